@@ -1,0 +1,98 @@
+//! Compiles `glsl/passes/*` to SPIR-V and turns `glsl/shared/layout.glsl` into Rust, both into `$OUT_DIR`.
+
+use std::{env, fmt::Write, fs, path::Path};
+
+fn main() {
+    let out_dir = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
+    let out_dir = Path::new(&out_dir);
+    println!("cargo::rerun-if-changed=glsl");
+
+    let layout = fs::read_to_string("glsl/shared/layout.glsl").expect("glsl/shared/layout.glsl");
+    fs::write(out_dir.join("layout.rs"), rust_layout(&layout)).expect("write layout.rs");
+
+    let compiler = shaderc::Compiler::new().expect("shaderc");
+    let mut passes: Vec<_> =
+        fs::read_dir("glsl/passes").expect("glsl/passes").map(|e| e.expect("entry").path()).collect();
+    passes.sort();
+    for path in passes {
+        let name = path.file_name().and_then(|n| n.to_str()).expect("a shader's name is UTF-8").to_owned();
+        match compile(&compiler, &path, &name) {
+            Ok(spirv) => fs::write(out_dir.join(format!("{name}.spv")), spirv).expect("write SPIR-V"),
+            // One line an error, as the compiler prints it, so that an editor can jump to it.
+            Err(error) => {
+                error.lines().for_each(|line| println!("cargo::error={line}"));
+                std::process::exit(1);
+            }
+        }
+    }
+}
+
+/// One shader, optimized, for Vulkan 1.3; `#include "x.glsl"` reads from glsl/shared.
+fn compile(compiler: &shaderc::Compiler, path: &Path, name: &str) -> Result<Vec<u8>, String> {
+    let kind = match path.extension().and_then(|e| e.to_str()) {
+        Some("comp") => shaderc::ShaderKind::Compute,
+        Some("vert") => shaderc::ShaderKind::Vertex,
+        Some("frag") => shaderc::ShaderKind::Fragment,
+        _ => return Err(format!("{name}: a shader ends in .comp, .vert or .frag")),
+    };
+    let mut options = shaderc::CompileOptions::new().map_err(|e| e.to_string())?;
+    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
+    options.set_optimization_level(shaderc::OptimizationLevel::Performance);
+    options.set_warnings_as_errors();
+    options.set_include_callback(|include, _, _, _| {
+        let path = Path::new("glsl/shared").join(include);
+        let content = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(shaderc::ResolvedInclude { resolved_name: path.display().to_string(), content })
+    });
+    let source = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let artifact = compiler
+        .compile_into_spirv(&source, kind, &format!("glsl/passes/{name}"), "main", Some(&options))
+        .map_err(|e| e.to_string())?;
+    Ok(artifact.as_binary_u8().to_vec())
+}
+
+/// Rust constants and structs for layout.glsl. Panics on a member that std430 would pad.
+fn rust_layout(glsl: &str) -> String {
+    let mut rust = String::new();
+    let mut doc = String::new();
+    let mut layout: Option<(String, usize, usize)> = None; // struct name, bytes so far, widest alignment
+    for line in glsl.lines().map(str::trim) {
+        if let Some(comment) = line.strip_prefix("//") {
+            writeln!(doc, "///{comment}").unwrap();
+            continue;
+        }
+        if let Some((name, offset, widest)) = layout.as_mut() {
+            if line == "};" {
+                assert_eq!(*offset % *widest, 0, "layout.glsl: std430 pads the end of {name} ({offset} bytes)");
+                writeln!(rust, "}}\nconst _: () = assert!(size_of::<{name}>() == {offset});").unwrap();
+                layout = None;
+            } else if let Some((ty, member)) = line.trim_end_matches(';').split_once(' ') {
+                let (rust_ty, bytes, align) = rust_type(ty);
+                assert_eq!(*offset % align, 0, "layout.glsl: std430 pads {name}.{member} (offset {offset})");
+                writeln!(rust, "    pub {member}: {rust_ty},").unwrap();
+                *offset += bytes;
+                *widest = align.max(*widest);
+            }
+        } else if let Some(rest) = line.strip_prefix("struct ") {
+            let name = rest.trim_end_matches(" {");
+            writeln!(rust, "{doc}#[repr(C)]\n#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]\npub struct {name} {{").unwrap();
+            layout = Some((name.to_owned(), 0, 4));
+        } else if let Some((name, value)) = line.strip_prefix("#define ").and_then(|rest| rest.split_once(' ')) {
+            let value = value.trim().trim_end_matches('u');
+            writeln!(rust, "{doc}pub const {name}: u32 = {value};").unwrap();
+        }
+        doc.clear();
+    }
+    rust
+}
+
+/// Rust type, size and std430 alignment in bytes of a GLSL type.
+fn rust_type(glsl: &str) -> (&'static str, usize, usize) {
+    match glsl {
+        "uint" => ("u32", 4, 4),
+        "float" => ("f32", 4, 4),
+        "vec3" => ("glam::Vec3", 12, 16),
+        "mat4" => ("glam::Mat4", 64, 16),
+        _ => panic!("layout.glsl: no Rust type for `{glsl}`"),
+    }
+}

@@ -1,0 +1,175 @@
+// What the host and the kernels share: constants, structs and bindings, once.
+//
+// build.rs turns this file into src/layout.rs's contents: `#define NAME 1u` becomes a `pub const NAME: u32`, a struct
+// a `#[repr(C)]` one with a size assert. Members are laid out by std430 without padding: a vec3 is always followed
+// by a 4-byte scalar, which fills its fourth word; whatever std430 would pad is refused by the build.
+#ifndef KDRAY_LAYOUT
+#define KDRAY_LAYOUT
+
+// Invocations of a workgroup: ray kernels (one ray each), pixel kernels (8 x 8 pixels), scans.
+#define RAY_GROUP_SIZE 64u
+#define TILE_SIZE 8u
+// Vulkan guarantees 128 invocations on every device.
+#define SCAN_GROUP_SIZE 128u
+// Counts that one invocation of a scan adds up; a scan block is SCAN_GROUP_SIZE * SCAN_ITEMS counts.
+#define SCAN_ITEMS 8u
+#define SCAN_BLOCK_SIZE 1024u
+
+// A ray that hits nothing, a pixel that no triangle covers.
+#define NO_TRIANGLE 0xffffffffu
+// In place of an encoded shading normal: use the triangle's own plane. No snorm pair encodes to it.
+#define FLAT_NORMAL 0x80008000u
+
+// KdNode.axis_and_child, bits 0..1: 0, 1, 2 = split axis, 3 = leaf.
+#define KD_LEAF 3u
+#define KD_AXIS_MASK 3u
+// Bits 2..31: first child of a split (the other is the next node), or number of triangles of a leaf.
+#define KD_CHILD_SHIFT 2u
+// Levels below the root that the traversal's bit mask can hold: two words.
+#define KD_MAX_DEPTH 64u
+
+// Material.flags
+#define MATERIAL_SPECULAR 1u
+#define MATERIAL_REFLECT 2u
+#define MATERIAL_REFRACT 4u
+#define MATERIAL_FRESNEL 8u
+
+// Light.kind
+#define LIGHT_POINT 0u
+#define LIGHT_DIRECTIONAL 1u
+
+// 48 bytes: world-space corners, counter-clockwise seen from outside; n*: octahedral 2 x snorm16 shading normals.
+struct Triangle {
+    vec3 v0;
+    uint n0;
+    vec3 v1;
+    uint n1;
+    vec3 v2;
+    uint n2;
+};
+
+// 8 bytes. Split: split_or_first = bits of the plane's position on the axis (world units).
+// Leaf: split_or_first = index of its first entry in leaf_triangles. Children of a split are neighbours at an even
+// index, so a node's sibling is `index ^ 1`; the root is node 0 and node 1 is unused.
+struct KdNode {
+    uint split_or_first;
+    uint axis_and_child;
+};
+
+// 80 bytes, named as in Wavefront MTL.
+struct Material {
+    vec3 ka;
+    float ns;
+    vec3 kd;
+    float d;
+    vec3 ks;
+    float ni;
+    vec3 ke;
+    uint flags;
+    vec3 tf;
+    uint illum;
+};
+
+// 32 bytes. Point: position, intensity in power per steradian (falls with the square of distance).
+// Directional: unit vector towards the light, irradiance on a surface that faces it.
+struct Light {
+    vec3 position;
+    uint kind;
+    vec3 intensity;
+    uint reserved;
+};
+
+// 48 bytes. direction: unit length; t in (0, t_max); source_triangle: where the ray starts, never hit again.
+struct Ray {
+    vec3 origin;
+    uint pixel_ix;
+    vec3 direction;
+    uint source_triangle;
+    vec3 throughput;
+    float t_max;
+};
+
+// 16 bytes. u, v: barycentric weights of v1 and v2. A miss: t = infinity, triangle_ix = NO_TRIANGLE.
+struct Hit {
+    float t;
+    uint triangle_ix;
+    float u;
+    float v;
+};
+
+// The frame's constants (a uniform buffer, std140-compatible). Camera ray of pixel (x, y):
+// forward + (2 (x + 0.5) / width - 1) * right + (1 - 2 (y + 0.5) / height) * up.
+struct Frame {
+    mat4 clip_from_world;
+    vec3 eye;
+    uint width;
+    vec3 right;
+    uint height;
+    vec3 up;
+    uint n_triangles;
+    vec3 forward;
+    uint n_lights;
+    vec3 ambient;
+    float exposure;
+    vec3 background;
+    float denoise_threshold;
+    vec3 cell_min;
+    uint max_depth;
+    vec3 cell_max;
+    uint queue_capacity;
+};
+
+// One a batch and bounce, 64 bytes; what follows n_rays sizes this bounce's indirect dispatches (VkDispatchIndirectCommand
+// + 1 word each). overflow: 1 where the bounce made more rays than a queue holds, and the batch must be split.
+struct Bounce {
+    uint n_rays;
+    uint n_shadow_rays;
+    uint overflow;
+    uint n_wanted;
+    uint ray_groups_x;
+    uint ray_groups_y;
+    uint ray_groups_z;
+    uint n_hits;
+    uint shadow_groups_x;
+    uint shadow_groups_y;
+    uint shadow_groups_z;
+    uint reserved0;
+    uint scan_groups_x;
+    uint scan_groups_y;
+    uint scan_groups_z;
+    uint reserved1;
+};
+
+// Push constants: the batch's pixels [first_pixel, first_pixel + n_pixels) in tile order, and its row of `bounces`.
+struct Batch {
+    uint first_pixel;
+    uint n_pixels;
+    uint bounce_ix;
+    uint depth;
+};
+
+// Bindings of the one descriptor set.
+#define BIND_FRAME 0u
+#define BIND_TRIANGLES 1u
+#define BIND_TRIANGLE_MATERIALS 2u
+#define BIND_MATERIALS 3u
+#define BIND_LIGHTS 4u
+#define BIND_KD_NODES 5u
+#define BIND_KD_PARENTS 6u
+#define BIND_LEAF_TRIANGLES 7u
+#define BIND_RAYS 8u
+#define BIND_NEXT_RAYS 9u
+#define BIND_CHILD_RAYS 10u
+#define BIND_CHILD_COUNTS 11u
+#define BIND_SCAN_BLOCKS 12u
+#define BIND_BOUNCES 13u
+#define BIND_HITS 14u
+#define BIND_LIGHT_VISIBILITY 15u
+#define BIND_RAY_RADIANCE 16u
+#define BIND_PIXEL_RADIANCE 17u
+#define BIND_PIXEL_FILTERED 18u
+#define BIND_PIXEL_DISPLAY 19u
+#define BIND_TRIANGLE_IDS 20u
+#define N_BINDINGS 21u
+
+#endif

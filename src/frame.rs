@@ -1,0 +1,155 @@
+//! What a frame is asked for, and what comes of it: the options, the picture and the profile, alike on GPU and CPU.
+
+use std::{fmt, str::FromStr};
+
+use serde::Serialize;
+
+/// How a frame is rendered. The scene's own defaults fill what the user leaves open.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderOptions {
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// Levels of rays, the primary one counted: 1 is ray casting with shadows (Algorithm 1's `maximumDepth`).
+    pub max_depth: u32,
+    /// Factor on radiance before it is encoded for display.
+    pub exposure: f32,
+    pub denoise: Denoise,
+    pub traversal: Traversal,
+    pub primary: Primary,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            width: 1024,
+            height: 768,
+            max_depth: 5,
+            exposure: 1.0,
+            denoise: Denoise::Paper { threshold: Denoise::DEFAULT_THRESHOLD },
+            traversal: Traversal::Mask,
+            primary: Primary::Raster,
+        }
+    }
+}
+
+/// The post process of the paper's section 2.4.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Denoise {
+    Off,
+    /// Smooths a pixel whose luminance differences to its four neighbours add up to more than the threshold.
+    Paper {
+        /// In units of display white, 0 to 4.
+        threshold: f32,
+    },
+}
+
+impl Denoise {
+    /// A straight edge between black and white adds up to 1, a corner or a thin line to 2, a lone pixel to 4.
+    pub const DEFAULT_THRESHOLD: f32 = 2.5;
+}
+
+/// How a ray finds its way back up the kd-tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Traversal {
+    /// A bit a level says which siblings are still to be visited; parent links lead back to them.
+    Mask,
+    /// An array of far children.
+    Stack,
+}
+
+/// How primary rays find their triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Primary {
+    /// By rasterized triangle IDs and a ray-plane test.
+    Raster,
+    /// Through the kd-tree.
+    Trace,
+}
+
+/// A rendered frame. Rows from the top, left to right.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    pub width: u32,
+    pub height: u32,
+    /// `width * height` linear RGB radiances before exposure (fourth: 1).
+    pub radiance: Vec<[f32; 4]>,
+    /// `width * height` sRGB-encoded RGBA pixels.
+    pub display: Vec<[u8; 4]>,
+}
+
+/// Where a frame's time went.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Profile {
+    /// The device's own name.
+    pub device: String,
+    /// In the order of execution.
+    pub passes: Vec<PassTime>,
+    /// One row a bounce, 0 = primary rays; batches added up.
+    pub bounces: Vec<BounceStats>,
+    /// Ray batches that the frame was split into.
+    pub n_batches: u32,
+    /// From the first pass's start to the last one's end; none where the device has no timestamps.
+    pub frame_ms: Option<f64>,
+}
+
+/// One pass of one bounce; its batches added up.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PassTime {
+    /// Also the debug label and the kernel's file name.
+    pub name: &'static str,
+    /// None for passes that run once a frame.
+    pub bounce: Option<u32>,
+    /// None where the device has no timestamps.
+    pub ms: Option<f64>,
+}
+
+/// Rays of one bounce.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct BounceStats {
+    /// Rays whose closest hit was found.
+    pub n_rays: u64,
+    /// Those that hit something.
+    pub n_hits: u64,
+    /// Shadow segments that were tested.
+    pub n_shadow_rays: u64,
+}
+
+impl Profile {
+    /// Milliseconds of all passes of one name, or none where any lacks a timestamp.
+    pub fn pass_ms(&self, name: &str) -> Option<f64> {
+        self.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.ms).sum()
+    }
+}
+
+/// A word that names no variant of an option.
+#[derive(Debug, thiserror::Error)]
+#[error("`{word}` is not one of {expected}")]
+pub struct UnknownWord {
+    word: String,
+    expected: &'static str,
+}
+
+/// Words for an option's variants, for the command line, scene files and JSON alike.
+macro_rules! words {
+    ($ty:ident { $($variant:ident = $word:literal),+ }, $all:literal) => {
+        impl FromStr for $ty {
+            type Err = UnknownWord;
+            fn from_str(word: &str) -> Result<Self, UnknownWord> {
+                match word {
+                    $($word => Ok(Self::$variant),)+
+                    _ => Err(UnknownWord { word: word.to_owned(), expected: $all }),
+                }
+            }
+        }
+        impl fmt::Display for $ty {
+            fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str(match self { $(Self::$variant => $word),+ })
+            }
+        }
+    };
+}
+
+words!(Traversal { Mask = "mask", Stack = "stack" }, "mask, stack");
+words!(Primary { Raster = "raster", Trace = "trace" }, "raster, trace");

@@ -1,0 +1,3 @@
+//! The `kdray` command.
+
+fn main() {}
