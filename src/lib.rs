@@ -5,3 +5,4 @@
 pub mod frame;
 pub mod gpu;
 pub mod layout;
+pub mod scene;
