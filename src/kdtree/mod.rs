@@ -6,12 +6,20 @@
 //!                  └── clip: a straddling triangle's bounds on either side ──┘
 //! ```
 
+mod binned;
+mod bounds;
+mod build;
+mod clip;
+mod counted;
+mod flatten;
+mod sah;
 mod statistics;
+mod subtree;
 mod validate;
 
 use glam::Vec3;
 
-use crate::layout::{KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_MAX_DEPTH, KdNode, Triangle};
+use crate::layout::{KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_MAX_DEPTH, KdNode};
 
 pub use statistics::Statistics;
 pub use validate::Invalid;
@@ -64,6 +72,11 @@ impl Default for BuildOptions {
 }
 
 impl BuildOptions {
+    /// Expected cost of a split cell whose children become leaves.
+    fn cost(&self, split: &sah::Split) -> f32 {
+        self.traversal_cost + self.intersection_cost * split.weight
+    }
+
     /// Levels below the root that the tree may have.
     pub fn depth_limit(&self) -> u32 {
         self.max_depth.unwrap_or(u32::MAX).min(KD_MAX_DEPTH - 2)
@@ -78,6 +91,9 @@ pub enum Node {
     /// `leaf_triangles[first .. first + count]`.
     Leaf { first: u32, count: u32 },
 }
+
+/// A leaf without triangles.
+const EMPTY_LEAF: KdNode = KdNode { split_or_first: 0, axis_and_child: KD_LEAF };
 
 impl From<KdNode> for Node {
     fn from(node: KdNode) -> Self {
@@ -103,20 +119,6 @@ impl From<Node> for KdNode {
 }
 
 impl KdTree {
-    /// Builds the tree of `triangles`.
-    pub fn build(triangles: &[Triangle], _options: &BuildOptions) -> KdTree {
-        let corners = || triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]);
-        let n = triangles.len() as u32;
-        KdTree {
-            nodes: vec![Node::Leaf { first: 0, count: n }.into(), Node::Leaf { first: 0, count: 0 }.into()],
-            parents: vec![0],
-            leaf_triangles: (0..n).collect(),
-            cell_min: corners().reduce(Vec3::min).unwrap_or_default(),
-            cell_max: corners().reduce(Vec3::max).unwrap_or_default(),
-            depth: 0,
-        }
-    }
-
     /// The node at an index.
     pub fn node(&self, node_ix: u32) -> Node {
         self.nodes[node_ix as usize].into()
