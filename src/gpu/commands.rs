@@ -76,7 +76,7 @@ impl Drop for CommandBuffer {
 
 impl Commands<'_> {
     /// One pass: its name is the debug label and the timer's row.
-    pub fn pass(&self, name: &'static str, bounce: Option<u32>, body: impl FnOnce()) {
+    fn pass(&self, name: &'static str, bounce: Option<u32>, body: impl FnOnce()) {
         let row = self.timer.map(|timer| (timer, timer.begin(self.raw, name, bounce)));
         self.labelled(name, body);
         if let Some((timer, row)) = row {
@@ -118,8 +118,12 @@ impl Commands<'_> {
         }
     }
 
-    /// Runs a kernel with the bound set.
-    pub fn dispatch(&self, pipeline: &ComputePipeline, push: &impl Pod, dispatch: Dispatch) {
+    /// Runs a kernel with the bound set, as a pass of its name and of a bounce, if it belongs to one.
+    pub fn dispatch(&self, pipeline: &ComputePipeline, bounce: Option<u32>, push: &impl Pod, dispatch: Dispatch) {
+        self.pass(pipeline.name, bounce, || self.launch(pipeline, push, dispatch));
+    }
+
+    fn launch(&self, pipeline: &ComputePipeline, push: &impl Pod, dispatch: Dispatch) {
         let device = &self.context.device;
         let stages = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX;
         // SAFETY: the set is bound; push constants fit the layout's range.
@@ -138,6 +142,10 @@ impl Commands<'_> {
 
     /// Rasterizes `n_vertices / 3` triangles into the cleared targets: IDs to u32::MAX, depth to 0 (far).
     pub fn draw(&self, pipeline: &RasterPipeline, ids: &Target, depth: &Target, n_vertices: u32) {
+        self.pass(pipeline.name, None, || self.rasterize(pipeline, ids, depth, n_vertices));
+    }
+
+    fn rasterize(&self, pipeline: &RasterPipeline, ids: &Target, depth: &Target, n_vertices: u32) {
         let device = &self.context.device;
         let area = vk::Rect2D { extent: vk::Extent2D { width: ids.width, height: ids.height }, ..Default::default() };
         let attachment = |target: &Target, layout, clear, store| {

@@ -79,7 +79,7 @@ pub struct RasterDesc<'a> {
 /// A raster pass over a triangle list without vertex buffers, two-sided.
 pub struct RasterPipeline {
     pub(super) raw: vk::Pipeline,
-    pub(super) bindings: Arc<Bindings>,
+    _bindings: Arc<Bindings>,
     pub(super) name: &'static str,
     context: Arc<Context>,
 }
@@ -132,7 +132,7 @@ impl RasterPipeline {
         let raw = unsafe { context.device.create_graphics_pipelines(vk::PipelineCache::null(), &info, None) }
             .map_err(|(_, result)| GpuError::call("vkCreateGraphicsPipelines", desc.name)(result))?[0];
         context.set_name(raw, desc.name);
-        Ok(Self { raw, bindings: bindings.clone(), name: desc.name, context: context.clone() })
+        Ok(Self { raw, _bindings: bindings.clone(), name: desc.name, context: context.clone() })
     }
 }
 
