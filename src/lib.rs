@@ -23,3 +23,7 @@ pub mod scene;
 pub mod kdtree;
 
 pub mod gpu;
+pub mod passes;
+
+pub mod camera;
+pub mod render;
