@@ -3,4 +3,5 @@
 #![deny(unsafe_code)]
 
 pub mod frame;
+pub mod kdtree;
 pub mod layout;
