@@ -2,6 +2,9 @@
 
 #![deny(unsafe_code)]
 
+pub mod camera;
+pub mod cpu;
 pub mod frame;
 pub mod kdtree;
 pub mod layout;
+pub mod scene;
