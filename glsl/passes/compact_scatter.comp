@@ -18,7 +18,7 @@ layout(std430, set = 0, binding = BIND_NEXT_RAYS) writeonly buffer NextRaysBlock
 void main() {
     uint n_rays = bounces[batch.bounce_ix].n_rays;
     uint place = scan_blocks[gl_WorkGroupID.x];
-    bool has_room = bounces[batch.bounce_ix].overflow == 0u;
+    bool has_room = bounces[batch.bounce_ix + 1u].overflow == 0u;
     for (uint i = 0u; i < SCAN_ITEMS; ++i) {
         uint ray_ix = gl_WorkGroupID.x * SCAN_BLOCK_SIZE + i * SCAN_GROUP_SIZE + scan_rank();
         uint n_children = has_room && ray_ix < n_rays ? child_counts[ray_ix] : 0u;

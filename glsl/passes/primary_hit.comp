@@ -3,7 +3,7 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Primary hit (the paper's section 2.2): one invocation a pixel of the batch makes the camera ray and intersects it
 // with the plane of the triangle that the rasterizer found there.
-// Reads triangle_ids, triangles; writes rays, hits, bounces[].n_hits.
+// Reads triangle_ids, triangles; writes rays, hits, counters[].n_hits.
 #include "layout.glsl"
 #include "camera.glsl"
 #include "triangle.glsl"
@@ -15,7 +15,7 @@ layout(set = 0, binding = BIND_TRIANGLE_IDS, r32ui) readonly uniform uimage2D tr
 layout(std430, set = 0, binding = BIND_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
 layout(std430, set = 0, binding = BIND_RAYS) writeonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_HITS) writeonly buffer HitsBlock { Hit hits[]; };
-layout(std430, set = 0, binding = BIND_BOUNCES) buffer BouncesBlock { Bounce bounces[]; };
+layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
 
 // 0: only make the rays, the trace pass finds their hits.
 layout(constant_id = 0) const uint FROM_RASTER = 1u;
@@ -38,5 +38,5 @@ void main() {
         }
     }
     uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
-    if (subgroupElect() && n_hits > 0u) atomicAdd(bounces[batch.bounce_ix].n_hits, n_hits);
+    if (subgroupElect() && n_hits > 0u) atomicAdd(counters[batch.bounce_ix].n_hits, n_hits);
 }

@@ -4,7 +4,7 @@
 // Shadow (the paper's section 2.1): one invocation a ray (x) and light (y) tests the segment from the ray's hit to
 // the light against the tree; any hit before its end puts the light out.
 // Reads rays, hits, lights and the tree; writes light_visibility[light * queue_capacity + ray] (1: lit),
-// bounces[].n_shadow_rays.
+// counters[].n_shadow_rays.
 #include "layout.glsl"
 #include "kdtree.glsl"
 #include "surface.glsl"
@@ -16,7 +16,8 @@ layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Lig
 layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) writeonly buffer LightVisibilityBlock { uint light_visibility[]; };
-layout(std430, set = 0, binding = BIND_BOUNCES) buffer BouncesBlock { Bounce bounces[]; };
+layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
+layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
 
 // The segment to the light, or false where the surface turns its back on it.
 bool shadow_segment(Ray ray, Hit hit, Light light, out Ray segment) {
@@ -40,5 +41,5 @@ void main() {
         light_visibility[light_ix * frame.queue_capacity + ray_ix] = is_lit ? 1u : 0u;
     }
     uint n_tested = subgroupAdd(is_tested ? 1u : 0u);
-    if (subgroupElect() && n_tested > 0u) atomicAdd(bounces[batch.bounce_ix].n_shadow_rays, n_tested);
+    if (subgroupElect() && n_tested > 0u) atomicAdd(counters[batch.bounce_ix].n_shadow_rays, n_tested);
 }
