@@ -15,13 +15,14 @@
 
 #![deny(unsafe_code)]
 
-pub mod camera;
-pub mod cpu;
 pub mod frame;
 pub mod layout;
 
 pub mod scene;
 
 pub mod kdtree;
+
+pub mod camera;
+pub mod cpu;
 
 pub mod gpu;

@@ -9,7 +9,8 @@ pub fn closest_hit(triangles: &[Triangle], ray: &Ray) -> Hit {
     let mut best = Hit { t: ray.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
     for (triangle_ix, triangle) in (0..).zip(triangles) {
         let hit = shear.intersect_triangle(triangle, triangle_ix);
-        let is_nearer = |hit: &Hit| hit.t > 0.0 && (hit.t < best.t || hit.t == best.t && best.triangle_ix == NO_TRIANGLE);
+        let is_nearer =
+            |hit: &Hit| hit.t > 0.0 && (hit.t < best.t || hit.t == best.t && best.triangle_ix == NO_TRIANGLE);
         if let Some(hit) = hit.filter(|hit| triangle_ix != ray.source_triangle && is_nearer(hit)) {
             best = hit;
         }

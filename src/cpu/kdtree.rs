@@ -1,8 +1,6 @@
 //! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree.glsl`.
 
-use super::{
-    bindings::Bindings, pending_mask::PendingMask, pending_stack::PendingStack, triangle::Shear,
-};
+use super::{bindings::Bindings, pending_mask::PendingMask, pending_stack::PendingStack, triangle::Shear};
 use crate::{
     frame::Traversal,
     layout::{Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KdNode, NO_TRIANGLE, Ray},

@@ -150,9 +150,9 @@ impl Renderer<'_> {
         let traversal = self.options.traversal;
         light_visibility.resize(rays.len() * bindings.lights.len(), 0);
         shaded.resize(rays.len());
-        let n_shadow_rays = self.clock.time("shadow", Some(depth), || {
-            shadow::shadow(&bindings, traversal, rays, hits, light_visibility)
-        });
+        let n_shadow_rays = self
+            .clock
+            .time("shadow", Some(depth), || shadow::shadow(&bindings, traversal, rays, hits, light_visibility));
         let lit = LitRays { rays, hits, light_visibility };
         self.clock.time("shade", Some(depth), || shade::shade(&bindings, depth, lit, shaded));
         let (radiance, pixels) = (&shaded.ray_radiance, &mut self.pixel_radiance);

@@ -5,7 +5,8 @@ use glam::{UVec2, Vec3};
 use rayon::prelude::*;
 
 use super::{
-    RAYS_PER_TASK, bindings::Bindings,
+    RAYS_PER_TASK,
+    bindings::Bindings,
     camera::{camera_direction, pixel_of},
     triangle::Shear,
 };

@@ -5,7 +5,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
-    RAYS_PER_TASK, bindings::Bindings,
+    RAYS_PER_TASK,
+    bindings::Bindings,
     light::sample_light,
     material::{local_weight, phong, scatter},
     surface::{Surface, surface_at},

@@ -38,8 +38,7 @@ fn shading_normal(t: &Triangle, hit: &Hit, geometric: Vec3) -> Vec3 {
     if [t.n0, t.n1, t.n2].contains(&FLAT_NORMAL) {
         return geometric;
     }
-    let n =
-        (1.0 - hit.u - hit.v) * decode_normal(t.n0) + hit.u * decode_normal(t.n1) + hit.v * decode_normal(t.n2);
+    let n = (1.0 - hit.u - hit.v) * decode_normal(t.n0) + hit.u * decode_normal(t.n1) + hit.v * decode_normal(t.n2);
     let squared = n.dot(n);
     if squared > 1e-12 { n * (1.0 / squared.sqrt()) } else { geometric }
 }

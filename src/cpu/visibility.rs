@@ -3,11 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::{
-    RAYS_PER_TASK, bindings::Bindings,
-    kdtree::Traverser,
-    primary_hit::camera_ray,
-};
+use super::{RAYS_PER_TASK, bindings::Bindings, kdtree::Traverser, primary_hit::camera_ray};
 use crate::frame::Traversal;
 
 /// Writes `triangle_ids` (`width * height`, rows from the top): the nearest triangle, or `NO_TRIANGLE`.
