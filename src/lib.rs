@@ -22,6 +22,9 @@ pub mod scene;
 
 pub mod kdtree;
 
+pub mod camera;
+pub mod cpu;
+
 pub mod gpu;
 pub mod passes;
 
