@@ -1,0 +1,148 @@
+//! A subtree by one thread: recursion with the references of the cells on the way in one growing and shrinking array.
+
+use std::ops::Range;
+
+use super::{
+    BuildOptions, EMPTY_LEAF, Node,
+    bounds::{Bounds, Reference},
+    clip::split_bounds,
+    sah::{Search, Split},
+};
+use crate::layout::{KdNode, Triangle};
+
+/// What a build reads.
+#[derive(Clone, Copy)]
+pub struct Input<'a> {
+    pub triangles: &'a [Triangle],
+    pub options: &'a BuildOptions,
+}
+
+/// A cell to be built, without its references.
+#[derive(Clone, Copy)]
+pub struct Cell {
+    pub bounds: Bounds,
+    /// Levels below the root.
+    pub level: u32,
+    /// References that the leaves in the cell may have.
+    pub budget: u64,
+}
+
+impl Cell {
+    /// The split to be made and its children's cells; none where a leaf is cheaper or a limit is reached.
+    pub fn split(
+        self,
+        references: &[Reference],
+        options: &BuildOptions,
+        search: &mut Search,
+    ) -> Option<(Split, [Cell; 2])> {
+        let leaf_cost = options.intersection_cost * references.len() as f32;
+        // A split costs a step at least.
+        if leaf_cost <= options.traversal_cost || self.level >= options.depth_limit() {
+            return None;
+        }
+        let split = search.best_split(references, &self.bounds, options);
+        let pays = options.traversal_cost + options.intersection_cost * split.weight < leaf_cost;
+        let n = split.n_references.map(u64::from);
+        let n_both = n[0] + n[1];
+        if !pays || n_both > self.budget {
+            return None;
+        }
+        let bounds = self.bounds.split(split.axis, split.position);
+        // In proportion to the references: what a cell may have does not depend on what is built before it.
+        let budget = n.map(|n| self.budget * n / n_both);
+        let child = |side: usize| Cell { bounds: bounds[side], level: self.level + 1, budget: budget[side] };
+        Some((split, [child(0), child(1)]))
+    }
+}
+
+/// The reference's parts below and above a split of its cell.
+#[inline]
+pub fn sort_out(input: Input, reference: &Reference, cell: &Bounds, split: &Split) -> [Option<Reference>; 2] {
+    let (min, max) = (reference.bounds.min[split.axis], reference.bounds.max[split.axis]);
+    let is_planar_below = split.planar_below && min == split.position && max == split.position;
+    if max < split.position || (max == split.position && min < max) || is_planar_below {
+        return [Some(*reference), None];
+    }
+    if min >= split.position {
+        return [None, Some(*reference)];
+    }
+    let triangle = &input.triangles[reference.triangle_ix as usize];
+    let parts = split_bounds(triangle, cell, split.axis, split.position);
+    // Bounds only ever shrink: each is rounded outwards by itself.
+    let limits = reference.bounds.split(split.axis, split.position);
+    [0, 1].map(|side| parts[side].map(|part| Reference { bounds: part.intersection(&limits[side]), ..*reference }))
+}
+
+/// A subtree on its own: node 0 is its root and node 1 unused, as in a whole tree.
+pub struct Subtree {
+    pub nodes: Vec<KdNode>,
+    pub leaf_triangles: Vec<u32>,
+    /// Levels of the deepest leaf below the whole tree's root.
+    pub depth: u32,
+}
+
+/// Builds the subtree of a cell.
+pub fn build(input: Input, references: Vec<Reference>, cell: Cell) -> Subtree {
+    let n = references.len();
+    let subtree = Subtree { nodes: vec![EMPTY_LEAF; 2], leaf_triangles: Vec::new(), depth: cell.level };
+    let mut builder = Builder { input, references, above: Vec::new(), search: Search::default(), subtree };
+    builder.node(0, 0..n, cell);
+    builder.subtree
+}
+
+struct Builder<'a> {
+    input: Input<'a>,
+    /// The references of the cells on the way, and of their siblings still to be built; the newest last.
+    references: Vec<Reference>,
+    /// Of the upper child, while both are sorted out.
+    above: Vec<Reference>,
+    search: Search,
+    subtree: Subtree,
+}
+
+impl Builder<'_> {
+    /// Builds the node of a cell into a slot, and all below it behind the last node.
+    fn node(&mut self, slot: usize, range: Range<usize>, cell: Cell) {
+        let references = &self.references[range.clone()];
+        let Some((split, cells)) = cell.split(references, self.input.options, &mut self.search) else {
+            return self.leaf(slot, range, cell.level);
+        };
+        let nodes = &mut self.subtree.nodes;
+        let child = nodes.len();
+        nodes[slot] = Node::Split { axis: split.axis, position: split.position, child: child as u32 }.into();
+        nodes.extend([EMPTY_LEAF; 2]);
+        let n_references = self.references.len();
+        let [below, above] = self.partition(range, &cell.bounds, &split);
+        self.node(child, below, cells[0]);
+        self.node(child + 1, above, cells[1]);
+        self.references.truncate(n_references);
+    }
+
+    fn leaf(&mut self, slot: usize, range: Range<usize>, level: u32) {
+        let leaf_triangles = &mut self.subtree.leaf_triangles;
+        let (first, count) = (leaf_triangles.len() as u32, range.len() as u32);
+        leaf_triangles.extend(self.references[range].iter().map(|reference| reference.triangle_ix));
+        self.subtree.nodes[slot] = Node::Leaf { first, count }.into();
+        self.subtree.depth = self.subtree.depth.max(level);
+    }
+
+    /// Appends the references of both children, the lower one's first. What lies on one side only stays where it is.
+    fn partition(&mut self, range: Range<usize>, cell: &Bounds, split: &Split) -> [Range<usize>; 2] {
+        let none = range.end..range.end;
+        match split.n_references {
+            [0, _] => return [none, range],
+            [_, 0] => return [range, none],
+            _ => (),
+        }
+        let first = self.references.len();
+        self.above.clear();
+        for ix in range {
+            let [below, above] = sort_out(self.input, &self.references[ix], cell, split);
+            self.references.extend(below);
+            self.above.extend(above);
+        }
+        let middle = self.references.len();
+        self.references.append(&mut self.above);
+        [first..middle, middle..self.references.len()]
+    }
+}
