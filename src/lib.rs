@@ -23,6 +23,9 @@ pub mod scene;
 pub mod kdtree;
 
 pub mod camera;
+
 pub mod cpu;
 
 pub mod gpu;
+pub mod passes;
+pub mod render;

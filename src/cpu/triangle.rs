@@ -77,19 +77,18 @@ impl Shear {
         Some(self.weighted_hit(edges, det, [a[2], b[2], c[2]], triangle_ix))
     }
 
-    /// Where the ray meets the triangle's plane, moved to the triangle's edge where that lies outside.
+    /// Where the ray meets the triangle's plane, moved into the triangle where that lies outside: no weight falls
+    /// below 2^-14.
     pub fn clamp_to_triangle(&self, triangle: &Triangle, triangle_ix: u32) -> Hit {
         let [a, b, c] = self.corners(triangle);
-        let z = [a[2], b[2], c[2]];
         let edges = edge_functions(a, b, c);
         let det = edges[0] + edges[1] + edges[2];
         let inside = edges.map(|e| (if det < 0.0 { -e } else { e }).max(0.0));
-        let sum = inside[0] + inside[1] + inside[2];
-        if sum > 0.0 {
-            self.weighted_hit(inside, sum, z, triangle_ix)
-        } else {
-            self.weighted_hit([1.0; 3], 3.0, z, triangle_ix)
-        }
+        let area = inside[0] + inside[1] + inside[2];
+        let least = area * (1.0 / 16_384.0);
+        let weights = if area > 0.0 { inside.map(|weight| weight.max(least)) } else { [1.0; 3] };
+        let sum = weights[0] + weights[1] + weights[2];
+        self.weighted_hit(weights, sum, [a[2], b[2], c[2]], triangle_ix)
     }
 }
 
