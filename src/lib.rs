@@ -1,7 +1,27 @@
 //! kdray: ray tracing by depth-first kd-tree traversal in Vulkan compute.
+//!
+//! The modules, in the order in which data flows through them:
+//!
+//! ```text
+//! scene    files -> triangles, materials, lights, camera
+//! kdtree   triangles -> flat SAH kd-tree
+//! camera   scene + size -> the frame's constants
+//! render   the frame: passes, barriers, batches -> picture
+//!   passes   one kernel and one file each, on
+//!   gpu      the Vulkan layer
+//! cpu      the same frame without Vulkan
+//! output   picture -> file
+//! ```
 
 #![deny(unsafe_code)]
 
 pub mod frame;
 pub mod layout;
+
+pub mod scene;
+
+pub mod kdtree;
+
+pub mod gpu;
+
 pub mod output;

@@ -119,25 +119,32 @@ struct Frame {
     uint queue_capacity;
 };
 
-// One a batch and bounce, 64 bytes; what follows n_rays sizes this bounce's indirect dispatches (VkDispatchIndirectCommand
-// + 1 word each). overflow: 1 where the bounce made more rays than a queue holds, and the batch must be split.
+// One a batch and bounce, 64 bytes, sized by the bounce before: each `groups` is a VkDispatchIndirectCommand.
+// n_wanted: rays that the bounce before made; overflow: 1 where they are more than a queue holds. Then n_rays is 0,
+// and the batch has to be split.
 struct Bounce {
     uint n_rays;
-    uint n_shadow_rays;
-    uint overflow;
     uint n_wanted;
+    uint overflow;
+    uint reserved0;
     uint ray_groups_x;
     uint ray_groups_y;
     uint ray_groups_z;
-    uint n_hits;
+    uint reserved1;
     uint shadow_groups_x;
     uint shadow_groups_y;
     uint shadow_groups_z;
-    uint reserved0;
+    uint reserved2;
     uint scan_groups_x;
     uint scan_groups_y;
     uint scan_groups_z;
-    uint reserved1;
+    uint reserved3;
+};
+
+// One a batch and bounce, 8 bytes: for the profile. Integer sums, the same in every order of arrival.
+struct Counters {
+    uint n_hits;
+    uint n_shadow_rays;
 };
 
 // Push constants: the batch's pixels [first_pixel, first_pixel + n_pixels) in tile order, and its row of `bounces`.
@@ -170,6 +177,7 @@ struct Batch {
 #define BIND_PIXEL_FILTERED 18u
 #define BIND_PIXEL_DISPLAY 19u
 #define BIND_TRIANGLE_IDS 20u
-#define N_BINDINGS 21u
+#define BIND_COUNTERS 21u
+#define N_BINDINGS 22u
 
 #endif

@@ -1,0 +1,42 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+// Primary hit (the paper's section 2.2): one invocation a pixel of the batch makes the camera ray and intersects it
+// with the plane of the triangle that the rasterizer found there.
+// Reads triangle_ids, triangles; writes rays, hits, counters[].n_hits.
+#include "layout.glsl"
+#include "camera.glsl"
+#include "triangle.glsl"
+
+layout(local_size_x = RAY_GROUP_SIZE) in;
+layout(push_constant) uniform BatchBlock { Batch batch; };
+layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
+layout(set = 0, binding = BIND_TRIANGLE_IDS, r32ui) readonly uniform uimage2D triangle_ids;
+layout(std430, set = 0, binding = BIND_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
+layout(std430, set = 0, binding = BIND_RAYS) writeonly buffer RaysBlock { Ray rays[]; };
+layout(std430, set = 0, binding = BIND_HITS) writeonly buffer HitsBlock { Hit hits[]; };
+layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
+
+// 0: only make the rays, the trace pass finds their hits.
+layout(constant_id = 0) const uint FROM_RASTER = 1u;
+
+void main() {
+    uint ray_ix = gl_GlobalInvocationID.x;
+    bool is_hit = false;
+    if (ray_ix < batch.n_pixels) {
+        uvec2 pixel = pixel_of(batch.first_pixel + ray_ix, frame.width, frame.height);
+        float infinity = uintBitsToFloat(0x7f800000u);
+        Ray ray = Ray(frame.eye, pixel.y * frame.width + pixel.x, camera_direction(frame, pixel), NO_TRIANGLE,
+                      vec3(1.0), infinity);
+        rays[ray_ix] = ray;
+        if (FROM_RASTER == 1u) {
+            uint triangle_ix = imageLoad(triangle_ids, ivec2(pixel)).x;
+            Hit hit = Hit(infinity, NO_TRIANGLE, 0.0, 0.0);
+            is_hit = triangle_ix != NO_TRIANGLE;
+            if (is_hit) hit = clamp_to_triangle(shear_of(ray.origin, ray.direction), triangles[triangle_ix], triangle_ix);
+            hits[ray_ix] = hit;
+        }
+    }
+    uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
+    if (subgroupElect() && n_hits > 0u) atomicAdd(counters[batch.bounce_ix].n_hits, n_hits);
+}

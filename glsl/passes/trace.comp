@@ -1,0 +1,26 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+// Trace (the paper's section 2.3): one invocation a ray finds its closest hit through the kd-tree.
+// Reads rays and the tree; writes hits, counters[].n_hits.
+#include "layout.glsl"
+#include "kdtree.glsl"
+
+layout(local_size_x = RAY_GROUP_SIZE) in;
+layout(push_constant) uniform BatchBlock { Batch batch; };
+layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
+layout(std430, set = 0, binding = BIND_HITS) writeonly buffer HitsBlock { Hit hits[]; };
+layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
+layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
+
+void main() {
+    uint ray_ix = gl_GlobalInvocationID.x;
+    bool is_hit = false;
+    if (ray_ix < bounces[batch.bounce_ix].n_rays) {
+        Hit hit = traverse(rays[ray_ix], false);
+        hits[ray_ix] = hit;
+        is_hit = hit.triangle_ix != NO_TRIANGLE;
+    }
+    uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
+    if (subgroupElect() && n_hits > 0u) atomicAdd(counters[batch.bounce_ix].n_hits, n_hits);
+}

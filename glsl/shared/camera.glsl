@@ -1,0 +1,25 @@
+// Pixels in the order of the ray queue, and the camera's rays.
+#ifndef KDRAY_CAMERA
+#define KDRAY_CAMERA
+
+#include "layout.glsl"
+
+// The pixel at place `order` when the image is walked tile by tile (TILE_SIZE squared pixels, cut at the right and
+// lower border), each tile row by row: neighbours in the queue are neighbours in the image. Without gaps.
+uvec2 pixel_of(uint order, uint width, uint height) {
+    uint band = order / (TILE_SIZE * width);
+    uint in_band = order - band * TILE_SIZE * width;
+    uint rows = min(TILE_SIZE, height - band * TILE_SIZE);
+    uint tile = in_band / (TILE_SIZE * rows);
+    uint in_tile = in_band - tile * TILE_SIZE * rows;
+    uint columns = min(TILE_SIZE, width - tile * TILE_SIZE);
+    return uvec2(tile * TILE_SIZE + in_tile % columns, band * TILE_SIZE + in_tile / columns);
+}
+
+// Unit direction through the pixel's centre, the sample that the rasterizer tests.
+vec3 camera_direction(Frame frame, uvec2 pixel) {
+    vec2 centre = (vec2(pixel) + 0.5) / vec2(frame.width, frame.height) * 2.0 - 1.0;
+    return normalize(frame.forward + centre.x * frame.right - centre.y * frame.up);
+}
+
+#endif

@@ -1,0 +1,148 @@
+// Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2), closest hit or any hit.
+//
+// A cell is a node and the interval [t_enter, t_exit] that the ray spends in it. Children come in the ray's order:
+// `first` is the one on the side that the ray comes from. A subtree that is left for later is pending; how pending
+// subtrees are kept is the variant (pending_mask.glsl, pending_stack.glsl).
+#ifndef KDRAY_KDTREE
+#define KDRAY_KDTREE
+
+#include "layout.glsl"
+#include "triangle.glsl"
+
+layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
+layout(std430, set = 0, binding = BIND_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
+layout(std430, set = 0, binding = BIND_KD_NODES) readonly buffer KdNodesBlock { KdNode kd_nodes[]; };
+layout(std430, set = 0, binding = BIND_KD_PARENTS) readonly buffer KdParentsBlock { uint kd_parents[]; };
+layout(std430, set = 0, binding = BIND_LEAF_TRIANGLES) readonly buffer LeafTrianglesBlock { uint leaf_triangles[]; };
+
+#define TRAVERSAL_MASK 0u
+#define TRAVERSAL_STACK 1u
+layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
+
+struct Cell {
+    uint node_ix;
+    uint depth;
+    float t_enter;
+    float t_exit;
+};
+
+// What the traversal needs of a ray. slack: by how much in t a plane is widened on each axis (see traversal_ray).
+struct TraversalRay {
+    Shear shear;
+    vec3 origin;
+    vec3 inv_direction;
+    vec3 slack;
+    float t_enter;
+    float t_exit;
+    bool exhaustive;
+    uint source_triangle;
+};
+
+// The hit test's rounding moves a corner across the ray by at most 3 * 2^-24 of its distance. Planes are widened by
+// 2^-21 of the farthest distance in the scene, so that a ray along a plane, or through a corner of cells, meets every
+// triangle that touches it there: what brute force finds, the traversal visits.
+TraversalRay traversal_ray(Ray ray) {
+    TraversalRay r;
+    r.shear = shear_of(ray.origin, ray.direction);
+    r.origin = ray.origin;
+    r.source_triangle = ray.source_triangle;
+    // A direction in the plane is taken as all but in it: finite everywhere, and one rule for all ties.
+    vec3 tiny = vec3(1e-12);
+    vec3 direction = mix(ray.direction, tiny, lessThan(abs(ray.direction), tiny));
+    r.inv_direction = 1.0 / direction;
+    vec3 reach = max(abs(frame.cell_min - ray.origin), abs(frame.cell_max - ray.origin));
+    float slack = max(reach.x, max(reach.y, reach.z)) * exp2(-21.0);
+    r.slack = slack * abs(r.inv_direction);
+    // Almost along a plane the widened intervals overlap far: a hit then does not end the search of pending cells.
+    r.exhaustive = any(lessThan(abs(direction), vec3(exp2(-8.0))));
+
+    vec3 t0 = (frame.cell_min - ray.origin) * r.inv_direction;
+    vec3 t1 = (frame.cell_max - ray.origin) * r.inv_direction;
+    vec3 near = min(t0, t1) - r.slack;
+    vec3 far = max(t0, t1) + r.slack;
+    r.t_enter = max(max(near.x, near.y), max(near.z, 0.0));
+    r.t_exit = min(min(far.x, far.y), min(far.z, ray.t_max));
+    return r;
+}
+
+uint axis_of(KdNode node) {
+    return node.axis_and_child & KD_AXIS_MASK;
+}
+
+float along(vec3 v, uint axis) {
+    return axis == 0u ? v.x : (axis == 1u ? v.y : v.z);
+}
+
+// Where the ray enters the second child's side and leaves the first one's, both widened by the slack: [x, y], x <= y.
+vec2 crossing(TraversalRay ray, KdNode node) {
+    uint axis = axis_of(node);
+    float t = (uintBitsToFloat(node.split_or_first) - along(ray.origin, axis)) * along(ray.inv_direction, axis);
+    float slack = along(ray.slack, axis);
+    return vec2(t - slack, t + slack);
+}
+
+#include "pending_mask.glsl"
+#include "pending_stack.glsl"
+
+void clear_pending() {
+    pending_mask = uvec2(0u);
+    stack_size = 0u;
+}
+
+void push_pending(uint second_ix, Cell cell, vec2 t_cross) {
+    if (TRAVERSAL == TRAVERSAL_STACK) stack_push(second_ix, cell, t_cross);
+    else mask_push(second_ix, cell, t_cross);
+}
+
+// The next pending cell that may hold a hit nearer than t_best, or false.
+bool pop_pending(TraversalRay ray, float t_best, inout Cell cell) {
+    return TRAVERSAL == TRAVERSAL_STACK ? stack_pop(t_best, cell) : mask_pop(ray, t_best, cell);
+}
+
+// Down to the leaf where the ray enters the cell. A NaN fails both tests and goes to the first child: it ends.
+KdNode descend(TraversalRay ray, inout Cell cell) {
+    KdNode node = kd_nodes[cell.node_ix];
+    while (axis_of(node) != KD_LEAF) {
+        vec2 t_cross = crossing(ray, node);
+        uint first_is_above = along(ray.inv_direction, axis_of(node)) < 0.0 ? 1u : 0u;
+        uint first_ix = (node.axis_and_child >> KD_CHILD_SHIFT) + first_is_above;
+        bool in_first = t_cross.y >= cell.t_enter;
+        bool in_second = t_cross.x <= cell.t_exit;
+        cell.depth += 1u;
+        cell.node_ix = in_second && !in_first ? first_ix ^ 1u : first_ix;
+        if (in_first && in_second) {
+            push_pending(first_ix ^ 1u, cell, t_cross);
+            cell.t_exit = min(cell.t_exit, t_cross.y);
+        }
+        node = kd_nodes[cell.node_ix];
+    }
+    return node;
+}
+
+// The leaf's triangles against the ray; of two hits at one t the lower index wins, whatever the order of leaves.
+void intersect_leaf(TraversalRay ray, KdNode leaf, inout Hit best) {
+    uint end = leaf.split_or_first + (leaf.axis_and_child >> KD_CHILD_SHIFT);
+    for (uint i = leaf.split_or_first; i < end; ++i) {
+        uint triangle_ix = leaf_triangles[i];
+        Hit hit;
+        if (!intersect_triangle(ray.shear, triangles[triangle_ix], triangle_ix, hit)) continue;
+        bool nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
+        if (hit.t > 0.0 && nearer && triangle_ix != ray.source_triangle) best = hit;
+    }
+}
+
+// The closest hit in (0, t_max), or with any_hit one that need not be the closest. A miss keeps t = t_max.
+Hit traverse(Ray ray_in, bool any_hit) {
+    Hit best = Hit(ray_in.t_max, NO_TRIANGLE, 0.0, 0.0);
+    TraversalRay ray = traversal_ray(ray_in);
+    if (!(ray.t_enter <= ray.t_exit)) return best;
+    Cell cell = Cell(0u, 0u, ray.t_enter, ray.t_exit);
+    clear_pending();
+    do {
+        intersect_leaf(ray, descend(ray, cell), best);
+        if (any_hit && best.triangle_ix != NO_TRIANGLE) break;
+    } while (pop_pending(ray, best.t, cell));
+    return best;
+}
+
+#endif

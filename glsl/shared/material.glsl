@@ -1,0 +1,79 @@
+// Wavefront MTL's materials: local light by Phong, mirrors, glass, transparency.
+#ifndef KDRAY_MATERIAL
+#define KDRAY_MATERIAL
+
+#include "layout.glsl"
+#include "surface.glsl"
+
+// Where light goes on from a surface, and what share of it. A weight of zero: no ray.
+struct Scattering {
+    vec3 reflected;
+    vec3 reflected_weight;
+    vec3 transmitted;
+    vec3 transmitted_weight;
+};
+
+// The share of the surface's own light: what a see-through material (d < 1) covers.
+float local_weight(Material material) {
+    return (material.flags & MATERIAL_REFRACT) != 0u ? 1.0 : material.d;
+}
+
+// Diffuse and specular reflectance towards the viewer. All vectors point away from the surface.
+vec3 phong(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
+    float cos_light = dot(normal, to_light);
+    if (!(cos_light > 0.0)) return vec3(0.0);
+    vec3 reflectance = material.kd * cos_light;
+    float cos_mirror = dot(reflect(-to_light, normal), to_viewer);
+    if ((material.flags & MATERIAL_SPECULAR) != 0u && cos_mirror > 0.0) {
+        reflectance += material.ks * pow(cos_mirror, material.ns);
+    }
+    return reflectance;
+}
+
+// Unpolarized Fresnel reflectance of a smooth dielectric; 1 in total internal reflection.
+// cos_in > 0; eta: index on the ray's side over index beyond; cos_out from refraction_cosine.
+float fresnel(float cos_in, float cos_out, float eta) {
+    if (cos_out <= 0.0) return 1.0;
+    float parallel = (cos_in - eta * cos_out) / (cos_in + eta * cos_out);
+    float perpendicular = (eta * cos_in - cos_out) / (eta * cos_in + cos_out);
+    return 0.5 * (parallel * parallel + perpendicular * perpendicular);
+}
+
+// Cosine of the refracted ray by Snell's law; 0 in total internal reflection.
+float refraction_cosine(float cos_in, float eta) {
+    return sqrt(max(0.0, 1.0 - eta * eta * (1.0 - cos_in * cos_in)));
+}
+
+// A direction that an interpolated normal has put on the wrong side of the surface, mirrored back to `side`.
+vec3 keep_side(vec3 direction, vec3 side) {
+    return direction - 2.0 * min(dot(direction, side), 0.0) * side;
+}
+
+Scattering scatter(Material material, Surface surface, vec3 direction) {
+    Scattering s = Scattering(vec3(0.0), vec3(0.0), direction, vec3(0.0));
+    bool reflects = (material.flags & MATERIAL_REFLECT) != 0u;
+    bool refracts = (material.flags & MATERIAL_REFRACT) != 0u;
+    if (!reflects && !refracts) {
+        s.transmitted_weight = vec3(1.0 - material.d);
+        return s;
+    }
+    float eta = surface.from_inside ? material.ni : 1.0 / material.ni;
+    // An interpolated normal can turn away from the viewer: grazing then.
+    float cos_in = max(dot(surface.shading, -direction), 1e-4);
+    float cos_out = refraction_cosine(cos_in, eta);
+    bool total = refracts && cos_out <= 0.0;
+    bool has_fresnel = (material.flags & MATERIAL_FRESNEL) != 0u;
+    vec3 share = has_fresnel ? vec3(fresnel(cos_in, cos_out, eta)) : (total ? vec3(1.0) : material.ks);
+    if (reflects) {
+        s.reflected = keep_side(normalize(direction + 2.0 * cos_in * surface.shading), surface.geometric);
+        s.reflected_weight = has_fresnel && !refracts ? share * material.ks : share;
+    }
+    if (refracts && !total) {
+        vec3 through = eta * direction + (eta * cos_in - cos_out) * surface.shading;
+        s.transmitted = keep_side(normalize(through), -surface.geometric);
+        s.transmitted_weight = reflects ? (1.0 - share) * material.tf : material.tf;
+    }
+    return s;
+}
+
+#endif

@@ -1,0 +1,66 @@
+// The surface at a hit, and rays that leave it.
+#ifndef KDRAY_SURFACE
+#define KDRAY_SURFACE
+
+#include "layout.glsl"
+
+struct Surface {
+    vec3 point_world;
+    // Unit normals on the side that the ray came from: the plane's, and the interpolated one.
+    vec3 geometric;
+    vec3 shading;
+    // Distance along `geometric` at which a new ray starts clear of this surface.
+    float clearance;
+    // The ray met the triangle's back: it leaves a solid.
+    bool from_inside;
+};
+
+// Unit vector of an octahedral 2 x snorm16 code (Cigolle et al.: Survey of Efficient Representations for Independent
+// Unit Vectors, JCGT 2014).
+vec3 decode_normal(uint code) {
+    vec2 p = unpackSnorm2x16(code);
+    vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
+    float fold = max(-n.z, 0.0);
+    n.x += n.x >= 0.0 ? -fold : fold;
+    n.y += n.y >= 0.0 ? -fold : fold;
+    return normalize(n);
+}
+
+vec3 shading_normal(Triangle t, Hit hit, vec3 geometric) {
+    if (t.n0 == FLAT_NORMAL || t.n1 == FLAT_NORMAL || t.n2 == FLAT_NORMAL) return geometric;
+    vec3 n = (1.0 - hit.u - hit.v) * decode_normal(t.n0) + hit.u * decode_normal(t.n1) + hit.v * decode_normal(t.n2);
+    float squared = dot(n, n);
+    return squared > 1e-12 ? n * inversesqrt(squared) : geometric;
+}
+
+// n with a non-negative component along `side`.
+vec3 towards(vec3 n, vec3 side) {
+    return dot(n, side) < 0.0 ? -n : n;
+}
+
+// The point is interpolated from the corners, so it lies within a few roundings of the plane: 2^-18 of the corners'
+// weighted magnitudes, 64 roundings, covers those and the next ray's test of neighbours in the same plane.
+Surface surface_at(Ray ray, Hit hit, Triangle t) {
+    float w = 1.0 - hit.u - hit.v;
+    vec3 magnitude = abs(w * t.v0) + abs(hit.u * t.v1) + abs(hit.v * t.v2);
+    Surface s;
+    s.point_world = w * t.v0 + hit.u * t.v1 + hit.v * t.v2;
+    // Edges at unit scale: the cross product of a tiny triangle would underflow.
+    vec3 e1 = t.v1 - t.v0, e2 = t.v2 - t.v0;
+    vec3 span = max(abs(e1), abs(e2));
+    float scale = 1.0 / max(span.x, max(span.y, span.z));
+    vec3 outward = normalize(cross(e1 * scale, e2 * scale));
+    s.from_inside = dot(outward, ray.direction) > 0.0;
+    s.geometric = s.from_inside ? -outward : outward;
+    s.shading = towards(shading_normal(t, hit, outward), s.geometric);
+    s.clearance = exp2(-18.0) * dot(magnitude, abs(s.geometric));
+    return s;
+}
+
+// A ray from the surface: starts on the side that it leaves to.
+Ray ray_from(Surface s, vec3 direction, uint triangle_ix, Ray parent, vec3 throughput) {
+    float side = dot(direction, s.geometric) < 0.0 ? -s.clearance : s.clearance;
+    return Ray(s.point_world + side * s.geometric, parent.pixel_ix, direction, triangle_ix, throughput, parent.t_max);
+}
+
+#endif

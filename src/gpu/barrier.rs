@@ -1,0 +1,50 @@
+//! Accesses by name, for barriers that read as sentences.
+
+use ash::vk::{AccessFlags2 as A, PipelineStageFlags2 as S};
+
+/// Who touches memory, and how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    ComputeRead,
+    ComputeWrite,
+    /// Reads and writes of a kernel that updates in place.
+    ComputeUpdate,
+    IndirectRead,
+    TransferRead,
+    TransferWrite,
+    HostRead,
+    /// Vertex, compute, uniform and indirect reads: after an upload.
+    AllReads,
+}
+
+impl Access {
+    pub(super) fn stages(self) -> S {
+        match self {
+            Self::ComputeRead | Self::ComputeWrite | Self::ComputeUpdate => S::COMPUTE_SHADER,
+            Self::IndirectRead => S::DRAW_INDIRECT,
+            Self::TransferRead | Self::TransferWrite => S::COPY,
+            Self::HostRead => S::HOST,
+            Self::AllReads => S::VERTEX_SHADER | S::COMPUTE_SHADER | S::DRAW_INDIRECT | S::COPY,
+        }
+    }
+
+    pub(super) fn accesses(self) -> A {
+        match self {
+            Self::ComputeRead => A::SHADER_STORAGE_READ | A::UNIFORM_READ,
+            Self::ComputeWrite => A::SHADER_STORAGE_WRITE,
+            Self::ComputeUpdate => A::SHADER_STORAGE_READ | A::SHADER_STORAGE_WRITE,
+            Self::IndirectRead => A::INDIRECT_COMMAND_READ,
+            Self::TransferRead => A::TRANSFER_READ,
+            Self::TransferWrite => A::TRANSFER_WRITE,
+            Self::HostRead => A::HOST_READ,
+            Self::AllReads => {
+                A::SHADER_STORAGE_READ
+                    | A::SHADER_STORAGE_WRITE
+                    | A::UNIFORM_READ
+                    | A::INDIRECT_COMMAND_READ
+                    | A::TRANSFER_READ
+                    | A::TRANSFER_WRITE
+            }
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! One descriptor set layout for all pipelines, and its sets.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::{AnyBuffer, Context, GpuError, Target};
+
+/// What a binding number holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BindingKind {
+    Uniform,
+    Storage,
+    Image,
+}
+
+impl BindingKind {
+    fn descriptor(self) -> vk::DescriptorType {
+        match self {
+            Self::Uniform => vk::DescriptorType::UNIFORM_BUFFER,
+            Self::Storage => vk::DescriptorType::STORAGE_BUFFER,
+            Self::Image => vk::DescriptorType::STORAGE_IMAGE,
+        }
+    }
+}
+
+/// The object behind a binding number.
+#[derive(Clone, Copy)]
+pub enum Binding<'a> {
+    Buffer(&'a AnyBuffer),
+    Image(&'a Target),
+}
+
+/// The layout of the one set, shared by all pipelines: binding `i` is of kind `kinds[i]`.
+pub struct Bindings {
+    pub(super) set_layout: vk::DescriptorSetLayout,
+    pub(super) pipeline_layout: vk::PipelineLayout,
+    kinds: Vec<BindingKind>,
+    context: Arc<Context>,
+}
+
+impl Bindings {
+    /// `push_bytes`: size of the push constants, for all stages.
+    pub fn new(context: &Arc<Context>, kinds: &[BindingKind], push_bytes: u32) -> Result<Arc<Self>, GpuError> {
+        let stages = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX;
+        let bindings: Vec<_> = (0..)
+            .zip(kinds)
+            .map(|(binding, kind)| {
+                vk::DescriptorSetLayoutBinding::default()
+                    .binding(binding)
+                    .descriptor_type(kind.descriptor())
+                    .descriptor_count(1)
+                    .stage_flags(stages)
+            })
+            .collect();
+        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        // SAFETY: all that the infos point to lives until the calls return; `Drop` takes what was made.
+        unsafe {
+            let set_layout = context
+                .device
+                .create_descriptor_set_layout(&info, None)
+                .map_err(GpuError::call("vkCreateDescriptorSetLayout", "bindings"))?;
+            let mut made = Self {
+                set_layout,
+                pipeline_layout: vk::PipelineLayout::null(),
+                kinds: kinds.to_vec(),
+                context: context.clone(),
+            };
+            let set_layouts = [set_layout];
+            let push = [vk::PushConstantRange::default().stage_flags(stages).size(push_bytes)];
+            let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(&push);
+            made.pipeline_layout = context
+                .device
+                .create_pipeline_layout(&info, None)
+                .map_err(GpuError::call("vkCreatePipelineLayout", "bindings"))?;
+            Ok(Arc::new(made))
+        }
+    }
+}
+
+impl Drop for Bindings {
+    fn drop(&mut self) {
+        // SAFETY: pipelines and sets hold the bindings, so none is left.
+        unsafe {
+            self.context.device.destroy_pipeline_layout(self.pipeline_layout, None);
+            self.context.device.destroy_descriptor_set_layout(self.set_layout, None);
+        }
+    }
+}
+
+/// One set, complete. Its buffers and images must outlive the commands that use it.
+pub struct BindingSet {
+    pub(super) raw: vk::DescriptorSet,
+    pool: vk::DescriptorPool,
+    pub(super) bindings: Arc<Bindings>,
+}
+
+impl BindingSet {
+    /// `objects[i]` is bound at number `i`.
+    pub fn new(bindings: &Arc<Bindings>, name: &str, objects: &[Binding]) -> Result<Self, GpuError> {
+        assert_eq!(objects.len(), bindings.kinds.len(), "one object a binding");
+        let context = &bindings.context;
+        let sizes: Vec<_> = bindings
+            .kinds
+            .iter()
+            .map(|kind| vk::DescriptorPoolSize { ty: kind.descriptor(), descriptor_count: 1 })
+            .collect();
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
+        // SAFETY: the pool has room for exactly this set and goes with it.
+        unsafe {
+            let pool = context
+                .device
+                .create_descriptor_pool(&info, None)
+                .map_err(GpuError::call("vkCreateDescriptorPool", name))?;
+            let mut set = Self { raw: vk::DescriptorSet::null(), pool, bindings: bindings.clone() };
+            let layouts = [bindings.set_layout];
+            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
+            set.raw = context
+                .device
+                .allocate_descriptor_sets(&info)
+                .map_err(GpuError::call("vkAllocateDescriptorSets", name))?[0];
+            context.set_name(set.raw, name);
+            set.write(objects);
+            Ok(set)
+        }
+    }
+
+    fn write(&self, objects: &[Binding]) {
+        for (binding, (kind, object)) in (0..).zip(self.bindings.kinds.iter().zip(objects)) {
+            let write = vk::WriteDescriptorSet::default()
+                .dst_set(self.raw)
+                .dst_binding(binding)
+                .descriptor_type(kind.descriptor());
+            let buffer_info;
+            let image_info;
+            let write = match object {
+                Binding::Buffer(buffer) => {
+                    buffer_info = [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(vk::WHOLE_SIZE)];
+                    write.buffer_info(&buffer_info)
+                }
+                Binding::Image(target) => {
+                    image_info = [vk::DescriptorImageInfo::default()
+                        .image_view(target.view)
+                        .image_layout(vk::ImageLayout::GENERAL)];
+                    write.image_info(&image_info)
+                }
+            };
+            // SAFETY: the set is not in use yet, and the object is of the binding's kind.
+            unsafe { self.bindings.context.device.update_descriptor_sets(&[write], &[]) };
+        }
+    }
+}
+
+impl Drop for BindingSet {
+    fn drop(&mut self) {
+        // SAFETY: the device has ended all work with it; the pool takes the set along.
+        unsafe { self.bindings.context.device.destroy_descriptor_pool(self.pool, None) };
+    }
+}

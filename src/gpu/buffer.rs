@@ -1,0 +1,176 @@
+//! Typed buffers.
+
+use std::{marker::PhantomData, mem::ManuallyDrop, sync::Arc};
+
+use ash::vk;
+use bytemuck::Pod;
+use gpu_allocator::{MemoryLocation, vulkan::Allocation};
+
+use super::{Access, Context, GpuError};
+
+/// What kernels do with a buffer. Every buffer can be copied from and to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BufferUse {
+    Storage,
+    Uniform,
+    /// Storage that also sizes indirect dispatches.
+    Indirect,
+}
+
+/// `len` elements of `T` in the device's memory.
+pub struct Buffer<T> {
+    any: AnyBuffer,
+    len: usize,
+    element: PhantomData<T>,
+}
+
+/// A buffer of unnamed element type: what descriptors and copies take.
+pub struct AnyBuffer {
+    raw: vk::Buffer,
+    allocation: ManuallyDrop<Allocation>,
+    bytes: u64,
+    name: String,
+    context: Arc<Context>,
+}
+
+impl<T: Pod> Buffer<T> {
+    /// An empty buffer has room for one element, since Vulkan knows none without bytes. Contents are undefined.
+    ///
+    /// # Errors
+    /// Beyond the device's limits, out of memory.
+    pub fn new(context: &Arc<Context>, name: &str, len: usize, usage: BufferUse) -> Result<Self, GpuError> {
+        let bytes = (len.max(1) * size_of::<T>()) as u64;
+        let limit = context.limits().storage_range;
+        if bytes > limit {
+            return Err(GpuError::TooLarge { object: name.to_owned(), bytes, limit });
+        }
+        let usage = match usage {
+            BufferUse::Storage => vk::BufferUsageFlags::STORAGE_BUFFER,
+            BufferUse::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
+            BufferUse::Indirect => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER,
+        } | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST;
+        let any = AnyBuffer::new(context, name, bytes, usage, MemoryLocation::GpuOnly)?;
+        Ok(Self { any, len, element: PhantomData })
+    }
+
+    /// A buffer that holds `data`.
+    ///
+    /// # Errors
+    /// As [`Buffer::new`]; a failed copy.
+    pub fn with(context: &Arc<Context>, name: &str, data: &[T], usage: BufferUse) -> Result<Self, GpuError> {
+        let buffer = Self::new(context, name, data.len(), usage)?;
+        buffer.upload(data)?;
+        Ok(buffer)
+    }
+
+    /// Elements.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Overwrites the first `data.len()` elements; waits for the device.
+    pub fn upload(&self, data: &[T]) -> Result<(), GpuError> {
+        assert!(data.len() <= self.len, "`{}` holds {} elements, not {}", self.any.name, self.len, data.len());
+        if data.is_empty() {
+            return Ok(());
+        }
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let context = &self.any.context;
+        let mut staging = AnyBuffer::staging(context, &self.any.name, bytes.len() as u64, MemoryLocation::CpuToGpu)?;
+        staging.mapped()[..bytes.len()].copy_from_slice(bytes);
+        context.run("upload", |commands| {
+            commands.copy_buffer(&staging, &self.any, bytes.len() as u64);
+            commands.barrier(Access::TransferWrite, Access::AllReads); // the buffer
+        })
+    }
+
+    /// All elements; waits for the device.
+    pub fn download(&self) -> Result<Vec<T>, GpuError> {
+        let bytes = self.len * size_of::<T>();
+        if bytes == 0 {
+            return Ok(Vec::new());
+        }
+        let context = &self.any.context;
+        let mut staging = AnyBuffer::staging(context, &self.any.name, bytes as u64, MemoryLocation::GpuToCpu)?;
+        context.run("download", |commands| {
+            commands.barrier(Access::ComputeWrite, Access::TransferRead); // the buffer
+            commands.copy_buffer(&self.any, &staging, bytes as u64);
+            commands.barrier(Access::TransferWrite, Access::HostRead); // staging
+        })?;
+        let mut data = vec![T::zeroed(); self.len];
+        bytemuck::cast_slice_mut(&mut data).copy_from_slice(&staging.mapped()[..bytes]);
+        Ok(data)
+    }
+
+    pub fn any(&self) -> &AnyBuffer {
+        &self.any
+    }
+}
+
+impl AnyBuffer {
+    fn new(
+        context: &Arc<Context>,
+        name: &str,
+        bytes: u64,
+        usage: vk::BufferUsageFlags,
+        location: MemoryLocation,
+    ) -> Result<Self, GpuError> {
+        let device = &context.device;
+        let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
+        // SAFETY: the raw buffer is destroyed on each way out that does not hand it to an owner.
+        unsafe {
+            let raw = device.create_buffer(&info, None).map_err(GpuError::call("vkCreateBuffer", name))?;
+            let requirements = device.get_buffer_memory_requirements(raw);
+            let allocation = match context.allocate(name, requirements, location, true) {
+                Ok(allocation) => ManuallyDrop::new(allocation),
+                Err(error) => {
+                    device.destroy_buffer(raw, None);
+                    return Err(error);
+                }
+            };
+            let buffer = Self { raw, allocation, bytes, name: name.to_owned(), context: context.clone() };
+            device
+                .bind_buffer_memory(raw, buffer.allocation.memory(), buffer.allocation.offset())
+                .map_err(GpuError::call("vkBindBufferMemory", name))?;
+            context.set_name(raw, name);
+            Ok(buffer)
+        }
+    }
+
+    fn staging(context: &Arc<Context>, name: &str, bytes: u64, location: MemoryLocation) -> Result<Self, GpuError> {
+        let usage = vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST;
+        Self::new(context, &format!("{name} staging"), bytes, usage, location)
+    }
+
+    fn mapped(&mut self) -> &mut [u8] {
+        self.allocation.mapped_slice_mut().expect("host-visible memory stays mapped")
+    }
+
+    pub(super) fn raw(&self) -> vk::Buffer {
+        self.raw
+    }
+
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Size in bytes.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+}
+
+impl Drop for AnyBuffer {
+    fn drop(&mut self) {
+        // SAFETY: the device has ended all work on it: `Context::run` waits, and a frame's owner does.
+        unsafe {
+            self.context.device.destroy_buffer(self.raw, None);
+            self.context.free(ManuallyDrop::take(&mut self.allocation));
+        }
+    }
+}

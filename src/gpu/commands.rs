@@ -1,0 +1,257 @@
+//! Recording commands.
+
+use std::{ffi::CString, sync::Arc};
+
+use ash::vk;
+use bytemuck::Pod;
+
+use super::{Access, AnyBuffer, BindingSet, ComputePipeline, Context, GpuError, RasterPipeline, Target, Timer};
+
+/// A recorded command buffer.
+pub struct CommandBuffer {
+    raw: vk::CommandBuffer,
+    name: String,
+    context: Arc<Context>,
+}
+
+/// What is being recorded: the body of [`CommandBuffer::record`].
+pub struct Commands<'a> {
+    raw: vk::CommandBuffer,
+    context: &'a Context,
+    timer: Option<&'a Timer>,
+}
+
+/// How many invocations a kernel runs with.
+#[derive(Clone, Copy)]
+pub enum Dispatch<'a> {
+    /// Invocations and workgroup size, each x, y, z.
+    Threads([u32; 3], [u32; 3]),
+    /// Workgroups x, y, z at a byte offset of a buffer.
+    Indirect(&'a AnyBuffer, u64),
+}
+
+impl CommandBuffer {
+    /// Records `body` under a debug label; with a timer each pass in it gets a row.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn record(
+        context: &Arc<Context>,
+        name: &str,
+        timer: Option<&Timer>,
+        body: impl FnOnce(&Commands),
+    ) -> Result<Self, GpuError> {
+        let device = &context.device;
+        let info = vk::CommandBufferAllocateInfo::default().command_pool(context.command_pool).command_buffer_count(1);
+        // SAFETY: the pool is used by one thread at a time.
+        let raw = unsafe { device.allocate_command_buffers(&info) }
+            .map_err(GpuError::call("vkAllocateCommandBuffers", name))?[0];
+        let buffer = Self { raw, name: name.to_owned(), context: context.clone() };
+        context.set_name(raw, name);
+        let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the buffer is new.
+        unsafe { device.begin_command_buffer(raw, &begin) }.map_err(GpuError::call("vkBeginCommandBuffer", name))?;
+        let commands = Commands { raw, context, timer };
+        commands.labelled(name, || body(&commands));
+        // SAFETY: it is being recorded.
+        unsafe { device.end_command_buffer(raw) }.map_err(GpuError::call("vkEndCommandBuffer", name))?;
+        Ok(buffer)
+    }
+
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(super) fn raw(&self) -> vk::CommandBuffer {
+        self.raw
+    }
+}
+
+impl Drop for CommandBuffer {
+    fn drop(&mut self) {
+        // SAFETY: its owner has waited for the device.
+        unsafe { self.context.device.free_command_buffers(self.context.command_pool, &[self.raw]) };
+    }
+}
+
+impl Commands<'_> {
+    /// One pass: its name is the debug label and the timer's row.
+    fn pass(&self, name: &'static str, bounce: Option<u32>, body: impl FnOnce()) {
+        let row = self.timer.map(|timer| (timer, timer.begin(self.raw, name, bounce)));
+        self.labelled(name, body);
+        if let Some((timer, row)) = row {
+            timer.end(self.raw, row);
+        }
+    }
+
+    fn labelled(&self, name: &str, body: impl FnOnce()) {
+        let label = CString::new(name).unwrap_or_default();
+        let debug_utils = self.context.debug_utils.as_ref();
+        // SAFETY: the commands are being recorded; begin and end come in pairs.
+        unsafe {
+            if let Some(debug_utils) = debug_utils {
+                let label = vk::DebugUtilsLabelEXT::default().label_name(&label);
+                debug_utils.cmd_begin_debug_utils_label(self.raw, &label);
+            }
+            body();
+            if let Some(debug_utils) = debug_utils {
+                debug_utils.cmd_end_debug_utils_label(self.raw);
+            }
+        }
+    }
+
+    /// Starts the timer's frame.
+    pub fn reset_timer(&self) {
+        if let Some(timer) = self.timer {
+            timer.reset(self.raw);
+        }
+    }
+
+    /// Binds the set for all kernels of this command buffer.
+    pub fn bind(&self, set: &BindingSet) {
+        // SAFETY: the set is complete, and its layout is every pipeline's.
+        unsafe {
+            for point in [vk::PipelineBindPoint::COMPUTE, vk::PipelineBindPoint::GRAPHICS] {
+                let layout = set.bindings.pipeline_layout;
+                self.context.device.cmd_bind_descriptor_sets(self.raw, point, layout, 0, &[set.raw], &[]);
+            }
+        }
+    }
+
+    /// Runs a kernel with the bound set, as a pass of its name and of a bounce, if it belongs to one.
+    pub fn dispatch(&self, pipeline: &ComputePipeline, bounce: Option<u32>, push: &impl Pod, dispatch: Dispatch) {
+        self.pass(pipeline.name, bounce, || self.launch(pipeline, push, dispatch));
+    }
+
+    fn launch(&self, pipeline: &ComputePipeline, push: &impl Pod, dispatch: Dispatch) {
+        let device = &self.context.device;
+        let stages = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX;
+        // SAFETY: the set is bound; push constants fit the layout's range.
+        unsafe {
+            device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.raw);
+            let layout = pipeline.bindings.pipeline_layout;
+            device.cmd_push_constants(self.raw, layout, stages, 0, bytemuck::bytes_of(push));
+            match dispatch {
+                Dispatch::Threads([nx, ny, nz], [x, y, z]) => {
+                    device.cmd_dispatch(self.raw, nx.div_ceil(x), ny.div_ceil(y), nz.div_ceil(z));
+                }
+                Dispatch::Indirect(buffer, offset) => device.cmd_dispatch_indirect(self.raw, buffer.raw(), offset),
+            }
+        }
+    }
+
+    /// Rasterizes `n_vertices / 3` triangles into the cleared targets: IDs to u32::MAX, depth to 0 (far).
+    pub fn draw(&self, pipeline: &RasterPipeline, ids: &Target, depth: &Target, n_vertices: u32) {
+        self.pass(pipeline.name, None, || self.rasterize(pipeline, ids, depth, n_vertices));
+    }
+
+    fn rasterize(&self, pipeline: &RasterPipeline, ids: &Target, depth: &Target, n_vertices: u32) {
+        let device = &self.context.device;
+        let area = vk::Rect2D { extent: vk::Extent2D { width: ids.width, height: ids.height }, ..Default::default() };
+        let attachment = |target: &Target, layout, clear, store| {
+            vk::RenderingAttachmentInfo::default()
+                .image_view(target.view)
+                .image_layout(layout)
+                .load_op(vk::AttachmentLoadOp::CLEAR)
+                .store_op(store)
+                .clear_value(clear)
+        };
+        let no_triangle = vk::ClearValue { color: vk::ClearColorValue { uint32: [u32::MAX; 4] } };
+        let far = vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } };
+        let (store, drop) = (vk::AttachmentStoreOp::STORE, vk::AttachmentStoreOp::DONT_CARE);
+        let color = [attachment(ids, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, no_triangle, store)];
+        let depth = attachment(depth, vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL, far, drop);
+        let rendering = vk::RenderingInfo::default()
+            .render_area(area)
+            .layer_count(1)
+            .color_attachments(&color)
+            .depth_attachment(&depth);
+        let viewport = vk::Viewport {
+            width: ids.width as f32,
+            height: ids.height as f32,
+            max_depth: 1.0,
+            ..vk::Viewport::default()
+        };
+        // SAFETY: the targets are in the named layouts (`begin_targets`), the set is bound.
+        unsafe {
+            device.cmd_begin_rendering(self.raw, &rendering);
+            device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
+            device.cmd_set_viewport(self.raw, 0, &[viewport]);
+            device.cmd_set_scissor(self.raw, 0, &[area]);
+            device.cmd_draw(self.raw, n_vertices, 1, 0, 0);
+            device.cmd_end_rendering(self.raw);
+        }
+    }
+
+    /// Everything that `source` did before is seen by `destination` after.
+    pub fn barrier(&self, source: Access, destination: Access) {
+        let barrier = [vk::MemoryBarrier2::default()
+            .src_stage_mask(source.stages())
+            .src_access_mask(source.accesses())
+            .dst_stage_mask(destination.stages())
+            .dst_access_mask(destination.accesses())];
+        let info = vk::DependencyInfo::default().memory_barriers(&barrier);
+        // SAFETY: the commands are being recorded, outside rendering.
+        unsafe { self.context.device.cmd_pipeline_barrier2(self.raw, &info) };
+    }
+
+    /// Makes the targets ready to be drawn to; their contents are dropped.
+    pub fn begin_targets(&self, ids: &Target, depth: &Target) {
+        let tests = vk::PipelineStageFlags2::EARLY_FRAGMENT_TESTS | vk::PipelineStageFlags2::LATE_FRAGMENT_TESTS;
+        // Kernels of the frame before may still read the IDs, its tests still write the depth.
+        self.transition(
+            ids,
+            (vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED),
+            (
+                vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
+                vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
+                vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+            ),
+        );
+        let depth_access =
+            vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_READ | vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE;
+        self.transition(
+            depth,
+            (tests, vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE, vk::ImageLayout::UNDEFINED),
+            (tests, depth_access, vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL),
+        );
+    }
+
+    /// Hands drawn IDs to kernels.
+    pub fn ids_to_compute(&self, ids: &Target) {
+        self.transition(
+            ids,
+            (
+                vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
+                vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
+                vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+            ),
+            (vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::SHADER_STORAGE_READ, vk::ImageLayout::GENERAL),
+        );
+    }
+
+    fn transition(&self, target: &Target, from: LayoutState, to: LayoutState) {
+        let barrier = [vk::ImageMemoryBarrier2::default()
+            .image(target.raw)
+            .subresource_range(target.range())
+            .src_stage_mask(from.0)
+            .src_access_mask(from.1)
+            .old_layout(from.2)
+            .dst_stage_mask(to.0)
+            .dst_access_mask(to.1)
+            .new_layout(to.2)];
+        let info = vk::DependencyInfo::default().image_memory_barriers(&barrier);
+        // SAFETY: the commands are being recorded, outside rendering.
+        unsafe { self.context.device.cmd_pipeline_barrier2(self.raw, &info) };
+    }
+
+    /// Copies the first `bytes`.
+    pub fn copy_buffer(&self, source: &AnyBuffer, destination: &AnyBuffer, bytes: u64) {
+        let region = [vk::BufferCopy::default().size(bytes)];
+        // SAFETY: both buffers hold that many bytes, which their owners have checked.
+        unsafe { self.context.device.cmd_copy_buffer(self.raw, source.raw(), destination.raw(), &region) };
+    }
+}
+
+/// Stages and accesses on one side of a layout transition.
+type LayoutState = (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout);

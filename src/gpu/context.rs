@@ -1,0 +1,230 @@
+//! A device in use: its queue, its memory, its limits.
+
+use std::{
+    ffi::CString,
+    mem::ManuallyDrop,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use ash::{ext, vk};
+use gpu_allocator::{
+    AllocationSizes, AllocatorDebugSettings, MemoryLocation,
+    vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc},
+};
+
+use super::{
+    Commands, DeviceInfo, DeviceSelector, GpuError, Limits,
+    commands::CommandBuffer,
+    devices::{queue_family, select},
+    instance::Instance,
+};
+
+/// Which device to use, and how.
+#[derive(Clone, Debug, Default)]
+pub struct ContextOptions {
+    /// None: the best GPU, a software driver where there is none.
+    pub device: Option<DeviceSelector>,
+    /// Run under the Khronos validation layer with synchronization validation.
+    pub validate: bool,
+}
+
+/// A Vulkan device with one queue for graphics and compute.
+pub struct Context {
+    pub(super) device: ash::Device,
+    pub(super) debug_utils: Option<ext::debug_utils::Device>,
+    pub(super) command_pool: vk::CommandPool,
+    pub(super) timestamp_period_ns: f32,
+    pub(super) timestamp_valid_bits: u32,
+    queue: vk::Queue,
+    allocator: ManuallyDrop<Mutex<Allocator>>,
+    info: DeviceInfo,
+    limits: Limits,
+    instance: Arc<Instance>,
+}
+
+impl Context {
+    /// Opens a device.
+    ///
+    /// # Errors
+    /// No loader, driver, device of that name or validation layer; a device that lacks a feature; a failed call.
+    pub fn new(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
+        let instance = Instance::new(options.validate)?;
+        let (physical, info) = select(&instance, options.device.as_ref())?;
+        // SAFETY: the device belongs to the instance.
+        let (families, properties) = unsafe {
+            (
+                instance.raw.get_physical_device_queue_family_properties(physical),
+                instance.raw.get_physical_device_properties(physical),
+            )
+        };
+        let family = queue_family(&families).expect("`select` refuses a device without such a queue");
+        let device = create_device(&instance, physical, family as u32, &info)?;
+        // SAFETY: the queue was asked for at creation; the pool belongs to its family.
+        let (queue, command_pool) = unsafe {
+            let pool = vk::CommandPoolCreateInfo::default()
+                .queue_family_index(family as u32)
+                .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
+            let pool = device.create_command_pool(&pool, None).map_err(GpuError::call("vkCreateCommandPool", "kdray"))?;
+            (device.get_device_queue(family as u32, 0), pool)
+        };
+        let allocator = create_allocator(&instance, &device, physical)?;
+        Ok(Arc::new(Self {
+            debug_utils: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device)),
+            device,
+            command_pool,
+            timestamp_period_ns: properties.limits.timestamp_period,
+            timestamp_valid_bits: families[family].timestamp_valid_bits,
+            queue,
+            allocator: ManuallyDrop::new(Mutex::new(allocator)),
+            info,
+            limits: Limits {
+                storage_range: u64::from(properties.limits.max_storage_buffer_range),
+                target_size: properties
+                    .limits
+                    .max_framebuffer_width
+                    .min(properties.limits.max_framebuffer_height)
+                    .min(properties.limits.max_image_dimension2_d),
+                n_groups: properties.limits.max_compute_work_group_count[0],
+            },
+            instance,
+        }))
+    }
+
+    pub fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// True for a driver that computes on the CPU.
+    pub fn is_software(&self) -> bool {
+        self.info.kind == "CPU"
+    }
+
+    /// What the validation layer has said so far; empty without validation.
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.instance.messages()
+    }
+
+    /// Records commands, runs them and waits for their end. For uploads, downloads and tests.
+    pub fn run(self: &Arc<Self>, name: &str, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
+        let buffer = CommandBuffer::record(self, name, None, record)?;
+        self.submit(&[&buffer])?;
+        self.wait()
+    }
+
+    /// Starts command buffers in order, one submit each: a driver's watchdog looks at submits.
+    pub fn submit(&self, buffers: &[&CommandBuffer]) -> Result<(), GpuError> {
+        for buffer in buffers {
+            let info = [vk::CommandBufferSubmitInfo::default().command_buffer(buffer.raw())];
+            let submit = [vk::SubmitInfo2::default().command_buffer_infos(&info)];
+            // SAFETY: the buffer is recorded, and its owner keeps it until `wait` has returned.
+            unsafe { self.device.queue_submit2(self.queue, &submit, vk::Fence::null()) }
+                .map_err(GpuError::call("vkQueueSubmit2", buffer.name()))?;
+        }
+        Ok(())
+    }
+
+    /// Waits until all that was submitted has ended.
+    pub fn wait(&self) -> Result<(), GpuError> {
+        // SAFETY: the queue is used by one thread at a time.
+        unsafe { self.device.queue_wait_idle(self.queue) }.map_err(GpuError::call("vkQueueWaitIdle", &self.info.name))
+    }
+
+    /// Gives a handle its name in the debuggers' and the validation layer's eyes.
+    pub(super) fn set_name(&self, handle: impl vk::Handle, name: &str) {
+        let (Some(debug_utils), Ok(name)) = (&self.debug_utils, CString::new(name)) else { return };
+        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
+        // SAFETY: the handle is one of this device's. A name that is not taken is no loss.
+        let _ = unsafe { debug_utils.set_debug_utils_object_name(&info) };
+    }
+
+    pub(super) fn allocate(
+        &self,
+        name: &str,
+        requirements: vk::MemoryRequirements,
+        location: MemoryLocation,
+        linear: bool,
+    ) -> Result<Allocation, GpuError> {
+        let desc =
+            AllocationCreateDesc { name, requirements, location, linear, allocation_scheme: AllocationScheme::GpuAllocatorManaged };
+        self.allocator
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .allocate(&desc)
+            .map_err(|source| GpuError::Memory { object: name.to_owned(), bytes: requirements.size, source })
+    }
+
+    pub(super) fn free(&self, allocation: Allocation) {
+        let freed = self.allocator.lock().unwrap_or_else(PoisonError::into_inner).free(allocation);
+        freed.expect("an allocation is freed once, by its owner");
+    }
+}
+
+impl Drop for Context {
+    fn drop(&mut self) {
+        // SAFETY: every object made from the context holds it, so none is left; the allocator goes before the device.
+        unsafe {
+            let _ = self.device.device_wait_idle();
+            ManuallyDrop::drop(&mut self.allocator);
+            self.device.destroy_command_pool(self.command_pool, None);
+            self.device.destroy_device(None);
+        }
+    }
+}
+
+fn create_device(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+    family: u32,
+    info: &DeviceInfo,
+) -> Result<ash::Device, GpuError> {
+    // SAFETY: the device belongs to the instance.
+    let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
+        .map_err(GpuError::call("vkEnumerateDeviceExtensionProperties", &info.name))?;
+    // A driver that is not fully conformant wants to be told that this is known.
+    let portability = ash::khr::portability_subset::NAME;
+    let extensions: Vec<_> = available
+        .iter()
+        .any(|e| e.extension_name_as_c_str() == Ok(portability))
+        .then_some(portability.as_ptr())
+        .into_iter()
+        .collect();
+    let priorities = [1.0];
+    let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
+    let mut features = vk::PhysicalDeviceVulkan13Features::default()
+        .dynamic_rendering(true)
+        .synchronization2(true)
+        .subgroup_size_control(true)
+        .compute_full_subgroups(true);
+    let create = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queues)
+        .enabled_extension_names(&extensions)
+        .push_next(&mut features);
+    // SAFETY: all that `create` points to lives until the call returns.
+    unsafe { instance.raw.create_device(physical, &create, None) }
+        .map_err(GpuError::call("vkCreateDevice", &info.name))
+}
+
+fn create_allocator(
+    instance: &Instance,
+    device: &ash::Device,
+    physical_device: vk::PhysicalDevice,
+) -> Result<Allocator, GpuError> {
+    const MIB: u64 = 1 << 20;
+    // Blocks grow with use, so that a small scene takes little memory.
+    let sizes = AllocationSizes::new(16 * MIB, 16 * MIB)
+        .with_max_device_memblock_size(256 * MIB)
+        .with_max_host_memblock_size(64 * MIB);
+    Allocator::new(&AllocatorCreateDesc {
+        instance: instance.raw.clone(),
+        device: device.clone(),
+        physical_device,
+        debug_settings: AllocatorDebugSettings::default(),
+        buffer_device_address: false,
+        allocation_sizes: sizes,
+    })
+    .map_err(|source| GpuError::Memory { object: "allocator".into(), bytes: 0, source })
+}

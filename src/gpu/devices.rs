@@ -1,0 +1,191 @@
+//! The machine's Vulkan devices: what they are, what they lack, which one is meant.
+
+use std::{ffi::CStr, fmt};
+
+use ash::vk;
+use serde::Serialize;
+
+use super::{GpuError, instance::Instance};
+
+/// One Vulkan device.
+#[derive(Clone, Debug, Serialize)]
+pub struct DeviceInfo {
+    /// Place in the loader's list.
+    pub index: usize,
+    /// The device's own name.
+    pub name: String,
+    /// `discrete GPU`, `integrated GPU`, `virtual GPU`, `CPU` or `other`.
+    pub kind: String,
+    /// The driver's name and version.
+    pub driver: String,
+    pub api_version: String,
+    /// Invocations of a subgroup.
+    pub subgroup_size: u32,
+    /// What kdray needs and the device has not; empty for a device that can be used.
+    pub missing: Vec<String>,
+}
+
+/// How a user names a device.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DeviceSelector {
+    Index(usize),
+    /// Part of the name, upper and lower case alike.
+    Name(String),
+}
+
+impl fmt::Display for DeviceSelector {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Index(index) => write!(f, "{index}"),
+            Self::Name(name) => f.write_str(name),
+        }
+    }
+}
+
+/// The limits that sizes are held against.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Bytes of one storage buffer.
+    pub storage_range: u64,
+    /// Pixels of a render target's side.
+    pub target_size: u32,
+    /// Workgroups of one dimension of a dispatch.
+    pub n_groups: u32,
+}
+
+/// All devices, usable or not.
+///
+/// # Errors
+/// No loader, no driver.
+pub fn devices() -> Result<Vec<DeviceInfo>, GpuError> {
+    let instance = Instance::new(false)?;
+    Ok(list(&instance)?.into_iter().map(|(_, info)| info).collect())
+}
+
+pub(super) fn list(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, DeviceInfo)>, GpuError> {
+    // SAFETY: the instance is alive.
+    let devices = unsafe { instance.raw.enumerate_physical_devices() }
+        .map_err(GpuError::call("vkEnumeratePhysicalDevices", "kdray"))?;
+    let list: Vec<_> = devices
+        .into_iter()
+        .enumerate()
+        .map(|(index, device)| (device, describe(instance, device, index)))
+        .collect();
+    if list.is_empty() { Err(GpuError::NoDriver) } else { Ok(list) }
+}
+
+/// The device that is meant: the named one, or the best of those that lack nothing.
+pub(super) fn select(
+    instance: &Instance,
+    selector: Option<&DeviceSelector>,
+) -> Result<(vk::PhysicalDevice, DeviceInfo), GpuError> {
+    let list = list(instance)?;
+    let chosen = match selector {
+        Some(DeviceSelector::Index(index)) => list.iter().find(|(_, info)| info.index == *index),
+        Some(DeviceSelector::Name(name)) => {
+            list.iter().find(|(_, info)| info.name.to_lowercase().contains(&name.to_lowercase()))
+        }
+        // Of equals the first: the loader's order is the user's.
+        None => list.iter().min_by_key(|(_, info)| (!info.missing.is_empty(), rank(&info.kind), info.index)),
+    };
+    let Some((device, info)) = chosen else {
+        let available: Vec<_> = list.iter().map(|(_, info)| format!("{} {}", info.index, info.name)).collect();
+        let wanted = selector.map(ToString::to_string).unwrap_or_default();
+        return Err(GpuError::NoSuchDevice { wanted, available: available.join(", ") });
+    };
+    if !info.missing.is_empty() {
+        return Err(GpuError::Lacks { device: info.name.clone(), missing: info.missing.join(", ") });
+    }
+    Ok((*device, info.clone()))
+}
+
+fn rank(kind: &str) -> usize {
+    KINDS.iter().position(|(_, name)| *name == kind).unwrap_or(KINDS.len())
+}
+
+/// Best first.
+const KINDS: [(vk::PhysicalDeviceType, &str); 4] = [
+    (vk::PhysicalDeviceType::DISCRETE_GPU, "discrete GPU"),
+    (vk::PhysicalDeviceType::INTEGRATED_GPU, "integrated GPU"),
+    (vk::PhysicalDeviceType::VIRTUAL_GPU, "virtual GPU"),
+    (vk::PhysicalDeviceType::CPU, "CPU"),
+];
+
+fn describe(instance: &Instance, device: vk::PhysicalDevice, index: usize) -> DeviceInfo {
+    // SAFETY: the device belongs to the instance.
+    let properties = unsafe { instance.raw.get_physical_device_properties(device) };
+    let version = properties.api_version;
+    let is_1_3 = version >= vk::API_VERSION_1_3;
+    let kind = KINDS.iter().find(|(kind, _)| *kind == properties.device_type).map_or("other", |(_, name)| name);
+    let mut info = DeviceInfo {
+        index,
+        name: text(properties.device_name_as_c_str().unwrap_or_default()),
+        kind: kind.to_owned(),
+        driver: String::new(),
+        api_version: format!(
+            "{}.{}.{}",
+            vk::api_version_major(version),
+            vk::api_version_minor(version),
+            vk::api_version_patch(version)
+        ),
+        subgroup_size: 0,
+        missing: Vec::new(),
+    };
+    if !is_1_3 {
+        info.missing.push(format!("Vulkan 1.3 (it has {})", info.api_version));
+        return info;
+    }
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+    let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut subgroup);
+    // SAFETY: a Vulkan 1.3 device knows both structs.
+    unsafe { instance.raw.get_physical_device_properties2(device, &mut all) };
+    info.driver = format!(
+        "{} {}",
+        text(driver.driver_name_as_c_str().unwrap_or_default()),
+        text(driver.driver_info_as_c_str().unwrap_or_default())
+    );
+    info.subgroup_size = subgroup.subgroup_size;
+    info.missing.extend(missing(instance, device, &subgroup));
+    info
+}
+
+fn text(raw: &CStr) -> String {
+    raw.to_string_lossy().trim().to_owned()
+}
+
+fn missing(
+    instance: &Instance,
+    device: vk::PhysicalDevice,
+    subgroup: &vk::PhysicalDeviceSubgroupProperties,
+) -> Vec<String> {
+    let mut features_1_3 = vk::PhysicalDeviceVulkan13Features::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut features_1_3);
+    // SAFETY: the device has Vulkan 1.3.
+    let (families, targets) = unsafe {
+        instance.raw.get_physical_device_features2(device, &mut features);
+        (
+            instance.raw.get_physical_device_queue_family_properties(device),
+            instance.raw.get_physical_device_format_properties(device, vk::Format::D32_SFLOAT).optimal_tiling_features,
+        )
+    };
+    let operations = vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::ARITHMETIC;
+    let needs = [
+        (features_1_3.dynamic_rendering == vk::TRUE, "dynamicRendering"),
+        (features_1_3.synchronization2 == vk::TRUE, "synchronization2"),
+        (features_1_3.compute_full_subgroups == vk::TRUE, "computeFullSubgroups"),
+        (subgroup.supported_operations.contains(operations), "subgroup arithmetic"),
+        (subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE), "subgroup operations in compute"),
+        // scan.glsl keeps one total for every four invocations.
+        ((4..=128).contains(&subgroup.subgroup_size), "a subgroup size from 4 to 128"),
+        (targets.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT), "D32_SFLOAT depth targets"),
+        (queue_family(&families).is_some(), "a queue for graphics and compute"),
+    ];
+    needs.iter().filter(|(has, _)| !has).map(|(_, name)| (*name).to_owned()).collect()
+}
+
+/// The first family that does graphics and compute.
+pub(super) fn queue_family(families: &[vk::QueueFamilyProperties]) -> Option<usize> {
+    let both = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+    families.iter().position(|family| family.queue_flags.contains(both))
+}

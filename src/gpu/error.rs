@@ -1,0 +1,38 @@
+//! What can go wrong with a driver, each in one line that names the call and the object.
+
+use ash::vk;
+
+/// Anything that stops a device from doing its work.
+#[derive(Debug, thiserror::Error)]
+pub enum GpuError {
+    #[error("no Vulkan loader ({0}); ./setup installs it")]
+    NoLoader(String),
+    #[error("no Vulkan driver found; ./setup installs Mesa's lavapipe, which needs no GPU")]
+    NoDriver,
+    #[error("no Vulkan device `{wanted}`; there are: {available}")]
+    NoSuchDevice { wanted: String, available: String },
+    #[error("device `{device}` lacks {missing}")]
+    Lacks { device: String, missing: String },
+    #[error("no validation layer VK_LAYER_KHRONOS_validation; ./setup installs it")]
+    NoValidationLayer,
+    #[error("{call} `{object}`: {result}")]
+    Call { call: &'static str, object: String, result: vk::Result },
+    #[error("memory for `{object}` ({}): {source}", mebibytes(*bytes))]
+    Memory { object: String, bytes: u64, source: gpu_allocator::AllocationError },
+    #[error("`{object}` takes {}, more than this device's limit of {}", mebibytes(*bytes), mebibytes(*limit))]
+    TooLarge { object: String, bytes: u64, limit: u64 },
+    #[error("{what}: {value} is beyond this device's limit of {limit}")]
+    Limit { what: &'static str, value: u64, limit: u64 },
+}
+
+impl GpuError {
+    /// Turns the result of `call` on `object` into an error.
+    pub(super) fn call(call: &'static str, object: &str) -> impl FnOnce(vk::Result) -> GpuError {
+        let object = object.to_owned();
+        move |result| GpuError::Call { call, object, result }
+    }
+}
+
+fn mebibytes(bytes: u64) -> String {
+    format!("{:.1} MiB", bytes as f64 / (1 << 20) as f64)
+}

@@ -1,0 +1,121 @@
+//! Render targets.
+
+use std::{mem::ManuallyDrop, sync::Arc};
+
+use ash::vk;
+use gpu_allocator::{MemoryLocation, vulkan::Allocation};
+
+use super::{Context, GpuError};
+
+/// What a target holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TargetKind {
+    /// One u32 a pixel, readable by kernels as a storage image.
+    Id,
+    /// One f32 a pixel.
+    Depth,
+}
+
+impl TargetKind {
+    pub(super) fn format(self) -> vk::Format {
+        match self {
+            Self::Id => vk::Format::R32_UINT,
+            Self::Depth => vk::Format::D32_SFLOAT,
+        }
+    }
+
+    pub(super) fn aspect(self) -> vk::ImageAspectFlags {
+        match self {
+            Self::Id => vk::ImageAspectFlags::COLOR,
+            Self::Depth => vk::ImageAspectFlags::DEPTH,
+        }
+    }
+
+    fn usage(self) -> vk::ImageUsageFlags {
+        match self {
+            Self::Id => vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::STORAGE,
+            Self::Depth => vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
+        }
+    }
+}
+
+/// An image that the rasterizer writes.
+pub struct Target {
+    pub(super) raw: vk::Image,
+    pub(super) view: vk::ImageView,
+    pub(super) kind: TargetKind,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    allocation: ManuallyDrop<Allocation>,
+    context: Arc<Context>,
+}
+
+impl Target {
+    /// Contents are undefined.
+    ///
+    /// # Errors
+    /// Beyond the device's limits, out of memory.
+    pub fn new(context: &Arc<Context>, name: &str, kind: TargetKind, size: (u32, u32)) -> Result<Self, GpuError> {
+        let (width, height) = size;
+        let limit = context.limits().target_size;
+        if width.max(height) > limit {
+            let value = u64::from(width.max(height));
+            return Err(GpuError::Limit { what: "picture size in pixels", value, limit: u64::from(limit) });
+        }
+        let device = &context.device;
+        let info = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(kind.format())
+            .extent(vk::Extent3D { width, height, depth: 1 })
+            .mip_levels(1)
+            .array_layers(1)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .tiling(vk::ImageTiling::OPTIMAL)
+            .usage(kind.usage());
+        // SAFETY: the raw image is destroyed on each way out that does not hand it to an owner.
+        unsafe {
+            let raw = device.create_image(&info, None).map_err(GpuError::call("vkCreateImage", name))?;
+            let requirements = device.get_image_memory_requirements(raw);
+            let allocation = match context.allocate(name, requirements, MemoryLocation::GpuOnly, false) {
+                Ok(allocation) => ManuallyDrop::new(allocation),
+                Err(error) => {
+                    device.destroy_image(raw, None);
+                    return Err(error);
+                }
+            };
+            let view = vk::ImageView::null();
+            let mut target = Self { raw, view, kind, width, height, allocation, context: context.clone() };
+            device
+                .bind_image_memory(raw, target.allocation.memory(), target.allocation.offset())
+                .map_err(GpuError::call("vkBindImageMemory", name))?;
+            target.view = target.create_view(name)?;
+            context.set_name(raw, name);
+            Ok(target)
+        }
+    }
+
+    fn create_view(&self, name: &str) -> Result<vk::ImageView, GpuError> {
+        let info = vk::ImageViewCreateInfo::default()
+            .image(self.raw)
+            .view_type(vk::ImageViewType::TYPE_2D)
+            .format(self.kind.format())
+            .subresource_range(self.range());
+        // SAFETY: the image is bound to memory.
+        unsafe { self.context.device.create_image_view(&info, None) }.map_err(GpuError::call("vkCreateImageView", name))
+    }
+
+    pub(super) fn range(&self) -> vk::ImageSubresourceRange {
+        vk::ImageSubresourceRange::default().aspect_mask(self.kind.aspect()).level_count(1).layer_count(1)
+    }
+}
+
+impl Drop for Target {
+    fn drop(&mut self) {
+        // SAFETY: the device has ended all work on it; a null view is ignored.
+        unsafe {
+            self.context.device.destroy_image_view(self.view, None);
+            self.context.device.destroy_image(self.raw, None);
+            self.context.free(ManuallyDrop::take(&mut self.allocation));
+        }
+    }
+}

@@ -1,0 +1,28 @@
+//! The Vulkan layer: devices, memory, pipelines, commands. It knows nothing of rays.
+//!
+//! All of the crate's `unsafe` is here. Every handle is released by its owner's `Drop`, and every owner holds the
+//! [`Context`] that it was made from. One context is used by one thread at a time.
+#![allow(unsafe_code)]
+
+mod barrier;
+mod bindings;
+mod buffer;
+mod commands;
+mod context;
+mod devices;
+mod error;
+mod image;
+mod instance;
+mod pipeline;
+mod timer;
+
+pub use barrier::Access;
+pub use bindings::{Binding, BindingKind, Bindings, BindingSet};
+pub use buffer::{AnyBuffer, Buffer, BufferUse};
+pub use commands::{CommandBuffer, Commands, Dispatch};
+pub use context::{Context, ContextOptions};
+pub use devices::{DeviceInfo, DeviceSelector, Limits, devices};
+pub use error::GpuError;
+pub use image::{Target, TargetKind};
+pub use pipeline::{ComputeDesc, ComputePipeline, RasterDesc, RasterPipeline};
+pub use timer::{Timer, TimerRow};

@@ -1,0 +1,168 @@
+//! Compute and raster pipelines.
+
+use std::{ffi::CStr, io::Cursor, sync::Arc};
+
+use ash::vk;
+
+use super::{Bindings, Context, GpuError, TargetKind};
+
+const ENTRY_POINT: &CStr = c"main";
+
+/// A kernel and its variant.
+pub struct ComputeDesc<'a> {
+    /// Also the debug label and the timer.
+    pub name: &'static str,
+    /// The SPIR-V module's bytes.
+    pub spirv: &'a [u8],
+    /// Specialization constants 0, 1, ...
+    pub constants: &'a [u32],
+    /// Every subgroup has all its invocations; the workgroup's width must be a multiple of the subgroup size.
+    pub full_subgroups: bool,
+}
+
+/// A kernel, ready to run.
+pub struct ComputePipeline {
+    pub(super) raw: vk::Pipeline,
+    pub(super) bindings: Arc<Bindings>,
+    pub(super) name: &'static str,
+    context: Arc<Context>,
+}
+
+impl ComputePipeline {
+    /// # Errors
+    /// The driver refuses the module or is out of memory.
+    pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &ComputeDesc) -> Result<Self, GpuError> {
+        let module = ShaderModule::new(context, desc.name, desc.spirv)?;
+        let entries: Vec<_> = (0..desc.constants.len() as u32)
+            .map(|id| vk::SpecializationMapEntry { constant_id: id, offset: 4 * id, size: 4 })
+            .collect();
+        let constants = vk::SpecializationInfo::default()
+            .map_entries(&entries)
+            .data(bytemuck::cast_slice(desc.constants));
+        let flags = if desc.full_subgroups {
+            vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS
+        } else {
+            vk::PipelineShaderStageCreateFlags::empty()
+        };
+        let stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(vk::ShaderStageFlags::COMPUTE)
+            .module(module.raw)
+            .name(ENTRY_POINT)
+            .flags(flags)
+            .specialization_info(&constants);
+        let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(bindings.pipeline_layout)];
+        // SAFETY: all that `info` points to lives until the call returns.
+        let raw = unsafe { context.device.create_compute_pipelines(vk::PipelineCache::null(), &info, None) }
+            .map_err(|(_, result)| GpuError::call("vkCreateComputePipelines", desc.name)(result))?[0];
+        context.set_name(raw, desc.name);
+        Ok(Self { raw, bindings: bindings.clone(), name: desc.name, context: context.clone() })
+    }
+}
+
+impl Drop for ComputePipeline {
+    fn drop(&mut self) {
+        // SAFETY: the device has ended all work with it.
+        unsafe { self.context.device.destroy_pipeline(self.raw, None) };
+    }
+}
+
+/// Shaders of a raster pass that writes one ID target, with reverse-Z depth.
+pub struct RasterDesc<'a> {
+    /// Also the debug label and the timer.
+    pub name: &'static str,
+    /// The vertex shader's SPIR-V bytes.
+    pub vertex: &'a [u8],
+    /// The fragment shader's SPIR-V bytes.
+    pub fragment: &'a [u8],
+}
+
+/// A raster pass over a triangle list without vertex buffers, two-sided.
+pub struct RasterPipeline {
+    pub(super) raw: vk::Pipeline,
+    _bindings: Arc<Bindings>,
+    pub(super) name: &'static str,
+    context: Arc<Context>,
+}
+
+impl RasterPipeline {
+    /// # Errors
+    /// The driver refuses a module or is out of memory.
+    pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &RasterDesc) -> Result<Self, GpuError> {
+        let vertex = ShaderModule::new(context, desc.name, desc.vertex)?;
+        let fragment = ShaderModule::new(context, desc.name, desc.fragment)?;
+        let stages = [(vk::ShaderStageFlags::VERTEX, vertex.raw), (vk::ShaderStageFlags::FRAGMENT, fragment.raw)]
+            .map(|(stage, module)| {
+                vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(ENTRY_POINT)
+            });
+        let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
+        let assembly =
+            vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
+        let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+        let raster = vk::PipelineRasterizationStateCreateInfo::default()
+            .polygon_mode(vk::PolygonMode::FILL)
+            .cull_mode(vk::CullModeFlags::NONE)
+            .line_width(1.0);
+        let samples =
+            vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+            .depth_test_enable(true)
+            .depth_write_enable(true)
+            .depth_compare_op(vk::CompareOp::GREATER);
+        let write = [vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::R)];
+        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&write);
+        let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
+        let formats = [TargetKind::Id.format()];
+        let mut rendering = vk::PipelineRenderingCreateInfo::default()
+            .color_attachment_formats(&formats)
+            .depth_attachment_format(TargetKind::Depth.format());
+        let info = [vk::GraphicsPipelineCreateInfo::default()
+            .stages(&stages)
+            .vertex_input_state(&vertex_input)
+            .input_assembly_state(&assembly)
+            .viewport_state(&viewport)
+            .rasterization_state(&raster)
+            .multisample_state(&samples)
+            .depth_stencil_state(&depth)
+            .color_blend_state(&blend)
+            .dynamic_state(&dynamic)
+            .layout(bindings.pipeline_layout)
+            .push_next(&mut rendering)];
+        // SAFETY: all that `info` points to lives until the call returns.
+        let raw = unsafe { context.device.create_graphics_pipelines(vk::PipelineCache::null(), &info, None) }
+            .map_err(|(_, result)| GpuError::call("vkCreateGraphicsPipelines", desc.name)(result))?[0];
+        context.set_name(raw, desc.name);
+        Ok(Self { raw, _bindings: bindings.clone(), name: desc.name, context: context.clone() })
+    }
+}
+
+impl Drop for RasterPipeline {
+    fn drop(&mut self) {
+        // SAFETY: the device has ended all work with it.
+        unsafe { self.context.device.destroy_pipeline(self.raw, None) };
+    }
+}
+
+/// A module, needed only while a pipeline is made of it.
+struct ShaderModule<'a> {
+    raw: vk::ShaderModule,
+    context: &'a Context,
+}
+
+impl<'a> ShaderModule<'a> {
+    fn new(context: &'a Context, name: &str, spirv: &[u8]) -> Result<Self, GpuError> {
+        let code = ash::util::read_spv(&mut Cursor::new(spirv)).expect("build.rs writes whole SPIR-V words");
+        let info = vk::ShaderModuleCreateInfo::default().code(&code);
+        // SAFETY: the code lives until the call returns.
+        let raw = unsafe { context.device.create_shader_module(&info, None) }
+            .map_err(GpuError::call("vkCreateShaderModule", name))?;
+        Ok(Self { raw, context })
+    }
+}
+
+impl Drop for ShaderModule<'_> {
+    fn drop(&mut self) {
+        // SAFETY: pipelines do not need their modules once made.
+        unsafe { self.context.device.destroy_shader_module(self.raw, None) };
+    }
+}

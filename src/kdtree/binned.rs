@@ -1,0 +1,266 @@
+//! The cheapest split of a large cell: the same plane that a sweep over all sorted ends would find, without sorting them.
+//!
+//! Counting ends by bins gives the weight at every edge between bins, hence an upper bound of the best weight, and a
+//! lower bound of every weight within a bin. Only bins whose lower bound does not exceed the upper bound can hold the
+//! best plane, so only their ends are sorted and swept (the sweep of Wald and Havran 2006): O(n) in practice.
+
+use rayon::prelude::*;
+
+use super::{
+    BuildOptions,
+    bounds::{Bounds, Reference},
+    sah::{Shares, Split},
+};
+
+/// Three axes of begins, ends and flags in 27 KiB: they fit the L1 cache.
+const MAX_BINS: usize = 1024;
+/// References that one task counts: 900 KB.
+const CHUNK: usize = 1 << 15;
+/// f32 rounding of weights, with room to spare: no bin is passed over for it.
+const ROUNDING: f32 = 1.0 - 1e-5;
+
+/// A number an axis and bin; one more bin, for what lies after the last.
+type PerBin<T> = [[T; MAX_BINS + 1]; 3];
+
+/// Buffers of a search.
+pub struct BinnedSearch {
+    /// Begins and ends in a bin; then triangles that begin before it, and those that end in it or after it.
+    n_below: Box<PerBin<u32>>,
+    n_above: Box<PerBin<u32>>,
+    /// Bins to be swept.
+    flags: Box<PerBin<bool>>,
+    /// Sorted: the ends in flagged bins.
+    events: Vec<Event>,
+}
+
+impl Default for BinnedSearch {
+    fn default() -> Self {
+        Self {
+            n_below: Box::new([[0; MAX_BINS + 1]; 3]),
+            n_above: Box::new([[0; MAX_BINS + 1]; 3]),
+            flags: Box::new([[false; MAX_BINS + 1]; 3]),
+            events: Vec::new(),
+        }
+    }
+}
+
+/// Bins of one axis.
+#[derive(Clone, Copy)]
+struct Bins {
+    shares: Shares,
+    /// Bin of a position: `(position - min) * scale`, rounded to the nearest.
+    scale: f32,
+}
+
+impl Bins {
+    fn new(shares: Shares, n_bins: usize) -> Self {
+        Self { shares, scale: (n_bins - 1) as f32 * shares.per_extent() }
+    }
+
+    /// Never decreases as the position grows. Adding 2^23 rounds to an integer, in the lowest bits.
+    #[inline]
+    fn bin(&self, position: f32) -> usize {
+        ((position - self.shares.min) * self.scale + 8_388_608.0).to_bits() as usize & (MAX_BINS - 1)
+    }
+}
+
+impl BinnedSearch {
+    /// The cheapest split of a cell; its weight is infinite where there is none.
+    pub fn best_split(&mut self, references: &[Reference], cell: &Bounds, options: &BuildOptions) -> Split {
+        let n_bins = (references.len() / 4).next_power_of_two().clamp(32, MAX_BINS);
+        let bins = [0, 1, 2].map(|axis| Shares::new(cell, axis, options).map(|shares| Bins::new(shares, n_bins)));
+        self.count(references, &bins, n_bins);
+        let mut limit = self.upper_bound(references.len() as u32, &bins, n_bins);
+        loop {
+            let n_flagged = self.flag(limit, &bins, n_bins);
+            if n_flagged == 0 {
+                return Split::NONE;
+            }
+            self.collect(references, &bins);
+            let best = self.sweep(&bins);
+            // An edge next to the cell's face can beat every end of a triangle: then look again, with what there is.
+            if best.weight <= limit || limit == f32::INFINITY {
+                return best;
+            }
+            limit = best.weight;
+        }
+    }
+
+    /// Counts begins and ends by bins.
+    fn count(&mut self, references: &[Reference], bins: &[Option<Bins>; 3], n_bins: usize) {
+        for axis in 0..3 {
+            self.n_below[axis][..n_bins].fill(0);
+            self.n_above[axis][..n_bins].fill(0);
+        }
+        if references.len() <= CHUNK {
+            return count(references, bins, &mut self.n_below, &mut self.n_above);
+        }
+        let zeros = || (Box::new([[0; MAX_BINS + 1]; 3]), Box::new([[0; MAX_BINS + 1]; 3]));
+        let counted = references.par_chunks(CHUNK).map(|chunk| {
+            let (mut begins, mut ends) = zeros();
+            count(chunk, bins, &mut begins, &mut ends);
+            (begins, ends)
+        });
+        (self.n_below, self.n_above) = counted.reduce(zeros, |mut sum, other| {
+            add(&mut sum.0, &other.0);
+            add(&mut sum.1, &other.1);
+            sum
+        });
+    }
+
+    /// Turns counts into sums, and returns the least weight at an edge between two bins.
+    fn upper_bound(&mut self, n: u32, bins: &[Option<Bins>; 3], n_bins: usize) -> f32 {
+        let mut least = f32::INFINITY;
+        for axis in 0..3 {
+            let Some(Bins { shares, .. }) = bins[axis] else { continue };
+            let (below, above) = (&mut self.n_below[axis], &mut self.n_above[axis]);
+            let (mut n_below, mut n_above) = (0, n);
+            let per_bin = 1.0 / (n_bins - 1) as f32;
+            for bin in 0..n_bins {
+                let (begins, ends) = (below[bin], above[bin]);
+                (below[bin], above[bin]) = (n_below, n_above);
+                (n_below, n_above) = (n_below + begins, n_above - ends);
+                let weight = shares.weight((bin as f32 + 0.5) * per_bin, n_below as f32, n_above as f32);
+                if bin + 1 < n_bins && weight < least {
+                    least = weight;
+                }
+            }
+            (below[n_bins], above[n_bins]) = (n_below, n_above);
+        }
+        least
+    }
+
+    /// Flags the bins that may hold a weight up to `limit`, and returns their number.
+    fn flag(&mut self, limit: f32, bins: &[Option<Bins>; 3], n_bins: usize) -> usize {
+        let mut n_flagged = 0;
+        for axis in 0..3 {
+            self.flags[axis][..n_bins].fill(false);
+            let Some(Bins { shares, .. }) = bins[axis] else { continue };
+            let (below, above) = (&self.n_below[axis], &self.n_above[axis]);
+            let per_bin = 1.0 / (n_bins - 1) as f32;
+            for bin in 0..n_bins {
+                let (n_below, n_above) = (below[bin] as f32, above[bin + 1] as f32);
+                let from = (bin as f32 - 0.5).max(0.0) * per_bin;
+                let to = ((bin as f32 + 0.5) * per_bin).min(1.0);
+                let has_ends = below[bin + 1] > below[bin] || above[bin + 1] < above[bin];
+                let flag = has_ends && shares.lower_bound(from, to, n_below, n_above) * ROUNDING <= limit;
+                self.flags[axis][bin] = flag;
+                n_flagged += usize::from(flag);
+            }
+        }
+        n_flagged
+    }
+
+    /// Gathers and sorts the ends in flagged bins.
+    fn collect(&mut self, references: &[Reference], bins: &[Option<Bins>; 3]) {
+        self.events.clear();
+        if references.len() <= CHUNK {
+            collect(references, bins, &self.flags, &mut self.events);
+            self.events.sort_unstable();
+            return;
+        }
+        let flags = &self.flags;
+        let collected = references.par_chunks(CHUNK).map(|chunk| {
+            let mut events = Vec::new();
+            collect(chunk, bins, flags, &mut events);
+            events
+        });
+        self.events = collected.collect::<Vec<_>>().concat();
+        self.events.par_sort_unstable();
+    }
+
+    /// Weighs the planes through all collected ends.
+    fn sweep(&self, bins: &[Option<Bins>; 3]) -> Split {
+        let mut best = Split::NONE;
+        for on_axis in self.events.chunk_by(|a, b| a.axis() == b.axis()) {
+            let axis = on_axis[0].axis();
+            let Some(bins) = bins[axis] else { continue };
+            let (mut n_below, mut n_above, mut last_bin) = (0, 0, usize::MAX);
+            for in_plane in on_axis.chunk_by(|a, b| a.position() == b.position()) {
+                let position = in_plane[0].position();
+                let bin = bins.bin(position);
+                if bin != last_bin {
+                    (n_below, n_above, last_bin) = (self.n_below[axis][bin], self.n_above[axis][bin], bin);
+                }
+                let mut n = [0; 3];
+                in_plane.iter().for_each(|event| n[event.kind()] += 1);
+                let [n_ends, n_planar, n_begins] = n;
+                n_above -= n_ends + n_planar;
+                if position > bins.shares.min && position < bins.shares.max {
+                    let split = bins.shares.split(position, [n_below, n_planar, n_above]);
+                    best = if split.weight < best.weight { split } else { best };
+                }
+                n_below += n_begins + n_planar;
+            }
+        }
+        best
+    }
+}
+
+/// The end of a triangle's bounds on an axis, as a number that sorts by axis, position, kind.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Event(u64);
+
+impl Event {
+    const END: u64 = 0;
+    const PLANAR: u64 = 1;
+    const BEGIN: u64 = 2;
+
+    #[inline]
+    fn new(axis: usize, position: f32, kind: u64) -> Self {
+        // 0.0 - 0.0 for -0.0, which is the same plane; then the usual map of floats to integers of the same order.
+        let bits = (position + 0.0).to_bits();
+        let ordered = bits ^ if bits >> 31 == 1 { u32::MAX } else { 1 << 31 };
+        Self((axis as u64) << 34 | u64::from(ordered) << 2 | kind)
+    }
+
+    fn axis(self) -> usize {
+        (self.0 >> 34) as usize
+    }
+
+    fn position(self) -> f32 {
+        let ordered = (self.0 >> 2) as u32;
+        f32::from_bits(ordered ^ if ordered >> 31 == 0 { u32::MAX } else { 1 << 31 })
+    }
+
+    fn kind(self) -> usize {
+        (self.0 & 3) as usize
+    }
+}
+
+/// Counts begins and ends by bins.
+fn count(references: &[Reference], bins: &[Option<Bins>; 3], begins: &mut PerBin<u32>, ends: &mut PerBin<u32>) {
+    for axis in 0..3 {
+        let Some(bins) = bins[axis] else { continue };
+        let (begins, ends) = (&mut begins[axis], &mut ends[axis]);
+        for Reference { bounds, .. } in references {
+            begins[bins.bin(bounds.min[axis])] += 1;
+            ends[bins.bin(bounds.max[axis])] += 1;
+        }
+    }
+}
+
+fn add(sum: &mut PerBin<u32>, other: &PerBin<u32>) {
+    sum.as_flattened_mut().iter_mut().zip(other.as_flattened()).for_each(|(sum, n)| *sum += n);
+}
+
+/// Appends the ends in flagged bins.
+fn collect(references: &[Reference], bins: &[Option<Bins>; 3], flags: &PerBin<bool>, events: &mut Vec<Event>) {
+    for axis in 0..3 {
+        let Some(bins) = bins[axis] else { continue };
+        for Reference { bounds, .. } in references {
+            let (min, max) = (bounds.min[axis], bounds.max[axis]);
+            let (from, to) = (flags[axis][bins.bin(min)], flags[axis][bins.bin(max)]);
+            if from && min == max {
+                events.push(Event::new(axis, min, Event::PLANAR));
+                continue;
+            }
+            if from {
+                events.push(Event::new(axis, min, Event::BEGIN));
+            }
+            if to {
+                events.push(Event::new(axis, max, Event::END));
+            }
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! Axis-aligned boxes and the references of triangles to the cells that they meet.
+
+use crate::layout::Triangle;
+
+/// A closed box, world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    pub min: [f32; 3],
+    pub max: [f32; 3],
+}
+
+impl Bounds {
+    /// Contains nothing; neutral for [`Bounds::union`].
+    pub const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
+
+    /// The exact bounds of a triangle.
+    pub fn of(triangle: &Triangle) -> Self {
+        let [v0, v1, v2] = [triangle.v0, triangle.v1, triangle.v2];
+        Self { min: v0.min(v1).min(v2).to_array(), max: v0.max(v1).max(v2).to_array() }
+    }
+
+    /// The smallest box around both.
+    pub fn union(mut self, other: &Self) -> Self {
+        for axis in 0..3 {
+            self.min[axis] = self.min[axis].min(other.min[axis]);
+            self.max[axis] = self.max[axis].max(other.max[axis]);
+        }
+        self
+    }
+
+    /// What both contain.
+    pub fn intersection(mut self, other: &Self) -> Self {
+        for axis in 0..3 {
+            self.min[axis] = self.min[axis].max(other.min[axis]);
+            self.max[axis] = self.max[axis].min(other.max[axis]);
+        }
+        self
+    }
+
+    /// The two parts on either side of a plane: below, above.
+    pub fn split(&self, axis: usize, position: f32) -> [Self; 2] {
+        let (mut below, mut above) = (*self, *self);
+        below.max[axis] = position;
+        above.min[axis] = position;
+        [below, above]
+    }
+
+    /// Side lengths. In f64 no finite box overflows, nor do products of two.
+    pub fn extent(&self) -> [f64; 3] {
+        [0, 1, 2].map(|axis| f64::from(self.max[axis]) - f64::from(self.min[axis]))
+    }
+}
+
+/// A triangle in a cell: 28 bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Reference {
+    /// Bounds of the part of the triangle that lies in the cell, rounded outwards.
+    pub bounds: Bounds,
+    pub triangle_ix: u32,
+}

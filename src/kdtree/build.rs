@@ -1,0 +1,95 @@
+//! The upper part of a tree: large cells, whose references are counted and sorted out by all threads, and whose children
+//! are built side by side. Sums of counts and the order of references do not depend on the threads, so neither does the
+//! tree.
+
+use rayon::prelude::*;
+
+use super::{
+    BuildOptions, KdTree,
+    bounds::{Bounds, Reference},
+    flatten::flatten,
+    sah::{Search, Split},
+    subtree::{self, Cell, Input, Subtree, sort_out},
+};
+use crate::layout::Triangle;
+
+/// A cell with at most this many references is built by one thread: some 5 ms.
+const TASK_REFERENCES: usize = 4096;
+/// References that one thread sorts out at a time.
+const CHUNK: usize = 1 << 15;
+/// References that the budget allows in any case.
+const MIN_BUDGET: u64 = 1024;
+/// Splits that cut off empty space make up to six nodes of one; so many references stay below 2^30 nodes.
+const MAX_BUDGET: u64 = 1 << 26;
+
+/// The upper part of a tree.
+pub enum Top {
+    Split { axis: usize, position: f32, children: Box<[Top; 2]> },
+    Subtree(Subtree),
+}
+
+impl KdTree {
+    /// Builds the tree of `triangles`. Those of a zero area stay in it, those with a corner that is not finite do not.
+    ///
+    /// The same triangles and options give the same tree on any number of threads. O(n log n) time; some 150 bytes a
+    /// triangle while it runs.
+    pub fn build(triangles: &[Triangle], options: &BuildOptions) -> KdTree {
+        let references: Vec<Reference> = (0..triangles.len() as u32)
+            .into_par_iter()
+            .filter(|&ix| is_finite(&triangles[ix as usize]))
+            .map(|ix| Reference { bounds: Bounds::of(&triangles[ix as usize]), triangle_ix: ix })
+            .collect();
+        let bounds = references.par_iter().map(|r| r.bounds).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
+        let bounds = if references.is_empty() { Bounds { min: [0.0; 3], max: [0.0; 3] } } else { bounds };
+        let n = references.len() as u64;
+        let budget = (n * u64::from(options.max_references_per_triangle) + MIN_BUDGET).min(MAX_BUDGET.max(n));
+        let cell = Cell { bounds, level: 0, budget, bad_splits: 0 };
+        flatten(grow(Input { triangles, options }, references, cell), bounds)
+    }
+}
+
+/// No NaN and no infinity among its corners.
+pub fn is_finite(triangle: &Triangle) -> bool {
+    triangle.v0.is_finite() && triangle.v1.is_finite() && triangle.v2.is_finite()
+}
+
+fn grow(input: Input, references: Vec<Reference>, cell: Cell) -> Top {
+    let leaf_cost = input.options.intersection_cost * references.len() as f32;
+    if references.len() <= TASK_REFERENCES || cell.level >= input.options.depth_limit() {
+        return Top::Subtree(subtree::build(input, references, cell));
+    }
+    let split = Search::default().best_split(&references, &cell.bounds, input.options);
+    let cells = cell.children(&split).filter(|_| input.options.cost(&split) < leaf_cost);
+    let Some(cells) = cells else {
+        // Rare: nearly all of them coincide.
+        return Top::Subtree(subtree::build(input, references, cell));
+    };
+    let [below, above] = partition(input, references, &cell.bounds, &split);
+    let (below, above) = rayon::join(|| grow(input, below, cells[0]), || grow(input, above, cells[1]));
+    Top::Split { axis: split.axis, position: split.position, children: Box::new([below, above]) }
+}
+
+/// The references of both children, in the order of their parent's.
+fn partition(input: Input, references: Vec<Reference>, cell: &Bounds, split: &Split) -> [Vec<Reference>; 2] {
+    match split.n_references {
+        [0, _] => return [Vec::new(), references],
+        [_, 0] => return [references, Vec::new()],
+        _ => (),
+    }
+    let sorted_out = |chunk: &[Reference]| {
+        let (mut below, mut above) = (Vec::with_capacity(chunk.len()), Vec::with_capacity(chunk.len()));
+        for reference in chunk {
+            let parts = sort_out(input, reference, cell, split);
+            below.extend(parts[0]);
+            above.extend(parts[1]);
+        }
+        (below, above)
+    };
+    if references.len() <= CHUNK {
+        let (below, above) = sorted_out(&references);
+        return [below, above];
+    }
+    let (below, above): (Vec<_>, Vec<_>) = references.par_chunks(CHUNK).map(sorted_out).unzip();
+    let (below, above) = rayon::join(|| below.concat(), || above.concat());
+    [below, above]
+}

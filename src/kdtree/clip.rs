@@ -1,0 +1,120 @@
+//! "Perfect splits" (Havran 2000): the bounds of what a plane leaves of a triangle in a cell on either side.
+//!
+//! Sutherland-Hodgman in f64: coordinates are f32, so a computed point is off by some 2^-52 of them, and rounding
+//! bounds outwards to f32 (2^-24) swallows that unless a coordinate lies within 2^-52 of an f32; the traversal's slack
+//! is larger by far.
+
+use super::bounds::Bounds;
+use crate::layout::Triangle;
+
+/// Three corners, and one more for each of the six faces of a cell.
+const MAX_CORNERS: usize = 9;
+
+/// A convex polygon.
+struct Polygon {
+    corners: [[f64; 3]; MAX_CORNERS],
+    len: usize,
+}
+
+/// Bounds of the parts of `triangle` in `cell` below and above a plane through the cell. None: no more than a touch of
+/// the plane.
+pub fn split_bounds(triangle: &Triangle, cell: &Bounds, axis: usize, position: f32) -> [Option<Bounds>; 2] {
+    let corner = |v: glam::Vec3| v.as_dvec3().to_array();
+    let mut polygon = Polygon { corners: [[0.0; 3]; MAX_CORNERS], len: 3 };
+    polygon.corners[..3].copy_from_slice(&[corner(triangle.v0), corner(triangle.v1), corner(triangle.v2)]);
+    for face in 0..3 {
+        polygon.clip::<false>(face, f64::from(cell.min[face]));
+        polygon.clip::<true>(face, f64::from(cell.max[face]));
+    }
+    polygon.sides(axis, f64::from(position))
+}
+
+impl Polygon {
+    /// Cuts off what lies above (`KEEP_BELOW`) or below a plane.
+    fn clip<const KEEP_BELOW: bool>(&mut self, axis: usize, position: f64) {
+        let outside = |p: &[f64; 3]| if KEEP_BELOW { p[axis] > position } else { p[axis] < position };
+        if !self.corners[..self.len].iter().any(outside) {
+            return;
+        }
+        let mut kept = Polygon { corners: [[0.0; 3]; MAX_CORNERS], len: 0 };
+        for ix in 0..self.len {
+            let (a, b) = (&self.corners[ix], &self.corners[if ix + 1 == self.len { 0 } else { ix + 1 }]);
+            if !outside(a) {
+                kept.push(*a);
+            }
+            // An edge that ends on the plane brings its end as a corner.
+            if outside(a) != outside(b) && a[axis] != position && b[axis] != position {
+                kept.push(crossing(a, b, axis, position));
+            }
+        }
+        *self = kept;
+    }
+
+    /// A convex polygon never needs more than `MAX_CORNERS`; one bent by rounding may lose a corner to the last place.
+    fn push(&mut self, corner: [f64; 3]) {
+        self.corners[self.len.min(MAX_CORNERS - 1)] = corner;
+        self.len = (self.len + 1).min(MAX_CORNERS);
+    }
+
+    /// Bounds of the parts below and above a plane, rounded outwards; none where a part has no inside.
+    fn sides(&self, axis: usize, position: f64) -> [Option<Bounds>; 2] {
+        let (mut below, mut above) = (Box3::EMPTY, Box3::EMPTY);
+        for ix in 0..self.len {
+            let (a, b) = (&self.corners[ix], &self.corners[if ix + 1 == self.len { 0 } else { ix + 1 }]);
+            if a[axis] <= position {
+                below.grow(a);
+            }
+            if a[axis] >= position {
+                above.grow(a);
+            }
+            if (a[axis] < position && b[axis] > position) || (a[axis] > position && b[axis] < position) {
+                let point = crossing(a, b, axis, position);
+                below.grow(&point);
+                above.grow(&point);
+            }
+        }
+        [(below.min[axis] < position).then(|| below.outwards()), (above.max[axis] > position).then(|| above.outwards())]
+    }
+}
+
+/// Where the edge from `a` to `b`, which lie on different sides, crosses a plane.
+fn crossing(a: &[f64; 3], b: &[f64; 3], axis: usize, position: f64) -> [f64; 3] {
+    let t = (position - a[axis]) / (b[axis] - a[axis]);
+    let mut point = [0, 1, 2].map(|k| a[k] + t * (b[k] - a[k]));
+    point[axis] = position;
+    point
+}
+
+/// A box in f64.
+struct Box3 {
+    min: [f64; 3],
+    max: [f64; 3],
+}
+
+impl Box3 {
+    const EMPTY: Self = Self { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
+
+    fn grow(&mut self, point: &[f64; 3]) {
+        for k in 0..3 {
+            self.min[k] = if point[k] < self.min[k] { point[k] } else { self.min[k] };
+            self.max[k] = if point[k] > self.max[k] { point[k] } else { self.max[k] };
+        }
+    }
+
+    /// The smallest f32 box around it.
+    fn outwards(&self) -> Bounds {
+        Bounds { min: self.min.map(round_down), max: self.max.map(round_up) }
+    }
+}
+
+/// The largest f32 not above `x`.
+fn round_down(x: f64) -> f32 {
+    let nearest = x as f32;
+    if f64::from(nearest) > x { nearest.next_down() } else { nearest }
+}
+
+/// The smallest f32 not below `x`.
+fn round_up(x: f64) -> f32 {
+    let nearest = x as f32;
+    if f64::from(nearest) < x { nearest.next_up() } else { nearest }
+}

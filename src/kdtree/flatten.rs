@@ -1,0 +1,54 @@
+//! The upper part of a tree and the subtrees below it, one behind the other in depth-first order.
+
+use glam::Vec3;
+
+use super::{EMPTY_LEAF, KdTree, Node, bounds::Bounds, build::Top, subtree::Subtree};
+
+/// The tree as the kernels read it.
+pub fn flatten(top: Top, cell: Bounds) -> KdTree {
+    let mut tree = KdTree {
+        nodes: vec![EMPTY_LEAF; 2],
+        parents: vec![0],
+        leaf_triangles: Vec::new(),
+        cell_min: Vec3::from_array(cell.min),
+        cell_max: Vec3::from_array(cell.max),
+        depth: 0,
+    };
+    append(&mut tree, 0, top);
+    tree
+}
+
+/// Fills a slot, and appends all below it.
+fn append(tree: &mut KdTree, slot: usize, top: Top) {
+    match top {
+        Top::Subtree(subtree) => append_subtree(tree, slot, &subtree),
+        Top::Split { axis, position, children } => {
+            let child = tree.nodes.len();
+            tree.nodes[slot] = Node::Split { axis, position, child: child as u32 }.into();
+            tree.nodes.extend([EMPTY_LEAF; 2]);
+            tree.parents.push(slot as u32);
+            let [below, above] = *children;
+            append(tree, child, below);
+            append(tree, child + 1, above);
+        }
+    }
+}
+
+/// The subtree's root goes to the slot, its other nodes behind all others.
+fn append_subtree(tree: &mut KdTree, slot: usize, subtree: &Subtree) {
+    let (first_node, first_triangle) = (tree.nodes.len() as u32, tree.leaf_triangles.len() as u32);
+    let relocated = |node| match Node::from(node) {
+        Node::Leaf { first, count } => Node::Leaf { first: first + first_triangle, count },
+        Node::Split { axis, position, child } => Node::Split { axis, position, child: child - 2 + first_node },
+    };
+    tree.nodes[slot] = relocated(subtree.nodes[0]).into();
+    tree.nodes.extend(subtree.nodes[2..].iter().map(|&node| -> crate::layout::KdNode { relocated(node).into() }));
+    tree.parents.resize(tree.nodes.len() / 2, 0);
+    for node_ix in std::iter::once(slot).chain(first_node as usize..tree.nodes.len()) {
+        if let Node::Split { child, .. } = tree.node(node_ix as u32) {
+            tree.parents[child as usize >> 1] = node_ix as u32;
+        }
+    }
+    tree.leaf_triangles.extend_from_slice(&subtree.leaf_triangles);
+    tree.depth = tree.depth.max(subtree.depth);
+}

@@ -1,0 +1,126 @@
+//! Triangles to a flat kd-tree built by the surface area heuristic (SAH), its statistics and its validator.
+//!
+//! ```text
+//! triangles ── build (large nodes, in parallel) ── subtree (one task) ── flatten ──> KdTree
+//!                  └── split: search by bins or by counting, SAH ──┘
+//!                  └── clip: a straddling triangle's bounds on either side ──┘
+//! ```
+
+mod binned;
+mod bounds;
+mod build;
+mod clip;
+mod counted;
+mod flatten;
+mod sah;
+mod statistics;
+mod subtree;
+mod validate;
+
+use glam::Vec3;
+
+use crate::layout::{KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_MAX_DEPTH, KdNode};
+
+pub use statistics::Statistics;
+pub use validate::Invalid;
+
+/// A kd-tree over triangles, as the kernels read it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KdTree {
+    /// Root 0; node 1 is unused (an empty leaf); the children of a split are neighbours at an even index. Depth-first:
+    /// a pair of children, then all below the first, then all below the second.
+    pub nodes: Vec<KdNode>,
+    /// `nodes.len() / 2` entries: `parents[n >> 1]` is the split whose children are `n & !1` and `n | 1`; entry 0 is 0.
+    pub parents: Vec<u32>,
+    /// Triangle indices, leaf after leaf in the order of the nodes, ascending in each leaf.
+    pub leaf_triangles: Vec<u32>,
+    /// The root's cell is the exact bounds of all triangles (a box of zeros for none).
+    pub cell_min: Vec3,
+    pub cell_max: Vec3,
+    /// Levels below the root, at most `KD_MAX_DEPTH - 2`.
+    pub depth: u32,
+}
+
+/// How a tree is built. Costs are in any one unit; only their ratio matters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BuildOptions {
+    /// Cost of a step from a split to a child.
+    pub traversal_cost: f32,
+    /// Cost of a ray-triangle test.
+    pub intersection_cost: f32,
+    /// Share of its intersection cost by which a split that cuts off empty space is favoured, 0 to 1.
+    pub empty_bonus: f32,
+    /// Levels below the root; never more than `KD_MAX_DEPTH - 2`, which is also what `None` means.
+    pub max_depth: Option<u32>,
+    /// Splits on the way to a leaf that may look more expensive than not splitting; what does not pay is undone.
+    pub bad_splits: u32,
+    /// No more references than this many times the triangles (plus 1024).
+    pub max_references_per_triangle: u32,
+}
+
+impl Default for BuildOptions {
+    fn default() -> Self {
+        Self {
+            traversal_cost: 1.0,
+            intersection_cost: 0.5,
+            empty_bonus: 0.1,
+            max_depth: None,
+            bad_splits: 0,
+            max_references_per_triangle: 16,
+        }
+    }
+}
+
+impl BuildOptions {
+    /// Expected cost of a split cell whose children become leaves.
+    fn cost(&self, split: &sah::Split) -> f32 {
+        self.traversal_cost + self.intersection_cost * split.weight
+    }
+
+    /// Levels below the root that the tree may have.
+    pub fn depth_limit(&self) -> u32 {
+        self.max_depth.unwrap_or(u32::MAX).min(KD_MAX_DEPTH - 2)
+    }
+}
+
+/// A node, decoded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Node {
+    /// The children are `child` (below `position`) and `child + 1` (above).
+    Split { axis: usize, position: f32, child: u32 },
+    /// `leaf_triangles[first .. first + count]`.
+    Leaf { first: u32, count: u32 },
+}
+
+/// A leaf without triangles.
+const EMPTY_LEAF: KdNode = KdNode { split_or_first: 0, axis_and_child: KD_LEAF };
+
+impl From<KdNode> for Node {
+    fn from(node: KdNode) -> Self {
+        let high = node.axis_and_child >> KD_CHILD_SHIFT;
+        match node.axis_and_child & KD_AXIS_MASK {
+            KD_LEAF => Self::Leaf { first: node.split_or_first, count: high },
+            axis => Self::Split { axis: axis as usize, position: f32::from_bits(node.split_or_first), child: high },
+        }
+    }
+}
+
+impl From<Node> for KdNode {
+    fn from(node: Node) -> Self {
+        match node {
+            Node::Leaf { first, count } => {
+                Self { split_or_first: first, axis_and_child: count << KD_CHILD_SHIFT | KD_LEAF }
+            }
+            Node::Split { axis, position, child } => {
+                Self { split_or_first: position.to_bits(), axis_and_child: child << KD_CHILD_SHIFT | axis as u32 }
+            }
+        }
+    }
+}
+
+impl KdTree {
+    /// The node at an index.
+    pub fn node(&self, node_ix: u32) -> Node {
+        self.nodes[node_ix as usize].into()
+    }
+}

@@ -1,0 +1,133 @@
+//! The surface area heuristic: what a split of a cell costs, and the search for the cheapest one.
+//!
+//! Costs within a search are *weights*: the expected number of ray-triangle tests below a split,
+//! `p_below * n_below + p_above * n_above`, where p is the share of the cell's surface that the child's cell has
+//! (MacDonald and Booth 1990). Along an axis the weight is linear between the ends of triangles, so only planes through
+//! these need be tried.
+
+use super::{BuildOptions, binned::BinnedSearch, bounds::Bounds, bounds::Reference, counted};
+
+/// A plane through a cell, and its weight.
+#[derive(Clone, Copy, Debug)]
+pub struct Split {
+    pub axis: usize,
+    pub position: f32,
+    /// Triangles that lie in the plane go below, otherwise above.
+    pub planar_below: bool,
+    /// Expected ray-triangle tests of a ray through the cell, after the bonus for cutting off empty space.
+    pub weight: f32,
+    /// Triangles below and above; both sides count those that straddle the plane.
+    pub n_references: [u32; 2],
+    /// Shares of the cell's surface that the cells below and above have.
+    pub shares: [f32; 2],
+}
+
+impl Split {
+    /// Worse than any other.
+    pub const NONE: Self = Self {
+        axis: 0,
+        position: 0.0,
+        planar_below: true,
+        weight: f32::INFINITY,
+        n_references: [0; 2],
+        shares: [0.0; 2],
+    };
+}
+
+/// The shares of a cell's surface on either side of a plane: linear in the plane's position.
+#[derive(Clone, Copy, Debug)]
+pub struct Shares {
+    pub axis: usize,
+    pub min: f32,
+    pub max: f32,
+    /// 1 / extent on the axis.
+    per_extent: f32,
+    /// Share of a cell of zero thickness, and what the whole thickness adds to it.
+    base: f32,
+    slope: f32,
+    /// Factor on the weight of a split with an empty side.
+    empty_factor: f32,
+}
+
+impl Shares {
+    /// None where no plane can split the cell: no thickness on this axis, or no surface at all.
+    pub fn new(cell: &Bounds, axis: usize, options: &BuildOptions) -> Option<Self> {
+        let extent = cell.extent();
+        let [along, u, v] = [extent[axis], extent[(axis + 1) % 3], extent[(axis + 2) % 3]];
+        let half_area = along * u + along * v + u * v;
+        // 1 / extent must be a finite f32 for the arithmetic of plane positions.
+        (along > f64::from(f32::MIN_POSITIVE) * 4.0 && along <= f64::from(f32::MAX) && half_area > 0.0).then(|| Self {
+            axis,
+            min: cell.min[axis],
+            max: cell.max[axis],
+            per_extent: (1.0 / along) as f32,
+            base: (u * v / half_area) as f32,
+            slope: (along * (u + v) / half_area) as f32,
+            empty_factor: 1.0 - options.empty_bonus,
+        })
+    }
+
+    /// Where a plane lies in the cell, 0 to 1.
+    #[inline]
+    pub fn fraction(&self, position: f32) -> f32 {
+        (position - self.min) * self.per_extent
+    }
+
+    /// The shares at a fraction of the extent.
+    #[inline]
+    fn shares(&self, fraction: f32) -> [f32; 2] {
+        [self.base + self.slope * fraction, self.base + self.slope * (1.0 - fraction)]
+    }
+
+    /// Weight of a split at a fraction of the extent, with so many triangles on either side.
+    #[inline]
+    pub fn weight(&self, fraction: f32, n_below: f32, n_above: f32) -> f32 {
+        self.lower_bound(fraction, fraction, n_below, n_above)
+    }
+
+    /// No weight between two fractions is less, with at least so many triangles on either side.
+    #[inline]
+    pub fn lower_bound(&self, from: f32, to: f32, n_below: f32, n_above: f32) -> f32 {
+        let (below, above) = (self.shares(from)[0], self.shares(to)[1]);
+        let factor = if n_below == 0.0 || n_above == 0.0 { self.empty_factor } else { 1.0 };
+        factor * (below * n_below + above * n_above)
+    }
+
+    pub fn per_extent(&self) -> f32 {
+        self.per_extent
+    }
+
+    /// The split at a position strictly inside the cell, with so many triangles below, in its plane and above.
+    #[inline]
+    pub fn split(&self, position: f32, [n_below, n_planar, n_above]: [u32; 3]) -> Split {
+        let fraction = self.fraction(position);
+        let if_below = self.weight(fraction, (n_below + n_planar) as f32, n_above as f32);
+        let if_above = self.weight(fraction, n_below as f32, (n_above + n_planar) as f32);
+        let planar_below = if_below <= if_above;
+        Split {
+            axis: self.axis,
+            position,
+            planar_below,
+            weight: if planar_below { if_below } else { if_above },
+            n_references: if planar_below { [n_below + n_planar, n_above] } else { [n_below, n_above + n_planar] },
+            shares: self.shares(fraction),
+        }
+    }
+}
+
+/// Buffers of a search, to be used again for the next cell.
+#[derive(Default)]
+pub struct Search {
+    binned: BinnedSearch,
+}
+
+impl Search {
+    /// The cheapest split of a cell; its weight is infinite where there is none.
+    pub fn best_split(&mut self, references: &[Reference], cell: &Bounds, options: &BuildOptions) -> Split {
+        if references.len() <= counted::MAX_REFERENCES {
+            counted::best_split(references, cell, options)
+        } else {
+            self.binned.best_split(references, cell, options)
+        }
+    }
+}

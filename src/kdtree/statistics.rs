@@ -1,0 +1,70 @@
+//! What a tree holds and what it costs.
+
+use serde::Serialize;
+
+use super::{BuildOptions, KdTree, Node};
+
+/// A tree in numbers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Statistics {
+    /// Splits and leaves; the unused node 1 is not counted.
+    pub n_nodes: u64,
+    pub n_leaves: u64,
+    /// Leaves without triangles.
+    pub n_empty_leaves: u64,
+    /// Levels below the root.
+    pub depth: u32,
+    /// Entries of all leaves.
+    pub n_references: u64,
+    /// References by the number of triangles; 0 for none.
+    pub references_per_triangle: f64,
+    /// Expected cost of a ray that crosses the root's cell, in the unit of the build's costs (MacDonald and Booth 1990):
+    /// the sum over all nodes of their own cost times the share of the root's surface that their cell has.
+    pub sah_cost: f64,
+    /// Nodes, parents and leaves in memory.
+    pub bytes: u64,
+}
+
+impl KdTree {
+    /// The tree in numbers. `options` are those it was built with (only their costs are read).
+    pub fn statistics(&self, n_triangles: usize, options: &BuildOptions) -> Statistics {
+        let mut statistics = Statistics {
+            depth: self.depth,
+            n_references: self.leaf_triangles.len() as u64,
+            references_per_triangle: self.leaf_triangles.len() as f64 / n_triangles.max(1) as f64,
+            bytes: (size_of_val(&*self.nodes) + size_of_val(&*self.parents) + size_of_val(&*self.leaf_triangles))
+                as u64,
+            ..Default::default()
+        };
+        let root = (self.cell_min.as_dvec3().to_array(), self.cell_max.as_dvec3().to_array());
+        let root_area = half_area(&root.0, &root.1);
+        let mut stack = vec![(0, root)];
+        while let Some((node_ix, (min, max))) = stack.pop() {
+            // A cell without a surface (a point, a line) counts like the root itself.
+            let share = if root_area > 0.0 { half_area(&min, &max) / root_area } else { 1.0 };
+            statistics.n_nodes += 1;
+            match self.node(node_ix) {
+                Node::Leaf { count, .. } => {
+                    statistics.n_leaves += 1;
+                    statistics.n_empty_leaves += u64::from(count == 0);
+                    statistics.sah_cost += f64::from(options.intersection_cost) * f64::from(count) * share;
+                }
+                Node::Split { axis, position, child } => {
+                    statistics.sah_cost += f64::from(options.traversal_cost) * share;
+                    let (mut below_max, mut above_min) = (max, min);
+                    below_max[axis] = f64::from(position);
+                    above_min[axis] = f64::from(position);
+                    stack.push((child + 1, (above_min, max)));
+                    stack.push((child, (min, below_max)));
+                }
+            }
+        }
+        statistics
+    }
+}
+
+/// Half of a box's surface.
+fn half_area(min: &[f64; 3], max: &[f64; 3]) -> f64 {
+    let [x, y, z] = [max[0] - min[0], max[1] - min[1], max[2] - min[2]];
+    x * y + y * z + z * x
+}

@@ -1,0 +1,219 @@
+//! A scene file's text to a scene.
+
+use std::{collections::HashMap, ops::Range, path::Path};
+
+use glam::Vec3;
+use toml::Spanned;
+
+use super::{
+    Camera, RenderDefaults, Scene,
+    description::{CameraSpec, CommonSpec, DenoiseWord, Description, LightSpec, MeshSpec, RenderSpec, Source},
+    error::{Checked, SceneError},
+    framing,
+    material::{MaterialSpec, colour, within},
+    mesh::{MAX_COORDINATE, Mesh, finite},
+    obj::{Library, load_obj},
+    read::read_utf8,
+};
+use crate::{
+    frame::Denoise,
+    layout::{LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Material},
+};
+
+/// Loads a scene file, and the meshes that it names relative to its folder.
+pub(super) fn load_toml(path: &Path) -> Result<Scene, SceneError> {
+    let text = read_utf8(path)?;
+    let file = File { path, text: &text };
+    let description: Description = toml::from_str(&text).map_err(|e| match e.span() {
+        Some(span) => file.at(&span, e.message()),
+        None => SceneError::file(path, e.message()),
+    })?;
+    assemble(&file, description)
+}
+
+/// The file that errors name.
+struct File<'a> {
+    path: &'a Path,
+    text: &'a str,
+}
+
+impl File<'_> {
+    fn at(&self, span: &Range<usize>, what: impl AsRef<str>) -> SceneError {
+        let before = &self.text.as_bytes()[..span.start.min(self.text.len())];
+        SceneError::line(self.path, 1 + before.iter().filter(|byte| **byte == b'\n').count(), what)
+    }
+
+    /// The value, checked; an error names the object and its line.
+    fn check<T, U>(
+        &self,
+        object: &str,
+        spec: &Spanned<T>,
+        check: impl FnOnce(&T) -> Checked<U>,
+    ) -> Result<U, SceneError> {
+        check(spec.get_ref()).map_err(|what| self.at(&spec.span(), format!("{object}: {what}")))
+    }
+}
+
+fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> {
+    let mut scene = Scene::empty(file.path);
+    let mut materials = HashMap::new();
+    for (name, spec) in &description.materials {
+        let material = file.check(&format!("material `{name}`"), spec, MaterialSpec::material)?;
+        materials.insert(name.clone(), scene.push_material(name, material));
+    }
+    for (ix, spec) in description.light.iter().enumerate() {
+        scene.lights.push(file.check(&format!("light {}", ix + 1), spec, light)?);
+    }
+    if let Some(spec) = &description.ambient {
+        scene.ambient = file.check("ambient", spec, |rgb| colour("ambient", Some(*rgb), Vec3::ZERO))?;
+    }
+    if let Some(spec) = &description.background {
+        scene.background = file.check("background", spec, |rgb| colour("background", Some(*rgb), Vec3::ZERO))?;
+    }
+    if let Some(spec) = &description.render {
+        scene.defaults = file.check("render", spec, render_defaults)?;
+    }
+    for (ix, table) in description.mesh.into_iter().enumerate() {
+        add_mesh(file, &mut scene, &materials, (ix, table))?;
+    }
+    if scene.triangles.is_empty() {
+        return Err(SceneError::file(file.path, "has no triangles"));
+    }
+    scene.camera = match &description.camera {
+        Some(spec) => file.check("camera", spec, camera)?,
+        None => framing::camera(&scene.triangles),
+    };
+    Ok(scene)
+}
+
+fn add_mesh(
+    file: &File,
+    scene: &mut Scene,
+    materials: &HashMap<String, u32>,
+    (ix, table): (usize, Spanned<toml::Table>),
+) -> Result<(), SceneError> {
+    let span = table.span();
+    let object = format!("mesh {}", ix + 1);
+    let failed = |what: String| file.at(&span, format!("{object}: {what}"));
+    let MeshSpec { source, common } = MeshSpec::new(table.into_inner()).map_err(failed)?;
+    let transform = common.transform.transform().map_err(failed)?;
+    let named = named_materials(&common, materials).map_err(failed)?;
+    let (mesh, slots) = match source {
+        Source::File { path, shading } => {
+            let folder = file.path.parent().unwrap_or(Path::new(""));
+            let (mesh, library) = load_obj(&folder.join(path), shading)?;
+            let slots = if named.is_empty() { scene.push_library(&library) } else { named };
+            (mesh, slots)
+        }
+        Source::Generator(generator) => {
+            let mut mesh = generator.build().map_err(failed)?;
+            if common.smooth == Some(false) {
+                mesh.normals.fill([Vec3::ZERO; 3]);
+            }
+            let slots = if named.is_empty() { vec![scene.default_material()] } else { named };
+            (mesh, slots)
+        }
+    };
+    scene.triangles.extend(mesh.to_world(&transform).map_err(failed)?);
+    scene.push_slots(&mesh, &slots);
+    Ok(())
+}
+
+/// Indices of the materials that a mesh names.
+fn named_materials(common: &CommonSpec, materials: &HashMap<String, u32>) -> Checked<Vec<u32>> {
+    let index = |name: &String| {
+        materials.get(name).copied().ok_or_else(|| format!("there is no material `{name}` in [materials]"))
+    };
+    common.material.iter().chain(&common.materials).map(index).collect()
+}
+
+impl Scene {
+    pub(super) fn push_material(&mut self, name: &str, material: Material) -> u32 {
+        self.materials.push(material);
+        self.material_names.push(name.to_owned());
+        (self.materials.len() - 1) as u32
+    }
+
+    /// Index of the material of meshes that have none.
+    pub(super) fn default_material(&mut self) -> u32 {
+        const NAME: &str = "(default)";
+        if let Some(ix) = self.material_names.iter().position(|name| name == NAME) {
+            return ix as u32;
+        }
+        let material = MaterialSpec::default().material().expect("defaults are in range");
+        self.push_material(NAME, material)
+    }
+
+    /// Adds a library's materials; returns the slots of the mesh that came with it, the last one for no material.
+    pub(super) fn push_library(&mut self, library: &Library) -> Vec<u32> {
+        let materials = library.names.iter().zip(&library.materials);
+        let mut slots: Vec<u32> = materials.map(|(name, material)| self.push_material(name, *material)).collect();
+        slots.push(self.default_material());
+        slots
+    }
+
+    /// One material a triangle of the mesh; slots beyond the last material start over.
+    pub(super) fn push_slots(&mut self, mesh: &Mesh, materials: &[u32]) {
+        self.triangle_materials.extend(mesh.slots.iter().map(|slot| materials[*slot as usize % materials.len()]));
+    }
+}
+
+fn light(spec: &LightSpec) -> Checked<Light> {
+    let (kind, position, intensity) = match *spec {
+        LightSpec::Point { position, intensity } => {
+            (LIGHT_POINT, point("position", position)?, colour("intensity", Some(intensity), Vec3::ZERO)?)
+        }
+        LightSpec::Directional { direction, irradiance } => {
+            let travels = finite("direction", direction)?.try_normalize();
+            let travels = travels.ok_or_else(|| format!("direction = {direction:?} has no direction"))?;
+            (LIGHT_DIRECTIONAL, -travels.as_vec3(), colour("irradiance", Some(irradiance), Vec3::ZERO)?)
+        }
+    };
+    Ok(Light { position, kind, intensity, reserved: 0 })
+}
+
+fn camera(spec: &CameraSpec) -> Checked<Camera> {
+    let camera = Camera {
+        eye: point("eye", spec.eye)?,
+        target: point("target", spec.target)?,
+        up: finite("up", spec.up.unwrap_or([0.0, 1.0, 0.0]))?.normalize_or_zero().as_vec3(),
+        vertical_fov_degrees: within("vertical_fov", spec.vertical_fov.unwrap_or(45.0), 0.1, 170.0)?,
+    };
+    let forward = (camera.target.as_dvec3() - camera.eye.as_dvec3()).normalize_or_zero();
+    if forward.cross(camera.up.as_dvec3()).length() < 1e-4 {
+        return Err(
+            "eye, target and up span no picture: eye and target coincide, or up points along the view".to_owned()
+        );
+    }
+    Ok(camera)
+}
+
+/// A point in the world.
+fn point(name: &str, value: [f32; 3]) -> Checked<Vec3> {
+    let point = finite(name, value)?.as_vec3();
+    if point.abs().max_element() <= MAX_COORDINATE {
+        Ok(point)
+    } else {
+        Err(format!("{name} = {value:?} lies beyond {MAX_COORDINATE:e}"))
+    }
+}
+
+fn render_defaults(spec: &RenderSpec) -> Checked<RenderDefaults> {
+    let defaults = RenderDefaults::default();
+    let count = |name: &str, value: Option<u32>, default: u32, max: u32| match value.unwrap_or(default) {
+        value if (1..=max).contains(&value) => Ok(value),
+        value => Err(format!("{name} = {value} is outside 1 to {max}")),
+    };
+    let threshold = spec.denoise_threshold.unwrap_or(Denoise::DEFAULT_THRESHOLD);
+    let threshold = within("denoise_threshold", threshold, 0.0, 4.0)?;
+    Ok(RenderDefaults {
+        width: count("width", spec.width, defaults.width, 16_384)?,
+        height: count("height", spec.height, defaults.height, 16_384)?,
+        max_depth: count("max_depth", spec.max_depth, defaults.max_depth, 64)?,
+        exposure: within("exposure", spec.exposure.unwrap_or(defaults.exposure), 1e-6, 1e6)?,
+        denoise: match spec.denoise.unwrap_or(DenoiseWord::Paper) {
+            DenoiseWord::Off => Denoise::Off,
+            DenoiseWord::Paper => Denoise::Paper { threshold },
+        },
+    })
+}

@@ -1,0 +1,43 @@
+//! A camera and a light for meshes that come without.
+
+use glam::Vec3;
+
+use super::Camera;
+use crate::layout::{LIGHT_DIRECTIONAL, Light, Triangle};
+
+/// From the middle of the picture towards the eye: from the front, the right and above.
+const TOWARDS_EYE: Vec3 = Vec3::new(0.45, 0.35, 1.0);
+const VERTICAL_FOV_DEGREES: f32 = 40.0;
+/// Room around the bounding sphere.
+const MARGIN: f32 = 1.05;
+
+/// Smallest and largest coordinates of all corners.
+pub fn bounds(triangles: &[Triangle]) -> (Vec3, Vec3) {
+    let corners = triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]);
+    corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
+}
+
+/// Sees the whole bounding sphere of the bounding box, in any picture that is not higher than wide.
+pub(super) fn camera(triangles: &[Triangle]) -> Camera {
+    let (min, max) = bounds(triangles);
+    let centre = (min + max) / 2.0;
+    // All in one point: any distance will do, but the eye must move off it.
+    let radius = ((max - min).length() / 2.0).max(centre.abs().max_element() * 1e-3).max(1e-6);
+    let distance = MARGIN * radius / (VERTICAL_FOV_DEGREES / 2.0).to_radians().sin();
+    Camera {
+        eye: centre + TOWARDS_EYE.normalize() * distance,
+        target: centre,
+        up: Vec3::Y,
+        vertical_fov_degrees: VERTICAL_FOV_DEGREES,
+    }
+}
+
+/// From over the camera's left shoulder.
+pub(super) fn light() -> Light {
+    Light {
+        position: Vec3::new(-0.4, 0.8, 0.7).normalize(),
+        kind: LIGHT_DIRECTIONAL,
+        intensity: Vec3::splat(0.8),
+        reserved: 0,
+    }
+}

@@ -1,0 +1,112 @@
+//! Surfaces of revolution: columns, goblets, vases.
+
+use glam::{DVec2, DVec3};
+use serde::Deserialize;
+
+use super::{
+    count, length,
+    rings::{Rings, SurfacePoint, heading},
+    triangle_budget,
+};
+use crate::scene::{error::Checked, mesh::Mesh};
+
+/// A profile turned about the y axis: 2 * segments triangles a step, half of that where a step ends on the axis. Closed
+/// where the profile begins and ends on the axis.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Lathe {
+    /// [distance from the axis, height], from top to bottom along the outside: outside is to the left of the way that
+    /// the profile runs (a vessel's runs up its inside first). A smooth curve goes through the points; a point given
+    /// twice is a sharp edge, and two points between sharp edges are a straight line.
+    profile: Vec<[f32; 2]>,
+    /// Points around.
+    segments: u32,
+    /// Steps between two points of a curve; 8 where absent.
+    steps: Option<u32>,
+}
+
+/// A point of the profile and the unit normal there.
+type ProfilePoint = (DVec2, DVec2);
+
+impl Lathe {
+    pub fn build(&self) -> Checked<Mesh> {
+        let segments = count("segments", self.segments, 3)?;
+        let steps = count("steps", self.steps.unwrap_or(8), 1)?;
+        triangle_budget(2 * u64::from(segments) * u64::from(steps) * self.profile.len() as u64)?;
+        let points = self.profile.iter().map(|[r, y]| profile_point(*r, *y)).collect::<Checked<Vec<DVec2>>>()?;
+        let mut mesh = Mesh::default();
+        for run in points.chunk_by(|a, b| a != b) {
+            let curve = curve(run, steps)?;
+            // On the axis all points of a ring are one.
+            let n_points = curve.iter().map(|(at, _)| if at.x == 0.0 { 1 } else { segments }).collect();
+            let point = |ring: usize, around: f64| -> SurfacePoint {
+                let (at, normal) = curve[ring];
+                let turned = |v: DVec2| v.x * heading(around) + v.y * DVec3::Y;
+                (turned(at), turned(normal))
+            };
+            mesh.append(Rings { n_points, cyclic: false }.sweep(point));
+        }
+        Ok(mesh)
+    }
+}
+
+fn profile_point(r: f32, y: f32) -> Checked<DVec2> {
+    if r != 0.0 {
+        length("a profile's distance from the axis", r)?;
+    }
+    crate::scene::material::within("a profile's height", y, -1e6, 1e6)?;
+    Ok(DVec2::new(f64::from(r), f64::from(y)))
+}
+
+/// A run of the profile between sharp edges, by Catmull and Rom's spline.
+fn curve(run: &[DVec2], steps: u32) -> Checked<Vec<ProfilePoint>> {
+    let [first, .., last] = run else {
+        return Err(
+            "the profile has a point that begins and ends nothing: a sharp edge is a point given twice".to_owned()
+        );
+    };
+    if run[1..run.len() - 1].iter().any(|point| point.x == 0.0) {
+        return Err("the profile touches the axis between its ends".to_owned());
+    }
+    if let [a, b] = run {
+        let normal = left_of(*b - *a);
+        return Ok(vec![(*a, pole_normal(*a, normal)), (*b, pole_normal(*b, normal))]);
+    }
+    let mut curve = Vec::new();
+    let before = beyond(*first, run[1]);
+    let after = beyond(*last, run[run.len() - 2]);
+    let at = |ix: isize| *run.get(ix as usize).unwrap_or(if ix < 0 { &before } else { &after });
+    for span in 0..run.len() as isize - 1 {
+        let points = [at(span - 1), at(span), at(span + 1), at(span + 2)];
+        curve.extend((0..steps).map(|step| catmull_rom(points, f64::from(step) / f64::from(steps))));
+    }
+    let end = run.len() as isize - 2;
+    let (_, normal) = catmull_rom([at(end - 1), at(end), at(end + 1), at(end + 2)], 1.0);
+    curve.push((*last, normal));
+    match curve.iter().skip(1).rev().skip(1).find(|(at, _)| at.x <= 0.0) {
+        Some((at, _)) => Err(format!("the profile's curve crosses the axis at height {}", at.y)),
+        None => Ok(curve.into_iter().map(|(at, normal)| (at, pole_normal(at, normal))).collect()),
+    }
+}
+
+/// The point before an end: its mirror image where the curve ends on the axis, so that the tip is round.
+fn beyond(end: DVec2, next: DVec2) -> DVec2 {
+    if end.x == 0.0 { DVec2::new(-next.x, next.y) } else { 2.0 * end - next }
+}
+
+/// Between the second and the third point; exactly the second one at 0.
+fn catmull_rom([a, b, c, d]: [DVec2; 4], t: f64) -> ProfilePoint {
+    let (linear, square, cube) = ((c - a) / 2.0, a - 2.5 * b + 2.0 * c - 0.5 * d, (d - a) / 2.0 + 1.5 * (b - c));
+    let at = b + t * (linear + t * (square + t * cube));
+    (at, left_of(linear + t * (2.0 * square + t * 3.0 * cube)))
+}
+
+/// Unit normal of a profile that runs along `way`.
+fn left_of(way: DVec2) -> DVec2 {
+    DVec2::new(-way.y, way.x).normalize_or_zero()
+}
+
+/// On the axis the normal is along it.
+fn pole_normal(at: DVec2, normal: DVec2) -> DVec2 {
+    if at.x == 0.0 { DVec2::new(0.0, 1f64.copysign(normal.y)) } else { normal }
+}

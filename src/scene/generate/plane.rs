@@ -1,0 +1,68 @@
+//! Flat things: rectangles of fields, and discs. Both lie on the ground and face up.
+
+use glam::Vec3;
+use serde::Deserialize;
+
+use super::{count, length, rings::heading, triangle_budget};
+use crate::scene::{error::Checked, mesh::Mesh};
+
+/// A rectangle of fields centred at the origin: 2 triangles a field. Field (i, k) has slot i + k: two materials make a
+/// checkerboard, and with one row of fields, stripes.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plane {
+    /// Along x and z.
+    size: [f32; 2],
+    /// Fields along x and z; 1 and 1 where absent.
+    fields: Option<[u32; 2]>,
+}
+
+/// A fan around the origin: one triangle a segment.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Disc {
+    radius: f32,
+    segments: u32,
+}
+
+impl Plane {
+    pub fn build(&self) -> Checked<Mesh> {
+        let [width, depth] = [length("size", self.size[0])?, length("size", self.size[1])?];
+        let [n_x, n_z] = self.fields.unwrap_or([1, 1]);
+        let (n_x, n_z) = (count("fields", n_x, 1)?, count("fields", n_z, 1)?);
+        triangle_budget(2 * u64::from(n_x) * u64::from(n_z))?;
+        let mut mesh = Mesh::default();
+        for k in 0..=n_z {
+            for i in 0..=n_x {
+                let x = width * (f64::from(i) / f64::from(n_x) - 0.5);
+                let z = depth * (f64::from(k) / f64::from(n_z) - 0.5);
+                mesh.push_position(Vec3::new(x as f32, 0.0, z as f32));
+            }
+        }
+        for k in 0..n_z {
+            for i in 0..n_x {
+                let back = k * (n_x + 1) + i;
+                let front = back + n_x + 1;
+                mesh.push_flat([back, front, front + 1], i + k);
+                mesh.push_flat([back, front + 1, back + 1], i + k);
+            }
+        }
+        Ok(mesh)
+    }
+}
+
+impl Disc {
+    pub fn build(&self) -> Checked<Mesh> {
+        let radius = length("radius", self.radius)?;
+        let n = count("segments", self.segments, 3)?;
+        let mut mesh = Mesh::default();
+        let centre = mesh.push_position(Vec3::ZERO);
+        for ix in 0..n {
+            mesh.push_position((radius * heading(f64::from(ix) / f64::from(n))).as_vec3());
+        }
+        for ix in 0..n {
+            mesh.push_flat([centre, 1 + ix, 1 + (ix + 1) % n], 0);
+        }
+        Ok(mesh)
+    }
+}

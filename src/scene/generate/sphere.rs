@@ -1,0 +1,168 @@
+//! Spheres: by longitude and latitude, or from an icosahedron.
+
+use std::{collections::HashMap, f64::consts::PI};
+
+use glam::DVec3;
+use serde::Deserialize;
+
+use super::{
+    count, length,
+    rings::{Rings, SurfacePoint, heading},
+    triangle_budget,
+};
+use crate::scene::{error::Checked, mesh::Mesh};
+
+/// A sphere around the origin with poles at +y and -y, closed: 2 * segments * rings triangles, or exactly `triangles`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sphere {
+    radius: f32,
+    segments: Option<u32>,
+    rings: Option<u32>,
+    triangles: Option<u32>,
+}
+
+/// A sphere around the origin, closed: 20 frequency^2 triangles of almost one size and shape.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Geodesic {
+    radius: f32,
+    /// Parts that each edge of the icosahedron is cut into.
+    frequency: u32,
+}
+
+impl Sphere {
+    pub fn build(&self) -> Checked<Mesh> {
+        let radius = length("radius", self.radius)?;
+        let rings = polar_rings(self.segments, self.rings, self.triangles)?;
+        let point = |ring: usize, around: f64| -> SurfacePoint {
+            let normal = polar_direction(&rings, ring, around);
+            (radius * normal, normal)
+        };
+        Ok(rings.sweep(point))
+    }
+}
+
+/// Rings between two poles, as asked for: even ones, or an exact number of triangles on rings of points in proportion
+/// to a sphere's circles.
+pub fn polar_rings(segments: Option<u32>, rings: Option<u32>, triangles: Option<u32>) -> Checked<Rings> {
+    match (segments, rings, triangles) {
+        (Some(segments), Some(rings), None) => {
+            let (segments, n_rings) = (count("segments", segments, 3)?, count("rings", rings, 1)?);
+            triangle_budget(2 * u64::from(segments) * u64::from(n_rings))?;
+            let mut n_points = vec![segments; n_rings as usize + 2];
+            n_points[0] = 1;
+            n_points[n_rings as usize + 1] = 1;
+            Ok(Rings { n_points, cyclic: false })
+        }
+        (None, None, Some(triangles)) => {
+            triangle_budget(u64::from(triangles))?;
+            // Almost equilateral: rows sqrt(3)/2 edges high, and rings of 2/pi of the equator's points on average.
+            let n_rows = (f64::from(triangles) * PI / (4.0 * 3f64.sqrt())).sqrt().round() as u32;
+            Rings::between_poles(triangles, n_rows.max(2) - 1, |down| (PI * down).sin())
+        }
+        _ => Err("needs either `segments` and `rings`, or `triangles`".to_owned()),
+    }
+}
+
+/// Where a point of a ring lies, seen from the middle.
+pub fn polar_direction(rings: &Rings, ring: usize, around: f64) -> DVec3 {
+    let last = rings.n_points.len() - 1;
+    if ring == 0 || ring == last {
+        return if ring == 0 { DVec3::Y } else { DVec3::NEG_Y };
+    }
+    let (sin, cos) = (PI * ring as f64 / last as f64).sin_cos();
+    sin * heading(around) + cos * DVec3::Y
+}
+
+/// The icosahedron's corners are (0, +-1, +-golden ratio) and their rotations; faces counter-clockwise from outside.
+const ICOSAHEDRON: [[usize; 3]; 20] = [
+    [0, 11, 5],
+    [0, 5, 1],
+    [0, 1, 7],
+    [0, 7, 10],
+    [0, 10, 11],
+    [1, 5, 9],
+    [5, 11, 4],
+    [11, 10, 2],
+    [10, 7, 6],
+    [7, 1, 8],
+    [3, 9, 4],
+    [3, 4, 2],
+    [3, 2, 6],
+    [3, 6, 8],
+    [3, 8, 9],
+    [4, 9, 5],
+    [2, 4, 11],
+    [6, 2, 10],
+    [8, 6, 7],
+    [9, 8, 1],
+];
+
+fn icosahedron_corners() -> [DVec3; 12] {
+    let g = (1.0 + 5f64.sqrt()) / 2.0;
+    [
+        [-1.0, g, 0.0],
+        [1.0, g, 0.0],
+        [-1.0, -g, 0.0],
+        [1.0, -g, 0.0],
+        [0.0, -1.0, g],
+        [0.0, 1.0, g],
+        [0.0, -1.0, -g],
+        [0.0, 1.0, -g],
+        [g, 0.0, -1.0],
+        [g, 0.0, 1.0],
+        [-g, 0.0, -1.0],
+        [-g, 0.0, 1.0],
+    ]
+    .map(DVec3::from_array)
+}
+
+impl Geodesic {
+    pub fn build(&self) -> Checked<Mesh> {
+        let radius = length("radius", self.radius)?;
+        let frequency = count("frequency", self.frequency, 1)?;
+        triangle_budget(20 * u64::from(frequency).pow(2))?;
+        let mut points =
+            Points { radius, corners: icosahedron_corners(), by_weights: HashMap::new(), mesh: Mesh::default() };
+        for face in ICOSAHEDRON {
+            for row in 0..frequency {
+                for ix in 0..=row {
+                    // Corner weights of a point: row - ix parts of the second corner, ix of the third.
+                    let mut at = |row: u32, ix: u32| points.at(face, [frequency - row, row - ix, ix]);
+                    let (top, left, right) = (at(row, ix), at(row + 1, ix), at(row + 1, ix + 1));
+                    let beside = (ix < row).then(|| at(row, ix + 1));
+                    points.mesh.push_flat([top, left, right], 0);
+                    if let Some(beside) = beside {
+                        points.mesh.push_flat([top, right, beside], 0);
+                    }
+                }
+            }
+        }
+        let Mesh { positions, faces, mut normals, slots } = points.mesh;
+        for (normals, face) in normals.iter_mut().zip(&faces) {
+            *normals = face.map(|ix| positions[ix as usize].normalize());
+        }
+        Ok(Mesh { positions, faces, normals, slots })
+    }
+}
+
+/// Points on the sphere, made once for all faces that share them.
+struct Points {
+    radius: f64,
+    corners: [DVec3; 12],
+    /// By the corners of the icosahedron that a point lies between and its parts of each, in order.
+    by_weights: HashMap<[(usize, u32); 3], u32>,
+    mesh: Mesh,
+}
+
+impl Points {
+    fn at(&mut self, face: [usize; 3], weights: [u32; 3]) -> u32 {
+        let mut key = [0, 1, 2].map(|k| if weights[k] == 0 { (0, 0) } else { (face[k], weights[k]) });
+        key.sort_unstable();
+        *self.by_weights.entry(key).or_insert_with(|| {
+            let sum: DVec3 = key.iter().map(|(corner, weight)| self.corners[*corner] * f64::from(*weight)).sum();
+            self.mesh.push_position((self.radius * sum.normalize()).as_vec3())
+        })
+    }
+}

@@ -1,0 +1,76 @@
+//! Superellipsoids: from boxes with rounded edges through ellipsoids to octahedra.
+
+use glam::{DVec3, Vec3};
+use serde::Deserialize;
+
+use super::{
+    length,
+    rings::SurfacePoint,
+    sphere::{polar_direction, polar_rings},
+};
+use crate::scene::{error::Checked, material::within, mesh::Mesh};
+
+/// (|x|^(2/h) + |z|^(2/h))^(h/v) + |y|^(2/v) = 1, scaled to its size, around the origin. Closed: triangles as of a
+/// sphere. Barr, "Superquadrics and Angle-Preserving Transformations" (1981).
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Superellipsoid {
+    /// Extents along x, y, z.
+    size: [f32; 3],
+    /// v and h, 0.1 (a box) to 1.9 (almost an octahedron); 1 and 1 make an ellipsoid.
+    exponents: [f32; 2],
+    segments: Option<u32>,
+    rings: Option<u32>,
+    triangles: Option<u32>,
+}
+
+impl Superellipsoid {
+    pub fn build(&self) -> Checked<Mesh> {
+        for extent in self.size {
+            length("size", extent)?;
+        }
+        let half = Vec3::from_array(self.size).as_dvec3() / 2.0;
+        let [v, h] = self.exponents;
+        let shape = Shape {
+            v: 2.0 / f64::from(within("exponents", v, 0.1, 1.9)?),
+            h: 2.0 / f64::from(within("exponents", h, 0.1, 1.9)?),
+        };
+        let rings = polar_rings(self.segments, self.rings, self.triangles)?;
+        let point = |ring: usize, around: f64| -> SurfacePoint {
+            let direction = polar_direction(&rings, ring, around);
+            let point = direction / shape.gauge(direction);
+            (half * point, (shape.gradient(point) / half).normalize())
+        };
+        Ok(rings.sweep(point))
+    }
+}
+
+/// The unscaled solid, with powers in place of exponents.
+struct Shape {
+    v: f64,
+    h: f64,
+}
+
+impl Shape {
+    /// What a vector must be divided by to lie on the surface.
+    fn gauge(&self, p: DVec3) -> f64 {
+        (self.across(p).powf(self.v) + p.y.abs().powf(self.v)).powf(1.0 / self.v)
+    }
+
+    /// Distance from the axis, in the measure of the horizontal section.
+    fn across(&self, p: DVec3) -> f64 {
+        (p.x.abs().powf(self.h) + p.z.abs().powf(self.h)).powf(1.0 / self.h)
+    }
+
+    /// Normal to the surface, of any length.
+    fn gradient(&self, p: DVec3) -> DVec3 {
+        let across = self.across(p);
+        let power = |x: f64, power: f64| x.abs().powf(power - 1.0).copysign(x);
+        if across == 0.0 {
+            return DVec3::new(0.0, p.y, 0.0);
+        }
+        let radial = across.powf(self.v - 1.0);
+        let horizontal = |x: f64| radial * power(x / across, self.h);
+        DVec3::new(horizontal(p.x), power(p.y, self.v), horizontal(p.z))
+    }
+}

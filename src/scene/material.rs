@@ -1,0 +1,115 @@
+//! Materials in MTL's own terms, from scene files and MTL files alike.
+//!
+//! Radiance leaving a hit is `Ke + Ka * ambient`, plus over all visible lights
+//! `(Kd * max(0, N.L) + Ks * (R.V)^Ns) * irradiance`, without 1/pi. `illum` says what else happens:
+//!
+//! | illum | |
+//! |---|---|
+//! | 0 | colour only: Kd, without a highlight |
+//! | 1 | diffuse |
+//! | 2, 10 | and a highlight (10's "cast shadows onto invisible surfaces" is left out) |
+//! | 3, 8 | and mirror reflection, weighted by Ks |
+//! | 4, 6 | glass: reflection Ks, refraction Tf (1 - Ks), no Fresnel term |
+//! | 5 | mirror reflection by Fresnel's term (Ni) |
+//! | 7 | glass whose reflection and refraction are weighted by Fresnel's term |
+//! | 9 | as 4, without reflection |
+
+use glam::Vec3;
+use serde::Deserialize;
+
+use super::error::Checked;
+use crate::layout::{MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR, Material};
+
+/// A material as written. Everything may be left out.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MaterialSpec {
+    /// Ambient colour; Kd where absent.
+    #[serde(rename = "Ka")]
+    pub ka: Option<[f32; 3]>,
+    /// Diffuse colour; 0.8 where absent, as in MTL.
+    #[serde(rename = "Kd")]
+    pub kd: Option<[f32; 3]>,
+    /// Specular colour, and the mirror's; black where absent.
+    #[serde(rename = "Ks")]
+    pub ks: Option<[f32; 3]>,
+    /// Radiance it gives off; black where absent.
+    #[serde(rename = "Ke")]
+    pub ke: Option<[f32; 3]>,
+    /// Transmission colour; white where absent.
+    #[serde(rename = "Tf")]
+    pub tf: Option<[f32; 3]>,
+    /// Exponent of the highlight; 32 where absent.
+    #[serde(rename = "Ns")]
+    pub ns: Option<f32>,
+    /// Index of refraction; 1.5 where absent.
+    #[serde(rename = "Ni")]
+    pub ni: Option<f32>,
+    /// Opacity, 0 to 1; 1 where absent.
+    pub d: Option<f32>,
+    /// 1 - d.
+    #[serde(rename = "Tr")]
+    pub tr: Option<f32>,
+    /// 0 to 10; 2 where absent and Ks is not black, 1 otherwise.
+    pub illum: Option<u8>,
+}
+
+/// What happens at a surface of MTL's illumination model; none beyond 10.
+pub fn illum_flags(illum: u32) -> Option<u32> {
+    const REFLECT: u32 = MATERIAL_SPECULAR | MATERIAL_REFLECT;
+    match illum {
+        0 | 1 => Some(0),
+        2 | 10 => Some(MATERIAL_SPECULAR),
+        3 | 8 => Some(REFLECT),
+        4 | 6 => Some(REFLECT | MATERIAL_REFRACT),
+        5 => Some(REFLECT | MATERIAL_FRESNEL),
+        7 => Some(REFLECT | MATERIAL_REFRACT | MATERIAL_FRESNEL),
+        9 => Some(MATERIAL_SPECULAR | MATERIAL_REFRACT),
+        _ => None,
+    }
+}
+
+impl MaterialSpec {
+    /// The material with its defaults filled in. The error says which term is out of range.
+    pub fn material(&self) -> Checked<Material> {
+        let kd = colour("Kd", self.kd, Vec3::splat(0.8))?;
+        let ks = colour("Ks", self.ks, Vec3::ZERO)?;
+        let illum = self.illum.map_or(if ks == Vec3::ZERO { 1 } else { 2 }, u32::from);
+        let opacity = match (self.d, self.tr) {
+            (Some(_), Some(_)) => return Err("has both d and Tr: they are one term (Tr = 1 - d)".to_owned()),
+            (None, Some(tr)) => 1.0 - within("Tr", tr, 0.0, 1.0)?,
+            (d, None) => within("d", d.unwrap_or(1.0), 0.0, 1.0)?,
+        };
+        // Some exporters write 0 for "does not bend".
+        let ni = self.ni.map(|ni| if ni == 0.0 { 1.0 } else { ni }).unwrap_or(1.5);
+        Ok(Material {
+            ka: colour("Ka", self.ka, kd)?,
+            // An exponent of 0 would be a highlight without a shape, and pow(0, 0) is undefined in GLSL.
+            ns: within("Ns", self.ns.unwrap_or(32.0), 0.0, 1e6)?.max(1.0),
+            kd,
+            d: opacity,
+            ks,
+            ni: within("Ni", ni, 0.001, 100.0)?,
+            ke: colour("Ke", self.ke, Vec3::ZERO)?,
+            flags: illum_flags(illum).ok_or_else(|| format!("illum {illum} is not one of 0 to 10"))?,
+            tf: colour("Tf", self.tf, Vec3::ONE)?,
+            illum,
+        })
+    }
+}
+
+/// A colour without negative or infinite parts.
+pub(super) fn colour(name: &str, value: Option<[f32; 3]>, default: Vec3) -> Checked<Vec3> {
+    let Some(value) = value else { return Ok(default) };
+    if value.iter().all(|part| part.is_finite() && *part >= 0.0) {
+        Ok(Vec3::from_array(value))
+    } else {
+        Err(format!("{name} = {value:?} is not a colour: three finite numbers, none below 0"))
+    }
+}
+
+/// A finite number of a closed range.
+pub(super) fn within(name: &str, value: f32, min: f32, max: f32) -> Checked<f32> {
+    // NaN is in no range.
+    if (min..=max).contains(&value) { Ok(value) } else { Err(format!("{name} = {value} is outside {min} to {max}")) }
+}

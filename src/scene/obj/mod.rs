@@ -1,0 +1,88 @@
+//! Wavefront OBJ files with their MTL materials.
+
+mod clean;
+mod mtl;
+
+use std::path::Path;
+
+use glam::Vec3;
+
+use self::clean::{CleanObj, NORMALS, SMOOTH, clean_obj};
+pub(super) use self::mtl::Library;
+use super::{error::SceneError, mesh::Mesh, read::read_lossy, smooth::crease_normals};
+
+/// Degrees between faces beyond which their common edge is sharp.
+pub(super) const DEFAULT_CREASE: f32 = 40.0;
+
+/// How a mesh without normals is shaded, and one with them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shading {
+    /// Otherwise every face is flat, whatever the file says.
+    pub smooth: bool,
+    /// Degrees.
+    pub crease: f32,
+}
+
+/// Reads a mesh and its materials. A face's slot is an index into the library; `library.materials.len()` stands for
+/// none, or one that the library lacks.
+pub(super) fn load_obj(path: &Path, shading: Shading) -> Result<(Mesh, Library), SceneError> {
+    let text = read_lossy(path)?;
+    let clean = clean_obj(&text).map_err(|(line, what)| SceneError::line(path, line, what))?;
+    let library = mtl::load_libraries(path, &clean.libraries)?;
+    warn(path, &clean, &library);
+    let models = parse(&clean, &library).map_err(|e| SceneError::file(path, e.to_string()))?;
+    let mesh = mesh(&models, library.materials.len() as u32, shading);
+    if mesh.faces.is_empty() {
+        return Err(SceneError::file(path, "has no triangles"));
+    }
+    Ok((mesh, library))
+}
+
+/// Says what is left out, once each.
+fn warn(path: &Path, clean: &CleanObj, library: &Library) {
+    let path = path.display();
+    if let Some((line, statement)) = &clean.unknown {
+        tracing::warn!("{path}:{line}: unknown statement `{}`", statement.escape_debug());
+    }
+    if let Some((name, line)) = clean.used_materials.iter().find(|(name, _)| !library.names.contains(name)) {
+        tracing::warn!(
+            "{path}:{line}: no library defines material `{}`: it becomes the default one",
+            name.escape_debug()
+        );
+    }
+}
+
+fn parse(clean: &CleanObj, library: &Library) -> Result<Vec<tobj::Model>, tobj::LoadError> {
+    let options =
+        tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
+    let by_name = library.names.iter().cloned().zip(0..).collect();
+    // tobj only looks names up; the materials themselves are in the library.
+    let materials = |_: &Path| Ok((vec![tobj::Material::default()], std::clone::Clone::clone(&by_name)));
+    tobj::load_obj_buf(&mut clean.text.as_bytes(), &options, materials).map(|(models, _)| models)
+}
+
+/// One mesh of all models; polygons have become fans.
+fn mesh(models: &[tobj::Model], no_material: u32, shading: Shading) -> Mesh {
+    let mut mesh = Mesh::default();
+    let mut to_smooth = Vec::new();
+    for tobj::Model { mesh: model, name } in models {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(model.positions.as_chunks().0.iter().copied().map(Vec3::from_array));
+        mesh.faces.extend(model.indices.as_chunks::<3>().0.iter().map(|face| face.map(|ix| first + ix)));
+        let n_faces = mesh.faces.len();
+        mesh.slots.resize(n_faces, model.material_id.map_or(no_material, |ix| ix as u32));
+        to_smooth.resize(n_faces, shading.smooth && name == SMOOTH);
+        if shading.smooth && name == NORMALS {
+            let normal = |ix: u32| Vec3::from_slice(&model.normals[ix as usize * 3..]).normalize_or_zero();
+            mesh.normals.extend(model.normal_indices.as_chunks::<3>().0.iter().map(|face| face.map(normal)));
+        }
+        mesh.normals.resize(n_faces, [Vec3::ZERO; 3]);
+    }
+    if to_smooth.contains(&true) {
+        let computed = crease_normals(&mesh.positions, &mesh.faces, &to_smooth, shading.crease);
+        for (face, normals) in computed.into_iter().enumerate().filter(|(face, _)| to_smooth[*face]) {
+            mesh.normals[face] = normals;
+        }
+    }
+    mesh
+}

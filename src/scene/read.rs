@@ -1,0 +1,37 @@
+//! Reading scene files whole.
+
+use std::{fs, path::Path};
+
+use super::error::SceneError;
+
+/// Text that need not be UTF-8 throughout: comments in old encodings are no reason to refuse a mesh.
+pub(super) fn read_lossy(path: &Path) -> Result<String, SceneError> {
+    let text = match String::from_utf8(read(path)?) {
+        Ok(text) => text,
+        Err(e) => String::from_utf8_lossy(e.as_bytes()).into_owned(),
+    };
+    Ok(without_bom(text))
+}
+
+/// Text that must be UTF-8.
+pub(super) fn read_utf8(path: &Path) -> Result<String, SceneError> {
+    let text = String::from_utf8(read(path)?).map_err(|e| {
+        let valid = &e.as_bytes()[..e.utf8_error().valid_up_to()];
+        let line = 1 + valid.iter().filter(|byte| **byte == b'\n').count();
+        SceneError::line(path, line, "is not UTF-8")
+    })?;
+    Ok(without_bom(text))
+}
+
+fn read(path: &Path) -> Result<Vec<u8>, SceneError> {
+    let failed = |e: std::io::Error| SceneError::file(path, format!("cannot be read: {e}"));
+    // A device or a pipe might never end.
+    if !fs::metadata(path).map_err(failed)?.is_file() {
+        return Err(SceneError::file(path, "is not a regular file"));
+    }
+    fs::read(path).map_err(failed)
+}
+
+fn without_bom(text: String) -> String {
+    text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text)
+}
