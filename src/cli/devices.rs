@@ -7,9 +7,6 @@ use super::{error::CliError, print, table::table};
 /// Lists the devices, and what keeps one from rendering.
 pub fn run() -> Result<(), CliError> {
     let devices = gpu::devices()?;
-    if devices.is_empty() {
-        return Err(CliError::NoDevice);
-    }
     let rows: Vec<_> = (devices.iter())
         .map(|device| {
             let index = device.index.to_string();

@@ -13,8 +13,6 @@ pub enum CliError {
     Scene(#[from] SceneError),
     #[error(transparent)]
     Device(#[from] GpuError),
-    #[error("the loader finds no Vulkan device")]
-    NoDevice,
     #[error("the validation layer reported {0} messages")]
     Validation(usize),
     #[error(transparent)]
@@ -29,7 +27,7 @@ impl CliError {
         match self {
             Self::Usage(_) | Self::Output(OutputError::UnknownEnding { .. }) => 2,
             Self::Scene(_) => 3,
-            Self::Device(_) | Self::NoDevice | Self::Validation(_) => 4,
+            Self::Device(_) | Self::Validation(_) => 4,
             Self::Output(_) | Self::Stdout(_) => 5,
         }
     }
