@@ -59,6 +59,16 @@ pub enum Traversal {
     Stack,
 }
 
+impl Traversal {
+    /// The kernels' specialization constant (kdtree.glsl's `TRAVERSAL_` numbers).
+    pub(crate) fn constant(self) -> u32 {
+        match self {
+            Self::Mask => 0,
+            Self::Stack => 1,
+        }
+    }
+}
+
 /// How primary rays find their triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Primary {

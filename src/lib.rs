@@ -22,6 +22,12 @@ pub mod scene;
 
 pub mod kdtree;
 
+pub mod camera;
+
+pub mod cpu;
+
 pub mod gpu;
+pub mod passes;
+pub mod render;
 
 pub mod output;

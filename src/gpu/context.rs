@@ -64,7 +64,8 @@ impl Context {
             let pool = vk::CommandPoolCreateInfo::default()
                 .queue_family_index(family as u32)
                 .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
-            let pool = device.create_command_pool(&pool, None).map_err(GpuError::call("vkCreateCommandPool", "kdray"))?;
+            let pool =
+                device.create_command_pool(&pool, None).map_err(GpuError::call("vkCreateCommandPool", "kdray"))?;
             (device.get_device_queue(family as u32, 0), pool)
         };
         let allocator = create_allocator(&instance, &device, physical)?;
@@ -148,8 +149,13 @@ impl Context {
         location: MemoryLocation,
         linear: bool,
     ) -> Result<Allocation, GpuError> {
-        let desc =
-            AllocationCreateDesc { name, requirements, location, linear, allocation_scheme: AllocationScheme::GpuAllocatorManaged };
+        let desc = AllocationCreateDesc {
+            name,
+            requirements,
+            location,
+            linear,
+            allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+        };
         self.allocator
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
@@ -204,8 +210,7 @@ fn create_device(
         .enabled_extension_names(&extensions)
         .push_next(&mut features);
     // SAFETY: all that `create` points to lives until the call returns.
-    unsafe { instance.raw.create_device(physical, &create, None) }
-        .map_err(GpuError::call("vkCreateDevice", &info.name))
+    unsafe { instance.raw.create_device(physical, &create, None) }.map_err(GpuError::call("vkCreateDevice", &info.name))
 }
 
 fn create_allocator(

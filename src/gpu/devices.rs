@@ -66,11 +66,8 @@ pub(super) fn list(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Devic
     // SAFETY: the instance is alive.
     let devices = unsafe { instance.raw.enumerate_physical_devices() }
         .map_err(GpuError::call("vkEnumeratePhysicalDevices", "kdray"))?;
-    let list: Vec<_> = devices
-        .into_iter()
-        .enumerate()
-        .map(|(index, device)| (device, describe(instance, device, index)))
-        .collect();
+    let list: Vec<_> =
+        devices.into_iter().enumerate().map(|(index, device)| (device, describe(instance, device, index))).collect();
     if list.is_empty() { Err(GpuError::NoDriver) } else { Ok(list) }
 }
 

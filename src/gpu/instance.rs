@@ -76,9 +76,8 @@ fn create(entry: &ash::Entry, validate: bool, debug_utils: bool) -> Result<ash::
         .api_version(vk::API_VERSION_1_3);
     // SAFETY: reads the list of extensions.
     let available = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
-    let portability = available
-        .iter()
-        .any(|e| e.extension_name_as_c_str() == Ok(ash::khr::portability_enumeration::NAME));
+    let portability =
+        available.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::khr::portability_enumeration::NAME));
     let mut extensions = Vec::new();
     if debug_utils {
         extensions.push(ext::debug_utils::NAME.as_ptr());
@@ -128,12 +127,8 @@ fn has_extension(entry: &ash::Entry, name: &CStr, layer: Option<&CStr>) -> Resul
 
 fn messenger_info() -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
     vk::DebugUtilsMessengerCreateInfoEXT::default()
-        .message_severity(
-            vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
-        )
-        .message_type(
-            vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE,
-        )
+        .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
+        .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::PERFORMANCE)
         .pfn_user_callback(Some(keep_message))
 }
 

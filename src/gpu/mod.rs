@@ -17,7 +17,7 @@ mod pipeline;
 mod timer;
 
 pub use barrier::Access;
-pub use bindings::{Binding, BindingKind, Bindings, BindingSet};
+pub use bindings::{Binding, BindingKind, BindingSet, Bindings};
 pub use buffer::{AnyBuffer, Buffer, BufferUse};
 pub use commands::{CommandBuffer, Commands, Dispatch};
 pub use context::{Context, ContextOptions};

@@ -36,9 +36,8 @@ impl ComputePipeline {
         let entries: Vec<_> = (0..desc.constants.len() as u32)
             .map(|id| vk::SpecializationMapEntry { constant_id: id, offset: 4 * id, size: 4 })
             .collect();
-        let constants = vk::SpecializationInfo::default()
-            .map_entries(&entries)
-            .data(bytemuck::cast_slice(desc.constants));
+        let constants =
+            vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(desc.constants));
         let flags = if desc.full_subgroups {
             vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS
         } else {
@@ -90,10 +89,11 @@ impl RasterPipeline {
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &RasterDesc) -> Result<Self, GpuError> {
         let vertex = ShaderModule::new(context, desc.name, desc.vertex)?;
         let fragment = ShaderModule::new(context, desc.name, desc.fragment)?;
-        let stages = [(vk::ShaderStageFlags::VERTEX, vertex.raw), (vk::ShaderStageFlags::FRAGMENT, fragment.raw)]
-            .map(|(stage, module)| {
+        let stages = [(vk::ShaderStageFlags::VERTEX, vertex.raw), (vk::ShaderStageFlags::FRAGMENT, fragment.raw)].map(
+            |(stage, module)| {
                 vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(ENTRY_POINT)
-            });
+            },
+        );
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
         let assembly =
             vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);

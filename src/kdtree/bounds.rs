@@ -1,5 +1,7 @@
 //! Axis-aligned boxes and the references of triangles to the cells that they meet.
 
+use rayon::prelude::*;
+
 use crate::layout::Triangle;
 
 /// A closed box, world units.
@@ -10,13 +12,16 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Contains nothing; neutral for [`Bounds::union`].
-    pub const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
-
     /// The exact bounds of a triangle.
     pub fn of(triangle: &Triangle) -> Self {
         let [v0, v1, v2] = [triangle.v0, triangle.v1, triangle.v2];
         Self { min: v0.min(v1).min(v2).to_array(), max: v0.max(v1).max(v2).to_array() }
+    }
+
+    /// The bounds of all triangles whose corners are finite; a box of zeros for none.
+    pub fn of_all(triangles: &[Triangle]) -> Self {
+        let finite = triangles.par_iter().filter(|triangle| is_finite(triangle));
+        finite.map(Self::of).reduce_with(|a, b| a.union(&b)).unwrap_or(Self { min: [0.0; 3], max: [0.0; 3] })
     }
 
     /// The smallest box around both.
@@ -37,6 +42,11 @@ impl Bounds {
         self
     }
 
+    /// Do the closed boxes have a point in common?
+    pub fn touches(&self, other: &Self) -> bool {
+        (0..3).all(|axis| self.min[axis] <= other.max[axis] && self.max[axis] >= other.min[axis])
+    }
+
     /// The two parts on either side of a plane: below, above.
     pub fn split(&self, axis: usize, position: f32) -> [Self; 2] {
         let (mut below, mut above) = (*self, *self);
@@ -49,6 +59,11 @@ impl Bounds {
     pub fn extent(&self) -> [f64; 3] {
         [0, 1, 2].map(|axis| f64::from(self.max[axis]) - f64::from(self.min[axis]))
     }
+}
+
+/// No NaN and no infinity among a triangle's corners.
+pub fn is_finite(triangle: &Triangle) -> bool {
+    triangle.v0.is_finite() && triangle.v1.is_finite() && triangle.v2.is_finite()
 }
 
 /// A triangle in a cell: 28 bytes.

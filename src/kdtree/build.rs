@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{
     BuildOptions, KdTree,
-    bounds::{Bounds, Reference},
+    bounds::{Bounds, Reference, is_finite},
     flatten::flatten,
     sah::{Search, Split},
     subtree::{self, Cell, Input, Subtree, sort_out},
@@ -39,29 +39,20 @@ impl KdTree {
             .filter(|&ix| is_finite(&triangles[ix as usize]))
             .map(|ix| Reference { bounds: Bounds::of(&triangles[ix as usize]), triangle_ix: ix })
             .collect();
-        let bounds = references.par_iter().map(|r| r.bounds).reduce(|| Bounds::EMPTY, |a, b| a.union(&b));
-        let bounds = if references.is_empty() { Bounds { min: [0.0; 3], max: [0.0; 3] } } else { bounds };
+        let bounds = Bounds::of_all(triangles);
         let n = references.len() as u64;
         let budget = (n * u64::from(options.max_references_per_triangle) + MIN_BUDGET).min(MAX_BUDGET.max(n));
-        let cell = Cell { bounds, level: 0, budget, bad_splits: 0 };
+        let cell = Cell { bounds, level: 0, budget };
         flatten(grow(Input { triangles, options }, references, cell), bounds)
     }
 }
 
-/// No NaN and no infinity among its corners.
-pub fn is_finite(triangle: &Triangle) -> bool {
-    triangle.v0.is_finite() && triangle.v1.is_finite() && triangle.v2.is_finite()
-}
-
 fn grow(input: Input, references: Vec<Reference>, cell: Cell) -> Top {
-    let leaf_cost = input.options.intersection_cost * references.len() as f32;
-    if references.len() <= TASK_REFERENCES || cell.level >= input.options.depth_limit() {
+    if references.len() <= TASK_REFERENCES {
         return Top::Subtree(subtree::build(input, references, cell));
     }
-    let split = Search::default().best_split(&references, &cell.bounds, input.options);
-    let cells = cell.children(&split).filter(|_| input.options.cost(&split) < leaf_cost);
-    let Some(cells) = cells else {
-        // Rare: nearly all of them coincide.
+    let Some((split, cells)) = cell.split(&references, input.options, &mut Search::default()) else {
+        // Rare: nearly all of them coincide, or are too many for the budget. A leaf.
         return Top::Subtree(subtree::build(input, references, cell));
     };
     let [below, above] = partition(input, references, &cell.bounds, &split);

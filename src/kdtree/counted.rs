@@ -1,7 +1,7 @@
 //! The cheapest split of a small cell, by counting the triangles on either side of every plane.
 //!
 //! n references make up to 2 n planes an axis, so this is 4 n^2 comparisons, but without a branch that depends on them
-//! and eight planes at a time: quicker than sorting up to some dozens of references.
+//! and eight planes at a time: quicker than sorting so few.
 
 use super::{
     BuildOptions,
@@ -10,7 +10,7 @@ use super::{
 };
 
 /// More references than this are binned.
-pub const MAX_REFERENCES: usize = 64;
+pub const MAX_REFERENCES: usize = 32;
 /// Planes that are counted together: two SSE registers.
 const LANES: usize = 8;
 

@@ -11,6 +11,7 @@ mod bounds;
 mod build;
 mod clip;
 mod counted;
+mod coverage;
 mod flatten;
 mod sah;
 mod statistics;
@@ -52,8 +53,6 @@ pub struct BuildOptions {
     pub empty_bonus: f32,
     /// Levels below the root; never more than `KD_MAX_DEPTH - 2`, which is also what `None` means.
     pub max_depth: Option<u32>,
-    /// Splits on the way to a leaf that may look more expensive than not splitting; what does not pay is undone.
-    pub bad_splits: u32,
     /// No more references than this many times the triangles (plus 1024).
     pub max_references_per_triangle: u32,
 }
@@ -65,18 +64,12 @@ impl Default for BuildOptions {
             intersection_cost: 0.5,
             empty_bonus: 0.1,
             max_depth: None,
-            bad_splits: 0,
             max_references_per_triangle: 16,
         }
     }
 }
 
 impl BuildOptions {
-    /// Expected cost of a split cell whose children become leaves.
-    fn cost(&self, split: &sah::Split) -> f32 {
-        self.traversal_cost + self.intersection_cost * split.weight
-    }
-
     /// Levels below the root that the tree may have.
     pub fn depth_limit(&self) -> u32 {
         self.max_depth.unwrap_or(u32::MAX).min(KD_MAX_DEPTH - 2)

@@ -18,20 +18,12 @@ pub struct Split {
     pub weight: f32,
     /// Triangles below and above; both sides count those that straddle the plane.
     pub n_references: [u32; 2],
-    /// Shares of the cell's surface that the cells below and above have.
-    pub shares: [f32; 2],
 }
 
 impl Split {
     /// Worse than any other.
-    pub const NONE: Self = Self {
-        axis: 0,
-        position: 0.0,
-        planar_below: true,
-        weight: f32::INFINITY,
-        n_references: [0; 2],
-        shares: [0.0; 2],
-    };
+    pub const NONE: Self =
+        Self { axis: 0, position: 0.0, planar_below: true, weight: f32::INFINITY, n_references: [0; 2] };
 }
 
 /// The shares of a cell's surface on either side of a plane: linear in the plane's position.
@@ -110,7 +102,6 @@ impl Shares {
             planar_below,
             weight: if planar_below { if_below } else { if_above },
             n_references: if planar_below { [n_below + n_planar, n_above] } else { [n_below, n_above + n_planar] },
-            shares: self.shares(fraction),
         }
     }
 }

@@ -25,23 +25,33 @@ pub struct Cell {
     pub level: u32,
     /// References that the leaves in the cell may have.
     pub budget: u64,
-    /// Splits on the way that looked worse than a leaf.
-    pub bad_splits: u32,
 }
 
 impl Cell {
-    /// The cells on either side of a plane, with budgets in proportion to their references, so that the tree does not
-    /// depend on the order in which cells are built. None where the references exceed the budget.
-    pub fn children(&self, split: &Split) -> Option<[Cell; 2]> {
-        let bounds = self.bounds.split(split.axis, split.position);
+    /// The split to be made and its children's cells; none where a leaf is cheaper or a limit is reached.
+    pub fn split(
+        self,
+        references: &[Reference],
+        options: &BuildOptions,
+        search: &mut Search,
+    ) -> Option<(Split, [Cell; 2])> {
+        let leaf_cost = options.intersection_cost * references.len() as f32;
+        // A split costs a step at least.
+        if leaf_cost <= options.traversal_cost || self.level >= options.depth_limit() {
+            return None;
+        }
+        let split = search.best_split(references, &self.bounds, options);
+        let pays = options.traversal_cost + options.intersection_cost * split.weight < leaf_cost;
         let n = split.n_references.map(u64::from);
-        let child = |side: usize| Cell {
-            bounds: bounds[side],
-            level: self.level + 1,
-            budget: self.budget * n[side] / (n[0] + n[1]),
-            ..*self
-        };
-        (n[0] + n[1] <= self.budget).then(|| [child(0), child(1)])
+        let n_both = n[0] + n[1];
+        if !pays || n_both > self.budget {
+            return None;
+        }
+        let bounds = self.bounds.split(split.axis, split.position);
+        // In proportion to the references: what a cell may have does not depend on what is built before it.
+        let budget = n.map(|n| self.budget * n / n_both);
+        let child = |side: usize| Cell { bounds: bounds[side], level: self.level + 1, budget: budget[side] };
+        Some((split, [child(0), child(1)]))
     }
 }
 
@@ -91,56 +101,29 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    /// Builds the node of a cell into a slot, with all below it behind the last node; returns its cost.
-    fn node(&mut self, slot: usize, range: Range<usize>, mut cell: Cell) -> f32 {
-        let options = self.input.options;
-        let leaf_cost = options.intersection_cost * range.len() as f32;
-        // A split costs a step at least.
-        if leaf_cost <= options.traversal_cost || cell.level >= options.depth_limit() {
-            return self.leaf(slot, range, cell.level);
-        }
-        let split = self.search.best_split(&self.references[range.clone()], &cell.bounds, options);
-        let is_bad = options.cost(&split) >= leaf_cost;
-        cell.bad_splits += u32::from(is_bad);
-        if split.weight == f32::INFINITY || cell.bad_splits > options.bad_splits {
-            return self.leaf(slot, range, cell.level);
-        }
-        let Some(cells) = cell.children(&split) else {
+    /// Builds the node of a cell into a slot, and all below it behind the last node.
+    fn node(&mut self, slot: usize, range: Range<usize>, cell: Cell) {
+        let references = &self.references[range.clone()];
+        let Some((split, cells)) = cell.split(references, self.input.options, &mut self.search) else {
             return self.leaf(slot, range, cell.level);
         };
-        let n_references = self.references.len();
-        let lengths = (self.subtree.nodes.len(), self.subtree.leaf_triangles.len(), self.subtree.depth);
-        let children = self.partition(range.clone(), &cell.bounds, &split);
-        let cost = self.children(slot, &split, children, cells);
-        self.references.truncate(n_references);
-        if is_bad && cost >= leaf_cost {
-            self.subtree.nodes.truncate(lengths.0);
-            self.subtree.leaf_triangles.truncate(lengths.1);
-            self.subtree.depth = lengths.2;
-            return self.leaf(slot, range, cell.level);
-        }
-        cost
-    }
-
-    /// Makes a slot a split and builds its children; returns its cost.
-    fn children(&mut self, slot: usize, split: &Split, ranges: [Range<usize>; 2], cells: [Cell; 2]) -> f32 {
         let nodes = &mut self.subtree.nodes;
         let child = nodes.len();
         nodes[slot] = Node::Split { axis: split.axis, position: split.position, child: child as u32 }.into();
         nodes.extend([EMPTY_LEAF; 2]);
-        let [below, above] = ranges;
-        let below = self.node(child, below, cells[0]);
-        let above = self.node(child + 1, above, cells[1]);
-        self.input.options.traversal_cost + split.shares[0] * below + split.shares[1] * above
+        let n_references = self.references.len();
+        let [below, above] = self.partition(range, &cell.bounds, &split);
+        self.node(child, below, cells[0]);
+        self.node(child + 1, above, cells[1]);
+        self.references.truncate(n_references);
     }
 
-    fn leaf(&mut self, slot: usize, range: Range<usize>, level: u32) -> f32 {
+    fn leaf(&mut self, slot: usize, range: Range<usize>, level: u32) {
         let leaf_triangles = &mut self.subtree.leaf_triangles;
         let (first, count) = (leaf_triangles.len() as u32, range.len() as u32);
         leaf_triangles.extend(self.references[range].iter().map(|reference| reference.triangle_ix));
         self.subtree.nodes[slot] = Node::Leaf { first, count }.into();
         self.subtree.depth = self.subtree.depth.max(level);
-        self.input.options.intersection_cost * count as f32
     }
 
     /// Appends the references of both children, the lower one's first. What lies on one side only stays where it is.

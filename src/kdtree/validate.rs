@@ -1,18 +1,142 @@
-//! Checks every invariant of a tree.
+//! Checks every invariant of a tree: its structure here, what its leaves hold in `coverage`.
 
-use super::KdTree;
-use crate::layout::Triangle;
+use super::{
+    EMPTY_LEAF, KdTree, Node,
+    bounds::{Bounds, is_finite},
+    coverage,
+};
+use crate::layout::{KD_MAX_DEPTH, Triangle};
 
 /// The first invariant found broken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Invalid {
-    #[error("{nodes} nodes with {parents} parents: nodes come in pairs with a parent each")]
+    #[error("{nodes} nodes, {parents} parents: nodes come in pairs, with a parent each")]
     Length { nodes: usize, parents: usize },
+    #[error("the root's cell is not the bounds of all triangles")]
+    RootCell,
+    #[error("node 1 or the root's parent is not 0")]
+    Unused,
+    #[error("node {node}: child {child} is odd, the root or out of range")]
+    Child { node: u32, child: u32 },
+    #[error("node {node} has two parents")]
+    Shared { node: u32 },
+    #[error("node {node} has no parent")]
+    Orphan { node: u32 },
+    #[error("parents[{pair}] is {found}, not {expected}")]
+    Parent { pair: u32, found: u32, expected: u32 },
+    #[error("node {node}: the split at {position} on axis {axis} lies outside its cell")]
+    Position { node: u32, axis: usize, position: f32 },
+    #[error("leaf {node}: its triangles do not follow those of the leaf before, or end behind the last")]
+    LeafRange { node: u32 },
+    #[error("leaf {node}: triangle {triangle} is out of range, or not behind the one before")]
+    LeafOrder { node: u32, triangle: u32 },
+    #[error("leaf {node}: triangle {triangle} lies outside its cell")]
+    Stray { node: u32, triangle: u32 },
+    #[error("{n_unused} leaf entries that no leaf has")]
+    UnusedEntries { n_unused: usize },
+    #[error("recorded depth {recorded}, found {found}, at most {}", KD_MAX_DEPTH - 2)]
+    Depth { recorded: u32, found: u32 },
+    #[error("leaf {node} lacks triangle {triangle}")]
+    Missing { node: u32, triangle: u32 },
 }
 
 impl KdTree {
-    /// Checks the tree against its triangles.
-    pub fn validate(&self, _triangles: &[Triangle]) -> Result<(), Invalid> {
+    /// Checks the tree against the triangles it was built from.
+    ///
+    /// Each triangle is cut up along the planes it meets, down to the leaves; what lies within 2^-44 of its largest
+    /// coordinate of a plane is a touch, which one of the two sides must have if all of the triangle lies there.
+    /// Some microseconds a triangle.
+    pub fn validate(&self, triangles: &[Triangle]) -> Result<(), Invalid> {
+        let (nodes, parents) = (self.nodes.len(), self.parents.len());
+        if nodes < 2 || nodes != 2 * parents {
+            return Err(Invalid::Length { nodes, parents });
+        }
+        let root = Bounds { min: self.cell_min.to_array(), max: self.cell_max.to_array() };
+        if root != Bounds::of_all(triangles) {
+            return Err(Invalid::RootCell);
+        }
+        if self.nodes[1] != EMPTY_LEAF || self.parents[0] != 0 {
+            return Err(Invalid::Unused);
+        }
+        Walk::new(self, triangles).run(root)?;
+        coverage::check(self, triangles)
+    }
+}
+
+/// A walk through all nodes in depth-first order.
+struct Walk<'a> {
+    tree: &'a KdTree,
+    triangles: &'a [Triangle],
+    seen: Vec<bool>,
+    /// Entries of the leaves so far.
+    n_entries: usize,
+    depth: u32,
+}
+
+impl<'a> Walk<'a> {
+    fn new(tree: &'a KdTree, triangles: &'a [Triangle]) -> Self {
+        Self { tree, triangles, seen: vec![false; tree.nodes.len()], n_entries: 0, depth: 0 }
+    }
+
+    fn run(mut self, root: Bounds) -> Result<(), Invalid> {
+        // Each node is entered once, so links in a circle end too.
+        let mut stack = vec![(0, 0, root)];
+        self.seen[1] = true;
+        while let Some((node, level, cell)) = stack.pop() {
+            if std::mem::replace(&mut self.seen[node as usize], true) {
+                return Err(Invalid::Shared { node });
+            }
+            self.depth = self.depth.max(level);
+            match self.tree.node(node) {
+                Node::Leaf { first, count } => self.leaf(node, first as usize, count as usize, &cell)?,
+                Node::Split { axis, position, child } => {
+                    self.split(node, (axis, position), child, &cell)?;
+                    let [below, above] = cell.split(axis, position);
+                    stack.extend([(child + 1, level + 1, above), (child, level + 1, below)]);
+                }
+            }
+        }
+        if let Some(node) = self.seen.iter().position(|seen| !seen) {
+            return Err(Invalid::Orphan { node: node as u32 });
+        }
+        let n_unused = self.tree.leaf_triangles.len() - self.n_entries;
+        if n_unused > 0 {
+            return Err(Invalid::UnusedEntries { n_unused });
+        }
+        if self.depth != self.tree.depth || self.depth > KD_MAX_DEPTH - 2 {
+            return Err(Invalid::Depth { recorded: self.tree.depth, found: self.depth });
+        }
+        Ok(())
+    }
+
+    fn split(&self, node: u32, (axis, position): (usize, f32), child: u32, cell: &Bounds) -> Result<(), Invalid> {
+        if child < 2 || child % 2 == 1 || child as usize + 1 >= self.tree.nodes.len() {
+            return Err(Invalid::Child { node, child });
+        }
+        let (pair, found) = (child / 2, self.tree.parents[child as usize / 2]);
+        if found != node {
+            return Err(Invalid::Parent { pair, found, expected: node });
+        }
+        // False for NaN.
+        let is_inside = position >= cell.min[axis] && position <= cell.max[axis];
+        if is_inside { Ok(()) } else { Err(Invalid::Position { node, axis, position }) }
+    }
+
+    fn leaf(&mut self, node: u32, first: usize, count: usize, cell: &Bounds) -> Result<(), Invalid> {
+        if first != self.n_entries || count > self.tree.leaf_triangles.len() - first {
+            return Err(Invalid::LeafRange { node });
+        }
+        self.n_entries += count;
+        let mut next = 0;
+        for &triangle in &self.tree.leaf_triangles[first..][..count] {
+            let Some(corners) = self.triangles.get(triangle as usize).filter(|_| triangle >= next) else {
+                return Err(Invalid::LeafOrder { node, triangle });
+            };
+            if !is_finite(corners) || !Bounds::of(corners).touches(cell) {
+                return Err(Invalid::Stray { node, triangle });
+            }
+            next = triangle + 1;
+        }
         Ok(())
     }
 }

@@ -6,53 +6,57 @@ use serde::Deserialize;
 use super::length;
 use crate::scene::{error::Checked, mesh::Mesh};
 
-/// A box centred at the origin: 12 triangles, closed.
+/// A box centred at the origin: 2 triangles a side, facing outwards. Closed where no side is left out.
+///
+/// Slot i is `sides[i]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cuboid {
     /// Edge lengths along x, y, z.
     size: [f32; 3],
+    /// Which sides there are; all six where absent, in the order left, right, bottom, top, back, front.
+    sides: Option<Vec<Side>>,
 }
 
-/// The inside of a box centred at the origin: 2 triangles a wall, facing inwards.
+/// The inside of a box centred at the origin: 2 triangles a side, facing inwards.
 ///
-/// Slot i is `walls[i]`.
+/// Slot i is `sides[i]`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Room {
     /// Edge lengths along x, y, z.
     size: [f32; 3],
-    /// Which walls there are; all six where absent.
-    walls: Option<Vec<Wall>>,
+    /// As of a box.
+    sides: Option<Vec<Side>>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "snake_case")]
-enum Wall {
+enum Side {
     /// -x
     Left,
     /// +x
     Right,
     /// -y
-    Floor,
+    Bottom,
     /// +y
-    Ceiling,
+    Top,
     /// -z
     Back,
     /// +z
     Front,
 }
 
-const ALL_WALLS: [Wall; 6] = [Wall::Left, Wall::Right, Wall::Floor, Wall::Ceiling, Wall::Back, Wall::Front];
+const ALL_SIDES: [Side; 6] = [Side::Left, Side::Right, Side::Bottom, Side::Top, Side::Back, Side::Front];
 
-impl Wall {
+impl Side {
     /// Corner numbers counter-clockwise seen from outside; bit 0, 1, 2 of a number: at +x, +y, +z.
     fn corners(self) -> [u32; 4] {
         match self {
             Self::Left => [0, 4, 6, 2],
             Self::Right => [5, 1, 3, 7],
-            Self::Floor => [0, 1, 5, 4],
-            Self::Ceiling => [6, 7, 3, 2],
+            Self::Bottom => [0, 1, 5, 4],
+            Self::Top => [6, 7, 3, 2],
             Self::Back => [1, 0, 2, 3],
             Self::Front => [4, 5, 7, 6],
         }
@@ -61,25 +65,25 @@ impl Wall {
 
 impl Cuboid {
     pub fn build(&self) -> Checked<Mesh> {
-        let mut mesh = Mesh { positions: corners(self.size)?, ..Mesh::default() };
-        for [a, b, c, d] in ALL_WALLS.map(Wall::corners) {
-            mesh.push_flat([a, b, c], 0);
-            mesh.push_flat([a, c, d], 0);
-        }
-        Ok(mesh)
+        faces(self.size, self.sides.as_deref(), |corners| corners)
     }
 }
 
 impl Room {
     pub fn build(&self) -> Checked<Mesh> {
-        let mut mesh = Mesh { positions: corners(self.size)?, ..Mesh::default() };
-        let walls = self.walls.as_deref().unwrap_or(&ALL_WALLS);
-        for (slot, [a, b, c, d]) in walls.iter().map(|wall| wall.corners()).enumerate() {
-            mesh.push_flat([a, c, b], slot as u32);
-            mesh.push_flat([a, d, c], slot as u32);
-        }
-        Ok(mesh)
+        faces(self.size, self.sides.as_deref(), |[a, b, c, d]| [a, d, c, b])
     }
+}
+
+/// Two triangles a side; `order` is given the side's corners counter-clockwise seen from outside.
+fn faces(size: [f32; 3], sides: Option<&[Side]>, order: impl Fn([u32; 4]) -> [u32; 4]) -> Checked<Mesh> {
+    let mut mesh = Mesh { positions: corners(size)?, ..Mesh::default() };
+    for (slot, side) in sides.unwrap_or(&ALL_SIDES).iter().enumerate() {
+        let [a, b, c, d] = order(side.corners());
+        mesh.push_flat([a, b, c], slot as u32);
+        mesh.push_flat([a, c, d], slot as u32);
+    }
+    Ok(mesh)
 }
 
 /// The eight corners, by the bits of their numbers.

@@ -1,0 +1,190 @@
+//! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree.glsl`.
+
+use super::{bindings::Bindings, pending_mask::PendingMask, pending_stack::PendingStack, triangle::Shear};
+use crate::{
+    frame::Traversal,
+    layout::{Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KdNode, NO_TRIANGLE, Ray},
+};
+
+/// A node and the interval that the ray spends in it.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    pub node_ix: u32,
+    pub depth: u32,
+    pub t_enter: f32,
+    pub t_exit: f32,
+}
+
+/// What the traversal needs of a ray. Arrays by axis have a fourth entry so that two bits index them without a check.
+#[derive(Clone, Copy, Debug)]
+pub struct TraversalRay {
+    shear: Shear,
+    origin: [f32; 4],
+    inv_direction: [f32; 4],
+    /// By how much in t a plane is widened on each axis.
+    slack: [f32; 4],
+    pub t_enter: f32,
+    pub t_exit: f32,
+    /// Almost along a plane the widened intervals overlap far: a hit then does not end the search of pending cells.
+    pub exhaustive: bool,
+    source_triangle: u32,
+}
+
+/// GLSL's `min`: the first operand where either is NaN.
+#[inline(always)]
+pub fn min(x: f32, y: f32) -> f32 {
+    if y < x { y } else { x }
+}
+
+/// GLSL's `max`: the first operand where either is NaN.
+#[inline(always)]
+pub fn max(x: f32, y: f32) -> f32 {
+    if x < y { y } else { x }
+}
+
+impl TraversalRay {
+    #[inline]
+    pub fn new(bindings: &Bindings, ray: &Ray) -> Self {
+        let origin = ray.origin.to_array();
+        let cell_min = bindings.frame.cell_min.to_array();
+        let cell_max = bindings.frame.cell_max.to_array();
+        // A direction in the plane is taken as all but in it: finite everywhere, and one rule for all ties.
+        let direction = ray.direction.to_array().map(|d| if d.abs() < 1e-12 { 1e-12 } else { d });
+        let inv_direction = direction.map(|d| 1.0 / d);
+        let reach = [0, 1, 2].map(|i| max((cell_min[i] - origin[i]).abs(), (cell_max[i] - origin[i]).abs()));
+        let slack = max(reach[0], max(reach[1], reach[2])) * 2f32.powi(-21);
+        let slack = inv_direction.map(|inv| slack * inv.abs());
+
+        let t0 = [0, 1, 2].map(|i| (cell_min[i] - origin[i]) * inv_direction[i]);
+        let t1 = [0, 1, 2].map(|i| (cell_max[i] - origin[i]) * inv_direction[i]);
+        let near = [0, 1, 2].map(|i| min(t0[i], t1[i]) - slack[i]);
+        let far = [0, 1, 2].map(|i| max(t0[i], t1[i]) + slack[i]);
+        Self {
+            shear: Shear::of(origin, ray.direction.to_array()),
+            origin: by_axis(origin),
+            inv_direction: by_axis(inv_direction),
+            slack: by_axis(slack),
+            t_enter: max(max(near[0], near[1]), max(near[2], 0.0)),
+            t_exit: min(min(far[0], far[1]), min(far[2], ray.t_max)),
+            exhaustive: direction.iter().any(|d| d.abs() < 2f32.powi(-8)),
+            source_triangle: ray.source_triangle,
+        }
+    }
+
+    /// Where the ray enters the second child's side and leaves the first one's, both widened by the slack.
+    #[inline(always)]
+    pub fn crossing(&self, node: KdNode) -> [f32; 2] {
+        let axis = axis_of(node) as usize;
+        let t = (f32::from_bits(node.split_or_first) - self.origin[axis]) * self.inv_direction[axis];
+        [t - self.slack[axis], t + self.slack[axis]]
+    }
+}
+
+fn by_axis([x, y, z]: [f32; 3]) -> [f32; 4] {
+    [x, y, z, 0.0]
+}
+
+/// Split axis, or `KD_LEAF`.
+#[inline(always)]
+pub fn axis_of(node: KdNode) -> u32 {
+    node.axis_and_child & KD_AXIS_MASK
+}
+
+/// How subtrees that are left for later are kept.
+pub trait Pending {
+    fn new() -> Self;
+    fn clear(&mut self);
+    fn push(&mut self, second_ix: u32, cell: &Cell, t_cross: [f32; 2]);
+    /// The next pending cell that may hold a hit nearer than `t_best`, or false.
+    fn pop(&mut self, bindings: &Bindings, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool;
+}
+
+/// Down to the leaf where the ray enters the cell. A NaN fails both tests and goes to the first child: it ends.
+#[inline(always)]
+fn descend<P: Pending>(bindings: &Bindings, ray: &TraversalRay, pending: &mut P, cell: &mut Cell) -> KdNode {
+    let mut node = bindings.kd_nodes[cell.node_ix as usize];
+    while axis_of(node) != KD_LEAF {
+        let t_cross = ray.crossing(node);
+        let first_is_above = u32::from(ray.inv_direction[axis_of(node) as usize] < 0.0);
+        let first_ix = (node.axis_and_child >> KD_CHILD_SHIFT) + first_is_above;
+        let in_first = t_cross[1] >= cell.t_enter;
+        let in_second = t_cross[0] <= cell.t_exit;
+        cell.depth += 1;
+        cell.node_ix = if in_second && !in_first { first_ix ^ 1 } else { first_ix };
+        if in_first && in_second {
+            pending.push(first_ix ^ 1, cell, t_cross);
+            cell.t_exit = min(cell.t_exit, t_cross[1]);
+        }
+        node = bindings.kd_nodes[cell.node_ix as usize];
+    }
+    node
+}
+
+/// The leaf's triangles against the ray; of two hits at one t the lower index wins, whatever the order of leaves.
+#[inline(always)]
+fn intersect_leaf(bindings: &Bindings, ray: &TraversalRay, leaf: KdNode, best: &mut Hit) {
+    let first = leaf.split_or_first as usize;
+    let end = first + (leaf.axis_and_child >> KD_CHILD_SHIFT) as usize;
+    for &triangle_ix in &bindings.leaf_triangles[first..end] {
+        let triangle = &bindings.triangles[triangle_ix as usize];
+        let Some(hit) = ray.shear.intersect_triangle(triangle, triangle_ix) else { continue };
+        let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
+        if hit.t > 0.0 && nearer && triangle_ix != ray.source_triangle {
+            *best = hit;
+        }
+    }
+}
+
+/// The closest hit in (0, t_max), or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
+#[inline]
+pub fn traverse<P: Pending, const ANY_HIT: bool>(bindings: &Bindings, pending: &mut P, ray_in: &Ray) -> Hit {
+    let mut best = Hit { t: ray_in.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
+    let ray = TraversalRay::new(bindings, ray_in);
+    // Not `>`: a NaN misses.
+    if !(ray.t_enter <= ray.t_exit) {
+        return best;
+    }
+    let mut cell = Cell { node_ix: 0, depth: 0, t_enter: ray.t_enter, t_exit: ray.t_exit };
+    pending.clear();
+    loop {
+        let leaf = descend(bindings, &ray, pending, &mut cell);
+        intersect_leaf(bindings, &ray, leaf, &mut best);
+        if ANY_HIT && best.triangle_ix != NO_TRIANGLE || !pending.pop(bindings, &ray, best.t, &mut cell) {
+            return best;
+        }
+    }
+}
+
+/// A traversal that remembers its working memory from ray to ray; one for each thread.
+pub enum Traverser {
+    Mask(PendingMask),
+    Stack(PendingStack),
+}
+
+impl Traverser {
+    pub fn new(traversal: Traversal) -> Self {
+        match traversal {
+            Traversal::Mask => Self::Mask(PendingMask::new()),
+            Traversal::Stack => Self::Stack(PendingStack::new()),
+        }
+    }
+
+    /// The closest hit in (0, t_max). A miss keeps t = t_max.
+    #[inline]
+    pub fn closest_hit(&mut self, bindings: &Bindings, ray: &Ray) -> Hit {
+        match self {
+            Self::Mask(pending) => traverse::<_, false>(bindings, pending, ray),
+            Self::Stack(pending) => traverse::<_, false>(bindings, pending, ray),
+        }
+    }
+
+    /// Whether anything lies in (0, t_max).
+    #[inline]
+    pub fn any_hit(&mut self, bindings: &Bindings, ray: &Ray) -> bool {
+        let hit = match self {
+            Self::Mask(pending) => traverse::<_, true>(bindings, pending, ray),
+            Self::Stack(pending) => traverse::<_, true>(bindings, pending, ray),
+        };
+        hit.triangle_ix != NO_TRIANGLE
+    }
+}

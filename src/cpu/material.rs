@@ -1,0 +1,98 @@
+//! Wavefront MTL's materials: local light by Phong, mirrors, glass, transparency. Twin of `material.glsl`.
+
+use glam::Vec3;
+
+use super::surface::Surface;
+use crate::layout::{MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR, Material};
+
+/// Where light goes on from a surface, and what share of it. A weight of zero: no ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Scattering {
+    pub reflected: Vec3,
+    pub reflected_weight: Vec3,
+    pub transmitted: Vec3,
+    pub transmitted_weight: Vec3,
+}
+
+/// The share of the surface's own light: what a see-through material (d < 1) covers.
+pub fn local_weight(material: &Material) -> f32 {
+    if material.flags & MATERIAL_REFRACT != 0 { 1.0 } else { material.d }
+}
+
+/// GLSL's `reflect`.
+fn reflect(incident: Vec3, normal: Vec3) -> Vec3 {
+    incident - 2.0 * normal.dot(incident) * normal
+}
+
+/// Diffuse and specular reflectance towards the viewer. All vectors point away from the surface.
+pub fn phong(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3) -> Vec3 {
+    let cos_light = normal.dot(to_light);
+    // Not `<=`: a NaN is dark.
+    if !(cos_light > 0.0) {
+        return Vec3::ZERO;
+    }
+    let mut reflectance = material.kd * cos_light;
+    let cos_mirror = reflect(-to_light, normal).dot(to_viewer);
+    if material.flags & MATERIAL_SPECULAR != 0 && cos_mirror > 0.0 {
+        reflectance += material.ks * cos_mirror.powf(material.ns);
+    }
+    reflectance
+}
+
+/// Unpolarized Fresnel reflectance of a smooth dielectric; 1 in total internal reflection.
+fn fresnel(cos_in: f32, cos_out: f32, eta: f32) -> f32 {
+    if cos_out <= 0.0 {
+        return 1.0;
+    }
+    let parallel = (cos_in - eta * cos_out) / (cos_in + eta * cos_out);
+    let perpendicular = (eta * cos_in - cos_out) / (eta * cos_in + cos_out);
+    0.5 * (parallel * parallel + perpendicular * perpendicular)
+}
+
+/// Cosine of the refracted ray by Snell's law; 0 in total internal reflection.
+fn refraction_cosine(cos_in: f32, eta: f32) -> f32 {
+    (1.0 - eta * eta * (1.0 - cos_in * cos_in)).max(0.0).sqrt()
+}
+
+/// A direction that an interpolated normal has put on the wrong side of the surface, mirrored back to `side`.
+fn keep_side(direction: Vec3, side: Vec3) -> Vec3 {
+    direction - 2.0 * direction.dot(side).min(0.0) * side
+}
+
+pub fn scatter(material: &Material, surface: &Surface, direction: Vec3) -> Scattering {
+    let mut s = Scattering {
+        reflected: Vec3::ZERO,
+        reflected_weight: Vec3::ZERO,
+        transmitted: direction,
+        transmitted_weight: Vec3::ZERO,
+    };
+    let reflects = material.flags & MATERIAL_REFLECT != 0;
+    let refracts = material.flags & MATERIAL_REFRACT != 0;
+    if !reflects && !refracts {
+        s.transmitted_weight = Vec3::splat(1.0 - material.d);
+        return s;
+    }
+    let eta = if surface.from_inside { material.ni } else { 1.0 / material.ni };
+    // An interpolated normal can turn away from the viewer: grazing then.
+    let cos_in = surface.shading.dot(-direction).max(1e-4);
+    let cos_out = refraction_cosine(cos_in, eta);
+    let total = refracts && cos_out <= 0.0;
+    let has_fresnel = material.flags & MATERIAL_FRESNEL != 0;
+    let share = if has_fresnel {
+        Vec3::splat(fresnel(cos_in, cos_out, eta))
+    } else if total {
+        Vec3::ONE
+    } else {
+        material.ks
+    };
+    if reflects {
+        s.reflected = keep_side((direction + 2.0 * cos_in * surface.shading).normalize(), surface.geometric);
+        s.reflected_weight = if has_fresnel && !refracts { share * material.ks } else { share };
+    }
+    if refracts && !total {
+        let through = eta * direction + (eta * cos_in - cos_out) * surface.shading;
+        s.transmitted = keep_side(through.normalize(), -surface.geometric);
+        s.transmitted_weight = if reflects { (1.0 - share) * material.tf } else { material.tf };
+    }
+    s
+}

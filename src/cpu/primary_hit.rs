@@ -1,0 +1,52 @@
+//! Primary hit (the paper's section 2.2): the camera's rays, and where they meet the triangles that visibility found.
+//! Twin of `primary_hit.comp`.
+
+use glam::{UVec2, Vec3};
+use rayon::prelude::*;
+
+use super::{
+    RAYS_PER_TASK,
+    bindings::Bindings,
+    camera::{camera_direction, pixel_of},
+    triangle::Shear,
+};
+use crate::layout::{Frame, Hit, NO_TRIANGLE, Ray};
+
+/// The ray through a pixel's centre.
+pub fn camera_ray(frame: &Frame, pixel: UVec2) -> Ray {
+    Ray {
+        origin: frame.eye,
+        pixel_ix: pixel.y * frame.width + pixel.x,
+        direction: camera_direction(frame, pixel),
+        source_triangle: NO_TRIANGLE,
+        throughput: Vec3::ONE,
+        t_max: f32::INFINITY,
+    }
+}
+
+/// Writes the rays of the pixels from place `first_pixel` on, in tile order, as many as `rays` holds.
+pub fn primary_rays(frame: &Frame, first_pixel: u32, rays: &mut [Ray]) {
+    rays.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each(|(task, rays)| {
+        for (order, ray) in (first_pixel + (task * RAYS_PER_TASK) as u32..).zip(rays) {
+            *ray = camera_ray(frame, pixel_of(order, frame.width, frame.height));
+        }
+    });
+}
+
+/// Writes `hits`, one a ray, from `triangle_ids` (rows from the top); returns how many are hits.
+pub fn primary_hit(bindings: &Bindings, triangle_ids: &[u32], rays: &[Ray], hits: &mut [Hit]) -> u32 {
+    let of_task = |(rays, hits): (&[Ray], &mut [Hit])| {
+        let mut n_hits = 0;
+        for (ray, hit) in rays.iter().zip(hits) {
+            let triangle_ix = triangle_ids[ray.pixel_ix as usize];
+            *hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
+            if triangle_ix != NO_TRIANGLE {
+                let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
+                *hit = shear.clamp_to_triangle(&bindings.triangles[triangle_ix as usize], triangle_ix);
+                n_hits += 1;
+            }
+        }
+        n_hits
+    };
+    rays.par_chunks(RAYS_PER_TASK).zip(hits.par_chunks_mut(RAYS_PER_TASK)).map(of_task).sum()
+}

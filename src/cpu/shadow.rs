@@ -1,0 +1,51 @@
+//! Shadow (the paper's section 2.1): which lights each hit sees. Twin of `shadow.comp`.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::{RAYS_PER_TASK, bindings::Bindings, kdtree::Traverser, light::sample_light, surface::surface_at};
+use crate::{
+    frame::Traversal,
+    layout::{Hit, Light, NO_TRIANGLE, Ray},
+};
+
+/// The segment to the light, or none where the surface turns its back on it.
+fn shadow_segment(bindings: &Bindings, ray: &Ray, hit: &Hit, light: &Light) -> Option<Ray> {
+    let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
+    let to_light = sample_light(light, surface.point_world);
+    // Not `<=`: a NaN is unlit.
+    if !(surface.geometric.dot(to_light.direction) > 0.0) {
+        return None;
+    }
+    let segment = surface.ray_from(to_light.direction, hit.triangle_ix, ray, Vec3::ZERO);
+    Some(Ray { t_max: to_light.distance, ..segment })
+}
+
+/// Writes `light_visibility[light * queue_capacity + ray]` (1: lit); returns how many segments were tested.
+pub fn shadow(
+    bindings: &Bindings,
+    traversal: Traversal,
+    rays: &[Ray],
+    hits: &[Hit],
+    light_visibility: &mut [u32],
+) -> u32 {
+    let of_light = |(light, visibility): (&Light, &mut [u32])| -> u32 {
+        let of_task = |traverser: &mut Traverser, ((rays, hits), visibility): ((&[Ray], &[Hit]), &mut [u32])| {
+            let mut n_tested = 0;
+            for ((ray, hit), visible) in rays.iter().zip(hits).zip(visibility) {
+                let is_hit = hit.triangle_ix != NO_TRIANGLE;
+                let segment = is_hit.then(|| shadow_segment(bindings, ray, hit, light)).flatten();
+                *visible = segment.is_some_and(|segment| !traverser.any_hit(bindings, &segment)).into();
+                n_tested += u32::from(segment.is_some());
+            }
+            n_tested
+        };
+        rays.par_chunks(RAYS_PER_TASK)
+            .zip(hits.par_chunks(RAYS_PER_TASK))
+            .zip(visibility.par_chunks_mut(RAYS_PER_TASK))
+            .map_init(|| Traverser::new(traversal), of_task)
+            .sum()
+    };
+    let stride = bindings.frame.queue_capacity as usize;
+    bindings.lights.iter().zip(light_visibility.chunks_mut(stride)).map(of_light).sum()
+}

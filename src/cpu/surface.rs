@@ -1,0 +1,84 @@
+//! The surface at a hit, and rays that leave it. Twin of `surface.glsl`.
+
+use glam::{Vec2, Vec3};
+
+use crate::layout::{FLAT_NORMAL, Hit, Ray, Triangle};
+
+/// Where a ray met a triangle.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface {
+    pub point_world: Vec3,
+    /// The plane's unit normal on the side that the ray came from.
+    pub geometric: Vec3,
+    /// The interpolated unit normal, on the same side.
+    pub shading: Vec3,
+    /// Distance along `geometric` at which a new ray starts clear of this surface.
+    pub clearance: f32,
+    /// The ray met the triangle's back: it leaves a solid.
+    pub from_inside: bool,
+}
+
+/// GLSL's `unpackSnorm2x16`.
+fn unpack_snorm_2x16(code: u32) -> Vec2 {
+    let component = |bits: u32| (f32::from(bits as u16 as i16) / 32767.0).clamp(-1.0, 1.0);
+    Vec2::new(component(code), component(code >> 16))
+}
+
+/// Unit vector of an octahedral 2 x snorm16 code.
+pub fn decode_normal(code: u32) -> Vec3 {
+    let p = unpack_snorm_2x16(code);
+    let mut n = Vec3::new(p.x, p.y, 1.0 - p.x.abs() - p.y.abs());
+    let fold = (-n.z).max(0.0);
+    n.x += if n.x >= 0.0 { -fold } else { fold };
+    n.y += if n.y >= 0.0 { -fold } else { fold };
+    n.normalize()
+}
+
+fn shading_normal(t: &Triangle, hit: &Hit, geometric: Vec3) -> Vec3 {
+    if [t.n0, t.n1, t.n2].contains(&FLAT_NORMAL) {
+        return geometric;
+    }
+    let n = (1.0 - hit.u - hit.v) * decode_normal(t.n0) + hit.u * decode_normal(t.n1) + hit.v * decode_normal(t.n2);
+    let squared = n.dot(n);
+    if squared > 1e-12 { n * (1.0 / squared.sqrt()) } else { geometric }
+}
+
+/// n with a non-negative component along `side`.
+fn towards(n: Vec3, side: Vec3) -> Vec3 {
+    if n.dot(side) < 0.0 { -n } else { n }
+}
+
+/// The surface of triangle `t` at `hit` as `ray` meets it.
+pub fn surface_at(ray: &Ray, hit: &Hit, t: &Triangle) -> Surface {
+    let w = 1.0 - hit.u - hit.v;
+    let magnitude = (w * t.v0).abs() + (hit.u * t.v1).abs() + (hit.v * t.v2).abs();
+    // Edges at unit scale: the cross product of a tiny triangle would underflow.
+    let (e1, e2) = (t.v1 - t.v0, t.v2 - t.v0);
+    let span = e1.abs().max(e2.abs());
+    let scale = 1.0 / span.x.max(span.y.max(span.z));
+    let outward = (e1 * scale).cross(e2 * scale).normalize();
+    let from_inside = outward.dot(ray.direction) > 0.0;
+    let geometric = if from_inside { -outward } else { outward };
+    Surface {
+        point_world: w * t.v0 + hit.u * t.v1 + hit.v * t.v2,
+        geometric,
+        shading: towards(shading_normal(t, hit, outward), geometric),
+        clearance: 2f32.powi(-18) * magnitude.dot(geometric.abs()),
+        from_inside,
+    }
+}
+
+impl Surface {
+    /// A ray from the surface: starts on the side that it leaves to.
+    pub fn ray_from(&self, direction: Vec3, triangle_ix: u32, parent: &Ray, throughput: Vec3) -> Ray {
+        let side = if direction.dot(self.geometric) < 0.0 { -self.clearance } else { self.clearance };
+        Ray {
+            origin: self.point_world + side * self.geometric,
+            pixel_ix: parent.pixel_ix,
+            direction,
+            source_triangle: triangle_ix,
+            throughput,
+            t_max: parent.t_max,
+        }
+    }
+}

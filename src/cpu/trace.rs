@@ -1,0 +1,27 @@
+//! Trace (the paper's section 2.3): each ray's closest hit through the kd-tree. Twin of `trace.comp`.
+
+use rayon::prelude::*;
+
+use super::{RAYS_PER_TASK, bindings::Bindings, kdtree::Traverser};
+use crate::{
+    frame::Traversal,
+    layout::{Hit, NO_TRIANGLE, Ray},
+};
+
+/// Writes `hits`, one a ray; returns how many are hits.
+pub fn trace(bindings: &Bindings, traversal: Traversal, rays: &[Ray], hits: &mut [Hit]) -> u32 {
+    rays.par_chunks(RAYS_PER_TASK)
+        .zip(hits.par_chunks_mut(RAYS_PER_TASK))
+        .map_init(
+            || Traverser::new(traversal),
+            |traverser, (rays, hits)| {
+                let mut n_hits = 0;
+                for (ray, hit) in rays.iter().zip(hits) {
+                    *hit = traverser.closest_hit(bindings, ray);
+                    n_hits += u32::from(hit.triangle_ix != NO_TRIANGLE);
+                }
+                n_hits
+            },
+        )
+        .sum()
+}

@@ -1,0 +1,25 @@
+//! Denoise (the paper's section 2.4): smooths pixels that stand out from their neighbours.
+
+use std::sync::Arc;
+
+use super::{Resources, kernel, spirv};
+use crate::{
+    gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
+    layout::Batch,
+};
+
+/// The pass's kernel.
+pub struct Denoise {
+    kernel: ComputePipeline,
+}
+
+impl Denoise {
+    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
+        Ok(Self { kernel: kernel(context, bindings, "denoise", spirv!("denoise.comp"), &[])? })
+    }
+
+    /// Needs pixel_radiance. Leaves pixel_filtered.
+    pub fn record(&self, commands: &Commands, resources: &Resources) {
+        commands.dispatch(&self.kernel, None, &Batch::default(), resources.pixel_dispatch());
+    }
+}

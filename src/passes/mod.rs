@@ -1,0 +1,83 @@
+//! The passes, one file each: its pipeline and how it is recorded. The kernel of the same name is in `glsl/passes`,
+//! its CPU twin in `cpu`, its test in `tests/passes`.
+
+use std::sync::Arc;
+
+use crate::{
+    frame::{Primary, RenderOptions},
+    gpu::{Bindings, ComputeDesc, ComputePipeline, Context, GpuError},
+};
+
+mod compact;
+mod denoise;
+mod primary_hit;
+mod resolve;
+mod resources;
+mod shade;
+mod shadow;
+mod tonemap;
+mod trace;
+mod visibility;
+
+pub use self::{
+    compact::Compact,
+    denoise::Denoise,
+    primary_hit::PrimaryHit,
+    resolve::Resolve,
+    resources::{Resources, bounce_row},
+    shade::Shade,
+    shadow::Shadow,
+    tonemap::Tonemap,
+    trace::Trace,
+    visibility::Visibility,
+};
+
+/// A shader's SPIR-V, as build.rs left it.
+macro_rules! spirv {
+    ($name:literal) => {
+        include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv"))
+    };
+}
+pub(crate) use spirv;
+
+/// All passes, ready to record.
+pub struct Passes {
+    pub visibility: Visibility,
+    pub primary_hit: PrimaryHit,
+    pub trace: Trace,
+    pub shadow: Shadow,
+    pub shade: Shade,
+    pub compact: Compact,
+    pub resolve: Resolve,
+    pub denoise: Denoise,
+    pub tonemap: Tonemap,
+}
+
+impl Passes {
+    /// # Errors
+    /// The driver refuses a shader.
+    pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, options: &RenderOptions) -> Result<Self, GpuError> {
+        Ok(Self {
+            visibility: Visibility::new(context, bindings)?,
+            primary_hit: PrimaryHit::new(context, bindings, options.primary == Primary::Raster)?,
+            trace: Trace::new(context, bindings, options.traversal)?,
+            shadow: Shadow::new(context, bindings, options.traversal)?,
+            shade: Shade::new(context, bindings)?,
+            compact: Compact::new(context, bindings)?,
+            resolve: Resolve::new(context, bindings)?,
+            denoise: Denoise::new(context, bindings)?,
+            tonemap: Tonemap::new(context, bindings)?,
+        })
+    }
+}
+
+/// A kernel without subgroup requirements.
+fn kernel(
+    context: &Arc<Context>,
+    bindings: &Arc<Bindings>,
+    name: &'static str,
+    spirv: &[u8],
+    constants: &[u32],
+) -> Result<ComputePipeline, GpuError> {
+    ComputePipeline::new(context, bindings, &ComputeDesc { name, spirv, constants, full_subgroups: false })
+}

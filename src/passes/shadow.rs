@@ -1,0 +1,30 @@
+//! Shadow (the paper's section 2.1): is there anything between a hit and a light?
+
+use std::sync::Arc;
+
+use super::{Resources, kernel, spirv};
+use crate::{
+    frame::Traversal,
+    gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
+    layout::Batch,
+};
+
+/// The pass's kernel.
+pub struct Shadow {
+    kernel: ComputePipeline,
+}
+
+impl Shadow {
+    pub(super) fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<Bindings>,
+        traversal: Traversal,
+    ) -> Result<Self, GpuError> {
+        Ok(Self { kernel: kernel(context, bindings, "shadow", spirv!("shadow.comp"), &[traversal.constant()])? })
+    }
+
+    /// Needs rays, hits. Leaves light_visibility; updates counters.
+    pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
+        commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.shadow_dispatch(batch));
+    }
+}

@@ -1,0 +1,25 @@
+//! Tonemap: radiance to sRGB bytes.
+
+use std::sync::Arc;
+
+use super::{Resources, kernel, spirv};
+use crate::{
+    gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
+    layout::Batch,
+};
+
+/// The pass's kernel.
+pub struct Tonemap {
+    kernel: ComputePipeline,
+}
+
+impl Tonemap {
+    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
+        Ok(Self { kernel: kernel(context, bindings, "tonemap", spirv!("tonemap.comp"), &[])? })
+    }
+
+    /// Needs pixel_filtered. Leaves pixel_display.
+    pub fn record(&self, commands: &Commands, resources: &Resources) {
+        commands.dispatch(&self.kernel, None, &Batch::default(), resources.pixel_dispatch());
+    }
+}

@@ -1,0 +1,30 @@
+//! Trace (the paper's section 2.3): each ray's closest hit through the kd-tree.
+
+use std::sync::Arc;
+
+use super::{Resources, kernel, spirv};
+use crate::{
+    frame::Traversal,
+    gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
+    layout::Batch,
+};
+
+/// The pass's kernel.
+pub struct Trace {
+    kernel: ComputePipeline,
+}
+
+impl Trace {
+    pub(super) fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<Bindings>,
+        traversal: Traversal,
+    ) -> Result<Self, GpuError> {
+        Ok(Self { kernel: kernel(context, bindings, "trace", spirv!("trace.comp"), &[traversal.constant()])? })
+    }
+
+    /// Needs rays. Leaves hits; updates counters.
+    pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
+        commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.ray_dispatch(batch));
+    }
+}
