@@ -98,6 +98,8 @@ fn survives_any_finite_input() {
         ("huge", scaled(&room(20), 1e18)),
         ("largest", scaled(&soup(1000, 1e-6, 6), 3.4e38)),
         ("tiny", scaled(&room(20), 1e-30)),
+        ("tinier", scaled(&soup(1000, 0.1, 7), 1e-34)),
+        ("nearly subnormal", scaled(&soup(1000, 0.1, 7), 1e-37)),
         ("subnormal", scaled(&soup(1000, 0.1, 7), 1e-42)),
         ("wide range", [scaled(&sphere(20), 1e-12), scaled(&sphere(20), 1e12)].concat()),
         ("far away", soup(3000, 0.1, 8).iter().map(|t| triangle([t.v0, t.v1, t.v2].map(|v| v + 1e5))).collect()),

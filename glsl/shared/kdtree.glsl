@@ -27,6 +27,7 @@ struct Cell {
 };
 
 // What the traversal needs of a ray. slack: by how much in t a plane is widened on each axis (see traversal_ray).
+// overlap: a pending cell begins at most this far before a deeper one.
 struct TraversalRay {
     Shear shear;
     vec3 origin;
@@ -34,7 +35,7 @@ struct TraversalRay {
     vec3 slack;
     float t_enter;
     float t_exit;
-    bool exhaustive;
+    float overlap;
     uint source_triangle;
 };
 
@@ -53,8 +54,9 @@ TraversalRay traversal_ray(Ray ray) {
     vec3 reach = max(abs(frame.cell_min - ray.origin), abs(frame.cell_max - ray.origin));
     float slack = max(reach.x, max(reach.y, reach.z)) * exp2(-21.0);
     r.slack = slack * abs(r.inv_direction);
-    // Almost along a plane the widened intervals overlap far: a hit then does not end the search of pending cells.
-    r.exhaustive = any(lessThan(abs(direction), vec3(exp2(-8.0))));
+    // Along the ray, planes of one axis come in order, the deepest pending one first; one of another axis may come
+    // earlier by as much as both are widened. A chain over the three axes adds up to no more than this.
+    r.overlap = 2.0 * (r.slack.x + r.slack.y + r.slack.z);
 
     vec3 t0 = (frame.cell_min - ray.origin) * r.inv_direction;
     vec3 t1 = (frame.cell_max - ray.origin) * r.inv_direction;

@@ -41,7 +41,7 @@ void climb(TraversalRay ray, inout Cell cell) {
 
 bool mask_pop(TraversalRay ray, float t_best, inout Cell cell) {
     while (pending_mask != uvec2(0u)) {
-        if (t_best < t_deepest && !ray.exhaustive) return false;
+        if (t_best < t_deepest - ray.overlap) return false;
         cell.node_ix = deepest_ix;
         cell.depth = deepest_pending();
         cell.t_enter = max(t_deepest, ray.t_enter);

@@ -25,8 +25,8 @@ pub struct TraversalRay {
     slack: [f32; 4],
     pub t_enter: f32,
     pub t_exit: f32,
-    /// Almost along a plane the widened intervals overlap far: a hit then does not end the search of pending cells.
-    pub exhaustive: bool,
+    /// A pending cell begins at most this far before a deeper one.
+    pub overlap: f32,
     source_triangle: u32,
 }
 
@@ -66,7 +66,7 @@ impl TraversalRay {
             slack: by_axis(slack),
             t_enter: max(max(near[0], near[1]), max(near[2], 0.0)),
             t_exit: min(min(far[0], far[1]), min(far[2], ray.t_max)),
-            exhaustive: direction.iter().any(|d| d.abs() < 2f32.powi(-8)),
+            overlap: 2.0 * (slack[0] + slack[1] + slack[2]),
             source_triangle: ray.source_triangle,
         }
     }

@@ -65,7 +65,7 @@ impl Pending for PendingMask {
     #[inline(always)]
     fn pop(&mut self, bindings: &Bindings, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
         while self.mask != 0 {
-            if t_best < self.t_deepest && !ray.exhaustive {
+            if t_best < self.t_deepest - ray.overlap {
                 return false;
             }
             cell.node_ix = self.deepest_ix;

@@ -1,0 +1,84 @@
+//! Rays at a mesh: ordinary ones, and those on which traversals fail.
+
+use glam::Vec3;
+use kdray::{
+    kdtree::Node,
+    layout::{NO_TRIANGLE, Ray, Triangle},
+};
+
+use super::{World, random::Random};
+
+/// A ray of the length `t_max`, from no triangle.
+pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
+    Ray { origin, pixel_ix: 0, direction, source_triangle: NO_TRIANGLE, throughput: Vec3::ONE, t_max: f32::INFINITY }
+}
+
+fn corner(random: &mut Random, triangles: &[Triangle]) -> Vec3 {
+    let t = random.of(triangles);
+    *random.of(&[t.v0, t.v1, t.v2])
+}
+
+/// The middle of an edge, or a point elsewhere on it.
+pub fn edge_point(random: &mut Random, triangles: &[Triangle]) -> Vec3 {
+    let t = random.of(triangles);
+    let (a, b) = *random.of(&[(t.v0, t.v1), (t.v1, t.v2), (t.v2, t.v0)]);
+    let share = if random.below(2) == 0 { 0.5 } else { random.unit() };
+    a + share * (b - a)
+}
+
+fn axis_direction(random: &mut Random) -> Vec3 {
+    let axis = *random.of(&Vec3::AXES);
+    if random.below(2) == 0 { axis } else { -axis }
+}
+
+/// A point of a split plane of the tree, and the plane's axis.
+fn split_plane_point(random: &mut Random, world: &World, point: Vec3) -> (Vec3, usize) {
+    let mut point = point;
+    for _ in 0..100 {
+        if let Node::Split { axis, position, .. } = world.tree.node(random.below(world.tree.nodes.len()) as u32) {
+            point[axis] = position;
+            return (point, axis);
+        }
+    }
+    (point, 0)
+}
+
+/// One of the kinds of rays below, in turn.
+pub fn nasty_ray(random: &mut Random, world: &World, kind: usize) -> Ray {
+    let far = world.centre() + 3.0 * world.radius() * random.direction();
+    let within = random.in_box(world.tree.cell_min, world.tree.cell_max);
+    let vertex = corner(random, &world.triangles);
+    let edge = edge_point(random, &world.triangles);
+    let (on_plane, axis) = split_plane_point(random, world, within);
+    let mut in_plane = random.direction();
+    in_plane[axis] = 0.0;
+    let almost_in_plane = in_plane + 1e-5 * random.direction();
+    let (origin, towards) = match kind % N_KINDS {
+        0 => (far, within - far),
+        1 => (within, random.direction()),
+        2 => (far, vertex - far),
+        3 => (far, edge - far),
+        4 => (vertex, random.direction()),
+        5 => (edge, within - edge),
+        6 => (within, axis_direction(random)),
+        7 => (vertex, axis_direction(random)),
+        8 => (vertex - 3.0 * world.radius() * Vec3::X, Vec3::X),
+        9 => (on_plane, in_plane),
+        10 => (on_plane, almost_in_plane),
+        11 => (on_plane, random.direction()),
+        12 => (vertex, edge - vertex),
+        _ => (within, vertex - within),
+    };
+    let towards = if towards.length_squared() > 0.0 { towards.normalize() } else { Vec3::Y };
+    let mut ray = ray(origin, towards);
+    if random.below(4) == 0 {
+        ray.t_max = 2.0 * world.radius() * random.unit();
+    }
+    if random.below(8) == 0 {
+        ray.source_triangle = random.below(world.triangles.len()) as u32;
+    }
+    ray
+}
+
+/// Kinds of rays that `nasty_ray` makes.
+pub const N_KINDS: usize = 14;

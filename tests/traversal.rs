@@ -1,0 +1,179 @@
+//! The CPU's kd-tree traversal against every triangle of the mesh, and its two ways back up against one another.
+
+mod support;
+
+use glam::{Vec3, vec3};
+use kdray::{
+    cpu::{brute, kdtree::Traverser},
+    frame::Traversal,
+    layout::{Hit, NO_TRIANGLE, Ray, Triangle},
+};
+use rayon::prelude::*;
+use support::{
+    World, meshes,
+    random::Random,
+    rays::{N_KINDS, edge_point, nasty_ray, ray},
+};
+
+const N_RAYS: usize = 100_000;
+
+fn rays_at(world: &World) -> Vec<Ray> {
+    (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), world, i)).collect()
+}
+
+/// All hits of one variant, and whether its any-hit agrees.
+fn traced(world: &World, traversal: Traversal, rays: &[Ray]) -> Vec<Hit> {
+    let bindings = world.bindings();
+    rays.par_iter()
+        .map_init(
+            || Traverser::new(traversal),
+            |traverser, ray| {
+                let hit = traverser.closest_hit(&bindings, ray);
+                assert_eq!(traverser.any_hit(&bindings, ray), hit.triangle_ix != NO_TRIANGLE, "any hit of {ray:?}");
+                hit
+            },
+        )
+        .collect()
+}
+
+/// The first ray whose hits differ, in any bit.
+fn first_difference(rays: &[Ray], expected: &[Hit], found: &[Hit]) -> Option<String> {
+    assert_eq!(expected.len(), found.len());
+    let bits = |hit: &Hit| (hit.t.to_bits(), hit.triangle_ix, hit.u.to_bits(), hit.v.to_bits());
+    let differ = |i: &usize| bits(&expected[*i]) != bits(&found[*i]);
+    let n = (0..rays.len()).filter(differ).count();
+    let i = (0..rays.len()).find(differ)?;
+    Some(format!("{n} rays; ray {i} (kind {}): {:?}: {:?}, not {:?}", i % N_KINDS, rays[i], found[i], expected[i]))
+}
+
+fn check_against_brute_force(name: &str, triangles: Vec<Triangle>) {
+    let world = World::new(triangles);
+    let rays = rays_at(&world);
+    let expected: Vec<Hit> = rays.par_iter().map(|ray| brute::closest_hit(&world.triangles, ray)).collect();
+    let n_hits = expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count();
+    assert!(n_hits > N_RAYS / 5, "{name}: only {n_hits} rays hit anything");
+    for traversal in [Traversal::Mask, Traversal::Stack] {
+        let difference = first_difference(&rays, &expected, &traced(&world, traversal, &rays));
+        assert_eq!(difference, None, "{name}, {traversal}");
+    }
+}
+
+#[test]
+fn finds_what_brute_force_finds() {
+    check_against_brute_force("torus", meshes::torus(40, 20));
+    check_against_brute_force("cube", meshes::cube(9, 0.0));
+    check_against_brute_force("sphere", meshes::cube(10, 1.0));
+    check_against_brute_force("threefold", meshes::threefold(meshes::torus(20, 10)));
+    check_against_brute_force("soup", meshes::soup(1200, 7));
+    check_against_brute_force("tiny", meshes::placed(meshes::torus(40, 20), 1e-6, Vec3::ZERO));
+    check_against_brute_force("far", meshes::placed(meshes::torus(40, 20), 0.3, vec3(1000.0, -70.0, 3.0)));
+    check_against_brute_force("one", vec![meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z); 1]);
+}
+
+#[test]
+fn mask_and_stack_agree_in_larger_meshes() {
+    for triangles in [meshes::torus(400, 200), meshes::cube(100, 0.3), meshes::soup(50_000, 3)] {
+        let world = World::new(triangles);
+        let rays = rays_at(&world);
+        let masked = traced(&world, Traversal::Mask, &rays);
+        assert_eq!(first_difference(&rays, &masked, &traced(&world, Traversal::Stack, &rays)), None);
+    }
+}
+
+#[test]
+fn a_wrong_bit_or_triangle_is_noticed() {
+    let world = World::new(meshes::torus(20, 10));
+    let rays = rays_at(&world);
+    let hits = traced(&world, Traversal::Mask, &rays);
+    assert_eq!(first_difference(&rays, &hits, &hits), None);
+    let i = hits.iter().position(|hit| hit.triangle_ix != NO_TRIANGLE).expect("some ray hits");
+    let mut wrong = hits.clone();
+    wrong[i].t = f32::from_bits(hits[i].t.to_bits() + 1);
+    assert!(first_difference(&rays, &hits, &wrong).is_some());
+    wrong[i] = Hit { triangle_ix: hits[i].triangle_ix ^ 1, ..hits[i] };
+    assert!(first_difference(&rays, &hits, &wrong).is_some());
+}
+
+#[test]
+fn a_missing_triangle_in_a_leaf_is_noticed() {
+    let mut world = World::new(meshes::torus(20, 10));
+    let rays = rays_at(&world);
+    let hits = traced(&world, Traversal::Mask, &rays);
+    let lost = world.tree.leaf_triangles[0];
+    world.tree.leaf_triangles.iter_mut().filter(|ix| **ix == lost).for_each(|ix| *ix = (lost + 1) % 400);
+    assert!(first_difference(&rays, &hits, &traced(&world, Traversal::Mask, &rays)).is_some());
+}
+
+#[test]
+fn rays_from_inside_never_leak() {
+    for (name, triangles) in [("sphere", meshes::cube(20, 1.0)), ("cube", meshes::cube(20, 0.0))] {
+        let world = World::new(triangles);
+        let rays: Vec<Ray> = (0..300_000).map(|i| outward_ray(&mut Random(i), &world)).collect();
+        for traversal in [Traversal::Mask, Traversal::Stack] {
+            let n_leaks = traced(&world, traversal, &rays).iter().filter(|hit| hit.triangle_ix == NO_TRIANGLE).count();
+            assert_eq!(n_leaks, 0, "{name}, {traversal}");
+        }
+    }
+}
+
+/// From somewhere inside a convex mesh around 0 exactly at a corner or a point of an edge.
+fn outward_ray(random: &mut Random, world: &World) -> Ray {
+    let t = *random.of(&world.triangles);
+    let target = if random.below(2) == 0 { t.v0 } else { edge_point(random, &world.triangles) };
+    let origin = if random.below(4) == 0 { Vec3::ZERO } else { 0.5 * random.unit() * random.direction() };
+    ray(origin, (target - origin).normalize())
+}
+
+#[test]
+fn a_hole_leaks() {
+    let mut triangles = meshes::cube(20, 1.0);
+    triangles.remove(7);
+    let world = World::new(triangles);
+    let rays: Vec<Ray> = (0..100_000).map(|i| outward_ray(&mut Random(i), &world)).collect();
+    assert!(traced(&world, Traversal::Mask, &rays).iter().any(|hit| hit.triangle_ix == NO_TRIANGLE));
+}
+
+/// Numbers that no ray should have, each in each component of origin and direction. Nothing is asked of directions
+/// that are merely far from unit length but that they end.
+#[test]
+fn rays_that_are_none_end_and_miss() {
+    let world = World::new(meshes::torus(40, 20));
+    let (nan, infinity) = (f32::NAN, f32::INFINITY);
+    let mut must_miss = vec![ray(Vec3::ZERO, Vec3::ZERO), ray(Vec3::NAN, Vec3::NAN)];
+    let mut must_end = Vec::new();
+    for origin in [Vec3::ZERO, Vec3::X, vec3(3.0, 0.1, 0.2), world.triangles[5].v0] {
+        for direction in [Vec3::X, Vec3::NEG_X, Vec3::Y, vec3(-0.6, 0.8, 0.0), vec3(-0.7, 0.1, -0.6)] {
+            for axis in 0..3 {
+                for wrong in [nan, infinity, -infinity] {
+                    must_miss.push(ray(with(origin, axis, wrong), direction));
+                    must_miss.push(ray(origin, with(direction, axis, wrong)));
+                }
+                for wrong in [f32::MAX, f32::MIN_POSITIVE, 1e-40, -1e-40, -1e30, 1e20] {
+                    must_end.push(ray(with(origin, axis, wrong), direction));
+                    must_end.push(ray(origin, with(direction, axis, wrong)));
+                }
+            }
+            must_end.extend([1e-38, 1e-44, 1e38].map(|scale| ray(origin, direction * scale)));
+            must_miss.extend([nan, 0.0, -1.0, -infinity].map(|t_max| Ray { t_max, ..ray(origin, direction) }));
+        }
+    }
+    for traversal in [Traversal::Mask, Traversal::Stack] {
+        let hits = traced(&world, traversal, &must_miss);
+        for (ray, hit) in must_miss.iter().zip(hits) {
+            assert_eq!(hit.triangle_ix, NO_TRIANGLE, "{traversal}: {ray:?} hits at {}", hit.t);
+        }
+        traced(&world, traversal, &must_end);
+    }
+}
+
+fn with(mut v: Vec3, axis: usize, value: f32) -> Vec3 {
+    v[axis] = value;
+    v
+}
+
+#[test]
+fn nothing_is_hit_in_an_empty_world() {
+    let world = World::new(Vec::new());
+    let hits = traced(&world, Traversal::Mask, &[ray(Vec3::ZERO, Vec3::X), ray(Vec3::ONE, Vec3::NEG_ONE.normalize())]);
+    assert!(hits.iter().all(|hit| hit.triangle_ix == NO_TRIANGLE && hit.t == f32::INFINITY));
+}
