@@ -171,6 +171,15 @@ fn with(mut v: Vec3, axis: usize, value: f32) -> Vec3 {
     v
 }
 
+/// Seen from its end, a needle's corners lie on one line with the ray as far as rounded products can tell.
+#[test]
+fn a_needle_is_not_hit_beside() {
+    let triangles = meshes::soup(1200, 7);
+    let origin = vec3(-1.7435632, -4.7086616, -7.629315);
+    let needle = ray(origin, vec3(0.40416333, 0.5116821, 0.75817764));
+    assert_eq!(brute::closest_hit(&triangles, &needle).triangle_ix, NO_TRIANGLE);
+}
+
 #[test]
 fn nothing_is_hit_in_an_empty_world() {
     let world = World::new(Vec::new());

@@ -39,12 +39,34 @@ vec3 sheared(Shear shear, vec3 corner) {
 }
 
 // Twice the signed areas that the ray's axis spans with the edges opposite to v0, v1, v2. A rounded product never
-// passes another one, so a sign is right or zero: the two triangles of an edge cannot both miss it.
+// passes another one, so a sign is right or zero.
 vec3 edge_functions(vec3 a, vec3 b, vec3 c) {
     precise float u = c.x * b.y - c.y * b.x;
     precise float v = a.x * c.y - a.y * c.x;
     precise float w = b.x * a.y - b.y * a.x;
     return vec3(u, v, w);
+}
+
+// What rounding took from the product a * b (Dekker: A floating-point technique for extending the available precision,
+// Numerische Mathematik 18, 1971).
+float product_error(float a, float b) {
+    precise float split_a = 4097.0 * a, split_b = 4097.0 * b;
+    precise float a_high = split_a - (split_a - a), b_high = split_b - (split_b - b);
+    precise float a_low = a - a_high, b_low = b - b_high;
+    precise float error = ((a_high * b_high - a * b) + a_high * b_low + a_low * b_high) + a_low * b_low;
+    return error;
+}
+
+// The edge function a.x * b.y - a.y * b.x where its products round to one value: now the sign is right, and zero means
+// that the ray meets the edge. Without it a needle, seen from its end, is hit at whatever corner.
+float exact_edge(vec3 a, vec3 b, float edge) {
+    if (edge != 0.0) return edge;
+    precise float difference = product_error(a.x, b.y) - product_error(a.y, b.x);
+    return difference;
+}
+
+bool is_outside(vec3 edges) {
+    return any(lessThan(edges, vec3(0.0))) && any(greaterThan(edges, vec3(0.0)));
 }
 
 // t and barycentric weights from edge functions whose sum is det (not 0).
@@ -63,9 +85,13 @@ bool intersect_triangle(Shear shear, Triangle triangle, uint triangle_ix, out Hi
     vec3 b = sheared(shear, triangle.v1);
     vec3 c = sheared(shear, triangle.v2);
     vec3 edges = edge_functions(a, b, c);
+    if (is_outside(edges)) return false;
+    if (any(equal(edges, vec3(0.0)))) {
+        edges = vec3(exact_edge(c, b, edges.x), exact_edge(a, c, edges.y), exact_edge(b, a, edges.z));
+        if (is_outside(edges)) return false;
+    }
     precise float det = edges.x + edges.y + edges.z;
-    bool outside = any(lessThan(edges, vec3(0.0))) && any(greaterThan(edges, vec3(0.0)));
-    if (outside || det == 0.0) return false;
+    if (!(abs(det) > 0.0)) return false;
     hit = weighted_hit(shear, edges, det, vec3(a.z, b.z, c.z), triangle_ix);
     return true;
 }

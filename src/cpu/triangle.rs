@@ -63,15 +63,23 @@ impl Shear {
     }
 
     /// Watertight and two-sided (Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2013), edges
-    /// included. None also for a triangle without area. t may be negative or NaN.
+    /// included. None also for a triangle without area and for NaN. t may be negative.
     #[inline(always)]
     pub fn intersect_triangle(&self, triangle: &Triangle, triangle_ix: u32) -> Option<Hit> {
         let [a, b, c] = self.corners(triangle);
-        let edges = edge_functions(a, b, c);
+        let mut edges = edge_functions(a, b, c);
+        if is_outside(edges) {
+            return None;
+        }
+        if edges.contains(&0.0) {
+            edges = [exact_edge(c, b, edges[0]), exact_edge(a, c, edges[1]), exact_edge(b, a, edges[2])];
+            if is_outside(edges) {
+                return None;
+            }
+        }
         let det = edges[0] + edges[1] + edges[2];
-        let outside = (edges[0] < 0.0 || edges[1] < 0.0 || edges[2] < 0.0)
-            && (edges[0] > 0.0 || edges[1] > 0.0 || edges[2] > 0.0);
-        if outside || det == 0.0 {
+        // Not `<=`: a NaN misses.
+        if !(det.abs() > 0.0) {
             return None;
         }
         Some(self.weighted_hit(edges, det, [a[2], b[2], c[2]], triangle_ix))
@@ -97,4 +105,17 @@ impl Shear {
 #[inline(always)]
 fn edge_functions(a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> [f32; 3] {
     [c[0] * b[1] - c[1] * b[0], a[0] * c[1] - a[1] * c[0], b[0] * a[1] - b[1] * a[0]]
+}
+
+/// The edge function a.x * b.y - a.y * b.x where its products round to one value. Two products of `f32` and their
+/// difference are exact in `f64`; the kernels have none and add up the products' errors to the same.
+#[cold]
+fn exact_edge(a: [f32; 3], b: [f32; 3], edge: f32) -> f32 {
+    let [ax, ay, bx, by] = [a[0], a[1], b[0], b[1]].map(f64::from);
+    if edge == 0.0 { (ax * by - ay * bx) as f32 } else { edge }
+}
+
+#[inline(always)]
+fn is_outside(edges: [f32; 3]) -> bool {
+    (edges[0] < 0.0 || edges[1] < 0.0 || edges[2] < 0.0) && (edges[0] > 0.0 || edges[1] > 0.0 || edges[2] > 0.0)
 }
