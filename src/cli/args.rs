@@ -67,6 +67,9 @@ pub struct RenderArgs {
     /// Device by its index in `kdray devices` or a part of its name [default: the best one]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
+    /// Draw the frame so many times and report the one of median time
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
+    pub repeat: u16,
     /// Write the report as JSON, too
     #[arg(long, value_name = "FILE")]
     pub profile: Option<PathBuf>,

@@ -12,7 +12,14 @@ use kdray::{
     scene::Scene,
 };
 
-use super::{args::RenderArgs, complain, error::CliError, print, progress::Progress, report::Report};
+use super::{
+    args::RenderArgs,
+    complain,
+    error::CliError,
+    print,
+    progress::Progress,
+    report::{Report, Spread},
+};
 
 /// Loads, builds, renders, writes and reports. What can be refused is refused before the work that it would waste.
 pub fn run(args: &RenderArgs) -> Result<(), CliError> {
@@ -33,8 +40,9 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let building = format!("building the kd-tree of {n_triangles} triangles");
     let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &build_options));
     let rendering = format!("rendering {}x{}", options.width, options.height);
-    let (drawn, render_ms) = progress.stage(&rendering, || draw(context.as_ref(), &scene, &tree, &options));
-    let (picture, profile) = drawn?;
+    let frame = FrameToDraw { scene: &scene, tree: &tree, options: &options };
+    let (drawn, render_ms) = progress.stage(&rendering, || frame.draw(context.as_ref(), args.repeat));
+    let (picture, profiles) = drawn?;
     output::write_picture(&picture_path, &picture)?;
     drop(progress);
 
@@ -47,7 +55,8 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         load_ms,
         build_ms,
         render_ms,
-        frame: profile.into(),
+        repeated: Spread::of(&profiles),
+        frame: median(profiles).into(),
     };
     if let Some(path) = &args.profile {
         output::write(path, &report.json())?;
@@ -91,17 +100,30 @@ fn open_device(args: &RenderArgs, progress: &Progress) -> Result<Arc<Context>, G
     Ok(context)
 }
 
-/// On the device, or on the CPU for want of one.
-fn draw(
-    context: Option<&Arc<Context>>,
-    scene: &Scene,
-    tree: &KdTree,
-    options: &RenderOptions,
-) -> Result<(Picture, Profile), GpuError> {
-    match context {
-        Some(context) => Renderer::new(Arc::clone(context), scene, tree, options)?.render(),
-        None => Ok(cpu::render(scene, tree, options)),
+struct FrameToDraw<'a> {
+    scene: &'a Scene,
+    tree: &'a KdTree,
+    options: &'a RenderOptions,
+}
+
+impl FrameToDraw<'_> {
+    /// Draws the frame so many times, on the device or on the CPU for want of one. The pictures are all the same.
+    fn draw(&self, context: Option<&Arc<Context>>, n_times: u16) -> Result<(Picture, Vec<Profile>), GpuError> {
+        let Some(context) = context else {
+            let (picture, profile) = cpu::render(self.scene, self.tree, self.options);
+            let again = (1..n_times).map(|_| cpu::render(self.scene, self.tree, self.options).1);
+            return Ok((picture, std::iter::once(profile).chain(again).collect()));
+        };
+        let mut renderer = Renderer::new(Arc::clone(context), self.scene, self.tree, self.options)?;
+        let profiles = (0..n_times).map(|_| renderer.draw()).collect::<Result<_, _>>()?;
+        Ok((renderer.picture()?, profiles))
     }
+}
+
+/// The frame of median time; the last one where the device has no timestamps.
+fn median(mut profiles: Vec<Profile>) -> Profile {
+    profiles.sort_by(|a, b| a.frame_ms.partial_cmp(&b.frame_ms).expect("times are numbers"));
+    profiles.swap_remove(profiles.len() / 2)
 }
 
 /// Lists what the validation layer said; anything is a failure.

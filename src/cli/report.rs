@@ -25,8 +25,31 @@ pub struct Report {
     pub build_ms: f64,
     /// From the finished tree to the picture in memory: uploading, compiling and copying back included.
     pub render_ms: f64,
+    /// Over all frames that were drawn; none for a single one.
+    pub repeated: Option<Spread>,
+    /// The frame of median time.
     #[serde(flatten)]
     pub frame: Frame,
+}
+
+/// Times of a frame that was drawn more than once.
+#[derive(Serialize)]
+pub struct Spread {
+    n_frames: usize,
+    min_ms: f64,
+    max_ms: f64,
+}
+
+impl Spread {
+    /// None for a single frame, or without timestamps.
+    pub fn of(profiles: &[Profile]) -> Option<Self> {
+        let times: Vec<_> = profiles.iter().filter_map(|profile| profile.frame_ms).collect();
+        (times.len() > 1).then(|| Self {
+            n_frames: times.len(),
+            min_ms: times.iter().copied().fold(f64::INFINITY, f64::min),
+            max_ms: times.iter().copied().fold(0.0, f64::max),
+        })
+    }
 }
 
 /// [`RenderOptions`] in words.
@@ -156,6 +179,9 @@ impl Report {
         text += &format!("{width}x{height} on {}: picture after {:.0} ms\n\n", self.frame.device, self.render_ms);
         if self.frame.frame_ms.is_none() {
             text += "This device has no timestamps: where the time went is unknown.\n\n";
+        }
+        if let Some(Spread { n_frames, min_ms, max_ms }) = &self.repeated {
+            text += &format!("the median of {n_frames} frames, which took {min_ms:.3} to {max_ms:.3} ms:\n\n");
         }
         text += &self.frame.passes_text();
         text.push('\n');
