@@ -13,7 +13,7 @@ use kdray::{
     kdtree::{BuildOptions, KdTree, Node},
     layout::{KD_MAX_DEPTH, Triangle},
 };
-use meshes::{Random, boxed, needles, room, soup, sphere, terrain, triangle};
+use meshes::{Random, boxed, boxes, needles, room, soup, sphere, terrain, triangle};
 
 /// Meshes of every kind, by name.
 fn all_meshes() -> Vec<(&'static str, Vec<Triangle>)> {
@@ -22,6 +22,8 @@ fn all_meshes() -> Vec<(&'static str, Vec<Triangle>)> {
         ("terrain", terrain(70)),
         ("room", room(40)),
         ("box", boxed(Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0), 16)),
+        // Most walls lie inside the root's cell, in the planes of splits.
+        ("boxes", boxes(20)),
         ("small soup", soup(5000, 0.02, 1)),
         ("large soup", soup(500, 0.5, 2)),
         ("needles", needles(500, 3)),
