@@ -29,3 +29,5 @@ pub mod cpu;
 pub mod gpu;
 pub mod passes;
 pub mod render;
+
+pub mod output;

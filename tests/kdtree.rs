@@ -13,7 +13,7 @@ use kdray::{
     kdtree::{BuildOptions, KdTree, Node},
     layout::{KD_MAX_DEPTH, Triangle},
 };
-use meshes::{Random, boxed, needles, room, soup, sphere, terrain, triangle};
+use meshes::{Random, boxed, boxes, needles, room, soup, sphere, terrain, triangle};
 
 /// Meshes of every kind, by name.
 fn all_meshes() -> Vec<(&'static str, Vec<Triangle>)> {
@@ -22,6 +22,8 @@ fn all_meshes() -> Vec<(&'static str, Vec<Triangle>)> {
         ("terrain", terrain(70)),
         ("room", room(40)),
         ("box", boxed(Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0), 16)),
+        // Most walls lie inside the root's cell, in the planes of splits.
+        ("boxes", boxes(20)),
         ("small soup", soup(5000, 0.02, 1)),
         ("large soup", soup(500, 0.5, 2)),
         ("needles", needles(500, 3)),
@@ -98,6 +100,8 @@ fn survives_any_finite_input() {
         ("huge", scaled(&room(20), 1e18)),
         ("largest", scaled(&soup(1000, 1e-6, 6), 3.4e38)),
         ("tiny", scaled(&room(20), 1e-30)),
+        ("tinier", scaled(&soup(1000, 0.1, 7), 1e-34)),
+        ("nearly subnormal", scaled(&soup(1000, 0.1, 7), 1e-37)),
         ("subnormal", scaled(&soup(1000, 0.1, 7), 1e-42)),
         ("wide range", [scaled(&sphere(20), 1e-12), scaled(&sphere(20), 1e12)].concat()),
         ("far away", soup(3000, 0.1, 8).iter().map(|t| triangle([t.v0, t.v1, t.v2].map(|v| v + 1e5))).collect()),

@@ -38,13 +38,20 @@ vec3 towards(vec3 n, vec3 side) {
     return dot(n, side) < 0.0 ? -n : n;
 }
 
+// Barycentric weights of a point that is not on an edge, but 2^-16 of the triangle inside: exactly on the edge of a
+// corner of two walls, rounding may put it behind the other wall, and into that wall's shadow.
+vec3 inner_weights(Hit hit) {
+    vec3 weights = max(vec3(1.0 - hit.u - hit.v, hit.u, hit.v), vec3(exp2(-16.0)));
+    return weights / (weights.x + weights.y + weights.z);
+}
+
 // The point is interpolated from the corners, so it lies within a few roundings of the plane: 2^-18 of the corners'
 // weighted magnitudes, 64 roundings, covers those and the next ray's test of neighbours in the same plane.
 Surface surface_at(Ray ray, Hit hit, Triangle t) {
-    float w = 1.0 - hit.u - hit.v;
-    vec3 magnitude = abs(w * t.v0) + abs(hit.u * t.v1) + abs(hit.v * t.v2);
+    vec3 weights = inner_weights(hit);
+    vec3 magnitude = abs(weights.x * t.v0) + abs(weights.y * t.v1) + abs(weights.z * t.v2);
     Surface s;
-    s.point_world = w * t.v0 + hit.u * t.v1 + hit.v * t.v2;
+    s.point_world = weights.x * t.v0 + weights.y * t.v1 + weights.z * t.v2;
     // Edges at unit scale: the cross product of a tiny triangle would underflow.
     vec3 e1 = t.v1 - t.v0, e2 = t.v2 - t.v0;
     vec3 span = max(abs(e1), abs(e2));

@@ -96,9 +96,8 @@ bool intersect_triangle(Shear shear, Triangle triangle, uint triangle_ix, out Hi
     return true;
 }
 
-// Where the ray meets the triangle's plane, moved into the triangle where that lies outside: a rasterizer snaps
-// corners to its sub-pixel grid and so covers samples that the exact triangle just misses. No weight falls below
-// 2^-14: a point exactly on an edge may lie behind the neighbour by a rounding, and be in its shadow.
+// Where the ray meets the triangle's plane, moved to the triangle's edge where that lies outside: a rasterizer snaps
+// corners to its sub-pixel grid and so covers samples that the exact triangle just misses.
 Hit clamp_to_triangle(Shear shear, Triangle triangle, uint triangle_ix) {
     vec3 a = sheared(shear, triangle.v0);
     vec3 b = sheared(shear, triangle.v1);
@@ -106,11 +105,10 @@ Hit clamp_to_triangle(Shear shear, Triangle triangle, uint triangle_ix) {
     vec3 edges = edge_functions(a, b, c);
     precise float det = edges.x + edges.y + edges.z;
     vec3 inside = max(det < 0.0 ? -edges : edges, vec3(0.0));
-    precise float area = inside.x + inside.y + inside.z;
+    precise float sum = inside.x + inside.y + inside.z;
     // Seen exactly edge-on the areas say nothing: its middle is the nearest certain point.
-    vec3 weights = area > 0.0 ? max(inside, vec3(area * exp2(-14.0))) : vec3(1.0);
-    precise float sum = weights.x + weights.y + weights.z;
-    return weighted_hit(shear, weights, sum, vec3(a.z, b.z, c.z), triangle_ix);
+    if (!(sum > 0.0)) return weighted_hit(shear, vec3(1.0), 3.0, vec3(a.z, b.z, c.z), triangle_ix);
+    return weighted_hit(shear, inside, sum, vec3(a.z, b.z, c.z), triangle_ix);
 }
 
 #endif

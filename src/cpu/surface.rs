@@ -48,10 +48,16 @@ fn towards(n: Vec3, side: Vec3) -> Vec3 {
     if n.dot(side) < 0.0 { -n } else { n }
 }
 
+/// Barycentric weights of a point that is not on an edge, but 2^-16 of the triangle inside.
+fn inner_weights(hit: &Hit) -> Vec3 {
+    let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v).max(Vec3::splat(1.0 / 65_536.0));
+    weights / (weights.x + weights.y + weights.z)
+}
+
 /// The surface of triangle `t` at `hit` as `ray` meets it.
 pub fn surface_at(ray: &Ray, hit: &Hit, t: &Triangle) -> Surface {
-    let w = 1.0 - hit.u - hit.v;
-    let magnitude = (w * t.v0).abs() + (hit.u * t.v1).abs() + (hit.v * t.v2).abs();
+    let weights = inner_weights(hit);
+    let magnitude = (weights.x * t.v0).abs() + (weights.y * t.v1).abs() + (weights.z * t.v2).abs();
     // Edges at unit scale: the cross product of a tiny triangle would underflow.
     let (e1, e2) = (t.v1 - t.v0, t.v2 - t.v0);
     let span = e1.abs().max(e2.abs());
@@ -60,7 +66,7 @@ pub fn surface_at(ray: &Ray, hit: &Hit, t: &Triangle) -> Surface {
     let from_inside = outward.dot(ray.direction) > 0.0;
     let geometric = if from_inside { -outward } else { outward };
     Surface {
-        point_world: w * t.v0 + hit.u * t.v1 + hit.v * t.v2,
+        point_world: weights.x * t.v0 + weights.y * t.v1 + weights.z * t.v2,
         geometric,
         shading: towards(shading_normal(t, hit, outward), geometric),
         clearance: 2f32.powi(-18) * magnitude.dot(geometric.abs()),

@@ -93,18 +93,18 @@ impl Shear {
         Some(self.weighted_hit(edges, det, corners.z, triangle_ix))
     }
 
-    /// Where the ray meets the triangle's plane, moved into the triangle where that lies outside: no weight falls
-    /// below 2^-14.
+    /// Where the ray meets the triangle's plane, moved to the triangle's edge where that lies outside.
     pub fn clamp_to_triangle(&self, triangle: &Triangle, triangle_ix: u32) -> Hit {
         let corners = self.corners(triangle);
         let edges = corners.edge_functions();
         let det = edges.x + edges.y + edges.z;
         let inside = (if det < 0.0 { -edges } else { edges }).max(Vec4::ZERO);
-        let area = inside.x + inside.y + inside.z;
-        let least = area * (1.0 / 16_384.0);
-        let weights = if area > 0.0 { inside.max(Vec4::splat(least)) } else { Vec4::ONE };
-        let sum = weights.x + weights.y + weights.z;
-        self.weighted_hit(weights, sum, corners.z, triangle_ix)
+        let sum = inside.x + inside.y + inside.z;
+        if sum > 0.0 {
+            self.weighted_hit(inside, sum, corners.z, triangle_ix)
+        } else {
+            self.weighted_hit(Vec4::ONE, 3.0, corners.z, triangle_ix)
+        }
     }
 }
 

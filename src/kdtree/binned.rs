@@ -54,7 +54,7 @@ struct Bins {
 
 impl Bins {
     fn new(shares: Shares, n_bins: usize) -> Self {
-        Self { shares, scale: (n_bins - 1) as f32 * shares.per_extent() }
+        Self { shares, scale: (n_bins - 1) as f32 * shares.per_extent }
     }
 
     /// Never decreases as the position grows. Adding 2^23 rounds to an integer, in the lowest bits.
@@ -111,8 +111,8 @@ impl BinnedSearch {
     /// Turns counts into sums, and returns the least weight at an edge between two bins.
     fn upper_bound(&mut self, n: u32, bins: &[Option<Bins>; 3], n_bins: usize) -> f32 {
         let mut least = f32::INFINITY;
-        for axis in 0..3 {
-            let Some(Bins { shares, .. }) = bins[axis] else { continue };
+        for (axis, bins) in bins.iter().enumerate() {
+            let Some(Bins { shares, .. }) = bins else { continue };
             let (below, above) = (&mut self.n_below[axis], &mut self.n_above[axis]);
             let (mut n_below, mut n_above) = (0, n);
             let per_bin = 1.0 / (n_bins - 1) as f32;
@@ -133,9 +133,9 @@ impl BinnedSearch {
     /// Flags the bins that may hold a weight up to `limit`, and returns their number.
     fn flag(&mut self, limit: f32, bins: &[Option<Bins>; 3], n_bins: usize) -> usize {
         let mut n_flagged = 0;
-        for axis in 0..3 {
+        for (axis, bins) in bins.iter().enumerate() {
             self.flags[axis][..n_bins].fill(false);
-            let Some(Bins { shares, .. }) = bins[axis] else { continue };
+            let Some(Bins { shares, .. }) = bins else { continue };
             let (below, above) = (&self.n_below[axis], &self.n_above[axis]);
             let per_bin = 1.0 / (n_bins - 1) as f32;
             for bin in 0..n_bins {

@@ -8,7 +8,8 @@ use super::{
     BuildOptions, KdTree,
     bounds::{Bounds, Reference, is_finite},
     flatten::flatten,
-    sah::{Search, Split},
+    sah::Split,
+    search::Search,
     subtree::{self, Cell, Input, Subtree, sort_out},
 };
 use crate::layout::Triangle;
@@ -19,7 +20,7 @@ const TASK_REFERENCES: usize = 4096;
 const CHUNK: usize = 1 << 15;
 /// References that the budget allows in any case.
 const MIN_BUDGET: u64 = 1024;
-/// Splits that cut off empty space make up to six nodes of one; so many references stay below 2^30 nodes.
+/// Cutting off empty space makes up to 14 nodes a reference; so many references stay below the 2^30 nodes of a link.
 const MAX_BUDGET: u64 = 1 << 26;
 
 /// The upper part of a tree.
@@ -31,7 +32,7 @@ pub enum Top {
 impl KdTree {
     /// Builds the tree of `triangles`. Those of a zero area stay in it, those with a corner that is not finite do not.
     ///
-    /// The same triangles and options give the same tree on any number of threads. O(n log n) time; some 150 bytes a
+    /// The same triangles and options give the same tree on any number of threads. O(n log n) time; some 200 bytes a
     /// triangle while it runs.
     pub fn build(triangles: &[Triangle], options: &BuildOptions) -> KdTree {
         let references: Vec<Reference> = (0..triangles.len() as u32)

@@ -95,9 +95,9 @@ impl Box3 {
     const EMPTY: Self = Self { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
 
     fn grow(&mut self, point: &[f64; 3]) {
-        for k in 0..3 {
-            self.min[k] = if point[k] < self.min[k] { point[k] } else { self.min[k] };
-            self.max[k] = if point[k] > self.max[k] { point[k] } else { self.max[k] };
+        for (k, &x) in point.iter().enumerate() {
+            self.min[k] = if x < self.min[k] { x } else { self.min[k] };
+            self.max[k] = if x > self.max[k] { x } else { self.max[k] };
         }
     }
 

@@ -19,7 +19,7 @@ pub fn best_split(references: &[Reference], cell: &Bounds, options: &BuildOption
     let mut best = Split::NONE;
     for axis in 0..3 {
         let Some(shares) = Shares::new(cell, axis, options) else { continue };
-        let mut planes = Planes::new(references, &shares);
+        let planes = Planes::new(references, &shares);
         let split = if planes.any_planar { planes.best::<true>(&shares) } else { planes.best::<false>(&shares) };
         if split.weight < best.weight {
             best = split;
@@ -70,7 +70,7 @@ impl Planes {
     }
 
     /// The cheapest plane. `PLANAR`: some references may lie in it.
-    fn best<const PLANAR: bool>(&mut self, shares: &Shares) -> Split {
+    fn best<const PLANAR: bool>(&self, shares: &Shares) -> Split {
         let mut best = Split::NONE;
         for first in (0..self.n_positions).step_by(LANES) {
             let positions: &[f32; LANES] = self.positions[first..][..LANES].try_into().expect("padded");
@@ -90,8 +90,8 @@ impl Planes {
                 weights[lane] = shares.weight(fraction, below[lane] as f32, above[lane] as f32);
             }
             for lane in 0..LANES {
-                // A triangle in the plane can only add to the weight without it.
-                if weights[lane] < best.weight || PLANAR {
+                // Triangles in the plane, not weighed yet, can only add.
+                if weights[lane] < best.weight {
                     let split = shares.split(positions[lane], [below[lane], planar[lane], above[lane]]);
                     best = if split.weight < best.weight { split } else { best };
                 }

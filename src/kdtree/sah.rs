@@ -1,11 +1,15 @@
-//! The surface area heuristic: what a split of a cell costs, and the search for the cheapest one.
+//! The surface area heuristic: what a split of a cell costs.
 //!
-//! Costs within a search are *weights*: the expected number of ray-triangle tests below a split,
+//! Splits of a cell are compared by their *weights*: the expected number of ray-triangle tests below a split,
 //! `p_below * n_below + p_above * n_above`, where p is the share of the cell's surface that the child's cell has
 //! (MacDonald and Booth 1990). Along an axis the weight is linear between the ends of triangles, so only planes through
 //! these need be tried.
 
-use super::{BuildOptions, binned::BinnedSearch, bounds::Bounds, bounds::Reference, counted};
+use super::{BuildOptions, bounds::Bounds};
+
+/// 2^-115: 1024 bins by an extent of at least this are a finite f32, and so is a plane's distance from the cell's face by
+/// an extent of at most `f32::MAX`. Cells beyond that are not split on the axis.
+const MIN_EXTENT: f64 = f32::MIN_POSITIVE as f64 * 2048.0;
 
 /// A plane through a cell, and its weight.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +37,7 @@ pub struct Shares {
     pub min: f32,
     pub max: f32,
     /// 1 / extent on the axis.
-    per_extent: f32,
+    pub per_extent: f32,
     /// Share of a cell of zero thickness, and what the whole thickness adds to it.
     base: f32,
     slope: f32,
@@ -42,13 +46,12 @@ pub struct Shares {
 }
 
 impl Shares {
-    /// None where no plane can split the cell: no thickness on this axis, or no surface at all.
+    /// None where no plane can split the cell: no thickness to speak of on this axis, or no surface at all.
     pub fn new(cell: &Bounds, axis: usize, options: &BuildOptions) -> Option<Self> {
         let extent = cell.extent();
         let [along, u, v] = [extent[axis], extent[(axis + 1) % 3], extent[(axis + 2) % 3]];
         let half_area = along * u + along * v + u * v;
-        // 1 / extent must be a finite f32 for the arithmetic of plane positions.
-        (along > f64::from(f32::MIN_POSITIVE) * 4.0 && along <= f64::from(f32::MAX) && half_area > 0.0).then(|| Self {
+        (along >= MIN_EXTENT && along <= f64::from(f32::MAX) && half_area > 0.0).then(|| Self {
             axis,
             min: cell.min[axis],
             max: cell.max[axis],
@@ -85,10 +88,6 @@ impl Shares {
         factor * (below * n_below + above * n_above)
     }
 
-    pub fn per_extent(&self) -> f32 {
-        self.per_extent
-    }
-
     /// The split at a position strictly inside the cell, with so many triangles below, in its plane and above.
     #[inline]
     pub fn split(&self, position: f32, [n_below, n_planar, n_above]: [u32; 3]) -> Split {
@@ -102,23 +101,6 @@ impl Shares {
             planar_below,
             weight: if planar_below { if_below } else { if_above },
             n_references: if planar_below { [n_below + n_planar, n_above] } else { [n_below, n_above + n_planar] },
-        }
-    }
-}
-
-/// Buffers of a search, to be used again for the next cell.
-#[derive(Default)]
-pub struct Search {
-    binned: BinnedSearch,
-}
-
-impl Search {
-    /// The cheapest split of a cell; its weight is infinite where there is none.
-    pub fn best_split(&mut self, references: &[Reference], cell: &Bounds, options: &BuildOptions) -> Split {
-        if references.len() <= counted::MAX_REFERENCES {
-            counted::best_split(references, cell, options)
-        } else {
-            self.binned.best_split(references, cell, options)
         }
     }
 }

@@ -6,7 +6,8 @@ use super::{
     BuildOptions, EMPTY_LEAF, Node,
     bounds::{Bounds, Reference},
     clip::split_bounds,
-    sah::{Search, Split},
+    sah::Split,
+    search::Search,
 };
 use crate::layout::{KdNode, Triangle};
 

@@ -107,6 +107,9 @@ fn add_mesh(
         }
         Source::Generator(generator) => {
             let mut mesh = generator.build().map_err(failed)?;
+            if mesh.faces.is_empty() {
+                return Err(failed("makes no triangles".to_owned()));
+            }
             if common.smooth == Some(false) {
                 mesh.normals.fill([Vec3::ZERO; 3]);
             }

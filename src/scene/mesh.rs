@@ -50,8 +50,8 @@ impl Mesh {
     /// One world-space triangle a face, in their order.
     pub fn to_world(&self, transform: &Transform) -> Checked<Vec<Triangle>> {
         let world: Vec<Vec3> = self.positions.par_iter().map(|p| transform.point(*p)).collect();
-        // NaN fails the comparison, too.
-        if let Some(ix) = world.par_iter().position_first(|p| !(p.abs().max_element() <= MAX_COORDINATE)) {
+        let is_inside = |p: &Vec3| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE;
+        if let Some(ix) = world.par_iter().position_first(|p| !is_inside(p)) {
             return Err(format!(
                 "a vertex lies at {:?} in world space: beyond {MAX_COORDINATE:e}",
                 world[ix].to_array()

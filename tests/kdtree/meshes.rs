@@ -92,6 +92,16 @@ pub fn boxed(min: Vec3, max: Vec3, n: usize) -> Vec<Triangle> {
     triangles
 }
 
+/// Boxes without symmetry, which would make many planes equally cheap.
+pub fn boxes(n: usize) -> Vec<Triangle> {
+    let mut random = Random(13);
+    let mut next = || {
+        let min = random.point() * 10.0;
+        boxed(min, min + random.point().abs() * 2.0, 4)
+    };
+    (0..n).flat_map(|_| next()).collect()
+}
+
 /// Long thin triangles across the whole cube: worst for splits.
 pub fn needles(n: usize, seed: u64) -> Vec<Triangle> {
     let mut random = Random(seed);

@@ -108,9 +108,10 @@ fn part_in(
         return Some(*part);
     }
     let mut polygon = corners.to_vec();
-    for face in 0..3 {
-        polygon = clip(&polygon, face, |x| x - cells[side][0][face]);
-        polygon = clip(&polygon, face, |x| cells[side][1][face] - x);
+    let [cell_min, cell_max] = cells[side];
+    for (face, (from, to)) in cell_min.into_iter().zip(cell_max).enumerate() {
+        polygon = clip(&polygon, face, |x| x - from);
+        polygon = clip(&polygon, face, |x| to - x);
     }
     let clipped = bounds(&polygon);
     (clipped[0][axis] < clipped[1][axis]).then_some((*corners, clipped))

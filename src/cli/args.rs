@@ -1,0 +1,220 @@
+//! The words of the command line, and what they mean where they are left out.
+
+use std::{path::PathBuf, str::FromStr};
+
+use clap::{Parser, Subcommand, ValueEnum, value_parser};
+use kdray::{
+    frame::{Denoise, Primary, RenderOptions, Traversal},
+    gpu::DeviceSelector,
+    scene::RenderDefaults,
+};
+
+use super::error::CliError;
+
+/// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
+#[derive(Parser)]
+#[command(name = "kdray", version, arg_required_else_help = false)]
+#[command(after_help = "Exit codes: 2 usage, 3 scene, 4 device, 5 output.")]
+pub struct Args {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Subcommand)]
+pub enum Command {
+    /// Render a scene to a picture, and report where the time went
+    Render(RenderArgs),
+    /// List the Vulkan devices
+    Devices,
+    /// Describe a scene and its kd-tree
+    Inspect(InspectArgs),
+}
+
+#[derive(clap::Args)]
+pub struct RenderArgs {
+    /// Scene file
+    pub scene: PathBuf,
+    /// Picture to write, .png or .exr (linear radiance) [default: the scene's name, .png]
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Pixels, as 1024x768 [default: the scene's]
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// Levels of rays, 1 to 64: 1 stops at what the camera sees [default: the scene's]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=64))]
+    pub max_depth: Option<u32>,
+    /// Noise filter [default: the scene's]
+    #[arg(long, value_name = "paper|off")]
+    pub denoise: Option<DenoiseWord>,
+    /// Sum of a pixel's differences to its neighbours above which it is smoothed, 0 to 4 [default: the scene's]
+    #[arg(long, value_name = "X", value_parser = threshold)]
+    pub denoise_threshold: Option<f32>,
+    /// Factor on radiance before it is encoded for display [default: the scene's]
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub exposure: Option<f32>,
+    /// How rays find their way back up the tree
+    #[arg(long, value_name = "mask|stack", default_value_t = RenderOptions::default().traversal)]
+    pub traversal: Traversal,
+    /// How primary rays find their triangles
+    #[arg(long, value_name = "raster|trace", default_value_t = RenderOptions::default().primary)]
+    pub primary: Primary,
+    /// Render on the CPU, without Vulkan
+    #[arg(long, conflicts_with_all = ["device", "validate"])]
+    pub cpu: bool,
+    /// Threads for loading, building and --cpu [default: all processors]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
+    pub device: Option<DeviceSelector>,
+    /// Draw the frame so many times and report the one of median time
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
+    pub repeat: u16,
+    /// Write the report as JSON, too
+    #[arg(long, value_name = "FILE")]
+    pub profile: Option<PathBuf>,
+    /// Run under the Khronos validation layer and fail on any message
+    #[arg(long)]
+    pub validate: bool,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+#[derive(clap::Args)]
+pub struct InspectArgs {
+    /// Scene file
+    pub scene: PathBuf,
+    /// Describe it as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl RenderArgs {
+    /// Refuses words that contradict each other.
+    pub fn check(&self) -> Result<(), CliError> {
+        if matches!(self.denoise, Some(DenoiseWord::Off)) && self.denoise_threshold.is_some() {
+            return Err(CliError::Usage("--denoise-threshold has no meaning with --denoise off".into()));
+        }
+        if self.output.is_some() && self.output == self.profile {
+            return Err(CliError::Usage("--output and --profile name the same file".into()));
+        }
+        Ok(())
+    }
+
+    /// The options asked for; the scene's own fill what was left open.
+    pub fn options(&self, scene: &RenderDefaults) -> RenderOptions {
+        let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });
+        RenderOptions {
+            width,
+            height,
+            max_depth: self.max_depth.unwrap_or(scene.max_depth),
+            exposure: self.exposure.unwrap_or(scene.exposure),
+            denoise: self.denoise(scene.denoise),
+            traversal: self.traversal,
+            primary: self.primary,
+        }
+    }
+
+    fn denoise(&self, scene: Denoise) -> Denoise {
+        let threshold = match scene {
+            Denoise::Paper { threshold } => threshold,
+            Denoise::Off => Denoise::DEFAULT_THRESHOLD,
+        };
+        match (self.denoise, self.denoise_threshold) {
+            (None, None) => scene,
+            (Some(DenoiseWord::Off), _) => Denoise::Off,
+            (_, asked) => Denoise::Paper { threshold: asked.unwrap_or(threshold) },
+        }
+    }
+}
+
+/// The words for [`Denoise`].
+#[derive(Clone, Copy, ValueEnum)]
+pub enum DenoiseWord {
+    /// The paper's filter over four neighbours
+    Paper,
+    /// None
+    Off,
+}
+
+/// Pixels of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    pub width: u32,
+    pub height: u32,
+}
+
+impl Size {
+    /// What common GPUs take as an image's side.
+    const MAX_SIDE: u32 = 16384;
+}
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        let side = |digits: &str| digits.parse().ok().filter(|side| (1..=Self::MAX_SIDE).contains(side));
+        word.split_once('x')
+            .and_then(|(width, height)| Some(Self { width: side(width)?, height: side(height)? }))
+            .ok_or_else(|| format!("expected WIDTHxHEIGHT, each 1 to {}", Self::MAX_SIDE))
+    }
+}
+
+fn threshold(word: &str) -> Result<f32, String> {
+    word.parse().ok().filter(|x| (0.0..=4.0).contains(x)).ok_or_else(|| "expected a number from 0 to 4".into())
+}
+
+fn positive(word: &str) -> Result<f32, String> {
+    let number = word.parse().ok().filter(|x: &f32| x.is_finite() && *x > 0.0);
+    number.ok_or_else(|| "expected a number above 0".into())
+}
+
+/// An index where the word is a number, else a name.
+fn device(word: &str) -> Result<DeviceSelector, String> {
+    match word.parse() {
+        Ok(index) => Ok(DeviceSelector::Index(index)),
+        Err(_) if word.trim().is_empty() => Err("expected an index or a name".into()),
+        Err(_) => Ok(DeviceSelector::Name(word.to_owned())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_is_consistent() {
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes() {
+        assert_eq!("1x16384".parse(), Ok(Size { width: 1, height: 16384 }));
+        for word in ["", "x", "0x1", "1x0", "16385x1", "-1x1", "1x1x1", "1", "1 x 1", "4294967297x1", "1X1"] {
+            assert!(word.parse::<Size>().is_err(), "{word}");
+        }
+    }
+
+    fn denoise(words: &[&str], scene: Denoise) -> Denoise {
+        let words = ["kdray", "render", "x.toml"].iter().chain(words);
+        match Args::try_parse_from(words).unwrap().command {
+            Command::Render(args) => args.denoise(scene),
+            _ => unreachable!(),
+        }
+    }
+
+    #[test]
+    fn what_is_left_open_the_scene_fills() {
+        let scene = Denoise::Paper { threshold: 1.0 };
+        assert_eq!(denoise(&[], scene), scene);
+        assert_eq!(denoise(&[], Denoise::Off), Denoise::Off);
+        assert_eq!(denoise(&["--denoise", "paper"], scene), scene);
+        assert_eq!(denoise(&["--denoise", "off"], scene), Denoise::Off);
+        assert_eq!(denoise(&["--denoise-threshold", "0.5"], Denoise::Off), Denoise::Paper { threshold: 0.5 });
+        let default = Denoise::Paper { threshold: Denoise::DEFAULT_THRESHOLD };
+        assert_eq!(denoise(&["--denoise", "paper"], Denoise::Off), default);
+    }
+}

@@ -1,0 +1,72 @@
+//! What can go wrong, and the exit code that says so.
+
+use std::io;
+
+use kdray::{gpu::GpuError, output::OutputError, scene::SceneError};
+
+/// Why a command failed. Displays as one line.
+#[derive(Debug, thiserror::Error)]
+pub enum CliError {
+    #[error("{0}")]
+    Usage(String),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Device(#[from] GpuError),
+    #[error("the validation layer reported {0} messages")]
+    Validation(usize),
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    #[error("cannot write to standard output: {0}")]
+    Stdout(io::Error),
+}
+
+impl CliError {
+    /// 2 usage, 3 scene, 4 device, 5 output.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Usage(_) | Self::Output(OutputError::UnknownEnding { .. }) => 2,
+            Self::Scene(_) => 3,
+            Self::Device(_) | Self::Validation(_) => 4,
+            Self::Output(_) | Self::Stdout(_) => 5,
+        }
+    }
+}
+
+impl From<clap::Error> for CliError {
+    /// Keeps clap's message and its hints, and leaves out the usage text below them.
+    fn from(error: clap::Error) -> Self {
+        let text = error.render().to_string();
+        let paragraphs = text.trim_start_matches("error:").split("\n\n").map(str::trim);
+        let told: Vec<_> = paragraphs
+            .filter(|paragraph| !paragraph.starts_with("Usage:") && !paragraph.starts_with("For more information"))
+            .collect();
+        Self::Usage(told.join("; "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+    use crate::cli::args::Args;
+
+    fn usage(arguments: &[&str]) -> String {
+        let words = std::iter::once(&"kdray").chain(arguments);
+        CliError::from(Args::command().try_get_matches_from(words).unwrap_err()).to_string()
+    }
+
+    #[test]
+    fn clap_messages_lose_their_usage_text() {
+        assert_eq!(
+            usage(&["render", "x.toml", "--sice", "1x1"]).split(';').next(),
+            Some("unexpected argument '--sice' found")
+        );
+        assert!(usage(&["render"]).contains("<SCENE>"));
+        for mistake in [&["render"][..], &["reader"], &[], &["render", "x", "--size"]] {
+            let message = usage(mistake);
+            assert!(!message.is_empty() && !message.contains("Usage:") && !message.contains("--help"), "{message}");
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! What the library remarks while it works, as `warning: …` lines beside the progress bar.
+
+use std::{
+    fmt,
+    io::{self, Write},
+};
+
+use indicatif::ProgressBar;
+use tracing::{Event, Level, Subscriber};
+use tracing_subscriber::{
+    fmt::{
+        FmtContext, FormatFields,
+        format::{FormatEvent, Writer},
+    },
+    registry::LookupSpan,
+};
+
+/// Sends the library's remarks to standard error from now on: errors alone if `quiet`, else warnings, too.
+pub fn start(quiet: bool, bar: Option<&ProgressBar>) {
+    let bar = bar.cloned();
+    let started = tracing_subscriber::fmt()
+        // They would go to a standard error that has just failed.
+        .log_internal_errors(false)
+        .with_max_level(if quiet { Level::ERROR } else { Level::WARN })
+        .event_format(Line)
+        .with_writer(move || Beside(bar.clone()))
+        .try_init();
+    // A second command in one process keeps the first one's.
+    drop(started);
+}
+
+/// `level: message`.
+struct Line;
+
+impl<S, N> FormatEvent<S, N> for Line
+where
+    S: Subscriber + for<'a> LookupSpan<'a>,
+    N: for<'a> FormatFields<'a> + 'static,
+{
+    fn format_event(&self, context: &FmtContext<S, N>, mut writer: Writer, event: &Event) -> fmt::Result {
+        let label = if *event.metadata().level() == Level::ERROR { "error" } else { "warning" };
+        write!(writer, "{label}: ")?;
+        context.field_format().format_fields(writer.by_ref(), event)?;
+        writeln!(writer)
+    }
+}
+
+/// Standard error, with the bar out of the way.
+struct Beside(Option<ProgressBar>);
+
+impl Write for Beside {
+    fn write(&mut self, text: &[u8]) -> io::Result<usize> {
+        match &self.0 {
+            Some(bar) => bar.suspend(|| io::stderr().write(text)),
+            None => io::stderr().write(text),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

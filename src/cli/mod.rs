@@ -1,0 +1,64 @@
+//! The command line: words to options, progress, reports, exit codes.
+//!
+//! What a command was asked for goes to standard output; progress, notes and errors go to standard error.
+
+mod args;
+mod devices;
+mod error;
+mod inspect;
+mod log;
+mod progress;
+mod render;
+mod report;
+mod table;
+
+use std::{
+    ffi::OsString,
+    io::{self, Write},
+    process::ExitCode,
+};
+
+use args::{Args, Command};
+use clap::Parser;
+use error::CliError;
+
+/// Runs the command that `arguments`, the program's name first, ask for.
+pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
+    let result = match Args::try_parse_from(arguments) {
+        Ok(args) => run(args),
+        Err(request) if !request.use_stderr() => print(&request.render().to_string()),
+        Err(mistake) => Err(CliError::from(mistake)),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            complain("error", &error.to_string());
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn run(args: Args) -> Result<(), CliError> {
+    match args.command {
+        Command::Render(args) => render::run(&args),
+        Command::Devices => devices::run(),
+        Command::Inspect(args) => inspect::run(&args),
+    }
+}
+
+/// Writes what was asked for to standard output. A reader that has seen enough is no error.
+fn print(text: &str) -> Result<(), CliError> {
+    let mut stdout = io::stdout().lock();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(CliError::Stdout(error)),
+        _ => Ok(()),
+    }
+}
+
+/// Writes `label: message` to standard error, as one line whatever the message quotes.
+fn complain(label: &str, message: &str) {
+    let line = message.split(char::is_whitespace).filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ");
+    let line = line.replace(char::is_control, "?");
+    // There is nobody left to tell where this fails.
+    let _ = writeln!(io::stderr(), "{label}: {line}");
+}

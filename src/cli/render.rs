@@ -1,0 +1,148 @@
+//! `kdray render`: scene file to picture.
+
+use std::{path::PathBuf, sync::Arc};
+
+use kdray::{
+    cpu,
+    frame::{Picture, Profile, RenderOptions},
+    gpu::{Context, ContextOptions, GpuError},
+    kdtree::{BuildOptions, KdTree},
+    output::{self, Format},
+    render::Renderer,
+    scene::Scene,
+};
+
+use super::{
+    args::RenderArgs,
+    complain,
+    error::CliError,
+    print,
+    progress::Progress,
+    report::{Report, Spread},
+};
+
+/// Loads, builds, renders, writes and reports. What can be refused is refused before the work that it would waste.
+pub fn run(args: &RenderArgs) -> Result<(), CliError> {
+    args.check()?;
+    check_outputs(args)?;
+    set_threads(args.threads)?;
+
+    let progress = Progress::new(args.quiet, 3);
+    let (scene, load_ms) = progress.stage(&format!("loading {}", args.scene.display()), || Scene::load(&args.scene));
+    let scene = scene?;
+    let picture_path = args.output.clone().unwrap_or_else(|| default_output(&scene.name));
+    output::check(&picture_path)?;
+    let options = args.options(&scene.defaults);
+    let context = if args.cpu { None } else { Some(open_device(args, &progress)?) };
+
+    let n_triangles = scene.triangles.len();
+    let build_options = BuildOptions::default();
+    let building = format!("building the kd-tree of {n_triangles} triangles");
+    let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &build_options));
+    let rendering = format!("rendering {}x{}", options.width, options.height);
+    let frame = FrameToDraw { scene: &scene, tree: &tree, options: &options };
+    let (drawn, render_ms) = progress.stage(&rendering, || frame.draw(context.as_ref(), args.repeat));
+    let (picture, profiles) = drawn?;
+    output::write_picture(&picture_path, &picture)?;
+    drop(progress);
+
+    let report = Report {
+        scene: scene.name,
+        picture: picture_path,
+        options: (&options).into(),
+        triangles: n_triangles,
+        tree: tree.statistics(n_triangles, &build_options),
+        load_ms,
+        build_ms,
+        render_ms,
+        repeated: Spread::of(&profiles),
+        frame: median(profiles).into(),
+    };
+    if let Some(path) = &args.profile {
+        output::write(path, &report.json())?;
+    }
+    if !args.quiet {
+        print(&report.text())?;
+    }
+    context.map_or(Ok(()), |context| report_validation(&context))
+}
+
+/// Refuses targets that cannot be written, as far as they are known before the scene is.
+fn check_outputs(args: &RenderArgs) -> Result<(), CliError> {
+    if let Some(path) = &args.output {
+        Format::of(path)?;
+        output::check(path)?;
+    }
+    if let Some(path) = &args.profile {
+        output::check(path)?;
+    }
+    Ok(())
+}
+
+fn set_threads(n_threads: Option<u16>) -> Result<(), CliError> {
+    let Some(n_threads) = n_threads else { return Ok(()) };
+    (rayon::ThreadPoolBuilder::new().num_threads(n_threads.into()).build_global())
+        .map_err(|error| CliError::Usage(format!("--threads {n_threads}: {error}")))
+}
+
+/// A PNG of the scene's name in the working directory.
+fn default_output(scene_name: &str) -> PathBuf {
+    let name = scene_name.replace(|c: char| std::path::is_separator(c) || c.is_control(), "-");
+    let stem = if name.is_empty() { "picture" } else { &name };
+    format!("{stem}.png").into()
+}
+
+fn open_device(args: &RenderArgs, progress: &Progress) -> Result<Arc<Context>, GpuError> {
+    let context = Context::new(&ContextOptions { device: args.device.clone(), validate: args.validate })?;
+    if args.device.is_none() && context.is_software() {
+        progress.note(&format!("no GPU found, rendering in software on {}", context.info().name));
+    }
+    Ok(context)
+}
+
+struct FrameToDraw<'a> {
+    scene: &'a Scene,
+    tree: &'a KdTree,
+    options: &'a RenderOptions,
+}
+
+impl FrameToDraw<'_> {
+    /// Draws the frame so many times, on the device or on the CPU for want of one. The pictures are all the same.
+    fn draw(&self, context: Option<&Arc<Context>>, n_times: u16) -> Result<(Picture, Vec<Profile>), GpuError> {
+        let Some(context) = context else {
+            let (picture, profile) = cpu::render(self.scene, self.tree, self.options);
+            let again = (1..n_times).map(|_| cpu::render(self.scene, self.tree, self.options).1);
+            return Ok((picture, std::iter::once(profile).chain(again).collect()));
+        };
+        let mut renderer = Renderer::new(Arc::clone(context), self.scene, self.tree, self.options)?;
+        let profiles = (0..n_times).map(|_| renderer.draw()).collect::<Result<_, _>>()?;
+        Ok((renderer.picture()?, profiles))
+    }
+}
+
+/// The frame of median time; the last one where the device has no timestamps.
+fn median(mut profiles: Vec<Profile>) -> Profile {
+    profiles.sort_by(|a, b| a.frame_ms.partial_cmp(&b.frame_ms).expect("times are numbers"));
+    profiles.swap_remove(profiles.len() / 2)
+}
+
+/// Lists what the validation layer said; anything is a failure.
+fn report_validation(context: &Context) -> Result<(), CliError> {
+    let messages = context.validation_messages();
+    for message in &messages {
+        complain("validation", message);
+    }
+    if messages.is_empty() { Ok(()) } else { Err(CliError::Validation(messages.len())) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_s_name_stays_in_the_working_directory() {
+        for (name, file) in [("cornell", "cornell.png"), ("../a", "..-a.png"), ("", "picture.png")] {
+            assert_eq!(default_output(name), PathBuf::from(file));
+        }
+    }
+}

@@ -1,0 +1,273 @@
+//! Where a frame's time went: tables for the reader, the same as JSON.
+
+use std::path::PathBuf;
+
+use kdray::{
+    frame::{Denoise, PassTime, Profile, RenderOptions},
+    kdtree::Statistics,
+};
+use serde::Serialize;
+
+use super::table::{decimal, table};
+
+/// Passes whose time counts as tracing: they find what rays hit.
+const TRACING: [&str; 4] = ["visibility", "primary_hit", "trace", "shadow"];
+
+/// What was rendered, how, and how long it took.
+#[derive(Serialize)]
+pub struct Report {
+    pub scene: String,
+    pub picture: PathBuf,
+    pub options: Options,
+    pub triangles: usize,
+    pub tree: Statistics,
+    pub load_ms: f64,
+    pub build_ms: f64,
+    /// From the finished tree to the picture in memory: uploading, compiling and copying back included.
+    pub render_ms: f64,
+    /// Over all frames that were drawn; none for a single one.
+    pub repeated: Option<Spread>,
+    /// The frame of median time.
+    #[serde(flatten)]
+    pub frame: Frame,
+}
+
+/// Times of a frame that was drawn more than once.
+#[derive(Serialize)]
+pub struct Spread {
+    n_frames: usize,
+    min_ms: f64,
+    max_ms: f64,
+}
+
+impl Spread {
+    /// None for a single frame, or without timestamps.
+    pub fn of(profiles: &[Profile]) -> Option<Self> {
+        let times: Vec<_> = profiles.iter().filter_map(|profile| profile.frame_ms).collect();
+        (times.len() > 1).then(|| Self {
+            n_frames: times.len(),
+            min_ms: times.iter().copied().fold(f64::INFINITY, f64::min),
+            max_ms: times.iter().copied().fold(0.0, f64::max),
+        })
+    }
+}
+
+/// [`RenderOptions`] in words.
+#[derive(Serialize)]
+pub struct Options {
+    width: u32,
+    height: u32,
+    max_depth: u32,
+    exposure: f32,
+    denoise: &'static str,
+    denoise_threshold: Option<f32>,
+    traversal: String,
+    primary: String,
+}
+
+impl From<&RenderOptions> for Options {
+    fn from(options: &RenderOptions) -> Self {
+        let (denoise, denoise_threshold) = match options.denoise {
+            Denoise::Off => ("off", None),
+            Denoise::Paper { threshold } => ("paper", Some(threshold)),
+        };
+        Self {
+            width: options.width,
+            height: options.height,
+            max_depth: options.max_depth,
+            exposure: options.exposure,
+            denoise,
+            denoise_threshold,
+            traversal: options.traversal.to_string(),
+            primary: options.primary.to_string(),
+        }
+    }
+}
+
+/// A [`Profile`] with its sums and rates.
+#[derive(Serialize)]
+pub struct Frame {
+    device: String,
+    /// First pass to last; none where the device has no timestamps.
+    frame_ms: Option<f64>,
+    n_batches: u32,
+    /// Each pass over all bounces, in the order of execution.
+    pass_totals: Vec<PassTotal>,
+    /// Each pass of each bounce.
+    passes: Vec<PassTime>,
+    /// One row a bounce, 0 = primary rays.
+    bounces: Vec<Bounce>,
+}
+
+#[derive(Serialize)]
+struct PassTotal {
+    name: &'static str,
+    ms: Option<f64>,
+    /// Of the frame, 0 to 1.
+    share: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct Bounce {
+    bounce: usize,
+    n_rays: u64,
+    n_hits: u64,
+    n_shadow_rays: u64,
+    /// Milliseconds of the passes in [`TRACING`].
+    tracing_ms: Option<f64>,
+    /// Million rays and shadow rays a second of tracing.
+    mrays_per_s: Option<f64>,
+}
+
+impl From<Profile> for Frame {
+    fn from(profile: Profile) -> Self {
+        Self {
+            pass_totals: pass_totals(&profile),
+            bounces: bounces(&profile),
+            device: profile.device,
+            frame_ms: profile.frame_ms,
+            n_batches: profile.n_batches,
+            passes: profile.passes,
+        }
+    }
+}
+
+fn pass_totals(profile: &Profile) -> Vec<PassTotal> {
+    let mut totals: Vec<PassTotal> = Vec::new();
+    for pass in &profile.passes {
+        if totals.iter().all(|total| total.name != pass.name) {
+            let ms = profile.pass_ms(pass.name);
+            let share = ms.zip(profile.frame_ms).filter(|(_, frame)| *frame > 0.0).map(|(ms, frame)| ms / frame);
+            totals.push(PassTotal { name: pass.name, ms, share });
+        }
+    }
+    totals
+}
+
+fn bounces(profile: &Profile) -> Vec<Bounce> {
+    let rows = profile.bounces.iter().enumerate().map(|(bounce, stats)| {
+        // A pass that runs once a frame and finds hits finds those of the primary rays.
+        let passes = profile.passes.iter().filter(|pass| TRACING.contains(&pass.name));
+        let tracing_ms = passes.filter(|pass| pass.bounce.unwrap_or(0) as usize == bounce).map(|pass| pass.ms).sum();
+        Bounce {
+            bounce,
+            n_rays: stats.n_rays,
+            n_hits: stats.n_hits,
+            n_shadow_rays: stats.n_shadow_rays,
+            tracing_ms,
+            mrays_per_s: rate(stats.n_rays + stats.n_shadow_rays, tracing_ms),
+        }
+    });
+    rows.collect()
+}
+
+/// Million rays a second, where the time is known and more than nothing.
+fn rate(n_rays: u64, ms: Option<f64>) -> Option<f64> {
+    ms.filter(|ms| *ms > 0.0).map(|ms| n_rays as f64 / ms / 1e3)
+}
+
+impl Report {
+    /// The report as text that ends with a line break.
+    pub fn text(&self) -> String {
+        let Options { width, height, .. } = self.options;
+        let tree = &self.tree;
+        let mut text = format!("{}: {} triangles, loaded in {:.0} ms\n", self.scene, self.triangles, self.load_ms);
+        text += &format!(
+            "kd-tree: {} nodes, depth {}, {:.2} references a triangle, built in {:.0} ms\n",
+            tree.n_nodes, tree.depth, tree.references_per_triangle, self.build_ms
+        );
+        text += &format!("{width}x{height} on {}: picture after {:.0} ms\n\n", self.frame.device, self.render_ms);
+        if self.frame.frame_ms.is_none() {
+            text += "This device has no timestamps: where the time went is unknown.\n\n";
+        }
+        if let Some(Spread { n_frames, min_ms, max_ms }) = &self.repeated {
+            text += &format!("the median of {n_frames} frames, which took {min_ms:.3} to {max_ms:.3} ms:\n\n");
+        }
+        text += &self.frame.passes_text();
+        text.push('\n');
+        text += &self.frame.bounces_text();
+        text += &format!("\nwrote {}\n", self.picture.display());
+        text
+    }
+
+    /// The report as JSON that ends with a line break.
+    pub fn json(&self) -> Vec<u8> {
+        let mut json = serde_json::to_vec_pretty(self).expect("plain structs of numbers and words");
+        json.push(b'\n');
+        json
+    }
+}
+
+impl Frame {
+    fn passes_text(&self) -> String {
+        let row = |name: &str, ms, share: Option<f64>| {
+            [name.to_owned(), decimal(ms, 3), decimal(share.map(|share| share * 100.0), 1)]
+        };
+        let mut rows: Vec<_> = self.pass_totals.iter().map(|total| row(total.name, total.ms, total.share)).collect();
+        rows.push(row("frame", self.frame_ms, self.frame_ms.map(|_| 1.0)));
+        table(["pass", "ms", "% of frame"], &rows)
+    }
+
+    fn bounces_text(&self) -> String {
+        let sum = |count: fn(&Bounce) -> u64| self.bounces.iter().map(count).sum::<u64>();
+        let all = (sum(|b| b.n_rays), sum(|b| b.n_hits), sum(|b| b.n_shadow_rays));
+        let tracing_ms: Option<f64> = self.bounces.iter().map(|bounce| bounce.tracing_ms).sum();
+        let row = |name: String, (n_rays, n_hits, n_shadow_rays): (u64, u64, u64), ms, rate| {
+            let counts = [n_rays, n_hits, n_shadow_rays].map(|count| count.to_string());
+            let [n_rays, n_hits, n_shadow_rays] = counts;
+            [name, n_rays, n_hits, n_shadow_rays, decimal(ms, 3), decimal(rate, 2)]
+        };
+        let mut rows: Vec<_> = (self.bounces.iter())
+            .map(|b| row(b.bounce.to_string(), (b.n_rays, b.n_hits, b.n_shadow_rays), b.tracing_ms, b.mrays_per_s))
+            .collect();
+        rows.push(row("all".to_owned(), all, tracing_ms, rate(all.0 + all.2, tracing_ms)));
+        table(["bounce", "rays", "hits", "shadow rays", "tracing ms", "Mrays/s"], &rows)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use kdray::frame::BounceStats;
+
+    use super::*;
+
+    fn frame(ms: impl Fn(f64) -> Option<f64>) -> Frame {
+        let pass = |name, bounce, time| PassTime { name, bounce, ms: ms(time) };
+        let stats = |n_rays, n_shadow_rays| BounceStats { n_rays, n_hits: 3, n_shadow_rays };
+        Frame::from(Profile {
+            device: "d".to_owned(),
+            passes: vec![
+                pass("visibility", None, 1.0),
+                pass("shadow", Some(0), 1.0),
+                pass("shade", Some(0), 4.0),
+                pass("trace", Some(1), 1.5),
+                pass("shadow", Some(1), 0.5),
+            ],
+            bounces: vec![stats(3000, 1000), stats(500, 0)],
+            n_batches: 1,
+            frame_ms: ms(10.0),
+        })
+    }
+
+    #[test]
+    fn times_are_summed_by_pass_and_by_bounce() {
+        let frame = frame(Some);
+        let names: Vec<_> = frame.pass_totals.iter().map(|total| total.name).collect();
+        assert_eq!(names, ["visibility", "shadow", "shade", "trace"]);
+        assert_eq!((frame.pass_totals[1].ms, frame.pass_totals[1].share), (Some(1.5), Some(0.15)));
+        assert_eq!((frame.bounces[0].tracing_ms, frame.bounces[0].mrays_per_s), (Some(2.0), Some(2.0)));
+        assert_eq!((frame.bounces[1].tracing_ms, frame.bounces[1].mrays_per_s), (Some(2.0), Some(0.25)));
+        assert!(frame.bounces_text().ends_with("all     3500     6         1000       4.000     1.12\n"));
+        assert!(frame.passes_text().ends_with("frame       10.000       100.0\n"));
+    }
+
+    #[test]
+    fn without_timestamps_there_are_dashes() {
+        let frame = frame(|_| None);
+        assert!(frame.pass_totals.iter().all(|total| total.ms.is_none() && total.share.is_none()));
+        for text in [frame.passes_text(), frame.bounces_text()] {
+            let last: Vec<_> = text.lines().last().unwrap().split_whitespace().collect();
+            assert!(last.ends_with(&["-", "-"]), "{text}");
+        }
+    }
+}

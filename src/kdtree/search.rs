@@ -1,0 +1,26 @@
+//! The cheapest split of a cell.
+
+use super::{
+    BuildOptions,
+    binned::BinnedSearch,
+    bounds::{Bounds, Reference},
+    counted,
+    sah::Split,
+};
+
+/// Buffers of a search, to be used again for the next cell.
+#[derive(Default)]
+pub struct Search {
+    binned: BinnedSearch,
+}
+
+impl Search {
+    /// The cheapest split; its weight is infinite where there is none.
+    pub fn best_split(&mut self, references: &[Reference], cell: &Bounds, options: &BuildOptions) -> Split {
+        if references.len() <= counted::MAX_REFERENCES {
+            counted::best_split(references, cell, options)
+        } else {
+            self.binned.best_split(references, cell, options)
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! Pixels to a file, whole or not at all.
+//!
+//! A file is encoded in memory, written beside its target under a temporary name, synchronized and renamed. So a full
+//! disk leaves what was there before, and no truncated or temporary file.
+
+#[cfg(unix)]
+use std::os::unix::fs::PermissionsExt;
+use std::{
+    fs::{self, File, OpenOptions},
+    io::{self, Cursor, Write},
+    path::{Path, PathBuf},
+};
+
+use image::{
+    EncodableLayout, ImageBuffer, ImageError, ImageFormat, PixelWithColorType, Primitive, Rgb,
+    error::{ParameterError, ParameterErrorKind},
+};
+use tempfile::NamedTempFile;
+
+use crate::frame::Picture;
+
+/// Why a file was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum OutputError {
+    #[error("cannot write `{path}`: a picture's name must end in .png or .exr")]
+    UnknownEnding { path: PathBuf },
+    #[error("cannot write `{path}`: `{directory}` is not a directory")]
+    NoDirectory { path: PathBuf, directory: PathBuf },
+    #[error("cannot write `{path}`: it is a directory")]
+    IsDirectory { path: PathBuf },
+    #[error("cannot encode `{path}`: {source}")]
+    Encode { path: PathBuf, source: ImageError },
+    #[error("cannot write `{path}`: {source}")]
+    Write { path: PathBuf, source: io::Error },
+}
+
+/// What a picture's file holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// 8 bits a channel, sRGB: [`Picture::display`].
+    Png,
+    /// Linear 32-bit floats, before exposure: [`Picture::radiance`].
+    Exr,
+}
+
+impl Format {
+    /// The format that a file's ending names, in whatever case.
+    pub fn of(path: &Path) -> Result<Self, OutputError> {
+        let ending = path.extension().unwrap_or_default();
+        if ending.eq_ignore_ascii_case("png") {
+            Ok(Self::Png)
+        } else if ending.eq_ignore_ascii_case("exr") {
+            Ok(Self::Exr)
+        } else {
+            Err(OutputError::UnknownEnding { path: path.to_owned() })
+        }
+    }
+}
+
+/// Finds out whether a file can be created or replaced at `path`, before minutes are spent on what it shall hold.
+pub fn check(path: &Path) -> Result<(), OutputError> {
+    match Target::at(path)? {
+        Target::Stream => Ok(()),
+        Target::File { directory, .. } => {
+            create_beside(&directory).map(drop).map_err(|source| OutputError::Write { path: path.to_owned(), source })
+        }
+    }
+}
+
+/// Writes a picture in the format that the file's ending names. Both formats hold exactly the picture's RGB values.
+pub fn write_picture(path: &Path, picture: &Picture) -> Result<(), OutputError> {
+    let bytes = match Format::of(path)? {
+        Format::Png => encode(picture, rgb(&picture.display), ImageFormat::Png),
+        Format::Exr => encode(picture, rgb(&picture.radiance), ImageFormat::OpenExr),
+    };
+    write(path, &bytes.map_err(|source| OutputError::Encode { path: path.to_owned(), source })?)
+}
+
+/// Writes a file whole or not at all. Devices and pipes are written to directly.
+///
+/// A symbolic link is followed; an existing file must be writable and keeps its permissions, a new one gets what the
+/// umask leaves.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    match Target::at(path)? {
+        Target::Stream => OpenOptions::new().write(true).open(path).and_then(|mut stream| stream.write_all(bytes)),
+        Target::File { directory, file } => replace(&directory, &file, bytes),
+    }
+    .map_err(|source| OutputError::Write { path: path.to_owned(), source })
+}
+
+/// What a path leads to.
+enum Target {
+    /// A device or a pipe, which cannot be replaced.
+    Stream,
+    /// A regular file, which may not exist yet, in an existing directory.
+    File { directory: PathBuf, file: PathBuf },
+}
+
+impl Target {
+    fn at(path: &Path) -> Result<Self, OutputError> {
+        let failed = |source| OutputError::Write { path: path.to_owned(), source };
+        let file = match fs::metadata(path) {
+            Ok(metadata) if metadata.is_dir() => return Err(OutputError::IsDirectory { path: path.to_owned() }),
+            Ok(metadata) if !metadata.is_file() => return Ok(Self::Stream),
+            Ok(_) => {
+                // Renaming asks nothing of the file that it replaces: a write-protected one is refused here.
+                OpenOptions::new().write(true).open(path).map_err(failed)?;
+                fs::canonicalize(path).map_err(failed)?
+            }
+            Err(_) => path.to_owned(),
+        };
+        let directory = match file.parent() {
+            Some(parent) if parent != Path::new("") => parent.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        if !directory.is_dir() {
+            return Err(OutputError::NoDirectory { path: path.to_owned(), directory });
+        }
+        Ok(Self::File { directory, file })
+    }
+}
+
+fn replace(directory: &Path, file: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut temporary = create_beside(directory)?;
+    temporary.as_file_mut().write_all(bytes)?;
+    if let Ok(replaced) = fs::metadata(file) {
+        temporary.as_file().set_permissions(replaced.permissions())?;
+    }
+    // Some file systems report a full disk only here.
+    temporary.as_file().sync_all()?;
+    temporary.persist(file).map(|_: File| ()).map_err(|failed| failed.error)
+}
+
+/// A temporary file that can be renamed to any other of its directory, and that is removed unless it is.
+fn create_beside(directory: &Path) -> io::Result<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".kdray-");
+    #[cfg(unix)]
+    builder.permissions(PermissionsExt::from_mode(0o666)); // less the umask
+    // The library's own message names the temporary file, which says nothing to the user.
+    builder.tempfile_in(directory).map_err(|error| io::Error::from(error.kind()))
+}
+
+fn rgb<T: Copy>(rgba: &[[T; 4]]) -> Vec<T> {
+    rgba.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect()
+}
+
+/// Encodes a picture's RGB values, three a pixel.
+fn encode<T>(picture: &Picture, rgb: Vec<T>, format: ImageFormat) -> Result<Vec<u8>, ImageError>
+where
+    Rgb<T>: PixelWithColorType<Subpixel = T>,
+    [T]: EncodableLayout,
+    T: Primitive,
+{
+    let image = ImageBuffer::<Rgb<T>, _>::from_raw(picture.width, picture.height, rgb)
+        .ok_or_else(|| ImageError::Parameter(ParameterError::from_kind(ParameterErrorKind::DimensionMismatch)))?;
+    let mut file = Cursor::new(Vec::new());
+    image.write_to(&mut file, format)?;
+    Ok(file.into_inner())
+}

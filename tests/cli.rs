@@ -1,0 +1,295 @@
+//! The command as its users meet it: exit codes, one-line errors, files, closed pipes.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output, Stdio},
+};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// The command in a directory.
+fn kdray(directory: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_kdray"));
+    command.current_dir(directory).args(arguments).stdin(Stdio::null());
+    command
+}
+
+fn cornell() -> String {
+    let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "scenes", "cornell.toml"].iter().collect();
+    path.into_os_string().into_string().unwrap()
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn stderr(output: &Output) -> String {
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!text.contains("panicked"), "{text}");
+    text
+}
+
+/// Runs a command that succeeds.
+fn succeed(directory: &Path, arguments: &[&str]) -> Output {
+    let output = kdray(directory, arguments).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+    output
+}
+
+/// Runs a command that fails with an exit code and one line that names what went wrong.
+fn fail(directory: &Path, arguments: &[&str], code: i32, named: &str) {
+    let output = kdray(directory, arguments).output().unwrap();
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {text}");
+    let errors: Vec<_> = text.lines().filter(|line| line.starts_with("error: ")).collect();
+    assert_eq!(errors.len(), 1, "{arguments:?}: {text}");
+    assert_eq!(text.lines().last(), Some(errors[0]), "{arguments:?}");
+    assert!(errors[0].contains(named), "{arguments:?}: {} does not name {named}", errors[0]);
+    assert!(output.stdout.is_empty(), "{arguments:?}: {}", stdout(&output));
+}
+
+fn names(directory: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn usage_mistakes_are_refused_before_the_scene_is_read() {
+    let directory = TempDir::new().unwrap();
+    let cases: &[(&[&str], &str)] = &[
+        (&[], "subcommand"),
+        (&["rendre"], "rendre"),
+        (&["render"], "SCENE"),
+        (&["render", ""], "SCENE"),
+        (&["render", "none.toml", "--sice", "1x1"], "--sice"),
+        (&["render", "none.toml", "--size", "640"], "640"),
+        (&["render", "none.toml", "--size", "0x480"], "0x480"),
+        (&["render", "none.toml", "--size", "640x99999"], "640x99999"),
+        (&["render", "none.toml", "--size", "-1x2"], "-1"),
+        (&["render", "none.toml", "--max-depth", "0"], "--max-depth"),
+        (&["render", "none.toml", "--max-depth", "65"], "1..=64"),
+        (&["render", "none.toml", "--denoise", "median"], "median"),
+        (&["render", "none.toml", "--denoise-threshold", "nan"], "--denoise-threshold"),
+        (&["render", "none.toml", "--denoise", "off", "--denoise-threshold", "1"], "--denoise off"),
+        (&["render", "none.toml", "--exposure", "0"], "--exposure"),
+        (&["render", "none.toml", "--exposure", "inf"], "--exposure"),
+        (&["render", "none.toml", "--traversal", "ropes"], "mask, stack"),
+        (&["render", "none.toml", "--primary", "rays"], "raster, trace"),
+        (&["render", "none.toml", "--threads", "0"], "--threads"),
+        (&["render", "none.toml", "--cpu", "--device", "0"], "--device"),
+        (&["render", "none.toml", "--device", ""], "--device"),
+        (&["render", "none.toml", "-o", "x.jpg"], "x.jpg"),
+        (&["render", "none.toml", "-o", "x"], ".png"),
+        (&["render", "none.toml", "-o", "x.png", "--profile", "x.png"], "same file"),
+        (&["inspect"], "SCENE"),
+        (&["devices", "0"], "'0'"),
+    ];
+    for (arguments, named) in cases {
+        fail(directory.path(), arguments, 2, named);
+    }
+    assert!(names(directory.path()).is_empty());
+}
+
+#[test]
+fn a_scene_that_cannot_be_loaded_is_named() {
+    let directory = TempDir::new().unwrap();
+    fs::write(directory.path().join("broken.toml"), "triangles = [[[\n").unwrap();
+    fs::write(directory.path().join("binary.toml"), [0xff, 0xfe, 0, 1, 2]).unwrap();
+    fs::create_dir(directory.path().join("folder.toml")).unwrap();
+    for scene in ["none.toml", "broken.toml", "binary.toml", "folder.toml", "two\nlines.toml"] {
+        let named = scene.split('\n').next().unwrap();
+        fail(directory.path(), &["render", scene, "--cpu", "-o", "x.png"], 3, named);
+        fail(directory.path(), &["inspect", scene], 3, named);
+        fail(directory.path(), &["inspect", scene, "--json"], 3, named);
+    }
+    assert_eq!(names(directory.path()), ["binary.toml", "broken.toml", "folder.toml"]);
+}
+
+#[test]
+fn a_device_that_is_not_there_is_named() {
+    let directory = TempDir::new().unwrap();
+    fail(directory.path(), &["render", &cornell(), "-q", "--device", "99"], 4, "99");
+    fail(directory.path(), &["render", &cornell(), "-q", "--device", "abacus"], 4, "abacus");
+    assert!(names(directory.path()).is_empty());
+}
+
+#[test]
+fn a_machine_without_a_driver_is_told_so() {
+    let directory = TempDir::new().unwrap();
+    for arguments in [&["devices"][..], &["render", &cornell(), "-q"]] {
+        let output = kdray(directory.path(), arguments)
+            .env("VK_DRIVER_FILES", "/dev/null")
+            .env("VK_ICD_FILENAMES", "/dev/null")
+            .output()
+            .unwrap();
+        let text = stderr(&output);
+        assert_eq!(output.status.code(), Some(4), "{arguments:?}: {text}");
+        assert_eq!(text.lines().filter(|line| line.starts_with("error: ")).count(), 1, "{text}");
+    }
+}
+
+#[test]
+fn a_file_that_cannot_be_written_is_named_before_rendering() {
+    let directory = TempDir::new().unwrap();
+    fs::write(directory.path().join("file"), "kept").unwrap();
+    fs::create_dir(directory.path().join("folder.png")).unwrap();
+    for path in ["none/x.png", "file/x.exr", "folder.png"] {
+        fail(directory.path(), &["render", "none.toml", "--cpu", "-o", path], 5, path);
+    }
+    fail(directory.path(), &["render", "none.toml", "--cpu", "--profile", "none/x.json"], 5, "none/x.json");
+    assert_eq!(names(directory.path()), ["file", "folder.png"]);
+}
+
+#[test]
+fn help_and_version() {
+    let directory = TempDir::new().unwrap();
+    for arguments in [&["--help"][..], &["help", "render"], &["render", "--help"], &["inspect", "-h"], &["-V"]] {
+        let output = succeed(directory.path(), arguments);
+        assert!(stdout(&output).contains("kdray") && stderr(&output).is_empty(), "{arguments:?}");
+    }
+    let help = stdout(&succeed(directory.path(), &["render", "--help"]));
+    for word in ["--size", "--max-depth", "mask|stack", "raster|trace", "paper", "--validate", "SCENE"] {
+        assert!(help.contains(word), "{word}");
+    }
+}
+
+#[test]
+fn devices_lists_what_there_is() {
+    let directory = TempDir::new().unwrap();
+    let text = stdout(&succeed(directory.path(), &["devices"]));
+    let mut lines = text.lines();
+    assert!(lines.next().unwrap().starts_with("device"));
+    assert!(lines.next().unwrap().starts_with('0'), "{text}");
+}
+
+#[test]
+fn inspect_describes_the_scene_and_its_tree() {
+    let directory = TempDir::new().unwrap();
+    let text = stdout(&succeed(directory.path(), &["inspect", &cornell()]));
+    let json: Value =
+        serde_json::from_slice(&succeed(directory.path(), &["inspect", &cornell(), "--json"]).stdout).unwrap();
+    let tree = &json["tree"];
+    assert!(tree["n_nodes"].as_u64() >= tree["n_leaves"].as_u64() && tree["n_leaves"].as_u64() >= Some(1));
+    let of_materials = json["materials"].as_array().unwrap().iter().map(|used| used["triangles"].as_u64().unwrap());
+    assert_eq!(Some(of_materials.sum::<u64>()), json["triangles"].as_u64());
+    for material in json["materials"].as_array().unwrap() {
+        assert!(text.contains(material["name"].as_str().unwrap()), "{text}");
+    }
+    for row in ["nodes", "leaves", "empty leaves", "depth", "references a triangle", "SAH cost", "bytes", "build ms"] {
+        assert!(text.lines().any(|line| line.starts_with(row)), "{row}: {text}");
+    }
+}
+
+/// Renders Cornell's box small, in a directory.
+fn render_small(directory: &Path, more: &[&str]) -> Output {
+    let scene = cornell();
+    succeed(directory, &[&["render", &scene, "--size", "64x48"], more].concat())
+}
+
+#[test]
+fn render_writes_the_picture_it_names() {
+    let directory = TempDir::new().unwrap();
+    let output = render_small(directory.path(), &["-o", "x.png"]);
+    let picture = image::open(directory.path().join("x.png")).unwrap();
+    assert_eq!((picture.width(), picture.height()), (64, 48));
+    assert!(stdout(&output).ends_with("wrote x.png\n"), "{}", stdout(&output));
+    let output = render_small(directory.path(), &["--cpu", "--threads", "1"]);
+    assert!(stdout(&output).ends_with("wrote cornell.png\n"), "{}", stdout(&output));
+    assert_eq!(names(directory.path()), ["cornell.png", "x.png"]);
+}
+
+#[test]
+fn quiet_says_nothing() {
+    let directory = TempDir::new().unwrap();
+    let output = render_small(directory.path(), &["--cpu", "-q", "-o", "x.exr"]);
+    assert!(output.stdout.is_empty() && output.stderr.is_empty(), "{}{}", stdout(&output), stderr(&output));
+    assert_eq!(names(directory.path()), ["x.exr"]);
+}
+
+#[test]
+fn the_profile_says_what_the_tables_say() {
+    let directory = TempDir::new().unwrap();
+    for more in [&["--cpu"][..], &["--traversal", "stack", "--denoise", "off"]] {
+        let output = render_small(directory.path(), &[&["-o", "x.png", "--profile", "x.json"], more].concat());
+        let text = stdout(&output);
+        let json: Value = serde_json::from_slice(&fs::read(directory.path().join("x.json")).unwrap()).unwrap();
+        assert_eq!(
+            (json["options"]["width"].as_u64(), json["bounces"][0]["n_rays"].as_u64()),
+            (Some(64), Some(64 * 48))
+        );
+        assert!(json["options"]["denoise"].is_string() && json["device"].is_string());
+        for key in ["load_ms", "build_ms", "render_ms"] {
+            assert!(json[key].is_f64(), "{key}");
+        }
+        for pass in json["pass_totals"].as_array().unwrap() {
+            assert!(text.contains(pass["name"].as_str().unwrap()), "{text}");
+        }
+        assert!(text.contains(&json["tree"]["n_nodes"].to_string()) && text.contains("Mrays/s"), "{text}");
+    }
+    assert_eq!(names(directory.path()), ["x.json", "x.png"]);
+}
+
+#[test]
+fn the_validation_layer_has_nothing_to_say() {
+    let directory = TempDir::new().unwrap();
+    render_small(directory.path(), &["--validate", "-o", "x.png"]);
+}
+
+#[cfg(unix)]
+mod unix {
+    use std::os::unix::fs::symlink;
+
+    use super::*;
+
+    /// Runs the command from a shell, as "$@", with the shell's own ways of closing and filling things up.
+    fn shell(directory: &Path, script: &str, arguments: &[&str]) -> Output {
+        let mut command = Command::new("bash");
+        command.args(["-c", &format!("set -o pipefail; {script}"), "bash", env!("CARGO_BIN_EXE_kdray")]);
+        command.args(arguments).current_dir(directory).output().unwrap()
+    }
+
+    #[test]
+    fn a_reader_that_leaves_is_no_error() {
+        let directory = TempDir::new().unwrap();
+        let scene = cornell();
+        let render = ["render", &scene, "--cpu", "--size", "64x48", "-o", "x.png"];
+        for arguments in [&["--help"][..], &["devices"], &["inspect", &scene], &render] {
+            for script in ["\"$@\" | true", "\"$@\" 2>&1 | true", "\"$@\" >&-", "\"$@\" 2>&-", "\"$@\" >&- 2>&-"] {
+                let output = shell(directory.path(), script, arguments);
+                assert_eq!(output.status.code(), Some(0), "{script} {arguments:?}: {}", stderr(&output));
+            }
+        }
+        let output = shell(directory.path(), "\"$@\" 2>&-", &["render", "none.toml"]);
+        assert_eq!(output.status.code(), Some(3));
+    }
+
+    #[test]
+    fn a_report_that_does_not_fit_is_an_error() {
+        let directory = TempDir::new().unwrap();
+        let output = shell(directory.path(), "\"$@\" >/dev/full", &["devices"]);
+        assert_eq!(output.status.code(), Some(5));
+        assert!(stderr(&output).starts_with("error: cannot write to standard output"), "{}", stderr(&output));
+    }
+
+    #[test]
+    fn a_full_disk_leaves_what_was_there() {
+        let directory = TempDir::new().unwrap();
+        fs::write(directory.path().join("x.exr"), "old").unwrap();
+        symlink("/dev/full", directory.path().join("full.png")).unwrap();
+        let scene = cornell();
+        // A limit on the size of files stands in for the full disk, without privileges.
+        for (limit, path) in [("ulimit -f 8", "x.exr"), ("ulimit -f 8", "new.exr"), ("true", "full.png")] {
+            let arguments = ["render", &scene, "--cpu", "-q", "--size", "256x256", "-o", path];
+            let output = shell(directory.path(), &format!("trap '' XFSZ; {limit}; exec \"$@\""), &arguments);
+            let text = stderr(&output);
+            assert_eq!(output.status.code(), Some(5), "{path}: {text}");
+            assert!(text.starts_with("error: ") && text.contains(path) && text.lines().count() == 1, "{text}");
+        }
+        assert_eq!(names(directory.path()), ["full.png", "x.exr"]);
+        assert_eq!(fs::read(directory.path().join("x.exr")).unwrap(), b"old");
+    }
+}

@@ -1,0 +1,279 @@
+//! What is refused, and how it is said: one line that names the file, and the line or object.
+
+use std::{fs, path::Path};
+
+use kdray::scene::Scene;
+
+use super::load;
+
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+const DISC: &str = "[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 3\n";
+
+/// The error of a scene whose first file is `name`.
+fn error(name: &str, content: &[u8]) -> String {
+    let mtl = content.split(|byte| *byte == b'\n').next() == Some(b"newmtl m");
+    let obj = format!("mtllib {name}\n{TRIANGLE}usemtl m\nf 1 2 3\n");
+    let files: &[(&str, &[u8])] =
+        if mtl { &[("user.obj", obj.as_bytes()), (name, content)] } else { &[(name, content)] };
+    let line = load(files).expect_err(&String::from_utf8_lossy(content)).to_string();
+    assert_eq!(line.lines().count(), 1, "{line}");
+    assert!(!line.chars().any(char::is_control) && line.len() < 800, "{line}");
+    line
+}
+
+/// Each error names `place` right after the folder, and says `what`.
+fn assert_errors(cases: &[(&str, String, &str, &str)]) {
+    for (name, content, place, what) in cases {
+        let line = error(name, content.as_bytes());
+        let at_place = line.split_once(&format!("/{place}: "));
+        let said = at_place.is_some_and(|(_, said)| said.contains(what));
+        assert!(said, "{content}\ngave    {line}\nwithout {place}: {what}");
+    }
+}
+
+#[test]
+fn bad_objs_are_refused() {
+    let after = |tail: &str| format!("{TRIANGLE}{tail}\n");
+    let cases = [
+        ("", "a.obj", "no triangles"),
+        (TRIANGLE, "a.obj", "no triangles"),
+        ("l 1 2\n", "a.obj", "no triangles"),
+        ("v 0 0\n", "a.obj:1", "2 numbers"),
+        ("v 0 0 zero\n", "a.obj:1", "`zero` is not a number"),
+        ("\n# c\nv 0 nan 0\n", "a.obj:3", "`nan` is not a finite number"),
+        ("v 0 -inf 0\n", "a.obj:1", "not a finite number"),
+        ("v 0 1e39 0\n", "a.obj:1", "not a finite number"),
+        ("vn 0 0\n", "a.obj:1", "2 numbers"),
+        ("vn 0 0 NaN\n", "a.obj:1", "not a finite number"),
+        (&after("f 1 2"), "a.obj:4", "2 corners"),
+        (&after("f"), "a.obj:4", "0 corners"),
+        (&after("f 1 2 4"), "a.obj:4", "vertex 4 is out of range: there are 3"),
+        (&after("f 1 2 0"), "a.obj:4", "vertex 0 is out of range"),
+        (&after("f 1 2 -4"), "a.obj:4", "vertex -4 is out of range"),
+        (&after("f 1 2 -9223372036854775808"), "a.obj:4", "out of range"),
+        (&after("f 1 2 99999999999999999999"), "a.obj:4", "not the index of a vertex"),
+        (&after("f 1//6148914691236517206 2//1 3//1"), "a.obj:4", "normal 6148914691236517206 is out of range"),
+        (&after("f 1/1 2/1 3/1"), "a.obj:4", "texture vertex 1 is out of range: there are 0"),
+        (&after("f 1/2/3/4 2 3"), "a.obj:4", "more than three indices"),
+        (&after("f / 2 3"), "a.obj:4", "not the index of a vertex"),
+        (&after("f a b c"), "a.obj:4", "`a` is not the index"),
+        (&after("usemtl"), "a.obj:4", "names no material"),
+        (&after("mtllib"), "a.obj:4", "names no file"),
+        (&after("mtllib /etc/passwd\nf 1 2 3"), "a.obj:4", "leaves the folder"),
+        (&after("mtllib ../x.mtl\nf 1 2 3"), "a.obj:4", "leaves the folder"),
+        (&after("mtllib a\\..\\..\\x.mtl\nf 1 2 3"), "a.obj:4", "leaves the folder"),
+        (&after("mtllib c:x.mtl\nf 1 2 3"), "a.obj:4", "leaves the folder"),
+        ("\u{1}\0\0\0\u{2}", "a.obj:1", "no text file"),
+        ("v 2e9 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3", "a.obj", "beyond 1e9"),
+    ];
+    assert_errors(&cases.map(|(content, place, what)| ("a.obj", content.to_owned(), place, what)));
+}
+
+#[test]
+fn bad_mtls_are_refused() {
+    let cases = [
+        ("Kd", "a.mtl:2", "0 numbers"),
+        ("Kd 1 2", "a.mtl:2", "2 numbers"),
+        ("Kd 1 2 x", "a.mtl:2", "`x` is not a finite number"),
+        ("Kd nan", "a.mtl:2", "not a finite number"),
+        ("\nKs spectral x.rfl", "a.mtl:3", "not a finite number"),
+        ("Kd -1 0 0", "a.mtl", "material `m`: Kd"),
+        ("Ns", "a.mtl:2", "not a finite number"),
+        ("Ns -5", "a.mtl", "material `m`: Ns = -5 is outside"),
+        ("d 1.5", "a.mtl", "material `m`: d = 1.5 is outside 0 to 1"),
+        ("Tr 2", "a.mtl", "material `m`: Tr = 2 is outside 0 to 1"),
+        ("Ni -1", "a.mtl", "material `m`: Ni = -1"),
+        ("illum 11", "a.mtl:2", "not one of 0 to 10"),
+        ("illum", "a.mtl:2", "not one of 0 to 10"),
+        ("newmtl", "a.mtl:2", "names no material"),
+    ];
+    assert_errors(&cases.map(|(content, place, what)| ("a.mtl", format!("newmtl m\n{content}\n"), place, what)));
+}
+
+#[test]
+fn bad_scene_files_are_refused() {
+    let mesh = |rest: &str| format!("\n[[mesh]]\n{rest}\n");
+    let disc = |rest: &str| format!("{rest}\n{DISC}");
+    let cases = [
+        (String::new(), "a.toml", "no triangles"),
+        ("[camera\n".to_owned(), "a.toml:1", ""),
+        (disc("ambience = 1"), "a.toml:1", "unknown field `ambience`"),
+        (disc("\nambient = [1, 1]"), "a.toml:2", ""),
+        (disc("ambient = [nan, 0, 0]"), "a.toml:1", "ambient"),
+        (disc("background = [-1, 0, 0]"), "a.toml:1", "background"),
+        (disc("\nmaterials.m = { kd = [1, 1, 1] }"), "a.toml:2", "unknown field `kd`"),
+        (disc("\nmaterials.m = { Kd = [1, 1, -1] }"), "a.toml:2", "material `m`: Kd"),
+        (disc("\nmaterials.m = { illum = 12 }"), "a.toml:2", "material `m`: illum 12"),
+        (disc("\nmaterials.m = { d = 1, Tr = 0 }"), "a.toml:2", "material `m`: has both d and Tr"),
+        (disc("\nmaterials.m = { Ni = inf }"), "a.toml:2", "material `m`: Ni"),
+        (disc("light = [{ kind = 'spot' }]"), "a.toml:1", "unknown variant `spot`"),
+        (disc("light = [{ kind = 'point', position = [0, 0, 0] }]"), "a.toml:1", "missing field `intensity`"),
+        (
+            disc("light = [{ kind = 'point', position = [0, nan, 0], intensity = [1, 1, 1] }]"),
+            "a.toml:1",
+            "light 1: position",
+        ),
+        (
+            disc("light = [{ kind = 'point', position = [0, 2e9, 0], intensity = [1, 1, 1] }]"),
+            "a.toml:1",
+            "light 1: position",
+        ),
+        (
+            disc("light = [{ kind = 'directional', direction = [0, 0, 0], irradiance = [1, 1, 1] }]"),
+            "a.toml:1",
+            "no direction",
+        ),
+        (disc("\ncamera = { eye = [0, 0, 0] }"), "a.toml:2", "missing field `target`"),
+        (disc("\ncamera = { eye = [1, 1, 1], target = [1, 1, 1] }"), "a.toml:2", "camera: eye, target and up"),
+        (disc("\ncamera = { eye = [1, 1, 1], target = [1, 3, 1] }"), "a.toml:2", "camera: eye, target and up"),
+        (disc("camera = { eye = [1, 1, inf], target = [1, 3, 1] }"), "a.toml:1", "camera: eye"),
+        (disc("camera = { eye = [1, 1, 2], target = [1, 3, 1], vertical_fov = 180 }"), "a.toml:1", "vertical_fov"),
+        (disc("render = { width = 0 }"), "a.toml:1", "render: width = 0"),
+        (disc("render = { height = 20000 }"), "a.toml:1", "render: height = 20000"),
+        (disc("render = { max_depth = 0 }"), "a.toml:1", "render: max_depth = 0"),
+        (disc("render = { exposure = -1 }"), "a.toml:1", "render: exposure = -1"),
+        (disc("render = { denoise = 'much' }"), "a.toml:1", "unknown variant `much`"),
+        (disc("render = { denoise_threshold = 5 }"), "a.toml:1", "render: denoise_threshold = 5"),
+        (mesh(""), "a.toml:2", "mesh 1: has neither `file` nor `generator`"),
+        (mesh("file = 'x.obj'\ngenerator = 'disc'"), "a.toml:2", "mesh 1: has both"),
+        (mesh("file = 'x.obj'"), "x.obj", "cannot be read"),
+        (mesh("file = '.'"), ".", "not a regular file"),
+        (mesh("file = 'x.obj'\nradius = 1"), "a.toml:2", "mesh 1: unknown field `radius`"),
+        (mesh("file = 'x.obj'\ncrease = 200"), "a.toml:2", "mesh 1: crease = 200"),
+        (mesh("generator = 'cone'"), "a.toml:2", "mesh 1: unknown variant `cone`"),
+        (mesh("generator = 'disc'\nradius = 1\nsegments = 3\ncrease = 2"), "a.toml:2", "unknown field `crease`"),
+        (mesh("generator = 'disc'\nradius = 1"), "a.toml:2", "missing field `segments`"),
+        (mesh("generator = 'disc'\nradius = 0\nsegments = 3"), "a.toml:2", "mesh 1: radius = 0"),
+        (mesh("generator = 'disc'\nradius = nan\nsegments = 3"), "a.toml:2", "mesh 1: radius = NaN"),
+        (mesh("generator = 'disc'\nradius = 1\nsegments = 2"), "a.toml:2", "mesh 1: segments = 2"),
+        (mesh("generator = 'sphere'\nradius = 1\ntriangles = 11"), "a.toml:2", "mesh 1: triangles = 11 is odd"),
+        (mesh("generator = 'sphere'\nradius = 1\ntriangles = 4"), "a.toml:2", "too few"),
+        (mesh("generator = 'sphere'\nradius = 1\ntriangles = 4000000000"), "a.toml:2", "makes 4000000000 triangles"),
+        (mesh("generator = 'sphere'\nradius = 1\nsegments = 65536\nrings = 65536"), "a.toml:2", "triangles: more than"),
+        (mesh("generator = 'sphere'\nradius = 1\nrings = 6"), "a.toml:2", "needs either"),
+        (mesh("generator = 'geodesic'\nradius = 1\nfrequency = 65536"), "a.toml:2", "triangles: more than"),
+        (mesh("generator = 'lathe'\nsegments = 9\nprofile = [[1, 1]]"), "a.toml:2", "begins and ends nothing"),
+        (mesh("generator = 'lathe'\nsegments = 9\nprofile = []"), "a.toml:2", "mesh 1: "),
+        (mesh("generator = 'lathe'\nsegments = 9\nprofile = [[1, 1], [0, 1], [1, 0]]"), "a.toml:2", "touches the axis"),
+        (mesh("generator = 'lathe'\nsegments = 9\nprofile = [[-1, 1], [1, 0]]"), "a.toml:2", "distance from the axis"),
+        (
+            mesh("generator = 'superellipsoid'\nsize = [1, 1, 1]\nexponents = [3, 1]\ntriangles = 90"),
+            "a.toml:2",
+            "exponents = 3",
+        ),
+        (
+            mesh("generator = 'torus_knot'\np = 2\nq = 4\nradius = 1\nswing = 1\ntube = 1\nsegments = 9\nsides = 3"),
+            "a.toml:2",
+            "common factor",
+        ),
+        (format!("{DISC}transform.scale = 0"), "a.toml:1", "mesh 1: scale"),
+        (format!("{DISC}transform.scale = [1, nan, 1]"), "a.toml:1", "mesh 1: scale"),
+        (format!("{DISC}transform.translate = [1, inf, 1]"), "a.toml:1", "mesh 1: translate"),
+        (format!("{DISC}transform.translate = [1, 1e10, 1]"), "a.toml:1", "mesh 1: a vertex lies at"),
+        (format!("{DISC}transform.rotate = [1, 1]"), "a.toml:1", "mesh 1: expected [x, y, z] in degrees or"),
+        (format!("{DISC}transform.rotate = {{ axis = [0, 0, 0], angle = 1 }}"), "a.toml:1", "no direction"),
+        (format!("{DISC}transform.shear = 1"), "a.toml:1", "unknown field `shear`"),
+        (format!("{DISC}{DISC}material = 'm'"), "a.toml:5", "mesh 2: there is no material `m`"),
+        (format!("{DISC}material = 'm'\nmaterials = ['m']"), "a.toml:1", "both `material` and `materials`"),
+        (format!("a = {}1{}", "[".repeat(10_000), "]".repeat(10_000)), "a.toml:1", ""),
+    ];
+    assert_errors(&cases.map(|(content, place, what)| ("a.toml", content, place, what)));
+}
+
+#[test]
+fn files_that_are_no_scenes_are_refused() {
+    assert!(error("a.toml", b"\n\xff").ends_with("a.toml:2: is not UTF-8"));
+    assert!(error("a.gltf", b"").ends_with("neither in .toml nor in .obj"));
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("x.obj")).unwrap();
+    assert!(
+        Scene::load(&folder.path().join("x.obj")).unwrap_err().to_string().ends_with("x.obj: is not a regular file")
+    );
+    let missing = Scene::load(Path::new("no\nsuch\u{7}.toml")).unwrap_err().to_string();
+    assert!(missing.starts_with("no such\\u{7}.toml: cannot be read"), "{missing}");
+}
+
+/// Good files to start from, the first of each row to be mutated.
+const SEEDS: [&[(&str, &str)]; 4] = [
+    &[(
+        "m.obj",
+        "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0.5\nvt 0 0\nvn 0 0 1\nusemtl m\ns 1\nf 1/1/1 2//1 3//1\nf 2 4 3\ns off\nf -1 -2 -3 -4\n",
+    )],
+    &[("m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")],
+    &[
+        (
+            "m.mtl",
+            "newmtl m\nKa 0.1 0.1 0.1\nKd 0.5\nKs 1 1 1\nNs 10\nNi 1.5\nd 0.5\nTr 0.5\nTf 1 1 1\nillum 7\nmap_Kd a.png\nbump b.png\n",
+        ),
+        ("user.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n"),
+    ],
+    &[(
+        "m.toml",
+        "ambient = [0.1, 0.1, 0.1]\n[camera]\neye = [0, 1, 5]\ntarget = [0, 0, 0]\n[[light]]\nkind = 'point'\n\
+         position = [1, 2, 3]\nintensity = [1, 1, 1]\n[materials.m]\nKd = [1, 1, 1]\nillum = 3\n[[mesh]]\n\
+         generator = 'sphere'\nradius = 1.5\nsegments = 8\nrings = 3\nmaterial = 'm'\n\
+         transform = { rotate = [0, 45, 0], scale = 2 }\n[[mesh]]\ngenerator = 'lathe'\nsegments = 5\nsteps = 2\n\
+         profile = [[0, 1], [1, 1], [1, 0], [0, 0]]\n[render]\nwidth = 64\n",
+    )],
+];
+
+/// Knuth's MMIX generator.
+fn random(state: &mut u64) -> usize {
+    *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+    (*state >> 33) as usize
+}
+
+/// Up to three edits: bytes changed, cut out or repeated, numbers swapped for nasty ones.
+fn mutate(bytes: &mut Vec<u8>, state: &mut u64) {
+    const NASTY: [&str; 12] =
+        ["nan", "-inf", "1e39", "-1", "0", "9223372036854775807", "1e-45", "", "\u{feff}", "\\\n", "/", "-0.0"];
+    for _ in 0..1 + random(state) % 3 {
+        let at = random(state) % bytes.len().max(1);
+        let end = (at + random(state) % 12).min(bytes.len());
+        match random(state) % 5 {
+            0 if !bytes.is_empty() => bytes[at] = random(state) as u8,
+            1 => drop(bytes.drain(at.min(end)..end)),
+            2 => bytes.extend_from_within(at.min(end)..end),
+            3 => drop(bytes.splice(at.min(end)..end, NASTY[random(state) % NASTY.len()].bytes())),
+            _ => {
+                let digit = bytes.iter().skip(at).position(u8::is_ascii_digit);
+                if let Some(digit) = digit {
+                    bytes.splice(at + digit..=at + digit, NASTY[random(state) % NASTY.len()].bytes());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn mutated_files_never_panic() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut state = 1;
+    let (mut n_good, mut n_bad) = (0, 0);
+    for seed in SEEDS {
+        for (name, content) in seed {
+            fs::write(folder.path().join(name), content).unwrap();
+        }
+        let (name, content) = seed[0];
+        let scene = if name.ends_with("mtl") { "user.obj" } else { name };
+        Scene::load(&folder.path().join(scene)).unwrap();
+        for _ in 0..1500 {
+            let mut bytes = content.as_bytes().to_vec();
+            mutate(&mut bytes, &mut state);
+            fs::write(folder.path().join(name), &bytes).unwrap();
+            match Scene::load(&folder.path().join(scene)) {
+                Ok(scene) => {
+                    n_good += 1;
+                    assert!(scene.triangles.iter().all(|t| t.v0.is_finite() && t.v1.is_finite() && t.v2.is_finite()));
+                    assert!(scene.triangle_materials.iter().all(|ix| (*ix as usize) < scene.materials.len()));
+                }
+                Err(e) => {
+                    n_bad += 1;
+                    assert_eq!(e.to_string().lines().count(), 1, "{e}");
+                }
+            }
+        }
+    }
+    // The mutations neither all miss nor all hit.
+    assert!(n_good > 500 && n_bad > 500, "{n_good} good, {n_bad} bad");
+}

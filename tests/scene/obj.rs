@@ -1,0 +1,181 @@
+//! OBJ and MTL files, as exporters and people write them.
+
+use std::fmt::Write;
+
+use glam::Vec3;
+use kdray::{
+    layout::FLAT_NORMAL,
+    scene::{Scene, framing::bounds, normal::decode_octahedral},
+};
+
+use super::{facet_normal, load};
+
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+/// The unit cube's corners and its quads.
+const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
+    f 1 5 7 3\nf 6 2 4 8\nf 1 2 6 5\nf 7 8 4 3\nf 2 1 3 4\nf 5 6 8 7\n";
+
+fn load_obj(text: &str) -> Scene {
+    load(&[("mesh.obj", text.as_bytes())]).unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+fn load_with(toml: &str, obj: &str) -> Scene {
+    load(&[("scene.toml", toml.as_bytes()), ("mesh.obj", obj.as_bytes())]).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn load_mtl(mtl: &str) -> Scene {
+    let obj = format!("mtllib a b.mtl\n{TRIANGLE}usemtl my own\nf 1 2 3\n");
+    load(&[("mesh.obj", obj.as_bytes()), ("a b.mtl", mtl.as_bytes())]).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// Encoded normals of all corners.
+fn normals(scene: &Scene) -> Vec<u32> {
+    scene.triangles.iter().flat_map(|t| [t.n0, t.n1, t.n2]).collect()
+}
+
+/// A sphere of radius 1 without normals, each triangle with corners of its own.
+fn triangle_soup_sphere() -> String {
+    let scene = load(&[("s.toml", b"mesh = [{ generator = 'geodesic', radius = 1, frequency = 8 }]")]).unwrap();
+    let mut obj = String::new();
+    for (ix, t) in scene.triangles.iter().enumerate() {
+        for v in [t.v0, t.v1, t.v2] {
+            writeln!(obj, "v {} {} {}", v.x, v.y, v.z).unwrap();
+        }
+        writeln!(obj, "f {} {} {}", 3 * ix + 1, 3 * ix + 2, 3 * ix + 3).unwrap();
+    }
+    obj
+}
+
+#[test]
+fn files_without_normals_are_smooth_up_to_the_crease() {
+    assert!(normals(&load_obj(CUBE)).iter().all(|n| *n == FLAT_NORMAL));
+    let scene = load_obj(&triangle_soup_sphere());
+    assert_eq!(scene.triangles.len(), 1280);
+    for t in &scene.triangles {
+        for (corner, normal) in [(t.v0, t.n0), (t.v1, t.n1), (t.v2, t.n2)] {
+            assert_ne!(normal, FLAT_NORMAL);
+            assert!(decode_octahedral(normal).angle_between(corner) < 0.02);
+        }
+    }
+    let round = load_with("mesh = [{ file = 'mesh.obj', crease = 100 }]", CUBE);
+    let expected = Vec3::new(-1.0, -1.0, -1.0).normalize();
+    // Weighted by angle, a corner's diagonals do not pull the normal to one side.
+    assert!(decode_octahedral(round.triangles[0].n0).distance(expected) < 1e-3);
+}
+
+#[test]
+fn flat_is_flat() {
+    let sphere = triangle_soup_sphere();
+    assert!(
+        normals(&load_with("mesh = [{ file = 'mesh.obj', smooth = false }]", &sphere))
+            .iter()
+            .all(|n| *n == FLAT_NORMAL)
+    );
+    for off in ["s off\n", "s 0\n"] {
+        assert!(normals(&load_obj(&[off, &sphere].concat())).iter().all(|n| *n == FLAT_NORMAL));
+    }
+    assert!(normals(&load_obj(&["s 1\n", &sphere].concat())).iter().all(|n| *n != FLAT_NORMAL));
+    let generator = "mesh = [{ generator = 'geodesic', radius = 1, frequency = 2, smooth = false }]";
+    assert!(normals(&load_with(generator, "")).iter().all(|n| *n == FLAT_NORMAL));
+}
+
+#[test]
+fn a_fans_hub_takes_no_quadratic_time() {
+    let n = 200_000;
+    let mut obj = "v 0 0.1 0\n".to_owned();
+    for ix in 0..n {
+        let (sin, cos) = (ix as f64 / n as f64 * std::f64::consts::TAU).sin_cos();
+        writeln!(obj, "v {sin} 0 {cos}\nf 1 {} {}", ix + 2, (ix + 1) % n + 2).unwrap();
+    }
+    let scene = load_obj(&obj);
+    assert!(decode_octahedral(scene.triangles[17].n0).distance(Vec3::Y) < 1e-3);
+}
+
+#[test]
+fn a_files_own_normals_count() {
+    // The second face has none for one corner, so none of its own; a zero normal is none.
+    let obj = format!("{TRIANGLE}v 1 1 0\nvn 0 3 4\nvn 0 0 0\nf 1//1 2//1 3//2\nf 2//1 4 3//1\n");
+    let scene = load_obj(&obj);
+    let [first, second] = scene.triangles[..] else { panic!("two triangles") };
+    assert!(decode_octahedral(first.n0).distance(Vec3::new(0.0, 0.6, 0.8)) < 1e-4);
+    assert_eq!([first.n2, second.n0, second.n1, second.n2], [FLAT_NORMAL; 4]);
+}
+
+#[test]
+fn the_format_is_read_as_people_write_it() {
+    let plain = load_obj(&format!("{TRIANGLE}f 1 2 3\n"));
+    let latin1 = [b"# caf\xe9\n".as_slice(), TRIANGLE.as_bytes(), b"f 1 2 3"].concat();
+    assert_eq!(load(&[("mesh.obj", &latin1)]).unwrap(), plain);
+    let same = [
+        format!("\u{feff}{TRIANGLE}f 1 2 3\n"),
+        format!("{TRIANGLE}f -3 -2 -1 # the lot"),
+        format!("{TRIANGLE}f 1 2 3\n").replace('\n', "\r\n"),
+        format!("f 1 2 3\n{TRIANGLE}"),
+        format!("{TRIANGLE}f 1 \\\n 2 \\\n 3\n"),
+        format!("o x\ng y z\n{TRIANGLE}vt 0 0\nf 1/1 2/1 3/1\nl 1 2\np 1\nl 7\n"),
+        "v 0 0 0 1\nv 1 0 0 0.5 0.5 0.5\nv\t0\t1 0\nvp 1\nf\t1 2\t3\nfoo bar\n".to_owned(),
+    ];
+    for text in same {
+        assert_eq!(load_obj(&text), plain, "{text}");
+    }
+    let pentagon = load_obj("v 0 0 0\nv 2 0 0\nv 3 2 0\nv 1 3 0\nv -1 2 0\nf 1 2 3 4 5\n");
+    assert_eq!(pentagon.triangles.len(), 3);
+    assert!(pentagon.triangles.iter().all(|t| facet_normal(t).z > 0.0));
+}
+
+#[test]
+fn mtl_terms_become_the_kernels() {
+    let mtl = "# c\nKd 1\nnewmtl other\nnewmtl my own\nKa 0.5\nKd 0.1 0.2 0.3 # rgb\n Ks 1 1 1\nKe 2 0 0\nNs 10\n\
+        Ni 1.3\nTr 0.4\nTf 0.7 0.8 0.9\nillum 7\nmap_Kd x.png\nsharpness 60\n";
+    let scene = load_mtl(mtl);
+    assert_eq!(scene.material_names, ["other", "my own", "(default)"]);
+    let m = scene.materials[scene.triangle_materials[0] as usize];
+    assert_eq!((m.ka, m.kd, m.ke), (Vec3::splat(0.5), Vec3::new(0.1, 0.2, 0.3), Vec3::new(2.0, 0.0, 0.0)));
+    assert_eq!((m.ns, m.ni, m.d, m.tf, m.illum), (10.0, 1.3, 0.6, Vec3::new(0.7, 0.8, 0.9), 7));
+    // d counts where a file gives both.
+    assert_eq!(load_mtl("newmtl my own\nTr 1\nd -halo 0.5\n").materials[0].d, 0.5);
+}
+
+#[test]
+fn what_no_library_defines_is_the_default() {
+    for obj in ["mtllib no.mtl\nusemtl x\n", "usemtl x\n", ""] {
+        let scene = load_obj(&format!("{obj}{TRIANGLE}f 1 2 3\n"));
+        assert_eq!((scene.material_names, scene.triangle_materials), (vec!["(default)".to_owned()], vec![0]));
+    }
+    // Two libraries on one line, and faces of several materials.
+    let obj = format!(
+        "mtllib a.mtl b.mtl\n{TRIANGLE}usemtl b\nf 1 2 3\nusemtl a\nf 1 2 3\nusemtl c\nf 3 2 1\nusemtl b\nf 1 2 3"
+    );
+    let files: [(&str, &[u8]); 3] =
+        [("m.obj", obj.as_bytes()), ("a.mtl", b"newmtl a\n"), ("b.mtl", b"newmtl b\nd 0.5")];
+    let scene = load(&files).unwrap();
+    let names: Vec<&str> =
+        scene.triangle_materials.iter().map(|ix| scene.material_names[*ix as usize].as_str()).collect();
+    assert_eq!(names, ["b", "a", "(default)", "b"]);
+}
+
+#[test]
+fn a_bare_obj_is_framed_and_lit() {
+    for (scale, offset) in [(1.0, 0.0), (1e-4, 0.0), (1e5, 0.0), (3.0, 1e4)] {
+        let mut obj = String::new();
+        for (x, y, z) in [(0, 0, 0), (9, 0, 1), (2, 5, 0), (4, 1, 3)] {
+            writeln!(obj, "v {} {} {}", x as f64 * scale + offset, y as f64 * scale, z as f64 * scale - offset)
+                .unwrap();
+        }
+        let scene = load_obj(&format!("{obj}f 1 2 3\nf 1 3 4\n"));
+        assert_eq!((scene.name.as_str(), scene.lights.len()), ("mesh", 1));
+        let (min, max) = bounds(&scene.triangles);
+        let (camera, half) = (scene.camera, scene.camera.vertical_fov_degrees.to_radians() / 2.0);
+        let forward = (camera.target - camera.eye).normalize();
+        let right = forward.cross(camera.up).normalize();
+        for n in 0..8 {
+            let side = |bit: u32, axis: usize| if n & bit == 0 { min[axis] } else { max[axis] };
+            let to = Vec3::new(side(1, 0), side(2, 1), side(4, 2)) - camera.eye;
+            let edge = to.dot(forward) * half.tan();
+            assert!(edge > 0.0, "behind the camera");
+            assert!(to.dot(right).abs() < edge && to.dot(right.cross(forward)).abs() < edge, "outside the picture");
+        }
+        // The box is not lost in the picture either.
+        assert!((camera.target - camera.eye).length() < 3.5 * (max - min).length());
+    }
+}
