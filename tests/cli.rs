@@ -239,6 +239,21 @@ fn the_validation_layer_has_nothing_to_say() {
     render_small(directory.path(), &["--validate", "-o", "x.png"]);
 }
 
+/// The layer's advice on best practices, asked for by environment, stands in for a fault.
+#[test]
+fn a_validation_message_is_listed_and_fails() {
+    let directory = TempDir::new().unwrap();
+    let scene = cornell();
+    let output = kdray(directory.path(), &["render", &scene, "--size", "64x48", "--validate", "-q", "-o", "x.png"])
+        .env("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT")
+        .output()
+        .unwrap();
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(4), "{text}");
+    assert!(text.contains("validation: "), "{text}");
+    assert!(text.lines().last().unwrap().starts_with("error: the validation layer"), "{text}");
+}
+
 #[cfg(unix)]
 mod unix {
     use std::os::unix::fs::symlink;

@@ -13,7 +13,7 @@ pub enum CliError {
     Scene(#[from] SceneError),
     #[error(transparent)]
     Device(#[from] GpuError),
-    #[error("the validation layer reported {0} messages")]
+    #[error("the validation layer had {0} complaint(s)")]
     Validation(usize),
     #[error(transparent)]
     Output(#[from] OutputError),
