@@ -156,6 +156,7 @@ pub fn traverse<P: Pending, const ANY_HIT: bool>(bindings: &Bindings, pending: &
 }
 
 /// A traversal that remembers its working memory from ray to ray; one for each thread.
+#[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
 pub enum Traverser {
     Mask(PendingMask),
     Stack(PendingStack),

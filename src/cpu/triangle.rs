@@ -119,8 +119,8 @@ impl Corners {
     /// difference are exact in `f64`; the kernels have none and add up the products' errors to the same.
     #[cold]
     fn exact_edge_functions(&self, rounded: Vec4) -> Vec4 {
-        let exact = self.x.zxyw().as_dvec4() * self.y.yzxw().as_dvec4()
-            - self.y.zxyw().as_dvec4() * self.x.yzxw().as_dvec4();
+        let exact =
+            self.x.zxyw().as_dvec4() * self.y.yzxw().as_dvec4() - self.y.zxyw().as_dvec4() * self.x.yzxw().as_dvec4();
         Vec4::select(rounded.cmpeq(Vec4::ZERO), exact.as_vec4(), rounded)
     }
 }
