@@ -3,8 +3,9 @@
 use glam::Vec3;
 
 /// Linear display value, 0..1; black for NaN.
+#[expect(clippy::manual_clamp, reason = "`clamp` keeps NaN")]
 pub fn displayed(radiance: Vec3, exposure: f32) -> Vec3 {
-    (radiance * exposure).map(|x| x.clamp(0.0, 1.0))
+    (radiance * exposure).map(|x| x.max(0.0).min(1.0))
 }
 
 /// Relative luminance of the displayed colour, 0..1 (ITU-R BT.709).
