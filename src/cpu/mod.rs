@@ -108,8 +108,8 @@ impl Renderer<'_> {
             let n_hits = self.closest_hits(depth);
             let n_shadow_rays = self.light(depth);
             stats.push(BounceStats { n_rays: self.queues.rays.len() as u64, n_hits, n_shadow_rays });
-            let this = self.next_rays(depth, capacity);
-            if this.overflow != 0 {
+            let next = self.next_rays(depth, capacity);
+            if next.overflow != 0 {
                 self.batch(first_pixel, n_pixels / 2);
                 self.batch(first_pixel + n_pixels / 2, n_pixels - n_pixels / 2);
                 return;
@@ -160,22 +160,22 @@ impl Renderer<'_> {
         n_shadow_rays.into()
     }
 
-    /// Compacts the children to the queue of the next bounce; returns what the spine says of this one.
+    /// Compacts the children to the queue of the next bounce; returns what the spine says of that.
     fn next_rays(&mut self, depth: u32, capacity: u32) -> Bounce {
         let Queues { rays, next_rays, scan_blocks, shaded, .. } = &mut self.queues;
         let Shaded { child_rays, child_counts, .. } = shaded;
-        let (mut this, mut next) = (Bounce::zeroed(), Bounce::zeroed());
+        let mut next = Bounce::zeroed();
         scan_blocks.resize(rays.len().div_ceil(SCAN_BLOCK_SIZE as usize), 0);
         self.clock.time("compact_reduce", Some(depth), || compact::reduce(child_counts, scan_blocks));
-        self.clock.time("compact_spine", Some(depth), || compact::spine(scan_blocks, capacity, &mut this, &mut next));
+        self.clock.time("compact_spine", Some(depth), || compact::spine(scan_blocks, capacity, &mut next));
         next_rays.resize(next.n_rays as usize, Ray::zeroed());
-        if this.overflow == 0 {
+        if next.overflow == 0 {
             self.clock.time("compact_scatter", Some(depth), || {
                 compact::scatter(child_rays, child_counts, scan_blocks, next_rays);
             });
         }
         swap(rays, next_rays);
-        this
+        next
     }
 
     fn count(&mut self, stats: &[BounceStats]) {

@@ -5,6 +5,7 @@
 pub mod meshes;
 pub mod random;
 pub mod rays;
+pub mod scenes;
 
 use glam::Vec3;
 use kdray::{
