@@ -3,10 +3,12 @@
 
 mod support;
 
+#[path = "passes/barriers.rs"]
+mod barriers;
 #[path = "passes/compact.rs"]
 mod compact;
-#[path = "passes/compare.rs"]
-mod compare;
+#[path = "passes/comparers.rs"]
+mod comparers;
 #[path = "passes/denoise.rs"]
 mod denoise;
 #[path = "passes/primary_hit.rs"]

@@ -5,11 +5,8 @@ use kdray::{
     layout::{Batch, Bounce, Ray, SCAN_BLOCK_SIZE, SCAN_GROUP_SIZE},
 };
 
-use super::{
-    compare,
-    stage::{FIRST, Stage, UNTOUCHED_RAY, UNTOUCHED_WORD, options},
-};
-use crate::support::{random::Random, scenes};
+use super::stage::{FIRST, Stage, UNTOUCHED_RAY, UNTOUCHED_WORD, options};
+use crate::support::{compare, random::Random, scenes};
 
 /// Blocks that one round of the spine holds.
 const ROUND: u32 = SCAN_GROUP_SIZE * SCAN_BLOCK_SIZE;

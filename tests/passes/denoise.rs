@@ -5,11 +5,8 @@ use kdray::{
     frame::{Denoise, RenderOptions},
 };
 
-use super::{
-    compare,
-    stage::{FIRST, Stage, UNTOUCHED_PIXEL, options},
-};
-use crate::support::{random::Random, scenes};
+use super::stage::{FIRST, Stage, UNTOUCHED_PIXEL, options};
+use crate::support::{compare, random::Random, scenes};
 
 /// Smooth, with some pixels that stand out, some brighter than white.
 fn noisy(n: usize) -> Vec<[f32; 4]> {

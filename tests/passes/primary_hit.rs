@@ -6,11 +6,8 @@ use kdray::{
     layout::{Batch, Hit, Ray},
 };
 
-use super::{
-    compare,
-    stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_HIT, UNTOUCHED_RAY, options},
-};
-use crate::support::scenes;
+use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_HIT, UNTOUCHED_RAY, options};
+use crate::support::{compare, scenes};
 
 /// Rays and hits of a batch, and how many are hits.
 fn on_device(stage: &Stage, batch: &Batch) -> (Vec<Ray>, Vec<Hit>, u32) {

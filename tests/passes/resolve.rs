@@ -5,11 +5,8 @@ use kdray::{
     layout::{Batch, Ray},
 };
 
-use super::{
-    compare,
-    stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_RAY, options},
-};
-use crate::support::{random::Random, scenes};
+use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_RAY, options};
+use crate::support::{compare, random::Random, scenes};
 
 /// Rays in runs of up to `longest` a pixel.
 fn runs(n_rays: u32, longest: usize) -> Vec<Ray> {

@@ -9,11 +9,10 @@ use kdray::{
     layout::{Batch, Ray},
 };
 
-use super::{
-    compare,
-    stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_PIXEL, UNTOUCHED_RAY, UNTOUCHED_WORD, hits_of, options, some_rays},
+use super::stage::{
+    FIRST, RAY_COUNTS, Stage, UNTOUCHED_PIXEL, UNTOUCHED_RAY, UNTOUCHED_WORD, hits_of, options, some_rays,
 };
-use crate::support::{random::Random, scenes};
+use crate::support::{compare, random::Random, scenes};
 
 /// Everything untouched.
 fn blank(n: usize) -> Shaded {
@@ -53,7 +52,6 @@ fn on_device(stage: &Stage, batch: &Batch, lit: LitRays) -> Shaded {
     }
 }
 
-/// Rounding decides about total reflection and whether a highlight shows: few rays may differ.
 /// Radiance and rays within 1e-4: `pow` and `inversesqrt` are good for some 2^-13 of a steep highlight.
 fn check(stage: &Stage, depth: u32, n_rays: u32) {
     let rays = some_rays(stage, n_rays);
@@ -64,7 +62,7 @@ fn check(stage: &Stage, depth: u32, n_rays: u32) {
     let lit = LitRays { rays: &rays, hits: &hits, light_visibility: &light_visibility };
     let batch = Batch { depth, ..FIRST };
     let (expected, found) = (on_cpu(stage, &batch, lit), on_device(stage, &batch, lit));
-    let n_outliers = n_rays as usize / 500;
+    let n_outliers = stage.n_outliers(n_rays);
     compare::pixels(1e-4, n_outliers, &expected.ray_radiance, &found.ray_radiance).unwrap();
     compare::exact_but_for(n_outliers, &expected.child_counts, &found.child_counts).unwrap();
     compare::rays(1e-4, 2 * n_outliers, &expected.child_rays, &found.child_rays).unwrap();

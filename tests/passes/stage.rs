@@ -1,6 +1,6 @@
 //! A scene on a device with all passes, to run one of them at a time.
 
-use std::{sync::Arc, thread};
+use std::{cell::Cell, sync::Arc, thread};
 
 use kdray::{
     camera::frame_constants,
@@ -40,6 +40,8 @@ pub struct Stage {
     pub resources: Resources,
     pub passes: Passes,
     pub context: Arc<Context>,
+    /// Set by a test that provokes the validation layer.
+    pub expects_messages: Cell<bool>,
 }
 
 /// Small, and with a noise filter.
@@ -55,7 +57,7 @@ impl Stage {
         let constants = Frame { queue_capacity: capacity, ..frame_constants(&scene, &tree, &options) };
         let resources = Resources::new(&context, &scene, &tree, &constants, N_ROWS).expect("resources");
         let passes = Passes::new(&context, &resources.bindings, &options).expect("passes");
-        Self { scene, tree, options, resources, passes, context }
+        Self { scene, tree, options, resources, passes, context, expects_messages: Cell::new(false) }
     }
 
     /// The twin's view of the same scene.
@@ -93,6 +95,13 @@ impl Stage {
         self.resources.hits.upload(&all).expect("hits");
     }
 
+    /// How many of `n` rays may differ from the twin's: none on software drivers, whose arithmetic is exactly the
+    /// CPU's. Elsewhere divisions are 2.5 units in the last place off (Vulkan's precision of OpFDiv), and few rays at
+    /// corners go another way.
+    pub fn n_outliers(&self, n: u32) -> usize {
+        if self.context.is_software() { 0 } else { n as usize / 500 }
+    }
+
     /// What the kernels counted in the first row.
     pub fn counters(&self) -> Counters {
         self.resources.counters.download().expect("counters")[0]
@@ -103,7 +112,8 @@ impl Stage {
 impl Drop for Stage {
     fn drop(&mut self) {
         let messages = self.context.validation_messages();
-        assert!(messages.is_empty() || thread::panicking(), "{}", messages.join("\n"));
+        let as_expected = messages.is_empty() != self.expects_messages.get();
+        assert!(as_expected || thread::panicking(), "{} messages: {}", messages.len(), messages.join("\n"));
     }
 }
 

@@ -2,11 +2,8 @@
 
 use kdray::{cpu, frame::RenderOptions};
 
-use super::{
-    compare,
-    stage::{FIRST, Stage, UNTOUCHED_WORD, options},
-};
-use crate::support::{random::Random, scenes};
+use super::stage::{FIRST, Stage, UNTOUCHED_WORD, options};
+use crate::support::{compare, random::Random, scenes};
 
 fn encoded(stage: &Stage, pixels: &[[f32; 4]]) -> Vec<[u8; 4]> {
     let resources = &stage.resources;

@@ -7,11 +7,8 @@ use kdray::{
     layout::{Batch, Frame, NO_TRIANGLE},
 };
 
-use super::{
-    compare,
-    stage::{FIRST, Stage, options},
-};
-use crate::support::scenes;
+use super::stage::{FIRST, Stage, options};
+use crate::support::{compare, scenes};
 
 /// Snapping to 1/16 px (Vulkan's least `subPixelPrecisionBits`) moves an edge by at most 1/32 px on each axis.
 const SNAP_PX: f32 = 1.0 / 16.0;
