@@ -2,7 +2,7 @@
 
 use glam::{Vec3, vec3};
 use kdray::{
-    frame::Picture,
+    frame::{Picture, Primary, RenderOptions},
     scene::{Camera, Scene},
 };
 
@@ -16,10 +16,12 @@ fn worst(picture: &Picture, radiance: Vec3) -> f32 {
     picture.radiance.iter().map(off).map(|off| if off.is_nan() { f32::INFINITY } else { off }).fold(0.0, f32::max)
 }
 
-/// A closed room that glows alike everywhere, and in it what neither adds nor takes light: all is one colour.
+/// A closed room that glows alike everywhere, and in it what neither adds nor takes light: all is one colour. (Traced:
+/// a rasterizer may show the back of a mirror's outline, and so a ray would start inside the mirror.)
 #[test]
 fn a_furnace_is_uniform() {
     let glow = vec3(0.2, 0.5, 0.9);
+    let traced = |depth| RenderOptions { primary: Primary::Trace, ..options(80, 60, depth) };
     let mut scene = scenes::empty();
     scenes::add(&mut scene, scenes::room(5.0), scenes::emissive(glow));
     for picture in on_both(&scene, &options(40, 30, 3)) {
@@ -30,12 +32,12 @@ fn a_furnace_is_uniform() {
     scenes::add(&mut scene, cube, scenes::mirror(Vec3::ONE));
     let veil = meshes::placed(meshes::cube(1, 0.0), 0.4, vec3(0.0, 0.2, 2.0));
     scenes::add(&mut scene, veil, kdray::layout::Material { ke: glow, d: 0.3, ..scenes::BLACK });
-    for picture in on_both(&scene, &options(80, 60, 12)) {
+    for picture in on_both(&scene, &traced(12)) {
         assert!(worst(&picture, glow) < 2e-3, "off by {}", worst(&picture, glow));
     }
     // Glass splits rays; near total reflection the share that the last level cuts off falls slowly.
     scenes::add(&mut scene, scenes::smooth_sphere(8, 0.5, vec3(0.3, -1.1, 0.5)), scenes::glass(1.5));
-    for picture in on_both(&scene, &options(80, 60, 40)) {
+    for picture in on_both(&scene, &traced(40)) {
         assert!(worst(&picture, glow) < 2e-3, "off by {}", worst(&picture, glow));
     }
 }
