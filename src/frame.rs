@@ -4,6 +4,8 @@ use std::{fmt, str::FromStr};
 
 use serde::Serialize;
 
+use crate::layout;
+
 /// How a frame is rendered. The scene's own defaults fill what the user leaves open.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
@@ -50,21 +52,24 @@ impl Denoise {
     pub const DEFAULT_THRESHOLD: f32 = 2.5;
 }
 
-/// How a ray finds its way back up the kd-tree.
+/// How a ray finds its way through the kd-tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Traversal {
     /// A bit a level says which siblings are still to be visited; parent links lead back to them.
     Mask,
     /// An array of far children.
     Stack,
+    /// No tree: every triangle. For small meshes.
+    Brute,
 }
 
 impl Traversal {
-    /// The kernels' specialization constant (kdtree.glsl's `TRAVERSAL_` numbers).
+    /// The kernels' specialization constant.
     pub(crate) fn constant(self) -> u32 {
         match self {
-            Self::Mask => 0,
-            Self::Stack => 1,
+            Self::Mask => layout::TRAVERSAL_MASK,
+            Self::Stack => layout::TRAVERSAL_STACK,
+            Self::Brute => layout::TRAVERSAL_BRUTE,
         }
     }
 }
@@ -138,18 +143,26 @@ impl Profile {
 #[error("`{word}` is not one of {expected}")]
 pub struct UnknownWord {
     word: String,
-    expected: &'static str,
+    expected: String,
 }
 
 /// Words for an option's variants, for the command line, scene files and JSON alike.
 macro_rules! words {
-    ($ty:ident { $($variant:ident = $word:literal),+ }, $all:literal) => {
+    ($ty:ident { $($variant:ident = $word:literal),+ }) => {
+        impl $ty {
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+
+            /// The words of all variants, with commas.
+            pub fn words() -> String {
+                [$($word),+].join(", ")
+            }
+        }
         impl FromStr for $ty {
             type Err = UnknownWord;
             fn from_str(word: &str) -> Result<Self, UnknownWord> {
                 match word {
                     $($word => Ok(Self::$variant),)+
-                    _ => Err(UnknownWord { word: word.to_owned(), expected: $all }),
+                    _ => Err(UnknownWord { word: word.to_owned(), expected: Self::words() }),
                 }
             }
         }
@@ -161,5 +174,5 @@ macro_rules! words {
     };
 }
 
-words!(Traversal { Mask = "mask", Stack = "stack" }, "mask, stack");
-words!(Primary { Raster = "raster", Trace = "trace" }, "raster, trace");
+words!(Traversal { Mask = "mask", Stack = "stack", Brute = "brute" });
+words!(Primary { Raster = "raster", Trace = "trace" });

@@ -15,8 +15,6 @@ layout(std430, set = 0, binding = BIND_KD_NODES) readonly buffer KdNodesBlock { 
 layout(std430, set = 0, binding = BIND_KD_PARENTS) readonly buffer KdParentsBlock { uint kd_parents[]; };
 layout(std430, set = 0, binding = BIND_LEAF_TRIANGLES) readonly buffer LeafTrianglesBlock { uint leaf_triangles[]; };
 
-#define TRAVERSAL_MASK 0u
-#define TRAVERSAL_STACK 1u
 layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
 
 struct Cell {
@@ -121,29 +119,41 @@ KdNode descend(TraversalRay ray, inout Cell cell) {
     return node;
 }
 
-// The leaf's triangles against the ray; of two hits at one t the lower index wins, whatever the order of leaves.
+// A triangle against the ray; of two hits at one t the lower index wins, whatever the order of triangles.
+void intersect(TraversalRay ray, uint triangle_ix, inout Hit best) {
+    Hit hit;
+    if (!intersect_triangle(ray.shear, triangles[triangle_ix], triangle_ix, hit)) return;
+    bool nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
+    if (hit.t > 0.0 && nearer && triangle_ix != ray.source_triangle) best = hit;
+}
+
 void intersect_leaf(TraversalRay ray, KdNode leaf, inout Hit best) {
     uint end = leaf.split_or_first + (leaf.axis_and_child >> KD_CHILD_SHIFT);
-    for (uint i = leaf.split_or_first; i < end; ++i) {
-        uint triangle_ix = leaf_triangles[i];
-        Hit hit;
-        if (!intersect_triangle(ray.shear, triangles[triangle_ix], triangle_ix, hit)) continue;
-        bool nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
-        if (hit.t > 0.0 && nearer && triangle_ix != ray.source_triangle) best = hit;
-    }
+    for (uint i = leaf.split_or_first; i < end; ++i) intersect(ray, leaf_triangles[i], best);
 }
+
+bool is_done(bool any_hit, Hit best) {
+    return any_hit && best.triangle_ix != NO_TRIANGLE;
+}
+
+// All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
+void search(TraversalRay ray, bool any_hit, inout Hit best) {
+    if (!(ray.t_enter <= ray.t_exit)) return;
+    Cell cell = Cell(0u, 0u, ray.t_enter, ray.t_exit);
+    clear_pending();
+    do {
+        intersect_leaf(ray, descend(ray, cell), best);
+    } while (!is_done(any_hit, best) && pop_pending(ray, best.t, cell));
+}
+
+#include "brute.glsl"
 
 // The closest hit in (0, t_max), or with any_hit one that need not be the closest. A miss keeps t = t_max.
 Hit traverse(Ray ray_in, bool any_hit) {
     Hit best = Hit(ray_in.t_max, NO_TRIANGLE, 0.0, 0.0);
     TraversalRay ray = traversal_ray(ray_in);
-    if (!(ray.t_enter <= ray.t_exit)) return best;
-    Cell cell = Cell(0u, 0u, ray.t_enter, ray.t_exit);
-    clear_pending();
-    do {
-        intersect_leaf(ray, descend(ray, cell), best);
-        if (any_hit && best.triangle_ix != NO_TRIANGLE) break;
-    } while (pop_pending(ray, best.t, cell));
+    if (TRAVERSAL == TRAVERSAL_BRUTE) intersect_all(ray, any_hit, best);
+    else search(ray, any_hit, best);
     return best;
 }
 

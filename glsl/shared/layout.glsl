@@ -28,6 +28,13 @@
 // Levels below the root that the traversal's bit mask can hold: two words.
 #define KD_MAX_DEPTH 64u
 
+// How rays find their way through the tree: the kernels' specialization constant TRAVERSAL.
+#define TRAVERSAL_MASK 0u
+#define TRAVERSAL_STACK 1u
+#define TRAVERSAL_BRUTE 2u
+// Triangles that brute force takes: a driver is known to end any shader after 65,535 turns of its loops, in silence.
+#define BRUTE_MAX_TRIANGLES 65000u
+
 // Material.flags
 #define MATERIAL_SPECULAR 1u
 #define MATERIAL_REFLECT 2u

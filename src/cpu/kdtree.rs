@@ -1,6 +1,6 @@
 //! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree.glsl`.
 
-use super::{bindings::Bindings, pending_mask::PendingMask, pending_stack::PendingStack, triangle::Shear};
+use super::{bindings::Bindings, brute, pending_mask::PendingMask, pending_stack::PendingStack, triangle::Shear};
 use crate::{
     frame::Traversal,
     layout::{Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KdNode, NO_TRIANGLE, Ray},
@@ -120,17 +120,50 @@ fn descend<P: Pending>(bindings: &Bindings, ray: &TraversalRay, pending: &mut P,
     node
 }
 
-/// The leaf's triangles against the ray; of two hits at one t the lower index wins, whatever the order of leaves.
+/// A triangle against the ray; of two hits at one t the lower index wins, whatever the order of triangles.
 #[inline(always)]
-fn intersect_leaf(bindings: &Bindings, ray: &TraversalRay, leaf: KdNode, best: &mut Hit) {
+fn intersect(bindings: &Bindings, ray: &TraversalRay, triangle_ix: u32, best: &mut Hit) {
+    let triangle = &bindings.triangles[triangle_ix as usize];
+    let Some(hit) = ray.shear.intersect_triangle(triangle, triangle_ix) else { return };
+    let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
+    if hit.t > 0.0 && nearer && triangle_ix != ray.source_triangle {
+        *best = hit;
+    }
+}
+
+#[inline(always)]
+pub(super) fn intersect_leaf(bindings: &Bindings, ray: &TraversalRay, leaf: KdNode, best: &mut Hit) {
     let first = leaf.split_or_first as usize;
     let end = first + (leaf.axis_and_child >> KD_CHILD_SHIFT) as usize;
     for &triangle_ix in &bindings.leaf_triangles[first..end] {
-        let triangle = &bindings.triangles[triangle_ix as usize];
-        let Some(hit) = ray.shear.intersect_triangle(triangle, triangle_ix) else { continue };
-        let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
-        if hit.t > 0.0 && nearer && triangle_ix != ray.source_triangle {
-            *best = hit;
+        intersect(bindings, ray, triangle_ix, best);
+    }
+}
+
+#[inline(always)]
+pub(super) fn is_done<const ANY_HIT: bool>(best: &Hit) -> bool {
+    ANY_HIT && best.triangle_ix != NO_TRIANGLE
+}
+
+/// All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
+#[inline(always)]
+pub(super) fn search<P: Pending, const ANY_HIT: bool>(
+    bindings: &Bindings,
+    ray: &TraversalRay,
+    pending: &mut P,
+    best: &mut Hit,
+) {
+    // Not `>`: a NaN misses.
+    if !(ray.t_enter <= ray.t_exit) {
+        return;
+    }
+    let mut cell = Cell { node_ix: 0, depth: 0, t_enter: ray.t_enter, t_exit: ray.t_exit };
+    pending.clear();
+    loop {
+        let leaf = descend(bindings, ray, pending, &mut cell);
+        intersect_leaf(bindings, ray, leaf, best);
+        if is_done::<ANY_HIT>(best) || !pending.pop(bindings, ray, best.t, &mut cell) {
+            return;
         }
     }
 }
@@ -139,20 +172,8 @@ fn intersect_leaf(bindings: &Bindings, ray: &TraversalRay, leaf: KdNode, best: &
 #[inline]
 pub fn traverse<P: Pending, const ANY_HIT: bool>(bindings: &Bindings, pending: &mut P, ray_in: &Ray) -> Hit {
     let mut best = Hit { t: ray_in.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
-    let ray = TraversalRay::new(bindings, ray_in);
-    // Not `>`: a NaN misses.
-    if !(ray.t_enter <= ray.t_exit) {
-        return best;
-    }
-    let mut cell = Cell { node_ix: 0, depth: 0, t_enter: ray.t_enter, t_exit: ray.t_exit };
-    pending.clear();
-    loop {
-        let leaf = descend(bindings, &ray, pending, &mut cell);
-        intersect_leaf(bindings, &ray, leaf, &mut best);
-        if ANY_HIT && best.triangle_ix != NO_TRIANGLE || !pending.pop(bindings, &ray, best.t, &mut cell) {
-            return best;
-        }
-    }
+    search::<P, ANY_HIT>(bindings, &TraversalRay::new(bindings, ray_in), pending, &mut best);
+    best
 }
 
 /// A traversal that remembers its working memory from ray to ray; one for each thread.
@@ -160,6 +181,7 @@ pub fn traverse<P: Pending, const ANY_HIT: bool>(bindings: &Bindings, pending: &
 pub enum Traverser {
     Mask(PendingMask),
     Stack(PendingStack),
+    Brute,
 }
 
 impl Traverser {
@@ -167,25 +189,29 @@ impl Traverser {
         match traversal {
             Traversal::Mask => Self::Mask(PendingMask::new()),
             Traversal::Stack => Self::Stack(PendingStack::new()),
+            Traversal::Brute => Self::Brute,
         }
     }
 
     /// The closest hit in (0, t_max). A miss keeps t = t_max.
     #[inline]
     pub fn closest_hit(&mut self, bindings: &Bindings, ray: &Ray) -> Hit {
-        match self {
-            Self::Mask(pending) => traverse::<_, false>(bindings, pending, ray),
-            Self::Stack(pending) => traverse::<_, false>(bindings, pending, ray),
-        }
+        self.traverse::<false>(bindings, ray)
     }
 
     /// Whether anything lies in (0, t_max).
     #[inline]
     pub fn any_hit(&mut self, bindings: &Bindings, ray: &Ray) -> bool {
-        let hit = match self {
-            Self::Mask(pending) => traverse::<_, true>(bindings, pending, ray),
-            Self::Stack(pending) => traverse::<_, true>(bindings, pending, ray),
-        };
-        hit.triangle_ix != NO_TRIANGLE
+        self.traverse::<true>(bindings, ray).triangle_ix != NO_TRIANGLE
+    }
+
+    /// The closest hit in (0, t_max), or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
+    #[inline]
+    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings, ray: &Ray) -> Hit {
+        match self {
+            Self::Mask(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
+            Self::Stack(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
+            Self::Brute => brute::closest_hit(bindings.triangles, ray),
+        }
     }
 }
