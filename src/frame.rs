@@ -57,6 +57,10 @@ impl Denoise {
 pub enum Traversal {
     /// A bit a level says which siblings are still to be visited; parent links lead back to them.
     Mask,
+    /// Every subtree that was left is found again from the root.
+    Restart,
+    /// The four newest far children; older ones by a restart.
+    ShortStack,
     /// An array of far children.
     Stack,
     /// No tree: every triangle. For small meshes.
@@ -68,6 +72,8 @@ impl Traversal {
     pub(crate) fn constant(self) -> u32 {
         match self {
             Self::Mask => layout::TRAVERSAL_MASK,
+            Self::Restart => layout::TRAVERSAL_RESTART,
+            Self::ShortStack => layout::TRAVERSAL_SHORT_STACK,
             Self::Stack => layout::TRAVERSAL_STACK,
             Self::Brute => layout::TRAVERSAL_BRUTE,
         }
@@ -174,5 +180,5 @@ macro_rules! words {
     };
 }
 
-words!(Traversal { Mask = "mask", Stack = "stack", Brute = "brute" });
+words!(Traversal { Mask = "mask", Restart = "restart", ShortStack = "short-stack", Stack = "stack", Brute = "brute" });
 words!(Primary { Raster = "raster", Trace = "trace" });

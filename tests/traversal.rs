@@ -57,10 +57,13 @@ fn check_against_brute_force(name: &str, triangles: Vec<Triangle>) {
     let expected: Vec<Hit> = rays.par_iter().map(|ray| brute::closest_hit(&world.triangles, ray)).collect();
     let n_hits = expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count();
     assert!(n_hits > N_RAYS / 5, "{name}: only {n_hits} rays hit anything");
-    for traversal in tree_traversals() {
-        let difference = first_difference(&rays, &expected, &traced(&world, traversal, &rays));
-        assert_eq!(difference, None, "{name}, {traversal}");
-    }
+    let wrong: Vec<String> = tree_traversals()
+        .filter_map(|traversal| {
+            let difference = first_difference(&rays, &expected, &traced(&world, traversal, &rays))?;
+            Some(format!("{name}, {traversal}: {difference}"))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]

@@ -101,10 +101,15 @@ fn check(context: &Arc<Context>, name: &str, triangles: Vec<Triangle>) {
     let rays: Vec<Ray> = (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), &world, i)).collect();
     let without_tree = traced(context, &scene, &world.tree, &rays, Traversal::Brute);
     check_against_cpu(name, &world, &rays, &without_tree);
-    for &traversal in Traversal::ALL {
-        let found = traced(context, &scene, &world.tree, &rays, traversal);
-        assert_eq!(difference(&rays, &without_tree, &found), None, "{name}, {traversal}");
-    }
+    let wrong: Vec<String> = Traversal::ALL
+        .iter()
+        .filter_map(|&traversal| {
+            let found = traced(context, &scene, &world.tree, &rays, traversal);
+            let difference = difference(&rays, &without_tree, &found)?;
+            Some(format!("{name}, {traversal}: {difference}"))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 /// A device's division may differ in the last bits, and with it a hit at an edge.

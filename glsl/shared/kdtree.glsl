@@ -2,7 +2,7 @@
 //
 // A cell is a node and the interval [t_enter, t_exit] that the ray spends in it. Children come in the ray's order:
 // `first` is the one on the side that the ray comes from. A subtree that is left for later is pending; how pending
-// subtrees are kept is the variant (pending_mask.glsl, pending_stack.glsl).
+// subtrees are kept is the variant (pending_*.glsl).
 #ifndef KDRAY_KDTREE
 #define KDRAY_KDTREE
 
@@ -16,6 +16,7 @@ layout(std430, set = 0, binding = BIND_KD_PARENTS) readonly buffer KdParentsBloc
 layout(std430, set = 0, binding = BIND_LEAF_TRIANGLES) readonly buffer LeafTrianglesBlock { uint leaf_triangles[]; };
 
 layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
+const bool RETRACES = TRAVERSAL == TRAVERSAL_RESTART || TRAVERSAL == TRAVERSAL_SHORT_STACK;
 
 struct Cell {
     uint node_ix;
@@ -73,30 +74,53 @@ float along(vec3 v, uint axis) {
     return axis == 0u ? v.x : (axis == 1u ? v.y : v.z);
 }
 
+// For who goes a way twice and must come to the same bits: one place contracted to fma and another not would part them.
+vec2 uncontracted_crossing(float distance, float inv_direction, float slack) {
+    precise float t = distance * inv_direction;
+    precise vec2 t_cross = vec2(t - slack, t + slack);
+    return t_cross;
+}
+
 // Where the ray enters the second child's side and leaves the first one's, both widened by the slack: [x, y], x <= y.
 vec2 crossing(TraversalRay ray, KdNode node) {
     uint axis = axis_of(node);
-    float t = (uintBitsToFloat(node.split_or_first) - along(ray.origin, axis)) * along(ray.inv_direction, axis);
+    float distance = uintBitsToFloat(node.split_or_first) - along(ray.origin, axis);
     float slack = along(ray.slack, axis);
+    if (RETRACES) return uncontracted_crossing(distance, along(ray.inv_direction, axis), slack);
+    float t = distance * along(ray.inv_direction, axis);
     return vec2(t - slack, t + slack);
+}
+
+// The child on the side that the ray comes from; the other is `^ 1`.
+uint first_child(TraversalRay ray, KdNode node) {
+    uint first_is_above = along(ray.inv_direction, axis_of(node)) < 0.0 ? 1u : 0u;
+    return (node.axis_and_child >> KD_CHILD_SHIFT) + first_is_above;
 }
 
 #include "pending_mask.glsl"
 #include "pending_stack.glsl"
+#include "pending_restart.glsl"
+#include "pending_short_stack.glsl"
 
 void clear_pending() {
     pending_mask = uvec2(0u);
     stack_size = 0u;
+    short_stack_top = 0u;
+    short_stack_size = 0u;
 }
 
 void push_pending(uint second_ix, Cell cell, vec2 t_cross) {
     if (TRAVERSAL == TRAVERSAL_STACK) stack_push(second_ix, cell, t_cross);
+    else if (TRAVERSAL == TRAVERSAL_SHORT_STACK) short_stack_push(second_ix, cell, t_cross);
     else mask_push(second_ix, cell, t_cross);
 }
 
 // The next pending cell that may hold a hit nearer than t_best, or false.
 bool pop_pending(TraversalRay ray, float t_best, inout Cell cell) {
-    return TRAVERSAL == TRAVERSAL_STACK ? stack_pop(t_best, cell) : mask_pop(ray, t_best, cell);
+    if (TRAVERSAL == TRAVERSAL_STACK) return stack_pop(t_best, cell);
+    if (TRAVERSAL == TRAVERSAL_RESTART) return restart_pop(ray, t_best, cell);
+    if (TRAVERSAL == TRAVERSAL_SHORT_STACK) return short_stack_pop(ray, t_best, cell);
+    return mask_pop(ray, t_best, cell);
 }
 
 // Down to the leaf where the ray enters the cell. A NaN fails both tests and goes to the first child: it ends.
@@ -104,8 +128,7 @@ KdNode descend(TraversalRay ray, inout Cell cell) {
     KdNode node = kd_nodes[cell.node_ix];
     while (axis_of(node) != KD_LEAF) {
         vec2 t_cross = crossing(ray, node);
-        uint first_is_above = along(ray.inv_direction, axis_of(node)) < 0.0 ? 1u : 0u;
-        uint first_ix = (node.axis_and_child >> KD_CHILD_SHIFT) + first_is_above;
+        uint first_ix = first_child(ray, node);
         bool in_first = t_cross.y >= cell.t_enter;
         bool in_second = t_cross.x <= cell.t_exit;
         cell.depth += 1u;

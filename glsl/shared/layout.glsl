@@ -32,6 +32,8 @@
 #define TRAVERSAL_MASK 0u
 #define TRAVERSAL_STACK 1u
 #define TRAVERSAL_BRUTE 2u
+#define TRAVERSAL_RESTART 3u
+#define TRAVERSAL_SHORT_STACK 4u
 // Triangles that brute force takes: a driver is known to end any shader after 65,535 turns of its loops, in silence.
 #define BRUTE_MAX_TRIANGLES 65000u
 

@@ -1,6 +1,9 @@
 //! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree.glsl`.
 
-use super::{bindings::Bindings, brute, pending_mask::PendingMask, pending_stack::PendingStack, triangle::Shear};
+use super::{
+    bindings::Bindings, brute, pending_mask::PendingMask, pending_restart::PendingRestart,
+    pending_short_stack::PendingShortStack, pending_stack::PendingStack, triangle::Shear,
+};
 use crate::{
     frame::Traversal,
     layout::{Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KdNode, NO_TRIANGLE, Ray},
@@ -78,6 +81,13 @@ impl TraversalRay {
         let t = (f32::from_bits(node.split_or_first) - self.origin[axis]) * self.inv_direction[axis];
         [t - self.slack[axis], t + self.slack[axis]]
     }
+
+    /// The child on the side that the ray comes from; the other is `^ 1`.
+    #[inline(always)]
+    pub fn first_child(&self, node: KdNode) -> u32 {
+        let first_is_above = u32::from(self.inv_direction[axis_of(node) as usize] < 0.0);
+        (node.axis_and_child >> KD_CHILD_SHIFT) + first_is_above
+    }
 }
 
 fn by_axis([x, y, z]: [f32; 3]) -> [f32; 4] {
@@ -105,8 +115,7 @@ fn descend<P: Pending>(bindings: &Bindings, ray: &TraversalRay, pending: &mut P,
     let mut node = bindings.kd_nodes[cell.node_ix as usize];
     while axis_of(node) != KD_LEAF {
         let t_cross = ray.crossing(node);
-        let first_is_above = u32::from(ray.inv_direction[axis_of(node) as usize] < 0.0);
-        let first_ix = (node.axis_and_child >> KD_CHILD_SHIFT) + first_is_above;
+        let first_ix = ray.first_child(node);
         let in_first = t_cross[1] >= cell.t_enter;
         let in_second = t_cross[0] <= cell.t_exit;
         cell.depth += 1;
@@ -180,6 +189,8 @@ pub fn traverse<P: Pending, const ANY_HIT: bool>(bindings: &Bindings, pending: &
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
 pub enum Traverser {
     Mask(PendingMask),
+    Restart(PendingRestart),
+    ShortStack(PendingShortStack<4>),
     Stack(PendingStack),
     Brute,
 }
@@ -188,6 +199,8 @@ impl Traverser {
     pub fn new(traversal: Traversal) -> Self {
         match traversal {
             Traversal::Mask => Self::Mask(PendingMask::new()),
+            Traversal::Restart => Self::Restart(PendingRestart::new()),
+            Traversal::ShortStack => Self::ShortStack(PendingShortStack::new()),
             Traversal::Stack => Self::Stack(PendingStack::new()),
             Traversal::Brute => Self::Brute,
         }
@@ -210,6 +223,8 @@ impl Traverser {
     pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings, ray: &Ray) -> Hit {
         match self {
             Self::Mask(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
+            Self::Restart(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
+            Self::ShortStack(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
             Self::Stack(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
             Self::Brute => brute::closest_hit(bindings.triangles, ray),
         }

@@ -14,6 +14,8 @@ pub mod kdtree;
 pub mod light;
 pub mod material;
 pub mod pending_mask;
+pub mod pending_restart;
+pub mod pending_short_stack;
 pub mod pending_stack;
 pub mod primary_hit;
 mod queues;
