@@ -57,6 +57,10 @@ impl Denoise {
 pub enum Traversal {
     /// A bit a level says which siblings are still to be visited; parent links lead back to them.
     Mask,
+    /// The paper's own: a bit a level says which siblings are done; their boxes tell whether to visit them.
+    MaskBoxes,
+    /// Back to the deepest ancestor that the ray has not left, by its box.
+    Backtrack,
     /// Every subtree that was left is found again from the root.
     Restart,
     /// The four newest far children; older ones by a restart.
@@ -72,11 +76,18 @@ impl Traversal {
     pub(crate) fn constant(self) -> u32 {
         match self {
             Self::Mask => layout::TRAVERSAL_MASK,
+            Self::MaskBoxes => layout::TRAVERSAL_MASK_BOXES,
+            Self::Backtrack => layout::TRAVERSAL_BACKTRACK,
             Self::Restart => layout::TRAVERSAL_RESTART,
             Self::ShortStack => layout::TRAVERSAL_SHORT_STACK,
             Self::Stack => layout::TRAVERSAL_STACK,
             Self::Brute => layout::TRAVERSAL_BRUTE,
         }
+    }
+
+    /// Whether it reads the nodes' boxes.
+    pub(crate) fn needs_boxes(self) -> bool {
+        matches!(self, Self::MaskBoxes | Self::Backtrack)
     }
 }
 
@@ -180,5 +191,13 @@ macro_rules! words {
     };
 }
 
-words!(Traversal { Mask = "mask", Restart = "restart", ShortStack = "short-stack", Stack = "stack", Brute = "brute" });
+words!(Traversal {
+    Mask = "mask",
+    MaskBoxes = "mask-boxes",
+    Restart = "restart",
+    Backtrack = "backtrack",
+    ShortStack = "short-stack",
+    Stack = "stack",
+    Brute = "brute"
+});
 words!(Primary { Raster = "raster", Trace = "trace" });

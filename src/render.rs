@@ -6,7 +6,7 @@ use crate::{
     camera::frame_constants,
     frame::{BounceStats, Denoise, PassTime, Picture, Primary, Profile, RenderOptions, Traversal},
     gpu::{Access, AnyBuffer, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Limits, Timer},
-    kdtree::KdTree,
+    kdtree::{Extras, KdTree},
     layout::{
         BRUTE_MAX_TRIANGLES, Batch, Bounce, Counters, Frame, MATERIAL_REFLECT, MATERIAL_REFRACT, RAY_GROUP_SIZE, Ray,
     },
@@ -48,7 +48,8 @@ impl Renderer {
         let constants = Frame { queue_capacity: capacity, ..frame_constants(scene, tree, options) };
         let spans = split_evenly(options.width * options.height, capacity);
         let n_rows = spans.len() * options.max_depth as usize;
-        let resources = Resources::new(&context, scene, tree, &constants, n_rows)?;
+        let mut resources = Resources::new(&context, scene, tree, &constants, n_rows)?;
+        resources.add_extras(&context, &Extras::new(tree, options.traversal))?;
         let passes = Passes::new(&context, &resources.bindings, options)?;
         let schedule = Schedule::new(&context, &resources, spans)?;
         Ok(Self { context, options: options.clone(), resources, passes, schedule })

@@ -101,18 +101,23 @@ uint first_child(TraversalRay ray, KdNode node) {
 #include "pending_stack.glsl"
 #include "pending_restart.glsl"
 #include "pending_short_stack.glsl"
+#include "kd_boxes.glsl"
+#include "pending_mask_boxes.glsl"
+#include "pending_backtrack.glsl"
 
 void clear_pending() {
     pending_mask = uvec2(0u);
     stack_size = 0u;
     short_stack_top = 0u;
     short_stack_size = 0u;
+    siblings_done = uvec2(0u);
 }
 
+// Traversals with boxes need nothing: they find out on the way back.
 void push_pending(uint second_ix, Cell cell, vec2 t_cross) {
     if (TRAVERSAL == TRAVERSAL_STACK) stack_push(second_ix, cell, t_cross);
     else if (TRAVERSAL == TRAVERSAL_SHORT_STACK) short_stack_push(second_ix, cell, t_cross);
-    else mask_push(second_ix, cell, t_cross);
+    else if (TRAVERSAL != TRAVERSAL_MASK_BOXES && TRAVERSAL != TRAVERSAL_BACKTRACK) mask_push(second_ix, cell, t_cross);
 }
 
 // The next pending cell that may hold a hit nearer than t_best, or false.
@@ -120,6 +125,8 @@ bool pop_pending(TraversalRay ray, float t_best, inout Cell cell) {
     if (TRAVERSAL == TRAVERSAL_STACK) return stack_pop(t_best, cell);
     if (TRAVERSAL == TRAVERSAL_RESTART) return restart_pop(ray, t_best, cell);
     if (TRAVERSAL == TRAVERSAL_SHORT_STACK) return short_stack_pop(ray, t_best, cell);
+    if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return mask_boxes_pop(ray, t_best, cell);
+    if (TRAVERSAL == TRAVERSAL_BACKTRACK) return backtrack_pop(ray, t_best, cell);
     return mask_pop(ray, t_best, cell);
 }
 

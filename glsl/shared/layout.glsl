@@ -34,6 +34,8 @@
 #define TRAVERSAL_BRUTE 2u
 #define TRAVERSAL_RESTART 3u
 #define TRAVERSAL_SHORT_STACK 4u
+#define TRAVERSAL_MASK_BOXES 5u
+#define TRAVERSAL_BACKTRACK 6u
 // Triangles that brute force takes: a driver is known to end any shader after 65,535 turns of its loops, in silence.
 #define BRUTE_MAX_TRIANGLES 65000u
 
@@ -63,6 +65,16 @@ struct Triangle {
 struct KdNode {
     uint split_or_first;
     uint axis_and_child;
+};
+
+// 24 bytes: a node's cell, world units. Only some traversals need it.
+struct KdBox {
+    float min_x;
+    float min_y;
+    float min_z;
+    float max_x;
+    float max_y;
+    float max_z;
 };
 
 // 80 bytes, named as in Wavefront MTL.
@@ -187,6 +199,7 @@ struct Batch {
 #define BIND_PIXEL_DISPLAY 19u
 #define BIND_TRIANGLE_IDS 20u
 #define BIND_COUNTERS 21u
-#define N_BINDINGS 22u
+#define BIND_KD_BOXES 22u
+#define N_BINDINGS 23u
 
 #endif

@@ -1,8 +1,9 @@
 //! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree.glsl`.
 
 use super::{
-    bindings::Bindings, brute, pending_mask::PendingMask, pending_restart::PendingRestart,
-    pending_short_stack::PendingShortStack, pending_stack::PendingStack, triangle::Shear,
+    bindings::Bindings, brute, pending_backtrack::PendingBacktrack, pending_mask::PendingMask,
+    pending_mask_boxes::PendingMaskBoxes, pending_restart::PendingRestart, pending_short_stack::PendingShortStack,
+    pending_stack::PendingStack, triangle::Shear,
 };
 use crate::{
     frame::Traversal,
@@ -22,10 +23,10 @@ pub struct Cell {
 #[derive(Clone, Copy, Debug)]
 pub struct TraversalRay {
     shear: Shear,
-    origin: [f32; 4],
-    inv_direction: [f32; 4],
+    pub(super) origin: [f32; 4],
+    pub(super) inv_direction: [f32; 4],
     /// By how much in t a plane is widened on each axis.
-    slack: [f32; 4],
+    pub(super) slack: [f32; 4],
     pub t_enter: f32,
     pub t_exit: f32,
     /// A pending cell begins at most this far before a deeper one.
@@ -189,6 +190,8 @@ pub fn traverse<P: Pending, const ANY_HIT: bool>(bindings: &Bindings, pending: &
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
 pub enum Traverser {
     Mask(PendingMask),
+    MaskBoxes(PendingMaskBoxes),
+    Backtrack(PendingBacktrack),
     Restart(PendingRestart),
     ShortStack(PendingShortStack<4>),
     Stack(PendingStack),
@@ -199,6 +202,8 @@ impl Traverser {
     pub fn new(traversal: Traversal) -> Self {
         match traversal {
             Traversal::Mask => Self::Mask(PendingMask::new()),
+            Traversal::MaskBoxes => Self::MaskBoxes(PendingMaskBoxes::new()),
+            Traversal::Backtrack => Self::Backtrack(PendingBacktrack::new()),
             Traversal::Restart => Self::Restart(PendingRestart::new()),
             Traversal::ShortStack => Self::ShortStack(PendingShortStack::new()),
             Traversal::Stack => Self::Stack(PendingStack::new()),
@@ -223,6 +228,8 @@ impl Traverser {
     pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings, ray: &Ray) -> Hit {
         match self {
             Self::Mask(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
+            Self::MaskBoxes(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
+            Self::Backtrack(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
             Self::Restart(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
             Self::ShortStack(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
             Self::Stack(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),

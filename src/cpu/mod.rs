@@ -10,10 +10,13 @@ pub mod camera;
 pub mod compact;
 pub mod denoise;
 pub mod display;
+pub mod kd_boxes;
 pub mod kdtree;
 pub mod light;
 pub mod material;
+pub mod pending_backtrack;
 pub mod pending_mask;
+pub mod pending_mask_boxes;
 pub mod pending_restart;
 pub mod pending_short_stack;
 pub mod pending_stack;
@@ -42,7 +45,7 @@ use self::{
 use crate::{
     camera::frame_constants,
     frame::{BounceStats, Picture, Primary, Profile, RenderOptions},
-    kdtree::KdTree,
+    kdtree::{Extras, KdTree},
     layout::{Bounce, Frame, Hit, Ray, SCAN_BLOCK_SIZE},
     scene::Scene,
 };
@@ -61,6 +64,7 @@ pub fn render(scene: &Scene, tree: &KdTree, options: &RenderOptions) -> (Picture
         scene,
         tree,
         options,
+        extras: Extras::new(tree, options.traversal),
         frame: frame_constants(scene, tree, options),
         triangle_ids: vec![0; n_pixels as usize],
         pixel_radiance: vec![[0.0; 4]; n_pixels as usize],
@@ -83,6 +87,7 @@ struct Renderer<'a> {
     scene: &'a Scene,
     tree: &'a KdTree,
     options: &'a RenderOptions,
+    extras: Extras,
     frame: Frame,
     /// Like `pixel_radiance`: `width * height`, rows from the top.
     triangle_ids: Vec<u32>,
@@ -95,7 +100,7 @@ struct Renderer<'a> {
 
 impl Renderer<'_> {
     fn visibility(&mut self) {
-        let bindings = Bindings::new(self.scene, self.tree, &self.frame);
+        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
         let (traversal, ids) = (self.options.traversal, &mut self.triangle_ids);
         self.clock.time("visibility", None, || visibility::visibility(&bindings, traversal, ids));
     }
@@ -131,7 +136,7 @@ impl Renderer<'_> {
 
     /// Fills `hits`; returns how many are hits.
     fn closest_hits(&mut self, depth: u32) -> u64 {
-        let bindings = Bindings::new(self.scene, self.tree, &self.frame);
+        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
         let Queues { rays, hits, .. } = &mut self.queues;
         hits.resize(rays.len(), Hit::zeroed());
         let n_hits = if depth == 0 && self.options.primary == Primary::Raster {
@@ -148,7 +153,7 @@ impl Renderer<'_> {
     fn light(&mut self, depth: u32) -> u64 {
         let Queues { rays, hits, light_visibility, shaded, .. } = &mut self.queues;
         self.frame.queue_capacity = rays.len() as u32;
-        let bindings = Bindings::new(self.scene, self.tree, &self.frame);
+        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
         let traversal = self.options.traversal;
         light_visibility.resize(rays.len() * bindings.lights.len(), 0);
         shaded.resize(rays.len());
