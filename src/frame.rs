@@ -59,12 +59,14 @@ pub enum Traversal {
     Mask,
     /// The paper's own: a bit a level says which siblings are done; their boxes tell whether to visit them.
     MaskBoxes,
-    /// Back to the deepest ancestor that the ray has not left, by its box.
-    Backtrack,
     /// Every subtree that was left is found again from the root.
     Restart,
+    /// Back to the deepest ancestor that the ray has not left, by its box.
+    Backtrack,
     /// The four newest far children; older ones by a restart.
     ShortStack,
+    /// From leaf to leaf, by links to its neighbours; where the ray keeps near an edge, by the mask.
+    Ropes,
     /// An array of far children.
     Stack,
     /// No tree: every triangle. For small meshes.
@@ -77,9 +79,10 @@ impl Traversal {
         match self {
             Self::Mask => layout::TRAVERSAL_MASK,
             Self::MaskBoxes => layout::TRAVERSAL_MASK_BOXES,
-            Self::Backtrack => layout::TRAVERSAL_BACKTRACK,
             Self::Restart => layout::TRAVERSAL_RESTART,
+            Self::Backtrack => layout::TRAVERSAL_BACKTRACK,
             Self::ShortStack => layout::TRAVERSAL_SHORT_STACK,
+            Self::Ropes => layout::TRAVERSAL_ROPES,
             Self::Stack => layout::TRAVERSAL_STACK,
             Self::Brute => layout::TRAVERSAL_BRUTE,
         }
@@ -87,7 +90,12 @@ impl Traversal {
 
     /// Whether it reads the nodes' boxes.
     pub(crate) fn needs_boxes(self) -> bool {
-        matches!(self, Self::MaskBoxes | Self::Backtrack)
+        matches!(self, Self::MaskBoxes | Self::Backtrack | Self::Ropes)
+    }
+
+    /// Whether it reads the nodes' ropes.
+    pub(crate) fn needs_ropes(self) -> bool {
+        self == Self::Ropes
     }
 }
 
@@ -197,6 +205,7 @@ words!(Traversal {
     Restart = "restart",
     Backtrack = "backtrack",
     ShortStack = "short-stack",
+    Ropes = "ropes",
     Stack = "stack",
     Brute = "brute"
 });

@@ -74,20 +74,23 @@ float along(vec3 v, uint axis) {
     return axis == 0u ? v.x : (axis == 1u ? v.y : v.z);
 }
 
+// Where the ray meets the split plane.
+float at_plane(TraversalRay ray, KdNode node) {
+    uint axis = axis_of(node);
+    return (uintBitsToFloat(node.split_or_first) - along(ray.origin, axis)) * along(ray.inv_direction, axis);
+}
+
 // For who goes a way twice and must come to the same bits: one place contracted to fma and another not would part them.
-vec2 uncontracted_crossing(float distance, float inv_direction, float slack) {
-    precise float t = distance * inv_direction;
+vec2 uncontracted_crossing(float t, float slack) {
     precise vec2 t_cross = vec2(t - slack, t + slack);
     return t_cross;
 }
 
 // Where the ray enters the second child's side and leaves the first one's, both widened by the slack: [x, y], x <= y.
 vec2 crossing(TraversalRay ray, KdNode node) {
-    uint axis = axis_of(node);
-    float distance = uintBitsToFloat(node.split_or_first) - along(ray.origin, axis);
-    float slack = along(ray.slack, axis);
-    if (RETRACES) return uncontracted_crossing(distance, along(ray.inv_direction, axis), slack);
-    float t = distance * along(ray.inv_direction, axis);
+    float t = at_plane(ray, node);
+    float slack = along(ray.slack, axis_of(node));
+    if (RETRACES) return uncontracted_crossing(t, slack);
     return vec2(t - slack, t + slack);
 }
 
@@ -177,12 +180,14 @@ void search(TraversalRay ray, bool any_hit, inout Hit best) {
 }
 
 #include "brute.glsl"
+#include "ropes.glsl"
 
 // The closest hit in (0, t_max), or with any_hit one that need not be the closest. A miss keeps t = t_max.
 Hit traverse(Ray ray_in, bool any_hit) {
     Hit best = Hit(ray_in.t_max, NO_TRIANGLE, 0.0, 0.0);
     TraversalRay ray = traversal_ray(ray_in);
     if (TRAVERSAL == TRAVERSAL_BRUTE) intersect_all(ray, any_hit, best);
+    else if (TRAVERSAL == TRAVERSAL_ROPES) follow_ropes(ray, any_hit, best);
     else search(ray, any_hit, best);
     return best;
 }

@@ -36,6 +36,7 @@
 #define TRAVERSAL_SHORT_STACK 4u
 #define TRAVERSAL_MASK_BOXES 5u
 #define TRAVERSAL_BACKTRACK 6u
+#define TRAVERSAL_ROPES 7u
 // Triangles that brute force takes: a driver is known to end any shader after 65,535 turns of its loops, in silence.
 #define BRUTE_MAX_TRIANGLES 65000u
 
@@ -200,6 +201,7 @@ struct Batch {
 #define BIND_TRIANGLE_IDS 20u
 #define BIND_COUNTERS 21u
 #define BIND_KD_BOXES 22u
-#define N_BINDINGS 23u
+#define BIND_KD_ROPES 23u
+#define N_BINDINGS 24u
 
 #endif

@@ -21,6 +21,8 @@ pub struct Bindings<'a> {
     pub leaf_triangles: &'a [u32],
     /// One a node, or none where the traversal does not ask for them.
     pub kd_boxes: &'a [KdBox],
+    /// Six a node, or none.
+    pub kd_ropes: &'a [u32],
 }
 
 impl<'a> Bindings<'a> {
@@ -35,10 +37,11 @@ impl<'a> Bindings<'a> {
             kd_parents: &tree.parents,
             leaf_triangles: &tree.leaf_triangles,
             kd_boxes: &[],
+            kd_ropes: &[],
         }
     }
 
     pub fn with_extras(self, extras: &'a Extras) -> Self {
-        Self { kd_boxes: &extras.boxes, ..self }
+        Self { kd_boxes: &extras.boxes, kd_ropes: &extras.ropes, ..self }
     }
 }

@@ -3,7 +3,7 @@
 use super::{
     bindings::Bindings, brute, pending_backtrack::PendingBacktrack, pending_mask::PendingMask,
     pending_mask_boxes::PendingMaskBoxes, pending_restart::PendingRestart, pending_short_stack::PendingShortStack,
-    pending_stack::PendingStack, triangle::Shear,
+    pending_stack::PendingStack, ropes::follow_ropes, triangle::Shear,
 };
 use crate::{
     frame::Traversal,
@@ -75,11 +75,17 @@ impl TraversalRay {
         }
     }
 
+    /// Where the ray meets the split plane.
+    #[inline(always)]
+    pub fn at_plane(&self, node: KdNode) -> f32 {
+        let axis = axis_of(node) as usize;
+        (f32::from_bits(node.split_or_first) - self.origin[axis]) * self.inv_direction[axis]
+    }
+
     /// Where the ray enters the second child's side and leaves the first one's, both widened by the slack.
     #[inline(always)]
     pub fn crossing(&self, node: KdNode) -> [f32; 2] {
-        let axis = axis_of(node) as usize;
-        let t = (f32::from_bits(node.split_or_first) - self.origin[axis]) * self.inv_direction[axis];
+        let (t, axis) = (self.at_plane(node), axis_of(node) as usize);
         [t - self.slack[axis], t + self.slack[axis]]
     }
 
@@ -156,7 +162,7 @@ pub(super) fn is_done<const ANY_HIT: bool>(best: &Hit) -> bool {
 }
 
 /// All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
-#[inline(always)]
+#[inline]
 pub(super) fn search<P: Pending, const ANY_HIT: bool>(
     bindings: &Bindings,
     ray: &TraversalRay,
@@ -178,22 +184,15 @@ pub(super) fn search<P: Pending, const ANY_HIT: bool>(
     }
 }
 
-/// The closest hit in (0, t_max), or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
-#[inline]
-pub fn traverse<P: Pending, const ANY_HIT: bool>(bindings: &Bindings, pending: &mut P, ray_in: &Ray) -> Hit {
-    let mut best = Hit { t: ray_in.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
-    search::<P, ANY_HIT>(bindings, &TraversalRay::new(bindings, ray_in), pending, &mut best);
-    best
-}
-
 /// A traversal that remembers its working memory from ray to ray; one for each thread.
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
 pub enum Traverser {
     Mask(PendingMask),
     MaskBoxes(PendingMaskBoxes),
-    Backtrack(PendingBacktrack),
     Restart(PendingRestart),
+    Backtrack(PendingBacktrack),
     ShortStack(PendingShortStack<4>),
+    Ropes(PendingMask),
     Stack(PendingStack),
     Brute,
 }
@@ -201,12 +200,13 @@ pub enum Traverser {
 impl Traverser {
     pub fn new(traversal: Traversal) -> Self {
         match traversal {
-            Traversal::Mask => Self::Mask(PendingMask::new()),
-            Traversal::MaskBoxes => Self::MaskBoxes(PendingMaskBoxes::new()),
-            Traversal::Backtrack => Self::Backtrack(PendingBacktrack::new()),
-            Traversal::Restart => Self::Restart(PendingRestart::new()),
-            Traversal::ShortStack => Self::ShortStack(PendingShortStack::new()),
-            Traversal::Stack => Self::Stack(PendingStack::new()),
+            Traversal::Mask => Self::Mask(Pending::new()),
+            Traversal::MaskBoxes => Self::MaskBoxes(Pending::new()),
+            Traversal::Restart => Self::Restart(Pending::new()),
+            Traversal::Backtrack => Self::Backtrack(Pending::new()),
+            Traversal::ShortStack => Self::ShortStack(Pending::new()),
+            Traversal::Ropes => Self::Ropes(Pending::new()),
+            Traversal::Stack => Self::Stack(Pending::new()),
             Traversal::Brute => Self::Brute,
         }
     }
@@ -225,15 +225,19 @@ impl Traverser {
 
     /// The closest hit in (0, t_max), or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings, ray: &Ray) -> Hit {
+    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings, ray_in: &Ray) -> Hit {
+        let mut best = Hit { t: ray_in.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
+        let ray = &TraversalRay::new(bindings, ray_in);
         match self {
-            Self::Mask(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
-            Self::MaskBoxes(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
-            Self::Backtrack(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
-            Self::Restart(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
-            Self::ShortStack(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
-            Self::Stack(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray),
-            Self::Brute => brute::closest_hit(bindings.triangles, ray),
+            Self::Mask(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::MaskBoxes(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::Restart(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::Backtrack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::ShortStack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::Ropes(pending) => follow_ropes::<ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::Stack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::Brute => best = brute::closest_hit(bindings.triangles, ray_in),
         }
+        best
     }
 }

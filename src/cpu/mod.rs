@@ -23,6 +23,7 @@ pub mod pending_stack;
 pub mod primary_hit;
 mod queues;
 pub mod resolve;
+pub mod ropes;
 pub mod shade;
 pub mod shadow;
 pub mod surface;

@@ -8,16 +8,21 @@ use crate::{frame::Traversal, layout::KdBox};
 pub struct Extras {
     /// One a node.
     pub boxes: Vec<KdBox>,
+    /// Six a node: below and above on x, y, z.
+    pub ropes: Vec<u32>,
 }
 
 impl Extras {
     /// What the traversal reads of the tree.
     pub fn new(tree: &KdTree, traversal: Traversal) -> Self {
-        Self { boxes: if traversal.needs_boxes() { tree.boxes() } else { Vec::new() } }
+        let boxes = if traversal.needs_boxes() { tree.boxes() } else { Vec::new() };
+        let ropes = if traversal.needs_ropes() { tree.ropes(&boxes) } else { Vec::new() };
+        Self { boxes, ropes }
     }
 
     /// What any traversal reads.
     pub fn all(tree: &KdTree) -> Self {
-        Self { boxes: tree.boxes() }
+        let boxes = tree.boxes();
+        Self { ropes: tree.ropes(&boxes), boxes }
     }
 }

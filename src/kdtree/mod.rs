@@ -20,6 +20,7 @@ mod counted;
 mod coverage;
 mod extras;
 mod flatten;
+mod ropes;
 mod sah;
 mod search;
 mod statistics;

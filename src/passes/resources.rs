@@ -31,6 +31,8 @@ pub struct Resources {
     pub leaf_triangles: Buffer<u32>,
     /// One a node, after `add_extras`.
     pub kd_boxes: Buffer<KdBox>,
+    /// Six a node, after `add_extras`.
+    pub kd_ropes: Buffer<u32>,
     /// Even bounces read the first queue and fill the second, odd ones the other way round; `queue_capacity` each.
     pub ray_queues: [Buffer<Ray>; 2],
     /// Two places a ray: `2 * queue_capacity`.
@@ -86,6 +88,7 @@ impl Resources {
         let kd_parents = Buffer::with(context, "kd_parents", &tree.parents, storage)?;
         let leaf_triangles = Buffer::with(context, "leaf_triangles", &tree.leaf_triangles, storage)?;
         let kd_boxes = Buffer::new(context, "kd_boxes", 0, storage)?;
+        let kd_ropes = Buffer::new(context, "kd_ropes", 0, storage)?;
         let ray_queues = [queue("ray_queues[0]")?, queue("ray_queues[1]")?];
         let child_rays = Buffer::new(context, "child_rays", 2 * capacity, storage)?;
         let child_counts = Buffer::new(context, "child_counts", capacity, storage)?;
@@ -115,6 +118,7 @@ impl Resources {
             kd_parents,
             leaf_triangles,
             kd_boxes,
+            kd_ropes,
             ray_queues,
             child_rays,
             child_counts,
@@ -168,6 +172,7 @@ impl Resources {
             Binding::Image(&self.triangle_ids),
             Binding::Buffer(self.counters.any()),
             Binding::Buffer(self.kd_boxes.any()),
+            Binding::Buffer(self.kd_ropes.any()),
         ];
         BindingSet::new(&self.bindings, name, &objects)
     }
@@ -178,6 +183,7 @@ impl Resources {
     /// Beyond the device's limits, out of memory.
     pub fn add_extras(&mut self, context: &Arc<Context>, extras: &Extras) -> Result<(), GpuError> {
         self.kd_boxes = Buffer::with(context, "kd_boxes", &extras.boxes, BufferUse::Storage)?;
+        self.kd_ropes = Buffer::with(context, "kd_ropes", &extras.ropes, BufferUse::Storage)?;
         self.sets = self.make_sets()?;
         Ok(())
     }

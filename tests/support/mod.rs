@@ -39,6 +39,7 @@ impl World {
             kd_parents: &self.tree.parents,
             leaf_triangles: &self.tree.leaf_triangles,
             kd_boxes: &self.extras.boxes,
+            kd_ropes: &self.extras.ropes,
         }
     }
 
