@@ -7,9 +7,9 @@ use crate::{
         Binding, BindingKind, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError, Target,
         TargetKind,
     },
-    kdtree::KdTree,
+    kdtree::{Extras, KdTree},
     layout::{
-        self, BIND_FRAME, BIND_TRIANGLE_IDS, Batch, Bounce, Counters, Frame, Hit, KdNode, Light, Material,
+        self, BIND_FRAME, BIND_TRIANGLE_IDS, Batch, Bounce, Counters, Frame, Hit, KdBox, KdNode, Light, Material,
         RAY_GROUP_SIZE, Ray, SCAN_BLOCK_SIZE, Triangle,
     },
     scene::Scene,
@@ -29,6 +29,10 @@ pub struct Resources {
     /// One a pair of nodes.
     pub kd_parents: Buffer<u32>,
     pub leaf_triangles: Buffer<u32>,
+    /// One a node, after `add_extras`.
+    pub kd_boxes: Buffer<KdBox>,
+    /// Six a node, after `add_extras`.
+    pub kd_ropes: Buffer<u32>,
     /// Even bounces read the first queue and fill the second, odd ones the other way round; `queue_capacity` each.
     pub ray_queues: [Buffer<Ray>; 2],
     /// Two places a ray: `2 * queue_capacity`.
@@ -83,6 +87,8 @@ impl Resources {
         let kd_nodes = Buffer::with(context, "kd_nodes", &tree.nodes, storage)?;
         let kd_parents = Buffer::with(context, "kd_parents", &tree.parents, storage)?;
         let leaf_triangles = Buffer::with(context, "leaf_triangles", &tree.leaf_triangles, storage)?;
+        let kd_boxes = Buffer::new(context, "kd_boxes", 0, storage)?;
+        let kd_ropes = Buffer::new(context, "kd_ropes", 0, storage)?;
         let ray_queues = [queue("ray_queues[0]")?, queue("ray_queues[1]")?];
         let child_rays = Buffer::new(context, "child_rays", 2 * capacity, storage)?;
         let child_counts = Buffer::new(context, "child_counts", capacity, storage)?;
@@ -111,6 +117,8 @@ impl Resources {
             kd_nodes,
             kd_parents,
             leaf_triangles,
+            kd_boxes,
+            kd_ropes,
             ray_queues,
             child_rays,
             child_counts,
@@ -163,8 +171,21 @@ impl Resources {
             Binding::Buffer(self.pixel_display.any()),
             Binding::Image(&self.triangle_ids),
             Binding::Buffer(self.counters.any()),
+            Binding::Buffer(self.kd_boxes.any()),
+            Binding::Buffer(self.kd_ropes.any()),
         ];
         BindingSet::new(&self.bindings, name, &objects)
+    }
+
+    /// Uploads what the traversal reads beside the tree.
+    ///
+    /// # Errors
+    /// Beyond the device's limits, out of memory.
+    pub fn add_extras(&mut self, context: &Arc<Context>, extras: &Extras) -> Result<(), GpuError> {
+        self.kd_boxes = Buffer::with(context, "kd_boxes", &extras.boxes, BufferUse::Storage)?;
+        self.kd_ropes = Buffer::with(context, "kd_ropes", &extras.ropes, BufferUse::Storage)?;
+        self.sets = self.make_sets()?;
+        Ok(())
     }
 
     /// Makes room for another number of batches and bounces; contents are undefined.
