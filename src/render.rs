@@ -4,12 +4,10 @@ use std::{mem, sync::Arc};
 
 use crate::{
     camera::frame_constants,
-    frame::{BounceStats, Denoise, PassTime, Picture, Primary, Profile, RenderOptions, Traversal},
+    frame::{BounceStats, Denoise, PassTime, Picture, Primary, Profile, RenderOptions},
     gpu::{Access, AnyBuffer, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Limits, Timer},
-    kdtree::{Extras, KdTree},
-    layout::{
-        BRUTE_MAX_TRIANGLES, Batch, Bounce, Counters, Frame, MATERIAL_REFLECT, MATERIAL_REFRACT, RAY_GROUP_SIZE, Ray,
-    },
+    kdtree::KdTree,
+    layout::{Batch, Bounce, Counters, Frame, MATERIAL_REFLECT, MATERIAL_REFRACT, RAY_GROUP_SIZE, Ray},
     passes::{Passes, Resources, bounce_row},
     scene::Scene,
 };
@@ -44,12 +42,11 @@ impl Renderer {
         options: &RenderOptions,
         capacity: u32,
     ) -> Result<Self, GpuError> {
-        check_triangles(scene, options.traversal)?;
         let constants = Frame { queue_capacity: capacity, ..frame_constants(scene, tree, options) };
         let spans = split_evenly(options.width * options.height, capacity);
         let n_rows = spans.len() * options.max_depth as usize;
         let mut resources = Resources::new(&context, scene, tree, &constants, n_rows)?;
-        resources.add_extras(&context, &Extras::new(tree, options.traversal))?;
+        resources.add_extras(&context, tree, options.traversal)?;
         let passes = Passes::new(&context, &resources.bindings, options)?;
         let schedule = Schedule::new(&context, &resources, spans)?;
         Ok(Self { context, options: options.clone(), resources, passes, schedule })
@@ -273,15 +270,6 @@ impl Schedule {
 
 fn copy_all(commands: &Commands, source: &AnyBuffer, destination: &AnyBuffer) {
     commands.copy_buffer(source, destination, source.bytes());
-}
-
-/// Brute force takes small meshes only.
-fn check_triangles(scene: &Scene, traversal: Traversal) -> Result<(), GpuError> {
-    let (value, limit) = (scene.triangles.len() as u64, u64::from(BRUTE_MAX_TRIANGLES));
-    if traversal == Traversal::Brute && value > limit {
-        return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
-    }
-    Ok(())
 }
 
 /// Rays that a queue should hold: two a pixel where rays can branch, else one, as far as the device's limits go.

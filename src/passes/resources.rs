@@ -3,14 +3,15 @@
 use std::{mem::offset_of, sync::Arc};
 
 use crate::{
+    frame::Traversal,
     gpu::{
         Binding, BindingKind, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError, Target,
         TargetKind,
     },
     kdtree::{Extras, KdTree},
     layout::{
-        self, BIND_FRAME, BIND_TRIANGLE_IDS, Batch, Bounce, Counters, Frame, Hit, KdBox, KdNode, Light, Material,
-        RAY_GROUP_SIZE, Ray, SCAN_BLOCK_SIZE, Triangle,
+        self, BIND_FRAME, BIND_TRIANGLE_IDS, BRUTE_MAX_TRIANGLES, Batch, Bounce, Counters, Frame, Hit, KdBox, KdNode,
+        Light, Material, RAY_GROUP_SIZE, Ray, SCAN_BLOCK_SIZE, Triangle,
     },
     scene::Scene,
 };
@@ -180,8 +181,13 @@ impl Resources {
     /// Uploads what the traversal reads beside the tree.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
-    pub fn add_extras(&mut self, context: &Arc<Context>, extras: &Extras) -> Result<(), GpuError> {
+    /// Too many triangles for brute force; beyond the device's limits, out of memory.
+    pub fn add_extras(&mut self, context: &Arc<Context>, tree: &KdTree, traversal: Traversal) -> Result<(), GpuError> {
+        let (value, limit) = (u64::from(self.constants.n_triangles), u64::from(BRUTE_MAX_TRIANGLES));
+        if traversal == Traversal::Brute && value > limit {
+            return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
+        }
+        let extras = Extras::new(tree, traversal);
         self.kd_boxes = Buffer::with(context, "kd_boxes", &extras.boxes, BufferUse::Storage)?;
         self.kd_ropes = Buffer::with(context, "kd_ropes", &extras.ropes, BufferUse::Storage)?;
         self.sets = self.make_sets()?;
