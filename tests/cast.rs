@@ -60,7 +60,7 @@ fn some_rays(world: &World, n: usize, scale_log2: RangeInclusive<f32>) -> Vec<Ca
         let mut random = Random(i as u64);
         let ray = nasty_ray(&mut random, world, i);
         let scale = 2f32.powf(random.between(*scale_log2.start(), *scale_log2.end()));
-        let t_min = if i % 4 == 0 { random.between(-1.0, 1.0) * world.radius() / scale } else { 0.0 };
+        let t_min = if i.is_multiple_of(4) { random.between(-1.0, 1.0) * world.radius() / scale } else { 0.0 };
         scaled(&ray, t_min, scale)
     };
     (0..n).map(some_ray).collect()
@@ -83,14 +83,12 @@ fn is_close(a: &Hit, b: &Hit) -> bool {
     a.triangle_ix == b.triangle_ix && near(a.t, b.t, 1e-5) && weights <= 1e-3
 }
 
-/// Says which hits differ: in any bit where no outliers are allowed, else by more than rounding in more than so many.
+/// Says which hits differ: at all where no outliers are allowed, else by more than rounding in more than so many.
 fn compare(n_outliers: usize, expected: &[Hit], found: &[Hit]) -> Result<(), String> {
     if expected.len() != found.len() {
         return Err(format!("{} hits, not {}", found.len(), expected.len()));
     }
-    let same = |a: &Hit, b: &Hit| {
-        if n_outliers == 0 { bytemuck::bytes_of(a) == bytemuck::bytes_of(b) } else { is_close(a, b) }
-    };
+    let same = |a: &Hit, b: &Hit| if n_outliers == 0 { a == b } else { is_close(a, b) };
     let differ: Vec<_> = (0..found.len()).filter(|&i| !same(&expected[i], &found[i])).collect();
     match differ.first() {
         Some(&i) if differ.len() > n_outliers => {
@@ -185,8 +183,7 @@ fn repetitions_are_timed_one_by_one() {
     assert_eq!(caster.cast(&[], Query::Closest, 3).expect("a cast").gpu_ms, Some(vec![0.0; 3]));
 }
 
-/// The interval is open, to the last bit: cut off at a hit it holds what is before the hit or behind it, and one unit
-/// in the last place farther the hit itself.
+/// The interval holds its far end and not its near one, to the last bit.
 #[test]
 fn the_interval_s_ends_are_exact() {
     let device = Device::new();
@@ -200,14 +197,15 @@ fn the_interval_s_ends_are_exact() {
         found
     };
     let first = cast(&rays);
-    let (rays, first): (Vec<_>, Vec<_>) = rays.into_iter().zip(first).filter(|(_, hit)| hit.t != f32::INFINITY).unzip();
+    let (rays, first): (Vec<_>, Vec<_>) = rays.into_iter().zip(first).filter(|(_, hit)| hit.t.is_normal()).unzip();
     assert!(first.len() > 1000);
     let with = |ends: &dyn Fn(&CastRay, f32) -> CastRay| -> Vec<_> {
         rays.iter().zip(&first).map(|(ray, hit)| ends(ray, hit.t)).collect()
     };
-    let up_to = cast(&with(&|ray, t| CastRay { t_max: t, ..*ray }));
-    assert!(up_to.iter().all(|hit| *hit == MISS));
-    assert_eq!(cast(&with(&|ray, t| CastRay { t_max: t.next_up(), ..*ray })), first);
+    let before = cast(&with(&|ray, t| CastRay { t_max: t.next_down(), ..*ray }));
+    let wrong = before.iter().position(|hit| *hit != MISS).map(|i| (&rays[i], &first[i], &before[i]));
+    assert_eq!(wrong, None, "a hit beyond the end");
+    assert_eq!(cast(&with(&|ray, t| CastRay { t_max: t, ..*ray })), first);
     assert_eq!(cast(&with(&|ray, t| CastRay { t_min: t.next_down(), ..*ray })), first);
     let behind = cast(&with(&|ray, t| CastRay { t_min: t, ..*ray }));
     assert!(behind.iter().zip(&first).all(|(hit, first)| hit.t > first.t));
@@ -261,7 +259,7 @@ fn what_is_no_ray_misses_and_is_counted() {
     let mut far = vec![CastRay { t_min: f32::NEG_INFINITY, ..good }];
     for wrong in [f32::MAX, f32::MIN_POSITIVE, 1e-40, -1e30, 1e20] {
         far.extend((0..3).map(|axis| CastRay { origin: with(good.origin, axis, wrong), ..good }));
-        far.extend((0..3).map(|axis| CastRay { direction: with(good.direction, axis, wrong), ..good }));
+        far.extend([0, 2].map(|axis| CastRay { direction: with(good.direction, axis, wrong), ..good }));
     }
     let rays = [&none[..], &must_miss, &far, &[good]].concat();
     for traversal in TRAVERSALS {

@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Cast: one invocation a ray finds its closest hit in (t_min, t_max) through the kd-tree, or with ANY_HIT one that need
+// Cast: one invocation a ray finds its closest hit in (t_min, t_max] through the kd-tree, or with ANY_HIT one that need
 // not be the closest.
 // Reads cast_rays and the tree; writes cast_hits.
 #include "layout.glsl"
