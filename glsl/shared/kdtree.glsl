@@ -34,6 +34,7 @@ struct TraversalRay {
     vec3 slack;
     vec3 bias;
     float width;
+    float t_min;
     float t_enter;
     float t_exit;
     float overlap;
@@ -44,11 +45,12 @@ struct TraversalRay {
 // the plane by 4 * 2^-24 of the coordinates. Planes are widened by 2^-20 of the farthest of these, so that a ray along
 // a plane, or through a corner of cells, meets every triangle that touches it there: what brute force finds, the
 // traversal visits.
-TraversalRay traversal_ray(Ray ray) {
+TraversalRay traversal_ray(Ray ray, float t_min) {
     TraversalRay r;
     r.shear = shear_of(ray.origin, ray.direction);
     r.origin = ray.origin;
     r.source_triangle = ray.source_triangle;
+    r.t_min = t_min;
     // A direction in the plane is taken as all but in it: finite everywhere, and one rule for all ties.
     vec3 tiny = vec3(1e-12);
     vec3 direction = mix(ray.direction, tiny, lessThan(abs(ray.direction), tiny));
@@ -66,7 +68,7 @@ TraversalRay traversal_ray(Ray ray) {
     vec3 t1 = (frame.cell_max - ray.origin) * r.inv_direction;
     vec3 near = min(t0, t1) - r.slack;
     vec3 far = max(t0, t1) + r.slack;
-    r.t_enter = max(max(near.x, near.y), max(near.z, 0.0));
+    r.t_enter = max(max(near.x, near.y), max(near.z, t_min));
     r.t_exit = min(min(far.x, far.y), min(far.z, ray.t_max));
     return r;
 }
@@ -121,7 +123,8 @@ void clear_pending() {
 void push_pending(uint second_ix, Cell cell, vec2 t_cross) {
     if (TRAVERSAL == TRAVERSAL_STACK) stack_push(second_ix, cell);
     else if (TRAVERSAL == TRAVERSAL_SHORT_STACK) short_stack_push(second_ix, cell, t_cross);
-    else if (TRAVERSAL != TRAVERSAL_MASK_BOXES && TRAVERSAL != TRAVERSAL_BACKTRACK) mask_push(second_ix, cell, t_cross);
+    else if (TRAVERSAL == TRAVERSAL_MASK) mask_push(second_ix, cell, t_cross);
+    else if (TRAVERSAL == TRAVERSAL_RESTART) mask_push(second_ix, cell, t_cross);
 }
 
 // The next pending cell that may hold a hit nearer than t_best, or false.
@@ -158,7 +161,7 @@ void intersect(TraversalRay ray, uint triangle_ix, inout Hit best) {
     Hit hit;
     if (!intersect_triangle(ray.shear, triangles[triangle_ix], triangle_ix, hit)) return;
     bool nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
-    if (hit.t > 0.0 && nearer && triangle_ix != ray.source_triangle) best = hit;
+    if (hit.t > ray.t_min && nearer && triangle_ix != ray.source_triangle) best = hit;
 }
 
 void intersect_leaf(TraversalRay ray, KdNode leaf, inout Hit best) {
@@ -183,10 +186,10 @@ void search(TraversalRay ray, bool any_hit, inout Hit best) {
 #include "brute.glsl"
 #include "ropes.glsl"
 
-// The closest hit in (0, t_max), or with any_hit one that need not be the closest. A miss keeps t = t_max.
-Hit traverse(Ray ray_in, bool any_hit) {
+// The closest hit in (t_min, t_max], or with any_hit one that need not be the closest. A miss keeps t = t_max.
+Hit traverse(Ray ray_in, float t_min, bool any_hit) {
     Hit best = Hit(ray_in.t_max, NO_TRIANGLE, 0.0, 0.0);
-    TraversalRay ray = traversal_ray(ray_in);
+    TraversalRay ray = traversal_ray(ray_in, t_min);
     if (TRAVERSAL == TRAVERSAL_BRUTE) intersect_all(ray, any_hit, best);
     else if (TRAVERSAL == TRAVERSAL_ROPES) follow_ropes(ray, any_hit, best);
     else search(ray, any_hit, best);

@@ -101,13 +101,22 @@ struct Light {
     uint reserved;
 };
 
-// 48 bytes. direction: unit length; t in (0, t_max); source_triangle: where the ray starts, never hit again.
+// 48 bytes. direction: unit length; t in (0, t_max]; source_triangle: where the ray starts, never hit again.
 struct Ray {
     vec3 origin;
     uint pixel_ix;
     vec3 direction;
     uint source_triangle;
     vec3 throughput;
+    float t_max;
+};
+
+// 32 bytes. A ray that is cast, not rendered: direction of any length, which is the unit of t; t in (t_min, t_max], any
+// bounds, but those below 2^-126 may count as 0.
+struct CastRay {
+    vec3 origin;
+    float t_min;
+    vec3 direction;
     float t_max;
 };
 
@@ -177,7 +186,12 @@ struct Batch {
     uint depth;
 };
 
-// Bindings of the one descriptor set.
+// Push constants of a cast: its rays.
+struct CastBatch {
+    uint n_rays;
+};
+
+// Bindings of the frame's descriptor set.
 #define BIND_FRAME 0u
 #define BIND_TRIANGLES 1u
 #define BIND_TRIANGLE_MATERIALS 2u
@@ -203,5 +217,9 @@ struct Batch {
 #define BIND_KD_BOXES 22u
 #define BIND_KD_ROPES 23u
 #define N_BINDINGS 24u
+
+// A cast's descriptor set has these and what the traversal reads: 0, 1, 5, 6, 7, 22, 23.
+#define BIND_CAST_RAYS 24u
+#define BIND_CAST_HITS 25u
 
 #endif

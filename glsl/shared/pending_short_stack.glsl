@@ -3,7 +3,7 @@
 //
 // The mask counts what is pending, so that nothing is visited twice; the paper restarts where the ray left the leaf.
 
-layout(constant_id = 2) const uint SHORT_STACK_SIZE = 4u;
+layout(constant_id = 3) const uint SHORT_STACK_SIZE = 4u;
 uint short_stack_node_ix[SHORT_STACK_SIZE];
 float short_stack_t_enter[SHORT_STACK_SIZE];
 float short_stack_t_exit[SHORT_STACK_SIZE];

@@ -3,6 +3,8 @@
 //! What a command was asked for goes to standard output; progress, notes and errors go to standard error.
 
 mod args;
+mod cast;
+mod cast_report;
 mod devices;
 mod error;
 mod inspect;
@@ -16,11 +18,14 @@ use std::{
     ffi::OsString,
     io::{self, Write},
     process::ExitCode,
+    sync::Arc,
 };
 
 use args::{Args, Command};
 use clap::Parser;
 use error::CliError;
+use kdray::gpu::{Context, ContextOptions, GpuError};
+use progress::Progress;
 
 /// Runs the command that `arguments`, the program's name first, ask for.
 pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
@@ -41,9 +46,19 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
 fn run(args: Args) -> Result<(), CliError> {
     match args.command {
         Command::Render(args) => render::run(&args),
+        Command::Cast(args) => cast::run(&args),
         Command::Devices => devices::run(),
         Command::Inspect(args) => inspect::run(&args),
     }
+}
+
+/// Opens the device that is meant, and says so where that is none but the CPU.
+fn open_device(options: &ContextOptions, progress: &Progress) -> Result<Arc<Context>, GpuError> {
+    let context = Context::new(options)?;
+    if options.device.is_none() && context.is_software() {
+        progress.note(&format!("no GPU found, rendering in software on {}", context.info().name));
+    }
+    Ok(context)
 }
 
 /// Writes what was asked for to standard output. A reader that has seen enough is no error.

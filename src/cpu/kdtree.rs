@@ -31,6 +31,7 @@ pub struct TraversalRay {
     bias: [f32; 4],
     /// Of a widened plane, in world units.
     width: f32,
+    t_min: f32,
     pub t_enter: f32,
     pub t_exit: f32,
     /// A pending cell begins at most this far before a deeper one.
@@ -52,7 +53,7 @@ pub fn max(x: f32, y: f32) -> f32 {
 
 impl TraversalRay {
     #[inline]
-    pub fn new(bindings: &Bindings, ray: &Ray) -> Self {
+    pub fn new(bindings: &Bindings, ray: &Ray, t_min: f32) -> Self {
         let origin = ray.origin.to_array();
         let cell_min = bindings.frame.cell_min.to_array();
         let cell_max = bindings.frame.cell_max.to_array();
@@ -75,7 +76,8 @@ impl TraversalRay {
             slack: by_axis(slack),
             bias: by_axis([0, 1, 2].map(|i| -origin[i] * inv_direction[i] - slack[i])),
             width: 2.0 * slack_world,
-            t_enter: max(max(near[0], near[1]), max(near[2], 0.0)),
+            t_min,
+            t_enter: max(max(near[0], near[1]), max(near[2], t_min)),
             t_exit: min(min(far[0], far[1]), min(far[2], ray.t_max)),
             overlap: 2.0 * (slack[0] + slack[1] + slack[2]),
             source_triangle: ray.source_triangle,
@@ -151,7 +153,7 @@ fn intersect(bindings: &Bindings, ray: &TraversalRay, triangle_ix: u32, best: &m
     let triangle = &bindings.triangles[triangle_ix as usize];
     let Some(hit) = ray.shear.intersect_triangle(triangle, triangle_ix) else { return };
     let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
-    if hit.t > 0.0 && nearer && triangle_ix != ray.source_triangle {
+    if hit.t > ray.t_min && nearer && triangle_ix != ray.source_triangle {
         *best = hit;
     }
 }
@@ -220,23 +222,23 @@ impl Traverser {
         }
     }
 
-    /// The closest hit in (0, t_max). A miss keeps t = t_max.
+    /// The closest hit in (0, t_max]. A miss keeps t = t_max.
     #[inline]
     pub fn closest_hit(&mut self, bindings: &Bindings, ray: &Ray) -> Hit {
-        self.traverse::<false>(bindings, ray)
+        self.traverse::<false>(bindings, ray, 0.0)
     }
 
-    /// Whether anything lies in (0, t_max).
+    /// Whether anything lies in (0, t_max].
     #[inline]
     pub fn any_hit(&mut self, bindings: &Bindings, ray: &Ray) -> bool {
-        self.traverse::<true>(bindings, ray).triangle_ix != NO_TRIANGLE
+        self.traverse::<true>(bindings, ray, 0.0).triangle_ix != NO_TRIANGLE
     }
 
-    /// The closest hit in (0, t_max), or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
+    /// The closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings, ray_in: &Ray) -> Hit {
+    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings, ray_in: &Ray, t_min: f32) -> Hit {
         let mut best = Hit { t: ray_in.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
-        let ray = &TraversalRay::new(bindings, ray_in);
+        let ray = &TraversalRay::new(bindings, ray_in, t_min);
         match self {
             Self::Mask(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
             Self::MaskBoxes(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
@@ -245,7 +247,7 @@ impl Traverser {
             Self::ShortStack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
             Self::Ropes(pending) => follow_ropes::<ANY_HIT>(bindings, ray, pending, &mut best),
             Self::Stack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
-            Self::Brute => best = brute::closest_hit(bindings.triangles, ray_in),
+            Self::Brute => best = brute::closest_hit_beyond(bindings.triangles, ray_in, t_min),
         }
         best
     }

@@ -13,8 +13,8 @@ const FUSED_FMA: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/fused_fma.com
 pub(super) fn fuses_fma(context: &Arc<Context>) -> Result<bool, GpuError> {
     // Its square needs 25 bits.
     let numbers = Buffer::with(context, "numbers", &[1.0 + 2f32.powi(-12), 0.0], BufferUse::Storage)?;
-    let bindings = Bindings::new(context, &[BindingKind::Storage], 4)?;
-    let set = BindingSet::new(&bindings, "fused_fma", &[Binding::Buffer(numbers.any())])?;
+    let bindings = Bindings::new(context, &[(0, BindingKind::Storage)], 4)?;
+    let set = BindingSet::new(&bindings, "fused_fma", &[(0, Binding::Buffer(numbers.any()))])?;
     let desc = ComputeDesc { name: "fused_fma", spirv: FUSED_FMA, constants: &[], full_subgroups: false };
     let kernel = ComputePipeline::new(context, &bindings, &desc)?;
     context.run("fused_fma", |commands| {

@@ -5,9 +5,11 @@ use std::sync::Arc;
 
 use crate::{
     frame::{Primary, RenderOptions, Traversal},
-    gpu::{Bindings, ComputeDesc, ComputePipeline, Context, GpuError},
+    gpu::{BindingKind, Bindings, ComputeDesc, ComputePipeline, Context, GpuError},
+    layout::{BIND_FRAME, BIND_TRIANGLE_IDS},
 };
 
+mod cast;
 mod compact;
 mod denoise;
 mod primary_hit;
@@ -17,9 +19,11 @@ mod shade;
 mod shadow;
 mod tonemap;
 mod trace;
+mod tree;
 mod visibility;
 
 pub use self::{
+    cast::{Cast, CastResources},
     compact::Compact,
     denoise::Denoise,
     primary_hit::PrimaryHit,
@@ -29,6 +33,7 @@ pub use self::{
     shadow::Shadow,
     tonemap::Tonemap,
     trace::Trace,
+    tree::Tree,
     visibility::Visibility,
 };
 
@@ -69,6 +74,16 @@ impl Passes {
             tonemap: Tonemap::new(context, bindings)?,
         })
     }
+}
+
+/// A binding number of layout.glsl and what it holds.
+fn binding(number: u32) -> (u32, BindingKind) {
+    let kind = match number {
+        BIND_FRAME => BindingKind::Uniform,
+        BIND_TRIANGLE_IDS => BindingKind::Image,
+        _ => BindingKind::Storage,
+    };
+    (number, kind)
 }
 
 /// Specialization constants of the kernels that traverse.

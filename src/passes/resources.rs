@@ -2,38 +2,25 @@
 
 use std::{mem::offset_of, sync::Arc};
 
+use super::{Tree, binding};
 use crate::{
     frame::Traversal,
     gpu::{
-        Binding, BindingKind, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError, Target,
-        TargetKind,
+        Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError, Target, TargetKind,
     },
-    kdtree::{Extras, KdTree},
-    layout::{
-        self, BIND_FRAME, BIND_TRIANGLE_IDS, BRUTE_MAX_TRIANGLES, Batch, Bounce, Counters, Frame, Hit, KdBox, KdNode,
-        Light, Material, RAY_GROUP_SIZE, Ray, SCAN_BLOCK_SIZE, Triangle,
-    },
+    kdtree::KdTree,
+    layout::{self, Batch, Bounce, Counters, Frame, Hit, Light, Material, RAY_GROUP_SIZE, Ray, SCAN_BLOCK_SIZE},
     scene::Scene,
 };
 
 /// What the kernels read and write. A name is the same here, in the kernels, as debug label and as allocation.
 pub struct Resources {
-    /// One.
-    pub frame: Buffer<Frame>,
-    /// `n_triangles`, like the next.
-    pub triangles: Buffer<Triangle>,
+    pub tree: Tree,
+    /// `n_triangles`.
     pub triangle_materials: Buffer<u32>,
     pub materials: Buffer<Material>,
     /// `n_lights`.
     pub lights: Buffer<Light>,
-    pub kd_nodes: Buffer<KdNode>,
-    /// One a pair of nodes.
-    pub kd_parents: Buffer<u32>,
-    pub leaf_triangles: Buffer<u32>,
-    /// One a node, after `add_extras`.
-    pub kd_boxes: Buffer<KdBox>,
-    /// Six a node, after `add_extras`.
-    pub kd_ropes: Buffer<u32>,
     /// Even bounces read the first queue and fill the second, odd ones the other way round; `queue_capacity` each.
     pub ray_queues: [Buffer<Ray>; 2],
     /// Two places a ray: `2 * queue_capacity`.
@@ -80,16 +67,10 @@ impl Resources {
         let size = (constants.width, constants.height);
         let queue = |name| Buffer::new(context, name, capacity, storage);
 
-        let frame = Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?;
-        let triangles = Buffer::with(context, "triangles", &scene.triangles, storage)?;
+        let tree = Tree::new(context, &scene.triangles, tree, constants)?;
         let triangle_materials = Buffer::with(context, "triangle_materials", &scene.triangle_materials, storage)?;
         let materials = Buffer::with(context, "materials", &scene.materials, storage)?;
         let lights = Buffer::with(context, "lights", &scene.lights, storage)?;
-        let kd_nodes = Buffer::with(context, "kd_nodes", &tree.nodes, storage)?;
-        let kd_parents = Buffer::with(context, "kd_parents", &tree.parents, storage)?;
-        let leaf_triangles = Buffer::with(context, "leaf_triangles", &tree.leaf_triangles, storage)?;
-        let kd_boxes = Buffer::new(context, "kd_boxes", 0, storage)?;
-        let kd_ropes = Buffer::new(context, "kd_ropes", 0, storage)?;
         let ray_queues = [queue("ray_queues[0]")?, queue("ray_queues[1]")?];
         let child_rays = Buffer::new(context, "child_rays", 2 * capacity, storage)?;
         let child_counts = Buffer::new(context, "child_counts", capacity, storage)?;
@@ -108,18 +89,13 @@ impl Resources {
         let triangle_ids = Target::new(context, "triangle_ids", TargetKind::Id, size)?;
         let depth = Target::new(context, "depth", TargetKind::Depth, size)?;
 
-        let bindings = Bindings::new(context, &binding_kinds(), size_of::<Batch>() as u32)?;
+        let kinds: Vec<_> = (0..layout::N_BINDINGS).map(binding).collect();
+        let bindings = Bindings::new(context, &kinds, size_of::<Batch>() as u32)?;
         let mut resources = Self {
-            frame,
-            triangles,
+            tree,
             triangle_materials,
             materials,
             lights,
-            kd_nodes,
-            kd_parents,
-            leaf_triangles,
-            kd_boxes,
-            kd_ropes,
             ray_queues,
             child_rays,
             child_counts,
@@ -148,34 +124,26 @@ impl Resources {
     }
 
     fn make_set(&self, name: &str, rays: &Buffer<Ray>, next_rays: &Buffer<Ray>) -> Result<BindingSet, GpuError> {
-        // In the order of the BIND_ numbers in layout.glsl.
-        let objects = [
-            Binding::Buffer(self.frame.any()),
-            Binding::Buffer(self.triangles.any()),
-            Binding::Buffer(self.triangle_materials.any()),
-            Binding::Buffer(self.materials.any()),
-            Binding::Buffer(self.lights.any()),
-            Binding::Buffer(self.kd_nodes.any()),
-            Binding::Buffer(self.kd_parents.any()),
-            Binding::Buffer(self.leaf_triangles.any()),
-            Binding::Buffer(rays.any()),
-            Binding::Buffer(next_rays.any()),
-            Binding::Buffer(self.child_rays.any()),
-            Binding::Buffer(self.child_counts.any()),
-            Binding::Buffer(self.scan_blocks.any()),
-            Binding::Buffer(self.bounces.any()),
-            Binding::Buffer(self.hits.any()),
-            Binding::Buffer(self.light_visibility.any()),
-            Binding::Buffer(self.ray_radiance.any()),
-            Binding::Buffer(self.pixel_radiance.any()),
-            Binding::Buffer(self.filtered().any()),
-            Binding::Buffer(self.pixel_display.any()),
-            Binding::Image(&self.triangle_ids),
-            Binding::Buffer(self.counters.any()),
-            Binding::Buffer(self.kd_boxes.any()),
-            Binding::Buffer(self.kd_ropes.any()),
+        let own = [
+            (layout::BIND_TRIANGLE_MATERIALS, Binding::Buffer(self.triangle_materials.any())),
+            (layout::BIND_MATERIALS, Binding::Buffer(self.materials.any())),
+            (layout::BIND_LIGHTS, Binding::Buffer(self.lights.any())),
+            (layout::BIND_RAYS, Binding::Buffer(rays.any())),
+            (layout::BIND_NEXT_RAYS, Binding::Buffer(next_rays.any())),
+            (layout::BIND_CHILD_RAYS, Binding::Buffer(self.child_rays.any())),
+            (layout::BIND_CHILD_COUNTS, Binding::Buffer(self.child_counts.any())),
+            (layout::BIND_SCAN_BLOCKS, Binding::Buffer(self.scan_blocks.any())),
+            (layout::BIND_BOUNCES, Binding::Buffer(self.bounces.any())),
+            (layout::BIND_HITS, Binding::Buffer(self.hits.any())),
+            (layout::BIND_LIGHT_VISIBILITY, Binding::Buffer(self.light_visibility.any())),
+            (layout::BIND_RAY_RADIANCE, Binding::Buffer(self.ray_radiance.any())),
+            (layout::BIND_PIXEL_RADIANCE, Binding::Buffer(self.pixel_radiance.any())),
+            (layout::BIND_PIXEL_FILTERED, Binding::Buffer(self.filtered().any())),
+            (layout::BIND_PIXEL_DISPLAY, Binding::Buffer(self.pixel_display.any())),
+            (layout::BIND_COUNTERS, Binding::Buffer(self.counters.any())),
+            (layout::BIND_TRIANGLE_IDS, Binding::Image(&self.triangle_ids)),
         ];
-        BindingSet::new(&self.bindings, name, &objects)
+        BindingSet::new(&self.bindings, name, &[&self.tree.objects()[..], &own].concat())
     }
 
     /// Uploads what the traversal reads beside the tree.
@@ -183,13 +151,7 @@ impl Resources {
     /// # Errors
     /// Too many triangles for brute force; beyond the device's limits, out of memory.
     pub fn add_extras(&mut self, context: &Arc<Context>, tree: &KdTree, traversal: Traversal) -> Result<(), GpuError> {
-        let (value, limit) = (u64::from(self.constants.n_triangles), u64::from(BRUTE_MAX_TRIANGLES));
-        if traversal == Traversal::Brute && value > limit {
-            return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
-        }
-        let extras = Extras::new(tree, traversal);
-        self.kd_boxes = Buffer::with(context, "kd_boxes", &extras.boxes, BufferUse::Storage)?;
-        self.kd_ropes = Buffer::with(context, "kd_ropes", &extras.ropes, BufferUse::Storage)?;
+        self.tree.add_extras(context, tree, traversal)?;
         self.sets = self.make_sets()?;
         Ok(())
     }
@@ -263,14 +225,4 @@ pub fn bounce_row(n_rays: u32, n_lights: u32) -> Bounce {
         scan_groups_z: 1,
         ..Bounce::default()
     }
-}
-
-fn binding_kinds() -> Vec<BindingKind> {
-    (0..layout::N_BINDINGS)
-        .map(|binding| match binding {
-            BIND_FRAME => BindingKind::Uniform,
-            BIND_TRIANGLE_IDS => BindingKind::Image,
-            _ => BindingKind::Storage,
-        })
-        .collect()
 }
