@@ -28,6 +28,7 @@ mod tests {
             BIND_RAYS | BIND_NEXT_RAYS | BIND_CHILD_RAYS => Some("Ray"),
             BIND_BOUNCES => Some("Bounce"),
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
+            BIND_KD_BOXES => Some("KdBox"),
             BIND_CAST_RAYS => Some("CastRay"),
             BIND_COUNTERS => Some("Counters"),
             _ => None,

@@ -6,9 +6,9 @@ use crate::{
     camera::frame_constants,
     frame::{BounceStats, Denoise, PassTime, Picture, Primary, Profile, RenderOptions},
     gpu::{Access, AnyBuffer, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Limits, Timer},
-    kdtree::KdTree,
+    kdtree::{Extras, KdTree},
     layout::{Batch, Bounce, Counters, Frame, MATERIAL_REFLECT, MATERIAL_REFRACT, RAY_GROUP_SIZE, Ray},
-    passes::{Passes, Resources, bounce_row},
+    passes::{Passes, Resources, bounce_row, check_triangles},
     scene::Scene,
 };
 
@@ -42,10 +42,12 @@ impl Renderer {
         options: &RenderOptions,
         capacity: u32,
     ) -> Result<Self, GpuError> {
+        check_triangles(&scene.triangles, options.traversal)?;
         let constants = Frame { queue_capacity: capacity, ..frame_constants(scene, tree, options) };
         let spans = split_evenly(options.width * options.height, capacity);
         let n_rows = spans.len() * options.max_depth as usize;
-        let resources = Resources::new(&context, scene, tree, &constants, n_rows)?;
+        let mut resources = Resources::new(&context, scene, tree, &constants, n_rows)?;
+        resources.add_extras(&context, &Extras::new(tree, options.traversal))?;
         let passes = Passes::new(&context, &resources.bindings, options)?;
         let schedule = Schedule::new(&context, &resources, spans)?;
         Ok(Self { context, options: options.clone(), resources, passes, schedule })

@@ -22,9 +22,9 @@ use crate::{
     cpu,
     frame::Traversal,
     gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Timer},
-    kdtree::KdTree,
+    kdtree::{Extras, KdTree},
     layout::{Frame, RAY_GROUP_SIZE, Triangle},
-    passes::{self, CastResources, Tree},
+    passes::{self, CastResources, Tree, check_triangles},
 };
 
 /// What is asked of a ray.
@@ -74,7 +74,10 @@ impl Caster {
         tree: &KdTree,
         traversal: Traversal,
     ) -> Result<Self, GpuError> {
-        let tree = Tree::new(context, triangles, tree, &constants(triangles, tree))?;
+        check_triangles(triangles, traversal)?;
+        let extras = Extras::new(tree, traversal);
+        let mut tree = Tree::new(context, triangles, tree, &constants(triangles, tree))?;
+        tree.add_extras(context, &extras)?;
         let bindings = CastResources::bindings(context)?;
         let resources = CastResources::new(context, &bindings, &tree, 0)?;
         let rays_per_batch = RAYS_PER_BATCH.min(most_rays(context.limits()));
@@ -164,7 +167,31 @@ pub fn count_invalid(rays: &[CastRay]) -> u64 {
     rays.par_iter().filter(|ray| !cpu::cast::is_ray(ray)).count() as u64
 }
 
-/// The hits of a [`Caster`], found on the current rayon pool.
+/// As [`Caster`], on the current rayon pool.
+pub struct CpuCaster<'a> {
+    triangles: &'a [Triangle],
+    tree: &'a KdTree,
+    traversal: Traversal,
+    extras: Extras,
+    frame: Frame,
+}
+
+impl<'a> CpuCaster<'a> {
+    pub fn new(triangles: &'a [Triangle], tree: &'a KdTree, traversal: Traversal) -> Self {
+        let (extras, frame) = (Extras::new(tree, traversal), constants(triangles, tree));
+        Self { triangles, tree, traversal, extras, frame }
+    }
+
+    /// One hit a ray.
+    pub fn cast(&self, rays: &[CastRay], query: Query) -> Vec<Hit> {
+        let bindings = cpu::bindings::Bindings::of_tree(self.triangles, self.tree, &self.frame);
+        let mut hits = vec![Hit::zeroed(); rays.len()];
+        cpu::cast::cast(&bindings.with_extras(&self.extras), self.traversal, query, rays, &mut hits);
+        hits
+    }
+}
+
+/// The hits of a [`Caster`], found by a [`CpuCaster`].
 pub fn cast_on_cpu(
     triangles: &[Triangle],
     tree: &KdTree,
@@ -172,8 +199,5 @@ pub fn cast_on_cpu(
     rays: &[CastRay],
     query: Query,
 ) -> Vec<Hit> {
-    let frame = constants(triangles, tree);
-    let mut hits = vec![Hit::zeroed(); rays.len()];
-    cpu::cast::cast(&cpu::bindings::Bindings::of_tree(triangles, tree, &frame), traversal, query, rays, &mut hits);
-    hits
+    CpuCaster::new(triangles, tree, traversal).cast(rays, query)
 }

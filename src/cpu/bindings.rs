@@ -1,8 +1,8 @@
 //! What the kernels only read, under the kernels' names.
 
 use crate::{
-    kdtree::KdTree,
-    layout::{Frame, KdNode, Light, Material, Triangle},
+    kdtree::{Extras, KdTree},
+    layout::{Frame, KdBox, KdNode, Light, Material, Triangle},
     scene::Scene,
 };
 
@@ -19,6 +19,10 @@ pub struct Bindings<'a> {
     /// One a pair of nodes.
     pub kd_parents: &'a [u32],
     pub leaf_triangles: &'a [u32],
+    /// One a node, or none where the traversal does not ask for them.
+    pub kd_boxes: &'a [KdBox],
+    /// Six a node, or none.
+    pub kd_ropes: &'a [u32],
 }
 
 impl<'a> Bindings<'a> {
@@ -42,6 +46,12 @@ impl<'a> Bindings<'a> {
             kd_nodes: &tree.nodes,
             kd_parents: &tree.parents,
             leaf_triangles: &tree.leaf_triangles,
+            kd_boxes: &[],
+            kd_ropes: &[],
         }
+    }
+
+    pub fn with_extras(self, extras: &'a Extras) -> Self {
+        Self { kd_boxes: &extras.boxes, kd_ropes: &extras.ropes, ..self }
     }
 }

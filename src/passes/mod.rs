@@ -33,7 +33,7 @@ pub use self::{
     shadow::Shadow,
     tonemap::Tonemap,
     trace::Trace,
-    tree::Tree,
+    tree::{Tree, check_triangles},
     visibility::Visibility,
 };
 

@@ -7,7 +7,7 @@ use crate::{
     gpu::{
         Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError, Target, TargetKind,
     },
-    kdtree::KdTree,
+    kdtree::{Extras, KdTree},
     layout::{self, Batch, Bounce, Counters, Frame, Hit, Light, Material, RAY_GROUP_SIZE, Ray, SCAN_BLOCK_SIZE},
     scene::Scene,
 };
@@ -143,6 +143,16 @@ impl Resources {
             (layout::BIND_TRIANGLE_IDS, Binding::Image(&self.triangle_ids)),
         ];
         BindingSet::new(&self.bindings, name, &[&self.tree.objects()[..], &own].concat())
+    }
+
+    /// Uploads what the traversal reads beside the tree.
+    ///
+    /// # Errors
+    /// Beyond the device's limits, out of memory.
+    pub fn add_extras(&mut self, context: &Arc<Context>, extras: &Extras) -> Result<(), GpuError> {
+        self.tree.add_extras(context, extras)?;
+        self.sets = self.make_sets()?;
+        Ok(())
     }
 
     /// Makes room for another number of batches and bounces; contents are undefined.
