@@ -6,9 +6,9 @@ use crate::{
     camera::frame_constants,
     frame::{BounceStats, Denoise, PassTime, Picture, Primary, Profile, RenderOptions},
     gpu::{Access, AnyBuffer, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Limits, Timer},
-    kdtree::{Extras, KdTree},
+    kdtree::KdTree,
     layout::{Batch, Bounce, Counters, Frame, MATERIAL_REFLECT, MATERIAL_REFRACT, RAY_GROUP_SIZE, Ray},
-    passes::{Passes, Resources, bounce_row, check_triangles},
+    passes::{Passes, Resources, bounce_row},
     scene::Scene,
 };
 
@@ -42,12 +42,11 @@ impl Renderer {
         options: &RenderOptions,
         capacity: u32,
     ) -> Result<Self, GpuError> {
-        check_triangles(&scene.triangles, options.traversal)?;
         let constants = Frame { queue_capacity: capacity, ..frame_constants(scene, tree, options) };
         let spans = split_evenly(options.width * options.height, capacity);
         let n_rows = spans.len() * options.max_depth as usize;
         let mut resources = Resources::new(&context, scene, tree, &constants, n_rows)?;
-        resources.add_extras(&context, &Extras::new(tree, options.traversal))?;
+        resources.add_extras(&context, tree, options.traversal)?;
         let passes = Passes::new(&context, &resources.bindings, options)?;
         let schedule = Schedule::new(&context, &resources, spans)?;
         Ok(Self { context, options: options.clone(), resources, passes, schedule })

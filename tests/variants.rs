@@ -11,7 +11,7 @@ use kdray::{
     cpu::brute,
     frame::{RenderOptions, Traversal},
     gpu::{Access, Context, ContextOptions, GpuError},
-    kdtree::{BuildOptions, Extras, KdTree},
+    kdtree::{BuildOptions, KdTree},
     layout::{
         BRUTE_MAX_TRIANGLES, Batch, Counters, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, NO_TRIANGLE, Ray,
         Triangle,
@@ -64,7 +64,7 @@ fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], tr
     let options = RenderOptions { width: 8, height: 8, traversal, ..RenderOptions::default() };
     let constants = Frame { queue_capacity: rays.len() as u32, ..frame_constants(scene, tree, &options) };
     let mut resources = Resources::new(context, scene, tree, &constants, 1).expect("resources");
-    resources.add_extras(context, &Extras::new(tree, traversal)).expect("extras");
+    resources.add_extras(context, tree, traversal).expect("extras");
     let passes = Passes::new(context, &resources.bindings, &options).expect("passes");
     resources.ray_queues[0].upload(rays).expect("rays");
     resources.bounces.upload(&[bounce_row(rays.len() as u32, 2)]).expect("bounces");

@@ -1,5 +1,5 @@
-// Pending subtrees as the paper has them (Algorithm 2): nothing is noted on the way down. On the way up, level by level,
-// a bit says that the sibling has been visited; where it has not, its box is tested.
+// Pending subtrees as the paper has them (Algorithm 2): nothing is noted on the way down. On the way up, a level at a
+// time, a bit says that the sibling has been visited; where it has not, its box is tested.
 //
 // Corrected: 64 levels for 31; boxes are widened; a failed test leaves the entry point alone; and a hit ends the search
 // only where no other cell can hold a nearer one, not as soon as a leaf has any.

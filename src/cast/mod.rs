@@ -24,7 +24,7 @@ use crate::{
     gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Timer},
     kdtree::{Extras, KdTree},
     layout::{Frame, RAY_GROUP_SIZE, Triangle},
-    passes::{self, CastResources, Tree, check_triangles},
+    passes::{self, CastResources, Tree},
 };
 
 /// What is asked of a ray.
@@ -67,22 +67,26 @@ impl Caster {
     /// Uploads the triangles and their tree.
     ///
     /// # Errors
-    /// The tree is beyond the device's limits or memory.
+    /// The tree is beyond the device's limits or memory; too many triangles for brute force.
     pub fn new(
         context: &Arc<Context>,
         triangles: &[Triangle],
         tree: &KdTree,
         traversal: Traversal,
     ) -> Result<Self, GpuError> {
-        check_triangles(triangles, traversal)?;
-        let extras = Extras::new(tree, traversal);
-        let mut tree = Tree::new(context, triangles, tree, &constants(triangles, tree))?;
-        tree.add_extras(context, &extras)?;
+        let mut buffers = Tree::new(context, triangles, tree, &constants(triangles, tree))?;
+        buffers.add_extras(context, tree, traversal)?;
         let bindings = CastResources::bindings(context)?;
-        let resources = CastResources::new(context, &bindings, &tree, 0)?;
-        let rays_per_batch = RAYS_PER_BATCH.min(most_rays(context.limits()));
-        let context = Arc::clone(context);
-        Ok(Self { context, tree, bindings, traversal, closest: None, any: None, resources, rays_per_batch })
+        Ok(Self {
+            resources: CastResources::new(context, &bindings, &buffers, 0)?,
+            rays_per_batch: RAYS_PER_BATCH.min(most_rays(context.limits())),
+            context: Arc::clone(context),
+            tree: buffers,
+            bindings,
+            traversal,
+            closest: None,
+            any: None,
+        })
     }
 
     /// With batches of at most so many rays, as far as the device's limits go.

@@ -21,7 +21,7 @@ impl TraversalRay {
         Slabs { enter: [0, 1, 2].map(|i| min(t0[i], t1[i])), exit: [0, 1, 2].map(|i| max(t0[i], t1[i])) }
     }
 
-    /// The ray's interval in a node's cell, widened by the slack: the very planes that `descend` meets on the way there.
+    /// The ray's interval in a node's cell, widened by the slack: the planes that `descend` meets on the way there.
     #[inline(always)]
     pub fn interval_in(&self, bindings: &Bindings, node_ix: u32) -> [f32; 2] {
         let slabs = self.slabs_of(bindings, node_ix);

@@ -15,8 +15,8 @@ impl KdTree {
         // Parents come before their children.
         for node_ix in 0..self.nodes.len() {
             let cell = boxes[node_ix].into();
-            for face in 0..N_FACES {
-                ropes[node_ix][face] = self.tightened(ropes[node_ix][face], face, &cell);
+            for (face, rope) in ropes[node_ix].iter_mut().enumerate() {
+                *rope = self.tightened(*rope, face, &cell);
             }
             if let Node::Split { axis, child, .. } = self.node(node_ix as u32) {
                 let [below, above] = [child as usize, child as usize + 1];

@@ -33,7 +33,7 @@ pub use self::{
     shadow::Shadow,
     tonemap::Tonemap,
     trace::Trace,
-    tree::{Tree, check_triangles},
+    tree::Tree,
     visibility::Visibility,
 };
 

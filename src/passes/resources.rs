@@ -4,10 +4,11 @@ use std::{mem::offset_of, sync::Arc};
 
 use super::{Tree, binding};
 use crate::{
+    frame::Traversal,
     gpu::{
         Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError, Target, TargetKind,
     },
-    kdtree::{Extras, KdTree},
+    kdtree::KdTree,
     layout::{self, Batch, Bounce, Counters, Frame, Hit, Light, Material, RAY_GROUP_SIZE, Ray, SCAN_BLOCK_SIZE},
     scene::Scene,
 };
@@ -148,9 +149,9 @@ impl Resources {
     /// Uploads what the traversal reads beside the tree.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
-    pub fn add_extras(&mut self, context: &Arc<Context>, extras: &Extras) -> Result<(), GpuError> {
-        self.tree.add_extras(context, extras)?;
+    /// Too many triangles for brute force; beyond the device's limits, out of memory.
+    pub fn add_extras(&mut self, context: &Arc<Context>, tree: &KdTree, traversal: Traversal) -> Result<(), GpuError> {
+        self.tree.add_extras(context, tree, traversal)?;
         self.sets = self.make_sets()?;
         Ok(())
     }

@@ -57,8 +57,13 @@ impl Tree {
     /// Uploads what the traversal reads beside the tree. Descriptor sets are to be made anew.
     ///
     /// # Errors
-    /// As [`Tree::new`].
-    pub fn add_extras(&mut self, context: &Arc<Context>, extras: &Extras) -> Result<(), GpuError> {
+    /// Too many triangles for brute force; beyond the device's limits, out of memory.
+    pub fn add_extras(&mut self, context: &Arc<Context>, tree: &KdTree, traversal: Traversal) -> Result<(), GpuError> {
+        let (value, limit) = (self.triangles.len() as u64, u64::from(BRUTE_MAX_TRIANGLES));
+        if traversal == Traversal::Brute && value > limit {
+            return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
+        }
+        let extras = Extras::new(tree, traversal);
         self.kd_boxes = Buffer::with(context, "kd_boxes", &extras.boxes, BufferUse::Storage)?;
         self.kd_ropes = Buffer::with(context, "kd_ropes", &extras.ropes, BufferUse::Storage)?;
         Ok(())
@@ -77,16 +82,4 @@ impl Tree {
         ];
         std::array::from_fn(|i| (BINDINGS[i], Binding::Buffer(buffers[i])))
     }
-}
-
-/// Brute force takes small meshes only.
-///
-/// # Errors
-/// Too many triangles for the traversal.
-pub fn check_triangles(triangles: &[Triangle], traversal: Traversal) -> Result<(), GpuError> {
-    let (value, limit) = (triangles.len() as u64, u64::from(BRUTE_MAX_TRIANGLES));
-    if traversal == Traversal::Brute && value > limit {
-        return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
-    }
-    Ok(())
 }
