@@ -67,12 +67,12 @@ mod tests {
         Ok(())
     }
 
-    /// Struct name and block of every binding and push constant of every shader.
+    /// Struct name and block of every binding and push constant of every pass's shaders.
     fn blocks() -> Vec<(&'static str, Type)> {
-        let files = fs::read_dir(env!("OUT_DIR")).expect("OUT_DIR").map(|entry| entry.expect("an entry").path());
-        let shaders = files.filter(|path| path.extension().is_some_and(|extension| extension == "spv"));
-        let variables = shaders.flat_map(|path| {
-            let spirv = fs::read(&path).expect("SPIR-V");
+        let sources = fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/glsl/passes")).expect("glsl/passes");
+        let variables = sources.flat_map(|source| {
+            let name = source.expect("an entry").file_name().into_string().expect("a shader's name is UTF-8");
+            let spirv = fs::read(format!("{}/{name}.spv", env!("OUT_DIR"))).expect("SPIR-V");
             let entry_points = ReflectConfig::new().spv(spirv).ref_all_rscs(true).reflect();
             entry_points.expect("valid SPIR-V").into_iter().flat_map(|entry_point| entry_point.vars)
         });
