@@ -25,10 +25,10 @@ mod tests {
             BIND_MATERIALS => Some("Material"),
             BIND_LIGHTS => Some("Light"),
             BIND_KD_NODES => Some("KdNode"),
-            BIND_KD_BOXES => Some("KdBox"),
             BIND_RAYS | BIND_NEXT_RAYS | BIND_CHILD_RAYS => Some("Ray"),
             BIND_BOUNCES => Some("Bounce"),
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
+            BIND_KD_BOXES => Some("KdBox"),
             BIND_CAST_RAYS => Some("CastRay"),
             BIND_COUNTERS => Some("Counters"),
             _ => None,
@@ -67,13 +67,12 @@ mod tests {
         Ok(())
     }
 
-    /// Struct name and block of every binding and push constant of every shader.
+    /// Struct name and block of every binding and push constant of every pass's shaders.
     fn blocks() -> Vec<(&'static str, Type)> {
-        let passes = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl/passes");
-        let files = fs::read_dir(passes).expect("glsl/passes").map(|entry| entry.expect("an entry").file_name());
-        let shaders = files.map(|name| format!("{}/{}.spv", env!("OUT_DIR"), name.to_string_lossy()));
-        let variables = shaders.flat_map(|path| {
-            let spirv = fs::read(&path).expect("SPIR-V");
+        let sources = fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/glsl/passes")).expect("glsl/passes");
+        let variables = sources.flat_map(|source| {
+            let name = source.expect("an entry").file_name().into_string().expect("a shader's name is UTF-8");
+            let spirv = fs::read(format!("{}/{name}.spv", env!("OUT_DIR"))).expect("SPIR-V");
             let entry_points = ReflectConfig::new().spv(spirv).ref_all_rscs(true).reflect();
             entry_points.expect("valid SPIR-V").into_iter().flat_map(|entry_point| entry_point.vars)
         });

@@ -159,7 +159,7 @@ fn usage_mistakes_are_refused() {
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--json", "m.obj"], "MESH"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--json", "x.npz"], "same file"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--repeat", "0"], "--repeat"),
-        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--traversal", "swing"], "mask"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--traversal", "bvh"], "mask"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--cpu", "--validate"], "--cpu"),
     ];
     for (arguments, named) in cases {

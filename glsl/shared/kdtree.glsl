@@ -121,10 +121,11 @@ void clear_pending() {
 
 // Traversals with boxes need nothing: they find out on the way back.
 void push_pending(uint second_ix, Cell cell, vec2 t_cross) {
+    if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
+    if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;
     if (TRAVERSAL == TRAVERSAL_STACK) stack_push(second_ix, cell);
     else if (TRAVERSAL == TRAVERSAL_SHORT_STACK) short_stack_push(second_ix, cell, t_cross);
-    else if (TRAVERSAL == TRAVERSAL_MASK) mask_push(second_ix, cell, t_cross);
-    else if (TRAVERSAL == TRAVERSAL_RESTART) mask_push(second_ix, cell, t_cross);
+    else mask_push(second_ix, cell, t_cross);
 }
 
 // The next pending cell that may hold a hit nearer than t_best, or false.

@@ -218,7 +218,7 @@ struct CastBatch {
 #define BIND_KD_ROPES 23u
 #define N_BINDINGS 24u
 
-// A cast's descriptor set has these and what the traversal reads: 0, 1, 5, 6, 7, 22, 23.
+// A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
 #define BIND_CAST_RAYS 24u
 #define BIND_CAST_HITS 25u
 

@@ -67,7 +67,7 @@ impl Caster {
     /// Uploads the triangles and their tree.
     ///
     /// # Errors
-    /// The tree is beyond the device's limits or memory.
+    /// The tree is beyond the device's limits or memory; too many triangles for brute force.
     pub fn new(
         context: &Arc<Context>,
         triangles: &[Triangle],
@@ -76,12 +76,17 @@ impl Caster {
     ) -> Result<Self, GpuError> {
         let mut buffers = Tree::new(context, triangles, tree, &constants(triangles, tree))?;
         buffers.add_extras(context, tree, traversal)?;
-        let tree = buffers;
         let bindings = CastResources::bindings(context)?;
-        let resources = CastResources::new(context, &bindings, &tree, 0)?;
-        let rays_per_batch = RAYS_PER_BATCH.min(most_rays(context.limits()));
-        let context = Arc::clone(context);
-        Ok(Self { context, tree, bindings, traversal, closest: None, any: None, resources, rays_per_batch })
+        Ok(Self {
+            resources: CastResources::new(context, &bindings, &buffers, 0)?,
+            rays_per_batch: RAYS_PER_BATCH.min(most_rays(context.limits())),
+            context: Arc::clone(context),
+            tree: buffers,
+            bindings,
+            traversal,
+            closest: None,
+            any: None,
+        })
     }
 
     /// With batches of at most so many rays, as far as the device's limits go.
@@ -166,7 +171,31 @@ pub fn count_invalid(rays: &[CastRay]) -> u64 {
     rays.par_iter().filter(|ray| !cpu::cast::is_ray(ray)).count() as u64
 }
 
-/// The hits of a [`Caster`], found on the current rayon pool.
+/// As [`Caster`], on the current rayon pool.
+pub struct CpuCaster<'a> {
+    triangles: &'a [Triangle],
+    tree: &'a KdTree,
+    traversal: Traversal,
+    extras: Extras,
+    frame: Frame,
+}
+
+impl<'a> CpuCaster<'a> {
+    pub fn new(triangles: &'a [Triangle], tree: &'a KdTree, traversal: Traversal) -> Self {
+        let (extras, frame) = (Extras::new(tree, traversal), constants(triangles, tree));
+        Self { triangles, tree, traversal, extras, frame }
+    }
+
+    /// One hit a ray.
+    pub fn cast(&self, rays: &[CastRay], query: Query) -> Vec<Hit> {
+        let bindings = cpu::bindings::Bindings::of_tree(self.triangles, self.tree, &self.frame);
+        let mut hits = vec![Hit::zeroed(); rays.len()];
+        cpu::cast::cast(&bindings.with_extras(&self.extras), self.traversal, query, rays, &mut hits);
+        hits
+    }
+}
+
+/// The hits of a [`Caster`], found by a [`CpuCaster`].
 pub fn cast_on_cpu(
     triangles: &[Triangle],
     tree: &KdTree,
@@ -174,10 +203,5 @@ pub fn cast_on_cpu(
     rays: &[CastRay],
     query: Query,
 ) -> Vec<Hit> {
-    let frame = constants(triangles, tree);
-    let mut hits = vec![Hit::zeroed(); rays.len()];
-    let extras = Extras::new(tree, traversal);
-    let bindings = cpu::bindings::Bindings::of_tree(triangles, tree, &frame).with_extras(&extras);
-    cpu::cast::cast(&bindings, traversal, query, rays, &mut hits);
-    hits
+    CpuCaster::new(triangles, tree, traversal).cast(rays, query)
 }

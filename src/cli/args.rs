@@ -96,8 +96,8 @@ pub struct CastArgs {
     /// Find out only whether rays hit anything: occluded
     #[arg(long)]
     pub any: bool,
-    /// How rays find their way back up the tree
-    #[arg(long, value_name = "mask|stack", default_value_t = RenderOptions::default().traversal)]
+    #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
+    #[arg(help = format!("How rays find their way through the tree: {}", Traversal::words()))]
     pub traversal: Traversal,
     /// Cast the rays so many times and report the least, median and greatest time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]

@@ -3,7 +3,7 @@
 use std::{sync::Arc, time::Instant};
 
 use kdray::{
-    cast::{self, Cast, CastRay, Caster, Hit, HitWriter, NO_TRIANGLE, Query, RAYS_PER_BATCH, RayReader},
+    cast::{self, Cast, CastRay, Caster, CpuCaster, Hit, HitWriter, NO_TRIANGLE, Query, RAYS_PER_BATCH, RayReader},
     frame::Traversal,
     gpu::{Context, ContextOptions, GpuError},
     kdtree::{BuildOptions, KdTree},
@@ -79,7 +79,7 @@ fn cpu_name() -> String {
 /// What casts.
 enum Engine<'a> {
     Device(Box<Caster>),
-    Cpu { triangles: &'a [Triangle], tree: &'a KdTree, traversal: Traversal },
+    Cpu(Box<CpuCaster<'a>>),
 }
 
 impl<'a> Engine<'a> {
@@ -92,7 +92,7 @@ impl<'a> Engine<'a> {
     ) -> Result<Self, GpuError> {
         match context {
             Some(context) => Ok(Self::Device(Box::new(Caster::new(context, triangles, tree, traversal)?))),
-            None => Ok(Self::Cpu { triangles, tree, traversal }),
+            None => Ok(Self::Cpu(Box::new(CpuCaster::new(triangles, tree, traversal)))),
         }
     }
 
@@ -100,12 +100,12 @@ impl<'a> Engine<'a> {
     fn cast(&mut self, rays: &[CastRay], query: Query, n_times: u32) -> Result<Cast, GpuError> {
         match self {
             Self::Device(caster) => caster.cast(rays, query, n_times),
-            Self::Cpu { triangles, tree, traversal } => {
+            Self::Cpu(caster) => {
                 let mut hits = Vec::new();
                 let mut ms = Vec::new();
                 for _ in 0..n_times {
                     let start = Instant::now();
-                    hits = cast::cast_on_cpu(triangles, tree, *traversal, rays, query);
+                    hits = caster.cast(rays, query);
                     ms.push(start.elapsed().as_secs_f64() * 1e3);
                 }
                 Ok(Cast { hits, gpu_ms: Some(ms), n_invalid: cast::count_invalid(rays) })

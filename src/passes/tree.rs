@@ -54,7 +54,7 @@ impl Tree {
         })
     }
 
-    /// Uploads what the traversal reads beside the tree. Sets made before must be made anew.
+    /// Uploads what the traversal reads beside the tree. Descriptor sets are to be made anew.
     ///
     /// # Errors
     /// Too many triangles for brute force; beyond the device's limits, out of memory.
