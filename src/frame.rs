@@ -144,6 +144,10 @@ pub struct UnknownWord {
 /// Words for an option's variants, for the command line, scene files and JSON alike.
 macro_rules! words {
     ($ty:ident { $($variant:ident = $word:literal),+ }, $all:literal) => {
+        impl $ty {
+            /// Every variant.
+            pub const ALL: &[Self] = &[$(Self::$variant),+];
+        }
         impl FromStr for $ty {
             type Err = UnknownWord;
             fn from_str(word: &str) -> Result<Self, UnknownWord> {

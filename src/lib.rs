@@ -11,6 +11,7 @@
 //!   gpu      the Vulkan layer
 //! cpu      the same frame without Vulkan
 //! output   picture -> file
+//! bench    all of it, timed
 //! ```
 
 #![deny(unsafe_code)]
@@ -31,3 +32,5 @@ pub mod passes;
 pub mod render;
 
 pub mod output;
+
+pub mod bench;

@@ -3,6 +3,7 @@
 //! What a command was asked for goes to standard output; progress, notes and errors go to standard error.
 
 mod args;
+mod bench;
 mod devices;
 mod error;
 mod inspect;
@@ -16,11 +17,14 @@ use std::{
     ffi::OsString,
     io::{self, Write},
     process::ExitCode,
+    sync::Arc,
 };
 
 use args::{Args, Command};
 use clap::Parser;
 use error::CliError;
+use kdray::gpu::{Context, ContextOptions, GpuError};
+use progress::Progress;
 
 /// Runs the command that `arguments`, the program's name first, ask for.
 pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
@@ -43,7 +47,17 @@ fn run(args: Args) -> Result<(), CliError> {
         Command::Render(args) => render::run(&args),
         Command::Devices => devices::run(),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Bench(suite) => bench::run(&suite),
     }
+}
+
+/// Opens the device that is meant, and says so where that is none but the CPU.
+fn open_device(options: &ContextOptions, progress: &Progress) -> Result<Arc<Context>, GpuError> {
+    let context = Context::new(options)?;
+    if options.device.is_none() && context.is_software() {
+        progress.note(&format!("no GPU found, rendering in software on {}", context.info().name));
+    }
+    Ok(context)
 }
 
 /// Writes what was asked for to standard output. A reader that has seen enough is no error.

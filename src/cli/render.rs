@@ -16,7 +16,7 @@ use super::{
     args::RenderArgs,
     complain,
     error::CliError,
-    print,
+    open_device, print,
     progress::Progress,
     report::{Report, Spread},
 };
@@ -33,7 +33,8 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let picture_path = args.output.clone().unwrap_or_else(|| default_output(&scene.name));
     output::check(&picture_path)?;
     let options = args.options(&scene.defaults);
-    let context = if args.cpu { None } else { Some(open_device(args, &progress)?) };
+    let device = ContextOptions { device: args.device.clone(), validate: args.validate };
+    let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
 
     let n_triangles = scene.triangles.len();
     let build_options = BuildOptions::default();
@@ -90,14 +91,6 @@ fn default_output(scene_name: &str) -> PathBuf {
     let name = scene_name.replace(|c: char| std::path::is_separator(c) || c.is_control(), "-");
     let stem = if name.is_empty() { "picture" } else { &name };
     format!("{stem}.png").into()
-}
-
-fn open_device(args: &RenderArgs, progress: &Progress) -> Result<Arc<Context>, GpuError> {
-    let context = Context::new(&ContextOptions { device: args.device.clone(), validate: args.validate })?;
-    if args.device.is_none() && context.is_software() {
-        progress.note(&format!("no GPU found, rendering in software on {}", context.info().name));
-    }
-    Ok(context)
 }
 
 struct FrameToDraw<'a> {
