@@ -9,7 +9,8 @@
 //! render   the frame: passes, barriers, batches -> picture
 //!   passes   one kernel and one file each, on
 //!   gpu      the Vulkan layer
-//! cpu      the same frame without Vulkan
+//! cast     rays -> hits, without a frame
+//! cpu      both without Vulkan
 //! output   picture -> file
 //! bench    all of it, timed
 //! ```
@@ -30,6 +31,8 @@ pub mod cpu;
 pub mod gpu;
 pub mod passes;
 pub mod render;
+
+pub mod cast;
 
 pub mod output;
 

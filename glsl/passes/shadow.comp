@@ -37,7 +37,7 @@ void main() {
         Hit hit = hits[ray_ix];
         Ray segment;
         is_tested = hit.triangle_ix != NO_TRIANGLE && shadow_segment(rays[ray_ix], hit, lights[light_ix], segment);
-        bool is_lit = is_tested && traverse(segment, true).triangle_ix == NO_TRIANGLE;
+        bool is_lit = is_tested && traverse(segment, 0.0, true).triangle_ix == NO_TRIANGLE;
         light_visibility[light_ix * frame.queue_capacity + ray_ix] = is_lit ? 1u : 0u;
     }
     uint n_tested = subgroupAdd(is_tested ? 1u : 0u);

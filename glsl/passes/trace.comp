@@ -17,7 +17,7 @@ void main() {
     uint ray_ix = gl_GlobalInvocationID.x;
     bool is_hit = false;
     if (ray_ix < bounces[batch.bounce_ix].n_rays) {
-        Hit hit = traverse(rays[ray_ix], false);
+        Hit hit = traverse(rays[ray_ix], 0.0, false);
         hits[ray_ix] = hit;
         is_hit = hit.triangle_ix != NO_TRIANGLE;
     }

@@ -33,6 +33,7 @@ struct TraversalRay {
     vec3 origin;
     vec3 inv_direction;
     vec3 slack;
+    float t_min;
     float t_enter;
     float t_exit;
     float overlap;
@@ -42,11 +43,12 @@ struct TraversalRay {
 // The hit test's rounding moves a corner across the ray by at most 3 * 2^-24 of its distance. Planes are widened by
 // 2^-21 of the farthest distance in the scene, so that a ray along a plane, or through a corner of cells, meets every
 // triangle that touches it there: what brute force finds, the traversal visits.
-TraversalRay traversal_ray(Ray ray) {
+TraversalRay traversal_ray(Ray ray, float t_min) {
     TraversalRay r;
     r.shear = shear_of(ray.origin, ray.direction);
     r.origin = ray.origin;
     r.source_triangle = ray.source_triangle;
+    r.t_min = t_min;
     // A direction in the plane is taken as all but in it: finite everywhere, and one rule for all ties.
     vec3 tiny = vec3(1e-12);
     vec3 direction = mix(ray.direction, tiny, lessThan(abs(ray.direction), tiny));
@@ -62,7 +64,7 @@ TraversalRay traversal_ray(Ray ray) {
     vec3 t1 = (frame.cell_max - ray.origin) * r.inv_direction;
     vec3 near = min(t0, t1) - r.slack;
     vec3 far = max(t0, t1) + r.slack;
-    r.t_enter = max(max(near.x, near.y), max(near.z, 0.0));
+    r.t_enter = max(max(near.x, near.y), max(near.z, t_min));
     r.t_exit = min(min(far.x, far.y), min(far.z, ray.t_max));
     return r;
 }
@@ -129,14 +131,14 @@ void intersect_leaf(TraversalRay ray, KdNode leaf, inout Hit best) {
         Hit hit;
         if (!intersect_triangle(ray.shear, triangles[triangle_ix], triangle_ix, hit)) continue;
         bool nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
-        if (hit.t > 0.0 && nearer && triangle_ix != ray.source_triangle) best = hit;
+        if (hit.t > ray.t_min && nearer && triangle_ix != ray.source_triangle) best = hit;
     }
 }
 
-// The closest hit in (0, t_max), or with any_hit one that need not be the closest. A miss keeps t = t_max.
-Hit traverse(Ray ray_in, bool any_hit) {
+// The closest hit in (t_min, t_max), or with any_hit one that need not be the closest. A miss keeps t = t_max.
+Hit traverse(Ray ray_in, float t_min, bool any_hit) {
     Hit best = Hit(ray_in.t_max, NO_TRIANGLE, 0.0, 0.0);
-    TraversalRay ray = traversal_ray(ray_in);
+    TraversalRay ray = traversal_ray(ray_in, t_min);
     if (!(ray.t_enter <= ray.t_exit)) return best;
     Cell cell = Cell(0u, 0u, ray.t_enter, ray.t_exit);
     clear_pending();

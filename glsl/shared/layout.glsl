@@ -89,6 +89,14 @@ struct Ray {
     float t_max;
 };
 
+// 32 bytes. A ray that is cast, not rendered: direction of any length; t in (t_min, t_max), in units of that length.
+struct CastRay {
+    vec3 origin;
+    float t_min;
+    vec3 direction;
+    float t_max;
+};
+
 // 16 bytes. u, v: barycentric weights of v1 and v2. A miss: t = infinity, triangle_ix = NO_TRIANGLE.
 struct Hit {
     float t;
@@ -155,15 +163,22 @@ struct Batch {
     uint depth;
 };
 
-// Bindings of the one descriptor set.
+// Push constants of a cast: its rays.
+struct CastBatch {
+    uint n_rays;
+};
+
+// Bindings of the traversal, with which each of the two descriptor sets begins.
 #define BIND_FRAME 0u
 #define BIND_TRIANGLES 1u
-#define BIND_TRIANGLE_MATERIALS 2u
-#define BIND_MATERIALS 3u
-#define BIND_LIGHTS 4u
-#define BIND_KD_NODES 5u
-#define BIND_KD_PARENTS 6u
-#define BIND_LEAF_TRIANGLES 7u
+#define BIND_KD_NODES 2u
+#define BIND_KD_PARENTS 3u
+#define BIND_LEAF_TRIANGLES 4u
+
+// The frame's set goes on.
+#define BIND_TRIANGLE_MATERIALS 5u
+#define BIND_MATERIALS 6u
+#define BIND_LIGHTS 7u
 #define BIND_RAYS 8u
 #define BIND_NEXT_RAYS 9u
 #define BIND_CHILD_RAYS 10u
@@ -179,5 +194,9 @@ struct Batch {
 #define BIND_TRIANGLE_IDS 20u
 #define BIND_COUNTERS 21u
 #define N_BINDINGS 22u
+
+// The cast's set goes on.
+#define BIND_CAST_RAYS 5u
+#define BIND_CAST_HITS 6u
 
 #endif

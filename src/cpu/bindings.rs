@@ -24,11 +24,21 @@ pub struct Bindings<'a> {
 impl<'a> Bindings<'a> {
     pub fn new(scene: &'a Scene, tree: &'a KdTree, frame: &'a Frame) -> Self {
         Self {
-            frame,
-            triangles: &scene.triangles,
             triangle_materials: &scene.triangle_materials,
             materials: &scene.materials,
             lights: &scene.lights,
+            ..Self::of_tree(&scene.triangles, tree, frame)
+        }
+    }
+
+    /// What the traversal reads, without materials and lights.
+    pub fn of_tree(triangles: &'a [Triangle], tree: &'a KdTree, frame: &'a Frame) -> Self {
+        Self {
+            frame,
+            triangles,
+            triangle_materials: &[],
+            materials: &[],
+            lights: &[],
             kd_nodes: &tree.nodes,
             kd_parents: &tree.parents,
             leaf_triangles: &tree.leaf_triangles,

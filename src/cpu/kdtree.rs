@@ -23,6 +23,7 @@ pub struct TraversalRay {
     inv_direction: [f32; 4],
     /// By how much in t a plane is widened on each axis.
     slack: [f32; 4],
+    t_min: f32,
     pub t_enter: f32,
     pub t_exit: f32,
     /// A pending cell begins at most this far before a deeper one.
@@ -44,7 +45,7 @@ pub fn max(x: f32, y: f32) -> f32 {
 
 impl TraversalRay {
     #[inline]
-    pub fn new(bindings: &Bindings, ray: &Ray) -> Self {
+    pub fn new(bindings: &Bindings, ray: &Ray, t_min: f32) -> Self {
         let origin = ray.origin.to_array();
         let cell_min = bindings.frame.cell_min.to_array();
         let cell_max = bindings.frame.cell_max.to_array();
@@ -64,7 +65,8 @@ impl TraversalRay {
             origin: by_axis(origin),
             inv_direction: by_axis(inv_direction),
             slack: by_axis(slack),
-            t_enter: max(max(near[0], near[1]), max(near[2], 0.0)),
+            t_min,
+            t_enter: max(max(near[0], near[1]), max(near[2], t_min)),
             t_exit: min(min(far[0], far[1]), min(far[2], ray.t_max)),
             overlap: 2.0 * (slack[0] + slack[1] + slack[2]),
             source_triangle: ray.source_triangle,
@@ -129,17 +131,22 @@ fn intersect_leaf(bindings: &Bindings, ray: &TraversalRay, leaf: KdNode, best: &
         let triangle = &bindings.triangles[triangle_ix as usize];
         let Some(hit) = ray.shear.intersect_triangle(triangle, triangle_ix) else { continue };
         let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
-        if hit.t > 0.0 && nearer && triangle_ix != ray.source_triangle {
+        if hit.t > ray.t_min && nearer && triangle_ix != ray.source_triangle {
             *best = hit;
         }
     }
 }
 
-/// The closest hit in (0, t_max), or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
+/// The closest hit in (t_min, t_max), or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
 #[inline]
-pub fn traverse<P: Pending, const ANY_HIT: bool>(bindings: &Bindings, pending: &mut P, ray_in: &Ray) -> Hit {
+pub fn traverse<P: Pending, const ANY_HIT: bool>(
+    bindings: &Bindings,
+    pending: &mut P,
+    ray_in: &Ray,
+    t_min: f32,
+) -> Hit {
     let mut best = Hit { t: ray_in.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
-    let ray = TraversalRay::new(bindings, ray_in);
+    let ray = TraversalRay::new(bindings, ray_in, t_min);
     // Not `>`: a NaN misses.
     if !(ray.t_enter <= ray.t_exit) {
         return best;
@@ -173,19 +180,21 @@ impl Traverser {
     /// The closest hit in (0, t_max). A miss keeps t = t_max.
     #[inline]
     pub fn closest_hit(&mut self, bindings: &Bindings, ray: &Ray) -> Hit {
-        match self {
-            Self::Mask(pending) => traverse::<_, false>(bindings, pending, ray),
-            Self::Stack(pending) => traverse::<_, false>(bindings, pending, ray),
-        }
+        self.traverse::<false>(bindings, ray, 0.0)
     }
 
     /// Whether anything lies in (0, t_max).
     #[inline]
     pub fn any_hit(&mut self, bindings: &Bindings, ray: &Ray) -> bool {
-        let hit = match self {
-            Self::Mask(pending) => traverse::<_, true>(bindings, pending, ray),
-            Self::Stack(pending) => traverse::<_, true>(bindings, pending, ray),
-        };
-        hit.triangle_ix != NO_TRIANGLE
+        self.traverse::<true>(bindings, ray, 0.0).triangle_ix != NO_TRIANGLE
+    }
+
+    /// The closest hit in (t_min, t_max), or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
+    #[inline]
+    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings, ray: &Ray, t_min: f32) -> Hit {
+        match self {
+            Self::Mask(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray, t_min),
+            Self::Stack(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray, t_min),
+        }
     }
 }

@@ -7,6 +7,7 @@
 pub mod bindings;
 pub mod brute;
 pub mod camera;
+pub mod cast;
 pub mod compact;
 pub mod denoise;
 pub mod display;

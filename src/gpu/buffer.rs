@@ -91,7 +91,13 @@ impl<T: Pod> Buffer<T> {
 
     /// All elements; waits for the device.
     pub fn download(&self) -> Result<Vec<T>, GpuError> {
-        let bytes = self.len * size_of::<T>();
+        self.download_first(self.len)
+    }
+
+    /// The first `len` elements; waits for the device.
+    pub fn download_first(&self, len: usize) -> Result<Vec<T>, GpuError> {
+        assert!(len <= self.len, "`{}` holds {} elements, not {len}", self.any.name, self.len);
+        let bytes = len * size_of::<T>();
         if bytes == 0 {
             return Ok(Vec::new());
         }
@@ -102,7 +108,7 @@ impl<T: Pod> Buffer<T> {
             commands.copy_buffer(&self.any, &staging, bytes as u64);
             commands.barrier(Access::TransferWrite, Access::HostRead); // staging
         })?;
-        let mut data = vec![T::zeroed(); self.len];
+        let mut data = vec![T::zeroed(); len];
         bytemuck::cast_slice_mut(&mut data).copy_from_slice(&staging.mapped()[..bytes]);
         Ok(data)
     }

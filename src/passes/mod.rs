@@ -8,6 +8,7 @@ use crate::{
     gpu::{Bindings, ComputeDesc, ComputePipeline, Context, GpuError},
 };
 
+mod cast;
 mod compact;
 mod denoise;
 mod primary_hit;
@@ -17,9 +18,11 @@ mod shade;
 mod shadow;
 mod tonemap;
 mod trace;
+mod tree;
 mod visibility;
 
 pub use self::{
+    cast::{Cast, CastResources},
     compact::Compact,
     denoise::Denoise,
     primary_hit::PrimaryHit,
@@ -29,6 +32,7 @@ pub use self::{
     shadow::Shadow,
     tonemap::Tonemap,
     trace::Trace,
+    tree::Tree,
     visibility::Visibility,
 };
 

@@ -2,6 +2,7 @@
 
 use std::{mem::offset_of, sync::Arc};
 
+use super::{Tree, tree};
 use crate::{
     gpu::{
         Binding, BindingKind, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError, Target,
@@ -9,26 +10,20 @@ use crate::{
     },
     kdtree::KdTree,
     layout::{
-        self, BIND_FRAME, BIND_TRIANGLE_IDS, Batch, Bounce, Counters, Frame, Hit, KdNode, Light, Material,
-        RAY_GROUP_SIZE, Ray, SCAN_BLOCK_SIZE, Triangle,
+        self, BIND_TRIANGLE_IDS, Batch, Bounce, Counters, Frame, Hit, Light, Material, RAY_GROUP_SIZE, Ray,
+        SCAN_BLOCK_SIZE,
     },
     scene::Scene,
 };
 
 /// What the kernels read and write. A name is the same here, in the kernels, as debug label and as allocation.
 pub struct Resources {
-    /// One.
-    pub frame: Buffer<Frame>,
-    /// `n_triangles`, like the next.
-    pub triangles: Buffer<Triangle>,
+    pub tree: Tree,
+    /// `n_triangles`.
     pub triangle_materials: Buffer<u32>,
     pub materials: Buffer<Material>,
     /// `n_lights`.
     pub lights: Buffer<Light>,
-    pub kd_nodes: Buffer<KdNode>,
-    /// One a pair of nodes.
-    pub kd_parents: Buffer<u32>,
-    pub leaf_triangles: Buffer<u32>,
     /// Even bounces read the first queue and fill the second, odd ones the other way round; `queue_capacity` each.
     pub ray_queues: [Buffer<Ray>; 2],
     /// Two places a ray: `2 * queue_capacity`.
@@ -75,14 +70,10 @@ impl Resources {
         let size = (constants.width, constants.height);
         let queue = |name| Buffer::new(context, name, capacity, storage);
 
-        let frame = Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?;
-        let triangles = Buffer::with(context, "triangles", &scene.triangles, storage)?;
+        let tree = Tree::new(context, &scene.triangles, tree, constants)?;
         let triangle_materials = Buffer::with(context, "triangle_materials", &scene.triangle_materials, storage)?;
         let materials = Buffer::with(context, "materials", &scene.materials, storage)?;
         let lights = Buffer::with(context, "lights", &scene.lights, storage)?;
-        let kd_nodes = Buffer::with(context, "kd_nodes", &tree.nodes, storage)?;
-        let kd_parents = Buffer::with(context, "kd_parents", &tree.parents, storage)?;
-        let leaf_triangles = Buffer::with(context, "leaf_triangles", &tree.leaf_triangles, storage)?;
         let ray_queues = [queue("ray_queues[0]")?, queue("ray_queues[1]")?];
         let child_rays = Buffer::new(context, "child_rays", 2 * capacity, storage)?;
         let child_counts = Buffer::new(context, "child_counts", capacity, storage)?;
@@ -103,14 +94,10 @@ impl Resources {
 
         let bindings = Bindings::new(context, &binding_kinds(), size_of::<Batch>() as u32)?;
         let mut resources = Self {
-            frame,
-            triangles,
+            tree,
             triangle_materials,
             materials,
             lights,
-            kd_nodes,
-            kd_parents,
-            leaf_triangles,
             ray_queues,
             child_rays,
             child_counts,
@@ -140,15 +127,10 @@ impl Resources {
 
     fn make_set(&self, name: &str, rays: &Buffer<Ray>, next_rays: &Buffer<Ray>) -> Result<BindingSet, GpuError> {
         // In the order of the BIND_ numbers in layout.glsl.
-        let objects = [
-            Binding::Buffer(self.frame.any()),
-            Binding::Buffer(self.triangles.any()),
+        let own = [
             Binding::Buffer(self.triangle_materials.any()),
             Binding::Buffer(self.materials.any()),
             Binding::Buffer(self.lights.any()),
-            Binding::Buffer(self.kd_nodes.any()),
-            Binding::Buffer(self.kd_parents.any()),
-            Binding::Buffer(self.leaf_triangles.any()),
             Binding::Buffer(rays.any()),
             Binding::Buffer(next_rays.any()),
             Binding::Buffer(self.child_rays.any()),
@@ -164,7 +146,7 @@ impl Resources {
             Binding::Image(&self.triangle_ids),
             Binding::Buffer(self.counters.any()),
         ];
-        BindingSet::new(&self.bindings, name, &objects)
+        BindingSet::new(&self.bindings, name, &[&self.tree.objects()[..], &own].concat())
     }
 
     /// Makes room for another number of batches and bounces; contents are undefined.
@@ -239,11 +221,9 @@ pub fn bounce_row(n_rays: u32, n_lights: u32) -> Bounce {
 }
 
 fn binding_kinds() -> Vec<BindingKind> {
-    (0..layout::N_BINDINGS)
-        .map(|binding| match binding {
-            BIND_FRAME => BindingKind::Uniform,
-            BIND_TRIANGLE_IDS => BindingKind::Image,
-            _ => BindingKind::Storage,
-        })
-        .collect()
+    let own = (tree::KINDS.len() as u32..layout::N_BINDINGS).map(|binding| match binding {
+        BIND_TRIANGLE_IDS => BindingKind::Image,
+        _ => BindingKind::Storage,
+    });
+    tree::KINDS.into_iter().chain(own).collect()
 }

@@ -1,0 +1,59 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Cast: one invocation a ray finds its closest hit in (t_min, t_max) through the kd-tree, or with ANY_HIT one that need
+// not be the closest.
+// Reads cast_rays and the tree; writes cast_hits.
+#include "layout.glsl"
+#include "kdtree.glsl"
+
+layout(constant_id = 1) const bool ANY_HIT = false;
+
+layout(local_size_x = RAY_GROUP_SIZE) in;
+layout(push_constant) uniform CastBatchBlock { CastBatch batch; };
+layout(std430, set = 0, binding = BIND_CAST_RAYS) readonly buffer CastRaysBlock { CastRay cast_rays[]; };
+layout(std430, set = 0, binding = BIND_CAST_HITS) writeonly buffer CastHitsBlock { Hit cast_hits[]; };
+
+const uint INFINITY_BITS = 0x7f800000u;
+const float GREATEST = uintBitsToFloat(0x7f7fffffu);
+const Hit MISS = Hit(uintBitsToFloat(INFINITY_BITS), NO_TRIANGLE, 0.0, 0.0);
+
+// By bits, in which magnitudes keep their order: a device may flush a denormal, and need not know a NaN from a number.
+uint magnitude_bits(float x) {
+    return floatBitsToUint(x) & 0x7fffffffu;
+}
+
+uint longest_bits(vec3 v) {
+    return max(max(magnitude_bits(v.x), magnitude_bits(v.y)), magnitude_bits(v.z));
+}
+
+// The longest component's exponent as the bits hold it, 1..254; 0: all but zero, 255: infinite or NaN.
+uint exponent_of(vec3 direction) {
+    return longest_bits(direction) >> 23;
+}
+
+bool is_ray(CastRay ray) {
+    uint exponent = exponent_of(ray.direction);
+    return exponent > 0u && exponent < 255u && longest_bits(ray.origin) < INFINITY_BITS
+        && magnitude_bits(ray.t_min) <= INFINITY_BITS && magnitude_bits(ray.t_max) <= INFINITY_BITS;
+}
+
+// The traversal wants a direction of about unit length. Scaled by a power of two it keeps its bits, and so does t: the
+// hit is that of the direction as it was given. A hit beyond the greatest t is none.
+Hit cast_ray(CastRay ray) {
+    uint exponent = min(exponent_of(ray.direction), 253u);
+    float scale = uintBitsToFloat((254u - exponent) << 23); // 2^(127 - exponent)
+    float inv_scale = uintBitsToFloat(exponent << 23);
+    float t_max = min(ray.t_max, GREATEST) * inv_scale;
+    Ray scaled = Ray(ray.origin, 0u, ray.direction * scale, NO_TRIANGLE, vec3(0.0), t_max);
+    Hit hit = traverse(scaled, ray.t_min * inv_scale, ANY_HIT);
+    if (hit.triangle_ix == NO_TRIANGLE) return MISS;
+    hit.t *= scale;
+    return hit;
+}
+
+void main() {
+    uint ray_ix = gl_GlobalInvocationID.x;
+    if (ray_ix >= batch.n_rays) return;
+    CastRay ray = cast_rays[ray_ix];
+    cast_hits[ray_ix] = is_ray(ray) ? cast_ray(ray) : MISS;
+}

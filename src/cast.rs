@@ -1,0 +1,167 @@
+//! Rays of the caller's own to hits, on a device or on the CPU, without a frame.
+//!
+//! ```text
+//! rays ─> batches ─> cast (the kernel, as often as it is to be timed) ─> hits
+//! ```
+
+use std::{mem, sync::Arc};
+
+use bytemuck::Zeroable;
+use rayon::prelude::*;
+
+pub use crate::layout::{CastRay, Hit, NO_TRIANGLE};
+use crate::{
+    cpu,
+    frame::Traversal,
+    gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Timer},
+    kdtree::KdTree,
+    layout::{Frame, RAY_GROUP_SIZE, Triangle},
+    passes::{self, CastResources, Tree},
+};
+
+/// What is asked of a ray.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Query {
+    /// The hit of smallest t; of several at one t, the triangle of the lowest index.
+    Closest,
+    /// Whether there is a hit: one that need not be the closest.
+    Any,
+}
+
+/// What became of rays.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cast {
+    /// One a ray; t in units of the ray's direction. A miss: t = infinity, triangle_ix = `NO_TRIANGLE`.
+    pub hits: Vec<Hit>,
+    /// The kernel's milliseconds, one entry a repetition, batches added up. None where the device has no timestamps.
+    pub gpu_ms: Option<Vec<f64>>,
+    /// Rays that can only miss: with a NaN, an infinite origin or direction, a direction of zero.
+    pub n_invalid: u64,
+}
+
+/// Rays of a batch: 64 MiB of rays and 32 MiB of hits, enough to fill a large GPU many times over.
+const RAYS_PER_BATCH: usize = 1 << 21;
+
+/// Triangles and their tree on a device, ready for rays.
+pub struct Caster {
+    context: Arc<Context>,
+    tree: Tree,
+    bindings: Arc<Bindings>,
+    traversal: Traversal,
+    /// For [`Query::Closest`] and [`Query::Any`], once they have been asked.
+    closest: Option<passes::Cast>,
+    any: Option<passes::Cast>,
+    resources: CastResources,
+    rays_per_batch: usize,
+}
+
+impl Caster {
+    /// Uploads the triangles and their tree.
+    ///
+    /// # Errors
+    /// The tree is beyond the device's limits or memory.
+    pub fn new(
+        context: &Arc<Context>,
+        triangles: &[Triangle],
+        tree: &KdTree,
+        traversal: Traversal,
+    ) -> Result<Self, GpuError> {
+        let tree = Tree::new(context, triangles, tree, &constants(triangles, tree))?;
+        let bindings = CastResources::bindings(context)?;
+        let resources = CastResources::new(context, &bindings, &tree, 0)?;
+        let rays_per_batch = RAYS_PER_BATCH.min(most_rays(context.limits()));
+        let context = Arc::clone(context);
+        Ok(Self { context, tree, bindings, traversal, closest: None, any: None, resources, rays_per_batch })
+    }
+
+    /// With batches of at most so many rays, as far as the device's limits go.
+    #[must_use]
+    pub fn with_batches_of(self, n_rays: usize) -> Self {
+        Self { rays_per_batch: n_rays.clamp(1, most_rays(self.context.limits())), ..self }
+    }
+
+    /// Casts rays, batch by batch, each batch `n_times` (at least once), all of them with the same hits.
+    ///
+    /// # Errors
+    /// Out of memory, a failed call.
+    pub fn cast(&mut self, rays: &[CastRay], query: Query, n_times: u32) -> Result<Cast, GpuError> {
+        self.prepare(query, rays.len())?;
+        let mut hits = Vec::with_capacity(rays.len());
+        let mut gpu_ms = Some(vec![0.0; n_times.max(1) as usize]);
+        for batch in rays.chunks(self.rays_per_batch) {
+            self.resources.cast_rays.upload(batch)?;
+            let batch_ms = self.run(query, batch.len() as u32, n_times.max(1))?;
+            gpu_ms = gpu_ms.zip(batch_ms).map(|(sums, batch)| sums.iter().zip(batch).map(|(a, b)| a + b).collect());
+            hits.extend(self.resources.cast_hits.download_first(batch.len())?);
+        }
+        let n_invalid = rays.par_iter().filter(|ray| !cpu::cast::is_ray(ray)).count() as u64;
+        Ok(Cast { hits, gpu_ms, n_invalid })
+    }
+
+    /// Makes the query's kernel and room for a batch, unless they are there.
+    fn prepare(&mut self, query: Query, n_rays: usize) -> Result<(), GpuError> {
+        let kernel = match query {
+            Query::Closest => &mut self.closest,
+            Query::Any => &mut self.any,
+        };
+        if kernel.is_none() {
+            *kernel = Some(passes::Cast::new(&self.context, &self.bindings, self.traversal, query)?);
+        }
+        let len = n_rays.min(self.rays_per_batch);
+        if self.resources.cast_rays.len() < len {
+            self.resources = CastResources::new(&self.context, &self.bindings, &self.tree, len)?;
+        }
+        Ok(())
+    }
+
+    /// Runs the kernel on the uploaded batch, one submit a repetition; returns their milliseconds.
+    fn run(&self, query: Query, n_rays: u32, n_times: u32) -> Result<Option<Vec<f64>>, GpuError> {
+        let kernel = match query {
+            Query::Closest => &self.closest,
+            Query::Any => &self.any,
+        };
+        let kernel = kernel.as_ref().expect("`prepare` has made it");
+        let timer = Timer::new(&self.context, n_times)?;
+        let record = |repetition| {
+            CommandBuffer::record(&self.context, "cast", Some(&timer), |commands| {
+                if repetition == 0 {
+                    commands.reset_timer();
+                }
+                // The repetition before has written what this one overwrites: cast_hits.
+                commands.barrier(Access::ComputeWrite, Access::ComputeUpdate);
+                kernel.record(commands, &self.resources, n_rays);
+            })
+        };
+        let buffers = (0..n_times).map(record).collect::<Result<Vec<_>, _>>()?;
+        self.context.submit(&buffers.iter().collect::<Vec<_>>())?;
+        self.context.wait()?;
+        let rows = timer.rows()?;
+        Ok(rows.iter().map(|row| row.span_ms.map(|(begin, end)| end - begin)).collect())
+    }
+}
+
+/// Rays that a batch can have on a device.
+fn most_rays(limits: &Limits) -> usize {
+    let bytes_a_ray = mem::size_of::<CastRay>().max(mem::size_of::<Hit>()) as u64;
+    let in_groups = u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE);
+    (limits.storage_range / bytes_a_ray).min(in_groups) as usize
+}
+
+/// What the traversal reads of a frame.
+fn constants(triangles: &[Triangle], tree: &KdTree) -> Frame {
+    Frame { n_triangles: triangles.len() as u32, cell_min: tree.cell_min, cell_max: tree.cell_max, ..Frame::default() }
+}
+
+/// The hits of a [`Caster`], found on the current rayon pool.
+pub fn cast_on_cpu(
+    triangles: &[Triangle],
+    tree: &KdTree,
+    traversal: Traversal,
+    rays: &[CastRay],
+    query: Query,
+) -> Vec<Hit> {
+    let frame = constants(triangles, tree);
+    let mut hits = vec![Hit::zeroed(); rays.len()];
+    cpu::cast::cast(&cpu::bindings::Bindings::of_tree(triangles, tree, &frame), traversal, query, rays, &mut hits);
+    hits
+}

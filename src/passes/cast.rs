@@ -1,0 +1,71 @@
+//! Cast: each given ray's closest hit through the kd-tree, or any hit; without a frame.
+
+use std::sync::Arc;
+
+use super::{Tree, kernel, spirv, tree};
+use crate::{
+    cast::Query,
+    frame::Traversal,
+    gpu::{
+        Binding, BindingKind, BindingSet, Bindings, Buffer, BufferUse, Commands, ComputePipeline, Context, Dispatch,
+        GpuError,
+    },
+    layout::{CastBatch, CastRay, Hit, RAY_GROUP_SIZE},
+};
+
+/// A batch's buffers and the descriptor set over them and the tree.
+pub struct CastResources {
+    /// Room for a batch, like cast_hits.
+    pub cast_rays: Buffer<CastRay>,
+    pub cast_hits: Buffer<Hit>,
+    pub set: BindingSet,
+}
+
+impl CastResources {
+    /// The layout of the set.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn bindings(context: &Arc<Context>) -> Result<Arc<Bindings>, GpuError> {
+        let kinds = [&tree::KINDS[..], &[BindingKind::Storage; 2]].concat();
+        Bindings::new(context, &kinds, size_of::<CastBatch>() as u32)
+    }
+
+    /// Room for `len` rays.
+    ///
+    /// # Errors
+    /// Beyond the device's limits, out of memory.
+    pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, tree: &Tree, len: usize) -> Result<Self, GpuError> {
+        let cast_rays = Buffer::new(context, "cast_rays", len, BufferUse::Storage)?;
+        let cast_hits = Buffer::new(context, "cast_hits", len, BufferUse::Storage)?;
+        let own = [Binding::Buffer(cast_rays.any()), Binding::Buffer(cast_hits.any())];
+        let set = BindingSet::new(bindings, "cast", &[&tree.objects()[..], &own].concat())?;
+        Ok(Self { cast_rays, cast_hits, set })
+    }
+}
+
+/// The pass's kernel.
+pub struct Cast {
+    kernel: ComputePipeline,
+}
+
+impl Cast {
+    /// # Errors
+    /// The driver refuses the shader.
+    pub fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<Bindings>,
+        traversal: Traversal,
+        query: Query,
+    ) -> Result<Self, GpuError> {
+        let constants = [traversal.constant(), u32::from(query == Query::Any)];
+        Ok(Self { kernel: kernel(context, bindings, "cast", spirv!("cast.comp"), &constants)? })
+    }
+
+    /// Needs the first `n_rays` of cast_rays. Leaves as many cast_hits.
+    pub fn record(&self, commands: &Commands, resources: &CastResources, n_rays: u32) {
+        commands.bind(&resources.set);
+        let dispatch = Dispatch::Threads([n_rays, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
+        commands.dispatch(&self.kernel, None, &CastBatch { n_rays }, dispatch);
+    }
+}
