@@ -34,6 +34,11 @@ impl Difference {
         difference
     }
 
+    /// The greater numbers of both.
+    pub fn max(self, other: Self) -> Self {
+        Self { n_differing: self.n_differing.max(other.n_differing), n_grazing: self.n_grazing.max(other.n_grazing) }
+    }
+
     /// Whether rounding explains it: one in 100,000 rays may slip past an outline that another way of computing hits.
     pub fn is_rounding(&self, n_rays: usize) -> bool {
         self.n_differing <= n_rays as u64 / 100_000

@@ -17,6 +17,7 @@ pub mod difference;
 pub mod paper;
 pub mod rays;
 pub mod stage;
+pub mod traversal;
 
 use serde::Serialize;
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Subcommand, value_parser};
-use kdray::{gpu::DeviceSelector, output};
+use kdray::{frame::Traversal, gpu::DeviceSelector, output};
 
 use crate::cli::{
     args::{Size, device},
@@ -15,6 +15,8 @@ use crate::cli::{
 pub enum Suite {
     /// The paper's table: its four scenes, whole frames on the GPU and on one CPU thread, beside its own times
     Paper(PaperArgs),
+    /// Every way through the kd-tree, on primary, shadow, mirror and diffuse rays of a mesh
+    Traversal(TraversalArgs),
 }
 
 #[derive(clap::Args)]
@@ -34,6 +36,32 @@ pub struct PaperArgs {
     /// Leave the CPU out
     #[arg(long, conflicts_with = "cpu_repeat")]
     pub no_cpu: bool,
+    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
+    pub device: Option<DeviceSelector>,
+    #[command(flatten)]
+    pub files: FileArgs,
+}
+
+#[derive(clap::Args)]
+pub struct TraversalArgs {
+    /// OBJ or scene file
+    pub mesh: PathBuf,
+    /// Pixels, one primary ray each
+    #[arg(long, value_name = "WxH", default_value = "1920x1080")]
+    pub size: Size,
+    /// Ways through the tree, as mask,stack [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub variants: Vec<Traversal>,
+    /// Timed casts of each set of rays
+    #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
+    pub repeat: u16,
+    /// Leave the scene as it is: its own camera and first light, and no closed room around it
+    #[arg(long)]
+    pub no_room: bool,
+    /// Cast on all threads of the CPU, without Vulkan
+    #[arg(long, conflicts_with = "device")]
+    pub cpu: bool,
     /// Device by its index in `kdray devices` or a part of its name [default: the best one]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,

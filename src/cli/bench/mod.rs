@@ -2,6 +2,7 @@
 
 mod args;
 mod paper;
+mod traversal;
 
 pub use args::Suite;
 
@@ -10,5 +11,6 @@ use super::error::CliError;
 pub fn run(suite: &Suite) -> Result<(), CliError> {
     match suite {
         Suite::Paper(args) => paper::run(args),
+        Suite::Traversal(args) => traversal::run(args),
     }
 }
