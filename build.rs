@@ -55,6 +55,7 @@ fn compile(compiler: &shaderc::Compiler, path: &Path, name: &str) -> Result<Vec<
 fn rust_layout(glsl: &str) -> String {
     let mut rust = String::new();
     let mut doc = String::new();
+    let mut structs = String::new(); // the same again as data, for the test against SPIR-V
     let mut layout: Option<(String, usize, usize)> = None; // struct name, bytes so far, widest alignment
     for line in glsl.lines().map(str::trim) {
         if let Some(comment) = line.strip_prefix("//") {
@@ -65,17 +66,20 @@ fn rust_layout(glsl: &str) -> String {
             if line == "};" {
                 assert_eq!(*offset % *widest, 0, "layout.glsl: std430 pads the end of {name} ({offset} bytes)");
                 writeln!(rust, "}}\nconst _: () = assert!(size_of::<{name}>() == {offset});").unwrap();
+                write!(structs, "]),").unwrap();
                 layout = None;
             } else if let Some((ty, member)) = line.trim_end_matches(';').split_once(' ') {
                 let (rust_ty, bytes, align) = rust_type(ty);
                 assert_eq!(*offset % align, 0, "layout.glsl: std430 pads {name}.{member} (offset {offset})");
                 writeln!(rust, "    pub {member}: {rust_ty},").unwrap();
+                write!(structs, "({rust_ty:?}, std::mem::offset_of!({name}, {member})),").unwrap();
                 *offset += bytes;
                 *widest = align.max(*widest);
             }
         } else if let Some(rest) = line.strip_prefix("struct ") {
             let name = rest.trim_end_matches(" {");
             writeln!(rust, "{doc}#[repr(C)]\n#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]\npub struct {name} {{").unwrap();
+            write!(structs, "({name:?}, size_of::<{name}>(), &[").unwrap();
             layout = Some((name.to_owned(), 0, 4));
         } else if let Some((name, value)) = line.strip_prefix("#define ").and_then(|rest| rest.split_once(' ')) {
             let value = value.trim().trim_end_matches('u');
@@ -83,6 +87,8 @@ fn rust_layout(glsl: &str) -> String {
         }
         doc.clear();
     }
+    let members = "/// Name, size, and each member's type and offset.";
+    writeln!(rust, "{members}\n#[cfg(test)]\nconst STRUCTS: &[Struct] = &[{structs}];").unwrap();
     rust
 }
 

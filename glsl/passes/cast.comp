@@ -1,6 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Cast: one invocation a ray finds its closest hit in (t_min, t_max) through the kd-tree, or with ANY_HIT one that need
+// Cast: one invocation a ray finds its closest hit in (t_min, t_max] through the kd-tree, or with ANY_HIT one that need
 // not be the closest.
 // Reads cast_rays and the tree; writes cast_hits.
 #include "layout.glsl"
@@ -14,8 +14,11 @@ layout(std430, set = 0, binding = BIND_CAST_RAYS) readonly buffer CastRaysBlock 
 layout(std430, set = 0, binding = BIND_CAST_HITS) writeonly buffer CastHitsBlock { Hit cast_hits[]; };
 
 const uint INFINITY_BITS = 0x7f800000u;
-const float GREATEST = uintBitsToFloat(0x7f7fffffu);
-const Hit MISS = Hit(uintBitsToFloat(INFINITY_BITS), NO_TRIANGLE, 0.0, 0.0);
+const float GREATEST = 3.40282347e38;
+
+Hit miss() {
+    return Hit(uintBitsToFloat(INFINITY_BITS), NO_TRIANGLE, 0.0, 0.0);
+}
 
 // By bits, in which magnitudes keep their order: a device may flush a denormal, and need not know a NaN from a number.
 uint magnitude_bits(float x) {
@@ -46,7 +49,7 @@ Hit cast_ray(CastRay ray) {
     float t_max = min(ray.t_max, GREATEST) * inv_scale;
     Ray scaled = Ray(ray.origin, 0u, ray.direction * scale, NO_TRIANGLE, vec3(0.0), t_max);
     Hit hit = traverse(scaled, ray.t_min * inv_scale, ANY_HIT);
-    if (hit.triangle_ix == NO_TRIANGLE) return MISS;
+    if (hit.triangle_ix == NO_TRIANGLE) return miss();
     hit.t *= scale;
     return hit;
 }
@@ -55,5 +58,5 @@ void main() {
     uint ray_ix = gl_GlobalInvocationID.x;
     if (ray_ix >= batch.n_rays) return;
     CastRay ray = cast_rays[ray_ix];
-    cast_hits[ray_ix] = is_ray(ray) ? cast_ray(ray) : MISS;
+    cast_hits[ray_ix] = is_ray(ray) ? cast_ray(ray) : miss();
 }

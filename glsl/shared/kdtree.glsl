@@ -135,7 +135,7 @@ void intersect_leaf(TraversalRay ray, KdNode leaf, inout Hit best) {
     }
 }
 
-// The closest hit in (t_min, t_max), or with any_hit one that need not be the closest. A miss keeps t = t_max.
+// The closest hit in (t_min, t_max], or with any_hit one that need not be the closest. A miss keeps t = t_max.
 Hit traverse(Ray ray_in, float t_min, bool any_hit) {
     Hit best = Hit(ray_in.t_max, NO_TRIANGLE, 0.0, 0.0);
     TraversalRay ray = traversal_ray(ray_in, t_min);

@@ -79,7 +79,7 @@ struct Light {
     uint reserved;
 };
 
-// 48 bytes. direction: unit length; t in (0, t_max); source_triangle: where the ray starts, never hit again.
+// 48 bytes. direction: unit length; t in (0, t_max]; source_triangle: where the ray starts, never hit again.
 struct Ray {
     vec3 origin;
     uint pixel_ix;
@@ -89,7 +89,8 @@ struct Ray {
     float t_max;
 };
 
-// 32 bytes. A ray that is cast, not rendered: direction of any length; t in (t_min, t_max), in units of that length.
+// 32 bytes. A ray that is cast, not rendered: direction of any length, which is the unit of t; t in (t_min, t_max], any
+// bounds, but those below 2^-126 may count as 0.
 struct CastRay {
     vec3 origin;
     float t_min;

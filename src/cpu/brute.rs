@@ -3,12 +3,12 @@
 use super::triangle::Shear;
 use crate::layout::{Hit, NO_TRIANGLE, Ray, Triangle};
 
-/// The hit of smallest t in (0, t_max); at one t, that of the lowest index. A miss keeps t = t_max.
+/// The hit of smallest t in (0, t_max]; at one t, that of the lowest index. A miss keeps t = t_max.
 pub fn closest_hit(triangles: &[Triangle], ray: &Ray) -> Hit {
     closest_hit_beyond(triangles, ray, 0.0)
 }
 
-/// As [`closest_hit`], in (t_min, t_max).
+/// As [`closest_hit`], in (t_min, t_max].
 pub fn closest_hit_beyond(triangles: &[Triangle], ray: &Ray, t_min: f32) -> Hit {
     let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
     let mut best = Hit { t: ray.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };

@@ -137,7 +137,7 @@ fn intersect_leaf(bindings: &Bindings, ray: &TraversalRay, leaf: KdNode, best: &
     }
 }
 
-/// The closest hit in (t_min, t_max), or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
+/// The closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
 #[inline]
 pub fn traverse<P: Pending, const ANY_HIT: bool>(
     bindings: &Bindings,
@@ -177,19 +177,19 @@ impl Traverser {
         }
     }
 
-    /// The closest hit in (0, t_max). A miss keeps t = t_max.
+    /// The closest hit in (0, t_max]. A miss keeps t = t_max.
     #[inline]
     pub fn closest_hit(&mut self, bindings: &Bindings, ray: &Ray) -> Hit {
         self.traverse::<false>(bindings, ray, 0.0)
     }
 
-    /// Whether anything lies in (0, t_max).
+    /// Whether anything lies in (0, t_max].
     #[inline]
     pub fn any_hit(&mut self, bindings: &Bindings, ray: &Ray) -> bool {
         self.traverse::<true>(bindings, ray, 0.0).triangle_ix != NO_TRIANGLE
     }
 
-    /// The closest hit in (t_min, t_max), or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
+    /// The closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
     #[inline]
     pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings, ray: &Ray, t_min: f32) -> Hit {
         match self {

@@ -1,0 +1,309 @@
+//! Casts on the device, under the validation layer, and on the CPU, against every triangle of the mesh.
+
+mod support;
+
+use std::{ops::RangeInclusive, sync::Arc};
+
+use glam::{Vec3, vec3};
+use kdray::{
+    cast::{CastRay, Caster, Hit, NO_TRIANGLE, Query, cast_on_cpu},
+    cpu::brute,
+    frame::Traversal,
+    gpu::{Context, ContextOptions},
+    layout::Ray,
+};
+use rayon::prelude::*;
+use support::{
+    World, meshes,
+    random::Random,
+    rays::{nasty_ray, ray},
+};
+
+const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
+const TRAVERSALS: [Traversal; 2] = [Traversal::Mask, Traversal::Stack];
+
+/// A device under validation, which must have had nothing to say when the test ends.
+struct Device(Arc<Context>);
+
+impl Device {
+    fn new() -> Self {
+        Self(Context::new(&ContextOptions { device: None, validate: true }).expect("a device with validation"))
+    }
+
+    fn caster(&self, world: &World, traversal: Traversal) -> Caster {
+        Caster::new(&self.0, &world.triangles, &world.tree, traversal).expect("a caster")
+    }
+
+    /// Rays that may differ from the CPU's: none where the arithmetic is exactly the CPU's; elsewhere divisions are
+    /// 2.5 units in the last place off, and few rays at edges go another way.
+    fn n_outliers(&self, n_rays: usize) -> usize {
+        if self.0.is_software() { 0 } else { n_rays / 500 }
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        if !std::thread::panicking() {
+            assert_eq!(self.0.validation_messages(), Vec::<String>::new());
+        }
+    }
+}
+
+/// A ray of the traversal's tests, with a direction of another length.
+fn scaled(ray: &Ray, t_min: f32, scale: f32) -> CastRay {
+    CastRay { origin: ray.origin, t_min, direction: ray.direction * scale, t_max: ray.t_max / scale }
+}
+
+/// Nasty rays with directions of all lengths, a fourth of them from behind their origins on or from before it.
+fn some_rays(world: &World, n: usize, scale_log2: RangeInclusive<f32>) -> Vec<CastRay> {
+    let some_ray = |i: usize| {
+        let mut random = Random(i as u64);
+        let ray = nasty_ray(&mut random, world, i);
+        let scale = 2f32.powf(random.between(*scale_log2.start(), *scale_log2.end()));
+        let t_min = if i.is_multiple_of(4) { random.between(-1.0, 1.0) * world.radius() / scale } else { 0.0 };
+        scaled(&ray, t_min, scale)
+    };
+    (0..n).map(some_ray).collect()
+}
+
+/// Without the tree, and with the direction as it is.
+fn by_brute_force(world: &World, cast: &CastRay) -> Hit {
+    let ray = Ray { t_max: cast.t_max, ..ray(cast.origin, cast.direction) };
+    let hit = brute::closest_hit_beyond(&world.triangles, &ray, cast.t_min);
+    if hit.triangle_ix == NO_TRIANGLE { MISS } else { hit }
+}
+
+fn all_by_brute_force(world: &World, rays: &[CastRay]) -> Vec<Hit> {
+    rays.par_iter().map(|ray| by_brute_force(world, ray)).collect()
+}
+
+fn is_close(a: &Hit, b: &Hit) -> bool {
+    let near = |a: f32, b: f32, tolerance: f32| a == b || (a - b).abs() <= tolerance * a.abs().max(b.abs());
+    let weights = (a.u - b.u).abs().max((a.v - b.v).abs());
+    a.triangle_ix == b.triangle_ix && near(a.t, b.t, 1e-5) && weights <= 1e-3
+}
+
+/// Says which hits differ: at all where no outliers are allowed, else by more than rounding in more than so many.
+fn compare(n_outliers: usize, expected: &[Hit], found: &[Hit]) -> Result<(), String> {
+    if expected.len() != found.len() {
+        return Err(format!("{} hits, not {}", found.len(), expected.len()));
+    }
+    let same = |a: &Hit, b: &Hit| if n_outliers == 0 { a == b } else { is_close(a, b) };
+    let differ: Vec<_> = (0..found.len()).filter(|&i| !same(&expected[i], &found[i])).collect();
+    match differ.first() {
+        Some(&i) if differ.len() > n_outliers => {
+            Err(format!("{} hits differ; hit {i} is {:?}, not {:?}", differ.len(), found[i], expected[i]))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Whether rays hit anything, by the hits of an any-hit query.
+fn occluded(hits: &[Hit]) -> Vec<bool> {
+    hits.iter().map(|hit| hit.triangle_ix != NO_TRIANGLE).collect()
+}
+
+fn check(device: &Device, world: &World, rays: &[CastRay]) {
+    let expected = all_by_brute_force(world, rays);
+    let n_outliers = device.n_outliers(rays.len());
+    for traversal in TRAVERSALS {
+        let on_cpu = |query| cast_on_cpu(&world.triangles, &world.tree, traversal, rays, query);
+        compare(0, &expected, &on_cpu(Query::Closest)).unwrap();
+        assert_eq!(occluded(&expected), occluded(&on_cpu(Query::Any)));
+        let mut caster = device.caster(world, traversal);
+        let closest = caster.cast(rays, Query::Closest, 1).expect("a cast");
+        compare(n_outliers, &expected, &closest.hits).unwrap();
+        let any = caster.cast(rays, Query::Any, 1).expect("a cast");
+        let (expected, found) = (occluded(&expected), occluded(&any.hits));
+        assert!(expected.iter().zip(&found).filter(|(a, b)| a != b).count() <= n_outliers);
+        assert_eq!((closest.n_invalid, any.n_invalid), (0, 0));
+    }
+}
+
+#[test]
+fn finds_what_brute_force_finds() {
+    let device = Device::new();
+    for triangles in [
+        meshes::torus(40, 20),
+        meshes::cube(9, 0.0),
+        meshes::cube(10, 1.0),
+        meshes::threefold(meshes::torus(20, 10)),
+        meshes::soup(1200, 7),
+        meshes::placed(meshes::torus(40, 20), 1e-6, Vec3::ZERO),
+        meshes::placed(meshes::torus(40, 20), 0.3, vec3(1000.0, -70.0, 3.0)),
+        vec![meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z)],
+    ] {
+        let world = World::new(triangles);
+        check(&device, &world, &some_rays(&world, 20_000, -20.0..=20.0));
+    }
+}
+
+#[test]
+fn any_number_of_rays_in_batches_of_any_size() {
+    let device = Device::new();
+    let world = World::new(meshes::torus(40, 20));
+    for n in [0, 1, 63, 64, 65, 1000] {
+        let rays = some_rays(&world, n, 0.0..=0.0);
+        let expected = all_by_brute_force(&world, &rays);
+        for n_in_batch in [1, 64, 100, 999, 1000, usize::MAX] {
+            if n_in_batch == 1 && n > 65 {
+                continue; // a thousand submits
+            }
+            let mut caster = device.caster(&world, Traversal::Mask).with_batches_of(n_in_batch);
+            let cast = caster.cast(&rays, Query::Closest, 1).expect("a cast");
+            compare(device.n_outliers(n).max(usize::from(!device.0.is_software())), &expected, &cast.hits).unwrap();
+        }
+    }
+}
+
+/// The same caster with more rays, fewer, other ones: nothing is left of the cast before.
+#[test]
+fn casts_follow_one_another() {
+    let device = Device::new();
+    let world = World::new(meshes::cube(9, 0.0));
+    let mut caster = device.caster(&world, Traversal::Mask).with_batches_of(300);
+    for n in [10, 1000, 5, 0, 250] {
+        let rays = some_rays(&world, n, -1.0..=1.0);
+        let cast = caster.cast(&rays, Query::Closest, 1).expect("a cast");
+        compare(n / 100 * device.n_outliers(500), &all_by_brute_force(&world, &rays), &cast.hits).unwrap();
+    }
+}
+
+#[test]
+fn repetitions_are_timed_one_by_one() {
+    let device = Device::new();
+    let world = World::new(meshes::torus(40, 20));
+    let rays = some_rays(&world, 1000, 0.0..=0.0);
+    let mut caster = device.caster(&world, Traversal::Mask).with_batches_of(300);
+    let once = caster.cast(&rays, Query::Closest, 1).expect("a cast");
+    let often = caster.cast(&rays, Query::Closest, 5).expect("a cast");
+    assert_eq!(once.hits, often.hits);
+    let times = often.gpu_ms.expect("the device has timestamps");
+    assert!(times.len() == 5 && times.iter().all(|ms| *ms > 0.0 && ms.is_finite()), "{times:?}");
+    assert_eq!(caster.cast(&[], Query::Closest, 3).expect("a cast").gpu_ms, Some(vec![0.0; 3]));
+}
+
+/// The interval holds its far end and not its near one, to the last bit.
+#[test]
+fn the_interval_s_ends_are_exact() {
+    let device = Device::new();
+    let world = World::new(meshes::torus(40, 20));
+    let rays: Vec<_> = some_rays(&world, 5000, -9.0..=9.0);
+    let mut caster = device.caster(&world, Traversal::Mask);
+    let mut cast = |rays: &[CastRay]| {
+        let on_cpu = cast_on_cpu(&world.triangles, &world.tree, Traversal::Mask, rays, Query::Closest);
+        let found = caster.cast(rays, Query::Closest, 1).expect("a cast").hits;
+        compare(device.n_outliers(rays.len()), &on_cpu, &found).unwrap();
+        found
+    };
+    let first = cast(&rays);
+    let (rays, first): (Vec<_>, Vec<_>) = rays.into_iter().zip(first).filter(|(_, hit)| hit.t.is_normal()).unzip();
+    assert!(first.len() > 1000);
+    let with = |ends: &dyn Fn(&CastRay, f32) -> CastRay| -> Vec<_> {
+        rays.iter().zip(&first).map(|(ray, hit)| ends(ray, hit.t)).collect()
+    };
+    let before = cast(&with(&|ray, t| CastRay { t_max: t.next_down(), ..*ray }));
+    let wrong = before.iter().position(|hit| *hit != MISS).map(|i| (&rays[i], &first[i], &before[i]));
+    assert_eq!(wrong, None, "a hit beyond the end");
+    assert_eq!(cast(&with(&|ray, t| CastRay { t_max: t, ..*ray })), first);
+    assert_eq!(cast(&with(&|ray, t| CastRay { t_min: t.next_down(), ..*ray })), first);
+    let behind = cast(&with(&|ray, t| CastRay { t_min: t, ..*ray }));
+    assert!(behind.iter().zip(&first).all(|(hit, first)| hit.t > first.t));
+    let empty = cast(&with(&|ray, t| CastRay { t_min: t.next_up(), t_max: t.next_down(), ..*ray }));
+    assert!(empty.iter().all(|hit| *hit == MISS));
+}
+
+/// A direction of any length that a float holds without denormals.
+#[test]
+fn the_direction_s_length_is_the_unit_of_t() {
+    let device = Device::new();
+    let world = World::new(meshes::torus(40, 20));
+    let unit = ray(vec3(0.05, 3.0, 1.02), Vec3::NEG_Y);
+    let expected = by_brute_force(&world, &scaled(&unit, 0.0, 1.0));
+    assert!(expected.t > 2.0 && expected.t < 3.0);
+    let exponents = -126..=127;
+    let rays: Vec<_> = exponents.clone().map(|e| scaled(&unit, 0.0, 2f32.powi(e))).collect();
+    let found = device.caster(&world, Traversal::Mask).cast(&rays, Query::Closest, 1).expect("a cast");
+    let on_cpu = cast_on_cpu(&world.triangles, &world.tree, Traversal::Mask, &rays, Query::Closest);
+    for ((e, found), on_cpu) in exponents.zip(&found.hits).zip(&on_cpu) {
+        let t = (f64::from(expected.t) / 2f64.powi(e)) as f32;
+        // Beyond the greatest float there is no hit; below the least normal one a device may flush t to zero.
+        let wanted = if t == f32::INFINITY { MISS } else { Hit { t, ..expected } };
+        assert!(is_close(on_cpu, &wanted) || t < f32::MIN_POSITIVE, "CPU: 2^{e}: {on_cpu:?}, not {wanted:?}");
+        assert!(is_close(found, &wanted) || t < f32::MIN_POSITIVE, "2^{e}: {found:?}, not {wanted:?}");
+    }
+    assert_eq!(found.n_invalid, 0);
+}
+
+fn with(mut v: Vec3, axis: usize, value: f32) -> Vec3 {
+    v[axis] = value;
+    v
+}
+
+#[test]
+fn what_is_no_ray_misses_and_is_counted() {
+    let device = Device::new();
+    let world = World::new(meshes::torus(40, 20));
+    let good = CastRay { origin: vec3(0.05, 3.0, 1.02), t_min: 0.0, direction: Vec3::NEG_Y, t_max: f32::INFINITY };
+    assert_ne!(by_brute_force(&world, &good), MISS);
+    let mut none = vec![CastRay { t_min: f32::NAN, ..good }, CastRay { t_max: f32::NAN, ..good }];
+    none.extend([0.0, -0.0, 1e-40, -1e-45].map(|short| CastRay { direction: Vec3::splat(short), ..good }));
+    for axis in 0..3 {
+        for wrong in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            none.push(CastRay { origin: with(good.origin, axis, wrong), ..good });
+            none.push(CastRay { direction: with(good.direction, axis, wrong), ..good });
+        }
+    }
+    let empty = [(1.0, 1.0), (5.0, -5.0), (f32::INFINITY, f32::INFINITY), (0.0, f32::NEG_INFINITY), (0.0, 0.0)];
+    let must_miss: Vec<_> = empty.map(|(t_min, t_max)| CastRay { t_min, t_max, ..good }).into();
+    let mut far = vec![CastRay { t_min: f32::NEG_INFINITY, ..good }];
+    for wrong in [f32::MAX, f32::MIN_POSITIVE, 1e-40, -1e30, 1e20] {
+        far.extend((0..3).map(|axis| CastRay { origin: with(good.origin, axis, wrong), ..good }));
+        far.extend([0, 2].map(|axis| CastRay { direction: with(good.direction, axis, wrong), ..good }));
+    }
+    let rays = [&none[..], &must_miss, &far, &[good]].concat();
+    for traversal in TRAVERSALS {
+        for query in [Query::Closest, Query::Any] {
+            let cast = device.caster(&world, traversal).cast(&rays, query, 1).expect("a cast");
+            let on_cpu = cast_on_cpu(&world.triangles, &world.tree, traversal, &rays, query);
+            for hits in [&cast.hits, &on_cpu] {
+                let n_misses = none.len() + must_miss.len();
+                assert!(hits[..n_misses].iter().all(|hit| *hit == MISS), "{traversal}, {query:?}: {hits:?}");
+                assert_ne!(hits[n_misses], MISS, "from minus infinity");
+                assert_ne!(hits.last(), Some(&MISS));
+            }
+            assert_eq!(cast.n_invalid, none.len() as u64);
+        }
+    }
+}
+
+#[test]
+fn nothing_is_hit_in_an_empty_world() {
+    let device = Device::new();
+    let world = World::new(Vec::new());
+    let rays = [ray(Vec3::ZERO, Vec3::X), ray(Vec3::ONE, Vec3::NEG_ONE)].map(|ray| scaled(&ray, 0.0, 1.0));
+    let cast = device.caster(&world, Traversal::Mask).cast(&rays, Query::Closest, 1).expect("a cast");
+    assert_eq!(cast.hits, [MISS; 2]);
+    assert_eq!(cast_on_cpu(&[], &world.tree, Traversal::Mask, &rays, Query::Closest), [MISS; 2]);
+}
+
+#[test]
+fn a_wrong_hit_is_noticed() {
+    let world = World::new(meshes::torus(40, 20));
+    let rays = some_rays(&world, 1000, 0.0..=0.0);
+    let hits = cast_on_cpu(&world.triangles, &world.tree, Traversal::Mask, &rays, Query::Closest);
+    compare(0, &hits, &hits).unwrap();
+    let struck = hits.iter().position(|hit| hit.triangle_ix != NO_TRIANGLE).expect("a hit");
+    let wrong: [fn(&mut Hit); 4] =
+        [|hit| hit.t *= 1.0 + 1e-4, |hit| hit.triangle_ix ^= 1, |hit| hit.u += 0.01, |hit| *hit = MISS];
+    for spoil in wrong {
+        let mut spoilt = hits.clone();
+        spoil(&mut spoilt[struck]);
+        assert!(compare(0, &hits, &spoilt).is_err());
+        assert!(!is_close(&hits[struck], &spoilt[struck]));
+    }
+    let mut last_bit = hits.clone();
+    last_bit[struck].t = last_bit[struck].t.next_up();
+    assert!(compare(0, &hits, &last_bit).is_err() && compare(1, &hits, &last_bit).is_ok());
+    assert!(compare(9, &hits, &hits[1..]).is_err());
+}
