@@ -118,6 +118,7 @@ impl BarChart {
         chart
             .configure_mesh()
             .disable_x_mesh()
+            .y_max_light_lines(1)
             .x_labels(0)
             .y_desc(&self.unit)
             .y_label_formatter(&|place| self.scale.label(*place))

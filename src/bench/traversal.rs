@@ -14,7 +14,10 @@ use super::{
 };
 use crate::{
     cast::{CastRay, Caster, Query},
-    cpu,
+    cpu::{
+        self,
+        steps::{Steps, count_steps},
+    },
     frame::Traversal,
     gpu::{Context, GpuError},
     kdtree::Statistics,
@@ -60,10 +63,13 @@ impl<'a> Tracers<'a> {
                 *difference = difference.max(Difference::of(set.kind, &expected, &hits));
             }
         }
+        let bindings = self.stage.bindings();
         let result = |(&variant, (ms, difference)): (&Traversal, (Option<Vec<f64>>, _))| {
             let ms = ms.and_then(Spread::of);
             let mrays_per_s = ms.and_then(|ms| ms.mrays_per_s(rays.len() as u64));
-            VariantResult { traversal: variant.to_string(), ms, mrays_per_s, difference }
+            let steps = count_steps(&bindings, variant, query, &set.rays);
+            let steps_a_ray = StepsARay::new(&steps, rays.len());
+            VariantResult { traversal: variant.to_string(), ms, mrays_per_s, difference, steps_a_ray }
         };
         Ok(SetResult {
             rays: set.kind,
@@ -132,6 +138,25 @@ pub struct VariantResult {
     /// From the CPU's hits, in the worst turn.
     #[serde(flatten)]
     pub difference: Difference,
+    /// As the CPU takes them.
+    pub steps_a_ray: StepsARay,
+}
+
+/// What is read of the tree, in the mean of a set's rays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct StepsARay {
+    pub nodes: f64,
+    /// Links to parents.
+    pub parents: f64,
+    /// Triangle tests.
+    pub triangles: f64,
+}
+
+impl StepsARay {
+    fn new(steps: &Steps, n_rays: usize) -> Self {
+        let mean = |n: u64| n as f64 / n_rays.max(1) as f64;
+        Self { nodes: mean(steps.n_nodes), parents: mean(steps.n_parents), triangles: mean(steps.n_triangles) }
+    }
 }
 
 /// What the suite found.

@@ -1,24 +1,25 @@
 //! What the kernels only read, under the kernels' names.
 
+use super::table::{Counted, ReadCounts, Table, Uncounted};
 use crate::{
     kdtree::KdTree,
     layout::{Frame, KdNode, Light, Material, Triangle},
     scene::Scene,
 };
 
-/// The scene, its tree and the frame's constants.
+/// The scene, its tree and the frame's constants. `R`: who is told of reads of the tree.
 #[derive(Clone, Copy, Debug)]
-pub struct Bindings<'a> {
+pub struct Bindings<'a, R = Uncounted> {
     pub frame: &'a Frame,
     pub triangles: &'a [Triangle],
     /// One index into `materials` a triangle.
     pub triangle_materials: &'a [u32],
     pub materials: &'a [Material],
     pub lights: &'a [Light],
-    pub kd_nodes: &'a [KdNode],
+    pub kd_nodes: Table<'a, KdNode, R>,
     /// One a pair of nodes.
-    pub kd_parents: &'a [u32],
-    pub leaf_triangles: &'a [u32],
+    pub kd_parents: Table<'a, u32, R>,
+    pub leaf_triangles: Table<'a, u32, R>,
 }
 
 impl<'a> Bindings<'a> {
@@ -39,9 +40,23 @@ impl<'a> Bindings<'a> {
             triangle_materials: &[],
             materials: &[],
             lights: &[],
-            kd_nodes: &tree.nodes,
-            kd_parents: &tree.parents,
-            leaf_triangles: &tree.leaf_triangles,
+            kd_nodes: Table::from(&*tree.nodes),
+            kd_parents: Table::from(&*tree.parents),
+            leaf_triangles: Table::from(&*tree.leaf_triangles),
+        }
+    }
+
+    /// The same, with reads of the tree counted.
+    pub fn counted<'c>(self, counts: &'c ReadCounts) -> Bindings<'a, Counted<'c>> {
+        Bindings {
+            frame: self.frame,
+            triangles: self.triangles,
+            triangle_materials: self.triangle_materials,
+            materials: self.materials,
+            lights: self.lights,
+            kd_nodes: self.kd_nodes.told_to(Counted(&counts.n_nodes)),
+            kd_parents: self.kd_parents.told_to(Counted(&counts.n_parents)),
+            leaf_triangles: self.leaf_triangles.told_to(Counted(&counts.n_triangles)),
         }
     }
 }

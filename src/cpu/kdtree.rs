@@ -1,6 +1,8 @@
 //! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree.glsl`.
 
-use super::{bindings::Bindings, pending_mask::PendingMask, pending_stack::PendingStack, triangle::Shear};
+use super::{
+    bindings::Bindings, pending_mask::PendingMask, pending_stack::PendingStack, table::Reads, triangle::Shear,
+};
 use crate::{
     frame::Traversal,
     layout::{Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KdNode, NO_TRIANGLE, Ray},
@@ -45,7 +47,7 @@ pub fn max(x: f32, y: f32) -> f32 {
 
 impl TraversalRay {
     #[inline]
-    pub fn new(bindings: &Bindings, ray: &Ray, t_min: f32) -> Self {
+    pub fn new(bindings: &Bindings<impl Reads>, ray: &Ray, t_min: f32) -> Self {
         let origin = ray.origin.to_array();
         let cell_min = bindings.frame.cell_min.to_array();
         let cell_max = bindings.frame.cell_max.to_array();
@@ -98,12 +100,17 @@ pub trait Pending {
     fn clear(&mut self);
     fn push(&mut self, second_ix: u32, cell: &Cell, t_cross: [f32; 2]);
     /// The next pending cell that may hold a hit nearer than `t_best`, or false.
-    fn pop(&mut self, bindings: &Bindings, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool;
+    fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool;
 }
 
 /// Down to the leaf where the ray enters the cell. A NaN fails both tests and goes to the first child: it ends.
 #[inline(always)]
-fn descend<P: Pending>(bindings: &Bindings, ray: &TraversalRay, pending: &mut P, cell: &mut Cell) -> KdNode {
+fn descend<P: Pending>(
+    bindings: &Bindings<impl Reads>,
+    ray: &TraversalRay,
+    pending: &mut P,
+    cell: &mut Cell,
+) -> KdNode {
     let mut node = bindings.kd_nodes[cell.node_ix as usize];
     while axis_of(node) != KD_LEAF {
         let t_cross = ray.crossing(node);
@@ -124,7 +131,7 @@ fn descend<P: Pending>(bindings: &Bindings, ray: &TraversalRay, pending: &mut P,
 
 /// The leaf's triangles against the ray; of two hits at one t the lower index wins, whatever the order of leaves.
 #[inline(always)]
-fn intersect_leaf(bindings: &Bindings, ray: &TraversalRay, leaf: KdNode, best: &mut Hit) {
+fn intersect_leaf(bindings: &Bindings<impl Reads>, ray: &TraversalRay, leaf: KdNode, best: &mut Hit) {
     let first = leaf.split_or_first as usize;
     let end = first + (leaf.axis_and_child >> KD_CHILD_SHIFT) as usize;
     for &triangle_ix in &bindings.leaf_triangles[first..end] {
@@ -140,7 +147,7 @@ fn intersect_leaf(bindings: &Bindings, ray: &TraversalRay, leaf: KdNode, best: &
 /// The closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
 #[inline]
 pub fn traverse<P: Pending, const ANY_HIT: bool>(
-    bindings: &Bindings,
+    bindings: &Bindings<impl Reads>,
     pending: &mut P,
     ray_in: &Ray,
     t_min: f32,
@@ -179,19 +186,19 @@ impl Traverser {
 
     /// The closest hit in (0, t_max]. A miss keeps t = t_max.
     #[inline]
-    pub fn closest_hit(&mut self, bindings: &Bindings, ray: &Ray) -> Hit {
+    pub fn closest_hit(&mut self, bindings: &Bindings<impl Reads>, ray: &Ray) -> Hit {
         self.traverse::<false>(bindings, ray, 0.0)
     }
 
     /// Whether anything lies in (0, t_max].
     #[inline]
-    pub fn any_hit(&mut self, bindings: &Bindings, ray: &Ray) -> bool {
+    pub fn any_hit(&mut self, bindings: &Bindings<impl Reads>, ray: &Ray) -> bool {
         self.traverse::<true>(bindings, ray, 0.0).triangle_ix != NO_TRIANGLE
     }
 
     /// The closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings, ray: &Ray, t_min: f32) -> Hit {
+    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl Reads>, ray: &Ray, t_min: f32) -> Hit {
         match self {
             Self::Mask(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray, t_min),
             Self::Stack(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray, t_min),

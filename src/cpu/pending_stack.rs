@@ -3,6 +3,7 @@
 use super::{
     bindings::Bindings,
     kdtree::{Cell, Pending, TraversalRay, max, min},
+    table::Reads,
 };
 use crate::layout::KD_MAX_DEPTH;
 
@@ -29,7 +30,7 @@ impl Pending for PendingStack {
     }
 
     #[inline(always)]
-    fn pop(&mut self, _: &Bindings, _: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+    fn pop(&mut self, _: &Bindings<impl Reads>, _: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
         while self.size > 0 {
             self.size -= 1;
             let (node_ix, t_enter, t_exit) = self.entries[self.size];

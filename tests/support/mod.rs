@@ -30,16 +30,7 @@ impl World {
     }
 
     pub fn bindings(&self) -> Bindings<'_> {
-        Bindings {
-            frame: &self.frame,
-            triangles: &self.triangles,
-            triangle_materials: &[],
-            materials: &[],
-            lights: &[],
-            kd_nodes: &self.tree.nodes,
-            kd_parents: &self.tree.parents,
-            leaf_triangles: &self.tree.leaf_triangles,
-        }
+        Bindings::of_tree(&self.triangles, &self.tree, &self.frame)
     }
 
     /// The middle of the root's cell.

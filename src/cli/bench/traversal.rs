@@ -93,20 +93,25 @@ fn text(report: &Report) -> String {
     text += &format!(", medians of {}\n\n", report.n_times);
     let rows: Vec<_> =
         report.sets.iter().flat_map(|set| set.variants.iter().map(|variant| cells(set, variant))).collect();
-    text += &table(["rays", "number", "hits", "variant", "Mrays/s", "differing", "grazing"], &rows);
+    let header = ["rays", "number", "hits", "variant", "Mrays/s", "nodes", "parents", "tests", "differing", "grazing"];
+    text += &table(header, &rows);
+    text += "\nNodes, parent links and triangle tests: the mean of a ray. Differing: from the CPU's hits.\n";
     if report.sets.iter().flat_map(|set| &set.variants).any(|variant| variant.ms.is_none()) {
-        text += "\nThis device has no timestamps: speeds are unknown.\n";
+        text += "This device has no timestamps: speeds are unknown.\n";
     }
     text
 }
 
-fn cells(set: &SetResult, variant: &VariantResult) -> [String; 7] {
+fn cells(set: &SetResult, variant: &VariantResult) -> [String; 10] {
     [
         set.rays.name().to_owned(),
         set.n_rays.to_string(),
         set.n_hits.to_string(),
         variant.traversal.clone(),
         decimal(variant.mrays_per_s.map(|rate| rate.median), 2),
+        decimal(Some(variant.steps_a_ray.nodes), 1),
+        decimal(Some(variant.steps_a_ray.parents), 1),
+        decimal(Some(variant.steps_a_ray.triangles), 1),
         variant.difference.n_differing.to_string(),
         variant.difference.n_grazing.to_string(),
     ]
