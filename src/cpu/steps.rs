@@ -72,7 +72,7 @@ mod tests {
 
     fn steps(max_depth: u32, traversal: Traversal, query: Query, rays: &[Ray]) -> Steps {
         let triangles = two_triangles();
-        let options = BuildOptions { max_depth: Some(max_depth), ..BuildOptions::default() };
+        let options = BuildOptions { traversal_cost: 1e-3, max_depth: Some(max_depth), ..BuildOptions::default() };
         let tree = KdTree::build(&triangles, &options);
         let frame = Frame { cell_min: tree.cell_min, cell_max: tree.cell_max, ..Frame::default() };
         count_steps(&Bindings::of_tree(&triangles, &tree, &frame), traversal, query, rays)
