@@ -27,7 +27,8 @@ mod tests {
             BIND_KD_NODES => Some("KdNode"),
             BIND_RAYS | BIND_NEXT_RAYS | BIND_CHILD_RAYS => Some("Ray"),
             BIND_BOUNCES => Some("Bounce"),
-            BIND_HITS => Some("Hit"),
+            BIND_HITS | BIND_CAST_HITS => Some("Hit"),
+            BIND_CAST_RAYS => Some("CastRay"),
             BIND_COUNTERS => Some("Counters"),
             _ => None,
         }
@@ -77,6 +78,8 @@ mod tests {
         variables
             .filter_map(|variable| match variable {
                 Variable::Descriptor { desc_bind, ty, .. } => Some((struct_at(desc_bind.bind())?, ty)),
+                // Two kinds of kernels, told apart by the one number that a cast's are given.
+                Variable::PushConstant { ty, .. } if members_of(&ty).0.len() == 1 => Some(("CastBatch", ty)),
                 Variable::PushConstant { ty, .. } => Some(("Batch", ty)),
                 _ => None,
             })

@@ -169,17 +169,15 @@ struct CastBatch {
     uint n_rays;
 };
 
-// Bindings of the traversal, with which each of the two descriptor sets begins.
+// Bindings of the frame's descriptor set.
 #define BIND_FRAME 0u
 #define BIND_TRIANGLES 1u
-#define BIND_KD_NODES 2u
-#define BIND_KD_PARENTS 3u
-#define BIND_LEAF_TRIANGLES 4u
-
-// The frame's set goes on.
-#define BIND_TRIANGLE_MATERIALS 5u
-#define BIND_MATERIALS 6u
-#define BIND_LIGHTS 7u
+#define BIND_TRIANGLE_MATERIALS 2u
+#define BIND_MATERIALS 3u
+#define BIND_LIGHTS 4u
+#define BIND_KD_NODES 5u
+#define BIND_KD_PARENTS 6u
+#define BIND_LEAF_TRIANGLES 7u
 #define BIND_RAYS 8u
 #define BIND_NEXT_RAYS 9u
 #define BIND_CHILD_RAYS 10u
@@ -196,8 +194,8 @@ struct CastBatch {
 #define BIND_COUNTERS 21u
 #define N_BINDINGS 22u
 
-// The cast's set goes on.
-#define BIND_CAST_RAYS 5u
-#define BIND_CAST_HITS 6u
+// A cast's descriptor set has these and what the traversal reads: 0, 1, 5, 6, 7.
+#define BIND_CAST_RAYS 22u
+#define BIND_CAST_HITS 23u
 
 #endif

@@ -1,4 +1,4 @@
-//! One descriptor set layout for all pipelines, and its sets.
+//! Descriptor set layouts, each shared by several pipelines, and their sets.
 
 use std::sync::Arc;
 
@@ -31,23 +31,24 @@ pub enum Binding<'a> {
     Image(&'a Target),
 }
 
-/// The layout of the one set, shared by all pipelines: binding `i` is of kind `kinds[i]`.
+/// The layout of a set, shared by all pipelines that use it.
 pub struct Bindings {
     pub(super) set_layout: vk::DescriptorSetLayout,
     pub(super) pipeline_layout: vk::PipelineLayout,
-    kinds: Vec<BindingKind>,
+    /// By binding number.
+    kinds: Vec<(u32, BindingKind)>,
     context: Arc<Context>,
 }
 
 impl Bindings {
-    /// `push_bytes`: size of the push constants, for all stages.
-    pub fn new(context: &Arc<Context>, kinds: &[BindingKind], push_bytes: u32) -> Result<Arc<Self>, GpuError> {
+    /// `kinds`: the bindings' numbers and what they hold; `push_bytes`: size of the push constants, for all stages.
+    pub fn new(context: &Arc<Context>, kinds: &[(u32, BindingKind)], push_bytes: u32) -> Result<Arc<Self>, GpuError> {
         let stages = context.stages();
-        let bindings: Vec<_> = (0..)
-            .zip(kinds)
+        let bindings: Vec<_> = kinds
+            .iter()
             .map(|(binding, kind)| {
                 vk::DescriptorSetLayoutBinding::default()
-                    .binding(binding)
+                    .binding(*binding)
                     .descriptor_type(kind.descriptor())
                     .descriptor_count(1)
                     .stage_flags(stages)
@@ -96,14 +97,14 @@ pub struct BindingSet {
 }
 
 impl BindingSet {
-    /// `objects[i]` is bound at number `i`.
-    pub fn new(bindings: &Arc<Bindings>, name: &str, objects: &[Binding]) -> Result<Self, GpuError> {
+    /// `objects`: one for each of the bindings, with its number.
+    pub fn new(bindings: &Arc<Bindings>, name: &str, objects: &[(u32, Binding)]) -> Result<Self, GpuError> {
         assert_eq!(objects.len(), bindings.kinds.len(), "one object a binding");
         let context = &bindings.context;
         let sizes: Vec<_> = bindings
             .kinds
             .iter()
-            .map(|kind| vk::DescriptorPoolSize { ty: kind.descriptor(), descriptor_count: 1 })
+            .map(|(_, kind)| vk::DescriptorPoolSize { ty: kind.descriptor(), descriptor_count: 1 })
             .collect();
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
         // SAFETY: the pool has room for exactly this set and goes with it.
@@ -125,11 +126,13 @@ impl BindingSet {
         }
     }
 
-    fn write(&self, objects: &[Binding]) {
-        for (binding, (kind, object)) in (0..).zip(self.bindings.kinds.iter().zip(objects)) {
+    fn write(&self, objects: &[(u32, Binding)]) {
+        for (binding, object) in objects {
+            let known = self.bindings.kinds.iter().find(|(known, _)| known == binding);
+            let (_, kind) = known.unwrap_or_else(|| panic!("the set has no binding {binding}"));
             let write = vk::WriteDescriptorSet::default()
                 .dst_set(self.raw)
-                .dst_binding(binding)
+                .dst_binding(*binding)
                 .descriptor_type(kind.descriptor());
             let buffer_info;
             let image_info;

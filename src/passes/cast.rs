@@ -2,15 +2,12 @@
 
 use std::sync::Arc;
 
-use super::{Tree, kernel, spirv, tree};
+use super::{Tree, binding, kernel, spirv, tree};
 use crate::{
     cast::Query,
     frame::Traversal,
-    gpu::{
-        Binding, BindingKind, BindingSet, Bindings, Buffer, BufferUse, Commands, ComputePipeline, Context, Dispatch,
-        GpuError,
-    },
-    layout::{CastBatch, CastRay, Hit, RAY_GROUP_SIZE},
+    gpu::{Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, ComputePipeline, Context, Dispatch, GpuError},
+    layout::{BIND_CAST_HITS, BIND_CAST_RAYS, CastBatch, CastRay, Hit, RAY_GROUP_SIZE},
 };
 
 /// A batch's buffers and the descriptor set over them and the tree.
@@ -27,7 +24,7 @@ impl CastResources {
     /// # Errors
     /// Out of memory.
     pub fn bindings(context: &Arc<Context>) -> Result<Arc<Bindings>, GpuError> {
-        let kinds = [&tree::KINDS[..], &[BindingKind::Storage; 2]].concat();
+        let kinds: Vec<_> = tree::BINDINGS.into_iter().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
         Bindings::new(context, &kinds, size_of::<CastBatch>() as u32)
     }
 
@@ -38,7 +35,8 @@ impl CastResources {
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, tree: &Tree, len: usize) -> Result<Self, GpuError> {
         let cast_rays = Buffer::new(context, "cast_rays", len, BufferUse::Storage)?;
         let cast_hits = Buffer::new(context, "cast_hits", len, BufferUse::Storage)?;
-        let own = [Binding::Buffer(cast_rays.any()), Binding::Buffer(cast_hits.any())];
+        let own =
+            [(BIND_CAST_RAYS, Binding::Buffer(cast_rays.any())), (BIND_CAST_HITS, Binding::Buffer(cast_hits.any()))];
         let set = BindingSet::new(bindings, "cast", &[&tree.objects()[..], &own].concat())?;
         Ok(Self { cast_rays, cast_hits, set })
     }

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use crate::{
     frame::{Primary, RenderOptions},
-    gpu::{Bindings, ComputeDesc, ComputePipeline, Context, GpuError},
+    gpu::{BindingKind, Bindings, ComputeDesc, ComputePipeline, Context, GpuError},
+    layout::{BIND_FRAME, BIND_TRIANGLE_IDS},
 };
 
 mod cast;
@@ -73,6 +74,16 @@ impl Passes {
             tonemap: Tonemap::new(context, bindings)?,
         })
     }
+}
+
+/// A binding number of layout.glsl and what it holds.
+fn binding(number: u32) -> (u32, BindingKind) {
+    let kind = match number {
+        BIND_FRAME => BindingKind::Uniform,
+        BIND_TRIANGLE_IDS => BindingKind::Image,
+        _ => BindingKind::Storage,
+    };
+    (number, kind)
 }
 
 /// A kernel without subgroup requirements.

@@ -2,17 +2,13 @@
 
 use std::{mem::offset_of, sync::Arc};
 
-use super::{Tree, tree};
+use super::{Tree, binding};
 use crate::{
     gpu::{
-        Binding, BindingKind, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError, Target,
-        TargetKind,
+        Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError, Target, TargetKind,
     },
     kdtree::KdTree,
-    layout::{
-        self, BIND_TRIANGLE_IDS, Batch, Bounce, Counters, Frame, Hit, Light, Material, RAY_GROUP_SIZE, Ray,
-        SCAN_BLOCK_SIZE,
-    },
+    layout::{self, Batch, Bounce, Counters, Frame, Hit, Light, Material, RAY_GROUP_SIZE, Ray, SCAN_BLOCK_SIZE},
     scene::Scene,
 };
 
@@ -92,7 +88,8 @@ impl Resources {
         let triangle_ids = Target::new(context, "triangle_ids", TargetKind::Id, size)?;
         let depth = Target::new(context, "depth", TargetKind::Depth, size)?;
 
-        let bindings = Bindings::new(context, &binding_kinds(), size_of::<Batch>() as u32)?;
+        let kinds: Vec<_> = (0..layout::N_BINDINGS).map(binding).collect();
+        let bindings = Bindings::new(context, &kinds, size_of::<Batch>() as u32)?;
         let mut resources = Self {
             tree,
             triangle_materials,
@@ -126,25 +123,24 @@ impl Resources {
     }
 
     fn make_set(&self, name: &str, rays: &Buffer<Ray>, next_rays: &Buffer<Ray>) -> Result<BindingSet, GpuError> {
-        // In the order of the BIND_ numbers in layout.glsl.
         let own = [
-            Binding::Buffer(self.triangle_materials.any()),
-            Binding::Buffer(self.materials.any()),
-            Binding::Buffer(self.lights.any()),
-            Binding::Buffer(rays.any()),
-            Binding::Buffer(next_rays.any()),
-            Binding::Buffer(self.child_rays.any()),
-            Binding::Buffer(self.child_counts.any()),
-            Binding::Buffer(self.scan_blocks.any()),
-            Binding::Buffer(self.bounces.any()),
-            Binding::Buffer(self.hits.any()),
-            Binding::Buffer(self.light_visibility.any()),
-            Binding::Buffer(self.ray_radiance.any()),
-            Binding::Buffer(self.pixel_radiance.any()),
-            Binding::Buffer(self.filtered().any()),
-            Binding::Buffer(self.pixel_display.any()),
-            Binding::Image(&self.triangle_ids),
-            Binding::Buffer(self.counters.any()),
+            (layout::BIND_TRIANGLE_MATERIALS, Binding::Buffer(self.triangle_materials.any())),
+            (layout::BIND_MATERIALS, Binding::Buffer(self.materials.any())),
+            (layout::BIND_LIGHTS, Binding::Buffer(self.lights.any())),
+            (layout::BIND_RAYS, Binding::Buffer(rays.any())),
+            (layout::BIND_NEXT_RAYS, Binding::Buffer(next_rays.any())),
+            (layout::BIND_CHILD_RAYS, Binding::Buffer(self.child_rays.any())),
+            (layout::BIND_CHILD_COUNTS, Binding::Buffer(self.child_counts.any())),
+            (layout::BIND_SCAN_BLOCKS, Binding::Buffer(self.scan_blocks.any())),
+            (layout::BIND_BOUNCES, Binding::Buffer(self.bounces.any())),
+            (layout::BIND_HITS, Binding::Buffer(self.hits.any())),
+            (layout::BIND_LIGHT_VISIBILITY, Binding::Buffer(self.light_visibility.any())),
+            (layout::BIND_RAY_RADIANCE, Binding::Buffer(self.ray_radiance.any())),
+            (layout::BIND_PIXEL_RADIANCE, Binding::Buffer(self.pixel_radiance.any())),
+            (layout::BIND_PIXEL_FILTERED, Binding::Buffer(self.filtered().any())),
+            (layout::BIND_PIXEL_DISPLAY, Binding::Buffer(self.pixel_display.any())),
+            (layout::BIND_COUNTERS, Binding::Buffer(self.counters.any())),
+            (layout::BIND_TRIANGLE_IDS, Binding::Image(&self.triangle_ids)),
         ];
         BindingSet::new(&self.bindings, name, &[&self.tree.objects()[..], &own].concat())
     }
@@ -218,12 +214,4 @@ pub fn bounce_row(n_rays: u32, n_lights: u32) -> Bounce {
         scan_groups_z: 1,
         ..Bounce::default()
     }
-}
-
-fn binding_kinds() -> Vec<BindingKind> {
-    let own = (tree::KINDS.len() as u32..layout::N_BINDINGS).map(|binding| match binding {
-        BIND_TRIANGLE_IDS => BindingKind::Image,
-        _ => BindingKind::Storage,
-    });
-    tree::KINDS.into_iter().chain(own).collect()
 }

@@ -1,16 +1,17 @@
-//! What the traversal reads: the buffers with which every descriptor set begins.
+//! What the traversal reads: a part of every descriptor set.
 
 use std::sync::Arc;
 
 use crate::{
-    gpu::{Binding, BindingKind, Buffer, BufferUse, Context, GpuError},
+    gpu::{Binding, Buffer, BufferUse, Context, GpuError},
     kdtree::KdTree,
-    layout::{Frame, KdNode, Triangle},
+    layout::{
+        BIND_FRAME, BIND_KD_NODES, BIND_KD_PARENTS, BIND_LEAF_TRIANGLES, BIND_TRIANGLES, Frame, KdNode, Triangle,
+    },
 };
 
-/// In the order of the first `BIND_` numbers in layout.glsl.
-pub(super) const KINDS: [BindingKind; 5] =
-    [BindingKind::Uniform, BindingKind::Storage, BindingKind::Storage, BindingKind::Storage, BindingKind::Storage];
+/// The bindings' numbers.
+pub(super) const BINDINGS: [u32; 5] = [BIND_FRAME, BIND_TRIANGLES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_LEAF_TRIANGLES];
 
 /// Triangles, their kd-tree, and the constants that hold the root's cell.
 pub struct Tree {
@@ -44,14 +45,15 @@ impl Tree {
         })
     }
 
-    /// Of the kinds `KINDS`.
-    pub(super) fn objects(&self) -> [Binding<'_>; KINDS.len()] {
-        [
-            Binding::Buffer(self.frame.any()),
-            Binding::Buffer(self.triangles.any()),
-            Binding::Buffer(self.kd_nodes.any()),
-            Binding::Buffer(self.kd_parents.any()),
-            Binding::Buffer(self.leaf_triangles.any()),
-        ]
+    /// For [`BINDINGS`].
+    pub(super) fn objects(&self) -> [(u32, Binding<'_>); BINDINGS.len()] {
+        let buffers = [
+            self.frame.any(),
+            self.triangles.any(),
+            self.kd_nodes.any(),
+            self.kd_parents.any(),
+            self.leaf_triangles.any(),
+        ];
+        std::array::from_fn(|i| (BINDINGS[i], Binding::Buffer(buffers[i])))
     }
 }
