@@ -13,7 +13,7 @@ pub use crate::layout::{CastRay, Hit, NO_TRIANGLE};
 use crate::{
     cpu,
     frame::Traversal,
-    gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Timer},
+    gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
     kdtree::KdTree,
     layout::{Frame, RAY_GROUP_SIZE, Triangle},
     passes::{self, CastResources, Tree},
@@ -96,6 +96,18 @@ impl Caster {
         }
         let n_invalid = rays.par_iter().filter(|ray| !cpu::cast::is_ray(ray)).count() as u64;
         Ok(Cast { hits, gpu_ms, n_invalid })
+    }
+
+    /// What the driver tells of the query's kernel; nothing before the first cast.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn statistics(&self, query: Query) -> Result<Vec<Statistic>, GpuError> {
+        let kernel = match query {
+            Query::Closest => &self.closest,
+            Query::Any => &self.any,
+        };
+        kernel.as_ref().map_or(Ok(Vec::new()), passes::Cast::statistics)
     }
 
     /// Makes the query's kernel and room for a batch, unless they are there.

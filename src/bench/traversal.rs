@@ -19,7 +19,7 @@ use crate::{
         steps::{Steps, count_steps},
     },
     frame::Traversal,
-    gpu::{Context, GpuError},
+    gpu::{Context, GpuError, Statistic, StatisticValue},
     kdtree::Statistics,
     layout::{Hit, NO_TRIANGLE, Ray},
 };
@@ -64,18 +64,23 @@ impl<'a> Tracers<'a> {
             }
         }
         let bindings = self.stage.bindings();
-        let result = |(&variant, (ms, difference)): (&Traversal, (Option<Vec<f64>>, _))| {
+        let result = |(variant_ix, (ms, difference)): (usize, (Option<Vec<f64>>, _))| {
+            let variant = self.variants[variant_ix];
             let ms = ms.and_then(Spread::of);
             let mrays_per_s = ms.and_then(|ms| ms.mrays_per_s(rays.len() as u64));
             let steps = count_steps(&bindings, variant, query, &set.rays);
             let steps_a_ray = StepsARay::new(&steps, rays.len());
-            VariantResult { traversal: variant.to_string(), ms, mrays_per_s, difference, steps_a_ray }
+            let kernel = match &self.casters {
+                Some(casters) => casters[variant_ix].statistics(query)?,
+                None => Vec::new(),
+            };
+            Ok(VariantResult { traversal: variant.to_string(), ms, mrays_per_s, difference, steps_a_ray, kernel })
         };
         Ok(SetResult {
             rays: set.kind,
             n_rays: rays.len(),
             n_hits: expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count(),
-            variants: self.variants.iter().zip(results).map(result).collect(),
+            variants: results.into_iter().enumerate().map(result).collect::<Result<_, GpuError>>()?,
         })
     }
 
@@ -140,6 +145,15 @@ pub struct VariantResult {
     pub difference: Difference,
     /// As the CPU takes them.
     pub steps_a_ray: StepsARay,
+    /// What the driver tells of the kernel; empty where it tells nothing.
+    pub kernel: Vec<Statistic>,
+}
+
+impl VariantResult {
+    /// Registers of an invocation, if the driver tells.
+    pub fn registers(&self) -> Option<StatisticValue> {
+        self.kernel.iter().find(|statistic| statistic.name.contains("egister")).map(|statistic| statistic.value)
+    }
 }
 
 /// What is read of the tree, in the mean of a set's rays.

@@ -1,7 +1,7 @@
 //! A device in use: its queue, its memory, its limits.
 
 use std::{
-    ffi::CString,
+    ffi::{CStr, CString, c_char},
     mem::ManuallyDrop,
     sync::{Arc, Mutex, PoisonError},
 };
@@ -18,6 +18,7 @@ use super::{
     devices::{queue_family, select},
     instance::Instance,
     ray_tracing::RayTracingCalls,
+    statistics::StatisticsCalls,
 };
 
 /// Which device to use, and how.
@@ -37,6 +38,8 @@ pub struct Context {
     pub(super) timestamp_period_ns: f32,
     pub(super) timestamp_valid_bits: u32,
     pub(super) ray_tracing: Option<RayTracingCalls>,
+    /// None where the device lacks the extension.
+    pub(super) statistics: Option<StatisticsCalls>,
     queue: vk::Queue,
     allocator: ManuallyDrop<Mutex<Allocator>>,
     info: DeviceInfo,
@@ -82,7 +85,18 @@ impl Context {
             )
         };
         let family = queue_family(&families).expect("`select` refuses a device without such a queue");
-        let device = create_device(&instance, physical, family as u32, &info, ray_tracing)?;
+        // SAFETY: the device belongs to the instance.
+        let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
+            .map_err(GpuError::call("vkEnumerateDeviceExtensionProperties", &info.name))?;
+        let extras = DeviceExtras {
+            // A driver that is not fully conformant wants to be told that this is known.
+            portability: available
+                .iter()
+                .any(|e| e.extension_name_as_c_str() == Ok(ash::khr::portability_subset::NAME)),
+            statistics: StatisticsCalls::available(&instance, physical, &available),
+            ray_tracing,
+        };
+        let device = create_device(&instance, physical, family as u32, &info, extras)?;
         // SAFETY: the queue was asked for at creation; the pool belongs to its family.
         let (queue, command_pool) = unsafe {
             let pool = vk::CommandPoolCreateInfo::default()
@@ -95,6 +109,7 @@ impl Context {
         let allocator = create_allocator(&instance, &device, physical, ray_tracing)?;
         Ok(Arc::new(Self {
             ray_tracing: ray_tracing.then(|| RayTracingCalls::new(&instance, physical, &device)),
+            statistics: extras.statistics.then(|| StatisticsCalls::new(&instance, &device)),
             debug_utils: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device)),
             device,
             command_pool,
@@ -212,24 +227,34 @@ impl Drop for Context {
     }
 }
 
+/// What a device is asked for beside Vulkan's core.
+#[derive(Clone, Copy)]
+struct DeviceExtras {
+    portability: bool,
+    statistics: bool,
+    ray_tracing: bool,
+}
+
+impl DeviceExtras {
+    fn extensions(self) -> Vec<*const c_char> {
+        let mut names = Vec::new();
+        names.extend(self.portability.then_some(ash::khr::portability_subset::NAME));
+        names.extend(self.statistics.then_some(StatisticsCalls::EXTENSION));
+        if self.ray_tracing {
+            names.extend(RayTracingCalls::EXTENSIONS);
+        }
+        names.into_iter().map(CStr::as_ptr).collect()
+    }
+}
+
 fn create_device(
     instance: &Instance,
     physical: vk::PhysicalDevice,
     family: u32,
     info: &DeviceInfo,
-    ray_tracing: bool,
+    extras: DeviceExtras,
 ) -> Result<ash::Device, GpuError> {
-    // SAFETY: the device belongs to the instance.
-    let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
-        .map_err(GpuError::call("vkEnumerateDeviceExtensionProperties", &info.name))?;
-    // A driver that is not fully conformant wants to be told that this is known.
-    let portability = ash::khr::portability_subset::NAME;
-    let mut extensions: Vec<_> = available
-        .iter()
-        .any(|e| e.extension_name_as_c_str() == Ok(portability))
-        .then_some(portability.as_ptr())
-        .into_iter()
-        .collect();
+    let extensions = extras.extensions();
     let priorities = [1.0];
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
     let mut features = vk::PhysicalDeviceVulkan13Features::default()
@@ -240,14 +265,16 @@ fn create_device(
     let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
     let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
     let mut pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
-    if ray_tracing {
-        extensions.extend(RayTracingCalls::EXTENSIONS.map(|name| name.as_ptr()));
-    }
+    let mut executables =
+        vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
     let mut create = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)
         .push_next(&mut features);
-    if ray_tracing {
+    if extras.statistics {
+        create = create.push_next(&mut executables);
+    }
+    if extras.ray_tracing {
         create = create.push_next(&mut addresses).push_next(&mut structures).push_next(&mut pipelines);
     }
     // SAFETY: all that `create` points to lives until the call returns.

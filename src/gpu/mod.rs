@@ -16,6 +16,7 @@ mod image;
 mod instance;
 mod pipeline;
 mod ray_tracing;
+mod statistics;
 mod timer;
 
 pub use acceleration::Scenery;
@@ -29,4 +30,5 @@ pub use error::GpuError;
 pub use image::{Target, TargetKind};
 pub use pipeline::{ComputeDesc, ComputePipeline, RasterDesc, RasterPipeline};
 pub use ray_tracing::{RayTracingDesc, RayTracingPipeline};
+pub use statistics::{Statistic, StatisticValue};
 pub use timer::{Timer, TimerRow};

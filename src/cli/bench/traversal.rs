@@ -93,7 +93,19 @@ fn text(report: &Report) -> String {
     text += &format!(", medians of {}\n\n", report.n_times);
     let rows: Vec<_> =
         report.sets.iter().flat_map(|set| set.variants.iter().map(|variant| cells(set, variant))).collect();
-    let header = ["rays", "number", "hits", "variant", "Mrays/s", "nodes", "parents", "tests", "differing", "grazing"];
+    let header = [
+        "rays",
+        "number",
+        "hits",
+        "variant",
+        "Mrays/s",
+        "nodes",
+        "parents",
+        "tests",
+        "registers",
+        "differing",
+        "grazing",
+    ];
     text += &table(header, &rows);
     text += "\nNodes, parent links and triangle tests: the mean of a ray. Differing: from the CPU's hits.\n";
     if report.sets.iter().flat_map(|set| &set.variants).any(|variant| variant.ms.is_none()) {
@@ -102,7 +114,7 @@ fn text(report: &Report) -> String {
     text
 }
 
-fn cells(set: &SetResult, variant: &VariantResult) -> [String; 10] {
+fn cells(set: &SetResult, variant: &VariantResult) -> [String; 11] {
     [
         set.rays.name().to_owned(),
         set.n_rays.to_string(),
@@ -112,6 +124,7 @@ fn cells(set: &SetResult, variant: &VariantResult) -> [String; 10] {
         decimal(Some(variant.steps_a_ray.nodes), 1),
         decimal(Some(variant.steps_a_ray.parents), 1),
         decimal(Some(variant.steps_a_ray.triangles), 1),
+        variant.registers().map_or_else(|| "-".to_owned(), |registers| registers.to_string()),
         variant.difference.n_differing.to_string(),
         variant.difference.n_grazing.to_string(),
     ]
