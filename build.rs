@@ -1,6 +1,11 @@
-//! Compiles `glsl/passes/*` to SPIR-V and turns `glsl/shared/layout.glsl` into Rust, both into `$OUT_DIR`.
+//! Compiles `glsl/passes/*` and `glsl/probes/*` to SPIR-V and turns `glsl/shared/layout.glsl` into Rust, both into `$OUT_DIR`.
 
-use std::{env, fmt::Write, fs, path::Path};
+use std::{
+    env,
+    fmt::Write,
+    fs,
+    path::{Path, PathBuf},
+};
 
 fn main() {
     let out_dir = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
@@ -11,10 +16,7 @@ fn main() {
     fs::write(out_dir.join("layout.rs"), rust_layout(&layout)).expect("write layout.rs");
 
     let compiler = shaderc::Compiler::new().expect("shaderc");
-    let mut passes: Vec<_> =
-        fs::read_dir("glsl/passes").expect("glsl/passes").map(|e| e.expect("entry").path()).collect();
-    passes.sort();
-    for path in passes {
+    for path in shaders() {
         let name = path.file_name().and_then(|n| n.to_str()).expect("a shader's name is UTF-8").to_owned();
         match compile(&compiler, &path, &name) {
             Ok(spirv) => fs::write(out_dir.join(format!("{name}.spv")), spirv).expect("write SPIR-V"),
@@ -25,6 +27,17 @@ fn main() {
             }
         }
     }
+}
+
+/// The files of both folders, in a fixed order.
+fn shaders() -> Vec<PathBuf> {
+    let mut shaders: Vec<_> = ["glsl/passes", "glsl/probes"]
+        .into_iter()
+        .flat_map(|folder| fs::read_dir(folder).unwrap_or_else(|e| panic!("{folder}: {e}")))
+        .map(|entry| entry.expect("an entry of the folder").path())
+        .collect();
+    shaders.sort();
+    shaders
 }
 
 /// One shader, optimized, for Vulkan 1.3; `#include "x.glsl"` reads from glsl/shared.
@@ -46,7 +59,7 @@ fn compile(compiler: &shaderc::Compiler, path: &Path, name: &str) -> Result<Vec<
     });
     let source = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let artifact = compiler
-        .compile_into_spirv(&source, kind, &format!("glsl/passes/{name}"), "main", Some(&options))
+        .compile_into_spirv(&source, kind, &path.display().to_string(), "main", Some(&options))
         .map_err(|e| e.to_string())?;
     Ok(artifact.as_binary_u8().to_vec())
 }

@@ -1,13 +1,13 @@
 //! Pixels to a file, whole or not at all.
 //!
-//! A file is encoded in memory, written beside its target under a temporary name, synchronized and renamed. So a full
+//! A file is encoded in memory, if it fits there, written beside its target under a temporary name, synchronized and renamed. So a full
 //! disk leaves what was there before, and no truncated or temporary file.
 
 #[cfg(unix)]
 use std::os::unix::fs::PermissionsExt;
 use std::{
     fs::{self, File, OpenOptions},
-    io::{self, Cursor, Write},
+    io::{self, Cursor, Seek, Write},
     path::{Path, PathBuf},
 };
 
@@ -15,9 +15,12 @@ use image::{
     EncodableLayout, ImageBuffer, ImageError, ImageFormat, PixelWithColorType, Primitive, Rgb,
     error::{ParameterError, ParameterErrorKind},
 };
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, SpooledTempFile};
 
 use crate::frame::Picture;
+
+/// Bytes beyond which a spool goes to disk.
+const SPOOL_IN_MEMORY: usize = 64 << 20;
 
 /// Why a file was not written.
 #[derive(Debug, thiserror::Error)]
@@ -82,10 +85,40 @@ pub fn write_picture(path: &Path, picture: &Picture) -> Result<(), OutputError> 
 /// umask leaves.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     match Target::at(path)? {
-        Target::Stream => OpenOptions::new().write(true).open(path).and_then(|mut stream| stream.write_all(bytes)),
-        Target::File { directory, file } => replace(&directory, &file, bytes),
+        Target::Stream => open_stream(path).and_then(|mut stream| stream.write_all(bytes)),
+        Target::File { directory, file } => replace(&directory, &file, |temporary| temporary.write_all(bytes)),
     }
     .map_err(|source| OutputError::Write { path: path.to_owned(), source })
+}
+
+/// As [`write`], for what is too large to encode in memory: `body` writes the file, and may seek in it.
+pub fn write_with(path: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), OutputError> {
+    match Target::at(path)? {
+        Target::Stream => write_stream(path, body),
+        Target::File { directory, file } => replace(&directory, &file, body),
+    }
+    .map_err(|source| OutputError::Write { path: path.to_owned(), source })
+}
+
+/// A place for what is on its way to the file at `path`: in memory while it is small, then on the same disk.
+pub fn spool(path: &Path) -> Result<SpooledTempFile, OutputError> {
+    let directory = match Target::at(path)? {
+        Target::Stream => std::env::temp_dir(),
+        Target::File { directory, .. } => directory,
+    };
+    Ok(tempfile::spooled_tempfile_in(SPOOL_IN_MEMORY, directory))
+}
+
+fn open_stream(path: &Path) -> io::Result<File> {
+    OpenOptions::new().write(true).open(path)
+}
+
+/// A pipe cannot be sought in: what it gets is put together in a temporary file.
+fn write_stream(path: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
+    let mut whole = tempfile::tempfile()?;
+    body(&mut whole)?;
+    whole.rewind()?;
+    io::copy(&mut whole, &mut open_stream(path)?).map(|_: u64| ())
 }
 
 /// What a path leads to.
@@ -120,9 +153,9 @@ impl Target {
     }
 }
 
-fn replace(directory: &Path, file: &Path, bytes: &[u8]) -> io::Result<()> {
+fn replace(directory: &Path, file: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     let mut temporary = create_beside(directory)?;
-    temporary.as_file_mut().write_all(bytes)?;
+    body(temporary.as_file_mut())?;
     if let Ok(replaced) = fs::metadata(file) {
         temporary.as_file().set_permissions(replaced.permissions())?;
     }

@@ -6,7 +6,7 @@
 #include "layout.glsl"
 #include "kdtree.glsl"
 
-layout(constant_id = 1) const bool ANY_HIT = false;
+layout(constant_id = 2) const bool ANY_HIT = false;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform CastBatchBlock { CastBatch batch; };

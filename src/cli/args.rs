@@ -4,6 +4,7 @@ use std::{path::PathBuf, str::FromStr};
 
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 use kdray::{
+    cast::Query,
     frame::{Denoise, Primary, RenderOptions, Traversal},
     gpu::DeviceSelector,
     scene::RenderDefaults,
@@ -14,7 +15,7 @@ use super::{bench::Suite, error::CliError};
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
 #[derive(Parser)]
 #[command(name = "kdray", version, arg_required_else_help = false)]
-#[command(after_help = "Exit codes: 2 usage, 3 scene, 4 device, 5 output.")]
+#[command(after_help = "Exit codes: 2 usage, 3 scene or rays, 4 device, 5 output.")]
 pub struct Args {
     #[command(subcommand)]
     pub command: Command,
@@ -24,6 +25,8 @@ pub struct Args {
 pub enum Command {
     /// Render a scene to a picture, and report where the time went
     Render(RenderArgs),
+    /// Find what given rays hit in a scene or mesh
+    Cast(CastArgs),
     /// List the Vulkan devices
     Devices,
     /// Describe a scene and its kd-tree
@@ -85,6 +88,44 @@ pub struct RenderArgs {
 }
 
 #[derive(clap::Args)]
+pub struct CastArgs {
+    /// OBJ file, or any scene file
+    pub mesh: PathBuf,
+    /// Rays, a .npy file of float32: K x 8 (origin, direction, t_min, t_max) or K x 6 (t from 0 to infinity)
+    pub rays: PathBuf,
+    /// Hits to write, .npz: t_hit, primitive_ids, primitive_uvs, primitive_normals
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Find out only whether rays hit anything: occluded
+    #[arg(long)]
+    pub any: bool,
+    /// How rays find their way back up the tree
+    #[arg(long, value_name = "mask|stack", default_value_t = RenderOptions::default().traversal)]
+    pub traversal: Traversal,
+    /// Cast the rays so many times and report the least, median and greatest time
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
+    pub repeat: u16,
+    /// Cast on the CPU, without Vulkan
+    #[arg(long, conflicts_with_all = ["device", "validate"])]
+    pub cpu: bool,
+    /// Threads for loading, building and --cpu [default: all processors]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
+    pub device: Option<DeviceSelector>,
+    /// Run under the Khronos validation layer and fail on any message
+    #[arg(long)]
+    pub validate: bool,
+    /// Write the report as JSON, too
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+#[derive(clap::Args)]
 pub struct InspectArgs {
     /// Scene file
     pub scene: PathBuf,
@@ -129,6 +170,30 @@ impl RenderArgs {
             (Some(DenoiseWord::Off), _) => Denoise::Off,
             (_, asked) => Denoise::Paper { threshold: asked.unwrap_or(threshold) },
         }
+    }
+}
+
+impl CastArgs {
+    /// Refuses words that contradict each other.
+    pub fn check(&self) -> Result<(), CliError> {
+        if self.output.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("npz")) {
+            let path = self.output.display();
+            return Err(CliError::Usage(format!("cannot write `{path}`: the name of a file of hits must end in .npz")));
+        }
+        for (name, file) in [("--output", &self.output), ("RAYS", &self.rays), ("MESH", &self.mesh)] {
+            if self.json.as_ref() == Some(file) {
+                return Err(CliError::Usage(format!("--json and {name} name the same file")));
+            }
+        }
+        if self.output == self.rays || self.output == self.mesh {
+            return Err(CliError::Usage("--output names a file that is read".into()));
+        }
+        Ok(())
+    }
+
+    /// What is asked of the rays.
+    pub fn query(&self) -> Query {
+        if self.any { Query::Any } else { Query::Closest }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::io;
 
-use kdray::{gpu::GpuError, output::OutputError, scene::SceneError};
+use kdray::{cast::RayFileError, gpu::GpuError, output::OutputError, scene::SceneError};
 
 /// Why a command failed. Displays as one line.
 #[derive(Debug, thiserror::Error)]
@@ -11,6 +11,8 @@ pub enum CliError {
     Usage(String),
     #[error(transparent)]
     Scene(#[from] SceneError),
+    #[error(transparent)]
+    Rays(#[from] RayFileError),
     #[error(transparent)]
     Device(#[from] GpuError),
     #[error("the validation layer had {0} complaint(s)")]
@@ -24,11 +26,11 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// 2 usage, 3 scene, 4 device, 5 output.
+    /// 2 usage, 3 scene or rays, 4 device, 5 output.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) | Self::Output(OutputError::UnknownEnding { .. }) => 2,
-            Self::Scene(_) => 3,
+            Self::Scene(_) | Self::Rays(_) => 3,
             Self::Device(_) | Self::Validation(_) | Self::WrongHits(_) => 4,
             Self::Output(_) | Self::Stdout(_) => 5,
         }

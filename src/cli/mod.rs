@@ -4,6 +4,8 @@
 
 mod args;
 mod bench;
+mod cast;
+mod cast_report;
 mod devices;
 mod error;
 mod inspect;
@@ -45,6 +47,7 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
 fn run(args: Args) -> Result<(), CliError> {
     match args.command {
         Command::Render(args) => render::run(&args),
+        Command::Cast(args) => cast::run(&args),
         Command::Devices => devices::run(),
         Command::Inspect(args) => inspect::run(&args),
         Command::Bench(suite) => bench::run(&suite),

@@ -80,7 +80,8 @@ fn check_outputs(args: &RenderArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-fn set_threads(n_threads: Option<u16>) -> Result<(), CliError> {
+/// Sizes the pool for everything that follows.
+pub(super) fn set_threads(n_threads: Option<u16>) -> Result<(), CliError> {
     let Some(n_threads) = n_threads else { return Ok(()) };
     (rayon::ThreadPoolBuilder::new().num_threads(n_threads.into()).build_global())
         .map_err(|error| CliError::Usage(format!("--threads {n_threads}: {error}")))
@@ -120,7 +121,7 @@ fn median(mut profiles: Vec<Profile>) -> Profile {
 }
 
 /// Lists what the validation layer said; anything is a failure.
-fn report_validation(context: &Context) -> Result<(), CliError> {
+pub(super) fn report_validation(context: &Context) -> Result<(), CliError> {
     let messages = context.validation_messages();
     for message in &messages {
         complain("validation", message);

@@ -3,7 +3,7 @@
 use std::{
     ffi::{CStr, CString, c_char},
     mem::ManuallyDrop,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
 use ash::{ext, vk};
@@ -17,6 +17,7 @@ use super::{
     commands::CommandBuffer,
     devices::{queue_family, select},
     instance::Instance,
+    probe,
     ray_tracing::RayTracingCalls,
     statistics::StatisticsCalls,
 };
@@ -44,6 +45,7 @@ pub struct Context {
     allocator: ManuallyDrop<Mutex<Allocator>>,
     info: DeviceInfo,
     limits: Limits,
+    fuses_fma: OnceLock<bool>,
     instance: Arc<Instance>,
 }
 
@@ -118,6 +120,7 @@ impl Context {
             queue,
             allocator: ManuallyDrop::new(Mutex::new(allocator)),
             info,
+            fuses_fma: OnceLock::new(),
             limits: Limits {
                 storage_range: u64::from(properties.limits.max_storage_buffer_range),
                 target_size: properties
@@ -142,6 +145,18 @@ impl Context {
     /// True for a driver that computes on the CPU.
     pub fn is_software(&self) -> bool {
         self.info.kind == "CPU"
+    }
+
+    /// Whether `fma` rounds once in this device's kernels; found out by one of them, the first time.
+    ///
+    /// # Errors
+    /// The kernel does not run.
+    pub fn fuses_fma(self: &Arc<Self>) -> Result<bool, GpuError> {
+        if let Some(&fuses) = self.fuses_fma.get() {
+            return Ok(fuses);
+        }
+        let fuses = probe::fuses_fma(self)?;
+        Ok(*self.fuses_fma.get_or_init(|| fuses))
     }
 
     /// What the validation layer has said so far; empty without validation.

@@ -15,6 +15,7 @@ mod error;
 mod image;
 mod instance;
 mod pipeline;
+mod probe;
 mod ray_tracing;
 mod statistics;
 mod timer;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Tree, binding, kernel, spirv, tree};
+use super::{Tree, binding, kernel, spirv, traversal_constants, tree};
 use crate::{
     cast::Query,
     frame::Traversal,
@@ -59,7 +59,8 @@ impl Cast {
         traversal: Traversal,
         query: Query,
     ) -> Result<Self, GpuError> {
-        let constants = [traversal.constant(), u32::from(query == Query::Any)];
+        let [traversal, fuses_fma] = traversal_constants(context, traversal)?;
+        let constants = [traversal, fuses_fma, (query == Query::Any).into()];
         Ok(Self { kernel: kernel(context, bindings, "cast", spirv!("cast.comp"), &constants)? })
     }
 

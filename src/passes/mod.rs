@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::{
-    frame::{Primary, RenderOptions},
+    frame::{Primary, RenderOptions, Traversal},
     gpu::{BindingKind, Bindings, ComputeDesc, ComputePipeline, Context, GpuError},
     layout::{BIND_FRAME, BIND_TRIANGLE_IDS},
 };
@@ -84,6 +84,11 @@ fn binding(number: u32) -> (u32, BindingKind) {
         _ => BindingKind::Storage,
     };
     (number, kind)
+}
+
+/// Specialization constants of the kernels that traverse.
+fn traversal_constants(context: &Arc<Context>, traversal: Traversal) -> Result<[u32; 2], GpuError> {
+    Ok([traversal.constant(), context.fuses_fma()?.into()])
 }
 
 /// A kernel without subgroup requirements.

@@ -1,14 +1,22 @@
 //! Rays of the caller's own to hits, on a device or on the CPU, without a frame.
 //!
 //! ```text
-//! rays ─> batches ─> cast (the kernel, as often as it is to be timed) ─> hits
+//! RayReader ─> batches ─> Caster (the kernel, as often as it is to be timed) ─> HitWriter
+//!   .npy                                                                          .npz
 //! ```
+
+mod read;
+mod write;
 
 use std::{mem, sync::Arc};
 
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
+pub use self::{
+    read::{RayFileError, RayReader},
+    write::HitWriter,
+};
 pub use crate::layout::{CastRay, Hit, NO_TRIANGLE};
 use crate::{
     cpu,
@@ -35,12 +43,12 @@ pub struct Cast {
     pub hits: Vec<Hit>,
     /// The kernel's milliseconds, one entry a repetition, batches added up. None where the device has no timestamps.
     pub gpu_ms: Option<Vec<f64>>,
-    /// Rays that can only miss: with a NaN, an infinite origin or direction, a direction of zero.
+    /// As [`count_invalid`] counts them.
     pub n_invalid: u64,
 }
 
 /// Rays of a batch: 64 MiB of rays and 32 MiB of hits, enough to fill a large GPU many times over.
-const RAYS_PER_BATCH: usize = 1 << 21;
+pub const RAYS_PER_BATCH: usize = 1 << 21;
 
 /// Triangles and their tree on a device, ready for rays.
 pub struct Caster {
@@ -94,8 +102,7 @@ impl Caster {
             gpu_ms = gpu_ms.zip(batch_ms).map(|(sums, batch)| sums.iter().zip(batch).map(|(a, b)| a + b).collect());
             hits.extend(self.resources.cast_hits.download_first(batch.len())?);
         }
-        let n_invalid = rays.par_iter().filter(|ray| !cpu::cast::is_ray(ray)).count() as u64;
-        Ok(Cast { hits, gpu_ms, n_invalid })
+        Ok(Cast { hits, gpu_ms, n_invalid: count_invalid(rays) })
     }
 
     /// What the driver tells of the query's kernel; nothing before the first cast.
@@ -162,6 +169,11 @@ fn most_rays(limits: &Limits) -> usize {
 /// What the traversal reads of a frame.
 fn constants(triangles: &[Triangle], tree: &KdTree) -> Frame {
     Frame { n_triangles: triangles.len() as u32, cell_min: tree.cell_min, cell_max: tree.cell_max, ..Frame::default() }
+}
+
+/// Rays that can only miss: with a NaN, an infinite origin or direction, a direction of zero.
+pub fn count_invalid(rays: &[CastRay]) -> u64 {
+    rays.par_iter().filter(|ray| !cpu::cast::is_ray(ray)).count() as u64
 }
 
 /// The hits of a [`Caster`], found on the current rayon pool.

@@ -1,0 +1,153 @@
+//! Hits to a NumPy archive, named as Open3D's `cast_rays` names them.
+//!
+//! An archive holds one array after the other, hits come all arrays at a time: so they wait in a spool, and are read
+//! again for each array. Memory stays bounded, whatever the number of rays.
+
+use std::{
+    fs::File,
+    io::{self, BufWriter, Read, Seek, SeekFrom, Write},
+    path::{Path, PathBuf},
+};
+
+use bytemuck::Zeroable;
+use npyz::{AutoSerialize, WriteOptions, WriterBuilder};
+use tempfile::SpooledTempFile;
+use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
+
+use super::{Hit, NO_TRIANGLE, Query};
+use crate::{
+    layout::Triangle,
+    output::{self, OutputError},
+};
+
+/// Hits that are read from the spool at a time: 1 MiB.
+const HITS_AT_A_TIME: usize = 1 << 16;
+
+/// A `.npz` file in the making; nothing of it is there before [`HitWriter::finish`].
+///
+/// Closest: `t_hit` (float32 K, infinity on a miss), `primitive_ids` (uint32 K, 4294967295 on a miss), `primitive_uvs`
+/// (float32 K x 2, the weights of the triangle's second and third corner) and `primitive_normals` (float32 K x 3, unit
+/// length, towards whom the corners go round counter-clockwise; zero on a miss). Any: `occluded` (bool K).
+pub struct HitWriter {
+    path: PathBuf,
+    spool: SpooledTempFile,
+    n_hits: u64,
+}
+
+impl HitWriter {
+    /// # Errors
+    /// The path leads to no file that could be written.
+    pub fn new(path: &Path) -> Result<Self, OutputError> {
+        Ok(Self { path: path.to_owned(), spool: output::spool(path)?, n_hits: 0 })
+    }
+
+    /// Takes the hits of the next rays.
+    ///
+    /// # Errors
+    /// The disk is full.
+    pub fn push(&mut self, hits: &[Hit]) -> Result<(), OutputError> {
+        self.n_hits += hits.len() as u64;
+        let written = self.spool.write_all(bytemuck::cast_slice(hits));
+        written.map_err(|source| OutputError::Write { path: self.path.clone(), source })
+    }
+
+    /// Writes the file whole or not at all, as [`output::write`] does. `triangles`: those that were hit.
+    ///
+    /// # Errors
+    /// The disk is full.
+    pub fn finish(self, triangles: &[Triangle], query: Query) -> Result<(), OutputError> {
+        let mut hits = Hits { spool: self.spool, n: self.n_hits };
+        output::write_with(&self.path, |file| {
+            let mut archive = ZipWriter::new(FailsOnce { file, failed: false });
+            match query {
+                Query::Closest => {
+                    hits.write(&mut archive, "t_hit", |hit| [hit.t])?;
+                    hits.write(&mut archive, "primitive_ids", |hit| [hit.triangle_ix])?;
+                    hits.write(&mut archive, "primitive_uvs", |hit| [hit.u, hit.v])?;
+                    hits.write(&mut archive, "primitive_normals", |hit| normal_at(triangles, hit))?;
+                }
+                Query::Any => hits.write(&mut archive, "occluded", |hit| [hit.triangle_ix != NO_TRIANGLE])?,
+            }
+            archive.finish()?;
+            Ok(())
+        })
+    }
+}
+
+/// The unit normal of the triangle by its winding; zero on a miss, or on a triangle without area.
+fn normal_at(triangles: &[Triangle], hit: &Hit) -> [f32; 3] {
+    let Some(triangle) = triangles.get(hit.triangle_ix as usize) else { return [0.0; 3] };
+    // In double precision the squares of the least edges are still numbers.
+    let [v0, v1, v2] = [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3());
+    (v1 - v0).cross(v2 - v0).normalize_or_zero().as_vec3().to_array()
+}
+
+/// What was spooled.
+struct Hits {
+    spool: SpooledTempFile,
+    n: u64,
+}
+
+impl Hits {
+    /// An array of `N` columns, one-dimensional where that is one.
+    fn write<T: AutoSerialize + npyz::Serialize, const N: usize>(
+        &mut self,
+        archive: &mut ZipWriter<FailsOnce>,
+        name: &str,
+        columns: impl Fn(&Hit) -> [T; N],
+    ) -> io::Result<()> {
+        let n_bytes = self.n * (N * size_of::<T>()) as u64;
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Stored)
+            .large_file(n_bytes >= u64::from(u32::MAX) - 1024); // the array's header
+        archive.start_file(npyz::npz::file_name_from_array_name(name), options)?;
+        let mut file = BufWriter::with_capacity(1 << 16, archive);
+        let shape = [self.n, N as u64];
+        let shape = if N == 1 { &shape[..1] } else { &shape[..] };
+        let mut array = WriteOptions::new().default_dtype().shape(shape).writer(&mut file).begin_nd()?;
+        self.for_each(|hit| columns(hit).iter().try_for_each(|number| array.push(number)))?;
+        array.finish()?;
+        file.flush()
+    }
+
+    fn for_each(&mut self, mut visit: impl FnMut(&Hit) -> io::Result<()>) -> io::Result<()> {
+        self.spool.rewind()?;
+        let mut hits = vec![Hit::zeroed(); HITS_AT_A_TIME];
+        let mut n_left = self.n;
+        while n_left > 0 {
+            let n = n_left.min(HITS_AT_A_TIME as u64) as usize;
+            self.spool.read_exact(bytemuck::cast_slice_mut(&mut hits[..n]))?;
+            hits[..n].iter().try_for_each(&mut visit)?;
+            n_left -= n as u64;
+        }
+        Ok(())
+    }
+}
+
+/// A file whose first error is its last: what the archive's writer tries when it is dropped after one, and would
+/// complain about by itself, goes nowhere.
+struct FailsOnce<'a> {
+    file: &'a mut File,
+    failed: bool,
+}
+
+impl Write for FailsOnce<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.failed {
+            return Ok(bytes.len());
+        }
+        let written = self.file.write(bytes);
+        self.failed = written.as_ref().is_err_and(|error| error.kind() != io::ErrorKind::Interrupted);
+        written
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Seek for FailsOnce<'_> {
+    fn seek(&mut self, position: SeekFrom) -> io::Result<u64> {
+        self.file.seek(position)
+    }
+}

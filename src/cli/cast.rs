@@ -1,0 +1,157 @@
+//! `kdray cast`: rays of the user's own to hits, file to file.
+
+use std::{sync::Arc, time::Instant};
+
+use kdray::{
+    cast::{self, Cast, CastRay, Caster, Hit, HitWriter, NO_TRIANGLE, Query, RAYS_PER_BATCH, RayReader},
+    frame::Traversal,
+    gpu::{Context, ContextOptions, GpuError},
+    kdtree::{BuildOptions, KdTree},
+    layout::Triangle,
+    output,
+    scene::Scene,
+};
+
+use super::{
+    args::CastArgs,
+    cast_report::{CastReport, Times},
+    error::CliError,
+    open_device, print,
+    progress::Progress,
+    render::{report_validation, set_threads},
+};
+
+/// Loads, builds, casts batch by batch, writes and reports. What can be refused is refused before the work that it
+/// would waste.
+pub fn run(args: &CastArgs) -> Result<(), CliError> {
+    args.check()?;
+    output::check(&args.output)?;
+    args.json.as_deref().map_or(Ok(()), output::check)?;
+    set_threads(args.threads)?;
+
+    let rays = RayReader::open(&args.rays)?;
+    let progress = Progress::new(args.quiet, 3);
+    let (scene, load_ms) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
+    let scene = scene?;
+    let device = ContextOptions { device: args.device.clone(), validate: args.validate };
+    let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
+
+    let n_triangles = scene.triangles.len();
+    let build_options = BuildOptions::default();
+    let building = format!("building the kd-tree of {n_triangles} triangles");
+    let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &build_options));
+    let casting = format!("casting {} rays", rays.n_rays());
+    let engine = Engine::new(context.as_ref(), &scene.triangles, &tree, args.traversal)?;
+    let (done, cast_ms) = progress.stage(&casting, || cast_all(args, rays, engine, &scene.triangles));
+    let totals = done?;
+    drop(progress);
+
+    let report = CastReport {
+        scene: scene.name,
+        rays: args.rays.clone(),
+        hits: args.output.clone(),
+        query: if args.any { "any" } else { "closest" },
+        traversal: args.traversal.to_string(),
+        device: context.as_ref().map_or_else(cpu_name, |context| context.info().name.clone()),
+        triangles: n_triangles,
+        tree: tree.statistics(n_triangles, &build_options),
+        n_rays: totals.n_rays,
+        n_hits: totals.n_hits,
+        n_invalid: totals.n_invalid,
+        times: totals.ms.and_then(|ms| Times::of(ms, totals.n_rays)),
+        load_ms,
+        build_ms,
+        cast_ms,
+    };
+    if let Some(path) = &args.json {
+        output::write(path, &report.json())?;
+    }
+    if !args.quiet {
+        print(&report.text())?;
+    }
+    context.map_or(Ok(()), |context| report_validation(&context))
+}
+
+fn cpu_name() -> String {
+    format!("CPU, {} threads", rayon::current_num_threads())
+}
+
+/// What casts.
+enum Engine<'a> {
+    Device(Box<Caster>),
+    Cpu { triangles: &'a [Triangle], tree: &'a KdTree, traversal: Traversal },
+}
+
+impl<'a> Engine<'a> {
+    /// The device, or the CPU for want of one.
+    fn new(
+        context: Option<&Arc<Context>>,
+        triangles: &'a [Triangle],
+        tree: &'a KdTree,
+        traversal: Traversal,
+    ) -> Result<Self, GpuError> {
+        match context {
+            Some(context) => Ok(Self::Device(Box::new(Caster::new(context, triangles, tree, traversal)?))),
+            None => Ok(Self::Cpu { triangles, tree, traversal }),
+        }
+    }
+
+    /// The hits, and the milliseconds of each of `n_times` casts, whoever needed them.
+    fn cast(&mut self, rays: &[CastRay], query: Query, n_times: u32) -> Result<Cast, GpuError> {
+        match self {
+            Self::Device(caster) => caster.cast(rays, query, n_times),
+            Self::Cpu { triangles, tree, traversal } => {
+                let mut hits = Vec::new();
+                let mut ms = Vec::new();
+                for _ in 0..n_times {
+                    let start = Instant::now();
+                    hits = cast::cast_on_cpu(triangles, tree, *traversal, rays, query);
+                    ms.push(start.elapsed().as_secs_f64() * 1e3);
+                }
+                Ok(Cast { hits, gpu_ms: Some(ms), n_invalid: cast::count_invalid(rays) })
+            }
+        }
+    }
+}
+
+/// Sums over all batches.
+struct Totals {
+    n_rays: u64,
+    n_hits: u64,
+    n_invalid: u64,
+    /// One entry a repetition; none where the device has no timestamps.
+    ms: Option<Vec<f64>>,
+}
+
+impl Totals {
+    fn add(&mut self, cast: &Cast) {
+        self.n_rays += cast.hits.len() as u64;
+        self.n_hits += cast.hits.iter().filter(|hit: &&Hit| hit.triangle_ix != NO_TRIANGLE).count() as u64;
+        self.n_invalid += cast.n_invalid;
+        let sums = self.ms.take().zip(cast.gpu_ms.as_ref());
+        self.ms = sums.map(|(sums, batch)| sums.iter().zip(batch).map(|(a, b)| a + b).collect());
+    }
+}
+
+/// Reads rays, casts them and writes their hits, a batch at a time.
+fn cast_all(
+    args: &CastArgs,
+    mut rays: RayReader,
+    mut engine: Engine,
+    triangles: &[Triangle],
+) -> Result<Totals, CliError> {
+    let (query, n_times) = (args.query(), u32::from(args.repeat));
+    let mut totals = Totals { n_rays: 0, n_hits: 0, n_invalid: 0, ms: Some(vec![0.0; n_times as usize]) };
+    let mut hits = HitWriter::new(&args.output)?;
+    loop {
+        let batch = rays.next_batch(RAYS_PER_BATCH)?;
+        if batch.is_empty() {
+            break;
+        }
+        let cast = engine.cast(&batch, query, n_times)?;
+        totals.add(&cast);
+        hits.push(&cast.hits)?;
+    }
+    hits.finish(triangles, query)?;
+    Ok(totals)
+}
