@@ -83,6 +83,14 @@ impl Scale {
         (bottom, bottom + length / (1.0 - LEGEND_SHARE))
     }
 
+    /// Most labels of an axis.
+    fn n_labels(self, length: f64) -> usize {
+        match self {
+            Self::Linear => 10,
+            Self::Logarithmic => length as usize + 1,
+        }
+    }
+
     /// What stands beside a place on the axis.
     fn label(self, place: f64) -> String {
         let is_power = (place - place.round()).abs() < 1e-6;
@@ -120,6 +128,7 @@ impl BarChart {
             .disable_x_mesh()
             .y_max_light_lines(1)
             .x_labels(0)
+            .y_labels(self.scale.n_labels(top - bottom))
             .y_desc(&self.unit)
             .y_label_formatter(&|place| self.scale.label(*place))
             .label_style(("sans-serif", 13))

@@ -77,11 +77,10 @@ fn text(report: &Report) -> String {
     let rows: Vec<_> = report.rows.iter().map(cells).collect();
     let mut text = format!("{}, {}\n\n", report.device, report.driver);
     text += &table(header, &rows);
-    text += &format!("\nMedians of {} frames on the GPU", report.n_gpu_frames);
-    text += &match report.n_cpu_frames {
-        0 => "; without the CPU.\n".to_owned(),
-        n => format!(", {n} on one thread of the CPU.\n"),
-    };
+    text += &format!(
+        "\nMedians; frames on the GPU: {}, on one CPU thread: {}.\n",
+        report.n_gpu_frames, report.n_cpu_frames
+    );
     text += "The paper's times: a GTX 285 and one CPU thread, scenes of the same triangle counts.\n";
     if report.rows.iter().any(|row| row.gpu_ms.is_none()) {
         text += "This device has no timestamps: its times are unknown.\n";
