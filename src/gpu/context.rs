@@ -1,7 +1,7 @@
 //! A device in use: its queue, its memory, its limits.
 
 use std::{
-    ffi::{CStr, CString, c_char},
+    ffi::CString,
     mem::ManuallyDrop,
     sync::{Arc, Mutex, OnceLock, PoisonError},
 };
@@ -15,6 +15,7 @@ use gpu_allocator::{
 use super::{
     Commands, DeviceInfo, DeviceSelector, GpuError, Limits,
     commands::CommandBuffer,
+    device::DeviceExtras,
     devices::{queue_family, select},
     instance::Instance,
     probe,
@@ -87,18 +88,11 @@ impl Context {
             )
         };
         let family = queue_family(&families).expect("`select` refuses a device without such a queue");
-        // SAFETY: the device belongs to the instance.
-        let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
+        let extras = DeviceExtras::of(&instance, physical, ray_tracing)
             .map_err(GpuError::call("vkEnumerateDeviceExtensionProperties", &info.name))?;
-        let extras = DeviceExtras {
-            // A driver that is not fully conformant wants to be told that this is known.
-            portability: available
-                .iter()
-                .any(|e| e.extension_name_as_c_str() == Ok(ash::khr::portability_subset::NAME)),
-            statistics: StatisticsCalls::available(&instance, physical, &available),
-            ray_tracing,
-        };
-        let device = create_device(&instance, physical, family as u32, &info, extras)?;
+        let device = extras
+            .create_device(&instance, physical, family as u32)
+            .map_err(GpuError::call("vkCreateDevice", &info.name))?;
         // SAFETY: the queue was asked for at creation; the pool belongs to its family.
         let (queue, command_pool) = unsafe {
             let pool = vk::CommandPoolCreateInfo::default()
@@ -240,60 +234,6 @@ impl Drop for Context {
             self.device.destroy_device(None);
         }
     }
-}
-
-/// What a device is asked for beside Vulkan's core.
-#[derive(Clone, Copy)]
-struct DeviceExtras {
-    portability: bool,
-    statistics: bool,
-    ray_tracing: bool,
-}
-
-impl DeviceExtras {
-    fn extensions(self) -> Vec<*const c_char> {
-        let mut names = Vec::new();
-        names.extend(self.portability.then_some(ash::khr::portability_subset::NAME));
-        names.extend(self.statistics.then_some(StatisticsCalls::EXTENSION));
-        if self.ray_tracing {
-            names.extend(RayTracingCalls::EXTENSIONS);
-        }
-        names.into_iter().map(CStr::as_ptr).collect()
-    }
-}
-
-fn create_device(
-    instance: &Instance,
-    physical: vk::PhysicalDevice,
-    family: u32,
-    info: &DeviceInfo,
-    extras: DeviceExtras,
-) -> Result<ash::Device, GpuError> {
-    let extensions = extras.extensions();
-    let priorities = [1.0];
-    let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
-    let mut features = vk::PhysicalDeviceVulkan13Features::default()
-        .dynamic_rendering(true)
-        .synchronization2(true)
-        .subgroup_size_control(true)
-        .compute_full_subgroups(true);
-    let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
-    let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
-    let mut pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
-    let mut executables =
-        vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
-    let mut create = vk::DeviceCreateInfo::default()
-        .queue_create_infos(&queues)
-        .enabled_extension_names(&extensions)
-        .push_next(&mut features);
-    if extras.statistics {
-        create = create.push_next(&mut executables);
-    }
-    if extras.ray_tracing {
-        create = create.push_next(&mut addresses).push_next(&mut structures).push_next(&mut pipelines);
-    }
-    // SAFETY: all that `create` points to lives until the call returns.
-    unsafe { instance.raw.create_device(physical, &create, None) }.map_err(GpuError::call("vkCreateDevice", &info.name))
 }
 
 fn create_allocator(

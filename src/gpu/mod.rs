@@ -10,6 +10,7 @@ mod bindings;
 mod buffer;
 mod commands;
 mod context;
+mod device;
 mod devices;
 mod error;
 mod image;

@@ -1,6 +1,6 @@
 //! What a driver tells of the code that it made of a kernel: registers, spills, instructions.
 
-use std::fmt;
+use std::{ffi::CStr, fmt};
 
 use ash::{khr, vk};
 use serde::Serialize;
@@ -41,17 +41,10 @@ impl fmt::Display for StatisticValue {
 pub(super) struct StatisticsCalls(khr::pipeline_executable_properties::Device);
 
 impl StatisticsCalls {
-    pub const EXTENSION: &'static std::ffi::CStr = khr::pipeline_executable_properties::NAME;
+    pub const EXTENSION: &'static CStr = khr::pipeline_executable_properties::NAME;
 
-    /// Whether the device has the extension's feature, `extensions` being all that it has.
-    pub fn available(
-        instance: &Instance,
-        physical: vk::PhysicalDevice,
-        extensions: &[vk::ExtensionProperties],
-    ) -> bool {
-        if !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(Self::EXTENSION)) {
-            return false;
-        }
+    /// Whether a device that has the extension has its feature.
+    pub fn has_feature(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
         let mut feature = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
         let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut feature);
         // SAFETY: the device belongs to the instance and has the extension.
