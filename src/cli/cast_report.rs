@@ -65,11 +65,11 @@ impl CastReport {
     pub fn text(&self) -> String {
         let Self { scene, triangles, load_ms, build_ms, device, n_rays, n_hits, n_invalid, .. } = self;
         let times = self.times.as_ref().map_or_else(|| "no timestamps".to_owned(), Times::text);
-        let invalid = if *n_invalid > 0 { format!(", {n_invalid} are no rays") } else { String::new() };
+        let invalid = if *n_invalid > 0 { format!(", {n_invalid} invalid") } else { String::new() };
         format!(
             "{scene}: {triangles} triangles, loaded in {load_ms:.0} ms, kd-tree built in {build_ms:.0} ms\n\
              {device}: {times}\n\
-             {n_rays} rays, {n_hits} hit{invalid}\n\
+             {n_rays} rays, {n_hits} hits{invalid}\n\
              wrote {}\n",
             self.hits.display()
         )

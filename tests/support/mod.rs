@@ -2,6 +2,7 @@
 
 #![allow(dead_code)] // each test target uses its own part
 
+pub mod command;
 pub mod compare;
 pub mod meshes;
 pub mod random;

@@ -1,0 +1,292 @@
+//! `kdray cast` as its users meet it: files in, files out, exit codes, one-line errors.
+
+mod support;
+
+use std::{
+    fs::{self, File},
+    io::BufReader,
+    path::Path,
+};
+
+use npyz::{NpyFile, WriterBuilder};
+use serde_json::Value;
+use support::command::{cornell, fail, kdray, names, stderr, stdout, succeed};
+use tempfile::TempDir;
+use zip::ZipArchive;
+
+/// A square at z = 0 of two triangles that face +z, and one above it that faces -z.
+const MESH: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 2\nv 0 1 2\nv 1 0 2\n\
+                    o square\nf 1 2 3\nf 1 3 4\no lid\nf 5 6 7\n";
+const MISS: u32 = u32::MAX;
+
+/// Rows of an array of rays as NumPy saves them.
+fn save<const N: usize>(path: &Path, rays: &[[f32; N]]) {
+    save_as(path, &[rays.len() as u64, N as u64], npyz::Order::C, rays.as_flattened());
+}
+
+fn save_as<T: npyz::AutoSerialize + npyz::Serialize>(path: &Path, shape: &[u64], order: npyz::Order, numbers: &[T]) {
+    let file = File::create(path).unwrap();
+    let mut array =
+        npyz::WriteOptions::new().default_dtype().shape(shape).order(order).writer(file).begin_nd().unwrap();
+    numbers.iter().for_each(|number| array.push(number).unwrap());
+    array.finish().unwrap();
+}
+
+/// Shape and elements of an array of the archive.
+fn load<T: npyz::Deserialize>(path: &Path, name: &str) -> (Vec<u64>, Vec<T>) {
+    let mut archive = ZipArchive::new(BufReader::new(File::open(path).unwrap())).unwrap();
+    let array = NpyFile::new(archive.by_name(&format!("{name}.npy")).unwrap()).unwrap();
+    (array.shape().to_vec(), array.into_vec().unwrap())
+}
+
+fn arrays(path: &Path) -> Vec<String> {
+    let archive = ZipArchive::new(BufReader::new(File::open(path).unwrap())).unwrap();
+    archive.file_names().map(|name| name.unwrap().into_owned()).collect()
+}
+
+/// A directory with the mesh in it.
+fn with_mesh() -> TempDir {
+    let directory = TempDir::new().unwrap();
+    fs::write(directory.path().join("mesh.obj"), MESH).unwrap();
+    directory
+}
+
+/// Down from above the lid, from below it, from beside; twice as long a direction; up to before and to behind the
+/// square; no ray.
+const RAYS: [[f32; 8]; 7] = {
+    let inf = f32::INFINITY;
+    [
+        [0.25, 0.25, 3.0, 0.0, 0.0, -1.0, 0.0, inf],
+        [0.25, 0.5, 1.0, 0.0, 0.0, -1.0, 0.0, inf],
+        [5.0, 0.5, 1.0, 0.0, 0.0, -1.0, 0.0, inf],
+        [0.75, 0.25, 1.0, 0.0, 0.0, -2.0, 0.0, inf],
+        [0.75, 0.25, 1.0, 0.0, 0.0, -1.0, 0.0, 0.75],
+        [0.25, 0.25, 3.0, 0.0, 0.0, -1.0, 1.5, inf],
+        [0.75, 0.25, 1.0, 0.0, 0.0, 0.0, 0.0, inf],
+    ]
+};
+
+#[test]
+fn hits_are_as_open3d_names_them() {
+    let directory = with_mesh();
+    let path = |name: &str| directory.path().join(name);
+    save(&path("rays.npy"), &RAYS);
+    for device in [&["--validate"][..], &["--cpu"], &["--traversal", "stack"]] {
+        let output = succeed(directory.path(), &[&["cast", "mesh.obj", "rays.npy", "-o", "hits.npz"], device].concat());
+        assert!(stdout(&output).contains("7 rays, 4 hits, 1 invalid\n"), "{}", stdout(&output));
+        let expected = ["t_hit.npy", "primitive_ids.npy", "primitive_uvs.npy", "primitive_normals.npy"];
+        let mut found = arrays(&path("hits.npz"));
+        found.sort_by_key(|name| expected.iter().position(|expected| expected == name));
+        assert_eq!(found, expected);
+        let inf = f32::INFINITY;
+        assert_eq!(load(&path("hits.npz"), "t_hit"), (vec![7], vec![1f32, 1.0, inf, 0.5, inf, 3.0, inf]));
+        assert_eq!(load(&path("hits.npz"), "primitive_ids"), (vec![7], vec![2, 1, MISS, 0, MISS, 0, MISS]));
+        let uvs = vec![0.25f32, 0.25, 0.25, 0.25, 0.0, 0.0, 0.5, 0.25, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0];
+        assert_eq!(load(&path("hits.npz"), "primitive_uvs"), (vec![7, 2], uvs));
+        let (shape, normals) = load::<f32>(&path("hits.npz"), "primitive_normals");
+        assert_eq!(shape, [7, 3]);
+        let z: Vec<_> = normals.chunks(3).map(|normal| normal[2]).collect();
+        assert_eq!(z, [-1.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0]);
+        assert!(normals.chunks(3).all(|normal| normal[..2] == [0.0, 0.0]));
+    }
+    assert_eq!(names(directory.path()), ["hits.npz", "mesh.obj", "rays.npy"]);
+}
+
+#[test]
+fn any_says_what_is_occluded() {
+    let directory = with_mesh();
+    let path = |name: &str| directory.path().join(name);
+    save(&path("rays.npy"), &RAYS);
+    for device in ["--validate", "--cpu"] {
+        succeed(directory.path(), &["cast", "mesh.obj", "rays.npy", "-o", "hits.npz", "--any", "-q", device]);
+        assert_eq!(arrays(&path("hits.npz")), ["occluded.npy"]);
+        let expected = vec![true, true, false, true, false, true, false];
+        assert_eq!(load(&path("hits.npz"), "occluded"), (vec![7], expected));
+    }
+}
+
+/// Six columns are eight with t from 0 to infinity; a scene is a mesh, too; no rays are rays.
+#[test]
+fn rays_of_six_columns_and_none() {
+    let directory = TempDir::new().unwrap();
+    let path = |name: &str| directory.path().join(name);
+    let scene = cornell();
+    let six: Vec<[f32; 6]> = (0..1000).map(|i| [0.0, 0.1, 0.0, (i as f32).sin(), (i as f32).cos(), 0.3]).collect();
+    let eight: Vec<[f32; 8]> = six.iter().map(|&[a, b, c, d, e, f]| [a, b, c, d, e, f, 0.0, f32::INFINITY]).collect();
+    save(&path("6.npy"), &six);
+    save(&path("8.npy"), &eight);
+    save::<8>(&path("0.npy"), &[]);
+    for rays in ["6", "8", "0"] {
+        let (rays, hits) = (format!("{rays}.npy"), format!("{rays}.npz"));
+        let output = succeed(directory.path(), &["cast", &scene, &rays, "-o", &hits, "-q"]);
+        assert!(output.stdout.is_empty() && output.stderr.is_empty(), "{}{}", stdout(&output), stderr(&output));
+    }
+    assert_eq!(fs::read(path("6.npz")).unwrap(), fs::read(path("8.npz")).unwrap());
+    assert!(load::<f32>(&path("6.npz"), "t_hit").1.iter().any(|t| t.is_finite()));
+    assert_eq!(load::<f32>(&path("0.npz"), "primitive_normals"), (vec![0, 3], vec![]));
+}
+
+#[test]
+fn the_report_is_json_too() {
+    let directory = with_mesh();
+    save(&directory.path().join("rays.npy"), &RAYS);
+    for device in [&[][..], &["--cpu", "--threads", "1"]] {
+        let arguments = ["cast", "mesh.obj", "rays.npy", "-o", "hits.npz", "--repeat", "3", "--json", "x.json"];
+        let output = succeed(directory.path(), &[&arguments[..], device].concat());
+        let text = stdout(&output);
+        assert!(text.contains("Mrays/s") && text.ends_with("wrote hits.npz\n"), "{text}");
+        let json: Value = serde_json::from_slice(&fs::read(directory.path().join("x.json")).unwrap()).unwrap();
+        let counts = ["n_rays", "n_hits", "n_invalid", "triangles"].map(|key| json[key].as_u64().unwrap());
+        assert_eq!(counts, [7, 4, 1, 3]);
+        let times = ["min_ms", "median_ms", "max_ms"].map(|key| json["times"][key].as_f64().unwrap());
+        assert!(0.0 < times[0] && times.is_sorted(), "{times:?}");
+        assert_eq!(json["times"]["n_times"].as_u64(), Some(3));
+        assert!(json["times"]["mrays_per_s"].as_f64() > Some(0.0) && json["device"].is_string());
+    }
+}
+
+#[test]
+fn usage_mistakes_are_refused() {
+    let directory = TempDir::new().unwrap();
+    let cases: &[(&[&str], &str)] = &[
+        (&["cast"], "MESH"),
+        (&["cast", "m.obj"], "RAYS"),
+        (&["cast", "m.obj", "r.npy"], "--output"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npy"], ".npz"),
+        (&["cast", "m.obj", "r.npy", "-o", "x"], ".npz"),
+        (&["cast", "m.obj", "r.npz", "-o", "r.npz"], "--output"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--json", "r.npy"], "RAYS"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--json", "m.obj"], "MESH"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--json", "x.npz"], "same file"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--repeat", "0"], "--repeat"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--traversal", "ropes"], "mask"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--cpu", "--validate"], "--cpu"),
+    ];
+    for (arguments, named) in cases {
+        fail(directory.path(), arguments, 2, named);
+    }
+    assert!(names(directory.path()).is_empty());
+}
+
+/// A header as `numpy` writes it, and what follows it.
+fn with_header(header: &str, data: &[u8]) -> Vec<u8> {
+    let size = (header.len() as u16).to_le_bytes();
+    [b"\x93NUMPY\x01\x00", &size[..], header.as_bytes(), data].concat()
+}
+
+#[test]
+fn rays_that_cannot_be_read_are_named() {
+    let directory = with_mesh();
+    let path = |name: &str| directory.path().join(name);
+    save(&path("good.npy"), &RAYS);
+    save(&path("seven.npy"), &[[0.0; 7]; 3]);
+    save_as(&path("row.npy"), &[8], npyz::Order::C, &[0f32; 8]);
+    save_as(&path("cube.npy"), &[2, 2, 8], npyz::Order::C, &[0f32; 32]);
+    save_as(&path("double.npy"), &[1, 8], npyz::Order::C, &[0f64; 8]);
+    save_as(&path("integer.npy"), &[1, 8], npyz::Order::C, &[0i32; 8]);
+    save_as(&path("fortran.npy"), &[4, 8], npyz::Order::Fortran, &[0f32; 32]);
+    let good = fs::read(path("good.npy")).unwrap();
+    fs::write(path("cut.npy"), &good[..good.len() - 1]).unwrap();
+    fs::write(path("head.npy"), &good[..40]).unwrap();
+    fs::write(path("junk.npy"), "these are no rays\n").unwrap();
+    fs::write(path("empty.npy"), "").unwrap();
+    fs::create_dir(path("folder.npy")).unwrap();
+    let huge = "{'descr': '<f4', 'fortran_order': False, 'shape': (1152921504606846976, 8), }\n";
+    fs::write(path("huge.npy"), with_header(huge, &[0; 64])).unwrap();
+    let many = "{'descr': '<f4', 'fortran_order': False, 'shape': (4611686018427387904, 8), }\n";
+    fs::write(path("many.npy"), with_header(many, &[0; 64])).unwrap();
+    fs::write(path("deep.npy"), with_header(&"(".repeat(60_000), &[])).unwrap();
+    fs::write(
+        path("record.npy"),
+        with_header("{'descr': [('a', '<f4')], 'fortran_order': False, 'shape': (1, 8)}\n", &[0; 32]),
+    )
+    .unwrap();
+    fs::write(path("giant.npy"), b"\x93NUMPY\x02\x00\xff\xff\xff\xff").unwrap();
+    let kept = names(directory.path());
+    for (rays, what) in [
+        ("none.npy", "none.npy"),
+        ("seven.npy", "[3, 7]"),
+        ("row.npy", "[8]"),
+        ("cube.npy", "[2, 2, 8]"),
+        ("double.npy", "float32"),
+        ("integer.npy", "float32"),
+        ("record.npy", "float32"),
+        ("fortran.npy", "Fortran"),
+        ("cut.npy", "6 of 7"),
+        ("head.npy", "is no .npy file"),
+        ("junk.npy", "is no .npy file"),
+        ("empty.npy", "is no .npy file"),
+        ("folder.npy", "directory"),
+        ("huge.npy", "2 of 1152921504606846976"),
+        ("many.npy", "4611686018427387904"),
+        ("deep.npy", "header"),
+        ("giant.npy", "header"),
+    ] {
+        fail(directory.path(), &["cast", "mesh.obj", rays, "-o", "x.npz", "--cpu"], 3, what);
+        fail(directory.path(), &["cast", "mesh.obj", rays, "-o", "x.npz", "--cpu"], 3, rays);
+    }
+    fail(directory.path(), &["cast", "none.obj", "good.npy", "-o", "x.npz", "--cpu"], 3, "none.obj");
+    fail(directory.path(), &["cast", "mesh.obj", "good.npy", "-o", "x.npz", "--device", "99"], 4, "99");
+    fail(directory.path(), &["cast", "mesh.obj", "good.npy", "-o", "none/x.npz"], 5, "none/x.npz");
+    assert_eq!(names(directory.path()), kept);
+}
+
+#[cfg(unix)]
+mod unix {
+    use std::process::Command;
+
+    use super::*;
+
+    fn shell(directory: &Path, script: &str) -> std::process::Output {
+        let script = format!("set -o pipefail; trap '' XFSZ; {script}");
+        Command::new("bash").args(["-c", &script, env!("CARGO_BIN_EXE_kdray")]).current_dir(directory).output().unwrap()
+    }
+
+    #[test]
+    fn a_full_disk_leaves_what_was_there() {
+        let directory = with_mesh();
+        let rays: Vec<[f32; 6]> = (0..20_000).map(|i| [0.0, 0.1, 1.0, (i as f32).sin(), 0.1, -1.0]).collect();
+        save(&directory.path().join("rays.npy"), &rays);
+        fs::write(directory.path().join("x.npz"), "old").unwrap();
+        for path in ["x.npz", "new.npz"] {
+            let output =
+                shell(directory.path(), &format!("ulimit -f 8; \"$0\" cast mesh.obj rays.npy --cpu -q -o {path}"));
+            let text = stderr(&output);
+            assert_eq!(output.status.code(), Some(5), "{text}");
+            assert!(text.starts_with("error: ") && text.contains(path) && text.lines().count() == 1, "{text}");
+        }
+        assert_eq!(names(directory.path()), ["mesh.obj", "rays.npy", "x.npz"]);
+        assert_eq!(fs::read(directory.path().join("x.npz")).unwrap(), b"old");
+    }
+
+    /// Rays may come from a pipe, hits may go to one.
+    #[test]
+    fn pipes() {
+        let directory = with_mesh();
+        save(&directory.path().join("rays.npy"), &RAYS);
+        std::os::unix::fs::symlink("/dev/stdout", directory.path().join("out.npz")).unwrap();
+        let output = shell(
+            directory.path(),
+            "cat rays.npy | \"$0\" cast mesh.obj /dev/stdin --cpu -q -o out.npz | cat > piped.npz && \
+             \"$0\" cast mesh.obj rays.npy --cpu -q -o whole.npz && cmp piped.npz whole.npz",
+        );
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let output =
+            shell(directory.path(), "head -c 300 rays.npy | \"$0\" cast mesh.obj /dev/stdin --cpu -q -o x.npz");
+        assert_eq!(output.status.code(), Some(3));
+        assert!(stderr(&output).contains("ends after 5 of 7 rays"), "{}", stderr(&output));
+        assert!(!directory.path().join("x.npz").exists());
+    }
+}
+
+/// The layer's advice on best practices, asked for by environment, stands in for a fault.
+#[test]
+fn a_validation_message_fails() {
+    let directory = with_mesh();
+    save(&directory.path().join("rays.npy"), &RAYS);
+    let output = kdray(directory.path(), &["cast", "mesh.obj", "rays.npy", "-o", "x.npz", "--validate", "-q"])
+        .env("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT")
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(4), "{}", stderr(&output));
+}

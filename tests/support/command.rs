@@ -1,0 +1,55 @@
+//! The command, run as its users run it.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output, Stdio},
+};
+
+/// The command in a directory.
+pub fn kdray(directory: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_kdray"));
+    command.current_dir(directory).args(arguments).stdin(Stdio::null());
+    command
+}
+
+pub fn cornell() -> String {
+    let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "scenes", "cornell.toml"].iter().collect();
+    path.into_os_string().into_string().unwrap()
+}
+
+pub fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+pub fn stderr(output: &Output) -> String {
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!text.contains("panicked"), "{text}");
+    text
+}
+
+/// Runs a command that succeeds.
+pub fn succeed(directory: &Path, arguments: &[&str]) -> Output {
+    let output = kdray(directory, arguments).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+    output
+}
+
+/// Runs a command that fails with an exit code and one line that names what went wrong.
+pub fn fail(directory: &Path, arguments: &[&str], code: i32, named: &str) {
+    let output = kdray(directory, arguments).output().unwrap();
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {text}");
+    let errors: Vec<_> = text.lines().filter(|line| line.starts_with("error: ")).collect();
+    assert_eq!(errors.len(), 1, "{arguments:?}: {text}");
+    assert_eq!(text.lines().last(), Some(errors[0]), "{arguments:?}");
+    assert!(errors[0].contains(named), "{arguments:?}: {} does not name {named}", errors[0]);
+    assert!(output.stdout.is_empty(), "{arguments:?}: {}", stdout(&output));
+}
+
+pub fn names(directory: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
