@@ -4,6 +4,8 @@ use std::{fmt, str::FromStr};
 
 use serde::Serialize;
 
+use crate::layout;
+
 /// How a frame is rendered. The scene's own defaults fill what the user leaves open.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
@@ -50,22 +52,50 @@ impl Denoise {
     pub const DEFAULT_THRESHOLD: f32 = 2.5;
 }
 
-/// How a ray finds its way back up the kd-tree.
+/// How a ray finds its way through the kd-tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Traversal {
     /// A bit a level says which siblings are still to be visited; parent links lead back to them.
     Mask,
+    /// The paper's own: a bit a level says which siblings are done; their boxes tell whether to visit them.
+    MaskBoxes,
+    /// Every subtree that was left is found again from the root.
+    Restart,
+    /// Back to the deepest ancestor that the ray has not left, by its box.
+    Backtrack,
+    /// The four newest far children; older ones by a restart.
+    ShortStack,
+    /// From leaf to leaf, by links to its neighbours; where the ray keeps near an edge, by the mask.
+    Ropes,
     /// An array of far children.
     Stack,
+    /// No tree: every triangle. For small meshes.
+    Brute,
 }
 
 impl Traversal {
-    /// The kernels' specialization constant (kdtree.glsl's `TRAVERSAL_` numbers).
+    /// The kernels' specialization constant.
     pub(crate) fn constant(self) -> u32 {
         match self {
-            Self::Mask => 0,
-            Self::Stack => 1,
+            Self::Mask => layout::TRAVERSAL_MASK,
+            Self::MaskBoxes => layout::TRAVERSAL_MASK_BOXES,
+            Self::Restart => layout::TRAVERSAL_RESTART,
+            Self::Backtrack => layout::TRAVERSAL_BACKTRACK,
+            Self::ShortStack => layout::TRAVERSAL_SHORT_STACK,
+            Self::Ropes => layout::TRAVERSAL_ROPES,
+            Self::Stack => layout::TRAVERSAL_STACK,
+            Self::Brute => layout::TRAVERSAL_BRUTE,
         }
+    }
+
+    /// Whether it reads the nodes' boxes.
+    pub(crate) fn needs_boxes(self) -> bool {
+        matches!(self, Self::MaskBoxes | Self::Backtrack | Self::Ropes)
+    }
+
+    /// Whether it reads the nodes' ropes.
+    pub(crate) fn needs_ropes(self) -> bool {
+        self == Self::Ropes
     }
 }
 
@@ -138,22 +168,27 @@ impl Profile {
 #[error("`{word}` is not one of {expected}")]
 pub struct UnknownWord {
     word: String,
-    expected: &'static str,
+    expected: String,
 }
 
 /// Words for an option's variants, for the command line, scene files and JSON alike.
 macro_rules! words {
-    ($ty:ident { $($variant:ident = $word:literal),+ }, $all:literal) => {
+    ($ty:ident { $($variant:ident = $word:literal),+ }) => {
         impl $ty {
             /// Every variant.
-            pub const ALL: &[Self] = &[$(Self::$variant),+];
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+
+            /// The words of all variants, with commas.
+            pub fn words() -> String {
+                [$($word),+].join(", ")
+            }
         }
         impl FromStr for $ty {
             type Err = UnknownWord;
             fn from_str(word: &str) -> Result<Self, UnknownWord> {
                 match word {
                     $($word => Ok(Self::$variant),)+
-                    _ => Err(UnknownWord { word: word.to_owned(), expected: $all }),
+                    _ => Err(UnknownWord { word: word.to_owned(), expected: Self::words() }),
                 }
             }
         }
@@ -165,5 +200,14 @@ macro_rules! words {
     };
 }
 
-words!(Traversal { Mask = "mask", Stack = "stack" }, "mask, stack");
-words!(Primary { Raster = "raster", Trace = "trace" }, "raster, trace");
+words!(Traversal {
+    Mask = "mask",
+    MaskBoxes = "mask-boxes",
+    Restart = "restart",
+    Backtrack = "backtrack",
+    ShortStack = "short-stack",
+    Ropes = "ropes",
+    Stack = "stack",
+    Brute = "brute"
+});
+words!(Primary { Raster = "raster", Trace = "trace" });

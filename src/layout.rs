@@ -25,6 +25,7 @@ mod tests {
             BIND_MATERIALS => Some("Material"),
             BIND_LIGHTS => Some("Light"),
             BIND_KD_NODES => Some("KdNode"),
+            BIND_KD_BOXES => Some("KdBox"),
             BIND_RAYS | BIND_NEXT_RAYS | BIND_CHILD_RAYS => Some("Ray"),
             BIND_BOUNCES => Some("Bounce"),
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
@@ -68,8 +69,9 @@ mod tests {
 
     /// Struct name and block of every binding and push constant of every shader.
     fn blocks() -> Vec<(&'static str, Type)> {
-        let files = fs::read_dir(env!("OUT_DIR")).expect("OUT_DIR").map(|entry| entry.expect("an entry").path());
-        let shaders = files.filter(|path| path.extension().is_some_and(|extension| extension == "spv"));
+        let passes = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl/passes");
+        let files = fs::read_dir(passes).expect("glsl/passes").map(|entry| entry.expect("an entry").file_name());
+        let shaders = files.map(|name| format!("{}/{}.spv", env!("OUT_DIR"), name.to_string_lossy()));
         let variables = shaders.flat_map(|path| {
             let spirv = fs::read(&path).expect("SPIR-V");
             let entry_points = ReflectConfig::new().spv(spirv).ref_all_rscs(true).reflect();

@@ -45,7 +45,8 @@ impl Renderer {
         let constants = Frame { queue_capacity: capacity, ..frame_constants(scene, tree, options) };
         let spans = split_evenly(options.width * options.height, capacity);
         let n_rows = spans.len() * options.max_depth as usize;
-        let resources = Resources::new(&context, scene, tree, &constants, n_rows)?;
+        let mut resources = Resources::new(&context, scene, tree, &constants, n_rows)?;
+        resources.add_extras(&context, tree, options.traversal)?;
         let passes = Passes::new(&context, &resources.bindings, options)?;
         let schedule = Schedule::new(&context, &resources, spans)?;
         Ok(Self { context, options: options.clone(), resources, passes, schedule })

@@ -216,7 +216,7 @@ fn traversal_measures_every_variant_on_every_set() {
                 assert!(rate("min") <= rate("median") && rate("median") <= rate("max") && rate("min") > 0.0);
                 let steps = &variant["steps_a_ray"];
                 assert!(steps["nodes"].as_f64() >= Some(1.0) && steps["triangles"].is_f64(), "{steps}");
-                assert_eq!(steps["parents"].as_f64() > Some(0.0), name == "mask", "{steps}");
+                assert_eq!(steps["links"].as_f64() > Some(0.0), name == "mask", "{steps}");
             }
         }
     }

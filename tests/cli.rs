@@ -32,7 +32,7 @@ fn usage_mistakes_are_refused_before_the_scene_is_read() {
         (&["render", "none.toml", "--denoise", "off", "--denoise-threshold", "1"], "--denoise off"),
         (&["render", "none.toml", "--exposure", "0"], "--exposure"),
         (&["render", "none.toml", "--exposure", "inf"], "--exposure"),
-        (&["render", "none.toml", "--traversal", "ropes"], "mask, stack"),
+        (&["render", "none.toml", "--traversal", "bvh"], "short-stack, "),
         (&["render", "none.toml", "--primary", "rays"], "raster, trace"),
         (&["render", "none.toml", "--threads", "0"], "--threads"),
         (&["render", "none.toml", "--cpu", "--device", "0"], "--device"),

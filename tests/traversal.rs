@@ -1,4 +1,4 @@
-//! The CPU's kd-tree traversal against every triangle of the mesh, and its two ways back up against one another.
+//! The CPU's kd-tree traversals against every triangle of the mesh, and against one another.
 
 mod support;
 
@@ -16,6 +16,11 @@ use support::{
 };
 
 const N_RAYS: usize = 100_000;
+
+/// All that use the tree.
+fn tree_traversals() -> impl Iterator<Item = Traversal> {
+    Traversal::ALL.iter().copied().filter(|&traversal| traversal != Traversal::Brute)
+}
 
 fn rays_at(world: &World) -> Vec<Ray> {
     (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), world, i)).collect()
@@ -52,10 +57,13 @@ fn check_against_brute_force(name: &str, triangles: Vec<Triangle>) {
     let expected: Vec<Hit> = rays.par_iter().map(|ray| brute::closest_hit(&world.triangles, ray)).collect();
     let n_hits = expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count();
     assert!(n_hits > N_RAYS / 5, "{name}: only {n_hits} rays hit anything");
-    for traversal in [Traversal::Mask, Traversal::Stack] {
-        let difference = first_difference(&rays, &expected, &traced(&world, traversal, &rays));
-        assert_eq!(difference, None, "{name}, {traversal}");
-    }
+    let wrong: Vec<String> = tree_traversals()
+        .filter_map(|traversal| {
+            let difference = first_difference(&rays, &expected, &traced(&world, traversal, &rays))?;
+            Some(format!("{name}, {traversal}: {difference}"))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
@@ -71,12 +79,15 @@ fn finds_what_brute_force_finds() {
 }
 
 #[test]
-fn mask_and_stack_agree_in_larger_meshes() {
+fn all_agree_in_larger_meshes() {
     for triangles in [meshes::torus(400, 200), meshes::cube(100, 0.3), meshes::soup(50_000, 3)] {
         let world = World::new(triangles);
         let rays = rays_at(&world);
         let masked = traced(&world, Traversal::Mask, &rays);
-        assert_eq!(first_difference(&rays, &masked, &traced(&world, Traversal::Stack, &rays)), None);
+        for traversal in tree_traversals() {
+            let difference = first_difference(&rays, &masked, &traced(&world, traversal, &rays));
+            assert_eq!(difference, None, "{traversal}");
+        }
     }
 }
 
@@ -109,7 +120,7 @@ fn rays_from_inside_never_leak() {
     for (name, triangles) in [("sphere", meshes::cube(20, 1.0)), ("cube", meshes::cube(20, 0.0))] {
         let world = World::new(triangles);
         let rays: Vec<Ray> = (0..300_000).map(|i| outward_ray(&mut Random(i), &world)).collect();
-        for traversal in [Traversal::Mask, Traversal::Stack] {
+        for traversal in tree_traversals() {
             let n_leaks = traced(&world, traversal, &rays).iter().filter(|hit| hit.triangle_ix == NO_TRIANGLE).count();
             assert_eq!(n_leaks, 0, "{name}, {traversal}");
         }
@@ -157,7 +168,7 @@ fn rays_that_are_none_end_and_miss() {
             must_miss.extend([nan, 0.0, -1.0, -infinity].map(|t_max| Ray { t_max, ..ray(origin, direction) }));
         }
     }
-    for traversal in [Traversal::Mask, Traversal::Stack] {
+    for &traversal in Traversal::ALL {
         let hits = traced(&world, traversal, &must_miss);
         for (ray, hit) in must_miss.iter().zip(hits) {
             assert_eq!(hit.triangle_ix, NO_TRIANGLE, "{traversal}: {ray:?} hits at {}", hit.t);

@@ -28,6 +28,18 @@
 // Levels below the root that the traversal's bit mask can hold: two words.
 #define KD_MAX_DEPTH 64u
 
+// How rays find their way through the tree: the kernels' specialization constant TRAVERSAL.
+#define TRAVERSAL_MASK 0u
+#define TRAVERSAL_STACK 1u
+#define TRAVERSAL_BRUTE 2u
+#define TRAVERSAL_RESTART 3u
+#define TRAVERSAL_SHORT_STACK 4u
+#define TRAVERSAL_MASK_BOXES 5u
+#define TRAVERSAL_BACKTRACK 6u
+#define TRAVERSAL_ROPES 7u
+// Triangles that brute force takes: a driver is known to end any shader after 65,535 turns of its loops, in silence.
+#define BRUTE_MAX_TRIANGLES 65000u
+
 // Material.flags
 #define MATERIAL_SPECULAR 1u
 #define MATERIAL_REFLECT 2u
@@ -54,6 +66,16 @@ struct Triangle {
 struct KdNode {
     uint split_or_first;
     uint axis_and_child;
+};
+
+// 24 bytes: a node's cell, world units. Only some traversals need it.
+struct KdBox {
+    float min_x;
+    float min_y;
+    float min_z;
+    float max_x;
+    float max_y;
+    float max_z;
 };
 
 // 80 bytes, named as in Wavefront MTL.
@@ -192,10 +214,12 @@ struct CastBatch {
 #define BIND_PIXEL_DISPLAY 19u
 #define BIND_TRIANGLE_IDS 20u
 #define BIND_COUNTERS 21u
-#define N_BINDINGS 22u
+#define BIND_KD_BOXES 22u
+#define BIND_KD_ROPES 23u
+#define N_BINDINGS 24u
 
-// A cast's descriptor set has these and what the traversal reads: 0, 1, 5, 6, 7.
-#define BIND_CAST_RAYS 22u
-#define BIND_CAST_HITS 23u
+// A cast's descriptor set has these and what the traversal reads: 0, 1, 5, 6, 7, 22, 23.
+#define BIND_CAST_RAYS 24u
+#define BIND_CAST_HITS 25u
 
 #endif

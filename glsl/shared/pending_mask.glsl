@@ -21,6 +21,10 @@ uint deepest_pending() {
     return uint(pending_mask.y != 0u ? 33 + findMSB(pending_mask.y) : 1 + findMSB(pending_mask.x));
 }
 
+bool is_pending(uint depth) {
+    return (pending_mask & bit_of(depth)) != uvec2(0u);
+}
+
 void mask_push(uint second_ix, Cell cell, vec2 t_cross) {
     pending_mask |= bit_of(cell.depth);
     deepest_ix = second_ix;

@@ -6,7 +6,7 @@ use crate::{
     camera::frame_constants,
     cpu::bindings::Bindings,
     frame::RenderOptions,
-    kdtree::{BuildOptions, KdTree},
+    kdtree::{BuildOptions, Extras, KdTree},
     layout::{FLAT_NORMAL, Frame, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
     scene::{Camera, Scene, framing},
 };
@@ -19,6 +19,8 @@ const VERTICAL_FOV_DEGREES: f32 = 60.0;
 pub struct Stage {
     pub scene: Scene,
     pub tree: KdTree,
+    /// What any traversal reads beside the tree.
+    pub extras: Extras,
     /// The camera's constants. `queue_capacity` is 0: there is no queue.
     pub frame: Frame,
     /// Where shadow rays go to.
@@ -33,7 +35,7 @@ impl Stage {
         let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
         let options = RenderOptions { width: size.0, height: size.1, ..RenderOptions::default() };
         let frame = frame_constants(&scene, &tree, &options);
-        Self { scene, tree, frame, light }
+        Self { scene, extras: Extras::all(&tree), tree, frame, light }
     }
 
     /// The scene on the floor of a closed room, seen from inside the room, with a point light under its ceiling.
@@ -49,7 +51,7 @@ impl Stage {
 
     /// What a traversal on the CPU reads.
     pub fn bindings(&self) -> Bindings<'_> {
-        Bindings::new(&self.scene, &self.tree, &self.frame)
+        Bindings::new(&self.scene, &self.tree, &self.frame).with_extras(&self.extras)
     }
 }
 

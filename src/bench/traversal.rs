@@ -160,8 +160,10 @@ impl VariantResult {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct StepsARay {
     pub nodes: f64,
-    /// Links to parents.
-    pub parents: f64,
+    /// Links to parents, and ropes.
+    pub links: f64,
+    /// Boxes of nodes.
+    pub boxes: f64,
     /// Triangle tests.
     pub triangles: f64,
 }
@@ -169,7 +171,12 @@ pub struct StepsARay {
 impl StepsARay {
     fn new(steps: &Steps, n_rays: usize) -> Self {
         let mean = |n: u64| n as f64 / n_rays.max(1) as f64;
-        Self { nodes: mean(steps.n_nodes), parents: mean(steps.n_parents), triangles: mean(steps.n_triangles) }
+        Self {
+            nodes: mean(steps.n_nodes),
+            links: mean(steps.n_links),
+            boxes: mean(steps.n_boxes),
+            triangles: mean(steps.n_triangles),
+        }
     }
 }
 

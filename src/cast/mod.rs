@@ -22,7 +22,7 @@ use crate::{
     cpu,
     frame::Traversal,
     gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
-    kdtree::KdTree,
+    kdtree::{Extras, KdTree},
     layout::{Frame, RAY_GROUP_SIZE, Triangle},
     passes::{self, CastResources, Tree},
 };
@@ -74,7 +74,9 @@ impl Caster {
         tree: &KdTree,
         traversal: Traversal,
     ) -> Result<Self, GpuError> {
-        let tree = Tree::new(context, triangles, tree, &constants(triangles, tree))?;
+        let mut buffers = Tree::new(context, triangles, tree, &constants(triangles, tree))?;
+        buffers.add_extras(context, tree, traversal)?;
+        let tree = buffers;
         let bindings = CastResources::bindings(context)?;
         let resources = CastResources::new(context, &bindings, &tree, 0)?;
         let rays_per_batch = RAYS_PER_BATCH.min(most_rays(context.limits()));
@@ -186,6 +188,8 @@ pub fn cast_on_cpu(
 ) -> Vec<Hit> {
     let frame = constants(triangles, tree);
     let mut hits = vec![Hit::zeroed(); rays.len()];
-    cpu::cast::cast(&cpu::bindings::Bindings::of_tree(triangles, tree, &frame), traversal, query, rays, &mut hits);
+    let extras = Extras::new(tree, traversal);
+    let bindings = cpu::bindings::Bindings::of_tree(triangles, tree, &frame).with_extras(&extras);
+    cpu::cast::cast(&bindings, traversal, query, rays, &mut hits);
     hits
 }

@@ -58,8 +58,8 @@ pub struct RenderArgs {
     /// Factor on radiance before it is encoded for display [default: the scene's]
     #[arg(long, value_name = "X", value_parser = positive)]
     pub exposure: Option<f32>,
-    /// How rays find their way back up the tree
-    #[arg(long, value_name = "mask|stack", default_value_t = RenderOptions::default().traversal)]
+    #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
+    #[arg(help = format!("How rays find their way through the tree: {}", Traversal::words()))]
     pub traversal: Traversal,
     /// How primary rays find their triangles
     #[arg(long, value_name = "raster|trace", default_value_t = RenderOptions::default().primary)]

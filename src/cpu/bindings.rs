@@ -2,8 +2,8 @@
 
 use super::table::{Counted, ReadCounts, Table, Uncounted};
 use crate::{
-    kdtree::KdTree,
-    layout::{Frame, KdNode, Light, Material, Triangle},
+    kdtree::{Extras, KdTree},
+    layout::{Frame, KdBox, KdNode, Light, Material, Triangle},
     scene::Scene,
 };
 
@@ -20,6 +20,10 @@ pub struct Bindings<'a, R = Uncounted> {
     /// One a pair of nodes.
     pub kd_parents: Table<'a, u32, R>,
     pub leaf_triangles: Table<'a, u32, R>,
+    /// One a node, or none where the traversal does not ask for them.
+    pub kd_boxes: Table<'a, KdBox, R>,
+    /// Six a node, or none.
+    pub kd_ropes: Table<'a, u32, R>,
 }
 
 impl<'a> Bindings<'a> {
@@ -43,6 +47,8 @@ impl<'a> Bindings<'a> {
             kd_nodes: Table::from(&*tree.nodes),
             kd_parents: Table::from(&*tree.parents),
             leaf_triangles: Table::from(&*tree.leaf_triangles),
+            kd_boxes: Table::from(&[][..]),
+            kd_ropes: Table::from(&[][..]),
         }
     }
 
@@ -55,8 +61,14 @@ impl<'a> Bindings<'a> {
             materials: self.materials,
             lights: self.lights,
             kd_nodes: self.kd_nodes.told_to(Counted(&counts.n_nodes)),
-            kd_parents: self.kd_parents.told_to(Counted(&counts.n_parents)),
+            kd_parents: self.kd_parents.told_to(Counted(&counts.n_links)),
             leaf_triangles: self.leaf_triangles.told_to(Counted(&counts.n_triangles)),
+            kd_boxes: self.kd_boxes.told_to(Counted(&counts.n_boxes)),
+            kd_ropes: self.kd_ropes.told_to(Counted(&counts.n_links)),
         }
+    }
+
+    pub fn with_extras(self, extras: &'a Extras) -> Self {
+        Self { kd_boxes: Table::from(&*extras.boxes), kd_ropes: Table::from(&*extras.ropes), ..self }
     }
 }

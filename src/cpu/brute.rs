@@ -1,4 +1,4 @@
-//! Closest hit over every triangle, without a tree: what the traversal must find.
+//! Closest hit over every triangle, without a tree: what the traversal must find. Twin of `brute.glsl`.
 
 use super::triangle::Shear;
 use crate::layout::{Hit, NO_TRIANGLE, Ray, Triangle};

@@ -1,7 +1,9 @@
 //! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree.glsl`.
 
 use super::{
-    bindings::Bindings, pending_mask::PendingMask, pending_stack::PendingStack, table::Reads, triangle::Shear,
+    bindings::Bindings, brute, pending_backtrack::PendingBacktrack, pending_mask::PendingMask,
+    pending_mask_boxes::PendingMaskBoxes, pending_restart::PendingRestart, pending_short_stack::PendingShortStack,
+    pending_stack::PendingStack, ropes::follow_ropes, table::Reads, triangle::Shear,
 };
 use crate::{
     frame::Traversal,
@@ -21,7 +23,10 @@ pub struct Cell {
 #[derive(Clone, Copy, Debug)]
 pub struct TraversalRay {
     shear: Shear,
-    inv_direction: [f32; 4],
+    pub(super) origin: [f32; 4],
+    pub(super) inv_direction: [f32; 4],
+    /// By how much in t a plane is widened on each axis.
+    pub(super) slack: [f32; 4],
     /// Where the ray enters the widened plane at 0 on each axis, in t.
     bias: [f32; 4],
     /// Of a widened plane, in world units.
@@ -66,7 +71,9 @@ impl TraversalRay {
         let far = [0, 1, 2].map(|i| max(t0[i], t1[i]) + slack[i]);
         Self {
             shear: Shear::of(origin, ray.direction.to_array()),
+            origin: by_axis(origin),
             inv_direction: by_axis(inv_direction),
+            slack: by_axis(slack),
             bias: by_axis([0, 1, 2].map(|i| -origin[i] * inv_direction[i] - slack[i])),
             width: 2.0 * slack_world,
             t_min,
@@ -77,6 +84,13 @@ impl TraversalRay {
         }
     }
 
+    /// Where the ray meets the split plane.
+    #[inline(always)]
+    pub fn at_plane(&self, node: KdNode) -> f32 {
+        let axis = axis_of(node) as usize;
+        (f32::from_bits(node.split_or_first) - self.origin[axis]) * self.inv_direction[axis]
+    }
+
     /// Where the ray enters the second child's side and leaves the first one's, both widened by the slack.
     #[inline(always)]
     pub fn crossing(&self, node: KdNode) -> [f32; 2] {
@@ -84,6 +98,13 @@ impl TraversalRay {
         let inv_direction = self.inv_direction[axis];
         let t = f32::from_bits(node.split_or_first) * inv_direction + self.bias[axis];
         [t, inv_direction.abs() * self.width + t]
+    }
+
+    /// The child on the side that the ray comes from; the other is `^ 1`.
+    #[inline(always)]
+    pub fn first_child(&self, node: KdNode) -> u32 {
+        let first_is_above = u32::from(self.inv_direction[axis_of(node) as usize] < 0.0);
+        (node.axis_and_child >> KD_CHILD_SHIFT) + first_is_above
     }
 }
 
@@ -117,8 +138,7 @@ fn descend<P: Pending>(
     let mut node = bindings.kd_nodes[cell.node_ix as usize];
     while axis_of(node) != KD_LEAF {
         let t_cross = ray.crossing(node);
-        let first_is_above = u32::from(ray.inv_direction[axis_of(node) as usize] < 0.0);
-        let first_ix = (node.axis_and_child >> KD_CHILD_SHIFT) + first_is_above;
+        let first_ix = ray.first_child(node);
         let in_first = t_cross[1] >= cell.t_enter;
         let in_second = t_cross[0] <= cell.t_exit;
         cell.depth += 1;
@@ -132,42 +152,50 @@ fn descend<P: Pending>(
     node
 }
 
-/// The leaf's triangles against the ray; of two hits at one t the lower index wins, whatever the order of leaves.
+/// A triangle against the ray; of two hits at one t the lower index wins, whatever the order of triangles.
 #[inline(always)]
-fn intersect_leaf(bindings: &Bindings<impl Reads>, ray: &TraversalRay, leaf: KdNode, best: &mut Hit) {
-    let first = leaf.split_or_first as usize;
-    let end = first + (leaf.axis_and_child >> KD_CHILD_SHIFT) as usize;
-    for &triangle_ix in &bindings.leaf_triangles[first..end] {
-        let triangle = &bindings.triangles[triangle_ix as usize];
-        let Some(hit) = ray.shear.intersect_triangle(triangle, triangle_ix) else { continue };
-        let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
-        if hit.t > ray.t_min && nearer && triangle_ix != ray.source_triangle {
-            *best = hit;
-        }
+fn intersect(bindings: &Bindings<impl Reads>, ray: &TraversalRay, triangle_ix: u32, best: &mut Hit) {
+    let triangle = &bindings.triangles[triangle_ix as usize];
+    let Some(hit) = ray.shear.intersect_triangle(triangle, triangle_ix) else { return };
+    let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
+    if hit.t > ray.t_min && nearer && triangle_ix != ray.source_triangle {
+        *best = hit;
     }
 }
 
-/// The closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
+#[inline(always)]
+pub(super) fn intersect_leaf(bindings: &Bindings<impl Reads>, ray: &TraversalRay, leaf: KdNode, best: &mut Hit) {
+    let first = leaf.split_or_first as usize;
+    let end = first + (leaf.axis_and_child >> KD_CHILD_SHIFT) as usize;
+    for &triangle_ix in &bindings.leaf_triangles[first..end] {
+        intersect(bindings, ray, triangle_ix, best);
+    }
+}
+
+#[inline(always)]
+pub(super) fn is_done<const ANY_HIT: bool>(best: &Hit) -> bool {
+    ANY_HIT && best.triangle_ix != NO_TRIANGLE
+}
+
+/// All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
 #[inline]
-pub fn traverse<P: Pending, const ANY_HIT: bool>(
+pub(super) fn search<P: Pending, const ANY_HIT: bool>(
     bindings: &Bindings<impl Reads>,
+    ray: &TraversalRay,
     pending: &mut P,
-    ray_in: &Ray,
-    t_min: f32,
-) -> Hit {
-    let mut best = Hit { t: ray_in.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
-    let ray = TraversalRay::new(bindings, ray_in, t_min);
+    best: &mut Hit,
+) {
     // Not `>`: a NaN misses.
     if !(ray.t_enter <= ray.t_exit) {
-        return best;
+        return;
     }
     let mut cell = Cell { node_ix: 0, depth: 0, t_enter: ray.t_enter, t_exit: ray.t_exit };
     pending.clear();
     loop {
-        let leaf = descend(bindings, &ray, pending, &mut cell);
-        intersect_leaf(bindings, &ray, leaf, &mut best);
-        if ANY_HIT && best.triangle_ix != NO_TRIANGLE || !pending.pop(bindings, &ray, best.t, &mut cell) {
-            return best;
+        let leaf = descend(bindings, ray, pending, &mut cell);
+        intersect_leaf(bindings, ray, leaf, best);
+        if is_done::<ANY_HIT>(best) || !pending.pop(bindings, ray, best.t, &mut cell) {
+            return;
         }
     }
 }
@@ -176,14 +204,26 @@ pub fn traverse<P: Pending, const ANY_HIT: bool>(
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
 pub enum Traverser {
     Mask(PendingMask),
+    MaskBoxes(PendingMaskBoxes),
+    Restart(PendingRestart),
+    Backtrack(PendingBacktrack),
+    ShortStack(PendingShortStack<4>),
+    Ropes(PendingMask),
     Stack(PendingStack),
+    Brute,
 }
 
 impl Traverser {
     pub fn new(traversal: Traversal) -> Self {
         match traversal {
-            Traversal::Mask => Self::Mask(PendingMask::new()),
-            Traversal::Stack => Self::Stack(PendingStack::new()),
+            Traversal::Mask => Self::Mask(Pending::new()),
+            Traversal::MaskBoxes => Self::MaskBoxes(Pending::new()),
+            Traversal::Restart => Self::Restart(Pending::new()),
+            Traversal::Backtrack => Self::Backtrack(Pending::new()),
+            Traversal::ShortStack => Self::ShortStack(Pending::new()),
+            Traversal::Ropes => Self::Ropes(Pending::new()),
+            Traversal::Stack => Self::Stack(Pending::new()),
+            Traversal::Brute => Self::Brute,
         }
     }
 
@@ -201,10 +241,19 @@ impl Traverser {
 
     /// The closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl Reads>, ray: &Ray, t_min: f32) -> Hit {
+    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl Reads>, ray_in: &Ray, t_min: f32) -> Hit {
+        let mut best = Hit { t: ray_in.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
+        let ray = &TraversalRay::new(bindings, ray_in, t_min);
         match self {
-            Self::Mask(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray, t_min),
-            Self::Stack(pending) => traverse::<_, ANY_HIT>(bindings, pending, ray, t_min),
+            Self::Mask(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::MaskBoxes(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::Restart(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::Backtrack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::ShortStack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::Ropes(pending) => follow_ropes::<ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::Stack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::Brute => best = brute::closest_hit_beyond(bindings.triangles, ray_in, t_min),
         }
+        best
     }
 }

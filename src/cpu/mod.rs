@@ -11,14 +11,20 @@ pub mod cast;
 pub mod compact;
 pub mod denoise;
 pub mod display;
+pub mod kd_boxes;
 pub mod kdtree;
 pub mod light;
 pub mod material;
+pub mod pending_backtrack;
 pub mod pending_mask;
+pub mod pending_mask_boxes;
+pub mod pending_restart;
+pub mod pending_short_stack;
 pub mod pending_stack;
 pub mod primary_hit;
 mod queues;
 pub mod resolve;
+pub mod ropes;
 pub mod shade;
 pub mod shadow;
 pub mod steps;
@@ -43,7 +49,7 @@ use self::{
 use crate::{
     camera::frame_constants,
     frame::{BounceStats, Picture, Primary, Profile, RenderOptions},
-    kdtree::KdTree,
+    kdtree::{Extras, KdTree},
     layout::{Bounce, Frame, Hit, Ray, SCAN_BLOCK_SIZE},
     scene::Scene,
 };
@@ -85,6 +91,7 @@ pub fn render_in_batches(
         tree,
         options,
         batching,
+        extras: Extras::new(tree, options.traversal),
         frame: frame_constants(scene, tree, options),
         triangle_ids: vec![0; n_pixels as usize],
         pixel_radiance: vec![[0.0; 4]; n_pixels as usize],
@@ -108,6 +115,7 @@ struct Renderer<'a> {
     tree: &'a KdTree,
     options: &'a RenderOptions,
     batching: Batching,
+    extras: Extras,
     frame: Frame,
     /// Like `pixel_radiance`: `width * height`, rows from the top.
     triangle_ids: Vec<u32>,
@@ -120,7 +128,7 @@ struct Renderer<'a> {
 
 impl Renderer<'_> {
     fn visibility(&mut self) {
-        let bindings = Bindings::new(self.scene, self.tree, &self.frame);
+        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
         let (traversal, ids) = (self.options.traversal, &mut self.triangle_ids);
         self.clock.time("visibility", None, || visibility::visibility(&bindings, traversal, ids));
     }
@@ -159,7 +167,7 @@ impl Renderer<'_> {
 
     /// Fills `hits`; returns how many are hits.
     fn closest_hits(&mut self, depth: u32) -> u64 {
-        let bindings = Bindings::new(self.scene, self.tree, &self.frame);
+        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
         let Queues { rays, hits, .. } = &mut self.queues;
         hits.resize(rays.len(), Hit::zeroed());
         let n_hits = if depth == 0 && self.options.primary == Primary::Raster {
@@ -176,7 +184,7 @@ impl Renderer<'_> {
     fn light(&mut self, depth: u32) -> u64 {
         let Queues { rays, hits, light_visibility, shaded, .. } = &mut self.queues;
         self.frame.queue_capacity = rays.len() as u32;
-        let bindings = Bindings::new(self.scene, self.tree, &self.frame);
+        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
         let traversal = self.options.traversal;
         light_visibility.resize(rays.len() * bindings.lights.len(), 0);
         shaded.resize(rays.len());

@@ -9,21 +9,21 @@ use super::{
 /// Which siblings on the way to the root are still to be visited.
 pub struct PendingMask {
     /// Bit d - 1: depth d. One word here for the kernel's two.
-    mask: u64,
+    pub(super) mask: u64,
     /// The deepest pending node and where the ray enters it.
     deepest_ix: u32,
-    t_deepest: f32,
+    pub(super) t_deepest: f32,
 }
 
 #[inline(always)]
-fn bit_of(depth: u32) -> u64 {
+pub(super) fn bit_of(depth: u32) -> u64 {
     1 << ((depth - 1) & 63)
 }
 
 impl PendingMask {
     /// Depth of the highest bit; the mask is not empty.
     #[inline(always)]
-    fn deepest(&self) -> u32 {
+    pub(super) fn deepest(&self) -> u32 {
         64 - self.mask.leading_zeros()
     }
 

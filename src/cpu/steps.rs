@@ -11,8 +11,10 @@ use crate::{cast::Query, frame::Traversal, layout::Ray};
 pub struct Steps {
     /// Nodes, on the way down and on the way back alike.
     pub n_nodes: u64,
-    /// Links from nodes to their parents.
-    pub n_parents: u64,
+    /// Links to parents, and ropes.
+    pub n_links: u64,
+    /// Boxes of nodes.
+    pub n_boxes: u64,
     /// Triangles that were tested, once a leaf.
     pub n_triangles: u64,
 }
@@ -21,7 +23,8 @@ impl Steps {
     fn plus(self, other: Self) -> Self {
         Self {
             n_nodes: self.n_nodes + other.n_nodes,
-            n_parents: self.n_parents + other.n_parents,
+            n_links: self.n_links + other.n_links,
+            n_boxes: self.n_boxes + other.n_boxes,
             n_triangles: self.n_triangles + other.n_triangles,
         }
     }
@@ -29,12 +32,21 @@ impl Steps {
 
 impl From<ReadCounts> for Steps {
     fn from(counts: ReadCounts) -> Self {
-        Self { n_nodes: counts.n_nodes.get(), n_parents: counts.n_parents.get(), n_triangles: counts.n_triangles.get() }
+        Self {
+            n_nodes: counts.n_nodes.get(),
+            n_links: counts.n_links.get(),
+            n_boxes: counts.n_boxes.get(),
+            n_triangles: counts.n_triangles.get(),
+        }
     }
 }
 
-/// The reads of all rays together. The kernels' are the same, but where rounding sends a ray another way.
+/// The reads of all rays together. The kernels' are the same, but where rounding sends a ray another way. Brute force
+/// tests every triangle, whatever is asked.
 pub fn count_steps(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[Ray]) -> Steps {
+    if traversal == Traversal::Brute {
+        return Steps { n_triangles: (rays.len() * bindings.triangles.len()) as u64, ..Steps::default() };
+    }
     let of_task = |traverser: &mut Traverser, rays: &[Ray]| {
         let counts = ReadCounts::default();
         let counted = bindings.counted(&counts);
@@ -55,7 +67,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        kdtree::{BuildOptions, KdTree},
+        kdtree::{BuildOptions, Extras, KdTree},
         layout::{Frame, NO_TRIANGLE, Triangle},
     };
 
@@ -75,7 +87,8 @@ mod tests {
         let options = BuildOptions { traversal_cost: 1e-3, max_depth: Some(max_depth), ..BuildOptions::default() };
         let tree = KdTree::build(&triangles, &options);
         let frame = Frame { cell_min: tree.cell_min, cell_max: tree.cell_max, ..Frame::default() };
-        count_steps(&Bindings::of_tree(&triangles, &tree, &frame), traversal, query, rays)
+        let extras = Extras::all(&tree);
+        count_steps(&Bindings::of_tree(&triangles, &tree, &frame).with_extras(&extras), traversal, query, rays)
     }
 
     fn ray(origin: Vec3, direction: Vec3) -> Ray {
@@ -86,19 +99,32 @@ mod tests {
     #[test]
     fn a_tree_of_one_leaf_is_one_node_and_all_triangles() {
         let at_first = ray(vec3(0.25, 0.25, 5.0), Vec3::NEG_Z);
-        for &traversal in Traversal::ALL {
+        for traversal in [Traversal::Mask, Traversal::Restart, Traversal::ShortStack, Traversal::Stack] {
             let found = steps(0, traversal, Query::Closest, &[at_first; 3]);
-            assert_eq!(found, Steps { n_nodes: 3, n_parents: 0, n_triangles: 6 }, "{traversal}");
+            assert_eq!(found, Steps { n_nodes: 3, n_triangles: 6, ..Steps::default() }, "{traversal}");
         }
+        let found = steps(0, Traversal::Brute, Query::Closest, &[at_first; 3]);
+        assert_eq!(found, Steps { n_triangles: 6, ..Steps::default() });
     }
 
     #[test]
     fn the_other_side_of_a_plane_costs_nothing() {
         let at_first = ray(vec3(0.25, 0.25, 5.0), Vec3::NEG_Z);
-        for &traversal in Traversal::ALL {
+        for traversal in [Traversal::Mask, Traversal::Restart, Traversal::ShortStack, Traversal::Stack] {
             let found = steps(1, traversal, Query::Closest, &[at_first]);
-            assert_eq!(found, Steps { n_nodes: 2, n_parents: 0, n_triangles: 1 }, "{traversal}");
+            assert_eq!(found, Steps { n_nodes: 2, n_triangles: 1, ..Steps::default() }, "{traversal}");
         }
+    }
+
+    /// Down to the first leaf, which is missed, and to the second: by the root again, or by one link.
+    #[test]
+    fn the_way_to_the_other_side_is_counted() {
+        let past_first = [ray(vec3(-5.0, 0.9, 0.0), Vec3::X)];
+        let by = |traversal| steps(1, traversal, Query::Closest, &past_first);
+        assert_eq!(by(Traversal::Stack).n_nodes + 1, by(Traversal::Restart).n_nodes);
+        assert_eq!((by(Traversal::Stack).n_links, by(Traversal::Stack).n_boxes), (0, 0));
+        assert!(by(Traversal::Backtrack).n_links > 0 && by(Traversal::Backtrack).n_boxes > 0);
+        assert!(by(Traversal::Ropes).n_links > 0);
     }
 
     #[test]

@@ -35,8 +35,9 @@ impl Reads for Counted<'_> {
 #[derive(Clone, Debug, Default)]
 pub struct ReadCounts {
     pub n_nodes: Cell<u64>,
-    /// Parent links.
-    pub n_parents: Cell<u64>,
+    /// Links to parents, and ropes.
+    pub n_links: Cell<u64>,
+    pub n_boxes: Cell<u64>,
     /// Leaves' entries: each is a triangle that is tested.
     pub n_triangles: Cell<u64>,
 }

@@ -13,11 +13,14 @@
 
 mod binned;
 mod bounds;
+mod boxes;
 mod build;
 mod clip;
 mod counted;
 mod coverage;
+mod extras;
 mod flatten;
+mod ropes;
 mod sah;
 mod search;
 mod statistics;
@@ -28,6 +31,7 @@ use glam::Vec3;
 
 use crate::layout::{KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_MAX_DEPTH, KdNode};
 
+pub use extras::Extras;
 pub use statistics::Statistics;
 pub use validate::Invalid;
 
@@ -123,5 +127,19 @@ impl KdTree {
     /// The node at an index.
     pub fn node(&self, node_ix: u32) -> Node {
         self.nodes[node_ix as usize].into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::vec3;
+
+    use crate::layout::Triangle;
+
+    /// Small triangles up a winding stair.
+    pub fn staircase(n: usize) -> Vec<Triangle> {
+        let corner = |i: usize| vec3((i as f32 * 0.7).cos(), i as f32 * 0.1, (i as f32 * 0.7).sin());
+        let step = |i| Triangle { v0: corner(i), v1: corner(i + 1), v2: 0.5 * corner(i), ..Triangle::default() };
+        (0..n).map(step).collect()
     }
 }

@@ -4,6 +4,7 @@ use std::{mem::offset_of, sync::Arc};
 
 use super::{Tree, binding};
 use crate::{
+    frame::Traversal,
     gpu::{
         Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError, Target, TargetKind,
     },
@@ -143,6 +144,16 @@ impl Resources {
             (layout::BIND_TRIANGLE_IDS, Binding::Image(&self.triangle_ids)),
         ];
         BindingSet::new(&self.bindings, name, &[&self.tree.objects()[..], &own].concat())
+    }
+
+    /// Uploads what the traversal reads beside the tree.
+    ///
+    /// # Errors
+    /// Too many triangles for brute force; beyond the device's limits, out of memory.
+    pub fn add_extras(&mut self, context: &Arc<Context>, tree: &KdTree, traversal: Traversal) -> Result<(), GpuError> {
+        self.tree.add_extras(context, tree, traversal)?;
+        self.sets = self.make_sets()?;
+        Ok(())
     }
 
     /// Makes room for another number of batches and bounces; contents are undefined.

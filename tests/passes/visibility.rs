@@ -1,14 +1,14 @@
 //! Visibility against the kd-tree: a rasterizer snaps corners to its sub-pixel grid, so where the two differ, the
 //! rasterizer's triangle is what a ray close by meets.
 
-use glam::{DVec2, dvec2, swizzles::Vec4Swizzles, uvec2};
+use glam::{DVec2, dvec2, swizzles::Vec4Swizzles, uvec2, vec3};
 use kdray::{
     cpu::{self, kdtree::Traverser, primary_hit::camera_ray},
     layout::{Batch, Frame, NO_TRIANGLE},
 };
 
 use super::stage::{FIRST, Stage, options};
-use crate::support::{compare, scenes};
+use crate::support::{compare, meshes, scenes};
 
 /// Snapping to 1/16 px (Vulkan's least `subPixelPrecisionBits`) moves an edge by at most 1/32 px on each axis.
 const SNAP_PX: f32 = 1.0 / 16.0;
@@ -28,6 +28,13 @@ fn rasterized(stage: &Stage) -> Vec<u32> {
     for (ray, hit) in rays.iter().zip(hits) {
         ids[ray.pixel_ix as usize] = hit.triangle_ix;
     }
+    ids
+}
+
+/// The same from the kd-tree.
+fn on_cpu(stage: &Stage) -> Vec<u32> {
+    let mut ids = vec![0xdead; (stage.options.width * stage.options.height) as usize];
+    cpu::visibility::visibility(&stage.bindings(), stage.options.traversal, &mut ids);
     ids
 }
 
@@ -85,8 +92,7 @@ fn shows_the_triangle_that_the_camera_ray_meets() {
         [(scenes::mixed(), 160, 120), (scenes::mixed_outdoors(), 33, 65), (scenes::mixed(), 1, 1)]
     {
         let stage = Stage::new(scene, options(width, height), width * height);
-        let mut expected = vec![0; (width * height) as usize];
-        cpu::visibility::visibility(&stage.bindings(), stage.options.traversal, &mut expected);
+        let expected = on_cpu(&stage);
         let found = rasterized(&stage);
         let (n_differing, wrong) = differences(&stage, &expected, &found);
         assert!(n_differing <= expected.len() / 100, "{n_differing} pixels of {width} x {height} differ");
@@ -102,12 +108,21 @@ fn nothing_is_shown_of_an_empty_scene() {
     compare::exact(&[NO_TRIANGLE; 63], &rasterized(&stage)).unwrap();
 }
 
+/// Triangle 0 is a triangle like any other.
+#[test]
+fn a_lone_triangle_is_shown() {
+    let mut scene = scenes::empty();
+    let corners = [vec3(-9.0, -9.0, 0.0), vec3(9.0, -9.0, 0.0), vec3(0.0, 9.0, 0.0)];
+    scenes::add(&mut scene, vec![meshes::triangle(corners[0], corners[1], corners[2])], scenes::BLACK);
+    let stage = Stage::new(scene, options(9, 7), 63);
+    compare::exact(&[0; 63], &rasterized(&stage)).unwrap();
+    compare::exact(&[0; 63], &on_cpu(&stage)).unwrap();
+}
+
 #[test]
 fn another_triangle_is_noticed() {
     let stage = Stage::new(scenes::mixed(), options(40, 30), 1200);
     let mut found = rasterized(&stage);
     found[600] = if found[600] == 3 { 4 } else { 3 };
-    let mut expected = vec![0; 1200];
-    cpu::visibility::visibility(&stage.bindings(), stage.options.traversal, &mut expected);
-    assert_eq!(differences(&stage, &expected, &found).1, [600]);
+    assert_eq!(differences(&stage, &on_cpu(&stage), &found).1, [600]);
 }

@@ -12,7 +12,7 @@ pub mod scenes;
 use glam::Vec3;
 use kdray::{
     cpu::bindings::Bindings,
-    kdtree::{BuildOptions, KdTree},
+    kdtree::{BuildOptions, Extras, KdTree},
     layout::{Frame, Triangle},
 };
 
@@ -20,6 +20,7 @@ use kdray::{
 pub struct World {
     pub triangles: Vec<Triangle>,
     pub tree: KdTree,
+    pub extras: Extras,
     pub frame: Frame,
 }
 
@@ -27,11 +28,11 @@ impl World {
     pub fn new(triangles: Vec<Triangle>) -> Self {
         let tree = KdTree::build(&triangles, &BuildOptions::default());
         let frame = Frame { cell_min: tree.cell_min, cell_max: tree.cell_max, ..Frame::default() };
-        Self { triangles, tree, frame }
+        Self { triangles, extras: Extras::all(&tree), tree, frame }
     }
 
     pub fn bindings(&self) -> Bindings<'_> {
-        Bindings::of_tree(&self.triangles, &self.tree, &self.frame)
+        Bindings::of_tree(&self.triangles, &self.tree, &self.frame).with_extras(&self.extras)
     }
 
     /// The middle of the root's cell.

@@ -71,6 +71,17 @@ pub fn glass(ni: f32) -> Material {
     Material { ks: Vec3::ONE, ns: 50.0, ni, flags, ..BLACK }
 }
 
+/// A mirror whose share grows towards grazing views.
+pub fn varnish(ks: Vec3, ni: f32) -> Material {
+    Material { ks, ni, flags: MATERIAL_REFLECT | MATERIAL_FRESNEL, ..diffuse(vec3(0.3, 0.1, 0.1)) }
+}
+
+/// Reflects Ks and refracts the rest, or, without reflection, refracts all.
+pub fn plain_glass(ks: Vec3, tf: Vec3, reflects: bool) -> Material {
+    let flags = MATERIAL_REFRACT | if reflects { MATERIAL_REFLECT } else { 0 };
+    Material { ks, tf, ni: 1.4, flags, ..BLACK }
+}
+
 /// Lets a part of the light straight through.
 pub fn veil(kd: Vec3, d: f32) -> Material {
     Material { d, ..diffuse(kd) }
@@ -113,6 +124,10 @@ pub fn mixed() -> Scene {
     add(&mut scene, smooth_sphere(6, 0.7, vec3(1.1, 0.5, 0.8)), glass(1.5));
     add(&mut scene, meshes::placed(meshes::cube(1, 0.0), 0.4, vec3(0.0, 1.2, -0.5)), glass(1.3));
     add(&mut scene, meshes::placed(meshes::cube(1, 0.0), 0.5, vec3(0.2, -0.1, 1.7)), veil(vec3(0.9, 0.1, 0.1), 0.4));
+    let small_sphere = |x: f32| smooth_sphere(5, 0.35, vec3(x, -0.9, 1.9));
+    add(&mut scene, small_sphere(-0.9), varnish(vec3(0.9, 0.5, 0.7), 1.6));
+    add(&mut scene, small_sphere(0.0), plain_glass(Vec3::splat(0.2), vec3(0.6, 0.9, 0.8), true));
+    add(&mut scene, small_sphere(0.9), plain_glass(Vec3::splat(0.2), vec3(0.9, 0.6, 0.8), false));
     add(&mut scene, meshes::soup(100, 5), emissive(vec3(0.3, 0.1, 0.6)));
     scene.lights = vec![
         point_light(vec3(2.0, 3.5, 3.0), vec3(9.0, 8.0, 7.0)),

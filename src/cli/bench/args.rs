@@ -50,8 +50,8 @@ pub struct TraversalArgs {
     /// Pixels, one primary ray each
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,
-    /// Ways through the tree, as mask,stack [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(help = format!("Ways through the tree, as mask,stack: {} [default: all but brute]", Traversal::words()))]
     pub variants: Vec<Traversal>,
     /// Timed casts of each set of rays
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]

@@ -25,10 +25,10 @@ use crate::cli::{
 /// Loads the mesh, makes the rays, casts set by set.
 pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
     args.files.check()?;
-    let variants = variants(&args.variants);
     let progress = Progress::new(false, 7);
     let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
     let scene = scene?;
+    let variants = variants(&args.variants);
     let device = ContextOptions { device: args.device.clone(), validate: false };
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
@@ -48,9 +48,11 @@ pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
     check_hits(&report)
 }
 
-/// Those asked for, each once; all where none is.
+/// Those asked for, each once; where none is, all that walk the tree.
 fn variants(asked: &[Traversal]) -> Vec<Traversal> {
-    let asked = if asked.is_empty() { Traversal::ALL } else { asked };
+    if asked.is_empty() {
+        return Traversal::ALL.iter().copied().filter(|variant| *variant != Traversal::Brute).collect();
+    }
     let mut variants = Vec::new();
     for variant in asked {
         if !variants.contains(variant) {
@@ -100,21 +102,22 @@ fn text(report: &Report) -> String {
         "variant",
         "Mrays/s",
         "nodes",
-        "parents",
+        "links",
+        "boxes",
         "tests",
         "registers",
         "differing",
         "grazing",
     ];
     text += &table(header, &rows);
-    text += "\nNodes, parent links and triangle tests: the mean of a ray. Differing: from the CPU's hits.\n";
+    text += "\nNodes, links to parents or neighbours, boxes, triangle tests: the mean of a ray. Differing: from the CPU's hits.\n";
     if report.sets.iter().flat_map(|set| &set.variants).any(|variant| variant.ms.is_none()) {
         text += "This device has no timestamps: speeds are unknown.\n";
     }
     text
 }
 
-fn cells(set: &SetResult, variant: &VariantResult) -> [String; 11] {
+fn cells(set: &SetResult, variant: &VariantResult) -> [String; 12] {
     [
         set.rays.name().to_owned(),
         set.n_rays.to_string(),
@@ -122,7 +125,8 @@ fn cells(set: &SetResult, variant: &VariantResult) -> [String; 11] {
         variant.traversal.clone(),
         decimal(variant.mrays_per_s.map(|rate| rate.median), 2),
         decimal(Some(variant.steps_a_ray.nodes), 1),
-        decimal(Some(variant.steps_a_ray.parents), 1),
+        decimal(Some(variant.steps_a_ray.links), 1),
+        decimal(Some(variant.steps_a_ray.boxes), 1),
         decimal(Some(variant.steps_a_ray.triangles), 1),
         variant.registers().map_or_else(|| "-".to_owned(), |registers| registers.to_string()),
         variant.difference.n_differing.to_string(),

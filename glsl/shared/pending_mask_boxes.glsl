@@ -1,0 +1,28 @@
+// Pending subtrees as the paper has them (Algorithm 2): nothing is noted on the way down. On the way up, a level at a
+// time, a bit says that the sibling has been visited; where it has not, its box is tested.
+//
+// Corrected: 64 levels for 31; boxes are widened; a failed test leaves the entry point alone; and a hit ends the search
+// only where no other cell can hold a nearer one, not as soon as a leaf has any.
+
+// Bit d - 1 of the two words: the sibling at depth d.
+uvec2 siblings_done;
+
+bool mask_boxes_pop(TraversalRay ray, float t_best, inout Cell cell) {
+    // What has not been visited begins at most ray.overlap before the leaf's end.
+    if (t_best < cell.t_exit - ray.overlap) return false;
+    while (cell.depth > 0u) {
+        uvec2 bit = bit_of(cell.depth);
+        if ((siblings_done & bit) == uvec2(0u)) {
+            vec2 interval = interval_in(ray, cell.node_ix ^ 1u);
+            if (interval.x <= min(interval.y, t_best)) {
+                siblings_done |= bit;
+                cell = Cell(cell.node_ix ^ 1u, cell.depth, interval.x, interval.y);
+                return true;
+            }
+        }
+        siblings_done &= ~bit;
+        cell.node_ix = kd_parents[cell.node_ix >> 1];
+        cell.depth -= 1u;
+    }
+    return false;
+}

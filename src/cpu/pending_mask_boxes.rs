@@ -1,0 +1,50 @@
+//! Pending subtrees by the paper's mask and the siblings' boxes. Twin of `pending_mask_boxes.glsl`.
+
+use super::{
+    bindings::Bindings,
+    kdtree::{Cell, Pending, TraversalRay, min},
+    pending_mask::bit_of,
+    table::Reads,
+};
+
+/// Bit d - 1: the sibling at depth d has been visited.
+pub struct PendingMaskBoxes {
+    siblings_done: u64,
+}
+
+impl Pending for PendingMaskBoxes {
+    fn new() -> Self {
+        Self { siblings_done: 0 }
+    }
+
+    #[inline(always)]
+    fn clear(&mut self) {
+        self.siblings_done = 0;
+    }
+
+    #[inline(always)]
+    fn push(&mut self, _: u32, _: &Cell, _: [f32; 2]) {}
+
+    #[inline(always)]
+    fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+        // What has not been visited begins at most `ray.overlap` before the leaf's end.
+        if t_best < cell.t_exit - ray.overlap {
+            return false;
+        }
+        while cell.depth > 0 {
+            let bit = bit_of(cell.depth);
+            if self.siblings_done & bit == 0 {
+                let [t_enter, t_exit] = ray.interval_in(bindings, cell.node_ix ^ 1);
+                if t_enter <= min(t_exit, t_best) {
+                    self.siblings_done |= bit;
+                    *cell = Cell { node_ix: cell.node_ix ^ 1, depth: cell.depth, t_enter, t_exit };
+                    return true;
+                }
+            }
+            self.siblings_done &= !bit;
+            cell.node_ix = bindings.kd_parents[cell.node_ix as usize >> 1];
+            cell.depth -= 1;
+        }
+        false
+    }
+}

@@ -1,0 +1,169 @@
+//! The kernels' traversals on the device: each finds, bit for bit, what the kernel without a tree finds, and that finds
+//! what brute force on the CPU finds. Under the validation layer.
+
+mod support;
+
+use std::sync::Arc;
+
+use glam::{Vec3, vec3};
+use kdray::{
+    camera::frame_constants,
+    cpu::brute,
+    frame::{RenderOptions, Traversal},
+    gpu::{Access, Context, ContextOptions, GpuError},
+    kdtree::{BuildOptions, KdTree},
+    layout::{
+        BRUTE_MAX_TRIANGLES, Batch, Counters, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, NO_TRIANGLE, Ray,
+        Triangle,
+    },
+    passes::{Passes, Resources, bounce_row},
+    render::Renderer,
+    scene::{Camera, RenderDefaults, Scene},
+};
+use support::{
+    World, meshes,
+    random::Random,
+    rays::{N_KINDS, nasty_ray},
+};
+
+const N_RAYS: usize = 4000;
+
+fn context() -> Arc<Context> {
+    Context::new(&ContextOptions { device: None, validate: true }).expect("a Vulkan driver and the validation layer")
+}
+
+/// The triangles under a lamp and a sun.
+fn scene(triangles: &[Triangle]) -> Scene {
+    let lamp = Light { position: vec3(0.3, 1.5, 0.2), kind: LIGHT_POINT, intensity: Vec3::ONE, reserved: 0 };
+    let sun = Light { position: vec3(0.48, 0.6, 0.64), kind: LIGHT_DIRECTIONAL, ..lamp };
+    Scene {
+        name: "variants".into(),
+        triangles: triangles.to_vec(),
+        triangle_materials: vec![0; triangles.len()],
+        materials: vec![Default::default()],
+        material_names: vec![String::new()],
+        lights: vec![lamp, sun],
+        camera: Camera { eye: vec3(0.0, 0.5, 5.0), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 45.0 },
+        ambient: Vec3::ZERO,
+        background: Vec3::ZERO,
+        defaults: RenderDefaults::default(),
+    }
+}
+
+/// What the trace and the shadow kernel leave.
+#[derive(PartialEq)]
+struct Traced {
+    /// t, triangle, u, v; floats by their bits.
+    hits: Vec<[u32; 4]>,
+    light_visibility: Vec<u32>,
+    n_hits: u32,
+    n_shadow_rays: u32,
+}
+
+fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], traversal: Traversal) -> Traced {
+    let options = RenderOptions { width: 8, height: 8, traversal, ..RenderOptions::default() };
+    let constants = Frame { queue_capacity: rays.len() as u32, ..frame_constants(scene, tree, &options) };
+    let mut resources = Resources::new(context, scene, tree, &constants, 1).expect("resources");
+    resources.add_extras(context, tree, traversal).expect("extras");
+    let passes = Passes::new(context, &resources.bindings, &options).expect("passes");
+    resources.ray_queues[0].upload(rays).expect("rays");
+    resources.bounces.upload(&[bounce_row(rays.len() as u32, 2)]).expect("bounces");
+    resources.counters.upload(&[Counters::default()]).expect("counters");
+    let batch = Batch { first_pixel: 0, n_pixels: 64, bounce_ix: 0, depth: 0 };
+    let record = |commands: &kdray::gpu::Commands| {
+        resources.bind(commands, &batch);
+        passes.trace.record(commands, &resources, &batch);
+        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // hits, counters
+        passes.shadow.record(commands, &resources, &batch);
+    };
+    context.run("variant", record).expect("run");
+    let counters = resources.counters.download().expect("counters")[0];
+    Traced {
+        hits: bytemuck::cast_slice(&resources.hits.download().expect("hits")).to_vec(),
+        light_visibility: resources.light_visibility.download().expect("light_visibility"),
+        n_hits: counters.n_hits,
+        n_shadow_rays: counters.n_shadow_rays,
+    }
+}
+
+/// The first ray that two variants do not agree on.
+fn difference(rays: &[Ray], expected: &Traced, found: &Traced) -> Option<String> {
+    let wrong = (0..rays.len()).find(|&i| expected.hits[i] != found.hits[i]);
+    let describe = |i: usize| {
+        let [expected, found]: [Hit; 2] = bytemuck::cast([expected.hits[i], found.hits[i]]);
+        format!("ray {i} (kind {}): {:?}: {found:?}, not {expected:?}", i % N_KINDS, rays[i])
+    };
+    wrong.map(describe).or_else(|| (expected != found).then(|| "light_visibility or counters".to_owned()))
+}
+
+fn check(context: &Arc<Context>, name: &str, triangles: Vec<Triangle>) {
+    let world = World::new(triangles);
+    let scene = scene(&world.triangles);
+    let rays: Vec<Ray> = (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), &world, i)).collect();
+    let without_tree = traced(context, &scene, &world.tree, &rays, Traversal::Brute);
+    check_against_cpu(name, &world, &rays, &without_tree);
+    let wrong: Vec<String> = Traversal::ALL
+        .iter()
+        .filter_map(|&traversal| {
+            let found = traced(context, &scene, &world.tree, &rays, traversal);
+            let difference = difference(&rays, &without_tree, &found)?;
+            Some(format!("{name}, {traversal}: {difference}"))
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// A device's division may differ in the last bits, and with it a hit at an edge.
+fn check_against_cpu(name: &str, world: &World, rays: &[Ray], found: &Traced) {
+    let hits: &[Hit] = bytemuck::cast_slice(&found.hits);
+    let differs = |(ray, hit): (&Ray, &Hit)| {
+        let expected = brute::closest_hit(&world.triangles, ray);
+        let is_near = (hit.t - expected.t).abs() <= 1e-5 * expected.t || hit.t == expected.t;
+        !is_near || hit.triangle_ix != expected.triangle_ix
+    };
+    let n_wrong = rays.iter().zip(hits).filter(|&pair| differs(pair)).count();
+    let n_hits = hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count();
+    assert!(n_wrong <= N_RAYS / 200, "{name}: {n_wrong} rays differ from the CPU's");
+    assert!(n_hits > N_RAYS / 5 && found.n_hits == n_hits as u32, "{name}: {n_hits} hits, {} counted", found.n_hits);
+    let n_lit = found.light_visibility.iter().sum::<u32>();
+    assert!(n_lit > 0 && n_lit < found.n_shadow_rays, "{name}: {n_lit} of {} lit", found.n_shadow_rays);
+}
+
+#[test]
+fn all_kernels_find_the_same() {
+    let context = context();
+    check(&context, "torus", meshes::torus(40, 20));
+    check(&context, "cube", meshes::cube(9, 0.0));
+    check(&context, "soup", meshes::soup(1200, 7));
+    check(&context, "threefold", meshes::threefold(meshes::torus(20, 10)));
+    assert_eq!(context.validation_messages(), Vec::<String>::new());
+}
+
+#[test]
+fn a_wrong_bit_is_noticed() {
+    let world = World::new(meshes::torus(20, 10));
+    let rays: Vec<Ray> = (0..64).map(|i| nasty_ray(&mut Random(i), &world, i as usize)).collect();
+    let context = context();
+    let of = |traversal| traced(&context, &scene(&world.triangles), &world.tree, &rays, traversal);
+    let expected = of(Traversal::Mask);
+    for wrong in 0..4 {
+        let mut found = of(Traversal::Mask);
+        assert_eq!(difference(&rays, &expected, &found), None);
+        match wrong {
+            0 => found.hits[63][1] ^= 1,
+            1 => found.hits[0][0] ^= 1,
+            2 => found.light_visibility[5] ^= 1,
+            _ => found.n_hits += 1,
+        }
+        assert!(difference(&rays, &expected, &found).is_some());
+    }
+}
+
+#[test]
+fn brute_force_refuses_large_meshes() {
+    let triangles = vec![meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z); BRUTE_MAX_TRIANGLES as usize + 1];
+    let (scene, tree) = (scene(&triangles), KdTree::build(&[], &BuildOptions::default()));
+    let options = RenderOptions { width: 8, height: 8, traversal: Traversal::Brute, ..RenderOptions::default() };
+    let refused = Renderer::new(context(), &scene, &tree, &options).err();
+    assert!(matches!(refused, Some(GpuError::Limit { value: 65_001, limit: 65_000, .. })), "{refused:?}");
+}
