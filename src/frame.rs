@@ -175,6 +175,7 @@ pub struct UnknownWord {
 macro_rules! words {
     ($ty:ident { $($variant:ident = $word:literal),+ }) => {
         impl $ty {
+            /// Every variant.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
 
             /// The words of all variants, with commas.

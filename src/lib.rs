@@ -12,6 +12,7 @@
 //! cast     rays -> hits, without a frame
 //! cpu      both without Vulkan
 //! output   picture -> file
+//! bench    all of it, timed
 //! ```
 
 #![deny(unsafe_code)]
@@ -34,3 +35,5 @@ pub mod render;
 pub mod cast;
 
 pub mod output;
+
+pub mod bench;

@@ -21,7 +21,7 @@ pub use crate::layout::{CastRay, Hit, NO_TRIANGLE};
 use crate::{
     cpu,
     frame::Traversal,
-    gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Timer},
+    gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
     kdtree::{Extras, KdTree},
     layout::{Frame, RAY_GROUP_SIZE, Triangle},
     passes::{self, CastResources, Tree},
@@ -110,6 +110,18 @@ impl Caster {
             hits.extend(self.resources.cast_hits.download_first(batch.len())?);
         }
         Ok(Cast { hits, gpu_ms, n_invalid: count_invalid(rays) })
+    }
+
+    /// What the driver tells of the query's kernel; nothing before the first cast.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn statistics(&self, query: Query) -> Result<Vec<Statistic>, GpuError> {
+        let kernel = match query {
+            Query::Closest => &self.closest,
+            Query::Any => &self.any,
+        };
+        kernel.as_ref().map_or(Ok(Vec::new()), passes::Cast::statistics)
     }
 
     /// Makes the query's kernel and room for a batch, unless they are there.

@@ -10,7 +10,7 @@ use kdray::{
     scene::RenderDefaults,
 };
 
-use super::error::CliError;
+use super::{bench::Suite, error::CliError};
 
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
 #[derive(Parser)]
@@ -31,6 +31,9 @@ pub enum Command {
     Devices,
     /// Describe a scene and its kd-tree
     Inspect(InspectArgs),
+    /// Measure: whole frames beside the paper's, or every way through the kd-tree
+    #[command(subcommand)]
+    Bench(Suite),
 }
 
 #[derive(clap::Args)]
@@ -236,7 +239,7 @@ fn positive(word: &str) -> Result<f32, String> {
 }
 
 /// An index where the word is a number, else a name.
-fn device(word: &str) -> Result<DeviceSelector, String> {
+pub fn device(word: &str) -> Result<DeviceSelector, String> {
     match word.parse() {
         Ok(index) => Ok(DeviceSelector::Index(index)),
         Err(_) if word.trim().is_empty() => Err("expected an index or a name".into()),

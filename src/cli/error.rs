@@ -17,6 +17,8 @@ pub enum CliError {
     Device(#[from] GpuError),
     #[error("the validation layer had {0} complaint(s)")]
     Validation(usize),
+    #[error("{0}")]
+    WrongHits(String),
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error("cannot write to standard output: {0}")]
@@ -29,7 +31,7 @@ impl CliError {
         match self {
             Self::Usage(_) | Self::Output(OutputError::UnknownEnding { .. }) => 2,
             Self::Scene(_) | Self::Rays(_) => 3,
-            Self::Device(_) | Self::Validation(_) => 4,
+            Self::Device(_) | Self::Validation(_) | Self::WrongHits(_) => 4,
             Self::Output(_) | Self::Stdout(_) => 5,
         }
     }

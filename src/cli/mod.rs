@@ -3,6 +3,7 @@
 //! What a command was asked for goes to standard output; progress, notes and errors go to standard error.
 
 mod args;
+mod bench;
 mod cast;
 mod cast_report;
 mod devices;
@@ -49,6 +50,7 @@ fn run(args: Args) -> Result<(), CliError> {
         Command::Cast(args) => cast::run(&args),
         Command::Devices => devices::run(),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Bench(suite) => bench::run(&suite),
     }
 }
 

@@ -1,28 +1,29 @@
 //! What the kernels only read, under the kernels' names.
 
+use super::table::{Counted, ReadCounts, Table, Uncounted};
 use crate::{
     kdtree::{Extras, KdTree},
     layout::{Frame, KdBox, KdNode, Light, Material, Triangle},
     scene::Scene,
 };
 
-/// The scene, its tree and the frame's constants.
+/// The scene, its tree and the frame's constants. `R`: who is told of reads of the tree.
 #[derive(Clone, Copy, Debug)]
-pub struct Bindings<'a> {
+pub struct Bindings<'a, R = Uncounted> {
     pub frame: &'a Frame,
     pub triangles: &'a [Triangle],
     /// One index into `materials` a triangle.
     pub triangle_materials: &'a [u32],
     pub materials: &'a [Material],
     pub lights: &'a [Light],
-    pub kd_nodes: &'a [KdNode],
+    pub kd_nodes: Table<'a, KdNode, R>,
     /// One a pair of nodes.
-    pub kd_parents: &'a [u32],
-    pub leaf_triangles: &'a [u32],
+    pub kd_parents: Table<'a, u32, R>,
+    pub leaf_triangles: Table<'a, u32, R>,
     /// One a node, or none where the traversal does not ask for them.
-    pub kd_boxes: &'a [KdBox],
+    pub kd_boxes: Table<'a, KdBox, R>,
     /// Six a node, or none.
-    pub kd_ropes: &'a [u32],
+    pub kd_ropes: Table<'a, u32, R>,
 }
 
 impl<'a> Bindings<'a> {
@@ -43,15 +44,31 @@ impl<'a> Bindings<'a> {
             triangle_materials: &[],
             materials: &[],
             lights: &[],
-            kd_nodes: &tree.nodes,
-            kd_parents: &tree.parents,
-            leaf_triangles: &tree.leaf_triangles,
-            kd_boxes: &[],
-            kd_ropes: &[],
+            kd_nodes: Table::from(&*tree.nodes),
+            kd_parents: Table::from(&*tree.parents),
+            leaf_triangles: Table::from(&*tree.leaf_triangles),
+            kd_boxes: Table::from(&[][..]),
+            kd_ropes: Table::from(&[][..]),
+        }
+    }
+
+    /// The same, with reads of the tree counted.
+    pub fn counted<'c>(self, counts: &'c ReadCounts) -> Bindings<'a, Counted<'c>> {
+        Bindings {
+            frame: self.frame,
+            triangles: self.triangles,
+            triangle_materials: self.triangle_materials,
+            materials: self.materials,
+            lights: self.lights,
+            kd_nodes: self.kd_nodes.told_to(Counted(&counts.n_nodes)),
+            kd_parents: self.kd_parents.told_to(Counted(&counts.n_links)),
+            leaf_triangles: self.leaf_triangles.told_to(Counted(&counts.n_triangles)),
+            kd_boxes: self.kd_boxes.told_to(Counted(&counts.n_boxes)),
+            kd_ropes: self.kd_ropes.told_to(Counted(&counts.n_links)),
         }
     }
 
     pub fn with_extras(self, extras: &'a Extras) -> Self {
-        Self { kd_boxes: &extras.boxes, kd_ropes: &extras.ropes, ..self }
+        Self { kd_boxes: Table::from(&*extras.boxes), kd_ropes: Table::from(&*extras.ropes), ..self }
     }
 }

@@ -3,6 +3,7 @@
 use super::{
     bindings::Bindings,
     kdtree::{TraversalRay, max, min},
+    table::Reads,
 };
 
 /// Where a ray enters and leaves a node's cell on each axis.
@@ -13,7 +14,7 @@ pub struct Slabs {
 
 impl TraversalRay {
     #[inline(always)]
-    pub fn slabs_of(&self, bindings: &Bindings, node_ix: u32) -> Slabs {
+    pub fn slabs_of(&self, bindings: &Bindings<impl Reads>, node_ix: u32) -> Slabs {
         let cell = &bindings.kd_boxes[node_ix as usize];
         let (low, high) = ([cell.min_x, cell.min_y, cell.min_z], [cell.max_x, cell.max_y, cell.max_z]);
         let t0 = [0, 1, 2].map(|i| (low[i] - self.origin[i]) * self.inv_direction[i]);
@@ -23,7 +24,7 @@ impl TraversalRay {
 
     /// The ray's interval in a node's cell, widened by the slack: the planes that `descend` meets on the way there.
     #[inline(always)]
-    pub fn interval_in(&self, bindings: &Bindings, node_ix: u32) -> [f32; 2] {
+    pub fn interval_in(&self, bindings: &Bindings<impl Reads>, node_ix: u32) -> [f32; 2] {
         let slabs = self.slabs_of(bindings, node_ix);
         let enter = [0, 1, 2].map(|i| slabs.enter[i] - self.slack[i]);
         let exit = [0, 1, 2].map(|i| slabs.exit[i] + self.slack[i]);

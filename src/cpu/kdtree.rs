@@ -3,7 +3,7 @@
 use super::{
     bindings::Bindings, brute, pending_backtrack::PendingBacktrack, pending_mask::PendingMask,
     pending_mask_boxes::PendingMaskBoxes, pending_restart::PendingRestart, pending_short_stack::PendingShortStack,
-    pending_stack::PendingStack, ropes::follow_ropes, triangle::Shear,
+    pending_stack::PendingStack, ropes::follow_ropes, table::Reads, triangle::Shear,
 };
 use crate::{
     frame::Traversal,
@@ -53,7 +53,7 @@ pub fn max(x: f32, y: f32) -> f32 {
 
 impl TraversalRay {
     #[inline]
-    pub fn new(bindings: &Bindings, ray: &Ray, t_min: f32) -> Self {
+    pub fn new(bindings: &Bindings<impl Reads>, ray: &Ray, t_min: f32) -> Self {
         let origin = ray.origin.to_array();
         let cell_min = bindings.frame.cell_min.to_array();
         let cell_max = bindings.frame.cell_max.to_array();
@@ -124,12 +124,17 @@ pub trait Pending {
     fn clear(&mut self);
     fn push(&mut self, second_ix: u32, cell: &Cell, t_cross: [f32; 2]);
     /// The next pending cell that may hold a hit nearer than `t_best`, or false.
-    fn pop(&mut self, bindings: &Bindings, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool;
+    fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool;
 }
 
 /// Down to the leaf where the ray enters the cell. A NaN fails both tests and goes to the first child: it ends.
 #[inline(always)]
-fn descend<P: Pending>(bindings: &Bindings, ray: &TraversalRay, pending: &mut P, cell: &mut Cell) -> KdNode {
+fn descend<P: Pending>(
+    bindings: &Bindings<impl Reads>,
+    ray: &TraversalRay,
+    pending: &mut P,
+    cell: &mut Cell,
+) -> KdNode {
     let mut node = bindings.kd_nodes[cell.node_ix as usize];
     while axis_of(node) != KD_LEAF {
         let t_cross = ray.crossing(node);
@@ -149,7 +154,7 @@ fn descend<P: Pending>(bindings: &Bindings, ray: &TraversalRay, pending: &mut P,
 
 /// A triangle against the ray; of two hits at one t the lower index wins, whatever the order of triangles.
 #[inline(always)]
-fn intersect(bindings: &Bindings, ray: &TraversalRay, triangle_ix: u32, best: &mut Hit) {
+fn intersect(bindings: &Bindings<impl Reads>, ray: &TraversalRay, triangle_ix: u32, best: &mut Hit) {
     let triangle = &bindings.triangles[triangle_ix as usize];
     let Some(hit) = ray.shear.intersect_triangle(triangle, triangle_ix) else { return };
     let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
@@ -159,7 +164,7 @@ fn intersect(bindings: &Bindings, ray: &TraversalRay, triangle_ix: u32, best: &m
 }
 
 #[inline(always)]
-pub(super) fn intersect_leaf(bindings: &Bindings, ray: &TraversalRay, leaf: KdNode, best: &mut Hit) {
+pub(super) fn intersect_leaf(bindings: &Bindings<impl Reads>, ray: &TraversalRay, leaf: KdNode, best: &mut Hit) {
     let first = leaf.split_or_first as usize;
     let end = first + (leaf.axis_and_child >> KD_CHILD_SHIFT) as usize;
     for &triangle_ix in &bindings.leaf_triangles[first..end] {
@@ -175,7 +180,7 @@ pub(super) fn is_done<const ANY_HIT: bool>(best: &Hit) -> bool {
 /// All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
 #[inline]
 pub(super) fn search<P: Pending, const ANY_HIT: bool>(
-    bindings: &Bindings,
+    bindings: &Bindings<impl Reads>,
     ray: &TraversalRay,
     pending: &mut P,
     best: &mut Hit,
@@ -224,19 +229,19 @@ impl Traverser {
 
     /// The closest hit in (0, t_max]. A miss keeps t = t_max.
     #[inline]
-    pub fn closest_hit(&mut self, bindings: &Bindings, ray: &Ray) -> Hit {
+    pub fn closest_hit(&mut self, bindings: &Bindings<impl Reads>, ray: &Ray) -> Hit {
         self.traverse::<false>(bindings, ray, 0.0)
     }
 
     /// Whether anything lies in (0, t_max].
     #[inline]
-    pub fn any_hit(&mut self, bindings: &Bindings, ray: &Ray) -> bool {
+    pub fn any_hit(&mut self, bindings: &Bindings<impl Reads>, ray: &Ray) -> bool {
         self.traverse::<true>(bindings, ray, 0.0).triangle_ix != NO_TRIANGLE
     }
 
     /// The closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings, ray_in: &Ray, t_min: f32) -> Hit {
+    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl Reads>, ray_in: &Ray, t_min: f32) -> Hit {
         let mut best = Hit { t: ray_in.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
         let ray = &TraversalRay::new(bindings, ray_in, t_min);
         match self {

@@ -3,6 +3,7 @@
 use super::{
     bindings::Bindings,
     kdtree::{Cell, Pending, TraversalRay, max, min},
+    table::Reads,
 };
 
 /// Nothing is remembered.
@@ -19,7 +20,7 @@ impl Pending for PendingBacktrack {
     fn push(&mut self, _: u32, _: &Cell, _: [f32; 2]) {}
 
     #[inline(always)]
-    fn pop(&mut self, bindings: &Bindings, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+    fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
         // What has not been visited begins at most `ray.overlap` before the leaf's end.
         if t_best < cell.t_exit - ray.overlap {
             return false;

@@ -3,6 +3,7 @@
 use super::{
     bindings::Bindings,
     kdtree::{Cell, Pending, TraversalRay, max, min},
+    table::Reads,
 };
 
 /// Which siblings on the way to the root are still to be visited.
@@ -28,7 +29,7 @@ impl PendingMask {
 
     /// Finds the pending node above `cell`, and with it where the cell ends; none: at the root cell's exit.
     #[inline(always)]
-    fn climb(&mut self, bindings: &Bindings, ray: &TraversalRay, cell: &mut Cell) {
+    fn climb(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, cell: &mut Cell) {
         cell.t_exit = ray.t_exit;
         if self.mask == 0 {
             return;
@@ -63,7 +64,7 @@ impl Pending for PendingMask {
     }
 
     #[inline(always)]
-    fn pop(&mut self, bindings: &Bindings, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+    fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
         while self.mask != 0 {
             if t_best < self.t_deepest - ray.overlap {
                 return false;

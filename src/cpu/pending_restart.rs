@@ -4,6 +4,7 @@ use super::{
     bindings::Bindings,
     kdtree::{Cell, Pending, TraversalRay, max, min},
     pending_mask::{PendingMask, bit_of},
+    table::Reads,
 };
 
 /// The trail of the way down.
@@ -14,7 +15,7 @@ pub struct PendingRestart {
 impl PendingRestart {
     /// From the root to the deepest pending node, which is pending no more, and with it where the next one is entered.
     #[inline(always)]
-    fn retrace(&mut self, bindings: &Bindings, ray: &TraversalRay, cell: &mut Cell) {
+    fn retrace(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, cell: &mut Cell) {
         let trail = &mut self.trail;
         let depth = trail.deepest();
         trail.mask &= !bit_of(depth);
@@ -52,7 +53,7 @@ impl Pending for PendingRestart {
 
     /// `t_exit` is not cut off at `t_best`: the trail depends on it.
     #[inline(always)]
-    fn pop(&mut self, bindings: &Bindings, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+    fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
         while self.trail.mask != 0 {
             if t_best < self.trail.t_deepest - ray.overlap {
                 return false;

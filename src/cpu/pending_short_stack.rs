@@ -5,6 +5,7 @@ use super::{
     kdtree::{Cell, Pending, TraversalRay, max},
     pending_mask::bit_of,
     pending_restart::PendingRestart,
+    table::Reads,
 };
 
 /// The `N` newest entries, and the trail to all.
@@ -38,7 +39,7 @@ impl<const N: usize> Pending for PendingShortStack<N> {
     }
 
     #[inline(always)]
-    fn pop(&mut self, bindings: &Bindings, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+    fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
         let trail = &mut self.restart.trail;
         while self.size > 0 {
             self.size -= 1;

@@ -3,6 +3,7 @@
 use super::{
     bindings::Bindings,
     kdtree::{Cell, Pending, TraversalRay, min},
+    table::Reads,
 };
 use crate::layout::KD_MAX_DEPTH;
 
@@ -30,7 +31,7 @@ impl Pending for PendingStack {
     }
 
     #[inline(always)]
-    fn pop(&mut self, _: &Bindings, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+    fn pop(&mut self, _: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
         cell.t_enter = cell.t_exit - ray.overlap;
         if self.size == 0 || t_best < cell.t_enter {
             return false;

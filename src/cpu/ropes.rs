@@ -5,6 +5,7 @@ use super::{
     kd_boxes::Slabs,
     kdtree::{TraversalRay, axis_of, intersect_leaf, is_done, max, min, search},
     pending_mask::PendingMask,
+    table::Reads,
 };
 use crate::layout::{Hit, KD_LEAF, KdNode};
 
@@ -24,7 +25,7 @@ struct Passage {
 
 /// The leaf in `node_ix` where the ray is at t, by planes as they are, not widened.
 #[inline(always)]
-fn leaf_at(bindings: &Bindings, ray: &TraversalRay, t: f32, node_ix: &mut u32) -> KdNode {
+fn leaf_at(bindings: &Bindings<impl Reads>, ray: &TraversalRay, t: f32, node_ix: &mut u32) -> KdNode {
     let mut node = bindings.kd_nodes[*node_ix as usize];
     while axis_of(node) != KD_LEAF {
         *node_ix = ray.first_child(node) ^ u32::from(t > ray.at_plane(node));
@@ -58,7 +59,7 @@ impl Passage {
 /// The closest hit, or with `ANY_HIT` one that need not be the closest.
 #[inline]
 pub fn follow_ropes<const ANY_HIT: bool>(
-    bindings: &Bindings,
+    bindings: &Bindings<impl Reads>,
     ray: &TraversalRay,
     pending: &mut PendingMask,
     best: &mut Hit,

@@ -15,10 +15,12 @@ use gpu_allocator::{
 use super::{
     Commands, DeviceInfo, DeviceSelector, GpuError, Limits,
     commands::CommandBuffer,
+    device::DeviceExtras,
     devices::{queue_family, select},
     instance::Instance,
     probe,
     ray_tracing::RayTracingCalls,
+    statistics::StatisticsCalls,
 };
 
 /// Which device to use, and how.
@@ -38,6 +40,8 @@ pub struct Context {
     pub(super) timestamp_period_ns: f32,
     pub(super) timestamp_valid_bits: u32,
     pub(super) ray_tracing: Option<RayTracingCalls>,
+    /// None where the device lacks the extension.
+    pub(super) statistics: Option<StatisticsCalls>,
     queue: vk::Queue,
     allocator: ManuallyDrop<Mutex<Allocator>>,
     info: DeviceInfo,
@@ -84,7 +88,11 @@ impl Context {
             )
         };
         let family = queue_family(&families).expect("`select` refuses a device without such a queue");
-        let device = create_device(&instance, physical, family as u32, &info, ray_tracing)?;
+        let extras = DeviceExtras::of(&instance, physical, ray_tracing)
+            .map_err(GpuError::call("vkEnumerateDeviceExtensionProperties", &info.name))?;
+        let device = extras
+            .create_device(&instance, physical, family as u32)
+            .map_err(GpuError::call("vkCreateDevice", &info.name))?;
         // SAFETY: the queue was asked for at creation; the pool belongs to its family.
         let (queue, command_pool) = unsafe {
             let pool = vk::CommandPoolCreateInfo::default()
@@ -97,6 +105,7 @@ impl Context {
         let allocator = create_allocator(&instance, &device, physical, ray_tracing)?;
         Ok(Arc::new(Self {
             ray_tracing: ray_tracing.then(|| RayTracingCalls::new(&instance, physical, &device)),
+            statistics: extras.statistics.then(|| StatisticsCalls::new(&instance, &device)),
             debug_utils: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device)),
             device,
             command_pool,
@@ -225,48 +234,6 @@ impl Drop for Context {
             self.device.destroy_device(None);
         }
     }
-}
-
-fn create_device(
-    instance: &Instance,
-    physical: vk::PhysicalDevice,
-    family: u32,
-    info: &DeviceInfo,
-    ray_tracing: bool,
-) -> Result<ash::Device, GpuError> {
-    // SAFETY: the device belongs to the instance.
-    let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
-        .map_err(GpuError::call("vkEnumerateDeviceExtensionProperties", &info.name))?;
-    // A driver that is not fully conformant wants to be told that this is known.
-    let portability = ash::khr::portability_subset::NAME;
-    let mut extensions: Vec<_> = available
-        .iter()
-        .any(|e| e.extension_name_as_c_str() == Ok(portability))
-        .then_some(portability.as_ptr())
-        .into_iter()
-        .collect();
-    let priorities = [1.0];
-    let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
-    let mut features = vk::PhysicalDeviceVulkan13Features::default()
-        .dynamic_rendering(true)
-        .synchronization2(true)
-        .subgroup_size_control(true)
-        .compute_full_subgroups(true);
-    let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
-    let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
-    let mut pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
-    if ray_tracing {
-        extensions.extend(RayTracingCalls::EXTENSIONS.map(|name| name.as_ptr()));
-    }
-    let mut create = vk::DeviceCreateInfo::default()
-        .queue_create_infos(&queues)
-        .enabled_extension_names(&extensions)
-        .push_next(&mut features);
-    if ray_tracing {
-        create = create.push_next(&mut addresses).push_next(&mut structures).push_next(&mut pipelines);
-    }
-    // SAFETY: all that `create` points to lives until the call returns.
-    unsafe { instance.raw.create_device(physical, &create, None) }.map_err(GpuError::call("vkCreateDevice", &info.name))
 }
 
 fn create_allocator(

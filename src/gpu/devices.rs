@@ -147,7 +147,7 @@ fn describe(instance: &Instance, device: vk::PhysicalDevice, index: usize) -> De
     info
 }
 
-fn text(raw: &CStr) -> String {
+pub(super) fn text(raw: &CStr) -> String {
     raw.to_string_lossy().trim().to_owned()
 }
 

@@ -4,7 +4,7 @@ use std::{ffi::CStr, io::Cursor, sync::Arc};
 
 use ash::vk;
 
-use super::{Bindings, Context, GpuError, TargetKind};
+use super::{Bindings, Context, GpuError, TargetKind, statistics::capture_flags};
 
 pub(super) const ENTRY_POINT: &CStr = c"main";
 
@@ -25,7 +25,7 @@ pub struct ComputePipeline {
     pub(super) raw: vk::Pipeline,
     pub(super) bindings: Arc<Bindings>,
     pub(super) name: &'static str,
-    context: Arc<Context>,
+    pub(super) context: Arc<Context>,
 }
 
 impl ComputePipeline {
@@ -49,7 +49,10 @@ impl ComputePipeline {
             .name(ENTRY_POINT)
             .flags(flags)
             .specialization_info(&constants);
-        let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(bindings.pipeline_layout)];
+        let info = [vk::ComputePipelineCreateInfo::default()
+            .flags(capture_flags(context))
+            .stage(stage)
+            .layout(bindings.pipeline_layout)];
         // SAFETY: all that `info` points to lives until the call returns.
         let raw = unsafe { context.device.create_compute_pipelines(vk::PipelineCache::null(), &info, None) }
             .map_err(|(_, result)| GpuError::call("vkCreateComputePipelines", desc.name)(result))?[0];

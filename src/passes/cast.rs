@@ -6,7 +6,10 @@ use super::{Tree, binding, kernel, spirv, traversal_constants, tree};
 use crate::{
     cast::Query,
     frame::Traversal,
-    gpu::{Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, ComputePipeline, Context, Dispatch, GpuError},
+    gpu::{
+        Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, ComputePipeline, Context, Dispatch, GpuError,
+        Statistic,
+    },
     layout::{BIND_CAST_HITS, BIND_CAST_RAYS, CastBatch, CastRay, Hit, RAY_GROUP_SIZE},
 };
 
@@ -59,6 +62,14 @@ impl Cast {
         let [traversal, fuses_fma] = traversal_constants(context, traversal)?;
         let constants = [traversal, fuses_fma, (query == Query::Any).into()];
         Ok(Self { kernel: kernel(context, bindings, "cast", spirv!("cast.comp"), &constants)? })
+    }
+
+    /// What the driver tells of the kernel.
+    ///
+    /// # Errors
+    /// As [`ComputePipeline::statistics`].
+    pub fn statistics(&self) -> Result<Vec<Statistic>, GpuError> {
+        self.kernel.statistics()
     }
 
     /// Needs the first `n_rays` of cast_rays. Leaves as many cast_hits.

@@ -32,18 +32,7 @@ impl World {
     }
 
     pub fn bindings(&self) -> Bindings<'_> {
-        Bindings {
-            frame: &self.frame,
-            triangles: &self.triangles,
-            triangle_materials: &[],
-            materials: &[],
-            lights: &[],
-            kd_nodes: &self.tree.nodes,
-            kd_parents: &self.tree.parents,
-            leaf_triangles: &self.tree.leaf_triangles,
-            kd_boxes: &self.extras.boxes,
-            kd_ropes: &self.extras.ropes,
-        }
+        Bindings::of_tree(&self.triangles, &self.tree, &self.frame).with_extras(&self.extras)
     }
 
     /// The middle of the root's cell.

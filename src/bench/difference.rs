@@ -1,0 +1,114 @@
+//! Whether two ways of tracing found the same.
+
+use serde::Serialize;
+
+use super::rays::RayKind;
+use crate::layout::{Hit, NO_TRIANGLE};
+
+/// Distances, relative to their own size, that the same hit may be computed at: of one triangle, whose plane the ray
+/// may meet at any angle, and of two, which then touch or share the edge that the ray meets.
+const SAME_TRIANGLE: f32 = 1.0 / 1024.0;
+const TWO_TRIANGLES: f32 = 1.0 / 65536.0;
+
+/// How many hits of a set of rays are not the expected ones.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Difference {
+    /// Hits elsewhere, and misses in place of hits or hits in place of misses.
+    pub n_differing: u64,
+    /// Another triangle at the same distance: rays that meet an edge.
+    pub n_grazing: u64,
+}
+
+impl Difference {
+    /// Of `found`, one hit a ray, from `expected`. Of hits that need not be the closest, only their being counts.
+    pub fn of(kind: RayKind, expected: &[Hit], found: &[Hit]) -> Self {
+        assert_eq!(expected.len(), found.len(), "one hit a ray");
+        let mut difference = Self::default();
+        for (expected, found) in expected.iter().zip(found) {
+            match compare(kind, expected, found) {
+                Agreement::Same => {}
+                Agreement::Grazing => difference.n_grazing += 1,
+                Agreement::Different => difference.n_differing += 1,
+            }
+        }
+        difference
+    }
+
+    /// The greater numbers of both.
+    pub fn max(self, other: Self) -> Self {
+        Self { n_differing: self.n_differing.max(other.n_differing), n_grazing: self.n_grazing.max(other.n_grazing) }
+    }
+
+    /// Whether rounding explains it: one in 100,000 rays may slip past an outline that another way of computing hits.
+    pub fn is_rounding(&self, n_rays: usize) -> bool {
+        self.n_differing <= n_rays as u64 / 100_000
+    }
+}
+
+enum Agreement {
+    Same,
+    Grazing,
+    Different,
+}
+
+fn compare(kind: RayKind, expected: &Hit, found: &Hit) -> Agreement {
+    let is_hit = |hit: &Hit| hit.triangle_ix != NO_TRIANGLE;
+    let is_same_triangle = expected.triangle_ix == found.triangle_ix;
+    let within = |share: f32| (expected.t - found.t).abs() <= share * expected.t.abs();
+    match (is_hit(expected), is_hit(found)) {
+        (false, false) => Agreement::Same,
+        (true, true) if kind.is_any_hit() || is_same_triangle && within(SAME_TRIANGLE) => Agreement::Same,
+        (true, true) if !is_same_triangle && within(TWO_TRIANGLES) => Agreement::Grazing,
+        _ => Agreement::Different,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
+
+    fn hit(t: f32, triangle_ix: u32) -> Hit {
+        Hit { t, triangle_ix, u: 0.25, v: 0.5 }
+    }
+
+    /// Of one wrong hit among right ones: differing, grazing.
+    fn counts(kind: RayKind, expected: Hit, found: Hit) -> (u64, u64) {
+        let right = [hit(1.0, 3), MISS];
+        let difference = Difference::of(kind, &[right[0], expected, right[1]], &[right[0], found, right[1]]);
+        (difference.n_differing, difference.n_grazing)
+    }
+
+    #[test]
+    fn a_wrong_hit_is_counted() {
+        for kind in [RayKind::Primary, RayKind::Mirror, RayKind::Diffuse] {
+            assert_eq!(counts(kind, hit(2.0, 7), hit(2.0, 7)), (0, 0));
+            assert_eq!(counts(kind, hit(2.0, 7), hit(2.0 + 1e-6, 7)), (0, 0));
+            assert_eq!(counts(kind, hit(2.0, 7), hit(2.1, 7)), (1, 0));
+            assert_eq!(counts(kind, hit(2.0, 7), hit(2.0 + 1e-6, 8)), (0, 1));
+            assert_eq!(counts(kind, hit(2.0, 7), hit(2.001, 8)), (1, 0));
+            assert_eq!(counts(kind, hit(2.0, 7), hit(f32::NAN, 7)), (1, 0));
+        }
+    }
+
+    #[test]
+    fn a_lost_or_invented_hit_is_counted() {
+        for kind in RayKind::ALL {
+            assert_eq!(counts(kind, hit(2.0, 7), MISS), (1, 0));
+            assert_eq!(counts(kind, MISS, hit(2.0, 7)), (1, 0));
+        }
+    }
+
+    #[test]
+    fn any_hit_is_as_good_as_another() {
+        assert_eq!(counts(RayKind::Shadow, hit(2.0, 7), hit(9.0, 1)), (0, 0));
+    }
+
+    #[test]
+    fn only_few_differences_are_rounding() {
+        let difference = Difference { n_differing: 2, n_grazing: 1000 };
+        assert!(difference.is_rounding(200_000) && !difference.is_rounding(199_999));
+        assert!(Difference::default().is_rounding(0));
+    }
+}

@@ -1,0 +1,205 @@
+//! The paper's own table: its four scenes at its three sizes, a frame on the GPU and on one thread of the CPU.
+
+use std::sync::Arc;
+
+use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
+use serde::Serialize;
+
+use super::{
+    Spread,
+    chart::{BarChart, Scale, Series},
+};
+use crate::{
+    cpu,
+    frame::{BounceStats, Profile, RenderOptions},
+    gpu::{Context, GpuError},
+    kdtree::KdTree,
+    render::Renderer,
+    scene::{RenderDefaults, Scene},
+};
+
+/// The shipped scenes' names, in the paper's order.
+pub const SCENES: [&str; 4] = ["cornell", "paper2", "paper3", "paper4"];
+/// The paper's sizes, pixels.
+pub const SIZES: [(u32, u32); 3] = [(640, 480), (800, 600), (1024, 768)];
+/// Milliseconds of the paper's table (CPU, then a GTX 285): a row a size, a column a scene.
+const REPORTED_MS: [[(u32, u32); 4]; 3] = [
+    [(2316, 32), (5590, 82), (10_059, 411), (6459, 374)],
+    [(3551, 49), (8523, 108), (15_054, 539), (10_103, 534)],
+    [(5723, 77), (14_106, 188), (24_736, 730), (16_213, 848)],
+];
+/// Frames drawn before times count: the first one fills caches and finds how many batches the frame needs.
+const N_WARM_UP: u16 = 1;
+
+/// What the paper reports for a scene of the same triangle count; its geometry was not published.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Reported {
+    pub cpu_ms: f64,
+    pub gpu_ms: f64,
+    pub speedup: f64,
+}
+
+impl Reported {
+    /// None for a scene or a size that the paper does not have.
+    pub fn of(scene: &str, size: (u32, u32)) -> Option<Self> {
+        let row = SIZES.iter().position(|known| *known == size)?;
+        let column = SCENES.iter().position(|known| *known == scene)?;
+        let (cpu_ms, gpu_ms) = REPORTED_MS[row][column];
+        let (cpu_ms, gpu_ms) = (f64::from(cpu_ms), f64::from(gpu_ms));
+        Some(Self { cpu_ms, gpu_ms, speedup: cpu_ms / gpu_ms })
+    }
+}
+
+/// The scene's own options at another size.
+pub fn options(scene: &RenderDefaults, (width, height): (u32, u32)) -> RenderOptions {
+    RenderOptions {
+        width,
+        height,
+        max_depth: scene.max_depth,
+        exposure: scene.exposure,
+        denoise: scene.denoise,
+        ..RenderOptions::default()
+    }
+}
+
+/// Frames drawn on a device, after a warm-up.
+///
+/// # Errors
+/// As [`Renderer::new`] and [`Renderer::draw`].
+pub fn draw_on_gpu(
+    context: &Arc<Context>,
+    scene: &Scene,
+    tree: &KdTree,
+    options: &RenderOptions,
+    n_frames: u16,
+) -> Result<Vec<Profile>, GpuError> {
+    let mut renderer = Renderer::new(Arc::clone(context), scene, tree, options)?;
+    for _ in 0..N_WARM_UP {
+        renderer.draw()?;
+    }
+    (0..n_frames).map(|_| renderer.draw()).collect()
+}
+
+/// Frames drawn by one thread, as the paper's were.
+///
+/// # Errors
+/// The thread cannot be started.
+pub fn draw_on_cpu(
+    scene: &Scene,
+    tree: &KdTree,
+    options: &RenderOptions,
+    n_frames: u16,
+) -> Result<Vec<Profile>, ThreadPoolBuildError> {
+    let thread = ThreadPoolBuilder::new().num_threads(1).build()?;
+    Ok(thread.install(|| (0..n_frames).map(|_| cpu::render(scene, tree, options).1).collect()))
+}
+
+/// One scene at one size.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    pub scene: String,
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    pub max_depth: u32,
+    pub n_triangles: usize,
+    pub n_primary_rays: u64,
+    pub n_secondary_rays: u64,
+    pub n_shadow_rays: u64,
+    /// None where the device has no timestamps.
+    pub gpu_ms: Option<Spread>,
+    /// None where the CPU was left out.
+    pub cpu_ms: Option<Spread>,
+    /// Median CPU time in median GPU times.
+    pub speedup: Option<f64>,
+    /// Million rays of all kinds in a second of whole frames on the GPU.
+    pub mrays_per_s: Option<Spread>,
+    pub paper: Option<Reported>,
+}
+
+impl Row {
+    /// From the profiles of frames drawn on a device, at least one, and on one thread.
+    pub fn new(scene: &Scene, options: &RenderOptions, on_gpu: &[Profile], on_cpu: &[Profile]) -> Self {
+        let size = (options.width, options.height);
+        let times = |frames: &[Profile]| Spread::of(frames.iter().filter_map(|frame| frame.frame_ms));
+        let bounces = on_gpu.first().map_or(&[][..], |frame| &frame.bounces);
+        let n_rays = |bounces: &[BounceStats]| bounces.iter().map(|bounce| bounce.n_rays).sum::<u64>();
+        let (first, later) = bounces.split_at(bounces.len().min(1));
+        let mut row = Self {
+            scene: scene.name.clone(),
+            width: options.width,
+            height: options.height,
+            max_depth: options.max_depth,
+            n_triangles: scene.triangles.len(),
+            n_primary_rays: n_rays(first),
+            n_secondary_rays: n_rays(later),
+            n_shadow_rays: bounces.iter().map(|bounce| bounce.n_shadow_rays).sum(),
+            gpu_ms: times(on_gpu),
+            cpu_ms: times(on_cpu),
+            speedup: None,
+            mrays_per_s: None,
+            paper: Reported::of(&scene.name, size),
+        };
+        row.speedup = row.cpu_ms.zip(row.gpu_ms).filter(|(_, gpu)| gpu.median > 0.0).map(|(c, g)| c.median / g.median);
+        row.mrays_per_s = row.gpu_ms.and_then(|gpu| gpu.mrays_per_s(row.n_rays()));
+        row
+    }
+
+    /// Primary, secondary and shadow rays together.
+    pub fn n_rays(&self) -> u64 {
+        self.n_primary_rays + self.n_secondary_rays + self.n_shadow_rays
+    }
+}
+
+/// What the suite found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// `paper`.
+    pub suite: &'static str,
+    /// The device's own name.
+    pub device: String,
+    /// The driver's name and version.
+    pub driver: String,
+    /// Frames on the device, less the warm-up.
+    pub n_gpu_frames: u16,
+    /// 0 where the CPU was left out.
+    pub n_cpu_frames: u16,
+    pub rows: Vec<Row>,
+}
+
+impl Report {
+    /// Times of kdray beside the paper's, on a logarithmic scale.
+    pub fn chart(&self) -> BarChart {
+        let column = |name: &str, value: fn(&Row) -> Option<f64>| Series {
+            name: name.to_owned(),
+            values: self.rows.iter().map(value).collect(),
+        };
+        BarChart {
+            title: format!("The paper's scenes on {}", self.device),
+            unit: "ms a frame".to_owned(),
+            scale: Scale::Logarithmic,
+            groups: self.rows.iter().map(|row| format!("{}\n{}x{}", row.scene, row.width, row.height)).collect(),
+            series: vec![
+                column("kdray, GPU", |row| row.gpu_ms.map(|ms| ms.median)),
+                column("paper, GTX 285", |row| row.paper.map(|paper| paper.gpu_ms)),
+                column("kdray, one CPU thread", |row| row.cpu_ms.map(|ms| ms.median)),
+                column("paper, CPU", |row| row.paper.map(|paper| paper.cpu_ms)),
+            ],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_papers_table_is_read_by_scene_and_size() {
+        let glass = Reported::of("paper3", (800, 600)).unwrap();
+        assert_eq!((glass.cpu_ms, glass.gpu_ms), (15_054.0, 539.0));
+        assert!((glass.speedup - 27.93).abs() < 0.01);
+        assert_eq!(Reported::of("paper3", (600, 800)), None);
+        assert_eq!(Reported::of("knot", (800, 600)), None);
+    }
+}

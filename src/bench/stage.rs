@@ -1,0 +1,146 @@
+//! Where rays are cast: a scene, a room around it, a camera and a light.
+
+use glam::{BVec3, Vec3};
+
+use crate::{
+    camera::frame_constants,
+    cpu::bindings::Bindings,
+    frame::RenderOptions,
+    kdtree::{BuildOptions, Extras, KdTree},
+    layout::{FLAT_NORMAL, Frame, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
+    scene::{Camera, Scene, framing},
+};
+
+/// From the middle of the picture towards the eye, in a room: from the front, the right and above.
+const TOWARDS_EYE: Vec3 = Vec3::new(0.45, 0.35, 1.0);
+const VERTICAL_FOV_DEGREES: f32 = 60.0;
+
+/// A scene and its tree, ready for rays.
+pub struct Stage {
+    pub scene: Scene,
+    pub tree: KdTree,
+    /// What any traversal reads beside the tree.
+    pub extras: Extras,
+    /// The camera's constants. `queue_capacity` is 0: there is no queue.
+    pub frame: Frame,
+    /// Where shadow rays go to.
+    pub light: Light,
+}
+
+impl Stage {
+    /// The scene seen by its own camera, lit by its first light (from above, if it has none).
+    pub fn open(scene: Scene, size: (u32, u32)) -> Self {
+        let above = Light { position: Vec3::Y, kind: LIGHT_DIRECTIONAL, intensity: Vec3::ONE, reserved: 0 };
+        let light = scene.lights.first().copied().unwrap_or(above);
+        let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
+        let options = RenderOptions { width: size.0, height: size.1, ..RenderOptions::default() };
+        let frame = frame_constants(&scene, &tree, &options);
+        Self { scene, extras: Extras::all(&tree), tree, frame, light }
+    }
+
+    /// The scene on the floor of a closed room, seen from inside the room, with a point light under its ceiling.
+    /// No ray from inside misses.
+    pub fn in_room(mut scene: Scene, size: (u32, u32)) -> Self {
+        let room = Room::around(&scene.triangles);
+        scene.triangles.extend(room.walls());
+        scene.triangle_materials.resize(scene.triangles.len(), 0);
+        scene.camera = room.camera;
+        scene.lights = vec![room.light];
+        Self::open(scene, size)
+    }
+
+    /// What a traversal on the CPU reads.
+    pub fn bindings(&self) -> Bindings<'_> {
+        Bindings::new(&self.scene, &self.tree, &self.frame).with_extras(&self.extras)
+    }
+}
+
+/// An axis-aligned room, its camera and its light.
+struct Room {
+    min: Vec3,
+    max: Vec3,
+    camera: Camera,
+    light: Light,
+}
+
+impl Room {
+    /// Lengths are in radii of the sphere around the mesh's bounding box: walls 2 from the middle, the ceiling 1.5
+    /// above it, the floor 0.05 below the mesh, the eye where it sees the whole sphere (2.1), the light 0.1 below
+    /// the ceiling.
+    fn around(triangles: &[Triangle]) -> Self {
+        let (min, max) = framing::bounds(triangles);
+        let centre = (min + max) / 2.0;
+        // All in one point: any radius will do, but it must change the coordinates.
+        let radius = ((max - min).length() / 2.0).max(centre.abs().max_element() * 1e-3).max(1e-6);
+        let distance = 1.05 / (VERTICAL_FOV_DEGREES / 2.0).to_radians().sin();
+        let floor = Vec3::new(centre.x - 2.0 * radius, min.y - 0.05 * radius, centre.z - 2.0 * radius);
+        let ceiling = centre + radius * Vec3::new(2.0, 1.5, 2.0);
+        Self {
+            min: floor,
+            max: ceiling,
+            camera: Camera {
+                eye: centre + TOWARDS_EYE.normalize() * distance * radius,
+                target: centre,
+                up: Vec3::Y,
+                vertical_fov_degrees: VERTICAL_FOV_DEGREES,
+            },
+            light: Light {
+                position: centre + radius * Vec3::new(0.0, 1.4, 0.0),
+                kind: LIGHT_POINT,
+                intensity: Vec3::ONE,
+                reserved: 0,
+            },
+        }
+    }
+
+    /// Two triangles a side. Hits are two-sided: their winding says nothing.
+    fn walls(&self) -> Vec<Triangle> {
+        // Bits 0, 1, 2 of a corner's number: at the greatest x, y, z.
+        let corner = |n: u32| Vec3::select(BVec3::new(n & 1 != 0, n & 2 != 0, n & 4 != 0), self.max, self.min);
+        let triangle = |v0, v1, v2| Triangle { v0, n0: FLAT_NORMAL, v1, n1: FLAT_NORMAL, v2, n2: FLAT_NORMAL };
+        let mut walls = Vec::with_capacity(12);
+        for axis in 0..3 {
+            let (side, u, v) = (1 << axis, 1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+            for first in [0, side] {
+                let [a, b, c, d] = [first, first | u, first | u | v, first | v].map(corner);
+                walls.extend([triangle(a, b, c), triangle(a, c, d)]);
+            }
+        }
+        walls
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::vec3;
+
+    use super::*;
+
+    #[test]
+    fn camera_light_and_mesh_are_inside_the_room() {
+        let corners = [vec3(5.0, -1.0, 2.0), vec3(9.0, 0.0, 2.5), vec3(5.5, 3.0, 2.0)];
+        let [v0, v1, v2] = corners;
+        let room = Room::around(&[Triangle { v0, v1, v2, ..Triangle::default() }]);
+        for p in corners.iter().chain([&room.camera.eye, &room.light.position]) {
+            assert!(p.cmpgt(room.min).all() && p.cmplt(room.max).all(), "{p} in {} to {}", room.min, room.max);
+        }
+    }
+
+    #[test]
+    fn six_walls_close_the_room() {
+        let room = Room::around(&[Triangle { v0: Vec3::X, v1: Vec3::Y, v2: Vec3::Z, ..Triangle::default() }]);
+        let walls = room.walls();
+        let area = |t: &Triangle| (t.v1 - t.v0).cross(t.v2 - t.v0).length() / 2.0;
+        let size = room.max - room.min;
+        let expected = 2.0 * (size.x * size.y + size.y * size.z + size.z * size.x);
+        assert_eq!(walls.len(), 12);
+        assert!((walls.iter().map(area).sum::<f32>() / expected - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_mesh_of_one_point_gets_a_room_all_the_same() {
+        let v = vec3(100.0, 0.0, 0.0);
+        let room = Room::around(&[Triangle { v0: v, v1: v, v2: v, ..Triangle::default() }]);
+        assert!(room.min.cmplt(v).all() && room.max.cmpgt(v).all() && room.camera.eye != v);
+    }
+}

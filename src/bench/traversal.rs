@@ -1,0 +1,243 @@
+//! Every way through the kd-tree on the same rays: how fast, and whether all find the same.
+
+use std::{sync::Arc, time::Instant};
+
+use bytemuck::Zeroable;
+use serde::Serialize;
+
+use super::{
+    Spread,
+    chart::{BarChart, Scale, Series},
+    difference::Difference,
+    rays::{RayKind, RaySet},
+    stage::Stage,
+};
+use crate::{
+    cast::{CastRay, Caster, Query},
+    cpu::{
+        self,
+        steps::{Steps, count_steps},
+    },
+    frame::Traversal,
+    gpu::{Context, GpuError, Statistic, StatisticValue},
+    kdtree::Statistics,
+    layout::{Hit, NO_TRIANGLE, Ray},
+};
+
+/// Timed casts of one variant before it is the next one's turn. One more, which is not timed, begins each turn: the
+/// rays have just been uploaded, and another variant's tree is in the caches.
+const CASTS_A_TURN: u16 = 5;
+
+/// The variants on one stage, ready for rays.
+pub struct Tracers<'a> {
+    stage: &'a Stage,
+    variants: &'a [Traversal],
+    /// One a variant; none: all threads of the CPU.
+    casters: Option<Vec<Caster>>,
+}
+
+impl<'a> Tracers<'a> {
+    /// On a device, or without one on the current rayon pool.
+    ///
+    /// # Errors
+    /// As [`Caster::new`].
+    pub fn new(context: Option<&Arc<Context>>, stage: &'a Stage, variants: &'a [Traversal]) -> Result<Self, GpuError> {
+        let caster = |context, variant| Caster::new(context, &stage.scene.triangles, &stage.tree, variant);
+        let casters = context.map(|context| variants.iter().map(|&variant| caster(context, variant)).collect());
+        Ok(Self { stage, variants, casters: casters.transpose()? })
+    }
+
+    /// Casts the rays `n_times` with each variant, in turns, and compares the hits with those that the CPU finds.
+    ///
+    /// # Errors
+    /// As [`Caster::cast`].
+    pub fn measure(&mut self, set: &RaySet, n_times: u16) -> Result<SetResult, GpuError> {
+        let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
+        let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
+        let expected = self.cast_on_cpu(Traversal::Mask, &rays, query);
+        let mut results = vec![(Some(Vec::new()), Difference::default()); self.variants.len()];
+        for n_casts in turns(n_times) {
+            for (variant_ix, (all_ms, difference)) in results.iter_mut().enumerate() {
+                let (hits, ms) = self.cast(variant_ix, &rays, query, 1 + n_casts)?;
+                *all_ms = all_ms.take().zip(ms).map(|(all, ms)| [all, ms[1..].to_vec()].concat());
+                *difference = difference.max(Difference::of(set.kind, &expected, &hits));
+            }
+        }
+        let bindings = self.stage.bindings();
+        let result = |(variant_ix, (ms, difference)): (usize, (Option<Vec<f64>>, _))| {
+            let variant = self.variants[variant_ix];
+            let ms = ms.and_then(Spread::of);
+            let mrays_per_s = ms.and_then(|ms| ms.mrays_per_s(rays.len() as u64));
+            let steps = count_steps(&bindings, variant, query, &set.rays);
+            let steps_a_ray = StepsARay::new(&steps, rays.len());
+            let kernel = match &self.casters {
+                Some(casters) => casters[variant_ix].statistics(query)?,
+                None => Vec::new(),
+            };
+            Ok(VariantResult { traversal: variant.to_string(), ms, mrays_per_s, difference, steps_a_ray, kernel })
+        };
+        Ok(SetResult {
+            rays: set.kind,
+            n_rays: rays.len(),
+            n_hits: expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count(),
+            variants: results.into_iter().enumerate().map(result).collect::<Result<_, GpuError>>()?,
+        })
+    }
+
+    /// Hits, and the milliseconds of each time (none without timestamps).
+    fn cast(
+        &mut self,
+        variant_ix: usize,
+        rays: &[CastRay],
+        query: Query,
+        n_times: u16,
+    ) -> Result<(Vec<Hit>, Option<Vec<f64>>), GpuError> {
+        if let Some(casters) = &mut self.casters {
+            let cast = casters[variant_ix].cast(rays, query, n_times.into())?;
+            return Ok((cast.hits, cast.gpu_ms));
+        }
+        let mut hits = Vec::new();
+        let once = |_| {
+            let begin = Instant::now();
+            hits = self.cast_on_cpu(self.variants[variant_ix], rays, query);
+            begin.elapsed().as_secs_f64() * 1e3
+        };
+        let ms = (0..n_times).map(once).collect();
+        Ok((hits, Some(ms)))
+    }
+
+    fn cast_on_cpu(&self, variant: Traversal, rays: &[CastRay], query: Query) -> Vec<Hit> {
+        let mut hits = vec![Hit::zeroed(); rays.len()];
+        cpu::cast::cast(&self.stage.bindings(), variant, query, rays, &mut hits);
+        hits
+    }
+}
+
+fn cast_ray(ray: &Ray) -> CastRay {
+    CastRay { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
+}
+
+/// How many casts each turn has: all together `n_times`.
+fn turns(n_times: u16) -> impl Iterator<Item = u16> {
+    (0..n_times).step_by(CASTS_A_TURN.into()).map(move |first| CASTS_A_TURN.min(n_times - first))
+}
+
+/// One set of rays.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SetResult {
+    pub rays: RayKind,
+    pub n_rays: usize,
+    /// As the CPU finds them.
+    pub n_hits: usize,
+    /// In the order in which they were asked for.
+    pub variants: Vec<VariantResult>,
+}
+
+/// One variant on one set of rays.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct VariantResult {
+    pub traversal: String,
+    /// Of a whole set; none where the device has no timestamps.
+    pub ms: Option<Spread>,
+    pub mrays_per_s: Option<Spread>,
+    /// From the CPU's hits, in the worst turn.
+    #[serde(flatten)]
+    pub difference: Difference,
+    /// As the CPU takes them.
+    pub steps_a_ray: StepsARay,
+    /// What the driver tells of the kernel; empty where it tells nothing.
+    pub kernel: Vec<Statistic>,
+}
+
+impl VariantResult {
+    /// Registers of an invocation, if the driver tells.
+    pub fn registers(&self) -> Option<StatisticValue> {
+        self.kernel.iter().find(|statistic| statistic.name.contains("egister")).map(|statistic| statistic.value)
+    }
+}
+
+/// What is read of the tree, in the mean of a set's rays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct StepsARay {
+    pub nodes: f64,
+    /// Links to parents, and ropes.
+    pub links: f64,
+    /// Boxes of nodes.
+    pub boxes: f64,
+    /// Triangle tests.
+    pub triangles: f64,
+}
+
+impl StepsARay {
+    fn new(steps: &Steps, n_rays: usize) -> Self {
+        let mean = |n: u64| n as f64 / n_rays.max(1) as f64;
+        Self {
+            nodes: mean(steps.n_nodes),
+            links: mean(steps.n_links),
+            boxes: mean(steps.n_boxes),
+            triangles: mean(steps.n_triangles),
+        }
+    }
+}
+
+/// What the suite found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// `traversal`.
+    pub suite: &'static str,
+    /// The device's own name, or the number of CPU threads.
+    pub device: String,
+    /// The driver's name and version; none on the CPU.
+    pub driver: Option<String>,
+    pub scene: String,
+    /// Whether the scene was put into a closed room.
+    pub room: bool,
+    /// Pixels, one primary ray each.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    pub n_triangles: usize,
+    pub tree: Statistics,
+    /// Timed casts of each set by each variant.
+    pub n_times: u16,
+    pub sets: Vec<SetResult>,
+}
+
+impl Report {
+    /// Speeds, a group a set, a bar a variant.
+    pub fn chart(&self) -> BarChart {
+        let n_variants = self.sets.first().map_or(0, |set| set.variants.len());
+        let series = |variant_ix: usize| Series {
+            name: self.sets[0].variants[variant_ix].traversal.clone(),
+            values: (self.sets.iter())
+                .map(|set| set.variants[variant_ix].mrays_per_s.map(|rate| rate.median))
+                .collect(),
+        };
+        BarChart {
+            title: format!("{}, {} triangles, on {}", self.scene, self.n_triangles, self.device),
+            unit: "Mrays/s".to_owned(),
+            scale: Scale::Linear,
+            groups: self.sets.iter().map(|set| set.rays.name().to_owned()).collect(),
+            series: (0..n_variants).map(series).collect(),
+        }
+    }
+
+    /// The first variant whose hits differ from the CPU's on more rays than rounding explains, and the set.
+    pub fn first_wrong(&self) -> Option<(&SetResult, &VariantResult)> {
+        let pairs = self.sets.iter().flat_map(|set| set.variants.iter().map(move |variant| (set, variant)));
+        pairs.into_iter().find(|(set, variant)| !variant.difference.is_rounding(set.n_rays))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn turns_add_up() {
+        for n_times in [1, 4, 5, 6, 25, 10_000] {
+            assert_eq!(turns(n_times).sum::<u16>(), n_times);
+            assert!(turns(n_times).all(|n| (1..=CASTS_A_TURN).contains(&n)));
+        }
+    }
+}

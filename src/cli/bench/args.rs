@@ -1,0 +1,104 @@
+//! The words of `kdray bench`.
+
+use std::path::PathBuf;
+
+use clap::{Subcommand, value_parser};
+use kdray::{frame::Traversal, gpu::DeviceSelector, output};
+
+use crate::cli::{
+    args::{Size, device},
+    error::CliError,
+};
+
+/// What is measured.
+#[derive(Subcommand)]
+pub enum Suite {
+    /// The paper's table: its four scenes, whole frames on the GPU and on one CPU thread, beside its own times
+    Paper(PaperArgs),
+    /// Every way through the kd-tree, on primary, shadow, mirror and diffuse rays of a mesh
+    Traversal(TraversalArgs),
+}
+
+#[derive(clap::Args)]
+pub struct PaperArgs {
+    /// Folder of cornell.toml, paper2.toml, paper3.toml and paper4.toml
+    #[arg(long, value_name = "DIR", default_value = "scenes")]
+    pub scenes: PathBuf,
+    /// Pixels, as 640x480,1024x768 [default: the paper's three sizes]
+    #[arg(long, value_name = "WxH", value_delimiter = ',')]
+    pub size: Vec<Size>,
+    /// Frames on the GPU
+    #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
+    pub repeat: u16,
+    /// Frames on the CPU
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
+    pub cpu_repeat: u16,
+    /// Leave the CPU out
+    #[arg(long, conflicts_with = "cpu_repeat")]
+    pub no_cpu: bool,
+    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
+    pub device: Option<DeviceSelector>,
+    #[command(flatten)]
+    pub files: FileArgs,
+}
+
+#[derive(clap::Args)]
+pub struct TraversalArgs {
+    /// OBJ or scene file
+    pub mesh: PathBuf,
+    /// Pixels, one primary ray each
+    #[arg(long, value_name = "WxH", default_value = "1920x1080")]
+    pub size: Size,
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(help = format!("Ways through the tree, as mask,stack: {} [default: all but brute]", Traversal::words()))]
+    pub variants: Vec<Traversal>,
+    /// Timed casts of each set of rays
+    #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
+    pub repeat: u16,
+    /// Leave the scene as it is: its own camera and first light, and no closed room around it
+    #[arg(long)]
+    pub no_room: bool,
+    /// Cast on all threads of the CPU, without Vulkan
+    #[arg(long, conflicts_with = "device")]
+    pub cpu: bool,
+    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
+    pub device: Option<DeviceSelector>,
+    #[command(flatten)]
+    pub files: FileArgs,
+}
+
+/// Where results go besides standard output.
+#[derive(clap::Args)]
+pub struct FileArgs {
+    /// Write all that was measured as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Write a chart
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+}
+
+impl FileArgs {
+    /// Refuses files that cannot be written, before anything is measured.
+    pub fn check(&self) -> Result<(), CliError> {
+        if self.json.is_some() && self.json == self.svg {
+            return Err(CliError::Usage("--json and --svg name the same file".into()));
+        }
+        Ok([&self.json, &self.svg].into_iter().flatten().try_for_each(|path| output::check(path))?)
+    }
+
+    /// Writes those files that were asked for.
+    pub fn write(&self, report: &impl serde::Serialize, svg: impl FnOnce() -> String) -> Result<(), CliError> {
+        if let Some(path) = &self.json {
+            let mut json = serde_json::to_vec_pretty(report).expect("plain structs of numbers and words");
+            json.push(b'\n');
+            output::write(path, &json)?;
+        }
+        if let Some(path) = &self.svg {
+            output::write(path, svg().as_bytes())?;
+        }
+        Ok(())
+    }
+}

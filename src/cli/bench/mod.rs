@@ -1,0 +1,16 @@
+//! `kdray bench`: measures, and prints a table; one file a suite.
+
+mod args;
+mod paper;
+mod traversal;
+
+pub use args::Suite;
+
+use super::error::CliError;
+
+pub fn run(suite: &Suite) -> Result<(), CliError> {
+    match suite {
+        Suite::Paper(args) => paper::run(args),
+        Suite::Traversal(args) => traversal::run(args),
+    }
+}

@@ -1,0 +1,106 @@
+//! `kdray bench paper`: the paper's table, measured here.
+
+use std::{path::Path, sync::Arc};
+
+use kdray::{
+    bench::{
+        Spread,
+        paper::{Report, Reported, Row, SCENES, SIZES, draw_on_cpu, draw_on_gpu, options},
+    },
+    gpu::{Context, ContextOptions},
+    kdtree::{BuildOptions, KdTree},
+    scene::Scene,
+};
+
+use super::args::PaperArgs;
+use crate::cli::{
+    error::CliError,
+    open_device, print,
+    progress::Progress,
+    table::{decimal, table},
+};
+
+/// Each scene at each size, scene by scene.
+pub fn run(args: &PaperArgs) -> Result<(), CliError> {
+    args.files.check()?;
+    let sizes: Vec<_> = match &args.size[..] {
+        [] => SIZES.to_vec(),
+        asked => asked.iter().map(|size| (size.width, size.height)).collect(),
+    };
+    let progress = Progress::new(false, (SCENES.len() * (1 + sizes.len())) as u64);
+    let context = open_device(&ContextOptions { device: args.device.clone(), validate: false }, &progress)?;
+    let mut report = Report {
+        suite: "paper",
+        device: context.info().name.clone(),
+        driver: context.info().driver.clone(),
+        n_gpu_frames: args.repeat,
+        n_cpu_frames: if args.no_cpu { 0 } else { args.cpu_repeat },
+        rows: Vec::new(),
+    };
+    for name in SCENES {
+        let path = args.scenes.join(name).with_extension("toml");
+        let (loaded, _) = progress.stage(&format!("loading {}", path.display()), || load(&path));
+        let (scene, tree) = loaded?;
+        for &size in &sizes {
+            let drawing = format!("drawing {name}, {}x{}", size.0, size.1);
+            let (row, _) = progress.stage(&drawing, || measure(&context, (&scene, &tree), size, &report));
+            report.rows.push(row?);
+        }
+    }
+    drop(progress);
+    args.files.write(&report, || report.chart().svg())?;
+    print(&text(&report))
+}
+
+fn load(path: &Path) -> Result<(Scene, KdTree), CliError> {
+    let scene = Scene::load(path)?;
+    let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
+    Ok((scene, tree))
+}
+
+fn measure(
+    context: &Arc<Context>,
+    (scene, tree): (&Scene, &KdTree),
+    size: (u32, u32),
+    report: &Report,
+) -> Result<Row, CliError> {
+    let options = options(&scene.defaults, size);
+    let on_gpu = draw_on_gpu(context, scene, tree, &options, report.n_gpu_frames)?;
+    let on_cpu = draw_on_cpu(scene, tree, &options, report.n_cpu_frames)
+        .map_err(|error| CliError::Usage(format!("cannot start a thread: {error}")))?;
+    Ok(Row::new(scene, &options, &on_gpu, &on_cpu))
+}
+
+/// The report as text that ends with a line break.
+fn text(report: &Report) -> String {
+    let header = ["scene", "size", "rays", "Mrays/s", "GPU ms", "CPU ms", "speed-up", "paper's GPU", "CPU", "speed-up"];
+    let rows: Vec<_> = report.rows.iter().map(cells).collect();
+    let mut text = format!("{}, {}\n\n", report.device, report.driver);
+    text += &table(header, &rows);
+    text += &format!(
+        "\nMedians; frames on the GPU: {}, on one CPU thread: {}.\n",
+        report.n_gpu_frames, report.n_cpu_frames
+    );
+    text += "The paper's times: a GTX 285 and one CPU thread, scenes of the same triangle counts.\n";
+    if report.rows.iter().any(|row| row.gpu_ms.is_none()) {
+        text += "This device has no timestamps: its times are unknown.\n";
+    }
+    text
+}
+
+fn cells(row: &Row) -> [String; 10] {
+    let median = |spread: Option<Spread>, decimals| decimal(spread.map(|spread| spread.median), decimals);
+    let paper = |value: fn(&Reported) -> f64, decimals| decimal(row.paper.as_ref().map(value), decimals);
+    [
+        row.scene.clone(),
+        format!("{}x{}", row.width, row.height),
+        row.n_rays().to_string(),
+        median(row.mrays_per_s, 1),
+        median(row.gpu_ms, 3),
+        median(row.cpu_ms, 0),
+        decimal(row.speedup, 1),
+        paper(|paper| paper.gpu_ms, 0),
+        paper(|paper| paper.cpu_ms, 0),
+        paper(|paper| paper.speedup, 1),
+    ]
+}

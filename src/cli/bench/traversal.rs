@@ -1,0 +1,147 @@
+//! `kdray bench traversal`: every way through the kd-tree, side by side.
+
+use std::sync::Arc;
+
+use kdray::{
+    bench::{
+        rays::ray_sets,
+        stage::Stage,
+        traversal::{Report, SetResult, Tracers, VariantResult},
+    },
+    frame::Traversal,
+    gpu::{Context, ContextOptions},
+    kdtree::BuildOptions,
+    scene::Scene,
+};
+
+use super::args::TraversalArgs;
+use crate::cli::{
+    error::CliError,
+    open_device, print,
+    progress::Progress,
+    table::{decimal, table},
+};
+
+/// Loads the mesh, makes the rays, casts set by set.
+pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
+    args.files.check()?;
+    let progress = Progress::new(false, 7);
+    let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
+    let scene = scene?;
+    let variants = variants(&args.variants);
+    let device = ContextOptions { device: args.device.clone(), validate: false };
+    let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
+    let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
+    let (stage, _) = progress.stage(&building, || stage(args, scene));
+    let (sets, _) = progress.stage("making rays", || ray_sets(&stage));
+
+    let mut tracers = Tracers::new(context.as_ref(), &stage, &variants)?;
+    let mut report = empty_report(args, &stage, context.as_ref());
+    for set in &sets {
+        let casting = format!("casting {} {} rays", set.rays.len(), set.kind.name());
+        let (result, _) = progress.stage(&casting, || tracers.measure(set, args.repeat));
+        report.sets.push(result?);
+    }
+    drop(progress);
+    args.files.write(&report, || report.chart().svg())?;
+    print(&text(&report))?;
+    check_hits(&report)
+}
+
+/// Those asked for, each once; where none is, all that walk the tree.
+fn variants(asked: &[Traversal]) -> Vec<Traversal> {
+    if asked.is_empty() {
+        return Traversal::ALL.iter().copied().filter(|variant| *variant != Traversal::Brute).collect();
+    }
+    let mut variants = Vec::new();
+    for variant in asked {
+        if !variants.contains(variant) {
+            variants.push(*variant);
+        }
+    }
+    variants
+}
+
+fn stage(args: &TraversalArgs, scene: Scene) -> Stage {
+    let size = (args.size.width, args.size.height);
+    if args.no_room { Stage::open(scene, size) } else { Stage::in_room(scene, size) }
+}
+
+fn empty_report(args: &TraversalArgs, stage: &Stage, context: Option<&Arc<Context>>) -> Report {
+    let n_triangles = stage.scene.triangles.len();
+    let info = context.map(|context| context.info());
+    Report {
+        suite: "traversal",
+        device: info.map_or_else(|| format!("CPU, {} threads", rayon::current_num_threads()), |info| info.name.clone()),
+        driver: info.map(|info| info.driver.clone()),
+        scene: stage.scene.name.clone(),
+        room: !args.no_room,
+        width: args.size.width,
+        height: args.size.height,
+        n_triangles,
+        tree: stage.tree.statistics(n_triangles, &BuildOptions::default()),
+        n_times: args.repeat,
+        sets: Vec::new(),
+    }
+}
+
+/// The report as text that ends with a line break.
+fn text(report: &Report) -> String {
+    let room = if report.room { " in a closed room" } else { "" };
+    let mut text = format!("{}: {} triangles{room}", report.scene, report.n_triangles);
+    text += &format!("; kd-tree: {} nodes, depth {}\n", report.tree.n_nodes, report.tree.depth);
+    text += &format!("{}x{} on {}", report.width, report.height, report.device);
+    text += &report.driver.as_ref().map_or_else(String::new, |driver| format!(", {driver}"));
+    text += &format!(", medians of {}\n\n", report.n_times);
+    let rows: Vec<_> =
+        report.sets.iter().flat_map(|set| set.variants.iter().map(|variant| cells(set, variant))).collect();
+    let header = [
+        "rays",
+        "number",
+        "hits",
+        "variant",
+        "Mrays/s",
+        "nodes",
+        "links",
+        "boxes",
+        "tests",
+        "registers",
+        "differing",
+        "grazing",
+    ];
+    text += &table(header, &rows);
+    text += "\nNodes, links to parents or neighbours, boxes, triangle tests: the mean of a ray. Differing: from the CPU's hits.\n";
+    if report.sets.iter().flat_map(|set| &set.variants).any(|variant| variant.ms.is_none()) {
+        text += "This device has no timestamps: speeds are unknown.\n";
+    }
+    text
+}
+
+fn cells(set: &SetResult, variant: &VariantResult) -> [String; 12] {
+    [
+        set.rays.name().to_owned(),
+        set.n_rays.to_string(),
+        set.n_hits.to_string(),
+        variant.traversal.clone(),
+        decimal(variant.mrays_per_s.map(|rate| rate.median), 2),
+        decimal(Some(variant.steps_a_ray.nodes), 1),
+        decimal(Some(variant.steps_a_ray.links), 1),
+        decimal(Some(variant.steps_a_ray.boxes), 1),
+        decimal(Some(variant.steps_a_ray.triangles), 1),
+        variant.registers().map_or_else(|| "-".to_owned(), |registers| registers.to_string()),
+        variant.difference.n_differing.to_string(),
+        variant.difference.n_grazing.to_string(),
+    ]
+}
+
+/// The speed of wrong answers is none.
+fn check_hits(report: &Report) -> Result<(), CliError> {
+    let Some((set, variant)) = report.first_wrong() else { return Ok(()) };
+    Err(CliError::WrongHits(format!(
+        "{} of {} {} rays hit otherwise with `{}` than on the CPU",
+        variant.difference.n_differing,
+        set.n_rays,
+        set.rays.name(),
+        variant.traversal
+    )))
+}

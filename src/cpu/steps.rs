@@ -1,0 +1,135 @@
+//! What a traversal reads of a tree, counted exactly.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::{RAYS_PER_TASK, bindings::Bindings, kdtree::Traverser, table::ReadCounts};
+use crate::{cast::Query, frame::Traversal, layout::Ray};
+
+/// Reads for one or more rays.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Steps {
+    /// Nodes, on the way down and on the way back alike.
+    pub n_nodes: u64,
+    /// Links to parents, and ropes.
+    pub n_links: u64,
+    /// Boxes of nodes.
+    pub n_boxes: u64,
+    /// Triangles that were tested, once a leaf.
+    pub n_triangles: u64,
+}
+
+impl Steps {
+    fn plus(self, other: Self) -> Self {
+        Self {
+            n_nodes: self.n_nodes + other.n_nodes,
+            n_links: self.n_links + other.n_links,
+            n_boxes: self.n_boxes + other.n_boxes,
+            n_triangles: self.n_triangles + other.n_triangles,
+        }
+    }
+}
+
+impl From<ReadCounts> for Steps {
+    fn from(counts: ReadCounts) -> Self {
+        Self {
+            n_nodes: counts.n_nodes.get(),
+            n_links: counts.n_links.get(),
+            n_boxes: counts.n_boxes.get(),
+            n_triangles: counts.n_triangles.get(),
+        }
+    }
+}
+
+/// The reads of all rays together. The kernels' are the same, but where rounding sends a ray another way. Brute force
+/// tests every triangle, whatever is asked.
+pub fn count_steps(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[Ray]) -> Steps {
+    if traversal == Traversal::Brute {
+        return Steps { n_triangles: (rays.len() * bindings.triangles.len()) as u64, ..Steps::default() };
+    }
+    let of_task = |traverser: &mut Traverser, rays: &[Ray]| {
+        let counts = ReadCounts::default();
+        let counted = bindings.counted(&counts);
+        for ray in rays {
+            match query {
+                Query::Closest => traverser.traverse::<false>(&counted, ray, 0.0),
+                Query::Any => traverser.traverse::<true>(&counted, ray, 0.0),
+            };
+        }
+        Steps::from(counts)
+    };
+    rays.par_chunks(RAYS_PER_TASK).map_init(|| Traverser::new(traversal), of_task).reduce(Steps::default, Steps::plus)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec3, vec3};
+
+    use super::*;
+    use crate::{
+        kdtree::{BuildOptions, Extras, KdTree},
+        layout::{Frame, NO_TRIANGLE, Triangle},
+    };
+
+    /// Two triangles far apart along x: split planes lie between and beside them.
+    fn two_triangles() -> Vec<Triangle> {
+        let at = |x: f32| Triangle {
+            v0: vec3(x, 0.0, 0.0),
+            v1: vec3(x + 1.0, 0.0, 0.0),
+            v2: vec3(x, 1.0, 0.0),
+            ..Triangle::default()
+        };
+        vec![at(0.0), at(10.0)]
+    }
+
+    fn steps(max_depth: u32, traversal: Traversal, query: Query, rays: &[Ray]) -> Steps {
+        let triangles = two_triangles();
+        let options = BuildOptions { traversal_cost: 1e-3, max_depth: Some(max_depth), ..BuildOptions::default() };
+        let tree = KdTree::build(&triangles, &options);
+        let frame = Frame { cell_min: tree.cell_min, cell_max: tree.cell_max, ..Frame::default() };
+        let extras = Extras::all(&tree);
+        count_steps(&Bindings::of_tree(&triangles, &tree, &frame).with_extras(&extras), traversal, query, rays)
+    }
+
+    fn ray(origin: Vec3, direction: Vec3) -> Ray {
+        let t_max = f32::INFINITY;
+        Ray { origin, pixel_ix: 0, direction, source_triangle: NO_TRIANGLE, throughput: Vec3::ONE, t_max }
+    }
+
+    #[test]
+    fn a_tree_of_one_leaf_is_one_node_and_all_triangles() {
+        let at_first = ray(vec3(0.25, 0.25, 5.0), Vec3::NEG_Z);
+        for traversal in [Traversal::Mask, Traversal::Restart, Traversal::ShortStack, Traversal::Stack] {
+            let found = steps(0, traversal, Query::Closest, &[at_first; 3]);
+            assert_eq!(found, Steps { n_nodes: 3, n_triangles: 6, ..Steps::default() }, "{traversal}");
+        }
+        let found = steps(0, Traversal::Brute, Query::Closest, &[at_first; 3]);
+        assert_eq!(found, Steps { n_triangles: 6, ..Steps::default() });
+    }
+
+    #[test]
+    fn the_other_side_of_a_plane_costs_nothing() {
+        let at_first = ray(vec3(0.25, 0.25, 5.0), Vec3::NEG_Z);
+        for traversal in [Traversal::Mask, Traversal::Restart, Traversal::ShortStack, Traversal::Stack] {
+            let found = steps(1, traversal, Query::Closest, &[at_first]);
+            assert_eq!(found, Steps { n_nodes: 2, n_triangles: 1, ..Steps::default() }, "{traversal}");
+        }
+    }
+
+    /// Down to the first leaf, which is missed, and to the second: by the root again, or by one link.
+    #[test]
+    fn the_way_to_the_other_side_is_counted() {
+        let past_first = [ray(vec3(-5.0, 0.9, 0.0), Vec3::X)];
+        let by = |traversal| steps(1, traversal, Query::Closest, &past_first);
+        assert_eq!(by(Traversal::Stack).n_nodes + 1, by(Traversal::Restart).n_nodes);
+        assert_eq!((by(Traversal::Stack).n_links, by(Traversal::Stack).n_boxes), (0, 0));
+        assert!(by(Traversal::Backtrack).n_links > 0 && by(Traversal::Backtrack).n_boxes > 0);
+        assert!(by(Traversal::Ropes).n_links > 0);
+    }
+
+    #[test]
+    fn rays_that_miss_the_root_read_nothing() {
+        let beside = ray(vec3(0.25, 9.0, 5.0), Vec3::NEG_Z);
+        assert_eq!(steps(1, Traversal::Mask, Query::Any, &[beside]), Steps::default());
+    }
+}

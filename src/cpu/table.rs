@@ -1,0 +1,97 @@
+//! A buffer that the kernels read, whose reads can be counted at no cost where nobody counts.
+
+use std::{
+    cell::Cell,
+    ops::{Index, Range},
+};
+
+/// Who is told of reads.
+pub trait Reads: Copy {
+    /// `n` elements are read.
+    fn read(self, n: usize);
+}
+
+/// Nobody.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Uncounted;
+
+impl Reads for Uncounted {
+    #[inline(always)]
+    fn read(self, _: usize) {}
+}
+
+/// A number that reads are added to.
+#[derive(Clone, Copy, Debug)]
+pub struct Counted<'c>(pub &'c Cell<u64>);
+
+impl Reads for Counted<'_> {
+    #[inline(always)]
+    fn read(self, n: usize) {
+        self.0.set(self.0.get() + n as u64);
+    }
+}
+
+/// Reads of a tree by a thread.
+#[derive(Clone, Debug, Default)]
+pub struct ReadCounts {
+    pub n_nodes: Cell<u64>,
+    /// Links to parents, and ropes.
+    pub n_links: Cell<u64>,
+    pub n_boxes: Cell<u64>,
+    /// Leaves' entries: each is a triangle that is tested.
+    pub n_triangles: Cell<u64>,
+}
+
+/// A slice and who is told of its reads.
+#[derive(Clone, Copy, Debug)]
+pub struct Table<'a, T, R = Uncounted> {
+    items: &'a [T],
+    reads: R,
+}
+
+impl<'a, T> From<&'a [T]> for Table<'a, T> {
+    fn from(items: &'a [T]) -> Self {
+        Self { items, reads: Uncounted }
+    }
+}
+
+impl<'a, T, R> Table<'a, T, R> {
+    /// The same slice, with another told of reads.
+    pub fn told_to<S>(self, reads: S) -> Table<'a, T, S> {
+        Table { items: self.items, reads }
+    }
+}
+
+impl<T, R: Reads> Index<usize> for Table<'_, T, R> {
+    type Output = T;
+
+    #[inline(always)]
+    fn index(&self, ix: usize) -> &T {
+        self.reads.read(1);
+        &self.items[ix]
+    }
+}
+
+impl<T, R: Reads> Index<Range<usize>> for Table<'_, T, R> {
+    type Output = [T];
+
+    #[inline(always)]
+    fn index(&self, range: Range<usize>) -> &[T] {
+        let items = &self.items[range];
+        self.reads.read(items.len());
+        items
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_element_that_is_read_counts_once() {
+        let n = Cell::new(0);
+        let table = Table::from(&[5, 6, 7, 8][..]).told_to(Counted(&n));
+        assert_eq!((table[1], &table[1..4], n.get()), (6, &[6, 7, 8][..], 4));
+        assert_eq!((table[2..2].len(), n.get()), (0, 4));
+    }
+}

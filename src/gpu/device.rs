@@ -1,0 +1,75 @@
+//! The logical device: its queue, its extensions, its features.
+
+use std::ffi::{CStr, c_char};
+
+use ash::{khr, prelude::VkResult, vk};
+
+use super::{instance::Instance, ray_tracing::RayTracingCalls, statistics::StatisticsCalls};
+
+/// What a device is asked for beside Vulkan's core.
+#[derive(Clone, Copy)]
+pub(super) struct DeviceExtras {
+    /// A driver that is not fully conformant wants to be told that this is known.
+    portability: bool,
+    /// Kernels can be asked for their statistics.
+    pub statistics: bool,
+    ray_tracing: bool,
+}
+
+impl DeviceExtras {
+    /// All that the device has and kdray can use; of ray tracing, what is asked for.
+    pub fn of(instance: &Instance, physical: vk::PhysicalDevice, ray_tracing: bool) -> VkResult<Self> {
+        // SAFETY: the device belongs to the instance.
+        let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }?;
+        let has = |name: &CStr| available.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        Ok(Self {
+            portability: has(khr::portability_subset::NAME),
+            statistics: has(StatisticsCalls::EXTENSION) && StatisticsCalls::has_feature(instance, physical),
+            ray_tracing,
+        })
+    }
+
+    fn extensions(self) -> Vec<*const c_char> {
+        let mut names = Vec::new();
+        names.extend(self.portability.then_some(khr::portability_subset::NAME));
+        names.extend(self.statistics.then_some(StatisticsCalls::EXTENSION));
+        if self.ray_tracing {
+            names.extend(RayTracingCalls::EXTENSIONS);
+        }
+        names.into_iter().map(CStr::as_ptr).collect()
+    }
+
+    /// A device with one queue of the family.
+    pub fn create_device(
+        self,
+        instance: &Instance,
+        physical: vk::PhysicalDevice,
+        family: u32,
+    ) -> VkResult<ash::Device> {
+        let extensions = self.extensions();
+        let priorities = [1.0];
+        let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
+        let mut features = vk::PhysicalDeviceVulkan13Features::default()
+            .dynamic_rendering(true)
+            .synchronization2(true)
+            .subgroup_size_control(true)
+            .compute_full_subgroups(true);
+        let mut executables =
+            vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
+        let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
+        let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+        let mut pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
+        let mut create = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&extensions)
+            .push_next(&mut features);
+        if self.statistics {
+            create = create.push_next(&mut executables);
+        }
+        if self.ray_tracing {
+            create = create.push_next(&mut addresses).push_next(&mut structures).push_next(&mut pipelines);
+        }
+        // SAFETY: all that `create` points to lives until the call returns.
+        unsafe { instance.raw.create_device(physical, &create, None) }
+    }
+}

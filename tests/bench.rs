@@ -1,0 +1,277 @@
+//! `kdray bench`: the rays that it casts, the checks that it makes, and the files that it writes.
+
+mod support;
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output, Stdio},
+};
+
+use glam::Vec3;
+use kdray::{
+    bench::{
+        difference::Difference,
+        rays::{RayKind, RaySet, ray_sets},
+        stage::Stage,
+        traversal::Tracers,
+    },
+    cpu::kdtree::Traverser,
+    frame::Traversal,
+    layout::{Hit, NO_TRIANGLE, Ray},
+    scene::Scene,
+};
+use serde_json::Value;
+use support::meshes::torus;
+use tempfile::TempDir;
+
+const SIZE: (u32, u32) = (33, 23);
+const N_PIXELS: usize = 33 * 23;
+
+/// A torus as an OBJ file.
+fn write_mesh(directory: &Path) -> PathBuf {
+    let triangles = torus(24, 12);
+    let corners = triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]);
+    let mut obj: String = corners.map(|v| format!("v {} {} {}\n", v.x, v.y, v.z)).collect();
+    obj.extend((0..triangles.len()).map(|i| format!("f {} {} {}\n", 3 * i + 1, 3 * i + 2, 3 * i + 3)));
+    let path = directory.join("torus.obj");
+    fs::write(&path, obj).unwrap();
+    path
+}
+
+fn mesh() -> Scene {
+    let directory = TempDir::new().unwrap();
+    Scene::load(&write_mesh(directory.path())).unwrap()
+}
+
+fn closest_hits(stage: &Stage, rays: &[Ray]) -> Vec<Hit> {
+    let mut traverser = Traverser::new(Traversal::Mask);
+    rays.iter().map(|ray| traverser.closest_hit(&stage.bindings(), ray)).collect()
+}
+
+fn rays(sets: &[RaySet; 4], kind: RayKind) -> &[Ray] {
+    &sets.iter().find(|set| set.kind == kind).unwrap().rays
+}
+
+#[test]
+fn in_a_room_every_ray_but_the_lit_shadow_rays_hits() {
+    let stage = Stage::in_room(mesh(), SIZE);
+    let sets = ray_sets(&stage);
+    for set in &sets {
+        assert_eq!(set.rays.len(), N_PIXELS, "{}", set.kind.name());
+        assert!(set.rays.iter().all(|ray| (ray.direction.length() - 1.0).abs() < 1e-5), "{}", set.kind.name());
+        let hits = closest_hits(&stage, &set.rays);
+        let n_hits = hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count();
+        if set.kind == RayKind::Shadow {
+            assert!((N_PIXELS / 20..N_PIXELS * 19 / 20).contains(&n_hits), "{n_hits} of {N_PIXELS} in shadow");
+        } else {
+            assert_eq!(n_hits, N_PIXELS, "{}", set.kind.name());
+        }
+    }
+    let on_mesh = |hit: &Hit| hit.triangle_ix < stage.scene.triangles.len() as u32 - 12;
+    let n_on_mesh = closest_hits(&stage, rays(&sets, RayKind::Primary)).iter().filter(|hit| on_mesh(hit)).count();
+    assert!((N_PIXELS / 20..N_PIXELS).contains(&n_on_mesh), "{n_on_mesh} of {N_PIXELS} see the mesh");
+}
+
+#[test]
+fn without_a_room_only_primary_hits_have_further_rays() {
+    let stage = Stage::open(mesh(), SIZE);
+    let sets = ray_sets(&stage);
+    let primary = rays(&sets, RayKind::Primary);
+    let hits = closest_hits(&stage, primary);
+    let pixels: Vec<_> = primary
+        .iter()
+        .zip(&hits)
+        .filter(|(_, hit)| hit.triangle_ix != NO_TRIANGLE)
+        .map(|(ray, _)| ray.pixel_ix)
+        .collect();
+    assert!((1..N_PIXELS).contains(&pixels.len()));
+    for kind in [RayKind::Shadow, RayKind::Mirror, RayKind::Diffuse] {
+        assert!(rays(&sets, kind).iter().map(|ray| ray.pixel_ix).eq(pixels.iter().copied()), "{}", kind.name());
+    }
+}
+
+#[test]
+fn primary_rays_go_tile_by_tile() {
+    let sets = ray_sets(&Stage::in_room(mesh(), SIZE));
+    let pixels: Vec<_> = rays(&sets, RayKind::Primary).iter().map(|ray| ray.pixel_ix).collect();
+    let first_tile: Vec<_> = (0..8).flat_map(|y| (0..8).map(move |x| y * SIZE.0 + x)).collect();
+    assert_eq!(pixels[..64], first_tile);
+}
+
+#[test]
+fn rays_leave_the_hits_of_the_primary_rays() {
+    let stage = Stage::in_room(mesh(), SIZE);
+    let sets = ray_sets(&stage);
+    let primary = rays(&sets, RayKind::Primary);
+    let hits = closest_hits(&stage, primary);
+    for (ray_ix, (came, hit)) in primary.iter().zip(&hits).enumerate() {
+        let point = came.origin + hit.t * came.direction;
+        let t = stage.scene.triangles[hit.triangle_ix as usize];
+        let normal = (t.v1 - t.v0).cross(t.v2 - t.v0).normalize();
+        let side = |direction: Vec3| direction.dot(normal) * came.direction.dot(normal);
+        let leaving = |kind| rays(&sets, kind)[ray_ix];
+        for kind in [RayKind::Shadow, RayKind::Mirror, RayKind::Diffuse] {
+            assert!((leaving(kind).origin - point).length() < 1e-3, "{}", kind.name());
+        }
+        assert!(side(leaving(RayKind::Mirror).direction) < 0.0 && side(leaving(RayKind::Diffuse).direction) <= 1e-6);
+        let shadow = leaving(RayKind::Shadow);
+        assert!((shadow.origin + shadow.t_max * shadow.direction - stage.light.position).length() < 1e-3);
+        if hit.triangle_ix as usize >= stage.scene.triangles.len() - 12 {
+            let mirrored = came.direction - 2.0 * came.direction.dot(normal) * normal;
+            assert!((leaving(RayKind::Mirror).direction - mirrored).length() < 1e-5);
+        }
+    }
+}
+
+#[test]
+fn rays_are_the_same_each_time() {
+    let sets = || ray_sets(&Stage::in_room(mesh(), SIZE));
+    assert_eq!(sets(), sets());
+}
+
+#[test]
+fn a_deliberately_wrong_hit_is_counted() {
+    let stage = Stage::in_room(mesh(), SIZE);
+    let sets = ray_sets(&stage);
+    let set = &sets[0];
+    let right = closest_hits(&stage, &set.rays);
+    assert_eq!(Difference::of(set.kind, &right, &right), Difference::default());
+    let mut wrong = right.clone();
+    wrong[7].t *= 1.01;
+    wrong[9] = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
+    assert_eq!(Difference::of(set.kind, &right, &wrong), Difference { n_differing: 2, n_grazing: 0 });
+}
+
+#[test]
+fn a_wrong_tree_is_noticed() {
+    let mut stage = Stage::in_room(mesh(), SIZE);
+    let sets = ray_sets(&stage);
+    let measured =
+        |stage: &Stage| Tracers::new(None, stage, &[Traversal::Stack]).unwrap().measure(&sets[0], 1).unwrap();
+    let right = measured(&stage);
+    assert!(right.n_hits == N_PIXELS && right.variants[0].difference == Difference::default());
+    let seen = closest_hits(&stage, &sets[0].rays)[N_PIXELS / 2].triangle_ix;
+    stage.tree.leaf_triangles.iter_mut().filter(|ix| **ix == seen).for_each(|ix| *ix ^= 1);
+    assert_ne!(measured(&stage).n_hits, 0);
+    let found = closest_hits(&stage, &sets[0].rays);
+    let right = closest_hits(&Stage::in_room(mesh(), SIZE), &sets[0].rays);
+    assert!(Difference::of(RayKind::Primary, &right, &found).n_differing > 0);
+}
+
+fn kdray(directory: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_kdray"));
+    command.current_dir(directory).arg("bench").args(arguments).stdin(Stdio::null()).output().unwrap()
+}
+
+/// Runs a suite; returns its table, JSON and SVG.
+fn measure(directory: &Path, arguments: &[&str]) -> (String, Value, String) {
+    let output = kdray(directory, &[arguments, &["--json", "x.json", "--svg", "x.svg"]].concat());
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    let json = serde_json::from_slice(&fs::read(directory.join("x.json")).unwrap()).unwrap();
+    let svg = fs::read_to_string(directory.join("x.svg")).unwrap();
+    (String::from_utf8(output.stdout).unwrap(), json, svg)
+}
+
+/// Fails unless every element that is opened is closed, in order, and no text has a bare `&` or `<`.
+fn check_xml(svg: &str) {
+    let mut open = Vec::new();
+    for tag in svg.split('<').skip(1) {
+        let (tag, text) = tag.split_once('>').expect("a tag ends");
+        let name = tag.trim_start_matches('/').split([' ', '/', '\n']).next().unwrap();
+        match (tag.starts_with('/'), tag.ends_with('/')) {
+            (true, _) => assert_eq!(open.pop(), Some(name)),
+            (false, false) => open.push(name),
+            (false, true) => {}
+        }
+        let is_entity = |rest: &str| ["amp;", "lt;", "gt;", "quot;", "apos;"].iter().any(|name| rest.starts_with(name));
+        assert!(text.split('&').skip(1).all(is_entity), "{text}");
+    }
+    assert!(open.is_empty() && svg.starts_with("<svg"));
+}
+
+#[test]
+fn traversal_measures_every_variant_on_every_set() {
+    let directory = TempDir::new().unwrap();
+    write_mesh(directory.path());
+    for more in [&[][..], &["--cpu"], &["--no-room"], &["--variants", "stack,mask,stack"]] {
+        let suite = ["traversal", "torus.obj", "--size", "32x24", "--repeat", "2", "--variants", "mask,stack"];
+        let suite = if more.contains(&"--variants") { &suite[..6] } else { &suite[..] };
+        let (text, json, svg) = measure(directory.path(), &[suite, more].concat());
+        check_xml(&svg);
+        assert_eq!((json["suite"].as_str(), json["scene"].as_str()), (Some("traversal"), Some("torus")));
+        assert_eq!(json["n_times"], 2);
+        assert_eq!(json["room"], !more.contains(&"--no-room"));
+        let sets = json["sets"].as_array().unwrap();
+        let names: Vec<_> = sets.iter().map(|set| set["rays"].as_str().unwrap()).collect();
+        assert_eq!(names, ["primary", "shadow", "mirror", "diffuse"]);
+        for set in sets {
+            let variants: Vec<_> = set["variants"].as_array().unwrap().iter().collect();
+            assert_eq!(variants.len(), 2, "{set}");
+            for variant in variants {
+                let name = variant["traversal"].as_str().unwrap();
+                assert!(text.contains(name) && svg.contains(name), "{name}");
+                assert_eq!(variant["n_differing"], 0, "{variant}");
+                let rate = |key: &str| variant["mrays_per_s"][key].as_f64().unwrap();
+                assert!(rate("min") <= rate("median") && rate("median") <= rate("max") && rate("min") > 0.0);
+                let steps = &variant["steps_a_ray"];
+                assert!(steps["nodes"].as_f64() >= Some(1.0) && steps["triangles"].is_f64(), "{steps}");
+                assert_eq!(steps["links"].as_f64() > Some(0.0), name == "mask", "{steps}");
+            }
+        }
+    }
+}
+
+#[test]
+fn paper_measures_the_four_scenes_beside_the_papers_times() {
+    let directory = TempDir::new().unwrap();
+    let scene = "[[mesh]]\ngenerator = \"box\"\nsize = [1.0, 1.0, 1.0]\n\n[render]\nmax_depth = 2\n";
+    for name in ["cornell", "paper2", "paper3", "paper4"] {
+        fs::write(directory.path().join(name).with_extension("toml"), scene).unwrap();
+    }
+    let suite = ["paper", "--scenes", ".", "--repeat", "2", "--size", "640x480,32x24", "--cpu-repeat", "2"];
+    let (text, json, svg) = measure(directory.path(), &suite);
+    check_xml(&svg);
+    let rows = json["rows"].as_array().unwrap();
+    assert_eq!((json["suite"].as_str(), rows.len()), (Some("paper"), 8));
+    for row in rows {
+        let name = row["scene"].as_str().unwrap();
+        assert!(text.contains(name) && svg.contains(name), "{name}");
+        let n_pixels = row["width"].as_u64().unwrap() * row["height"].as_u64().unwrap();
+        assert_eq!(row["n_primary_rays"].as_u64(), Some(n_pixels));
+        assert!(row["gpu_ms"]["median"].is_f64() && row["cpu_ms"]["max"].is_f64() && row["speedup"].is_f64());
+        assert_eq!(row["paper"].is_null(), n_pixels != 640 * 480, "{row}");
+    }
+    assert_eq!(rows[2]["paper"]["gpu_ms"], 82.0);
+    let (_, json, _) =
+        measure(directory.path(), &["paper", "--scenes", ".", "--repeat", "1", "--size", "8x8", "--no-cpu"]);
+    assert!(json["rows"][0]["cpu_ms"].is_null() && json["rows"][0]["speedup"].is_null());
+}
+
+#[test]
+fn mistakes_are_told_in_one_line_before_anything_is_measured() {
+    let directory = TempDir::new().unwrap();
+    write_mesh(directory.path());
+    let cases: [(&[&str], i32, &str); 11] = [
+        (&[], 2, "paper"),
+        (&["driver"], 2, "driver"),
+        (&["traversal"], 2, "MESH"),
+        (&["traversal", "torus.obj", "--variants", "mask,ropes!"], 2, "ropes!"),
+        (&["traversal", "torus.obj", "--cpu", "--device", "0"], 2, "--device"),
+        (&["traversal", "torus.obj", "--json", "x", "--svg", "x"], 2, "same file"),
+        (&["paper", "--no-cpu", "--cpu-repeat", "2"], 2, "--cpu-repeat"),
+        (&["traversal", "none.obj"], 3, "none.obj"),
+        (&["paper", "--scenes", "none"], 3, "cornell.toml"),
+        (&["traversal", "torus.obj", "--device", "abacus"], 4, "abacus"),
+        (&["traversal", "torus.obj", "--svg", "none/x.svg"], 5, "none/x.svg"),
+    ];
+    for (arguments, code, named) in cases {
+        let output = kdray(directory.path(), arguments);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {text}");
+        let errors: Vec<_> = text.lines().filter(|line| line.starts_with("error: ")).collect();
+        assert!(errors.len() == 1 && errors[0].contains(named), "{arguments:?}: {text}");
+        assert!(output.stdout.is_empty(), "{arguments:?}");
+    }
+    assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1);
+}
