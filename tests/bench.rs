@@ -194,10 +194,9 @@ fn check_xml(svg: &str) {
 fn traversal_measures_every_variant_on_every_set() {
     let directory = TempDir::new().unwrap();
     write_mesh(directory.path());
-    for more in [&[][..], &["--cpu"], &["--no-room"], &["--variants", "stack,mask,stack"]] {
-        let suite = ["traversal", "torus.obj", "--size", "32x24", "--repeat", "2", "--variants", "mask,stack"];
-        let suite = if more.contains(&"--variants") { &suite[..6] } else { &suite[..] };
-        let (text, json, svg) = measure(directory.path(), &[suite, more].concat());
+    for more in [&[][..], &["--cpu"], &["--no-room"], &["--variants", "stack,brute,stack"]] {
+        let suite = ["traversal", "torus.obj", "--size", "32x24", "--repeat", "2"];
+        let (text, json, svg) = measure(directory.path(), &[&suite[..], more].concat());
         check_xml(&svg);
         assert_eq!((json["suite"].as_str(), json["scene"].as_str()), (Some("traversal"), Some("torus")));
         assert_eq!(json["n_times"], 2);
@@ -206,8 +205,8 @@ fn traversal_measures_every_variant_on_every_set() {
         let names: Vec<_> = sets.iter().map(|set| set["rays"].as_str().unwrap()).collect();
         assert_eq!(names, ["primary", "shadow", "mirror", "diffuse"]);
         for set in sets {
-            let variants: Vec<_> = set["variants"].as_array().unwrap().iter().collect();
-            assert_eq!(variants.len(), 2, "{set}");
+            let variants = set["variants"].as_array().unwrap();
+            assert_eq!(variants.len(), if more.contains(&"--variants") { 2 } else { Traversal::ALL.len() - 1 });
             for variant in variants {
                 let name = variant["traversal"].as_str().unwrap();
                 assert!(text.contains(name) && svg.contains(name), "{name}");
@@ -215,8 +214,12 @@ fn traversal_measures_every_variant_on_every_set() {
                 let rate = |key: &str| variant["mrays_per_s"][key].as_f64().unwrap();
                 assert!(rate("min") <= rate("median") && rate("median") <= rate("max") && rate("min") > 0.0);
                 let steps = &variant["steps_a_ray"];
-                assert!(steps["nodes"].as_f64() >= Some(1.0) && steps["triangles"].is_f64(), "{steps}");
-                assert_eq!(steps["links"].as_f64() > Some(0.0), name == "mask", "{steps}");
+                assert_eq!(steps["nodes"].as_f64() >= Some(1.0), name != "brute", "{name}: {steps}");
+                assert!(steps["triangles"].as_f64() > Some(0.0), "{name}: {steps}");
+                let has_links = ["mask", "mask-boxes", "backtrack", "ropes"].contains(&name);
+                assert_eq!(steps["links"].as_f64() > Some(0.0), has_links, "{name}: {steps}");
+                let has_boxes = ["mask-boxes", "backtrack", "ropes"].contains(&name);
+                assert_eq!(steps["boxes"].as_f64() > Some(0.0), has_boxes, "{name}: {steps}");
             }
         }
     }
@@ -256,7 +259,7 @@ fn mistakes_are_told_in_one_line_before_anything_is_measured() {
         (&[], 2, "paper"),
         (&["driver"], 2, "driver"),
         (&["traversal"], 2, "MESH"),
-        (&["traversal", "torus.obj", "--variants", "mask,ropes!"], 2, "ropes!"),
+        (&["traversal", "torus.obj", "--variants", "mask,rope"], 2, "`rope`"),
         (&["traversal", "torus.obj", "--cpu", "--device", "0"], 2, "--device"),
         (&["traversal", "torus.obj", "--json", "x", "--svg", "x"], 2, "same file"),
         (&["paper", "--no-cpu", "--cpu-repeat", "2"], 2, "--cpu-repeat"),
