@@ -1,6 +1,11 @@
-//! Compiles `glsl/passes/*` to SPIR-V and turns `glsl/shared/layout.glsl` into Rust, both into `$OUT_DIR`.
+//! Compiles `glsl/passes/*` and `glsl/probes/*` to SPIR-V and turns `glsl/shared/layout.glsl` into Rust, both into `$OUT_DIR`.
 
-use std::{env, fmt::Write, fs, path::Path};
+use std::{
+    env,
+    fmt::Write,
+    fs,
+    path::{Path, PathBuf},
+};
 
 fn main() {
     let out_dir = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
@@ -11,10 +16,7 @@ fn main() {
     fs::write(out_dir.join("layout.rs"), rust_layout(&layout)).expect("write layout.rs");
 
     let compiler = shaderc::Compiler::new().expect("shaderc");
-    let mut passes: Vec<_> =
-        fs::read_dir("glsl/passes").expect("glsl/passes").map(|e| e.expect("entry").path()).collect();
-    passes.sort();
-    for path in passes {
+    for path in shaders() {
         let name = path.file_name().and_then(|n| n.to_str()).expect("a shader's name is UTF-8").to_owned();
         match compile(&compiler, &path, &name) {
             Ok(spirv) => fs::write(out_dir.join(format!("{name}.spv")), spirv).expect("write SPIR-V"),
@@ -25,6 +27,17 @@ fn main() {
             }
         }
     }
+}
+
+/// The files of both folders, in a fixed order.
+fn shaders() -> Vec<PathBuf> {
+    let mut shaders: Vec<_> = ["glsl/passes", "glsl/probes"]
+        .into_iter()
+        .flat_map(|folder| fs::read_dir(folder).unwrap_or_else(|e| panic!("{folder}: {e}")))
+        .map(|entry| entry.expect("an entry of the folder").path())
+        .collect();
+    shaders.sort();
+    shaders
 }
 
 /// One shader, optimized, for Vulkan 1.3; `#include "x.glsl"` reads from glsl/shared.
@@ -46,7 +59,7 @@ fn compile(compiler: &shaderc::Compiler, path: &Path, name: &str) -> Result<Vec<
     });
     let source = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let artifact = compiler
-        .compile_into_spirv(&source, kind, &format!("glsl/passes/{name}"), "main", Some(&options))
+        .compile_into_spirv(&source, kind, &path.display().to_string(), "main", Some(&options))
         .map_err(|e| e.to_string())?;
     Ok(artifact.as_binary_u8().to_vec())
 }
@@ -55,6 +68,7 @@ fn compile(compiler: &shaderc::Compiler, path: &Path, name: &str) -> Result<Vec<
 fn rust_layout(glsl: &str) -> String {
     let mut rust = String::new();
     let mut doc = String::new();
+    let mut structs = String::new(); // the same again as data, for the test against SPIR-V
     let mut layout: Option<(String, usize, usize)> = None; // struct name, bytes so far, widest alignment
     for line in glsl.lines().map(str::trim) {
         if let Some(comment) = line.strip_prefix("//") {
@@ -65,17 +79,20 @@ fn rust_layout(glsl: &str) -> String {
             if line == "};" {
                 assert_eq!(*offset % *widest, 0, "layout.glsl: std430 pads the end of {name} ({offset} bytes)");
                 writeln!(rust, "}}\nconst _: () = assert!(size_of::<{name}>() == {offset});").unwrap();
+                write!(structs, "]),").unwrap();
                 layout = None;
             } else if let Some((ty, member)) = line.trim_end_matches(';').split_once(' ') {
                 let (rust_ty, bytes, align) = rust_type(ty);
                 assert_eq!(*offset % align, 0, "layout.glsl: std430 pads {name}.{member} (offset {offset})");
                 writeln!(rust, "    pub {member}: {rust_ty},").unwrap();
+                write!(structs, "({rust_ty:?}, std::mem::offset_of!({name}, {member})),").unwrap();
                 *offset += bytes;
                 *widest = align.max(*widest);
             }
         } else if let Some(rest) = line.strip_prefix("struct ") {
             let name = rest.trim_end_matches(" {");
             writeln!(rust, "{doc}#[repr(C)]\n#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]\npub struct {name} {{").unwrap();
+            write!(structs, "({name:?}, size_of::<{name}>(), &[").unwrap();
             layout = Some((name.to_owned(), 0, 4));
         } else if let Some((name, value)) = line.strip_prefix("#define ").and_then(|rest| rest.split_once(' ')) {
             let value = value.trim().trim_end_matches('u');
@@ -83,6 +100,8 @@ fn rust_layout(glsl: &str) -> String {
         }
         doc.clear();
     }
+    let members = "/// Name, size, and each member's type and offset.";
+    writeln!(rust, "{members}\n#[cfg(test)]\nconst STRUCTS: &[Struct] = &[{structs}];").unwrap();
     rust
 }
 

@@ -1,3 +1,108 @@
 //! The structs, constants and bindings that the kernels share with the host, generated from `glsl/shared/layout.glsl`.
 
 include!(concat!(env!("OUT_DIR"), "/layout.rs"));
+
+#[cfg(test)]
+type Struct = (&'static str, usize, &'static [(&'static str, usize)]);
+
+#[cfg(test)]
+mod tests {
+    use std::{collections::BTreeSet, fs};
+
+    use spirq::{
+        ReflectConfig,
+        ty::{ScalarType, Type},
+        var::Variable,
+    };
+
+    use super::*;
+
+    /// Which struct's array, or single struct, stands at a binding; none for words and vectors.
+    fn struct_at(binding: u32) -> Option<&'static str> {
+        match binding {
+            BIND_FRAME => Some("Frame"),
+            BIND_TRIANGLES => Some("Triangle"),
+            BIND_MATERIALS => Some("Material"),
+            BIND_LIGHTS => Some("Light"),
+            BIND_KD_NODES => Some("KdNode"),
+            BIND_KD_BOXES => Some("KdBox"),
+            BIND_RAYS | BIND_NEXT_RAYS | BIND_CHILD_RAYS => Some("Ray"),
+            BIND_BOUNCES => Some("Bounce"),
+            BIND_HITS => Some("Hit"),
+            BIND_COUNTERS => Some("Counters"),
+            _ => None,
+        }
+    }
+
+    fn rust_type(ty: &Type) -> &'static str {
+        match ty {
+            Type::Scalar(ScalarType::Integer { bits: 32, is_signed: false }) => "u32",
+            Type::Scalar(ScalarType::Float { bits: 32 }) => "f32",
+            Type::Vector(v) if v.nscalar == 3 && v.scalar_ty == (ScalarType::Float { bits: 32 }) => "glam::Vec3",
+            Type::Matrix(m) if (m.nvector, m.vector_ty.nscalar, m.stride) == (4, 4, Some(16)) => "glam::Mat4",
+            other => panic!("layout.glsl holds no {other:?}"),
+        }
+    }
+
+    /// Types and offsets of a block's only member, a struct or an array of structs, and the array's stride.
+    fn members_of(block: &Type) -> (Vec<(&'static str, usize)>, Option<usize>) {
+        let Type::Struct(block) = block else { panic!("{block:?} is no block") };
+        let (element, stride) = match &block.members[0].ty {
+            Type::Array(array) => (&*array.element_ty, array.stride),
+            single => (single, None),
+        };
+        let Type::Struct(element) = element else { panic!("{element:?} is no struct") };
+        let members = element.members.iter().map(|m| (rust_type(&m.ty), m.offset.expect("an offset"))).collect();
+        (members, stride)
+    }
+
+    /// Ok where the kernels see this struct as Rust does.
+    fn check(name: &str, block: &Type, structs: &[Struct]) -> Result<(), String> {
+        let (_, size, members) = structs.iter().find(|(known, ..)| *known == name).expect("a struct of that name");
+        let (found, stride) = members_of(block);
+        if found != *members || stride.is_some_and(|stride| stride != *size) {
+            return Err(format!("{name}: {found:?} with stride {stride:?}, not {members:?} of {size} bytes"));
+        }
+        Ok(())
+    }
+
+    /// Struct name and block of every binding and push constant of every shader.
+    fn blocks() -> Vec<(&'static str, Type)> {
+        let files = fs::read_dir(env!("OUT_DIR")).expect("OUT_DIR").map(|entry| entry.expect("an entry").path());
+        let shaders = files.filter(|path| path.extension().is_some_and(|extension| extension == "spv"));
+        let variables = shaders.flat_map(|path| {
+            let spirv = fs::read(&path).expect("SPIR-V");
+            let entry_points = ReflectConfig::new().spv(spirv).ref_all_rscs(true).reflect();
+            entry_points.expect("valid SPIR-V").into_iter().flat_map(|entry_point| entry_point.vars)
+        });
+        variables
+            .filter_map(|variable| match variable {
+                Variable::Descriptor { desc_bind, ty, .. } => Some((struct_at(desc_bind.bind())?, ty)),
+                Variable::PushConstant { ty, .. } => Some(("Batch", ty)),
+                _ => None,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn kernels_see_the_structs_as_rust_does() {
+        let blocks = blocks();
+        for (name, block) in &blocks {
+            check(name, block, STRUCTS).unwrap();
+        }
+        let seen: BTreeSet<_> = blocks.iter().map(|(name, _)| *name).collect();
+        assert_eq!(seen, STRUCTS.iter().map(|(name, ..)| *name).collect());
+    }
+
+    #[test]
+    fn a_moved_member_is_noticed() {
+        let blocks = blocks();
+        let (_, block) = blocks.iter().find(|(name, _)| *name == "Hit").expect("some kernel binds hits");
+        let moved: Struct = ("Hit", 16, &[("f32", 0), ("u32", 4), ("f32", 12), ("f32", 8)]);
+        let swapped: Struct = ("Hit", 16, &[("u32", 0), ("f32", 4), ("f32", 8), ("f32", 12)]);
+        let longer: Struct = ("Hit", 20, &[("f32", 0), ("u32", 4), ("f32", 8), ("f32", 12)]);
+        for planted in [moved, swapped, longer] {
+            assert!(check("Hit", block, &[planted]).is_err(), "{planted:?}");
+        }
+    }
+}

@@ -123,8 +123,13 @@ impl Renderer {
         copy_all(commands, self.schedule.first_bounces.any(), self.resources.bounces.any());
         copy_all(commands, self.schedule.zero_counters.any(), self.resources.counters.any());
         commands.barrier(Access::TransferWrite, Access::AllReads); // bounces, counters
-        if self.options.primary == Primary::Raster {
-            self.passes.visibility.record(commands, &self.resources);
+        match self.options.primary {
+            Primary::Raster => self.passes.visibility.record(commands, &self.resources),
+            // Unread then, but bound: the layout has to be the set's.
+            Primary::Trace => {
+                commands.begin_targets(&self.resources.triangle_ids, &self.resources.depth);
+                commands.ids_to_compute(&self.resources.triangle_ids);
+            }
         }
     }
 

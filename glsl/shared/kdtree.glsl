@@ -16,7 +16,6 @@ layout(std430, set = 0, binding = BIND_KD_PARENTS) readonly buffer KdParentsBloc
 layout(std430, set = 0, binding = BIND_LEAF_TRIANGLES) readonly buffer LeafTrianglesBlock { uint leaf_triangles[]; };
 
 layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
-const bool RETRACES = TRAVERSAL == TRAVERSAL_RESTART || TRAVERSAL == TRAVERSAL_SHORT_STACK;
 
 struct Cell {
     uint node_ix;
@@ -25,42 +24,45 @@ struct Cell {
     float t_exit;
 };
 
-// What the traversal needs of a ray. slack: by how much in t a plane is widened on each axis (see traversal_ray).
-// overlap: a pending cell begins at most this far before a deeper one.
+// What the traversal needs of a ray. On each axis it enters the widened plane at x at t = x * inv_direction + bias and
+// leaves it width * |inv_direction| later (see traversal_ray). overlap: a pending cell begins at most this far before a
+// deeper one.
 struct TraversalRay {
     Shear shear;
-    vec3 origin;
     vec3 inv_direction;
-    vec3 slack;
+    vec3 bias;
+    float width;
     float t_enter;
     float t_exit;
     float overlap;
     uint source_triangle;
 };
 
-// The hit test's rounding moves a corner across the ray by at most 3 * 2^-24 of its distance. Planes are widened by
-// 2^-21 of the farthest distance in the scene, so that a ray along a plane, or through a corner of cells, meets every
-// triangle that touches it there: what brute force finds, the traversal visits.
+// The hit test's rounding moves a corner across the ray by at most 3 * 2^-24 of its distance, that of a crossing moves
+// the plane by 4 * 2^-24 of the coordinates. Planes are widened by 2^-20 of the farthest of these, so that a ray along
+// a plane, or through a corner of cells, meets every triangle that touches it there: what brute force finds, the
+// traversal visits.
 TraversalRay traversal_ray(Ray ray) {
     TraversalRay r;
     r.shear = shear_of(ray.origin, ray.direction);
-    r.origin = ray.origin;
     r.source_triangle = ray.source_triangle;
     // A direction in the plane is taken as all but in it: finite everywhere, and one rule for all ties.
     vec3 tiny = vec3(1e-12);
     vec3 direction = mix(ray.direction, tiny, lessThan(abs(ray.direction), tiny));
     r.inv_direction = 1.0 / direction;
-    vec3 reach = max(abs(frame.cell_min - ray.origin), abs(frame.cell_max - ray.origin));
-    float slack = max(reach.x, max(reach.y, reach.z)) * exp2(-21.0);
-    r.slack = slack * abs(r.inv_direction);
+    vec3 reach = max(abs(ray.origin), max(abs(frame.cell_min - ray.origin), abs(frame.cell_max - ray.origin)));
+    float slack_world = max(reach.x, max(reach.y, reach.z)) * exp2(-20.0);
+    vec3 slack = slack_world * abs(r.inv_direction);
+    r.bias = -ray.origin * r.inv_direction - slack;
+    r.width = 2.0 * slack_world;
     // Along the ray, planes of one axis come in order, the deepest pending one first; one of another axis may come
     // earlier by as much as both are widened. A chain over the three axes adds up to no more than this.
-    r.overlap = 2.0 * (r.slack.x + r.slack.y + r.slack.z);
+    r.overlap = 2.0 * (slack.x + slack.y + slack.z);
 
     vec3 t0 = (frame.cell_min - ray.origin) * r.inv_direction;
     vec3 t1 = (frame.cell_max - ray.origin) * r.inv_direction;
-    vec3 near = min(t0, t1) - r.slack;
-    vec3 far = max(t0, t1) + r.slack;
+    vec3 near = min(t0, t1) - slack;
+    vec3 far = max(t0, t1) + slack;
     r.t_enter = max(max(near.x, near.y), max(near.z, 0.0));
     r.t_exit = min(min(far.x, far.y), min(far.z, ray.t_max));
     return r;
@@ -74,24 +76,26 @@ float along(vec3 v, uint axis) {
     return axis == 0u ? v.x : (axis == 1u ? v.y : v.z);
 }
 
-// Where the ray meets the split plane.
-float at_plane(TraversalRay ray, KdNode node) {
-    uint axis = axis_of(node);
-    return (uintBitsToFloat(node.split_or_first) - along(ray.origin, axis)) * along(ray.inv_direction, axis);
+bool goes_twice() {
+    if (TRAVERSAL == TRAVERSAL_RESTART) return true;
+    return TRAVERSAL == TRAVERSAL_SHORT_STACK;
 }
 
-// For who goes a way twice and must come to the same bits: one place contracted to fma and another not would part them.
-vec2 uncontracted_crossing(float t, float slack) {
-    precise vec2 t_cross = vec2(t - slack, t + slack);
-    return t_cross;
+// A crossing for who goes a way twice and must come to the same bits: a compiler may fuse one place and not another.
+vec2 same_crossing(float position, float inv_direction, float bias, float width) {
+    precise float t = fma(position, inv_direction, bias);
+    precise float t_leave = fma(abs(inv_direction), width, t);
+    return vec2(t, t_leave);
 }
 
 // Where the ray enters the second child's side and leaves the first one's, both widened by the slack: [x, y], x <= y.
 vec2 crossing(TraversalRay ray, KdNode node) {
-    float t = at_plane(ray, node);
-    float slack = along(ray.slack, axis_of(node));
-    if (RETRACES) return uncontracted_crossing(t, slack);
-    return vec2(t - slack, t + slack);
+    uint axis = axis_of(node);
+    float position = uintBitsToFloat(node.split_or_first);
+    float inv_direction = along(ray.inv_direction, axis);
+    if (goes_twice()) return same_crossing(position, inv_direction, along(ray.bias, axis), ray.width);
+    float t = fma(position, inv_direction, along(ray.bias, axis));
+    return vec2(t, fma(abs(inv_direction), ray.width, t));
 }
 
 // The child on the side that the ray comes from; the other is `^ 1`.
@@ -116,16 +120,18 @@ void clear_pending() {
     siblings_done = uvec2(0u);
 }
 
-// Traversals with boxes need nothing: they find out on the way back.
 void push_pending(uint second_ix, Cell cell, vec2 t_cross) {
-    if (TRAVERSAL == TRAVERSAL_STACK) stack_push(second_ix, cell, t_cross);
+    // These find out on the way back.
+    if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
+    if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;
+    if (TRAVERSAL == TRAVERSAL_STACK) stack_push(second_ix, cell);
     else if (TRAVERSAL == TRAVERSAL_SHORT_STACK) short_stack_push(second_ix, cell, t_cross);
-    else if (TRAVERSAL != TRAVERSAL_MASK_BOXES && TRAVERSAL != TRAVERSAL_BACKTRACK) mask_push(second_ix, cell, t_cross);
+    else mask_push(second_ix, cell, t_cross);
 }
 
 // The next pending cell that may hold a hit nearer than t_best, or false.
 bool pop_pending(TraversalRay ray, float t_best, inout Cell cell) {
-    if (TRAVERSAL == TRAVERSAL_STACK) return stack_pop(t_best, cell);
+    if (TRAVERSAL == TRAVERSAL_STACK) return stack_pop(ray, t_best, cell);
     if (TRAVERSAL == TRAVERSAL_RESTART) return restart_pop(ray, t_best, cell);
     if (TRAVERSAL == TRAVERSAL_SHORT_STACK) return short_stack_pop(ray, t_best, cell);
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return mask_boxes_pop(ray, t_best, cell);

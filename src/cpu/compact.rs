@@ -13,20 +13,20 @@ pub fn reduce(child_counts: &[u32], scan_blocks: &mut [u32]) {
 }
 
 /// Turns the blocks' sums into their exclusive prefix sums and sizes the next bounce. Where a queue of
-/// `queue_capacity` cannot hold that many rays, the next bounce is empty and this one says `overflow`.
-pub fn spine(scan_blocks: &mut [u32], queue_capacity: u32, this: &mut Bounce, next: &mut Bounce) {
+/// `queue_capacity` cannot hold that many rays, the next bounce is empty and says `overflow`.
+pub fn spine(scan_blocks: &mut [u32], queue_capacity: u32, next: &mut Bounce) {
     let mut carry = 0;
     for block in scan_blocks {
         let sum = *block;
         *block = carry;
         carry += sum;
     }
-    size_next_bounce(carry, queue_capacity, this, next);
+    size_next_bounce(carry, queue_capacity, next);
 }
 
-fn size_next_bounce(n_wanted: u32, queue_capacity: u32, this: &mut Bounce, next: &mut Bounce) {
+fn size_next_bounce(n_wanted: u32, queue_capacity: u32, next: &mut Bounce) {
     let n_rays = if n_wanted <= queue_capacity { n_wanted } else { 0 };
-    this.overflow = u32::from(n_rays != n_wanted);
+    next.overflow = u32::from(n_rays != n_wanted);
     next.n_wanted = n_wanted;
     next.n_rays = n_rays;
     next.ray_groups_x = n_rays.div_ceil(RAY_GROUP_SIZE);

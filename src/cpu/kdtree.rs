@@ -23,10 +23,11 @@ pub struct Cell {
 #[derive(Clone, Copy, Debug)]
 pub struct TraversalRay {
     shear: Shear,
-    pub(super) origin: [f32; 4],
     pub(super) inv_direction: [f32; 4],
-    /// By how much in t a plane is widened on each axis.
-    pub(super) slack: [f32; 4],
+    /// Where the ray enters the widened plane at 0 on each axis, in t.
+    pub(super) bias: [f32; 4],
+    /// Of a widened plane, in world units.
+    pub(super) width: f32,
     pub t_enter: f32,
     pub t_exit: f32,
     /// A pending cell begins at most this far before a deeper one.
@@ -55,9 +56,10 @@ impl TraversalRay {
         // A direction in the plane is taken as all but in it: finite everywhere, and one rule for all ties.
         let direction = ray.direction.to_array().map(|d| if d.abs() < 1e-12 { 1e-12 } else { d });
         let inv_direction = direction.map(|d| 1.0 / d);
-        let reach = [0, 1, 2].map(|i| max((cell_min[i] - origin[i]).abs(), (cell_max[i] - origin[i]).abs()));
-        let slack = max(reach[0], max(reach[1], reach[2])) * 2f32.powi(-21);
-        let slack = inv_direction.map(|inv| slack * inv.abs());
+        let reach = [0, 1, 2]
+            .map(|i| max(origin[i].abs(), max((cell_min[i] - origin[i]).abs(), (cell_max[i] - origin[i]).abs())));
+        let slack_world = max(reach[0], max(reach[1], reach[2])) * 2f32.powi(-20);
+        let slack = inv_direction.map(|inv| slack_world * inv.abs());
 
         let t0 = [0, 1, 2].map(|i| (cell_min[i] - origin[i]) * inv_direction[i]);
         let t1 = [0, 1, 2].map(|i| (cell_max[i] - origin[i]) * inv_direction[i]);
@@ -65,9 +67,9 @@ impl TraversalRay {
         let far = [0, 1, 2].map(|i| max(t0[i], t1[i]) + slack[i]);
         Self {
             shear: Shear::of(origin, ray.direction.to_array()),
-            origin: by_axis(origin),
             inv_direction: by_axis(inv_direction),
-            slack: by_axis(slack),
+            bias: by_axis([0, 1, 2].map(|i| -origin[i] * inv_direction[i] - slack[i])),
+            width: 2.0 * slack_world,
             t_enter: max(max(near[0], near[1]), max(near[2], 0.0)),
             t_exit: min(min(far[0], far[1]), min(far[2], ray.t_max)),
             overlap: 2.0 * (slack[0] + slack[1] + slack[2]),
@@ -75,18 +77,13 @@ impl TraversalRay {
         }
     }
 
-    /// Where the ray meets the split plane.
-    #[inline(always)]
-    pub fn at_plane(&self, node: KdNode) -> f32 {
-        let axis = axis_of(node) as usize;
-        (f32::from_bits(node.split_or_first) - self.origin[axis]) * self.inv_direction[axis]
-    }
-
     /// Where the ray enters the second child's side and leaves the first one's, both widened by the slack.
     #[inline(always)]
     pub fn crossing(&self, node: KdNode) -> [f32; 2] {
-        let (t, axis) = (self.at_plane(node), axis_of(node) as usize);
-        [t - self.slack[axis], t + self.slack[axis]]
+        let axis = axis_of(node) as usize;
+        let inv_direction = self.inv_direction[axis];
+        let t = f32::from_bits(node.split_or_first) * inv_direction + self.bias[axis];
+        [t, inv_direction.abs() * self.width + t]
     }
 
     /// The child on the side that the ray comes from; the other is `^ 1`.

@@ -53,19 +53,42 @@ use crate::{
 
 /// Rays that one thread handles at a time: enough to pay for handing them out, few enough to balance.
 const RAYS_PER_TASK: usize = 512;
-/// Pixels whose rays are traced together: few enough for a bounce's rays to stay in the cache.
-const PIXELS_PER_BATCH: u32 = 1 << 16;
-/// Rays of a bounce beyond which a batch is split: 270 MB of queues.
-const QUEUE_CAPACITY: u32 = 1 << 20;
+
+/// How a frame is cut into pieces. The picture does not depend on it.
+#[derive(Clone, Copy, Debug)]
+pub struct Batching {
+    /// Pixels whose rays are traced together.
+    pub n_pixels: u32,
+    /// Rays of a bounce beyond which a batch of more than one pixel is halved.
+    pub queue_capacity: u32,
+}
+
+impl Default for Batching {
+    /// Some 30 MB of queues as a rule, and 270 MB at the most.
+    fn default() -> Self {
+        Self { n_pixels: 1 << 16, queue_capacity: 1 << 20 }
+    }
+}
 
 /// Renders a frame on the current rayon pool.
 pub fn render(scene: &Scene, tree: &KdTree, options: &RenderOptions) -> (Picture, Profile) {
+    render_in_batches(scene, tree, options, Batching::default())
+}
+
+/// Renders a frame on the current rayon pool, in batches of a given size.
+pub fn render_in_batches(
+    scene: &Scene,
+    tree: &KdTree,
+    options: &RenderOptions,
+    batching: Batching,
+) -> (Picture, Profile) {
     let n_pixels = options.width * options.height;
     let mut renderer = Renderer {
         scene,
         tree,
         options,
         extras: Extras::new(tree, options.traversal),
+        batching,
         frame: frame_constants(scene, tree, options),
         triangle_ids: vec![0; n_pixels as usize],
         pixel_radiance: vec![[0.0; 4]; n_pixels as usize],
@@ -77,8 +100,8 @@ pub fn render(scene: &Scene, tree: &KdTree, options: &RenderOptions) -> (Picture
     if options.primary == Primary::Raster {
         renderer.visibility();
     }
-    for first_pixel in (0..n_pixels).step_by(PIXELS_PER_BATCH as usize) {
-        renderer.batch(first_pixel, PIXELS_PER_BATCH.min(n_pixels - first_pixel));
+    for first_pixel in (0..n_pixels).step_by(batching.n_pixels as usize) {
+        renderer.batch(first_pixel, batching.n_pixels.min(n_pixels - first_pixel));
     }
     renderer.finish()
 }
@@ -89,6 +112,7 @@ struct Renderer<'a> {
     tree: &'a KdTree,
     options: &'a RenderOptions,
     extras: Extras,
+    batching: Batching,
     frame: Frame,
     /// Like `pixel_radiance`: `width * height`, rows from the top.
     triangle_ids: Vec<u32>,
@@ -109,15 +133,18 @@ impl Renderer<'_> {
     /// Algorithm 1 for a batch of pixels: all bounces, or those of its halves where a bounce makes more rays than the
     /// queue is meant to hold. Starting over is harmless: bounce 0 sets its pixels.
     fn batch(&mut self, first_pixel: u32, n_pixels: u32) {
-        let capacity = if n_pixels == 1 { u32::MAX } else { QUEUE_CAPACITY };
+        let capacity = if n_pixels == 1 { u32::MAX } else { self.batching.queue_capacity };
         let mut stats = Vec::new();
         self.primary_rays(first_pixel, n_pixels);
         for depth in 0..self.options.max_depth {
             let n_hits = self.closest_hits(depth);
             let n_shadow_rays = self.light(depth);
             stats.push(BounceStats { n_rays: self.queues.rays.len() as u64, n_hits, n_shadow_rays });
-            let this = self.next_rays(depth, capacity);
-            if this.overflow != 0 {
+            if depth + 1 == self.options.max_depth {
+                break;
+            }
+            let next = self.next_rays(depth, capacity);
+            if next.overflow != 0 {
                 self.batch(first_pixel, n_pixels / 2);
                 self.batch(first_pixel + n_pixels / 2, n_pixels - n_pixels / 2);
                 return;
@@ -168,22 +195,22 @@ impl Renderer<'_> {
         n_shadow_rays.into()
     }
 
-    /// Compacts the children to the queue of the next bounce; returns what the spine says of this one.
+    /// Compacts the children to the queue of the next bounce; returns what the spine says of that.
     fn next_rays(&mut self, depth: u32, capacity: u32) -> Bounce {
         let Queues { rays, next_rays, scan_blocks, shaded, .. } = &mut self.queues;
         let Shaded { child_rays, child_counts, .. } = shaded;
-        let (mut this, mut next) = (Bounce::zeroed(), Bounce::zeroed());
+        let mut next = Bounce::zeroed();
         scan_blocks.resize(rays.len().div_ceil(SCAN_BLOCK_SIZE as usize), 0);
         self.clock.time("compact_reduce", Some(depth), || compact::reduce(child_counts, scan_blocks));
-        self.clock.time("compact_spine", Some(depth), || compact::spine(scan_blocks, capacity, &mut this, &mut next));
+        self.clock.time("compact_spine", Some(depth), || compact::spine(scan_blocks, capacity, &mut next));
         next_rays.resize(next.n_rays as usize, Ray::zeroed());
-        if this.overflow == 0 {
+        if next.overflow == 0 {
             self.clock.time("compact_scatter", Some(depth), || {
                 compact::scatter(child_rays, child_counts, scan_blocks, next_rays);
             });
         }
         swap(rays, next_rays);
-        this
+        next
     }
 
     fn count(&mut self, stats: &[BounceStats]) {

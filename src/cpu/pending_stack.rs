@@ -2,19 +2,20 @@
 
 use super::{
     bindings::Bindings,
-    kdtree::{Cell, Pending, TraversalRay, max, min},
+    kdtree::{Cell, Pending, TraversalRay, min},
 };
 use crate::layout::KD_MAX_DEPTH;
 
-/// Node, entry and exit of each pending subtree.
+/// Node and exit of each pending subtree. Where one begins is not kept: it is where the ray has just left the cell before
+/// it, or `overlap` earlier.
 pub struct PendingStack {
-    entries: [(u32, f32, f32); KD_MAX_DEPTH as usize],
+    entries: [(u32, f32); KD_MAX_DEPTH as usize],
     size: usize,
 }
 
 impl Pending for PendingStack {
     fn new() -> Self {
-        Self { entries: [(0, 0.0, 0.0); KD_MAX_DEPTH as usize], size: 0 }
+        Self { entries: [(0, 0.0); KD_MAX_DEPTH as usize], size: 0 }
     }
 
     #[inline(always)]
@@ -23,23 +24,21 @@ impl Pending for PendingStack {
     }
 
     #[inline(always)]
-    fn push(&mut self, second_ix: u32, cell: &Cell, t_cross: [f32; 2]) {
-        self.entries[self.size] = (second_ix, max(cell.t_enter, t_cross[0]), cell.t_exit);
+    fn push(&mut self, second_ix: u32, cell: &Cell, _: [f32; 2]) {
+        self.entries[self.size] = (second_ix, cell.t_exit);
         self.size += 1;
     }
 
     #[inline(always)]
-    fn pop(&mut self, _: &Bindings, _: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
-        while self.size > 0 {
-            self.size -= 1;
-            let (node_ix, t_enter, t_exit) = self.entries[self.size];
-            cell.node_ix = node_ix;
-            cell.t_enter = t_enter;
-            cell.t_exit = min(t_exit, t_best);
-            if cell.t_enter <= t_best {
-                return true;
-            }
+    fn pop(&mut self, _: &Bindings, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+        cell.t_enter = cell.t_exit - ray.overlap;
+        if self.size == 0 || t_best < cell.t_enter {
+            return false;
         }
-        false
+        self.size -= 1;
+        let (node_ix, t_exit) = self.entries[self.size];
+        cell.node_ix = node_ix;
+        cell.t_exit = min(t_exit, t_best);
+        true
     }
 }

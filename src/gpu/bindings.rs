@@ -42,7 +42,7 @@ pub struct Bindings {
 impl Bindings {
     /// `push_bytes`: size of the push constants, for all stages.
     pub fn new(context: &Arc<Context>, kinds: &[BindingKind], push_bytes: u32) -> Result<Arc<Self>, GpuError> {
-        let stages = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX;
+        let stages = context.stages();
         let bindings: Vec<_> = (0..)
             .zip(kinds)
             .map(|(binding, kind)| {

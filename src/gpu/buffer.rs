@@ -15,6 +15,8 @@ pub enum BufferUse {
     Uniform,
     /// Storage that also sizes indirect dispatches.
     Indirect,
+    /// Whatever the driver's own ray tracing reads and writes, by address.
+    Structure,
 }
 
 /// `len` elements of `T` in the device's memory.
@@ -41,13 +43,20 @@ impl<T: Pod> Buffer<T> {
     pub fn new(context: &Arc<Context>, name: &str, len: usize, usage: BufferUse) -> Result<Self, GpuError> {
         let bytes = (len.max(1) * size_of::<T>()) as u64;
         let limit = context.limits().storage_range;
-        if bytes > limit {
+        if bytes > limit && usage != BufferUse::Structure {
             return Err(GpuError::TooLarge { object: name.to_owned(), bytes, limit });
         }
         let usage = match usage {
             BufferUse::Storage => vk::BufferUsageFlags::STORAGE_BUFFER,
             BufferUse::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
             BufferUse::Indirect => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER,
+            BufferUse::Structure => {
+                vk::BufferUsageFlags::STORAGE_BUFFER
+                    | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR
+                    | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR
+                    | vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR
+                    | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
+            }
         } | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST;
         let any = AnyBuffer::new(context, name, bytes, usage, MemoryLocation::GpuOnly)?;
@@ -153,6 +162,13 @@ impl AnyBuffer {
 
     pub(super) fn raw(&self) -> vk::Buffer {
         self.raw
+    }
+
+    /// Of a buffer for [`BufferUse::Structure`].
+    pub(super) fn address(&self) -> vk::DeviceAddress {
+        let info = vk::BufferDeviceAddressInfo::default().buffer(self.raw);
+        // SAFETY: the buffer was created with the usage that allows it.
+        unsafe { self.context.device.get_buffer_device_address(&info) }
     }
 
     pub fn name(&self) -> &str {

@@ -16,8 +16,8 @@ pub struct CommandBuffer {
 
 /// What is being recorded: the body of [`CommandBuffer::record`].
 pub struct Commands<'a> {
-    raw: vk::CommandBuffer,
-    context: &'a Context,
+    pub(super) raw: vk::CommandBuffer,
+    pub(super) context: &'a Context,
     timer: Option<&'a Timer>,
 }
 
@@ -76,7 +76,7 @@ impl Drop for CommandBuffer {
 
 impl Commands<'_> {
     /// One pass: its name is the debug label and the timer's row.
-    fn pass(&self, name: &'static str, bounce: Option<u32>, body: impl FnOnce()) {
+    pub(super) fn pass(&self, name: &'static str, bounce: Option<u32>, body: impl FnOnce()) {
         let row = self.timer.map(|timer| (timer, timer.begin(self.raw, name, bounce)));
         self.labelled(name, body);
         if let Some((timer, row)) = row {
@@ -111,7 +111,9 @@ impl Commands<'_> {
     pub fn bind(&self, set: &BindingSet) {
         // SAFETY: the set is complete, and its layout is every pipeline's.
         unsafe {
-            for point in [vk::PipelineBindPoint::COMPUTE, vk::PipelineBindPoint::GRAPHICS] {
+            let ray_tracing = self.context.ray_tracing.as_ref().map(|_| vk::PipelineBindPoint::RAY_TRACING_KHR);
+            let points = [vk::PipelineBindPoint::COMPUTE, vk::PipelineBindPoint::GRAPHICS];
+            for point in points.into_iter().chain(ray_tracing) {
                 let layout = set.bindings.pipeline_layout;
                 self.context.device.cmd_bind_descriptor_sets(self.raw, point, layout, 0, &[set.raw], &[]);
             }
@@ -125,7 +127,7 @@ impl Commands<'_> {
 
     fn launch(&self, pipeline: &ComputePipeline, push: &impl Pod, dispatch: Dispatch) {
         let device = &self.context.device;
-        let stages = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX;
+        let stages = self.context.stages();
         // SAFETY: the set is bound; push constants fit the layout's range.
         unsafe {
             device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.raw);

@@ -3,7 +3,7 @@
 use std::{
     ffi::CString,
     mem::ManuallyDrop,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
 use ash::{ext, vk};
@@ -17,6 +17,8 @@ use super::{
     commands::CommandBuffer,
     devices::{queue_family, select},
     instance::Instance,
+    probe,
+    ray_tracing::RayTracingCalls,
 };
 
 /// Which device to use, and how.
@@ -35,10 +37,12 @@ pub struct Context {
     pub(super) command_pool: vk::CommandPool,
     pub(super) timestamp_period_ns: f32,
     pub(super) timestamp_valid_bits: u32,
+    pub(super) ray_tracing: Option<RayTracingCalls>,
     queue: vk::Queue,
     allocator: ManuallyDrop<Mutex<Allocator>>,
     info: DeviceInfo,
     limits: Limits,
+    fuses_fma: OnceLock<bool>,
     instance: Arc<Instance>,
 }
 
@@ -50,6 +54,28 @@ impl Context {
     pub fn new(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::new(options.validate)?;
         let (physical, info) = select(&instance, options.device.as_ref())?;
+        Self::open(instance, physical, info, false)
+    }
+
+    /// As [`Context::new`], with the driver's own ray tracing, to compare with; none where the device lacks it.
+    ///
+    /// # Errors
+    /// As [`Context::new`].
+    pub fn with_ray_tracing(options: &ContextOptions) -> Result<Option<Arc<Self>>, GpuError> {
+        let instance = Instance::new(options.validate)?;
+        let (physical, info) = select(&instance, options.device.as_ref())?;
+        if !RayTracingCalls::available(&instance, physical) {
+            return Ok(None);
+        }
+        Self::open(instance, physical, info, true).map(Some)
+    }
+
+    fn open(
+        instance: Arc<Instance>,
+        physical: vk::PhysicalDevice,
+        info: DeviceInfo,
+        ray_tracing: bool,
+    ) -> Result<Arc<Self>, GpuError> {
         // SAFETY: the device belongs to the instance.
         let (families, properties) = unsafe {
             (
@@ -58,7 +84,7 @@ impl Context {
             )
         };
         let family = queue_family(&families).expect("`select` refuses a device without such a queue");
-        let device = create_device(&instance, physical, family as u32, &info)?;
+        let device = create_device(&instance, physical, family as u32, &info, ray_tracing)?;
         // SAFETY: the queue was asked for at creation; the pool belongs to its family.
         let (queue, command_pool) = unsafe {
             let pool = vk::CommandPoolCreateInfo::default()
@@ -68,8 +94,9 @@ impl Context {
                 device.create_command_pool(&pool, None).map_err(GpuError::call("vkCreateCommandPool", "kdray"))?;
             (device.get_device_queue(family as u32, 0), pool)
         };
-        let allocator = create_allocator(&instance, &device, physical)?;
+        let allocator = create_allocator(&instance, &device, physical, ray_tracing)?;
         Ok(Arc::new(Self {
+            ray_tracing: ray_tracing.then(|| RayTracingCalls::new(&instance, physical, &device)),
             debug_utils: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device)),
             device,
             command_pool,
@@ -78,6 +105,7 @@ impl Context {
             queue,
             allocator: ManuallyDrop::new(Mutex::new(allocator)),
             info,
+            fuses_fma: OnceLock::new(),
             limits: Limits {
                 storage_range: u64::from(properties.limits.max_storage_buffer_range),
                 target_size: properties
@@ -102,6 +130,18 @@ impl Context {
     /// True for a driver that computes on the CPU.
     pub fn is_software(&self) -> bool {
         self.info.kind == "CPU"
+    }
+
+    /// Whether `fma` rounds once in this device's kernels; found out by one of them, the first time.
+    ///
+    /// # Errors
+    /// The kernel does not run.
+    pub fn fuses_fma(self: &Arc<Self>) -> Result<bool, GpuError> {
+        if let Some(&fuses) = self.fuses_fma.get() {
+            return Ok(fuses);
+        }
+        let fuses = probe::fuses_fma(self)?;
+        Ok(*self.fuses_fma.get_or_init(|| fuses))
     }
 
     /// What the validation layer has said so far; empty without validation.
@@ -132,6 +172,12 @@ impl Context {
     pub fn wait(&self) -> Result<(), GpuError> {
         // SAFETY: the queue is used by one thread at a time.
         unsafe { self.device.queue_wait_idle(self.queue) }.map_err(GpuError::call("vkQueueWaitIdle", &self.info.name))
+    }
+
+    /// Shader stages that see bindings and push constants.
+    pub(super) fn stages(&self) -> vk::ShaderStageFlags {
+        let base = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX;
+        if self.ray_tracing.is_some() { base | vk::ShaderStageFlags::RAYGEN_KHR } else { base }
     }
 
     /// Gives a handle its name in the debuggers' and the validation layer's eyes.
@@ -186,13 +232,14 @@ fn create_device(
     physical: vk::PhysicalDevice,
     family: u32,
     info: &DeviceInfo,
+    ray_tracing: bool,
 ) -> Result<ash::Device, GpuError> {
     // SAFETY: the device belongs to the instance.
     let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
         .map_err(GpuError::call("vkEnumerateDeviceExtensionProperties", &info.name))?;
     // A driver that is not fully conformant wants to be told that this is known.
     let portability = ash::khr::portability_subset::NAME;
-    let extensions: Vec<_> = available
+    let mut extensions: Vec<_> = available
         .iter()
         .any(|e| e.extension_name_as_c_str() == Ok(portability))
         .then_some(portability.as_ptr())
@@ -205,10 +252,19 @@ fn create_device(
         .synchronization2(true)
         .subgroup_size_control(true)
         .compute_full_subgroups(true);
-    let create = vk::DeviceCreateInfo::default()
+    let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
+    let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+    let mut pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
+    if ray_tracing {
+        extensions.extend(RayTracingCalls::EXTENSIONS.map(|name| name.as_ptr()));
+    }
+    let mut create = vk::DeviceCreateInfo::default()
         .queue_create_infos(&queues)
         .enabled_extension_names(&extensions)
         .push_next(&mut features);
+    if ray_tracing {
+        create = create.push_next(&mut addresses).push_next(&mut structures).push_next(&mut pipelines);
+    }
     // SAFETY: all that `create` points to lives until the call returns.
     unsafe { instance.raw.create_device(physical, &create, None) }.map_err(GpuError::call("vkCreateDevice", &info.name))
 }
@@ -217,6 +273,7 @@ fn create_allocator(
     instance: &Instance,
     device: &ash::Device,
     physical_device: vk::PhysicalDevice,
+    buffer_device_address: bool,
 ) -> Result<Allocator, GpuError> {
     const MIB: u64 = 1 << 20;
     // Blocks grow with use, so that a small scene takes little memory.
@@ -228,7 +285,7 @@ fn create_allocator(
         device: device.clone(),
         physical_device,
         debug_settings: AllocatorDebugSettings::default(),
-        buffer_device_address: false,
+        buffer_device_address,
         allocation_sizes: sizes,
     })
     .map_err(|source| GpuError::Memory { object: "allocator".into(), bytes: 0, source })

@@ -4,6 +4,7 @@
 //! [`Context`] that it was made from. One context is used by one thread at a time.
 #![allow(unsafe_code)]
 
+mod acceleration;
 mod barrier;
 mod bindings;
 mod buffer;
@@ -14,8 +15,11 @@ mod error;
 mod image;
 mod instance;
 mod pipeline;
+mod probe;
+mod ray_tracing;
 mod timer;
 
+pub use acceleration::Scenery;
 pub use barrier::Access;
 pub use bindings::{Binding, BindingKind, BindingSet, Bindings};
 pub use buffer::{AnyBuffer, Buffer, BufferUse};
@@ -25,4 +29,5 @@ pub use devices::{DeviceInfo, DeviceSelector, Limits, devices};
 pub use error::GpuError;
 pub use image::{Target, TargetKind};
 pub use pipeline::{ComputeDesc, ComputePipeline, RasterDesc, RasterPipeline};
+pub use ray_tracing::{RayTracingDesc, RayTracingPipeline};
 pub use timer::{Timer, TimerRow};

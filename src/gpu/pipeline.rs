@@ -6,7 +6,7 @@ use ash::vk;
 
 use super::{Bindings, Context, GpuError, TargetKind};
 
-const ENTRY_POINT: &CStr = c"main";
+pub(super) const ENTRY_POINT: &CStr = c"main";
 
 /// A kernel and its variant.
 pub struct ComputeDesc<'a> {
@@ -144,13 +144,13 @@ impl Drop for RasterPipeline {
 }
 
 /// A module, needed only while a pipeline is made of it.
-struct ShaderModule<'a> {
-    raw: vk::ShaderModule,
+pub(super) struct ShaderModule<'a> {
+    pub(super) raw: vk::ShaderModule,
     context: &'a Context,
 }
 
 impl<'a> ShaderModule<'a> {
-    fn new(context: &'a Context, name: &str, spirv: &[u8]) -> Result<Self, GpuError> {
+    pub(super) fn new(context: &'a Context, name: &str, spirv: &[u8]) -> Result<Self, GpuError> {
         let code = ash::util::read_spv(&mut Cursor::new(spirv)).expect("build.rs writes whole SPIR-V words");
         let info = vk::ShaderModuleCreateInfo::default().code(&code);
         // SAFETY: the code lives until the call returns.

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::{
-    frame::{Primary, RenderOptions},
+    frame::{Primary, RenderOptions, Traversal},
     gpu::{Bindings, ComputeDesc, ComputePipeline, Context, GpuError},
 };
 
@@ -69,6 +69,11 @@ impl Passes {
             tonemap: Tonemap::new(context, bindings)?,
         })
     }
+}
+
+/// Specialization constants of the kernels that traverse.
+fn traversal_constants(context: &Arc<Context>, traversal: Traversal) -> Result<[u32; 2], GpuError> {
+    Ok([traversal.constant(), context.fuses_fma()?.into()])
 }
 
 /// A kernel without subgroup requirements.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Resources, kernel, spirv};
+use super::{Resources, kernel, spirv, traversal_constants};
 use crate::{
     frame::Traversal,
     gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
@@ -20,7 +20,8 @@ impl Trace {
         bindings: &Arc<Bindings>,
         traversal: Traversal,
     ) -> Result<Self, GpuError> {
-        Ok(Self { kernel: kernel(context, bindings, "trace", spirv!("trace.comp"), &[traversal.constant()])? })
+        let constants = traversal_constants(context, traversal)?;
+        Ok(Self { kernel: kernel(context, bindings, "trace", spirv!("trace.comp"), &constants)? })
     }
 
     /// Needs rays. Leaves hits; updates counters.

@@ -2,9 +2,11 @@
 
 #![allow(dead_code)] // each test target uses its own part
 
+pub mod compare;
 pub mod meshes;
 pub mod random;
 pub mod rays;
+pub mod scenes;
 
 use glam::Vec3;
 use kdray::{

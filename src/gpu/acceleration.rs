@@ -1,0 +1,168 @@
+//! The driver's own acceleration structure over triangles, to compare with.
+
+use std::sync::Arc;
+
+use ash::vk;
+use bytemuck::Pod;
+
+use super::{Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, ray_tracing::RayTracingCalls};
+
+/// A bottom level over all triangles, and a top level of one instance.
+pub struct Scenery {
+    top: Level,
+    _bottom: Level,
+    build_ms: Option<f64>,
+}
+
+/// One acceleration structure and its memory.
+struct Level {
+    raw: vk::AccelerationStructureKHR,
+    bytes: Buffer<u8>,
+    context: Arc<Context>,
+}
+
+/// Geometry of a level, and how many primitives it has.
+struct Contents<'a> {
+    name: &'static str,
+    ty: vk::AccelerationStructureTypeKHR,
+    geometry: vk::AccelerationStructureGeometryKHR<'a>,
+    n_primitives: u32,
+}
+
+impl Scenery {
+    /// Builds both levels for fast tracing. `triangles`: elements whose first three 16-byte words begin with a corner.
+    ///
+    /// # Errors
+    /// Out of memory. Panics on a context without ray tracing.
+    pub fn new<T: Pod>(context: &Arc<Context>, triangles: &[T]) -> Result<Self, GpuError> {
+        let corners = Buffer::with(context, "scenery corners", triangles, BufferUse::Structure)?;
+        let data = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+            .vertex_format(vk::Format::R32G32B32_SFLOAT)
+            .vertex_data(vk::DeviceOrHostAddressConstKHR { device_address: corners.any().address() })
+            .vertex_stride(16)
+            .max_vertex(3 * triangles.len() as u32 - 1)
+            .index_type(vk::IndexType::NONE_KHR);
+        let bottom = Contents {
+            name: "bottom level",
+            ty: vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL,
+            geometry: vk::AccelerationStructureGeometryKHR::default()
+                .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+                .geometry(vk::AccelerationStructureGeometryDataKHR { triangles: data })
+                .flags(vk::GeometryFlagsKHR::OPAQUE),
+            n_primitives: triangles.len() as u32,
+        };
+        let (bottom, build_ms) = Level::build(context, &bottom)?;
+        let instances =
+            Buffer::with(context, "scenery instance", &[instance_of(bottom.address())], BufferUse::Structure)?;
+        let data = vk::AccelerationStructureGeometryInstancesDataKHR::default()
+            .data(vk::DeviceOrHostAddressConstKHR { device_address: instances.any().address() });
+        let top = Contents {
+            name: "top level",
+            ty: vk::AccelerationStructureTypeKHR::TOP_LEVEL,
+            geometry: vk::AccelerationStructureGeometryKHR::default()
+                .geometry_type(vk::GeometryTypeKHR::INSTANCES)
+                .geometry(vk::AccelerationStructureGeometryDataKHR { instances: data }),
+            n_primitives: 1,
+        };
+        let (top, _) = Level::build(context, &top)?;
+        Ok(Self { top, _bottom: bottom, build_ms })
+    }
+
+    /// Of the top level: what a ray generation shader takes as `accelerationStructureEXT`.
+    pub fn address(&self) -> u64 {
+        self.top.address()
+    }
+
+    /// GPU time of the bottom level's build; none without timestamps.
+    pub fn build_ms(&self) -> Option<f64> {
+        self.build_ms
+    }
+}
+
+/// VkAccelerationStructureInstanceKHR as 16 words: identity, mask 0xff, no custom index, the bottom level's address.
+fn instance_of(address: u64) -> [u32; 16] {
+    let one = 1f32.to_bits();
+    let rows = [one, 0, 0, 0, 0, one, 0, 0, 0, 0, one, 0];
+    let mut words = [0; 16];
+    words[..12].copy_from_slice(&rows);
+    words[12] = 0xff << 24;
+    words[14] = address as u32;
+    words[15] = (address >> 32) as u32;
+    words
+}
+
+impl Level {
+    fn build(context: &Arc<Context>, contents: &Contents) -> Result<(Self, Option<f64>), GpuError> {
+        let calls = RayTracingCalls::of(context);
+        let geometries = [contents.geometry];
+        let mut info = vk::AccelerationStructureBuildGeometryInfoKHR::default()
+            .ty(contents.ty)
+            .flags(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE)
+            .mode(vk::BuildAccelerationStructureModeKHR::BUILD)
+            .geometries(&geometries);
+        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+        let by_device = vk::AccelerationStructureBuildTypeKHR::DEVICE;
+        // SAFETY: one count for the one geometry.
+        unsafe {
+            calls.structures.get_acceleration_structure_build_sizes(
+                by_device,
+                &info,
+                &[contents.n_primitives],
+                &mut sizes,
+            );
+        }
+        let bytes = sizes.acceleration_structure_size;
+        let bytes = Buffer::<u8>::new(context, contents.name, bytes as usize, BufferUse::Structure)?;
+        let create = vk::AccelerationStructureCreateInfoKHR::default()
+            .buffer(bytes.any().raw())
+            .size(sizes.acceleration_structure_size)
+            .ty(contents.ty);
+        // SAFETY: the buffer has the size that was asked for, and lives as long as the level.
+        let raw = unsafe { calls.structures.create_acceleration_structure(&create, None) }
+            .map_err(GpuError::call("vkCreateAccelerationStructureKHR", contents.name))?;
+        let level = Self { raw, bytes, context: context.clone() };
+
+        // Room to round the address up.
+        let alignment = u64::from(calls.scratch_alignment);
+        let n_scratch = (sizes.build_scratch_size + alignment) as usize;
+        let scratch = Buffer::<u8>::new(context, "scratch", n_scratch, BufferUse::Structure)?;
+        let device_address = scratch.any().address().next_multiple_of(alignment);
+        info = info.dst_acceleration_structure(raw).scratch_data(vk::DeviceOrHostAddressKHR { device_address });
+        let timer = Timer::new(context, 1)?;
+        let buffer = CommandBuffer::record(context, contents.name, Some(&timer), |commands| {
+            commands.reset_timer();
+            commands.pass(contents.name, None, || build(commands, calls, &info, contents.n_primitives));
+        })?;
+        context.submit(&[&buffer])?;
+        context.wait()?;
+        let ms = timer.rows()?[0].span_ms.map(|(begin, end)| end - begin);
+        Ok((level, ms))
+    }
+
+    fn address(&self) -> u64 {
+        let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(self.raw);
+        // SAFETY: the structure is alive.
+        unsafe { RayTracingCalls::of(&self.context).structures.get_acceleration_structure_device_address(&info) }
+    }
+}
+
+fn build(
+    commands: &Commands,
+    calls: &RayTracingCalls,
+    info: &vk::AccelerationStructureBuildGeometryInfoKHR,
+    n_primitives: u32,
+) {
+    let range = vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(n_primitives);
+    // SAFETY: inputs, scratch and destination are buffers of the sizes asked for, kept until the device has ended.
+    unsafe {
+        calls.structures.cmd_build_acceleration_structures(commands.raw, std::slice::from_ref(info), &[&[range]]);
+    }
+}
+
+impl Drop for Level {
+    fn drop(&mut self) {
+        let _ = &self.bytes;
+        // SAFETY: the device has ended all work with it.
+        unsafe { RayTracingCalls::of(&self.context).structures.destroy_acceleration_structure(self.raw, None) };
+    }
+}

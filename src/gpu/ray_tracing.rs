@@ -1,0 +1,189 @@
+//! The driver's own ray tracing pipeline, to compare with. Nothing else in kdray uses it.
+
+use std::{ffi::CStr, sync::Arc};
+
+use ash::{khr, vk};
+use bytemuck::Pod;
+
+use super::{
+    Bindings, Buffer, BufferUse, Commands, Context, GpuError,
+    instance::Instance,
+    pipeline::{ENTRY_POINT, ShaderModule},
+};
+
+/// The extensions' functions and limits.
+pub(super) struct RayTracingCalls {
+    pub structures: khr::acceleration_structure::Device,
+    pub scratch_alignment: u32,
+    pipelines: khr::ray_tracing_pipeline::Device,
+    handle_bytes: usize,
+    /// Of a shader group's place in the table.
+    table_alignment: usize,
+}
+
+impl RayTracingCalls {
+    pub const EXTENSIONS: [&'static CStr; 3] =
+        [khr::acceleration_structure::NAME, khr::ray_tracing_pipeline::NAME, khr::deferred_host_operations::NAME];
+
+    pub fn available(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
+        // SAFETY: the device belongs to the instance.
+        let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }.unwrap_or_default();
+        let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        Self::EXTENSIONS.iter().all(|name| has(name))
+    }
+
+    pub fn new(instance: &Instance, physical: vk::PhysicalDevice, device: &ash::Device) -> Self {
+        let mut structures = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
+        let mut pipelines = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
+        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut structures).push_next(&mut pipelines);
+        // SAFETY: the device has both extensions.
+        unsafe { instance.raw.get_physical_device_properties2(physical, &mut all) };
+        Self {
+            structures: khr::acceleration_structure::Device::new(&instance.raw, device),
+            scratch_alignment: structures.min_acceleration_structure_scratch_offset_alignment,
+            pipelines: khr::ray_tracing_pipeline::Device::new(&instance.raw, device),
+            handle_bytes: pipelines.shader_group_handle_size as usize,
+            table_alignment: pipelines.shader_group_base_alignment as usize,
+        }
+    }
+
+    pub fn of(context: &Context) -> &Self {
+        context.ray_tracing.as_ref().expect("a context with ray tracing")
+    }
+}
+
+/// SPIR-V bytes of a pipeline's three shaders.
+pub struct RayTracingDesc<'a> {
+    /// Also the debug label and the timer.
+    pub name: &'static str,
+    pub generation: &'a [u8],
+    pub miss: &'a [u8],
+    pub closest_hit: &'a [u8],
+    /// Specialization constant 0 of the ray generation shader.
+    pub constant: u32,
+}
+
+/// A ray tracing pipeline with one group for each shader, and its table.
+pub struct RayTracingPipeline {
+    raw: vk::Pipeline,
+    table: Buffer<u8>,
+    bindings: Arc<Bindings>,
+    name: &'static str,
+    context: Arc<Context>,
+}
+
+impl RayTracingPipeline {
+    /// # Errors
+    /// The driver refuses a shader. Panics on a context without ray tracing.
+    pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &RayTracingDesc) -> Result<Self, GpuError> {
+        let calls = RayTracingCalls::of(context);
+        let stages = [
+            (vk::ShaderStageFlags::RAYGEN_KHR, desc.generation),
+            (vk::ShaderStageFlags::MISS_KHR, desc.miss),
+            (vk::ShaderStageFlags::CLOSEST_HIT_KHR, desc.closest_hit),
+        ];
+        let modules = stages
+            .iter()
+            .map(|(_, spirv)| ShaderModule::new(context, desc.name, spirv))
+            .collect::<Result<Vec<_>, _>>()?;
+        let entries = [vk::SpecializationMapEntry { constant_id: 0, offset: 0, size: 4 }];
+        let constant = desc.constant.to_ne_bytes();
+        let constants = vk::SpecializationInfo::default().map_entries(&entries).data(&constant);
+        let stages: Vec<_> = (stages.iter().zip(&modules))
+            .map(|((stage, _), module)| {
+                let info =
+                    vk::PipelineShaderStageCreateInfo::default().stage(*stage).module(module.raw).name(ENTRY_POINT);
+                if *stage == vk::ShaderStageFlags::RAYGEN_KHR { info.specialization_info(&constants) } else { info }
+            })
+            .collect();
+        let groups = [group(0), group(1), hit_group(2)];
+        let info = [vk::RayTracingPipelineCreateInfoKHR::default()
+            .stages(&stages)
+            .groups(&groups)
+            .max_pipeline_ray_recursion_depth(1)
+            .layout(bindings.pipeline_layout)];
+        let (deferred, cache) = (vk::DeferredOperationKHR::null(), vk::PipelineCache::null());
+        // SAFETY: all that `info` points to lives until the call returns.
+        let raw = unsafe { calls.pipelines.create_ray_tracing_pipelines(deferred, cache, &info, None) }
+            .map_err(|(_, result)| GpuError::call("vkCreateRayTracingPipelinesKHR", desc.name)(result))?[0];
+        let table = match table(context, calls, raw, groups.len()) {
+            Ok(table) => table,
+            Err(error) => {
+                // SAFETY: nothing uses it yet.
+                unsafe { context.device.destroy_pipeline(raw, None) };
+                return Err(error);
+            }
+        };
+        Ok(Self { raw, table, bindings: bindings.clone(), name: desc.name, context: context.clone() })
+    }
+
+    fn region(&self, group_ix: u64) -> vk::StridedDeviceAddressRegionKHR {
+        let stride = RayTracingCalls::of(&self.context).table_alignment as u64;
+        // One place of the table stays free in front, to round its address up.
+        let base = self.table.any().address().next_multiple_of(stride);
+        vk::StridedDeviceAddressRegionKHR { device_address: base + group_ix * stride, stride, size: stride }
+    }
+}
+
+fn group(shader_ix: u32) -> vk::RayTracingShaderGroupCreateInfoKHR<'static> {
+    vk::RayTracingShaderGroupCreateInfoKHR::default()
+        .ty(vk::RayTracingShaderGroupTypeKHR::GENERAL)
+        .general_shader(shader_ix)
+        .closest_hit_shader(vk::SHADER_UNUSED_KHR)
+        .any_hit_shader(vk::SHADER_UNUSED_KHR)
+        .intersection_shader(vk::SHADER_UNUSED_KHR)
+}
+
+fn hit_group(shader_ix: u32) -> vk::RayTracingShaderGroupCreateInfoKHR<'static> {
+    group(vk::SHADER_UNUSED_KHR).ty(vk::RayTracingShaderGroupTypeKHR::TRIANGLES_HIT_GROUP).closest_hit_shader(shader_ix)
+}
+
+/// One handle each `table_alignment` bytes from the first aligned address on.
+fn table(
+    context: &Arc<Context>,
+    calls: &RayTracingCalls,
+    pipeline: vk::Pipeline,
+    n_groups: usize,
+) -> Result<Buffer<u8>, GpuError> {
+    let bytes = n_groups * calls.handle_bytes;
+    // SAFETY: the pipeline has that many groups.
+    let handles = unsafe { calls.pipelines.get_ray_tracing_shader_group_handles(pipeline, 0, n_groups as u32, bytes) }
+        .map_err(GpuError::call("vkGetRayTracingShaderGroupHandlesKHR", "table"))?;
+    let stride = calls.table_alignment;
+    let table = Buffer::new(context, "shader table", (n_groups + 1) * stride, BufferUse::Structure)?;
+    let address = table.any().address();
+    let first = (address.next_multiple_of(stride as u64) - address) as usize;
+    let mut content = vec![0; (n_groups + 1) * stride];
+    for (group_ix, handle) in handles.chunks_exact(calls.handle_bytes).enumerate() {
+        let place = first + group_ix * stride;
+        content[place..place + handle.len()].copy_from_slice(handle);
+    }
+    table.upload(&content)?;
+    Ok(table)
+}
+
+impl Drop for RayTracingPipeline {
+    fn drop(&mut self) {
+        // SAFETY: the device has ended all work with it.
+        unsafe { self.context.device.destroy_pipeline(self.raw, None) };
+    }
+}
+
+impl Commands<'_> {
+    /// Runs the ray generation shader so many times with the bound set, as a pass of the pipeline's name.
+    pub fn trace_rays(&self, pipeline: &RayTracingPipeline, push: &impl Pod, n_rays: u32) {
+        let calls = RayTracingCalls::of(self.context);
+        let device = &self.context.device;
+        let none = vk::StridedDeviceAddressRegionKHR::default();
+        let [generation, miss, hit] = [0, 1, 2].map(|group_ix| pipeline.region(group_ix));
+        self.pass(pipeline.name, None, || {
+            // SAFETY: the set is bound; push constants fit the layout's range; the table has the three groups.
+            unsafe {
+                device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::RAY_TRACING_KHR, pipeline.raw);
+                let (layout, stages) = (pipeline.bindings.pipeline_layout, self.context.stages());
+                device.cmd_push_constants(self.raw, layout, stages, 0, bytemuck::bytes_of(push));
+                calls.pipelines.cmd_trace_rays(self.raw, &generation, &miss, &hit, &none, n_rays, 1, 1);
+            }
+        });
+    }
+}

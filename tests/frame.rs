@@ -1,0 +1,15 @@
+//! Whole frames on the device, under the validation layer, and on the CPU: against one another, against closed forms,
+//! and against themselves in other batches and on other numbers of threads.
+
+mod support;
+
+#[path = "frame/agreement.rs"]
+mod agreement;
+#[path = "frame/batches.rs"]
+mod batches;
+#[path = "frame/closed_forms.rs"]
+mod closed_forms;
+#[path = "frame/primaries.rs"]
+mod primaries;
+#[path = "frame/studio.rs"]
+mod studio;

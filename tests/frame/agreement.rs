@@ -1,0 +1,65 @@
+//! The device's picture against the CPU's.
+
+use std::path::Path;
+
+use kdray::{
+    frame::{Denoise, Primary, RenderOptions, Traversal},
+    scene::Scene,
+};
+
+use super::studio::{differing, on_both, options};
+use crate::support::scenes;
+
+/// Radiance of a pixel may differ by this much: some 2^-13 of a steep highlight's `pow`.
+const TOLERANCE: f32 = 2e-3;
+
+/// Few pixels may differ more: where the rasterizer's snapped edges, or the rounding of another `sqrt` or `pow`, send a
+/// ray past the other side of an edge. Glass multiplies such rays.
+fn check(name: &str, scene: &Scene, options: &RenderOptions, share: f64) {
+    let [device, cpu] = on_both(scene, options);
+    let n_differing = differing(&device, &cpu, TOLERANCE).len();
+    let n_allowed = (share * device.radiance.len() as f64) as usize;
+    assert!(n_differing <= n_allowed, "{name}: {n_differing} of {} pixels differ", device.radiance.len());
+    let lit = device.radiance.iter().filter(|pixel| pixel[..3].iter().sum::<f32>() > 0.05).count();
+    assert!(lit > device.radiance.len() / 2, "{name}: most of the picture is dark");
+}
+
+#[test]
+fn device_and_cpu_agree_on_the_scenes_that_ship() {
+    let depth = |scene: &Scene| scene.defaults.max_depth;
+    for name in ["cornell", "paper2", "paper3", "paper4"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(format!("{name}.toml"));
+        let scene = Scene::load(&path).expect("a scene");
+        let raster = options(96, 72, depth(&scene));
+        check(name, &scene, &RenderOptions { primary: Primary::Trace, ..raster.clone() }, 0.002);
+        // Snapped to 1/16 px, the outlines of triangles of less than a pixel are many and far off.
+        check(name, &scene, &raster, 0.05);
+    }
+}
+
+#[test]
+fn device_and_cpu_agree_whatever_the_options() {
+    let scene = scenes::mixed_outdoors();
+    for &traversal in Traversal::ALL {
+        for primary in [Primary::Raster, Primary::Trace] {
+            let share = if primary == Primary::Raster { 0.02 } else { 0.005 };
+            check("mixed", &scene, &RenderOptions { traversal, primary, ..options(80, 60, 5) }, share);
+        }
+    }
+    for (width, height, max_depth) in [(1, 1, 1), (7, 91, 2), (130, 3, 4)] {
+        check("odd size", &scenes::mixed(), &options(width, height, max_depth), 0.03);
+    }
+    let denoise = Denoise::Paper { threshold: 0.3 };
+    check("filtered", &scene, &RenderOptions { denoise, exposure: 2.0, ..options(80, 60, 3) }, 0.02);
+}
+
+#[test]
+fn an_empty_scene_shows_its_background() {
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, Vec::new(), scenes::BLACK);
+    scene.background = glam::Vec3::new(0.25, 0.5, 1.0);
+    for picture in on_both(&scene, &options(9, 5, 3)) {
+        assert_eq!(picture.radiance, [[0.25, 0.5, 1.0, 1.0]; 45]);
+        assert_eq!(picture.display, [[137, 188, 255, 255]; 45]);
+    }
+}

@@ -1,0 +1,154 @@
+//! Pictures that are known beforehand.
+
+use glam::{Vec3, vec3};
+use kdray::{
+    frame::{Picture, Primary, RenderOptions},
+    scene::{Camera, Scene},
+};
+
+use super::studio::{differing, on_both, options};
+use crate::support::{meshes, scenes};
+
+/// Largest difference of any channel of any pixel from `radiance`.
+fn worst(picture: &Picture, radiance: Vec3) -> f32 {
+    let off = |pixel: &[f32; 4]| (Vec3::new(pixel[0], pixel[1], pixel[2]) - radiance).abs().max_element();
+    // NaN counts as infinitely wrong.
+    picture.radiance.iter().map(off).map(|off| if off.is_nan() { f32::INFINITY } else { off }).fold(0.0, f32::max)
+}
+
+/// A closed room that glows alike everywhere, and in it what neither adds nor takes light: all is one colour. (Traced:
+/// a rasterizer may show the back of a mirror's outline, and so a ray would start inside the mirror.)
+#[test]
+fn a_furnace_is_uniform() {
+    let glow = vec3(0.2, 0.5, 0.9);
+    let traced = |depth| RenderOptions { primary: Primary::Trace, ..options(80, 60, depth) };
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, scenes::room(5.0), scenes::emissive(glow));
+    for picture in on_both(&scene, &options(40, 30, 3)) {
+        assert_eq!(worst(&picture, glow), 0.0);
+    }
+    scenes::add(&mut scene, scenes::smooth_sphere(8, 0.8, vec3(-1.0, 0.0, 0.0)), scenes::mirror(Vec3::ONE));
+    let cube = meshes::placed(meshes::cube(2, 0.0), 0.5, vec3(1.0, 0.2, 0.0));
+    scenes::add(&mut scene, cube, scenes::mirror(Vec3::ONE));
+    let veil = meshes::placed(meshes::cube(1, 0.0), 0.4, vec3(0.0, 0.2, 2.0));
+    scenes::add(&mut scene, veil, kdray::layout::Material { ke: glow, d: 0.3, ..scenes::BLACK });
+    for picture in on_both(&scene, &traced(12)) {
+        assert!(worst(&picture, glow) < 2e-3, "off by {}", worst(&picture, glow));
+    }
+    // Glass splits rays; near total reflection the share that the last level cuts off falls slowly.
+    scenes::add(&mut scene, scenes::smooth_sphere(8, 0.5, vec3(0.3, -1.1, 0.5)), scenes::glass(1.5));
+    for picture in on_both(&scene, &traced(40)) {
+        assert!(worst(&picture, glow) < 2e-3, "off by {}", worst(&picture, glow));
+    }
+}
+
+/// Ambient light alone, or none but emitted: what a surface shows does not depend on where it is.
+#[test]
+fn ambient_light_is_ka_times_ambient() {
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, scenes::room(3.0), scenes::diffuse(vec3(0.25, 0.5, 0.75)));
+    scene.ambient = vec3(0.5, 0.25, 1.0);
+    for picture in on_both(&scene, &options(16, 12, 2)) {
+        assert_eq!(worst(&picture, vec3(0.125, 0.125, 0.75)), 0.0);
+    }
+}
+
+/// A room of differently glowing walls.
+fn colourful_room() -> Scene {
+    let mut scene = scenes::empty();
+    for (i, wall) in meshes::cube(4, 0.0).chunks(7).enumerate() {
+        let colour = vec3((i * 37 % 11) as f32, (i * 53 % 13) as f32, (i * 71 % 7) as f32) / 12.0;
+        scenes::add(&mut scene, meshes::placed(wall.to_vec(), 5.0, Vec3::ZERO), scenes::emissive(colour));
+    }
+    scene
+}
+
+/// Not more than a few pixels, on edges of what is seen through the glass, may change.
+#[test]
+fn glass_of_index_one_is_invisible() {
+    let scene = colourful_room();
+    let mut with_glass = scene.clone();
+    scenes::add(&mut with_glass, scenes::smooth_sphere(8, 1.0, vec3(0.5, 0.0, 0.0)), scenes::glass(1.0));
+    let cube = meshes::placed(meshes::cube(1, 0.0), 0.6, vec3(-1.2, 0.3, 0.4));
+    scenes::add(&mut with_glass, cube, scenes::glass(1.0));
+    let options = options(80, 60, 8);
+    for (without, with) in on_both(&scene, &options).iter().zip(&on_both(&with_glass, &options)) {
+        let n_differing = differing(without, with, 1e-3).len();
+        assert!(n_differing <= 5, "{n_differing} pixels differ");
+    }
+    // Of index 1.5 it is visible.
+    with_glass
+        .materials
+        .iter_mut()
+        .filter(|material| material.ni == 1.0 && material.flags != 0)
+        .for_each(|m| m.ni = 1.5);
+    for (without, with) in on_both(&scene, &options).iter().zip(&on_both(&with_glass, &options)) {
+        assert!(differing(without, with, 1e-3).len() > 500);
+    }
+}
+
+/// A plane mirror shows what would be seen if the world behind it were the world before it, mirrored.
+#[test]
+fn a_mirror_shows_the_mirrored_world() {
+    let things = |scene: &mut Scene, side: f32| {
+        for (i, (position, scale)) in
+            [(vec3(0.5, 0.2, 3.5), 0.5), (vec3(-0.8, 0.5, 3.0), 0.4), (vec3(0.1, -0.9, 2.5), 0.3)]
+                .into_iter()
+                .enumerate()
+        {
+            let mut thing = meshes::placed(meshes::torus(12, 8), scale, position);
+            for v in thing.iter_mut().flat_map(|t| [&mut t.v0, &mut t.v1, &mut t.v2]) {
+                v.z *= side;
+            }
+            scenes::add(scene, thing, scenes::emissive(vec3(0.3 + 0.3 * i as f32, 0.8 - 0.3 * i as f32, 0.5)));
+        }
+    };
+    // The camera stands between the mirror (z = 0) and the things, which it turns its back on.
+    let camera = Camera { eye: vec3(0.1, 0.0, 1.5), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 50.0 };
+    let mut before = Scene { camera, background: vec3(0.1, 0.1, 0.2), ..scenes::empty() };
+    things(&mut before, 1.0);
+    let plane = meshes::triangle(vec3(-90.0, -50.0, 0.0), vec3(90.0, -50.0, 0.0), vec3(0.0, 99.0, 0.0));
+    scenes::add(&mut before, vec![plane], scenes::mirror(vec3(1.0, 0.5, 0.25)));
+    let mut behind = Scene { camera, background: vec3(0.1, 0.1, 0.2), ..scenes::empty() };
+    things(&mut behind, -1.0);
+    for (mirrored, mut direct) in
+        on_both(&before, &options(80, 60, 2)).iter().zip(on_both(&behind, &options(80, 60, 2)))
+    {
+        direct.radiance.iter_mut().for_each(|[_, g, b, _]| (*g, *b) = (*g * 0.5, *b * 0.25));
+        let n_differing = differing(mirrored, &direct, 1e-3).len();
+        assert!(n_differing <= 60, "{n_differing} pixels differ"); // on the things' outlines
+        assert!(differing(mirrored, &direct, -1.0).len() == 4800, "the comparison looks at every pixel");
+        let n_things = mirrored.radiance.iter().filter(|pixel| pixel[0] > 0.25).count();
+        assert!(n_things > 200, "{n_things} pixels show things");
+    }
+}
+
+/// A square of half width 0.5 in the plane y = 2, under a lamp at y = 4, darkens the square of half width 1 on y = 0.
+#[test]
+fn a_shadow_ends_where_it_must() {
+    let square = |half: f32, y: f32| {
+        let corner = |x: f32, z: f32| vec3(x * half, y, z * half);
+        let [a, b, c, d] = [corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
+        vec![meshes::triangle(a, b, c), meshes::triangle(a, c, d)]
+    };
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, square(4.0, 0.0), scenes::diffuse(Vec3::ONE));
+    scenes::add(&mut scene, square(0.5, 2.0), scenes::diffuse(Vec3::ONE));
+    scene.lights = vec![scenes::point_light(vec3(0.0, 4.0, 0.0), Vec3::splat(16.0))];
+    // 90 degrees from a height of 1.5: the picture's edge lies 1.5 from its middle.
+    scene.camera = Camera { eye: vec3(0.0, 1.5, 0.0), target: Vec3::ZERO, up: Vec3::NEG_Z, vertical_fov_degrees: 90.0 };
+    let n = 90;
+    for picture in on_both(&scene, &options(n, n, 1)) {
+        for (i, pixel) in picture.radiance.iter().enumerate() {
+            let at = |i: usize| ((i as f32 + 0.5) / n as f32 * 2.0 - 1.0) * 1.5;
+            let (x, z) = (at(i % n as usize), at(i / n as usize));
+            if (x.abs().max(z.abs()) - 1.0).abs() < 0.02 {
+                continue;
+            }
+            // Lambert and the square of distance: 16 / 16 at the foot, times the cosine cubed.
+            let cos = 4.0 / vec3(x, 4.0, z).length();
+            let expected = if x.abs().max(z.abs()) < 1.0 { 0.0 } else { cos * cos * cos };
+            assert!((pixel[0] - expected).abs() < 1e-4, "at {x}, {z}: {}, not {expected}", pixel[0]);
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! Rasterized primaries against traced ones: the same picture but for pixels on edges.
+
+use std::collections::HashSet;
+
+use glam::UVec2;
+use kdray::{
+    camera::frame_constants,
+    cpu::{bindings::Bindings, kdtree::Traverser, primary_hit::camera_ray},
+    frame::{Picture, Primary, RenderOptions},
+    kdtree::KdTree,
+    layout::Frame,
+    scene::Scene,
+};
+
+use super::studio::{differing, on_cpu, on_device, options, tree_of};
+use crate::support::scenes;
+
+/// Whether rays within 1/8 px of the pixel's centre meet more than one triangle. (Corners are snapped to a grid of
+/// 1/16 px or finer.)
+fn is_on_edge(scene: &Scene, tree: &KdTree, options: &RenderOptions, pixel_ix: usize) -> bool {
+    let frame = frame_constants(scene, tree, options);
+    let pixel = UVec2::new(pixel_ix as u32 % frame.width, pixel_ix as u32 / frame.width);
+    let mut traverser = Traverser::new(options.traversal);
+    let ids: HashSet<u32> = (0..25 * 25)
+        .map(|i| {
+            let [x, y] = [i % 25, i / 25].map(|i| (i - 12) as f32 / 96.0);
+            let shift = frame.right * (2.0 * x / frame.width as f32) - frame.up * (2.0 * y / frame.height as f32);
+            let frame = Frame { forward: frame.forward + shift, ..frame };
+            traverser.closest_hit(&Bindings::new(scene, tree, &frame), &camera_ray(&frame, pixel)).triangle_ix
+        })
+        .collect();
+    ids.len() > 1
+}
+
+/// How many pixels differ in any bit, and those of them that are on no edge.
+fn off_edges(scene: &Scene, options: &RenderOptions, a: &Picture, b: &Picture) -> (usize, Vec<usize>) {
+    let tree = tree_of(scene);
+    let differing = differing(a, b, 0.0);
+    let n = differing.len();
+    (n, differing.into_iter().filter(|&i| !is_on_edge(scene, &tree, options, i)).collect())
+}
+
+#[test]
+fn raster_and_trace_differ_only_on_edges() {
+    for (scene, max_depth) in [(scenes::mixed(), 1), (scenes::mixed_outdoors(), 4)] {
+        let raster = options(120, 90, max_depth);
+        let trace = RenderOptions { primary: Primary::Trace, ..raster.clone() };
+        for (name, render) in [("device", on_device as fn(&_, &_) -> _), ("cpu", on_cpu)] {
+            let (a, b) = (render(&scene, &raster), render(&scene, &trace));
+            let (n_differing, wrong) = off_edges(&scene, &raster, &a, &b);
+            assert_eq!(wrong, [], "{name}, {max_depth} levels");
+            assert!(n_differing <= a.radiance.len() / 50, "{name}: {n_differing} pixels differ");
+        }
+    }
+}
+
+#[test]
+fn a_pixel_off_the_edges_is_noticed() {
+    let (scene, options) = (scenes::mixed(), options(120, 90, 1));
+    let picture = on_cpu(&scene, &options);
+    let mut changed = picture.clone();
+    // Of ten pixels in a row some lie on no edge.
+    (500..510).for_each(|i| changed.radiance[i][0] += 0.1);
+    assert!(!off_edges(&scene, &options, &picture, &changed).1.is_empty());
+}

@@ -1,0 +1,80 @@
+//! Rendering in tests.
+
+use std::sync::Arc;
+
+use kdray::{
+    cpu,
+    frame::{Denoise, Picture, RenderOptions},
+    gpu::{Context, ContextOptions},
+    kdtree::{BuildOptions, KdTree},
+    render::Renderer,
+    scene::Scene,
+};
+
+/// Without a noise filter.
+pub fn options(width: u32, height: u32, max_depth: u32) -> RenderOptions {
+    RenderOptions { width, height, max_depth, denoise: Denoise::Off, ..RenderOptions::default() }
+}
+
+pub fn tree_of(scene: &Scene) -> KdTree {
+    KdTree::build(&scene.triangles, &BuildOptions::default())
+}
+
+/// A device whose validation messages `assert_silent` looks at.
+pub fn device() -> Arc<Context> {
+    Context::new(&ContextOptions { device: None, validate: true }).expect("a device with validation")
+}
+
+pub fn assert_silent(context: &Context) {
+    let messages = context.validation_messages();
+    assert!(messages.is_empty(), "{}", messages.join("\n"));
+}
+
+pub fn on_device(scene: &Scene, options: &RenderOptions) -> Picture {
+    let context = device();
+    let mut renderer = Renderer::new(context.clone(), scene, &tree_of(scene), options).expect("a renderer");
+    let picture = renderer.render().expect("a frame").0;
+    assert_silent(&context);
+    picture
+}
+
+pub fn on_cpu(scene: &Scene, options: &RenderOptions) -> Picture {
+    cpu::render(scene, &tree_of(scene), options).0
+}
+
+/// The device's picture and the CPU's: what holds for one has to hold for the other.
+pub fn on_both(scene: &Scene, options: &RenderOptions) -> [Picture; 2] {
+    [on_device(scene, options), on_cpu(scene, options)]
+}
+
+/// Pixels in which a channel's radiance differs by more than `tolerance`, by index.
+pub fn differing(a: &Picture, b: &Picture, tolerance: f32) -> Vec<usize> {
+    assert_eq!((a.width, a.height, a.radiance.len()), (b.width, b.height, b.radiance.len()));
+    // Not `>`: a NaN differs.
+    let differs = |a: &[f32; 4], b: &[f32; 4]| (0..4).any(|i| !((a[i] - b[i]).abs() <= tolerance));
+    (0..a.radiance.len()).filter(|&i| differs(&a.radiance[i], &b.radiance[i])).collect()
+}
+
+/// Whether radiance and display agree in every bit.
+pub fn identical(a: &Picture, b: &Picture) -> bool {
+    let bits = |picture: &Picture| -> Vec<_> { picture.radiance.iter().map(|p| p.map(f32::to_bits)).collect() };
+    bits(a) == bits(b) && a.display == b.display && (a.width, a.height) == (b.width, b.height)
+}
+
+#[test]
+fn one_changed_pixel_is_noticed() {
+    let scene = crate::support::scenes::mixed();
+    let picture = on_cpu(&scene, &options(16, 12, 3));
+    assert!(differing(&picture, &picture, 0.0).is_empty() && identical(&picture, &picture));
+    let mut changed = picture.clone();
+    changed.radiance[77][1] += 0.01;
+    assert_eq!(differing(&picture, &changed, 1e-3), [77]);
+    changed.radiance[77][1] = f32::NAN;
+    assert_eq!(differing(&picture, &changed, 1e-3), [77]);
+    let mut changed = picture.clone();
+    changed.radiance[5][0] = f32::from_bits(changed.radiance[5][0].to_bits() ^ 1);
+    assert!(!identical(&picture, &changed));
+    let mut changed = picture.clone();
+    changed.display[5][2] ^= 1;
+    assert!(!identical(&picture, &changed));
+}

@@ -1,0 +1,90 @@
+//! Synchronization validation: it sees each kind of hazard between kernels where a barrier is left out, and none where
+//! it stands. Without these, tests that hear no message would prove nothing.
+
+use kdray::{
+    gpu::{Access, Commands},
+    layout::Batch,
+};
+
+use super::stage::{FIRST, Stage, hits_of, options, some_rays};
+use crate::support::scenes;
+
+const BATCH: Batch = Batch { n_pixels: 64, ..FIRST };
+
+/// Valid contents, so that a kernel that runs too early reads nothing wild.
+fn fill(stage: &Stage) {
+    let rays = some_rays(stage, 64);
+    stage.set_n_rays(64);
+    stage.set_rays(&rays);
+    stage.set_hits(&hits_of(stage, &rays));
+    stage.resources.child_counts.upload(&[0; 64]).expect("child_counts");
+}
+
+/// Runs `first`, the barrier if there is one, and `second`; a message is expected without it and none with it.
+fn check(barrier: (Access, Access), first: impl Fn(&Stage, &Commands), second: impl Fn(&Stage, &Commands)) {
+    for has_barrier in [true, false] {
+        let stage = Stage::new(scenes::mixed(), options(8, 8), 64);
+        fill(&stage);
+        stage.run(&BATCH, |commands| {
+            first(&stage, commands);
+            if has_barrier {
+                commands.barrier(barrier.0, barrier.1);
+            }
+            second(&stage, commands);
+        });
+        stage.expects_messages.set(!has_barrier);
+    }
+}
+
+fn trace(stage: &Stage, commands: &Commands) {
+    stage.passes.trace.record(commands, &stage.resources, &BATCH);
+}
+
+fn shadow(stage: &Stage, commands: &Commands) {
+    stage.passes.shadow.record(commands, &stage.resources, &BATCH);
+}
+
+fn shade(stage: &Stage, commands: &Commands) {
+    stage.passes.shade.record(commands, &stage.resources, &BATCH);
+}
+
+fn resolve(stage: &Stage, commands: &Commands) {
+    stage.passes.resolve.record(commands, &stage.resources, &BATCH);
+}
+
+fn compact(stage: &Stage, commands: &Commands) {
+    stage.passes.compact.record(commands, &stage.resources, &BATCH);
+}
+
+fn tonemap(stage: &Stage, commands: &Commands) {
+    stage.passes.tonemap.record(commands, &stage.resources);
+}
+
+fn denoise(stage: &Stage, commands: &Commands) {
+    stage.passes.denoise.record(commands, &stage.resources);
+}
+
+#[test]
+fn reading_hits_before_they_are_written_is_reported() {
+    check((Access::ComputeWrite, Access::ComputeUpdate), trace, shadow);
+}
+
+#[test]
+fn reading_radiance_before_it_is_written_is_reported() {
+    check((Access::ComputeWrite, Access::ComputeUpdate), shade, resolve);
+}
+
+#[test]
+fn reading_children_before_they_are_written_is_reported() {
+    check((Access::ComputeWrite, Access::ComputeUpdate), shade, compact);
+}
+
+#[test]
+fn overwriting_hits_before_they_are_read_is_reported() {
+    check((Access::ComputeUpdate, Access::ComputeUpdate), shade, trace);
+}
+
+#[test]
+fn showing_pixels_before_they_are_filtered_is_reported() {
+    check((Access::ComputeWrite, Access::ComputeRead), denoise, tonemap);
+}

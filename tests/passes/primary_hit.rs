@@ -1,0 +1,78 @@
+//! Primary hit against its twin, from the same triangle IDs.
+
+use kdray::{
+    cpu,
+    frame::{Primary, RenderOptions},
+    layout::{Batch, Hit, Ray},
+};
+
+use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_HIT, UNTOUCHED_RAY, options};
+use crate::support::{compare, scenes};
+
+/// Rays and hits of a batch, and how many are hits.
+fn on_device(stage: &Stage, batch: &Batch) -> (Vec<Ray>, Vec<Hit>, u32) {
+    stage.set_n_rays(batch.n_pixels);
+    stage.set_rays(&[]);
+    stage.set_hits(&[]);
+    stage.run(batch, |commands| {
+        stage.passes.visibility.record(commands, &stage.resources);
+        stage.passes.primary_hit.record(commands, batch);
+    });
+    let rays = stage.resources.ray_queues[0].download().expect("rays");
+    (rays, stage.resources.hits.download().expect("hits"), stage.counters().n_hits)
+}
+
+/// The same on the CPU, with the triangles of the device's hits.
+fn on_cpu(stage: &Stage, batch: &Batch, found: &[Hit]) -> (Vec<Ray>, Vec<Hit>, u32) {
+    let n = batch.n_pixels as usize;
+    let (mut rays, mut hits) = (vec![UNTOUCHED_RAY; found.len()], vec![UNTOUCHED_HIT; found.len()]);
+    cpu::primary_hit::primary_rays(stage.resources.constants(), batch.first_pixel, &mut rays[..n]);
+    let mut ids = vec![0; (stage.options.width * stage.options.height) as usize];
+    for (ray, hit) in rays[..n].iter().zip(found) {
+        ids[ray.pixel_ix as usize] = hit.triangle_ix;
+    }
+    let n_hits = cpu::primary_hit::primary_hit(&stage.bindings(), &ids, &rays[..n], &mut hits[..n]);
+    (rays, hits, n_hits)
+}
+
+fn check(stage: &Stage, batch: Batch) {
+    let (rays, hits, n_hits) = on_device(stage, &batch);
+    let (expected_rays, expected_hits, expected_n_hits) = on_cpu(stage, &batch, &hits);
+    compare::rays(1e-6, 0, &expected_rays, &rays).unwrap();
+    compare::hits(0, &expected_hits, &hits).unwrap();
+    assert_eq!(n_hits, expected_n_hits, "{batch:?}");
+}
+
+#[test]
+fn agrees_with_its_twin() {
+    let stage = Stage::new(scenes::mixed_outdoors(), options(61, 37), 2100);
+    for n_pixels in RAY_COUNTS {
+        check(&stage, Batch { n_pixels, ..FIRST });
+        check(&stage, Batch { first_pixel: 200, n_pixels, ..FIRST });
+    }
+}
+
+#[test]
+fn leaves_hits_to_trace_where_it_is_told_so() {
+    let options = RenderOptions { primary: Primary::Trace, ..options(20, 10) };
+    let stage = Stage::new(scenes::mixed_outdoors(), options, 200);
+    let batch = Batch { n_pixels: 200, ..FIRST };
+    let (rays, hits, n_hits) = on_device(&stage, &batch);
+    let mut expected = [UNTOUCHED_RAY; 200];
+    cpu::primary_hit::primary_rays(stage.resources.constants(), 0, &mut expected);
+    compare::rays(1e-6, 0, &expected, &rays).unwrap();
+    compare::exact(&[UNTOUCHED_HIT; 200], &hits).unwrap();
+    assert_eq!(n_hits, 0);
+}
+
+/// All pixels once, whatever the tiles that the border cuts.
+#[test]
+fn every_pixel_has_one_ray() {
+    for (width, height) in [(1, 1), (8, 8), (9, 7), (17, 31), (64, 1), (1, 64)] {
+        let stage = Stage::new(scenes::mixed(), options(width, height), width * height);
+        let (rays, ..) = on_device(&stage, &Batch { n_pixels: width * height, ..FIRST });
+        let mut pixels: Vec<u32> = rays.iter().map(|ray| ray.pixel_ix).collect();
+        pixels.sort_unstable();
+        compare::exact(&(0..width * height).collect::<Vec<_>>(), &pixels).unwrap();
+    }
+}

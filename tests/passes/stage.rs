@@ -1,0 +1,146 @@
+//! A scene on a device with all passes, to run one of them at a time.
+
+use std::{cell::Cell, sync::Arc, thread};
+
+use kdray::{
+    camera::frame_constants,
+    cpu::bindings::Bindings,
+    frame::{Denoise, RenderOptions},
+    gpu::{Commands, Context, ContextOptions},
+    kdtree::{BuildOptions, Extras, KdTree},
+    layout::{Batch, Counters, Frame, Hit, NO_TRIANGLE, RAY_GROUP_SIZE, Ray},
+    passes::{Passes, Resources, bounce_row},
+    scene::Scene,
+};
+
+/// Numbers of rays around a workgroup's size.
+pub const RAY_COUNTS: [u32; 7] =
+    [0, 1, RAY_GROUP_SIZE - 1, RAY_GROUP_SIZE, RAY_GROUP_SIZE + 1, 5 * RAY_GROUP_SIZE + 7, 2000];
+
+/// Rows of `bounces` that a stage has room for.
+const N_ROWS: usize = 3;
+
+/// What stands in buffers before a kernel runs: where it still stands, nothing was written.
+pub const UNTOUCHED_RAY: Ray = Ray {
+    origin: glam::Vec3::splat(-7.0),
+    pixel_ix: 0xdead,
+    direction: glam::Vec3::splat(-7.0),
+    source_triangle: 0xdead,
+    throughput: glam::Vec3::splat(-7.0),
+    t_max: -7.0,
+};
+pub const UNTOUCHED_HIT: Hit = Hit { t: -7.0, triangle_ix: 0xdead, u: -7.0, v: -7.0 };
+pub const UNTOUCHED_WORD: u32 = 0xdead_beef;
+pub const UNTOUCHED_PIXEL: [f32; 4] = [-7.0; 4];
+
+pub struct Stage {
+    pub scene: Scene,
+    pub tree: KdTree,
+    pub extras: Extras,
+    pub options: RenderOptions,
+    pub resources: Resources,
+    pub passes: Passes,
+    pub context: Arc<Context>,
+    /// Set by a test that provokes the validation layer.
+    pub expects_messages: Cell<bool>,
+}
+
+/// Small, and with a noise filter.
+pub fn options(width: u32, height: u32) -> RenderOptions {
+    RenderOptions { width, height, denoise: Denoise::Paper { threshold: 0.5 }, ..RenderOptions::default() }
+}
+
+impl Stage {
+    /// Queues for `capacity` rays.
+    pub fn new(scene: Scene, options: RenderOptions, capacity: u32) -> Self {
+        let context = Context::new(&ContextOptions { device: None, validate: true }).expect("a device with validation");
+        let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
+        let constants = Frame { queue_capacity: capacity, ..frame_constants(&scene, &tree, &options) };
+        let mut resources = Resources::new(&context, &scene, &tree, &constants, N_ROWS).expect("resources");
+        resources.add_extras(&context, &tree, options.traversal).expect("extras");
+        let extras = Extras::new(&tree, options.traversal);
+        let passes = Passes::new(&context, &resources.bindings, &options).expect("passes");
+        Self { scene, tree, extras, options, resources, passes, context, expects_messages: Cell::new(false) }
+    }
+
+    /// The twin's view of the same scene.
+    pub fn bindings(&self) -> Bindings<'_> {
+        Bindings::new(&self.scene, &self.tree, self.resources.constants()).with_extras(&self.extras)
+    }
+
+    /// Binds the batch's descriptor set, records and runs.
+    pub fn run(&self, batch: &Batch, record: impl FnOnce(&Commands)) {
+        let body = |commands: &Commands| {
+            self.resources.bind(commands, batch);
+            record(commands);
+        };
+        self.context.run("test", body).expect("the commands run");
+    }
+
+    /// A bounce of `n_rays`; all counters 0.
+    pub fn set_n_rays(&self, n_rays: u32) {
+        let row = bounce_row(n_rays, self.scene.lights.len() as u32);
+        self.resources.bounces.upload(&[row; N_ROWS]).expect("bounces");
+        self.resources.counters.upload(&[Counters::default(); N_ROWS]).expect("counters");
+    }
+
+    /// The first `rays.len()` of the queue that even bounces read; untouched ones behind.
+    pub fn set_rays(&self, rays: &[Ray]) {
+        let mut queue = vec![UNTOUCHED_RAY; self.resources.ray_queues[0].len()];
+        queue[..rays.len()].copy_from_slice(rays);
+        self.resources.ray_queues[0].upload(&queue).expect("rays");
+    }
+
+    /// As `set_rays`.
+    pub fn set_hits(&self, hits: &[Hit]) {
+        let mut all = vec![UNTOUCHED_HIT; self.resources.hits.len()];
+        all[..hits.len()].copy_from_slice(hits);
+        self.resources.hits.upload(&all).expect("hits");
+    }
+
+    /// How many of `n` rays may differ from the twin's: none on software drivers, whose arithmetic is exactly the
+    /// CPU's. Elsewhere divisions are 2.5 units in the last place off (Vulkan's precision of OpFDiv), and few rays at
+    /// corners go another way.
+    pub fn n_outliers(&self, n: u32) -> usize {
+        if self.context.is_software() { 0 } else { n as usize / 500 }
+    }
+
+    /// What the kernels counted in the first row.
+    pub fn counters(&self) -> Counters {
+        self.resources.counters.download().expect("counters")[0]
+    }
+}
+
+/// A test passes only if the validation layer had nothing to say.
+impl Drop for Stage {
+    fn drop(&mut self) {
+        let messages = self.context.validation_messages();
+        let as_expected = messages.is_empty() != self.expects_messages.get();
+        assert!(as_expected || thread::panicking(), "{} messages: {}", messages.len(), messages.join("\n"));
+    }
+}
+
+/// The first batch's bounce of depth 0.
+pub const FIRST: Batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, depth: 0 };
+
+/// `n` rays of every nasty kind at the stage's scene, with pixels and throughputs of their own.
+pub fn some_rays(stage: &Stage, n: u32) -> Vec<Ray> {
+    use crate::support::{World, random::Random, rays::nasty_ray};
+    let world = World::new(stage.scene.triangles.clone());
+    (0..n)
+        .map(|i| {
+            let mut random = Random(u64::from(i));
+            let mut ray = nasty_ray(&mut random, &world, i as usize);
+            ray.pixel_ix = i % (stage.options.width * stage.options.height);
+            ray.throughput = random.in_box(glam::Vec3::ZERO, glam::Vec3::ONE);
+            ray
+        })
+        .collect()
+}
+
+/// The twin's hits of `rays`.
+pub fn hits_of(stage: &Stage, rays: &[Ray]) -> Vec<Hit> {
+    let mut hits = vec![Hit { triangle_ix: NO_TRIANGLE, ..UNTOUCHED_HIT }; rays.len()];
+    kdray::cpu::trace::trace(&stage.bindings(), stage.options.traversal, rays, &mut hits);
+    hits
+}

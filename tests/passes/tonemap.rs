@@ -1,0 +1,46 @@
+//! Tonemap against its twin: within one level, since `pow` is not exact.
+
+use kdray::{cpu, frame::RenderOptions};
+
+use super::stage::{FIRST, Stage, UNTOUCHED_WORD, options};
+use crate::support::{compare, random::Random, scenes};
+
+fn encoded(stage: &Stage, pixels: &[[f32; 4]]) -> Vec<[u8; 4]> {
+    let resources = &stage.resources;
+    resources.filtered().upload(pixels).expect("pixel_filtered");
+    resources.pixel_display.upload(&vec![UNTOUCHED_WORD; pixels.len()]).expect("pixel_display");
+    stage.run(&FIRST, |commands| stage.passes.tonemap.record(commands, resources));
+    resources.pixel_display.download().expect("pixel_display").into_iter().map(u32::to_le_bytes).collect()
+}
+
+fn empty_stage(options: RenderOptions) -> Stage {
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, Vec::new(), scenes::BLACK);
+    Stage::new(scene, options, 1)
+}
+
+#[test]
+fn agrees_with_its_twin() {
+    for (width, height) in [(1, 1), (7, 8), (8, 8), (9, 9), (1, 65), (100, 75)] {
+        let stage = empty_stage(RenderOptions { exposure: 0.7, ..options(width, height) });
+        let mut random = Random(6);
+        let mut channel = |_| random.unit() * random.unit() * 2.0;
+        let pixels: Vec<[f32; 4]> = (0..width * height).map(|_| [0; 4].map(&mut channel)).collect();
+        let mut expected = vec![[0; 4]; pixels.len()];
+        cpu::tonemap::tonemap(stage.resources.constants(), &pixels, &mut expected);
+        let found = encoded(&stage, &pixels);
+        compare::bytes(1, &expected, &found).unwrap();
+        let n_off = expected.iter().zip(&found).filter(|(a, b)| a != b).count();
+        assert!(n_off <= pixels.len() / 100, "{n_off} pixels are a level off");
+    }
+}
+
+/// Values of IEC 61966-2-1, worked out by hand.
+#[test]
+fn known_values_are_encoded_as_the_standard_says() {
+    let stage = empty_stage(options(3, 3));
+    let linear = [0.0, 0.001, 0.0031308, 0.01, 0.21404, 0.5, 1.0, 7.0, f32::INFINITY];
+    let levels = [0, 3, 10, 25, 127, 188, 255, 255, 255];
+    let pixels = linear.map(|x| [x, x, x, 1.0]);
+    compare::bytes(1, &levels.map(|x| [x, x, x, 255]), &encoded(&stage, &pixels)).unwrap();
+}

@@ -1,0 +1,63 @@
+//! Trace against its twin, with ordinary rays and with those on which traversals fail.
+
+use kdray::{
+    cpu,
+    frame::{RenderOptions, Traversal},
+    scene::Scene,
+};
+
+use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_HIT, options, some_rays};
+use crate::support::{compare, meshes, scenes};
+
+fn check(stage: &Stage, n_rays: u32) {
+    let n = n_rays as usize;
+    let rays = some_rays(stage, n_rays);
+    let mut expected = vec![UNTOUCHED_HIT; stage.resources.hits.len()];
+    let n_hits = cpu::trace::trace(&stage.bindings(), stage.options.traversal, &rays, &mut expected[..n]);
+    stage.set_n_rays(n_rays);
+    stage.set_rays(&rays);
+    stage.set_hits(&[]);
+    stage.run(&FIRST, |commands| stage.passes.trace.record(commands, &stage.resources, &FIRST));
+    let found = stage.resources.hits.download().expect("hits");
+    let n_outliers = stage.n_outliers(n_rays);
+    if stage.context.is_software() {
+        compare::exact(&expected, &found).unwrap();
+    } else {
+        compare::hits(n_outliers, &expected, &found).unwrap();
+    }
+    assert!(stage.counters().n_hits.abs_diff(n_hits) as usize <= n_outliers, "{n_rays} rays");
+}
+
+fn check_all(scene: &Scene, counts: &[u32]) {
+    for &traversal in Traversal::ALL {
+        let capacity = counts.iter().max().expect("some") + 9;
+        let stage = Stage::new(scene.clone(), RenderOptions { traversal, ..options(8, 8) }, capacity);
+        counts.iter().for_each(|&n| check(&stage, n));
+    }
+}
+
+#[test]
+fn agrees_with_its_twin() {
+    check_all(&scenes::mixed(), &RAY_COUNTS);
+}
+
+#[test]
+fn agrees_on_many_rays_at_many_triangles() {
+    for triangles in [meshes::soup(20_000, 11), meshes::torus(100, 60), meshes::threefold(meshes::cube(9, 0.0))] {
+        let mut scene = scenes::empty();
+        scenes::add(&mut scene, triangles, scenes::BLACK);
+        check_all(&scene, &[20_000]);
+    }
+}
+
+#[test]
+fn nothing_is_hit_in_an_empty_scene() {
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, Vec::new(), scenes::BLACK);
+    let stage = Stage::new(scene, options(8, 8), 9);
+    let rays = vec![crate::support::rays::ray(glam::Vec3::ZERO, glam::Vec3::X); 9];
+    stage.set_n_rays(9);
+    stage.set_rays(&rays);
+    stage.run(&FIRST, |commands| stage.passes.trace.record(commands, &stage.resources, &FIRST));
+    compare::exact(&super::stage::hits_of(&stage, &rays), &stage.resources.hits.download().expect("hits")).unwrap();
+}

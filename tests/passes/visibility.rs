@@ -1,0 +1,113 @@
+//! Visibility against the kd-tree: a rasterizer snaps corners to its sub-pixel grid, so where the two differ, the
+//! rasterizer's triangle is what a ray close by meets.
+
+use glam::{DVec2, dvec2, swizzles::Vec4Swizzles, uvec2};
+use kdray::{
+    cpu::{self, kdtree::Traverser, primary_hit::camera_ray},
+    layout::{Batch, Frame, NO_TRIANGLE},
+};
+
+use super::stage::{FIRST, Stage, options};
+use crate::support::{compare, scenes};
+
+/// Snapping to 1/16 px (Vulkan's least `subPixelPrecisionBits`) moves an edge by at most 1/32 px on each axis.
+const SNAP_PX: f32 = 1.0 / 16.0;
+
+/// Which triangle each pixel shows, by way of primary hits; rows from the top.
+fn rasterized(stage: &Stage) -> Vec<u32> {
+    let n_pixels = stage.options.width * stage.options.height;
+    let batch = Batch { n_pixels, ..FIRST };
+    stage.set_n_rays(n_pixels);
+    stage.run(&batch, |commands| {
+        stage.passes.visibility.record(commands, &stage.resources);
+        stage.passes.primary_hit.record(commands, &batch);
+    });
+    let rays = stage.resources.ray_queues[0].download().expect("rays");
+    let hits = stage.resources.hits.download().expect("hits");
+    let mut ids = vec![0; n_pixels as usize];
+    for (ray, hit) in rays.iter().zip(hits) {
+        ids[ray.pixel_ix as usize] = hit.triangle_ix;
+    }
+    ids
+}
+
+/// Whether some ray within `SNAP_PX` of the pixel's centre meets triangle `id` first.
+fn is_met_nearby(stage: &Stage, pixel_ix: u32, id: u32) -> bool {
+    let mut traverser = Traverser::new(stage.options.traversal);
+    let frame = stage.resources.constants();
+    let pixel = uvec2(pixel_ix % frame.width, pixel_ix / frame.width);
+    let shifted = |dx: f32, dy: f32| Frame {
+        forward: frame.forward + frame.right * (2.0 * dx / frame.width as f32)
+            - frame.up * (2.0 * dy / frame.height as f32),
+        ..*frame
+    };
+    (0..17 * 17).any(|i| {
+        let offset = |i: i32| (i - 8) as f32 / 8.0 * SNAP_PX;
+        let ray = camera_ray(&shifted(offset(i % 17), offset(i / 17)), pixel);
+        traverser.closest_hit(&stage.bindings(), &ray).triangle_ix == id
+    })
+}
+
+/// Whether triangle `id`, seen edge-on, comes within `SNAP_PX` of the pixel's centre with all of its corners in front of
+/// the eye: so thin a triangle may hide from every ray close by.
+fn is_touched(stage: &Stage, pixel_ix: u32, id: u32) -> bool {
+    let (width, height) = (stage.options.width, stage.options.height);
+    let centre = uvec2(pixel_ix % width, pixel_ix / width).as_dvec2() + 0.5;
+    let Some(triangle) = stage.scene.triangles.get(id as usize) else { return false };
+    let clip = [triangle.v0, triangle.v1, triangle.v2]
+        .map(|v| stage.resources.constants().clip_from_world.as_dmat4() * v.as_dvec3().extend(1.0));
+    if clip.iter().any(|corner| corner.w <= 0.0) {
+        return false;
+    }
+    let corners = clip.map(|c| (c.xy() / c.w + 1.0) / 2.0 * dvec2(width.into(), height.into()) - centre);
+    let distance = |a: DVec2, b: DVec2| {
+        let share = (-a.dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+        (a + share * (b - a)).length()
+    };
+    (0..3).any(|i| distance(corners[i], corners[(i + 1) % 3]) <= f64::from(SNAP_PX))
+}
+
+/// Pixels whose IDs differ, and those among them whose ID no ray close by explains.
+fn differences(stage: &Stage, expected: &[u32], found: &[u32]) -> (usize, Vec<u32>) {
+    let differing: Vec<u32> =
+        (0..expected.len() as u32).filter(|&i| expected[i as usize] != found[i as usize]).collect();
+    let wrong = differing
+        .iter()
+        .copied()
+        .filter(|&i| !is_met_nearby(stage, i, found[i as usize]) && !is_touched(stage, i, found[i as usize]))
+        .collect();
+    (differing.len(), wrong)
+}
+
+#[test]
+fn shows_the_triangle_that_the_camera_ray_meets() {
+    for (scene, width, height) in
+        [(scenes::mixed(), 160, 120), (scenes::mixed_outdoors(), 33, 65), (scenes::mixed(), 1, 1)]
+    {
+        let stage = Stage::new(scene, options(width, height), width * height);
+        let mut expected = vec![0; (width * height) as usize];
+        cpu::visibility::visibility(&stage.bindings(), stage.options.traversal, &mut expected);
+        let found = rasterized(&stage);
+        let (n_differing, wrong) = differences(&stage, &expected, &found);
+        assert!(n_differing <= expected.len() / 100, "{n_differing} pixels of {width} x {height} differ");
+        assert_eq!(wrong, [], "pixels of {width} x {height}");
+    }
+}
+
+#[test]
+fn nothing_is_shown_of_an_empty_scene() {
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, Vec::new(), scenes::BLACK);
+    let stage = Stage::new(scene, options(9, 7), 63);
+    compare::exact(&[NO_TRIANGLE; 63], &rasterized(&stage)).unwrap();
+}
+
+#[test]
+fn another_triangle_is_noticed() {
+    let stage = Stage::new(scenes::mixed(), options(40, 30), 1200);
+    let mut found = rasterized(&stage);
+    found[600] = if found[600] == 3 { 4 } else { 3 };
+    let mut expected = vec![0; 1200];
+    cpu::visibility::visibility(&stage.bindings(), stage.options.traversal, &mut expected);
+    assert_eq!(differences(&stage, &expected, &found).1, [600]);
+}

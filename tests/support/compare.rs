@@ -1,0 +1,81 @@
+//! Comparers: each says where two results first differ, and how often.
+
+use std::fmt::Debug;
+
+use glam::Vec3;
+use kdray::layout::{Hit, Ray};
+
+/// Ok where all pairs agree; at most `n_outliers` may not.
+fn all_agree<T: Debug>(
+    expected: &[T],
+    found: &[T],
+    n_outliers: usize,
+    agree: impl Fn(&T, &T) -> bool,
+) -> Result<(), String> {
+    if expected.len() != found.len() {
+        return Err(format!("{} elements, not {}", found.len(), expected.len()));
+    }
+    let differing: Vec<_> = (0..expected.len()).filter(|&i| !agree(&expected[i], &found[i])).collect();
+    match differing.first() {
+        Some(&i) if differing.len() > n_outliers => Err(format!(
+            "{} of {} differ, first [{i}]: {:?}, not {:?}",
+            differing.len(),
+            expected.len(),
+            found[i],
+            expected[i]
+        )),
+        _ => Ok(()),
+    }
+}
+
+pub fn exact<T: PartialEq + Debug>(expected: &[T], found: &[T]) -> Result<(), String> {
+    all_agree(expected, found, 0, |a, b| a == b)
+}
+
+/// As `exact`, but for `n_outliers` elements.
+pub fn exact_but_for<T: PartialEq + Debug>(n_outliers: usize, expected: &[T], found: &[T]) -> Result<(), String> {
+    all_agree(expected, found, n_outliers, |a, b| a == b)
+}
+
+/// Equal bits, or finite and within `relative` of the larger magnitude and at least of 1.
+pub fn near(a: f32, b: f32, relative: f32) -> bool {
+    let magnitude = a.abs().max(b.abs()).max(1.0);
+    a.to_bits() == b.to_bits() || (magnitude.is_finite() && (a - b).abs() <= relative * magnitude)
+}
+
+fn near_vec(a: Vec3, b: Vec3, relative: f32) -> bool {
+    near(a.x, b.x, relative) && near(a.y, b.y, relative) && near(a.z, b.z, relative)
+}
+
+/// All four components near.
+pub fn pixels(relative: f32, n_outliers: usize, expected: &[[f32; 4]], found: &[[f32; 4]]) -> Result<(), String> {
+    all_agree(expected, found, n_outliers, |a, b| (0..4).all(|i| near(a[i], b[i], relative)))
+}
+
+/// The same triangle at the same place; or, where edges meet or surfaces lie on one another, another one at the same t.
+/// Divisions may be 2.5 units in the last place off (Vulkan's precision of OpFDiv), so t and the weights may be too,
+/// where a needle is seen edge-on far more: hence the outliers.
+pub fn hits(n_outliers: usize, expected: &[Hit], found: &[Hit]) -> Result<(), String> {
+    all_agree(expected, found, n_outliers, |a, b| {
+        let same = a.triangle_ix == b.triangle_ix && near(a.u, b.u, 1e-3) && near(a.v, b.v, 1e-3);
+        let both = (a.triangle_ix == u32::MAX) == (b.triangle_ix == u32::MAX);
+        near(a.t, b.t, 1e-5) && (same || (both && a.triangle_ix != b.triangle_ix))
+    })
+}
+
+/// Integers equal, the rest near.
+pub fn rays(relative: f32, n_outliers: usize, expected: &[Ray], found: &[Ray]) -> Result<(), String> {
+    all_agree(expected, found, n_outliers, |a, b| {
+        a.pixel_ix == b.pixel_ix
+            && a.source_triangle == b.source_triangle
+            && near_vec(a.origin, b.origin, relative)
+            && near_vec(a.direction, b.direction, relative)
+            && near_vec(a.throughput, b.throughput, relative)
+            && near(a.t_max, b.t_max, relative)
+    })
+}
+
+/// Every channel within `levels`.
+pub fn bytes(levels: u8, expected: &[[u8; 4]], found: &[[u8; 4]]) -> Result<(), String> {
+    all_agree(expected, found, 0, |a, b| (0..4).all(|i| a[i].abs_diff(b[i]) <= levels))
+}

@@ -1,0 +1,141 @@
+//! Small scenes in code.
+
+use glam::{Vec3, vec3};
+use kdray::{
+    layout::{
+        LIGHT_DIRECTIONAL, LIGHT_POINT, Light, MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR,
+        Material, Triangle,
+    },
+    scene::{Camera, RenderDefaults, Scene, normal::encode_octahedral},
+};
+
+use super::meshes;
+
+/// A scene without triangles and lights, seen from z = 4.
+pub fn empty() -> Scene {
+    Scene {
+        name: "test".to_owned(),
+        triangles: Vec::new(),
+        triangle_materials: Vec::new(),
+        materials: Vec::new(),
+        material_names: Vec::new(),
+        lights: Vec::new(),
+        camera: Camera { eye: vec3(0.0, 0.0, 4.0), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 45.0 },
+        ambient: Vec3::ZERO,
+        background: Vec3::ZERO,
+        defaults: RenderDefaults::default(),
+    }
+}
+
+/// Adds a mesh of one material.
+pub fn add(scene: &mut Scene, triangles: Vec<Triangle>, material: Material) {
+    scene.triangle_materials.extend(triangles.iter().map(|_| scene.materials.len() as u32));
+    scene.triangles.extend(triangles);
+    scene.material_names.push(format!("material {}", scene.materials.len()));
+    scene.materials.push(material);
+}
+
+/// Without light of any kind.
+pub const BLACK: Material = Material {
+    ka: Vec3::ZERO,
+    ns: 1.0,
+    kd: Vec3::ZERO,
+    d: 1.0,
+    ks: Vec3::ZERO,
+    ni: 1.0,
+    ke: Vec3::ZERO,
+    flags: 0,
+    tf: Vec3::ONE,
+    illum: 0,
+};
+
+pub fn diffuse(kd: Vec3) -> Material {
+    Material { ka: kd, kd, ..BLACK }
+}
+
+pub fn glossy(kd: Vec3, ks: Vec3, ns: f32) -> Material {
+    Material { ks, ns, flags: MATERIAL_SPECULAR, ..diffuse(kd) }
+}
+
+pub fn emissive(ke: Vec3) -> Material {
+    Material { ke, ..BLACK }
+}
+
+pub fn mirror(ks: Vec3) -> Material {
+    Material { ks, flags: MATERIAL_REFLECT, ..BLACK }
+}
+
+/// Reflection and refraction by Fresnel's term.
+pub fn glass(ni: f32) -> Material {
+    let flags = MATERIAL_SPECULAR | MATERIAL_REFLECT | MATERIAL_REFRACT | MATERIAL_FRESNEL;
+    Material { ks: Vec3::ONE, ns: 50.0, ni, flags, ..BLACK }
+}
+
+/// Lets a part of the light straight through.
+pub fn veil(kd: Vec3, d: f32) -> Material {
+    Material { d, ..diffuse(kd) }
+}
+
+pub fn point_light(position: Vec3, intensity: Vec3) -> Light {
+    Light { position, kind: LIGHT_POINT, intensity, reserved: 0 }
+}
+
+pub fn directional_light(towards: Vec3, intensity: Vec3) -> Light {
+    Light { position: towards.normalize(), kind: LIGHT_DIRECTIONAL, intensity, reserved: 0 }
+}
+
+/// A closed sphere with interpolated normals.
+pub fn smooth_sphere(n: usize, radius: f32, centre: Vec3) -> Vec<Triangle> {
+    let mut triangles = meshes::cube(n, 1.0);
+    for t in &mut triangles {
+        [t.n0, t.n1, t.n2] = [t.v0, t.v1, t.v2].map(encode_octahedral);
+    }
+    meshes::placed(triangles, radius, centre)
+}
+
+/// A box of side 2 * `half` whose faces look inwards.
+pub fn room(half: f32) -> Vec<Triangle> {
+    let mut triangles = meshes::placed(meshes::cube(2, 0.0), half, Vec3::ZERO);
+    triangles.iter_mut().for_each(|t| (t.v1, t.v2) = (t.v2, t.v1));
+    triangles
+}
+
+/// Every material in a room, under a lamp and a far light.
+pub fn mixed() -> Scene {
+    let mut scene = empty();
+    add(&mut scene, room(5.0), diffuse(vec3(0.7, 0.6, 0.5)));
+    add(
+        &mut scene,
+        meshes::placed(meshes::torus(24, 12), 1.0, vec3(0.1, -1.0, 0.0)),
+        glossy(vec3(0.2, 0.5, 0.3), Vec3::splat(0.5), 20.0),
+    );
+    add(&mut scene, smooth_sphere(6, 0.7, vec3(-1.2, 0.6, 0.3)), mirror(vec3(0.9, 0.8, 0.7)));
+    add(&mut scene, smooth_sphere(6, 0.7, vec3(1.1, 0.5, 0.8)), glass(1.5));
+    add(&mut scene, meshes::placed(meshes::cube(1, 0.0), 0.4, vec3(0.0, 1.2, -0.5)), glass(1.3));
+    add(&mut scene, meshes::placed(meshes::cube(1, 0.0), 0.5, vec3(0.2, -0.1, 1.7)), veil(vec3(0.9, 0.1, 0.1), 0.4));
+    add(&mut scene, meshes::soup(100, 5), emissive(vec3(0.3, 0.1, 0.6)));
+    scene.lights = vec![
+        point_light(vec3(2.0, 3.5, 3.0), vec3(9.0, 8.0, 7.0)),
+        point_light(vec3(-3.0, 2.5, 2.0), vec3(3.0, 4.0, 5.0)),
+        directional_light(vec3(0.3, 1.0, 0.5), Vec3::splat(0.4)),
+    ];
+    scene.ambient = Vec3::splat(0.2);
+    scene.background = vec3(0.1, 0.2, 0.4);
+    scene
+}
+
+/// The room of `mixed` with the front taken off, so that some rays leave.
+pub fn mixed_outdoors() -> Scene {
+    let scene = mixed();
+    let keep: Vec<bool> = scene
+        .triangles
+        .iter()
+        .map(|t| t.v0.z.min(t.v1.z).min(t.v2.z) < 4.9 && t.v0.x.min(t.v1.x).min(t.v2.x) < 4.9)
+        .collect();
+    let mut kept = keep.iter();
+    let mut outdoors = scene.clone();
+    outdoors.triangles.retain(|_| *kept.next().expect("one a triangle"));
+    let mut kept = keep.iter();
+    outdoors.triangle_materials.retain(|_| *kept.next().expect("one a triangle"));
+    outdoors
+}
