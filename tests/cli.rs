@@ -107,7 +107,7 @@ fn help_and_version() {
         assert!(stdout(&output).contains("kdray") && stderr(&output).is_empty(), "{arguments:?}");
     }
     let help = stdout(&succeed(directory.path(), &["render", "--help"]));
-    for word in ["--size", "--max-depth", "short-stack", "raster|trace", "paper", "--validate", "SCENE"] {
+    for word in ["--size", "--max-depth", "mask, mask-boxes, restart", "raster|trace", "paper", "--validate", "SCENE"] {
         assert!(help.contains(word), "{word}");
     }
 }

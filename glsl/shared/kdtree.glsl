@@ -24,14 +24,12 @@ struct Cell {
     float t_exit;
 };
 
-// What the traversal needs of a ray. slack: by how much in t planes are widened on each axis, both ways. It enters the widened plane at x at t = x * inv_direction + bias and
+// What the traversal needs of a ray. On each axis it enters the widened plane at x at t = x * inv_direction + bias and
 // leaves it width * |inv_direction| later (see traversal_ray). overlap: a pending cell begins at most this far before a
 // deeper one.
 struct TraversalRay {
     Shear shear;
-    vec3 origin;
     vec3 inv_direction;
-    vec3 slack;
     vec3 bias;
     float width;
     float t_min;
@@ -48,7 +46,6 @@ struct TraversalRay {
 TraversalRay traversal_ray(Ray ray, float t_min) {
     TraversalRay r;
     r.shear = shear_of(ray.origin, ray.direction);
-    r.origin = ray.origin;
     r.source_triangle = ray.source_triangle;
     r.t_min = t_min;
     // A direction in the plane is taken as all but in it: finite everywhere, and one rule for all ties.
@@ -57,17 +54,17 @@ TraversalRay traversal_ray(Ray ray, float t_min) {
     r.inv_direction = 1.0 / direction;
     vec3 reach = max(abs(ray.origin), max(abs(frame.cell_min - ray.origin), abs(frame.cell_max - ray.origin)));
     float slack_world = max(reach.x, max(reach.y, reach.z)) * exp2(-20.0);
-    r.slack = slack_world * abs(r.inv_direction);
-    r.bias = -ray.origin * r.inv_direction - r.slack;
+    vec3 slack = slack_world * abs(r.inv_direction);
+    r.bias = -ray.origin * r.inv_direction - slack;
     r.width = 2.0 * slack_world;
     // Along the ray, planes of one axis come in order, the deepest pending one first; one of another axis may come
     // earlier by as much as both are widened. A chain over the three axes adds up to no more than this.
-    r.overlap = 2.0 * (r.slack.x + r.slack.y + r.slack.z);
+    r.overlap = 2.0 * (slack.x + slack.y + slack.z);
 
     vec3 t0 = (frame.cell_min - ray.origin) * r.inv_direction;
     vec3 t1 = (frame.cell_max - ray.origin) * r.inv_direction;
-    vec3 near = min(t0, t1) - r.slack;
-    vec3 far = max(t0, t1) + r.slack;
+    vec3 near = min(t0, t1) - slack;
+    vec3 far = max(t0, t1) + slack;
     r.t_enter = max(max(near.x, near.y), max(near.z, t_min));
     r.t_exit = min(min(far.x, far.y), min(far.z, ray.t_max));
     return r;
@@ -79,12 +76,6 @@ uint axis_of(KdNode node) {
 
 float along(vec3 v, uint axis) {
     return axis == 0u ? v.x : (axis == 1u ? v.y : v.z);
-}
-
-// Where the ray meets the split plane.
-float at_plane(TraversalRay ray, KdNode node) {
-    uint axis = axis_of(node);
-    return (uintBitsToFloat(node.split_or_first) - along(ray.origin, axis)) * along(ray.inv_direction, axis);
 }
 
 // Where the ray enters the second child's side and leaves the first one's, both widened by the slack: [x, y], x <= y.
@@ -119,8 +110,8 @@ void clear_pending() {
     siblings_done = uvec2(0u);
 }
 
-// Traversals with boxes need nothing: they find out on the way back.
 void push_pending(uint second_ix, Cell cell, vec2 t_cross) {
+    // These find out on the way back.
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;
     if (TRAVERSAL == TRAVERSAL_STACK) stack_push(second_ix, cell);

@@ -7,32 +7,26 @@
 // pending_mask.glsl writes them: at a set bit the way went to the first child; at one that is not set to the second,
 // where the ray enters it at all. Each restart clears the lowest set bit and only sets lower ones: it ends.
 
-// From the root to the deepest pending node, which is pending no more, and with it where the next one is entered.
+// From the root to the deepest pending node, which is pending no more.
 void retrace(TraversalRay ray, inout Cell cell) {
     uint depth = deepest_pending();
     pending_mask &= ~bit_of(depth);
-    cell = Cell(0u, 0u, ray.t_enter, ray.t_exit);
-    while (cell.depth < depth) {
+    cell.node_ix = 0u;
+    cell.t_exit = ray.t_exit;
+    for (cell.depth = 1u; cell.depth <= depth; ++cell.depth) {
         KdNode node = kd_nodes[cell.node_ix];
         vec2 t_cross = crossing(ray, node);
-        cell.node_ix = first_child(ray, node);
-        cell.depth += 1u;
-        if (is_pending(cell.depth)) {
-            cell.t_exit = min(cell.t_exit, t_cross.y);
-            t_deepest = t_cross.x;
-        } else if (t_cross.x <= cell.t_exit) {
-            cell.node_ix ^= 1u;
-            cell.t_enter = max(cell.t_enter, t_cross.x);
-        }
+        bool in_second = t_cross.x <= cell.t_exit;
+        cell.node_ix = first_child(ray, node) ^ (in_second && !is_pending(cell.depth) ? 1u : 0u);
+        if (is_pending(cell.depth)) cell.t_exit = min(cell.t_exit, t_cross.y);
     }
+    cell.depth = depth;
 }
 
 // t_exit is not cut off at t_best: the trail depends on it.
 bool restart_pop(TraversalRay ray, float t_best, inout Cell cell) {
-    while (pending_mask != uvec2(0u)) {
-        if (t_best < t_deepest - ray.overlap) return false;
-        retrace(ray, cell);
-        if (cell.t_enter <= t_best) return true;
-    }
-    return false;
+    cell.t_enter = cell.t_exit - ray.overlap;
+    if (pending_mask == uvec2(0u) || t_best < cell.t_enter) return false;
+    retrace(ray, cell);
+    return true;
 }

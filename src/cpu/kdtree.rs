@@ -23,14 +23,11 @@ pub struct Cell {
 #[derive(Clone, Copy, Debug)]
 pub struct TraversalRay {
     shear: Shear,
-    pub(super) origin: [f32; 4],
     pub(super) inv_direction: [f32; 4],
-    /// By how much in t a plane is widened on each axis.
-    pub(super) slack: [f32; 4],
     /// Where the ray enters the widened plane at 0 on each axis, in t.
-    bias: [f32; 4],
+    pub(super) bias: [f32; 4],
     /// Of a widened plane, in world units.
-    width: f32,
+    pub(super) width: f32,
     t_min: f32,
     pub t_enter: f32,
     pub t_exit: f32,
@@ -71,9 +68,7 @@ impl TraversalRay {
         let far = [0, 1, 2].map(|i| max(t0[i], t1[i]) + slack[i]);
         Self {
             shear: Shear::of(origin, ray.direction.to_array()),
-            origin: by_axis(origin),
             inv_direction: by_axis(inv_direction),
-            slack: by_axis(slack),
             bias: by_axis([0, 1, 2].map(|i| -origin[i] * inv_direction[i] - slack[i])),
             width: 2.0 * slack_world,
             t_min,
@@ -82,13 +77,6 @@ impl TraversalRay {
             overlap: 2.0 * (slack[0] + slack[1] + slack[2]),
             source_triangle: ray.source_triangle,
         }
-    }
-
-    /// Where the ray meets the split plane.
-    #[inline(always)]
-    pub fn at_plane(&self, node: KdNode) -> f32 {
-        let axis = axis_of(node) as usize;
-        (f32::from_bits(node.split_or_first) - self.origin[axis]) * self.inv_direction[axis]
     }
 
     /// Where the ray enters the second child's side and leaves the first one's, both widened by the slack.

@@ -12,7 +12,7 @@ pub struct PendingMask {
     pub(super) mask: u64,
     /// The deepest pending node and where the ray enters it.
     deepest_ix: u32,
-    pub(super) t_deepest: f32,
+    t_deepest: f32,
 }
 
 #[inline(always)]

@@ -2,7 +2,7 @@
 
 use super::{
     bindings::Bindings,
-    kdtree::{Cell, Pending, TraversalRay, max, min},
+    kdtree::{Cell, Pending, TraversalRay, min},
     pending_mask::{PendingMask, bit_of},
     table::Reads,
 };
@@ -13,24 +13,20 @@ pub struct PendingRestart {
 }
 
 impl PendingRestart {
-    /// From the root to the deepest pending node, which is pending no more, and with it where the next one is entered.
+    /// From the root to the deepest pending node, which is pending no more.
     #[inline(always)]
     fn retrace(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, cell: &mut Cell) {
-        let trail = &mut self.trail;
-        let depth = trail.deepest();
-        trail.mask &= !bit_of(depth);
-        *cell = Cell { node_ix: 0, depth: 0, t_enter: ray.t_enter, t_exit: ray.t_exit };
-        while cell.depth < depth {
+        let depth = self.trail.deepest();
+        self.trail.mask &= !bit_of(depth);
+        *cell = Cell { node_ix: 0, depth, t_exit: ray.t_exit, ..*cell };
+        for depth in 1..=depth {
             let node = bindings.kd_nodes[cell.node_ix as usize];
             let t_cross = ray.crossing(node);
-            cell.node_ix = ray.first_child(node);
-            cell.depth += 1;
-            if trail.mask & bit_of(cell.depth) != 0 {
+            let is_pending = self.trail.mask & bit_of(depth) != 0;
+            let in_second = t_cross[0] <= cell.t_exit;
+            cell.node_ix = ray.first_child(node) ^ u32::from(in_second && !is_pending);
+            if is_pending {
                 cell.t_exit = min(cell.t_exit, t_cross[1]);
-                trail.t_deepest = t_cross[0];
-            } else if t_cross[0] <= cell.t_exit {
-                cell.node_ix ^= 1;
-                cell.t_enter = max(cell.t_enter, t_cross[0]);
             }
         }
     }
@@ -54,15 +50,11 @@ impl Pending for PendingRestart {
     /// `t_exit` is not cut off at `t_best`: the trail depends on it.
     #[inline(always)]
     fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
-        while self.trail.mask != 0 {
-            if t_best < self.trail.t_deepest - ray.overlap {
-                return false;
-            }
-            self.retrace(bindings, ray, cell);
-            if cell.t_enter <= t_best {
-                return true;
-            }
+        cell.t_enter = cell.t_exit - ray.overlap;
+        if self.trail.mask == 0 || t_best < cell.t_enter {
+            return false;
         }
-        false
+        self.retrace(bindings, ray, cell);
+        true
     }
 }

@@ -40,7 +40,7 @@ fn device_and_cpu_agree_on_the_scenes_that_ship() {
 #[test]
 fn device_and_cpu_agree_whatever_the_options() {
     let scene = scenes::mixed_outdoors();
-    for traversal in [Traversal::Mask, Traversal::Stack] {
+    for &traversal in Traversal::ALL {
         for primary in [Primary::Raster, Primary::Trace] {
             let share = if primary == Primary::Raster { 0.02 } else { 0.005 };
             check("mixed", &scene, &RenderOptions { traversal, primary, ..options(80, 60, 5) }, share);

@@ -26,7 +26,7 @@ fn check(stage: &Stage, n_rays: u32) {
 
 #[test]
 fn agrees_with_its_twin() {
-    for traversal in [Traversal::Mask, Traversal::Stack] {
+    for &traversal in Traversal::ALL {
         let stage = Stage::new(scenes::mixed_outdoors(), RenderOptions { traversal, ..options(8, 8) }, 2010);
         RAY_COUNTS.into_iter().for_each(|n| check(&stage, n));
     }

@@ -7,7 +7,7 @@ use kdray::{
     cpu::bindings::Bindings,
     frame::{Denoise, RenderOptions},
     gpu::{Commands, Context, ContextOptions},
-    kdtree::{BuildOptions, KdTree},
+    kdtree::{BuildOptions, Extras, KdTree},
     layout::{Batch, Counters, Frame, Hit, NO_TRIANGLE, RAY_GROUP_SIZE, Ray},
     passes::{Passes, Resources, bounce_row},
     scene::Scene,
@@ -36,6 +36,7 @@ pub const UNTOUCHED_PIXEL: [f32; 4] = [-7.0; 4];
 pub struct Stage {
     pub scene: Scene,
     pub tree: KdTree,
+    pub extras: Extras,
     pub options: RenderOptions,
     pub resources: Resources,
     pub passes: Passes,
@@ -55,14 +56,16 @@ impl Stage {
         let context = Context::new(&ContextOptions { device: None, validate: true }).expect("a device with validation");
         let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
         let constants = Frame { queue_capacity: capacity, ..frame_constants(&scene, &tree, &options) };
-        let resources = Resources::new(&context, &scene, &tree, &constants, N_ROWS).expect("resources");
+        let mut resources = Resources::new(&context, &scene, &tree, &constants, N_ROWS).expect("resources");
+        resources.add_extras(&context, &tree, options.traversal).expect("extras");
+        let extras = Extras::new(&tree, options.traversal);
         let passes = Passes::new(&context, &resources.bindings, &options).expect("passes");
-        Self { scene, tree, options, resources, passes, context, expects_messages: Cell::new(false) }
+        Self { scene, tree, extras, options, resources, passes, context, expects_messages: Cell::new(false) }
     }
 
     /// The twin's view of the same scene.
     pub fn bindings(&self) -> Bindings<'_> {
-        Bindings::new(&self.scene, &self.tree, self.resources.constants())
+        Bindings::new(&self.scene, &self.tree, self.resources.constants()).with_extras(&self.extras)
     }
 
     /// Binds the batch's descriptor set, records and runs.

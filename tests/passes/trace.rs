@@ -29,7 +29,7 @@ fn check(stage: &Stage, n_rays: u32) {
 }
 
 fn check_all(scene: &Scene, counts: &[u32]) {
-    for traversal in [Traversal::Mask, Traversal::Stack] {
+    for &traversal in Traversal::ALL {
         let capacity = counts.iter().max().expect("some") + 9;
         let stage = Stage::new(scene.clone(), RenderOptions { traversal, ..options(8, 8) }, capacity);
         counts.iter().for_each(|&n| check(&stage, n));
