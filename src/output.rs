@@ -91,7 +91,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     .map_err(|source| OutputError::Write { path: path.to_owned(), source })
 }
 
-/// As [`write`], for what is too large to encode in memory: `body` writes the file, and may seek in it.
+/// As [`write()`], for what is too large to encode in memory: `body` writes the file, and may seek in it.
 pub fn write_with(path: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), OutputError> {
     match Target::at(path)? {
         Target::Stream => write_stream(path, body),
