@@ -6,6 +6,7 @@
 //!   stage      scene -> room, camera, light, tree
 //!   rays       stage -> camera rays, and the rays that leave their hits
 //!   difference hits -> how many are not what the CPU finds
+//! driver     the traversal against the driver's own ray tracing
 //! chart      numbers -> SVG
 //! ```
 //!
@@ -14,6 +15,7 @@
 
 pub mod chart;
 pub mod difference;
+pub mod driver;
 pub mod paper;
 pub mod rays;
 pub mod stage;

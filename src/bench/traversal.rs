@@ -113,12 +113,13 @@ impl<'a> Tracers<'a> {
     }
 }
 
-fn cast_ray(ray: &Ray) -> CastRay {
+/// A ray of the renderer as one that is cast.
+pub(super) fn cast_ray(ray: &Ray) -> CastRay {
     CastRay { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
 }
 
 /// How many casts each turn has: all together `n_times`.
-fn turns(n_times: u16) -> impl Iterator<Item = u16> {
+pub(super) fn turns(n_times: u16) -> impl Iterator<Item = u16> {
     (0..n_times).step_by(CASTS_A_TURN.into()).map(move |first| CASTS_A_TURN.min(n_times - first))
 }
 
