@@ -1,6 +1,6 @@
 //! What a frame is asked for, and what comes of it: the options, the picture and the profile, alike on GPU and CPU.
 
-use std::{fmt, str::FromStr};
+use std::{fmt, str::FromStr, time::Instant};
 
 use serde::Serialize;
 
@@ -20,6 +20,8 @@ pub struct RenderOptions {
     pub denoise: Denoise,
     pub traversal: Traversal,
     pub primary: Primary,
+    /// Whether the device takes times and counts; without them its frames have empty profiles.
+    pub profile: bool,
 }
 
 impl Default for RenderOptions {
@@ -32,6 +34,7 @@ impl Default for RenderOptions {
             denoise: Denoise::Paper { threshold: Denoise::DEFAULT_THRESHOLD },
             traversal: Traversal::Mask,
             primary: Primary::Raster,
+            profile: true,
         }
     }
 }
@@ -120,7 +123,7 @@ pub struct Picture {
     pub display: Vec<[u8; 4]>,
 }
 
-/// Where a frame's time went.
+/// Where a frame's time went; nothing where nobody asked.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Profile {
     /// The device's own name.
@@ -133,21 +136,32 @@ pub struct Profile {
     pub n_batches: u32,
     /// From the first pass's start to the last one's end; none where the device has no timestamps.
     pub frame_ms: Option<f64>,
+    /// When the device was given its first command, or the CPU began.
+    #[serde(skip)]
+    pub begun_at: Option<Instant>,
 }
 
-/// One pass of one bounce; its batches added up.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// One pass of one bounce of one batch.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PassTime {
     /// Also the debug label and the kernel's file name.
     pub name: &'static str,
-    /// None for passes that run once a frame.
+    /// None for passes that run once a frame, like `batch`.
     pub bounce: Option<u32>,
-    /// None where the device has no timestamps.
+    /// In the order of execution.
+    pub batch: Option<u32>,
+    /// Since the frame's first pass began; none where the device has no timestamps, like `ms`.
+    pub start_ms: Option<f64>,
     pub ms: Option<f64>,
+    /// Rays of the bounce; none where a pass has pixels.
+    pub n_rays_in: Option<u64>,
+    /// Of what finds hits: rays that hit; of shadow: segments that were tested; of shade and compaction: rays of the
+    /// next bounce. None where a pass leaves pixels.
+    pub n_rays_out: Option<u64>,
 }
 
 /// Rays of one bounce.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct BounceStats {
     /// Rays whose closest hit was found.
     pub n_rays: u64,
@@ -155,6 +169,15 @@ pub struct BounceStats {
     pub n_hits: u64,
     /// Shadow segments that were tested.
     pub n_shadow_rays: u64,
+}
+
+impl BounceStats {
+    /// Adds another batch's.
+    pub fn add(&mut self, other: &Self) {
+        self.n_rays += other.n_rays;
+        self.n_hits += other.n_hits;
+        self.n_shadow_rays += other.n_shadow_rays;
+    }
 }
 
 impl Profile {

@@ -19,6 +19,7 @@
 
 pub mod frame;
 pub mod layout;
+mod profile;
 
 pub mod scene;
 

@@ -1,14 +1,17 @@
 //! The frame: the order of passes, every barrier between them, one command buffer a bounce.
 
-use std::{mem, sync::Arc};
+use std::{mem, sync::Arc, time::Instant};
+
+use tracing::info_span;
 
 use crate::{
     camera::frame_constants,
-    frame::{BounceStats, Denoise, PassTime, Picture, Primary, Profile, RenderOptions},
+    frame::{Denoise, Picture, Primary, Profile, RenderOptions},
     gpu::{Access, AnyBuffer, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Limits, Timer},
     kdtree::KdTree,
     layout::{Batch, Bounce, Counters, Frame, MATERIAL_REFLECT, MATERIAL_REFRACT, RAY_GROUP_SIZE, Ray},
     passes::{Passes, Resources, bounce_row},
+    profile::{device_counts, device_passes, sum_of_batches},
     scene::Scene,
 };
 
@@ -45,10 +48,12 @@ impl Renderer {
         let constants = Frame { queue_capacity: capacity, ..frame_constants(scene, tree, options) };
         let spans = split_evenly(options.width * options.height, capacity);
         let n_rows = spans.len() * options.max_depth as usize;
+        let uploading = info_span!("upload scene").entered();
         let mut resources = Resources::new(&context, scene, tree, &constants, n_rows)?;
         resources.add_extras(&context, tree, options.traversal)?;
-        let passes = Passes::new(&context, &resources.bindings, options)?;
-        let schedule = Schedule::new(&context, &resources, spans)?;
+        drop(uploading);
+        let passes = info_span!("make pipelines").in_scope(|| Passes::new(&context, &resources.bindings, options))?;
+        let schedule = Schedule::new(&context, &resources, &spans, options.profile)?;
         Ok(Self { context, options: options.clone(), resources, passes, schedule })
     }
 
@@ -68,13 +73,16 @@ impl Renderer {
     /// As [`Renderer::render`].
     pub fn draw(&mut self) -> Result<Profile, GpuError> {
         loop {
-            let frame = self.record()?;
+            let frame = info_span!("record").in_scope(|| self.record())?;
+            let running = info_span!("submit and wait").entered();
+            let begun_at = Instant::now();
             self.context.submit(&frame.iter().collect::<Vec<_>>())?;
             self.context.wait()?;
-            drop(frame);
+            drop((frame, running));
+            let _fetching = info_span!("fetch counts").entered();
             let bounces = self.resources.bounces.download()?;
             if !bounces.iter().any(|row| row.overflow != 0) {
-                return self.profile(&bounces);
+                return self.profile(&bounces, begun_at);
             }
             self.split_batches(&bounces)?;
         }
@@ -85,6 +93,7 @@ impl Renderer {
     /// # Errors
     /// A failed copy.
     pub fn picture(&self) -> Result<Picture, GpuError> {
+        let _fetching = info_span!("fetch picture").entered();
         let resources = &self.resources;
         Ok(Picture {
             width: self.options.width,
@@ -114,7 +123,7 @@ impl Renderer {
     }
 
     fn command_buffer(&self, name: &str, body: impl FnOnce(&Commands)) -> Result<CommandBuffer, GpuError> {
-        CommandBuffer::record(&self.context, name, Some(&self.schedule.timer), body)
+        CommandBuffer::record(&self.context, name, self.schedule.timer.as_ref(), body)
     }
 
     fn begin_frame(&self, commands: &Commands) {
@@ -190,40 +199,25 @@ impl Renderer {
         }
         tracing::debug!(n_batches = spans.len(), "ray queues overflowed");
         self.resources.resize_bounces(&self.context, spans.len() * max_depth)?;
-        self.schedule = Schedule::new(&self.context, &self.resources, spans)?;
+        self.schedule = Schedule::new(&self.context, &self.resources, &spans, self.options.profile)?;
         Ok(())
     }
 
-    /// Adds up the batches' times and counts.
-    fn profile(&self, bounces: &[Bounce]) -> Result<Profile, GpuError> {
-        let rows = self.schedule.timer.rows()?;
-        let counters = self.resources.counters.download()?;
-        let mut profile = Profile {
+    /// Times and counts of a frame that was begun then; nothing without a profile.
+    fn profile(&self, bounces: &[Bounce], begun_at: Instant) -> Result<Profile, GpuError> {
+        let Some(timer) = &self.schedule.timer else { return Ok(Profile::default()) };
+        let rows = timer.rows()?;
+        let max_depth = self.options.max_depth;
+        let counts = device_counts(bounces, &self.resources.counters.download()?);
+        let ends_ms = rows.iter().map(|row| row.span_ms.map(|(_, end)| end));
+        Ok(Profile {
             device: self.context.info().name.clone(),
             n_batches: self.schedule.batches.len() as u32,
-            bounces: vec![BounceStats::default(); self.options.max_depth as usize],
-            frame_ms: rows
-                .iter()
-                .map(|row| row.span_ms.map(|(_, end)| end))
-                .max_by(|a, b| a.partial_cmp(b).expect("no NaN"))
-                .flatten(),
-            passes: Vec::new(),
-        };
-        for row in rows {
-            let ms = row.span_ms.map(|(begin, end)| end - begin);
-            let known = profile.passes.iter_mut().find(|pass| pass.name == row.name && pass.bounce == row.bounce);
-            match known {
-                Some(pass) => pass.ms = pass.ms.zip(ms).map(|(a, b)| a + b),
-                None => profile.passes.push(PassTime { name: row.name, bounce: row.bounce, ms }),
-            }
-        }
-        for (row_ix, (bounce, counters)) in bounces.iter().zip(&counters).enumerate() {
-            let stats = &mut profile.bounces[row_ix % self.options.max_depth as usize];
-            stats.n_rays += u64::from(bounce.n_rays);
-            stats.n_hits += u64::from(counters.n_hits);
-            stats.n_shadow_rays += u64::from(counters.n_shadow_rays);
-        }
-        Ok(profile)
+            bounces: sum_of_batches(&counts, max_depth),
+            frame_ms: ends_ms.max_by(|a, b| a.partial_cmp(b).expect("no NaN")).flatten(),
+            passes: device_passes(&rows, &counts, max_depth, self.options.primary),
+            begun_at: Some(begun_at),
+        })
     }
 }
 
@@ -234,17 +228,18 @@ struct Schedule {
     /// What `bounces` and `counters` hold when a frame begins.
     first_bounces: Buffer<Bounce>,
     zero_counters: Buffer<Counters>,
-    timer: Timer,
+    /// None without a profile.
+    timer: Option<Timer>,
 }
 
 impl Schedule {
     /// `spans`: first pixel and number of pixels of each batch.
-    fn new(context: &Arc<Context>, resources: &Resources, spans: Vec<(u32, u32)>) -> Result<Self, GpuError> {
+    fn new(context: &Arc<Context>, resources: &Resources, spans: &[(u32, u32)], timed: bool) -> Result<Self, GpuError> {
         let constants = resources.constants();
         let max_depth = constants.max_depth;
         let batches: Vec<_> = (0..)
             .zip(spans)
-            .map(|(batch_ix, (first_pixel, n_pixels))| Batch {
+            .map(|(batch_ix, &(first_pixel, n_pixels))| Batch {
                 first_pixel,
                 n_pixels,
                 bounce_ix: batch_ix * max_depth,
@@ -262,7 +257,7 @@ impl Schedule {
         Ok(Self {
             first_bounces: Buffer::with(context, "first_bounces", &rows, BufferUse::Storage)?,
             zero_counters: Buffer::with(context, "zero_counters", &zeros, BufferUse::Storage)?,
-            timer: Timer::new(context, n_passes)?,
+            timer: timed.then(|| Timer::new(context, n_passes)).transpose()?,
             batches,
         })
     }

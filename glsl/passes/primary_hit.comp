@@ -19,6 +19,8 @@ layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters
 
 // 0: only make the rays, the trace pass finds their hits.
 layout(constant_id = 0) const uint FROM_RASTER = 1u;
+// Whether hits are counted.
+layout(constant_id = 2) const bool COUNTS = true;
 
 void main() {
     uint ray_ix = gl_GlobalInvocationID.x;
@@ -37,6 +39,8 @@ void main() {
             hits[ray_ix] = hit;
         }
     }
-    uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
-    if (subgroupElect() && n_hits > 0u) atomicAdd(counters[batch.bounce_ix].n_hits, n_hits);
+    if (COUNTS) {
+        uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
+        if (subgroupElect() && n_hits > 0u) atomicAdd(counters[batch.bounce_ix].n_hits, n_hits);
+    }
 }

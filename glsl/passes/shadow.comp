@@ -10,6 +10,9 @@
 #include "surface.glsl"
 #include "light.glsl"
 
+// Whether tested segments are counted.
+layout(constant_id = 2) const bool COUNTS = true;
+
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };
 layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };
@@ -40,6 +43,8 @@ void main() {
         bool is_lit = is_tested && traverse(segment, 0.0, true).triangle_ix == NO_TRIANGLE;
         light_visibility[light_ix * frame.queue_capacity + ray_ix] = is_lit ? 1u : 0u;
     }
-    uint n_tested = subgroupAdd(is_tested ? 1u : 0u);
-    if (subgroupElect() && n_tested > 0u) atomicAdd(counters[batch.bounce_ix].n_shadow_rays, n_tested);
+    if (COUNTS) {
+        uint n_tested = subgroupAdd(is_tested ? 1u : 0u);
+        if (subgroupElect() && n_tested > 0u) atomicAdd(counters[batch.bounce_ix].n_shadow_rays, n_tested);
+    }
 }

@@ -6,6 +6,9 @@
 #include "layout.glsl"
 #include "kdtree.glsl"
 
+// Whether hits are counted.
+layout(constant_id = 2) const bool COUNTS = true;
+
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };
 layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
@@ -21,6 +24,8 @@ void main() {
         hits[ray_ix] = hit;
         is_hit = hit.triangle_ix != NO_TRIANGLE;
     }
-    uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
-    if (subgroupElect() && n_hits > 0u) atomicAdd(counters[batch.bounce_ix].n_hits, n_hits);
+    if (COUNTS) {
+        uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
+        if (subgroupElect() && n_hits > 0u) atomicAdd(counters[batch.bounce_ix].n_hits, n_hits);
+    }
 }

@@ -76,9 +76,12 @@ pub struct RenderArgs {
     /// Draw the frame so many times and report the one of median time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
-    /// Write the report as JSON, too
+    /// Write the report as JSON, with the times and rays of each pass of each bounce
     #[arg(long, value_name = "FILE")]
     pub profile: Option<PathBuf>,
+    /// Write what CPU and device did when as Chrome trace events, for Perfetto or chrome://tracing
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
     /// Run under the Khronos validation layer and fail on any message
     #[arg(long)]
     pub validate: bool,
@@ -140,8 +143,12 @@ impl RenderArgs {
         if matches!(self.denoise, Some(DenoiseWord::Off)) && self.denoise_threshold.is_some() {
             return Err(CliError::Usage("--denoise-threshold has no meaning with --denoise off".into()));
         }
-        if self.output.is_some() && self.output == self.profile {
-            return Err(CliError::Usage("--output and --profile name the same file".into()));
+        let files = [("--output", &self.output), ("--profile", &self.profile), ("--trace", &self.trace)];
+        for (file_ix, (name, file)) in files.iter().enumerate() {
+            let same = files[..file_ix].iter().find(|(_, other)| file.is_some() && other == file);
+            if let Some((other, _)) = same {
+                return Err(CliError::Usage(format!("{other} and {name} name the same file")));
+            }
         }
         Ok(())
     }
@@ -157,6 +164,8 @@ impl RenderArgs {
             denoise: self.denoise(scene.denoise),
             traversal: self.traversal,
             primary: self.primary,
+            // Where anybody wants to know where the time went.
+            profile: !self.quiet || self.profile.is_some() || self.trace.is_some(),
         }
     }
 

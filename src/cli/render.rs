@@ -1,6 +1,6 @@
 //! `kdray render`: scene file to picture.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc, time::Instant};
 
 use kdray::{
     cpu,
@@ -11,6 +11,7 @@ use kdray::{
     render::Renderer,
     scene::Scene,
 };
+use tracing::info_span;
 
 use super::{
     args::RenderArgs,
@@ -19,6 +20,8 @@ use super::{
     open_device, print,
     progress::Progress,
     report::{Report, Spread},
+    spans::Spans,
+    trace::trace_json,
 };
 
 /// Loads, builds, renders, writes and reports. What can be refused is refused before the work that it would waste.
@@ -27,19 +30,23 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     check_outputs(args)?;
     set_threads(args.threads)?;
 
-    let progress = Progress::new(args.quiet, 3);
-    let (scene, load_ms) = progress.stage(&format!("loading {}", args.scene.display()), || Scene::load(&args.scene));
+    let (begun_at, spans) = (Instant::now(), Spans::default());
+    let progress = Progress::with_spans(args.quiet, 3, args.trace.is_some().then_some(&spans));
+    let loading = format!("loading {}", args.scene.display());
+    let (scene, load_ms) = progress.stage(&loading, || info_span!("load scene").in_scope(|| Scene::load(&args.scene)));
     let scene = scene?;
     let picture_path = args.output.clone().unwrap_or_else(|| default_output(&scene.name));
     output::check(&picture_path)?;
     let options = args.options(&scene.defaults);
     let device = ContextOptions { device: args.device.clone(), validate: args.validate };
-    let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
+    let opening = || info_span!("create device").in_scope(|| open_device(&device, &progress));
+    let context = if args.cpu { None } else { Some(opening()?) };
 
     let n_triangles = scene.triangles.len();
     let build_options = BuildOptions::default();
     let building = format!("building the kd-tree of {n_triangles} triangles");
-    let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &build_options));
+    let build = || KdTree::build(&scene.triangles, &build_options);
+    let (tree, build_ms) = progress.stage(&building, || info_span!("build tree").in_scope(build));
     let rendering = format!("rendering {}x{}", options.width, options.height);
     let frame = FrameToDraw { scene: &scene, tree: &tree, options: &options };
     let (drawn, render_ms) = progress.stage(&rendering, || frame.draw(context.as_ref(), args.repeat));
@@ -47,6 +54,11 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     output::write_picture(&picture_path, &picture)?;
     drop(progress);
 
+    let repeated = Spread::of(&profiles);
+    let profile = median(profiles);
+    if let Some(path) = &args.trace {
+        output::write(path, &trace_json(begun_at, &spans.sorted(), &profile))?;
+    }
     let report = Report {
         scene: scene.name,
         picture: picture_path,
@@ -56,8 +68,8 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         load_ms,
         build_ms,
         render_ms,
-        repeated: Spread::of(&profiles),
-        frame: median(profiles).into(),
+        repeated,
+        frame: profile.into(),
     };
     if let Some(path) = &args.profile {
         output::write(path, &report.json())?;
@@ -74,10 +86,7 @@ fn check_outputs(args: &RenderArgs) -> Result<(), CliError> {
         Format::of(path)?;
         output::check(path)?;
     }
-    if let Some(path) = &args.profile {
-        output::check(path)?;
-    }
-    Ok(())
+    Ok([&args.profile, &args.trace].into_iter().flatten().try_for_each(|path| output::check(path))?)
 }
 
 /// Sizes the pool for everything that follows.
@@ -104,8 +113,9 @@ impl FrameToDraw<'_> {
     /// Draws the frame so many times, on the device or on the CPU for want of one. The pictures are all the same.
     fn draw(&self, context: Option<&Arc<Context>>, n_times: u16) -> Result<(Picture, Vec<Profile>), GpuError> {
         let Some(context) = context else {
-            let (picture, profile) = cpu::render(self.scene, self.tree, self.options);
-            let again = (1..n_times).map(|_| cpu::render(self.scene, self.tree, self.options).1);
+            let render = || info_span!("render").in_scope(|| cpu::render(self.scene, self.tree, self.options));
+            let (picture, profile) = render();
+            let again = (1..n_times).map(|_| render().1);
             return Ok((picture, std::iter::once(profile).chain(again).collect()));
         };
         let mut renderer = Renderer::new(Arc::clone(context), self.scene, self.tree, self.options)?;

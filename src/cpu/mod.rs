@@ -148,6 +148,7 @@ impl Renderer<'_> {
             }
             let next = self.next_rays(depth, capacity);
             if next.overflow != 0 {
+                self.clock.end_batch(&stats, self.options.primary);
                 self.batch(first_pixel, n_pixels / 2);
                 self.batch(first_pixel + n_pixels / 2, n_pixels - n_pixels / 2);
                 return;
@@ -219,11 +220,8 @@ impl Renderer<'_> {
     fn count(&mut self, stats: &[BounceStats]) {
         self.n_batches += 1;
         self.bounces.resize(self.bounces.len().max(stats.len()), BounceStats::default());
-        for (sum, bounce) in self.bounces.iter_mut().zip(stats) {
-            sum.n_rays += bounce.n_rays;
-            sum.n_hits += bounce.n_hits;
-            sum.n_shadow_rays += bounce.n_shadow_rays;
-        }
+        self.bounces.iter_mut().zip(stats).for_each(|(sum, bounce)| sum.add(bounce));
+        self.clock.end_batch(stats, self.options.primary);
     }
 
     /// The post processes, and the finished frame.
@@ -237,6 +235,7 @@ impl Renderer<'_> {
         let profile = Profile {
             device: format!("CPU, {} threads", rayon::current_num_threads()),
             frame_ms: Some(self.clock.elapsed_ms()),
+            begun_at: Some(self.clock.begun_at()),
             passes: self.clock.into_passes(),
             bounces: self.bounces,
             n_batches: self.n_batches,

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::{
-    frame::{Primary, RenderOptions, Traversal},
+    frame::{RenderOptions, Traversal},
     gpu::{BindingKind, Bindings, ComputeDesc, ComputePipeline, Context, GpuError},
     layout::{BIND_FRAME, BIND_TRIANGLE_IDS},
 };
@@ -64,9 +64,9 @@ impl Passes {
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, options: &RenderOptions) -> Result<Self, GpuError> {
         Ok(Self {
             visibility: Visibility::new(context, bindings)?,
-            primary_hit: PrimaryHit::new(context, bindings, options.primary == Primary::Raster)?,
-            trace: Trace::new(context, bindings, options.traversal)?,
-            shadow: Shadow::new(context, bindings, options.traversal)?,
+            primary_hit: PrimaryHit::new(context, bindings, options)?,
+            trace: Trace::new(context, bindings, options)?,
+            shadow: Shadow::new(context, bindings, options)?,
             shade: Shade::new(context, bindings)?,
             compact: Compact::new(context, bindings)?,
             resolve: Resolve::new(context, bindings)?,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{kernel, spirv};
 use crate::{
+    frame::{Primary, RenderOptions},
     gpu::{Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError},
     layout::{Batch, RAY_GROUP_SIZE},
 };
@@ -14,9 +15,14 @@ pub struct PrimaryHit {
 }
 
 impl PrimaryHit {
-    /// `from_raster`: find the hits too; otherwise only make the rays, for [`super::Trace`].
-    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, from_raster: bool) -> Result<Self, GpuError> {
-        let constants = [u32::from(from_raster)];
+    /// From raster finds the hits, too; otherwise only makes the rays, for [`super::Trace`].
+    pub(super) fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<Bindings>,
+        options: &RenderOptions,
+    ) -> Result<Self, GpuError> {
+        // Between the two stands FUSED_FMA, which clamping a hit to its triangle has no use for.
+        let constants = [(options.primary == Primary::Raster).into(), 0, options.profile.into()];
         Ok(Self { kernel: kernel(context, bindings, "primary_hit", spirv!("primary_hit.comp"), &constants)? })
     }
 

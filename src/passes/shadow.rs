@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Resources, kernel, spirv, traversal_constants};
 use crate::{
-    frame::Traversal,
+    frame::RenderOptions,
     gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
     layout::Batch,
 };
@@ -18,9 +18,10 @@ impl Shadow {
     pub(super) fn new(
         context: &Arc<Context>,
         bindings: &Arc<Bindings>,
-        traversal: Traversal,
+        options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        let constants = traversal_constants(context, traversal)?;
+        let [traversal, fuses_fma] = traversal_constants(context, options.traversal)?;
+        let constants = [traversal, fuses_fma, options.profile.into()];
         Ok(Self { kernel: kernel(context, bindings, "shadow", spirv!("shadow.comp"), &constants)? })
     }
 
