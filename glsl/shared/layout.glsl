@@ -31,6 +31,9 @@
 // Times the scene's largest coordinate: rays that start farther away are moved up to the scene first (the tree's
 // rounding margin is derived for this).
 #define KD_ORIGIN_REACH 4.0
+// Times the scene's largest coordinate: a ray that keeps this far from a triangle's plane within a leaf has no hit there.
+// Twice the tree's margin, the second for the rounding of the plane and of the ray's distance to it.
+#define KD_PLANE_REACH 0.0000152587890625
 
 // How rays find their way through the tree: the kernels' specialization constant TRAVERSAL.
 #define TRAVERSAL_MASK 0u
@@ -70,6 +73,13 @@ struct Triangle {
 struct KdNode {
     uint split_or_first;
     uint axis_and_child;
+};
+
+// 16 bytes: the plane of a leaf's triangle, at once beside the leaf's other planes. normal: unit length, or 0 where the
+// triangle has no area; a point p lies dot(normal, p) - distance above it.
+struct Plane {
+    vec3 normal;
+    float distance;
 };
 
 // 24 bytes: a node's cell, world units. Only some traversals need it.
@@ -227,10 +237,11 @@ struct DriverCast {
 #define BIND_COUNTERS 21u
 #define BIND_KD_BOXES 22u
 #define BIND_KD_ROPES 23u
-#define N_BINDINGS 24u
+#define BIND_LEAF_PLANES 24u
+#define N_BINDINGS 25u
 
 // A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
-#define BIND_CAST_RAYS 24u
-#define BIND_CAST_HITS 25u
+#define BIND_CAST_RAYS 25u
+#define BIND_CAST_HITS 26u
 
 #endif
