@@ -176,8 +176,18 @@ pub struct Report {
 pub struct Growth {
     /// The logarithm of the number of triangles.
     pub logarithm: f64,
-    /// A ray's time, by kind; none without timestamps.
-    pub times: Vec<(RayKind, Option<f64>)>,
+    /// By kind of ray.
+    pub rays: Vec<RayGrowth>,
+}
+
+/// Of [`Growth`]: the mean ray of a kind.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayGrowth {
+    pub kind: RayKind,
+    /// Its time; none without timestamps.
+    pub time: Option<f64>,
+    /// The nodes that it visits, whatever the caches hold.
+    pub nodes: f64,
 }
 
 impl Report {
@@ -185,11 +195,12 @@ impl Report {
     pub fn growth(&self) -> Option<Growth> {
         let [first, .., last] = &self.rows[..] else { return None };
         let logarithm = (last.n_triangles as f64).ln() / (first.n_triangles as f64).ln();
-        let ratio = |(a, b): (&RayCost, &RayCost)| {
-            let ratio = a.ns_a_ray.zip(b.ns_a_ray).map(|(a, b)| b.median / a.median);
-            (a.rays, ratio)
+        let growth = |(a, b): (&RayCost, &RayCost)| RayGrowth {
+            kind: a.rays,
+            time: a.ns_a_ray.zip(b.ns_a_ray).map(|(a, b)| b.median / a.median),
+            nodes: b.steps_a_ray.nodes / a.steps_a_ray.nodes,
         };
-        Some(Growth { logarithm, times: first.rays.iter().zip(&last.rays).map(ratio).collect() })
+        Some(Growth { logarithm, rays: first.rays.iter().zip(&last.rays).map(growth).collect() })
     }
 
     /// Times of a ray, a group a size, a bar a kind of rays.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use kdray::{
     bench::{
         rays::ray_sets,
-        size::{Report, Row, Sized},
+        size::{RayGrowth, Report, Row, Sized},
     },
     gpu::{Context, ContextOptions, GpuError},
 };
@@ -79,12 +79,15 @@ fn text(report: &Report) -> String {
         report.n_threads
     );
     if let Some(growth) = report.growth() {
-        let times: Vec<_> =
-            growth.times.iter().map(|(kind, ratio)| format!("{} {}", kind.name(), decimal(*ratio, 2))).collect();
+        let list = |ratio: fn(&RayGrowth) -> Option<f64>| {
+            let words = growth.rays.iter().map(|ray| format!("{} {}", ray.kind.name(), decimal(ratio(ray), 2)));
+            words.collect::<Vec<_>>().join(", ")
+        };
         text += &format!(
-            "From the least to the largest mesh, log N grows {:.2} times, the time of a ray: {}.\n",
+            "From the least to the largest mesh, log N grows {:.2} times, the nodes that a ray visits: {}; its time: {}.\n",
             growth.logarithm,
-            times.join(", ")
+            list(|ray| Some(ray.nodes)),
+            list(|ray| ray.time)
         );
     }
     text
@@ -142,7 +145,7 @@ mod tests {
                     n_rays: 1000,
                     ms: Spread::of([ns * 1e-3]),
                     ns_a_ray: Spread::of([ns]),
-                    steps_a_ray: StepsARay::default(),
+                    steps_a_ray: StepsARay { nodes: 2.0 + (n_triangles / 1_000_000) as f64, ..StepsARay::default() },
                     difference: Difference { n_differing, n_grazing: 9 },
                 })
                 .to_vec(),
@@ -163,7 +166,8 @@ mod tests {
     #[test]
     fn growth_is_that_of_the_last_over_the_first() {
         let text = text(&report([8.0, 20.0], 0));
-        assert!(text.contains("log N grows 2.00 times, the time of a ray: primary 2.50, shadow 2.50, "), "{text}");
+        assert!(text.contains("log N grows 2.00 times, the nodes that a ray visits: primary 1.50, "), "{text}");
+        assert!(text.contains("; its time: primary 2.50, shadow 2.50, "), "{text}");
         assert!(text.contains("\n1000000 "), "{text}");
         let single = Report { rows: report([8.0, 20.0], 0).rows[..1].to_vec(), ..report([8.0, 20.0], 0) };
         assert_eq!(single.growth(), None);
