@@ -11,6 +11,7 @@
 //!   gpu      the Vulkan layer
 //! cast     rays -> hits, without a frame
 //! cpu      both without Vulkan
+//! profile  times and counts -> each pass's rays
 //! output   picture -> file
 //! bench    all of it, timed
 //! ```

@@ -2,7 +2,6 @@
 
 use crate::{
     frame::{BounceStats, PassTime, Primary},
-    gpu::TimerRow,
     layout::{Bounce, Counters},
 };
 
@@ -32,34 +31,19 @@ pub(crate) fn device_counts(bounces: &[Bounce], counters: &[Counters]) -> Vec<Bo
     bounces.iter().zip(counters).map(row).collect()
 }
 
-/// The passes of a device's frame. `counts`: as [`device_counts`] gives them, `max_depth` rows a batch.
-pub(crate) fn device_passes(
-    rows: &[TimerRow],
-    counts: &[BounceStats],
-    max_depth: u32,
-    primary: Primary,
-) -> Vec<PassTime> {
-    let batches: Vec<_> = counts.chunks_exact(max_depth as usize).collect();
+/// Fills in the batch and the rays of each pass of a device's frame. `counts`: as [`device_counts`] gives them,
+/// `max_depth` rows a batch.
+pub(crate) fn count_batches(passes: &mut [PassTime], counts: &[BounceStats], max_depth: u32, primary: Primary) {
+    let batches = || (0..).zip(counts.chunks_exact(max_depth as usize));
     // Every batch is recorded alike, whatever becomes of its rays.
-    let rows_a_batch = rows.iter().filter(|row| row.bounce.is_some()).count() / batches.len().max(1);
-    let mut n_in_batches = 0;
-    let pass = |row: &TimerRow| {
-        let mut pass = PassTime {
-            name: row.name,
-            bounce: row.bounce,
-            start_ms: row.span_ms.map(|(begin, _)| begin),
-            ms: row.span_ms.map(|(begin, end)| end - begin),
-            ..PassTime::default()
-        };
-        if row.bounce.is_some() {
-            let batch_ix = n_in_batches / rows_a_batch;
-            n_in_batches += 1;
-            pass.batch = Some(batch_ix as u32);
-            count_rays(&mut pass, batches[batch_ix], primary);
+    let passes_a_batch = passes.iter().filter(|pass| pass.bounce.is_some()).count() / batches().count().max(1);
+    let mut in_batches = passes.iter_mut().filter(|pass| pass.bounce.is_some());
+    for (batch_ix, bounces) in batches() {
+        for pass in in_batches.by_ref().take(passes_a_batch) {
+            pass.batch = Some(batch_ix);
+            count_rays(pass, bounces, primary);
         }
-        pass
-    };
-    rows.iter().map(pass).collect()
+    }
 }
 
 /// The batches' counts added up, one row a bounce.
@@ -79,22 +63,22 @@ mod tests {
         BounceStats { n_rays, n_hits, n_shadow_rays }
     }
 
-    fn row(name: &'static str, bounce: Option<u32>, begin: f64) -> TimerRow {
-        TimerRow { name, bounce, span_ms: Some((begin, begin + 0.25)) }
+    fn pass(name: &'static str, bounce: Option<u32>) -> PassTime {
+        PassTime { name, bounce, ..PassTime::default() }
     }
 
     #[test]
     fn each_pass_has_the_rays_of_its_batch_and_bounce() {
         let names = ["primary_hit", "shadow", "shade", "resolve", "compact_scatter"];
         let second = ["trace", "shade"];
-        let mut rows = vec![row("visibility", None, 0.0)];
+        let mut passes = vec![pass("visibility", None)];
         for _ in 0..2 {
-            rows.extend(names.iter().map(|name| row(name, Some(0), rows.len() as f64)).collect::<Vec<_>>());
-            rows.extend(second.iter().map(|name| row(name, Some(1), rows.len() as f64)).collect::<Vec<_>>());
+            passes.extend(names.map(|name| pass(name, Some(0))));
+            passes.extend(second.map(|name| pass(name, Some(1))));
         }
-        rows.push(row("tonemap", None, 15.0));
+        passes.push(pass("tonemap", None));
         let counts = [stats(64, 60, 50), stats(20, 10, 0), stats(32, 30, 9), stats(8, 7, 0)];
-        let passes = device_passes(&rows, &counts, 2, Primary::Raster);
+        count_batches(&mut passes, &counts, 2, Primary::Raster);
         let found: Vec<_> = passes.iter().map(|p| (p.batch, p.n_rays_in, p.n_rays_out)).collect();
         let batch = |ix, [first, second]: [BounceStats; 2]| {
             let [n, m] = [first.n_rays, second.n_rays].map(Some);
@@ -105,13 +89,13 @@ mod tests {
         let [a, b, c, d] = counts;
         let once = (None, None, None);
         assert_eq!(found, [vec![once], batch(0, [a, b]), batch(1, [c, d]), vec![once]].concat());
-        assert_eq!((passes[3].start_ms, passes[3].ms), (rows[3].span_ms.map(|span| span.0), Some(0.25)));
         assert_eq!(sum_of_batches(&[a, b, c, d], 2), [stats(96, 90, 59), stats(28, 17, 0)]);
     }
 
     #[test]
     fn camera_rays_that_are_traced_are_only_made_by_primary_hit() {
-        let passes = device_passes(&[row("primary_hit", Some(0), 0.0)], &[stats(64, 60, 0)], 1, Primary::Trace);
+        let mut passes = [pass("primary_hit", Some(0))];
+        count_batches(&mut passes, &[stats(64, 60, 0)], 1, Primary::Trace);
         assert_eq!((passes[0].n_rays_in, passes[0].n_rays_out), (Some(64), Some(64)));
     }
 }

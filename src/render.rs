@@ -6,12 +6,12 @@ use tracing::info_span;
 
 use crate::{
     camera::frame_constants,
-    frame::{Denoise, Picture, Primary, Profile, RenderOptions},
-    gpu::{Access, AnyBuffer, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Limits, Timer},
+    frame::{Denoise, PassTime, Picture, Primary, Profile, RenderOptions},
+    gpu::{Access, AnyBuffer, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Limits, Timer, TimerRow},
     kdtree::KdTree,
     layout::{Batch, Bounce, Counters, Frame, MATERIAL_REFLECT, MATERIAL_REFRACT, RAY_GROUP_SIZE, Ray},
     passes::{Passes, Resources, bounce_row},
-    profile::{device_counts, device_passes, sum_of_batches},
+    profile::{count_batches, device_counts, sum_of_batches},
     scene::Scene,
 };
 
@@ -210,12 +210,21 @@ impl Renderer {
         let max_depth = self.options.max_depth;
         let counts = device_counts(bounces, &self.resources.counters.download()?);
         let ends_ms = rows.iter().map(|row| row.span_ms.map(|(_, end)| end));
+        let pass = |row: &TimerRow| PassTime {
+            name: row.name,
+            bounce: row.bounce,
+            start_ms: row.span_ms.map(|(begin, _)| begin),
+            ms: row.span_ms.map(|(begin, end)| end - begin),
+            ..PassTime::default()
+        };
+        let mut passes: Vec<_> = rows.iter().map(pass).collect();
+        count_batches(&mut passes, &counts, max_depth, self.options.primary);
         Ok(Profile {
             device: self.context.info().name.clone(),
             n_batches: self.schedule.batches.len() as u32,
             bounces: sum_of_batches(&counts, max_depth),
             frame_ms: ends_ms.max_by(|a, b| a.partial_cmp(b).expect("no NaN")).flatten(),
-            passes: device_passes(&rows, &counts, max_depth, self.options.primary),
+            passes,
             begun_at: Some(begun_at),
         })
     }

@@ -53,7 +53,7 @@ pub const T_TOLERANCE: f32 = 1.0 / 8192.0;
 /// nothing: many share edges and corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Apart {
-    /// A hit here and a miss there.
+    /// A hit here and a miss there, or what is neither: a distance that is no number.
     pub n_hit_or_miss: u64,
     /// Distances that differ by more than [`T_TOLERANCE`] of themselves.
     pub n_distance: u64,
@@ -66,9 +66,10 @@ impl Apart {
         let mut apart = Self::default();
         for (reference, found) in reference.iter().zip(found) {
             let is_near = (reference.t - found.t).abs() <= T_TOLERANCE * reference.t.abs();
+            let is_neither = reference.t.is_nan() || found.t.is_nan();
             match (is_hit(reference), is_hit(found)) {
+                (a, b) if a != b || is_neither => apart.n_hit_or_miss += 1,
                 (true, true) if !is_near && !kind.is_any_hit() => apart.n_distance += 1,
-                (a, b) if a != b => apart.n_hit_or_miss += 1,
                 _ => {}
             }
         }
@@ -169,6 +170,7 @@ mod tests {
             assert_eq!(apart(kind, hit(2.0, 7), MISS), (1, 0));
             assert_eq!(apart(kind, MISS, hit(2.0, 7)), (1, 0));
             assert_eq!(apart(kind, hit(2.0, 7), hit(f32::NAN, 7)), (1, 0));
+            assert_eq!(apart(kind, hit(f32::NAN, 7), hit(f32::NAN, 7)), (1, 0));
         }
         assert!(Apart { n_hit_or_miss: 1, n_distance: 1 }.is_rounding(200_000));
         assert!(!Apart { n_hit_or_miss: 1, n_distance: 1 }.is_rounding(199_999));

@@ -7,6 +7,7 @@
 //!   rays       stage -> camera rays, and the rays that leave their hits
 //!   difference hits -> how many are not what the CPU finds
 //! driver     the traversal against the driver's own ray tracing
+//! size       one shape of ever more triangles
 //! chart      numbers -> SVG
 //! ```
 //!
@@ -18,6 +19,7 @@ pub mod difference;
 pub mod driver;
 pub mod paper;
 pub mod rays;
+pub mod size;
 pub mod stage;
 pub mod traversal;
 

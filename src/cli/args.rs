@@ -31,7 +31,7 @@ pub enum Command {
     Devices,
     /// Describe a scene and its kd-tree
     Inspect(InspectArgs),
-    /// Measure: whole frames beside the paper's, or every way through the kd-tree
+    /// Measure: whole frames, ways through the kd-tree, the driver's own ray tracing, cost against size
     #[command(subcommand)]
     Bench(Suite),
 }

@@ -28,7 +28,8 @@ impl Timing {
 
     /// How many times as fast as another that traces as many rays, by medians.
     fn ratio_to(&self, other: &Self) -> Option<f64> {
-        self.mrays_per_s.zip(other.mrays_per_s).map(|(own, other)| own.median / other.median)
+        let ratio = self.mrays_per_s.zip(other.mrays_per_s).map(|(own, other)| own.median / other.median);
+        ratio.filter(|ratio| ratio.is_finite()) // there may be no rays
     }
 }
 
@@ -212,6 +213,13 @@ mod tests {
         assert!((raster.ratio.unwrap() - 8.0).abs() < 1e-12);
         let unknown = RasterResult::new([None; 2], None, &set(RayKind::Primary));
         assert_eq!((unknown.ratio, unknown.timing.mrays_per_s), (None, None));
+    }
+
+    #[test]
+    fn no_rays_have_no_speed() {
+        let nobody = |name: &str| Trial { hits: Vec::new(), ..trial(name, 1.0, [hit(1.0); 4]) };
+        let result = SetResult::new(RayKind::Shadow, &[nobody("driver"), nobody("mask")]);
+        assert_eq!((result.n_rays, result.kdray[0].ratio, result.kdray[0].apart), (0, None, Apart::default()));
     }
 
     #[test]

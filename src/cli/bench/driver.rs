@@ -83,7 +83,7 @@ fn text(report: &Report) -> String {
     text += &format!(", medians of {}\n\n", report.n_times);
     let mut rows = Vec::new();
     for set in &report.sets {
-        rows.push(cells(set, "driver", &set.driver, set.driver.ms.map(|_| 1.0), None));
+        rows.push(cells(set, "driver", &set.driver, set.driver.mrays_per_s.map(|_| 1.0), None));
         rows.extend(
             set.kdray
                 .iter()

@@ -3,6 +3,7 @@
 mod args;
 mod driver;
 mod paper;
+mod size;
 mod traversal;
 
 pub use args::Suite;
@@ -14,5 +15,6 @@ pub fn run(suite: &Suite) -> Result<(), CliError> {
         Suite::Paper(args) => paper::run(args),
         Suite::Traversal(args) => traversal::run(args),
         Suite::Driver(args) => driver::run(args),
+        Suite::Size(args) => size::run(args),
     }
 }
