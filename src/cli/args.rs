@@ -5,7 +5,7 @@ use std::{path::PathBuf, str::FromStr};
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 use kdray::{
     cast::Query,
-    frame::{Crop, Denoise, Primary, RenderOptions, Traversal},
+    frame::{Crop, Denoise, Primary, RenderOptions, Tonemap, Traversal},
     gpu::DeviceSelector,
     scene::RenderDefaults,
 };
@@ -64,6 +64,9 @@ pub struct RenderArgs {
     /// Factor on radiance before it is encoded for display [default: the scene's]
     #[arg(long, value_name = "X", value_parser = positive)]
     pub exposure: Option<f32>,
+    #[arg(long, value_name = "CURVE")]
+    #[arg(help = format!("From radiance to what a display shows: {} [default: the scene's]", Tonemap::words()))]
+    pub tonemap: Option<Tonemap>,
     #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
     #[arg(help = format!("How rays find their way through the tree: {}", Traversal::words()))]
     pub traversal: Traversal,
@@ -166,6 +169,7 @@ impl RenderArgs {
             crop: self.crop,
             max_depth: self.max_depth.unwrap_or(scene.max_depth),
             exposure: self.exposure.unwrap_or(scene.exposure),
+            tonemap: self.tonemap.unwrap_or(scene.tonemap),
             denoise: self.denoise(scene.denoise),
             traversal: self.traversal,
             primary: self.primary,
