@@ -30,6 +30,7 @@ mod tests {
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
             BIND_KD_BOXES => Some("KdBox"),
             BIND_CAST_RAYS => Some("CastRay"),
+            BIND_PIXEL_FEATURES => Some("Feature"),
             BIND_COUNTERS => Some("Counters"),
             _ => None,
         }

@@ -196,6 +196,24 @@ struct Counters {
     uint n_shadow_rays;
 };
 
+// 64 bytes: what the primary ray of a pixel's sample hits, and what all rays of the sample cost. normal: the shading
+// normal, unit length, towards the eye; albedo: Kd; depth: along the camera's view. Where nothing is hit, depth is
+// infinity, both indices are NO_TRIANGLE, the vectors 0.
+struct Feature {
+    vec3 position_world;
+    uint triangle_ix;
+    vec3 normal_world;
+    uint material_ix;
+    vec3 albedo;
+    float depth;
+    // Primary, secondary and shadow rays.
+    uint n_rays;
+    // Of all of them: nodes read and triangles tested.
+    uint n_steps;
+    uint reserved0;
+    uint reserved1;
+};
+
 // Push constants: the batch's pixels [first_pixel, first_pixel + n_pixels) in tile order, and its row of `bounces`.
 struct Batch {
     uint first_pixel;
@@ -235,10 +253,11 @@ struct CastBatch {
 #define BIND_KD_BOXES 22u
 #define BIND_KD_ROPES 23u
 #define BIND_PIXEL_ACCUMULATED 24u
-#define N_BINDINGS 25u
+#define BIND_PIXEL_FEATURES 25u
+#define N_BINDINGS 26u
 
 // A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
-#define BIND_CAST_RAYS 25u
-#define BIND_CAST_HITS 26u
+#define BIND_CAST_RAYS 26u
+#define BIND_CAST_HITS 27u
 
 #endif

@@ -5,7 +5,7 @@ use std::{path::PathBuf, str::FromStr};
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 use kdray::{
     cast::Query,
-    frame::{Crop, Denoise, Primary, RenderOptions, Tonemap, Traversal},
+    frame::{Aov, Crop, Denoise, Primary, RenderOptions, Tonemap, Traversal},
     gpu::DeviceSelector,
     scene::RenderDefaults,
 };
@@ -52,6 +52,9 @@ pub struct RenderArgs {
     /// Samples a pixel, 1 to 65536: the first at its centre, more of them smooth edges
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..=65_536))]
     pub spp: u32,
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(help = format!("What else to write of each pixel, as layers of an .exr, with commas: {}", Aov::words()))]
+    pub aov: Vec<Aov>,
     /// Levels of rays, 1 to 64: 1 stops at what the camera sees [default: the scene's]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=64))]
     pub max_depth: Option<u32>,
@@ -173,6 +176,7 @@ impl RenderArgs {
             denoise: self.denoise(scene.denoise),
             traversal: self.traversal,
             primary: self.primary,
+            features: !self.aov.is_empty(),
         })
     }
 
