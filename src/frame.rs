@@ -91,7 +91,8 @@ impl Tonemap {
 /// How a ray finds its way through the kd-tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Traversal {
-    /// A bit a level says which siblings are still to be visited; parent links lead back to them.
+    /// A bit a level says which siblings are still to be visited; the eight newest are kept, parent links lead back to
+    /// older ones.
     Mask,
     /// The paper's own: a bit a level says which siblings are done; their boxes tell whether to visit them.
     MaskBoxes,
@@ -99,9 +100,9 @@ pub enum Traversal {
     Restart,
     /// Back to the deepest ancestor that the ray has not left, by its box.
     Backtrack,
-    /// The four newest far children; older ones by a restart.
+    /// The eight newest far children; older ones by a restart.
     ShortStack,
-    /// From leaf to leaf, by links to its neighbours; where the ray keeps near an edge, by the mask.
+    /// From leaf to leaf, by links to its neighbours.
     Ropes,
     /// An array of far children.
     Stack,

@@ -26,7 +26,7 @@ layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters
 
 // The segment to the light, or false where the surface turns its back on it.
 bool shadow_segment(Ray ray, Hit hit, Light light, out Ray segment) {
-    Surface surface = surface_at(ray, hit, triangles[hit.triangle_ix]);
+    Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
     LightSample to_light = sample_light(light, surface.point_world);
     if (!(dot(surface.geometric, to_light.direction) > 0.0)) return false;
     segment = ray_from(surface, to_light.direction, hit.triangle_ix, ray, vec3(0.0));

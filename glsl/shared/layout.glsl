@@ -1,6 +1,6 @@
 // What the host and the kernels share: constants, structs and bindings, once.
 //
-// build.rs turns this file into src/layout.rs's contents: `#define NAME 1u` becomes a `pub const NAME: u32`, a struct
+// build.rs turns this file into src/layout.rs's contents: `#define NAME 1u` becomes a `pub const NAME: u32` (1.0: f32), a struct
 // a `#[repr(C)]` one with a size assert. Members are laid out by std430 without padding: a vec3 is always followed
 // by a 4-byte scalar, which fills its fourth word; whatever std430 would pad is refused by the build.
 #ifndef KDRAY_LAYOUT
@@ -27,6 +27,10 @@
 #define KD_CHILD_SHIFT 2u
 // Levels below the root that the traversal's bit mask can hold: two words.
 #define KD_MAX_DEPTH 64u
+
+// Times the scene's largest coordinate: rays that start farther away are moved up to the scene first (the tree's
+// rounding margin is derived for this).
+#define KD_ORIGIN_REACH 4.0
 
 // How rays find their way through the tree: the kernels' specialization constant TRAVERSAL.
 #define TRAVERSAL_MASK 0u
@@ -117,7 +121,8 @@ struct Ray {
 };
 
 // 32 bytes. A ray that is cast, not rendered: direction of any length, which is the unit of t; t in (t_min, t_max], any
-// bounds, but those below 2^-126 may count as 0.
+// bounds, but those below 2^-126 may count as 0. Bounds are kept to the last bit where the origin lies within
+// KD_ORIGIN_REACH, elsewhere to 2^-24 of the way to the scene.
 struct CastRay {
     vec3 origin;
     float t_min;
