@@ -9,7 +9,6 @@
 
 // 1: note what segments cost.
 layout(constant_id = 2) const uint COUNT_COSTS = 0u;
-#include "steps.glsl"
 #include "kdtree.glsl"
 #include "surface.glsl"
 #include "light.glsl"

@@ -7,7 +7,6 @@
 
 // 1: note what rays cost.
 layout(constant_id = 2) const uint COUNT_COSTS = 0u;
-#include "steps.glsl"
 #include "kdtree.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;

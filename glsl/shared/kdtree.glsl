@@ -7,6 +7,7 @@
 #define KDRAY_KDTREE
 
 #include "layout.glsl"
+#include "steps.glsl"
 #include "triangle.glsl"
 
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
@@ -72,6 +73,7 @@ Ray near_scene(Ray ray, out float t_start) {
 }
 
 KdNode kd_node(uint node_ix) {
+    count_steps(1u);
     uvec2 words = kd_nodes[node_ix];
     return KdNode(words.x, words.y);
 }
@@ -157,6 +159,7 @@ KdNode descend(TraversalRay ray, inout Cell cell) {
 
 // A triangle against the ray; of two hits at one t the lower index wins, whatever the order of triangles.
 void intersect(TraversalRay ray, uint triangle_ix, inout Hit best) {
+    count_steps(1u);
     Hit hit;
     if (!intersect_triangle(ray.shear, triangle_at(triangle_ix), triangle_ix, hit)) return;
     bool nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);

@@ -1,5 +1,5 @@
-// What an invocation's rays read of the tree. Who includes this says whether to count: COUNT_COSTS, a constant; where it
-// is 0, nothing is left of it.
+// What an invocation's rays read of the tree. Who includes this says before whether to count, by COUNT_COSTS, a constant;
+// where it is 0, nothing is left of the counting.
 #ifndef KDRAY_STEPS
 #define KDRAY_STEPS
 
