@@ -40,12 +40,19 @@ pub enum Command {
 pub struct RenderArgs {
     /// Scene file
     pub scene: PathBuf,
-    /// Picture to write, .png or .exr (linear radiance) [default: the scene's name, .png]
+    /// Picture to write, .png or .exr (linear radiance) [default: the scene's name, .png]; with --path, #### stands for
+    /// the frame's number
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Pixels, as 1024x768 [default: the scene's]
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
+    /// Move the camera as keyframes in this TOML file say, and write a picture a frame
+    #[arg(long, value_name = "FILE", conflicts_with = "repeat")]
+    pub path: Option<PathBuf>,
+    /// Frames of the path to render, as 0-99 or 7 [default: from the first keyframe to the last]
+    #[arg(long, value_name = "A-B", requires = "path")]
+    pub frames: Option<Frames>,
     /// Only the pixels x0 <= x < x1, y0 <= y < y1 of the picture, counted from its upper left corner
     #[arg(long, value_name = "x0,y0,x1,y1")]
     pub crop: Option<Crop>,
@@ -249,6 +256,27 @@ impl FromStr for Size {
     }
 }
 
+/// Frames from the first to the last, both of them too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frames {
+    pub first: u32,
+    pub last: u32,
+}
+
+impl FromStr for Frames {
+    type Err = &'static str;
+
+    fn from_str(word: &str) -> Result<Self, Self::Err> {
+        let number = |digits: &str| digits.parse().ok().filter(|frame| *frame <= 1_000_000);
+        let (first, last) = word.split_once('-').unwrap_or((word, word));
+        match (number(first), number(last)) {
+            (Some(first), Some(last)) if first <= last => Ok(Self { first, last }),
+            (Some(_), Some(_)) => Err("the first frame comes after the last"),
+            _ => Err("expected A-B or A, whole numbers up to 1000000"),
+        }
+    }
+}
+
 fn threshold(word: &str) -> Result<f32, String> {
     word.parse().ok().filter(|x| (0.0..=4.0).contains(x)).ok_or_else(|| "expected a number from 0 to 4".into())
 }
@@ -283,6 +311,15 @@ mod tests {
         assert_eq!("1x16384".parse(), Ok(Size { width: 1, height: 16384 }));
         for word in ["", "x", "0x1", "1x0", "16385x1", "-1x1", "1x1x1", "1", "1 x 1", "4294967297x1", "1X1"] {
             assert!(word.parse::<Size>().is_err(), "{word}");
+        }
+    }
+
+    #[test]
+    fn frames() {
+        assert_eq!("3-17".parse(), Ok(Frames { first: 3, last: 17 }));
+        assert_eq!("0".parse(), Ok(Frames { first: 0, last: 0 }));
+        for word in ["", "-", "3-", "-3", "4-3", "1-2-3", "1.5-2", "0-1000001", "a-b"] {
+            assert!(word.parse::<Frames>().is_err(), "{word}");
         }
     }
 

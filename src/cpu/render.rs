@@ -20,7 +20,7 @@ use crate::{
     frame::{BounceStats, Picture, Primary, Profile, RenderOptions},
     kdtree::{Extras, KdTree},
     layout::{Bounce, Feature, Frame, Hit, Ray, SCAN_BLOCK_SIZE},
-    scene::Scene,
+    scene::{Camera, Scene},
 };
 
 /// How a frame is cut into pieces. The picture does not depend on it.
@@ -42,6 +42,7 @@ impl Default for Batching {
 /// A scene, and its picture in the making, sample by sample.
 pub struct Renderer<'a> {
     scene: &'a Scene,
+    camera: Camera,
     tree: &'a KdTree,
     options: &'a RenderOptions,
     batching: Batching,
@@ -71,6 +72,7 @@ impl<'a> Renderer<'a> {
         let n_pixels = frame.width as usize * frame.height as usize;
         Self {
             scene,
+            camera: scene.camera,
             tree,
             options,
             batching,
@@ -96,7 +98,7 @@ impl<'a> Renderer<'a> {
         self.clock = Clock::start();
         self.bounces.clear();
         self.n_batches = 0;
-        self.frame.set_view(&self.scene.camera, self.n_samples);
+        self.frame.set_view(&self.camera, self.n_samples);
         if self.n_samples == 1 {
             self.pixel_accumulated.clone_from(&self.pixel_radiance);
         }
@@ -111,6 +113,16 @@ impl<'a> Renderer<'a> {
         self.finish();
         self.n_samples += 1;
         self.profile()
+    }
+
+    /// Looks from elsewhere from the next sample on, which is the first of a new picture.
+    pub fn set_camera(&mut self, camera: &Camera) {
+        self.camera = *camera;
+        self.reset_samples();
+    }
+
+    pub fn options(&self) -> &RenderOptions {
+        self.options
     }
 
     /// The next sample is the first of a new picture.

@@ -11,6 +11,7 @@ mod material;
 pub mod mesh;
 pub mod normal;
 mod obj;
+mod path;
 mod read;
 mod smooth;
 
@@ -18,7 +19,7 @@ use std::path::Path;
 
 use glam::Vec3;
 
-pub use self::{error::SceneError, material::illum_flags};
+pub use self::{error::SceneError, material::illum_flags, path::CameraPath};
 use crate::{
     frame::{Denoise, RenderOptions, Tonemap},
     layout::{Light, Material, Triangle},
