@@ -22,6 +22,7 @@ mod words;
 
 pub mod frame;
 pub mod layout;
+mod profile;
 
 pub mod scene;
 

@@ -34,6 +34,7 @@ fn usage_mistakes_are_refused_before_the_scene_is_read() {
         (&["render", "none.toml", "--exposure", "inf"], "--exposure"),
         (&["render", "none.toml", "--tonemap", "film"], "linear, agx, aces"),
         (&["render", "none.toml", "--spp", "0"], "--spp"),
+        (&["render", "none.toml", "--spp", "2", "--trace", "x.json"], "single sample"),
         (&["render", "none.toml", "--crop", "1,2,3"], "x0,y0,x1,y1"),
         (&["render", "none.toml", "--crop", "5,2,5,9"], "x0 must be less than x1"),
         (&["render", "none.toml", "--aov", "depth,colour"], "depth, normal, position"),

@@ -5,7 +5,7 @@
 // Reads cast_rays and the tree; writes cast_hits.
 #include "layout.glsl"
 
-const uint COUNT_COSTS = 0u;
+const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
 
 layout(constant_id = 2) const bool ANY_HIT = false;

@@ -232,6 +232,12 @@ struct CastBatch {
     uint n_rays;
 };
 
+// Push constants of a cast by the driver's own ray tracing: the address of its structure.
+struct DriverCast {
+    uint scenery_low;
+    uint scenery_high;
+};
+
 // Bindings of the frame's descriptor set.
 #define BIND_FRAME 0u
 #define BIND_TRIANGLES 1u

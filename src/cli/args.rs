@@ -95,9 +95,12 @@ pub struct RenderArgs {
     /// Draw the frame so many times and report the one of median time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
-    /// Write the report as JSON, too
+    /// Write the report as JSON, with the times and rays of each pass of each bounce
     #[arg(long, value_name = "FILE")]
     pub profile: Option<PathBuf>,
+    /// Write what CPU and device did when as Chrome trace events, for Perfetto or chrome://tracing
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
     /// Run under the Khronos validation layer and fail on any message
     #[arg(long)]
     pub validate: bool,
@@ -159,8 +162,15 @@ impl RenderArgs {
         if matches!(self.denoise, Some(DenoiseWord::Off)) && self.denoise_threshold.is_some() {
             return Err(CliError::Usage("--denoise-threshold has no meaning with --denoise off".into()));
         }
-        if self.output.is_some() && self.output == self.profile {
-            return Err(CliError::Usage("--output and --profile name the same file".into()));
+        if self.trace.is_some() && (self.spp > 1 || self.path.is_some()) {
+            return Err(CliError::Usage("--trace shows a single sample: it goes with neither --spp nor --path".into()));
+        }
+        let files = [("--output", &self.output), ("--profile", &self.profile), ("--trace", &self.trace)];
+        for (file_ix, (name, file)) in files.iter().enumerate() {
+            let same = files[..file_ix].iter().find(|(_, other)| file.is_some() && other == file);
+            if let Some((other, _)) = same {
+                return Err(CliError::Usage(format!("{other} and {name} name the same file")));
+            }
         }
         Ok(())
     }
@@ -184,6 +194,8 @@ impl RenderArgs {
             traversal: self.traversal,
             primary: self.primary,
             features: !self.aov.is_empty(),
+            // Where anybody wants to know where the time went.
+            profile: !self.quiet || self.profile.is_some() || self.trace.is_some(),
         })
     }
 

@@ -13,7 +13,9 @@ mod log;
 mod progress;
 mod render;
 mod report;
+mod spans;
 mod table;
+mod trace;
 
 use std::{
     ffi::OsString,

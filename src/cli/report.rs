@@ -258,7 +258,7 @@ mod tests {
     use super::*;
 
     fn frame(ms: impl Fn(f64) -> Option<f64>) -> Frame {
-        let pass = |name, bounce, time| PassTime { name, bounce, ms: ms(time) };
+        let pass = |name, bounce, time| PassTime { name, bounce, ms: ms(time), ..PassTime::default() };
         let stats = |n_rays, n_shadow_rays| BounceStats { n_rays, n_hits: 3, n_shadow_rays };
         Frame::from(Profile {
             device: "d".to_owned(),
@@ -272,6 +272,7 @@ mod tests {
             bounces: vec![stats(3000, 1000), stats(500, 0)],
             n_batches: 1,
             frame_ms: ms(10.0),
+            begun_at: None,
         })
     }
 

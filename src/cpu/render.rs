@@ -174,6 +174,7 @@ impl<'a> Renderer<'a> {
             }
             let next = self.next_rays(depth, capacity);
             if next.overflow != 0 {
+                self.clock.end_batch(&stats, self.options.primary);
                 self.batch(first_pixel, n_pixels / 2);
                 self.batch(first_pixel + n_pixels / 2, n_pixels - n_pixels / 2);
                 return;
@@ -263,11 +264,8 @@ impl<'a> Renderer<'a> {
     fn count(&mut self, stats: &[BounceStats]) {
         self.n_batches += 1;
         self.bounces.resize(self.bounces.len().max(stats.len()), BounceStats::default());
-        for (sum, bounce) in self.bounces.iter_mut().zip(stats) {
-            sum.n_rays += bounce.n_rays;
-            sum.n_hits += bounce.n_hits;
-            sum.n_shadow_rays += bounce.n_shadow_rays;
-        }
+        self.bounces.iter_mut().zip(stats).for_each(|(sum, bounce)| sum.add(bounce));
+        self.clock.end_batch(stats, self.options.primary);
     }
 
     /// The mean of the samples, and the post processes.
@@ -287,6 +285,7 @@ impl<'a> Renderer<'a> {
         Profile {
             device: format!("CPU, {} threads", rayon::current_num_threads()),
             frame_ms: Some(self.clock.elapsed_ms()),
+            begun_at: Some(self.clock.begun_at()),
             passes: self.clock.passes().to_vec(),
             bounces: self.bounces.clone(),
             n_batches: self.n_batches,

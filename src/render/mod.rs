@@ -4,7 +4,9 @@ mod changes;
 mod profile;
 mod schedule;
 
-use std::{mem, sync::Arc};
+use std::{mem, sync::Arc, time::Instant};
+
+use tracing::info_span;
 
 use self::schedule::{Schedule, queue_capacity, split_evenly};
 use crate::{
@@ -69,11 +71,13 @@ impl Renderer {
         constants.queue_capacity =
             fixed_capacity.unwrap_or_else(|| queue_capacity(context.limits(), &constants, branches));
         let spans = split_evenly(constants.width * constants.height, constants.queue_capacity);
-        let schedule = Schedule::new(&context, &constants, spans)?;
+        let schedule = Schedule::new(&context, &constants, spans, options.profile)?;
+        let uploading = info_span!("upload scene").entered();
         let mut resources = Resources::new(&context, scene, tree, &constants, schedule.n_rows())?;
         resources.fit(&context, &constants, options.features)?;
         resources.add_extras(&context, tree, options.traversal)?;
-        let passes = Passes::new(&context, &resources.bindings, options)?;
+        drop(uploading);
+        let passes = info_span!("make pipelines").in_scope(|| Passes::new(&context, &resources.bindings, options))?;
         let (camera, options) = (scene.camera, options.clone());
         Ok(Self { context, camera, options, fixed_capacity, branches, resources, passes, schedule, n_samples: 0 })
     }
@@ -111,17 +115,20 @@ impl Renderer {
         constants.set_view(&self.camera, sample_ix);
         self.resources.set_constants(&constants);
         loop {
-            let frame = self.record()?;
+            let frame = info_span!("record").in_scope(|| self.record())?;
+            let running = info_span!("submit and wait").entered();
+            let begun_at = Instant::now();
             self.context.submit(&frame.iter().collect::<Vec<_>>())?;
             self.context.wait()?;
-            drop(frame);
+            drop((frame, running));
+            let _fetching = info_span!("fetch counts").entered();
             let bounces = self.resources.bounces.download()?;
             if !bounces.iter().any(|row| row.overflow != 0) {
                 self.n_samples = sample_ix + 1;
-                return self.profile(&bounces);
+                return self.profile(&bounces, begun_at);
             }
             let spans = self.schedule.split(&bounces, &constants)?;
-            self.schedule = Schedule::new(&self.context, &constants, spans)?;
+            self.schedule = Schedule::new(&self.context, &constants, spans, self.options.profile)?;
             self.resources.resize_bounces(&self.context, self.schedule.n_rows())?;
         }
     }
@@ -143,6 +150,7 @@ impl Renderer {
     /// # Errors
     /// A failed copy.
     pub fn picture(&self) -> Result<Picture, GpuError> {
+        let _fetching = info_span!("fetch picture").entered();
         let (pixels, n_pixels) = (&self.resources.pixels, self.resources.n_pixels());
         let (window, crop) = (self.options.window(), self.options.crop_or_whole());
         let display = pixels.pixel_display.download_first(n_pixels)?;
@@ -187,7 +195,7 @@ impl Renderer {
     }
 
     fn command_buffer(&self, name: &str, body: impl FnOnce(&Commands)) -> Result<CommandBuffer, GpuError> {
-        CommandBuffer::record(&self.context, name, Some(&self.schedule.timer), body)
+        CommandBuffer::record(&self.context, name, self.schedule.timer.as_ref(), body)
     }
 
     fn begin_frame(&self, commands: &Commands) {

@@ -17,6 +17,8 @@ pub enum Suite {
     Paper(PaperArgs),
     /// Every way through the kd-tree, on primary, shadow, mirror and diffuse rays of a mesh
     Traversal(TraversalArgs),
+    /// The traversal against the driver's own ray tracing, on the same rays; exits with 4 where the device lacks it
+    Driver(DriverArgs),
 }
 
 #[derive(clap::Args)]
@@ -62,6 +64,26 @@ pub struct TraversalArgs {
     /// Cast on all threads of the CPU, without Vulkan
     #[arg(long, conflicts_with = "device")]
     pub cpu: bool,
+    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
+    pub device: Option<DeviceSelector>,
+    #[command(flatten)]
+    pub files: FileArgs,
+}
+
+#[derive(clap::Args)]
+pub struct DriverArgs {
+    /// OBJ or scene file
+    pub mesh: PathBuf,
+    /// Pixels, one primary ray each
+    #[arg(long, value_name = "WxH", default_value = "1920x1080")]
+    pub size: Size,
+    /// Timed casts of each set of rays
+    #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
+    pub repeat: u16,
+    /// Leave the scene as it is: its own camera and first light, and no closed room around it
+    #[arg(long)]
+    pub no_room: bool,
     /// Device by its index in `kdray devices` or a part of its name [default: the best one]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,

@@ -1,6 +1,7 @@
 //! `kdray bench`: measures, and prints a table; one file a suite.
 
 mod args;
+mod driver;
 mod paper;
 mod traversal;
 
@@ -12,5 +13,6 @@ pub fn run(suite: &Suite) -> Result<(), CliError> {
     match suite {
         Suite::Paper(args) => paper::run(args),
         Suite::Traversal(args) => traversal::run(args),
+        Suite::Driver(args) => driver::run(args),
     }
 }

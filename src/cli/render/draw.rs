@@ -11,6 +11,7 @@ use kdray::{
     render::Renderer,
     scene::{Camera, Scene},
 };
+use tracing::info_span;
 
 use crate::cli::progress::Steps;
 
@@ -20,9 +21,8 @@ pub enum Drawer<'a> {
     Cpu(Box<cpu::Renderer<'a>>),
 }
 
-/// A picture and what it took.
+/// What comes of drawing, beside the picture.
 pub struct Drawn {
-    pub picture: Picture,
     /// Of the first sample, at the pixels' centres; empty where the options do not ask for them.
     pub features: Vec<Feature>,
     /// All samples together.
@@ -42,7 +42,7 @@ impl<'a> Drawer<'a> {
         })
     }
 
-    /// The picture that a camera sees, by so many samples a pixel.
+    /// Draws what a camera sees by so many samples a pixel.
     pub fn draw(&mut self, camera: &Camera, n_samples: u32, steps: &mut Steps) -> Result<Drawn, GpuError> {
         self.set_camera(camera);
         let mut profile = self.draw_sample()?;
@@ -52,7 +52,7 @@ impl<'a> Drawer<'a> {
             profile.add(&self.draw_sample()?);
             steps.step();
         }
-        Ok(Drawn { picture: self.picture()?, features, profile })
+        Ok(Drawn { features, profile })
     }
 
     fn set_camera(&mut self, camera: &Camera) {
@@ -65,7 +65,7 @@ impl<'a> Drawer<'a> {
     fn draw_sample(&mut self) -> Result<Profile, GpuError> {
         match self {
             Self::Device(renderer) => renderer.draw_sample(),
-            Self::Cpu(renderer) => Ok(renderer.draw_sample()),
+            Self::Cpu(renderer) => Ok(info_span!("render").in_scope(|| renderer.draw_sample())),
         }
     }
 
@@ -77,7 +77,8 @@ impl<'a> Drawer<'a> {
         }
     }
 
-    fn picture(&self) -> Result<Picture, GpuError> {
+    /// The picture drawn last.
+    pub fn picture(&self) -> Result<Picture, GpuError> {
         match self {
             Self::Device(renderer) => renderer.picture(),
             Self::Cpu(renderer) => Ok(renderer.picture()),

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use kdray::{
-    frame::Aov,
+    frame::{Aov, Picture},
+    layout::Feature,
     output::{self, Format, HeatMap},
 };
 
-use super::draw::Drawn;
 use crate::cli::{args::RenderArgs, error::CliError};
 
 /// A picture's file and those beside it.
@@ -42,8 +42,7 @@ impl Files {
         Ok(self.beside().try_for_each(|path| output::check(path))?)
     }
 
-    pub fn write(&self, aovs: &[Aov], drawn: &Drawn) -> Result<(), CliError> {
-        let Drawn { picture, features, .. } = drawn;
+    pub fn write(&self, aovs: &[Aov], picture: &Picture, features: &[Feature]) -> Result<(), CliError> {
         if let Some(path) = &self.layers {
             output::write_layers(path, picture, aovs, features)?;
         }
@@ -67,10 +66,7 @@ pub fn check_outputs(args: &RenderArgs) -> Result<(), CliError> {
             numbered(path, 0)?;
         }
     }
-    if let Some(path) = &args.profile {
-        output::check(path)?;
-    }
-    Ok(())
+    Ok([&args.profile, &args.trace].into_iter().flatten().try_for_each(|path| output::check(path))?)
 }
 
 /// A PNG of the scene's name in the working directory.

@@ -3,7 +3,7 @@
 mod draw;
 mod files;
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use kdray::{
     frame::Profile,
@@ -12,6 +12,7 @@ use kdray::{
     output,
     scene::{Camera, CameraPath, Scene},
 };
+use tracing::info_span;
 
 use self::{
     draw::Drawer,
@@ -24,6 +25,8 @@ use super::{
     open_device, print,
     progress::Progress,
     report::{Report, Spread},
+    spans::Spans,
+    trace::trace_json,
 };
 
 /// Loads, builds, renders, writes and reports. What can be refused is refused before the work that it would waste.
@@ -32,8 +35,10 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     check_outputs(args)?;
     set_threads(args.threads)?;
 
-    let progress = Progress::new(args.quiet, 3);
-    let (scene, load_ms) = progress.stage(&format!("loading {}", args.scene.display()), || Scene::load(&args.scene));
+    let (begun_at, spans) = (Instant::now(), Spans::default());
+    let progress = Progress::with_spans(args.quiet, 3, args.trace.is_some().then_some(&spans));
+    let loading = format!("loading {}", args.scene.display());
+    let (scene, load_ms) = progress.stage(&loading, || info_span!("load scene").in_scope(|| Scene::load(&args.scene)));
     let scene = scene?;
     let views = views(args, &scene)?;
     for view in &views {
@@ -41,12 +46,14 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     }
     let options = args.options(&scene.defaults)?;
     let device = ContextOptions { device: args.device.clone(), validate: args.validate };
-    let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
+    let opening = || info_span!("create device").in_scope(|| open_device(&device, &progress));
+    let context = if args.cpu { None } else { Some(opening()?) };
 
     let n_triangles = scene.triangles.len();
     let build_options = BuildOptions::default();
     let building = format!("building the kd-tree of {n_triangles} triangles");
-    let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &build_options));
+    let build = || KdTree::build(&scene.triangles, &build_options);
+    let (tree, build_ms) = progress.stage(&building, || info_span!("build tree").in_scope(build));
     let crop = options.crop_or_whole();
     let rendering = format!("rendering {}x{}", crop.width(), crop.height());
     let (drawn, _) = progress.stage(&rendering, || {
@@ -57,6 +64,11 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let (profiles, render_ms) = drawn?;
     drop(progress);
 
+    let repeated = Spread::of(&profiles);
+    let profile = median(profiles);
+    if let Some(path) = &args.trace {
+        output::write(path, &trace_json(begun_at, &spans.sorted(), &profile))?;
+    }
     let report = Report {
         scene: scene.name,
         pictures: views.iter().map(|view| view.files.picture.clone()).collect(),
@@ -68,8 +80,8 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         load_ms,
         build_ms,
         render_ms,
-        repeated: Spread::of(&profiles),
-        frame: median(profiles).into(),
+        repeated,
+        frame: profile.into(),
     };
     if let Some(path) = &args.profile {
         output::write(path, &report.json())?;
@@ -118,17 +130,18 @@ fn draw_and_write(
     begin: Instant,
 ) -> Result<(Vec<Profile>, f64), CliError> {
     let mut steps = progress.steps(message, views.len() as u32 * args.spp * u32::from(args.repeat));
-    let (mut profiles, mut drawing, mut last) = (Vec::new(), std::time::Duration::ZERO, begin);
+    let (mut profiles, mut drawing, mut last) = (Vec::new(), Duration::ZERO, begin);
     for view in views {
-        for nth in 1..=args.repeat {
+        let mut features = Vec::new();
+        for _ in 0..args.repeat {
             let drawn = drawer.draw(&view.camera, args.spp, &mut steps)?;
-            drawing += last.elapsed();
-            if nth == args.repeat {
-                view.files.write(&args.aov, &drawn)?;
-            }
             profiles.push(drawn.profile);
-            last = Instant::now();
+            features = drawn.features;
         }
+        let picture = drawer.picture()?;
+        drawing += last.elapsed();
+        view.files.write(&args.aov, &picture, &features)?;
+        last = Instant::now();
     }
     Ok((profiles, drawing.as_secs_f64() * 1e3))
 }
