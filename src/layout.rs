@@ -29,6 +29,7 @@ mod tests {
             BIND_BOUNCES => Some("Bounce"),
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
             BIND_KD_BOXES => Some("KdBox"),
+            BIND_LEAF_PLANES => Some("Plane"),
             BIND_CAST_RAYS => Some("CastRay"),
             BIND_PIXEL_FEATURES => Some("Feature"),
             BIND_COUNTERS => Some("Counters"),

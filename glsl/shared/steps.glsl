@@ -3,7 +3,7 @@
 #ifndef KDRAY_STEPS
 #define KDRAY_STEPS
 
-// Nodes read and triangles tested so far.
+// Nodes, and triangles of leaves, so far.
 uint n_steps = 0u;
 
 void count_steps(uint n) {
