@@ -1,27 +1,38 @@
 //! What a frame is asked for, and what comes of it: the options, the picture and the profile, alike on GPU and CPU.
 
-use std::{fmt, str::FromStr, time::Instant};
+mod aov;
+mod crop;
+mod profile;
 
-use serde::Serialize;
-
+pub use self::{
+    aov::{Aov, Channel, Samples},
+    crop::Crop,
+    profile::{BounceStats, PassTime, Profile},
+};
 use crate::layout;
+pub use crate::words::UnknownWord;
 
 /// How a frame is rendered. The scene's own defaults fill what the user leaves open.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// Pixels.
+    /// Of the whole picture, pixels.
     pub width: u32,
-    /// Pixels.
+    /// As `width`.
     pub height: u32,
+    /// The part of the picture to render, within it; none for all.
+    pub crop: Option<Crop>,
     /// Levels of rays, the primary one counted: 1 is ray casting with shadows (Algorithm 1's `maximumDepth`).
     pub max_depth: u32,
     /// Factor on radiance before it is encoded for display.
     pub exposure: f32,
+    pub tonemap: Tonemap,
     pub denoise: Denoise,
     pub traversal: Traversal,
     pub primary: Primary,
     /// Whether the device takes times and counts; without them its frames have empty profiles.
     pub profile: bool,
+    /// Note what the rays of each pixel meet and cost, too.
+    pub features: bool,
 }
 
 impl Default for RenderOptions {
@@ -29,12 +40,15 @@ impl Default for RenderOptions {
         Self {
             width: 1024,
             height: 768,
+            crop: None,
             max_depth: 5,
             exposure: 1.0,
+            tonemap: Tonemap::Linear,
             denoise: Denoise::Paper { threshold: Denoise::DEFAULT_THRESHOLD },
             traversal: Traversal::Mask,
             primary: Primary::Raster,
             profile: true,
+            features: false,
         }
     }
 }
@@ -53,6 +67,28 @@ pub enum Denoise {
 impl Denoise {
     /// A straight edge between black and white adds up to 1, a corner or a thin line to 2, a lone pixel to 4.
     pub const DEFAULT_THRESHOLD: f32 = 2.5;
+}
+
+/// How radiance, which knows no bounds, becomes what a display shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tonemap {
+    /// As it is, cut off at white.
+    Linear,
+    /// AgX: bright colours fade to white, dark ones keep their hue.
+    Agx,
+    /// The film-like curve of the Academy Color Encoding System.
+    Aces,
+}
+
+impl Tonemap {
+    /// The kernel's specialization constant.
+    pub(crate) fn constant(self) -> u32 {
+        match self {
+            Self::Linear => layout::TONEMAP_LINEAR,
+            Self::Agx => layout::TONEMAP_AGX,
+            Self::Aces => layout::TONEMAP_ACES,
+        }
+    }
 }
 
 /// How a ray finds its way through the kd-tree.
@@ -112,7 +148,7 @@ pub enum Primary {
     Trace,
 }
 
-/// A rendered frame. Rows from the top, left to right.
+/// A rendered frame, or the part of it that was asked for. Rows from the top, left to right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     pub width: u32,
@@ -121,107 +157,6 @@ pub struct Picture {
     pub radiance: Vec<[f32; 4]>,
     /// `width * height` sRGB-encoded RGBA pixels.
     pub display: Vec<[u8; 4]>,
-}
-
-/// Where a frame's time went; nothing where nobody asked.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Profile {
-    /// The device's own name.
-    pub device: String,
-    /// In the order of execution.
-    pub passes: Vec<PassTime>,
-    /// One row a bounce, 0 = primary rays; batches added up.
-    pub bounces: Vec<BounceStats>,
-    /// Ray batches that the frame was split into.
-    pub n_batches: u32,
-    /// From the first pass's start to the last one's end; none where the device has no timestamps.
-    pub frame_ms: Option<f64>,
-    /// When the device was given its first command, or the CPU began.
-    #[serde(skip)]
-    pub begun_at: Option<Instant>,
-}
-
-/// One pass of one bounce of one batch.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct PassTime {
-    /// Also the debug label and the kernel's file name.
-    pub name: &'static str,
-    /// None for passes that run once a frame, like `batch`.
-    pub bounce: Option<u32>,
-    /// In the order of execution.
-    pub batch: Option<u32>,
-    /// Since the frame's first pass began; none where the device has no timestamps, like `ms`.
-    pub start_ms: Option<f64>,
-    pub ms: Option<f64>,
-    /// Rays of the bounce; none where a pass has pixels.
-    pub n_rays_in: Option<u64>,
-    /// Of what finds hits: rays that hit; of shadow: segments that were tested; of shade and compaction: rays of the
-    /// next bounce. None where a pass leaves pixels.
-    pub n_rays_out: Option<u64>,
-}
-
-/// Rays of one bounce.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct BounceStats {
-    /// Rays whose closest hit was found.
-    pub n_rays: u64,
-    /// Those that hit something.
-    pub n_hits: u64,
-    /// Shadow segments that were tested.
-    pub n_shadow_rays: u64,
-}
-
-impl BounceStats {
-    /// Adds another batch's.
-    pub fn add(&mut self, other: &Self) {
-        self.n_rays += other.n_rays;
-        self.n_hits += other.n_hits;
-        self.n_shadow_rays += other.n_shadow_rays;
-    }
-}
-
-impl Profile {
-    /// Milliseconds of all passes of one name, or none where any lacks a timestamp.
-    pub fn pass_ms(&self, name: &str) -> Option<f64> {
-        self.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.ms).sum()
-    }
-}
-
-/// A word that names no variant of an option.
-#[derive(Debug, thiserror::Error)]
-#[error("`{word}` is not one of {expected}")]
-pub struct UnknownWord {
-    word: String,
-    expected: String,
-}
-
-/// Words for an option's variants, for the command line, scene files and JSON alike.
-macro_rules! words {
-    ($ty:ident { $($variant:ident = $word:literal),+ }) => {
-        impl $ty {
-            /// Every variant.
-            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
-
-            /// The words of all variants, with commas.
-            pub fn words() -> String {
-                [$($word),+].join(", ")
-            }
-        }
-        impl FromStr for $ty {
-            type Err = UnknownWord;
-            fn from_str(word: &str) -> Result<Self, UnknownWord> {
-                match word {
-                    $($word => Ok(Self::$variant),)+
-                    _ => Err(UnknownWord { word: word.to_owned(), expected: Self::words() }),
-                }
-            }
-        }
-        impl fmt::Display for $ty {
-            fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str(match self { $(Self::$variant => $word),+ })
-            }
-        }
-    };
 }
 
 words!(Traversal {
@@ -234,4 +169,5 @@ words!(Traversal {
     Stack = "stack",
     Brute = "brute"
 });
+words!(Tonemap { Linear = "linear", Agx = "agx", Aces = "aces" });
 words!(Primary { Raster = "raster", Trace = "trace" });

@@ -5,7 +5,7 @@
 //! ```text
 //! scene    files -> triangles, materials, lights, camera
 //! kdtree   triangles -> flat SAH kd-tree
-//! camera   scene + size -> the frame's constants
+//! camera   scene + size + sample -> the frame's constants
 //! render   the frame: passes, barriers, batches -> picture
 //!   passes   one kernel and one file each, on
 //!   gpu      the Vulkan layer
@@ -18,6 +18,9 @@
 
 #![deny(unsafe_code)]
 
+#[macro_use]
+mod words;
+
 pub mod frame;
 pub mod layout;
 mod profile;
@@ -27,6 +30,7 @@ pub mod scene;
 pub mod kdtree;
 
 pub mod camera;
+pub mod sampling;
 
 pub mod cpu;
 

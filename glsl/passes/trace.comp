@@ -2,8 +2,11 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Trace (the paper's section 2.3): one invocation a ray finds its closest hit through the kd-tree.
-// Reads rays and the tree; writes hits, counters[].n_hits.
+// Reads rays and the tree; writes hits, counters[].n_hits, pixel_features (n_rays, n_steps).
 #include "layout.glsl"
+
+// Whether what rays cost is noted.
+layout(constant_id = 3) const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
 
 // Whether hits are counted.
@@ -14,6 +17,7 @@ layout(push_constant) uniform BatchBlock { Batch batch; };
 layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_HITS) writeonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
+layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
 
 void main() {
@@ -22,6 +26,10 @@ void main() {
     if (ray_ix < bounces[batch.bounce_ix].n_rays) {
         Hit hit = traverse(rays[ray_ix], 0.0, false);
         hits[ray_ix] = hit;
+        if (COUNT_COSTS) {
+            atomicAdd(pixel_features[rays[ray_ix].pixel_ix].n_rays, 1u);
+            atomicAdd(pixel_features[rays[ray_ix].pixel_ix].n_steps, n_steps);
+        }
         is_hit = hit.triangle_ix != NO_TRIANGLE;
     }
     if (COUNTS) {

@@ -7,6 +7,7 @@
 #define KDRAY_KDTREE
 
 #include "layout.glsl"
+#include "steps.glsl"
 #include "triangle.glsl"
 
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
@@ -84,6 +85,7 @@ Ray near_scene(Ray ray, out float t_start) {
 }
 
 KdNode kd_node(uint node_ix) {
+    count_steps(1u);
     uvec2 words = kd_nodes[node_ix];
     return KdNode(words.x, words.y);
 }
@@ -188,6 +190,7 @@ void intersect_leaf(TraversalRay ray, KdNode leaf, vec2 interval, inout Hit best
     vec3 from = ray.shear.origin + interval.x * ray.direction;
     vec3 to = ray.shear.origin + interval.y * ray.direction;
     uint end = leaf.split_or_first + (leaf.axis_and_child >> KD_CHILD_SHIFT);
+    count_steps(end - leaf.split_or_first);
     for (uint i = leaf.split_or_first; i < end; ++i) {
         if (!is_clear(leaf_planes[i], from, to)) intersect(ray, leaf_triangles[i], best);
     }

@@ -47,6 +47,11 @@
 // Triangles that brute force takes: a driver is known to end any shader after 65,535 turns of its loops, in silence.
 #define BRUTE_MAX_TRIANGLES 65000u
 
+// How radiance becomes what a display shows: the kernel's specialization constant CURVE.
+#define TONEMAP_LINEAR 0u
+#define TONEMAP_AGX 1u
+#define TONEMAP_ACES 2u
+
 // Material.flags
 #define MATERIAL_SPECULAR 1u
 #define MATERIAL_REFLECT 2u
@@ -143,8 +148,13 @@ struct Hit {
     float v;
 };
 
-// The frame's constants (a uniform buffer, std140-compatible). Camera ray of pixel (x, y):
-// forward + (2 (x + 0.5) / width - 1) * right + (1 - 2 (y + 0.5) / height) * up.
+// The frame's constants (a uniform buffer, std140-compatible). width, height: of the window, the part of the picture
+// that is rendered; it begins at the picture's pixel (window_x, window_y). sample_x, sample_y: where the frame's sample
+// lies in each pixel, px from its upper left corner. Camera ray of the window's pixel (x, y):
+// forward + (2 (window_x + x + sample_x) / picture_width - 1) * right
+//         + (1 - 2 (window_y + y + sample_y) / picture_height) * up.
+// clip_from_world is the whole picture's, moved so that the sample lies in the middle of its pixel.
+// n_samples: how many samples a pixel there are with this frame's.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -163,6 +173,14 @@ struct Frame {
     uint max_depth;
     vec3 cell_max;
     uint queue_capacity;
+    uint picture_width;
+    uint picture_height;
+    uint window_x;
+    uint window_y;
+    float sample_x;
+    float sample_y;
+    uint n_samples;
+    uint reserved;
 };
 
 // One a batch and bounce, 64 bytes, sized by the bounce before: each `groups` is a VkDispatchIndirectCommand.
@@ -191,6 +209,24 @@ struct Bounce {
 struct Counters {
     uint n_hits;
     uint n_shadow_rays;
+};
+
+// 64 bytes: what the primary ray of a pixel's sample hits, and what all rays of the sample cost. normal: the shading
+// normal, unit length, towards the eye; albedo: Kd; depth: along the camera's view. Where nothing is hit, depth is
+// infinity, both indices are NO_TRIANGLE, the vectors 0.
+struct Feature {
+    vec3 position_world;
+    uint triangle_ix;
+    vec3 normal_world;
+    uint material_ix;
+    vec3 albedo;
+    float depth;
+    // Primary, secondary and shadow rays.
+    uint n_rays;
+    // Of all of them: nodes read, and leaves' triangles.
+    uint n_steps;
+    uint reserved0;
+    uint reserved1;
 };
 
 // Push constants: the batch's pixels [first_pixel, first_pixel + n_pixels) in tile order, and its row of `bounces`.
@@ -238,10 +274,12 @@ struct DriverCast {
 #define BIND_KD_BOXES 22u
 #define BIND_KD_ROPES 23u
 #define BIND_LEAF_PLANES 24u
-#define N_BINDINGS 25u
+#define BIND_PIXEL_ACCUMULATED 25u
+#define BIND_PIXEL_FEATURES 26u
+#define N_BINDINGS 27u
 
 // A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
-#define BIND_CAST_RAYS 25u
-#define BIND_CAST_HITS 26u
+#define BIND_CAST_RAYS 27u
+#define BIND_CAST_HITS 28u
 
 #endif

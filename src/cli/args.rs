@@ -5,7 +5,7 @@ use std::{path::PathBuf, str::FromStr};
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 use kdray::{
     cast::Query,
-    frame::{Denoise, Primary, RenderOptions, Traversal},
+    frame::{Aov, Crop, Denoise, Primary, RenderOptions, Tonemap, Traversal},
     gpu::DeviceSelector,
     scene::RenderDefaults,
 };
@@ -40,12 +40,28 @@ pub enum Command {
 pub struct RenderArgs {
     /// Scene file
     pub scene: PathBuf,
-    /// Picture to write, .png or .exr (linear radiance) [default: the scene's name, .png]
+    /// Picture to write, .png or .exr (linear radiance) [default: the scene's name, .png]; with --path, #### stands for
+    /// the frame's number
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Pixels, as 1024x768 [default: the scene's]
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
+    /// Move the camera as keyframes in this TOML file say, and write a picture a frame
+    #[arg(long, value_name = "FILE", conflicts_with = "repeat")]
+    pub path: Option<PathBuf>,
+    /// Frames of the path to render, as 0-99 or 7 [default: from the first keyframe to the last]
+    #[arg(long, value_name = "A-B", requires = "path")]
+    pub frames: Option<Frames>,
+    /// Only the pixels x0 <= x < x1, y0 <= y < y1 of the picture, counted from its upper left corner
+    #[arg(long, value_name = "x0,y0,x1,y1")]
+    pub crop: Option<Crop>,
+    /// Samples a pixel, 1 to 65536: the first at its centre, more of them smooth edges
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..=65_536))]
+    pub spp: u32,
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(help = format!("What else to write of each pixel, as layers of an .exr, with commas: {}", Aov::words()))]
+    pub aov: Vec<Aov>,
     /// Levels of rays, 1 to 64: 1 stops at what the camera sees [default: the scene's]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=64))]
     pub max_depth: Option<u32>,
@@ -58,6 +74,9 @@ pub struct RenderArgs {
     /// Factor on radiance before it is encoded for display [default: the scene's]
     #[arg(long, value_name = "X", value_parser = positive)]
     pub exposure: Option<f32>,
+    #[arg(long, value_name = "CURVE")]
+    #[arg(help = format!("From radiance to what a display shows: {} [default: the scene's]", Tonemap::words()))]
+    pub tonemap: Option<Tonemap>,
     #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
     #[arg(help = format!("How rays find their way through the tree: {}", Traversal::words()))]
     pub traversal: Traversal,
@@ -143,6 +162,9 @@ impl RenderArgs {
         if matches!(self.denoise, Some(DenoiseWord::Off)) && self.denoise_threshold.is_some() {
             return Err(CliError::Usage("--denoise-threshold has no meaning with --denoise off".into()));
         }
+        if self.trace.is_some() && (self.spp > 1 || self.path.is_some()) {
+            return Err(CliError::Usage("--trace shows a single sample: it goes with neither --spp nor --path".into()));
+        }
         let files = [("--output", &self.output), ("--profile", &self.profile), ("--trace", &self.trace)];
         for (file_ix, (name, file)) in files.iter().enumerate() {
             let same = files[..file_ix].iter().find(|(_, other)| file.is_some() && other == file);
@@ -153,20 +175,28 @@ impl RenderArgs {
         Ok(())
     }
 
-    /// The options asked for; the scene's own fill what was left open.
-    pub fn options(&self, scene: &RenderDefaults) -> RenderOptions {
+    /// The options asked for; the scene's own fill what was left open. A crop beyond the picture is refused.
+    pub fn options(&self, scene: &RenderDefaults) -> Result<RenderOptions, CliError> {
         let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });
-        RenderOptions {
+        if let Some(crop) = self.crop.filter(|crop| crop.x1 > width || crop.y1 > height) {
+            return Err(CliError::Usage(format!(
+                "--crop {crop} reaches beyond the picture of {width}x{height} pixels"
+            )));
+        }
+        Ok(RenderOptions {
             width,
             height,
+            crop: self.crop,
             max_depth: self.max_depth.unwrap_or(scene.max_depth),
             exposure: self.exposure.unwrap_or(scene.exposure),
+            tonemap: self.tonemap.unwrap_or(scene.tonemap),
             denoise: self.denoise(scene.denoise),
             traversal: self.traversal,
             primary: self.primary,
+            features: !self.aov.is_empty(),
             // Where anybody wants to know where the time went.
             profile: !self.quiet || self.profile.is_some() || self.trace.is_some(),
-        }
+        })
     }
 
     fn denoise(&self, scene: Denoise) -> Denoise {
@@ -238,6 +268,27 @@ impl FromStr for Size {
     }
 }
 
+/// Frames from the first to the last, both of them too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frames {
+    pub first: u32,
+    pub last: u32,
+}
+
+impl FromStr for Frames {
+    type Err = &'static str;
+
+    fn from_str(word: &str) -> Result<Self, Self::Err> {
+        let number = |digits: &str| digits.parse().ok().filter(|frame| *frame <= 1_000_000);
+        let (first, last) = word.split_once('-').unwrap_or((word, word));
+        match (number(first), number(last)) {
+            (Some(first), Some(last)) if first <= last => Ok(Self { first, last }),
+            (Some(_), Some(_)) => Err("the first frame comes after the last"),
+            _ => Err("expected A-B or A, whole numbers up to 1000000"),
+        }
+    }
+}
+
 fn threshold(word: &str) -> Result<f32, String> {
     word.parse().ok().filter(|x| (0.0..=4.0).contains(x)).ok_or_else(|| "expected a number from 0 to 4".into())
 }
@@ -272,6 +323,15 @@ mod tests {
         assert_eq!("1x16384".parse(), Ok(Size { width: 1, height: 16384 }));
         for word in ["", "x", "0x1", "1x0", "16385x1", "-1x1", "1x1x1", "1", "1 x 1", "4294967297x1", "1X1"] {
             assert!(word.parse::<Size>().is_err(), "{word}");
+        }
+    }
+
+    #[test]
+    fn frames() {
+        assert_eq!("3-17".parse(), Ok(Frames { first: 3, last: 17 }));
+        assert_eq!("0".parse(), Ok(Frames { first: 0, last: 0 }));
+        for word in ["", "-", "3-", "-3", "4-3", "1-2-3", "1.5-2", "0-1000001", "a-b"] {
+            assert!(word.parse::<Frames>().is_err(), "{word}");
         }
     }
 

@@ -17,8 +17,13 @@ const TRACING: [&str; 4] = ["visibility", "primary_hit", "trace", "shadow"];
 #[derive(Serialize)]
 pub struct Report {
     pub scene: String,
-    pub picture: PathBuf,
+    /// At least one, in the order of frames.
+    pub pictures: Vec<PathBuf>,
+    /// Written beside them.
+    pub extra_files: Vec<PathBuf>,
     pub options: Options,
+    /// A pixel.
+    pub samples: u32,
     pub triangles: usize,
     pub tree: Statistics,
     pub load_ms: f64,
@@ -57,8 +62,11 @@ impl Spread {
 pub struct Options {
     width: u32,
     height: u32,
+    /// x0,y0,x1,y1; none for all of the picture.
+    crop: Option<String>,
     max_depth: u32,
     exposure: f32,
+    tonemap: String,
     denoise: &'static str,
     denoise_threshold: Option<f32>,
     traversal: String,
@@ -74,8 +82,10 @@ impl From<&RenderOptions> for Options {
         Self {
             width: options.width,
             height: options.height,
+            crop: options.crop.map(|crop| crop.to_string()),
             max_depth: options.max_depth,
             exposure: options.exposure,
+            tonemap: options.tonemap.to_string(),
             denoise,
             denoise_threshold,
             traversal: options.traversal.to_string(),
@@ -169,14 +179,19 @@ fn rate(n_rays: u64, ms: Option<f64>) -> Option<f64> {
 impl Report {
     /// The report as text that ends with a line break.
     pub fn text(&self) -> String {
-        let Options { width, height, .. } = self.options;
+        let Options { width, height, crop, .. } = &self.options;
+        let crop = crop.as_ref().map(|crop| format!(" ({crop} of it)")).unwrap_or_default();
+        let samples = if self.samples > 1 { format!(", {} samples a pixel,", self.samples) } else { String::new() };
         let tree = &self.tree;
         let mut text = format!("{}: {} triangles, loaded in {:.0} ms\n", self.scene, self.triangles, self.load_ms);
         text += &format!(
             "kd-tree: {} nodes, depth {}, {:.2} references a triangle, built in {:.0} ms\n",
             tree.n_nodes, tree.depth, tree.references_per_triangle, self.build_ms
         );
-        text += &format!("{width}x{height} on {}: picture after {:.0} ms\n\n", self.frame.device, self.render_ms);
+        text += &format!(
+            "{width}x{height}{crop}{samples} on {}: picture after {:.0} ms\n\n",
+            self.frame.device, self.render_ms
+        );
         if self.frame.frame_ms.is_none() {
             text += "This device has no timestamps: where the time went is unknown.\n\n";
         }
@@ -186,8 +201,19 @@ impl Report {
         text += &self.frame.passes_text();
         text.push('\n');
         text += &self.frame.bounces_text();
-        text += &format!("\nwrote {}\n", self.picture.display());
+        text.push('\n');
+        text += &self.files_text();
         text
+    }
+
+    fn files_text(&self) -> String {
+        if let [first, .., last] = &self.pictures[..] {
+            let (n_pictures, n_extra) = (self.pictures.len(), self.extra_files.len());
+            let beside = if n_extra > 0 { format!(", and {n_extra} files beside them") } else { String::new() };
+            return format!("wrote {n_pictures} pictures, {} to {}{beside}\n", first.display(), last.display());
+        }
+        let paths = self.extra_files.iter().chain(&self.pictures);
+        paths.map(|path| format!("wrote {}\n", path.display())).collect()
     }
 
     /// The report as JSON that ends with a line break.

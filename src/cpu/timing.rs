@@ -45,16 +45,16 @@ impl Clock {
         self.batch_ix += 1;
     }
 
+    /// In the order of execution.
+    pub fn passes(&self) -> &[PassTime] {
+        &self.passes
+    }
+
     pub fn begun_at(&self) -> Instant {
         self.begin
     }
 
     pub fn elapsed_ms(&self) -> f64 {
         self.begin.elapsed().as_secs_f64() * 1e3
-    }
-
-    /// In the order of execution.
-    pub fn into_passes(self) -> Vec<PassTime> {
-        self.passes
     }
 }

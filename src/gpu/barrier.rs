@@ -18,7 +18,8 @@ pub enum Access {
     RayTracingUpdate,
     /// What a build of the driver's structure reads and writes.
     StructureBuild,
-    /// Vertex, compute, uniform and indirect reads: after an upload.
+    /// Vertex, compute, uniform and indirect reads and transfers: between an upload and whatever uses it, or a frame and
+    /// the next one's uploads.
     AllReads,
 }
 
@@ -27,11 +28,13 @@ impl Access {
         match self {
             Self::ComputeRead | Self::ComputeWrite | Self::ComputeUpdate => S::COMPUTE_SHADER,
             Self::IndirectRead => S::DRAW_INDIRECT,
-            Self::TransferRead | Self::TransferWrite => S::COPY,
+            Self::TransferRead => S::COPY,
+            // Updates are no copies, but clears.
+            Self::TransferWrite => S::COPY | S::CLEAR,
             Self::HostRead => S::HOST,
             Self::RayTracingUpdate => S::RAY_TRACING_SHADER_KHR,
             Self::StructureBuild => S::ACCELERATION_STRUCTURE_BUILD_KHR,
-            Self::AllReads => S::VERTEX_SHADER | S::COMPUTE_SHADER | S::DRAW_INDIRECT | S::COPY,
+            Self::AllReads => S::VERTEX_SHADER | S::COMPUTE_SHADER | S::DRAW_INDIRECT | S::COPY | S::CLEAR,
         }
     }
 

@@ -25,7 +25,7 @@ pub use acceleration::Scenery;
 pub use barrier::Access;
 pub use bindings::{Binding, BindingKind, BindingSet, Bindings};
 pub use buffer::{AnyBuffer, Buffer, BufferUse};
-pub use commands::{CommandBuffer, Commands, Dispatch};
+pub use commands::{Area, CommandBuffer, Commands, Dispatch, DrawDesc};
 pub use context::{Context, ContextOptions};
 pub use devices::{DeviceInfo, DeviceSelector, Limits, devices};
 pub use error::GpuError;

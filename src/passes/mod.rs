@@ -9,10 +9,14 @@ use crate::{
     layout::{BIND_FRAME, BIND_TRIANGLE_IDS},
 };
 
+mod accumulate;
 mod cast;
 mod compact;
 mod denoise;
+mod features;
+mod pixels;
 mod primary_hit;
+mod queues;
 mod resolve;
 mod resources;
 mod shade;
@@ -23,10 +27,14 @@ mod tree;
 mod visibility;
 
 pub use self::{
+    accumulate::Accumulate,
     cast::{Cast, CastResources},
     compact::Compact,
     denoise::Denoise,
+    features::Features,
+    pixels::Pixels,
     primary_hit::PrimaryHit,
+    queues::Queues,
     resolve::Resolve,
     resources::{Resources, bounce_row},
     shade::Shade,
@@ -50,10 +58,12 @@ pub struct Passes {
     pub visibility: Visibility,
     pub primary_hit: PrimaryHit,
     pub trace: Trace,
+    pub features: Features,
     pub shadow: Shadow,
     pub shade: Shade,
     pub compact: Compact,
     pub resolve: Resolve,
+    pub accumulate: Accumulate,
     pub denoise: Denoise,
     pub tonemap: Tonemap,
 }
@@ -66,13 +76,41 @@ impl Passes {
             visibility: Visibility::new(context, bindings)?,
             primary_hit: PrimaryHit::new(context, bindings, options)?,
             trace: Trace::new(context, bindings, options)?,
+            features: Features::new(context, bindings)?,
             shadow: Shadow::new(context, bindings, options)?,
             shade: Shade::new(context, bindings)?,
             compact: Compact::new(context, bindings)?,
             resolve: Resolve::new(context, bindings)?,
+            accumulate: Accumulate::new(context, bindings)?,
             denoise: Denoise::new(context, bindings)?,
-            tonemap: Tonemap::new(context, bindings)?,
+            tonemap: Tonemap::new(context, bindings, options.tonemap)?,
         })
+    }
+
+    /// Makes the kernels anew in which the options differ.
+    ///
+    /// # Errors
+    /// The driver refuses a shader; then all are as before.
+    pub fn set_options(
+        &mut self,
+        context: &Arc<Context>,
+        bindings: &Arc<Bindings>,
+        from: &RenderOptions,
+        to: &RenderOptions,
+    ) -> Result<(), GpuError> {
+        let counts = |options: &RenderOptions| (options.profile, options.features);
+        if (from.traversal, counts(from)) != (to.traversal, counts(to)) {
+            let trace = Trace::new(context, bindings, to)?;
+            self.shadow = Shadow::new(context, bindings, to)?;
+            self.trace = trace;
+        }
+        if from.tonemap != to.tonemap {
+            self.tonemap = Tonemap::new(context, bindings, to.tonemap)?;
+        }
+        if (from.primary, counts(from)) != (to.primary, counts(to)) {
+            self.primary_hit = PrimaryHit::new(context, bindings, to)?;
+        }
+        Ok(())
     }
 }
 

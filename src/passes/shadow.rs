@@ -21,11 +21,11 @@ impl Shadow {
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
         let [traversal, fuses_fma] = traversal_constants(context, options.traversal)?;
-        let constants = [traversal, fuses_fma, options.profile.into()];
+        let constants = [traversal, fuses_fma, options.profile.into(), options.features.into()];
         Ok(Self { kernel: kernel(context, bindings, "shadow", spirv!("shadow.comp"), &constants)? })
     }
 
-    /// Needs rays, hits. Leaves light_visibility; updates counters.
+    /// Needs rays, hits. Leaves light_visibility; updates counters, and pixel_features where the options ask for them.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.shadow_dispatch(batch));
     }

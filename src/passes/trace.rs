@@ -21,11 +21,11 @@ impl Trace {
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
         let [traversal, fuses_fma] = traversal_constants(context, options.traversal)?;
-        let constants = [traversal, fuses_fma, options.profile.into()];
+        let constants = [traversal, fuses_fma, options.profile.into(), options.features.into()];
         Ok(Self { kernel: kernel(context, bindings, "trace", spirv!("trace.comp"), &constants)? })
     }
 
-    /// Needs rays. Leaves hits; updates counters.
+    /// Needs rays. Leaves hits; updates counters, and pixel_features where the options ask for them.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.ray_dispatch(batch));
     }

@@ -11,6 +11,7 @@ mod material;
 pub mod mesh;
 pub mod normal;
 mod obj;
+mod path;
 mod read;
 mod smooth;
 
@@ -18,9 +19,9 @@ use std::path::Path;
 
 use glam::Vec3;
 
-pub use self::{error::SceneError, material::illum_flags};
+pub use self::{error::SceneError, material::illum_flags, path::CameraPath};
 use crate::{
-    frame::{Denoise, RenderOptions},
+    frame::{Denoise, RenderOptions, Tonemap},
     layout::{Light, Material, Triangle},
 };
 
@@ -69,13 +70,14 @@ pub struct RenderDefaults {
     /// Levels of rays, the primary one counted.
     pub max_depth: u32,
     pub exposure: f32,
+    pub tonemap: Tonemap,
     pub denoise: Denoise,
 }
 
 impl Default for RenderDefaults {
     fn default() -> Self {
-        let RenderOptions { width, height, max_depth, exposure, denoise, .. } = RenderOptions::default();
-        Self { width, height, max_depth, exposure, denoise }
+        let RenderOptions { width, height, max_depth, exposure, tonemap, denoise, .. } = RenderOptions::default();
+        Self { width, height, max_depth, exposure, tonemap, denoise }
     }
 }
 
