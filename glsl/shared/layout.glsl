@@ -33,7 +33,7 @@
 #define KD_ORIGIN_REACH 4.0
 // Times the scene's largest coordinate: a ray that keeps this far from a triangle's plane within a leaf has no hit there.
 // Twice the tree's margin, the second for the rounding of the plane and of the ray's distance to it.
-#define KD_PLANE_REACH 0.0000152587890625
+#define KD_PLANE_REACH 0.000015258789
 
 // How rays find their way through the tree: the kernels' specialization constant TRAVERSAL.
 #define TRAVERSAL_MASK 0u

@@ -10,7 +10,7 @@ use kdray::{
     scene::RenderDefaults,
 };
 
-use super::{bench::Suite, error::CliError};
+use super::{bench::Suite, build::Build, error::CliError};
 
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
 #[derive(Parser)]
@@ -80,6 +80,9 @@ pub struct RenderArgs {
     #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
     #[arg(help = format!("How rays find their way through the tree: {}", Traversal::words()))]
     pub traversal: Traversal,
+    /// How much work goes into the kd-tree
+    #[arg(long, value_enum, default_value_t = Build::Auto)]
+    pub build: Build,
     /// How primary rays find their triangles
     #[arg(long, value_name = "raster|trace", default_value_t = RenderOptions::default().primary)]
     pub primary: Primary,
@@ -124,6 +127,9 @@ pub struct CastArgs {
     #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
     #[arg(help = format!("How rays find their way through the tree: {}", Traversal::words()))]
     pub traversal: Traversal,
+    /// How much work goes into the kd-tree
+    #[arg(long, value_enum, default_value_t = Build::Auto)]
+    pub build: Build,
     /// Cast the rays so many times and report the least, median and greatest time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,

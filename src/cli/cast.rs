@@ -6,7 +6,7 @@ use kdray::{
     cast::{self, Cast, CastRay, Caster, CpuCaster, Hit, HitWriter, NO_TRIANGLE, Query, RAYS_PER_BATCH, RayReader},
     frame::Traversal,
     gpu::{Context, ContextOptions, GpuError},
-    kdtree::{BuildOptions, KdTree},
+    kdtree::KdTree,
     layout::Triangle,
     output,
     scene::Scene,
@@ -37,7 +37,8 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
 
     let n_triangles = scene.triangles.len();
-    let build_options = BuildOptions::default();
+    let n_casts = rays.n_rays() * u64::from(args.repeat);
+    let build_options = args.build.options(context.as_deref(), n_triangles, n_casts);
     let building = format!("building the kd-tree of {n_triangles} triangles");
     let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &build_options));
     let casting = format!("casting {} rays", rays.n_rays());

@@ -4,6 +4,7 @@
 
 mod args;
 mod bench;
+mod build;
 mod cast;
 mod cast_report;
 mod devices;

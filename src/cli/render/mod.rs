@@ -6,9 +6,9 @@ mod files;
 use std::time::{Duration, Instant};
 
 use kdray::{
-    frame::Profile,
+    frame::{Profile, RenderOptions},
     gpu::{Context, ContextOptions},
-    kdtree::{BuildOptions, KdTree},
+    kdtree::KdTree,
     output,
     scene::{Camera, CameraPath, Scene},
 };
@@ -50,7 +50,8 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let context = if args.cpu { None } else { Some(opening()?) };
 
     let n_triangles = scene.triangles.len();
-    let build_options = BuildOptions::default();
+    let n_rays = most_rays(args, &options, scene.lights.len(), views.len());
+    let build_options = args.build.options(context.as_deref(), n_triangles, n_rays);
     let building = format!("building the kd-tree of {n_triangles} triangles");
     let build = || KdTree::build(&scene.triangles, &build_options);
     let (tree, build_ms) = progress.stage(&building, || info_span!("build tree").in_scope(build));
@@ -90,6 +91,15 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         print(&report.text())?;
     }
     context.map_or(Ok(()), |context| report_validation(&context))
+}
+
+/// Rays of all frames, if every pixel's ray hits and is reflected once.
+fn most_rays(args: &RenderArgs, options: &RenderOptions, n_lights: usize, n_views: usize) -> u64 {
+    let crop = options.crop_or_whole();
+    let n_pixels = u64::from(crop.width()) * u64::from(crop.height());
+    let rays_a_sample = u64::from(options.max_depth.min(2)) * (1 + n_lights as u64);
+    let n_frames = n_views as u64 * u64::from(args.repeat);
+    [u64::from(args.spp), rays_a_sample, n_frames].into_iter().fold(n_pixels, u64::saturating_mul)
 }
 
 /// A camera, and where what it sees is written.
