@@ -79,11 +79,10 @@ pub fn check(path: &Path) -> Result<(), OutputError> {
 
 /// Writes a picture in the format that the file's ending names. Both formats hold exactly the picture's RGB values.
 pub fn write_picture(path: &Path, picture: &Picture) -> Result<(), OutputError> {
-    let format = Format::of(path)?;
-    let bytes = info_span!("encode picture").in_scope(|| match format {
-        Format::Png => encode(picture, rgb(&picture.display), ImageFormat::Png),
-        Format::Exr => encode(picture, rgb(&picture.radiance), ImageFormat::OpenExr),
-    });
+    if Format::of(path)? == Format::Exr {
+        return write_layers(path, picture, &[], &[]);
+    }
+    let bytes = info_span!("encode picture").in_scope(|| encode(picture, rgb(&picture.display), ImageFormat::Png));
     let _writing = info_span!("write picture").entered();
     write(path, &bytes.map_err(|source| OutputError::Encode { path: path.to_owned(), source })?)
 }
@@ -194,9 +193,14 @@ where
     [T]: EncodableLayout,
     T: Primitive,
 {
-    let image = ImageBuffer::<Rgb<T>, _>::from_raw(picture.width, picture.height, rgb)
-        .ok_or_else(|| ImageError::Parameter(ParameterError::from_kind(ParameterErrorKind::DimensionMismatch)))?;
+    let image =
+        ImageBuffer::<Rgb<T>, _>::from_raw(picture.width, picture.height, rgb).ok_or_else(dimension_mismatch)?;
     let mut file = Cursor::new(Vec::new());
     image.write_to(&mut file, format)?;
     Ok(file.into_inner())
+}
+
+/// A picture does not have the pixels that its size promises.
+fn dimension_mismatch() -> ImageError {
+    ImageError::Parameter(ParameterError::from_kind(ParameterErrorKind::DimensionMismatch))
 }

@@ -7,7 +7,8 @@ use std::{
 };
 
 use kdray::{
-    frame::Picture,
+    frame::{Aov, Picture},
+    layout::Feature,
     output::{self, Format, OutputError},
 };
 use tempfile::TempDir;
@@ -75,6 +76,33 @@ fn exr_holds_the_radiance_bit_for_bit() {
         assert_eq!(read, bits(&picture.radiance));
     }
     assert_eq!(names(directory.path()), ["x.EXR"]);
+}
+
+#[test]
+fn the_same_picture_is_the_same_file() {
+    let directory = TempDir::new().unwrap();
+    let picture = picture(700, 500);
+    for name in ["x.exr", "x.png"] {
+        let path = directory.path().join(name);
+        let write = || {
+            output::write_picture(&path, &picture).unwrap();
+            fs::read(&path).unwrap()
+        };
+        let first = write();
+        assert!((0..20).all(|_| write() == first), "{name}");
+    }
+}
+
+#[test]
+fn features_that_contradict_the_size_are_an_error() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path().join("x.exr");
+    for n in [0, 3, 5] {
+        let features = vec![Feature::default(); n];
+        let error = output::write_layers(&path, &picture(2, 2), &[Aov::Depth], &features).unwrap_err();
+        assert!(matches!(error, OutputError::Encode { .. }), "{error}");
+    }
+    assert!(names(directory.path()).is_empty());
 }
 
 #[test]

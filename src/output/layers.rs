@@ -3,12 +3,12 @@
 use std::{io::Cursor, path::Path};
 
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, WritableImage,
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, LineOrder, SmallVec, WritableImage,
 };
 
 use tracing::info_span;
 
-use super::{OutputError, write};
+use super::{OutputError, dimension_mismatch, write};
 use crate::{
     frame::{Aov, Channel, Picture, Samples},
     layout::Feature,
@@ -20,6 +20,10 @@ use crate::{
 /// # Errors
 /// As [`write()`].
 pub fn write_layers(path: &Path, picture: &Picture, aovs: &[Aov], features: &[Feature]) -> Result<(), OutputError> {
+    let n_pixels = picture.width as usize * picture.height as usize;
+    if picture.radiance.len() != n_pixels || (!aovs.is_empty() && features.len() != n_pixels) {
+        return Err(OutputError::Encode { path: path.to_owned(), source: dimension_mismatch() });
+    }
     let colour = |name: &str, component: usize| Channel {
         name: name.to_owned(),
         samples: Samples::Float(picture.radiance.iter().map(|pixel| pixel[component]).collect()),
@@ -47,8 +51,9 @@ fn encode(size: (usize, usize), channels: Vec<Channel>) -> Result<Vec<u8>, exr::
             AnyChannel::new(channel.name.as_str(), samples)
         })
         .collect();
-    let attributes = LayerAttributes::default();
-    let layer = Layer::new(size, attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(channels));
+    // Blocks are compressed in parallel; in order, the same picture is always the same file.
+    let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::FAST_LOSSLESS };
+    let layer = Layer::new(size, LayerAttributes::default(), encoding, AnyChannels::sort(channels));
     let mut file = Cursor::new(Vec::new());
     Image::from_layer(layer).write().to_buffered(&mut file)?;
     Ok(file.into_inner())
