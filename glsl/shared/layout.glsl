@@ -186,6 +186,14 @@ struct Batch {
     uint depth;
 };
 
+// Push constants of what shows a picture in a window: the sizes of both, pixels.
+struct Present {
+    uint width;
+    uint height;
+    uint window_width;
+    uint window_height;
+};
+
 // Push constants of a cast: its rays.
 struct CastBatch {
     uint n_rays;

@@ -6,16 +6,16 @@ use std::{
     sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 use gpu_allocator::{
     AllocationSizes, AllocatorDebugSettings, MemoryLocation,
     vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc},
 };
 
 use super::{
-    Commands, DeviceInfo, DeviceSelector, GpuError, Limits,
+    Commands, DeviceInfo, DeviceSelector, GpuError, Limits, Screen, Surface,
     commands::CommandBuffer,
-    device::DeviceExtras,
+    device::{DeviceExtras, Purpose},
     devices::{queue_family, select},
     instance::Instance,
     probe,
@@ -42,8 +42,12 @@ pub struct Context {
     pub(super) ray_tracing: Option<RayTracingCalls>,
     /// None where the device lacks the extension.
     pub(super) statistics: Option<StatisticsCalls>,
-    queue: vk::Queue,
-    allocator: ManuallyDrop<Mutex<Allocator>>,
+    /// None where the device was opened without a window.
+    pub(super) presentation: Option<khr::swapchain::Device>,
+    pub(super) physical: vk::PhysicalDevice,
+    pub(super) queue: vk::Queue,
+    /// Shared with the overlay's renderer, which ends before the context.
+    pub(super) allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
     info: DeviceInfo,
     limits: Limits,
     fuses_fma: OnceLock<bool>,
@@ -57,8 +61,19 @@ impl Context {
     /// No loader, driver, device of that name or validation layer; a device that lacks a feature; a failed call.
     pub fn new(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::new(options.validate)?;
-        let (physical, info) = select(&instance, options.device.as_ref())?;
-        Self::open(instance, physical, info, false)
+        let (physical, info) = select(&instance, options.device.as_ref(), None)?;
+        Self::open(instance, physical, info, Purpose::Compute)
+    }
+
+    /// As [`Context::new`], with the surface of a window that it can show pictures in.
+    ///
+    /// # Errors
+    /// As [`Context::new`]; a device that cannot present to the window.
+    pub fn for_window(options: &ContextOptions, window: Arc<dyn Screen>) -> Result<(Arc<Self>, Surface), GpuError> {
+        let instance = Instance::with_extensions(options.validate, &Surface::extensions(&*window)?)?;
+        let surface = Surface::new(&instance, window)?;
+        let (physical, info) = select(&instance, options.device.as_ref(), Some(&surface))?;
+        Ok((Self::open(instance, physical, info, Purpose::Window)?, surface))
     }
 
     /// As [`Context::new`], with the driver's own ray tracing, to compare with; none where the device lacks it.
@@ -67,19 +82,20 @@ impl Context {
     /// As [`Context::new`].
     pub fn with_ray_tracing(options: &ContextOptions) -> Result<Option<Arc<Self>>, GpuError> {
         let instance = Instance::new(options.validate)?;
-        let (physical, info) = select(&instance, options.device.as_ref())?;
+        let (physical, info) = select(&instance, options.device.as_ref(), None)?;
         if !RayTracingCalls::available(&instance, physical) {
             return Ok(None);
         }
-        Self::open(instance, physical, info, true).map(Some)
+        Self::open(instance, physical, info, Purpose::RayTracing).map(Some)
     }
 
     fn open(
         instance: Arc<Instance>,
         physical: vk::PhysicalDevice,
         info: DeviceInfo,
-        ray_tracing: bool,
+        purpose: Purpose,
     ) -> Result<Arc<Self>, GpuError> {
+        let ray_tracing = purpose == Purpose::RayTracing;
         // SAFETY: the device belongs to the instance.
         let (families, properties) = unsafe {
             (
@@ -88,7 +104,7 @@ impl Context {
             )
         };
         let family = queue_family(&families).expect("`select` refuses a device without such a queue");
-        let extras = DeviceExtras::of(&instance, physical, ray_tracing)
+        let extras = DeviceExtras::of(&instance, physical, purpose)
             .map_err(GpuError::call("vkEnumerateDeviceExtensionProperties", &info.name))?;
         let device = extras
             .create_device(&instance, physical, family as u32)
@@ -107,12 +123,14 @@ impl Context {
             ray_tracing: ray_tracing.then(|| RayTracingCalls::new(&instance, physical, &device)),
             statistics: extras.statistics.then(|| StatisticsCalls::new(&instance, &device)),
             debug_utils: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device)),
+            presentation: (purpose == Purpose::Window).then(|| khr::swapchain::Device::new(&instance.raw, &device)),
             device,
+            physical,
             command_pool,
             timestamp_period_ns: properties.limits.timestamp_period,
             timestamp_valid_bits: families[family].timestamp_valid_bits,
             queue,
-            allocator: ManuallyDrop::new(Mutex::new(allocator)),
+            allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
             info,
             fuses_fma: OnceLock::new(),
             limits: Limits {
@@ -185,8 +203,14 @@ impl Context {
 
     /// Shader stages that see bindings and push constants.
     pub(super) fn stages(&self) -> vk::ShaderStageFlags {
-        let base = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX;
-        if self.ray_tracing.is_some() { base | vk::ShaderStageFlags::RAYGEN_KHR } else { base }
+        let mut stages = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX;
+        if self.ray_tracing.is_some() {
+            stages |= vk::ShaderStageFlags::RAYGEN_KHR;
+        }
+        if self.presentation.is_some() {
+            stages |= vk::ShaderStageFlags::FRAGMENT;
+        }
+        stages
     }
 
     /// Gives a handle its name in the debuggers' and the validation layer's eyes.

@@ -15,6 +15,10 @@ pub enum GpuError {
     Lacks { device: String, missing: String },
     #[error("no validation layer VK_LAYER_KHRONOS_validation; ./setup installs it")]
     NoValidationLayer,
+    #[error("cannot show pictures in this window: {0}")]
+    NoSurface(String),
+    #[error("the overlay: {0}")]
+    Overlay(#[from] egui_ash_renderer::RendererError),
     #[error("{call} `{object}`: {result}")]
     Call { call: &'static str, object: String, result: vk::Result },
     #[error("memory for `{object}` ({}): {source}", mebibytes(*bytes))]

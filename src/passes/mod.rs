@@ -12,6 +12,7 @@ use crate::{
 mod cast;
 mod compact;
 mod denoise;
+mod present;
 mod primary_hit;
 mod resolve;
 mod resources;
@@ -26,6 +27,7 @@ pub use self::{
     cast::{Cast, CastResources},
     compact::Compact,
     denoise::Denoise,
+    present::Present,
     primary_hit::PrimaryHit,
     resolve::Resolve,
     resources::{Resources, bounce_row},

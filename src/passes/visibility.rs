@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{Resources, spirv};
-use crate::gpu::{Bindings, Commands, Context, GpuError, RasterDesc, RasterPipeline};
+use crate::gpu::{Bindings, Commands, Context, GpuError, RasterDesc, RasterPipeline, RasterTargets};
 
 /// The pass's pipeline.
 pub struct Visibility {
@@ -12,8 +12,12 @@ pub struct Visibility {
 
 impl Visibility {
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
-        let desc =
-            RasterDesc { name: "visibility", vertex: spirv!("visibility.vert"), fragment: spirv!("visibility.frag") };
+        let desc = RasterDesc {
+            name: "visibility",
+            vertex: spirv!("visibility.vert"),
+            fragment: spirv!("visibility.frag"),
+            targets: RasterTargets::Ids,
+        };
         Ok(Self { pipeline: RasterPipeline::new(context, bindings, &desc)? })
     }
 
