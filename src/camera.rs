@@ -1,11 +1,12 @@
 //! The frame's constants: one camera for the rasterizer's matrix and for the rays, on GPU and CPU alike.
 
-use glam::{DMat4, DVec3, DVec4};
+use glam::{DMat4, DVec2, DVec3, DVec4, dvec2};
 
 use crate::{
-    frame::{Denoise, RenderOptions},
+    frame::{Crop, Denoise, RenderOptions},
     kdtree::KdTree,
     layout::Frame,
+    sampling::sample_offset,
     scene::{Camera, Scene},
 };
 
@@ -13,34 +14,63 @@ use crate::{
 /// nearer, and reverse-Z in floating point loses no precision by it.
 const NEAR_SHARE: f64 = 1.0 / (1 << 20) as f64;
 
-/// What the kernels know of the frame. `queue_capacity` is left 0: the caller's queues decide.
+/// What the kernels know of a frame of first samples. `queue_capacity` is left 0: the caller's queues decide.
 pub fn frame_constants(scene: &Scene, tree: &KdTree, options: &RenderOptions) -> Frame {
-    let image_plane = ImagePlane::new(&scene.camera, options.width as f64 / options.height as f64);
-    let eye = scene.camera.eye;
-    let reach = (tree.cell_min - eye).abs().max((tree.cell_max - eye).abs()).as_dvec3().length();
-    let near = if reach > 0.0 { reach * NEAR_SHARE } else { NEAR_SHARE };
-    Frame {
-        clip_from_world: image_plane.clip_from_world(eye.as_dvec3(), near).as_mat4(),
-        eye,
-        width: options.width,
-        right: image_plane.right.as_vec3(),
-        height: options.height,
-        up: image_plane.up.as_vec3(),
+    let mut frame = Frame {
         n_triangles: scene.triangles.len() as u32,
-        forward: image_plane.forward.as_vec3(),
         n_lights: scene.lights.len() as u32,
         ambient: scene.ambient,
-        exposure: options.exposure,
         background: scene.background,
-        denoise_threshold: match options.denoise {
+        cell_min: tree.cell_min,
+        cell_max: tree.cell_max,
+        ..Frame::default()
+    };
+    frame.set_options(options);
+    frame.set_view(&scene.camera, 0);
+    frame
+}
+
+impl Frame {
+    /// What follows from the options alone. The view has to be set after it.
+    pub fn set_options(&mut self, options: &RenderOptions) {
+        let window = options.window();
+        let Crop { x1, y1, .. } = window;
+        assert!(x1 <= options.width && y1 <= options.height, "a crop lies within its picture");
+        self.picture_width = options.width;
+        self.picture_height = options.height;
+        (self.window_x, self.window_y) = (window.x0, window.y0);
+        (self.width, self.height) = (window.width(), window.height());
+        self.max_depth = options.max_depth;
+        self.exposure = options.exposure;
+        self.denoise_threshold = match options.denoise {
             Denoise::Off => f32::INFINITY,
             Denoise::Paper { threshold } => threshold,
-        },
-        cell_min: tree.cell_min,
-        max_depth: options.max_depth,
-        cell_max: tree.cell_max,
-        queue_capacity: 0,
+        };
     }
+
+    /// The camera, and which of a pixel's samples the frame shows, counted from 0.
+    pub fn set_view(&mut self, camera: &Camera, sample_ix: u32) {
+        let size = dvec2(self.picture_width.into(), self.picture_height.into());
+        let offset = sample_offset(sample_ix);
+        let image_plane = ImagePlane::new(camera, size.x / size.y);
+        let eye = camera.eye;
+        let reach = (self.cell_min - eye).abs().max((self.cell_max - eye).abs()).as_dvec3().length();
+        let near = if reach > 0.0 { reach * NEAR_SHARE } else { NEAR_SHARE };
+        let clip_from_world = moved_by(-2.0 * offset / size) * image_plane.clip_from_world(eye.as_dvec3(), near);
+        self.clip_from_world = clip_from_world.as_mat4();
+        self.eye = eye;
+        self.right = image_plane.right.as_vec3();
+        self.up = image_plane.up.as_vec3();
+        self.forward = image_plane.forward.as_vec3();
+        [self.sample_x, self.sample_y] = (offset + 0.5).as_vec2().to_array();
+        self.n_samples = sample_ix + 1;
+    }
+}
+
+/// Moves what is seen within the picture, in units of half its sides: the viewport could not, since a device need not
+/// place one between pixels.
+fn moved_by(step: DVec2) -> DMat4 {
+    DMat4::from_cols(DVec4::X, DVec4::Y, DVec4::Z, step.extend(0.0).extend(1.0))
 }
 
 /// The image plane at unit distance: its middle, and from there to its right and its upper edge.
@@ -72,10 +102,19 @@ mod tests {
     use glam::{UVec2, Vec3, uvec2, vec3};
 
     use super::*;
-    use crate::{cpu::camera::camera_direction, kdtree::BuildOptions, layout::Triangle, scene::RenderDefaults};
+    use crate::{
+        cpu::camera::{camera_direction, in_picture},
+        kdtree::BuildOptions,
+        layout::Triangle,
+        scene::RenderDefaults,
+    };
 
     /// A view of one triangle.
     fn frame(camera: Camera, width: u32, height: u32) -> Frame {
+        part(camera, RenderOptions { width, height, ..RenderOptions::default() }, 0)
+    }
+
+    fn part(camera: Camera, options: RenderOptions, sample_ix: u32) -> Frame {
         let corner = |direction| camera.target + 3.0 * (camera.target - camera.eye).length() * direction;
         let triangle = Triangle { v0: corner(Vec3::X), v1: corner(Vec3::Y), v2: corner(Vec3::Z), ..Default::default() };
         let scene = Scene {
@@ -91,16 +130,22 @@ mod tests {
             defaults: RenderDefaults::default(),
         };
         let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
-        frame_constants(&scene, &tree, &RenderOptions { width, height, ..RenderOptions::default() })
+        let mut frame = frame_constants(&scene, &tree, &options);
+        frame.set_view(&scene.camera, sample_ix);
+        frame
     }
 
     fn views() -> Vec<Frame> {
         let camera = |eye, target, up, vertical_fov_degrees| Camera { eye, target, up, vertical_fov_degrees };
+        let crop = Some(Crop { x0: 600, y0: 31, x1: 640, y1: 480 });
+        let cropped = RenderOptions { width: 640, height: 480, crop, ..RenderOptions::default() };
         vec![
             frame(camera(vec3(0.0, 0.0, 5.0), Vec3::ZERO, Vec3::Y, 45.0), 1024, 768),
             frame(camera(vec3(1.0, 2.0, 3.0), vec3(-2.0, 0.5, 0.1), vec3(0.6, 0.8, 0.0), 100.0), 640, 480),
             frame(camera(vec3(-0.3, 40.0, 0.2), vec3(0.1, -7.0, 0.3), Vec3::X, 10.0), 333, 777),
             frame(camera(vec3(1e-4, 2e-4, -3e-4), Vec3::ZERO, Vec3::Z, 60.0), 8, 8),
+            part(camera(vec3(1.0, 2.0, 3.0), vec3(-2.0, 0.5, 0.1), vec3(0.6, 0.8, 0.0), 100.0), cropped.clone(), 0),
+            part(camera(vec3(1.0, 2.0, 3.0), vec3(-2.0, 0.5, 0.1), vec3(0.6, 0.8, 0.0), 100.0), cropped, 5),
         ]
     }
 
@@ -108,18 +153,19 @@ mod tests {
     fn project(frame: &Frame, point: DVec3) -> (f64, f64, f64) {
         let clip = frame.clip_from_world.as_dmat4() * point.extend(1.0);
         let ndc = clip.truncate() / clip.w;
-        let (width, height) = (f64::from(frame.width), f64::from(frame.height));
+        let (width, height) = (f64::from(frame.picture_width), f64::from(frame.picture_height));
         ((ndc.x + 1.0) / 2.0 * width, (ndc.y + 1.0) / 2.0 * height, ndc.z)
     }
 
-    /// Farthest that a point of a camera ray is projected from its pixel's centre, px.
+    /// Farthest that a point of a camera ray is projected from its pixel's centre, px, whatever sample it goes through.
     fn worst_distance(frame: &Frame) -> f64 {
         let pixels = (0..50).map(|i| uvec2(i * 7919 % frame.width, i * 104_729 % frame.height));
         let corners = [UVec2::ZERO, uvec2(frame.width - 1, frame.height - 1)];
         let distance = |pixel: UVec2, scale: f64| {
             let direction = camera_direction(frame, pixel).as_dvec3();
             let (x, y, _) = project(frame, frame.eye.as_dvec3() + scale * direction);
-            (x - f64::from(pixel.x) - 0.5).hypot(y - f64::from(pixel.y) - 0.5)
+            let centre = in_picture(frame, pixel).as_dvec2() + 0.5;
+            (x - centre.x).hypot(y - centre.y)
         };
         let scale = frame.eye.as_dvec3().length();
         pixels.chain(corners).flat_map(|pixel| [0.5, 1.0, 30.0].map(|t| distance(pixel, t * scale))).fold(0.0, f64::max)
@@ -138,6 +184,19 @@ mod tests {
             frame.right *= 1.0 + 4.0 / frame.width as f32 * 1e-3;
             assert!(worst_distance(&frame) > 1e-4);
         }
+    }
+
+    #[test]
+    fn a_sample_lies_where_it_is_said_to() {
+        let camera = Camera { eye: vec3(0.0, 0.0, 5.0), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 45.0 };
+        let options = RenderOptions { width: 90, height: 60, ..RenderOptions::default() };
+        let [first, seventh] = [0, 6].map(|sample_ix| part(camera, options.clone(), sample_ix));
+        let point = vec3(0.3, -0.2, 1.0).as_dvec3();
+        let ((x, y, _), (moved_x, moved_y, _)) = (project(&first, point), project(&seventh, point));
+        let offset = sample_offset(6);
+        assert!((x - moved_x - offset.x).abs() < 1e-4 && (y - moved_y - offset.y).abs() < 1e-4);
+        assert_eq!([seventh.sample_x, seventh.sample_y], (offset + 0.5).as_vec2().to_array());
+        assert_eq!([first.sample_x, first.sample_y, seventh.n_samples as f32], [0.5, 0.5, 7.0]);
     }
 
     #[test]

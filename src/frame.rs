@@ -6,13 +6,19 @@ use serde::Serialize;
 
 use crate::layout;
 
+mod crop;
+
+pub use self::crop::Crop;
+
 /// How a frame is rendered. The scene's own defaults fill what the user leaves open.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// Pixels.
+    /// Of the whole picture, pixels.
     pub width: u32,
-    /// Pixels.
+    /// As `width`.
     pub height: u32,
+    /// The part of the picture to render, within it; none for all.
+    pub crop: Option<Crop>,
     /// Levels of rays, the primary one counted: 1 is ray casting with shadows (Algorithm 1's `maximumDepth`).
     pub max_depth: u32,
     /// Factor on radiance before it is encoded for display.
@@ -27,6 +33,7 @@ impl Default for RenderOptions {
         Self {
             width: 1024,
             height: 768,
+            crop: None,
             max_depth: 5,
             exposure: 1.0,
             denoise: Denoise::Paper { threshold: Denoise::DEFAULT_THRESHOLD },
@@ -108,7 +115,7 @@ pub enum Primary {
     Trace,
 }
 
-/// A rendered frame. Rows from the top, left to right.
+/// A rendered frame, or the part of it that was asked for. Rows from the top, left to right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     pub width: u32,
@@ -128,7 +135,7 @@ pub struct Profile {
     pub passes: Vec<PassTime>,
     /// One row a bounce, 0 = primary rays; batches added up.
     pub bounces: Vec<BounceStats>,
-    /// Ray batches that the frame was split into.
+    /// Ray batches that the frame was split into; the most of any, where several frames are added up.
     pub n_batches: u32,
     /// From the first pass's start to the last one's end; none where the device has no timestamps.
     pub frame_ms: Option<f64>,
@@ -157,6 +164,24 @@ pub struct BounceStats {
 }
 
 impl Profile {
+    /// Adds a frame's times and counts to those of others of the same options.
+    pub fn add(&mut self, frame: &Profile) {
+        for pass in &frame.passes {
+            match self.passes.iter_mut().find(|sum| sum.name == pass.name && sum.bounce == pass.bounce) {
+                Some(sum) => sum.ms = sum.ms.zip(pass.ms).map(|(a, b)| a + b),
+                None => self.passes.push(pass.clone()),
+            }
+        }
+        self.bounces.resize(self.bounces.len().max(frame.bounces.len()), BounceStats::default());
+        for (sum, bounce) in self.bounces.iter_mut().zip(&frame.bounces) {
+            sum.n_rays += bounce.n_rays;
+            sum.n_hits += bounce.n_hits;
+            sum.n_shadow_rays += bounce.n_shadow_rays;
+        }
+        self.frame_ms = self.frame_ms.zip(frame.frame_ms).map(|(a, b)| a + b);
+        self.n_batches = self.n_batches.max(frame.n_batches);
+    }
+
     /// Milliseconds of all passes of one name, or none where any lacks a timestamp.
     pub fn pass_ms(&self, name: &str) -> Option<f64> {
         self.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.ms).sum()

@@ -5,7 +5,7 @@
 //! ```text
 //! scene    files -> triangles, materials, lights, camera
 //! kdtree   triangles -> flat SAH kd-tree
-//! camera   scene + size -> the frame's constants
+//! camera   scene + size + sample -> the frame's constants
 //! render   the frame: passes, barriers, batches -> picture
 //!   passes   one kernel and one file each, on
 //!   gpu      the Vulkan layer
@@ -13,6 +13,7 @@
 //! cpu      both without Vulkan
 //! output   picture -> file
 //! bench    all of it, timed
+//! view     all of it, in a window
 //! ```
 
 #![deny(unsafe_code)]
@@ -25,6 +26,7 @@ pub mod scene;
 pub mod kdtree;
 
 pub mod camera;
+pub mod sampling;
 
 pub mod cpu;
 
@@ -37,3 +39,5 @@ pub mod cast;
 pub mod output;
 
 pub mod bench;
+
+pub mod view;

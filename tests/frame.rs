@@ -9,7 +9,13 @@ mod agreement;
 mod batches;
 #[path = "frame/closed_forms.rs"]
 mod closed_forms;
+#[path = "frame/crop.rs"]
+mod crop;
+#[path = "frame/living.rs"]
+mod living;
 #[path = "frame/primaries.rs"]
 mod primaries;
+#[path = "frame/samples.rs"]
+mod samples;
 #[path = "frame/studio.rs"]
 mod studio;

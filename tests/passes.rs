@@ -3,6 +3,8 @@
 
 mod support;
 
+#[path = "passes/accumulate.rs"]
+mod accumulate;
 #[path = "passes/barriers.rs"]
 mod barriers;
 #[path = "passes/compact.rs"]

@@ -66,7 +66,7 @@ fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], tr
     let mut resources = Resources::new(context, scene, tree, &constants, 1).expect("resources");
     resources.add_extras(context, tree, traversal).expect("extras");
     let passes = Passes::new(context, &resources.bindings, &options).expect("passes");
-    resources.ray_queues[0].upload(rays).expect("rays");
+    resources.queues.ray_queues[0].upload(rays).expect("rays");
     resources.bounces.upload(&[bounce_row(rays.len() as u32, 2)]).expect("bounces");
     resources.counters.upload(&[Counters::default()]).expect("counters");
     let batch = Batch { first_pixel: 0, n_pixels: 64, bounce_ix: 0, depth: 0 };
@@ -79,8 +79,8 @@ fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], tr
     context.run("variant", record).expect("run");
     let counters = resources.counters.download().expect("counters")[0];
     Traced {
-        hits: bytemuck::cast_slice(&resources.hits.download().expect("hits")).to_vec(),
-        light_visibility: resources.light_visibility.download().expect("light_visibility"),
+        hits: bytemuck::cast_slice(&resources.queues.hits.download().expect("hits")).to_vec(),
+        light_visibility: resources.queues.light_visibility.download().expect("light_visibility"),
         n_hits: counters.n_hits,
         n_shadow_rays: counters.n_shadow_rays,
     }

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Primary hit (the paper's section 2.2): one invocation a pixel of the batch makes the camera ray and intersects it
+// Primary hit (the paper's section 2.2): one invocation a pixel of the batch makes the ray of its sample and intersects it
 // with the plane of the triangle that the rasterizer found there.
 // Reads triangle_ids, triangles; writes rays, hits, counters[].n_hits.
 #include "layout.glsl"
@@ -30,7 +30,7 @@ void main() {
                       vec3(1.0), infinity);
         rays[ray_ix] = ray;
         if (FROM_RASTER == 1u) {
-            uint triangle_ix = imageLoad(triangle_ids, ivec2(pixel)).x;
+            uint triangle_ix = imageLoad(triangle_ids, ivec2(in_picture(frame, pixel))).x;
             Hit hit = Hit(infinity, NO_TRIANGLE, 0.0, 0.0);
             is_hit = triangle_ix != NO_TRIANGLE;
             if (is_hit) hit = clamp_to_triangle(shear_of(ray.origin, ray.direction), triangles[triangle_ix], triangle_ix);

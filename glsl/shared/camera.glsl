@@ -16,10 +16,16 @@ uvec2 pixel_of(uint order, uint width, uint height) {
     return uvec2(tile * TILE_SIZE + in_tile % columns, band * TILE_SIZE + in_tile / columns);
 }
 
-// Unit direction through the pixel's centre, the sample that the rasterizer tests.
+// The window's pixel in the whole picture.
+uvec2 in_picture(Frame frame, uvec2 pixel) {
+    return pixel + uvec2(frame.window_x, frame.window_y);
+}
+
+// Unit direction through the sample of the window's pixel, the one that the rasterizer tests.
 vec3 camera_direction(Frame frame, uvec2 pixel) {
-    vec2 centre = (vec2(pixel) + 0.5) / vec2(frame.width, frame.height) * 2.0 - 1.0;
-    return normalize(frame.forward + centre.x * frame.right - centre.y * frame.up);
+    vec2 at_px = vec2(in_picture(frame, pixel)) + vec2(frame.sample_x, frame.sample_y);
+    vec2 at = at_px / vec2(frame.picture_width, frame.picture_height) * 2.0 - 1.0;
+    return normalize(frame.forward + at.x * frame.right - at.y * frame.up);
 }
 
 #endif

@@ -128,8 +128,13 @@ struct Hit {
     float v;
 };
 
-// The frame's constants (a uniform buffer, std140-compatible). Camera ray of pixel (x, y):
-// forward + (2 (x + 0.5) / width - 1) * right + (1 - 2 (y + 0.5) / height) * up.
+// The frame's constants (a uniform buffer, std140-compatible). width, height: of the window, the part of the picture
+// that is rendered; it begins at the picture's pixel (window_x, window_y). sample_x, sample_y: where the frame's sample
+// lies in each pixel, px from its upper left corner. Camera ray of the window's pixel (x, y):
+// forward + (2 (window_x + x + sample_x) / picture_width - 1) * right
+//         + (1 - 2 (window_y + y + sample_y) / picture_height) * up.
+// clip_from_world is the whole picture's, moved so that the sample lies in the middle of its pixel.
+// n_samples: how many samples a pixel there are with this frame's.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -148,6 +153,14 @@ struct Frame {
     uint max_depth;
     vec3 cell_max;
     uint queue_capacity;
+    uint picture_width;
+    uint picture_height;
+    uint window_x;
+    uint window_y;
+    float sample_x;
+    float sample_y;
+    uint n_samples;
+    uint reserved;
 };
 
 // One a batch and bounce, 64 bytes, sized by the bounce before: each `groups` is a VkDispatchIndirectCommand.
@@ -224,10 +237,11 @@ struct CastBatch {
 #define BIND_COUNTERS 21u
 #define BIND_KD_BOXES 22u
 #define BIND_KD_ROPES 23u
-#define N_BINDINGS 24u
+#define BIND_PIXEL_ACCUMULATED 24u
+#define N_BINDINGS 25u
 
 // A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
-#define BIND_CAST_RAYS 24u
-#define BIND_CAST_HITS 25u
+#define BIND_CAST_RAYS 25u
+#define BIND_CAST_HITS 26u
 
 #endif

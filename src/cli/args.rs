@@ -5,7 +5,7 @@ use std::{path::PathBuf, str::FromStr};
 use clap::{Parser, Subcommand, ValueEnum, value_parser};
 use kdray::{
     cast::Query,
-    frame::{Denoise, Primary, RenderOptions, Traversal},
+    frame::{Crop, Denoise, Primary, RenderOptions, Traversal},
     gpu::DeviceSelector,
     scene::RenderDefaults,
 };
@@ -46,6 +46,12 @@ pub struct RenderArgs {
     /// Pixels, as 1024x768 [default: the scene's]
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
+    /// Only the pixels x0 <= x < x1, y0 <= y < y1 of the picture, counted from its upper left corner
+    #[arg(long, value_name = "x0,y0,x1,y1")]
+    pub crop: Option<Crop>,
+    /// Samples a pixel, 1 to 65536: the first at its centre, more of them smooth edges
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..=65_536))]
+    pub spp: u32,
     /// Levels of rays, 1 to 64: 1 stops at what the camera sees [default: the scene's]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=64))]
     pub max_depth: Option<u32>,
@@ -146,18 +152,24 @@ impl RenderArgs {
         Ok(())
     }
 
-    /// The options asked for; the scene's own fill what was left open.
-    pub fn options(&self, scene: &RenderDefaults) -> RenderOptions {
+    /// The options asked for; the scene's own fill what was left open. A crop beyond the picture is refused.
+    pub fn options(&self, scene: &RenderDefaults) -> Result<RenderOptions, CliError> {
         let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });
-        RenderOptions {
+        if let Some(crop) = self.crop.filter(|crop| crop.x1 > width || crop.y1 > height) {
+            return Err(CliError::Usage(format!(
+                "--crop {crop} reaches beyond the picture of {width}x{height} pixels"
+            )));
+        }
+        Ok(RenderOptions {
             width,
             height,
+            crop: self.crop,
             max_depth: self.max_depth.unwrap_or(scene.max_depth),
             exposure: self.exposure.unwrap_or(scene.exposure),
             denoise: self.denoise(scene.denoise),
             traversal: self.traversal,
             primary: self.primary,
-        }
+        })
     }
 
     fn denoise(&self, scene: Denoise) -> Denoise {

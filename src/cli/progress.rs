@@ -63,10 +63,75 @@ impl Progress {
     }
 }
 
+/// A stage of many equal steps.
+pub struct Steps<'a> {
+    progress: &'a Progress,
+    message: String,
+    n_done: u32,
+    n_steps: u32,
+    start: Instant,
+    last_line: Instant,
+}
+
+impl Progress {
+    /// Tells how far the stage is that `message` names, and how much time is left.
+    pub fn steps(&self, message: &str, n_steps: u32) -> Steps<'_> {
+        let (message, start) = (message.to_owned(), Instant::now());
+        Steps { progress: self, message, n_done: 0, n_steps, start, last_line: start }
+    }
+}
+
+impl Steps<'_> {
+    /// One more is done.
+    pub fn step(&mut self) {
+        /// Between lines where there is no terminal.
+        const PAUSE: Duration = Duration::from_secs(5);
+        self.n_done += 1;
+        if self.n_done >= self.n_steps {
+            return;
+        }
+        match self.progress {
+            Progress::Silent => {}
+            Progress::Lines if self.last_line.elapsed() >= PAUSE => {
+                self.last_line = Instant::now();
+                complain("kdray", &self.text());
+            }
+            Progress::Lines => {}
+            Progress::Bar(bar) => bar.set_message(self.text()),
+        }
+    }
+
+    fn text(&self) -> String {
+        let left_s = time_left(self.start.elapsed(), self.n_done, self.n_steps).as_secs_f64().ceil();
+        let left = if left_s < 120.0 { format!("{left_s} s") } else { format!("{} min", (left_s / 60.0).ceil()) };
+        format!("{}: {} of {}, {left} left", self.message, self.n_done, self.n_steps)
+    }
+}
+
+/// If all steps take as long as those that are done, at least one.
+fn time_left(elapsed: Duration, n_done: u32, n_steps: u32) -> Duration {
+    elapsed.mul_f64(f64::from(n_steps - n_done) / f64::from(n_done))
+}
+
 impl Drop for Progress {
     fn drop(&mut self) {
         if let Self::Bar(bar) = self {
             bar.finish_and_clear();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_takes_as_long_as_what_is_done() {
+        assert_eq!(time_left(Duration::from_secs(3), 1, 4), Duration::from_secs(9));
+        assert_eq!(time_left(Duration::from_secs(3), 4, 4), Duration::ZERO);
+        let progress = Progress::Silent;
+        let mut steps = progress.steps("rendering", 3);
+        steps.step();
+        assert!(steps.text().starts_with("rendering: 1 of 3, ") && steps.text().ends_with(" left"), "{}", steps.text());
     }
 }

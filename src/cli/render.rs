@@ -3,7 +3,7 @@
 use std::{path::PathBuf, sync::Arc};
 
 use kdray::{
-    cpu,
+    cpu::{self, Batching},
     frame::{Picture, Profile, RenderOptions},
     gpu::{Context, ContextOptions, GpuError},
     kdtree::{BuildOptions, KdTree},
@@ -17,7 +17,7 @@ use super::{
     complain,
     error::CliError,
     open_device, print,
-    progress::Progress,
+    progress::{Progress, Steps},
     report::{Report, Spread},
 };
 
@@ -32,7 +32,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let scene = scene?;
     let picture_path = args.output.clone().unwrap_or_else(|| default_output(&scene.name));
     output::check(&picture_path)?;
-    let options = args.options(&scene.defaults);
+    let options = args.options(&scene.defaults)?;
     let device = ContextOptions { device: args.device.clone(), validate: args.validate };
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
 
@@ -40,9 +40,11 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let build_options = BuildOptions::default();
     let building = format!("building the kd-tree of {n_triangles} triangles");
     let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &build_options));
-    let rendering = format!("rendering {}x{}", options.width, options.height);
-    let frame = FrameToDraw { scene: &scene, tree: &tree, options: &options };
-    let (drawn, render_ms) = progress.stage(&rendering, || frame.draw(context.as_ref(), args.repeat));
+    let crop = options.crop_or_whole();
+    let rendering = format!("rendering {}x{}", crop.width(), crop.height());
+    let frame = FrameToDraw { scene: &scene, tree: &tree, options: &options, n_samples: args.spp };
+    let mut steps = progress.steps(&rendering, args.spp * u32::from(args.repeat));
+    let (drawn, render_ms) = progress.stage(&rendering, || frame.draw(context.as_ref(), args.repeat, &mut steps));
     let (picture, profiles) = drawn?;
     output::write_picture(&picture_path, &picture)?;
     drop(progress);
@@ -51,6 +53,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         scene: scene.name,
         picture: picture_path,
         options: (&options).into(),
+        samples: args.spp,
         triangles: n_triangles,
         tree: tree.statistics(n_triangles, &build_options),
         load_ms,
@@ -98,19 +101,48 @@ struct FrameToDraw<'a> {
     scene: &'a Scene,
     tree: &'a KdTree,
     options: &'a RenderOptions,
+    /// A pixel.
+    n_samples: u32,
 }
 
 impl FrameToDraw<'_> {
     /// Draws the frame so many times, on the device or on the CPU for want of one. The pictures are all the same.
-    fn draw(&self, context: Option<&Arc<Context>>, n_times: u16) -> Result<(Picture, Vec<Profile>), GpuError> {
+    fn draw(
+        &self,
+        context: Option<&Arc<Context>>,
+        n_times: u16,
+        steps: &mut Steps,
+    ) -> Result<(Picture, Vec<Profile>), GpuError> {
+        let mut profiles = Vec::new();
         let Some(context) = context else {
-            let (picture, profile) = cpu::render(self.scene, self.tree, self.options);
-            let again = (1..n_times).map(|_| cpu::render(self.scene, self.tree, self.options).1);
-            return Ok((picture, std::iter::once(profile).chain(again).collect()));
+            let mut renderer = cpu::Renderer::new(self.scene, self.tree, self.options, Batching::default());
+            for _ in 0..n_times {
+                renderer.reset_samples();
+                profiles.push(self.add_up(steps, || Ok(renderer.draw_sample()))?);
+            }
+            return Ok((renderer.picture(), profiles));
         };
         let mut renderer = Renderer::new(Arc::clone(context), self.scene, self.tree, self.options)?;
-        let profiles = (0..n_times).map(|_| renderer.draw()).collect::<Result<_, _>>()?;
+        for _ in 0..n_times {
+            renderer.reset_samples();
+            profiles.push(self.add_up(steps, || renderer.draw_sample())?);
+        }
         Ok((renderer.picture()?, profiles))
+    }
+
+    /// Draws all samples; their profiles together.
+    fn add_up(
+        &self,
+        steps: &mut Steps,
+        mut draw_sample: impl FnMut() -> Result<Profile, GpuError>,
+    ) -> Result<Profile, GpuError> {
+        let mut sum = draw_sample()?;
+        steps.step();
+        for _ in 1..self.n_samples {
+            sum.add(&draw_sample()?);
+            steps.step();
+        }
+        Ok(sum)
     }
 }
 

@@ -19,6 +19,8 @@ pub struct Report {
     pub scene: String,
     pub picture: PathBuf,
     pub options: Options,
+    /// A pixel.
+    pub samples: u32,
     pub triangles: usize,
     pub tree: Statistics,
     pub load_ms: f64,
@@ -57,6 +59,8 @@ impl Spread {
 pub struct Options {
     width: u32,
     height: u32,
+    /// x0,y0,x1,y1; none for all of the picture.
+    crop: Option<String>,
     max_depth: u32,
     exposure: f32,
     denoise: &'static str,
@@ -74,6 +78,7 @@ impl From<&RenderOptions> for Options {
         Self {
             width: options.width,
             height: options.height,
+            crop: options.crop.map(|crop| crop.to_string()),
             max_depth: options.max_depth,
             exposure: options.exposure,
             denoise,
@@ -169,14 +174,19 @@ fn rate(n_rays: u64, ms: Option<f64>) -> Option<f64> {
 impl Report {
     /// The report as text that ends with a line break.
     pub fn text(&self) -> String {
-        let Options { width, height, .. } = self.options;
+        let Options { width, height, crop, .. } = &self.options;
+        let crop = crop.as_ref().map(|crop| format!(" ({crop} of it)")).unwrap_or_default();
+        let samples = if self.samples > 1 { format!(", {} samples a pixel,", self.samples) } else { String::new() };
         let tree = &self.tree;
         let mut text = format!("{}: {} triangles, loaded in {:.0} ms\n", self.scene, self.triangles, self.load_ms);
         text += &format!(
             "kd-tree: {} nodes, depth {}, {:.2} references a triangle, built in {:.0} ms\n",
             tree.n_nodes, tree.depth, tree.references_per_triangle, self.build_ms
         );
-        text += &format!("{width}x{height} on {}: picture after {:.0} ms\n\n", self.frame.device, self.render_ms);
+        text += &format!(
+            "{width}x{height}{crop}{samples} on {}: picture after {:.0} ms\n\n",
+            self.frame.device, self.render_ms
+        );
         if self.frame.frame_ms.is_none() {
             text += "This device has no timestamps: where the time went is unknown.\n\n";
         }

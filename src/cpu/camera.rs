@@ -1,6 +1,6 @@
 //! Pixels in the order of the ray queue, and the camera's rays. Twin of `camera.glsl`.
 
-use glam::{UVec2, Vec2, Vec3, uvec2};
+use glam::{UVec2, Vec3, uvec2, vec2};
 
 use crate::layout::{Frame, TILE_SIZE};
 
@@ -15,9 +15,14 @@ pub fn pixel_of(order: u32, width: u32, height: u32) -> UVec2 {
     uvec2(tile * TILE_SIZE + in_tile % columns, band * TILE_SIZE + in_tile / columns)
 }
 
-/// Unit direction through the pixel's centre, the sample that the rasterizer tests.
+/// The window's pixel in the whole picture.
+pub fn in_picture(frame: &Frame, pixel: UVec2) -> UVec2 {
+    pixel + uvec2(frame.window_x, frame.window_y)
+}
+
+/// Unit direction through the sample of the window's pixel, the one that the rasterizer tests.
 pub fn camera_direction(frame: &Frame, pixel: UVec2) -> Vec3 {
-    let size = Vec2::new(frame.width as f32, frame.height as f32);
-    let centre = (pixel.as_vec2() + 0.5) / size * 2.0 - 1.0;
-    (frame.forward + centre.x * frame.right - centre.y * frame.up).normalize()
+    let at_px = in_picture(frame, pixel).as_vec2() + vec2(frame.sample_x, frame.sample_y);
+    let at = at_px / uvec2(frame.picture_width, frame.picture_height).as_vec2() * 2.0 - 1.0;
+    (frame.forward + at.x * frame.right - at.y * frame.up).normalize()
 }

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::layout::{Frame, Hit, NO_TRIANGLE, Ray};
 
-/// The ray through a pixel's centre.
+/// The ray through a pixel's sample.
 pub fn camera_ray(frame: &Frame, pixel: UVec2) -> Ray {
     Ray {
         origin: frame.eye,

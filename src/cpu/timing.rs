@@ -32,8 +32,8 @@ impl Clock {
     }
 
     /// In the order in which they were first timed.
-    pub fn into_passes(self) -> Vec<PassTime> {
-        self.passes
+    pub fn passes(&self) -> &[PassTime] {
+        &self.passes
     }
 }
 

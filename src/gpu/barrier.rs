@@ -15,7 +15,8 @@ pub enum Access {
     TransferRead,
     TransferWrite,
     HostRead,
-    /// Vertex, compute, uniform and indirect reads: after an upload.
+    /// Vertex, compute, uniform and indirect reads and transfers: between an upload and whatever uses it, or a frame and
+    /// the next one's uploads.
     AllReads,
 }
 
@@ -25,9 +26,11 @@ impl Access {
             Self::ComputeRead | Self::ComputeWrite | Self::ComputeUpdate => S::COMPUTE_SHADER,
             Self::FragmentRead => S::FRAGMENT_SHADER,
             Self::IndirectRead => S::DRAW_INDIRECT,
-            Self::TransferRead | Self::TransferWrite => S::COPY,
+            Self::TransferRead => S::COPY,
+            // Updates are no copies, but clears.
+            Self::TransferWrite => S::COPY | S::CLEAR,
             Self::HostRead => S::HOST,
-            Self::AllReads => S::VERTEX_SHADER | S::COMPUTE_SHADER | S::DRAW_INDIRECT | S::COPY,
+            Self::AllReads => S::VERTEX_SHADER | S::COMPUTE_SHADER | S::DRAW_INDIRECT | S::COPY | S::CLEAR,
         }
     }
 

@@ -30,6 +30,27 @@ pub enum Dispatch<'a> {
     Indirect(&'a AnyBuffer, u64),
 }
 
+/// A rectangle of pixels, from the upper left corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Area {
+    pub x: u32,
+    pub y: u32,
+    pub width: u32,
+    pub height: u32,
+}
+
+/// What is drawn, and where.
+pub struct DrawDesc<'a> {
+    pub ids: &'a Target,
+    pub depth: &'a Target,
+    /// Width and height of the picture that clip space spans, pixels; the targets are no smaller.
+    pub picture: (u32, u32),
+    /// The part of it to draw: the same, bit for bit, as if all of it were drawn. The rest stays as it is.
+    pub area: Area,
+    /// Three a triangle.
+    pub n_vertices: u32,
+}
+
 impl CommandBuffer {
     /// Records `body` under a debug label; with a timer each pass in it gets a row.
     ///
@@ -142,14 +163,16 @@ impl Commands<'_> {
         }
     }
 
-    /// Rasterizes `n_vertices / 3` triangles into the cleared targets: IDs to u32::MAX, depth to 0 (far).
-    pub fn draw(&self, pipeline: &RasterPipeline, ids: &Target, depth: &Target, n_vertices: u32) {
-        self.pass(pipeline.name, None, || self.rasterize(pipeline, ids, depth, n_vertices));
+    /// Rasterizes triangles into the cleared area of the targets: IDs to u32::MAX, depth to 0 (far).
+    pub fn draw(&self, pipeline: &RasterPipeline, desc: &DrawDesc) {
+        self.pass(pipeline.name, None, || self.rasterize(pipeline, desc));
     }
 
-    fn rasterize(&self, pipeline: &RasterPipeline, ids: &Target, depth: &Target, n_vertices: u32) {
+    fn rasterize(&self, pipeline: &RasterPipeline, desc: &DrawDesc) {
         let device = &self.context.device;
-        let area = vk::Rect2D { extent: vk::Extent2D { width: ids.width, height: ids.height }, ..Default::default() };
+        let Area { x, y, width, height } = desc.area;
+        let area =
+            vk::Rect2D { offset: vk::Offset2D { x: x as i32, y: y as i32 }, extent: vk::Extent2D { width, height } };
         let attachment = |target: &Target, layout, clear, store| {
             vk::RenderingAttachmentInfo::default()
                 .image_view(target.view)
@@ -161,16 +184,16 @@ impl Commands<'_> {
         let no_triangle = vk::ClearValue { color: vk::ClearColorValue { uint32: [u32::MAX; 4] } };
         let far = vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: 0.0, stencil: 0 } };
         let (store, drop) = (vk::AttachmentStoreOp::STORE, vk::AttachmentStoreOp::DONT_CARE);
-        let color = [attachment(ids, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, no_triangle, store)];
-        let depth = attachment(depth, vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL, far, drop);
+        let color = [attachment(desc.ids, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL, no_triangle, store)];
+        let depth = attachment(desc.depth, vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL, far, drop);
         let rendering = vk::RenderingInfo::default()
             .render_area(area)
             .layer_count(1)
             .color_attachments(&color)
             .depth_attachment(&depth);
         let viewport = vk::Viewport {
-            width: ids.width as f32,
-            height: ids.height as f32,
+            width: desc.picture.0 as f32,
+            height: desc.picture.1 as f32,
             max_depth: 1.0,
             ..vk::Viewport::default()
         };
@@ -180,7 +203,7 @@ impl Commands<'_> {
             device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
             device.cmd_set_viewport(self.raw, 0, &[viewport]);
             device.cmd_set_scissor(self.raw, 0, &[area]);
-            device.cmd_draw(self.raw, n_vertices, 1, 0, 0);
+            device.cmd_draw(self.raw, desc.n_vertices, 1, 0, 0);
             device.cmd_end_rendering(self.raw);
         }
     }
@@ -245,6 +268,14 @@ impl Commands<'_> {
         let info = vk::DependencyInfo::default().image_memory_barriers(&barrier);
         // SAFETY: the commands are being recorded, outside rendering.
         unsafe { self.context.device.cmd_pipeline_barrier2(self.raw, &info) };
+    }
+
+    /// Overwrites the first bytes with data that travels in the command buffer: 64 KiB at most.
+    pub fn update_buffer(&self, destination: &AnyBuffer, data: &impl Pod) {
+        let bytes = bytemuck::bytes_of(data);
+        assert!(bytes.len() as u64 <= destination.bytes() && bytes.len() <= 1 << 16 && bytes.len() % 4 == 0);
+        // SAFETY: the commands are being recorded, outside rendering, and the buffer holds that many bytes.
+        unsafe { self.context.device.cmd_update_buffer(self.raw, destination.raw(), 0, bytes) };
     }
 
     /// Copies the first `bytes`.

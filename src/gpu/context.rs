@@ -32,6 +32,14 @@ pub struct ContextOptions {
     pub validate: bool,
 }
 
+/// What a part of the device's memory is for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MemoryUse {
+    /// The buffer's or image's.
+    pub name: String,
+    pub bytes: u64,
+}
+
 /// A Vulkan device with one queue for graphics and compute.
 pub struct Context {
     pub(super) device: ash::Device,
@@ -240,6 +248,22 @@ impl Context {
             .unwrap_or_else(PoisonError::into_inner)
             .allocate(&desc)
             .map_err(|source| GpuError::Memory { object: name.to_owned(), bytes: requirements.size, source })
+    }
+
+    /// What memory is in use for, the most first; objects of one name together.
+    pub fn memory(&self) -> Vec<MemoryUse> {
+        let report = self.allocator.lock().unwrap_or_else(PoisonError::into_inner).generate_report();
+        let mut uses: Vec<MemoryUse> = Vec::new();
+        for allocation in report.allocations {
+            // egui's renderer gives its own no names.
+            let name = if allocation.name.is_empty() { "overlay".to_owned() } else { allocation.name };
+            match uses.iter_mut().find(|known| known.name == name) {
+                Some(known) => known.bytes += allocation.size,
+                None => uses.push(MemoryUse { name, bytes: allocation.size }),
+            }
+        }
+        uses.sort_by(|a, b| b.bytes.cmp(&a.bytes).then_with(|| a.name.cmp(&b.name)));
+        uses
     }
 
     pub(super) fn free(&self, allocation: Allocation) {

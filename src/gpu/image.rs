@@ -94,6 +94,11 @@ impl Target {
         }
     }
 
+    /// Width and height, pixels.
+    pub fn size(&self) -> (u32, u32) {
+        (self.width, self.height)
+    }
+
     fn create_view(&self, name: &str) -> Result<vk::ImageView, GpuError> {
         let info = vk::ImageViewCreateInfo::default()
             .image(self.raw)

@@ -9,11 +9,14 @@ use crate::{
     layout::{BIND_FRAME, BIND_TRIANGLE_IDS},
 };
 
+mod accumulate;
 mod cast;
 mod compact;
 mod denoise;
+mod pixels;
 mod present;
 mod primary_hit;
+mod queues;
 mod resolve;
 mod resources;
 mod shade;
@@ -24,11 +27,14 @@ mod tree;
 mod visibility;
 
 pub use self::{
+    accumulate::Accumulate,
     cast::{Cast, CastResources},
     compact::Compact,
     denoise::Denoise,
+    pixels::Pixels,
     present::Present,
     primary_hit::PrimaryHit,
+    queues::Queues,
     resolve::Resolve,
     resources::{Resources, bounce_row},
     shade::Shade,
@@ -56,6 +62,7 @@ pub struct Passes {
     pub shade: Shade,
     pub compact: Compact,
     pub resolve: Resolve,
+    pub accumulate: Accumulate,
     pub denoise: Denoise,
     pub tonemap: Tonemap,
 }
@@ -72,9 +79,32 @@ impl Passes {
             shade: Shade::new(context, bindings)?,
             compact: Compact::new(context, bindings)?,
             resolve: Resolve::new(context, bindings)?,
+            accumulate: Accumulate::new(context, bindings)?,
             denoise: Denoise::new(context, bindings)?,
             tonemap: Tonemap::new(context, bindings)?,
         })
+    }
+
+    /// Makes the kernels anew in which the options differ.
+    ///
+    /// # Errors
+    /// The driver refuses a shader; then all are as before.
+    pub fn set_options(
+        &mut self,
+        context: &Arc<Context>,
+        bindings: &Arc<Bindings>,
+        from: &RenderOptions,
+        to: &RenderOptions,
+    ) -> Result<(), GpuError> {
+        if from.traversal != to.traversal {
+            let trace = Trace::new(context, bindings, to.traversal)?;
+            self.shadow = Shadow::new(context, bindings, to.traversal)?;
+            self.trace = trace;
+        }
+        if from.primary != to.primary {
+            self.primary_hit = PrimaryHit::new(context, bindings, to.primary == Primary::Raster)?;
+        }
+        Ok(())
     }
 }
 

@@ -1,15 +1,13 @@
-//! The frame's buffers and images, and the two descriptor sets over them.
+//! What a frame needs on the device, and the two descriptor sets over it.
 
 use std::{mem::offset_of, sync::Arc};
 
-use super::{Tree, binding};
+use super::{Pixels, Queues, Tree, binding, pixels::n_pixels};
 use crate::{
     frame::Traversal,
-    gpu::{
-        Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError, Target, TargetKind,
-    },
+    gpu::{Access, Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
     kdtree::KdTree,
-    layout::{self, Batch, Bounce, Counters, Frame, Hit, Light, Material, RAY_GROUP_SIZE, Ray, SCAN_BLOCK_SIZE},
+    layout::{self, Batch, Bounce, Counters, Frame, Light, Material, RAY_GROUP_SIZE, Ray, SCAN_BLOCK_SIZE},
     scene::Scene,
 };
 
@@ -21,28 +19,11 @@ pub struct Resources {
     pub materials: Buffer<Material>,
     /// `n_lights`.
     pub lights: Buffer<Light>,
-    /// Even bounces read the first queue and fill the second, odd ones the other way round; `queue_capacity` each.
-    pub ray_queues: [Buffer<Ray>; 2],
-    /// Two places a ray: `2 * queue_capacity`.
-    pub child_rays: Buffer<Ray>,
-    /// `queue_capacity`, like hits and ray_radiance.
-    pub child_counts: Buffer<u32>,
-    pub hits: Buffer<Hit>,
-    pub ray_radiance: Buffer<[f32; 4]>,
-    /// `n_lights * queue_capacity`, lights outermost.
-    pub light_visibility: Buffer<u32>,
-    /// `queue_capacity / SCAN_BLOCK_SIZE`, rounded up.
-    pub scan_blocks: Buffer<u32>,
+    pub queues: Queues,
+    pub pixels: Pixels,
     /// One a batch and bounce, like counters.
     pub bounces: Buffer<Bounce>,
     pub counters: Buffer<Counters>,
-    /// `width * height`, like the next two.
-    pub pixel_radiance: Buffer<[f32; 4]>,
-    /// None without a noise filter: what follows it then reads pixel_radiance.
-    pub pixel_filtered: Option<Buffer<[f32; 4]>>,
-    pub pixel_display: Buffer<u32>,
-    pub triangle_ids: Target,
-    pub depth: Target,
     pub bindings: Arc<Bindings>,
     /// For even and for odd bounces.
     pub sets: Vec<BindingSet>,
@@ -62,55 +43,17 @@ impl Resources {
         n_bounces: usize,
     ) -> Result<Self, GpuError> {
         let storage = BufferUse::Storage;
-        let capacity = constants.queue_capacity as usize;
-        let n_pixels = constants.width as usize * constants.height as usize;
-        let size = (constants.width, constants.height);
-        let queue = |name| Buffer::new(context, name, capacity, storage);
-
-        let tree = Tree::new(context, &scene.triangles, tree, constants)?;
-        let triangle_materials = Buffer::with(context, "triangle_materials", &scene.triangle_materials, storage)?;
-        let materials = Buffer::with(context, "materials", &scene.materials, storage)?;
-        let lights = Buffer::with(context, "lights", &scene.lights, storage)?;
-        let ray_queues = [queue("ray_queues[0]")?, queue("ray_queues[1]")?];
-        let child_rays = Buffer::new(context, "child_rays", 2 * capacity, storage)?;
-        let child_counts = Buffer::new(context, "child_counts", capacity, storage)?;
-        let hits = Buffer::new(context, "hits", capacity, storage)?;
-        let ray_radiance = Buffer::new(context, "ray_radiance", capacity, storage)?;
-        let n_visibility = capacity * constants.n_lights as usize;
-        let light_visibility = Buffer::new(context, "light_visibility", n_visibility, storage)?;
-        let n_blocks = capacity.div_ceil(SCAN_BLOCK_SIZE as usize);
-        let scan_blocks = Buffer::new(context, "scan_blocks", n_blocks, storage)?;
-        let bounces = Buffer::new(context, "bounces", n_bounces, BufferUse::Indirect)?;
-        let counters = Buffer::new(context, "counters", n_bounces, storage)?;
-        let pixel_radiance = Buffer::new(context, "pixel_radiance", n_pixels, storage)?;
-        let filters = constants.denoise_threshold.is_finite();
-        let pixel_filtered = filters.then(|| Buffer::new(context, "pixel_filtered", n_pixels, storage)).transpose()?;
-        let pixel_display = Buffer::new(context, "pixel_display", n_pixels, storage)?;
-        let triangle_ids = Target::new(context, "triangle_ids", TargetKind::Id, size)?;
-        let depth = Target::new(context, "depth", TargetKind::Depth, size)?;
-
         let kinds: Vec<_> = (0..layout::N_BINDINGS).map(binding).collect();
-        let bindings = Bindings::new(context, &kinds, size_of::<Batch>() as u32)?;
         let mut resources = Self {
-            tree,
-            triangle_materials,
-            materials,
-            lights,
-            ray_queues,
-            child_rays,
-            child_counts,
-            hits,
-            ray_radiance,
-            light_visibility,
-            scan_blocks,
-            bounces,
-            counters,
-            pixel_radiance,
-            pixel_filtered,
-            pixel_display,
-            triangle_ids,
-            depth,
-            bindings,
+            tree: Tree::new(context, &scene.triangles, tree, constants)?,
+            triangle_materials: Buffer::with(context, "triangle_materials", &scene.triangle_materials, storage)?,
+            materials: Buffer::with(context, "materials", &scene.materials, storage)?,
+            lights: Buffer::with(context, "lights", &scene.lights, storage)?,
+            queues: Queues::new(context, constants.queue_capacity, constants.n_lights)?,
+            pixels: Pixels::new(context, constants)?,
+            bounces: Buffer::new(context, "bounces", n_bounces, BufferUse::Indirect)?,
+            counters: Buffer::new(context, "counters", n_bounces, storage)?,
+            bindings: Bindings::new(context, &kinds, size_of::<Batch>() as u32)?,
             sets: Vec::new(),
             constants: *constants,
         };
@@ -119,31 +62,61 @@ impl Resources {
     }
 
     fn make_sets(&self) -> Result<Vec<BindingSet>, GpuError> {
-        let [even, odd] = &self.ray_queues;
+        let [even, odd] = &self.queues.ray_queues;
         Ok(vec![self.make_set("even bounces", even, odd)?, self.make_set("odd bounces", odd, even)?])
     }
 
     fn make_set(&self, name: &str, rays: &Buffer<Ray>, next_rays: &Buffer<Ray>) -> Result<BindingSet, GpuError> {
+        let (queues, pixels) = (&self.queues, &self.pixels);
         let own = [
             (layout::BIND_TRIANGLE_MATERIALS, Binding::Buffer(self.triangle_materials.any())),
             (layout::BIND_MATERIALS, Binding::Buffer(self.materials.any())),
             (layout::BIND_LIGHTS, Binding::Buffer(self.lights.any())),
             (layout::BIND_RAYS, Binding::Buffer(rays.any())),
             (layout::BIND_NEXT_RAYS, Binding::Buffer(next_rays.any())),
-            (layout::BIND_CHILD_RAYS, Binding::Buffer(self.child_rays.any())),
-            (layout::BIND_CHILD_COUNTS, Binding::Buffer(self.child_counts.any())),
-            (layout::BIND_SCAN_BLOCKS, Binding::Buffer(self.scan_blocks.any())),
+            (layout::BIND_CHILD_RAYS, Binding::Buffer(queues.child_rays.any())),
+            (layout::BIND_CHILD_COUNTS, Binding::Buffer(queues.child_counts.any())),
+            (layout::BIND_SCAN_BLOCKS, Binding::Buffer(queues.scan_blocks.any())),
             (layout::BIND_BOUNCES, Binding::Buffer(self.bounces.any())),
-            (layout::BIND_HITS, Binding::Buffer(self.hits.any())),
-            (layout::BIND_LIGHT_VISIBILITY, Binding::Buffer(self.light_visibility.any())),
-            (layout::BIND_RAY_RADIANCE, Binding::Buffer(self.ray_radiance.any())),
-            (layout::BIND_PIXEL_RADIANCE, Binding::Buffer(self.pixel_radiance.any())),
-            (layout::BIND_PIXEL_FILTERED, Binding::Buffer(self.filtered().any())),
-            (layout::BIND_PIXEL_DISPLAY, Binding::Buffer(self.pixel_display.any())),
+            (layout::BIND_HITS, Binding::Buffer(queues.hits.any())),
+            (layout::BIND_LIGHT_VISIBILITY, Binding::Buffer(queues.light_visibility.any())),
+            (layout::BIND_RAY_RADIANCE, Binding::Buffer(queues.ray_radiance.any())),
+            (layout::BIND_PIXEL_RADIANCE, Binding::Buffer(pixels.pixel_radiance.any())),
+            (layout::BIND_PIXEL_ACCUMULATED, Binding::Buffer(pixels.accumulated().any())),
+            (layout::BIND_PIXEL_FILTERED, Binding::Buffer(pixels.filtered().any())),
+            (layout::BIND_PIXEL_DISPLAY, Binding::Buffer(pixels.pixel_display.any())),
             (layout::BIND_COUNTERS, Binding::Buffer(self.counters.any())),
-            (layout::BIND_TRIANGLE_IDS, Binding::Image(&self.triangle_ids)),
+            (layout::BIND_TRIANGLE_IDS, Binding::Image(&pixels.triangle_ids)),
         ];
         BindingSet::new(&self.bindings, name, &[&self.tree.objects()[..], &own].concat())
+    }
+
+    /// The kernels' constants from now on, with room for their picture and for `constants.queue_capacity` rays, or for as
+    /// many as there was room for. What they hold is undefined. Where there is no room, all is as before.
+    ///
+    /// # Errors
+    /// Beyond the device's limits, out of memory.
+    pub fn fit(&mut self, context: &Arc<Context>, constants: &Frame) -> Result<(), GpuError> {
+        let grows = self.queues.capacity() < constants.queue_capacity;
+        let queues = grows.then(|| Queues::new(context, constants.queue_capacity, constants.n_lights)).transpose()?;
+        let pixels = (!self.pixels.fit(constants)).then(|| Pixels::new(context, constants)).transpose()?;
+        let has_room = queues.is_none() && pixels.is_none();
+        if let Some(queues) = queues {
+            self.queues = queues;
+        }
+        if let Some(pixels) = pixels {
+            self.pixels = pixels;
+        }
+        self.constants = Frame { queue_capacity: self.queues.capacity(), ..*constants };
+        if !has_room {
+            self.sets = self.make_sets()?;
+        }
+        Ok(())
+    }
+
+    /// Other constants for as many pixels and rays; the next frame brings them to the device.
+    pub fn set_constants(&mut self, constants: &Frame) {
+        self.constants = *constants;
     }
 
     /// Uploads what the traversal reads beside the tree.
@@ -167,9 +140,29 @@ impl Resources {
         Ok(())
     }
 
-    /// The image after the noise filter, or the one without it.
-    pub fn filtered(&self) -> &Buffer<[f32; 4]> {
-        self.pixel_filtered.as_ref().unwrap_or(&self.pixel_radiance)
+    /// Makes the first sample the sum of samples.
+    ///
+    /// # Errors
+    /// Out of memory, a failed copy.
+    pub fn begin_sums(&mut self, context: &Arc<Context>) -> Result<(), GpuError> {
+        if self.pixels.pixel_accumulated.is_none() {
+            let n_pixels = self.pixels.pixel_radiance.len();
+            let sums = Buffer::new(context, "pixel_accumulated", n_pixels, BufferUse::Storage)?;
+            self.pixels.pixel_accumulated = Some(sums);
+            self.sets = self.make_sets()?;
+        }
+        let (sample, sums) = (self.pixels.pixel_radiance.any(), self.pixels.accumulated().any());
+        context.run("first sample", |commands| {
+            commands.barrier(Access::ComputeWrite, Access::TransferRead); // pixel_radiance
+            commands.barrier(Access::ComputeUpdate, Access::TransferWrite); // pixel_accumulated
+            commands.copy_buffer(sample, sums, sample.bytes());
+            commands.barrier(Access::TransferWrite, Access::AllReads); // pixel_accumulated
+        })
+    }
+
+    /// Pixels of the window.
+    pub fn n_pixels(&self) -> usize {
+        n_pixels(&self.constants)
     }
 
     /// The constants that the kernels read.

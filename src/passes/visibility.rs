@@ -1,9 +1,12 @@
-//! Visibility (the paper's section 2.2): the nearest triangle's index in each pixel, by rasterization.
+//! Visibility (the paper's section 2.2): the nearest triangle's index in each pixel's sample, by rasterization.
 
 use std::sync::Arc;
 
 use super::{Resources, spirv};
-use crate::gpu::{Bindings, Commands, Context, GpuError, RasterDesc, RasterPipeline, RasterTargets};
+use crate::{
+    gpu::{Area, Bindings, Commands, Context, DrawDesc, GpuError, RasterDesc, RasterPipeline, RasterTargets},
+    layout::Frame,
+};
 
 /// The pass's pipeline.
 pub struct Visibility {
@@ -23,9 +26,18 @@ impl Visibility {
 
     /// Needs nothing. Leaves triangle_ids, ready for kernels.
     pub fn record(&self, commands: &Commands, resources: &Resources) {
-        let (ids, depth) = (&resources.triangle_ids, &resources.depth);
+        let (ids, depth) = (&resources.pixels.triangle_ids, &resources.pixels.depth);
+        let Frame { window_x: x, window_y: y, width, height, .. } = *resources.constants();
+        let Frame { picture_width, picture_height, n_triangles, .. } = *resources.constants();
         commands.begin_targets(ids, depth);
-        commands.draw(&self.pipeline, ids, depth, 3 * resources.constants().n_triangles);
+        let desc = DrawDesc {
+            ids,
+            depth,
+            picture: (picture_width, picture_height),
+            area: Area { x, y, width, height },
+            n_vertices: 3 * n_triangles,
+        };
+        commands.draw(&self.pipeline, &desc);
         commands.ids_to_compute(ids);
     }
 }

@@ -12,7 +12,7 @@ use super::studio::{assert_silent, device, identical, options, tree_of};
 use crate::support::scenes;
 
 /// Glass in glass, nowhere dark: rays double at each of its surfaces.
-fn glass_in_glass() -> Scene {
+pub fn glass_in_glass() -> Scene {
     let mut scene = scenes::empty();
     scenes::add(&mut scene, scenes::smooth_sphere(6, 1.4, Vec3::ZERO), scenes::glass(1.5));
     scenes::add(&mut scene, scenes::smooth_sphere(5, 0.9, Vec3::ZERO), scenes::glass(1.2));

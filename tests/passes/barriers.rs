@@ -17,7 +17,7 @@ fn fill(stage: &Stage) {
     stage.set_n_rays(64);
     stage.set_rays(&rays);
     stage.set_hits(&hits_of(stage, &rays));
-    stage.resources.child_counts.upload(&[0; 64]).expect("child_counts");
+    stage.resources.queues.child_counts.upload(&[0; 64]).expect("child_counts");
 }
 
 /// Runs `first`, the barrier if there is one, and `second`; a message is expected without it and none with it.
@@ -52,6 +52,10 @@ fn resolve(stage: &Stage, commands: &Commands) {
     stage.passes.resolve.record(commands, &stage.resources, &BATCH);
 }
 
+fn accumulate(stage: &Stage, commands: &Commands) {
+    stage.passes.accumulate.record(commands, &stage.resources);
+}
+
 fn compact(stage: &Stage, commands: &Commands) {
     stage.passes.compact.record(commands, &stage.resources, &BATCH);
 }
@@ -82,6 +86,11 @@ fn reading_children_before_they_are_written_is_reported() {
 #[test]
 fn overwriting_hits_before_they_are_read_is_reported() {
     check((Access::ComputeUpdate, Access::ComputeUpdate), shade, trace);
+}
+
+#[test]
+fn adding_a_sample_before_it_is_there_is_reported() {
+    check((Access::ComputeWrite, Access::ComputeUpdate), resolve, accumulate);
 }
 
 #[test]

@@ -44,17 +44,23 @@ fn on_device(stage: &Stage, child_counts: &[u32]) -> (Vec<Ray>, [Bounce; 2]) {
     let n_rays = child_counts.len();
     let children: Vec<Ray> = (0..2 * n_rays).map(numbered).collect();
     stage.set_n_rays(n_rays as u32);
-    resources.child_rays.upload(&children).expect("child_rays");
-    resources.child_counts.upload(child_counts).expect("child_counts");
-    resources.scan_blocks.upload(&vec![UNTOUCHED_WORD; resources.scan_blocks.len()]).expect("scan_blocks");
-    resources.ray_queues[1].upload(&vec![UNTOUCHED_RAY; resources.ray_queues[1].len()]).expect("next_rays");
+    resources.queues.child_rays.upload(&children).expect("child_rays");
+    resources.queues.child_counts.upload(child_counts).expect("child_counts");
+    resources
+        .queues
+        .scan_blocks
+        .upload(&vec![UNTOUCHED_WORD; resources.queues.scan_blocks.len()])
+        .expect("scan_blocks");
+    resources.queues.ray_queues[1]
+        .upload(&vec![UNTOUCHED_RAY; resources.queues.ray_queues[1].len()])
+        .expect("next_rays");
     stage.run(&FIRST, |commands| stage.passes.compact.record(commands, resources, &FIRST));
     let bounces = resources.bounces.download().expect("bounces");
-    (resources.ray_queues[1].download().expect("next_rays"), [bounces[0], bounces[1]])
+    (resources.queues.ray_queues[1].download().expect("next_rays"), [bounces[0], bounces[1]])
 }
 
 fn on_cpu(stage: &Stage, child_counts: &[u32]) -> (Vec<Ray>, [Bounce; 2]) {
-    let (n_rays, capacity) = (child_counts.len(), stage.resources.ray_queues[1].len());
+    let (n_rays, capacity) = (child_counts.len(), stage.resources.queues.ray_queues[1].len());
     let children: Vec<Ray> = (0..2 * n_rays).map(numbered).collect();
     let this = kdray::passes::bounce_row(n_rays as u32, 0);
     let mut next = this;
@@ -119,12 +125,15 @@ fn odd_bounces_fill_the_other_queue() {
     let batch = Batch { depth: 1, bounce_ix: 1, ..FIRST };
     stage.set_n_rays(50);
     stage.set_rays(&[]);
-    resources.ray_queues[1].upload(&[UNTOUCHED_RAY; 100]).expect("next_rays");
-    resources.child_rays.upload(&(0..100).map(numbered).collect::<Vec<_>>()).expect("child_rays");
-    resources.child_counts.upload(&[2; 50]).expect("child_counts");
+    resources.queues.ray_queues[1].upload(&[UNTOUCHED_RAY; 100]).expect("next_rays");
+    resources.queues.child_rays.upload(&(0..100).map(numbered).collect::<Vec<_>>()).expect("child_rays");
+    resources.queues.child_counts.upload(&[2; 50]).expect("child_counts");
     stage.run(&batch, |commands| stage.passes.compact.record(commands, resources, &batch));
-    compare::exact(&(0..100).map(numbered).collect::<Vec<_>>(), &resources.ray_queues[0].download().expect("rays"))
-        .unwrap();
-    compare::exact(&[UNTOUCHED_RAY; 100], &resources.ray_queues[1].download().expect("next_rays")).unwrap();
+    compare::exact(
+        &(0..100).map(numbered).collect::<Vec<_>>(),
+        &resources.queues.ray_queues[0].download().expect("rays"),
+    )
+    .unwrap();
+    compare::exact(&[UNTOUCHED_RAY; 100], &resources.queues.ray_queues[1].download().expect("next_rays")).unwrap();
     assert_eq!(resources.bounces.download().expect("bounces")[2].n_rays, 100);
 }

@@ -20,10 +20,10 @@ fn noisy(n: usize) -> Vec<[f32; 4]> {
 
 fn filtered(stage: &Stage, pixels: &[[f32; 4]]) -> Vec<[f32; 4]> {
     let resources = &stage.resources;
-    resources.pixel_radiance.upload(pixels).expect("pixel_radiance");
-    resources.filtered().upload(&vec![UNTOUCHED_PIXEL; pixels.len()]).expect("pixel_filtered");
+    resources.pixels.pixel_radiance.upload(pixels).expect("pixel_radiance");
+    resources.pixels.filtered().upload(&vec![UNTOUCHED_PIXEL; pixels.len()]).expect("pixel_filtered");
     stage.run(&FIRST, |commands| stage.passes.denoise.record(commands, resources));
-    resources.filtered().download().expect("pixel_filtered")
+    resources.pixels.filtered().download().expect("pixel_filtered")
 }
 
 fn empty_stage(options: RenderOptions) -> Stage {

@@ -18,8 +18,8 @@ fn on_device(stage: &Stage, batch: &Batch) -> (Vec<Ray>, Vec<Hit>, u32) {
         stage.passes.visibility.record(commands, &stage.resources);
         stage.passes.primary_hit.record(commands, batch);
     });
-    let rays = stage.resources.ray_queues[0].download().expect("rays");
-    (rays, stage.resources.hits.download().expect("hits"), stage.counters().n_hits)
+    let rays = stage.resources.queues.ray_queues[0].download().expect("rays");
+    (rays, stage.resources.queues.hits.download().expect("hits"), stage.counters().n_hits)
 }
 
 /// The same on the CPU, with the triangles of the device's hits.

@@ -21,7 +21,7 @@ fn check(stage: &Stage, depth: u32, rays: &[Ray]) {
     let resources = &stage.resources;
     let mut random = Random(4);
     let mut some = |n: usize| -> Vec<[f32; 4]> { (0..n).map(|_| [0; 4].map(|_| random.between(0.0, 5.0))).collect() };
-    let before = some(resources.pixel_radiance.len());
+    let before = some(resources.pixels.pixel_radiance.len());
     let radiance = some(rays.len());
     let mut expected = before.clone();
     cpu::resolve::resolve(depth, rays, &radiance, &mut expected);
@@ -29,10 +29,10 @@ fn check(stage: &Stage, depth: u32, rays: &[Ray]) {
     let batch = Batch { depth, ..FIRST };
     stage.set_n_rays(rays.len() as u32);
     stage.set_rays(rays);
-    resources.ray_radiance.upload(&radiance).expect("ray_radiance");
-    resources.pixel_radiance.upload(&before).expect("pixel_radiance");
+    resources.queues.ray_radiance.upload(&radiance).expect("ray_radiance");
+    resources.pixels.pixel_radiance.upload(&before).expect("pixel_radiance");
     stage.run(&batch, |commands| stage.passes.resolve.record(commands, resources, &batch));
-    compare::exact(&expected, &resources.pixel_radiance.download().expect("pixel_radiance")).unwrap();
+    compare::exact(&expected, &resources.pixels.pixel_radiance.download().expect("pixel_radiance")).unwrap();
 }
 
 #[test]

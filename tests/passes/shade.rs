@@ -27,7 +27,7 @@ fn blank(n: usize) -> Shaded {
 fn on_cpu(stage: &Stage, batch: &Batch, lit: LitRays) -> Shaded {
     let mut shaded = blank(lit.rays.len());
     cpu::shade::shade(&stage.bindings(), batch.depth, lit, &mut shaded);
-    let capacity = stage.resources.hits.len();
+    let capacity = stage.resources.queues.hits.len();
     shaded.ray_radiance.resize(capacity, UNTOUCHED_PIXEL);
     shaded.child_rays.resize(2 * capacity, UNTOUCHED_RAY);
     shaded.child_counts.resize(capacity, UNTOUCHED_WORD);
@@ -36,19 +36,19 @@ fn on_cpu(stage: &Stage, batch: &Batch, lit: LitRays) -> Shaded {
 
 fn on_device(stage: &Stage, batch: &Batch, lit: LitRays) -> Shaded {
     let resources = &stage.resources;
-    let blank = blank(resources.hits.len());
+    let blank = blank(resources.queues.hits.len());
     stage.set_n_rays(lit.rays.len() as u32);
     stage.set_rays(lit.rays);
     stage.set_hits(lit.hits);
-    resources.light_visibility.upload(lit.light_visibility).expect("light_visibility");
-    resources.ray_radiance.upload(&blank.ray_radiance).expect("ray_radiance");
-    resources.child_rays.upload(&blank.child_rays).expect("child_rays");
-    resources.child_counts.upload(&blank.child_counts).expect("child_counts");
+    resources.queues.light_visibility.upload(lit.light_visibility).expect("light_visibility");
+    resources.queues.ray_radiance.upload(&blank.ray_radiance).expect("ray_radiance");
+    resources.queues.child_rays.upload(&blank.child_rays).expect("child_rays");
+    resources.queues.child_counts.upload(&blank.child_counts).expect("child_counts");
     stage.run(batch, |commands| stage.passes.shade.record(commands, resources, batch));
     Shaded {
-        ray_radiance: resources.ray_radiance.download().expect("ray_radiance"),
-        child_rays: resources.child_rays.download().expect("child_rays"),
-        child_counts: resources.child_counts.download().expect("child_counts"),
+        ray_radiance: resources.queues.ray_radiance.download().expect("ray_radiance"),
+        child_rays: resources.queues.child_rays.download().expect("child_rays"),
+        child_counts: resources.queues.child_counts.download().expect("child_counts"),
     }
 }
 
@@ -58,7 +58,7 @@ fn check(stage: &Stage, depth: u32, n_rays: u32) {
     let hits = hits_of(stage, &rays);
     let mut random = Random(3);
     let light_visibility: Vec<u32> =
-        (0..stage.resources.light_visibility.len()).map(|_| random.below(2) as u32).collect();
+        (0..stage.resources.queues.light_visibility.len()).map(|_| random.below(2) as u32).collect();
     let lit = LitRays { rays: &rays, hits: &hits, light_visibility: &light_visibility };
     let batch = Batch { depth, ..FIRST };
     let (expected, found) = (on_cpu(stage, &batch, lit), on_device(stage, &batch, lit));

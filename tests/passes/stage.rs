@@ -86,16 +86,16 @@ impl Stage {
 
     /// The first `rays.len()` of the queue that even bounces read; untouched ones behind.
     pub fn set_rays(&self, rays: &[Ray]) {
-        let mut queue = vec![UNTOUCHED_RAY; self.resources.ray_queues[0].len()];
+        let mut queue = vec![UNTOUCHED_RAY; self.resources.queues.ray_queues[0].len()];
         queue[..rays.len()].copy_from_slice(rays);
-        self.resources.ray_queues[0].upload(&queue).expect("rays");
+        self.resources.queues.ray_queues[0].upload(&queue).expect("rays");
     }
 
     /// As `set_rays`.
     pub fn set_hits(&self, hits: &[Hit]) {
-        let mut all = vec![UNTOUCHED_HIT; self.resources.hits.len()];
+        let mut all = vec![UNTOUCHED_HIT; self.resources.queues.hits.len()];
         all[..hits.len()].copy_from_slice(hits);
-        self.resources.hits.upload(&all).expect("hits");
+        self.resources.queues.hits.upload(&all).expect("hits");
     }
 
     /// How many of `n` rays may differ from the twin's: none on software drivers, whose arithmetic is exactly the

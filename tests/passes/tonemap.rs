@@ -7,10 +7,10 @@ use crate::support::{compare, random::Random, scenes};
 
 fn encoded(stage: &Stage, pixels: &[[f32; 4]]) -> Vec<[u8; 4]> {
     let resources = &stage.resources;
-    resources.filtered().upload(pixels).expect("pixel_filtered");
-    resources.pixel_display.upload(&vec![UNTOUCHED_WORD; pixels.len()]).expect("pixel_display");
+    resources.pixels.filtered().upload(pixels).expect("pixel_filtered");
+    resources.pixels.pixel_display.upload(&vec![UNTOUCHED_WORD; pixels.len()]).expect("pixel_display");
     stage.run(&FIRST, |commands| stage.passes.tonemap.record(commands, resources));
-    resources.pixel_display.download().expect("pixel_display").into_iter().map(u32::to_le_bytes).collect()
+    resources.pixels.pixel_display.download().expect("pixel_display").into_iter().map(u32::to_le_bytes).collect()
 }
 
 fn empty_stage(options: RenderOptions) -> Stage {

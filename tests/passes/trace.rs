@@ -12,13 +12,13 @@ use crate::support::{compare, meshes, scenes};
 fn check(stage: &Stage, n_rays: u32) {
     let n = n_rays as usize;
     let rays = some_rays(stage, n_rays);
-    let mut expected = vec![UNTOUCHED_HIT; stage.resources.hits.len()];
+    let mut expected = vec![UNTOUCHED_HIT; stage.resources.queues.hits.len()];
     let n_hits = cpu::trace::trace(&stage.bindings(), stage.options.traversal, &rays, &mut expected[..n]);
     stage.set_n_rays(n_rays);
     stage.set_rays(&rays);
     stage.set_hits(&[]);
     stage.run(&FIRST, |commands| stage.passes.trace.record(commands, &stage.resources, &FIRST));
-    let found = stage.resources.hits.download().expect("hits");
+    let found = stage.resources.queues.hits.download().expect("hits");
     let n_outliers = stage.n_outliers(n_rays);
     if stage.context.is_software() {
         compare::exact(&expected, &found).unwrap();
@@ -59,5 +59,6 @@ fn nothing_is_hit_in_an_empty_scene() {
     stage.set_n_rays(9);
     stage.set_rays(&rays);
     stage.run(&FIRST, |commands| stage.passes.trace.record(commands, &stage.resources, &FIRST));
-    compare::exact(&super::stage::hits_of(&stage, &rays), &stage.resources.hits.download().expect("hits")).unwrap();
+    compare::exact(&super::stage::hits_of(&stage, &rays), &stage.resources.queues.hits.download().expect("hits"))
+        .unwrap();
 }

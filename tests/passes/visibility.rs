@@ -22,8 +22,8 @@ fn rasterized(stage: &Stage) -> Vec<u32> {
         stage.passes.visibility.record(commands, &stage.resources);
         stage.passes.primary_hit.record(commands, &batch);
     });
-    let rays = stage.resources.ray_queues[0].download().expect("rays");
-    let hits = stage.resources.hits.download().expect("hits");
+    let rays = stage.resources.queues.ray_queues[0].download().expect("rays");
+    let hits = stage.resources.queues.hits.download().expect("hits");
     let mut ids = vec![0; n_pixels as usize];
     for (ray, hit) in rays.iter().zip(hits) {
         ids[ray.pixel_ix as usize] = hit.triangle_ix;

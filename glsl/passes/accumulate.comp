@@ -1,0 +1,24 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Accumulate: one invocation a pixel adds the frame's sample to those before it, and puts their mean in its place.
+// Where a ray queue overflowed the frame is drawn anew: then it adds nothing.
+// Reads bounces; updates pixel_accumulated (sums of radiance) and pixel_radiance (the sample, then the mean).
+#include "layout.glsl"
+
+layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;
+layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
+layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
+layout(std430, set = 0, binding = BIND_PIXEL_RADIANCE) buffer PixelRadianceBlock { vec4 pixel_radiance[]; };
+layout(std430, set = 0, binding = BIND_PIXEL_ACCUMULATED) buffer PixelAccumulatedBlock { vec4 pixel_accumulated[]; };
+
+void main() {
+    uvec2 pixel = gl_GlobalInvocationID.xy;
+    if (pixel.x >= frame.width || pixel.y >= frame.height) return;
+    for (int i = 0; i < bounces.length(); ++i) {
+        if (bounces[i].overflow != 0u) return;
+    }
+    uint pixel_ix = pixel.y * frame.width + pixel.x;
+    vec4 sum = pixel_accumulated[pixel_ix] + pixel_radiance[pixel_ix];
+    pixel_accumulated[pixel_ix] = sum;
+    pixel_radiance[pixel_ix] = sum / float(frame.n_samples);
+}

@@ -1,0 +1,24 @@
+//! Accumulate: adds a sample to those before it. Twin of `accumulate.comp`.
+
+use glam::Vec4;
+use rayon::prelude::*;
+
+use crate::layout::{Bounce, Frame};
+
+/// Adds `pixel_radiance`, the frame's sample, to the sums in `pixel_accumulated`, and puts the mean of all samples in its
+/// place; nothing where one of `bounces` overflowed.
+pub fn accumulate(
+    frame: &Frame,
+    bounces: &[Bounce],
+    pixel_radiance: &mut [[f32; 4]],
+    pixel_accumulated: &mut [[f32; 4]],
+) {
+    if bounces.iter().any(|bounce| bounce.overflow != 0) {
+        return;
+    }
+    pixel_radiance.par_iter_mut().zip(pixel_accumulated).with_min_len(1024).for_each(|(radiance, accumulated)| {
+        let sum = Vec4::from(*accumulated) + Vec4::from(*radiance);
+        *accumulated = sum.to_array();
+        *radiance = (sum / frame.n_samples as f32).to_array();
+    });
+}

@@ -1,0 +1,248 @@
+//! The frame on the CPU: the order of passes, batch by batch.
+
+use std::mem::swap;
+
+use bytemuck::Zeroable;
+
+use super::{
+    accumulate,
+    bindings::Bindings,
+    compact, denoise, primary_hit,
+    queues::Queues,
+    resolve,
+    shade::{self, LitRays, Shaded},
+    shadow,
+    timing::Clock,
+    tonemap, trace, visibility,
+};
+use crate::{
+    camera::frame_constants,
+    frame::{BounceStats, Picture, Primary, Profile, RenderOptions},
+    kdtree::{Extras, KdTree},
+    layout::{Bounce, Frame, Hit, Ray, SCAN_BLOCK_SIZE},
+    scene::Scene,
+};
+
+/// How a frame is cut into pieces. The picture does not depend on it.
+#[derive(Clone, Copy, Debug)]
+pub struct Batching {
+    /// Pixels whose rays are traced together.
+    pub n_pixels: u32,
+    /// Rays of a bounce beyond which a batch of more than one pixel is halved.
+    pub queue_capacity: u32,
+}
+
+impl Default for Batching {
+    /// Some 30 MB of queues as a rule, and 270 MB at the most.
+    fn default() -> Self {
+        Self { n_pixels: 1 << 16, queue_capacity: 1 << 20 }
+    }
+}
+
+/// A scene, and its picture in the making, sample by sample.
+pub struct Renderer<'a> {
+    scene: &'a Scene,
+    tree: &'a KdTree,
+    options: &'a RenderOptions,
+    batching: Batching,
+    extras: Extras,
+    frame: Frame,
+    /// Like `pixel_radiance`: `width * height` of the window, rows from the top.
+    triangle_ids: Vec<u32>,
+    /// The sample, then the mean of all.
+    pixel_radiance: Vec<[f32; 4]>,
+    /// Sums of samples; empty before there is a second one.
+    pixel_accumulated: Vec<[f32; 4]>,
+    pixel_filtered: Vec<[f32; 4]>,
+    pixel_display: Vec<[u8; 4]>,
+    queues: Queues,
+    /// Samples a pixel that the picture holds.
+    n_samples: u32,
+    clock: Clock,
+    bounces: Vec<BounceStats>,
+    n_batches: u32,
+}
+
+impl<'a> Renderer<'a> {
+    pub fn new(scene: &'a Scene, tree: &'a KdTree, options: &'a RenderOptions, batching: Batching) -> Self {
+        let frame = frame_constants(scene, tree, options);
+        let n_pixels = frame.width as usize * frame.height as usize;
+        Self {
+            scene,
+            tree,
+            options,
+            batching,
+            extras: Extras::new(tree, options.traversal),
+            frame,
+            triangle_ids: vec![0; n_pixels],
+            pixel_radiance: vec![[0.0; 4]; n_pixels],
+            pixel_accumulated: Vec::new(),
+            pixel_filtered: vec![[0.0; 4]; n_pixels],
+            pixel_display: vec![[0; 4]; n_pixels],
+            queues: Queues::default(),
+            n_samples: 0,
+            clock: Clock::start(),
+            bounces: Vec::new(),
+            n_batches: 0,
+        }
+    }
+
+    /// Draws the frame by one sample more a pixel on the current rayon pool, the first at its centre; the picture is the
+    /// mean of all.
+    pub fn draw_sample(&mut self) -> Profile {
+        self.clock = Clock::start();
+        self.bounces.clear();
+        self.n_batches = 0;
+        self.frame.set_view(&self.scene.camera, self.n_samples);
+        if self.n_samples == 1 {
+            self.pixel_accumulated.clone_from(&self.pixel_radiance);
+        }
+        if self.options.primary == Primary::Raster {
+            self.visibility();
+        }
+        let n_pixels = self.pixel_radiance.len() as u32;
+        for first_pixel in (0..n_pixels).step_by(self.batching.n_pixels as usize) {
+            self.batch(first_pixel, self.batching.n_pixels.min(n_pixels - first_pixel));
+        }
+        self.finish();
+        self.n_samples += 1;
+        self.profile()
+    }
+
+    /// The next sample is the first of a new picture.
+    pub fn reset_samples(&mut self) {
+        self.n_samples = 0;
+    }
+
+    /// The mean of the samples so far, filtered.
+    pub fn picture(&self) -> Picture {
+        let (window, crop) = (self.options.window(), self.options.crop_or_whole());
+        Picture {
+            width: crop.width(),
+            height: crop.height(),
+            radiance: window.part(&self.pixel_filtered, &crop),
+            display: window.part(&self.pixel_display, &crop),
+        }
+    }
+
+    fn visibility(&mut self) {
+        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
+        let (traversal, ids) = (self.options.traversal, &mut self.triangle_ids);
+        self.clock.time("visibility", None, || visibility::visibility(&bindings, traversal, ids));
+    }
+
+    /// Algorithm 1 for a batch of pixels: all bounces, or those of its halves where a bounce makes more rays than the
+    /// queue is meant to hold. Starting over is harmless: bounce 0 sets its pixels.
+    fn batch(&mut self, first_pixel: u32, n_pixels: u32) {
+        let capacity = if n_pixels == 1 { u32::MAX } else { self.batching.queue_capacity };
+        let mut stats = Vec::new();
+        self.primary_rays(first_pixel, n_pixels);
+        for depth in 0..self.options.max_depth {
+            let n_hits = self.closest_hits(depth);
+            let n_shadow_rays = self.light(depth);
+            stats.push(BounceStats { n_rays: self.queues.rays.len() as u64, n_hits, n_shadow_rays });
+            if depth + 1 == self.options.max_depth {
+                break;
+            }
+            let next = self.next_rays(depth, capacity);
+            if next.overflow != 0 {
+                self.batch(first_pixel, n_pixels / 2);
+                self.batch(first_pixel + n_pixels / 2, n_pixels - n_pixels / 2);
+                return;
+            }
+            if self.queues.rays.is_empty() {
+                break;
+            }
+        }
+        self.count(&stats);
+    }
+
+    fn primary_rays(&mut self, first_pixel: u32, n_pixels: u32) {
+        let rays = &mut self.queues.rays;
+        rays.resize(n_pixels as usize, Ray::zeroed());
+        self.clock.time("primary_hit", Some(0), || primary_hit::primary_rays(&self.frame, first_pixel, rays));
+    }
+
+    /// Fills `hits`; returns how many are hits.
+    fn closest_hits(&mut self, depth: u32) -> u64 {
+        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
+        let Queues { rays, hits, .. } = &mut self.queues;
+        hits.resize(rays.len(), Hit::zeroed());
+        let n_hits = if depth == 0 && self.options.primary == Primary::Raster {
+            let ids = &self.triangle_ids;
+            self.clock.time("primary_hit", Some(0), || primary_hit::primary_hit(&bindings, ids, rays, hits))
+        } else {
+            let traversal = self.options.traversal;
+            self.clock.time("trace", Some(depth), || trace::trace(&bindings, traversal, rays, hits))
+        };
+        n_hits.into()
+    }
+
+    /// Shadows, shading and the children, resolved to pixels; returns how many shadow segments were tested.
+    fn light(&mut self, depth: u32) -> u64 {
+        let Queues { rays, hits, light_visibility, shaded, .. } = &mut self.queues;
+        self.frame.queue_capacity = rays.len() as u32;
+        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
+        let traversal = self.options.traversal;
+        light_visibility.resize(rays.len() * bindings.lights.len(), 0);
+        shaded.resize(rays.len());
+        let n_shadow_rays = self
+            .clock
+            .time("shadow", Some(depth), || shadow::shadow(&bindings, traversal, rays, hits, light_visibility));
+        let lit = LitRays { rays, hits, light_visibility };
+        self.clock.time("shade", Some(depth), || shade::shade(&bindings, depth, lit, shaded));
+        let (radiance, pixels) = (&shaded.ray_radiance, &mut self.pixel_radiance);
+        self.clock.time("resolve", Some(depth), || resolve::resolve(depth, rays, radiance, pixels));
+        n_shadow_rays.into()
+    }
+
+    /// Compacts the children to the queue of the next bounce; returns what the spine says of that.
+    fn next_rays(&mut self, depth: u32, capacity: u32) -> Bounce {
+        let Queues { rays, next_rays, scan_blocks, shaded, .. } = &mut self.queues;
+        let Shaded { child_rays, child_counts, .. } = shaded;
+        let mut next = Bounce::zeroed();
+        scan_blocks.resize(rays.len().div_ceil(SCAN_BLOCK_SIZE as usize), 0);
+        self.clock.time("compact_reduce", Some(depth), || compact::reduce(child_counts, scan_blocks));
+        self.clock.time("compact_spine", Some(depth), || compact::spine(scan_blocks, capacity, &mut next));
+        next_rays.resize(next.n_rays as usize, Ray::zeroed());
+        if next.overflow == 0 {
+            self.clock.time("compact_scatter", Some(depth), || {
+                compact::scatter(child_rays, child_counts, scan_blocks, next_rays);
+            });
+        }
+        swap(rays, next_rays);
+        next
+    }
+
+    fn count(&mut self, stats: &[BounceStats]) {
+        self.n_batches += 1;
+        self.bounces.resize(self.bounces.len().max(stats.len()), BounceStats::default());
+        for (sum, bounce) in self.bounces.iter_mut().zip(stats) {
+            sum.n_rays += bounce.n_rays;
+            sum.n_hits += bounce.n_hits;
+            sum.n_shadow_rays += bounce.n_shadow_rays;
+        }
+    }
+
+    /// The mean of the samples, and the post processes.
+    fn finish(&mut self) {
+        let (frame, radiance) = (&self.frame, &mut self.pixel_radiance);
+        if frame.n_samples > 1 {
+            let sums = &mut self.pixel_accumulated;
+            self.clock.time("accumulate", None, || accumulate::accumulate(frame, &[], radiance, sums));
+        }
+        let (filtered, display) = (&mut self.pixel_filtered, &mut self.pixel_display);
+        self.clock.time("denoise", None, || denoise::denoise(frame, radiance, filtered));
+        self.clock.time("tonemap", None, || tonemap::tonemap(frame, filtered, display));
+    }
+
+    fn profile(&self) -> Profile {
+        Profile {
+            device: format!("CPU, {} threads", rayon::current_num_threads()),
+            frame_ms: Some(self.clock.elapsed_ms()),
+            passes: self.clock.passes().to_vec(),
+            bounces: self.bounces.clone(),
+            n_batches: self.n_batches,
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Parts of a picture.
+
+use std::{fmt, str::FromStr};
+
+use super::{Denoise, RenderOptions};
+
+/// The pixels of a picture with `x0 <= x < x1` and `y0 <= y < y1`, from the upper left corner; at least one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crop {
+    pub x0: u32,
+    pub y0: u32,
+    pub x1: u32,
+    pub y1: u32,
+}
+
+impl Crop {
+    /// All of a picture.
+    pub fn whole(width: u32, height: u32) -> Self {
+        Self { x0: 0, y0: 0, x1: width, y1: height }
+    }
+
+    pub fn width(&self) -> u32 {
+        self.x1 - self.x0
+    }
+
+    pub fn height(&self) -> u32 {
+        self.y1 - self.y0
+    }
+
+    /// With so many pixels more on each side, as far as the picture goes.
+    fn grown(&self, border: u32, width: u32, height: u32) -> Self {
+        Self {
+            x0: self.x0.saturating_sub(border),
+            y0: self.y0.saturating_sub(border),
+            x1: (self.x1 + border).min(width),
+            y1: (self.y1 + border).min(height),
+        }
+    }
+
+    /// The part of `pixels`, rows of this window from the top, that `crop` holds, which lies in it.
+    pub(crate) fn part<T: Copy>(&self, pixels: &[T], crop: &Crop) -> Vec<T> {
+        let (left, width) = ((crop.x0 - self.x0) as usize, crop.width() as usize);
+        let rows = pixels.chunks_exact(self.width() as usize).skip((crop.y0 - self.y0) as usize);
+        rows.take(crop.height() as usize).flat_map(|row| &row[left..left + width]).copied().collect()
+    }
+}
+
+impl RenderOptions {
+    /// The part of the picture that is asked for.
+    pub fn crop_or_whole(&self) -> Crop {
+        self.crop.unwrap_or(Crop::whole(self.width, self.height))
+    }
+
+    /// The part of the picture that has to be rendered: the noise filter looks one pixel beyond what is asked for.
+    pub fn window(&self) -> Crop {
+        let border = if self.denoise == Denoise::Off { 0 } else { 1 };
+        self.crop_or_whole().grown(border, self.width, self.height)
+    }
+}
+
+impl FromStr for Crop {
+    type Err = &'static str;
+
+    fn from_str(word: &str) -> Result<Self, Self::Err> {
+        let numbers: Option<Vec<u32>> = word.split(',').map(|number| number.trim().parse().ok()).collect();
+        match numbers.as_deref() {
+            Some(&[x0, y0, x1, y1]) if x0 < x1 && y0 < y1 => Ok(Self { x0, y0, x1, y1 }),
+            Some([_, _, _, _]) => Err("x0 must be less than x1, and y0 less than y1"),
+            _ => Err("expected four whole numbers x0,y0,x1,y1"),
+        }
+    }
+}
+
+impl fmt::Display for Crop {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{},{},{},{}", self.x0, self.y0, self.x1, self.y1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words() {
+        let crop = Crop { x0: 1, y0: 2, x1: 30, y1: 4 };
+        assert_eq!("1,2,30,4".parse(), Ok(crop));
+        assert_eq!(crop.to_string().parse(), Ok(crop));
+        for word in ["", "1,2,3", "1,2,3,4,5", "1,2,1,4", "3,2,1,4", "1,4,3,4", "-1,0,1,1", "0,0,1.5,1", "a,b,c,d"] {
+            assert!(word.parse::<Crop>().is_err(), "{word}");
+        }
+    }
+
+    #[test]
+    fn the_filter_needs_a_border_inside_the_picture() {
+        let crop = Some(Crop { x0: 0, y0: 3, x1: 5, y1: 8 });
+        let options = RenderOptions { width: 9, height: 8, crop, ..RenderOptions::default() };
+        assert_eq!(options.window(), Crop { x0: 0, y0: 2, x1: 6, y1: 8 });
+        let options = RenderOptions { denoise: Denoise::Off, ..options };
+        assert_eq!(options.window(), options.crop_or_whole());
+    }
+
+    #[test]
+    fn a_part_is_cut_out() {
+        let window = Crop { x0: 10, y0: 20, x1: 13, y1: 23 };
+        let pixels = [0, 1, 2, 3, 4, 5, 6, 7, 8];
+        assert_eq!(window.part(&pixels, &Crop { x0: 11, y0: 21, x1: 13, y1: 22 }), [4, 5]);
+        assert_eq!(window.part(&pixels, &Crop { x0: 10, y0: 22, x1: 11, y1: 23 }), [6]);
+        assert_eq!(window.part(&pixels, &window), pixels);
+    }
+}

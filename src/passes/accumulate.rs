@@ -1,0 +1,26 @@
+//! Accumulate: the mean of the samples so far.
+
+use std::sync::Arc;
+
+use super::{Resources, kernel, spirv};
+use crate::{
+    gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
+    layout::Batch,
+};
+
+/// The pass's kernel.
+pub struct Accumulate {
+    kernel: ComputePipeline,
+}
+
+impl Accumulate {
+    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
+        Ok(Self { kernel: kernel(context, bindings, "accumulate", spirv!("accumulate.comp"), &[])? })
+    }
+
+    /// Needs pixel_radiance (a sample), pixel_accumulated (the sum of those before it), bounces. Leaves
+    /// pixel_accumulated (with the sample), pixel_radiance (the mean).
+    pub fn record(&self, commands: &Commands, resources: &Resources) {
+        commands.dispatch(&self.kernel, None, &Batch::default(), resources.pixel_dispatch());
+    }
+}

@@ -1,0 +1,91 @@
+//! What may change between frames: the scene and its tree stay on the device.
+
+use super::{
+    Renderer,
+    schedule::{Schedule, queue_capacity, split_evenly},
+};
+use crate::{frame::RenderOptions, gpu::GpuError, kdtree::KdTree, layout::Frame, scene::Camera};
+
+impl Renderer {
+    /// Looks from elsewhere from the next sample on, which is the first of a new picture.
+    pub fn set_camera(&mut self, camera: &Camera) {
+        self.camera = *camera;
+        self.reset_samples();
+    }
+
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The next sample is the first of a new picture.
+    pub fn reset_samples(&mut self) {
+        self.n_samples = 0;
+    }
+
+    /// Samples a pixel that the picture is the mean of.
+    pub fn n_samples(&self) -> u32 {
+        self.n_samples
+    }
+
+    pub fn options(&self) -> &RenderOptions {
+        &self.options
+    }
+
+    /// Renders all of a picture of another size from the next sample on, the first. Memory is kept for the largest yet, so
+    /// changes below that are cheap.
+    ///
+    /// # Errors
+    /// Beyond the device's limits or memory; then nothing has changed.
+    pub fn resize(&mut self, width: u32, height: u32) -> Result<(), GpuError> {
+        let options = RenderOptions { width, height, crop: None, ..self.options.clone() };
+        self.remake(&options, None)
+    }
+
+    /// Renders with other options from the next sample on. Kernels are made anew only where they differ. Samples are kept
+    /// where only what is done with them changes: the exposure, the filter's threshold; [`Renderer::show`] shows that.
+    /// `tree`: the one that the renderer was made with, for what another traversal reads beside it.
+    ///
+    /// # Errors
+    /// Beyond the device's limits or memory, the driver refuses a kernel; the options are as before then.
+    pub fn set_options(&mut self, options: &RenderOptions, tree: &KdTree) -> Result<(), GpuError> {
+        self.remake(options, Some(tree))
+    }
+
+    fn remake(&mut self, options: &RenderOptions, tree: Option<&KdTree>) -> Result<(), GpuError> {
+        let before = self.options.clone();
+        if let Some(tree) = tree.filter(|_| before.traversal != options.traversal) {
+            self.resources.add_extras(&self.context, tree, options.traversal)?;
+        }
+        self.passes.set_options(&self.context, &self.resources.bindings, &before, options)?;
+        let mut constants = *self.resources.constants();
+        constants.set_options(options);
+        if same_samples(&before, options) {
+            self.resources.set_constants(&constants);
+        } else {
+            self.make_room(constants)?;
+            self.reset_samples();
+        }
+        self.options = options.clone();
+        Ok(())
+    }
+
+    /// Buffers and batches for other sizes or another number of bounces.
+    fn make_room(&mut self, constants: Frame) -> Result<(), GpuError> {
+        let capacity = self.fixed_capacity;
+        let limits = self.context.limits();
+        let queue_capacity = capacity.unwrap_or_else(|| queue_capacity(limits, &constants, self.branches));
+        let constants = Frame { queue_capacity, ..constants };
+        let spans = split_evenly(constants.width * constants.height, queue_capacity);
+        let schedule = Schedule::new(&self.context, &constants, spans)?;
+        self.resources.fit(&self.context, &constants)?;
+        self.resources.resize_bounces(&self.context, schedule.n_rows())?;
+        self.schedule = schedule;
+        Ok(())
+    }
+}
+
+/// Whether all that differs is what becomes of the samples, with the same buffers.
+fn same_samples(a: &RenderOptions, b: &RenderOptions) -> bool {
+    let of_samples = |options: &RenderOptions| RenderOptions { exposure: 1.0, denoise: a.denoise, ..options.clone() };
+    of_samples(a) == of_samples(b) && std::mem::discriminant(&a.denoise) == std::mem::discriminant(&b.denoise)
+}

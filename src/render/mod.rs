@@ -1,0 +1,252 @@
+//! The frame: the order of passes, every barrier between them, one command buffer a bounce.
+
+mod changes;
+mod profile;
+mod schedule;
+
+use std::{mem, sync::Arc};
+
+use self::schedule::{Schedule, queue_capacity, split_evenly};
+use crate::{
+    camera::frame_constants,
+    frame::{Denoise, Picture, Primary, Profile, RenderOptions},
+    gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
+    kdtree::KdTree,
+    layout::{Batch, MATERIAL_REFLECT, MATERIAL_REFRACT},
+    passes::{Passes, Resources},
+    scene::{Camera, Scene},
+};
+
+/// A scene on a device, ready to be drawn again and again: sample by sample, from other places, with other options.
+pub struct Renderer {
+    context: Arc<Context>,
+    camera: Camera,
+    options: RenderOptions,
+    /// Rays in a queue, where the caller has said so.
+    fixed_capacity: Option<u32>,
+    /// Whether a hit can have two children.
+    branches: bool,
+    resources: Resources,
+    passes: Passes,
+    schedule: Schedule,
+    /// Samples a pixel that the picture holds.
+    n_samples: u32,
+}
+
+impl Renderer {
+    /// Uploads the scene and makes the passes.
+    ///
+    /// # Errors
+    /// The scene or the picture is beyond the device's limits or memory.
+    pub fn new(context: Arc<Context>, scene: &Scene, tree: &KdTree, options: &RenderOptions) -> Result<Self, GpuError> {
+        Self::with_capacity(context, scene, tree, options, None)
+    }
+
+    /// As [`Renderer::new`], with room for so many rays in a queue. A frame that makes more is split into batches.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn with_queue_capacity(
+        context: Arc<Context>,
+        scene: &Scene,
+        tree: &KdTree,
+        options: &RenderOptions,
+        capacity: u32,
+    ) -> Result<Self, GpuError> {
+        Self::with_capacity(context, scene, tree, options, Some(capacity))
+    }
+
+    fn with_capacity(
+        context: Arc<Context>,
+        scene: &Scene,
+        tree: &KdTree,
+        options: &RenderOptions,
+        fixed_capacity: Option<u32>,
+    ) -> Result<Self, GpuError> {
+        let both = MATERIAL_REFLECT | MATERIAL_REFRACT;
+        let branches = scene.materials.iter().any(|material| material.flags & both == both);
+        let mut constants = frame_constants(scene, tree, options);
+        constants.queue_capacity =
+            fixed_capacity.unwrap_or_else(|| queue_capacity(context.limits(), &constants, branches));
+        let spans = split_evenly(constants.width * constants.height, constants.queue_capacity);
+        let schedule = Schedule::new(&context, &constants, spans)?;
+        let mut resources = Resources::new(&context, scene, tree, &constants, schedule.n_rows())?;
+        resources.add_extras(&context, tree, options.traversal)?;
+        let passes = Passes::new(&context, &resources.bindings, options)?;
+        let (camera, options) = (scene.camera, options.clone());
+        Ok(Self { context, camera, options, fixed_capacity, branches, resources, passes, schedule, n_samples: 0 })
+    }
+
+    /// Draws the frame and fetches its picture.
+    ///
+    /// # Errors
+    /// A failed call; one pixel alone makes more rays than a queue holds.
+    pub fn render(&mut self) -> Result<(Picture, Profile), GpuError> {
+        let profile = self.draw()?;
+        Ok((self.picture()?, profile))
+    }
+
+    /// Draws the frame by one sample a pixel, at its centre. The picture stays on the device.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`].
+    pub fn draw(&mut self) -> Result<Profile, GpuError> {
+        self.reset_samples();
+        self.draw_sample()
+    }
+
+    /// Draws the frame by one sample more a pixel, the first at its centre; the picture, which stays on the device, is the
+    /// mean of all. Where a queue was too small, the batches that it broke off are halved and the sample is drawn anew;
+    /// later ones keep the smaller batches.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`]. The next sample is the first again then.
+    pub fn draw_sample(&mut self) -> Result<Profile, GpuError> {
+        let sample_ix = mem::take(&mut self.n_samples);
+        if sample_ix == 1 {
+            self.resources.begin_sums(&self.context)?;
+        }
+        let mut constants = *self.resources.constants();
+        constants.set_view(&self.camera, sample_ix);
+        self.resources.set_constants(&constants);
+        loop {
+            let frame = self.record()?;
+            self.context.submit(&frame.iter().collect::<Vec<_>>())?;
+            self.context.wait()?;
+            drop(frame);
+            let bounces = self.resources.bounces.download()?;
+            if !bounces.iter().any(|row| row.overflow != 0) {
+                self.n_samples = sample_ix + 1;
+                return self.profile(&bounces);
+            }
+            let spans = self.schedule.split(&bounces, &constants)?;
+            self.schedule = Schedule::new(&self.context, &constants, spans)?;
+            self.resources.resize_bounces(&self.context, self.schedule.n_rows())?;
+        }
+    }
+
+    /// Filters and encodes the samples that are there anew, with options that have changed since.
+    ///
+    /// # Errors
+    /// A failed call.
+    pub fn show(&mut self) -> Result<(), GpuError> {
+        self.context.run("show", |commands| {
+            commands.bind(&self.resources.sets[0]);
+            self.update_constants(commands);
+            self.show_samples(commands);
+        })
+    }
+
+    /// The picture as it was last drawn or shown.
+    ///
+    /// # Errors
+    /// A failed copy.
+    pub fn picture(&self) -> Result<Picture, GpuError> {
+        let (pixels, n_pixels) = (&self.resources.pixels, self.resources.n_pixels());
+        let (window, crop) = (self.options.window(), self.options.crop_or_whole());
+        let display = pixels.pixel_display.download_first(n_pixels)?;
+        Ok(Picture {
+            width: crop.width(),
+            height: crop.height(),
+            radiance: window.part(&pixels.filtered().download_first(n_pixels)?, &crop),
+            display: window.part(&display, &crop).into_iter().map(u32::to_le_bytes).collect(),
+        })
+    }
+
+    /// The frame's buffers, as the last frame left them.
+    pub fn resources(&self) -> &Resources {
+        &self.resources
+    }
+
+    /// Algorithm 1: one command buffer before, one a bounce, one after.
+    fn record(&self) -> Result<Vec<CommandBuffer>, GpuError> {
+        let mut frame = vec![self.command_buffer("begin frame", |commands| self.begin_frame(commands))?];
+        for &batch in &self.schedule.batches {
+            for depth in 0..self.options.max_depth {
+                let batch = Batch { bounce_ix: batch.bounce_ix + depth, depth, ..batch };
+                let name = format!("bounce {depth}");
+                frame.push(self.command_buffer(&name, |commands| self.bounce(commands, &batch))?);
+            }
+        }
+        frame.push(self.command_buffer("end frame", |commands| self.end_frame(commands))?);
+        Ok(frame)
+    }
+
+    fn command_buffer(&self, name: &str, body: impl FnOnce(&Commands)) -> Result<CommandBuffer, GpuError> {
+        CommandBuffer::record(&self.context, name, Some(&self.schedule.timer), body)
+    }
+
+    fn begin_frame(&self, commands: &Commands) {
+        commands.reset_timer();
+        commands.bind(&self.resources.sets[0]);
+        self.update_constants(commands);
+        copy_all(commands, self.schedule.first_bounces.any(), self.resources.bounces.any());
+        copy_all(commands, self.schedule.zero_counters.any(), self.resources.counters.any());
+        commands.barrier(Access::TransferWrite, Access::AllReads); // bounces, counters
+        match self.options.primary {
+            Primary::Raster => self.passes.visibility.record(commands, &self.resources),
+            // Unread then, but bound: the layout has to be the set's.
+            Primary::Trace => {
+                let pixels = &self.resources.pixels;
+                commands.begin_targets(&pixels.triangle_ids, &pixels.depth);
+                commands.ids_to_compute(&pixels.triangle_ids);
+            }
+        }
+    }
+
+    fn update_constants(&self, commands: &Commands) {
+        commands.barrier(Access::AllReads, Access::TransferWrite); // what the frame before still reads
+        commands.update_buffer(self.resources.tree.frame.any(), self.resources.constants());
+        commands.barrier(Access::TransferWrite, Access::AllReads); // frame
+    }
+
+    /// One level of rays: hits, light, the next level's rays.
+    fn bounce(&self, commands: &Commands, batch: &Batch) {
+        let (passes, resources) = (&self.passes, &self.resources);
+        resources.bind(commands, batch);
+        // The bounce before has read what this one overwrites: hits, light_visibility, the ray queue of the batch before.
+        commands.barrier(Access::ComputeRead, Access::ComputeWrite);
+        if batch.depth == 0 {
+            passes.primary_hit.record(commands, batch);
+            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // rays, hits, counters
+        }
+        if batch.depth > 0 || self.options.primary == Primary::Trace {
+            passes.trace.record(commands, resources, batch);
+            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // hits, counters
+        }
+        if resources.constants().n_lights > 0 {
+            passes.shadow.record(commands, resources, batch);
+            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // light_visibility, counters
+        }
+        passes.shade.record(commands, resources, batch);
+        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // ray_radiance, child_rays, child_counts
+        passes.resolve.record(commands, resources, batch);
+        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_radiance
+        if batch.depth + 1 < self.options.max_depth {
+            passes.compact.record(commands, resources, batch);
+            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // next_rays
+        }
+    }
+
+    fn end_frame(&self, commands: &Commands) {
+        commands.bind(&self.resources.sets[0]);
+        if self.resources.constants().n_samples > 1 {
+            self.passes.accumulate.record(commands, &self.resources);
+            commands.barrier(Access::ComputeWrite, Access::ComputeRead); // pixel_radiance
+        }
+        self.show_samples(commands);
+    }
+
+    /// From the mean of all samples to what a display shows.
+    fn show_samples(&self, commands: &Commands) {
+        if self.options.denoise != Denoise::Off {
+            self.passes.denoise.record(commands, &self.resources);
+            commands.barrier(Access::ComputeWrite, Access::ComputeRead); // pixel_filtered
+        }
+        self.passes.tonemap.record(commands, &self.resources);
+    }
+}
+
+fn copy_all(commands: &Commands, source: &AnyBuffer, destination: &AnyBuffer) {
+    commands.copy_buffer(source, destination, source.bytes());
+}

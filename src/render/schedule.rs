@@ -1,0 +1,94 @@
+//! The batches of a frame: no ray is dropped, so what a queue cannot hold is drawn in parts.
+
+use std::{mem, sync::Arc};
+
+use crate::{
+    gpu::{Buffer, BufferUse, Context, GpuError, Limits, Timer},
+    layout::{Batch, Bounce, Counters, Frame, RAY_GROUP_SIZE, Ray},
+    passes::bounce_row,
+};
+
+/// The batches of a frame, and what depends on their number.
+pub struct Schedule {
+    /// depth 0; bounce_ix is the batch's first row.
+    pub batches: Vec<Batch>,
+    /// What `bounces` and `counters` hold when a frame begins.
+    pub first_bounces: Buffer<Bounce>,
+    pub zero_counters: Buffer<Counters>,
+    pub timer: Timer,
+}
+
+impl Schedule {
+    /// `spans`: first pixel and number of pixels of each batch.
+    pub fn new(context: &Arc<Context>, constants: &Frame, spans: Vec<(u32, u32)>) -> Result<Self, GpuError> {
+        let max_depth = constants.max_depth;
+        let batches: Vec<_> = (0..)
+            .zip(spans)
+            .map(|(batch_ix, (first_pixel, n_pixels))| Batch {
+                first_pixel,
+                n_pixels,
+                bounce_ix: batch_ix * max_depth,
+                depth: 0,
+            })
+            .collect();
+        let rows: Vec<_> = batches
+            .iter()
+            .flat_map(|batch| (0..max_depth).map(|depth| if depth == 0 { batch.n_pixels } else { 0 }))
+            .map(|n_rays| bounce_row(n_rays, constants.n_lights))
+            .collect();
+        let zeros = vec![Counters::default(); rows.len()];
+        // The widest bounce has 9 kernels; visibility, accumulate, denoise and tonemap stand outside.
+        let n_passes = 4 + 9 * rows.len() as u32;
+        Ok(Self {
+            first_bounces: Buffer::with(context, "first_bounces", &rows, BufferUse::Storage)?,
+            zero_counters: Buffer::with(context, "zero_counters", &zeros, BufferUse::Storage)?,
+            timer: Timer::new(context, n_passes)?,
+            batches,
+        })
+    }
+
+    /// Rows of `bounces`: one a batch and bounce.
+    pub fn n_rows(&self) -> usize {
+        self.first_bounces.len()
+    }
+
+    /// Spans for the next attempt: each batch in which a bounce overflowed is halved.
+    ///
+    /// # Errors
+    /// One pixel alone makes more rays than a queue holds.
+    pub fn split(&self, bounces: &[Bounce], constants: &Frame) -> Result<Vec<(u32, u32)>, GpuError> {
+        let mut spans = Vec::new();
+        for (batch, rows) in self.batches.iter().zip(bounces.chunks_exact(constants.max_depth as usize)) {
+            let (first, n) = (batch.first_pixel, batch.n_pixels);
+            match rows.iter().find(|row| row.overflow != 0) {
+                None => spans.push((first, n)),
+                Some(row) if n == 1 => {
+                    return Err(GpuError::Limit {
+                        what: "rays of one pixel on one level",
+                        value: u64::from(row.n_wanted),
+                        limit: u64::from(constants.queue_capacity),
+                    });
+                }
+                Some(_) => spans.extend([(first, n / 2), (first + n / 2, n - n / 2)]),
+            }
+        }
+        tracing::debug!(n_batches = spans.len(), "ray queues overflowed");
+        Ok(spans)
+    }
+}
+
+/// Rays that a queue should hold: two a pixel where rays can branch, else one, as far as the device's limits go.
+pub fn queue_capacity(limits: &Limits, constants: &Frame, branches: bool) -> u32 {
+    let wanted = u64::from(constants.width) * u64::from(constants.height) * if branches { 2 } else { 1 };
+    // child_rays and light_visibility are the widest buffers of a ray.
+    let bytes_a_ray = (2 * mem::size_of::<Ray>()).max(4 * constants.n_lights as usize) as u64;
+    let most = (limits.storage_range / bytes_a_ray).min(u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE));
+    wanted.min(most).max(1) as u32
+}
+
+/// Spans of equal size that leave each batch room to grow to the capacity.
+pub fn split_evenly(n_pixels: u32, capacity: u32) -> Vec<(u32, u32)> {
+    let n_batches = n_pixels.div_ceil(capacity).max(1);
+    let size = n_pixels.div_ceil(n_batches);
+    (0..n_batches).map(|i| (i * size, size.min(n_pixels - i * size))).collect()
+}

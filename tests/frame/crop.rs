@@ -1,0 +1,83 @@
+//! A part of a picture is the same, bit for bit, as that part of the whole.
+
+use kdray::{
+    cpu::{self, Batching},
+    frame::{Crop, Denoise, Picture, Primary, RenderOptions},
+    render::Renderer,
+    scene::Scene,
+};
+
+use super::studio::{assert_silent, device, identical, options, tree_of};
+use crate::support::scenes;
+
+const SIZE: (u32, u32) = (61, 47);
+
+const CROPS: [Crop; 5] = [
+    Crop { x0: 0, y0: 0, x1: 61, y1: 47 },
+    Crop { x0: 0, y0: 0, x1: 1, y1: 1 },
+    Crop { x0: 60, y0: 46, x1: 61, y1: 47 },
+    Crop { x0: 13, y0: 9, x1: 50, y1: 31 },
+    Crop { x0: 0, y0: 20, x1: 61, y1: 21 },
+];
+
+fn on_device(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
+    let context = device();
+    let mut renderer = Renderer::new(context.clone(), scene, &tree_of(scene), options).expect("a renderer");
+    (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
+    assert_silent(&context);
+    renderer.picture().expect("a picture")
+}
+
+fn on_cpu(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
+    let tree = tree_of(scene);
+    let mut renderer = cpu::Renderer::new(scene, &tree, options, Batching::default());
+    (0..n_samples).for_each(|_| drop(renderer.draw_sample()));
+    renderer.picture()
+}
+
+fn cut(whole: &Picture, crop: Crop) -> Picture {
+    let pixels = (crop.y0..crop.y1).flat_map(|y| (crop.x0..crop.x1).map(move |x| (y * whole.width + x) as usize));
+    let (radiance, display) = pixels.map(|i| (whole.radiance[i], whole.display[i])).unzip();
+    Picture { width: crop.width(), height: crop.height(), radiance, display }
+}
+
+#[test]
+fn a_crop_is_a_part_of_the_whole() {
+    let scene = scenes::mixed_outdoors();
+    let filter = Denoise::Paper { threshold: 0.1 };
+    for (primary, denoise, n_samples) in
+        [(Primary::Raster, filter, 1), (Primary::Trace, filter, 1), (Primary::Raster, Denoise::Off, 3)]
+    {
+        let whole = RenderOptions { primary, denoise, ..options(SIZE.0, SIZE.1, 4) };
+        for (name, render) in [("device", on_device as fn(&_, &_, _) -> _), ("cpu", on_cpu)] {
+            let picture = render(&scene, &whole, n_samples);
+            for crop in CROPS {
+                let part = render(&scene, &RenderOptions { crop: Some(crop), ..whole.clone() }, n_samples);
+                assert!(identical(&cut(&picture, crop), &part), "{name}, {primary}, {denoise:?}: {crop}");
+            }
+        }
+    }
+}
+
+/// Without its border the filter would see other neighbours.
+#[test]
+fn the_filter_s_border_matters() {
+    let scene = scenes::mixed_outdoors();
+    let options = RenderOptions { denoise: Denoise::Paper { threshold: 0.1 }, ..options(SIZE.0, SIZE.1, 4) };
+    let whole = on_cpu(&scene, &options, 1);
+    let crop = Crop { x0: 13, y0: 9, x1: 50, y1: 31 };
+    let beside = Crop { x0: 12, x1: 49, ..crop };
+    assert!(!identical(&cut(&whole, crop), &cut(&whole, beside)));
+    let without_border = RenderOptions { denoise: Denoise::Off, crop: Some(crop), ..options };
+    let unfiltered = on_cpu(&scene, &without_border, 1);
+    let frame = kdray::layout::Frame {
+        width: crop.width(),
+        height: crop.height(),
+        exposure: 1.0,
+        denoise_threshold: 0.1,
+        ..Default::default()
+    };
+    let mut filtered = unfiltered.radiance.clone();
+    cpu::denoise::denoise(&frame, &unfiltered.radiance, &mut filtered);
+    assert_ne!(filtered, cut(&whole, crop).radiance);
+}

@@ -1,0 +1,105 @@
+//! A renderer that has been changed draws what a new one draws, bit for bit.
+
+use glam::vec3;
+use kdray::{
+    frame::{Denoise, Picture, Primary, RenderOptions, Traversal},
+    gpu::GpuError,
+    render::Renderer,
+    scene::{Camera, Scene},
+};
+
+use super::studio::{assert_silent, device, identical, on_device, options, tree_of};
+use crate::support::scenes;
+
+const ELSEWHERE: Camera =
+    Camera { eye: vec3(1.5, 0.5, 3.5), target: vec3(0.0, -0.2, 0.0), up: glam::Vec3::Y, vertical_fov_degrees: 60.0 };
+
+/// Means of so many samples.
+fn sampled(renderer: &mut Renderer, n_samples: u32) -> Picture {
+    renderer.reset_samples();
+    for _ in 0..n_samples {
+        renderer.draw_sample().expect("a sample");
+    }
+    assert_eq!(renderer.n_samples(), n_samples);
+    renderer.picture().expect("a picture")
+}
+
+fn sampled_anew(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
+    sampled(&mut Renderer::new(device(), scene, &tree_of(scene), options).expect("a renderer"), n_samples)
+}
+
+#[test]
+fn other_options_draw_what_a_new_renderer_draws() {
+    let scene = scenes::mixed_outdoors();
+    let (tree, context) = (tree_of(&scene), device());
+    let start = options(40, 30, 3);
+    let filtered = RenderOptions { denoise: Denoise::Paper { threshold: 0.3 }, ..start.clone() };
+    let steps = [
+        RenderOptions { max_depth: 5, ..start.clone() },
+        RenderOptions { primary: Primary::Trace, ..start.clone() },
+        RenderOptions { traversal: Traversal::Ropes, ..start.clone() },
+        RenderOptions { traversal: Traversal::MaskBoxes, max_depth: 2, ..start.clone() },
+        filtered.clone(),
+        RenderOptions { exposure: 0.5, ..filtered.clone() },
+        RenderOptions { width: 70, height: 50, ..filtered },
+        RenderOptions { width: 17, height: 9, ..start.clone() },
+        start.clone(),
+    ];
+    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &start).expect("a renderer");
+    let before = sampled(&mut renderer, 2);
+    for to in &steps {
+        renderer.set_options(to, &tree).expect("options");
+        let n_samples = 1 + to.max_depth % 2;
+        assert!(identical(&sampled(&mut renderer, n_samples), &sampled_anew(&scene, to, n_samples)), "{to:?}");
+    }
+    assert!(identical(&before, &sampled(&mut renderer, 2)));
+    assert_silent(&context);
+}
+
+#[test]
+fn other_cameras_and_sizes_draw_what_a_new_renderer_draws() {
+    let scene = scenes::mixed_outdoors();
+    let (tree, context) = (tree_of(&scene), device());
+    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options(40, 30, 3)).expect("a renderer");
+    renderer.draw_sample().expect("a sample");
+    renderer.set_camera(&ELSEWHERE);
+    assert_eq!((renderer.n_samples(), renderer.camera()), (0, &ELSEWHERE));
+    let from_there = Scene { camera: ELSEWHERE, ..scene };
+    for (width, height) in [(40, 30), (90, 20), (12, 60), (41, 30)] {
+        renderer.resize(width, height).expect("another size");
+        let expected = on_device(&from_there, &options(width, height, 3));
+        assert!(identical(&sampled(&mut renderer, 1), &expected), "{width}x{height}");
+    }
+    assert_silent(&context);
+}
+
+#[test]
+fn exposure_and_threshold_keep_the_samples() {
+    let scene = scenes::mixed_outdoors();
+    let (tree, context) = (tree_of(&scene), device());
+    let denoise = |threshold| Denoise::Paper { threshold };
+    let start = RenderOptions { denoise: denoise(2.0), ..options(40, 30, 3) };
+    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &start).expect("a renderer");
+    sampled(&mut renderer, 3);
+    let to = RenderOptions { exposure: 2.0, denoise: denoise(0.2), ..start };
+    renderer.set_options(&to, &tree).expect("options");
+    assert_eq!(renderer.n_samples(), 3);
+    renderer.show().expect("the picture");
+    let shown = renderer.picture().expect("a picture");
+    assert!(identical(&shown, &sampled_anew(&scene, &to, 3)));
+    renderer.draw_sample().expect("a sample");
+    assert!(identical(&renderer.picture().expect("a picture"), &sampled_anew(&scene, &to, 4)));
+    assert_silent(&context);
+}
+
+#[test]
+fn refused_options_change_nothing() {
+    let scene = scenes::mixed_outdoors();
+    let (tree, context) = (tree_of(&scene), device());
+    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options(40, 30, 3)).expect("a renderer");
+    let before = sampled(&mut renderer, 1);
+    let refused = renderer.resize(1 << 20, 1);
+    assert!(matches!(refused, Err(GpuError::Limit { .. })), "{:?}", refused.err());
+    assert!(identical(&before, &sampled(&mut renderer, 1)));
+    assert_silent(&context);
+}

@@ -1,0 +1,109 @@
+//! Pictures of several samples a pixel.
+
+use glam::{Vec3, vec3};
+use kdray::{
+    cpu::{self, Batching},
+    frame::{Picture, Primary, RenderOptions},
+    render::Renderer,
+    scene::Scene,
+};
+
+use super::{
+    batches::glass_in_glass,
+    studio::{assert_silent, device, differing, identical, on_both, options, tree_of},
+};
+use crate::support::{meshes, scenes};
+
+fn on_device(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
+    let context = device();
+    let mut renderer = Renderer::new(context.clone(), scene, &tree_of(scene), options).expect("a renderer");
+    (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
+    assert_silent(&context);
+    renderer.picture().expect("a picture")
+}
+
+fn on_cpu(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
+    let tree = tree_of(scene);
+    let mut renderer = cpu::Renderer::new(scene, &tree, options, Batching::default());
+    (0..n_samples).for_each(|_| drop(renderer.draw_sample()));
+    renderer.picture()
+}
+
+/// White to the left of x = `edge` in the plane z = 0, black elsewhere; a pixel of a picture 30 high is 1/10 wide there.
+fn half_plane(edge: f32) -> Scene {
+    let mut scene = scenes::empty();
+    let corner = |x: f32, y: f32| vec3(x, y, 0.0);
+    let plane = meshes::triangle(corner(edge, -90.0), corner(edge, 90.0), corner(-90.0, 0.0));
+    scenes::add(&mut scene, vec![plane], scenes::emissive(Vec3::ONE));
+    scene.camera.eye = vec3(0.0, 0.0, 1.5);
+    scene.camera.vertical_fov_degrees = 90.0;
+    scene
+}
+
+/// The share of a tent filter over -1 to 1 that lies left of `x`.
+fn left_of(x: f32) -> f32 {
+    let x = x.clamp(-1.0, 1.0);
+    0.5 + x - x * x.abs() / 2.0
+}
+
+/// Farthest that any pixel of a picture 40 wide is from what the filter makes of the edge.
+fn worst(picture: &Picture, edge: f32) -> f32 {
+    let of_column = |x: usize| left_of((edge * 10.0 + 20.0) - (x as f32 + 0.5));
+    let off = |(i, pixel): (usize, &[f32; 4])| (pixel[0] - of_column(i % 40)).abs();
+    picture.radiance.iter().enumerate().map(off).fold(0.0, f32::max)
+}
+
+#[test]
+fn an_edge_converges_to_the_filter_s_coverage() {
+    for (edge, primary) in [(0.03, Primary::Raster), (0.68, Primary::Trace), (-1.25, Primary::Raster)] {
+        let (scene, options) = (half_plane(edge), RenderOptions { primary, ..options(40, 30, 1) });
+        for (name, render) in [("device", on_device as fn(&_, &_, _) -> _), ("cpu", on_cpu)] {
+            // Three samples' weight for their number, and what snapping to 1/16 px moves an edge.
+            let found = worst(&render(&scene, &options, 256), edge);
+            assert!(found < 3.0 / 256.0 + 1.0 / 32.0, "{name}, {edge}: {found}");
+            let one = worst(&render(&scene, &options, 1), edge);
+            assert!(one > 0.1, "{name}: one sample is no filter, but {one}");
+        }
+    }
+}
+
+#[test]
+fn device_and_cpu_agree() {
+    let scene = scenes::mixed_outdoors();
+    for primary in [Primary::Raster, Primary::Trace] {
+        let options = RenderOptions { primary, ..options(80, 60, 4) };
+        let (device, cpu) = (on_device(&scene, &options, 3), on_cpu(&scene, &options, 3));
+        let n_differing = differing(&device, &cpu, 2e-3).len();
+        assert!(n_differing <= 4800 / 30, "{primary}: {n_differing} pixels differ");
+        assert!(differing(&device, &on_device(&scene, &options, 2), 2e-3).len() > 1000);
+    }
+}
+
+#[test]
+fn one_sample_is_the_frame() {
+    let (scene, options) = (scenes::mixed_outdoors(), options(40, 30, 4));
+    let [device, cpu] = on_both(&scene, &options);
+    assert!(identical(&device, &on_device(&scene, &options, 1)) && identical(&cpu, &on_cpu(&scene, &options, 1)));
+}
+
+#[test]
+fn small_queues_give_the_same_bits() {
+    let (scene, options, context) = (glass_in_glass(), options(32, 24, 8), device());
+    let tree = tree_of(&scene);
+    let render = |capacity| {
+        let renderer = Renderer::with_queue_capacity(context.clone(), &scene, &tree, &options, capacity);
+        let mut renderer = renderer.expect("a renderer");
+        let profiles: Vec<_> = (0..9).map(|_| renderer.draw_sample().expect("a sample")).collect();
+        (renderer.picture().expect("a picture"), profiles)
+    };
+    let (whole, profiles) = render(100_000);
+    // Enough for the first sample, but not for all.
+    let enough = profiles[0].bounces.iter().map(|bounce| bounce.n_rays as u32).max().expect("a bounce");
+    for capacity in [600, 1000, enough] {
+        let (picture, profiles) = render(capacity);
+        assert!(identical(&whole, &picture), "queues for {capacity} rays");
+        let n_batches = [&profiles[0], &profiles[8]].map(|profile| profile.n_batches);
+        assert!(n_batches[1] > 1 && (capacity < enough || n_batches[0] == 1), "{n_batches:?}");
+    }
+    assert_silent(&context);
+}
