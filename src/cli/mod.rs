@@ -10,10 +10,13 @@ mod devices;
 mod error;
 mod inspect;
 mod log;
+mod picture_args;
 mod progress;
 mod render;
 mod report;
 mod table;
+mod view;
+mod view_args;
 
 use std::{
     ffi::OsString,
@@ -47,6 +50,7 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
 fn run(args: Args) -> Result<(), CliError> {
     match args.command {
         Command::Render(args) => render::run(&args),
+        Command::View(args) => view::run(&args),
         Command::Cast(args) => cast::run(&args),
         Command::Devices => devices::run(),
         Command::Inspect(args) => inspect::run(&args),

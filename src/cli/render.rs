@@ -92,9 +92,7 @@ pub(super) fn set_threads(n_threads: Option<u16>) -> Result<(), CliError> {
 
 /// A PNG of the scene's name in the working directory.
 fn default_output(scene_name: &str) -> PathBuf {
-    let name = scene_name.replace(|c: char| std::path::is_separator(c) || c.is_control(), "-");
-    let stem = if name.is_empty() { "picture" } else { &name };
-    format!("{stem}.png").into()
+    format!("{}.png", output::stem_of(scene_name)).into()
 }
 
 struct FrameToDraw<'a> {

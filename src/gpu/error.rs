@@ -30,6 +30,11 @@ pub enum GpuError {
 }
 
 impl GpuError {
+    /// Whether the device is gone, so that all that is on it has to be made anew.
+    pub fn is_device_lost(&self) -> bool {
+        matches!(self, Self::Call { result: vk::Result::ERROR_DEVICE_LOST, .. })
+    }
+
     /// Turns the result of `call` on `object` into an error.
     pub(super) fn call(call: &'static str, object: &str) -> impl FnOnce(vk::Result) -> GpuError {
         let object = object.to_owned();

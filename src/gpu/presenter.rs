@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::{
-    CommandBuffer, Commands, Context, GpuError, Surface,
+    Access, CommandBuffer, Commands, Context, GpuError, Surface,
     swapchain::{Outcome, Swapchain, SwapchainImage, format},
 };
 
@@ -71,7 +71,8 @@ impl Presenter {
         self.vsync = vsync;
     }
 
-    /// Draws a frame by `body`, within rendering to the window's image, and shows it. `size`: the window's, where the
+    /// Draws a frame by `body`, within rendering to the window's image, and shows it. Its shaders see what kernels wrote
+    /// before, and kernels may overwrite that afterwards. `size`: the window's, where the
     /// window system does not say. False where the window has no area or has just changed: nothing was drawn.
     ///
     /// # Errors
@@ -102,9 +103,11 @@ impl Presenter {
         let shown = WindowImage { extent: swapchain.extent };
         let mut drawn = Ok(());
         let commands = CommandBuffer::record(&self.context, "window", None, |commands| {
+            commands.barrier(Access::ComputeWrite, Access::FragmentRead); // what the frame's kernels leave
             commands.begin_window(image, swapchain.extent);
             drawn = body(commands, &shown);
             commands.end_window(image);
+            commands.barrier(Access::FragmentRead, Access::ComputeWrite); // what the next frame's overwrite
         })?;
         // What was acquired has to be shown, else it is never released.
         slot.submit(&self.context, commands, image)?;

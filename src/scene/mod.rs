@@ -13,12 +13,13 @@ pub mod normal;
 mod obj;
 mod read;
 mod smooth;
+mod sources;
 
 use std::path::Path;
 
 use glam::Vec3;
 
-pub use self::{error::SceneError, material::illum_flags};
+pub use self::{error::SceneError, material::illum_flags, sources::source_files};
 use crate::{
     frame::{Denoise, RenderOptions},
     layout::{Light, Material, Triangle},

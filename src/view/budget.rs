@@ -25,6 +25,11 @@ impl Budget {
         Self { budget_ms, step: N_STEPS / 2, full_ms: None }
     }
 
+    /// Milliseconds a frame.
+    pub fn set_budget(&mut self, budget_ms: f64) {
+        self.budget_ms = budget_ms;
+    }
+
     /// The picture's share of the window's sides, 0 to 1.
     pub fn share(&self) -> f64 {
         f64::from(self.step) / f64::from(N_STEPS)
@@ -45,7 +50,8 @@ impl Budget {
         // Down at once to what fits; up one step at a time, since what does not shrink with the picture is counted as
         // if it did.
         if expected(self.step) > self.budget_ms {
-            self.step = (LEAST_STEP..self.step).rev().find(|&step| expected(step) <= self.budget_ms).unwrap_or(LEAST_STEP);
+            self.step =
+                (LEAST_STEP..self.step).rev().find(|&step| expected(step) <= self.budget_ms).unwrap_or(LEAST_STEP);
         } else if self.step < N_STEPS && expected(self.step + 1) <= ROOM * self.budget_ms {
             self.step += 1;
         }

@@ -55,14 +55,7 @@ impl Controller {
     pub fn new(camera: Camera, bounds: (Vec3, Vec3)) -> Self {
         let (min, max) = bounds;
         let radius = ((max - min).length() / 2.0).max(1e-6);
-        Self {
-            camera,
-            start: camera,
-            speed: radius / 2.0,
-            held: Held::default(),
-            centre: (min + max) / 2.0,
-            radius,
-        }
+        Self { camera, start: camera, speed: radius / 2.0, held: Held::default(), centre: (min + max) / 2.0, radius }
     }
 
     pub fn camera(&self) -> &Camera {

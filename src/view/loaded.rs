@@ -1,6 +1,9 @@
 //! A scene with all that is made from it before there is a device.
 
-use std::{path::{Path, PathBuf}, time::Instant};
+use std::{
+    path::{Path, PathBuf},
+    time::Instant,
+};
 
 use glam::Vec3;
 

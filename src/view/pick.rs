@@ -15,7 +15,7 @@ use crate::{
     frame::RenderOptions,
     kdtree::{Extras, KdTree},
     layout::{Hit, NO_TRIANGLE, Ray},
-    scene::Scene,
+    scene::{Camera, Scene},
 };
 
 /// Rays of one level that are followed; a pixel of glass can make more than anyone reads.
@@ -56,10 +56,11 @@ pub struct PickedHit {
     pub point_world: Vec3,
 }
 
-/// Follows the rays of the pixel's middle. `options.width` and `height` are the picture's that the pixel is counted in.
-pub fn pick(scene: &Scene, tree: &KdTree, options: &RenderOptions, pixel: UVec2) -> Picked {
+/// Follows the rays of the pixel's middle, as seen from `camera`. `options.width` and `height` are the picture's that the pixel is counted in.
+pub fn pick(scene: &Scene, tree: &KdTree, options: &RenderOptions, camera: &Camera, pixel: UVec2) -> Picked {
     let extras = Extras::new(tree, options.traversal);
     let mut frame = frame_constants(scene, tree, options);
+    frame.set_view(camera, 0);
     let mut rays = vec![camera_ray(&frame, pixel)];
     let mut picked = Picked { pixel, rays: Vec::new(), n_more: 0 };
     for depth in 0..options.max_depth {

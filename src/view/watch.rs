@@ -25,7 +25,7 @@ impl Watch {
     ///
     /// # Errors
     /// The system refuses to watch.
-    pub fn new(files: &[PathBuf], changed: impl Fn() + Send + 'static) -> notify::Result<Self> {
+    pub fn new(files: &BTreeSet<PathBuf>, changed: impl Fn() + Send + 'static) -> notify::Result<Self> {
         let files: BTreeSet<_> = files.iter().map(|file| absolute(file)).collect();
         let folders: BTreeSet<_> = files.iter().filter_map(|file| file.parent().map(Path::to_owned)).collect();
         let (sender, events) = channel();
@@ -85,7 +85,8 @@ mod tests {
         let path = |name: &str| directory.path().join(name);
         fs::write(path("scene.toml"), "1").unwrap();
         let (sender, changes) = channel();
-        let watch = Watch::new(&[path("scene.toml"), path("later.obj")], move || sender.send(()).unwrap()).unwrap();
+        let files = BTreeSet::from(["scene.toml", "later.obj"].map(path));
+        let watch = Watch::new(&files, move || sender.send(()).unwrap()).unwrap();
 
         fs::write(path("other.toml"), "1").unwrap();
         assert_eq!(changes.recv_timeout(4 * QUIET), Err(RecvTimeoutError::Timeout));

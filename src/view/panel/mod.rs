@@ -59,16 +59,14 @@ pub fn show(ui: &mut Ui, settings: &mut Settings, facts: &Facts) {
         .fill(Color32::from_black_alpha(200))
         .corner_radius(CornerRadius::same(4))
         .inner_margin(Margin::same(8));
-    Window::new("kdray")
-        .frame(frame)
-        .default_pos([8.0, 8.0])
-        .default_width(WIDTH)
-        .resizable([false, false])
-        .show(ui.ctx(), |ui| {
+    Window::new("kdray").frame(frame).default_pos([8.0, 8.0]).default_width(WIDTH).resizable([false, false]).show(
+        ui.ctx(),
+        |ui| {
             ui.set_width(WIDTH);
             let room = ui.ctx().content_rect().height() - 60.0;
             ScrollArea::vertical().max_height(room.max(80.0)).show(ui, |ui| sections(ui, settings, facts));
-        });
+        },
+    );
 }
 
 fn sections(ui: &mut Ui, settings: &mut Settings, facts: &Facts) {

@@ -106,7 +106,10 @@ fn picked_ray(ray: &PickedRay) -> String {
         None => "leaves the scene".to_owned(),
         Some(hit) => {
             let [x, y, z] = hit.point_world.to_array();
-            format!("triangle {} ({})\n  at {x:.3} {y:.3} {z:.3}, {:.3} away", hit.triangle_ix, hit.material, hit.distance)
+            format!(
+                "triangle {} ({})\n  at {x:.3} {y:.3} {z:.3}, {:.3} away",
+                hit.triangle_ix, hit.material, hit.distance
+            )
         }
     };
     let [r, g, b] = throughput.to_array();

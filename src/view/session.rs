@@ -1,0 +1,155 @@
+//! The viewer without its window: the scene, the camera, the settings, and what each frame does with them.
+
+use std::time::Instant;
+
+use super::{
+    budget::Budget,
+    controller::Controller,
+    history::{FrameRecord, History},
+    live::Live,
+    loaded::Loaded,
+    pace::Pace,
+    panel::{Facts, Settings},
+    pick::Picked,
+};
+use crate::{
+    frame::{Profile, RenderOptions},
+    gpu::{GpuError, MemoryUse},
+};
+
+/// Seconds that the overlay looks back.
+const HISTORY_S: f64 = 5.0;
+
+/// What is viewed, from where, how.
+pub struct Session {
+    pub loaded: Loaded,
+    pub settings: Settings,
+    pub controller: Controller,
+    pub pace: Pace,
+    /// Of the last seconds.
+    pub history: History,
+    /// Of all the time, without passes.
+    pub all_frames: History,
+    budget: Budget,
+    profile: Profile,
+    memory: Vec<MemoryUse>,
+    pub(super) picked: Option<Picked>,
+    pub(super) message: Option<String>,
+    start: Instant,
+}
+
+impl Session {
+    pub fn new(loaded: Loaded, settings: Settings) -> Self {
+        Self {
+            controller: Controller::new(loaded.scene.camera, loaded.bounds()),
+            budget: Budget::new(settings.budget_ms),
+            loaded,
+            settings,
+            pace: Pace::default(),
+            history: History::new(HISTORY_S),
+            all_frames: History::new(f64::INFINITY),
+            profile: Profile::default(),
+            memory: Vec::new(),
+            picked: None,
+            message: None,
+            start: Instant::now(),
+        }
+    }
+
+    /// Whether the next frame will differ from the last one.
+    pub fn is_busy(&self, live: &Live, now: Instant) -> bool {
+        self.controller.is_flying() || self.pace.is_moving(now) || !self.is_done(live)
+    }
+
+    /// Whether the picture at rest has all its samples.
+    pub fn is_done(&self, live: &Live) -> bool {
+        live.renderer.n_samples() >= self.settings.max_samples
+    }
+
+    /// Draws what the frame needs: one sample more, of a smaller picture while the camera moves. `window`: pixels, not 0.
+    ///
+    /// # Errors
+    /// A failed call. Settings that the device refuses are taken back instead.
+    pub fn draw(&mut self, live: &mut Live, window: (u32, u32)) -> Result<(), GpuError> {
+        let now = Instant::now();
+        let seconds = self.pace.begin(now);
+        if self.controller.is_flying() {
+            self.controller.advance(seconds);
+            self.pace.moved(now);
+        }
+        // Frames in flight read what changes here.
+        live.context.wait()?;
+        live.presenter.set_vsync(self.settings.vsync);
+        self.budget.set_budget(self.settings.budget_ms);
+        let (width, height) = if self.pace.is_moving(now) { self.budget.size(window) } else { window };
+        let asked = RenderOptions { width, height, ..self.settings.options.clone() };
+        let is_new = asked != *live.renderer.options();
+        if is_new && let Err(error) = live.renderer.set_options(&asked, &self.loaded.tree) {
+            self.take_back(live, &error);
+        }
+        if self.controller.camera() != live.renderer.camera() {
+            live.renderer.set_camera(self.controller.camera());
+        }
+        if !self.is_done(live) {
+            self.draw_sample(live, window)
+        } else if is_new {
+            live.renderer.show()
+        } else {
+            Ok(())
+        }
+    }
+
+    fn draw_sample(&mut self, live: &mut Live, window: (u32, u32)) -> Result<(), GpuError> {
+        let start = Instant::now();
+        self.profile = live.renderer.draw_sample()?;
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        let share = f64::from(live.renderer.options().height) / f64::from(window.1);
+        self.budget.learn(share, ms);
+        Ok(())
+    }
+
+    /// Goes back to what the device did before; a size that it refuses is not the user's to change.
+    fn take_back(&mut self, live: &Live, error: &GpuError) {
+        self.settings.options = live.renderer.options().clone();
+        self.complain(&error.to_string());
+    }
+
+    /// The frame is on its way to the screen.
+    pub fn shown(&mut self) {
+        let now = Instant::now();
+        let times = self.pace.shown(now);
+        let record = FrameRecord {
+            shown_s: now.duration_since(self.start).as_secs_f64(),
+            frame_ms: times.frame_ms,
+            latency_ms: times.latency_ms,
+            pass_ms: Vec::new(),
+        };
+        self.all_frames.push(record.clone());
+        let pass_ms = self.profile.passes.iter().filter_map(|pass| Some((pass.name, pass.ms?))).collect();
+        self.history.push(FrameRecord { pass_ms, ..record });
+    }
+
+    /// What the overlay shows.
+    pub fn facts<'a>(&'a self, live: &'a Live, window: (u32, u32)) -> Facts<'a> {
+        let options = live.renderer.options();
+        Facts {
+            device: &live.context.info().name,
+            loaded: &self.loaded,
+            window,
+            picture: (options.width, options.height),
+            n_samples: live.renderer.n_samples(),
+            speed: self.controller.speed(),
+            profile: &self.profile,
+            history: &self.history,
+            memory: &self.memory,
+            picked: self.picked.as_ref(),
+            message: self.message.as_deref(),
+        }
+    }
+
+    /// Tells the user what went wrong, in the overlay and on the terminal.
+    pub fn complain(&mut self, message: &str) {
+        tracing::warn!("{message}");
+        self.message = Some(message.to_owned());
+    }
+}

@@ -1,0 +1,65 @@
+//! egui between the window and the overlay.
+
+use std::time::Duration;
+
+use egui::{Context, TexturesDelta, ViewportId};
+use egui_winit::State;
+use winit::{event::WindowEvent, window::Window};
+
+use super::panel::{self, Facts, Settings};
+use crate::gpu::OverlayFrame;
+
+/// The overlay's state.
+pub struct Ui {
+    state: State,
+    /// When it wants to be laid out again, counted from its last layout.
+    repaint_after: Duration,
+}
+
+/// The overlay of one frame.
+pub struct Layout {
+    pub frame: OverlayFrame,
+    pub textures: TexturesDelta,
+}
+
+impl Ui {
+    pub fn new(window: &Window) -> Self {
+        let context = Context::default();
+        context.set_visuals(egui::Visuals::dark());
+        let scale = Some(window.scale_factor() as f32);
+        let state = State::new(context, ViewportId::ROOT, window, scale, window.theme(), None);
+        Self { state, repaint_after: Duration::ZERO }
+    }
+
+    /// Tells the overlay of an event; true where it is the overlay's alone.
+    pub fn take_event(&mut self, window: &Window, event: &WindowEvent) -> bool {
+        let response = self.state.on_window_event(window, event);
+        if response.repaint {
+            self.repaint_after = Duration::ZERO;
+        }
+        let context = self.state.egui_ctx();
+        match event {
+            WindowEvent::MouseInput { .. } | WindowEvent::MouseWheel { .. } => context.egui_wants_pointer_input(),
+            WindowEvent::CursorMoved { .. } => context.egui_is_using_pointer(),
+            WindowEvent::KeyboardInput { .. } => context.egui_wants_keyboard_input(),
+            _ => false,
+        }
+    }
+
+    pub fn repaint_after(&self) -> Duration {
+        self.repaint_after
+    }
+
+    /// Lays the overlay out; changes the settings as the user does.
+    pub fn layout(&mut self, window: &Window, settings: &mut Settings, facts: &Facts) -> Layout {
+        let input = self.state.take_egui_input(window);
+        let context = self.state.egui_ctx().clone();
+        let output = context.run_ui(input, |ui| panel::show(ui, settings, facts));
+        self.state.handle_platform_output(window, output.platform_output);
+        let root = output.viewport_output.get(&ViewportId::ROOT);
+        self.repaint_after = root.map_or(Duration::MAX, |viewport| viewport.repaint_delay);
+        let pixels_per_point = output.pixels_per_point;
+        let primitives = context.tessellate(output.shapes, pixels_per_point);
+        Layout { frame: OverlayFrame { primitives, pixels_per_point }, textures: output.textures_delta }
+    }
+}
