@@ -79,7 +79,12 @@ impl Display {
     pub fn open() -> Result<Self, ViewError> {
         match EventLoop::with_user_event().build() {
             Ok(event_loop) => Ok(Self { event_loop }),
-            Err(error) => Err(ViewError::NoDisplay(error.to_string())),
+            Err(error) => {
+                // The message begins with a place in the library's source.
+                let message = error.to_string();
+                let what = message.rsplit_once(": ").map_or(&*message, |(_, what)| what);
+                Err(ViewError::NoDisplay(what.trim_end_matches('.').to_owned()))
+            }
         }
     }
 
@@ -181,7 +186,7 @@ impl App {
             None => size,
         };
         let session = &mut self.session;
-        let layout = self.is_overlaid.then(|| lay_out(session, live, ui, window, size));
+        let layout = self.is_overlaid.then(|| lay_out(session, live, ui, window, self.input.is_flying()));
         session.draw(live, picture)?;
         let frame = match layout {
             Some(Layout { frame, textures }) => {
@@ -257,9 +262,10 @@ impl App {
     }
 }
 
-fn lay_out(session: &mut Session, live: &Live, ui: &mut Ui, window: &Window, size: (u32, u32)) -> Layout {
+fn lay_out(session: &mut Session, live: &Live, ui: &mut Ui, window: &Window, is_flying: bool) -> Layout {
+    let size = window.inner_size();
     let mut settings = session.settings.clone();
-    let layout = ui.layout(window, &mut settings, &session.facts(live, size));
+    let layout = ui.layout(window, &mut settings, &session.facts(live, (size.width, size.height), is_flying));
     if settings != session.settings {
         session.pace.hear(Instant::now());
         session.settings = settings;

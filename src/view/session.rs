@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     frame::{Profile, RenderOptions},
-    gpu::{GpuError, MemoryUse},
+    gpu::GpuError,
 };
 
 /// Seconds that the overlay looks back.
@@ -32,7 +32,6 @@ pub struct Session {
     pub all_frames: History,
     budget: Budget,
     profile: Profile,
-    memory: Vec<MemoryUse>,
     pub(super) picked: Option<Picked>,
     pub(super) message: Option<String>,
     start: Instant,
@@ -49,7 +48,6 @@ impl Session {
             history: History::new(HISTORY_S),
             all_frames: History::new(f64::INFINITY),
             profile: Profile::default(),
-            memory: Vec::new(),
             picked: None,
             message: None,
             start: Instant::now(),
@@ -130,7 +128,7 @@ impl Session {
     }
 
     /// What the overlay shows.
-    pub fn facts<'a>(&'a self, live: &'a Live, window: (u32, u32)) -> Facts<'a> {
+    pub fn facts<'a>(&'a self, live: &'a Live, window: (u32, u32), is_flying: bool) -> Facts<'a> {
         let options = live.renderer.options();
         Facts {
             device: &live.context.info().name,
@@ -139,9 +137,10 @@ impl Session {
             picture: (options.width, options.height),
             n_samples: live.renderer.n_samples(),
             speed: self.controller.speed(),
+            is_flying,
             profile: &self.profile,
             history: &self.history,
-            memory: &self.memory,
+            memory: live.context.memory(),
             picked: self.picked.as_ref(),
             message: self.message.as_deref(),
         }

@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// Points.
-const WIDTH: f32 = 290.0;
+const WIDTH: f32 = 300.0;
 
 /// What the user sets.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,10 +43,12 @@ pub struct Facts<'a> {
     pub n_samples: u32,
     /// World units a second.
     pub speed: f32,
+    /// Whether S flies back, rather than saves.
+    pub is_flying: bool,
     /// Of the last frame that was drawn.
     pub profile: &'a Profile,
     pub history: &'a History,
-    pub memory: &'a [MemoryUse],
+    pub memory: Vec<MemoryUse>,
     pub picked: Option<&'a Picked>,
     /// What went wrong last.
     pub message: Option<&'a str>,
@@ -64,7 +66,10 @@ pub fn show(ui: &mut Ui, settings: &mut Settings, facts: &Facts) {
         |ui| {
             ui.set_width(WIDTH);
             let room = ui.ctx().content_rect().height() - 60.0;
-            ScrollArea::vertical().max_height(room.max(80.0)).show(ui, |ui| sections(ui, settings, facts));
+            ScrollArea::vertical()
+                .max_height(room.max(80.0))
+                .min_scrolled_height(room.max(80.0))
+                .show(ui, |ui| sections(ui, settings, facts));
         },
     );
 }
@@ -80,7 +85,7 @@ fn sections(ui: &mut Ui, settings: &mut Settings, facts: &Facts) {
     section(ui, "Rays", true, |ui| tables::rays(ui, facts.profile));
     section(ui, "Pixel", facts.picked.is_some(), |ui| tables::picked(ui, facts.picked));
     section(ui, "Tree", false, |ui| tables::tree(ui, facts.loaded));
-    section(ui, "Memory", false, |ui| tables::memory(ui, facts.memory));
+    section(ui, "Memory", false, |ui| tables::memory(ui, &facts.memory));
     section(ui, "Keys", false, keys);
 }
 
@@ -93,22 +98,24 @@ fn status(ui: &mut Ui, settings: &Settings, facts: &Facts) {
     ui.label(format!("{}: {} triangles", loaded.scene.name, loaded.scene.triangles.len()));
     ui.label(facts.device);
     ui.label(format!("{}x{} in {}x{}", picture.0, picture.1, window.0, window.1));
-    ui.label(format!("{n_samples} of {} samples, speed {:.3}/s", settings.max_samples, facts.speed));
-    ui.monospace(percentiles("frame  ms", facts.history.pace()));
-    ui.monospace(percentiles("answer ms", facts.history.latency()))
+    let way = if facts.is_flying { "fly" } else { "orbit" };
+    ui.label(format!("{n_samples} of {} samples; {way}, speed {:.3}/s", settings.max_samples, facts.speed));
+    ui.monospace("              p50     p95     p99");
+    ui.monospace(percentiles("frame, ms ", facts.history.pace()));
+    ui.monospace(percentiles("answer, ms", facts.history.latency()))
         .on_hover_text("from an input's arrival until the first frame that shows it is handed to the screen");
 }
 
 fn percentiles(name: &str, of: Option<Percentiles>) -> String {
     match of {
-        Some(Percentiles { p50, p95, p99, .. }) => format!("{name}  p50 {p50:.1}  p95 {p95:.1}  p99 {p99:.1}"),
-        None => format!("{name}  -"),
+        Some(Percentiles { p50, p95, p99, .. }) => format!("{name} {p50:7.1} {p95:7.1} {p99:7.1}"),
+        None => format!("{name}       -       -       -"),
     }
 }
 
 fn keys(ui: &mut Ui) {
     const KEYS: [(&str, &str); 12] = [
-        ("W S A D", "fly ahead, back, left, right"),
+        ("W S A D", "fly; S goes back only after another"),
         ("E Q", "fly up, down"),
         ("Shift, Ctrl", "faster, slower"),
         ("wheel", "speed"),
@@ -118,7 +125,7 @@ fn keys(ui: &mut Ui) {
         ("F", "frame the scene"),
         ("Home", "back to the start"),
         ("P", "print the camera"),
-        ("S + Ctrl", "save the picture"),
+        ("S, F12", "save the picture"),
         ("Tab, Esc", "hide this, quit"),
     ];
     tables::grid(ui, "keys", KEYS.iter().map(|(key, does)| [(*key).to_owned(), (*does).to_owned()]));
