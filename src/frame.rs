@@ -23,6 +23,7 @@ pub struct RenderOptions {
     pub max_depth: u32,
     /// Factor on radiance before it is encoded for display.
     pub exposure: f32,
+    pub tonemap: Tonemap,
     pub denoise: Denoise,
     pub traversal: Traversal,
     pub primary: Primary,
@@ -36,6 +37,7 @@ impl Default for RenderOptions {
             crop: None,
             max_depth: 5,
             exposure: 1.0,
+            tonemap: Tonemap::Linear,
             denoise: Denoise::Paper { threshold: Denoise::DEFAULT_THRESHOLD },
             traversal: Traversal::Mask,
             primary: Primary::Raster,
@@ -57,6 +59,28 @@ pub enum Denoise {
 impl Denoise {
     /// A straight edge between black and white adds up to 1, a corner or a thin line to 2, a lone pixel to 4.
     pub const DEFAULT_THRESHOLD: f32 = 2.5;
+}
+
+/// How radiance, which knows no bounds, becomes what a display shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tonemap {
+    /// As it is, cut off at white.
+    Linear,
+    /// AgX: bright colours fade to white, dark ones keep their hue.
+    Agx,
+    /// The film-like curve of the Academy Color Encoding System.
+    Aces,
+}
+
+impl Tonemap {
+    /// The kernel's specialization constant.
+    pub(crate) fn constant(self) -> u32 {
+        match self {
+            Self::Linear => layout::TONEMAP_LINEAR,
+            Self::Agx => layout::TONEMAP_AGX,
+            Self::Aces => layout::TONEMAP_ACES,
+        }
+    }
 }
 
 /// How a ray finds its way through the kd-tree.
@@ -166,10 +190,18 @@ pub struct BounceStats {
 impl Profile {
     /// Adds a frame's times and counts to those of others of the same options.
     pub fn add(&mut self, frame: &Profile) {
+        let mut next = 0;
         for pass in &frame.passes {
-            match self.passes.iter_mut().find(|sum| sum.name == pass.name && sum.bounce == pass.bounce) {
-                Some(sum) => sum.ms = sum.ms.zip(pass.ms).map(|(a, b)| a + b),
-                None => self.passes.push(pass.clone()),
+            let known = self.passes.iter().position(|sum| sum.name == pass.name && sum.bounce == pass.bounce);
+            match known.map(|i| (i, &mut self.passes[i])) {
+                Some((i, sum)) => {
+                    sum.ms = sum.ms.zip(pass.ms).map(|(a, b)| a + b);
+                    next = i + 1;
+                }
+                None => {
+                    self.passes.insert(next, pass.clone());
+                    next += 1;
+                }
             }
         }
         self.bounces.resize(self.bounces.len().max(frame.bounces.len()), BounceStats::default());
@@ -235,4 +267,32 @@ words!(Traversal {
     Stack = "stack",
     Brute = "brute"
 });
+words!(Tonemap { Linear = "linear", Agx = "agx", Aces = "aces" });
 words!(Primary { Raster = "raster", Trace = "trace" });
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn profiles_add_up() {
+        let pass = |name, bounce, ms| PassTime { name, bounce, ms: Some(ms) };
+        let stats = |n_rays| BounceStats { n_rays, n_hits: 1, n_shadow_rays: 2 };
+        let frame = |passes, n_batches| Profile {
+            device: "d".to_owned(),
+            passes,
+            bounces: vec![stats(10), stats(5)],
+            n_batches,
+            frame_ms: Some(4.0),
+        };
+        let mut sum = frame(vec![pass("trace", Some(0), 1.0), pass("tonemap", None, 2.0)], 3);
+        let later =
+            frame(vec![pass("trace", Some(0), 1.5), pass("accumulate", None, 0.5), pass("tonemap", None, 2.0)], 2);
+        sum.add(&later);
+        let expected = [pass("trace", Some(0), 2.5), pass("accumulate", None, 0.5), pass("tonemap", None, 4.0)];
+        assert_eq!((&sum.passes[..], sum.n_batches, sum.frame_ms), (&expected[..], 3, Some(8.0)));
+        assert_eq!(sum.bounces[0], BounceStats { n_rays: 20, n_hits: 2, n_shadow_rays: 4 });
+        sum.add(&Profile { frame_ms: None, ..later });
+        assert_eq!(sum.frame_ms, None);
+    }
+}

@@ -40,6 +40,11 @@
 // Triangles that brute force takes: a driver is known to end any shader after 65,535 turns of its loops, in silence.
 #define BRUTE_MAX_TRIANGLES 65000u
 
+// How radiance becomes what a display shows: the kernel's specialization constant CURVE.
+#define TONEMAP_LINEAR 0u
+#define TONEMAP_AGX 1u
+#define TONEMAP_ACES 2u
+
 // Material.flags
 #define MATERIAL_SPECULAR 1u
 #define MATERIAL_REFLECT 2u

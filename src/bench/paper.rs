@@ -57,6 +57,7 @@ pub fn options(scene: &RenderDefaults, (width, height): (u32, u32)) -> RenderOpt
         height,
         max_depth: scene.max_depth,
         exposure: scene.exposure,
+        tonemap: scene.tonemap,
         denoise: scene.denoise,
         ..RenderOptions::default()
     }

@@ -2,7 +2,7 @@
 
 use clap::{ValueEnum, value_parser};
 use kdray::{
-    frame::{Denoise, Primary, RenderOptions, Traversal},
+    frame::{Denoise, Primary, RenderOptions, Tonemap, Traversal},
     scene::RenderDefaults,
 };
 
@@ -25,6 +25,9 @@ pub struct PictureArgs {
     /// Factor on radiance before it is encoded for display [default: the scene's]
     #[arg(long, value_name = "X", value_parser = positive)]
     pub exposure: Option<f32>,
+    #[arg(long, value_name = "CURVE")]
+    #[arg(help = format!("From radiance to what a display shows: {} [default: the scene's]", Tonemap::words()))]
+    pub tonemap: Option<Tonemap>,
     #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
     #[arg(help = format!("How rays find their way through the tree: {}", Traversal::words()))]
     pub traversal: Traversal,
@@ -51,6 +54,7 @@ impl PictureArgs {
             crop: None,
             max_depth: self.max_depth.unwrap_or(scene.max_depth),
             exposure: self.exposure.unwrap_or(scene.exposure),
+            tonemap: self.tonemap.unwrap_or(scene.tonemap),
             denoise: self.denoise(scene.denoise),
             traversal: self.traversal,
             primary: self.primary,

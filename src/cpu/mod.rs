@@ -33,6 +33,7 @@ pub mod steps;
 pub mod surface;
 pub mod table;
 mod timing;
+pub mod tone_curves;
 pub mod tonemap;
 pub mod trace;
 pub mod triangle;

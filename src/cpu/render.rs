@@ -232,8 +232,9 @@ impl<'a> Renderer<'a> {
             self.clock.time("accumulate", None, || accumulate::accumulate(frame, &[], radiance, sums));
         }
         let (filtered, display) = (&mut self.pixel_filtered, &mut self.pixel_display);
+        let curve = self.options.tonemap;
         self.clock.time("denoise", None, || denoise::denoise(frame, radiance, filtered));
-        self.clock.time("tonemap", None, || tonemap::tonemap(frame, filtered, display));
+        self.clock.time("tonemap", None, || tonemap::tonemap(frame, curve, filtered, display));
     }
 
     fn profile(&self) -> Profile {

@@ -273,7 +273,7 @@ impl Commands<'_> {
     /// Overwrites the first bytes with data that travels in the command buffer: 64 KiB at most.
     pub fn update_buffer(&self, destination: &AnyBuffer, data: &impl Pod) {
         let bytes = bytemuck::bytes_of(data);
-        assert!(bytes.len() as u64 <= destination.bytes() && bytes.len() <= 1 << 16 && bytes.len() % 4 == 0);
+        assert!(bytes.len() as u64 <= destination.bytes() && bytes.len() <= 1 << 16 && bytes.len().is_multiple_of(4));
         // SAFETY: the commands are being recorded, outside rendering, and the buffer holds that many bytes.
         unsafe { self.context.device.cmd_update_buffer(self.raw, destination.raw(), 0, bytes) };
     }

@@ -81,7 +81,7 @@ impl Passes {
             resolve: Resolve::new(context, bindings)?,
             accumulate: Accumulate::new(context, bindings)?,
             denoise: Denoise::new(context, bindings)?,
-            tonemap: Tonemap::new(context, bindings)?,
+            tonemap: Tonemap::new(context, bindings, options.tonemap)?,
         })
     }
 
@@ -100,6 +100,9 @@ impl Passes {
             let trace = Trace::new(context, bindings, to.traversal)?;
             self.shadow = Shadow::new(context, bindings, to.traversal)?;
             self.trace = trace;
+        }
+        if from.tonemap != to.tonemap {
+            self.tonemap = Tonemap::new(context, bindings, to.tonemap)?;
         }
         if from.primary != to.primary {
             self.primary_hit = PrimaryHit::new(context, bindings, to.primary == Primary::Raster)?;

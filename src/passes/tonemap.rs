@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{Resources, kernel, spirv};
 use crate::{
+    frame,
     gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
     layout::Batch,
 };
@@ -14,8 +15,13 @@ pub struct Tonemap {
 }
 
 impl Tonemap {
-    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
-        Ok(Self { kernel: kernel(context, bindings, "tonemap", spirv!("tonemap.comp"), &[])? })
+    pub(super) fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<Bindings>,
+        curve: frame::Tonemap,
+    ) -> Result<Self, GpuError> {
+        let constants = [curve.constant()];
+        Ok(Self { kernel: kernel(context, bindings, "tonemap", spirv!("tonemap.comp"), &constants)? })
     }
 
     /// Needs pixel_filtered. Leaves pixel_display.

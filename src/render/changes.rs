@@ -42,7 +42,7 @@ impl Renderer {
     }
 
     /// Renders with other options from the next sample on. Kernels are made anew only where they differ. Samples are kept
-    /// where only what is done with them changes: the exposure, the filter's threshold; [`Renderer::show`] shows that.
+    /// where only what is done with them changes: the exposure, the curve, the filter's threshold; [`Renderer::show`] shows that.
     /// `tree`: the one that the renderer was made with, for what another traversal reads beside it.
     ///
     /// # Errors
@@ -86,6 +86,7 @@ impl Renderer {
 
 /// Whether all that differs is what becomes of the samples, with the same buffers.
 fn same_samples(a: &RenderOptions, b: &RenderOptions) -> bool {
-    let of_samples = |options: &RenderOptions| RenderOptions { exposure: 1.0, denoise: a.denoise, ..options.clone() };
+    let (denoise, tonemap) = (a.denoise, a.tonemap);
+    let of_samples = |options: &RenderOptions| RenderOptions { exposure: 1.0, denoise, tonemap, ..options.clone() };
     of_samples(a) == of_samples(b) && std::mem::discriminant(&a.denoise) == std::mem::discriminant(&b.denoise)
 }

@@ -213,6 +213,10 @@ fn render_defaults(spec: &RenderSpec) -> Checked<RenderDefaults> {
         width: count("width", spec.width, defaults.width, 16_384)?,
         height: count("height", spec.height, defaults.height, 16_384)?,
         max_depth: count("max_depth", spec.max_depth, defaults.max_depth, 64)?,
+        tonemap: match &spec.tonemap {
+            Some(word) => word.parse().map_err(|e| format!("tonemap: {e}"))?,
+            None => defaults.tonemap,
+        },
         exposure: within("exposure", spec.exposure.unwrap_or(defaults.exposure), 1e-6, 1e6)?,
         denoise: match spec.denoise.unwrap_or(DenoiseWord::Paper) {
             DenoiseWord::Off => Denoise::Off,

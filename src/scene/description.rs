@@ -61,6 +61,8 @@ pub(super) struct RenderSpec {
     pub height: Option<u32>,
     pub max_depth: Option<u32>,
     pub exposure: Option<f32>,
+    /// linear, agx or aces.
+    pub tonemap: Option<String>,
     pub denoise: Option<DenoiseWord>,
     pub denoise_threshold: Option<f32>,
 }

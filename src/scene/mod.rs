@@ -21,7 +21,7 @@ use glam::Vec3;
 
 pub use self::{error::SceneError, material::illum_flags, sources::source_files};
 use crate::{
-    frame::{Denoise, RenderOptions},
+    frame::{Denoise, RenderOptions, Tonemap},
     layout::{Light, Material, Triangle},
 };
 
@@ -70,13 +70,14 @@ pub struct RenderDefaults {
     /// Levels of rays, the primary one counted.
     pub max_depth: u32,
     pub exposure: f32,
+    pub tonemap: Tonemap,
     pub denoise: Denoise,
 }
 
 impl Default for RenderDefaults {
     fn default() -> Self {
-        let RenderOptions { width, height, max_depth, exposure, denoise, .. } = RenderOptions::default();
-        Self { width, height, max_depth, exposure, denoise }
+        let RenderOptions { width, height, max_depth, exposure, tonemap, denoise, .. } = RenderOptions::default();
+        Self { width, height, max_depth, exposure, tonemap, denoise }
     }
 }
 

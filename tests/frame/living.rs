@@ -2,7 +2,7 @@
 
 use glam::vec3;
 use kdray::{
-    frame::{Denoise, Picture, Primary, RenderOptions, Traversal},
+    frame::{Denoise, Picture, Primary, RenderOptions, Tonemap, Traversal},
     gpu::GpuError,
     render::Renderer,
     scene::{Camera, Scene},
@@ -74,14 +74,14 @@ fn other_cameras_and_sizes_draw_what_a_new_renderer_draws() {
 }
 
 #[test]
-fn exposure_and_threshold_keep_the_samples() {
+fn exposure_curve_and_threshold_keep_the_samples() {
     let scene = scenes::mixed_outdoors();
     let (tree, context) = (tree_of(&scene), device());
     let denoise = |threshold| Denoise::Paper { threshold };
     let start = RenderOptions { denoise: denoise(2.0), ..options(40, 30, 3) };
     let mut renderer = Renderer::new(context.clone(), &scene, &tree, &start).expect("a renderer");
     sampled(&mut renderer, 3);
-    let to = RenderOptions { exposure: 2.0, denoise: denoise(0.2), ..start };
+    let to = RenderOptions { exposure: 2.0, denoise: denoise(0.2), tonemap: Tonemap::Agx, ..start };
     renderer.set_options(&to, &tree).expect("options");
     assert_eq!(renderer.n_samples(), 3);
     renderer.show().expect("the picture");

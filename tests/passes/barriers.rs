@@ -89,8 +89,8 @@ fn overwriting_hits_before_they_are_read_is_reported() {
 }
 
 #[test]
-fn adding_a_sample_before_it_is_there_is_reported() {
-    check((Access::ComputeWrite, Access::ComputeUpdate), resolve, accumulate);
+fn filtering_pixels_before_their_mean_is_there_is_reported() {
+    check((Access::ComputeWrite, Access::ComputeRead), accumulate, denoise);
 }
 
 #[test]

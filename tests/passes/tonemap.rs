@@ -1,6 +1,9 @@
 //! Tonemap against its twin: within one level, since `pow` is not exact.
 
-use kdray::{cpu, frame::RenderOptions};
+use kdray::{
+    cpu,
+    frame::{RenderOptions, Tonemap},
+};
 
 use super::stage::{FIRST, Stage, UNTOUCHED_WORD, options};
 use crate::support::{compare, random::Random, scenes};
@@ -22,16 +25,28 @@ fn empty_stage(options: RenderOptions) -> Stage {
 #[test]
 fn agrees_with_its_twin() {
     for (width, height) in [(1, 1), (7, 8), (8, 8), (9, 9), (1, 65), (100, 75)] {
-        let stage = empty_stage(RenderOptions { exposure: 0.7, ..options(width, height) });
-        let mut random = Random(6);
-        let mut channel = |_| random.unit() * random.unit() * 2.0;
-        let pixels: Vec<[f32; 4]> = (0..width * height).map(|_| [0; 4].map(&mut channel)).collect();
-        let mut expected = vec![[0; 4]; pixels.len()];
-        cpu::tonemap::tonemap(stage.resources.constants(), &pixels, &mut expected);
-        let found = encoded(&stage, &pixels);
-        compare::bytes(1, &expected, &found).unwrap();
-        let n_off = expected.iter().zip(&found).filter(|(a, b)| a != b).count();
-        assert!(n_off <= pixels.len() / 100, "{n_off} pixels are a level off");
+        for &tonemap in Tonemap::ALL {
+            let stage = empty_stage(RenderOptions { exposure: 0.7, tonemap, ..options(width, height) });
+            let mut random = Random(6);
+            let mut channel = |_| random.unit() * random.unit() * 2.0;
+            let pixels: Vec<[f32; 4]> = (0..width * height).map(|_| [0; 4].map(&mut channel)).collect();
+            let mut expected = vec![[0; 4]; pixels.len()];
+            cpu::tonemap::tonemap(stage.resources.constants(), tonemap, &pixels, &mut expected);
+            let found = encoded(&stage, &pixels);
+            compare::bytes(1, &expected, &found).unwrap();
+            let n_off = expected.iter().zip(&found).filter(|(a, b)| a != b).count();
+            assert!(n_off <= pixels.len() / 50, "{tonemap}: {n_off} pixels are a level off");
+        }
+    }
+}
+
+#[test]
+fn another_curve_is_noticed() {
+    let pixels: Vec<[f32; 4]> = (0..64).map(|i| [i as f32 / 32.0, 0.3, 0.1, 1.0]).collect();
+    let shown = |&tonemap: &Tonemap| encoded(&empty_stage(RenderOptions { tonemap, ..options(8, 8) }), &pixels);
+    let shown: Vec<_> = Tonemap::ALL.iter().map(shown).collect();
+    for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+        assert!(compare::bytes(1, &shown[i], &shown[j]).is_err());
     }
 }
 

@@ -5,7 +5,7 @@ use std::fmt::Display;
 use egui::{ComboBox, Grid, Slider, Ui};
 
 use super::Settings;
-use crate::frame::{Denoise, Primary, Traversal};
+use crate::frame::{Denoise, Primary, Tonemap, Traversal};
 
 /// The controls; all take effect with the next frame.
 pub fn show(ui: &mut Ui, settings: &mut Settings) {
@@ -14,6 +14,7 @@ pub fn show(ui: &mut Ui, settings: &mut Settings) {
         row(ui, "bounces", |ui| ui.add(Slider::new(&mut options.max_depth, 1..=16)));
         row(ui, "samples", |ui| ui.add(Slider::new(max_samples, 1..=4096).logarithmic(true)));
         row(ui, "exposure", |ui| ui.add(Slider::new(&mut options.exposure, 0.01..=100.0).logarithmic(true)));
+        choice(ui, "tone curve", &mut options.tonemap, Tonemap::ALL);
         denoise(ui, &mut options.denoise);
         choice(ui, "traversal", &mut options.traversal, Traversal::ALL);
         choice(ui, "primary rays", &mut options.primary, Primary::ALL);
