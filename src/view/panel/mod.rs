@@ -80,10 +80,12 @@ fn sections(ui: &mut Ui, settings: &mut Settings, facts: &Facts) {
         ui.separator();
     }
     status(ui, settings, facts);
+    if let Some(picked) = facts.picked {
+        section(ui, "Pixel", true, |ui| tables::picked(ui, picked));
+    }
     section(ui, "Passes", true, |ui| graph::show(ui, facts.history));
     section(ui, "Picture", true, |ui| controls::show(ui, settings));
     section(ui, "Rays", true, |ui| tables::rays(ui, facts.profile));
-    section(ui, "Pixel", facts.picked.is_some(), |ui| tables::picked(ui, facts.picked));
     section(ui, "Tree", false, |ui| tables::tree(ui, facts.loaded));
     section(ui, "Memory", false, |ui| tables::memory(ui, &facts.memory));
     section(ui, "Keys", false, keys);

@@ -86,11 +86,7 @@ fn bytes(n: u64) -> String {
 }
 
 /// The rays of a pixel.
-pub fn picked(ui: &mut Ui, picked: Option<&Picked>) {
-    let Some(picked) = picked else {
-        ui.label("click on the picture");
-        return;
-    };
+pub fn picked(ui: &mut Ui, picked: &Picked) {
     ui.monospace(format!("pixel {}, {}", picked.pixel.x, picked.pixel.y));
     for ray in &picked.rays {
         ui.monospace(picked_ray(ray));
