@@ -96,7 +96,8 @@ fn rust_layout(glsl: &str) -> String {
             layout = Some((name.to_owned(), 0, 4));
         } else if let Some((name, value)) = line.strip_prefix("#define ").and_then(|rest| rest.split_once(' ')) {
             let value = value.trim().trim_end_matches('u');
-            writeln!(rust, "{doc}pub const {name}: u32 = {value};").unwrap();
+            let ty = if value.contains('.') { "f32" } else { "u32" };
+            writeln!(rust, "{doc}pub const {name}: {ty} = {value};").unwrap();
         }
         doc.clear();
     }

@@ -1,14 +1,16 @@
 //! What a frame is asked for, and what comes of it: the options, the picture and the profile, alike on GPU and CPU.
 
-use std::{fmt, str::FromStr};
-
 use serde::Serialize;
 
-use crate::layout;
-
+mod aov;
 mod crop;
 
-pub use self::crop::Crop;
+pub use self::{
+    aov::{Aov, Channel, Samples},
+    crop::Crop,
+};
+use crate::layout;
+pub use crate::words::UnknownWord;
 
 /// How a frame is rendered. The scene's own defaults fill what the user leaves open.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,6 +29,8 @@ pub struct RenderOptions {
     pub denoise: Denoise,
     pub traversal: Traversal,
     pub primary: Primary,
+    /// Note what the rays of each pixel meet and cost, too.
+    pub features: bool,
 }
 
 impl Default for RenderOptions {
@@ -41,6 +45,7 @@ impl Default for RenderOptions {
             denoise: Denoise::Paper { threshold: Denoise::DEFAULT_THRESHOLD },
             traversal: Traversal::Mask,
             primary: Primary::Raster,
+            features: false,
         }
     }
 }
@@ -86,7 +91,8 @@ impl Tonemap {
 /// How a ray finds its way through the kd-tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Traversal {
-    /// A bit a level says which siblings are still to be visited; parent links lead back to them.
+    /// A bit a level says which siblings are still to be visited; the eight newest are kept, parent links lead back to
+    /// older ones.
     Mask,
     /// The paper's own: a bit a level says which siblings are done; their boxes tell whether to visit them.
     MaskBoxes,
@@ -94,9 +100,9 @@ pub enum Traversal {
     Restart,
     /// Back to the deepest ancestor that the ray has not left, by its box.
     Backtrack,
-    /// The four newest far children; older ones by a restart.
+    /// The eight newest far children; older ones by a restart.
     ShortStack,
-    /// From leaf to leaf, by links to its neighbours; where the ray keeps near an edge, by the mask.
+    /// From leaf to leaf, by links to its neighbours.
     Ropes,
     /// An array of far children.
     Stack,
@@ -218,43 +224,6 @@ impl Profile {
     pub fn pass_ms(&self, name: &str) -> Option<f64> {
         self.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.ms).sum()
     }
-}
-
-/// A word that names no variant of an option.
-#[derive(Debug, thiserror::Error)]
-#[error("`{word}` is not one of {expected}")]
-pub struct UnknownWord {
-    word: String,
-    expected: String,
-}
-
-/// Words for an option's variants, for the command line, scene files and JSON alike.
-macro_rules! words {
-    ($ty:ident { $($variant:ident = $word:literal),+ }) => {
-        impl $ty {
-            /// Every variant.
-            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
-
-            /// The words of all variants, with commas.
-            pub fn words() -> String {
-                [$($word),+].join(", ")
-            }
-        }
-        impl FromStr for $ty {
-            type Err = UnknownWord;
-            fn from_str(word: &str) -> Result<Self, UnknownWord> {
-                match word {
-                    $($word => Ok(Self::$variant),)+
-                    _ => Err(UnknownWord { word: word.to_owned(), expected: Self::words() }),
-                }
-            }
-        }
-        impl fmt::Display for $ty {
-            fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                f.write_str(match self { $(Self::$variant => $word),+ })
-            }
-        }
-    };
 }
 
 words!(Traversal {

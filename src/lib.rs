@@ -18,6 +18,9 @@
 
 #![deny(unsafe_code)]
 
+#[macro_use]
+mod words;
+
 pub mod frame;
 pub mod layout;
 

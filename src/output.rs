@@ -17,7 +17,11 @@ use image::{
 };
 use tempfile::{NamedTempFile, SpooledTempFile};
 
+pub use self::{heat_map::HeatMap, layers::write_layers};
 use crate::frame::Picture;
+
+mod heat_map;
+mod layers;
 
 /// Bytes beyond which a spool goes to disk.
 const SPOOL_IN_MEMORY: usize = 64 << 20;
@@ -33,6 +37,8 @@ pub enum OutputError {
     IsDirectory { path: PathBuf },
     #[error("cannot encode `{path}`: {source}")]
     Encode { path: PathBuf, source: ImageError },
+    #[error("cannot encode `{path}`: {source}")]
+    EncodeLayers { path: PathBuf, source: exr::error::Error },
     #[error("cannot write `{path}`: {source}")]
     Write { path: PathBuf, source: io::Error },
 }

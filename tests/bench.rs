@@ -216,7 +216,8 @@ fn traversal_measures_every_variant_on_every_set() {
                 let steps = &variant["steps_a_ray"];
                 assert_eq!(steps["nodes"].as_f64() >= Some(1.0), name != "brute", "{name}: {steps}");
                 assert!(steps["triangles"].as_f64() > Some(0.0), "{name}: {steps}");
-                let has_links = ["mask", "mask-boxes", "backtrack", "ropes"].contains(&name);
+                // The mask keeps the newest pending cells; a mesh so small has no more.
+                let has_links = ["mask-boxes", "backtrack", "ropes"].contains(&name);
                 assert_eq!(steps["links"].as_f64() > Some(0.0), has_links, "{name}: {steps}");
                 let has_boxes = ["mask-boxes", "backtrack", "ropes"].contains(&name);
                 assert_eq!(steps["boxes"].as_f64() > Some(0.0), has_boxes, "{name}: {steps}");

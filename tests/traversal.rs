@@ -4,7 +4,10 @@ mod support;
 
 use glam::{Vec3, vec3};
 use kdray::{
-    cpu::{brute, kdtree::Traverser},
+    cpu::{
+        brute,
+        kdtree::{Traverser, near_scene},
+    },
     frame::Traversal,
     layout::{Hit, NO_TRIANGLE, Ray, Triangle},
 };
@@ -54,7 +57,7 @@ fn first_difference(rays: &[Ray], expected: &[Hit], found: &[Hit]) -> Option<Str
 fn check_against_brute_force(name: &str, triangles: Vec<Triangle>) {
     let world = World::new(triangles);
     let rays = rays_at(&world);
-    let expected: Vec<Hit> = rays.par_iter().map(|ray| brute::closest_hit(&world.triangles, ray)).collect();
+    let expected: Vec<Hit> = rays.par_iter().map(|ray| world.by_brute_force(ray, 0.0)).collect();
     let n_hits = expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count();
     assert!(n_hits > N_RAYS / 5, "{name}: only {n_hits} rays hit anything");
     let wrong: Vec<String> = tree_traversals()
@@ -189,6 +192,31 @@ fn a_needle_is_not_hit_beside() {
     let origin = vec3(-1.7435632, -4.7086616, -7.629315);
     let needle = ray(origin, vec3(0.40416333, 0.5116821, 0.75817764));
     assert_eq!(brute::closest_hit(&triangles, &needle).triangle_ix, NO_TRIANGLE);
+}
+
+/// From so far away that rays start at the scene instead: the same triangles, by the test without that.
+#[test]
+fn rays_from_afar_hit_the_same() {
+    let world = World::new(meshes::torus(40, 20));
+    for distance in [10.0, 300.0, 3000.0] {
+        let afar = |i: usize| {
+            let mut random = Random(i as u64);
+            let within = random.in_box(world.tree.cell_min, world.tree.cell_max);
+            let origin = world.centre() + distance * world.radius() * random.direction();
+            ray(origin, (within - origin).normalize())
+        };
+        let rays: Vec<Ray> = (0..N_RAYS / 10).map(afar).collect();
+        assert!(rays.iter().all(|ray| near_scene(&world.bindings(), ray).1 > 0.0));
+        let unmoved: Vec<Hit> = rays.par_iter().map(|ray| brute::closest_hit(&world.triangles, ray)).collect();
+        for traversal in tree_traversals() {
+            let found = traced(&world, traversal, &rays);
+            let differs = |(a, b): &(&Hit, &Hit)| a.triangle_ix != b.triangle_ix || (a.t - b.t).abs() > 1e-6 * a.t;
+            let n = unmoved.iter().zip(&found).filter(differs).count();
+            // Rays at edges: an origin is rounded to 2^-24 of its distance, a triangle is some 2^-4 wide.
+            assert!(n as f32 <= 5.0 + rays.len() as f32 * distance * 2e-6, "{traversal}, {distance}: {n} rays differ");
+            assert!(found.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count() > rays.len() / 5);
+        }
+    }
 }
 
 #[test]

@@ -8,7 +8,6 @@ use std::sync::Arc;
 use glam::{Vec3, vec3};
 use kdray::{
     camera::frame_constants,
-    cpu::brute,
     frame::{RenderOptions, Traversal},
     gpu::{Access, Context, ContextOptions, GpuError},
     kdtree::{BuildOptions, KdTree},
@@ -117,7 +116,7 @@ fn check(context: &Arc<Context>, name: &str, triangles: Vec<Triangle>) {
 fn check_against_cpu(name: &str, world: &World, rays: &[Ray], found: &Traced) {
     let hits: &[Hit] = bytemuck::cast_slice(&found.hits);
     let differs = |(ray, hit): (&Ray, &Hit)| {
-        let expected = brute::closest_hit(&world.triangles, ray);
+        let expected = world.by_brute_force(ray, 0.0);
         let is_near = (hit.t - expected.t).abs() <= 1e-5 * expected.t || hit.t == expected.t;
         !is_near || hit.triangle_ix != expected.triangle_ix
     };

@@ -3,7 +3,7 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Primary hit (the paper's section 2.2): one invocation a pixel of the batch makes the ray of its sample and intersects it
 // with the plane of the triangle that the rasterizer found there.
-// Reads triangle_ids, triangles; writes rays, hits, counters[].n_hits.
+// Reads triangle_ids, triangles; writes rays, hits, counters[].n_hits, pixel_features (n_rays, n_steps).
 #include "layout.glsl"
 #include "camera.glsl"
 #include "triangle.glsl"
@@ -17,8 +17,12 @@ layout(std430, set = 0, binding = BIND_RAYS) writeonly buffer RaysBlock { Ray ra
 layout(std430, set = 0, binding = BIND_HITS) writeonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
 
+layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
+
 // 0: only make the rays, the trace pass finds their hits.
 layout(constant_id = 0) const uint FROM_RASTER = 1u;
+// 1: note what the ray costs.
+layout(constant_id = 2) const uint COUNT_COSTS = 0u;
 
 void main() {
     uint ray_ix = gl_GlobalInvocationID.x;
@@ -35,6 +39,10 @@ void main() {
             is_hit = triangle_ix != NO_TRIANGLE;
             if (is_hit) hit = clamp_to_triangle(shear_of(ray.origin, ray.direction), triangles[triangle_ix], triangle_ix);
             hits[ray_ix] = hit;
+            if (COUNT_COSTS == 1u) {
+                pixel_features[ray.pixel_ix].n_rays = 1u;
+                pixel_features[ray.pixel_ix].n_steps = is_hit ? 1u : 0u;
+            }
         }
     }
     uint n_hits = subgroupAdd(is_hit ? 1u : 0u);

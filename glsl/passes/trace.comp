@@ -2,8 +2,12 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Trace (the paper's section 2.3): one invocation a ray finds its closest hit through the kd-tree.
-// Reads rays and the tree; writes hits, counters[].n_hits.
+// Reads rays and the tree; writes hits, counters[].n_hits, pixel_features (n_rays, n_steps).
 #include "layout.glsl"
+
+// 1: note what rays cost.
+layout(constant_id = 2) const uint COUNT_COSTS = 0u;
+#include "steps.glsl"
 #include "kdtree.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
@@ -11,6 +15,7 @@ layout(push_constant) uniform BatchBlock { Batch batch; };
 layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_HITS) writeonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
+layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
 
 void main() {
@@ -19,6 +24,10 @@ void main() {
     if (ray_ix < bounces[batch.bounce_ix].n_rays) {
         Hit hit = traverse(rays[ray_ix], 0.0, false);
         hits[ray_ix] = hit;
+        if (COUNT_COSTS == 1u) {
+            atomicAdd(pixel_features[rays[ray_ix].pixel_ix].n_rays, 1u);
+            atomicAdd(pixel_features[rays[ray_ix].pixel_ix].n_steps, n_steps);
+        }
         is_hit = hit.triangle_ix != NO_TRIANGLE;
     }
     uint n_hits = subgroupAdd(is_hit ? 1u : 0u);

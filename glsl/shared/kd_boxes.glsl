@@ -2,7 +2,7 @@
 
 layout(std430, set = 0, binding = BIND_KD_BOXES) readonly buffer KdBoxesBlock { KdBox kd_boxes[]; };
 
-// Where the ray enters the widened planes of a node's cell on each axis: those it comes to first, and the far ones.
+// Where the ray meets the planes of a node's cell on each axis: those it comes to first, and the far ones.
 struct Slabs {
     vec3 near;
     vec3 far;
@@ -10,20 +10,14 @@ struct Slabs {
 
 Slabs slabs_of(TraversalRay ray, uint node_ix) {
     KdBox box = kd_boxes[node_ix];
-    vec3 t0 = fma(vec3(box.min_x, box.min_y, box.min_z), ray.inv_direction, ray.bias);
-    vec3 t1 = fma(vec3(box.max_x, box.max_y, box.max_z), ray.inv_direction, ray.bias);
+    precise vec3 t0 = fma(vec3(box.min_x, box.min_y, box.min_z), ray.inv_direction, ray.bias);
+    precise vec3 t1 = fma(vec3(box.max_x, box.max_y, box.max_z), ray.inv_direction, ray.bias);
     return Slabs(min(t0, t1), max(t0, t1));
 }
 
-// In t, how long the ray is in a widened plane on each axis.
-vec3 widths_of(TraversalRay ray) {
-    return ray.width * abs(ray.inv_direction);
-}
-
-// The ray's interval in a node's cell between widened planes: the planes that `descend` meets on the way there.
+// The ray's interval in a node's cell: the planes that `descend` meets on the way there.
 vec2 interval_in(TraversalRay ray, uint node_ix) {
     Slabs slabs = slabs_of(ray, node_ix);
-    vec3 exit = slabs.far + widths_of(ray);
     return vec2(max(max(slabs.near.x, slabs.near.y), max(slabs.near.z, ray.t_enter)),
-                min(min(exit.x, exit.y), min(exit.z, ray.t_exit)));
+                min(min(slabs.far.x, slabs.far.y), min(slabs.far.z, ray.t_exit)));
 }

@@ -1,6 +1,6 @@
 // What the host and the kernels share: constants, structs and bindings, once.
 //
-// build.rs turns this file into src/layout.rs's contents: `#define NAME 1u` becomes a `pub const NAME: u32`, a struct
+// build.rs turns this file into src/layout.rs's contents: `#define NAME 1u` becomes a `pub const NAME: u32` (1.0: f32), a struct
 // a `#[repr(C)]` one with a size assert. Members are laid out by std430 without padding: a vec3 is always followed
 // by a 4-byte scalar, which fills its fourth word; whatever std430 would pad is refused by the build.
 #ifndef KDRAY_LAYOUT
@@ -27,6 +27,10 @@
 #define KD_CHILD_SHIFT 2u
 // Levels below the root that the traversal's bit mask can hold: two words.
 #define KD_MAX_DEPTH 64u
+
+// Times the scene's largest coordinate: rays that start farther away are moved up to the scene first (the tree's
+// rounding margin is derived for this).
+#define KD_ORIGIN_REACH 4.0
 
 // How rays find their way through the tree: the kernels' specialization constant TRAVERSAL.
 #define TRAVERSAL_MASK 0u
@@ -117,7 +121,8 @@ struct Ray {
 };
 
 // 32 bytes. A ray that is cast, not rendered: direction of any length, which is the unit of t; t in (t_min, t_max], any
-// bounds, but those below 2^-126 may count as 0.
+// bounds, but those below 2^-126 may count as 0. Bounds are kept to the last bit where the origin lies within
+// KD_ORIGIN_REACH, elsewhere to 2^-24 of the way to the scene.
 struct CastRay {
     vec3 origin;
     float t_min;
@@ -196,6 +201,24 @@ struct Counters {
     uint n_shadow_rays;
 };
 
+// 64 bytes: what the primary ray of a pixel's sample hits, and what all rays of the sample cost. normal: the shading
+// normal, unit length, towards the eye; albedo: Kd; depth: along the camera's view. Where nothing is hit, depth is
+// infinity, both indices are NO_TRIANGLE, the vectors 0.
+struct Feature {
+    vec3 position_world;
+    uint triangle_ix;
+    vec3 normal_world;
+    uint material_ix;
+    vec3 albedo;
+    float depth;
+    // Primary, secondary and shadow rays.
+    uint n_rays;
+    // Of all of them: nodes read and triangles tested.
+    uint n_steps;
+    uint reserved0;
+    uint reserved1;
+};
+
 // Push constants: the batch's pixels [first_pixel, first_pixel + n_pixels) in tile order, and its row of `bounces`.
 struct Batch {
     uint first_pixel;
@@ -243,10 +266,11 @@ struct CastBatch {
 #define BIND_KD_BOXES 22u
 #define BIND_KD_ROPES 23u
 #define BIND_PIXEL_ACCUMULATED 24u
-#define N_BINDINGS 25u
+#define BIND_PIXEL_FEATURES 25u
+#define N_BINDINGS 26u
 
 // A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
-#define BIND_CAST_RAYS 25u
-#define BIND_CAST_HITS 26u
+#define BIND_CAST_RAYS 26u
+#define BIND_CAST_HITS 27u
 
 #endif

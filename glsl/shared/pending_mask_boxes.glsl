@@ -1,15 +1,15 @@
 // Pending subtrees as the paper has them (Algorithm 2): nothing is noted on the way down. On the way up, a level at a
 // time, a bit says that the sibling has been visited; where it has not, its box is tested.
 //
-// Corrected: 64 levels for 31; boxes are widened; a failed test leaves the entry point alone; and a hit ends the search
+// Corrected: 64 levels for 31; a failed test leaves the entry point alone; and a hit ends the search
 // only where no other cell can hold a nearer one, not as soon as a leaf has any.
 
 // Bit d - 1 of the two words: the sibling at depth d.
 uvec2 siblings_done;
 
 bool mask_boxes_pop(TraversalRay ray, float t_best, inout Cell cell) {
-    // What has not been visited begins at most ray.overlap before the leaf's end.
-    if (t_best < cell.t_exit - ray.overlap) return false;
+    // What has not been visited begins where the leaf ends, or later.
+    if (t_best < cell.t_exit) return false;
     while (cell.depth > 0u) {
         uvec2 bit = bit_of(cell.depth);
         if ((siblings_done & bit) == uvec2(0u)) {

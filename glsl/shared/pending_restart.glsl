@@ -1,9 +1,8 @@
 // Pending subtrees found again from the root (Foley, Sugerman: KD-Tree Acceleration Structures for a GPU Raytracer,
 // Graphics Hardware 2005). No parent links, and nothing is kept but a bit a level.
 //
-// The paper keeps not even that: it enters the root again where the ray left the leaf. Here planes are widened, so
-// cells overlap: at that t the old leaf would be entered anew, and stepping past it could lose a cell that the ray only
-// touches. The bits are the trail of the way down (Laine: Restart Trail for Stackless BVH Traversal, HPG 2010), read as
+// The paper keeps not even that: it enters the root again where the ray left the leaf. But cells that meet in one t have
+// to be told apart, lest the old leaf be entered for ever. The bits are the trail of the way down (Laine: Restart Trail for Stackless BVH Traversal, HPG 2010), read as
 // pending_mask.glsl writes them: at a set bit the way went to the first child; at one that is not set to the second,
 // where the ray enters it at all. Each restart clears the lowest set bit and only sets lower ones: it ends.
 
@@ -14,19 +13,11 @@ void retrace(TraversalRay ray, inout Cell cell) {
     cell.node_ix = 0u;
     cell.t_exit = ray.t_exit;
     for (cell.depth = 1u; cell.depth <= depth; ++cell.depth) {
-        KdNode node = kd_nodes[cell.node_ix];
-        vec2 t_cross = crossing(ray, node);
-        bool in_second = t_cross.x <= cell.t_exit;
+        KdNode node = kd_node(cell.node_ix);
+        float t_cross = crossing(ray, node);
+        bool in_second = t_cross <= cell.t_exit;
         cell.node_ix = first_child(ray, node) ^ (in_second && !is_pending(cell.depth) ? 1u : 0u);
-        if (is_pending(cell.depth)) cell.t_exit = min(cell.t_exit, t_cross.y);
+        if (is_pending(cell.depth)) cell.t_exit = min(cell.t_exit, t_cross);
     }
     cell.depth = depth;
-}
-
-// t_exit is not cut off at t_best: the trail depends on it.
-bool restart_pop(TraversalRay ray, float t_best, inout Cell cell) {
-    cell.t_enter = cell.t_exit - ray.overlap;
-    if (pending_mask == uvec2(0u) || t_best < cell.t_enter) return false;
-    retrace(ray, cell);
-    return true;
 }

@@ -1,31 +1,38 @@
-// The newest pending subtrees on a short stack, a ring; older ones, which it has lost, by a restart (Horn, Sugerman,
-// Houston, Hanrahan: Interactive k-D Tree GPU Raytracing, I3D 2007). Most rays never need one.
-//
-// The mask counts what is pending, so that nothing is visited twice; the paper restarts where the ray left the leaf.
+// The newest pending subtrees on a short stack, a ring; older ones, which it has lost, by the mask: up to them by parent
+// links, or down to them from the root (Horn, Sugerman, Houston, Hanrahan: Interactive k-D Tree GPU Raytracing, I3D 2007;
+// there the ray restarts where it left the leaf). Most rays lose none.
 
-layout(constant_id = 3) const uint SHORT_STACK_SIZE = 4u;
+layout(constant_id = 3) const uint SHORT_STACK_SIZE = 8u;
 // Node, and the bits of where the ray leaves it.
 uvec2 short_stack[SHORT_STACK_SIZE];
 // Where the next entry goes, and how many are kept.
 uint short_stack_top;
 uint short_stack_size;
 
-void short_stack_push(uint second_ix, Cell cell, vec2 t_cross) {
-    mask_push(second_ix, cell, t_cross);
-    short_stack[short_stack_top] = uvec2(second_ix, floatBitsToUint(cell.t_exit));
-    short_stack_top = (short_stack_top + 1u) % SHORT_STACK_SIZE;
+void short_stack_push(uint second_ix, float t_exit) {
+    short_stack[short_stack_top % SHORT_STACK_SIZE] = uvec2(second_ix, floatBitsToUint(t_exit));
+    short_stack_top += 1u;
     short_stack_size = min(short_stack_size + 1u, SHORT_STACK_SIZE);
 }
 
-bool short_stack_pop(TraversalRay ray, float t_best, inout Cell cell) {
-    if (short_stack_size == 0u) return restart_pop(ray, t_best, cell);
-    cell.t_enter = cell.t_exit - ray.overlap;
-    if (t_best < cell.t_enter) return false;
+void short_stack_pop(inout Cell cell) {
     short_stack_size -= 1u;
-    short_stack_top = (short_stack_top + SHORT_STACK_SIZE - 1u) % SHORT_STACK_SIZE;
-    cell.node_ix = short_stack[short_stack_top].x;
-    cell.t_exit = uintBitsToFloat(short_stack[short_stack_top].y);
-    cell.depth = deepest_pending();
+    short_stack_top -= 1u;
+    uvec2 entry = short_stack[short_stack_top % SHORT_STACK_SIZE];
+    cell = Cell(entry.x, deepest_pending(), cell.t_enter, uintBitsToFloat(entry.y));
     pending_mask &= ~bit_of(cell.depth);
+}
+
+void marked_push(uint second_ix, Cell cell) {
+    pending_mask |= bit_of(cell.depth);
+    if (TRAVERSAL != TRAVERSAL_RESTART) short_stack_push(second_ix, cell.t_exit);
+}
+
+bool marked_pop(TraversalRay ray, float t_best, inout Cell cell) {
+    cell.t_enter = cell.t_exit;
+    if (pending_mask == uvec2(0u) || t_best < cell.t_enter) return false;
+    if (short_stack_size > 0u) short_stack_pop(cell);
+    else if (TRAVERSAL == TRAVERSAL_MASK) climb(ray, cell);
+    else retrace(ray, cell);
     return true;
 }

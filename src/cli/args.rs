@@ -5,7 +5,7 @@ use std::{path::PathBuf, str::FromStr};
 use clap::{Parser, Subcommand, value_parser};
 use kdray::{
     cast::Query,
-    frame::{Crop, RenderOptions, Traversal},
+    frame::{Aov, Crop, RenderOptions, Traversal},
     gpu::DeviceSelector,
     scene::RenderDefaults,
 };
@@ -52,6 +52,9 @@ pub struct RenderArgs {
     /// Samples a pixel, 1 to 65536: the first at its centre, more of them smooth edges
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..=65_536))]
     pub spp: u32,
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(help = format!("What else to write of each pixel, as layers of an .exr, with commas: {}", Aov::words()))]
+    pub aov: Vec<Aov>,
     #[command(flatten)]
     pub picture: PictureArgs,
     /// Render on the CPU, without Vulkan
@@ -143,7 +146,7 @@ impl RenderArgs {
                 "--crop {crop} reaches beyond the picture of {width}x{height} pixels"
             )));
         }
-        Ok(RenderOptions { crop: self.crop, ..options })
+        Ok(RenderOptions { crop: self.crop, features: !self.aov.is_empty(), ..options })
     }
 }
 

@@ -58,6 +58,7 @@ impl PictureArgs {
             denoise: self.denoise(scene.denoise),
             traversal: self.traversal,
             primary: self.primary,
+            features: false,
         }
     }
 

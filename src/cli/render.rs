@@ -1,13 +1,17 @@
 //! `kdray render`: scene file to picture.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
 
 use kdray::{
     cpu::{self, Batching},
-    frame::{Picture, Profile, RenderOptions},
+    frame::{Aov, Picture, Profile, RenderOptions},
     gpu::{Context, ContextOptions, GpuError},
     kdtree::{BuildOptions, KdTree},
-    output::{self, Format},
+    layout::Feature,
+    output::{self, Format, HeatMap},
     render::Renderer,
     scene::Scene,
 };
@@ -31,7 +35,10 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let (scene, load_ms) = progress.stage(&format!("loading {}", args.scene.display()), || Scene::load(&args.scene));
     let scene = scene?;
     let picture_path = args.output.clone().unwrap_or_else(|| default_output(&scene.name));
-    output::check(&picture_path)?;
+    let extra = ExtraFiles::of(&picture_path, &args.aov);
+    for path in extra.layers.iter().chain(&extra.heat_map).chain([&picture_path]) {
+        output::check(path)?;
+    }
     let options = args.options(&scene.defaults)?;
     let device = ContextOptions { device: args.device.clone(), validate: args.validate };
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
@@ -45,12 +52,16 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let frame = FrameToDraw { scene: &scene, tree: &tree, options: &options, n_samples: args.spp };
     let mut steps = progress.steps(&rendering, args.spp * u32::from(args.repeat));
     let (drawn, render_ms) = progress.stage(&rendering, || frame.draw(context.as_ref(), args.repeat, &mut steps));
-    let (picture, profiles) = drawn?;
-    output::write_picture(&picture_path, &picture)?;
+    let Drawn { picture, features, profiles } = drawn?;
+    extra.write(&args.aov, &picture, &features)?;
+    if extra.layers.as_ref() != Some(&picture_path) {
+        output::write_picture(&picture_path, &picture)?;
+    }
     drop(progress);
 
     let report = Report {
         scene: scene.name,
+        extra_files: extra.beside(&picture_path),
         picture: picture_path,
         options: (&options).into(),
         samples: args.spp,
@@ -105,42 +116,94 @@ struct FrameToDraw<'a> {
 
 impl FrameToDraw<'_> {
     /// Draws the frame so many times, on the device or on the CPU for want of one. The pictures are all the same.
-    fn draw(
-        &self,
-        context: Option<&Arc<Context>>,
-        n_times: u16,
-        steps: &mut Steps,
-    ) -> Result<(Picture, Vec<Profile>), GpuError> {
-        let mut profiles = Vec::new();
+    fn draw(&self, context: Option<&Arc<Context>>, n_times: u16, steps: &mut Steps) -> Result<Drawn, GpuError> {
+        let with_features = self.options.features;
+        let (mut profiles, mut features) = (Vec::new(), Vec::new());
         let Some(context) = context else {
             let mut renderer = cpu::Renderer::new(self.scene, self.tree, self.options, Batching::default());
             for _ in 0..n_times {
                 renderer.reset_samples();
-                profiles.push(self.add_up(steps, || Ok(renderer.draw_sample()))?);
+                profiles.push(self.add_up(steps, |sample_ix| {
+                    let profile = renderer.draw_sample();
+                    if with_features && sample_ix == 0 {
+                        features = renderer.features();
+                    }
+                    Ok(profile)
+                })?);
             }
-            return Ok((renderer.picture(), profiles));
+            return Ok(Drawn { picture: renderer.picture(), features, profiles });
         };
         let mut renderer = Renderer::new(Arc::clone(context), self.scene, self.tree, self.options)?;
         for _ in 0..n_times {
             renderer.reset_samples();
-            profiles.push(self.add_up(steps, || renderer.draw_sample())?);
+            profiles.push(self.add_up(steps, |sample_ix| {
+                let profile = renderer.draw_sample()?;
+                if with_features && sample_ix == 0 {
+                    features = renderer.features()?;
+                }
+                Ok(profile)
+            })?);
         }
-        Ok((renderer.picture()?, profiles))
+        Ok(Drawn { picture: renderer.picture()?, features, profiles })
     }
 
     /// Draws all samples; their profiles together.
     fn add_up(
         &self,
         steps: &mut Steps,
-        mut draw_sample: impl FnMut() -> Result<Profile, GpuError>,
+        mut draw_sample: impl FnMut(u32) -> Result<Profile, GpuError>,
     ) -> Result<Profile, GpuError> {
-        let mut sum = draw_sample()?;
+        let mut sum = draw_sample(0)?;
         steps.step();
-        for _ in 1..self.n_samples {
-            sum.add(&draw_sample()?);
+        for sample_ix in 1..self.n_samples {
+            sum.add(&draw_sample(sample_ix)?);
             steps.step();
         }
         Ok(sum)
+    }
+}
+
+/// What comes of it.
+struct Drawn {
+    picture: Picture,
+    /// Of the first sample, at the pixels' centres; empty where the options do not ask for them.
+    features: Vec<Feature>,
+    /// One a repetition.
+    profiles: Vec<Profile>,
+}
+
+/// What is written beside the picture.
+struct ExtraFiles {
+    /// The picture with layers; the picture itself where that is an .exr.
+    layers: Option<PathBuf>,
+    /// The costs in colours.
+    heat_map: Option<PathBuf>,
+}
+
+impl ExtraFiles {
+    fn of(picture: &Path, aovs: &[Aov]) -> Self {
+        let is_exr = picture.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
+        let layers = if is_exr { picture.to_owned() } else { picture.with_extension("exr") };
+        Self {
+            layers: (!aovs.is_empty()).then_some(layers),
+            heat_map: aovs.contains(&Aov::Cost).then(|| picture.with_extension("cost.png")),
+        }
+    }
+
+    fn write(&self, aovs: &[Aov], picture: &Picture, features: &[Feature]) -> Result<(), CliError> {
+        if let Some(path) = &self.layers {
+            output::write_layers(path, picture, aovs, features)?;
+        }
+        if let Some(path) = &self.heat_map {
+            let values = features.iter().map(|feature| feature.n_steps).collect();
+            HeatMap { title: "steps a pixel", width: picture.width, height: picture.height, values }.write(path)?;
+        }
+        Ok(())
+    }
+
+    /// All but the picture.
+    fn beside(self, picture: &Path) -> Vec<PathBuf> {
+        self.layers.into_iter().chain(self.heat_map).filter(|path| path != picture).collect()
     }
 }
 

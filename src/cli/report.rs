@@ -18,6 +18,8 @@ const TRACING: [&str; 4] = ["visibility", "primary_hit", "trace", "shadow"];
 pub struct Report {
     pub scene: String,
     pub picture: PathBuf,
+    /// Written beside it.
+    pub extra_files: Vec<PathBuf>,
     pub options: Options,
     /// A pixel.
     pub samples: u32,
@@ -198,7 +200,10 @@ impl Report {
         text += &self.frame.passes_text();
         text.push('\n');
         text += &self.frame.bounces_text();
-        text += &format!("\nwrote {}\n", self.picture.display());
+        text.push('\n');
+        for path in self.extra_files.iter().chain([&self.picture]) {
+            text += &format!("wrote {}\n", path.display());
+        }
         text
     }
 

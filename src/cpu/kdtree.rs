@@ -1,13 +1,15 @@
 //! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree.glsl`.
 
+use glam::Vec3;
+
 use super::{
-    bindings::Bindings, brute, pending_backtrack::PendingBacktrack, pending_mask::PendingMask,
-    pending_mask_boxes::PendingMaskBoxes, pending_restart::PendingRestart, pending_short_stack::PendingShortStack,
+    bindings::Bindings, brute, pending_backtrack::PendingBacktrack, pending_mask::Climb,
+    pending_mask_boxes::PendingMaskBoxes, pending_restart::Retrace, pending_short_stack::PendingMarked,
     pending_stack::PendingStack, ropes::follow_ropes, table::Reads, triangle::Shear,
 };
 use crate::{
     frame::Traversal,
-    layout::{Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KdNode, NO_TRIANGLE, Ray},
+    layout::{Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_ORIGIN_REACH, KdNode, NO_TRIANGLE, Ray},
 };
 
 /// A node and the interval that the ray spends in it.
@@ -24,15 +26,11 @@ pub struct Cell {
 pub struct TraversalRay {
     shear: Shear,
     pub(super) inv_direction: [f32; 4],
-    /// Where the ray enters the widened plane at 0 on each axis, in t.
+    /// Where the ray meets the plane at 0 on each axis, in t.
     pub(super) bias: [f32; 4],
-    /// Of a widened plane, in world units.
-    pub(super) width: f32,
     t_min: f32,
     pub t_enter: f32,
     pub t_exit: f32,
-    /// A pending cell begins at most this far before a deeper one.
-    pub overlap: f32,
     source_triangle: u32,
 }
 
@@ -57,35 +55,27 @@ impl TraversalRay {
         // A direction in the plane is taken as all but in it: finite everywhere, and one rule for all ties.
         let direction = ray.direction.to_array().map(|d| if d.abs() < 1e-12 { 1e-12 } else { d });
         let inv_direction = direction.map(|d| 1.0 / d);
-        let reach = [0, 1, 2]
-            .map(|i| max(origin[i].abs(), max((cell_min[i] - origin[i]).abs(), (cell_max[i] - origin[i]).abs())));
-        let slack_world = max(reach[0], max(reach[1], reach[2])) * 2f32.powi(-20);
-        let slack = inv_direction.map(|inv| slack_world * inv.abs());
-
-        let t0 = [0, 1, 2].map(|i| (cell_min[i] - origin[i]) * inv_direction[i]);
-        let t1 = [0, 1, 2].map(|i| (cell_max[i] - origin[i]) * inv_direction[i]);
-        let near = [0, 1, 2].map(|i| min(t0[i], t1[i]) - slack[i]);
-        let far = [0, 1, 2].map(|i| max(t0[i], t1[i]) + slack[i]);
+        let bias = [0, 1, 2].map(|i| -origin[i] * inv_direction[i]);
+        let t0 = [0, 1, 2].map(|i| cell_min[i] * inv_direction[i] + bias[i]);
+        let t1 = [0, 1, 2].map(|i| cell_max[i] * inv_direction[i] + bias[i]);
+        let near = [0, 1, 2].map(|i| min(t0[i], t1[i]));
+        let far = [0, 1, 2].map(|i| max(t0[i], t1[i]));
         Self {
             shear: Shear::of(origin, ray.direction.to_array()),
             inv_direction: by_axis(inv_direction),
-            bias: by_axis([0, 1, 2].map(|i| -origin[i] * inv_direction[i] - slack[i])),
-            width: 2.0 * slack_world,
+            bias: by_axis(bias),
             t_min,
             t_enter: max(max(near[0], near[1]), max(near[2], t_min)),
             t_exit: min(min(far[0], far[1]), min(far[2], ray.t_max)),
-            overlap: 2.0 * (slack[0] + slack[1] + slack[2]),
             source_triangle: ray.source_triangle,
         }
     }
 
-    /// Where the ray enters the second child's side and leaves the first one's, both widened by the slack.
+    /// Where the ray meets the split plane.
     #[inline(always)]
-    pub fn crossing(&self, node: KdNode) -> [f32; 2] {
+    pub fn crossing(&self, node: KdNode) -> f32 {
         let axis = axis_of(node) as usize;
-        let inv_direction = self.inv_direction[axis];
-        let t = f32::from_bits(node.split_or_first) * inv_direction + self.bias[axis];
-        [t, inv_direction.abs() * self.width + t]
+        f32::from_bits(node.split_or_first) * self.inv_direction[axis] + self.bias[axis]
     }
 
     /// The child on the side that the ray comes from; the other is `^ 1`.
@@ -94,6 +84,18 @@ impl TraversalRay {
         let first_is_above = u32::from(self.inv_direction[axis_of(node) as usize] < 0.0);
         (node.axis_and_child >> KD_CHILD_SHIFT) + first_is_above
     }
+}
+
+/// The ray with its origin moved along it to lie within `KD_ORIGIN_REACH`, and how far: 0 for all but cameras far away.
+#[inline(always)]
+pub fn near_scene(bindings: &Bindings<impl Reads>, ray: &Ray) -> (Ray, f32) {
+    let largest = |v: Vec3| v.abs().max_element();
+    let reach = KD_ORIGIN_REACH * largest(bindings.frame.cell_min).max(largest(bindings.frame.cell_max));
+    if largest(ray.origin) <= reach {
+        return (*ray, 0.0);
+    }
+    let t_start = max(TraversalRay::new(bindings, ray, 0.0).t_enter, 0.0);
+    (Ray { origin: ray.origin + t_start * ray.direction, t_max: ray.t_max - t_start, ..*ray }, t_start)
 }
 
 fn by_axis([x, y, z]: [f32; 3]) -> [f32; 4] {
@@ -110,7 +112,7 @@ pub fn axis_of(node: KdNode) -> u32 {
 pub trait Pending {
     fn new() -> Self;
     fn clear(&mut self);
-    fn push(&mut self, second_ix: u32, cell: &Cell, t_cross: [f32; 2]);
+    fn push(&mut self, second_ix: u32, cell: &Cell);
     /// The next pending cell that may hold a hit nearer than `t_best`, or false.
     fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool;
 }
@@ -127,13 +129,13 @@ fn descend<P: Pending>(
     while axis_of(node) != KD_LEAF {
         let t_cross = ray.crossing(node);
         let first_ix = ray.first_child(node);
-        let in_first = t_cross[1] >= cell.t_enter;
-        let in_second = t_cross[0] <= cell.t_exit;
+        let in_first = t_cross >= cell.t_enter;
+        let in_second = t_cross <= cell.t_exit;
         cell.depth += 1;
         cell.node_ix = if in_second && !in_first { first_ix ^ 1 } else { first_ix };
         if in_first && in_second {
-            pending.push(first_ix ^ 1, cell, t_cross);
-            cell.t_exit = min(cell.t_exit, t_cross[1]);
+            pending.push(first_ix ^ 1, cell);
+            cell.t_exit = t_cross;
         }
         node = bindings.kd_nodes[cell.node_ix as usize];
     }
@@ -191,12 +193,12 @@ pub(super) fn search<P: Pending, const ANY_HIT: bool>(
 /// A traversal that remembers its working memory from ray to ray; one for each thread.
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
 pub enum Traverser {
-    Mask(PendingMask),
+    Mask(PendingMarked<Climb, 8>),
     MaskBoxes(PendingMaskBoxes),
-    Restart(PendingRestart),
+    Restart(PendingMarked<Retrace, 0>),
     Backtrack(PendingBacktrack),
-    ShortStack(PendingShortStack<4>),
-    Ropes(PendingMask),
+    ShortStack(PendingMarked<Retrace, 8>),
+    Ropes,
     Stack(PendingStack),
     Brute,
 }
@@ -209,7 +211,7 @@ impl Traverser {
             Traversal::Restart => Self::Restart(Pending::new()),
             Traversal::Backtrack => Self::Backtrack(Pending::new()),
             Traversal::ShortStack => Self::ShortStack(Pending::new()),
-            Traversal::Ropes => Self::Ropes(Pending::new()),
+            Traversal::Ropes => Self::Ropes,
             Traversal::Stack => Self::Stack(Pending::new()),
             Traversal::Brute => Self::Brute,
         }
@@ -230,18 +232,20 @@ impl Traverser {
     /// The closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
     #[inline]
     pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl Reads>, ray_in: &Ray, t_min: f32) -> Hit {
-        let mut best = Hit { t: ray_in.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
-        let ray = &TraversalRay::new(bindings, ray_in, t_min);
+        let (near, t_start) = near_scene(bindings, ray_in);
+        let mut best = Hit { t: near.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
+        let ray = &TraversalRay::new(bindings, &near, t_min - t_start);
         match self {
             Self::Mask(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
             Self::MaskBoxes(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
             Self::Restart(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
             Self::Backtrack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
             Self::ShortStack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
-            Self::Ropes(pending) => follow_ropes::<ANY_HIT>(bindings, ray, pending, &mut best),
+            Self::Ropes => follow_ropes::<ANY_HIT>(bindings, ray, &mut best),
             Self::Stack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
-            Self::Brute => best = brute::closest_hit_beyond(bindings.triangles, ray_in, t_min),
+            Self::Brute => best = brute::closest_hit_beyond(bindings.triangles, &near, t_min - t_start),
         }
+        best.t = if best.triangle_ix == NO_TRIANGLE { ray_in.t_max } else { best.t + t_start };
         best
     }
 }

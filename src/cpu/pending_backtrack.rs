@@ -17,19 +17,19 @@ impl Pending for PendingBacktrack {
     fn clear(&mut self) {}
 
     #[inline(always)]
-    fn push(&mut self, _: u32, _: &Cell, _: [f32; 2]) {}
+    fn push(&mut self, _: u32, _: &Cell) {}
 
     #[inline(always)]
     fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
-        // What has not been visited begins at most `ray.overlap` before the leaf's end.
-        if t_best < cell.t_exit - ray.overlap {
+        // What has not been visited begins where the leaf ends, or later.
+        if t_best < cell.t_exit {
             return false;
         }
         while cell.node_ix != 0 {
             let parent_ix = bindings.kd_parents[cell.node_ix as usize >> 1];
             let parent = bindings.kd_nodes[parent_ix as usize];
             if cell.node_ix == ray.first_child(parent) {
-                let [t_enter, _] = ray.crossing(parent);
+                let t_enter = ray.crossing(parent);
                 let [_, t_exit] = ray.interval_in(bindings, parent_ix);
                 if t_enter <= min(t_exit, t_best) {
                     cell.node_ix ^= 1;

@@ -2,83 +2,65 @@
 
 use super::{
     bindings::Bindings,
-    kdtree::{Cell, Pending, TraversalRay, max, min},
+    kdtree::{Cell, TraversalRay},
     table::Reads,
 };
 
-/// Which siblings on the way to the root are still to be visited.
-pub struct PendingMask {
-    /// Bit d - 1: depth d. One word here for the kernel's two.
-    pub(super) mask: u64,
-    /// The deepest pending node and where the ray enters it.
-    deepest_ix: u32,
-    t_deepest: f32,
-}
+/// Which siblings on the way to the root are still to be visited. Bit d - 1: depth d; one word for the kernel's two.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Mask(pub u64);
 
 #[inline(always)]
-pub(super) fn bit_of(depth: u32) -> u64 {
+pub fn bit_of(depth: u32) -> u64 {
     1 << ((depth - 1) & 63)
 }
 
-impl PendingMask {
-    /// Depth of the highest bit; the mask is not empty.
+impl Mask {
     #[inline(always)]
-    pub(super) fn deepest(&self) -> u32 {
-        64 - self.mask.leading_zeros()
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
     }
 
-    /// Finds the pending node above `cell`, and with it where the cell ends; none: at the root cell's exit.
     #[inline(always)]
-    fn climb(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, cell: &mut Cell) {
-        cell.t_exit = ray.t_exit;
-        if self.mask == 0 {
-            return;
-        }
-        let parent_of = |node_ix: u32| bindings.kd_parents[(node_ix >> 1) as usize];
-        let mut path_ix = cell.node_ix;
-        for _ in self.deepest()..cell.depth {
-            path_ix = parent_of(path_ix);
-        }
-        self.deepest_ix = path_ix ^ 1;
-        let t_cross = ray.crossing(bindings.kd_nodes[parent_of(path_ix) as usize]);
-        self.t_deepest = t_cross[0];
-        cell.t_exit = min(cell.t_exit, t_cross[1]);
+    pub fn has(self, depth: u32) -> bool {
+        self.0 & bit_of(depth) != 0
+    }
+
+    /// Depth of the highest bit; the mask is not empty.
+    #[inline(always)]
+    pub fn deepest(self) -> u32 {
+        64 - self.0.leading_zeros()
+    }
+
+    /// Takes the highest bit away, and returns its depth.
+    #[inline(always)]
+    pub fn take_deepest(&mut self) -> u32 {
+        let depth = self.deepest();
+        self.0 &= !bit_of(depth);
+        depth
     }
 }
 
-impl Pending for PendingMask {
-    fn new() -> Self {
-        Self { mask: 0, deepest_ix: 0, t_deepest: 0.0 }
-    }
+/// How a pending node is found that no stack has kept.
+pub trait WayBack {
+    /// The deepest pending node, which is pending no more, and where the ray leaves it. `cell` is the leaf just left.
+    fn find(mask: &mut Mask, bindings: &Bindings<impl Reads>, ray: &TraversalRay, cell: &mut Cell);
+}
 
-    #[inline(always)]
-    fn clear(&mut self) {
-        self.mask = 0;
-    }
+/// Up by parent links, and on to the plane where the cell ends.
+pub struct Climb;
 
+impl WayBack for Climb {
     #[inline(always)]
-    fn push(&mut self, second_ix: u32, cell: &Cell, t_cross: [f32; 2]) {
-        self.mask |= bit_of(cell.depth);
-        self.deepest_ix = second_ix;
-        self.t_deepest = t_cross[0];
-    }
-
-    #[inline(always)]
-    fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
-        while self.mask != 0 {
-            if t_best < self.t_deepest - ray.overlap {
-                return false;
-            }
-            cell.node_ix = self.deepest_ix;
-            cell.depth = self.deepest();
-            cell.t_enter = max(self.t_deepest, ray.t_enter);
-            self.mask &= !bit_of(cell.depth);
-            self.climb(bindings, ray, cell);
-            cell.t_exit = min(cell.t_exit, t_best);
-            if cell.t_enter <= t_best {
-                return true;
-            }
+    fn find(mask: &mut Mask, bindings: &Bindings<impl Reads>, ray: &TraversalRay, cell: &mut Cell) {
+        let parent_of = |node_ix: u32| bindings.kd_parents[(node_ix >> 1) as usize];
+        let ancestor_of = |node_ix: u32, n_levels: u32| (0..n_levels).fold(node_ix, |ix, _| parent_of(ix));
+        let depth = mask.take_deepest();
+        let path_ix = ancestor_of(cell.node_ix, cell.depth - depth);
+        *cell = Cell { node_ix: path_ix ^ 1, depth, t_exit: ray.t_exit, ..*cell };
+        if !mask.is_empty() {
+            let next_ix = ancestor_of(path_ix, depth - mask.deepest());
+            cell.t_exit = ray.crossing(bindings.kd_nodes[parent_of(next_ix) as usize]);
         }
-        false
     }
 }

@@ -23,12 +23,12 @@ impl Pending for PendingMaskBoxes {
     }
 
     #[inline(always)]
-    fn push(&mut self, _: u32, _: &Cell, _: [f32; 2]) {}
+    fn push(&mut self, _: u32, _: &Cell) {}
 
     #[inline(always)]
     fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
-        // What has not been visited begins at most `ray.overlap` before the leaf's end.
-        if t_best < cell.t_exit - ray.overlap {
+        // What has not been visited begins where the leaf ends, or later.
+        if t_best < cell.t_exit {
             return false;
         }
         while cell.depth > 0 {

@@ -2,13 +2,13 @@
 
 use super::{
     bindings::Bindings,
-    kdtree::{Cell, Pending, TraversalRay, min},
+    kdtree::{Cell, Pending, TraversalRay},
     table::Reads,
 };
 use crate::layout::KD_MAX_DEPTH;
 
 /// Node and exit of each pending subtree. Where one begins is not kept: it is where the ray has just left the cell before
-/// it, or `overlap` earlier.
+/// it.
 pub struct PendingStack {
     entries: [(u32, f32); KD_MAX_DEPTH as usize],
     size: usize,
@@ -25,21 +25,19 @@ impl Pending for PendingStack {
     }
 
     #[inline(always)]
-    fn push(&mut self, second_ix: u32, cell: &Cell, _: [f32; 2]) {
+    fn push(&mut self, second_ix: u32, cell: &Cell) {
         self.entries[self.size] = (second_ix, cell.t_exit);
         self.size += 1;
     }
 
     #[inline(always)]
-    fn pop(&mut self, _: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
-        cell.t_enter = cell.t_exit - ray.overlap;
+    fn pop(&mut self, _: &Bindings<impl Reads>, _: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+        cell.t_enter = cell.t_exit;
         if self.size == 0 || t_best < cell.t_enter {
             return false;
         }
         self.size -= 1;
-        let (node_ix, t_exit) = self.entries[self.size];
-        cell.node_ix = node_ix;
-        cell.t_exit = min(t_exit, t_best);
+        (cell.node_ix, cell.t_exit) = self.entries[self.size];
         true
     }
 }

@@ -7,7 +7,7 @@ use bytemuck::Zeroable;
 use super::{
     accumulate,
     bindings::Bindings,
-    compact, denoise, primary_hit,
+    compact, costs, denoise, features, primary_hit,
     queues::Queues,
     resolve,
     shade::{self, LitRays, Shaded},
@@ -19,7 +19,7 @@ use crate::{
     camera::frame_constants,
     frame::{BounceStats, Picture, Primary, Profile, RenderOptions},
     kdtree::{Extras, KdTree},
-    layout::{Bounce, Frame, Hit, Ray, SCAN_BLOCK_SIZE},
+    layout::{Bounce, Feature, Frame, Hit, Ray, SCAN_BLOCK_SIZE},
     scene::Scene,
 };
 
@@ -55,6 +55,8 @@ pub struct Renderer<'a> {
     pixel_accumulated: Vec<[f32; 4]>,
     pixel_filtered: Vec<[f32; 4]>,
     pixel_display: Vec<[u8; 4]>,
+    /// Empty where the options do not ask for them.
+    pixel_features: Vec<Feature>,
     queues: Queues,
     /// Samples a pixel that the picture holds.
     n_samples: u32,
@@ -79,6 +81,7 @@ impl<'a> Renderer<'a> {
             pixel_accumulated: Vec::new(),
             pixel_filtered: vec![[0.0; 4]; n_pixels],
             pixel_display: vec![[0; 4]; n_pixels],
+            pixel_features: vec![Feature::default(); if options.features { n_pixels } else { 0 }],
             queues: Queues::default(),
             n_samples: 0,
             clock: Clock::start(),
@@ -97,6 +100,7 @@ impl<'a> Renderer<'a> {
         if self.n_samples == 1 {
             self.pixel_accumulated.clone_from(&self.pixel_radiance);
         }
+        self.pixel_features.fill(Feature::default());
         if self.options.primary == Primary::Raster {
             self.visibility();
         }
@@ -125,6 +129,15 @@ impl<'a> Renderer<'a> {
         }
     }
 
+    /// What the rays of each of the picture's pixels met and cost, of the sample drawn last.
+    ///
+    /// # Panics
+    /// The options do not ask for features.
+    pub fn features(&self) -> Vec<Feature> {
+        assert!(self.options.features, "the options ask for features");
+        self.options.window().part(&self.pixel_features, &self.options.crop_or_whole())
+    }
+
     fn visibility(&mut self) {
         let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
         let (traversal, ids) = (self.options.traversal, &mut self.triangle_ids);
@@ -139,6 +152,9 @@ impl<'a> Renderer<'a> {
         self.primary_rays(first_pixel, n_pixels);
         for depth in 0..self.options.max_depth {
             let n_hits = self.closest_hits(depth);
+            if self.options.features {
+                self.note_features(depth);
+            }
             let n_shadow_rays = self.light(depth);
             stats.push(BounceStats { n_rays: self.queues.rays.len() as u64, n_hits, n_shadow_rays });
             if depth + 1 == self.options.max_depth {
@@ -176,6 +192,24 @@ impl<'a> Renderer<'a> {
             self.clock.time("trace", Some(depth), || trace::trace(&bindings, traversal, rays, hits))
         };
         n_hits.into()
+    }
+
+    /// What primary rays meet, and what the rays of any bounce cost. Of a batch that is started over, it forgets what it
+    /// noted.
+    fn note_features(&mut self, depth: u32) {
+        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
+        let (traversal, pixels) = (self.options.traversal, &mut self.pixel_features);
+        let Queues { rays, hits, .. } = &self.queues;
+        if depth == 0 {
+            rays.iter().for_each(|ray| pixels[ray.pixel_ix as usize] = Feature::default());
+            self.clock.time("features", Some(0), || features::features(&bindings, rays, hits, pixels));
+        }
+        if depth == 0 && self.options.primary == Primary::Raster {
+            costs::count_rasterized(rays, hits, pixels);
+        } else {
+            costs::count_closest(&bindings, traversal, rays, pixels);
+        }
+        costs::count_shadow(&bindings, traversal, rays, hits, pixels);
     }
 
     /// Shadows, shading and the children, resolved to pixels; returns how many shadow segments were tested.

@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// The segment to the light, or none where the surface turns its back on it.
-fn shadow_segment(bindings: &Bindings, ray: &Ray, hit: &Hit, light: &Light) -> Option<Ray> {
+pub(super) fn shadow_segment(bindings: &Bindings, ray: &Ray, hit: &Hit, light: &Light) -> Option<Ray> {
     let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
     let to_light = sample_light(light, surface.point_world);
     // Not `<=`: a NaN is unlit.

@@ -278,6 +278,12 @@ impl Commands<'_> {
         unsafe { self.context.device.cmd_update_buffer(self.raw, destination.raw(), 0, bytes) };
     }
 
+    /// Fills a buffer with zeros.
+    pub fn clear_buffer(&self, buffer: &AnyBuffer) {
+        // SAFETY: the commands are being recorded, outside rendering.
+        unsafe { self.context.device.cmd_fill_buffer(self.raw, buffer.raw(), 0, vk::WHOLE_SIZE, 0) };
+    }
+
     /// Copies the first `bytes`.
     pub fn copy_buffer(&self, source: &AnyBuffer, destination: &AnyBuffer, bytes: u64) {
         let region = [vk::BufferCopy::default().size(bytes)];

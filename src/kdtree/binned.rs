@@ -182,49 +182,43 @@ impl BinnedSearch {
                 if bin != last_bin {
                     (n_below, n_above, last_bin) = (self.n_below[axis][bin], self.n_above[axis][bin], bin);
                 }
-                let mut n = [0; 3];
-                in_plane.iter().for_each(|event| n[event.kind()] += 1);
-                let [n_ends, n_planar, n_begins] = n;
-                n_above -= n_ends + n_planar;
+                let n_begins = in_plane.iter().filter(|event| event.is_begin()).count() as u32;
+                n_above -= in_plane.len() as u32 - n_begins;
                 if position > bins.shares.min && position < bins.shares.max {
-                    let split = bins.shares.split(position, [n_below, n_planar, n_above]);
+                    let split = bins.shares.split(position, [n_below, n_above]);
                     best = if split.weight < best.weight { split } else { best };
                 }
-                n_below += n_begins + n_planar;
+                n_below += n_begins;
             }
         }
         best
     }
 }
 
-/// The end of a triangle's bounds on an axis, as a number that sorts by axis, position, kind.
+/// The begin or end of a triangle's bounds on an axis, as a number that sorts by axis and position.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Event(u64);
 
 impl Event {
-    const END: u64 = 0;
-    const PLANAR: u64 = 1;
-    const BEGIN: u64 = 2;
-
     #[inline]
-    fn new(axis: usize, position: f32, kind: u64) -> Self {
+    fn new(axis: usize, position: f32, is_begin: bool) -> Self {
         // 0.0 - 0.0 for -0.0, which is the same plane; then the usual map of floats to integers of the same order.
         let bits = (position + 0.0).to_bits();
         let ordered = bits ^ if bits >> 31 == 1 { u32::MAX } else { 1 << 31 };
-        Self((axis as u64) << 34 | u64::from(ordered) << 2 | kind)
+        Self((axis as u64) << 33 | u64::from(ordered) << 1 | u64::from(is_begin))
     }
 
     fn axis(self) -> usize {
-        (self.0 >> 34) as usize
+        (self.0 >> 33) as usize
     }
 
     fn position(self) -> f32 {
-        let ordered = (self.0 >> 2) as u32;
+        let ordered = (self.0 >> 1) as u32;
         f32::from_bits(ordered ^ if ordered >> 31 == 0 { u32::MAX } else { 1 << 31 })
     }
 
-    fn kind(self) -> usize {
-        (self.0 & 3) as usize
+    fn is_begin(self) -> bool {
+        self.0 & 1 == 1
     }
 }
 
@@ -250,16 +244,11 @@ fn collect(references: &[Reference], bins: &[Option<Bins>; 3], flags: &PerBin<bo
         let Some(bins) = bins[axis] else { continue };
         for Reference { bounds, .. } in references {
             let (min, max) = (bounds.min[axis], bounds.max[axis]);
-            let (from, to) = (flags[axis][bins.bin(min)], flags[axis][bins.bin(max)]);
-            if from && min == max {
-                events.push(Event::new(axis, min, Event::PLANAR));
-                continue;
+            if flags[axis][bins.bin(min)] {
+                events.push(Event::new(axis, min, true));
             }
-            if from {
-                events.push(Event::new(axis, min, Event::BEGIN));
-            }
-            if to {
-                events.push(Event::new(axis, max, Event::END));
+            if flags[axis][bins.bin(max)] {
+                events.push(Event::new(axis, max, false));
             }
         }
     }

@@ -35,16 +35,18 @@ impl KdTree {
     /// The same triangles and options give the same tree on any number of threads. O(n log n) time; some 200 bytes a
     /// triangle while it runs.
     pub fn build(triangles: &[Triangle], options: &BuildOptions) -> KdTree {
+        let exact_bounds = Bounds::of_all(triangles);
+        let margin = exact_bounds.margin();
         let references: Vec<Reference> = (0..triangles.len() as u32)
             .into_par_iter()
             .filter(|&ix| is_finite(&triangles[ix as usize]))
-            .map(|ix| Reference { bounds: Bounds::of(&triangles[ix as usize]), triangle_ix: ix })
+            .map(|ix| Reference { bounds: Bounds::of(&triangles[ix as usize]).grown(margin), triangle_ix: ix })
             .collect();
-        let bounds = Bounds::of_all(triangles);
+        let bounds = exact_bounds.grown(margin);
         let n = references.len() as u64;
         let budget = (n * u64::from(options.max_references_per_triangle) + MIN_BUDGET).min(MAX_BUDGET.max(n));
         let cell = Cell { bounds, level: 0, budget };
-        flatten(grow(Input { triangles, options }, references, cell), bounds)
+        flatten(grow(Input { triangles, options, margin }, references, cell), bounds)
     }
 }
 

@@ -1,8 +1,7 @@
 //! "Perfect splits" (Havran 2000): the bounds of what a plane leaves of a triangle in a cell on either side.
 //!
-//! Sutherland-Hodgman in f64: coordinates are f32, so a computed point is off by some 2^-52 of them, and rounding
-//! bounds outwards to f32 (2^-24) swallows that unless a coordinate lies within 2^-52 of an f32; the traversal's slack
-//! is larger by far.
+//! Sutherland-Hodgman in f64: coordinates are f32, so a computed point is off by some 2^-52 of them, which the margin is
+//! larger than by far.
 
 use super::bounds::Bounds;
 use crate::layout::Triangle;
@@ -16,17 +15,20 @@ struct Polygon {
     len: usize,
 }
 
-/// Bounds of the parts of `triangle` in `cell` below and above a plane through the cell. None: no more than a touch of
-/// the plane.
-pub fn split_bounds(triangle: &Triangle, cell: &Bounds, axis: usize, position: f32) -> [Option<Bounds>; 2] {
+/// Bounds of the parts of `triangle` below and above a plane through the cell, all grown by a margin: of what comes
+/// within the margin of the cell, and of the plane from its other side. None: no such part.
+pub fn split_bounds(triangle: &Triangle, cell: &Bounds, plane: (usize, f32), margin: f32) -> [Option<Bounds>; 2] {
     let corner = |v: glam::Vec3| v.as_dvec3().to_array();
     let mut polygon = Polygon { corners: [[0.0; 3]; MAX_CORNERS], len: 3 };
     polygon.corners[..3].copy_from_slice(&[corner(triangle.v0), corner(triangle.v1), corner(triangle.v2)]);
+    let margin = f64::from(margin);
     for face in 0..3 {
-        polygon.clip::<false>(face, f64::from(cell.min[face]));
-        polygon.clip::<true>(face, f64::from(cell.max[face]));
+        polygon.clip::<false>(face, f64::from(cell.min[face]) - margin);
+        polygon.clip::<true>(face, f64::from(cell.max[face]) + margin);
     }
-    polygon.sides(axis, f64::from(position))
+    let (axis, position) = (plane.0, f64::from(plane.1));
+    [polygon.bounds_in::<true>(axis, position + margin), polygon.bounds_in::<false>(axis, position - margin)]
+        .map(|part| part.grown(margin))
 }
 
 impl Polygon {
@@ -56,24 +58,19 @@ impl Polygon {
         self.len = (self.len + 1).min(MAX_CORNERS);
     }
 
-    /// Bounds of the parts below and above a plane, rounded outwards; none where a part has no inside.
-    fn sides(&self, axis: usize, position: f64) -> [Option<Bounds>; 2] {
-        let (mut below, mut above) = (Box3::EMPTY, Box3::EMPTY);
+    /// Bounds of the part below (`KEEP_BELOW`) or above a plane.
+    fn bounds_in<const KEEP_BELOW: bool>(&self, axis: usize, position: f64) -> Box3 {
+        let mut part = Box3::EMPTY;
         for ix in 0..self.len {
             let (a, b) = (&self.corners[ix], &self.corners[if ix + 1 == self.len { 0 } else { ix + 1 }]);
-            if a[axis] <= position {
-                below.grow(a);
-            }
-            if a[axis] >= position {
-                above.grow(a);
+            if if KEEP_BELOW { a[axis] <= position } else { a[axis] >= position } {
+                part.grow(a);
             }
             if (a[axis] < position && b[axis] > position) || (a[axis] > position && b[axis] < position) {
-                let point = crossing(a, b, axis, position);
-                below.grow(&point);
-                above.grow(&point);
+                part.grow(&crossing(a, b, axis, position));
             }
         }
-        [(below.min[axis] < position).then(|| below.outwards()), (above.max[axis] > position).then(|| above.outwards())]
+        part
     }
 }
 
@@ -101,9 +98,10 @@ impl Box3 {
         }
     }
 
-    /// The smallest f32 box around it.
-    fn outwards(&self) -> Bounds {
-        Bounds { min: self.min.map(round_down), max: self.max.map(round_up) }
+    /// The smallest f32 box around it and a margin; none around nothing.
+    fn grown(&self, margin: f64) -> Option<Bounds> {
+        let (min, max) = (self.min.map(|x| round_down(x - margin)), self.max.map(|x| round_up(x + margin)));
+        (self.min[0] <= self.max[0]).then_some(Bounds { min, max })
     }
 }
 

@@ -19,8 +19,7 @@ pub fn best_split(references: &[Reference], cell: &Bounds, options: &BuildOption
     let mut best = Split::NONE;
     for axis in 0..3 {
         let Some(shares) = Shares::new(cell, axis, options) else { continue };
-        let planes = Planes::new(references, &shares);
-        let split = if planes.any_planar { planes.best::<true>(&shares) } else { planes.best::<false>(&shares) };
+        let split = Planes::new(references, &shares).best(&shares);
         if split.weight < best.weight {
             best = split;
         }
@@ -36,8 +35,6 @@ struct Planes {
     /// Ends strictly inside the cell, padded with NaN, which no comparison counts and no weight beats.
     positions: [f32; 2 * MAX_REFERENCES + LANES],
     n_positions: usize,
-    /// Some reference lies in a plane inside the cell.
-    any_planar: bool,
 }
 
 impl Planes {
@@ -48,40 +45,33 @@ impl Planes {
             n_references: references.len(),
             positions: [f32::NAN; 2 * MAX_REFERENCES + LANES],
             n_positions: 0,
-            any_planar: false,
         };
         let mut n_positions = 0;
         for (ix, reference) in references.iter().enumerate() {
             let (min, max) = (reference.bounds.min[shares.axis], reference.bounds.max[shares.axis]);
             planes.min[ix] = min;
             planes.max[ix] = max;
-            let planar = min == max;
-            let min_inside = min > shares.min && min < shares.max;
-            planes.any_planar |= planar && min_inside;
             // Written always, kept where inside: no branch.
             planes.positions[n_positions] = min;
-            n_positions += usize::from(min_inside);
+            n_positions += usize::from(min > shares.min && min < shares.max);
             planes.positions[n_positions] = max;
-            n_positions += usize::from(max > shares.min && max < shares.max && !planar);
+            n_positions += usize::from(max > shares.min && max < shares.max);
         }
         planes.positions[n_positions..][..LANES].fill(f32::NAN);
         planes.n_positions = n_positions;
         planes
     }
 
-    /// The cheapest plane. `PLANAR`: some references may lie in it.
-    fn best<const PLANAR: bool>(&self, shares: &Shares) -> Split {
+    /// The cheapest plane.
+    fn best(&self, shares: &Shares) -> Split {
         let mut best = Split::NONE;
         for first in (0..self.n_positions).step_by(LANES) {
             let positions: &[f32; LANES] = self.positions[first..][..LANES].try_into().expect("padded");
-            let (mut below, mut above, mut planar) = ([0u32; LANES], [0u32; LANES], [0u32; LANES]);
+            let (mut below, mut above) = ([0u32; LANES], [0u32; LANES]);
             for (&min, &max) in self.min[..self.n_references].iter().zip(&self.max[..self.n_references]) {
                 for lane in 0..LANES {
                     below[lane] += u32::from(min < positions[lane]);
                     above[lane] += u32::from(max > positions[lane]);
-                    if PLANAR {
-                        planar[lane] += u32::from((min == positions[lane]) & (max == positions[lane]));
-                    }
                 }
             }
             let mut weights = [0.0; LANES];
@@ -90,10 +80,8 @@ impl Planes {
                 weights[lane] = shares.weight(fraction, below[lane] as f32, above[lane] as f32);
             }
             for lane in 0..LANES {
-                // Triangles in the plane, not weighed yet, can only add.
                 if weights[lane] < best.weight {
-                    let split = shares.split(positions[lane], [below[lane], planar[lane], above[lane]]);
-                    best = if split.weight < best.weight { split } else { best };
+                    best = shares.split(positions[lane], [below[lane], above[lane]]);
                 }
             }
         }

@@ -16,8 +16,6 @@ const MIN_EXTENT: f64 = f32::MIN_POSITIVE as f64 * 2048.0;
 pub struct Split {
     pub axis: usize,
     pub position: f32,
-    /// Triangles that lie in the plane go below, otherwise above.
-    pub planar_below: bool,
     /// Expected ray-triangle tests of a ray through the cell, after the bonus for cutting off empty space.
     pub weight: f32,
     /// Triangles below and above; both sides count those that straddle the plane.
@@ -26,8 +24,7 @@ pub struct Split {
 
 impl Split {
     /// Worse than any other.
-    pub const NONE: Self =
-        Self { axis: 0, position: 0.0, planar_below: true, weight: f32::INFINITY, n_references: [0; 2] };
+    pub const NONE: Self = Self { axis: 0, position: 0.0, weight: f32::INFINITY, n_references: [0; 2] };
 }
 
 /// The shares of a cell's surface on either side of a plane: linear in the plane's position.
@@ -88,19 +85,10 @@ impl Shares {
         factor * (below * n_below + above * n_above)
     }
 
-    /// The split at a position strictly inside the cell, with so many triangles below, in its plane and above.
+    /// The split at a position strictly inside the cell, with so many triangles below and above.
     #[inline]
-    pub fn split(&self, position: f32, [n_below, n_planar, n_above]: [u32; 3]) -> Split {
-        let fraction = self.fraction(position);
-        let if_below = self.weight(fraction, (n_below + n_planar) as f32, n_above as f32);
-        let if_above = self.weight(fraction, n_below as f32, (n_above + n_planar) as f32);
-        let planar_below = if_below <= if_above;
-        Split {
-            axis: self.axis,
-            position,
-            planar_below,
-            weight: if planar_below { if_below } else { if_above },
-            n_references: if planar_below { [n_below + n_planar, n_above] } else { [n_below, n_above + n_planar] },
-        }
+    pub fn split(&self, position: f32, n_references: [u32; 2]) -> Split {
+        let weight = self.weight(self.fraction(position), n_references[0] as f32, n_references[1] as f32);
+        Split { axis: self.axis, position, weight, n_references }
     }
 }

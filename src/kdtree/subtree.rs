@@ -16,6 +16,8 @@ use crate::layout::{KdNode, Triangle};
 pub struct Input<'a> {
     pub triangles: &'a [Triangle],
     pub options: &'a BuildOptions,
+    /// How far from a cell a triangle is still taken as in it, world units.
+    pub margin: f32,
 }
 
 /// A cell to be built, without its references.
@@ -59,16 +61,14 @@ impl Cell {
 /// The reference's parts below and above a split of its cell.
 #[inline]
 pub fn sort_out(input: Input, reference: &Reference, cell: &Bounds, split: &Split) -> [Option<Reference>; 2] {
-    let (min, max) = (reference.bounds.min[split.axis], reference.bounds.max[split.axis]);
-    let is_planar_below = split.planar_below && min == split.position && max == split.position;
-    if max < split.position || (max == split.position && min < max) || is_planar_below {
+    if reference.bounds.max[split.axis] <= split.position {
         return [Some(*reference), None];
     }
-    if min >= split.position {
+    if reference.bounds.min[split.axis] >= split.position {
         return [None, Some(*reference)];
     }
     let triangle = &input.triangles[reference.triangle_ix as usize];
-    let parts = split_bounds(triangle, cell, split.axis, split.position);
+    let parts = split_bounds(triangle, cell, (split.axis, split.position), input.margin);
     // Bounds only ever shrink: each is rounded outwards by itself.
     let limits = reference.bounds.split(split.axis, split.position);
     [0, 1].map(|side| parts[side].map(|part| Reference { bounds: part.intersection(&limits[side]), ..*reference }))

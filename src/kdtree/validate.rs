@@ -12,7 +12,7 @@ use crate::layout::{KD_MAX_DEPTH, Triangle};
 pub enum Invalid {
     #[error("{nodes} nodes, {parents} parents: nodes come in pairs, with a parent each")]
     Length { nodes: usize, parents: usize },
-    #[error("the root's cell is not the bounds of all triangles")]
+    #[error("the root's cell is not the bounds of all triangles and their margin")]
     RootCell,
     #[error("node 1 or the root's parent is not 0")]
     Unused,
@@ -43,23 +43,24 @@ pub enum Invalid {
 impl KdTree {
     /// Checks the tree against the triangles it was built from.
     ///
-    /// Each triangle is cut up along the planes it meets, down to the leaves; what lies within 2^-44 of its largest
-    /// coordinate of a plane is a touch, which one of the two sides must have if all of the triangle lies there.
-    /// Some microseconds a triangle.
+    /// Each triangle is cut up along the planes it meets, down to the leaves: each leaf within the margin of a part must
+    /// have the triangle. Some microseconds a triangle.
     pub fn validate(&self, triangles: &[Triangle]) -> Result<(), Invalid> {
         let (nodes, parents) = (self.nodes.len(), self.parents.len());
         if nodes < 2 || nodes != 2 * parents {
             return Err(Invalid::Length { nodes, parents });
         }
         let root = Bounds { min: self.cell_min.to_array(), max: self.cell_max.to_array() };
-        if root != Bounds::of_all(triangles) {
+        let exact_bounds = Bounds::of_all(triangles);
+        let margin = exact_bounds.margin();
+        if root != exact_bounds.grown(margin) {
             return Err(Invalid::RootCell);
         }
         if self.nodes[1] != EMPTY_LEAF || self.parents[0] != 0 {
             return Err(Invalid::Unused);
         }
-        Walk::new(self, triangles).run(root)?;
-        coverage::check(self, triangles)
+        Walk::new(self, triangles, margin).run(root)?;
+        coverage::check(self, triangles, margin)
     }
 }
 
@@ -67,6 +68,8 @@ impl KdTree {
 struct Walk<'a> {
     tree: &'a KdTree,
     triangles: &'a [Triangle],
+    /// World units.
+    margin: f32,
     seen: Vec<bool>,
     /// Entries of the leaves so far.
     n_entries: usize,
@@ -74,8 +77,8 @@ struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    fn new(tree: &'a KdTree, triangles: &'a [Triangle]) -> Self {
-        Self { tree, triangles, seen: vec![false; tree.nodes.len()], n_entries: 0, depth: 0 }
+    fn new(tree: &'a KdTree, triangles: &'a [Triangle], margin: f32) -> Self {
+        Self { tree, triangles, margin, seen: vec![false; tree.nodes.len()], n_entries: 0, depth: 0 }
     }
 
     fn run(mut self, root: Bounds) -> Result<(), Invalid> {
@@ -132,7 +135,7 @@ impl<'a> Walk<'a> {
             let Some(corners) = self.triangles.get(triangle as usize).filter(|_| triangle >= next) else {
                 return Err(Invalid::LeafOrder { node, triangle });
             };
-            if !is_finite(corners) || !Bounds::of(corners).touches(cell) {
+            if !is_finite(corners) || !Bounds::of(corners).grown(self.margin).touches(cell) {
                 return Err(Invalid::Stray { node, triangle });
             }
             next = triangle + 1;

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::{
-    frame::{Primary, RenderOptions, Traversal},
+    frame::{RenderOptions, Traversal},
     gpu::{BindingKind, Bindings, ComputeDesc, ComputePipeline, Context, GpuError},
     layout::{BIND_FRAME, BIND_TRIANGLE_IDS},
 };
@@ -13,6 +13,7 @@ mod accumulate;
 mod cast;
 mod compact;
 mod denoise;
+mod features;
 mod pixels;
 mod present;
 mod primary_hit;
@@ -31,6 +32,7 @@ pub use self::{
     cast::{Cast, CastResources},
     compact::Compact,
     denoise::Denoise,
+    features::Features,
     pixels::Pixels,
     present::Present,
     primary_hit::PrimaryHit,
@@ -58,6 +60,7 @@ pub struct Passes {
     pub visibility: Visibility,
     pub primary_hit: PrimaryHit,
     pub trace: Trace,
+    pub features: Features,
     pub shadow: Shadow,
     pub shade: Shade,
     pub compact: Compact,
@@ -73,9 +76,10 @@ impl Passes {
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, options: &RenderOptions) -> Result<Self, GpuError> {
         Ok(Self {
             visibility: Visibility::new(context, bindings)?,
-            primary_hit: PrimaryHit::new(context, bindings, options.primary == Primary::Raster)?,
-            trace: Trace::new(context, bindings, options.traversal)?,
-            shadow: Shadow::new(context, bindings, options.traversal)?,
+            primary_hit: PrimaryHit::new(context, bindings, options)?,
+            trace: Trace::new(context, bindings, options)?,
+            features: Features::new(context, bindings)?,
+            shadow: Shadow::new(context, bindings, options)?,
             shade: Shade::new(context, bindings)?,
             compact: Compact::new(context, bindings)?,
             resolve: Resolve::new(context, bindings)?,
@@ -96,16 +100,16 @@ impl Passes {
         from: &RenderOptions,
         to: &RenderOptions,
     ) -> Result<(), GpuError> {
-        if from.traversal != to.traversal {
-            let trace = Trace::new(context, bindings, to.traversal)?;
-            self.shadow = Shadow::new(context, bindings, to.traversal)?;
+        if (from.traversal, from.features) != (to.traversal, to.features) {
+            let trace = Trace::new(context, bindings, to)?;
+            self.shadow = Shadow::new(context, bindings, to)?;
             self.trace = trace;
         }
         if from.tonemap != to.tonemap {
             self.tonemap = Tonemap::new(context, bindings, to.tonemap)?;
         }
-        if from.primary != to.primary {
-            self.primary_hit = PrimaryHit::new(context, bindings, to.primary == Primary::Raster)?;
+        if (from.primary, from.features) != (to.primary, to.features) {
+            self.primary_hit = PrimaryHit::new(context, bindings, to)?;
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     gpu::{Buffer, BufferUse, Context, GpuError, Target, TargetKind},
-    layout::Frame,
+    layout::{Feature, Frame},
 };
 
 /// Room for the window's pixels, rows from the top; buffers may be longer.
@@ -16,6 +16,8 @@ pub struct Pixels {
     /// None without a noise filter: what follows it then reads pixel_radiance.
     pub pixel_filtered: Option<Buffer<[f32; 4]>>,
     pub pixel_display: Buffer<u32>,
+    /// Empty where the options do not ask for them.
+    pub pixel_features: Buffer<Feature>,
     /// Of the whole picture, like depth; only the window's part is drawn to.
     pub triangle_ids: Target,
     pub depth: Target,
@@ -24,7 +26,7 @@ pub struct Pixels {
 impl Pixels {
     /// # Errors
     /// Beyond the device's limits, out of memory.
-    pub fn new(context: &Arc<Context>, frame: &Frame) -> Result<Self, GpuError> {
+    pub fn new(context: &Arc<Context>, frame: &Frame, features: bool) -> Result<Self, GpuError> {
         let n_pixels = n_pixels(frame);
         let size = (frame.picture_width, frame.picture_height);
         let storage = BufferUse::Storage;
@@ -34,16 +36,18 @@ impl Pixels {
             pixel_accumulated: None,
             pixel_filtered: filters.then(|| Buffer::new(context, "pixel_filtered", n_pixels, storage)).transpose()?,
             pixel_display: Buffer::new(context, "pixel_display", n_pixels, storage)?,
+            pixel_features: Buffer::new(context, "pixel_features", if features { n_pixels } else { 0 }, storage)?,
             triangle_ids: Target::new(context, "triangle_ids", TargetKind::Id, size)?,
             depth: Target::new(context, "depth", TargetKind::Depth, size)?,
         })
     }
 
-    /// Whether the frame's pixels have room, and filters what the frame wants filtered.
-    pub fn fit(&self, frame: &Frame) -> bool {
+    /// Whether the frame's pixels have room, and no more buffers than the frame uses.
+    pub fn fit(&self, frame: &Frame, features: bool) -> bool {
         let (width, height) = self.triangle_ids.size();
         self.pixel_radiance.len() >= n_pixels(frame)
             && (width >= frame.picture_width && height >= frame.picture_height)
+            && self.pixel_features.is_empty() != features
             && self.pixel_filtered.is_some() == frame.denoise_threshold.is_finite()
     }
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{kernel, spirv};
 use crate::{
+    frame::{Primary, RenderOptions},
     gpu::{Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError},
     layout::{Batch, RAY_GROUP_SIZE},
 };
@@ -14,13 +15,18 @@ pub struct PrimaryHit {
 }
 
 impl PrimaryHit {
-    /// `from_raster`: find the hits too; otherwise only make the rays, for [`super::Trace`].
-    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, from_raster: bool) -> Result<Self, GpuError> {
-        let constants = [u32::from(from_raster)];
+    /// From raster it finds the hits, too; otherwise it only makes the rays, for [`super::Trace`].
+    pub(super) fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<Bindings>,
+        options: &RenderOptions,
+    ) -> Result<Self, GpuError> {
+        // The second is the triangle test's FUSED_FMA, which a hit with a known triangle does without.
+        let constants = [u32::from(options.primary == Primary::Raster), 0, options.features.into()];
         Ok(Self { kernel: kernel(context, bindings, "primary_hit", spirv!("primary_hit.comp"), &constants)? })
     }
 
-    /// Needs triangle_ids. Leaves rays and, from raster, hits; updates counters.
+    /// Needs triangle_ids. Leaves rays and, from raster, hits; updates counters, and pixel_features where the options ask for them.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, Some(batch.depth), batch, dispatch);

@@ -50,7 +50,7 @@ impl Resources {
             materials: Buffer::with(context, "materials", &scene.materials, storage)?,
             lights: Buffer::with(context, "lights", &scene.lights, storage)?,
             queues: Queues::new(context, constants.queue_capacity, constants.n_lights)?,
-            pixels: Pixels::new(context, constants)?,
+            pixels: Pixels::new(context, constants, false)?,
             bounces: Buffer::new(context, "bounces", n_bounces, BufferUse::Indirect)?,
             counters: Buffer::new(context, "counters", n_bounces, storage)?,
             bindings: Bindings::new(context, &kinds, size_of::<Batch>() as u32)?,
@@ -85,21 +85,23 @@ impl Resources {
             (layout::BIND_PIXEL_ACCUMULATED, Binding::Buffer(pixels.accumulated().any())),
             (layout::BIND_PIXEL_FILTERED, Binding::Buffer(pixels.filtered().any())),
             (layout::BIND_PIXEL_DISPLAY, Binding::Buffer(pixels.pixel_display.any())),
+            (layout::BIND_PIXEL_FEATURES, Binding::Buffer(pixels.pixel_features.any())),
             (layout::BIND_COUNTERS, Binding::Buffer(self.counters.any())),
             (layout::BIND_TRIANGLE_IDS, Binding::Image(&pixels.triangle_ids)),
         ];
         BindingSet::new(&self.bindings, name, &[&self.tree.objects()[..], &own].concat())
     }
 
-    /// The kernels' constants from now on, with room for their picture and for `constants.queue_capacity` rays, or for as
+    /// The kernels' constants from now on, with room for their picture, with or without features, and for `constants.queue_capacity` rays, or for as
     /// many as there was room for. What they hold is undefined. Where there is no room, all is as before.
     ///
     /// # Errors
     /// Beyond the device's limits, out of memory.
-    pub fn fit(&mut self, context: &Arc<Context>, constants: &Frame) -> Result<(), GpuError> {
+    pub fn fit(&mut self, context: &Arc<Context>, constants: &Frame, features: bool) -> Result<(), GpuError> {
         let grows = self.queues.capacity() < constants.queue_capacity;
         let queues = grows.then(|| Queues::new(context, constants.queue_capacity, constants.n_lights)).transpose()?;
-        let pixels = (!self.pixels.fit(constants)).then(|| Pixels::new(context, constants)).transpose()?;
+        let pixels =
+            (!self.pixels.fit(constants, features)).then(|| Pixels::new(context, constants, features)).transpose()?;
         let has_room = queues.is_none() && pixels.is_none();
         if let Some(queues) = queues {
             self.queues = queues;

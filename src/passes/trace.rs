@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Resources, kernel, spirv, traversal_constants};
 use crate::{
-    frame::Traversal,
+    frame::RenderOptions,
     gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
     layout::Batch,
 };
@@ -18,13 +18,14 @@ impl Trace {
     pub(super) fn new(
         context: &Arc<Context>,
         bindings: &Arc<Bindings>,
-        traversal: Traversal,
+        options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        let constants = traversal_constants(context, traversal)?;
+        let [traversal, fuses_fma] = traversal_constants(context, options.traversal)?;
+        let constants = [traversal, fuses_fma, options.features.into()];
         Ok(Self { kernel: kernel(context, bindings, "trace", spirv!("trace.comp"), &constants)? })
     }
 
-    /// Needs rays. Leaves hits; updates counters.
+    /// Needs rays. Leaves hits; updates counters, and pixel_features where the options ask for them.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.ray_dispatch(batch));
     }

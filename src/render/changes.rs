@@ -62,22 +62,22 @@ impl Renderer {
         if same_samples(&before, options) {
             self.resources.set_constants(&constants);
         } else {
-            self.make_room(constants)?;
+            self.make_room(constants, options.features)?;
             self.reset_samples();
         }
         self.options = options.clone();
         Ok(())
     }
 
-    /// Buffers and batches for other sizes or another number of bounces.
-    fn make_room(&mut self, constants: Frame) -> Result<(), GpuError> {
+    /// Buffers and batches for other sizes, another number of bounces, or other outputs.
+    fn make_room(&mut self, constants: Frame, features: bool) -> Result<(), GpuError> {
         let capacity = self.fixed_capacity;
         let limits = self.context.limits();
         let queue_capacity = capacity.unwrap_or_else(|| queue_capacity(limits, &constants, self.branches));
         let constants = Frame { queue_capacity, ..constants };
         let spans = split_evenly(constants.width * constants.height, queue_capacity);
         let schedule = Schedule::new(&self.context, &constants, spans)?;
-        self.resources.fit(&self.context, &constants)?;
+        self.resources.fit(&self.context, &constants, features)?;
         self.resources.resize_bounces(&self.context, schedule.n_rows())?;
         self.schedule = schedule;
         Ok(())

@@ -12,7 +12,7 @@ use crate::{
     frame::{Denoise, Picture, Primary, Profile, RenderOptions},
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     kdtree::KdTree,
-    layout::{Batch, MATERIAL_REFLECT, MATERIAL_REFRACT},
+    layout::{Batch, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
     passes::{Passes, Resources},
     scene::{Camera, Scene},
 };
@@ -71,6 +71,7 @@ impl Renderer {
         let spans = split_evenly(constants.width * constants.height, constants.queue_capacity);
         let schedule = Schedule::new(&context, &constants, spans)?;
         let mut resources = Resources::new(&context, scene, tree, &constants, schedule.n_rows())?;
+        resources.fit(&context, &constants, options.features)?;
         resources.add_extras(&context, tree, options.traversal)?;
         let passes = Passes::new(&context, &resources.bindings, options)?;
         let (camera, options) = (scene.camera, options.clone());
@@ -153,6 +154,19 @@ impl Renderer {
         })
     }
 
+    /// What the rays of each of the picture's pixels met and cost, of the sample drawn last.
+    ///
+    /// # Panics
+    /// The options do not ask for features.
+    ///
+    /// # Errors
+    /// A failed copy.
+    pub fn features(&self) -> Result<Vec<Feature>, GpuError> {
+        assert!(self.options.features, "the options ask for features");
+        let features = self.resources.pixels.pixel_features.download_first(self.resources.n_pixels())?;
+        Ok(self.options.window().part(&features, &self.options.crop_or_whole()))
+    }
+
     /// The frame's buffers, as the last frame left them.
     pub fn resources(&self) -> &Resources {
         &self.resources
@@ -182,7 +196,10 @@ impl Renderer {
         self.update_constants(commands);
         copy_all(commands, self.schedule.first_bounces.any(), self.resources.bounces.any());
         copy_all(commands, self.schedule.zero_counters.any(), self.resources.counters.any());
-        commands.barrier(Access::TransferWrite, Access::AllReads); // bounces, counters
+        if self.options.features {
+            commands.clear_buffer(self.resources.pixels.pixel_features.any());
+        }
+        commands.barrier(Access::TransferWrite, Access::AllReads); // bounces, counters, pixel_features
         match self.options.primary {
             Primary::Raster => self.passes.visibility.record(commands, &self.resources),
             // Unread then, but bound: the layout has to be the set's.
@@ -213,6 +230,10 @@ impl Renderer {
         if batch.depth > 0 || self.options.primary == Primary::Trace {
             passes.trace.record(commands, resources, batch);
             commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // hits, counters
+        }
+        if batch.depth == 0 && self.options.features {
+            passes.features.record(commands, batch);
+            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_features
         }
         if resources.constants().n_lights > 0 {
             passes.shadow.record(commands, resources, batch);

@@ -37,8 +37,8 @@ impl Schedule {
             .map(|n_rays| bounce_row(n_rays, constants.n_lights))
             .collect();
         let zeros = vec![Counters::default(); rows.len()];
-        // The widest bounce has 9 kernels; visibility, accumulate, denoise and tonemap stand outside.
-        let n_passes = 4 + 9 * rows.len() as u32;
+        // The widest bounce has 10 kernels; visibility, accumulate, denoise and tonemap stand outside.
+        let n_passes = 4 + 10 * rows.len() as u32;
         Ok(Self {
             first_bounces: Buffer::with(context, "first_bounces", &rows, BufferUse::Storage)?,
             zero_counters: Buffer::with(context, "zero_counters", &zeros, BufferUse::Storage)?,

@@ -1,5 +1,5 @@
 //! A plain exact builder: at every cell it sorts all ends on all axes and sweeps them (O(n log^2 n)), with clipped
-//! triangles, in f64. Only the tree's cost is kept.
+//! triangles and their margins, in f64. Only the tree's cost is kept.
 
 use kdray::{kdtree::BuildOptions, layout::Triangle};
 
@@ -13,9 +13,14 @@ type Part = ([Point; 3], Box3);
 /// SAH cost of the greedy tree.
 pub fn sah_cost(triangles: &[Triangle], options: &BuildOptions) -> f64 {
     let corners = |t: &Triangle| [t.v0, t.v1, t.v2].map(|v| v.as_dvec3().to_array());
-    let parts: Vec<Part> = triangles.iter().map(|t| (corners(t), bounds(&corners(t)))).collect();
-    let cell = bounds(&parts.iter().flat_map(|part| part.1).collect::<Vec<_>>());
-    cost(&parts, &cell, options, options.depth_limit())
+    let points: Vec<Point> = triangles.iter().flat_map(corners).collect();
+    let margin = points.as_flattened().iter().fold(0.0, |m: f64, x| m.max(x.abs())) * 2f64.powi(-17);
+    let parts: Vec<Part> = triangles.iter().map(|t| (corners(t), grown(bounds(&corners(t)), margin))).collect();
+    cost(&parts, &grown(bounds(&points), margin), options, margin, options.depth_limit())
+}
+
+fn grown([min, max]: Box3, margin: f64) -> Box3 {
+    [min.map(|x| x - margin), max.map(|x| x + margin)]
 }
 
 fn bounds(points: &[Point]) -> Box3 {
@@ -37,10 +42,10 @@ fn split_cell(cell: &Box3, axis: usize, position: f64) -> [Box3; 2] {
     [below, above]
 }
 
-fn cost(parts: &[Part], cell: &Box3, options: &BuildOptions, levels: u32) -> f64 {
+fn cost(parts: &[Part], cell: &Box3, options: &BuildOptions, margin: f64, levels: u32) -> f64 {
     let (step, test) = (f64::from(options.traversal_cost), f64::from(options.intersection_cost));
     let leaf = test * parts.len() as f64;
-    let Some((weight, axis, position, planar_below)) = best_plane(parts, cell, options).filter(|_| levels > 0) else {
+    let Some((weight, axis, position)) = best_plane(parts, cell, options).filter(|_| levels > 0) else {
         return leaf;
     };
     if step + test * weight >= leaf {
@@ -48,59 +53,45 @@ fn cost(parts: &[Part], cell: &Box3, options: &BuildOptions, levels: u32) -> f64
     }
     let cells = split_cell(cell, axis, position);
     let sides = [0, 1].map(|side| -> Vec<Part> {
-        parts.iter().filter_map(|part| part_in(part, &cells, side, (axis, position, planar_below))).collect()
+        parts.iter().filter_map(|part| part_in(part, &cells, side, (axis, position), margin)).collect()
     });
-    let child =
-        |side: usize| half_area(&cells[side]) / half_area(cell) * cost(&sides[side], &cells[side], options, levels - 1);
+    let child = |side: usize| {
+        half_area(&cells[side]) / half_area(cell) * cost(&sides[side], &cells[side], options, margin, levels - 1)
+    };
     step + child(0) + child(1)
 }
 
-/// Weight, axis, position, and whether triangles in the plane go below.
-fn best_plane(parts: &[Part], cell: &Box3, options: &BuildOptions) -> Option<(f64, usize, f64, bool)> {
-    let mut best: Option<(f64, usize, f64, bool)> = None;
+/// Weight, axis, position.
+fn best_plane(parts: &[Part], cell: &Box3, options: &BuildOptions) -> Option<(f64, usize, f64)> {
+    let mut best: Option<(f64, usize, f64)> = None;
     for axis in 0..3 {
-        // End, planar, begin: the order in which they count at one position.
-        let mut events: Vec<(f64, usize)> = Vec::new();
-        for (_, [min, max]) in parts {
-            if min[axis] == max[axis] {
-                events.push((min[axis], 1));
-            } else {
-                events.extend([(min[axis], 2), (max[axis], 0)]);
-            }
-        }
+        // An end counts before a begin at one position.
+        let mut events: Vec<(f64, bool)> =
+            parts.iter().flat_map(|(_, [min, max])| [(min[axis], true), (max[axis], false)]).collect();
         events.sort_by(|a, b| a.partial_cmp(b).expect("finite"));
         let (mut n_below, mut n_above) = (0, parts.len());
         for in_plane in events.chunk_by(|a, b| a.0 == b.0) {
             let position = in_plane[0].0;
-            let [n_ends, n_planar, n_begins] = [0, 1, 2].map(|kind| in_plane.iter().filter(|e| e.1 == kind).count());
-            n_above -= n_ends + n_planar;
+            let n_begins = in_plane.iter().filter(|event| event.1).count();
+            n_above -= in_plane.len() - n_begins;
             if position > cell[0][axis] && position < cell[1][axis] {
                 let areas = split_cell(cell, axis, position).map(|child| half_area(&child) / half_area(cell));
-                for (below, above, planar_below) in [(n_planar, 0, true), (0, n_planar, false)] {
-                    let n = [n_below + below, n_above + above];
-                    let bonus = if n.contains(&0) { f64::from(options.empty_bonus) } else { 0.0 };
-                    let weight = (1.0 - bonus) * (areas[0] * n[0] as f64 + areas[1] * n[1] as f64);
-                    if best.is_none_or(|best| weight < best.0) {
-                        best = Some((weight, axis, position, planar_below));
-                    }
+                let bonus = if n_below == 0 || n_above == 0 { f64::from(options.empty_bonus) } else { 0.0 };
+                let weight = (1.0 - bonus) * (areas[0] * n_below as f64 + areas[1] * n_above as f64);
+                if best.is_none_or(|best| weight < best.0) {
+                    best = Some((weight, axis, position));
                 }
             }
-            n_below += n_begins + n_planar;
+            n_below += n_begins;
         }
     }
     best
 }
 
 /// The part of a triangle on one side (0 below, 1 above) of a plane, none where it has none there.
-fn part_in(
-    part: &Part,
-    cells: &[Box3; 2],
-    side: usize,
-    (axis, position, planar_below): (usize, f64, bool),
-) -> Option<Part> {
-    let (corners, [min, max]) = part;
-    let planar = min[axis] == position && max[axis] == position;
-    let sides = [(planar && planar_below) || min[axis] < position, (planar && !planar_below) || max[axis] > position];
+fn part_in(part: &Part, cells: &[Box3; 2], side: usize, (axis, position): (usize, f64), margin: f64) -> Option<Part> {
+    let (corners, part_box @ [min, max]) = part;
+    let sides = [min[axis] < position, max[axis] > position];
     if !sides[side] {
         return None;
     }
@@ -108,13 +99,20 @@ fn part_in(
         return Some(*part);
     }
     let mut polygon = corners.to_vec();
-    let [cell_min, cell_max] = cells[side];
-    for (face, (from, to)) in cell_min.into_iter().zip(cell_max).enumerate() {
+    let [near_min, near_max] = grown(cells[side], margin);
+    for (face, (from, to)) in near_min.into_iter().zip(near_max).enumerate() {
         polygon = clip(&polygon, face, |x| x - from);
         polygon = clip(&polygon, face, |x| to - x);
     }
-    let clipped = bounds(&polygon);
-    (clipped[0][axis] < clipped[1][axis]).then_some((*corners, clipped))
+    if polygon.is_empty() {
+        return None;
+    }
+    let clipped = grown(bounds(&polygon), margin);
+    let limits = [cells[side], *part_box];
+    let within = |pick: fn(f64, f64) -> f64, end: usize| {
+        [0, 1, 2].map(|k| limits.iter().fold(clipped[end][k], |x, limit| pick(x, limit[end][k])))
+    };
+    Some((*corners, [within(f64::max, 0), within(f64::min, 1)]))
 }
 
 /// What of a polygon has a height of 0 or more over a plane that is square to an axis.

@@ -242,14 +242,13 @@ fn a_wrong_depth() {
     assert!(matches!(Plant::new().after(|tree| tree.depth += 1), Invalid::Depth { .. }));
     // A chain of splits, one level more than the traversal can hold.
     let n_levels = KD_MAX_DEPTH - 1;
-    let mut tree = KdTree::build(&[], &BuildOptions::default());
     let triangles = [triangle([Vec3::ZERO, Vec3::X, Vec3::Y])];
-    tree.cell_max = Vec3::new(1.0, 1.0, 0.0);
-    tree.leaf_triangles = vec![0];
+    let mut tree = KdTree::build(&triangles, &BuildOptions { max_depth: Some(0), ..Default::default() });
+    let end = tree.cell_max.x;
     for level in 0..n_levels {
         let child = 2 * level + 2;
         let node = if level == 0 { 0 } else { child - 2 };
-        set(&mut tree, node, Node::Split { axis: 0, position: 1.0, child });
+        set(&mut tree, node, Node::Split { axis: 0, position: end, child });
         tree.nodes.extend([KdNode::from(Node::Leaf { first: 0, count: 1 }), Node::Leaf { first: 1, count: 0 }.into()]);
         tree.parents.push(node);
     }

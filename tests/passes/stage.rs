@@ -57,6 +57,7 @@ impl Stage {
         let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
         let constants = Frame { queue_capacity: capacity, ..frame_constants(&scene, &tree, &options) };
         let mut resources = Resources::new(&context, &scene, &tree, &constants, N_ROWS).expect("resources");
+        resources.fit(&context, &constants, options.features).expect("room");
         resources.add_extras(&context, &tree, options.traversal).expect("extras");
         let extras = Extras::new(&tree, options.traversal);
         let passes = Passes::new(&context, &resources.bindings, &options).expect("passes");

@@ -11,9 +11,9 @@ pub mod scenes;
 
 use glam::Vec3;
 use kdray::{
-    cpu::bindings::Bindings,
+    cpu::{bindings::Bindings, brute, kdtree::near_scene},
     kdtree::{BuildOptions, Extras, KdTree},
-    layout::{Frame, Triangle},
+    layout::{Frame, Hit, NO_TRIANGLE, Ray, Triangle},
 };
 
 /// Triangles and their tree, with no more of a frame than rays need.
@@ -33,6 +33,13 @@ impl World {
 
     pub fn bindings(&self) -> Bindings<'_> {
         Bindings::of_tree(&self.triangles, &self.tree, &self.frame).with_extras(&self.extras)
+    }
+
+    /// The closest hit beyond `t_min` over every triangle, of the ray as the traversal sees it.
+    pub fn by_brute_force(&self, ray: &Ray, t_min: f32) -> Hit {
+        let (near, t_start) = near_scene(&self.bindings(), ray);
+        let hit = brute::closest_hit_beyond(&self.triangles, &near, t_min - t_start);
+        Hit { t: if hit.triangle_ix == NO_TRIANGLE { ray.t_max } else { hit.t + t_start }, ..hit }
     }
 
     /// The middle of the root's cell.

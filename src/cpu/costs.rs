@@ -1,0 +1,71 @@
+//! What the rays of a pixel cost: how many there are, and how many nodes and triangles they read. The kernels count in
+//! passing; here rays go through the tree once more, so that uncounted ones cost nothing.
+
+use rayon::prelude::*;
+
+use super::{RAYS_PER_TASK, bindings::Bindings, kdtree::Traverser, shadow::shadow_segment, table::ReadCounts};
+use crate::{
+    frame::Traversal,
+    layout::{Feature, Hit, NO_TRIANGLE, Ray},
+};
+
+/// Primary rays whose triangles the rasterizer found: one test each.
+pub fn count_rasterized(rays: &[Ray], hits: &[Hit], pixel_features: &mut [Feature]) {
+    for (ray, hit) in rays.iter().zip(hits) {
+        let feature = &mut pixel_features[ray.pixel_ix as usize];
+        feature.n_rays = 1;
+        feature.n_steps = (hit.triangle_ix != NO_TRIANGLE).into();
+    }
+}
+
+/// Rays whose closest hit was found through the tree.
+pub fn count_closest(bindings: &Bindings, traversal: Traversal, rays: &[Ray], pixel_features: &mut [Feature]) {
+    let steps: Vec<_> = (rays.par_iter().with_min_len(RAYS_PER_TASK))
+        .map_init(|| Traverser::new(traversal), |traverser, ray| steps_of::<false>(bindings, traverser, ray))
+        .collect();
+    for (ray, n_steps) in rays.iter().zip(steps) {
+        add(pixel_features, ray, n_steps);
+    }
+}
+
+/// Segments from the hits to all lights that their surfaces face.
+pub fn count_shadow(
+    bindings: &Bindings,
+    traversal: Traversal,
+    rays: &[Ray],
+    hits: &[Hit],
+    pixel_features: &mut [Feature],
+) {
+    for light in bindings.lights {
+        let steps: Vec<_> = (rays.par_iter().zip(hits).with_min_len(RAYS_PER_TASK))
+            .map_init(
+                || Traverser::new(traversal),
+                |traverser, (ray, hit)| {
+                    let is_hit = hit.triangle_ix != NO_TRIANGLE;
+                    let segment = is_hit.then(|| shadow_segment(bindings, ray, hit, light)).flatten()?;
+                    Some(steps_of::<true>(bindings, traverser, &segment))
+                },
+            )
+            .collect();
+        for (ray, n_steps) in rays.iter().zip(steps) {
+            if let Some(n_steps) = n_steps {
+                add(pixel_features, ray, n_steps);
+            }
+        }
+    }
+}
+
+fn steps_of<const ANY: bool>(bindings: &Bindings, traverser: &mut Traverser, ray: &Ray) -> u32 {
+    if matches!(traverser, Traverser::Brute) {
+        return bindings.triangles.len() as u32;
+    }
+    let counts = ReadCounts::default();
+    traverser.traverse::<ANY>(&bindings.counted(&counts), ray, 0.0);
+    (counts.n_nodes.get() + counts.n_triangles.get()) as u32
+}
+
+fn add(pixel_features: &mut [Feature], ray: &Ray, n_steps: u32) {
+    let feature = &mut pixel_features[ray.pixel_ix as usize];
+    feature.n_rays += 1;
+    feature.n_steps += n_steps;
+}

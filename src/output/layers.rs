@@ -1,0 +1,51 @@
+//! A picture with more than colour: one OpenEXR file of many channels.
+
+use std::{io::Cursor, path::Path};
+
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, WritableImage,
+};
+
+use super::{OutputError, write};
+use crate::{
+    frame::{Aov, Channel, Picture, Samples},
+    layout::Feature,
+};
+
+/// Writes the radiance as R, G, B, and each output's channels beside it, whole or not at all: 32-bit floats, numbers of
+/// things as 32-bit integers.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_layers(path: &Path, picture: &Picture, aovs: &[Aov], features: &[Feature]) -> Result<(), OutputError> {
+    let colour = |name: &str, component: usize| Channel {
+        name: name.to_owned(),
+        samples: Samples::Float(picture.radiance.iter().map(|pixel| pixel[component]).collect()),
+    };
+    let mut channels = vec![colour("R", 0), colour("G", 1), colour("B", 2)];
+    for (i, aov) in aovs.iter().enumerate() {
+        if !aovs[..i].contains(aov) {
+            channels.extend(aov.channels(features));
+        }
+    }
+    let bytes = encode((picture.width as usize, picture.height as usize), channels);
+    write(path, &bytes.map_err(|source| OutputError::EncodeLayers { path: path.to_owned(), source })?)
+}
+
+fn encode(size: (usize, usize), channels: Vec<Channel>) -> Result<Vec<u8>, exr::error::Error> {
+    let channels: SmallVec<_> = channels
+        .into_iter()
+        .map(|channel| {
+            let samples = match channel.samples {
+                Samples::Float(samples) => FlatSamples::F32(samples),
+                Samples::Uint(samples) => FlatSamples::U32(samples),
+            };
+            AnyChannel::new(channel.name.as_str(), samples)
+        })
+        .collect();
+    let attributes = LayerAttributes::default();
+    let layer = Layer::new(size, attributes, Encoding::FAST_LOSSLESS, AnyChannels::sort(channels));
+    let mut file = Cursor::new(Vec::new());
+    Image::from_layer(layer).write().to_buffered(&mut file)?;
+    Ok(file.into_inner())
+}

@@ -1,0 +1,129 @@
+//! What pixels show beside their colour.
+
+use glam::{Vec3, vec3};
+use kdray::{
+    cpu::{self, Batching},
+    frame::{Crop, Primary, RenderOptions},
+    layout::{Feature, NO_TRIANGLE},
+    render::Renderer,
+    scene::Scene,
+};
+
+use super::{
+    batches::glass_in_glass,
+    studio::{assert_silent, device, identical, on_both, options, tree_of},
+};
+use crate::support::scenes;
+
+fn on_device(scene: &Scene, options: &RenderOptions) -> Vec<Feature> {
+    let context = device();
+    let mut renderer = Renderer::new(context.clone(), scene, &tree_of(scene), options).expect("a renderer");
+    renderer.draw().expect("a frame");
+    assert_silent(&context);
+    renderer.features().expect("features")
+}
+
+fn on_cpu(scene: &Scene, options: &RenderOptions) -> Vec<Feature> {
+    let tree = tree_of(scene);
+    let mut renderer = cpu::Renderer::new(scene, &tree, options, Batching::default());
+    renderer.draw_sample();
+    renderer.features()
+}
+
+fn noting(options: RenderOptions) -> RenderOptions {
+    RenderOptions { features: true, ..options }
+}
+
+/// A room of half width 5 seen from its middle, straight on.
+#[test]
+fn a_wall_s_features_are_known() {
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, Vec::new(), scenes::BLACK);
+    scenes::add(&mut scene, scenes::room(5.0), scenes::diffuse(vec3(0.25, 0.5, 0.75)));
+    scene.camera.eye = Vec3::ZERO;
+    scene.camera.target = vec3(0.0, 0.0, -1.0);
+    let lamp = scenes::point_light(vec3(0.0, 0.0, 1.0), Vec3::ONE);
+    scene.lights = vec![lamp, scenes::point_light(vec3(0.0, 0.0, -9.0), Vec3::ONE)];
+    for features in [on_device, on_cpu].map(|render| render(&scene, &noting(options(32, 24, 3)))) {
+        for (i, feature) in features.iter().enumerate() {
+            assert!((feature.depth - 5.0).abs() < 1e-5 && (feature.position_world.z + 5.0).abs() < 1e-5);
+            assert_eq!((feature.normal_world, feature.albedo), (Vec3::Z, vec3(0.25, 0.5, 0.75)));
+            assert_eq!(feature.material_ix, 1);
+            // The second lamp stands behind the wall, which turns its back on it.
+            assert_eq!(feature.n_rays, 2);
+            let x = ((i % 32) as f32 + 0.5) / 16.0 - 1.0;
+            let half_width = 5.0 * (45.0_f32 / 2.0).to_radians().tan() * 32.0 / 24.0;
+            assert!((feature.position_world.x - x * half_width).abs() < 1e-4);
+        }
+    }
+}
+
+#[test]
+fn nothing_has_features_too() {
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, Vec::new(), scenes::BLACK);
+    let nothing = Feature {
+        triangle_ix: NO_TRIANGLE,
+        material_ix: NO_TRIANGLE,
+        depth: f32::INFINITY,
+        n_rays: 1,
+        ..Feature::default()
+    };
+    for primary in [Primary::Raster, Primary::Trace] {
+        let options = noting(RenderOptions { primary, ..options(9, 7, 2) });
+        for mut features in [on_device, on_cpu].map(|render| render(&scene, &options)) {
+            features.iter_mut().for_each(|feature| feature.n_steps = 0); // the root may be read
+            assert!(features == [nothing; 63], "{primary}: {:?}", features[0]);
+        }
+    }
+}
+
+#[test]
+fn device_and_cpu_agree() {
+    let scene = scenes::mixed_outdoors();
+    for primary in [Primary::Raster, Primary::Trace] {
+        let options = noting(RenderOptions { primary, ..options(80, 60, 4) });
+        let [a, b] = [on_device, on_cpu].map(|render| render(&scene, &options));
+        let differs = |(a, b): (&Feature, &Feature)| a.triangle_ix != b.triangle_ix || a.n_rays != b.n_rays;
+        let n_differing = a.iter().zip(&b).filter(|pair| differs(*pair)).count();
+        assert!(n_differing <= 4800 / 50, "{primary}: {n_differing}");
+        assert!(a.iter().map(|feature| feature.n_rays).max() > Some(20));
+    }
+}
+
+#[test]
+fn rays_are_counted_as_in_the_profile() {
+    let (scene, options) = (scenes::mixed(), noting(options(40, 30, 4)));
+    let tree = tree_of(&scene);
+    let mut device = Renderer::new(device(), &scene, &tree, &options).expect("a renderer");
+    let mut cpu = cpu::Renderer::new(&scene, &tree, &options, Batching { n_pixels: 500, queue_capacity: 300 });
+    let profiles = [device.draw().expect("a frame"), cpu.draw_sample()];
+    for (profile, features) in profiles.iter().zip([device.features().expect("features"), cpu.features()]) {
+        let counted: u64 = features.iter().map(|feature| u64::from(feature.n_rays)).sum();
+        let expected: u64 = profile.bounces.iter().map(|bounce| bounce.n_rays + bounce.n_shadow_rays).sum();
+        assert_eq!(counted, expected);
+    }
+}
+
+#[test]
+fn neither_batches_nor_crops_nor_the_picture_are_changed_by_them() {
+    let (scene, plain, context) = (glass_in_glass(), options(32, 24, 6), device());
+    let (tree, options) = (tree_of(&scene), noting(plain.clone()));
+    let features = |options: &RenderOptions, capacity| {
+        let renderer = Renderer::with_queue_capacity(context.clone(), &scene, &tree, options, capacity);
+        let mut renderer = renderer.expect("a renderer");
+        renderer.draw_sample().expect("a sample");
+        renderer.draw_sample().expect("a sample");
+        renderer.features().expect("features")
+    };
+    let whole = features(&options, 100_000);
+    assert!(whole == features(&options, 300));
+    let crop = Crop { x0: 3, y0: 5, x1: 20, y1: 9 };
+    let part = features(&RenderOptions { crop: Some(crop), ..options.clone() }, 100_000);
+    let pixels = (5..9).flat_map(|y| (3..20).map(move |x| y * 32 + x));
+    assert!(part == pixels.map(|i| whole[i]).collect::<Vec<_>>());
+    for (with, without) in on_both(&scene, &options).iter().zip(&on_both(&scene, &plain)) {
+        assert!(identical(with, without));
+    }
+    assert_silent(&context);
+}

@@ -1,0 +1,86 @@
+//! Features against their twin.
+
+use kdray::{
+    cpu,
+    frame::RenderOptions,
+    layout::{Batch, Feature, NO_TRIANGLE, Ray},
+};
+
+use super::stage::{FIRST, RAY_COUNTS, Stage, hits_of, options, some_rays};
+use crate::support::scenes;
+
+/// One ray a pixel.
+fn primary_like(stage: &Stage, n: u32) -> Vec<Ray> {
+    let mut rays = some_rays(stage, n);
+    (0..).zip(&mut rays).for_each(|(i, ray)| ray.pixel_ix = n - 1 - i);
+    rays
+}
+
+fn noted(stage: &Stage, rays: &[Ray], before: &[Feature]) -> Vec<Feature> {
+    let hits = hits_of(stage, rays);
+    let batch = Batch { n_pixels: rays.len() as u32, ..FIRST };
+    stage.set_n_rays(batch.n_pixels);
+    stage.set_rays(rays);
+    stage.set_hits(&hits);
+    stage.resources.pixels.pixel_features.upload(before).expect("pixel_features");
+    stage.run(&batch, |commands| stage.passes.features.record(commands, &batch));
+    stage.resources.pixels.pixel_features.download().expect("pixel_features")
+}
+
+/// Where two features differ: not at all in indices and counts, in the rest by few roundings.
+fn difference(a: &[Feature], b: &[Feature]) -> Option<usize> {
+    let exact = |f: &Feature| (f.triangle_ix, f.material_ix, f.n_rays, f.n_steps, f.albedo.to_array());
+    let agree = |a: &Feature, b: &Feature| {
+        let near = |a: glam::Vec3, b: glam::Vec3| (a - b).abs().max_element() <= 1e-4;
+        exact(a) == exact(b)
+            && near(a.position_world, b.position_world)
+            && near(a.normal_world, b.normal_world)
+            && (a.depth == b.depth || (a.depth - b.depth).abs() <= 1e-4)
+    };
+    assert_eq!(a.len(), b.len());
+    (0..a.len()).find(|&i| !agree(&a[i], &b[i]))
+}
+
+fn stage() -> Stage {
+    let options = RenderOptions { features: true, ..options(50, 40) };
+    Stage::new(scenes::mixed_outdoors(), options, 2000)
+}
+
+#[test]
+fn agrees_with_its_twin() {
+    let stage = stage();
+    for n in RAY_COUNTS {
+        let rays = primary_like(&stage, n);
+        // Cleared but for the counts, which stay.
+        let before: Vec<_> = (0..2000).map(|i| Feature { n_rays: i, n_steps: 7 * i, ..Feature::default() }).collect();
+        let mut expected = before.clone();
+        cpu::features::features(&stage.bindings(), &rays, &hits_of(&stage, &rays), &mut expected);
+        let found = noted(&stage, &rays, &before);
+        assert_eq!(difference(&expected, &found), None);
+        assert!(found[n as usize..] == before[n as usize..], "pixels without a ray");
+    }
+    let rays = primary_like(&stage, 2000);
+    let found = noted(&stage, &rays, &[Feature::default(); 2000]);
+    let n_missed = found.iter().filter(|feature| feature.triangle_ix == NO_TRIANGLE).count();
+    assert!((100..1900).contains(&n_missed), "{n_missed} of 2000 rays miss");
+}
+
+#[test]
+fn one_changed_feature_is_noticed() {
+    let some = vec![Feature { depth: 1.0, ..Feature::default() }; 5];
+    assert_eq!(difference(&some, &some), None);
+    let changes: [fn(&mut Feature); 7] = [
+        |f| f.triangle_ix ^= 1,
+        |f| f.material_ix ^= 1,
+        |f| f.n_steps ^= 1,
+        |f| f.normal_world.y += 0.001,
+        |f| f.position_world.z = f32::NAN,
+        |f| f.albedo.x += 0.001,
+        |f| f.depth = f32::INFINITY,
+    ];
+    for change in changes {
+        let mut changed = some.clone();
+        change(&mut changed[3]);
+        assert_eq!(difference(&some, &changed), Some(3));
+    }
+}
