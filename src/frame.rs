@@ -4,10 +4,12 @@ use serde::Serialize;
 
 mod aov;
 mod crop;
+mod view;
 
 pub use self::{
     aov::{Aov, Channel, Samples},
     crop::Crop,
+    view::View,
 };
 use crate::layout;
 pub use crate::words::UnknownWord;

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use kdray::{
+    frame::View,
     gpu::ContextOptions,
     output::{self, Format, OutputError},
     scene::Scene,
@@ -39,7 +40,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
 
     let max_samples = args.spp.unwrap_or(if args.frames.is_some() { 1 } else { SAMPLES_AT_REST });
     let vsync = args.vsync == Switch::On;
-    let settings = Settings { options, max_samples, budget_ms: args.budget_ms, vsync };
+    let settings = Settings { options, max_samples, budget_ms: args.budget_ms, vsync, view: View::Picture, gain: 1.0 };
     let scene_name = loaded.scene.name.clone();
     let report = display.view(
         loaded,

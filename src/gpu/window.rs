@@ -6,7 +6,7 @@ use bytemuck::Pod;
 use super::{BindingSet, Commands, RasterPipeline, WindowImage, swapchain::SwapchainImage};
 
 impl Commands<'_> {
-    /// Makes the image ready to be drawn to, all of it, and begins that.
+    /// Makes the image black and ready to be drawn to, and begins that.
     pub(super) fn begin_window(&self, image: &SwapchainImage, extent: vk::Extent2D) {
         let output = vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT;
         // The submit's wait for the acquired image ends at this stage.
@@ -19,7 +19,7 @@ impl Commands<'_> {
         let color = [vk::RenderingAttachmentInfo::default()
             .image_view(image.view)
             .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
-            .load_op(vk::AttachmentLoadOp::DONT_CARE)
+            .load_op(vk::AttachmentLoadOp::CLEAR)
             .store_op(vk::AttachmentStoreOp::STORE)];
         let area = vk::Rect2D { extent, ..Default::default() };
         let rendering = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color);

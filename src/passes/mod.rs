@@ -34,7 +34,7 @@ pub use self::{
     denoise::Denoise,
     features::Features,
     pixels::Pixels,
-    present::Present,
+    present::{Present, Shown},
     primary_hit::PrimaryHit,
     queues::Queues,
     resolve::Resolve,

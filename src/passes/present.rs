@@ -4,9 +4,19 @@ use std::sync::Arc;
 
 use super::{Resources, spirv};
 use crate::{
+    frame::View,
     gpu::{Commands, Context, GpuError, Presenter, RasterDesc, RasterPipeline, RasterTargets, WindowImage},
     layout,
 };
+
+/// What a window shows of a picture.
+pub struct Shown {
+    /// The picture's width and height, pixels.
+    pub size: (u32, u32),
+    pub view: View,
+    /// The value that is shown brightest, or half as bright for depth.
+    pub brightest: f32,
+}
 
 /// The pass's pipeline.
 pub struct Present {
@@ -28,11 +38,12 @@ impl Present {
         Ok(Self { pipeline: RasterPipeline::new(context, &resources.bindings, &desc)? })
     }
 
-    /// Needs pixel_display, readable by fragments. Leaves the window's image, all of it.
-    pub fn record(&self, commands: &Commands, resources: &Resources, image: &WindowImage) {
-        let (window_width, window_height) = image.size();
-        let frame = resources.constants();
-        let push = layout::Present { width: frame.width, height: frame.height, window_width, window_height };
+    /// Needs pixel_display and, but for `View::Picture`, pixel_features, both of `size` pixels and readable by fragments.
+    /// Leaves the window's image, all of it.
+    pub fn record(&self, commands: &Commands, resources: &Resources, shown: &Shown, image: &WindowImage) {
+        let ((width, height), (window_width, window_height)) = (shown.size, image.size());
+        let (view, brightest) = (shown.view.constant(), shown.brightest);
+        let push = layout::Present { width, height, window_width, window_height, view, brightest };
         commands.cover(&self.pipeline, &resources.sets[0], &push, image);
     }
 }

@@ -1,12 +1,16 @@
 //! The frame: the order of passes, every barrier between them, one command buffer a bounce.
 
 mod changes;
+mod parts;
 mod profile;
 mod schedule;
 
-use std::{mem, sync::Arc};
+use std::sync::Arc;
 
-use self::schedule::{Schedule, queue_capacity, split_evenly};
+use self::{
+    parts::Pending,
+    schedule::{Schedule, queue_capacity, split_evenly},
+};
 use crate::{
     camera::frame_constants,
     frame::{Denoise, Picture, Primary, Profile, RenderOptions},
@@ -31,6 +35,14 @@ pub struct Renderer {
     schedule: Schedule,
     /// Samples a pixel that the picture holds.
     n_samples: u32,
+    /// Whether what samples are added to holds the first one.
+    has_sums: bool,
+    /// A sample that is drawn in part.
+    pending: Option<Pending>,
+    /// Pixels of a batch at the most, where the caller has said so.
+    most_pixels: Option<u32>,
+    /// Width and height of what pixel_display holds.
+    displayed: Option<(u32, u32)>,
 }
 
 impl Renderer {
@@ -75,7 +87,21 @@ impl Renderer {
         resources.add_extras(&context, tree, options.traversal)?;
         let passes = Passes::new(&context, &resources.bindings, options)?;
         let (camera, options) = (scene.camera, options.clone());
-        Ok(Self { context, camera, options, fixed_capacity, branches, resources, passes, schedule, n_samples: 0 })
+        Ok(Self {
+            context,
+            camera,
+            options,
+            fixed_capacity,
+            branches,
+            resources,
+            passes,
+            schedule,
+            n_samples: 0,
+            has_sums: false,
+            pending: None,
+            most_pixels: None,
+            displayed: None,
+        })
     }
 
     /// Draws the frame and fetches its picture.
@@ -103,30 +129,14 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::render`]. The next sample is the first again then.
     pub fn draw_sample(&mut self) -> Result<Profile, GpuError> {
-        let sample_ix = mem::take(&mut self.n_samples);
-        if sample_ix == 1 {
-            self.resources.begin_sums(&self.context)?;
-        }
-        let mut constants = *self.resources.constants();
-        constants.set_view(&self.camera, sample_ix);
-        self.resources.set_constants(&constants);
         loop {
-            let frame = self.record()?;
-            self.context.submit(&frame.iter().collect::<Vec<_>>())?;
-            self.context.wait()?;
-            drop(frame);
-            let bounces = self.resources.bounces.download()?;
-            if !bounces.iter().any(|row| row.overflow != 0) {
-                self.n_samples = sample_ix + 1;
-                return self.profile(&bounces);
+            if let Some(profile) = self.go_on(usize::MAX)? {
+                return Ok(profile);
             }
-            let spans = self.schedule.split(&bounces, &constants)?;
-            self.schedule = Schedule::new(&self.context, &constants, spans)?;
-            self.resources.resize_bounces(&self.context, self.schedule.n_rows())?;
         }
     }
 
-    /// Filters and encodes the samples that are there anew, with options that have changed since.
+    /// Filters and encodes the samples that are there anew, with options that have changed since; no sample is begun.
     ///
     /// # Errors
     /// A failed call.
@@ -135,10 +145,12 @@ impl Renderer {
             commands.bind(&self.resources.sets[0]);
             self.update_constants(commands);
             self.show_samples(commands);
-        })
+        })?;
+        self.note_displayed();
+        Ok(())
     }
 
-    /// The picture as it was last drawn or shown.
+    /// The picture as it was last drawn or shown, of a sample that is complete.
     ///
     /// # Errors
     /// A failed copy.

@@ -21,7 +21,7 @@ pub enum SaveError {
 
 impl Session {
     /// Does what the user asks for, but for what is the window's to do. `window`: pixels; `print`: to the terminal.
-    pub fn act(&mut self, action: Action, live: &Live, window: (u32, u32), print: fn(&str)) {
+    pub fn act(&mut self, action: Action, live: &mut Live, window: (u32, u32), print: fn(&str)) {
         match action {
             Action::Save => self.save_next(live, print),
             Action::PrintCamera => print(&to_toml(self.controller.camera())),
@@ -33,9 +33,9 @@ impl Session {
     }
 
     /// Saves what is seen under the next free name in the working directory.
-    fn save_next(&mut self, live: &Live, print: fn(&str)) {
+    fn save_next(&mut self, live: &mut Live, print: fn(&str)) {
         let path = next_free(&self.loaded.scene.name);
-        match save(live, &path) {
+        match self.complete(live).map_err(SaveError::from).and_then(|()| save(live, &path)) {
             Ok(()) => {
                 print(&format!("wrote {}\n", path.display()));
                 self.message = None;

@@ -195,7 +195,7 @@ impl App {
             }
             None => None,
         };
-        if !live.show(size, frame.as_ref())? {
+        if !live.show(size, session.shown_as(), frame.as_ref())? {
             return Ok(false);
         }
         session.shown();
@@ -218,7 +218,7 @@ impl App {
     }
 
     fn act(&mut self, event_loop: &ActiveEventLoop, action: Action) {
-        let Some(Shown { live, window, .. }) = &self.shown else { return };
+        let Some(Shown { live, window, .. }) = &mut self.shown else { return };
         let size = window.inner_size();
         match action {
             Action::Quit => self.end(event_loop, Ok(())),
@@ -284,7 +284,11 @@ impl ApplicationHandler<Wake> for App {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
         if self.shown.is_none() {
             match self.open(event_loop) {
-                Ok(shown) => self.shown = Some(shown),
+                Ok(shown) => {
+                    // A small picture first: the full one may take a while.
+                    self.session.pace.moved(Instant::now());
+                    self.shown = Some(shown);
+                }
                 Err(error) => self.end(event_loop, Err(error)),
             }
         }

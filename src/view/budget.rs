@@ -22,7 +22,7 @@ pub struct Budget {
 
 impl Budget {
     pub fn new(budget_ms: f64) -> Self {
-        Self { budget_ms, step: N_STEPS / 2, full_ms: None }
+        Self { budget_ms, step: LEAST_STEP, full_ms: None }
     }
 
     /// Milliseconds a frame.
@@ -39,6 +39,11 @@ impl Budget {
     pub fn size(&self, window: (u32, u32)) -> (u32, u32) {
         let part = |side: u32| (f64::from(side) * self.share()).round().max(1.0) as u32;
         (part(window.0), part(window.1))
+    }
+
+    /// Expected milliseconds of a frame of the window's full size; none before there was a frame.
+    pub fn full_ms(&self) -> Option<f64> {
+        self.full_ms
     }
 
     /// Learns from a frame of a share of the sides that took so long, all of it counted.

@@ -62,6 +62,11 @@ impl Controller {
         &self.camera
     }
 
+    /// Of a sphere around the scene, world units.
+    pub fn radius(&self) -> f32 {
+        self.radius
+    }
+
     /// World units a second.
     pub fn speed(&self) -> f32 {
         self.speed

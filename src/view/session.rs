@@ -13,12 +13,16 @@ use super::{
     pick::Picked,
 };
 use crate::{
-    frame::{Profile, RenderOptions},
+    frame::{Profile, RenderOptions, View},
     gpu::GpuError,
 };
 
 /// Seconds that the overlay looks back.
 const HISTORY_S: f64 = 5.0;
+/// Reads of the tree, for each of its levels, that are shown brightest: some rays of some ways down and up.
+const STEPS_A_LEVEL: u32 = 16;
+/// Milliseconds that input waits for at the most, as a rule, while a picture at rest is drawn.
+const PART_MS: f64 = 60.0;
 
 /// What is viewed, from where, how.
 pub struct Session {
@@ -32,6 +36,10 @@ pub struct Session {
     pub all_frames: History,
     budget: Budget,
     profile: Profile,
+    /// Whether the last frame completed a sample.
+    has_new_sample: bool,
+    /// Milliseconds of the sample that is being drawn.
+    sample_ms: f64,
     pub(super) picked: Option<Picked>,
     pub(super) message: Option<String>,
     start: Instant,
@@ -48,6 +56,8 @@ impl Session {
             history: History::new(HISTORY_S),
             all_frames: History::new(f64::INFINITY),
             profile: Profile::default(),
+            has_new_sample: false,
+            sample_ms: 0.0,
             picked: None,
             message: None,
             start: Instant::now(),
@@ -61,7 +71,7 @@ impl Session {
 
     /// Whether the picture at rest has all its samples.
     pub fn is_done(&self, live: &Live) -> bool {
-        live.renderer.n_samples() >= self.settings.max_samples
+        !live.renderer.is_pending() && live.renderer.n_samples() >= self.settings.max_samples
     }
 
     /// Draws what the frame needs: one sample more, of a smaller picture while the camera moves. `window`: pixels, not 0.
@@ -79,8 +89,10 @@ impl Session {
         live.context.wait()?;
         live.presenter.set_vsync(self.settings.vsync);
         self.budget.set_budget(self.settings.budget_ms);
-        let (width, height) = if self.pace.is_moving(now) { self.budget.size(window) } else { window };
-        let asked = RenderOptions { width, height, ..self.settings.options.clone() };
+        let is_moving = self.pace.is_moving(now);
+        let (width, height) = if is_moving { self.budget.size(window) } else { window };
+        let features = self.settings.view != View::Picture;
+        let asked = RenderOptions { width, height, features, ..self.settings.options.clone() };
         let is_new = asked != *live.renderer.options();
         if is_new && let Err(error) = live.renderer.set_options(&asked, &self.loaded.tree) {
             self.take_back(live, &error);
@@ -88,8 +100,9 @@ impl Session {
         if self.controller.camera() != live.renderer.camera() {
             live.renderer.set_camera(self.controller.camera());
         }
+        self.has_new_sample = false;
         if !self.is_done(live) {
-            self.draw_sample(live, window)
+            self.draw_part(live, window, is_moving)
         } else if is_new {
             live.renderer.show()
         } else {
@@ -97,12 +110,43 @@ impl Session {
         }
     }
 
-    fn draw_sample(&mut self, live: &mut Live, window: (u32, u32)) -> Result<(), GpuError> {
+    /// A whole sample while the camera moves. At rest so much of it that input is not kept waiting.
+    fn draw_part(&mut self, live: &mut Live, window: (u32, u32), is_moving: bool) -> Result<(), GpuError> {
+        let renderer = &mut live.renderer;
+        if !renderer.is_pending() {
+            self.sample_ms = 0.0;
+            if renderer.n_samples() == 0 {
+                renderer.limit_batches(self.part_pixels(window).filter(|_| !is_moving))?;
+            }
+        }
         let start = Instant::now();
-        self.profile = live.renderer.draw_sample()?;
-        let ms = start.elapsed().as_secs_f64() * 1e3;
-        let share = f64::from(live.renderer.options().height) / f64::from(window.1);
-        self.budget.learn(share, ms);
+        let complete = renderer.draw_part()?;
+        self.sample_ms += start.elapsed().as_secs_f64() * 1e3;
+        if let Some(profile) = complete {
+            let share = f64::from(renderer.options().height) / f64::from(window.1);
+            self.budget.learn(share, self.sample_ms);
+            self.profile = profile;
+            self.has_new_sample = true;
+        }
+        Ok(())
+    }
+
+    /// Pixels that are drawn in about [`PART_MS`]; none where the whole picture is.
+    fn part_pixels(&self, (width, height): (u32, u32)) -> Option<u32> {
+        let n_parts = (self.budget.full_ms()? / PART_MS).ceil();
+        // Powers of two, so that estimates that waver do not change them.
+        let n_parts = (n_parts as u32).clamp(1, 1 << 12).next_power_of_two();
+        (n_parts > 1).then(|| (width * height).div_ceil(n_parts))
+    }
+
+    /// The picture as it is wanted by those who save it: a sample that is begun is completed.
+    ///
+    /// # Errors
+    /// A failed call.
+    pub fn complete(&self, live: &mut Live) -> Result<(), GpuError> {
+        if live.renderer.is_pending() || live.renderer.n_samples() == 0 {
+            live.renderer.draw_sample()?;
+        }
         Ok(())
     }
 
@@ -123,8 +167,20 @@ impl Session {
             pass_ms: Vec::new(),
         };
         self.all_frames.push(record.clone());
-        let pass_ms = self.profile.passes.iter().filter_map(|pass| Some((pass.name, pass.ms?))).collect();
+        let passes = self.profile.passes.iter().filter(|_| self.has_new_sample);
+        let pass_ms = passes.filter_map(|pass| Some((pass.name, pass.ms?))).collect();
         self.history.push(FrameRecord { pass_ms, ..record });
+    }
+
+    /// What the window shows of the picture.
+    pub fn shown_as(&self) -> (View, f32) {
+        let automatic = match self.settings.view {
+            View::Picture | View::Normal | View::Id => 1.0,
+            View::Depth => self.controller.radius(),
+            View::Rays => (1 + self.loaded.scene.lights.len() as u32 * self.settings.options.max_depth) as f32,
+            View::Cost => (STEPS_A_LEVEL * self.loaded.statistics.depth.max(1)) as f32,
+        };
+        (self.settings.view, automatic / self.settings.gain)
     }
 
     /// What the overlay shows.

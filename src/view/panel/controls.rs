@@ -5,12 +5,16 @@ use std::fmt::Display;
 use egui::{ComboBox, Grid, Slider, Ui};
 
 use super::Settings;
-use crate::frame::{Denoise, Primary, Tonemap, Traversal};
+use crate::frame::{Denoise, Primary, Tonemap, Traversal, View};
 
 /// The controls; all take effect with the next frame.
 pub fn show(ui: &mut Ui, settings: &mut Settings) {
     Grid::new("controls").num_columns(2).spacing([10.0, 3.0]).show(ui, |ui| {
-        let Settings { options, max_samples, budget_ms, vsync } = settings;
+        let Settings { options, max_samples, budget_ms, vsync, view, gain } = settings;
+        choice(ui, "view", view, View::ALL);
+        if matches!(view, View::Depth | View::Cost | View::Rays) {
+            row(ui, "brightness", |ui| ui.add(Slider::new(gain, 0.01..=100.0).logarithmic(true)));
+        }
         row(ui, "bounces", |ui| ui.add(Slider::new(&mut options.max_depth, 1..=16)));
         row(ui, "samples", |ui| ui.add(Slider::new(max_samples, 1..=4096).logarithmic(true)));
         row(ui, "exposure", |ui| ui.add(Slider::new(&mut options.exposure, 0.01..=100.0).logarithmic(true)));

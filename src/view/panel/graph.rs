@@ -24,7 +24,8 @@ pub fn show(ui: &mut Ui, history: &History) {
     for frame in history.frames() {
         let right = x_at(frame.shown_s).max(left);
         // What was long ago drawn shows as a gap, and is no wider than it took.
-        let begin = x_at(frame.shown_s - frame.frame_ms * 1e-3).max(left);
+        let busy_ms: f64 = frame.pass_ms.iter().map(|(_, ms)| ms).sum();
+        let begin = x_at(frame.shown_s - busy_ms.max(frame.frame_ms) * 1e-3).max(left);
         let mut bottom = area.bottom();
         for (name, color) in &passes {
             let height = (pass_ms(frame, name) / top_ms) as f32 * area.height();
@@ -32,7 +33,9 @@ pub fn show(ui: &mut Ui, history: &History) {
             painter.rect_filled(Rect::from_min_max(Pos2::new(begin, top), Pos2::new(right, bottom)), 0.0, *color);
             bottom = top;
         }
-        left = right;
+        if busy_ms > 0.0 {
+            left = right;
+        }
     }
     painter.text(
         area.left_top() + vec2(3.0, 1.0),

@@ -12,7 +12,7 @@ use super::{
     pick::Picked,
 };
 use crate::{
-    frame::{Profile, RenderOptions},
+    frame::{Profile, RenderOptions, View},
     gpu::MemoryUse,
 };
 
@@ -29,6 +29,9 @@ pub struct Settings {
     /// Milliseconds a frame while the camera moves.
     pub budget_ms: f64,
     pub vsync: bool,
+    pub view: View,
+    /// Factor on the brightness of views of numbers.
+    pub gain: f32,
 }
 
 /// What the user reads.
