@@ -41,6 +41,11 @@ impl Renderer {
         self.pending.is_some()
     }
 
+    /// Share of the next sample that is drawn, 0 to 1.
+    pub fn progress(&self) -> f32 {
+        self.pending.as_ref().map_or(0.0, |pending| pending.n_done as f32 / pending.commands.len() as f32)
+    }
+
     /// Batches have so many pixels at the most from now on, or as many as the queues hold. The picture does not depend on
     /// it. A sample that is begun is begun anew.
     ///
@@ -53,6 +58,11 @@ impl Renderer {
         self.most_pixels = most_pixels;
         let spans = self.spans(self.resources.constants());
         self.reschedule(spans)
+    }
+
+    /// What `limit_batches` was told last.
+    pub fn most_pixels(&self) -> Option<u32> {
+        self.most_pixels
     }
 
     /// The batches' spans of pixels, before any was found to be too large.

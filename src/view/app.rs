@@ -99,7 +99,7 @@ impl Display {
         });
         let reloader = Reloader::new(loaded.path.clone(), self.event_loop.create_proxy());
         let mut app = App {
-            session: Session::new(loaded, options.settings.clone()),
+            session: Session::new(loaded, options.settings.clone(), script.is_none()),
             is_overlaid: options.overlay,
             options,
             script,
@@ -285,8 +285,6 @@ impl ApplicationHandler<Wake> for App {
         if self.shown.is_none() {
             match self.open(event_loop) {
                 Ok(shown) => {
-                    // A small picture first: the full one may take a while.
-                    self.session.pace.moved(Instant::now());
                     self.shown = Some(shown);
                 }
                 Err(error) => self.end(event_loop, Err(error)),
@@ -315,6 +313,8 @@ impl ApplicationHandler<Wake> for App {
             WindowEvent::Resized(_) => {
                 if let Some(Shown { live, .. }) = &mut self.shown {
                     live.presenter.mark_stale();
+                    // As long as the user pulls at the window, it is drawn fast.
+                    self.session.pace.moved(Instant::now());
                 }
                 self.hear(event_loop, &event);
             }

@@ -18,11 +18,13 @@ pub struct Budget {
     step: u32,
     /// Expected milliseconds of a frame of the window's full size.
     full_ms: Option<f64>,
+    /// Whether there was a frame: the first one takes long, since drivers finish their kernels then.
+    is_warm: bool,
 }
 
 impl Budget {
     pub fn new(budget_ms: f64) -> Self {
-        Self { budget_ms, step: LEAST_STEP, full_ms: None }
+        Self { budget_ms, step: LEAST_STEP, full_ms: None, is_warm: false }
     }
 
     /// Milliseconds a frame.
@@ -41,13 +43,16 @@ impl Budget {
         (part(window.0), part(window.1))
     }
 
-    /// Expected milliseconds of a frame of the window's full size; none before there was a frame.
+    /// Expected milliseconds of a frame of the window's full size; none before there were two frames.
     pub fn full_ms(&self) -> Option<f64> {
         self.full_ms
     }
 
     /// Learns from a frame of a share of the sides that took so long, all of it counted.
     pub fn learn(&mut self, share: f64, ms: f64) {
+        if !std::mem::replace(&mut self.is_warm, true) {
+            return;
+        }
         let full_ms = ms / (share * share);
         let mean = self.full_ms.map_or(full_ms, |mean| mean + NEWEST * (full_ms - mean));
         self.full_ms = Some(mean);
@@ -90,6 +95,15 @@ mod tests {
             assert!(ms <= 16.0, "{full_ms}: {ms}");
             assert!(share == 1.0 || ms > 16.0 * 0.6, "{full_ms}: {ms} at {share}");
         }
+    }
+
+    #[test]
+    fn the_first_frame_teaches_nothing() {
+        let mut budget = Budget::new(16.0);
+        budget.learn(0.125, 5000.0);
+        assert_eq!(budget.full_ms(), None);
+        budget.learn(0.125, 1.0);
+        assert_eq!(budget.full_ms(), Some(64.0));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Another version of the scene, while the one before is shown.
 
-use std::{collections::BTreeSet, path::PathBuf, thread};
+use std::{collections::BTreeSet, path::PathBuf, thread, time::Instant};
 
 use winit::event_loop::EventLoopProxy;
 
@@ -83,6 +83,8 @@ impl Session {
                 self.controller.set_scene(loaded.scene.camera, loaded.bounds());
                 self.loaded = loaded;
                 self.picked = None;
+                // A small picture at once.
+                self.pace.moved(Instant::now());
                 self.message = None;
             }
             Err(error) => self.complain(&error.to_string()),

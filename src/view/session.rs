@@ -36,8 +36,12 @@ pub struct Session {
     pub all_frames: History,
     budget: Budget,
     profile: Profile,
+    /// Whether nobody waits for pictures of full size.
+    is_interactive: bool,
     /// Whether the last frame completed a sample.
     has_new_sample: bool,
+    /// The widest and the highest picture that there was.
+    room: (u32, u32),
     /// Milliseconds of the sample that is being drawn.
     sample_ms: f64,
     pub(super) picked: Option<Picked>,
@@ -46,7 +50,7 @@ pub struct Session {
 }
 
 impl Session {
-    pub fn new(loaded: Loaded, settings: Settings) -> Self {
+    pub fn new(loaded: Loaded, settings: Settings, is_interactive: bool) -> Self {
         Self {
             controller: Controller::new(loaded.scene.camera, loaded.bounds()),
             budget: Budget::new(settings.budget_ms),
@@ -56,8 +60,10 @@ impl Session {
             history: History::new(HISTORY_S),
             all_frames: History::new(f64::INFINITY),
             profile: Profile::default(),
+            is_interactive,
             has_new_sample: false,
             sample_ms: 0.0,
+            room: (0, 0),
             picked: None,
             message: None,
             start: Instant::now(),
@@ -66,7 +72,12 @@ impl Session {
 
     /// Whether the next frame will differ from the last one.
     pub fn is_busy(&self, live: &Live, now: Instant) -> bool {
-        self.controller.is_flying() || self.pace.is_moving(now) || !self.is_done(live)
+        self.controller.is_flying() || self.pace.is_moving(now) || self.is_learning() || !self.is_done(live)
+    }
+
+    /// Whether it is not known yet how long a picture takes: small ones tell.
+    fn is_learning(&self) -> bool {
+        self.is_interactive && self.budget.full_ms().is_none()
     }
 
     /// Whether the picture at rest has all its samples.
@@ -89,16 +100,20 @@ impl Session {
         live.context.wait()?;
         live.presenter.set_vsync(self.settings.vsync);
         self.budget.set_budget(self.settings.budget_ms);
-        let is_moving = self.pace.is_moving(now);
+        let is_moving = self.pace.is_moving(now) || self.is_learning();
         let (width, height) = if is_moving { self.budget.size(window) } else { window };
         let features = self.settings.view != View::Picture;
         let asked = RenderOptions { width, height, features, ..self.settings.options.clone() };
         let is_new = asked != *live.renderer.options();
+        self.make_room(live, window, is_moving)?;
         if is_new && let Err(error) = live.renderer.set_options(&asked, &self.loaded.tree) {
             self.take_back(live, &error);
         }
         if self.controller.camera() != live.renderer.camera() {
             live.renderer.set_camera(self.controller.camera());
+        }
+        if self.is_learning() {
+            live.renderer.reset_samples();
         }
         self.has_new_sample = false;
         if !self.is_done(live) {
@@ -110,13 +125,21 @@ impl Session {
         }
     }
 
+    /// Room for a picture as large as the window, before a small one is drawn: to make it later would lose that one.
+    fn make_room(&mut self, live: &mut Live, (width, height): (u32, u32), is_moving: bool) -> Result<(), GpuError> {
+        let has_room = width <= self.room.0 && height <= self.room.1;
+        self.room = (self.room.0.max(width), self.room.1.max(height));
+        if has_room || !is_moving { Ok(()) } else { live.renderer.resize(width, height) }
+    }
+
     /// A whole sample while the camera moves. At rest so much of it that input is not kept waiting.
     fn draw_part(&mut self, live: &mut Live, window: (u32, u32), is_moving: bool) -> Result<(), GpuError> {
         let renderer = &mut live.renderer;
         if !renderer.is_pending() {
             self.sample_ms = 0.0;
-            if renderer.n_samples() == 0 {
-                renderer.limit_batches(self.part_pixels(window).filter(|_| !is_moving))?;
+            let most_pixels = self.part_pixels(window).filter(|_| !is_moving);
+            if renderer.n_samples() == 0 || is_other_pace(most_pixels, renderer.most_pixels()) {
+                renderer.limit_batches(most_pixels)?;
             }
         }
         let start = Instant::now();
@@ -192,6 +215,7 @@ impl Session {
             window,
             picture: (options.width, options.height),
             n_samples: live.renderer.n_samples(),
+            progress: live.renderer.progress(),
             speed: self.controller.speed(),
             is_flying,
             profile: &self.profile,
@@ -206,5 +230,13 @@ impl Session {
     pub fn complain(&mut self, message: &str) {
         tracing::warn!("{message}");
         self.message = Some(message.to_owned());
+    }
+}
+
+/// Whether parts of so many pixels would take a fourth or four times as long as before.
+fn is_other_pace(a: Option<u32>, b: Option<u32>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => a >= 4 * b || b >= 4 * a,
+        (a, b) => a != b,
     }
 }

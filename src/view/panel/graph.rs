@@ -85,6 +85,7 @@ fn color(name: &str) -> Color32 {
 /// A round number that hardly any frame exceeds, so that one slow frame does not flatten the others.
 fn top_ms(history: &History) -> f64 {
     let mut sums: Vec<f64> = history.frames().map(|frame| frame.pass_ms.iter().map(|(_, ms)| ms).sum()).collect();
+    sums.retain(|sum| *sum > 0.0);
     sums.sort_by(f64::total_cmp);
     let most = sums.get(sums.len() * 95 / 100).copied().unwrap_or(0.0).max(0.01);
     let magnitude = 10f64.powf(most.log10().floor());

@@ -44,6 +44,8 @@ pub struct Facts<'a> {
     pub picture: (u32, u32),
     /// A pixel.
     pub n_samples: u32,
+    /// Share of the next sample that is drawn, 0 to 1.
+    pub progress: f32,
     /// World units a second.
     pub speed: f32,
     /// Whether S flies back, rather than saves.
@@ -104,7 +106,8 @@ fn status(ui: &mut Ui, settings: &Settings, facts: &Facts) {
     ui.label(facts.device);
     ui.label(format!("{}x{} in {}x{}", picture.0, picture.1, window.0, window.1));
     let way = if facts.is_flying { "fly" } else { "orbit" };
-    ui.label(format!("{n_samples} of {} samples; {way}, speed {:.3}/s", settings.max_samples, facts.speed));
+    let next = if facts.progress > 0.0 { format!(" + {:.0} %", 100.0 * facts.progress) } else { String::new() };
+    ui.label(format!("{n_samples}{next} of {} samples; {way}, speed {:.3}/s", settings.max_samples, facts.speed));
     ui.monospace("              p50     p95     p99");
     ui.monospace(percentiles("frame, ms ", facts.history.pace()));
     ui.monospace(percentiles("answer, ms", facts.history.latency()))
