@@ -324,8 +324,8 @@ impl ApplicationHandler<Wake> for App {
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
         let Some(Shown { live, ui, window }) = &self.shown else { return };
-        let now = Instant::now();
-        let is_busy = self.script.is_some() || self.session.is_busy(live, now);
+        let (now, size) = (Instant::now(), window.inner_size());
+        let is_busy = self.script.is_some() || self.session.is_busy(live, now, (size.width, size.height));
         let wait = if is_busy || !self.is_overlaid { Duration::MAX } else { ui.repaint_after() };
         if self.is_occluded {
             event_loop.set_control_flow(ControlFlow::Wait);

@@ -70,9 +70,11 @@ impl Session {
         }
     }
 
-    /// Whether the next frame will differ from the last one.
-    pub fn is_busy(&self, live: &Live, now: Instant) -> bool {
-        self.controller.is_flying() || self.pace.is_moving(now) || self.is_learning() || !self.is_done(live)
+    /// Whether the next frame will differ from the last one. `window`: pixels.
+    pub fn is_busy(&self, live: &Live, now: Instant, window: (u32, u32)) -> bool {
+        let options = live.renderer.options();
+        let is_small = window != (options.width, options.height);
+        is_small || self.controller.is_flying() || self.pace.is_moving(now) || self.is_learning() || !self.is_done(live)
     }
 
     /// Whether it is not known yet how long a picture takes: small ones tell.
