@@ -327,7 +327,8 @@ impl ApplicationHandler<Wake> for App {
         let (now, size) = (Instant::now(), window.inner_size());
         let is_busy = self.script.is_some() || self.session.is_busy(live, now, (size.width, size.height));
         let wait = if is_busy || !self.is_overlaid { Duration::MAX } else { ui.repaint_after() };
-        if self.is_occluded {
+        let has_area = size.width > 0 && size.height > 0;
+        if self.is_occluded || !has_area {
             event_loop.set_control_flow(ControlFlow::Wait);
         } else if is_busy || wait.is_zero() {
             window.request_redraw();
