@@ -22,7 +22,7 @@ const HISTORY_S: f64 = 5.0;
 /// Reads of the tree, for each of its levels, that are shown brightest: some rays of some ways down and up.
 const STEPS_A_LEVEL: u32 = 16;
 /// Milliseconds that input waits for at the most, as a rule, while a picture at rest is drawn.
-const PART_MS: f64 = 60.0;
+const PART_MS: f64 = 100.0;
 
 /// What is viewed, from where, how.
 pub struct Session {
@@ -102,9 +102,13 @@ impl Session {
         live.context.wait()?;
         live.presenter.set_vsync(self.settings.vsync);
         self.budget.set_budget(self.settings.budget_ms);
+        let features = self.settings.view != View::Picture;
+        if self.is_interactive && features != live.renderer.options().features {
+            // Other buffers, with nothing in them yet: a small picture first.
+            self.pace.moved(now);
+        }
         let is_moving = self.pace.is_moving(now) || self.is_learning();
         let (width, height) = if is_moving { self.budget.size(window) } else { window };
-        let features = self.settings.view != View::Picture;
         let asked = RenderOptions { width, height, features, ..self.settings.options.clone() };
         let is_new = asked != *live.renderer.options();
         self.make_room(live, window, is_moving)?;
@@ -235,10 +239,10 @@ impl Session {
     }
 }
 
-/// Whether parts of so many pixels would take a fourth or four times as long as before.
+/// Whether parts of so many pixels would take half or twice as long as before.
 fn is_other_pace(a: Option<u32>, b: Option<u32>) -> bool {
     match (a, b) {
-        (Some(a), Some(b)) => a >= 4 * b || b >= 4 * a,
+        (Some(a), Some(b)) => a >= 2 * b || b >= 2 * a,
         (a, b) => a != b,
     }
 }

@@ -2,9 +2,12 @@
 
 use std::time::Duration;
 
-use egui::{Context, TexturesDelta, ViewportId};
+use egui::{Context, Order, Pos2, TexturesDelta, ViewportId, pos2};
 use egui_winit::State;
-use winit::{event::WindowEvent, window::Window};
+use winit::{
+    event::{ElementState, WindowEvent},
+    window::Window,
+};
 
 use super::panel::{self, Facts, Settings};
 use crate::gpu::OverlayFrame;
@@ -12,6 +15,8 @@ use crate::gpu::OverlayFrame;
 /// The overlay's state.
 pub struct Ui {
     state: State,
+    /// Where the mouse is, points; egui itself knows it only at its next layout.
+    cursor: Pos2,
     /// When it wants to be laid out again, counted from its last layout.
     repaint_after: Duration,
 }
@@ -28,7 +33,7 @@ impl Ui {
         context.set_visuals(egui::Visuals::dark());
         let scale = Some(window.scale_factor() as f32);
         let state = State::new(context, ViewportId::ROOT, window, scale, window.theme(), None);
-        Self { state, repaint_after: Duration::ZERO }
+        Self { state, cursor: Pos2::ZERO, repaint_after: Duration::ZERO }
     }
 
     /// Tells the overlay of an event; true where it is the overlay's alone.
@@ -38,8 +43,17 @@ impl Ui {
             self.repaint_after = Duration::ZERO;
         }
         let context = self.state.egui_ctx();
+        if let WindowEvent::CursorMoved { position, .. } = event {
+            let scale = context.pixels_per_point();
+            self.cursor = pos2(position.x as f32 / scale, position.y as f32 / scale);
+        }
         match event {
-            WindowEvent::MouseInput { .. } | WindowEvent::MouseWheel { .. } => context.egui_wants_pointer_input(),
+            // A drag that began on the picture ends wherever the mouse is.
+            WindowEvent::MouseInput { state: ElementState::Released, .. } => false,
+            WindowEvent::MouseInput { .. } | WindowEvent::MouseWheel { .. } => {
+                context.egui_is_using_pointer()
+                    || context.layer_id_at(self.cursor).is_some_and(|layer| layer.order != Order::Background)
+            }
             WindowEvent::CursorMoved { .. } => context.egui_is_using_pointer(),
             WindowEvent::KeyboardInput { .. } => context.egui_wants_keyboard_input(),
             _ => false,

@@ -85,7 +85,8 @@ fn parts_that_overflow_are_drawn_anew() {
     let (scene, context) = (glass_in_glass(), device());
     let tree = tree_of(&scene);
     let new = |capacity| {
-        Renderer::with_queue_capacity(context.clone(), &scene, &tree, &options_of_parts(), capacity).expect("a renderer")
+        Renderer::with_queue_capacity(context.clone(), &scene, &tree, &options_of_parts(), capacity)
+            .expect("a renderer")
     };
     let whole = at_once(&mut new(100_000), 3);
     assert!(identical(&in_parts(&mut new(600), 3).0, &whole));

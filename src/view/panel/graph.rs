@@ -66,7 +66,7 @@ fn passes(history: &History) -> Vec<(&'static str, Color32)> {
 
 /// The same for a pass, whatever others run.
 fn color(name: &str) -> Color32 {
-    const COLORS: [(&str, Color32); 11] = [
+    const COLORS: [(&str, Color32); 13] = [
         ("visibility", Color32::from_rgb(120, 190, 255)),
         ("primary_hit", Color32::from_rgb(70, 130, 220)),
         ("trace", Color32::from_rgb(240, 130, 60)),
@@ -76,6 +76,8 @@ fn color(name: &str) -> Color32 {
         ("compact_reduce", Color32::from_rgb(200, 90, 110)),
         ("compact_spine", Color32::from_rgb(225, 120, 135)),
         ("compact_scatter", Color32::from_rgb(245, 160, 165)),
+        ("features", Color32::from_rgb(60, 160, 90)),
+        ("accumulate", Color32::from_rgb(210, 180, 240)),
         ("denoise", Color32::from_rgb(80, 180, 180)),
         ("tonemap", Color32::from_rgb(170, 170, 170)),
     ];
