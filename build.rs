@@ -1,4 +1,4 @@
-//! Compiles `glsl/passes/*` and `glsl/probes/*` to SPIR-V and turns `glsl/shared/layout.glsl` into Rust, both into `$OUT_DIR`.
+//! Compiles `glsl/{passes,probes,driver}/*` to SPIR-V and turns `glsl/shared/layout.glsl` into Rust, both into `$OUT_DIR`.
 
 use std::{
     env,
@@ -29,9 +29,9 @@ fn main() {
     }
 }
 
-/// The files of both folders, in a fixed order.
+/// The files of all folders, in a fixed order.
 fn shaders() -> Vec<PathBuf> {
-    let mut shaders: Vec<_> = ["glsl/passes", "glsl/probes"]
+    let mut shaders: Vec<_> = ["glsl/passes", "glsl/probes", "glsl/driver"]
         .into_iter()
         .flat_map(|folder| fs::read_dir(folder).unwrap_or_else(|e| panic!("{folder}: {e}")))
         .map(|entry| entry.expect("an entry of the folder").path())
@@ -46,7 +46,10 @@ fn compile(compiler: &shaderc::Compiler, path: &Path, name: &str) -> Result<Vec<
         Some("comp") => shaderc::ShaderKind::Compute,
         Some("vert") => shaderc::ShaderKind::Vertex,
         Some("frag") => shaderc::ShaderKind::Fragment,
-        _ => return Err(format!("{name}: a shader ends in .comp, .vert or .frag")),
+        Some("rgen") => shaderc::ShaderKind::RayGeneration,
+        Some("rmiss") => shaderc::ShaderKind::Miss,
+        Some("rchit") => shaderc::ShaderKind::ClosestHit,
+        _ => return Err(format!("{name}: a shader ends in .comp, .vert, .frag, .rgen, .rmiss or .rchit")),
     };
     let mut options = shaderc::CompileOptions::new().map_err(|e| e.to_string())?;
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);

@@ -1,14 +1,14 @@
 //! What a frame is asked for, and what comes of it: the options, the picture and the profile, alike on GPU and CPU.
 
-use serde::Serialize;
-
 mod aov;
 mod crop;
+mod profile;
 mod view;
 
 pub use self::{
     aov::{Aov, Channel, Samples},
     crop::Crop,
+    profile::{BounceStats, PassTime, Profile},
     view::View,
 };
 use crate::layout;
@@ -31,6 +31,8 @@ pub struct RenderOptions {
     pub denoise: Denoise,
     pub traversal: Traversal,
     pub primary: Primary,
+    /// Whether the device takes times and counts; without them its frames have empty profiles.
+    pub profile: bool,
     /// Note what the rays of each pixel meet and cost, too.
     pub features: bool,
 }
@@ -47,6 +49,7 @@ impl Default for RenderOptions {
             denoise: Denoise::Paper { threshold: Denoise::DEFAULT_THRESHOLD },
             traversal: Traversal::Mask,
             primary: Primary::Raster,
+            profile: true,
             features: false,
         }
     }
@@ -158,76 +161,6 @@ pub struct Picture {
     pub display: Vec<[u8; 4]>,
 }
 
-/// Where a frame's time went.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Profile {
-    /// The device's own name.
-    pub device: String,
-    /// In the order of execution.
-    pub passes: Vec<PassTime>,
-    /// One row a bounce, 0 = primary rays; batches added up.
-    pub bounces: Vec<BounceStats>,
-    /// Ray batches that the frame was split into; the most of any, where several frames are added up.
-    pub n_batches: u32,
-    /// From the first pass's start to the last one's end; none where the device has no timestamps.
-    pub frame_ms: Option<f64>,
-}
-
-/// One pass of one bounce; its batches added up.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PassTime {
-    /// Also the debug label and the kernel's file name.
-    pub name: &'static str,
-    /// None for passes that run once a frame.
-    pub bounce: Option<u32>,
-    /// None where the device has no timestamps.
-    pub ms: Option<f64>,
-}
-
-/// Rays of one bounce.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct BounceStats {
-    /// Rays whose closest hit was found.
-    pub n_rays: u64,
-    /// Those that hit something.
-    pub n_hits: u64,
-    /// Shadow segments that were tested.
-    pub n_shadow_rays: u64,
-}
-
-impl Profile {
-    /// Adds a frame's times and counts to those of others of the same options.
-    pub fn add(&mut self, frame: &Profile) {
-        let mut next = 0;
-        for pass in &frame.passes {
-            let known = self.passes.iter().position(|sum| sum.name == pass.name && sum.bounce == pass.bounce);
-            match known.map(|i| (i, &mut self.passes[i])) {
-                Some((i, sum)) => {
-                    sum.ms = sum.ms.zip(pass.ms).map(|(a, b)| a + b);
-                    next = i + 1;
-                }
-                None => {
-                    self.passes.insert(next, pass.clone());
-                    next += 1;
-                }
-            }
-        }
-        self.bounces.resize(self.bounces.len().max(frame.bounces.len()), BounceStats::default());
-        for (sum, bounce) in self.bounces.iter_mut().zip(&frame.bounces) {
-            sum.n_rays += bounce.n_rays;
-            sum.n_hits += bounce.n_hits;
-            sum.n_shadow_rays += bounce.n_shadow_rays;
-        }
-        self.frame_ms = self.frame_ms.zip(frame.frame_ms).map(|(a, b)| a + b);
-        self.n_batches = self.n_batches.max(frame.n_batches);
-    }
-
-    /// Milliseconds of all passes of one name, or none where any lacks a timestamp.
-    pub fn pass_ms(&self, name: &str) -> Option<f64> {
-        self.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.ms).sum()
-    }
-}
-
 words!(Traversal {
     Mask = "mask",
     MaskBoxes = "mask-boxes",
@@ -240,30 +173,3 @@ words!(Traversal {
 });
 words!(Tonemap { Linear = "linear", Agx = "agx", Aces = "aces" });
 words!(Primary { Raster = "raster", Trace = "trace" });
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn profiles_add_up() {
-        let pass = |name, bounce, ms| PassTime { name, bounce, ms: Some(ms) };
-        let stats = |n_rays| BounceStats { n_rays, n_hits: 1, n_shadow_rays: 2 };
-        let frame = |passes, n_batches| Profile {
-            device: "d".to_owned(),
-            passes,
-            bounces: vec![stats(10), stats(5)],
-            n_batches,
-            frame_ms: Some(4.0),
-        };
-        let mut sum = frame(vec![pass("trace", Some(0), 1.0), pass("tonemap", None, 2.0)], 3);
-        let later =
-            frame(vec![pass("trace", Some(0), 1.5), pass("accumulate", None, 0.5), pass("tonemap", None, 2.0)], 2);
-        sum.add(&later);
-        let expected = [pass("trace", Some(0), 2.5), pass("accumulate", None, 0.5), pass("tonemap", None, 4.0)];
-        assert_eq!((&sum.passes[..], sum.n_batches, sum.frame_ms), (&expected[..], 3, Some(8.0)));
-        assert_eq!(sum.bounces[0], BounceStats { n_rays: 20, n_hits: 2, n_shadow_rays: 4 });
-        sum.add(&Profile { frame_ms: None, ..later });
-        assert_eq!(sum.frame_ms, None);
-    }
-}

@@ -29,6 +29,7 @@ mod tests {
             BIND_BOUNCES => Some("Bounce"),
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
             BIND_KD_BOXES => Some("KdBox"),
+            BIND_LEAF_PLANES => Some("Plane"),
             BIND_CAST_RAYS => Some("CastRay"),
             BIND_PIXEL_FEATURES => Some("Feature"),
             BIND_COUNTERS => Some("Counters"),
@@ -46,9 +47,12 @@ mod tests {
         }
     }
 
+    /// Type and offset of each.
+    type Members = Vec<(&'static str, usize)>;
+
     /// Types and offsets of a block's only member, a struct or an array of structs, and the array's stride. No members
     /// where it is an array of vectors, which the kernel makes structs of itself.
-    fn members_of(block: &Type) -> (Option<Vec<(&'static str, usize)>>, Option<usize>) {
+    fn members_of(block: &Type) -> (Option<Members>, Option<usize>) {
         let Type::Struct(block) = block else { panic!("{block:?} is no block") };
         let (element, stride) = match &block.members[0].ty {
             Type::Array(array) => (&*array.element_ty, array.stride),
@@ -78,7 +82,8 @@ mod tests {
 
     /// Struct name and block of every binding and push constant of every pass's shaders.
     fn blocks() -> Vec<(&'static str, Type)> {
-        let sources = fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/glsl/passes")).expect("glsl/passes");
+        let folders = ["passes", "driver"].map(|name| format!("{}/glsl/{name}", env!("CARGO_MANIFEST_DIR")));
+        let sources = folders.iter().flat_map(|folder| fs::read_dir(folder).expect("a folder of shaders"));
         let variables = sources.flat_map(|source| {
             let name = source.expect("an entry").file_name().into_string().expect("a shader's name is UTF-8");
             let spirv = fs::read(format!("{}/{name}.spv", env!("OUT_DIR"))).expect("SPIR-V");
@@ -88,11 +93,12 @@ mod tests {
         variables
             .filter_map(|variable| match variable {
                 Variable::Descriptor { desc_bind, ty, .. } => Some((struct_at(desc_bind.bind())?, ty)),
-                // Two kinds of kernels, told apart by the one number that a cast's are given.
-                Variable::PushConstant { ty, .. } if members_of(&ty).0.is_some_and(|m| m.len() == 1) => {
-                    Some(("CastBatch", ty))
-                }
-                Variable::PushConstant { ty, .. } => Some(("Batch", ty)),
+                // Three kinds of kernels, told apart by how many numbers they are given.
+                Variable::PushConstant { ty, .. } => match members_of(&ty).0.map_or(0, |members| members.len()) {
+                    1 => Some(("CastBatch", ty)),
+                    2 => Some(("DriverCast", ty)),
+                    _ => Some(("Batch", ty)),
+                },
                 _ => None,
             })
             .collect()

@@ -11,6 +11,7 @@
 //!   gpu      the Vulkan layer
 //! cast     rays -> hits, without a frame
 //! cpu      both without Vulkan
+//! profile  times and counts -> each pass's rays
 //! output   picture -> file
 //! bench    all of it, timed
 //! view     all of it, in a window
@@ -23,6 +24,7 @@ mod words;
 
 pub mod frame;
 pub mod layout;
+mod profile;
 
 pub mod scene;
 

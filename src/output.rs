@@ -16,6 +16,7 @@ use image::{
     error::{ParameterError, ParameterErrorKind},
 };
 use tempfile::{NamedTempFile, SpooledTempFile};
+use tracing::info_span;
 
 pub use self::{heat_map::HeatMap, layers::write_layers};
 use crate::frame::Picture;
@@ -84,10 +85,12 @@ pub fn check(path: &Path) -> Result<(), OutputError> {
 
 /// Writes a picture in the format that the file's ending names. Both formats hold exactly the picture's RGB values.
 pub fn write_picture(path: &Path, picture: &Picture) -> Result<(), OutputError> {
-    let bytes = match Format::of(path)? {
+    let format = Format::of(path)?;
+    let bytes = info_span!("encode picture").in_scope(|| match format {
         Format::Png => encode(picture, rgb(&picture.display), ImageFormat::Png),
         Format::Exr => encode(picture, rgb(&picture.radiance), ImageFormat::OpenExr),
-    };
+    });
+    let _writing = info_span!("write picture").entered();
     write(path, &bytes.map_err(|source| OutputError::Encode { path: path.to_owned(), source })?)
 }
 

@@ -258,7 +258,7 @@ fn mistakes_are_told_in_one_line_before_anything_is_measured() {
     write_mesh(directory.path());
     let cases: [(&[&str], i32, &str); 11] = [
         (&[], 2, "paper"),
-        (&["driver"], 2, "driver"),
+        (&["pilot"], 2, "pilot"),
         (&["traversal"], 2, "MESH"),
         (&["traversal", "torus.obj", "--variants", "mask,rope"], 2, "`rope`"),
         (&["traversal", "torus.obj", "--cpu", "--device", "0"], 2, "--device"),

@@ -32,6 +32,17 @@ fn usage_mistakes_are_refused_before_the_scene_is_read() {
         (&["render", "none.toml", "--denoise", "off", "--denoise-threshold", "1"], "--denoise off"),
         (&["render", "none.toml", "--exposure", "0"], "--exposure"),
         (&["render", "none.toml", "--exposure", "inf"], "--exposure"),
+        (&["render", "none.toml", "--tonemap", "film"], "linear, agx, aces"),
+        (&["render", "none.toml", "--spp", "0"], "--spp"),
+        (&["render", "none.toml", "--spp", "2", "--trace", "x.json"], "single sample"),
+        (&["render", "none.toml", "--crop", "1,2,3"], "x0,y0,x1,y1"),
+        (&["render", "none.toml", "--crop", "5,2,5,9"], "x0 must be less than x1"),
+        (&["render", "none.toml", "--aov", "depth,colour"], "depth, normal, position"),
+        (&["render", "none.toml", "--frames", "1-2"], "--path"),
+        (&["render", "none.toml", "--path", "p.toml", "--frames", "2-1"], "comes after the last"),
+        (&["render", "none.toml", "--path", "p.toml", "--repeat", "2"], "--repeat"),
+        (&["render", "none.toml", "--path", "p.toml", "-o", "x.png"], "####"),
+        (&["render", "none.toml", "--path", "p.toml", "-o", "x#.#.png"], "more than one"),
         (&["render", "none.toml", "--traversal", "bvh"], "short-stack, "),
         (&["render", "none.toml", "--primary", "rays"], "raster, trace"),
         (&["render", "none.toml", "--threads", "0"], "--threads"),
@@ -107,6 +118,9 @@ fn help_and_version() {
         assert!(stdout(&output).contains("kdray") && stderr(&output).is_empty(), "{arguments:?}");
     }
     let help = stdout(&succeed(directory.path(), &["render", "--help"]));
+    for word in ["--spp", "--crop", "--aov", "linear, agx, aces", "--path"] {
+        assert!(help.contains(word), "{word}");
+    }
     for word in ["--size", "--max-depth", "mask, mask-boxes, restart", "raster|trace", "paper", "--validate", "SCENE"] {
         assert!(help.contains(word), "{word}");
     }

@@ -6,6 +6,8 @@ mod errors;
 mod generators;
 #[path = "scene/obj.rs"]
 mod obj;
+#[path = "scene/path.rs"]
+mod path;
 
 use std::{fs, path::Path};
 

@@ -4,6 +4,8 @@
 // not be the closest.
 // Reads cast_rays and the tree; writes cast_hits.
 #include "layout.glsl"
+
+const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
 
 layout(constant_id = 2) const bool ANY_HIT = false;

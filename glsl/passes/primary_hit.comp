@@ -21,8 +21,10 @@ layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock
 
 // 0: only make the rays, the trace pass finds their hits.
 layout(constant_id = 0) const uint FROM_RASTER = 1u;
-// 1: note what the ray costs.
-layout(constant_id = 2) const uint COUNT_COSTS = 0u;
+// Whether hits are counted.
+layout(constant_id = 2) const bool COUNTS = true;
+// Whether what the ray costs is noted.
+layout(constant_id = 3) const bool COUNT_COSTS = false;
 
 void main() {
     uint ray_ix = gl_GlobalInvocationID.x;
@@ -39,12 +41,14 @@ void main() {
             is_hit = triangle_ix != NO_TRIANGLE;
             if (is_hit) hit = clamp_to_triangle(shear_of(ray.origin, ray.direction), triangles[triangle_ix], triangle_ix);
             hits[ray_ix] = hit;
-            if (COUNT_COSTS == 1u) {
+            if (COUNT_COSTS) {
                 pixel_features[ray.pixel_ix].n_rays = 1u;
                 pixel_features[ray.pixel_ix].n_steps = is_hit ? 1u : 0u;
             }
         }
     }
-    uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
-    if (subgroupElect() && n_hits > 0u) atomicAdd(counters[batch.bounce_ix].n_hits, n_hits);
+    if (COUNTS) {
+        uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
+        if (subgroupElect() && n_hits > 0u) atomicAdd(counters[batch.bounce_ix].n_hits, n_hits);
+    }
 }

@@ -7,12 +7,14 @@
 // counters[].n_shadow_rays, pixel_features (n_rays, n_steps).
 #include "layout.glsl"
 
-// 1: note what segments cost.
-layout(constant_id = 2) const uint COUNT_COSTS = 0u;
-#include "steps.glsl"
+// Whether what segments cost is noted.
+layout(constant_id = 3) const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
 #include "surface.glsl"
 #include "light.glsl"
+
+// Whether tested segments are counted.
+layout(constant_id = 2) const bool COUNTS = true;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };
@@ -44,11 +46,13 @@ void main() {
         is_tested = hit.triangle_ix != NO_TRIANGLE && shadow_segment(rays[ray_ix], hit, lights[light_ix], segment);
         bool is_lit = is_tested && traverse(segment, 0.0, true).triangle_ix == NO_TRIANGLE;
         light_visibility[light_ix * frame.queue_capacity + ray_ix] = is_lit ? 1u : 0u;
-        if (COUNT_COSTS == 1u && is_tested) {
+        if (COUNT_COSTS && is_tested) {
             atomicAdd(pixel_features[rays[ray_ix].pixel_ix].n_rays, 1u);
             atomicAdd(pixel_features[rays[ray_ix].pixel_ix].n_steps, n_steps);
         }
     }
-    uint n_tested = subgroupAdd(is_tested ? 1u : 0u);
-    if (subgroupElect() && n_tested > 0u) atomicAdd(counters[batch.bounce_ix].n_shadow_rays, n_tested);
+    if (COUNTS) {
+        uint n_tested = subgroupAdd(is_tested ? 1u : 0u);
+        if (subgroupElect() && n_tested > 0u) atomicAdd(counters[batch.bounce_ix].n_shadow_rays, n_tested);
+    }
 }

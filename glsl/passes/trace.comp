@@ -5,10 +5,12 @@
 // Reads rays and the tree; writes hits, counters[].n_hits, pixel_features (n_rays, n_steps).
 #include "layout.glsl"
 
-// 1: note what rays cost.
-layout(constant_id = 2) const uint COUNT_COSTS = 0u;
-#include "steps.glsl"
+// Whether what rays cost is noted.
+layout(constant_id = 3) const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
+
+// Whether hits are counted.
+layout(constant_id = 2) const bool COUNTS = true;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };
@@ -24,12 +26,14 @@ void main() {
     if (ray_ix < bounces[batch.bounce_ix].n_rays) {
         Hit hit = traverse(rays[ray_ix], 0.0, false);
         hits[ray_ix] = hit;
-        if (COUNT_COSTS == 1u) {
+        if (COUNT_COSTS) {
             atomicAdd(pixel_features[rays[ray_ix].pixel_ix].n_rays, 1u);
             atomicAdd(pixel_features[rays[ray_ix].pixel_ix].n_steps, n_steps);
         }
         is_hit = hit.triangle_ix != NO_TRIANGLE;
     }
-    uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
-    if (subgroupElect() && n_hits > 0u) atomicAdd(counters[batch.bounce_ix].n_hits, n_hits);
+    if (COUNTS) {
+        uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
+        if (subgroupElect() && n_hits > 0u) atomicAdd(counters[batch.bounce_ix].n_hits, n_hits);
+    }
 }

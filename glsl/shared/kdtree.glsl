@@ -7,6 +7,7 @@
 #define KDRAY_KDTREE
 
 #include "layout.glsl"
+#include "steps.glsl"
 #include "triangle.glsl"
 
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
@@ -15,6 +16,8 @@ layout(std430, set = 0, binding = BIND_TRIANGLES) readonly buffer TrianglesBlock
 layout(std430, set = 0, binding = BIND_KD_NODES) readonly buffer KdNodesBlock { uvec2 kd_nodes[]; };
 layout(std430, set = 0, binding = BIND_KD_PARENTS) readonly buffer KdParentsBlock { uint kd_parents[]; };
 layout(std430, set = 0, binding = BIND_LEAF_TRIANGLES) readonly buffer LeafTrianglesBlock { uint leaf_triangles[]; };
+
+layout(std430, set = 0, binding = BIND_LEAF_PLANES) readonly buffer LeafPlanesBlock { vec4 leaf_planes[]; };
 
 layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
 
@@ -32,6 +35,7 @@ struct Cell {
 // finds, the traversal finds, along planes and through corners of cells as elsewhere.
 struct TraversalRay {
     Shear shear;
+    vec3 direction;
     vec3 inv_direction;
     vec3 bias;
     float t_min;
@@ -43,6 +47,7 @@ struct TraversalRay {
 TraversalRay traversal_ray(Ray ray, float t_min) {
     TraversalRay r;
     r.shear = shear_of(ray.origin, ray.direction);
+    r.direction = ray.direction;
     r.source_triangle = ray.source_triangle;
     r.t_min = t_min;
     // A direction in the plane is taken as all but in it: finite everywhere, and one rule for all ties.
@@ -58,12 +63,20 @@ TraversalRay traversal_ray(Ray ray, float t_min) {
     return r;
 }
 
+float largest_coordinate() {
+    vec3 largest = max(abs(frame.cell_min), abs(frame.cell_max));
+    return max(largest.x, max(largest.y, largest.z));
+}
+
+float plane_reach() {
+    return KD_PLANE_REACH * largest_coordinate();
+}
+
 // The ray with its origin moved along it to lie within KD_ORIGIN_REACH. t_start: how far; 0 for all but cameras far away.
 Ray near_scene(Ray ray, out float t_start) {
-    vec3 reach = KD_ORIGIN_REACH * max(abs(frame.cell_min), abs(frame.cell_max));
     vec3 away = abs(ray.origin);
     t_start = 0.0;
-    if (max(away.x, max(away.y, away.z)) <= max(reach.x, max(reach.y, reach.z))) return ray;
+    if (max(away.x, max(away.y, away.z)) <= KD_ORIGIN_REACH * largest_coordinate()) return ray;
     t_start = max(traversal_ray(ray, 0.0).t_enter, 0.0);
     precise vec3 origin = ray.origin + t_start * ray.direction;
     ray.origin = origin;
@@ -72,6 +85,7 @@ Ray near_scene(Ray ray, out float t_start) {
 }
 
 KdNode kd_node(uint node_ix) {
+    count_steps(1u);
     uvec2 words = kd_nodes[node_ix];
     return KdNode(words.x, words.y);
 }
@@ -163,9 +177,23 @@ void intersect(TraversalRay ray, uint triangle_ix, inout Hit best) {
     if (hit.t > ray.t_min && nearer && triangle_ix != ray.source_triangle) best = hit;
 }
 
-void intersect_leaf(TraversalRay ray, KdNode leaf, inout Hit best) {
+// Whether a segment keeps to one side of a plane, so far from it that no rounding of the hit test reaches across.
+bool is_clear(vec4 plane, vec3 from, vec3 to) {
+    float height_from = dot(plane.xyz, from) - plane.w;
+    float height_to = dot(plane.xyz, to) - plane.w;
+    return height_from * height_to > 0.0 && min(abs(height_from), abs(height_to)) > plane_reach();
+}
+
+// The leaf's triangles, but those whose planes the ray does not meet within the cell: it may meet them elsewhere, in a
+// leaf that has them too. Most triangles are in several leaves, so most tests are spared.
+void intersect_leaf(TraversalRay ray, KdNode leaf, vec2 interval, inout Hit best) {
+    vec3 from = ray.shear.origin + interval.x * ray.direction;
+    vec3 to = ray.shear.origin + interval.y * ray.direction;
     uint end = leaf.split_or_first + (leaf.axis_and_child >> KD_CHILD_SHIFT);
-    for (uint i = leaf.split_or_first; i < end; ++i) intersect(ray, leaf_triangles[i], best);
+    count_steps(end - leaf.split_or_first);
+    for (uint i = leaf.split_or_first; i < end; ++i) {
+        if (!is_clear(leaf_planes[i], from, to)) intersect(ray, leaf_triangles[i], best);
+    }
 }
 
 bool is_done(bool any_hit, Hit best) {
@@ -178,7 +206,8 @@ void search(TraversalRay ray, bool any_hit, inout Hit best) {
     Cell cell = Cell(0u, 0u, ray.t_enter, ray.t_exit);
     clear_pending();
     do {
-        intersect_leaf(ray, descend(ray, cell), best);
+        KdNode leaf = descend(ray, cell);
+        intersect_leaf(ray, leaf, vec2(cell.t_enter, min(cell.t_exit, best.t)), best);
     } while (!is_done(any_hit, best) && pop_pending(ray, best.t, cell));
 }
 

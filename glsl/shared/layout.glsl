@@ -31,6 +31,9 @@
 // Times the scene's largest coordinate: rays that start farther away are moved up to the scene first (the tree's
 // rounding margin is derived for this).
 #define KD_ORIGIN_REACH 4.0
+// Times the scene's largest coordinate: a ray that keeps this far from a triangle's plane within a leaf has no hit there.
+// Twice the tree's margin, the second for the rounding of the plane and of the ray's distance to it.
+#define KD_PLANE_REACH 0.0000152587890625
 
 // How rays find their way through the tree: the kernels' specialization constant TRAVERSAL.
 #define TRAVERSAL_MASK 0u
@@ -75,6 +78,13 @@ struct Triangle {
 struct KdNode {
     uint split_or_first;
     uint axis_and_child;
+};
+
+// 16 bytes: the plane of a leaf's triangle, at once beside the leaf's other planes. normal: unit length, or 0 where the
+// triangle has no area; a point p lies dot(normal, p) - distance above it.
+struct Plane {
+    vec3 normal;
+    float distance;
 };
 
 // 24 bytes: a node's cell, world units. Only some traversals need it.
@@ -213,7 +223,7 @@ struct Feature {
     float depth;
     // Primary, secondary and shadow rays.
     uint n_rays;
-    // Of all of them: nodes read and triangles tested.
+    // Of all of them: nodes read, and leaves' triangles.
     uint n_steps;
     uint reserved0;
     uint reserved1;
@@ -251,6 +261,12 @@ struct CastBatch {
     uint n_rays;
 };
 
+// Push constants of a cast by the driver's own ray tracing: the address of its structure.
+struct DriverCast {
+    uint scenery_low;
+    uint scenery_high;
+};
+
 // Bindings of the frame's descriptor set.
 #define BIND_FRAME 0u
 #define BIND_TRIANGLES 1u
@@ -276,12 +292,13 @@ struct CastBatch {
 #define BIND_COUNTERS 21u
 #define BIND_KD_BOXES 22u
 #define BIND_KD_ROPES 23u
-#define BIND_PIXEL_ACCUMULATED 24u
-#define BIND_PIXEL_FEATURES 25u
-#define N_BINDINGS 26u
+#define BIND_LEAF_PLANES 24u
+#define BIND_PIXEL_ACCUMULATED 25u
+#define BIND_PIXEL_FEATURES 26u
+#define N_BINDINGS 27u
 
 // A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
-#define BIND_CAST_RAYS 26u
-#define BIND_CAST_HITS 27u
+#define BIND_CAST_RAYS 27u
+#define BIND_CAST_HITS 28u
 
 #endif

@@ -23,10 +23,12 @@ void follow_ropes(TraversalRay ray, bool any_hit, inout Hit best) {
     uint node_ix = 0u;
     float t = ray.t_enter;
     do {
-        intersect_leaf(ray, leaf_at(ray, t, node_ix), best);
+        KdNode leaf = leaf_at(ray, t, node_ix);
         vec3 far = slabs_of(ray, node_ix).far;
         uint axis = far.x <= far.y && far.x <= far.z ? 0u : (far.y <= far.z ? 1u : 2u);
+        float t_enter = t;
         t = along(far, axis);
+        intersect_leaf(ray, leaf, vec2(t_enter, min(t, best.t)), best);
         if (is_done(any_hit, best) || best.t < t) return;
         uint is_above = along(ray.inv_direction, axis) < 0.0 ? 0u : 1u;
         node_ix = kd_ropes[6u * node_ix + 2u * axis + is_above];

@@ -1,13 +1,13 @@
-// What an invocation's rays read of the tree. Who includes this says whether to count: COUNT_COSTS, a constant; where it
-// is 0, nothing is left of it.
+// What an invocation's rays read of the tree. Who includes this says before whether to count, by COUNT_COSTS, a constant;
+// where it is false, nothing is left of the counting.
 #ifndef KDRAY_STEPS
 #define KDRAY_STEPS
 
-// Nodes read and triangles tested so far.
+// Nodes, and triangles of leaves, so far.
 uint n_steps = 0u;
 
 void count_steps(uint n) {
-    if (COUNT_COSTS == 1u) n_steps += n;
+    if (COUNT_COSTS) n_steps += n;
 }
 
 #endif

@@ -45,6 +45,53 @@ impl Difference {
     }
 }
 
+/// Of the distance of a hit, what two arithmetics may differ by: 2^-13. Corners and products are rounded by 2^-24 each,
+/// and a plane that a ray meets at a grazing angle moves its hit by a multiple of that.
+pub const T_TOLERANCE: f32 = 1.0 / 8192.0;
+
+/// How many hits of a set of rays are not those of a tracer that computes them otherwise. Which triangle was hit says
+/// nothing: many share edges and corners.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Apart {
+    /// A hit here and a miss there, or what is neither: a distance that is no number.
+    pub n_hit_or_miss: u64,
+    /// Distances that differ by more than [`T_TOLERANCE`] of themselves.
+    pub n_distance: u64,
+}
+
+impl Apart {
+    /// Of `found`, one hit a ray, from `reference`. Of hits that need not be the closest, only their being counts.
+    pub fn of(kind: RayKind, reference: &[Hit], found: &[Hit]) -> Self {
+        assert_eq!(reference.len(), found.len(), "one hit a ray");
+        let mut apart = Self::default();
+        for (reference, found) in reference.iter().zip(found) {
+            let is_near = (reference.t - found.t).abs() <= T_TOLERANCE * reference.t.abs();
+            let is_neither = reference.t.is_nan() || found.t.is_nan();
+            match (is_hit(reference), is_hit(found)) {
+                (a, b) if a != b || is_neither => apart.n_hit_or_miss += 1,
+                (true, true) if !is_near && !kind.is_any_hit() => apart.n_distance += 1,
+                _ => {}
+            }
+        }
+        apart
+    }
+
+    /// Of both kinds.
+    pub fn n_differing(&self) -> u64 {
+        self.n_hit_or_miss + self.n_distance
+    }
+
+    /// As [`Difference::is_rounding`].
+    pub fn is_rounding(&self, n_rays: usize) -> bool {
+        Difference { n_differing: self.n_differing(), n_grazing: 0 }.is_rounding(n_rays)
+    }
+}
+
+/// Whether it is one, and no miss and no number.
+pub fn is_hit(hit: &Hit) -> bool {
+    hit.triangle_ix != NO_TRIANGLE && !hit.t.is_nan()
+}
+
 enum Agreement {
     Same,
     Grazing,
@@ -103,6 +150,30 @@ mod tests {
     #[test]
     fn any_hit_is_as_good_as_another() {
         assert_eq!(counts(RayKind::Shadow, hit(2.0, 7), hit(9.0, 1)), (0, 0));
+    }
+
+    /// Of one wrong hit among right ones: hit or miss, distance.
+    fn apart(kind: RayKind, reference: Hit, found: Hit) -> (u64, u64) {
+        let right = [hit(1.0, 3), MISS];
+        let apart = Apart::of(kind, &[right[0], reference, right[1]], &[right[0], found, right[1]]);
+        assert_eq!(apart.n_differing(), apart.n_hit_or_miss + apart.n_distance);
+        (apart.n_hit_or_miss, apart.n_distance)
+    }
+
+    #[test]
+    fn another_arithmetic_may_find_another_triangle_but_not_another_distance() {
+        for kind in RayKind::ALL {
+            let beyond = if kind.is_any_hit() { (0, 0) } else { (0, 1) };
+            assert_eq!(apart(kind, hit(2.0, 7), hit(2.0002, 8)), (0, 0));
+            assert_eq!(apart(kind, hit(2.0, 7), hit(2.0003, 7)), beyond);
+            assert_eq!(apart(kind, hit(2.0, 7), hit(1.9997, 7)), beyond);
+            assert_eq!(apart(kind, hit(2.0, 7), MISS), (1, 0));
+            assert_eq!(apart(kind, MISS, hit(2.0, 7)), (1, 0));
+            assert_eq!(apart(kind, hit(2.0, 7), hit(f32::NAN, 7)), (1, 0));
+            assert_eq!(apart(kind, hit(f32::NAN, 7), hit(f32::NAN, 7)), (1, 0));
+        }
+        assert!(Apart { n_hit_or_miss: 1, n_distance: 1 }.is_rounding(200_000));
+        assert!(!Apart { n_hit_or_miss: 1, n_distance: 1 }.is_rounding(199_999));
     }
 
     #[test]

@@ -6,6 +6,8 @@
 //!   stage      scene -> room, camera, light, tree
 //!   rays       stage -> camera rays, and the rays that leave their hits
 //!   difference hits -> how many are not what the CPU finds
+//! driver     the traversal against the driver's own ray tracing
+//! size       one shape of ever more triangles
 //! chart      numbers -> SVG
 //! ```
 //!
@@ -14,12 +16,30 @@
 
 pub mod chart;
 pub mod difference;
+pub mod driver;
 pub mod paper;
 pub mod rays;
+pub mod size;
 pub mod stage;
 pub mod traversal;
 
+use std::time::{Duration, Instant};
+
 use serde::Serialize;
+
+/// How long a device works before its times count. One that has been idle for some seconds runs at a low clock (an H200
+/// at 345 MHz instead of 1980) until it has been busy for a while, and short bursts don't do.
+const WARM_UP: Duration = Duration::from_millis(300);
+
+/// Does the work again and again until the device is warm; at least once.
+fn warm_up<E>(mut work: impl FnMut() -> Result<(), E>) -> Result<(), E> {
+    let begin = Instant::now();
+    while {
+        work()?;
+        begin.elapsed() < WARM_UP
+    } {}
+    Ok(())
+}
 
 /// Numbers from repeated runs, in whatever unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::{
     Spread,
     chart::{BarChart, Scale, Series},
+    warm_up,
 };
 use crate::{
     cpu,
@@ -28,9 +29,6 @@ const REPORTED_MS: [[(u32, u32); 4]; 3] = [
     [(3551, 49), (8523, 108), (15_054, 539), (10_103, 534)],
     [(5723, 77), (14_106, 188), (24_736, 730), (16_213, 848)],
 ];
-/// Frames drawn before times count: the first one fills caches and finds how many batches the frame needs.
-const N_WARM_UP: u16 = 1;
-
 /// What the paper reports for a scene of the same triangle count; its geometry was not published.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Reported {
@@ -63,7 +61,7 @@ pub fn options(scene: &RenderDefaults, (width, height): (u32, u32)) -> RenderOpt
     }
 }
 
-/// Frames drawn on a device, after a warm-up.
+/// Frames drawn on a device, after a warm-up, which also finds how many batches the frame needs.
 ///
 /// # Errors
 /// As [`Renderer::new`] and [`Renderer::draw`].
@@ -75,9 +73,7 @@ pub fn draw_on_gpu(
     n_frames: u16,
 ) -> Result<Vec<Profile>, GpuError> {
     let mut renderer = Renderer::new(Arc::clone(context), scene, tree, options)?;
-    for _ in 0..N_WARM_UP {
-        renderer.draw()?;
-    }
+    warm_up(|| renderer.draw().map(drop))?;
     (0..n_frames).map(|_| renderer.draw()).collect()
 }
 

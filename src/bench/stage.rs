@@ -1,5 +1,7 @@
 //! Where rays are cast: a scene, a room around it, a camera and a light.
 
+use std::time::Instant;
+
 use glam::{BVec3, Vec3};
 
 use crate::{
@@ -19,6 +21,8 @@ const VERTICAL_FOV_DEGREES: f32 = 60.0;
 pub struct Stage {
     pub scene: Scene,
     pub tree: KdTree,
+    /// What it took to build the tree, wall-clock.
+    pub tree_build_ms: f64,
     /// What any traversal reads beside the tree.
     pub extras: Extras,
     /// The camera's constants. `queue_capacity` is 0: there is no queue.
@@ -32,10 +36,12 @@ impl Stage {
     pub fn open(scene: Scene, size: (u32, u32)) -> Self {
         let above = Light { position: Vec3::Y, kind: LIGHT_DIRECTIONAL, intensity: Vec3::ONE, reserved: 0 };
         let light = scene.lights.first().copied().unwrap_or(above);
+        let begin = Instant::now();
         let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
+        let tree_build_ms = begin.elapsed().as_secs_f64() * 1e3;
         let options = RenderOptions { width: size.0, height: size.1, ..RenderOptions::default() };
         let frame = frame_constants(&scene, &tree, &options);
-        Self { scene, extras: Extras::all(&tree), tree, frame, light }
+        Self { scene, extras: Extras::all(&tree), tree, tree_build_ms, frame, light }
     }
 
     /// The scene on the floor of a closed room, seen from inside the room, with a point light under its ceiling.

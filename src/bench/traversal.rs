@@ -6,7 +6,7 @@ use bytemuck::Zeroable;
 use serde::Serialize;
 
 use super::{
-    Spread,
+    Spread, WARM_UP,
     chart::{BarChart, Scale, Series},
     difference::Difference,
     rays::{RayKind, RaySet},
@@ -26,7 +26,7 @@ use crate::{
 
 /// Timed casts of one variant before it is the next one's turn. One more, which is not timed, begins each turn: the
 /// rays have just been uploaded, and another variant's tree is in the caches.
-const CASTS_A_TURN: u16 = 5;
+pub const CASTS_A_TURN: u16 = 5;
 
 /// The variants on one stage, ready for rays.
 pub struct Tracers<'a> {
@@ -56,6 +56,7 @@ impl<'a> Tracers<'a> {
         let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
         let expected = self.cast_on_cpu(Traversal::Mask, &rays, query);
         let mut results = vec![(Some(Vec::new()), Difference::default()); self.variants.len()];
+        self.warm_up(&rays, query)?;
         for n_casts in turns(n_times) {
             for (variant_ix, (all_ms, difference)) in results.iter_mut().enumerate() {
                 let (hits, ms) = self.cast(variant_ix, &rays, query, 1 + n_casts)?;
@@ -82,6 +83,17 @@ impl<'a> Tracers<'a> {
             n_hits: expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count(),
             variants: results.into_iter().enumerate().map(result).collect::<Result<_, GpuError>>()?,
         })
+    }
+
+    /// So many casts in one go that the device has no rest between them.
+    fn warm_up(&mut self, rays: &[CastRay], query: Query) -> Result<(), GpuError> {
+        let Some(caster) = self.casters.as_mut().and_then(|casters| casters.first_mut()) else { return Ok(()) };
+        let once_ms = caster.cast(rays, query, 1)?.gpu_ms.map_or(f64::INFINITY, |ms| ms.iter().sum());
+        let n_times = (WARM_UP.as_secs_f64() * 1e3 / once_ms.max(1e-2)) as u32;
+        if n_times > 1 {
+            caster.cast(rays, query, n_times)?;
+        }
+        Ok(())
     }
 
     /// Hits, and the milliseconds of each time (none without timestamps).
@@ -113,12 +125,13 @@ impl<'a> Tracers<'a> {
     }
 }
 
-fn cast_ray(ray: &Ray) -> CastRay {
+/// A ray of the renderer as one that is cast.
+pub(super) fn cast_ray(ray: &Ray) -> CastRay {
     CastRay { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
 }
 
 /// How many casts each turn has: all together `n_times`.
-fn turns(n_times: u16) -> impl Iterator<Item = u16> {
+pub(super) fn turns(n_times: u16) -> impl Iterator<Item = u16> {
     (0..n_times).step_by(CASTS_A_TURN.into()).map(move |first| CASTS_A_TURN.min(n_times - first))
 }
 

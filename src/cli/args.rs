@@ -34,7 +34,7 @@ pub enum Command {
     Devices,
     /// Describe a scene and its kd-tree
     Inspect(InspectArgs),
-    /// Measure: whole frames beside the paper's, or every way through the kd-tree
+    /// Measure: whole frames, ways through the kd-tree, the driver's own ray tracing, cost against size
     #[command(subcommand)]
     Bench(Suite),
 }
@@ -43,9 +43,16 @@ pub enum Command {
 pub struct RenderArgs {
     /// Scene file
     pub scene: PathBuf,
-    /// Picture to write, .png or .exr (linear radiance) [default: the scene's name, .png]
+    /// Picture to write, .png or .exr (linear radiance) [default: the scene's name, .png]; with --path, #### stands for
+    /// the frame's number
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
+    /// Move the camera as keyframes in this TOML file say, and write a picture a frame
+    #[arg(long, value_name = "FILE", conflicts_with = "repeat")]
+    pub path: Option<PathBuf>,
+    /// Frames of the path to render, as 0-99 or 7 [default: from the first keyframe to the last]
+    #[arg(long, value_name = "A-B", requires = "path")]
+    pub frames: Option<Frames>,
     /// Only the pixels x0 <= x < x1, y0 <= y < y1 of the picture, counted from its upper left corner
     #[arg(long, value_name = "x0,y0,x1,y1")]
     pub crop: Option<Crop>,
@@ -69,9 +76,12 @@ pub struct RenderArgs {
     /// Draw the frame so many times and report the one of median time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
-    /// Write the report as JSON, too
+    /// Write the report as JSON, with the times and rays of each pass of each bounce
     #[arg(long, value_name = "FILE")]
     pub profile: Option<PathBuf>,
+    /// Write what CPU and device did when as Chrome trace events, for Perfetto or chrome://tracing
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
     /// Run under the Khronos validation layer and fail on any message
     #[arg(long)]
     pub validate: bool,
@@ -131,8 +141,15 @@ impl RenderArgs {
     /// Refuses words that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         self.picture.check()?;
-        if self.output.is_some() && self.output == self.profile {
-            return Err(CliError::Usage("--output and --profile name the same file".into()));
+        if self.trace.is_some() && (self.spp > 1 || self.path.is_some()) {
+            return Err(CliError::Usage("--trace shows a single sample: it goes with neither --spp nor --path".into()));
+        }
+        let files = [("--output", &self.output), ("--profile", &self.profile), ("--trace", &self.trace)];
+        for (file_ix, (name, file)) in files.iter().enumerate() {
+            let same = files[..file_ix].iter().find(|(_, other)| file.is_some() && other == file);
+            if let Some((other, _)) = same {
+                return Err(CliError::Usage(format!("{other} and {name} name the same file")));
+            }
         }
         Ok(())
     }
@@ -146,7 +163,9 @@ impl RenderArgs {
                 "--crop {crop} reaches beyond the picture of {width}x{height} pixels"
             )));
         }
-        Ok(RenderOptions { crop: self.crop, features: !self.aov.is_empty(), ..options })
+        // Where anybody wants to know where the time went.
+        let profile = !self.quiet || self.profile.is_some() || self.trace.is_some();
+        Ok(RenderOptions { crop: self.crop, features: !self.aov.is_empty(), profile, ..options })
     }
 }
 
@@ -197,6 +216,27 @@ impl FromStr for Size {
     }
 }
 
+/// Frames from the first to the last, both of them too.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frames {
+    pub first: u32,
+    pub last: u32,
+}
+
+impl FromStr for Frames {
+    type Err = &'static str;
+
+    fn from_str(word: &str) -> Result<Self, Self::Err> {
+        let number = |digits: &str| digits.parse().ok().filter(|frame| *frame <= 1_000_000);
+        let (first, last) = word.split_once('-').unwrap_or((word, word));
+        match (number(first), number(last)) {
+            (Some(first), Some(last)) if first <= last => Ok(Self { first, last }),
+            (Some(_), Some(_)) => Err("the first frame comes after the last"),
+            _ => Err("expected A-B or A, whole numbers up to 1000000"),
+        }
+    }
+}
+
 /// An index where the word is a number, else a name.
 pub fn device(word: &str) -> Result<DeviceSelector, String> {
     match word.parse() {
@@ -222,6 +262,15 @@ mod tests {
         assert_eq!("1x16384".parse(), Ok(Size { width: 1, height: 16384 }));
         for word in ["", "x", "0x1", "1x0", "16385x1", "-1x1", "1x1x1", "1", "1 x 1", "4294967297x1", "1X1"] {
             assert!(word.parse::<Size>().is_err(), "{word}");
+        }
+    }
+
+    #[test]
+    fn frames() {
+        assert_eq!("3-17".parse(), Ok(Frames { first: 3, last: 17 }));
+        assert_eq!("0".parse(), Ok(Frames { first: 0, last: 0 }));
+        for word in ["", "-", "3-", "-3", "4-3", "1-2-3", "1.5-2", "0-1000001", "a-b"] {
+            assert!(word.parse::<Frames>().is_err(), "{word}");
         }
     }
 }

@@ -8,23 +8,30 @@ use std::{
 use indicatif::ProgressBar;
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::{
+    Layer,
+    filter::LevelFilter,
     fmt::{
         FmtContext, FormatFields,
         format::{FormatEvent, Writer},
     },
+    layer::SubscriberExt,
     registry::LookupSpan,
+    util::SubscriberInitExt,
 };
 
-/// Sends the library's remarks to standard error from now on: errors alone if `quiet`, else warnings, too.
-pub fn start(quiet: bool, bar: Option<&ProgressBar>) {
+use super::spans::Spans;
+
+/// Sends the library's remarks to standard error from now on: errors alone if `quiet`, else warnings, too. Its spans go
+/// to `spans`; without that they cost nothing.
+pub fn start(quiet: bool, bar: Option<&ProgressBar>, spans: Option<&Spans>) {
     let bar = bar.cloned();
-    let started = tracing_subscriber::fmt()
+    let lines = tracing_subscriber::fmt::layer()
         // They would go to a standard error that has just failed.
         .log_internal_errors(false)
-        .with_max_level(if quiet { Level::ERROR } else { Level::WARN })
         .event_format(Line)
         .with_writer(move || Beside(bar.clone()))
-        .try_init();
+        .with_filter(if quiet { LevelFilter::ERROR } else { LevelFilter::WARN });
+    let started = tracing_subscriber::registry().with(lines).with(spans.map(Spans::layer)).try_init();
     // A second command in one process keeps the first one's.
     drop(started);
 }

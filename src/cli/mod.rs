@@ -14,7 +14,9 @@ mod picture_args;
 mod progress;
 mod render;
 mod report;
+mod spans;
 mod table;
+mod trace;
 mod view;
 mod view_args;
 

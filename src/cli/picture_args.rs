@@ -59,6 +59,7 @@ impl PictureArgs {
             traversal: self.traversal,
             primary: self.primary,
             features: false,
+            profile: true,
         }
     }
 

@@ -7,7 +7,7 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::{complain, log};
+use super::{complain, log, spans::Spans};
 
 /// Stages of a command, told on standard error.
 pub enum Progress {
@@ -19,14 +19,19 @@ pub enum Progress {
 impl Progress {
     /// For a command of `n_stages`. The library's own remarks appear beside it.
     pub fn new(quiet: bool, n_stages: u64) -> Self {
+        Self::with_spans(quiet, n_stages, None)
+    }
+
+    /// As [`Progress::new`]; the library's spans go to `spans`.
+    pub fn with_spans(quiet: bool, n_stages: u64, spans: Option<&Spans>) -> Self {
         let progress = match (quiet, io::stderr().is_terminal()) {
             (true, _) => Self::Silent,
             (false, false) => Self::Lines,
             (false, true) => Self::bar(n_stages),
         };
         match &progress {
-            Self::Bar(bar) => log::start(quiet, Some(bar)),
-            Self::Silent | Self::Lines => log::start(quiet, None),
+            Self::Bar(bar) => log::start(quiet, Some(bar), spans),
+            Self::Silent | Self::Lines => log::start(quiet, None, spans),
         }
         progress
     }

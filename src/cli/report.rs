@@ -17,8 +17,9 @@ const TRACING: [&str; 4] = ["visibility", "primary_hit", "trace", "shadow"];
 #[derive(Serialize)]
 pub struct Report {
     pub scene: String,
-    pub picture: PathBuf,
-    /// Written beside it.
+    /// At least one, in the order of frames.
+    pub pictures: Vec<PathBuf>,
+    /// Written beside them.
     pub extra_files: Vec<PathBuf>,
     pub options: Options,
     /// A pixel.
@@ -201,10 +202,18 @@ impl Report {
         text.push('\n');
         text += &self.frame.bounces_text();
         text.push('\n');
-        for path in self.extra_files.iter().chain([&self.picture]) {
-            text += &format!("wrote {}\n", path.display());
-        }
+        text += &self.files_text();
         text
+    }
+
+    fn files_text(&self) -> String {
+        if let [first, .., last] = &self.pictures[..] {
+            let (n_pictures, n_extra) = (self.pictures.len(), self.extra_files.len());
+            let beside = if n_extra > 0 { format!(", and {n_extra} files beside them") } else { String::new() };
+            return format!("wrote {n_pictures} pictures, {} to {}{beside}\n", first.display(), last.display());
+        }
+        let paths = self.extra_files.iter().chain(&self.pictures);
+        paths.map(|path| format!("wrote {}\n", path.display())).collect()
     }
 
     /// The report as JSON that ends with a line break.
@@ -249,7 +258,7 @@ mod tests {
     use super::*;
 
     fn frame(ms: impl Fn(f64) -> Option<f64>) -> Frame {
-        let pass = |name, bounce, time| PassTime { name, bounce, ms: ms(time) };
+        let pass = |name, bounce, time| PassTime { name, bounce, ms: ms(time), ..PassTime::default() };
         let stats = |n_rays, n_shadow_rays| BounceStats { n_rays, n_hits: 3, n_shadow_rays };
         Frame::from(Profile {
             device: "d".to_owned(),
@@ -263,6 +272,7 @@ mod tests {
             bounces: vec![stats(3000, 1000), stats(500, 0)],
             n_batches: 1,
             frame_ms: ms(10.0),
+            begun_at: None,
         })
     }
 

@@ -3,7 +3,7 @@
 use super::table::{Counted, ReadCounts, Table, Uncounted};
 use crate::{
     kdtree::{Extras, KdTree},
-    layout::{Frame, KdBox, KdNode, Light, Material, Triangle},
+    layout::{Frame, KdBox, KdNode, Light, Material, Plane, Triangle},
     scene::Scene,
 };
 
@@ -20,6 +20,8 @@ pub struct Bindings<'a, R = Uncounted> {
     /// One a pair of nodes.
     pub kd_parents: Table<'a, u32, R>,
     pub leaf_triangles: Table<'a, u32, R>,
+    /// One an entry of `leaf_triangles`.
+    pub leaf_planes: &'a [Plane],
     /// One a node, or none where the traversal does not ask for them.
     pub kd_boxes: Table<'a, KdBox, R>,
     /// Six a node, or none.
@@ -47,6 +49,7 @@ impl<'a> Bindings<'a> {
             kd_nodes: Table::from(&*tree.nodes),
             kd_parents: Table::from(&*tree.parents),
             leaf_triangles: Table::from(&*tree.leaf_triangles),
+            leaf_planes: &tree.leaf_planes,
             kd_boxes: Table::from(&[][..]),
             kd_ropes: Table::from(&[][..]),
         }
@@ -63,6 +66,7 @@ impl<'a> Bindings<'a> {
             kd_nodes: self.kd_nodes.told_to(Counted(&counts.n_nodes)),
             kd_parents: self.kd_parents.told_to(Counted(&counts.n_links)),
             leaf_triangles: self.leaf_triangles.told_to(Counted(&counts.n_triangles)),
+            leaf_planes: self.leaf_planes,
             kd_boxes: self.kd_boxes.told_to(Counted(&counts.n_boxes)),
             kd_ropes: self.kd_ropes.told_to(Counted(&counts.n_links)),
         }

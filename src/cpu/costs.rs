@@ -1,5 +1,6 @@
-//! What the rays of a pixel cost: how many there are, and how many nodes and triangles they read. The kernels count in
-//! passing; here rays go through the tree once more, so that uncounted ones cost nothing.
+//! What the rays of a pixel cost: how many there are, and how many nodes, and triangles of leaves, they read. The kernels count in
+//! passing; here rays go through the tree once more, so that uncounted ones cost nothing. Brute force tests every triangle
+//! here, where a kernel ends at a shadow ray's first hit.
 
 use rayon::prelude::*;
 

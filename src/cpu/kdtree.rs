@@ -1,6 +1,6 @@
 //! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree.glsl`.
 
-use glam::Vec3;
+use glam::Vec3A;
 
 use super::{
     bindings::Bindings, brute, pending_backtrack::PendingBacktrack, pending_mask::Climb,
@@ -9,7 +9,9 @@ use super::{
 };
 use crate::{
     frame::Traversal,
-    layout::{Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_ORIGIN_REACH, KdNode, NO_TRIANGLE, Ray},
+    layout::{
+        Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_ORIGIN_REACH, KD_PLANE_REACH, KdNode, NO_TRIANGLE, Plane, Ray,
+    },
 };
 
 /// A node and the interval that the ray spends in it.
@@ -25,6 +27,10 @@ pub struct Cell {
 #[derive(Clone, Copy, Debug)]
 pub struct TraversalRay {
     shear: Shear,
+    origin: Vec3A,
+    direction: Vec3A,
+    /// How far a segment has to keep from a plane to be clear of it.
+    plane_reach: f32,
     pub(super) inv_direction: [f32; 4],
     /// Where the ray meets the plane at 0 on each axis, in t.
     pub(super) bias: [f32; 4],
@@ -62,6 +68,9 @@ impl TraversalRay {
         let far = [0, 1, 2].map(|i| max(t0[i], t1[i]));
         Self {
             shear: Shear::of(origin, ray.direction.to_array()),
+            origin: ray.origin.into(),
+            direction: ray.direction.into(),
+            plane_reach: KD_PLANE_REACH * largest_coordinate(bindings),
             inv_direction: by_axis(inv_direction),
             bias: by_axis(bias),
             t_min,
@@ -86,12 +95,15 @@ impl TraversalRay {
     }
 }
 
+#[inline(always)]
+fn largest_coordinate(bindings: &Bindings<impl Reads>) -> f32 {
+    bindings.frame.cell_min.abs().max(bindings.frame.cell_max.abs()).max_element()
+}
+
 /// The ray with its origin moved along it to lie within `KD_ORIGIN_REACH`, and how far: 0 for all but cameras far away.
 #[inline(always)]
 pub fn near_scene(bindings: &Bindings<impl Reads>, ray: &Ray) -> (Ray, f32) {
-    let largest = |v: Vec3| v.abs().max_element();
-    let reach = KD_ORIGIN_REACH * largest(bindings.frame.cell_min).max(largest(bindings.frame.cell_max));
-    if largest(ray.origin) <= reach {
+    if ray.origin.abs().max_element() <= KD_ORIGIN_REACH * largest_coordinate(bindings) {
         return (*ray, 0.0);
     }
     let t_start = max(TraversalRay::new(bindings, ray, 0.0).t_enter, 0.0);
@@ -153,12 +165,31 @@ fn intersect(bindings: &Bindings<impl Reads>, ray: &TraversalRay, triangle_ix: u
     }
 }
 
+/// Whether a segment keeps to one side of a plane, so far from it that no rounding of the hit test reaches across.
 #[inline(always)]
-pub(super) fn intersect_leaf(bindings: &Bindings<impl Reads>, ray: &TraversalRay, leaf: KdNode, best: &mut Hit) {
+fn is_clear(plane: &Plane, from: Vec3A, to: Vec3A, reach: f32) -> bool {
+    let normal = Vec3A::from(plane.normal);
+    let (height_from, height_to) = (normal.dot(from) - plane.distance, normal.dot(to) - plane.distance);
+    height_from * height_to > 0.0 && height_from.abs().min(height_to.abs()) > reach
+}
+
+/// The leaf's triangles, but those whose planes the ray does not meet within the cell.
+#[inline(always)]
+pub(super) fn intersect_leaf(
+    bindings: &Bindings<impl Reads>,
+    ray: &TraversalRay,
+    leaf: KdNode,
+    [t_enter, t_exit]: [f32; 2],
+    best: &mut Hit,
+) {
+    let (from, to) = (ray.origin + t_enter * ray.direction, ray.origin + t_exit * ray.direction);
     let first = leaf.split_or_first as usize;
-    let end = first + (leaf.axis_and_child >> KD_CHILD_SHIFT) as usize;
-    for &triangle_ix in &bindings.leaf_triangles[first..end] {
-        intersect(bindings, ray, triangle_ix, best);
+    let entries = first..first + (leaf.axis_and_child >> KD_CHILD_SHIFT) as usize;
+    let planes = &bindings.leaf_planes[entries.clone()];
+    for (plane, &triangle_ix) in planes.iter().zip(&bindings.leaf_triangles[entries]) {
+        if !is_clear(plane, from, to, ray.plane_reach) {
+            intersect(bindings, ray, triangle_ix, best);
+        }
     }
 }
 
@@ -183,7 +214,7 @@ pub(super) fn search<P: Pending, const ANY_HIT: bool>(
     pending.clear();
     loop {
         let leaf = descend(bindings, ray, pending, &mut cell);
-        intersect_leaf(bindings, ray, leaf, best);
+        intersect_leaf(bindings, ray, leaf, [cell.t_enter, min(cell.t_exit, best.t)], best);
         if is_done::<ANY_HIT>(best) || !pending.pop(bindings, ray, best.t, &mut cell) {
             return;
         }

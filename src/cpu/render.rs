@@ -20,7 +20,7 @@ use crate::{
     frame::{BounceStats, Picture, Primary, Profile, RenderOptions},
     kdtree::{Extras, KdTree},
     layout::{Bounce, Feature, Frame, Hit, Ray, SCAN_BLOCK_SIZE},
-    scene::Scene,
+    scene::{Camera, Scene},
 };
 
 /// How a frame is cut into pieces. The picture does not depend on it.
@@ -42,6 +42,7 @@ impl Default for Batching {
 /// A scene, and its picture in the making, sample by sample.
 pub struct Renderer<'a> {
     scene: &'a Scene,
+    camera: Camera,
     tree: &'a KdTree,
     options: &'a RenderOptions,
     batching: Batching,
@@ -71,6 +72,7 @@ impl<'a> Renderer<'a> {
         let n_pixels = frame.width as usize * frame.height as usize;
         Self {
             scene,
+            camera: scene.camera,
             tree,
             options,
             batching,
@@ -96,7 +98,7 @@ impl<'a> Renderer<'a> {
         self.clock = Clock::start();
         self.bounces.clear();
         self.n_batches = 0;
-        self.frame.set_view(&self.scene.camera, self.n_samples);
+        self.frame.set_view(&self.camera, self.n_samples);
         if self.n_samples == 1 {
             self.pixel_accumulated.clone_from(&self.pixel_radiance);
         }
@@ -111,6 +113,16 @@ impl<'a> Renderer<'a> {
         self.finish();
         self.n_samples += 1;
         self.profile()
+    }
+
+    /// Looks from elsewhere from the next sample on, which is the first of a new picture.
+    pub fn set_camera(&mut self, camera: &Camera) {
+        self.camera = *camera;
+        self.reset_samples();
+    }
+
+    pub fn options(&self) -> &RenderOptions {
+        self.options
     }
 
     /// The next sample is the first of a new picture.
@@ -162,6 +174,7 @@ impl<'a> Renderer<'a> {
             }
             let next = self.next_rays(depth, capacity);
             if next.overflow != 0 {
+                self.clock.end_batch(&stats, self.options.primary);
                 self.batch(first_pixel, n_pixels / 2);
                 self.batch(first_pixel + n_pixels / 2, n_pixels - n_pixels / 2);
                 return;
@@ -251,11 +264,8 @@ impl<'a> Renderer<'a> {
     fn count(&mut self, stats: &[BounceStats]) {
         self.n_batches += 1;
         self.bounces.resize(self.bounces.len().max(stats.len()), BounceStats::default());
-        for (sum, bounce) in self.bounces.iter_mut().zip(stats) {
-            sum.n_rays += bounce.n_rays;
-            sum.n_hits += bounce.n_hits;
-            sum.n_shadow_rays += bounce.n_shadow_rays;
-        }
+        self.bounces.iter_mut().zip(stats).for_each(|(sum, bounce)| sum.add(bounce));
+        self.clock.end_batch(stats, self.options.primary);
     }
 
     /// The mean of the samples, and the post processes.
@@ -275,6 +285,7 @@ impl<'a> Renderer<'a> {
         Profile {
             device: format!("CPU, {} threads", rayon::current_num_threads()),
             frame_ms: Some(self.clock.elapsed_ms()),
+            begun_at: Some(self.clock.begun_at()),
             passes: self.clock.passes().to_vec(),
             bounces: self.bounces.clone(),
             n_batches: self.n_batches,

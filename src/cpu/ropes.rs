@@ -2,7 +2,7 @@
 
 use super::{
     bindings::Bindings,
-    kdtree::{TraversalRay, axis_of, intersect_leaf, is_done},
+    kdtree::{TraversalRay, axis_of, intersect_leaf, is_done, min},
     table::Reads,
 };
 use crate::layout::{Hit, KD_LEAF, KdNode};
@@ -27,14 +27,15 @@ pub fn follow_ropes<const ANY_HIT: bool>(bindings: &Bindings<impl Reads>, ray: &
     let (mut node_ix, mut t) = (0, ray.t_enter);
     loop {
         let leaf = leaf_at(bindings, ray, t, &mut node_ix);
-        intersect_leaf(bindings, ray, leaf, best);
         let far = ray.slabs_of(bindings, node_ix).far;
         let axis = match (far[0] <= far[1] && far[0] <= far[2], far[1] <= far[2]) {
             (true, _) => 0,
             (_, true) => 1,
             _ => 2,
         };
+        let t_enter = t;
         t = far[axis];
+        intersect_leaf(bindings, ray, leaf, [t_enter, min(t, best.t)], best);
         if is_done::<ANY_HIT>(best) || best.t < t {
             return;
         }

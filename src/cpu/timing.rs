@@ -2,41 +2,59 @@
 
 use std::time::Instant;
 
-use crate::frame::PassTime;
+use crate::{
+    frame::{BounceStats, PassTime, Primary},
+    profile::count_rays,
+};
 
-/// Times passes by name and bounce; those of several batches are added up.
+/// Times passes by name, bounce and batch.
 pub struct Clock {
     begin: Instant,
     passes: Vec<PassTime>,
+    /// Of them, those of batches that have ended.
+    n_counted: usize,
+    batch_ix: u32,
 }
 
 impl Clock {
     pub fn start() -> Self {
-        Self { begin: Instant::now(), passes: Vec::new() }
+        Self { begin: Instant::now(), passes: Vec::new(), n_counted: 0, batch_ix: 0 }
     }
 
+    /// Two runs on end count as one.
     pub fn time<R>(&mut self, name: &'static str, bounce: Option<u32>, pass: impl FnOnce() -> R) -> R {
-        let begin = Instant::now();
+        let start_ms = self.elapsed_ms();
         let result = pass();
-        let ms = milliseconds_since(begin);
-        let is_same = |row: &&mut PassTime| row.name == name && row.bounce == bounce;
-        match self.passes.iter_mut().find(is_same) {
+        let ms = self.elapsed_ms() - start_ms;
+        let batch = bounce.map(|_| self.batch_ix);
+        let known = self.passes.last_mut().filter(|row| (row.name, row.bounce, row.batch) == (name, bounce, batch));
+        match known {
             Some(row) => row.ms = row.ms.map(|sum| sum + ms),
-            None => self.passes.push(PassTime { name, bounce, ms: Some(ms) }),
+            None => {
+                let times = PassTime { start_ms: Some(start_ms), ms: Some(ms), ..PassTime::default() };
+                self.passes.push(PassTime { name, bounce, batch, ..times });
+            }
         }
         result
     }
 
-    pub fn elapsed_ms(&self) -> f64 {
-        milliseconds_since(self.begin)
+    /// A batch has ended or been given up, with these counts.
+    pub fn end_batch(&mut self, bounces: &[BounceStats], primary: Primary) {
+        self.passes[self.n_counted..].iter_mut().for_each(|pass| count_rays(pass, bounces, primary));
+        self.n_counted = self.passes.len();
+        self.batch_ix += 1;
     }
 
-    /// In the order in which they were first timed.
+    /// In the order of execution.
     pub fn passes(&self) -> &[PassTime] {
         &self.passes
     }
-}
 
-fn milliseconds_since(begin: Instant) -> f64 {
-    begin.elapsed().as_secs_f64() * 1e3
+    pub fn begun_at(&self) -> Instant {
+        self.begin
+    }
+
+    pub fn elapsed_ms(&self) -> f64 {
+        self.begin.elapsed().as_secs_f64() * 1e3
+    }
 }

@@ -68,13 +68,10 @@ mod tests {
             assert!(grey(curve, 0.0).max_element() < 1e-5);
             assert!(grey(curve, f32::INFINITY).min_element() > 0.99);
             let mut before = -1.0;
-            for i in -40..=20 {
+            for i in -20..=20 {
                 let shown = grey(curve, 1.25_f32.powi(i));
                 assert!(shown.max_element() - shown.min_element() < 1e-3, "{curve}: {shown}");
-                assert!(
-                    shown.x > before || shown.x > 0.99 || curve == TONEMAP_AGX && shown.x < 1e-3,
-                    "{curve}: {shown}"
-                );
+                assert!(shown.x > before || shown.x > 0.99, "{curve}: {shown}");
                 before = shown.x;
             }
         }

@@ -19,7 +19,7 @@ pub enum Aov {
     Material,
     /// Rays that the pixel took: primary, secondary and shadow rays.
     Rays,
-    /// What they read of the tree: nodes and triangles.
+    /// What they read of the tree: nodes, and leaves' triangles.
     Cost,
 }
 

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use ash::vk;
 use bytemuck::Pod;
 
-use super::{Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, ray_tracing::RayTracingCalls};
+use super::{
+    Access, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, ray_tracing::RayTracingCalls,
+};
 
 /// A bottom level over all triangles, and a top level of one instance.
 pub struct Scenery {
@@ -40,7 +42,7 @@ impl Scenery {
             .vertex_format(vk::Format::R32G32B32_SFLOAT)
             .vertex_data(vk::DeviceOrHostAddressConstKHR { device_address: corners.any().address() })
             .vertex_stride(16)
-            .max_vertex(3 * triangles.len() as u32 - 1)
+            .max_vertex((3 * triangles.len() as u32).saturating_sub(1))
             .index_type(vk::IndexType::NONE_KHR);
         let bottom = Contents {
             name: "bottom level",
@@ -120,6 +122,7 @@ impl Level {
         // SAFETY: the buffer has the size that was asked for, and lives as long as the level.
         let raw = unsafe { calls.structures.create_acceleration_structure(&create, None) }
             .map_err(GpuError::call("vkCreateAccelerationStructureKHR", contents.name))?;
+        context.set_name(raw, contents.name);
         let level = Self { raw, bytes, context: context.clone() };
 
         // Room to round the address up.
@@ -131,7 +134,10 @@ impl Level {
         let timer = Timer::new(context, 1)?;
         let buffer = CommandBuffer::record(context, contents.name, Some(&timer), |commands| {
             commands.reset_timer();
+            commands.barrier(Access::TransferWrite, Access::StructureBuild); // corners, instances
+            commands.barrier(Access::StructureBuild, Access::StructureBuild); // the level below
             commands.pass(contents.name, None, || build(commands, calls, &info, contents.n_primitives));
+            commands.barrier(Access::StructureBuild, Access::RayTracingUpdate); // this level
         })?;
         context.submit(&[&buffer])?;
         context.wait()?;

@@ -15,6 +15,11 @@ pub enum Access {
     TransferRead,
     TransferWrite,
     HostRead,
+    /// Reads and writes of a ray generation shader, and the driver's reads of its structure. Only on a context with
+    /// ray tracing, like `StructureBuild`.
+    RayTracingUpdate,
+    /// What a build of the driver's structure reads and writes.
+    StructureBuild,
     /// Vertex, compute, uniform and indirect reads and transfers: between an upload and whatever uses it, or a frame and
     /// the next one's uploads.
     AllReads,
@@ -30,6 +35,8 @@ impl Access {
             // Updates are no copies, but clears.
             Self::TransferWrite => S::COPY | S::CLEAR,
             Self::HostRead => S::HOST,
+            Self::RayTracingUpdate => S::RAY_TRACING_SHADER_KHR,
+            Self::StructureBuild => S::ACCELERATION_STRUCTURE_BUILD_KHR,
             Self::AllReads => S::VERTEX_SHADER | S::COMPUTE_SHADER | S::DRAW_INDIRECT | S::COPY | S::CLEAR,
         }
     }
@@ -44,6 +51,13 @@ impl Access {
             Self::TransferRead => A::TRANSFER_READ,
             Self::TransferWrite => A::TRANSFER_WRITE,
             Self::HostRead => A::HOST_READ,
+            Self::RayTracingUpdate => {
+                A::SHADER_STORAGE_READ | A::SHADER_STORAGE_WRITE | A::ACCELERATION_STRUCTURE_READ_KHR
+            }
+            // Corners and instances are inputs that count as shader reads.
+            Self::StructureBuild => {
+                A::SHADER_READ | A::ACCELERATION_STRUCTURE_READ_KHR | A::ACCELERATION_STRUCTURE_WRITE_KHR
+            }
             Self::AllReads => {
                 A::SHADER_STORAGE_READ
                     | A::SHADER_STORAGE_WRITE

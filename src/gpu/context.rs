@@ -84,17 +84,17 @@ impl Context {
         Ok((Self::open(instance, physical, info, Purpose::Window)?, surface))
     }
 
-    /// As [`Context::new`], with the driver's own ray tracing, to compare with; none where the device lacks it.
+    /// As [`Context::new`], with the driver's own ray tracing, to compare with.
     ///
     /// # Errors
-    /// As [`Context::new`].
-    pub fn with_ray_tracing(options: &ContextOptions) -> Result<Option<Arc<Self>>, GpuError> {
+    /// As [`Context::new`]; the device lacks that extension.
+    pub fn with_ray_tracing(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::new(options.validate)?;
         let (physical, info) = select(&instance, options.device.as_ref(), None)?;
-        if !RayTracingCalls::available(&instance, physical) {
-            return Ok(None);
+        if let Some(missing) = RayTracingCalls::missing(&instance, physical) {
+            return Err(GpuError::Lacks { device: info.name, missing });
         }
-        Self::open(instance, physical, info, Purpose::RayTracing).map(Some)
+        Self::open(instance, physical, info, Purpose::RayTracing)
     }
 
     fn open(

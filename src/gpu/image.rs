@@ -90,6 +90,7 @@ impl Target {
                 .map_err(GpuError::call("vkBindImageMemory", name))?;
             target.view = target.create_view(name)?;
             context.set_name(raw, name);
+            context.set_name(target.view, name);
             Ok(target)
         }
     }

@@ -7,6 +7,7 @@ use bytemuck::Pod;
 
 use super::{
     Bindings, Buffer, BufferUse, Commands, Context, GpuError,
+    devices::text,
     instance::Instance,
     pipeline::{ENTRY_POINT, ShaderModule},
 };
@@ -25,11 +26,13 @@ impl RayTracingCalls {
     pub const EXTENSIONS: [&'static CStr; 3] =
         [khr::acceleration_structure::NAME, khr::ray_tracing_pipeline::NAME, khr::deferred_host_operations::NAME];
 
-    pub fn available(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
+    /// Those of the extensions that a device lacks, with commas; none where it has all.
+    pub fn missing(instance: &Instance, physical: vk::PhysicalDevice) -> Option<String> {
         // SAFETY: the device belongs to the instance.
         let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }.unwrap_or_default();
         let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
-        Self::EXTENSIONS.iter().all(|name| has(name))
+        let missing: Vec<_> = Self::EXTENSIONS.iter().filter(|name| !has(name)).map(|name| text(name)).collect();
+        (!missing.is_empty()).then(|| missing.join(", "))
     }
 
     pub fn new(instance: &Instance, physical: vk::PhysicalDevice, device: &ash::Device) -> Self {
@@ -106,6 +109,7 @@ impl RayTracingPipeline {
         // SAFETY: all that `info` points to lives until the call returns.
         let raw = unsafe { calls.pipelines.create_ray_tracing_pipelines(deferred, cache, &info, None) }
             .map_err(|(_, result)| GpuError::call("vkCreateRayTracingPipelinesKHR", desc.name)(result))?[0];
+        context.set_name(raw, desc.name);
         let table = match table(context, calls, raw, groups.len()) {
             Ok(table) => table,
             Err(error) => {

@@ -34,6 +34,7 @@ impl Timer {
         // SAFETY: a plain creation.
         let pool = unsafe { context.device.create_query_pool(&info, None) }
             .map_err(GpuError::call("vkCreateQueryPool", "timer"))?;
+        context.set_name(pool, "timer");
         Ok(Self { pool, capacity, rows: RefCell::default(), context: context.clone() })
     }
 

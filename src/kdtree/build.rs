@@ -8,6 +8,7 @@ use super::{
     BuildOptions, KdTree,
     bounds::{Bounds, Reference, is_finite},
     flatten::flatten,
+    planes::planes_of,
     sah::Split,
     search::Search,
     subtree::{self, Cell, Input, Subtree, sort_out},
@@ -46,7 +47,9 @@ impl KdTree {
         let n = references.len() as u64;
         let budget = (n * u64::from(options.max_references_per_triangle) + MIN_BUDGET).min(MAX_BUDGET.max(n));
         let cell = Cell { bounds, level: 0, budget };
-        flatten(grow(Input { triangles, options, margin }, references, cell), bounds)
+        let mut tree = flatten(grow(Input { triangles, options, margin }, references, cell), bounds);
+        tree.leaf_planes = planes_of(triangles, &tree.leaf_triangles);
+        tree
     }
 }
 

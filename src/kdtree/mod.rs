@@ -20,6 +20,7 @@ mod counted;
 mod coverage;
 mod extras;
 mod flatten;
+mod planes;
 mod ropes;
 mod sah;
 mod search;
@@ -29,7 +30,7 @@ mod validate;
 
 use glam::Vec3;
 
-use crate::layout::{KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_MAX_DEPTH, KdNode};
+use crate::layout::{KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_MAX_DEPTH, KdNode, Plane};
 
 pub use extras::Extras;
 pub use statistics::Statistics;
@@ -45,6 +46,8 @@ pub struct KdTree {
     pub parents: Vec<u32>,
     /// Triangle indices, leaf after leaf in depth-first order, ascending in each leaf.
     pub leaf_triangles: Vec<u32>,
+    /// The plane of each of `leaf_triangles`.
+    pub leaf_planes: Vec<Plane>,
     /// The root's cell is the exact bounds of all triangles (a box of zeros for none).
     pub cell_min: Vec3,
     pub cell_max: Vec3,

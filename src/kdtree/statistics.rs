@@ -21,7 +21,7 @@ pub struct Statistics {
     /// Expected cost of a ray that crosses the root's cell, in the unit of the build's costs (MacDonald and Booth 1990):
     /// the sum over all nodes of their own cost times the share of the root's surface that their cell has.
     pub sah_cost: f64,
-    /// Nodes, parents and leaves in memory.
+    /// Nodes, parents, and leaves with their planes, in memory.
     pub bytes: u64,
 }
 
@@ -32,8 +32,10 @@ impl KdTree {
             depth: self.depth,
             n_references: self.leaf_triangles.len() as u64,
             references_per_triangle: self.leaf_triangles.len() as f64 / n_triangles.max(1) as f64,
-            bytes: (size_of_val(&*self.nodes) + size_of_val(&*self.parents) + size_of_val(&*self.leaf_triangles))
-                as u64,
+            bytes: (size_of_val(&*self.nodes)
+                + size_of_val(&*self.parents)
+                + size_of_val(&*self.leaf_triangles)
+                + size_of_val(&*self.leaf_planes)) as u64,
             ..Default::default()
         };
         let root = (self.cell_min.as_dvec3().to_array(), self.cell_max.as_dvec3().to_array());

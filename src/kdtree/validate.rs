@@ -4,6 +4,7 @@ use super::{
     EMPTY_LEAF, KdTree, Node,
     bounds::{Bounds, is_finite},
     coverage,
+    planes::planes_of,
 };
 use crate::layout::{KD_MAX_DEPTH, Triangle};
 
@@ -38,6 +39,8 @@ pub enum Invalid {
     Depth { recorded: u32, found: u32 },
     #[error("leaf {node} lacks triangle {triangle}")]
     Missing { node: u32, triangle: u32 },
+    #[error("leaf_planes are not those of leaf_triangles")]
+    Planes,
 }
 
 impl KdTree {
@@ -60,7 +63,9 @@ impl KdTree {
             return Err(Invalid::Unused);
         }
         Walk::new(self, triangles, margin).run(root)?;
-        coverage::check(self, triangles, margin)
+        coverage::check(self, triangles, margin)?;
+        let are_right = self.leaf_planes == planes_of(triangles, &self.leaf_triangles);
+        if are_right { Ok(()) } else { Err(Invalid::Planes) }
     }
 }
 

@@ -6,6 +6,8 @@ use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, SmallVec, WritableImage,
 };
 
+use tracing::info_span;
+
 use super::{OutputError, write};
 use crate::{
     frame::{Aov, Channel, Picture, Samples},
@@ -28,7 +30,9 @@ pub fn write_layers(path: &Path, picture: &Picture, aovs: &[Aov], features: &[Fe
             channels.extend(aov.channels(features));
         }
     }
-    let bytes = encode((picture.width as usize, picture.height as usize), channels);
+    let size = (picture.width as usize, picture.height as usize);
+    let bytes = info_span!("encode picture").in_scope(|| encode(size, channels));
+    let _writing = info_span!("write picture").entered();
     write(path, &bytes.map_err(|source| OutputError::EncodeLayers { path: path.to_owned(), source })?)
 }
 

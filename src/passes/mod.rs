@@ -100,7 +100,8 @@ impl Passes {
         from: &RenderOptions,
         to: &RenderOptions,
     ) -> Result<(), GpuError> {
-        if (from.traversal, from.features) != (to.traversal, to.features) {
+        let counts = |options: &RenderOptions| (options.profile, options.features);
+        if (from.traversal, counts(from)) != (to.traversal, counts(to)) {
             let trace = Trace::new(context, bindings, to)?;
             self.shadow = Shadow::new(context, bindings, to)?;
             self.trace = trace;
@@ -108,7 +109,7 @@ impl Passes {
         if from.tonemap != to.tonemap {
             self.tonemap = Tonemap::new(context, bindings, to.tonemap)?;
         }
-        if (from.primary, from.features) != (to.primary, to.features) {
+        if (from.primary, counts(from)) != (to.primary, counts(to)) {
             self.primary_hit = PrimaryHit::new(context, bindings, to)?;
         }
         Ok(())

@@ -21,8 +21,9 @@ impl PrimaryHit {
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        // The second is the triangle test's FUSED_FMA, which a hit with a known triangle does without.
-        let constants = [u32::from(options.primary == Primary::Raster), 0, options.features.into()];
+        // The second is the triangle test's FUSED_FMA, which clamping a hit to its triangle has no use for.
+        let from_raster = u32::from(options.primary == Primary::Raster);
+        let constants = [from_raster, 0, options.profile.into(), options.features.into()];
         Ok(Self { kernel: kernel(context, bindings, "primary_hit", spirv!("primary_hit.comp"), &constants)? })
     }
 

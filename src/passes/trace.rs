@@ -21,7 +21,7 @@ impl Trace {
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
         let [traversal, fuses_fma] = traversal_constants(context, options.traversal)?;
-        let constants = [traversal, fuses_fma, options.features.into()];
+        let constants = [traversal, fuses_fma, options.profile.into(), options.features.into()];
         Ok(Self { kernel: kernel(context, bindings, "trace", spirv!("trace.comp"), &constants)? })
     }
 

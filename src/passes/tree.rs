@@ -7,14 +7,22 @@ use crate::{
     gpu::{Binding, Buffer, BufferUse, Context, GpuError},
     kdtree::{Extras, KdTree},
     layout::{
-        BIND_FRAME, BIND_KD_BOXES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_ROPES, BIND_LEAF_TRIANGLES, BIND_TRIANGLES,
-        BRUTE_MAX_TRIANGLES, Frame, KdBox, KdNode, Triangle,
+        BIND_FRAME, BIND_KD_BOXES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_ROPES, BIND_LEAF_PLANES,
+        BIND_LEAF_TRIANGLES, BIND_TRIANGLES, BRUTE_MAX_TRIANGLES, Frame, KdBox, KdNode, Plane, Triangle,
     },
 };
 
 /// The bindings' numbers.
-pub(super) const BINDINGS: [u32; 7] =
-    [BIND_FRAME, BIND_TRIANGLES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_LEAF_TRIANGLES, BIND_KD_BOXES, BIND_KD_ROPES];
+pub(super) const BINDINGS: [u32; 8] = [
+    BIND_FRAME,
+    BIND_TRIANGLES,
+    BIND_KD_NODES,
+    BIND_KD_PARENTS,
+    BIND_LEAF_TRIANGLES,
+    BIND_LEAF_PLANES,
+    BIND_KD_BOXES,
+    BIND_KD_ROPES,
+];
 
 /// Triangles, their kd-tree, and the constants that hold the root's cell.
 pub struct Tree {
@@ -25,6 +33,8 @@ pub struct Tree {
     /// One a pair of nodes.
     pub kd_parents: Buffer<u32>,
     pub leaf_triangles: Buffer<u32>,
+    /// One an entry of `leaf_triangles`.
+    pub leaf_planes: Buffer<Plane>,
     /// One a node, after `add_extras`.
     pub kd_boxes: Buffer<KdBox>,
     /// Six a node, after `add_extras`.
@@ -49,6 +59,7 @@ impl Tree {
             kd_nodes: Buffer::with(context, "kd_nodes", &tree.nodes, storage)?,
             kd_parents: Buffer::with(context, "kd_parents", &tree.parents, storage)?,
             leaf_triangles: Buffer::with(context, "leaf_triangles", &tree.leaf_triangles, storage)?,
+            leaf_planes: Buffer::with(context, "leaf_planes", &tree.leaf_planes, storage)?,
             kd_boxes: Buffer::new(context, "kd_boxes", 0, storage)?,
             kd_ropes: Buffer::new(context, "kd_ropes", 0, storage)?,
         })
@@ -77,6 +88,7 @@ impl Tree {
             self.kd_nodes.any(),
             self.kd_parents.any(),
             self.leaf_triangles.any(),
+            self.leaf_planes.any(),
             self.kd_boxes.any(),
             self.kd_ropes.any(),
         ];

@@ -66,7 +66,7 @@ impl Renderer {
         if same_samples(&before, options) {
             self.resources.set_constants(&constants);
         } else {
-            self.make_room(constants, options.features)?;
+            self.make_room(constants, options)?;
             self.reset_samples();
         }
         self.options = options.clone();
@@ -74,14 +74,14 @@ impl Renderer {
     }
 
     /// Buffers and batches for other sizes, another number of bounces, or other outputs.
-    fn make_room(&mut self, constants: Frame, features: bool) -> Result<(), GpuError> {
+    fn make_room(&mut self, constants: Frame, options: &RenderOptions) -> Result<(), GpuError> {
         let capacity = self.fixed_capacity;
         let limits = self.context.limits();
         let queue_capacity = capacity.unwrap_or_else(|| queue_capacity(limits, &constants, self.branches));
         let constants = Frame { queue_capacity, ..constants };
         let spans = self.spans(&constants);
-        let schedule = Schedule::new(&self.context, &constants, spans)?;
-        if !self.resources.fit(&self.context, &constants, features)? {
+        let schedule = Schedule::new(&self.context, &constants, spans, options.profile)?;
+        if !self.resources.fit(&self.context, &constants, options.features)? {
             self.displayed = None;
         }
         self.resources.resize_bounces(&self.context, schedule.n_rows())?;

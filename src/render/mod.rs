@@ -7,6 +7,8 @@ mod schedule;
 
 use std::sync::Arc;
 
+use tracing::info_span;
+
 use self::{
     parts::Pending,
     schedule::{Schedule, queue_capacity, split_evenly},
@@ -81,11 +83,13 @@ impl Renderer {
         constants.queue_capacity =
             fixed_capacity.unwrap_or_else(|| queue_capacity(context.limits(), &constants, branches));
         let spans = split_evenly(constants.width * constants.height, constants.queue_capacity);
-        let schedule = Schedule::new(&context, &constants, spans)?;
+        let schedule = Schedule::new(&context, &constants, spans, options.profile)?;
+        let uploading = info_span!("upload scene").entered();
         let mut resources = Resources::new(&context, scene, tree, &constants, schedule.n_rows())?;
         resources.fit(&context, &constants, options.features)?;
         resources.add_extras(&context, tree, options.traversal)?;
-        let passes = Passes::new(&context, &resources.bindings, options)?;
+        drop(uploading);
+        let passes = info_span!("make pipelines").in_scope(|| Passes::new(&context, &resources.bindings, options))?;
         let (camera, options) = (scene.camera, options.clone());
         Ok(Self {
             context,
@@ -155,6 +159,7 @@ impl Renderer {
     /// # Errors
     /// A failed copy.
     pub fn picture(&self) -> Result<Picture, GpuError> {
+        let _fetching = info_span!("fetch picture").entered();
         let (pixels, n_pixels) = (&self.resources.pixels, self.resources.n_pixels());
         let (window, crop) = (self.options.window(), self.options.crop_or_whole());
         let display = pixels.pixel_display.download_first(n_pixels)?;
@@ -199,7 +204,7 @@ impl Renderer {
     }
 
     fn command_buffer(&self, name: &str, body: impl FnOnce(&Commands)) -> Result<CommandBuffer, GpuError> {
-        CommandBuffer::record(&self.context, name, Some(&self.schedule.timer), body)
+        CommandBuffer::record(&self.context, name, self.schedule.timer.as_ref(), body)
     }
 
     fn begin_frame(&self, commands: &Commands) {

@@ -1,5 +1,9 @@
 //! A sample in parts, for those who have to do something else meanwhile.
 
+use std::time::Instant;
+
+use tracing::info_span;
+
 use super::{
     Renderer,
     schedule::{Schedule, split_evenly},
@@ -16,6 +20,8 @@ pub(super) struct Pending {
     /// How many of the commands have run.
     n_done: usize,
     sample_ix: u32,
+    /// When its first commands were submitted.
+    begun_at: Option<Instant>,
 }
 
 impl Renderer {
@@ -73,7 +79,8 @@ impl Renderer {
 
     fn reschedule(&mut self, spans: Vec<(u32, u32)>) -> Result<(), GpuError> {
         self.pending = None;
-        let schedule = Schedule::new(&self.context, self.resources.constants(), spans)?;
+        let timed = self.options.profile;
+        let schedule = Schedule::new(&self.context, self.resources.constants(), spans, timed)?;
         self.resources.resize_bounces(&self.context, schedule.n_rows())?;
         self.schedule = schedule;
         Ok(())
@@ -96,25 +103,29 @@ impl Renderer {
         };
         let rest = &pending.commands[pending.n_done..];
         let now = &rest[..n_buffers.min(rest.len())];
+        let running = info_span!("submit and wait").entered();
+        let begun_at = *pending.begun_at.get_or_insert_with(Instant::now);
         self.context.submit(&now.iter().collect::<Vec<_>>())?;
         self.context.wait()?;
+        drop(running);
         pending.n_done += now.len();
         if pending.n_done < pending.commands.len() {
             self.pending = Some(pending);
             return Ok(None);
         }
+        let _fetching = info_span!("fetch counts").entered();
         let bounces = self.resources.bounces.download()?;
         if bounces.iter().any(|row| row.overflow != 0) {
             // At once and whole: pixel_display shows a picture without the rays that had no room.
             let spans = self.schedule.split(&bounces, self.resources.constants())?;
             pending.commands.clear();
             self.reschedule(spans)?;
-            self.pending = Some(Pending { commands: self.record()?, n_done: 0, ..pending });
+            self.pending = Some(self.recorded(pending.sample_ix)?);
             return self.try_to_go_on(usize::MAX);
         }
         self.n_samples = pending.sample_ix + 1;
         self.note_displayed();
-        self.profile(&bounces).map(Some)
+        self.profile(&bounces, begun_at).map(Some)
     }
 
     fn begin_sample(&mut self) -> Result<Pending, GpuError> {
@@ -127,7 +138,12 @@ impl Renderer {
         let mut constants = *self.resources.constants();
         constants.set_view(&self.camera, sample_ix);
         self.resources.set_constants(&constants);
-        Ok(Pending { commands: self.record()?, n_done: 0, sample_ix })
+        self.recorded(sample_ix)
+    }
+
+    fn recorded(&self, sample_ix: u32) -> Result<Pending, GpuError> {
+        let commands = info_span!("record").in_scope(|| self.record())?;
+        Ok(Pending { commands, n_done: 0, sample_ix, begun_at: None })
     }
 
     /// Width and height of what pixel_display holds; none before there is a picture.

@@ -1,42 +1,39 @@
 //! What a frame says of itself.
 
+use std::time::Instant;
+
 use super::Renderer;
 use crate::{
-    frame::{BounceStats, PassTime, Profile},
-    gpu::GpuError,
+    frame::{PassTime, Profile},
+    gpu::{GpuError, TimerRow},
     layout::Bounce,
+    profile::{count_batches, device_counts, sum_of_batches},
 };
 
 impl Renderer {
-    /// Adds up the batches' times and counts.
-    pub(super) fn profile(&self, bounces: &[Bounce]) -> Result<Profile, GpuError> {
-        let rows = self.schedule.timer.rows()?;
-        let counters = self.resources.counters.download()?;
-        let mut profile = Profile {
+    /// Times and counts of a frame that was begun then; nothing without a profile.
+    pub(super) fn profile(&self, bounces: &[Bounce], begun_at: Instant) -> Result<Profile, GpuError> {
+        let Some(timer) = &self.schedule.timer else { return Ok(Profile::default()) };
+        let rows = timer.rows()?;
+        let max_depth = self.options.max_depth;
+        let counts = device_counts(bounces, &self.resources.counters.download()?);
+        let ends_ms = rows.iter().map(|row| row.span_ms.map(|(_, end)| end));
+        let pass = |row: &TimerRow| PassTime {
+            name: row.name,
+            bounce: row.bounce,
+            start_ms: row.span_ms.map(|(begin, _)| begin),
+            ms: row.span_ms.map(|(begin, end)| end - begin),
+            ..PassTime::default()
+        };
+        let mut passes: Vec<_> = rows.iter().map(pass).collect();
+        count_batches(&mut passes, &counts, max_depth, self.options.primary);
+        Ok(Profile {
             device: self.context.info().name.clone(),
             n_batches: self.schedule.batches.len() as u32,
-            bounces: vec![BounceStats::default(); self.options.max_depth as usize],
-            frame_ms: rows
-                .iter()
-                .map(|row| row.span_ms.map(|(_, end)| end))
-                .max_by(|a, b| a.partial_cmp(b).expect("no NaN"))
-                .flatten(),
-            passes: Vec::new(),
-        };
-        for row in rows {
-            let ms = row.span_ms.map(|(begin, end)| end - begin);
-            let known = profile.passes.iter_mut().find(|pass| pass.name == row.name && pass.bounce == row.bounce);
-            match known {
-                Some(pass) => pass.ms = pass.ms.zip(ms).map(|(a, b)| a + b),
-                None => profile.passes.push(PassTime { name: row.name, bounce: row.bounce, ms }),
-            }
-        }
-        for (row_ix, (bounce, counters)) in bounces.iter().zip(&counters).enumerate() {
-            let stats = &mut profile.bounces[row_ix % self.options.max_depth as usize];
-            stats.n_rays += u64::from(bounce.n_rays);
-            stats.n_hits += u64::from(counters.n_hits);
-            stats.n_shadow_rays += u64::from(counters.n_shadow_rays);
-        }
-        Ok(profile)
+            bounces: sum_of_batches(&counts, max_depth),
+            frame_ms: ends_ms.max_by(|a, b| a.partial_cmp(b).expect("no NaN")).flatten(),
+            passes,
+            begun_at: Some(begun_at),
+        })
     }
 }

@@ -15,12 +15,18 @@ pub struct Schedule {
     /// What `bounces` and `counters` hold when a frame begins.
     pub first_bounces: Buffer<Bounce>,
     pub zero_counters: Buffer<Counters>,
-    pub timer: Timer,
+    /// None without a profile.
+    pub timer: Option<Timer>,
 }
 
 impl Schedule {
     /// `spans`: first pixel and number of pixels of each batch.
-    pub fn new(context: &Arc<Context>, constants: &Frame, spans: Vec<(u32, u32)>) -> Result<Self, GpuError> {
+    pub fn new(
+        context: &Arc<Context>,
+        constants: &Frame,
+        spans: Vec<(u32, u32)>,
+        timed: bool,
+    ) -> Result<Self, GpuError> {
         let max_depth = constants.max_depth;
         let batches: Vec<_> = (0..)
             .zip(spans)
@@ -42,7 +48,7 @@ impl Schedule {
         Ok(Self {
             first_bounces: Buffer::with(context, "first_bounces", &rows, BufferUse::Storage)?,
             zero_counters: Buffer::with(context, "zero_counters", &zeros, BufferUse::Storage)?,
-            timer: Timer::new(context, n_passes)?,
+            timer: timed.then(|| Timer::new(context, n_passes)).transpose()?,
             batches,
         })
     }

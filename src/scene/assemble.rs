@@ -3,6 +3,7 @@
 use std::{collections::HashMap, ops::Range, path::Path};
 
 use glam::Vec3;
+use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use super::{
@@ -24,27 +25,31 @@ use crate::{
 pub(super) fn load_toml(path: &Path) -> Result<Scene, SceneError> {
     let text = read_utf8(path)?;
     let file = File { path, text: &text };
-    let description: Description = toml::from_str(&text).map_err(|e| match e.span() {
-        Some(span) => file.at(&span, e.message()),
-        None => SceneError::file(path, e.message()),
-    })?;
-    assemble(&file, description)
+    assemble(&file, file.parse()?)
 }
 
 /// The file that errors name.
-struct File<'a> {
-    path: &'a Path,
-    text: &'a str,
+pub(super) struct File<'a> {
+    pub path: &'a Path,
+    pub text: &'a str,
 }
 
 impl File<'_> {
+    /// The text as TOML.
+    pub fn parse<T: DeserializeOwned>(&self) -> Result<T, SceneError> {
+        toml::from_str(self.text).map_err(|e| match e.span() {
+            Some(span) => self.at(&span, e.message()),
+            None => SceneError::file(self.path, e.message()),
+        })
+    }
+
     fn at(&self, span: &Range<usize>, what: impl AsRef<str>) -> SceneError {
         let before = &self.text.as_bytes()[..span.start.min(self.text.len())];
         SceneError::line(self.path, 1 + before.iter().filter(|byte| **byte == b'\n').count(), what)
     }
 
     /// The value, checked; an error names the object and its line.
-    fn check<T, U>(
+    pub fn check<T, U>(
         &self,
         object: &str,
         spec: &Spanned<T>,
@@ -175,7 +180,7 @@ fn light(spec: &LightSpec) -> Checked<Light> {
     Ok(Light { position, kind, intensity, reserved: 0 })
 }
 
-fn camera(spec: &CameraSpec) -> Checked<Camera> {
+pub(super) fn camera(spec: &CameraSpec) -> Checked<Camera> {
     let camera = Camera {
         eye: point("eye", spec.eye)?,
         target: point("target", spec.target)?,

@@ -11,6 +11,7 @@ mod material;
 pub mod mesh;
 pub mod normal;
 mod obj;
+mod path;
 mod read;
 mod smooth;
 mod sources;
@@ -19,7 +20,7 @@ use std::path::Path;
 
 use glam::Vec3;
 
-pub use self::{error::SceneError, material::illum_flags, sources::source_files};
+pub use self::{error::SceneError, material::illum_flags, path::CameraPath, sources::source_files};
 use crate::{
     frame::{Denoise, RenderOptions, Tonemap},
     layout::{Light, Material, Triangle},

@@ -3,7 +3,7 @@
 use glam::{Vec3, vec3};
 use kdray::{
     cpu::{self, Batching},
-    frame::{Crop, Primary, RenderOptions},
+    frame::{Crop, Primary, RenderOptions, Traversal},
     layout::{Feature, NO_TRIANGLE},
     render::Renderer,
     scene::Scene,
@@ -88,6 +88,38 @@ fn device_and_cpu_agree() {
         let n_differing = a.iter().zip(&b).filter(|pair| differs(*pair)).count();
         assert!(n_differing <= 4800 / 50, "{primary}: {n_differing}");
         assert!(a.iter().map(|feature| feature.n_rays).max() > Some(20));
+    }
+}
+
+/// Traced alike, they read the same nodes and triangles; but for few rays that rounding sends another way.
+#[test]
+fn device_and_cpu_count_the_same_steps() {
+    let scene = scenes::mixed_outdoors();
+    for &traversal in Traversal::ALL.iter().filter(|&&traversal| traversal != Traversal::Brute) {
+        let options = noting(RenderOptions { primary: Primary::Trace, traversal, ..options(60, 45, 3) });
+        let [a, b] = [on_device, on_cpu].map(|render| render(&scene, &options));
+        let n_differing = a.iter().zip(&b).filter(|(a, b)| a.n_steps != b.n_steps).count();
+        assert!(n_differing <= a.len() / 20, "{traversal}: {n_differing} of {} pixels", a.len());
+        let sum = |features: &[Feature]| features.iter().map(|feature| f64::from(feature.n_steps)).sum::<f64>();
+        assert!((sum(&a) / sum(&b) - 1.0).abs() < 0.01, "{traversal}: {} steps, {}", sum(&a), sum(&b));
+        assert!(sum(&a) > 20.0 * a.len() as f64);
+    }
+}
+
+/// A ray through a tree of one leaf reads that, and its triangles; one that misses the tree reads nothing.
+#[test]
+fn steps_through_one_leaf_are_known() {
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, scenes::room(0.5)[..2].to_vec(), scenes::diffuse(Vec3::ONE));
+    let n_triangles = scene.triangles.len() as u32;
+    let tree = tree_of(&scene);
+    assert_eq!(tree.nodes.len(), 2, "the root and the place beside it");
+    for features in [on_device, on_cpu]
+        .map(|render| render(&scene, &noting(RenderOptions { primary: Primary::Trace, ..options(40, 30, 1) })))
+    {
+        let steps: std::collections::HashSet<_> = features.iter().map(|feature| feature.n_steps).collect();
+        assert_eq!(steps, [0, 1 + n_triangles].into());
+        assert!(features.iter().all(|feature| feature.triangle_ix == NO_TRIANGLE || feature.n_steps > 0));
     }
 }
 

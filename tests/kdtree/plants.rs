@@ -53,6 +53,7 @@ fn set(tree: &mut KdTree, node: u32, to: Node) {
 /// Takes an entry out of a leaf, and moves those of the leaves behind.
 fn drop_entry(tree: &mut KdTree, entry: u32) {
     tree.leaf_triangles.remove(entry as usize);
+    tree.leaf_planes.remove(entry as usize);
     for node in (0..tree.nodes.len() as u32).filter(|&node| node != 1) {
         if let Node::Leaf { first, count } = tree.node(node) {
             let has_it = first <= entry && entry < first + count;
@@ -217,6 +218,12 @@ fn wrong_leaf_ranges() {
     assert!(matches!(leaf_of(0, 1 << 20), Invalid::LeafRange { .. }));
     let found = Plant::new().after(|tree| tree.leaf_triangles.push(0));
     assert_eq!(found, Invalid::UnusedEntries { n_unused: 1 });
+}
+
+#[test]
+fn a_wrong_plane() {
+    assert_eq!(Plant::new().after(|tree| tree.leaf_planes[5].distance += 1e-3), Invalid::Planes);
+    assert_eq!(Plant::new().after(|tree| tree.leaf_planes.truncate(9)), Invalid::Planes);
 }
 
 #[test]

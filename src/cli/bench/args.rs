@@ -3,7 +3,12 @@
 use std::path::PathBuf;
 
 use clap::{Subcommand, value_parser};
-use kdray::{frame::Traversal, gpu::DeviceSelector, output};
+use kdray::{
+    bench::size::{MIN_TRIANGLES, MOST_TRIANGLES, SIZES},
+    frame::{RenderOptions, Traversal},
+    gpu::DeviceSelector,
+    output,
+};
 
 use crate::cli::{
     args::{Size, device},
@@ -17,6 +22,10 @@ pub enum Suite {
     Paper(PaperArgs),
     /// Every way through the kd-tree, on primary, shadow, mirror and diffuse rays of a mesh
     Traversal(TraversalArgs),
+    /// The traversal against the driver's own ray tracing, on the same rays; exits with 4 where the device lacks it
+    Driver(DriverArgs),
+    /// Cost of building and of a ray against the number of triangles, on a generated mesh
+    Size(SizeArgs),
 }
 
 #[derive(clap::Args)]
@@ -59,6 +68,51 @@ pub struct TraversalArgs {
     /// Leave the scene as it is: its own camera and first light, and no closed room around it
     #[arg(long)]
     pub no_room: bool,
+    /// Cast on all threads of the CPU, without Vulkan
+    #[arg(long, conflicts_with = "device")]
+    pub cpu: bool,
+    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
+    pub device: Option<DeviceSelector>,
+    #[command(flatten)]
+    pub files: FileArgs,
+}
+
+#[derive(clap::Args)]
+pub struct DriverArgs {
+    /// OBJ or scene file
+    pub mesh: PathBuf,
+    /// Pixels, one primary ray each
+    #[arg(long, value_name = "WxH", default_value = "1920x1080")]
+    pub size: Size,
+    /// Timed casts of each set of rays
+    #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
+    pub repeat: u16,
+    /// Leave the scene as it is: its own camera and first light, and no closed room around it
+    #[arg(long)]
+    pub no_room: bool,
+    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
+    pub device: Option<DeviceSelector>,
+    #[command(flatten)]
+    pub files: FileArgs,
+}
+
+#[derive(clap::Args)]
+pub struct SizeArgs {
+    /// Numbers of triangles, as 10000,10000000
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = SIZES)]
+    #[arg(value_parser = value_parser!(u32).range(i64::from(MIN_TRIANGLES)..=i64::from(MOST_TRIANGLES)))]
+    pub triangles: Vec<u32>,
+    /// Pixels, one primary ray each
+    #[arg(long, value_name = "WxH", default_value = "1920x1080")]
+    pub size: Size,
+    #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
+    #[arg(help = format!("Way through the tree: {}", Traversal::words()))]
+    pub traversal: Traversal,
+    /// Timed casts of each set of rays
+    #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
+    pub repeat: u16,
     /// Cast on all threads of the CPU, without Vulkan
     #[arg(long, conflicts_with = "device")]
     pub cpu: bool,

@@ -1,7 +1,9 @@
 //! `kdray bench`: measures, and prints a table; one file a suite.
 
 mod args;
+mod driver;
 mod paper;
+mod size;
 mod traversal;
 
 pub use args::Suite;
@@ -12,5 +14,7 @@ pub fn run(suite: &Suite) -> Result<(), CliError> {
     match suite {
         Suite::Paper(args) => paper::run(args),
         Suite::Traversal(args) => traversal::run(args),
+        Suite::Driver(args) => driver::run(args),
+        Suite::Size(args) => size::run(args),
     }
 }

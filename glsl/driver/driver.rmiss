@@ -1,0 +1,11 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_ray_tracing : require
+// Driver: the ray of driver.rgen hits nothing.
+#include "layout.glsl"
+
+layout(location = 0) rayPayloadInEXT Hit hit;
+
+void main() {
+    hit = Hit(uintBitsToFloat(0x7f800000u), NO_TRIANGLE, 0.0, 0.0);
+}

@@ -1,0 +1,52 @@
+//! kdray's traversal as a contender.
+
+use std::{rc::Rc, sync::Arc};
+
+use super::contest::Contender;
+use crate::{
+    cast::Query,
+    frame::Traversal,
+    gpu::{Access, Bindings, Commands, Context, GpuError},
+    passes::{Cast, CastResources},
+};
+
+/// One way through the tree.
+pub struct Kernel {
+    traversal: Traversal,
+    cast: Cast,
+    resources: Rc<CastResources>,
+}
+
+impl Kernel {
+    /// `resources`: of the bindings, with rays. The traversal must need nothing beside the tree.
+    ///
+    /// # Errors
+    /// The driver refuses the shader.
+    pub fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<Bindings>,
+        resources: &Rc<CastResources>,
+        (traversal, query): (Traversal, Query),
+    ) -> Result<Self, GpuError> {
+        let cast = Cast::new(context, bindings, traversal, query)?;
+        Ok(Self { traversal, cast, resources: Rc::clone(resources) })
+    }
+}
+
+impl Contender for Kernel {
+    fn name(&self) -> String {
+        self.traversal.to_string()
+    }
+
+    fn access(&self) -> Access {
+        Access::ComputeUpdate
+    }
+
+    fn record(&self, commands: &Commands) {
+        self.cast.record(commands, &self.resources, self.resources.cast_rays.len() as u32);
+    }
+
+    fn resources(&self) -> &Rc<CastResources> {
+        &self.resources
+    }
+}

@@ -1,0 +1,116 @@
+//! kdray's traversal against the driver's own ray tracing, on the same rays and triangles in one run.
+//!
+//! ```text
+//! contest   ways of tracing that take turns on a device -> times, hits
+//!   kernel    kdray's traversal is one
+//!   pipeline  VK_KHR_ray_tracing_pipeline another; nothing else uses that extension
+//! raster    visibility and primary_hit: primary rays without a tree
+//! report    what came of it, in numbers and as a chart
+//! ```
+
+pub mod contest;
+pub mod kernel;
+mod pipeline;
+pub mod raster;
+pub mod report;
+
+use std::{rc::Rc, sync::Arc};
+
+use self::{
+    contest::{Contender, hold},
+    kernel::Kernel,
+    pipeline::Pipeline,
+    raster::Raster,
+    report::{Builds, RasterResult, SetResult},
+};
+use super::{
+    Spread,
+    rays::{RayKind, RaySet},
+    stage::Stage,
+    traversal::cast_ray,
+};
+use crate::{
+    cast::Query,
+    frame::Traversal,
+    gpu::{Bindings, Context, GpuError, Scenery},
+    passes::{CastResources, Tree},
+};
+
+/// kdray's ways through the tree that are measured: the default one, and the one that keeps a stack in memory.
+pub const VARIANTS: [Traversal; 2] = [Traversal::Mask, Traversal::Stack];
+/// Builds of the driver's structure, of which the median counts.
+const N_BUILDS: usize = 5;
+
+/// A stage on a device that has ray tracing, ready for rays.
+pub struct Arena {
+    context: Arc<Context>,
+    tree: Tree,
+    bindings: Arc<Bindings>,
+    scenery: Rc<Scenery>,
+    raster: Raster,
+    builds: Builds,
+}
+
+impl Arena {
+    /// Uploads the stage and lets the driver build its structure. Panics on a context without ray tracing.
+    ///
+    /// # Errors
+    /// Tree, structure or picture are beyond the device's limits or memory.
+    pub fn new(context: &Arc<Context>, stage: &Stage) -> Result<Self, GpuError> {
+        let triangles = &stage.scene.triangles;
+        let mut scenery = Scenery::new(context, triangles)?;
+        let mut build_ms = vec![scenery.build_ms()];
+        for _ in 1..N_BUILDS {
+            scenery = Scenery::new(context, triangles)?;
+            build_ms.push(scenery.build_ms());
+        }
+        Ok(Self {
+            tree: Tree::new(context, triangles, &stage.tree, &stage.frame)?,
+            bindings: CastResources::bindings(context)?,
+            scenery: Rc::new(scenery),
+            raster: Raster::new(context, stage)?,
+            builds: Builds {
+                tree_ms: stage.tree_build_ms,
+                n_threads: rayon::current_num_threads(),
+                bvh_ms: Spread::of(build_ms.into_iter().flatten()),
+                n_bvh_builds: N_BUILDS,
+            },
+            context: Arc::clone(context),
+        })
+    }
+
+    /// What it took to build the two trees.
+    pub fn builds(&self) -> Builds {
+        self.builds
+    }
+
+    /// Traces the rays `n_times` by the driver and by each of [`VARIANTS`], in turn. Primary rays are rasterized, too.
+    ///
+    /// # Errors
+    /// Out of memory, a failed call.
+    pub fn measure(&mut self, set: &RaySet, n_times: u16) -> Result<(SetResult, Option<RasterResult>), GpuError> {
+        let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
+        let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
+        let resources = Rc::new(CastResources::new(&self.context, &self.bindings, &self.tree, rays.len())?);
+        resources.cast_rays.upload(&rays)?;
+
+        let mut contenders: Vec<Box<dyn Contender>> =
+            vec![Box::new(Pipeline::new(&self.context, &self.scenery, &resources, query)?)];
+        for variant in VARIANTS {
+            contenders.push(Box::new(Kernel::new(&self.context, &self.bindings, &resources, (variant, query))?));
+        }
+        let rasterizes = set.kind == RayKind::Primary;
+        let trials =
+            hold(
+                &self.context,
+                &contenders,
+                n_times,
+                |n_rounds| {
+                    if rasterizes { self.raster.draw(n_rounds) } else { Ok(()) }
+                },
+            )?;
+        let set = SetResult::new(set.kind, &trials);
+        let raster = rasterizes.then(|| self.raster.result(&set));
+        Ok((set, raster))
+    }
+}

@@ -1,0 +1,74 @@
+//! VK_KHR_ray_tracing_pipeline as a contender.
+
+use std::{rc::Rc, sync::Arc};
+
+use super::contest::Contender;
+use crate::{
+    cast::Query,
+    gpu::{
+        Access, Binding, BindingKind, BindingSet, Bindings, Commands, Context, GpuError, RayTracingDesc,
+        RayTracingPipeline, Scenery,
+    },
+    layout::{BIND_CAST_HITS, BIND_CAST_RAYS, DriverCast},
+    passes::{CastResources, spirv},
+};
+
+/// The driver's own ray tracing.
+pub struct Pipeline {
+    pipeline: RayTracingPipeline,
+    set: BindingSet,
+    scenery: Rc<Scenery>,
+    resources: Rc<CastResources>,
+}
+
+impl Pipeline {
+    /// # Errors
+    /// The driver refuses a shader. Panics on a context without ray tracing.
+    pub fn new(
+        context: &Arc<Context>,
+        scenery: &Rc<Scenery>,
+        resources: &Rc<CastResources>,
+        query: Query,
+    ) -> Result<Self, GpuError> {
+        let kinds = [(BIND_CAST_RAYS, BindingKind::Storage), (BIND_CAST_HITS, BindingKind::Storage)];
+        let bindings = Bindings::new(context, &kinds, size_of::<DriverCast>() as u32)?;
+        let buffers = [
+            (BIND_CAST_RAYS, Binding::Buffer(resources.cast_rays.any())),
+            (BIND_CAST_HITS, Binding::Buffer(resources.cast_hits.any())),
+        ];
+        let desc = RayTracingDesc {
+            name: "driver",
+            generation: spirv!("driver.rgen"),
+            miss: spirv!("driver.rmiss"),
+            closest_hit: spirv!("driver.rchit"),
+            constant: (query == Query::Any).into(),
+        };
+        Ok(Self {
+            pipeline: RayTracingPipeline::new(context, &bindings, &desc)?,
+            set: BindingSet::new(&bindings, "driver", &buffers)?,
+            scenery: Rc::clone(scenery),
+            resources: Rc::clone(resources),
+        })
+    }
+}
+
+impl Contender for Pipeline {
+    fn name(&self) -> String {
+        "driver".to_owned()
+    }
+
+    fn access(&self) -> Access {
+        Access::RayTracingUpdate
+    }
+
+    fn record(&self, commands: &Commands) {
+        let address = self.scenery.address();
+        let push = DriverCast { scenery_low: address as u32, scenery_high: (address >> 32) as u32 };
+        commands.bind(&self.set);
+        commands.trace_rays(&self.pipeline, &push, self.resources.cast_rays.len() as u32);
+    }
+
+    fn resources(&self) -> &Rc<CastResources> {
+        &self.resources
+    }
+}

@@ -1,0 +1,231 @@
+//! What the contest found.
+
+use serde::Serialize;
+
+use super::contest::Trial;
+use crate::{
+    bench::{
+        Spread,
+        chart::{BarChart, Scale, Series},
+        difference::{Apart, is_hit},
+        rays::RayKind,
+    },
+    kdtree::Statistics,
+};
+
+/// Times of one tracer on one set of rays.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Timing {
+    /// Of a whole set; none where the device has no timestamps.
+    pub ms: Option<Spread>,
+    pub mrays_per_s: Option<Spread>,
+}
+
+impl Timing {
+    fn new(ms: Option<Spread>, n_rays: usize) -> Self {
+        Self { ms, mrays_per_s: ms.and_then(|ms| ms.mrays_per_s(n_rays as u64)) }
+    }
+
+    /// How many times as fast as another that traces as many rays, by medians.
+    fn ratio_to(&self, other: &Self) -> Option<f64> {
+        let ratio = self.mrays_per_s.zip(other.mrays_per_s).map(|(own, other)| own.median / other.median);
+        ratio.filter(|ratio| ratio.is_finite()) // there may be no rays
+    }
+}
+
+/// One set of rays.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SetResult {
+    pub rays: RayKind,
+    pub n_rays: usize,
+    /// As the driver finds them.
+    pub n_hits: usize,
+    pub driver: Timing,
+    pub kdray: Vec<Rival>,
+}
+
+/// One of kdray's ways through the tree on one set of rays.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Rival {
+    pub traversal: String,
+    #[serde(flatten)]
+    pub timing: Timing,
+    /// Its speed in speeds of the driver.
+    pub ratio: Option<f64>,
+    /// Its hits from the driver's.
+    #[serde(flatten)]
+    pub apart: Apart,
+}
+
+impl SetResult {
+    /// `trials`: the driver's first; all of the same rays.
+    pub fn new(rays: RayKind, trials: &[Trial]) -> Self {
+        let (driver, rivals) = trials.split_first().expect("the driver's trial");
+        let n_rays = driver.hits.len();
+        let driver_timing = Timing::new(driver.ms, n_rays);
+        let rival = |trial: &Trial| {
+            let timing = Timing::new(trial.ms, n_rays);
+            Rival {
+                traversal: trial.name.clone(),
+                timing,
+                ratio: timing.ratio_to(&driver_timing),
+                apart: Apart::of(rays, &driver.hits, &trial.hits),
+            }
+        };
+        Self {
+            rays,
+            n_rays,
+            n_hits: driver.hits.iter().filter(|hit| is_hit(hit)).count(),
+            driver: driver_timing,
+            kdray: rivals.iter().map(rival).collect(),
+        }
+    }
+}
+
+/// Primary rays by rasterization, in the view of the set of primary rays.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RasterResult {
+    pub visibility_ms: Option<Spread>,
+    pub primary_hit_ms: Option<Spread>,
+    /// Both passes.
+    #[serde(flatten)]
+    pub timing: Timing,
+    /// Its speed in speeds of the driver's primary rays.
+    pub ratio: Option<f64>,
+}
+
+impl RasterResult {
+    /// `passes_ms`: of visibility and of primary_hit; `ms`: of both together.
+    pub fn new(passes_ms: [Option<Spread>; 2], ms: Option<Spread>, primary: &SetResult) -> Self {
+        let timing = Timing::new(ms, primary.n_rays);
+        let [visibility_ms, primary_hit_ms] = passes_ms;
+        Self { visibility_ms, primary_hit_ms, timing, ratio: timing.ratio_to(&primary.driver) }
+    }
+}
+
+/// What the two trees over the same triangles cost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Builds {
+    /// kdray's kd-tree on the CPU, wall-clock.
+    pub tree_ms: f64,
+    /// For the kd-tree.
+    pub n_threads: usize,
+    /// The driver's structure over the triangles, on the GPU; none where the device has no timestamps.
+    pub bvh_ms: Option<Spread>,
+    pub n_bvh_builds: usize,
+}
+
+/// What the suite found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// `driver`.
+    pub suite: &'static str,
+    /// The device's own name.
+    pub device: String,
+    /// The driver's name and version.
+    pub driver: String,
+    pub scene: String,
+    /// Whether the scene was put into a closed room.
+    pub room: bool,
+    /// Pixels, one primary ray each.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    pub n_triangles: usize,
+    pub tree: Statistics,
+    /// Timed casts of each set by each tracer, and timed frames.
+    pub n_times: u16,
+    /// Distances of the same hit may differ by so much of themselves.
+    pub t_tolerance: f32,
+    pub builds: Builds,
+    pub sets: Vec<SetResult>,
+    pub raster: Option<RasterResult>,
+}
+
+impl Report {
+    /// Speeds, a group a set, a bar a tracer.
+    pub fn chart(&self) -> BarChart {
+        let rate = |timing: &Timing| timing.mrays_per_s.map(|rate| rate.median);
+        let mut series =
+            vec![Series { name: "driver".to_owned(), values: self.sets.iter().map(|set| rate(&set.driver)).collect() }];
+        let rivals = self.sets.first().map_or(&[][..], |set| &set.kdray);
+        series.extend(rivals.iter().enumerate().map(|(rival_ix, rival)| Series {
+            name: format!("kdray, {}", rival.traversal),
+            values: self.sets.iter().map(|set| rate(&set.kdray[rival_ix].timing)).collect(),
+        }));
+        series.extend(self.raster.as_ref().map(|raster| Series {
+            name: "kdray, rasterized".to_owned(),
+            values:
+                (self.sets.iter()).map(|set| rate(&raster.timing).filter(|_| set.rays == RayKind::Primary)).collect(),
+        }));
+        BarChart {
+            title: format!("{}, {} triangles, on {}", self.scene, self.n_triangles, self.device),
+            unit: "Mrays/s".to_owned(),
+            scale: Scale::Linear,
+            groups: self.sets.iter().map(|set| set.rays.name().to_owned()).collect(),
+            series,
+        }
+    }
+
+    /// The first tracer whose hits differ from the driver's on more rays than rounding explains, and the set.
+    pub fn first_wrong(&self) -> Option<(&SetResult, &Rival)> {
+        let mut pairs = self.sets.iter().flat_map(|set| set.kdray.iter().map(move |rival| (set, rival)));
+        pairs.find(|(set, rival)| !rival.apart.is_rounding(set.n_rays))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::{Hit, NO_TRIANGLE};
+
+    const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
+
+    fn hit(t: f32) -> Hit {
+        Hit { t, triangle_ix: 3, u: 0.0, v: 0.0 }
+    }
+
+    fn trial(name: &str, ms: f64, hits: [Hit; 4]) -> Trial {
+        Trial { name: name.to_owned(), ms: Spread::of([ms, 2.0 * ms, 3.0 * ms]), hits: hits.to_vec() }
+    }
+
+    fn set(rays: RayKind) -> SetResult {
+        let right = [hit(1.0), hit(2.0), MISS, hit(3.0)];
+        let wrong = [hit(1.0), MISS, hit(9.0), hit(3.1)];
+        SetResult::new(rays, &[trial("driver", 3.0, right), trial("mask", 2.0, right), trial("stack", 6.0, wrong)])
+    }
+
+    #[test]
+    fn speeds_are_ratios_of_medians_and_hits_are_held_against_the_drivers() {
+        let result = set(RayKind::Mirror);
+        assert_eq!((result.n_rays, result.n_hits, result.driver.ms.unwrap().median), (4, 3, 6.0));
+        let [mask, stack] = &result.kdray[..] else { panic!("two rivals") };
+        assert!((mask.ratio.unwrap() - 1.5).abs() < 1e-12 && (stack.ratio.unwrap() - 0.5).abs() < 1e-12);
+        assert_eq!(mask.apart, Apart::default());
+        assert_eq!(stack.apart, Apart { n_hit_or_miss: 2, n_distance: 1 });
+        assert_eq!(set(RayKind::Shadow).kdray[1].apart, Apart { n_hit_or_miss: 2, n_distance: 0 });
+    }
+
+    #[test]
+    fn rasterized_rays_are_as_many_as_the_drivers() {
+        let passes = [0.5, 0.25].map(|ms| Spread::of([ms]));
+        let raster = RasterResult::new(passes, Spread::of([0.75]), &set(RayKind::Primary));
+        assert!((raster.ratio.unwrap() - 8.0).abs() < 1e-12);
+        let unknown = RasterResult::new([None; 2], None, &set(RayKind::Primary));
+        assert_eq!((unknown.ratio, unknown.timing.mrays_per_s), (None, None));
+    }
+
+    #[test]
+    fn no_rays_have_no_speed() {
+        let nobody = |name: &str| Trial { hits: Vec::new(), ..trial(name, 1.0, [hit(1.0); 4]) };
+        let result = SetResult::new(RayKind::Shadow, &[nobody("driver"), nobody("mask")]);
+        assert_eq!((result.n_rays, result.kdray[0].ratio, result.kdray[0].apart), (0, None, Apart::default()));
+    }
+
+    #[test]
+    fn without_timestamps_only_hits_are_compared() {
+        let untimed = |name| Trial { ms: None, ..trial(name, 1.0, [hit(1.0); 4]) };
+        let result = SetResult::new(RayKind::Primary, &[untimed("driver"), untimed("mask")]);
+        assert_eq!((result.kdray[0].ratio, result.kdray[0].apart), (None, Apart::default()));
+    }
+}

@@ -1,0 +1,230 @@
+//! `kdray bench driver`: the traversal against the driver's own ray tracing.
+
+use kdray::{
+    bench::{
+        difference::T_TOLERANCE,
+        driver::{
+            Arena,
+            report::{Builds, RasterResult, Report, SetResult, Timing},
+        },
+        rays::{RayKind, ray_sets},
+        stage::Stage,
+    },
+    gpu::{Context, ContextOptions},
+    kdtree::BuildOptions,
+    scene::Scene,
+};
+
+use super::args::DriverArgs;
+use crate::cli::{
+    error::CliError,
+    print,
+    progress::Progress,
+    table::{decimal, table},
+};
+
+/// Loads the mesh, makes the rays, lets both trace them set by set. A device without ray tracing is refused first.
+pub fn run(args: &DriverArgs) -> Result<(), CliError> {
+    args.files.check()?;
+    let context = Context::with_ray_tracing(&ContextOptions { device: args.device.clone(), validate: false })?;
+    let progress = Progress::new(false, 8);
+    let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
+    let scene = scene?;
+    let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
+    let (stage, _) = progress.stage(&building, || stage(args, scene));
+    let (arena, _) = progress.stage("letting the driver build its tree", || Arena::new(&context, &stage));
+    let mut arena = arena?;
+    let (sets, _) = progress.stage("making rays", || ray_sets(&stage));
+
+    let mut report = empty_report(args, &stage, &context, arena.builds());
+    for set in &sets {
+        let casting = format!("casting {} {} rays", set.rays.len(), set.kind.name());
+        let (result, _) = progress.stage(&casting, || arena.measure(set, args.repeat));
+        let (set, raster) = result?;
+        report.sets.push(set);
+        report.raster = report.raster.or(raster);
+    }
+    drop(progress);
+    args.files.write(&report, || report.chart().svg())?;
+    print(&text(&report))?;
+    check_hits(&report)
+}
+
+fn stage(args: &DriverArgs, scene: Scene) -> Stage {
+    let size = (args.size.width, args.size.height);
+    if args.no_room { Stage::open(scene, size) } else { Stage::in_room(scene, size) }
+}
+
+fn empty_report(args: &DriverArgs, stage: &Stage, context: &Context, builds: Builds) -> Report {
+    let n_triangles = stage.scene.triangles.len();
+    Report {
+        suite: "driver",
+        device: context.info().name.clone(),
+        driver: context.info().driver.clone(),
+        scene: stage.scene.name.clone(),
+        room: !args.no_room,
+        width: args.size.width,
+        height: args.size.height,
+        n_triangles,
+        tree: stage.tree.statistics(n_triangles, &BuildOptions::default()),
+        n_times: args.repeat,
+        t_tolerance: T_TOLERANCE,
+        builds,
+        sets: Vec::new(),
+        raster: None,
+    }
+}
+
+/// The report as text that ends with a line break.
+fn text(report: &Report) -> String {
+    let room = if report.room { " in a closed room" } else { "" };
+    let mut text = format!("{}: {} triangles{room}\n", report.scene, report.n_triangles);
+    text += &format!("{}x{} on {}, {}", report.width, report.height, report.device, report.driver);
+    text += &format!(", medians of {}\n\n", report.n_times);
+    let mut rows = Vec::new();
+    for set in &report.sets {
+        rows.push(cells(set, "driver", &set.driver, set.driver.mrays_per_s.map(|_| 1.0), None));
+        rows.extend(
+            set.kdray
+                .iter()
+                .map(|rival| cells(set, &rival.traversal, &rival.timing, rival.ratio, Some(rival.apart.n_differing()))),
+        );
+        let raster = report.raster.as_ref().filter(|_| set.rays == RayKind::Primary);
+        rows.extend(raster.map(|raster| cells(set, "rasterized", &raster.timing, raster.ratio, None)));
+    }
+    text += &table(["rays", "number", "hits", "by", "ms", "Mrays/s", "ratio", "differing"], &rows);
+    text +=
+        "\nRatio: speed in speeds of the driver. Differing from the driver's: a hit for a miss, a miss for a hit, or\n";
+    text += &format!("another distance by more than {:.1e} of it.\n", report.t_tolerance);
+    text += &passes_text(report.raster.as_ref());
+    text += &builds_text(&report.builds);
+    text
+}
+
+fn cells(set: &SetResult, by: &str, timing: &Timing, ratio: Option<f64>, n_differing: Option<u64>) -> [String; 8] {
+    [
+        set.rays.name().to_owned(),
+        set.n_rays.to_string(),
+        set.n_hits.to_string(),
+        by.to_owned(),
+        decimal(timing.ms.map(|ms| ms.median), 3),
+        decimal(timing.mrays_per_s.map(|rate| rate.median), 1),
+        decimal(ratio, 2),
+        n_differing.map_or_else(|| "-".to_owned(), |n| n.to_string()),
+    ]
+}
+
+fn passes_text(raster: Option<&RasterResult>) -> String {
+    let Some(raster) = raster else { return String::new() };
+    let [visibility, primary_hit] =
+        [raster.visibility_ms, raster.primary_hit_ms].map(|ms| decimal(ms.map(|ms| ms.median), 3));
+    format!("Rasterized: visibility {visibility} ms, primary_hit {primary_hit} ms.\n")
+}
+
+fn builds_text(builds: &Builds) -> String {
+    let Builds { tree_ms, n_threads, bvh_ms, n_bvh_builds } = builds;
+    let bvh_ms = decimal(bvh_ms.map(|ms| ms.median), 3);
+    format!(
+        "Built: the driver's tree in {bvh_ms} ms of the GPU (median of {n_bvh_builds}), the kd-tree in {tree_ms:.0} ms of \
+         {n_threads} CPU threads.\n"
+    )
+}
+
+/// The speed of wrong answers is none.
+fn check_hits(report: &Report) -> Result<(), CliError> {
+    let Some((set, rival)) = report.first_wrong() else { return Ok(()) };
+    Err(CliError::WrongHits(format!(
+        "{} of {} {} rays hit otherwise with `{}` than with the driver",
+        rival.apart.n_differing(),
+        set.n_rays,
+        set.rays.name(),
+        rival.traversal
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use kdray::{
+        bench::{Spread, driver::contest::Trial},
+        cast::Hit,
+        kdtree::KdTree,
+    };
+
+    use super::*;
+
+    /// Four rays of each kind: the driver takes 4, 8, 12 ms, `mask` half of that, `stack` the same; `stack` has
+    /// `n_wrong` wrong hits among its primary rays.
+    fn report(n_wrong: usize) -> Report {
+        let trial = |name: &str, ms: f64, n_wrong: usize| Trial {
+            name: name.to_owned(),
+            ms: Spread::of([ms, 2.0 * ms, 3.0 * ms]),
+            hits: (0..4)
+                .map(|i| Hit { t: if i < n_wrong { 2.0 } else { 1.0 }, triangle_ix: 0, u: 0.0, v: 0.0 })
+                .collect(),
+        };
+        let set = |kind: RayKind| {
+            let n_wrong = if kind == RayKind::Primary { n_wrong } else { 0 };
+            SetResult::new(kind, &[trial("driver", 4.0, 0), trial("mask", 2.0, 0), trial("stack", 4.0, n_wrong)])
+        };
+        let sets = RayKind::ALL.map(set);
+        let ms = |ms| Spread::of([ms]);
+        Report {
+            suite: "driver",
+            device: "d < e".to_owned(),
+            driver: "v 1".to_owned(),
+            scene: "s".to_owned(),
+            room: true,
+            width: 2,
+            height: 2,
+            n_triangles: 14,
+            tree: KdTree::build(&[], &BuildOptions::default()).statistics(0, &BuildOptions::default()),
+            n_times: 3,
+            t_tolerance: T_TOLERANCE,
+            builds: Builds { tree_ms: 1234.5, n_threads: 2, bvh_ms: ms(1.5), n_bvh_builds: 5 },
+            raster: Some(RasterResult::new([ms(0.5), ms(1.5)], ms(2.0), &sets[0])),
+            sets: sets.to_vec(),
+        }
+    }
+
+    #[test]
+    fn the_table_has_a_row_for_each_tracer_of_each_set() {
+        let text = text(&report(0));
+        let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
+        assert!(rows.contains(&vec!["primary", "4", "4", "driver", "8.000", "0.0", "1.00", "-"]), "{text}");
+        assert!(rows.contains(&vec!["primary", "4", "4", "rasterized", "2.000", "0.0", "4.00", "-"]), "{text}");
+        assert!(rows.contains(&vec!["diffuse", "4", "4", "mask", "4.000", "0.0", "2.00", "0"]), "{text}");
+        assert_eq!(rows.iter().filter(|row| row.get(1) == Some(&"4")).count(), 4 * 3 + 1, "{text}");
+        assert!(
+            text.contains("in 1.500 ms of the GPU (median of 5), the kd-tree in 1234 ms of 2 CPU threads"),
+            "{text}"
+        );
+        assert!(text.contains("visibility 0.500 ms, primary_hit 1.500 ms"), "{text}");
+    }
+
+    #[test]
+    fn json_and_chart_hold_what_the_table_holds() {
+        let report = report(1);
+        let json = serde_json::to_value(&report).unwrap();
+        assert_eq!((&json["suite"], json["sets"].as_array().unwrap().len()), (&"driver".into(), 4));
+        let stack = &json["sets"][0]["kdray"][1];
+        assert_eq!(
+            (&stack["traversal"], &stack["ratio"], &stack["n_distance"]),
+            (&"stack".into(), &1.0.into(), &1.into())
+        );
+        assert_eq!(stack["ms"]["median"], 8.0);
+        assert_eq!((&json["raster"]["ratio"], &json["builds"]["bvh_ms"]["median"]), (&4.0.into(), &1.5.into()));
+        let chart = report.chart();
+        let names: Vec<_> = chart.series.iter().map(|series| series.name.as_str()).collect();
+        assert_eq!(names, ["driver", "kdray, mask", "kdray, stack", "kdray, rasterized"]);
+        assert_eq!(chart.series[3].values, [Some(0.002), None, None, None]);
+        assert!(chart.svg().contains("d &lt; e"));
+    }
+
+    #[test]
+    fn wrong_hits_fail() {
+        assert!(check_hits(&report(0)).is_ok());
+        let error = check_hits(&report(1)).unwrap_err();
+        assert_eq!(error.to_string(), "1 of 4 primary rays hit otherwise with `stack` than with the driver");
+        assert_eq!(error.exit_code(), 4);
+    }
+}

@@ -1,0 +1,186 @@
+//! `kdray bench size`: cost against size.
+
+use std::sync::Arc;
+
+use kdray::{
+    bench::{
+        rays::ray_sets,
+        size::{RayGrowth, Report, Row, Sized},
+    },
+    gpu::{Context, ContextOptions, GpuError},
+};
+
+use super::args::SizeArgs;
+use crate::cli::{
+    error::CliError,
+    open_device, print,
+    progress::Progress,
+    table::{decimal, table},
+};
+
+/// Size by size, the least first.
+pub fn run(args: &SizeArgs) -> Result<(), CliError> {
+    args.files.check()?;
+    let mut sizes = args.triangles.clone();
+    sizes.sort_unstable();
+    sizes.dedup();
+    let progress = Progress::new(false, 3 * sizes.len() as u64);
+    let device = ContextOptions { device: args.device.clone(), validate: false };
+    let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
+    let info = context.as_ref().map(|context| context.info());
+    let n_threads = rayon::current_num_threads();
+    let mut report = Report {
+        suite: "size",
+        device: info.map_or_else(|| format!("CPU, {n_threads} threads"), |info| info.name.clone()),
+        driver: info.map(|info| info.driver.clone()),
+        traversal: args.traversal.to_string(),
+        width: args.size.width,
+        height: args.size.height,
+        n_threads,
+        n_times: args.repeat,
+        rows: Vec::new(),
+    };
+    // A size that is too large for the device leaves the smaller ones' results.
+    let done = sizes.into_iter().try_for_each(|n_triangles| {
+        report.rows.push(measure(args, context.as_ref(), n_triangles, &progress)?);
+        Ok(())
+    });
+    drop(progress);
+    if !report.rows.is_empty() {
+        args.files.write(&report, || report.chart().svg())?;
+        print(&text(&report))?;
+    }
+    done.and_then(|()| check_hits(&report))
+}
+
+fn measure(
+    args: &SizeArgs,
+    context: Option<&Arc<Context>>,
+    n_triangles: u32,
+    progress: &Progress,
+) -> Result<Row, GpuError> {
+    let building = format!("building the kd-tree of {n_triangles} triangles");
+    let pixels = (args.size.width, args.size.height);
+    let (sized, _) = progress.stage(&building, || Sized::new(n_triangles, pixels));
+    let (sets, _) = progress.stage("making rays", || ray_sets(&sized.stage));
+    let casting = format!("casting rays at {n_triangles} triangles");
+    progress.stage(&casting, || sized.measure(context, args.traversal, &sets, args.repeat)).0
+}
+
+/// The report as text that ends with a line break.
+fn text(report: &Report) -> String {
+    let mut text = format!("{}x{} on {}", report.width, report.height, report.device);
+    text += &report.driver.as_ref().map_or_else(String::new, |driver| format!(", {driver}"));
+    text += &format!(", `{}`, medians of {}\n\n", report.traversal, report.n_times);
+    let header = ["triangles", "nodes", "depth", "build ms", "primary ns", "shadow ns", "mirror ns", "diffuse ns"];
+    text += &table(header, &report.rows.iter().map(cells).collect::<Vec<_>>());
+    text += &format!(
+        "\nA rippled knot in a closed room; trees built on {} threads; ns: time of a ray.\n",
+        report.n_threads
+    );
+    if let Some(growth) = report.growth() {
+        let list = |ratio: fn(&RayGrowth) -> Option<f64>| {
+            let words = growth.rays.iter().map(|ray| format!("{} {}", ray.kind.name(), decimal(ratio(ray), 2)));
+            words.collect::<Vec<_>>().join(", ")
+        };
+        text += &format!(
+            "From the least to the largest mesh, log N grows {:.2} times, the nodes that a ray visits: {}; its time: {}.\n",
+            growth.logarithm,
+            list(|ray| Some(ray.nodes)),
+            list(|ray| ray.time)
+        );
+    }
+    text
+}
+
+fn cells(row: &Row) -> [String; 8] {
+    let ns = |kind_ix: usize| {
+        let cost = row.rays.get(kind_ix).and_then(|cost| cost.ns_a_ray);
+        decimal(cost.map(|ns| ns.median), 3)
+    };
+    [
+        row.n_triangles.to_string(),
+        row.tree.n_nodes.to_string(),
+        row.tree.depth.to_string(),
+        decimal(Some(row.build_ms), 0),
+        ns(0),
+        ns(1),
+        ns(2),
+        ns(3),
+    ]
+}
+
+/// The speed of wrong answers is none.
+fn check_hits(report: &Report) -> Result<(), CliError> {
+    let Some((row, cost)) = report.first_wrong() else { return Ok(()) };
+    Err(CliError::WrongHits(format!(
+        "{} of {} {} rays at {} triangles hit otherwise with `{}` than on the CPU",
+        cost.difference.n_differing,
+        cost.n_rays,
+        cost.rays.name(),
+        row.n_triangles,
+        report.traversal
+    )))
+}
+
+#[cfg(test)]
+mod tests {
+    use kdray::{
+        bench::{Spread, difference::Difference, rays::RayKind, size::RayCost, traversal::StepsARay},
+        kdtree::{BuildOptions, KdTree},
+    };
+
+    use super::*;
+
+    /// Two sizes; a ray takes `ns` of each of them.
+    fn report(ns: [f64; 2], n_differing: u64) -> Report {
+        let row = |n_triangles: usize, ns: f64| Row {
+            n_triangles,
+            generate_ms: 1.0,
+            build_ms: 7.0,
+            tree: KdTree::build(&[], &BuildOptions::default()).statistics(0, &BuildOptions::default()),
+            rays: RayKind::ALL
+                .map(|rays| RayCost {
+                    rays,
+                    n_rays: 1000,
+                    ms: Spread::of([ns * 1e-3]),
+                    ns_a_ray: Spread::of([ns]),
+                    steps_a_ray: StepsARay { nodes: 2.0 + (n_triangles / 1_000_000) as f64, ..StepsARay::default() },
+                    difference: Difference { n_differing, n_grazing: 9 },
+                })
+                .to_vec(),
+        };
+        Report {
+            suite: "size",
+            device: "d".to_owned(),
+            driver: None,
+            traversal: "mask".to_owned(),
+            width: 40,
+            height: 25,
+            n_threads: 2,
+            n_times: 1,
+            rows: vec![row(1000, ns[0]), row(1_000_000, ns[1])],
+        }
+    }
+
+    #[test]
+    fn growth_is_that_of_the_last_over_the_first() {
+        let text = text(&report([8.0, 20.0], 0));
+        assert!(text.contains("log N grows 2.00 times, the nodes that a ray visits: primary 1.50, "), "{text}");
+        assert!(text.contains("; its time: primary 2.50, shadow 2.50, "), "{text}");
+        assert!(text.contains("\n1000000 "), "{text}");
+        let single = Report { rows: report([8.0, 20.0], 0).rows[..1].to_vec(), ..report([8.0, 20.0], 0) };
+        assert_eq!(single.growth(), None);
+    }
+
+    #[test]
+    fn wrong_hits_fail() {
+        assert!(check_hits(&report([8.0, 20.0], 0)).is_ok());
+        let error = check_hits(&report([8.0, 20.0], 1)).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "1 of 1000 primary rays at 1000 triangles hit otherwise with `mask` than on the CPU"
+        );
+        assert_eq!(error.exit_code(), 4);
+    }
+}

@@ -1,0 +1,132 @@
+//! The files that a rendering leaves.
+
+use std::path::{Path, PathBuf};
+
+use kdray::{
+    frame::{Aov, Picture},
+    layout::Feature,
+    output::{self, Format, HeatMap},
+};
+
+use crate::cli::{args::RenderArgs, error::CliError};
+
+/// A picture's file and those beside it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Files {
+    pub picture: PathBuf,
+    /// The picture with layers; the picture itself where that is an .exr.
+    layers: Option<PathBuf>,
+    /// The costs in colours.
+    heat_map: Option<PathBuf>,
+}
+
+impl Files {
+    pub fn of(picture: PathBuf, aovs: &[Aov]) -> Self {
+        let is_exr = picture.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
+        let layers = if is_exr { picture.clone() } else { picture.with_extension("exr") };
+        Self {
+            layers: (!aovs.is_empty()).then_some(layers),
+            heat_map: aovs.contains(&Aov::Cost).then(|| picture.with_extension("cost.png")),
+            picture,
+        }
+    }
+
+    /// All but the picture.
+    pub fn beside(&self) -> impl Iterator<Item = &PathBuf> {
+        self.layers.iter().chain(&self.heat_map).filter(|path| **path != self.picture)
+    }
+
+    /// Refuses what cannot be written.
+    pub fn check(&self) -> Result<(), CliError> {
+        output::check(&self.picture)?;
+        Ok(self.beside().try_for_each(|path| output::check(path))?)
+    }
+
+    pub fn write(&self, aovs: &[Aov], picture: &Picture, features: &[Feature]) -> Result<(), CliError> {
+        if let Some(path) = &self.layers {
+            output::write_layers(path, picture, aovs, features)?;
+        }
+        if let Some(path) = &self.heat_map {
+            let values = features.iter().map(|feature| feature.n_steps).collect();
+            HeatMap { title: "steps a pixel", width: picture.width, height: picture.height, values }.write(path)?;
+        }
+        if self.layers.as_ref() != Some(&self.picture) {
+            output::write_picture(&self.picture, picture)?;
+        }
+        Ok(())
+    }
+}
+
+/// Refuses targets that cannot be written, as far as they are known before the scene is.
+pub fn check_outputs(args: &RenderArgs) -> Result<(), CliError> {
+    if let Some(path) = &args.output {
+        Format::of(path)?;
+        output::check(path)?;
+        if args.path.is_some() {
+            numbered(path, 0)?;
+        }
+    }
+    Ok([&args.profile, &args.trace].into_iter().flatten().try_for_each(|path| output::check(path))?)
+}
+
+/// A PNG of the scene's name in the working directory.
+pub fn default_output(scene_name: &str, is_numbered: bool) -> PathBuf {
+    let name = scene_name.replace(|c: char| std::path::is_separator(c) || c.is_control() || c == '#', "-");
+    let stem = if name.is_empty() { "picture" } else { &name };
+    format!("{stem}{}.png", if is_numbered { ".####" } else { "" }).into()
+}
+
+/// The name of a frame's picture: its number in place of the only run of `#`, with as many digits or more.
+pub fn numbered(pattern: &Path, frame: u32) -> Result<PathBuf, CliError> {
+    let refused = |what| {
+        let pattern = pattern.display();
+        Err(CliError::Usage(format!("--output `{pattern}` {what} #### for the frame's number, as in out.####.png")))
+    };
+    let Some(name) = pattern.file_name().and_then(|name| name.to_str()) else { return refused("has no") };
+    let runs: Vec<&str> = name.split(|c| c != '#').filter(|run| !run.is_empty()).collect();
+    match runs[..] {
+        [] => refused("has no"),
+        [run] => Ok(pattern.with_file_name(name.replace(run, &format!("{frame:0width$}", width = run.len())))),
+        _ => refused("has more than one"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_s_name_stays_in_the_working_directory() {
+        for (name, file) in [("cornell", "cornell.png"), ("../a", "..-a.png"), ("", "picture.png")] {
+            assert_eq!(default_output(name, false), PathBuf::from(file));
+        }
+        assert_eq!(default_output("a#b", true), PathBuf::from("a-b.####.png"));
+    }
+
+    #[test]
+    fn frames_have_numbers_in_place_of_their_signs() {
+        for (pattern, frame, name) in [
+            ("out.####.png", 7, "out.0007.png"),
+            ("a#/x#.png", 12, "a#/x12.png"),
+            ("##.exr", 1234, "1234.exr"),
+            ("f_###_a.png", 0, "f_000_a.png"),
+        ] {
+            assert_eq!(numbered(Path::new(pattern), frame).unwrap(), PathBuf::from(name));
+        }
+        for pattern in ["out.png", "a##/out.png", "#a#.png", ""] {
+            assert!(numbered(Path::new(pattern), 1).is_err(), "{pattern}");
+        }
+    }
+
+    #[test]
+    fn what_lies_beside_a_picture() {
+        let names = |picture: &str, aovs: &[Aov]| -> Vec<String> {
+            let files = Files::of(picture.into(), aovs);
+            files.beside().map(|path| path.display().to_string()).collect()
+        };
+        assert!(names("x.png", &[]).is_empty() && names("x.EXR", &[Aov::Depth]).is_empty());
+        assert_eq!(names("a/x.png", &[Aov::Depth]), ["a/x.exr"]);
+        assert_eq!(names("x.exr", &[Aov::Cost]), ["x.cost.png"]);
+        assert_eq!(names("x.0001.png", &[Aov::Id, Aov::Cost]), ["x.0001.exr", "x.0001.cost.png"]);
+    }
+}

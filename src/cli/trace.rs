@@ -1,0 +1,158 @@
+//! A frame as Chrome trace events, which Perfetto and chrome://tracing show: the CPU's work on one track, the passes on
+//! another. <https://docs.google.com/document/d/1CvAClvFfyA5R-PhYUmn5OOQtYMH4h6I0nSsKchNAySU>
+
+use std::time::Instant;
+
+use kdray::frame::{PassTime, Profile};
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+use super::spans::Span;
+
+/// Thread numbers, which are tracks.
+const CPU: u32 = 1;
+const PASSES: u32 = 2;
+
+/// The file's only object.
+#[derive(Serialize)]
+struct Trace {
+    #[serde(rename = "traceEvents")]
+    events: Vec<Event>,
+    #[serde(rename = "displayTimeUnit")]
+    unit: &'static str,
+}
+
+/// A slice (`X`) or a track's name (`M`).
+#[derive(Serialize)]
+struct Event {
+    name: String,
+    #[serde(rename = "cat")]
+    category: &'static str,
+    #[serde(rename = "ph")]
+    phase: &'static str,
+    /// Microseconds.
+    #[serde(rename = "ts")]
+    start: f64,
+    #[serde(rename = "dur", skip_serializing_if = "Option::is_none")]
+    duration: Option<f64>,
+    #[serde(rename = "pid")]
+    process: u32,
+    #[serde(rename = "tid")]
+    track: u32,
+    args: Map<String, Value>,
+}
+
+/// From a moment to another, in whole nanoseconds: what encloses another still does so when it is rounded.
+#[derive(Clone, Copy)]
+struct Interval {
+    begin: u64,
+    end: u64,
+}
+
+impl Interval {
+    /// None where the pass has no timestamps.
+    fn of(pass: &PassTime) -> Option<Self> {
+        let nanoseconds = |ms: f64| (ms * 1e6).round() as u64;
+        let (start, ms) = pass.start_ms.zip(pass.ms)?;
+        Some(Self { begin: nanoseconds(start), end: nanoseconds(start + ms) })
+    }
+
+    /// From the first's begin to the last's end; none for none.
+    fn around(passes: &[&PassTime]) -> Option<Self> {
+        let intervals = passes.iter().filter_map(|pass| Self::of(pass));
+        intervals.reduce(|a, b| Self { begin: a.begin.min(b.begin), end: a.end.max(b.end) })
+    }
+
+    fn after(self, begin: u64) -> Self {
+        Self { begin: self.begin + begin, end: self.end + begin }
+    }
+}
+
+/// The trace as JSON that ends with a line break. `origin`: when the command began, which is time 0.
+///
+/// The device's clock is another than the CPU's: the frame is drawn from the moment when the device got it.
+pub fn trace_json(origin: Instant, spans: &[Span], frame: &Profile) -> Vec<u8> {
+    let mut events = vec![
+        named("process_name", CPU, "kdray"),
+        named("thread_name", CPU, "CPU"),
+        named("thread_name", PASSES, &format!("passes on {}", frame.device)),
+    ];
+    let since = |moment: Instant| moment.saturating_duration_since(origin).as_nanos() as u64;
+    events.extend(spans.iter().map(|span| {
+        let interval = Interval { begin: since(span.begin), end: since(span.end) };
+        slice(span.name.to_owned(), CPU, interval, Map::new())
+    }));
+    events.extend(frame_slices(frame, frame.begun_at.map_or(0, since)));
+    let mut json = serde_json::to_vec(&Trace { events, unit: "ms" }).expect("plain structs of numbers and words");
+    json.push(b'\n');
+    json
+}
+
+/// The frame, in it its batches if it has several, in these the bounces, in these the passes.
+fn frame_slices(frame: &Profile, begun_at: u64) -> Vec<Event> {
+    let mut slices = Vec::new();
+    let mut add = |name: String, passes: &[&PassTime], args| {
+        if let Some(interval) = Interval::around(passes) {
+            slices.push(slice(name, PASSES, interval.after(begun_at), args));
+        }
+    };
+    add("frame".to_owned(), &frame.passes.iter().collect::<Vec<_>>(), object(json!({ "n_batches": frame.n_batches })));
+    let batches = frame.passes.chunk_by(|a, b| a.batch == b.batch);
+    for batch in batches {
+        let of_batch: Vec<_> = batch.iter().collect();
+        if let Some(batch_ix) = batch[0].batch.filter(|_| frame.n_batches > 1) {
+            add(format!("batch {batch_ix}"), &of_batch, Map::new());
+        }
+        for bounce in batch.chunk_by(|a, b| a.bounce == b.bounce) {
+            if let Some(bounce_ix) = bounce[0].bounce {
+                let args = object(json!({ "n_rays": bounce[0].n_rays_in }));
+                add(format!("bounce {bounce_ix}"), &bounce.iter().collect::<Vec<_>>(), args);
+            }
+            for pass in bounce {
+                add(pass.name.to_owned(), &[pass], rays(pass));
+            }
+        }
+    }
+    slices
+}
+
+fn rays(pass: &PassTime) -> Map<String, Value> {
+    let counts = [("n_rays_in", pass.n_rays_in), ("n_rays_out", pass.n_rays_out)];
+    counts.into_iter().filter_map(|(name, n)| Some((name.to_owned(), n?.into()))).collect()
+}
+
+fn object(value: Value) -> Map<String, Value> {
+    match value {
+        Value::Object(map) => map,
+        _ => Map::new(),
+    }
+}
+
+fn slice(name: String, track: u32, interval: Interval, args: Map<String, Value>) -> Event {
+    let microseconds = |nanoseconds: u64| nanoseconds as f64 / 1e3;
+    Event {
+        name,
+        category: if track == CPU { "cpu" } else { "pass" },
+        phase: "X",
+        start: microseconds(interval.begin),
+        duration: Some(microseconds(interval.end.saturating_sub(interval.begin))),
+        process: 1,
+        track,
+        args,
+    }
+}
+
+/// `kind`: what is named, the process or the track.
+fn named(kind: &str, track: u32, name: &str) -> Event {
+    let args = object(json!({ "name": name }));
+    Event {
+        name: kind.to_owned(),
+        category: "__metadata",
+        phase: "M",
+        start: 0.0,
+        duration: None,
+        process: 1,
+        track,
+        args,
+    }
+}

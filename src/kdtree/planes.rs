@@ -1,0 +1,44 @@
+//! The planes of the leaves' triangles: where a ray keeps clear of a plane, its triangle need not be tested.
+
+use rayon::prelude::*;
+
+use crate::layout::{Plane, Triangle};
+
+/// The plane of each entry's triangle.
+pub fn planes_of(triangles: &[Triangle], entries: &[u32]) -> Vec<Plane> {
+    entries.par_iter().map(|&ix| plane_of(&triangles[ix as usize])).collect()
+}
+
+/// The rounded normal, and the distance at which a plane of that normal passes through the triangle's middle.
+pub fn plane_of(triangle: &Triangle) -> Plane {
+    let [v0, v1, v2] = [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3());
+    let normal = (v1 - v0).cross(v2 - v0).normalize_or_zero().as_vec3();
+    let middle = (v0 + v1 + v2) / 3.0;
+    Plane { normal, distance: normal.as_dvec3().dot(middle) as f32 }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec3, vec3};
+
+    use super::*;
+    use crate::kdtree::tests::staircase;
+
+    #[test]
+    fn all_corners_lie_in_the_plane() {
+        for triangle in staircase(100) {
+            let plane = plane_of(&triangle);
+            assert!((plane.normal.length() - 1.0).abs() < 1e-6);
+            for corner in [triangle.v0, triangle.v1, triangle.v2] {
+                assert!((plane.normal.dot(corner) - plane.distance).abs() < 1e-5, "{plane:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_triangle_without_area_has_a_plane_that_no_point_is_clear_of() {
+        let corner = vec3(1.0, 2.0, 3.0);
+        let segment = Triangle { v0: corner, v1: corner, v2: 2.0 * corner, ..Triangle::default() };
+        assert_eq!(plane_of(&segment), Plane { normal: Vec3::ZERO, distance: 0.0 });
+    }
+}

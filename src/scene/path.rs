@@ -1,0 +1,161 @@
+//! A camera that moves: a TOML file of keyframes, and the smooth way between them.
+
+use std::path::Path;
+
+use glam::DVec3;
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{
+    Camera, SceneError,
+    assemble::{File, camera},
+    description::CameraSpec,
+    error::Checked,
+    read::read_utf8,
+};
+
+/// Frames a second where the file says nothing.
+const DEFAULT_FPS: f64 = 25.0;
+/// What any film has fewer of.
+const MAX_FRAMES: f64 = 1e6;
+
+/// A path file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PathSpec {
+    fps: Option<Spanned<f64>>,
+    #[serde(default)]
+    keyframe: Vec<Spanned<KeyframeSpec>>,
+}
+
+/// A scene file's camera, and when it is there.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct KeyframeSpec {
+    /// Frames, counted from 0.
+    frame: Option<f64>,
+    /// Seconds, in place of a frame.
+    time: Option<f64>,
+    eye: [f32; 3],
+    target: [f32; 3],
+    up: Option<[f32; 3]>,
+    vertical_fov: Option<f32>,
+}
+
+/// Keyframes in the order of frames, at least one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraPath {
+    /// Frames a second.
+    pub fps: f64,
+    keyframes: Vec<Keyframe>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Keyframe {
+    frame: f64,
+    pose: Pose,
+}
+
+/// A camera as numbers that are interpolated one by one.
+type Pose = [f64; 10];
+
+impl CameraPath {
+    /// # Errors
+    /// The file cannot be read or understood; keyframes out of order, or with a camera that sees nothing.
+    pub fn load(path: &Path) -> Result<Self, SceneError> {
+        let text = read_utf8(path)?;
+        let file = File { path, text: &text };
+        let spec: PathSpec = file.parse()?;
+        let fps = match &spec.fps {
+            Some(fps) => file.check("fps", fps, |&fps| rate(fps))?,
+            None => DEFAULT_FPS,
+        };
+        let mut keyframes: Vec<Keyframe> = Vec::new();
+        for (ix, spec) in spec.keyframe.iter().enumerate() {
+            let before = keyframes.last().map(|keyframe| keyframe.frame);
+            let check = |spec: &KeyframeSpec| keyframe(spec, fps, before);
+            keyframes.push(file.check(&format!("keyframe {}", ix + 1), spec, check)?);
+        }
+        if keyframes.is_empty() {
+            return Err(SceneError::file(path, "has no [[keyframe]]"));
+        }
+        Ok(Self { fps, keyframes })
+    }
+
+    /// Frame of the first keyframe.
+    pub fn begin(&self) -> f64 {
+        self.keyframes[0].frame
+    }
+
+    /// Frame of the last keyframe.
+    pub fn end(&self) -> f64 {
+        self.keyframes[self.keyframes.len() - 1].frame
+    }
+
+    /// The camera at a frame, or between two; before the first keyframe and after the last it stands still. None where the
+    /// way between keyframes leads through one that sees nothing: eye and target meet, or up points along the view.
+    ///
+    /// Cubic Hermite splines, one a number, with Catmull-Rom's tangents (E. Catmull, R. Rom: A Class of Local Interpolating
+    /// Splines, 1974) over frames: through all keyframes, without jumps of speed; even motion stays even.
+    pub fn camera_at(&self, frame: f64) -> Option<Camera> {
+        let frame = frame.clamp(self.begin(), self.end());
+        let after = self.keyframes.partition_point(|keyframe| keyframe.frame <= frame);
+        let from = after.saturating_sub(1);
+        if from + 1 == self.keyframes.len() {
+            return to_camera(&self.keyframes[from].pose);
+        }
+        let (a, b) = (&self.keyframes[from], &self.keyframes[from + 1]);
+        let span = b.frame - a.frame;
+        let s = (frame - a.frame) / span;
+        // Weights of both ends and of their tangents.
+        let b_weight = s * s * (3.0 - 2.0 * s);
+        let (a_slope, b_slope) = (span * s * (1.0 - s) * (1.0 - s), span * s * s * (s - 1.0));
+        let (a_tangent, b_tangent) = (self.tangent(from), self.tangent(from + 1));
+        to_camera(&std::array::from_fn(|i| {
+            let between = a.pose[i] + (b.pose[i] - a.pose[i]) * b_weight;
+            between + a_tangent[i] * a_slope + b_tangent[i] * b_slope
+        }))
+    }
+
+    /// Change a frame at a keyframe: from the one before to the one after, as far as there are any.
+    fn tangent(&self, ix: usize) -> Pose {
+        let before = &self.keyframes[ix.saturating_sub(1)];
+        let after = &self.keyframes[(ix + 1).min(self.keyframes.len() - 1)];
+        std::array::from_fn(|i| (after.pose[i] - before.pose[i]) / (after.frame - before.frame))
+    }
+}
+
+fn rate(fps: f64) -> Checked<f64> {
+    if fps > 0.0 && fps <= 1000.0 { Ok(fps) } else { Err(format!("{fps} is outside 0 to 1000")) }
+}
+
+fn keyframe(spec: &KeyframeSpec, fps: f64, before: Option<f64>) -> Checked<Keyframe> {
+    let frame = match (spec.frame, spec.time) {
+        (Some(frame), None) => frame,
+        (None, Some(time)) => time * fps,
+        (Some(_), Some(_)) => return Err("has both `frame` and `time`".to_owned()),
+        (None, None) => return Err("has neither `frame` nor `time`".to_owned()),
+    };
+    if !(0.0..=MAX_FRAMES).contains(&frame) {
+        return Err(format!("its frame is outside 0 to {MAX_FRAMES}"));
+    }
+    if before.is_some_and(|before| frame <= before) {
+        return Err(format!("frame {frame} does not come after the keyframe before it"));
+    }
+    let KeyframeSpec { eye, target, up, vertical_fov, .. } = *spec;
+    let Camera { eye, target, up, vertical_fov_degrees } = camera(&CameraSpec { eye, target, up, vertical_fov })?;
+    let mut pose = [0.0; 10];
+    for (numbers, vector) in pose.chunks_exact_mut(3).zip([eye, target, up]) {
+        numbers.copy_from_slice(&vector.as_dvec3().to_array());
+    }
+    pose[9] = f64::from(vertical_fov_degrees);
+    Ok(Keyframe { frame, pose })
+}
+
+fn to_camera(pose: &Pose) -> Option<Camera> {
+    let vector = |i: usize| DVec3::from_slice(&pose[i..]).as_vec3().to_array();
+    // A curve may swing beyond its keyframes.
+    let vertical_fov = (pose[9] as f32).clamp(0.1, 170.0);
+    let spec = CameraSpec { eye: vector(0), target: vector(3), up: Some(vector(6)), vertical_fov: Some(vertical_fov) };
+    camera(&spec).ok()
+}

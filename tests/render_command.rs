@@ -1,0 +1,182 @@
+//! `kdray render`'s samples, crops, curves, layers and camera paths, as its users meet them.
+
+mod support;
+
+use std::{fs, path::Path, process::Output};
+
+use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
+use support::command::{cornell, fail, names, stderr, stdout, succeed};
+use tempfile::TempDir;
+
+/// Renders Cornell's box small, on the CPU, in a directory.
+fn render(directory: &Path, more: &[&str]) -> Output {
+    let scene = cornell();
+    succeed(directory, &[&["render", &scene, "--size", "64x48", "--cpu"], more].concat())
+}
+
+fn refused(directory: &Path, code: i32, more: &[&str], named: &str) {
+    let scene = cornell();
+    fail(directory, &[&["render", &scene, "--size", "64x48", "--cpu"], more].concat(), code, named);
+}
+
+fn pixels(directory: &Path, name: &str) -> image::RgbImage {
+    image::open(directory.join(name)).unwrap().into_rgb8()
+}
+
+#[test]
+fn more_samples_smooth_edges_and_are_counted() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    render(path, &["-o", "1.png", "--denoise", "off"]);
+    let output = render(path, &["-o", "8.png", "--denoise", "off", "--spp", "8", "--profile", "8.json"]);
+    assert!(stdout(&output).contains("8 samples a pixel"), "{}", stdout(&output));
+    let json: serde_json::Value = serde_json::from_slice(&fs::read(path.join("8.json")).unwrap()).unwrap();
+    assert_eq!((json["samples"].as_u64(), json["bounces"][0]["n_rays"].as_u64()), (Some(8), Some(8 * 64 * 48)));
+    let n_colours = |name| pixels(path, name).pixels().map(|p| p.0).collect::<std::collections::HashSet<_>>().len();
+    assert!(n_colours("8.png") > n_colours("1.png"));
+}
+
+#[test]
+fn a_crop_is_a_part_of_the_picture() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    render(path, &["-o", "whole.png", "--spp", "2"]);
+    let output = render(path, &["-o", "part.png", "--spp", "2", "--crop", "10,5,40,17"]);
+    assert!(stdout(&output).contains("64x48 (10,5,40,17 of it)"), "{}", stdout(&output));
+    let part = image::imageops::crop_imm(&pixels(path, "whole.png"), 10, 5, 30, 12).to_image();
+    assert_eq!(part, pixels(path, "part.png"));
+    refused(path, 2, &["--crop", "10,5,65,17"], "64x48");
+    refused(path, 2, &["--crop", "0,0,4294967295,1"], "beyond the picture");
+}
+
+#[test]
+fn curves_change_what_is_shown_and_not_what_is() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    for curve in ["linear", "agx", "aces"] {
+        render(path, &["-o", &format!("{curve}.png"), "--tonemap", curve]);
+        render(path, &["-o", &format!("{curve}.exr"), "--tonemap", curve]);
+    }
+    render(path, &["-o", "default.png"]);
+    let read = |name: &str| fs::read(path.join(name)).unwrap();
+    assert!(read("default.png") == read("linear.png"));
+    assert!(read("agx.png") != read("linear.png") && read("agx.png") != read("aces.png"));
+    assert!(read("agx.exr") == read("linear.exr") && read("aces.exr") == read("linear.exr"));
+}
+
+/// Channels of an EXR file by name, their samples as bits.
+fn channels(path: &Path) -> Vec<(String, &'static str, Vec<u32>)> {
+    let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels();
+    let image = reader.first_valid_layer().all_attributes().from_file(path).unwrap();
+    let channel = |channel: &exr::prelude::AnyChannel<FlatSamples>| {
+        let (kind, bits) = match &channel.sample_data {
+            FlatSamples::F32(values) => ("f32", values.iter().map(|value| value.to_bits()).collect()),
+            FlatSamples::U32(values) => ("u32", values.clone()),
+            FlatSamples::F16(_) => panic!("no halves"),
+        };
+        (channel.name.to_string(), kind, bits)
+    };
+    image.layer_data.channel_data.list.iter().map(channel).collect()
+}
+
+#[test]
+fn aovs_are_layers_beside_the_colour() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let output = render(path, &["-o", "x.exr", "--aov", "depth,normal,id,rays,depth"]);
+    assert!(stdout(&output).ends_with("wrote x.exr\n"), "{}", stdout(&output));
+    render(path, &["-o", "plain.exr"]);
+    let (with, plain) = (channels(&path.join("x.exr")), channels(&path.join("plain.exr")));
+    let kinds: Vec<_> = with.iter().map(|(name, kind, _)| (name.as_str(), *kind)).collect();
+    let floats = |names: &[&'static str]| names.iter().map(|name| (*name, "f32")).collect::<Vec<_>>();
+    let mut expected = floats(&["B", "G", "R", "depth.Z"]);
+    expected.extend([("id.ID", "u32")]);
+    expected.extend(floats(&["normal.X", "normal.Y", "normal.Z"]));
+    expected.extend([("rays.N", "u32")]);
+    assert_eq!(kinds, expected);
+    assert!(with.iter().all(|(.., bits)| bits.len() == 64 * 48));
+    for colour in &plain {
+        assert!(with.contains(colour), "{} is the same as without layers", colour.0);
+    }
+    let named = |name: &str| &with.iter().find(|channel| channel.0 == name).unwrap().2;
+    // 34 triangles, and around the box what is none.
+    assert!(named("id.ID").iter().all(|id| *id < 34 || *id == u32::MAX));
+    let is_far = |z: &u32| f32::from_bits(*z) == f32::INFINITY;
+    assert!(named("id.ID").iter().zip(named("depth.Z")).all(|(id, z)| (*id == u32::MAX) == is_far(z)));
+    assert_eq!(names(path), ["plain.exr", "x.exr"]);
+}
+
+#[test]
+fn the_costs_are_a_heat_map_too() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let output = render(path, &["-o", "x.png", "--aov", "cost", "--crop", "0,0,40,30"]);
+    let text = stdout(&output);
+    assert!(["wrote x.exr\n", "wrote x.cost.png\n", "wrote x.png\n"].iter().all(|line| text.contains(line)), "{text}");
+    assert_eq!(names(path), ["x.cost.png", "x.exr", "x.png"]);
+    let map = pixels(path, "x.cost.png");
+    assert!(map.width() > 40 && map.height() > 30);
+    let costs = channels(&path.join("x.exr"));
+    let (name, kind, values) = &costs[3];
+    assert_eq!((name.as_str(), *kind, values.len()), ("cost.N", "u32", 1200));
+    refused(path, 5, &["--aov", "cost", "-o", "none/x.png"], "none");
+}
+
+const PATH: &str = "
+    [[keyframe]]
+    frame = 0
+    eye = [0, 2.75, 10.7]
+    target = [0, 2.75, 0]
+    vertical_fov = 39.5
+    [[keyframe]]
+    frame = 2
+    eye = [1, 3, 9]
+    target = [0, 2.75, 0]
+";
+
+#[test]
+fn a_path_makes_a_picture_a_frame() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    fs::write(path.join("p.toml"), PATH).unwrap();
+    let output = render(path, &["--path", "p.toml", "-o", "out.##.png"]);
+    assert!(stdout(&output).ends_with("wrote 3 pictures, out.00.png to out.02.png\n"), "{}", stdout(&output));
+    assert_eq!(names(path), ["out.00.png", "out.01.png", "out.02.png", "p.toml"]);
+    render(path, &["-o", "still.png"]);
+    // The first keyframe is the scene's own camera; a part of the path is the same as in the whole.
+    assert_eq!(pixels(path, "still.png"), pixels(path, "out.00.png"));
+    render(path, &["--path", "p.toml", "-o", "again.####.png", "--frames", "1", "--aov", "cost"]);
+    assert_eq!(pixels(path, "again.0001.png"), pixels(path, "out.01.png"));
+    assert!(path.join("again.0001.cost.png").exists() && path.join("again.0001.exr").exists());
+    assert_ne!(pixels(path, "out.01.png"), pixels(path, "out.02.png"));
+}
+
+#[test]
+fn bad_paths_are_refused_before_rendering() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    refused(path, 3, &["--path", "none.toml"], "none.toml");
+    fs::write(path.join("bad.toml"), "[[keyframe]]\nframe = 0\neye = [0, 0, 0]\n").unwrap();
+    refused(path, 3, &["--path", "bad.toml"], "bad.toml:1");
+    // Half way, the eye goes through its target.
+    let through = "[[keyframe]]\nframe = 0\neye = [0, 0, -1]\ntarget = [0, 0, 0]\n\
+                   [[keyframe]]\nframe = 2\neye = [0, 0, 1]\ntarget = [0, 0, 0]\n";
+    fs::write(path.join("through.toml"), through).unwrap();
+    refused(path, 2, &["--path", "through.toml"], "at frame 1,");
+    fs::write(path.join("short.toml"), PATH.replace("= 0\n", "= 0.2\n").replace("= 2\n", "= 0.8\n")).unwrap();
+    refused(path, 2, &["--path", "short.toml"], "no whole frame");
+    assert_eq!(names(path), ["bad.toml", "short.toml", "through.toml"]);
+}
+
+#[test]
+fn frames_differ_by_the_camera_alone_on_the_device_too() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    fs::write(path.join("p.toml"), PATH).unwrap();
+    let scene = cornell();
+    let arguments = ["render", &scene, "--size", "64x48", "--validate", "--path", "p.toml", "--spp", "3"];
+    let output = succeed(path, &[&arguments[..], &["--frames", "0-1", "-o", "a#.png"]].concat());
+    assert!(stderr(&output).contains("rendering"), "{}", stderr(&output));
+    succeed(path, &[&arguments[..], &["--frames", "1", "-o", "b#.png"]].concat());
+    assert_eq!(pixels(path, "a1.png"), pixels(path, "b1.png"));
+}
