@@ -28,15 +28,15 @@ words!(View {
 });
 
 impl View {
-    /// As the kernel knows it.
-    pub(crate) fn constant(self) -> u32 {
+    /// As the kernel knows it; none for the picture.
+    pub(crate) fn constant(self) -> Option<u32> {
         match self {
-            Self::Picture => layout::VIEW_PICTURE,
-            Self::Depth => layout::VIEW_DEPTH,
-            Self::Normal => layout::VIEW_NORMAL,
-            Self::Id => layout::VIEW_ID,
-            Self::Cost => layout::VIEW_COST,
-            Self::Rays => layout::VIEW_RAYS,
+            Self::Picture => None,
+            Self::Depth => Some(layout::VIEW_DEPTH),
+            Self::Normal => Some(layout::VIEW_NORMAL),
+            Self::Id => Some(layout::VIEW_ID),
+            Self::Cost => Some(layout::VIEW_COST),
+            Self::Rays => Some(layout::VIEW_RAYS),
         }
     }
 }

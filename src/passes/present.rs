@@ -4,19 +4,9 @@ use std::sync::Arc;
 
 use super::{Resources, spirv};
 use crate::{
-    frame::View,
     gpu::{Commands, Context, GpuError, Presenter, RasterDesc, RasterPipeline, RasterTargets, WindowImage},
     layout,
 };
-
-/// What a window shows of a picture.
-pub struct Shown {
-    /// The picture's width and height, pixels.
-    pub size: (u32, u32),
-    pub view: View,
-    /// The value that is shown brightest, or half as bright for depth.
-    pub brightest: f32,
-}
 
 /// The pass's pipeline.
 pub struct Present {
@@ -38,12 +28,10 @@ impl Present {
         Ok(Self { pipeline: RasterPipeline::new(context, &resources.bindings, &desc)? })
     }
 
-    /// Needs pixel_display and, but for `View::Picture`, pixel_features, both of `size` pixels and readable by fragments.
-    /// Leaves the window's image, all of it.
-    pub fn record(&self, commands: &Commands, resources: &Resources, shown: &Shown, image: &WindowImage) {
-        let ((width, height), (window_width, window_height)) = (shown.size, image.size());
-        let (view, brightest) = (shown.view.constant(), shown.brightest);
-        let push = layout::Present { width, height, window_width, window_height, view, brightest };
+    /// Needs pixel_display of `size` pixels, readable by fragments. Leaves the window's image, all of it.
+    pub fn record(&self, commands: &Commands, resources: &Resources, size: (u32, u32), image: &WindowImage) {
+        let ((width, height), (window_width, window_height)) = (size, image.size());
+        let push = layout::Present { width, height, window_width, window_height };
         commands.cover(&self.pipeline, &resources.sets[0], &push, image);
     }
 }

@@ -18,7 +18,7 @@ use crate::{
     frame::{Denoise, Picture, Primary, Profile, RenderOptions},
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     kdtree::KdTree,
-    layout::{Batch, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
+    layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
     passes::{Passes, Resources},
     scene::{Camera, Scene},
 };
@@ -37,6 +37,8 @@ pub struct Renderer {
     schedule: Schedule,
     /// Samples a pixel that the picture holds.
     n_samples: u32,
+    /// What is displayed in place of the picture, where there are features.
+    false_color: Option<FalseColor>,
     /// Whether what samples are added to holds the first one.
     has_sums: bool,
     /// A sample that is drawn in part.
@@ -101,6 +103,7 @@ impl Renderer {
             passes,
             schedule,
             n_samples: 0,
+            false_color: None,
             has_sums: false,
             pending: None,
             most_pixels: None,
@@ -281,7 +284,10 @@ impl Renderer {
             self.passes.denoise.record(commands, &self.resources);
             commands.barrier(Access::ComputeWrite, Access::ComputeRead); // pixel_filtered
         }
-        self.passes.tonemap.record(commands, &self.resources);
+        match &self.false_color {
+            Some(push) if self.options.features => self.passes.false_color.record(commands, &self.resources, push),
+            _ => self.passes.tonemap.record(commands, &self.resources),
+        }
     }
 }
 

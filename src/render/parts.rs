@@ -9,9 +9,9 @@ use super::{
     schedule::{Schedule, split_evenly},
 };
 use crate::{
-    frame::Profile,
+    frame::{Profile, View},
     gpu::{CommandBuffer, GpuError},
-    layout::Frame,
+    layout::{FalseColor, Frame},
 };
 
 /// A sample that is drawn in part; nothing of it is under way.
@@ -144,6 +144,19 @@ impl Renderer {
     fn recorded(&self, sample_ix: u32) -> Result<Pending, GpuError> {
         let commands = info_span!("record").in_scope(|| self.record())?;
         Ok(Pending { commands, n_done: 0, sample_ix, begun_at: None })
+    }
+
+    /// Displays one of the features in place of the picture, from the next sample on; only where the options ask for
+    /// features. `brightest`: the value that is brightest, for cost and rays, or half as bright, for depth. True where
+    /// that is new; a sample that is begun is begun anew then.
+    pub fn set_view(&mut self, view: View, brightest: f32) -> bool {
+        let false_color = view.constant().map(|view| FalseColor { view, brightest });
+        let is_new = false_color != self.false_color;
+        if is_new {
+            self.pending = None;
+            self.false_color = false_color;
+        }
+        is_new
     }
 
     /// Width and height of what pixel_display holds; none before there is a picture.

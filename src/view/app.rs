@@ -195,7 +195,7 @@ impl App {
             }
             None => None,
         };
-        if !live.show(size, session.shown_as(), frame.as_ref())? {
+        if !live.show(size, frame.as_ref())? {
             return Ok(false);
         }
         session.shown();

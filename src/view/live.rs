@@ -6,9 +6,9 @@ use egui::TexturesDelta;
 
 use super::loaded::Loaded;
 use crate::{
-    frame::{RenderOptions, View},
+    frame::RenderOptions,
     gpu::{Context, ContextOptions, GpuError, Overlay, OverlayFrame, Presenter, Screen},
-    passes::{Present, Shown},
+    passes::Present,
     render::Renderer,
 };
 
@@ -62,21 +62,16 @@ impl Live {
         self.overlay.update_textures(textures)
     }
 
-    /// Shows the picture as it is, or a view of it with the value that is brightest, and the overlay over it. False where
-    /// the window cannot show anything now. `window`: its size in pixels.
+    /// Shows what is displayed, and the overlay over it. False where the window cannot show anything now. `window`: its size
+    /// in pixels.
     ///
     /// # Errors
     /// A failed call.
-    pub fn show(
-        &mut self,
-        window: (u32, u32),
-        (view, brightest): (View, f32),
-        overlay: Option<&OverlayFrame>,
-    ) -> Result<bool, GpuError> {
+    pub fn show(&mut self, window: (u32, u32), overlay: Option<&OverlayFrame>) -> Result<bool, GpuError> {
         let Self { renderer, present, overlay: drawer, presenter, .. } = self;
         presenter.present(window, |commands, image| {
             if let Some(size) = renderer.displayed() {
-                present.record(commands, renderer.resources(), &Shown { size, view, brightest }, image);
+                present.record(commands, renderer.resources(), size, image);
             }
             match overlay {
                 Some(frame) => drawer.draw(commands, image, frame),

@@ -103,8 +103,10 @@ impl Session {
         live.presenter.set_vsync(self.settings.vsync);
         self.budget.set_budget(self.settings.budget_ms);
         let features = self.settings.view != View::Picture;
-        if self.is_interactive && features != live.renderer.options().features {
-            // Other buffers, with nothing in them yet: a small picture first.
+        let (view, brightest) = self.view();
+        if live.renderer.set_view(view, brightest) && self.is_interactive {
+            // A small picture at once.
+            live.renderer.reset_samples();
             self.pace.moved(now);
         }
         let is_moving = self.pace.is_moving(now) || self.is_learning();
@@ -201,8 +203,8 @@ impl Session {
         self.history.push(FrameRecord { pass_ms, ..record });
     }
 
-    /// What the window shows of the picture.
-    pub fn shown_as(&self) -> (View, f32) {
+    /// What is displayed, and the value that is brightest.
+    fn view(&self) -> (View, f32) {
         let automatic = match self.settings.view {
             View::Picture | View::Normal | View::Id => 1.0,
             View::Depth => self.controller.radius(),
