@@ -27,6 +27,7 @@ impl Session {
             Action::PrintCamera => print(&to_toml(self.controller.camera())),
             Action::FrameScene => self.controller.frame_scene(window.0 as f32 / window.1 as f32),
             Action::GoHome => self.controller.go_home(),
+            Action::Show(view) => self.settings.view = view,
             Action::Pick { x, y } => self.pick(live, window, (x, y)),
             Action::ToggleOverlay | Action::Quit => {}
         }

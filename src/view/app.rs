@@ -1,120 +1,34 @@
 //! The window: its events, and the order of things in a frame.
 
 use std::{
-    path::PathBuf,
     sync::Arc,
     time::{Duration, Instant},
 };
 
-use serde::Serialize;
 use winit::{
     application::ApplicationHandler,
     dpi::PhysicalSize,
     event::{ElementState, KeyEvent, WindowEvent},
-    event_loop::{ActiveEventLoop, ControlFlow, EventLoop},
+    event_loop::{ActiveEventLoop, ControlFlow},
     keyboard::{KeyCode, PhysicalKey},
     window::{Window, WindowId},
 };
 
 use super::{
+    display::{PaceReport, ViewOptions, ViewReport},
     error::ViewError,
-    history::Percentiles,
     input::{Action, Input},
     live::Live,
-    loaded::Loaded,
     panel::Settings,
     reload::{Reloader, Wake},
     script::Script,
     session::Session,
-    tour::Tour,
     ui::{Layout, Ui},
 };
-use crate::gpu::{ContextOptions, GpuError};
+use crate::gpu::GpuError;
 
-/// What the viewer is asked for.
-pub struct ViewOptions {
-    /// The options' size is the window's at first.
-    pub settings: Settings,
-    pub device: ContextOptions,
-    /// Whether there is an overlay; the user can hide it.
-    pub overlay: bool,
-    /// Frames of a tour after which it ends; none: the user's own way.
-    pub n_frames: Option<u32>,
-    /// Of the tour's last frame.
-    pub screenshot: Option<PathBuf>,
-    /// A directory for the tour's frames.
-    pub record: Option<PathBuf>,
-    /// Writes to the terminal.
-    pub print: fn(&str),
-}
-
-/// What came of it.
-#[derive(Serialize)]
-pub struct ViewReport {
-    pub device: String,
-    #[serde(flatten)]
-    pub pace: PaceReport,
-    /// What the validation layer has said.
-    #[serde(skip)]
-    pub validation: Vec<String>,
-}
-
-/// Milliseconds.
-#[derive(Serialize)]
-pub struct PaceReport {
-    /// From a frame to the next.
-    pub frame_ms: Option<Percentiles>,
-    /// From an input to the first frame that shows it.
-    pub input_to_present_ms: Option<Percentiles>,
-}
-
-/// A display that windows can be opened on.
-pub struct Display {
-    event_loop: EventLoop<Wake>,
-}
-
-impl Display {
-    /// # Errors
-    /// There is none.
-    pub fn open() -> Result<Self, ViewError> {
-        match EventLoop::with_user_event().build() {
-            Ok(event_loop) => Ok(Self { event_loop }),
-            Err(error) => {
-                // The message begins with a place in the library's source.
-                let message = error.to_string();
-                let what = message.rsplit_once(": ").map_or(&*message, |(_, what)| what);
-                Err(ViewError::NoDisplay(what.trim_end_matches('.').to_owned()))
-            }
-        }
-    }
-
-    /// Shows the scene until the user, or the tour, ends it.
-    ///
-    /// # Errors
-    /// No window, no device that can present to it; a device that fails for good; a tour's picture that cannot be written.
-    pub fn view(self, loaded: Loaded, options: ViewOptions) -> Result<ViewReport, ViewError> {
-        let script = options.n_frames.map(|n_frames| {
-            let tour = Tour::around(loaded.scene.camera, n_frames);
-            Script::new(tour, options.record.clone(), options.screenshot.clone())
-        });
-        let reloader = Reloader::new(loaded.path.clone(), self.event_loop.create_proxy());
-        let mut app = App {
-            session: Session::new(loaded, options.settings.clone(), script.is_none()),
-            is_overlaid: options.overlay,
-            options,
-            script,
-            reloader,
-            input: Input::default(),
-            shown: None,
-            is_occluded: false,
-            outcome: Ok(()),
-        };
-        self.event_loop.run_app(&mut app).map_err(|error| ViewError::Window(error.to_string()))?;
-        app.report()
-    }
-}
-
-struct App {
+/// The viewer, as the event loop drives it.
+pub(super) struct App {
     session: Session,
     options: ViewOptions,
     script: Option<Script>,
@@ -135,6 +49,20 @@ struct Shown {
 }
 
 impl App {
+    pub fn new(session: Session, options: ViewOptions, script: Option<Script>, reloader: Reloader) -> Self {
+        Self {
+            session,
+            is_overlaid: options.overlay,
+            options,
+            script,
+            reloader,
+            input: Input::default(),
+            shown: None,
+            is_occluded: false,
+            outcome: Ok(()),
+        }
+    }
+
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<Shown, ViewError> {
         let Settings { options, vsync, .. } = &self.session.settings;
         let attributes = Window::default_attributes()
@@ -248,7 +176,8 @@ impl App {
         }
     }
 
-    fn report(self) -> Result<ViewReport, ViewError> {
+    /// What came of it, once the loop has ended.
+    pub fn report(self) -> Result<ViewReport, ViewError> {
         self.outcome?;
         let frames = &self.session.all_frames;
         let pace = PaceReport { frame_ms: frames.pace(), input_to_present_ms: frames.latency() };

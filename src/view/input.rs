@@ -6,6 +6,7 @@ use winit::{
 };
 
 use super::controller::{Controller, Fly};
+use crate::frame::View;
 
 /// Pixels of the wheel's travel where it has no steps.
 const WHEEL_STEP_PX: f64 = 50.0;
@@ -20,6 +21,7 @@ pub enum Action {
     FrameScene,
     GoHome,
     ToggleOverlay,
+    Show(View),
     /// What a place of the window shows, pixels from its upper left corner.
     Pick {
         x: f64,
@@ -98,6 +100,12 @@ impl Input {
             KeyCode::Home => Some(Action::GoHome),
             KeyCode::Tab => Some(Action::ToggleOverlay),
             KeyCode::Escape => Some(Action::Quit),
+            KeyCode::Digit1 => Some(Action::Show(View::Picture)),
+            KeyCode::Digit2 => Some(Action::Show(View::Depth)),
+            KeyCode::Digit3 => Some(Action::Show(View::Normal)),
+            KeyCode::Digit4 => Some(Action::Show(View::Id)),
+            KeyCode::Digit5 => Some(Action::Show(View::Cost)),
+            KeyCode::Digit6 => Some(Action::Show(View::Rays)),
             _ => None,
         };
         if matches!(action, Some(Action::FrameScene | Action::GoHome)) {

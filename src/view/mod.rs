@@ -4,6 +4,7 @@ mod actions;
 mod app;
 pub mod budget;
 pub mod controller;
+mod display;
 mod error;
 pub mod history;
 mod input;
@@ -20,7 +21,7 @@ mod ui;
 pub mod watch;
 
 pub use self::{
-    app::{Display, PaceReport, ViewOptions, ViewReport},
+    display::{Display, PaceReport, ViewOptions, ViewReport},
     error::ViewError,
     loaded::Loaded,
     panel::Settings,

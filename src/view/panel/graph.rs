@@ -2,14 +2,17 @@
 
 use egui::{Color32, Pos2, Rect, Sense, Stroke, StrokeKind, Ui, vec2};
 
-use crate::view::history::{FrameRecord, History};
+use crate::{
+    frame::Profile,
+    view::history::{FrameRecord, History},
+};
 
 /// Points.
 const HEIGHT: f32 = 80.0;
 
 /// The graph and its legend.
-pub fn show(ui: &mut Ui, history: &History) {
-    let passes = passes(history);
+pub fn show(ui: &mut Ui, history: &History, newest: &Profile) {
+    let passes = passes(newest);
     if passes.is_empty() {
         ui.label("no times yet, or a device without timestamps");
         return;
@@ -44,21 +47,19 @@ pub fn show(ui: &mut Ui, history: &History) {
         egui::FontId::proportional(10.0),
         Color32::LIGHT_GRAY,
     );
-    legend(ui, history, &passes);
+    legend(ui, newest, &passes);
 }
 
 fn pass_ms(frame: &FrameRecord, name: &str) -> f64 {
     frame.pass_ms.iter().filter(|(pass, _)| *pass == name).map(|(_, ms)| ms).sum()
 }
 
-/// Every pass of the history and its colour, in the order of execution.
-fn passes(history: &History) -> Vec<(&'static str, Color32)> {
+/// Every pass of the sample and its colour, in the order of execution.
+fn passes(profile: &Profile) -> Vec<(&'static str, Color32)> {
     let mut names: Vec<&'static str> = Vec::new();
-    for frame in history.frames().rev() {
-        for (name, _) in &frame.pass_ms {
-            if !names.contains(name) {
-                names.push(name);
-            }
+    for pass in profile.passes.iter().filter(|pass| pass.ms.is_some()) {
+        if !names.contains(&pass.name) {
+            names.push(pass.name);
         }
     }
     names.into_iter().map(|name| (name, color(name))).collect()
@@ -66,7 +67,7 @@ fn passes(history: &History) -> Vec<(&'static str, Color32)> {
 
 /// The same for a pass, whatever others run.
 fn color(name: &str) -> Color32 {
-    const COLORS: [(&str, Color32); 13] = [
+    const COLORS: [(&str, Color32); 14] = [
         ("visibility", Color32::from_rgb(120, 190, 255)),
         ("primary_hit", Color32::from_rgb(70, 130, 220)),
         ("trace", Color32::from_rgb(240, 130, 60)),
@@ -79,6 +80,7 @@ fn color(name: &str) -> Color32 {
         ("features", Color32::from_rgb(60, 160, 90)),
         ("accumulate", Color32::from_rgb(210, 180, 240)),
         ("denoise", Color32::from_rgb(80, 180, 180)),
+        ("false_color", Color32::from_rgb(190, 140, 140)),
         ("tonemap", Color32::from_rgb(170, 170, 170)),
     ];
     COLORS.iter().find(|(pass, _)| *pass == name).map_or(Color32::WHITE, |(_, color)| *color)
@@ -94,15 +96,13 @@ fn top_ms(history: &History) -> f64 {
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|step| step * magnitude).find(|top| *top >= most).unwrap_or(most)
 }
 
-/// Names with the mean time over the graph.
-fn legend(ui: &mut Ui, history: &History, passes: &[(&'static str, Color32)]) {
-    let n_frames = history.frames().filter(|frame| !frame.pass_ms.is_empty()).count().max(1) as f64;
-    let mean = |name: &str| history.frames().map(|frame| pass_ms(frame, name)).sum::<f64>() / n_frames;
+/// Names with the time of the newest sample, milliseconds.
+fn legend(ui: &mut Ui, newest: &Profile, passes: &[(&'static str, Color32)]) {
     egui::Grid::new("passes").num_columns(4).spacing([8.0, 1.0]).show(ui, |ui| {
         for pair in passes.chunks(2) {
             for (name, color) in pair {
                 ui.colored_label(*color, *name);
-                ui.monospace(format!("{:.2}", mean(name)));
+                ui.monospace(format!("{:.2}", newest.pass_ms(name).unwrap_or(0.0)));
             }
             ui.end_row();
         }

@@ -88,7 +88,7 @@ fn sections(ui: &mut Ui, settings: &mut Settings, facts: &Facts) {
     if let Some(picked) = facts.picked {
         section(ui, "Pixel", true, |ui| tables::picked(ui, picked));
     }
-    section(ui, "Passes", true, |ui| graph::show(ui, facts.history));
+    section(ui, "Passes", true, |ui| graph::show(ui, facts.history, facts.profile));
     section(ui, "Picture", true, |ui| controls::show(ui, settings));
     section(ui, "Rays", true, |ui| tables::rays(ui, facts.profile));
     section(ui, "Tree", false, |ui| tables::tree(ui, facts.loaded));
@@ -122,7 +122,7 @@ fn percentiles(name: &str, of: Option<Percentiles>) -> String {
 }
 
 fn keys(ui: &mut Ui) {
-    const KEYS: [(&str, &str); 12] = [
+    const KEYS: [(&str, &str); 13] = [
         ("W S A D", "fly; S goes back only after another"),
         ("E Q", "fly up, down"),
         ("Shift, Ctrl", "faster, slower"),
@@ -132,6 +132,7 @@ fn keys(ui: &mut Ui) {
         ("click", "what the pixel shows"),
         ("F", "frame the scene"),
         ("Home", "back to the start"),
+        ("1 to 6", "picture, depth, normal, id, cost, rays"),
         ("P", "print the camera"),
         ("S, F12", "save the picture"),
         ("Tab, Esc", "hide this, quit"),
