@@ -77,6 +77,43 @@ fn recorded_frames_go_once_around() {
 }
 
 #[test]
+fn a_path_is_the_one_that_render_follows() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    let keyframe = |frame: u32, x: f32| {
+        format!("[[keyframe]]\nframe = {frame}\neye = [{x:?}, 2.75, 9.0]\ntarget = [0.0, 2.75, 0.0]\n")
+    };
+    fs::write(directory.path().join("path.toml"), keyframe(0, 0.0) + &keyframe(3, 2.0)).unwrap();
+    fs::create_dir(directory.path().join("frames")).unwrap();
+    let path = ["--path", "path.toml"];
+    ended(viewer(directory.path(), &display, &cornell(), &[&path[..], &["--record", "frames", "-q"]].concat()));
+    let arguments = [&["render", &cornell(), "--size", SIZE, "-q", "-o", "####.png"], &path[..]].concat();
+    succeed(directory.path(), &arguments);
+    for frame in ["0000.png", "0001.png", "0002.png", "0003.png"] {
+        let shown = Screen::load(&directory.path().join(format!("frames/frame.{frame}")));
+        assert_eq!(shown, Screen::load(&directory.path().join(frame)), "{frame}");
+    }
+}
+
+#[test]
+fn number_keys_show_other_views_and_the_picture_again() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    let picture = rendered(directory.path(), &cornell(), &[]);
+    let viewer = viewer(directory.path(), &display, &cornell(), &["--spp", "1", "--no-overlay", "-q"]);
+    display.wait_until("the picture", |screen| picture.is_shown_on(screen));
+    display.focus("kdray");
+    let mut before = display.screen();
+    for key in ["2", "3", "4", "5", "6"] {
+        display.act(&["key", key]);
+        display.wait_until("another view", |screen| *screen != before && !picture.is_shown_on(screen));
+        before = display.screen();
+    }
+    display.act(&["key", "1"]);
+    display.wait_until("the picture again", |screen| picture.is_shown_on(screen));
+    display.act(&["key", "Escape"]);
+    ended(viewer);
+}
+
+#[test]
 fn the_window_shows_the_picture_and_the_overlay_over_it() {
     let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
     let picture = rendered(directory.path(), &cornell(), &[]);

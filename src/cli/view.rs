@@ -6,8 +6,8 @@ use kdray::{
     frame::View,
     gpu::ContextOptions,
     output::{self, Format, OutputError},
-    scene::Scene,
-    view::{Display, Loaded, Settings, ViewOptions, ViewReport},
+    scene::{Camera, CameraPath, Scene},
+    view::{Display, Loaded, Settings, Tour, ViewOptions, ViewReport},
 };
 use serde::Serialize;
 
@@ -38,7 +38,8 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     let (loaded, _) = progress.stage(&building, || Loaded::with_tree(&args.scene, scene));
     drop(progress);
 
-    let max_samples = args.spp.unwrap_or(if args.frames.is_some() { 1 } else { SAMPLES_AT_REST });
+    let tour = tour(args, loaded.scene.camera)?;
+    let max_samples = args.spp.unwrap_or(if tour.is_some() { 1 } else { SAMPLES_AT_REST });
     let vsync = args.vsync == Switch::On;
     let settings = Settings { options, max_samples, budget_ms: args.budget_ms, vsync, view: View::Picture, gain: 1.0 };
     let scene_name = loaded.scene.name.clone();
@@ -48,7 +49,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
             settings,
             device: ContextOptions { device: args.device.clone(), validate: args.validate },
             overlay: !args.no_overlay,
-            n_frames: args.frames,
+            tour,
             screenshot: args.screenshot.clone(),
             record: args.record.clone(),
             // The window goes on without its terminal.
@@ -62,6 +63,17 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         complain("validation", message);
     }
     if report.validation.is_empty() { Ok(()) } else { Err(CliError::Validation(report.validation.len())) }
+}
+
+/// The way that the camera goes by itself, if that is asked for.
+fn tour(args: &ViewArgs, start: Camera) -> Result<Option<Tour>, CliError> {
+    let Some(file) = &args.path else { return Ok(args.frames.map(|n_frames| Tour::around(start, n_frames))) };
+    let path = CameraPath::load(file)?;
+    let n_frames = args.frames.unwrap_or((path.end() - path.begin()).ceil() as u32 + 1);
+    let tour = Tour::along(&path, n_frames).ok_or_else(|| {
+        CliError::Usage(format!("{}: between keyframes, eye, target and up span no picture", file.display()))
+    });
+    tour.map(Some)
 }
 
 #[derive(Serialize)]

@@ -11,6 +11,8 @@ use super::{
 };
 
 #[derive(clap::Args)]
+#[group(skip)]
+#[command(group = clap::ArgGroup::new("tour").args(["frames", "path"]).multiple(true))]
 pub struct ViewArgs {
     /// Scene file; it is read again whenever it changes
     pub scene: PathBuf,
@@ -28,14 +30,17 @@ pub struct ViewArgs {
     /// Nothing over the picture at first; Tab shows it
     #[arg(long)]
     pub no_overlay: bool,
-    /// Go once around the scene in so many frames, and end
+    /// Move the camera as keyframes in this TOML file say, and end
+    #[arg(long, value_name = "FILE")]
+    pub path: Option<PathBuf>,
+    /// Go once around the scene, or along --path, in so many frames, and end
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000))]
     pub frames: Option<u32>,
     /// Picture to write of the last frame, .png or .exr
-    #[arg(long, value_name = "FILE", requires = "frames")]
+    #[arg(long, value_name = "FILE", requires = "tour")]
     pub screenshot: Option<PathBuf>,
     /// Directory to write every frame to, as frame.0000.png
-    #[arg(long, value_name = "DIR", requires = "frames")]
+    #[arg(long, value_name = "DIR", requires = "tour")]
     pub record: Option<PathBuf>,
     /// Write frame times and latency as JSON
     #[arg(long, value_name = "FILE")]

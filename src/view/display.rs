@@ -25,8 +25,8 @@ pub struct ViewOptions {
     pub device: ContextOptions,
     /// Whether there is an overlay; the user can hide it.
     pub overlay: bool,
-    /// Frames of a tour after which it ends; none: the user's own way.
-    pub n_frames: Option<u32>,
+    /// After which it ends; none: the user's own way.
+    pub tour: Option<Tour>,
     /// Of the tour's last frame.
     pub screenshot: Option<PathBuf>,
     /// A directory for the tour's frames.
@@ -80,10 +80,8 @@ impl Display {
     /// # Errors
     /// No window, no device that can present to it; a device that fails for good; a tour's picture that cannot be written.
     pub fn view(self, loaded: Loaded, options: ViewOptions) -> Result<ViewReport, ViewError> {
-        let script = options.n_frames.map(|n_frames| {
-            let tour = Tour::around(loaded.scene.camera, n_frames);
-            Script::new(tour, options.record.clone(), options.screenshot.clone())
-        });
+        let script =
+            (options.tour.clone()).map(|tour| Script::new(tour, options.record.clone(), options.screenshot.clone()));
         let reloader = Reloader::new(loaded.path.clone(), self.event_loop.create_proxy());
         let session = Session::new(loaded, options.settings.clone(), script.is_none());
         let mut app = App::new(session, options, script, reloader);

@@ -25,4 +25,5 @@ pub use self::{
     error::ViewError,
     loaded::Loaded,
     panel::Settings,
+    tour::Tour,
 };

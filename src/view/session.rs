@@ -13,7 +13,7 @@ use super::{
     pick::Picked,
 };
 use crate::{
-    frame::{Profile, RenderOptions, View},
+    frame::{Denoise, Profile, RenderOptions, View},
     gpu::GpuError,
 };
 
@@ -103,19 +103,26 @@ impl Session {
         live.presenter.set_vsync(self.settings.vsync);
         self.budget.set_budget(self.settings.budget_ms);
         let features = self.settings.view != View::Picture;
+        let whole = RenderOptions { width: window.0, height: window.1, features, ..self.settings.options.clone() };
         let (view, brightest) = self.view();
-        if live.renderer.set_view(view, brightest) && self.is_interactive {
+        let is_other_view = live.renderer.set_view(view, brightest);
+        let makes_room = !self.has_room(live, &whole);
+        if self.is_interactive && (is_other_view || makes_room) {
             // A small picture at once.
             live.renderer.reset_samples();
             self.pace.moved(now);
         }
         let is_moving = self.pace.is_moving(now) || self.is_learning();
         let (width, height) = if is_moving { self.budget.size(window) } else { window };
-        let asked = RenderOptions { width, height, features, ..self.settings.options.clone() };
+        let asked = RenderOptions { width, height, ..whole.clone() };
         let is_new = asked != *live.renderer.options();
-        self.make_room(live, window, is_moving)?;
-        if is_new && let Err(error) = live.renderer.set_options(&asked, &self.loaded.tree) {
-            self.take_back(live, &error);
+        // Room for the whole picture before a small one is drawn: to make it later would lose that one.
+        let steps = [(is_moving && makes_room).then_some(&whole), is_new.then_some(&asked)];
+        for options in steps.into_iter().flatten() {
+            if let Err(error) = live.renderer.set_options(options, &self.loaded.tree) {
+                self.take_back(live, &error);
+                break;
+            }
         }
         if self.controller.camera() != live.renderer.camera() {
             live.renderer.set_camera(self.controller.camera());
@@ -133,11 +140,13 @@ impl Session {
         }
     }
 
-    /// Room for a picture as large as the window, before a small one is drawn: to make it later would lose that one.
-    fn make_room(&mut self, live: &mut Live, (width, height): (u32, u32), is_moving: bool) -> Result<(), GpuError> {
-        let has_room = width <= self.room.0 && height <= self.room.1;
-        self.room = (self.room.0.max(width), self.room.1.max(height));
-        if has_room || !is_moving { Ok(()) } else { live.renderer.resize(width, height) }
+    /// Whether the buffers are those that such a picture needs, and large enough; they will be.
+    fn has_room(&mut self, live: &Live, whole: &RenderOptions) -> bool {
+        let now = live.renderer.options();
+        let has_room = whole.width <= self.room.0 && whole.height <= self.room.1;
+        self.room = (self.room.0.max(whole.width), self.room.1.max(whole.height));
+        let filters = |options: &RenderOptions| options.denoise != Denoise::Off;
+        has_room && whole.features == now.features && filters(whole) == filters(now)
     }
 
     /// A whole sample while the camera moves. At rest so much of it that input is not kept waiting.
