@@ -3,11 +3,13 @@
 mod aov;
 mod crop;
 mod profile;
+mod view;
 
 pub use self::{
     aov::{Aov, Channel, Samples},
     crop::Crop,
     profile::{BounceStats, PassTime, Profile},
+    view::View,
 };
 use crate::layout;
 pub use crate::words::UnknownWord;

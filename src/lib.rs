@@ -14,6 +14,7 @@
 //! profile  times and counts -> each pass's rays
 //! output   picture -> file
 //! bench    all of it, timed
+//! view     all of it, in a window
 //! ```
 
 #![deny(unsafe_code)]
@@ -43,3 +44,5 @@ pub mod cast;
 pub mod output;
 
 pub mod bench;
+
+pub mod view;

@@ -67,6 +67,12 @@ impl Format {
     }
 }
 
+/// A file's name without its ending for pictures of a scene, in the working directory.
+pub fn stem_of(scene_name: &str) -> String {
+    let name = scene_name.replace(|c: char| std::path::is_separator(c) || c.is_control(), "-");
+    if name.is_empty() { "picture".to_owned() } else { name }
+}
+
 /// Finds out whether a file can be created or replaced at `path`, before minutes are spent on what it shall hold.
 pub fn check(path: &Path) -> Result<(), OutputError> {
     match Target::at(path)? {

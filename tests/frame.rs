@@ -15,6 +15,8 @@ mod crop;
 mod features;
 #[path = "frame/living.rs"]
 mod living;
+#[path = "frame/parts.rs"]
+mod parts;
 #[path = "frame/primaries.rs"]
 mod primaries;
 #[path = "frame/samples.rs"]

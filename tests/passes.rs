@@ -13,6 +13,8 @@ mod compact;
 mod comparers;
 #[path = "passes/denoise.rs"]
 mod denoise;
+#[path = "passes/false_color.rs"]
+mod false_color;
 #[path = "passes/features.rs"]
 mod features;
 #[path = "passes/primary_hit.rs"]

@@ -237,6 +237,28 @@ struct Batch {
     uint depth;
 };
 
+// What is displayed of features.
+#define VIEW_DEPTH 1u
+#define VIEW_NORMAL 2u
+#define VIEW_ID 3u
+#define VIEW_COST 4u
+#define VIEW_RAYS 5u
+
+// Push constants of what displays features: which of them; the value that is brightest, for cost and rays, or half as
+// bright, for depth.
+struct FalseColor {
+    uint view;
+    float brightest;
+};
+
+// Push constants of what shows a picture in a window: the sizes of both, pixels.
+struct Present {
+    uint width;
+    uint height;
+    uint window_width;
+    uint window_height;
+};
+
 // Push constants of a cast: its rays.
 struct CastBatch {
     uint n_rays;

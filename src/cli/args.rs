@@ -2,15 +2,16 @@
 
 use std::{path::PathBuf, str::FromStr};
 
-use clap::{Parser, Subcommand, ValueEnum, value_parser};
+use clap::{Parser, Subcommand, value_parser};
 use kdray::{
     cast::Query,
-    frame::{Aov, Crop, Denoise, Primary, RenderOptions, Tonemap, Traversal},
+    frame::{Aov, Crop, RenderOptions, Traversal},
     gpu::DeviceSelector,
     scene::RenderDefaults,
 };
 
-use super::{bench::Suite, build::Build, error::CliError};
+pub use super::view_args::ViewArgs;
+use super::{bench::Suite, build::Build, error::CliError, picture_args::PictureArgs};
 
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
 #[derive(Parser)]
@@ -25,6 +26,8 @@ pub struct Args {
 pub enum Command {
     /// Render a scene to a picture, and report where the time went
     Render(RenderArgs),
+    /// Show a scene in a window, moved through with keys and mouse
+    View(ViewArgs),
     /// Find what given rays hit in a scene or mesh
     Cast(CastArgs),
     /// List the Vulkan devices
@@ -44,9 +47,6 @@ pub struct RenderArgs {
     /// the frame's number
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// Pixels, as 1024x768 [default: the scene's]
-    #[arg(long, value_name = "WxH")]
-    pub size: Option<Size>,
     /// Move the camera as keyframes in this TOML file say, and write a picture a frame
     #[arg(long, value_name = "FILE", conflicts_with = "repeat")]
     pub path: Option<PathBuf>,
@@ -62,30 +62,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     #[arg(help = format!("What else to write of each pixel, as layers of an .exr, with commas: {}", Aov::words()))]
     pub aov: Vec<Aov>,
-    /// Levels of rays, 1 to 64: 1 stops at what the camera sees [default: the scene's]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=64))]
-    pub max_depth: Option<u32>,
-    /// Noise filter [default: the scene's]
-    #[arg(long, value_name = "paper|off")]
-    pub denoise: Option<DenoiseWord>,
-    /// Sum of a pixel's differences to its neighbours above which it is smoothed, 0 to 4 [default: the scene's]
-    #[arg(long, value_name = "X", value_parser = threshold)]
-    pub denoise_threshold: Option<f32>,
-    /// Factor on radiance before it is encoded for display [default: the scene's]
-    #[arg(long, value_name = "X", value_parser = positive)]
-    pub exposure: Option<f32>,
-    #[arg(long, value_name = "CURVE")]
-    #[arg(help = format!("From radiance to what a display shows: {} [default: the scene's]", Tonemap::words()))]
-    pub tonemap: Option<Tonemap>,
-    #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
-    #[arg(help = format!("How rays find their way through the tree: {}", Traversal::words()))]
-    pub traversal: Traversal,
+    #[command(flatten)]
+    pub picture: PictureArgs,
     /// How much work goes into the kd-tree
     #[arg(long, value_enum, default_value_t = Build::Auto)]
     pub build: Build,
-    /// How primary rays find their triangles
-    #[arg(long, value_name = "raster|trace", default_value_t = RenderOptions::default().primary)]
-    pub primary: Primary,
     /// Render on the CPU, without Vulkan
     #[arg(long, conflicts_with_all = ["device", "validate"])]
     pub cpu: bool,
@@ -165,9 +146,7 @@ pub struct InspectArgs {
 impl RenderArgs {
     /// Refuses words that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
-        if matches!(self.denoise, Some(DenoiseWord::Off)) && self.denoise_threshold.is_some() {
-            return Err(CliError::Usage("--denoise-threshold has no meaning with --denoise off".into()));
-        }
+        self.picture.check()?;
         if self.trace.is_some() && (self.spp > 1 || self.path.is_some()) {
             return Err(CliError::Usage("--trace shows a single sample: it goes with neither --spp nor --path".into()));
         }
@@ -183,38 +162,16 @@ impl RenderArgs {
 
     /// The options asked for; the scene's own fill what was left open. A crop beyond the picture is refused.
     pub fn options(&self, scene: &RenderDefaults) -> Result<RenderOptions, CliError> {
-        let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });
+        let options = self.picture.options(scene);
+        let RenderOptions { width, height, .. } = options;
         if let Some(crop) = self.crop.filter(|crop| crop.x1 > width || crop.y1 > height) {
             return Err(CliError::Usage(format!(
                 "--crop {crop} reaches beyond the picture of {width}x{height} pixels"
             )));
         }
-        Ok(RenderOptions {
-            width,
-            height,
-            crop: self.crop,
-            max_depth: self.max_depth.unwrap_or(scene.max_depth),
-            exposure: self.exposure.unwrap_or(scene.exposure),
-            tonemap: self.tonemap.unwrap_or(scene.tonemap),
-            denoise: self.denoise(scene.denoise),
-            traversal: self.traversal,
-            primary: self.primary,
-            features: !self.aov.is_empty(),
-            // Where anybody wants to know where the time went.
-            profile: !self.quiet || self.profile.is_some() || self.trace.is_some(),
-        })
-    }
-
-    fn denoise(&self, scene: Denoise) -> Denoise {
-        let threshold = match scene {
-            Denoise::Paper { threshold } => threshold,
-            Denoise::Off => Denoise::DEFAULT_THRESHOLD,
-        };
-        match (self.denoise, self.denoise_threshold) {
-            (None, None) => scene,
-            (Some(DenoiseWord::Off), _) => Denoise::Off,
-            (_, asked) => Denoise::Paper { threshold: asked.unwrap_or(threshold) },
-        }
+        // Where anybody wants to know where the time went.
+        let profile = !self.quiet || self.profile.is_some() || self.trace.is_some();
+        Ok(RenderOptions { crop: self.crop, features: !self.aov.is_empty(), profile, ..options })
     }
 }
 
@@ -240,15 +197,6 @@ impl CastArgs {
     pub fn query(&self) -> Query {
         if self.any { Query::Any } else { Query::Closest }
     }
-}
-
-/// The words for [`Denoise`].
-#[derive(Clone, Copy, ValueEnum)]
-pub enum DenoiseWord {
-    /// The paper's filter over four neighbours
-    Paper,
-    /// None
-    Off,
 }
 
 /// Pixels of a picture.
@@ -295,15 +243,6 @@ impl FromStr for Frames {
     }
 }
 
-fn threshold(word: &str) -> Result<f32, String> {
-    word.parse().ok().filter(|x| (0.0..=4.0).contains(x)).ok_or_else(|| "expected a number from 0 to 4".into())
-}
-
-fn positive(word: &str) -> Result<f32, String> {
-    let number = word.parse().ok().filter(|x: &f32| x.is_finite() && *x > 0.0);
-    number.ok_or_else(|| "expected a number above 0".into())
-}
-
 /// An index where the word is a number, else a name.
 pub fn device(word: &str) -> Result<DeviceSelector, String> {
     match word.parse() {
@@ -339,25 +278,5 @@ mod tests {
         for word in ["", "-", "3-", "-3", "4-3", "1-2-3", "1.5-2", "0-1000001", "a-b"] {
             assert!(word.parse::<Frames>().is_err(), "{word}");
         }
-    }
-
-    fn denoise(words: &[&str], scene: Denoise) -> Denoise {
-        let words = ["kdray", "render", "x.toml"].iter().chain(words);
-        match Args::try_parse_from(words).unwrap().command {
-            Command::Render(args) => args.denoise(scene),
-            _ => unreachable!(),
-        }
-    }
-
-    #[test]
-    fn what_is_left_open_the_scene_fills() {
-        let scene = Denoise::Paper { threshold: 1.0 };
-        assert_eq!(denoise(&[], scene), scene);
-        assert_eq!(denoise(&[], Denoise::Off), Denoise::Off);
-        assert_eq!(denoise(&["--denoise", "paper"], scene), scene);
-        assert_eq!(denoise(&["--denoise", "off"], scene), Denoise::Off);
-        assert_eq!(denoise(&["--denoise-threshold", "0.5"], Denoise::Off), Denoise::Paper { threshold: 0.5 });
-        let default = Denoise::Paper { threshold: Denoise::DEFAULT_THRESHOLD };
-        assert_eq!(denoise(&["--denoise", "paper"], Denoise::Off), default);
     }
 }

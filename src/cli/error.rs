@@ -2,7 +2,7 @@
 
 use std::io;
 
-use kdray::{cast::RayFileError, gpu::GpuError, output::OutputError, scene::SceneError};
+use kdray::{cast::RayFileError, gpu::GpuError, output::OutputError, scene::SceneError, view::ViewError};
 
 /// Why a command failed. Displays as one line.
 #[derive(Debug, thiserror::Error)]
@@ -15,6 +15,8 @@ pub enum CliError {
     Rays(#[from] RayFileError),
     #[error(transparent)]
     Device(#[from] GpuError),
+    #[error("{0}")]
+    Window(String),
     #[error("the validation layer had {0} complaint(s)")]
     Validation(usize),
     #[error("{0}")]
@@ -31,8 +33,18 @@ impl CliError {
         match self {
             Self::Usage(_) | Self::Output(OutputError::UnknownEnding { .. }) => 2,
             Self::Scene(_) | Self::Rays(_) => 3,
-            Self::Device(_) | Self::Validation(_) | Self::WrongHits(_) => 4,
+            Self::Device(_) | Self::Window(_) | Self::Validation(_) | Self::WrongHits(_) => 4,
             Self::Output(_) | Self::Stdout(_) => 5,
+        }
+    }
+}
+
+impl From<ViewError> for CliError {
+    fn from(error: ViewError) -> Self {
+        match error {
+            ViewError::Device(error) => Self::Device(error),
+            ViewError::Output(error) => Self::Output(error),
+            ViewError::NoDisplay(_) | ViewError::Window(_) => Self::Window(error.to_string()),
         }
     }
 }

@@ -45,6 +45,10 @@ where
     N: for<'a> FormatFields<'a> + 'static,
 {
     fn format_event(&self, context: &FmtContext<S, N>, mut writer: Writer, event: &Event) -> fmt::Result {
+        // Other libraries' remarks are for their developers.
+        if !event.metadata().target().starts_with("kdray") {
+            return Ok(());
+        }
         let label = if *event.metadata().level() == Level::ERROR { "error" } else { "warning" };
         write!(writer, "{label}: ")?;
         context.field_format().format_fields(writer.by_ref(), event)?;

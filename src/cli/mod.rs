@@ -11,12 +11,15 @@ mod devices;
 mod error;
 mod inspect;
 mod log;
+mod picture_args;
 mod progress;
 mod render;
 mod report;
 mod spans;
 mod table;
 mod trace;
+mod view;
+mod view_args;
 
 use std::{
     ffi::OsString,
@@ -50,6 +53,7 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
 fn run(args: Args) -> Result<(), CliError> {
     match args.command {
         Command::Render(args) => render::run(&args),
+        Command::View(args) => view::run(&args),
         Command::Cast(args) => cast::run(&args),
         Command::Devices => devices::run(),
         Command::Inspect(args) => inspect::run(&args),

@@ -13,6 +13,7 @@ pub mod compact;
 pub mod costs;
 pub mod denoise;
 pub mod display;
+pub mod false_color;
 pub mod features;
 pub mod kd_boxes;
 pub mod kdtree;

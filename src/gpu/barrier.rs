@@ -9,6 +9,8 @@ pub enum Access {
     ComputeWrite,
     /// Reads and writes of a kernel that updates in place.
     ComputeUpdate,
+    /// Storage that a raster pass reads.
+    FragmentRead,
     IndirectRead,
     TransferRead,
     TransferWrite,
@@ -27,6 +29,7 @@ impl Access {
     pub(super) fn stages(self) -> S {
         match self {
             Self::ComputeRead | Self::ComputeWrite | Self::ComputeUpdate => S::COMPUTE_SHADER,
+            Self::FragmentRead => S::FRAGMENT_SHADER,
             Self::IndirectRead => S::DRAW_INDIRECT,
             Self::TransferRead => S::COPY,
             // Updates are no copies, but clears.
@@ -43,6 +46,7 @@ impl Access {
             Self::ComputeRead => A::SHADER_STORAGE_READ | A::UNIFORM_READ,
             Self::ComputeWrite => A::SHADER_STORAGE_WRITE,
             Self::ComputeUpdate => A::SHADER_STORAGE_READ | A::SHADER_STORAGE_WRITE,
+            Self::FragmentRead => A::SHADER_STORAGE_READ,
             Self::IndirectRead => A::INDIRECT_COMMAND_READ,
             Self::TransferRead => A::TRANSFER_READ,
             Self::TransferWrite => A::TRANSFER_WRITE,

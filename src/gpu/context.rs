@@ -6,16 +6,16 @@ use std::{
     sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 use gpu_allocator::{
     AllocationSizes, AllocatorDebugSettings, MemoryLocation,
     vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc},
 };
 
 use super::{
-    Commands, DeviceInfo, DeviceSelector, GpuError, Limits,
+    Commands, DeviceInfo, DeviceSelector, GpuError, Limits, Screen, Surface,
     commands::CommandBuffer,
-    device::DeviceExtras,
+    device::{DeviceExtras, Purpose},
     devices::{queue_family, select},
     instance::Instance,
     probe,
@@ -32,6 +32,14 @@ pub struct ContextOptions {
     pub validate: bool,
 }
 
+/// What a part of the device's memory is for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MemoryUse {
+    /// The buffer's or image's.
+    pub name: String,
+    pub bytes: u64,
+}
+
 /// A Vulkan device with one queue for graphics and compute.
 pub struct Context {
     pub(super) device: ash::Device,
@@ -42,8 +50,12 @@ pub struct Context {
     pub(super) ray_tracing: Option<RayTracingCalls>,
     /// None where the device lacks the extension.
     pub(super) statistics: Option<StatisticsCalls>,
-    queue: vk::Queue,
-    allocator: ManuallyDrop<Mutex<Allocator>>,
+    /// None where the device was opened without a window.
+    pub(super) presentation: Option<khr::swapchain::Device>,
+    pub(super) physical: vk::PhysicalDevice,
+    pub(super) queue: vk::Queue,
+    /// Shared with the overlay's renderer, which ends before the context.
+    pub(super) allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
     info: DeviceInfo,
     limits: Limits,
     fuses_fma: OnceLock<bool>,
@@ -57,8 +69,19 @@ impl Context {
     /// No loader, driver, device of that name or validation layer; a device that lacks a feature; a failed call.
     pub fn new(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::new(options.validate)?;
-        let (physical, info) = select(&instance, options.device.as_ref())?;
-        Self::open(instance, physical, info, false)
+        let (physical, info) = select(&instance, options.device.as_ref(), None)?;
+        Self::open(instance, physical, info, Purpose::Compute)
+    }
+
+    /// As [`Context::new`], with the surface of a window that it can show pictures in.
+    ///
+    /// # Errors
+    /// As [`Context::new`]; a device that cannot present to the window.
+    pub fn for_window(options: &ContextOptions, window: Arc<dyn Screen>) -> Result<(Arc<Self>, Surface), GpuError> {
+        let instance = Instance::with_extensions(options.validate, &Surface::extensions(&*window)?)?;
+        let surface = Surface::new(&instance, window)?;
+        let (physical, info) = select(&instance, options.device.as_ref(), Some(&surface))?;
+        Ok((Self::open(instance, physical, info, Purpose::Window)?, surface))
     }
 
     /// As [`Context::new`], with the driver's own ray tracing, to compare with.
@@ -67,19 +90,20 @@ impl Context {
     /// As [`Context::new`]; the device lacks that extension.
     pub fn with_ray_tracing(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::new(options.validate)?;
-        let (physical, info) = select(&instance, options.device.as_ref())?;
+        let (physical, info) = select(&instance, options.device.as_ref(), None)?;
         if let Some(missing) = RayTracingCalls::missing(&instance, physical) {
             return Err(GpuError::Lacks { device: info.name, missing });
         }
-        Self::open(instance, physical, info, true)
+        Self::open(instance, physical, info, Purpose::RayTracing)
     }
 
     fn open(
         instance: Arc<Instance>,
         physical: vk::PhysicalDevice,
         info: DeviceInfo,
-        ray_tracing: bool,
+        purpose: Purpose,
     ) -> Result<Arc<Self>, GpuError> {
+        let ray_tracing = purpose == Purpose::RayTracing;
         // SAFETY: the device belongs to the instance.
         let (families, properties) = unsafe {
             (
@@ -88,7 +112,7 @@ impl Context {
             )
         };
         let family = queue_family(&families).expect("`select` refuses a device without such a queue");
-        let extras = DeviceExtras::of(&instance, physical, ray_tracing)
+        let extras = DeviceExtras::of(&instance, physical, purpose)
             .map_err(GpuError::call("vkEnumerateDeviceExtensionProperties", &info.name))?;
         let device = extras
             .create_device(&instance, physical, family as u32)
@@ -107,12 +131,14 @@ impl Context {
             ray_tracing: ray_tracing.then(|| RayTracingCalls::new(&instance, physical, &device)),
             statistics: extras.statistics.then(|| StatisticsCalls::new(&instance, &device)),
             debug_utils: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device)),
+            presentation: (purpose == Purpose::Window).then(|| khr::swapchain::Device::new(&instance.raw, &device)),
             device,
+            physical,
             command_pool,
             timestamp_period_ns: properties.limits.timestamp_period,
             timestamp_valid_bits: families[family].timestamp_valid_bits,
             queue,
-            allocator: ManuallyDrop::new(Mutex::new(allocator)),
+            allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
             info,
             fuses_fma: OnceLock::new(),
             limits: Limits {
@@ -185,8 +211,14 @@ impl Context {
 
     /// Shader stages that see bindings and push constants.
     pub(super) fn stages(&self) -> vk::ShaderStageFlags {
-        let base = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX;
-        if self.ray_tracing.is_some() { base | vk::ShaderStageFlags::RAYGEN_KHR } else { base }
+        let mut stages = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX;
+        if self.ray_tracing.is_some() {
+            stages |= vk::ShaderStageFlags::RAYGEN_KHR;
+        }
+        if self.presentation.is_some() {
+            stages |= vk::ShaderStageFlags::FRAGMENT;
+        }
+        stages
     }
 
     /// Gives a handle its name in the debuggers' and the validation layer's eyes.
@@ -216,6 +248,22 @@ impl Context {
             .unwrap_or_else(PoisonError::into_inner)
             .allocate(&desc)
             .map_err(|source| GpuError::Memory { object: name.to_owned(), bytes: requirements.size, source })
+    }
+
+    /// What memory is in use for, the most first; objects of one name together.
+    pub fn memory(&self) -> Vec<MemoryUse> {
+        let report = self.allocator.lock().unwrap_or_else(PoisonError::into_inner).generate_report();
+        let mut uses: Vec<MemoryUse> = Vec::new();
+        for allocation in report.allocations {
+            // egui's renderer gives its own no names.
+            let name = if allocation.name.is_empty() { "overlay".to_owned() } else { allocation.name };
+            match uses.iter_mut().find(|known| known.name == name) {
+                Some(known) => known.bytes += allocation.size,
+                None => uses.push(MemoryUse { name, bytes: allocation.size }),
+            }
+        }
+        uses.sort_by(|a, b| b.bytes.cmp(&a.bytes).then_with(|| a.name.cmp(&b.name)));
+        uses
     }
 
     pub(super) fn free(&self, allocation: Allocation) {

@@ -6,6 +6,17 @@ use ash::{khr, prelude::VkResult, vk};
 
 use super::{instance::Instance, ray_tracing::RayTracingCalls, statistics::StatisticsCalls};
 
+/// What a device is opened for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Purpose {
+    /// Pictures and numbers in memory.
+    Compute,
+    /// To compare with the driver's own ray tracing, too.
+    RayTracing,
+    /// To show pictures in a window, too.
+    Window,
+}
+
 /// What a device is asked for beside Vulkan's core.
 #[derive(Clone, Copy)]
 pub(super) struct DeviceExtras {
@@ -13,19 +24,19 @@ pub(super) struct DeviceExtras {
     portability: bool,
     /// Kernels can be asked for their statistics.
     pub statistics: bool,
-    ray_tracing: bool,
+    purpose: Purpose,
 }
 
 impl DeviceExtras {
-    /// All that the device has and kdray can use; of ray tracing, what is asked for.
-    pub fn of(instance: &Instance, physical: vk::PhysicalDevice, ray_tracing: bool) -> VkResult<Self> {
+    /// All that the device has and kdray can use; of ray tracing and presentation, what is asked for.
+    pub fn of(instance: &Instance, physical: vk::PhysicalDevice, purpose: Purpose) -> VkResult<Self> {
         // SAFETY: the device belongs to the instance.
         let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }?;
         let has = |name: &CStr| available.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         Ok(Self {
             portability: has(khr::portability_subset::NAME),
             statistics: has(StatisticsCalls::EXTENSION) && StatisticsCalls::has_feature(instance, physical),
-            ray_tracing,
+            purpose,
         })
     }
 
@@ -33,8 +44,10 @@ impl DeviceExtras {
         let mut names = Vec::new();
         names.extend(self.portability.then_some(khr::portability_subset::NAME));
         names.extend(self.statistics.then_some(StatisticsCalls::EXTENSION));
-        if self.ray_tracing {
-            names.extend(RayTracingCalls::EXTENSIONS);
+        match self.purpose {
+            Purpose::Compute => {}
+            Purpose::RayTracing => names.extend(RayTracingCalls::EXTENSIONS),
+            Purpose::Window => names.push(khr::swapchain::NAME),
         }
         names.into_iter().map(CStr::as_ptr).collect()
     }
@@ -66,7 +79,7 @@ impl DeviceExtras {
         if self.statistics {
             create = create.push_next(&mut executables);
         }
-        if self.ray_tracing {
+        if self.purpose == Purpose::RayTracing {
             create = create.push_next(&mut addresses).push_next(&mut structures).push_next(&mut pipelines);
         }
         // SAFETY: all that `create` points to lives until the call returns.

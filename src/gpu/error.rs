@@ -15,6 +15,10 @@ pub enum GpuError {
     Lacks { device: String, missing: String },
     #[error("no validation layer VK_LAYER_KHRONOS_validation; ./setup installs it")]
     NoValidationLayer,
+    #[error("cannot show pictures in this window: {0}")]
+    NoSurface(String),
+    #[error("the overlay: {0}")]
+    Overlay(#[from] egui_ash_renderer::RendererError),
     #[error("{call} `{object}`: {result}")]
     Call { call: &'static str, object: String, result: vk::Result },
     #[error("memory for `{object}` ({}): {source}", mebibytes(*bytes))]
@@ -26,6 +30,11 @@ pub enum GpuError {
 }
 
 impl GpuError {
+    /// Whether the device is gone, so that all that is on it has to be made anew.
+    pub fn is_device_lost(&self) -> bool {
+        matches!(self, Self::Call { result: vk::Result::ERROR_DEVICE_LOST, .. })
+    }
+
     /// Turns the result of `call` on `object` into an error.
     pub(super) fn call(call: &'static str, object: &str) -> impl FnOnce(vk::Result) -> GpuError {
         let object = object.to_owned();

@@ -26,14 +26,24 @@ pub(super) struct Instance {
 impl Instance {
     /// `validate`: with synchronization validation, its messages kept.
     pub fn new(validate: bool) -> Result<Arc<Self>, GpuError> {
+        Self::with_extensions(validate, &[])
+    }
+
+    /// As [`Instance::new`], with extensions that a window needs.
+    pub fn with_extensions(validate: bool, window: &[&CStr]) -> Result<Arc<Self>, GpuError> {
         // SAFETY: loads the system's Vulkan loader; its initialization code is trusted as any driver's is.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| GpuError::NoLoader(e.to_string()))?;
         if validate && !has_layer(&entry)? {
             return Err(GpuError::NoValidationLayer);
         }
         let has_debug_utils = has_extension(&entry, ext::debug_utils::NAME, validate.then_some(VALIDATION_LAYER))?;
+        for name in window {
+            if !has_extension(&entry, name, None)? {
+                return Err(GpuError::NoSurface(format!("no Vulkan driver has {}", name.to_string_lossy())));
+            }
+        }
         let messages = Box::<Messages>::default();
-        let raw = create(&entry, validate, has_debug_utils)?;
+        let raw = create(&entry, validate, has_debug_utils, window)?;
         let mut instance = Self { entry, raw, has_debug_utils, messenger: None, messages };
         if validate && has_debug_utils {
             instance.listen()?;
@@ -69,7 +79,7 @@ impl Drop for Instance {
     }
 }
 
-fn create(entry: &ash::Entry, validate: bool, debug_utils: bool) -> Result<ash::Instance, GpuError> {
+fn create(entry: &ash::Entry, validate: bool, debug_utils: bool, window: &[&CStr]) -> Result<ash::Instance, GpuError> {
     let application = vk::ApplicationInfo::default()
         .application_name(c"kdray")
         .engine_name(c"kdray")
@@ -78,7 +88,7 @@ fn create(entry: &ash::Entry, validate: bool, debug_utils: bool) -> Result<ash::
     let available = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
     let portability =
         available.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::khr::portability_enumeration::NAME));
-    let mut extensions = Vec::new();
+    let mut extensions: Vec<_> = window.iter().map(|name| name.as_ptr()).collect();
     if debug_utils {
         extensions.push(ext::debug_utils::NAME.as_ptr());
     }

@@ -4,7 +4,7 @@ use std::{ffi::CStr, io::Cursor, sync::Arc};
 
 use ash::vk;
 
-use super::{Bindings, Context, GpuError, TargetKind, statistics::capture_flags};
+use super::{Bindings, Context, GpuError, Presenter, TargetKind, statistics::capture_flags};
 
 pub(super) const ENTRY_POINT: &CStr = c"main";
 
@@ -68,7 +68,32 @@ impl Drop for ComputePipeline {
     }
 }
 
-/// Shaders of a raster pass that writes one ID target, with reverse-Z depth.
+/// What a raster pass draws to.
+#[derive(Clone, Copy)]
+pub enum RasterTargets<'a> {
+    /// One ID target, with reverse-Z depth.
+    Ids,
+    /// A window's image.
+    Window(&'a Presenter),
+}
+
+impl RasterTargets<'_> {
+    fn color_format(self) -> vk::Format {
+        match self {
+            Self::Ids => TargetKind::Id.format(),
+            Self::Window(presenter) => presenter.format(),
+        }
+    }
+
+    fn depth_format(self) -> vk::Format {
+        match self {
+            Self::Ids => TargetKind::Depth.format(),
+            Self::Window(_) => vk::Format::UNDEFINED,
+        }
+    }
+}
+
+/// Shaders of a raster pass.
 pub struct RasterDesc<'a> {
     /// Also the debug label and the timer.
     pub name: &'static str,
@@ -76,6 +101,7 @@ pub struct RasterDesc<'a> {
     pub vertex: &'a [u8],
     /// The fragment shader's SPIR-V bytes.
     pub fragment: &'a [u8],
+    pub targets: RasterTargets<'a>,
 }
 
 /// A raster pass over a triangle list without vertex buffers, two-sided.
@@ -107,18 +133,19 @@ impl RasterPipeline {
             .line_width(1.0);
         let samples =
             vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        let has_depth = desc.targets.depth_format() != vk::Format::UNDEFINED;
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-            .depth_test_enable(true)
-            .depth_write_enable(true)
+            .depth_test_enable(has_depth)
+            .depth_write_enable(has_depth)
             .depth_compare_op(vk::CompareOp::GREATER);
-        let write = [vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::R)];
+        let write = [vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA)];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&write);
         let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
         let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
-        let formats = [TargetKind::Id.format()];
+        let formats = [desc.targets.color_format()];
         let mut rendering = vk::PipelineRenderingCreateInfo::default()
             .color_attachment_formats(&formats)
-            .depth_attachment_format(TargetKind::Depth.format());
+            .depth_attachment_format(desc.targets.depth_format());
         let info = [vk::GraphicsPipelineCreateInfo::default()
             .stages(&stages)
             .vertex_input_state(&vertex_input)

@@ -13,8 +13,10 @@ mod accumulate;
 mod cast;
 mod compact;
 mod denoise;
+mod false_color;
 mod features;
 mod pixels;
+mod present;
 mod primary_hit;
 mod queues;
 mod resolve;
@@ -31,8 +33,10 @@ pub use self::{
     cast::{Cast, CastResources},
     compact::Compact,
     denoise::Denoise,
+    false_color::FalseColor,
     features::Features,
     pixels::Pixels,
+    present::Present,
     primary_hit::PrimaryHit,
     queues::Queues,
     resolve::Resolve,
@@ -66,6 +70,7 @@ pub struct Passes {
     pub accumulate: Accumulate,
     pub denoise: Denoise,
     pub tonemap: Tonemap,
+    pub false_color: FalseColor,
 }
 
 impl Passes {
@@ -83,6 +88,7 @@ impl Passes {
             resolve: Resolve::new(context, bindings)?,
             accumulate: Accumulate::new(context, bindings)?,
             denoise: Denoise::new(context, bindings)?,
+            false_color: FalseColor::new(context, bindings)?,
             tonemap: Tonemap::new(context, bindings, options.tonemap)?,
         })
     }

@@ -11,6 +11,12 @@ use crate::{
     scene::Scene,
 };
 
+/// Of the longest push constants.
+const PUSH_BYTES: u32 = {
+    let (batch, present) = (size_of::<Batch>(), size_of::<layout::Present>());
+    if batch > present { batch as u32 } else { present as u32 }
+};
+
 /// What the kernels read and write. A name is the same here, in the kernels, as debug label and as allocation.
 pub struct Resources {
     pub tree: Tree,
@@ -53,7 +59,7 @@ impl Resources {
             pixels: Pixels::new(context, constants, false)?,
             bounces: Buffer::new(context, "bounces", n_bounces, BufferUse::Indirect)?,
             counters: Buffer::new(context, "counters", n_bounces, storage)?,
-            bindings: Bindings::new(context, &kinds, size_of::<Batch>() as u32)?,
+            bindings: Bindings::new(context, &kinds, PUSH_BYTES)?,
             sets: Vec::new(),
             constants: *constants,
         };
@@ -93,16 +99,18 @@ impl Resources {
     }
 
     /// The kernels' constants from now on, with room for their picture, with or without features, and for `constants.queue_capacity` rays, or for as
-    /// many as there was room for. What they hold is undefined. Where there is no room, all is as before.
+    /// many as there was room for. What they hold is undefined. Where there is no room, all is as before. True where the
+    /// buffers of pixels are the same, and hold what they held.
     ///
     /// # Errors
     /// Beyond the device's limits, out of memory.
-    pub fn fit(&mut self, context: &Arc<Context>, constants: &Frame, features: bool) -> Result<(), GpuError> {
+    pub fn fit(&mut self, context: &Arc<Context>, constants: &Frame, features: bool) -> Result<bool, GpuError> {
         let grows = self.queues.capacity() < constants.queue_capacity;
         let queues = grows.then(|| Queues::new(context, constants.queue_capacity, constants.n_lights)).transpose()?;
         let pixels =
             (!self.pixels.fit(constants, features)).then(|| Pixels::new(context, constants, features)).transpose()?;
-        let has_room = queues.is_none() && pixels.is_none();
+        let keeps_pixels = pixels.is_none();
+        let has_room = queues.is_none() && keeps_pixels;
         if let Some(queues) = queues {
             self.queues = queues;
         }
@@ -113,7 +121,7 @@ impl Resources {
         if !has_room {
             self.sets = self.make_sets()?;
         }
-        Ok(())
+        Ok(keeps_pixels)
     }
 
     /// Other constants for as many pixels and rays; the next frame brings them to the device.

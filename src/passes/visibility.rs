@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Resources, spirv};
 use crate::{
-    gpu::{Area, Bindings, Commands, Context, DrawDesc, GpuError, RasterDesc, RasterPipeline},
+    gpu::{Area, Bindings, Commands, Context, DrawDesc, GpuError, RasterDesc, RasterPipeline, RasterTargets},
     layout::Frame,
 };
 
@@ -15,8 +15,12 @@ pub struct Visibility {
 
 impl Visibility {
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
-        let desc =
-            RasterDesc { name: "visibility", vertex: spirv!("visibility.vert"), fragment: spirv!("visibility.frag") };
+        let desc = RasterDesc {
+            name: "visibility",
+            vertex: spirv!("visibility.vert"),
+            fragment: spirv!("visibility.frag"),
+            targets: RasterTargets::Ids,
+        };
         Ok(Self { pipeline: RasterPipeline::new(context, bindings, &desc)? })
     }
 

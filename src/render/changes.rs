@@ -2,7 +2,7 @@
 
 use super::{
     Renderer,
-    schedule::{Schedule, queue_capacity, split_evenly},
+    schedule::{Schedule, queue_capacity},
 };
 use crate::{frame::RenderOptions, gpu::GpuError, kdtree::KdTree, layout::Frame, scene::Camera};
 
@@ -20,6 +20,8 @@ impl Renderer {
     /// The next sample is the first of a new picture.
     pub fn reset_samples(&mut self) {
         self.n_samples = 0;
+        self.has_sums = false;
+        self.pending = None;
     }
 
     /// Samples a pixel that the picture is the mean of.
@@ -53,6 +55,8 @@ impl Renderer {
 
     fn remake(&mut self, options: &RenderOptions, tree: Option<&KdTree>) -> Result<(), GpuError> {
         let before = self.options.clone();
+        // Its commands hold kernels and sets that may go.
+        self.pending = None;
         if let Some(tree) = tree.filter(|_| before.traversal != options.traversal) {
             self.resources.add_extras(&self.context, tree, options.traversal)?;
         }
@@ -75,9 +79,11 @@ impl Renderer {
         let limits = self.context.limits();
         let queue_capacity = capacity.unwrap_or_else(|| queue_capacity(limits, &constants, self.branches));
         let constants = Frame { queue_capacity, ..constants };
-        let spans = split_evenly(constants.width * constants.height, queue_capacity);
+        let spans = self.spans(&constants);
         let schedule = Schedule::new(&self.context, &constants, spans, options.profile)?;
-        self.resources.fit(&self.context, &constants, options.features)?;
+        if !self.resources.fit(&self.context, &constants, options.features)? {
+            self.displayed = None;
+        }
         self.resources.resize_bounces(&self.context, schedule.n_rows())?;
         self.schedule = schedule;
         Ok(())

@@ -1,20 +1,24 @@
 //! The frame: the order of passes, every barrier between them, one command buffer a bounce.
 
 mod changes;
+mod parts;
 mod profile;
 mod schedule;
 
-use std::{mem, sync::Arc, time::Instant};
+use std::sync::Arc;
 
 use tracing::info_span;
 
-use self::schedule::{Schedule, queue_capacity, split_evenly};
+use self::{
+    parts::Pending,
+    schedule::{Schedule, queue_capacity, split_evenly},
+};
 use crate::{
     camera::frame_constants,
     frame::{Denoise, Picture, Primary, Profile, RenderOptions},
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     kdtree::KdTree,
-    layout::{Batch, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
+    layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
     passes::{Passes, Resources},
     scene::{Camera, Scene},
 };
@@ -33,6 +37,16 @@ pub struct Renderer {
     schedule: Schedule,
     /// Samples a pixel that the picture holds.
     n_samples: u32,
+    /// What is displayed in place of the picture, where there are features.
+    false_color: Option<FalseColor>,
+    /// Whether what samples are added to holds the first one.
+    has_sums: bool,
+    /// A sample that is drawn in part.
+    pending: Option<Pending>,
+    /// Pixels of a batch at the most, where the caller has said so.
+    most_pixels: Option<u32>,
+    /// Width and height of what pixel_display holds.
+    displayed: Option<(u32, u32)>,
 }
 
 impl Renderer {
@@ -79,7 +93,22 @@ impl Renderer {
         drop(uploading);
         let passes = info_span!("make pipelines").in_scope(|| Passes::new(&context, &resources.bindings, options))?;
         let (camera, options) = (scene.camera, options.clone());
-        Ok(Self { context, camera, options, fixed_capacity, branches, resources, passes, schedule, n_samples: 0 })
+        Ok(Self {
+            context,
+            camera,
+            options,
+            fixed_capacity,
+            branches,
+            resources,
+            passes,
+            schedule,
+            n_samples: 0,
+            false_color: None,
+            has_sums: false,
+            pending: None,
+            most_pixels: None,
+            displayed: None,
+        })
     }
 
     /// Draws the frame and fetches its picture.
@@ -107,33 +136,14 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::render`]. The next sample is the first again then.
     pub fn draw_sample(&mut self) -> Result<Profile, GpuError> {
-        let sample_ix = mem::take(&mut self.n_samples);
-        if sample_ix == 1 {
-            self.resources.begin_sums(&self.context)?;
-        }
-        let mut constants = *self.resources.constants();
-        constants.set_view(&self.camera, sample_ix);
-        self.resources.set_constants(&constants);
         loop {
-            let frame = info_span!("record").in_scope(|| self.record())?;
-            let running = info_span!("submit and wait").entered();
-            let begun_at = Instant::now();
-            self.context.submit(&frame.iter().collect::<Vec<_>>())?;
-            self.context.wait()?;
-            drop((frame, running));
-            let _fetching = info_span!("fetch counts").entered();
-            let bounces = self.resources.bounces.download()?;
-            if !bounces.iter().any(|row| row.overflow != 0) {
-                self.n_samples = sample_ix + 1;
-                return self.profile(&bounces, begun_at);
+            if let Some(profile) = self.go_on(usize::MAX)? {
+                return Ok(profile);
             }
-            let spans = self.schedule.split(&bounces, &constants)?;
-            self.schedule = Schedule::new(&self.context, &constants, spans, self.options.profile)?;
-            self.resources.resize_bounces(&self.context, self.schedule.n_rows())?;
         }
     }
 
-    /// Filters and encodes the samples that are there anew, with options that have changed since.
+    /// Filters and encodes the samples that are there anew, with options that have changed since; no sample is begun.
     ///
     /// # Errors
     /// A failed call.
@@ -142,10 +152,12 @@ impl Renderer {
             commands.bind(&self.resources.sets[0]);
             self.update_constants(commands);
             self.show_samples(commands);
-        })
+        })?;
+        self.note_displayed();
+        Ok(())
     }
 
-    /// The picture as it was last drawn or shown.
+    /// The picture as it was last drawn or shown, of a sample that is complete.
     ///
     /// # Errors
     /// A failed copy.
@@ -272,7 +284,10 @@ impl Renderer {
             self.passes.denoise.record(commands, &self.resources);
             commands.barrier(Access::ComputeWrite, Access::ComputeRead); // pixel_filtered
         }
-        self.passes.tonemap.record(commands, &self.resources);
+        match &self.false_color {
+            Some(push) if self.options.features => self.passes.false_color.record(commands, &self.resources, push),
+            _ => self.passes.tonemap.record(commands, &self.resources),
+        }
     }
 }
 

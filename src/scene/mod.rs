@@ -14,12 +14,13 @@ mod obj;
 mod path;
 mod read;
 mod smooth;
+mod sources;
 
 use std::path::Path;
 
 use glam::Vec3;
 
-pub use self::{error::SceneError, material::illum_flags, path::CameraPath};
+pub use self::{error::SceneError, material::illum_flags, path::CameraPath, sources::source_files};
 use crate::{
     frame::{Denoise, RenderOptions, Tonemap},
     layout::{Light, Material, Triangle},

@@ -4,6 +4,7 @@
 
 pub mod command;
 pub mod compare;
+pub mod display;
 pub mod meshes;
 pub mod random;
 pub mod rays;

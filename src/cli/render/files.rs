@@ -71,8 +71,7 @@ pub fn check_outputs(args: &RenderArgs) -> Result<(), CliError> {
 
 /// A PNG of the scene's name in the working directory.
 pub fn default_output(scene_name: &str, is_numbered: bool) -> PathBuf {
-    let name = scene_name.replace(|c: char| std::path::is_separator(c) || c.is_control() || c == '#', "-");
-    let stem = if name.is_empty() { "picture" } else { &name };
+    let stem = output::stem_of(scene_name).replace('#', "-");
     format!("{stem}{}.png", if is_numbered { ".####" } else { "" }).into()
 }
 

@@ -1,0 +1,123 @@
+//! How a picture is made, in words: alike for files and windows.
+
+use clap::{ValueEnum, value_parser};
+use kdray::{
+    frame::{Denoise, Primary, RenderOptions, Tonemap, Traversal},
+    scene::RenderDefaults,
+};
+
+use super::{args::Size, error::CliError};
+
+#[derive(clap::Args)]
+pub struct PictureArgs {
+    /// Pixels, as 1024x768 [default: the scene's]
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// Levels of rays, 1 to 64: 1 stops at what the camera sees [default: the scene's]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=64))]
+    pub max_depth: Option<u32>,
+    /// Noise filter [default: the scene's]
+    #[arg(long, value_name = "paper|off")]
+    pub denoise: Option<DenoiseWord>,
+    /// Sum of a pixel's differences to its neighbours above which it is smoothed, 0 to 4 [default: the scene's]
+    #[arg(long, value_name = "X", value_parser = threshold)]
+    pub denoise_threshold: Option<f32>,
+    /// Factor on radiance before it is encoded for display [default: the scene's]
+    #[arg(long, value_name = "X", value_parser = positive)]
+    pub exposure: Option<f32>,
+    #[arg(long, value_name = "CURVE")]
+    #[arg(help = format!("From radiance to what a display shows: {} [default: the scene's]", Tonemap::words()))]
+    pub tonemap: Option<Tonemap>,
+    #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
+    #[arg(help = format!("How rays find their way through the tree: {}", Traversal::words()))]
+    pub traversal: Traversal,
+    /// How primary rays find their triangles
+    #[arg(long, value_name = "raster|trace", default_value_t = RenderOptions::default().primary)]
+    pub primary: Primary,
+}
+
+impl PictureArgs {
+    /// Refuses words that contradict each other.
+    pub fn check(&self) -> Result<(), CliError> {
+        if matches!(self.denoise, Some(DenoiseWord::Off)) && self.denoise_threshold.is_some() {
+            return Err(CliError::Usage("--denoise-threshold has no meaning with --denoise off".into()));
+        }
+        Ok(())
+    }
+
+    /// The options asked for; the scene's own fill what was left open.
+    pub fn options(&self, scene: &RenderDefaults) -> RenderOptions {
+        let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });
+        RenderOptions {
+            width,
+            height,
+            crop: None,
+            max_depth: self.max_depth.unwrap_or(scene.max_depth),
+            exposure: self.exposure.unwrap_or(scene.exposure),
+            tonemap: self.tonemap.unwrap_or(scene.tonemap),
+            denoise: self.denoise(scene.denoise),
+            traversal: self.traversal,
+            primary: self.primary,
+            features: false,
+            profile: true,
+        }
+    }
+
+    fn denoise(&self, scene: Denoise) -> Denoise {
+        let threshold = match scene {
+            Denoise::Paper { threshold } => threshold,
+            Denoise::Off => Denoise::DEFAULT_THRESHOLD,
+        };
+        match (self.denoise, self.denoise_threshold) {
+            (None, None) => scene,
+            (Some(DenoiseWord::Off), _) => Denoise::Off,
+            (_, asked) => Denoise::Paper { threshold: asked.unwrap_or(threshold) },
+        }
+    }
+}
+
+/// The words for [`Denoise`].
+#[derive(Clone, Copy, ValueEnum)]
+pub enum DenoiseWord {
+    /// The paper's filter over four neighbours
+    Paper,
+    /// None
+    Off,
+}
+
+fn threshold(word: &str) -> Result<f32, String> {
+    word.parse().ok().filter(|x| (0.0..=4.0).contains(x)).ok_or_else(|| "expected a number from 0 to 4".into())
+}
+
+pub fn positive(word: &str) -> Result<f32, String> {
+    let number = word.parse().ok().filter(|x: &f32| x.is_finite() && *x > 0.0);
+    number.ok_or_else(|| "expected a number above 0".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+
+    use super::*;
+    use crate::cli::args::{Args, Command};
+
+    fn denoise(words: &[&str], scene: Denoise) -> Denoise {
+        let words = ["kdray", "render", "x.toml"].iter().chain(words);
+        match Args::try_parse_from(words).unwrap().command {
+            Command::Render(args) => args.picture.denoise(scene),
+            _ => unreachable!(),
+        }
+    }
+
+    #[test]
+    fn what_is_left_open_the_scene_fills() {
+        let scene = Denoise::Paper { threshold: 1.0 };
+        assert_eq!(denoise(&[], scene), scene);
+        assert_eq!(denoise(&[], Denoise::Off), Denoise::Off);
+        assert_eq!(denoise(&["--denoise", "paper"], scene), scene);
+        assert_eq!(denoise(&["--denoise", "off"], scene), Denoise::Off);
+        assert_eq!(denoise(&["--denoise-threshold", "0.5"], Denoise::Off), Denoise::Paper { threshold: 0.5 });
+        let default = Denoise::Paper { threshold: Denoise::DEFAULT_THRESHOLD };
+        assert_eq!(denoise(&["--denoise", "paper"], Denoise::Off), default);
+    }
+}

@@ -1,0 +1,115 @@
+//! `kdray view`: a scene in a window.
+
+use std::path::Path;
+
+use kdray::{
+    frame::View,
+    gpu::ContextOptions,
+    output::{self, Format, OutputError},
+    scene::{Camera, CameraPath, Scene},
+    view::{Display, Loaded, Settings, Tour, ViewOptions, ViewReport},
+};
+use serde::Serialize;
+
+use super::{
+    complain,
+    error::CliError,
+    print,
+    progress::Progress,
+    render::set_threads,
+    view_args::{Switch, ViewArgs},
+};
+
+/// Samples that a picture at rest gets, where the user does not say.
+const SAMPLES_AT_REST: u32 = 256;
+
+/// Loads, builds and shows. What can be refused is refused before the work that it would waste.
+pub fn run(args: &ViewArgs) -> Result<(), CliError> {
+    args.picture.check()?;
+    check_outputs(args)?;
+    set_threads(args.threads)?;
+    let display = Display::open()?;
+
+    let progress = Progress::new(args.quiet, 2);
+    let (scene, _) = progress.stage(&format!("loading {}", args.scene.display()), || Scene::load(&args.scene));
+    let scene = scene?;
+    let options = args.picture.options(&scene.defaults);
+    let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
+    let (loaded, _) = progress.stage(&building, || Loaded::with_tree(&args.scene, scene));
+    drop(progress);
+
+    let tour = tour(args, loaded.scene.camera)?;
+    let max_samples = args.spp.unwrap_or(if tour.is_some() { 1 } else { SAMPLES_AT_REST });
+    let vsync = args.vsync == Switch::On;
+    let settings = Settings { options, max_samples, budget_ms: args.budget_ms, vsync, view: View::Picture, gain: 1.0 };
+    let scene_name = loaded.scene.name.clone();
+    let report = display.view(
+        loaded,
+        ViewOptions {
+            settings,
+            device: ContextOptions { device: args.device.clone(), validate: args.validate },
+            overlay: !args.no_overlay,
+            tour,
+            screenshot: args.screenshot.clone(),
+            record: args.record.clone(),
+            // The window goes on without its terminal.
+            print: |text| drop(print(text)),
+        },
+    )?;
+    if let Some(path) = &args.profile {
+        output::write(path, &json(&Profile { scene: &scene_name, budget_ms: args.budget_ms, vsync, view: &report }))?;
+    }
+    for message in &report.validation {
+        complain("validation", message);
+    }
+    if report.validation.is_empty() { Ok(()) } else { Err(CliError::Validation(report.validation.len())) }
+}
+
+/// The way that the camera goes by itself, if that is asked for.
+fn tour(args: &ViewArgs, start: Camera) -> Result<Option<Tour>, CliError> {
+    let Some(file) = &args.path else { return Ok(args.frames.map(|n_frames| Tour::around(start, n_frames))) };
+    let path = CameraPath::load(file)?;
+    let n_frames = args.frames.unwrap_or((path.end() - path.begin()).ceil() as u32 + 1);
+    let tour = Tour::along(&path, n_frames).ok_or_else(|| {
+        CliError::Usage(format!("{}: between keyframes, eye, target and up span no picture", file.display()))
+    });
+    tour.map(Some)
+}
+
+#[derive(Serialize)]
+struct Profile<'a> {
+    scene: &'a str,
+    budget_ms: f64,
+    vsync: bool,
+    #[serde(flatten)]
+    view: &'a ViewReport,
+}
+
+fn json(profile: &Profile) -> Vec<u8> {
+    let mut json = serde_json::to_vec_pretty(profile).expect("plain structs of numbers and words");
+    json.push(b'\n');
+    json
+}
+
+/// Refuses targets that cannot be written.
+fn check_outputs(args: &ViewArgs) -> Result<(), CliError> {
+    if let Some(path) = &args.screenshot {
+        Format::of(path)?;
+        output::check(path)?;
+    }
+    if let Some(path) = &args.profile {
+        output::check(path)?;
+    }
+    if let Some(directory) = &args.record {
+        check_directory(directory)?;
+    }
+    Ok(())
+}
+
+fn check_directory(directory: &Path) -> Result<(), CliError> {
+    let path = directory.join("frame.0000.png");
+    if directory.is_dir() {
+        return Ok(output::check(&path)?);
+    }
+    Err(OutputError::NoDirectory { path, directory: directory.to_owned() }.into())
+}

@@ -1,0 +1,200 @@
+//! Frames into a window: what each needs until it is shown.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::{
+    Access, CommandBuffer, Commands, Context, GpuError, Surface,
+    swapchain::{Outcome, Swapchain, SwapchainImage, format},
+};
+
+/// Frames that may be recorded or drawn at a time.
+pub const FRAMES_IN_FLIGHT: usize = 2;
+
+/// Draws frames into a window and shows them.
+pub struct Presenter {
+    // In the order of release.
+    slots: [Slot; FRAMES_IN_FLIGHT],
+    next_slot: usize,
+    /// None while the window has no area.
+    swapchain: Option<Swapchain>,
+    stale: bool,
+    vsync: bool,
+    surface: Surface,
+    format: vk::Format,
+    context: Arc<Context>,
+}
+
+/// The image of a window that is being drawn.
+pub struct WindowImage {
+    pub(super) extent: vk::Extent2D,
+}
+
+impl WindowImage {
+    /// Width and height, pixels.
+    pub fn size(&self) -> (u32, u32) {
+        (self.extent.width, self.extent.height)
+    }
+}
+
+impl Presenter {
+    /// # Errors
+    /// The window takes no images that can be drawn; out of memory.
+    pub fn new(context: &Arc<Context>, surface: Surface, vsync: bool) -> Result<Self, GpuError> {
+        let format = format(context, &surface)?.format;
+        Ok(Self {
+            slots: [Slot::new(context)?, Slot::new(context)?],
+            next_slot: 0,
+            swapchain: None,
+            stale: true,
+            vsync,
+            surface,
+            format,
+            context: context.clone(),
+        })
+    }
+
+    /// The window's image format, which pipelines that draw into it have to know.
+    pub(super) fn format(&self) -> vk::Format {
+        self.format
+    }
+
+    /// The window has changed: its images are made anew with the next frame.
+    pub fn mark_stale(&mut self) {
+        self.stale = true;
+    }
+
+    /// Whether frames wait for the screen's refresh; takes effect with the next one.
+    pub fn set_vsync(&mut self, vsync: bool) {
+        self.stale |= vsync != self.vsync;
+        self.vsync = vsync;
+    }
+
+    /// Draws a frame by `body`, within rendering to the window's image, and shows it. Its shaders see what kernels wrote
+    /// before, and kernels may overwrite that afterwards. `size`: the window's, where the
+    /// window system does not say. False where the window has no area or has just changed: nothing was drawn.
+    ///
+    /// # Errors
+    /// A failed call; those of `body`.
+    pub fn present(
+        &mut self,
+        size: (u32, u32),
+        body: impl FnOnce(&Commands, &WindowImage) -> Result<(), GpuError>,
+    ) -> Result<bool, GpuError> {
+        if self.stale {
+            self.renew(size)?;
+        }
+        let slot = &mut self.slots[self.next_slot];
+        slot.wait()?;
+        let Some(swapchain) = &self.swapchain else { return Ok(false) };
+        let image_ix = match swapchain.acquire(slot.acquired)? {
+            Outcome::Good(image_ix) => image_ix,
+            Outcome::Suboptimal(image_ix) => {
+                self.stale = true;
+                image_ix
+            }
+            Outcome::OutOfDate => {
+                self.stale = true;
+                return Ok(false);
+            }
+        };
+        let image = &swapchain.images[image_ix];
+        let shown = WindowImage { extent: swapchain.extent };
+        let mut drawn = Ok(());
+        let commands = CommandBuffer::record(&self.context, "window", None, |commands| {
+            commands.barrier(Access::ComputeWrite, Access::FragmentRead); // what the frame's kernels leave
+            commands.begin_window(image, swapchain.extent);
+            drawn = body(commands, &shown);
+            commands.end_window(image);
+            commands.barrier(Access::FragmentRead, Access::ComputeWrite); // what the next frame's overwrite
+        })?;
+        // What was acquired has to be shown, else it is never released.
+        slot.submit(&self.context, commands, image)?;
+        self.next_slot = (self.next_slot + 1) % FRAMES_IN_FLIGHT;
+        self.stale |= !matches!(swapchain.present(image_ix)?, Outcome::Good(()));
+        drawn.map(|()| true)
+    }
+
+    fn renew(&mut self, size: (u32, u32)) -> Result<(), GpuError> {
+        let old = self.swapchain.take();
+        self.swapchain = Swapchain::new(&self.context, &self.surface, old.as_ref(), self.vsync, size)?;
+        self.stale = self.swapchain.is_none();
+        Ok(())
+    }
+}
+
+impl Drop for Presenter {
+    fn drop(&mut self) {
+        // SAFETY: nothing is submitted meanwhile. What failed has ended, too.
+        let _ = unsafe { self.context.device.device_wait_idle() };
+    }
+}
+
+/// What one frame in flight needs.
+struct Slot {
+    /// Signalled when the frame's image can be drawn.
+    acquired: vk::Semaphore,
+    /// Signalled when the frame is drawn.
+    done: vk::Fence,
+    commands: Option<CommandBuffer>,
+    context: Arc<Context>,
+}
+
+impl Slot {
+    fn new(context: &Arc<Context>) -> Result<Self, GpuError> {
+        let mut slot =
+            Self { acquired: vk::Semaphore::null(), done: vk::Fence::null(), commands: None, context: context.clone() };
+        let signalled = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
+        // SAFETY: plain creations; `Drop` takes what was made.
+        unsafe {
+            slot.acquired = (context.device.create_semaphore(&Default::default(), None))
+                .map_err(GpuError::call("vkCreateSemaphore", "acquired"))?;
+            slot.done =
+                context.device.create_fence(&signalled, None).map_err(GpuError::call("vkCreateFence", "frame"))?;
+        }
+        Ok(slot)
+    }
+
+    /// Waits until the slot's frame is drawn.
+    fn wait(&mut self) -> Result<(), GpuError> {
+        // SAFETY: the fence is alive.
+        unsafe { self.context.device.wait_for_fences(&[self.done], true, u64::MAX) }
+            .map_err(GpuError::call("vkWaitForFences", "frame"))?;
+        self.commands = None;
+        Ok(())
+    }
+
+    /// Starts the frame's commands; the slot's last frame has been waited for.
+    fn submit(&mut self, context: &Context, commands: CommandBuffer, image: &SwapchainImage) -> Result<(), GpuError> {
+        let stage = vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT;
+        let wait = [vk::SemaphoreSubmitInfo::default().semaphore(self.acquired).stage_mask(stage)];
+        // The image's way to the screen ends the commands.
+        let signal = [vk::SemaphoreSubmitInfo::default()
+            .semaphore(image.drawn)
+            .stage_mask(vk::PipelineStageFlags2::ALL_GRAPHICS)];
+        let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(commands.raw())];
+        let submit = [vk::SubmitInfo2::default()
+            .wait_semaphore_infos(&wait)
+            .command_buffer_infos(&buffers)
+            .signal_semaphore_infos(&signal)];
+        // SAFETY: nothing else uses the fence; the slot keeps the commands until it is signalled.
+        unsafe {
+            context.device.reset_fences(&[self.done]).map_err(GpuError::call("vkResetFences", "frame"))?;
+            (context.device.queue_submit2(context.queue, &submit, self.done))
+                .map_err(GpuError::call("vkQueueSubmit2", "window"))?;
+        }
+        self.commands = Some(commands);
+        Ok(())
+    }
+}
+
+impl Drop for Slot {
+    fn drop(&mut self) {
+        // SAFETY: the presenter has waited for the device; null handles are ignored.
+        unsafe {
+            self.context.device.destroy_semaphore(self.acquired, None);
+            self.context.device.destroy_fence(self.done, None);
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! The surface of a window: where pictures are shown.
+
+use std::{ffi::CStr, sync::Arc};
+
+use ash::{khr, vk};
+use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
+
+use super::{GpuError, instance::Instance};
+
+/// What has a place on a screen: a window.
+pub trait Screen: HasDisplayHandle + HasWindowHandle {}
+
+impl<T: HasDisplayHandle + HasWindowHandle> Screen for T {}
+
+/// A window's surface, which keeps the window.
+pub struct Surface {
+    pub(super) raw: vk::SurfaceKHR,
+    pub(super) calls: khr::surface::Instance,
+    _instance: Arc<Instance>,
+    _window: Arc<dyn Screen>,
+}
+
+impl Surface {
+    /// Instance extensions that a surface of this window needs.
+    pub(super) fn extensions(window: &dyn Screen) -> Result<Vec<&'static CStr>, GpuError> {
+        let display = window.display_handle().map_err(|error| GpuError::NoSurface(error.to_string()))?;
+        let names = ash_window::enumerate_required_extensions(display.as_raw())
+            .map_err(GpuError::call("enumerate_required_extensions", "window"))?;
+        // SAFETY: the names are string literals of ash.
+        Ok(names.iter().map(|name| unsafe { CStr::from_ptr(*name) }).collect())
+    }
+
+    /// The instance has the extensions that the window needs.
+    pub(super) fn new(instance: &Arc<Instance>, window: Arc<dyn Screen>) -> Result<Self, GpuError> {
+        let no_surface = |error: raw_window_handle::HandleError| GpuError::NoSurface(error.to_string());
+        let display = window.display_handle().map_err(no_surface)?.as_raw();
+        let handle = window.window_handle().map_err(no_surface)?.as_raw();
+        // SAFETY: the handles are the window's, which the surface keeps.
+        let raw = unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, handle, None) }
+            .map_err(GpuError::call("vkCreateSurfaceKHR", "window"))?;
+        let calls = khr::surface::Instance::new(&instance.entry, &instance.raw);
+        Ok(Self { raw, calls, _instance: instance.clone(), _window: window })
+    }
+
+    /// Whether queues of the family can present to it.
+    pub(super) fn is_served_by(&self, device: vk::PhysicalDevice, family: u32) -> bool {
+        // SAFETY: device and surface belong to one instance.
+        unsafe { self.calls.get_physical_device_surface_support(device, family, self.raw) }.unwrap_or(false)
+    }
+}
+
+impl Drop for Surface {
+    fn drop(&mut self) {
+        // SAFETY: the swapchain that holds the surface has ended before it.
+        unsafe { self.calls.destroy_surface(self.raw, None) };
+    }
+}

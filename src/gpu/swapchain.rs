@@ -1,0 +1,193 @@
+//! The images of a window, in one size.
+
+use std::{slice, sync::Arc};
+
+use ash::{khr, vk};
+
+use super::{Context, GpuError, Surface};
+
+/// One is shown, one waits to be shown, one is drawn.
+const N_IMAGES: u32 = 3;
+
+/// Images of one size that are drawn and shown in turns.
+pub(super) struct Swapchain {
+    pub raw: vk::SwapchainKHR,
+    pub images: Vec<SwapchainImage>,
+    pub extent: vk::Extent2D,
+    context: Arc<Context>,
+}
+
+/// An image to show.
+pub(super) struct SwapchainImage {
+    pub raw: vk::Image,
+    pub view: vk::ImageView,
+    /// Signalled when it is drawn. One an image: nothing tells when a presentation has waited for it, but that the
+    /// image can be acquired again.
+    pub drawn: vk::Semaphore,
+}
+
+/// What became of a call that the window's changes can upset.
+pub(super) enum Outcome<T> {
+    Good(T),
+    /// It worked, though the images no longer fit the window.
+    Suboptimal(T),
+    /// It did not: the images have to be made anew.
+    OutOfDate,
+}
+
+impl Swapchain {
+    /// None for a window without area. `size`: pixels, where the window system leaves them to us; `old` is retired.
+    pub fn new(
+        context: &Arc<Context>,
+        surface: &Surface,
+        old: Option<&Swapchain>,
+        vsync: bool,
+        size: (u32, u32),
+    ) -> Result<Option<Self>, GpuError> {
+        // SAFETY: the surface belongs to the device's instance.
+        let able = unsafe { surface.calls.get_physical_device_surface_capabilities(context.physical, surface.raw) }
+            .map_err(GpuError::call("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", "window"))?;
+        let extent = extent(&able, size);
+        if extent.width == 0 || extent.height == 0 {
+            return Ok(None);
+        }
+        let most = if able.max_image_count == 0 { u32::MAX } else { able.max_image_count };
+        let opaque = vk::CompositeAlphaFlagsKHR::OPAQUE;
+        let alpha =
+            if able.supported_composite_alpha.contains(opaque) { opaque } else { vk::CompositeAlphaFlagsKHR::INHERIT };
+        let format = format(context, surface)?;
+        let info = vk::SwapchainCreateInfoKHR::default()
+            .surface(surface.raw)
+            .min_image_count(able.min_image_count.max(N_IMAGES).min(most))
+            .image_format(format.format)
+            .image_color_space(format.color_space)
+            .image_extent(extent)
+            .image_array_layers(1)
+            .image_usage(vk::ImageUsageFlags::COLOR_ATTACHMENT)
+            .pre_transform(able.current_transform)
+            .composite_alpha(alpha)
+            .present_mode(present_mode(context, surface, vsync)?)
+            .clipped(true)
+            .old_swapchain(old.map_or(vk::SwapchainKHR::null(), |old| old.raw));
+        let calls = calls(context);
+        // SAFETY: `info` asks for what the surface offers; `Drop` takes what was made.
+        let raw =
+            unsafe { calls.create_swapchain(&info, None) }.map_err(GpuError::call("vkCreateSwapchainKHR", "window"))?;
+        let mut swapchain = Self { raw, images: Vec::new(), extent, context: context.clone() };
+        // SAFETY: the swapchain is alive.
+        let images =
+            unsafe { calls.get_swapchain_images(raw) }.map_err(GpuError::call("vkGetSwapchainImagesKHR", "window"))?;
+        for image in images {
+            swapchain.add_image(image, format.format)?;
+        }
+        Ok(Some(swapchain))
+    }
+
+    fn add_image(&mut self, raw: vk::Image, format: vk::Format) -> Result<(), GpuError> {
+        let device = &self.context.device;
+        let range = vk::ImageSubresourceRange {
+            aspect_mask: vk::ImageAspectFlags::COLOR,
+            level_count: 1,
+            layer_count: 1,
+            ..Default::default()
+        };
+        let info = vk::ImageViewCreateInfo::default()
+            .image(raw)
+            .view_type(vk::ImageViewType::TYPE_2D)
+            .format(format)
+            .subresource_range(range);
+        // SAFETY: the image is the swapchain's; what is made is released with it.
+        unsafe {
+            let view = device.create_image_view(&info, None).map_err(GpuError::call("vkCreateImageView", "window"))?;
+            let drawn = vk::Semaphore::null();
+            self.images.push(SwapchainImage { raw, view, drawn });
+            let info = vk::SemaphoreCreateInfo::default();
+            let drawn = device.create_semaphore(&info, None).map_err(GpuError::call("vkCreateSemaphore", "drawn"))?;
+            self.images.last_mut().expect("just pushed").drawn = drawn;
+        }
+        self.context.set_name(raw, &format!("window {}", self.images.len() - 1));
+        Ok(())
+    }
+
+    /// The next image to draw; `acquired` is signalled when the screen has let go of it.
+    pub fn acquire(&self, acquired: vk::Semaphore) -> Result<Outcome<usize>, GpuError> {
+        // SAFETY: the semaphore is unsignalled and nothing waits for it.
+        let result =
+            unsafe { calls(&self.context).acquire_next_image(self.raw, u64::MAX, acquired, vk::Fence::null()) };
+        match result {
+            Ok((image_ix, false)) => Ok(Outcome::Good(image_ix as usize)),
+            Ok((image_ix, true)) => Ok(Outcome::Suboptimal(image_ix as usize)),
+            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => Ok(Outcome::OutOfDate),
+            Err(result) => Err(GpuError::call("vkAcquireNextImageKHR", "window")(result)),
+        }
+    }
+
+    /// Shows an image once it is drawn.
+    pub fn present(&self, image_ix: usize) -> Result<Outcome<()>, GpuError> {
+        let wait = [self.images[image_ix].drawn];
+        let image_ix = image_ix as u32;
+        let info = vk::PresentInfoKHR::default()
+            .wait_semaphores(&wait)
+            .swapchains(slice::from_ref(&self.raw))
+            .image_indices(slice::from_ref(&image_ix));
+        // SAFETY: the image was acquired, and a submit that signals the semaphore is under way.
+        match unsafe { calls(&self.context).queue_present(self.context.queue, &info) } {
+            Ok(false) => Ok(Outcome::Good(())),
+            Ok(true) => Ok(Outcome::Suboptimal(())),
+            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => Ok(Outcome::OutOfDate),
+            Err(result) => Err(GpuError::call("vkQueuePresentKHR", "window")(result)),
+        }
+    }
+}
+
+impl Drop for Swapchain {
+    fn drop(&mut self) {
+        // SAFETY: the device is idle, the screen's share of it included; null handles are ignored.
+        unsafe {
+            let _ = self.context.device.device_wait_idle();
+            for image in &self.images {
+                self.context.device.destroy_semaphore(image.drawn, None);
+                self.context.device.destroy_image_view(image.view, None);
+            }
+            calls(&self.context).destroy_swapchain(self.raw, None);
+        }
+    }
+}
+
+fn calls(context: &Context) -> &khr::swapchain::Device {
+    context.presentation.as_ref().expect("a context with a surface was opened for a window")
+}
+
+/// Eight bits a channel, written as they are: the tone mapper has encoded them for display.
+pub(super) fn format(context: &Context, surface: &Surface) -> Result<vk::SurfaceFormatKHR, GpuError> {
+    // SAFETY: the surface belongs to the device's instance.
+    let offered = unsafe { surface.calls.get_physical_device_surface_formats(context.physical, surface.raw) }
+        .map_err(GpuError::call("vkGetPhysicalDeviceSurfaceFormatsKHR", "window"))?;
+    let fits = |wanted: vk::Format| {
+        let encoded = |f: &&vk::SurfaceFormatKHR| f.color_space == vk::ColorSpaceKHR::SRGB_NONLINEAR;
+        offered.iter().filter(encoded).find(|f| f.format == wanted).copied()
+    };
+    fits(vk::Format::B8G8R8A8_UNORM)
+        .or_else(|| fits(vk::Format::R8G8B8A8_UNORM))
+        .ok_or_else(|| GpuError::NoSurface("it takes no images of 8 bits a channel".to_owned()))
+}
+
+/// With `vsync` the screen's pace; without it as soon as may be.
+fn present_mode(context: &Context, surface: &Surface, vsync: bool) -> Result<vk::PresentModeKHR, GpuError> {
+    // SAFETY: the surface belongs to the device's instance.
+    let offered = unsafe { surface.calls.get_physical_device_surface_present_modes(context.physical, surface.raw) }
+        .map_err(GpuError::call("vkGetPhysicalDeviceSurfacePresentModesKHR", "window"))?;
+    let unpaced = [vk::PresentModeKHR::IMMEDIATE, vk::PresentModeKHR::MAILBOX];
+    let found = unpaced.into_iter().find(|mode| !vsync && offered.contains(mode));
+    // Every device has this one.
+    Ok(found.unwrap_or(vk::PresentModeKHR::FIFO))
+}
+
+/// The window's size, or `size` within bounds where the window takes that of its images.
+fn extent(able: &vk::SurfaceCapabilitiesKHR, size: (u32, u32)) -> vk::Extent2D {
+    if able.current_extent.width != u32::MAX {
+        return able.current_extent;
+    }
+    let (min, max) = (able.min_image_extent, able.max_image_extent);
+    vk::Extent2D { width: size.0.min(max.width).max(min.width), height: size.1.min(max.height).max(min.height) }
+}

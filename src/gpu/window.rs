@@ -1,0 +1,82 @@
+//! Commands that draw into a window's image.
+
+use ash::vk;
+use bytemuck::Pod;
+
+use super::{BindingSet, Commands, RasterPipeline, WindowImage, swapchain::SwapchainImage};
+
+impl Commands<'_> {
+    /// Makes the image black and ready to be drawn to, and begins that.
+    pub(super) fn begin_window(&self, image: &SwapchainImage, extent: vk::Extent2D) {
+        let output = vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT;
+        // The submit's wait for the acquired image ends at this stage.
+        let barrier = image_barrier(image)
+            .src_stage_mask(output)
+            .old_layout(vk::ImageLayout::UNDEFINED)
+            .dst_stage_mask(output)
+            .dst_access_mask(vk::AccessFlags2::COLOR_ATTACHMENT_READ | vk::AccessFlags2::COLOR_ATTACHMENT_WRITE)
+            .new_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+        let color = [vk::RenderingAttachmentInfo::default()
+            .image_view(image.view)
+            .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+            .load_op(vk::AttachmentLoadOp::CLEAR)
+            .store_op(vk::AttachmentStoreOp::STORE)];
+        let area = vk::Rect2D { extent, ..Default::default() };
+        let rendering = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color);
+        self.image_barrier(barrier);
+        // SAFETY: the commands are being recorded; the image is in the named layout.
+        unsafe { self.context.device.cmd_begin_rendering(self.raw, &rendering) };
+    }
+
+    /// Hands the image to the screen.
+    pub(super) fn end_window(&self, image: &SwapchainImage) {
+        // SAFETY: `begin_window` began it.
+        unsafe { self.context.device.cmd_end_rendering(self.raw) };
+        let barrier = image_barrier(image)
+            .src_stage_mask(vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT)
+            .src_access_mask(vk::AccessFlags2::COLOR_ATTACHMENT_WRITE)
+            .old_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+            .dst_stage_mask(vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT)
+            .new_layout(vk::ImageLayout::PRESENT_SRC_KHR);
+        self.image_barrier(barrier);
+    }
+
+    /// Draws one triangle that covers the window.
+    pub fn cover(&self, pipeline: &RasterPipeline, set: &BindingSet, push: &impl Pod, image: &WindowImage) {
+        let device = &self.context.device;
+        let (width, height) = image.size();
+        let viewport =
+            vk::Viewport { width: width as f32, height: height as f32, max_depth: 1.0, ..Default::default() };
+        let area = vk::Rect2D { extent: image.extent, ..Default::default() };
+        self.pass(pipeline.name, None, || {
+            // SAFETY: rendering to the window has begun; the set's layout is the pipeline's.
+            unsafe {
+                let layout = set.bindings.pipeline_layout;
+                let point = vk::PipelineBindPoint::GRAPHICS;
+                device.cmd_bind_pipeline(self.raw, point, pipeline.raw);
+                device.cmd_bind_descriptor_sets(self.raw, point, layout, 0, &[set.raw], &[]);
+                device.cmd_push_constants(self.raw, layout, self.context.stages(), 0, bytemuck::bytes_of(push));
+                device.cmd_set_viewport(self.raw, 0, &[viewport]);
+                device.cmd_set_scissor(self.raw, 0, &[area]);
+                device.cmd_draw(self.raw, 3, 1, 0, 0);
+            }
+        });
+    }
+
+    fn image_barrier(&self, barrier: vk::ImageMemoryBarrier2) {
+        let barriers = [barrier];
+        let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
+        // SAFETY: the commands are being recorded, outside rendering.
+        unsafe { self.context.device.cmd_pipeline_barrier2(self.raw, &info) };
+    }
+}
+
+fn image_barrier(image: &SwapchainImage) -> vk::ImageMemoryBarrier2<'static> {
+    let range = vk::ImageSubresourceRange {
+        aspect_mask: vk::ImageAspectFlags::COLOR,
+        level_count: 1,
+        layer_count: 1,
+        ..Default::default()
+    };
+    vk::ImageMemoryBarrier2::default().image(image.raw).subresource_range(range)
+}

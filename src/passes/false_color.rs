@@ -1,0 +1,25 @@
+//! False colour: a feature of each pixel, displayed.
+
+use std::sync::Arc;
+
+use super::{Resources, kernel, spirv};
+use crate::{
+    gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
+    layout,
+};
+
+/// The pass's kernel.
+pub struct FalseColor {
+    kernel: ComputePipeline,
+}
+
+impl FalseColor {
+    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
+        Ok(Self { kernel: kernel(context, bindings, "false_color", spirv!("false_color.comp"), &[])? })
+    }
+
+    /// Needs pixel_features. Leaves pixel_display.
+    pub fn record(&self, commands: &Commands, resources: &Resources, push: &layout::FalseColor) {
+        commands.dispatch(&self.kernel, None, push, resources.pixel_dispatch());
+    }
+}

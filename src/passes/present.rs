@@ -1,0 +1,37 @@
+//! Present: the displayed picture into a window.
+
+use std::sync::Arc;
+
+use super::{Resources, spirv};
+use crate::{
+    gpu::{Commands, Context, GpuError, Presenter, RasterDesc, RasterPipeline, RasterTargets, WindowImage},
+    layout,
+};
+
+/// The pass's pipeline.
+pub struct Present {
+    pipeline: RasterPipeline,
+}
+
+impl Present {
+    /// For pictures of resources like these.
+    ///
+    /// # Errors
+    /// The driver refuses a shader.
+    pub fn new(context: &Arc<Context>, resources: &Resources, presenter: &Presenter) -> Result<Self, GpuError> {
+        let desc = RasterDesc {
+            name: "present",
+            vertex: spirv!("present.vert"),
+            fragment: spirv!("present.frag"),
+            targets: RasterTargets::Window(presenter),
+        };
+        Ok(Self { pipeline: RasterPipeline::new(context, &resources.bindings, &desc)? })
+    }
+
+    /// Needs pixel_display of `size` pixels, readable by fragments. Leaves the window's image, all of it.
+    pub fn record(&self, commands: &Commands, resources: &Resources, size: (u32, u32), image: &WindowImage) {
+        let ((width, height), (window_width, window_height)) = (size, image.size());
+        let push = layout::Present { width, height, window_width, window_height };
+        commands.cover(&self.pipeline, &resources.sets[0], &push, image);
+    }
+}

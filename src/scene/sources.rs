@@ -1,0 +1,61 @@
+//! The files that a scene is made from.
+
+use std::path::{Path, PathBuf};
+
+use toml::{Table, Value};
+
+use super::read::{read_lossy, read_utf8};
+
+/// The scene file, the meshes that it names and the material libraries that those name, whether they exist or not. What
+/// cannot be read names nothing.
+pub fn source_files(path: &Path) -> Vec<PathBuf> {
+    let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
+    let meshes = if is_obj { vec![path.to_owned()] } else { meshes(path) };
+    let libraries: Vec<_> = meshes.iter().flat_map(|mesh| libraries(mesh)).collect();
+    let mut files = [vec![path.to_owned()], meshes, libraries].concat();
+    files.sort();
+    files.dedup();
+    files
+}
+
+fn meshes(scene: &Path) -> Vec<PathBuf> {
+    let table: Table = read_utf8(scene).ok().and_then(|text| text.parse().ok()).unwrap_or_default();
+    let meshes = table.get("mesh").and_then(Value::as_array).into_iter().flatten();
+    let names = meshes.filter_map(|mesh| mesh.get("file").and_then(Value::as_str));
+    names.map(|name| beside(scene, name)).collect()
+}
+
+fn libraries(mesh: &Path) -> Vec<PathBuf> {
+    let text = read_lossy(mesh).unwrap_or_default();
+    let named = text.lines().filter_map(|line| line.trim_start().strip_prefix("mtllib "));
+    named.map(|name| beside(mesh, name.trim())).collect()
+}
+
+fn beside(file: &Path, name: &str) -> PathBuf {
+    file.parent().unwrap_or(Path::new("")).join(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use tempfile::TempDir;
+
+    use super::*;
+
+    #[test]
+    fn a_scene_names_its_meshes_and_they_their_libraries() {
+        let directory = TempDir::new().unwrap();
+        let path = |name: &str| directory.path().join(name);
+        fs::create_dir(path("parts")).unwrap();
+        let scene =
+            "[[mesh]]\nfile = \"parts/a.obj\"\n[[mesh]]\nfile = \"none.obj\"\n[[mesh]]\ngenerator = \"plane\"\n";
+        fs::write(path("x.toml"), scene).unwrap();
+        fs::write(path("parts/a.obj"), "# a\nmtllib a.mtl\nv 0 0 0\n").unwrap();
+        let expected = [path("none.obj"), path("parts/a.mtl"), path("parts/a.obj"), path("x.toml")];
+        assert_eq!(source_files(&path("x.toml")), expected);
+        assert_eq!(source_files(&path("parts/a.obj")), [path("parts/a.mtl"), path("parts/a.obj")]);
+        fs::write(path("x.toml"), "[[mesh\n").unwrap();
+        assert_eq!(source_files(&path("x.toml")), [path("x.toml")]);
+    }
+}

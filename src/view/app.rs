@@ -1,0 +1,273 @@
+//! The window: its events, and the order of things in a frame.
+
+use std::{
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use winit::{
+    application::ApplicationHandler,
+    dpi::PhysicalSize,
+    event::{ElementState, KeyEvent, WindowEvent},
+    event_loop::{ActiveEventLoop, ControlFlow},
+    keyboard::{KeyCode, PhysicalKey},
+    window::{Window, WindowId},
+};
+
+use super::{
+    display::{PaceReport, ViewOptions, ViewReport},
+    error::ViewError,
+    input::{Action, Input},
+    live::Live,
+    panel::Settings,
+    reload::{Reloader, Wake},
+    script::Script,
+    session::Session,
+    ui::{Layout, Ui},
+};
+use crate::gpu::GpuError;
+
+/// The viewer, as the event loop drives it.
+pub(super) struct App {
+    session: Session,
+    options: ViewOptions,
+    script: Option<Script>,
+    reloader: Reloader,
+    input: Input,
+    /// None before the window is there.
+    shown: Option<Shown>,
+    is_overlaid: bool,
+    is_occluded: bool,
+    outcome: Result<(), ViewError>,
+}
+
+/// A window and what it shows.
+struct Shown {
+    live: Live,
+    ui: Ui,
+    window: Arc<Window>,
+}
+
+impl App {
+    pub fn new(session: Session, options: ViewOptions, script: Option<Script>, reloader: Reloader) -> Self {
+        Self {
+            session,
+            is_overlaid: options.overlay,
+            options,
+            script,
+            reloader,
+            input: Input::default(),
+            shown: None,
+            is_occluded: false,
+            outcome: Ok(()),
+        }
+    }
+
+    fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<Shown, ViewError> {
+        let Settings { options, vsync, .. } = &self.session.settings;
+        let attributes = Window::default_attributes()
+            .with_title(format!("kdray: {}", self.session.loaded.scene.name))
+            .with_inner_size(PhysicalSize::new(options.width, options.height));
+        let window = event_loop.create_window(attributes).map_err(|error| ViewError::Window(error.to_string()))?;
+        let window = Arc::new(window);
+        let live = Live::open(window.clone(), &self.options.device, &self.session.loaded, options, *vsync)?;
+        Ok(Shown { live, ui: Ui::new(&window), window })
+    }
+
+    fn end(&mut self, event_loop: &ActiveEventLoop, outcome: Result<(), ViewError>) {
+        if self.outcome.is_ok() {
+            self.outcome = outcome;
+        }
+        event_loop.exit();
+    }
+
+    /// One frame: input and overlay, a sample, the screen.
+    fn frame(&mut self, event_loop: &ActiveEventLoop) {
+        let Some(mut shown) = self.shown.take() else { return };
+        let result = self.draw(&mut shown);
+        match result {
+            Ok(true) => self.end(event_loop, Ok(())),
+            Ok(false) => {}
+            Err(ViewError::Device(error)) if error.is_device_lost() => {
+                self.recover(shown, event_loop, error);
+                return;
+            }
+            Err(error) => self.end(event_loop, Err(error)),
+        }
+        self.shown = Some(shown);
+    }
+
+    /// True when the script has ended.
+    fn draw(&mut self, shown: &mut Shown) -> Result<bool, ViewError> {
+        let Shown { live, ui, window } = shown;
+        let size = window.inner_size();
+        let size = (size.width, size.height);
+        if size.0 == 0 || size.1 == 0 {
+            return Ok(false);
+        }
+        // A script's pictures do not depend on what the window manager makes of the window.
+        let picture = match &mut self.script {
+            Some(script) => {
+                script.direct(&mut self.session);
+                (self.options.settings.options.width, self.options.settings.options.height)
+            }
+            None => size,
+        };
+        let session = &mut self.session;
+        let layout = self.is_overlaid.then(|| lay_out(session, live, ui, window, self.input.is_flying()));
+        session.draw(live, picture)?;
+        let frame = match layout {
+            Some(Layout { frame, textures }) => {
+                live.update_textures(textures)?;
+                Some(frame)
+            }
+            None => None,
+        };
+        if !live.show(size, frame.as_ref())? {
+            return Ok(false);
+        }
+        session.shown();
+        match &mut self.script {
+            Some(script) => Ok(script.shown(session, live)?),
+            None => Ok(false),
+        }
+    }
+
+    /// Opens the device anew after it was lost; ends where that fails.
+    fn recover(&mut self, shown: Shown, event_loop: &ActiveEventLoop, error: GpuError) {
+        let Shown { live, ui, window } = shown;
+        drop((live, ui));
+        self.session.complain(&format!("{error}; the device was opened anew"));
+        let Settings { options, vsync, .. } = &self.session.settings;
+        match Live::open(window.clone(), &self.options.device, &self.session.loaded, options, *vsync) {
+            Ok(live) => self.shown = Some(Shown { live, ui: Ui::new(&window), window }),
+            Err(error) => self.end(event_loop, Err(error.into())),
+        }
+    }
+
+    fn act(&mut self, event_loop: &ActiveEventLoop, action: Action) {
+        let Some(Shown { live, window, .. }) = &mut self.shown else { return };
+        let size = window.inner_size();
+        match action {
+            Action::Quit => self.end(event_loop, Ok(())),
+            Action::ToggleOverlay => self.is_overlaid = !self.is_overlaid,
+            action => self.session.act(action, live, (size.width.max(1), size.height.max(1)), self.options.print),
+        }
+    }
+
+    /// What the user does: the overlay's first, then the camera's.
+    fn hear(&mut self, event_loop: &ActiveEventLoop, event: &WindowEvent) {
+        let Some(Shown { ui, window, .. }) = &mut self.shown else { return };
+        let is_overlays = self.is_overlaid && !is_tab(event) && ui.take_event(window, event);
+        window.request_redraw();
+        if is_overlays || self.script.is_some() {
+            return;
+        }
+        let now = Instant::now();
+        let heard = self.input.hear(event, window.inner_size().height, &mut self.session.controller);
+        if heard.moves {
+            self.session.pace.moved(now);
+        }
+        if heard.moves || heard.action.is_some() {
+            self.session.pace.hear(now);
+        }
+        if let Some(action) = heard.action {
+            self.act(event_loop, action);
+        }
+    }
+
+    /// What came of it, once the loop has ended.
+    pub fn report(self) -> Result<ViewReport, ViewError> {
+        self.outcome?;
+        let frames = &self.session.all_frames;
+        let pace = PaceReport { frame_ms: frames.pace(), input_to_present_ms: frames.latency() };
+        let Some(Shown { live, ui, window }) = self.shown else {
+            return Err(ViewError::Window("it was closed before it was open".to_owned()));
+        };
+        let context = live.context.clone();
+        // What the layer says of the end counts, too.
+        drop((live, ui, window));
+        Ok(ViewReport { device: context.info().name.clone(), pace, validation: context.validation_messages() })
+    }
+}
+
+fn lay_out(session: &mut Session, live: &Live, ui: &mut Ui, window: &Window, is_flying: bool) -> Layout {
+    let size = window.inner_size();
+    let mut settings = session.settings.clone();
+    let layout = ui.layout(window, &mut settings, &session.facts(live, (size.width, size.height), is_flying));
+    if settings != session.settings {
+        session.pace.hear(Instant::now());
+        session.settings = settings;
+    }
+    layout
+}
+
+fn is_tab(event: &WindowEvent) -> bool {
+    let tab = PhysicalKey::Code(KeyCode::Tab);
+    matches!(event, WindowEvent::KeyboardInput {
+        event: KeyEvent { physical_key, state: ElementState::Pressed, .. }, ..
+    } if *physical_key == tab)
+}
+
+impl ApplicationHandler<Wake> for App {
+    fn resumed(&mut self, event_loop: &ActiveEventLoop) {
+        if self.shown.is_none() {
+            match self.open(event_loop) {
+                Ok(shown) => {
+                    self.shown = Some(shown);
+                }
+                Err(error) => self.end(event_loop, Err(error)),
+            }
+        }
+    }
+
+    fn user_event(&mut self, _: &ActiveEventLoop, wake: Wake) {
+        match wake {
+            Wake::Changed => self.reloader.load(),
+            Wake::Reloaded(loaded) => {
+                if let Some(Shown { live, window, .. }) = &mut self.shown {
+                    self.session.replace_scene(live, *loaded);
+                    window.request_redraw();
+                }
+                self.reloader.done();
+            }
+        }
+    }
+
+    fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        match event {
+            WindowEvent::CloseRequested => self.end(event_loop, Ok(())),
+            WindowEvent::RedrawRequested => self.frame(event_loop),
+            WindowEvent::Occluded(is_occluded) => self.is_occluded = is_occluded,
+            WindowEvent::Resized(_) => {
+                if let Some(Shown { live, .. }) = &mut self.shown {
+                    live.presenter.mark_stale();
+                    // As long as the user pulls at the window, it is drawn fast.
+                    self.session.pace.moved(Instant::now());
+                }
+                self.hear(event_loop, &event);
+            }
+            event => self.hear(event_loop, &event),
+        }
+    }
+
+    fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
+        let Some(Shown { live, ui, window }) = &self.shown else { return };
+        let (now, size) = (Instant::now(), window.inner_size());
+        let is_busy = self.script.is_some() || self.session.is_busy(live, now, (size.width, size.height));
+        let wait = if is_busy || !self.is_overlaid { Duration::MAX } else { ui.repaint_after() };
+        let has_area = size.width > 0 && size.height > 0;
+        if self.is_occluded || !has_area {
+            event_loop.set_control_flow(ControlFlow::Wait);
+        } else if is_busy || wait.is_zero() {
+            window.request_redraw();
+            event_loop.set_control_flow(ControlFlow::Poll);
+        } else {
+            self.session.pace.pause();
+            event_loop.set_control_flow(match now.checked_add(wait) {
+                Some(at) => ControlFlow::WaitUntil(at),
+                None => ControlFlow::Wait,
+            });
+        }
+    }
+}

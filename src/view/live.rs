@@ -1,0 +1,89 @@
+//! What the viewer has on the device: the renderer, and the way from its picture into the window.
+
+use std::sync::Arc;
+
+use egui::TexturesDelta;
+
+use super::loaded::Loaded;
+use crate::{
+    frame::RenderOptions,
+    gpu::{Context, ContextOptions, GpuError, Overlay, OverlayFrame, Presenter, Screen},
+    passes::Present,
+    render::Renderer,
+};
+
+/// A scene on a device that shows its pictures in a window.
+pub struct Live {
+    pub renderer: Renderer,
+    present: Present,
+    overlay: Overlay,
+    pub presenter: Presenter,
+    pub context: Arc<Context>,
+}
+
+impl Live {
+    /// Opens the device and uploads the scene.
+    ///
+    /// # Errors
+    /// No device can do it; the scene or the picture is beyond its limits or memory.
+    pub fn open(
+        window: Arc<dyn Screen>,
+        device: &ContextOptions,
+        loaded: &Loaded,
+        options: &RenderOptions,
+        vsync: bool,
+    ) -> Result<Self, GpuError> {
+        let (context, surface) = Context::for_window(device, window)?;
+        let presenter = Presenter::new(&context, surface, vsync)?;
+        let overlay = Overlay::new(&context, &presenter)?;
+        let renderer = Renderer::new(context.clone(), &loaded.scene, &loaded.tree, options)?;
+        let present = Present::new(&context, renderer.resources(), &presenter)?;
+        Ok(Self { renderer, present, overlay, presenter, context })
+    }
+
+    /// Puts another scene in the place of the last one, which stays where that fails.
+    ///
+    /// # Errors
+    /// The scene is beyond the device's limits or memory.
+    pub fn set_scene(&mut self, loaded: &Loaded) -> Result<(), GpuError> {
+        let camera = *self.renderer.camera();
+        let mut renderer = Renderer::new(self.context.clone(), &loaded.scene, &loaded.tree, self.renderer.options())?;
+        renderer.set_camera(&camera);
+        self.context.wait()?;
+        self.renderer = renderer;
+        Ok(())
+    }
+
+    /// Takes over what egui has changed in its textures; no change may be left out.
+    ///
+    /// # Errors
+    /// Out of memory; a failed copy.
+    pub fn update_textures(&mut self, textures: TexturesDelta) -> Result<(), GpuError> {
+        self.overlay.update_textures(textures)
+    }
+
+    /// Shows what is displayed, and the overlay over it. False where the window cannot show anything now. `window`: its size
+    /// in pixels.
+    ///
+    /// # Errors
+    /// A failed call.
+    pub fn show(&mut self, window: (u32, u32), overlay: Option<&OverlayFrame>) -> Result<bool, GpuError> {
+        let Self { renderer, present, overlay: drawer, presenter, .. } = self;
+        presenter.present(window, |commands, image| {
+            if let Some(size) = renderer.displayed() {
+                present.record(commands, renderer.resources(), size, image);
+            }
+            match overlay {
+                Some(frame) => drawer.draw(commands, image, frame),
+                None => Ok(()),
+            }
+        })
+    }
+}
+
+impl Drop for Live {
+    fn drop(&mut self) {
+        // Frames in flight still read what goes; after a lost device there is nothing to wait for.
+        let _ = self.context.wait();
+    }
+}

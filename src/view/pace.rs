@@ -1,0 +1,96 @@
+//! When the picture is drawn fast, and when well.
+
+use std::time::{Duration, Instant};
+
+/// A camera that has not moved for so long rests.
+const REST_AFTER: Duration = Duration::from_millis(150);
+
+/// Whether the camera moves, when frames were shown, and since when an input waits for its frame.
+#[derive(Debug, Default)]
+pub struct Pace {
+    moved_at: Option<Instant>,
+    /// When the last frame was shown, if drawing has gone on since.
+    shown_at: Option<Instant>,
+    begun_at: Option<Instant>,
+    oldest_input: Option<Instant>,
+}
+
+/// Times of a frame that was shown, milliseconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrameTimes {
+    /// Since the frame before, or the frame's beginning where nothing was drawn for a while.
+    pub frame_ms: f64,
+    /// Since the oldest input that it is the first to show.
+    pub latency_ms: Option<f64>,
+}
+
+impl Pace {
+    /// An input came that the next frame will show.
+    pub fn hear(&mut self, now: Instant) {
+        self.oldest_input.get_or_insert(now);
+    }
+
+    /// The camera has moved.
+    pub fn moved(&mut self, now: Instant) {
+        self.moved_at = Some(now);
+    }
+
+    /// The camera is where it shall be.
+    pub fn rest(&mut self) {
+        self.moved_at = None;
+    }
+
+    pub fn is_moving(&self, now: Instant) -> bool {
+        self.moved_at.is_some_and(|at| now.duration_since(at) < REST_AFTER)
+    }
+
+    /// A frame begins; gives the seconds since the last one was begun, 0 after a pause.
+    pub fn begin(&mut self, now: Instant) -> f32 {
+        let last = self.begun_at.replace(now).filter(|_| self.shown_at.is_some());
+        last.map_or(0.0, |last| now.duration_since(last).as_secs_f32())
+    }
+
+    /// The frame was shown.
+    pub fn shown(&mut self, now: Instant) -> FrameTimes {
+        let since = |then: Instant| now.duration_since(then).as_secs_f64() * 1e3;
+        let before = self.shown_at.replace(now).or(self.begun_at);
+        FrameTimes { frame_ms: before.map_or(0.0, since), latency_ms: self.oldest_input.take().map(since) }
+    }
+
+    /// Nothing is drawn until something happens.
+    pub fn pause(&mut self) {
+        self.shown_at = None;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_run_from_frame_to_frame_and_from_input_to_screen() {
+        let start = Instant::now();
+        let at = |ms: u64| start + Duration::from_millis(ms);
+        let mut pace = Pace::default();
+        assert_eq!(pace.begin(at(0)), 0.0);
+        assert_eq!(pace.shown(at(10)), FrameTimes { frame_ms: 10.0, latency_ms: None });
+        pace.hear(at(12));
+        pace.hear(at(15));
+        assert_eq!(pace.begin(at(20)), 0.02);
+        assert_eq!(pace.shown(at(30)), FrameTimes { frame_ms: 20.0, latency_ms: Some(18.0) });
+        pace.pause();
+        assert_eq!(pace.begin(at(1000)), 0.0, "a pause is no time to fly");
+        assert_eq!(pace.shown(at(1007)), FrameTimes { frame_ms: 7.0, latency_ms: None });
+    }
+
+    #[test]
+    fn a_camera_rests_a_moment_after_it_moved() {
+        let start = Instant::now();
+        let mut pace = Pace::default();
+        assert!(!pace.is_moving(start));
+        pace.moved(start);
+        assert!(pace.is_moving(start + REST_AFTER / 2) && !pace.is_moving(start + REST_AFTER));
+        pace.rest();
+        assert!(!pace.is_moving(start));
+    }
+}

@@ -1,0 +1,58 @@
+//! How the picture is made.
+
+use std::fmt::Display;
+
+use egui::{ComboBox, Grid, Slider, Ui};
+
+use super::Settings;
+use crate::frame::{Denoise, Primary, Tonemap, Traversal, View};
+
+/// The controls; all take effect with the next frame.
+pub fn show(ui: &mut Ui, settings: &mut Settings) {
+    Grid::new("controls").num_columns(2).spacing([10.0, 3.0]).show(ui, |ui| {
+        let Settings { options, max_samples, budget_ms, vsync, view, gain } = settings;
+        choice(ui, "view", view, View::ALL);
+        if matches!(view, View::Depth | View::Cost | View::Rays) {
+            row(ui, "brightness", |ui| ui.add(Slider::new(gain, 0.01..=100.0).logarithmic(true)));
+        }
+        row(ui, "bounces", |ui| ui.add(Slider::new(&mut options.max_depth, 1..=16)));
+        row(ui, "samples", |ui| ui.add(Slider::new(max_samples, 1..=4096).logarithmic(true)));
+        row(ui, "exposure", |ui| ui.add(Slider::new(&mut options.exposure, 0.01..=100.0).logarithmic(true)));
+        choice(ui, "tone curve", &mut options.tonemap, Tonemap::ALL);
+        denoise(ui, &mut options.denoise);
+        choice(ui, "traversal", &mut options.traversal, Traversal::ALL);
+        choice(ui, "primary rays", &mut options.primary, Primary::ALL);
+        row(ui, "budget, ms", |ui| ui.add(Slider::new(budget_ms, 1.0..=200.0).logarithmic(true)));
+        row(ui, "vsync", |ui| ui.checkbox(vsync, ""));
+    });
+}
+
+fn row<R>(ui: &mut Ui, name: &str, control: impl FnOnce(&mut Ui) -> R) {
+    ui.label(name);
+    control(ui);
+    ui.end_row();
+}
+
+/// One of several words.
+fn choice<T: Copy + PartialEq + Display>(ui: &mut Ui, name: &str, chosen: &mut T, all: &[T]) {
+    row(ui, name, |ui| {
+        ComboBox::from_id_salt(name).selected_text(chosen.to_string()).show_ui(ui, |ui| {
+            for one in all {
+                ui.selectable_value(chosen, *one, one.to_string());
+            }
+        });
+    });
+}
+
+fn denoise(ui: &mut Ui, denoise: &mut Denoise) {
+    let mut is_on = *denoise != Denoise::Off;
+    let mut threshold = match *denoise {
+        Denoise::Off => Denoise::DEFAULT_THRESHOLD,
+        Denoise::Paper { threshold } => threshold,
+    };
+    row(ui, "noise filter", |ui| ui.checkbox(&mut is_on, ""));
+    if is_on {
+        row(ui, "threshold", |ui| ui.add(Slider::new(&mut threshold, 0.0..=4.0)));
+    }
+    *denoise = if is_on { Denoise::Paper { threshold } } else { Denoise::Off };
+}

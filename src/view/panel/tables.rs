@@ -1,0 +1,143 @@
+//! Numbers in rows.
+
+use egui::{Grid, Ui};
+
+use crate::{
+    frame::Profile,
+    gpu::MemoryUse,
+    view::{
+        loaded::Loaded,
+        pick::{Picked, PickedRay},
+    },
+};
+
+/// Passes that find what rays hit, and the bounce that those without one belong to.
+const TRACING: [&str; 4] = ["visibility", "primary_hit", "trace", "shadow"];
+
+/// Rows of words under each other.
+pub fn grid<const N: usize>(ui: &mut Ui, name: &str, rows: impl IntoIterator<Item = [String; N]>) {
+    Grid::new(name).num_columns(N).spacing([10.0, 1.0]).show(ui, |ui| {
+        for row in rows {
+            for cell in row {
+                ui.monospace(cell);
+            }
+            ui.end_row();
+        }
+    });
+}
+
+/// Rays and their speed, a bounce a row.
+pub fn rays(ui: &mut Ui, profile: &Profile) {
+    let head = ["", "rays", "hits", "shadow", "Mrays/s"].map(str::to_owned);
+    let rows = profile.bounces.iter().enumerate().map(|(bounce, stats)| {
+        let n_rays = stats.n_rays + stats.n_shadow_rays;
+        [
+            bounce.to_string(),
+            stats.n_rays.to_string(),
+            stats.n_hits.to_string(),
+            stats.n_shadow_rays.to_string(),
+            rate(n_rays, tracing_ms(profile, bounce as u32)),
+        ]
+    });
+    grid(ui, "rays", std::iter::once(head).chain(rows));
+}
+
+fn tracing_ms(profile: &Profile, bounce: u32) -> Option<f64> {
+    let passes = profile.passes.iter().filter(|pass| TRACING.contains(&pass.name));
+    passes.filter(|pass| pass.bounce.unwrap_or(0) == bounce).map(|pass| pass.ms).sum()
+}
+
+fn rate(n_rays: u64, ms: Option<f64>) -> String {
+    match ms {
+        Some(ms) if ms > 0.0 => format!("{:.2}", n_rays as f64 / ms / 1e3),
+        _ => "-".to_owned(),
+    }
+}
+
+/// The tree's figures.
+pub fn tree(ui: &mut Ui, loaded: &Loaded) {
+    let tree = &loaded.statistics;
+    let row = |name: &str, value: String| [name.to_owned(), value];
+    let rows = [
+        row("nodes", tree.n_nodes.to_string()),
+        row("leaves", tree.n_leaves.to_string()),
+        row("empty leaves", tree.n_empty_leaves.to_string()),
+        row("depth", tree.depth.to_string()),
+        row("references a triangle", format!("{:.2}", tree.references_per_triangle)),
+        row("SAH cost", format!("{:.2}", tree.sah_cost)),
+        row("size", bytes(tree.bytes)),
+        row("built in", format!("{:.0} ms", loaded.build_ms)),
+    ];
+    grid(ui, "tree", rows);
+}
+
+/// The device's memory by what it holds.
+pub fn memory(ui: &mut Ui, memory: &[MemoryUse]) {
+    let all = MemoryUse { name: "all".to_owned(), bytes: memory.iter().map(|used| used.bytes).sum() };
+    grid(ui, "memory", memory.iter().chain([&all]).map(|used| [used.name.clone(), bytes(used.bytes)]));
+}
+
+fn bytes(n: u64) -> String {
+    match n {
+        0..1024 => format!("{n} B"),
+        1024..1_048_576 => format!("{:.1} KiB", n as f64 / 1024.0),
+        _ => format!("{:.1} MiB", n as f64 / 1_048_576.0),
+    }
+}
+
+/// The rays of a pixel.
+pub fn picked(ui: &mut Ui, picked: &Picked) {
+    ui.monospace(format!("pixel {}, {}", picked.pixel.x, picked.pixel.y));
+    for ray in &picked.rays {
+        ui.monospace(picked_ray(ray));
+    }
+    if picked.n_more > 0 {
+        ui.monospace(format!("and {} rays more", picked.n_more));
+    }
+}
+
+fn picked_ray(ray: &PickedRay) -> String {
+    let PickedRay { depth, throughput, steps, hit } = ray;
+    let hit = match hit {
+        None => "leaves the scene".to_owned(),
+        Some(hit) => {
+            let [x, y, z] = hit.point_world.to_array();
+            format!(
+                "triangle {} ({})\n  at {x:.3} {y:.3} {z:.3}, {:.3} away",
+                hit.triangle_ix, hit.material, hit.distance
+            )
+        }
+    };
+    let [r, g, b] = throughput.to_array();
+    format!(
+        "{depth}: {hit}\n  {} nodes, {} links, {} triangles\n  weighs {r:.2} {g:.2} {b:.2}",
+        steps.n_nodes, steps.n_links, steps.n_triangles
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::PassTime;
+
+    #[test]
+    fn rates_count_the_passes_that_find_hits() {
+        let pass = |name, bounce, ms| PassTime { name, bounce, ms: Some(ms) };
+        let passes = vec![
+            pass("visibility", None, 1.0),
+            pass("shadow", Some(0), 1.0),
+            pass("shade", Some(0), 9.0),
+            pass("trace", Some(1), 3.0),
+        ];
+        let profile = Profile { passes, ..Profile::default() };
+        assert_eq!(tracing_ms(&profile, 0), Some(2.0));
+        assert_eq!(tracing_ms(&profile, 1), Some(3.0));
+        assert_eq!(rate(4000, Some(2.0)), "2.00");
+        assert_eq!((rate(1, None), rate(1, Some(0.0))), ("-".to_owned(), "-".to_owned()));
+    }
+
+    #[test]
+    fn sizes_have_units() {
+        assert_eq!([bytes(10), bytes(1536), bytes(3 << 20)], ["10 B", "1.5 KiB", "3.0 MiB"]);
+    }
+}

@@ -1,0 +1,259 @@
+//! The viewer without its window: the scene, the camera, the settings, and what each frame does with them.
+
+use std::time::Instant;
+
+use super::{
+    budget::Budget,
+    controller::Controller,
+    history::{FrameRecord, History},
+    live::Live,
+    loaded::Loaded,
+    pace::Pace,
+    panel::{Facts, Settings},
+    pick::Picked,
+};
+use crate::{
+    frame::{Denoise, Profile, RenderOptions, View},
+    gpu::GpuError,
+};
+
+/// Seconds that the overlay looks back.
+const HISTORY_S: f64 = 5.0;
+/// Reads of the tree, for each of its levels, that are shown brightest: some rays of some ways down and up.
+const STEPS_A_LEVEL: u32 = 16;
+/// Milliseconds that input waits for at the most, as a rule, while a picture at rest is drawn.
+const PART_MS: f64 = 100.0;
+
+/// What is viewed, from where, how.
+pub struct Session {
+    pub loaded: Loaded,
+    pub settings: Settings,
+    pub controller: Controller,
+    pub pace: Pace,
+    /// Of the last seconds.
+    pub history: History,
+    /// Of all the time, without passes.
+    pub all_frames: History,
+    budget: Budget,
+    profile: Profile,
+    /// Whether nobody waits for pictures of full size.
+    is_interactive: bool,
+    /// Whether the last frame completed a sample.
+    has_new_sample: bool,
+    /// The widest and the highest picture that there was.
+    room: (u32, u32),
+    /// Milliseconds of the sample that is being drawn.
+    sample_ms: f64,
+    pub(super) picked: Option<Picked>,
+    pub(super) message: Option<String>,
+    start: Instant,
+}
+
+impl Session {
+    pub fn new(loaded: Loaded, settings: Settings, is_interactive: bool) -> Self {
+        Self {
+            controller: Controller::new(loaded.scene.camera, loaded.bounds()),
+            budget: Budget::new(settings.budget_ms),
+            loaded,
+            settings,
+            pace: Pace::default(),
+            history: History::new(HISTORY_S),
+            all_frames: History::new(f64::INFINITY),
+            profile: Profile::default(),
+            is_interactive,
+            has_new_sample: false,
+            sample_ms: 0.0,
+            room: (0, 0),
+            picked: None,
+            message: None,
+            start: Instant::now(),
+        }
+    }
+
+    /// Whether the next frame will differ from the last one. `window`: pixels.
+    pub fn is_busy(&self, live: &Live, now: Instant, window: (u32, u32)) -> bool {
+        let options = live.renderer.options();
+        let is_small = window != (options.width, options.height);
+        is_small || self.controller.is_flying() || self.pace.is_moving(now) || self.is_learning() || !self.is_done(live)
+    }
+
+    /// Whether it is not known yet how long a picture takes: small ones tell.
+    fn is_learning(&self) -> bool {
+        self.is_interactive && self.budget.full_ms().is_none()
+    }
+
+    /// Whether the picture at rest has all its samples.
+    pub fn is_done(&self, live: &Live) -> bool {
+        !live.renderer.is_pending() && live.renderer.n_samples() >= self.settings.max_samples
+    }
+
+    /// Draws what the frame needs: one sample more, of a smaller picture while the camera moves. `window`: pixels, not 0.
+    ///
+    /// # Errors
+    /// A failed call. Settings that the device refuses are taken back instead.
+    pub fn draw(&mut self, live: &mut Live, window: (u32, u32)) -> Result<(), GpuError> {
+        let now = Instant::now();
+        let seconds = self.pace.begin(now);
+        if self.controller.is_flying() {
+            self.controller.advance(seconds);
+            self.pace.moved(now);
+        }
+        // Frames in flight read what changes here.
+        live.context.wait()?;
+        live.presenter.set_vsync(self.settings.vsync);
+        self.budget.set_budget(self.settings.budget_ms);
+        let features = self.settings.view != View::Picture;
+        let whole = RenderOptions { width: window.0, height: window.1, features, ..self.settings.options.clone() };
+        let (view, brightest) = self.view();
+        let is_other_view = live.renderer.set_view(view, brightest);
+        let makes_room = !self.has_room(live, &whole);
+        if self.is_interactive && (is_other_view || makes_room) {
+            // A small picture at once.
+            live.renderer.reset_samples();
+            self.pace.moved(now);
+        }
+        let is_moving = self.pace.is_moving(now) || self.is_learning();
+        let (width, height) = if is_moving { self.budget.size(window) } else { window };
+        let asked = RenderOptions { width, height, ..whole.clone() };
+        let is_new = asked != *live.renderer.options();
+        // Room for the whole picture before a small one is drawn: to make it later would lose that one.
+        let steps = [(is_moving && makes_room).then_some(&whole), is_new.then_some(&asked)];
+        for options in steps.into_iter().flatten() {
+            if let Err(error) = live.renderer.set_options(options, &self.loaded.tree) {
+                self.take_back(live, &error);
+                break;
+            }
+        }
+        if self.controller.camera() != live.renderer.camera() {
+            live.renderer.set_camera(self.controller.camera());
+        }
+        if self.is_learning() {
+            live.renderer.reset_samples();
+        }
+        self.has_new_sample = false;
+        if !self.is_done(live) {
+            self.draw_part(live, window, is_moving)
+        } else if is_new {
+            live.renderer.show()
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Whether the buffers are those that such a picture needs, and large enough; they will be.
+    fn has_room(&mut self, live: &Live, whole: &RenderOptions) -> bool {
+        let now = live.renderer.options();
+        let has_room = whole.width <= self.room.0 && whole.height <= self.room.1;
+        self.room = (self.room.0.max(whole.width), self.room.1.max(whole.height));
+        let filters = |options: &RenderOptions| options.denoise != Denoise::Off;
+        has_room && whole.features == now.features && filters(whole) == filters(now)
+    }
+
+    /// A whole sample while the camera moves. At rest so much of it that input is not kept waiting.
+    fn draw_part(&mut self, live: &mut Live, window: (u32, u32), is_moving: bool) -> Result<(), GpuError> {
+        let renderer = &mut live.renderer;
+        if !renderer.is_pending() {
+            self.sample_ms = 0.0;
+            let most_pixels = self.part_pixels(window).filter(|_| !is_moving);
+            if renderer.n_samples() == 0 || is_other_pace(most_pixels, renderer.most_pixels()) {
+                renderer.limit_batches(most_pixels)?;
+            }
+        }
+        let start = Instant::now();
+        let complete = renderer.draw_part()?;
+        self.sample_ms += start.elapsed().as_secs_f64() * 1e3;
+        if let Some(profile) = complete {
+            let share = f64::from(renderer.options().height) / f64::from(window.1);
+            self.budget.learn(share, self.sample_ms);
+            self.profile = profile;
+            self.has_new_sample = true;
+        }
+        Ok(())
+    }
+
+    /// Pixels that are drawn in about [`PART_MS`]; none where the whole picture is.
+    fn part_pixels(&self, (width, height): (u32, u32)) -> Option<u32> {
+        let n_parts = (self.budget.full_ms()? / PART_MS).ceil();
+        // Powers of two, so that estimates that waver do not change them.
+        let n_parts = (n_parts as u32).clamp(1, 1 << 12).next_power_of_two();
+        (n_parts > 1).then(|| (width * height).div_ceil(n_parts))
+    }
+
+    /// The picture as it is wanted by those who save it: a sample that is begun is completed.
+    ///
+    /// # Errors
+    /// A failed call.
+    pub fn complete(&self, live: &mut Live) -> Result<(), GpuError> {
+        if live.renderer.is_pending() || live.renderer.n_samples() == 0 {
+            live.renderer.draw_sample()?;
+        }
+        Ok(())
+    }
+
+    /// Goes back to what the device did before; a size that it refuses is not the user's to change.
+    fn take_back(&mut self, live: &Live, error: &GpuError) {
+        self.settings.options = live.renderer.options().clone();
+        self.complain(&error.to_string());
+    }
+
+    /// The frame is on its way to the screen.
+    pub fn shown(&mut self) {
+        let now = Instant::now();
+        let times = self.pace.shown(now);
+        let record = FrameRecord {
+            shown_s: now.duration_since(self.start).as_secs_f64(),
+            frame_ms: times.frame_ms,
+            latency_ms: times.latency_ms,
+            pass_ms: Vec::new(),
+        };
+        self.all_frames.push(record.clone());
+        let passes = self.profile.passes.iter().filter(|_| self.has_new_sample);
+        let pass_ms = passes.filter_map(|pass| Some((pass.name, pass.ms?))).collect();
+        self.history.push(FrameRecord { pass_ms, ..record });
+    }
+
+    /// What is displayed, and the value that is brightest.
+    fn view(&self) -> (View, f32) {
+        let automatic = match self.settings.view {
+            View::Picture | View::Normal | View::Id => 1.0,
+            View::Depth => self.controller.radius(),
+            View::Rays => (1 + self.loaded.scene.lights.len() as u32 * self.settings.options.max_depth) as f32,
+            View::Cost => (STEPS_A_LEVEL * self.loaded.statistics.depth.max(1)) as f32,
+        };
+        (self.settings.view, automatic / self.settings.gain)
+    }
+
+    /// What the overlay shows.
+    pub fn facts<'a>(&'a self, live: &'a Live, window: (u32, u32), is_flying: bool) -> Facts<'a> {
+        let options = live.renderer.options();
+        Facts {
+            device: &live.context.info().name,
+            loaded: &self.loaded,
+            window,
+            picture: (options.width, options.height),
+            n_samples: live.renderer.n_samples(),
+            progress: live.renderer.progress(),
+            speed: self.controller.speed(),
+            is_flying,
+            profile: &self.profile,
+            history: &self.history,
+            memory: live.context.memory(),
+            picked: self.picked.as_ref(),
+            message: self.message.as_deref(),
+        }
+    }
+
+    /// Tells the user what went wrong, in the overlay and on the terminal.
+    pub fn complain(&mut self, message: &str) {
+        tracing::warn!("{message}");
+        self.message = Some(message.to_owned());
+    }
+}
+
+/// Whether parts of so many pixels would take half or twice as long as before.
+fn is_other_pace(a: Option<u32>, b: Option<u32>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => a >= 2 * b || b >= 2 * a,
+        (a, b) => a != b,
+    }
+}

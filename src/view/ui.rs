@@ -1,0 +1,79 @@
+//! egui between the window and the overlay.
+
+use std::time::Duration;
+
+use egui::{Context, Order, Pos2, TexturesDelta, ViewportId, pos2};
+use egui_winit::State;
+use winit::{
+    event::{ElementState, WindowEvent},
+    window::Window,
+};
+
+use super::panel::{self, Facts, Settings};
+use crate::gpu::OverlayFrame;
+
+/// The overlay's state.
+pub struct Ui {
+    state: State,
+    /// Where the mouse is, points; egui itself knows it only at its next layout.
+    cursor: Pos2,
+    /// When it wants to be laid out again, counted from its last layout.
+    repaint_after: Duration,
+}
+
+/// The overlay of one frame.
+pub struct Layout {
+    pub frame: OverlayFrame,
+    pub textures: TexturesDelta,
+}
+
+impl Ui {
+    pub fn new(window: &Window) -> Self {
+        let context = Context::default();
+        context.set_visuals(egui::Visuals::dark());
+        let scale = Some(window.scale_factor() as f32);
+        let state = State::new(context, ViewportId::ROOT, window, scale, window.theme(), None);
+        Self { state, cursor: Pos2::ZERO, repaint_after: Duration::ZERO }
+    }
+
+    /// Tells the overlay of an event; true where it is the overlay's alone.
+    pub fn take_event(&mut self, window: &Window, event: &WindowEvent) -> bool {
+        let response = self.state.on_window_event(window, event);
+        if response.repaint {
+            self.repaint_after = Duration::ZERO;
+        }
+        let context = self.state.egui_ctx();
+        if let WindowEvent::CursorMoved { position, .. } = event {
+            let scale = context.pixels_per_point();
+            self.cursor = pos2(position.x as f32 / scale, position.y as f32 / scale);
+        }
+        match event {
+            // A drag that began on the picture ends wherever the mouse is.
+            WindowEvent::MouseInput { state: ElementState::Released, .. } => false,
+            WindowEvent::MouseInput { .. } | WindowEvent::MouseWheel { .. } => {
+                context.egui_is_using_pointer()
+                    || context.layer_id_at(self.cursor).is_some_and(|layer| layer.order != Order::Background)
+            }
+            WindowEvent::CursorMoved { .. } => context.egui_is_using_pointer(),
+            WindowEvent::KeyboardInput { .. } => context.egui_wants_keyboard_input(),
+            _ => false,
+        }
+    }
+
+    pub fn repaint_after(&self) -> Duration {
+        self.repaint_after
+    }
+
+    /// Lays the overlay out; changes the settings as the user does.
+    pub fn layout(&mut self, window: &Window, settings: &mut Settings, facts: &Facts) -> Layout {
+        let input = self.state.take_egui_input(window);
+        let context = self.state.egui_ctx().clone();
+        let output = context.run_ui(input, |ui| panel::show(ui, settings, facts));
+        self.state.handle_platform_output(window, output.platform_output);
+        let root = output.viewport_output.get(&ViewportId::ROOT);
+        self.repaint_after = root.map_or(Duration::MAX, |viewport| viewport.repaint_delay);
+        let pixels_per_point = output.pixels_per_point;
+        let primitives = context.tessellate(output.shapes, pixels_per_point);
+        Layout { frame: OverlayFrame { primitives, pixels_per_point }, textures: output.textures_delta }
+    }
+}

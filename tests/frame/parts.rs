@@ -1,0 +1,116 @@
+//! A sample in parts is the sample in one, bit for bit, and shows nothing of itself before it is complete.
+
+use kdray::{
+    frame::{Picture, RenderOptions},
+    render::Renderer,
+};
+
+use super::{
+    batches::glass_in_glass,
+    studio::{assert_silent, device, identical, options, tree_of},
+};
+
+fn options_of_parts() -> RenderOptions {
+    options(32, 24, 5)
+}
+
+/// Draws so many samples in parts; gives the picture and the number of parts.
+fn in_parts(renderer: &mut Renderer, n_samples: u32) -> (Picture, u32) {
+    let mut n_parts = 0;
+    while renderer.n_samples() < n_samples {
+        assert_eq!(renderer.progress() > 0.0, renderer.is_pending());
+        n_parts += 1;
+        if let Some(profile) = renderer.draw_part().expect("a part") {
+            assert_eq!(profile.bounces[0].n_rays, 32 * 24);
+        }
+    }
+    assert!(!renderer.is_pending());
+    (renderer.picture().expect("a picture"), n_parts)
+}
+
+fn at_once(renderer: &mut Renderer, n_samples: u32) -> Picture {
+    renderer.reset_samples();
+    (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
+    renderer.picture().expect("a picture")
+}
+
+#[test]
+fn parts_make_the_same_picture() {
+    let (scene, context) = (glass_in_glass(), device());
+    let tree = tree_of(&scene);
+    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options_of_parts()).expect("a renderer");
+    let whole = [1, 3].map(|n_samples| at_once(&mut renderer, n_samples));
+    for (most_pixels, n_parts) in [(None, 1), (Some(768), 1), (Some(767), 2), (Some(100), 8), (Some(1), 768)] {
+        renderer.limit_batches(most_pixels).expect("batches");
+        for (n_samples, whole) in [1, 3].into_iter().zip(&whole) {
+            renderer.reset_samples();
+            let (picture, n) = in_parts(&mut renderer, n_samples);
+            assert!(identical(&picture, whole), "{most_pixels:?}, {n_samples} samples");
+            // More where a queue overflowed.
+            assert!(n >= n_samples * n_parts, "{most_pixels:?}: {n} parts");
+        }
+        assert!(identical(&at_once(&mut renderer, 3), &whole[1]));
+    }
+    assert_silent(&context);
+}
+
+#[test]
+fn what_is_dropped_half_way_leaves_no_trace() {
+    let (scene, context, options) = (glass_in_glass(), device(), options_of_parts());
+    let tree = tree_of(&scene);
+    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
+    let whole = at_once(&mut renderer, 3);
+    renderer.limit_batches(Some(200)).expect("batches");
+    for n_before in 0..3 {
+        renderer.reset_samples();
+        in_parts(&mut renderer, n_before);
+        assert!(renderer.draw_part().expect("a part").is_none() && renderer.is_pending());
+        // Begun anew, in other parts.
+        renderer.limit_batches(Some(300 + n_before)).expect("batches");
+        assert!(!renderer.is_pending());
+        assert!(identical(&in_parts(&mut renderer, 3).0, &whole), "after {n_before} samples");
+    }
+    assert!(renderer.draw_part().expect("a part").is_none());
+    let brighter = RenderOptions { exposure: 2.0, ..options.clone() };
+    renderer.set_options(&brighter, &tree).expect("options");
+    assert!(!renderer.is_pending() && renderer.n_samples() == 3);
+    assert!(!identical(&in_parts(&mut renderer, 4).0, &at_once(&mut renderer, 3)));
+    renderer.set_options(&options, &tree).expect("options");
+    assert!(identical(&at_once(&mut renderer, 3), &whole));
+    assert_silent(&context);
+}
+
+#[test]
+fn parts_that_overflow_are_drawn_anew() {
+    let (scene, context) = (glass_in_glass(), device());
+    let tree = tree_of(&scene);
+    let new = |capacity| {
+        Renderer::with_queue_capacity(context.clone(), &scene, &tree, &options_of_parts(), capacity)
+            .expect("a renderer")
+    };
+    let whole = at_once(&mut new(100_000), 3);
+    assert!(identical(&in_parts(&mut new(600), 3).0, &whole));
+    assert_silent(&context);
+}
+
+#[test]
+fn the_picture_changes_with_the_last_part() {
+    let (scene, context) = (glass_in_glass(), device());
+    let tree = tree_of(&scene);
+    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options_of_parts()).expect("a renderer");
+    assert_eq!(renderer.displayed(), None);
+    renderer.limit_batches(Some(400)).expect("batches");
+    assert!(renderer.draw_part().expect("a part").is_none());
+    assert_eq!(renderer.displayed(), None);
+    assert!(renderer.draw_part().expect("a part").is_some());
+    assert_eq!(renderer.displayed(), Some((32, 24)));
+    renderer.resize(16, 12).expect("a size");
+    assert!(renderer.draw_part().expect("a part").is_some());
+    assert_eq!(renderer.displayed(), Some((16, 12)));
+    renderer.resize(32, 24).expect("a size");
+    assert!(renderer.draw_part().expect("a part").is_none());
+    assert_eq!(renderer.displayed(), Some((16, 12)), "what is seen is still the small one");
+    renderer.resize(64, 48).expect("a size");
+    assert_eq!(renderer.displayed(), None, "larger buffers hold nothing yet");
+    assert_silent(&context);
+}

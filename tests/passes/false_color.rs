@@ -1,0 +1,79 @@
+//! False colour against its twin: within one level, since division is not exact.
+
+use glam::{Vec3, vec3};
+use kdray::{
+    cpu,
+    layout::{FalseColor, Feature, NO_TRIANGLE, VIEW_COST, VIEW_DEPTH, VIEW_ID, VIEW_NORMAL, VIEW_RAYS},
+};
+
+use super::stage::{FIRST, Stage, UNTOUCHED_WORD, options};
+use crate::support::{compare, random::Random, scenes};
+
+const VIEWS: [u32; 5] = [VIEW_DEPTH, VIEW_NORMAL, VIEW_ID, VIEW_COST, VIEW_RAYS];
+
+fn stage(width: u32, height: u32) -> Stage {
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, Vec::new(), scenes::BLACK);
+    Stage::new(scene, kdray::frame::RenderOptions { features: true, ..options(width, height) }, 1)
+}
+
+fn displayed(stage: &Stage, push: &FalseColor, features: &[Feature]) -> Vec<[u8; 4]> {
+    let pixels = &stage.resources.pixels;
+    pixels.pixel_features.upload(features).expect("pixel_features");
+    pixels.pixel_display.upload(&vec![UNTOUCHED_WORD; features.len()]).expect("pixel_display");
+    stage.run(&FIRST, |commands| stage.passes.false_color.record(commands, &stage.resources, push));
+    pixels.pixel_display.download().expect("pixel_display").into_iter().map(u32::to_le_bytes).collect()
+}
+
+fn random_features(n: u32) -> Vec<Feature> {
+    let mut random = Random(9);
+    let mut unit = || random.unit();
+    (0..n)
+        .map(|i| Feature {
+            triangle_ix: if i % 5 == 3 { NO_TRIANGLE } else { (unit() * 1e6) as u32 },
+            normal_world: vec3(unit() - 0.5, unit() - 0.5, unit() - 0.5).normalize_or(Vec3::X),
+            depth: if i % 5 == 3 { f32::INFINITY } else { unit() * 100.0 },
+            n_rays: (unit() * 40.0) as u32,
+            n_steps: (unit() * 4000.0) as u32,
+            ..Feature::default()
+        })
+        .collect()
+}
+
+#[test]
+fn agrees_with_its_twin() {
+    for (width, height) in [(1, 1), (8, 8), (9, 9), (1, 65), (100, 75)] {
+        let (stage, features) = (stage(width, height), random_features(width * height));
+        for view in VIEWS {
+            let push = FalseColor { view, brightest: if view == VIEW_COST { 2000.0 } else { 20.0 } };
+            let mut expected = vec![[0; 4]; features.len()];
+            cpu::false_color::false_color(&push, &features, &mut expected);
+            compare::bytes(1, &expected, &displayed(&stage, &push, &features)).unwrap();
+        }
+    }
+}
+
+#[test]
+fn every_view_shows_something_else() {
+    let (stage, features) = (stage(8, 8), random_features(64));
+    let shown = VIEWS.map(|view| displayed(&stage, &FalseColor { view, brightest: 20.0 }, &features));
+    for (i, a) in shown.iter().enumerate() {
+        for b in &shown[..i] {
+            assert!(compare::bytes(1, a, b).is_err());
+        }
+    }
+}
+
+#[test]
+fn known_values_have_known_colours() {
+    let stage = stage(2, 1);
+    let nothing = Feature { triangle_ix: NO_TRIANGLE, depth: f32::INFINITY, ..Feature::default() };
+    let hit = Feature { depth: 10.0, normal_world: Vec3::Y, n_rays: 7, n_steps: 30, ..Feature::default() };
+    let show = |view| displayed(&stage, &FalseColor { view, brightest: 10.0 }, &[nothing, hit]);
+    let black = [0, 0, 0, 255];
+    compare::bytes(1, &[black, [128, 128, 128, 255]], &show(VIEW_DEPTH)).unwrap();
+    compare::bytes(1, &[black, [128, 255, 128, 255]], &show(VIEW_NORMAL)).unwrap();
+    compare::bytes(1, &[black, [255, 255, 255, 255]], &show(VIEW_COST)).unwrap();
+    // 0.7 of the way: red is full, green at 1.1, blue at 0.1.
+    compare::bytes(1, &[black, [255, 255, 26, 255]], &show(VIEW_RAYS)).unwrap();
+}

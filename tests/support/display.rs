@@ -1,0 +1,109 @@
+//! A display of one's own: an X server without a screen, what it shows, and a hand at its keys.
+
+use std::{
+    fs,
+    io::{BufRead, BufReader},
+    path::PathBuf,
+    process::{Child, Command, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use tempfile::TempDir;
+
+/// Longer than any picture takes to come on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// A running Xvfb.
+pub struct Display {
+    server: Child,
+    /// As DISPLAY has it.
+    pub name: String,
+    /// Holds the screen's memory, as an XWD file.
+    memory: TempDir,
+}
+
+/// Rows from the top, RGB.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Screen {
+    pub width: usize,
+    pub height: usize,
+    pub pixels: Vec<[u8; 3]>,
+}
+
+impl Display {
+    pub fn start(width: u32, height: u32) -> Self {
+        let memory = TempDir::new().unwrap();
+        let mut server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", &format!("{width}x{height}x24"), "-fbdir"])
+            .arg(memory.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb, which ./setup installs");
+        let mut number = String::new();
+        BufReader::new(server.stdout.take().unwrap()).read_line(&mut number).unwrap();
+        assert!(!number.trim().is_empty(), "Xvfb found no free display");
+        Self { server, name: format!(":{}", number.trim()), memory }
+    }
+
+    /// What the screen shows now.
+    pub fn screen(&self) -> Screen {
+        let xwd = fs::read(self.memory.path().join("Xvfb_screen0")).unwrap();
+        let field = |ix: usize| u32::from_be_bytes(xwd[4 * ix..4 * ix + 4].try_into().unwrap()) as usize;
+        let [header, width, height, bits, stride, n_colors] = [0, 4, 5, 11, 12, 19].map(field);
+        assert_eq!((field(2), bits, field(7)), (2, 32, 0), "32 bits a pixel, the lowest byte first");
+        let pixels = &xwd[header + 12 * n_colors..];
+        let row = |y: usize| (0..width).map(move |x| &pixels[y * stride + 4 * x..][..4]);
+        let pixels = (0..height).flat_map(|y| row(y).map(|bgrx| [bgrx[2], bgrx[1], bgrx[0]])).collect();
+        Screen { width, height, pixels }
+    }
+
+    /// Waits until the screen is as wanted.
+    pub fn wait_until(&self, what: &str, is_so: impl Fn(&Screen) -> bool) {
+        let start = Instant::now();
+        while !is_so(&self.screen()) {
+            assert!(start.elapsed() < PATIENCE, "the screen never showed {what}");
+            thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Runs xdotool; `arguments` are its commands.
+    pub fn act(&self, arguments: &[&str]) -> String {
+        let output = Command::new("xdotool").args(arguments).env("DISPLAY", &self.name).output();
+        let output = output.expect("xdotool, which ./setup installs");
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    /// Waits for the window of a name and gives it the keys, which without a window manager nobody does.
+    pub fn focus(&self, name: &str) -> String {
+        let window = self.act(&["search", "--sync", "--name", name]).lines().last().unwrap().to_owned();
+        self.act(&["windowfocus", "--sync", &window]);
+        window
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+impl Screen {
+    /// A picture file.
+    pub fn load(path: &PathBuf) -> Self {
+        let image = image::open(path).unwrap().to_rgb8();
+        let pixels = image.pixels().map(|pixel| pixel.0).collect();
+        Self { width: image.width() as usize, height: image.height() as usize, pixels }
+    }
+
+    /// Whether it is the upper left part of another.
+    pub fn is_shown_on(&self, screen: &Screen) -> bool {
+        let row = |of: &Screen, y: usize| of.pixels[y * of.width..][..self.width].to_vec();
+        self.width <= screen.width
+            && self.height <= screen.height
+            && (0..self.height).all(|y| row(self, y) == row(screen, y))
+    }
+}

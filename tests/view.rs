@@ -1,0 +1,241 @@
+//! The viewer as its users meet it, in a window on a display of its own, under the validation layer.
+#![cfg(target_os = "linux")]
+
+mod support;
+
+use std::{
+    fs,
+    path::Path,
+    process::{Child, Output, Stdio},
+};
+
+use serde_json::Value;
+use support::{
+    command::{cornell, kdray, names, stderr, stdout, succeed},
+    display::{Display, Screen},
+};
+use tempfile::TempDir;
+
+const SIZE: &str = "160x120";
+
+/// A viewer of Cornell's box on the display, without an overlay.
+fn viewer(directory: &Path, display: &Display, scene: &str, more: &[&str]) -> Child {
+    let arguments = [&["view", scene, "--size", SIZE, "--validate"], more].concat();
+    let mut command = kdray(directory, &arguments);
+    command.env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY").stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
+/// Waits for the viewer's end, which is a good one.
+fn ended(viewer: Child) -> Output {
+    let output = viewer.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    output
+}
+
+/// What `kdray render` makes of a scene.
+fn rendered(directory: &Path, scene: &str, more: &[&str]) -> Screen {
+    let path = directory.join("rendered.png");
+    let arguments = [&["render", scene, "--size", SIZE, "-q", "-o", path.to_str().unwrap()], more].concat();
+    succeed(directory, &arguments);
+    let picture = Screen::load(&path);
+    fs::remove_file(path).unwrap();
+    picture
+}
+
+#[test]
+fn a_tour_ends_with_the_picture_that_render_makes() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    let files = ["--screenshot", "x.png", "--profile", "x.json", "-q"];
+    for more in [&["--no-overlay"][..], &["--spp", "3", "--vsync", "off"]] {
+        let arguments = [&["--frames", "4"], &files[..], more].concat();
+        let output = ended(viewer(directory.path(), &display, &cornell(), &arguments));
+        assert!(output.stdout.is_empty() && output.stderr.is_empty(), "{}{}", stdout(&output), stderr(&output));
+        let samples = if more[0] == "--spp" { &more[..2] } else { &[] };
+        let expected = rendered(directory.path(), &cornell(), samples);
+        assert_eq!(Screen::load(&directory.path().join("x.png")), expected);
+    }
+    let json: Value = serde_json::from_slice(&fs::read(directory.path().join("x.json")).unwrap()).unwrap();
+    for times in ["frame_ms", "input_to_present_ms"] {
+        let at = |percentile: &str| json[times][percentile].as_f64().unwrap();
+        assert!(json[times]["n"].as_u64() >= Some(4) && json["vsync"] == false, "{json}");
+        assert!(0.0 < at("p50") && at("p50") <= at("p95") && at("p95") <= at("p99"), "{json}");
+    }
+}
+
+#[test]
+fn recorded_frames_go_once_around() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    fs::create_dir(directory.path().join("frames")).unwrap();
+    let arguments = ["--frames", "3", "--record", "frames", "--no-overlay", "-q"];
+    ended(viewer(directory.path(), &display, &cornell(), &arguments));
+    let frames = directory.path().join("frames");
+    assert_eq!(names(&frames), ["frame.0000.png", "frame.0001.png", "frame.0002.png"]);
+    let [first, second, last] = [0, 1, 2].map(|i| Screen::load(&frames.join(format!("frame.000{i}.png"))));
+    assert_eq!(last, rendered(directory.path(), &cornell(), &[]));
+    assert!(first != second && first != last && second != last);
+}
+
+#[test]
+fn a_path_is_the_one_that_render_follows() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    let keyframe = |frame: u32, x: f32| {
+        format!("[[keyframe]]\nframe = {frame}\neye = [{x:?}, 2.75, 9.0]\ntarget = [0.0, 2.75, 0.0]\n")
+    };
+    fs::write(directory.path().join("path.toml"), keyframe(0, 0.0) + &keyframe(3, 2.0)).unwrap();
+    fs::create_dir(directory.path().join("frames")).unwrap();
+    let path = ["--path", "path.toml"];
+    ended(viewer(directory.path(), &display, &cornell(), &[&path[..], &["--record", "frames", "-q"]].concat()));
+    let arguments = [&["render", &cornell(), "--size", SIZE, "-q", "-o", "####.png"], &path[..]].concat();
+    succeed(directory.path(), &arguments);
+    for frame in ["0000.png", "0001.png", "0002.png", "0003.png"] {
+        let shown = Screen::load(&directory.path().join(format!("frames/frame.{frame}")));
+        assert_eq!(shown, Screen::load(&directory.path().join(frame)), "{frame}");
+    }
+}
+
+#[test]
+fn number_keys_show_other_views_and_the_picture_again() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    let picture = rendered(directory.path(), &cornell(), &[]);
+    let viewer = viewer(directory.path(), &display, &cornell(), &["--spp", "1", "--no-overlay", "-q"]);
+    display.wait_until("the picture", |screen| picture.is_shown_on(screen));
+    display.focus("kdray");
+    let mut before = display.screen();
+    for key in ["2", "3", "4", "5", "6"] {
+        display.act(&["key", key]);
+        display.wait_until("another view", |screen| *screen != before && !picture.is_shown_on(screen));
+        before = display.screen();
+    }
+    display.act(&["key", "1"]);
+    display.wait_until("the picture again", |screen| picture.is_shown_on(screen));
+    display.act(&["key", "Escape"]);
+    ended(viewer);
+}
+
+#[test]
+fn the_window_shows_the_picture_and_the_overlay_over_it() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    let picture = rendered(directory.path(), &cornell(), &[]);
+    let other = rendered(directory.path(), &cornell(), &["--exposure", "1.02"]);
+    let viewer = viewer(directory.path(), &display, &cornell(), &["--spp", "1", "--no-overlay", "-q"]);
+    display.wait_until("the picture", |screen| picture.is_shown_on(screen));
+    assert!(!other.is_shown_on(&display.screen()), "a picture of another exposure is told from it");
+    display.focus("kdray");
+    display.act(&["key", "Tab"]);
+    display.wait_until("the overlay", |screen| !picture.is_shown_on(screen));
+    display.act(&["key", "Tab"]);
+    display.wait_until("the picture again", |screen| picture.is_shown_on(screen));
+    display.act(&["key", "s", "key", "p", "key", "Escape"]);
+    let output = ended(viewer);
+    assert!(stdout(&output).contains("wrote cornell-001.png\n[camera]\neye = [0.0, 2.75, 10.7]\n"));
+    assert_eq!(Screen::load(&directory.path().join("cornell-001.png")), picture);
+}
+
+#[test]
+fn keys_and_mouse_move_the_camera_and_home_brings_it_back() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    let picture = rendered(directory.path(), &cornell(), &[]);
+    let viewer = viewer(directory.path(), &display, &cornell(), &["--spp", "1", "--no-overlay", "-q"]);
+    display.wait_until("the picture", |screen| picture.is_shown_on(screen));
+    display.focus("kdray");
+    let moves: [&[&str]; 4] = [
+        &["keydown", "w", "sleep", "0.3", "keyup", "w"],
+        &["mousemove", "80", "60", "mousedown", "1", "mousemove", "120", "60", "mouseup", "1"],
+        &["mousemove", "80", "60", "mousedown", "3", "mousemove", "120", "60", "mouseup", "3"],
+        &["key", "f"],
+    ];
+    for arguments in moves {
+        display.act(arguments);
+        display.wait_until("another view", |screen| !picture.is_shown_on(screen));
+        display.act(&["key", "Home"]);
+        display.wait_until("the first view", |screen| picture.is_shown_on(screen));
+    }
+    display.act(&["key", "Escape"]);
+    ended(viewer);
+}
+
+#[test]
+fn a_resized_window_shows_a_picture_of_its_size() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    let viewer = viewer(directory.path(), &display, &cornell(), &["--spp", "1", "--no-overlay", "-q"]);
+    let window = display.focus("kdray");
+    for size in ["300x200", "40x30", "161x121"] {
+        let (width, height) = size.split_once('x').unwrap();
+        display.act(&["windowsize", &window, width, height]);
+        let path = directory.path().join("sized.png");
+        succeed(directory.path(), &["render", &cornell(), "--size", size, "-q", "-o", "sized.png"]);
+        let picture = Screen::load(&path);
+        display.wait_until(size, |screen| picture.is_shown_on(screen));
+    }
+    display.act(&["key", "Escape"]);
+    ended(viewer);
+}
+
+#[test]
+fn a_changed_scene_is_shown_and_a_broken_one_is_not() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    let path = directory.path().join("x.toml");
+    let bright = fs::read_to_string(cornell()).unwrap();
+    let dark = bright.replace("ambient = [0.34, 0.33, 0.31]", "ambient = [0.1, 0.1, 0.4]");
+    assert_ne!(bright, dark);
+    fs::write(&path, &bright).unwrap();
+    let before = rendered(directory.path(), "x.toml", &[]);
+    let viewer = viewer(directory.path(), &display, "x.toml", &["--spp", "1", "--no-overlay"]);
+    display.wait_until("the scene", |screen| before.is_shown_on(screen));
+    fs::write(&path, &dark).unwrap();
+    let after = rendered(directory.path(), "x.toml", &[]);
+    assert!(before != after);
+    display.wait_until("the changed scene", |screen| after.is_shown_on(screen));
+    fs::write(&path, "mesh = [[").unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(1));
+    assert!(after.is_shown_on(&display.screen()), "the old one stays");
+    fs::write(&path, &bright).unwrap();
+    display.wait_until("the mended scene", |screen| before.is_shown_on(screen));
+    display.focus("kdray");
+    display.act(&["key", "Escape"]);
+    let text = stderr(&ended(viewer));
+    assert!(text.lines().any(|line| line.starts_with("warning: x.toml:1:")), "{text}");
+}
+
+#[test]
+fn without_a_display_it_says_so() {
+    let directory = TempDir::new().unwrap();
+    for display in [None, Some(":98765")] {
+        let mut command = kdray(directory.path(), &["view", &cornell()]);
+        command.env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
+        let output = command.envs(display.map(|display| ("DISPLAY", display))).output().unwrap();
+        let text = stderr(&output);
+        assert_eq!((output.status.code(), text.lines().count()), (Some(4), 1), "{text}");
+        assert!(text.starts_with("error: no display to open a window on: "), "{text}");
+    }
+}
+
+#[test]
+fn usage_mistakes_are_refused_before_there_is_a_window() {
+    let directory = TempDir::new().unwrap();
+    let cases: &[(&[&str], i32, &str)] = &[
+        (&["--screenshot", "x.png"], 2, "--frames"),
+        (&["--frames", "0"], 2, "--frames"),
+        (&["--frames", "1", "--screenshot", "x.jpg"], 2, "x.jpg"),
+        (&["--budget-ms", "0"], 2, "--budget-ms"),
+        (&["--vsync", "maybe"], 2, "--vsync"),
+        (&["--frames", "1", "--record", "none"], 5, "none"),
+        (&["--frames", "1", "--screenshot", "none/x.png"], 5, "none/x.png"),
+    ];
+    for (more, code, named) in cases {
+        support::command::fail(directory.path(), &[&["view", "none.toml"], *more].concat(), *code, named);
+    }
+}
+
+/// The layer's advice on best practices, asked for by environment, stands in for a fault.
+#[test]
+fn a_validation_message_fails() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    let mut command = kdray(directory.path(), &["view", &cornell(), "--frames", "1", "--validate", "-q"]);
+    command.env("DISPLAY", &display.name).env("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT");
+    let output = command.output().unwrap();
+    let text = stderr(&output);
+    assert_eq!(output.status.code(), Some(4), "{text}");
+    assert!(text.lines().last().unwrap().starts_with("error: the validation layer"), "{text}");
+}
