@@ -86,7 +86,8 @@ fn a_path_is_the_one_that_render_follows() {
     fs::create_dir(directory.path().join("frames")).unwrap();
     let path = ["--path", "path.toml"];
     ended(viewer(directory.path(), &display, &cornell(), &[&path[..], &["--record", "frames", "-q"]].concat()));
-    let arguments = [&["render", &cornell(), "--size", SIZE, "-q", "-o", "####.png"], &path[..]].concat();
+    let scene = cornell();
+    let arguments = [&["render", &scene, "--size", SIZE, "-q", "-o", "####.png"], &path[..]].concat();
     succeed(directory.path(), &arguments);
     for frame in ["0000.png", "0001.png", "0002.png", "0003.png"] {
         let shown = Screen::load(&directory.path().join(format!("frames/frame.{frame}")));

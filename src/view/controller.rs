@@ -341,7 +341,7 @@ mod tests {
         let directory = tempfile::TempDir::new().unwrap();
         let path = directory.path().join("view.toml");
         let camera = Camera {
-            eye: vec3(1.0, -2.5e-7, 3.0e10),
+            eye: vec3(3.0e8, -2.5e-7, 1.0),
             target: vec3(0.1, 1.0 / 3.0, -7.0),
             up: Vec3::Z,
             vertical_fov_degrees: 39.5,

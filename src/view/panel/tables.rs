@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn rates_count_the_passes_that_find_hits() {
-        let pass = |name, bounce, ms| PassTime { name, bounce, ms: Some(ms) };
+        let pass = |name, bounce, ms| PassTime { name, bounce, ms: Some(ms), ..PassTime::default() };
         let passes = vec![
             pass("visibility", None, 1.0),
             pass("shadow", Some(0), 1.0),
