@@ -7,9 +7,17 @@
 #define KDRAY_KDTREE
 
 #include "layout.glsl"
-#include "scene.glsl"
 #include "steps.glsl"
 #include "triangle.glsl"
+
+layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
+// Triangles as three rows, nodes as one: a device then loads each at once.
+layout(std430, set = 0, binding = BIND_TRIANGLES) readonly buffer TrianglesBlock { vec4 triangle_rows[]; };
+layout(std430, set = 0, binding = BIND_KD_NODES) readonly buffer KdNodesBlock { uvec2 kd_nodes[]; };
+layout(std430, set = 0, binding = BIND_KD_PARENTS) readonly buffer KdParentsBlock { uint kd_parents[]; };
+layout(std430, set = 0, binding = BIND_LEAF_TRIANGLES) readonly buffer LeafTrianglesBlock { uint leaf_triangles[]; };
+
+layout(std430, set = 0, binding = BIND_LEAF_PLANES) readonly buffer LeafPlanesBlock { vec4 leaf_planes[]; };
 
 layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
 
@@ -78,7 +86,15 @@ Ray near_scene(Ray ray, out float t_start) {
 
 KdNode kd_node(uint node_ix) {
     count_steps(1u);
-    return kd_node_at(node_ix);
+    uvec2 words = kd_nodes[node_ix];
+    return KdNode(words.x, words.y);
+}
+
+Triangle triangle_at(uint triangle_ix) {
+    vec4 v0 = triangle_rows[3u * triangle_ix];
+    vec4 v1 = triangle_rows[3u * triangle_ix + 1u];
+    vec4 v2 = triangle_rows[3u * triangle_ix + 2u];
+    return Triangle(v0.xyz, floatBitsToUint(v0.w), v1.xyz, floatBitsToUint(v1.w), v2.xyz, floatBitsToUint(v2.w));
 }
 
 uint axis_of(KdNode node) {
@@ -176,7 +192,7 @@ void intersect_leaf(TraversalRay ray, KdNode leaf, vec2 interval, inout Hit best
     uint end = leaf.split_or_first + (leaf.axis_and_child >> KD_CHILD_SHIFT);
     count_steps(end - leaf.split_or_first);
     for (uint i = leaf.split_or_first; i < end; ++i) {
-        if (!is_clear(leaf_plane(i), from, to)) intersect(ray, leaf_triangle(i), best);
+        if (!is_clear(leaf_planes[i], from, to)) intersect(ray, leaf_triangles[i], best);
     }
 }
 

@@ -154,8 +154,7 @@ struct Hit {
 // forward + (2 (window_x + x + sample_x) / picture_width - 1) * right
 //         + (1 - 2 (window_y + y + sample_y) / picture_height) * up.
 // clip_from_world is the whole picture's, moved so that the sample lies in the middle of its pixel.
-// n_samples: how many samples a pixel there are with this frame's. uvec2: the device address of the buffer of that name,
-// low word first, which scene.glsl reads.
+// n_samples: how many samples a pixel there are with this frame's.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -182,20 +181,6 @@ struct Frame {
     float sample_y;
     uint n_samples;
     uint reserved;
-    // n_triangles.
-    uvec2 triangles;
-    // n_triangles.
-    uvec2 triangle_materials;
-    uvec2 kd_nodes;
-    // One a pair of nodes.
-    uvec2 kd_parents;
-    uvec2 leaf_triangles;
-    // One an entry of leaf_triangles.
-    uvec2 leaf_planes;
-    // One a node, or none.
-    uvec2 kd_boxes;
-    // Six a node, or none.
-    uvec2 kd_ropes;
 };
 
 // One a batch and bounce, 64 bytes, sized by the bounce before: each `groups` is a VkDispatchIndirectCommand.
@@ -287,28 +272,36 @@ struct DriverCast {
 
 // Bindings of the frame's descriptor set.
 #define BIND_FRAME 0u
-#define BIND_MATERIALS 1u
-#define BIND_LIGHTS 2u
-#define BIND_RAYS 3u
-#define BIND_NEXT_RAYS 4u
-#define BIND_CHILD_RAYS 5u
-#define BIND_CHILD_COUNTS 6u
-#define BIND_SCAN_BLOCKS 7u
-#define BIND_BOUNCES 8u
-#define BIND_HITS 9u
-#define BIND_LIGHT_VISIBILITY 10u
-#define BIND_RAY_RADIANCE 11u
-#define BIND_PIXEL_RADIANCE 12u
-#define BIND_PIXEL_FILTERED 13u
-#define BIND_PIXEL_DISPLAY 14u
-#define BIND_TRIANGLE_IDS 15u
-#define BIND_COUNTERS 16u
-#define BIND_PIXEL_ACCUMULATED 17u
-#define BIND_PIXEL_FEATURES 18u
-#define N_BINDINGS 19u
+#define BIND_TRIANGLES 1u
+#define BIND_TRIANGLE_MATERIALS 2u
+#define BIND_MATERIALS 3u
+#define BIND_LIGHTS 4u
+#define BIND_KD_NODES 5u
+#define BIND_KD_PARENTS 6u
+#define BIND_LEAF_TRIANGLES 7u
+#define BIND_RAYS 8u
+#define BIND_NEXT_RAYS 9u
+#define BIND_CHILD_RAYS 10u
+#define BIND_CHILD_COUNTS 11u
+#define BIND_SCAN_BLOCKS 12u
+#define BIND_BOUNCES 13u
+#define BIND_HITS 14u
+#define BIND_LIGHT_VISIBILITY 15u
+#define BIND_RAY_RADIANCE 16u
+#define BIND_PIXEL_RADIANCE 17u
+#define BIND_PIXEL_FILTERED 18u
+#define BIND_PIXEL_DISPLAY 19u
+#define BIND_TRIANGLE_IDS 20u
+#define BIND_COUNTERS 21u
+#define BIND_KD_BOXES 22u
+#define BIND_KD_ROPES 23u
+#define BIND_LEAF_PLANES 24u
+#define BIND_PIXEL_ACCUMULATED 25u
+#define BIND_PIXEL_FEATURES 26u
+#define N_BINDINGS 27u
 
-// A cast's descriptor set has these and the frame.
-#define BIND_CAST_RAYS 19u
-#define BIND_CAST_HITS 20u
+// A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
+#define BIND_CAST_RAYS 27u
+#define BIND_CAST_HITS 28u
 
 #endif

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Tree, binding, kernel, spirv, traversal_constants};
+use super::{Tree, binding, kernel, spirv, traversal_constants, tree};
 use crate::{
     cast::Query,
     frame::Traversal,
@@ -10,7 +10,7 @@ use crate::{
         Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, ComputePipeline, Context, Dispatch, GpuError,
         Statistic,
     },
-    layout::{BIND_CAST_HITS, BIND_CAST_RAYS, BIND_FRAME, CastBatch, CastRay, Hit, RAY_GROUP_SIZE},
+    layout::{BIND_CAST_HITS, BIND_CAST_RAYS, CastBatch, CastRay, Hit, RAY_GROUP_SIZE},
 };
 
 /// A batch's buffers and the descriptor set over them and the tree.
@@ -27,7 +27,7 @@ impl CastResources {
     /// # Errors
     /// Out of memory.
     pub fn bindings(context: &Arc<Context>) -> Result<Arc<Bindings>, GpuError> {
-        let kinds = [BIND_FRAME, BIND_CAST_RAYS, BIND_CAST_HITS].map(binding);
+        let kinds: Vec<_> = tree::BINDINGS.into_iter().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
         Bindings::new(context, &kinds, size_of::<CastBatch>() as u32)
     }
 
@@ -38,12 +38,9 @@ impl CastResources {
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, tree: &Tree, len: usize) -> Result<Self, GpuError> {
         let cast_rays = Buffer::new(context, "cast_rays", len, BufferUse::Storage)?;
         let cast_hits = Buffer::new(context, "cast_hits", len, BufferUse::Storage)?;
-        let objects = [
-            tree.binding(),
-            (BIND_CAST_RAYS, Binding::Buffer(cast_rays.any())),
-            (BIND_CAST_HITS, Binding::Buffer(cast_hits.any())),
-        ];
-        let set = BindingSet::new(bindings, "cast", &objects)?;
+        let own =
+            [(BIND_CAST_RAYS, Binding::Buffer(cast_rays.any())), (BIND_CAST_HITS, Binding::Buffer(cast_hits.any()))];
+        let set = BindingSet::new(bindings, "cast", &[&tree.objects()[..], &own].concat())?;
         Ok(Self { cast_rays, cast_hits, set })
     }
 }

@@ -20,7 +20,7 @@ const PUSH_BYTES: u32 = {
 /// What the kernels read and write. A name is the same here, in the kernels, as debug label and as allocation.
 pub struct Resources {
     pub tree: Tree,
-    /// `n_triangles`, read by address.
+    /// `n_triangles`.
     pub triangle_materials: Buffer<u32>,
     pub materials: Buffer<Material>,
     /// `n_lights`.
@@ -33,6 +33,7 @@ pub struct Resources {
     pub bindings: Arc<Bindings>,
     /// For even and for odd bounces.
     pub sets: Vec<BindingSet>,
+    constants: Frame,
 }
 
 impl Resources {
@@ -49,12 +50,9 @@ impl Resources {
     ) -> Result<Self, GpuError> {
         let storage = BufferUse::Storage;
         let kinds: Vec<_> = (0..layout::N_BINDINGS).map(binding).collect();
-        let triangle_materials =
-            Buffer::with(context, "triangle_materials", &scene.triangle_materials, BufferUse::Address)?;
-        let constants = &Frame { triangle_materials: triangle_materials.address(), ..*constants };
         let mut resources = Self {
             tree: Tree::new(context, &scene.triangles, tree, constants)?,
-            triangle_materials,
+            triangle_materials: Buffer::with(context, "triangle_materials", &scene.triangle_materials, storage)?,
             materials: Buffer::with(context, "materials", &scene.materials, storage)?,
             lights: Buffer::with(context, "lights", &scene.lights, storage)?,
             queues: Queues::new(context, constants.queue_capacity, constants.n_lights)?,
@@ -63,6 +61,7 @@ impl Resources {
             counters: Buffer::new(context, "counters", n_bounces, storage)?,
             bindings: Bindings::new(context, &kinds, PUSH_BYTES)?,
             sets: Vec::new(),
+            constants: *constants,
         };
         resources.sets = resources.make_sets()?;
         Ok(resources)
@@ -75,8 +74,8 @@ impl Resources {
 
     fn make_set(&self, name: &str, rays: &Buffer<Ray>, next_rays: &Buffer<Ray>) -> Result<BindingSet, GpuError> {
         let (queues, pixels) = (&self.queues, &self.pixels);
-        let objects = [
-            self.tree.binding(),
+        let own = [
+            (layout::BIND_TRIANGLE_MATERIALS, Binding::Buffer(self.triangle_materials.any())),
             (layout::BIND_MATERIALS, Binding::Buffer(self.materials.any())),
             (layout::BIND_LIGHTS, Binding::Buffer(self.lights.any())),
             (layout::BIND_RAYS, Binding::Buffer(rays.any())),
@@ -96,7 +95,7 @@ impl Resources {
             (layout::BIND_COUNTERS, Binding::Buffer(self.counters.any())),
             (layout::BIND_TRIANGLE_IDS, Binding::Image(&pixels.triangle_ids)),
         ];
-        BindingSet::new(&self.bindings, name, &objects)
+        BindingSet::new(&self.bindings, name, &[&self.tree.objects()[..], &own].concat())
     }
 
     /// The kernels' constants from now on, with room for their picture, with or without features, and for `constants.queue_capacity` rays, or for as
@@ -118,7 +117,7 @@ impl Resources {
         if let Some(pixels) = pixels {
             self.pixels = pixels;
         }
-        self.set_constants(&Frame { queue_capacity: self.queues.capacity(), ..*constants });
+        self.constants = Frame { queue_capacity: self.queues.capacity(), ..*constants };
         if !has_room {
             self.sets = self.make_sets()?;
         }
@@ -127,7 +126,7 @@ impl Resources {
 
     /// Other constants for as many pixels and rays; the next frame brings them to the device.
     pub fn set_constants(&mut self, constants: &Frame) {
-        self.tree.set_constants(&Frame { triangle_materials: self.triangle_materials.address(), ..*constants });
+        self.constants = *constants;
     }
 
     /// Uploads what the traversal reads beside the tree.
@@ -135,7 +134,9 @@ impl Resources {
     /// # Errors
     /// Too many triangles for brute force; beyond the device's limits, out of memory.
     pub fn add_extras(&mut self, context: &Arc<Context>, tree: &KdTree, traversal: Traversal) -> Result<(), GpuError> {
-        self.tree.add_extras(context, tree, traversal)
+        self.tree.add_extras(context, tree, traversal)?;
+        self.sets = self.make_sets()?;
+        Ok(())
     }
 
     /// Makes room for another number of batches and bounces; contents are undefined.
@@ -171,12 +172,12 @@ impl Resources {
 
     /// Pixels of the window.
     pub fn n_pixels(&self) -> usize {
-        n_pixels(self.constants())
+        n_pixels(&self.constants)
     }
 
     /// The constants that the kernels read.
     pub fn constants(&self) -> &Frame {
-        self.tree.constants()
+        &self.constants
     }
 
     /// One invocation a ray of the bounce.
@@ -201,7 +202,7 @@ impl Resources {
     /// One invocation a pixel.
     pub fn pixel_dispatch(&self) -> Dispatch<'_> {
         let tile = layout::TILE_SIZE;
-        Dispatch::Threads([self.constants().width, self.constants().height, 1], [tile, tile, 1])
+        Dispatch::Threads([self.constants.width, self.constants.height, 1], [tile, tile, 1])
     }
 
     /// Binds the set in which the batch's bounce reads its queue.

@@ -1,4 +1,4 @@
-//! What the traversal reads: triangles and their tree by address, and the constants that hold the addresses.
+//! What the traversal reads: a part of every descriptor set.
 
 use std::sync::Arc;
 
@@ -6,12 +6,27 @@ use crate::{
     frame::Traversal,
     gpu::{Binding, Buffer, BufferUse, Context, GpuError},
     kdtree::{Extras, KdTree},
-    layout::{BIND_FRAME, BRUTE_MAX_TRIANGLES, Frame, KdBox, KdNode, Plane, Triangle},
+    layout::{
+        BIND_FRAME, BIND_KD_BOXES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_ROPES, BIND_LEAF_PLANES,
+        BIND_LEAF_TRIANGLES, BIND_TRIANGLES, BRUTE_MAX_TRIANGLES, Frame, KdBox, KdNode, Plane, Triangle,
+    },
 };
+
+/// The bindings' numbers.
+pub(super) const BINDINGS: [u32; 8] = [
+    BIND_FRAME,
+    BIND_TRIANGLES,
+    BIND_KD_NODES,
+    BIND_KD_PARENTS,
+    BIND_LEAF_TRIANGLES,
+    BIND_LEAF_PLANES,
+    BIND_KD_BOXES,
+    BIND_KD_ROPES,
+];
 
 /// Triangles, their kd-tree, and the constants that hold the root's cell.
 pub struct Tree {
-    /// One: `constants`, once they are there.
+    /// One.
     pub frame: Buffer<Frame>,
     pub triangles: Buffer<Triangle>,
     pub kd_nodes: Buffer<KdNode>,
@@ -24,7 +39,6 @@ pub struct Tree {
     pub kd_boxes: Buffer<KdBox>,
     /// Six a node, after `add_extras`.
     pub kd_ropes: Buffer<u32>,
-    constants: Frame,
 }
 
 impl Tree {
@@ -38,24 +52,20 @@ impl Tree {
         tree: &KdTree,
         constants: &Frame,
     ) -> Result<Self, GpuError> {
-        let by_address = BufferUse::Address;
-        let mut made = Self {
-            frame: Buffer::new(context, "frame", 1, BufferUse::Uniform)?,
-            triangles: Buffer::with(context, "triangles", triangles, by_address)?,
-            kd_nodes: Buffer::with(context, "kd_nodes", &tree.nodes, by_address)?,
-            kd_parents: Buffer::with(context, "kd_parents", &tree.parents, by_address)?,
-            leaf_triangles: Buffer::with(context, "leaf_triangles", &tree.leaf_triangles, by_address)?,
-            leaf_planes: Buffer::with(context, "leaf_planes", &tree.leaf_planes, by_address)?,
-            kd_boxes: Buffer::new(context, "kd_boxes", 0, by_address)?,
-            kd_ropes: Buffer::new(context, "kd_ropes", 0, by_address)?,
-            constants: *constants,
-        };
-        made.set_constants(constants);
-        made.frame.upload(&[made.constants])?;
-        Ok(made)
+        let storage = BufferUse::Storage;
+        Ok(Self {
+            frame: Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?,
+            triangles: Buffer::with(context, "triangles", triangles, storage)?,
+            kd_nodes: Buffer::with(context, "kd_nodes", &tree.nodes, storage)?,
+            kd_parents: Buffer::with(context, "kd_parents", &tree.parents, storage)?,
+            leaf_triangles: Buffer::with(context, "leaf_triangles", &tree.leaf_triangles, storage)?,
+            leaf_planes: Buffer::with(context, "leaf_planes", &tree.leaf_planes, storage)?,
+            kd_boxes: Buffer::new(context, "kd_boxes", 0, storage)?,
+            kd_ropes: Buffer::new(context, "kd_ropes", 0, storage)?,
+        })
     }
 
-    /// Uploads what the traversal reads beside the tree. Where that fails, all is as before.
+    /// Uploads what the traversal reads beside the tree. Descriptor sets are to be made anew.
     ///
     /// # Errors
     /// Too many triangles for brute force; beyond the device's limits, out of memory.
@@ -65,35 +75,23 @@ impl Tree {
             return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
         }
         let extras = Extras::new(tree, traversal);
-        let kd_boxes = Buffer::with(context, "kd_boxes", &extras.boxes, BufferUse::Address)?;
-        let kd_ropes = Buffer::with(context, "kd_ropes", &extras.ropes, BufferUse::Address)?;
-        let constants = Frame { kd_boxes: kd_boxes.address(), kd_ropes: kd_ropes.address(), ..self.constants };
-        self.frame.upload(&[constants])?;
-        (self.kd_boxes, self.kd_ropes, self.constants) = (kd_boxes, kd_ropes, constants);
+        self.kd_boxes = Buffer::with(context, "kd_boxes", &extras.boxes, BufferUse::Storage)?;
+        self.kd_ropes = Buffer::with(context, "kd_ropes", &extras.ropes, BufferUse::Storage)?;
         Ok(())
     }
 
-    /// Other constants, with the addresses of the triangles and the tree; they are not uploaded.
-    pub fn set_constants(&mut self, constants: &Frame) {
-        self.constants = Frame {
-            triangles: self.triangles.address(),
-            kd_nodes: self.kd_nodes.address(),
-            kd_parents: self.kd_parents.address(),
-            leaf_triangles: self.leaf_triangles.address(),
-            leaf_planes: self.leaf_planes.address(),
-            kd_boxes: self.kd_boxes.address(),
-            kd_ropes: self.kd_ropes.address(),
-            ..*constants
-        };
-    }
-
-    /// The constants that the kernels are to read.
-    pub fn constants(&self) -> &Frame {
-        &self.constants
-    }
-
-    /// What a descriptor set has of it.
-    pub(super) fn binding(&self) -> (u32, Binding<'_>) {
-        (BIND_FRAME, Binding::Buffer(self.frame.any()))
+    /// For [`BINDINGS`].
+    pub(super) fn objects(&self) -> [(u32, Binding<'_>); BINDINGS.len()] {
+        let buffers = [
+            self.frame.any(),
+            self.triangles.any(),
+            self.kd_nodes.any(),
+            self.kd_parents.any(),
+            self.leaf_triangles.any(),
+            self.leaf_planes.any(),
+            self.kd_boxes.any(),
+            self.kd_ropes.any(),
+        ];
+        std::array::from_fn(|i| (BINDINGS[i], Binding::Buffer(buffers[i])))
     }
 }
