@@ -20,6 +20,9 @@ layout(std430, set = 0, binding = BIND_LEAF_TRIANGLES) readonly buffer LeafTrian
 layout(std430, set = 0, binding = BIND_LEAF_PLANES) readonly buffer LeafPlanesBlock { vec4 leaf_planes[]; };
 
 layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
+// Whether a triangle's plane is looked at before the triangle. It pays where lanes take branches of their own; a device
+// that runs both sides for all lanes has the plane to read and spares nothing.
+layout(constant_id = 4) const bool TRIES_PLANES = true;
 
 struct Cell {
     uint node_ix;
@@ -192,7 +195,10 @@ void intersect_leaf(TraversalRay ray, KdNode leaf, vec2 interval, inout Hit best
     uint end = leaf.split_or_first + (leaf.axis_and_child >> KD_CHILD_SHIFT);
     count_steps(end - leaf.split_or_first);
     for (uint i = leaf.split_or_first; i < end; ++i) {
-        if (!is_clear(leaf_planes[i], from, to)) intersect(ray, leaf_triangles[i], best);
+        if (TRIES_PLANES) {
+            if (is_clear(leaf_planes[i], from, to)) continue;
+        }
+        intersect(ray, leaf_triangles[i], best);
     }
 }
 

@@ -29,7 +29,7 @@ use serde::Serialize;
 
 /// How long a device works before its times count. One that has been idle for some seconds runs at a low clock (an H200
 /// at 345 MHz instead of 1980) until it has been busy for a while, and short bursts don't do.
-const WARM_UP: Duration = Duration::from_millis(300);
+const WARM_UP: Duration = Duration::from_millis(200);
 
 /// Does the work again and again until the device is warm; at least once.
 fn warm_up<E>(mut work: impl FnMut() -> Result<(), E>) -> Result<(), E> {

@@ -24,8 +24,7 @@ use crate::{
     layout::{Hit, NO_TRIANGLE, Ray},
 };
 
-/// Timed casts of one variant before it is the next one's turn. One more, which is not timed, begins each turn: the
-/// rays have just been uploaded, and another variant's tree is in the caches.
+/// Timed casts of one variant before it is the next one's turn.
 pub const CASTS_A_TURN: u16 = 5;
 
 /// The variants on one stage, ready for rays.
@@ -56,11 +55,11 @@ impl<'a> Tracers<'a> {
         let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
         let expected = self.cast_on_cpu(Traversal::Mask, &rays, query);
         let mut results = vec![(Some(Vec::new()), Difference::default()); self.variants.len()];
-        self.warm_up(&rays, query)?;
+        let n_warm_up = self.n_warm_up(&rays, query)?;
         for n_casts in turns(n_times) {
             for (variant_ix, (all_ms, difference)) in results.iter_mut().enumerate() {
-                let (hits, ms) = self.cast(variant_ix, &rays, query, 1 + n_casts)?;
-                *all_ms = all_ms.take().zip(ms).map(|(all, ms)| [all, ms[1..].to_vec()].concat());
+                let (hits, ms) = self.cast(variant_ix, &rays, query, n_warm_up + n_casts)?;
+                *all_ms = all_ms.take().zip(ms).map(|(all, ms)| [all, ms[usize::from(n_warm_up)..].to_vec()].concat());
                 *difference = difference.max(Difference::of(set.kind, &expected, &hits));
             }
         }
@@ -85,15 +84,12 @@ impl<'a> Tracers<'a> {
         })
     }
 
-    /// So many casts in one go that the device has no rest between them.
-    fn warm_up(&mut self, rays: &[CastRay], query: Query) -> Result<(), GpuError> {
-        let Some(caster) = self.casters.as_mut().and_then(|casters| casters.first_mut()) else { return Ok(()) };
+    /// Casts that each turn begins with, untimed: the rays have just been uploaded, another variant's tree is in the
+    /// caches, and while the CPU compared hits the device's clock may have fallen. One at least.
+    fn n_warm_up(&mut self, rays: &[CastRay], query: Query) -> Result<u16, GpuError> {
+        let Some(caster) = self.casters.as_mut().and_then(|casters| casters.first_mut()) else { return Ok(1) };
         let once_ms = caster.cast(rays, query, 1)?.gpu_ms.map_or(f64::INFINITY, |ms| ms.iter().sum());
-        let n_times = (WARM_UP.as_secs_f64() * 1e3 / once_ms.max(1e-2)) as u32;
-        if n_times > 1 {
-            caster.cast(rays, query, n_times)?;
-        }
-        Ok(())
+        Ok((WARM_UP.as_secs_f64() * 1e3 / once_ms.max(1e-2)).clamp(1.0, 1000.0) as u16)
     }
 
     /// Hits, and the milliseconds of each time (none without timestamps).

@@ -59,8 +59,7 @@ impl Cast {
         traversal: Traversal,
         query: Query,
     ) -> Result<Self, GpuError> {
-        let [traversal, fuses_fma] = traversal_constants(context, traversal)?;
-        let constants = [traversal, fuses_fma, (query == Query::Any).into()];
+        let constants = traversal_constants(context, traversal, [query == Query::Any, false])?;
         Ok(Self { kernel: kernel(context, bindings, "cast", spirv!("cast.comp"), &constants)? })
     }
 

@@ -20,8 +20,7 @@ impl Shadow {
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        let [traversal, fuses_fma] = traversal_constants(context, options.traversal)?;
-        let constants = [traversal, fuses_fma, options.profile.into(), options.features.into()];
+        let constants = traversal_constants(context, options.traversal, [options.profile, options.features])?;
         Ok(Self { kernel: kernel(context, bindings, "shadow", spirv!("shadow.comp"), &constants)? })
     }
 
