@@ -22,7 +22,7 @@ const RAYS_A_TRIANGLE_ON_GPU: u64 = 1000;
 impl Build {
     /// For so many rays on a device, or without one on the CPU.
     pub fn options(self, context: Option<&Context>, n_triangles: usize, n_rays: u64) -> BuildOptions {
-        let on_gpu = context.is_some_and(|context| !context.info().is_software());
+        let on_gpu = context.is_some_and(|context| !context.is_software());
         let rays_a_triangle = if on_gpu { RAYS_A_TRIANGLE_ON_GPU } else { RAYS_A_TRIANGLE_ON_CPU };
         let is_fast = match self {
             Self::Fast => true,

@@ -25,13 +25,6 @@ pub struct DeviceInfo {
     pub missing: Vec<String>,
 }
 
-impl DeviceInfo {
-    /// Whether the "device" is the CPU.
-    pub fn is_software(&self) -> bool {
-        self.kind == "CPU"
-    }
-}
-
 /// How a user names a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceSelector {

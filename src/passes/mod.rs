@@ -132,7 +132,7 @@ fn binding(number: u32) -> (u32, BindingKind) {
 
 /// Specialization constants of the kernels that traverse: their own are the two in the middle.
 fn traversal_constants(context: &Arc<Context>, traversal: Traversal, own: [bool; 2]) -> Result<[u32; 5], GpuError> {
-    let tries_planes = !context.info().is_software();
+    let tries_planes = !context.is_software();
     let [a, b] = own.map(u32::from);
     Ok([traversal.constant(), context.fuses_fma()?.into(), a, b, tries_planes.into()])
 }

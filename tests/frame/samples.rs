@@ -88,7 +88,7 @@ fn one_sample_is_the_frame() {
 
 #[test]
 fn small_queues_give_the_same_bits() {
-    let (scene, options, context) = (glass_in_glass(), options(32, 24, 8), device());
+    let (scene, options, context) = (glass_in_glass(), options(32, 24, 6), device());
     let tree = tree_of(&scene);
     let render = |capacity| {
         let renderer = Renderer::with_queue_capacity(context.clone(), &scene, &tree, &options, capacity);
