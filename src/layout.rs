@@ -22,6 +22,7 @@ mod tests {
         match binding {
             BIND_FRAME => Some("Frame"),
             BIND_TRIANGLES => Some("Triangle"),
+            BIND_ADDRESSES => Some("Addresses"),
             BIND_MATERIALS => Some("Material"),
             BIND_LIGHTS => Some("Light"),
             BIND_KD_NODES => Some("KdNode"),
@@ -41,6 +42,11 @@ mod tests {
         match ty {
             Type::Scalar(ScalarType::Integer { bits: 32, is_signed: false }) => "u32",
             Type::Scalar(ScalarType::Float { bits: 32 }) => "f32",
+            Type::Vector(v)
+                if v.nscalar == 2 && v.scalar_ty == (ScalarType::Integer { bits: 32, is_signed: false }) =>
+            {
+                "[u32; 2]"
+            }
             Type::Vector(v) if v.nscalar == 3 && v.scalar_ty == (ScalarType::Float { bits: 32 }) => "glam::Vec3",
             Type::Matrix(m) if (m.nvector, m.vector_ty.nscalar, m.stride) == (4, 4, Some(16)) => "glam::Mat4",
             other => panic!("layout.glsl holds no {other:?}"),

@@ -20,8 +20,6 @@ const PUSH_BYTES: u32 = {
 /// What the kernels read and write. A name is the same here, in the kernels, as debug label and as allocation.
 pub struct Resources {
     pub tree: Tree,
-    /// `n_triangles`.
-    pub triangle_materials: Buffer<u32>,
     pub materials: Buffer<Material>,
     /// `n_lights`.
     pub lights: Buffer<Light>,
@@ -49,17 +47,18 @@ impl Resources {
         n_bounces: usize,
     ) -> Result<Self, GpuError> {
         let storage = BufferUse::Storage;
+        let mut tree = Tree::new(context, &scene.triangles, tree, constants)?;
+        tree.add_materials(context, &scene.triangle_materials)?;
         let kinds: Vec<_> = (0..layout::N_BINDINGS).map(binding).collect();
         let mut resources = Self {
-            tree: Tree::new(context, &scene.triangles, tree, constants)?,
-            triangle_materials: Buffer::with(context, "triangle_materials", &scene.triangle_materials, storage)?,
             materials: Buffer::with(context, "materials", &scene.materials, storage)?,
             lights: Buffer::with(context, "lights", &scene.lights, storage)?,
             queues: Queues::new(context, constants.queue_capacity, constants.n_lights)?,
             pixels: Pixels::new(context, constants, false)?,
             bounces: Buffer::new(context, "bounces", n_bounces, BufferUse::Indirect)?,
             counters: Buffer::new(context, "counters", n_bounces, storage)?,
-            bindings: Bindings::new(context, &kinds, PUSH_BYTES)?,
+            bindings: Bindings::with_constants(context, &kinds, PUSH_BYTES, &tree.constants())?,
+            tree,
             sets: Vec::new(),
             constants: *constants,
         };
@@ -75,7 +74,6 @@ impl Resources {
     fn make_set(&self, name: &str, rays: &Buffer<Ray>, next_rays: &Buffer<Ray>) -> Result<BindingSet, GpuError> {
         let (queues, pixels) = (&self.queues, &self.pixels);
         let own = [
-            (layout::BIND_TRIANGLE_MATERIALS, Binding::Buffer(self.triangle_materials.any())),
             (layout::BIND_MATERIALS, Binding::Buffer(self.materials.any())),
             (layout::BIND_LIGHTS, Binding::Buffer(self.lights.any())),
             (layout::BIND_RAYS, Binding::Buffer(rays.any())),
