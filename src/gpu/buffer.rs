@@ -60,9 +60,7 @@ impl<T: Pod> Buffer<T> {
             BufferUse::Storage => vk::BufferUsageFlags::STORAGE_BUFFER,
             BufferUse::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
             BufferUse::Indirect => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER,
-            BufferUse::Address => {
-                vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
-            }
+            BufferUse::Address => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS,
             BufferUse::Structure => {
                 vk::BufferUsageFlags::STORAGE_BUFFER
                     | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR

@@ -4,7 +4,9 @@ use std::{ffi::CStr, io::Cursor, sync::Arc};
 
 use ash::vk;
 
-use super::{Bindings, Context, GpuError, Presenter, TargetKind, specialization::Specialization, statistics::capture_flags};
+use super::{
+    Bindings, Context, GpuError, Presenter, TargetKind, specialization::Specialization, statistics::capture_flags,
+};
 
 pub(super) const ENTRY_POINT: &CStr = c"main";
 
