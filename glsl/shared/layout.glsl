@@ -242,7 +242,7 @@ struct Addresses {
     uvec2 kd_ropes;
 };
 
-// Specialization constant: whether kernels read them so. Beyond those that kernels have of their own.
+// Specialization constant: whether kernels read the scene by address. Numbers below are for kernels' own.
 #define CONSTANT_BY_ADDRESS 31u
 
 // Push constants: the batch's pixels [first_pixel, first_pixel + n_pixels) in tile order, and its row of `bounces`.

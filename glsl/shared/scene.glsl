@@ -8,7 +8,8 @@
 
 #include "layout.glsl"
 
-// The same for all kernels over one scene. A load by address takes more instructions, and what it reads may alias.
+// The same for all kernels over one scene. By address the traversal loses up to 7 % of its speed on a large GPU, up to half on
+// lavapipe: only scenes that could not be had otherwise are read so.
 layout(constant_id = CONSTANT_BY_ADDRESS) const bool BY_ADDRESS = false;
 
 // Triangles as three rows, nodes as one: a device then loads each at once.
