@@ -114,6 +114,7 @@ fn rust_type(glsl: &str) -> (&'static str, usize, usize) {
     match glsl {
         "uint" => ("u32", 4, 4),
         "float" => ("f32", 4, 4),
+        "uvec2" => ("[u32; 2]", 8, 8),
         "vec3" => ("glam::Vec3", 12, 16),
         "mat4" => ("glam::Mat4", 64, 16),
         _ => panic!("layout.glsl: no Rust type for `{glsl}`"),

@@ -22,6 +22,7 @@ mod tests {
         match binding {
             BIND_FRAME => Some("Frame"),
             BIND_TRIANGLES => Some("Triangle"),
+            BIND_ADDRESSES => Some("Addresses"),
             BIND_MATERIALS => Some("Material"),
             BIND_LIGHTS => Some("Light"),
             BIND_KD_NODES => Some("KdNode"),
@@ -37,10 +38,26 @@ mod tests {
         }
     }
 
+    /// A shader's push constants.
+    fn pushed_to(shader: &str) -> &'static str {
+        match shader {
+            "cast.comp" => "CastBatch",
+            "driver.rgen" => "DriverCast",
+            "false_color.comp" => "FalseColor",
+            "present.frag" => "Present",
+            _ => "Batch",
+        }
+    }
+
     fn rust_type(ty: &Type) -> &'static str {
         match ty {
             Type::Scalar(ScalarType::Integer { bits: 32, is_signed: false }) => "u32",
             Type::Scalar(ScalarType::Float { bits: 32 }) => "f32",
+            Type::Vector(v)
+                if v.nscalar == 2 && v.scalar_ty == (ScalarType::Integer { bits: 32, is_signed: false }) =>
+            {
+                "[u32; 2]"
+            }
             Type::Vector(v) if v.nscalar == 3 && v.scalar_ty == (ScalarType::Float { bits: 32 }) => "glam::Vec3",
             Type::Matrix(m) if (m.nvector, m.vector_ty.nscalar, m.stride) == (4, 4, Some(16)) => "glam::Mat4",
             other => panic!("layout.glsl holds no {other:?}"),
@@ -88,17 +105,13 @@ mod tests {
             let name = source.expect("an entry").file_name().into_string().expect("a shader's name is UTF-8");
             let spirv = fs::read(format!("{}/{name}.spv", env!("OUT_DIR"))).expect("SPIR-V");
             let entry_points = ReflectConfig::new().spv(spirv).ref_all_rscs(true).reflect();
-            entry_points.expect("valid SPIR-V").into_iter().flat_map(|entry_point| entry_point.vars)
+            let variables = entry_points.expect("valid SPIR-V").into_iter().flat_map(|entry_point| entry_point.vars);
+            variables.map(|variable| (pushed_to(&name), variable)).collect::<Vec<_>>()
         });
         variables
-            .filter_map(|variable| match variable {
+            .filter_map(|(pushed, variable)| match variable {
                 Variable::Descriptor { desc_bind, ty, .. } => Some((struct_at(desc_bind.bind())?, ty)),
-                // Three kinds of kernels, told apart by how many numbers they are given.
-                Variable::PushConstant { ty, .. } => match members_of(&ty).0.map_or(0, |members| members.len()) {
-                    1 => Some(("CastBatch", ty)),
-                    2 => Some(("DriverCast", ty)),
-                    _ => Some(("Batch", ty)),
-                },
+                Variable::PushConstant { ty, .. } => Some((pushed, ty)),
                 _ => None,
             })
             .collect()

@@ -50,7 +50,7 @@ struct Walker {
 fn walker(context: &Arc<Context>, stage: &Stage, set: &RaySet, traversal: Traversal) -> Box<dyn Contender> {
     let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
     let tree = Tree::new(context, &stage.scene.triangles, &stage.tree, &stage.frame).expect("a tree");
-    let bindings = CastResources::bindings(context).expect("bindings");
+    let bindings = CastResources::bindings(context, &tree).expect("bindings");
     let resources = CastResources::new(context, &bindings, &tree, set.rays.len()).expect("resources");
     let cast = |ray: &kdray::layout::Ray| CastRay {
         origin: ray.origin,

@@ -3,13 +3,12 @@
 // Features: one invocation a primary ray notes what its pixel shows, for other uses than light.
 // Reads rays, hits and the scene; writes pixel_features, all but n_rays and n_steps.
 #include "layout.glsl"
+#include "scene.glsl"
 #include "surface.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
-layout(std430, set = 0, binding = BIND_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
-layout(std430, set = 0, binding = BIND_TRIANGLE_MATERIALS) readonly buffer TriangleMaterialsBlock { uint triangle_materials[]; };
 layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
 layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
@@ -27,8 +26,8 @@ void main() {
         pixel_features[pixel_ix].depth = uintBitsToFloat(0x7f800000u);
         return; // the vectors were cleared
     }
-    Surface surface = surface_at(ray, hit, triangles[hit.triangle_ix]);
-    uint material_ix = triangle_materials[hit.triangle_ix];
+    Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
+    uint material_ix = triangle_material_at(hit.triangle_ix);
     pixel_features[pixel_ix].position_world = surface.point_world;
     pixel_features[pixel_ix].normal_world = surface.shading;
     pixel_features[pixel_ix].material_ix = material_ix;

@@ -5,6 +5,7 @@
 // with the plane of the triangle that the rasterizer found there.
 // Reads triangle_ids, triangles; writes rays, hits, counters[].n_hits, pixel_features (n_rays, n_steps).
 #include "layout.glsl"
+#include "scene.glsl"
 #include "camera.glsl"
 #include "triangle.glsl"
 
@@ -12,7 +13,6 @@ layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 layout(set = 0, binding = BIND_TRIANGLE_IDS, r32ui) readonly uniform uimage2D triangle_ids;
-layout(std430, set = 0, binding = BIND_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
 layout(std430, set = 0, binding = BIND_RAYS) writeonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_HITS) writeonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
@@ -39,7 +39,7 @@ void main() {
             uint triangle_ix = imageLoad(triangle_ids, ivec2(in_picture(frame, pixel))).x;
             Hit hit = Hit(infinity, NO_TRIANGLE, 0.0, 0.0);
             is_hit = triangle_ix != NO_TRIANGLE;
-            if (is_hit) hit = clamp_to_triangle(shear_of(ray.origin, ray.direction), triangles[triangle_ix], triangle_ix);
+            if (is_hit) hit = clamp_to_triangle(shear_of(ray.origin, ray.direction), triangle_at(triangle_ix), triangle_ix);
             hits[ray_ix] = hit;
             if (COUNT_COSTS) {
                 pixel_features[ray.pixel_ix].n_rays = 1u;

@@ -5,6 +5,7 @@
 // Reads rays, hits, light_visibility and the scene; writes ray_radiance (weighted by throughput), child_rays,
 // child_counts.
 #include "layout.glsl"
+#include "scene.glsl"
 #include "surface.glsl"
 #include "light.glsl"
 #include "material.glsl"
@@ -12,8 +13,6 @@
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
-layout(std430, set = 0, binding = BIND_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
-layout(std430, set = 0, binding = BIND_TRIANGLE_MATERIALS) readonly buffer TriangleMaterialsBlock { uint triangle_materials[]; };
 layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
 layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
@@ -52,8 +51,8 @@ void main() {
         child_counts[ray_ix] = 0u;
         return;
     }
-    Surface surface = surface_at(ray, hit, triangles[hit.triangle_ix]);
-    Material material = materials[triangle_materials[hit.triangle_ix]];
+    Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
+    Material material = materials[triangle_material_at(hit.triangle_ix)];
     ray_radiance[ray_ix] = vec4(ray.throughput * local_radiance(ray, ray_ix, surface, material), 0.0);
 
     uint n_children = 0u;

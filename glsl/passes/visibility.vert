@@ -4,16 +4,14 @@
 // Reads triangles; the triangle's index goes on, flat, to visibility.frag: that of the vertex that the triangle drawn
 // begins with.
 #include "layout.glsl"
+#include "scene.glsl"
 
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
-layout(std430, set = 0, binding = BIND_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
 
 layout(location = 0) flat out uint triangle_ix;
 
 void main() {
     triangle_ix = uint(gl_VertexIndex) / 3u;
-    uint corner = uint(gl_VertexIndex) % 3u;
-    Triangle t = triangles[triangle_ix];
-    vec3 position_world = corner == 0u ? t.v0 : (corner == 1u ? t.v1 : t.v2);
+    vec3 position_world = triangle_row(uint(gl_VertexIndex)).xyz;
     gl_Position = frame.clip_from_world * vec4(position_world, 1.0);
 }

@@ -1,7 +1,5 @@
 // The cells of nodes as boxes, one a node, for traversals that ask for them.
 
-layout(std430, set = 0, binding = BIND_KD_BOXES) readonly buffer KdBoxesBlock { KdBox kd_boxes[]; };
-
 // Where the ray meets the planes of a node's cell on each axis: those it comes to first, and the far ones.
 struct Slabs {
     vec3 near;
@@ -9,7 +7,7 @@ struct Slabs {
 };
 
 Slabs slabs_of(TraversalRay ray, uint node_ix) {
-    KdBox box = kd_boxes[node_ix];
+    KdBox box = kd_box_of(node_ix);
     precise vec3 t0 = fma(vec3(box.min_x, box.min_y, box.min_z), ray.inv_direction, ray.bias);
     precise vec3 t1 = fma(vec3(box.max_x, box.max_y, box.max_z), ray.inv_direction, ray.bias);
     return Slabs(min(t0, t1), max(t0, t1));

@@ -7,17 +7,11 @@
 #define KDRAY_KDTREE
 
 #include "layout.glsl"
+#include "scene.glsl"
 #include "steps.glsl"
 #include "triangle.glsl"
 
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
-// Triangles as three rows, nodes as one: a device then loads each at once.
-layout(std430, set = 0, binding = BIND_TRIANGLES) readonly buffer TrianglesBlock { vec4 triangle_rows[]; };
-layout(std430, set = 0, binding = BIND_KD_NODES) readonly buffer KdNodesBlock { uvec2 kd_nodes[]; };
-layout(std430, set = 0, binding = BIND_KD_PARENTS) readonly buffer KdParentsBlock { uint kd_parents[]; };
-layout(std430, set = 0, binding = BIND_LEAF_TRIANGLES) readonly buffer LeafTrianglesBlock { uint leaf_triangles[]; };
-
-layout(std430, set = 0, binding = BIND_LEAF_PLANES) readonly buffer LeafPlanesBlock { vec4 leaf_planes[]; };
 
 layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
 // Whether a triangle's plane is looked at before the triangle. It pays where lanes take branches of their own; a device
@@ -89,15 +83,7 @@ Ray near_scene(Ray ray, out float t_start) {
 
 KdNode kd_node(uint node_ix) {
     count_steps(1u);
-    uvec2 words = kd_nodes[node_ix];
-    return KdNode(words.x, words.y);
-}
-
-Triangle triangle_at(uint triangle_ix) {
-    vec4 v0 = triangle_rows[3u * triangle_ix];
-    vec4 v1 = triangle_rows[3u * triangle_ix + 1u];
-    vec4 v2 = triangle_rows[3u * triangle_ix + 2u];
-    return Triangle(v0.xyz, floatBitsToUint(v0.w), v1.xyz, floatBitsToUint(v1.w), v2.xyz, floatBitsToUint(v2.w));
+    return kd_node_at(node_ix);
 }
 
 uint axis_of(KdNode node) {
@@ -196,9 +182,9 @@ void intersect_leaf(TraversalRay ray, KdNode leaf, vec2 interval, inout Hit best
     count_steps(end - leaf.split_or_first);
     for (uint i = leaf.split_or_first; i < end; ++i) {
         if (TRIES_PLANES) {
-            if (is_clear(leaf_planes[i], from, to)) continue;
+            if (is_clear(leaf_plane_at(i), from, to)) continue;
         }
-        intersect(ray, leaf_triangles[i], best);
+        intersect(ray, leaf_triangle_at(i), best);
     }
 }
 

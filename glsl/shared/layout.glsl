@@ -229,6 +229,22 @@ struct Feature {
     uint reserved1;
 };
 
+// Where the buffers of these names lie on the device, low word first (a uniform buffer): for kernels that read them by
+// address, as scene.glsl says. Zeros where they are bound.
+struct Addresses {
+    uvec2 triangles;
+    uvec2 triangle_materials;
+    uvec2 kd_nodes;
+    uvec2 kd_parents;
+    uvec2 leaf_triangles;
+    uvec2 leaf_planes;
+    uvec2 kd_boxes;
+    uvec2 kd_ropes;
+};
+
+// Specialization constant: whether kernels read the scene by address. Numbers below are for kernels' own.
+#define CONSTANT_BY_ADDRESS 31u
+
 // Push constants: the batch's pixels [first_pixel, first_pixel + n_pixels) in tile order, and its row of `bounces`.
 struct Batch {
     uint first_pixel;
@@ -298,10 +314,11 @@ struct DriverCast {
 #define BIND_LEAF_PLANES 24u
 #define BIND_PIXEL_ACCUMULATED 25u
 #define BIND_PIXEL_FEATURES 26u
-#define N_BINDINGS 27u
+#define BIND_ADDRESSES 27u
+#define N_BINDINGS 28u
 
 // A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
-#define BIND_CAST_RAYS 27u
-#define BIND_CAST_HITS 28u
+#define BIND_CAST_RAYS 28u
+#define BIND_CAST_HITS 29u
 
 #endif

@@ -10,7 +10,7 @@ bool backtrack_pop(TraversalRay ray, float t_best, inout Cell cell) {
     // What has not been visited begins where the leaf ends, or later.
     if (t_best < cell.t_exit) return false;
     while (cell.node_ix != 0u) {
-        uint parent_ix = kd_parents[cell.node_ix >> 1];
+        uint parent_ix = kd_parent_of(cell.node_ix);
         KdNode parent = kd_node(parent_ix);
         if (cell.node_ix == first_child(ray, parent)) {
             float t_enter = crossing(ray, parent);

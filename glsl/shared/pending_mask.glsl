@@ -24,7 +24,7 @@ bool is_pending(uint depth) {
 
 // The node on the way from the root to node_ix, so many levels higher.
 uint ancestor_of(uint node_ix, uint n_levels) {
-    for (uint level = 0u; level < n_levels; ++level) node_ix = kd_parents[node_ix >> 1];
+    for (uint level = 0u; level < n_levels; ++level) node_ix = kd_parent_of(node_ix);
     return node_ix;
 }
 
@@ -37,5 +37,5 @@ void climb(TraversalRay ray, inout Cell cell) {
     cell = Cell(path_ix ^ 1u, depth, cell.t_enter, ray.t_exit);
     if (pending_mask == uvec2(0u)) return;
     uint next_ix = ancestor_of(path_ix, depth - deepest_pending());
-    cell.t_exit = crossing(ray, kd_node(kd_parents[next_ix >> 1]));
+    cell.t_exit = crossing(ray, kd_node(kd_parent_of(next_ix)));
 }

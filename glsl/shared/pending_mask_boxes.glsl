@@ -21,7 +21,7 @@ bool mask_boxes_pop(TraversalRay ray, float t_best, inout Cell cell) {
             }
         }
         siblings_done &= ~bit;
-        cell.node_ix = kd_parents[cell.node_ix >> 1];
+        cell.node_ix = kd_parent_of(cell.node_ix);
         cell.depth -= 1u;
     }
     return false;

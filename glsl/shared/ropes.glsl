@@ -5,9 +5,6 @@
 // The leaves on the way end and begin at the same t, so every hit's t is in one of them; which of several that meet there
 // does not matter.
 
-// 6 a node: below and above on x, y, z; 0: the face is the root's.
-layout(std430, set = 0, binding = BIND_KD_ROPES) readonly buffer KdRopesBlock { uint kd_ropes[]; };
-
 // The leaf in node_ix where the ray is at t.
 KdNode leaf_at(TraversalRay ray, float t, inout uint node_ix) {
     KdNode node = kd_node(node_ix);
@@ -31,6 +28,6 @@ void follow_ropes(TraversalRay ray, bool any_hit, inout Hit best) {
         intersect_leaf(ray, leaf, vec2(t_enter, min(t, best.t)), best);
         if (is_done(any_hit, best) || best.t < t) return;
         uint is_above = along(ray.inv_direction, axis) < 0.0 ? 0u : 1u;
-        node_ix = kd_ropes[6u * node_ix + 2u * axis + is_above];
+        node_ix = kd_rope_of(node_ix, 2u * axis + is_above);
     } while (node_ix != 0u);
 }

@@ -76,7 +76,7 @@ impl Caster {
     ) -> Result<Self, GpuError> {
         let mut buffers = Tree::new(context, triangles, tree, &constants(triangles, tree))?;
         buffers.add_extras(context, tree, traversal)?;
-        let bindings = CastResources::bindings(context)?;
+        let bindings = CastResources::bindings(context, &buffers)?;
         Ok(Self {
             resources: CastResources::new(context, &bindings, &buffers, 0)?,
             rays_per_batch: RAYS_PER_BATCH.min(most_rays(context.limits())),

@@ -31,18 +31,31 @@ pub enum Binding<'a> {
     Image(&'a Target),
 }
 
-/// The layout of a set, shared by all pipelines that use it.
+/// The layout of a set, shared by all pipelines that use it, with the specialization constants that they share.
 pub struct Bindings {
     pub(super) set_layout: vk::DescriptorSetLayout,
     pub(super) pipeline_layout: vk::PipelineLayout,
     /// By binding number.
     kinds: Vec<(u32, BindingKind)>,
+    /// Numbers and values.
+    pub(super) constants: Vec<(u32, u32)>,
     context: Arc<Context>,
 }
 
 impl Bindings {
     /// `kinds`: the bindings' numbers and what they hold; `push_bytes`: size of the push constants, for all stages.
     pub fn new(context: &Arc<Context>, kinds: &[(u32, BindingKind)], push_bytes: u32) -> Result<Arc<Self>, GpuError> {
+        Self::with_constants(context, kinds, push_bytes, &[])
+    }
+
+    /// As [`Bindings::new`]. `constants`: numbers and values of specialization constants that are the same for all
+    /// pipelines; a kernel need not know them.
+    pub fn with_constants(
+        context: &Arc<Context>,
+        kinds: &[(u32, BindingKind)],
+        push_bytes: u32,
+        constants: &[(u32, u32)],
+    ) -> Result<Arc<Self>, GpuError> {
         let stages = context.stages();
         let bindings: Vec<_> = kinds
             .iter()
@@ -65,6 +78,7 @@ impl Bindings {
                 set_layout,
                 pipeline_layout: vk::PipelineLayout::null(),
                 kinds: kinds.to_vec(),
+                constants: constants.to_vec(),
                 context: context.clone(),
             };
             let set_layouts = [set_layout];
@@ -97,7 +111,8 @@ pub struct BindingSet {
 }
 
 impl BindingSet {
-    /// `objects`: one for each of the bindings, with its number.
+    /// `objects`: one for each of the bindings, with its number. A buffer that is larger than what the device binds is
+    /// bound in part: kernels read it by its address.
     pub fn new(bindings: &Arc<Bindings>, name: &str, objects: &[(u32, Binding)]) -> Result<Self, GpuError> {
         assert_eq!(objects.len(), bindings.kinds.len(), "one object a binding");
         let context = &bindings.context;
@@ -127,6 +142,7 @@ impl BindingSet {
     }
 
     fn write(&self, objects: &[(u32, Binding)]) {
+        let most_bytes = self.bindings.context.limits().storage_range;
         for (binding, object) in objects {
             let known = self.bindings.kinds.iter().find(|(known, _)| known == binding);
             let (_, kind) = known.unwrap_or_else(|| panic!("the set has no binding {binding}"));
@@ -138,7 +154,8 @@ impl BindingSet {
             let image_info;
             let write = match object {
                 Binding::Buffer(buffer) => {
-                    buffer_info = [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(vk::WHOLE_SIZE)];
+                    let bytes = buffer.bytes().min(most_bytes);
+                    buffer_info = [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(bytes)];
                     write.buffer_info(&buffer_info)
                 }
                 Binding::Image(target) => {

@@ -8,6 +8,11 @@ use gpu_allocator::{MemoryLocation, vulkan::Allocation};
 
 use super::{Access, Context, GpuError};
 
+/// What an upload copies at a time, so that it takes little memory beside the buffer's own.
+const MOST_STAGING_BYTES: usize = 64 << 20;
+/// Of a vector of four: what a kernel reads at once by address.
+const ROW_BYTES: u64 = 16;
+
 /// What kernels do with a buffer. Every buffer can be copied from and to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BufferUse {
@@ -17,6 +22,8 @@ pub enum BufferUse {
     Indirect,
     /// Vertices' numbers, for draws alone.
     Index,
+    /// Storage that is read by its address: it may be larger than what can be bound.
+    Address,
     /// Whatever the driver's own ray tracing reads and writes, by address.
     Structure,
 }
@@ -44,8 +51,11 @@ impl<T: Pod> Buffer<T> {
     /// Beyond the device's limits, out of memory.
     pub fn new(context: &Arc<Context>, name: &str, len: usize, usage: BufferUse) -> Result<Self, GpuError> {
         let bytes = (len.max(1) * size_of::<T>()) as u64;
-        let limit = context.limits().storage_range;
-        if bytes > limit && !matches!(usage, BufferUse::Index | BufferUse::Structure) {
+        let limit = match usage {
+            BufferUse::Index | BufferUse::Address | BufferUse::Structure => context.limits().buffer_bytes,
+            BufferUse::Storage | BufferUse::Uniform | BufferUse::Indirect => context.limits().storage_range,
+        };
+        if bytes > limit {
             return Err(GpuError::TooLarge { object: name.to_owned(), bytes, limit });
         }
         let usage = match usage {
@@ -53,6 +63,7 @@ impl<T: Pod> Buffer<T> {
             BufferUse::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
             BufferUse::Indirect => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER,
             BufferUse::Index => vk::BufferUsageFlags::INDEX_BUFFER,
+            BufferUse::Address => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS,
             BufferUse::Structure => {
                 vk::BufferUsageFlags::STORAGE_BUFFER
                     | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR
@@ -93,12 +104,17 @@ impl<T: Pod> Buffer<T> {
         }
         let bytes: &[u8] = bytemuck::cast_slice(data);
         let context = &self.any.context;
-        let mut staging = AnyBuffer::staging(context, &self.any.name, bytes.len() as u64, MemoryLocation::CpuToGpu)?;
-        staging.mapped()[..bytes.len()].copy_from_slice(bytes);
-        context.run("upload", |commands| {
-            commands.copy_buffer(&staging, &self.any, bytes.len() as u64);
-            commands.barrier(Access::TransferWrite, Access::AllReads); // the buffer
-        })
+        let staging_bytes = bytes.len().min(MOST_STAGING_BYTES) as u64;
+        let mut staging = AnyBuffer::staging(context, &self.any.name, staging_bytes, MemoryLocation::CpuToGpu)?;
+        for (part_ix, part) in bytes.chunks(MOST_STAGING_BYTES).enumerate() {
+            staging.mapped()[..part.len()].copy_from_slice(part);
+            let begin = (part_ix * MOST_STAGING_BYTES) as u64;
+            context.run("upload", |commands| {
+                commands.copy_buffer_to((&self.any, begin), &staging, part.len() as u64);
+                commands.barrier(Access::TransferWrite, Access::AllReads); // the buffer
+            })?;
+        }
+        Ok(())
     }
 
     /// All elements; waits for the device.
@@ -128,6 +144,12 @@ impl<T: Pod> Buffer<T> {
     pub fn any(&self) -> &AnyBuffer {
         &self.any
     }
+
+    /// Of a buffer for [`BufferUse::Address`], low word first, as kernels take it. A multiple of 16.
+    pub fn address(&self) -> [u32; 2] {
+        let address = self.any.address();
+        [address as u32, (address >> 32) as u32]
+    }
 }
 
 impl AnyBuffer {
@@ -143,7 +165,9 @@ impl AnyBuffer {
         // SAFETY: the raw buffer is destroyed on each way out that does not hand it to an owner.
         unsafe {
             let raw = device.create_buffer(&info, None).map_err(GpuError::call("vkCreateBuffer", name))?;
-            let requirements = device.get_buffer_memory_requirements(raw);
+            let mut requirements = device.get_buffer_memory_requirements(raw);
+            // By address, kernels read whole rows.
+            requirements.alignment = requirements.alignment.max(ROW_BYTES);
             let allocation = match context.allocate(name, requirements, location, true) {
                 Ok(allocation) => ManuallyDrop::new(allocation),
                 Err(error) => {
@@ -173,7 +197,7 @@ impl AnyBuffer {
         self.raw
     }
 
-    /// Of a buffer for [`BufferUse::Structure`].
+    /// Of a buffer for [`BufferUse::Address`] or [`BufferUse::Structure`].
     pub(super) fn address(&self) -> vk::DeviceAddress {
         let info = vk::BufferDeviceAddressInfo::default().buffer(self.raw);
         // SAFETY: the buffer was created with the usage that allows it.

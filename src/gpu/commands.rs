@@ -293,7 +293,12 @@ impl Commands<'_> {
 
     /// Copies the first `bytes`.
     pub fn copy_buffer(&self, source: &AnyBuffer, destination: &AnyBuffer, bytes: u64) {
-        let region = [vk::BufferCopy::default().size(bytes)];
+        self.copy_buffer_to((destination, 0), source, bytes);
+    }
+
+    /// Copies the source's first `bytes` to where the destination's byte `begin` stands.
+    pub fn copy_buffer_to(&self, (destination, begin): (&AnyBuffer, u64), source: &AnyBuffer, bytes: u64) {
+        let region = [vk::BufferCopy::default().dst_offset(begin).size(bytes)];
         // SAFETY: both buffers hold that many bytes, which their owners have checked.
         unsafe { self.context.device.cmd_copy_buffer(self.raw, source.raw(), destination.raw(), &region) };
     }

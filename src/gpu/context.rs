@@ -97,6 +97,18 @@ impl Context {
         Self::open(instance, physical, info, Purpose::RayTracing)
     }
 
+    /// As [`Context::new`], as if no more than so many bytes of a storage buffer could be bound: small scenes then meet
+    /// what large ones meet elsewhere.
+    ///
+    /// # Errors
+    /// As [`Context::new`].
+    pub fn with_storage_range(options: &ContextOptions, bytes: u64) -> Result<Arc<Self>, GpuError> {
+        let mut context = Self::new(options)?;
+        let limits = &mut Arc::get_mut(&mut context).expect("nothing has been made from it yet").limits;
+        limits.storage_range = limits.storage_range.min(bytes);
+        Ok(context)
+    }
+
     fn open(
         instance: Arc<Instance>,
         physical: vk::PhysicalDevice,
@@ -126,7 +138,7 @@ impl Context {
                 device.create_command_pool(&pool, None).map_err(GpuError::call("vkCreateCommandPool", "kdray"))?;
             (device.get_device_queue(family as u32, 0), pool)
         };
-        let allocator = create_allocator(&instance, &device, physical, ray_tracing)?;
+        let allocator = create_allocator(&instance, &device, physical)?;
         Ok(Arc::new(Self {
             ray_tracing: ray_tracing.then(|| RayTracingCalls::new(&instance, physical, &device)),
             statistics: extras.statistics.then(|| StatisticsCalls::new(&instance, &device)),
@@ -141,15 +153,7 @@ impl Context {
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
             info,
             fuses_fma: OnceLock::new(),
-            limits: Limits {
-                storage_range: u64::from(properties.limits.max_storage_buffer_range),
-                target_size: properties
-                    .limits
-                    .max_framebuffer_width
-                    .min(properties.limits.max_framebuffer_height)
-                    .min(properties.limits.max_image_dimension2_d),
-                n_groups: properties.limits.max_compute_work_group_count[0],
-            },
+            limits: Limits::of(&instance, physical),
             instance,
         }))
     }
@@ -288,7 +292,6 @@ fn create_allocator(
     instance: &Instance,
     device: &ash::Device,
     physical_device: vk::PhysicalDevice,
-    buffer_device_address: bool,
 ) -> Result<Allocator, GpuError> {
     const MIB: u64 = 1 << 20;
     // Blocks grow with use, so that a small scene takes little memory.
@@ -300,7 +303,7 @@ fn create_allocator(
         device: device.clone(),
         physical_device,
         debug_settings: AllocatorDebugSettings::default(),
-        buffer_device_address,
+        buffer_device_address: true,
         allocation_sizes: sizes,
     })
     .map_err(|source| GpuError::Memory { object: "allocator".into(), bytes: 0, source })

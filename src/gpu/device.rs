@@ -75,12 +75,13 @@ impl DeviceExtras {
         let mut create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions)
-            .push_next(&mut features);
+            .push_next(&mut features)
+            .push_next(&mut addresses);
         if self.statistics {
             create = create.push_next(&mut executables);
         }
         if self.purpose == Purpose::RayTracing {
-            create = create.push_next(&mut addresses).push_next(&mut structures).push_next(&mut pipelines);
+            create = create.push_next(&mut structures).push_next(&mut pipelines);
         }
         // SAFETY: all that `create` points to lives until the call returns.
         unsafe { instance.raw.create_device(physical, &create, None) }

@@ -45,12 +45,35 @@ impl fmt::Display for DeviceSelector {
 /// The limits that sizes are held against.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Bytes of one storage buffer.
+    /// Bytes of one storage buffer that is bound.
     pub storage_range: u64,
+    /// Bytes of one buffer that is read by its address.
+    pub buffer_bytes: u64,
     /// Pixels of a render target's side.
     pub target_size: u32,
     /// Workgroups of one dimension of a dispatch.
     pub n_groups: u32,
+}
+
+impl Limits {
+    /// Of a device with Vulkan 1.3.
+    pub(super) fn of(instance: &Instance, device: vk::PhysicalDevice) -> Self {
+        let mut of_1_1 = vk::PhysicalDeviceVulkan11Properties::default();
+        let mut of_1_3 = vk::PhysicalDeviceVulkan13Properties::default();
+        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut of_1_1).push_next(&mut of_1_3);
+        // SAFETY: the device belongs to the instance and knows both structs.
+        unsafe { instance.raw.get_physical_device_properties2(device, &mut all) };
+        let limits = all.properties.limits;
+        Self {
+            storage_range: u64::from(limits.max_storage_buffer_range),
+            buffer_bytes: of_1_3.max_buffer_size.min(of_1_1.max_memory_allocation_size),
+            target_size: limits
+                .max_framebuffer_width
+                .min(limits.max_framebuffer_height)
+                .min(limits.max_image_dimension2_d),
+            n_groups: limits.max_compute_work_group_count[0],
+        }
+    }
 }
 
 /// All devices, usable or not.
@@ -176,8 +199,9 @@ fn missing(
     device: vk::PhysicalDevice,
     subgroup: &vk::PhysicalDeviceSubgroupProperties,
 ) -> Vec<String> {
+    let mut features_1_2 = vk::PhysicalDeviceVulkan12Features::default();
     let mut features_1_3 = vk::PhysicalDeviceVulkan13Features::default();
-    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut features_1_3);
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut features_1_2).push_next(&mut features_1_3);
     // SAFETY: the device has Vulkan 1.3.
     let (families, targets) = unsafe {
         instance.raw.get_physical_device_features2(device, &mut features);
@@ -188,6 +212,7 @@ fn missing(
     };
     let operations = vk::SubgroupFeatureFlags::BASIC | vk::SubgroupFeatureFlags::ARITHMETIC;
     let needs = [
+        (features_1_2.buffer_device_address == vk::TRUE, "bufferDeviceAddress"),
         (features_1_3.dynamic_rendering == vk::TRUE, "dynamicRendering"),
         (features_1_3.synchronization2 == vk::TRUE, "synchronization2"),
         (features_1_3.compute_full_subgroups == vk::TRUE, "computeFullSubgroups"),

@@ -20,6 +20,7 @@ mod pipeline;
 mod presenter;
 mod probe;
 mod ray_tracing;
+mod specialization;
 mod statistics;
 mod surface;
 mod swapchain;

@@ -4,7 +4,9 @@ use std::{ffi::CStr, io::Cursor, sync::Arc};
 
 use ash::vk;
 
-use super::{Bindings, Context, GpuError, Presenter, TargetKind, statistics::capture_flags};
+use super::{
+    Bindings, Context, GpuError, Presenter, TargetKind, specialization::Specialization, statistics::capture_flags,
+};
 
 pub(super) const ENTRY_POINT: &CStr = c"main";
 
@@ -33,11 +35,8 @@ impl ComputePipeline {
     /// The driver refuses the module or is out of memory.
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &ComputeDesc) -> Result<Self, GpuError> {
         let module = ShaderModule::new(context, desc.name, desc.spirv)?;
-        let entries: Vec<_> = (0..desc.constants.len() as u32)
-            .map(|id| vk::SpecializationMapEntry { constant_id: id, offset: 4 * id, size: 4 })
-            .collect();
-        let constants =
-            vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(desc.constants));
+        let constants = Specialization::new(desc.constants, bindings);
+        let constants = constants.info();
         let flags = if desc.full_subgroups {
             vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS
         } else {
@@ -118,9 +117,15 @@ impl RasterPipeline {
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &RasterDesc) -> Result<Self, GpuError> {
         let vertex = ShaderModule::new(context, desc.name, desc.vertex)?;
         let fragment = ShaderModule::new(context, desc.name, desc.fragment)?;
+        let constants = Specialization::new(&[], bindings);
+        let constants = constants.info();
         let stages = [(vk::ShaderStageFlags::VERTEX, vertex.raw), (vk::ShaderStageFlags::FRAGMENT, fragment.raw)].map(
             |(stage, module)| {
-                vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(ENTRY_POINT)
+                vk::PipelineShaderStageCreateInfo::default()
+                    .stage(stage)
+                    .module(module)
+                    .name(ENTRY_POINT)
+                    .specialization_info(&constants)
             },
         );
         let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();

@@ -39,7 +39,7 @@ mod tests {
 
     #[test]
     fn leaves_touch_their_triangles_and_fill_the_root() {
-        let triangles = staircase(40);
+        let triangles = staircase(100);
         let tree = KdTree::build(&triangles, &BuildOptions::default());
         let boxes = tree.boxes();
         let volume = |cell: &KdBox| Bounds::from(*cell).extent().iter().product::<f64>();

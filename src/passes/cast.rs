@@ -22,13 +22,13 @@ pub struct CastResources {
 }
 
 impl CastResources {
-    /// The layout of the set.
+    /// The layout of the set, for kernels that read the tree.
     ///
     /// # Errors
     /// Out of memory.
-    pub fn bindings(context: &Arc<Context>) -> Result<Arc<Bindings>, GpuError> {
+    pub fn bindings(context: &Arc<Context>, tree: &Tree) -> Result<Arc<Bindings>, GpuError> {
         let kinds: Vec<_> = tree::BINDINGS.into_iter().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
-        Bindings::new(context, &kinds, size_of::<CastBatch>() as u32)
+        Bindings::with_constants(context, &kinds, size_of::<CastBatch>() as u32, &tree.constants())
     }
 
     /// Room for `len` rays.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::{
     frame::{RenderOptions, Traversal},
     gpu::{BindingKind, Bindings, ComputeDesc, ComputePipeline, Context, GpuError},
-    layout::{BIND_FRAME, BIND_TRIANGLE_IDS},
+    layout::{BIND_ADDRESSES, BIND_FRAME, BIND_TRIANGLE_IDS},
 };
 
 mod accumulate;
@@ -124,7 +124,7 @@ impl Passes {
 /// A binding number of layout.glsl and what it holds.
 fn binding(number: u32) -> (u32, BindingKind) {
     let kind = match number {
-        BIND_FRAME => BindingKind::Uniform,
+        BIND_FRAME | BIND_ADDRESSES => BindingKind::Uniform,
         BIND_TRIANGLE_IDS => BindingKind::Image,
         _ => BindingKind::Storage,
     };

@@ -22,8 +22,6 @@ pub struct Resources {
     pub tree: Tree,
     /// Three a triangle, or none.
     pub vertex_indices: Buffer<u32>,
-    /// `n_triangles`.
-    pub triangle_materials: Buffer<u32>,
     pub materials: Buffer<Material>,
     /// `n_lights`.
     pub lights: Buffer<Light>,
@@ -51,23 +49,20 @@ impl Resources {
         n_bounces: usize,
     ) -> Result<Self, GpuError> {
         let storage = BufferUse::Storage;
+        let mut tree = Tree::new(context, &scene.triangles, tree, constants)?;
+        tree.add_materials(context, &scene.triangle_materials)?;
         let kinds: Vec<_> = (0..layout::N_BINDINGS).map(binding).collect();
+        let indices = vertex_indices(&scene.triangles);
         let mut resources = Self {
-            tree: Tree::new(context, &scene.triangles, tree, constants)?,
-            vertex_indices: Buffer::with(
-                context,
-                "vertex_indices",
-                &vertex_indices(&scene.triangles),
-                BufferUse::Index,
-            )?,
-            triangle_materials: Buffer::with(context, "triangle_materials", &scene.triangle_materials, storage)?,
+            vertex_indices: Buffer::with(context, "vertex_indices", &indices, BufferUse::Index)?,
             materials: Buffer::with(context, "materials", &scene.materials, storage)?,
             lights: Buffer::with(context, "lights", &scene.lights, storage)?,
             queues: Queues::new(context, constants.queue_capacity, constants.n_lights)?,
             pixels: Pixels::new(context, constants, false)?,
             bounces: Buffer::new(context, "bounces", n_bounces, BufferUse::Indirect)?,
             counters: Buffer::new(context, "counters", n_bounces, storage)?,
-            bindings: Bindings::new(context, &kinds, PUSH_BYTES)?,
+            bindings: Bindings::with_constants(context, &kinds, PUSH_BYTES, &tree.constants())?,
+            tree,
             sets: Vec::new(),
             constants: *constants,
         };
@@ -83,7 +78,6 @@ impl Resources {
     fn make_set(&self, name: &str, rays: &Buffer<Ray>, next_rays: &Buffer<Ray>) -> Result<BindingSet, GpuError> {
         let (queues, pixels) = (&self.queues, &self.pixels);
         let own = [
-            (layout::BIND_TRIANGLE_MATERIALS, Binding::Buffer(self.triangle_materials.any())),
             (layout::BIND_MATERIALS, Binding::Buffer(self.materials.any())),
             (layout::BIND_LIGHTS, Binding::Buffer(self.lights.any())),
             (layout::BIND_RAYS, Binding::Buffer(rays.any())),

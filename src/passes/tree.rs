@@ -1,21 +1,26 @@
-//! What the traversal reads: a part of every descriptor set.
+//! What grows with the scene, a part of every descriptor set: triangles and their tree.
 
 use std::sync::Arc;
+
+use bytemuck::Pod;
 
 use crate::{
     frame::Traversal,
     gpu::{Binding, Buffer, BufferUse, Context, GpuError},
     kdtree::{Extras, KdTree},
     layout::{
-        BIND_FRAME, BIND_KD_BOXES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_ROPES, BIND_LEAF_PLANES,
-        BIND_LEAF_TRIANGLES, BIND_TRIANGLES, BRUTE_MAX_TRIANGLES, Frame, KdBox, KdNode, Plane, Triangle,
+        Addresses, BIND_ADDRESSES, BIND_FRAME, BIND_KD_BOXES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_ROPES,
+        BIND_LEAF_PLANES, BIND_LEAF_TRIANGLES, BIND_TRIANGLE_MATERIALS, BIND_TRIANGLES, BRUTE_MAX_TRIANGLES,
+        CONSTANT_BY_ADDRESS, Frame, KdBox, KdNode, Plane, Triangle,
     },
 };
 
 /// The bindings' numbers.
-pub(super) const BINDINGS: [u32; 8] = [
+pub(super) const BINDINGS: [u32; 10] = [
     BIND_FRAME,
+    BIND_ADDRESSES,
     BIND_TRIANGLES,
+    BIND_TRIANGLE_MATERIALS,
     BIND_KD_NODES,
     BIND_KD_PARENTS,
     BIND_LEAF_TRIANGLES,
@@ -25,10 +30,17 @@ pub(super) const BINDINGS: [u32; 8] = [
 ];
 
 /// Triangles, their kd-tree, and the constants that hold the root's cell.
+///
+/// Where one of the buffers of triangles and tree is larger than what the device binds, kernels read all of them by
+/// address (glsl/shared/scene.glsl).
 pub struct Tree {
     /// One.
     pub frame: Buffer<Frame>,
+    /// One: of the buffers below.
+    addresses: Buffer<Addresses>,
     pub triangles: Buffer<Triangle>,
+    /// One a triangle, after `add_materials`.
+    pub triangle_materials: Buffer<u32>,
     pub kd_nodes: Buffer<KdNode>,
     /// One a pair of nodes.
     pub kd_parents: Buffer<u32>,
@@ -39,6 +51,7 @@ pub struct Tree {
     pub kd_boxes: Buffer<KdBox>,
     /// Six a node, after `add_extras`.
     pub kd_ropes: Buffer<u32>,
+    usage: BufferUse,
 }
 
 impl Tree {
@@ -52,17 +65,32 @@ impl Tree {
         tree: &KdTree,
         constants: &Frame,
     ) -> Result<Self, GpuError> {
-        let storage = BufferUse::Storage;
-        Ok(Self {
+        let is_bound = most_bytes(triangles, tree) as u64 <= context.limits().storage_range;
+        let usage = if is_bound { BufferUse::Storage } else { BufferUse::Address };
+        let made = Self {
             frame: Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?,
-            triangles: Buffer::with(context, "triangles", triangles, storage)?,
-            kd_nodes: Buffer::with(context, "kd_nodes", &tree.nodes, storage)?,
-            kd_parents: Buffer::with(context, "kd_parents", &tree.parents, storage)?,
-            leaf_triangles: Buffer::with(context, "leaf_triangles", &tree.leaf_triangles, storage)?,
-            leaf_planes: Buffer::with(context, "leaf_planes", &tree.leaf_planes, storage)?,
-            kd_boxes: Buffer::new(context, "kd_boxes", 0, storage)?,
-            kd_ropes: Buffer::new(context, "kd_ropes", 0, storage)?,
-        })
+            addresses: Buffer::new(context, "addresses", 1, BufferUse::Uniform)?,
+            triangles: Buffer::with(context, "triangles", triangles, usage)?,
+            triangle_materials: Buffer::new(context, "triangle_materials", 0, usage)?,
+            kd_nodes: Buffer::with(context, "kd_nodes", &tree.nodes, usage)?,
+            kd_parents: Buffer::with(context, "kd_parents", &tree.parents, usage)?,
+            leaf_triangles: Buffer::with(context, "leaf_triangles", &tree.leaf_triangles, usage)?,
+            leaf_planes: Buffer::with(context, "leaf_planes", &tree.leaf_planes, usage)?,
+            kd_boxes: Buffer::new(context, "kd_boxes", 0, usage)?,
+            kd_ropes: Buffer::new(context, "kd_ropes", 0, usage)?,
+            usage,
+        };
+        made.addresses.upload(&[made.addresses()])?;
+        Ok(made)
+    }
+
+    /// Uploads the triangles' materials, which a cast has no use for. Descriptor sets are to be made anew.
+    ///
+    /// # Errors
+    /// Beyond the device's limits, out of memory.
+    pub fn add_materials(&mut self, context: &Arc<Context>, triangle_materials: &[u32]) -> Result<(), GpuError> {
+        self.triangle_materials = Buffer::with(context, "triangle_materials", triangle_materials, self.usage)?;
+        self.addresses.upload(&[self.addresses()])
     }
 
     /// Uploads what the traversal reads beside the tree. Descriptor sets are to be made anew.
@@ -75,16 +103,49 @@ impl Tree {
             return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
         }
         let extras = Extras::new(tree, traversal);
-        self.kd_boxes = Buffer::with(context, "kd_boxes", &extras.boxes, BufferUse::Storage)?;
-        self.kd_ropes = Buffer::with(context, "kd_ropes", &extras.ropes, BufferUse::Storage)?;
+        let kd_boxes = Buffer::with(context, "kd_boxes", &extras.boxes, self.usage)?;
+        let kd_ropes = Buffer::with(context, "kd_ropes", &extras.ropes, self.usage)?;
+        let (boxes_at, ropes_at) = (self.address_of(&kd_boxes), self.address_of(&kd_ropes));
+        self.addresses.upload(&[Addresses { kd_boxes: boxes_at, kd_ropes: ropes_at, ..self.addresses() }])?;
+        (self.kd_boxes, self.kd_ropes) = (kd_boxes, kd_ropes);
         Ok(())
+    }
+
+    /// Whether kernels read triangles and tree by address.
+    pub fn is_by_address(&self) -> bool {
+        self.usage == BufferUse::Address
+    }
+
+    /// Specialization constants of all kernels that read it.
+    pub(super) fn constants(&self) -> [(u32, u32); 1] {
+        [(CONSTANT_BY_ADDRESS, self.is_by_address().into())]
+    }
+
+    fn addresses(&self) -> Addresses {
+        Addresses {
+            triangles: self.address_of(&self.triangles),
+            triangle_materials: self.address_of(&self.triangle_materials),
+            kd_nodes: self.address_of(&self.kd_nodes),
+            kd_parents: self.address_of(&self.kd_parents),
+            leaf_triangles: self.address_of(&self.leaf_triangles),
+            leaf_planes: self.address_of(&self.leaf_planes),
+            kd_boxes: self.address_of(&self.kd_boxes),
+            kd_ropes: self.address_of(&self.kd_ropes),
+        }
+    }
+
+    /// 0 where it is bound.
+    fn address_of<T: Pod>(&self, buffer: &Buffer<T>) -> [u32; 2] {
+        if self.is_by_address() { buffer.address() } else { [0; 2] }
     }
 
     /// For [`BINDINGS`].
     pub(super) fn objects(&self) -> [(u32, Binding<'_>); BINDINGS.len()] {
         let buffers = [
             self.frame.any(),
+            self.addresses.any(),
             self.triangles.any(),
+            self.triangle_materials.any(),
             self.kd_nodes.any(),
             self.kd_parents.any(),
             self.leaf_triangles.any(),
@@ -94,4 +155,20 @@ impl Tree {
         ];
         std::array::from_fn(|i| (BINDINGS[i], Binding::Buffer(buffers[i])))
     }
+}
+
+/// Of the largest buffer, bytes, with those that any traversal asks for: what one can be bound by, all can.
+fn most_bytes(triangles: &[Triangle], tree: &KdTree) -> usize {
+    const ROPES_BYTES: usize = 6 * size_of::<u32>();
+    let n_nodes = tree.nodes.len();
+    let sizes = [
+        size_of_val(triangles),
+        size_of_val(&*tree.nodes),
+        size_of_val(&*tree.parents),
+        size_of_val(&*tree.leaf_triangles),
+        size_of_val(&*tree.leaf_planes),
+        n_nodes * size_of::<KdBox>(),
+        n_nodes * ROPES_BYTES,
+    ];
+    sizes.into_iter().max().unwrap_or(0)
 }

@@ -64,9 +64,10 @@ impl Arena {
             scenery = Scenery::new(context, triangles)?;
             build_ms.push(scenery.build_ms());
         }
+        let tree = Tree::new(context, triangles, &stage.tree, &stage.frame)?;
         Ok(Self {
-            tree: Tree::new(context, triangles, &stage.tree, &stage.frame)?,
-            bindings: CastResources::bindings(context)?,
+            bindings: CastResources::bindings(context, &tree)?,
+            tree,
             scenery: Rc::new(scenery),
             raster: Raster::new(context, stage)?,
             builds: Builds {

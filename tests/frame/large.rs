@@ -1,0 +1,155 @@
+//! What grows with the scene is bound, and read by address where the device binds less than that: the same bits both ways.
+//! Tried with a device that binds little.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use kdray::{
+    cast::{CastRay, Caster, Query},
+    frame::{Primary, RenderOptions, Traversal},
+    gpu::{Buffer, BufferUse, Context, ContextOptions, GpuError},
+    kdtree::KdTree,
+    layout::{Frame, KdBox},
+    passes::Tree,
+    render::Renderer,
+    scene::Scene,
+};
+
+use super::studio::{assert_silent, device, identical, options, tree_of};
+use crate::support::{meshes, scenes};
+
+/// What the device binds, bytes: enough for the pictures here.
+const RANGE: u64 = 48 << 10;
+
+fn small_device() -> Arc<Context> {
+    let options = ContextOptions { device: None, validate: true };
+    Context::with_storage_range(&options, RANGE).expect("a device with validation")
+}
+
+/// With a ring of 16,000 triangles: none of its arrays can be bound then.
+fn large_scene() -> (Scene, KdTree) {
+    let mut scene = scenes::mixed();
+    scenes::add(&mut scene, meshes::torus(200, 40), scenes::mirror(Vec3::splat(0.8)));
+    let tree = tree_of(&scene);
+    (scene, tree)
+}
+
+/// Of each array that grows with the scene, with whatever the traversal asks for.
+fn scene_bytes(tree: &Tree, traversal: Traversal) -> Vec<u64> {
+    let mut buffers = vec![
+        tree.triangles.any(),
+        tree.triangle_materials.any(),
+        tree.kd_nodes.any(),
+        tree.kd_parents.any(),
+        tree.leaf_triangles.any(),
+        tree.leaf_planes.any(),
+    ];
+    let has_boxes = matches!(traversal, Traversal::MaskBoxes | Traversal::Backtrack | Traversal::Ropes);
+    buffers.extend(has_boxes.then(|| tree.kd_boxes.any()));
+    buffers.extend((traversal == Traversal::Ropes).then(|| tree.kd_ropes.any()));
+    buffers.iter().map(|buffer| buffer.bytes()).collect()
+}
+
+#[test]
+fn a_scene_larger_than_what_the_device_binds_gives_the_same_bits() {
+    let ((scene, tree), any, small) = (large_scene(), device(), small_device());
+    for &traversal in Traversal::ALL {
+        for primary in [Primary::Raster, Primary::Trace] {
+            let features = traversal == Traversal::Mask;
+            let options = RenderOptions { traversal, primary, features, ..options(24, 16, 3) };
+            let [mut bound, mut by_address] = [&any, &small]
+                .map(|context| Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer"));
+            assert!(!bound.resources().tree.is_by_address() && by_address.resources().tree.is_by_address());
+            let bytes = scene_bytes(&by_address.resources().tree, traversal);
+            assert!(bytes.iter().all(|&bytes| bytes > RANGE), "{traversal}: {bytes:?}");
+            let pictures = [&mut bound, &mut by_address].map(|renderer| renderer.render().expect("a frame").0);
+            assert!(identical(&pictures[0], &pictures[1]), "{traversal} {primary}");
+            if features {
+                assert!(bound.features().expect("features") == by_address.features().expect("features"), "{primary}");
+            }
+        }
+    }
+    assert_silent(&any);
+    assert_silent(&small);
+}
+
+#[test]
+fn another_traversal_of_a_renderer_that_is_there_reads_by_address_too() {
+    let ((scene, tree), small) = (large_scene(), small_device());
+    let start = options(24, 16, 3);
+    let mut renderer = Renderer::new(small.clone(), &scene, &tree, &start).expect("a renderer");
+    let picture = renderer.render().expect("a frame").0;
+    for traversal in [Traversal::Ropes, Traversal::MaskBoxes] {
+        renderer.set_options(&RenderOptions { traversal, ..start.clone() }, &tree).expect("options");
+        assert!(identical(&picture, &renderer.render().expect("a frame").0), "{traversal}");
+    }
+    assert_silent(&small);
+}
+
+#[test]
+fn rays_through_a_scene_larger_than_what_the_device_binds_find_the_same_hits() {
+    let ((scene, tree), any, small) = (large_scene(), device(), small_device());
+    let towards = |i: u16| Vec3::new((f32::from(i) * 0.7).sin(), (f32::from(i) * 0.31).cos(), -0.4);
+    let ray = |i| CastRay { origin: Vec3::new(0.1, 0.2, 0.3), t_min: 0.0, direction: towards(i), t_max: f32::INFINITY };
+    let rays: Vec<_> = (0..3000).map(ray).collect();
+    for (traversal, query) in [(Traversal::Mask, Query::Closest), (Traversal::Stack, Query::Any)] {
+        let hits = [&any, &small].map(|context| {
+            let mut caster = Caster::new(context, &scene.triangles, &tree, traversal).expect("a caster");
+            caster.cast(&rays, query, 1).expect("a cast").hits
+        });
+        assert!(hits[0].iter().any(|hit| hit.t.is_finite()));
+        assert_eq!(hits[0], hits[1], "{traversal} {query:?}");
+    }
+    assert_silent(&any);
+    assert_silent(&small);
+}
+
+/// One array beyond the range is enough, and what another traversal would read counts; a byte less, and all are bound.
+#[test]
+fn a_scene_is_read_by_address_only_where_something_of_it_cannot_be_bound() {
+    let scene = scenes::mixed();
+    let tree = tree_of(&scene);
+    let boxes = (tree.nodes.len() * size_of::<KdBox>()) as u64;
+    let largest = (size_of_val(&*scene.triangles) as u64).max(size_of_val(&*tree.leaf_planes) as u64).max(boxes);
+    for (range, is_by_address) in [(largest, false), (largest - 1, true)] {
+        let options = ContextOptions { device: None, validate: true };
+        let context = Context::with_storage_range(&options, range).expect("a device with validation");
+        let made = Tree::new(&context, &scene.triangles, &tree, &Frame::default()).expect("a tree");
+        assert_eq!(made.is_by_address(), is_by_address, "{range}");
+        assert_silent(&context);
+    }
+}
+
+/// Without this, the small device would prove nothing.
+#[test]
+fn what_is_bound_is_held_against_the_range() {
+    let ((scene, tree), small) = (large_scene(), small_device());
+    let capacity = RANGE as u32;
+    let queues = Renderer::with_queue_capacity(small.clone(), &scene, &tree, &options(8, 8, 2), capacity);
+    assert!(matches!(queues.err(), Some(GpuError::TooLarge { limit: RANGE, .. })));
+    let buffer = |len, usage| Buffer::<u32>::new(&small, "words", len, usage).err().map(|error| error.to_string());
+    let n_words = RANGE as usize / 4;
+    assert_eq!(buffer(n_words, BufferUse::Storage), None);
+    assert_eq!(buffer(n_words + 1, BufferUse::Address), None);
+    let beyond = "`words` takes 0.0 MiB, more than this device's limit of 0.0 MiB";
+    assert_eq!(buffer(n_words + 1, BufferUse::Storage).as_deref(), Some(beyond));
+}
+
+#[test]
+fn a_buffer_larger_than_the_devices_memory_is_refused_in_one_line() {
+    let context = device();
+    let n_words = context.limits().buffer_bytes as usize / 4 + 1;
+    let error = Buffer::<u32>::new(&context, "words", n_words, BufferUse::Address).err().expect("no such buffer");
+    assert!(matches!(error, GpuError::TooLarge { .. }) && !error.to_string().contains('\n'), "{error}");
+    assert_silent(&context);
+}
+
+/// Uploads come in parts.
+#[test]
+fn a_large_upload_arrives_whole() {
+    let context = device();
+    let numbers: Vec<u32> = (0..(65 << 20) / 4).collect();
+    let buffer = Buffer::with(&context, "numbers", &numbers, BufferUse::Storage).expect("a buffer");
+    assert!(buffer.download().expect("a download") == numbers);
+    assert_silent(&context);
+}
