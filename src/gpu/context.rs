@@ -59,6 +59,8 @@ pub struct Context {
     info: DeviceInfo,
     limits: Limits,
     fuses_fma: OnceLock<bool>,
+    #[cfg(feature = "hot-reload")]
+    pub(super) replacements: Mutex<super::Replacements>,
     instance: Arc<Instance>,
 }
 
@@ -141,6 +143,8 @@ impl Context {
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
             info,
             fuses_fma: OnceLock::new(),
+            #[cfg(feature = "hot-reload")]
+            replacements: Mutex::default(),
             limits: Limits {
                 storage_range: u64::from(properties.limits.max_storage_buffer_range),
                 target_size: properties

@@ -20,6 +20,7 @@ mod pipeline;
 mod presenter;
 mod probe;
 mod ray_tracing;
+mod shader;
 mod statistics;
 mod surface;
 mod swapchain;
@@ -39,6 +40,9 @@ pub use overlay::{Overlay, OverlayFrame};
 pub use pipeline::{ComputeDesc, ComputePipeline, RasterDesc, RasterPipeline, RasterTargets};
 pub use presenter::{Presenter, WindowImage};
 pub use ray_tracing::{RayTracingDesc, RayTracingPipeline};
+#[cfg(feature = "hot-reload")]
+pub use shader::Replacements;
+pub use shader::Shader;
 pub use statistics::{Statistic, StatisticValue};
 pub use surface::{Screen, Surface};
 pub use timer::{Timer, TimerRow};

@@ -1,10 +1,12 @@
 //! Compute and raster pipelines.
 
-use std::{ffi::CStr, io::Cursor, sync::Arc};
+use std::{ffi::CStr, sync::Arc};
 
 use ash::vk;
 
-use super::{Bindings, Context, GpuError, Presenter, TargetKind, statistics::capture_flags};
+use super::{
+    Bindings, Context, GpuError, Presenter, Shader, TargetKind, shader::ShaderModule, statistics::capture_flags,
+};
 
 pub(super) const ENTRY_POINT: &CStr = c"main";
 
@@ -12,8 +14,7 @@ pub(super) const ENTRY_POINT: &CStr = c"main";
 pub struct ComputeDesc<'a> {
     /// Also the debug label and the timer.
     pub name: &'static str,
-    /// The SPIR-V module's bytes.
-    pub spirv: &'a [u8],
+    pub shader: Shader,
     /// Specialization constants 0, 1, ...
     pub constants: &'a [u32],
     /// Every subgroup has all its invocations; the workgroup's width must be a multiple of the subgroup size.
@@ -32,7 +33,7 @@ impl ComputePipeline {
     /// # Errors
     /// The driver refuses the module or is out of memory.
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &ComputeDesc) -> Result<Self, GpuError> {
-        let module = ShaderModule::new(context, desc.name, desc.spirv)?;
+        let module = ShaderModule::new(context, desc.shader)?;
         let entries: Vec<_> = (0..desc.constants.len() as u32)
             .map(|id| vk::SpecializationMapEntry { constant_id: id, offset: 4 * id, size: 4 })
             .collect();
@@ -97,10 +98,8 @@ impl RasterTargets<'_> {
 pub struct RasterDesc<'a> {
     /// Also the debug label and the timer.
     pub name: &'static str,
-    /// The vertex shader's SPIR-V bytes.
-    pub vertex: &'a [u8],
-    /// The fragment shader's SPIR-V bytes.
-    pub fragment: &'a [u8],
+    pub vertex: Shader,
+    pub fragment: Shader,
     pub targets: RasterTargets<'a>,
 }
 
@@ -116,8 +115,8 @@ impl RasterPipeline {
     /// # Errors
     /// The driver refuses a module or is out of memory.
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &RasterDesc) -> Result<Self, GpuError> {
-        let vertex = ShaderModule::new(context, desc.name, desc.vertex)?;
-        let fragment = ShaderModule::new(context, desc.name, desc.fragment)?;
+        let vertex = ShaderModule::new(context, desc.vertex)?;
+        let fragment = ShaderModule::new(context, desc.fragment)?;
         let stages = [(vk::ShaderStageFlags::VERTEX, vertex.raw), (vk::ShaderStageFlags::FRAGMENT, fragment.raw)].map(
             |(stage, module)| {
                 vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module).name(ENTRY_POINT)
@@ -170,29 +169,5 @@ impl Drop for RasterPipeline {
     fn drop(&mut self) {
         // SAFETY: the device has ended all work with it.
         unsafe { self.context.device.destroy_pipeline(self.raw, None) };
-    }
-}
-
-/// A module, needed only while a pipeline is made of it.
-pub(super) struct ShaderModule<'a> {
-    pub(super) raw: vk::ShaderModule,
-    context: &'a Context,
-}
-
-impl<'a> ShaderModule<'a> {
-    pub(super) fn new(context: &'a Context, name: &str, spirv: &[u8]) -> Result<Self, GpuError> {
-        let code = ash::util::read_spv(&mut Cursor::new(spirv)).expect("build.rs writes whole SPIR-V words");
-        let info = vk::ShaderModuleCreateInfo::default().code(&code);
-        // SAFETY: the code lives until the call returns.
-        let raw = unsafe { context.device.create_shader_module(&info, None) }
-            .map_err(GpuError::call("vkCreateShaderModule", name))?;
-        Ok(Self { raw, context })
-    }
-}
-
-impl Drop for ShaderModule<'_> {
-    fn drop(&mut self) {
-        // SAFETY: pipelines do not need their modules once made.
-        unsafe { self.context.device.destroy_shader_module(self.raw, None) };
     }
 }

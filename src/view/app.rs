@@ -140,7 +140,12 @@ impl App {
         self.session.complain(&format!("{error}; the device was opened anew"));
         let Settings { options, vsync, .. } = &self.session.settings;
         match Live::open(window.clone(), &self.options.device, &self.session.loaded, options, *vsync) {
-            Ok(live) => self.shown = Some(Shown { live, ui: Ui::new(&window), window }),
+            Ok(live) => {
+                // What took the place of shaders went with the device.
+                #[cfg(feature = "hot-reload")]
+                self.reloader.shaders.compile();
+                self.shown = Some(Shown { live, ui: Ui::new(&window), window });
+            }
             Err(error) => self.end(event_loop, Err(error.into())),
         }
     }
@@ -230,6 +235,16 @@ impl ApplicationHandler<Wake> for App {
                     window.request_redraw();
                 }
                 self.reloader.done();
+            }
+            #[cfg(feature = "hot-reload")]
+            Wake::ShadersChanged => self.reloader.shaders.compile(),
+            #[cfg(feature = "hot-reload")]
+            Wake::Compiled(shaders) => {
+                if let Some(Shown { live, window, .. }) = &mut self.shown {
+                    self.session.replace_shaders(live, shaders);
+                    window.request_redraw();
+                }
+                self.reloader.shaders.done();
             }
         }
     }

@@ -16,6 +16,8 @@ pub mod pick;
 mod reload;
 mod script;
 mod session;
+#[cfg(feature = "hot-reload")]
+mod shaders;
 pub mod tour;
 mod ui;
 pub mod watch;
