@@ -61,6 +61,10 @@ fn a_tour_ends_with_the_picture_that_render_makes() {
         assert!(json[times]["n"].as_u64() >= Some(4) && json["vsync"] == false, "{json}");
         assert!(0.0 < at("p50") && at("p50") <= at("p95") && at("p95") <= at("p99"), "{json}");
     }
+    // The last frame is at rest; the first ones are drawn small.
+    let moving = &json["moving"];
+    let pixels = ["width", "height"].map(|side| moving[side].as_u64().unwrap());
+    assert!(moving["frame_ms"]["n"] == 3 && (20..160).contains(&pixels[0]) && pixels[1] < 120, "{json}");
 }
 
 #[test]
@@ -171,6 +175,46 @@ fn a_resized_window_shows_a_picture_of_its_size() {
     }
     display.act(&["key", "Escape"]);
     ended(viewer);
+}
+
+#[test]
+fn windows_without_area_and_sudden_sizes_are_no_trouble() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    let viewer = viewer(directory.path(), &display, &cornell(), &["--spp", "1"]);
+    let window = display.focus("kdray");
+    for round in 0..3 {
+        for (width, height) in [(1, 1), (300, 20), (20, 200), (2, 1), (310, 230), (1, 1)] {
+            display.act(&["windowsize", &window, &(width + round).to_string(), &height.to_string()]);
+        }
+        display.act(&["windowunmap", "--sync", &window, "windowsize", &window, "50", "50"]);
+        display.act(&["windowmap", "--sync", &window]);
+    }
+    display.act(&["windowsize", &window, "160", "120"]);
+    let picture = rendered(directory.path(), &cornell(), &[]);
+    display.act(&["windowfocus", "--sync", &window, "key", "Tab"]);
+    display.wait_until("the picture", |screen| picture.is_shown_on(screen));
+    display.act(&["key", "Escape"]);
+    let text = stderr(&ended(viewer));
+    assert!(!text.contains("warning"), "{text}");
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_is_no_end() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
+    let picture = rendered(directory.path(), &cornell(), &[]);
+    let gone = directory.path().join("gone");
+    fs::create_dir(&gone).unwrap();
+    let viewer = viewer(&gone, &display, &cornell(), &["--spp", "1", "--no-overlay"]);
+    display.wait_until("the picture", |screen| picture.is_shown_on(screen));
+    fs::remove_dir(&gone).unwrap();
+    display.focus("kdray");
+    display.act(&["key", "s", "sleep", "0.2", "key", "p", "key", "2"]);
+    display.wait_until("another view", |screen| !picture.is_shown_on(screen));
+    display.act(&["key", "Escape"]);
+    let output = ended(viewer);
+    assert!(stdout(&output).starts_with("[camera]\n"), "{}", stdout(&output));
+    let text = stderr(&output);
+    assert!(text.contains("\nwarning: cannot write `cornell-001.png`: "), "{text}");
 }
 
 #[test]

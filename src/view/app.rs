@@ -25,7 +25,7 @@ use super::{
     session::Session,
     ui::{Layout, Ui},
 };
-use crate::gpu::GpuError;
+use crate::{frame::RenderOptions, gpu::GpuError};
 
 /// The viewer, as the event loop drives it.
 pub(super) struct App {
@@ -38,6 +38,8 @@ pub(super) struct App {
     shown: Option<Shown>,
     is_overlaid: bool,
     is_occluded: bool,
+    /// Whether nothing was shown yet since the device was lost.
+    is_reopened: bool,
     outcome: Result<(), ViewError>,
 }
 
@@ -59,6 +61,7 @@ impl App {
             input: Input::default(),
             shown: None,
             is_occluded: false,
+            is_reopened: false,
             outcome: Ok(()),
         }
     }
@@ -88,7 +91,8 @@ impl App {
         match result {
             Ok(true) => self.end(event_loop, Ok(())),
             Ok(false) => {}
-            Err(ViewError::Device(error)) if error.is_device_lost() => {
+            // What is lost before it shows anything will not come back.
+            Err(ViewError::Device(error)) if error.is_device_lost() && !self.is_reopened => {
                 self.recover(shown, event_loop, error);
                 return;
             }
@@ -126,7 +130,9 @@ impl App {
         if !live.show(size, frame.as_ref())? {
             return Ok(false);
         }
-        session.shown();
+        let RenderOptions { width, height, .. } = *live.renderer.options();
+        session.shown((width, height));
+        self.is_reopened = false;
         match &mut self.script {
             Some(script) => Ok(script.shown(session, live)?),
             None => Ok(false),
@@ -141,6 +147,7 @@ impl App {
         let Settings { options, vsync, .. } = &self.session.settings;
         match Live::open(window.clone(), &self.options.device, &self.session.loaded, options, *vsync) {
             Ok(live) => {
+                self.is_reopened = true;
                 // What took the place of shaders went with the device.
                 #[cfg(feature = "hot-reload")]
                 self.reloader.shaders.compile();
@@ -185,7 +192,8 @@ impl App {
     pub fn report(self) -> Result<ViewReport, ViewError> {
         self.outcome?;
         let frames = &self.session.all_frames;
-        let pace = PaceReport { frame_ms: frames.pace(), input_to_present_ms: frames.latency() };
+        let pace =
+            PaceReport { frame_ms: frames.pace(), input_to_present_ms: frames.latency(), moving: frames.moving() };
         let Some(Shown { live, ui, window }) = self.shown else {
             return Err(ViewError::Window("it was closed before it was open".to_owned()));
         };
@@ -254,7 +262,7 @@ impl ApplicationHandler<Wake> for App {
             WindowEvent::CloseRequested => self.end(event_loop, Ok(())),
             WindowEvent::RedrawRequested => self.frame(event_loop),
             WindowEvent::Occluded(is_occluded) => self.is_occluded = is_occluded,
-            WindowEvent::Resized(_) => {
+            WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => {
                 if let Some(Shown { live, .. }) = &mut self.shown {
                     live.presenter.mark_stale();
                     // As long as the user pulls at the window, it is drawn fast.

@@ -38,10 +38,14 @@ pub struct Session {
     profile: Profile,
     /// Whether nobody waits for pictures of full size.
     is_interactive: bool,
+    /// Whether the last frame was drawn while the camera moved.
+    is_moving: bool,
     /// Whether the last frame completed a sample.
     has_new_sample: bool,
     /// The widest and the highest picture that there was.
     room: (u32, u32),
+    /// The window's size that the last frame was drawn for.
+    window: (u32, u32),
     /// Milliseconds of the sample that is being drawn.
     sample_ms: f64,
     pub(super) picked: Option<Picked>,
@@ -61,9 +65,11 @@ impl Session {
             all_frames: History::new(f64::INFINITY),
             profile: Profile::default(),
             is_interactive,
+            is_moving: false,
             has_new_sample: false,
             sample_ms: 0.0,
             room: (0, 0),
+            window: (0, 0),
             picked: None,
             message: None,
             start: Instant::now(),
@@ -102,6 +108,7 @@ impl Session {
         live.context.wait()?;
         live.presenter.set_vsync(self.settings.vsync);
         self.budget.set_budget(self.settings.budget_ms);
+        self.fit_window(live, window)?;
         let features = self.settings.view != View::Picture;
         let whole = RenderOptions { width: window.0, height: window.1, features, ..self.settings.options.clone() };
         let (view, brightest) = self.view();
@@ -113,6 +120,7 @@ impl Session {
             self.pace.moved(now);
         }
         let is_moving = self.pace.is_moving(now) || self.is_learning();
+        self.is_moving = self.pace.is_moving(now);
         let (width, height) = if is_moving { self.budget.size(window) } else { window };
         let asked = RenderOptions { width, height, ..whole.clone() };
         let is_new = asked != *live.renderer.options();
@@ -138,6 +146,18 @@ impl Session {
         } else {
             Ok(())
         }
+    }
+
+    /// What was learned of a window of another size is put right.
+    fn fit_window(&mut self, live: &mut Live, window: (u32, u32)) -> Result<(), GpuError> {
+        let before = std::mem::replace(&mut self.window, window);
+        if before == window || before == (0, 0) {
+            return Ok(());
+        }
+        let n_pixels = |(width, height): (u32, u32)| f64::from(width) * f64::from(height);
+        self.budget.resize(n_pixels(window) / n_pixels(before));
+        // Parts as small as a small window's would be too many for a large one.
+        live.renderer.limit_batches(None)
     }
 
     /// Whether the buffers are those that such a picture needs, and large enough; they will be.
@@ -196,14 +216,15 @@ impl Session {
         self.complain(&error.to_string());
     }
 
-    /// The frame is on its way to the screen.
-    pub fn shown(&mut self) {
+    /// The frame, a picture of that size, is on its way to the screen.
+    pub fn shown(&mut self, picture: (u32, u32)) {
         let now = Instant::now();
         let times = self.pace.shown(now);
         let record = FrameRecord {
             shown_s: now.duration_since(self.start).as_secs_f64(),
             frame_ms: times.frame_ms,
             latency_ms: times.latency_ms,
+            moving: self.is_moving.then_some(picture),
             pass_ms: Vec::new(),
         };
         self.all_frames.push(record.clone());
