@@ -6,6 +6,7 @@ pub mod budget;
 pub mod controller;
 mod display;
 mod error;
+pub mod flight;
 pub mod history;
 mod input;
 mod live;

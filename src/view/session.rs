@@ -80,7 +80,11 @@ impl Session {
     pub fn is_busy(&self, live: &Live, now: Instant, window: (u32, u32)) -> bool {
         let options = live.renderer.options();
         let is_small = window != (options.width, options.height);
-        is_small || self.controller.is_flying() || self.pace.is_moving(now) || self.is_learning() || !self.is_done(live)
+        is_small
+            || self.controller.flight.is_under_way()
+            || self.pace.is_moving(now)
+            || self.is_learning()
+            || !self.is_done(live)
     }
 
     /// Whether it is not known yet how long a picture takes: small ones tell.
@@ -100,7 +104,7 @@ impl Session {
     pub fn draw(&mut self, live: &mut Live, window: (u32, u32)) -> Result<(), GpuError> {
         let now = Instant::now();
         let seconds = self.pace.begin(now);
-        if self.controller.is_flying() {
+        if self.controller.flight.is_under_way() {
             self.controller.advance(seconds);
             self.pace.moved(now);
         }
@@ -254,7 +258,7 @@ impl Session {
             picture: (options.width, options.height),
             n_samples: live.renderer.n_samples(),
             progress: live.renderer.progress(),
-            speed: self.controller.speed(),
+            speed: self.controller.flight.speed(),
             is_flying,
             profile: &self.profile,
             history: &self.history,
