@@ -3,6 +3,9 @@
 
 mod support;
 
+#[path = "view/failures.rs"]
+mod failures;
+
 use std::{
     fs,
     path::Path,
@@ -196,51 +199,6 @@ fn windows_without_area_and_sudden_sizes_are_no_trouble() {
     display.act(&["key", "Escape"]);
     let text = stderr(&ended(viewer));
     assert!(!text.contains("warning"), "{text}");
-}
-
-#[test]
-fn a_picture_that_cannot_be_written_is_no_end() {
-    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
-    let picture = rendered(directory.path(), &cornell(), &[]);
-    let gone = directory.path().join("gone");
-    fs::create_dir(&gone).unwrap();
-    let viewer = viewer(&gone, &display, &cornell(), &["--spp", "1", "--no-overlay"]);
-    display.wait_until("the picture", |screen| picture.is_shown_on(screen));
-    fs::remove_dir(&gone).unwrap();
-    display.focus("kdray");
-    display.act(&["key", "s", "sleep", "0.2", "key", "p", "key", "2"]);
-    display.wait_until("another view", |screen| !picture.is_shown_on(screen));
-    display.act(&["key", "Escape"]);
-    let output = ended(viewer);
-    assert!(stdout(&output).starts_with("[camera]\n"), "{}", stdout(&output));
-    let text = stderr(&output);
-    assert!(text.contains("\nwarning: cannot write `cornell-001.png`: "), "{text}");
-}
-
-#[test]
-fn a_changed_scene_is_shown_and_a_broken_one_is_not() {
-    let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
-    let path = directory.path().join("x.toml");
-    let bright = fs::read_to_string(cornell()).unwrap();
-    let dark = bright.replace("ambient = [0.34, 0.33, 0.31]", "ambient = [0.1, 0.1, 0.4]");
-    assert_ne!(bright, dark);
-    fs::write(&path, &bright).unwrap();
-    let before = rendered(directory.path(), "x.toml", &[]);
-    let viewer = viewer(directory.path(), &display, "x.toml", &["--spp", "1", "--no-overlay"]);
-    display.wait_until("the scene", |screen| before.is_shown_on(screen));
-    fs::write(&path, &dark).unwrap();
-    let after = rendered(directory.path(), "x.toml", &[]);
-    assert!(before != after);
-    display.wait_until("the changed scene", |screen| after.is_shown_on(screen));
-    fs::write(&path, "mesh = [[").unwrap();
-    std::thread::sleep(std::time::Duration::from_secs(1));
-    assert!(after.is_shown_on(&display.screen()), "the old one stays");
-    fs::write(&path, &bright).unwrap();
-    display.wait_until("the mended scene", |screen| before.is_shown_on(screen));
-    display.focus("kdray");
-    display.act(&["key", "Escape"]);
-    let text = stderr(&ended(viewer));
-    assert!(text.lines().any(|line| line.starts_with("warning: x.toml:1:")), "{text}");
 }
 
 #[test]

@@ -4,7 +4,12 @@ use std::path::{Path, PathBuf};
 
 use glam::{Vec3, uvec2};
 
-use super::{input::Action, live::Live, pick::pick, session::Session};
+use super::{
+    input::Action,
+    live::Live,
+    pick::pick,
+    session::{Session, Topic},
+};
 use crate::{
     gpu::GpuError,
     output::{self, OutputError},
@@ -40,9 +45,9 @@ impl Session {
         match self.complete(live).map_err(SaveError::from).and_then(|()| save(live, &path)) {
             Ok(()) => {
                 print(&format!("wrote {}\n", path.display()));
-                self.message = None;
+                self.settle(Topic::File);
             }
-            Err(error) => self.complain(&error.to_string()),
+            Err(error) => self.complain(Topic::File, &error.to_string()),
         }
     }
 

@@ -22,7 +22,7 @@ use super::{
     panel::Settings,
     reload::{Reloader, Wake},
     script::Script,
-    session::Session,
+    session::{Session, Topic},
     ui::{Layout, Ui},
 };
 use crate::{frame::RenderOptions, gpu::GpuError};
@@ -143,7 +143,7 @@ impl App {
     fn recover(&mut self, shown: Shown, event_loop: &ActiveEventLoop, error: GpuError) {
         let Shown { live, ui, window } = shown;
         drop((live, ui));
-        self.session.complain(&format!("{error}; the device was opened anew"));
+        self.session.complain(Topic::Device, &format!("{error}; the device was opened anew"));
         let Settings { options, vsync, .. } = &self.session.settings;
         match Live::open(window.clone(), &self.options.device, &self.session.loaded, options, *vsync) {
             Ok(live) => {
@@ -280,7 +280,9 @@ impl ApplicationHandler<Wake> for App {
         let is_busy = self.script.is_some() || self.session.is_busy(live, now, (size.width, size.height));
         let wait = if is_busy || !self.is_overlaid { Duration::MAX } else { ui.repaint_after() };
         let has_area = size.width > 0 && size.height > 0;
-        if self.is_occluded || !has_area {
+        // A script goes on whoever looks.
+        let is_seen = self.script.is_some() || !(self.is_occluded || window.is_minimized() == Some(true));
+        if !is_seen || !has_area {
             event_loop.set_control_flow(ControlFlow::Wait);
         } else if is_busy || wait.is_zero() {
             window.request_redraw();

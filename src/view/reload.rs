@@ -4,7 +4,12 @@ use std::{collections::BTreeSet, path::PathBuf, thread, time::Instant};
 
 use winit::event_loop::EventLoopProxy;
 
-use super::{live::Live, loaded::Loaded, session::Session, watch::Watch};
+use super::{
+    live::Live,
+    loaded::Loaded,
+    session::{Session, Topic},
+    watch::Watch,
+};
 use crate::scene::{SceneError, source_files};
 
 /// What wakes the viewer.
@@ -107,7 +112,7 @@ impl Session {
     pub fn replace_scene(&mut self, live: &mut Live, loaded: Result<Loaded, SceneError>) {
         let loaded = match loaded {
             Ok(loaded) => loaded,
-            Err(error) => return self.complain(&error.to_string()),
+            Err(error) => return self.complain(Topic::Scene, &error.to_string()),
         };
         match live.set_scene(&loaded) {
             Ok(()) => {
@@ -116,9 +121,9 @@ impl Session {
                 self.picked = None;
                 // A small picture at once.
                 self.pace.moved(Instant::now());
-                self.message = None;
+                self.settle(Topic::Scene);
             }
-            Err(error) => self.complain(&error.to_string()),
+            Err(error) => self.complain(Topic::Scene, &error.to_string()),
         }
     }
 }

@@ -24,6 +24,17 @@ const STEPS_A_LEVEL: u32 = 16;
 /// Milliseconds that input waits for at the most, as a rule, while a picture at rest is drawn.
 const PART_MS: f64 = 100.0;
 
+/// What can go wrong while the window lives on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Topic {
+    Device,
+    Scene,
+    #[cfg(feature = "hot-reload")]
+    Shaders,
+    Settings,
+    File,
+}
+
 /// What is viewed, from where, how.
 pub struct Session {
     pub loaded: Loaded,
@@ -49,7 +60,7 @@ pub struct Session {
     /// Milliseconds of the sample that is being drawn.
     sample_ms: f64,
     pub(super) picked: Option<Picked>,
-    pub(super) message: Option<String>,
+    message: Option<(Topic, String)>,
     start: Instant,
 }
 
@@ -217,7 +228,7 @@ impl Session {
     /// Goes back to what the device did before; a size that it refuses is not the user's to change.
     fn take_back(&mut self, live: &Live, error: &GpuError) {
         self.settings.options = live.renderer.options().clone();
-        self.complain(&error.to_string());
+        self.complain(Topic::Settings, &error.to_string());
     }
 
     /// The frame, a picture of that size, is on its way to the screen.
@@ -264,14 +275,19 @@ impl Session {
             history: &self.history,
             memory: live.context.memory(),
             picked: self.picked.as_ref(),
-            message: self.message.as_deref(),
+            message: self.message.as_ref().map(|(_, message)| &**message),
         }
     }
 
-    /// Tells the user what went wrong, in the overlay and on the terminal.
-    pub fn complain(&mut self, message: &str) {
+    /// Tells the user what went wrong last, in the overlay and on the terminal.
+    pub fn complain(&mut self, topic: Topic, message: &str) {
         tracing::warn!("{message}");
-        self.message = Some(message.to_owned());
+        self.message = Some((topic, message.to_owned()));
+    }
+
+    /// What went wrong there is right again.
+    pub fn settle(&mut self, topic: Topic) {
+        self.message.take_if(|(wrong, _)| *wrong == topic);
     }
 }
 

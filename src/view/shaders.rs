@@ -15,7 +15,7 @@ use winit::event_loop::EventLoopProxy;
 use super::{
     live::Live,
     reload::{OneAtATime, Wake},
-    session::Session,
+    session::{Session, Topic},
     watch::Watch,
 };
 use crate::gpu::Replacements;
@@ -73,9 +73,9 @@ impl Session {
             Ok(()) => {
                 // A small picture at once.
                 self.pace.moved(Instant::now());
-                self.message = None;
+                self.settle(Topic::Shaders);
             }
-            Err(error) => self.complain(&error),
+            Err(error) => self.complain(Topic::Shaders, &error),
         }
     }
 }
