@@ -37,6 +37,17 @@ mod tests {
         }
     }
 
+    /// The struct of a shader's push constants.
+    fn pushed_to(shader: &str) -> &'static str {
+        match shader {
+            "cast.comp" => "CastBatch",
+            "driver.rgen" => "DriverCast",
+            "false_color.comp" => "FalseColor",
+            "present.frag" => "Present",
+            _ => "Batch",
+        }
+    }
+
     fn rust_type(ty: &Type) -> &'static str {
         match ty {
             Type::Scalar(ScalarType::Integer { bits: 32, is_signed: false }) => "u32",
@@ -88,17 +99,13 @@ mod tests {
             let name = source.expect("an entry").file_name().into_string().expect("a shader's name is UTF-8");
             let spirv = fs::read(format!("{}/{name}.spv", env!("OUT_DIR"))).expect("SPIR-V");
             let entry_points = ReflectConfig::new().spv(spirv).ref_all_rscs(true).reflect();
-            entry_points.expect("valid SPIR-V").into_iter().flat_map(|entry_point| entry_point.vars)
+            let variables = entry_points.expect("valid SPIR-V").into_iter().flat_map(|entry_point| entry_point.vars);
+            variables.map(move |variable| (name.clone(), variable))
         });
         variables
-            .filter_map(|variable| match variable {
+            .filter_map(|(shader, variable)| match variable {
                 Variable::Descriptor { desc_bind, ty, .. } => Some((struct_at(desc_bind.bind())?, ty)),
-                // Three kinds of kernels, told apart by how many numbers they are given.
-                Variable::PushConstant { ty, .. } => match members_of(&ty).0.map_or(0, |members| members.len()) {
-                    1 => Some(("CastBatch", ty)),
-                    2 => Some(("DriverCast", ty)),
-                    _ => Some(("Batch", ty)),
-                },
+                Variable::PushConstant { ty, .. } => Some((pushed_to(&shader), ty)),
                 _ => None,
             })
             .collect()
