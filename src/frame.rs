@@ -109,13 +109,16 @@ pub enum Traversal {
     ShortStack,
     /// From leaf to leaf, by links to its neighbours.
     Ropes,
-    /// An array of far children.
+    /// An array of far children. On the CPU, eight rays go together.
     Stack,
     /// No tree: every triangle. For small meshes.
     Brute,
 }
 
 impl Traversal {
+    /// What is fastest on the CPU itself.
+    pub const OF_CPU: Self = Self::Stack;
+
     /// The kernels' specialization constant.
     pub(crate) fn constant(self) -> u32 {
         match self {

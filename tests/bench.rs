@@ -16,7 +16,7 @@ use kdray::{
         stage::Stage,
         traversal::Tracers,
     },
-    cpu::kdtree::Traverser,
+    cpu::traverser::Traverser,
     frame::Traversal,
     layout::{Hit, NO_TRIANGLE, Ray},
     scene::Scene,
@@ -46,7 +46,7 @@ fn mesh() -> Scene {
 
 fn closest_hits(stage: &Stage, rays: &[Ray]) -> Vec<Hit> {
     let mut traverser = Traverser::new(Traversal::Mask);
-    rays.iter().map(|ray| traverser.closest_hit(&stage.bindings(), ray)).collect()
+    rays.iter().map(|ray| traverser.traverse::<false>(&stage.bindings(), &ray.into())).collect()
 }
 
 fn rays(sets: &[RaySet; 4], kind: RayKind) -> &[Ray] {

@@ -6,7 +6,8 @@ use glam::{Vec3, vec3};
 use kdray::{
     cpu::{
         brute,
-        kdtree::{Traverser, near_scene},
+        kdtree::near_scene,
+        traverser::{Probe, Traverser},
     },
     frame::Traversal,
     layout::{Hit, NO_TRIANGLE, Ray, Triangle},
@@ -29,19 +30,21 @@ fn rays_at(world: &World) -> Vec<Ray> {
     (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), world, i)).collect()
 }
 
-/// All hits of one variant, and whether its any-hit agrees.
+/// The hits of rays that go together; they hit the same, bit for bit, alone, and no less where any hit will do.
 fn traced(world: &World, traversal: Traversal, rays: &[Ray]) -> Vec<Hit> {
     let bindings = world.bindings();
-    rays.par_iter()
-        .map_init(
-            || Traverser::new(traversal),
-            |traverser, ray| {
-                let hit = traverser.closest_hit(&bindings, ray);
-                assert_eq!(traverser.any_hit(&bindings, ray), hit.triangle_ix != NO_TRIANGLE, "any hit of {ray:?}");
-                hit
-            },
-        )
-        .collect()
+    let of_task = |traverser: &mut Traverser, rays: &[Ray]| {
+        let (mut closest, mut is_hit) = (Vec::new(), Vec::new());
+        let probes = || rays.iter().map(|ray| ((), Probe::from(ray)));
+        traverser.traverse_all::<false, _>(&bindings, probes(), |(), hit| closest.push(hit));
+        traverser.traverse_all::<true, _>(&bindings, probes(), |(), hit| is_hit.push(hit.triangle_ix != NO_TRIANGLE));
+        let alone = rays.iter().map(|ray| traverser.traverse::<false>(&bindings, &ray.into())).collect::<Vec<_>>();
+        assert_eq!(first_difference(rays, &alone, &closest), None, "{traversal}: together");
+        assert_eq!(is_hit, closest.iter().map(|hit| hit.triangle_ix != NO_TRIANGLE).collect::<Vec<_>>(), "{traversal}");
+        closest
+    };
+    // Not a multiple of what goes together.
+    rays.par_chunks(1001).map_init(|| Traverser::new(traversal), of_task).flatten().collect()
 }
 
 /// The first ray whose hits differ, in any bit.

@@ -1,7 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Visibility (the paper's section 2.2): one vertex an invocation, three a triangle, no index buffer.
-// Reads triangles; the triangle's index goes on, flat, to visibility.frag.
+// Visibility (the paper's section 2.2): one vertex an invocation, number 3 * triangle + corner.
+// Reads triangles; the triangle's index goes on, flat, to visibility.frag: that of the vertex that the triangle drawn
+// begins with.
 #include "layout.glsl"
 
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     cpu,
-    frame::{BounceStats, Profile, RenderOptions},
+    frame::{BounceStats, Profile, RenderOptions, Traversal},
     gpu::{Context, GpuError},
     kdtree::KdTree,
     render::Renderer,
@@ -77,7 +77,7 @@ pub fn draw_on_gpu(
     (0..n_frames).map(|_| renderer.draw()).collect()
 }
 
-/// Frames drawn by one thread, as the paper's were.
+/// Frames drawn by one thread, as the paper's were, on the way through the tree that suits it.
 ///
 /// # Errors
 /// The thread cannot be started.
@@ -87,6 +87,7 @@ pub fn draw_on_cpu(
     options: &RenderOptions,
     n_frames: u16,
 ) -> Result<Vec<Profile>, ThreadPoolBuildError> {
+    let options = &RenderOptions { traversal: Traversal::OF_CPU, ..options.clone() };
     let thread = ThreadPoolBuilder::new().num_threads(1).build()?;
     Ok(thread.install(|| (0..n_frames).map(|_| cpu::render(scene, tree, options).1).collect()))
 }

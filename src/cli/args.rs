@@ -11,7 +11,12 @@ use kdray::{
 };
 
 pub use super::view_args::ViewArgs;
-use super::{bench::Suite, build::Build, error::CliError, picture_args::PictureArgs};
+use super::{
+    bench::Suite,
+    build::Build,
+    error::CliError,
+    picture_args::{PictureArgs, way_help},
+};
 
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
 #[derive(Parser)]
@@ -105,9 +110,9 @@ pub struct CastArgs {
     /// Find out only whether rays hit anything: occluded
     #[arg(long)]
     pub any: bool,
-    #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
-    #[arg(help = format!("How rays find their way through the tree: {}", Traversal::words()))]
-    pub traversal: Traversal,
+    #[arg(long, value_name = "WAY")]
+    #[arg(help = way_help())]
+    pub traversal: Option<Traversal>,
     /// How much work goes into the kd-tree
     #[arg(long, value_enum, default_value_t = Build::Auto)]
     pub build: Build,
@@ -162,7 +167,7 @@ impl RenderArgs {
 
     /// The options asked for; the scene's own fill what was left open. A crop beyond the picture is refused.
     pub fn options(&self, scene: &RenderDefaults) -> Result<RenderOptions, CliError> {
-        let options = self.picture.options(scene);
+        let options = self.picture.options(scene, self.cpu);
         let RenderOptions { width, height, .. } = options;
         if let Some(crop) = self.crop.filter(|crop| crop.x1 > width || crop.y1 > height) {
             return Err(CliError::Usage(format!(

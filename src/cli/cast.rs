@@ -16,7 +16,9 @@ use super::{
     args::CastArgs,
     cast_report::{CastReport, Times},
     error::CliError,
-    open_device, print,
+    open_device,
+    picture_args::way_through_tree,
+    print,
     progress::Progress,
     render::{report_validation, set_threads},
 };
@@ -42,7 +44,8 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     let building = format!("building the kd-tree of {n_triangles} triangles");
     let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &build_options));
     let casting = format!("casting {} rays", rays.n_rays());
-    let engine = Engine::new(context.as_ref(), &scene.triangles, &tree, args.traversal)?;
+    let traversal = way_through_tree(args.traversal, args.cpu);
+    let engine = Engine::new(context.as_ref(), &scene.triangles, &tree, traversal)?;
     let (done, cast_ms) = progress.stage(&casting, || cast_all(args, rays, engine, &scene.triangles));
     let totals = done?;
     drop(progress);
@@ -52,7 +55,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
         rays: args.rays.clone(),
         hits: args.output.clone(),
         query: if args.any { "any" } else { "closest" },
-        traversal: args.traversal.to_string(),
+        traversal: traversal.to_string(),
         device: context.as_ref().map_or_else(cpu_name, |context| context.info().name.clone()),
         triangles: n_triangles,
         tree: tree.statistics(n_triangles, &build_options),

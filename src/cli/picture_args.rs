@@ -28,12 +28,24 @@ pub struct PictureArgs {
     #[arg(long, value_name = "CURVE")]
     #[arg(help = format!("From radiance to what a display shows: {} [default: the scene's]", Tonemap::words()))]
     pub tonemap: Option<Tonemap>,
-    #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
-    #[arg(help = format!("How rays find their way through the tree: {}", Traversal::words()))]
-    pub traversal: Traversal,
+    #[arg(long, value_name = "WAY")]
+    #[arg(help = way_help())]
+    pub traversal: Option<Traversal>,
     /// How primary rays find their triangles
     #[arg(long, value_name = "raster|trace", default_value_t = RenderOptions::default().primary)]
     pub primary: Primary,
+}
+
+/// What `--traversal` says of itself.
+pub fn way_help() -> String {
+    let (of_device, of_cpu) = (RenderOptions::default().traversal, Traversal::OF_CPU);
+    let words = Traversal::words();
+    format!("How rays find their way through the tree: {words} [default: {of_device}, with --cpu {of_cpu}]")
+}
+
+/// The way asked for, or what suits.
+pub fn way_through_tree(asked: Option<Traversal>, on_cpu: bool) -> Traversal {
+    asked.unwrap_or(if on_cpu { Traversal::OF_CPU } else { RenderOptions::default().traversal })
 }
 
 impl PictureArgs {
@@ -46,7 +58,7 @@ impl PictureArgs {
     }
 
     /// The options asked for; the scene's own fill what was left open.
-    pub fn options(&self, scene: &RenderDefaults) -> RenderOptions {
+    pub fn options(&self, scene: &RenderDefaults, on_cpu: bool) -> RenderOptions {
         let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });
         RenderOptions {
             width,
@@ -56,7 +68,7 @@ impl PictureArgs {
             exposure: self.exposure.unwrap_or(scene.exposure),
             tonemap: self.tonemap.unwrap_or(scene.tonemap),
             denoise: self.denoise(scene.denoise),
-            traversal: self.traversal,
+            traversal: way_through_tree(self.traversal, on_cpu),
             primary: self.primary,
             features: false,
             profile: true,

@@ -20,7 +20,7 @@ pub struct Bindings<'a, R = Uncounted> {
     /// One a pair of nodes.
     pub kd_parents: Table<'a, u32, R>,
     pub leaf_triangles: Table<'a, u32, R>,
-    /// One an entry of `leaf_triangles`.
+    /// One an entry of `leaf_triangles`, or none.
     pub leaf_planes: &'a [Plane],
     /// One a node, or none where the traversal does not ask for them.
     pub kd_boxes: Table<'a, KdBox, R>,

@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use super::{
     RAYS_PER_TASK,
     bindings::Bindings,
-    kdtree::{Traverser, min},
+    kdtree::min,
+    traverser::{Probe, Traverser},
 };
 use crate::{
     cast::Query,
@@ -31,11 +32,15 @@ pub fn is_ray(ray: &CastRay) -> bool {
         && !ray.t_max.is_nan()
 }
 
-/// The traversal wants a direction of about unit length. Scaled by a power of two it keeps its bits, and so does t.
-fn cast_ray<const ANY_HIT: bool>(bindings: &Bindings, traverser: &mut Traverser, ray: &CastRay) -> Hit {
-    let exponent = exponent_of(ray.direction).min(253);
-    let scale = f32::from_bits((254 - exponent) << 23); // 2^(127 - exponent)
-    let inv_scale = f32::from_bits(exponent << 23);
+/// A direction's scale to about unit length, which the traversal wants: a power of two, so that it keeps its bits, and t.
+fn scale_of(direction: Vec3) -> f32 {
+    let exponent = exponent_of(direction).min(253);
+    f32::from_bits((254 - exponent) << 23) // 2^(127 - exponent)
+}
+
+fn scaled(ray: &CastRay) -> Probe {
+    let scale = scale_of(ray.direction);
+    let inv_scale = 1.0 / scale;
     let scaled = Ray {
         origin: ray.origin,
         pixel_ix: 0,
@@ -44,22 +49,28 @@ fn cast_ray<const ANY_HIT: bool>(bindings: &Bindings, traverser: &mut Traverser,
         throughput: Vec3::ZERO,
         t_max: min(ray.t_max, f32::MAX) * inv_scale,
     };
-    let hit = traverser.traverse::<ANY_HIT>(bindings, &scaled, ray.t_min * inv_scale);
-    if hit.triangle_ix == NO_TRIANGLE { MISS } else { Hit { t: hit.t * scale, ..hit } }
+    Probe { ray: scaled, t_min: ray.t_min * inv_scale }
+}
+
+fn cast_all<const ANY_HIT: bool>(bindings: &Bindings, traverser: &mut Traverser, rays: &[CastRay], hits: &mut [Hit]) {
+    let probes = rays.iter().zip(hits).filter_map(|(ray, hit)| {
+        *hit = MISS;
+        is_ray(ray).then(|| ((ray, hit), scaled(ray)))
+    });
+    traverser.traverse_all::<ANY_HIT, _>(bindings, probes, |(ray, hit), found| {
+        if found.triangle_ix != NO_TRIANGLE {
+            *hit = Hit { t: found.t * scale_of(ray.direction), ..found };
+        }
+    });
 }
 
 /// Writes `hits`, one a ray.
 pub fn cast(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[CastRay], hits: &mut [Hit]) {
     rays.par_chunks(RAYS_PER_TASK).zip(hits.par_chunks_mut(RAYS_PER_TASK)).for_each_init(
         || Traverser::new(traversal),
-        |traverser, (rays, hits)| {
-            for (ray, hit) in rays.iter().zip(hits) {
-                *hit = match query {
-                    _ if !is_ray(ray) => MISS,
-                    Query::Closest => cast_ray::<false>(bindings, traverser, ray),
-                    Query::Any => cast_ray::<true>(bindings, traverser, ray),
-                };
-            }
+        |traverser, (rays, hits)| match query {
+            Query::Closest => cast_all::<false>(bindings, traverser, rays, hits),
+            Query::Any => cast_all::<true>(bindings, traverser, rays, hits),
         },
     );
 }

@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::{RAYS_PER_TASK, bindings::Bindings, kdtree::Traverser, shadow::shadow_segment, table::ReadCounts};
+use super::{RAYS_PER_TASK, bindings::Bindings, shadow::shadow_segment, table::ReadCounts, traverser::Traverser};
 use crate::{
     frame::Traversal,
     layout::{Feature, Hit, NO_TRIANGLE, Ray},
@@ -61,7 +61,7 @@ fn steps_of<const ANY: bool>(bindings: &Bindings, traverser: &mut Traverser, ray
         return bindings.triangles.len() as u32;
     }
     let counts = ReadCounts::default();
-    traverser.traverse::<ANY>(&bindings.counted(&counts), ray, 0.0);
+    traverser.traverse::<ANY>(&bindings.counted(&counts), &ray.into());
     (counts.n_nodes.get() + counts.n_triangles.get()) as u32
 }
 

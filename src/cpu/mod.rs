@@ -17,8 +17,10 @@ pub mod false_color;
 pub mod features;
 pub mod kd_boxes;
 pub mod kdtree;
+pub mod leaf;
 pub mod light;
 pub mod material;
+pub mod packet;
 pub mod pending_backtrack;
 pub mod pending_mask;
 pub mod pending_mask_boxes;
@@ -39,6 +41,7 @@ mod timing;
 pub mod tone_curves;
 pub mod tonemap;
 pub mod trace;
+pub mod traverser;
 pub mod triangle;
 pub mod visibility;
 

@@ -2,7 +2,8 @@
 
 use super::{
     bindings::Bindings,
-    kdtree::{TraversalRay, axis_of, intersect_leaf, is_done, min},
+    kdtree::{TraversalRay, axis_of, is_done, min},
+    leaf::intersect_leaf,
     table::Reads,
 };
 use crate::layout::{Hit, KD_LEAF, KdNode};

@@ -3,7 +3,13 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{RAYS_PER_TASK, bindings::Bindings, kdtree::Traverser, light::sample_light, surface::surface_at};
+use super::{
+    RAYS_PER_TASK,
+    bindings::Bindings,
+    light::sample_light,
+    surface::surface_at,
+    traverser::{Probe, Traverser},
+};
 use crate::{
     frame::Traversal,
     layout::{Hit, Light, NO_TRIANGLE, Ray},
@@ -32,12 +38,16 @@ pub fn shadow(
     let of_light = |(light, visibility): (&Light, &mut [u32])| -> u32 {
         let of_task = |traverser: &mut Traverser, ((rays, hits), visibility): ((&[Ray], &[Hit]), &mut [u32])| {
             let mut n_tested = 0;
-            for ((ray, hit), visible) in rays.iter().zip(hits).zip(visibility) {
+            let segments = rays.iter().zip(hits).zip(visibility).filter_map(|((ray, hit), visible)| {
+                *visible = 0;
                 let is_hit = hit.triangle_ix != NO_TRIANGLE;
-                let segment = is_hit.then(|| shadow_segment(bindings, ray, hit, light)).flatten();
-                *visible = segment.is_some_and(|segment| !traverser.any_hit(bindings, &segment)).into();
-                n_tested += u32::from(segment.is_some());
-            }
+                let segment = is_hit.then(|| shadow_segment(bindings, ray, hit, light)).flatten()?;
+                n_tested += 1;
+                Some((visible, Probe::from(&segment)))
+            });
+            traverser.traverse_all::<true, _>(bindings, segments, |visible, hit| {
+                *visible = u32::from(hit.triangle_ix == NO_TRIANGLE);
+            });
             n_tested
         };
         rays.par_chunks(RAYS_PER_TASK)

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{RAYS_PER_TASK, bindings::Bindings, kdtree::Traverser, table::ReadCounts};
+use super::{RAYS_PER_TASK, bindings::Bindings, table::ReadCounts, traverser::Traverser};
 use crate::{cast::Query, frame::Traversal, layout::Ray};
 
 /// Reads for one or more rays.
@@ -52,8 +52,8 @@ pub fn count_steps(bindings: &Bindings, traversal: Traversal, query: Query, rays
         let counted = bindings.counted(&counts);
         for ray in rays {
             match query {
-                Query::Closest => traverser.traverse::<false>(&counted, ray, 0.0),
-                Query::Any => traverser.traverse::<true>(&counted, ray, 0.0),
+                Query::Closest => traverser.traverse::<false>(&counted, &ray.into()),
+                Query::Any => traverser.traverse::<true>(&counted, &ray.into()),
             };
         }
         Steps::from(counts)

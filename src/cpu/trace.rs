@@ -2,7 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::{RAYS_PER_TASK, bindings::Bindings, kdtree::Traverser};
+use super::{
+    RAYS_PER_TASK,
+    bindings::Bindings,
+    traverser::{Probe, Traverser},
+};
 use crate::{
     frame::Traversal,
     layout::{Hit, NO_TRIANGLE, Ray},
@@ -16,10 +20,11 @@ pub fn trace(bindings: &Bindings, traversal: Traversal, rays: &[Ray], hits: &mut
             || Traverser::new(traversal),
             |traverser, (rays, hits)| {
                 let mut n_hits = 0;
-                for (ray, hit) in rays.iter().zip(hits) {
-                    *hit = traverser.closest_hit(bindings, ray);
-                    n_hits += u32::from(hit.triangle_ix != NO_TRIANGLE);
-                }
+                let probes = rays.iter().map(Probe::from);
+                traverser.traverse_all::<false, _>(bindings, hits.iter_mut().zip(probes), |hit, found| {
+                    *hit = found;
+                    n_hits += u32::from(found.triangle_ix != NO_TRIANGLE);
+                });
                 n_hits
             },
         )

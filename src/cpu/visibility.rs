@@ -3,7 +3,12 @@
 
 use rayon::prelude::*;
 
-use super::{RAYS_PER_TASK, bindings::Bindings, kdtree::Traverser, primary_hit::camera_ray};
+use super::{
+    RAYS_PER_TASK,
+    bindings::Bindings,
+    primary_hit::camera_ray,
+    traverser::{Probe, Traverser},
+};
 use crate::frame::Traversal;
 
 /// Writes `triangle_ids` (`width * height`, rows from the top): the nearest triangle, or `NO_TRIANGLE`.
@@ -12,10 +17,11 @@ pub fn visibility(bindings: &Bindings, traversal: Traversal, triangle_ids: &mut 
     triangle_ids.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each_init(
         || Traverser::new(traversal),
         |traverser, (task, ids)| {
-            for (pixel_ix, id) in (task * RAYS_PER_TASK..).zip(ids) {
+            let probes = (task * RAYS_PER_TASK..).map(|pixel_ix| {
                 let pixel = glam::uvec2(pixel_ix as u32 % width, pixel_ix as u32 / width);
-                *id = traverser.closest_hit(bindings, &camera_ray(bindings.frame, pixel)).triangle_ix;
-            }
+                Probe::from(&camera_ray(bindings.frame, pixel))
+            });
+            traverser.traverse_all::<false, _>(bindings, ids.iter_mut().zip(probes), |id, hit| *id = hit.triangle_ix);
         },
     );
 }

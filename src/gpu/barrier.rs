@@ -20,7 +20,7 @@ pub enum Access {
     RayTracingUpdate,
     /// What a build of the driver's structure reads and writes.
     StructureBuild,
-    /// Vertex, compute, uniform and indirect reads and transfers: between an upload and whatever uses it, or a frame and
+    /// Index, vertex, compute, uniform and indirect reads and transfers: between an upload and whatever uses it, or a frame and
     /// the next one's uploads.
     AllReads,
 }
@@ -37,7 +37,9 @@ impl Access {
             Self::HostRead => S::HOST,
             Self::RayTracingUpdate => S::RAY_TRACING_SHADER_KHR,
             Self::StructureBuild => S::ACCELERATION_STRUCTURE_BUILD_KHR,
-            Self::AllReads => S::VERTEX_SHADER | S::COMPUTE_SHADER | S::DRAW_INDIRECT | S::COPY | S::CLEAR,
+            Self::AllReads => {
+                S::INDEX_INPUT | S::VERTEX_SHADER | S::COMPUTE_SHADER | S::DRAW_INDIRECT | S::COPY | S::CLEAR
+            }
         }
     }
 
@@ -62,6 +64,7 @@ impl Access {
                 A::SHADER_STORAGE_READ
                     | A::SHADER_STORAGE_WRITE
                     | A::UNIFORM_READ
+                    | A::INDEX_READ
                     | A::INDIRECT_COMMAND_READ
                     | A::TRANSFER_READ
                     | A::TRANSFER_WRITE

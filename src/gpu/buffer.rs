@@ -15,6 +15,8 @@ pub enum BufferUse {
     Uniform,
     /// Storage that also sizes indirect dispatches.
     Indirect,
+    /// Vertices' numbers, for draws alone.
+    Index,
     /// Whatever the driver's own ray tracing reads and writes, by address.
     Structure,
 }
@@ -43,13 +45,14 @@ impl<T: Pod> Buffer<T> {
     pub fn new(context: &Arc<Context>, name: &str, len: usize, usage: BufferUse) -> Result<Self, GpuError> {
         let bytes = (len.max(1) * size_of::<T>()) as u64;
         let limit = context.limits().storage_range;
-        if bytes > limit && usage != BufferUse::Structure {
+        if bytes > limit && !matches!(usage, BufferUse::Index | BufferUse::Structure) {
             return Err(GpuError::TooLarge { object: name.to_owned(), bytes, limit });
         }
         let usage = match usage {
             BufferUse::Storage => vk::BufferUsageFlags::STORAGE_BUFFER,
             BufferUse::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
             BufferUse::Indirect => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER,
+            BufferUse::Index => vk::BufferUsageFlags::INDEX_BUFFER,
             BufferUse::Structure => {
                 vk::BufferUsageFlags::STORAGE_BUFFER
                     | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR

@@ -5,7 +5,7 @@ use std::{ffi::CString, sync::Arc};
 use ash::vk;
 use bytemuck::Pod;
 
-use super::{Access, AnyBuffer, BindingSet, ComputePipeline, Context, GpuError, RasterPipeline, Target, Timer};
+use super::{Access, AnyBuffer, BindingSet, Buffer, ComputePipeline, Context, GpuError, RasterPipeline, Target, Timer};
 
 /// A recorded command buffer.
 pub struct CommandBuffer {
@@ -47,8 +47,10 @@ pub struct DrawDesc<'a> {
     pub picture: (u32, u32),
     /// The part of it to draw: the same, bit for bit, as if all of it were drawn. The rest stays as it is.
     pub area: Area,
-    /// Three a triangle.
-    pub n_vertices: u32,
+    /// Three vertices a triangle.
+    pub n_triangles: u32,
+    /// The vertices' numbers; without any, they are 0, 1, 2 and so on.
+    pub indices: &'a Buffer<u32>,
 }
 
 impl CommandBuffer {
@@ -203,7 +205,12 @@ impl Commands<'_> {
             device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
             device.cmd_set_viewport(self.raw, 0, &[viewport]);
             device.cmd_set_scissor(self.raw, 0, &[area]);
-            device.cmd_draw(self.raw, desc.n_vertices, 1, 0, 0);
+            if desc.indices.is_empty() {
+                device.cmd_draw(self.raw, 3 * desc.n_triangles, 1, 0, 0);
+            } else {
+                device.cmd_bind_index_buffer(self.raw, desc.indices.any().raw(), 0, vk::IndexType::UINT32);
+                device.cmd_draw_indexed(self.raw, desc.indices.len() as u32, 1, 0, 0, 0);
+            }
             device.cmd_end_rendering(self.raw);
         }
     }

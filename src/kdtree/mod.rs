@@ -46,7 +46,7 @@ pub struct KdTree {
     pub parents: Vec<u32>,
     /// Triangle indices, leaf after leaf in depth-first order, ascending in each leaf.
     pub leaf_triangles: Vec<u32>,
-    /// The plane of each of `leaf_triangles`.
+    /// The plane of each of `leaf_triangles`; without any, every triangle of a leaf is tested.
     pub leaf_planes: Vec<Plane>,
     /// The root's cell is the exact bounds of all triangles (a box of zeros for none).
     pub cell_min: Vec3,

@@ -18,6 +18,7 @@ mod features;
 mod pixels;
 mod present;
 mod primary_hit;
+mod provoking;
 mod queues;
 mod resolve;
 mod resources;

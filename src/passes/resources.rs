@@ -2,7 +2,7 @@
 
 use std::{mem::offset_of, sync::Arc};
 
-use super::{Pixels, Queues, Tree, binding, pixels::n_pixels};
+use super::{Pixels, Queues, Tree, binding, pixels::n_pixels, provoking::vertex_indices};
 use crate::{
     frame::Traversal,
     gpu::{Access, Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
@@ -20,6 +20,8 @@ const PUSH_BYTES: u32 = {
 /// What the kernels read and write. A name is the same here, in the kernels, as debug label and as allocation.
 pub struct Resources {
     pub tree: Tree,
+    /// Three a triangle, or none.
+    pub vertex_indices: Buffer<u32>,
     /// `n_triangles`.
     pub triangle_materials: Buffer<u32>,
     pub materials: Buffer<Material>,
@@ -52,6 +54,12 @@ impl Resources {
         let kinds: Vec<_> = (0..layout::N_BINDINGS).map(binding).collect();
         let mut resources = Self {
             tree: Tree::new(context, &scene.triangles, tree, constants)?,
+            vertex_indices: Buffer::with(
+                context,
+                "vertex_indices",
+                &vertex_indices(&scene.triangles),
+                BufferUse::Index,
+            )?,
             triangle_materials: Buffer::with(context, "triangle_materials", &scene.triangle_materials, storage)?,
             materials: Buffer::with(context, "materials", &scene.materials, storage)?,
             lights: Buffer::with(context, "lights", &scene.lights, storage)?,

@@ -35,7 +35,8 @@ impl Visibility {
             depth,
             picture: (picture_width, picture_height),
             area: Area { x, y, width, height },
-            n_vertices: 3 * n_triangles,
+            n_triangles,
+            indices: &resources.vertex_indices,
         };
         commands.draw(&self.pipeline, &desc);
         commands.ids_to_compute(ids);

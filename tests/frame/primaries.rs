@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use glam::UVec2;
 use kdray::{
     camera::frame_constants,
-    cpu::{bindings::Bindings, kdtree::Traverser, primary_hit::camera_ray},
+    cpu::{bindings::Bindings, primary_hit::camera_ray, traverser::Traverser},
     frame::{Picture, Primary, RenderOptions},
     kdtree::KdTree,
     layout::Frame,
@@ -26,7 +26,9 @@ fn is_on_edge(scene: &Scene, tree: &KdTree, options: &RenderOptions, pixel_ix: u
             let [x, y] = [i % 25, i / 25].map(|i| (i - 12) as f32 / 96.0);
             let shift = frame.right * (2.0 * x / frame.width as f32) - frame.up * (2.0 * y / frame.height as f32);
             let frame = Frame { forward: frame.forward + shift, ..frame };
-            traverser.closest_hit(&Bindings::new(scene, tree, &frame), &camera_ray(&frame, pixel)).triangle_ix
+            traverser
+                .traverse::<false>(&Bindings::new(scene, tree, &frame), &(&camera_ray(&frame, pixel)).into())
+                .triangle_ix
         })
         .collect();
     ids.len() > 1

@@ -3,7 +3,7 @@
 
 use glam::{DVec2, dvec2, swizzles::Vec4Swizzles, uvec2, vec3};
 use kdray::{
-    cpu::{self, kdtree::Traverser, primary_hit::camera_ray},
+    cpu::{self, primary_hit::camera_ray, traverser::Traverser},
     layout::{Batch, Frame, NO_TRIANGLE},
 };
 
@@ -51,7 +51,7 @@ fn is_met_nearby(stage: &Stage, pixel_ix: u32, id: u32) -> bool {
     (0..17 * 17).any(|i| {
         let offset = |i: i32| (i - 8) as f32 / 8.0 * SNAP_PX;
         let ray = camera_ray(&shifted(offset(i % 17), offset(i / 17)), pixel);
-        traverser.closest_hit(&stage.bindings(), &ray).triangle_ix == id
+        traverser.traverse::<false>(&stage.bindings(), &(&ray).into()).triangle_ix == id
     })
 }
 

@@ -1,0 +1,81 @@
+//! A leaf's triangles against a ray, but those whose planes it does not meet there. Part of `kdtree.glsl`'s twin.
+
+use glam::{Mat4, Vec3A, Vec4};
+
+use super::{bindings::Bindings, kdtree::TraversalRay, table::Reads, triangle::Shear};
+use crate::layout::{Hit, KD_CHILD_SHIFT, KdNode, Plane};
+
+/// What tells a ray's hits from what it passes by.
+#[derive(Clone, Copy, Debug)]
+pub struct Target {
+    pub shear: Shear,
+    pub t_min: f32,
+    pub source_triangle: u32,
+}
+
+/// A triangle against the ray; of two hits at one t the lower index wins, whatever the order of triangles.
+#[inline(always)]
+pub fn intersect(bindings: &Bindings<impl Reads>, target: &Target, triangle_ix: u32, best: &mut Hit) {
+    let triangle = &bindings.triangles[triangle_ix as usize];
+    let Some(hit) = target.shear.intersect_triangle(triangle, triangle_ix) else { return };
+    let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
+    if hit.t > target.t_min && nearer && triangle_ix != target.source_triangle {
+        *best = hit;
+    }
+}
+
+/// The leaf's entries: indices into `leaf_triangles` and `leaf_planes`.
+#[inline(always)]
+pub fn entries_of(leaf: KdNode) -> std::ops::Range<usize> {
+    let first = leaf.split_or_first as usize;
+    first..first + (leaf.axis_and_child >> KD_CHILD_SHIFT) as usize
+}
+
+/// Four planes, of which the last may be void, as columns: normal's x, y, z and distance.
+#[inline(always)]
+fn four_planes(planes: &[Plane], first: usize) -> Mat4 {
+    let columns = |planes: &[Plane; 4]| {
+        let [a, b, c, d]: [[f32; 4]; 4] = bytemuck::cast(*planes);
+        Mat4::from_cols(a.into(), b.into(), c.into(), d.into()).transpose()
+    };
+    match planes.get(first..first + 4).and_then(|four| four.try_into().ok()) {
+        Some(four) => columns(four),
+        None => columns(&std::array::from_fn(|i| planes.get(first + i).copied().unwrap_or_default())),
+    }
+}
+
+/// Bit i is set where the segment does not keep to one side of plane i, so far from it that no rounding of the hit test
+/// reaches across.
+#[inline(always)]
+fn near_planes(planes: &Mat4, from: Vec3A, to: Vec3A, reach: f32) -> u32 {
+    let height = |p: Vec3A| planes.x_axis * p.x + planes.y_axis * p.y + planes.z_axis * p.z - planes.w_axis;
+    let (height_from, height_to) = (height(from), height(to));
+    let one_side = (height_from * height_to).cmpgt(Vec4::ZERO);
+    !(one_side & height_from.abs().min(height_to.abs()).cmpgt(Vec4::splat(reach))).bitmask()
+}
+
+/// The leaf's triangles, but those whose planes the ray does not meet within the cell; all of them where the tree has no
+/// planes.
+#[inline(always)]
+pub fn intersect_leaf(
+    bindings: &Bindings<impl Reads>,
+    ray: &TraversalRay,
+    leaf: KdNode,
+    [t_enter, t_exit]: [f32; 2],
+    best: &mut Hit,
+) {
+    let entries = entries_of(leaf);
+    let triangles = &bindings.leaf_triangles[entries.clone()];
+    if bindings.leaf_planes.is_empty() {
+        return triangles.iter().for_each(|&ix| intersect(bindings, &ray.target, ix, best));
+    }
+    let (from, to) = (ray.at(t_enter), ray.at(t_exit));
+    for (four, first) in triangles.chunks(4).zip(entries.step_by(4)) {
+        let planes = four_planes(bindings.leaf_planes, first);
+        let mut near = near_planes(&planes, from, to, ray.plane_reach) & ((1 << four.len()) - 1);
+        while near != 0 {
+            intersect(bindings, &ray.target, four[near.trailing_zeros() as usize], best);
+            near &= near - 1;
+        }
+    }
+}

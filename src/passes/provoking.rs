@@ -1,0 +1,113 @@
+//! In which order visibility draws vertices. A pixel learns its triangle from the triangle's first vertex, so that each
+//! triangle needs one of its own; the other two may be any that lie at the same points. Shared like that, a device
+//! transforms about a vertex a triangle in place of three.
+
+use std::collections::HashMap;
+
+use glam::Vec3;
+
+use crate::layout::Triangle;
+
+/// Devices need not draw by greater indices than this.
+const MAX_INDEX: usize = (1 << 24) - 1;
+
+/// Three indices a triangle, each `3 * triangle + corner` of a corner at the same point; the first is of the triangle
+/// itself, and the order goes round as the corners do. None for so many triangles that devices need not draw them by
+/// indices.
+pub fn vertex_indices(triangles: &[Triangle]) -> Vec<u32> {
+    if 3 * triangles.len() > MAX_INDEX {
+        return Vec::new();
+    }
+    let (points, n_points) = points_of(triangles);
+    // For each point a corner there, if possible one that a triangle begins with.
+    let mut vertex_at = vec![u32::MAX; n_points];
+    let mut first_corners = Vec::with_capacity(triangles.len());
+    for (triangle_ix, corners) in (0..).zip(&points) {
+        let first = (0..3).find(|&corner| vertex_at[corners[corner] as usize] == u32::MAX).unwrap_or(0);
+        vertex_at[corners[first] as usize] = vertex(triangle_ix, first);
+        first_corners.push(first);
+    }
+    for (triangle_ix, corners) in (0..).zip(&points) {
+        for (corner, &point) in corners.iter().enumerate() {
+            let at_point = &mut vertex_at[point as usize];
+            if *at_point == u32::MAX {
+                *at_point = vertex(triangle_ix, corner);
+            }
+        }
+    }
+    let indices_of = |(triangle_ix, (corners, &first)): (u32, (&[u32; 3], &usize))| {
+        let at = |corner: usize| vertex_at[corners[corner % 3] as usize];
+        [vertex(triangle_ix, first), at(first + 1), at(first + 2)]
+    };
+    (0..).zip(points.iter().zip(&first_corners)).flat_map(indices_of).collect()
+}
+
+fn vertex(triangle_ix: u32, corner: usize) -> u32 {
+    3 * triangle_ix + corner as u32
+}
+
+/// Numbers of the corners' points, and how many there are. Points of one number have the same bits.
+fn points_of(triangles: &[Triangle]) -> (Vec<[u32; 3]>, usize) {
+    let mut numbers = HashMap::with_capacity(triangles.len());
+    let mut number_of = |p: Vec3| {
+        let next = numbers.len() as u32;
+        *numbers.entry(p.to_array().map(f32::to_bits)).or_insert(next)
+    };
+    let points = triangles.iter().map(|t| [t.v0, t.v1, t.v2].map(&mut number_of)).collect();
+    (points, numbers.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use glam::vec3;
+
+    use super::*;
+
+    fn corner(triangles: &[Triangle], vertex: u32) -> Vec3 {
+        let t = &triangles[vertex as usize / 3];
+        [t.v0, t.v1, t.v2][vertex as usize % 3]
+    }
+
+    /// A square of n x n cells, two triangles each.
+    fn grid(n: usize) -> Vec<Triangle> {
+        let at = |x: usize, y: usize| vec3(x as f32, y as f32, 0.0);
+        let triangle = |v0, v1, v2| Triangle { v0, v1, v2, ..Triangle::default() };
+        let cell = |i: usize| {
+            let (x, y) = (i % n, i / n);
+            let [a, b, c, d] = [at(x, y), at(x + 1, y), at(x + 1, y + 1), at(x, y + 1)];
+            [triangle(a, b, c), triangle(a, c, d)]
+        };
+        (0..n * n).flat_map(cell).collect()
+    }
+
+    #[test]
+    fn the_same_points_the_same_way_round_beginning_with_a_corner_of_their_own() {
+        let mut triangles = grid(7);
+        triangles.push(Triangle::default()); // without area
+        triangles.push(triangles[3]);
+        triangles[5].v1.x = -0.0;
+        let indices = vertex_indices(&triangles);
+        assert_eq!(indices.len(), 3 * triangles.len());
+        for (triangle_ix, indices) in indices.chunks(3).enumerate() {
+            let t = &triangles[triangle_ix];
+            assert_eq!(indices[0] as usize / 3, triangle_ix);
+            let first = indices[0] as usize % 3;
+            for (i, &index) in indices.iter().enumerate() {
+                let expected = [t.v0, t.v1, t.v2][(first + i) % 3];
+                assert_eq!(
+                    corner(&triangles, index).to_array().map(f32::to_bits),
+                    expected.to_array().map(f32::to_bits)
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn there_are_hardly_more_vertices_than_triangles() {
+        let triangles = grid(30);
+        let distinct: HashSet<u32> = vertex_indices(&triangles).into_iter().collect();
+        assert!(distinct.len() < triangles.len() + 20, "{} of {} triangles", distinct.len(), triangles.len());
+    }
+}
