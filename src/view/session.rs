@@ -143,7 +143,7 @@ impl Session {
         let steps = [(is_moving && makes_room).then_some(&whole), is_new.then_some(&asked)];
         for options in steps.into_iter().flatten() {
             if let Err(error) = live.renderer.set_options(options, &self.loaded.tree) {
-                self.take_back(live, &error);
+                self.take_back(live, error)?;
                 break;
             }
         }
@@ -225,10 +225,14 @@ impl Session {
         Ok(())
     }
 
-    /// Goes back to what the device did before; a size that it refuses is not the user's to change.
-    fn take_back(&mut self, live: &Live, error: &GpuError) {
+    /// Goes back to what the device did before, unless it is lost; a size that it refuses is not the user's to change.
+    fn take_back(&mut self, live: &Live, error: GpuError) -> Result<(), GpuError> {
+        if error.is_device_lost() {
+            return Err(error);
+        }
         self.settings.options = live.renderer.options().clone();
         self.complain(Topic::Settings, &error.to_string());
+        Ok(())
     }
 
     /// The frame, a picture of that size, is on its way to the screen.
