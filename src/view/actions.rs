@@ -4,12 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{Vec3, uvec2};
 
-use super::{
-    input::Action,
-    live::Live,
-    pick::pick,
-    session::{Session, Topic},
-};
+use super::{error::Topic, input::Action, live::Live, pick::pick, session::Session};
 use crate::{
     gpu::GpuError,
     output::{self, OutputError},

@@ -16,13 +16,13 @@ use winit::{
 
 use super::{
     display::{PaceReport, ViewOptions, ViewReport},
-    error::ViewError,
+    error::{Topic, ViewError},
     input::{Action, Input},
     live::Live,
     panel::Settings,
     reload::{Reloader, Wake},
     script::Script,
-    session::{Session, Topic},
+    session::Session,
     ui::{Layout, Ui},
 };
 use crate::{frame::RenderOptions, gpu::GpuError};

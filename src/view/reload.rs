@@ -4,12 +4,7 @@ use std::{collections::BTreeSet, path::PathBuf, thread, time::Instant};
 
 use winit::event_loop::EventLoopProxy;
 
-use super::{
-    live::Live,
-    loaded::Loaded,
-    session::{Session, Topic},
-    watch::Watch,
-};
+use super::{error::Topic, live::Live, loaded::Loaded, session::Session, watch::Watch};
 use crate::scene::{SceneError, source_files};
 
 /// What wakes the viewer.

@@ -5,6 +5,7 @@ use std::time::Instant;
 use super::{
     budget::Budget,
     controller::Controller,
+    error::Topic,
     history::{FrameRecord, History},
     live::Live,
     loaded::Loaded,
@@ -23,17 +24,6 @@ const HISTORY_S: f64 = 5.0;
 const STEPS_A_LEVEL: u32 = 16;
 /// Milliseconds that input waits for at the most, as a rule, while a picture at rest is drawn.
 const PART_MS: f64 = 100.0;
-
-/// What can go wrong while the window lives on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Topic {
-    Device,
-    Scene,
-    #[cfg(feature = "hot-reload")]
-    Shaders,
-    Settings,
-    File,
-}
 
 /// What is viewed, from where, how.
 pub struct Session {

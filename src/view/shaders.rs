@@ -13,9 +13,10 @@ use tempfile::TempDir;
 use winit::event_loop::EventLoopProxy;
 
 use super::{
+    error::Topic,
     live::Live,
     reload::{OneAtATime, Wake},
-    session::{Session, Topic},
+    session::Session,
     watch::Watch,
 };
 use crate::gpu::Replacements;
