@@ -11,6 +11,11 @@ fn main() {
     let out_dir = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
     let out_dir = Path::new(&out_dir);
     println!("cargo::rerun-if-changed=glsl");
+    // With hot reload the program runs this one again: shaders are compiled here only, and with one set of options.
+    if env::var_os("CARGO_FEATURE_HOT_RELOAD").is_some() {
+        let compiler = env::current_exe().expect("this program's path");
+        println!("cargo::rustc-env=KDRAY_SHADER_COMPILER={}", compiler.display());
+    }
 
     let layout = fs::read_to_string("glsl/shared/layout.glsl").expect("glsl/shared/layout.glsl");
     fs::write(out_dir.join("layout.rs"), rust_layout(&layout)).expect("write layout.rs");

@@ -38,7 +38,7 @@ mod tests {
         }
     }
 
-    /// A shader's push constants.
+    /// The struct of a shader's push constants.
     fn pushed_to(shader: &str) -> &'static str {
         match shader {
             "cast.comp" => "CastBatch",
@@ -106,12 +106,12 @@ mod tests {
             let spirv = fs::read(format!("{}/{name}.spv", env!("OUT_DIR"))).expect("SPIR-V");
             let entry_points = ReflectConfig::new().spv(spirv).ref_all_rscs(true).reflect();
             let variables = entry_points.expect("valid SPIR-V").into_iter().flat_map(|entry_point| entry_point.vars);
-            variables.map(|variable| (pushed_to(&name), variable)).collect::<Vec<_>>()
+            variables.map(move |variable| (name.clone(), variable))
         });
         variables
-            .filter_map(|(pushed, variable)| match variable {
+            .filter_map(|(shader, variable)| match variable {
                 Variable::Descriptor { desc_bind, ty, .. } => Some((struct_at(desc_bind.bind())?, ty)),
-                Variable::PushConstant { ty, .. } => Some((pushed, ty)),
+                Variable::PushConstant { ty, .. } => Some((pushed_to(&shader), ty)),
                 _ => None,
             })
             .collect()

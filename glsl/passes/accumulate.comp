@@ -14,9 +14,7 @@ layout(std430, set = 0, binding = BIND_PIXEL_ACCUMULATED) buffer PixelAccumulate
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (pixel.x >= frame.width || pixel.y >= frame.height) return;
-    for (int i = 0; i < bounces.length(); ++i) {
-        if (bounces[i].overflow != 0u) return;
-    }
+    if (bounces[0].any_overflow != 0u) return;
     uint pixel_ix = pixel.y * frame.width + pixel.x;
     vec4 sum = pixel_accumulated[pixel_ix] + pixel_radiance[pixel_ix];
     pixel_accumulated[pixel_ix] = sum;

@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Compact, 2 of 3: one workgroup turns the blocks' sums into their exclusive prefix sums and sizes the next bounce.
-// Where the queue cannot hold that many rays, the next bounce is empty and says `overflow`.
+// Where the queue cannot hold that many rays, the next bounce is empty and says `overflow`, and the first row `any_overflow`.
 // Reads and writes scan_blocks, bounces.
 #include "layout.glsl"
 #include "scan.glsl"
@@ -17,6 +17,7 @@ void size_next_bounce(uint n_wanted) {
     uint n_rays = n_wanted <= frame.queue_capacity ? n_wanted : 0u;
     uint next_ix = batch.bounce_ix + 1u;
     bounces[next_ix].overflow = n_rays == n_wanted ? 0u : 1u;
+    if (n_rays != n_wanted) bounces[0].any_overflow = 1u;
     bounces[next_ix].n_wanted = n_wanted;
     bounces[next_ix].n_rays = n_rays;
     uint groups = (n_rays + RAY_GROUP_SIZE - 1u) / RAY_GROUP_SIZE;

@@ -185,24 +185,24 @@ struct Frame {
 
 // One a batch and bounce, 64 bytes, sized by the bounce before: each `groups` is a VkDispatchIndirectCommand.
 // n_wanted: rays that the bounce before made; overflow: 1 where they are more than a queue holds. Then n_rays is 0,
-// and the batch has to be split.
+// and the batch has to be split. any_overflow: of the first row only, 1 where one of all the frame's has an overflow.
 struct Bounce {
     uint n_rays;
     uint n_wanted;
     uint overflow;
-    uint reserved0;
+    uint any_overflow;
     uint ray_groups_x;
     uint ray_groups_y;
     uint ray_groups_z;
-    uint reserved1;
+    uint reserved0;
     uint shadow_groups_x;
     uint shadow_groups_y;
     uint shadow_groups_z;
-    uint reserved2;
+    uint reserved1;
     uint scan_groups_x;
     uint scan_groups_y;
     uint scan_groups_z;
-    uint reserved3;
+    uint reserved2;
 };
 
 // One a batch and bounce, 8 bytes: for the profile. Integer sums, the same in every order of arrival.

@@ -6,14 +6,14 @@ use rayon::prelude::*;
 use crate::layout::{Bounce, Frame};
 
 /// Adds `pixel_radiance`, the frame's sample, to the sums in `pixel_accumulated`, and puts the mean of all samples in its
-/// place; nothing where one of `bounces` overflowed.
+/// place; nothing where the first of `bounces` says that one overflowed.
 pub fn accumulate(
     frame: &Frame,
     bounces: &[Bounce],
     pixel_radiance: &mut [[f32; 4]],
     pixel_accumulated: &mut [[f32; 4]],
 ) {
-    if bounces.iter().any(|bounce| bounce.overflow != 0) {
+    if bounces.first().is_some_and(|first| first.any_overflow != 0) {
         return;
     }
     pixel_radiance.par_iter_mut().zip(pixel_accumulated).with_min_len(1024).for_each(|(radiance, accumulated)| {

@@ -3,14 +3,11 @@
 use std::{
     ffi::CString,
     mem::ManuallyDrop,
-    sync::{Arc, Mutex, OnceLock, PoisonError},
+    sync::{Arc, Mutex, OnceLock},
 };
 
 use ash::{ext, khr, vk};
-use gpu_allocator::{
-    AllocationSizes, AllocatorDebugSettings, MemoryLocation,
-    vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc},
-};
+use gpu_allocator::vulkan::Allocator;
 
 use super::{
     Commands, DeviceInfo, DeviceSelector, GpuError, Limits, Screen, Surface,
@@ -18,6 +15,7 @@ use super::{
     device::{DeviceExtras, Purpose},
     devices::{queue_family, select},
     instance::Instance,
+    memory::create_allocator,
     probe,
     ray_tracing::RayTracingCalls,
     statistics::StatisticsCalls,
@@ -30,14 +28,6 @@ pub struct ContextOptions {
     pub device: Option<DeviceSelector>,
     /// Run under the Khronos validation layer with synchronization validation.
     pub validate: bool,
-}
-
-/// What a part of the device's memory is for.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MemoryUse {
-    /// The buffer's or image's.
-    pub name: String,
-    pub bytes: u64,
 }
 
 /// A Vulkan device with one queue for graphics and compute.
@@ -59,6 +49,8 @@ pub struct Context {
     info: DeviceInfo,
     limits: Limits,
     fuses_fma: OnceLock<bool>,
+    #[cfg(feature = "hot-reload")]
+    pub(super) replacements: Mutex<super::Replacements>,
     instance: Arc<Instance>,
 }
 
@@ -153,6 +145,8 @@ impl Context {
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
             info,
             fuses_fma: OnceLock::new(),
+            #[cfg(feature = "hot-reload")]
+            replacements: Mutex::default(),
             limits: Limits::of(&instance, physical),
             instance,
         }))
@@ -196,15 +190,22 @@ impl Context {
     }
 
     /// Starts command buffers in order, one submit each: a driver's watchdog looks at submits.
+    /// Where that fails, those before have ended.
     pub fn submit(&self, buffers: &[&CommandBuffer]) -> Result<(), GpuError> {
-        for buffer in buffers {
-            let info = [vk::CommandBufferSubmitInfo::default().command_buffer(buffer.raw())];
-            let submit = [vk::SubmitInfo2::default().command_buffer_infos(&info)];
-            // SAFETY: the buffer is recorded, and its owner keeps it until `wait` has returned.
-            unsafe { self.device.queue_submit2(self.queue, &submit, vk::Fence::null()) }
-                .map_err(GpuError::call("vkQueueSubmit2", buffer.name()))?;
+        let submitted = buffers.iter().try_for_each(|buffer| self.submit_one(buffer));
+        if submitted.is_err() {
+            // Their owner may release them now.
+            let _ = self.wait();
         }
-        Ok(())
+        submitted
+    }
+
+    fn submit_one(&self, buffer: &CommandBuffer) -> Result<(), GpuError> {
+        let info = [vk::CommandBufferSubmitInfo::default().command_buffer(buffer.raw())];
+        let submit = [vk::SubmitInfo2::default().command_buffer_infos(&info)];
+        // SAFETY: the buffer is recorded, and its owner keeps it until `wait` has returned.
+        unsafe { self.device.queue_submit2(self.queue, &submit, vk::Fence::null()) }
+            .map_err(GpuError::call("vkQueueSubmit2", buffer.name()))
     }
 
     /// Waits until all that was submitted has ended.
@@ -232,48 +233,6 @@ impl Context {
         // SAFETY: the handle is one of this device's. A name that is not taken is no loss.
         let _ = unsafe { debug_utils.set_debug_utils_object_name(&info) };
     }
-
-    pub(super) fn allocate(
-        &self,
-        name: &str,
-        requirements: vk::MemoryRequirements,
-        location: MemoryLocation,
-        linear: bool,
-    ) -> Result<Allocation, GpuError> {
-        let desc = AllocationCreateDesc {
-            name,
-            requirements,
-            location,
-            linear,
-            allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-        };
-        self.allocator
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .allocate(&desc)
-            .map_err(|source| GpuError::Memory { object: name.to_owned(), bytes: requirements.size, source })
-    }
-
-    /// What memory is in use for, the most first; objects of one name together.
-    pub fn memory(&self) -> Vec<MemoryUse> {
-        let report = self.allocator.lock().unwrap_or_else(PoisonError::into_inner).generate_report();
-        let mut uses: Vec<MemoryUse> = Vec::new();
-        for allocation in report.allocations {
-            // egui's renderer gives its own no names.
-            let name = if allocation.name.is_empty() { "overlay".to_owned() } else { allocation.name };
-            match uses.iter_mut().find(|known| known.name == name) {
-                Some(known) => known.bytes += allocation.size,
-                None => uses.push(MemoryUse { name, bytes: allocation.size }),
-            }
-        }
-        uses.sort_by(|a, b| b.bytes.cmp(&a.bytes).then_with(|| a.name.cmp(&b.name)));
-        uses
-    }
-
-    pub(super) fn free(&self, allocation: Allocation) {
-        let freed = self.allocator.lock().unwrap_or_else(PoisonError::into_inner).free(allocation);
-        freed.expect("an allocation is freed once, by its owner");
-    }
 }
 
 impl Drop for Context {
@@ -286,25 +245,4 @@ impl Drop for Context {
             self.device.destroy_device(None);
         }
     }
-}
-
-fn create_allocator(
-    instance: &Instance,
-    device: &ash::Device,
-    physical_device: vk::PhysicalDevice,
-) -> Result<Allocator, GpuError> {
-    const MIB: u64 = 1 << 20;
-    // Blocks grow with use, so that a small scene takes little memory.
-    let sizes = AllocationSizes::new(16 * MIB, 16 * MIB)
-        .with_max_device_memblock_size(256 * MIB)
-        .with_max_host_memblock_size(64 * MIB);
-    Allocator::new(&AllocatorCreateDesc {
-        instance: instance.raw.clone(),
-        device: device.clone(),
-        physical_device,
-        debug_settings: AllocatorDebugSettings::default(),
-        buffer_device_address: true,
-        allocation_sizes: sizes,
-    })
-    .map_err(|source| GpuError::Memory { object: "allocator".into(), bytes: 0, source })
 }

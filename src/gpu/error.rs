@@ -30,9 +30,13 @@ pub enum GpuError {
 }
 
 impl GpuError {
-    /// Whether the device is gone, so that all that is on it has to be made anew.
+    /// Whether the device or the window's surface is gone, so that all that is on it has to be made anew.
     pub fn is_device_lost(&self) -> bool {
-        matches!(self, Self::Call { result: vk::Result::ERROR_DEVICE_LOST, .. })
+        let result = match self {
+            Self::Call { result, .. } | Self::Overlay(egui_ash_renderer::RendererError::Vulkan(result)) => *result,
+            _ => return false,
+        };
+        matches!(result, vk::Result::ERROR_DEVICE_LOST | vk::Result::ERROR_SURFACE_LOST_KHR)
     }
 
     /// Turns the result of `call` on `object` into an error.

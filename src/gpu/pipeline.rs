@@ -1,11 +1,12 @@
 //! Compute and raster pipelines.
 
-use std::{ffi::CStr, io::Cursor, sync::Arc};
+use std::{ffi::CStr, sync::Arc};
 
 use ash::vk;
 
 use super::{
-    Bindings, Context, GpuError, Presenter, TargetKind, specialization::Specialization, statistics::capture_flags,
+    Bindings, Context, GpuError, Presenter, Shader, TargetKind, shader::ShaderModule, specialization::Specialization,
+    statistics::capture_flags,
 };
 
 pub(super) const ENTRY_POINT: &CStr = c"main";
@@ -14,8 +15,7 @@ pub(super) const ENTRY_POINT: &CStr = c"main";
 pub struct ComputeDesc<'a> {
     /// Also the debug label and the timer.
     pub name: &'static str,
-    /// The SPIR-V module's bytes.
-    pub spirv: &'a [u8],
+    pub shader: Shader,
     /// Specialization constants 0, 1, ...
     pub constants: &'a [u32],
     /// Every subgroup has all its invocations; the workgroup's width must be a multiple of the subgroup size.
@@ -34,7 +34,7 @@ impl ComputePipeline {
     /// # Errors
     /// The driver refuses the module or is out of memory.
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &ComputeDesc) -> Result<Self, GpuError> {
-        let module = ShaderModule::new(context, desc.name, desc.spirv)?;
+        let module = ShaderModule::new(context, desc.shader)?;
         let constants = Specialization::new(desc.constants, bindings);
         let constants = constants.info();
         let flags = if desc.full_subgroups {
@@ -96,10 +96,8 @@ impl RasterTargets<'_> {
 pub struct RasterDesc<'a> {
     /// Also the debug label and the timer.
     pub name: &'static str,
-    /// The vertex shader's SPIR-V bytes.
-    pub vertex: &'a [u8],
-    /// The fragment shader's SPIR-V bytes.
-    pub fragment: &'a [u8],
+    pub vertex: Shader,
+    pub fragment: Shader,
     pub targets: RasterTargets<'a>,
 }
 
@@ -115,8 +113,8 @@ impl RasterPipeline {
     /// # Errors
     /// The driver refuses a module or is out of memory.
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &RasterDesc) -> Result<Self, GpuError> {
-        let vertex = ShaderModule::new(context, desc.name, desc.vertex)?;
-        let fragment = ShaderModule::new(context, desc.name, desc.fragment)?;
+        let vertex = ShaderModule::new(context, desc.vertex)?;
+        let fragment = ShaderModule::new(context, desc.fragment)?;
         let constants = Specialization::new(&[], bindings);
         let constants = constants.info();
         let stages = [(vk::ShaderStageFlags::VERTEX, vertex.raw), (vk::ShaderStageFlags::FRAGMENT, fragment.raw)].map(
@@ -175,29 +173,5 @@ impl Drop for RasterPipeline {
     fn drop(&mut self) {
         // SAFETY: the device has ended all work with it.
         unsafe { self.context.device.destroy_pipeline(self.raw, None) };
-    }
-}
-
-/// A module, needed only while a pipeline is made of it.
-pub(super) struct ShaderModule<'a> {
-    pub(super) raw: vk::ShaderModule,
-    context: &'a Context,
-}
-
-impl<'a> ShaderModule<'a> {
-    pub(super) fn new(context: &'a Context, name: &str, spirv: &[u8]) -> Result<Self, GpuError> {
-        let code = ash::util::read_spv(&mut Cursor::new(spirv)).expect("build.rs writes whole SPIR-V words");
-        let info = vk::ShaderModuleCreateInfo::default().code(&code);
-        // SAFETY: the code lives until the call returns.
-        let raw = unsafe { context.device.create_shader_module(&info, None) }
-            .map_err(GpuError::call("vkCreateShaderModule", name))?;
-        Ok(Self { raw, context })
-    }
-}
-
-impl Drop for ShaderModule<'_> {
-    fn drop(&mut self) {
-        // SAFETY: pipelines do not need their modules once made.
-        unsafe { self.context.device.destroy_shader_module(self.raw, None) };
     }
 }

@@ -6,10 +6,8 @@ use ash::{khr, vk};
 use bytemuck::Pod;
 
 use super::{
-    Bindings, Buffer, BufferUse, Commands, Context, GpuError,
-    devices::text,
-    instance::Instance,
-    pipeline::{ENTRY_POINT, ShaderModule},
+    Bindings, Buffer, BufferUse, Commands, Context, GpuError, Shader, devices::text, instance::Instance,
+    pipeline::ENTRY_POINT, shader::ShaderModule,
 };
 
 /// The extensions' functions and limits.
@@ -55,13 +53,13 @@ impl RayTracingCalls {
     }
 }
 
-/// SPIR-V bytes of a pipeline's three shaders.
-pub struct RayTracingDesc<'a> {
+/// A pipeline's three shaders.
+pub struct RayTracingDesc {
     /// Also the debug label and the timer.
     pub name: &'static str,
-    pub generation: &'a [u8],
-    pub miss: &'a [u8],
-    pub closest_hit: &'a [u8],
+    pub generation: Shader,
+    pub miss: Shader,
+    pub closest_hit: Shader,
     /// Specialization constant 0 of the ray generation shader.
     pub constant: u32,
 }
@@ -85,10 +83,8 @@ impl RayTracingPipeline {
             (vk::ShaderStageFlags::MISS_KHR, desc.miss),
             (vk::ShaderStageFlags::CLOSEST_HIT_KHR, desc.closest_hit),
         ];
-        let modules = stages
-            .iter()
-            .map(|(_, spirv)| ShaderModule::new(context, desc.name, spirv))
-            .collect::<Result<Vec<_>, _>>()?;
+        let modules =
+            stages.iter().map(|(_, shader)| ShaderModule::new(context, *shader)).collect::<Result<Vec<_>, _>>()?;
         let entries = [vk::SpecializationMapEntry { constant_id: 0, offset: 0, size: 4 }];
         let constant = desc.constant.to_ne_bytes();
         let constants = vk::SpecializationInfo::default().map_entries(&entries).data(&constant);

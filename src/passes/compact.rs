@@ -17,8 +17,8 @@ pub struct Compact {
 
 impl Compact {
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
-        let kernel = |name, spirv: &[u8]| {
-            let desc = ComputeDesc { name, spirv, constants: &[], full_subgroups: true };
+        let kernel = |name, shader| {
+            let desc = ComputeDesc { name, shader, constants: &[], full_subgroups: true };
             ComputePipeline::new(context, bindings, &desc)
         };
         Ok(Self {

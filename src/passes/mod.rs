@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::{
     frame::{RenderOptions, Traversal},
-    gpu::{BindingKind, Bindings, ComputeDesc, ComputePipeline, Context, GpuError},
+    gpu::{BindingKind, Bindings, ComputeDesc, ComputePipeline, Context, GpuError, Shader},
     layout::{BIND_ADDRESSES, BIND_FRAME, BIND_TRIANGLE_IDS},
 };
 
@@ -50,10 +50,10 @@ pub use self::{
     visibility::Visibility,
 };
 
-/// A shader's SPIR-V, as build.rs left it.
+/// A shader, as build.rs left it.
 macro_rules! spirv {
     ($name:literal) => {
-        include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv"))
+        $crate::gpu::Shader { file: $name, spirv: include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv")) }
     };
 }
 pub(crate) use spirv;
@@ -143,8 +143,8 @@ fn kernel(
     context: &Arc<Context>,
     bindings: &Arc<Bindings>,
     name: &'static str,
-    spirv: &[u8],
+    shader: Shader,
     constants: &[u32],
 ) -> Result<ComputePipeline, GpuError> {
-    ComputePipeline::new(context, bindings, &ComputeDesc { name, spirv, constants, full_subgroups: false })
+    ComputePipeline::new(context, bindings, &ComputeDesc { name, shader, constants, full_subgroups: false })
 }

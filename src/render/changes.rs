@@ -53,6 +53,18 @@ impl Renderer {
         self.remake(options, Some(tree))
     }
 
+    /// Makes all kernels anew, of shaders that have changed. The next sample is the first of a new picture.
+    ///
+    /// # Errors
+    /// The driver refuses a shader; then all are as before.
+    #[cfg(feature = "hot-reload")]
+    pub fn remake_passes(&mut self) -> Result<(), GpuError> {
+        let passes = crate::passes::Passes::new(&self.context, &self.resources.bindings, &self.options)?;
+        self.reset_samples();
+        self.passes = passes;
+        Ok(())
+    }
+
     fn remake(&mut self, options: &RenderOptions, tree: Option<&KdTree>) -> Result<(), GpuError> {
         let before = self.options.clone();
         // Its commands hold kernels and sets that may go.

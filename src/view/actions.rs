@@ -2,12 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::uvec2;
+use glam::{Vec3, uvec2};
 
-use super::{controller::to_toml, input::Action, live::Live, pick::pick, session::Session};
+use super::{error::Topic, input::Action, live::Live, pick::pick, session::Session};
 use crate::{
     gpu::GpuError,
     output::{self, OutputError},
+    scene::Camera,
 };
 
 /// Why a picture was not saved.
@@ -39,9 +40,9 @@ impl Session {
         match self.complete(live).map_err(SaveError::from).and_then(|()| save(live, &path)) {
             Ok(()) => {
                 print(&format!("wrote {}\n", path.display()));
-                self.message = None;
+                self.settle(Topic::File);
             }
-            Err(error) => self.complain(&error.to_string()),
+            Err(error) => self.complain(Topic::File, &error.to_string()),
         }
     }
 
@@ -66,4 +67,34 @@ fn next_free(scene_name: &str) -> PathBuf {
     let stem = output::stem_of(scene_name);
     let mut names = (1..).map(|n| PathBuf::from(format!("{stem}-{n:03}.png")));
     names.find(|path| !path.exists()).expect("numbers do not end")
+}
+
+/// The camera as a scene file has it.
+fn to_toml(camera: &Camera) -> String {
+    let vector = |v: Vec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
+    let Camera { eye, target, up, vertical_fov_degrees } = *camera;
+    let (eye, target, up) = (vector(eye), vector(target), vector(up));
+    format!("[camera]\neye = {eye}\ntarget = {target}\nup = {up}\nvertical_fov = {vertical_fov_degrees:?}\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::vec3;
+
+    use super::*;
+
+    #[test]
+    fn a_scene_file_reads_the_printed_camera() {
+        let directory = tempfile::TempDir::new().unwrap();
+        let path = directory.path().join("view.toml");
+        let camera = Camera {
+            eye: vec3(3.0e8, -2.5e-7, 1.0),
+            target: vec3(0.1, 1.0 / 3.0, -7.0),
+            up: Vec3::Z,
+            vertical_fov_degrees: 39.5,
+        };
+        let mesh = "[[mesh]]\ngenerator = \"plane\"\nsize = [1.0, 1.0]\n";
+        std::fs::write(&path, format!("{}{mesh}", to_toml(&camera))).unwrap();
+        assert_eq!(crate::scene::Scene::load(&path).unwrap().camera, camera);
+    }
 }

@@ -16,7 +16,7 @@ use winit::{
 
 use super::{
     display::{PaceReport, ViewOptions, ViewReport},
-    error::ViewError,
+    error::{Topic, ViewError},
     input::{Action, Input},
     live::Live,
     panel::Settings,
@@ -25,7 +25,7 @@ use super::{
     session::Session,
     ui::{Layout, Ui},
 };
-use crate::gpu::GpuError;
+use crate::{frame::RenderOptions, gpu::GpuError};
 
 /// The viewer, as the event loop drives it.
 pub(super) struct App {
@@ -38,6 +38,8 @@ pub(super) struct App {
     shown: Option<Shown>,
     is_overlaid: bool,
     is_occluded: bool,
+    /// Whether nothing was shown yet since the device was lost.
+    is_reopened: bool,
     outcome: Result<(), ViewError>,
 }
 
@@ -59,6 +61,7 @@ impl App {
             input: Input::default(),
             shown: None,
             is_occluded: false,
+            is_reopened: false,
             outcome: Ok(()),
         }
     }
@@ -88,7 +91,8 @@ impl App {
         match result {
             Ok(true) => self.end(event_loop, Ok(())),
             Ok(false) => {}
-            Err(ViewError::Device(error)) if error.is_device_lost() => {
+            // What is lost before it shows anything will not come back.
+            Err(ViewError::Device(error)) if error.is_device_lost() && !self.is_reopened => {
                 self.recover(shown, event_loop, error);
                 return;
             }
@@ -126,7 +130,9 @@ impl App {
         if !live.show(size, frame.as_ref())? {
             return Ok(false);
         }
-        session.shown();
+        let RenderOptions { width, height, .. } = *live.renderer.options();
+        session.shown((width, height));
+        self.is_reopened = false;
         match &mut self.script {
             Some(script) => Ok(script.shown(session, live)?),
             None => Ok(false),
@@ -137,10 +143,16 @@ impl App {
     fn recover(&mut self, shown: Shown, event_loop: &ActiveEventLoop, error: GpuError) {
         let Shown { live, ui, window } = shown;
         drop((live, ui));
-        self.session.complain(&format!("{error}; the device was opened anew"));
+        self.session.complain(Topic::Device, &format!("{error}; the device was opened anew"));
         let Settings { options, vsync, .. } = &self.session.settings;
         match Live::open(window.clone(), &self.options.device, &self.session.loaded, options, *vsync) {
-            Ok(live) => self.shown = Some(Shown { live, ui: Ui::new(&window), window }),
+            Ok(live) => {
+                self.is_reopened = true;
+                // What took the place of shaders went with the device.
+                #[cfg(feature = "hot-reload")]
+                self.reloader.shaders.compile();
+                self.shown = Some(Shown { live, ui: Ui::new(&window), window });
+            }
             Err(error) => self.end(event_loop, Err(error.into())),
         }
     }
@@ -180,7 +192,8 @@ impl App {
     pub fn report(self) -> Result<ViewReport, ViewError> {
         self.outcome?;
         let frames = &self.session.all_frames;
-        let pace = PaceReport { frame_ms: frames.pace(), input_to_present_ms: frames.latency() };
+        let pace =
+            PaceReport { frame_ms: frames.pace(), input_to_present_ms: frames.latency(), moving: frames.moving() };
         let Some(Shown { live, ui, window }) = self.shown else {
             return Err(ViewError::Window("it was closed before it was open".to_owned()));
         };
@@ -231,6 +244,16 @@ impl ApplicationHandler<Wake> for App {
                 }
                 self.reloader.done();
             }
+            #[cfg(feature = "hot-reload")]
+            Wake::ShadersChanged => self.reloader.shaders.compile(),
+            #[cfg(feature = "hot-reload")]
+            Wake::Compiled(shaders) => {
+                if let Some(Shown { live, window, .. }) = &mut self.shown {
+                    self.session.replace_shaders(live, shaders);
+                    window.request_redraw();
+                }
+                self.reloader.shaders.done();
+            }
         }
     }
 
@@ -239,7 +262,7 @@ impl ApplicationHandler<Wake> for App {
             WindowEvent::CloseRequested => self.end(event_loop, Ok(())),
             WindowEvent::RedrawRequested => self.frame(event_loop),
             WindowEvent::Occluded(is_occluded) => self.is_occluded = is_occluded,
-            WindowEvent::Resized(_) => {
+            WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => {
                 if let Some(Shown { live, .. }) = &mut self.shown {
                     live.presenter.mark_stale();
                     // As long as the user pulls at the window, it is drawn fast.
@@ -257,7 +280,9 @@ impl ApplicationHandler<Wake> for App {
         let is_busy = self.script.is_some() || self.session.is_busy(live, now, (size.width, size.height));
         let wait = if is_busy || !self.is_overlaid { Duration::MAX } else { ui.repaint_after() };
         let has_area = size.width > 0 && size.height > 0;
-        if self.is_occluded || !has_area {
+        // A script goes on whoever looks.
+        let is_seen = self.script.is_some() || !(self.is_occluded || window.is_minimized() == Some(true));
+        if !is_seen || !has_area {
             event_loop.set_control_flow(ControlFlow::Wait);
         } else if is_busy || wait.is_zero() {
             window.request_redraw();

@@ -48,6 +48,15 @@ impl Budget {
         self.full_ms
     }
 
+    /// The window has `ratio` times as many pixels as before. What small windows cost says nothing of large ones: beyond
+    /// a factor of two it is learned anew.
+    pub fn resize(&mut self, ratio: f64) {
+        self.full_ms = self.full_ms.filter(|_| (0.5..=2.0).contains(&ratio)).map(|full_ms| full_ms * ratio);
+        if self.full_ms.is_none() {
+            self.step = LEAST_STEP;
+        }
+    }
+
     /// Learns from a frame of a share of the sides that took so long, all of it counted.
     pub fn learn(&mut self, share: f64, ms: f64) {
         if !std::mem::replace(&mut self.is_warm, true) {
@@ -103,6 +112,17 @@ mod tests {
         let mut budget = Budget::new(16.0);
         budget.learn(0.125, 5000.0);
         assert_eq!(budget.full_ms(), None);
+        budget.learn(0.125, 1.0);
+        assert_eq!(budget.full_ms(), Some(64.0));
+    }
+
+    #[test]
+    fn another_window_costs_by_its_pixels_or_is_learned_anew() {
+        let (mut budget, _) = settled(16.0, 0.0, 10.0);
+        budget.resize(1.5);
+        assert!((budget.full_ms().unwrap() - 15.0).abs() < 1e-6 && budget.share() == 1.0);
+        budget.resize(1000.0);
+        assert_eq!((budget.full_ms(), budget.size((640, 480))), (None, (80, 60)));
         budget.learn(0.125, 1.0);
         assert_eq!(budget.full_ms(), Some(64.0));
     }

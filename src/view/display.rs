@@ -8,7 +8,7 @@ use winit::event_loop::EventLoop;
 use super::{
     app::App,
     error::ViewError,
-    history::Percentiles,
+    history::{Moving, Percentiles},
     loaded::Loaded,
     panel::Settings,
     reload::{Reloader, Wake},
@@ -53,6 +53,8 @@ pub struct PaceReport {
     pub frame_ms: Option<Percentiles>,
     /// From an input to the first frame that shows it.
     pub input_to_present_ms: Option<Percentiles>,
+    /// While the camera moves.
+    pub moving: Option<Moving>,
 }
 
 /// A display that windows can be opened on.

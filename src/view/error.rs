@@ -1,4 +1,4 @@
-//! Why the viewer ends, or does not begin.
+//! Why the viewer ends, or does not begin, and what it outlives.
 
 use super::actions::SaveError;
 use crate::{gpu::GpuError, output::OutputError};
@@ -23,4 +23,15 @@ impl From<SaveError> for ViewError {
             SaveError::Output(error) => Self::Output(error),
         }
     }
+}
+
+/// What can go wrong while the window lives on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Topic {
+    Device,
+    Scene,
+    #[cfg(feature = "hot-reload")]
+    Shaders,
+    Settings,
+    File,
 }

@@ -13,6 +13,8 @@ pub struct FrameRecord {
     pub frame_ms: f64,
     /// From the oldest input that it is the first to show to its hand-over to the screen; none without input.
     pub latency_ms: Option<f64>,
+    /// Width and height of the picture, pixels, if the camera moved.
+    pub moving: Option<(u32, u32)>,
     /// GPU time of each pass, in the order of execution; empty where the device has no timestamps.
     pub pass_ms: Vec<(&'static str, f64)>,
 }
@@ -53,10 +55,30 @@ impl History {
         Percentiles::of(self.frames().map(|frame| frame.frame_ms).collect())
     }
 
+    /// Of those that were drawn while the camera moved.
+    pub fn moving(&self) -> Option<Moving> {
+        let moving = || self.frames().filter_map(|frame| Some((frame.moving?, frame.frame_ms)));
+        let frame_ms = Percentiles::of(moving().map(|(_, ms)| ms).collect())?;
+        let mut sizes: Vec<_> = moving().map(|(size, _)| size).collect();
+        sizes.sort_by_key(|(width, height)| u64::from(*width) * u64::from(*height));
+        let (width, height) = sizes[sizes.len() / 2];
+        Some(Moving { width, height, frame_ms })
+    }
+
     /// Of the latency of those that answered input.
     pub fn latency(&self) -> Option<Percentiles> {
         Percentiles::of(self.frames().filter_map(|frame| frame.latency_ms).collect())
     }
+}
+
+/// What the budget made of frames while the camera moved.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Moving {
+    /// Of the picture of median size, pixels.
+    pub width: u32,
+    pub height: u32,
+    /// From a frame to the next, milliseconds.
+    pub frame_ms: Percentiles,
 }
 
 /// Of times, in milliseconds.
@@ -97,10 +119,14 @@ mod tests {
         let mut history = History::new(2.0);
         for i in 0..10 {
             let latency_ms = (i % 2 == 0).then_some(1.0);
-            history.push(FrameRecord { shown_s: f64::from(i), frame_ms: 5.0, latency_ms, ..Default::default() });
+            let moving = (i % 2 == 1).then_some((10 * i, 10));
+            let frame_ms = f64::from(i);
+            history.push(FrameRecord { shown_s: f64::from(i), frame_ms, latency_ms, moving, ..Default::default() });
         }
         let kept: Vec<_> = history.frames().map(|frame| frame.shown_s).collect();
         assert_eq!(kept, [7.0, 8.0, 9.0]);
         assert_eq!((history.pace().unwrap().n, history.latency().unwrap().n), (3, 1));
+        let frame_ms = Percentiles { n: 2, p50: 7.0, p95: 9.0, p99: 9.0 };
+        assert_eq!(history.moving(), Some(Moving { width: 90, height: 10, frame_ms }));
     }
 }

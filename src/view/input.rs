@@ -5,7 +5,7 @@ use winit::{
     keyboard::{KeyCode, PhysicalKey},
 };
 
-use super::controller::{Controller, Fly};
+use super::{controller::Controller, flight::Fly};
 use crate::frame::View;
 
 /// Pixels of the wheel's travel where it has no steps.
@@ -57,23 +57,27 @@ impl Input {
     /// Handles an event that is not the overlay's; `height`: the window's, pixels.
     pub fn hear(&mut self, event: &WindowEvent, height: u32, controller: &mut Controller) -> Heard {
         match event {
+            // Keys that are down when the window gets them: those pressed since are told of once more.
+            WindowEvent::KeyboardInput { event, is_synthetic: true, .. } if event.state.is_pressed() => {
+                Heard::default()
+            }
             WindowEvent::KeyboardInput { event, .. } => self.key(event, controller),
             WindowEvent::ModifiersChanged(modifiers) => {
                 let state = modifiers.state();
-                controller.hurry(state.shift_key(), state.control_key());
+                controller.flight.hurry(state.shift_key(), state.control_key());
                 Heard::default()
             }
             WindowEvent::CursorMoved { position, .. } => self.motion((position.x, position.y), height, controller),
             WindowEvent::MouseInput { state, button, .. } => self.button(*state, *button),
             WindowEvent::MouseWheel { delta, .. } => {
-                controller.wheel(match delta {
+                controller.flight.wheel(match delta {
                     MouseScrollDelta::LineDelta(_, y) => *y,
                     MouseScrollDelta::PixelDelta(position) => (position.y / WHEEL_STEP_PX) as f32,
                 });
                 Heard::default()
             }
             WindowEvent::Focused(false) => {
-                controller.release();
+                controller.flight.release();
                 self.press = None;
                 Heard::default()
             }
@@ -88,7 +92,7 @@ impl Input {
 
     fn press_key(&mut self, code: KeyCode, is_down: bool, is_repeat: bool, controller: &mut Controller) -> Heard {
         if let Some(way) = self.way(code).filter(|_| !is_repeat) {
-            controller.hold(way, is_down);
+            controller.flight.hold(way, is_down);
             self.is_flying |= is_down;
             return Heard { moves: true, action: None };
         }
@@ -110,7 +114,7 @@ impl Input {
         };
         if matches!(action, Some(Action::FrameScene | Action::GoHome)) {
             self.is_flying = false;
-            controller.release();
+            controller.flight.release();
         }
         Heard { action, moves: false }
     }
@@ -139,7 +143,7 @@ impl Input {
         match button {
             MouseButton::Left => {
                 self.is_flying = false;
-                controller.release();
+                controller.flight.release();
                 controller.orbit(x, y);
             }
             MouseButton::Right => {
@@ -193,10 +197,10 @@ mod tests {
         assert_eq!(tap(&mut input, &mut controller, KeyCode::KeyW), None);
         assert_eq!(tap(&mut input, &mut controller, KeyCode::KeyS), None);
         input.press_key(KeyCode::KeyS, true, false, &mut controller);
-        assert!(controller.is_flying());
+        assert!(controller.flight.is_under_way());
         assert_eq!(tap(&mut input, &mut controller, KeyCode::F12), Some(Action::Save));
         assert_eq!(tap(&mut input, &mut controller, KeyCode::Home), Some(Action::GoHome));
-        assert!(!controller.is_flying());
+        assert!(!controller.flight.is_under_way());
         assert_eq!(tap(&mut input, &mut controller, KeyCode::KeyS), Some(Action::Save));
     }
 

@@ -54,6 +54,22 @@ impl Live {
         Ok(())
     }
 
+    /// Goes on with other shaders; where the device refuses them, with those before.
+    ///
+    /// # Errors
+    /// The driver refuses a shader.
+    #[cfg(feature = "hot-reload")]
+    pub fn replace_shaders(&mut self, shaders: crate::gpu::Replacements) -> Result<(), GpuError> {
+        self.context.wait()?;
+        let before = self.context.replace_shaders(shaders);
+        let remade = Present::new(&self.context, self.renderer.resources(), &self.presenter)
+            .and_then(|present| self.renderer.remake_passes().map(|()| self.present = present));
+        if remade.is_err() {
+            self.context.replace_shaders(before);
+        }
+        remade
+    }
+
     /// Takes over what egui has changed in its textures; no change may be left out.
     ///
     /// # Errors

@@ -6,6 +6,7 @@ pub mod budget;
 pub mod controller;
 mod display;
 mod error;
+pub mod flight;
 pub mod history;
 mod input;
 mod live;
@@ -16,6 +17,8 @@ pub mod pick;
 mod reload;
 mod script;
 mod session;
+#[cfg(feature = "hot-reload")]
+mod shaders;
 pub mod tour;
 mod ui;
 pub mod watch;

@@ -4,7 +4,7 @@ use std::{collections::BTreeSet, path::PathBuf, thread, time::Instant};
 
 use winit::event_loop::EventLoopProxy;
 
-use super::{live::Live, loaded::Loaded, session::Session, watch::Watch};
+use super::{error::Topic, live::Live, loaded::Loaded, session::Session, watch::Watch};
 use crate::scene::{SceneError, source_files};
 
 /// What wakes the viewer.
@@ -13,6 +13,33 @@ pub enum Wake {
     Changed,
     /// The scene was read again.
     Reloaded(Box<Result<Loaded, SceneError>>),
+    /// A shader has changed.
+    #[cfg(feature = "hot-reload")]
+    ShadersChanged,
+    /// The shaders were compiled anew.
+    #[cfg(feature = "hot-reload")]
+    Compiled(Result<crate::gpu::Replacements, String>),
+}
+
+/// Work that is not begun while it is under way; asked for meanwhile, it is due again.
+#[derive(Default)]
+pub struct OneAtATime {
+    is_under_way: bool,
+    is_due: bool,
+}
+
+impl OneAtATime {
+    /// Whether to begin now.
+    pub fn begin(&mut self) -> bool {
+        self.is_due = self.is_under_way;
+        !std::mem::replace(&mut self.is_under_way, true)
+    }
+
+    /// It has ended; whether it is due again.
+    pub fn end(&mut self) -> bool {
+        self.is_under_way = false;
+        std::mem::take(&mut self.is_due)
+    }
 }
 
 /// Watches the scene's files and reads them again on a thread of its own.
@@ -23,14 +50,22 @@ pub struct Reloader {
     proxy: EventLoopProxy<Wake>,
     /// None where the system refuses.
     _watch: Option<Watch>,
-    is_loading: bool,
-    is_stale: bool,
+    loading: OneAtATime,
+    #[cfg(feature = "hot-reload")]
+    pub shaders: super::shaders::Shaders,
 }
 
 impl Reloader {
     pub fn new(path: PathBuf, proxy: EventLoopProxy<Wake>) -> Self {
-        let mut reloader =
-            Self { path, files: BTreeSet::new(), proxy, _watch: None, is_loading: false, is_stale: false };
+        let mut reloader = Self {
+            path,
+            files: BTreeSet::new(),
+            #[cfg(feature = "hot-reload")]
+            shaders: super::shaders::Shaders::new(proxy.clone()),
+            proxy,
+            _watch: None,
+            loading: OneAtATime::default(),
+        };
         reloader.watch();
         reloader
     }
@@ -52,20 +87,16 @@ impl Reloader {
 
     /// Begins to read the scene again, or does so once it is read that is being read.
     pub fn load(&mut self) {
-        if self.is_loading {
-            self.is_stale = true;
-            return;
+        if self.loading.begin() {
+            let (path, proxy) = (self.path.clone(), self.proxy.clone());
+            thread::spawn(move || drop(proxy.send_event(Wake::Reloaded(Box::new(Loaded::load(&path))))));
         }
-        self.is_loading = true;
-        let (path, proxy) = (self.path.clone(), self.proxy.clone());
-        thread::spawn(move || drop(proxy.send_event(Wake::Reloaded(Box::new(Loaded::load(&path))))));
     }
 
     /// The scene was read.
     pub fn done(&mut self) {
-        self.is_loading = false;
         self.watch();
-        if std::mem::take(&mut self.is_stale) {
+        if self.loading.end() {
             self.load();
         }
     }
@@ -76,7 +107,7 @@ impl Session {
     pub fn replace_scene(&mut self, live: &mut Live, loaded: Result<Loaded, SceneError>) {
         let loaded = match loaded {
             Ok(loaded) => loaded,
-            Err(error) => return self.complain(&error.to_string()),
+            Err(error) => return self.complain(Topic::Scene, &error.to_string()),
         };
         match live.set_scene(&loaded) {
             Ok(()) => {
@@ -85,9 +116,23 @@ impl Session {
                 self.picked = None;
                 // A small picture at once.
                 self.pace.moved(Instant::now());
-                self.message = None;
+                self.settle(Topic::Scene);
             }
-            Err(error) => self.complain(&error.to_string()),
+            Err(error) => self.complain(Topic::Scene, &error.to_string()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_that_is_under_way_is_begun_again_once() {
+        let mut work = OneAtATime::default();
+        assert!(work.begin());
+        assert!(!work.begin() && !work.begin());
+        assert!(work.end() && work.begin());
+        assert!(!work.end());
     }
 }

@@ -5,6 +5,7 @@ use std::time::Instant;
 use super::{
     budget::Budget,
     controller::Controller,
+    error::Topic,
     history::{FrameRecord, History},
     live::Live,
     loaded::Loaded,
@@ -38,14 +39,18 @@ pub struct Session {
     profile: Profile,
     /// Whether nobody waits for pictures of full size.
     is_interactive: bool,
+    /// Whether the last frame was drawn while the camera moved.
+    is_moving: bool,
     /// Whether the last frame completed a sample.
     has_new_sample: bool,
     /// The widest and the highest picture that there was.
     room: (u32, u32),
+    /// The window's size that the last frame was drawn for.
+    window: (u32, u32),
     /// Milliseconds of the sample that is being drawn.
     sample_ms: f64,
     pub(super) picked: Option<Picked>,
-    pub(super) message: Option<String>,
+    message: Option<(Topic, String)>,
     start: Instant,
 }
 
@@ -61,9 +66,11 @@ impl Session {
             all_frames: History::new(f64::INFINITY),
             profile: Profile::default(),
             is_interactive,
+            is_moving: false,
             has_new_sample: false,
             sample_ms: 0.0,
             room: (0, 0),
+            window: (0, 0),
             picked: None,
             message: None,
             start: Instant::now(),
@@ -74,7 +81,11 @@ impl Session {
     pub fn is_busy(&self, live: &Live, now: Instant, window: (u32, u32)) -> bool {
         let options = live.renderer.options();
         let is_small = window != (options.width, options.height);
-        is_small || self.controller.is_flying() || self.pace.is_moving(now) || self.is_learning() || !self.is_done(live)
+        is_small
+            || self.controller.flight.is_under_way()
+            || self.pace.is_moving(now)
+            || self.is_learning()
+            || !self.is_done(live)
     }
 
     /// Whether it is not known yet how long a picture takes: small ones tell.
@@ -94,7 +105,7 @@ impl Session {
     pub fn draw(&mut self, live: &mut Live, window: (u32, u32)) -> Result<(), GpuError> {
         let now = Instant::now();
         let seconds = self.pace.begin(now);
-        if self.controller.is_flying() {
+        if self.controller.flight.is_under_way() {
             self.controller.advance(seconds);
             self.pace.moved(now);
         }
@@ -102,6 +113,7 @@ impl Session {
         live.context.wait()?;
         live.presenter.set_vsync(self.settings.vsync);
         self.budget.set_budget(self.settings.budget_ms);
+        self.fit_window(live, window)?;
         let features = self.settings.view != View::Picture;
         let whole = RenderOptions { width: window.0, height: window.1, features, ..self.settings.options.clone() };
         let (view, brightest) = self.view();
@@ -113,6 +125,7 @@ impl Session {
             self.pace.moved(now);
         }
         let is_moving = self.pace.is_moving(now) || self.is_learning();
+        self.is_moving = self.pace.is_moving(now);
         let (width, height) = if is_moving { self.budget.size(window) } else { window };
         let asked = RenderOptions { width, height, ..whole.clone() };
         let is_new = asked != *live.renderer.options();
@@ -120,7 +133,7 @@ impl Session {
         let steps = [(is_moving && makes_room).then_some(&whole), is_new.then_some(&asked)];
         for options in steps.into_iter().flatten() {
             if let Err(error) = live.renderer.set_options(options, &self.loaded.tree) {
-                self.take_back(live, &error);
+                self.take_back(live, error)?;
                 break;
             }
         }
@@ -138,6 +151,18 @@ impl Session {
         } else {
             Ok(())
         }
+    }
+
+    /// What was learned of a window of another size is put right.
+    fn fit_window(&mut self, live: &mut Live, window: (u32, u32)) -> Result<(), GpuError> {
+        let before = std::mem::replace(&mut self.window, window);
+        if before == window || before == (0, 0) {
+            return Ok(());
+        }
+        let n_pixels = |(width, height): (u32, u32)| f64::from(width) * f64::from(height);
+        self.budget.resize(n_pixels(window) / n_pixels(before));
+        // Parts as small as a small window's would be too many for a large one.
+        live.renderer.limit_batches(None)
     }
 
     /// Whether the buffers are those that such a picture needs, and large enough; they will be.
@@ -190,20 +215,25 @@ impl Session {
         Ok(())
     }
 
-    /// Goes back to what the device did before; a size that it refuses is not the user's to change.
-    fn take_back(&mut self, live: &Live, error: &GpuError) {
+    /// Goes back to what the device did before, unless it is lost; a size that it refuses is not the user's to change.
+    fn take_back(&mut self, live: &Live, error: GpuError) -> Result<(), GpuError> {
+        if error.is_device_lost() {
+            return Err(error);
+        }
         self.settings.options = live.renderer.options().clone();
-        self.complain(&error.to_string());
+        self.complain(Topic::Settings, &error.to_string());
+        Ok(())
     }
 
-    /// The frame is on its way to the screen.
-    pub fn shown(&mut self) {
+    /// The frame, a picture of that size, is on its way to the screen.
+    pub fn shown(&mut self, picture: (u32, u32)) {
         let now = Instant::now();
         let times = self.pace.shown(now);
         let record = FrameRecord {
             shown_s: now.duration_since(self.start).as_secs_f64(),
             frame_ms: times.frame_ms,
             latency_ms: times.latency_ms,
+            moving: self.is_moving.then_some(picture),
             pass_ms: Vec::new(),
         };
         self.all_frames.push(record.clone());
@@ -233,20 +263,25 @@ impl Session {
             picture: (options.width, options.height),
             n_samples: live.renderer.n_samples(),
             progress: live.renderer.progress(),
-            speed: self.controller.speed(),
+            speed: self.controller.flight.speed(),
             is_flying,
             profile: &self.profile,
             history: &self.history,
             memory: live.context.memory(),
             picked: self.picked.as_ref(),
-            message: self.message.as_deref(),
+            message: self.message.as_ref().map(|(_, message)| &**message),
         }
     }
 
-    /// Tells the user what went wrong, in the overlay and on the terminal.
-    pub fn complain(&mut self, message: &str) {
+    /// Tells the user what went wrong last, in the overlay and on the terminal.
+    pub fn complain(&mut self, topic: Topic, message: &str) {
         tracing::warn!("{message}");
-        self.message = Some(message.to_owned());
+        self.message = Some((topic, message.to_owned()));
+    }
+
+    /// What went wrong there is right again.
+    pub fn settle(&mut self, topic: Topic) {
+        self.message.take_if(|(wrong, _)| *wrong == topic);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use egui::{Context, Order, Pos2, TexturesDelta, ViewportId, pos2};
+use egui::{Context, Order, Popup, Pos2, TexturesDelta, ViewportId, pos2};
 use egui_winit::State;
 use winit::{
     event::{ElementState, WindowEvent},
@@ -55,7 +55,8 @@ impl Ui {
                     || context.layer_id_at(self.cursor).is_some_and(|layer| layer.order != Order::Background)
             }
             WindowEvent::CursorMoved { .. } => context.egui_is_using_pointer(),
-            WindowEvent::KeyboardInput { .. } => context.egui_wants_keyboard_input(),
+            // Escape closes a list of choices first.
+            WindowEvent::KeyboardInput { .. } => context.egui_wants_keyboard_input() || Popup::is_any_open(context),
             _ => false,
         }
     }

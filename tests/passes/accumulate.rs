@@ -69,14 +69,12 @@ fn the_mean_of_whole_numbers_is_known() {
 fn nothing_is_added_where_a_queue_overflowed() {
     let stage = stage(9, 5, 2);
     let (sample, sums) = (some(45, 1), some(45, 2));
-    for row in 0..3 {
-        let mut bounces = [Bounce::default(); 3];
-        bounces[row].overflow = 1;
-        let (found, found_sums) = accumulated(&stage, &bounces, &sample, &sums);
-        compare::exact(&sample, &found).unwrap();
-        compare::exact(&sums, &found_sums).unwrap();
-        let (mut twin, mut twin_sums) = (sample.clone(), sums.clone());
-        cpu::accumulate::accumulate(stage.resources.constants(), &bounces, &mut twin, &mut twin_sums);
-        assert_eq!((twin, twin_sums), (sample.clone(), sums.clone()));
-    }
+    let mut bounces = [Bounce::default(); 3];
+    bounces[0].any_overflow = 1;
+    let (found, found_sums) = accumulated(&stage, &bounces, &sample, &sums);
+    compare::exact(&sample, &found).unwrap();
+    compare::exact(&sums, &found_sums).unwrap();
+    let (mut twin, mut twin_sums) = (sample.clone(), sums.clone());
+    cpu::accumulate::accumulate(stage.resources.constants(), &bounces, &mut twin, &mut twin_sums);
+    assert_eq!((twin, twin_sums), (sample.clone(), sums.clone()));
 }

@@ -62,7 +62,7 @@ fn on_device(stage: &Stage, child_counts: &[u32]) -> (Vec<Ray>, [Bounce; 2]) {
 fn on_cpu(stage: &Stage, child_counts: &[u32]) -> (Vec<Ray>, [Bounce; 2]) {
     let (n_rays, capacity) = (child_counts.len(), stage.resources.queues.ray_queues[1].len());
     let children: Vec<Ray> = (0..2 * n_rays).map(numbered).collect();
-    let this = kdray::passes::bounce_row(n_rays as u32, 0);
+    let mut this = kdray::passes::bounce_row(n_rays as u32, 0);
     let mut next = this;
     let mut scan_blocks = vec![0; n_rays.div_ceil(SCAN_BLOCK_SIZE as usize)];
     let mut next_rays = vec![UNTOUCHED_RAY; capacity];
@@ -71,6 +71,7 @@ fn on_cpu(stage: &Stage, child_counts: &[u32]) -> (Vec<Ray>, [Bounce; 2]) {
     if next.overflow == 0 {
         cpu::compact::scatter(&children, child_counts, &scan_blocks, &mut next_rays[..next.n_rays as usize]);
     }
+    this.any_overflow = next.overflow;
     (next_rays, [this, next])
 }
 
@@ -115,6 +116,7 @@ fn a_full_queue_is_used_and_an_overfull_one_reported() {
     let (rays, bounces) = on_device(&stage, &child_counts);
     compare::exact(&[UNTOUCHED_RAY; 3000], &rays).unwrap();
     assert_eq!((bounces[1].overflow, bounces[1].n_rays, bounces[1].n_wanted), (1, 0, 3001));
+    assert_eq!([bounces[0].any_overflow, bounces[0].overflow], [1, 0]);
 }
 
 /// Odd bounces read the second queue and fill the first.

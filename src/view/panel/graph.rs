@@ -40,10 +40,11 @@ pub fn show(ui: &mut Ui, history: &History, newest: &Profile) {
             left = right;
         }
     }
+    let digits = usize::from(top_ms < 1.0) * 2;
     painter.text(
         area.left_top() + vec2(3.0, 1.0),
         egui::Align2::LEFT_TOP,
-        format!("{top_ms:.1} ms of GPU time, {:.0} s", history.length_s()),
+        format!("{top_ms:.digits$} ms of GPU time, {:.0} s", history.length_s()),
         egui::FontId::proportional(10.0),
         Color32::LIGHT_GRAY,
     );

@@ -1,0 +1,64 @@
+//! Shaders as build.rs has compiled them, and what takes their place while the program runs.
+
+use std::io::Cursor;
+
+use ash::vk;
+
+use super::{Context, GpuError};
+
+/// A shader that the program brings along.
+#[derive(Clone, Copy)]
+pub struct Shader {
+    /// Its file's name in glsl/passes, say.
+    pub file: &'static str,
+    /// The SPIR-V module's bytes.
+    pub spirv: &'static [u8],
+}
+
+/// SPIR-V modules that take the place of those that the program brings along, by their files' names.
+#[cfg(feature = "hot-reload")]
+pub type Replacements = std::collections::HashMap<String, Vec<u8>>;
+
+#[cfg(feature = "hot-reload")]
+impl Context {
+    /// Pipelines that are made from now on are made of these; gives what they were made of before.
+    pub fn replace_shaders(&self, replacements: Replacements) -> Replacements {
+        let mut current = self.replacements.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        std::mem::replace(&mut current, replacements)
+    }
+}
+
+/// A module, needed only while a pipeline is made of it.
+pub(super) struct ShaderModule<'a> {
+    pub(super) raw: vk::ShaderModule,
+    context: &'a Context,
+}
+
+impl<'a> ShaderModule<'a> {
+    pub(super) fn new(context: &'a Context, shader: Shader) -> Result<Self, GpuError> {
+        #[cfg(feature = "hot-reload")]
+        {
+            let replacements = context.replacements.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            if let Some(spirv) = replacements.get(shader.file) {
+                return Self::of(context, shader.file, spirv);
+            }
+        }
+        Self::of(context, shader.file, shader.spirv)
+    }
+
+    fn of(context: &'a Context, file: &str, spirv: &[u8]) -> Result<Self, GpuError> {
+        let code = ash::util::read_spv(&mut Cursor::new(spirv)).expect("build.rs writes whole SPIR-V words");
+        let info = vk::ShaderModuleCreateInfo::default().code(&code);
+        // SAFETY: the code lives until the call returns.
+        let raw = unsafe { context.device.create_shader_module(&info, None) }
+            .map_err(GpuError::call("vkCreateShaderModule", file))?;
+        Ok(Self { raw, context })
+    }
+}
+
+impl Drop for ShaderModule<'_> {
+    fn drop(&mut self) {
+        // SAFETY: pipelines do not need their modules once made.
+        unsafe { self.context.device.destroy_shader_module(self.raw, None) };
+    }
+}

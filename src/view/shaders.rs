@@ -1,0 +1,187 @@
+//! Shaders that change while they are used. The build script compiles them, as it does for cargo.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output, Stdio},
+    thread,
+    time::Instant,
+};
+
+use tempfile::TempDir;
+use winit::event_loop::EventLoopProxy;
+
+use super::{
+    error::Topic,
+    live::Live,
+    reload::{OneAtATime, Wake},
+    session::Session,
+    watch::Watch,
+};
+use crate::gpu::Replacements;
+
+/// The build script's program.
+const COMPILER: &str = env!("KDRAY_SHADER_COMPILER");
+/// What the program knows of layout.glsl.
+const LAYOUT: &str = include_str!(concat!(env!("OUT_DIR"), "/layout.rs"));
+
+/// Watches the shaders and compiles them anew on a thread of its own.
+pub struct Shaders {
+    checkout: PathBuf,
+    proxy: EventLoopProxy<Wake>,
+    /// None where the system refuses.
+    _watch: Option<Watch>,
+    compiling: OneAtATime,
+}
+
+impl Shaders {
+    /// Of the working directory, if it is a checkout, or of the one that the program was built in.
+    pub fn new(proxy: EventLoopProxy<Wake>) -> Self {
+        let here = Path::new(".");
+        let checkout = if here.join("glsl").is_dir() { here } else { Path::new(env!("CARGO_MANIFEST_DIR")) };
+        let waker = proxy.clone();
+        // There may be no viewer left to wake.
+        let changed = move || drop(waker.send_event(Wake::ShadersChanged));
+        let watch = Watch::new(&shader_files(checkout), changed)
+            .inspect_err(|error| tracing::warn!("the shaders are not watched: {error}"))
+            .ok();
+        Self { checkout: checkout.to_owned(), proxy, _watch: watch, compiling: OneAtATime::default() }
+    }
+
+    /// Begins to compile all shaders, or does so once those are compiled that are being compiled.
+    pub fn compile(&mut self) {
+        if self.compiling.begin() {
+            let (checkout, proxy) = (self.checkout.clone(), self.proxy.clone());
+            thread::spawn(move || drop(proxy.send_event(Wake::Compiled(compile(&checkout)))));
+        }
+    }
+
+    /// They were compiled.
+    pub fn done(&mut self) {
+        if self.compiling.end() {
+            self.compile();
+        }
+    }
+}
+
+impl Session {
+    /// Goes on with other shaders; where they were not compiled, or the device refuses them, with those before.
+    pub fn replace_shaders(&mut self, live: &mut Live, shaders: Result<Replacements, String>) {
+        let replaced =
+            shaders.and_then(|shaders| live.replace_shaders(shaders).map_err(|error| format!("shaders: {error}")));
+        match replaced {
+            Ok(()) => {
+                // A small picture at once.
+                self.pace.moved(Instant::now());
+                self.settle(Topic::Shaders);
+            }
+            Err(error) => self.complain(Topic::Shaders, &error),
+        }
+    }
+}
+
+fn shader_files(checkout: &Path) -> BTreeSet<PathBuf> {
+    let folders = fs::read_dir(checkout.join("glsl")).into_iter().flatten().flatten();
+    let files = folders.flat_map(|folder| fs::read_dir(folder.path()).into_iter().flatten().flatten());
+    files.map(|file| file.path()).collect()
+}
+
+/// All shaders of the checkout, or why there are none: the compiler's errors, with file and line.
+fn compile(checkout: &Path) -> Result<Replacements, String> {
+    let out_dir = TempDir::new().map_err(|error| format!("shaders: {error}"))?;
+    let output = Command::new(COMPILER)
+        .current_dir(checkout)
+        .env("OUT_DIR", out_dir.path())
+        .env("RUST_BACKTRACE", "0")
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|error| format!("{COMPILER}: {error}"))?;
+    if !output.status.success() {
+        return Err(complaints(&output));
+    }
+    let read = |path: &Path| fs::read(path).map_err(|error| format!("{}: {error}", path.display()));
+    let layout = read(&out_dir.path().join("layout.rs"))?;
+    if code_of(&String::from_utf8_lossy(&layout)) != code_of(LAYOUT) {
+        return Err("glsl/shared/layout.glsl: the program shares its structs and constants and has to be built anew \
+                    to use others; the shaders before go on"
+            .to_owned());
+    }
+    let files = fs::read_dir(out_dir.path()).into_iter().flatten().flatten().map(|entry| entry.path());
+    let modules = files.filter(|path| path.extension().is_some_and(|extension| extension == "spv"));
+    modules
+        .map(|path| {
+            let shader = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            Ok((shader, read(&path)?))
+        })
+        .collect()
+}
+
+/// What the build script says to cargo of shaders, or, where it does not like layout.glsl, to nobody.
+fn complaints(output: &Output) -> String {
+    let (stdout, stderr) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    let errors = stdout.lines().filter_map(|line| line.strip_prefix("cargo::error="));
+    // Their number stands above them.
+    let errors: Vec<_> =
+        errors.filter(|line| !line.ends_with("compilation error:") && !line.ends_with("errors:")).collect();
+    if !errors.is_empty() {
+        return errors.join("\n");
+    }
+    let is_why = |line: &&str| !line.trim().is_empty() && !line.starts_with("thread ") && !line.starts_with("note:");
+    stderr.lines().filter(is_why).collect::<Vec<_>>().join("\n")
+}
+
+/// The lines that are no documentation.
+fn code_of(rust: &str) -> Vec<&str> {
+    rust.lines().filter(|line| !line.trim_start().starts_with("///")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A copy of this checkout's shaders, one file of them edited.
+    fn edited(file: &str, edit: impl Fn(&str) -> String) -> TempDir {
+        let copy = TempDir::new().unwrap();
+        for path in shader_files(Path::new(env!("CARGO_MANIFEST_DIR"))) {
+            let inside = path.strip_prefix(env!("CARGO_MANIFEST_DIR")).unwrap();
+            let text = fs::read_to_string(&path).unwrap();
+            fs::create_dir_all(copy.path().join(inside).parent().unwrap()).unwrap();
+            let text = if inside == Path::new(file) { edit(&text) } else { text };
+            fs::write(copy.path().join(inside), text).unwrap();
+        }
+        copy
+    }
+
+    #[test]
+    fn unchanged_shaders_are_those_that_the_program_brings_along() {
+        let copy = edited("glsl/shared/layout.glsl", |text| text.replacen("// ", "// Documentation: ", 1));
+        let modules = compile(copy.path()).unwrap();
+        let trace = include_bytes!(concat!(env!("OUT_DIR"), "/trace.comp.spv"));
+        assert_eq!(modules["trace.comp"], trace);
+        let copy = edited("glsl/passes/trace.comp", |text| text.replace("void main() {", "void main() { return;"));
+        assert_ne!(compile(copy.path()).unwrap()["trace.comp"], trace);
+    }
+
+    #[test]
+    fn errors_name_file_and_line() {
+        let line_of = |text: &str| 1 + text.lines().position(|line| line.contains("void main()")).unwrap();
+        let text = include_str!("../../glsl/passes/trace.comp");
+        let copy = edited("glsl/passes/trace.comp", |text| text.replace("void main() {", "void main() { oops();"));
+        let error = compile(copy.path()).unwrap_err();
+        assert!(error.starts_with(&format!("glsl/passes/trace.comp:{}: error: 'oops'", line_of(text))), "{error}");
+        let copy = edited("glsl/shared/kdtree.glsl", |text| format!("oops\n{text}"));
+        let error = compile(copy.path()).unwrap_err();
+        assert!(error.contains("glsl/shared/kdtree.glsl:"), "{error}");
+    }
+
+    #[test]
+    fn another_layout_is_refused() {
+        let layout = "glsl/shared/layout.glsl";
+        let copy = edited(layout, |text| text.replacen("#define TILE_SIZE 8u", "#define TILE_SIZE 4u", 1));
+        assert!(compile(copy.path()).unwrap_err().starts_with(layout));
+        let copy = edited(layout, |text| format!("{text}\nstruct Bad {{\n    float a;\n    vec3 b;\n}};\n"));
+        let error = compile(copy.path()).unwrap_err();
+        assert!(error.contains("layout.glsl: std430 pads Bad.b (offset 4)"), "{error}");
+    }
+}
