@@ -95,8 +95,12 @@ fn without_a_room_only_primary_hits_have_further_rays() {
 fn primary_rays_go_tile_by_tile() {
     let sets = ray_sets(&Stage::in_room(mesh(), SIZE));
     let pixels: Vec<_> = rays(&sets, RayKind::Primary).iter().map(|ray| ray.pixel_ix).collect();
-    let first_tile: Vec<_> = (0..8).flat_map(|y| (0..8).map(move |x| y * SIZE.0 + x)).collect();
-    assert_eq!(pixels[..64], first_tile);
+    let mut first_tile = pixels[..64].to_vec();
+    first_tile.sort_unstable();
+    assert!(first_tile.into_iter().eq((0..8).flat_map(|y| (0..8).map(move |x| y * SIZE.0 + x))));
+    // A Z-curve within the tile.
+    let [right, down] = [1, SIZE.0];
+    assert_eq!(pixels[..8], [0, 1, down, right + down, 2, 3, 2 + down, 3 + down]);
 }
 
 #[test]

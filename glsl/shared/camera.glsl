@@ -4,8 +4,14 @@
 
 #include "layout.glsl"
 
-// The pixel at place `order` when the image is walked tile by tile (TILE_SIZE squared pixels, cut at the right and
-// lower border), each tile row by row: neighbours in the queue are neighbours in the image. Without gaps.
+// Every second bit of a number below 64.
+uint every_second_bit(uint n) {
+    return (n & 1u) | ((n >> 1) & 2u) | ((n >> 2) & 4u);
+}
+
+// The pixel at place `order` when the image is walked tile by tile (TILE_SIZE squared pixels), each tile along a Z-curve,
+// so that subgroups of any size are blocks of the image; row by row where the right or lower border cuts the tile.
+// Without gaps.
 uvec2 pixel_of(uint order, uint width, uint height) {
     uint band = order / (TILE_SIZE * width);
     uint in_band = order - band * TILE_SIZE * width;
@@ -13,7 +19,10 @@ uvec2 pixel_of(uint order, uint width, uint height) {
     uint tile = in_band / (TILE_SIZE * rows);
     uint in_tile = in_band - tile * TILE_SIZE * rows;
     uint columns = min(TILE_SIZE, width - tile * TILE_SIZE);
-    return uvec2(tile * TILE_SIZE + in_tile % columns, band * TILE_SIZE + in_tile / columns);
+    bool is_whole = rows == TILE_SIZE && columns == TILE_SIZE;
+    uvec2 at = is_whole ? uvec2(every_second_bit(in_tile), every_second_bit(in_tile >> 1))
+        : uvec2(in_tile % columns, in_tile / columns);
+    return TILE_SIZE * uvec2(tile, band) + at;
 }
 
 // The window's pixel in the whole picture.

@@ -4,7 +4,13 @@ use glam::{UVec2, Vec3, uvec2, vec2};
 
 use crate::layout::{Frame, TILE_SIZE};
 
-/// The pixel at place `order` when the image is walked tile by tile, each tile row by row. Without gaps.
+/// Every second bit of a number below 64.
+fn every_second_bit(n: u32) -> u32 {
+    n & 1 | n >> 1 & 2 | n >> 2 & 4
+}
+
+/// The pixel at place `order` when the image is walked tile by tile, each tile along a Z-curve, so that neighbours in the
+/// queue are blocks of the image; row by row where the border cuts the tile. Without gaps.
 pub fn pixel_of(order: u32, width: u32, height: u32) -> UVec2 {
     let band = order / (TILE_SIZE * width);
     let in_band = order - band * TILE_SIZE * width;
@@ -12,7 +18,13 @@ pub fn pixel_of(order: u32, width: u32, height: u32) -> UVec2 {
     let tile = in_band / (TILE_SIZE * rows);
     let in_tile = in_band - tile * TILE_SIZE * rows;
     let columns = TILE_SIZE.min(width - tile * TILE_SIZE);
-    uvec2(tile * TILE_SIZE + in_tile % columns, band * TILE_SIZE + in_tile / columns)
+    let is_whole = rows == TILE_SIZE && columns == TILE_SIZE;
+    let at = if is_whole {
+        uvec2(every_second_bit(in_tile), every_second_bit(in_tile >> 1))
+    } else {
+        uvec2(in_tile % columns, in_tile / columns)
+    };
+    TILE_SIZE * uvec2(tile, band) + at
 }
 
 /// The window's pixel in the whole picture.
@@ -25,4 +37,32 @@ pub fn camera_direction(frame: &Frame, pixel: UVec2) -> Vec3 {
     let at_px = in_picture(frame, pixel).as_vec2() + vec2(frame.sample_x, frame.sample_y);
     let at = at_px / uvec2(frame.picture_width, frame.picture_height).as_vec2() * 2.0 - 1.0;
     (frame.forward + at.x * frame.right - at.y * frame.up).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    #[test]
+    fn every_pixel_has_one_place() {
+        for (width, height) in [(16, 8), (21, 13), (3, 40), (1, 1)] {
+            let pixels: HashSet<UVec2> = (0..width * height).map(|order| pixel_of(order, width, height)).collect();
+            assert_eq!(pixels.len() as u32, width * height);
+            assert!(pixels.iter().all(|pixel| pixel.x < width && pixel.y < height));
+        }
+    }
+
+    #[test]
+    fn neighbours_in_the_queue_are_blocks() {
+        for (n, block) in [(4, uvec2(2, 2)), (8, uvec2(4, 2)), (16, uvec2(4, 4)), (32, uvec2(8, 4)), (64, uvec2(8, 8))]
+        {
+            for first in (0..24 * 16).step_by(n as usize) {
+                let pixels = || (first..first + n).map(|order| pixel_of(order, 24, 16));
+                let (least, most) = pixels().fold((UVec2::MAX, UVec2::ZERO), |(a, b), p| (a.min(p), b.max(p)));
+                assert_eq!(most - least + 1, block);
+            }
+        }
+    }
 }

@@ -42,6 +42,15 @@ impl Probe {
     }
 }
 
+/// Rays that point into more octants than this share too little of their way to go together.
+const MOST_OCTANTS: u32 = 2;
+
+/// Into how many octants the rays point.
+fn n_octants(probes: &[Probe]) -> u32 {
+    let octant_of = |probe: &Probe| probe.ray.direction.is_negative_bitmask();
+    probes.iter().fold(0_u32, |octants, probe| octants | 1 << octant_of(probe)).count_ones()
+}
+
 /// A traversal that remembers its working memory from ray to ray; one for each thread.
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
 pub enum Traverser {
@@ -109,7 +118,7 @@ impl Traverser {
         }
     }
 
-    /// Up to `LANES` rays. What starts far away is rare, and goes alone.
+    /// Up to `LANES` rays. What starts far away is rare, and goes alone; so do rays all over the place.
     #[inline]
     fn traverse_packet<const ANY_HIT: bool>(
         &mut self,
@@ -117,7 +126,10 @@ impl Traverser {
         probes: &[Probe],
     ) -> [Hit; LANES] {
         match self {
-            Self::Stack(packets) if probes.iter().all(|probe| is_within_reach(bindings, &probe.ray)) => {
+            Self::Stack(packets)
+                if probes.iter().all(|probe| is_within_reach(bindings, &probe.ray))
+                    && n_octants(probes) <= MOST_OCTANTS =>
+            {
                 packets.traverse::<ANY_HIT>(bindings, probes)
             }
             _ => from_fn(|i| self.traverse::<ANY_HIT>(bindings, probes.get(i).unwrap_or(&probes[0]))),
