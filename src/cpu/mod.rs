@@ -21,6 +21,7 @@ pub mod leaf;
 pub mod light;
 pub mod material;
 pub mod packet;
+pub mod packet_traverser;
 pub mod pending_backtrack;
 pub mod pending_mask;
 pub mod pending_mask_boxes;

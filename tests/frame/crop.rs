@@ -1,13 +1,11 @@
 //! A part of a picture is the same, bit for bit, as that part of the whole.
 
 use kdray::{
-    cpu::{self, Batching},
+    cpu,
     frame::{Crop, Denoise, Picture, Primary, RenderOptions},
-    render::Renderer,
-    scene::Scene,
 };
 
-use super::studio::{assert_silent, device, identical, options, tree_of};
+use super::studio::{identical, options, samples_on_cpu as on_cpu, samples_on_device as on_device};
 use crate::support::scenes;
 
 const SIZE: (u32, u32) = (61, 47);
@@ -19,21 +17,6 @@ const CROPS: [Crop; 5] = [
     Crop { x0: 13, y0: 9, x1: 50, y1: 31 },
     Crop { x0: 0, y0: 20, x1: 61, y1: 21 },
 ];
-
-fn on_device(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
-    let context = device();
-    let mut renderer = Renderer::new(context.clone(), scene, &tree_of(scene), options).expect("a renderer");
-    (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
-    assert_silent(&context);
-    renderer.picture().expect("a picture")
-}
-
-fn on_cpu(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
-    let tree = tree_of(scene);
-    let mut renderer = cpu::Renderer::new(scene, &tree, options, Batching::default());
-    (0..n_samples).for_each(|_| drop(renderer.draw_sample()));
-    renderer.picture()
-}
 
 fn cut(whole: &Picture, crop: Crop) -> Picture {
     let pixels = (crop.y0..crop.y1).flat_map(|y| (crop.x0..crop.x1).map(move |x| (y * whole.width + x) as usize));

@@ -2,7 +2,6 @@
 
 use glam::{Vec3, vec3};
 use kdray::{
-    cpu::{self, Batching},
     frame::{Picture, Primary, RenderOptions},
     render::Renderer,
     scene::Scene,
@@ -10,24 +9,12 @@ use kdray::{
 
 use super::{
     batches::glass_in_glass,
-    studio::{assert_silent, device, differing, identical, on_both, options, tree_of},
+    studio::{
+        assert_silent, device, differing, identical, on_both, options, samples_on_cpu as on_cpu,
+        samples_on_device as on_device, tree_of,
+    },
 };
 use crate::support::{meshes, scenes};
-
-fn on_device(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
-    let context = device();
-    let mut renderer = Renderer::new(context.clone(), scene, &tree_of(scene), options).expect("a renderer");
-    (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
-    assert_silent(&context);
-    renderer.picture().expect("a picture")
-}
-
-fn on_cpu(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
-    let tree = tree_of(scene);
-    let mut renderer = cpu::Renderer::new(scene, &tree, options, Batching::default());
-    (0..n_samples).for_each(|_| drop(renderer.draw_sample()));
-    renderer.picture()
-}
 
 /// White to the left of x = `edge` in the plane z = 0, black elsewhere; a pixel of a picture 30 high is 1/10 wide there.
 fn half_plane(edge: f32) -> Scene {

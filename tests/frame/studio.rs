@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use kdray::{
-    cpu,
+    cpu::{self, Batching},
     frame::{Denoise, Picture, RenderOptions},
     gpu::{Context, ContextOptions},
     kdtree::{BuildOptions, KdTree},
@@ -40,6 +40,23 @@ pub fn on_device(scene: &Scene, options: &RenderOptions) -> Picture {
 
 pub fn on_cpu(scene: &Scene, options: &RenderOptions) -> Picture {
     cpu::render(scene, &tree_of(scene), options).0
+}
+
+/// The mean of so many samples a pixel.
+pub fn samples_on_device(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
+    let context = device();
+    let mut renderer = Renderer::new(context.clone(), scene, &tree_of(scene), options).expect("a renderer");
+    (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
+    assert_silent(&context);
+    renderer.picture().expect("a picture")
+}
+
+/// As [`samples_on_device`].
+pub fn samples_on_cpu(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
+    let tree = tree_of(scene);
+    let mut renderer = cpu::Renderer::new(scene, &tree, options, Batching::default());
+    (0..n_samples).for_each(|_| drop(renderer.draw_sample()));
+    renderer.picture()
 }
 
 /// The device's picture and the CPU's: what holds for one has to hold for the other.
