@@ -19,22 +19,35 @@ pub struct FrameRecord {
     pub pass_ms: Vec<(&'static str, f64)>,
 }
 
-/// Frames of the last seconds.
+/// Samples that are kept, however long they take, if it is not too long.
+const N_SLOW_SAMPLES: usize = 3;
+/// Seconds.
+const TOO_LONG_S: f64 = 60.0;
+
+/// Frames of the last seconds, or of more of them where a sample takes seconds.
 pub struct History {
     frames: VecDeque<FrameRecord>,
     /// Seconds.
-    length_s: f64,
+    shortest_s: f64,
+}
+
+impl FrameRecord {
+    /// GPU time of all passes.
+    pub fn busy_ms(&self) -> f64 {
+        self.pass_ms.iter().map(|(_, ms)| ms).sum()
+    }
 }
 
 impl History {
-    /// Keeps what was shown within so many seconds before the newest.
-    pub fn new(length_s: f64) -> Self {
-        Self { frames: VecDeque::new(), length_s }
+    /// Keeps what was shown within so many seconds before the newest, and the last samples.
+    pub fn new(shortest_s: f64) -> Self {
+        Self { frames: VecDeque::new(), shortest_s }
     }
 
     pub fn push(&mut self, frame: FrameRecord) {
-        let oldest = frame.shown_s - self.length_s;
+        let newest = frame.shown_s;
         self.frames.push_back(frame);
+        let oldest = newest - self.length_s();
         while self.frames.front().is_some_and(|frame| frame.shown_s < oldest) {
             self.frames.pop_front();
         }
@@ -45,9 +58,12 @@ impl History {
         self.frames.iter()
     }
 
-    /// Seconds.
+    /// Seconds before the newest frame in which what is kept was drawn.
     pub fn length_s(&self) -> f64 {
-        self.length_s
+        let Some(newest) = self.frames.back() else { return self.shortest_s };
+        let samples = self.frames.iter().rev().filter(|frame| !frame.pass_ms.is_empty()).take(N_SLOW_SAMPLES);
+        let ago = |sample: &FrameRecord| newest.shown_s - sample.shown_s + sample.busy_ms() * 1e-3;
+        samples.map(ago).fold(self.shortest_s, f64::max).min(TOO_LONG_S.max(self.shortest_s))
     }
 
     /// Of frame times.
@@ -112,6 +128,22 @@ mod tests {
         assert_eq!(three, Percentiles { n: 3, p50: 2.0, p95: 3.0, p99: 3.0 });
         assert_eq!(Percentiles::of(vec![7.0]).unwrap().p50, 7.0);
         assert_eq!(Percentiles::of(Vec::new()), None);
+    }
+
+    #[test]
+    fn slow_samples_are_kept() {
+        let mut history = History::new(2.0);
+        for i in 0..60 {
+            // Every tenth frame ends a sample of 8 s.
+            let pass_ms = if i % 10 == 9 { vec![("trace", 8000.0)] } else { Vec::new() };
+            history.push(FrameRecord { shown_s: f64::from(i), pass_ms, ..Default::default() });
+        }
+        assert_eq!(history.length_s(), 28.0);
+        assert_eq!(history.frames().next().unwrap().shown_s, 31.0);
+        assert_eq!(history.frames().filter(|frame| frame.busy_ms() > 0.0).count(), 3);
+        let pass_ms = vec![("trace", 1e6)];
+        history.push(FrameRecord { shown_s: 60.0, pass_ms, ..Default::default() });
+        assert_eq!(history.length_s(), TOO_LONG_S);
     }
 
     #[test]

@@ -27,7 +27,7 @@ pub fn show(ui: &mut Ui, history: &History, newest: &Profile) {
     for frame in history.frames() {
         let right = x_at(frame.shown_s).max(left);
         // What was long ago drawn shows as a gap, and is no wider than it took.
-        let busy_ms: f64 = frame.pass_ms.iter().map(|(_, ms)| ms).sum();
+        let busy_ms = frame.busy_ms();
         let begin = x_at(frame.shown_s - busy_ms.max(frame.frame_ms) * 1e-3).max(left);
         let mut bottom = area.bottom();
         for (name, color) in &passes {
@@ -89,7 +89,7 @@ fn color(name: &str) -> Color32 {
 
 /// A round number that hardly any frame exceeds, so that one slow frame does not flatten the others.
 fn top_ms(history: &History) -> f64 {
-    let mut sums: Vec<f64> = history.frames().map(|frame| frame.pass_ms.iter().map(|(_, ms)| ms).sum()).collect();
+    let mut sums: Vec<f64> = history.frames().map(FrameRecord::busy_ms).collect();
     sums.retain(|sum| *sum > 0.0);
     sums.sort_by(f64::total_cmp);
     let most = sums.get(sums.len() * 95 / 100).copied().unwrap_or(0.0).max(0.01);
