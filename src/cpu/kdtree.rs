@@ -6,7 +6,6 @@ use super::{
     bindings::Bindings,
     leaf::{Target, intersect_leaf},
     table::Reads,
-    triangle::Shear,
 };
 use crate::layout::{
     Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_ORIGIN_REACH, KD_PLANE_REACH, KdNode, NO_TRIANGLE, Ray,
@@ -63,11 +62,7 @@ impl TraversalRay {
         let near = [0, 1, 2].map(|i| min(t0[i], t1[i]));
         let far = [0, 1, 2].map(|i| max(t0[i], t1[i]));
         Self {
-            target: Target {
-                shear: Shear::of(origin, ray.direction.to_array()),
-                t_min,
-                source_triangle: ray.source_triangle,
-            },
+            target: Target::of(ray, t_min),
             origin: ray.origin.into(),
             direction: ray.direction.into(),
             plane_reach: KD_PLANE_REACH * largest_coordinate(bindings),

@@ -3,7 +3,7 @@
 use glam::{Mat4, Vec3A, Vec4};
 
 use super::{bindings::Bindings, kdtree::TraversalRay, table::Reads, triangle::Shear};
-use crate::layout::{Hit, KD_CHILD_SHIFT, KdNode, Plane};
+use crate::layout::{Hit, KD_CHILD_SHIFT, KdNode, Plane, Ray};
 
 /// What tells a ray's hits from what it passes by.
 #[derive(Clone, Copy, Debug)]
@@ -11,6 +11,15 @@ pub struct Target {
     pub shear: Shear,
     pub t_min: f32,
     pub source_triangle: u32,
+}
+
+impl Target {
+    /// Of a ray that is to be traced in (t_min, ray.t_max].
+    #[inline(always)]
+    pub fn of(ray: &Ray, t_min: f32) -> Self {
+        let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
+        Self { shear, t_min, source_triangle: ray.source_triangle }
+    }
 }
 
 /// A triangle against the ray; of two hits at one t the lower index wins, whatever the order of triangles.

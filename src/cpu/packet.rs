@@ -11,7 +11,6 @@ use super::{
     leaf::{Target, entries_of, intersect},
     table::Reads,
     traverser::Probe,
-    triangle::Shear,
 };
 use crate::layout::{Hit, KD_PLANE_REACH, KdNode, Plane};
 
@@ -100,7 +99,7 @@ impl Packet {
             inv_direction,
             bias,
             plane_reach: KD_PLANE_REACH * largest_coordinate(bindings),
-            targets: from_fn(|lane| probe(lane).target()),
+            targets: from_fn(|lane| Target::of(&probe(lane).ray, probe(lane).t_min)),
             best: from_fn(|lane| probe(lane).miss()),
             t_best: t_max,
         };
@@ -180,17 +179,6 @@ impl Packet {
             bias: row(&self.bias),
             t_enter: 0.0,
             t_exit: 0.0,
-        }
-    }
-}
-
-impl Probe {
-    #[inline(always)]
-    fn target(&self) -> Target {
-        Target {
-            shear: Shear::of(self.ray.origin.to_array(), self.ray.direction.to_array()),
-            t_min: self.t_min,
-            source_triangle: self.ray.source_triangle,
         }
     }
 }
