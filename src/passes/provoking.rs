@@ -2,9 +2,8 @@
 //! triangle needs one of its own; the other two may be any that lie at the same points. Shared like that, a device
 //! transforms about a vertex a triangle in place of three.
 
-use std::collections::HashMap;
-
 use glam::Vec3;
+use hashbrown::HashMap;
 
 use crate::layout::Triangle;
 
