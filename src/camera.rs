@@ -21,9 +21,7 @@ pub fn frame_constants(scene: &Scene, tree: &KdTree, options: &RenderOptions) ->
         n_lights: scene.lights.len() as u32,
         ambient: scene.ambient,
         background: scene.background,
-        cell_min: tree.cell_min,
-        cell_max: tree.cell_max,
-        ..Frame::default()
+        ..tree.constants()
     };
     frame.set_options(options);
     frame.set_view(&scene.camera, 0);

@@ -10,11 +10,13 @@ use kdray::{
     cpu::kdtree::near_scene,
     frame::Traversal,
     gpu::{Context, ContextOptions},
-    layout::Ray,
+    layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, Ray},
 };
 use rayon::prelude::*;
 use support::{
-    World, compare, meshes,
+    World,
+    chain::chain,
+    compare, meshes,
     random::Random,
     rays::{nasty_ray, ray},
 };
@@ -27,6 +29,14 @@ struct Device(Arc<Context>);
 impl Device {
     fn new() -> Self {
         Self(Context::new(&ContextOptions { device: None, validate: true }).expect("a device with validation"))
+    }
+
+    /// One that runs the kernels as GPUs do, whatever it is.
+    fn with_lanes_apart() -> Self {
+        Self(
+            Context::with_lanes_apart(&ContextOptions { device: None, validate: true })
+                .expect("a device with validation"),
+        )
     }
 
     fn caster(&self, world: &World, traversal: Traversal) -> Caster {
@@ -115,10 +125,9 @@ fn check(device: &Device, world: &World, rays: &[CastRay]) {
     }
 }
 
-#[test]
-fn finds_what_brute_force_finds() {
-    let device = Device::new();
-    for triangles in [
+/// Of all shapes, sizes and places.
+fn worlds() -> impl Iterator<Item = World> {
+    let meshes = [
         meshes::torus(40, 20),
         meshes::cube(9, 0.0),
         meshes::cube(10, 1.0),
@@ -127,9 +136,33 @@ fn finds_what_brute_force_finds() {
         meshes::placed(meshes::torus(40, 20), 1e-6, Vec3::ZERO),
         meshes::placed(meshes::torus(40, 20), 0.3, vec3(1000.0, -70.0, 3.0)),
         vec![meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z)],
-    ] {
-        let world = World::new(triangles);
+    ];
+    meshes.into_iter().map(World::new)
+}
+
+#[test]
+fn finds_what_brute_force_finds() {
+    let device = Device::new();
+    for world in worlds() {
         check(&device, &world, &some_rays(&world, 20_000, -20.0..=20.0));
+    }
+}
+
+#[test]
+fn lanes_apart_find_the_same() {
+    let device = Device::with_lanes_apart();
+    for world in worlds() {
+        check(&device, &world, &some_rays(&world, 4000, -20.0..=20.0));
+    }
+}
+
+#[test]
+fn a_mask_of_two_words_finds_the_same() {
+    let world = chain(KD_MAX_DEPTH - 2);
+    assert!(world.tree.depth > KD_WORD_DEPTH);
+    for device in [Device::new(), Device::with_lanes_apart()] {
+        // Towards the chain's root every level is pending; `mask` climbs, since it has lost most of them.
+        check(&device, &world, &some_rays(&world, 4000, 0.0..=0.0));
     }
 }
 

@@ -14,9 +14,9 @@
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 
 layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
-// Whether a triangle's plane is looked at before the triangle. It pays where lanes take branches of their own; a device
-// that runs both sides for all lanes has the plane to read and spares nothing.
-layout(constant_id = 4) const bool TRIES_PLANES = true;
+// Whether the device runs both sides of a branch for all lanes, as software drivers do. A triangle's plane, looked at before
+// the triangle, then spares nothing, and tests are best done leaf by leaf.
+layout(constant_id = 4) const bool RUNS_BOTH_SIDES = false;
 
 struct Cell {
     uint node_ix;
@@ -65,10 +65,6 @@ float largest_coordinate() {
     return max(largest.x, max(largest.y, largest.z));
 }
 
-float plane_reach() {
-    return KD_PLANE_REACH * largest_coordinate();
-}
-
 // The ray with its origin moved along it to lie within KD_ORIGIN_REACH. t_start: how far; 0 for all but cameras far away.
 Ray near_scene(Ray ray, out float t_start) {
     vec3 away = abs(ray.origin);
@@ -101,10 +97,14 @@ float crossing(TraversalRay ray, KdNode node) {
     return t;
 }
 
-// The child on the side that the ray comes from; the other is `^ 1`.
+// The child on the side that the ray comes from, or the other one.
+uint child_of(TraversalRay ray, KdNode node, bool second) {
+    bool is_above = (along(ray.inv_direction, axis_of(node)) < 0.0) != second;
+    return (node.axis_and_child >> KD_CHILD_SHIFT) + (is_above ? 1u : 0u);
+}
+
 uint first_child(TraversalRay ray, KdNode node) {
-    uint first_is_above = along(ray.inv_direction, axis_of(node)) < 0.0 ? 1u : 0u;
-    return (node.axis_and_child >> KD_CHILD_SHIFT) + first_is_above;
+    return child_of(ray, node, false);
 }
 
 #include "pending_mask.glsl"
@@ -144,16 +144,15 @@ KdNode descend(TraversalRay ray, inout Cell cell) {
     KdNode node = kd_node(cell.node_ix);
     while (axis_of(node) != KD_LEAF) {
         float t_cross = crossing(ray, node);
-        uint first_ix = first_child(ray, node);
         bool in_first = t_cross >= cell.t_enter;
         bool in_second = t_cross <= cell.t_exit;
         cell.depth += 1u;
-        cell.node_ix = in_second && !in_first ? first_ix ^ 1u : first_ix;
+        cell.node_ix = child_of(ray, node, in_second && !in_first);
+        node = kd_node(cell.node_ix);
         if (in_first && in_second) {
-            push_pending(first_ix ^ 1u, cell);
+            push_pending(cell.node_ix ^ 1u, cell);
             cell.t_exit = t_cross;
         }
-        node = kd_node(cell.node_ix);
     }
     return node;
 }
@@ -166,30 +165,76 @@ void intersect(TraversalRay ray, uint triangle_ix, inout Hit best) {
     if (hit.t > ray.t_min && nearer && triangle_ix != ray.source_triangle) best = hit;
 }
 
-// Whether a segment keeps to one side of a plane, so far from it that no rounding of the hit test reaches across.
-bool is_clear(vec4 plane, vec3 from, vec3 to) {
-    float height_from = dot(plane.xyz, from) - plane.w;
-    float height_to = dot(plane.xyz, to) - plane.w;
-    return height_from * height_to > 0.0 && min(abs(height_from), abs(height_to)) > plane_reach();
+// A ray's way through a leaf: from t_middle - t_half to t_middle + t_half, with the entries that are still to be looked at.
+struct Visit {
+    uint entry_ix;
+    uint end_ix;
+    float t_middle;
+    float t_half;
+};
+
+Visit visit_leaf(KdNode leaf, float t_enter, float t_exit) {
+    uint n_entries = leaf.axis_and_child >> KD_CHILD_SHIFT;
+    count_steps(n_entries);
+    return Visit(leaf.split_or_first, leaf.split_or_first + n_entries, 0.5 * (t_enter + t_exit), 0.5 * (t_exit - t_enter));
 }
 
-// The leaf's triangles, but those whose planes the ray does not meet within the cell: it may meet them elsewhere, in a
-// leaf that has them too. Most triangles are in several leaves, so most tests are spared.
-void intersect_leaf(TraversalRay ray, KdNode leaf, vec2 interval, inout Hit best) {
-    vec3 from = ray.shear.origin + interval.x * ray.direction;
-    vec3 to = ray.shear.origin + interval.y * ray.direction;
-    uint end = leaf.split_or_first + (leaf.axis_and_child >> KD_CHILD_SHIFT);
-    count_steps(end - leaf.split_or_first);
-    for (uint i = leaf.split_or_first; i < end; ++i) {
-        if (TRIES_PLANES) {
-            if (is_clear(leaf_plane_at(i), from, to)) continue;
-        }
-        intersect(ray, leaf_triangle_at(i), best);
+// Whether the ray keeps to one side of a plane on its way, so far from it that no rounding of the hit test reaches across.
+bool is_clear(TraversalRay ray, Visit visit, vec4 plane) {
+    float height = dot(plane.xyz, ray.shear.origin) - plane.w;
+    float slope = dot(plane.xyz, ray.direction);
+    return abs(fma(visit.t_middle, slope, height)) > fma(visit.t_half, abs(slope), frame.plane_reach);
+}
+
+// On to the leaf's next triangle whose plane the ray meets on its way. It may meet the others' planes elsewhere, in leaves
+// that have those triangles too: most are in several, so most tests are spared.
+bool find_candidate(TraversalRay ray, inout Visit visit, out uint entry_ix) {
+    while (visit.entry_ix < visit.end_ix) {
+        entry_ix = visit.entry_ix;
+        visit.entry_ix += 1u;
+        if (RUNS_BOTH_SIDES) return true;
+        if (!is_clear(ray, visit, leaf_plane_at(entry_ix))) return true;
     }
+    return false;
+}
+
+void intersect_rest(TraversalRay ray, inout Visit visit, inout Hit best) {
+    uint entry_ix;
+    while (find_candidate(ray, visit, entry_ix)) intersect(ray, leaf_triangle_at(entry_ix), best);
 }
 
 bool is_done(bool any_hit, Hit best) {
     return any_hit && best.triangle_ix != NO_TRIANGLE;
+}
+
+Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
+    KdNode leaf = descend(ray, cell);
+    return visit_leaf(leaf, cell.t_enter, min(cell.t_exit, t_best));
+}
+
+// Leaf by leaf, each with all its tests.
+void search_by_leaves(TraversalRay ray, bool any_hit, Cell cell, inout Hit best) {
+    do {
+        Visit visit = next_leaf(ray, best.t, cell);
+        intersect_rest(ray, visit, best);
+    } while (!is_done(any_hit, best) && pop_pending(ray, best.t, cell));
+}
+
+// Turn by turn, each a test or a leaf: lanes that test and lanes that go on each keep together. Of two loops in one another
+// the outer waits, for all lanes' leaves or for each lane's tests.
+void search_by_turns(TraversalRay ray, bool any_hit, Cell cell, inout Hit best) {
+    Visit visit = next_leaf(ray, best.t, cell);
+    bool goes_on = true;
+    do {
+        uint entry_ix;
+        if (find_candidate(ray, visit, entry_ix)) {
+            intersect(ray, leaf_triangle_at(entry_ix), best);
+            goes_on = !is_done(any_hit, best);
+        } else {
+            goes_on = pop_pending(ray, best.t, cell);
+            if (goes_on) visit = next_leaf(ray, best.t, cell);
+        }
+    } while (goes_on);
 }
 
 // All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
@@ -197,10 +242,8 @@ void search(TraversalRay ray, bool any_hit, inout Hit best) {
     if (!(ray.t_enter <= ray.t_exit)) return;
     Cell cell = Cell(0u, 0u, ray.t_enter, ray.t_exit);
     clear_pending();
-    do {
-        KdNode leaf = descend(ray, cell);
-        intersect_leaf(ray, leaf, vec2(cell.t_enter, min(cell.t_exit, best.t)), best);
-    } while (!is_done(any_hit, best) && pop_pending(ray, best.t, cell));
+    if (RUNS_BOTH_SIDES) search_by_leaves(ray, any_hit, cell, best);
+    else search_by_turns(ray, any_hit, cell, best);
 }
 
 #include "brute.glsl"

@@ -25,14 +25,15 @@
 #define KD_AXIS_MASK 3u
 // Bits 2..31: first child of a split (the other is the next node), or number of triangles of a leaf.
 #define KD_CHILD_SHIFT 2u
-// Levels below the root that the traversal's bit mask can hold: two words.
+// Levels below the root that the traversal's bit mask can hold: one word's, and two words'.
+#define KD_WORD_DEPTH 32u
 #define KD_MAX_DEPTH 64u
 
 // Times the scene's largest coordinate: rays that start farther away are moved up to the scene first (the tree's
 // rounding margin is derived for this).
 #define KD_ORIGIN_REACH 4.0
 // Times the scene's largest coordinate: a ray that keeps this far from a triangle's plane within a leaf has no hit there.
-// Twice the tree's margin, the second for the rounding of the plane and of the ray's distance to it.
+// Twice the tree's margin, the second for the rounding of the plane and of the ray's distance to it (kdtree/planes.rs).
 #define KD_PLANE_REACH 0.000015258789
 
 // How rays find their way through the tree: the kernels' specialization constant TRAVERSAL.
@@ -155,6 +156,7 @@ struct Hit {
 //         + (1 - 2 (window_y + y + sample_y) / picture_height) * up.
 // clip_from_world is the whole picture's, moved so that the sample lies in the middle of its pixel.
 // n_samples: how many samples a pixel there are with this frame's.
+// plane_reach: KD_PLANE_REACH in world units.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -180,7 +182,7 @@ struct Frame {
     float sample_x;
     float sample_y;
     uint n_samples;
-    uint reserved;
+    float plane_reach;
 };
 
 // One a batch and bounce, 64 bytes, sized by the bounce before: each `groups` is a VkDispatchIndirectCommand.
@@ -242,8 +244,10 @@ struct Addresses {
     uvec2 kd_ropes;
 };
 
-// Specialization constant: whether kernels read the scene by address. Numbers below are for kernels' own.
+// Specialization constants that all kernels over one scene share: whether they read it by address, and the words of the
+// traversal's mask. Numbers below are for kernels' own.
 #define CONSTANT_BY_ADDRESS 31u
+#define CONSTANT_MASK_WORDS 30u
 
 // Push constants: the batch's pixels [first_pixel, first_pixel + n_pixels) in tile order, and its row of `bounces`.
 struct Batch {

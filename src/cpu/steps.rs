@@ -68,7 +68,7 @@ mod tests {
     use super::*;
     use crate::{
         kdtree::{BuildOptions, Extras, KdTree},
-        layout::{Frame, NO_TRIANGLE, Triangle},
+        layout::{NO_TRIANGLE, Triangle},
     };
 
     /// Two triangles far apart along x: split planes lie between and beside them.
@@ -86,7 +86,7 @@ mod tests {
         let triangles = two_triangles();
         let options = BuildOptions { traversal_cost: 1e-3, max_depth: Some(max_depth), ..BuildOptions::default() };
         let tree = KdTree::build(&triangles, &options);
-        let frame = Frame { cell_min: tree.cell_min, cell_max: tree.cell_max, ..Frame::default() };
+        let frame = tree.constants();
         let extras = Extras::all(&tree);
         count_steps(&Bindings::of_tree(&triangles, &tree, &frame).with_extras(&extras), traversal, query, rays)
     }

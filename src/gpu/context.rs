@@ -30,6 +30,9 @@ pub struct ContextOptions {
     pub validate: bool,
 }
 
+/// [`DeviceInfo::kind`] of a driver that computes on the CPU.
+const SOFTWARE: &str = "CPU";
+
 /// A Vulkan device with one queue for graphics and compute.
 pub struct Context {
     pub(super) device: ash::Device,
@@ -47,6 +50,7 @@ pub struct Context {
     /// Shared with the overlay's renderer, which ends before the context.
     pub(super) allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
     info: DeviceInfo,
+    runs_both_sides: bool,
     limits: Limits,
     fuses_fma: OnceLock<bool>,
     #[cfg(feature = "hot-reload")]
@@ -101,6 +105,16 @@ impl Context {
         Ok(context)
     }
 
+    /// As [`Context::new`], as if lanes took branches of their own: a software device then runs what GPUs run.
+    ///
+    /// # Errors
+    /// As [`Context::new`].
+    pub fn with_lanes_apart(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
+        let mut context = Self::new(options)?;
+        Arc::get_mut(&mut context).expect("nothing has been made from it yet").runs_both_sides = false;
+        Ok(context)
+    }
+
     fn open(
         instance: Arc<Instance>,
         physical: vk::PhysicalDevice,
@@ -143,6 +157,7 @@ impl Context {
             timestamp_valid_bits: families[family].timestamp_valid_bits,
             queue,
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
+            runs_both_sides: info.kind == SOFTWARE,
             info,
             fuses_fma: OnceLock::new(),
             #[cfg(feature = "hot-reload")]
@@ -162,7 +177,12 @@ impl Context {
 
     /// True for a driver that computes on the CPU.
     pub fn is_software(&self) -> bool {
-        self.info.kind == "CPU"
+        self.info.kind == SOFTWARE
+    }
+
+    /// Whether kernels run both sides of a branch for all lanes, where any lane takes it.
+    pub fn runs_both_sides(&self) -> bool {
+        self.runs_both_sides
     }
 
     /// Whether `fma` rounds once in this device's kernels; found out by one of them, the first time.

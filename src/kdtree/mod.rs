@@ -30,7 +30,7 @@ mod validate;
 
 use glam::Vec3;
 
-use crate::layout::{KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_MAX_DEPTH, KdNode, Plane};
+use crate::layout::{Frame, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_MAX_DEPTH, KD_PLANE_REACH, KdNode, Plane};
 
 pub use extras::Extras;
 pub use statistics::Statistics;
@@ -53,6 +53,15 @@ pub struct KdTree {
     pub cell_max: Vec3,
     /// Levels below the root, at most `KD_MAX_DEPTH - 2`.
     pub depth: u32,
+}
+
+impl KdTree {
+    /// What kernels have to know of the tree beside its arrays; the rest is zero.
+    pub fn constants(&self) -> Frame {
+        let Self { cell_min, cell_max, .. } = *self;
+        let largest_coordinate = cell_min.abs().max(cell_max.abs()).max_element();
+        Frame { cell_min, cell_max, plane_reach: KD_PLANE_REACH * largest_coordinate, ..Frame::default() }
+    }
 }
 
 /// How a tree is built. Costs are in any one unit; only their ratio matters.

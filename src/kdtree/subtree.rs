@@ -9,7 +9,7 @@ use super::{
     sah::Split,
     search::Search,
 };
-use crate::layout::{KdNode, Triangle};
+use crate::layout::{KD_WORD_DEPTH, KdNode, Triangle};
 
 /// What a build reads.
 #[derive(Clone, Copy)]
@@ -30,6 +30,10 @@ pub struct Cell {
     pub budget: u64,
 }
 
+/// So many are not worth the second word of the traversal's mask, which slows all rays down: a cell at the first word's end
+/// is split for more only. Meshes of a million triangles have hardly a leaf of as many there (benches/EXPERIMENTS.md).
+const FEW_REFERENCES: usize = 64;
+
 impl Cell {
     /// The split to be made and its children's cells; none where a leaf is cheaper or a limit is reached.
     pub fn split(
@@ -41,6 +45,9 @@ impl Cell {
         let leaf_cost = options.intersection_cost * references.len() as f32;
         // A split costs a step at least.
         if leaf_cost <= options.traversal_cost || self.level >= options.depth_limit() {
+            return None;
+        }
+        if self.level >= KD_WORD_DEPTH && references.len() <= FEW_REFERENCES {
             return None;
         }
         let split = search.best_split(references, &self.bounds, options);

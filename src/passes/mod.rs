@@ -133,9 +133,9 @@ fn binding(number: u32) -> (u32, BindingKind) {
 
 /// Specialization constants of the kernels that traverse: their own are the two in the middle.
 fn traversal_constants(context: &Arc<Context>, traversal: Traversal, own: [bool; 2]) -> Result<[u32; 5], GpuError> {
-    let tries_planes = !context.is_software();
+    let runs_both_sides = context.runs_both_sides();
     let [a, b] = own.map(u32::from);
-    Ok([traversal.constant(), context.fuses_fma()?.into(), a, b, tries_planes.into()])
+    Ok([traversal.constant(), context.fuses_fma()?.into(), a, b, runs_both_sides.into()])
 }
 
 /// A kernel without subgroup requirements.

@@ -11,7 +11,7 @@ use crate::{
     layout::{
         Addresses, BIND_ADDRESSES, BIND_FRAME, BIND_KD_BOXES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_ROPES,
         BIND_LEAF_PLANES, BIND_LEAF_TRIANGLES, BIND_TRIANGLE_MATERIALS, BIND_TRIANGLES, BRUTE_MAX_TRIANGLES,
-        CONSTANT_BY_ADDRESS, Frame, KdBox, KdNode, Plane, Triangle,
+        CONSTANT_BY_ADDRESS, CONSTANT_MASK_WORDS, Frame, KD_WORD_DEPTH, KdBox, KdNode, Plane, Triangle,
     },
 };
 
@@ -52,6 +52,8 @@ pub struct Tree {
     /// Six a node, after `add_extras`.
     pub kd_ropes: Buffer<u32>,
     usage: BufferUse,
+    /// Of the traversal's mask.
+    mask_words: u32,
 }
 
 impl Tree {
@@ -79,6 +81,7 @@ impl Tree {
             kd_boxes: Buffer::new(context, "kd_boxes", 0, usage)?,
             kd_ropes: Buffer::new(context, "kd_ropes", 0, usage)?,
             usage,
+            mask_words: if tree.depth <= KD_WORD_DEPTH { 1 } else { 2 },
         };
         made.addresses.upload(&[made.addresses()])?;
         Ok(made)
@@ -117,8 +120,8 @@ impl Tree {
     }
 
     /// Specialization constants of all kernels that read it.
-    pub(super) fn constants(&self) -> [(u32, u32); 1] {
-        [(CONSTANT_BY_ADDRESS, self.is_by_address().into())]
+    pub(super) fn constants(&self) -> [(u32, u32); 2] {
+        [(CONSTANT_BY_ADDRESS, self.is_by_address().into()), (CONSTANT_MASK_WORDS, self.mask_words)]
     }
 
     fn addresses(&self) -> Addresses {

@@ -2,6 +2,7 @@
 
 #![allow(dead_code)] // each test target uses its own part
 
+pub mod chain;
 pub mod command;
 pub mod compare;
 pub mod display;
@@ -28,8 +29,11 @@ pub struct World {
 impl World {
     pub fn new(triangles: Vec<Triangle>) -> Self {
         let tree = KdTree::build(&triangles, &BuildOptions::default());
-        let frame = Frame { cell_min: tree.cell_min, cell_max: tree.cell_max, ..Frame::default() };
-        Self { triangles, extras: Extras::all(&tree), tree, frame }
+        Self::with_tree(triangles, tree)
+    }
+
+    pub fn with_tree(triangles: Vec<Triangle>, tree: KdTree) -> Self {
+        Self { triangles, extras: Extras::all(&tree), frame: tree.constants(), tree }
     }
 
     pub fn bindings(&self) -> Bindings<'_> {

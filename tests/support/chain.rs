@@ -1,0 +1,44 @@
+//! A tree as deep as one wishes: a chain of splits across x, each with a leaf below.
+
+use glam::{Vec3, vec3};
+use kdray::{
+    kdtree::{BuildOptions, KdTree, Node},
+    layout::{Plane, Triangle},
+};
+
+use super::{World, meshes::triangle};
+
+/// One triangle across x a leaf, that of the lower or of the upper half in turn.
+fn slabs(n: u32) -> Vec<Triangle> {
+    let slab = |ix: u32| {
+        let x = ix as f32 + 0.5;
+        let (low, high) = (vec3(x, 0.0, 0.0), vec3(x, 40.0, 40.0));
+        if ix.is_multiple_of(2) {
+            triangle(low, vec3(x, 40.0, 0.0), high)
+        } else {
+            triangle(low, high, vec3(x, 0.0, 40.0))
+        }
+    };
+    (0..n).map(slab).collect()
+}
+
+/// Rays that come from above leave the lower leaf of every level pending.
+pub fn chain(n_levels: u32) -> World {
+    let triangles = slabs(n_levels + 1);
+    let mut tree = KdTree::build(&triangles, &BuildOptions { max_depth: Some(0), ..BuildOptions::default() });
+    let leaf = |ix: u32| Node::Leaf { first: ix, count: 1 }.into();
+    (tree.nodes, tree.parents, tree.depth) = (vec![leaf(0); 2], vec![0], n_levels);
+    let mut node = 0;
+    for level in 0..n_levels {
+        let child = 2 * level + 2;
+        tree.nodes[node as usize] = Node::Split { axis: 0, position: (level + 1) as f32, child }.into();
+        tree.nodes.extend([leaf(level), leaf(level + 1)]);
+        tree.parents.push(node);
+        node = child + 1;
+    }
+    tree.nodes[1] = Node::Leaf { first: 0, count: 0 }.into();
+    tree.leaf_triangles = (0..triangles.len() as u32).collect();
+    tree.leaf_planes = triangles.iter().map(|t| Plane { normal: Vec3::X, distance: t.v0.x }).collect();
+    tree.validate(&triangles).expect("a tree");
+    World::with_tree(triangles, tree)
+}
