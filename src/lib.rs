@@ -22,6 +22,7 @@
 #[macro_use]
 mod words;
 
+mod bounce;
 pub mod frame;
 pub mod layout;
 mod profile;

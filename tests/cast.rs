@@ -31,12 +31,10 @@ impl Device {
         Self(Context::new(&ContextOptions { device: None, validate: true }).expect("a device with validation"))
     }
 
-    /// One that runs the kernels as GPUs do, whatever it is.
-    fn with_lanes_apart() -> Self {
-        Self(
-            Context::with_lanes_apart(&ContextOptions { device: None, validate: true })
-                .expect("a device with validation"),
-        )
+    /// One that runs the kernels as a GPU of so many lanes, whatever it is.
+    fn with_lanes(n_lanes: u32) -> Self {
+        let options = ContextOptions { device: None, validate: true };
+        Self(Context::with_lanes(&options, n_lanes).expect("a device with validation"))
     }
 
     fn caster(&self, world: &World, traversal: Traversal) -> Caster {
@@ -150,7 +148,7 @@ fn finds_what_brute_force_finds() {
 
 #[test]
 fn lanes_apart_find_the_same() {
-    let device = Device::with_lanes_apart();
+    let device = Device::with_lanes(5000);
     for world in worlds() {
         check(&device, &world, &some_rays(&world, 4000, -20.0..=20.0));
     }
@@ -160,7 +158,7 @@ fn lanes_apart_find_the_same() {
 fn a_mask_of_two_words_finds_the_same() {
     let world = chain(KD_MAX_DEPTH - 2);
     assert!(world.tree.depth > KD_WORD_DEPTH);
-    for device in [Device::new(), Device::with_lanes_apart()] {
+    for device in [Device::new(), Device::with_lanes(5000)] {
         // Towards the chain's root every level is pending; `mask` climbs, since it has lost most of them.
         check(&device, &world, &some_rays(&world, 4000, 0.0..=0.0));
     }
@@ -168,7 +166,12 @@ fn a_mask_of_two_words_finds_the_same() {
 
 #[test]
 fn any_number_of_rays_in_batches_of_any_size() {
-    let device = Device::new();
+    // Two and more lanes a ray, and one.
+    any_number_on(&Device::with_lanes(2000));
+    any_number_on(&Device::new());
+}
+
+fn any_number_on(device: &Device) {
     let world = World::new(meshes::torus(40, 20));
     for n in [0, 1, 63, 64, 65, 1000] {
         let rays = some_rays(&world, n, 0.0..=0.0);

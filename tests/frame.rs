@@ -13,6 +13,8 @@ mod closed_forms;
 mod crop;
 #[path = "frame/features.rs"]
 mod features;
+#[path = "frame/lanes.rs"]
+mod lanes;
 #[path = "frame/large.rs"]
 mod large;
 #[path = "frame/living.rs"]

@@ -12,10 +12,10 @@ use kdray::{
     gpu::{Access, Context, ContextOptions, GpuError},
     kdtree::{BuildOptions, KdTree},
     layout::{
-        BRUTE_MAX_TRIANGLES, Batch, Counters, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, NO_TRIANGLE, Ray,
-        Triangle,
+        BRUTE_MAX_TRIANGLES, Batch, Bounce, Counters, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, NO_TRIANGLE,
+        Ray, Triangle,
     },
-    passes::{Passes, Resources, bounce_row},
+    passes::{Passes, Resources},
     render::Renderer,
     scene::{Camera, RenderDefaults, Scene},
 };
@@ -66,7 +66,7 @@ fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], tr
     resources.add_extras(context, tree, traversal).expect("extras");
     let passes = Passes::new(context, &resources.bindings, &options).expect("passes");
     resources.queues.ray_queues[0].upload(rays).expect("rays");
-    resources.bounces.upload(&[bounce_row(rays.len() as u32, 2)]).expect("bounces");
+    resources.bounces.upload(&[Bounce::of(rays.len() as u32, &constants)]).expect("bounces");
     resources.counters.upload(&[Counters::default()]).expect("counters");
     let batch = Batch { first_pixel: 0, n_pixels: 64, bounce_ix: 0, depth: 0 };
     let record = |commands: &kdray::gpu::Commands| {

@@ -1,12 +1,13 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Cast: one invocation a ray finds its closest hit in (t_min, t_max] through the kd-tree, or with ANY_HIT one that need
+// Cast: one working lane a ray finds its closest hit in (t_min, t_max] through the kd-tree, or with ANY_HIT one that need
 // not be the closest.
 // Reads cast_rays and the tree; writes cast_hits.
 #include "layout.glsl"
 
 const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
+#include "lanes.glsl"
 
 layout(constant_id = 2) const bool ANY_HIT = false;
 
@@ -57,7 +58,7 @@ Hit cast_ray(CastRay ray) {
 }
 
 void main() {
-    uint ray_ix = gl_GlobalInvocationID.x;
+    uint ray_ix = ray_of_lane(batch.lanes_log2);
     if (ray_ix >= batch.n_rays) return;
     CastRay ray = cast_rays[ray_ix];
     cast_hits[ray_ix] = is_ray(ray) ? cast_ray(ray) : miss();

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Shadow (the paper's section 2.1): one invocation a ray (x) and light (y) tests the segment from the ray's hit to
+// Shadow (the paper's section 2.1): one working lane a ray (x) and light (y) tests the segment from the ray's hit to
 // the light against the tree; any hit before its end puts the light out.
 // Reads rays, hits, lights and the tree; writes light_visibility[light * queue_capacity + ray] (1: lit),
 // counters[].n_shadow_rays, pixel_features (n_rays, n_steps).
@@ -10,6 +10,7 @@
 // Whether what segments cost is noted.
 layout(constant_id = 3) const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
+#include "lanes.glsl"
 #include "surface.glsl"
 #include "light.glsl"
 
@@ -37,7 +38,7 @@ bool shadow_segment(Ray ray, Hit hit, Light light, out Ray segment) {
 }
 
 void main() {
-    uint ray_ix = gl_GlobalInvocationID.x;
+    uint ray_ix = ray_of_lane(bounces[batch.bounce_ix].shadow_lanes_log2);
     uint light_ix = gl_GlobalInvocationID.y;
     bool is_tested = false;
     if (ray_ix < bounces[batch.bounce_ix].n_rays) {

@@ -1,13 +1,14 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Trace (the paper's section 2.3): one invocation a ray finds its closest hit through the kd-tree.
+// Trace (the paper's section 2.3): one working lane a ray finds its closest hit through the kd-tree.
 // Reads rays and the tree; writes hits, counters[].n_hits, pixel_features (n_rays, n_steps).
 #include "layout.glsl"
 
 // Whether what rays cost is noted.
 layout(constant_id = 3) const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
+#include "lanes.glsl"
 
 // Whether hits are counted.
 layout(constant_id = 2) const bool COUNTS = true;
@@ -21,7 +22,7 @@ layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock
 layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
 
 void main() {
-    uint ray_ix = gl_GlobalInvocationID.x;
+    uint ray_ix = ray_of_lane(bounces[batch.bounce_ix].trace_lanes_log2);
     bool is_hit = false;
     if (ray_ix < bounces[batch.bounce_ix].n_rays) {
         Hit hit = traverse(rays[ray_ix], 0.0, false);

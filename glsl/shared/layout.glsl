@@ -9,6 +9,8 @@
 // Invocations of a workgroup: ray kernels (one ray each), pixel kernels (8 x 8 pixels), scans.
 #define RAY_GROUP_SIZE 64u
 #define TILE_SIZE 8u
+// Of as many lanes for one ray, one works, where a device has lanes to spare.
+#define MOST_LANES_LOG2 5u
 // Vulkan guarantees 128 invocations on every device.
 #define SCAN_GROUP_SIZE 128u
 // Counts that one invocation of a scan adds up; a scan block is SCAN_GROUP_SIZE * SCAN_ITEMS counts.
@@ -156,7 +158,8 @@ struct Hit {
 //         + (1 - 2 (window_y + y + sample_y) / picture_height) * up.
 // clip_from_world is the whole picture's, moved so that the sample lies in the middle of its pixel.
 // n_samples: how many samples a pixel there are with this frame's.
-// plane_reach: KD_PLANE_REACH in world units.
+// plane_reach: KD_PLANE_REACH in world units. n_lanes: lanes that the device has, to be shared out among fewer rays; 0: each
+// ray gets one.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -183,9 +186,14 @@ struct Frame {
     float sample_y;
     uint n_samples;
     float plane_reach;
+    uint n_lanes;
+    uint reserved0;
+    uint reserved1;
+    uint reserved2;
 };
 
-// One a batch and bounce, 64 bytes, sized by the bounce before: each `groups` is a VkDispatchIndirectCommand.
+// One a batch and bounce, 80 bytes, sized by the bounce before: each `groups` is a VkDispatchIndirectCommand. trace and shadow
+// have their own, with 2^lanes_log2 lanes for a ray, or a segment, of which the first works (bounce.rs).
 // n_wanted: rays that the bounce before made; overflow: 1 where they are more than a queue holds. Then n_rays is 0,
 // and the batch has to be split. any_overflow: of the first row only, 1 where one of all the frame's has an overflow.
 struct Bounce {
@@ -197,14 +205,18 @@ struct Bounce {
     uint ray_groups_y;
     uint ray_groups_z;
     uint reserved0;
+    uint trace_groups_x;
+    uint trace_groups_y;
+    uint trace_groups_z;
+    uint trace_lanes_log2;
     uint shadow_groups_x;
     uint shadow_groups_y;
     uint shadow_groups_z;
-    uint reserved1;
+    uint shadow_lanes_log2;
     uint scan_groups_x;
     uint scan_groups_y;
     uint scan_groups_z;
-    uint reserved2;
+    uint reserved1;
 };
 
 // One a batch and bounce, 8 bytes: for the profile. Integer sums, the same in every order of arrival.
@@ -279,9 +291,10 @@ struct Present {
     uint window_height;
 };
 
-// Push constants of a cast: its rays.
+// Push constants of a cast: its rays, and 2^lanes_log2 lanes for each, of which the first works.
 struct CastBatch {
     uint n_rays;
+    uint lanes_log2;
 };
 
 // Push constants of a cast by the driver's own ray tracing: the address of its structure.

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::layout::{Bounce, RAY_GROUP_SIZE, Ray, SCAN_BLOCK_SIZE};
+use crate::layout::{Bounce, Frame, Ray, SCAN_BLOCK_SIZE};
 
 const BLOCK: usize = SCAN_BLOCK_SIZE as usize;
 
@@ -13,25 +13,22 @@ pub fn reduce(child_counts: &[u32], scan_blocks: &mut [u32]) {
 }
 
 /// Turns the blocks' sums into their exclusive prefix sums and sizes the next bounce. Where a queue of
-/// `queue_capacity` cannot hold that many rays, the next bounce is empty and says `overflow`.
-pub fn spine(scan_blocks: &mut [u32], queue_capacity: u32, next: &mut Bounce) {
+/// `constants.queue_capacity` cannot hold that many rays, the next bounce is empty and says `overflow`.
+pub fn spine(scan_blocks: &mut [u32], constants: &Frame, next: &mut Bounce) {
     let mut carry = 0;
     for block in scan_blocks {
         let sum = *block;
         *block = carry;
         carry += sum;
     }
-    size_next_bounce(carry, queue_capacity, next);
+    size_next_bounce(carry, constants, next);
 }
 
-fn size_next_bounce(n_wanted: u32, queue_capacity: u32, next: &mut Bounce) {
-    let n_rays = if n_wanted <= queue_capacity { n_wanted } else { 0 };
+fn size_next_bounce(n_wanted: u32, constants: &Frame, next: &mut Bounce) {
+    let n_rays = if n_wanted <= constants.queue_capacity { n_wanted } else { 0 };
     next.overflow = u32::from(n_rays != n_wanted);
     next.n_wanted = n_wanted;
-    next.n_rays = n_rays;
-    next.ray_groups_x = n_rays.div_ceil(RAY_GROUP_SIZE);
-    next.shadow_groups_x = next.ray_groups_x;
-    next.scan_groups_x = n_rays.div_ceil(SCAN_BLOCK_SIZE);
+    next.set_n_rays(n_rays, constants);
 }
 
 /// Moves the children of each ray (two places a ray, `child_counts` of them filled) to the next queue, which is

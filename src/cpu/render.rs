@@ -248,9 +248,10 @@ impl<'a> Renderer<'a> {
         let Queues { rays, next_rays, scan_blocks, shaded, .. } = &mut self.queues;
         let Shaded { child_rays, child_counts, .. } = shaded;
         let mut next = Bounce::zeroed();
+        let constants = Frame { queue_capacity: capacity, ..self.frame };
         scan_blocks.resize(rays.len().div_ceil(SCAN_BLOCK_SIZE as usize), 0);
         self.clock.time("compact_reduce", Some(depth), || compact::reduce(child_counts, scan_blocks));
-        self.clock.time("compact_spine", Some(depth), || compact::spine(scan_blocks, capacity, &mut next));
+        self.clock.time("compact_spine", Some(depth), || compact::spine(scan_blocks, &constants, &mut next));
         next_rays.resize(next.n_rays as usize, Ray::zeroed());
         if next.overflow == 0 {
             self.clock.time("compact_scatter", Some(depth), || {

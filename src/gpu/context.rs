@@ -53,6 +53,7 @@ pub struct Context {
     runs_both_sides: bool,
     limits: Limits,
     fuses_fma: OnceLock<bool>,
+    n_lanes: OnceLock<u32>,
     #[cfg(feature = "hot-reload")]
     pub(super) replacements: Mutex<super::Replacements>,
     instance: Arc<Instance>,
@@ -105,13 +106,15 @@ impl Context {
         Ok(context)
     }
 
-    /// As [`Context::new`], as if lanes took branches of their own: a software device then runs what GPUs run.
+    /// As [`Context::new`], as if it had so many lanes that took branches of their own: a software device then runs what
+    /// GPUs run.
     ///
     /// # Errors
     /// As [`Context::new`].
-    pub fn with_lanes_apart(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
+    pub fn with_lanes(options: &ContextOptions, n_lanes: u32) -> Result<Arc<Self>, GpuError> {
         let mut context = Self::new(options)?;
-        Arc::get_mut(&mut context).expect("nothing has been made from it yet").runs_both_sides = false;
+        let own = Arc::get_mut(&mut context).expect("nothing has been made from it yet");
+        (own.runs_both_sides, own.n_lanes) = (false, OnceLock::from(n_lanes));
         Ok(context)
     }
 
@@ -160,6 +163,7 @@ impl Context {
             runs_both_sides: info.kind == SOFTWARE,
             info,
             fuses_fma: OnceLock::new(),
+            n_lanes: OnceLock::new(),
             #[cfg(feature = "hot-reload")]
             replacements: Mutex::default(),
             limits: Limits::of(&instance, physical),
@@ -195,6 +199,19 @@ impl Context {
         }
         let fuses = probe::fuses_fma(self)?;
         Ok(*self.fuses_fma.get_or_init(|| fuses))
+    }
+
+    /// How many lanes the device runs at once; found out by a kernel, the first time. 0 where lanes are not the device's
+    /// own, so that leaving some of them idle spares nothing.
+    ///
+    /// # Errors
+    /// The kernel does not run.
+    pub fn n_lanes(self: &Arc<Self>) -> Result<u32, GpuError> {
+        if let Some(&n_lanes) = self.n_lanes.get() {
+            return Ok(n_lanes);
+        }
+        let n_lanes = if self.runs_both_sides { 0 } else { probe::n_lanes(self)? };
+        Ok(*self.n_lanes.get_or_init(|| n_lanes))
     }
 
     /// What the validation layer has said so far; empty without validation.

@@ -10,6 +10,10 @@ use super::{
 const FUSED_FMA: Shader =
     Shader { file: "fused_fma.comp", spirv: include_bytes!(concat!(env!("OUT_DIR"), "/fused_fma.comp.spv")) };
 
+const LANES: Shader = Shader { file: "lanes.comp", spirv: include_bytes!(concat!(env!("OUT_DIR"), "/lanes.comp.spv")) };
+/// Of the probe, and of ray kernels.
+const GROUP_SIZE: u32 = 64;
+
 /// Whether GLSL's `fma` rounds once on this device. Vulkan allows it to round twice, and software drivers do.
 pub(super) fn fuses_fma(context: &Arc<Context>) -> Result<bool, GpuError> {
     // Its square needs 25 bits.
@@ -24,4 +28,27 @@ pub(super) fn fuses_fma(context: &Arc<Context>) -> Result<bool, GpuError> {
         commands.barrier(Access::ComputeWrite, Access::TransferRead); // numbers
     })?;
     Ok(numbers.download()?[1] != 0.0)
+}
+
+/// How many lanes the device runs at once, in workgroups of a light kernel: those that were seen side by side.
+pub(super) fn n_lanes(context: &Arc<Context>) -> Result<u32, GpuError> {
+    // More than any device has room for; each stays for some 20,000 cycles, longer than it takes to begin them all.
+    const N_GROUPS: u32 = 16_384;
+    const N_TURNS: u32 = 2500;
+    let counts = Buffer::with(context, "counts", &[0u32; 3], BufferUse::Storage)?;
+    let bindings = Bindings::new(context, &[(0, BindingKind::Storage)], 4)?;
+    let set = BindingSet::new(&bindings, "lanes", &[(0, Binding::Buffer(counts.any()))])?;
+    let desc = ComputeDesc { name: "lanes", shader: LANES, constants: &[], full_subgroups: false };
+    let kernel = ComputePipeline::new(context, &bindings, &desc)?;
+    context.run("lanes", |commands| {
+        commands.bind(&set);
+        commands.dispatch(
+            &kernel,
+            None,
+            &N_TURNS,
+            Dispatch::Threads([N_GROUPS * GROUP_SIZE, 1, 1], [GROUP_SIZE, 1, 1]),
+        );
+        commands.barrier(Access::ComputeWrite, Access::TransferRead); // counts
+    })?;
+    Ok(GROUP_SIZE * counts.download()?[1])
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::{Tree, binding, kernel, spirv, traversal_constants, tree};
 use crate::{
+    bounce::lanes_log2,
     cast::Query,
     frame::Traversal,
     gpu::{
@@ -48,6 +49,8 @@ impl CastResources {
 /// The pass's kernel.
 pub struct Cast {
     kernel: ComputePipeline,
+    /// That the device shares out among rays.
+    n_lanes: u32,
 }
 
 impl Cast {
@@ -60,7 +63,8 @@ impl Cast {
         query: Query,
     ) -> Result<Self, GpuError> {
         let constants = traversal_constants(context, traversal, [query == Query::Any, false])?;
-        Ok(Self { kernel: kernel(context, bindings, "cast", spirv!("cast.comp"), &constants)? })
+        let n_lanes = context.n_lanes()?;
+        Ok(Self { kernel: kernel(context, bindings, "cast", spirv!("cast.comp"), &constants)?, n_lanes })
     }
 
     /// What the driver tells of the kernel.
@@ -74,7 +78,8 @@ impl Cast {
     /// Needs the first `n_rays` of cast_rays. Leaves as many cast_hits.
     pub fn record(&self, commands: &Commands, resources: &CastResources, n_rays: u32) {
         commands.bind(&resources.set);
-        let dispatch = Dispatch::Threads([n_rays, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
-        commands.dispatch(&self.kernel, None, &CastBatch { n_rays }, dispatch);
+        let lanes_log2 = lanes_log2(n_rays, self.n_lanes);
+        let dispatch = Dispatch::Threads([n_rays << lanes_log2, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
+        commands.dispatch(&self.kernel, None, &CastBatch { n_rays, lanes_log2 }, dispatch);
     }
 }

@@ -41,7 +41,7 @@ pub use self::{
     primary_hit::PrimaryHit,
     queues::Queues,
     resolve::Resolve,
-    resources::{Resources, bounce_row},
+    resources::Resources,
     shade::Shade,
     shadow::Shadow,
     tonemap::Tonemap,

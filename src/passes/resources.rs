@@ -7,7 +7,7 @@ use crate::{
     frame::Traversal,
     gpu::{Access, Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
     kdtree::KdTree,
-    layout::{self, Batch, Bounce, Counters, Frame, Light, Material, RAY_GROUP_SIZE, Ray, SCAN_BLOCK_SIZE},
+    layout::{self, Batch, Bounce, Counters, Frame, Light, Material, Ray},
     scene::Scene,
 };
 
@@ -187,7 +187,12 @@ impl Resources {
         self.indirect(batch, offset_of!(Bounce, ray_groups_x))
     }
 
-    /// One invocation a ray of the bounce and light.
+    /// The lanes of each of the bounce's rays.
+    pub fn trace_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
+        self.indirect(batch, offset_of!(Bounce, trace_groups_x))
+    }
+
+    /// The lanes of each of the bounce's rays, for each light.
     pub fn shadow_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
         self.indirect(batch, offset_of!(Bounce, shadow_groups_x))
     }
@@ -210,24 +215,5 @@ impl Resources {
     /// Binds the set in which the batch's bounce reads its queue.
     pub fn bind(&self, commands: &Commands, batch: &Batch) {
         commands.bind(&self.sets[batch.depth as usize % 2]);
-    }
-}
-
-/// A row of `bounces` for `n_rays` rays.
-pub fn bounce_row(n_rays: u32, n_lights: u32) -> Bounce {
-    let ray_groups = n_rays.div_ceil(RAY_GROUP_SIZE);
-    Bounce {
-        n_rays,
-        n_wanted: n_rays,
-        ray_groups_x: ray_groups,
-        ray_groups_y: 1,
-        ray_groups_z: 1,
-        shadow_groups_x: ray_groups,
-        shadow_groups_y: n_lights,
-        shadow_groups_z: 1,
-        scan_groups_x: n_rays.div_ceil(SCAN_BLOCK_SIZE),
-        scan_groups_y: 1,
-        scan_groups_z: 1,
-        ..Bounce::default()
     }
 }

@@ -26,6 +26,6 @@ impl Trace {
 
     /// Needs rays. Leaves hits; updates counters, and pixel_features where the options ask for them.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
-        commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.ray_dispatch(batch));
+        commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.trace_dispatch(batch));
     }
 }

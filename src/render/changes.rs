@@ -1,7 +1,7 @@
 //! What may change between frames: the scene and its tree stay on the device.
 
 use super::{
-    Renderer,
+    Renderer, lanes_to_share,
     schedule::{Schedule, queue_capacity},
 };
 use crate::{frame::RenderOptions, gpu::GpuError, kdtree::KdTree, layout::Frame, scene::Camera};
@@ -90,7 +90,8 @@ impl Renderer {
         let capacity = self.fixed_capacity;
         let limits = self.context.limits();
         let queue_capacity = capacity.unwrap_or_else(|| queue_capacity(limits, &constants, self.branches));
-        let constants = Frame { queue_capacity, ..constants };
+        let n_lanes = lanes_to_share(&self.context, options)?;
+        let constants = Frame { queue_capacity, n_lanes, ..constants };
         let spans = self.spans(&constants);
         let schedule = Schedule::new(&self.context, &constants, spans, options.profile)?;
         if !self.resources.fit(&self.context, &constants, options.features)? {

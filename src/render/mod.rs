@@ -82,6 +82,7 @@ impl Renderer {
         let both = MATERIAL_REFLECT | MATERIAL_REFRACT;
         let branches = scene.materials.iter().any(|material| material.flags & both == both);
         let mut constants = frame_constants(scene, tree, options);
+        constants.n_lanes = lanes_to_share(&context, options)?;
         constants.queue_capacity =
             fixed_capacity.unwrap_or_else(|| queue_capacity(context.limits(), &constants, branches));
         let spans = split_evenly(constants.width * constants.height, constants.queue_capacity);
@@ -289,6 +290,11 @@ impl Renderer {
             _ => self.passes.tonemap.record(commands, &self.resources),
         }
     }
+}
+
+/// Lanes that are shared out among rays. Where what rays cost is shown, each has one, as if it went alone.
+fn lanes_to_share(context: &Arc<Context>, options: &RenderOptions) -> Result<u32, GpuError> {
+    if options.features { Ok(0) } else { context.n_lanes() }
 }
 
 fn copy_all(commands: &Commands, source: &AnyBuffer, destination: &AnyBuffer) {

@@ -5,7 +5,6 @@ use std::{mem, sync::Arc};
 use crate::{
     gpu::{Buffer, BufferUse, Context, GpuError, Limits, Timer},
     layout::{Batch, Bounce, Counters, Frame, RAY_GROUP_SIZE, Ray},
-    passes::bounce_row,
 };
 
 /// The batches of a frame, and what depends on their number.
@@ -40,7 +39,7 @@ impl Schedule {
         let rows: Vec<_> = batches
             .iter()
             .flat_map(|batch| (0..max_depth).map(|depth| if depth == 0 { batch.n_pixels } else { 0 }))
-            .map(|n_rays| bounce_row(n_rays, constants.n_lights))
+            .map(|n_rays| Bounce::of(n_rays, constants))
             .collect();
         let zeros = vec![Counters::default(); rows.len()];
         // The widest bounce has 10 kernels; visibility, accumulate, denoise and tonemap stand outside.

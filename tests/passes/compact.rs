@@ -2,7 +2,7 @@
 
 use kdray::{
     cpu,
-    layout::{Batch, Bounce, Ray, SCAN_BLOCK_SIZE, SCAN_GROUP_SIZE},
+    layout::{Batch, Bounce, Frame, Ray, SCAN_BLOCK_SIZE, SCAN_GROUP_SIZE},
 };
 
 use super::stage::{FIRST, Stage, UNTOUCHED_RAY, UNTOUCHED_WORD, options};
@@ -62,12 +62,13 @@ fn on_device(stage: &Stage, child_counts: &[u32]) -> (Vec<Ray>, [Bounce; 2]) {
 fn on_cpu(stage: &Stage, child_counts: &[u32]) -> (Vec<Ray>, [Bounce; 2]) {
     let (n_rays, capacity) = (child_counts.len(), stage.resources.queues.ray_queues[1].len());
     let children: Vec<Ray> = (0..2 * n_rays).map(numbered).collect();
-    let mut this = kdray::passes::bounce_row(n_rays as u32, 0);
+    let constants = stage.resources.constants();
+    let mut this = Bounce::of(n_rays as u32, constants);
     let mut next = this;
     let mut scan_blocks = vec![0; n_rays.div_ceil(SCAN_BLOCK_SIZE as usize)];
     let mut next_rays = vec![UNTOUCHED_RAY; capacity];
     cpu::compact::reduce(child_counts, &mut scan_blocks);
-    cpu::compact::spine(&mut scan_blocks, capacity as u32, &mut next);
+    cpu::compact::spine(&mut scan_blocks, constants, &mut next);
     if next.overflow == 0 {
         cpu::compact::scatter(&children, child_counts, &scan_blocks, &mut next_rays[..next.n_rays as usize]);
     }
@@ -91,6 +92,19 @@ fn agrees_with_its_twin() {
         // The last block, of one ray or more, moves something.
         child_counts.iter_mut().last().into_iter().for_each(|count| *count = 2);
         check(&stage, &child_counts);
+    }
+}
+
+#[test]
+fn lanes_to_spare_are_shared_out_as_on_the_cpu() {
+    let mut stage = stage(5000);
+    let constants = Frame { n_lanes: 5000, n_lights: 3, ..*stage.resources.constants() };
+    stage.resources.set_constants(&constants);
+    stage.resources.tree.frame.upload(&[constants]).expect("frame");
+    for n_rays in [0, 1, 50, 160, 1250, 1251, 2500, 2501, 5000] {
+        check(&stage, &vec![1; n_rays]);
+        let lanes = 1 << on_device(&stage, &vec![1; n_rays]).1[1].trace_lanes_log2;
+        assert!(lanes == 1 || lanes * n_rays <= 5000, "{n_rays}: {lanes}");
     }
 }
 

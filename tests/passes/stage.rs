@@ -8,8 +8,8 @@ use kdray::{
     frame::{Denoise, RenderOptions},
     gpu::{Commands, Context, ContextOptions},
     kdtree::{BuildOptions, Extras, KdTree},
-    layout::{Batch, Counters, Frame, Hit, NO_TRIANGLE, RAY_GROUP_SIZE, Ray},
-    passes::{Passes, Resources, bounce_row},
+    layout::{Batch, Bounce, Counters, Frame, Hit, NO_TRIANGLE, RAY_GROUP_SIZE, Ray},
+    passes::{Passes, Resources},
     scene::Scene,
 };
 
@@ -80,7 +80,7 @@ impl Stage {
 
     /// A bounce of `n_rays`; all counters 0.
     pub fn set_n_rays(&self, n_rays: u32) {
-        let row = bounce_row(n_rays, self.scene.lights.len() as u32);
+        let row = Bounce::of(n_rays, self.resources.constants());
         self.resources.bounces.upload(&[row; N_ROWS]).expect("bounces");
         self.resources.counters.upload(&[Counters::default(); N_ROWS]).expect("counters");
     }

@@ -1,0 +1,34 @@
+//! How many lanes a ray has, and how they run, changes nothing.
+
+use kdray::{
+    frame::{Primary, RenderOptions},
+    gpu::{Context, ContextOptions},
+    render::Renderer,
+};
+
+use super::studio::{assert_silent, device, identical, options, tree_of};
+use crate::support::scenes;
+
+#[test]
+fn a_device_with_lanes_to_spare_gives_the_same_bits() {
+    let scene = scenes::mixed();
+    let (tree, plain) = (tree_of(&scene), device());
+    let options = RenderOptions { primary: Primary::Trace, ..options(40, 30, 4) };
+    let picture = |context: &std::sync::Arc<Context>| {
+        let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
+        let picture = renderer.render().expect("a frame").0;
+        let lanes_log2: Vec<_> =
+            renderer.resources().bounces.download().expect("bounces").iter().map(|row| row.trace_lanes_log2).collect();
+        (picture, lanes_log2)
+    };
+    let (expected, lanes_log2) = picture(&plain);
+    assert!(lanes_log2.iter().all(|&log2| log2 == 0), "{lanes_log2:?}");
+    let options = ContextOptions { device: None, validate: true };
+    // Ever fewer rays have ever more lanes.
+    let spare = Context::with_lanes(&options, 3000).expect("a device with validation");
+    let (found, lanes_log2) = picture(&spare);
+    assert!(lanes_log2[0] == 1 && lanes_log2.is_sorted() && lanes_log2[3] > 1, "{lanes_log2:?}");
+    assert!(identical(&expected, &found));
+    assert_silent(&plain);
+    assert_silent(&spare);
+}
