@@ -36,8 +36,9 @@ use crate::{
     passes::{CastResources, Tree},
 };
 
-/// kdray's ways through the tree that are measured: the default one, and the one that keeps a stack in memory.
-pub const VARIANTS: [Traversal; 2] = [Traversal::Mask, Traversal::Stack];
+/// kdray's ways through the tree that are measured: the default one, the one that keeps a stack in memory, and the one that
+/// needs neither, but six words more a node.
+pub const VARIANTS: [Traversal; 3] = [Traversal::Mask, Traversal::Stack, Traversal::Ropes];
 /// Builds of the driver's structure, of which the median counts.
 const N_BUILDS: usize = 5;
 
@@ -64,7 +65,8 @@ impl Arena {
             scenery = Scenery::new(context, triangles)?;
             build_ms.push(scenery.build_ms());
         }
-        let tree = Tree::new(context, triangles, &stage.tree, &stage.frame)?;
+        let mut tree = Tree::new(context, triangles, &stage.tree, &stage.frame)?;
+        tree.add_extras(context, &stage.tree, Traversal::Ropes)?;
         Ok(Self {
             bindings: CastResources::bindings(context, &tree)?,
             tree,
