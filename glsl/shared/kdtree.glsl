@@ -114,6 +114,7 @@ uint first_child(TraversalRay ray, KdNode node) {
 #include "kd_boxes.glsl"
 #include "pending_mask_boxes.glsl"
 #include "pending_backtrack.glsl"
+#include "ropes.glsl"
 
 void clear_pending() {
     pending_mask = uvec2(0u);
@@ -136,6 +137,7 @@ bool pop_pending(TraversalRay ray, float t_best, inout Cell cell) {
     if (TRAVERSAL == TRAVERSAL_STACK) return stack_pop(t_best, cell);
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return mask_boxes_pop(ray, t_best, cell);
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return backtrack_pop(ray, t_best, cell);
+    if (TRAVERSAL == TRAVERSAL_ROPES) return follow_rope(t_best, cell);
     return marked_pop(ray, t_best, cell);
 }
 
@@ -208,7 +210,9 @@ bool is_done(bool any_hit, Hit best) {
 }
 
 Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
-    KdNode leaf = descend(ray, cell);
+    KdNode leaf;
+    if (TRAVERSAL == TRAVERSAL_ROPES) leaf = descend_to_rope(ray, cell);
+    else leaf = descend(ray, cell);
     return visit_leaf(leaf, cell.t_enter, min(cell.t_exit, t_best));
 }
 
@@ -247,7 +251,6 @@ void search(TraversalRay ray, bool any_hit, inout Hit best) {
 }
 
 #include "brute.glsl"
-#include "ropes.glsl"
 
 // The closest hit in (t_min, t_max], or with any_hit one that need not be the closest. A miss keeps t = t_max.
 Hit traverse(Ray ray_in, float t_min, bool any_hit) {
@@ -256,7 +259,6 @@ Hit traverse(Ray ray_in, float t_min, bool any_hit) {
     TraversalRay ray = traversal_ray(ray_near, t_min - t_start);
     Hit best = Hit(ray_near.t_max, NO_TRIANGLE, 0.0, 0.0);
     if (TRAVERSAL == TRAVERSAL_BRUTE) intersect_all(ray, any_hit, best);
-    else if (TRAVERSAL == TRAVERSAL_ROPES) follow_ropes(ray, any_hit, best);
     else search(ray, any_hit, best);
     best.t = best.triangle_ix == NO_TRIANGLE ? ray_in.t_max : best.t + t_start;
     return best;
