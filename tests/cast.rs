@@ -149,7 +149,8 @@ fn finds_what_brute_force_finds() {
 #[test]
 fn lanes_apart_find_the_same() {
     let device = Device::with_lanes(5000);
-    for world in worlds() {
+    // Some of them: a software driver takes long to make the kernels.
+    for world in worlds().step_by(3) {
         check(&device, &world, &some_rays(&world, 4000, -20.0..=20.0));
     }
 }
