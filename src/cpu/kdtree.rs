@@ -164,7 +164,7 @@ pub(super) fn is_done<const ANY_HIT: bool>(best: &Hit) -> bool {
 }
 
 /// All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
-#[inline]
+#[inline(always)]
 pub(super) fn search<P: Pending, const ANY_HIT: bool>(
     bindings: &Bindings<impl Reads>,
     ray: &TraversalRay,
@@ -179,7 +179,7 @@ pub(super) fn search<P: Pending, const ANY_HIT: bool>(
 }
 
 /// As [`search`], in a cell that the ray is in.
-#[inline]
+#[inline(always)]
 pub(super) fn search_cell<P: Pending, const ANY_HIT: bool>(
     bindings: &Bindings<impl Reads>,
     ray: &TraversalRay,

@@ -1,14 +1,18 @@
 //! Eight rays as columns: where they are in a cell, and a leaf's triangles against those that are in it.
+//!
+//! Whatever computes with columns is inlined into the function that `dispatch!` compiles for a set of instructions, and
+//! does so in no closure: elsewhere, each operation would be a call.
 
 use std::array::from_fn;
 
+use fearless_simd::{Simd, f32x8, mask32x8, prelude::*, u32x8};
 use glam::{Vec3A, Vec4};
-use wide::f32x8;
 
 use super::{
     bindings::Bindings,
-    kdtree::{TraversalRay, is_done, largest_coordinate},
-    leaf::{Target, entries_of, intersect},
+    kdtree::{TraversalRay, largest_coordinate},
+    leaf::{Target, entries_of},
+    packet_triangle::{Found, Shears},
     table::Reads,
     traverser::Probe,
 };
@@ -20,78 +24,111 @@ pub const LANES: usize = 8;
 /// Triangles of a leaf whose planes are tried before the first of them is tested.
 const BLOCK: usize = 8;
 
-/// Where the rays are in a cell. A ray that is not in it enters after it leaves.
-#[derive(Clone, Copy)]
-pub struct Interval {
-    pub enter: f32x8,
-    pub exit: f32x8,
-}
-
 /// One bit a ray.
 pub type Lanes = u32;
 
-/// The rays as columns, and what each has found.
-pub struct Packet {
-    origin: [f32x8; 3],
-    direction: [f32x8; 3],
-    pub inv_direction: [f32x8; 3],
-    /// Where the rays meet the plane at 0 on each axis, in t.
-    pub bias: [f32x8; 3],
-    plane_reach: f32,
-    targets: [Target; LANES],
-    pub best: [Hit; LANES],
-    /// The rays' `best` t; before everything where a ray is done.
-    pub t_best: f32x8,
+/// Where the rays are in a cell. A ray that is not in it enters after it leaves.
+#[derive(Clone, Copy)]
+pub struct Interval<S: Simd> {
+    pub enter: f32x8<S>,
+    pub exit: f32x8<S>,
 }
 
-impl Interval {
-    pub fn empty() -> Self {
-        Self { enter: f32x8::splat(1.0), exit: f32x8::splat(0.0) }
-    }
+/// The rays as columns, and what each has found.
+pub struct Packet<S: Simd> {
+    origin: [f32x8<S>; 3],
+    direction: [f32x8<S>; 3],
+    pub inv_direction: [f32x8<S>; 3],
+    /// Where the rays meet the plane at 0 on each axis, in t.
+    pub bias: [f32x8<S>; 3],
+    plane_reach: f32,
+    shears: Shears<S>,
+    t_min: f32x8<S>,
+    source_triangle: u32x8<S>,
+    best: Found<S>,
+    /// The rays' `best` t; before everything where a ray is done.
+    pub t_best: f32x8<S>,
+}
 
+impl<S: Simd> Interval<S> {
     /// The rays that are in the cell.
     #[inline(always)]
     pub fn lanes(&self) -> Lanes {
-        self.enter.simd_le(self.exit).to_bitmask()
+        self.enter.simd_le(self.exit).to_bitmask() as Lanes
     }
 
     /// Without the other rays.
+    #[inline(always)]
     pub fn of(self, lanes: Lanes) -> Self {
-        let is_in = |lane: usize| lanes >> lane & 1 == 1;
-        let (enter, exit) = (self.enter.to_array(), self.exit.to_array());
+        let simd = self.enter.simd;
+        let is_in = mask32x8::from_bitmask(simd, lanes.into());
         Self {
-            enter: from_fn(|i| if is_in(i) { enter[i] } else { 1.0 }).into(),
-            exit: from_fn(|i| if is_in(i) { exit[i] } else { 0.0 }).into(),
+            enter: is_in.select(self.enter, f32x8::splat(simd, 1.0)),
+            exit: is_in.select(self.exit, f32x8::splat(simd, 0.0)),
         }
     }
 }
 
-fn columns(of: impl Fn(usize) -> [f32; 3]) -> [f32x8; 3] {
+#[inline(always)]
+fn columns<S: Simd>(simd: S, of: impl Fn(usize) -> [f32; 3]) -> [f32x8<S>; 3] {
     let rows: [[f32; 3]; LANES] = from_fn(of);
-    from_fn(|axis| from_fn(|lane| rows[lane][axis]).into())
+    let [x, y, z] = [0, 1, 2].map(|axis| rows.map(|row| row[axis]));
+    [f32x8::load_array(simd, x), f32x8::load_array(simd, y), f32x8::load_array(simd, z)]
 }
 
-impl Packet {
+/// One ray's, by axis; a fourth is 0.
+#[inline(always)]
+fn row<S: Simd>(columns: &[f32x8<S>; 3], lane: usize) -> [f32; 4] {
+    [columns[0].as_array()[lane], columns[1].as_array()[lane], columns[2].as_array()[lane], 0.0]
+}
+
+/// A direction in the plane is taken as all but in it.
+#[inline(always)]
+fn inverse<S: Simd>(direction: f32x8<S>) -> f32x8<S> {
+    let tiny = f32x8::splat(direction.simd, 1e-12);
+    1.0 / direction.abs().simd_lt(tiny).select(tiny, direction)
+}
+
+#[inline(always)]
+fn like_on_axis<S: Simd>(direction: &f32x8<S>, lane: u32) -> Lanes {
+    let below = direction.simd_lt(0.0).to_bitmask() as Lanes;
+    if below >> lane & 1 == 1 { below } else { !below }
+}
+
+/// a * b + c, rounded twice.
+#[inline(always)]
+fn times_plus<S: Simd, A: std::ops::Mul<f32x8<S>, Output = f32x8<S>>>(
+    [ax, ay, az]: [A; 3],
+    b: &[f32x8<S>; 3],
+    c: &[f32x8<S>; 3],
+) -> [f32x8<S>; 3] {
+    [ax * b[0] + c[0], ay * b[1] + c[1], az * b[2] + c[2]]
+}
+
+/// Heights of points above a plane.
+#[inline(always)]
+fn heights<S: Simd>(plane: &Plane, at: &[f32x8<S>; 3]) -> f32x8<S> {
+    let [x, y, z] = plane.normal.to_array();
+    x * at[0] + y * at[1] + z * at[2] - plane.distance
+}
+
+impl<S: Simd> Packet<S> {
     /// The packet, and where its rays are in the root's cell: the operations of `TraversalRay::new`.
     #[inline(always)]
-    pub fn new(bindings: &Bindings<impl Reads>, probes: &[Probe]) -> (Self, Interval) {
+    pub fn new(simd: S, bindings: &Bindings<impl Reads>, probes: &[Probe]) -> (Self, Interval<S>) {
         // Missing rays copy the first, and are in no cell.
         let probe = |lane: usize| probes.get(lane).unwrap_or(&probes[0]);
-        let origin = columns(|lane| probe(lane).ray.origin.to_array());
-        let direction = columns(|lane| probe(lane).ray.direction.to_array());
-        let tiny = f32x8::splat(1e-12);
-        let inv_direction = direction.map(|d| 1.0 / d.abs().simd_lt(tiny).select(tiny, d));
-        let bias = from_fn(|i| -origin[i] * inv_direction[i]);
-        let at = |corner: [f32; 3]| from_fn(|i| f32x8::splat(corner[i]) * inv_direction[i] + bias[i]);
-        let t0: [f32x8; 3] = at(bindings.frame.cell_min.to_array());
-        let t1: [f32x8; 3] = at(bindings.frame.cell_max.to_array());
-        let near: [f32x8; 3] = from_fn(|i| t0[i].fast_min(t1[i]));
-        let far: [f32x8; 3] = from_fn(|i| t0[i].fast_max(t1[i]));
-        let t_min: f32x8 = from_fn(|lane| probe(lane).t_min).into();
-        let t_max: f32x8 = from_fn(|lane| probe(lane).ray.t_max).into();
+        let origin = columns(simd, |lane| probe(lane).ray.origin.to_array());
+        let direction = columns(simd, |lane| probe(lane).ray.direction.to_array());
+        let inv_direction = [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])];
+        let bias = [-origin[0] * inv_direction[0], -origin[1] * inv_direction[1], -origin[2] * inv_direction[2]];
+        let [x0, y0, z0] = times_plus(bindings.frame.cell_min.to_array(), &inv_direction, &bias);
+        let [x1, y1, z1] = times_plus(bindings.frame.cell_max.to_array(), &inv_direction, &bias);
+        let t_min = f32x8::load_array(simd, from_fn(|lane| probe(lane).t_min));
+        let t_max = f32x8::load_array(simd, from_fn(|lane| probe(lane).ray.t_max));
         let whole = Interval {
-            enter: near[0].fast_max(near[1]).fast_max(near[2].fast_max(t_min)),
-            exit: far[0].fast_min(far[1]).fast_min(far[2].fast_min(t_max)),
+            enter: x0.min(x1).max(y0.min(y1)).max(z0.min(z1).max(t_min)),
+            exit: x0.max(x1).min(y0.max(y1)).min(z0.max(z1).min(t_max)),
         };
         let packet = Self {
             origin,
@@ -99,32 +136,35 @@ impl Packet {
             inv_direction,
             bias,
             plane_reach: KD_PLANE_REACH * largest_coordinate(bindings),
-            targets: from_fn(|lane| Target::of(&probe(lane).ray, probe(lane).t_min)),
-            best: from_fn(|lane| probe(lane).miss()),
+            shears: Shears::of(&origin, &direction),
+            t_min,
+            source_triangle: u32x8::load_array(simd, from_fn(|lane| probe(lane).ray.source_triangle)),
+            best: Found::nothing(t_max),
             t_best: t_max,
         };
         (packet, whole.of((1 << probes.len()) - 1))
     }
 
+    /// By axis, whether the ray comes to the upper child first; a fourth is 0.
+    #[inline(always)]
+    pub fn first_is_above(&self, lane: u32) -> [u32; 4] {
+        row(&self.inv_direction, lane as usize).map(|d| u32::from(d < 0.0))
+    }
+
     /// The rays that go the same way as one of them on all axes.
     #[inline(always)]
     pub fn like(&self, lane: u32) -> Lanes {
-        let same = |d: f32x8| {
-            let below = d.simd_lt(f32x8::splat(0.0)).to_bitmask();
-            if below >> lane & 1 == 1 { below } else { !below }
-        };
-        self.inv_direction.map(same).into_iter().fold(!0, |all, axis| all & axis)
+        let [x, y, z] = &self.inv_direction;
+        like_on_axis(x, lane) & like_on_axis(y, lane) & like_on_axis(z, lane)
     }
 
     /// Which of the rays do not keep to one side of a plane within the cell.
     #[inline(always)]
-    fn near_plane(&self, plane: &Plane, from: &[f32x8; 3], to: &[f32x8; 3]) -> Lanes {
-        let [x, y, z] = plane.normal.to_array().map(f32x8::splat);
-        let height = |p: &[f32x8; 3]| x * p[0] + y * p[1] + z * p[2] - f32x8::splat(plane.distance);
-        let (height_from, height_to) = (height(from), height(to));
-        let one_side = (height_from * height_to).simd_gt(f32x8::splat(0.0));
-        let apart = height_from.abs().fast_min(height_to.abs()).simd_gt(f32x8::splat(self.plane_reach));
-        !(one_side & apart).to_bitmask()
+    fn near_plane(&self, plane: &Plane, from: &[f32x8<S>; 3], to: &[f32x8<S>; 3]) -> Lanes {
+        let (height_from, height_to) = (heights(plane, from), heights(plane, to));
+        let one_side = (height_from * height_to).simd_gt(0.0);
+        let apart = height_from.abs().min(height_to.abs()).simd_gt(self.plane_reach);
+        !(one_side & apart).to_bitmask() as Lanes
     }
 
     /// The leaf's triangles against the rays that are in it.
@@ -133,52 +173,97 @@ impl Packet {
         &mut self,
         bindings: &Bindings<impl Reads>,
         leaf: KdNode,
-        cell: &Interval,
+        cell: &Interval<S>,
     ) {
         let entries = entries_of(leaf);
         if entries.is_empty() {
             return;
         }
         let in_cell = cell.lanes();
-        let at = |t: f32x8| from_fn(|i| self.origin[i] + t * self.direction[i]);
-        let (from, to) = (at(cell.enter), at(cell.exit.fast_min(self.t_best)));
+        let t_to = cell.exit.min(self.t_best);
+        let from = times_plus([cell.enter; 3], &self.direction, &self.origin);
+        let to = times_plus([t_to; 3], &self.direction, &self.origin);
         // Planes first, triangles after: so that the loads of several triangles are on their way at once.
         for (triangles, first) in bindings.leaf_triangles[entries.clone()].chunks(BLOCK).zip(entries.step_by(BLOCK)) {
             let mut near = [0; BLOCK];
             for (lanes, entry) in near.iter_mut().zip(first..first + triangles.len()) {
                 let plane = bindings.leaf_planes.get(entry);
-                *lanes = in_cell & plane.map_or(!0, |plane| self.near_plane(plane, &from, &to));
+                *lanes = in_cell & if let Some(plane) = plane { self.near_plane(plane, &from, &to) } else { !0 };
             }
-            for (&triangle_ix, mut lanes) in triangles.iter().zip(near) {
-                while lanes != 0 {
-                    let lane = lanes.trailing_zeros() as usize;
-                    intersect(bindings, &self.targets[lane], triangle_ix, &mut self.best[lane]);
-                    lanes &= lanes - 1;
+            for (&triangle_ix, lanes) in triangles.iter().zip(near) {
+                if lanes != 0 {
+                    self.intersect(bindings, triangle_ix, lanes);
                 }
             }
         }
         self.note_best::<ANY_HIT>();
     }
 
+    /// A triangle against some of the rays: `leaf::intersect` for all at once.
+    #[inline(always)]
+    fn intersect(&mut self, bindings: &Bindings<impl Reads>, triangle_ix: u32, lanes: Lanes) {
+        let triangle = &bindings.triangles[triangle_ix as usize];
+        for axis in 0..3 {
+            let lanes = lanes & self.shears.lanes_of_axis[axis];
+            if lanes == 0 {
+                continue;
+            }
+            if let Some((found, hit)) = self.shears.intersect_triangle(triangle, triangle_ix, axis, lanes) {
+                let nearer = found.t.simd_lt(self.best.t)
+                    | (found.t.simd_eq(self.best.t) & found.triangle_ix.simd_lt(self.best.triangle_ix));
+                let is_new = found.t.simd_gt(self.t_min) & found.triangle_ix.simd_ne(self.source_triangle);
+                self.best = found.or(self.best, hit & nearer & is_new);
+            }
+        }
+    }
+
     #[inline(always)]
     pub fn note_best<const ANY_HIT: bool>(&mut self) {
-        let t_best = |hit: &Hit| if is_done::<ANY_HIT>(hit) { f32::NEG_INFINITY } else { hit.t };
-        self.t_best = from_fn(|lane| t_best(&self.best[lane])).into();
+        let best = &self.best;
+        self.t_best = best.t;
+        if ANY_HIT {
+            self.t_best = best.is_hit().select(f32x8::splat(best.t.simd, f32::NEG_INFINITY), best.t);
+        }
     }
 
     /// One of the rays, for itself.
     #[inline(always)]
     pub fn ray(&self, lane: usize) -> TraversalRay {
-        let row = |columns: &[f32x8; 3]| from_fn(|axis| columns.get(axis).map_or(0.0, |c| c.as_array()[lane]));
         TraversalRay {
-            target: self.targets[lane],
-            origin: Vec3A::from_vec4(Vec4::from_array(row(&self.origin))),
-            direction: Vec3A::from_vec4(Vec4::from_array(row(&self.direction))),
+            target: Target {
+                shear: self.shears.of_lane(lane),
+                t_min: self.t_min.as_array()[lane],
+                source_triangle: self.source_triangle.as_array()[lane],
+            },
+            origin: Vec3A::from_vec4(Vec4::from_array(row(&self.origin, lane))),
+            direction: Vec3A::from_vec4(Vec4::from_array(row(&self.direction, lane))),
             plane_reach: self.plane_reach,
-            inv_direction: row(&self.inv_direction),
-            bias: row(&self.bias),
+            inv_direction: row(&self.inv_direction, lane),
+            bias: row(&self.bias, lane),
             t_enter: 0.0,
             t_exit: 0.0,
         }
+    }
+
+    /// What a ray has found.
+    #[inline(always)]
+    pub fn hit(&self, lane: usize) -> Hit {
+        self.best.of_lane(lane)
+    }
+
+    /// What the rays have found.
+    #[inline(always)]
+    pub fn hits(&self) -> [Hit; LANES] {
+        let best = &self.best;
+        let (t, triangle_ix) = (best.t.to_array(), best.triangle_ix.to_array());
+        let (u, v) = (best.u.to_array(), best.v.to_array());
+        from_fn(|lane| Hit { t: t[lane], triangle_ix: triangle_ix[lane], u: u[lane], v: v[lane] })
+    }
+
+    /// A ray has found this by itself.
+    #[inline(always)]
+    pub fn set_hit<const ANY_HIT: bool>(&mut self, lane: usize, hit: &Hit) {
+        self.best.set_lane(lane, hit);
+        self.note_best::<ANY_HIT>();
     }
 }

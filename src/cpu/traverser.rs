@@ -3,10 +3,13 @@
 use std::array::from_fn;
 
 use arrayvec::ArrayVec;
+use bytemuck::Zeroable;
+use fearless_simd::Level;
 
 use super::{
     bindings::Bindings,
     brute,
+    companions::{WINDOW, point_the_same_way, sort_by_direction},
     kdtree::{Pending, TraversalRay, is_within_reach, near_scene, search},
     packet::LANES,
     packet_traverser::PacketTraverser,
@@ -43,15 +46,6 @@ impl Probe {
     }
 }
 
-/// Rays that point into more octants than this share too little of their way to go together.
-const MOST_OCTANTS: u32 = 2;
-
-/// Into how many octants the rays point.
-fn n_octants(probes: &[Probe]) -> u32 {
-    let octant_of = |probe: &Probe| probe.ray.direction.is_negative_bitmask();
-    probes.iter().fold(0_u32, |octants, probe| octants | 1 << octant_of(probe)).count_ones()
-}
-
 /// A traversal that remembers its working memory from ray to ray; one for each thread.
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
 pub enum Traverser {
@@ -67,6 +61,11 @@ pub enum Traverser {
 
 impl Traverser {
     pub fn new(traversal: Traversal) -> Self {
+        Self::at_level(traversal, Level::new())
+    }
+
+    /// With the instructions of that level, which the machine has: the same hits, bit for bit.
+    pub fn at_level(traversal: Traversal, level: Level) -> Self {
         match traversal {
             Traversal::Mask => Self::Mask(Pending::new()),
             Traversal::MaskBoxes => Self::MaskBoxes(Pending::new()),
@@ -74,7 +73,7 @@ impl Traverser {
             Traversal::Backtrack => Self::Backtrack(Pending::new()),
             Traversal::ShortStack => Self::ShortStack(Pending::new()),
             Traversal::Ropes => Self::Ropes,
-            Traversal::Stack => Self::Stack(PacketTraverser::default()),
+            Traversal::Stack => Self::Stack(PacketTraverser::new(level)),
             Traversal::Brute => Self::Brute,
         }
     }
@@ -93,14 +92,15 @@ impl Traverser {
             Self::Backtrack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
             Self::ShortStack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
             Self::Ropes => follow_ropes::<ANY_HIT>(bindings, ray, &mut best),
-            Self::Stack(packets) => search::<_, ANY_HIT>(bindings, ray, &mut packets.single, &mut best),
+            Self::Stack(packets) => packets.traverse_alone::<ANY_HIT>(bindings, ray, &mut best),
             Self::Brute => best = brute::closest_hit_beyond(bindings.triangles, &near, t_min - t_start),
         }
         best.t = if best.triangle_ix == NO_TRIANGLE { ray_in.t_max } else { best.t + t_start };
         best
     }
 
-    /// Tells `found` each ray's hit, as [`Traverser::traverse`] finds it; with a stack, eight neighbours go together.
+    /// Tells `found` each ray's hit, as [`Traverser::traverse`] finds it; in their order. With a stack, eight that point
+    /// the same way go together.
     #[inline]
     pub fn traverse_all<const ANY_HIT: bool, Key>(
         &mut self,
@@ -113,13 +113,35 @@ impl Traverser {
         };
         let mut probes = probes.peekable();
         while probes.peek().is_some() {
-            let (keys, packet): (ArrayVec<_, LANES>, ArrayVec<_, LANES>) = probes.by_ref().take(LANES).unzip();
-            let hits = self.traverse_packet::<ANY_HIT>(bindings, &packet);
+            let (keys, window): (Vec<_>, Vec<_>) = probes.by_ref().take(WINDOW).unzip();
+            let hits = self.traverse_window::<ANY_HIT>(bindings, &window);
             keys.into_iter().zip(hits).for_each(|(key, hit)| found(key, hit));
         }
     }
 
-    /// Up to `LANES` rays. What starts far away is rare, and goes alone; so do rays all over the place.
+    /// The rays' hits, in their order.
+    #[inline]
+    fn traverse_window<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl Reads>, probes: &[Probe]) -> Vec<Hit> {
+        let mut hits = vec![Hit::zeroed(); probes.len()];
+        let mut others = Vec::new();
+        for (neighbours, first) in probes.chunks(LANES).zip((0..).step_by(LANES)) {
+            if point_the_same_way(neighbours) {
+                let found = self.traverse_packet::<ANY_HIT>(bindings, neighbours);
+                hits[first..][..neighbours.len()].copy_from_slice(&found[..neighbours.len()]);
+            } else {
+                others.extend(first as u32..(first + neighbours.len()) as u32);
+            }
+        }
+        sort_by_direction(probes, &mut others);
+        for ray_ixs in others.chunks(LANES) {
+            let companions: ArrayVec<_, LANES> = ray_ixs.iter().map(|&ix| probes[ix as usize]).collect();
+            let found = self.traverse_packet::<ANY_HIT>(bindings, &companions);
+            ray_ixs.iter().zip(found).for_each(|(&ix, hit)| hits[ix as usize] = hit);
+        }
+        hits
+    }
+
+    /// Up to `LANES` rays. What starts far away is rare, and goes alone.
     #[inline]
     fn traverse_packet<const ANY_HIT: bool>(
         &mut self,
@@ -127,10 +149,7 @@ impl Traverser {
         probes: &[Probe],
     ) -> [Hit; LANES] {
         match self {
-            Self::Stack(packets)
-                if probes.iter().all(|probe| is_within_reach(bindings, &probe.ray))
-                    && n_octants(probes) <= MOST_OCTANTS =>
-            {
+            Self::Stack(packets) if probes.iter().all(|probe| is_within_reach(bindings, &probe.ray)) => {
                 packets.traverse::<ANY_HIT>(bindings, probes)
             }
             _ => from_fn(|i| self.traverse::<ANY_HIT>(bindings, probes.get(i).unwrap_or(&probes[0]))),

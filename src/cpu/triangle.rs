@@ -8,11 +8,11 @@ use crate::layout::{Hit, Triangle};
 #[derive(Clone, Copy, Debug)]
 pub struct Shear {
     /// Cyclic, so that winding is kept: the axis after the longest one first, the longest one last.
-    origin: [f32; 3],
-    x: f32,
-    y: f32,
-    z: f32,
-    axis: usize,
+    pub(super) origin: [f32; 3],
+    pub(super) x: f32,
+    pub(super) y: f32,
+    pub(super) z: f32,
+    pub(super) axis: usize,
 }
 
 /// A triangle's corners seen from a ray, as columns: the test treats all three alike, at once. Fourth lanes are void.
@@ -24,7 +24,8 @@ struct Corners {
 }
 
 /// v with component `axis` last.
-fn axis_last<T: Copy>([x, y, z]: [T; 3], axis: usize) -> [T; 3] {
+#[inline(always)]
+pub(super) fn axis_last<T: Copy>([x, y, z]: [T; 3], axis: usize) -> [T; 3] {
     match axis {
         0 => [y, z, x],
         1 => [z, x, y],

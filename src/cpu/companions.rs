@@ -1,0 +1,30 @@
+//! Which rays go through the tree together: neighbours that point the same way; of the others, such as do.
+
+use glam::Vec3;
+
+use super::traverser::Probe;
+
+/// Rays among which companions are looked for: of more, those that point the same way start too far apart.
+pub const WINDOW: usize = 512;
+
+/// Neighbours that point into more octants than this share too little of their way to go together.
+const MOST_OCTANTS: u32 = 2;
+
+/// Whether neighbours are companions.
+pub fn point_the_same_way(neighbours: &[Probe]) -> bool {
+    let octant_of = |probe: &Probe| probe.ray.direction.is_negative_bitmask();
+    let octants = neighbours.iter().fold(0_u32, |octants, probe| octants | 1 << octant_of(probe));
+    octants.count_ones() <= MOST_OCTANTS
+}
+
+/// Octant, and the order of the components by magnitude: 48 classes of equal solid angle, numbered below 64.
+fn class_of(direction: Vec3) -> u32 {
+    let Vec3 { x, y, z } = direction.abs();
+    let order = u32::from(x > y) | u32::from(y > z) << 1 | u32::from(x > z) << 2;
+    direction.is_negative_bitmask() << 3 | order
+}
+
+/// Puts some of the rays, by their indices, into an order in which neighbours are companions.
+pub fn sort_by_direction(probes: &[Probe], ray_ixs: &mut [u32]) {
+    ray_ixs.sort_by_cached_key(|&ix| (class_of(probes[ix as usize].ray.direction), ix));
+}
