@@ -96,8 +96,7 @@ impl Tonemap {
 /// How a ray finds its way through the kd-tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Traversal {
-    /// A bit a level says which siblings are still to be visited; the eight newest are kept, parent links lead back to
-    /// older ones.
+    /// A bit a level says which siblings are still to be visited, and what waits there has its place in local memory.
     Mask,
     /// The paper's own: a bit a level says which siblings are done; their boxes tell whether to visit them.
     MaskBoxes,

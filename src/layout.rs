@@ -31,6 +31,7 @@ mod tests {
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
             BIND_KD_BOXES => Some("KdBox"),
             BIND_LEAF_PLANES => Some("Plane"),
+            BIND_KD_SLABS => Some("Slab"),
             BIND_CAST_RAYS => Some("CastRay"),
             BIND_PIXEL_FEATURES => Some("Feature"),
             BIND_COUNTERS => Some("Counters"),

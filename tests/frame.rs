@@ -25,5 +25,7 @@ mod parts;
 mod primaries;
 #[path = "frame/samples.rs"]
 mod samples;
+#[path = "frame/slabs.rs"]
+mod slabs;
 #[path = "frame/studio.rs"]
 mod studio;

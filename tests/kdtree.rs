@@ -164,7 +164,7 @@ fn statistics_of_a_split_by_hand() {
     assert!((statistics.sah_cost - (1.0 + 4.0 * 20.0 / 18.0)).abs() < 1e-3, "{statistics:?}");
     assert_eq!((statistics.n_nodes, statistics.n_leaves, statistics.n_empty_leaves), (3, 2, 0));
     assert_eq!((statistics.n_references, statistics.references_per_triangle, statistics.depth), (2, 1.0, 1));
-    assert_eq!(statistics.bytes, 4 * 8 + 2 * 4 + 2 * 4 + 2 * 16);
+    assert_eq!(statistics.bytes, 4 * 8 + 2 * 4 + 2 * 4 + 2 * 16 + 4 * 16);
 }
 
 #[test]

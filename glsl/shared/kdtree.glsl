@@ -14,8 +14,8 @@
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 
 layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
-// Whether the device runs both sides of a branch for all lanes, as software drivers do. A triangle's plane, looked at before
-// the triangle, then spares nothing, and tests are best done leaf by leaf.
+// Whether the device runs both sides of a branch for all lanes, as software drivers do. A slab, looked at before what is in
+// it, or a triangle's plane then spare nothing, and tests are best done leaf by leaf.
 layout(constant_id = 4) const bool RUNS_BOTH_SIDES = false;
 
 struct Cell {
@@ -107,6 +107,7 @@ uint first_child(TraversalRay ray, KdNode node) {
     return child_of(ray, node, false);
 }
 
+#include "slab.glsl"
 #include "pending_mask.glsl"
 #include "pending_stack.glsl"
 #include "pending_restart.glsl"
@@ -128,12 +129,14 @@ void push_pending(uint second_ix, Cell cell) {
     // These find out on the way back.
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;
-    if (TRAVERSAL == TRAVERSAL_STACK) stack_push(second_ix, cell);
+    if (TRAVERSAL == TRAVERSAL_MASK) mask_push(second_ix, cell);
+    else if (TRAVERSAL == TRAVERSAL_STACK) stack_push(second_ix, cell);
     else marked_push(second_ix, cell);
 }
 
 // The next pending cell that may hold a hit nearer than t_best, or false.
 bool pop_pending(TraversalRay ray, float t_best, inout Cell cell) {
+    if (TRAVERSAL == TRAVERSAL_MASK) return mask_pop(t_best, cell);
     if (TRAVERSAL == TRAVERSAL_STACK) return stack_pop(t_best, cell);
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return mask_boxes_pop(ray, t_best, cell);
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return backtrack_pop(ray, t_best, cell);
@@ -141,22 +144,26 @@ bool pop_pending(TraversalRay ray, float t_best, inout Cell cell) {
     return marked_pop(ray, t_best, cell);
 }
 
-// Down to the leaf where the ray enters the cell. A NaN fails both tests and goes to the first child: it ends.
-KdNode descend(TraversalRay ray, inout Cell cell) {
+// Down to the leaf where the ray enters the cell, or to a slab that it keeps clear of, as if that were an empty leaf. A NaN
+// fails both tests and goes to the first child: it ends.
+KdNode descend(TraversalRay ray, float t_best, inout Cell cell) {
     KdNode node = kd_node(cell.node_ix);
-    while (axis_of(node) != KD_LEAF) {
-        float t_cross = crossing(ray, node);
-        bool in_first = t_cross >= cell.t_enter;
-        bool in_second = t_cross <= cell.t_exit;
-        cell.depth += 1u;
-        cell.node_ix = child_of(ray, node, in_second && !in_first);
-        node = kd_node(cell.node_ix);
-        if (in_first && in_second) {
-            push_pending(cell.node_ix ^ 1u, cell);
-            cell.t_exit = t_cross;
+    for (;;) {
+        while (is_open_split(node)) {
+            float t_cross = crossing(ray, node);
+            bool in_first = t_cross >= cell.t_enter;
+            bool in_second = t_cross <= cell.t_exit;
+            cell.depth += 1u;
+            cell.node_ix = child_of(ray, node, in_second && !in_first);
+            node = kd_node(cell.node_ix);
+            if (in_first && in_second) {
+                push_pending(cell.node_ix ^ 1u, cell);
+                cell.t_exit = t_cross;
+            }
         }
+        if (!has_slab(node)) return node;
+        node = enter_slab(ray, t_best, cell, node);
     }
-    return node;
 }
 
 // A triangle against the ray; of two hits at one t the lower index wins, whatever the order of triangles.
@@ -167,25 +174,17 @@ void intersect(TraversalRay ray, uint triangle_ix, inout Hit best) {
     if (hit.t > ray.t_min && nearer && triangle_ix != ray.source_triangle) best = hit;
 }
 
-// A ray's way through a leaf: from t_middle - t_half to t_middle + t_half, with the entries that are still to be looked at.
+// A ray's way through a leaf, with the entries that are still to be looked at.
 struct Visit {
     uint entry_ix;
     uint end_ix;
-    float t_middle;
-    float t_half;
+    Stretch way;
 };
 
 Visit visit_leaf(KdNode leaf, float t_enter, float t_exit) {
     uint n_entries = leaf.axis_and_child >> KD_CHILD_SHIFT;
     count_steps(n_entries);
-    return Visit(leaf.split_or_first, leaf.split_or_first + n_entries, 0.5 * (t_enter + t_exit), 0.5 * (t_exit - t_enter));
-}
-
-// Whether the ray keeps to one side of a plane on its way, so far from it that no rounding of the hit test reaches across.
-bool is_clear(TraversalRay ray, Visit visit, vec4 plane) {
-    float height = dot(plane.xyz, ray.shear.origin) - plane.w;
-    float slope = dot(plane.xyz, ray.direction);
-    return abs(fma(visit.t_middle, slope, height)) > fma(visit.t_half, abs(slope), frame.plane_reach);
+    return Visit(leaf.split_or_first, leaf.split_or_first + n_entries, stretch(t_enter, t_exit));
 }
 
 // On to the leaf's next triangle whose plane the ray meets on its way. It may meet the others' planes elsewhere, in leaves
@@ -195,7 +194,7 @@ bool find_candidate(TraversalRay ray, inout Visit visit, out uint entry_ix) {
         entry_ix = visit.entry_ix;
         visit.entry_ix += 1u;
         if (RUNS_BOTH_SIDES) return true;
-        if (!is_clear(ray, visit, leaf_plane_at(entry_ix))) return true;
+        if (!is_clear(ray, visit.way, leaf_plane_at(entry_ix), frame.plane_reach)) return true;
     }
     return false;
 }
@@ -211,8 +210,8 @@ bool is_done(bool any_hit, Hit best) {
 
 Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
     KdNode leaf;
-    if (TRAVERSAL == TRAVERSAL_ROPES) leaf = descend_to_rope(ray, cell);
-    else leaf = descend(ray, cell);
+    if (TRAVERSAL == TRAVERSAL_ROPES) leaf = descend_to_rope(ray, t_best, cell);
+    else leaf = descend(ray, t_best, cell);
     return visit_leaf(leaf, cell.t_enter, min(cell.t_exit, t_best));
 }
 

@@ -25,8 +25,10 @@
 // KdNode.axis_and_child, bits 0..1: 0, 1, 2 = split axis, 3 = leaf.
 #define KD_LEAF 3u
 #define KD_AXIS_MASK 3u
-// Bits 2..31: first child of a split (the other is the next node), or number of triangles of a leaf.
-#define KD_CHILD_SHIFT 2u
+// Bit 2: the node has a slab, which is to be looked at first.
+#define KD_IN_SLAB 4u
+// Bits 3..31: first child of a split (the other is the next node), or number of triangles of a leaf.
+#define KD_CHILD_SHIFT 3u
 // Levels below the root that the traversal's bit mask can hold: one word's, and two words'.
 #define KD_WORD_DEPTH 32u
 #define KD_MAX_DEPTH 64u
@@ -88,6 +90,13 @@ struct KdNode {
 struct Plane {
     vec3 normal;
     float distance;
+};
+
+// 16 bytes: between two planes, whatever of its triangles comes near a node's cell (Kay, Kajiya: Ray Tracing Complex Scenes,
+// SIGGRAPH 1986). A point p lies in the slab where |dot(normal, p) - offset| <= 1: the shorter the normal, the thicker.
+struct Slab {
+    vec3 normal;
+    float offset;
 };
 
 // 24 bytes: a node's cell, world units. Only some traversals need it.
@@ -252,6 +261,7 @@ struct Addresses {
     uvec2 kd_parents;
     uvec2 leaf_triangles;
     uvec2 leaf_planes;
+    uvec2 kd_slabs;
     uvec2 kd_boxes;
     uvec2 kd_ropes;
 };
@@ -332,10 +342,11 @@ struct DriverCast {
 #define BIND_PIXEL_ACCUMULATED 25u
 #define BIND_PIXEL_FEATURES 26u
 #define BIND_ADDRESSES 27u
-#define N_BINDINGS 28u
+#define BIND_KD_SLABS 28u
+#define N_BINDINGS 29u
 
 // A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
-#define BIND_CAST_RAYS 28u
-#define BIND_CAST_HITS 29u
+#define BIND_CAST_RAYS 29u
+#define BIND_CAST_HITS 30u
 
 #endif

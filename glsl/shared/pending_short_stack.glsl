@@ -1,6 +1,6 @@
-// The newest pending subtrees on a short stack, a ring; older ones, which it has lost, by the mask: up to them by parent
-// links, or down to them from the root (Horn, Sugerman, Houston, Hanrahan: Interactive k-D Tree GPU Raytracing, I3D 2007;
-// there the ray restarts where it left the leaf). Most rays lose none.
+// The newest pending subtrees on a short stack, a ring; older ones, which it has lost, by the mask, down to them from the
+// root (Horn, Sugerman, Houston, Hanrahan: Interactive k-D Tree GPU Raytracing, I3D 2007; there the ray restarts where it
+// left the leaf). Most rays lose none.
 
 layout(constant_id = 5) const uint SHORT_STACK_SIZE = 8u;
 // Node, and the bits of where the ray leaves it.
@@ -32,7 +32,6 @@ bool marked_pop(TraversalRay ray, float t_best, inout Cell cell) {
     cell.t_enter = cell.t_exit;
     if (pending_mask == uvec2(0u) || t_best < cell.t_enter) return false;
     if (short_stack_size > 0u) short_stack_pop(cell);
-    else if (TRAVERSAL == TRAVERSAL_MASK) climb(ray, cell);
     else retrace(ray, cell);
     return true;
 }

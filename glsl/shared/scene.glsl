@@ -19,6 +19,7 @@ layout(std430, set = 0, binding = BIND_KD_NODES) readonly buffer KdNodesBlock { 
 layout(std430, set = 0, binding = BIND_KD_PARENTS) readonly buffer KdParentsBlock { uint kd_parents[]; };
 layout(std430, set = 0, binding = BIND_LEAF_TRIANGLES) readonly buffer LeafTrianglesBlock { uint leaf_triangles[]; };
 layout(std430, set = 0, binding = BIND_LEAF_PLANES) readonly buffer LeafPlanesBlock { vec4 leaf_planes[]; };
+layout(std430, set = 0, binding = BIND_KD_SLABS) readonly buffer KdSlabsBlock { vec4 kd_slabs[]; };
 layout(std430, set = 0, binding = BIND_KD_BOXES) readonly buffer KdBoxesBlock { KdBox kd_boxes[]; };
 layout(std430, set = 0, binding = BIND_KD_ROPES) readonly buffer KdRopesBlock { uint kd_ropes[]; };
 
@@ -67,6 +68,12 @@ uint leaf_triangle_at(uint entry_ix) {
 vec4 leaf_plane_at(uint entry_ix) {
     if (BY_ADDRESS) return Rows(addresses.leaf_planes).at[entry_ix];
     return leaf_planes[entry_ix];
+}
+
+// A Slab as a vector: normal, offset.
+vec4 kd_slab_of(uint node_ix) {
+    if (BY_ADDRESS) return Rows(addresses.kd_slabs).at[node_ix];
+    return kd_slabs[node_ix];
 }
 
 KdBox kd_box_of(uint node_ix) {

@@ -108,6 +108,7 @@ impl Inspection {
             ["nodes".to_owned(), tree.n_nodes.to_string()],
             ["leaves".to_owned(), tree.n_leaves.to_string()],
             ["empty leaves".to_owned(), tree.n_empty_leaves.to_string()],
+            ["slabs".to_owned(), tree.n_slabs.to_string()],
             ["depth".to_owned(), tree.depth.to_string()],
             ["references".to_owned(), tree.n_references.to_string()],
             ["references a triangle".to_owned(), format!("{:.2}", tree.references_per_triangle)],

@@ -2,9 +2,10 @@
 
 use super::{
     bindings::Bindings,
-    kdtree::{Cell, TraversalRay},
+    kdtree::{Cell, Pending, TraversalRay},
     table::Reads,
 };
+use crate::layout::KD_MAX_DEPTH;
 
 /// Which siblings on the way to the root are still to be visited. Bit d - 1: depth d; one word for the kernel's two.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -41,26 +42,37 @@ impl Mask {
     }
 }
 
-/// How a pending node is found that no stack has kept.
-pub trait WayBack {
-    /// The deepest pending node, which is pending no more, and where the ray leaves it. `cell` is the leaf just left.
-    fn find(mask: &mut Mask, bindings: &Bindings<impl Reads>, ray: &TraversalRay, cell: &mut Cell);
+/// The mask, and a cell's place for each level.
+pub struct PendingMask {
+    mask: Mask,
+    /// Of each depth: node, and where the ray leaves it. What the mask does not name is left over.
+    cells: [(u32, f32); KD_MAX_DEPTH as usize],
 }
 
-/// Up by parent links, and on to the plane where the cell ends.
-pub struct Climb;
+impl Pending for PendingMask {
+    fn new() -> Self {
+        Self { mask: Mask(0), cells: [(0, 0.0); KD_MAX_DEPTH as usize] }
+    }
 
-impl WayBack for Climb {
     #[inline(always)]
-    fn find(mask: &mut Mask, bindings: &Bindings<impl Reads>, ray: &TraversalRay, cell: &mut Cell) {
-        let parent_of = |node_ix: u32| bindings.kd_parents[(node_ix >> 1) as usize];
-        let ancestor_of = |node_ix: u32, n_levels: u32| (0..n_levels).fold(node_ix, |ix, _| parent_of(ix));
-        let depth = mask.take_deepest();
-        let path_ix = ancestor_of(cell.node_ix, cell.depth - depth);
-        *cell = Cell { node_ix: path_ix ^ 1, depth, t_exit: ray.t_exit, ..*cell };
-        if !mask.is_empty() {
-            let next_ix = ancestor_of(path_ix, depth - mask.deepest());
-            cell.t_exit = ray.crossing(bindings.kd_nodes[parent_of(next_ix) as usize]);
+    fn clear(&mut self) {
+        self.mask = Mask(0);
+    }
+
+    #[inline(always)]
+    fn push(&mut self, second_ix: u32, cell: &Cell) {
+        self.mask.0 |= bit_of(cell.depth);
+        self.cells[cell.depth as usize - 1] = (second_ix, cell.t_exit);
+    }
+
+    #[inline(always)]
+    fn pop(&mut self, _: &Bindings<impl Reads>, _: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+        cell.t_enter = cell.t_exit;
+        if self.mask.is_empty() || t_best < cell.t_enter {
+            return false;
         }
+        cell.depth = self.mask.take_deepest();
+        (cell.node_ix, cell.t_exit) = self.cells[cell.depth as usize - 1];
+        true
     }
 }

@@ -1,28 +1,26 @@
 //! The newest pending subtrees on a ring, older ones by the mask. Twin of `pending_short_stack.glsl`.
 
-use std::marker::PhantomData;
-
 use super::{
     bindings::Bindings,
     kdtree::{Cell, Pending, TraversalRay},
-    pending_mask::{Mask, WayBack, bit_of},
+    pending_mask::{Mask, bit_of},
+    pending_restart::retrace,
     table::Reads,
 };
 
-/// The `N` newest entries (a power of two, or none), the mask of all, and the way back to older ones.
-pub struct PendingMarked<W, const N: usize> {
+/// The `N` newest entries (a power of two, or none) and the mask of all.
+pub struct PendingMarked<const N: usize> {
     mask: Mask,
     /// Node, and where the ray leaves it.
     entries: [(u32, f32); N],
     /// Where the next entry goes, and how many are kept.
     top: usize,
     size: usize,
-    way_back: PhantomData<W>,
 }
 
-impl<W: WayBack, const N: usize> Pending for PendingMarked<W, N> {
+impl<const N: usize> Pending for PendingMarked<N> {
     fn new() -> Self {
-        Self { mask: Mask(0), entries: [(0, 0.0); N], top: 0, size: 0, way_back: PhantomData }
+        Self { mask: Mask(0), entries: [(0, 0.0); N], top: 0, size: 0 }
     }
 
     #[inline(always)]
@@ -54,7 +52,7 @@ impl<W: WayBack, const N: usize> Pending for PendingMarked<W, N> {
             (cell.node_ix, cell.t_exit) = self.entries[self.top & N.wrapping_sub(1)];
             cell.depth = self.mask.take_deepest();
         } else {
-            W::find(&mut self.mask, bindings, ray, cell);
+            retrace(&mut self.mask, bindings, ray, cell);
         }
         true
     }

@@ -14,9 +14,8 @@ use super::{
     packet::LANES,
     packet_traverser::PacketTraverser,
     pending_backtrack::PendingBacktrack,
-    pending_mask::Climb,
+    pending_mask::PendingMask,
     pending_mask_boxes::PendingMaskBoxes,
-    pending_restart::Retrace,
     pending_short_stack::PendingMarked,
     ropes::follow_ropes,
     table::Reads,
@@ -49,11 +48,11 @@ impl Probe {
 /// A traversal that remembers its working memory from ray to ray; one for each thread.
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
 pub enum Traverser {
-    Mask(PendingMarked<Climb, 8>),
+    Mask(PendingMask),
     MaskBoxes(PendingMaskBoxes),
-    Restart(PendingMarked<Retrace, 0>),
+    Restart(PendingMarked<0>),
     Backtrack(PendingBacktrack),
-    ShortStack(PendingMarked<Retrace, 8>),
+    ShortStack(PendingMarked<8>),
     Ropes,
     Stack(PacketTraverser),
     Brute,

@@ -21,8 +21,8 @@ const TASK_REFERENCES: usize = 4096;
 const CHUNK: usize = 1 << 15;
 /// References that the budget allows in any case.
 const MIN_BUDGET: u64 = 1024;
-/// Cutting off empty space makes up to 14 nodes a reference; so many references stay below the 2^30 nodes of a link.
-const MAX_BUDGET: u64 = 1 << 26;
+/// Cutting off empty space makes up to 14 nodes a reference; so many references stay below the 2^29 nodes of a link.
+const MAX_BUDGET: u64 = 1 << 25;
 
 /// The upper part of a tree.
 pub enum Top {
@@ -49,6 +49,9 @@ impl KdTree {
         let cell = Cell { bounds, level: 0, budget };
         let mut tree = flatten(grow(Input { triangles, options, margin }, references, cell), bounds);
         tree.leaf_planes = planes_of(triangles, &tree.leaf_triangles);
+        if options.slabs {
+            tree.add_slabs(triangles);
+        }
         tree
     }
 }

@@ -1,4 +1,5 @@
-//! "Perfect splits" (Havran 2000): the bounds of what a plane leaves of a triangle in a cell on either side.
+//! What of a triangle comes near a cell, and "perfect splits" (Havran 2000): the bounds of what a plane leaves of that on
+//! either side.
 //!
 //! Sutherland-Hodgman in f64: coordinates are f32, so a computed point is off by some 2^-52 of them, which the margin is
 //! larger than by far.
@@ -10,7 +11,7 @@ use crate::layout::Triangle;
 const MAX_CORNERS: usize = 9;
 
 /// A convex polygon.
-struct Polygon {
+pub struct Polygon {
     corners: [[f64; 3]; MAX_CORNERS],
     len: usize,
 }
@@ -18,20 +19,31 @@ struct Polygon {
 /// Bounds of the parts of `triangle` below and above a plane through the cell, all grown by a margin: of what comes
 /// within the margin of the cell, and of the plane from its other side. None: no such part.
 pub fn split_bounds(triangle: &Triangle, cell: &Bounds, plane: (usize, f32), margin: f32) -> [Option<Bounds>; 2] {
-    let corner = |v: glam::Vec3| v.as_dvec3().to_array();
-    let mut polygon = Polygon { corners: [[0.0; 3]; MAX_CORNERS], len: 3 };
-    polygon.corners[..3].copy_from_slice(&[corner(triangle.v0), corner(triangle.v1), corner(triangle.v2)]);
-    let margin = f64::from(margin);
-    for face in 0..3 {
-        polygon.clip::<false>(face, f64::from(cell.min[face]) - margin);
-        polygon.clip::<true>(face, f64::from(cell.max[face]) + margin);
-    }
-    let (axis, position) = (plane.0, f64::from(plane.1));
+    let polygon = Polygon::near(triangle, cell, margin);
+    let (axis, position, margin) = (plane.0, f64::from(plane.1), f64::from(margin));
     [polygon.bounds_in::<true>(axis, position + margin), polygon.bounds_in::<false>(axis, position - margin)]
         .map(|part| part.grown(margin))
 }
 
 impl Polygon {
+    /// The part of `triangle` within a margin of a cell.
+    pub fn near(triangle: &Triangle, cell: &Bounds, margin: f32) -> Self {
+        let corner = |v: glam::Vec3| v.as_dvec3().to_array();
+        let mut polygon = Polygon { corners: [[0.0; 3]; MAX_CORNERS], len: 3 };
+        polygon.corners[..3].copy_from_slice(&[corner(triangle.v0), corner(triangle.v1), corner(triangle.v2)]);
+        let margin = f64::from(margin);
+        for face in 0..3 {
+            polygon.clip::<false>(face, f64::from(cell.min[face]) - margin);
+            polygon.clip::<true>(face, f64::from(cell.max[face]) + margin);
+        }
+        polygon
+    }
+
+    /// In order; none where no such part is.
+    pub fn corners(&self) -> &[[f64; 3]] {
+        &self.corners[..self.len]
+    }
+
     /// Cuts off what lies above (`KEEP_BELOW`) or below a plane.
     fn clip<const KEEP_BELOW: bool>(&mut self, axis: usize, position: f64) {
         let outside = |p: &[f64; 3]| if KEEP_BELOW { p[axis] > position } else { p[axis] < position };

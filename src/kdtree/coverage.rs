@@ -1,5 +1,5 @@
-//! Is every triangle in all leaves whose cells it comes near? By cutting up each one, in f64 and independently of the
-//! builder's own clipping.
+//! Is every triangle in all leaves whose cells it comes near, and in the slabs on the way there? By cutting up each one, in
+//! f64 and independently of the builder's own clipping.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -17,35 +17,55 @@ struct Descent<'a> {
     triangle_ix: u32,
     /// World units.
     margin: f64,
+    /// How far slabs reach beyond their triangles, world units.
+    reach: f64,
 }
 
-/// The first triangle, by index, that a leaf within `margin` lacks.
+/// What a node does not have of a triangle.
+enum Lack {
+    Entry(u32),
+    Slab(u32),
+}
+
+/// The first triangle, by index, that a leaf within `margin` lacks, or a node's slab.
 pub fn check(tree: &KdTree, triangles: &[Triangle], margin: f32) -> Result<(), Invalid> {
+    let reach = CHECKED * f64::from(tree.constants().plane_reach);
     let missing = triangles.par_iter().enumerate().find_map_first(|(ix, triangle)| {
         let corners = [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3());
-        let descent = Descent { tree, triangle_ix: ix as u32, margin: CHECKED * f64::from(margin) };
-        let node = if is_finite(triangle) { descent.leaf_without_it(0, &corners) } else { None };
-        node.map(|node| Invalid::Missing { node, triangle: ix as u32 })
+        let descent = Descent { tree, triangle_ix: ix as u32, margin: CHECKED * f64::from(margin), reach };
+        let lack = if is_finite(triangle) { descent.lack_below(0, &corners) } else { None };
+        lack.map(|lack| match lack {
+            Lack::Entry(node) => Invalid::Missing { node, triangle: ix as u32 },
+            Lack::Slab(node) => Invalid::OutsideSlab { node, triangle: ix as u32 },
+        })
     });
     missing.map_or(Ok(()), Err)
 }
 
 impl Descent<'_> {
-    /// The first leaf below a node that comes near a polygon and does not have the triangle.
-    fn leaf_without_it(&self, node: u32, polygon: &[DVec3]) -> Option<u32> {
+    /// The first node, from one down, that comes near a polygon: a leaf that does not have the triangle, or any with a slab
+    /// out of which the polygon reaches.
+    fn lack_below(&self, node: u32, polygon: &[DVec3]) -> Option<Lack> {
         if polygon.is_empty() {
             return None;
+        }
+        if let Some(slab) = self.tree.slab_of(node) {
+            let (normal, offset) = (slab.normal.as_dvec3(), f64::from(slab.offset));
+            let room = 1.0 - self.reach * normal.length();
+            if polygon.iter().any(|&corner| (normal.dot(corner) - offset).abs() > room) {
+                return Some(Lack::Slab(node));
+            }
         }
         match self.tree.node(node) {
             Node::Leaf { first, count } => {
                 let entries = &self.tree.leaf_triangles[first as usize..][..count as usize];
-                entries.binary_search(&self.triangle_ix).is_err().then_some(node)
+                entries.binary_search(&self.triangle_ix).is_err().then_some(Lack::Entry(node))
             }
             Node::Split { axis, position, child } => {
                 let above_plane = |v: DVec3| v[axis] - f64::from(position);
                 let near_below = clip(polygon, |v| self.margin - above_plane(v));
                 let near_above = clip(polygon, |v| self.margin + above_plane(v));
-                self.leaf_without_it(child, &near_below).or_else(|| self.leaf_without_it(child + 1, &near_above))
+                self.lack_below(child, &near_below).or_else(|| self.lack_below(child + 1, &near_above))
             }
         }
     }

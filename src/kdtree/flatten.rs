@@ -11,6 +11,7 @@ pub fn flatten(top: Top, cell: Bounds) -> KdTree {
         parents: vec![0],
         leaf_triangles: Vec::new(),
         leaf_planes: Vec::new(),
+        slabs: Vec::new(),
         cell_min: Vec3::from_array(cell.min),
         cell_max: Vec3::from_array(cell.max),
         depth: 0,

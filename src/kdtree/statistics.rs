@@ -12,6 +12,8 @@ pub struct Statistics {
     pub n_leaves: u64,
     /// Leaves without triangles.
     pub n_empty_leaves: u64,
+    /// Nodes with a slab around their triangles.
+    pub n_slabs: u64,
     /// Levels below the root.
     pub depth: u32,
     /// Entries of all leaves.
@@ -21,7 +23,7 @@ pub struct Statistics {
     /// Expected cost of a ray that crosses the root's cell, in the unit of the build's costs (MacDonald and Booth 1990):
     /// the sum over all nodes of their own cost times the share of the root's surface that their cell has.
     pub sah_cost: f64,
-    /// Nodes, parents, and leaves with their planes, in memory.
+    /// Nodes, parents, leaves with their planes, and slabs, in memory.
     pub bytes: u64,
 }
 
@@ -35,7 +37,8 @@ impl KdTree {
             bytes: (size_of_val(&*self.nodes)
                 + size_of_val(&*self.parents)
                 + size_of_val(&*self.leaf_triangles)
-                + size_of_val(&*self.leaf_planes)) as u64,
+                + size_of_val(&*self.leaf_planes)
+                + size_of_val(&*self.slabs)) as u64,
             ..Default::default()
         };
         let root = (self.cell_min.as_dvec3().to_array(), self.cell_max.as_dvec3().to_array());
@@ -45,6 +48,7 @@ impl KdTree {
             // A cell without a surface (a point, a line) counts like the root itself.
             let share = if root_area > 0.0 { half_area(&min, &max) / root_area } else { 1.0 };
             statistics.n_nodes += 1;
+            statistics.n_slabs += u64::from(self.is_in_slab(node_ix));
             match self.node(node_ix) {
                 Node::Leaf { count, .. } => {
                     statistics.n_leaves += 1;

@@ -41,6 +41,10 @@ pub enum Invalid {
     Missing { node: u32, triangle: u32 },
     #[error("leaf_planes are not those of leaf_triangles")]
     Planes,
+    #[error("node {node} is said to be in a slab, but there are {slabs}")]
+    NoSlab { node: u32, slabs: usize },
+    #[error("node {node}: triangle {triangle} reaches out of its slab")]
+    OutsideSlab { node: u32, triangle: u32 },
 }
 
 impl KdTree {
@@ -91,6 +95,10 @@ impl<'a> Walk<'a> {
         let mut stack = vec![(0, 0, root)];
         self.seen[1] = true;
         while let Some((node, level, cell)) = stack.pop() {
+            let slabs = self.tree.slabs.len();
+            if self.tree.is_in_slab(node) && node as usize >= slabs {
+                return Err(Invalid::NoSlab { node, slabs });
+            }
             if std::mem::replace(&mut self.seen[node as usize], true) {
                 return Err(Invalid::Shared { node });
             }

@@ -10,13 +10,14 @@ use crate::{
     kdtree::{Extras, KdTree},
     layout::{
         Addresses, BIND_ADDRESSES, BIND_FRAME, BIND_KD_BOXES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_ROPES,
-        BIND_LEAF_PLANES, BIND_LEAF_TRIANGLES, BIND_TRIANGLE_MATERIALS, BIND_TRIANGLES, BRUTE_MAX_TRIANGLES,
-        CONSTANT_BY_ADDRESS, CONSTANT_MASK_WORDS, Frame, KD_WORD_DEPTH, KdBox, KdNode, Plane, Triangle,
+        BIND_KD_SLABS, BIND_LEAF_PLANES, BIND_LEAF_TRIANGLES, BIND_TRIANGLE_MATERIALS, BIND_TRIANGLES,
+        BRUTE_MAX_TRIANGLES, CONSTANT_BY_ADDRESS, CONSTANT_MASK_WORDS, Frame, KD_WORD_DEPTH, KdBox, KdNode, Plane,
+        Slab, Triangle,
     },
 };
 
 /// The bindings' numbers.
-pub(super) const BINDINGS: [u32; 10] = [
+pub(super) const BINDINGS: [u32; 11] = [
     BIND_FRAME,
     BIND_ADDRESSES,
     BIND_TRIANGLES,
@@ -25,6 +26,7 @@ pub(super) const BINDINGS: [u32; 10] = [
     BIND_KD_PARENTS,
     BIND_LEAF_TRIANGLES,
     BIND_LEAF_PLANES,
+    BIND_KD_SLABS,
     BIND_KD_BOXES,
     BIND_KD_ROPES,
 ];
@@ -47,6 +49,8 @@ pub struct Tree {
     pub leaf_triangles: Buffer<u32>,
     /// One an entry of `leaf_triangles`.
     pub leaf_planes: Buffer<Plane>,
+    /// One a node, or none.
+    pub kd_slabs: Buffer<Slab>,
     /// One a node, after `add_extras`.
     pub kd_boxes: Buffer<KdBox>,
     /// Six a node, after `add_extras`.
@@ -78,6 +82,7 @@ impl Tree {
             kd_parents: Buffer::with(context, "kd_parents", &tree.parents, usage)?,
             leaf_triangles: Buffer::with(context, "leaf_triangles", &tree.leaf_triangles, usage)?,
             leaf_planes: Buffer::with(context, "leaf_planes", &tree.leaf_planes, usage)?,
+            kd_slabs: Buffer::with(context, "kd_slabs", &tree.slabs, usage)?,
             kd_boxes: Buffer::new(context, "kd_boxes", 0, usage)?,
             kd_ropes: Buffer::new(context, "kd_ropes", 0, usage)?,
             usage,
@@ -132,6 +137,7 @@ impl Tree {
             kd_parents: self.address_of(&self.kd_parents),
             leaf_triangles: self.address_of(&self.leaf_triangles),
             leaf_planes: self.address_of(&self.leaf_planes),
+            kd_slabs: self.address_of(&self.kd_slabs),
             kd_boxes: self.address_of(&self.kd_boxes),
             kd_ropes: self.address_of(&self.kd_ropes),
         }
@@ -153,6 +159,7 @@ impl Tree {
             self.kd_parents.any(),
             self.leaf_triangles.any(),
             self.leaf_planes.any(),
+            self.kd_slabs.any(),
             self.kd_boxes.any(),
             self.kd_ropes.any(),
         ];
@@ -170,6 +177,7 @@ fn most_bytes(triangles: &[Triangle], tree: &KdTree) -> usize {
         size_of_val(&*tree.parents),
         size_of_val(&*tree.leaf_triangles),
         size_of_val(&*tree.leaf_planes),
+        size_of_val(&*tree.slabs),
         n_nodes * size_of::<KdBox>(),
         n_nodes * ROPES_BYTES,
     ];

@@ -43,6 +43,7 @@ fn scene_bytes(tree: &Tree, traversal: Traversal) -> Vec<u64> {
         tree.kd_parents.any(),
         tree.leaf_triangles.any(),
         tree.leaf_planes.any(),
+        tree.kd_slabs.any(),
     ];
     let has_boxes = matches!(traversal, Traversal::MaskBoxes | Traversal::Backtrack | Traversal::Ropes);
     buffers.extend(has_boxes.then(|| tree.kd_boxes.any()));

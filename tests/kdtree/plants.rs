@@ -3,7 +3,7 @@
 use glam::Vec3;
 use kdray::{
     kdtree::{BuildOptions, Invalid, KdTree, Node},
-    layout::{KD_MAX_DEPTH, KdNode, Triangle},
+    layout::{KD_MAX_DEPTH, KdNode, Slab, Triangle},
 };
 
 use crate::meshes::{boxed, room, triangle};
@@ -110,7 +110,11 @@ fn a_moved_split() {
     };
     for share in [1e-3, 0.5, -0.01] {
         let found = after(share);
-        assert!(matches!(found, Invalid::Missing { .. } | Invalid::Stray { .. } | Invalid::Position { .. }), "{found}");
+        let is_found = matches!(
+            found,
+            Invalid::Missing { .. } | Invalid::Stray { .. } | Invalid::Position { .. } | Invalid::OutsideSlab { .. }
+        );
+        assert!(is_found, "{found}");
     }
     for share in [2.0, f32::NAN, f32::INFINITY] {
         assert!(matches!(after(share), Invalid::Position { node: 0, .. }), "{share}");
@@ -152,7 +156,7 @@ fn a_used_second_node() {
 
 #[test]
 fn a_child_that_cannot_be_one() {
-    for wrong in [0, 1, u32::MAX >> 2, 1 << 28] {
+    for wrong in [0, 1, u32::MAX >> 3, 1 << 28] {
         let found = Plant::new().after(|tree| {
             let (node, axis, position, _) = last_split(tree);
             set(tree, node, Node::Split { axis, position, child: wrong });
@@ -224,6 +228,35 @@ fn wrong_leaf_ranges() {
 fn a_wrong_plane() {
     assert_eq!(Plant::new().after(|tree| tree.leaf_planes[5].distance += 1e-3), Invalid::Planes);
     assert_eq!(Plant::new().after(|tree| tree.leaf_planes.truncate(9)), Invalid::Planes);
+}
+
+/// A node with a slab, and that.
+fn last_slab(tree: &KdTree) -> (u32, Slab) {
+    let slab = |node| tree.slab_of(node).map(|slab| (node, *slab));
+    (0..tree.nodes.len() as u32).rev().find_map(slab).expect("a slab")
+}
+
+#[test]
+fn a_slab_too_thin_or_elsewhere() {
+    let change: [fn(&mut Slab); 4] = [
+        |slab| slab.offset += 1.0,
+        |slab| slab.offset -= 0.2,
+        |slab| *slab = Slab { normal: 1.5 * slab.normal, offset: 1.5 * slab.offset },
+        |slab| slab.normal = slab.normal.any_orthogonal_vector(),
+    ];
+    for change in change {
+        let found = Plant::new().after(|tree| {
+            let (node, _) = last_slab(tree);
+            change(&mut tree.slabs[node as usize]);
+        });
+        assert!(matches!(found, Invalid::OutsideSlab { .. }), "{found}");
+    }
+}
+
+#[test]
+fn a_slab_that_is_not_there() {
+    let found = Plant::new().after(|tree| tree.slabs.clear());
+    assert!(matches!(found, Invalid::NoSlab { slabs: 0, .. }), "{found}");
 }
 
 #[test]

@@ -1,0 +1,178 @@
+//! A slab around the surface in a cell, between two parallel planes (Kay, Kajiya: Ray Tracing Complex Scenes, SIGGRAPH 1986).
+//! A ray that passes by a surface goes through many cells that have a part of it; where it keeps clear of a cell's slab it
+//! need not go down to the leaves.
+//!
+//! A slab holds what comes within the tree's margin (bounds.rs) of the cell, and reaches `KD_PLANE_REACH` beyond: as far as
+//! a ray has to keep from a triangle's plane, and for the same reasons (planes.rs), but that rounding moves a slab by 5 of
+//! the units there, where a plane is off by 4.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::{KdTree, Node, bounds::Bounds, clip::Polygon};
+use crate::layout::{KD_IN_SLAB, Slab, Triangle};
+
+/// Entries below a node at most: on the way down, the first node with no more than each of these gets a slab, if the surface
+/// there is flat enough to be passed by. Larger pieces hardly are (benches/EXPERIMENTS.md).
+const MOST_ENTRIES: [u32; 5] = [4, 16, 64, 256, LARGEST_PATCH];
+const LARGEST_PATCH: u32 = 1024;
+/// Entries of a leaf at least; a single one's plane does as well.
+const LEAF_ENTRIES: u32 = 2;
+/// Of the longest side of a cell: how thick the slab of a split may be, and of a leaf.
+const THICKEST_SPLIT: f64 = 0.2;
+const THICKEST_LEAF: f64 = 0.3;
+
+/// The slabs of a tree's nodes: index, slab.
+type Slabs = Vec<(u32, Slab)>;
+
+impl KdTree {
+    /// Looks for flat pieces of the surface, and gives their nodes slabs.
+    ///
+    /// The same triangles and tree give the same slabs on any number of threads. Some 200 ns an entry of the leaves.
+    pub fn add_slabs(&mut self, triangles: &[Triangle]) {
+        let bounds = Bounds { min: self.cell_min.to_array(), max: self.cell_max.to_array() };
+        // The root's cell has the margin around it already: this one is larger by 2^-17 of itself.
+        let margin = bounds.margin();
+        let reach = f64::from(self.constants().plane_reach);
+        let fitting = Fitting { tree: self, triangles, n_entries: self.entries_below(), margin, reach };
+        let slabs: Vec<Slabs> = fitting.patches(bounds).par_iter().map(|patch| fitting.slabs_of(patch)).collect();
+        self.slabs = vec![Slab::default(); self.nodes.len()];
+        for (node, slab) in slabs.into_iter().flatten() {
+            self.slabs[node as usize] = slab;
+            self.nodes[node as usize].axis_and_child |= KD_IN_SLAB;
+        }
+    }
+
+    /// The node's, if it has one.
+    pub fn slab_of(&self, node_ix: u32) -> Option<&Slab> {
+        self.is_in_slab(node_ix).then(|| &self.slabs[node_ix as usize])
+    }
+
+    pub(super) fn is_in_slab(&self, node_ix: u32) -> bool {
+        self.nodes[node_ix as usize].axis_and_child & KD_IN_SLAB != 0
+    }
+
+    /// Of each node: entries of all leaves below.
+    fn entries_below(&self) -> Vec<u32> {
+        let mut n_entries = vec![0; self.nodes.len()];
+        // Children come after their parents.
+        for node in (0..self.nodes.len()).rev() {
+            n_entries[node] = match self.node(node as u32) {
+                Node::Leaf { count, .. } => count,
+                Node::Split { child, .. } => n_entries[child as usize] + n_entries[child as usize + 1],
+            };
+        }
+        n_entries
+    }
+}
+
+/// A node and its cell.
+struct Patch {
+    node: u32,
+    cell: Bounds,
+}
+
+struct Fitting<'a> {
+    tree: &'a KdTree,
+    triangles: &'a [Triangle],
+    n_entries: Vec<u32>,
+    /// World units.
+    margin: f32,
+    /// World units.
+    reach: f64,
+}
+
+/// What the leaves below a node have of the surface.
+#[derive(Default)]
+struct Surface {
+    /// Of all polygons, leaf after leaf.
+    corners: Vec<DVec3>,
+    slabs: Slabs,
+}
+
+impl Fitting<'_> {
+    /// The largest pieces that may get a slab.
+    fn patches(&self, root: Bounds) -> Vec<Patch> {
+        let mut patches = Vec::new();
+        let mut stack = vec![Patch { node: 0, cell: root }];
+        while let Some(patch) = stack.pop() {
+            match self.tree.node(patch.node) {
+                Node::Split { axis, position, child } if self.n_entries[patch.node as usize] > LARGEST_PATCH => {
+                    let [below, above] = patch.cell.split(axis, position);
+                    stack.extend([Patch { node: child, cell: below }, Patch { node: child + 1, cell: above }]);
+                }
+                _ => patches.push(patch),
+            }
+        }
+        patches
+    }
+
+    fn slabs_of(&self, patch: &Patch) -> Slabs {
+        let mut surface = Surface::default();
+        self.fit(patch, u32::MAX, &mut surface);
+        surface.slabs
+    }
+
+    /// Adds what is below a node to the surface, and its slabs; `n_above`: entries below the parent. Returns the sum of its
+    /// areas as vectors, turned to one side.
+    fn fit(&self, patch: &Patch, n_above: u32, surface: &mut Surface) -> DVec3 {
+        let (n_entries, first_corner) = (self.n_entries[patch.node as usize], surface.corners.len());
+        let (area, thickest) = match self.tree.node(patch.node) {
+            Node::Leaf { first, count } => {
+                let entries = &self.tree.leaf_triangles[first as usize..][..count as usize];
+                let area = entries.iter().fold(DVec3::ZERO, |area, &ix| {
+                    let polygon = Polygon::near(&self.triangles[ix as usize], &patch.cell, self.margin);
+                    towards(area, surface.add(&polygon))
+                });
+                (area, if count >= LEAF_ENTRIES { THICKEST_LEAF } else { 0.0 })
+            }
+            Node::Split { axis, position, child } => {
+                let [below, above] = patch.cell.split(axis, position);
+                let below = self.fit(&Patch { node: child, cell: below }, n_entries, surface);
+                let above = self.fit(&Patch { node: child + 1, cell: above }, n_entries, surface);
+                let is_first = MOST_ENTRIES.iter().any(|&most| n_entries <= most && most < n_above);
+                (towards(below, above), if is_first { THICKEST_SPLIT } else { 0.0 })
+            }
+        };
+        if thickest > 0.0 && n_entries > 0 {
+            let longest = patch.cell.extent().into_iter().fold(0.0, f64::max);
+            let slab = self.slab_around(&surface.corners[first_corner..], area, thickest * longest);
+            surface.slabs.extend(slab.map(|slab| (patch.node, slab)));
+        }
+        area
+    }
+
+    /// Across the surface's mean normal; none if the surface is thicker, or faces all ways alike.
+    fn slab_around(&self, corners: &[DVec3], area: DVec3, thickest: f64) -> Option<Slab> {
+        let across = area.try_normalize()?;
+        let (low, high) = extent_along(corners, across);
+        if high - low > thickest {
+            return None;
+        }
+        let half = 0.5 * (high - low) + self.reach;
+        let slab = Slab { normal: (across / half).as_vec3(), offset: (0.5 * (low + high) / half) as f32 };
+        (slab.normal.is_finite() && slab.offset.is_finite()).then_some(slab)
+    }
+}
+
+impl Surface {
+    /// Returns the polygon's area as a vector.
+    fn add(&mut self, polygon: &Polygon) -> DVec3 {
+        let first_corner = self.corners.len();
+        self.corners.extend(polygon.corners().iter().map(|&corner| DVec3::from_array(corner)));
+        let Some((&apex, rest)) = self.corners[first_corner..].split_first() else { return DVec3::ZERO };
+        rest.windows(2).map(|edge| (edge[0] - apex).cross(edge[1] - apex)).sum()
+    }
+}
+
+/// The sum of two areas, the second turned to the side of the first.
+fn towards(area: DVec3, other: DVec3) -> DVec3 {
+    if area.dot(other) < 0.0 { area - other } else { area + other }
+}
+
+fn extent_along(corners: &[DVec3], direction: DVec3) -> (f64, f64) {
+    corners.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), corner| {
+        let height = corner.dot(direction);
+        (if height < low { height } else { low }, if height > high { height } else { high })
+    })
+}

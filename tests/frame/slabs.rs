@@ -1,0 +1,63 @@
+//! Slabs spare rays steps, and change nothing else.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use kdray::{
+    frame::{Picture, Primary, RenderOptions, Traversal},
+    gpu::{Context, ContextOptions},
+    kdtree::{BuildOptions, KdTree},
+    render::Renderer,
+    scene::Scene,
+};
+
+use super::studio::{assert_silent, identical, options};
+use crate::support::{meshes, scenes};
+
+/// One whose kernels look at slabs, whatever the driver.
+fn device() -> Arc<Context> {
+    Context::with_lanes(&ContextOptions { device: None, validate: true }, 0).expect("a device with validation")
+}
+
+/// A mirror of many small triangles, which rays graze.
+fn scene() -> Scene {
+    let mut scene = scenes::mixed();
+    scenes::add(&mut scene, meshes::torus(120, 60), scenes::mirror(Vec3::splat(0.8)));
+    scene
+}
+
+/// The picture, and the steps of all its rays.
+fn render(context: &Arc<Context>, scene: &Scene, tree: &KdTree, traversal: Traversal) -> (Picture, u64) {
+    let options = RenderOptions { primary: Primary::Trace, features: true, traversal, ..options(40, 30, 3) };
+    let mut renderer = Renderer::new(context.clone(), scene, tree, &options).expect("a renderer");
+    let picture = renderer.render().expect("a frame").0;
+    let features = renderer.features().expect("features");
+    (picture, features.iter().map(|feature| u64::from(feature.n_steps)).sum())
+}
+
+#[test]
+fn slabs_spare_steps_and_change_no_bit() {
+    let (scene, context) = (scene(), device());
+    let [with, without] =
+        [true, false].map(|slabs| KdTree::build(&scene.triangles, &BuildOptions { slabs, ..Default::default() }));
+    assert!(without.slabs.is_empty());
+    for &traversal in Traversal::ALL.iter().filter(|&&traversal| traversal != Traversal::Brute) {
+        let ((expected, all), (found, some)) =
+            (render(&context, &scene, &without, traversal), render(&context, &scene, &with, traversal));
+        assert!(identical(&expected, &found), "{traversal}");
+        // Ropes lead to leaves, whose own slabs are all that they look at.
+        let most = if traversal == Traversal::Ropes { 2 * all } else { all * 97 / 100 };
+        assert!(some < most, "{traversal}: {some} steps of {all}");
+    }
+    assert_silent(&context);
+}
+
+/// What the test above rests on.
+#[test]
+fn slabs_beside_their_surface_lose_it() {
+    let (scene, context) = (scene(), device());
+    let mut tree = KdTree::build(&scene.triangles, &BuildOptions::default());
+    let (expected, _) = render(&context, &scene, &tree, Traversal::Mask);
+    tree.slabs.iter_mut().for_each(|slab| slab.offset += 2.0);
+    assert!(!identical(&expected, &render(&context, &scene, &tree, Traversal::Mask).0));
+}
