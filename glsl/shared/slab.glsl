@@ -25,7 +25,8 @@ bool is_open_split(KdNode node) {
 }
 
 bool has_slab(KdNode node) {
-    return !RUNS_BOTH_SIDES && (node.axis_and_child & KD_IN_SLAB) != 0u;
+    if (RUNS_BOTH_SIDES) return false;
+    return (node.axis_and_child & KD_IN_SLAB) != 0u;
 }
 
 // The node as it is within its slab; an empty leaf, if the ray does not come into that in its way through the cell.
