@@ -49,7 +49,7 @@ pub struct KdTree {
     pub leaf_triangles: Vec<u32>,
     /// The plane of each of `leaf_triangles`; without any, every triangle of a leaf is tested.
     pub leaf_planes: Vec<Plane>,
-    /// Of each node that is marked as being in one; without any, none is.
+    /// One a node, zeros where that is not marked as having one; or none, if no node is.
     pub slabs: Vec<Slab>,
     /// The root's cell is the exact bounds of all triangles (a box of zeros for none).
     pub cell_min: Vec3,
