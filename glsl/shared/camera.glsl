@@ -9,12 +9,20 @@ uint every_second_bit(uint n) {
     return (n & 1u) | ((n >> 1) & 2u) | ((n >> 2) & 4u);
 }
 
+// The k-th of n bands from the middle outward, those below and above in turn; the last is the lowest one.
+uint band_outward(uint k, uint n) {
+    uint n_left = n - 1u - k;
+    return (n_left & 1u) == 0u ? n - 1u - (n_left >> 1) : n_left >> 1;
+}
+
 // The pixel at place `order` when the image is walked tile by tile (TILE_SIZE squared pixels), each tile along a Z-curve,
 // so that subgroups of any size are blocks of the image; row by row where the right or lower border cuts the tile.
-// Without gaps.
+// Without gaps. The bands of tiles come from the middle outward: that is where most pictures show what they are of, and a
+// dispatch does not wait at its end for long rays that began late.
 uvec2 pixel_of(uint order, uint width, uint height) {
-    uint band = order / (TILE_SIZE * width);
-    uint in_band = order - band * TILE_SIZE * width;
+    uint nth_band = order / (TILE_SIZE * width);
+    uint in_band = order - nth_band * TILE_SIZE * width;
+    uint band = band_outward(nth_band, (height + TILE_SIZE - 1u) / TILE_SIZE);
     uint rows = min(TILE_SIZE, height - band * TILE_SIZE);
     uint tile = in_band / (TILE_SIZE * rows);
     uint in_tile = in_band - tile * TILE_SIZE * rows;

@@ -9,11 +9,19 @@ fn every_second_bit(n: u32) -> u32 {
     n & 1 | n >> 1 & 2 | n >> 2 & 4
 }
 
+/// The `k`-th of `n` bands from the middle outward, those below and above in turn; the last is the lowest one.
+fn band_outward(k: u32, n: u32) -> u32 {
+    let n_left = n - 1 - k;
+    if n_left.is_multiple_of(2) { n - 1 - n_left / 2 } else { n_left / 2 }
+}
+
 /// The pixel at place `order` when the image is walked tile by tile, each tile along a Z-curve, so that neighbours in the
-/// queue are blocks of the image; row by row where the border cuts the tile. Without gaps.
+/// queue are blocks of the image; row by row where the border cuts the tile. Without gaps. The bands of tiles come from the
+/// middle outward.
 pub fn pixel_of(order: u32, width: u32, height: u32) -> UVec2 {
-    let band = order / (TILE_SIZE * width);
-    let in_band = order - band * TILE_SIZE * width;
+    let nth_band = order / (TILE_SIZE * width);
+    let in_band = order - nth_band * TILE_SIZE * width;
+    let band = band_outward(nth_band, height.div_ceil(TILE_SIZE));
     let rows = TILE_SIZE.min(height - band * TILE_SIZE);
     let tile = in_band / (TILE_SIZE * rows);
     let in_tile = in_band - tile * TILE_SIZE * rows;
@@ -52,6 +60,14 @@ mod tests {
             assert_eq!(pixels.len() as u32, width * height);
             assert!(pixels.iter().all(|pixel| pixel.x < width && pixel.y < height));
         }
+    }
+
+    #[test]
+    fn bands_come_from_the_middle_outward() {
+        let bands = |n| (0..n).map(|k| band_outward(k, n)).collect::<Vec<_>>();
+        assert_eq!(bands(1), [0]);
+        assert_eq!(bands(4), [1, 2, 0, 3]);
+        assert_eq!(bands(5), [2, 1, 3, 0, 4]);
     }
 
     #[test]
