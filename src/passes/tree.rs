@@ -47,7 +47,7 @@ pub struct Tree {
     /// One a pair of nodes.
     pub kd_parents: Buffer<u32>,
     pub leaf_triangles: Buffer<u32>,
-    /// One an entry of `leaf_triangles`.
+    /// One an entry of `leaf_triangles`, or none.
     pub leaf_planes: Buffer<Plane>,
     /// One a node, or none.
     pub kd_slabs: Buffer<Slab>,
@@ -71,7 +71,8 @@ impl Tree {
         tree: &KdTree,
         constants: &Frame,
     ) -> Result<Self, GpuError> {
-        let is_bound = most_bytes(triangles, tree) as u64 <= context.limits().storage_range;
+        let sparing = Sparing::of(context, tree);
+        let is_bound = most_bytes(triangles, tree, &sparing) as u64 <= context.limits().storage_range;
         let usage = if is_bound { BufferUse::Storage } else { BufferUse::Address };
         let made = Self {
             frame: Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?,
@@ -81,8 +82,8 @@ impl Tree {
             kd_nodes: Buffer::with(context, "kd_nodes", &tree.nodes, usage)?,
             kd_parents: Buffer::with(context, "kd_parents", &tree.parents, usage)?,
             leaf_triangles: Buffer::with(context, "leaf_triangles", &tree.leaf_triangles, usage)?,
-            leaf_planes: Buffer::with(context, "leaf_planes", &tree.leaf_planes, usage)?,
-            kd_slabs: Buffer::with(context, "kd_slabs", &tree.slabs, usage)?,
+            leaf_planes: Buffer::with(context, "leaf_planes", sparing.leaf_planes, usage)?,
+            kd_slabs: Buffer::with(context, "kd_slabs", sparing.slabs, usage)?,
             kd_boxes: Buffer::new(context, "kd_boxes", 0, usage)?,
             kd_ropes: Buffer::new(context, "kd_ropes", 0, usage)?,
             usage,
@@ -167,8 +168,23 @@ impl Tree {
     }
 }
 
+/// What spares rays nodes and tests, where the kernels look at it: not where they run both sides of every branch.
+struct Sparing<'a> {
+    leaf_planes: &'a [Plane],
+    slabs: &'a [Slab],
+}
+
+impl<'a> Sparing<'a> {
+    fn of(context: &Context, tree: &'a KdTree) -> Self {
+        if context.runs_both_sides() {
+            return Self { leaf_planes: &[], slabs: &[] };
+        }
+        Self { leaf_planes: &tree.leaf_planes, slabs: &tree.slabs }
+    }
+}
+
 /// Of the largest buffer, bytes, with those that any traversal asks for: what one can be bound by, all can.
-fn most_bytes(triangles: &[Triangle], tree: &KdTree) -> usize {
+fn most_bytes(triangles: &[Triangle], tree: &KdTree, sparing: &Sparing) -> usize {
     const ROPES_BYTES: usize = 6 * size_of::<u32>();
     let n_nodes = tree.nodes.len();
     let sizes = [
@@ -176,8 +192,8 @@ fn most_bytes(triangles: &[Triangle], tree: &KdTree) -> usize {
         size_of_val(&*tree.nodes),
         size_of_val(&*tree.parents),
         size_of_val(&*tree.leaf_triangles),
-        size_of_val(&*tree.leaf_planes),
-        size_of_val(&*tree.slabs),
+        size_of_val(sparing.leaf_planes),
+        size_of_val(sparing.slabs),
         n_nodes * size_of::<KdBox>(),
         n_nodes * ROPES_BYTES,
     ];
