@@ -4,9 +4,13 @@ mod support;
 
 use glam::{Vec3, vec3};
 use kdray::{
+    cast::Query,
     cpu::{
+        bindings::Bindings,
         brute,
         kdtree::near_scene,
+        steps::count_steps,
+        table::Table,
         traverser::{Probe, Traverser},
     },
     frame::Traversal,
@@ -119,6 +123,28 @@ fn a_missing_triangle_in_a_leaf_is_noticed() {
     let lost = world.tree.leaf_triangles[0];
     world.tree.leaf_triangles.iter_mut().filter(|ix| **ix == lost).for_each(|ix| *ix = (lost + 1) % 400);
     assert!(first_difference(&rays, &hits, &traced(&world, Traversal::Mask, &rays)).is_some());
+}
+
+/// Fewer steps by each way through the tree, and slabs that are moved lose hits.
+#[test]
+fn slabs_are_looked_at() {
+    let world = World::new(meshes::torus(120, 60));
+    let rays = rays_at(&world);
+    for traversal in tree_traversals() {
+        let bindings = world.bindings();
+        let without = Bindings { kd_slabs: Table::from(&[][..]), ..bindings };
+        let [some, all] = [bindings, without].map(|bindings| {
+            let steps = count_steps(&bindings, traversal, Query::Closest, &rays);
+            steps.n_nodes + steps.n_triangles
+        });
+        assert!(some < all * 97 / 100, "{traversal}: {some} steps of {all}");
+    }
+    let mut moved = World::new(meshes::torus(120, 60));
+    moved.tree.slabs.iter_mut().for_each(|slab| slab.offset += 2.0);
+    for traversal in tree_traversals() {
+        let [expected, found] = [&world, &moved].map(|world| traced(world, traversal, &rays));
+        assert!(first_difference(&rays, &expected, &found).is_some(), "{traversal}");
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use super::table::{Counted, ReadCounts, Table, Uncounted};
 use crate::{
     kdtree::{Extras, KdTree},
-    layout::{Frame, KdBox, KdNode, Light, Material, Plane, Triangle},
+    layout::{Frame, KdBox, KdNode, Light, Material, Plane, Slab, Triangle},
     scene::Scene,
 };
 
@@ -22,6 +22,8 @@ pub struct Bindings<'a, R = Uncounted> {
     pub leaf_triangles: Table<'a, u32, R>,
     /// One an entry of `leaf_triangles`, or none.
     pub leaf_planes: &'a [Plane],
+    /// One a node, or none.
+    pub kd_slabs: Table<'a, Slab, R>,
     /// One a node, or none where the traversal does not ask for them.
     pub kd_boxes: Table<'a, KdBox, R>,
     /// Six a node, or none.
@@ -50,6 +52,7 @@ impl<'a> Bindings<'a> {
             kd_parents: Table::from(&*tree.parents),
             leaf_triangles: Table::from(&*tree.leaf_triangles),
             leaf_planes: &tree.leaf_planes,
+            kd_slabs: Table::from(&*tree.slabs),
             kd_boxes: Table::from(&[][..]),
             kd_ropes: Table::from(&[][..]),
         }
@@ -67,6 +70,7 @@ impl<'a> Bindings<'a> {
             kd_parents: self.kd_parents.told_to(Counted(&counts.n_links)),
             leaf_triangles: self.leaf_triangles.told_to(Counted(&counts.n_triangles)),
             leaf_planes: self.leaf_planes,
+            kd_slabs: self.kd_slabs.told_to(Counted(&counts.n_nodes)),
             kd_boxes: self.kd_boxes.told_to(Counted(&counts.n_boxes)),
             kd_ropes: self.kd_ropes.told_to(Counted(&counts.n_links)),
         }

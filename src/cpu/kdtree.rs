@@ -5,8 +5,10 @@ use glam::Vec3A;
 use super::{
     bindings::Bindings,
     leaf::{Target, intersect_leaf},
+    slab::slab_of,
     table::Reads,
 };
+use crate::kdtree::EMPTY_LEAF;
 use crate::layout::{
     Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_ORIGIN_REACH, KD_PLANE_REACH, KdNode, NO_TRIANGLE, Ray,
 };
@@ -133,16 +135,26 @@ pub trait Pending {
     fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool;
 }
 
-/// Down to the leaf where the ray enters the cell. A NaN fails both tests and goes to the first child: it ends.
+/// Down to the leaf where the ray enters the cell, or to a slab that it keeps clear of, as if that were an empty leaf. A NaN
+/// fails both tests and goes to the first child: it ends.
 #[inline(always)]
 fn descend<P: Pending>(
     bindings: &Bindings<impl Reads>,
     ray: &TraversalRay,
+    t_best: f32,
     pending: &mut P,
     cell: &mut Cell,
 ) -> KdNode {
     let mut node = bindings.kd_nodes[cell.node_ix as usize];
-    while axis_of(node) != KD_LEAF {
+    loop {
+        if let Some(slab) = slab_of(bindings, node, cell.node_ix)
+            && ray.is_clear_of(slab, [cell.t_enter, min(cell.t_exit, t_best)])
+        {
+            return EMPTY_LEAF;
+        }
+        if axis_of(node) == KD_LEAF {
+            return node;
+        }
         let t_cross = ray.crossing(node);
         let first_ix = ray.first_child(node);
         let in_first = t_cross >= cell.t_enter;
@@ -155,7 +167,6 @@ fn descend<P: Pending>(
         }
         node = bindings.kd_nodes[cell.node_ix as usize];
     }
-    node
 }
 
 #[inline(always)]
@@ -189,7 +200,7 @@ pub(super) fn search_cell<P: Pending, const ANY_HIT: bool>(
 ) {
     pending.clear();
     loop {
-        let leaf = descend(bindings, ray, pending, &mut cell);
+        let leaf = descend(bindings, ray, best.t, pending, &mut cell);
         intersect_leaf(bindings, ray, leaf, [cell.t_enter, min(cell.t_exit, best.t)], best);
         if is_done::<ANY_HIT>(best) || !pending.pop(bindings, ray, best.t, &mut cell) {
             return;

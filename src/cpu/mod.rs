@@ -37,6 +37,7 @@ pub mod resolve;
 pub mod ropes;
 pub mod shade;
 pub mod shadow;
+pub mod slab;
 pub mod steps;
 pub mod surface;
 pub mod table;

@@ -6,7 +6,7 @@
 use std::array::from_fn;
 
 use fearless_simd::{Simd, f32x8, mask32x8, prelude::*, u32x8};
-use glam::{Vec3A, Vec4};
+use glam::{Vec3, Vec3A, Vec4};
 
 use super::{
     bindings::Bindings,
@@ -16,7 +16,7 @@ use super::{
     table::Reads,
     traverser::Probe,
 };
-use crate::layout::{Hit, KD_PLANE_REACH, KdNode, Plane};
+use crate::layout::{Hit, KD_PLANE_REACH, KdNode, Plane, Slab};
 
 /// Rays of a packet.
 pub const LANES: usize = 8;
@@ -105,11 +105,15 @@ fn times_plus<S: Simd, A: std::ops::Mul<f32x8<S>, Output = f32x8<S>>>(
     [ax * b[0] + c[0], ay * b[1] + c[1], az * b[2] + c[2]]
 }
 
+#[inline(always)]
+fn dot<S: Simd>(normal: Vec3, v: &[f32x8<S>; 3]) -> f32x8<S> {
+    normal.x * v[0] + normal.y * v[1] + normal.z * v[2]
+}
+
 /// Heights of points above a plane.
 #[inline(always)]
 fn heights<S: Simd>(plane: &Plane, at: &[f32x8<S>; 3]) -> f32x8<S> {
-    let [x, y, z] = plane.normal.to_array();
-    x * at[0] + y * at[1] + z * at[2] - plane.distance
+    dot(plane.normal, at) - plane.distance
 }
 
 impl<S: Simd> Packet<S> {
@@ -156,6 +160,17 @@ impl<S: Simd> Packet<S> {
     pub fn like(&self, lane: u32) -> Lanes {
         let [x, y, z] = &self.inv_direction;
         like_on_axis(x, lane) & like_on_axis(y, lane) & like_on_axis(z, lane)
+    }
+
+    /// Which of the rays do not keep to one side of a slab within the cell.
+    #[inline(always)]
+    pub fn lanes_in_slab(&self, slab: &Slab, cell: &Interval<S>) -> Lanes {
+        let t_exit = cell.exit.min(self.t_best);
+        let (t_middle, t_half) = ((cell.enter + t_exit) * 0.5, (t_exit - cell.enter) * 0.5);
+        let height = dot(slab.normal, &self.origin) - slab.offset;
+        let slope = dot(slab.normal, &self.direction);
+        let is_clear = (t_middle * slope + height).abs().simd_gt(t_half * slope.abs() + 1.0);
+        !is_clear.to_bitmask() as Lanes
     }
 
     /// Which of the rays do not keep to one side of a plane within the cell.

@@ -9,9 +9,11 @@ use super::{
     kdtree::{Cell, Pending, TraversalRay, axis_of, search, search_cell},
     packet::{Interval, LANES, Packet},
     pending_stack::PendingStack,
+    slab::slab_of,
     table::Reads,
     traverser::Probe,
 };
+use crate::kdtree::EMPTY_LEAF;
 use crate::layout::{Hit, KD_CHILD_SHIFT, KD_LEAF, KD_MAX_DEPTH, KdNode};
 
 /// The working memory of a thread.
@@ -37,7 +39,8 @@ impl PacketTraverser {
         Self { level, single: Pending::new(), entries: [Entry::default(); KD_MAX_DEPTH as usize], size: 0 }
     }
 
-    /// Down to the leaf where the rays of `cell` enter. One that is not in it goes nowhere.
+    /// Down to the leaf where the rays of `cell` enter, or to a slab that all of them keep clear of, as if that were an empty
+    /// leaf. A ray that is not in the cell goes nowhere.
     #[inline(always)]
     fn descend<S: Simd>(
         &mut self,
@@ -48,7 +51,16 @@ impl PacketTraverser {
         cell: &mut Interval<S>,
     ) -> KdNode {
         let mut node = bindings.kd_nodes[*node_ix as usize];
-        while axis_of(node) != KD_LEAF {
+        loop {
+            if let Some(slab) = slab_of(bindings, node, *node_ix) {
+                *cell = cell.of(packet.lanes_in_slab(slab, cell));
+                if cell.lanes() == 0 {
+                    return EMPTY_LEAF;
+                }
+            }
+            if axis_of(node) == KD_LEAF {
+                return node;
+            }
             let axis = axis_of(node) as usize;
             let t_cross = f32::from_bits(node.split_or_first) * packet.inv_direction[axis] + packet.bias[axis];
             let first_ix = (node.axis_and_child >> KD_CHILD_SHIFT) + first_is_above[axis];
@@ -67,7 +79,6 @@ impl PacketTraverser {
             };
             node = bindings.kd_nodes[*node_ix as usize];
         }
-        node
     }
 
     /// The next pending cell in which a ray may hit something nearer than it has, or none.

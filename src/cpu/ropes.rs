@@ -4,6 +4,7 @@ use super::{
     bindings::Bindings,
     kdtree::{TraversalRay, axis_of, is_done, min},
     leaf::intersect_leaf,
+    slab::slab_of,
     table::Reads,
 };
 use crate::layout::{Hit, KD_LEAF, KdNode};
@@ -36,7 +37,10 @@ pub fn follow_ropes<const ANY_HIT: bool>(bindings: &Bindings<impl Reads>, ray: &
         };
         let t_enter = t;
         t = far[axis];
-        intersect_leaf(bindings, ray, leaf, [t_enter, min(t, best.t)], best);
+        let way = [t_enter, min(t, best.t)];
+        if !slab_of(bindings, leaf, node_ix).is_some_and(|slab| ray.is_clear_of(slab, way)) {
+            intersect_leaf(bindings, ray, leaf, way, best);
+        }
         if is_done::<ANY_HIT>(best) || best.t < t {
             return;
         }

@@ -9,7 +9,7 @@ use crate::{cast::Query, frame::Traversal, layout::Ray};
 /// Reads for one or more rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Steps {
-    /// Nodes, on the way down and on the way back alike.
+    /// Nodes, on the way down and on the way back alike, and slabs.
     pub n_nodes: u64,
     /// Links to parents, and ropes.
     pub n_links: u64,
@@ -82,9 +82,15 @@ mod tests {
         vec![at(0.0), at(10.0)]
     }
 
+    /// Without slabs.
     fn steps(max_depth: u32, traversal: Traversal, query: Query, rays: &[Ray]) -> Steps {
+        let options = BuildOptions { max_depth: Some(max_depth), slabs: false, ..BuildOptions::default() };
+        steps_through(options, traversal, query, rays)
+    }
+
+    fn steps_through(options: BuildOptions, traversal: Traversal, query: Query, rays: &[Ray]) -> Steps {
         let triangles = two_triangles();
-        let options = BuildOptions { traversal_cost: 1e-3, max_depth: Some(max_depth), ..BuildOptions::default() };
+        let options = BuildOptions { traversal_cost: 1e-3, ..options };
         let tree = KdTree::build(&triangles, &options);
         let frame = tree.constants();
         let extras = Extras::all(&tree);
@@ -105,6 +111,14 @@ mod tests {
         }
         let found = steps(0, Traversal::Brute, Query::Closest, &[at_first; 3]);
         assert_eq!(found, Steps { n_triangles: 6, ..Steps::default() });
+    }
+
+    #[test]
+    fn a_slab_counts_as_a_node() {
+        let in_slab = ray(vec3(0.25, 0.25, 5.0), Vec3::NEG_Z);
+        let options = BuildOptions { max_depth: Some(0), ..BuildOptions::default() };
+        let found = steps_through(options, Traversal::Mask, Query::Closest, &[in_slab]);
+        assert_eq!(found, Steps { n_nodes: 2, n_triangles: 2, ..Steps::default() });
     }
 
     #[test]

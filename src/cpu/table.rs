@@ -34,6 +34,7 @@ impl Reads for Counted<'_> {
 /// Reads of a tree by a thread.
 #[derive(Clone, Debug, Default)]
 pub struct ReadCounts {
+    /// And slabs.
     pub n_nodes: Cell<u64>,
     /// Links to parents, and ropes.
     pub n_links: Cell<u64>,
@@ -59,6 +60,16 @@ impl<'a, T, R> Table<'a, T, R> {
     /// The same slice, with another told of reads.
     pub fn told_to<S>(self, reads: S) -> Table<'a, T, S> {
         Table { items: self.items, reads }
+    }
+}
+
+impl<'a, T, R: Reads> Table<'a, T, R> {
+    /// The element, if there is one: only then it is read.
+    #[inline(always)]
+    pub fn get(&self, ix: usize) -> Option<&'a T> {
+        let item = self.items.get(ix)?;
+        self.reads.read(1);
+        Some(item)
     }
 }
 
@@ -93,5 +104,6 @@ mod tests {
         let table = Table::from(&[5, 6, 7, 8][..]).told_to(Counted(&n));
         assert_eq!((table[1], &table[1..4], n.get()), (6, &[6, 7, 8][..], 4));
         assert_eq!((table[2..2].len(), n.get()), (0, 4));
+        assert_eq!((table.get(3), table.get(4), n.get()), (Some(&8), None, 5));
     }
 }

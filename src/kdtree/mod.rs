@@ -80,7 +80,7 @@ pub struct BuildOptions {
     pub max_depth: Option<u32>,
     /// No more references than this many times the triangles, plus 1024; a leaf for all of them always fits.
     pub max_references_per_triangle: u32,
-    /// Whether nodes get slabs, which GPUs make use of; some 200 ns a reference.
+    /// Whether nodes get slabs, which the CPU and GPUs make use of, software drivers not; some 200 ns a reference.
     pub slabs: bool,
 }
 
@@ -122,7 +122,7 @@ pub enum Node {
 }
 
 /// A leaf without triangles.
-const EMPTY_LEAF: KdNode = KdNode { split_or_first: 0, axis_and_child: KD_LEAF };
+pub(crate) const EMPTY_LEAF: KdNode = KdNode { split_or_first: 0, axis_and_child: KD_LEAF };
 
 impl From<KdNode> for Node {
     fn from(node: KdNode) -> Self {

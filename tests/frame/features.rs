@@ -99,15 +99,16 @@ fn device_and_cpu_agree() {
     }
 }
 
-/// Traced alike, they read the same nodes and triangles; but for few rays that rounding sends another way. A device that is
-/// software tries no planes, the CPU no slabs.
+/// Traced alike, they read the same nodes, slabs and triangles; but for few rays that rounding sends another way. A device that
+/// is software tries neither planes nor slabs.
 #[test]
 fn device_and_cpu_count_the_same_steps() {
     let scene = scenes::mixed_outdoors();
-    let tree = KdTree::build(&scene.triangles, &BuildOptions { slabs: false, ..BuildOptions::default() });
+    let tree = tree_of(&scene);
     let mut tree_on_cpu = tree.clone();
     if device().is_software() {
         tree_on_cpu.leaf_planes.clear();
+        tree_on_cpu.slabs.clear();
     }
     for &traversal in Traversal::ALL.iter().filter(|&&traversal| traversal != Traversal::Brute) {
         let options = noting(RenderOptions { primary: Primary::Trace, traversal, ..options(60, 45, 3) });
@@ -126,10 +127,10 @@ fn steps_through_one_leaf_are_known() {
     let mut scene = scenes::empty();
     scenes::add(&mut scene, scenes::room(0.5)[..2].to_vec(), scenes::diffuse(Vec3::ONE));
     let n_triangles = scene.triangles.len() as u32;
-    let tree = tree_of(&scene);
+    let tree = KdTree::build(&scene.triangles, &BuildOptions { slabs: false, ..BuildOptions::default() });
     assert_eq!(tree.nodes.len(), 2, "the root and the place beside it");
-    for features in [on_device, on_cpu]
-        .map(|render| render(&scene, &noting(RenderOptions { primary: Primary::Trace, ..options(40, 30, 1) })))
+    for features in [on_device_by, on_cpu_by]
+        .map(|render| render(&tree, &scene, &noting(RenderOptions { primary: Primary::Trace, ..options(40, 30, 1) })))
     {
         let steps: std::collections::HashSet<_> = features.iter().map(|feature| feature.n_steps).collect();
         assert_eq!(steps, [0, 1 + n_triangles].into());

@@ -110,7 +110,7 @@ fn text(report: &Report) -> String {
         "grazing",
     ];
     text += &table(header, &rows);
-    text += "\nNodes, links to parents or neighbours, boxes, triangle tests: the mean of a ray, counted on the CPU, which\nlooks at no slabs. Differing: from the CPU's hits.\n";
+    text += "\nNodes and slabs, links to parents or neighbours, boxes, triangle tests: the mean of a ray, counted on the CPU.\nDiffering: from the CPU's hits.\n";
     if report.sets.iter().flat_map(|set| &set.variants).any(|variant| variant.ms.is_none()) {
         text += "This device has no timestamps: speeds are unknown.\n";
     }
