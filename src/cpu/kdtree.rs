@@ -8,9 +8,9 @@ use super::{
     slab::slab_of,
     table::Reads,
 };
-use crate::kdtree::EMPTY_LEAF;
-use crate::layout::{
-    Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_ORIGIN_REACH, KD_PLANE_REACH, KdNode, NO_TRIANGLE, Ray,
+use crate::{
+    kdtree::EMPTY_LEAF,
+    layout::{Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_ORIGIN_REACH, KD_PLANE_REACH, KdNode, NO_TRIANGLE, Ray},
 };
 
 /// A node and the interval that the ray spends in it.

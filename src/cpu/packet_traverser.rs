@@ -13,8 +13,10 @@ use super::{
     table::Reads,
     traverser::Probe,
 };
-use crate::kdtree::EMPTY_LEAF;
-use crate::layout::{Hit, KD_CHILD_SHIFT, KD_LEAF, KD_MAX_DEPTH, KdNode};
+use crate::{
+    kdtree::EMPTY_LEAF,
+    layout::{Hit, KD_CHILD_SHIFT, KD_LEAF, KD_MAX_DEPTH, KdNode},
+};
 
 /// The working memory of a thread.
 pub struct PacketTraverser {
