@@ -8,14 +8,14 @@ use kdray::{gpu::Context, kdtree::BuildOptions};
 pub enum Build {
     /// The quicker of the two, by the number of rays
     Auto,
-    /// A small tree, built in half of the time; rays take a fifth longer on the CPU, up to twice as long on a GPU
+    /// A small tree, built in half of the time; rays take up to a tenth longer on the CPU, up to twice as long on a GPU
     Fast,
     /// The tree that traces fastest
     Best,
 }
 
 /// Rays a triangle from which on the best tree pays: it takes about a microsecond a triangle longer to build, with slabs
-/// half of one more, and spares a ray some 25 ns on the CPU's threads and half of one to one on a GPU.
+/// half of one more, and spares a ray some 10 to 25 ns on the CPU's threads and half of one to one on a GPU.
 const RAYS_A_TRIANGLE_ON_CPU: u64 = 40;
 const RAYS_A_TRIANGLE_ON_GPU: u64 = 1000;
 

@@ -100,8 +100,8 @@ impl Default for BuildOptions {
 }
 
 impl BuildOptions {
-    /// A tree of a fifth of the nodes and without slabs, built in half of the time. Rays take a fifth longer on the CPU, up to
-    /// twice as long on a GPU.
+    /// A tree of a fifth of the nodes and without slabs, built in half of the time. Rays take up to a tenth longer on the CPU,
+    /// up to twice as long on a GPU.
     pub fn fast() -> Self {
         Self { intersection_cost: 0.15, slabs: false, ..Self::default() }
     }
