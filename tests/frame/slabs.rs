@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use kdray::{
+    cpu::{self, Batching},
     frame::{Picture, Primary, RenderOptions, Traversal},
     gpu::{Context, ContextOptions},
     kdtree::{BuildOptions, KdTree},
+    layout::Feature,
     render::Renderer,
     scene::Scene,
 };
@@ -26,13 +28,26 @@ fn scene() -> Scene {
     scene
 }
 
+fn options_of(traversal: Traversal) -> RenderOptions {
+    RenderOptions { primary: Primary::Trace, features: true, traversal, ..options(40, 30, 3) }
+}
+
+fn steps(features: &[Feature]) -> u64 {
+    features.iter().map(|feature| u64::from(feature.n_steps)).sum()
+}
+
 /// The picture, and the steps of all its rays.
 fn render(context: &Arc<Context>, scene: &Scene, tree: &KdTree, traversal: Traversal) -> (Picture, u64) {
-    let options = RenderOptions { primary: Primary::Trace, features: true, traversal, ..options(40, 30, 3) };
-    let mut renderer = Renderer::new(context.clone(), scene, tree, &options).expect("a renderer");
+    let mut renderer = Renderer::new(context.clone(), scene, tree, &options_of(traversal)).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
-    let features = renderer.features().expect("features");
-    (picture, features.iter().map(|feature| u64::from(feature.n_steps)).sum())
+    (picture, steps(&renderer.features().expect("features")))
+}
+
+fn steps_on_cpu(scene: &Scene, tree: &KdTree, traversal: Traversal) -> u64 {
+    let options = options_of(traversal);
+    let mut renderer = cpu::Renderer::new(scene, tree, &options, Batching::default());
+    renderer.draw_sample();
+    steps(&renderer.features())
 }
 
 #[test]
@@ -47,6 +62,8 @@ fn slabs_spare_steps_and_change_no_bit() {
             (render(&context, &scene, &without, traversal), render(&context, &scene, &with, traversal));
         assert!(identical(&expected, &found), "{traversal}");
         assert!(some < all * 97 / 100, "{traversal}: {some} steps of {all}");
+        let on_cpu = steps_on_cpu(&scene, &with, traversal);
+        assert!(some.abs_diff(on_cpu) < all / 200, "{traversal}: {some} steps, {on_cpu} on the CPU");
     }
     assert_silent(&context);
 }
