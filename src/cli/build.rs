@@ -15,7 +15,7 @@ pub enum Build {
 }
 
 /// Rays a triangle from which on the best tree pays: it takes about a microsecond a triangle longer to build, with slabs
-/// half of one more, and spares a ray some 10 to 25 ns on the CPU's threads and half of one to one on a GPU.
+/// a third of one more, and spares a ray some 10 to 25 ns on the CPU's threads and half of one to one on a GPU.
 const RAYS_A_TRIANGLE_ON_CPU: u64 = 40;
 const RAYS_A_TRIANGLE_ON_GPU: u64 = 1000;
 
