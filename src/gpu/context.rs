@@ -43,6 +43,8 @@ pub struct Context {
     pub(super) ray_tracing: Option<RayTracingCalls>,
     /// None where the device lacks the extension.
     pub(super) statistics: Option<StatisticsCalls>,
+    /// Kernels can do without bounds checks.
+    pub(super) unchecked: bool,
     /// None where the device was opened without a window.
     pub(super) presentation: Option<khr::swapchain::Device>,
     pub(super) physical: vk::PhysicalDevice,
@@ -150,6 +152,7 @@ impl Context {
         let allocator = create_allocator(&instance, &device, physical)?;
         Ok(Arc::new(Self {
             ray_tracing: ray_tracing.then(|| RayTracingCalls::new(&instance, physical, &device)),
+            unchecked: extras.unchecked,
             statistics: extras.statistics.then(|| StatisticsCalls::new(&instance, &device)),
             debug_utils: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device)),
             presentation: (purpose == Purpose::Window).then(|| khr::swapchain::Device::new(&instance.raw, &device)),

@@ -4,7 +4,7 @@ use std::ffi::{CStr, c_char};
 
 use ash::{khr, prelude::VkResult, vk};
 
-use super::{instance::Instance, ray_tracing::RayTracingCalls, statistics::StatisticsCalls};
+use super::{instance::Instance, ray_tracing::RayTracingCalls, robustness, statistics::StatisticsCalls};
 
 /// What a device is opened for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +24,8 @@ pub(super) struct DeviceExtras {
     portability: bool,
     /// Kernels can be asked for their statistics.
     pub statistics: bool,
+    /// Pipelines can do without bounds checks.
+    pub unchecked: bool,
     purpose: Purpose,
 }
 
@@ -36,6 +38,7 @@ impl DeviceExtras {
         Ok(Self {
             portability: has(khr::portability_subset::NAME),
             statistics: has(StatisticsCalls::EXTENSION) && StatisticsCalls::has_feature(instance, physical),
+            unchecked: has(robustness::EXTENSION) && robustness::has_feature(instance, physical),
             purpose,
         })
     }
@@ -44,6 +47,7 @@ impl DeviceExtras {
         let mut names = Vec::new();
         names.extend(self.portability.then_some(khr::portability_subset::NAME));
         names.extend(self.statistics.then_some(StatisticsCalls::EXTENSION));
+        names.extend(self.unchecked.then_some(robustness::EXTENSION));
         match self.purpose {
             Purpose::Compute => {}
             Purpose::RayTracing => names.extend(RayTracingCalls::EXTENSIONS),
@@ -69,6 +73,7 @@ impl DeviceExtras {
             .compute_full_subgroups(true);
         let mut executables =
             vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
+        let mut unchecked = vk::PhysicalDevicePipelineRobustnessFeaturesEXT::default().pipeline_robustness(true);
         let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
         let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
         let mut pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
@@ -79,6 +84,9 @@ impl DeviceExtras {
             .push_next(&mut addresses);
         if self.statistics {
             create = create.push_next(&mut executables);
+        }
+        if self.unchecked {
+            create = create.push_next(&mut unchecked);
         }
         if self.purpose == Purpose::RayTracing {
             create = create.push_next(&mut structures).push_next(&mut pipelines);

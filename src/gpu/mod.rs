@@ -21,6 +21,7 @@ mod pipeline;
 mod presenter;
 mod probe;
 mod ray_tracing;
+mod robustness;
 mod shader;
 mod specialization;
 mod statistics;

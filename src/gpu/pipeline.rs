@@ -5,8 +5,8 @@ use std::{ffi::CStr, sync::Arc};
 use ash::vk;
 
 use super::{
-    Bindings, Context, GpuError, Presenter, Shader, TargetKind, shader::ShaderModule, specialization::Specialization,
-    statistics::capture_flags,
+    Bindings, Context, GpuError, Presenter, Shader, TargetKind, robustness::without_checks, shader::ShaderModule,
+    specialization::Specialization, statistics::capture_flags,
 };
 
 pub(super) const ENTRY_POINT: &CStr = c"main";
@@ -48,12 +48,16 @@ impl ComputePipeline {
             .name(ENTRY_POINT)
             .flags(flags)
             .specialization_info(&constants);
-        let info = [vk::ComputePipelineCreateInfo::default()
+        let mut info = vk::ComputePipelineCreateInfo::default()
             .flags(capture_flags(context))
             .stage(stage)
-            .layout(bindings.pipeline_layout)];
+            .layout(bindings.pipeline_layout);
+        let mut without_checks = without_checks();
+        if context.unchecked {
+            info = info.push_next(&mut without_checks);
+        }
         // SAFETY: all that `info` points to lives until the call returns.
-        let raw = unsafe { context.device.create_compute_pipelines(vk::PipelineCache::null(), &info, None) }
+        let raw = unsafe { context.device.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) }
             .map_err(|(_, result)| GpuError::call("vkCreateComputePipelines", desc.name)(result))?[0];
         context.set_name(raw, desc.name);
         Ok(Self { raw, bindings: bindings.clone(), name: desc.name, context: context.clone() })

@@ -1,0 +1,27 @@
+//! Kernels without bounds checks: their indices come from trees and queues of our own making, and a check of each load costs
+//! rays 3 to 4 % of their speed on an H200 (benches/EXPERIMENTS.md).
+
+use std::ffi::CStr;
+
+use ash::{ext, vk};
+
+use super::instance::Instance;
+
+/// Some drivers check every access to a buffer unless they are told, by this, that a pipeline does not need it.
+pub(super) const EXTENSION: &CStr = ext::pipeline_robustness::NAME;
+
+/// Whether a device that has the extension has its feature.
+pub(super) fn has_feature(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
+    let mut feature = vk::PhysicalDevicePipelineRobustnessFeaturesEXT::default();
+    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut feature);
+    // SAFETY: the device belongs to the instance and has the extension.
+    unsafe { instance.raw.get_physical_device_features2(physical, &mut all) };
+    feature.pipeline_robustness == vk::TRUE
+}
+
+/// How a pipeline says so.
+pub(super) fn without_checks() -> vk::PipelineRobustnessCreateInfoEXT<'static> {
+    vk::PipelineRobustnessCreateInfoEXT::default()
+        .storage_buffers(vk::PipelineRobustnessBufferBehaviorEXT::DISABLED)
+        .uniform_buffers(vk::PipelineRobustnessBufferBehaviorEXT::DISABLED)
+}
