@@ -19,13 +19,17 @@ layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
 layout(constant_id = 4) const bool RUNS_BOTH_SIDES = false;
 
 struct Cell {
-    uint node_ix;
+    // The node's place in kd_nodes, in bytes: what a split names its children by.
+    uint node_at;
     uint depth;
     float t_enter;
     float t_exit;
 };
 
 // What the traversal needs of a ray. It meets the plane at x on an axis at t = x * inv_direction + bias.
+//
+// All t of the traversal are half of the ray's own: the middle of an interval then is the sum of its ends, and half its length
+// their difference (slab.glsl). Halving loses no bits.
 //
 // This t is rounded, and taken as exact: that is the same as if the plane lay a little off, and a leaf has all triangles
 // that come so near to it (kdtree/bounds.rs). The hit test's rounding is allowed for there too. So what brute force
@@ -46,17 +50,18 @@ TraversalRay traversal_ray(Ray ray, float t_min) {
     r.shear = shear_of(ray.origin, ray.direction);
     r.direction = ray.direction;
     r.source_triangle = ray.source_triangle;
-    r.t_min = t_min;
+    r.t_min = 0.5 * t_min;
+    r.shear.z *= 0.5;
     // A direction in the plane is taken as all but in it: finite everywhere, and one rule for all ties.
     vec3 tiny = vec3(1e-12);
-    r.inv_direction = 1.0 / mix(ray.direction, tiny, lessThan(abs(ray.direction), tiny));
+    r.inv_direction = 0.5 / mix(ray.direction, tiny, lessThan(abs(ray.direction), tiny));
     r.bias = -ray.origin * r.inv_direction;
     precise vec3 t0 = fma(frame.cell_min, r.inv_direction, r.bias);
     precise vec3 t1 = fma(frame.cell_max, r.inv_direction, r.bias);
     vec3 near = min(t0, t1);
     vec3 far = max(t0, t1);
-    r.t_enter = max(max(near.x, near.y), max(near.z, t_min));
-    r.t_exit = min(min(far.x, far.y), min(far.z, ray.t_max));
+    r.t_enter = max(max(near.x, near.y), max(near.z, 0.5 * t_min));
+    r.t_exit = min(min(far.x, far.y), min(far.z, 0.5 * ray.t_max));
     return r;
 }
 
@@ -70,43 +75,68 @@ Ray near_scene(Ray ray, out float t_start) {
     vec3 away = abs(ray.origin);
     t_start = 0.0;
     if (max(away.x, max(away.y, away.z)) <= KD_ORIGIN_REACH * largest_coordinate()) return ray;
-    t_start = max(traversal_ray(ray, 0.0).t_enter, 0.0);
+    t_start = 2.0 * max(traversal_ray(ray, 0.0).t_enter, 0.0);
     precise vec3 origin = ray.origin + t_start * ray.direction;
     ray.origin = origin;
     ray.t_max -= t_start;
     return ray;
 }
 
-KdNode kd_node(uint node_ix) {
-    count_steps(1u);
-    return kd_node_at(node_ix);
+// The nearest hit so far; where it lies in its triangle is in local memory.
+struct Nearest {
+    float t;
+    uint triangle_ix;
+};
+
+uint index_of(uint node_at) {
+    return node_at / KD_NODE_BYTES;
 }
 
-uint axis_of(KdNode node) {
-    return node.axis_and_child & KD_AXIS_MASK;
+uint place_of(uint node_ix) {
+    return KD_NODE_BYTES * node_ix;
+}
+
+uint sibling_of(uint node_at) {
+    return node_at ^ KD_NODE_BYTES;
+}
+
+KdNode kd_node(uint node_at) {
+    count_steps(1u);
+    return kd_node_of(index_of(node_at));
+}
+
+bool is_leaf(KdNode node) {
+    return (node.axis_and_child & KD_LEAF) != 0u;
 }
 
 float along(vec3 v, uint axis) {
     return axis == 0u ? v.x : (axis == 1u ? v.y : v.z);
 }
 
+// Along a split's axis, whose two bits choose at once.
+float along_split(vec3 v, KdNode node) {
+    return (node.axis_and_child & 2u) != 0u ? v.z : ((node.axis_and_child & 1u) != 0u ? v.y : v.x);
+}
+
 // Where the ray meets the split plane. `precise`: a traversal that comes the same way again must come to the same bits.
 float crossing(TraversalRay ray, KdNode node) {
-    uint axis = axis_of(node);
-    precise float t = fma(uintBitsToFloat(node.split_or_first), along(ray.inv_direction, axis), along(ray.bias, axis));
+    float split = uintBitsToFloat(node.split_or_first);
+    precise float t = fma(split, along_split(ray.inv_direction, node), along_split(ray.bias, node));
     return t;
 }
 
 // The child on the side that the ray comes from, or the other one.
 uint child_of(TraversalRay ray, KdNode node, bool second) {
-    bool is_above = (along(ray.inv_direction, axis_of(node)) < 0.0) != second;
-    return (node.axis_and_child >> KD_CHILD_SHIFT) + (is_above ? 1u : 0u);
+    bool is_above = (along_split(ray.inv_direction, node) < 0.0) != second;
+    uint pair_at = node.axis_and_child & ~((1u << KD_PAIR_SHIFT) - 1u);
+    return pair_at | (is_above ? KD_NODE_BYTES : 0u);
 }
 
 uint first_child(TraversalRay ray, KdNode node) {
     return child_of(ray, node, false);
 }
 
+#include "local_cells.glsl"
 #include "slab.glsl"
 #include "pending_mask.glsl"
 #include "pending_stack.glsl"
@@ -125,39 +155,51 @@ void clear_pending() {
     siblings_done = uvec2(0u);
 }
 
-void push_pending(uint second_ix, Cell cell) {
+// The sibling of the cell's node, to which the ray comes later, until it leaves the cell.
+void push_pending(Cell cell) {
     // These find out on the way back.
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;
-    if (TRAVERSAL == TRAVERSAL_MASK) mask_push(second_ix, cell);
-    else if (TRAVERSAL == TRAVERSAL_STACK) stack_push(second_ix, cell);
-    else marked_push(second_ix, cell);
+    if (TRAVERSAL == TRAVERSAL_MASK) mask_push(cell);
+    else if (TRAVERSAL == TRAVERSAL_STACK) stack_push(cell);
+    else marked_push(cell);
 }
 
-// The next pending cell that may hold a hit nearer than t_best, or false.
-bool pop_pending(TraversalRay ray, float t_best, inout Cell cell) {
-    if (TRAVERSAL == TRAVERSAL_MASK) return mask_pop(t_best, cell);
-    if (TRAVERSAL == TRAVERSAL_STACK) return stack_pop(t_best, cell);
-    if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return mask_boxes_pop(ray, t_best, cell);
-    if (TRAVERSAL == TRAVERSAL_BACKTRACK) return backtrack_pop(ray, t_best, cell);
-    if (TRAVERSAL == TRAVERSAL_ROPES) return follow_rope(t_best, cell);
-    return marked_pop(ray, t_best, cell);
+// Whether a pending cell may hold a hit nearer than t_best. Ways that have to look for it are in it then.
+bool find_pending(TraversalRay ray, float t_best, inout Cell cell) {
+    // What has not been visited begins where the leaf ends, or later.
+    bool has_time = !(t_best < cell.t_exit);
+    if (TRAVERSAL == TRAVERSAL_STACK) return has_time && stack_size > 0u;
+    if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return has_time && climb_by_boxes(ray, t_best, cell);
+    if (TRAVERSAL == TRAVERSAL_BACKTRACK) return has_time && backtrack(ray, t_best, cell);
+    if (TRAVERSAL == TRAVERSAL_ROPES) return has_time && cell.node_at != 0u;
+    return has_time && pending_mask != uvec2(0u);
+}
+
+// To the pending cell that was found, but for those that are there. It begins where the ray has left the last one.
+void take_pending(TraversalRay ray, inout Cell cell) {
+    if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
+    if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;
+    cell.t_enter = cell.t_exit;
+    if (TRAVERSAL == TRAVERSAL_ROPES) return;
+    if (TRAVERSAL == TRAVERSAL_MASK) mask_pop(cell);
+    else if (TRAVERSAL == TRAVERSAL_STACK) stack_pop(cell);
+    else marked_pop(ray, cell);
 }
 
 // Down to the leaf where the ray enters the cell, or to a slab that it keeps clear of, as if that were an empty leaf. A NaN
 // fails both tests and goes to the first child: it ends.
 KdNode descend(TraversalRay ray, float t_best, inout Cell cell) {
-    KdNode node = kd_node(cell.node_ix);
+    KdNode node = kd_node(cell.node_at);
     for (;;) {
         while (is_open_split(node)) {
             float t_cross = crossing(ray, node);
-            bool in_first = t_cross >= cell.t_enter;
-            bool in_second = t_cross <= cell.t_exit;
+            bool only_second = t_cross < cell.t_enter;
             cell.depth += 1u;
-            cell.node_ix = child_of(ray, node, in_second && !in_first);
-            node = kd_node(cell.node_ix);
-            if (in_first && in_second) {
-                push_pending(cell.node_ix ^ 1u, cell);
+            cell.node_at = child_of(ray, node, only_second);
+            node = kd_node(cell.node_at);
+            if (!only_second && t_cross <= cell.t_exit) {
+                push_pending(cell);
                 cell.t_exit = t_cross;
             }
         }
@@ -167,11 +209,14 @@ KdNode descend(TraversalRay ray, float t_best, inout Cell cell) {
 }
 
 // A triangle against the ray; of two hits at one t the lower index wins, whatever the order of triangles.
-void intersect(TraversalRay ray, uint triangle_ix, inout Hit best) {
+void intersect(TraversalRay ray, uint triangle_ix, inout Nearest best) {
     Hit hit;
     if (!intersect_triangle(ray.shear, triangle_at(triangle_ix), triangle_ix, hit)) return;
     bool nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
-    if (hit.t > ray.t_min && nearer && triangle_ix != ray.source_triangle) best = hit;
+    if (hit.t > ray.t_min && nearer && triangle_ix != ray.source_triangle) {
+        best = Nearest(hit.t, triangle_ix);
+        local_cells[WEIGHTS_PLACE] = floatBitsToUint(vec2(hit.u, hit.v));
+    }
 }
 
 // A ray's way through a leaf, with the entries that are still to be looked at.
@@ -182,7 +227,7 @@ struct Visit {
 };
 
 Visit visit_leaf(KdNode leaf, float t_enter, float t_exit) {
-    uint n_entries = leaf.axis_and_child >> KD_CHILD_SHIFT;
+    uint n_entries = leaf.axis_and_child >> KD_PAIR_SHIFT;
     count_steps(n_entries);
     return Visit(leaf.split_or_first, leaf.split_or_first + n_entries, stretch(t_enter, t_exit));
 }
@@ -199,12 +244,12 @@ bool find_candidate(TraversalRay ray, inout Visit visit, out uint entry_ix) {
     return false;
 }
 
-void intersect_rest(TraversalRay ray, inout Visit visit, inout Hit best) {
+void intersect_rest(TraversalRay ray, inout Visit visit, inout Nearest best) {
     uint entry_ix;
     while (find_candidate(ray, visit, entry_ix)) intersect(ray, leaf_triangle_at(entry_ix), best);
 }
 
-bool is_done(bool any_hit, Hit best) {
+bool is_done(bool any_hit, Nearest best) {
     return any_hit && best.triangle_ix != NO_TRIANGLE;
 }
 
@@ -216,16 +261,18 @@ Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
 }
 
 // Leaf by leaf, each with all its tests.
-void search_by_leaves(TraversalRay ray, bool any_hit, Cell cell, inout Hit best) {
-    do {
+void search_by_leaves(TraversalRay ray, bool any_hit, Cell cell, inout Nearest best) {
+    for (;;) {
         Visit visit = next_leaf(ray, best.t, cell);
         intersect_rest(ray, visit, best);
-    } while (!is_done(any_hit, best) && pop_pending(ray, best.t, cell));
+        if (is_done(any_hit, best) || !find_pending(ray, best.t, cell)) return;
+        take_pending(ray, cell);
+    }
 }
 
 // Turn by turn, each a test or a leaf: lanes that test and lanes that go on each keep together. Of two loops in one another
 // the outer waits, for all lanes' leaves or for each lane's tests.
-void search_by_turns(TraversalRay ray, bool any_hit, Cell cell, inout Hit best) {
+void search_by_turns(TraversalRay ray, bool any_hit, Cell cell, inout Nearest best) {
     Visit visit = next_leaf(ray, best.t, cell);
     bool goes_on = true;
     do {
@@ -234,14 +281,17 @@ void search_by_turns(TraversalRay ray, bool any_hit, Cell cell, inout Hit best) 
             intersect(ray, leaf_triangle_at(entry_ix), best);
             goes_on = !is_done(any_hit, best);
         } else {
-            goes_on = pop_pending(ray, best.t, cell);
-            if (goes_on) visit = next_leaf(ray, best.t, cell);
+            goes_on = find_pending(ray, best.t, cell);
+            if (goes_on) {
+                take_pending(ray, cell);
+                visit = next_leaf(ray, best.t, cell);
+            }
         }
     } while (goes_on);
 }
 
 // All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
-void search(TraversalRay ray, bool any_hit, inout Hit best) {
+void search(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (!(ray.t_enter <= ray.t_exit)) return;
     Cell cell = Cell(0u, 0u, ray.t_enter, ray.t_exit);
     clear_pending();
@@ -256,11 +306,12 @@ Hit traverse(Ray ray_in, float t_min, bool any_hit) {
     float t_start;
     Ray ray_near = near_scene(ray_in, t_start);
     TraversalRay ray = traversal_ray(ray_near, t_min - t_start);
-    Hit best = Hit(ray_near.t_max, NO_TRIANGLE, 0.0, 0.0);
+    Nearest best = Nearest(0.5 * ray_near.t_max, NO_TRIANGLE);
     if (TRAVERSAL == TRAVERSAL_BRUTE) intersect_all(ray, any_hit, best);
     else search(ray, any_hit, best);
-    best.t = best.triangle_ix == NO_TRIANGLE ? ray_in.t_max : best.t + t_start;
-    return best;
+    if (best.triangle_ix == NO_TRIANGLE) return Hit(ray_in.t_max, NO_TRIANGLE, 0.0, 0.0);
+    vec2 weights = uintBitsToFloat(local_cells[WEIGHTS_PLACE]);
+    return Hit(2.0 * best.t + t_start, best.triangle_ix, weights.x, weights.y);
 }
 
 #endif

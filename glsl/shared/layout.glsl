@@ -22,13 +22,16 @@
 // In place of an encoded shading normal: use the triangle's own plane. No snorm pair encodes to it.
 #define FLAT_NORMAL 0x80008000u
 
-// KdNode.axis_and_child, bits 0..1: 0, 1, 2 = split axis, 3 = leaf.
-#define KD_LEAF 3u
+// KdNode.axis_and_child, bits 0..1: the axis of a split, 0, 1 or 2; 0 in a leaf.
 #define KD_AXIS_MASK 3u
-// Bit 2: the node has a slab, which is to be looked at first.
-#define KD_IN_SLAB 4u
-// Bits 3..31: first child of a split (the other is the next node), or number of triangles of a leaf.
-#define KD_CHILD_SHIFT 3u
+// Bit 2: the node is a leaf.
+#define KD_LEAF 4u
+// Bit 3: the node has a slab, which is to be looked at first.
+#define KD_IN_SLAB 8u
+// Bits 4..31: p of a split, whose children are nodes 2 p and 2 p + 1; of a leaf, how many triangles it has. With the lower
+// bits cleared, a split's word is the place of its children in bytes.
+#define KD_PAIR_SHIFT 4u
+#define KD_NODE_BYTES 8u
 // Levels below the root that the traversal's bit mask can hold: one word's, and two words'.
 #define KD_WORD_DEPTH 32u
 #define KD_MAX_DEPTH 64u

@@ -6,21 +6,19 @@
 // direction alone says which is which: from the second the ancestor is done; from the first, it is left unless its
 // split plane lies before its exit.
 
-bool backtrack_pop(TraversalRay ray, float t_best, inout Cell cell) {
-    // What has not been visited begins where the leaf ends, or later.
-    if (t_best < cell.t_exit) return false;
-    while (cell.node_ix != 0u) {
-        uint parent_ix = kd_parent_of(cell.node_ix);
-        KdNode parent = kd_node(parent_ix);
-        if (cell.node_ix == first_child(ray, parent)) {
+bool backtrack(TraversalRay ray, float t_best, inout Cell cell) {
+    while (cell.node_at != 0u) {
+        uint parent_ix = kd_parent_of(index_of(cell.node_at));
+        KdNode parent = kd_node(place_of(parent_ix));
+        if (cell.node_at == first_child(ray, parent)) {
             float t_enter = crossing(ray, parent);
             float t_exit = interval_in(ray, parent_ix).y;
             if (t_enter <= min(t_exit, t_best)) {
-                cell = Cell(cell.node_ix ^ 1u, cell.depth, max(t_enter, ray.t_enter), t_exit);
+                cell = Cell(sibling_of(cell.node_at), cell.depth, max(t_enter, ray.t_enter), t_exit);
                 return true;
             }
         }
-        cell.node_ix = parent_ix;
+        cell.node_at = place_of(parent_ix);
     }
     return false;
 }

@@ -1,9 +1,8 @@
 // Pending subtrees by the paper's bit mask: one bit a level, set where the sibling on that level is still to be
 // visited (the paper stores the opposite, "sibling done"; 32 levels in one word).
 //
-// The paper climbs level by level and tests the sibling's box. Here the highest bit names the level at once, and a place in
-// local memory is each level's: what waits there, and where the ray leaves it. Where it begins is not kept: it is where the
-// ray has just left the cell before.
+// The paper climbs level by level and tests the sibling's box. Here the highest bit names the level at once, and each level has
+// a place in local memory (local_cells.glsl); what the mask does not name there is left over.
 
 // 1 where no leaf lies deeper than KD_WORD_DEPTH, as in most trees: a mask of one word is 3 to 6 % faster. The same for all
 // kernels over one tree.
@@ -11,8 +10,6 @@ layout(constant_id = CONSTANT_MASK_WORDS) const uint MASK_WORDS = 2u;
 
 // Bit d - 1 of the words: depth d.
 uvec2 pending_mask;
-// Of each depth: node, and the bits of where the ray leaves it. What the mask does not name is left over.
-uvec2 pending_cells[KD_MAX_DEPTH];
 
 uvec2 bit_of(uint depth) {
     uint bit = 1u << ((depth - 1u) % KD_WORD_DEPTH);
@@ -29,17 +26,13 @@ bool is_pending(uint depth) {
     return (pending_mask & bit_of(depth)) != uvec2(0u);
 }
 
-void mask_push(uint second_ix, Cell cell) {
+void mask_push(Cell cell) {
     pending_mask |= bit_of(cell.depth);
-    pending_cells[cell.depth - 1u] = uvec2(second_ix, floatBitsToUint(cell.t_exit));
+    keep_cell(cell.depth - 1u, cell);
 }
 
-bool mask_pop(float t_best, inout Cell cell) {
-    cell.t_enter = cell.t_exit;
-    if (pending_mask == uvec2(0u) || t_best < cell.t_enter) return false;
+void mask_pop(inout Cell cell) {
     cell.depth = deepest_pending();
     pending_mask &= ~bit_of(cell.depth);
-    cell.node_ix = pending_cells[cell.depth - 1u].x;
-    cell.t_exit = uintBitsToFloat(pending_cells[cell.depth - 1u].y);
-    return true;
+    take_cell(cell.depth - 1u, cell);
 }

@@ -7,21 +7,19 @@
 // Bit d - 1 of the two words: the sibling at depth d.
 uvec2 siblings_done;
 
-bool mask_boxes_pop(TraversalRay ray, float t_best, inout Cell cell) {
-    // What has not been visited begins where the leaf ends, or later.
-    if (t_best < cell.t_exit) return false;
+bool climb_by_boxes(TraversalRay ray, float t_best, inout Cell cell) {
     while (cell.depth > 0u) {
         uvec2 bit = bit_of(cell.depth);
         if ((siblings_done & bit) == uvec2(0u)) {
-            vec2 interval = interval_in(ray, cell.node_ix ^ 1u);
+            vec2 interval = interval_in(ray, index_of(sibling_of(cell.node_at)));
             if (interval.x <= min(interval.y, t_best)) {
                 siblings_done |= bit;
-                cell = Cell(cell.node_ix ^ 1u, cell.depth, interval.x, interval.y);
+                cell = Cell(sibling_of(cell.node_at), cell.depth, interval.x, interval.y);
                 return true;
             }
         }
         siblings_done &= ~bit;
-        cell.node_ix = kd_parent_of(cell.node_ix);
+        cell.node_at = place_of(kd_parent_of(index_of(cell.node_at)));
         cell.depth -= 1u;
     }
     return false;

@@ -10,13 +10,13 @@
 void retrace(TraversalRay ray, inout Cell cell) {
     uint depth = deepest_pending();
     pending_mask &= ~bit_of(depth);
-    cell.node_ix = 0u;
+    cell.node_at = 0u;
     cell.t_exit = ray.t_exit;
     for (cell.depth = 1u; cell.depth <= depth; ++cell.depth) {
-        KdNode node = kd_node(cell.node_ix);
+        KdNode node = kd_node(cell.node_at);
         float t_cross = crossing(ray, node);
         bool in_second = t_cross <= cell.t_exit;
-        cell.node_ix = first_child(ray, node) ^ (in_second && !is_pending(cell.depth) ? 1u : 0u);
+        cell.node_at = child_of(ray, node, in_second && !is_pending(cell.depth));
         if (is_pending(cell.depth)) cell.t_exit = min(cell.t_exit, t_cross);
     }
     cell.depth = depth;

@@ -9,8 +9,8 @@ uvec2 short_stack[SHORT_STACK_SIZE];
 uint short_stack_top;
 uint short_stack_size;
 
-void short_stack_push(uint second_ix, float t_exit) {
-    short_stack[short_stack_top % SHORT_STACK_SIZE] = uvec2(second_ix, floatBitsToUint(t_exit));
+void short_stack_push(Cell cell) {
+    short_stack[short_stack_top % SHORT_STACK_SIZE] = uvec2(cell.node_at, floatBitsToUint(cell.t_exit));
     short_stack_top += 1u;
     short_stack_size = min(short_stack_size + 1u, SHORT_STACK_SIZE);
 }
@@ -19,19 +19,16 @@ void short_stack_pop(inout Cell cell) {
     short_stack_size -= 1u;
     short_stack_top -= 1u;
     uvec2 entry = short_stack[short_stack_top % SHORT_STACK_SIZE];
-    cell = Cell(entry.x, deepest_pending(), cell.t_enter, uintBitsToFloat(entry.y));
+    cell = Cell(sibling_of(entry.x), deepest_pending(), cell.t_enter, uintBitsToFloat(entry.y));
     pending_mask &= ~bit_of(cell.depth);
 }
 
-void marked_push(uint second_ix, Cell cell) {
+void marked_push(Cell cell) {
     pending_mask |= bit_of(cell.depth);
-    if (TRAVERSAL != TRAVERSAL_RESTART) short_stack_push(second_ix, cell.t_exit);
+    if (TRAVERSAL != TRAVERSAL_RESTART) short_stack_push(cell);
 }
 
-bool marked_pop(TraversalRay ray, float t_best, inout Cell cell) {
-    cell.t_enter = cell.t_exit;
-    if (pending_mask == uvec2(0u) || t_best < cell.t_enter) return false;
+void marked_pop(TraversalRay ray, inout Cell cell) {
     if (short_stack_size > 0u) short_stack_pop(cell);
     else retrace(ray, cell);
-    return true;
 }

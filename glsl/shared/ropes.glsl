@@ -6,24 +6,18 @@
 // does not matter.
 
 // Down to the leaf where the ray is at t_enter, through all slabs but the leaf's own: where the ray leaves other cells is not
-// known. Then node_ix is where the rope of the face leads to by which the ray leaves it.
+// known. Then node_at is where the rope of the face leads to by which the ray leaves it.
 KdNode descend_to_rope(TraversalRay ray, float t_best, inout Cell cell) {
-    KdNode node = kd_node(cell.node_ix);
-    while (axis_of(node) != KD_LEAF) {
-        cell.node_ix = child_of(ray, node, cell.t_enter > crossing(ray, node));
-        node = kd_node(cell.node_ix);
+    KdNode node = kd_node(cell.node_at);
+    while (!is_leaf(node)) {
+        cell.node_at = child_of(ray, node, cell.t_enter > crossing(ray, node));
+        node = kd_node(cell.node_at);
     }
-    vec3 far = slabs_of(ray, cell.node_ix).far;
+    vec3 far = slabs_of(ray, index_of(cell.node_at)).far;
     uint axis = far.x <= far.y && far.x <= far.z ? 0u : (far.y <= far.z ? 1u : 2u);
     uint is_above = along(ray.inv_direction, axis) < 0.0 ? 0u : 1u;
     cell.t_exit = along(far, axis);
     if (has_slab(node)) node = enter_slab(ray, t_best, cell, node);
-    cell.node_ix = kd_rope_of(cell.node_ix, 2u * axis + is_above);
+    cell.node_at = place_of(kd_rope_of(index_of(cell.node_at), 2u * axis + is_above));
     return node;
-}
-
-// Whether the rope leads to anything that may hold a hit nearer than t_best.
-bool follow_rope(float t_best, inout Cell cell) {
-    cell.t_enter = cell.t_exit;
-    return cell.node_ix != 0u && !(t_best < cell.t_enter);
 }

@@ -47,7 +47,7 @@ uint triangle_material_at(uint triangle_ix) {
     return triangle_materials[triangle_ix];
 }
 
-KdNode kd_node_at(uint node_ix) {
+KdNode kd_node_of(uint node_ix) {
     uvec2 words;
     if (BY_ADDRESS) words = Pairs(addresses.kd_nodes).at[node_ix];
     else words = kd_nodes[node_ix];

@@ -1,14 +1,15 @@
 // What spares a ray tests: where it keeps clear of the slab around a node's surface, all that is below; where it keeps clear of
 // a triangle's plane, the triangle.
 
-// A way from t_middle - t_half to t_middle + t_half.
+// A way from t_middle - t_half to t_middle + t_half, in the ray's own t.
 struct Stretch {
     float t_middle;
     float t_half;
 };
 
+// In the traversal's t, which are half as large.
 Stretch stretch(float t_enter, float t_exit) {
-    return Stretch(0.5 * (t_enter + t_exit), 0.5 * (t_exit - t_enter));
+    return Stretch(t_enter + t_exit, t_exit - t_enter);
 }
 
 // Whether the ray keeps to one side of a plane (normal, distance from the origin) on its way, farther from it than `reach`.
@@ -20,8 +21,8 @@ bool is_clear(TraversalRay ray, Stretch way, vec4 plane, float reach) {
 
 // A split that has no slab, or none that is looked at.
 bool is_open_split(KdNode node) {
-    if (RUNS_BOTH_SIDES) return axis_of(node) != KD_LEAF;
-    return (node.axis_and_child & (KD_AXIS_MASK | KD_IN_SLAB)) < KD_LEAF;
+    if (RUNS_BOTH_SIDES) return !is_leaf(node);
+    return (node.axis_and_child & (KD_LEAF | KD_IN_SLAB)) == 0u;
 }
 
 bool has_slab(KdNode node) {
@@ -32,6 +33,7 @@ bool has_slab(KdNode node) {
 // The node as it is within its slab; an empty leaf, if the ray does not come into that in its way through the cell.
 KdNode enter_slab(TraversalRay ray, float t_best, Cell cell, KdNode node) {
     count_steps(1u);
-    if (is_clear(ray, stretch(cell.t_enter, min(cell.t_exit, t_best)), kd_slab_of(cell.node_ix), 1.0)) return KdNode(0u, KD_LEAF);
+    Stretch way = stretch(cell.t_enter, min(cell.t_exit, t_best));
+    if (is_clear(ray, way, kd_slab_of(index_of(cell.node_at)), 1.0)) return KdNode(0u, KD_LEAF);
     return KdNode(node.split_or_first, node.axis_and_child & ~KD_IN_SLAB);
 }

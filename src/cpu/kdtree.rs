@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     kdtree::EMPTY_LEAF,
-    layout::{Hit, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_ORIGIN_REACH, KD_PLANE_REACH, KdNode, NO_TRIANGLE, Ray},
+    layout::{Hit, KD_AXIS_MASK, KD_LEAF, KD_ORIGIN_REACH, KD_PAIR_SHIFT, KD_PLANE_REACH, KdNode, NO_TRIANGLE, Ray},
 };
 
 /// A node and the interval that the ray spends in it.
@@ -91,7 +91,7 @@ impl TraversalRay {
     #[inline(always)]
     pub fn first_child(&self, node: KdNode) -> u32 {
         let first_is_above = u32::from(self.inv_direction[axis_of(node) as usize] < 0.0);
-        (node.axis_and_child >> KD_CHILD_SHIFT) + first_is_above
+        2 * (node.axis_and_child >> KD_PAIR_SHIFT) + first_is_above
     }
 }
 
@@ -120,10 +120,15 @@ fn by_axis([x, y, z]: [f32; 3]) -> [f32; 4] {
     [x, y, z, 0.0]
 }
 
-/// Split axis, or `KD_LEAF`.
+/// Of a split.
 #[inline(always)]
 pub fn axis_of(node: KdNode) -> u32 {
     node.axis_and_child & KD_AXIS_MASK
+}
+
+#[inline(always)]
+pub fn is_leaf(node: KdNode) -> bool {
+    node.axis_and_child & KD_LEAF != 0
 }
 
 /// How subtrees that are left for later are kept.
@@ -152,7 +157,7 @@ fn descend<P: Pending>(
         {
             return EMPTY_LEAF;
         }
-        if axis_of(node) == KD_LEAF {
+        if is_leaf(node) {
             return node;
         }
         let t_cross = ray.crossing(node);

@@ -3,7 +3,7 @@
 use glam::{Mat4, Vec3A, Vec4};
 
 use super::{bindings::Bindings, kdtree::TraversalRay, table::Reads, triangle::Shear};
-use crate::layout::{Hit, KD_CHILD_SHIFT, KdNode, Plane, Ray};
+use crate::layout::{Hit, KD_PAIR_SHIFT, KdNode, Plane, Ray};
 
 /// What tells a ray's hits from what it passes by.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +37,7 @@ pub fn intersect(bindings: &Bindings<impl Reads>, target: &Target, triangle_ix: 
 #[inline(always)]
 pub fn entries_of(leaf: KdNode) -> std::ops::Range<usize> {
     let first = leaf.split_or_first as usize;
-    first..first + (leaf.axis_and_child >> KD_CHILD_SHIFT) as usize
+    first..first + (leaf.axis_and_child >> KD_PAIR_SHIFT) as usize
 }
 
 /// Four planes, of which the last may be void, as columns: normal's x, y, z and distance.

@@ -6,7 +6,7 @@ use fearless_simd::{Level, Simd, dispatch, f32x8, prelude::*};
 
 use super::{
     bindings::Bindings,
-    kdtree::{Cell, Pending, TraversalRay, axis_of, search, search_cell},
+    kdtree::{Cell, Pending, TraversalRay, axis_of, is_leaf, search, search_cell},
     packet::{Interval, LANES, Packet},
     pending_stack::PendingStack,
     slab::slab_of,
@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     kdtree::EMPTY_LEAF,
-    layout::{Hit, KD_CHILD_SHIFT, KD_LEAF, KD_MAX_DEPTH, KdNode},
+    layout::{Hit, KD_MAX_DEPTH, KD_PAIR_SHIFT, KdNode},
 };
 
 /// The working memory of a thread.
@@ -60,12 +60,12 @@ impl PacketTraverser {
                     return EMPTY_LEAF;
                 }
             }
-            if axis_of(node) == KD_LEAF {
+            if is_leaf(node) {
                 return node;
             }
             let axis = axis_of(node) as usize;
             let t_cross = f32::from_bits(node.split_or_first) * packet.inv_direction[axis] + packet.bias[axis];
-            let first_ix = (node.axis_and_child >> KD_CHILD_SHIFT) + first_is_above[axis];
+            let first_ix = 2 * (node.axis_and_child >> KD_PAIR_SHIFT) + first_is_above[axis];
             // Those in neither have met a NaN, or are not in the cell.
             let first = Interval { enter: cell.enter, exit: t_cross.min(cell.exit) };
             let second = Interval { enter: t_cross.max(cell.enter), exit: cell.exit };

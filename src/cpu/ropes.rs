@@ -2,18 +2,18 @@
 
 use super::{
     bindings::Bindings,
-    kdtree::{TraversalRay, axis_of, is_done, min},
+    kdtree::{TraversalRay, is_done, is_leaf, min},
     leaf::intersect_leaf,
     slab::slab_of,
     table::Reads,
 };
-use crate::layout::{Hit, KD_LEAF, KdNode};
+use crate::layout::{Hit, KdNode};
 
 /// The leaf in `node_ix` where the ray is at t.
 #[inline(always)]
 fn leaf_at(bindings: &Bindings<impl Reads>, ray: &TraversalRay, t: f32, node_ix: &mut u32) -> KdNode {
     let mut node = bindings.kd_nodes[*node_ix as usize];
-    while axis_of(node) != KD_LEAF {
+    while !is_leaf(node) {
         *node_ix = ray.first_child(node) ^ u32::from(t > ray.crossing(node));
         node = bindings.kd_nodes[*node_ix as usize];
     }

@@ -31,7 +31,7 @@ mod validate;
 
 use glam::Vec3;
 
-use crate::layout::{Frame, KD_AXIS_MASK, KD_CHILD_SHIFT, KD_LEAF, KD_MAX_DEPTH, KD_PLANE_REACH, KdNode, Plane, Slab};
+use crate::layout::{Frame, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_REACH, KdNode, Plane, Slab};
 
 pub use extras::Extras;
 pub use statistics::Statistics;
@@ -115,7 +115,7 @@ impl BuildOptions {
 /// A node, decoded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Node {
-    /// The children are `child` (below `position`) and `child + 1` (above).
+    /// The children are `child` (below `position`), which is even, and `child + 1` (above).
     Split { axis: usize, position: f32, child: u32 },
     /// `leaf_triangles[first .. first + count]`.
     Leaf { first: u32, count: u32 },
@@ -126,11 +126,12 @@ pub(crate) const EMPTY_LEAF: KdNode = KdNode { split_or_first: 0, axis_and_child
 
 impl From<KdNode> for Node {
     fn from(node: KdNode) -> Self {
-        let high = node.axis_and_child >> KD_CHILD_SHIFT;
-        match node.axis_and_child & KD_AXIS_MASK {
-            KD_LEAF => Self::Leaf { first: node.split_or_first, count: high },
-            axis => Self::Split { axis: axis as usize, position: f32::from_bits(node.split_or_first), child: high },
+        let high = node.axis_and_child >> KD_PAIR_SHIFT;
+        if node.axis_and_child & KD_LEAF != 0 {
+            return Self::Leaf { first: node.split_or_first, count: high };
         }
+        let axis = (node.axis_and_child & KD_AXIS_MASK) as usize;
+        Self::Split { axis, position: f32::from_bits(node.split_or_first), child: 2 * high }
     }
 }
 
@@ -138,10 +139,11 @@ impl From<Node> for KdNode {
     fn from(node: Node) -> Self {
         match node {
             Node::Leaf { first, count } => {
-                Self { split_or_first: first, axis_and_child: count << KD_CHILD_SHIFT | KD_LEAF }
+                Self { split_or_first: first, axis_and_child: count << KD_PAIR_SHIFT | KD_LEAF }
             }
             Node::Split { axis, position, child } => {
-                Self { split_or_first: position.to_bits(), axis_and_child: child << KD_CHILD_SHIFT | axis as u32 }
+                debug_assert!(child % 2 == 0, "child {child}");
+                Self { split_or_first: position.to_bits(), axis_and_child: (child / 2) << KD_PAIR_SHIFT | axis as u32 }
             }
         }
     }

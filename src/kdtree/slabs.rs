@@ -14,8 +14,8 @@ use crate::layout::{KD_IN_SLAB, Slab, Triangle};
 
 /// Entries below a node at most: on the way down, the first node with no more than each of these gets a slab, if the surface
 /// there is flat enough to be passed by. Larger pieces hardly are (benches/EXPERIMENTS.md).
-const MOST_ENTRIES: [u32; 5] = [4, 16, 64, 256, LARGEST_PATCH];
-const LARGEST_PATCH: u32 = 1024;
+const MOST_ENTRIES: [u32; 5] = [8, 32, 128, 512, LARGEST_PATCH];
+const LARGEST_PATCH: u32 = 2048;
 /// Entries of a leaf at least; a single one's plane does as well.
 const LEAF_ENTRIES: u32 = 2;
 /// Of the longest side of a cell: how thick the slab of a split may be, and of a leaf.

@@ -17,7 +17,9 @@ pub enum Invalid {
     RootCell,
     #[error("node 1 or the root's parent is not 0")]
     Unused,
-    #[error("node {node}: child {child} is odd, the root or out of range")]
+    #[error("node {node} is split along no axis")]
+    Axis { node: u32 },
+    #[error("node {node}: child {child} is the root or out of range")]
     Child { node: u32, child: u32 },
     #[error("node {node} has two parents")]
     Shared { node: u32 },
@@ -126,7 +128,10 @@ impl<'a> Walk<'a> {
     }
 
     fn split(&self, node: u32, (axis, position): (usize, f32), child: u32, cell: &Bounds) -> Result<(), Invalid> {
-        if child < 2 || child % 2 == 1 || child as usize + 1 >= self.tree.nodes.len() {
+        if axis > 2 {
+            return Err(Invalid::Axis { node });
+        }
+        if child < 2 || child as usize + 1 >= self.tree.nodes.len() {
             return Err(Invalid::Child { node, child });
         }
         let (pair, found) = (child / 2, self.tree.parents[child as usize / 2]);
