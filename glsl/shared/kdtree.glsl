@@ -215,7 +215,7 @@ void intersect(TraversalRay ray, uint triangle_ix, inout Nearest best) {
     bool nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
     if (hit.t > ray.t_min && nearer && triangle_ix != ray.source_triangle) {
         best = Nearest(hit.t, triangle_ix);
-        local_cells[WEIGHTS_PLACE] = floatBitsToUint(vec2(hit.u, hit.v));
+        keep_pair(WEIGHTS_PLACE, hit.u, hit.v);
     }
 }
 
@@ -235,6 +235,8 @@ Visit visit_leaf(KdNode leaf, float t_enter, float t_exit) {
 // On to the leaf's next triangle whose plane the ray meets on its way. It may meet the others' planes elsewhere, in leaves
 // that have those triangles too: most are in several, so most tests are spared.
 bool find_candidate(TraversalRay ray, inout Visit visit, out uint entry_ix) {
+    // What is left undefined is kept from turn to turn, in a register.
+    entry_ix = 0u;
     while (visit.entry_ix < visit.end_ix) {
         entry_ix = visit.entry_ix;
         visit.entry_ix += 1u;
@@ -306,12 +308,14 @@ Hit traverse(Ray ray_in, float t_min, bool any_hit) {
     float t_start;
     Ray ray_near = near_scene(ray_in, t_start);
     TraversalRay ray = traversal_ray(ray_near, t_min - t_start);
+    keep_pair(LENGTHS_PLACE, t_start, ray_in.t_max);
     Nearest best = Nearest(0.5 * ray_near.t_max, NO_TRIANGLE);
     if (TRAVERSAL == TRAVERSAL_BRUTE) intersect_all(ray, any_hit, best);
     else search(ray, any_hit, best);
-    if (best.triangle_ix == NO_TRIANGLE) return Hit(ray_in.t_max, NO_TRIANGLE, 0.0, 0.0);
-    vec2 weights = uintBitsToFloat(local_cells[WEIGHTS_PLACE]);
-    return Hit(2.0 * best.t + t_start, best.triangle_ix, weights.x, weights.y);
+    vec2 lengths = kept_pair(LENGTHS_PLACE);
+    if (best.triangle_ix == NO_TRIANGLE) return Hit(lengths.y, NO_TRIANGLE, 0.0, 0.0);
+    vec2 weights = kept_pair(WEIGHTS_PLACE);
+    return Hit(2.0 * best.t + lengths.x, best.triangle_ix, weights.x, weights.y);
 }
 
 #endif
