@@ -88,7 +88,6 @@ Hit weighted_hit(Shear shear, vec3 edges, float det, vec3 z, uint triangle_ix) {
 // Watertight and two-sided (Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2013), edges included.
 // False also for a triangle without area and for NaN. t may be negative.
 bool intersect_triangle(Shear shear, Triangle triangle, uint triangle_ix, out Hit hit) {
-    hit = Hit(0.0, NO_TRIANGLE, 0.0, 0.0);
     vec3 a = sheared(shear, triangle.v0);
     vec3 b = sheared(shear, triangle.v1);
     vec3 c = sheared(shear, triangle.v2);
