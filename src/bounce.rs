@@ -1,38 +1,47 @@
 //! Rows of `bounces`: how many rays a level has, and what that makes of its dispatches. `compact_spine.comp` does the same on
 //! the device.
 
-use crate::layout::{Bounce, Frame, MOST_LANES_LOG2, RAY_GROUP_SIZE, SCAN_BLOCK_SIZE};
+use std::ops::Range;
+
+use crate::layout::{Bounce, Frame, MOST_LANES_LOG2, RAY_GROUP_SIZE, SCAN_GROUP_SIZE};
 
 impl Bounce {
-    /// A level of `n_rays`, all of which there is room for.
+    /// A batch's first level, of `n_rays`, all of which there is room for.
     pub fn of(n_rays: u32, constants: &Frame) -> Self {
         let mut row = Self {
             n_wanted: n_rays,
-            ray_groups_y: 1,
-            ray_groups_z: 1,
             trace_groups_y: 1,
             trace_groups_z: 1,
             shadow_groups_y: constants.n_lights,
             shadow_groups_z: 1,
             scan_groups_y: 1,
             scan_groups_z: 1,
+            shade_groups_y: 1,
+            shade_groups_z: 1,
             ..Self::default()
         };
-        row.set_n_rays(n_rays, constants);
+        row.set_rays(0, n_rays, constants);
         row
     }
 
-    /// Sizes the dispatches along x.
-    pub fn set_n_rays(&mut self, n_rays: u32, constants: &Frame) {
+    /// The level's place in the queue; sizes the dispatches along x.
+    pub fn set_rays(&mut self, first_ray: u32, n_rays: u32, constants: &Frame) {
+        let n_so_far = first_ray + n_rays;
         let for_rays = lanes_log2(n_rays, constants.n_lanes);
-        let for_segments = lanes_log2(n_rays * constants.n_lights, constants.n_lanes);
+        let for_segments = lanes_log2(n_so_far * constants.n_lights, constants.n_lanes);
+        self.first_ray = first_ray;
         self.n_rays = n_rays;
-        self.ray_groups_x = n_rays.div_ceil(RAY_GROUP_SIZE);
         self.trace_groups_x = (n_rays << for_rays).div_ceil(RAY_GROUP_SIZE);
         self.trace_lanes_log2 = for_rays;
-        self.shadow_groups_x = (n_rays << for_segments).div_ceil(RAY_GROUP_SIZE);
+        self.shadow_groups_x = (n_so_far << for_segments).div_ceil(RAY_GROUP_SIZE);
         self.shadow_lanes_log2 = for_segments;
-        self.scan_groups_x = n_rays.div_ceil(SCAN_BLOCK_SIZE);
+        self.scan_groups_x = n_rays.div_ceil(SCAN_GROUP_SIZE);
+        self.shade_groups_x = n_so_far.div_ceil(RAY_GROUP_SIZE);
+    }
+
+    /// The places of its rays in the queue.
+    pub fn rays(&self) -> Range<usize> {
+        self.first_ray as usize..(self.first_ray + self.n_rays) as usize
     }
 }
 
@@ -58,9 +67,13 @@ mod tests {
     }
 
     #[test]
-    fn without_lanes_to_spare_all_dispatches_over_rays_are_alike() {
-        let row = Bounce::of(100, &Frame { n_lights: 3, ..Frame::default() });
-        assert_eq!([row.ray_groups_x, row.trace_groups_x, row.shadow_groups_x, row.shadow_groups_y], [2, 2, 2, 3]);
+    fn light_is_for_all_rays_so_far() {
+        let constants = Frame { n_lights: 3, ..Frame::default() };
+        let mut row = Bounce::of(100, &constants);
+        assert_eq!([row.trace_groups_x, row.shade_groups_x, row.shadow_groups_x, row.shadow_groups_y], [2, 2, 2, 3]);
         assert_eq!((row.trace_lanes_log2, row.shadow_lanes_log2), (0, 0));
+        row.set_rays(100, 60, &constants);
+        assert_eq!([row.trace_groups_x, row.shade_groups_x, row.shadow_groups_x, row.shadow_groups_y], [1, 3, 3, 3]);
+        assert_eq!((row.scan_groups_x, row.rays()), (1, 100..160));
     }
 }

@@ -152,6 +152,13 @@ pub enum Primary {
     Trace,
 }
 
+impl Primary {
+    /// What takes less work: the rasterizer goes over all triangles, tracing over all pixels of the whole picture.
+    pub fn suited_to(n_triangles: usize, (width, height): (u32, u32)) -> Self {
+        if n_triangles as u64 <= u64::from(width) * u64::from(height) { Self::Raster } else { Self::Trace }
+    }
+}
+
 /// A rendered frame, or the part of it that was asked for. Rows from the top, left to right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {

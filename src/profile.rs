@@ -5,19 +5,35 @@ use crate::{
     layout::{Bounce, Counters},
 };
 
+/// Whether it lights the hits of all of a batch's bounces.
+fn is_lighting(pass: &PassTime) -> bool {
+    ["shadow", "shade", "resolve"].contains(&pass.name)
+}
+
+/// Whether it runs once a batch, or once a bounce of a batch.
+pub(crate) fn is_in_batch(pass: &PassTime) -> bool {
+    pass.bounce.is_some() || is_lighting(pass)
+}
+
 /// Fills in a pass's rays. `bounces`: of the pass's batch.
 pub(crate) fn count_rays(pass: &mut PassTime, bounces: &[BounceStats], primary: Primary) {
+    if is_lighting(pass) {
+        let sum = |count: fn(&BounceStats) -> u64| bounces.iter().map(count).sum();
+        pass.n_rays_in = Some(sum(|bounce| bounce.n_rays));
+        // Of the others, rays end in pixels.
+        pass.n_rays_out = (pass.name == "shadow").then(|| sum(|bounce| bounce.n_shadow_rays));
+        return;
+    }
     let Some(bounce_ix) = pass.bounce.map(|bounce| bounce as usize) else { return };
     let Some(bounce) = bounces.get(bounce_ix) else { return };
     pass.n_rays_in = Some(bounce.n_rays);
     pass.n_rays_out = match pass.name {
         "primary_hit" if primary == Primary::Trace => Some(bounce.n_rays),
         "primary_hit" | "trace" => Some(bounce.n_hits),
-        "shadow" => Some(bounce.n_shadow_rays),
-        "shade" | "compact_reduce" | "compact_spine" | "compact_scatter" => {
+        "compact_reduce" | "compact_spine" | "compact_scatter" => {
             Some(bounces.get(bounce_ix + 1).map_or(0, |next| next.n_rays))
         }
-        _ => None, // resolve: rays end in pixels
+        _ => None,
     };
 }
 
@@ -36,8 +52,8 @@ pub(crate) fn device_counts(bounces: &[Bounce], counters: &[Counters]) -> Vec<Bo
 pub(crate) fn count_batches(passes: &mut [PassTime], counts: &[BounceStats], max_depth: u32, primary: Primary) {
     let batches = || (0..).zip(counts.chunks_exact(max_depth as usize));
     // Every batch is recorded alike, whatever becomes of its rays.
-    let passes_a_batch = passes.iter().filter(|pass| pass.bounce.is_some()).count() / batches().count().max(1);
-    let mut in_batches = passes.iter_mut().filter(|pass| pass.bounce.is_some());
+    let passes_a_batch = passes.iter().filter(|pass| is_in_batch(pass)).count() / batches().count().max(1);
+    let mut in_batches = passes.iter_mut().filter(|pass| is_in_batch(pass));
     for (batch_ix, bounces) in batches() {
         for pass in in_batches.by_ref().take(passes_a_batch) {
             pass.batch = Some(batch_ix);
@@ -69,27 +85,28 @@ mod tests {
 
     #[test]
     fn each_pass_has_the_rays_of_its_batch_and_bounce() {
-        let names = ["primary_hit", "shadow", "shade", "resolve", "compact_scatter"];
-        let second = ["trace", "shade"];
         let mut passes = vec![pass("visibility", None)];
         for _ in 0..2 {
-            passes.extend(names.map(|name| pass(name, Some(0))));
-            passes.extend(second.map(|name| pass(name, Some(1))));
+            passes.extend(["primary_hit", "features", "compact_scatter"].map(|name| pass(name, Some(0))));
+            passes.push(pass("trace", Some(1)));
+            passes.extend(["shadow", "shade", "resolve"].map(|name| pass(name, None)));
         }
         passes.push(pass("tonemap", None));
-        let counts = [stats(64, 60, 50), stats(20, 10, 0), stats(32, 30, 9), stats(8, 7, 0)];
+        let counts = [stats(64, 60, 50), stats(20, 10, 4), stats(32, 30, 9), stats(8, 7, 0)];
         count_batches(&mut passes, &counts, 2, Primary::Raster);
         let found: Vec<_> = passes.iter().map(|p| (p.batch, p.n_rays_in, p.n_rays_out)).collect();
         let batch = |ix, [first, second]: [BounceStats; 2]| {
-            let [n, m] = [first.n_rays, second.n_rays].map(Some);
+            let [n, m, all] = [first.n_rays, second.n_rays, first.n_rays + second.n_rays].map(Some);
             let [hits, more_hits] = [first.n_hits, second.n_hits].map(Some);
-            let outs = [hits, Some(first.n_shadow_rays), m, None, m].map(|out| (Some(ix), n, out));
-            [&outs[..], &[(Some(ix), m, more_hits), (Some(ix), m, Some(0))]].concat()
+            let n_tested = Some(first.n_shadow_rays + second.n_shadow_rays);
+            let of_first = [hits, None, m].map(|out| (Some(ix), n, out));
+            let of_all = [n_tested, None, None].map(|out| (Some(ix), all, out));
+            [&of_first[..], &[(Some(ix), m, more_hits)], &of_all[..]].concat()
         };
         let [a, b, c, d] = counts;
         let once = (None, None, None);
         assert_eq!(found, [vec![once], batch(0, [a, b]), batch(1, [c, d]), vec![once]].concat());
-        assert_eq!(sum_of_batches(&[a, b, c, d], 2), [stats(96, 90, 59), stats(28, 17, 0)]);
+        assert_eq!(sum_of_batches(&[a, b, c, d], 2), [stats(96, 90, 59), stats(28, 17, 4)]);
     }
 
     #[test]

@@ -12,8 +12,8 @@ use kdray::{
     gpu::{Access, Context, ContextOptions, GpuError},
     kdtree::{BuildOptions, KdTree},
     layout::{
-        BRUTE_MAX_TRIANGLES, Batch, Bounce, Counters, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, NO_TRIANGLE,
-        Ray, Triangle,
+        BRUTE_MAX_TRIANGLES, Batch, Bounce, Counters, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_LIT, LIGHT_POINT,
+        LIGHT_SHADOWED, LIGHT_UNTESTED, Light, NO_TRIANGLE, Ray, Triangle,
     },
     passes::{Passes, Resources},
     render::Renderer,
@@ -23,6 +23,7 @@ use support::{
     World, meshes,
     random::Random,
     rays::{N_KINDS, nasty_ray},
+    scenes,
 };
 
 const N_RAYS: usize = 4000;
@@ -39,7 +40,7 @@ fn scene(triangles: &[Triangle]) -> Scene {
         name: "variants".into(),
         triangles: triangles.to_vec(),
         triangle_materials: vec![0; triangles.len()],
-        materials: vec![Default::default()],
+        materials: vec![scenes::diffuse(Vec3::ONE)],
         material_names: vec![String::new()],
         lights: vec![lamp, sun],
         camera: Camera { eye: vec3(0.0, 0.5, 5.0), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 45.0 },
@@ -56,21 +57,20 @@ struct Traced {
     hits: Vec<[u32; 4]>,
     light_visibility: Vec<u32>,
     n_hits: u32,
-    n_shadow_rays: u32,
 }
 
 fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], traversal: Traversal) -> Traced {
-    let options = RenderOptions { width: 8, height: 8, traversal, ..RenderOptions::default() };
+    let options = RenderOptions { width: 8, height: 8, max_depth: 1, traversal, ..RenderOptions::default() };
     let constants = Frame { queue_capacity: rays.len() as u32, ..frame_constants(scene, tree, &options) };
     let mut resources = Resources::new(context, scene, tree, &constants, 1).expect("resources");
     resources.add_extras(context, tree, traversal).expect("extras");
     let passes = Passes::new(context, &resources.bindings, &options).expect("passes");
-    resources.queues.ray_queues[0].upload(rays).expect("rays");
+    resources.queue.rays.upload(rays).expect("rays");
     resources.bounces.upload(&[Bounce::of(rays.len() as u32, &constants)]).expect("bounces");
     resources.counters.upload(&[Counters::default()]).expect("counters");
     let batch = Batch { first_pixel: 0, n_pixels: 64, bounce_ix: 0, depth: 0 };
     let record = |commands: &kdray::gpu::Commands| {
-        resources.bind(commands, &batch);
+        resources.bind(commands);
         passes.trace.record(commands, &resources, &batch);
         commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // hits, counters
         passes.shadow.record(commands, &resources, &batch);
@@ -78,10 +78,9 @@ fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], tr
     context.run("variant", record).expect("run");
     let counters = resources.counters.download().expect("counters")[0];
     Traced {
-        hits: bytemuck::cast_slice(&resources.queues.hits.download().expect("hits")).to_vec(),
-        light_visibility: resources.queues.light_visibility.download().expect("light_visibility"),
+        hits: bytemuck::cast_slice(&resources.queue.hits.download().expect("hits")).to_vec(),
+        light_visibility: resources.queue.light_visibility.download().expect("light_visibility"),
         n_hits: counters.n_hits,
-        n_shadow_rays: counters.n_shadow_rays,
     }
 }
 
@@ -124,8 +123,9 @@ fn check_against_cpu(name: &str, world: &World, rays: &[Ray], found: &Traced) {
     let n_hits = hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count();
     assert!(n_wrong <= N_RAYS / 200, "{name}: {n_wrong} rays differ from the CPU's");
     assert!(n_hits > N_RAYS / 5 && found.n_hits == n_hits as u32, "{name}: {n_hits} hits, {} counted", found.n_hits);
-    let n_lit = found.light_visibility.iter().sum::<u32>();
-    assert!(n_lit > 0 && n_lit < found.n_shadow_rays, "{name}: {n_lit} of {} lit", found.n_shadow_rays);
+    let n_of = |state| found.light_visibility.iter().filter(|&&visibility| visibility == state).count();
+    let n_segments = [LIGHT_UNTESTED, LIGHT_LIT, LIGHT_SHADOWED].map(n_of);
+    assert!(n_segments.into_iter().all(|n| n > 0), "{name}: {n_segments:?} not tested, lit, in shadow");
 }
 
 #[test]

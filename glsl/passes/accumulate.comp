@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Accumulate: one invocation a pixel adds the frame's sample to those before it, and puts their mean in its place.
-// Where a ray queue overflowed the frame is drawn anew: then it adds nothing.
+// Where the ray queue overflowed the frame is drawn anew: then it adds nothing.
 // Reads bounces; updates pixel_accumulated (sums of radiance) and pixel_radiance (the sample, then the mean).
 #include "layout.glsl"
 

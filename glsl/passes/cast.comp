@@ -58,7 +58,7 @@ Hit cast_ray(CastRay ray) {
 }
 
 void main() {
-    uint ray_ix = ray_of_lane(batch.lanes_log2);
+    uint ray_ix = ray_of_lane(gl_GlobalInvocationID.x, batch.lanes_log2);
     if (ray_ix >= batch.n_rays) return;
     CastRay ray = cast_rays[ray_ix];
     cast_hits[ray_ix] = is_ray(ray) ? cast_ray(ray) : miss();

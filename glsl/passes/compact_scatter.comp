@@ -1,32 +1,48 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Compact, 3 of 3: one workgroup moves the children of one block of rays to their places in the next queue, in order
-// (after Harris, Sengupta, Owens: Parallel Prefix Sum (Scan) with CUDA, GPU Gems 3).
-// Reads child_rays, child_counts, scan_blocks, bounces; writes next_rays.
+// Compact, 3 of 3: one workgroup makes the rays that go on from the hits of SCAN_GROUP_SIZE rays, at their places in the queue,
+// in order and without gaps (after Harris, Sengupta, Owens: Parallel Prefix Sum (Scan) with CUDA, GPU Gems 3).
+// Reads rays, hits, child_kinds, scan_blocks, bounces and the scene; writes first_children, the next bounce's rays.
 #include "layout.glsl"
+#include "children.glsl"
 #include "scan.glsl"
+#include "store.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };
-layout(std430, set = 0, binding = BIND_CHILD_RAYS) readonly buffer ChildRaysBlock { Ray child_rays[]; };
-layout(std430, set = 0, binding = BIND_CHILD_COUNTS) readonly buffer ChildCountsBlock { uint child_counts[]; };
-layout(std430, set = 0, binding = BIND_SCAN_BLOCKS) readonly buffer ScanBlocksBlock { uint scan_blocks[]; };
+layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
+layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
-layout(std430, set = 0, binding = BIND_NEXT_RAYS) writeonly buffer NextRaysBlock { Ray next_rays[]; };
+layout(std430, set = 0, binding = BIND_CHILD_KINDS) readonly buffer ChildKindsBlock { uint child_kinds[]; };
+layout(std430, set = 0, binding = BIND_FIRST_CHILDREN) writeonly buffer FirstChildrenBlock { uint first_children[]; };
+layout(std430, set = 0, binding = BIND_SCAN_BLOCKS) readonly buffer ScanBlocksBlock { uint scan_blocks[]; };
+
+void make_children(uint ray_ix, uint kinds, uint child_ix) {
+    Ray ray = rays[ray_ix];
+    Hit hit = hits[ray_ix];
+    Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
+    Scattering next = scatter(material_at(hit), surface, ray.direction);
+    if ((kinds & CHILD_REFLECTED) != 0u) {
+        vec3 throughput = ray.throughput * next.reflected_weight;
+        store_ray(child_ix, ray_from(surface, next.reflected, hit.triangle_ix, ray, throughput));
+        child_ix += 1u;
+    }
+    if ((kinds & CHILD_TRANSMITTED) != 0u) {
+        vec3 throughput = ray.throughput * next.transmitted_weight;
+        store_ray(child_ix, ray_from(surface, next.transmitted, hit.triangle_ix, ray, throughput));
+    }
+}
 
 void main() {
-    uint n_rays = bounces[batch.bounce_ix].n_rays;
-    uint place = scan_blocks[gl_WorkGroupID.x];
-    bool has_room = bounces[batch.bounce_ix + 1u].overflow == 0u;
-    for (uint i = 0u; i < SCAN_ITEMS; ++i) {
-        uint ray_ix = gl_WorkGroupID.x * SCAN_BLOCK_SIZE + i * SCAN_GROUP_SIZE + scan_rank();
-        uint n_children = has_room && ray_ix < n_rays ? child_counts[ray_ix] : 0u;
-        uint total;
-        uint before = workgroup_exclusive_add(n_children, total);
-        for (uint child = 0u; child < n_children; ++child) {
-            next_rays[place + before + child] = child_rays[2u * ray_ix + child];
-        }
-        place += total;
-    }
+    uint place = gl_WorkGroupID.x * SCAN_GROUP_SIZE + scan_rank();
+    uint ray_ix = bounces[batch.bounce_ix].first_ray + place;
+    bool is_ray = place < bounces[batch.bounce_ix].n_rays && bounces[batch.bounce_ix + 1u].overflow == 0u;
+    uint kinds = is_ray ? child_kinds[ray_ix] : 0u;
+    uint n_children;
+    uint before = workgroup_exclusive_add(uint(bitCount(kinds)), n_children);
+    if (!is_ray) return;
+    uint child_ix = bounces[batch.bounce_ix + 1u].first_ray + scan_blocks[gl_WorkGroupID.x] + before;
+    first_children[ray_ix] = child_ix;
+    if (kinds != 0u) make_children(ray_ix, kinds, child_ix);
 }

@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Compact, 2 of 3: one workgroup turns the blocks' sums into their exclusive prefix sums and sizes the next bounce.
-// Where the queue cannot hold that many rays, the next bounce is empty and says `overflow`, and the first row `any_overflow`.
+// Where the queue has no room for that many rays, the next bounce is empty and says `overflow`, and the first row `any_overflow`.
 // Reads and writes scan_blocks, bounces.
 #include "layout.glsl"
 #include "scan.glsl"
@@ -19,35 +19,46 @@ uint lanes_log2(uint n_rays) {
     return n_lanes == 0u ? 0u : min(uint(findMSB(n_lanes)), MOST_LANES_LOG2);
 }
 
-uint groups_for(uint n_invocations) {
-    return (n_invocations + RAY_GROUP_SIZE - 1u) / RAY_GROUP_SIZE;
+uint groups_for(uint n_invocations, uint group_size) {
+    return (n_invocations + group_size - 1u) / group_size;
 }
 
 void size_next_bounce(uint n_wanted) {
-    uint n_rays = n_wanted <= frame.queue_capacity ? n_wanted : 0u;
     uint next_ix = batch.bounce_ix + 1u;
+    uint first_ray = bounces[batch.bounce_ix].first_ray + bounces[batch.bounce_ix].n_rays;
+    uint n_rays = n_wanted <= frame.queue_capacity - first_ray ? n_wanted : 0u;
+    bounces[next_ix].first_ray = first_ray;
+    bounces[next_ix].n_rays = n_rays;
+    bounces[next_ix].n_wanted = n_wanted;
     bounces[next_ix].overflow = n_rays == n_wanted ? 0u : 1u;
     if (n_rays != n_wanted) bounces[0].any_overflow = 1u;
-    bounces[next_ix].n_wanted = n_wanted;
-    bounces[next_ix].n_rays = n_rays;
+    uint n_so_far = first_ray + n_rays;
     uint for_rays = lanes_log2(n_rays);
-    uint for_segments = lanes_log2(n_rays * frame.n_lights);
-    bounces[next_ix].ray_groups_x = groups_for(n_rays);
-    bounces[next_ix].trace_groups_x = groups_for(n_rays << for_rays);
+    uint for_segments = lanes_log2(n_so_far * frame.n_lights);
+    bounces[next_ix].trace_groups_x = groups_for(n_rays << for_rays, RAY_GROUP_SIZE);
     bounces[next_ix].trace_lanes_log2 = for_rays;
-    bounces[next_ix].shadow_groups_x = groups_for(n_rays << for_segments);
+    bounces[next_ix].shadow_groups_x = groups_for(n_so_far << for_segments, RAY_GROUP_SIZE);
     bounces[next_ix].shadow_lanes_log2 = for_segments;
-    bounces[next_ix].scan_groups_x = (n_rays + SCAN_BLOCK_SIZE - 1u) / SCAN_BLOCK_SIZE;
+    bounces[next_ix].scan_groups_x = groups_for(n_rays, SCAN_GROUP_SIZE);
+    bounces[next_ix].shade_groups_x = groups_for(n_so_far, RAY_GROUP_SIZE);
 }
 
 void main() {
     uint n_blocks = bounces[batch.bounce_ix].scan_groups_x;
     uint carry = 0u;
-    for (uint first = 0u; first < n_blocks; first += SCAN_GROUP_SIZE) {
-        uint block = first + scan_rank();
+    for (uint first = 0u; first < n_blocks; first += SCAN_GROUP_SIZE * SPINE_ITEMS) {
+        uint begin = first + scan_rank() * SPINE_ITEMS;
+        // Loaded before any is needed, so that one does not wait for another.
+        uint n_children[SPINE_ITEMS];
+        for (uint i = 0u; i < SPINE_ITEMS; ++i) n_children[i] = begin + i < n_blocks ? scan_blocks[begin + i] : 0u;
+        uint sum = 0u;
+        for (uint i = 0u; i < SPINE_ITEMS; ++i) sum += n_children[i];
         uint total;
-        uint before = workgroup_exclusive_add(block < n_blocks ? scan_blocks[block] : 0u, total);
-        if (block < n_blocks) scan_blocks[block] = carry + before;
+        uint before = carry + workgroup_exclusive_add(sum, total);
+        for (uint i = 0u; i < SPINE_ITEMS; ++i) {
+            if (begin + i < n_blocks) scan_blocks[begin + i] = before;
+            before += n_children[i];
+        }
         carry += total;
     }
     if (gl_LocalInvocationIndex == 0u) size_next_bounce(carry);

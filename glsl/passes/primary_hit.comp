@@ -7,14 +7,12 @@
 #include "layout.glsl"
 #include "scene.glsl"
 #include "camera.glsl"
+#include "store.glsl"
 #include "triangle.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };
-layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 layout(set = 0, binding = BIND_TRIANGLE_IDS, r32ui) readonly uniform uimage2D triangle_ids;
-layout(std430, set = 0, binding = BIND_RAYS) writeonly buffer RaysBlock { Ray rays[]; };
-layout(std430, set = 0, binding = BIND_HITS) writeonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
 
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
@@ -32,15 +30,15 @@ void main() {
     if (ray_ix < batch.n_pixels) {
         uvec2 pixel = pixel_of(batch.first_pixel + ray_ix, frame.width, frame.height);
         float infinity = uintBitsToFloat(0x7f800000u);
-        Ray ray = Ray(frame.eye, pixel.y * frame.width + pixel.x, camera_direction(frame, pixel), NO_TRIANGLE,
+        Ray ray = Ray(frame.eye, pixel.y * frame.width + pixel.x, camera_direction(pixel), NO_TRIANGLE,
                       vec3(1.0), infinity);
-        rays[ray_ix] = ray;
+        store_ray(ray_ix, ray);
         if (FROM_RASTER == 1u) {
-            uint triangle_ix = imageLoad(triangle_ids, ivec2(in_picture(frame, pixel))).x;
+            uint triangle_ix = imageLoad(triangle_ids, ivec2(in_picture(pixel))).x;
             Hit hit = Hit(infinity, NO_TRIANGLE, 0.0, 0.0);
             is_hit = triangle_ix != NO_TRIANGLE;
             if (is_hit) hit = clamp_to_triangle(shear_of(ray.origin, ray.direction), triangle_at(triangle_ix), triangle_ix);
-            hits[ray_ix] = hit;
+            store_hit(ray_ix, hit);
             if (COUNT_COSTS) {
                 pixel_features[ray.pixel_ix].n_rays = 1u;
                 pixel_features[ray.pixel_ix].n_steps = is_hit ? 1u : 0u;

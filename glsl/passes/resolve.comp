@@ -1,24 +1,44 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Resolve: adds a bounce's radiance to the image. Compaction keeps order, so the rays of a pixel stand together: the
-// invocation of its first ray adds up all of them, one writer a pixel, always in the same order.
-// Reads rays, ray_radiance, bounces; adds to pixel_radiance (bounce 0: sets it).
+// Resolve: the light of all rays of a pixel. Compaction keeps order, so those of a bounce stand together, and one invocation a
+// primary ray goes from bounce to bounce by the places of their children: one writer a pixel, always in the same order.
+// Reads rays, ray_radiance, first_children, bounces; writes pixel_radiance.
 #include "layout.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };
+layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_RAY_RADIANCE) readonly buffer RayRadianceBlock { vec4 ray_radiance[]; };
+layout(std430, set = 0, binding = BIND_FIRST_CHILDREN) readonly buffer FirstChildrenBlock { uint first_children[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
-layout(std430, set = 0, binding = BIND_PIXEL_RADIANCE) buffer PixelRadianceBlock { vec4 pixel_radiance[]; };
+layout(std430, set = 0, binding = BIND_PIXEL_RADIANCE) writeonly buffer PixelRadianceBlock { vec4 pixel_radiance[]; };
+
+// The rays of a pixel in one bounce.
+struct Span {
+    uint begin;
+    uint end;
+};
+
+// Their children, which are in the bounce of the row.
+Span children_of(Span rays_of_pixel, uint bounce_ix) {
+    uint first_ray = bounces[bounce_ix].first_ray;
+    uint end = first_ray + bounces[bounce_ix].n_rays;
+    // Behind the last ray of a bounce stands none of it.
+    if (rays_of_pixel.end < first_ray) end = first_children[rays_of_pixel.end];
+    return Span(first_children[rays_of_pixel.begin], end);
+}
 
 void main() {
     uint ray_ix = gl_GlobalInvocationID.x;
-    uint n_rays = bounces[batch.bounce_ix].n_rays;
-    if (ray_ix >= n_rays) return;
-    uint pixel_ix = rays[ray_ix].pixel_ix;
-    if (ray_ix > 0u && rays[ray_ix - 1u].pixel_ix == pixel_ix) return;
-    vec3 sum = batch.depth == 0u ? vec3(0.0) : pixel_radiance[pixel_ix].rgb;
-    for (uint i = ray_ix; i < n_rays && rays[i].pixel_ix == pixel_ix; ++i) sum += ray_radiance[i].rgb;
-    pixel_radiance[pixel_ix] = vec4(sum, 1.0);
+    if (ray_ix >= batch.n_pixels) return;
+    vec3 sum = vec3(0.0);
+    Span span = Span(ray_ix, ray_ix + 1u);
+    for (uint depth = 0u; span.begin < span.end; ++depth) {
+        for (uint i = span.begin; i < span.end; ++i) sum += ray_radiance[i].rgb;
+        uint next_ix = batch.bounce_ix + depth + 1u;
+        if (depth + 1u == frame.max_depth || bounces[next_ix].n_rays == 0u) break;
+        span = children_of(span, next_ix);
+    }
+    pixel_radiance[rays[ray_ix].pixel_ix] = vec4(sum, 1.0);
 }

@@ -1,14 +1,18 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Shade (the paper's section 2.1): one invocation a ray adds up ambient, diffuse, specular and emitted light at its
-// hit and makes the next level's rays, scattered: up to two, in places 2 i and 2 i + 1.
-// Reads rays, hits, light_visibility and the scene; writes ray_radiance (weighted by throughput), child_rays,
-// child_counts.
+#extension GL_KHR_shader_subgroup_arithmetic : require
+// Shade (the paper's section 2.1): one invocation a ray of the batch, of any bounce, adds up ambient, diffuse, specular and
+// emitted light at its hit.
+// Reads rays, hits, light_visibility, bounces and the scene; writes ray_radiance (weighted by throughput),
+// counters[].n_shadow_rays.
 #include "layout.glsl"
 #include "scene.glsl"
 #include "surface.glsl"
 #include "light.glsl"
 #include "material.glsl"
+
+// Whether shadow segments are counted.
+layout(constant_id = 0) const bool COUNTS = true;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };
@@ -19,47 +23,44 @@ layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { B
 layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) readonly buffer LightVisibilityBlock { uint light_visibility[]; };
-layout(std430, set = 0, binding = BIND_CHILD_RAYS) writeonly buffer ChildRaysBlock { Ray child_rays[]; };
-layout(std430, set = 0, binding = BIND_CHILD_COUNTS) writeonly buffer ChildCountsBlock { uint child_counts[]; };
 layout(std430, set = 0, binding = BIND_RAY_RADIANCE) writeonly buffer RayRadianceBlock { vec4 ray_radiance[]; };
+layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
 
 vec3 local_radiance(Ray ray, uint ray_ix, Surface surface, Material material) {
     vec3 radiance = material.ke + material.ka * frame.ambient;
     for (uint light_ix = 0u; light_ix < frame.n_lights; ++light_ix) {
-        if (light_visibility[light_ix * frame.queue_capacity + ray_ix] == 0u) continue;
+        if (light_visibility[light_ix * frame.queue_capacity + ray_ix] != LIGHT_LIT) continue;
         LightSample to_light = sample_light(lights[light_ix], surface.point_world);
         radiance += phong(material, surface.shading, -ray.direction, to_light.direction) * to_light.irradiance;
     }
     return radiance * local_weight(material);
 }
 
-// Stores the child if it carries light; returns how many that makes.
-uint add_child(uint ray_ix, uint n_children, Surface surface, vec3 direction, uint triangle_ix, Ray parent, vec3 weight) {
-    vec3 throughput = parent.throughput * weight;
-    if (!any(greaterThan(throughput, vec3(0.0)))) return n_children;
-    child_rays[2u * ray_ix + n_children] = ray_from(surface, direction, triangle_ix, parent, throughput);
-    return n_children + 1u;
+vec3 radiance_of(Ray ray, uint ray_ix) {
+    Hit hit = hits[ray_ix];
+    if (hit.triangle_ix == NO_TRIANGLE) return ray.throughput * frame.background;
+    Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
+    return ray.throughput * local_radiance(ray, ray_ix, surface, materials[triangle_material_at(hit.triangle_ix)]);
+}
+
+// Adds the ray's shadow segments to those of its bounce.
+void count_segments(uint ray_ix) {
+    uint n_segments = 0u;
+    for (uint light_ix = 0u; light_ix < frame.n_lights; ++light_ix) {
+        n_segments += light_visibility[light_ix * frame.queue_capacity + ray_ix] == LIGHT_UNTESTED ? 0u : 1u;
+    }
+    for (uint depth = 0u; depth < frame.max_depth; ++depth) {
+        uint bounce_ix = batch.bounce_ix + depth;
+        bool is_of_bounce = ray_ix - bounces[bounce_ix].first_ray < bounces[bounce_ix].n_rays;
+        uint n_of_bounce = subgroupAdd(is_of_bounce ? n_segments : 0u);
+        if (subgroupElect() && n_of_bounce > 0u) atomicAdd(counters[bounce_ix].n_shadow_rays, n_of_bounce);
+    }
 }
 
 void main() {
     uint ray_ix = gl_GlobalInvocationID.x;
-    if (ray_ix >= bounces[batch.bounce_ix].n_rays) return;
-    Ray ray = rays[ray_ix];
-    Hit hit = hits[ray_ix];
-    if (hit.triangle_ix == NO_TRIANGLE) {
-        ray_radiance[ray_ix] = vec4(ray.throughput * frame.background, 0.0);
-        child_counts[ray_ix] = 0u;
-        return;
-    }
-    Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
-    Material material = materials[triangle_material_at(hit.triangle_ix)];
-    ray_radiance[ray_ix] = vec4(ray.throughput * local_radiance(ray, ray_ix, surface, material), 0.0);
-
-    uint n_children = 0u;
-    if (batch.depth + 1u < frame.max_depth) {
-        Scattering next = scatter(material, surface, ray.direction);
-        n_children = add_child(ray_ix, n_children, surface, next.reflected, hit.triangle_ix, ray, next.reflected_weight);
-        n_children = add_child(ray_ix, n_children, surface, next.transmitted, hit.triangle_ix, ray, next.transmitted_weight);
-    }
-    child_counts[ray_ix] = n_children;
+    uint last_ix = batch.bounce_ix + frame.max_depth - 1u;
+    if (ray_ix >= bounces[last_ix].first_ray + bounces[last_ix].n_rays) return;
+    ray_radiance[ray_ix] = vec4(radiance_of(rays[ray_ix], ray_ix), 0.0);
+    if (COUNTS) count_segments(ray_ix);
 }

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Trace (the paper's section 2.3): one working lane a ray finds its closest hit through the kd-tree.
+// Trace (the paper's section 2.3): one working lane a ray of the bounce finds its closest hit through the kd-tree.
 // Reads rays and the tree; writes hits, counters[].n_hits, pixel_features (n_rays, n_steps).
 #include "layout.glsl"
 
@@ -9,6 +9,7 @@
 layout(constant_id = 3) const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
 #include "lanes.glsl"
+#include "store.glsl"
 
 // Whether hits are counted.
 layout(constant_id = 2) const bool COUNTS = true;
@@ -16,17 +17,17 @@ layout(constant_id = 2) const bool COUNTS = true;
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };
 layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
-layout(std430, set = 0, binding = BIND_HITS) writeonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
 
 void main() {
-    uint ray_ix = ray_of_lane(bounces[batch.bounce_ix].trace_lanes_log2);
+    uint place = ray_of_lane(gl_GlobalInvocationID.x, bounces[batch.bounce_ix].trace_lanes_log2);
     bool is_hit = false;
-    if (ray_ix < bounces[batch.bounce_ix].n_rays) {
+    if (place < bounces[batch.bounce_ix].n_rays) {
+        uint ray_ix = bounces[batch.bounce_ix].first_ray + place;
         Hit hit = traverse(rays[ray_ix], 0.0, false);
-        hits[ray_ix] = hit;
+        store_hit(ray_ix, hit);
         if (COUNT_COSTS) {
             atomicAdd(pixel_features[rays[ray_ix].pixel_ix].n_rays, 1u);
             atomicAdd(pixel_features[rays[ray_ix].pixel_ix].n_steps, n_steps);

@@ -4,6 +4,8 @@
 
 #include "layout.glsl"
 
+layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
+
 // Every second bit of a number below 64.
 uint every_second_bit(uint n) {
     return (n & 1u) | ((n >> 1) & 2u) | ((n >> 2) & 4u);
@@ -34,13 +36,13 @@ uvec2 pixel_of(uint order, uint width, uint height) {
 }
 
 // The window's pixel in the whole picture.
-uvec2 in_picture(Frame frame, uvec2 pixel) {
+uvec2 in_picture(uvec2 pixel) {
     return pixel + uvec2(frame.window_x, frame.window_y);
 }
 
 // Unit direction through the sample of the window's pixel, the one that the rasterizer tests.
-vec3 camera_direction(Frame frame, uvec2 pixel) {
-    vec2 at_px = vec2(in_picture(frame, pixel)) + vec2(frame.sample_x, frame.sample_y);
+vec3 camera_direction(uvec2 pixel) {
+    vec2 at_px = vec2(in_picture(pixel)) + vec2(frame.sample_x, frame.sample_y);
     vec2 at = at_px / vec2(frame.picture_width, frame.picture_height) * 2.0 - 1.0;
     return normalize(frame.forward + at.x * frame.right - at.y * frame.up);
 }

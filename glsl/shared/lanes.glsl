@@ -3,9 +3,8 @@
 #ifndef KDRAY_LANES
 #define KDRAY_LANES
 
-// The ray of this lane, or one beyond all.
-uint ray_of_lane(uint lanes_log2) {
-    uint lane = gl_GlobalInvocationID.x;
+// The ray of a lane, or one beyond all.
+uint ray_of_lane(uint lane, uint lanes_log2) {
     bool works = (lane & ((1u << lanes_log2) - 1u)) == 0u;
     return works ? lane >> lanes_log2 : 0xffffffffu;
 }

@@ -13,9 +13,8 @@
 #define MOST_LANES_LOG2 5u
 // Vulkan guarantees 128 invocations on every device.
 #define SCAN_GROUP_SIZE 128u
-// Counts that one invocation of a scan adds up; a scan block is SCAN_GROUP_SIZE * SCAN_ITEMS counts.
-#define SCAN_ITEMS 8u
-#define SCAN_BLOCK_SIZE 1024u
+// Blocks of SCAN_GROUP_SIZE rays of which one invocation of the spine adds up the counts.
+#define SPINE_ITEMS 8u
 
 // A ray that hits nothing, a pixel that no triangle covers.
 #define NO_TRIANGLE 0xffffffffu
@@ -65,6 +64,16 @@
 #define MATERIAL_REFLECT 2u
 #define MATERIAL_REFRACT 4u
 #define MATERIAL_FRESNEL 8u
+
+// Which rays go on from a hit: child_kinds. In this order they stand in the queue.
+#define CHILD_REFLECTED 1u
+#define CHILD_TRANSMITTED 2u
+
+// What light_visibility says of a ray's hit and a light: not asked for, since the light could not be seen there; lit by it;
+// in the shadow of something.
+#define LIGHT_UNTESTED 0u
+#define LIGHT_LIT 1u
+#define LIGHT_SHADOWED 2u
 
 // Light.kind
 #define LIGHT_POINT 0u
@@ -205,18 +214,16 @@ struct Frame {
 };
 
 // One a batch and bounce, 80 bytes, sized by the bounce before: each `groups` is a VkDispatchIndirectCommand. trace and shadow
-// have their own, with 2^lanes_log2 lanes for a ray, or a segment, of which the first works (bounce.rs).
-// n_wanted: rays that the bounce before made; overflow: 1 where they are more than a queue holds. Then n_rays is 0,
+// have 2^lanes_log2 lanes for a ray, or a segment, of which the first works (bounce.rs). Those of shadow and shade are for all
+// rays of the batch up to this bounce's last one.
+// Rays of a batch stand in one queue, bounce after bounce: this one's are first_ray and the n_rays from there on.
+// n_wanted: rays that the bounce before made; overflow: 1 where the queue has no room for them. Then n_rays is 0,
 // and the batch has to be split. any_overflow: of the first row only, 1 where one of all the frame's has an overflow.
 struct Bounce {
+    uint first_ray;
     uint n_rays;
     uint n_wanted;
     uint overflow;
-    uint any_overflow;
-    uint ray_groups_x;
-    uint ray_groups_y;
-    uint ray_groups_z;
-    uint reserved0;
     uint trace_groups_x;
     uint trace_groups_y;
     uint trace_groups_z;
@@ -228,7 +235,11 @@ struct Bounce {
     uint scan_groups_x;
     uint scan_groups_y;
     uint scan_groups_z;
-    uint reserved1;
+    uint any_overflow;
+    uint shade_groups_x;
+    uint shade_groups_y;
+    uint shade_groups_z;
+    uint reserved0;
 };
 
 // One a batch and bounce, 8 bytes: for the profile. Integer sums, the same in every order of arrival.
@@ -274,7 +285,8 @@ struct Addresses {
 #define CONSTANT_BY_ADDRESS 31u
 #define CONSTANT_MASK_WORDS 30u
 
-// Push constants: the batch's pixels [first_pixel, first_pixel + n_pixels) in tile order, and its row of `bounces`.
+// Push constants: the batch's pixels [first_pixel, first_pixel + n_pixels) in tile order, and the row of `bounces` of its bounce
+// of this depth; for what lights all of its rays, depth is 0 and the row its first.
 struct Batch {
     uint first_pixel;
     uint n_pixels;
@@ -326,30 +338,29 @@ struct DriverCast {
 #define BIND_KD_PARENTS 6u
 #define BIND_LEAF_TRIANGLES 7u
 #define BIND_RAYS 8u
-#define BIND_NEXT_RAYS 9u
-#define BIND_CHILD_RAYS 10u
-#define BIND_CHILD_COUNTS 11u
-#define BIND_SCAN_BLOCKS 12u
-#define BIND_BOUNCES 13u
-#define BIND_HITS 14u
-#define BIND_LIGHT_VISIBILITY 15u
-#define BIND_RAY_RADIANCE 16u
-#define BIND_PIXEL_RADIANCE 17u
-#define BIND_PIXEL_FILTERED 18u
-#define BIND_PIXEL_DISPLAY 19u
-#define BIND_TRIANGLE_IDS 20u
-#define BIND_COUNTERS 21u
-#define BIND_KD_BOXES 22u
-#define BIND_KD_ROPES 23u
-#define BIND_LEAF_PLANES 24u
-#define BIND_PIXEL_ACCUMULATED 25u
-#define BIND_PIXEL_FEATURES 26u
-#define BIND_ADDRESSES 27u
-#define BIND_KD_SLABS 28u
-#define N_BINDINGS 29u
+#define BIND_CHILD_KINDS 9u
+#define BIND_FIRST_CHILDREN 10u
+#define BIND_SCAN_BLOCKS 11u
+#define BIND_BOUNCES 12u
+#define BIND_HITS 13u
+#define BIND_LIGHT_VISIBILITY 14u
+#define BIND_RAY_RADIANCE 15u
+#define BIND_PIXEL_RADIANCE 16u
+#define BIND_PIXEL_FILTERED 17u
+#define BIND_PIXEL_DISPLAY 18u
+#define BIND_TRIANGLE_IDS 19u
+#define BIND_COUNTERS 20u
+#define BIND_KD_BOXES 21u
+#define BIND_KD_ROPES 22u
+#define BIND_LEAF_PLANES 23u
+#define BIND_PIXEL_ACCUMULATED 24u
+#define BIND_PIXEL_FEATURES 25u
+#define BIND_ADDRESSES 26u
+#define BIND_KD_SLABS 27u
+#define N_BINDINGS 28u
 
 // A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
-#define BIND_CAST_RAYS 29u
-#define BIND_CAST_HITS 30u
+#define BIND_CAST_RAYS 28u
+#define BIND_CAST_HITS 29u
 
 #endif

@@ -1,5 +1,6 @@
 // What waits in an invocation's local memory: subtrees that are left for later, and what is not needed before the end. In
 // registers the latter would cost: fewer rays run at a time on an H200, diffuse ones a twentieth slower (benches/EXPERIMENTS.md).
+// Software drivers have registers enough, and pay for each store: there it stays in them.
 
 // A pending cell: the node whose sibling it is, and the bits of where the ray leaves it. Where it begins is not kept: it is
 // where the ray has just left the cell before.
@@ -8,12 +9,15 @@ uvec2 local_cells[KD_MAX_DEPTH + 2u];
 const uint WEIGHTS_PLACE = KD_MAX_DEPTH;
 const uint LENGTHS_PLACE = KD_MAX_DEPTH + 1u;
 
+vec2 pairs_in_registers[2];
+
 void keep_pair(uint place, float x, float y) {
-    local_cells[place] = floatBitsToUint(vec2(x, y));
+    if (RUNS_BOTH_SIDES) pairs_in_registers[place - KD_MAX_DEPTH] = vec2(x, y);
+    else local_cells[place] = floatBitsToUint(vec2(x, y));
 }
 
 vec2 kept_pair(uint place) {
-    return uintBitsToFloat(local_cells[place]);
+    return RUNS_BOTH_SIDES ? pairs_in_registers[place - KD_MAX_DEPTH] : uintBitsToFloat(local_cells[place]);
 }
 
 void keep_cell(uint place, Cell cell) {

@@ -18,6 +18,11 @@ float local_weight(Material material) {
     return (material.flags & MATERIAL_REFRACT) != 0u ? 1.0 : material.d;
 }
 
+// Whether light goes on from the surface.
+bool scatters_light(Material material) {
+    return (material.flags & (MATERIAL_REFLECT | MATERIAL_REFRACT)) != 0u || material.d < 1.0;
+}
+
 // Diffuse and specular reflectance towards the viewer. All vectors point away from the surface.
 vec3 phong(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
     float cos_light = dot(normal, to_light);
@@ -28,6 +33,15 @@ vec3 phong(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
         reflectance += material.ks * pow(cos_mirror, material.ns);
     }
     return reflectance;
+}
+
+// Below, a reflectance shows nowhere: 2^-64. A narrow highlight is darker almost all around, and need not be lit there.
+const float LEAST_REFLECTANCE = 5.421011e-20;
+
+// Whether a light from there can be seen in the surface.
+bool can_show(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
+    vec3 reflectance = phong(material, normal, to_viewer, to_light) * local_weight(material);
+    return any(greaterThan(reflectance, vec3(LEAST_REFLECTANCE)));
 }
 
 // Unpolarized Fresnel reflectance of a smooth dielectric; 1 in total internal reflection.

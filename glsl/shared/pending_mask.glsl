@@ -1,8 +1,9 @@
 // Pending subtrees by the paper's bit mask: one bit a level, set where the sibling on that level is still to be
 // visited (the paper stores the opposite, "sibling done"; 32 levels in one word).
 //
-// The paper climbs level by level and tests the sibling's box. Here the highest bit names the level at once, and each level has
-// a place in local memory (local_cells.glsl); what the mask does not name there is left over.
+// The paper climbs level by level and tests the sibling's box. Here the highest bit names the level at once, and what is
+// pending stands in local memory in the bits' order (local_cells.glsl), without gaps: with a place for each level, rays that part
+// soon spread over memory that the first cache cannot hold, and take up to a quarter longer (benches/EXPERIMENTS.md).
 
 // 1 where no leaf lies deeper than KD_WORD_DEPTH, as in most trees: a mask of one word is 3 to 6 % faster. The same for all
 // kernels over one tree.
@@ -26,13 +27,18 @@ bool is_pending(uint depth) {
     return (pending_mask & bit_of(depth)) != uvec2(0u);
 }
 
+uint n_pending() {
+    uint n = uint(bitCount(pending_mask.x));
+    return MASK_WORDS == 1u ? n : n + uint(bitCount(pending_mask.y));
+}
+
 void mask_push(Cell cell) {
+    keep_cell(n_pending(), cell);
     pending_mask |= bit_of(cell.depth);
-    keep_cell(cell.depth - 1u, cell);
 }
 
 void mask_pop(inout Cell cell) {
     cell.depth = deepest_pending();
     pending_mask &= ~bit_of(cell.depth);
-    take_cell(cell.depth - 1u, cell);
+    take_cell(n_pending(), cell);
 }

@@ -12,11 +12,11 @@ use super::{
 };
 use crate::{
     cpu,
-    frame::{BounceStats, Profile, RenderOptions, Traversal},
+    frame::{BounceStats, Primary, Profile, RenderOptions, Traversal},
     gpu::{Context, GpuError},
     kdtree::KdTree,
     render::Renderer,
-    scene::{RenderDefaults, Scene},
+    scene::Scene,
 };
 
 /// The shipped scenes' names, in the paper's order.
@@ -48,9 +48,13 @@ impl Reported {
     }
 }
 
-/// The scene's own options at another size.
-pub fn options(scene: &RenderDefaults, (width, height): (u32, u32)) -> RenderOptions {
+/// The scene's own options at another size, and the primary rays that suit it.
+pub fn options(scene: &Scene, (width, height): (u32, u32), traversal: Traversal) -> RenderOptions {
+    let primary = Primary::suited_to(scene.triangles.len(), (width, height));
+    let scene = &scene.defaults;
     RenderOptions {
+        primary,
+        traversal,
         width,
         height,
         max_depth: scene.max_depth,
@@ -159,6 +163,8 @@ pub struct Report {
     pub device: String,
     /// The driver's name and version.
     pub driver: String,
+    /// Way through the tree on the device.
+    pub traversal: String,
     /// Frames on the device, less the warm-up.
     pub n_gpu_frames: u16,
     /// 0 where the CPU was left out.

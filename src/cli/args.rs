@@ -7,7 +7,7 @@ use kdray::{
     cast::Query,
     frame::{Aov, Crop, RenderOptions, Traversal},
     gpu::DeviceSelector,
-    scene::RenderDefaults,
+    scene::Scene,
 };
 
 pub use super::view_args::ViewArgs;
@@ -166,7 +166,7 @@ impl RenderArgs {
     }
 
     /// The options asked for; the scene's own fill what was left open. A crop beyond the picture is refused.
-    pub fn options(&self, scene: &RenderDefaults) -> Result<RenderOptions, CliError> {
+    pub fn options(&self, scene: &Scene) -> Result<RenderOptions, CliError> {
         let options = self.picture.options(scene, self.cpu);
         let RenderOptions { width, height, .. } = options;
         if let Some(crop) = self.crop.filter(|crop| crop.x1 > width || crop.y1 > height) {

@@ -3,7 +3,7 @@
 use clap::{ValueEnum, value_parser};
 use kdray::{
     frame::{Denoise, Primary, RenderOptions, Tonemap, Traversal},
-    scene::RenderDefaults,
+    scene::Scene,
 };
 
 use super::{args::Size, error::CliError};
@@ -31,9 +31,9 @@ pub struct PictureArgs {
     #[arg(long, value_name = "WAY")]
     #[arg(help = way_help())]
     pub traversal: Option<Traversal>,
-    /// How primary rays find their triangles
-    #[arg(long, value_name = "raster|trace", default_value_t = RenderOptions::default().primary)]
-    pub primary: Primary,
+    /// How primary rays find their triangles [default: raster, but trace where there are more triangles than pixels]
+    #[arg(long, value_name = "raster|trace")]
+    pub primary: Option<Primary>,
 }
 
 /// What `--traversal` says of itself.
@@ -58,7 +58,9 @@ impl PictureArgs {
     }
 
     /// The options asked for; the scene's own fill what was left open.
-    pub fn options(&self, scene: &RenderDefaults, on_cpu: bool) -> RenderOptions {
+    pub fn options(&self, scene: &Scene, on_cpu: bool) -> RenderOptions {
+        let n_triangles = scene.triangles.len();
+        let scene = &scene.defaults;
         let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });
         RenderOptions {
             width,
@@ -69,7 +71,7 @@ impl PictureArgs {
             tonemap: self.tonemap.unwrap_or(scene.tonemap),
             denoise: self.denoise(scene.denoise),
             traversal: way_through_tree(self.traversal, on_cpu),
-            primary: self.primary,
+            primary: self.primary.unwrap_or_else(|| Primary::suited_to(n_triangles, (width, height))),
             features: false,
             profile: true,
         }
@@ -119,6 +121,13 @@ mod tests {
             Command::Render(args) => args.picture.denoise(scene),
             _ => unreachable!(),
         }
+    }
+
+    #[test]
+    fn more_triangles_than_pixels_are_not_rasterized() {
+        assert_eq!(Primary::suited_to(4800, (80, 60)), Primary::Raster);
+        assert_eq!(Primary::suited_to(4801, (80, 60)), Primary::Trace);
+        assert_eq!(Primary::suited_to(usize::MAX, (1 << 16, 1 << 16)), Primary::Trace);
     }
 
     #[test]

@@ -10,8 +10,8 @@ use serde::Serialize;
 
 use super::table::{decimal, table};
 
-/// Passes whose time counts as tracing: they find what rays hit.
-const TRACING: [&str; 4] = ["visibility", "primary_hit", "trace", "shadow"];
+/// Passes that find the closest hits of a bounce's rays.
+const TRACING: [&str; 3] = ["visibility", "primary_hit", "trace"];
 
 /// What was rendered, how, and how long it took.
 #[derive(Serialize)]
@@ -107,6 +107,8 @@ pub struct Frame {
     passes: Vec<PassTime>,
     /// One row a bounce, 0 = primary rays.
     bounces: Vec<Bounce>,
+    /// Of all bounces.
+    shadow: Shadow,
 }
 
 #[derive(Serialize)]
@@ -125,7 +127,16 @@ struct Bounce {
     n_shadow_rays: u64,
     /// Milliseconds of the passes in [`TRACING`].
     tracing_ms: Option<f64>,
-    /// Million rays and shadow rays a second of tracing.
+    /// Million rays a second of tracing.
+    mrays_per_s: Option<f64>,
+}
+
+/// Shadow rays, which go to the lights when all hits are found.
+#[derive(Serialize)]
+struct Shadow {
+    n_shadow_rays: u64,
+    ms: Option<f64>,
+    /// Million shadow rays a second.
     mrays_per_s: Option<f64>,
 }
 
@@ -134,6 +145,7 @@ impl From<Profile> for Frame {
         Self {
             pass_totals: pass_totals(&profile),
             bounces: bounces(&profile),
+            shadow: shadow(&profile),
             device: profile.device,
             frame_ms: profile.frame_ms,
             n_batches: profile.n_batches,
@@ -165,10 +177,16 @@ fn bounces(profile: &Profile) -> Vec<Bounce> {
             n_hits: stats.n_hits,
             n_shadow_rays: stats.n_shadow_rays,
             tracing_ms,
-            mrays_per_s: rate(stats.n_rays + stats.n_shadow_rays, tracing_ms),
+            mrays_per_s: rate(stats.n_rays, tracing_ms),
         }
     });
     rows.collect()
+}
+
+fn shadow(profile: &Profile) -> Shadow {
+    let n_shadow_rays = profile.bounces.iter().map(|bounce| bounce.n_shadow_rays).sum();
+    let ms = profile.pass_ms("shadow");
+    Shadow { n_shadow_rays, ms, mrays_per_s: rate(n_shadow_rays, ms) }
 }
 
 /// Million rays a second, where the time is known and more than nothing.
@@ -235,18 +253,23 @@ impl Frame {
     }
 
     fn bounces_text(&self) -> String {
-        let sum = |count: fn(&Bounce) -> u64| self.bounces.iter().map(count).sum::<u64>();
-        let all = (sum(|b| b.n_rays), sum(|b| b.n_hits), sum(|b| b.n_shadow_rays));
-        let tracing_ms: Option<f64> = self.bounces.iter().map(|bounce| bounce.tracing_ms).sum();
-        let row = |name: String, (n_rays, n_hits, n_shadow_rays): (u64, u64, u64), ms, rate| {
-            let counts = [n_rays, n_hits, n_shadow_rays].map(|count| count.to_string());
-            let [n_rays, n_hits, n_shadow_rays] = counts;
-            [name, n_rays, n_hits, n_shadow_rays, decimal(ms, 3), decimal(rate, 2)]
+        let row = |name: &str, counts: [Option<u64>; 3], ms, rate| {
+            let [n_rays, n_hits, n_shadow_rays] = counts.map(|n| n.map_or_else(String::new, |n| n.to_string()));
+            [name.to_owned(), n_rays, n_hits, n_shadow_rays, decimal(ms, 3), decimal(rate, 2)]
         };
         let mut rows: Vec<_> = (self.bounces.iter())
-            .map(|b| row(b.bounce.to_string(), (b.n_rays, b.n_hits, b.n_shadow_rays), b.tracing_ms, b.mrays_per_s))
+            .map(|b| {
+                let counts = [b.n_rays, b.n_hits, b.n_shadow_rays].map(Some);
+                row(&b.bounce.to_string(), counts, b.tracing_ms, b.mrays_per_s)
+            })
             .collect();
-        rows.push(row("all".to_owned(), all, tracing_ms, rate(all.0 + all.2, tracing_ms)));
+        let Shadow { n_shadow_rays, ms: shadow_ms, mrays_per_s } = self.shadow;
+        rows.push(row("shadow", [None, None, Some(n_shadow_rays)], shadow_ms, mrays_per_s));
+        let sum = |count: fn(&Bounce) -> u64| self.bounces.iter().map(count).sum::<u64>();
+        let (n_rays, n_hits) = (sum(|b| b.n_rays), sum(|b| b.n_hits));
+        let ms: Option<f64> = self.bounces.iter().map(|bounce| bounce.tracing_ms).chain([shadow_ms]).sum();
+        let counts = [n_rays, n_hits, n_shadow_rays].map(Some);
+        rows.push(row("all", counts, ms, rate(n_rays + n_shadow_rays, ms)));
         table(["bounce", "rays", "hits", "shadow rays", "tracing ms", "Mrays/s"], &rows)
     }
 }
@@ -264,12 +287,13 @@ mod tests {
             device: "d".to_owned(),
             passes: vec![
                 pass("visibility", None, 1.0),
-                pass("shadow", Some(0), 1.0),
-                pass("shade", Some(0), 4.0),
+                pass("primary_hit", Some(0), 1.0),
+                pass("compact_scatter", Some(0), 4.0),
                 pass("trace", Some(1), 1.5),
-                pass("shadow", Some(1), 0.5),
+                pass("compact_scatter", Some(1), 0.5),
+                pass("shadow", None, 0.5),
             ],
-            bounces: vec![stats(3000, 1000), stats(500, 0)],
+            bounces: vec![stats(3000, 900), stats(500, 100)],
             n_batches: 1,
             frame_ms: ms(10.0),
             begun_at: None,
@@ -280,10 +304,11 @@ mod tests {
     fn times_are_summed_by_pass_and_by_bounce() {
         let frame = frame(Some);
         let names: Vec<_> = frame.pass_totals.iter().map(|total| total.name).collect();
-        assert_eq!(names, ["visibility", "shadow", "shade", "trace"]);
-        assert_eq!((frame.pass_totals[1].ms, frame.pass_totals[1].share), (Some(1.5), Some(0.15)));
-        assert_eq!((frame.bounces[0].tracing_ms, frame.bounces[0].mrays_per_s), (Some(2.0), Some(2.0)));
-        assert_eq!((frame.bounces[1].tracing_ms, frame.bounces[1].mrays_per_s), (Some(2.0), Some(0.25)));
+        assert_eq!(names, ["visibility", "primary_hit", "compact_scatter", "trace", "shadow"]);
+        assert_eq!((frame.pass_totals[2].ms, frame.pass_totals[2].share), (Some(4.5), Some(0.45)));
+        assert_eq!((frame.bounces[0].tracing_ms, frame.bounces[0].mrays_per_s), (Some(2.0), Some(1.5)));
+        assert_eq!((frame.bounces[1].tracing_ms, frame.bounces[1].mrays_per_s), (Some(1.5), Some(0.5 / 1.5)));
+        assert_eq!((frame.shadow.ms, frame.shadow.mrays_per_s), (Some(0.5), Some(2.0)));
         assert!(frame.bounces_text().ends_with("all     3500     6         1000       4.000     1.12\n"));
         assert!(frame.passes_text().ends_with("frame       10.000       100.0\n"));
     }

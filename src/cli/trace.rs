@@ -88,7 +88,7 @@ pub fn trace_json(origin: Instant, spans: &[Span], frame: &Profile) -> Vec<u8> {
     json
 }
 
-/// The frame, in it its batches if it has several, in these the bounces, in these the passes.
+/// The frame, in it its batches if it has several, in these the bounces and their light, in these the passes.
 fn frame_slices(frame: &Profile, begun_at: u64) -> Vec<Event> {
     let mut slices = Vec::new();
     let mut add = |name: String, passes: &[&PassTime], args| {
@@ -104,9 +104,14 @@ fn frame_slices(frame: &Profile, begun_at: u64) -> Vec<Event> {
             add(format!("batch {batch_ix}"), &of_batch, Map::new());
         }
         for bounce in batch.chunk_by(|a, b| a.bounce == b.bounce) {
-            if let Some(bounce_ix) = bounce[0].bounce {
+            let name = match (bounce[0].bounce, bounce[0].batch) {
+                (Some(bounce_ix), _) => Some(format!("bounce {bounce_ix}")),
+                (None, Some(_)) => Some("light".to_owned()),
+                (None, None) => None,
+            };
+            if let Some(name) = name {
                 let args = object(json!({ "n_rays": bounce[0].n_rays_in }));
-                add(format!("bounce {bounce_ix}"), &bounce.iter().collect::<Vec<_>>(), args);
+                add(name, &bounce.iter().collect::<Vec<_>>(), args);
             }
             for pass in bounce {
                 add(pass.name.to_owned(), &[pass], rays(pass));

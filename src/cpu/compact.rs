@@ -1,39 +1,69 @@
-//! Compact: the children of all rays, in order and without gaps, by a prefix sum over their counts. Twin of
+//! Compact: the rays that go on from all hits of a bounce, in order and without gaps, by a prefix sum over their counts. Twin of
 //! `compact_reduce.comp`, `compact_spine.comp` and `compact_scatter.comp`.
 
 use rayon::prelude::*;
 
-use crate::layout::{Bounce, Frame, Ray, SCAN_BLOCK_SIZE};
+use super::{
+    RAYS_PER_TASK,
+    bindings::Bindings,
+    children::{child_kinds_of, children_of},
+};
+use crate::layout::{Bounce, Frame, Hit, Ray, SCAN_GROUP_SIZE};
 
-const BLOCK: usize = SCAN_BLOCK_SIZE as usize;
+const BLOCK: usize = SCAN_GROUP_SIZE as usize;
+const BLOCKS_PER_TASK: usize = RAYS_PER_TASK.div_ceil(BLOCK);
 
-/// Writes the child counts of each block of `SCAN_BLOCK_SIZE` rays, added up.
-pub fn reduce(child_counts: &[u32], scan_blocks: &mut [u32]) {
-    child_counts.par_chunks(BLOCK).zip(scan_blocks).for_each(|(counts, sum)| *sum = counts.iter().sum());
+/// The rays of a bounce.
+#[derive(Clone, Copy)]
+pub struct Parents<'a> {
+    pub rays: &'a [Ray],
+    /// One a ray.
+    pub hits: &'a [Hit],
+}
+
+/// Writes which rays go on from each hit, and how many from the hits of each block of `SCAN_GROUP_SIZE` rays.
+pub fn reduce(bindings: &Bindings, parents: Parents, child_kinds: &mut [u32], scan_blocks: &mut [u32]) {
+    (parents.rays.par_chunks(BLOCK).zip(parents.hits.par_chunks(BLOCK)))
+        .zip(child_kinds.par_chunks_mut(BLOCK).zip(scan_blocks))
+        .with_min_len(BLOCKS_PER_TASK)
+        .for_each(|((rays, hits), (kinds, sum))| {
+            for ((ray, hit), kinds) in rays.iter().zip(hits).zip(&mut *kinds) {
+                *kinds = child_kinds_of(bindings, ray, hit);
+            }
+            *sum = kinds.iter().map(|kinds| kinds.count_ones()).sum();
+        });
 }
 
 /// Turns the blocks' sums into their exclusive prefix sums and sizes the next bounce. Where a queue of
-/// `constants.queue_capacity` cannot hold that many rays, the next bounce is empty and says `overflow`.
-pub fn spine(scan_blocks: &mut [u32], constants: &Frame, next: &mut Bounce) {
+/// `constants.queue_capacity` has no room for that many rays more, the next bounce is empty and says `overflow`.
+pub fn spine(scan_blocks: &mut [u32], constants: &Frame, this: &Bounce, next: &mut Bounce) {
     let mut carry = 0;
     for block in scan_blocks {
         let sum = *block;
         *block = carry;
         carry += sum;
     }
-    size_next_bounce(carry, constants, next);
+    size_next_bounce(carry, constants, this, next);
 }
 
-fn size_next_bounce(n_wanted: u32, constants: &Frame, next: &mut Bounce) {
-    let n_rays = if n_wanted <= constants.queue_capacity { n_wanted } else { 0 };
+fn size_next_bounce(n_wanted: u32, constants: &Frame, this: &Bounce, next: &mut Bounce) {
+    let first_ray = this.first_ray + this.n_rays;
+    let n_rays = if n_wanted <= constants.queue_capacity.saturating_sub(first_ray) { n_wanted } else { 0 };
     next.overflow = u32::from(n_rays != n_wanted);
     next.n_wanted = n_wanted;
-    next.set_n_rays(n_rays, constants);
+    next.set_rays(first_ray, n_rays, constants);
 }
 
-/// Moves the children of each ray (two places a ray, `child_counts` of them filled) to the next queue, which is
-/// exactly as long as all of them.
-pub fn scatter(child_rays: &[Ray], child_counts: &[u32], scan_blocks: &[u32], next_rays: &mut [Ray]) {
+/// Makes the rays that go on, `next_rays`, whose first is the queue's `first_ray`, and tells of each hit which is its first.
+pub fn scatter(
+    bindings: &Bindings,
+    parents: Parents,
+    child_kinds: &[u32],
+    scan_blocks: &[u32],
+    first_ray: u32,
+    first_children: &mut [u32],
+    next_rays: &mut [Ray],
+) {
     let mut places = Vec::with_capacity(scan_blocks.len());
     let mut rest = next_rays;
     for (block, &begin) in scan_blocks.iter().enumerate() {
@@ -42,10 +72,17 @@ pub fn scatter(child_rays: &[Ray], child_counts: &[u32], scan_blocks: &[u32], ne
         places.push(place);
         rest = behind;
     }
-    child_rays.par_chunks(2 * BLOCK).zip(child_counts.par_chunks(BLOCK)).zip(places).for_each(
-        |((children, counts), place)| {
-            let filled = children.chunks_exact(2).zip(counts).flat_map(|(pair, &count)| &pair[..count as usize]);
-            place.iter_mut().zip(filled).for_each(|(place, child)| *place = *child);
-        },
-    );
+    (parents.rays.par_chunks(BLOCK).zip(parents.hits.par_chunks(BLOCK)).zip(child_kinds.par_chunks(BLOCK)))
+        .zip(first_children.par_chunks_mut(BLOCK).zip(scan_blocks).zip(places))
+        .with_min_len(BLOCKS_PER_TASK)
+        .for_each(|(((rays, hits), kinds), ((first_children, &begin), place))| {
+            let mut n_made = 0;
+            for (((ray, hit), &kinds), first_child) in rays.iter().zip(hits).zip(kinds).zip(first_children) {
+                *first_child = first_ray + begin + n_made as u32;
+                for child in children_of(bindings, ray, hit, kinds) {
+                    place[n_made] = child;
+                    n_made += 1;
+                }
+            }
+        });
 }

@@ -24,6 +24,11 @@ fn reflect(incident: Vec3, normal: Vec3) -> Vec3 {
     incident - 2.0 * normal.dot(incident) * normal
 }
 
+/// Whether light goes on from the surface.
+pub fn scatters_light(material: &Material) -> bool {
+    material.flags & (MATERIAL_REFLECT | MATERIAL_REFRACT) != 0 || material.d < 1.0
+}
+
 /// Diffuse and specular reflectance towards the viewer. All vectors point away from the surface.
 pub fn phong(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3) -> Vec3 {
     let cos_light = normal.dot(to_light);
@@ -37,6 +42,15 @@ pub fn phong(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3)
         reflectance += material.ks * cos_mirror.powf(material.ns);
     }
     reflectance
+}
+
+/// Below, a reflectance shows nowhere: 2^-64.
+const LEAST_REFLECTANCE: f32 = 5.421_011e-20;
+
+/// Whether a light from there can be seen in the surface.
+pub fn can_show(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3) -> bool {
+    let reflectance = phong(material, normal, to_viewer, to_light) * local_weight(material);
+    reflectance.cmpgt(Vec3::splat(LEAST_REFLECTANCE)).any()
 }
 
 /// Unpolarized Fresnel reflectance of a smooth dielectric; 1 in total internal reflection.

@@ -1,16 +1,15 @@
 //! The frame on the CPU: the order of passes, batch by batch.
 
-use std::mem::swap;
-
 use bytemuck::Zeroable;
 
 use super::{
     accumulate,
     bindings::Bindings,
-    compact, costs, denoise, features, primary_hit,
-    queues::Queues,
+    compact::{self, Parents},
+    costs, denoise, features, primary_hit,
+    queue::Queue,
     resolve,
-    shade::{self, LitRays, Shaded},
+    shade::{self, LitRays},
     shadow,
     timing::Clock,
     tonemap, trace, visibility,
@@ -19,7 +18,7 @@ use crate::{
     camera::frame_constants,
     frame::{BounceStats, Picture, Primary, Profile, RenderOptions},
     kdtree::{Extras, KdTree},
-    layout::{Bounce, Feature, Frame, Hit, Ray, SCAN_BLOCK_SIZE},
+    layout::{Bounce, Feature, Frame, Hit, Ray, SCAN_GROUP_SIZE},
     scene::{Camera, Scene},
 };
 
@@ -28,12 +27,12 @@ use crate::{
 pub struct Batching {
     /// Pixels whose rays are traced together.
     pub n_pixels: u32,
-    /// Rays of a bounce beyond which a batch of more than one pixel is halved.
+    /// Rays of all bounces beyond which a batch of more than one pixel is halved.
     pub queue_capacity: u32,
 }
 
 impl Default for Batching {
-    /// Some 30 MB of queues as a rule, and 270 MB at the most.
+    /// Some 15 MB of rays and what belongs to them as a rule, and 110 MB at the most.
     fn default() -> Self {
         Self { n_pixels: 1 << 16, queue_capacity: 1 << 20 }
     }
@@ -58,7 +57,7 @@ pub struct Renderer<'a> {
     pixel_display: Vec<[u8; 4]>,
     /// Empty where the options do not ask for them.
     pixel_features: Vec<Feature>,
-    queues: Queues,
+    queue: Queue,
     /// Samples a pixel that the picture holds.
     n_samples: u32,
     clock: Clock,
@@ -84,7 +83,7 @@ impl<'a> Renderer<'a> {
             pixel_filtered: vec![[0.0; 4]; n_pixels],
             pixel_display: vec![[0; 4]; n_pixels],
             pixel_features: vec![Feature::default(); if options.features { n_pixels } else { 0 }],
-            queues: Queues::default(),
+            queue: Queue::default(),
             n_samples: 0,
             clock: Clock::start(),
             bounces: Vec::new(),
@@ -156,19 +155,17 @@ impl<'a> Renderer<'a> {
         self.clock.time("visibility", None, || visibility::visibility(&bindings, traversal, ids));
     }
 
-    /// Algorithm 1 for a batch of pixels: all bounces, or those of its halves where a bounce makes more rays than the
-    /// queue is meant to hold. Starting over is harmless: bounce 0 sets its pixels.
+    /// Algorithm 1 for a batch of pixels: all bounces and their light, or those of its halves where there are more rays than the
+    /// queue is meant to hold.
     fn batch(&mut self, first_pixel: u32, n_pixels: u32) {
         let capacity = if n_pixels == 1 { u32::MAX } else { self.batching.queue_capacity };
         let mut stats = Vec::new();
         self.primary_rays(first_pixel, n_pixels);
         for depth in 0..self.options.max_depth {
-            let n_hits = self.closest_hits(depth);
-            if self.options.features {
-                self.note_features(depth);
+            stats.push(self.closest_hits(depth));
+            if depth == 0 && self.options.features {
+                self.note_features();
             }
-            let n_shadow_rays = self.light(depth);
-            stats.push(BounceStats { n_rays: self.queues.rays.len() as u64, n_hits, n_shadow_rays });
             if depth + 1 == self.options.max_depth {
                 break;
             }
@@ -179,24 +176,31 @@ impl<'a> Renderer<'a> {
                 self.batch(first_pixel + n_pixels / 2, n_pixels - n_pixels / 2);
                 return;
             }
-            if self.queues.rays.is_empty() {
+            if next.n_rays == 0 {
                 break;
             }
         }
+        if self.options.features {
+            self.note_costs();
+        }
+        self.light(&mut stats);
         self.count(&stats);
     }
 
     fn primary_rays(&mut self, first_pixel: u32, n_pixels: u32) {
-        let rays = &mut self.queues.rays;
+        let Queue { rays, bounces, .. } = &mut self.queue;
+        *bounces = vec![Bounce::of(n_pixels, &self.frame)];
         rays.resize(n_pixels as usize, Ray::zeroed());
         self.clock.time("primary_hit", Some(0), || primary_hit::primary_rays(&self.frame, first_pixel, rays));
     }
 
-    /// Fills `hits`; returns how many are hits.
-    fn closest_hits(&mut self, depth: u32) -> u64 {
+    /// Fills the bounce's `hits`, and counts them.
+    fn closest_hits(&mut self, depth: u32) -> BounceStats {
         let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
-        let Queues { rays, hits, .. } = &mut self.queues;
+        let Queue { rays, bounces, hits, .. } = &mut self.queue;
         hits.resize(rays.len(), Hit::zeroed());
+        let places = bounces[depth as usize].rays();
+        let (rays, hits) = (&rays[places.clone()], &mut hits[places]);
         let n_hits = if depth == 0 && self.options.primary == Primary::Raster {
             let ids = &self.triangle_ids;
             self.clock.time("primary_hit", Some(0), || primary_hit::primary_hit(&bindings, ids, rays, hits))
@@ -204,62 +208,71 @@ impl<'a> Renderer<'a> {
             let traversal = self.options.traversal;
             self.clock.time("trace", Some(depth), || trace::trace(&bindings, traversal, rays, hits))
         };
-        n_hits.into()
+        BounceStats { n_rays: rays.len() as u64, n_hits: n_hits.into(), n_shadow_rays: 0 }
     }
 
-    /// What primary rays meet, and what the rays of any bounce cost. Of a batch that is started over, it forgets what it
-    /// noted.
-    fn note_features(&mut self, depth: u32) {
+    /// What primary rays meet.
+    fn note_features(&mut self) {
+        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
+        let (Queue { rays, hits, .. }, pixels) = (&self.queue, &mut self.pixel_features);
+        self.clock.time("features", Some(0), || features::features(&bindings, rays, hits, pixels));
+    }
+
+    /// What the rays of all bounces cost.
+    fn note_costs(&mut self) {
         let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
         let (traversal, pixels) = (self.options.traversal, &mut self.pixel_features);
-        let Queues { rays, hits, .. } = &self.queues;
-        if depth == 0 {
-            rays.iter().for_each(|ray| pixels[ray.pixel_ix as usize] = Feature::default());
-            self.clock.time("features", Some(0), || features::features(&bindings, rays, hits, pixels));
-        }
-        if depth == 0 && self.options.primary == Primary::Raster {
-            costs::count_rasterized(rays, hits, pixels);
-        } else {
-            costs::count_closest(&bindings, traversal, rays, pixels);
-        }
+        let Queue { rays, bounces, hits, .. } = &self.queue;
+        let n_rasterized = if self.options.primary == Primary::Raster { bounces[0].n_rays as usize } else { 0 };
+        let (rasterized, traced) = rays.split_at(n_rasterized);
+        costs::count_rasterized(rasterized, hits, pixels);
+        costs::count_closest(&bindings, traversal, traced, pixels);
         costs::count_shadow(&bindings, traversal, rays, hits, pixels);
     }
 
-    /// Shadows, shading and the children, resolved to pixels; returns how many shadow segments were tested.
-    fn light(&mut self, depth: u32) -> u64 {
-        let Queues { rays, hits, light_visibility, shaded, .. } = &mut self.queues;
+    /// Compacts the rays that go on from the bounce's hits, behind it; returns what the spine says of them.
+    fn next_rays(&mut self, depth: u32, capacity: u32) -> Bounce {
+        let constants = Frame { queue_capacity: capacity, ..self.frame };
+        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
+        let Queue { rays, bounces, hits, child_kinds, first_children, scan_blocks, .. } = &mut self.queue;
+        let (this, mut next) = (bounces[depth as usize], Bounce::of(0, &self.frame));
+        let places = this.rays();
+        child_kinds.resize(rays.len(), 0);
+        first_children.resize(rays.len(), 0);
+        scan_blocks.resize(places.len().div_ceil(SCAN_GROUP_SIZE as usize), 0);
+        let (kinds, first_children) = (&mut child_kinds[places.clone()], &mut first_children[places.clone()]);
+        let parents = Parents { rays: &rays[places.clone()], hits: &hits[places.clone()] };
+        self.clock.time("compact_reduce", Some(depth), || compact::reduce(&bindings, parents, kinds, scan_blocks));
+        self.clock.time("compact_spine", Some(depth), || compact::spine(scan_blocks, &constants, &this, &mut next));
+        rays.resize(next.rays().end, Ray::zeroed());
+        let (so_far, next_rays) = rays.split_at_mut(next.rays().start);
+        let parents = Parents { rays: &so_far[places.clone()], hits: &hits[places] };
+        if next.overflow == 0 {
+            self.clock.time("compact_scatter", Some(depth), || {
+                compact::scatter(&bindings, parents, kinds, scan_blocks, next.first_ray, first_children, next_rays);
+            });
+        }
+        bounces.push(next);
+        next
+    }
+
+    /// Shadows and shading of all bounces, resolved to pixels; notes how many shadow segments were tested.
+    fn light(&mut self, stats: &mut [BounceStats]) {
+        let Queue { rays, bounces, hits, first_children, ray_radiance, light_visibility, .. } = &mut self.queue;
         self.frame.queue_capacity = rays.len() as u32;
         let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
         let traversal = self.options.traversal;
         light_visibility.resize(rays.len() * bindings.lights.len(), 0);
-        shaded.resize(rays.len());
-        let n_shadow_rays = self
-            .clock
-            .time("shadow", Some(depth), || shadow::shadow(&bindings, traversal, rays, hits, light_visibility));
-        let lit = LitRays { rays, hits, light_visibility };
-        self.clock.time("shade", Some(depth), || shade::shade(&bindings, depth, lit, shaded));
-        let (radiance, pixels) = (&shaded.ray_radiance, &mut self.pixel_radiance);
-        self.clock.time("resolve", Some(depth), || resolve::resolve(depth, rays, radiance, pixels));
-        n_shadow_rays.into()
-    }
-
-    /// Compacts the children to the queue of the next bounce; returns what the spine says of that.
-    fn next_rays(&mut self, depth: u32, capacity: u32) -> Bounce {
-        let Queues { rays, next_rays, scan_blocks, shaded, .. } = &mut self.queues;
-        let Shaded { child_rays, child_counts, .. } = shaded;
-        let mut next = Bounce::zeroed();
-        let constants = Frame { queue_capacity: capacity, ..self.frame };
-        scan_blocks.resize(rays.len().div_ceil(SCAN_BLOCK_SIZE as usize), 0);
-        self.clock.time("compact_reduce", Some(depth), || compact::reduce(child_counts, scan_blocks));
-        self.clock.time("compact_spine", Some(depth), || compact::spine(scan_blocks, &constants, &mut next));
-        next_rays.resize(next.n_rays as usize, Ray::zeroed());
-        if next.overflow == 0 {
-            self.clock.time("compact_scatter", Some(depth), || {
-                compact::scatter(child_rays, child_counts, scan_blocks, next_rays);
-            });
+        ray_radiance.resize(rays.len(), [0.0; 4]);
+        for (bounce, stats) in bounces.iter().zip(stats) {
+            let of_bounce =
+                || shadow::shadow(&bindings, traversal, &bounce.rays(), (rays.as_slice(), hits), light_visibility);
+            stats.n_shadow_rays = self.clock.time("shadow", None, of_bounce).into();
         }
-        swap(rays, next_rays);
-        next
+        let lit = LitRays { rays, hits, light_visibility };
+        self.clock.time("shade", None, || shade::shade(&bindings, lit, ray_radiance));
+        let pixels = &mut self.pixel_radiance;
+        self.clock.time("resolve", None, || resolve::resolve(bounces, rays, ray_radiance, first_children, pixels));
     }
 
     fn count(&mut self, stats: &[BounceStats]) {

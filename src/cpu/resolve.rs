@@ -1,20 +1,38 @@
-//! Resolve: adds a bounce's radiance to the image. Twin of `resolve.comp`.
+//! Resolve: the light of all rays of a pixel. Twin of `resolve.comp`.
+
+use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::layout::Ray;
+use crate::layout::{Bounce, Ray};
 
-/// Adds `ray_radiance` to the rays' pixels (depth 0: sets them). The rays of a pixel stand together.
-pub fn resolve(depth: u32, rays: &[Ray], ray_radiance: &[[f32; 4]], pixel_radiance: &mut [[f32; 4]]) {
-    let mut of_pixel = ray_radiance.iter();
-    for rays in rays.chunk_by(|a, b| a.pixel_ix == b.pixel_ix) {
-        let pixel = &mut pixel_radiance[rays[0].pixel_ix as usize];
-        let before = if depth == 0 { Vec3::ZERO } else { rgb(pixel) };
-        let sum = of_pixel.by_ref().take(rays.len()).fold(before, |sum, radiance| sum + rgb(radiance));
-        *pixel = sum.extend(1.0).to_array();
+/// Writes the pixels of the first bounce's rays: of each the sum of its ray's `ray_radiance` and that of all rays that came of
+/// it, bounce after bounce.
+pub fn resolve(
+    bounces: &[Bounce],
+    rays: &[Ray],
+    ray_radiance: &[[f32; 4]],
+    first_children: &[u32],
+    pixel_radiance: &mut [[f32; 4]],
+) {
+    for ray_ix in bounces[0].rays() {
+        let mut sum = Vec3::ZERO;
+        let mut span = ray_ix..ray_ix + 1;
+        for next in bounces[1..].iter().map(Some).chain([None]) {
+            sum = ray_radiance[span.clone()].iter().fold(sum, |sum, &[r, g, b, _]| sum + Vec3::new(r, g, b));
+            span = next.filter(|next| next.n_rays > 0).map_or(0..0, |next| children_of(&span, next, first_children));
+            if span.is_empty() {
+                break;
+            }
+        }
+        pixel_radiance[rays[ray_ix].pixel_ix as usize] = sum.extend(1.0).to_array();
     }
 }
 
-fn rgb(&[r, g, b, _]: &[f32; 4]) -> Vec3 {
-    Vec3::new(r, g, b)
+/// The children, in the bounce `next`, of a span of rays of the bounce before.
+fn children_of(span: &Range<usize>, next: &Bounce, first_children: &[u32]) -> Range<usize> {
+    let Range { start, end } = next.rays();
+    // Behind the last ray of a bounce stands none of it.
+    let end = if span.end < start { first_children[span.end] as usize } else { end };
+    first_children[span.start] as usize..end
 }

@@ -1,5 +1,7 @@
 //! Shadow (the paper's section 2.1): which lights each hit sees. Twin of `shadow.comp`.
 
+use std::ops::Range;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -7,15 +9,16 @@ use super::{
     RAYS_PER_TASK,
     bindings::Bindings,
     light::sample_light,
+    material::can_show,
     surface::surface_at,
     traverser::{Probe, Traverser},
 };
 use crate::{
     frame::Traversal,
-    layout::{Hit, Light, NO_TRIANGLE, Ray},
+    layout::{Hit, LIGHT_LIT, LIGHT_SHADOWED, LIGHT_UNTESTED, Light, NO_TRIANGLE, Ray},
 };
 
-/// The segment to the light, or none where the surface turns its back on it.
+/// The segment to the light, or none where the surface turns its back on it or would not show it.
 pub(super) fn shadow_segment(bindings: &Bindings, ray: &Ray, hit: &Hit, light: &Light) -> Option<Ray> {
     let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
     let to_light = sample_light(light, surface.point_world);
@@ -23,36 +26,42 @@ pub(super) fn shadow_segment(bindings: &Bindings, ray: &Ray, hit: &Hit, light: &
     if !(surface.geometric.dot(to_light.direction) > 0.0) {
         return None;
     }
+    let material = &bindings.materials[bindings.triangle_materials[hit.triangle_ix as usize] as usize];
+    if !can_show(material, surface.shading, -ray.direction, to_light.direction) {
+        return None;
+    }
     let segment = surface.ray_from(to_light.direction, hit.triangle_ix, ray, Vec3::ZERO);
     Some(Ray { t_max: to_light.distance, ..segment })
 }
 
-/// Writes `light_visibility[light * queue_capacity + ray]` (1: lit); returns how many segments were tested.
+/// Writes `light_visibility[light * queue_capacity + ray]` (`LIGHT_*`) of a bounce's rays, whose places are given; returns how many
+/// segments were tested.
 pub fn shadow(
     bindings: &Bindings,
     traversal: Traversal,
-    rays: &[Ray],
-    hits: &[Hit],
+    places: &Range<usize>,
+    (rays, hits): (&[Ray], &[Hit]),
     light_visibility: &mut [u32],
 ) -> u32 {
+    let (rays, hits) = (&rays[places.clone()], &hits[places.clone()]);
     let of_light = |(light, visibility): (&Light, &mut [u32])| -> u32 {
         let of_task = |traverser: &mut Traverser, ((rays, hits), visibility): ((&[Ray], &[Hit]), &mut [u32])| {
             let mut n_tested = 0;
             let segments = rays.iter().zip(hits).zip(visibility).filter_map(|((ray, hit), visible)| {
-                *visible = 0;
+                *visible = LIGHT_UNTESTED;
                 let is_hit = hit.triangle_ix != NO_TRIANGLE;
                 let segment = is_hit.then(|| shadow_segment(bindings, ray, hit, light)).flatten()?;
                 n_tested += 1;
                 Some((visible, Probe::from(&segment)))
             });
             traverser.traverse_all::<true, _>(bindings, segments, |visible, hit| {
-                *visible = u32::from(hit.triangle_ix == NO_TRIANGLE);
+                *visible = if hit.triangle_ix == NO_TRIANGLE { LIGHT_LIT } else { LIGHT_SHADOWED };
             });
             n_tested
         };
         rays.par_chunks(RAYS_PER_TASK)
             .zip(hits.par_chunks(RAYS_PER_TASK))
-            .zip(visibility.par_chunks_mut(RAYS_PER_TASK))
+            .zip(visibility[places.clone()].par_chunks_mut(RAYS_PER_TASK))
             .map_init(|| Traverser::new(traversal), of_task)
             .sum()
     };

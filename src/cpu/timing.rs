@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use crate::{
     frame::{BounceStats, PassTime, Primary},
-    profile::count_rays,
+    profile::{count_rays, is_in_batch},
 };
 
 /// Times passes by name, bounce and batch.
@@ -26,14 +26,12 @@ impl Clock {
         let start_ms = self.elapsed_ms();
         let result = pass();
         let ms = self.elapsed_ms() - start_ms;
-        let batch = bounce.map(|_| self.batch_ix);
-        let known = self.passes.last_mut().filter(|row| (row.name, row.bounce, row.batch) == (name, bounce, batch));
-        match known {
-            Some(row) => row.ms = row.ms.map(|sum| sum + ms),
-            None => {
-                let times = PassTime { start_ms: Some(start_ms), ms: Some(ms), ..PassTime::default() };
-                self.passes.push(PassTime { name, bounce, batch, ..times });
-            }
+        let mut pass = PassTime { name, bounce, start_ms: Some(start_ms), ms: Some(ms), ..PassTime::default() };
+        pass.batch = is_in_batch(&pass).then_some(self.batch_ix);
+        let place = |pass: &PassTime| (pass.name, pass.bounce, pass.batch);
+        match self.passes.last_mut().filter(|last| place(last) == place(&pass)) {
+            Some(last) => last.ms = last.ms.map(|sum| sum + ms),
+            None => self.passes.push(pass),
         }
         result
     }

@@ -22,22 +22,22 @@ pub struct Profile {
     pub begun_at: Option<Instant>,
 }
 
-/// One pass of one bounce of one batch.
+/// One pass, of one bounce of one batch as a rule.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PassTime {
     /// Also the debug label and the kernel's file name.
     pub name: &'static str,
-    /// None for passes that run once a frame, like `batch`.
+    /// None for passes that run once a frame, or for all bounces of a batch at once: shadow, shade, resolve.
     pub bounce: Option<u32>,
-    /// In the order of execution.
+    /// In the order of execution; none for passes that run once a frame.
     pub batch: Option<u32>,
     /// Since the frame's first pass began; none where the device has no timestamps, like `ms`.
     pub start_ms: Option<f64>,
     pub ms: Option<f64>,
-    /// Rays of the bounce; none where a pass has pixels.
+    /// Rays of the bounce, or of all the batch's; none where a pass has pixels.
     pub n_rays_in: Option<u64>,
-    /// Of what finds hits: rays that hit; of shadow: segments that were tested; of shade and compaction: rays of the
-    /// next bounce. None where a pass leaves pixels.
+    /// Of what finds hits: rays that hit; of shadow: segments that were tested; of compaction: rays of the next bounce.
+    /// None where a pass makes no rays.
     pub n_rays_out: Option<u64>,
 }
 

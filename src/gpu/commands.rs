@@ -1,6 +1,6 @@
 //! Recording commands.
 
-use std::{ffi::CString, sync::Arc};
+use std::{cell::Cell, ffi::CString, sync::Arc};
 
 use ash::vk;
 use bytemuck::Pod;
@@ -19,6 +19,7 @@ pub struct Commands<'a> {
     pub(super) raw: vk::CommandBuffer,
     pub(super) context: &'a Context,
     timer: Option<&'a Timer>,
+    has_passes: Cell<bool>,
 }
 
 /// How many invocations a kernel runs with.
@@ -74,7 +75,7 @@ impl CommandBuffer {
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the buffer is new.
         unsafe { device.begin_command_buffer(raw, &begin) }.map_err(GpuError::call("vkBeginCommandBuffer", name))?;
-        let commands = Commands { raw, context, timer };
+        let commands = Commands { raw, context, timer, has_passes: Cell::new(false) };
         commands.labelled(name, || body(&commands));
         // SAFETY: it is being recorded.
         unsafe { device.end_command_buffer(raw) }.map_err(GpuError::call("vkEndCommandBuffer", name))?;
@@ -100,10 +101,12 @@ impl Drop for CommandBuffer {
 impl Commands<'_> {
     /// One pass: its name is the debug label and the timer's row.
     pub(super) fn pass(&self, name: &'static str, bounce: Option<u32>, body: impl FnOnce()) {
-        let row = self.timer.map(|timer| (timer, timer.begin(self.raw, name, bounce)));
+        if let Some(timer) = self.timer {
+            timer.begin(self.raw, name, bounce, !self.has_passes.replace(true));
+        }
         self.labelled(name, body);
-        if let Some((timer, row)) = row {
-            timer.end(self.raw, row);
+        if let Some(timer) = self.timer {
+            timer.end(self.raw);
         }
     }
 

@@ -1,4 +1,4 @@
-//! Compact (the paper's section 2.1): moves scattered child rays to the front of the next queue, by a prefix sum.
+//! Compact (the paper's section 2.1): the next level's rays, without gaps behind this one's, by a prefix sum.
 
 use std::sync::Arc;
 
@@ -28,11 +28,11 @@ impl Compact {
         })
     }
 
-    /// Needs child_rays, child_counts. Leaves next_rays and the next row of bounces.
+    /// Needs rays, hits. Leaves the next row of bounces and its rays, first_children.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         let bounce = Some(batch.depth);
         commands.dispatch(&self.reduce, bounce, batch, resources.scan_dispatch(batch));
-        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // scan_blocks
+        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // child_kinds, scan_blocks
         commands.barrier(Access::IndirectRead, Access::ComputeWrite); // bounces
         commands.dispatch(&self.spine, bounce, batch, Dispatch::Threads([1, 1, 1], [1, 1, 1]));
         commands.barrier(Access::ComputeWrite, Access::ComputeRead); // scan_blocks, bounces

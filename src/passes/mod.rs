@@ -19,7 +19,7 @@ mod pixels;
 mod present;
 mod primary_hit;
 mod provoking;
-mod queues;
+mod queue;
 mod resolve;
 mod resources;
 mod shade;
@@ -39,7 +39,7 @@ pub use self::{
     pixels::Pixels,
     present::Present,
     primary_hit::PrimaryHit,
-    queues::Queues,
+    queue::Queue,
     resolve::Resolve,
     resources::Resources,
     shade::Shade,
@@ -84,7 +84,7 @@ impl Passes {
             trace: Trace::new(context, bindings, options)?,
             features: Features::new(context, bindings)?,
             shadow: Shadow::new(context, bindings, options)?,
-            shade: Shade::new(context, bindings)?,
+            shade: Shade::new(context, bindings, options)?,
             compact: Compact::new(context, bindings)?,
             resolve: Resolve::new(context, bindings)?,
             accumulate: Accumulate::new(context, bindings)?,
@@ -110,6 +110,9 @@ impl Passes {
             let trace = Trace::new(context, bindings, to)?;
             self.shadow = Shadow::new(context, bindings, to)?;
             self.trace = trace;
+        }
+        if from.profile != to.profile {
+            self.shade = Shade::new(context, bindings, to)?;
         }
         if from.tonemap != to.tonemap {
             self.tonemap = Tonemap::new(context, bindings, to.tonemap)?;

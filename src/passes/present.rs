@@ -32,6 +32,6 @@ impl Present {
     pub fn record(&self, commands: &Commands, resources: &Resources, size: (u32, u32), image: &WindowImage) {
         let ((width, height), (window_width, window_height)) = (size, image.size());
         let push = layout::Present { width, height, window_width, window_height };
-        commands.cover(&self.pipeline, &resources.sets[0], &push, image);
+        commands.cover(&self.pipeline, resources.set(), &push, image);
     }
 }

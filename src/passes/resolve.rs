@@ -1,11 +1,11 @@
-//! Resolve: a bounce's radiance onto the image, the rays of a pixel in the queue's order.
+//! Resolve: the light of all rays of a pixel, in the queue's order.
 
 use std::sync::Arc;
 
-use super::{Resources, kernel, spirv};
+use super::{kernel, spirv};
 use crate::{
-    gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
-    layout::Batch,
+    gpu::{Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError},
+    layout::{Batch, RAY_GROUP_SIZE},
 };
 
 /// The pass's kernel.
@@ -18,8 +18,9 @@ impl Resolve {
         Ok(Self { kernel: kernel(context, bindings, "resolve", spirv!("resolve.comp"), &[])? })
     }
 
-    /// Needs rays, ray_radiance. Updates pixel_radiance; bounce 0 sets it.
-    pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
-        commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.ray_dispatch(batch));
+    /// Needs rays, ray_radiance, first_children of all the batch's bounces. Leaves pixel_radiance.
+    pub fn record(&self, commands: &Commands, batch: &Batch) {
+        let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
+        commands.dispatch(&self.kernel, None, batch, dispatch);
     }
 }

@@ -1,13 +1,13 @@
-//! What a frame needs on the device, and the two descriptor sets over it.
+//! What a frame needs on the device, and the descriptor set over it.
 
 use std::{mem::offset_of, sync::Arc};
 
-use super::{Pixels, Queues, Tree, binding, pixels::n_pixels, provoking::vertex_indices};
+use super::{Pixels, Queue, Tree, binding, pixels::n_pixels, provoking::vertex_indices};
 use crate::{
     frame::Traversal,
     gpu::{Access, Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
     kdtree::KdTree,
-    layout::{self, Batch, Bounce, Counters, Frame, Light, Material, Ray},
+    layout::{self, Batch, Bounce, Counters, Frame, Light, Material},
     scene::Scene,
 };
 
@@ -25,14 +25,14 @@ pub struct Resources {
     pub materials: Buffer<Material>,
     /// `n_lights`.
     pub lights: Buffer<Light>,
-    pub queues: Queues,
+    pub queue: Queue,
     pub pixels: Pixels,
     /// One a batch and bounce, like counters.
     pub bounces: Buffer<Bounce>,
     pub counters: Buffer<Counters>,
     pub bindings: Arc<Bindings>,
-    /// For even and for odd bounces.
-    pub sets: Vec<BindingSet>,
+    /// None while all else is made.
+    set: Option<BindingSet>,
     constants: Frame,
 }
 
@@ -57,38 +57,32 @@ impl Resources {
             vertex_indices: Buffer::with(context, "vertex_indices", &indices, BufferUse::Index)?,
             materials: Buffer::with(context, "materials", &scene.materials, storage)?,
             lights: Buffer::with(context, "lights", &scene.lights, storage)?,
-            queues: Queues::new(context, constants.queue_capacity, constants.n_lights)?,
+            queue: Queue::new(context, constants.queue_capacity, constants.n_lights)?,
             pixels: Pixels::new(context, constants, false)?,
             bounces: Buffer::new(context, "bounces", n_bounces, BufferUse::Indirect)?,
             counters: Buffer::new(context, "counters", n_bounces, storage)?,
             bindings: Bindings::with_constants(context, &kinds, PUSH_BYTES, &tree.constants())?,
             tree,
-            sets: Vec::new(),
+            set: None,
             constants: *constants,
         };
-        resources.sets = resources.make_sets()?;
+        resources.set = Some(resources.make_set()?);
         Ok(resources)
     }
 
-    fn make_sets(&self) -> Result<Vec<BindingSet>, GpuError> {
-        let [even, odd] = &self.queues.ray_queues;
-        Ok(vec![self.make_set("even bounces", even, odd)?, self.make_set("odd bounces", odd, even)?])
-    }
-
-    fn make_set(&self, name: &str, rays: &Buffer<Ray>, next_rays: &Buffer<Ray>) -> Result<BindingSet, GpuError> {
-        let (queues, pixels) = (&self.queues, &self.pixels);
+    fn make_set(&self) -> Result<BindingSet, GpuError> {
+        let (queue, pixels) = (&self.queue, &self.pixels);
         let own = [
             (layout::BIND_MATERIALS, Binding::Buffer(self.materials.any())),
             (layout::BIND_LIGHTS, Binding::Buffer(self.lights.any())),
-            (layout::BIND_RAYS, Binding::Buffer(rays.any())),
-            (layout::BIND_NEXT_RAYS, Binding::Buffer(next_rays.any())),
-            (layout::BIND_CHILD_RAYS, Binding::Buffer(queues.child_rays.any())),
-            (layout::BIND_CHILD_COUNTS, Binding::Buffer(queues.child_counts.any())),
-            (layout::BIND_SCAN_BLOCKS, Binding::Buffer(queues.scan_blocks.any())),
+            (layout::BIND_RAYS, Binding::Buffer(queue.rays.any())),
+            (layout::BIND_CHILD_KINDS, Binding::Buffer(queue.child_kinds.any())),
+            (layout::BIND_FIRST_CHILDREN, Binding::Buffer(queue.first_children.any())),
+            (layout::BIND_SCAN_BLOCKS, Binding::Buffer(queue.scan_blocks.any())),
             (layout::BIND_BOUNCES, Binding::Buffer(self.bounces.any())),
-            (layout::BIND_HITS, Binding::Buffer(queues.hits.any())),
-            (layout::BIND_LIGHT_VISIBILITY, Binding::Buffer(queues.light_visibility.any())),
-            (layout::BIND_RAY_RADIANCE, Binding::Buffer(queues.ray_radiance.any())),
+            (layout::BIND_HITS, Binding::Buffer(queue.hits.any())),
+            (layout::BIND_LIGHT_VISIBILITY, Binding::Buffer(queue.light_visibility.any())),
+            (layout::BIND_RAY_RADIANCE, Binding::Buffer(queue.ray_radiance.any())),
             (layout::BIND_PIXEL_RADIANCE, Binding::Buffer(pixels.pixel_radiance.any())),
             (layout::BIND_PIXEL_ACCUMULATED, Binding::Buffer(pixels.accumulated().any())),
             (layout::BIND_PIXEL_FILTERED, Binding::Buffer(pixels.filtered().any())),
@@ -97,7 +91,7 @@ impl Resources {
             (layout::BIND_COUNTERS, Binding::Buffer(self.counters.any())),
             (layout::BIND_TRIANGLE_IDS, Binding::Image(&pixels.triangle_ids)),
         ];
-        BindingSet::new(&self.bindings, name, &[&self.tree.objects()[..], &own].concat())
+        BindingSet::new(&self.bindings, "frame", &[&self.tree.objects()[..], &own].concat())
     }
 
     /// The kernels' constants from now on, with room for their picture, with or without features, and for `constants.queue_capacity` rays, or for as
@@ -107,21 +101,21 @@ impl Resources {
     /// # Errors
     /// Beyond the device's limits, out of memory.
     pub fn fit(&mut self, context: &Arc<Context>, constants: &Frame, features: bool) -> Result<bool, GpuError> {
-        let grows = self.queues.capacity() < constants.queue_capacity;
-        let queues = grows.then(|| Queues::new(context, constants.queue_capacity, constants.n_lights)).transpose()?;
+        let grows = self.queue.capacity() < constants.queue_capacity;
+        let queue = grows.then(|| Queue::new(context, constants.queue_capacity, constants.n_lights)).transpose()?;
         let pixels =
             (!self.pixels.fit(constants, features)).then(|| Pixels::new(context, constants, features)).transpose()?;
         let keeps_pixels = pixels.is_none();
-        let has_room = queues.is_none() && keeps_pixels;
-        if let Some(queues) = queues {
-            self.queues = queues;
+        let has_room = queue.is_none() && keeps_pixels;
+        if let Some(queue) = queue {
+            self.queue = queue;
         }
         if let Some(pixels) = pixels {
             self.pixels = pixels;
         }
-        self.constants = Frame { queue_capacity: self.queues.capacity(), ..*constants };
+        self.constants = Frame { queue_capacity: self.queue.capacity(), ..*constants };
         if !has_room {
-            self.sets = self.make_sets()?;
+            self.set = Some(self.make_set()?);
         }
         Ok(keeps_pixels)
     }
@@ -137,7 +131,7 @@ impl Resources {
     /// Too many triangles for brute force; beyond the device's limits, out of memory.
     pub fn add_extras(&mut self, context: &Arc<Context>, tree: &KdTree, traversal: Traversal) -> Result<(), GpuError> {
         self.tree.add_extras(context, tree, traversal)?;
-        self.sets = self.make_sets()?;
+        self.set = Some(self.make_set()?);
         Ok(())
     }
 
@@ -148,7 +142,7 @@ impl Resources {
     pub fn resize_bounces(&mut self, context: &Arc<Context>, n_bounces: usize) -> Result<(), GpuError> {
         self.bounces = Buffer::new(context, "bounces", n_bounces, BufferUse::Indirect)?;
         self.counters = Buffer::new(context, "counters", n_bounces, BufferUse::Storage)?;
-        self.sets = self.make_sets()?;
+        self.set = Some(self.make_set()?);
         Ok(())
     }
 
@@ -161,7 +155,7 @@ impl Resources {
             let n_pixels = self.pixels.pixel_radiance.len();
             let sums = Buffer::new(context, "pixel_accumulated", n_pixels, BufferUse::Storage)?;
             self.pixels.pixel_accumulated = Some(sums);
-            self.sets = self.make_sets()?;
+            self.set = Some(self.make_set()?);
         }
         let (sample, sums) = (self.pixels.pixel_radiance.any(), self.pixels.accumulated().any());
         context.run("first sample", |commands| {
@@ -182,28 +176,33 @@ impl Resources {
         &self.constants
     }
 
-    /// One invocation a ray of the bounce.
-    pub fn ray_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
-        self.indirect(batch, offset_of!(Bounce, ray_groups_x))
-    }
-
     /// The lanes of each of the bounce's rays.
     pub fn trace_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
-        self.indirect(batch, offset_of!(Bounce, trace_groups_x))
+        self.indirect(batch.bounce_ix, offset_of!(Bounce, trace_groups_x))
     }
 
-    /// The lanes of each of the bounce's rays, for each light.
-    pub fn shadow_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
-        self.indirect(batch, offset_of!(Bounce, shadow_groups_x))
-    }
-
-    /// One workgroup a scan block of the bounce's rays.
+    /// One invocation a ray of the bounce.
     pub fn scan_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
-        self.indirect(batch, offset_of!(Bounce, scan_groups_x))
+        self.indirect(batch.bounce_ix, offset_of!(Bounce, scan_groups_x))
     }
 
-    fn indirect(&self, batch: &Batch, member: usize) -> Dispatch<'_> {
-        Dispatch::Indirect(self.bounces.any(), (batch.bounce_ix as usize * size_of::<Bounce>() + member) as u64)
+    /// The lanes of each of the batch's rays, of all bounces, for each light.
+    pub fn shadow_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
+        self.indirect(self.last_bounce(batch), offset_of!(Bounce, shadow_groups_x))
+    }
+
+    /// One invocation a ray of the batch, of all bounces.
+    pub fn shade_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
+        self.indirect(self.last_bounce(batch), offset_of!(Bounce, shade_groups_x))
+    }
+
+    /// The last row of a batch whose first one is given.
+    fn last_bounce(&self, batch: &Batch) -> u32 {
+        batch.bounce_ix + self.constants.max_depth - 1
+    }
+
+    fn indirect(&self, bounce_ix: u32, member: usize) -> Dispatch<'_> {
+        Dispatch::Indirect(self.bounces.any(), (bounce_ix as usize * size_of::<Bounce>() + member) as u64)
     }
 
     /// One invocation a pixel.
@@ -212,8 +211,12 @@ impl Resources {
         Dispatch::Threads([self.constants.width, self.constants.height, 1], [tile, tile, 1])
     }
 
-    /// Binds the set in which the batch's bounce reads its queue.
-    pub fn bind(&self, commands: &Commands, batch: &Batch) {
-        commands.bind(&self.sets[batch.depth as usize % 2]);
+    /// Binds all that the kernels read and write.
+    pub fn bind(&self, commands: &Commands) {
+        commands.bind(self.set());
+    }
+
+    pub(super) fn set(&self) -> &BindingSet {
+        self.set.as_ref().expect("made with the resources")
     }
 }

@@ -1,9 +1,10 @@
-//! Shade (the paper's section 2.1): local light at each hit, and the next level's rays, scattered.
+//! Shade (the paper's section 2.1): local light at each hit.
 
 use std::sync::Arc;
 
 use super::{Resources, kernel, spirv};
 use crate::{
+    frame::RenderOptions,
     gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
     layout::Batch,
 };
@@ -14,12 +15,16 @@ pub struct Shade {
 }
 
 impl Shade {
-    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
-        Ok(Self { kernel: kernel(context, bindings, "shade", spirv!("shade.comp"), &[])? })
+    pub(super) fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<Bindings>,
+        options: &RenderOptions,
+    ) -> Result<Self, GpuError> {
+        Ok(Self { kernel: kernel(context, bindings, "shade", spirv!("shade.comp"), &[options.profile.into()])? })
     }
 
-    /// Needs rays, hits, light_visibility. Leaves ray_radiance, child_rays, child_counts.
+    /// Needs rays, hits, light_visibility of all the batch's bounces. Leaves ray_radiance; updates counters.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
-        commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.ray_dispatch(batch));
+        commands.dispatch(&self.kernel, None, batch, resources.shade_dispatch(batch));
     }
 }

@@ -20,12 +20,12 @@ impl Shadow {
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        let constants = traversal_constants(context, options.traversal, [options.profile, options.features])?;
+        let constants = traversal_constants(context, options.traversal, [false, options.features])?;
         Ok(Self { kernel: kernel(context, bindings, "shadow", spirv!("shadow.comp"), &constants)? })
     }
 
-    /// Needs rays, hits. Leaves light_visibility; updates counters, and pixel_features where the options ask for them.
+    /// Needs rays, hits of all the batch's bounces. Leaves light_visibility; updates pixel_features where the options ask for them.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
-        commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.shadow_dispatch(batch));
+        commands.dispatch(&self.kernel, None, batch, resources.shadow_dispatch(batch));
     }
 }

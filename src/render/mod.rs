@@ -11,7 +11,7 @@ use tracing::info_span;
 
 use self::{
     parts::Pending,
-    schedule::{Schedule, queue_capacity, split_evenly},
+    schedule::{Schedule, queue_capacity, rays_a_pixel, split_into_batches},
 };
 use crate::{
     camera::frame_constants,
@@ -28,7 +28,7 @@ pub struct Renderer {
     context: Arc<Context>,
     camera: Camera,
     options: RenderOptions,
-    /// Rays in a queue, where the caller has said so.
+    /// Rays in the queue, where the caller has said so.
     fixed_capacity: Option<u32>,
     /// Whether a hit can have two children.
     branches: bool,
@@ -58,7 +58,7 @@ impl Renderer {
         Self::with_capacity(context, scene, tree, options, None)
     }
 
-    /// As [`Renderer::new`], with room for so many rays in a queue. A frame that makes more is split into batches.
+    /// As [`Renderer::new`], with room for so many rays in the queue. A frame that makes more is split into batches.
     ///
     /// # Errors
     /// As [`Renderer::new`].
@@ -85,7 +85,8 @@ impl Renderer {
         constants.n_lanes = lanes_to_share(&context, options)?;
         constants.queue_capacity =
             fixed_capacity.unwrap_or_else(|| queue_capacity(context.limits(), &constants, branches));
-        let spans = split_evenly(constants.width * constants.height, constants.queue_capacity);
+        let expected = if fixed_capacity.is_some() { 1 } else { rays_a_pixel(&constants, branches) };
+        let spans = split_into_batches(&constants, expected, None);
         let schedule = Schedule::new(&context, &constants, spans, options.profile)?;
         let uploading = info_span!("upload scene").entered();
         let mut resources = Resources::new(&context, scene, tree, &constants, schedule.n_rows())?;
@@ -150,7 +151,7 @@ impl Renderer {
     /// A failed call.
     pub fn show(&mut self) -> Result<(), GpuError> {
         self.context.run("show", |commands| {
-            commands.bind(&self.resources.sets[0]);
+            self.resources.bind(commands);
             self.update_constants(commands);
             self.show_samples(commands);
         })?;
@@ -193,7 +194,7 @@ impl Renderer {
         &self.resources
     }
 
-    /// Algorithm 1: one command buffer before, one a bounce, one after.
+    /// Algorithm 1: one command buffer before, one a bounce, one for the light on all of a batch's rays, one after.
     fn record(&self) -> Result<Vec<CommandBuffer>, GpuError> {
         let mut frame = vec![self.command_buffer("begin frame", |commands| self.begin_frame(commands))?];
         for &batch in &self.schedule.batches {
@@ -202,6 +203,7 @@ impl Renderer {
                 let name = format!("bounce {depth}");
                 frame.push(self.command_buffer(&name, |commands| self.bounce(commands, &batch))?);
             }
+            frame.push(self.command_buffer("light", |commands| self.light(commands, &batch))?);
         }
         frame.push(self.command_buffer("end frame", |commands| self.end_frame(commands))?);
         Ok(frame)
@@ -213,7 +215,7 @@ impl Renderer {
 
     fn begin_frame(&self, commands: &Commands) {
         commands.reset_timer();
-        commands.bind(&self.resources.sets[0]);
+        self.resources.bind(commands);
         self.update_constants(commands);
         copy_all(commands, self.schedule.first_bounces.any(), self.resources.bounces.any());
         copy_all(commands, self.schedule.zero_counters.any(), self.resources.counters.any());
@@ -238,12 +240,10 @@ impl Renderer {
         commands.barrier(Access::TransferWrite, Access::AllReads); // frame
     }
 
-    /// One level of rays: hits, light, the next level's rays.
+    /// One level of rays: hits, the next level's rays.
     fn bounce(&self, commands: &Commands, batch: &Batch) {
         let (passes, resources) = (&self.passes, &self.resources);
-        resources.bind(commands, batch);
-        // The bounce before has read what this one overwrites: hits, light_visibility, the ray queue of the batch before.
-        commands.barrier(Access::ComputeRead, Access::ComputeWrite);
+        resources.bind(commands);
         if batch.depth == 0 {
             passes.primary_hit.record(commands, batch);
             commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // rays, hits, counters
@@ -256,22 +256,29 @@ impl Renderer {
             passes.features.record(commands, batch);
             commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_features
         }
-        if resources.constants().n_lights > 0 {
-            passes.shadow.record(commands, resources, batch);
-            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // light_visibility, counters
-        }
-        passes.shade.record(commands, resources, batch);
-        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // ray_radiance, child_rays, child_counts
-        passes.resolve.record(commands, resources, batch);
-        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_radiance
         if batch.depth + 1 < self.options.max_depth {
             passes.compact.record(commands, resources, batch);
-            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // next_rays
+            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // rays, first_children
         }
     }
 
+    /// What the lights give to the hits of all bounces, and that to the pixels. Ways through the tree end one by one, and a
+    /// dispatch with the last of its own: one for all shadows ends once.
+    fn light(&self, commands: &Commands, batch: &Batch) {
+        let (passes, resources) = (&self.passes, &self.resources);
+        resources.bind(commands);
+        if resources.constants().n_lights > 0 {
+            passes.shadow.record(commands, resources, batch);
+            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // light_visibility
+        }
+        passes.shade.record(commands, resources, batch);
+        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // ray_radiance, counters
+        passes.resolve.record(commands, batch);
+        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_radiance; the next batch overwrites the queue
+    }
+
     fn end_frame(&self, commands: &Commands) {
-        commands.bind(&self.resources.sets[0]);
+        self.resources.bind(commands);
         if self.resources.constants().n_samples > 1 {
             self.passes.accumulate.record(commands, &self.resources);
             commands.barrier(Access::ComputeWrite, Access::ComputeRead); // pixel_radiance

@@ -6,7 +6,7 @@ use tracing::info_span;
 
 use super::{
     Renderer,
-    schedule::{Schedule, split_evenly},
+    schedule::{Schedule, rays_a_pixel, split_into_batches},
 };
 use crate::{
     frame::{Profile, View},
@@ -31,7 +31,7 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::draw_sample`].
     pub fn draw_part(&mut self) -> Result<Option<Profile>, GpuError> {
-        let a_batch = self.options.max_depth as usize;
+        let a_batch = self.options.max_depth as usize + 1; // its bounces and their light
         let (n_done, n_all) = match &self.pending {
             Some(pending) => (pending.n_done, pending.commands.len()),
             None => (0, 2 + a_batch * self.schedule.batches.len()),
@@ -73,8 +73,9 @@ impl Renderer {
 
     /// The batches' spans of pixels, before any was found to be too large.
     pub(super) fn spans(&self, constants: &Frame) -> Vec<(u32, u32)> {
-        let most = self.most_pixels.map_or(constants.queue_capacity, |most| most.min(constants.queue_capacity));
-        split_evenly(constants.width * constants.height, most.max(1))
+        // Who gives the room knows how many pixels' rays it is for.
+        let expected = if self.fixed_capacity.is_some() { 1 } else { rays_a_pixel(constants, self.branches) };
+        split_into_batches(constants, expected, self.most_pixels)
     }
 
     fn reschedule(&mut self, spans: Vec<(u32, u32)>) -> Result<(), GpuError> {

@@ -1,4 +1,4 @@
-//! The batches of a frame: no ray is dropped, so what a queue cannot hold is drawn in parts.
+//! The batches of a frame: no ray is dropped, so what the queue cannot hold is drawn in parts.
 
 use std::{mem, sync::Arc};
 
@@ -6,6 +6,9 @@ use crate::{
     gpu::{Buffer, BufferUse, Context, GpuError, Limits, Timer},
     layout::{Batch, Bounce, Counters, Frame, RAY_GROUP_SIZE, Ray},
 };
+
+/// Rays that go well into memory together, some 100 bytes each; enough to keep any device busy.
+const MOST_RAYS: u64 = 1 << 24;
 
 /// The batches of a frame, and what depends on their number.
 pub struct Schedule {
@@ -42,8 +45,8 @@ impl Schedule {
             .map(|n_rays| Bounce::of(n_rays, constants))
             .collect();
         let zeros = vec![Counters::default(); rows.len()];
-        // The widest bounce has 10 kernels; visibility, accumulate, denoise and tonemap stand outside.
-        let n_passes = 4 + 10 * rows.len() as u32;
+        // The widest bounce has 6 kernels, a batch's light 3; visibility, accumulate, denoise and tonemap stand outside.
+        let n_passes = 4 + 3 * batches.len() as u32 + 6 * rows.len() as u32;
         Ok(Self {
             first_bounces: Buffer::with(context, "first_bounces", &rows, BufferUse::Storage)?,
             zero_counters: Buffer::with(context, "zero_counters", &zeros, BufferUse::Storage)?,
@@ -60,7 +63,7 @@ impl Schedule {
     /// Spans for the next attempt: each batch in which a bounce overflowed is halved.
     ///
     /// # Errors
-    /// One pixel alone makes more rays than a queue holds.
+    /// One pixel alone makes more rays than the queue holds.
     pub fn split(&self, bounces: &[Bounce], constants: &Frame) -> Result<Vec<(u32, u32)>, GpuError> {
         let mut spans = Vec::new();
         for (batch, rows) in self.batches.iter().zip(bounces.chunks_exact(constants.max_depth as usize)) {
@@ -69,31 +72,41 @@ impl Schedule {
                 None => spans.push((first, n)),
                 Some(row) if n == 1 => {
                     return Err(GpuError::Limit {
-                        what: "rays of one pixel on one level",
-                        value: u64::from(row.n_wanted),
+                        what: "rays of one pixel",
+                        value: u64::from(row.first_ray) + u64::from(row.n_wanted),
                         limit: u64::from(constants.queue_capacity),
                     });
                 }
                 Some(_) => spans.extend([(first, n / 2), (first + n / 2, n - n / 2)]),
             }
         }
-        tracing::debug!(n_batches = spans.len(), "ray queues overflowed");
+        tracing::debug!(n_batches = spans.len(), "the ray queue overflowed");
         Ok(spans)
     }
 }
 
-/// Rays that a queue should hold: two a pixel where rays can branch, else one, as far as the device's limits go.
-pub fn queue_capacity(limits: &Limits, constants: &Frame, branches: bool) -> u32 {
-    let wanted = u64::from(constants.width) * u64::from(constants.height) * if branches { 2 } else { 1 };
-    // child_rays and light_visibility are the widest buffers of a ray.
-    let bytes_a_ray = (2 * mem::size_of::<Ray>()).max(4 * constants.n_lights as usize) as u64;
-    let most = (limits.storage_range / bytes_a_ray).min(u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE));
-    wanted.min(most).max(1) as u32
+/// Rays that a batch is first given room for, a pixel: as many as most scenes make. `branches`: a hit can have two children.
+pub fn rays_a_pixel(constants: &Frame, branches: bool) -> u32 {
+    if branches { 8.min((1 << constants.max_depth.min(4)) - 1) } else { constants.max_depth.min(2) }
 }
 
-/// Spans of equal size that leave each batch room to grow to the capacity.
-pub fn split_evenly(n_pixels: u32, capacity: u32) -> Vec<(u32, u32)> {
-    let n_batches = n_pixels.div_ceil(capacity).max(1);
+/// Rays that the queue should hold: all of the picture's, as far as that is no more than [`MOST_RAYS`] and the device's limits
+/// go.
+pub fn queue_capacity(limits: &Limits, constants: &Frame, branches: bool) -> u32 {
+    let n_pixels = u64::from(constants.width) * u64::from(constants.height);
+    // rays and light_visibility are the widest buffers of a ray.
+    let bytes_a_ray = mem::size_of::<Ray>().max(4 * constants.n_lights as usize) as u64;
+    let most = (limits.storage_range / bytes_a_ray).min(u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE));
+    let wanted = n_pixels * u64::from(rays_a_pixel(constants, branches));
+    wanted.min(MOST_RAYS).min(most).max(1) as u32
+}
+
+/// Spans of equal size, whose rays have room in the queue if there are `rays_a_pixel`; of no more pixels than `most_pixels`, if
+/// it is given.
+pub fn split_into_batches(constants: &Frame, rays_a_pixel: u32, most_pixels: Option<u32>) -> Vec<(u32, u32)> {
+    let n_pixels = constants.width * constants.height;
+    let with_room = (constants.queue_capacity / rays_a_pixel).max(1);
+    let n_batches = n_pixels.div_ceil(most_pixels.map_or(with_room, |most| most.clamp(1, with_room))).max(1);
     let size = n_pixels.div_ceil(n_batches);
     (0..n_batches).map(|i| (i * size, size.min(n_pixels - i * size))).collect()
 }

@@ -7,8 +7,8 @@ use crate::{
     cast::Query,
     cpu::{
         bindings::Bindings,
+        children::{child_kinds_of, children_of},
         primary_hit::camera_ray,
-        shade::{LitRays, Shaded, shade},
         steps::{Steps, count_steps},
         trace::trace,
     },
@@ -61,24 +61,25 @@ pub fn pick(scene: &Scene, tree: &KdTree, options: &RenderOptions, camera: &Came
     let extras = Extras::new(tree, options.traversal);
     let mut frame = frame_constants(scene, tree, options);
     frame.set_view(camera, 0);
+    let bindings = Bindings::new(scene, tree, &frame).with_extras(&extras);
     let mut rays = vec![camera_ray(&frame, pixel)];
     let mut picked = Picked { pixel, rays: Vec::new(), n_more: 0 };
     for depth in 0..options.max_depth {
         if rays.is_empty() {
             break;
         }
-        frame.queue_capacity = rays.len() as u32;
-        let bindings = Bindings::new(scene, tree, &frame).with_extras(&extras);
         let mut hits = vec![Hit::default(); rays.len()];
         trace(&bindings, options.traversal, &rays, &mut hits);
         for (ray, hit) in rays.iter().zip(&hits) {
             let steps = count_steps(&bindings, options.traversal, Query::Closest, &[*ray]);
             picked.rays.push(PickedRay { depth, throughput: ray.throughput, steps, hit: found(scene, ray, hit) });
         }
-        let mut children = children(&bindings, depth, &rays, &hits);
-        picked.n_more += children.len().saturating_sub(MAX_RAYS);
-        children.truncate(MAX_RAYS);
-        rays = children;
+        if depth + 1 == options.max_depth {
+            break;
+        }
+        rays = next_rays(&bindings, &rays, &hits);
+        picked.n_more += rays.len().saturating_sub(MAX_RAYS);
+        rays.truncate(MAX_RAYS);
     }
     picked
 }
@@ -96,11 +97,7 @@ fn found(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<PickedHit> {
 }
 
 /// The rays of the next level.
-fn children(bindings: &Bindings, depth: u32, rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
-    let dark = vec![0; rays.len() * bindings.lights.len()];
-    let mut shaded = Shaded::default();
-    shaded.resize(rays.len());
-    shade(bindings, depth, LitRays { rays, hits, light_visibility: &dark }, &mut shaded);
-    let places = shaded.child_rays.chunks_exact(2).zip(&shaded.child_counts);
-    places.flat_map(|(places, &count)| places[..count as usize].to_vec()).collect()
+fn next_rays(bindings: &Bindings, rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
+    let of_ray = |(ray, hit)| children_of(bindings, ray, hit, child_kinds_of(bindings, ray, hit));
+    rays.iter().zip(hits).flat_map(of_ray).collect()
 }

@@ -5,7 +5,7 @@ use kdray::{
     layout::{Bounce, Frame},
 };
 
-use super::stage::{FIRST, Stage, options};
+use super::stage::{Stage, options};
 use crate::support::{compare, random::Random, scenes};
 
 type Pixels = Vec<[f32; 4]>;
@@ -33,7 +33,7 @@ fn accumulated(stage: &Stage, bounces: &[Bounce; 3], sample: &Pixels, sums: &Pix
     stage.resources.bounces.upload(bounces).expect("bounces");
     pixels.pixel_radiance.upload(sample).expect("pixel_radiance");
     accumulated.upload(sums).expect("pixel_accumulated");
-    stage.run(&FIRST, |commands| stage.passes.accumulate.record(commands, &stage.resources));
+    stage.run(|commands| stage.passes.accumulate.record(commands, &stage.resources));
     (pixels.pixel_radiance.download().expect("pixel_radiance"), accumulated.download().expect("pixel_accumulated"))
 }
 

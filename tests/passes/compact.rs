@@ -1,155 +1,188 @@
 //! Compact against its twin and against closed forms.
 
+use glam::{Vec3, vec3};
 use kdray::{
-    cpu,
-    layout::{Batch, Bounce, Frame, Ray, SCAN_BLOCK_SIZE, SCAN_GROUP_SIZE},
+    cpu::{self, compact::Parents},
+    layout::{
+        Batch, Bounce, CHILD_REFLECTED, CHILD_TRANSMITTED, Frame, Hit, NO_TRIANGLE, Ray, SCAN_GROUP_SIZE, SPINE_ITEMS,
+    },
 };
 
 use super::stage::{FIRST, Stage, UNTOUCHED_RAY, UNTOUCHED_WORD, options};
-use crate::support::{compare, random::Random, scenes};
+use crate::support::{compare, meshes, random::Random, scenes};
 
-/// Blocks that one round of the spine holds.
-const ROUND: u32 = SCAN_GROUP_SIZE * SCAN_BLOCK_SIZE;
+/// Rays that one round of the spine has the counts of.
+const ROUND: u32 = SCAN_GROUP_SIZE * SCAN_GROUP_SIZE * SPINE_ITEMS;
 
-/// One more and less than a workgroup, a block, and a round of the spine.
-const COUNTS: [u32; 12] = [
+/// One more and less than a workgroup, what one invocation of the spine adds up, and a round of it.
+const COUNTS: [u32; 11] = [
     0,
     1,
     SCAN_GROUP_SIZE - 1,
     SCAN_GROUP_SIZE,
     SCAN_GROUP_SIZE + 1,
-    SCAN_BLOCK_SIZE - 1,
-    SCAN_BLOCK_SIZE,
-    SCAN_BLOCK_SIZE + 1,
-    5 * SCAN_BLOCK_SIZE + 3,
+    SPINE_ITEMS * SCAN_GROUP_SIZE,
+    SPINE_ITEMS * SCAN_GROUP_SIZE + 1,
+    5000,
     ROUND - 1,
     ROUND,
     ROUND + 1,
 ];
 
+/// Triangle i has i children: one of plaster, a mirror, one of glass.
 fn stage(capacity: u32) -> Stage {
     let mut scene = scenes::empty();
-    scenes::add(&mut scene, Vec::new(), scenes::BLACK);
+    for material in [scenes::diffuse(Vec3::ONE), scenes::mirror(Vec3::splat(0.5)), scenes::glass(1.5)] {
+        let triangle = meshes::triangle(Vec3::ZERO, vec3(0.0, 0.0, 1.0), vec3(1.0, 0.0, 0.0));
+        scenes::add(&mut scene, vec![triangle], material);
+    }
     Stage::new(scene, options(8, 8), capacity)
 }
 
-/// A ray that says which one it is.
-fn numbered(i: usize) -> Ray {
-    Ray { pixel_ix: i as u32, ..UNTOUCHED_RAY }
+/// A ray that says which one it is, and its hit.
+fn parent(i: usize, n_children: u32) -> (Ray, Hit) {
+    let ray = Ray {
+        origin: vec3(0.3, 1.0, 0.3),
+        pixel_ix: i as u32,
+        direction: vec3(0.1, -1.0, 0.2).normalize(),
+        source_triangle: NO_TRIANGLE,
+        throughput: Vec3::ONE,
+        t_max: f32::INFINITY,
+    };
+    (ray, Hit { t: 1.0, triangle_ix: n_children, u: 0.3, v: 0.3 })
 }
 
-/// The next queue and both rows of `bounces`.
-fn on_device(stage: &Stage, child_counts: &[u32]) -> (Vec<Ray>, [Bounce; 2]) {
+/// What compaction leaves.
+struct Compacted {
+    rays: Vec<Ray>,
+    child_kinds: Vec<u32>,
+    first_children: Vec<u32>,
+    bounces: Vec<Bounce>,
+}
+
+/// The second bounce's children behind `n_before` rays of the first one.
+fn on_device(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
     let resources = &stage.resources;
-    let n_rays = child_counts.len();
-    let children: Vec<Ray> = (0..2 * n_rays).map(numbered).collect();
-    stage.set_n_rays(n_rays as u32);
-    resources.queues.child_rays.upload(&children).expect("child_rays");
-    resources.queues.child_counts.upload(child_counts).expect("child_counts");
-    resources
-        .queues
-        .scan_blocks
-        .upload(&vec![UNTOUCHED_WORD; resources.queues.scan_blocks.len()])
-        .expect("scan_blocks");
-    resources.queues.ray_queues[1]
-        .upload(&vec![UNTOUCHED_RAY; resources.queues.ray_queues[1].len()])
-        .expect("next_rays");
-    stage.run(&FIRST, |commands| stage.passes.compact.record(commands, resources, &FIRST));
-    let bounces = resources.bounces.download().expect("bounces");
-    (resources.queues.ray_queues[1].download().expect("next_rays"), [bounces[0], bounces[1]])
-}
-
-fn on_cpu(stage: &Stage, child_counts: &[u32]) -> (Vec<Ray>, [Bounce; 2]) {
-    let (n_rays, capacity) = (child_counts.len(), stage.resources.queues.ray_queues[1].len());
-    let children: Vec<Ray> = (0..2 * n_rays).map(numbered).collect();
-    let constants = stage.resources.constants();
-    let mut this = Bounce::of(n_rays as u32, constants);
-    let mut next = this;
-    let mut scan_blocks = vec![0; n_rays.div_ceil(SCAN_BLOCK_SIZE as usize)];
-    let mut next_rays = vec![UNTOUCHED_RAY; capacity];
-    cpu::compact::reduce(child_counts, &mut scan_blocks);
-    cpu::compact::spine(&mut scan_blocks, constants, &mut next);
-    if next.overflow == 0 {
-        cpu::compact::scatter(&children, child_counts, &scan_blocks, &mut next_rays[..next.n_rays as usize]);
+    let before = vec![parent(0, 0); n_before as usize];
+    let parents = child_counts.iter().enumerate().map(|(i, &n)| parent(i, n));
+    let (rays, hits): (Vec<_>, Vec<_>) = before.into_iter().chain(parents).unzip();
+    stage.set_n_rays(&[n_before, child_counts.len() as u32]);
+    stage.set_rays(&rays);
+    stage.set_hits(&hits);
+    let queue = &resources.queue;
+    for words in [&queue.child_kinds, &queue.first_children, &queue.scan_blocks] {
+        words.upload(&vec![UNTOUCHED_WORD; words.len()]).expect("words");
     }
-    this.any_overflow = next.overflow;
-    (next_rays, [this, next])
+    let batch = Batch { depth: 1, bounce_ix: 1, ..FIRST };
+    stage.run(|commands| stage.passes.compact.record(commands, resources, &batch));
+    Compacted {
+        rays: queue.rays.download().expect("rays"),
+        child_kinds: queue.child_kinds.download().expect("child_kinds"),
+        first_children: queue.first_children.download().expect("first_children"),
+        bounces: resources.bounces.download().expect("bounces"),
+    }
 }
 
-fn check(stage: &Stage, child_counts: &[u32]) {
-    let (expected, expected_bounces) = on_cpu(stage, child_counts);
-    let (found, bounces) = on_device(stage, child_counts);
-    compare::exact(&expected, &found).unwrap();
-    compare::exact(&expected_bounces, &bounces).unwrap();
+fn on_cpu(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
+    let (bindings, constants) = (stage.bindings(), stage.resources.constants());
+    let capacity = stage.resources.queue.rays.len();
+    let parents = child_counts.iter().enumerate().map(|(i, &n)| parent(i, n));
+    let (rays, hits): (Vec<_>, Vec<_>) = parents.unzip();
+    let n = child_counts.len();
+    let mut bounces = stage.set_n_rays(&[n_before, n as u32]);
+    let mut all = vec![UNTOUCHED_RAY; capacity];
+    all[..n_before as usize].fill(parent(0, 0).0);
+    let (before, behind) = all.split_at_mut(n_before as usize + n);
+    before[n_before as usize..].copy_from_slice(&rays);
+    let untouched = || vec![UNTOUCHED_WORD; capacity];
+    let (mut child_kinds, mut first_children) = (untouched(), untouched());
+    let places = n_before as usize..n_before as usize + n;
+    let mut scan_blocks = vec![0; n.div_ceil(SCAN_GROUP_SIZE as usize)];
+    let parents = Parents { rays: &rays, hits: &hits };
+    cpu::compact::reduce(&bindings, parents, &mut child_kinds[places.clone()], &mut scan_blocks);
+    let (this, mut next) = (bounces[1], bounces[2]);
+    cpu::compact::spine(&mut scan_blocks, constants, &this, &mut next);
+    if next.overflow == 0 {
+        cpu::compact::scatter(
+            &bindings,
+            parents,
+            &child_kinds[places.clone()],
+            &scan_blocks,
+            next.first_ray,
+            &mut first_children[places],
+            &mut behind[..next.n_rays as usize],
+        );
+    }
+    bounces[2] = next;
+    bounces[0].any_overflow = next.overflow;
+    Compacted { rays: all, child_kinds, first_children, bounces }
+}
+
+fn check(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
+    let expected = on_cpu(stage, n_before, child_counts);
+    let found = on_device(stage, n_before, child_counts);
+    compare::rays(1e-5, 0, &expected.rays, &found.rays).unwrap();
+    compare::exact(&expected.child_kinds, &found.child_kinds).unwrap();
+    compare::exact(&expected.first_children, &found.first_children).unwrap();
+    compare::exact(&expected.bounces, &found.bounces).unwrap();
+    found
 }
 
 #[test]
 fn agrees_with_its_twin() {
-    let stage = stage(2 * (ROUND + 1));
-    for n_rays in COUNTS {
+    let stage = stage(3 * (ROUND + 1) + 70);
+    for (n_rays, n_before) in COUNTS.into_iter().zip([0, 70].into_iter().cycle()) {
         let mut random = Random(u64::from(n_rays));
         let mut child_counts: Vec<u32> = (0..n_rays).map(|_| random.below(3) as u32).collect();
         // The last block, of one ray or more, moves something.
         child_counts.iter_mut().last().into_iter().for_each(|count| *count = 2);
-        check(&stage, &child_counts);
+        check(&stage, n_before, &child_counts);
     }
 }
 
 #[test]
 fn lanes_to_spare_are_shared_out_as_on_the_cpu() {
-    let mut stage = stage(5000);
+    let mut stage = stage(10_000);
     let constants = Frame { n_lanes: 5000, n_lights: 3, ..*stage.resources.constants() };
     stage.resources.set_constants(&constants);
     stage.resources.tree.frame.upload(&[constants]).expect("frame");
     for n_rays in [0, 1, 50, 160, 1250, 1251, 2500, 2501, 5000] {
-        check(&stage, &vec![1; n_rays]);
-        let lanes = 1 << on_device(&stage, &vec![1; n_rays]).1[1].trace_lanes_log2;
+        let lanes = 1 << check(&stage, 0, &vec![1; n_rays]).bounces[2].trace_lanes_log2;
         assert!(lanes == 1 || lanes * n_rays <= 5000, "{n_rays}: {lanes}");
     }
 }
 
+/// Which rays go on is said by closed forms: plaster ends all, a mirror reflects, glass does both, and they stand in order.
 #[test]
 fn all_children_keep_their_order() {
-    let stage = stage(5000);
-    let (rays, bounces) = on_device(&stage, &[2; 2500]);
-    compare::exact(&(0..5000).map(numbered).collect::<Vec<_>>(), &rays).unwrap();
-    assert_eq!((bounces[1].n_rays, bounces[1].overflow), (5000, 0));
-    let (rays, bounces) = on_device(&stage, &[0; 2500]);
-    compare::exact(&[UNTOUCHED_RAY; 5000], &rays).unwrap();
-    assert_eq!((bounces[1].n_rays, bounces[1].ray_groups_x, bounces[1].scan_groups_x), (0, 0, 0));
+    let stage = stage(7500);
+    let found = check(&stage, 0, &[2; 2500]);
+    let children = &found.rays[2500..];
+    assert!(children.iter().enumerate().all(|(i, ray)| ray.pixel_ix == i as u32 / 2));
+    assert!(children.iter().enumerate().all(|(i, ray)| (ray.direction.y > 0.0) == i.is_multiple_of(2)));
+    assert!((0..2500).all(|i| found.child_kinds[i] == CHILD_REFLECTED | CHILD_TRANSMITTED));
+    assert!((0..2500).all(|i| found.first_children[i] == 2500 + 2 * i as u32));
+    assert_eq!((found.bounces[2].first_ray, found.bounces[2].n_rays, found.bounces[2].overflow), (2500, 5000, 0));
+    let found = check(&stage, 10, &[1; 2490]);
+    assert!(
+        (0..2490).all(|i| found.rays[2500 + i].pixel_ix == i as u32 && found.child_kinds[10 + i] == CHILD_REFLECTED)
+    );
+    let found = check(&stage, 0, &[0; 2500]);
+    compare::exact(&[UNTOUCHED_RAY; 5000], &found.rays[2500..]).unwrap();
+    let next = found.bounces[2];
+    assert_eq!((next.n_rays, next.trace_groups_x, next.scan_groups_x, next.shade_groups_x), (0, 0, 0, 40));
 }
 
-/// One ray more than the queue holds: none is moved, none lost without word.
+/// One ray more than the queue holds: none is made, none lost without word.
 #[test]
 fn a_full_queue_is_used_and_an_overfull_one_reported() {
-    let stage = stage(3000);
+    let stage = stage(6100);
     let mut child_counts = vec![1; 3000];
-    check(&stage, &child_counts);
+    assert_eq!(check(&stage, 100, &child_counts).bounces[2].n_rays, 3000);
     child_counts[1234] = 2;
-    check(&stage, &child_counts);
-    let (rays, bounces) = on_device(&stage, &child_counts);
-    compare::exact(&[UNTOUCHED_RAY; 3000], &rays).unwrap();
-    assert_eq!((bounces[1].overflow, bounces[1].n_rays, bounces[1].n_wanted), (1, 0, 3001));
-    assert_eq!([bounces[0].any_overflow, bounces[0].overflow], [1, 0]);
-}
-
-/// Odd bounces read the second queue and fill the first.
-#[test]
-fn odd_bounces_fill_the_other_queue() {
-    let stage = stage(100);
-    let resources = &stage.resources;
-    let batch = Batch { depth: 1, bounce_ix: 1, ..FIRST };
-    stage.set_n_rays(50);
-    stage.set_rays(&[]);
-    resources.queues.ray_queues[1].upload(&[UNTOUCHED_RAY; 100]).expect("next_rays");
-    resources.queues.child_rays.upload(&(0..100).map(numbered).collect::<Vec<_>>()).expect("child_rays");
-    resources.queues.child_counts.upload(&[2; 50]).expect("child_counts");
-    stage.run(&batch, |commands| stage.passes.compact.record(commands, resources, &batch));
-    compare::exact(
-        &(0..100).map(numbered).collect::<Vec<_>>(),
-        &resources.queues.ray_queues[0].download().expect("rays"),
-    )
-    .unwrap();
-    compare::exact(&[UNTOUCHED_RAY; 100], &resources.queues.ray_queues[1].download().expect("next_rays")).unwrap();
-    assert_eq!(resources.bounces.download().expect("bounces")[2].n_rays, 100);
+    let found = check(&stage, 100, &child_counts);
+    compare::exact(&[UNTOUCHED_RAY; 3000], &found.rays[3100..]).unwrap();
+    let [first, _, next, ..] = found.bounces[..] else { panic!("three rows") };
+    assert_eq!((next.overflow, next.n_rays, next.n_wanted), (1, 0, 3001));
+    assert_eq!([first.any_overflow, first.overflow], [1, 0]);
 }

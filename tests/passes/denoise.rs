@@ -5,7 +5,7 @@ use kdray::{
     frame::{Denoise, RenderOptions},
 };
 
-use super::stage::{FIRST, Stage, UNTOUCHED_PIXEL, options};
+use super::stage::{Stage, UNTOUCHED_PIXEL, options};
 use crate::support::{compare, random::Random, scenes};
 
 /// Smooth, with some pixels that stand out, some brighter than white.
@@ -22,7 +22,7 @@ fn filtered(stage: &Stage, pixels: &[[f32; 4]]) -> Vec<[f32; 4]> {
     let resources = &stage.resources;
     resources.pixels.pixel_radiance.upload(pixels).expect("pixel_radiance");
     resources.pixels.filtered().upload(&vec![UNTOUCHED_PIXEL; pixels.len()]).expect("pixel_filtered");
-    stage.run(&FIRST, |commands| stage.passes.denoise.record(commands, resources));
+    stage.run(|commands| stage.passes.denoise.record(commands, resources));
     resources.pixels.filtered().download().expect("pixel_filtered")
 }
 

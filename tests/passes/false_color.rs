@@ -6,7 +6,7 @@ use kdray::{
     layout::{FalseColor, Feature, NO_TRIANGLE, VIEW_COST, VIEW_DEPTH, VIEW_ID, VIEW_NORMAL, VIEW_RAYS},
 };
 
-use super::stage::{FIRST, Stage, UNTOUCHED_WORD, options};
+use super::stage::{Stage, UNTOUCHED_WORD, options};
 use crate::support::{compare, random::Random, scenes};
 
 const VIEWS: [u32; 5] = [VIEW_DEPTH, VIEW_NORMAL, VIEW_ID, VIEW_COST, VIEW_RAYS];
@@ -21,7 +21,7 @@ fn displayed(stage: &Stage, push: &FalseColor, features: &[Feature]) -> Vec<[u8;
     let pixels = &stage.resources.pixels;
     pixels.pixel_features.upload(features).expect("pixel_features");
     pixels.pixel_display.upload(&vec![UNTOUCHED_WORD; features.len()]).expect("pixel_display");
-    stage.run(&FIRST, |commands| stage.passes.false_color.record(commands, &stage.resources, push));
+    stage.run(|commands| stage.passes.false_color.record(commands, &stage.resources, push));
     pixels.pixel_display.download().expect("pixel_display").into_iter().map(u32::to_le_bytes).collect()
 }
 

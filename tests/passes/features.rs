@@ -19,11 +19,11 @@ fn primary_like(stage: &Stage, n: u32) -> Vec<Ray> {
 fn noted(stage: &Stage, rays: &[Ray], before: &[Feature]) -> Vec<Feature> {
     let hits = hits_of(stage, rays);
     let batch = Batch { n_pixels: rays.len() as u32, ..FIRST };
-    stage.set_n_rays(batch.n_pixels);
+    stage.set_n_rays(&[batch.n_pixels]);
     stage.set_rays(rays);
     stage.set_hits(&hits);
     stage.resources.pixels.pixel_features.upload(before).expect("pixel_features");
-    stage.run(&batch, |commands| stage.passes.features.record(commands, &batch));
+    stage.run(|commands| stage.passes.features.record(commands, &batch));
     stage.resources.pixels.pixel_features.download().expect("pixel_features")
 }
 

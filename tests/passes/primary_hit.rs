@@ -11,15 +11,15 @@ use crate::support::{compare, scenes};
 
 /// Rays and hits of a batch, and how many are hits.
 fn on_device(stage: &Stage, batch: &Batch) -> (Vec<Ray>, Vec<Hit>, u32) {
-    stage.set_n_rays(batch.n_pixels);
+    stage.set_n_rays(&[batch.n_pixels]);
     stage.set_rays(&[]);
     stage.set_hits(&[]);
-    stage.run(batch, |commands| {
+    stage.run(|commands| {
         stage.passes.visibility.record(commands, &stage.resources);
         stage.passes.primary_hit.record(commands, batch);
     });
-    let rays = stage.resources.queues.ray_queues[0].download().expect("rays");
-    (rays, stage.resources.queues.hits.download().expect("hits"), stage.counters().n_hits)
+    let rays = stage.resources.queue.rays.download().expect("rays");
+    (rays, stage.resources.queue.hits.download().expect("hits"), stage.counters()[0].n_hits)
 }
 
 /// The same on the CPU, with the triangles of the device's hits.

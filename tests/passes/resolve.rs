@@ -1,37 +1,58 @@
-//! Resolve against its twin: sums in the same order, so the same to the last bit.
+//! Resolve against its twin and against the sum of a pixel's rays in the queue's order: the same to the last bit.
 
 use kdray::{
     cpu,
     layout::{Batch, Ray},
 };
 
-use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_RAY, options};
+use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_PIXEL, UNTOUCHED_RAY, options};
 use crate::support::{compare, random::Random, scenes};
 
-/// Rays in runs of up to `longest` a pixel.
-fn runs(n_rays: u32, longest: usize) -> Vec<Ray> {
-    let mut random = Random(9);
-    (0..)
-        .flat_map(|pixel_ix| vec![Ray { pixel_ix, ..UNTOUCHED_RAY }; 1 + random.below(longest)])
-        .take(n_rays as usize)
-        .collect()
+/// A batch's rays, bounce after bounce.
+struct Family {
+    rays: Vec<Ray>,
+    first_children: Vec<u32>,
+    n_rays: Vec<u32>,
 }
 
-fn check(stage: &Stage, depth: u32, rays: &[Ray]) {
+/// One ray a pixel, and up to `most_children` of each ray of `n_bounces`.
+fn family(n_primary: u32, n_bounces: usize, most_children: usize) -> Family {
+    let mut random = Random(9);
+    let mut rays: Vec<Ray> = (0..n_primary).map(|pixel_ix| Ray { pixel_ix, ..UNTOUCHED_RAY }).collect();
+    let (mut first_children, mut n_rays) = (Vec::new(), vec![n_primary]);
+    for _ in 1..n_bounces {
+        let parents = first_children.len()..rays.len();
+        for parent in parents.clone() {
+            let ray = rays[parent];
+            first_children.push(rays.len() as u32);
+            rays.extend(vec![ray; random.below(most_children + 1)]);
+        }
+        n_rays.push((rays.len() - parents.end) as u32);
+    }
+    Family { rays, first_children, n_rays }
+}
+
+fn check(stage: &Stage, family: &Family) {
     let resources = &stage.resources;
+    let Family { rays, first_children, n_rays } = family;
     let mut random = Random(4);
-    let mut some = |n: usize| -> Vec<[f32; 4]> { (0..n).map(|_| [0; 4].map(|_| random.between(0.0, 5.0))).collect() };
-    let before = some(resources.pixels.pixel_radiance.len());
-    let radiance = some(rays.len());
+    let radiance: Vec<[f32; 4]> = rays.iter().map(|_| [0; 4].map(|_| random.between(0.0, 5.0))).collect();
+    let before = vec![UNTOUCHED_PIXEL; resources.pixels.pixel_radiance.len()];
+    let mut sums = before.clone();
+    sums[..n_rays[0] as usize].fill([0.0, 0.0, 0.0, 1.0]);
+    for (ray, radiance) in rays.iter().zip(&radiance) {
+        (0..3).for_each(|i| sums[ray.pixel_ix as usize][i] += radiance[i]);
+    }
+    let bounces = stage.set_n_rays(n_rays);
     let mut expected = before.clone();
-    cpu::resolve::resolve(depth, rays, &radiance, &mut expected);
-    // Even depths: the set whose queue `set_rays` fills.
-    let batch = Batch { depth, ..FIRST };
-    stage.set_n_rays(rays.len() as u32);
+    cpu::resolve::resolve(&bounces[..n_rays.len()], rays, &radiance, first_children, &mut expected);
+    compare::exact(&sums, &expected).unwrap();
     stage.set_rays(rays);
-    resources.queues.ray_radiance.upload(&radiance).expect("ray_radiance");
+    resources.queue.ray_radiance.upload(&radiance).expect("ray_radiance");
+    resources.queue.first_children.upload(first_children).expect("first_children");
     resources.pixels.pixel_radiance.upload(&before).expect("pixel_radiance");
-    stage.run(&batch, |commands| stage.passes.resolve.record(commands, resources, &batch));
+    let batch = Batch { n_pixels: n_rays[0], ..FIRST };
+    stage.run(|commands| stage.passes.resolve.record(commands, &batch));
     compare::exact(&expected, &resources.pixels.pixel_radiance.download().expect("pixel_radiance")).unwrap();
 }
 
@@ -39,10 +60,13 @@ fn check(stage: &Stage, depth: u32, rays: &[Ray]) {
 fn agrees_with_its_twin() {
     let mut scene = scenes::empty();
     scenes::add(&mut scene, Vec::new(), scenes::BLACK);
-    let stage = Stage::new(scene, options(50, 50), 2010);
+    let stage = Stage::new(scene, options(50, 50), 100_000);
+    let max_depth = stage.options.max_depth as usize;
     for n_rays in RAY_COUNTS {
-        for (depth, longest) in [(0, 1), (2, 1), (2, 5), (4, 300)] {
-            check(&stage, depth, &runs(n_rays, longest));
+        for (n_bounces, most_children) in
+            [(1, 0), (2, 1), (max_depth, 0), (max_depth, 1), (max_depth - 1, 3), (max_depth, 3)]
+        {
+            check(&stage, &family(n_rays, n_bounces, most_children));
         }
     }
 }

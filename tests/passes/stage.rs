@@ -17,9 +17,6 @@ use kdray::{
 pub const RAY_COUNTS: [u32; 7] =
     [0, 1, RAY_GROUP_SIZE - 1, RAY_GROUP_SIZE, RAY_GROUP_SIZE + 1, 5 * RAY_GROUP_SIZE + 7, 2000];
 
-/// Rows of `bounces` that a stage has room for.
-const N_ROWS: usize = 3;
-
 /// What stands in buffers before a kernel runs: where it still stands, nothing was written.
 pub const UNTOUCHED_RAY: Ray = Ray {
     origin: glam::Vec3::splat(-7.0),
@@ -51,12 +48,13 @@ pub fn options(width: u32, height: u32) -> RenderOptions {
 }
 
 impl Stage {
-    /// Queues for `capacity` rays.
+    /// A queue for `capacity` rays.
     pub fn new(scene: Scene, options: RenderOptions, capacity: u32) -> Self {
         let context = Context::new(&ContextOptions { device: None, validate: true }).expect("a device with validation");
         let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
         let constants = Frame { queue_capacity: capacity, ..frame_constants(&scene, &tree, &options) };
-        let mut resources = Resources::new(&context, &scene, &tree, &constants, N_ROWS).expect("resources");
+        let mut resources =
+            Resources::new(&context, &scene, &tree, &constants, constants.max_depth as usize).expect("resources");
         resources.fit(&context, &constants, options.features).expect("room");
         resources.add_extras(&context, &tree, options.traversal).expect("extras");
         let extras = Extras::new(&tree, options.traversal);
@@ -69,34 +67,43 @@ impl Stage {
         Bindings::new(&self.scene, &self.tree, self.resources.constants()).with_extras(&self.extras)
     }
 
-    /// Binds the batch's descriptor set, records and runs.
-    pub fn run(&self, batch: &Batch, record: impl FnOnce(&Commands)) {
+    /// Binds the descriptor set, records and runs.
+    pub fn run(&self, record: impl FnOnce(&Commands)) {
         let body = |commands: &Commands| {
-            self.resources.bind(commands, batch);
+            self.resources.bind(commands);
             record(commands);
         };
         self.context.run("test", body).expect("the commands run");
     }
 
-    /// A bounce of `n_rays`; all counters 0.
-    pub fn set_n_rays(&self, n_rays: u32) {
-        let row = Bounce::of(n_rays, self.resources.constants());
-        self.resources.bounces.upload(&[row; N_ROWS]).expect("bounces");
-        self.resources.counters.upload(&[Counters::default(); N_ROWS]).expect("counters");
+    /// A batch of bounces of so many rays, one after the other, and none after these; all counters 0. Returns their rows.
+    pub fn set_n_rays(&self, n_rays: &[u32]) -> Vec<Bounce> {
+        let constants = self.resources.constants();
+        let mut first_ray = 0;
+        let mut rows = vec![Bounce::of(0, constants); constants.max_depth as usize];
+        for (depth, row) in rows.iter_mut().enumerate() {
+            let n_rays = n_rays.get(depth).copied().unwrap_or(0);
+            row.set_rays(first_ray, n_rays, constants);
+            row.n_wanted = n_rays;
+            first_ray += n_rays;
+        }
+        self.resources.bounces.upload(&rows).expect("bounces");
+        self.resources.counters.upload(&vec![Counters::default(); rows.len()]).expect("counters");
+        rows
     }
 
-    /// The first `rays.len()` of the queue that even bounces read; untouched ones behind.
+    /// The first `rays.len()` of the queue; untouched ones behind.
     pub fn set_rays(&self, rays: &[Ray]) {
-        let mut queue = vec![UNTOUCHED_RAY; self.resources.queues.ray_queues[0].len()];
+        let mut queue = vec![UNTOUCHED_RAY; self.resources.queue.rays.len()];
         queue[..rays.len()].copy_from_slice(rays);
-        self.resources.queues.ray_queues[0].upload(&queue).expect("rays");
+        self.resources.queue.rays.upload(&queue).expect("rays");
     }
 
     /// As `set_rays`.
     pub fn set_hits(&self, hits: &[Hit]) {
-        let mut all = vec![UNTOUCHED_HIT; self.resources.queues.hits.len()];
+        let mut all = vec![UNTOUCHED_HIT; self.resources.queue.hits.len()];
         all[..hits.len()].copy_from_slice(hits);
-        self.resources.queues.hits.upload(&all).expect("hits");
+        self.resources.queue.hits.upload(&all).expect("hits");
     }
 
     /// How many of `n` rays may differ from the twin's: none on software drivers, whose arithmetic is exactly the
@@ -106,9 +113,9 @@ impl Stage {
         if self.context.is_software() { 0 } else { n as usize / 500 }
     }
 
-    /// What the kernels counted in the first row.
-    pub fn counters(&self) -> Counters {
-        self.resources.counters.download().expect("counters")[0]
+    /// What the kernels counted, a row a bounce.
+    pub fn counters(&self) -> Vec<Counters> {
+        self.resources.counters.download().expect("counters")
     }
 }
 
@@ -121,7 +128,7 @@ impl Drop for Stage {
     }
 }
 
-/// The first batch's bounce of depth 0.
+/// The first batch, and its bounce of depth 0.
 pub const FIRST: Batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, depth: 0 };
 
 /// `n` rays of every nasty kind at the stage's scene, with pixels and throughputs of their own.

@@ -5,14 +5,14 @@ use kdray::{
     frame::{RenderOptions, Tonemap},
 };
 
-use super::stage::{FIRST, Stage, UNTOUCHED_WORD, options};
+use super::stage::{Stage, UNTOUCHED_WORD, options};
 use crate::support::{compare, random::Random, scenes};
 
 fn encoded(stage: &Stage, pixels: &[[f32; 4]]) -> Vec<[u8; 4]> {
     let resources = &stage.resources;
     resources.pixels.filtered().upload(pixels).expect("pixel_filtered");
     resources.pixels.pixel_display.upload(&vec![UNTOUCHED_WORD; pixels.len()]).expect("pixel_display");
-    stage.run(&FIRST, |commands| stage.passes.tonemap.record(commands, resources));
+    stage.run(|commands| stage.passes.tonemap.record(commands, resources));
     resources.pixels.pixel_display.download().expect("pixel_display").into_iter().map(u32::to_le_bytes).collect()
 }
 

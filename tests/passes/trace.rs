@@ -12,20 +12,20 @@ use crate::support::{compare, meshes, scenes};
 fn check(stage: &Stage, n_rays: u32) {
     let n = n_rays as usize;
     let rays = some_rays(stage, n_rays);
-    let mut expected = vec![UNTOUCHED_HIT; stage.resources.queues.hits.len()];
+    let mut expected = vec![UNTOUCHED_HIT; stage.resources.queue.hits.len()];
     let n_hits = cpu::trace::trace(&stage.bindings(), stage.options.traversal, &rays, &mut expected[..n]);
-    stage.set_n_rays(n_rays);
+    stage.set_n_rays(&[n_rays]);
     stage.set_rays(&rays);
     stage.set_hits(&[]);
-    stage.run(&FIRST, |commands| stage.passes.trace.record(commands, &stage.resources, &FIRST));
-    let found = stage.resources.queues.hits.download().expect("hits");
+    stage.run(|commands| stage.passes.trace.record(commands, &stage.resources, &FIRST));
+    let found = stage.resources.queue.hits.download().expect("hits");
     let n_outliers = stage.n_outliers(n_rays);
     if stage.context.is_software() {
         compare::exact(&expected, &found).unwrap();
     } else {
         compare::hits(n_outliers, &expected, &found).unwrap();
     }
-    assert!(stage.counters().n_hits.abs_diff(n_hits) as usize <= n_outliers, "{n_rays} rays");
+    assert!(stage.counters()[0].n_hits.abs_diff(n_hits) as usize <= n_outliers, "{n_rays} rays");
 }
 
 fn check_all(scene: &Scene, counts: &[u32]) {
@@ -56,9 +56,9 @@ fn nothing_is_hit_in_an_empty_scene() {
     scenes::add(&mut scene, Vec::new(), scenes::BLACK);
     let stage = Stage::new(scene, options(8, 8), 9);
     let rays = vec![crate::support::rays::ray(glam::Vec3::ZERO, glam::Vec3::X); 9];
-    stage.set_n_rays(9);
+    stage.set_n_rays(&[9]);
     stage.set_rays(&rays);
-    stage.run(&FIRST, |commands| stage.passes.trace.record(commands, &stage.resources, &FIRST));
-    compare::exact(&super::stage::hits_of(&stage, &rays), &stage.resources.queues.hits.download().expect("hits"))
+    stage.run(|commands| stage.passes.trace.record(commands, &stage.resources, &FIRST));
+    compare::exact(&super::stage::hits_of(&stage, &rays), &stage.resources.queue.hits.download().expect("hits"))
         .unwrap();
 }

@@ -17,13 +17,13 @@ const SNAP_PX: f32 = 1.0 / 16.0;
 fn rasterized(stage: &Stage) -> Vec<u32> {
     let n_pixels = stage.options.width * stage.options.height;
     let batch = Batch { n_pixels, ..FIRST };
-    stage.set_n_rays(n_pixels);
-    stage.run(&batch, |commands| {
+    stage.set_n_rays(&[n_pixels]);
+    stage.run(|commands| {
         stage.passes.visibility.record(commands, &stage.resources);
         stage.passes.primary_hit.record(commands, &batch);
     });
-    let rays = stage.resources.queues.ray_queues[0].download().expect("rays");
-    let hits = stage.resources.queues.hits.download().expect("hits");
+    let rays = stage.resources.queue.rays.download().expect("rays");
+    let hits = stage.resources.queue.hits.download().expect("hits");
     let mut ids = vec![0; n_pixels as usize];
     for (ray, hit) in rays.iter().zip(hits) {
         ids[ray.pixel_ix as usize] = hit.triangle_ix;

@@ -36,6 +36,9 @@ pub struct PaperArgs {
     /// Pixels, as 640x480,1024x768 [default: the paper's three sizes]
     #[arg(long, value_name = "WxH", value_delimiter = ',')]
     pub size: Vec<Size>,
+    #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
+    #[arg(help = format!("Way through the tree on the GPU: {}", Traversal::words()))]
+    pub traversal: Traversal,
     /// Frames on the GPU
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,

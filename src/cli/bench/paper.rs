@@ -7,6 +7,7 @@ use kdray::{
         Spread,
         paper::{Report, Reported, Row, SCENES, SIZES, draw_on_cpu, draw_on_gpu, options},
     },
+    frame::RenderOptions,
     gpu::{Context, ContextOptions},
     kdtree::{BuildOptions, KdTree},
     scene::Scene,
@@ -33,6 +34,7 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
         suite: "paper",
         device: context.info().name.clone(),
         driver: context.info().driver.clone(),
+        traversal: args.traversal.to_string(),
         n_gpu_frames: args.repeat,
         n_cpu_frames: if args.no_cpu { 0 } else { args.cpu_repeat },
         rows: Vec::new(),
@@ -43,7 +45,9 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
         let (scene, tree) = loaded?;
         for &size in &sizes {
             let drawing = format!("drawing {name}, {}x{}", size.0, size.1);
-            let (row, _) = progress.stage(&drawing, || measure(&context, (&scene, &tree), size, &report));
+            let (row, _) = progress.stage(&drawing, || {
+                measure(&context, (&scene, &tree), &options(&scene, size, args.traversal), &report)
+            });
             report.rows.push(row?);
         }
     }
@@ -61,14 +65,13 @@ fn load(path: &Path) -> Result<(Scene, KdTree), CliError> {
 fn measure(
     context: &Arc<Context>,
     (scene, tree): (&Scene, &KdTree),
-    size: (u32, u32),
+    options: &RenderOptions,
     report: &Report,
 ) -> Result<Row, CliError> {
-    let options = options(&scene.defaults, size);
-    let on_gpu = draw_on_gpu(context, scene, tree, &options, report.n_gpu_frames)?;
-    let on_cpu = draw_on_cpu(scene, tree, &options, report.n_cpu_frames)
+    let on_gpu = draw_on_gpu(context, scene, tree, options, report.n_gpu_frames)?;
+    let on_cpu = draw_on_cpu(scene, tree, options, report.n_cpu_frames)
         .map_err(|error| CliError::Usage(format!("cannot start a thread: {error}")))?;
-    Ok(Row::new(scene, &options, &on_gpu, &on_cpu))
+    Ok(Row::new(scene, options, &on_gpu, &on_cpu))
 }
 
 /// The report as text that ends with a line break.

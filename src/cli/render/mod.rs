@@ -44,7 +44,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     for view in &views {
         view.files.check()?;
     }
-    let options = args.options(&scene.defaults)?;
+    let options = args.options(&scene)?;
     let device = ContextOptions { device: args.device.clone(), validate: args.validate };
     let opening = || info_span!("create device").in_scope(|| open_device(&device, &progress));
     let context = if args.cpu { None } else { Some(opening()?) };

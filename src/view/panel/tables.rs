@@ -11,8 +11,8 @@ use crate::{
     },
 };
 
-/// Passes that find what rays hit, and the bounce that those without one belong to.
-const TRACING: [&str; 4] = ["visibility", "primary_hit", "trace", "shadow"];
+/// Passes that find the closest hits of a bounce's rays.
+const TRACING: [&str; 3] = ["visibility", "primary_hit", "trace"];
 
 /// Rows of words under each other.
 pub fn grid<const N: usize>(ui: &mut Ui, name: &str, rows: impl IntoIterator<Item = [String; N]>) {
@@ -26,22 +26,25 @@ pub fn grid<const N: usize>(ui: &mut Ui, name: &str, rows: impl IntoIterator<Ite
     });
 }
 
-/// Rays and their speed, a bounce a row.
+/// Rays and their speed, a bounce a row, and all shadow rays in one.
 pub fn rays(ui: &mut Ui, profile: &Profile) {
     let head = ["", "rays", "hits", "shadow", "Mrays/s"].map(str::to_owned);
     let rows = profile.bounces.iter().enumerate().map(|(bounce, stats)| {
-        let n_rays = stats.n_rays + stats.n_shadow_rays;
         [
             bounce.to_string(),
             stats.n_rays.to_string(),
             stats.n_hits.to_string(),
             stats.n_shadow_rays.to_string(),
-            rate(n_rays, tracing_ms(profile, bounce as u32)),
+            rate(stats.n_rays, tracing_ms(profile, bounce as u32)),
         ]
     });
-    grid(ui, "rays", std::iter::once(head).chain(rows));
+    let n_shadow_rays = profile.bounces.iter().map(|stats| stats.n_shadow_rays).sum::<u64>();
+    let shadow_rate = rate(n_shadow_rays, profile.pass_ms("shadow"));
+    let shadow = ["shadow".to_owned(), String::new(), String::new(), n_shadow_rays.to_string(), shadow_rate];
+    grid(ui, "rays", std::iter::once(head).chain(rows).chain([shadow]));
 }
 
+/// Of the closest hits of a bounce; a pass that runs once a frame and finds hits finds those of the primary rays.
 fn tracing_ms(profile: &Profile, bounce: u32) -> Option<f64> {
     let passes = profile.passes.iter().filter(|pass| TRACING.contains(&pass.name));
     passes.filter(|pass| pass.bounce.unwrap_or(0) == bounce).map(|pass| pass.ms).sum()
@@ -125,9 +128,10 @@ mod tests {
         let pass = |name, bounce, ms| PassTime { name, bounce, ms: Some(ms), ..PassTime::default() };
         let passes = vec![
             pass("visibility", None, 1.0),
-            pass("shadow", Some(0), 1.0),
-            pass("shade", Some(0), 9.0),
+            pass("primary_hit", Some(0), 1.0),
+            pass("compact_scatter", Some(0), 9.0),
             pass("trace", Some(1), 3.0),
+            pass("shadow", None, 4.0),
         ];
         let profile = Profile { passes, ..Profile::default() };
         assert_eq!(tracing_ms(&profile, 0), Some(2.0));

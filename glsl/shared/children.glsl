@@ -1,0 +1,29 @@
+// Rays that go on from a hit: how many, and which.
+#ifndef KDRAY_CHILDREN
+#define KDRAY_CHILDREN
+
+#include "layout.glsl"
+#include "scene.glsl"
+#include "surface.glsl"
+#include "material.glsl"
+
+layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
+
+Material material_at(Hit hit) {
+    return materials[triangle_material_at(hit.triangle_ix)];
+}
+
+bool carries_light(Ray ray, vec3 weight) {
+    return any(greaterThan(ray.throughput * weight, vec3(0.0)));
+}
+
+// Bits of CHILD_*: of the ray's children, those that carry light.
+uint child_kinds_of(Ray ray, Hit hit) {
+    if (hit.triangle_ix == NO_TRIANGLE || !scatters_light(material_at(hit))) return 0u;
+    Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
+    Scattering next = scatter(material_at(hit), surface, ray.direction);
+    return (carries_light(ray, next.reflected_weight) ? CHILD_REFLECTED : 0u)
+         | (carries_light(ray, next.transmitted_weight) ? CHILD_TRANSMITTED : 0u);
+}
+
+#endif

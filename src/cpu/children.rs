@@ -1,0 +1,48 @@
+//! Rays that go on from a hit: how many, and which. Twin of `children.glsl`.
+
+use glam::Vec3;
+
+use super::{
+    bindings::Bindings,
+    material::{Scattering, scatter, scatters_light},
+    surface::{Surface, surface_at},
+};
+use crate::layout::{CHILD_REFLECTED, CHILD_TRANSMITTED, Hit, Material, NO_TRIANGLE, Ray};
+
+fn material_at<'a>(bindings: &Bindings<'a>, hit: &Hit) -> &'a Material {
+    &bindings.materials[bindings.triangle_materials[hit.triangle_ix as usize] as usize]
+}
+
+fn scattering_at(bindings: &Bindings, ray: &Ray, hit: &Hit) -> (Surface, Scattering) {
+    let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
+    let scattering = scatter(material_at(bindings, hit), &surface, ray.direction);
+    (surface, scattering)
+}
+
+/// Bits of `CHILD_*`: of the ray's children, those that carry light.
+pub fn child_kinds_of(bindings: &Bindings, ray: &Ray, hit: &Hit) -> u32 {
+    if hit.triangle_ix == NO_TRIANGLE || !scatters_light(material_at(bindings, hit)) {
+        return 0;
+    }
+    let carries_light = |weight: Vec3| (ray.throughput * weight).cmpgt(Vec3::ZERO).any();
+    let (_, next) = scattering_at(bindings, ray, hit);
+    let reflected = if carries_light(next.reflected_weight) { CHILD_REFLECTED } else { 0 };
+    let transmitted = if carries_light(next.transmitted_weight) { CHILD_TRANSMITTED } else { 0 };
+    reflected | transmitted
+}
+
+/// The children of these kinds, in order.
+pub fn children_of(bindings: &Bindings, ray: &Ray, hit: &Hit, kinds: u32) -> impl Iterator<Item = Ray> {
+    let scattering = (kinds != 0).then(|| scattering_at(bindings, ray, hit));
+    let children = scattering.map(|(surface, next)| {
+        [
+            (CHILD_REFLECTED, next.reflected, next.reflected_weight),
+            (CHILD_TRANSMITTED, next.transmitted, next.transmitted_weight),
+        ]
+        .map(|(kind, direction, weight)| {
+            let throughput = ray.throughput * weight;
+            (kinds & kind != 0).then(|| surface.ray_from(direction, hit.triangle_ix, ray, throughput))
+        })
+    });
+    children.into_iter().flatten().flatten()
+}
