@@ -1,7 +1,7 @@
 //! Which rays go into each pass and come out of it, alike on GPU and CPU.
 
 use crate::{
-    frame::{BounceStats, PassTime, Primary},
+    frame::{BounceStats, PassTime},
     layout::{Bounce, Counters},
 };
 
@@ -16,7 +16,7 @@ pub(crate) fn is_in_batch(pass: &PassTime) -> bool {
 }
 
 /// Fills in a pass's rays. `bounces`: of the pass's batch.
-pub(crate) fn count_rays(pass: &mut PassTime, bounces: &[BounceStats], primary: Primary) {
+pub(crate) fn count_rays(pass: &mut PassTime, bounces: &[BounceStats]) {
     if is_lighting(pass) {
         let sum = |count: fn(&BounceStats) -> u64| bounces.iter().map(count).sum();
         pass.n_rays_in = Some(sum(|bounce| bounce.n_rays));
@@ -28,7 +28,6 @@ pub(crate) fn count_rays(pass: &mut PassTime, bounces: &[BounceStats], primary: 
     let Some(bounce) = bounces.get(bounce_ix) else { return };
     pass.n_rays_in = Some(bounce.n_rays);
     pass.n_rays_out = match pass.name {
-        "primary_hit" if primary == Primary::Trace => Some(bounce.n_rays),
         "primary_hit" | "trace" => Some(bounce.n_hits),
         "compact_reduce" | "compact_spine" | "compact_scatter" => {
             Some(bounces.get(bounce_ix + 1).map_or(0, |next| next.n_rays))
@@ -49,7 +48,7 @@ pub(crate) fn device_counts(bounces: &[Bounce], counters: &[Counters]) -> Vec<Bo
 
 /// Fills in the batch and the rays of each pass of a device's frame. `counts`: as [`device_counts`] gives them,
 /// `max_depth` rows a batch.
-pub(crate) fn count_batches(passes: &mut [PassTime], counts: &[BounceStats], max_depth: u32, primary: Primary) {
+pub(crate) fn count_batches(passes: &mut [PassTime], counts: &[BounceStats], max_depth: u32) {
     let batches = || (0..).zip(counts.chunks_exact(max_depth as usize));
     // Every batch is recorded alike, whatever becomes of its rays.
     let passes_a_batch = passes.iter().filter(|pass| is_in_batch(pass)).count() / batches().count().max(1);
@@ -57,7 +56,7 @@ pub(crate) fn count_batches(passes: &mut [PassTime], counts: &[BounceStats], max
     for (batch_ix, bounces) in batches() {
         for pass in in_batches.by_ref().take(passes_a_batch) {
             pass.batch = Some(batch_ix);
-            count_rays(pass, bounces, primary);
+            count_rays(pass, bounces);
         }
     }
 }
@@ -93,7 +92,7 @@ mod tests {
         }
         passes.push(pass("tonemap", None));
         let counts = [stats(64, 60, 50), stats(20, 10, 4), stats(32, 30, 9), stats(8, 7, 0)];
-        count_batches(&mut passes, &counts, 2, Primary::Raster);
+        count_batches(&mut passes, &counts, 2);
         let found: Vec<_> = passes.iter().map(|p| (p.batch, p.n_rays_in, p.n_rays_out)).collect();
         let batch = |ix, [first, second]: [BounceStats; 2]| {
             let [n, m, all] = [first.n_rays, second.n_rays, first.n_rays + second.n_rays].map(Some);
@@ -107,12 +106,5 @@ mod tests {
         let once = (None, None, None);
         assert_eq!(found, [vec![once], batch(0, [a, b]), batch(1, [c, d]), vec![once]].concat());
         assert_eq!(sum_of_batches(&[a, b, c, d], 2), [stats(96, 90, 59), stats(28, 17, 4)]);
-    }
-
-    #[test]
-    fn camera_rays_that_are_traced_are_only_made_by_primary_hit() {
-        let mut passes = [pass("primary_hit", Some(0))];
-        count_batches(&mut passes, &[stats(64, 60, 0)], 1, Primary::Trace);
-        assert_eq!((passes[0].n_rays_in, passes[0].n_rays_out), (Some(64), Some(64)));
     }
 }

@@ -4,12 +4,13 @@
 // Shade (the paper's section 2.1): one invocation a ray of the batch, of any bounce, adds up ambient, diffuse, specular and
 // emitted light at its hit.
 // Reads rays, hits, light_visibility, bounces and the scene; writes ray_radiance (weighted by throughput),
-// counters[].n_shadow_rays.
+// counters (n_shadow_rays).
 #include "layout.glsl"
 #include "scene.glsl"
 #include "surface.glsl"
 #include "light.glsl"
 #include "material.glsl"
+#include "counters.glsl"
 
 // Whether shadow segments are counted.
 layout(constant_id = 0) const bool COUNTS = true;
@@ -24,7 +25,6 @@ layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray ray
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) readonly buffer LightVisibilityBlock { uint light_visibility[]; };
 layout(std430, set = 0, binding = BIND_RAY_RADIANCE) writeonly buffer RayRadianceBlock { vec4 ray_radiance[]; };
-layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
 
 vec3 local_radiance(Ray ray, uint ray_ix, Surface surface, Material material) {
     vec3 radiance = material.ke + material.ka * frame.ambient;
@@ -52,8 +52,7 @@ void count_segments(uint ray_ix) {
     for (uint depth = 0u; depth < frame.max_depth; ++depth) {
         uint bounce_ix = batch.bounce_ix + depth;
         bool is_of_bounce = ray_ix - bounces[bounce_ix].first_ray < bounces[bounce_ix].n_rays;
-        uint n_of_bounce = subgroupAdd(is_of_bounce ? n_segments : 0u);
-        if (subgroupElect() && n_of_bounce > 0u) atomicAdd(counters[bounce_ix].n_shadow_rays, n_of_bounce);
+        count_shadow_rays(bounce_ix, is_of_bounce ? n_segments : 0u);
     }
 }
 

@@ -3,8 +3,7 @@
 #define KDRAY_CAMERA
 
 #include "layout.glsl"
-
-layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
+#include "frame.glsl"
 
 // Every second bit of a number below 64.
 uint every_second_bit(uint n) {
@@ -45,6 +44,13 @@ vec3 camera_direction(uvec2 pixel) {
     vec2 at_px = vec2(in_picture(pixel)) + vec2(frame.sample_x, frame.sample_y);
     vec2 at = at_px / vec2(frame.picture_width, frame.picture_height) * 2.0 - 1.0;
     return normalize(frame.forward + at.x * frame.right - at.y * frame.up);
+}
+
+// The ray through the pixel's sample.
+Ray camera_ray(uvec2 pixel) {
+    float infinity = uintBitsToFloat(0x7f800000u);
+    uint pixel_ix = pixel.y * frame.width + pixel.x;
+    return Ray(frame.eye, pixel_ix, camera_direction(pixel), NO_TRIANGLE, vec3(1.0), infinity);
 }
 
 #endif

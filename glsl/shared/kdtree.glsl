@@ -7,11 +7,10 @@
 #define KDRAY_KDTREE
 
 #include "layout.glsl"
+#include "frame.glsl"
 #include "scene.glsl"
 #include "steps.glsl"
 #include "triangle.glsl"
-
-layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 
 layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
 // Whether the device runs both sides of a branch for all lanes, as software drivers do. A slab, looked at before what is in

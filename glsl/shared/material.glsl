@@ -40,6 +40,9 @@ const float LEAST_REFLECTANCE = 5.421011e-20;
 
 // Whether a light from there can be seen in the surface.
 bool can_show(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
+    // Without a power for what is not black.
+    vec3 diffuse = material.kd * dot(normal, to_light) * local_weight(material);
+    if (any(greaterThan(diffuse, vec3(LEAST_REFLECTANCE)))) return true;
     vec3 reflectance = phong(material, normal, to_viewer, to_light) * local_weight(material);
     return any(greaterThan(reflectance, vec3(LEAST_REFLECTANCE)));
 }

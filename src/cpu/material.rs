@@ -49,8 +49,11 @@ const LEAST_REFLECTANCE: f32 = 5.421_011e-20;
 
 /// Whether a light from there can be seen in the surface.
 pub fn can_show(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3) -> bool {
-    let reflectance = phong(material, normal, to_viewer, to_light) * local_weight(material);
-    reflectance.cmpgt(Vec3::splat(LEAST_REFLECTANCE)).any()
+    let least = Vec3::splat(LEAST_REFLECTANCE);
+    // Without a power for what is not black.
+    let diffuse = material.kd * normal.dot(to_light) * local_weight(material);
+    diffuse.cmpgt(least).any()
+        || (phong(material, normal, to_viewer, to_light) * local_weight(material)).cmpgt(least).any()
 }
 
 /// Unpolarized Fresnel reflectance of a smooth dielectric; 1 in total internal reflection.

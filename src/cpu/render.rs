@@ -171,7 +171,7 @@ impl<'a> Renderer<'a> {
             }
             let next = self.next_rays(depth, capacity);
             if next.overflow != 0 {
-                self.clock.end_batch(&stats, self.options.primary);
+                self.clock.end_batch(&stats);
                 self.batch(first_pixel, n_pixels / 2);
                 self.batch(first_pixel + n_pixels / 2, n_pixels - n_pixels / 2);
                 return;
@@ -191,7 +191,8 @@ impl<'a> Renderer<'a> {
         let Queue { rays, bounces, .. } = &mut self.queue;
         *bounces = vec![Bounce::of(n_pixels, &self.frame)];
         rays.resize(n_pixels as usize, Ray::zeroed());
-        self.clock.time("primary_hit", Some(0), || primary_hit::primary_rays(&self.frame, first_pixel, rays));
+        let of_pass = if self.options.primary == Primary::Raster { "primary_hit" } else { "trace" };
+        self.clock.time(of_pass, Some(0), || primary_hit::primary_rays(&self.frame, first_pixel, rays));
     }
 
     /// Fills the bounce's `hits`, and counts them.
@@ -279,7 +280,7 @@ impl<'a> Renderer<'a> {
         self.n_batches += 1;
         self.bounces.resize(self.bounces.len().max(stats.len()), BounceStats::default());
         self.bounces.iter_mut().zip(stats).for_each(|(sum, bounce)| sum.add(bounce));
-        self.clock.end_batch(stats, self.options.primary);
+        self.clock.end_batch(stats);
     }
 
     /// The mean of the samples, and the post processes.

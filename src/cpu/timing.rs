@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::{
-    frame::{BounceStats, PassTime, Primary},
+    frame::{BounceStats, PassTime},
     profile::{count_rays, is_in_batch},
 };
 
@@ -37,8 +37,8 @@ impl Clock {
     }
 
     /// A batch has ended or been given up, with these counts.
-    pub fn end_batch(&mut self, bounces: &[BounceStats], primary: Primary) {
-        self.passes[self.n_counted..].iter_mut().for_each(|pass| count_rays(pass, bounces, primary));
+    pub fn end_batch(&mut self, bounces: &[BounceStats]) {
+        self.passes[self.n_counted..].iter_mut().for_each(|pass| count_rays(pass, bounces));
         self.n_counted = self.passes.len();
         self.batch_ix += 1;
     }

@@ -107,9 +107,10 @@ impl Passes {
     ) -> Result<(), GpuError> {
         let counts = |options: &RenderOptions| (options.profile, options.features);
         if (from.traversal, counts(from)) != (to.traversal, counts(to)) {
-            let trace = Trace::new(context, bindings, to)?;
             self.shadow = Shadow::new(context, bindings, to)?;
-            self.trace = trace;
+        }
+        if (from.traversal, from.primary, counts(from)) != (to.traversal, to.primary, counts(to)) {
+            self.trace = Trace::new(context, bindings, to)?;
         }
         if from.profile != to.profile {
             self.shade = Shade::new(context, bindings, to)?;
@@ -117,7 +118,7 @@ impl Passes {
         if from.tonemap != to.tonemap {
             self.tonemap = Tonemap::new(context, bindings, to.tonemap)?;
         }
-        if (from.primary, counts(from)) != (to.primary, counts(to)) {
+        if counts(from) != counts(to) {
             self.primary_hit = PrimaryHit::new(context, bindings, to)?;
         }
         Ok(())
@@ -134,7 +135,7 @@ fn binding(number: u32) -> (u32, BindingKind) {
     (number, kind)
 }
 
-/// Specialization constants of the kernels that traverse: their own are the two in the middle.
+/// Specialization constants of the kernels that traverse: their own are the two in the middle, and what follows.
 fn traversal_constants(context: &Arc<Context>, traversal: Traversal, own: [bool; 2]) -> Result<[u32; 5], GpuError> {
     let runs_both_sides = context.runs_both_sides();
     let [a, b] = own.map(u32::from);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{kernel, spirv};
 use crate::{
-    frame::{Primary, RenderOptions},
+    frame::RenderOptions,
     gpu::{Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError},
     layout::{Batch, RAY_GROUP_SIZE},
 };
@@ -15,19 +15,17 @@ pub struct PrimaryHit {
 }
 
 impl PrimaryHit {
-    /// From raster it finds the hits, too; otherwise it only makes the rays, for [`super::Trace`].
     pub(super) fn new(
         context: &Arc<Context>,
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
         // The second is the triangle test's FUSED_FMA, which clamping a hit to its triangle has no use for.
-        let from_raster = u32::from(options.primary == Primary::Raster);
-        let constants = [from_raster, 0, options.profile.into(), options.features.into()];
+        let constants = [0, 0, options.profile.into(), options.features.into()];
         Ok(Self { kernel: kernel(context, bindings, "primary_hit", spirv!("primary_hit.comp"), &constants)? })
     }
 
-    /// Needs triangle_ids. Leaves rays and, from raster, hits; updates counters, and pixel_features where the options ask for them.
+    /// Needs triangle_ids. Leaves rays and hits; updates counters, and pixel_features where the options ask for them.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, Some(batch.depth), batch, dispatch);

@@ -4,14 +4,16 @@ use std::sync::Arc;
 
 use super::{Resources, kernel, spirv, traversal_constants};
 use crate::{
-    frame::RenderOptions,
+    frame::{Primary, RenderOptions},
     gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
     layout::Batch,
 };
 
-/// The pass's kernel.
+/// The pass's kernels.
 pub struct Trace {
     kernel: ComputePipeline,
+    /// Makes its rays itself; none where the rasterizer finds their hits.
+    from_camera: Option<ComputePipeline>,
 }
 
 impl Trace {
@@ -21,11 +23,17 @@ impl Trace {
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
         let constants = traversal_constants(context, options.traversal, [options.profile, options.features])?;
-        Ok(Self { kernel: kernel(context, bindings, "trace", spirv!("trace.comp"), &constants)? })
+        let from = |camera: bool| {
+            let constants = [&constants[..], &[camera.into()]].concat();
+            kernel(context, bindings, "trace", spirv!("trace.comp"), &constants)
+        };
+        let from_camera = (options.primary == Primary::Trace).then(|| from(true)).transpose()?;
+        Ok(Self { kernel: from(false)?, from_camera })
     }
 
-    /// Needs rays. Leaves hits; updates counters, and pixel_features where the options ask for them.
+    /// Needs rays. Leaves hits, on the first level camera rays, too, where they are traced; updates counters, and pixel_features where the options ask for them.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
-        commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.trace_dispatch(batch));
+        let of_camera = self.from_camera.as_ref().filter(|_| batch.depth == 0);
+        commands.dispatch(of_camera.unwrap_or(&self.kernel), Some(batch.depth), batch, resources.trace_dispatch(batch));
     }
 }

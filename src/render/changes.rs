@@ -1,9 +1,6 @@
 //! What may change between frames: the scene and its tree stay on the device.
 
-use super::{
-    Renderer, lanes_to_share,
-    schedule::{Schedule, queue_capacity},
-};
+use super::{Renderer, lanes_to_share, schedule::Schedule};
 use crate::{frame::RenderOptions, gpu::GpuError, kdtree::KdTree, layout::Frame, scene::Camera};
 
 impl Renderer {
@@ -87,12 +84,10 @@ impl Renderer {
 
     /// Buffers and batches for other sizes, another number of bounces, or other outputs.
     fn make_room(&mut self, constants: Frame, options: &RenderOptions) -> Result<(), GpuError> {
-        let capacity = self.fixed_capacity;
-        let limits = self.context.limits();
-        let queue_capacity = capacity.unwrap_or_else(|| queue_capacity(limits, &constants, self.branches));
+        let queue_capacity = self.room.queue_capacity(self.context.limits(), &constants);
         let n_lanes = lanes_to_share(&self.context, options)?;
         let constants = Frame { queue_capacity, n_lanes, ..constants };
-        let spans = self.spans(&constants);
+        let spans = self.room.spans(&constants, self.most_pixels);
         let schedule = Schedule::new(&self.context, &constants, spans, options.profile)?;
         if !self.resources.fit(&self.context, &constants, options.features)? {
             self.displayed = None;

@@ -11,7 +11,7 @@ use tracing::info_span;
 
 use self::{
     parts::Pending,
-    schedule::{Schedule, queue_capacity, rays_a_pixel, split_into_batches},
+    schedule::{Room, Schedule},
 };
 use crate::{
     camera::frame_constants,
@@ -28,10 +28,7 @@ pub struct Renderer {
     context: Arc<Context>,
     camera: Camera,
     options: RenderOptions,
-    /// Rays in the queue, where the caller has said so.
-    fixed_capacity: Option<u32>,
-    /// Whether a hit can have two children.
-    branches: bool,
+    room: Room,
     resources: Resources,
     passes: Passes,
     schedule: Schedule,
@@ -83,10 +80,9 @@ impl Renderer {
         let branches = scene.materials.iter().any(|material| material.flags & both == both);
         let mut constants = frame_constants(scene, tree, options);
         constants.n_lanes = lanes_to_share(&context, options)?;
-        constants.queue_capacity =
-            fixed_capacity.unwrap_or_else(|| queue_capacity(context.limits(), &constants, branches));
-        let expected = if fixed_capacity.is_some() { 1 } else { rays_a_pixel(&constants, branches) };
-        let spans = split_into_batches(&constants, expected, None);
+        let room = Room { fixed_capacity, branches };
+        constants.queue_capacity = room.queue_capacity(context.limits(), &constants);
+        let spans = room.spans(&constants, None);
         let schedule = Schedule::new(&context, &constants, spans, options.profile)?;
         let uploading = info_span!("upload scene").entered();
         let mut resources = Resources::new(&context, scene, tree, &constants, schedule.n_rows())?;
@@ -99,8 +95,7 @@ impl Renderer {
             context,
             camera,
             options,
-            fixed_capacity,
-            branches,
+            room,
             resources,
             passes,
             schedule,
@@ -244,14 +239,12 @@ impl Renderer {
     fn bounce(&self, commands: &Commands, batch: &Batch) {
         let (passes, resources) = (&self.passes, &self.resources);
         resources.bind(commands);
-        if batch.depth == 0 {
+        if batch.depth == 0 && self.options.primary == Primary::Raster {
             passes.primary_hit.record(commands, batch);
-            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // rays, hits, counters
-        }
-        if batch.depth > 0 || self.options.primary == Primary::Trace {
+        } else {
             passes.trace.record(commands, resources, batch);
-            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // hits, counters
         }
+        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // hits, counters, rays of the camera
         if batch.depth == 0 && self.options.features {
             passes.features.record(commands, batch);
             commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_features

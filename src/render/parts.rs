@@ -4,10 +4,7 @@ use std::time::Instant;
 
 use tracing::info_span;
 
-use super::{
-    Renderer,
-    schedule::{Schedule, rays_a_pixel, split_into_batches},
-};
+use super::{Renderer, schedule::Schedule};
 use crate::{
     frame::{Profile, View},
     gpu::{CommandBuffer, GpuError},
@@ -62,20 +59,13 @@ impl Renderer {
             return Ok(());
         }
         self.most_pixels = most_pixels;
-        let spans = self.spans(self.resources.constants());
+        let spans = self.room.spans(self.resources.constants(), most_pixels);
         self.reschedule(spans)
     }
 
     /// What `limit_batches` was told last.
     pub fn most_pixels(&self) -> Option<u32> {
         self.most_pixels
-    }
-
-    /// The batches' spans of pixels, before any was found to be too large.
-    pub(super) fn spans(&self, constants: &Frame) -> Vec<(u32, u32)> {
-        // Who gives the room knows how many pixels' rays it is for.
-        let expected = if self.fixed_capacity.is_some() { 1 } else { rays_a_pixel(constants, self.branches) };
-        split_into_batches(constants, expected, self.most_pixels)
     }
 
     fn reschedule(&mut self, spans: Vec<(u32, u32)>) -> Result<(), GpuError> {

@@ -26,7 +26,7 @@ impl Renderer {
             ..PassTime::default()
         };
         let mut passes: Vec<_> = rows.iter().map(pass).collect();
-        count_batches(&mut passes, &counts, max_depth, self.options.primary);
+        count_batches(&mut passes, &counts, max_depth);
         Ok(Profile {
             device: self.context.info().name.clone(),
             n_batches: self.schedule.batches.len() as u32,

@@ -85,28 +85,77 @@ impl Schedule {
     }
 }
 
-/// Rays that a batch is first given room for, a pixel: as many as most scenes make. `branches`: a hit can have two children.
-pub fn rays_a_pixel(constants: &Frame, branches: bool) -> u32 {
-    if branches { 8.min((1 << constants.max_depth.min(4)) - 1) } else { constants.max_depth.min(2) }
+/// How much room there is for rays, and what they are expected to take.
+#[derive(Clone, Copy)]
+pub struct Room {
+    /// Rays in the queue, where the caller has said so; it is then for as many pixels.
+    pub fixed_capacity: Option<u32>,
+    /// Whether a hit can have two children.
+    pub branches: bool,
 }
 
-/// Rays that the queue should hold: all of the picture's, as far as that is no more than [`MOST_RAYS`] and the device's limits
-/// go.
-pub fn queue_capacity(limits: &Limits, constants: &Frame, branches: bool) -> u32 {
-    let n_pixels = u64::from(constants.width) * u64::from(constants.height);
-    // rays and light_visibility are the widest buffers of a ray.
-    let bytes_a_ray = mem::size_of::<Ray>().max(4 * constants.n_lights as usize) as u64;
-    let most = (limits.storage_range / bytes_a_ray).min(u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE));
-    let wanted = n_pixels * u64::from(rays_a_pixel(constants, branches));
-    wanted.min(MOST_RAYS).min(most).max(1) as u32
+impl Room {
+    /// Rays that the queue should hold: all of the picture's, as far as that is no more than [`MOST_RAYS`] and the device's
+    /// limits go.
+    pub fn queue_capacity(&self, limits: &Limits, constants: &Frame) -> u32 {
+        if let Some(capacity) = self.fixed_capacity {
+            return capacity;
+        }
+        let n_pixels = u64::from(constants.width) * u64::from(constants.height);
+        // rays and light_visibility are the widest buffers of a ray.
+        let bytes_a_ray = mem::size_of::<Ray>().max(4 * constants.n_lights as usize) as u64;
+        let most = (limits.storage_range / bytes_a_ray).min(u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE));
+        let wanted = n_pixels * u64::from(self.rays_a_pixel(constants.max_depth));
+        wanted.min(MOST_RAYS).min(most).max(1) as u32
+    }
+
+    /// Spans of equal size, first pixel and number of pixels, whose rays are expected to find room in the queue of
+    /// `constants.queue_capacity`; of no more pixels than `most_pixels`, if it is given.
+    pub fn spans(&self, constants: &Frame, most_pixels: Option<u32>) -> Vec<(u32, u32)> {
+        let n_pixels = constants.width * constants.height;
+        let with_room = (constants.queue_capacity / self.rays_a_pixel(constants.max_depth)).max(1);
+        let n_batches = n_pixels.div_ceil(most_pixels.map_or(with_room, |most| most.clamp(1, with_room))).max(1);
+        let size = n_pixels.div_ceil(n_batches);
+        (0..n_batches).map(|i| (i * size, size.min(n_pixels - i * size))).collect()
+    }
+
+    /// As many as most scenes make on so many levels.
+    fn rays_a_pixel(&self, max_depth: u32) -> u32 {
+        match self {
+            Self { fixed_capacity: Some(_), .. } => 1,
+            Self { branches: true, .. } => 8.min((1 << max_depth.min(4)) - 1),
+            Self { branches: false, .. } => max_depth.min(2),
+        }
+    }
 }
 
-/// Spans of equal size, whose rays have room in the queue if there are `rays_a_pixel`; of no more pixels than `most_pixels`, if
-/// it is given.
-pub fn split_into_batches(constants: &Frame, rays_a_pixel: u32, most_pixels: Option<u32>) -> Vec<(u32, u32)> {
-    let n_pixels = constants.width * constants.height;
-    let with_room = (constants.queue_capacity / rays_a_pixel).max(1);
-    let n_batches = n_pixels.div_ceil(most_pixels.map_or(with_room, |most| most.clamp(1, with_room))).max(1);
-    let size = n_pixels.div_ceil(n_batches);
-    (0..n_batches).map(|i| (i * size, size.min(n_pixels - i * size))).collect()
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn batches_have_room_for_their_rays() {
+        let limits = Limits { storage_range: 1 << 27, buffer_bytes: u64::MAX, target_size: 16_384, n_groups: 65_535 };
+        for (width, height, max_depth) in [(1, 1, 1), (1024, 768, 5), (3840, 2160, 8), (7, 9, 64)] {
+            for (branches, fixed_capacity) in [(false, None), (true, None), (true, Some(50))] {
+                let room = Room { fixed_capacity, branches };
+                let mut constants = Frame { width, height, max_depth, n_lights: 3, ..Frame::default() };
+                constants.queue_capacity = room.queue_capacity(&limits, &constants);
+                assert!(u64::from(constants.queue_capacity) * 48 <= limits.storage_range);
+                for most_pixels in [None, Some(0), Some(10), Some(u32::MAX)] {
+                    let spans = room.spans(&constants, most_pixels);
+                    let ends = spans.iter().scan(0, |end, &(first, n)| {
+                        assert_eq!(first, *end);
+                        *end += n;
+                        Some(*end)
+                    });
+                    assert_eq!(ends.last(), Some(width * height));
+                    let most = constants.queue_capacity / room.rays_a_pixel(max_depth);
+                    let fits =
+                        |n: u32| n > 0 && n <= most.max(1) && most_pixels.is_none_or(|pixels| n <= pixels.max(1));
+                    assert!(spans.iter().all(|&(_, n)| fits(n)), "{width}x{height}: {spans:?}");
+                }
+            }
+        }
+    }
 }

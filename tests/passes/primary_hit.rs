@@ -2,7 +2,6 @@
 
 use kdray::{
     cpu,
-    frame::{Primary, RenderOptions},
     layout::{Batch, Hit, Ray},
 };
 
@@ -50,19 +49,6 @@ fn agrees_with_its_twin() {
         check(&stage, Batch { n_pixels, ..FIRST });
         check(&stage, Batch { first_pixel: 200, n_pixels, ..FIRST });
     }
-}
-
-#[test]
-fn leaves_hits_to_trace_where_it_is_told_so() {
-    let options = RenderOptions { primary: Primary::Trace, ..options(20, 10) };
-    let stage = Stage::new(scenes::mixed_outdoors(), options, 200);
-    let batch = Batch { n_pixels: 200, ..FIRST };
-    let (rays, hits, n_hits) = on_device(&stage, &batch);
-    let mut expected = [UNTOUCHED_RAY; 200];
-    cpu::primary_hit::primary_rays(stage.resources.constants(), 0, &mut expected);
-    compare::rays(1e-6, 0, &expected, &rays).unwrap();
-    compare::exact(&[UNTOUCHED_HIT; 200], &hits).unwrap();
-    assert_eq!(n_hits, 0);
 }
 
 /// All pixels once, whatever the tiles that the border cuts.

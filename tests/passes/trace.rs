@@ -2,11 +2,12 @@
 
 use kdray::{
     cpu,
-    frame::{RenderOptions, Traversal},
+    frame::{Primary, RenderOptions, Traversal},
+    layout::Batch,
     scene::Scene,
 };
 
-use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_HIT, options, some_rays};
+use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_HIT, UNTOUCHED_RAY, options, some_rays};
 use crate::support::{compare, meshes, scenes};
 
 fn check(stage: &Stage, n_rays: u32) {
@@ -48,6 +49,23 @@ fn agrees_on_many_rays_at_many_triangles() {
         scenes::add(&mut scene, triangles, scenes::BLACK);
         check_all(&scene, &[20_000]);
     }
+}
+
+#[test]
+fn camera_rays_are_made_where_they_are_traced() {
+    let options = RenderOptions { primary: Primary::Trace, ..options(20, 10) };
+    let stage = Stage::new(scenes::mixed_outdoors(), options, 250);
+    let batch = Batch { first_pixel: 30, n_pixels: 150, ..FIRST };
+    stage.set_n_rays(&[batch.n_pixels]);
+    stage.set_rays(&[]);
+    stage.set_hits(&[]);
+    stage.run(|commands| stage.passes.trace.record(commands, &stage.resources, &batch));
+    let mut rays = [UNTOUCHED_RAY; 250];
+    cpu::primary_hit::primary_rays(stage.resources.constants(), batch.first_pixel, &mut rays[..150]);
+    compare::rays(1e-6, 0, &rays, &stage.resources.queue.rays.download().expect("rays")).unwrap();
+    let mut hits = super::stage::hits_of(&stage, &rays[..150]);
+    hits.resize(250, UNTOUCHED_HIT);
+    compare::hits(0, &hits, &stage.resources.queue.hits.download().expect("hits")).unwrap();
 }
 
 #[test]
