@@ -310,8 +310,7 @@ mod tests {
         assert_eq!((frame.bounces[1].tracing_ms, frame.bounces[1].mrays_per_s), (Some(1.5), Some(0.5 / 1.5)));
         assert_eq!((frame.shadow.ms, frame.shadow.mrays_per_s), (Some(0.5), Some(2.0)));
         assert!(frame.bounces_text().ends_with("all     3500     6         1000       4.000     1.12\n"));
-        let last = frame.passes_text().lines().last().map(|line| line.split_whitespace().map(str::to_owned).collect());
-        assert_eq!(last, Some(["frame", "10.000", "100.0"].map(str::to_owned).to_vec()));
+        assert!(frame.passes_text().ends_with("frame            10.000       100.0\n"));
     }
 
     #[test]

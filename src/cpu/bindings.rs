@@ -3,7 +3,7 @@
 use super::table::{Counted, ReadCounts, Table, Uncounted};
 use crate::{
     kdtree::{Extras, KdTree},
-    layout::{Frame, KdBox, KdNode, Light, Material, Plane, Slab, Triangle},
+    layout::{Frame, Hit, KdBox, KdNode, Light, Material, Plane, Slab, Triangle},
     scene::Scene,
 };
 
@@ -74,6 +74,11 @@ impl<'a> Bindings<'a> {
             kd_boxes: self.kd_boxes.told_to(Counted(&counts.n_boxes)),
             kd_ropes: self.kd_ropes.told_to(Counted(&counts.n_links)),
         }
+    }
+
+    /// Of the triangle that was hit.
+    pub fn material_at(&self, hit: &Hit) -> &'a Material {
+        &self.materials[self.triangle_materials[hit.triangle_ix as usize] as usize]
     }
 
     pub fn with_extras(self, extras: &'a Extras) -> Self {

@@ -7,21 +7,17 @@ use super::{
     material::{Scattering, scatter, scatters_light},
     surface::{Surface, surface_at},
 };
-use crate::layout::{CHILD_REFLECTED, CHILD_TRANSMITTED, Hit, Material, NO_TRIANGLE, Ray};
-
-fn material_at<'a>(bindings: &Bindings<'a>, hit: &Hit) -> &'a Material {
-    &bindings.materials[bindings.triangle_materials[hit.triangle_ix as usize] as usize]
-}
+use crate::layout::{CHILD_REFLECTED, CHILD_TRANSMITTED, Hit, NO_TRIANGLE, Ray};
 
 fn scattering_at(bindings: &Bindings, ray: &Ray, hit: &Hit) -> (Surface, Scattering) {
     let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
-    let scattering = scatter(material_at(bindings, hit), &surface, ray.direction);
+    let scattering = scatter(bindings.material_at(hit), &surface, ray.direction);
     (surface, scattering)
 }
 
 /// Bits of `CHILD_*`: of the ray's children, those that carry light.
 pub fn child_kinds_of(bindings: &Bindings, ray: &Ray, hit: &Hit) -> u32 {
-    if hit.triangle_ix == NO_TRIANGLE || !scatters_light(material_at(bindings, hit)) {
+    if hit.triangle_ix == NO_TRIANGLE || !scatters_light(bindings.material_at(hit)) {
         return 0;
     }
     let carries_light = |weight: Vec3| (ray.throughput * weight).cmpgt(Vec3::ZERO).any();

@@ -46,9 +46,7 @@ fn radiance_of(bindings: &Bindings, (ray, hit): (&Ray, &Hit), is_lit: impl Fn(us
         return ray.throughput * bindings.frame.background;
     }
     let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
-    let material_ix = bindings.triangle_materials[hit.triangle_ix as usize];
-    let material = &bindings.materials[material_ix as usize];
-    ray.throughput * local_radiance(bindings, is_lit, ray, &surface, material)
+    ray.throughput * local_radiance(bindings, is_lit, ray, &surface, bindings.material_at(hit))
 }
 
 /// Writes `ray_radiance`, one a ray, weighted by its throughput.

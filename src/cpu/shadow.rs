@@ -26,8 +26,7 @@ pub(super) fn shadow_segment(bindings: &Bindings, ray: &Ray, hit: &Hit, light: &
     if !(surface.geometric.dot(to_light.direction) > 0.0) {
         return None;
     }
-    let material = &bindings.materials[bindings.triangle_materials[hit.triangle_ix as usize] as usize];
-    if !can_show(material, surface.shading, -ray.direction, to_light.direction) {
+    if !can_show(bindings.material_at(hit), surface.shading, -ray.direction, to_light.direction) {
         return None;
     }
     let segment = surface.ray_from(to_light.direction, hit.triangle_ix, ray, Vec3::ZERO);

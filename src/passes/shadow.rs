@@ -20,6 +20,7 @@ impl Shadow {
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
+        // Its segments are counted by shade.
         let constants = traversal_constants(context, options.traversal, [false, options.features])?;
         Ok(Self { kernel: kernel(context, bindings, "shadow", spirv!("shadow.comp"), &constants)? })
     }
