@@ -148,6 +148,8 @@ impl Traversal {
 pub enum Primary {
     /// By rasterized triangle IDs and a ray-plane test.
     Raster,
+    /// By triangles that kernels rasterize, with the very hits of rays; needs atomics of 64 bits. The CPU has no such kernels.
+    Compute,
     /// Through the kd-tree.
     Trace,
 }
@@ -181,4 +183,4 @@ words!(Traversal {
     Brute = "brute"
 });
 words!(Tonemap { Linear = "linear", Agx = "agx", Aces = "aces" });
-words!(Primary { Raster = "raster", Trace = "trace" });
+words!(Primary { Raster = "raster", Compute = "compute", Trace = "trace" });

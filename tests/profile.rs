@@ -98,7 +98,7 @@ fn without_a_profile_nothing_is_measured() {
         let (same_picture, nothing) = bare.render().expect("a frame");
         assert!(picture == same_picture && !profile.passes.is_empty());
         assert_eq!((nothing.passes.len(), nothing.bounces.len(), nothing.frame_ms), (0, 0, None));
-        let counters = |renderer: &Renderer| renderer.resources().counters.download().expect("counters");
+        let counters = |renderer: &Renderer| renderer.resources().counters().expect("counters");
         assert!(counters(&measured).iter().any(|counters| counters.n_hits > 0 && counters.n_shadow_rays > 0));
         assert!(counters(&bare).iter().all(|counters| *counters == Counters::default()));
     }

@@ -12,7 +12,7 @@ use kdray::{
     gpu::{Access, Context, ContextOptions, GpuError},
     kdtree::{BuildOptions, KdTree},
     layout::{
-        BRUTE_MAX_TRIANGLES, Batch, Bounce, Counters, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_LIT, LIGHT_POINT,
+        BRUTE_MAX_TRIANGLES, Batch, Bounce, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_LIT, LIGHT_POINT,
         LIGHT_SHADOWED, LIGHT_UNTESTED, Light, NO_TRIANGLE, Ray, Triangle,
     },
     passes::{Passes, Resources},
@@ -67,7 +67,7 @@ fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], tr
     let passes = Passes::new(context, &resources.bindings, &options).expect("passes");
     resources.queue.rays.upload(rays).expect("rays");
     resources.bounces.upload(&[Bounce::of(rays.len() as u32, &constants)]).expect("bounces");
-    resources.counters.upload(&[Counters::default()]).expect("counters");
+    context.run("clear", |commands| resources.clear_counters(commands)).expect("cleared counters");
     let batch = Batch { first_pixel: 0, n_pixels: 64, bounce_ix: 0, depth: 0 };
     let record = |commands: &kdray::gpu::Commands| {
         resources.bind(commands);
@@ -76,7 +76,7 @@ fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], tr
         passes.shadow.record(commands, &resources, &batch);
     };
     context.run("variant", record).expect("run");
-    let counters = resources.counters.download().expect("counters")[0];
+    let counters = resources.counters().expect("counters")[0];
     Traced {
         hits: bytemuck::cast_slice(&resources.queue.hits.download().expect("hits")).to_vec(),
         light_visibility: resources.queue.light_visibility.download().expect("light_visibility"),

@@ -4,12 +4,11 @@
 // Compact, 1 of 3: one workgroup finds out which rays go on from the hits of SCAN_GROUP_SIZE rays, and counts them.
 // Reads rays, hits, bounces and the scene; writes child_kinds, scan_blocks[block].
 #include "layout.glsl"
+#include "rays.glsl"
 #include "children.glsl"
 #include "scan.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
-layout(push_constant) uniform BatchBlock { Batch batch; };
-layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_CHILD_KINDS) writeonly buffer ChildKindsBlock { uint child_kinds[]; };
@@ -20,7 +19,7 @@ void main() {
     uint kinds = 0u;
     if (place < bounces[batch.bounce_ix].n_rays) {
         uint ray_ix = bounces[batch.bounce_ix].first_ray + place;
-        kinds = child_kinds_of(rays[ray_ix], hits[ray_ix]);
+        kinds = child_kinds_of(ray_at(ray_ix), hits[ray_ix]);
         child_kinds[ray_ix] = kinds;
     }
     uint n_children;

@@ -5,13 +5,12 @@
 // in order and without gaps (after Harris, Sengupta, Owens: Parallel Prefix Sum (Scan) with CUDA, GPU Gems 3).
 // Reads rays, hits, child_kinds, scan_blocks, bounces and the scene; writes first_children, the next bounce's rays.
 #include "layout.glsl"
+#include "rays.glsl"
 #include "children.glsl"
 #include "scan.glsl"
 #include "store.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
-layout(push_constant) uniform BatchBlock { Batch batch; };
-layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_CHILD_KINDS) readonly buffer ChildKindsBlock { uint child_kinds[]; };
@@ -19,7 +18,7 @@ layout(std430, set = 0, binding = BIND_FIRST_CHILDREN) writeonly buffer FirstChi
 layout(std430, set = 0, binding = BIND_SCAN_BLOCKS) readonly buffer ScanBlocksBlock { uint scan_blocks[]; };
 
 void make_children(uint ray_ix, uint kinds, uint child_ix) {
-    Ray ray = rays[ray_ix];
+    Ray ray = ray_at(ray_ix);
     Hit hit = hits[ray_ix];
     Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
     Scattering next = scatter(material_at(hit), surface, ray.direction);

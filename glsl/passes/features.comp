@@ -3,21 +3,19 @@
 // Features: one invocation a primary ray notes what its pixel shows, for other uses than light.
 // Reads rays, hits and the scene; writes pixel_features, all but n_rays and n_steps.
 #include "layout.glsl"
+#include "rays.glsl"
 #include "scene.glsl"
 #include "surface.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
-layout(push_constant) uniform BatchBlock { Batch batch; };
-layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
-layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 
 void main() {
     uint ray_ix = gl_GlobalInvocationID.x;
     if (ray_ix >= batch.n_pixels) return;
-    Ray ray = rays[ray_ix];
+    Ray ray = ray_at(ray_ix);
     Hit hit = hits[ray_ix];
     uint pixel_ix = ray.pixel_ix;
     pixel_features[pixel_ix].triangle_ix = hit.triangle_ix;

@@ -2,13 +2,11 @@
 #extension GL_GOOGLE_include_directive : require
 // Resolve: the light of all rays of a pixel. Compaction keeps order, so those of a bounce stand together, and one invocation a
 // primary ray goes from bounce to bounce by the places of their children: one writer a pixel, always in the same order.
-// Reads rays, ray_radiance, first_children, bounces; writes pixel_radiance.
+// Reads ray_radiance, first_children, bounces; writes pixel_radiance.
 #include "layout.glsl"
+#include "rays.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
-layout(push_constant) uniform BatchBlock { Batch batch; };
-layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
-layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_RAY_RADIANCE) readonly buffer RayRadianceBlock { vec4 ray_radiance[]; };
 layout(std430, set = 0, binding = BIND_FIRST_CHILDREN) readonly buffer FirstChildrenBlock { uint first_children[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
@@ -40,5 +38,5 @@ void main() {
         if (depth + 1u == frame.max_depth || bounces[next_ix].n_rays == 0u) break;
         span = children_of(span, next_ix);
     }
-    pixel_radiance[rays[ray_ix].pixel_ix] = vec4(sum, 1.0);
+    pixel_radiance[pixel_ix_of(pixel_of_ray(ray_ix))] = vec4(sum, 1.0);
 }

@@ -6,6 +6,7 @@
 // Reads rays, hits, light_visibility, bounces and the scene; writes ray_radiance (weighted by throughput),
 // counters (n_shadow_rays).
 #include "layout.glsl"
+#include "rays.glsl"
 #include "scene.glsl"
 #include "surface.glsl"
 #include "light.glsl"
@@ -16,12 +17,9 @@
 layout(constant_id = 0) const bool COUNTS = true;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
-layout(push_constant) uniform BatchBlock { Batch batch; };
-layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
 layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
 layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
-layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) readonly buffer LightVisibilityBlock { uint light_visibility[]; };
 layout(std430, set = 0, binding = BIND_RAY_RADIANCE) writeonly buffer RayRadianceBlock { vec4 ray_radiance[]; };
@@ -52,7 +50,7 @@ void count_segments(uint ray_ix) {
     for (uint depth = 0u; depth < frame.max_depth; ++depth) {
         uint bounce_ix = batch.bounce_ix + depth;
         bool is_of_bounce = ray_ix - bounces[bounce_ix].first_ray < bounces[bounce_ix].n_rays;
-        count_shadow_rays(bounce_ix, is_of_bounce ? n_segments : 0u);
+        count_shadow_rays(bounce_ix, gl_WorkGroupID.x, is_of_bounce ? n_segments : 0u);
     }
 }
 
@@ -60,6 +58,6 @@ void main() {
     uint ray_ix = gl_GlobalInvocationID.x;
     uint last_ix = batch.bounce_ix + frame.max_depth - 1u;
     if (ray_ix >= bounces[last_ix].first_ray + bounces[last_ix].n_rays) return;
-    ray_radiance[ray_ix] = vec4(radiance_of(rays[ray_ix], ray_ix), 0.0);
+    ray_radiance[ray_ix] = vec4(radiance_of(ray_at(ray_ix), ray_ix), 0.0);
     if (COUNTS) count_segments(ray_ix);
 }

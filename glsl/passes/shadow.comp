@@ -9,16 +9,15 @@
 // Whether what segments cost is noted.
 layout(constant_id = 3) const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
+#include "rays.glsl"
 #include "lanes.glsl"
 #include "surface.glsl"
 #include "light.glsl"
 #include "material.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
-layout(push_constant) uniform BatchBlock { Batch batch; };
 layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
 layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };
-layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) writeonly buffer LightVisibilityBlock { uint light_visibility[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
@@ -39,11 +38,11 @@ bool shadow_segment(Ray ray, Hit hit, Light light, out Ray segment) {
 uint visibility_of(Light light, uint ray_ix) {
     Hit hit = hits[ray_ix];
     Ray segment;
-    if (hit.triangle_ix == NO_TRIANGLE || !shadow_segment(rays[ray_ix], hit, light, segment)) return LIGHT_UNTESTED;
+    if (hit.triangle_ix == NO_TRIANGLE || !shadow_segment(ray_at(ray_ix), hit, light, segment)) return LIGHT_UNTESTED;
     bool is_free = traverse(segment, 0.0, true).triangle_ix == NO_TRIANGLE;
     if (COUNT_COSTS) {
-        atomicAdd(pixel_features[rays[ray_ix].pixel_ix].n_rays, 1u);
-        atomicAdd(pixel_features[rays[ray_ix].pixel_ix].n_steps, n_steps);
+        atomicAdd(pixel_features[segment.pixel_ix].n_rays, 1u);
+        atomicAdd(pixel_features[segment.pixel_ix].n_steps, n_steps);
     }
     return is_free ? LIGHT_LIT : LIGHT_SHADOWED;
 }

@@ -1,15 +1,14 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Trace (the paper's section 2.3): one working lane a ray of the bounce finds its closest hit through the kd-tree. Camera rays are
-// made here, where they are not rasterized.
-// Reads rays and the tree; writes hits, camera rays, counters (n_hits), pixel_features (n_rays, n_steps).
+// Trace (the paper's section 2.3): one working lane a ray of the bounce finds its closest hit through the kd-tree.
+// Reads rays and the tree; writes hits, counters (n_hits), pixel_features (n_rays, n_steps).
 #include "layout.glsl"
 
 // Whether what rays cost is noted.
 layout(constant_id = 3) const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
-#include "camera.glsl"
+#include "rays.glsl"
 #include "lanes.glsl"
 #include "store.glsl"
 #include "counters.glsl"
@@ -20,26 +19,17 @@ layout(constant_id = 2) const bool COUNTS = true;
 layout(constant_id = 5) const bool FROM_CAMERA = false;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
-layout(push_constant) uniform BatchBlock { Batch batch; };
-layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
-
-Ray ray_at(uint ray_ix) {
-    if (FROM_CAMERA) {
-        Ray ray = camera_ray(pixel_of(batch.first_pixel + ray_ix, frame.width, frame.height));
-        store_ray(ray_ix, ray);
-        return ray;
-    }
-    return rays[ray_ix];
-}
 
 void main() {
     uint place = ray_of_lane(gl_GlobalInvocationID.x, bounces[batch.bounce_ix].trace_lanes_log2);
     bool is_hit = false;
     if (place < bounces[batch.bounce_ix].n_rays) {
         uint ray_ix = bounces[batch.bounce_ix].first_ray + place;
-        Ray ray = ray_at(ray_ix);
+        Ray ray;
+        if (FROM_CAMERA) ray = camera_ray(pixel_of_ray(ray_ix));
+        else ray = rays[ray_ix];
         Hit hit = traverse(ray, 0.0, false);
         store_hit(ray_ix, hit);
         if (COUNT_COSTS) {
@@ -48,5 +38,5 @@ void main() {
         }
         is_hit = hit.triangle_ix != NO_TRIANGLE;
     }
-    if (COUNTS) count_hits(batch.bounce_ix, is_hit);
+    if (COUNTS) count_hits(batch.bounce_ix, 0u, is_hit);
 }

@@ -39,18 +39,27 @@ uvec2 in_picture(uvec2 pixel) {
     return pixel + uvec2(frame.window_x, frame.window_y);
 }
 
-// Unit direction through the sample of the window's pixel, the one that the rasterizer tests.
-vec3 camera_direction(uvec2 pixel) {
+// The sample of the window's pixel, the one that the rasterizer tests, as seen from the eye: in the plane at distance 1.
+vec3 sample_in_image(uvec2 pixel) {
     vec2 at_px = vec2(in_picture(pixel)) + vec2(frame.sample_x, frame.sample_y);
     vec2 at = at_px / vec2(frame.picture_width, frame.picture_height) * 2.0 - 1.0;
-    return normalize(frame.forward + at.x * frame.right - at.y * frame.up);
+    return frame.forward + at.x * frame.right - at.y * frame.up;
+}
+
+// Unit direction through the sample of the window's pixel.
+vec3 camera_direction(uvec2 pixel) {
+    return normalize(sample_in_image(pixel));
+}
+
+// Its place in buffers of the window's pixels: rows from the top.
+uint pixel_ix_of(uvec2 pixel) {
+    return pixel.y * frame.width + pixel.x;
 }
 
 // The ray through the pixel's sample.
 Ray camera_ray(uvec2 pixel) {
     float infinity = uintBitsToFloat(0x7f800000u);
-    uint pixel_ix = pixel.y * frame.width + pixel.x;
-    return Ray(frame.eye, pixel_ix, camera_direction(pixel), NO_TRIANGLE, vec3(1.0), infinity);
+    return Ray(frame.eye, pixel_ix_of(pixel), camera_direction(pixel), NO_TRIANGLE, vec3(1.0), infinity);
 }
 
 #endif

@@ -6,14 +6,19 @@
 
 layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
 
-void count_hits(uint bounce_ix, bool is_hit) {
-    uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
-    if (subgroupElect() && n_hits > 0u) atomicAdd(counters[bounce_ix].n_hits, n_hits);
+uint counters_of(uint bounce_ix, uint place) {
+    return (bounce_ix * COUNTER_PLACES + place % COUNTER_PLACES) * COUNTER_STRIDE;
 }
 
-void count_shadow_rays(uint bounce_ix, uint n_of_lane) {
-    uint n_shadow_rays = subgroupAdd(n_of_lane);
-    if (subgroupElect() && n_shadow_rays > 0u) atomicAdd(counters[bounce_ix].n_shadow_rays, n_shadow_rays);
+// place: the same for a workgroup, and others for its neighbours, if they all come at once.
+void count_hits(uint bounce_ix, uint place, bool is_hit) {
+    uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
+    if (subgroupElect() && n_hits > 0u) atomicAdd(counters[counters_of(bounce_ix, place)].n_hits, n_hits);
+}
+
+void count_shadow_rays(uint bounce_ix, uint place, uint n_of_lane) {
+    uint n_segments = subgroupAdd(n_of_lane);
+    if (subgroupElect() && n_segments > 0u) atomicAdd(counters[counters_of(bounce_ix, place)].n_shadow_rays, n_segments);
 }
 
 #endif

@@ -13,6 +13,10 @@
 #define MOST_LANES_LOG2 5u
 // Vulkan guarantees 128 invocations on every device.
 #define SCAN_GROUP_SIZE 128u
+// Triangles that kernels rasterize: pixels of a bounding rectangle that one invocation looks at alone; workgroups side by side in
+// the dispatch over the blocks that larger ones are cut into.
+#define RASTER_SMALL 64u
+#define RASTER_GROUPS_X 256u
 // Blocks of SCAN_GROUP_SIZE rays of which one invocation of the spine adds up the counts.
 #define SPINE_ITEMS 8u
 
@@ -242,7 +246,12 @@ struct Bounce {
     uint reserved0;
 };
 
-// One a batch and bounce, 8 bytes: for the profile. Integer sums, the same in every order of arrival.
+// Counters of a bounce, of which the sum counts: as many workgroups as there are places can add to them at once. They stand so far
+// apart, in counters, that they do not share a cache line.
+#define COUNTER_PLACES 16u
+#define COUNTER_STRIDE 16u
+
+// COUNTER_PLACES a batch and bounce, 8 bytes: for the profile. Integer sums, the same in every order of arrival.
 struct Counters {
     uint n_hits;
     uint n_shadow_rays;
@@ -316,6 +325,28 @@ struct Present {
     uint window_height;
 };
 
+// 16 bytes: a triangle with a large bounding rectangle, which is cut into blocks, numbered from first_block on, row by row.
+// first, size: the window's pixels, x in the lower half, y in the upper.
+struct LargeTriangle {
+    uint triangle_ix;
+    uint first_block;
+    uint first;
+    uint size;
+};
+
+// 16 bytes: how many workgroups go over the blocks, a VkDispatchIndirectCommand.
+struct RasterGroups {
+    uint x;
+    uint y;
+    uint z;
+    uint reserved;
+};
+
+// Push constants of what rasterizes: sides of blocks are 2^block_log2 pixels.
+struct RasterPush {
+    uint block_log2;
+};
+
 // Push constants of a cast: its rays, and 2^lanes_log2 lanes for each, of which the first works.
 struct CastBatch {
     uint n_rays;
@@ -357,10 +388,14 @@ struct DriverCast {
 #define BIND_PIXEL_FEATURES 25u
 #define BIND_ADDRESSES 26u
 #define BIND_KD_SLABS 27u
-#define N_BINDINGS 28u
+#define BIND_PIXEL_NEAREST 28u
+#define BIND_RASTER_GROUPS 29u
+#define BIND_RASTER_COUNT 30u
+#define BIND_LARGE_TRIANGLES 31u
+#define N_BINDINGS 32u
 
 // A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
-#define BIND_CAST_RAYS 28u
-#define BIND_CAST_HITS 29u
+#define BIND_CAST_RAYS 32u
+#define BIND_CAST_HITS 33u
 
 #endif

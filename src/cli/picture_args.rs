@@ -32,7 +32,7 @@ pub struct PictureArgs {
     #[arg(help = way_help())]
     pub traversal: Option<Traversal>,
     /// How primary rays find their triangles [default: raster, but trace where there are more triangles than pixels]
-    #[arg(long, value_name = "raster|trace")]
+    #[arg(long, value_name = "raster|compute|trace")]
     pub primary: Option<Primary>,
 }
 

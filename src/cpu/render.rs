@@ -102,7 +102,7 @@ impl<'a> Renderer<'a> {
             self.pixel_accumulated.clone_from(&self.pixel_radiance);
         }
         self.pixel_features.fill(Feature::default());
-        if self.options.primary == Primary::Raster {
+        if self.options.primary != Primary::Trace {
             self.visibility();
         }
         let n_pixels = self.pixel_radiance.len() as u32;
@@ -191,7 +191,7 @@ impl<'a> Renderer<'a> {
         let Queue { rays, bounces, .. } = &mut self.queue;
         *bounces = vec![Bounce::of(n_pixels, &self.frame)];
         rays.resize(n_pixels as usize, Ray::zeroed());
-        let of_pass = if self.options.primary == Primary::Raster { "primary_hit" } else { "trace" };
+        let of_pass = if self.options.primary != Primary::Trace { "primary_hit" } else { "trace" };
         self.clock.time(of_pass, Some(0), || primary_hit::primary_rays(&self.frame, first_pixel, rays));
     }
 
@@ -202,7 +202,7 @@ impl<'a> Renderer<'a> {
         hits.resize(rays.len(), Hit::zeroed());
         let places = bounces[depth as usize].rays();
         let (rays, hits) = (&rays[places.clone()], &mut hits[places]);
-        let n_hits = if depth == 0 && self.options.primary == Primary::Raster {
+        let n_hits = if depth == 0 && self.options.primary != Primary::Trace {
             let ids = &self.triangle_ids;
             self.clock.time("primary_hit", Some(0), || primary_hit::primary_hit(&bindings, ids, rays, hits))
         } else {
@@ -224,7 +224,7 @@ impl<'a> Renderer<'a> {
         let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
         let (traversal, pixels) = (self.options.traversal, &mut self.pixel_features);
         let Queue { rays, bounces, hits, .. } = &self.queue;
-        let n_rasterized = if self.options.primary == Primary::Raster { bounces[0].n_rays as usize } else { 0 };
+        let n_rasterized = if self.options.primary != Primary::Trace { bounces[0].n_rays as usize } else { 0 };
         let (rasterized, traced) = rays.split_at(n_rasterized);
         costs::count_rasterized(rasterized, hits, pixels);
         costs::count_closest(&bindings, traversal, traced, pixels);

@@ -288,6 +288,14 @@ impl Commands<'_> {
         unsafe { self.context.device.cmd_update_buffer(self.raw, destination.raw(), 0, bytes) };
     }
 
+    /// Fills a buffer with a word, as a pass of its own.
+    pub fn fill_pass(&self, name: &'static str, buffer: &AnyBuffer, word: u32) {
+        // SAFETY: the commands are being recorded, outside rendering.
+        self.pass(name, None, || unsafe {
+            self.context.device.cmd_fill_buffer(self.raw, buffer.raw(), 0, vk::WHOLE_SIZE, word);
+        });
+    }
+
     /// Fills a buffer with zeros.
     pub fn clear_buffer(&self, buffer: &AnyBuffer) {
         // SAFETY: the commands are being recorded, outside rendering.

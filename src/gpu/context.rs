@@ -45,6 +45,7 @@ pub struct Context {
     pub(super) statistics: Option<StatisticsCalls>,
     /// Kernels can do without bounds checks.
     pub(super) unchecked: bool,
+    wide_atomics: bool,
     /// None where the device was opened without a window.
     pub(super) presentation: Option<khr::swapchain::Device>,
     pub(super) physical: vk::PhysicalDevice,
@@ -153,6 +154,7 @@ impl Context {
         Ok(Arc::new(Self {
             ray_tracing: ray_tracing.then(|| RayTracingCalls::new(&instance, physical, &device)),
             unchecked: extras.unchecked,
+            wide_atomics: extras.wide_atomics,
             statistics: extras.statistics.then(|| StatisticsCalls::new(&instance, &device)),
             debug_utils: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device)),
             presentation: (purpose == Purpose::Window).then(|| khr::swapchain::Device::new(&instance.raw, &device)),
@@ -190,6 +192,18 @@ impl Context {
     /// Whether kernels run both sides of a branch for all lanes, where any lane takes it.
     pub fn runs_both_sides(&self) -> bool {
         self.runs_both_sides
+    }
+
+    /// Whether kernels have atomics of 64 bits.
+    pub fn has_wide_atomics(&self) -> bool {
+        self.wide_atomics
+    }
+
+    /// # Errors
+    /// Kernels have no atomics of 64 bits.
+    pub fn require_wide_atomics(&self) -> Result<(), GpuError> {
+        let missing = "shaderBufferInt64Atomics".to_owned();
+        if self.wide_atomics { Ok(()) } else { Err(GpuError::Lacks { device: self.info.name.clone(), missing }) }
     }
 
     /// Whether `fma` rounds once in this device's kernels; found out by one of them, the first time.

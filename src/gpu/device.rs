@@ -26,6 +26,8 @@ pub(super) struct DeviceExtras {
     pub statistics: bool,
     /// Pipelines can do without bounds checks.
     pub unchecked: bool,
+    /// Kernels have atomics of 64 bits on buffers.
+    pub wide_atomics: bool,
     purpose: Purpose,
 }
 
@@ -39,6 +41,7 @@ impl DeviceExtras {
             portability: has(khr::portability_subset::NAME),
             statistics: has(StatisticsCalls::EXTENSION) && StatisticsCalls::has_feature(instance, physical),
             unchecked: has(robustness::EXTENSION) && robustness::has_feature(instance, physical),
+            wide_atomics: has_wide_atomics(instance, physical),
             purpose,
         })
     }
@@ -74,14 +77,18 @@ impl DeviceExtras {
         let mut executables =
             vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
         let mut unchecked = vk::PhysicalDevicePipelineRobustnessFeaturesEXT::default().pipeline_robustness(true);
-        let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
+        let mut of_1_2 = vk::PhysicalDeviceVulkan12Features::default()
+            .buffer_device_address(true)
+            .shader_buffer_int64_atomics(self.wide_atomics);
+        let of_1_0 = vk::PhysicalDeviceFeatures::default().shader_int64(self.wide_atomics);
         let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
         let mut pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
         let mut create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions)
             .push_next(&mut features)
-            .push_next(&mut addresses);
+            .enabled_features(&of_1_0)
+            .push_next(&mut of_1_2);
         if self.statistics {
             create = create.push_next(&mut executables);
         }
@@ -94,4 +101,12 @@ impl DeviceExtras {
         // SAFETY: all that `create` points to lives until the call returns.
         unsafe { instance.raw.create_device(physical, &create, None) }
     }
+}
+
+fn has_wide_atomics(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
+    let mut of_1_2 = vk::PhysicalDeviceVulkan12Features::default();
+    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut of_1_2);
+    // SAFETY: the device has Vulkan 1.3, which knows the struct.
+    unsafe { instance.raw.get_physical_device_features2(physical, &mut all) };
+    all.features.shader_int64 == vk::TRUE && of_1_2.shader_buffer_int64_atomics == vk::TRUE
 }

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use crate::{
-    frame::{RenderOptions, Traversal},
+    frame::{Primary, RenderOptions, Traversal},
     gpu::{BindingKind, Bindings, ComputeDesc, ComputePipeline, Context, GpuError, Shader},
     layout::{BIND_ADDRESSES, BIND_FRAME, BIND_TRIANGLE_IDS},
 };
@@ -20,6 +20,8 @@ mod present;
 mod primary_hit;
 mod provoking;
 mod queue;
+mod raster;
+mod rasterize;
 mod resolve;
 mod resources;
 mod shade;
@@ -40,6 +42,8 @@ pub use self::{
     present::Present,
     primary_hit::PrimaryHit,
     queue::Queue,
+    raster::Raster,
+    rasterize::Rasterize,
     resolve::Resolve,
     resources::Resources,
     shade::Shade,
@@ -61,6 +65,8 @@ pub(crate) use spirv;
 /// All passes, ready to record.
 pub struct Passes {
     pub visibility: Visibility,
+    /// None where kernels do not rasterize.
+    pub rasterize: Option<Rasterize>,
     pub primary_hit: PrimaryHit,
     pub trace: Trace,
     pub features: Features,
@@ -80,6 +86,7 @@ impl Passes {
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, options: &RenderOptions) -> Result<Self, GpuError> {
         Ok(Self {
             visibility: Visibility::new(context, bindings)?,
+            rasterize: Self::rasterize(context, bindings, options)?,
             primary_hit: PrimaryHit::new(context, bindings, options)?,
             trace: Trace::new(context, bindings, options)?,
             features: Features::new(context, bindings)?,
@@ -92,6 +99,14 @@ impl Passes {
             false_color: FalseColor::new(context, bindings)?,
             tonemap: Tonemap::new(context, bindings, options.tonemap)?,
         })
+    }
+
+    fn rasterize(
+        context: &Arc<Context>,
+        bindings: &Arc<Bindings>,
+        options: &RenderOptions,
+    ) -> Result<Option<Rasterize>, GpuError> {
+        (options.primary == Primary::Compute).then(|| Rasterize::new(context, bindings)).transpose()
     }
 
     /// Makes the kernels anew in which the options differ.
@@ -118,7 +133,10 @@ impl Passes {
         if from.tonemap != to.tonemap {
             self.tonemap = Tonemap::new(context, bindings, to.tonemap)?;
         }
-        if counts(from) != counts(to) {
+        if from.primary != to.primary {
+            self.rasterize = Self::rasterize(context, bindings, to)?;
+        }
+        if (from.primary, counts(from)) != (to.primary, counts(to)) {
             self.primary_hit = PrimaryHit::new(context, bindings, to)?;
         }
         Ok(())

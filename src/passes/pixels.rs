@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::{
+    frame::{Primary, RenderOptions},
     gpu::{Buffer, BufferUse, Context, GpuError, Target, TargetKind},
     layout::{Feature, Frame},
 };
@@ -16,6 +17,8 @@ pub struct Pixels {
     /// None without a noise filter: what follows it then reads pixel_radiance.
     pub pixel_filtered: Option<Buffer<[f32; 4]>>,
     pub pixel_display: Buffer<u32>,
+    /// The nearest hit's triangle, and above it, its distance's bits. Empty where the options do not ask for it.
+    pub pixel_nearest: Buffer<u64>,
     /// Empty where the options do not ask for them.
     pub pixel_features: Buffer<Feature>,
     /// Of the whole picture, like depth; only the window's part is drawn to.
@@ -26,16 +29,18 @@ pub struct Pixels {
 impl Pixels {
     /// # Errors
     /// Beyond the device's limits, out of memory.
-    pub fn new(context: &Arc<Context>, frame: &Frame, features: bool) -> Result<Self, GpuError> {
+    pub fn new(context: &Arc<Context>, frame: &Frame, options: &RenderOptions) -> Result<Self, GpuError> {
         let n_pixels = n_pixels(frame);
         let size = (frame.picture_width, frame.picture_height);
         let storage = BufferUse::Storage;
+        let (features, by_kernels) = (options.features, options.primary == Primary::Compute);
         let filters = frame.denoise_threshold.is_finite();
         Ok(Self {
             pixel_radiance: Buffer::new(context, "pixel_radiance", n_pixels, storage)?,
             pixel_accumulated: None,
             pixel_filtered: filters.then(|| Buffer::new(context, "pixel_filtered", n_pixels, storage)).transpose()?,
             pixel_display: Buffer::new(context, "pixel_display", n_pixels, storage)?,
+            pixel_nearest: Buffer::new(context, "pixel_nearest", if by_kernels { n_pixels } else { 0 }, storage)?,
             pixel_features: Buffer::new(context, "pixel_features", if features { n_pixels } else { 0 }, storage)?,
             triangle_ids: Target::new(context, "triangle_ids", TargetKind::Id, size)?,
             depth: Target::new(context, "depth", TargetKind::Depth, size)?,
@@ -43,11 +48,12 @@ impl Pixels {
     }
 
     /// Whether the frame's pixels have room, and no more buffers than the frame uses.
-    pub fn fit(&self, frame: &Frame, features: bool) -> bool {
+    pub fn fit(&self, frame: &Frame, options: &RenderOptions) -> bool {
         let (width, height) = self.triangle_ids.size();
         self.pixel_radiance.len() >= n_pixels(frame)
             && (width >= frame.picture_width && height >= frame.picture_height)
-            && self.pixel_features.is_empty() != features
+            && self.pixel_features.is_empty() != options.features
+            && self.pixel_nearest.is_empty() == (options.primary != Primary::Compute)
             && self.pixel_filtered.is_some() == frame.denoise_threshold.is_finite()
     }
 

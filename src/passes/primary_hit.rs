@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{kernel, spirv};
 use crate::{
-    frame::RenderOptions,
+    frame::{Primary, RenderOptions},
     gpu::{Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError},
     layout::{Batch, RAY_GROUP_SIZE},
 };
@@ -20,12 +20,13 @@ impl PrimaryHit {
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        // The second is the triangle test's FUSED_FMA, which clamping a hit to its triangle has no use for.
-        let constants = [0, 0, options.profile.into(), options.features.into()];
+        let fuses_fma = context.fuses_fma()?.into();
+        let by_kernels = options.primary == Primary::Compute;
+        let constants = [0, fuses_fma, options.profile.into(), options.features.into(), by_kernels.into()];
         Ok(Self { kernel: kernel(context, bindings, "primary_hit", spirv!("primary_hit.comp"), &constants)? })
     }
 
-    /// Needs triangle_ids. Leaves rays and hits; updates counters, and pixel_features where the options ask for them.
+    /// Needs triangle_ids, or pixel_nearest. Leaves rays and hits; updates counters, and pixel_features where the options ask for them.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, Some(batch.depth), batch, dispatch);

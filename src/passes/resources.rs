@@ -2,12 +2,12 @@
 
 use std::{mem::offset_of, sync::Arc};
 
-use super::{Pixels, Queue, Tree, binding, pixels::n_pixels, provoking::vertex_indices};
+use super::{Pixels, Queue, Raster, Tree, binding, pixels::n_pixels, provoking::vertex_indices};
 use crate::{
-    frame::Traversal,
+    frame::{RenderOptions, Traversal},
     gpu::{Access, Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
     kdtree::KdTree,
-    layout::{self, Batch, Bounce, Counters, Frame, Light, Material},
+    layout::{self, Batch, Bounce, COUNTER_PLACES, COUNTER_STRIDE, Counters, Frame, Light, Material},
     scene::Scene,
 };
 
@@ -16,6 +16,9 @@ const PUSH_BYTES: u32 = {
     let (batch, present) = (size_of::<Batch>(), size_of::<layout::Present>());
     if batch > present { batch as u32 } else { present as u32 }
 };
+
+/// Of a batch and bounce, those between the places included.
+const COUNTERS_A_ROW: usize = (COUNTER_PLACES * COUNTER_STRIDE) as usize;
 
 /// What the kernels read and write. A name is the same here, in the kernels, as debug label and as allocation.
 pub struct Resources {
@@ -27,9 +30,10 @@ pub struct Resources {
     pub lights: Buffer<Light>,
     pub queue: Queue,
     pub pixels: Pixels,
-    /// One a batch and bounce, like counters.
+    pub raster: Raster,
+    /// One a batch and bounce.
     pub bounces: Buffer<Bounce>,
-    pub counters: Buffer<Counters>,
+    counters: Buffer<Counters>,
     pub bindings: Arc<Bindings>,
     /// None while all else is made.
     set: Option<BindingSet>,
@@ -46,6 +50,7 @@ impl Resources {
         scene: &Scene,
         tree: &KdTree,
         constants: &Frame,
+        options: &RenderOptions,
         n_bounces: usize,
     ) -> Result<Self, GpuError> {
         let storage = BufferUse::Storage;
@@ -58,9 +63,10 @@ impl Resources {
             materials: Buffer::with(context, "materials", &scene.materials, storage)?,
             lights: Buffer::with(context, "lights", &scene.lights, storage)?,
             queue: Queue::new(context, constants.queue_capacity, constants.n_lights)?,
-            pixels: Pixels::new(context, constants, false)?,
+            pixels: Pixels::new(context, constants, options)?,
+            raster: Raster::new(context, constants.n_triangles, options)?,
             bounces: Buffer::new(context, "bounces", n_bounces, BufferUse::Indirect)?,
-            counters: Buffer::new(context, "counters", n_bounces, storage)?,
+            counters: new_counters(context, n_bounces)?,
             bindings: Bindings::with_constants(context, &kinds, PUSH_BYTES, &tree.constants())?,
             tree,
             set: None,
@@ -89,6 +95,10 @@ impl Resources {
             (layout::BIND_PIXEL_DISPLAY, Binding::Buffer(pixels.pixel_display.any())),
             (layout::BIND_PIXEL_FEATURES, Binding::Buffer(pixels.pixel_features.any())),
             (layout::BIND_COUNTERS, Binding::Buffer(self.counters.any())),
+            (layout::BIND_PIXEL_NEAREST, Binding::Buffer(pixels.pixel_nearest.any())),
+            (layout::BIND_RASTER_GROUPS, Binding::Buffer(self.raster.groups.any())),
+            (layout::BIND_RASTER_COUNT, Binding::Buffer(self.raster.count.any())),
+            (layout::BIND_LARGE_TRIANGLES, Binding::Buffer(self.raster.large_triangles.any())),
             (layout::BIND_TRIANGLE_IDS, Binding::Image(&pixels.triangle_ids)),
         ];
         BindingSet::new(&self.bindings, "frame", &[&self.tree.objects()[..], &own].concat())
@@ -100,18 +110,30 @@ impl Resources {
     ///
     /// # Errors
     /// Beyond the device's limits, out of memory.
-    pub fn fit(&mut self, context: &Arc<Context>, constants: &Frame, features: bool) -> Result<bool, GpuError> {
+    pub fn fit(
+        &mut self,
+        context: &Arc<Context>,
+        constants: &Frame,
+        options: &RenderOptions,
+    ) -> Result<bool, GpuError> {
         let grows = self.queue.capacity() < constants.queue_capacity;
         let queue = grows.then(|| Queue::new(context, constants.queue_capacity, constants.n_lights)).transpose()?;
         let pixels =
-            (!self.pixels.fit(constants, features)).then(|| Pixels::new(context, constants, features)).transpose()?;
+            (!self.pixels.fit(constants, options)).then(|| Pixels::new(context, constants, options)).transpose()?;
+        let n_triangles = constants.n_triangles;
+        let raster = (!self.raster.fits(n_triangles, options))
+            .then(|| Raster::new(context, n_triangles, options))
+            .transpose()?;
         let keeps_pixels = pixels.is_none();
-        let has_room = queue.is_none() && keeps_pixels;
+        let has_room = queue.is_none() && keeps_pixels && raster.is_none();
         if let Some(queue) = queue {
             self.queue = queue;
         }
         if let Some(pixels) = pixels {
             self.pixels = pixels;
+        }
+        if let Some(raster) = raster {
+            self.raster = raster;
         }
         self.constants = Frame { queue_capacity: self.queue.capacity(), ..*constants };
         if !has_room {
@@ -141,7 +163,7 @@ impl Resources {
     /// Out of memory.
     pub fn resize_bounces(&mut self, context: &Arc<Context>, n_bounces: usize) -> Result<(), GpuError> {
         self.bounces = Buffer::new(context, "bounces", n_bounces, BufferUse::Indirect)?;
-        self.counters = Buffer::new(context, "counters", n_bounces, BufferUse::Storage)?;
+        self.counters = new_counters(context, n_bounces)?;
         self.set = Some(self.make_set()?);
         Ok(())
     }
@@ -164,6 +186,25 @@ impl Resources {
             commands.copy_buffer(sample, sums, sample.bytes());
             commands.barrier(Access::TransferWrite, Access::AllReads); // pixel_accumulated
         })
+    }
+
+    /// Sets all counters to 0.
+    pub fn clear_counters(&self, commands: &Commands) {
+        commands.clear_buffer(self.counters.any());
+    }
+
+    /// What the kernels counted, a row a batch and bounce.
+    ///
+    /// # Errors
+    /// A failed copy.
+    pub fn counters(&self) -> Result<Vec<Counters>, GpuError> {
+        let sum = |row: &[Counters]| {
+            row.iter().step_by(COUNTER_STRIDE as usize).fold(Counters::default(), |sum, place| Counters {
+                n_hits: sum.n_hits + place.n_hits,
+                n_shadow_rays: sum.n_shadow_rays + place.n_shadow_rays,
+            })
+        };
+        Ok(self.counters.download()?.chunks_exact(COUNTERS_A_ROW).map(sum).collect())
     }
 
     /// Pixels of the window.
@@ -219,4 +260,8 @@ impl Resources {
     pub(super) fn set(&self) -> &BindingSet {
         self.set.as_ref().expect("made with the resources")
     }
+}
+
+fn new_counters(context: &Arc<Context>, n_bounces: usize) -> Result<Buffer<Counters>, GpuError> {
+    Buffer::new(context, "counters", n_bounces * COUNTERS_A_ROW, BufferUse::Storage)
 }

@@ -89,7 +89,7 @@ impl Renderer {
         let constants = Frame { queue_capacity, n_lanes, ..constants };
         let spans = self.room.spans(&constants, self.most_pixels);
         let schedule = Schedule::new(&self.context, &constants, spans, options.profile)?;
-        if !self.resources.fit(&self.context, &constants, options.features)? {
+        if !self.resources.fit(&self.context, &constants, options)? {
             self.displayed = None;
         }
         self.resources.resize_bounces(&self.context, schedule.n_rows())?;

@@ -85,8 +85,7 @@ impl Renderer {
         let spans = room.spans(&constants, None);
         let schedule = Schedule::new(&context, &constants, spans, options.profile)?;
         let uploading = info_span!("upload scene").entered();
-        let mut resources = Resources::new(&context, scene, tree, &constants, schedule.n_rows())?;
-        resources.fit(&context, &constants, options.features)?;
+        let mut resources = Resources::new(&context, scene, tree, &constants, options, schedule.n_rows())?;
         resources.add_extras(&context, tree, options.traversal)?;
         drop(uploading);
         let passes = info_span!("make pipelines").in_scope(|| Passes::new(&context, &resources.bindings, options))?;
@@ -213,7 +212,7 @@ impl Renderer {
         self.resources.bind(commands);
         self.update_constants(commands);
         copy_all(commands, self.schedule.first_bounces.any(), self.resources.bounces.any());
-        copy_all(commands, self.schedule.zero_counters.any(), self.resources.counters.any());
+        self.resources.clear_counters(commands);
         if self.options.features {
             commands.clear_buffer(self.resources.pixels.pixel_features.any());
         }
@@ -221,11 +220,15 @@ impl Renderer {
         match self.options.primary {
             Primary::Raster => self.passes.visibility.record(commands, &self.resources),
             // Unread then, but bound: the layout has to be the set's.
-            Primary::Trace => {
+            Primary::Compute | Primary::Trace => {
                 let pixels = &self.resources.pixels;
                 commands.begin_targets(&pixels.triangle_ids, &pixels.depth);
                 commands.ids_to_compute(&pixels.triangle_ids);
             }
+        }
+        if let Some(rasterize) = &self.passes.rasterize {
+            rasterize.record(commands, &self.resources);
+            commands.barrier(Access::ComputeWrite, Access::ComputeRead); // pixel_nearest
         }
     }
 
@@ -239,7 +242,7 @@ impl Renderer {
     fn bounce(&self, commands: &Commands, batch: &Batch) {
         let (passes, resources) = (&self.passes, &self.resources);
         resources.bind(commands);
-        if batch.depth == 0 && self.options.primary == Primary::Raster {
+        if batch.depth == 0 && self.options.primary != Primary::Trace {
             passes.primary_hit.record(commands, batch);
         } else {
             passes.trace.record(commands, resources, batch);

@@ -16,7 +16,7 @@ impl Renderer {
         let Some(timer) = &self.schedule.timer else { return Ok(Profile::default()) };
         let rows = timer.rows()?;
         let max_depth = self.options.max_depth;
-        let counts = device_counts(bounces, &self.resources.counters.download()?);
+        let counts = device_counts(bounces, &self.resources.counters()?);
         let ends_ms = rows.iter().map(|row| row.span_ms.map(|(_, end)| end));
         let pass = |row: &TimerRow| PassTime {
             name: row.name,

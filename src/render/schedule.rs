@@ -4,7 +4,7 @@ use std::{mem, sync::Arc};
 
 use crate::{
     gpu::{Buffer, BufferUse, Context, GpuError, Limits, Timer},
-    layout::{Batch, Bounce, Counters, Frame, RAY_GROUP_SIZE, Ray},
+    layout::{Batch, Bounce, Frame, RAY_GROUP_SIZE, Ray},
 };
 
 /// Rays that go well into memory together, some 100 bytes each; enough to keep any device busy.
@@ -14,9 +14,8 @@ const MOST_RAYS: u64 = 1 << 24;
 pub struct Schedule {
     /// depth 0; bounce_ix is the batch's first row.
     pub batches: Vec<Batch>,
-    /// What `bounces` and `counters` hold when a frame begins.
+    /// What `bounces` holds when a frame begins.
     pub first_bounces: Buffer<Bounce>,
-    pub zero_counters: Buffer<Counters>,
     /// None without a profile.
     pub timer: Option<Timer>,
 }
@@ -44,12 +43,10 @@ impl Schedule {
             .flat_map(|batch| (0..max_depth).map(|depth| if depth == 0 { batch.n_pixels } else { 0 }))
             .map(|n_rays| Bounce::of(n_rays, constants))
             .collect();
-        let zeros = vec![Counters::default(); rows.len()];
-        // The widest bounce has 6 kernels, a batch's light 3; visibility, accumulate, denoise and tonemap stand outside.
-        let n_passes = 4 + 3 * batches.len() as u32 + 6 * rows.len() as u32;
+        // The widest bounce has 6 kernels, a batch's light 3; rasterize's three, accumulate, denoise and tonemap stand outside.
+        let n_passes = 6 + 3 * batches.len() as u32 + 6 * rows.len() as u32;
         Ok(Self {
             first_bounces: Buffer::with(context, "first_bounces", &rows, BufferUse::Storage)?,
-            zero_counters: Buffer::with(context, "zero_counters", &zeros, BufferUse::Storage)?,
             timer: timed.then(|| Timer::new(context, n_passes)).transpose()?,
             batches,
         })

@@ -54,8 +54,8 @@ impl Stage {
         let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
         let constants = Frame { queue_capacity: capacity, ..frame_constants(&scene, &tree, &options) };
         let mut resources =
-            Resources::new(&context, &scene, &tree, &constants, constants.max_depth as usize).expect("resources");
-        resources.fit(&context, &constants, options.features).expect("room");
+            Resources::new(&context, &scene, &tree, &constants, &options, constants.max_depth as usize)
+                .expect("resources");
         resources.add_extras(&context, &tree, options.traversal).expect("extras");
         let extras = Extras::new(&tree, options.traversal);
         let passes = Passes::new(&context, &resources.bindings, &options).expect("passes");
@@ -88,7 +88,7 @@ impl Stage {
             first_ray += n_rays;
         }
         self.resources.bounces.upload(&rows).expect("bounces");
-        self.resources.counters.upload(&vec![Counters::default(); rows.len()]).expect("counters");
+        self.context.run("clear", |commands| self.resources.clear_counters(commands)).expect("cleared counters");
         rows
     }
 
@@ -115,7 +115,7 @@ impl Stage {
 
     /// What the kernels counted, a row a bounce.
     pub fn counters(&self) -> Vec<Counters> {
-        self.resources.counters.download().expect("counters")
+        self.resources.counters().expect("counters")
     }
 }
 

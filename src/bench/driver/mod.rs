@@ -4,7 +4,7 @@
 //! contest   ways of tracing that take turns on a device -> times, hits
 //!   kernel    kdray's traversal is one
 //!   pipeline  VK_KHR_ray_tracing_pipeline another; nothing else uses that extension
-//! raster    visibility and primary_hit: primary rays without a tree
+//! raster    primary rays without a tree, by the passes that rasterize
 //! report    what came of it, in numbers and as a chart
 //! ```
 
@@ -48,7 +48,7 @@ pub struct Arena {
     tree: Tree,
     bindings: Arc<Bindings>,
     scenery: Rc<Scenery>,
-    raster: Raster,
+    rasters: Vec<Raster>,
     builds: Builds,
 }
 
@@ -71,7 +71,7 @@ impl Arena {
             bindings: CastResources::bindings(context, &tree)?,
             tree,
             scenery: Rc::new(scenery),
-            raster: Raster::new(context, stage)?,
+            rasters: Raster::all(context, stage)?,
             builds: Builds {
                 tree_ms: stage.tree_build_ms,
                 n_threads: rayon::current_num_threads(),
@@ -91,7 +91,7 @@ impl Arena {
     ///
     /// # Errors
     /// Out of memory, a failed call.
-    pub fn measure(&mut self, set: &RaySet, n_times: u16) -> Result<(SetResult, Option<RasterResult>), GpuError> {
+    pub fn measure(&mut self, set: &RaySet, n_times: u16) -> Result<(SetResult, Vec<RasterResult>), GpuError> {
         let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
         let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
         let resources = Rc::new(CastResources::new(&self.context, &self.bindings, &self.tree, rays.len())?);
@@ -109,11 +109,12 @@ impl Arena {
                 &contenders,
                 n_times,
                 |n_rounds| {
-                    if rasterizes { self.raster.draw(n_rounds) } else { Ok(()) }
+                    let rasters = if rasterizes { &mut self.rasters[..] } else { &mut [] };
+                    rasters.iter_mut().try_for_each(|raster| raster.draw(n_rounds))
                 },
             )?;
         let set = SetResult::new(set.kind, &trials);
-        let raster = rasterizes.then(|| self.raster.result(&set));
-        Ok((set, raster))
+        let rasters = if rasterizes { self.rasters.iter().map(|raster| raster.result(&set)).collect() } else { Vec::new() };
+        Ok((set, rasters))
     }
 }

@@ -1,8 +1,8 @@
-//! Primary rays that are rasterized: the visibility and primary_hit passes of whole frames of one bounce.
+//! Primary rays that are rasterized: the first passes of whole frames of one bounce.
 
 use std::sync::Arc;
 
-use super::report::{RasterResult, SetResult};
+use super::report::{PassSpread, RasterResult, SetResult};
 use crate::{
     bench::{Spread, stage::Stage},
     frame::{Denoise, Primary, RenderOptions},
@@ -10,27 +10,40 @@ use crate::{
     render::Renderer,
 };
 
+/// The pass that turns triangles into hits, and ends what is timed.
+const LAST_PASS: &str = "primary_hit";
+
 /// Frames of a stage's view, and the times of their passes.
 pub struct Raster {
+    primary: Primary,
     renderer: Renderer,
-    visibility_ms: Vec<f64>,
-    primary_hit_ms: Vec<f64>,
+    /// A frame each: name and milliseconds of its passes, where the device has timestamps.
+    frames: Vec<Vec<(&'static str, f64)>>,
 }
 
 impl Raster {
     /// # Errors
     /// As [`Renderer::new`].
-    pub fn new(context: &Arc<Context>, stage: &Stage) -> Result<Self, GpuError> {
+    pub fn new(context: &Arc<Context>, stage: &Stage, primary: Primary) -> Result<Self, GpuError> {
         let options = RenderOptions {
             width: stage.frame.width,
             height: stage.frame.height,
             max_depth: 1,
             denoise: Denoise::Off,
-            primary: Primary::Raster,
+            primary,
             ..RenderOptions::default()
         };
         let renderer = Renderer::new(Arc::clone(context), &stage.scene, &stage.tree, &options)?;
-        Ok(Self { renderer, visibility_ms: Vec::new(), primary_hit_ms: Vec::new() })
+        Ok(Self { primary, renderer, frames: Vec::new() })
+    }
+
+    /// Both ways of rasterizing, where the device has them.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`].
+    pub fn all(context: &Arc<Context>, stage: &Stage) -> Result<Vec<Self>, GpuError> {
+        let by_kernels = context.has_wide_atomics().then_some(Primary::Compute);
+        [Primary::Raster].into_iter().chain(by_kernels).map(|primary| Self::new(context, stage, primary)).collect()
     }
 
     /// Draws so many frames, after one that is not counted.
@@ -40,20 +53,21 @@ impl Raster {
     pub fn draw(&mut self, n_frames: u16) -> Result<(), GpuError> {
         self.renderer.draw()?;
         for _ in 0..n_frames {
-            let profile = self.renderer.draw()?;
-            self.visibility_ms.extend(profile.pass_ms("visibility"));
-            self.primary_hit_ms.extend(profile.pass_ms("primary_hit"));
+            let passes = self.renderer.draw()?.passes;
+            let n_passes = passes.iter().position(|pass| pass.name == LAST_PASS).map_or(0, |last| last + 1);
+            self.frames.extend(
+                passes[..n_passes].iter().map(|pass| pass.ms.map(|ms| (pass.name, ms))).collect::<Option<Vec<_>>>(),
+            );
         }
         Ok(())
     }
 
     /// All frames so far, beside the driver's primary rays, which are as many.
     pub fn result(&self, primary: &SetResult) -> RasterResult {
-        let both = self.visibility_ms.iter().zip(&self.primary_hit_ms).map(|(a, b)| a + b);
-        RasterResult::new(
-            [&self.visibility_ms, &self.primary_hit_ms].map(|ms| Spread::of(ms.iter().copied())),
-            Spread::of(both),
-            primary,
-        )
+        let sums = self.frames.iter().map(|frame| frame.iter().map(|(_, ms)| ms).sum());
+        let names = self.frames.first().into_iter().flatten().map(|(name, _)| *name);
+        let ms_of = |pass_ix: usize| Spread::of(self.frames.iter().map(|frame| frame[pass_ix].1));
+        let passes = names.enumerate().filter_map(|(i, name)| ms_of(i).map(|ms| PassSpread { name, ms })).collect();
+        RasterResult::new(self.primary.to_string(), passes, Spread::of(sums), primary)
     }
 }

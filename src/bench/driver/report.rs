@@ -83,23 +83,31 @@ impl SetResult {
 }
 
 /// Primary rays by rasterization, in the view of the set of primary rays.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RasterResult {
-    pub visibility_ms: Option<Spread>,
-    pub primary_hit_ms: Option<Spread>,
-    /// Both passes.
+    /// `--primary`'s word.
+    pub primary: String,
+    /// In the order of execution; none where the device has no timestamps.
+    pub passes: Vec<PassSpread>,
+    /// All of them.
     #[serde(flatten)]
     pub timing: Timing,
     /// Its speed in speeds of the driver's primary rays.
     pub ratio: Option<f64>,
 }
 
+/// One pass of them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PassSpread {
+    pub name: &'static str,
+    pub ms: Spread,
+}
+
 impl RasterResult {
-    /// `passes_ms`: of visibility and of primary_hit; `ms`: of both together.
-    pub fn new(passes_ms: [Option<Spread>; 2], ms: Option<Spread>, primary: &SetResult) -> Self {
-        let timing = Timing::new(ms, primary.n_rays);
-        let [visibility_ms, primary_hit_ms] = passes_ms;
-        Self { visibility_ms, primary_hit_ms, timing, ratio: timing.ratio_to(&primary.driver) }
+    /// `ms`: of all passes together; `primary_rays`: what the driver makes of them.
+    pub fn new(primary: String, passes: Vec<PassSpread>, ms: Option<Spread>, primary_rays: &SetResult) -> Self {
+        let timing = Timing::new(ms, primary_rays.n_rays);
+        Self { primary, passes, timing, ratio: timing.ratio_to(&primary_rays.driver) }
     }
 }
 
@@ -139,7 +147,8 @@ pub struct Report {
     pub t_tolerance: f32,
     pub builds: Builds,
     pub sets: Vec<SetResult>,
-    pub raster: Option<RasterResult>,
+    /// A way of rasterizing each.
+    pub raster: Vec<RasterResult>,
 }
 
 impl Report {
@@ -153,8 +162,8 @@ impl Report {
             name: format!("kdray, {}", rival.traversal),
             values: self.sets.iter().map(|set| rate(&set.kdray[rival_ix].timing)).collect(),
         }));
-        series.extend(self.raster.as_ref().map(|raster| Series {
-            name: "kdray, rasterized".to_owned(),
+        series.extend(self.raster.iter().map(|raster| Series {
+            name: format!("kdray, {}", raster.primary),
             values:
                 (self.sets.iter()).map(|set| rate(&raster.timing).filter(|_| set.rays == RayKind::Primary)).collect(),
         }));
@@ -208,10 +217,9 @@ mod tests {
 
     #[test]
     fn rasterized_rays_are_as_many_as_the_drivers() {
-        let passes = [0.5, 0.25].map(|ms| Spread::of([ms]));
-        let raster = RasterResult::new(passes, Spread::of([0.75]), &set(RayKind::Primary));
+        let raster = RasterResult::new("raster".into(), Vec::new(), Spread::of([0.75]), &set(RayKind::Primary));
         assert!((raster.ratio.unwrap() - 8.0).abs() < 1e-12);
-        let unknown = RasterResult::new([None; 2], None, &set(RayKind::Primary));
+        let unknown = RasterResult::new("raster".into(), Vec::new(), None, &set(RayKind::Primary));
         assert_eq!((unknown.ratio, unknown.timing.mrays_per_s), (None, None));
     }
 

@@ -40,9 +40,9 @@ pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     for set in &sets {
         let casting = format!("casting {} {} rays", set.rays.len(), set.kind.name());
         let (result, _) = progress.stage(&casting, || arena.measure(set, args.repeat));
-        let (set, raster) = result?;
+        let (set, rasters) = result?;
         report.sets.push(set);
-        report.raster = report.raster.or(raster);
+        report.raster.extend(rasters);
     }
     drop(progress);
     args.files.write(&report, || report.chart().svg())?;
@@ -71,7 +71,7 @@ fn empty_report(args: &DriverArgs, stage: &Stage, context: &Context, builds: Bui
         t_tolerance: T_TOLERANCE,
         builds,
         sets: Vec::new(),
-        raster: None,
+        raster: Vec::new(),
     }
 }
 
@@ -89,14 +89,14 @@ fn text(report: &Report) -> String {
                 .iter()
                 .map(|rival| cells(set, &rival.traversal, &rival.timing, rival.ratio, Some(rival.apart.n_differing()))),
         );
-        let raster = report.raster.as_ref().filter(|_| set.rays == RayKind::Primary);
-        rows.extend(raster.map(|raster| cells(set, "rasterized", &raster.timing, raster.ratio, None)));
+        let rasters = if set.rays == RayKind::Primary { &report.raster[..] } else { &[] };
+        rows.extend(rasters.iter().map(|raster| cells(set, &raster.primary, &raster.timing, raster.ratio, None)));
     }
     text += &table(["rays", "number", "hits", "by", "ms", "Mrays/s", "ratio", "differing"], &rows);
     text +=
         "\nRatio: speed in speeds of the driver. Differing from the driver's: a hit for a miss, a miss for a hit, or\n";
     text += &format!("another distance by more than {:.1e} of it.\n", report.t_tolerance);
-    text += &passes_text(report.raster.as_ref());
+    text.extend(report.raster.iter().map(passes_text));
     text += &builds_text(&report.builds);
     text
 }
@@ -114,11 +114,10 @@ fn cells(set: &SetResult, by: &str, timing: &Timing, ratio: Option<f64>, n_diffe
     ]
 }
 
-fn passes_text(raster: Option<&RasterResult>) -> String {
-    let Some(raster) = raster else { return String::new() };
-    let [visibility, primary_hit] =
-        [raster.visibility_ms, raster.primary_hit_ms].map(|ms| decimal(ms.map(|ms| ms.median), 3));
-    format!("Rasterized: visibility {visibility} ms, primary_hit {primary_hit} ms.\n")
+fn passes_text(raster: &RasterResult) -> String {
+    let passes = raster.passes.iter().map(|pass| format!("{} {:.3} ms", pass.name, pass.ms.median));
+    let passes: Vec<_> = passes.collect();
+    if passes.is_empty() { String::new() } else { format!("`{}`: {}.\n", raster.primary, passes.join(", ")) }
 }
 
 fn builds_text(builds: &Builds) -> String {
@@ -145,7 +144,7 @@ fn check_hits(report: &Report) -> Result<(), CliError> {
 #[cfg(test)]
 mod tests {
     use kdray::{
-        bench::{Spread, driver::contest::Trial},
+        bench::{Spread, driver::{contest::Trial, report::PassSpread}},
         cast::Hit,
         kdtree::KdTree,
     };
@@ -168,6 +167,7 @@ mod tests {
         };
         let sets = RayKind::ALL.map(set);
         let ms = |ms| Spread::of([ms]);
+        let pass = |name, pass_ms| PassSpread { name, ms: ms(pass_ms).unwrap() };
         Report {
             suite: "driver",
             device: "d < e".to_owned(),
@@ -181,7 +181,10 @@ mod tests {
             n_times: 3,
             t_tolerance: T_TOLERANCE,
             builds: Builds { tree_ms: 1234.5, n_threads: 2, bvh_ms: ms(1.5), n_bvh_builds: 5 },
-            raster: Some(RasterResult::new([ms(0.5), ms(1.5)], ms(2.0), &sets[0])),
+            raster: vec![
+                RasterResult::new("raster".to_owned(), vec![pass("visibility", 0.5), pass("primary_hit", 1.5)], ms(2.0), &sets[0]),
+                RasterResult::new("compute".to_owned(), Vec::new(), ms(1.0), &sets[0]),
+            ],
             sets: sets.to_vec(),
         }
     }
@@ -191,14 +194,14 @@ mod tests {
         let text = text(&report(0));
         let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
         assert!(rows.contains(&vec!["primary", "4", "4", "driver", "8.000", "0.0", "1.00", "-"]), "{text}");
-        assert!(rows.contains(&vec!["primary", "4", "4", "rasterized", "2.000", "0.0", "4.00", "-"]), "{text}");
+        assert!(rows.contains(&vec!["primary", "4", "4", "raster", "2.000", "0.0", "4.00", "-"]), "{text}");
         assert!(rows.contains(&vec!["diffuse", "4", "4", "mask", "4.000", "0.0", "2.00", "0"]), "{text}");
-        assert_eq!(rows.iter().filter(|row| row.get(1) == Some(&"4")).count(), 4 * 3 + 1, "{text}");
+        assert_eq!(rows.iter().filter(|row| row.get(1) == Some(&"4")).count(), 4 * 3 + 2, "{text}");
         assert!(
             text.contains("in 1.500 ms of the GPU (median of 5), the kd-tree in 1234 ms of 2 CPU threads"),
             "{text}"
         );
-        assert!(text.contains("visibility 0.500 ms, primary_hit 1.500 ms"), "{text}");
+        assert!(text.contains("`raster`: visibility 0.500 ms, primary_hit 1.500 ms."), "{text}");
     }
 
     #[test]
@@ -212,10 +215,10 @@ mod tests {
             (&"stack".into(), &1.0.into(), &1.into())
         );
         assert_eq!(stack["ms"]["median"], 8.0);
-        assert_eq!((&json["raster"]["ratio"], &json["builds"]["bvh_ms"]["median"]), (&4.0.into(), &1.5.into()));
+        assert_eq!((&json["raster"][0]["ratio"], &json["builds"]["bvh_ms"]["median"]), (&4.0.into(), &1.5.into()));
         let chart = report.chart();
         let names: Vec<_> = chart.series.iter().map(|series| series.name.as_str()).collect();
-        assert_eq!(names, ["driver", "kdray, mask", "kdray, stack", "kdray, rasterized"]);
+        assert_eq!(names, ["driver", "kdray, mask", "kdray, stack", "kdray, raster", "kdray, compute"]);
         assert_eq!(chart.series[3].values, [Some(0.002), None, None, None]);
         assert!(chart.svg().contains("d &lt; e"));
     }

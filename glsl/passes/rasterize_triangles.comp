@@ -1,0 +1,171 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Rasterize, 1 of 2: one invocation a triangle finds the pixels that it may cover. Those of small triangles are shared out
+// among the workgroup and tested; large ones are left to workgroups of their own.
+// Reads triangles; writes pixel_nearest, large_triangles, raster_count, raster_groups.
+#include "layout.glsl"
+#include "rasterize.glsl"
+#include "footprint.glsl"
+
+layout(local_size_x = RAY_GROUP_SIZE) in;
+
+// Tests of small triangles: the triangle's place in the workgroup and, above it, the pixel's in its rectangle, x and y.
+const uint N_TESTS = 512u;
+const uint PLACE_BITS = 6u; // RAY_GROUP_SIZE
+const uint OFFSET_BITS = 6u; // RASTER_SMALL
+shared uint tests[N_TESTS];
+// Of all triangles of the workgroup, in turns of N_TESTS.
+shared uint n_tests;
+// Of each triangle's rectangle, the window's first pixel, x in the lower half.
+shared uint first_pixels[RAY_GROUP_SIZE];
+
+// The pixels of a row that a triangle may cover lie between the lines of its edges, x = at_first + y * step on row y. An edge
+// ends a row or begins it, and in the other bound has an infinity.
+struct EdgeLines {
+    vec3 low_at_first;
+    vec3 low_step;
+    vec3 high_at_first;
+    vec3 high_step;
+};
+
+const float FAR = 1e9;
+
+// Corners from the rectangle's first pixel.
+EdgeLines edge_lines(vec2 a, vec2 b, vec2 c, float slack) {
+    vec3 along_x = vec3(b.x - a.x, c.x - b.x, a.x - c.x);
+    vec3 along_y = vec3(b.y - a.y, c.y - b.y, a.y - c.y);
+    vec3 from_x = vec3(a.x, b.x, c.x), from_y = vec3(a.y, b.y, c.y);
+    float area = along_x.x * along_y.y - along_y.x * along_x.y;
+    vec3 spans = slack * (abs(along_x) + abs(along_y));
+    // A sliver has no side that is certain.
+    bool is_sliver = abs(area) <= 4.0 * (spans.x + spans.y + spans.z);
+    float side = area < 0.0 ? -1.0 : 1.0;
+    // Twice the area that an edge spans with a pixel is at_first + x * step_x + y * step_y, and not below 0 if it is covered.
+    vec3 step_x = -side * along_y, step_y = side * along_x;
+    vec3 at_first = side * (along_y * from_x - along_x * from_y) + spans;
+    // An edge along the row: beyond all pixels on one side of it, before all on the other.
+    step_x = mix(step_x, vec3(1e-6), lessThan(abs(step_x), vec3(1e-6)));
+    vec3 crossing = -at_first / step_x, step = -step_y / step_x;
+    bvec3 is_low = greaterThan(step_x, vec3(0.0)), is_high = not(is_low);
+    if (is_sliver) is_low = is_high = bvec3(false);
+    return EdgeLines(
+        mix(vec3(-FAR), crossing, is_low), mix(vec3(0.0), step, is_low),
+        mix(vec3(FAR), crossing, is_high), mix(vec3(0.0), step, is_high)
+    );
+}
+
+// Of a row of the rectangle, from `first` on: as bits, from the lowest on.
+uint covered_of_row(EdgeLines lines, float y, float width) {
+    vec3 low = lines.low_at_first + y * lines.low_step, high = lines.high_at_first + y * lines.high_step;
+    float first = clamp(ceil(max(low.x, max(low.y, low.z))), 0.0, width);
+    float end = clamp(floor(min(high.x, min(high.y, high.z))) + 1.0, first, width);
+    return bitfieldInsert(0u, 0xffffffffu, int(first), int(end - first));
+}
+
+// Of a rectangle of RASTER_SMALL pixels at the most, row by row.
+uvec2 covered_of(Rectangle rectangle, EdgeLines lines) {
+    uint64_t bits = uint64_t(0);
+    uint n = 0u;
+    for (uint y = 0u; y < rectangle.size.y; ++y, n += rectangle.size.x) {
+        bits |= uint64_t(covered_of_row(lines, float(y), float(rectangle.size.x))) << n;
+    }
+    return unpackUint2x32(bits);
+}
+
+// The pixels of one invocation's triangle that are still to be tested, and the place of the first one among all tests.
+struct Pending {
+    Rectangle rectangle;
+    uvec2 covered;
+    uint place;
+};
+
+Pending nothing_pending() {
+    return Pending(Rectangle(uvec2(0u), uvec2(0u)), uvec2(0u), 0u);
+}
+
+Pending pending_of(Rectangle rectangle, uvec2 covered) {
+    first_pixels[gl_LocalInvocationIndex] = rectangle.first.x | rectangle.first.y << 16;
+    return Pending(rectangle, covered, atomicAdd(n_tests, bitCount(covered.x) + bitCount(covered.y)));
+}
+
+// Takes the next pixel, a bit.
+uint take_pixel(inout Pending pending) {
+    uint word = pending.covered.x != 0u ? 0u : 1u;
+    uint left = pending.covered[word];
+    pending.covered[word] = left & (left - 1u);
+    pending.place += 1u;
+    return 32u * word + uint(findLSB(left));
+}
+
+// Those of the tests before `end` that are the invocation's.
+void put_tests(inout Pending pending, uint end) {
+    float rows_a_pixel = 1.0 / float(pending.rectangle.size.x);
+    while (pending.covered != uvec2(0u) && pending.place < end) {
+        uint place = pending.place % N_TESTS, bit = take_pixel(pending);
+        uint y = uint((float(bit) + 0.5) * rows_a_pixel), x = bit - y * pending.rectangle.size.x;
+        tests[place] = gl_LocalInvocationIndex | x << PLACE_BITS | y << (PLACE_BITS + OFFSET_BITS);
+    }
+}
+
+void run_test(uint test, uint first_triangle) {
+    uint place = bitfieldExtract(test, 0, int(PLACE_BITS));
+    uvec2 offset = uvec2(bitfieldExtract(test, int(PLACE_BITS), int(OFFSET_BITS)), test >> (PLACE_BITS + OFFSET_BITS));
+    uint first = first_pixels[place];
+    test_pixel(uvec2(first & 0xffffu, first >> 16) + offset, triangle_at(first_triangle + place), first_triangle + place);
+}
+
+// Numbered by one atomic for both counts, large triangles stand in the order of their blocks.
+void add_large(uint triangle_ix, Rectangle rectangle) {
+    uvec2 n = blocks_of(rectangle.size);
+    uvec2 before = unpackUint2x32(atomicAdd(raster_count, packUint2x32(uvec2(n.x * n.y, 1u))));
+    large_triangles[before.y] = LargeTriangle(
+        triangle_ix, before.x, rectangle.first.x | rectangle.first.y << 16, rectangle.size.x | rectangle.size.y << 16
+    );
+    uint n_groups = before.x + n.x * n.y;
+    atomicMax(raster_groups.y, min((n_groups - 1u) / RASTER_GROUPS_X + 1u, 65535u));
+}
+
+void rasterize_beside_eye(uint triangle_ix, vec3 a, vec3 b, vec3 c, vec3 ahead) {
+    Rectangle rectangle = rectangle_beside_eye(a, b, c, ahead);
+    if (area_of(rectangle) == 0u || misses(edge_heights(a, b, c, rectangle), rectangle)) return;
+    add_large(triangle_ix, rectangle);
+}
+
+Pending rasterize(Triangle triangle, uint triangle_ix) {
+    vec3 a = triangle.v0 - frame.eye, b = triangle.v1 - frame.eye, c = triangle.v2 - frame.eye;
+    vec3 ahead = vec3(dot(a, frame.forward), dot(b, frame.forward), dot(c, frame.forward));
+    if (all(lessThanEqual(ahead, vec3(0.0)))) return nothing_pending();
+    if (is_steep(a, ahead.x) || is_steep(b, ahead.y) || is_steep(c, ahead.z)) {
+        rasterize_beside_eye(triangle_ix, a, b, c, ahead);
+        return nothing_pending();
+    }
+    vec2 a_px = projected(a, ahead.x), b_px = projected(b, ahead.y), c_px = projected(c, ahead.z);
+    Bounds bounds = Bounds(min(a_px, min(b_px, c_px)), max(a_px, max(b_px, c_px)), least_slack());
+    Rectangle rectangle = rectangle_of(bounds);
+    if (area_of(rectangle) == 0u) return nothing_pending();
+    if (area_of(rectangle) > RASTER_SMALL || rectangle.size.x > 32u) {
+        add_large(triangle_ix, rectangle);
+        return nothing_pending();
+    }
+    vec2 first = vec2(rectangle.first);
+    return pending_of(rectangle, covered_of(rectangle, edge_lines(a_px - first, b_px - first, c_px - first, bounds.slack)));
+}
+
+void main() {
+    uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uint first_triangle = group * RAY_GROUP_SIZE;
+    if (gl_LocalInvocationIndex == 0u) n_tests = 0u;
+    barrier();
+    Pending pending = nothing_pending();
+    uint triangle_ix = first_triangle + gl_LocalInvocationIndex;
+    if (triangle_ix < frame.n_triangles) pending = rasterize(triangle_at(triangle_ix), triangle_ix);
+    barrier();
+    for (uint first = 0u; first < n_tests; first += N_TESTS) {
+        put_tests(pending, first + N_TESTS);
+        barrier();
+        for (uint i = gl_LocalInvocationIndex; i < min(n_tests - first, N_TESTS); i += RAY_GROUP_SIZE) {
+            run_test(tests[i], first_triangle);
+        }
+        barrier();
+    }
+}

@@ -1,0 +1,38 @@
+//! What the kernels that rasterize hand to one another.
+
+use std::sync::Arc;
+
+use crate::{
+    frame::{Primary, RenderOptions},
+    gpu::{Buffer, BufferUse, Context, GpuError},
+    layout::{LargeTriangle, RasterGroups},
+};
+
+/// Triangles with large bounding rectangles, and their blocks. Without room where the options do not ask for these kernels.
+pub struct Raster {
+    /// One.
+    pub groups: Buffer<RasterGroups>,
+    /// One: large triangles in the upper half, their blocks in the lower.
+    pub count: Buffer<u64>,
+    /// One a triangle: all may be large.
+    pub large_triangles: Buffer<LargeTriangle>,
+}
+
+impl Raster {
+    /// # Errors
+    /// Beyond the device's limits, out of memory.
+    pub fn new(context: &Arc<Context>, n_triangles: u32, options: &RenderOptions) -> Result<Self, GpuError> {
+        let n_large = if options.primary == Primary::Compute { n_triangles as usize } else { 0 };
+        Ok(Self {
+            groups: Buffer::new(context, "raster_groups", 1, BufferUse::Indirect)?,
+            count: Buffer::new(context, "raster_count", 1, BufferUse::Storage)?,
+            large_triangles: Buffer::new(context, "large_triangles", n_large, BufferUse::Storage)?,
+        })
+    }
+
+    /// Whether there is room where the options ask for it, and none where they do not.
+    pub fn fits(&self, n_triangles: u32, options: &RenderOptions) -> bool {
+        let has_room = self.large_triangles.len() == n_triangles as usize;
+        if options.primary == Primary::Compute { has_room } else { self.large_triangles.is_empty() }
+    }
+}

@@ -1,0 +1,63 @@
+//! Rasterize: what visibility does (the paper's section 2.2), by kernels, for devices with few units for graphics. The
+//! triangle of each pixel is the one that its camera ray hits, to the last bit.
+
+use std::sync::Arc;
+
+use super::{Resources, kernel, spirv};
+use crate::{
+    gpu::{Access, Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError},
+    layout::{Frame, RASTER_GROUPS_X, RAY_GROUP_SIZE, RasterGroups, RasterPush},
+};
+
+/// A workgroup of 64 goes over such a block in 16 steps.
+const SMALLEST_BLOCK_LOG2: u32 = 5;
+
+/// The pass's two kernels.
+pub struct Rasterize {
+    triangles: ComputePipeline,
+    blocks: ComputePipeline,
+}
+
+impl Rasterize {
+    /// # Errors
+    /// The device lacks atomics of 64 bits; the driver refuses a shader.
+    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
+        context.require_wide_atomics()?;
+        let constants = [0, context.fuses_fma()?.into()];
+        let kernel = |name, shader| kernel(context, bindings, name, shader, &constants);
+        Ok(Self {
+            triangles: kernel("rasterize_triangles", spirv!("rasterize_triangles.comp"))?,
+            blocks: kernel("rasterize_blocks", spirv!("rasterize_blocks.comp"))?,
+        })
+    }
+
+    /// Needs nothing. Leaves pixel_nearest.
+    pub fn record(&self, commands: &Commands, resources: &Resources) {
+        let (pixels, raster, constants) = (&resources.pixels, &resources.raster, resources.constants());
+        let push = RasterPush { block_log2: block_log2(constants) };
+        commands.fill_pass("rasterize_clear", pixels.pixel_nearest.any(), u32::MAX);
+        commands.update_buffer(raster.groups.any(), &RasterGroups { x: RASTER_GROUPS_X, y: 0, z: 1, reserved: 0 });
+        commands.update_buffer(raster.count.any(), &0u64);
+        commands.barrier(Access::TransferWrite, Access::ComputeUpdate); // pixel_nearest, raster_groups, raster_count
+        commands.dispatch(&self.triangles, None, &push, groups_for(constants.n_triangles));
+        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_nearest, large_triangles, raster_count
+        commands.barrier(Access::ComputeWrite, Access::IndirectRead); // raster_groups
+        commands.dispatch(&self.blocks, None, &push, Dispatch::Indirect(raster.groups.any(), 0));
+    }
+}
+
+/// Sides of blocks: as small as can be, if the blocks of all triangles are to have numbers even where each fills the window.
+fn block_log2(constants: &Frame) -> u32 {
+    let n_blocks = |log2: u32| {
+        let along = |pixels: u32| u64::from(pixels.div_ceil(1 << log2));
+        along(constants.width) * along(constants.height) * u64::from(constants.n_triangles)
+    };
+    (SMALLEST_BLOCK_LOG2..16).find(|&log2| u32::try_from(n_blocks(log2)).is_ok()).unwrap_or(16)
+}
+
+/// One invocation a triangle, in rows of as many workgroups as any device takes.
+fn groups_for(n_triangles: u32) -> Dispatch<'static> {
+    const GROUPS_OF_ROW: u32 = 1 << 15;
+    let n_groups = n_triangles.div_ceil(RAY_GROUP_SIZE);
+    Dispatch::Threads([n_groups.min(GROUPS_OF_ROW), n_groups.div_ceil(GROUPS_OF_ROW), 1], [1, 1, 1])
+}
