@@ -148,7 +148,8 @@ impl Traversal {
 pub enum Primary {
     /// By rasterized triangle IDs and a ray-plane test.
     Raster,
-    /// By triangles that kernels rasterize, with the very hits of rays; needs atomics of 64 bits. The CPU has no such kernels.
+    /// By triangles that kernels rasterize with the test of rays, so that hits are those of `Trace`, bit for bit. Needs atomics of 64
+    /// bits. The CPU has no such kernels: there it is `Raster`.
     Compute,
     /// Through the kd-tree.
     Trace,
@@ -156,8 +157,10 @@ pub enum Primary {
 
 impl Primary {
     /// What takes less work: the rasterizer goes over all triangles, tracing over all pixels of the whole picture.
-    pub fn suited_to(n_triangles: usize, (width, height): (u32, u32)) -> Self {
-        if n_triangles as u64 <= u64::from(width) * u64::from(height) { Self::Raster } else { Self::Trace }
+    /// `triangles_a_ray`: how many triangles are rasterized while one ray is traced.
+    pub fn suited_to(n_triangles: usize, (width, height): (u32, u32), triangles_a_ray: u64) -> Self {
+        let n_rays = u64::from(width) * u64::from(height);
+        if n_triangles as u64 <= triangles_a_ray * n_rays { Self::Raster } else { Self::Trace }
     }
 }
 

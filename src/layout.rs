@@ -35,6 +35,8 @@ mod tests {
             BIND_CAST_RAYS => Some("CastRay"),
             BIND_PIXEL_FEATURES => Some("Feature"),
             BIND_COUNTERS => Some("Counters"),
+            BIND_RASTER_GROUPS => Some("RasterGroups"),
+            BIND_LARGE_TRIANGLES => Some("LargeTriangle"),
             _ => None,
         }
     }
@@ -46,6 +48,7 @@ mod tests {
             "driver.rgen" => "DriverCast",
             "false_color.comp" => "FalseColor",
             "present.frag" => "Present",
+            "rasterize_triangles.comp" | "rasterize_blocks.comp" => "RasterPush",
             _ => "Batch",
         }
     }

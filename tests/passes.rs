@@ -19,6 +19,8 @@ mod false_color;
 mod features;
 #[path = "passes/primary_hit.rs"]
 mod primary_hit;
+#[path = "passes/rasterize.rs"]
+mod rasterize;
 #[path = "passes/resolve.rs"]
 mod resolve;
 #[path = "passes/shade.rs"]

@@ -62,13 +62,13 @@ struct Traced {
 fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], traversal: Traversal) -> Traced {
     let options = RenderOptions { width: 8, height: 8, max_depth: 1, traversal, ..RenderOptions::default() };
     let constants = Frame { queue_capacity: rays.len() as u32, ..frame_constants(scene, tree, &options) };
-    let mut resources = Resources::new(context, scene, tree, &constants, 1).expect("resources");
+    let mut resources = Resources::new(context, scene, tree, &constants, &options, 1).expect("resources");
     resources.add_extras(context, tree, traversal).expect("extras");
     let passes = Passes::new(context, &resources.bindings, &options).expect("passes");
     resources.queue.rays.upload(rays).expect("rays");
     resources.bounces.upload(&[Bounce::of(rays.len() as u32, &constants)]).expect("bounces");
     context.run("clear", |commands| resources.clear_counters(commands)).expect("cleared counters");
-    let batch = Batch { first_pixel: 0, n_pixels: 64, bounce_ix: 0, depth: 0 };
+    let batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, depth: 0 };
     let record = |commands: &kdray::gpu::Commands| {
         resources.bind(commands);
         passes.trace.record(commands, &resources, &batch);

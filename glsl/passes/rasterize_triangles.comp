@@ -122,7 +122,7 @@ void add_large(uint triangle_ix, Rectangle rectangle) {
         triangle_ix, before.x, rectangle.first.x | rectangle.first.y << 16, rectangle.size.x | rectangle.size.y << 16
     );
     uint n_groups = before.x + n.x * n.y;
-    atomicMax(raster_groups.y, min((n_groups - 1u) / RASTER_GROUPS_X + 1u, 65535u));
+    atomicMax(raster_groups.y, min((n_groups - 1u) / RASTER_GROUPS_X + 1u, RASTER_GROUPS_Y));
 }
 
 void rasterize_beside_eye(uint triangle_ix, vec3 a, vec3 b, vec3 c, vec3 ahead) {

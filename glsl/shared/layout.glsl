@@ -13,10 +13,11 @@
 #define MOST_LANES_LOG2 5u
 // Vulkan guarantees 128 invocations on every device.
 #define SCAN_GROUP_SIZE 128u
-// Triangles that kernels rasterize: pixels of a bounding rectangle that one invocation looks at alone; workgroups side by side in
-// the dispatch over the blocks that larger ones are cut into.
+// Triangles that kernels rasterize: pixels of a bounding rectangle that one invocation looks at alone; workgroups in
+// the dispatch over the blocks that larger ones are cut into: side by side, and rows at the most.
 #define RASTER_SMALL 64u
 #define RASTER_GROUPS_X 256u
+#define RASTER_GROUPS_Y 1024u
 // Blocks of SCAN_GROUP_SIZE rays of which one invocation of the spine adds up the counts.
 #define SPINE_ITEMS 8u
 

@@ -48,12 +48,10 @@ impl Reported {
     }
 }
 
-/// The scene's own options at another size, and the primary rays that suit it.
+/// The scene's own options at another size.
 pub fn options(scene: &Scene, (width, height): (u32, u32), traversal: Traversal) -> RenderOptions {
-    let primary = Primary::suited_to(scene.triangles.len(), (width, height));
     let scene = &scene.defaults;
     RenderOptions {
-        primary,
         traversal,
         width,
         height,
@@ -65,7 +63,7 @@ pub fn options(scene: &Scene, (width, height): (u32, u32), traversal: Traversal)
     }
 }
 
-/// Frames drawn on a device, after a warm-up, which also finds how many batches the frame needs.
+/// Frames drawn on a device by the primary rays that suit it, after a warm-up, which also finds how many batches the frame needs.
 ///
 /// # Errors
 /// As [`Renderer::new`] and [`Renderer::draw`].
@@ -76,6 +74,8 @@ pub fn draw_on_gpu(
     options: &RenderOptions,
     n_frames: u16,
 ) -> Result<Vec<Profile>, GpuError> {
+    let primary = Renderer::suited_primary(context, scene.triangles.len(), (options.width, options.height));
+    let options = &RenderOptions { primary, ..options.clone() };
     let mut renderer = Renderer::new(Arc::clone(context), scene, tree, options)?;
     warm_up(|| renderer.draw().map(drop))?;
     (0..n_frames).map(|_| renderer.draw()).collect()
@@ -91,7 +91,8 @@ pub fn draw_on_cpu(
     options: &RenderOptions,
     n_frames: u16,
 ) -> Result<Vec<Profile>, ThreadPoolBuildError> {
-    let options = &RenderOptions { traversal: Traversal::OF_CPU, ..options.clone() };
+    let primary = Primary::suited_to(scene.triangles.len(), (options.width, options.height), 1);
+    let options = &RenderOptions { primary, traversal: Traversal::OF_CPU, ..options.clone() };
     let thread = ThreadPoolBuilder::new().num_threads(1).build()?;
     Ok(thread.install(|| (0..n_frames).map(|_| cpu::render(scene, tree, options).1).collect()))
 }

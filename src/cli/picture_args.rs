@@ -3,6 +3,8 @@
 use clap::{ValueEnum, value_parser};
 use kdray::{
     frame::{Denoise, Primary, RenderOptions, Tonemap, Traversal},
+    gpu::Context,
+    render::Renderer,
     scene::Scene,
 };
 
@@ -31,7 +33,8 @@ pub struct PictureArgs {
     #[arg(long, value_name = "WAY")]
     #[arg(help = way_help())]
     pub traversal: Option<Traversal>,
-    /// How primary rays find their triangles [default: raster, but trace where there are more triangles than pixels]
+    /// How primary rays find their triangles: rasterized by the device's graphics or by kernels, or traced [default: what suits the
+    /// device and the scene]
     #[arg(long, value_name = "raster|compute|trace")]
     pub primary: Option<Primary>,
 }
@@ -57,9 +60,17 @@ impl PictureArgs {
         Ok(())
     }
 
-    /// The options asked for; the scene's own fill what was left open.
+    /// The primary rays asked for, or what suits; without a device, the CPU.
+    pub fn primary(&self, context: Option<&Context>, n_triangles: usize, size: (u32, u32)) -> Primary {
+        let suited = || match context {
+            Some(context) => Renderer::suited_primary(context, n_triangles, size),
+            None => Primary::suited_to(n_triangles, size, 1),
+        };
+        self.primary.unwrap_or_else(suited)
+    }
+
+    /// The options asked for; the scene's own fill what was left open, but for what depends on the device: `primary`.
     pub fn options(&self, scene: &Scene, on_cpu: bool) -> RenderOptions {
-        let n_triangles = scene.triangles.len();
         let scene = &scene.defaults;
         let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });
         RenderOptions {
@@ -71,7 +82,7 @@ impl PictureArgs {
             tonemap: self.tonemap.unwrap_or(scene.tonemap),
             denoise: self.denoise(scene.denoise),
             traversal: way_through_tree(self.traversal, on_cpu),
-            primary: self.primary.unwrap_or_else(|| Primary::suited_to(n_triangles, (width, height))),
+            primary: RenderOptions::default().primary,
             features: false,
             profile: true,
         }
@@ -125,9 +136,10 @@ mod tests {
 
     #[test]
     fn more_triangles_than_pixels_are_not_rasterized() {
-        assert_eq!(Primary::suited_to(4800, (80, 60)), Primary::Raster);
-        assert_eq!(Primary::suited_to(4801, (80, 60)), Primary::Trace);
-        assert_eq!(Primary::suited_to(usize::MAX, (1 << 16, 1 << 16)), Primary::Trace);
+        assert_eq!(Primary::suited_to(4800, (80, 60), 1), Primary::Raster);
+        assert_eq!(Primary::suited_to(4801, (80, 60), 1), Primary::Trace);
+        assert_eq!(Primary::suited_to(4801, (80, 60), 8), Primary::Raster);
+        assert_eq!(Primary::suited_to(usize::MAX, (1 << 16, 1 << 16), 8), Primary::Trace);
     }
 
     #[test]

@@ -47,6 +47,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         loaded,
         ViewOptions {
             settings,
+            primary: args.picture.primary,
             device: ContextOptions { device: args.device.clone(), validate: args.validate },
             overlay: !args.no_overlay,
             tour,

@@ -121,6 +121,16 @@ impl Context {
         Ok(context)
     }
 
+    /// As [`Context::new`], as if kernels had no atomics of 64 bits.
+    ///
+    /// # Errors
+    /// As [`Context::new`].
+    pub fn without_wide_atomics(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
+        let mut context = Self::new(options)?;
+        Arc::get_mut(&mut context).expect("nothing has been made from it yet").wide_atomics = false;
+        Ok(context)
+    }
+
     fn open(
         instance: Arc<Instance>,
         physical: vk::PhysicalDevice,

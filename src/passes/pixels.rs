@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     frame::{Primary, RenderOptions},
-    gpu::{Buffer, BufferUse, Context, GpuError, Target, TargetKind},
+    gpu::{Buffer, BufferUse, Commands, Context, GpuError, Target, TargetKind},
     layout::{Feature, Frame},
 };
 
@@ -55,6 +55,12 @@ impl Pixels {
             && self.pixel_features.is_empty() != options.features
             && self.pixel_nearest.is_empty() == (options.primary != Primary::Compute)
             && self.pixel_filtered.is_some() == frame.denoise_threshold.is_finite()
+    }
+
+    /// Where nothing is drawn to triangle_ids: no kernel reads them then, but they are bound, in the layout of the set.
+    pub fn leave_unread(&self, commands: &Commands) {
+        commands.begin_targets(&self.triangle_ids, &self.depth);
+        commands.ids_to_compute(&self.triangle_ids);
     }
 
     /// The image after the noise filter, or the one without it.

@@ -73,7 +73,9 @@ impl App {
             .with_inner_size(PhysicalSize::new(options.width, options.height));
         let window = event_loop.create_window(attributes).map_err(|error| ViewError::Window(error.to_string()))?;
         let window = Arc::new(window);
-        let live = Live::open(window.clone(), &self.options.device, &self.session.loaded, options, *vsync)?;
+        let ViewOptions { device, primary, .. } = &self.options;
+        let live = Live::open(window.clone(), device, &self.session.loaded, options, *primary, *vsync)?;
+        self.session.settings.options.primary = live.renderer.options().primary;
         Ok(Shown { live, ui: Ui::new(&window), window })
     }
 
@@ -145,7 +147,8 @@ impl App {
         drop((live, ui));
         self.session.complain(Topic::Device, &format!("{error}; the device was opened anew"));
         let Settings { options, vsync, .. } = &self.session.settings;
-        match Live::open(window.clone(), &self.options.device, &self.session.loaded, options, *vsync) {
+        let primary = Some(options.primary);
+        match Live::open(window.clone(), &self.options.device, &self.session.loaded, options, primary, *vsync) {
             Ok(live) => {
                 self.is_reopened = true;
                 // What took the place of shaders went with the device.

@@ -16,12 +16,14 @@ use super::{
     session::Session,
     tour::Tour,
 };
-use crate::gpu::ContextOptions;
+use crate::{frame::Primary, gpu::ContextOptions};
 
 /// What the viewer is asked for.
 pub struct ViewOptions {
     /// The options' size is the window's at first.
     pub settings: Settings,
+    /// In place of the settings': none for what suits the device.
+    pub primary: Option<Primary>,
     pub device: ContextOptions,
     /// Whether there is an overlay; the user can hide it.
     pub overlay: bool,

@@ -6,7 +6,7 @@ use egui::TexturesDelta;
 
 use super::loaded::Loaded;
 use crate::{
-    frame::RenderOptions,
+    frame::{Primary, RenderOptions},
     gpu::{Context, ContextOptions, GpuError, Overlay, OverlayFrame, Presenter, Screen},
     passes::Present,
     render::Renderer,
@@ -22,7 +22,7 @@ pub struct Live {
 }
 
 impl Live {
-    /// Opens the device and uploads the scene.
+    /// Opens the device and uploads the scene. primary: in place of the options'; none for what suits the device.
     ///
     /// # Errors
     /// No device can do it; the scene or the picture is beyond its limits or memory.
@@ -31,12 +31,17 @@ impl Live {
         device: &ContextOptions,
         loaded: &Loaded,
         options: &RenderOptions,
+        primary: Option<Primary>,
         vsync: bool,
     ) -> Result<Self, GpuError> {
         let (context, surface) = Context::for_window(device, window)?;
+        // In motion, where it has to be quick, a picture is smaller than its window.
+        let moving = (options.width / 4, options.height / 4);
+        let suited = || Renderer::suited_primary(&context, loaded.scene.triangles.len(), moving);
+        let options = RenderOptions { primary: primary.unwrap_or_else(suited), ..options.clone() };
         let presenter = Presenter::new(&context, surface, vsync)?;
         let overlay = Overlay::new(&context, &presenter)?;
-        let renderer = Renderer::new(context.clone(), &loaded.scene, &loaded.tree, options)?;
+        let renderer = Renderer::new(context.clone(), &loaded.scene, &loaded.tree, &options)?;
         let present = Present::new(&context, renderer.resources(), &presenter)?;
         Ok(Self { renderer, present, overlay, presenter, context })
     }

@@ -6,13 +6,14 @@ use glam::UVec2;
 use kdray::{
     camera::frame_constants,
     cpu::{bindings::Bindings, primary_hit::camera_ray, traverser::Traverser},
-    frame::{Picture, Primary, RenderOptions},
+    frame::{Crop, Picture, Primary, RenderOptions},
     kdtree::KdTree,
     layout::Frame,
+    render::Renderer,
     scene::Scene,
 };
 
-use super::studio::{differing, on_cpu, on_device, options, tree_of};
+use super::studio::{assert_silent, device, differing, on_cpu, on_device, options, tree_of};
 use crate::support::scenes;
 
 /// Whether rays within 1/8 px of the pixel's centre meet more than one triangle. (Corners are snapped to a grid of
@@ -54,6 +55,54 @@ fn raster_and_trace_differ_only_on_edges() {
             assert!(n_differing <= a.radiance.len() / 50, "{name}: {n_differing} pixels differ");
         }
     }
+}
+
+/// Triangles that kernels rasterize are those that rays hit, to the last bit; in batches, windows and samples, too.
+#[test]
+fn compute_and_trace_are_the_same() {
+    let trace = RenderOptions { primary: Primary::Trace, ..options(120, 90, 4) };
+    let crop = Some(Crop { x0: 33, y0: 0, x1: 120, y1: 41 });
+    let compute_and_trace = |options: &RenderOptions, n_samples: u32, capacity: u32| {
+        let context = device();
+        [Primary::Compute, Primary::Trace].map(|primary| {
+            let (scene, options) = (scenes::mixed_outdoors(), RenderOptions { primary, ..options.clone() });
+            let tree = tree_of(&scene);
+            let mut renderer =
+                Renderer::with_queue_capacity(context.clone(), &scene, &tree, &options, capacity).expect("a renderer");
+            (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
+            assert_silent(&context);
+            renderer.picture().expect("a picture")
+        })
+    };
+    if !device().has_wide_atomics() {
+        return;
+    }
+    for (options, n_samples, capacity) in
+        [(&trace, 1, 1 << 20), (&RenderOptions { crop, ..trace.clone() }, 3, 1 << 20), (&trace, 2, 4000)]
+    {
+        let [compute, trace] = compute_and_trace(options, n_samples, capacity);
+        assert_eq!(differing(&compute, &trace, 0.0), [], "{n_samples} samples, room for {capacity} rays");
+    }
+}
+
+/// A living renderer makes room for what another way needs.
+#[test]
+fn primaries_change_between_frames() {
+    let context = device();
+    let (scene, raster) = (scenes::mixed(), options(60, 45, 2));
+    let tree = tree_of(&scene);
+    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &raster).expect("a renderer");
+    let mut pictures = Vec::new();
+    let all = if context.has_wide_atomics() { Primary::ALL } else { &[Primary::Raster, Primary::Trace] };
+    for &primary in all.iter().chain(all) {
+        let options = RenderOptions { primary, ..raster.clone() };
+        renderer.set_options(&options, &tree).expect("other options");
+        pictures.push((primary, renderer.render().expect("a frame").0));
+        assert_eq!(pictures.last().unwrap().1, on_device(&scene, &options), "{primary}");
+    }
+    assert_silent(&context);
+    let (first, second) = pictures.split_at(all.len());
+    assert!(first == second);
 }
 
 #[test]

@@ -8,6 +8,9 @@ use kdray::{
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_PIXEL, UNTOUCHED_RAY, options};
 use crate::support::{compare, random::Random, scenes};
 
+/// Where the batch's pixels begin.
+const FIRST_PIXEL: u32 = 200;
+
 /// A batch's rays, bounce after bounce.
 struct Family {
     rays: Vec<Ray>,
@@ -16,9 +19,10 @@ struct Family {
 }
 
 /// One ray a pixel, and up to `most_children` of each ray of `n_bounces`.
-fn family(n_primary: u32, n_bounces: usize, most_children: usize) -> Family {
+fn family(stage: &Stage, n_primary: u32, n_bounces: usize, most_children: usize) -> Family {
     let mut random = Random(9);
-    let mut rays: Vec<Ray> = (0..n_primary).map(|pixel_ix| Ray { pixel_ix, ..UNTOUCHED_RAY }).collect();
+    let mut rays = vec![UNTOUCHED_RAY; n_primary as usize];
+    cpu::primary_hit::primary_rays(stage.resources.constants(), FIRST_PIXEL, &mut rays);
     let (mut first_children, mut n_rays) = (Vec::new(), vec![n_primary]);
     for _ in 1..n_bounces {
         let parents = first_children.len()..rays.len();
@@ -39,7 +43,7 @@ fn check(stage: &Stage, family: &Family) {
     let radiance: Vec<[f32; 4]> = rays.iter().map(|_| [0; 4].map(|_| random.between(0.0, 5.0))).collect();
     let before = vec![UNTOUCHED_PIXEL; resources.pixels.pixel_radiance.len()];
     let mut sums = before.clone();
-    sums[..n_rays[0] as usize].fill([0.0, 0.0, 0.0, 1.0]);
+    rays[..n_rays[0] as usize].iter().for_each(|ray| sums[ray.pixel_ix as usize] = [0.0, 0.0, 0.0, 1.0]);
     for (ray, radiance) in rays.iter().zip(&radiance) {
         (0..3).for_each(|i| sums[ray.pixel_ix as usize][i] += radiance[i]);
     }
@@ -47,11 +51,10 @@ fn check(stage: &Stage, family: &Family) {
     let mut expected = before.clone();
     cpu::resolve::resolve(&bounces[..n_rays.len()], rays, &radiance, first_children, &mut expected);
     compare::exact(&sums, &expected).unwrap();
-    stage.set_rays(rays);
     resources.queue.ray_radiance.upload(&radiance).expect("ray_radiance");
     resources.queue.first_children.upload(first_children).expect("first_children");
     resources.pixels.pixel_radiance.upload(&before).expect("pixel_radiance");
-    let batch = Batch { n_pixels: n_rays[0], ..FIRST };
+    let batch = Batch { first_pixel: FIRST_PIXEL, n_pixels: n_rays[0], ..FIRST };
     stage.run(|commands| stage.passes.resolve.record(commands, &batch));
     compare::exact(&expected, &resources.pixels.pixel_radiance.download().expect("pixel_radiance")).unwrap();
 }
@@ -66,7 +69,7 @@ fn agrees_with_its_twin() {
         for (n_bounces, most_children) in
             [(1, 0), (2, 1), (max_depth, 0), (max_depth, 1), (max_depth - 1, 3), (max_depth, 3)]
         {
-            check(&stage, &family(n_rays, n_bounces, most_children));
+            check(&stage, &family(&stage, n_rays, n_bounces, most_children));
         }
     }
 }

@@ -2,16 +2,16 @@
 
 use kdray::{
     cpu::{self, shade::LitRays},
-    layout::LIGHT_UNTESTED,
+    layout::{Batch, LIGHT_UNTESTED},
 };
 
-use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_PIXEL, hits_of, options, some_rays};
+use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_PIXEL, hits_of, options, rays_of};
 use crate::support::{compare, random::Random, scenes};
 
 /// Radiance within 1e-4: `pow` and `inversesqrt` are good for some 2^-13 of a steep highlight. The rays are those of two bounces.
-fn check(stage: &Stage, n_rays: u32) {
+fn check(stage: &Stage, batch: &Batch, n_rays: u32) {
     let queue = &stage.resources.queue;
-    let rays = some_rays(stage, n_rays);
+    let (rays, stored) = rays_of(stage, batch, n_rays);
     let hits = hits_of(stage, &rays);
     let mut random = Random(3);
     let light_visibility: Vec<u32> = (0..queue.light_visibility.len()).map(|_| random.below(3) as u32).collect();
@@ -21,11 +21,11 @@ fn check(stage: &Stage, n_rays: u32) {
     expected.resize(queue.hits.len(), UNTOUCHED_PIXEL);
 
     let bounces = stage.set_n_rays(&[n_rays / 3, n_rays - n_rays / 3]);
-    stage.set_rays(&rays);
+    stage.set_rays(&stored);
     stage.set_hits(&hits);
     queue.light_visibility.upload(&light_visibility).expect("light_visibility");
     queue.ray_radiance.upload(&vec![UNTOUCHED_PIXEL; queue.ray_radiance.len()]).expect("ray_radiance");
-    stage.run(|commands| stage.passes.shade.record(commands, &stage.resources, &FIRST));
+    stage.run(|commands| stage.passes.shade.record(commands, &stage.resources, batch));
     let found = queue.ray_radiance.download().expect("ray_radiance");
     compare::pixels(1e-4, stage.n_outliers(n_rays), &expected, &found).unwrap();
 
@@ -40,7 +40,8 @@ fn check(stage: &Stage, n_rays: u32) {
 fn agrees_with_its_twin() {
     let stage = Stage::new(scenes::mixed_outdoors(), options(50, 50), 2010);
     for n_rays in RAY_COUNTS {
-        check(&stage, n_rays);
+        check(&stage, &FIRST, n_rays);
+        check(&stage, &Batch { first_pixel: 300, n_pixels: n_rays / 3, ..FIRST }, n_rays);
     }
 }
 
@@ -48,5 +49,5 @@ fn agrees_with_its_twin() {
 fn agrees_without_lights() {
     let mut scene = scenes::mixed();
     scene.lights.clear();
-    check(&Stage::new(scene, options(50, 50), 500), 500);
+    check(&Stage::new(scene, options(50, 50), 500), &FIRST, 500);
 }

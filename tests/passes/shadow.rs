@@ -6,17 +6,17 @@ use glam::Vec3;
 use kdray::{
     cpu::{self, shade::LitRays},
     frame::{RenderOptions, Traversal},
-    layout::{FLAT_NORMAL, Hit, LIGHT_LIT, LIGHT_SHADOWED, LIGHT_UNTESTED, NO_TRIANGLE},
+    layout::{Batch, FLAT_NORMAL, Hit, LIGHT_LIT, LIGHT_SHADOWED, LIGHT_UNTESTED, NO_TRIANGLE},
     scene::Scene,
 };
 
-use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_WORD, hits_of, options, some_rays};
+use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_WORD, hits_of, options, rays_of, some_rays};
 use crate::support::{compare, scenes};
 
 /// The rays are those of two bounces. Returns what is said of their lights.
-fn check(stage: &Stage, n_rays: u32) -> Vec<u32> {
+fn check(stage: &Stage, batch: &Batch, n_rays: u32) -> Vec<u32> {
     let queue = &stage.resources.queue;
-    let rays = some_rays(stage, n_rays);
+    let (rays, stored) = rays_of(stage, batch, n_rays);
     let hits = hits_of(stage, &rays);
     let bounces = stage.set_n_rays(&[n_rays / 3, n_rays - n_rays / 3]);
     let mut expected = vec![UNTOUCHED_WORD; queue.light_visibility.len()];
@@ -28,10 +28,10 @@ fn check(stage: &Stage, n_rays: u32) -> Vec<u32> {
         let n_marked: usize = of_lights.map(|of_light| of_light[row.rays()].iter().filter(is_tested).count()).sum();
         assert_eq!(n_tested as usize, n_marked);
     }
-    stage.set_rays(&rays);
+    stage.set_rays(&stored);
     stage.set_hits(&hits);
     queue.light_visibility.upload(&vec![UNTOUCHED_WORD; expected.len()]).expect("light_visibility");
-    stage.run(|commands| stage.passes.shadow.record(commands, &stage.resources, &FIRST));
+    stage.run(|commands| stage.passes.shadow.record(commands, &stage.resources, batch));
     let found = queue.light_visibility.download().expect("light_visibility");
     compare::exact_but_for(stage.n_outliers(n_rays * stage.scene.lights.len() as u32), &expected, &found).unwrap();
     found
@@ -41,8 +41,16 @@ fn check(stage: &Stage, n_rays: u32) -> Vec<u32> {
 fn agrees_with_its_twin() {
     for &traversal in Traversal::ALL {
         let stage = Stage::new(scenes::mixed_outdoors(), RenderOptions { traversal, ..options(8, 8) }, 2010);
-        let states: HashSet<u32> = RAY_COUNTS.into_iter().flat_map(|n| check(&stage, n)).collect();
+        let states: HashSet<u32> = RAY_COUNTS.into_iter().flat_map(|n| check(&stage, &FIRST, n)).collect();
         assert_eq!(states, HashSet::from([LIGHT_UNTESTED, LIGHT_LIT, LIGHT_SHADOWED, UNTOUCHED_WORD]));
+    }
+}
+
+#[test]
+fn agrees_where_the_first_rays_are_the_cameras() {
+    let stage = Stage::new(scenes::mixed_outdoors(), options(50, 50), 2010);
+    for n in RAY_COUNTS {
+        check(&stage, &Batch { first_pixel: 300, n_pixels: n / 3, ..FIRST }, n);
     }
 }
 

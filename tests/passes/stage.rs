@@ -146,6 +146,16 @@ pub fn some_rays(stage: &Stage, n: u32) -> Vec<Ray> {
         .collect()
 }
 
+/// As `some_rays`, but that the first are the batch's camera rays; and what of them is in memory, where those are not.
+pub fn rays_of(stage: &Stage, batch: &Batch, n: u32) -> (Vec<Ray>, Vec<Ray>) {
+    let mut rays = some_rays(stage, n);
+    let mut stored = rays.clone();
+    let n_camera = batch.n_pixels as usize;
+    kdray::cpu::primary_hit::primary_rays(stage.resources.constants(), batch.first_pixel, &mut rays[..n_camera]);
+    stored[..n_camera].fill(UNTOUCHED_RAY);
+    (rays, stored)
+}
+
 /// The twin's hits of `rays`.
 pub fn hits_of(stage: &Stage, rays: &[Ray]) -> Vec<Hit> {
     let mut hits = vec![Hit { triangle_ix: NO_TRIANGLE, ..UNTOUCHED_HIT }; rays.len()];

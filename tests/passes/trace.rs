@@ -52,7 +52,7 @@ fn agrees_on_many_rays_at_many_triangles() {
 }
 
 #[test]
-fn camera_rays_are_made_where_they_are_traced() {
+fn camera_rays_are_traced_by_their_places() {
     let options = RenderOptions { primary: Primary::Trace, ..options(20, 10) };
     let stage = Stage::new(scenes::mixed_outdoors(), options, 250);
     let batch = Batch { first_pixel: 30, n_pixels: 150, ..FIRST };
@@ -60,10 +60,9 @@ fn camera_rays_are_made_where_they_are_traced() {
     stage.set_rays(&[]);
     stage.set_hits(&[]);
     stage.run(|commands| stage.passes.trace.record(commands, &stage.resources, &batch));
-    let mut rays = [UNTOUCHED_RAY; 250];
-    cpu::primary_hit::primary_rays(stage.resources.constants(), batch.first_pixel, &mut rays[..150]);
-    compare::rays(1e-6, 0, &rays, &stage.resources.queue.rays.download().expect("rays")).unwrap();
-    let mut hits = super::stage::hits_of(&stage, &rays[..150]);
+    let mut rays = [UNTOUCHED_RAY; 150];
+    cpu::primary_hit::primary_rays(stage.resources.constants(), batch.first_pixel, &mut rays);
+    let mut hits = super::stage::hits_of(&stage, &rays);
     hits.resize(250, UNTOUCHED_HIT);
     compare::hits(0, &hits, &stage.resources.queue.hits.download().expect("hits")).unwrap();
 }

@@ -3,7 +3,7 @@
 
 use glam::{DVec2, dvec2, swizzles::Vec4Swizzles, uvec2, vec3};
 use kdray::{
-    cpu::{self, primary_hit::camera_ray, traverser::Traverser},
+    cpu::{self, camera::pixel_of, primary_hit::camera_ray, traverser::Traverser},
     layout::{Batch, Frame, NO_TRIANGLE},
 };
 
@@ -22,11 +22,11 @@ fn rasterized(stage: &Stage) -> Vec<u32> {
         stage.passes.visibility.record(commands, &stage.resources);
         stage.passes.primary_hit.record(commands, &batch);
     });
-    let rays = stage.resources.queue.rays.download().expect("rays");
     let hits = stage.resources.queue.hits.download().expect("hits");
     let mut ids = vec![0; n_pixels as usize];
-    for (ray, hit) in rays.iter().zip(hits) {
-        ids[ray.pixel_ix as usize] = hit.triangle_ix;
+    for (place, hit) in (0..n_pixels).zip(hits) {
+        let pixel = pixel_of(place, stage.options.width, stage.options.height);
+        ids[(pixel.y * stage.options.width + pixel.x) as usize] = hit.triangle_ix;
     }
     ids
 }

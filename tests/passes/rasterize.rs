@@ -1,0 +1,185 @@
+//! Rasterize against the kd-tree: what it finds is what camera rays hit, to the last bit.
+
+use glam::{Vec3, vec3};
+use kdray::{
+    frame::{Crop, Primary, RenderOptions},
+    gpu::{Access, Commands, Context, ContextOptions, GpuError},
+    layout::{Batch, Hit, RASTER_GROUPS_X, RASTER_GROUPS_Y, Triangle},
+    passes::{Passes, Trace},
+    render::Renderer,
+    scene::{Camera, Scene},
+};
+
+use super::stage::{FIRST, Stage, options};
+use crate::support::{compare, meshes, random::Random, scenes};
+
+/// A stage whose kernels rasterize, and the pass that traces the same rays.
+struct View {
+    stage: Stage,
+    trace: Trace,
+}
+
+/// None where the device has no atomics of 64 bits.
+fn view(scene: Scene, options: RenderOptions) -> Option<View> {
+    let context = Context::new(&ContextOptions::default()).expect("a device");
+    let crop = options.crop_or_whole();
+    let options = RenderOptions { primary: Primary::Compute, ..options };
+    let stage = context.has_wide_atomics().then(|| Stage::new(scene, options, crop.width() * crop.height()))?;
+    let options = RenderOptions { primary: Primary::Trace, ..stage.options.clone() };
+    let passes = Passes::new(&stage.context, &stage.resources.bindings, &options).expect("passes");
+    Some(View { stage, trace: passes.trace })
+}
+
+/// Hits of all pixels.
+fn hits_by(stage: &Stage, record: impl FnOnce(&Commands, &Batch)) -> Vec<Hit> {
+    let batch = Batch { n_pixels: stage.resources.n_pixels() as u32, ..FIRST };
+    stage.set_n_rays(&[batch.n_pixels]);
+    stage.set_hits(&[]);
+    stage.run(|commands| {
+        stage.resources.pixels.leave_unread(commands);
+        record(commands, &batch);
+    });
+    stage.resources.queue.hits.download().expect("hits")
+}
+
+impl View {
+    fn rasterized(&self) -> Vec<Hit> {
+        let Stage { passes, resources, .. } = &self.stage;
+        hits_by(&self.stage, |commands, batch| {
+            passes.rasterize.as_ref().expect("the options ask for it").record(commands, resources);
+            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_nearest
+            passes.primary_hit.record(commands, batch);
+        })
+    }
+
+    fn traced(&self) -> Vec<Hit> {
+        hits_by(&self.stage, |commands, batch| self.trace.record(commands, &self.stage.resources, batch))
+    }
+
+    fn look(&mut self, camera: &Camera) {
+        let mut constants = *self.stage.resources.constants();
+        constants.set_view(camera, 0);
+        self.stage.resources.set_constants(&constants);
+        self.stage.resources.tree.frame.upload(&[constants]).expect("constants");
+    }
+
+    /// How many pixels show a triangle.
+    fn check(&self) -> usize {
+        let found = self.rasterized();
+        compare::exact(&self.traced(), &found).unwrap();
+        found.iter().filter(|hit| hit.t < f32::INFINITY).count()
+    }
+}
+
+fn check(scene: Scene, options: RenderOptions) -> usize {
+    view(scene, options).map_or(usize::MAX, |view| view.check())
+}
+
+fn random_camera(random: &mut Random, reach: f32) -> Camera {
+    let [eye, target, up] = [reach, 3.0, 1.0].map(|r| random.in_box(Vec3::splat(-r), Vec3::splat(r)));
+    // From the flattest to beyond what is cut off beside the eye.
+    let fovs = [5.0, 45.0, 90.0, 150.0, 176.0];
+    Camera { eye, target, up, vertical_fov_degrees: fovs[random.below(fovs.len())] }
+}
+
+/// From within and without, with triangles behind, beside and around the eye.
+#[test]
+fn shows_what_camera_rays_hit_from_anywhere() {
+    let mut random = Random(17);
+    for scene in [scenes::mixed(), scenes::mixed_outdoors()] {
+        let Some(mut view) = view(scene, options(41, 33)) else { return };
+        for i in 0..30 {
+            view.look(&random_camera(&mut random, [2.0, 4.9, 20.0][i % 3]));
+            view.check();
+        }
+    }
+}
+
+/// Triangles as large as the room, all around the eye, some through it.
+#[test]
+fn shows_what_camera_rays_hit_amid_triangles() {
+    let mut random = Random(23);
+    let eye = Vec3::splat(0.125);
+    let mut corner = || random.in_box(Vec3::splat(-3.0), Vec3::splat(3.0));
+    let mut triangles: Vec<Triangle> = (0..150).map(|_| meshes::triangle(corner(), corner(), corner())).collect();
+    triangles.push(meshes::triangle(eye - Vec3::X, eye + Vec3::X, corner()));
+    triangles.push(meshes::triangle(eye, corner(), corner()));
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, triangles, scenes::BLACK);
+    let Some(mut view) = view(scene, options(50, 37)) else { return };
+    for i in 0..30 {
+        let camera = random_camera(&mut random, 2.0);
+        view.look(&if i % 2 == 0 { Camera { eye, ..camera } } else { camera });
+        assert!(view.check() > 0, "view {i}");
+    }
+}
+
+/// Far more triangles than pixels, and triangles that no pixel's sample lies in.
+#[test]
+fn shows_what_camera_rays_hit_of_small_triangles() {
+    for triangles in [meshes::soup(20_000, 3), meshes::torus(150, 100), meshes::threefold(meshes::cube(9, 0.0))] {
+        let mut scene = scenes::empty();
+        scenes::add(&mut scene, triangles, scenes::BLACK);
+        assert!(check(scene, options(64, 48)) > 0);
+    }
+}
+
+/// Triangles of some 25 pixels, so that a workgroup has more tests than fit at once.
+#[test]
+fn shows_all_pixels_of_a_workgroups_triangles() {
+    let mut scene = scenes::empty();
+    let corner = |i: usize, j: usize| vec3(i as f32 / 8.0 - 2.0, j as f32 / 8.0 - 2.0, (i + j) as f32 * 0.01);
+    let square = |(i, j)| {
+        [
+            meshes::triangle(corner(i, j), corner(i + 1, j), corner(i, j + 1)),
+            meshes::triangle(corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)),
+        ]
+    };
+    let squares = (0..32).flat_map(|i| (0..32).map(move |j| (i, j)));
+    scenes::add(&mut scene, squares.flat_map(square).collect(), scenes::BLACK);
+    assert!(check(scene, options(200, 200)) > 30_000);
+}
+
+/// Slivers across the picture have blocks of which most are empty, and together more than there are workgroups.
+#[test]
+fn shows_all_blocks_of_large_triangles() {
+    let (width, height) = (160, 120);
+    let n_blocks = 5 * 4;
+    let n_slivers = RASTER_GROUPS_X * RASTER_GROUPS_Y / n_blocks + 2000;
+    let mut random = Random(31);
+    let mut scene = scenes::empty();
+    let sliver = |_| {
+        let [x, y] = [0; 2].map(|_| random.between(-0.3, 0.3));
+        let (a, b) = (vec3(-4.0 + x, -3.0 + y, y), vec3(4.0 + y, 3.0 + x, x));
+        meshes::triangle(a, b, b + vec3(0.001, 0.0, 0.0))
+    };
+    scenes::add(&mut scene, (0..n_slivers).map(sliver).collect(), scenes::BLACK);
+    assert!(check(scene, options(width, height)) > 500);
+}
+
+#[test]
+fn a_window_shows_its_part() {
+    for (x0, y0, x1, y1) in [(0, 0, 1, 1), (30, 20, 51, 48), (63, 47, 64, 48), (0, 9, 64, 10)] {
+        let crop = Some(Crop { x0, y0, x1, y1 });
+        check(scenes::mixed(), RenderOptions { crop, ..options(64, 48) });
+    }
+}
+
+#[test]
+fn nothing_is_shown_of_an_empty_scene() {
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, Vec::new(), scenes::BLACK);
+    check(scene, options(9, 7));
+}
+
+#[test]
+fn a_device_without_wide_atomics_is_told_so() {
+    let context = Context::without_wide_atomics(&ContextOptions::default()).expect("a device");
+    let scene = scenes::mixed();
+    let options = RenderOptions { primary: Primary::Compute, ..options(9, 7) };
+    let tree = crate::support::World::new(scene.triangles.clone()).tree;
+    match Renderer::new(context, &scene, &tree, &options).err() {
+        Some(GpuError::Lacks { missing, .. }) => assert_eq!(missing, "shaderBufferInt64Atomics"),
+        other => panic!("{other:?}"),
+    }
+}
