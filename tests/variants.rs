@@ -12,8 +12,8 @@ use kdray::{
     gpu::{Access, Context, ContextOptions, GpuError},
     kdtree::{BuildOptions, KdTree},
     layout::{
-        BRUTE_MAX_TRIANGLES, Batch, Bounce, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_LIT, LIGHT_POINT,
-        LIGHT_SHADOWED, LIGHT_UNTESTED, Light, NO_TRIANGLE, Ray, Triangle,
+        BRUTE_MAX_TRIANGLES, Batch, Bounce, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_LIT, LIGHT_POINT, LIGHT_SHADOWED,
+        LIGHT_UNTESTED, Light, NO_TRIANGLE, Ray, Triangle,
     },
     passes::{Passes, Resources},
     render::Renderer,

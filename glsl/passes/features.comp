@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Features: one invocation a primary ray notes what its pixel shows, for other uses than light.
-// Reads rays, hits and the scene; writes pixel_features, all but n_rays and n_steps.
+// Reads hits and the scene; writes pixel_features, all but n_rays and n_steps.
 #include "layout.glsl"
 #include "rays.glsl"
 #include "scene.glsl"

@@ -18,7 +18,7 @@ impl Features {
         Ok(Self { kernel: kernel(context, bindings, "features", spirv!("features.comp"), &[])? })
     }
 
-    /// Needs rays, hits of primary rays, pixel_features (cleared). Leaves pixel_features, all but the counts.
+    /// Needs hits of camera rays, pixel_features (cleared). Leaves pixel_features, all but the counts.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, Some(batch.depth), batch, dispatch);

@@ -1,4 +1,4 @@
-//! Primary hit (the paper's section 2.2): camera rays, and their hits with the planes of the rasterized triangles.
+//! Primary hit (the paper's section 2.2): the hits of camera rays with the planes of the rasterized triangles.
 
 use std::sync::Arc;
 
@@ -26,7 +26,7 @@ impl PrimaryHit {
         Ok(Self { kernel: kernel(context, bindings, "primary_hit", spirv!("primary_hit.comp"), &constants)? })
     }
 
-    /// Needs triangle_ids, or pixel_nearest. Leaves rays and hits; updates counters, and pixel_features where the options ask for them.
+    /// Needs triangle_ids, or pixel_nearest. Leaves hits; updates counters, and pixel_features where the options ask for them.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, Some(batch.depth), batch, dispatch);

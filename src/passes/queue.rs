@@ -9,7 +9,8 @@ use crate::{
 
 /// Room for `queue_capacity` rays, those of all bounces of a batch, and what belongs to each.
 pub struct Queue {
-    /// Bounce after bounce; `queue_capacity`, like what follows but for the last two.
+    /// Bounce after bounce; `queue_capacity`, like what follows but for the last two. The camera's, which come first, are never
+    /// stored: kernels make them anew from their places (glsl/shared/rays.glsl).
     pub rays: Buffer<Ray>,
     pub hits: Buffer<Hit>,
     pub child_kinds: Buffer<u32>,

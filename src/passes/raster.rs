@@ -30,6 +30,11 @@ impl Raster {
         })
     }
 
+    /// Whether a device binds what so many triangles take here.
+    pub fn has_room(context: &Context, n_triangles: usize) -> bool {
+        (n_triangles as u64).saturating_mul(size_of::<LargeTriangle>() as u64) <= context.limits().storage_range
+    }
+
     /// Whether there is room where the options ask for it, and none where they do not.
     pub fn fits(&self, n_triangles: u32, options: &RenderOptions) -> bool {
         let has_room = self.large_triangles.len() == n_triangles as usize;

@@ -18,7 +18,7 @@ impl Resolve {
         Ok(Self { kernel: kernel(context, bindings, "resolve", spirv!("resolve.comp"), &[])? })
     }
 
-    /// Needs rays, ray_radiance, first_children of all the batch's bounces. Leaves pixel_radiance.
+    /// Needs ray_radiance, first_children of all the batch's bounces. Leaves pixel_radiance.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, None, batch, dispatch);

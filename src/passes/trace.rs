@@ -12,7 +12,7 @@ use crate::{
 /// The pass's kernels.
 pub struct Trace {
     kernel: ComputePipeline,
-    /// Makes its rays itself; none where the rasterizer finds their hits.
+    /// Of camera rays; none where the rasterizer finds their hits.
     from_camera: Option<ComputePipeline>,
 }
 
@@ -31,7 +31,7 @@ impl Trace {
         Ok(Self { kernel: from(false)?, from_camera })
     }
 
-    /// Needs rays. Leaves hits, on the first level camera rays, too, where they are traced; updates counters, and pixel_features where the options ask for them.
+    /// Needs rays, but for the camera's. Leaves hits; updates counters, and pixel_features where the options ask for them.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         let of_camera = self.from_camera.as_ref().filter(|_| batch.depth == 0);
         commands.dispatch(of_camera.unwrap_or(&self.kernel), Some(batch.depth), batch, resources.trace_dispatch(batch));

@@ -19,7 +19,7 @@ use crate::{
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     kdtree::KdTree,
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
-    passes::{Passes, Resources},
+    passes::{Passes, Raster, Resources},
     scene::{Camera, Scene},
 };
 
@@ -71,10 +71,10 @@ impl Renderer {
 
     /// The primary rays that a device finds soonest in a picture of that size.
     pub fn suited_primary(context: &Context, n_triangles: usize, size: (u32, u32)) -> Primary {
-        if context.is_software() {
+        if context.runs_both_sides() {
             // Mesa's lavapipe: 870,000 triangles in 66 ms, 790,000 rays in 750 (benches/EXPERIMENTS.md).
             Primary::suited_to(n_triangles, size, 8)
-        } else if context.has_wide_atomics() {
+        } else if context.has_wide_atomics() && Raster::has_room(context, n_triangles) {
             Primary::Compute
         } else {
             Primary::suited_to(n_triangles, size, 1)
@@ -255,7 +255,7 @@ impl Renderer {
         } else {
             passes.trace.record(commands, resources, batch);
         }
-        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // hits, counters, rays of the camera
+        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // hits, counters
         if batch.depth == 0 && self.options.features {
             passes.features.record(commands, batch);
             commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_features

@@ -9,7 +9,7 @@ use kdray::{
     frame::{Primary, RenderOptions, Traversal},
     gpu::{Buffer, BufferUse, Context, ContextOptions, GpuError},
     kdtree::KdTree,
-    layout::{Frame, KdBox},
+    layout::{Frame, KdBox, LargeTriangle},
     passes::Tree,
     render::Renderer,
     scene::Scene,
@@ -73,6 +73,29 @@ fn a_scene_larger_than_what_the_device_binds_gives_the_same_bits() {
     }
     assert_silent(&any);
     assert_silent(&small);
+}
+
+/// What kernels that rasterize note of large triangles is bound; the triangles need not be.
+#[test]
+fn triangles_that_are_not_bound_are_rasterized() {
+    let ((scene, tree), any) = (large_scene(), device());
+    if !any.has_wide_atomics() {
+        return;
+    }
+    let options = RenderOptions { primary: Primary::Compute, ..options(24, 16, 2) };
+    let n_bytes = (scene.triangles.len() * size_of::<LargeTriangle>()) as u64;
+    let with_range = |bytes| {
+        let context = Context::with_storage_range(&ContextOptions { device: None, validate: true }, bytes);
+        Renderer::new(context.expect("a device with validation"), &scene, &tree, &options)
+    };
+    let mut by_address = with_range(n_bytes).expect("a renderer");
+    assert!(by_address.resources().tree.is_by_address());
+    let mut bound = Renderer::new(any.clone(), &scene, &tree, &options).expect("a renderer");
+    let pictures = [&mut bound, &mut by_address].map(|renderer| renderer.render().expect("a frame").0);
+    assert!(identical(&pictures[0], &pictures[1]));
+    let too_small = with_range(n_bytes - 1).err().expect("no room").to_string();
+    assert!(too_small.starts_with("`large_triangles` takes"), "{too_small}");
+    assert_silent(&any);
 }
 
 #[test]

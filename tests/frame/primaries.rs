@@ -7,13 +7,14 @@ use kdray::{
     camera::frame_constants,
     cpu::{bindings::Bindings, primary_hit::camera_ray, traverser::Traverser},
     frame::{Crop, Picture, Primary, RenderOptions},
+    gpu::{Context, ContextOptions},
     kdtree::KdTree,
     layout::Frame,
     render::Renderer,
     scene::Scene,
 };
 
-use super::studio::{assert_silent, device, differing, on_cpu, on_device, options, tree_of};
+use super::studio::{assert_silent, device, differing, identical, on_cpu, on_device, options, tree_of};
 use crate::support::scenes;
 
 /// Whether rays within 1/8 px of the pixel's centre meet more than one triangle. (Corners are snapped to a grid of
@@ -51,7 +52,7 @@ fn raster_and_trace_differ_only_on_edges() {
         for (name, render) in [("device", on_device as fn(&_, &_) -> _), ("cpu", on_cpu)] {
             let (a, b) = (render(&scene, &raster), render(&scene, &trace));
             let (n_differing, wrong) = off_edges(&scene, &raster, &a, &b);
-            assert_eq!(wrong, [], "{name}, {max_depth} levels");
+            assert_eq!(wrong, [0usize; 0], "{name}, {max_depth} levels");
             assert!(n_differing <= a.radiance.len() / 50, "{name}: {n_differing} pixels differ");
         }
     }
@@ -81,8 +82,21 @@ fn compute_and_trace_are_the_same() {
         [(&trace, 1, 1 << 20), (&RenderOptions { crop, ..trace.clone() }, 3, 1 << 20), (&trace, 2, 4000)]
     {
         let [compute, trace] = compute_and_trace(options, n_samples, capacity);
-        assert_eq!(differing(&compute, &trace, 0.0), [], "{n_samples} samples, room for {capacity} rays");
+        assert!(identical(&compute, &trace), "{n_samples} samples, room for {capacity} rays");
     }
+}
+
+/// What takes less work, and what there is room for. A device that takes branches lane by lane is taken for a GPU.
+#[test]
+fn primaries_suit_the_device() {
+    let gpu = Context::with_lanes(&ContextOptions::default(), 1000).expect("a device");
+    let suited = |n_triangles| Renderer::suited_primary(&gpu, n_triangles, (100, 80));
+    let by_kernels = if gpu.has_wide_atomics() { Primary::Compute } else { Primary::Trace };
+    assert_eq!([suited(8001), suited(usize::MAX)], [by_kernels, Primary::Trace]);
+    let without = Context::without_wide_atomics(&ContextOptions::default()).expect("a device");
+    let n_raster = if without.runs_both_sides() { 8 * 8000 } else { 8000 };
+    let suited = [n_raster, n_raster + 1].map(|n| Renderer::suited_primary(&without, n, (100, 80)));
+    assert_eq!(suited, [Primary::Raster, Primary::Trace]);
 }
 
 /// A living renderer makes room for what another way needs.

@@ -53,9 +53,8 @@ impl Stage {
         let context = Context::new(&ContextOptions { device: None, validate: true }).expect("a device with validation");
         let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
         let constants = Frame { queue_capacity: capacity, ..frame_constants(&scene, &tree, &options) };
-        let mut resources =
-            Resources::new(&context, &scene, &tree, &constants, &options, constants.max_depth as usize)
-                .expect("resources");
+        let mut resources = Resources::new(&context, &scene, &tree, &constants, &options, constants.max_depth as usize)
+            .expect("resources");
         resources.add_extras(&context, &tree, options.traversal).expect("extras");
         let extras = Extras::new(&tree, options.traversal);
         let passes = Passes::new(&context, &resources.bindings, &options).expect("passes");

@@ -103,18 +103,13 @@ impl Arena {
             contenders.push(Box::new(Kernel::new(&self.context, &self.bindings, &resources, (variant, query))?));
         }
         let rasterizes = set.kind == RayKind::Primary;
-        let trials =
-            hold(
-                &self.context,
-                &contenders,
-                n_times,
-                |n_rounds| {
-                    let rasters = if rasterizes { &mut self.rasters[..] } else { &mut [] };
-                    rasters.iter_mut().try_for_each(|raster| raster.draw(n_rounds))
-                },
-            )?;
+        let trials = hold(&self.context, &contenders, n_times, |n_rounds| {
+            let rasters = if rasterizes { &mut self.rasters[..] } else { &mut [] };
+            rasters.iter_mut().try_for_each(|raster| raster.draw(n_rounds))
+        })?;
         let set = SetResult::new(set.kind, &trials);
-        let rasters = if rasterizes { self.rasters.iter().map(|raster| raster.result(&set)).collect() } else { Vec::new() };
+        let rasters =
+            if rasterizes { self.rasters.iter().map(|raster| raster.result(&set)).collect() } else { Vec::new() };
         Ok((set, rasters))
     }
 }

@@ -144,7 +144,10 @@ fn check_hits(report: &Report) -> Result<(), CliError> {
 #[cfg(test)]
 mod tests {
     use kdray::{
-        bench::{Spread, driver::{contest::Trial, report::PassSpread}},
+        bench::{
+            Spread,
+            driver::{contest::Trial, report::PassSpread},
+        },
         cast::Hit,
         kdtree::KdTree,
     };
@@ -182,7 +185,12 @@ mod tests {
             t_tolerance: T_TOLERANCE,
             builds: Builds { tree_ms: 1234.5, n_threads: 2, bvh_ms: ms(1.5), n_bvh_builds: 5 },
             raster: vec![
-                RasterResult::new("raster".to_owned(), vec![pass("visibility", 0.5), pass("primary_hit", 1.5)], ms(2.0), &sets[0]),
+                RasterResult::new(
+                    "raster".to_owned(),
+                    vec![pass("visibility", 0.5), pass("primary_hit", 1.5)],
+                    ms(2.0),
+                    &sets[0],
+                ),
                 RasterResult::new("compute".to_owned(), Vec::new(), ms(1.0), &sets[0]),
             ],
             sets: sets.to_vec(),
