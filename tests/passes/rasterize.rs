@@ -1,7 +1,9 @@
 //! Rasterize against the kd-tree: what it finds is what camera rays hit, to the last bit.
 
-use glam::{Vec3, vec3};
+use glam::{Vec3, uvec2, vec3};
 use kdray::{
+    camera::frame_constants,
+    cpu::primary_hit::camera_ray,
     frame::{Crop, Primary, RenderOptions},
     gpu::{Access, Commands, Context, ContextOptions, GpuError},
     layout::{Batch, Hit, RASTER_GROUPS_X, RASTER_GROUPS_Y, Triangle},
@@ -11,7 +13,7 @@ use kdray::{
 };
 
 use super::stage::{FIRST, Stage, options};
-use crate::support::{compare, meshes, random::Random, scenes};
+use crate::support::{World, compare, meshes, random::Random, scenes};
 
 /// A stage whose kernels rasterize, and the pass that traces the same rays.
 struct View {
@@ -124,6 +126,30 @@ fn shows_what_camera_rays_hit_of_small_triangles() {
     }
 }
 
+/// Slivers so thin that rounding decides from which side they are seen, through the very samples that the rays go through.
+#[test]
+fn shows_what_camera_rays_hit_of_slivers() {
+    let (options, mut random) = (options(64, 48), Random(41));
+    let mut scene = scenes::empty();
+    let tree = World::new(Vec::new()).tree;
+    let frame = frame_constants(&scene, &tree, &options);
+    let mut sliver = || {
+        let pixel = uvec2(random.below(64) as u32, random.below(48) as u32);
+        let ray = camera_ray(&frame, pixel);
+        let across = ray.direction.cross(random.direction()).normalize();
+        // Some 6 pixels long.
+        let at = |random: &mut Random, share: f32| {
+            let along = ray.direction + share * across * random.between(0.0, 0.04);
+            frame.eye + along * random.between(2.0, 6.0)
+        };
+        let (a, b) = (at(&mut random, 1.0), at(&mut random, -1.0));
+        let width = 10f32.powf(random.between(-8.0, -3.0));
+        meshes::triangle(a, b, a + width * random.direction())
+    };
+    scenes::add(&mut scene, (0..20_000).map(|_| sliver()).collect(), scenes::BLACK);
+    assert!(check(scene, options) > 1000);
+}
+
 /// Triangles of some 25 pixels, so that a workgroup has more tests than fit at once.
 #[test]
 fn shows_all_pixels_of_a_workgroups_triangles() {
@@ -177,7 +203,7 @@ fn a_device_without_wide_atomics_is_told_so() {
     let context = Context::without_wide_atomics(&ContextOptions::default()).expect("a device");
     let scene = scenes::mixed();
     let options = RenderOptions { primary: Primary::Compute, ..options(9, 7) };
-    let tree = crate::support::World::new(scene.triangles.clone()).tree;
+    let tree = World::new(scene.triangles.clone()).tree;
     match Renderer::new(context, &scene, &tree, &options).err() {
         Some(GpuError::Lacks { missing, .. }) => assert_eq!(missing, "shaderBufferInt64Atomics"),
         other => panic!("{other:?}"),
