@@ -57,17 +57,38 @@ fn is_as_cheap_as_a_plain_exact_build() {
     }
 }
 
+/// Planes between bins: another tree, little worse, and the same where cells are too small for bins.
+#[test]
+fn is_nearly_as_cheap_without_exact_planes() {
+    let mut n_same = 0;
+    for (name, triangles) in all_meshes() {
+        let exact = BuildOptions::default();
+        let fast = BuildOptions { exact_planes: false, ..exact.clone() };
+        let trees = [&exact, &fast].map(|options| build(&triangles, options));
+        let [cost, fast_cost] = [&trees[0], &trees[1]].map(|tree| tree.statistics(triangles.len(), &exact).sah_cost);
+        println!("{name}: {cost:.4}, {fast_cost:.4}");
+        assert!(fast_cost <= cost * 1.05, "{name}: {fast_cost} against {cost}");
+        n_same += usize::from(trees[0] == trees[1]);
+    }
+    assert!(n_same < all_meshes().len() / 2);
+    let few = soup(32, 0.5, 12);
+    let [exact, fast] = [true, false].map(|exact_planes| BuildOptions { exact_planes, ..Default::default() });
+    assert_eq!(build(&few, &exact), build(&few, &fast));
+}
+
 #[test]
 fn is_the_same_on_any_number_of_threads() {
     // Large enough for parallel counting, sorting and partition.
     let triangles = [sphere(180), terrain(120), soup(3000, 0.2, 4)].concat();
-    let build_with = |n_threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().expect("threads");
-        pool.install(|| build(&triangles, &BuildOptions::default()))
-    };
-    let first = build_with(1);
-    for n_threads in [1, 2, 4] {
-        assert_eq!(build_with(n_threads), first, "{n_threads} threads");
+    for options in [BuildOptions::default(), BuildOptions::fast()] {
+        let build_with = |n_threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().expect("threads");
+            pool.install(|| build(&triangles, &options))
+        };
+        let first = build_with(1);
+        for n_threads in [1, 2, 4] {
+            assert_eq!(build_with(n_threads), first, "{n_threads} threads");
+        }
     }
 }
 
@@ -110,11 +131,11 @@ fn survives_any_finite_input() {
         ("large soup", soup(3000, 2.0, 10)),
     ];
     for (name, triangles) in inputs {
-        let tree = build(&triangles, &BuildOptions::default());
-        println!(
-            "{name}: {}",
-            serde_json::to_string(&tree.statistics(triangles.len(), &BuildOptions::default())).unwrap()
-        );
+        for options in [BuildOptions::default(), BuildOptions::fast()] {
+            let tree = build(&triangles, &options);
+            let statistics = tree.statistics(triangles.len(), &options);
+            println!("{name}: {}", serde_json::to_string(&statistics).unwrap());
+        }
     }
 }
 

@@ -70,7 +70,13 @@ impl BinnedSearch {
         let n_bins = (references.len() / 4).next_power_of_two().clamp(32, MAX_BINS);
         let bins = [0, 1, 2].map(|axis| Shares::new(cell, axis, options).map(|shares| Bins::new(shares, n_bins)));
         self.count(references, &bins, n_bins);
-        let mut limit = self.upper_bound(references.len() as u32, &bins, n_bins);
+        let edge = self.best_edge(references.len() as u32, &bins, n_bins);
+        if !options.exact_planes
+            && let Some(split) = edge.split(references, &bins, n_bins)
+        {
+            return split;
+        }
+        let mut limit = edge.weight;
         loop {
             let n_flagged = self.flag(limit, &bins, n_bins);
             if n_flagged == 0 {
@@ -108,9 +114,9 @@ impl BinnedSearch {
         });
     }
 
-    /// Turns counts into sums, and returns the least weight at an edge between two bins.
-    fn upper_bound(&mut self, n: u32, bins: &[Option<Bins>; 3], n_bins: usize) -> f32 {
-        let mut least = f32::INFINITY;
+    /// Turns counts into sums, and returns the edge of the least weight.
+    fn best_edge(&mut self, n: u32, bins: &[Option<Bins>; 3], n_bins: usize) -> Edge {
+        let mut best = Edge { axis: 0, bin: 0, weight: f32::INFINITY };
         for (axis, bins) in bins.iter().enumerate() {
             let Some(Bins { shares, .. }) = bins else { continue };
             let (below, above) = (&mut self.n_below[axis], &mut self.n_above[axis]);
@@ -121,13 +127,13 @@ impl BinnedSearch {
                 (below[bin], above[bin]) = (n_below, n_above);
                 (n_below, n_above) = (n_below + begins, n_above - ends);
                 let weight = shares.weight((bin as f32 + 0.5) * per_bin, n_below as f32, n_above as f32);
-                if bin + 1 < n_bins && weight < least {
-                    least = weight;
+                if bin + 1 < n_bins && weight < best.weight {
+                    best = Edge { axis, bin, weight };
                 }
             }
             (below[n_bins], above[n_bins]) = (n_below, n_above);
         }
-        least
+        best
     }
 
     /// Flags the bins that may hold a weight up to `limit`, and returns their number.
@@ -193,6 +199,38 @@ impl BinnedSearch {
         }
         best
     }
+}
+
+/// Where a bin ends and the next one begins.
+struct Edge {
+    axis: usize,
+    bin: usize,
+    weight: f32,
+}
+
+impl Edge {
+    /// The plane there; none where it does not lie inside the cell.
+    fn split(&self, references: &[Reference], bins: &[Option<Bins>; 3], n_bins: usize) -> Option<Split> {
+        let shares = bins[self.axis]?.shares;
+        let fraction = (self.bin as f32 + 0.5) / (n_bins - 1) as f32;
+        let position = shares.min + fraction / shares.per_extent;
+        let is_inside = self.weight < f32::INFINITY && position > shares.min && position < shares.max;
+        // A position is binned with rounding: which side it lies on is for the plane itself to say.
+        is_inside.then(|| shares.split(position, count_sides(references, self.axis, position)))
+    }
+}
+
+/// References that reach below and above a plane.
+fn count_sides(references: &[Reference], axis: usize, position: f32) -> [u32; 2] {
+    let count = |references: &[Reference]| {
+        references.iter().fold([0; 2], |[below, above], Reference { bounds, .. }| {
+            [below + u32::from(bounds.min[axis] < position), above + u32::from(bounds.max[axis] > position)]
+        })
+    };
+    if references.len() <= CHUNK {
+        return count(references);
+    }
+    references.par_chunks(CHUNK).map(count).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
 }
 
 /// The begin or end of a triangle's bounds on an axis, as a number that sorts by axis and position.

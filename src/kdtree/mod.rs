@@ -80,6 +80,9 @@ pub struct BuildOptions {
     pub max_depth: Option<u32>,
     /// No more references than this many times the triangles, plus 1024; a leaf for all of them always fits.
     pub max_references_per_triangle: u32,
+    /// Whether cells of more than 32 references are split at the very best end of a triangle; else at the best of up to 1023 planes
+    /// on each axis, which are found sooner.
+    pub exact_planes: bool,
     /// Whether nodes get slabs, which the CPU and GPUs make use of, software drivers not; some 200 ns a reference.
     pub slabs: bool,
 }
@@ -94,6 +97,7 @@ impl Default for BuildOptions {
             empty_bonus: 0.0,
             max_depth: None,
             max_references_per_triangle: 16,
+            exact_planes: true,
             slabs: true,
         }
     }
@@ -103,7 +107,7 @@ impl BuildOptions {
     /// A tree of a fifth of the nodes and without slabs, built in half of the time. Rays take up to a tenth longer on the CPU,
     /// up to twice as long on a GPU.
     pub fn fast() -> Self {
-        Self { intersection_cost: 0.15, slabs: false, ..Self::default() }
+        Self { intersection_cost: 0.15, exact_planes: false, slabs: false, ..Self::default() }
     }
 
     /// Levels below the root that the tree may have.
