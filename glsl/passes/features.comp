@@ -6,9 +6,9 @@
 #include "rays.glsl"
 #include "scene.glsl"
 #include "surface.glsl"
+#include "material.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
-layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 

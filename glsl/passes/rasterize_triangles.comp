@@ -6,6 +6,7 @@
 #include "layout.glsl"
 #include "rasterize.glsl"
 #include "footprint.glsl"
+#include "covered.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 
@@ -18,59 +19,6 @@ shared uint tests[N_TESTS];
 shared uint n_tests;
 // Of each triangle's rectangle, the window's first pixel, x in the lower half.
 shared uint first_pixels[RAY_GROUP_SIZE];
-
-// The pixels of a row that a triangle may cover lie between the lines of its edges, x = at_first + y * step on row y. An edge
-// ends a row or begins it, and in the other bound has an infinity.
-struct EdgeLines {
-    vec3 low_at_first;
-    vec3 low_step;
-    vec3 high_at_first;
-    vec3 high_step;
-};
-
-const float FAR = 1e9;
-
-// Corners from the rectangle's first pixel.
-EdgeLines edge_lines(vec2 a, vec2 b, vec2 c, float slack) {
-    vec3 along_x = vec3(b.x - a.x, c.x - b.x, a.x - c.x);
-    vec3 along_y = vec3(b.y - a.y, c.y - b.y, a.y - c.y);
-    vec3 from_x = vec3(a.x, b.x, c.x), from_y = vec3(a.y, b.y, c.y);
-    float area = along_x.x * along_y.y - along_y.x * along_x.y;
-    vec3 spans = slack * (abs(along_x) + abs(along_y));
-    // A sliver has no side that is certain.
-    bool is_sliver = abs(area) <= 4.0 * (spans.x + spans.y + spans.z);
-    float side = area < 0.0 ? -1.0 : 1.0;
-    // Twice the area that an edge spans with a pixel is at_first + x * step_x + y * step_y, and not below 0 if it is covered.
-    vec3 step_x = -side * along_y, step_y = side * along_x;
-    vec3 at_first = side * (along_y * from_x - along_x * from_y) + spans;
-    // An edge along the row: beyond all pixels on one side of it, before all on the other.
-    step_x = mix(step_x, vec3(1e-6), lessThan(abs(step_x), vec3(1e-6)));
-    vec3 crossing = -at_first / step_x, step = -step_y / step_x;
-    bvec3 is_low = greaterThan(step_x, vec3(0.0)), is_high = not(is_low);
-    if (is_sliver) is_low = is_high = bvec3(false);
-    return EdgeLines(
-        mix(vec3(-FAR), crossing, is_low), mix(vec3(0.0), step, is_low),
-        mix(vec3(FAR), crossing, is_high), mix(vec3(0.0), step, is_high)
-    );
-}
-
-// Of a row of the rectangle, from `first` on: as bits, from the lowest on.
-uint covered_of_row(EdgeLines lines, float y, float width) {
-    vec3 low = lines.low_at_first + y * lines.low_step, high = lines.high_at_first + y * lines.high_step;
-    float first = clamp(ceil(max(low.x, max(low.y, low.z))), 0.0, width);
-    float end = clamp(floor(min(high.x, min(high.y, high.z))) + 1.0, first, width);
-    return bitfieldInsert(0u, 0xffffffffu, int(first), int(end - first));
-}
-
-// Of a rectangle of RASTER_SMALL pixels at the most, row by row.
-uvec2 covered_of(Rectangle rectangle, EdgeLines lines) {
-    uint64_t bits = uint64_t(0);
-    uint n = 0u;
-    for (uint y = 0u; y < rectangle.size.y; ++y, n += rectangle.size.x) {
-        bits |= uint64_t(covered_of_row(lines, float(y), float(rectangle.size.x))) << n;
-    }
-    return unpackUint2x32(bits);
-}
 
 // The pixels of one invocation's triangle that are still to be tested, and the place of the first one among all tests.
 struct Pending {
@@ -148,7 +96,7 @@ Pending rasterize(Triangle triangle, uint triangle_ix) {
         return nothing_pending();
     }
     vec2 first = vec2(rectangle.first);
-    return pending_of(rectangle, covered_of(rectangle, edge_lines(a_px - first, b_px - first, c_px - first, bounds.slack)));
+    return pending_of(rectangle, covered_of(rectangle.size, edge_lines(a_px - first, b_px - first, c_px - first, bounds.slack)));
 }
 
 void main() {

@@ -17,7 +17,6 @@
 layout(constant_id = 0) const bool COUNTS = true;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
-layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
 layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
@@ -38,7 +37,7 @@ vec3 radiance_of(Ray ray, uint ray_ix) {
     Hit hit = hits[ray_ix];
     if (hit.triangle_ix == NO_TRIANGLE) return ray.throughput * frame.background;
     Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
-    return ray.throughput * local_radiance(ray, ray_ix, surface, materials[triangle_material_at(hit.triangle_ix)]);
+    return ray.throughput * local_radiance(ray, ray_ix, surface, material_at(hit));
 }
 
 // Adds the ray's shadow segments to those of its bounce.

@@ -16,7 +16,6 @@ layout(constant_id = 3) const bool COUNT_COSTS = false;
 #include "material.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
-layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
 layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) writeonly buffer LightVisibilityBlock { uint light_visibility[]; };
@@ -28,8 +27,7 @@ bool shadow_segment(Ray ray, Hit hit, Light light, out Ray segment) {
     Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
     LightSample to_light = sample_light(light, surface.point_world);
     if (!(dot(surface.geometric, to_light.direction) > 0.0)) return false;
-    Material material = materials[triangle_material_at(hit.triangle_ix)];
-    if (!can_show(material, surface.shading, -ray.direction, to_light.direction)) return false;
+    if (!can_show(material_at(hit), surface.shading, -ray.direction, to_light.direction)) return false;
     segment = ray_from(surface, to_light.direction, hit.triangle_ix, ray, vec3(0.0));
     segment.t_max = to_light.distance;
     return true;

@@ -7,12 +7,6 @@
 #include "surface.glsl"
 #include "material.glsl"
 
-layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
-
-Material material_at(Hit hit) {
-    return materials[triangle_material_at(hit.triangle_ix)];
-}
-
 bool carries_light(Ray ray, vec3 weight) {
     return any(greaterThan(ray.throughput * weight, vec3(0.0)));
 }

@@ -3,7 +3,15 @@
 #define KDRAY_MATERIAL
 
 #include "layout.glsl"
+#include "scene.glsl"
 #include "surface.glsl"
+
+layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
+
+// Of what the ray has hit.
+Material material_at(Hit hit) {
+    return materials[triangle_material_at(hit.triangle_ix)];
+}
 
 // Where light goes on from a surface, and what share of it. A weight of zero: no ray.
 struct Scattering {

@@ -55,9 +55,9 @@ fn block_log2(constants: &Frame) -> u32 {
     (SMALLEST_BLOCK_LOG2..16).find(|&log2| u32::try_from(n_blocks(log2)).is_ok()).unwrap_or(16)
 }
 
-/// One invocation a triangle, in rows of as many workgroups as any device takes.
+/// One invocation a triangle, in rows of workgroups, since a device need not take more than 65,535 in one.
 fn groups_for(n_triangles: u32) -> Dispatch<'static> {
-    const GROUPS_OF_ROW: u32 = 1 << 15;
+    const GROUPS_OF_ROW: u32 = 1 << 10;
     let n_groups = n_triangles.div_ceil(RAY_GROUP_SIZE);
     Dispatch::Threads([n_groups.min(GROUPS_OF_ROW), n_groups.div_ceil(GROUPS_OF_ROW), 1], [1, 1, 1])
 }

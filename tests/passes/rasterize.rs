@@ -116,10 +116,10 @@ fn shows_what_camera_rays_hit_amid_triangles() {
     }
 }
 
-/// Far more triangles than pixels, and triangles that no pixel's sample lies in.
+/// Far more triangles than pixels, triangles that no pixel's sample lies in, and more than one row of workgroups.
 #[test]
 fn shows_what_camera_rays_hit_of_small_triangles() {
-    for triangles in [meshes::soup(20_000, 3), meshes::torus(150, 100), meshes::threefold(meshes::cube(9, 0.0))] {
+    for triangles in [meshes::soup(20_000, 3), meshes::torus(300, 120), meshes::threefold(meshes::cube(9, 0.0))] {
         let mut scene = scenes::empty();
         scenes::add(&mut scene, triangles, scenes::BLACK);
         assert!(check(scene, options(64, 48)) > 0);
