@@ -148,7 +148,22 @@ impl Commands<'_> {
 
     /// Runs a kernel with the bound set, as a pass of its name and of a bounce, if it belongs to one.
     pub fn dispatch(&self, pipeline: &ComputePipeline, bounce: Option<u32>, push: &impl Pod, dispatch: Dispatch) {
-        self.pass(pipeline.name, bounce, || self.launch(pipeline, push, dispatch));
+        self.dispatch_after(|| (), pipeline, bounce, push, dispatch);
+    }
+
+    /// As [`Commands::dispatch`], with transfers and barriers that are a part of the pass.
+    pub fn dispatch_after(
+        &self,
+        prepare: impl FnOnce(),
+        pipeline: &ComputePipeline,
+        bounce: Option<u32>,
+        push: &impl Pod,
+        dispatch: Dispatch,
+    ) {
+        self.pass(pipeline.name, bounce, || {
+            prepare();
+            self.launch(pipeline, push, dispatch);
+        });
     }
 
     fn launch(&self, pipeline: &ComputePipeline, push: &impl Pod, dispatch: Dispatch) {
@@ -288,18 +303,15 @@ impl Commands<'_> {
         unsafe { self.context.device.cmd_update_buffer(self.raw, destination.raw(), 0, bytes) };
     }
 
-    /// Fills a buffer with a word, as a pass of its own.
-    pub fn fill_pass(&self, name: &'static str, buffer: &AnyBuffer, word: u32) {
-        // SAFETY: the commands are being recorded, outside rendering.
-        self.pass(name, None, || unsafe {
-            self.context.device.cmd_fill_buffer(self.raw, buffer.raw(), 0, vk::WHOLE_SIZE, word);
-        });
-    }
-
     /// Fills a buffer with zeros.
     pub fn clear_buffer(&self, buffer: &AnyBuffer) {
+        self.fill_buffer(buffer, 0);
+    }
+
+    /// Fills a buffer with a word.
+    pub fn fill_buffer(&self, buffer: &AnyBuffer, word: u32) {
         // SAFETY: the commands are being recorded, outside rendering.
-        unsafe { self.context.device.cmd_fill_buffer(self.raw, buffer.raw(), 0, vk::WHOLE_SIZE, 0) };
+        unsafe { self.context.device.cmd_fill_buffer(self.raw, buffer.raw(), 0, vk::WHOLE_SIZE, word) };
     }
 
     /// Copies the first `bytes`.

@@ -31,15 +31,22 @@ impl Rasterize {
         })
     }
 
-    /// Needs nothing. Leaves pixel_nearest.
+    /// Leaves raster_groups and raster_count as `record` needs them, by transfers.
+    pub fn reset(commands: &Commands, resources: &Resources) {
+        let none = RasterGroups { x: RASTER_GROUPS_X, y: 0, z: 1, reserved: 0 };
+        commands.update_buffer(resources.raster.groups.any(), &none);
+        commands.update_buffer(resources.raster.count.any(), &0u64);
+    }
+
+    /// Needs what `reset` leaves. Leaves pixel_nearest.
     pub fn record(&self, commands: &Commands, resources: &Resources) {
         let (pixels, raster, constants) = (&resources.pixels, &resources.raster, resources.constants());
         let push = RasterPush { block_log2: block_log2(constants) };
-        commands.fill_pass("rasterize_clear", pixels.pixel_nearest.any(), u32::MAX);
-        commands.update_buffer(raster.groups.any(), &RasterGroups { x: RASTER_GROUPS_X, y: 0, z: 1, reserved: 0 });
-        commands.update_buffer(raster.count.any(), &0u64);
-        commands.barrier(Access::TransferWrite, Access::ComputeUpdate); // pixel_nearest, raster_groups, raster_count
-        commands.dispatch(&self.triangles, None, &push, groups_for(constants.n_triangles));
+        let clear = || {
+            commands.fill_buffer(pixels.pixel_nearest.any(), u32::MAX);
+            commands.barrier(Access::TransferWrite, Access::ComputeUpdate); // pixel_nearest
+        };
+        commands.dispatch_after(clear, &self.triangles, None, &push, groups_for(constants.n_triangles));
         commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_nearest, large_triangles, raster_count
         commands.barrier(Access::ComputeWrite, Access::IndirectRead); // raster_groups
         commands.dispatch(&self.blocks, None, &push, Dispatch::Indirect(raster.groups.any(), 0));

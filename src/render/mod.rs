@@ -19,7 +19,7 @@ use crate::{
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     kdtree::KdTree,
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
-    passes::{Passes, Raster, Resources},
+    passes::{Passes, Raster, Rasterize, Resources},
     scene::{Camera, Scene},
 };
 
@@ -228,7 +228,11 @@ impl Renderer {
         if self.options.features {
             commands.clear_buffer(self.resources.pixels.pixel_features.any());
         }
-        commands.barrier(Access::TransferWrite, Access::AllReads); // bounces, counters, pixel_features
+        if self.options.primary == Primary::Compute {
+            Rasterize::reset(commands, &self.resources);
+        }
+        // bounces, counters, pixel_features, raster_groups, raster_count
+        commands.barrier(Access::TransferWrite, Access::AllReads);
         if self.options.primary == Primary::Raster {
             self.passes.visibility.record(commands, &self.resources);
         } else {

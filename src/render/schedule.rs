@@ -43,8 +43,8 @@ impl Schedule {
             .flat_map(|batch| (0..max_depth).map(|depth| if depth == 0 { batch.n_pixels } else { 0 }))
             .map(|n_rays| Bounce::of(n_rays, constants))
             .collect();
-        // The widest bounce has 6 kernels, a batch's light 3; rasterize's three, accumulate, denoise and tonemap stand outside.
-        let n_passes = 6 + 3 * batches.len() as u32 + 6 * rows.len() as u32;
+        // The widest bounce has 6 kernels, a batch's light 3; rasterize's two, accumulate, denoise and tonemap stand outside.
+        let n_passes = 5 + 3 * batches.len() as u32 + 6 * rows.len() as u32;
         Ok(Self {
             first_bounces: Buffer::with(context, "first_bounces", &rows, BufferUse::Storage)?,
             timer: timed.then(|| Timer::new(context, n_passes)).transpose()?,

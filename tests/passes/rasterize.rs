@@ -7,7 +7,7 @@ use kdray::{
     frame::{Crop, Primary, RenderOptions},
     gpu::{Access, Commands, Context, ContextOptions, GpuError},
     layout::{Batch, Hit, RASTER_GROUPS_X, RASTER_GROUPS_Y, Triangle},
-    passes::{Passes, Trace},
+    passes::{Passes, Rasterize, Trace},
     render::Renderer,
     scene::{Camera, Scene},
 };
@@ -48,6 +48,8 @@ impl View {
     fn rasterized(&self) -> Vec<Hit> {
         let Stage { passes, resources, .. } = &self.stage;
         hits_by(&self.stage, |commands, batch| {
+            Rasterize::reset(commands, resources);
+            commands.barrier(Access::TransferWrite, Access::AllReads); // raster_groups, raster_count
             passes.rasterize.as_ref().expect("the options ask for it").record(commands, resources);
             commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_nearest
             passes.primary_hit.record(commands, batch);
