@@ -68,3 +68,15 @@ fn groups_for(n_triangles: u32) -> Dispatch<'static> {
     let n_groups = n_triangles.div_ceil(RAY_GROUP_SIZE);
     Dispatch::Threads([n_groups.min(GROUPS_OF_ROW), n_groups.div_ceil(GROUPS_OF_ROW), 1], [1, 1, 1])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_of_all_triangles_have_numbers() {
+        let of = |width, height, n_triangles| block_log2(&Frame { width, height, n_triangles, ..Frame::default() });
+        assert_eq!([of(1, 1, 1), of(1920, 1080, 810_092), of(3840, 2160, 810_092)], [5, 5, 6]);
+        assert_eq!([of(1920, 1080, 10_000_000), of(16_384, 16_384, 1 << 24), of(0, 0, 0)], [7, 11, 5]);
+    }
+}
