@@ -44,7 +44,7 @@ fn usage_mistakes_are_refused_before_the_scene_is_read() {
         (&["render", "none.toml", "--path", "p.toml", "-o", "x.png"], "####"),
         (&["render", "none.toml", "--path", "p.toml", "-o", "x#.#.png"], "more than one"),
         (&["render", "none.toml", "--traversal", "bvh"], "short-stack, "),
-        (&["render", "none.toml", "--primary", "rays"], "raster, trace"),
+        (&["render", "none.toml", "--primary", "rays"], "raster, compute, trace"),
         (&["render", "none.toml", "--threads", "0"], "--threads"),
         (&["render", "none.toml", "--cpu", "--device", "0"], "--device"),
         (&["render", "none.toml", "--device", ""], "--device"),
@@ -121,7 +121,9 @@ fn help_and_version() {
     for word in ["--spp", "--crop", "--aov", "linear, agx, aces", "--path"] {
         assert!(help.contains(word), "{word}");
     }
-    for word in ["--size", "--max-depth", "mask, mask-boxes, restart", "raster|trace", "paper", "--validate", "SCENE"] {
+    for word in
+        ["--size", "--max-depth", "mask, mask-boxes, restart", "raster|compute|trace", "paper", "--validate", "SCENE"]
+    {
         assert!(help.contains(word), "{word}");
     }
 }
