@@ -13,8 +13,7 @@
 #include "triangle.glsl"
 
 layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
-// Whether the device runs both sides of a branch for all lanes, as software drivers do. A slab, looked at before what is in
-// it, or a triangle's plane then spare nothing, and tests are best done leaf by leaf.
+// Whether the device runs both sides of a branch for all lanes, as software drivers do: lockstep.glsl.
 layout(constant_id = 4) const bool RUNS_BOTH_SIDES = false;
 
 struct Cell {
@@ -62,6 +61,16 @@ TraversalRay traversal_ray(Ray ray, float t_min) {
     r.t_enter = max(max(near.x, near.y), max(near.z, 0.5 * t_min));
     r.t_exit = min(min(far.x, far.y), min(far.z, 0.5 * ray.t_max));
     return r;
+}
+
+// Whether the ray comes into the root's cell at all.
+bool is_in(TraversalRay ray) {
+    return ray.t_enter <= ray.t_exit;
+}
+
+// The root.
+Cell whole(TraversalRay ray) {
+    return Cell(0u, 0u, ray.t_enter, ray.t_exit);
 }
 
 float largest_coordinate() {
@@ -117,10 +126,19 @@ float along_split(vec3 v, KdNode node) {
     return (node.axis_and_child & 2u) != 0u ? v.z : ((node.axis_and_child & 1u) != 0u ? v.y : v.x);
 }
 
+// Where a split's plane meets its axis. A leaf's number of an entry, which lanes that wait hold in lockstep, is no number to
+// compute with: denormal as a float, a product with it takes a hundred times as long. Its mask is made of its bits, since a
+// compiler takes away what asks for a leaf where a branch has asked before.
+float plane_of(KdNode node) {
+    const int LEAF_BIT = findMSB(KD_LEAF);
+    uint bits = node.split_or_first;
+    if (RUNS_BOTH_SIDES) bits &= ~uint(bitfieldExtract(int(node.axis_and_child), LEAF_BIT, 1));
+    return uintBitsToFloat(bits);
+}
+
 // Where the ray meets the split plane. `precise`: a traversal that comes the same way again must come to the same bits.
 float crossing(TraversalRay ray, KdNode node) {
-    float split = uintBitsToFloat(node.split_or_first);
-    precise float t = fma(split, along_split(ray.inv_direction, node), along_split(ray.bias, node));
+    precise float t = fma(plane_of(node), along_split(ray.inv_direction, node), along_split(ray.bias, node));
     return t;
 }
 
@@ -186,33 +204,51 @@ void take_pending(TraversalRay ray, inout Cell cell) {
     else marked_pop(ray, cell);
 }
 
-// Down to the leaf where the ray enters the cell, or to a slab that it keeps clear of, as if that were an empty leaf. A NaN
-// fails both tests and goes to the first child: it ends.
+// From a split to the child where the ray enters the cell. A NaN fails both tests and goes to the first child: it ends.
+KdNode step_down(TraversalRay ray, KdNode node, inout Cell cell) {
+    float t_cross = crossing(ray, node);
+    bool only_second = t_cross < cell.t_enter;
+    cell.depth += 1u;
+    cell.node_at = child_of(ray, node, only_second);
+    node = kd_node(cell.node_at);
+    if (!only_second && t_cross <= cell.t_exit) {
+        push_pending(cell);
+        cell.t_exit = t_cross;
+    }
+    return node;
+}
+
+// Down to the leaf where the ray enters the cell, or to a slab that it keeps clear of, as if that were an empty leaf.
 KdNode descend(TraversalRay ray, float t_best, inout Cell cell) {
     KdNode node = kd_node(cell.node_at);
     for (;;) {
-        while (is_open_split(node)) {
-            float t_cross = crossing(ray, node);
-            bool only_second = t_cross < cell.t_enter;
-            cell.depth += 1u;
-            cell.node_at = child_of(ray, node, only_second);
-            node = kd_node(cell.node_at);
-            if (!only_second && t_cross <= cell.t_exit) {
-                push_pending(cell);
-                cell.t_exit = t_cross;
-            }
-        }
+        while (is_open_split(node)) node = step_down(ray, node, cell);
         if (!has_slab(node)) return node;
         node = enter_slab(ray, t_best, cell, node);
     }
 }
 
-// A triangle against the ray; of two hits at one t the lower index wins, whatever the order of triangles.
+// Down to the leaf where the ray enters the cell, for lockstep.glsl.
+KdNode descend_in_step(TraversalRay ray, inout Cell cell) {
+    KdNode node = kd_node(cell.node_at);
+    while (!is_leaf(node)) {
+        node = step_down(ray, node, cell);
+        if (is_leaf(node)) break;
+    }
+    return node;
+}
+
+// Whether a hit is the ray's, and nearer than the best; of two hits at one t the lower index wins, whatever the order of triangles.
+bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
+    bool nearer = t < best.t || (t == best.t && triangle_ix < best.triangle_ix);
+    return t > ray.t_min && nearer && triangle_ix != ray.source_triangle;
+}
+
+// A triangle against the ray.
 void intersect(TraversalRay ray, uint triangle_ix, inout Nearest best) {
     Hit hit;
     if (!intersect_triangle(ray.shear, triangle_at(triangle_ix), triangle_ix, hit)) return;
-    bool nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
-    if (hit.t > ray.t_min && nearer && triangle_ix != ray.source_triangle) {
+    if (is_better(ray, hit.t, triangle_ix, best)) {
         best = Nearest(hit.t, triangle_ix);
         keep_pair(WEIGHTS_PLACE, hit.u, hit.v);
     }
@@ -239,15 +275,9 @@ bool find_candidate(TraversalRay ray, inout Visit visit, out uint entry_ix) {
     while (visit.entry_ix < visit.end_ix) {
         entry_ix = visit.entry_ix;
         visit.entry_ix += 1u;
-        if (RUNS_BOTH_SIDES) return true;
         if (!is_clear(ray, visit.way, leaf_plane_at(entry_ix), frame.plane_reach)) return true;
     }
     return false;
-}
-
-void intersect_rest(TraversalRay ray, inout Visit visit, inout Nearest best) {
-    uint entry_ix;
-    while (find_candidate(ray, visit, entry_ix)) intersect(ray, leaf_triangle_at(entry_ix), best);
 }
 
 bool is_done(bool any_hit, Nearest best) {
@@ -257,23 +287,16 @@ bool is_done(bool any_hit, Nearest best) {
 Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
     KdNode leaf;
     if (TRAVERSAL == TRAVERSAL_ROPES) leaf = descend_to_rope(ray, t_best, cell);
+    else if (RUNS_BOTH_SIDES) leaf = descend_in_step(ray, cell);
     else leaf = descend(ray, t_best, cell);
     return visit_leaf(leaf, cell.t_enter, min(cell.t_exit, t_best));
 }
 
-// Leaf by leaf, each with all its tests.
-void search_by_leaves(TraversalRay ray, bool any_hit, Cell cell, inout Nearest best) {
-    for (;;) {
-        Visit visit = next_leaf(ray, best.t, cell);
-        intersect_rest(ray, visit, best);
-        if (is_done(any_hit, best) || !find_pending(ray, best.t, cell)) return;
-        take_pending(ray, cell);
-    }
-}
-
 // Turn by turn, each a test or a leaf: lanes that test and lanes that go on each keep together. Of two loops in one another
 // the outer waits, for all lanes' leaves or for each lane's tests.
-void search_by_turns(TraversalRay ray, bool any_hit, Cell cell, inout Nearest best) {
+void search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
+    if (!is_in(ray)) return;
+    Cell cell = whole(ray);
     Visit visit = next_leaf(ray, best.t, cell);
     bool goes_on = true;
     do {
@@ -291,13 +314,13 @@ void search_by_turns(TraversalRay ray, bool any_hit, Cell cell, inout Nearest be
     } while (goes_on);
 }
 
+#include "lockstep.glsl"
+
 // All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
 void search(TraversalRay ray, bool any_hit, inout Nearest best) {
-    if (!(ray.t_enter <= ray.t_exit)) return;
-    Cell cell = Cell(0u, 0u, ray.t_enter, ray.t_exit);
     clear_pending();
-    if (RUNS_BOTH_SIDES) search_by_leaves(ray, any_hit, cell, best);
-    else search_by_turns(ray, any_hit, cell, best);
+    if (RUNS_BOTH_SIDES) search_in_step(ray, any_hit, best);
+    else search_by_turns(ray, any_hit, best);
 }
 
 #include "brute.glsl"

@@ -290,10 +290,14 @@ struct Addresses {
     uvec2 kd_ropes;
 };
 
-// Specialization constants that all kernels over one scene share: whether they read it by address, and the words of the
-// traversal's mask. Numbers below are for kernels' own.
-#define CONSTANT_BY_ADDRESS 31u
+// Specialization constants that all kernels over one scene share: how they read it, and the words of the traversal's mask.
+// Numbers below are for kernels' own.
+#define CONSTANT_READING 31u
 #define CONSTANT_MASK_WORDS 30u
+// Ways to read triangles and tree: as storage that is bound, as texels, by address.
+#define READING_BOUND 0u
+#define READING_TEXELS 1u
+#define READING_ADDRESS 2u
 
 // Push constants: the batch's pixels [first_pixel, first_pixel + n_pixels) in tile order, and the row of `bounces` of its bounce
 // of this depth; for what lights all of its rays, depth is 0 and the row its first.
@@ -394,6 +398,9 @@ struct DriverCast {
 #define BIND_RASTER_COUNT 30u
 #define BIND_LARGE_TRIANGLES 31u
 #define N_BINDINGS 32u
+
+// The same buffers of triangles and tree as texels: each at this and its own binding.
+#define BIND_TEXELS 64u
 
 // A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
 #define BIND_CAST_RAYS 32u

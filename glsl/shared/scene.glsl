@@ -1,5 +1,10 @@
-// The scene's triangles and their kd-tree, an accessor an array. On most devices each is bound; one that grows beyond what
-// the device binds is read behind its address, and so are all of them then.
+// The scene's triangles and their kd-tree, an accessor an array, and three ways to read them, one for all kernels over a scene:
+//
+// - as storage buffers that are bound, on GPUs;
+// - as texels of the same buffers, on software drivers: lavapipe fetches the texels of eight lanes side by side, and loads
+//   from storage lane by lane, which takes up to twice as long;
+// - by address where an array grows beyond what the device binds. The traversal loses up to 7 % of its speed by it on a large
+//   GPU.
 #ifndef KDRAY_SCENE
 #define KDRAY_SCENE
 
@@ -8,9 +13,7 @@
 
 #include "layout.glsl"
 
-// The same for all kernels over one scene. By address the traversal loses up to 7 % of its speed on a large GPU, up to half on
-// lavapipe: only scenes that could not be had otherwise are read so.
-layout(constant_id = CONSTANT_BY_ADDRESS) const bool BY_ADDRESS = false;
+layout(constant_id = CONSTANT_READING) const uint READING = READING_BOUND;
 
 // Triangles as three rows, nodes as one: a device then loads each at once.
 layout(std430, set = 0, binding = BIND_TRIANGLES) readonly buffer TrianglesBlock { vec4 triangle_rows[]; };
@@ -23,15 +26,38 @@ layout(std430, set = 0, binding = BIND_KD_SLABS) readonly buffer KdSlabsBlock { 
 layout(std430, set = 0, binding = BIND_KD_BOXES) readonly buffer KdBoxesBlock { KdBox kd_boxes[]; };
 layout(std430, set = 0, binding = BIND_KD_ROPES) readonly buffer KdRopesBlock { uint kd_ropes[]; };
 
+layout(set = 0, binding = BIND_TEXELS + BIND_TRIANGLES) uniform usamplerBuffer triangle_texels;
+layout(set = 0, binding = BIND_TEXELS + BIND_TRIANGLE_MATERIALS) uniform usamplerBuffer triangle_material_texels;
+layout(set = 0, binding = BIND_TEXELS + BIND_KD_NODES) uniform usamplerBuffer kd_node_texels;
+layout(set = 0, binding = BIND_TEXELS + BIND_KD_PARENTS) uniform usamplerBuffer kd_parent_texels;
+layout(set = 0, binding = BIND_TEXELS + BIND_LEAF_TRIANGLES) uniform usamplerBuffer leaf_triangle_texels;
+layout(set = 0, binding = BIND_TEXELS + BIND_LEAF_PLANES) uniform usamplerBuffer leaf_plane_texels;
+layout(set = 0, binding = BIND_TEXELS + BIND_KD_SLABS) uniform usamplerBuffer kd_slab_texels;
+layout(set = 0, binding = BIND_TEXELS + BIND_KD_BOXES) uniform usamplerBuffer kd_box_texels;
+layout(set = 0, binding = BIND_TEXELS + BIND_KD_ROPES) uniform usamplerBuffer kd_rope_texels;
+
 layout(std140, set = 0, binding = BIND_ADDRESSES) uniform AddressesBlock { Addresses addresses; };
 layout(std430, buffer_reference, buffer_reference_align = 16) readonly buffer Rows { vec4 at[]; };
 layout(std430, buffer_reference, buffer_reference_align = 8) readonly buffer Pairs { uvec2 at[]; };
 layout(std430, buffer_reference, buffer_reference_align = 4) readonly buffer Words { uint at[]; };
 layout(std430, buffer_reference, buffer_reference_align = 8) readonly buffer Boxes { KdBox at[]; };
 
+uint word_of(usamplerBuffer texels, uint ix) {
+    return texelFetch(texels, int(ix)).x;
+}
+
+uvec2 pair_of(usamplerBuffer texels, uint ix) {
+    return texelFetch(texels, int(ix)).xy;
+}
+
+vec4 row_of(usamplerBuffer texels, uint ix) {
+    return uintBitsToFloat(texelFetch(texels, int(ix)));
+}
+
 // Row 3 i + k: corner k of triangle i, and what its fourth word holds.
 vec4 triangle_row(uint row_ix) {
-    if (BY_ADDRESS) return Rows(addresses.triangles).at[row_ix];
+    if (READING == READING_TEXELS) return row_of(triangle_texels, row_ix);
+    if (READING == READING_ADDRESS) return Rows(addresses.triangles).at[row_ix];
     return triangle_rows[row_ix];
 }
 
@@ -43,47 +69,63 @@ Triangle triangle_at(uint triangle_ix) {
 }
 
 uint triangle_material_at(uint triangle_ix) {
-    if (BY_ADDRESS) return Words(addresses.triangle_materials).at[triangle_ix];
+    if (READING == READING_TEXELS) return word_of(triangle_material_texels, triangle_ix);
+    if (READING == READING_ADDRESS) return Words(addresses.triangle_materials).at[triangle_ix];
     return triangle_materials[triangle_ix];
 }
 
 KdNode kd_node_of(uint node_ix) {
     uvec2 words;
-    if (BY_ADDRESS) words = Pairs(addresses.kd_nodes).at[node_ix];
+    if (READING == READING_TEXELS) words = pair_of(kd_node_texels, node_ix);
+    else if (READING == READING_ADDRESS) words = Pairs(addresses.kd_nodes).at[node_ix];
     else words = kd_nodes[node_ix];
     return KdNode(words.x, words.y);
 }
 
 uint kd_parent_of(uint node_ix) {
-    if (BY_ADDRESS) return Words(addresses.kd_parents).at[node_ix >> 1];
+    if (READING == READING_TEXELS) return word_of(kd_parent_texels, node_ix >> 1);
+    if (READING == READING_ADDRESS) return Words(addresses.kd_parents).at[node_ix >> 1];
     return kd_parents[node_ix >> 1];
 }
 
 uint leaf_triangle_at(uint entry_ix) {
-    if (BY_ADDRESS) return Words(addresses.leaf_triangles).at[entry_ix];
+    if (READING == READING_TEXELS) return word_of(leaf_triangle_texels, entry_ix);
+    if (READING == READING_ADDRESS) return Words(addresses.leaf_triangles).at[entry_ix];
     return leaf_triangles[entry_ix];
 }
 
 // A Plane as a vector: normal, distance.
 vec4 leaf_plane_at(uint entry_ix) {
-    if (BY_ADDRESS) return Rows(addresses.leaf_planes).at[entry_ix];
+    if (READING == READING_TEXELS) return row_of(leaf_plane_texels, entry_ix);
+    if (READING == READING_ADDRESS) return Rows(addresses.leaf_planes).at[entry_ix];
     return leaf_planes[entry_ix];
 }
 
 // A Slab as a vector: normal, offset.
 vec4 kd_slab_of(uint node_ix) {
-    if (BY_ADDRESS) return Rows(addresses.kd_slabs).at[node_ix];
+    if (READING == READING_TEXELS) return row_of(kd_slab_texels, node_ix);
+    if (READING == READING_ADDRESS) return Rows(addresses.kd_slabs).at[node_ix];
     return kd_slabs[node_ix];
 }
 
+// A box as texels: three pairs.
+KdBox fetch_kd_box(uint node_ix) {
+    vec2 a = uintBitsToFloat(pair_of(kd_box_texels, 3u * node_ix));
+    vec2 b = uintBitsToFloat(pair_of(kd_box_texels, 3u * node_ix + 1u));
+    vec2 c = uintBitsToFloat(pair_of(kd_box_texels, 3u * node_ix + 2u));
+    return KdBox(a.x, a.y, b.x, b.y, c.x, c.y);
+}
+
 KdBox kd_box_of(uint node_ix) {
-    if (BY_ADDRESS) return Boxes(addresses.kd_boxes).at[node_ix];
+    if (READING == READING_TEXELS) return fetch_kd_box(node_ix);
+    if (READING == READING_ADDRESS) return Boxes(addresses.kd_boxes).at[node_ix];
     return kd_boxes[node_ix];
 }
 
 // side: below and above on x, y, z. 0: the face is the root's.
 uint kd_rope_of(uint node_ix, uint side) {
-    if (BY_ADDRESS) return Words(addresses.kd_ropes).at[6u * node_ix + side];
+    if (READING == READING_TEXELS) return word_of(kd_rope_texels, 6u * node_ix + side);
+    if (READING == READING_ADDRESS) return Words(addresses.kd_ropes).at[6u * node_ix + side];
     return kd_ropes[6u * node_ix + side];
 }
 

@@ -21,7 +21,6 @@ bool is_clear(TraversalRay ray, Stretch way, vec4 plane, float reach) {
 
 // A split that has no slab, or none that is looked at.
 bool is_open_split(KdNode node) {
-    if (RUNS_BOTH_SIDES) return !is_leaf(node);
     return (node.axis_and_child & (KD_LEAF | KD_IN_SLAB)) == 0u;
 }
 

@@ -85,16 +85,26 @@ Hit weighted_hit(Shear shear, vec3 edges, float det, vec3 z, uint triangle_ix) {
     return Hit(t, triangle_ix, u, v);
 }
 
+// The corners as the ray sees them, and their edge functions.
+vec3 seen_edges(Shear shear, Triangle triangle, out vec3 a, out vec3 b, out vec3 c) {
+    a = sheared(shear, triangle.v0);
+    b = sheared(shear, triangle.v1);
+    c = sheared(shear, triangle.v2);
+    return edge_functions(a, b, c);
+}
+
+vec3 exact_edges(vec3 edges, vec3 a, vec3 b, vec3 c) {
+    return vec3(exact_edge(c, b, edges.x), exact_edge(a, c, edges.y), exact_edge(b, a, edges.z));
+}
+
 // Watertight and two-sided (Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2013), edges included.
 // False also for a triangle without area and for NaN. t may be negative.
 bool intersect_triangle(Shear shear, Triangle triangle, uint triangle_ix, out Hit hit) {
-    vec3 a = sheared(shear, triangle.v0);
-    vec3 b = sheared(shear, triangle.v1);
-    vec3 c = sheared(shear, triangle.v2);
-    vec3 edges = edge_functions(a, b, c);
+    vec3 a, b, c;
+    vec3 edges = seen_edges(shear, triangle, a, b, c);
     if (is_outside(edges)) return false;
     if (any(equal(edges, vec3(0.0)))) {
-        edges = vec3(exact_edge(c, b, edges.x), exact_edge(a, c, edges.y), exact_edge(b, a, edges.z));
+        edges = exact_edges(edges, a, b, c);
         if (is_outside(edges)) return false;
     }
     precise float det = edges.x + edges.y + edges.z;
@@ -106,10 +116,8 @@ bool intersect_triangle(Shear shear, Triangle triangle, uint triangle_ix, out Hi
 // Where the ray meets the triangle's plane, moved to the triangle's edge where that lies outside: a rasterizer snaps
 // corners to its sub-pixel grid and so covers samples that the exact triangle just misses.
 Hit clamp_to_triangle(Shear shear, Triangle triangle, uint triangle_ix) {
-    vec3 a = sheared(shear, triangle.v0);
-    vec3 b = sheared(shear, triangle.v1);
-    vec3 c = sheared(shear, triangle.v2);
-    vec3 edges = edge_functions(a, b, c);
+    vec3 a, b, c;
+    vec3 edges = seen_edges(shear, triangle, a, b, c);
     precise float det = edges.x + edges.y + edges.z;
     vec3 inside = max(det < 0.0 ? -edges : edges, vec3(0.0));
     precise float sum = inside.x + inside.y + inside.z;

@@ -11,6 +11,7 @@ use super::{AnyBuffer, Context, GpuError, Target};
 pub enum BindingKind {
     Uniform,
     Storage,
+    Texels,
     Image,
 }
 
@@ -19,6 +20,7 @@ impl BindingKind {
         match self {
             Self::Uniform => vk::DescriptorType::UNIFORM_BUFFER,
             Self::Storage => vk::DescriptorType::STORAGE_BUFFER,
+            Self::Texels => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
             Self::Image => vk::DescriptorType::STORAGE_IMAGE,
         }
     }
@@ -28,6 +30,8 @@ impl BindingKind {
 #[derive(Clone, Copy)]
 pub enum Binding<'a> {
     Buffer(&'a AnyBuffer),
+    /// Of a buffer for [`BufferUse::Texels`](super::BufferUse::Texels) or [`BufferUse::Address`](super::BufferUse::Address).
+    Texels(&'a AnyBuffer),
     Image(&'a Target),
 }
 
@@ -112,7 +116,7 @@ pub struct BindingSet {
 
 impl BindingSet {
     /// `objects`: one for each of the bindings, with its number. A buffer that is larger than what the device binds is
-    /// bound in part: kernels read it by its address.
+    /// bound in part: kernels read it another way.
     pub fn new(bindings: &Arc<Bindings>, name: &str, objects: &[(u32, Binding)]) -> Result<Self, GpuError> {
         assert_eq!(objects.len(), bindings.kinds.len(), "one object a binding");
         let context = &bindings.context;
@@ -151,12 +155,17 @@ impl BindingSet {
                 .dst_binding(*binding)
                 .descriptor_type(kind.descriptor());
             let buffer_info;
+            let texels;
             let image_info;
             let write = match object {
                 Binding::Buffer(buffer) => {
                     let bytes = buffer.bytes().min(most_bytes);
                     buffer_info = [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(bytes)];
                     write.buffer_info(&buffer_info)
+                }
+                Binding::Texels(buffer) => {
+                    texels = [buffer.texels()];
+                    write.texel_buffer_view(&texels)
                 }
                 Binding::Image(target) => {
                     image_info = [vk::DescriptorImageInfo::default()

@@ -22,10 +22,18 @@ pub enum BufferUse {
     Indirect,
     /// Vertices' numbers, for draws alone.
     Index,
-    /// Storage that is read by its address: it may be larger than what can be bound.
+    /// Storage that kernels may fetch as texels, of four words, of two or of one, as its elements are made of: it may be larger
+    /// than what can be bound.
+    Texels,
+    /// The same, and read by its address.
     Address,
     /// Whatever the driver's own ray tracing reads and writes, by address.
     Structure,
+}
+
+/// Of the widest texel that elements are made of.
+pub fn texel_bytes<T>() -> u64 {
+    [16, 8].into_iter().find(|bytes| size_of::<T>() % bytes == 0).unwrap_or(4) as u64
 }
 
 /// `len` elements of `T` in the device's memory.
@@ -40,6 +48,8 @@ pub struct AnyBuffer {
     raw: vk::Buffer,
     allocation: ManuallyDrop<Allocation>,
     bytes: u64,
+    /// Null where it has no texels.
+    texels: vk::BufferView,
     name: String,
     context: Arc<Context>,
 }
@@ -52,18 +62,26 @@ impl<T: Pod> Buffer<T> {
     pub fn new(context: &Arc<Context>, name: &str, len: usize, usage: BufferUse) -> Result<Self, GpuError> {
         let bytes = (len.max(1) * size_of::<T>()) as u64;
         let limit = match usage {
-            BufferUse::Index | BufferUse::Address | BufferUse::Structure => context.limits().buffer_bytes,
+            BufferUse::Index | BufferUse::Texels | BufferUse::Address | BufferUse::Structure => {
+                context.limits().buffer_bytes
+            }
             BufferUse::Storage | BufferUse::Uniform | BufferUse::Indirect => context.limits().storage_range,
         };
         if bytes > limit {
             return Err(GpuError::TooLarge { object: name.to_owned(), bytes, limit });
         }
+        let has_texels = matches!(usage, BufferUse::Texels | BufferUse::Address);
         let usage = match usage {
             BufferUse::Storage => vk::BufferUsageFlags::STORAGE_BUFFER,
             BufferUse::Uniform => vk::BufferUsageFlags::UNIFORM_BUFFER,
             BufferUse::Indirect => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::INDIRECT_BUFFER,
             BufferUse::Index => vk::BufferUsageFlags::INDEX_BUFFER,
-            BufferUse::Address => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS,
+            BufferUse::Texels => vk::BufferUsageFlags::STORAGE_BUFFER | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER,
+            BufferUse::Address => {
+                vk::BufferUsageFlags::STORAGE_BUFFER
+                    | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+                    | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
+            }
             BufferUse::Structure => {
                 vk::BufferUsageFlags::STORAGE_BUFFER
                     | vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR
@@ -73,7 +91,10 @@ impl<T: Pod> Buffer<T> {
             }
         } | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST;
-        let any = AnyBuffer::new(context, name, bytes, usage, MemoryLocation::GpuOnly)?;
+        let mut any = AnyBuffer::new(context, name, bytes, usage, MemoryLocation::GpuOnly)?;
+        if has_texels {
+            any.add_texels(texel_bytes::<T>())?;
+        }
         Ok(Self { any, len, element: PhantomData })
     }
 
@@ -175,13 +196,35 @@ impl AnyBuffer {
                     return Err(error);
                 }
             };
-            let buffer = Self { raw, allocation, bytes, name: name.to_owned(), context: context.clone() };
+            let buffer = Self {
+                raw,
+                allocation,
+                bytes,
+                texels: vk::BufferView::null(),
+                name: name.to_owned(),
+                context: context.clone(),
+            };
             device
                 .bind_buffer_memory(raw, buffer.allocation.memory(), buffer.allocation.offset())
                 .map_err(GpuError::call("vkBindBufferMemory", name))?;
             context.set_name(raw, name);
             Ok(buffer)
         }
+    }
+
+    /// As many of its texels as the device has in one buffer.
+    fn add_texels(&mut self, texel_bytes: u64) -> Result<(), GpuError> {
+        let format = match texel_bytes {
+            16 => vk::Format::R32G32B32A32_UINT,
+            8 => vk::Format::R32G32_UINT,
+            _ => vk::Format::R32_UINT,
+        };
+        let range = self.bytes.min(u64::from(self.context.limits().n_texels) * texel_bytes);
+        let info = vk::BufferViewCreateInfo::default().buffer(self.raw).format(format).range(range);
+        // SAFETY: the buffer was created with the usage that allows it; all devices have these formats.
+        self.texels = unsafe { self.context.device.create_buffer_view(&info, None) }
+            .map_err(GpuError::call("vkCreateBufferView", &self.name))?;
+        Ok(())
     }
 
     fn staging(context: &Arc<Context>, name: &str, bytes: u64, location: MemoryLocation) -> Result<Self, GpuError> {
@@ -195,6 +238,11 @@ impl AnyBuffer {
 
     pub(super) fn raw(&self) -> vk::Buffer {
         self.raw
+    }
+
+    /// Of a buffer for [`BufferUse::Texels`] or [`BufferUse::Address`].
+    pub(super) fn texels(&self) -> vk::BufferView {
+        self.texels
     }
 
     /// Of a buffer for [`BufferUse::Address`] or [`BufferUse::Structure`].
@@ -218,6 +266,7 @@ impl Drop for AnyBuffer {
     fn drop(&mut self) {
         // SAFETY: the device has ended all work on it: `Context::run` waits, and a frame's owner does.
         unsafe {
+            self.context.device.destroy_buffer_view(self.texels, None);
             self.context.device.destroy_buffer(self.raw, None);
             self.context.free(ManuallyDrop::take(&mut self.allocation));
         }

@@ -97,15 +97,16 @@ impl Context {
         Self::open(instance, physical, info, Purpose::RayTracing)
     }
 
-    /// As [`Context::new`], as if no more than so many bytes of a storage buffer could be bound: small scenes then meet
-    /// what large ones meet elsewhere.
+    /// As [`Context::new`], as if no more than so many bytes of a storage buffer could be bound, and no more texels: small scenes
+    /// then meet what large ones meet elsewhere.
     ///
     /// # Errors
     /// As [`Context::new`].
-    pub fn with_storage_range(options: &ContextOptions, bytes: u64) -> Result<Arc<Self>, GpuError> {
+    pub fn with_ranges(options: &ContextOptions, bytes: u64, n_texels: u32) -> Result<Arc<Self>, GpuError> {
         let mut context = Self::new(options)?;
         let limits = &mut Arc::get_mut(&mut context).expect("nothing has been made from it yet").limits;
         limits.storage_range = limits.storage_range.min(bytes);
+        limits.n_texels = limits.n_texels.min(n_texels);
         Ok(context)
     }
 

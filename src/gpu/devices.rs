@@ -47,6 +47,8 @@ impl fmt::Display for DeviceSelector {
 pub struct Limits {
     /// Bytes of one storage buffer that is bound.
     pub storage_range: u64,
+    /// Texels of one buffer.
+    pub n_texels: u32,
     /// Bytes of one buffer that is read by its address.
     pub buffer_bytes: u64,
     /// Pixels of a render target's side.
@@ -66,6 +68,7 @@ impl Limits {
         let limits = all.properties.limits;
         Self {
             storage_range: u64::from(limits.max_storage_buffer_range),
+            n_texels: limits.max_texel_buffer_elements,
             buffer_bytes: of_1_3.max_buffer_size.min(of_1_1.max_memory_allocation_size),
             target_size: limits
                 .max_framebuffer_width

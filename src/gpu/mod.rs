@@ -33,7 +33,7 @@ mod window;
 pub use acceleration::Scenery;
 pub use barrier::Access;
 pub use bindings::{Binding, BindingKind, BindingSet, Bindings};
-pub use buffer::{AnyBuffer, Buffer, BufferUse};
+pub use buffer::{AnyBuffer, Buffer, BufferUse, texel_bytes};
 pub use commands::{Area, CommandBuffer, Commands, Dispatch, DrawDesc};
 pub use context::{Context, ContextOptions};
 pub use devices::{DeviceInfo, DeviceSelector, Limits, devices};

@@ -28,7 +28,7 @@ impl CastResources {
     /// # Errors
     /// Out of memory.
     pub fn bindings(context: &Arc<Context>, tree: &Tree) -> Result<Arc<Bindings>, GpuError> {
-        let kinds: Vec<_> = tree::BINDINGS.into_iter().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
+        let kinds: Vec<_> = tree::bindings().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
         Bindings::with_constants(context, &kinds, size_of::<CastBatch>() as u32, &tree.constants())
     }
 
@@ -41,7 +41,7 @@ impl CastResources {
         let cast_hits = Buffer::new(context, "cast_hits", len, BufferUse::Storage)?;
         let own =
             [(BIND_CAST_RAYS, Binding::Buffer(cast_rays.any())), (BIND_CAST_HITS, Binding::Buffer(cast_hits.any()))];
-        let set = BindingSet::new(bindings, "cast", &[&tree.objects()[..], &own].concat())?;
+        let set = BindingSet::new(bindings, "cast", &[&tree.objects(), &own[..]].concat())?;
         Ok(Self { cast_rays, cast_hits, set })
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::{
     frame::{Primary, RenderOptions, Traversal},
     gpu::{BindingKind, Bindings, ComputeDesc, ComputePipeline, Context, GpuError, Shader},
-    layout::{BIND_ADDRESSES, BIND_FRAME, BIND_TRIANGLE_IDS},
+    layout::{BIND_ADDRESSES, BIND_FRAME, BIND_TEXELS, BIND_TRIANGLE_IDS},
 };
 
 mod accumulate;
@@ -50,7 +50,7 @@ pub use self::{
     shadow::Shadow,
     tonemap::Tonemap,
     trace::Trace,
-    tree::Tree,
+    tree::{Reading, Tree},
     visibility::Visibility,
 };
 
@@ -146,6 +146,7 @@ impl Passes {
 /// A binding number of layout.glsl and what it holds.
 fn binding(number: u32) -> (u32, BindingKind) {
     let kind = match number {
+        BIND_TEXELS.. => BindingKind::Texels,
         BIND_FRAME | BIND_ADDRESSES => BindingKind::Uniform,
         BIND_TRIANGLE_IDS => BindingKind::Image,
         _ => BindingKind::Storage,

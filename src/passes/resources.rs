@@ -2,7 +2,7 @@
 
 use std::{mem::offset_of, sync::Arc};
 
-use super::{Pixels, Queue, Raster, Tree, binding, pixels::n_pixels, provoking::vertex_indices};
+use super::{Pixels, Queue, Raster, Tree, binding, pixels::n_pixels, provoking::vertex_indices, tree};
 use crate::{
     frame::{RenderOptions, Traversal},
     gpu::{Access, Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
@@ -56,7 +56,7 @@ impl Resources {
         let storage = BufferUse::Storage;
         let mut tree = Tree::new(context, &scene.triangles, tree, constants)?;
         tree.add_materials(context, &scene.triangle_materials)?;
-        let kinds: Vec<_> = (0..layout::N_BINDINGS).map(binding).collect();
+        let kinds: Vec<_> = (0..layout::N_BINDINGS).chain(tree::texel_bindings()).map(binding).collect();
         let indices = vertex_indices(&scene.triangles);
         let mut resources = Self {
             vertex_indices: Buffer::with(context, "vertex_indices", &indices, BufferUse::Index)?,
@@ -101,7 +101,7 @@ impl Resources {
             (layout::BIND_LARGE_TRIANGLES, Binding::Buffer(self.raster.large_triangles.any())),
             (layout::BIND_TRIANGLE_IDS, Binding::Image(&pixels.triangle_ids)),
         ];
-        BindingSet::new(&self.bindings, "frame", &[&self.tree.objects()[..], &own].concat())
+        BindingSet::new(&self.bindings, "frame", &[&self.tree.objects(), &own[..]].concat())
     }
 
     /// The kernels' constants from now on, with room for their picture, with or without features, and for `constants.queue_capacity` rays, or for as

@@ -6,20 +6,18 @@ use bytemuck::Pod;
 
 use crate::{
     frame::Traversal,
-    gpu::{Binding, Buffer, BufferUse, Context, GpuError},
+    gpu::{AnyBuffer, Binding, Buffer, BufferUse, Context, GpuError, texel_bytes},
     kdtree::{Extras, KdTree},
     layout::{
         Addresses, BIND_ADDRESSES, BIND_FRAME, BIND_KD_BOXES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_ROPES,
-        BIND_KD_SLABS, BIND_LEAF_PLANES, BIND_LEAF_TRIANGLES, BIND_TRIANGLE_MATERIALS, BIND_TRIANGLES,
-        BRUTE_MAX_TRIANGLES, CONSTANT_BY_ADDRESS, CONSTANT_MASK_WORDS, Frame, KD_WORD_DEPTH, KdBox, KdNode, Plane,
-        Slab, Triangle,
+        BIND_KD_SLABS, BIND_LEAF_PLANES, BIND_LEAF_TRIANGLES, BIND_TEXELS, BIND_TRIANGLE_MATERIALS, BIND_TRIANGLES,
+        BRUTE_MAX_TRIANGLES, CONSTANT_MASK_WORDS, CONSTANT_READING, Frame, KD_WORD_DEPTH, KdBox, KdNode, Plane,
+        READING_ADDRESS, READING_BOUND, READING_TEXELS, Slab, Triangle,
     },
 };
 
-/// The bindings' numbers.
-pub(super) const BINDINGS: [u32; 11] = [
-    BIND_FRAME,
-    BIND_ADDRESSES,
+/// The numbers of what is read in one of three ways, in the order of [`Tree::arrays`].
+const ARRAYS: [u32; 9] = [
     BIND_TRIANGLES,
     BIND_TRIANGLE_MATERIALS,
     BIND_KD_NODES,
@@ -31,10 +29,48 @@ pub(super) const BINDINGS: [u32; 11] = [
     BIND_KD_ROPES,
 ];
 
+/// The bindings' numbers.
+pub(super) fn bindings() -> impl Iterator<Item = u32> {
+    [BIND_FRAME, BIND_ADDRESSES].into_iter().chain(ARRAYS).chain(texel_bindings())
+}
+
+/// Those of texels.
+pub(super) fn texel_bindings() -> impl Iterator<Item = u32> {
+    ARRAYS.into_iter().map(|number| BIND_TEXELS + number)
+}
+
+/// How kernels read triangles and tree (glsl/shared/scene.glsl).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reading {
+    Bound,
+    /// Software drivers, if no array has more texels than the device allows for.
+    Texels,
+    /// Where an array is larger than what the device binds.
+    Address,
+}
+
+impl Reading {
+    fn of(context: &Context, arrays: &[Extent]) -> Self {
+        let limits = context.limits();
+        if context.runs_both_sides() && arrays.iter().all(|array| array.n_texels <= u64::from(limits.n_texels)) {
+            Self::Texels
+        } else if arrays.iter().all(|array| array.bytes <= limits.storage_range) {
+            Self::Bound
+        } else {
+            Self::Address
+        }
+    }
+
+    fn constant(self) -> u32 {
+        match self {
+            Self::Bound => READING_BOUND,
+            Self::Texels => READING_TEXELS,
+            Self::Address => READING_ADDRESS,
+        }
+    }
+}
+
 /// Triangles, their kd-tree, and the constants that hold the root's cell.
-///
-/// Where one of the buffers of triangles and tree is larger than what the device binds, kernels read all of them by
-/// address (glsl/shared/scene.glsl).
 pub struct Tree {
     /// One.
     pub frame: Buffer<Frame>,
@@ -55,7 +91,7 @@ pub struct Tree {
     pub kd_boxes: Buffer<KdBox>,
     /// Six a node, after `add_extras`.
     pub kd_ropes: Buffer<u32>,
-    usage: BufferUse,
+    reading: Reading,
     /// Of the traversal's mask.
     mask_words: u32,
 }
@@ -71,9 +107,9 @@ impl Tree {
         tree: &KdTree,
         constants: &Frame,
     ) -> Result<Self, GpuError> {
-        let sparing = Sparing::of(context, tree);
-        let is_bound = most_bytes(triangles, tree, &sparing) as u64 <= context.limits().storage_range;
-        let usage = if is_bound { BufferUse::Storage } else { BufferUse::Address };
+        let slabs = slabs_for(context, tree);
+        let reading = Reading::of(context, &extents(triangles, tree, slabs));
+        let usage = buffer_use(reading);
         let made = Self {
             frame: Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?,
             addresses: Buffer::new(context, "addresses", 1, BufferUse::Uniform)?,
@@ -82,11 +118,11 @@ impl Tree {
             kd_nodes: Buffer::with(context, "kd_nodes", &tree.nodes, usage)?,
             kd_parents: Buffer::with(context, "kd_parents", &tree.parents, usage)?,
             leaf_triangles: Buffer::with(context, "leaf_triangles", &tree.leaf_triangles, usage)?,
-            leaf_planes: Buffer::with(context, "leaf_planes", sparing.leaf_planes, usage)?,
-            kd_slabs: Buffer::with(context, "kd_slabs", sparing.slabs, usage)?,
+            leaf_planes: Buffer::with(context, "leaf_planes", &tree.leaf_planes, usage)?,
+            kd_slabs: Buffer::with(context, "kd_slabs", slabs, usage)?,
             kd_boxes: Buffer::new(context, "kd_boxes", 0, usage)?,
             kd_ropes: Buffer::new(context, "kd_ropes", 0, usage)?,
-            usage,
+            reading,
             mask_words: if tree.depth <= KD_WORD_DEPTH { 1 } else { 2 },
         };
         made.addresses.upload(&[made.addresses()])?;
@@ -98,7 +134,8 @@ impl Tree {
     /// # Errors
     /// Beyond the device's limits, out of memory.
     pub fn add_materials(&mut self, context: &Arc<Context>, triangle_materials: &[u32]) -> Result<(), GpuError> {
-        self.triangle_materials = Buffer::with(context, "triangle_materials", triangle_materials, self.usage)?;
+        self.triangle_materials =
+            Buffer::with(context, "triangle_materials", triangle_materials, buffer_use(self.reading))?;
         self.addresses.upload(&[self.addresses()])
     }
 
@@ -112,22 +149,23 @@ impl Tree {
             return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
         }
         let extras = Extras::new(tree, traversal);
-        let kd_boxes = Buffer::with(context, "kd_boxes", &extras.boxes, self.usage)?;
-        let kd_ropes = Buffer::with(context, "kd_ropes", &extras.ropes, self.usage)?;
+        let usage = buffer_use(self.reading);
+        let kd_boxes = Buffer::with(context, "kd_boxes", &extras.boxes, usage)?;
+        let kd_ropes = Buffer::with(context, "kd_ropes", &extras.ropes, usage)?;
         let (boxes_at, ropes_at) = (self.address_of(&kd_boxes), self.address_of(&kd_ropes));
         self.addresses.upload(&[Addresses { kd_boxes: boxes_at, kd_ropes: ropes_at, ..self.addresses() }])?;
         (self.kd_boxes, self.kd_ropes) = (kd_boxes, kd_ropes);
         Ok(())
     }
 
-    /// Whether kernels read triangles and tree by address.
-    pub fn is_by_address(&self) -> bool {
-        self.usage == BufferUse::Address
+    /// How kernels read it.
+    pub fn reading(&self) -> Reading {
+        self.reading
     }
 
     /// Specialization constants of all kernels that read it.
     pub(super) fn constants(&self) -> [(u32, u32); 2] {
-        [(CONSTANT_BY_ADDRESS, self.is_by_address().into()), (CONSTANT_MASK_WORDS, self.mask_words)]
+        [(CONSTANT_READING, self.reading.constant()), (CONSTANT_MASK_WORDS, self.mask_words)]
     }
 
     fn addresses(&self) -> Addresses {
@@ -144,16 +182,14 @@ impl Tree {
         }
     }
 
-    /// 0 where it is bound.
+    /// 0 where it is not read by it.
     fn address_of<T: Pod>(&self, buffer: &Buffer<T>) -> [u32; 2] {
-        if self.is_by_address() { buffer.address() } else { [0; 2] }
+        if self.reading == Reading::Address { buffer.address() } else { [0; 2] }
     }
 
-    /// For [`BINDINGS`].
-    pub(super) fn objects(&self) -> [(u32, Binding<'_>); BINDINGS.len()] {
-        let buffers = [
-            self.frame.any(),
-            self.addresses.any(),
+    /// What is read in one of three ways.
+    fn arrays(&self) -> [&AnyBuffer; ARRAYS.len()] {
+        [
             self.triangles.any(),
             self.triangle_materials.any(),
             self.kd_nodes.any(),
@@ -163,39 +199,54 @@ impl Tree {
             self.kd_slabs.any(),
             self.kd_boxes.any(),
             self.kd_ropes.any(),
-        ];
-        std::array::from_fn(|i| (BINDINGS[i], Binding::Buffer(buffers[i])))
+        ]
+    }
+
+    /// For [`bindings`].
+    pub(super) fn objects(&self) -> Vec<(u32, Binding<'_>)> {
+        let own =
+            [(BIND_FRAME, Binding::Buffer(self.frame.any())), (BIND_ADDRESSES, Binding::Buffer(self.addresses.any()))];
+        let arrays = ARRAYS.into_iter().zip(self.arrays());
+        let bound = arrays.clone().map(|(number, buffer)| (number, Binding::Buffer(buffer)));
+        let texels = arrays.map(|(number, buffer)| (BIND_TEXELS + number, Binding::Texels(buffer)));
+        own.into_iter().chain(bound).chain(texels).collect()
     }
 }
 
-/// What spares rays nodes and tests, where the kernels look at it: not where they run both sides of every branch.
-struct Sparing<'a> {
-    leaf_planes: &'a [Plane],
-    slabs: &'a [Slab],
+/// Of the arrays that are read so.
+fn buffer_use(reading: Reading) -> BufferUse {
+    if reading == Reading::Address { BufferUse::Address } else { BufferUse::Texels }
 }
 
-impl<'a> Sparing<'a> {
-    fn of(context: &Context, tree: &'a KdTree) -> Self {
-        if context.runs_both_sides() {
-            return Self { leaf_planes: &[], slabs: &[] };
-        }
-        Self { leaf_planes: &tree.leaf_planes, slabs: &tree.slabs }
+/// What spares rays nodes, where the kernels look at it: not where they run both sides of every branch.
+fn slabs_for<'a>(context: &Context, tree: &'a KdTree) -> &'a [Slab] {
+    if context.runs_both_sides() { &[] } else { &tree.slabs }
+}
+
+/// How much an array takes.
+struct Extent {
+    bytes: u64,
+    n_texels: u64,
+}
+
+impl Extent {
+    fn of<T>(len: usize) -> Self {
+        let bytes = (len * size_of::<T>()) as u64;
+        Self { bytes, n_texels: bytes / texel_bytes::<T>() }
     }
 }
 
-/// Of the largest buffer, bytes, with those that any traversal asks for: what one can be bound by, all can.
-fn most_bytes(triangles: &[Triangle], tree: &KdTree, sparing: &Sparing) -> usize {
-    const ROPES_BYTES: usize = 6 * size_of::<u32>();
+/// Of all arrays, with those that any traversal asks for: in the way that one can be read, all can.
+fn extents(triangles: &[Triangle], tree: &KdTree, slabs: &[Slab]) -> [Extent; 8] {
     let n_nodes = tree.nodes.len();
-    let sizes = [
-        size_of_val(triangles),
-        size_of_val(&*tree.nodes),
-        size_of_val(&*tree.parents),
-        size_of_val(&*tree.leaf_triangles),
-        size_of_val(sparing.leaf_planes),
-        size_of_val(sparing.slabs),
-        n_nodes * size_of::<KdBox>(),
-        n_nodes * ROPES_BYTES,
-    ];
-    sizes.into_iter().max().unwrap_or(0)
+    [
+        Extent::of::<Triangle>(triangles.len()),
+        Extent::of::<KdNode>(n_nodes),
+        Extent::of::<u32>(tree.parents.len()),
+        Extent::of::<u32>(tree.leaf_triangles.len()),
+        Extent::of::<Plane>(tree.leaf_planes.len()),
+        Extent::of::<Slab>(slabs.len()),
+        Extent::of::<KdBox>(n_nodes),
+        Extent::of::<u32>(6 * n_nodes), // ropes
+    ]
 }

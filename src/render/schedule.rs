@@ -132,7 +132,13 @@ mod tests {
 
     #[test]
     fn batches_have_room_for_their_rays() {
-        let limits = Limits { storage_range: 1 << 27, buffer_bytes: u64::MAX, target_size: 16_384, n_groups: 65_535 };
+        let limits = Limits {
+            storage_range: 1 << 27,
+            n_texels: 1 << 27,
+            buffer_bytes: u64::MAX,
+            target_size: 16_384,
+            n_groups: 65_535,
+        };
         for (width, height, max_depth) in [(1, 1, 1), (1024, 768, 5), (3840, 2160, 8), (7, 9, 64)] {
             for (branches, fixed_capacity) in [(false, None), (true, None), (true, Some(50))] {
                 let room = Room { fixed_capacity, branches };

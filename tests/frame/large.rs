@@ -1,5 +1,5 @@
-//! What grows with the scene is bound, and read by address where the device binds less than that: the same bits both ways.
-//! Tried with a device that binds little.
+//! What grows with the scene is bound or read as texels, and read by address where the device has less of both: the same bits
+//! in all ways. Tried with devices that have little.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use kdray::{
     gpu::{Buffer, BufferUse, Context, ContextOptions, GpuError},
     kdtree::KdTree,
     layout::{Frame, KdBox, LargeTriangle},
-    passes::Tree,
+    passes::{Reading, Tree},
     render::Renderer,
     scene::Scene,
 };
@@ -21,9 +21,18 @@ use crate::support::{meshes, scenes};
 /// What the device binds, bytes: enough for the pictures here.
 const RANGE: u64 = 48 << 10;
 
-fn small_device() -> Arc<Context> {
+fn device_with(bytes: u64, n_texels: u32) -> Arc<Context> {
     let options = ContextOptions { device: None, validate: true };
-    Context::with_storage_range(&options, RANGE).expect("a device with validation")
+    Context::with_ranges(&options, bytes, n_texels).expect("a device with validation")
+}
+
+fn small_device() -> Arc<Context> {
+    device_with(RANGE, 1)
+}
+
+/// What a device without such bounds takes for a small scene.
+fn usual_reading(context: &Context) -> Reading {
+    if context.runs_both_sides() { Reading::Texels } else { Reading::Bound }
 }
 
 /// With a ring of 16,000 triangles: none of its arrays can be bound then.
@@ -61,7 +70,8 @@ fn a_scene_larger_than_what_the_device_binds_gives_the_same_bits() {
             let options = RenderOptions { traversal, primary, features, ..options(24, 16, 3) };
             let [mut bound, mut by_address] = [&any, &small]
                 .map(|context| Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer"));
-            assert!(!bound.resources().tree.is_by_address() && by_address.resources().tree.is_by_address());
+            assert_eq!(bound.resources().tree.reading(), usual_reading(&any));
+            assert_eq!(by_address.resources().tree.reading(), Reading::Address);
             let bytes = scene_bytes(&by_address.resources().tree, traversal);
             assert!(bytes.iter().all(|&bytes| bytes > RANGE), "{traversal}: {bytes:?}");
             let pictures = [&mut bound, &mut by_address].map(|renderer| renderer.render().expect("a frame").0);
@@ -75,6 +85,23 @@ fn a_scene_larger_than_what_the_device_binds_gives_the_same_bits() {
     assert_silent(&small);
 }
 
+/// Between them, these traversals read all arrays. On a GPU two of the ways are one.
+#[test]
+fn texels_and_what_is_bound_give_the_same_bits() {
+    let ((scene, tree), any, bound) = (large_scene(), device(), device_with(u64::MAX, 1));
+    for traversal in [Traversal::Mask, Traversal::MaskBoxes, Traversal::Ropes] {
+        let options = RenderOptions { traversal, primary: Primary::Trace, ..options(24, 16, 3) };
+        let pictures = [(&any, usual_reading(&any)), (&bound, Reading::Bound)].map(|(context, reading)| {
+            let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
+            assert_eq!(renderer.resources().tree.reading(), reading);
+            renderer.render().expect("a frame").0
+        });
+        assert!(identical(&pictures[0], &pictures[1]), "{traversal}");
+    }
+    assert_silent(&any);
+    assert_silent(&bound);
+}
+
 /// What kernels that rasterize note of large triangles is bound; the triangles need not be.
 #[test]
 fn triangles_that_are_not_bound_are_rasterized() {
@@ -84,12 +111,9 @@ fn triangles_that_are_not_bound_are_rasterized() {
     }
     let options = RenderOptions { primary: Primary::Compute, ..options(24, 16, 2) };
     let n_bytes = (scene.triangles.len() * size_of::<LargeTriangle>()) as u64;
-    let with_range = |bytes| {
-        let context = Context::with_storage_range(&ContextOptions { device: None, validate: true }, bytes);
-        Renderer::new(context.expect("a device with validation"), &scene, &tree, &options)
-    };
+    let with_range = |bytes| Renderer::new(device_with(bytes, 1), &scene, &tree, &options);
     let mut by_address = with_range(n_bytes).expect("a renderer");
-    assert!(by_address.resources().tree.is_by_address());
+    assert_eq!(by_address.resources().tree.reading(), Reading::Address);
     let mut bound = Renderer::new(any.clone(), &scene, &tree, &options).expect("a renderer");
     let pictures = [&mut bound, &mut by_address].map(|renderer| renderer.render().expect("a frame").0);
     assert!(identical(&pictures[0], &pictures[1]));
@@ -117,31 +141,45 @@ fn rays_through_a_scene_larger_than_what_the_device_binds_find_the_same_hits() {
     let towards = |i: u16| Vec3::new((f32::from(i) * 0.7).sin(), (f32::from(i) * 0.31).cos(), -0.4);
     let ray = |i| CastRay { origin: Vec3::new(0.1, 0.2, 0.3), t_min: 0.0, direction: towards(i), t_max: f32::INFINITY };
     let rays: Vec<_> = (0..3000).map(ray).collect();
-    for (traversal, query) in [(Traversal::Mask, Query::Closest), (Traversal::Stack, Query::Any)] {
+    for (traversal, query) in [
+        (Traversal::Mask, Query::Closest),
+        (Traversal::Mask, Query::Any),
+        (Traversal::Stack, Query::Closest),
+        (Traversal::Stack, Query::Any),
+    ] {
         let hits = [&any, &small].map(|context| {
             let mut caster = Caster::new(context, &scene.triangles, &tree, traversal).expect("a caster");
             caster.cast(&rays, query, 1).expect("a cast").hits
         });
         assert!(hits[0].iter().any(|hit| hit.t.is_finite()));
-        assert_eq!(hits[0], hits[1], "{traversal} {query:?}");
+        let nans = hits.each_ref().map(|hits| hits.iter().filter(|hit| hit.u.is_nan()).count());
+        let differing = hits[0].iter().zip(&hits[1]).filter(|(a, b)| a != b).count();
+        assert_eq!((differing, nans), (0, [0; 2]), "{traversal} {query:?}");
     }
     assert_silent(&any);
     assert_silent(&small);
 }
 
-/// One array beyond the range is enough, and what another traversal would read counts; a byte less, and all are bound.
+/// One array beyond the range is enough, and what another traversal would read counts; a byte or texel less, and all are read so.
 #[test]
 fn a_scene_is_read_by_address_only_where_something_of_it_cannot_be_bound() {
     let scene = scenes::mixed();
     let tree = tree_of(&scene);
     let boxes = (tree.nodes.len() * size_of::<KdBox>()) as u64;
-    let planes = if device().runs_both_sides() { 0 } else { size_of_val(&*tree.leaf_planes) as u64 };
+    let planes = size_of_val(&*tree.leaf_planes) as u64;
     let largest = (size_of_val(&*scene.triangles) as u64).max(planes).max(boxes);
-    for (range, is_by_address) in [(largest, false), (largest - 1, true)] {
-        let options = ContextOptions { device: None, validate: true };
-        let context = Context::with_storage_range(&options, range).expect("a device with validation");
+    // Ropes are of a word each.
+    let most_texels = (6 * tree.nodes.len()) as u32;
+    let usual = usual_reading(&device());
+    for (range, n_texels, reading) in [
+        (largest - 1, 1, Reading::Address),
+        (largest, 1, Reading::Bound),
+        (largest, most_texels - 1, Reading::Bound),
+        (largest, most_texels, usual),
+    ] {
+        let context = device_with(range, n_texels);
         let made = Tree::new(&context, &scene.triangles, &tree, &Frame::default()).expect("a tree");
-        assert_eq!(made.is_by_address(), is_by_address, "{range}");
+        assert_eq!(made.reading(), reading, "{range} bytes, {n_texels} texels");
         assert_silent(&context);
     }
 }

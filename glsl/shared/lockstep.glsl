@@ -1,0 +1,60 @@
+// The search for devices that run both sides of a branch for all lanes, as software drivers do (RUNS_BOTH_SIDES). Nothing is
+// spared there by `if`: what not all lanes ask for costs as if they did, and so does what none asks for. A loop ends as soon as
+// no lane goes on, but runs its body at least once. A ray finds the same hits, in the same order, as in kdtree.glsl, of which this
+// is a part.
+//
+// So loops ask at their ends whether to go on, which spares a turn that no lane is in. They ask at their beginnings, too:
+// lavapipe (Mesa 22.3) would otherwise take what a loop leaves behind from its last turn, for lanes that left it before as
+// well.
+
+// As `find_candidate`.
+bool find_candidate_in_step(TraversalRay ray, inout Visit visit, out uint entry_ix) {
+    bool found = false;
+    bool looks = visit.entry_ix < visit.end_ix;
+    entry_ix = 0u;
+    while (looks) {
+        entry_ix = visit.entry_ix;
+        visit.entry_ix += 1u;
+        found = !is_clear(ray, visit.way, leaf_plane_at(entry_ix), frame.plane_reach);
+        looks = !found && visit.entry_ix < visit.end_ix;
+        if (!looks) break;
+    }
+    return found;
+}
+
+// As `intersect`, without a branch.
+void intersect_in_step(TraversalRay ray, uint triangle_ix, bool tests, inout Nearest best) {
+    vec3 a, b, c;
+    vec3 edges = exact_edges(seen_edges(ray.shear, triangle_at(triangle_ix), a, b, c), a, b, c);
+    precise float det = edges.x + edges.y + edges.z;
+    Hit hit = weighted_hit(ray.shear, edges, det, vec3(a.z, b.z, c.z), triangle_ix);
+    bool is_new = tests && !is_outside(edges) && abs(det) > 0.0 && is_better(ray, hit.t, triangle_ix, best);
+    vec2 weights = kept_pair(WEIGHTS_PLACE);
+    best.t = is_new ? hit.t : best.t;
+    best.triangle_ix = is_new ? triangle_ix : best.triangle_ix;
+    keep_pair(WEIGHTS_PLACE, is_new ? hit.u : weights.x, is_new ? hit.v : weights.y);
+}
+
+// Turn by turn: on to the next leaf, where this one is done with, and at most one test.
+void search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
+    Cell cell = whole(ray);
+    // At the root, as in a leaf that is done with.
+    Visit visit = Visit(0u, 0u, stretch(0.0, 0.0));
+    bool begins = true;
+    bool goes_on = is_in(ray);
+    while (goes_on) {
+        if (visit.entry_ix >= visit.end_ix) {
+            if (!begins) goes_on = find_pending(ray, best.t, cell);
+            if (goes_on) {
+                if (!begins) take_pending(ray, cell);
+                visit = next_leaf(ray, best.t, cell);
+            }
+            begins = false;
+        }
+        uint entry_ix;
+        bool found = find_candidate_in_step(ray, visit, entry_ix);
+        intersect_in_step(ray, found ? leaf_triangle_at(entry_ix) : 0u, found, best);
+        goes_on = goes_on && !is_done(any_hit, best);
+        if (!goes_on) break;
+    }
+}
