@@ -33,7 +33,7 @@ pub enum BufferUse {
 
 /// Of the widest texel that elements are made of.
 pub fn texel_bytes<T>() -> u64 {
-    [16, 8].into_iter().find(|bytes| size_of::<T>() % bytes == 0).unwrap_or(4) as u64
+    [16, 8].into_iter().find(|&bytes| size_of::<T>().is_multiple_of(bytes)).unwrap_or(4) as u64
 }
 
 /// `len` elements of `T` in the device's memory.
