@@ -7,6 +7,9 @@ use super::traverser::Probe;
 /// Rays among which companions are looked for: of more, those that point the same way start too far apart.
 pub const WINDOW: usize = 512;
 
+/// Above all indices in a window.
+const CLASS_SHIFT: u32 = 16;
+
 /// Neighbours that point into more octants than this share too little of their way to go together.
 const MOST_OCTANTS: u32 = 2;
 
@@ -24,7 +27,12 @@ fn class_of(direction: Vec3) -> u32 {
     direction.is_negative_bitmask() << 3 | order
 }
 
-/// Puts some of the rays, by their indices, into an order in which neighbours are companions.
+/// Puts some of a window's rays, by their indices, into an order in which neighbours are companions.
 pub fn sort_by_direction(probes: &[Probe], ray_ixs: &mut [u32]) {
-    ray_ixs.sort_by_cached_key(|&ix| (class_of(probes[ix as usize].ray.direction), ix));
+    // Class and index as one number: to sort these takes a third of the time.
+    for ix in ray_ixs.iter_mut() {
+        *ix |= class_of(probes[*ix as usize].ray.direction) << CLASS_SHIFT;
+    }
+    ray_ixs.sort_unstable();
+    ray_ixs.iter_mut().for_each(|ix| *ix &= (1 << CLASS_SHIFT) - 1);
 }

@@ -72,8 +72,8 @@ impl Renderer {
     /// The primary rays that a device finds soonest in a picture of that size.
     pub fn suited_primary(context: &Context, n_triangles: usize, size: (u32, u32)) -> Primary {
         if context.runs_both_sides() {
-            // Mesa's lavapipe: 870,000 triangles in 66 ms, 790,000 rays in 750 (benches/EXPERIMENTS.md).
-            Primary::suited_to(n_triangles, size, 8)
+            // Mesa's lavapipe: 870,000 triangles in 72 ms, 790,000 rays in 242 (benches/EXPERIMENTS.md).
+            Primary::suited_to(n_triangles, size, 4)
         } else if context.has_wide_atomics() && Raster::has_room(context, n_triangles) {
             Primary::Compute
         } else {

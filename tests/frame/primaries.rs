@@ -94,7 +94,7 @@ fn primaries_suit_the_device() {
     let by_kernels = if gpu.has_wide_atomics() { Primary::Compute } else { Primary::Trace };
     assert_eq!([suited(8001), suited(usize::MAX)], [by_kernels, Primary::Trace]);
     let without = Context::without_wide_atomics(&ContextOptions::default()).expect("a device");
-    let n_raster = if without.runs_both_sides() { 8 * 8000 } else { 8000 };
+    let n_raster = if without.runs_both_sides() { 4 * 8000 } else { 8000 };
     let suited = [n_raster, n_raster + 1].map(|n| Renderer::suited_primary(&without, n, (100, 80)));
     assert_eq!(suited, [Primary::Raster, Primary::Trace]);
 }
