@@ -30,6 +30,7 @@ mod tests {
             BIND_BOUNCES => Some("Bounce"),
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
             BIND_KD_BOXES => Some("KdBox"),
+            BIND_KD_ROPES => Some("KdRope"),
             BIND_LEAF_PLANES => Some("Plane"),
             BIND_KD_SLABS => Some("Slab"),
             BIND_CAST_RAYS => Some("CastRay"),

@@ -225,7 +225,7 @@ fn traversal_measures_every_variant_on_every_set() {
                 // The mask keeps the newest pending cells; a mesh so small has no more.
                 let has_links = ["mask-boxes", "backtrack", "ropes"].contains(&name);
                 assert_eq!(steps["links"].as_f64() > Some(0.0), has_links, "{name}: {steps}");
-                let has_boxes = ["mask-boxes", "backtrack", "ropes"].contains(&name);
+                let has_boxes = ["mask-boxes", "backtrack"].contains(&name);
                 assert_eq!(steps["boxes"].as_f64() > Some(0.0), has_boxes, "{name}: {steps}");
             }
         }

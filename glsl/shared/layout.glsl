@@ -126,6 +126,13 @@ struct KdBox {
     float max_z;
 };
 
+// 8 bytes: a face of a node's cell. position: where it lies on its axis (world units); node_ix: the smallest node that has all of its
+// other side, 0 where that is outside the root's cell.
+struct KdRope {
+    float position;
+    uint node_ix;
+};
+
 // 80 bytes, named as in Wavefront MTL.
 struct Material {
     vec3 ka;

@@ -5,6 +5,29 @@
 // The leaves on the way end and begin at the same t, so every hit's t is in one of them; which of several that meet there
 // does not matter.
 
+// Where the ray leaves a cell, and the node that is there.
+struct Exit {
+    float t;
+    uint node_ix;
+};
+
+// By the face that it comes to along an axis.
+Exit exit_along(TraversalRay ray, uint leaf_ix, uint axis) {
+    float inv_direction = along(ray.inv_direction, axis);
+    KdRope rope = kd_rope_of(leaf_ix, 2u * axis + (inv_direction < 0.0 ? 0u : 1u));
+    precise float t = fma(rope.position, inv_direction, along(ray.bias, axis));
+    return Exit(t, rope.node_ix);
+}
+
+// By the face that it comes to first.
+Exit exit_of(TraversalRay ray, uint leaf_ix) {
+    Exit x = exit_along(ray, leaf_ix, 0u);
+    Exit y = exit_along(ray, leaf_ix, 1u);
+    Exit z = exit_along(ray, leaf_ix, 2u);
+    float t = min(x.t, min(y.t, z.t));
+    return Exit(t, x.t == t ? x.node_ix : (y.t == t ? y.node_ix : z.node_ix));
+}
+
 // Down to the leaf where the ray is at t_enter, through all slabs but the leaf's own: where the ray leaves other cells is not
 // known. Then node_at is where the rope of the face leads to by which the ray leaves it.
 KdNode descend_to_rope(TraversalRay ray, float t_best, inout Cell cell) {
@@ -12,12 +35,11 @@ KdNode descend_to_rope(TraversalRay ray, float t_best, inout Cell cell) {
     while (!is_leaf(node)) {
         cell.node_at = child_of(ray, node, cell.t_enter > crossing(ray, node));
         node = kd_node(cell.node_at);
+        if (RUNS_BOTH_SIDES && is_leaf(node)) break;
     }
-    vec3 far = slabs_of(ray, index_of(cell.node_at)).far;
-    uint axis = far.x <= far.y && far.x <= far.z ? 0u : (far.y <= far.z ? 1u : 2u);
-    uint is_above = along(ray.inv_direction, axis) < 0.0 ? 0u : 1u;
-    cell.t_exit = along(far, axis);
+    Exit exit = exit_of(ray, index_of(cell.node_at));
+    cell.t_exit = exit.t;
     if (has_slab(node)) node = enter_slab(ray, t_best, cell, node);
-    cell.node_at = place_of(kd_rope_of(index_of(cell.node_at), 2u * axis + is_above));
+    cell.node_at = place_of(exit.node_ix);
     return node;
 }

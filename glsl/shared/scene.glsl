@@ -15,7 +15,7 @@
 
 layout(constant_id = CONSTANT_READING) const uint READING = READING_BOUND;
 
-// Triangles as three rows, nodes as one: a device then loads each at once.
+// Triangles as three rows, nodes and ropes as one each: a device then loads each at once.
 layout(std430, set = 0, binding = BIND_TRIANGLES) readonly buffer TrianglesBlock { vec4 triangle_rows[]; };
 layout(std430, set = 0, binding = BIND_TRIANGLE_MATERIALS) readonly buffer TriangleMaterialsBlock { uint triangle_materials[]; };
 layout(std430, set = 0, binding = BIND_KD_NODES) readonly buffer KdNodesBlock { uvec2 kd_nodes[]; };
@@ -24,7 +24,7 @@ layout(std430, set = 0, binding = BIND_LEAF_TRIANGLES) readonly buffer LeafTrian
 layout(std430, set = 0, binding = BIND_LEAF_PLANES) readonly buffer LeafPlanesBlock { vec4 leaf_planes[]; };
 layout(std430, set = 0, binding = BIND_KD_SLABS) readonly buffer KdSlabsBlock { vec4 kd_slabs[]; };
 layout(std430, set = 0, binding = BIND_KD_BOXES) readonly buffer KdBoxesBlock { KdBox kd_boxes[]; };
-layout(std430, set = 0, binding = BIND_KD_ROPES) readonly buffer KdRopesBlock { uint kd_ropes[]; };
+layout(std430, set = 0, binding = BIND_KD_ROPES) readonly buffer KdRopesBlock { uvec2 kd_ropes[]; };
 
 layout(set = 0, binding = BIND_TEXELS + BIND_TRIANGLES) uniform usamplerBuffer triangle_texels;
 layout(set = 0, binding = BIND_TEXELS + BIND_TRIANGLE_MATERIALS) uniform usamplerBuffer triangle_material_texels;
@@ -122,11 +122,13 @@ KdBox kd_box_of(uint node_ix) {
     return kd_boxes[node_ix];
 }
 
-// side: below and above on x, y, z. 0: the face is the root's.
-uint kd_rope_of(uint node_ix, uint side) {
-    if (READING == READING_TEXELS) return word_of(kd_rope_texels, 6u * node_ix + side);
-    if (READING == READING_ADDRESS) return Words(addresses.kd_ropes).at[6u * node_ix + side];
-    return kd_ropes[6u * node_ix + side];
+// side: below and above on x, y, z.
+KdRope kd_rope_of(uint node_ix, uint side) {
+    uvec2 words;
+    if (READING == READING_TEXELS) words = pair_of(kd_rope_texels, 6u * node_ix + side);
+    else if (READING == READING_ADDRESS) words = Pairs(addresses.kd_ropes).at[6u * node_ix + side];
+    else words = kd_ropes[6u * node_ix + side];
+    return KdRope(uintBitsToFloat(words.x), words.y);
 }
 
 #endif

@@ -12,10 +12,10 @@ use super::{
 };
 use crate::{
     cpu,
-    frame::{BounceStats, Primary, Profile, RenderOptions, Traversal},
+    frame::{BounceStats, Profile, RenderOptions, Traversal},
     gpu::{Context, GpuError},
     kdtree::KdTree,
-    render::Renderer,
+    render::{Renderer, Ways, suited_primary},
     scene::Scene,
 };
 
@@ -74,7 +74,7 @@ pub fn draw_on_gpu(
     options: &RenderOptions,
     n_frames: u16,
 ) -> Result<Vec<Profile>, GpuError> {
-    let primary = Renderer::suited_primary(context, scene.triangles.len(), (options.width, options.height));
+    let primary = suited_primary(Some(context), scene.triangles.len(), (options.width, options.height));
     let options = &RenderOptions { primary, ..options.clone() };
     let mut renderer = Renderer::new(Arc::clone(context), scene, tree, options)?;
     warm_up(|| renderer.draw().map(drop))?;
@@ -91,8 +91,7 @@ pub fn draw_on_cpu(
     options: &RenderOptions,
     n_frames: u16,
 ) -> Result<Vec<Profile>, ThreadPoolBuildError> {
-    let primary = Primary::suited_to(scene.triangles.len(), (options.width, options.height), 1);
-    let options = &RenderOptions { primary, traversal: Traversal::OF_CPU, ..options.clone() };
+    let options = &Ways::default().suited(options, None, scene.triangles.len(), (options.width, options.height));
     let thread = ThreadPoolBuilder::new().num_threads(1).build()?;
     Ok(thread.install(|| (0..n_frames).map(|_| cpu::render(scene, tree, options).1).collect()))
 }

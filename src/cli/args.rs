@@ -167,7 +167,7 @@ impl RenderArgs {
 
     /// The options asked for; the scene's own fill what was left open. A crop beyond the picture is refused.
     pub fn options(&self, scene: &Scene) -> Result<RenderOptions, CliError> {
-        let options = self.picture.options(scene, self.cpu);
+        let options = self.picture.options(scene);
         let RenderOptions { width, height, .. } = options;
         if let Some(crop) = self.crop.filter(|crop| crop.x1 > width || crop.y1 > height) {
             return Err(CliError::Usage(format!(

@@ -9,6 +9,7 @@ use kdray::{
     kdtree::KdTree,
     layout::Triangle,
     output,
+    render::suited_traversal,
     scene::Scene,
 };
 
@@ -16,9 +17,7 @@ use super::{
     args::CastArgs,
     cast_report::{CastReport, Times},
     error::CliError,
-    open_device,
-    picture_args::way_through_tree,
-    print,
+    open_device, print,
     progress::Progress,
     render::{report_validation, set_threads},
 };
@@ -44,7 +43,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     let building = format!("building the kd-tree of {n_triangles} triangles");
     let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &build_options));
     let casting = format!("casting {} rays", rays.n_rays());
-    let traversal = way_through_tree(args.traversal, args.cpu);
+    let traversal = args.traversal.unwrap_or_else(|| suited_traversal(context.as_deref()));
     let engine = Engine::new(context.as_ref(), &scene.triangles, &tree, traversal)?;
     let (done, cast_ms) = progress.stage(&casting, || cast_all(args, rays, engine, &scene.triangles));
     let totals = done?;

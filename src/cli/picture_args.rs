@@ -3,8 +3,7 @@
 use clap::{ValueEnum, value_parser};
 use kdray::{
     frame::{Denoise, Primary, RenderOptions, Tonemap, Traversal},
-    gpu::Context,
-    render::Renderer,
+    render::Ways,
     scene::Scene,
 };
 
@@ -41,14 +40,11 @@ pub struct PictureArgs {
 
 /// What `--traversal` says of itself.
 pub fn way_help() -> String {
-    let (of_device, of_cpu) = (RenderOptions::default().traversal, Traversal::OF_CPU);
+    let [of_gpus, of_software, of_cpu] = [Traversal::OF_GPUS, Traversal::OF_SOFTWARE_DRIVERS, Traversal::OF_CPU];
     let words = Traversal::words();
-    format!("How rays find their way through the tree: {words} [default: {of_device}, with --cpu {of_cpu}]")
-}
-
-/// The way asked for, or what suits.
-pub fn way_through_tree(asked: Option<Traversal>, on_cpu: bool) -> Traversal {
-    asked.unwrap_or(if on_cpu { Traversal::OF_CPU } else { RenderOptions::default().traversal })
+    format!(
+        "How rays find their way through the tree: {words} [default: {of_gpus}, {of_software} on software drivers, with --cpu {of_cpu}]"
+    )
 }
 
 impl PictureArgs {
@@ -60,17 +56,13 @@ impl PictureArgs {
         Ok(())
     }
 
-    /// The primary rays asked for, or what suits; without a device, the CPU.
-    pub fn primary(&self, context: Option<&Context>, n_triangles: usize, size: (u32, u32)) -> Primary {
-        let suited = || match context {
-            Some(context) => Renderer::suited_primary(context, n_triangles, size),
-            None => Primary::suited_to(n_triangles, size, 1),
-        };
-        self.primary.unwrap_or_else(suited)
+    /// The ways asked for.
+    pub fn ways(&self) -> Ways {
+        Ways { traversal: self.traversal, primary: self.primary }
     }
 
-    /// The options asked for; the scene's own fill what was left open, but for what depends on the device: `primary`.
-    pub fn options(&self, scene: &Scene, on_cpu: bool) -> RenderOptions {
+    /// The options asked for; the scene's own fill what was left open, but for what depends on the device: [`Self::ways`].
+    pub fn options(&self, scene: &Scene) -> RenderOptions {
         let scene = &scene.defaults;
         let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });
         RenderOptions {
@@ -81,10 +73,7 @@ impl PictureArgs {
             exposure: self.exposure.unwrap_or(scene.exposure),
             tonemap: self.tonemap.unwrap_or(scene.tonemap),
             denoise: self.denoise(scene.denoise),
-            traversal: way_through_tree(self.traversal, on_cpu),
-            primary: RenderOptions::default().primary,
-            features: false,
-            profile: true,
+            ..RenderOptions::default()
         }
     }
 

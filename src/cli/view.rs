@@ -33,7 +33,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     let progress = Progress::new(args.quiet, 2);
     let (scene, _) = progress.stage(&format!("loading {}", args.scene.display()), || Scene::load(&args.scene));
     let scene = scene?;
-    let options = args.picture.options(&scene, false);
+    let options = args.picture.options(&scene);
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
     let (loaded, _) = progress.stage(&building, || Loaded::with_tree(&args.scene, scene));
     drop(progress);
@@ -47,7 +47,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         loaded,
         ViewOptions {
             settings,
-            primary: args.picture.primary,
+            ways: args.picture.ways(),
             device: ContextOptions { device: args.device.clone(), validate: args.validate },
             overlay: !args.no_overlay,
             tour,

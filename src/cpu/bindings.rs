@@ -3,7 +3,7 @@
 use super::table::{Counted, ReadCounts, Table, Uncounted};
 use crate::{
     kdtree::{Extras, KdTree},
-    layout::{Frame, Hit, KdBox, KdNode, Light, Material, Plane, Slab, Triangle},
+    layout::{Frame, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, Triangle},
     scene::Scene,
 };
 
@@ -27,7 +27,7 @@ pub struct Bindings<'a, R = Uncounted> {
     /// One a node, or none where the traversal does not ask for them.
     pub kd_boxes: Table<'a, KdBox, R>,
     /// Six a node, or none.
-    pub kd_ropes: Table<'a, u32, R>,
+    pub kd_ropes: Table<'a, KdRope, R>,
 }
 
 impl<'a> Bindings<'a> {

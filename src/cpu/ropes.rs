@@ -20,6 +20,17 @@ fn leaf_at(bindings: &Bindings<impl Reads>, ray: &TraversalRay, t: f32, node_ix:
     node
 }
 
+/// Where the ray leaves a leaf's cell, and the node that is there, 0 outside the root's: by the face that it comes to first.
+#[inline(always)]
+fn exit_of(bindings: &Bindings<impl Reads>, ray: &TraversalRay, leaf_ix: u32) -> (f32, u32) {
+    let exits = [0, 1, 2].map(|axis| {
+        let is_above = usize::from(!(ray.inv_direction[axis] < 0.0));
+        let rope = bindings.kd_ropes[6 * leaf_ix as usize + 2 * axis + is_above];
+        (rope.position * ray.inv_direction[axis] + ray.bias[axis], rope.node_ix)
+    });
+    exits.into_iter().reduce(|first, other| if other.0 < first.0 { other } else { first }).expect("three")
+}
+
 /// The closest hit, or with `ANY_HIT` one that need not be the closest.
 #[inline]
 pub fn follow_ropes<const ANY_HIT: bool>(bindings: &Bindings<impl Reads>, ray: &TraversalRay, best: &mut Hit) {
@@ -29,14 +40,9 @@ pub fn follow_ropes<const ANY_HIT: bool>(bindings: &Bindings<impl Reads>, ray: &
     let (mut node_ix, mut t) = (0, ray.t_enter);
     loop {
         let leaf = leaf_at(bindings, ray, t, &mut node_ix);
-        let far = ray.slabs_of(bindings, node_ix).far;
-        let axis = match (far[0] <= far[1] && far[0] <= far[2], far[1] <= far[2]) {
-            (true, _) => 0,
-            (_, true) => 1,
-            _ => 2,
-        };
         let t_enter = t;
-        t = far[axis];
+        let rope;
+        (t, rope) = exit_of(bindings, ray, node_ix);
         let way = [t_enter, min(t, best.t)];
         if !slab_of(bindings, leaf, node_ix).is_some_and(|slab| ray.is_clear_of(slab, way)) {
             intersect_leaf(bindings, ray, leaf, way, best);
@@ -44,8 +50,7 @@ pub fn follow_ropes<const ANY_HIT: bool>(bindings: &Bindings<impl Reads>, ray: &
         if is_done::<ANY_HIT>(best) || best.t < t {
             return;
         }
-        let is_above = usize::from(!(ray.inv_direction[axis] < 0.0));
-        node_ix = bindings.kd_ropes[6 * node_ix as usize + 2 * axis + is_above];
+        node_ix = rope;
         if node_ix == 0 {
             return;
         }

@@ -1,7 +1,10 @@
 //! What some traversals read beside the tree.
 
 use super::KdTree;
-use crate::{frame::Traversal, layout::KdBox};
+use crate::{
+    frame::Traversal,
+    layout::{KdBox, KdRope},
+};
 
 /// Empty where a traversal asks for nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -9,14 +12,14 @@ pub struct Extras {
     /// One a node.
     pub boxes: Vec<KdBox>,
     /// Six a node: below and above on x, y, z.
-    pub ropes: Vec<u32>,
+    pub ropes: Vec<KdRope>,
 }
 
 impl Extras {
     /// What the traversal reads of the tree.
     pub fn new(tree: &KdTree, traversal: Traversal) -> Self {
         let boxes = if traversal.needs_boxes() { tree.boxes() } else { Vec::new() };
-        let ropes = if traversal.needs_ropes() { tree.ropes(&boxes) } else { Vec::new() };
+        let ropes = if traversal.needs_ropes() { tree.ropes(&tree.boxes()) } else { Vec::new() };
         Self { boxes, ropes }
     }
 

@@ -2,28 +2,28 @@
 //! High Performance GPU Ray Tracing, Eurographics 2007, section 3).
 
 use super::{KdTree, Node, bounds::Bounds};
-use crate::layout::KdBox;
+use crate::layout::{KdBox, KdRope};
 
 /// Faces of a cell: below and above on x, y, z.
 const N_FACES: usize = 6;
 
 impl KdTree {
-    /// Six ropes a node: each the smallest node that has all of the face's other side; 0 where that is outside the
-    /// root's cell. `boxes` are the nodes' cells.
-    pub fn ropes(&self, boxes: &[KdBox]) -> Vec<u32> {
-        let mut ropes = vec![[0; N_FACES]; self.nodes.len()];
+    /// Six ropes a node, below and above on x, y, z. `boxes` are the nodes' cells.
+    pub fn ropes(&self, boxes: &[KdBox]) -> Vec<KdRope> {
+        let mut ropes = vec![[KdRope::default(); N_FACES]; self.nodes.len()];
         // Parents come before their children.
         for node_ix in 0..self.nodes.len() {
-            let cell = boxes[node_ix].into();
+            let cell: Bounds = boxes[node_ix].into();
             for (face, rope) in ropes[node_ix].iter_mut().enumerate() {
-                *rope = self.tightened(*rope, face, &cell);
+                let position = if face % 2 == 1 { cell.max[face / 2] } else { cell.min[face / 2] };
+                *rope = KdRope { position, node_ix: self.tightened(rope.node_ix, face, &cell) };
             }
             if let Node::Split { axis, child, .. } = self.node(node_ix as u32) {
                 let [below, above] = [child as usize, child as usize + 1];
                 ropes[below] = ropes[node_ix];
                 ropes[above] = ropes[node_ix];
-                ropes[below][2 * axis + 1] = child + 1;
-                ropes[above][2 * axis] = child;
+                ropes[below][2 * axis + 1].node_ix = child + 1;
+                ropes[above][2 * axis].node_ix = child;
             }
         }
         ropes.into_flattened()
@@ -88,7 +88,7 @@ mod tests {
                     neighbours(&tree, &cells, leaf, face).iter().map(|&node| path(&tree, node)).collect();
                 let is_common = |node: &&u32| paths.iter().all(|path| path.contains(node));
                 let expected = paths.first().map_or(0, |path| *path.iter().find(is_common).expect("the root"));
-                assert_eq!(ropes[N_FACES * leaf + face], expected, "leaf {leaf}, face {face}");
+                assert_eq!(ropes[N_FACES * leaf + face].node_ix, expected, "leaf {leaf}, face {face}");
                 n_checked += usize::from(expected != 0);
             }
         }

@@ -11,7 +11,7 @@ use crate::{
     layout::{
         Addresses, BIND_ADDRESSES, BIND_FRAME, BIND_KD_BOXES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_ROPES,
         BIND_KD_SLABS, BIND_LEAF_PLANES, BIND_LEAF_TRIANGLES, BIND_TEXELS, BIND_TRIANGLE_MATERIALS, BIND_TRIANGLES,
-        BRUTE_MAX_TRIANGLES, CONSTANT_MASK_WORDS, CONSTANT_READING, Frame, KD_WORD_DEPTH, KdBox, KdNode, Plane,
+        BRUTE_MAX_TRIANGLES, CONSTANT_MASK_WORDS, CONSTANT_READING, Frame, KD_WORD_DEPTH, KdBox, KdNode, KdRope, Plane,
         READING_ADDRESS, READING_BOUND, READING_TEXELS, Slab, Triangle,
     },
 };
@@ -90,7 +90,7 @@ pub struct Tree {
     /// One a node, after `add_extras`.
     pub kd_boxes: Buffer<KdBox>,
     /// Six a node, after `add_extras`.
-    pub kd_ropes: Buffer<u32>,
+    pub kd_ropes: Buffer<KdRope>,
     reading: Reading,
     /// Of the traversal's mask.
     mask_words: u32,
@@ -247,6 +247,6 @@ fn extents(triangles: &[Triangle], tree: &KdTree, slabs: &[Slab]) -> [Extent; 8]
         Extent::of::<Plane>(tree.leaf_planes.len()),
         Extent::of::<Slab>(slabs.len()),
         Extent::of::<KdBox>(n_nodes),
-        Extent::of::<u32>(6 * n_nodes), // ropes
+        Extent::of::<KdRope>(6 * n_nodes),
     ]
 }

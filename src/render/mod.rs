@@ -4,11 +4,13 @@ mod changes;
 mod parts;
 mod profile;
 mod schedule;
+mod ways;
 
 use std::sync::Arc;
 
 use tracing::info_span;
 
+pub use self::ways::{Ways, suited_primary, suited_traversal};
 use self::{
     parts::Pending,
     schedule::{Room, Schedule},
@@ -19,7 +21,7 @@ use crate::{
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     kdtree::KdTree,
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
-    passes::{Passes, Raster, Rasterize, Resources},
+    passes::{Passes, Rasterize, Resources},
     scene::{Camera, Scene},
 };
 
@@ -67,18 +69,6 @@ impl Renderer {
         capacity: u32,
     ) -> Result<Self, GpuError> {
         Self::with_capacity(context, scene, tree, options, Some(capacity))
-    }
-
-    /// The primary rays that a device finds soonest in a picture of that size.
-    pub fn suited_primary(context: &Context, n_triangles: usize, size: (u32, u32)) -> Primary {
-        if context.runs_both_sides() {
-            // Mesa's lavapipe: 870,000 triangles in 72 ms, 790,000 rays in 242 (benches/EXPERIMENTS.md).
-            Primary::suited_to(n_triangles, size, 4)
-        } else if context.has_wide_atomics() && Raster::has_room(context, n_triangles) {
-            Primary::Compute
-        } else {
-            Primary::suited_to(n_triangles, size, 1)
-        }
     }
 
     fn with_capacity(

@@ -25,7 +25,7 @@ use super::{
     session::Session,
     ui::{Layout, Ui},
 };
-use crate::{frame::RenderOptions, gpu::GpuError};
+use crate::{frame::RenderOptions, gpu::GpuError, render::Ways};
 
 /// The viewer, as the event loop drives it.
 pub(super) struct App {
@@ -73,9 +73,9 @@ impl App {
             .with_inner_size(PhysicalSize::new(options.width, options.height));
         let window = event_loop.create_window(attributes).map_err(|error| ViewError::Window(error.to_string()))?;
         let window = Arc::new(window);
-        let ViewOptions { device, primary, .. } = &self.options;
-        let live = Live::open(window.clone(), device, &self.session.loaded, options, *primary, *vsync)?;
-        self.session.settings.options.primary = live.renderer.options().primary;
+        let ViewOptions { device, ways, .. } = &self.options;
+        let live = Live::open(window.clone(), device, &self.session.loaded, options, *ways, *vsync)?;
+        self.session.settings.options = live.renderer.options().clone();
         Ok(Shown { live, ui: Ui::new(&window), window })
     }
 
@@ -147,8 +147,8 @@ impl App {
         drop((live, ui));
         self.session.complain(Topic::Device, &format!("{error}; the device was opened anew"));
         let Settings { options, vsync, .. } = &self.session.settings;
-        let primary = Some(options.primary);
-        match Live::open(window.clone(), &self.options.device, &self.session.loaded, options, primary, *vsync) {
+        let ways = Ways { traversal: Some(options.traversal), primary: Some(options.primary) };
+        match Live::open(window.clone(), &self.options.device, &self.session.loaded, options, ways, *vsync) {
             Ok(live) => {
                 self.is_reopened = true;
                 // What took the place of shaders went with the device.

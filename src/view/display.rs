@@ -16,14 +16,14 @@ use super::{
     session::Session,
     tour::Tour,
 };
-use crate::{frame::Primary, gpu::ContextOptions};
+use crate::{gpu::ContextOptions, render::Ways};
 
 /// What the viewer is asked for.
 pub struct ViewOptions {
     /// The options' size is the window's at first.
     pub settings: Settings,
-    /// In place of the settings': none for what suits the device.
-    pub primary: Option<Primary>,
+    /// In place of the settings'.
+    pub ways: Ways,
     pub device: ContextOptions,
     /// Whether there is an overlay; the user can hide it.
     pub overlay: bool,

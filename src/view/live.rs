@@ -6,10 +6,10 @@ use egui::TexturesDelta;
 
 use super::loaded::Loaded;
 use crate::{
-    frame::{Primary, RenderOptions},
+    frame::RenderOptions,
     gpu::{Context, ContextOptions, GpuError, Overlay, OverlayFrame, Presenter, Screen},
     passes::Present,
-    render::Renderer,
+    render::{Renderer, Ways},
 };
 
 /// A scene on a device that shows its pictures in a window.
@@ -22,7 +22,7 @@ pub struct Live {
 }
 
 impl Live {
-    /// Opens the device and uploads the scene. primary: in place of the options'; none for what suits the device.
+    /// Opens the device and uploads the scene. ways: in place of the options'.
     ///
     /// # Errors
     /// No device can do it; the scene or the picture is beyond its limits or memory.
@@ -31,14 +31,13 @@ impl Live {
         device: &ContextOptions,
         loaded: &Loaded,
         options: &RenderOptions,
-        primary: Option<Primary>,
+        ways: Ways,
         vsync: bool,
     ) -> Result<Self, GpuError> {
         let (context, surface) = Context::for_window(device, window)?;
         // In motion, where it has to be quick, a picture is smaller than its window.
         let moving = (options.width / 4, options.height / 4);
-        let suited = || Renderer::suited_primary(&context, loaded.scene.triangles.len(), moving);
-        let options = RenderOptions { primary: primary.unwrap_or_else(suited), ..options.clone() };
+        let options = ways.suited(options, Some(&context), loaded.scene.triangles.len(), moving);
         let presenter = Presenter::new(&context, surface, vsync)?;
         let overlay = Overlay::new(&context, &presenter)?;
         let renderer = Renderer::new(context.clone(), &loaded.scene, &loaded.tree, &options)?;

@@ -9,7 +9,7 @@ use kdray::{
     frame::{Primary, RenderOptions, Traversal},
     gpu::{Buffer, BufferUse, Context, ContextOptions, GpuError},
     kdtree::KdTree,
-    layout::{Frame, KdBox, LargeTriangle},
+    layout::{Frame, KdRope, LargeTriangle},
     passes::{Reading, Tree},
     render::Renderer,
     scene::Scene,
@@ -56,7 +56,7 @@ fn scene_bytes(tree: &Tree, traversal: Traversal) -> Vec<u64> {
     // None where the kernels would not look at them.
     buffers.extend((!tree.leaf_planes.is_empty()).then(|| tree.leaf_planes.any()));
     buffers.extend((!tree.kd_slabs.is_empty()).then(|| tree.kd_slabs.any()));
-    let has_boxes = matches!(traversal, Traversal::MaskBoxes | Traversal::Backtrack | Traversal::Ropes);
+    let has_boxes = matches!(traversal, Traversal::MaskBoxes | Traversal::Backtrack);
     buffers.extend(has_boxes.then(|| tree.kd_boxes.any()));
     buffers.extend((traversal == Traversal::Ropes).then(|| tree.kd_ropes.any()));
     buffers.iter().map(|buffer| buffer.bytes()).collect()
@@ -167,9 +167,9 @@ fn rays_through_a_scene_larger_than_what_the_device_binds_find_the_same_hits() {
 fn a_scene_is_read_by_address_only_where_something_of_it_cannot_be_bound() {
     let scene = scenes::mixed();
     let tree = tree_of(&scene);
-    let boxes = (tree.nodes.len() * size_of::<KdBox>()) as u64;
+    let ropes = (6 * tree.nodes.len() * size_of::<KdRope>()) as u64;
     let planes = size_of_val(&*tree.leaf_planes) as u64;
-    let largest = (size_of_val(&*scene.triangles) as u64).max(planes).max(boxes);
+    let largest = (size_of_val(&*scene.triangles) as u64).max(planes).max(ropes);
     let most_texels = (6 * tree.nodes.len()) as u32;
     let usual = usual_reading(&device(), &tree);
     for (range, n_texels, reading) in [

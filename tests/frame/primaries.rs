@@ -6,11 +6,11 @@ use glam::UVec2;
 use kdray::{
     camera::frame_constants,
     cpu::{bindings::Bindings, primary_hit::camera_ray, traverser::Traverser},
-    frame::{Crop, Picture, Primary, RenderOptions},
+    frame::{Crop, Picture, Primary, RenderOptions, Traversal},
     gpu::{Context, ContextOptions},
     kdtree::KdTree,
     layout::Frame,
-    render::Renderer,
+    render::{Renderer, suited_primary, suited_traversal},
     scene::Scene,
 };
 
@@ -88,15 +88,18 @@ fn compute_and_trace_are_the_same() {
 
 /// What takes less work, and what there is room for. A device that takes branches lane by lane is taken for a GPU.
 #[test]
-fn primaries_suit_the_device() {
+fn ways_suit_the_device() {
     let gpu = Context::with_lanes(&ContextOptions::default(), 1000).expect("a device");
-    let suited = |n_triangles| Renderer::suited_primary(&gpu, n_triangles, (100, 80));
+    let suited = |n_triangles| suited_primary(Some(&gpu), n_triangles, (100, 80));
     let by_kernels = if gpu.has_wide_atomics() { Primary::Compute } else { Primary::Trace };
     assert_eq!([suited(8001), suited(usize::MAX)], [by_kernels, Primary::Trace]);
     let without = Context::without_wide_atomics(&ContextOptions::default()).expect("a device");
     let n_raster = if without.runs_both_sides() { 4 * 8000 } else { 8000 };
-    let suited = [n_raster, n_raster + 1].map(|n| Renderer::suited_primary(&without, n, (100, 80)));
+    let suited = [n_raster, n_raster + 1].map(|n| suited_primary(Some(&without), n, (100, 80)));
     assert_eq!(suited, [Primary::Raster, Primary::Trace]);
+    let way = if without.runs_both_sides() { Traversal::Ropes } else { Traversal::Mask };
+    let suited = [Some(&*gpu), Some(&*without), None].map(suited_traversal);
+    assert_eq!(suited, [Traversal::Mask, way, Traversal::Stack]);
 }
 
 /// A living renderer makes room for what another way needs.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Subcommand, value_parser};
 use kdray::{
     bench::size::{MIN_TRIANGLES, MOST_TRIANGLES, SIZES},
-    frame::{RenderOptions, Traversal},
+    frame::Traversal,
     gpu::DeviceSelector,
     output,
 };
@@ -13,6 +13,7 @@ use kdray::{
 use crate::cli::{
     args::{Size, device},
     error::CliError,
+    picture_args::way_help,
 };
 
 /// What is measured.
@@ -36,9 +37,9 @@ pub struct PaperArgs {
     /// Pixels, as 640x480,1024x768 [default: the paper's three sizes]
     #[arg(long, value_name = "WxH", value_delimiter = ',')]
     pub size: Vec<Size>,
-    #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
-    #[arg(help = format!("Way through the tree on the GPU: {}", Traversal::words()))]
-    pub traversal: Traversal,
+    #[arg(long, value_name = "WAY")]
+    #[arg(help = way_help())]
+    pub traversal: Option<Traversal>,
     /// Frames on the GPU
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
@@ -110,9 +111,9 @@ pub struct SizeArgs {
     /// Pixels, one primary ray each
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,
-    #[arg(long, value_name = "WAY", default_value_t = RenderOptions::default().traversal)]
-    #[arg(help = format!("Way through the tree: {}", Traversal::words()))]
-    pub traversal: Traversal,
+    #[arg(long, value_name = "WAY")]
+    #[arg(help = way_help())]
+    pub traversal: Option<Traversal>,
     /// Timed casts of each set of rays
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,

@@ -10,6 +10,7 @@ use kdray::{
     frame::RenderOptions,
     gpu::{Context, ContextOptions},
     kdtree::{BuildOptions, KdTree},
+    render::suited_traversal,
     scene::Scene,
 };
 
@@ -30,11 +31,12 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
     };
     let progress = Progress::new(false, (SCENES.len() * (1 + sizes.len())) as u64);
     let context = open_device(&ContextOptions { device: args.device.clone(), validate: false }, &progress)?;
+    let traversal = args.traversal.unwrap_or_else(|| suited_traversal(Some(&context)));
     let mut report = Report {
         suite: "paper",
         device: context.info().name.clone(),
         driver: context.info().driver.clone(),
-        traversal: args.traversal.to_string(),
+        traversal: traversal.to_string(),
         n_gpu_frames: args.repeat,
         n_cpu_frames: if args.no_cpu { 0 } else { args.cpu_repeat },
         rows: Vec::new(),
@@ -45,9 +47,8 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
         let (scene, tree) = loaded?;
         for &size in &sizes {
             let drawing = format!("drawing {name}, {}x{}", size.0, size.1);
-            let (row, _) = progress.stage(&drawing, || {
-                measure(&context, (&scene, &tree), &options(&scene, size, args.traversal), &report)
-            });
+            let (row, _) = progress
+                .stage(&drawing, || measure(&context, (&scene, &tree), &options(&scene, size, traversal), &report));
             report.rows.push(row?);
         }
     }

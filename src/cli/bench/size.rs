@@ -7,7 +7,9 @@ use kdray::{
         rays::ray_sets,
         size::{RayGrowth, Report, Row, Sized},
     },
+    frame::Traversal,
     gpu::{Context, ContextOptions, GpuError},
+    render::suited_traversal,
 };
 
 use super::args::SizeArgs;
@@ -28,12 +30,13 @@ pub fn run(args: &SizeArgs) -> Result<(), CliError> {
     let device = ContextOptions { device: args.device.clone(), validate: false };
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
     let info = context.as_ref().map(|context| context.info());
+    let traversal = args.traversal.unwrap_or_else(|| suited_traversal(context.as_deref()));
     let n_threads = rayon::current_num_threads();
     let mut report = Report {
         suite: "size",
         device: info.map_or_else(|| format!("CPU, {n_threads} threads"), |info| info.name.clone()),
         driver: info.map(|info| info.driver.clone()),
-        traversal: args.traversal.to_string(),
+        traversal: traversal.to_string(),
         width: args.size.width,
         height: args.size.height,
         n_threads,
@@ -42,7 +45,7 @@ pub fn run(args: &SizeArgs) -> Result<(), CliError> {
     };
     // A size that is too large for the device leaves the smaller ones' results.
     let done = sizes.into_iter().try_for_each(|n_triangles| {
-        report.rows.push(measure(args, context.as_ref(), n_triangles, &progress)?);
+        report.rows.push(measure(args, context.as_ref(), traversal, n_triangles, &progress)?);
         Ok(())
     });
     drop(progress);
@@ -56,6 +59,7 @@ pub fn run(args: &SizeArgs) -> Result<(), CliError> {
 fn measure(
     args: &SizeArgs,
     context: Option<&Arc<Context>>,
+    traversal: Traversal,
     n_triangles: u32,
     progress: &Progress,
 ) -> Result<Row, GpuError> {
@@ -64,7 +68,7 @@ fn measure(
     let (sized, _) = progress.stage(&building, || Sized::new(n_triangles, pixels));
     let (sets, _) = progress.stage("making rays", || ray_sets(&sized.stage));
     let casting = format!("casting rays at {n_triangles} triangles");
-    progress.stage(&casting, || sized.measure(context, args.traversal, &sets, args.repeat)).0
+    progress.stage(&casting, || sized.measure(context, traversal, &sets, args.repeat)).0
 }
 
 /// The report as text that ends with a line break.

@@ -44,13 +44,14 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     for view in &views {
         view.files.check()?;
     }
-    let mut options = args.options(&scene)?;
+    let options = args.options(&scene)?;
     let device = ContextOptions { device: args.device.clone(), validate: args.validate };
     let opening = || info_span!("create device").in_scope(|| open_device(&device, &progress));
     let context = if args.cpu { None } else { Some(opening()?) };
 
     let n_triangles = scene.triangles.len();
-    options.primary = args.picture.primary(context.as_deref(), n_triangles, (options.width, options.height));
+    let size = (options.width, options.height);
+    let options = args.picture.ways().suited(&options, context.as_deref(), n_triangles, size);
     let n_rays = most_rays(args, &options, scene.lights.len(), views.len());
     let build_options = args.build.options(context.as_deref(), n_triangles, n_rays);
     let building = format!("building the kd-tree of {n_triangles} triangles");
