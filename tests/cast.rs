@@ -7,7 +7,7 @@ use std::{ops::RangeInclusive, sync::Arc};
 use glam::{Vec3, vec3};
 use kdray::{
     cast::{CastRay, Caster, Hit, NO_TRIANGLE, Query, cast_on_cpu},
-    cpu::kdtree::near_scene,
+    cpu::{kdtree::near_scene, probe::Probe},
     frame::Traversal,
     gpu::{Context, ContextOptions},
     layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, Ray},
@@ -220,7 +220,8 @@ fn repetitions_are_timed_one_by_one() {
 fn the_interval_s_ends_are_exact() {
     let device = Device::new();
     let world = World::new(meshes::torus(40, 20));
-    let is_near = |cast: &CastRay| near_scene(&world.bindings(), &ray(cast.origin, cast.direction)).1 == 0.0;
+    let is_near =
+        |cast: &CastRay| near_scene(&world.bindings(), &Probe::from(&ray(cast.origin, cast.direction))).1 == 0.0;
     let rays: Vec<_> = some_rays(&world, 5000, -9.0..=9.0).into_iter().filter(is_near).collect();
     let mut caster = device.caster(&world, Traversal::Mask);
     let mut cast = |rays: &[CastRay]| {

@@ -12,7 +12,8 @@ use kdray::{
         companions::{point_the_same_way, sort_by_direction},
         packet::LANES,
         packet_triangle::Shears,
-        traverser::{Probe, Traverser},
+        probe::Probe,
+        traverser::Traverser,
         triangle::Shear,
     },
     frame::Traversal,
@@ -168,7 +169,7 @@ fn others_go_with_rays_of_their_direction() {
     let mut order: Vec<u32> = (0..512).collect();
     sort_by_direction(&probes, &mut order);
     for eight in order.chunks(LANES) {
-        assert!(eight.iter().all(|&ix| probes[ix as usize].ray.direction == probes[eight[0] as usize].ray.direction));
+        assert!(eight.iter().all(|&ix| probes[ix as usize].direction == probes[eight[0] as usize].direction));
     }
     order.sort_unstable();
     assert_eq!(order, (0..512).collect::<Vec<_>>());

@@ -6,12 +6,8 @@ use glam::{Vec3, vec3};
 use kdray::{
     cast::Query,
     cpu::{
-        bindings::Bindings,
-        brute,
-        kdtree::near_scene,
-        steps::count_steps,
-        table::Table,
-        traverser::{Probe, Traverser},
+        bindings::Bindings, brute, kdtree::near_scene, probe::Probe, steps::count_steps, table::Table,
+        traverser::Traverser,
     },
     frame::Traversal,
     layout::{Hit, NO_TRIANGLE, Ray, Triangle},
@@ -225,7 +221,7 @@ fn a_needle_is_not_hit_beside() {
     let triangles = meshes::soup(1200, 7);
     let origin = vec3(-1.7435632, -4.7086616, -7.629315);
     let needle = ray(origin, vec3(0.40416333, 0.5116821, 0.75817764));
-    assert_eq!(brute::closest_hit(&triangles, &needle).triangle_ix, NO_TRIANGLE);
+    assert_eq!(brute::closest_hit(&triangles, &Probe::from(&needle)).triangle_ix, NO_TRIANGLE);
 }
 
 /// From so far away that rays start at the scene instead: the same triangles, by the test without that.
@@ -240,8 +236,9 @@ fn rays_from_afar_hit_the_same() {
             ray(origin, (within - origin).normalize())
         };
         let rays: Vec<Ray> = (0..N_RAYS / 10).map(afar).collect();
-        assert!(rays.iter().all(|ray| near_scene(&world.bindings(), ray).1 > 0.0));
-        let unmoved: Vec<Hit> = rays.par_iter().map(|ray| brute::closest_hit(&world.triangles, ray)).collect();
+        assert!(rays.iter().all(|ray| near_scene(&world.bindings(), &Probe::from(ray)).1 > 0.0));
+        let unmoved: Vec<Hit> =
+            rays.par_iter().map(|ray| brute::closest_hit(&world.triangles, &Probe::from(ray))).collect();
         for traversal in tree_traversals() {
             let found = traced(&world, traversal, &rays);
             let differs = |(a, b): &(&Hit, &Hit)| a.triangle_ix != b.triangle_ix || (a.t - b.t).abs() > 1e-6 * a.t;

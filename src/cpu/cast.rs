@@ -3,16 +3,11 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{
-    RAYS_PER_TASK,
-    bindings::Bindings,
-    kdtree::min,
-    traverser::{Probe, Traverser},
-};
+use super::{RAYS_PER_TASK, bindings::Bindings, kdtree::min, probe::Probe, traverser::Traverser};
 use crate::{
     cast::Query,
     frame::Traversal,
-    layout::{CastRay, Hit, NO_TRIANGLE, Ray},
+    layout::{CastRay, Hit, NO_TRIANGLE},
 };
 
 const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
@@ -41,15 +36,13 @@ fn scale_of(direction: Vec3) -> f32 {
 fn scaled(ray: &CastRay) -> Probe {
     let scale = scale_of(ray.direction);
     let inv_scale = 1.0 / scale;
-    let scaled = Ray {
+    Probe {
         origin: ray.origin,
-        pixel_ix: 0,
+        t_min: ray.t_min * inv_scale,
         direction: ray.direction * scale,
-        source_triangle: NO_TRIANGLE,
-        throughput: Vec3::ZERO,
         t_max: min(ray.t_max, f32::MAX) * inv_scale,
-    };
-    Probe { ray: scaled, t_min: ray.t_min * inv_scale }
+        source_triangle: NO_TRIANGLE,
+    }
 }
 
 fn cast_all<const ANY_HIT: bool>(bindings: &Bindings, traverser: &mut Traverser, rays: &[CastRay], hits: &mut [Hit]) {

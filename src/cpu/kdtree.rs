@@ -5,12 +5,13 @@ use glam::Vec3A;
 use super::{
     bindings::Bindings,
     leaf::{Target, intersect_leaf},
+    probe::Probe,
     slab::slab_of,
     table::Reads,
 };
 use crate::{
     kdtree::EMPTY_LEAF,
-    layout::{Hit, KD_AXIS_MASK, KD_LEAF, KD_ORIGIN_REACH, KD_PAIR_SHIFT, KD_PLANE_REACH, KdNode, NO_TRIANGLE, Ray},
+    layout::{Hit, KD_AXIS_MASK, KD_LEAF, KD_ORIGIN_REACH, KD_PAIR_SHIFT, KD_PLANE_REACH, KdNode, NO_TRIANGLE},
 };
 
 /// A node and the interval that the ray spends in it.
@@ -51,7 +52,7 @@ pub fn max(x: f32, y: f32) -> f32 {
 
 impl TraversalRay {
     #[inline]
-    pub fn new(bindings: &Bindings<impl Reads>, ray: &Ray, t_min: f32) -> Self {
+    pub fn new(bindings: &Bindings<impl Reads>, ray: &Probe) -> Self {
         let origin = ray.origin.to_array();
         let cell_min = bindings.frame.cell_min.to_array();
         let cell_max = bindings.frame.cell_max.to_array();
@@ -64,13 +65,13 @@ impl TraversalRay {
         let near = [0, 1, 2].map(|i| min(t0[i], t1[i]));
         let far = [0, 1, 2].map(|i| max(t0[i], t1[i]));
         Self {
-            target: Target::of(ray, t_min),
+            target: Target::of(ray),
             origin: ray.origin.into(),
             direction: ray.direction.into(),
             plane_reach: KD_PLANE_REACH * largest_coordinate(bindings),
             inv_direction: by_axis(inv_direction),
             bias: by_axis(bias),
-            t_enter: max(max(near[0], near[1]), max(near[2], t_min)),
+            t_enter: max(max(near[0], near[1]), max(near[2], ray.t_min)),
             t_exit: min(min(far[0], far[1]), min(far[2], ray.t_max)),
         }
     }
@@ -102,18 +103,19 @@ pub fn largest_coordinate(bindings: &Bindings<impl Reads>) -> f32 {
 
 /// Whether the ray starts so near that the margins of the leaves cover its rounding.
 #[inline(always)]
-pub fn is_within_reach(bindings: &Bindings<impl Reads>, ray: &Ray) -> bool {
+pub fn is_within_reach(bindings: &Bindings<impl Reads>, ray: &Probe) -> bool {
     ray.origin.abs().max_element() <= KD_ORIGIN_REACH * largest_coordinate(bindings)
 }
 
 /// The ray with its origin moved along it to lie within `KD_ORIGIN_REACH`, and how far: 0 for all but cameras far away.
 #[inline(always)]
-pub fn near_scene(bindings: &Bindings<impl Reads>, ray: &Ray) -> (Ray, f32) {
+pub fn near_scene(bindings: &Bindings<impl Reads>, ray: &Probe) -> (Probe, f32) {
     if is_within_reach(bindings, ray) {
         return (*ray, 0.0);
     }
-    let t_start = max(TraversalRay::new(bindings, ray, 0.0).t_enter, 0.0);
-    (Ray { origin: ray.origin + t_start * ray.direction, t_max: ray.t_max - t_start, ..*ray }, t_start)
+    let t_start = max(TraversalRay::new(bindings, &Probe { t_min: 0.0, ..*ray }).t_enter, 0.0);
+    let origin = ray.origin + t_start * ray.direction;
+    (Probe { origin, t_min: ray.t_min - t_start, t_max: ray.t_max - t_start, ..*ray }, t_start)
 }
 
 fn by_axis([x, y, z]: [f32; 3]) -> [f32; 4] {

@@ -2,8 +2,8 @@
 
 use glam::{Mat4, Vec3A, Vec4};
 
-use super::{bindings::Bindings, kdtree::TraversalRay, table::Reads, triangle::Shear};
-use crate::layout::{Hit, KD_PAIR_SHIFT, KdNode, Plane, Ray};
+use super::{bindings::Bindings, kdtree::TraversalRay, probe::Probe, table::Reads, triangle::Shear};
+use crate::layout::{Hit, KD_PAIR_SHIFT, KdNode, Plane};
 
 /// What tells a ray's hits from what it passes by.
 #[derive(Clone, Copy, Debug)]
@@ -14,11 +14,10 @@ pub struct Target {
 }
 
 impl Target {
-    /// Of a ray that is to be traced in (t_min, ray.t_max].
     #[inline(always)]
-    pub fn of(ray: &Ray, t_min: f32) -> Self {
+    pub fn of(ray: &Probe) -> Self {
         let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
-        Self { shear, t_min, source_triangle: ray.source_triangle }
+        Self { shear, t_min: ray.t_min, source_triangle: ray.source_triangle }
     }
 }
 

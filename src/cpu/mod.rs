@@ -32,6 +32,7 @@ pub mod pending_restart;
 pub mod pending_short_stack;
 pub mod pending_stack;
 pub mod primary_hit;
+pub mod probe;
 mod queue;
 mod render;
 pub mod resolve;

@@ -13,8 +13,8 @@ use super::{
     kdtree::{TraversalRay, largest_coordinate},
     leaf::{Target, entries_of},
     packet_triangle::{Found, Shears},
+    probe::Probe,
     table::Reads,
-    traverser::Probe,
 };
 use crate::layout::{Hit, KD_PLANE_REACH, KdNode, Plane, Slab};
 
@@ -69,10 +69,16 @@ impl<S: Simd> Interval<S> {
     }
 }
 
+/// Of vectors, one a ray.
 #[inline(always)]
-fn columns<S: Simd>(simd: S, of: impl Fn(usize) -> [f32; 3]) -> [f32x8<S>; 3] {
-    let rows: [[f32; 3]; LANES] = from_fn(of);
-    let [x, y, z] = [0, 1, 2].map(|axis| rows.map(|row| row[axis]));
+fn columns<S: Simd>(simd: S, rows: &[Vec3; LANES]) -> [f32x8<S>; 3] {
+    let mut columns = [[0.0; LANES]; 3];
+    for (lane, row) in rows.iter().enumerate() {
+        columns[0][lane] = row.x;
+        columns[1][lane] = row.y;
+        columns[2][lane] = row.z;
+    }
+    let [x, y, z] = columns;
     [f32x8::load_array(simd, x), f32x8::load_array(simd, y), f32x8::load_array(simd, z)]
 }
 
@@ -121,15 +127,24 @@ impl<S: Simd> Packet<S> {
     #[inline(always)]
     pub fn new(simd: S, bindings: &Bindings<impl Reads>, probes: &[Probe]) -> (Self, Interval<S>) {
         // Missing rays copy the first, and are in no cell.
-        let probe = |lane: usize| probes.get(lane).unwrap_or(&probes[0]);
-        let origin = columns(simd, |lane| probe(lane).ray.origin.to_array());
-        let direction = columns(simd, |lane| probe(lane).ray.direction.to_array());
+        let mut origins = [probes[0].origin; LANES];
+        let mut directions = [probes[0].direction; LANES];
+        let (mut t_mins, mut t_maxs) = ([probes[0].t_min; LANES], [probes[0].t_max; LANES]);
+        let mut source_triangles = [probes[0].source_triangle; LANES];
+        for (lane, probe) in probes.iter().enumerate() {
+            origins[lane] = probe.origin;
+            directions[lane] = probe.direction;
+            t_mins[lane] = probe.t_min;
+            t_maxs[lane] = probe.t_max;
+            source_triangles[lane] = probe.source_triangle;
+        }
+        let (origin, direction) = (columns(simd, &origins), columns(simd, &directions));
         let inv_direction = [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])];
         let bias = [-origin[0] * inv_direction[0], -origin[1] * inv_direction[1], -origin[2] * inv_direction[2]];
         let [x0, y0, z0] = times_plus(bindings.frame.cell_min.to_array(), &inv_direction, &bias);
         let [x1, y1, z1] = times_plus(bindings.frame.cell_max.to_array(), &inv_direction, &bias);
-        let t_min = f32x8::load_array(simd, from_fn(|lane| probe(lane).t_min));
-        let t_max = f32x8::load_array(simd, from_fn(|lane| probe(lane).ray.t_max));
+        let t_min = f32x8::load_array(simd, t_mins);
+        let t_max = f32x8::load_array(simd, t_maxs);
         let whole = Interval {
             enter: x0.min(x1).max(y0.min(y1)).max(z0.min(z1).max(t_min)),
             exit: x0.max(x1).min(y0.max(y1)).min(z0.max(z1).min(t_max)),
@@ -142,7 +157,7 @@ impl<S: Simd> Packet<S> {
             plane_reach: KD_PLANE_REACH * largest_coordinate(bindings),
             shears: Shears::of(&origin, &direction),
             t_min,
-            source_triangle: u32x8::load_array(simd, from_fn(|lane| probe(lane).ray.source_triangle)),
+            source_triangle: u32x8::load_array(simd, source_triangles),
             best: Found::nothing(t_max),
             t_best: t_max,
         };

@@ -9,9 +9,9 @@ use super::{
     kdtree::{Cell, Pending, TraversalRay, axis_of, is_leaf, search, search_cell},
     packet::{Interval, LANES, Packet},
     pending_stack::PendingStack,
+    probe::Probe,
     slab::slab_of,
     table::Reads,
-    traverser::Probe,
 };
 use crate::{
     kdtree::EMPTY_LEAF,

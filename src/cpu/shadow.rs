@@ -6,12 +6,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
-    RAYS_PER_TASK,
-    bindings::Bindings,
-    light::sample_light,
-    material::can_show,
-    surface::surface_at,
-    traverser::{Probe, Traverser},
+    RAYS_PER_TASK, bindings::Bindings, light::sample_light, material::can_show, probe::Probe, surface::surface_at,
+    traverser::Traverser,
 };
 use crate::{
     frame::Traversal,

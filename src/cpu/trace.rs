@@ -2,11 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{
-    RAYS_PER_TASK,
-    bindings::Bindings,
-    traverser::{Probe, Traverser},
-};
+use super::{RAYS_PER_TASK, bindings::Bindings, probe::Probe, traverser::Traverser};
 use crate::{
     frame::Traversal,
     layout::{Hit, NO_TRIANGLE, Ray},

@@ -9,7 +9,7 @@ use fearless_simd::Level;
 use super::{
     bindings::Bindings,
     brute,
-    companions::{WINDOW, point_the_same_way, sort_by_direction},
+    companions::{Window, point_the_same_way, sort_by_direction},
     kdtree::{Pending, TraversalRay, is_within_reach, near_scene, search},
     packet::LANES,
     packet_traverser::PacketTraverser,
@@ -17,33 +17,14 @@ use super::{
     pending_mask::PendingMask,
     pending_mask_boxes::PendingMaskBoxes,
     pending_short_stack::PendingMarked,
+    probe::Probe,
     ropes::follow_ropes,
     table::Reads,
 };
 use crate::{
     frame::Traversal,
-    layout::{Hit, NO_TRIANGLE, Ray},
+    layout::{Hit, NO_TRIANGLE},
 };
-
-/// A ray that is to be traced in (t_min, ray.t_max].
-#[derive(Clone, Copy, Debug)]
-pub struct Probe {
-    pub ray: Ray,
-    pub t_min: f32,
-}
-
-impl From<&Ray> for Probe {
-    fn from(ray: &Ray) -> Self {
-        Self { ray: *ray, t_min: 0.0 }
-    }
-}
-
-impl Probe {
-    /// What is there before anything is hit.
-    pub fn miss(&self) -> Hit {
-        Hit { t: self.ray.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 }
-    }
-}
 
 /// A traversal that remembers its working memory from ray to ray; one for each thread.
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
@@ -80,10 +61,9 @@ impl Traverser {
     /// The closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps t = t_max.
     #[inline]
     pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl Reads>, probe: &Probe) -> Hit {
-        let (ray_in, t_min) = (&probe.ray, probe.t_min);
-        let (near, t_start) = near_scene(bindings, ray_in);
-        let mut best = Hit { t: near.t_max, ..probe.miss() };
-        let ray = &TraversalRay::new(bindings, &near, t_min - t_start);
+        let (near, t_start) = near_scene(bindings, probe);
+        let mut best = near.miss();
+        let ray = &TraversalRay::new(bindings, &near);
         match self {
             Self::Mask(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
             Self::MaskBoxes(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
@@ -92,9 +72,9 @@ impl Traverser {
             Self::ShortStack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, &mut best),
             Self::Ropes => follow_ropes::<ANY_HIT>(bindings, ray, &mut best),
             Self::Stack(packets) => packets.traverse_alone::<ANY_HIT>(bindings, ray, &mut best),
-            Self::Brute => best = brute::closest_hit_beyond(bindings.triangles, &near, t_min - t_start),
+            Self::Brute => best = brute::closest_hit(bindings.triangles, &near),
         }
-        best.t = if best.triangle_ix == NO_TRIANGLE { ray_in.t_max } else { best.t + t_start };
+        best.t = if best.triangle_ix == NO_TRIANGLE { probe.t_max } else { best.t + t_start };
         best
     }
 
@@ -104,25 +84,25 @@ impl Traverser {
     pub fn traverse_all<const ANY_HIT: bool, Key>(
         &mut self,
         bindings: &Bindings<impl Reads>,
-        probes: impl Iterator<Item = (Key, Probe)>,
+        mut probes: impl Iterator<Item = (Key, Probe)>,
         mut found: impl FnMut(Key, Hit),
     ) {
         let Self::Stack(_) = self else {
             return probes.for_each(|(key, probe)| found(key, self.traverse::<ANY_HIT>(bindings, &probe)));
         };
-        let mut probes = probes.peekable();
-        while probes.peek().is_some() {
-            let (keys, window): (Vec<_>, Vec<_>) = probes.by_ref().take(WINDOW).unzip();
-            let hits = self.traverse_window::<ANY_HIT>(bindings, &window);
-            keys.into_iter().zip(hits).for_each(|(key, hit)| found(key, hit));
+        let mut window = Window::default();
+        while window.fill(&mut probes) {
+            self.traverse_window::<ANY_HIT, _>(bindings, &mut window);
+            window.tell(&mut found);
         }
     }
 
-    /// The rays' hits, in their order.
+    /// Finds the window's hits.
     #[inline]
-    fn traverse_window<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl Reads>, probes: &[Probe]) -> Vec<Hit> {
-        let mut hits = vec![Hit::zeroed(); probes.len()];
-        let mut others = Vec::new();
+    fn traverse_window<const ANY_HIT: bool, Key>(&mut self, bindings: &Bindings<impl Reads>, window: &mut Window<Key>) {
+        let Window { probes, hits, others, .. } = window;
+        hits.resize(probes.len(), Hit::zeroed());
+        others.clear();
         for (neighbours, first) in probes.chunks(LANES).zip((0..).step_by(LANES)) {
             if point_the_same_way(neighbours) {
                 let found = self.traverse_packet::<ANY_HIT>(bindings, neighbours);
@@ -131,13 +111,12 @@ impl Traverser {
                 others.extend(first as u32..(first + neighbours.len()) as u32);
             }
         }
-        sort_by_direction(probes, &mut others);
+        sort_by_direction(probes, others);
         for ray_ixs in others.chunks(LANES) {
             let companions: ArrayVec<_, LANES> = ray_ixs.iter().map(|&ix| probes[ix as usize]).collect();
             let found = self.traverse_packet::<ANY_HIT>(bindings, &companions);
             ray_ixs.iter().zip(found).for_each(|(&ix, hit)| hits[ix as usize] = hit);
         }
-        hits
     }
 
     /// Up to `LANES` rays. What starts far away is rare, and goes alone.
@@ -148,7 +127,7 @@ impl Traverser {
         probes: &[Probe],
     ) -> [Hit; LANES] {
         match self {
-            Self::Stack(packets) if probes.iter().all(|probe| is_within_reach(bindings, &probe.ray)) => {
+            Self::Stack(packets) if probes.iter().all(|probe| is_within_reach(bindings, probe)) => {
                 packets.traverse::<ANY_HIT>(bindings, probes)
             }
             _ => from_fn(|i| self.traverse::<ANY_HIT>(bindings, probes.get(i).unwrap_or(&probes[0]))),

@@ -3,12 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::{
-    RAYS_PER_TASK,
-    bindings::Bindings,
-    primary_hit::camera_ray,
-    traverser::{Probe, Traverser},
-};
+use super::{RAYS_PER_TASK, bindings::Bindings, primary_hit::camera_ray, probe::Probe, traverser::Traverser};
 use crate::frame::Traversal;
 
 /// Writes `triangle_ids` (`width * height`, rows from the top): the nearest triangle, or `NO_TRIANGLE`.

@@ -13,7 +13,7 @@ pub mod scenes;
 
 use glam::Vec3;
 use kdray::{
-    cpu::{bindings::Bindings, brute, kdtree::near_scene},
+    cpu::{bindings::Bindings, brute, kdtree::near_scene, probe::Probe},
     kdtree::{BuildOptions, Extras, KdTree},
     layout::{Frame, Hit, NO_TRIANGLE, Ray, Triangle},
 };
@@ -42,8 +42,8 @@ impl World {
 
     /// The closest hit beyond `t_min` over every triangle, of the ray as the traversal sees it.
     pub fn by_brute_force(&self, ray: &Ray, t_min: f32) -> Hit {
-        let (near, t_start) = near_scene(&self.bindings(), ray);
-        let hit = brute::closest_hit_beyond(&self.triangles, &near, t_min - t_start);
+        let (near, t_start) = near_scene(&self.bindings(), &Probe { t_min, ..Probe::from(ray) });
+        let hit = brute::closest_hit(&self.triangles, &near);
         Hit { t: if hit.triangle_ix == NO_TRIANGLE { ray.t_max } else { hit.t + t_start }, ..hit }
     }
 
