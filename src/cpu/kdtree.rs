@@ -76,11 +76,6 @@ impl TraversalRay {
         }
     }
 
-    #[inline(always)]
-    pub fn at(&self, t: f32) -> Vec3A {
-        self.origin + t * self.direction
-    }
-
     /// Where the ray meets the split plane.
     #[inline(always)]
     pub fn crossing(&self, node: KdNode) -> f32 {

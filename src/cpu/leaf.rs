@@ -2,7 +2,7 @@
 
 use glam::{Mat4, Vec3A, Vec4};
 
-use super::{bindings::Bindings, kdtree::TraversalRay, probe::Probe, table::Reads, triangle::Shear};
+use super::{bindings::Bindings, kdtree::TraversalRay, probe::Probe, slab::Way, table::Reads, triangle::Shear};
 use crate::layout::{Hit, KD_PAIR_SHIFT, KdNode, Plane};
 
 /// What tells a ray's hits from what it passes by.
@@ -52,14 +52,14 @@ fn four_planes(planes: &[Plane], first: usize) -> Mat4 {
     }
 }
 
-/// Bit i is set where the segment does not keep to one side of plane i, so far from it that no rounding of the hit test
+/// Bit i is set where the ray does not keep to one side of plane i on its way, so far from it that no rounding of the hit test
 /// reaches across.
 #[inline(always)]
-fn near_planes(planes: &Mat4, from: Vec3A, to: Vec3A, reach: f32) -> u32 {
-    let height = |p: Vec3A| planes.x_axis * p.x + planes.y_axis * p.y + planes.z_axis * p.z - planes.w_axis;
-    let (height_from, height_to) = (height(from), height(to));
-    let one_side = (height_from * height_to).cmpgt(Vec4::ZERO);
-    !(one_side & height_from.abs().min(height_to.abs()).cmpgt(Vec4::splat(reach))).bitmask()
+fn near_planes(ray: &TraversalRay, way: Way, planes: &Mat4) -> u32 {
+    let dot = |v: Vec3A| planes.x_axis * v.x + planes.y_axis * v.y + planes.z_axis * v.z;
+    let (height, slope) = (dot(ray.origin) - planes.w_axis, dot(ray.direction));
+    let is_clear = (way.middle * slope + height).abs().cmpgt(way.half * slope.abs() + Vec4::splat(ray.plane_reach));
+    !is_clear.bitmask()
 }
 
 /// The leaf's triangles, but those whose planes the ray does not meet within the cell; all of them where the tree has no
@@ -77,10 +77,10 @@ pub fn intersect_leaf(
     if bindings.leaf_planes.is_empty() {
         return triangles.iter().for_each(|&ix| intersect(bindings, &ray.target, ix, best));
     }
-    let (from, to) = (ray.at(t_enter), ray.at(t_exit));
+    let way = Way::new(t_enter, t_exit);
     for (four, first) in triangles.chunks(4).zip(entries.step_by(4)) {
         let planes = four_planes(bindings.leaf_planes, first);
-        let mut near = near_planes(&planes, from, to, ray.plane_reach) & ((1 << four.len()) - 1);
+        let mut near = near_planes(ray, way, &planes) & ((1 << four.len()) - 1);
         while near != 0 {
             intersect(bindings, &ray.target, four[near.trailing_zeros() as usize], best);
             near &= near - 1;

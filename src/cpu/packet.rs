@@ -16,7 +16,7 @@ use super::{
     probe::Probe,
     table::Reads,
 };
-use crate::layout::{Hit, KD_PLANE_REACH, KdNode, Plane, Slab};
+use crate::layout::{Hit, KD_PLANE_REACH, KdNode, Slab};
 
 /// Rays of a packet.
 pub const LANES: usize = 8;
@@ -32,6 +32,12 @@ pub type Lanes = u32;
 pub struct Interval<S: Simd> {
     pub enter: f32x8<S>,
     pub exit: f32x8<S>,
+}
+
+/// The middles of the rays' ways through a cell, and half their lengths, in t.
+struct Ways<S: Simd> {
+    middle: f32x8<S>,
+    half: f32x8<S>,
 }
 
 /// The rays as columns, and what each has found.
@@ -116,12 +122,6 @@ fn dot<S: Simd>(normal: Vec3, v: &[f32x8<S>; 3]) -> f32x8<S> {
     normal.x * v[0] + normal.y * v[1] + normal.z * v[2]
 }
 
-/// Heights of points above a plane.
-#[inline(always)]
-fn heights<S: Simd>(plane: &Plane, at: &[f32x8<S>; 3]) -> f32x8<S> {
-    dot(plane.normal, at) - plane.distance
-}
-
 impl<S: Simd> Packet<S> {
     /// The packet, and where its rays are in the root's cell: the operations of `TraversalRay::new`.
     #[inline(always)]
@@ -177,24 +177,26 @@ impl<S: Simd> Packet<S> {
         like_on_axis(x, lane) & like_on_axis(y, lane) & like_on_axis(z, lane)
     }
 
-    /// Which of the rays do not keep to one side of a slab within the cell.
+    /// The rays' ways through the cell, but for what lies beyond their best hits.
     #[inline(always)]
-    pub fn lanes_in_slab(&self, slab: &Slab, cell: &Interval<S>) -> Lanes {
-        let t_exit = cell.exit.min(self.t_best);
-        let (t_middle, t_half) = ((cell.enter + t_exit) * 0.5, (t_exit - cell.enter) * 0.5);
-        let height = dot(slab.normal, &self.origin) - slab.offset;
-        let slope = dot(slab.normal, &self.direction);
-        let is_clear = (t_middle * slope + height).abs().simd_gt(t_half * slope.abs() + 1.0);
+    fn ways(&self, cell: &Interval<S>) -> Ways<S> {
+        let exit = cell.exit.min(self.t_best);
+        Ways { middle: (cell.enter + exit) * 0.5, half: (exit - cell.enter) * 0.5 }
+    }
+
+    /// Which of the rays do not keep to one side of a plane on their ways, farther from it than `reach`.
+    #[inline(always)]
+    fn lanes_near(&self, ways: &Ways<S>, normal: Vec3, distance: f32, reach: f32) -> Lanes {
+        let height = dot(normal, &self.origin) - distance;
+        let slope = dot(normal, &self.direction);
+        let is_clear = (ways.middle * slope + height).abs().simd_gt(ways.half * slope.abs() + reach);
         !is_clear.to_bitmask() as Lanes
     }
 
-    /// Which of the rays do not keep to one side of a plane within the cell.
+    /// Which of the rays come into a slab within the cell.
     #[inline(always)]
-    fn near_plane(&self, plane: &Plane, from: &[f32x8<S>; 3], to: &[f32x8<S>; 3]) -> Lanes {
-        let (height_from, height_to) = (heights(plane, from), heights(plane, to));
-        let one_side = (height_from * height_to).simd_gt(0.0);
-        let apart = height_from.abs().min(height_to.abs()).simd_gt(self.plane_reach);
-        !(one_side & apart).to_bitmask() as Lanes
+    pub fn lanes_in_slab(&self, slab: &Slab, cell: &Interval<S>) -> Lanes {
+        self.lanes_near(&self.ways(cell), slab.normal, slab.offset, 1.0)
     }
 
     /// The leaf's triangles against the rays that are in it.
@@ -210,15 +212,13 @@ impl<S: Simd> Packet<S> {
             return;
         }
         let in_cell = cell.lanes();
-        let t_to = cell.exit.min(self.t_best);
-        let from = times_plus([cell.enter; 3], &self.direction, &self.origin);
-        let to = times_plus([t_to; 3], &self.direction, &self.origin);
+        let ways = self.ways(cell);
         // Planes first, triangles after: so that the loads of several triangles are on their way at once.
         for (triangles, first) in bindings.leaf_triangles[entries.clone()].chunks(BLOCK).zip(entries.step_by(BLOCK)) {
-            let mut near = [0; BLOCK];
+            let mut near = [in_cell; BLOCK];
             for (lanes, entry) in near.iter_mut().zip(first..first + triangles.len()) {
-                let plane = bindings.leaf_planes.get(entry);
-                *lanes = in_cell & if let Some(plane) = plane { self.near_plane(plane, &from, &to) } else { !0 };
+                let Some(plane) = bindings.leaf_planes.get(entry) else { break };
+                *lanes &= self.lanes_near(&ways, plane.normal, plane.distance, self.plane_reach);
             }
             for (&triangle_ix, lanes) in triangles.iter().zip(near) {
                 if lanes != 0 {
