@@ -2,7 +2,7 @@
 
 use glam::{Mat4, Vec3A, Vec4};
 
-use super::{bindings::Bindings, kdtree::TraversalRay, probe::Probe, slab::Way, table::Reads, triangle::Shear};
+use super::{bindings::Bindings, kdtree::TraversalRay, probe::Probe, slab::Stretch, table::Reads, triangle::Shear};
 use crate::layout::{Hit, KD_PAIR_SHIFT, KdNode, Plane};
 
 /// What tells a ray's hits from what it passes by.
@@ -55,7 +55,7 @@ fn four_planes(planes: &[Plane], first: usize) -> Mat4 {
 /// Bit i is set where the ray does not keep to one side of plane i on its way, so far from it that no rounding of the hit test
 /// reaches across.
 #[inline(always)]
-fn near_planes(ray: &TraversalRay, way: Way, planes: &Mat4) -> u32 {
+fn near_planes(ray: &TraversalRay, way: Stretch, planes: &Mat4) -> u32 {
     let dot = |v: Vec3A| planes.x_axis * v.x + planes.y_axis * v.y + planes.z_axis * v.z;
     let (height, slope) = (dot(ray.origin) - planes.w_axis, dot(ray.direction));
     let is_clear = (way.middle * slope + height).abs().cmpgt(way.half * slope.abs() + Vec4::splat(ray.plane_reach));
@@ -77,7 +77,7 @@ pub fn intersect_leaf(
     if bindings.leaf_planes.is_empty() {
         return triangles.iter().for_each(|&ix| intersect(bindings, &ray.target, ix, best));
     }
-    let way = Way::new(t_enter, t_exit);
+    let way = Stretch::new(t_enter, t_exit);
     for (four, first) in triangles.chunks(4).zip(entries.step_by(4)) {
         let planes = four_planes(bindings.leaf_planes, first);
         let mut near = near_planes(ray, way, &planes) & ((1 << four.len()) - 1);

@@ -35,7 +35,7 @@ pub struct Interval<S: Simd> {
 }
 
 /// The middles of the rays' ways through a cell, and half their lengths, in t.
-struct Ways<S: Simd> {
+struct Stretches<S: Simd> {
     middle: f32x8<S>,
     half: f32x8<S>,
 }
@@ -179,14 +179,14 @@ impl<S: Simd> Packet<S> {
 
     /// The rays' ways through the cell, but for what lies beyond their best hits.
     #[inline(always)]
-    fn ways(&self, cell: &Interval<S>) -> Ways<S> {
+    fn ways(&self, cell: &Interval<S>) -> Stretches<S> {
         let exit = cell.exit.min(self.t_best);
-        Ways { middle: (cell.enter + exit) * 0.5, half: (exit - cell.enter) * 0.5 }
+        Stretches { middle: (cell.enter + exit) * 0.5, half: (exit - cell.enter) * 0.5 }
     }
 
     /// Which of the rays do not keep to one side of a plane on their ways, farther from it than `reach`.
     #[inline(always)]
-    fn lanes_near(&self, ways: &Ways<S>, normal: Vec3, distance: f32, reach: f32) -> Lanes {
+    fn lanes_near(&self, ways: &Stretches<S>, normal: Vec3, distance: f32, reach: f32) -> Lanes {
         let height = dot(normal, &self.origin) - distance;
         let slope = dot(normal, &self.direction);
         let is_clear = (ways.middle * slope + height).abs().simd_gt(ways.half * slope.abs() + reach);

@@ -12,12 +12,12 @@ pub fn slab_of<'a>(bindings: &Bindings<'a, impl Reads>, node: KdNode, node_ix: u
 
 /// The middle of a ray's way through a cell, and half its length, in t.
 #[derive(Clone, Copy)]
-pub struct Way {
+pub struct Stretch {
     pub middle: f32,
     pub half: f32,
 }
 
-impl Way {
+impl Stretch {
     #[inline(always)]
     pub fn new(t_enter: f32, t_exit: f32) -> Self {
         Self { middle: 0.5 * (t_enter + t_exit), half: 0.5 * (t_exit - t_enter) }
@@ -28,7 +28,7 @@ impl TraversalRay {
     /// Whether the ray keeps to one side of the slab on its way from `t_enter` to `t_exit`.
     #[inline(always)]
     pub fn is_clear_of(&self, slab: &Slab, [t_enter, t_exit]: [f32; 2]) -> bool {
-        let way = Way::new(t_enter, t_exit);
+        let way = Stretch::new(t_enter, t_exit);
         let height = slab.normal.dot(self.origin.into()) - slab.offset;
         let slope = slab.normal.dot(self.direction.into());
         (way.middle * slope + height).abs() > way.half * slope.abs() + 1.0
