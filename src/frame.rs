@@ -115,7 +115,7 @@ pub enum Traversal {
 }
 
 impl Traversal {
-    /// The paper's idea, within a tenth of what is fastest on a GPU.
+    /// The paper's idea; a stack and ropes are up to a seventh faster on some scenes (benches/EXPERIMENTS.md).
     pub const OF_GPUS: Self = Self::Mask;
     /// What is fastest where drivers run kernels on the CPU.
     pub const OF_SOFTWARE_DRIVERS: Self = Self::Ropes;
