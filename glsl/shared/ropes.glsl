@@ -28,8 +28,8 @@ Exit exit_of(TraversalRay ray, uint leaf_ix) {
     return Exit(t, x.t == t ? x.node_ix : (y.t == t ? y.node_ix : z.node_ix));
 }
 
-// Down to the leaf where the ray is at t_enter, through all slabs but the leaf's own: where the ray leaves other cells is not
-// known. Then node_at is where the rope of the face leads to by which the ray leaves it.
+// Down to the leaf where the ray is at t_enter, through all slabs but the leaf's own: to find out where the ray leaves other cells
+// costs more than their slabs spare (benches/EXPERIMENTS.md). Then node_at is where the rope of the face leads to by which the ray leaves it.
 KdNode descend_to_rope(TraversalRay ray, float t_best, inout Cell cell) {
     KdNode node = kd_node(cell.node_at);
     while (!is_leaf(node)) {

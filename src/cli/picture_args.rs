@@ -40,11 +40,13 @@ pub struct PictureArgs {
 
 /// What `--traversal` says of itself.
 pub fn way_help() -> String {
-    let [of_gpus, of_software, of_cpu] = [Traversal::OF_GPUS, Traversal::OF_SOFTWARE_DRIVERS, Traversal::OF_CPU];
-    let words = Traversal::words();
-    format!(
-        "How rays find their way through the tree: {words} [default: {of_gpus}, {of_software} on software drivers, with --cpu {of_cpu}]"
-    )
+    let (words, of_devices, of_cpu) = (Traversal::words(), ways_of_devices(), Traversal::OF_CPU);
+    format!("How rays find their way through the tree: {words} [default: {of_devices}, with --cpu {of_cpu}]")
+}
+
+/// What devices take by default.
+pub fn ways_of_devices() -> String {
+    format!("{}, {} on software drivers", Traversal::OF_GPUS, Traversal::OF_SOFTWARE_DRIVERS)
 }
 
 impl PictureArgs {

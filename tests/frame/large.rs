@@ -30,7 +30,7 @@ fn small_device() -> Arc<Context> {
     device_with(RANGE, 1)
 }
 
-/// How a device reads what it can bind. Ropes have the most texels, of a word each.
+/// How a device reads what it can bind. Ropes have the most texels, one each.
 fn usual_reading(context: &Context, tree: &KdTree) -> Reading {
     let has_texels = 6 * tree.nodes.len() <= context.limits().n_texels as usize;
     if context.runs_both_sides() && has_texels { Reading::Texels } else { Reading::Bound }

@@ -13,7 +13,7 @@ use kdray::{
 use crate::cli::{
     args::{Size, device},
     error::CliError,
-    picture_args::way_help,
+    picture_args::{way_help, ways_of_devices},
 };
 
 /// What is measured.
@@ -38,7 +38,7 @@ pub struct PaperArgs {
     #[arg(long, value_name = "WxH", value_delimiter = ',')]
     pub size: Vec<Size>,
     #[arg(long, value_name = "WAY")]
-    #[arg(help = way_help())]
+    #[arg(help = format!("Way through the tree on the GPU: {} [default: {}]", Traversal::words(), ways_of_devices()))]
     pub traversal: Option<Traversal>,
     /// Frames on the GPU
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
