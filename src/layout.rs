@@ -31,6 +31,7 @@ mod tests {
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
             BIND_KD_BOXES => Some("KdBox"),
             BIND_KD_ROPES => Some("KdRope"),
+            BIND_LEAF_TRIANGLES => Some("LeafTriangle"),
             BIND_LEAF_PLANES => Some("Plane"),
             BIND_KD_SLABS => Some("Slab"),
             BIND_CAST_RAYS => Some("CastRay"),

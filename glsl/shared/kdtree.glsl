@@ -245,9 +245,9 @@ bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
 }
 
 // A triangle against the ray.
-void intersect(TraversalRay ray, uint triangle_ix, inout Nearest best) {
+void intersect(TraversalRay ray, Triangle triangle, uint triangle_ix, inout Nearest best) {
     Hit hit;
-    if (!intersect_triangle(ray.shear, triangle_at(triangle_ix), triangle_ix, hit)) return;
+    if (!intersect_triangle(ray.shear, triangle, triangle_ix, hit)) return;
     if (is_better(ray, hit.t, triangle_ix, best)) {
         best = Nearest(hit.t, triangle_ix);
         keep_pair(WEIGHTS_PLACE, hit.u, hit.v);
@@ -302,7 +302,8 @@ void search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
     do {
         uint entry_ix;
         if (find_candidate(ray, visit, entry_ix)) {
-            intersect(ray, leaf_triangle_at(entry_ix), best);
+            LeafTriangle entry = leaf_triangle_at(entry_ix);
+            intersect(ray, corners_of(entry), entry.triangle_ix, best);
             goes_on = !is_done(any_hit, best);
         } else {
             goes_on = find_pending(ray, best.t, cell);

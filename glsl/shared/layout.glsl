@@ -94,6 +94,17 @@ struct Triangle {
     uint n2;
 };
 
+// 48 bytes: a triangle as a leaf has it, so that a ray's test waits for one load, not for an index and then a triangle. Corners as
+// in Triangle; triangle_ix: its number.
+struct LeafTriangle {
+    vec3 v0;
+    uint triangle_ix;
+    vec3 v1;
+    uint reserved0;
+    vec3 v2;
+    uint reserved1;
+};
+
 // 8 bytes. Split: split_or_first = bits of the plane's position on the axis (world units).
 // Leaf: split_or_first = index of its first entry in leaf_triangles. Children of a split are neighbours at an even
 // index, so a node's sibling is `index ^ 1`; the root is node 0 and node 1 is unused.

@@ -22,15 +22,15 @@ bool find_candidate_in_step(TraversalRay ray, float reach, inout Visit visit) {
 }
 
 // As `intersect`, without a branch.
-void intersect_in_step(TraversalRay ray, uint triangle_ix, bool tests, inout Nearest best) {
+void intersect_in_step(TraversalRay ray, LeafTriangle entry, bool tests, inout Nearest best) {
     vec3 a, b, c;
-    vec3 edges = exact_edges(seen_edges(ray.shear, triangle_at(triangle_ix), a, b, c), a, b, c);
+    vec3 edges = exact_edges(seen_edges(ray.shear, corners_of(entry), a, b, c), a, b, c);
     precise float det = edges.x + edges.y + edges.z;
-    Hit hit = weighted_hit(ray.shear, edges, det, vec3(a.z, b.z, c.z), triangle_ix);
-    bool is_new = tests && !is_outside(edges) && abs(det) > 0.0 && is_better(ray, hit.t, triangle_ix, best);
+    Hit hit = weighted_hit(ray.shear, edges, det, vec3(a.z, b.z, c.z), entry.triangle_ix);
+    bool is_new = tests && !is_outside(edges) && abs(det) > 0.0 && is_better(ray, hit.t, entry.triangle_ix, best);
     vec2 weights = kept_pair(WEIGHTS_PLACE);
     best.t = is_new ? hit.t : best.t;
-    best.triangle_ix = is_new ? triangle_ix : best.triangle_ix;
+    best.triangle_ix = is_new ? entry.triangle_ix : best.triangle_ix;
     keep_pair(WEIGHTS_PLACE, is_new ? hit.u : weights.x, is_new ? hit.v : weights.y);
 }
 
@@ -68,7 +68,7 @@ void search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
             is_second = true;
             if (!seeks) break;
         }
-        intersect_in_step(ray, found ? leaf_triangle_at(visit.entry_ix - 1u) : 0u, found, best);
+        intersect_in_step(ray, leaf_triangle_at(found ? visit.entry_ix - 1u : 0u), found, best);
         goes_on = goes_on && !is_done(any_hit, best);
         if (!goes_on) break;
     }

@@ -15,12 +15,12 @@
 
 layout(constant_id = CONSTANT_READING) const uint READING = READING_BOUND;
 
-// Triangles as three rows, nodes and ropes as one each: a device then loads each at once.
+// Triangles, and the leaves' triangles, as three rows, nodes and ropes as one each: a device then loads each at once.
 layout(std430, set = 0, binding = BIND_TRIANGLES) readonly buffer TrianglesBlock { vec4 triangle_rows[]; };
 layout(std430, set = 0, binding = BIND_TRIANGLE_MATERIALS) readonly buffer TriangleMaterialsBlock { uint triangle_materials[]; };
 layout(std430, set = 0, binding = BIND_KD_NODES) readonly buffer KdNodesBlock { uvec2 kd_nodes[]; };
 layout(std430, set = 0, binding = BIND_KD_PARENTS) readonly buffer KdParentsBlock { uint kd_parents[]; };
-layout(std430, set = 0, binding = BIND_LEAF_TRIANGLES) readonly buffer LeafTrianglesBlock { uint leaf_triangles[]; };
+layout(std430, set = 0, binding = BIND_LEAF_TRIANGLES) readonly buffer LeafTrianglesBlock { vec4 leaf_triangle_rows[]; };
 layout(std430, set = 0, binding = BIND_LEAF_PLANES) readonly buffer LeafPlanesBlock { vec4 leaf_planes[]; };
 layout(std430, set = 0, binding = BIND_KD_SLABS) readonly buffer KdSlabsBlock { vec4 kd_slabs[]; };
 layout(std430, set = 0, binding = BIND_KD_BOXES) readonly buffer KdBoxesBlock { KdBox kd_boxes[]; };
@@ -88,10 +88,23 @@ uint kd_parent_of(uint node_ix) {
     return kd_parents[node_ix >> 1];
 }
 
-uint leaf_triangle_at(uint entry_ix) {
-    if (READING == READING_TEXELS) return word_of(leaf_triangle_texels, entry_ix);
-    if (READING == READING_ADDRESS) return Words(addresses.leaf_triangles).at[entry_ix];
-    return leaf_triangles[entry_ix];
+// As triangle_row, of a leaf's entry.
+vec4 leaf_triangle_row(uint row_ix) {
+    if (READING == READING_TEXELS) return row_of(leaf_triangle_texels, row_ix);
+    if (READING == READING_ADDRESS) return Rows(addresses.leaf_triangles).at[row_ix];
+    return leaf_triangle_rows[row_ix];
+}
+
+LeafTriangle leaf_triangle_at(uint entry_ix) {
+    vec4 v0 = leaf_triangle_row(3u * entry_ix);
+    vec4 v1 = leaf_triangle_row(3u * entry_ix + 1u);
+    vec4 v2 = leaf_triangle_row(3u * entry_ix + 2u);
+    return LeafTriangle(v0.xyz, floatBitsToUint(v0.w), v1.xyz, 0u, v2.xyz, 0u);
+}
+
+// What a test needs of it.
+Triangle corners_of(LeafTriangle entry) {
+    return Triangle(entry.v0, 0u, entry.v1, 0u, entry.v2, 0u);
 }
 
 // A Plane as a vector: normal, distance.

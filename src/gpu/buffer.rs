@@ -8,7 +8,7 @@ use gpu_allocator::{MemoryLocation, vulkan::Allocation};
 
 use super::{Access, Context, GpuError};
 
-/// What an upload copies at a time, so that it takes little memory beside the buffer's own.
+/// What an upload copies at a time, at most, so that it takes little memory beside the buffer's own.
 const MOST_STAGING_BYTES: usize = 64 << 20;
 /// Of a vector of four: what a kernel reads at once by address.
 const ROW_BYTES: u64 = 16;
@@ -108,6 +108,23 @@ impl<T: Pod> Buffer<T> {
         Ok(buffer)
     }
 
+    /// A buffer of `len` elements, which `write(first, part)` makes in parts: those from element `first` on. They are never
+    /// in the host's memory together.
+    ///
+    /// # Errors
+    /// As [`Buffer::new`]; a failed copy.
+    pub fn written_by(
+        context: &Arc<Context>,
+        name: &str,
+        len: usize,
+        usage: BufferUse,
+        write: impl FnMut(usize, &mut [T]),
+    ) -> Result<Self, GpuError> {
+        let buffer = Self::new(context, name, len, usage)?;
+        buffer.upload_by(len, write)?;
+        Ok(buffer)
+    }
+
     /// Elements.
     pub fn len(&self) -> usize {
         self.len
@@ -120,18 +137,24 @@ impl<T: Pod> Buffer<T> {
     /// Overwrites the first `data.len()` elements; waits for the device.
     pub fn upload(&self, data: &[T]) -> Result<(), GpuError> {
         assert!(data.len() <= self.len, "`{}` holds {} elements, not {}", self.any.name, self.len, data.len());
-        if data.is_empty() {
+        self.upload_by(data.len(), |first, part| part.copy_from_slice(&data[first..][..part.len()]))
+    }
+
+    /// Overwrites the first `len` elements, part by part, with what `write` makes of them; waits for the device.
+    fn upload_by(&self, len: usize, mut write: impl FnMut(usize, &mut [T])) -> Result<(), GpuError> {
+        if len == 0 {
             return Ok(());
         }
-        let bytes: &[u8] = bytemuck::cast_slice(data);
         let context = &self.any.context;
-        let staging_bytes = bytes.len().min(MOST_STAGING_BYTES) as u64;
+        let most = (MOST_STAGING_BYTES / size_of::<T>()).min(len);
+        let staging_bytes = (most * size_of::<T>()) as u64;
         let mut staging = AnyBuffer::staging(context, &self.any.name, staging_bytes, MemoryLocation::CpuToGpu)?;
-        for (part_ix, part) in bytes.chunks(MOST_STAGING_BYTES).enumerate() {
-            staging.mapped()[..part.len()].copy_from_slice(part);
-            let begin = (part_ix * MOST_STAGING_BYTES) as u64;
+        for first in (0..len).step_by(most) {
+            let bytes = most.min(len - first) * size_of::<T>();
+            write(first, bytemuck::cast_slice_mut(&mut staging.mapped()[..bytes]));
+            let begin = (first * size_of::<T>()) as u64;
             context.run("upload", |commands| {
-                commands.copy_buffer_to((&self.any, begin), &staging, part.len() as u64);
+                commands.copy_buffer_to((&self.any, begin), &staging, bytes as u64);
                 commands.barrier(Access::TransferWrite, Access::AllReads); // the buffer
             })?;
         }

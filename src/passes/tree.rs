@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use bytemuck::Pod;
+use rayon::prelude::*;
 
 use crate::{
     frame::Traversal,
@@ -11,8 +12,8 @@ use crate::{
     layout::{
         Addresses, BIND_ADDRESSES, BIND_FRAME, BIND_KD_BOXES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_ROPES,
         BIND_KD_SLABS, BIND_LEAF_PLANES, BIND_LEAF_TRIANGLES, BIND_TEXELS, BIND_TRIANGLE_MATERIALS, BIND_TRIANGLES,
-        BRUTE_MAX_TRIANGLES, CONSTANT_MASK_WORDS, CONSTANT_READING, Frame, KD_WORD_DEPTH, KdBox, KdNode, KdRope, Plane,
-        READING_ADDRESS, READING_BOUND, READING_TEXELS, Slab, Triangle,
+        BRUTE_MAX_TRIANGLES, CONSTANT_MASK_WORDS, CONSTANT_READING, Frame, KD_WORD_DEPTH, KdBox, KdNode, KdRope,
+        LeafTriangle, Plane, READING_ADDRESS, READING_BOUND, READING_TEXELS, Slab, Triangle,
     },
 };
 
@@ -82,8 +83,9 @@ pub struct Tree {
     pub kd_nodes: Buffer<KdNode>,
     /// One a pair of nodes.
     pub kd_parents: Buffer<u32>,
-    pub leaf_triangles: Buffer<u32>,
-    /// One an entry of `leaf_triangles`, or none.
+    /// One a leaf's entry.
+    pub leaf_triangles: Buffer<LeafTriangle>,
+    /// One a leaf's entry, or none.
     pub leaf_planes: Buffer<Plane>,
     /// One a node, or none.
     pub kd_slabs: Buffer<Slab>,
@@ -117,7 +119,7 @@ impl Tree {
             triangle_materials: Buffer::new(context, "triangle_materials", 0, usage)?,
             kd_nodes: Buffer::with(context, "kd_nodes", &tree.nodes, usage)?,
             kd_parents: Buffer::with(context, "kd_parents", &tree.parents, usage)?,
-            leaf_triangles: Buffer::with(context, "leaf_triangles", &tree.leaf_triangles, usage)?,
+            leaf_triangles: leaf_triangles(context, triangles, tree, usage)?,
             leaf_planes: Buffer::with(context, "leaf_planes", &tree.leaf_planes, usage)?,
             kd_slabs: Buffer::with(context, "kd_slabs", slabs, usage)?,
             kd_boxes: Buffer::new(context, "kd_boxes", 0, usage)?,
@@ -213,6 +215,24 @@ impl Tree {
     }
 }
 
+/// The triangles in the leaves' order.
+fn leaf_triangles(
+    context: &Arc<Context>,
+    triangles: &[Triangle],
+    tree: &KdTree,
+    usage: BufferUse,
+) -> Result<Buffer<LeafTriangle>, GpuError> {
+    let entry_of = |triangle_ix: u32| {
+        let Triangle { v0, v1, v2, .. } = triangles[triangle_ix as usize];
+        LeafTriangle { v0, triangle_ix, v1, v2, ..LeafTriangle::default() }
+    };
+    let entries = &tree.leaf_triangles;
+    Buffer::written_by(context, "leaf_triangles", entries.len(), usage, |first, part| {
+        let numbers = &entries[first..][..part.len()];
+        part.par_iter_mut().zip(numbers).for_each(|(entry, &triangle_ix)| *entry = entry_of(triangle_ix));
+    })
+}
+
 /// Of the arrays that are read so.
 fn buffer_use(reading: Reading) -> BufferUse {
     if reading == Reading::Address { BufferUse::Address } else { BufferUse::Texels }
@@ -243,7 +263,7 @@ fn extents(triangles: &[Triangle], tree: &KdTree, slabs: &[Slab]) -> [Extent; 8]
         Extent::of::<Triangle>(triangles.len()),
         Extent::of::<KdNode>(n_nodes),
         Extent::of::<u32>(tree.parents.len()),
-        Extent::of::<u32>(tree.leaf_triangles.len()),
+        Extent::of::<LeafTriangle>(tree.leaf_triangles.len()),
         Extent::of::<Plane>(tree.leaf_planes.len()),
         Extent::of::<Slab>(slabs.len()),
         Extent::of::<KdBox>(n_nodes),

@@ -9,7 +9,7 @@ use kdray::{
     frame::{Primary, RenderOptions, Traversal},
     gpu::{Buffer, BufferUse, Context, ContextOptions, GpuError},
     kdtree::KdTree,
-    layout::{Frame, KdRope, LargeTriangle},
+    layout::{Frame, KdRope, LargeTriangle, LeafTriangle},
     passes::{Reading, Tree},
     render::Renderer,
     scene::Scene,
@@ -30,9 +30,14 @@ fn small_device() -> Arc<Context> {
     device_with(RANGE, 1)
 }
 
-/// How a device reads what it can bind. Ropes have the most texels, one each.
+/// Ropes or the leaves' triangles have the most, one each and three each.
+fn most_texels(tree: &KdTree) -> u32 {
+    (6 * tree.nodes.len()).max(3 * tree.leaf_triangles.len()) as u32
+}
+
+/// How a device reads what it can bind.
 fn usual_reading(context: &Context, tree: &KdTree) -> Reading {
-    let has_texels = 6 * tree.nodes.len() <= context.limits().n_texels as usize;
+    let has_texels = most_texels(tree) <= context.limits().n_texels;
     if context.runs_both_sides() && has_texels { Reading::Texels } else { Reading::Bound }
 }
 
@@ -169,8 +174,9 @@ fn a_scene_is_read_by_address_only_where_something_of_it_cannot_be_bound() {
     let tree = tree_of(&scene);
     let ropes = (6 * tree.nodes.len() * size_of::<KdRope>()) as u64;
     let planes = size_of_val(&*tree.leaf_planes) as u64;
-    let largest = (size_of_val(&*scene.triangles) as u64).max(planes).max(ropes);
-    let most_texels = (6 * tree.nodes.len()) as u32;
+    let leaf_triangles = (tree.leaf_triangles.len() * size_of::<LeafTriangle>()) as u64;
+    let largest = leaf_triangles.max(size_of_val(&*scene.triangles) as u64).max(planes).max(ropes);
+    let most_texels = most_texels(&tree);
     let usual = usual_reading(&device(), &tree);
     for (range, n_texels, reading) in [
         (largest - 1, 1, Reading::Address),
@@ -209,11 +215,11 @@ fn a_buffer_larger_than_the_devices_memory_is_refused_in_one_line() {
     assert_silent(&context);
 }
 
-/// Uploads come in parts.
+/// Uploads come in parts, of whole elements.
 #[test]
 fn a_large_upload_arrives_whole() {
     let context = device();
-    let numbers: Vec<u32> = (0..(65 << 20) / 4).collect();
+    let numbers: Vec<[u32; 3]> = (0..(65 << 20) / 12).map(|ix| [ix, ix + 1, ix + 2]).collect();
     let buffer = Buffer::with(&context, "numbers", &numbers, BufferUse::Storage).expect("a buffer");
     assert!(buffer.download().expect("a download") == numbers);
     assert_silent(&context);
