@@ -19,7 +19,6 @@ layout(constant_id = 4) const bool RUNS_BOTH_SIDES = false;
 struct Cell {
     // The node's place in kd_nodes, in bytes: what a split names its children by.
     uint node_at;
-    uint depth;
     float t_enter;
     float t_exit;
 };
@@ -70,7 +69,7 @@ bool is_in(TraversalRay ray) {
 
 // The root.
 Cell whole(TraversalRay ray) {
-    return Cell(0u, 0u, ray.t_enter, ray.t_exit);
+    return Cell(0u, ray.t_enter, ray.t_exit);
 }
 
 float largest_coordinate() {
@@ -169,7 +168,16 @@ void clear_pending() {
     stack_size = 0u;
     short_stack_top = 0u;
     short_stack_size = 0u;
+    trail_length = 0u;
     siblings_done = uvec2(0u);
+}
+
+// A level down, where a bit is kept for each.
+void go_down() {
+    if (TRAVERSAL == TRAVERSAL_MASK_BOXES) siblings_done = below(siblings_done);
+    if (TRAVERSAL == TRAVERSAL_MASK) mask_down();
+    if (TRAVERSAL == TRAVERSAL_RESTART) marked_down();
+    if (TRAVERSAL == TRAVERSAL_SHORT_STACK) marked_down();
 }
 
 // The sibling of the cell's node, to which the ray comes later, until it leaves the cell.
@@ -208,7 +216,7 @@ void take_pending(TraversalRay ray, inout Cell cell) {
 KdNode step_down(TraversalRay ray, KdNode node, inout Cell cell) {
     float t_cross = crossing(ray, node);
     bool only_second = t_cross < cell.t_enter;
-    cell.depth += 1u;
+    go_down();
     cell.node_at = child_of(ray, node, only_second);
     node = kd_node(cell.node_at);
     if (!only_second && t_cross <= cell.t_exit) {

@@ -14,7 +14,7 @@ bool backtrack(TraversalRay ray, float t_best, inout Cell cell) {
             float t_enter = crossing(ray, parent);
             float t_exit = interval_in(ray, parent_ix).y;
             if (t_enter <= min(t_exit, t_best)) {
-                cell = Cell(sibling_of(cell.node_at), cell.depth, max(t_enter, ray.t_enter), t_exit);
+                cell = Cell(sibling_of(cell.node_at), max(t_enter, ray.t_enter), t_exit);
                 return true;
             }
         }

@@ -4,23 +4,21 @@
 // Corrected: 64 levels for 31; a failed test leaves the entry point alone; and a hit ends the search
 // only where no other cell can hold a nearer one, not as soon as a leaf has any.
 
-// Bit d - 1 of the two words: the sibling at depth d.
+// As pending_mask.glsl has them, from the cell's node upward.
 uvec2 siblings_done;
 
 bool climb_by_boxes(TraversalRay ray, float t_best, inout Cell cell) {
-    while (cell.depth > 0u) {
-        uvec2 bit = bit_of(cell.depth);
-        if ((siblings_done & bit) == uvec2(0u)) {
+    while (cell.node_at != 0u) {
+        if ((siblings_done.x & 1u) == 0u) {
             vec2 interval = interval_in(ray, index_of(sibling_of(cell.node_at)));
             if (interval.x <= min(interval.y, t_best)) {
-                siblings_done |= bit;
-                cell = Cell(sibling_of(cell.node_at), cell.depth, interval.x, interval.y);
+                siblings_done.x |= 1u;
+                cell = Cell(sibling_of(cell.node_at), interval.x, interval.y);
                 return true;
             }
         }
-        siblings_done &= ~bit;
+        siblings_done = above(siblings_done, 1u);
         cell.node_at = place_of(kd_parent_of(index_of(cell.node_at)));
-        cell.depth -= 1u;
     }
     return false;
 }

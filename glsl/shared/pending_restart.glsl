@@ -6,18 +6,20 @@
 // pending_mask.glsl writes them: at a set bit the way went to the first child; at one that is not set to the second,
 // where the ray enters it at all. Each restart clears the lowest set bit and only sets lower ones: it ends.
 
-// From the root to the deepest pending node, which is pending no more.
+// Levels from the root down to the cell's node.
+uint trail_length;
+
+// From the root to the lowest pending node, which is pending no more.
 void retrace(TraversalRay ray, inout Cell cell) {
-    uint depth = deepest_pending();
-    pending_mask &= ~bit_of(depth);
+    trail_length -= mask_up();
     cell.node_at = 0u;
     cell.t_exit = ray.t_exit;
-    for (cell.depth = 1u; cell.depth <= depth; ++cell.depth) {
+    for (uint n_left = trail_length; n_left > 0u; --n_left) {
         KdNode node = kd_node(cell.node_at);
         float t_cross = crossing(ray, node);
+        bool to_first = is_pending(n_left - 1u);
         bool in_second = t_cross <= cell.t_exit;
-        cell.node_at = child_of(ray, node, in_second && !is_pending(cell.depth));
-        if (is_pending(cell.depth)) cell.t_exit = min(cell.t_exit, t_cross);
+        cell.node_at = child_of(ray, node, in_second && !to_first);
+        if (to_first) cell.t_exit = min(cell.t_exit, t_cross);
     }
-    cell.depth = depth;
 }

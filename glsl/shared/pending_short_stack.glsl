@@ -19,12 +19,17 @@ void short_stack_pop(inout Cell cell) {
     short_stack_size -= 1u;
     short_stack_top -= 1u;
     uvec2 entry = short_stack[short_stack_top % SHORT_STACK_SIZE];
-    cell = Cell(sibling_of(entry.x), deepest_pending(), cell.t_enter, uintBitsToFloat(entry.y));
-    pending_mask &= ~bit_of(cell.depth);
+    cell = Cell(sibling_of(entry.x), cell.t_enter, uintBitsToFloat(entry.y));
+    trail_length -= mask_up();
+}
+
+void marked_down() {
+    mask_down();
+    trail_length += 1u;
 }
 
 void marked_push(Cell cell) {
-    pending_mask |= bit_of(cell.depth);
+    mark();
     if (TRAVERSAL != TRAVERSAL_RESTART) short_stack_push(cell);
 }
 

@@ -18,7 +18,6 @@ use crate::{
 #[derive(Clone, Copy, Debug)]
 pub struct Cell {
     pub node_ix: u32,
-    pub depth: u32,
     pub t_enter: f32,
     pub t_exit: f32,
 }
@@ -132,6 +131,8 @@ pub fn is_leaf(node: KdNode) -> bool {
 pub trait Pending {
     fn new() -> Self;
     fn clear(&mut self);
+    /// A level down, where a bit is kept for each.
+    fn go_down(&mut self) {}
     fn push(&mut self, second_ix: u32, cell: &Cell);
     /// The next pending cell that may hold a hit nearer than `t_best`, or false.
     fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool;
@@ -161,7 +162,7 @@ fn descend<P: Pending>(
         let first_ix = ray.first_child(node);
         let in_first = t_cross >= cell.t_enter;
         let in_second = t_cross <= cell.t_exit;
-        cell.depth += 1;
+        pending.go_down();
         cell.node_ix = if in_second && !in_first { first_ix ^ 1 } else { first_ix };
         if in_first && in_second {
             pending.push(first_ix ^ 1, cell);
@@ -186,7 +187,7 @@ pub(super) fn search<P: Pending, const ANY_HIT: bool>(
 ) {
     // Not `>`: a NaN misses.
     if ray.t_enter <= ray.t_exit {
-        let root = Cell { node_ix: 0, depth: 0, t_enter: ray.t_enter, t_exit: ray.t_exit };
+        let root = Cell { node_ix: 0, t_enter: ray.t_enter, t_exit: ray.t_exit };
         search_cell::<_, ANY_HIT>(bindings, ray, pending, root, best);
     }
 }

@@ -116,7 +116,7 @@ impl PacketTraverser {
             if lanes.is_power_of_two() {
                 let lane = lanes.trailing_zeros() as usize;
                 let (t_enter, t_exit) = (cell.enter.as_array()[lane], cell.exit.as_array()[lane]);
-                let (ray, alone) = (packet.ray(lane), Cell { node_ix, depth: 0, t_enter, t_exit });
+                let (ray, alone) = (packet.ray(lane), Cell { node_ix, t_enter, t_exit });
                 let mut best = packet.hit(lane);
                 search_cell::<_, ANY_HIT>(bindings, &ray, &mut self.single, alone, &mut best);
                 packet.set_hit::<ANY_HIT>(lane, &best);

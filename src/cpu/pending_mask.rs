@@ -7,14 +7,10 @@ use super::{
 };
 use crate::layout::KD_MAX_DEPTH;
 
-/// Which siblings on the way to the root are still to be visited. Bit d - 1: depth d; one word for the kernel's two.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub struct Mask(pub u64);
-
-#[inline(always)]
-pub fn bit_of(depth: u32) -> u64 {
-    1 << ((depth - 1) & 63)
-}
+/// Which siblings on the way to the root are still to be visited. Bit i: the one i levels above the cell's node; one word for
+/// the kernel's two.
+#[derive(Clone, Copy, Default)]
+pub struct Mask(u64);
 
 impl Mask {
     #[inline(always)]
@@ -22,47 +18,63 @@ impl Mask {
         self.0 == 0
     }
 
+    /// Bits that are set.
     #[inline(always)]
-    pub fn has(self, depth: u32) -> bool {
-        self.0 & bit_of(depth) != 0
+    pub fn len(self) -> usize {
+        self.0.count_ones() as usize
     }
 
-    /// Depth of the highest bit; the mask is not empty.
     #[inline(always)]
-    pub fn deepest(self) -> u32 {
-        64 - self.0.leading_zeros()
+    pub fn has(self, n_levels_up: u32) -> bool {
+        self.0 >> n_levels_up & 1 != 0
     }
 
-    /// Takes the highest bit away, and returns its depth.
     #[inline(always)]
-    pub fn take_deepest(&mut self) -> u32 {
-        let depth = self.deepest();
-        self.0 &= !bit_of(depth);
-        depth
+    pub fn go_down(&mut self) {
+        self.0 <<= 1;
+    }
+
+    /// The sibling of the cell's node is pending.
+    #[inline(always)]
+    pub fn mark(&mut self) {
+        self.0 |= 1;
+    }
+
+    /// Up to the lowest sibling that is pending, and is no more. By how many levels. The mask is not empty.
+    #[inline(always)]
+    pub fn go_up(&mut self) -> u32 {
+        let n = self.0.trailing_zeros();
+        self.0 = self.0 >> (n & 63) ^ 1;
+        n
     }
 }
 
-/// The mask, and a cell's place for each level.
+/// The mask, and the pending cells in its bits' order.
 pub struct PendingMask {
     mask: Mask,
-    /// Of each depth: node, and where the ray leaves it. What the mask does not name is left over.
+    /// Node, and where the ray leaves it.
     cells: [(u32, f32); KD_MAX_DEPTH as usize],
 }
 
 impl Pending for PendingMask {
     fn new() -> Self {
-        Self { mask: Mask(0), cells: [(0, 0.0); KD_MAX_DEPTH as usize] }
+        Self { mask: Mask::default(), cells: [(0, 0.0); KD_MAX_DEPTH as usize] }
     }
 
     #[inline(always)]
     fn clear(&mut self) {
-        self.mask = Mask(0);
+        self.mask = Mask::default();
+    }
+
+    #[inline(always)]
+    fn go_down(&mut self) {
+        self.mask.go_down();
     }
 
     #[inline(always)]
     fn push(&mut self, second_ix: u32, cell: &Cell) {
-        self.mask.0 |= bit_of(cell.depth);
-        self.cells[cell.depth as usize - 1] = (second_ix, cell.t_exit);
+        self.cells[self.mask.len()] = (second_ix, cell.t_exit);
+        self.mask.mark();
     }
 
     #[inline(always)]
@@ -71,8 +83,8 @@ impl Pending for PendingMask {
         if self.mask.is_empty() || t_best < cell.t_enter {
             return false;
         }
-        cell.depth = self.mask.take_deepest();
-        (cell.node_ix, cell.t_exit) = self.cells[cell.depth as usize - 1];
+        self.mask.go_up();
+        (cell.node_ix, cell.t_exit) = self.cells[self.mask.len()];
         true
     }
 }

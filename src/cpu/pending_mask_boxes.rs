@@ -3,12 +3,11 @@
 use super::{
     bindings::Bindings,
     kdtree::{Cell, Pending, TraversalRay, min},
-    pending_mask::bit_of,
     table::Reads,
 };
 
-/// Bit d - 1: the sibling at depth d has been visited.
 pub struct PendingMaskBoxes {
+    /// Bit i: the sibling i levels above the cell's node.
     siblings_done: u64,
 }
 
@@ -23,6 +22,11 @@ impl Pending for PendingMaskBoxes {
     }
 
     #[inline(always)]
+    fn go_down(&mut self) {
+        self.siblings_done <<= 1;
+    }
+
+    #[inline(always)]
     fn push(&mut self, _: u32, _: &Cell) {}
 
     #[inline(always)]
@@ -31,19 +35,17 @@ impl Pending for PendingMaskBoxes {
         if t_best < cell.t_exit {
             return false;
         }
-        while cell.depth > 0 {
-            let bit = bit_of(cell.depth);
-            if self.siblings_done & bit == 0 {
+        while cell.node_ix != 0 {
+            if self.siblings_done & 1 == 0 {
                 let [t_enter, t_exit] = ray.interval_in(bindings, cell.node_ix ^ 1);
                 if t_enter <= min(t_exit, t_best) {
-                    self.siblings_done |= bit;
-                    *cell = Cell { node_ix: cell.node_ix ^ 1, depth: cell.depth, t_enter, t_exit };
+                    self.siblings_done |= 1;
+                    *cell = Cell { node_ix: cell.node_ix ^ 1, t_enter, t_exit };
                     return true;
                 }
             }
-            self.siblings_done &= !bit;
+            self.siblings_done >>= 1;
             cell.node_ix = bindings.kd_parents[cell.node_ix as usize >> 1];
-            cell.depth -= 1;
         }
         false
     }

@@ -7,18 +7,41 @@ use super::{
     table::Reads,
 };
 
-/// Down from the root to the deepest pending node, which is pending no more.
-#[inline(always)]
-pub fn retrace(mask: &mut Mask, bindings: &Bindings<impl Reads>, ray: &TraversalRay, cell: &mut Cell) {
-    let depth = mask.take_deepest();
-    *cell = Cell { node_ix: 0, depth, t_exit: ray.t_exit, ..*cell };
-    for depth in 1..=depth {
-        let node = bindings.kd_nodes[cell.node_ix as usize];
-        let t_cross = ray.crossing(node);
-        let in_second = t_cross <= cell.t_exit;
-        cell.node_ix = ray.first_child(node) ^ u32::from(in_second && !mask.has(depth));
-        if mask.has(depth) {
-            cell.t_exit = min(cell.t_exit, t_cross);
+/// The way down to the cell's node.
+#[derive(Clone, Copy, Default)]
+pub struct Trail {
+    pub mask: Mask,
+    /// Levels.
+    length: u32,
+}
+
+impl Trail {
+    #[inline(always)]
+    pub fn go_down(&mut self) {
+        self.mask.go_down();
+        self.length += 1;
+    }
+
+    /// Up to the lowest sibling that is pending, and is no more.
+    #[inline(always)]
+    pub fn go_up(&mut self) {
+        self.length -= self.mask.go_up();
+    }
+
+    /// The same, and the cell from the root down to there.
+    #[inline(always)]
+    pub fn retrace(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, cell: &mut Cell) {
+        self.go_up();
+        *cell = Cell { node_ix: 0, t_exit: ray.t_exit, ..*cell };
+        for n_left in (0..self.length).rev() {
+            let node = bindings.kd_nodes[cell.node_ix as usize];
+            let t_cross = ray.crossing(node);
+            let to_first = self.mask.has(n_left);
+            let in_second = t_cross <= cell.t_exit;
+            cell.node_ix = ray.first_child(node) ^ u32::from(in_second && !to_first);
+            if to_first {
+                cell.t_exit = min(cell.t_exit, t_cross);
+            }
         }
     }
 }

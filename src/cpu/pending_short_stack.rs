@@ -3,14 +3,13 @@
 use super::{
     bindings::Bindings,
     kdtree::{Cell, Pending, TraversalRay},
-    pending_mask::{Mask, bit_of},
-    pending_restart::retrace,
+    pending_restart::Trail,
     table::Reads,
 };
 
-/// The `N` newest entries (a power of two, or none) and the mask of all.
+/// The `N` newest entries (a power of two, or none) and the trail of all.
 pub struct PendingMarked<const N: usize> {
-    mask: Mask,
+    trail: Trail,
     /// Node, and where the ray leaves it.
     entries: [(u32, f32); N],
     /// Where the next entry goes, and how many are kept.
@@ -20,19 +19,24 @@ pub struct PendingMarked<const N: usize> {
 
 impl<const N: usize> Pending for PendingMarked<N> {
     fn new() -> Self {
-        Self { mask: Mask(0), entries: [(0, 0.0); N], top: 0, size: 0 }
+        Self { trail: Trail::default(), entries: [(0, 0.0); N], top: 0, size: 0 }
     }
 
     #[inline(always)]
     fn clear(&mut self) {
-        self.mask = Mask(0);
+        self.trail = Trail::default();
         self.top = 0;
         self.size = 0;
     }
 
     #[inline(always)]
+    fn go_down(&mut self) {
+        self.trail.go_down();
+    }
+
+    #[inline(always)]
     fn push(&mut self, second_ix: u32, cell: &Cell) {
-        self.mask.0 |= bit_of(cell.depth);
+        self.trail.mask.mark();
         if N > 0 {
             self.entries[self.top & N.wrapping_sub(1)] = (second_ix, cell.t_exit);
             self.top += 1;
@@ -43,16 +47,16 @@ impl<const N: usize> Pending for PendingMarked<N> {
     #[inline(always)]
     fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
         cell.t_enter = cell.t_exit;
-        if self.mask.is_empty() || t_best < cell.t_enter {
+        if self.trail.mask.is_empty() || t_best < cell.t_enter {
             return false;
         }
         if self.size > 0 {
             self.size -= 1;
             self.top -= 1;
             (cell.node_ix, cell.t_exit) = self.entries[self.top & N.wrapping_sub(1)];
-            cell.depth = self.mask.take_deepest();
+            self.trail.go_up();
         } else {
-            retrace(&mut self.mask, bindings, ray, cell);
+            self.trail.retrace(bindings, ray, cell);
         }
         true
     }
