@@ -18,10 +18,10 @@ impl Mask {
         self.0 == 0
     }
 
-    /// Bits that are set.
+    /// Where the last of what is pending is kept.
     #[inline(always)]
-    pub fn len(self) -> usize {
-        self.0.count_ones() as usize
+    fn last_place(self) -> usize {
+        self.0.count_ones() as usize - 1
     }
 
     #[inline(always)]
@@ -73,8 +73,8 @@ impl Pending for PendingMask {
 
     #[inline(always)]
     fn push(&mut self, second_ix: u32, cell: &Cell) {
-        self.cells[self.mask.len()] = (second_ix, cell.t_exit);
         self.mask.mark();
+        self.cells[self.mask.last_place()] = (second_ix, cell.t_exit);
     }
 
     #[inline(always)]
@@ -83,8 +83,8 @@ impl Pending for PendingMask {
         if self.mask.is_empty() || t_best < cell.t_enter {
             return false;
         }
+        (cell.node_ix, cell.t_exit) = self.cells[self.mask.last_place()];
         self.mask.go_up();
-        (cell.node_ix, cell.t_exit) = self.cells[self.mask.len()];
         true
     }
 }
