@@ -7,8 +7,8 @@
 // a place for each level, rays that part soon spread over memory that the first cache cannot hold, and take up to a quarter
 // longer (benches/EXPERIMENTS.md).
 
-// 1 where no leaf lies deeper than KD_WORD_DEPTH, as in most trees: a mask of one word is 3 to 6 % faster. The same for all
-// kernels over one tree.
+// 1 where no leaf lies deeper than KD_WORD_DEPTH, as in most trees: a mask of one word is shifted and searched faster. The same
+// for all kernels over one tree.
 layout(constant_id = CONSTANT_MASK_WORDS) const uint MASK_WORDS = 2u;
 
 // Bit i, of the words together: the sibling i levels above the cell's node.
