@@ -115,7 +115,7 @@ pub enum Traversal {
 }
 
 impl Traversal {
-    /// The paper's idea; a stack and ropes are up to a seventh faster on some scenes (benches/EXPERIMENTS.md).
+    /// The paper's idea; a stack and ropes are up to a tenth faster on some scenes (README.md's figures).
     pub const OF_GPUS: Self = Self::Mask;
     /// What is fastest where drivers run kernels on the CPU.
     pub const OF_SOFTWARE_DRIVERS: Self = Self::Ropes;
