@@ -1,15 +1,16 @@
-//! Eight rays together, with each set of instructions that the machine has, against one ray after the other: the same,
+//! Sixteen rays together, with each set of instructions that the machine has, against one ray after the other: the same,
 //! bit for bit.
 
 mod support;
 
 use std::array::from_fn;
 
-use fearless_simd::{Level, Simd, dispatch, f32x8, prelude::*};
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use glam::Vec3;
 use kdray::{
     cpu::{
-        companions::{point_the_same_way, sort_by_direction},
+        companions::Companions,
+        kdtree::{TraversalRay, signs_of},
         packet::LANES,
         packet_triangle::Shears,
         probe::Probe,
@@ -50,12 +51,12 @@ fn bits(hit: &Hit) -> [u32; 4] {
 fn together(level: Level, rays: &[Ray; LANES], triangle: &Triangle, triangle_ix: u32) -> [Option<Hit>; LANES] {
     dispatch!(level, simd => {
         let columns = |of: fn(&Ray) -> Vec3| -> [_; 3] {
-            from_fn(|axis| f32x8::load_array(simd, from_fn(|lane| of(&rays[lane])[axis])))
+            from_fn(|axis| f32x16::load_array(simd, from_fn(|lane| of(&rays[lane])[axis])))
         };
         let shears = Shears::of(&columns(|ray| ray.origin), &columns(|ray| ray.direction));
         let mut hits = [None; LANES];
         for axis in 0..3 {
-            let lanes = shears.lanes_of_axis[axis] & 0xff;
+            let lanes = shears.lanes_of_axis[axis] & ((1 << LANES) - 1);
             let Some((found, is_hit)) = shears.intersect_triangle(triangle, triangle_ix, axis, lanes) else { continue };
             for lane in (0..LANES).filter(|&lane| is_hit.test(lane)) {
                 assert_eq!((lanes >> lane & 1, hits[lane]), (1, None), "a ray has one axis");
@@ -84,7 +85,7 @@ fn odd_triangles() -> Vec<Triangle> {
 }
 
 /// Nasty rays, and some with numbers that no ray should have.
-fn eight_rays(random: &mut Random, world: &World) -> [Ray; LANES] {
+fn rays_of_a_packet(random: &mut Random, world: &World) -> [Ray; LANES] {
     let first = random.below(1000);
     let mut rays = from_fn(|lane| nasty_ray(random, world, first + lane));
     if random.below(10) == 0 {
@@ -103,7 +104,7 @@ fn a_triangle_is_met_as_by_one_ray() {
     for level in levels() {
         let (mut n_hits, mut n_at_edges) = (0, 0);
         for seed in 0..5000 {
-            let rays = eight_rays(&mut Random(seed), &world);
+            let rays = rays_of_a_packet(&mut Random(seed), &world);
             for (triangle_ix, triangle) in (0..).zip(&triangles) {
                 let found = together(level, &rays, triangle, triangle_ix);
                 for (ray, found) in rays.iter().zip(found) {
@@ -123,18 +124,20 @@ fn a_triangle_is_met_as_by_one_ray() {
 }
 
 fn traced<const ANY_HIT: bool>(world: &World, level: Level, rays: &[Ray]) -> Vec<Hit> {
-    let mut hits = Vec::new();
-    let probes = rays.iter().map(|ray| ((), Probe::from(ray)));
+    let mut hits = vec![None; rays.len()];
+    let probes = hits.iter_mut().zip(rays.iter().map(Probe::from));
     let mut traverser = Traverser::at_level(Traversal::Stack, level);
-    traverser.traverse_all::<ANY_HIT, _>(&world.bindings(), probes, |(), hit| hits.push(hit));
-    hits
+    traverser.traverse_all::<ANY_HIT, _>(&world.bindings(), probes, |place, hit| {
+        assert_eq!(place.replace(hit), None, "a ray has one hit");
+    });
+    hits.into_iter().map(|hit| hit.expect("a ray has a hit")).collect()
 }
 
 #[test]
 fn every_set_of_instructions_finds_the_same() {
     for triangles in [meshes::torus(40, 20), meshes::cube(9, 0.0), meshes::soup(1200, 7)] {
         let world = World::new(triangles);
-        let rays: Vec<_> = (0..1500).flat_map(|seed| eight_rays(&mut Random(seed), &world)).collect();
+        let rays: Vec<_> = (0..1500).flat_map(|seed| rays_of_a_packet(&mut Random(seed), &world)).collect();
         let mut one = Traverser::new(Traversal::Mask);
         let expected: Vec<Hit> = rays.iter().map(|ray| one.traverse::<false>(&world.bindings(), &ray.into())).collect();
         assert!(expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count() > rays.len() / 5);
@@ -149,28 +152,47 @@ fn every_set_of_instructions_finds_the_same() {
     }
 }
 
-fn towards(directions: impl IntoIterator<Item = Vec3>) -> Vec<Probe> {
-    directions.into_iter().map(|direction| Probe::from(&support::rays::ray(Vec3::ZERO, direction))).collect()
-}
-
-#[test]
-fn neighbours_of_two_octants_go_together() {
-    let along = |signs: [f32; 3]| towards(signs.map(|sign| Vec3::new(1.0, 2.0 * sign, 0.1)));
-    assert!(point_the_same_way(&along([1.0, 1.0, 1.0])));
-    assert!(point_the_same_way(&along([1.0, -1.0, 1.0])));
-    assert!(!point_the_same_way(&towards(Vec3::AXES.map(|axis| Vec3::ONE - 2.0 * axis))));
-}
-
-/// Of 512 rays into all octants in turn, eight that go together point into one.
-#[test]
-fn others_go_with_rays_of_their_direction() {
+/// Rays of all octants in turn, some of whose components are zeros and all but zeros of either sign.
+fn directions_in_turn() -> impl Iterator<Item = Vec3> {
     let sign = |i: u32, bit: u32| if i >> bit & 1 == 1 { -1.0 } else { 1.0 };
-    let probes = towards((0..512).map(|i| Vec3::new(sign(i, 0), 2.0 * sign(i, 1), 3.0 * sign(i, 2))));
-    let mut order: Vec<u32> = (0..512).collect();
-    sort_by_direction(&probes, &mut order);
-    for eight in order.chunks(LANES) {
-        assert!(eight.iter().all(|&ix| probes[ix as usize].direction == probes[eight[0] as usize].direction));
+    (0..1000).map(move |i| {
+        let flat = [1.0, 0.0, 1e-13, 1e-12, 2e-12][i as usize / 8 % 5];
+        Vec3::new(sign(i, 0) * flat, 2.0 * sign(i, 1), 3.0 * sign(i, 2))
+    })
+}
+
+#[test]
+fn sixteen_rays_of_an_octant_are_a_packet() {
+    let mut companions = Companions::default();
+    let mut seen = vec![];
+    let mut n_packets = 0;
+    for (ray_ix, direction) in directions_in_turn().enumerate() {
+        let probe = Probe::from(&support::rays::ray(Vec3::X * ray_ix as f32, direction));
+        let Some(waiting) = companions.with(ray_ix, &probe) else { continue };
+        n_packets += 1;
+        assert_eq!(waiting.keys.len(), LANES);
+        for (lane, ray_ix) in waiting.keys.drain(..).enumerate() {
+            let probe = waiting.probes.get(lane);
+            assert_eq!(probe.origin.x, ray_ix as f32, "the ray's own");
+            assert_eq!(signs_of(probe.direction), signs_of(waiting.probes.get(0).direction));
+            seen.push(ray_ix);
+        }
     }
-    order.sort_unstable();
-    assert_eq!(order, (0..512).collect::<Vec<_>>());
+    assert!(n_packets > 1000 / LANES - 8);
+    companions.rest().for_each(|waiting| seen.extend(waiting.keys.drain(..)));
+    assert_eq!(companions.rest().count(), 0);
+    seen.sort_unstable();
+    assert_eq!(seen, (0..1000).collect::<Vec<_>>());
+}
+
+/// The signs say in which order a ray comes to the children of a node, as `TraversalRay` has it.
+#[test]
+fn rays_of_an_octant_take_children_in_one_order() {
+    let world = World::new(meshes::cube(2, 0.0));
+    for direction in directions_in_turn() {
+        let ray = TraversalRay::new(&world.bindings(), &Probe::from(&support::rays::ray(Vec3::ZERO, direction)));
+        for axis in 0..3 {
+            assert_eq!(signs_of(direction) >> axis & 1 == 1, ray.inv_direction[axis] < 0.0, "{direction}");
+        }
+    }
 }

@@ -34,10 +34,10 @@ fn rays_at(world: &World) -> Vec<Ray> {
 fn traced(world: &World, traversal: Traversal, rays: &[Ray]) -> Vec<Hit> {
     let bindings = world.bindings();
     let of_task = |traverser: &mut Traverser, rays: &[Ray]| {
-        let (mut closest, mut is_hit) = (Vec::new(), Vec::new());
-        let probes = || rays.iter().map(|ray| ((), Probe::from(ray)));
-        traverser.traverse_all::<false, _>(&bindings, probes(), |(), hit| closest.push(hit));
-        traverser.traverse_all::<true, _>(&bindings, probes(), |(), hit| is_hit.push(hit.triangle_ix != NO_TRIANGLE));
+        let (mut closest, mut is_hit) = (vec![Hit::default(); rays.len()], vec![false; rays.len()]);
+        let probes = || rays.iter().map(Probe::from).enumerate();
+        traverser.traverse_all::<false, _>(&bindings, probes(), |i, hit| closest[i] = hit);
+        traverser.traverse_all::<true, _>(&bindings, probes(), |i, hit| is_hit[i] = hit.triangle_ix != NO_TRIANGLE);
         let alone = rays.iter().map(|ray| traverser.traverse::<false>(&bindings, &ray.into())).collect::<Vec<_>>();
         assert_eq!(first_difference(rays, &alone, &closest), None, "{traversal}: together");
         assert_eq!(is_hit, closest.iter().map(|hit| hit.triangle_ix != NO_TRIANGLE).collect::<Vec<_>>(), "{traversal}");

@@ -13,47 +13,52 @@ use crate::{
 const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
 
 /// The longest component's exponent as the bits hold it, 1 to 254; 0: all but zero, 255: infinite or NaN.
-fn exponent_of(direction: Vec3) -> u32 {
-    let [x, y, z] = direction.to_array().map(|d| d.to_bits() & 0x7fff_ffff);
+#[inline(always)]
+fn exponent_of(v: Vec3) -> u32 {
+    let [x, y, z] = v.to_array().map(|x| x.to_bits() & 0x7fff_ffff);
     x.max(y).max(z) >> 23
 }
 
 /// False for what can only miss: a NaN anywhere, an infinite origin or direction, a direction of zero (or one so short
 /// that it is denormal).
+#[inline(always)]
 pub fn is_ray(ray: &CastRay) -> bool {
+    // All is asked at once: a branch each takes longer.
     (1..255).contains(&exponent_of(ray.direction))
-        && ray.origin.is_finite()
-        && !ray.t_min.is_nan()
-        && !ray.t_max.is_nan()
+        & (exponent_of(ray.origin) < 255)
+        & !ray.t_min.is_nan()
+        & !ray.t_max.is_nan()
 }
 
-/// A direction's scale to about unit length, which the traversal wants: a power of two, so that it keeps its bits, and t.
-fn scale_of(direction: Vec3) -> f32 {
+/// A direction's scale to about unit length, which the traversal wants, and its inverse: powers of two, so that direction and t
+/// keep their bits.
+#[inline(always)]
+fn scales_of(direction: Vec3) -> [f32; 2] {
     let exponent = exponent_of(direction).min(253);
-    f32::from_bits((254 - exponent) << 23) // 2^(127 - exponent)
+    [254 - exponent, exponent].map(|exponent| f32::from_bits(exponent << 23))
 }
 
+/// As the traversal wants it. What can only miss is in no cell.
+#[inline(always)]
 fn scaled(ray: &CastRay) -> Probe {
-    let scale = scale_of(ray.direction);
-    let inv_scale = 1.0 / scale;
-    Probe {
+    let [scale, inv_scale] = scales_of(ray.direction);
+    let nowhere =
+        Probe { origin: Vec3::ZERO, t_min: 1.0, direction: Vec3::X, t_max: 0.0, source_triangle: NO_TRIANGLE };
+    let scaled = Probe {
         origin: ray.origin,
         t_min: ray.t_min * inv_scale,
         direction: ray.direction * scale,
         t_max: min(ray.t_max, f32::MAX) * inv_scale,
         source_triangle: NO_TRIANGLE,
-    }
+    };
+    if is_ray(ray) { scaled } else { nowhere }
 }
 
 fn cast_all<const ANY_HIT: bool>(bindings: &Bindings, traverser: &mut Traverser, rays: &[CastRay], hits: &mut [Hit]) {
-    let probes = rays.iter().zip(hits).filter_map(|(ray, hit)| {
-        *hit = MISS;
-        is_ray(ray).then(|| ((ray, hit), scaled(ray)))
-    });
+    let probes = rays.iter().zip(hits).map(|(ray, hit)| ((ray, hit), scaled(ray)));
     traverser.traverse_all::<ANY_HIT, _>(bindings, probes, |(ray, hit), found| {
-        if found.triangle_ix != NO_TRIANGLE {
-            *hit = Hit { t: found.t * scale_of(ray.direction), ..found };
-        }
+        let [scale, _] = scales_of(ray.direction);
+        *hit = if found.triangle_ix == NO_TRIANGLE { MISS } else { Hit { t: found.t * scale, ..found } };
     });
 }
 

@@ -1,6 +1,6 @@
 //! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree.glsl`.
 
-use glam::Vec3A;
+use glam::{Vec3, Vec3A};
 
 use super::{
     bindings::Bindings,
@@ -49,14 +49,23 @@ pub fn max(x: f32, y: f32) -> f32 {
     if x < y { y } else { x }
 }
 
+/// A component below this is taken as this: finite everywhere, and one rule for all ties.
+pub const FLAT: f32 = 1e-12;
+
+/// Bit i: on axis i, the ray comes to the upper child first.
+#[inline(always)]
+pub fn signs_of(direction: Vec3) -> u32 {
+    let is_below = |d: f32| u32::from(d <= -FLAT);
+    is_below(direction.x) | is_below(direction.y) << 1 | is_below(direction.z) << 2
+}
+
 impl TraversalRay {
     #[inline]
     pub fn new(bindings: &Bindings<impl Reads>, ray: &Probe) -> Self {
         let origin = ray.origin.to_array();
         let cell_min = bindings.frame.cell_min.to_array();
         let cell_max = bindings.frame.cell_max.to_array();
-        // A direction in the plane is taken as all but in it: finite everywhere, and one rule for all ties.
-        let direction = ray.direction.to_array().map(|d| if d.abs() < 1e-12 { 1e-12 } else { d });
+        let direction = ray.direction.to_array().map(|d| if d.abs() < FLAT { FLAT } else { d });
         let inv_direction = direction.map(|d| 1.0 / d);
         let bias = [0, 1, 2].map(|i| -origin[i] * inv_direction[i]);
         let t0 = [0, 1, 2].map(|i| cell_min[i] * inv_direction[i] + bias[i]);
@@ -110,6 +119,16 @@ pub fn near_scene(bindings: &Bindings<impl Reads>, ray: &Probe) -> (Probe, f32) 
     let t_start = max(TraversalRay::new(bindings, &Probe { t_min: 0.0, ..*ray }).t_enter, 0.0);
     let origin = ray.origin + t_start * ray.direction;
     (Probe { origin, t_min: ray.t_min - t_start, t_max: ray.t_max - t_start, ..*ray }, t_start)
+}
+
+/// What `search` finds from there. A miss keeps t = t_max.
+#[inline(always)]
+pub fn hit_from_near(bindings: &Bindings<impl Reads>, probe: &Probe, search: impl FnOnce(&Probe, &mut Hit)) -> Hit {
+    let (near, t_start) = near_scene(bindings, probe);
+    let mut best = near.miss();
+    search(&near, &mut best);
+    best.t = if best.triangle_ix == NO_TRIANGLE { probe.t_max } else { best.t + t_start };
+    best
 }
 
 fn by_axis([x, y, z]: [f32; 3]) -> [f32; 4] {

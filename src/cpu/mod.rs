@@ -10,6 +10,7 @@ pub mod brute;
 pub mod camera;
 pub mod cast;
 pub mod children;
+pub mod columns;
 pub mod compact;
 pub mod companions;
 pub mod costs;

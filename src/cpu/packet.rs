@@ -1,25 +1,23 @@
-//! Eight rays as columns: where they are in a cell, and a leaf's triangles against those that are in it.
+//! Sixteen rays as columns: where they are in a cell, and a leaf's triangles against those that are in it.
 //!
 //! Whatever computes with columns is inlined into the function that `dispatch!` compiles for a set of instructions, and
 //! does so in no closure: elsewhere, each operation would be a call.
 
-use std::array::from_fn;
-
-use fearless_simd::{Simd, f32x8, mask32x8, prelude::*, u32x8};
+use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 use glam::{Vec3, Vec3A, Vec4};
 
 use super::{
     bindings::Bindings,
-    kdtree::{TraversalRay, largest_coordinate},
+    columns::{HitColumns, ProbeColumns},
+    kdtree::{FLAT, TraversalRay, largest_coordinate, signs_of},
     leaf::{Target, entries_of},
     packet_triangle::{Found, Shears},
-    probe::Probe,
     table::Reads,
 };
-use crate::layout::{Hit, KD_PLANE_REACH, KdNode, Slab};
+use crate::layout::{Hit, KD_ORIGIN_REACH, KD_PLANE_REACH, KdNode, Slab};
 
 /// Rays of a packet.
-pub const LANES: usize = 8;
+pub const LANES: usize = 16;
 
 /// Triangles of a leaf whose planes are tried before the first of them is tested.
 const BLOCK: usize = 8;
@@ -30,30 +28,32 @@ pub type Lanes = u32;
 /// Where the rays are in a cell. A ray that is not in it enters after it leaves.
 #[derive(Clone, Copy)]
 pub struct Interval<S: Simd> {
-    pub enter: f32x8<S>,
-    pub exit: f32x8<S>,
+    pub enter: f32x16<S>,
+    pub exit: f32x16<S>,
 }
 
 /// The middles of the rays' ways through a cell, and half their lengths, in t.
 struct Stretches<S: Simd> {
-    middle: f32x8<S>,
-    half: f32x8<S>,
+    middle: f32x16<S>,
+    half: f32x16<S>,
 }
 
 /// The rays as columns, and what each has found.
 pub struct Packet<S: Simd> {
-    origin: [f32x8<S>; 3],
-    direction: [f32x8<S>; 3],
-    pub inv_direction: [f32x8<S>; 3],
+    origin: [f32x16<S>; 3],
+    direction: [f32x16<S>; 3],
+    pub inv_direction: [f32x16<S>; 3],
+    /// By axis, whether the rays come to the upper child first.
+    pub first_is_above: [u32; 3],
     /// Where the rays meet the plane at 0 on each axis, in t.
-    pub bias: [f32x8<S>; 3],
+    pub bias: [f32x16<S>; 3],
     plane_reach: f32,
     shears: Shears<S>,
-    t_min: f32x8<S>,
-    source_triangle: u32x8<S>,
+    t_min: f32x16<S>,
+    source_triangle: u32x16<S>,
     best: Found<S>,
     /// The rays' `best` t; before everything where a ray is done.
-    pub t_best: f32x8<S>,
+    pub t_best: f32x16<S>,
 }
 
 impl<S: Simd> Interval<S> {
@@ -67,84 +67,59 @@ impl<S: Simd> Interval<S> {
     #[inline(always)]
     pub fn of(self, lanes: Lanes) -> Self {
         let simd = self.enter.simd;
-        let is_in = mask32x8::from_bitmask(simd, lanes.into());
+        let is_in = mask32x16::from_bitmask(simd, lanes.into());
         Self {
-            enter: is_in.select(self.enter, f32x8::splat(simd, 1.0)),
-            exit: is_in.select(self.exit, f32x8::splat(simd, 0.0)),
+            enter: is_in.select(self.enter, f32x16::splat(simd, 1.0)),
+            exit: is_in.select(self.exit, f32x16::splat(simd, 0.0)),
         }
     }
 }
 
 /// Of vectors, one a ray.
 #[inline(always)]
-fn columns<S: Simd>(simd: S, rows: &[Vec3; LANES]) -> [f32x8<S>; 3] {
-    let mut columns = [[0.0; LANES]; 3];
-    for (lane, row) in rows.iter().enumerate() {
-        columns[0][lane] = row.x;
-        columns[1][lane] = row.y;
-        columns[2][lane] = row.z;
-    }
-    let [x, y, z] = columns;
-    [f32x8::load_array(simd, x), f32x8::load_array(simd, y), f32x8::load_array(simd, z)]
+pub fn columns<S: Simd>(simd: S, [x, y, z]: &[[f32; LANES]; 3]) -> [f32x16<S>; 3] {
+    [f32x16::load_array_ref(simd, x), f32x16::load_array_ref(simd, y), f32x16::load_array_ref(simd, z)]
 }
 
 /// One ray's, by axis; a fourth is 0.
 #[inline(always)]
-fn row<S: Simd>(columns: &[f32x8<S>; 3], lane: usize) -> [f32; 4] {
+fn row<S: Simd>(columns: &[f32x16<S>; 3], lane: usize) -> [f32; 4] {
     [columns[0].as_array()[lane], columns[1].as_array()[lane], columns[2].as_array()[lane], 0.0]
 }
 
 /// A direction in the plane is taken as all but in it.
 #[inline(always)]
-fn inverse<S: Simd>(direction: f32x8<S>) -> f32x8<S> {
-    let tiny = f32x8::splat(direction.simd, 1e-12);
+fn inverse<S: Simd>(direction: f32x16<S>) -> f32x16<S> {
+    let tiny = f32x16::splat(direction.simd, FLAT);
     1.0 / direction.abs().simd_lt(tiny).select(tiny, direction)
-}
-
-#[inline(always)]
-fn like_on_axis<S: Simd>(direction: &f32x8<S>, lane: u32) -> Lanes {
-    let below = direction.simd_lt(0.0).to_bitmask() as Lanes;
-    if below >> lane & 1 == 1 { below } else { !below }
 }
 
 /// a * b + c, rounded twice.
 #[inline(always)]
-fn times_plus<S: Simd, A: std::ops::Mul<f32x8<S>, Output = f32x8<S>>>(
+fn times_plus<S: Simd, A: std::ops::Mul<f32x16<S>, Output = f32x16<S>>>(
     [ax, ay, az]: [A; 3],
-    b: &[f32x8<S>; 3],
-    c: &[f32x8<S>; 3],
-) -> [f32x8<S>; 3] {
+    b: &[f32x16<S>; 3],
+    c: &[f32x16<S>; 3],
+) -> [f32x16<S>; 3] {
     [ax * b[0] + c[0], ay * b[1] + c[1], az * b[2] + c[2]]
 }
 
 #[inline(always)]
-fn dot<S: Simd>(normal: Vec3, v: &[f32x8<S>; 3]) -> f32x8<S> {
+fn dot<S: Simd>(normal: Vec3, v: &[f32x16<S>; 3]) -> f32x16<S> {
     normal.x * v[0] + normal.y * v[1] + normal.z * v[2]
 }
 
 impl<S: Simd> Packet<S> {
-    /// The packet, and where its rays are in the root's cell: the operations of `TraversalRay::new`.
+    /// The first `n_rays`, and where they are in the root's cell: the operations of `TraversalRay::new`.
     #[inline(always)]
-    pub fn new(simd: S, bindings: &Bindings<impl Reads>, probes: &[Probe]) -> (Self, Interval<S>) {
-        // Missing rays copy the first, and are in no cell.
-        let mut origins = [probes[0].origin; LANES];
-        let mut directions = [probes[0].direction; LANES];
-        let (mut t_mins, mut t_maxs) = ([probes[0].t_min; LANES], [probes[0].t_max; LANES]);
-        let mut source_triangles = [probes[0].source_triangle; LANES];
-        for (lane, probe) in probes.iter().enumerate() {
-            origins[lane] = probe.origin;
-            directions[lane] = probe.direction;
-            t_mins[lane] = probe.t_min;
-            t_maxs[lane] = probe.t_max;
-            source_triangles[lane] = probe.source_triangle;
-        }
-        let (origin, direction) = (columns(simd, &origins), columns(simd, &directions));
+    pub fn new(simd: S, bindings: &Bindings<impl Reads>, probes: &ProbeColumns, n_rays: usize) -> (Self, Interval<S>) {
+        let (origin, direction) = (columns(simd, &probes.origin), columns(simd, &probes.direction));
         let inv_direction = [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])];
         let bias = [-origin[0] * inv_direction[0], -origin[1] * inv_direction[1], -origin[2] * inv_direction[2]];
         let [x0, y0, z0] = times_plus(bindings.frame.cell_min.to_array(), &inv_direction, &bias);
         let [x1, y1, z1] = times_plus(bindings.frame.cell_max.to_array(), &inv_direction, &bias);
-        let t_min = f32x8::load_array(simd, t_mins);
-        let t_max = f32x8::load_array(simd, t_maxs);
+        let t_min = f32x16::load_array_ref(simd, &probes.t_min);
+        let t_max = f32x16::load_array_ref(simd, &probes.t_max);
         let whole = Interval {
             enter: x0.min(x1).max(y0.min(y1)).max(z0.min(z1).max(t_min)),
             exit: x0.max(x1).min(y0.max(y1)).min(z0.max(z1).min(t_max)),
@@ -153,28 +128,24 @@ impl<S: Simd> Packet<S> {
             origin,
             direction,
             inv_direction,
+            first_is_above: [0, 1, 2].map(|axis| signs_of(probes.direction(0)) >> axis & 1),
             bias,
             plane_reach: KD_PLANE_REACH * largest_coordinate(bindings),
             shears: Shears::of(&origin, &direction),
             t_min,
-            source_triangle: u32x8::load_array(simd, source_triangles),
+            source_triangle: u32x16::load_array_ref(simd, &probes.source_triangle),
             best: Found::nothing(t_max),
             t_best: t_max,
         };
-        (packet, whole.of((1 << probes.len()) - 1))
+        (packet, whole.of((1 << n_rays) - 1))
     }
 
-    /// By axis, whether the ray comes to the upper child first; a fourth is 0.
+    /// Whether all rays start so near that the margins of the leaves cover their rounding; so do those that are missing.
     #[inline(always)]
-    pub fn first_is_above(&self, lane: u32) -> [u32; 4] {
-        row(&self.inv_direction, lane as usize).map(|d| u32::from(d < 0.0))
-    }
-
-    /// The rays that go the same way as one of them on all axes.
-    #[inline(always)]
-    pub fn like(&self, lane: u32) -> Lanes {
-        let [x, y, z] = &self.inv_direction;
-        like_on_axis(x, lane) & like_on_axis(y, lane) & like_on_axis(z, lane)
+    pub fn is_within_reach(&self, bindings: &Bindings<impl Reads>) -> bool {
+        let reach = KD_ORIGIN_REACH * largest_coordinate(bindings);
+        let [x, y, z] = [self.origin[0].abs(), self.origin[1].abs(), self.origin[2].abs()];
+        (x.simd_gt(reach) | y.simd_gt(reach) | z.simd_gt(reach)).all_false()
     }
 
     /// The rays' ways through the cell, but for what lies beyond their best hits.
@@ -252,7 +223,7 @@ impl<S: Simd> Packet<S> {
         let best = &self.best;
         self.t_best = best.t;
         if ANY_HIT {
-            self.t_best = best.is_hit().select(f32x8::splat(best.t.simd, f32::NEG_INFINITY), best.t);
+            self.t_best = best.is_hit().select(f32x16::splat(best.t.simd, f32::NEG_INFINITY), best.t);
         }
     }
 
@@ -283,11 +254,14 @@ impl<S: Simd> Packet<S> {
 
     /// What the rays have found.
     #[inline(always)]
-    pub fn hits(&self) -> [Hit; LANES] {
+    pub fn hits(&self) -> HitColumns {
         let best = &self.best;
-        let (t, triangle_ix) = (best.t.to_array(), best.triangle_ix.to_array());
-        let (u, v) = (best.u.to_array(), best.v.to_array());
-        from_fn(|lane| Hit { t: t[lane], triangle_ix: triangle_ix[lane], u: u[lane], v: v[lane] })
+        HitColumns {
+            t: best.t.to_array(),
+            triangle_ix: best.triangle_ix.to_array(),
+            u: best.u.to_array(),
+            v: best.v.to_array(),
+        }
     }
 
     /// A ray has found this by itself.

@@ -1,15 +1,15 @@
-//! Eight rays through the tree together (Wald et al., "Interactive rendering with coherent ray tracing", 2001): a node is
+//! Sixteen rays through the tree together (Wald et al., "Interactive rendering with coherent ray tracing", 2001): a node is
 //! read and a plane is tried once for all that are there. A ray is tested where it would be alone, and finds the same, bit
 //! for bit.
 
-use fearless_simd::{Level, Simd, dispatch, f32x8, prelude::*};
+use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use super::{
     bindings::Bindings,
-    kdtree::{Cell, Pending, TraversalRay, axis_of, is_leaf, search, search_cell},
+    columns::{HitColumns, ProbeColumns},
+    kdtree::{Cell, Pending, TraversalRay, axis_of, hit_from_near, is_leaf, search, search_cell},
     packet::{Interval, LANES, Packet},
     pending_stack::PendingStack,
-    probe::Probe,
     slab::slab_of,
     table::Reads,
 };
@@ -28,11 +28,17 @@ pub struct PacketTraverser {
 
 /// A pending subtree: node, and where the rays are in its cell.
 #[derive(Clone, Copy, Default)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 struct Entry {
     enter: [f32; LANES],
     exit: [f32; LANES],
     node_ix: u32,
+}
+
+/// Whether a ray that is left alone in a cell is there faster by itself than as a packet: where a packet takes several
+/// instructions for one (benches/EXPERIMENTS.md).
+const fn goes_on_alone<S: Simd>() -> bool {
+    size_of::<S::f32s>() < size_of::<f32x16<S>>()
 }
 
 impl PacketTraverser {
@@ -48,7 +54,6 @@ impl PacketTraverser {
         &mut self,
         bindings: &Bindings<impl Reads>,
         packet: &Packet<S>,
-        first_is_above: [u32; 4],
         node_ix: &mut u32,
         cell: &mut Interval<S>,
     ) -> KdNode {
@@ -65,7 +70,7 @@ impl PacketTraverser {
             }
             let axis = axis_of(node) as usize;
             let t_cross = f32::from_bits(node.split_or_first) * packet.inv_direction[axis] + packet.bias[axis];
-            let first_ix = 2 * (node.axis_and_child >> KD_PAIR_SHIFT) + first_is_above[axis];
+            let first_ix = 2 * (node.axis_and_child >> KD_PAIR_SHIFT) + packet.first_is_above[axis];
             // Those in neither have met a NaN, or are not in the cell.
             let first = Interval { enter: cell.enter, exit: t_cross.min(cell.exit) };
             let second = Interval { enter: t_cross.max(cell.enter), exit: cell.exit };
@@ -85,12 +90,12 @@ impl PacketTraverser {
 
     /// The next pending cell in which a ray may hit something nearer than it has, or none.
     #[inline(always)]
-    fn pop<S: Simd>(&mut self, t_best: f32x8<S>) -> Option<(u32, Interval<S>)> {
+    fn pop<S: Simd>(&mut self, t_best: f32x16<S>) -> Option<(u32, Interval<S>)> {
         while self.size > 0 {
             self.size -= 1;
             let entry = &self.entries[self.size];
-            let enter = f32x8::load_array_ref(t_best.simd, &entry.enter);
-            let exit = f32x8::load_array_ref(t_best.simd, &entry.exit);
+            let enter = f32x16::load_array_ref(t_best.simd, &entry.enter);
+            let exit = f32x16::load_array_ref(t_best.simd, &entry.exit);
             let cell = Interval { enter, exit: exit.min(t_best) };
             if cell.lanes() != 0 {
                 return Some((entry.node_ix, cell));
@@ -99,21 +104,19 @@ impl PacketTraverser {
         None
     }
 
-    /// All leaves that the rays meet in `whole`, which go the same way on all axes. One that is left alone in a cell goes
-    /// on alone there.
+    /// All leaves that the rays meet in `whole`.
     #[inline(always)]
     fn search<S: Simd, const ANY_HIT: bool>(
         &mut self,
         bindings: &Bindings<impl Reads>,
         packet: &mut Packet<S>,
-        first_is_above: [u32; 4],
         whole: Interval<S>,
     ) {
         let (mut node_ix, mut cell) = (0, whole);
         self.size = 0;
         loop {
             let lanes = cell.lanes();
-            if lanes.is_power_of_two() {
+            if lanes.is_power_of_two() && goes_on_alone::<S>() {
                 let lane = lanes.trailing_zeros() as usize;
                 let (t_enter, t_exit) = (cell.enter.as_array()[lane], cell.exit.as_array()[lane]);
                 let (ray, alone) = (packet.ray(lane), Cell { node_ix, t_enter, t_exit });
@@ -121,7 +124,7 @@ impl PacketTraverser {
                 search_cell::<_, ANY_HIT>(bindings, &ray, &mut self.single, alone, &mut best);
                 packet.set_hit::<ANY_HIT>(lane, &best);
             } else {
-                let leaf = self.descend(bindings, packet, first_is_above, &mut node_ix, &mut cell);
+                let leaf = self.descend(bindings, packet, &mut node_ix, &mut cell);
                 packet.intersect_leaf::<ANY_HIT>(bindings, leaf, &cell);
             }
             match self.pop(packet.t_best) {
@@ -131,28 +134,50 @@ impl PacketTraverser {
         }
     }
 
+    /// What starts far away is rare, and goes alone.
     #[inline(always)]
     fn traverse_at<S: Simd, const ANY_HIT: bool>(
         &mut self,
         simd: S,
         bindings: &Bindings<impl Reads>,
-        probes: &[Probe],
-    ) -> [Hit; LANES] {
-        let (mut packet, whole) = Packet::new(simd, bindings, probes);
-        let mut remaining = whole.lanes();
-        while remaining != 0 {
-            let lane = remaining.trailing_zeros();
-            let lanes = packet.like(lane) & remaining;
-            remaining &= !lanes;
-            let first_is_above = packet.first_is_above(lane);
-            self.search::<_, ANY_HIT>(bindings, &mut packet, first_is_above, whole.of(lanes));
+        probes: &ProbeColumns,
+        n_rays: usize,
+    ) -> HitColumns {
+        let (mut packet, whole) = Packet::new(simd, bindings, probes, n_rays);
+        if !packet.is_within_reach(bindings) {
+            return self.traverse_one_by_one::<ANY_HIT>(bindings, probes, n_rays);
+        }
+        if whole.lanes() != 0 {
+            self.search::<_, ANY_HIT>(bindings, &mut packet, whole);
         }
         packet.hits()
     }
 
-    /// The hits of up to `LANES` rays, at least one, that start within reach; void beyond them.
-    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl Reads>, probes: &[Probe]) -> [Hit; LANES] {
-        dispatch!(self.level, simd => self.traverse_at::<_, ANY_HIT>(simd, bindings, probes))
+    #[cold]
+    fn traverse_one_by_one<const ANY_HIT: bool>(
+        &mut self,
+        bindings: &Bindings<impl Reads>,
+        probes: &ProbeColumns,
+        n_rays: usize,
+    ) -> HitColumns {
+        let mut hits = HitColumns::default();
+        for lane in 0..n_rays {
+            let hit = hit_from_near(bindings, &probes.get(lane), |near, best| {
+                search::<_, ANY_HIT>(bindings, &TraversalRay::new(bindings, near), &mut self.single, best);
+            });
+            hits.set(lane, &hit);
+        }
+        hits
+    }
+
+    /// The hits of the first `n_rays`, which are of one octant; void beyond them.
+    pub fn traverse<const ANY_HIT: bool>(
+        &mut self,
+        bindings: &Bindings<impl Reads>,
+        probes: &ProbeColumns,
+        n_rays: usize,
+    ) -> HitColumns {
+        dispatch!(self.level, simd => self.traverse_at::<_, ANY_HIT>(simd, bindings, probes, n_rays))
     }
 
     /// A ray for itself.

@@ -1,7 +1,7 @@
-//! A triangle against eight rays: the operations of `triangle.rs` on columns, so that each ray finds the same, bit for
+//! A triangle against sixteen rays: the operations of `triangle.rs` on columns, so that each ray finds the same, bit for
 //! bit.
 
-use fearless_simd::{Simd, f32x8, mask32x8, prelude::*, u32x8};
+use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 
 use super::{
     packet::{LANES, Lanes},
@@ -9,37 +9,37 @@ use super::{
 };
 use crate::layout::{Hit, NO_TRIANGLE, Triangle};
 
-/// The shears of eight rays.
+/// The shears of sixteen rays.
 pub struct Shears<S: Simd> {
     /// As `Shear` has it: each ray's longest axis last.
-    origin: [f32x8<S>; 3],
-    x: f32x8<S>,
-    y: f32x8<S>,
-    z: f32x8<S>,
+    origin: [f32x16<S>; 3],
+    x: f32x16<S>,
+    y: f32x16<S>,
+    z: f32x16<S>,
     /// The rays whose longest axis it is.
     pub lanes_of_axis: [Lanes; 3],
 }
 
-/// Eight hits.
+/// Sixteen hits.
 #[derive(Clone, Copy)]
 pub struct Found<S: Simd> {
-    pub t: f32x8<S>,
-    pub triangle_ix: u32x8<S>,
-    pub u: f32x8<S>,
-    pub v: f32x8<S>,
+    pub t: f32x16<S>,
+    pub triangle_ix: u32x16<S>,
+    pub u: f32x16<S>,
+    pub v: f32x16<S>,
 }
 
 impl<S: Simd> Found<S> {
     /// Misses.
     #[inline(always)]
-    pub fn nothing(t_max: f32x8<S>) -> Self {
-        let zero = f32x8::splat(t_max.simd, 0.0);
-        Self { t: t_max, triangle_ix: u32x8::splat(t_max.simd, NO_TRIANGLE), u: zero, v: zero }
+    pub fn nothing(t_max: f32x16<S>) -> Self {
+        let zero = f32x16::splat(t_max.simd, 0.0);
+        Self { t: t_max, triangle_ix: u32x16::splat(t_max.simd, NO_TRIANGLE), u: zero, v: zero }
     }
 
     /// These where `mask` is set, others elsewhere.
     #[inline(always)]
-    pub fn or(self, other: Self, mask: mask32x8<S>) -> Self {
+    pub fn or(self, other: Self, mask: mask32x16<S>) -> Self {
         Self {
             t: mask.select(self.t, other.t),
             triangle_ix: mask.select(self.triangle_ix, other.triangle_ix),
@@ -49,7 +49,7 @@ impl<S: Simd> Found<S> {
     }
 
     #[inline(always)]
-    pub fn is_hit(&self) -> mask32x8<S> {
+    pub fn is_hit(&self) -> mask32x16<S> {
         self.triangle_ix.simd_ne(NO_TRIANGLE)
     }
 
@@ -75,7 +75,7 @@ impl<S: Simd> Found<S> {
 impl<S: Simd> Shears<S> {
     /// As `Shear::of`.
     #[inline(always)]
-    pub fn of(origin: &[f32x8<S>; 3], direction: &[f32x8<S>; 3]) -> Self {
+    pub fn of(origin: &[f32x16<S>; 3], direction: &[f32x16<S>; 3]) -> Self {
         let [x, y, z] = [direction[0].abs(), direction[1].abs(), direction[2].abs()];
         let is_x = x.simd_ge(y) & x.simd_ge(z);
         let is_y = !is_x & y.simd_ge(z);
@@ -101,7 +101,7 @@ impl<S: Simd> Shears<S> {
 
     /// A corner, the rays' longest axis last, as each ray sees it.
     #[inline(always)]
-    fn corner(&self, [x, y, z]: [f32; 3]) -> [f32x8<S>; 3] {
+    fn corner(&self, [x, y, z]: [f32; 3]) -> [f32x16<S>; 3] {
         let z = z - self.origin[2];
         [(x - self.origin[0]) - self.x * z, (y - self.origin[1]) - self.y * z, z]
     }
@@ -115,13 +115,13 @@ impl<S: Simd> Shears<S> {
         triangle_ix: u32,
         axis: usize,
         lanes: Lanes,
-    ) -> Option<(Found<S>, mask32x8<S>)> {
+    ) -> Option<(Found<S>, mask32x16<S>)> {
         let simd = self.x.simd;
         let [x0, y0, z0] = self.corner(axis_last(triangle.v0.to_array(), axis));
         let [x1, y1, z1] = self.corner(axis_last(triangle.v1.to_array(), axis));
         let [x2, y2, z2] = self.corner(axis_last(triangle.v2.to_array(), axis));
         let edges = [x2 * y1 - y2 * x1, x0 * y2 - y0 * x2, x1 * y0 - y1 * x0];
-        let inside = !is_outside(edges) & mask32x8::from_bitmask(simd, lanes.into());
+        let inside = !is_outside(edges) & mask32x16::from_bitmask(simd, lanes.into());
         if inside.all_false() {
             return None;
         }
@@ -131,7 +131,7 @@ impl<S: Simd> Shears<S> {
         let inv_det = 1.0 / det;
         let t = (edges[0] * z0 + edges[1] * z1 + edges[2] * z2) * self.z * inv_det;
         let mut found =
-            Found { t, triangle_ix: u32x8::splat(simd, triangle_ix), u: edges[1] * inv_det, v: edges[2] * inv_det };
+            Found { t, triangle_ix: u32x16::splat(simd, triangle_ix), u: edges[1] * inv_det, v: edges[2] * inv_det };
         let touches = edges[0].simd_eq(0.0) | edges[1].simd_eq(0.0) | edges[2].simd_eq(0.0);
         let at_edge = (inside & touches).to_bitmask() as Lanes;
         if at_edge != 0 {
@@ -148,7 +148,7 @@ impl<S: Simd> Shears<S> {
         triangle_ix: u32,
         lanes: Lanes,
         found: &mut Found<S>,
-        hit: &mut mask32x8<S>,
+        hit: &mut mask32x16<S>,
     ) {
         for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
             let exact = self.of_lane(lane).intersect_triangle(triangle, triangle_ix);
@@ -161,7 +161,7 @@ impl<S: Simd> Shears<S> {
 }
 
 #[inline(always)]
-fn is_outside<S: Simd>(edges: [f32x8<S>; 3]) -> mask32x8<S> {
+fn is_outside<S: Simd>(edges: [f32x16<S>; 3]) -> mask32x16<S> {
     let below = edges[0].simd_lt(0.0) | edges[1].simd_lt(0.0) | edges[2].simd_lt(0.0);
     let above = edges[0].simd_gt(0.0) | edges[1].simd_gt(0.0) | edges[2].simd_gt(0.0);
     below & above
@@ -169,6 +169,6 @@ fn is_outside<S: Simd>(edges: [f32x8<S>; 3]) -> mask32x8<S> {
 
 /// Vectors with a component last: x, y or else z.
 #[inline(always)]
-fn axes_last<S: Simd>([x, y, z]: &[f32x8<S>; 3], is_x: mask32x8<S>, is_y: mask32x8<S>) -> [f32x8<S>; 3] {
+fn axes_last<S: Simd>([x, y, z]: &[f32x16<S>; 3], is_x: mask32x16<S>, is_y: mask32x16<S>) -> [f32x16<S>; 3] {
     [is_x.select(*y, is_y.select(*z, *x)), is_x.select(*z, is_y.select(*x, *y)), is_x.select(*x, is_y.select(*y, *z))]
 }

@@ -1,5 +1,5 @@
 //! Whether a ray keeps clear of the slab around a node's surface. Twin of `slab.glsl`; the planes of triangles are in `leaf.rs`,
-//! slabs for eight rays in `packet.rs`.
+//! slabs for sixteen rays in `packet.rs`.
 
 use super::{bindings::Bindings, kdtree::TraversalRay, table::Reads};
 use crate::layout::{KD_IN_SLAB, KdNode, Slab};

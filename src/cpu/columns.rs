@@ -1,0 +1,73 @@
+//! Rays by columns, and their hits: as the packets' instructions load and store them.
+
+use glam::Vec3;
+
+use super::{packet::LANES, probe::Probe};
+use crate::layout::Hit;
+
+/// The rays of a packet.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub struct ProbeColumns {
+    pub origin: [[f32; LANES]; 3],
+    pub direction: [[f32; LANES]; 3],
+    pub t_min: [f32; LANES],
+    pub t_max: [f32; LANES],
+    pub source_triangle: [u32; LANES],
+}
+
+/// The hits of a packet.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(align(64))]
+pub struct HitColumns {
+    pub t: [f32; LANES],
+    pub triangle_ix: [u32; LANES],
+    pub u: [f32; LANES],
+    pub v: [f32; LANES],
+}
+
+impl ProbeColumns {
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, probe: &Probe) {
+        for axis in 0..3 {
+            self.origin[axis][lane] = probe.origin[axis];
+            self.direction[axis][lane] = probe.direction[axis];
+        }
+        self.t_min[lane] = probe.t_min;
+        self.t_max[lane] = probe.t_max;
+        self.source_triangle[lane] = probe.source_triangle;
+    }
+
+    #[inline(always)]
+    pub fn direction(&self, lane: usize) -> Vec3 {
+        let [x, y, z] = &self.direction;
+        Vec3::new(x[lane], y[lane], z[lane])
+    }
+
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> Probe {
+        let [x, y, z] = &self.origin;
+        Probe {
+            origin: Vec3::new(x[lane], y[lane], z[lane]),
+            t_min: self.t_min[lane],
+            direction: self.direction(lane),
+            t_max: self.t_max[lane],
+            source_triangle: self.source_triangle[lane],
+        }
+    }
+}
+
+impl HitColumns {
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, hit: &Hit) {
+        self.t[lane] = hit.t;
+        self.triangle_ix[lane] = hit.triangle_ix;
+        self.u[lane] = hit.u;
+        self.v[lane] = hit.v;
+    }
+
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> Hit {
+        Hit { t: self.t[lane], triangle_ix: self.triangle_ix[lane], u: self.u[lane], v: self.v[lane] }
+    }
+}
