@@ -108,7 +108,7 @@ pub enum Traversal {
     ShortStack,
     /// From leaf to leaf, by links to its neighbours.
     Ropes,
-    /// An array of far children. On the CPU, eight rays go together.
+    /// An array of far children. On the CPU, sixteen rays go together.
     Stack,
     /// No tree: every triangle. For small meshes.
     Brute,

@@ -140,7 +140,8 @@ impl<S: Simd> Packet<S> {
         (packet, whole.of((1 << n_rays) - 1))
     }
 
-    /// Whether all rays start so near that the margins of the leaves cover their rounding; so do those that are missing.
+    /// Whether all rays start so near that the margins of the leaves cover their rounding. Missing ones are asked, too: they are
+    /// those of an earlier packet, and near as a rule.
     #[inline(always)]
     pub fn is_within_reach(&self, bindings: &Bindings<impl Reads>) -> bool {
         let reach = KD_ORIGIN_REACH * largest_coordinate(bindings);
