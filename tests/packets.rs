@@ -168,7 +168,7 @@ fn sixteen_rays_of_an_octant_are_a_packet() {
     let mut n_packets = 0;
     for (ray_ix, direction) in directions_in_turn().enumerate() {
         let probe = Probe::from(&support::rays::ray(Vec3::X * ray_ix as f32, direction));
-        let Some(waiting) = companions.with(ray_ix, &probe) else { continue };
+        let Some(waiting) = companions.join(ray_ix, &probe) else { continue };
         n_packets += 1;
         assert_eq!(waiting.keys.len(), LANES);
         for (lane, ray_ix) in waiting.keys.drain(..).enumerate() {

@@ -29,9 +29,9 @@ impl<Key> Default for Companions<Key> {
 }
 
 impl<Key> Companions<Key> {
-    /// With the ray; returns those of its octant if they are a packet now, which is to be taken away.
+    /// The ray waits, too. Returns those of its octant if they are a packet now, which is to be taken away.
     #[inline(always)]
-    pub fn with(&mut self, key: Key, probe: &Probe) -> Option<&mut Waiting<Key>> {
+    pub fn join(&mut self, key: Key, probe: &Probe) -> Option<&mut Waiting<Key>> {
         let octant = &mut self.octants[signs_of(probe.direction) as usize & 7];
         octant.probes.set(octant.keys.len(), probe);
         octant.keys.push(key);

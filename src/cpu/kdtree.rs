@@ -49,7 +49,7 @@ pub fn max(x: f32, y: f32) -> f32 {
     if x < y { y } else { x }
 }
 
-/// A component below this is taken as this: finite everywhere, and one rule for all ties.
+/// A component of less magnitude is taken as this: finite everywhere, and one rule for all ties.
 pub const FLAT: f32 = 1e-12;
 
 /// Bit i: on axis i, the ray comes to the upper child first.
@@ -104,10 +104,16 @@ pub fn largest_coordinate(bindings: &Bindings<impl Reads>) -> f32 {
     bindings.frame.cell_min.abs().max(bindings.frame.cell_max.abs()).max_element()
 }
 
-/// Whether the ray starts so near that the margins of the leaves cover its rounding.
+/// How far from 0, by its largest coordinate, a ray may start for the margins of the leaves to cover its rounding.
 #[inline(always)]
-pub fn is_within_reach(bindings: &Bindings<impl Reads>, ray: &Probe) -> bool {
-    ray.origin.abs().max_element() <= KD_ORIGIN_REACH * largest_coordinate(bindings)
+pub fn origin_reach(bindings: &Bindings<impl Reads>) -> f32 {
+    KD_ORIGIN_REACH * largest_coordinate(bindings)
+}
+
+/// Whether the ray starts within reach.
+#[inline(always)]
+fn is_within_reach(bindings: &Bindings<impl Reads>, ray: &Probe) -> bool {
+    ray.origin.abs().max_element() <= origin_reach(bindings)
 }
 
 /// The ray with its origin moved along it to lie within `KD_ORIGIN_REACH`, and how far: 0 for all but cameras far away.
@@ -121,7 +127,7 @@ pub fn near_scene(bindings: &Bindings<impl Reads>, ray: &Probe) -> (Probe, f32) 
     (Probe { origin, t_min: ray.t_min - t_start, t_max: ray.t_max - t_start, ..*ray }, t_start)
 }
 
-/// What `search` finds from there. A miss keeps t = t_max.
+/// What `search` finds from near the scene, as seen from where the ray starts. A miss keeps t = t_max.
 #[inline(always)]
 pub fn hit_from_near(bindings: &Bindings<impl Reads>, probe: &Probe, search: impl FnOnce(&Probe, &mut Hit)) -> Hit {
     let (near, t_start) = near_scene(bindings, probe);

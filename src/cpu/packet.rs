@@ -9,12 +9,12 @@ use glam::{Vec3, Vec3A, Vec4};
 use super::{
     bindings::Bindings,
     columns::{HitColumns, ProbeColumns},
-    kdtree::{FLAT, TraversalRay, largest_coordinate, signs_of},
+    kdtree::{FLAT, TraversalRay, largest_coordinate, origin_reach, signs_of},
     leaf::{Target, entries_of},
     packet_triangle::{Found, Shears},
     table::Reads,
 };
-use crate::layout::{Hit, KD_ORIGIN_REACH, KD_PLANE_REACH, KdNode, Slab};
+use crate::layout::{Hit, KD_PLANE_REACH, KdNode, Slab};
 
 /// Rays of a packet.
 pub const LANES: usize = 16;
@@ -140,11 +140,11 @@ impl<S: Simd> Packet<S> {
         (packet, whole.of((1 << n_rays) - 1))
     }
 
-    /// Whether all rays start so near that the margins of the leaves cover their rounding. Missing ones are asked, too: they are
-    /// those of an earlier packet, and near as a rule.
+    /// Whether all rays start within reach. Missing ones are asked, too: they are those of an earlier packet, and near as a
+    /// rule.
     #[inline(always)]
     pub fn is_within_reach(&self, bindings: &Bindings<impl Reads>) -> bool {
-        let reach = KD_ORIGIN_REACH * largest_coordinate(bindings);
+        let reach = origin_reach(bindings);
         let [x, y, z] = [self.origin[0].abs(), self.origin[1].abs(), self.origin[2].abs()];
         (x.simd_gt(reach) | y.simd_gt(reach) | z.simd_gt(reach)).all_false()
     }

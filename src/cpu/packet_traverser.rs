@@ -163,7 +163,7 @@ impl PacketTraverser {
         let mut hits = HitColumns::default();
         for lane in 0..n_rays {
             let hit = hit_from_near(bindings, &probes.get(lane), |near, best| {
-                search::<_, ANY_HIT>(bindings, &TraversalRay::new(bindings, near), &mut self.single, best);
+                self.traverse_alone::<ANY_HIT>(bindings, &TraversalRay::new(bindings, near), best);
             });
             hits.set(lane, &hit);
         }

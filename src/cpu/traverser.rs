@@ -86,7 +86,9 @@ impl Traverser {
             keys.drain(..).enumerate().for_each(|(lane, key)| found(key, hits.get(lane)));
         };
         for (key, probe) in probes {
-            companions.with(key, &probe).map(&mut traverse);
+            if let Some(packet) = companions.join(key, &probe) {
+                traverse(packet);
+            }
         }
         companions.rest().for_each(traverse);
     }
