@@ -24,7 +24,10 @@ fn main() {
     for path in shaders() {
         let name = path.file_name().and_then(|n| n.to_str()).expect("a shader's name is UTF-8").to_owned();
         match compile(&compiler, &path, &name) {
-            Ok(spirv) => fs::write(out_dir.join(format!("{name}.spv")), spirv).expect("write SPIR-V"),
+            Ok(spirv) => {
+                name_compiler(&spirv);
+                fs::write(out_dir.join(format!("{name}.spv")), spirv).expect("write SPIR-V");
+            }
             // One line an error, as the compiler prints it, so that an editor can jump to it.
             Err(error) => {
                 error.lines().for_each(|line| println!("cargo::error={line}"));
@@ -32,6 +35,13 @@ fn main() {
             }
         }
     }
+}
+
+/// Tells the crate which compiler made the kernels: its SPIR-V version and its generator word (tool and its version),
+/// both from SPIR-V's header.
+fn name_compiler(spirv: &[u8]) {
+    let word = |ix: usize| u32::from_le_bytes(spirv[4 * ix..][..4].try_into().expect("SPIR-V has a header"));
+    println!("cargo::rustc-env=KDRAY_SPIRV_COMPILER=SPIR-V {:#x}, generator {:#010x}", word(1), word(2));
 }
 
 /// The files of all folders, in a fixed order.

@@ -2,12 +2,14 @@
 
 mod aov;
 mod crop;
+mod pass;
 mod profile;
 mod view;
 
 pub use self::{
     aov::{Aov, Channel, Samples},
     crop::Crop,
+    pass::{Pass, Role, Scope},
     profile::{BounceStats, PassTime, Profile},
     view::View,
 };

@@ -10,9 +10,11 @@
 //!   passes   one kernel and one file each, on
 //!   gpu      the Vulkan layer
 //! cast     rays -> hits, without a frame
+//! choices  what the user leaves open: which tree, which traversal, which primary rays
 //! cpu      both without Vulkan
 //! profile  times and counts -> each pass's rays
 //! output   picture -> file
+//! memory   what there is of it
 //! bench    all of it, timed
 //! view     all of it, in a window
 //! ```
@@ -42,7 +44,11 @@ pub mod render;
 
 pub mod cast;
 
+pub mod choices;
+pub mod memory;
+
 pub mod output;
+pub mod text;
 
 pub mod bench;
 

@@ -1,10 +1,9 @@
-//! Pixels to a file, whole or not at all.
+//! Writes pixels to a file, whole or not at all.
 //!
-//! A file is encoded in memory, if it fits there, written beside its target under a temporary name, synchronized and renamed. So a full
-//! disk leaves what was there before, and no truncated or temporary file.
+//! A file is encoded in memory, if it fits there, written beside its target under a temporary name, synchronized and
+//! renamed. So a full disk leaves what was there before, and no truncated or temporary file. A signal that ends the
+//! process leaves none either, if its handler calls [`remove_temporaries`].
 
-#[cfg(unix)]
-use std::os::unix::fs::PermissionsExt;
 use std::{
     fs::{self, File, OpenOptions},
     io::{self, Cursor, Seek, Write},
@@ -15,14 +14,17 @@ use image::{
     EncodableLayout, ImageBuffer, ImageError, ImageFormat, PixelWithColorType, Primitive, Rgb,
     error::{ParameterError, ParameterErrorKind},
 };
-use tempfile::{NamedTempFile, SpooledTempFile};
+use tempfile::SpooledTempFile;
 use tracing::info_span;
 
-pub use self::{heat_map::HeatMap, layers::write_layers};
+pub use self::{heat_map::HeatMap, layers::write_layers, target::regular_file, temporary::remove_temporaries};
+use self::{target::Target, temporary::Temporary};
 use crate::frame::Picture;
 
 mod heat_map;
 mod layers;
+mod target;
+mod temporary;
 
 /// Bytes beyond which a spool goes to disk.
 const SPOOL_IN_MEMORY: usize = 64 << 20;
@@ -77,9 +79,9 @@ pub fn stem_of(scene_name: &str) -> String {
 pub fn check(path: &Path) -> Result<(), OutputError> {
     match Target::at(path)? {
         Target::Stream => Ok(()),
-        Target::File { directory, .. } => {
-            create_beside(&directory).map(drop).map_err(|source| OutputError::Write { path: path.to_owned(), source })
-        }
+        Target::File { directory, .. } => Temporary::create_in(&directory)
+            .map(drop)
+            .map_err(|source| OutputError::Write { path: path.to_owned(), source }),
     }
 }
 
@@ -95,8 +97,8 @@ pub fn write_picture(path: &Path, picture: &Picture) -> Result<(), OutputError> 
 
 /// Writes a file whole or not at all. Devices and pipes are written to directly.
 ///
-/// A symbolic link is followed; an existing file must be writable and keeps its permissions, a new one gets what the
-/// umask leaves.
+/// A symbolic link is followed, and a link that leads nowhere gets the file that it names. An existing file must be
+/// writable and keeps its permissions; a new one gets those that the umask leaves.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     match Target::at(path)? {
         Target::Stream => open_stream(path).and_then(|mut stream| stream.write_all(bytes)),
@@ -135,57 +137,17 @@ fn write_stream(path: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -> 
     io::copy(&mut whole, &mut open_stream(path)?).map(|_: u64| ())
 }
 
-/// What a path leads to.
-enum Target {
-    /// A device or a pipe, which cannot be replaced.
-    Stream,
-    /// A regular file, which may not exist yet, in an existing directory.
-    File { directory: PathBuf, file: PathBuf },
-}
-
-impl Target {
-    fn at(path: &Path) -> Result<Self, OutputError> {
-        let failed = |source| OutputError::Write { path: path.to_owned(), source };
-        let file = match fs::metadata(path) {
-            Ok(metadata) if metadata.is_dir() => return Err(OutputError::IsDirectory { path: path.to_owned() }),
-            Ok(metadata) if !metadata.is_file() => return Ok(Self::Stream),
-            Ok(_) => {
-                // Renaming asks nothing of the file that it replaces: a write-protected one is refused here.
-                OpenOptions::new().write(true).open(path).map_err(failed)?;
-                fs::canonicalize(path).map_err(failed)?
-            }
-            Err(_) => path.to_owned(),
-        };
-        let directory = match file.parent() {
-            Some(parent) if parent != Path::new("") => parent.to_owned(),
-            _ => PathBuf::from("."),
-        };
-        if !directory.is_dir() {
-            return Err(OutputError::NoDirectory { path: path.to_owned(), directory });
-        }
-        Ok(Self::File { directory, file })
-    }
-}
-
+/// Lets `body` write a temporary file, which then takes the place of `file`.
 fn replace(directory: &Path, file: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
-    let mut temporary = create_beside(directory)?;
-    body(temporary.as_file_mut())?;
+    let mut temporary = Temporary::create_in(directory)?;
+    let written = temporary.as_file_mut();
+    body(written)?;
     if let Ok(replaced) = fs::metadata(file) {
-        temporary.as_file().set_permissions(replaced.permissions())?;
+        written.set_permissions(replaced.permissions())?;
     }
     // Some file systems report a full disk only here.
-    temporary.as_file().sync_all()?;
-    temporary.persist(file).map(|_: File| ()).map_err(|failed| failed.error)
-}
-
-/// A temporary file that can be renamed to any other of its directory, and that is removed unless it is.
-fn create_beside(directory: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".kdray-");
-    #[cfg(unix)]
-    builder.permissions(PermissionsExt::from_mode(0o666)); // less the umask
-    // The library's own message names the temporary file, which says nothing to the user.
-    builder.tempfile_in(directory).map_err(|error| io::Error::from(error.kind()))
+    written.sync_all()?;
+    temporary.persist(file)
 }
 
 fn rgb<T: Copy>(rgba: &[[T; 4]]) -> Vec<T> {

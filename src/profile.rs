@@ -1,37 +1,31 @@
 //! Which rays go into each pass and come out of it, alike on GPU and CPU.
 
 use crate::{
-    frame::{BounceStats, PassTime},
+    frame::{BounceStats, PassTime, Role, Scope},
     layout::{Bounce, Counters},
 };
 
-/// Whether it lights the hits of all of a batch's bounces.
-fn is_lighting(pass: &PassTime) -> bool {
-    ["shadow", "shade", "resolve"].contains(&pass.name)
-}
-
-/// Whether it runs once a batch, or once a bounce of a batch.
+/// Whether the pass runs once a batch, or once a bounce of a batch.
 pub(crate) fn is_in_batch(pass: &PassTime) -> bool {
-    pass.bounce.is_some() || is_lighting(pass)
+    pass.pass().scope != Scope::Frame
 }
 
 /// Fills in a pass's rays. `bounces`: of the pass's batch.
 pub(crate) fn count_rays(pass: &mut PassTime, bounces: &[BounceStats]) {
-    if is_lighting(pass) {
+    let role = pass.pass().role;
+    if pass.pass().scope == Scope::Batch {
         let sum = |count: fn(&BounceStats) -> u64| bounces.iter().map(count).sum();
         pass.n_rays_in = Some(sum(|bounce| bounce.n_rays));
-        // Of the others, rays end in pixels.
-        pass.n_rays_out = (pass.name == "shadow").then(|| sum(|bounce| bounce.n_shadow_rays));
+        // The other passes of a batch make no rays: theirs end in pixels.
+        pass.n_rays_out = (role == Role::Shadow).then(|| sum(|bounce| bounce.n_shadow_rays));
         return;
     }
     let Some(bounce_ix) = pass.bounce.map(|bounce| bounce as usize) else { return };
     let Some(bounce) = bounces.get(bounce_ix) else { return };
     pass.n_rays_in = Some(bounce.n_rays);
-    pass.n_rays_out = match pass.name {
-        "primary_hit" | "trace" => Some(bounce.n_hits),
-        "compact_reduce" | "compact_spine" | "compact_scatter" => {
-            Some(bounces.get(bounce_ix + 1).map_or(0, |next| next.n_rays))
-        }
+    pass.n_rays_out = match role {
+        Role::ClosestHit => Some(bounce.n_hits),
+        Role::Compaction => Some(bounces.get(bounce_ix + 1).map_or(0, |next| next.n_rays)),
         _ => None,
     };
 }

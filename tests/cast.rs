@@ -19,6 +19,7 @@ use support::{
     compare, meshes,
     random::Random,
     rays::{nasty_ray, ray},
+    with_lanes,
 };
 
 const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
@@ -28,13 +29,12 @@ struct Device(Arc<Context>);
 
 impl Device {
     fn new() -> Self {
-        Self(Context::new(&ContextOptions { device: None, validate: true }).expect("a device with validation"))
+        Self(Context::new(&ContextOptions::new(None, true)).expect("a device with validation"))
     }
 
     /// One that runs the kernels as a GPU of so many lanes, whatever it is.
     fn with_lanes(n_lanes: u32) -> Self {
-        let options = ContextOptions { device: None, validate: true };
-        Self(Context::with_lanes(&options, n_lanes).expect("a device with validation"))
+        Self(with_lanes(n_lanes))
     }
 
     fn caster(&self, world: &World, traversal: Traversal) -> Caster {
@@ -110,7 +110,7 @@ fn check(device: &Device, world: &World, rays: &[CastRay]) {
         let n = if traversal == Traversal::Mask { rays.len() } else { rays.len() / 20 };
         let (rays, expected) = (&rays[..n], &all_expected[..n]);
         let n_outliers = device.n_outliers(n);
-        let on_cpu = |query| cast_on_cpu(&world.triangles, &world.tree, traversal, rays, query);
+        let on_cpu = |query| cast_on_cpu(&world.triangles, &world.tree, traversal, rays, query).expect("hits");
         compare::exact(expected, &on_cpu(Query::Closest)).unwrap();
         assert_eq!(occluded(expected), occluded(&on_cpu(Query::Any)));
         let mut caster = device.caster(world, traversal);
@@ -158,7 +158,7 @@ fn lanes_apart_find_the_same() {
 #[test]
 fn a_mask_of_two_words_finds_the_same() {
     let world = chain(KD_MAX_DEPTH - 2);
-    assert!(world.tree.depth > KD_WORD_DEPTH);
+    assert!(world.tree.depth() > KD_WORD_DEPTH);
     for device in [Device::new(), Device::with_lanes(5000)] {
         // Towards the chain's root every level is pending.
         check(&device, &world, &some_rays(&world, 4000, 0.0..=0.0));
@@ -225,7 +225,7 @@ fn the_interval_s_ends_are_exact() {
     let rays: Vec<_> = some_rays(&world, 5000, -9.0..=9.0).into_iter().filter(is_near).collect();
     let mut caster = device.caster(&world, Traversal::Mask);
     let mut cast = |rays: &[CastRay]| {
-        let on_cpu = cast_on_cpu(&world.triangles, &world.tree, Traversal::Mask, rays, Query::Closest);
+        let on_cpu = cast_on_cpu(&world.triangles, &world.tree, Traversal::Mask, rays, Query::Closest).expect("hits");
         let found = caster.cast(rays, Query::Closest, 1).expect("a cast").hits;
         device.agree(&on_cpu, &found).unwrap();
         found
@@ -258,7 +258,7 @@ fn the_direction_s_length_is_the_unit_of_t() {
     let exponents = -126..=127;
     let rays: Vec<_> = exponents.clone().map(|e| scaled(&unit, 0.0, 2f32.powi(e))).collect();
     let found = device.caster(&world, Traversal::Mask).cast(&rays, Query::Closest, 1).expect("a cast");
-    let on_cpu = cast_on_cpu(&world.triangles, &world.tree, Traversal::Mask, &rays, Query::Closest);
+    let on_cpu = cast_on_cpu(&world.triangles, &world.tree, Traversal::Mask, &rays, Query::Closest).expect("hits");
     for ((e, found), on_cpu) in exponents.zip(&found.hits).zip(&on_cpu) {
         let t = (f64::from(expected.t) / 2f64.powi(e)) as f32;
         // Beyond the greatest float there is no hit; below the least normal one a device may flush t to zero.
@@ -299,7 +299,7 @@ fn what_is_no_ray_misses_and_is_counted() {
     for &traversal in Traversal::ALL {
         for query in [Query::Closest, Query::Any] {
             let cast = device.caster(&world, traversal).cast(&rays, query, 1).expect("a cast");
-            let on_cpu = cast_on_cpu(&world.triangles, &world.tree, traversal, &rays, query);
+            let on_cpu = cast_on_cpu(&world.triangles, &world.tree, traversal, &rays, query).expect("hits");
             for hits in [&cast.hits, &on_cpu] {
                 let n_misses = none.len() + must_miss.len();
                 assert!(hits[..n_misses].iter().all(|hit| *hit == MISS), "{traversal}, {query:?}: {hits:?}");
@@ -318,14 +318,14 @@ fn nothing_is_hit_in_an_empty_world() {
     let rays = [ray(Vec3::ZERO, Vec3::X), ray(Vec3::ONE, Vec3::NEG_ONE)].map(|ray| scaled(&ray, 0.0, 1.0));
     let cast = device.caster(&world, Traversal::Mask).cast(&rays, Query::Closest, 1).expect("a cast");
     assert_eq!(cast.hits, [MISS; 2]);
-    assert_eq!(cast_on_cpu(&[], &world.tree, Traversal::Mask, &rays, Query::Closest), [MISS; 2]);
+    assert_eq!(cast_on_cpu(&[], &world.tree, Traversal::Mask, &rays, Query::Closest).expect("hits"), [MISS; 2]);
 }
 
 #[test]
 fn a_wrong_hit_is_noticed() {
     let world = World::new(meshes::torus(40, 20));
     let rays = some_rays(&world, 1000, 0.0..=0.0);
-    let hits = cast_on_cpu(&world.triangles, &world.tree, Traversal::Mask, &rays, Query::Closest);
+    let hits = cast_on_cpu(&world.triangles, &world.tree, Traversal::Mask, &rays, Query::Closest).expect("hits");
     compare::exact(&hits, &hits).unwrap();
     let struck = hits.iter().position(|hit| hit.triangle_ix != NO_TRIANGLE).expect("a hit");
     let wrong: [fn(&mut Hit); 4] =

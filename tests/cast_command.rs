@@ -238,7 +238,7 @@ mod unix {
     use super::*;
 
     fn shell(directory: &Path, script: &str) -> std::process::Output {
-        let script = format!("set -o pipefail; trap '' XFSZ; {script}");
+        let script = format!("set -o pipefail; {script}");
         Command::new("bash").args(["-c", &script, env!("CARGO_BIN_EXE_kdray")]).current_dir(directory).output().unwrap()
     }
 

@@ -21,6 +21,7 @@ use kdray::{
     cast::{CastRay, Query},
     frame::Traversal,
     gpu::{Access, Commands, Context, ContextOptions, GpuError},
+    kdtree::{BuildOptions, KdTree},
     layout::NO_TRIANGLE,
     passes::{CastResources, Tree},
 };
@@ -34,11 +35,11 @@ use tempfile::TempDir;
 const SIZE: (u32, u32) = (40, 30);
 
 fn context() -> Arc<Context> {
-    Context::new(&ContextOptions { device: None, validate: true }).expect("a device with validation")
+    Context::new(&ContextOptions::new(None, true)).expect("a device with validation")
 }
 
 fn stage() -> Stage {
-    Stage::in_room(scenes::mixed(), SIZE)
+    Stage::in_room(scenes::mixed(), SIZE, BuildOptions::default())
 }
 
 /// A kernel, and the tree that it walks.
@@ -130,9 +131,11 @@ fn contenders_are_timed_and_agree() {
 #[test]
 fn a_wrong_tree_is_noticed() {
     let (stage, mut wrong) = (stage(), stage());
-    // The walls' triangles move to the mesh's places: rays that should hit them miss or hit elsewhere.
-    let first_wall = wrong.scene.triangles.len() as u32 - 12;
-    wrong.tree.leaf_triangles.iter_mut().filter(|ix| **ix >= first_wall).for_each(|ix| *ix -= first_wall);
+    // The tree has triangles of the mesh where the walls are: rays that should hit them miss or hit elsewhere.
+    let first_wall = wrong.scene.triangles.len() - 12;
+    let mut swapped = wrong.scene.triangles.clone();
+    (0..12).for_each(|i| swapped.swap(i, first_wall + i));
+    wrong.tree = KdTree::build(&swapped, &BuildOptions::default());
     for set in &ray_sets(&stage) {
         let result = SetResult::new(set.kind, &trials(&stage, &wrong, set));
         let apart = result.kdray[0].apart;

@@ -34,9 +34,9 @@ fn all_meshes() -> Vec<(&'static str, Vec<Triangle>)> {
 fn build(triangles: &[Triangle], options: &BuildOptions) -> KdTree {
     let tree = KdTree::build(triangles, options);
     assert_eq!(tree.validate(triangles), Ok(()));
-    assert!(tree.depth <= options.depth_limit());
+    assert!(tree.depth() <= options.depth_limit());
     let budget = triangles.len() * options.max_references_per_triangle as usize + 1024;
-    assert!(tree.leaf_triangles.len() <= budget, "{} references", tree.leaf_triangles.len());
+    assert!(tree.leaf_triangles().len() <= budget, "{} references", tree.leaf_triangles().len());
     tree
 }
 
@@ -95,12 +95,12 @@ fn is_the_same_on_any_number_of_threads() {
 #[test]
 fn of_nothing_or_one_triangle_is_a_leaf() {
     let none = build(&[], &BuildOptions::default());
-    assert_eq!((none.nodes.len(), none.node(0)), (2, Node::Leaf { first: 0, count: 0 }));
-    assert_eq!((none.cell_min, none.cell_max), (Vec3::splat(-f32::MIN_POSITIVE), Vec3::splat(f32::MIN_POSITIVE)));
+    assert_eq!((none.nodes().len(), none.node(0)), (2, Node::Leaf { first: 0, count: 0 }));
+    assert_eq!((none.cell_min(), none.cell_max()), (Vec3::splat(-f32::MIN_POSITIVE), Vec3::splat(f32::MIN_POSITIVE)));
     let one = build(&[triangle([Vec3::X, Vec3::Y, Vec3::Z])], &BuildOptions::default());
-    assert_eq!((one.node(0), &one.leaf_triangles[..]), (Node::Leaf { first: 0, count: 1 }, &[0][..]));
+    assert_eq!((one.node(0), one.leaf_triangles()), (Node::Leaf { first: 0, count: 1 }, &[0][..]));
     let margin = 2f32.powi(-17);
-    assert_eq!((one.cell_min, one.cell_max), (Vec3::splat(-margin), Vec3::splat(1.0 + margin)));
+    assert_eq!((one.cell_min(), one.cell_max()), (Vec3::splat(-margin), Vec3::splat(1.0 + margin)));
 }
 
 #[test]
@@ -149,8 +149,8 @@ fn leaves_out_what_is_not_finite() {
     triangles[7].v1.x = f32::NAN;
     triangles[8].v2.z = f32::INFINITY;
     let tree = build(&triangles, &BuildOptions::default());
-    assert!(!tree.leaf_triangles.contains(&7) && !tree.leaf_triangles.contains(&8));
-    assert!(tree.leaf_triangles.contains(&9));
+    assert!(!tree.leaf_triangles().contains(&7) && !tree.leaf_triangles().contains(&8));
+    assert!(tree.leaf_triangles().contains(&9));
 }
 
 #[test]
@@ -158,18 +158,18 @@ fn keeps_its_limits() {
     let triangles = needles(2000, 11);
     let unbounded =
         BuildOptions { max_references_per_triangle: 1 << 20, intersection_cost: 10.0, ..Default::default() };
-    let n_references = build(&triangles, &unbounded).leaf_triangles.len();
+    let n_references = build(&triangles, &unbounded).leaf_triangles().len();
     for max_references_per_triangle in [0, 1, 2, 4] {
         let options = BuildOptions { max_references_per_triangle, ..unbounded.clone() };
         // Only as strict as it must be.
         if max_references_per_triangle > 0 {
-            let n = build(&triangles, &options).leaf_triangles.len();
+            let n = build(&triangles, &options).leaf_triangles().len();
             assert!(n < n_references && n > max_references_per_triangle as usize * 1000, "{n}");
         }
     }
     for max_depth in [0, 1, 5, 100] {
         let options = BuildOptions { max_depth: Some(max_depth), ..unbounded.clone() };
-        assert!(build(&triangles, &options).depth <= max_depth.min(KD_MAX_DEPTH - 2));
+        assert!(build(&triangles, &options).depth() <= max_depth.min(KD_MAX_DEPTH - 2));
     }
 }
 
@@ -193,7 +193,7 @@ fn finds_what_brute_force_finds() {
     let mut random = Random(12);
     for (name, triangles) in all_meshes() {
         let tree = build(&triangles, &BuildOptions::default());
-        let (center, size) = ((tree.cell_min + tree.cell_max) * 0.5, (tree.cell_max - tree.cell_min).length());
+        let (center, size) = ((tree.cell_min() + tree.cell_max()) * 0.5, (tree.cell_max() - tree.cell_min()).length());
         for _ in 0..200 {
             let origin = center + random.point() * size;
             let direction = center + random.point() * size * 0.4 - origin;
@@ -208,7 +208,7 @@ fn finds_what_brute_force_finds() {
 /// All triangles of leaves whose cells a ray meets.
 fn candidates(tree: &KdTree, origin: Vec3, direction: Vec3) -> Vec<u32> {
     let mut found = Vec::new();
-    let mut stack = vec![(0, tree.cell_min, tree.cell_max)];
+    let mut stack = vec![(0, tree.cell_min(), tree.cell_max())];
     while let Some((node, min, max)) = stack.pop() {
         let slack = Vec3::splat((max - min).max_element() * 1e-5);
         let (to_min, to_max) = ((min - slack - origin) / direction, (max + slack - origin) / direction);
@@ -216,7 +216,7 @@ fn candidates(tree: &KdTree, origin: Vec3, direction: Vec3) -> Vec<u32> {
             continue;
         }
         match tree.node(node) {
-            Node::Leaf { first, count } => found.extend(&tree.leaf_triangles[first as usize..][..count as usize]),
+            Node::Leaf { first, count } => found.extend(&tree.leaf_triangles()[first as usize..][..count as usize]),
             Node::Split { axis, position, child } => {
                 let (mut below_max, mut above_min) = (max, min);
                 (below_max[axis], above_min[axis]) = (position, position);

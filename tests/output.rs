@@ -202,16 +202,15 @@ mod unix {
     #[test]
     fn a_device_is_written_to_directly_and_its_error_reported() {
         let directory = TempDir::new().unwrap();
-        for (device, fits) in [("/dev/full", false), ("/dev/null", true)] {
+        // macOS has no /dev/full.
+        let devices = [("/dev/full", false), ("/dev/null", true)].into_iter();
+        for (device, fits) in devices.filter(|(device, _)| Path::new(device).exists()) {
             let path = directory.path().join("x.png");
             symlink(device, &path).unwrap();
             output::check(&path).unwrap();
             let written = output::write_picture(&path, &picture(9, 9));
-            // macOS has no /dev/full: there the link leads nowhere and is replaced.
-            if Path::new(device).exists() {
-                assert_eq!(written.is_ok(), fits, "{device}");
-                assert_eq!(fs::read_link(&path).unwrap(), Path::new(device));
-            }
+            assert_eq!(written.is_ok(), fits, "{device}");
+            assert_eq!(fs::read_link(&path).unwrap(), Path::new(device));
             fs::remove_file(&path).unwrap();
             assert!(names(directory.path()).is_empty());
         }
@@ -227,6 +226,57 @@ mod unix {
         assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
         assert_eq!(&fs::read(&file).unwrap()[1..4], b"PNG");
         assert_eq!(names(directory.path()), ["file", "x.png"]);
+    }
+
+    /// A link to a link to a file in another directory that is not there yet.
+    #[test]
+    fn a_link_that_leads_nowhere_gets_the_file_it_names() {
+        let directory = TempDir::new().unwrap();
+        let path = |name: &str| directory.path().join(name);
+        fs::create_dir(path("a")).unwrap();
+        symlink("a/second", path("first.png")).unwrap();
+        symlink("../third", path("a/second")).unwrap();
+        output::check(&path("first.png")).unwrap();
+        assert_eq!(names(directory.path()), ["a", "first.png"]);
+        output::write_picture(&path("first.png"), &picture(2, 2)).unwrap();
+        assert_eq!(names(directory.path()), ["a", "first.png", "third"]);
+        assert_eq!(names(&path("a")), ["second"]);
+        assert_eq!(fs::read_link(path("first.png")).unwrap(), Path::new("a/second"));
+        assert_eq!(&fs::read(path("third")).unwrap()[1..4], b"PNG");
+    }
+
+    #[test]
+    fn a_link_into_no_directory_or_a_circle_is_an_error() {
+        let directory = TempDir::new().unwrap();
+        let path = |name: &str| directory.path().join(name);
+        symlink("missing/x", path("nowhere.png")).unwrap();
+        symlink("circle.png", path("circle.png")).unwrap();
+        for name in ["nowhere.png", "circle.png"] {
+            assert!(output::check(&path(name)).is_err(), "{name}");
+            let error = output::write_picture(&path(name), &picture(1, 1)).unwrap_err();
+            assert!(error.to_string().contains(name), "{error}");
+        }
+        assert_eq!(names(directory.path()), ["circle.png", "nowhere.png"]);
+    }
+
+    #[test]
+    fn a_file_is_the_same_by_whatever_name() {
+        let directory = TempDir::new().unwrap();
+        let path = |name: &str| directory.path().join(name);
+        fs::create_dir(path("a")).unwrap();
+        symlink("a", path("b")).unwrap();
+        symlink("b/x.png", path("link")).unwrap();
+        let same = ["a/x.png", "b/x.png", "a/../a/./x.png", "link"];
+        let file = output::regular_file(&path("a/x.png")).unwrap();
+        for is_there in [false, true] {
+            for name in same {
+                assert_eq!(output::regular_file(&path(name)), Some(file.clone()), "{name}, {is_there}");
+            }
+            fs::write(path("a/x.png"), "").unwrap();
+        }
+        assert_ne!(output::regular_file(&path("a/y.png")), Some(file));
+        assert_eq!(output::regular_file(Path::new("/dev/null")), None);
+        assert_eq!(output::regular_file(&path("a")), None);
     }
 
     #[test]

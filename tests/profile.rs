@@ -3,10 +3,11 @@
 
 mod support;
 
-use std::{fs, path::Path, sync::Arc};
+use std::{collections::BTreeSet, fs, path::Path, sync::Arc};
 
 use kdray::{
-    frame::{BounceStats, PassTime, Primary, RenderOptions},
+    cpu::{self, Batching},
+    frame::{BounceStats, Pass, PassTime, Primary, Profile, RenderOptions, Scope, View},
     gpu::{Context, ContextOptions},
     kdtree::{BuildOptions, KdTree},
     layout::Counters,
@@ -27,7 +28,7 @@ fn options() -> RenderOptions {
 }
 
 fn context() -> Arc<Context> {
-    Context::new(&ContextOptions { device: None, validate: true }).expect("a device with validation")
+    Context::new(&ContextOptions::new(None, true)).expect("a device with validation")
 }
 
 fn renderer(context: &Arc<Context>, scene: &Scene, options: &RenderOptions, capacity: u32) -> Renderer {
@@ -38,6 +39,50 @@ fn renderer(context: &Arc<Context>, scene: &Scene, options: &RenderOptions, capa
 fn n_rays_in(passes: &[PassTime], name: &str, bounce: Option<u32>) -> u64 {
     let of_name = passes.iter().filter(|pass| (pass.name, pass.bounce) == (name, bounce));
     of_name.map(|pass| pass.n_rays_in.expect("a number of rays")).sum()
+}
+
+/// The ways to find primary hits that the device has.
+fn primaries(context: &Context) -> &'static [Primary] {
+    if context.has_wide_atomics() { Primary::ALL } else { &[Primary::Raster, Primary::Trace] }
+}
+
+/// Asserts that the table knows how often each pass runs, and that tracing takes all passes up to the primary rays' hits,
+/// whose last one comes before `next`. Gives the passes' names.
+fn checked_names(profile: &Profile, next: &str) -> Vec<&'static str> {
+    for pass in &profile.passes {
+        let scope = pass.pass().scope;
+        let (is_bounces, is_batches) = (scope == Scope::Bounce, scope != Scope::Frame);
+        assert_eq!((pass.bounce.is_some(), pass.batch.is_some()), (is_bounces, is_batches), "{}", pass.name);
+    }
+    let n_primary = profile.passes.iter().position(|pass| pass.name == next).expect("a next pass");
+    let ms: f64 = profile.passes[..n_primary].iter().filter_map(|pass| pass.ms).sum();
+    let tracing_ms = profile.tracing_ms(0).expect("timestamps");
+    assert!((tracing_ms - ms).abs() < 1e-9, "{tracing_ms} for {ms}");
+    profile.passes.iter().map(|pass| pass.name).collect()
+}
+
+#[test]
+fn the_table_has_every_pass_and_tracing_takes_all_that_find_primary_hits() {
+    let (scene, context) = (scenes::mixed(), context());
+    let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
+    let mut names = BTreeSet::new();
+    for &primary in primaries(&context) {
+        let options = RenderOptions { primary, features: true, ..options() };
+        let mut renderer = renderer(&context, &scene, &options, 8 * N_PIXELS);
+        for view in [View::Picture, View::Depth, View::Rays] {
+            renderer.set_view(view, 1.0);
+            for _sample in 0..2 {
+                names.extend(checked_names(&renderer.draw_sample().expect("a sample"), "features"));
+            }
+        }
+        let mut on_cpu =
+            cpu::Renderer::new(&scene, &tree, &options, Batching::default()).expect("a scene and its tree");
+        (0..2).for_each(|_sample| names.extend(checked_names(&on_cpu.draw_sample(), "features")));
+    }
+    let by_kernels = |name: &str| name.starts_with("rasterize_") && !context.has_wide_atomics();
+    let known = Pass::ALL.iter().map(|pass| pass.name).filter(|name| !by_kernels(name));
+    assert_eq!(names, known.collect::<BTreeSet<_>>());
+    assert_eq!(context.validation_messages(), Vec::<String>::new());
 }
 
 #[test]
@@ -183,6 +228,20 @@ fn the_trace_has_a_slice_for_each_pass_within_its_bounce() {
             assert!(slices.iter().any(|outer| around(&outer)), "{} is in no {name}", slice.name);
         }
         assert!(passes.iter().any(|pass| pass["n_rays_in"] == 64 * 48));
+    }
+}
+
+#[test]
+fn reported_rates_count_every_pass_that_finds_primary_hits() {
+    let directory = TempDir::new().unwrap();
+    for primary in primaries(&context()) {
+        let (profile, _) = measure(directory.path(), &["--primary", &primary.to_string()]);
+        let passes = profile["passes"].as_array().unwrap();
+        let n_primary = passes.iter().position(|pass| pass["name"] == "compact_reduce").unwrap();
+        let ms: f64 = passes[..n_primary].iter().filter_map(|pass| pass["ms"].as_f64()).sum();
+        let number = |key: &str| profile["bounces"][0][key].as_f64().unwrap();
+        assert!((number("tracing_ms") - ms).abs() < 1e-9, "{primary}: {} for {ms}", number("tracing_ms"));
+        assert!((number("mrays_per_s") * ms * 1e3 / number("n_rays") - 1.0).abs() < 1e-9, "{primary}");
     }
 }
 

@@ -11,7 +11,8 @@ use tempfile::TempDir;
 /// Renders Cornell's box small, on the CPU, in a directory.
 fn render(directory: &Path, more: &[&str]) -> Output {
     let scene = cornell();
-    succeed(directory, &[&["render", &scene, "--size", "64x48", "--cpu"], more].concat())
+    let size = if more.contains(&"--size") { &[][..] } else { &["--size", "64x48"] };
+    succeed(directory, &[&["render", &scene, "--cpu"], size, more].concat())
 }
 
 fn refused(directory: &Path, code: i32, more: &[&str], named: &str) {
@@ -120,6 +121,43 @@ fn the_costs_are_a_heat_map_too() {
     let (name, kind, values) = &costs[3];
     assert_eq!((name.as_str(), *kind, values.len()), ("cost.N", "u32", 1200));
     refused(path, 5, &["--aov", "cost", "-o", "none/x.png"], "none");
+}
+
+/// A tree of other nodes costs otherwise: a part is rendered with the tree that the whole picture gets.
+#[test]
+fn a_part_costs_what_it_costs_in_the_whole() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let render = |name: &str, more: &[&str]| {
+        render(path, &[&["-o", name, "--aov", "cost", "--profile", "x.json"], more].concat());
+        let json: serde_json::Value = serde_json::from_slice(&fs::read(path.join("x.json")).unwrap()).unwrap();
+        let costs = channels(&path.join(name)).into_iter().find(|(name, ..)| name == "cost.N").unwrap().2;
+        (json["choices"]["build"].clone(), costs)
+    };
+    let (whole_tree, whole) = render("whole.exr", &[]);
+    let (part_tree, part) = render("part.exr", &["--crop", "30,20,34,24"]);
+    let expected: Vec<_> = (20..24).flat_map(|y| whole[y * 64 + 30..][..4].to_vec()).collect();
+    assert_eq!((part_tree, part), (whole_tree, expected));
+    // Pixels of the other tree cost otherwise, or nothing was seen.
+    assert_ne!(render("fast.exr", &["--build", "fast"]).1, render("best.exr", &["--build", "best"]).1);
+}
+
+/// A measurement shows what a run without it does.
+#[test]
+fn repetitions_do_not_change_the_tree() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let tree = |more: &[&str]| {
+        render(path, &[&["-o", "x.png", "--size", "16x8", "--profile", "x.json"], more].concat());
+        let json: serde_json::Value = serde_json::from_slice(&fs::read(path.join("x.json")).unwrap()).unwrap();
+        let word = |name: &str| json["choices"]["build"][name].as_str().unwrap().to_owned();
+        (word("value"), word("by"))
+    };
+    let words = |value: &str, by: &str| (value.to_owned(), by.to_owned());
+    assert_eq!(tree(&[]), words("fast", "rule"));
+    assert_eq!(tree(&["--repeat", "50"]), words("fast", "rule"));
+    assert_eq!(tree(&["--spp", "50"]), words("best", "rule"));
+    assert_eq!(tree(&["--build", "best"]), words("best", "pinned"));
 }
 
 const PATH: &str = "

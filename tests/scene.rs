@@ -2,12 +2,15 @@
 
 #[path = "scene/errors.rs"]
 mod errors;
+#[path = "scene/extent.rs"]
+mod extent;
 #[path = "scene/generators.rs"]
 mod generators;
 #[path = "scene/obj.rs"]
 mod obj;
 #[path = "scene/path.rs"]
 mod path;
+mod support;
 
 use std::{fs, path::Path};
 

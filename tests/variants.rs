@@ -15,7 +15,7 @@ use kdray::{
         BRUTE_MAX_TRIANGLES, Batch, Bounce, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_LIT, LIGHT_POINT, LIGHT_SHADOWED,
         LIGHT_UNTESTED, Light, NO_TRIANGLE, Ray, Triangle,
     },
-    passes::{Passes, Resources},
+    passes::{Needs, Passes, Resources},
     render::Renderer,
     scene::{Camera, RenderDefaults, Scene},
 };
@@ -29,7 +29,7 @@ use support::{
 const N_RAYS: usize = 4000;
 
 fn context() -> Arc<Context> {
-    Context::new(&ContextOptions { device: None, validate: true }).expect("a Vulkan driver and the validation layer")
+    Context::new(&ContextOptions::new(None, true)).expect("a Vulkan driver and the validation layer")
 }
 
 /// The triangles under a lamp and a sun.
@@ -62,13 +62,13 @@ struct Traced {
 fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], traversal: Traversal) -> Traced {
     let options = RenderOptions { width: 8, height: 8, max_depth: 1, traversal, ..RenderOptions::default() };
     let constants = Frame { queue_capacity: rays.len() as u32, ..frame_constants(scene, tree, &options) };
-    let mut resources = Resources::new(context, scene, tree, &constants, &options, 1).expect("resources");
-    resources.add_extras(context, tree, traversal).expect("extras");
+    let needs = Needs { constants: &constants, options: &options, n_bounces: 1 };
+    let resources = Resources::new(context, scene, tree, &needs).expect("resources");
     let passes = Passes::new(context, &resources.bindings, &options).expect("passes");
     resources.queue.rays.upload(rays).expect("rays");
     resources.bounces.upload(&[Bounce::of(rays.len() as u32, &constants)]).expect("bounces");
     context.run("clear", |commands| resources.clear_counters(commands)).expect("cleared counters");
-    let batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, depth: 0 };
+    let batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, depth: 0, round: 0 };
     let record = |commands: &kdray::gpu::Commands| {
         resources.bind(commands);
         passes.trace.record(commands, &resources, &batch);
@@ -161,7 +161,7 @@ fn a_wrong_bit_is_noticed() {
 #[test]
 fn brute_force_refuses_large_meshes() {
     let triangles = vec![meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z); BRUTE_MAX_TRIANGLES as usize + 1];
-    let (scene, tree) = (scene(&triangles), KdTree::build(&[], &BuildOptions::default()));
+    let (scene, tree) = (scene(&triangles), KdTree::build(&triangles, &BuildOptions::fast()));
     let options = RenderOptions { width: 8, height: 8, traversal: Traversal::Brute, ..RenderOptions::default() };
     let refused = Renderer::new(context(), &scene, &tree, &options).err();
     assert!(matches!(refused, Some(GpuError::Limit { value: 65_001, limit: 65_000, .. })), "{refused:?}");

@@ -5,6 +5,8 @@ mod support;
 
 #[path = "view/failures.rs"]
 mod failures;
+#[path = "view/slow.rs"]
+mod slow;
 
 use std::{
     fs,
@@ -21,10 +23,14 @@ use tempfile::TempDir;
 
 const SIZE: &str = "160x120";
 
-/// A viewer of Cornell's box on the display, without an overlay.
+/// A viewer of a scene on the display, in a small window.
 fn viewer(directory: &Path, display: &Display, scene: &str, more: &[&str]) -> Child {
-    let arguments = [&["view", scene, "--size", SIZE, "--validate"], more].concat();
-    let mut command = kdray(directory, &arguments);
+    viewer_of_size(directory, display, scene, &[&["--size", SIZE], more].concat())
+}
+
+/// A viewer of a scene on the display, in a window of the size that is among the arguments.
+fn viewer_of_size(directory: &Path, display: &Display, scene: &str, more: &[&str]) -> Child {
+    let mut command = kdray(directory, &[&["view", scene, "--validate"], more].concat());
     command.env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY").stdout(Stdio::piped()).stderr(Stdio::piped());
     command.spawn().unwrap()
 }
@@ -50,7 +56,7 @@ fn rendered(directory: &Path, scene: &str, more: &[&str]) -> Screen {
 fn a_tour_ends_with_the_picture_that_render_makes() {
     let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
     let files = ["--screenshot", "x.png", "--profile", "x.json", "-q"];
-    for more in [&["--no-overlay"][..], &["--spp", "3", "--vsync", "off"]] {
+    for more in [&["--no-overlay"][..], &["--spp", "3", "--vsync", "off", "--build", "fast"]] {
         let arguments = [&["--frames", "4"], &files[..], more].concat();
         let output = ended(viewer(directory.path(), &display, &cornell(), &arguments));
         assert!(output.stdout.is_empty() && output.stderr.is_empty(), "{}{}", stdout(&output), stderr(&output));
@@ -59,6 +65,9 @@ fn a_tour_ends_with_the_picture_that_render_makes() {
         assert_eq!(Screen::load(&directory.path().join("x.png")), expected);
     }
     let json: Value = serde_json::from_slice(&fs::read(directory.path().join("x.json")).unwrap()).unwrap();
+    let words = |choice: &str| ["value", "by"].map(|word| json["choices"][choice][word].as_str().unwrap().to_owned());
+    assert_eq!(words("build"), ["fast", "pinned"]);
+    assert_eq!(words("traversal")[1], "rule");
     for times in ["frame_ms", "input_to_present_ms"] {
         let at = |percentile: &str| json[times][percentile].as_f64().unwrap();
         assert!(json[times]["n"].as_u64() >= Some(4) && json["vsync"] == false, "{json}");
@@ -147,10 +156,13 @@ fn keys_and_mouse_move_the_camera_and_home_brings_it_back() {
     let viewer = viewer(directory.path(), &display, &cornell(), &["--spp", "1", "--no-overlay", "-q"]);
     display.wait_until("the picture", |screen| picture.is_shown_on(screen));
     display.focus("kdray");
-    let moves: [&[&str]; 4] = [
+    let moves: [&[&str]; 7] = [
         &["keydown", "w", "sleep", "0.3", "keyup", "w"],
         &["mousemove", "80", "60", "mousedown", "1", "mousemove", "120", "60", "mouseup", "1"],
         &["mousemove", "80", "60", "mousedown", "3", "mousemove", "120", "60", "mouseup", "3"],
+        &["mousemove", "80", "60", "mousedown", "2", "mousemove", "100", "70", "mouseup", "2"],
+        &["keydown", "shift", "mousedown", "1", "mousemove", "80", "60", "mouseup", "1", "keyup", "shift"],
+        &["mousemove", "80", "60", "click", "4"],
         &["key", "f"],
     ];
     for arguments in moves {
@@ -158,6 +170,36 @@ fn keys_and_mouse_move_the_camera_and_home_brings_it_back() {
         display.wait_until("another view", |screen| !picture.is_shown_on(screen));
         display.act(&["key", "Home"]);
         display.wait_until("the first view", |screen| picture.is_shown_on(screen));
+    }
+    display.act(&["key", "Escape"]);
+    ended(viewer);
+}
+
+#[test]
+fn keys_are_listed_over_the_picture_and_a_line_says_how() {
+    // The mouse pointer, in the screen's middle, is beside the window.
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(1000, 400));
+    let size = ["--size", "480x360"];
+    succeed(directory.path(), &[&["render", &cornell(), "-q", "-o", "rendered.png"], &size[..]].concat());
+    let picture = Screen::load(&directory.path().join("rendered.png"));
+    let corner = |screen: &Screen| -> Vec<[u8; 3]> {
+        (330..360).flat_map(|y| screen.pixels[y * screen.width..][400..480].to_vec()).collect()
+    };
+    let arguments = [&["--spp", "1", "-q"], &size[..]].concat();
+    let viewer = viewer_of_size(directory.path(), &display, &cornell(), &arguments);
+    display.focus("kdray");
+    let beside = |screen: &Screen| screen.pixels[400..480] == picture.pixels[400..480];
+    display.wait_until("a line in the corner", |screen| beside(screen) && corner(screen) != corner(&picture));
+    display.act(&["key", "p"]);
+    display.wait_until("no line any more", |screen| corner(screen) == corner(&picture));
+    display.act(&["key", "Tab"]);
+    display.wait_until("nothing but the picture", |screen| picture.is_shown_on(screen));
+    for key in ["h", "F1", "question"] {
+        display.act(&["key", key]);
+        display.wait_until("the keys", |screen| !picture.is_shown_on(screen));
+        // Escape closes the list before it closes the window.
+        display.act(&["key", if key == "F1" { "Escape" } else { key }]);
+        display.wait_until("the picture again", |screen| picture.is_shown_on(screen));
     }
     display.act(&["key", "Escape"]);
     ended(viewer);

@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 // Cast: one working lane a ray finds its closest hit in (t_min, t_max] through the kd-tree, or with ANY_HIT one that need
 // not be the closest.
-// Reads cast_rays and the tree; writes cast_hits.
+// Reads cast_rays and the tree; writes cast_hits, where a ray that has stalled leaves its mark.
 #include "layout.glsl"
 
 const bool COUNT_COSTS = false;
@@ -14,7 +14,7 @@ layout(constant_id = 2) const bool ANY_HIT = false;
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform CastBatchBlock { CastBatch batch; };
 layout(std430, set = 0, binding = BIND_CAST_RAYS) readonly buffer CastRaysBlock { CastRay cast_rays[]; };
-layout(std430, set = 0, binding = BIND_CAST_HITS) writeonly buffer CastHitsBlock { Hit cast_hits[]; };
+layout(std430, set = 0, binding = BIND_CAST_HITS) buffer CastHitsBlock { Hit cast_hits[]; };
 
 const uint INFINITY_BITS = 0x7f800000u;
 const float GREATEST = 3.40282347e38;
@@ -59,7 +59,7 @@ Hit cast_ray(CastRay ray) {
 
 void main() {
     uint ray_ix = ray_of_lane(gl_GlobalInvocationID.x, batch.lanes_log2);
-    if (ray_ix >= batch.n_rays) return;
+    if (ray_ix >= batch.n_rays || !runs_in_round(batch.round, cast_hits[ray_ix].triangle_ix)) return;
     CastRay ray = cast_rays[ray_ix];
     cast_hits[ray_ix] = is_ray(ray) ? cast_ray(ray) : miss();
 }

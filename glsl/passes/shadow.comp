@@ -2,8 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 // Shadow (the paper's section 2.1): one working lane a ray of the batch, of any bounce, and a light tests the segment from the
 // ray's hit to the light against the tree, if the light could be seen there; any hit before its end puts the light out.
-// Reads rays, hits, bounces and the scene; writes light_visibility[light * queue_capacity + ray], pixel_features (n_rays,
-// n_steps).
+// Reads rays, hits, bounces and the scene; writes light_visibility[light * queue_capacity + ray], where a segment that has
+// stalled leaves its mark, pixel_features (n_rays, n_steps).
 #include "layout.glsl"
 
 // Whether what segments cost is noted.
@@ -18,7 +18,7 @@ layout(constant_id = 3) const bool COUNT_COSTS = false;
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
-layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) writeonly buffer LightVisibilityBlock { uint light_visibility[]; };
+layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) buffer LightVisibilityBlock { uint light_visibility[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 
@@ -37,12 +37,13 @@ uint visibility_of(Light light, uint ray_ix) {
     Hit hit = hits[ray_ix];
     Ray segment;
     if (hit.triangle_ix == NO_TRIANGLE || !shadow_segment(ray_at(ray_ix), hit, light, segment)) return LIGHT_UNTESTED;
-    bool is_free = traverse(segment, 0.0, true).triangle_ix == NO_TRIANGLE;
+    uint found = traverse(segment, 0.0, true).triangle_ix;
+    if (is_stalled(found)) return found;
     if (COUNT_COSTS) {
         atomicAdd(pixel_features[segment.pixel_ix].n_rays, 1u);
         atomicAdd(pixel_features[segment.pixel_ix].n_steps, n_steps);
     }
-    return is_free ? LIGHT_LIT : LIGHT_SHADOWED;
+    return found == NO_TRIANGLE ? LIGHT_LIT : LIGHT_SHADOWED;
 }
 
 void main() {
@@ -53,5 +54,7 @@ void main() {
     uint lane = (group / frame.n_lights) * RAY_GROUP_SIZE + gl_LocalInvocationIndex;
     uint ray_ix = ray_of_lane(lane, bounces[last_ix].shadow_lanes_log2);
     if (ray_ix >= bounces[last_ix].first_ray + bounces[last_ix].n_rays) return;
-    light_visibility[light_ix * frame.queue_capacity + ray_ix] = visibility_of(lights[light_ix], ray_ix);
+    uint place = light_ix * frame.queue_capacity + ray_ix;
+    if (!runs_in_round(batch.round, light_visibility[place])) return;
+    light_visibility[place] = visibility_of(lights[light_ix], ray_ix);
 }

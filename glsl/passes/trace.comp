@@ -2,7 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Trace (the paper's section 2.3): one working lane a ray of the bounce finds its closest hit through the kd-tree.
-// Reads rays and the tree; writes hits, counters (n_hits), pixel_features (n_rays, n_steps).
+// Reads rays and the tree; writes hits, where a ray that has stalled leaves its mark, counters (n_hits), pixel_features
+// (n_rays, n_steps).
 #include "layout.glsl"
 
 // Whether what rays cost is noted.
@@ -20,23 +21,25 @@ layout(constant_id = 5) const bool FROM_CAMERA = false;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
+layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 
 void main() {
     uint place = ray_of_lane(gl_GlobalInvocationID.x, bounces[batch.bounce_ix].trace_lanes_log2);
     bool is_hit = false;
-    if (place < bounces[batch.bounce_ix].n_rays) {
-        uint ray_ix = bounces[batch.bounce_ix].first_ray + place;
+    uint ray_ix = bounces[batch.bounce_ix].first_ray + place;
+    if (place < bounces[batch.bounce_ix].n_rays && runs_in_round(batch.round, hits[ray_ix].triangle_ix)) {
         Ray ray;
         if (FROM_CAMERA) ray = camera_ray(pixel_of_ray(ray_ix));
         else ray = rays[ray_ix];
         Hit hit = traverse(ray, 0.0, false);
         store_hit(ray_ix, hit);
-        if (COUNT_COSTS) {
+        bool ends = !is_stalled(hit.triangle_ix);
+        if (COUNT_COSTS && ends) {
             atomicAdd(pixel_features[ray.pixel_ix].n_rays, 1u);
             atomicAdd(pixel_features[ray.pixel_ix].n_steps, n_steps);
         }
-        is_hit = hit.triangle_ix != NO_TRIANGLE;
+        is_hit = ends && hit.triangle_ix != NO_TRIANGLE;
     }
     if (COUNTS) count_hits(batch.bounce_ix, 0u, is_hit);
 }

@@ -1,9 +1,17 @@
 // Every triangle, without a tree, as the first ray tracing on GPUs did (Carr, Hall, Hart: The Ray Engine, Graphics
 // Hardware 2002). For at most BRUTE_MAX_TRIANGLES.
 
-void intersect_all(TraversalRay ray, bool any_hit, inout Nearest best) {
-    for (uint triangle_ix = 0u; triangle_ix < frame.n_triangles && !is_done(any_hit, best); ++triangle_ix) {
+// Returns 0, or the mark of a ray that has stalled.
+uint intersect_all(TraversalRay ray, bool any_hit, inout Nearest best) {
+    Cell cell = whole(ray);
+    Visit all = Visit(0u, frame.n_triangles, stretch(0.0, 0.0));
+    if (is_resumed()) resume(ray, cell, all, best);
+    while (all.entry_ix < all.end_ix && !is_done(any_hit, best) && has_turns()) {
+        count_turn();
         count_steps(1u);
-        intersect(ray, triangle_at(triangle_ix), triangle_ix, best);
+        intersect(ray, triangle_at(all.entry_ix), all.entry_ix, best);
+        all.entry_ix += 1u;
     }
+    bool ends = all.entry_ix >= all.end_ix || is_done(any_hit, best);
+    return ends ? 0u : stall_at(cell, all, best);
 }

@@ -9,6 +9,7 @@
 #include "layout.glsl"
 #include "frame.glsl"
 #include "scene.glsl"
+#include "stalls.glsl"
 #include "steps.glsl"
 #include "triangle.glsl"
 
@@ -109,6 +110,7 @@ uint sibling_of(uint node_at) {
 
 KdNode kd_node(uint node_at) {
     count_steps(1u);
+    count_turn();
     return kd_node_of(index_of(node_at));
 }
 
@@ -280,7 +282,8 @@ Visit visit_leaf(KdNode leaf, float t_enter, float t_exit) {
 bool find_candidate(TraversalRay ray, inout Visit visit, out uint entry_ix) {
     // What is left undefined is kept from turn to turn, in a register.
     entry_ix = 0u;
-    while (visit.entry_ix < visit.end_ix) {
+    while (visit.entry_ix < visit.end_ix && has_turns()) {
+        count_turn();
         entry_ix = visit.entry_ix;
         visit.entry_ix += 1u;
         if (!is_clear(ray, visit.way, leaf_plane_at(entry_ix), frame.plane_reach)) return true;
@@ -300,49 +303,64 @@ Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
     return visit_leaf(leaf, cell.t_enter, min(cell.t_exit, t_best));
 }
 
+#include "resume.glsl"
+
 // Turn by turn, each a test or a leaf: lanes that test and lanes that go on each keep together. Of two loops in one another
-// the outer waits, for all lanes' leaves or for each lane's tests.
-void search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
-    if (!is_in(ray)) return;
+// the outer waits, for all lanes' leaves or for each lane's tests. Returns 0, or the mark of a ray that has stalled.
+uint search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
+    if (!is_in(ray)) return 0u;
     Cell cell = whole(ray);
-    Visit visit = next_leaf(ray, best.t, cell);
+    Visit visit;
+    if (is_resumed()) resume(ray, cell, visit, best);
+    else visit = next_leaf(ray, best.t, cell);
+    uint mark = 0u;
     bool goes_on = true;
     do {
+        count_turn();
         uint entry_ix;
         if (find_candidate(ray, visit, entry_ix)) {
             LeafTriangle entry = leaf_triangle_at(entry_ix);
             intersect(ray, corners_of(entry), entry.triangle_ix, best);
             goes_on = !is_done(any_hit, best);
-        } else {
+        } else if (has_turns()) {
             goes_on = find_pending(ray, best.t, cell);
             if (goes_on) {
                 take_pending(ray, cell);
                 visit = next_leaf(ray, best.t, cell);
             }
         }
+        if (goes_on && !has_turns()) {
+            mark = stall_at(cell, visit, best);
+            goes_on = false;
+        }
     } while (goes_on);
+    return mark;
 }
 
 #include "lockstep.glsl"
 
-// All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
-void search(TraversalRay ray, bool any_hit, inout Nearest best) {
+// All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow. Returns 0, or the mark of a ray that
+// has stalled.
+uint search(TraversalRay ray, bool any_hit, inout Nearest best) {
     clear_pending();
-    if (RUNS_BOTH_SIDES) search_in_step(ray, any_hit, best);
-    else search_by_turns(ray, any_hit, best);
+    if (RUNS_BOTH_SIDES) return search_in_step(ray, any_hit, best);
+    return search_by_turns(ray, any_hit, best);
 }
 
 #include "brute.glsl"
 
-// The closest hit in (t_min, t_max], or with any_hit one that need not be the closest. A miss keeps t = t_max.
+// The closest hit in (t_min, t_max], or with any_hit one that need not be the closest. A miss keeps t = t_max. Where the
+// ray has stalled, the hit's triangle_ix is its mark.
 Hit traverse(Ray ray_in, float t_min, bool any_hit) {
     float t_start;
     Ray ray_near = near_scene(ray_in, t_start);
     TraversalRay ray = traversal_ray(ray_near, t_min - t_start);
     keep_pair(LENGTHS_PLACE, t_start, ray_in.t_max);
     Nearest best = Nearest(0.5 * ray_near.t_max, NO_TRIANGLE);
-    if (TRAVERSAL == TRAVERSAL_BRUTE) intersect_all(ray, any_hit, best);
-    else search(ray, any_hit, best);
+    uint mark;
+    if (TRAVERSAL == TRAVERSAL_BRUTE) mark = intersect_all(ray, any_hit, best);
+    else mark = search(ray, any_hit, best);
+    if (CAN_STALL && mark != 0u) return Hit(0.0, mark, 0.0, 0.0);
     vec2 lengths = kept_pair(LENGTHS_PLACE);
     if (best.triangle_ix == NO_TRIANGLE) return Hit(lengths.y, NO_TRIANGLE, 0.0, 0.0);
     vec2 weights = kept_pair(WEIGHTS_PLACE);

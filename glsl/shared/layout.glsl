@@ -44,7 +44,7 @@
 // rounding margin is derived for this).
 #define KD_ORIGIN_REACH 4.0
 // Times the scene's largest coordinate: a ray that keeps this far from a triangle's plane within a leaf has no hit there.
-// Twice the tree's margin, the second for the rounding of the plane and of the ray's distance to it (kdtree/planes.rs).
+// Twice the tree's margin: kdtree/planes.rs counts what rounding does to hits, planes and a ray's distance to a plane.
 #define KD_PLANE_REACH 0.000015258789
 
 // How rays find their way through the tree: the kernels' specialization constant TRAVERSAL.
@@ -56,7 +56,7 @@
 #define TRAVERSAL_MASK_BOXES 5u
 #define TRAVERSAL_BACKTRACK 6u
 #define TRAVERSAL_ROPES 7u
-// Triangles that brute force takes: a driver is known to end any shader after 65,535 turns of its loops, in silence.
+// Triangles that brute force takes.
 #define BRUTE_MAX_TRIANGLES 65000u
 
 // How radiance becomes what a display shows: the kernel's specialization constant CURVE.
@@ -79,6 +79,18 @@
 #define LIGHT_UNTESTED 0u
 #define LIGHT_LIT 1u
 #define LIGHT_SHADOWED 2u
+
+// A mark in place of a hit's triangle or a light's visibility, where a ray's traversal has stopped before its end: this
+// bit, and below it the slot that holds the ray's state, or NO_SLOT if there was none left. Never NO_TRIANGLE.
+#define STALLED 0x80000000u
+#define NO_SLOT 0x7ffffffeu
+// Rows of four words that a slot takes in `stalls`; one row of counts comes before the slots.
+#define STALLED_RAY_ROWS 3u
+// Which rays a dispatch takes: all, from their beginning; those that have stalled, from their slots; those that found no
+// slot, from their beginning.
+#define ROUND_BEGIN 0u
+#define ROUND_RESUME 1u
+#define ROUND_RESTART 2u
 
 // Light.kind
 #define LIGHT_POINT 0u
@@ -312,18 +324,21 @@ struct Addresses {
 // Numbers below are for kernels' own.
 #define CONSTANT_READING 31u
 #define CONSTANT_MASK_WORDS 30u
+// Turns of its loops that an invocation takes before its ray stalls; 0: any number.
+#define CONSTANT_TURN_BUDGET 29u
 // Ways to read triangles and tree: as storage that is bound, as texels, by address.
 #define READING_BOUND 0u
 #define READING_TEXELS 1u
 #define READING_ADDRESS 2u
 
 // Push constants: the batch's pixels [first_pixel, first_pixel + n_pixels) in tile order, and the row of `bounces` of its bounce
-// of this depth; for what lights all of its rays, depth is 0 and the row its first.
+// of this depth; for what lights all of its rays, depth is 0 and the row its first. round: one of ROUND_*.
 struct Batch {
     uint first_pixel;
     uint n_pixels;
     uint bounce_ix;
     uint depth;
+    uint round;
 };
 
 // What is displayed of features.
@@ -370,10 +385,11 @@ struct RasterPush {
     uint block_log2;
 };
 
-// Push constants of a cast: its rays, and 2^lanes_log2 lanes for each, of which the first works.
+// Push constants of a cast: its rays, and 2^lanes_log2 lanes for each, of which the first works. round: one of ROUND_*.
 struct CastBatch {
     uint n_rays;
     uint lanes_log2;
+    uint round;
 };
 
 // Push constants of a cast by the driver's own ray tracing: the address of its structure.
@@ -415,13 +431,14 @@ struct DriverCast {
 #define BIND_RASTER_GROUPS 29u
 #define BIND_RASTER_COUNT 30u
 #define BIND_LARGE_TRIANGLES 31u
-#define N_BINDINGS 32u
+#define BIND_STALLS 32u
+#define N_BINDINGS 33u
 
 // The same buffers of triangles and tree as texels: each at this and its own binding.
 #define BIND_TEXELS 64u
 
 // A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
-#define BIND_CAST_RAYS 32u
-#define BIND_CAST_HITS 33u
+#define BIND_CAST_RAYS 33u
+#define BIND_CAST_HITS 34u
 
 #endif

@@ -11,11 +11,12 @@
 // lavapipe 23 instructions of 145.
 bool find_candidate_in_step(TraversalRay ray, float reach, inout Visit visit) {
     bool found = false;
-    bool looks = visit.entry_ix < visit.end_ix;
+    bool looks = visit.entry_ix < visit.end_ix && has_turns();
     while (looks) {
+        count_turn();
         found = !is_clear(ray, visit.way, leaf_plane_at(visit.entry_ix), reach);
         visit.entry_ix += 1u;
-        looks = !found && visit.entry_ix < visit.end_ix;
+        looks = !found && visit.entry_ix < visit.end_ix && has_turns();
         if (!looks) break;
     }
     return found;
@@ -24,10 +25,11 @@ bool find_candidate_in_step(TraversalRay ray, float reach, inout Visit visit) {
 // As `intersect`, without a branch.
 void intersect_in_step(TraversalRay ray, LeafTriangle entry, bool tests, inout Nearest best) {
     vec3 a, b, c;
-    vec3 edges = exact_edges(seen_edges(ray.shear, corners_of(entry), a, b, c), a, b, c);
-    precise float det = edges.x + edges.y + edges.z;
-    Hit hit = weighted_hit(ray.shear, edges, det, vec3(a.z, b.z, c.z), entry.triangle_ix);
-    bool is_new = tests && !is_outside(edges) && abs(det) > 0.0 && is_better(ray, hit.t, entry.triangle_ix, best);
+    vec3 edges = seen_edges(ray.shear, corners_of(entry), a, b, c);
+    vec3 errors = edge_errors(a, b, c);
+    Hit hit = weighted_hit(ray.shear, exact_edges(edges, errors), vec3(a.z, b.z, c.z), entry.triangle_ix);
+    bool is_hit = tests && is_inside(with_exact_signs(edges, errors));
+    bool is_new = is_hit && is_better(ray, hit.t, entry.triangle_ix, best);
     vec2 weights = kept_pair(WEIGHTS_PLACE);
     best.t = is_new ? hit.t : best.t;
     best.triangle_ix = is_new ? entry.triangle_ix : best.triangle_ix;
@@ -49,15 +51,22 @@ bool go_on_in_step(TraversalRay ray, float t_best, inout bool begins, inout Cell
 }
 
 // Turn by turn: on to a leaf, and to one more if nothing is to be tested in the first, then at most one test. To go on until all
-// lanes have something to test would let most of them wait; to test after every leaf is often done for none.
-void search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
+// lanes have something to test would let most of them wait; to test after every leaf is often done for none. Returns 0, or the
+// mark of a ray that has stalled.
+uint search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
     Cell cell = whole(ray);
     // At the root, as in a leaf that is done with.
     Visit visit = Visit(0u, 0u, stretch(0.0, 0.0));
     float reach = frame.plane_reach;
     bool begins = true;
     bool goes_on = is_in(ray);
+    uint mark = 0u;
+    if (is_resumed()) {
+        resume(ray, cell, visit, best);
+        begins = false;
+    }
     while (goes_on) {
+        count_turn();
         bool found = false;
         bool is_second = false;
         bool seeks = true;
@@ -70,6 +79,11 @@ void search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
         }
         intersect_in_step(ray, leaf_triangle_at(found ? visit.entry_ix - 1u : 0u), found, best);
         goes_on = goes_on && !is_done(any_hit, best);
+        if (goes_on && !has_turns()) {
+            mark = stall_at(cell, visit, best);
+            goes_on = false;
+        }
         if (!goes_on) break;
     }
+    return mark;
 }

@@ -9,6 +9,7 @@ uvec2 siblings_done;
 
 bool climb_by_boxes(TraversalRay ray, float t_best, inout Cell cell) {
     while (cell.node_at != 0u) {
+        count_turn();
         if ((siblings_done.x & 1u) == 0u) {
             vec2 interval = interval_in(ray, index_of(sibling_of(cell.node_at)));
             if (interval.x <= min(interval.y, t_best)) {

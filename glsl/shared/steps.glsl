@@ -10,4 +10,8 @@ void count_steps(uint n) {
     if (COUNT_COSTS) n_steps += n;
 }
 
+uint steps_so_far() {
+    return COUNT_COSTS ? n_steps : 0u;
+}
+
 #endif

@@ -64,24 +64,56 @@ float product_error(float a, float b) {
     return error;
 }
 
-// The edge function a.x * b.y - a.y * b.x where its products round to one value: now the sign is right, and zero means
-// that the ray meets the edge. Without it a needle, seen from its end, is hit at whatever corner.
-float exact_edge(vec3 a, vec3 b, float edge) {
-    if (edge != 0.0) return edge;
-    precise float difference = product_error(a.x, b.y) - product_error(a.y, b.x);
-    return difference;
+// What rounding took from the products of the edge function a.x * b.y - a.y * b.x.
+float edge_error(vec3 a, vec3 b) {
+    precise float error = product_error(a.x, b.y) - product_error(a.y, b.x);
+    return error;
+}
+
+// The errors of `edge_functions`.
+vec3 edge_errors(vec3 a, vec3 b, vec3 c) {
+    return vec3(edge_error(c, b), edge_error(a, c), edge_error(b, a));
+}
+
+// The edge functions with right signs: where the two products round to one value, their errors are the edge function.
+// Zero then means that the ray meets the edge. Without this a needle, seen from its end, is hit at whatever corner.
+vec3 with_exact_signs(vec3 edges, vec3 errors) {
+    return mix(edges, errors, equal(edges, vec3(0.0)));
 }
 
 bool is_outside(vec3 edges) {
     return any(lessThan(edges, vec3(0.0))) && any(greaterThan(edges, vec3(0.0)));
 }
 
-// t and barycentric weights from edge functions whose sum is det (not 0).
-Hit weighted_hit(Shear shear, vec3 edges, float det, vec3 z, uint triangle_ix) {
-    precise float inv_det = 1.0 / det;
-    precise float t = (edges.x * z.x + edges.y * z.y + edges.z * z.z) * shear.z * inv_det;
+float sum_of(vec3 v) {
+    precise float sum = v.x + v.y + v.z;
+    return sum;
+}
+
+// Tells by edge functions with exact signs whether the ray goes through the triangle or its edges. False also for a
+// triangle without area and for NaN.
+bool is_inside(vec3 edges) {
+    return !is_outside(edges) && abs(sum_of(edges)) > 0.0;
+}
+
+// Where edge functions have a smaller sum, the errors of their products may underflow.
+const float LEAST_EXACT_SUM = 8.077935669e-28; // 2^-90
+
+// Returns the edge functions, each right to 2^-23 of itself (Muller: On the error of computing ab + cd using Cornea,
+// Harrison and Tang's method, ACM TOMS 41, 2015). If the triangle is narrow, its rounded products differ by little more
+// than their errors: weights made of them would lie anywhere along a needle.
+vec3 exact_edges(vec3 edges, vec3 errors) {
+    precise vec3 exact = edges + errors;
+    return abs(sum_of(exact)) < LEAST_EXACT_SUM ? with_exact_signs(edges, errors) : exact;
+}
+
+// Returns t and barycentric weights from edge functions whose sum is not 0. src/cpu/triangle.rs proves how far off they
+// are.
+Hit weighted_hit(Shear shear, vec3 edges, vec3 z, uint triangle_ix) {
+    precise float inv_det = 1.0 / sum_of(edges);
     precise float u = edges.y * inv_det;
     precise float v = edges.z * inv_det;
+    precise float t = (z.x + (u * (z.y - z.x) + v * (z.z - z.x))) * shear.z;
     return Hit(t, triangle_ix, u, v);
 }
 
@@ -93,23 +125,15 @@ vec3 seen_edges(Shear shear, Triangle triangle, out vec3 a, out vec3 b, out vec3
     return edge_functions(a, b, c);
 }
 
-vec3 exact_edges(vec3 edges, vec3 a, vec3 b, vec3 c) {
-    return vec3(exact_edge(c, b, edges.x), exact_edge(a, c, edges.y), exact_edge(b, a, edges.z));
-}
-
 // Watertight and two-sided (Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2013), edges included.
 // False also for a triangle without area and for NaN. t may be negative.
 bool intersect_triangle(Shear shear, Triangle triangle, uint triangle_ix, out Hit hit) {
     vec3 a, b, c;
     vec3 edges = seen_edges(shear, triangle, a, b, c);
     if (is_outside(edges)) return false;
-    if (any(equal(edges, vec3(0.0)))) {
-        edges = exact_edges(edges, a, b, c);
-        if (is_outside(edges)) return false;
-    }
-    precise float det = edges.x + edges.y + edges.z;
-    if (!(abs(det) > 0.0)) return false;
-    hit = weighted_hit(shear, edges, det, vec3(a.z, b.z, c.z), triangle_ix);
+    vec3 errors = edge_errors(a, b, c);
+    if (!is_inside(with_exact_signs(edges, errors))) return false;
+    hit = weighted_hit(shear, exact_edges(edges, errors), vec3(a.z, b.z, c.z), triangle_ix);
     return true;
 }
 
@@ -118,12 +142,11 @@ bool intersect_triangle(Shear shear, Triangle triangle, uint triangle_ix, out Hi
 Hit clamp_to_triangle(Shear shear, Triangle triangle, uint triangle_ix) {
     vec3 a, b, c;
     vec3 edges = seen_edges(shear, triangle, a, b, c);
-    precise float det = edges.x + edges.y + edges.z;
-    vec3 inside = max(det < 0.0 ? -edges : edges, vec3(0.0));
-    precise float sum = inside.x + inside.y + inside.z;
+    edges = exact_edges(edges, edge_errors(a, b, c));
+    vec3 inside = max(sum_of(edges) < 0.0 ? -edges : edges, vec3(0.0));
     // Seen exactly edge-on the areas say nothing: its middle is the nearest certain point.
-    if (!(sum > 0.0)) return weighted_hit(shear, vec3(1.0), 3.0, vec3(a.z, b.z, c.z), triangle_ix);
-    return weighted_hit(shear, inside, sum, vec3(a.z, b.z, c.z), triangle_ix);
+    if (!(sum_of(inside) > 0.0)) inside = vec3(1.0);
+    return weighted_hit(shear, inside, vec3(a.z, b.z, c.z), triangle_ix);
 }
 
 #endif

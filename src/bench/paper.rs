@@ -11,11 +11,12 @@ use super::{
     warm_up,
 };
 use crate::{
+    choices::{Request, primary_by_rule},
     cpu,
     frame::{BounceStats, Profile, RenderOptions, Traversal},
     gpu::{Context, GpuError},
     kdtree::KdTree,
-    render::{Renderer, Ways, suited_primary},
+    render::BandedRenderer,
     scene::Scene,
 };
 
@@ -66,7 +67,7 @@ pub fn options(scene: &Scene, (width, height): (u32, u32), traversal: Traversal)
 /// Frames drawn on a device by the primary rays that suit it, after a warm-up, which also finds how many batches the frame needs.
 ///
 /// # Errors
-/// As [`Renderer::new`] and [`Renderer::draw`].
+/// As [`BandedRenderer::new`] and [`BandedRenderer::draw`].
 pub fn draw_on_gpu(
     context: &Arc<Context>,
     scene: &Scene,
@@ -74,26 +75,32 @@ pub fn draw_on_gpu(
     options: &RenderOptions,
     n_frames: u16,
 ) -> Result<Vec<Profile>, GpuError> {
-    let primary = suited_primary(Some(context), scene.triangles.len(), (options.width, options.height));
+    let primary = primary_by_rule(Some(context), scene.triangles.len(), (options.width, options.height));
     let options = &RenderOptions { primary, ..options.clone() };
-    let mut renderer = Renderer::new(Arc::clone(context), scene, tree, options)?;
-    warm_up(|| renderer.draw().map(drop))?;
-    (0..n_frames).map(|_| renderer.draw()).collect()
+    let mut renderer = BandedRenderer::new(Arc::clone(context), scene, tree, options)?;
+    let mut draw = || renderer.draw(1, || ()).map(|drawn| drawn.profile);
+    warm_up(|| draw().map(drop))?;
+    (0..n_frames).map(|_| draw()).collect()
 }
 
 /// Frames drawn by one thread, as the paper's were, on the way through the tree that suits it.
 ///
 /// # Errors
 /// The thread cannot be started.
+///
+/// # Panics
+/// Scene and tree do not fit together.
 pub fn draw_on_cpu(
     scene: &Scene,
     tree: &KdTree,
     options: &RenderOptions,
     n_frames: u16,
 ) -> Result<Vec<Profile>, ThreadPoolBuildError> {
-    let options = &Ways::default().suited(options, None, scene.triangles.len(), (options.width, options.height));
+    let size = (options.width, options.height);
+    let options = &Request::default().methods_by_rule(None, scene.triangles.len(), size).apply(options);
+    let draw = || cpu::render(scene, tree, options).expect("a scene and its tree");
     let thread = ThreadPoolBuilder::new().num_threads(1).build()?;
-    Ok(thread.install(|| (0..n_frames).map(|_| cpu::render(scene, tree, options).1).collect()))
+    Ok(thread.install(|| (0..n_frames).map(|_| draw().1).collect()))
 }
 
 /// One scene at one size.

@@ -10,14 +10,13 @@ use serde::Serialize;
 use super::stage::Stage;
 use crate::{
     cpu::{
-        bindings::Bindings,
         light::sample_light,
         primary_hit::primary_rays,
         surface::{Surface, surface_at},
         trace::trace,
     },
     frame::Traversal,
-    layout::{Hit, NO_TRIANGLE, Ray},
+    layout::{Hit, NO_TRIANGLE, Ray, Triangle},
 };
 
 /// What the rays of a set are for.
@@ -70,29 +69,35 @@ pub fn ray_sets(stage: &Stage) -> [RaySet; 4] {
     let mut hits = vec![Hit::zeroed(); primary.len()];
     trace(&bindings, Traversal::Mask, &primary, &mut hits);
 
-    let shadow = rays_from_hits(&bindings, &primary, &hits, |ray, surface| {
+    let triangles = bindings.triangles;
+    let shadow = rays_from_hits(triangles, &primary, &hits, |ray, surface| {
         let to_light = sample_light(&stage.light, surface.point_world);
         Ray { t_max: to_light.distance, ..leaving(surface, ray, to_light.direction) }
     });
-    let mirror = rays_from_hits(&bindings, &primary, &hits, |ray, surface| {
+    let mirror = rays_from_hits(triangles, &primary, &hits, |ray, surface| {
         leaving(surface, ray, mirrored(ray.direction, surface))
     });
-    let diffuse = rays_from_hits(&bindings, &primary, &hits, |ray, surface| {
-        leaving(surface, ray, cosine_distributed(surface.geometric, uniform_pair(ray.pixel_ix)))
-    });
+    let diffuse = diffuse_rays(triangles, &primary, &hits);
     let mut sets = RayKind::ALL.into_iter().zip([primary, shadow, mirror, diffuse]);
     std::array::from_fn(|_| sets.next().map(|(kind, rays)| RaySet { kind, rays }).expect("as many sets as kinds"))
 }
 
+/// One ray for each hit, in their order, into the hemisphere above it, by the cosine.
+pub(crate) fn diffuse_rays(triangles: &[Triangle], rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
+    rays_from_hits(triangles, rays, hits, |ray, surface| {
+        leaving(surface, ray, cosine_distributed(surface.geometric, uniform_pair(ray.pixel_ix)))
+    })
+}
+
 /// One ray for each hit, in their order.
 fn rays_from_hits(
-    bindings: &Bindings,
+    triangles: &[Triangle],
     rays: &[Ray],
     hits: &[Hit],
     next: impl Fn(&Ray, &Surface) -> Ray + Sync,
 ) -> Vec<Ray> {
     let of_hit = |(ray, hit): (&Ray, &Hit)| {
-        let triangle = bindings.triangles.get(hit.triangle_ix as usize)?;
+        let triangle = triangles.get(hit.triangle_ix as usize)?;
         Some(next(ray, &surface_at(ray, hit, triangle)))
     };
     rays.par_iter().zip(hits).filter_map(of_hit).collect()

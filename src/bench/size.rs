@@ -21,7 +21,7 @@ use crate::{
     layout::Material,
     scene::{
         Camera, RenderDefaults, Scene,
-        generate::{Generator, MAX_TRIANGLES},
+        generate::{Budget, Generator, MAX_TRIANGLES},
         mesh::Transform,
     },
 };
@@ -47,7 +47,7 @@ pub fn knot(n_triangles: u32) -> Scene {
         n_triangles & !1
     );
     let generator: Generator = toml::from_str(&description).expect("the generator knows its words");
-    let mesh = generator.build().expect("numbers within its limits");
+    let mesh = generator.build(&Budget::default()).expect("numbers within its limits and memory");
     let triangles = mesh.to_world(&Transform::IDENTITY).expect("a knot of a few units");
     Scene {
         name: "knot".to_owned(),
@@ -72,11 +72,11 @@ pub struct Sized {
 
 impl Sized {
     /// `size`: pixels, one primary ray each.
-    pub fn new(n_triangles: u32, size: (u32, u32)) -> Self {
+    pub fn new(n_triangles: u32, size: (u32, u32), build_options: BuildOptions) -> Self {
         let begin = Instant::now();
         let scene = knot(n_triangles);
         let generate_ms = begin.elapsed().as_secs_f64() * 1e3;
-        Self { n_triangles: scene.triangles.len(), stage: Stage::in_room(scene, size), generate_ms }
+        Self { n_triangles: scene.triangles.len(), stage: Stage::in_room(scene, size, build_options), generate_ms }
     }
 
     /// Casts the rays `n_times` on a device, or without one on the current rayon pool.
@@ -98,7 +98,7 @@ impl Sized {
             generate_ms: self.generate_ms,
             build_ms: self.stage.tree_build_ms,
             rays: rays.collect::<Result<_, GpuError>>()?,
-            tree: self.stage.tree.statistics(self.stage.scene.triangles.len(), &BuildOptions::default()),
+            tree: self.stage.tree.statistics(self.stage.scene.triangles.len(), &self.stage.build_options),
         })
     }
 }

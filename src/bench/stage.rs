@@ -21,6 +21,8 @@ const VERTICAL_FOV_DEGREES: f32 = 60.0;
 pub struct Stage {
     pub scene: Scene,
     pub tree: KdTree,
+    /// How the tree was built.
+    pub build_options: BuildOptions,
     /// What it took to build the tree, wall-clock.
     pub tree_build_ms: f64,
     /// What any traversal reads beside the tree.
@@ -33,26 +35,26 @@ pub struct Stage {
 
 impl Stage {
     /// The scene seen by its own camera, lit by its first light (from above, if it has none).
-    pub fn open(scene: Scene, size: (u32, u32)) -> Self {
+    pub fn open(scene: Scene, size: (u32, u32), build_options: BuildOptions) -> Self {
         let above = Light { position: Vec3::Y, kind: LIGHT_DIRECTIONAL, intensity: Vec3::ONE, reserved: 0 };
         let light = scene.lights.first().copied().unwrap_or(above);
         let begin = Instant::now();
-        let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
+        let tree = KdTree::build(&scene.triangles, &build_options);
         let tree_build_ms = begin.elapsed().as_secs_f64() * 1e3;
         let options = RenderOptions { width: size.0, height: size.1, ..RenderOptions::default() };
         let frame = frame_constants(&scene, &tree, &options);
-        Self { scene, extras: Extras::all(&tree), tree, tree_build_ms, frame, light }
+        Self { scene, extras: Extras::all(&tree), tree, build_options, tree_build_ms, frame, light }
     }
 
     /// The scene on the floor of a closed room, seen from inside the room, with a point light under its ceiling.
     /// No ray from inside misses.
-    pub fn in_room(mut scene: Scene, size: (u32, u32)) -> Self {
+    pub fn in_room(mut scene: Scene, size: (u32, u32), build_options: BuildOptions) -> Self {
         let room = Room::around(&scene.triangles);
         scene.triangles.extend(room.walls());
         scene.triangle_materials.resize(scene.triangles.len(), 0);
         scene.camera = room.camera;
         scene.lights = vec![room.light];
-        Self::open(scene, size)
+        Self::open(scene, size, build_options)
     }
 
     /// What a traversal on the CPU reads.

@@ -122,7 +122,7 @@ impl<'a> Tracers<'a> {
 }
 
 /// A ray of the renderer as one that is cast.
-pub(super) fn cast_ray(ray: &Ray) -> CastRay {
+pub(crate) fn cast_ray(ray: &Ray) -> CastRay {
     CastRay { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
 }
 

@@ -8,7 +8,7 @@
 mod read;
 mod write;
 
-use std::{mem, sync::Arc};
+use std::{mem, sync::Arc, time::Instant};
 
 use bytemuck::Zeroable;
 use rayon::prelude::*;
@@ -24,7 +24,8 @@ use crate::{
     gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
     kdtree::{Extras, KdTree},
     layout::{Frame, RAY_GROUP_SIZE, Triangle},
-    passes::{self, CastResources, Tree},
+    passes::{self, CastResources, Round, Tree},
+    scene::Mismatch,
 };
 
 /// What is asked of a ray.
@@ -67,7 +68,7 @@ impl Caster {
     /// Uploads the triangles and their tree.
     ///
     /// # Errors
-    /// The tree is beyond the device's limits or memory; too many triangles for brute force.
+    /// The tree is of another number of triangles; it is beyond the device's limits or memory; too many triangles for brute force.
     pub fn new(
         context: &Arc<Context>,
         triangles: &[Triangle],
@@ -155,14 +156,21 @@ impl Caster {
                 }
                 // The repetition before has written what this one overwrites: cast_hits.
                 commands.barrier(Access::ComputeWrite, Access::ComputeUpdate);
-                kernel.record(commands, &self.resources, n_rays);
+                self.tree.stalls.reset(commands);
+                kernel.record(commands, &self.resources, n_rays, Round::Begin);
             })
         };
         let buffers = (0..n_times).map(record).collect::<Result<Vec<_>, _>>()?;
         self.context.submit(&buffers.iter().collect::<Vec<_>>())?;
         self.context.wait()?;
+        let began_ms = Instant::now();
+        let n_rounds = self.tree.stalls.finish(&self.context, |commands, round| {
+            kernel.record(commands, &self.resources, n_rays, round);
+        })?;
+        // Every repetition stalls alike, but only the last one's rays go on.
+        let stalled_ms = if n_rounds > 0 { began_ms.elapsed().as_secs_f64() * 1e3 } else { 0.0 };
         let rows = timer.rows()?;
-        Ok(rows.iter().map(|row| row.span_ms.map(|(begin, end)| end - begin)).collect())
+        Ok(rows.iter().map(|row| row.span_ms.map(|(begin, end)| end - begin + stalled_ms)).collect())
     }
 }
 
@@ -178,7 +186,8 @@ fn constants(triangles: &[Triangle], tree: &KdTree) -> Frame {
     Frame { n_triangles: triangles.len() as u32, ..tree.constants() }
 }
 
-/// Rays that can only miss: with a NaN, an infinite origin or direction, a direction of zero.
+/// Rays that can only miss: with a NaN, an infinite origin or direction, or a direction of zero or so short that all
+/// its components are denormal (less than 2^-126).
 pub fn count_invalid(rays: &[CastRay]) -> u64 {
     rays.par_iter().filter(|ray| !cpu::cast::is_ray(ray)).count() as u64
 }
@@ -193,9 +202,12 @@ pub struct CpuCaster<'a> {
 }
 
 impl<'a> CpuCaster<'a> {
-    pub fn new(triangles: &'a [Triangle], tree: &'a KdTree, traversal: Traversal) -> Self {
+    /// # Errors
+    /// The tree is of another number of triangles.
+    pub fn new(triangles: &'a [Triangle], tree: &'a KdTree, traversal: Traversal) -> Result<Self, Mismatch> {
+        tree.check_triangles(triangles.len())?;
         let (extras, frame) = (Extras::new(tree, traversal), constants(triangles, tree));
-        Self { triangles, tree, traversal, extras, frame }
+        Ok(Self { triangles, tree, traversal, extras, frame })
     }
 
     /// One hit a ray.
@@ -208,12 +220,15 @@ impl<'a> CpuCaster<'a> {
 }
 
 /// The hits of a [`Caster`], found by a [`CpuCaster`].
+///
+/// # Errors
+/// The tree is of another number of triangles.
 pub fn cast_on_cpu(
     triangles: &[Triangle],
     tree: &KdTree,
     traversal: Traversal,
     rays: &[CastRay],
     query: Query,
-) -> Vec<Hit> {
-    CpuCaster::new(triangles, tree, traversal).cast(rays, query)
+) -> Result<Vec<Hit>, Mismatch> {
+    Ok(CpuCaster::new(triangles, tree, traversal)?.cast(rays, query))
 }

@@ -5,6 +5,7 @@ use std::{path::PathBuf, str::FromStr};
 use clap::{Parser, Subcommand, value_parser};
 use kdray::{
     cast::Query,
+    choices::{BuildPolicy, Request},
     frame::{Aov, Crop, RenderOptions, Traversal},
     gpu::DeviceSelector,
     scene::Scene,
@@ -13,9 +14,9 @@ use kdray::{
 pub use super::view_args::ViewArgs;
 use super::{
     bench::Suite,
-    build::Build,
     error::CliError,
-    picture_args::{PictureArgs, way_help},
+    picture_args::{PictureArgs, build_help, way_help},
+    wanted::Wanted,
 };
 
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
@@ -69,9 +70,6 @@ pub struct RenderArgs {
     pub aov: Vec<Aov>,
     #[command(flatten)]
     pub picture: PictureArgs,
-    /// How much work goes into the kd-tree
-    #[arg(long, value_enum, default_value_t = Build::Auto)]
-    pub build: Build,
     /// Render on the CPU, without Vulkan
     #[arg(long, conflicts_with_all = ["device", "validate"])]
     pub cpu: bool,
@@ -102,7 +100,8 @@ pub struct RenderArgs {
 pub struct CastArgs {
     /// OBJ file, or any scene file
     pub mesh: PathBuf,
-    /// Rays, a .npy file of float32: K x 8 (origin, direction, t_min, t_max) or K x 6 (t from 0 to infinity)
+    /// Rays, a .npy file of float32: K x 8 (origin, direction, t_min, t_max) or K x 6 (t from 0 to infinity); a
+    /// direction may have any length from 1.2e-38 on, rays with a shorter one miss
     pub rays: PathBuf,
     /// Hits to write, .npz: t_hit, primitive_ids, primitive_uvs, primitive_normals
     #[arg(short, long, value_name = "FILE")]
@@ -111,11 +110,11 @@ pub struct CastArgs {
     #[arg(long)]
     pub any: bool,
     #[arg(long, value_name = "WAY")]
-    #[arg(help = way_help())]
-    pub traversal: Option<Traversal>,
-    /// How much work goes into the kd-tree
-    #[arg(long, value_enum, default_value_t = Build::Auto)]
-    pub build: Build,
+    #[arg(help = way_help(), default_value = "auto", hide_default_value = true)]
+    pub traversal: Wanted<Traversal>,
+    #[arg(long, value_name = "TREE", default_value_t = BuildPolicy::Auto)]
+    #[arg(help = build_help())]
+    pub build: BuildPolicy,
     /// Cast the rays so many times and report the least, median and greatest time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
@@ -155,13 +154,6 @@ impl RenderArgs {
         if self.trace.is_some() && (self.spp > 1 || self.path.is_some()) {
             return Err(CliError::Usage("--trace shows a single sample: it goes with neither --spp nor --path".into()));
         }
-        let files = [("--output", &self.output), ("--profile", &self.profile), ("--trace", &self.trace)];
-        for (file_ix, (name, file)) in files.iter().enumerate() {
-            let same = files[..file_ix].iter().find(|(_, other)| file.is_some() && other == file);
-            if let Some((other, _)) = same {
-                return Err(CliError::Usage(format!("{other} and {name} name the same file")));
-            }
-        }
         Ok(())
     }
 
@@ -187,15 +179,12 @@ impl CastArgs {
             let path = self.output.display();
             return Err(CliError::Usage(format!("cannot write `{path}`: the name of a file of hits must end in .npz")));
         }
-        for (name, file) in [("--output", &self.output), ("RAYS", &self.rays), ("MESH", &self.mesh)] {
-            if self.json.as_ref() == Some(file) {
-                return Err(CliError::Usage(format!("--json and {name} name the same file")));
-            }
-        }
-        if self.output == self.rays || self.output == self.mesh {
-            return Err(CliError::Usage("--output names a file that is read".into()));
-        }
         Ok(())
+    }
+
+    /// The choices asked for.
+    pub fn request(&self) -> Request {
+        Request { build: self.build, traversal: self.traversal.pinned(), primary: None }
     }
 
     /// What is asked of the rays.

@@ -4,19 +4,21 @@ use std::{sync::Arc, time::Instant};
 
 use kdray::{
     cast::{self, Cast, CastRay, Caster, CpuCaster, Hit, HitWriter, NO_TRIANGLE, Query, RAYS_PER_BATCH, RayReader},
+    choices::{self, Cache, Choices, Workload},
     frame::Traversal,
     gpu::{Context, ContextOptions, GpuError},
     kdtree::KdTree,
     layout::Triangle,
     output,
-    render::suited_traversal,
     scene::Scene,
 };
 
 use super::{
     args::CastArgs,
+    build,
     cast_report::{CastReport, Times},
     error::CliError,
+    file_roles::FileRoles,
     open_device, print,
     progress::Progress,
     render::{report_validation, set_threads},
@@ -26,6 +28,7 @@ use super::{
 /// would waste.
 pub fn run(args: &CastArgs) -> Result<(), CliError> {
     args.check()?;
+    check_roles(args)?;
     output::check(&args.output)?;
     args.json.as_deref().map_or(Ok(()), output::check)?;
     set_threads(args.threads)?;
@@ -34,16 +37,21 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     let progress = Progress::new(args.quiet, 3);
     let (scene, load_ms) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
     let scene = scene?;
-    let device = ContextOptions { device: args.device.clone(), validate: args.validate };
+    let device = ContextOptions::new(args.device.clone(), args.validate);
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
 
     let n_triangles = scene.triangles.len();
-    let n_casts = rays.n_rays() * u64::from(args.repeat);
-    let build_options = args.build.options(context.as_deref(), n_triangles, n_casts);
+    let (request, processor) = (args.request(), choices::Engine::of(context.as_deref()));
+    let workload = Workload::of_rays(rays.n_rays());
+    let tree_kind = request.tree(processor, n_triangles, &workload);
+    let build_options = tree_kind.value.options(processor);
+    build::check_memory(&build_options, n_triangles)?;
     let building = format!("building the kd-tree of {n_triangles} triangles");
     let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &build_options));
     let casting = format!("casting {} rays", rays.n_rays());
-    let traversal = args.traversal.unwrap_or_else(|| suited_traversal(context.as_deref()));
+    let (used, cache) = (context.as_ref(), Cache::open());
+    let methods = request.methods(used, (&scene, &tree), &build_options, &workload, &cache)?;
+    let traversal = methods.traversal.value;
     let engine = Engine::new(context.as_ref(), &scene.triangles, &tree, traversal)?;
     let (done, cast_ms) = progress.stage(&casting, || cast_all(args, rays, engine, &scene.triangles));
     let totals = done?;
@@ -55,6 +63,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
         hits: args.output.clone(),
         query: if args.any { "any" } else { "closest" },
         traversal: traversal.to_string(),
+        choices: Choices::of_rays(tree_kind, methods),
         device: context.as_ref().map_or_else(cpu_name, |context| context.info().name.clone()),
         triangles: n_triangles,
         tree: tree.statistics(n_triangles, &build_options),
@@ -73,6 +82,15 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
         print(&report.text())?;
     }
     context.map_or(Ok(()), |context| report_validation(&context))
+}
+
+/// Refuses an output that is read, or written twice.
+fn check_roles(args: &CastArgs) -> Result<(), CliError> {
+    let mut roles = FileRoles::default();
+    roles.read_scene("MESH", &args.mesh);
+    roles.read("RAYS", &args.rays);
+    roles.write("--output", &args.output)?;
+    args.json.iter().try_for_each(|path| roles.write("--json", path))
 }
 
 fn cpu_name() -> String {
@@ -95,7 +113,7 @@ impl<'a> Engine<'a> {
     ) -> Result<Self, GpuError> {
         match context {
             Some(context) => Ok(Self::Device(Box::new(Caster::new(context, triangles, tree, traversal)?))),
-            None => Ok(Self::Cpu(Box::new(CpuCaster::new(triangles, tree, traversal)))),
+            None => Ok(Self::Cpu(Box::new(CpuCaster::new(triangles, tree, traversal)?))),
         }
     }
 

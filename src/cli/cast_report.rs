@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use kdray::kdtree::Statistics;
+use kdray::{choices::Choices, kdtree::Statistics};
 use serde::Serialize;
 
 use super::table::decimal;
@@ -15,12 +15,15 @@ pub struct CastReport {
     pub hits: PathBuf,
     pub query: &'static str,
     pub traversal: String,
+    /// What the user left open, and why it is so.
+    pub choices: Choices,
     pub device: String,
     pub triangles: usize,
     pub tree: Statistics,
     pub n_rays: u64,
     pub n_hits: u64,
-    /// Rays that can only miss: with a NaN, an infinite origin or direction, a direction of zero.
+    /// Rays that can only miss: with a NaN, an infinite origin or direction, or a direction of zero or so short that
+    /// all its components are denormal (less than 2^-126).
     pub n_invalid: u64,
     /// None where the device has no timestamps.
     pub times: Option<Times>,
@@ -63,11 +66,12 @@ impl Times {
 impl CastReport {
     /// The report as text that ends with a line break.
     pub fn text(&self) -> String {
-        let Self { scene, triangles, load_ms, build_ms, device, n_rays, n_hits, n_invalid, .. } = self;
+        let Self { scene, choices, triangles, load_ms, build_ms, device, n_rays, n_hits, n_invalid, .. } = self;
         let times = self.times.as_ref().map_or_else(|| "no timestamps".to_owned(), Times::text);
         let invalid = if *n_invalid > 0 { format!(", {n_invalid} invalid") } else { String::new() };
         format!(
             "{scene}: {triangles} triangles, loaded in {load_ms:.0} ms, kd-tree built in {build_ms:.0} ms\n\
+             {choices}\n\
              {device}: {times}\n\
              {n_rays} rays, {n_hits} hits{invalid}\n\
              wrote {}\n",

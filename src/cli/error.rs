@@ -2,7 +2,9 @@
 
 use std::io;
 
-use kdray::{cast::RayFileError, gpu::GpuError, output::OutputError, scene::SceneError, view::ViewError};
+use kdray::{
+    cast::RayFileError, gpu::GpuError, memory::OutOfMemory, output::OutputError, scene::SceneError, view::ViewError,
+};
 
 /// Why a command failed. Displays as one line.
 #[derive(Debug, thiserror::Error)]
@@ -15,6 +17,10 @@ pub enum CliError {
     Rays(#[from] RayFileError),
     #[error(transparent)]
     Device(#[from] GpuError),
+    #[error(transparent)]
+    Memory(#[from] OutOfMemory),
+    #[error("{0}; a smaller --size, a --crop or --primary trace takes less")]
+    DeviceMemory(GpuError),
     #[error("{0}")]
     Window(String),
     #[error("the validation layer had {0} complaint(s)")]
@@ -28,13 +34,23 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// 2 usage, 3 scene or rays, 4 device, 5 output.
+    /// 2 usage; 3 scene or rays, also those that need more memory than there is; 4 device; 5 output.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) | Self::Output(OutputError::UnknownEnding { .. }) => 2,
-            Self::Scene(_) | Self::Rays(_) => 3,
-            Self::Device(_) | Self::Window(_) | Self::Validation(_) | Self::WrongHits(_) => 4,
+            Self::Scene(_) | Self::Rays(_) | Self::Memory(_) => 3,
+            Self::Device(_) | Self::DeviceMemory(_) | Self::Window(_) | Self::Validation(_) | Self::WrongHits(_) => 4,
             Self::Output(_) | Self::Stdout(_) => 5,
+        }
+    }
+}
+
+impl CliError {
+    /// Names what takes less memory, where a picture's drawing failed for want of it.
+    pub fn of_drawing(self) -> Self {
+        match self {
+            Self::Device(error) if error.is_out_of_memory() => Self::DeviceMemory(error),
+            other => other,
         }
     }
 }
@@ -71,6 +87,17 @@ mod tests {
     fn usage(arguments: &[&str]) -> String {
         let words = std::iter::once(&"kdray").chain(arguments);
         CliError::from(Args::command().try_get_matches_from(words).unwrap_err()).to_string()
+    }
+
+    #[test]
+    fn a_picture_that_takes_too_much_memory_can_be_drawn_in_parts() {
+        let error = GpuError::HostMemory { object: "displayed picture", bytes: 3 << 30 };
+        let error = CliError::Device(error).of_drawing();
+        let expected = "memory for the displayed picture (3072.0 MiB): the system has too little; \
+                        a smaller --size, a --crop or --primary trace takes less";
+        assert_eq!((error.to_string().as_str(), error.exit_code()), (expected, 4));
+        let other = CliError::Device(GpuError::NoDriver).of_drawing();
+        assert!(matches!(other, CliError::Device(GpuError::NoDriver)));
     }
 
     #[test]

@@ -1,13 +1,14 @@
 //! `kdray inspect`: what a scene holds, and its kd-tree in numbers.
 
 use kdray::{
-    kdtree::{BuildOptions, KdTree, Statistics},
+    choices::{Engine, TreeKind},
+    kdtree::{KdTree, Statistics},
     layout::{LIGHT_DIRECTIONAL, Light},
     scene::Scene,
 };
 use serde::Serialize;
 
-use super::{args::InspectArgs, error::CliError, print, progress::Progress, table::table};
+use super::{args::InspectArgs, build, error::CliError, print, print_raw, progress::Progress, table::table};
 
 /// Loads the scene, builds its tree, describes both.
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
@@ -16,13 +17,14 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let scene = scene?;
     let n_triangles = scene.triangles.len();
     let building = format!("building the kd-tree of {n_triangles} triangles");
-    let options = BuildOptions::default();
+    let options = TreeKind::Best.options(Engine::Gpu);
+    build::check_memory(&options, n_triangles)?;
     let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &options));
     drop(progress);
 
     let inspection = Inspection {
         triangles: n_triangles,
-        bounds: [tree.cell_min.to_array(), tree.cell_max.to_array()],
+        bounds: [tree.cell_min().to_array(), tree.cell_max().to_array()],
         materials: material_uses(&scene),
         lights: scene.lights.iter().map(LightUse::from).collect(),
         tree: tree.statistics(n_triangles, &options),
@@ -32,7 +34,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     };
     if args.json {
         let json = serde_json::to_string_pretty(&inspection).expect("plain structs of numbers and words");
-        print(&format!("{json}\n"))
+        print_raw(&format!("{json}\n"))
     } else {
         print(&inspection.text())
     }

@@ -6,6 +6,7 @@ use std::{
 };
 
 use indicatif::ProgressBar;
+use kdray::text::one_line;
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::{
     Layer,
@@ -36,7 +37,7 @@ pub fn start(quiet: bool, bar: Option<&ProgressBar>, spans: Option<&Spans>) {
     drop(started);
 }
 
-/// `level: message`.
+/// `level: message` on one line, without control characters.
 struct Line;
 
 impl<S, N> FormatEvent<S, N> for Line
@@ -50,9 +51,10 @@ where
             return Ok(());
         }
         let label = if *event.metadata().level() == Level::ERROR { "error" } else { "warning" };
-        write!(writer, "{label}: ")?;
-        context.field_format().format_fields(writer.by_ref(), event)?;
-        writeln!(writer)
+        // A remark may quote a name from a file.
+        let mut remark = String::new();
+        context.field_format().format_fields(Writer::new(&mut remark), event)?;
+        writeln!(writer, "{label}: {}", one_line(&remark))
     }
 }
 

@@ -9,17 +9,21 @@ mod cast;
 mod cast_report;
 mod devices;
 mod error;
+mod file_roles;
 mod inspect;
 mod log;
 mod picture_args;
 mod progress;
 mod render;
 mod report;
+#[cfg(unix)]
+mod signals;
 mod spans;
 mod table;
 mod trace;
 mod view;
 mod view_args;
+mod wanted;
 
 use std::{
     ffi::OsString,
@@ -31,11 +35,16 @@ use std::{
 use args::{Args, Command};
 use clap::Parser;
 use error::CliError;
-use kdray::gpu::{Context, ContextOptions, GpuError};
+use kdray::{
+    gpu::{Context, ContextOptions, GpuError},
+    text::{escape_controls, one_line},
+};
 use progress::Progress;
 
 /// Runs the command that `arguments`, the program's name first, ask for.
 pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
+    #[cfg(unix)]
+    signals::handle();
     let result = match Args::try_parse_from(arguments) {
         Ok(args) => run(args),
         Err(request) if !request.use_stderr() => print(&request.render().to_string()),
@@ -70,8 +79,13 @@ fn open_device(options: &ContextOptions, progress: &Progress) -> Result<Arc<Cont
     Ok(context)
 }
 
-/// Writes what was asked for to standard output. A reader that has seen enough is no error.
+/// Writes a report to standard output, line by line, with control characters of the names that it quotes escaped.
 fn print(text: &str) -> Result<(), CliError> {
+    print_raw(&text.split('\n').map(escape_controls).collect::<Vec<_>>().join("\n"))
+}
+
+/// Writes what was asked for to standard output, as it is. A reader that has seen enough is no error.
+fn print_raw(text: &str) -> Result<(), CliError> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(CliError::Stdout(error)),
@@ -81,8 +95,6 @@ fn print(text: &str) -> Result<(), CliError> {
 
 /// Writes `label: message` to standard error, as one line whatever the message quotes.
 fn complain(label: &str, message: &str) {
-    let line = message.split(char::is_whitespace).filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ");
-    let line = line.replace(char::is_control, "?");
     // There is nobody left to tell where this fails.
-    let _ = writeln!(io::stderr(), "{label}: {line}");
+    let _ = writeln!(io::stderr(), "{label}: {}", one_line(message));
 }

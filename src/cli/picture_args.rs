@@ -2,12 +2,12 @@
 
 use clap::{ValueEnum, value_parser};
 use kdray::{
+    choices::{BuildPolicy, Request},
     frame::{Denoise, Primary, RenderOptions, Tonemap, Traversal},
-    render::Ways,
     scene::Scene,
 };
 
-use super::{args::Size, error::CliError};
+use super::{args::Size, error::CliError, wanted::Wanted};
 
 #[derive(clap::Args)]
 pub struct PictureArgs {
@@ -30,18 +30,33 @@ pub struct PictureArgs {
     #[arg(help = format!("From radiance to what a display shows: {} [default: the scene's]", Tonemap::words()))]
     pub tonemap: Option<Tonemap>,
     #[arg(long, value_name = "WAY")]
-    #[arg(help = way_help())]
-    pub traversal: Option<Traversal>,
-    /// How primary rays find their triangles: rasterized by the device's graphics or by kernels, or traced [default: what suits the
-    /// device and the scene]
-    #[arg(long, value_name = "raster|compute|trace")]
-    pub primary: Option<Primary>,
+    #[arg(help = way_help(), default_value = "auto", hide_default_value = true)]
+    pub traversal: Wanted<Traversal>,
+    /// How primary rays find their triangles: rasterized by the device's graphics or by kernels, or traced; auto: what
+    /// suits the device and the sizes of scene and picture, or what a measurement has found to be quicker
+    #[arg(long, value_name = "auto|raster|compute|trace", default_value = "auto", hide_default_value = true)]
+    pub primary: Wanted<Primary>,
+    #[arg(long, value_name = "TREE", default_value_t = BuildPolicy::Auto)]
+    #[arg(help = build_help())]
+    pub build: BuildPolicy,
 }
 
 /// What `--traversal` says of itself.
 pub fn way_help() -> String {
     let (words, of_devices, of_cpu) = (Traversal::words(), ways_of_devices(), Traversal::OF_CPU);
-    format!("How rays find their way through the tree: {words} [default: {of_devices}, with --cpu {of_cpu}]")
+    format!(
+        "How rays find their way through the tree: {words}, or auto: {of_devices}, with --cpu {of_cpu}, or what a \
+         measurement on this GPU and scene has found to be quicker [default: auto]"
+    )
+}
+
+/// What `--build` says of itself.
+pub fn build_help() -> String {
+    format!(
+        "Which kd-tree to build: {}. best traces fastest; fast is built in half of the time, and rays take up to a \
+         tenth longer on the CPU, up to twice as long on a GPU; auto takes what is quicker for the number of rays",
+        BuildPolicy::words()
+    )
 }
 
 /// What devices take by default.
@@ -58,12 +73,13 @@ impl PictureArgs {
         Ok(())
     }
 
-    /// The ways asked for.
-    pub fn ways(&self) -> Ways {
-        Ways { traversal: self.traversal, primary: self.primary }
+    /// The choices asked for.
+    pub fn request(&self) -> Request {
+        Request { build: self.build, traversal: self.traversal.pinned(), primary: self.primary.pinned() }
     }
 
-    /// The options asked for; the scene's own fill what was left open, but for what depends on the device: [`Self::ways`].
+    /// The options asked for; the scene's own fill what was left open, but for what depends on the device:
+    /// [`Self::request`].
     pub fn options(&self, scene: &Scene) -> RenderOptions {
         let scene = &scene.defaults;
         let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });

@@ -7,7 +7,12 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use kdray::text::one_line;
+
 use super::{complain, log, spans::Spans};
+
+/// Positions of the bar for each stage of a command.
+const BAR_STEPS: u64 = 1000;
 
 /// Stages of a command, told on standard error.
 pub enum Progress {
@@ -38,7 +43,7 @@ impl Progress {
 
     fn bar(n_stages: u64) -> Self {
         let style = ProgressStyle::with_template("{bar:20} {msg} {elapsed}").expect("a valid template");
-        let bar = ProgressBar::new(n_stages).with_style(style);
+        let bar = ProgressBar::new(n_stages * BAR_STEPS).with_style(style);
         bar.enable_steady_tick(Duration::from_millis(100));
         Self::Bar(bar)
     }
@@ -48,14 +53,20 @@ impl Progress {
         match self {
             Self::Silent => {}
             Self::Lines => complain("kdray", message),
-            Self::Bar(bar) => bar.set_message(message.to_owned()),
+            Self::Bar(bar) => bar.set_message(one_line(message)),
         }
         let start = Instant::now();
+        let begin = self.position();
         let made = work();
         if let Self::Bar(bar) = self {
-            bar.inc(1);
+            bar.set_position(begin + BAR_STEPS);
         }
         (made, start.elapsed().as_secs_f64() * 1e3)
+    }
+
+    /// Where the bar is.
+    fn position(&self) -> u64 {
+        if let Self::Bar(bar) = self { bar.position() } else { 0 }
     }
 
     /// Tells what the user should know but need not act on.
@@ -74,6 +85,12 @@ pub struct Steps<'a> {
     message: String,
     n_done: u32,
     n_steps: u32,
+    /// Share of the step under way that is done, 0 to 1.
+    part: f32,
+    /// Whether the user sees a step go on, rather than only end.
+    pub shows_parts: bool,
+    /// The bar's position at the stage's begin.
+    begin: u64,
     start: Instant,
     last_line: Instant,
 }
@@ -82,7 +99,8 @@ impl Progress {
     /// Tells how far the stage is that `message` names, and how much time is left.
     pub fn steps(&self, message: &str, n_steps: u32) -> Steps<'_> {
         let (message, start) = (message.to_owned(), Instant::now());
-        Steps { progress: self, message, n_done: 0, n_steps, start, last_line: start }
+        let (begin, shows_parts) = (self.position(), matches!(self, Self::Bar(_)));
+        Steps { progress: self, message, n_done: 0, n_steps, part: 0.0, shows_parts, begin, start, last_line: start }
     }
 }
 
@@ -92,6 +110,7 @@ impl Steps<'_> {
         /// Between lines where there is no terminal.
         const PAUSE: Duration = Duration::from_secs(5);
         self.n_done += 1;
+        self.part = 0.0;
         if self.n_done >= self.n_steps {
             return;
         }
@@ -102,20 +121,42 @@ impl Steps<'_> {
                 complain("kdray", &self.text());
             }
             Progress::Lines => {}
-            Progress::Bar(bar) => bar.set_message(self.text()),
+            Progress::Bar(bar) => self.move_bar(bar),
         }
     }
 
+    /// So much of the step under way is done, 0 to 1.
+    pub fn part(&mut self, share: f32) {
+        self.part = share.clamp(0.0, 1.0);
+        if let Progress::Bar(bar) = self.progress {
+            self.move_bar(bar);
+        }
+    }
+
+    fn move_bar(&self, bar: &ProgressBar) {
+        bar.set_position(self.begin + (self.share() * BAR_STEPS as f64) as u64);
+        bar.set_message(self.text());
+    }
+
+    /// Share of the stage that is done, 0 to 1.
+    fn share(&self) -> f64 {
+        (f64::from(self.n_done) + f64::from(self.part)) / f64::from(self.n_steps)
+    }
+
     fn text(&self) -> String {
-        let left_s = time_left(self.start.elapsed(), self.n_done, self.n_steps).as_secs_f64().ceil();
+        let left_s = time_left(self.start.elapsed(), self.share()).as_secs_f64().ceil();
         let left = if left_s < 120.0 { format!("{left_s} s") } else { format!("{} min", (left_s / 60.0).ceil()) };
-        format!("{}: {} of {}, {left} left", self.message, self.n_done, self.n_steps)
+        let done = match self.n_steps {
+            1 => format!("{:.0} %", 100.0 * self.share()),
+            n_steps => format!("{} of {n_steps}", self.n_done),
+        };
+        format!("{}: {done}, {left} left", self.message)
     }
 }
 
-/// If all steps take as long as those that are done, at least one.
-fn time_left(elapsed: Duration, n_done: u32, n_steps: u32) -> Duration {
-    elapsed.mul_f64(f64::from(n_steps - n_done) / f64::from(n_done))
+/// The time that the rest takes if it goes on as fast; none at the very begin, of which nothing can be said.
+fn time_left(elapsed: Duration, share_done: f64) -> Duration {
+    if share_done > 0.0 { elapsed.mul_f64((1.0 - share_done) / share_done) } else { Duration::ZERO }
 }
 
 impl Drop for Progress {
@@ -132,11 +173,33 @@ mod tests {
 
     #[test]
     fn what_is_left_takes_as_long_as_what_is_done() {
-        assert_eq!(time_left(Duration::from_secs(3), 1, 4), Duration::from_secs(9));
-        assert_eq!(time_left(Duration::from_secs(3), 4, 4), Duration::ZERO);
+        assert_eq!(time_left(Duration::from_secs(3), 0.25), Duration::from_secs(9));
+        assert_eq!(time_left(Duration::from_secs(3), 1.0), Duration::ZERO);
+        assert_eq!(time_left(Duration::from_secs(3), 0.0), Duration::ZERO);
         let progress = Progress::Silent;
         let mut steps = progress.steps("rendering", 3);
         steps.step();
         assert!(steps.text().starts_with("rendering: 1 of 3, ") && steps.text().ends_with(" left"), "{}", steps.text());
+    }
+
+    #[test]
+    fn the_bar_moves_within_a_step() {
+        let bar = ProgressBar::hidden();
+        bar.set_length(3 * BAR_STEPS);
+        let progress = Progress::Bar(bar.clone());
+        progress.stage("loading", || ());
+        progress.stage("rendering", || {
+            let mut steps = progress.steps("rendering", 2);
+            steps.part(0.5);
+            assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS / 4);
+            steps.step();
+            steps.part(0.5);
+            assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS * 3 / 4);
+            assert!(bar.message().starts_with("rendering: 1 of 2, "), "{}", bar.message());
+        });
+        assert_eq!(bar.position(), 2 * BAR_STEPS);
+        let mut alone = progress.steps("rendering", 1);
+        alone.part(0.25);
+        assert!(bar.message().starts_with("rendering: 25 %, "), "{}", bar.message());
     }
 }

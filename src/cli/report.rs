@@ -3,15 +3,13 @@
 use std::path::PathBuf;
 
 use kdray::{
+    choices::Choices,
     frame::{Denoise, PassTime, Profile, RenderOptions},
     kdtree::Statistics,
 };
 use serde::Serialize;
 
 use super::table::{decimal, table};
-
-/// Passes that find the closest hits of a bounce's rays.
-const TRACING: [&str; 3] = ["visibility", "primary_hit", "trace"];
 
 /// What was rendered, how, and how long it took.
 #[derive(Serialize)]
@@ -22,6 +20,8 @@ pub struct Report {
     /// Written beside them.
     pub extra_files: Vec<PathBuf>,
     pub options: Options,
+    /// What the user left open, and why it is so.
+    pub choices: Choices,
     /// A pixel.
     pub samples: u32,
     pub triangles: usize,
@@ -125,7 +125,7 @@ struct Bounce {
     n_rays: u64,
     n_hits: u64,
     n_shadow_rays: u64,
-    /// Milliseconds of the passes in [`TRACING`].
+    /// Milliseconds of the passes that find the closest hits of the bounce's rays.
     tracing_ms: Option<f64>,
     /// Million rays a second of tracing.
     mrays_per_s: Option<f64>,
@@ -168,9 +168,7 @@ fn pass_totals(profile: &Profile) -> Vec<PassTotal> {
 
 fn bounces(profile: &Profile) -> Vec<Bounce> {
     let rows = profile.bounces.iter().enumerate().map(|(bounce, stats)| {
-        // A pass that runs once a frame and finds hits finds those of the primary rays.
-        let passes = profile.passes.iter().filter(|pass| TRACING.contains(&pass.name));
-        let tracing_ms = passes.filter(|pass| pass.bounce.unwrap_or(0) as usize == bounce).map(|pass| pass.ms).sum();
+        let tracing_ms = profile.tracing_ms(bounce as u32);
         Bounce {
             bounce,
             n_rays: stats.n_rays,
@@ -185,7 +183,7 @@ fn bounces(profile: &Profile) -> Vec<Bounce> {
 
 fn shadow(profile: &Profile) -> Shadow {
     let n_shadow_rays = profile.bounces.iter().map(|bounce| bounce.n_shadow_rays).sum();
-    let ms = profile.pass_ms("shadow");
+    let ms = profile.shadow_ms();
     Shadow { n_shadow_rays, ms, mrays_per_s: rate(n_shadow_rays, ms) }
 }
 
@@ -207,8 +205,8 @@ impl Report {
             tree.n_nodes, tree.depth, tree.references_per_triangle, self.build_ms
         );
         text += &format!(
-            "{width}x{height}{crop}{samples} on {}: picture after {:.0} ms\n\n",
-            self.frame.device, self.render_ms
+            "{width}x{height}{crop}{samples} on {}: picture after {:.0} ms\n{}\n\n",
+            self.frame.device, self.render_ms, self.choices
         );
         if self.frame.frame_ms.is_none() {
             text += "This device has no timestamps: where the time went is unknown.\n\n";
@@ -286,7 +284,8 @@ mod tests {
         Frame::from(Profile {
             device: "d".to_owned(),
             passes: vec![
-                pass("visibility", None, 1.0),
+                pass("rasterize_triangles", None, 0.75),
+                pass("rasterize_blocks", None, 0.25),
                 pass("primary_hit", Some(0), 1.0),
                 pass("compact_scatter", Some(0), 4.0),
                 pass("trace", Some(1), 1.5),
@@ -304,13 +303,16 @@ mod tests {
     fn times_are_summed_by_pass_and_by_bounce() {
         let frame = frame(Some);
         let names: Vec<_> = frame.pass_totals.iter().map(|total| total.name).collect();
-        assert_eq!(names, ["visibility", "primary_hit", "compact_scatter", "trace", "shadow"]);
-        assert_eq!((frame.pass_totals[2].ms, frame.pass_totals[2].share), (Some(4.5), Some(0.45)));
+        assert_eq!(
+            names,
+            ["rasterize_triangles", "rasterize_blocks", "primary_hit", "compact_scatter", "trace", "shadow"]
+        );
+        assert_eq!((frame.pass_totals[3].ms, frame.pass_totals[3].share), (Some(4.5), Some(0.45)));
         assert_eq!((frame.bounces[0].tracing_ms, frame.bounces[0].mrays_per_s), (Some(2.0), Some(1.5)));
         assert_eq!((frame.bounces[1].tracing_ms, frame.bounces[1].mrays_per_s), (Some(1.5), Some(0.5 / 1.5)));
         assert_eq!((frame.shadow.ms, frame.shadow.mrays_per_s), (Some(0.5), Some(2.0)));
         assert!(frame.bounces_text().ends_with("all     3500     6         1000       4.000     1.12\n"));
-        assert!(frame.passes_text().ends_with("frame            10.000       100.0\n"));
+        assert!(frame.passes_text().ends_with("frame                10.000       100.0\n"));
     }
 
     #[test]

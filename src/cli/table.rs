@@ -1,9 +1,13 @@
 //! Text in columns.
 
-/// Rows under a header: the first column to the left, the others to the right, no trailing blanks.
+use kdray::text::escape_controls;
+
+/// Rows under a header: the first column to the left, the others to the right, no trailing blanks. Control characters
+/// of cells are escaped, so that a row stays a line.
 pub fn table<const N: usize>(header: [&str; N], rows: &[[String; N]]) -> String {
     let header = header.map(str::to_owned);
-    let lines = || std::iter::once(&header).chain(rows);
+    let rows: Vec<_> = rows.iter().map(|row| row.each_ref().map(|cell| escape_controls(cell).into_owned())).collect();
+    let lines = || std::iter::once(&header).chain(&rows);
     let width = |column: usize| lines().map(|line| line[column].chars().count()).max().unwrap_or(0);
     let widths: [usize; N] = std::array::from_fn(width);
     let mut text = String::new();
@@ -33,6 +37,7 @@ mod tests {
     #[test]
     fn columns_line_up() {
         let rows = [["a".to_owned(), "1.50".to_owned()], ["süß".to_owned(), decimal(None, 1)]];
+        assert_eq!(table(["of"], &[["a\nb\u{1b}".to_owned()]]), "of\na\\nb\\u{1b}\n");
         assert_eq!(table(["of", "ms"], &rows), "of     ms\na    1.50\nsüß     -\n");
     }
 }

@@ -3,17 +3,20 @@
 use std::path::Path;
 
 use kdray::{
+    choices::{Engine, Workload},
     frame::View,
-    gpu::ContextOptions,
+    gpu::{ContextOptions, chosen_device},
+    kdtree::BuildOptions,
     output::{self, Format, OutputError},
     scene::{Camera, CameraPath, Scene},
-    view::{Display, Loaded, Settings, Tour, ViewOptions, ViewReport},
+    view::{Display, LoadOptions, Loaded, Settings, Tour, ViewOptions, ViewReport},
 };
 use serde::Serialize;
 
 use super::{
-    complain,
+    build, complain,
     error::CliError,
+    file_roles::FileRoles,
     print,
     progress::Progress,
     render::set_threads,
@@ -33,13 +36,24 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     let progress = Progress::new(args.quiet, 2);
     let (scene, _) = progress.stage(&format!("loading {}", args.scene.display()), || Scene::load(&args.scene));
     let scene = scene?;
+    scene.warn_if_unlit(&args.scene);
     let options = args.picture.options(&scene);
+    build::check_memory(&BuildOptions::default(), scene.triangles.len())?;
+    let tour = tour(args, scene.camera)?;
+    let max_samples = args.spp.unwrap_or(if tour.is_some() { 1 } else { SAMPLES_AT_REST });
+    let workload = match &tour {
+        Some(tour) => {
+            let n_pictures = u64::from(tour.n_frames()) * u64::from(max_samples);
+            Workload::of_pictures(&options, scene.lights.len(), n_pictures)
+        }
+        None => Workload::of_window((options.width, options.height)),
+    };
+    let engine = Engine::of_device(&chosen_device(args.device.as_ref())?);
+    let load_options = LoadOptions { request: args.picture.request(), engine, workload };
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
-    let (loaded, _) = progress.stage(&building, || Loaded::with_tree(&args.scene, scene));
+    let (loaded, _) = progress.stage(&building, || Loaded::with_tree(&args.scene, scene, load_options));
     drop(progress);
 
-    let tour = tour(args, loaded.scene.camera)?;
-    let max_samples = args.spp.unwrap_or(if tour.is_some() { 1 } else { SAMPLES_AT_REST });
     let vsync = args.vsync == Switch::On;
     let settings = Settings { options, max_samples, budget_ms: args.budget_ms, vsync, view: View::Picture, gain: 1.0 };
     let scene_name = loaded.scene.name.clone();
@@ -47,8 +61,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         loaded,
         ViewOptions {
             settings,
-            ways: args.picture.ways(),
-            device: ContextOptions { device: args.device.clone(), validate: args.validate },
+            device: ContextOptions::new(args.device.clone(), args.validate),
             overlay: !args.no_overlay,
             tour,
             screenshot: args.screenshot.clone(),
@@ -59,6 +72,9 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     )?;
     if let Some(path) = &args.profile {
         output::write(path, &json(&Profile { scene: &scene_name, budget_ms: args.budget_ms, vsync, view: &report }))?;
+    }
+    if !args.quiet {
+        print(&format!("{}\n", report.choices))?;
     }
     for message in &report.validation {
         complain("validation", message);
@@ -92,8 +108,9 @@ fn json(profile: &Profile) -> Vec<u8> {
     json
 }
 
-/// Refuses targets that cannot be written.
+/// Refuses targets that cannot be written, or that are read.
 fn check_outputs(args: &ViewArgs) -> Result<(), CliError> {
+    check_roles(args)?;
     if let Some(path) = &args.screenshot {
         Format::of(path)?;
         output::check(path)?;
@@ -105,6 +122,15 @@ fn check_outputs(args: &ViewArgs) -> Result<(), CliError> {
         check_directory(directory)?;
     }
     Ok(())
+}
+
+/// Refuses an output that is read, or written twice.
+fn check_roles(args: &ViewArgs) -> Result<(), CliError> {
+    let mut roles = FileRoles::default();
+    roles.read_scene("SCENE", &args.scene);
+    args.path.iter().for_each(|path| roles.read("--path", path));
+    args.screenshot.iter().try_for_each(|path| roles.write("--screenshot", path))?;
+    args.profile.iter().try_for_each(|path| roles.write("--profile", path))
 }
 
 fn check_directory(directory: &Path) -> Result<(), CliError> {

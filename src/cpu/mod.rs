@@ -56,25 +56,31 @@ pub use self::render::{Batching, Renderer};
 use crate::{
     frame::{Picture, Profile, RenderOptions},
     kdtree::KdTree,
-    scene::Scene,
+    scene::{Mismatch, Scene},
 };
 
 /// Rays that one thread handles at a time: enough to pay for handing them out, few enough to balance.
 const RAYS_PER_TASK: usize = 512;
 
 /// Renders a frame of one sample a pixel on the current rayon pool.
-pub fn render(scene: &Scene, tree: &KdTree, options: &RenderOptions) -> (Picture, Profile) {
+///
+/// # Errors
+/// Scene and tree do not fit together.
+pub fn render(scene: &Scene, tree: &KdTree, options: &RenderOptions) -> Result<(Picture, Profile), Mismatch> {
     render_in_batches(scene, tree, options, Batching::default())
 }
 
 /// As [`render`], in batches of a given size.
+///
+/// # Errors
+/// Scene and tree do not fit together.
 pub fn render_in_batches(
     scene: &Scene,
     tree: &KdTree,
     options: &RenderOptions,
     batching: Batching,
-) -> (Picture, Profile) {
-    let mut renderer = Renderer::new(scene, tree, options, batching);
+) -> Result<(Picture, Profile), Mismatch> {
+    let mut renderer = Renderer::new(scene, tree, options, batching)?;
     let profile = renderer.draw_sample();
-    (renderer.picture(), profile)
+    Ok((renderer.picture(), profile))
 }

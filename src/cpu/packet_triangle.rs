@@ -4,8 +4,8 @@
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 
 use super::{
-    packet::{LANES, Lanes},
-    triangle::{Shear, axis_last},
+    packet::Lanes,
+    triangle::{LEAST_EXACT_SUM, Shear, axis_last},
 };
 use crate::layout::{Hit, NO_TRIANGLE, Triangle};
 
@@ -106,8 +106,8 @@ impl<S: Simd> Shears<S> {
         [(x - self.origin[0]) - self.x * z, (y - self.origin[1]) - self.y * z, z]
     }
 
-    /// As `Shear::intersect_triangle`, of `lanes`, whose longest axis is `axis`: hits, and which of them are hits; none where no
-    /// ray comes near.
+    /// Finds what `Shear::intersect_triangle` finds for each of `lanes`, whose longest axis is `axis`. Returns columns
+    /// and which of their lanes are hits, or nothing if no ray comes near.
     #[inline(always)]
     pub fn intersect_triangle(
         &self,
@@ -121,43 +121,69 @@ impl<S: Simd> Shears<S> {
         let [x1, y1, z1] = self.corner(axis_last(triangle.v1.to_array(), axis));
         let [x2, y2, z2] = self.corner(axis_last(triangle.v2.to_array(), axis));
         let edges = [x2 * y1 - y2 * x1, x0 * y2 - y0 * x2, x1 * y0 - y1 * x0];
-        let inside = !is_outside(edges) & mask32x16::from_bitmask(simd, lanes.into());
-        if inside.all_false() {
+        let near = !is_outside(edges) & mask32x16::from_bitmask(simd, lanes.into());
+        if near.all_false() {
             return None;
         }
-        let det = edges[0] + edges[1] + edges[2];
-        // Not `<=`: a NaN misses.
-        let mut hit = inside & det.abs().simd_gt(0.0);
-        let inv_det = 1.0 / det;
-        let t = (edges[0] * z0 + edges[1] * z1 + edges[2] * z2) * self.z * inv_det;
-        let mut found =
-            Found { t, triangle_ix: u32x16::splat(simd, triangle_ix), u: edges[1] * inv_det, v: edges[2] * inv_det };
-        let touches = edges[0].simd_eq(0.0) | edges[1].simd_eq(0.0) | edges[2].simd_eq(0.0);
-        let at_edge = (inside & touches).to_bitmask() as Lanes;
-        if at_edge != 0 {
-            self.intersect_exactly(triangle, triangle_ix, at_edge, &mut found, &mut hit);
-        }
-        Some((found, hit))
+        let errors = [edge_error([x2, y2], [x1, y1]), edge_error([x0, y0], [x2, y2]), edge_error([x1, y1], [x0, y0])];
+        let hit = near & is_inside(with_exact_signs(edges, errors));
+        let edges = exact_edges(edges, errors);
+        let inv_det = 1.0 / sum_of(edges);
+        let (u, v) = (edges[1] * inv_det, edges[2] * inv_det);
+        let t = (z0 + (u * (z1 - z0) + v * (z2 - z0))) * self.z;
+        Some((Found { t, triangle_ix: u32x16::splat(simd, triangle_ix), u, v }, hit))
     }
+}
 
-    /// The rays at an edge, one by one.
-    #[cold]
-    fn intersect_exactly(
-        &self,
-        triangle: &Triangle,
-        triangle_ix: u32,
-        lanes: Lanes,
-        found: &mut Found<S>,
-        hit: &mut mask32x16<S>,
-    ) {
-        for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
-            let exact = self.of_lane(lane).intersect_triangle(triangle, triangle_ix);
-            hit.set(lane, exact.is_some());
-            if let Some(exact) = exact {
-                found.set_lane(lane, &exact);
-            }
-        }
+/// What rounding took from the products of the edge function `a.x * b.y - a.y * b.x`.
+#[inline(always)]
+fn edge_error<S: Simd>(a: [f32x16<S>; 2], b: [f32x16<S>; 2]) -> f32x16<S> {
+    product_error(a[0], b[1]) - product_error(a[1], b[0])
+}
+
+/// What rounding took from a product.
+#[inline(always)]
+fn product_error<S: Simd>(a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
+    a.mul_sub_precise(b, a * b)
+}
+
+/// Returns the edge functions, each right to 2^-23 of itself, as those of `triangle.rs` are.
+#[inline(always)]
+fn exact_edges<S: Simd>(edges: [f32x16<S>; 3], errors: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    let exact = [edges[0] + errors[0], edges[1] + errors[1], edges[2] + errors[2]];
+    let underflows = sum_of(exact).abs().simd_lt(LEAST_EXACT_SUM);
+    if underflows.all_false() {
+        return exact;
     }
+    let signed = with_exact_signs(edges, errors);
+    [
+        underflows.select(signed[0], exact[0]),
+        underflows.select(signed[1], exact[1]),
+        underflows.select(signed[2], exact[2]),
+    ]
+}
+
+/// Returns the edge functions with right signs: where the two products round to one value, their errors are the edge
+/// function.
+#[inline(always)]
+fn with_exact_signs<S: Simd>(edges: [f32x16<S>; 3], errors: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
+    [
+        edges[0].simd_eq(0.0).select(errors[0], edges[0]),
+        edges[1].simd_eq(0.0).select(errors[1], edges[1]),
+        edges[2].simd_eq(0.0).select(errors[2], edges[2]),
+    ]
+}
+
+#[inline(always)]
+fn sum_of<S: Simd>(edges: [f32x16<S>; 3]) -> f32x16<S> {
+    edges[0] + edges[1] + edges[2]
+}
+
+/// Tells by edge functions with exact signs whether the rays go through the triangle or its edges. False also for a
+/// triangle without area and for NaN.
+#[inline(always)]
+fn is_inside<S: Simd>(edges: [f32x16<S>; 3]) -> mask32x16<S> {
+    !is_outside(edges) & sum_of(edges).abs().simd_gt(0.0)
 }
 
 #[inline(always)]

@@ -19,7 +19,7 @@ use crate::{
     frame::{BounceStats, Picture, Primary, Profile, RenderOptions},
     kdtree::{Extras, KdTree},
     layout::{Bounce, Feature, Frame, Hit, Ray, SCAN_GROUP_SIZE},
-    scene::{Camera, Scene},
+    scene::{Camera, Mismatch, Scene},
 };
 
 /// How a frame is cut into pieces. The picture does not depend on it.
@@ -66,10 +66,18 @@ pub struct Renderer<'a> {
 }
 
 impl<'a> Renderer<'a> {
-    pub fn new(scene: &'a Scene, tree: &'a KdTree, options: &'a RenderOptions, batching: Batching) -> Self {
+    /// # Errors
+    /// Scene and tree do not fit together.
+    pub fn new(
+        scene: &'a Scene,
+        tree: &'a KdTree,
+        options: &'a RenderOptions,
+        batching: Batching,
+    ) -> Result<Self, Mismatch> {
+        scene.check(tree)?;
         let frame = frame_constants(scene, tree, options);
         let n_pixels = frame.width as usize * frame.height as usize;
-        Self {
+        Ok(Self {
             scene,
             camera: scene.camera,
             tree,
@@ -88,12 +96,18 @@ impl<'a> Renderer<'a> {
             clock: Clock::start(),
             bounces: Vec::new(),
             n_batches: 0,
-        }
+        })
     }
 
     /// Draws the frame by one sample more a pixel on the current rayon pool, the first at its centre; the picture is the
     /// mean of all.
     pub fn draw_sample(&mut self) -> Profile {
+        self.draw_sample_with(|_| ())
+    }
+
+    /// Draws as [`Renderer::draw_sample`] does, and tells the share of the sample's pixels that are drawn, 0 to 1, after each
+    /// batch.
+    pub fn draw_sample_with(&mut self, mut progress: impl FnMut(f32)) -> Profile {
         self.clock = Clock::start();
         self.bounces.clear();
         self.n_batches = 0;
@@ -107,7 +121,9 @@ impl<'a> Renderer<'a> {
         }
         let n_pixels = self.pixel_radiance.len() as u32;
         for first_pixel in (0..n_pixels).step_by(self.batching.n_pixels as usize) {
-            self.batch(first_pixel, self.batching.n_pixels.min(n_pixels - first_pixel));
+            let n_pixels_of_batch = self.batching.n_pixels.min(n_pixels - first_pixel);
+            self.batch(first_pixel, n_pixels_of_batch);
+            progress((first_pixel + n_pixels_of_batch) as f32 / n_pixels as f32);
         }
         self.finish();
         self.n_samples += 1;

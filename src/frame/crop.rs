@@ -53,8 +53,12 @@ impl RenderOptions {
 
     /// The part of the picture that has to be rendered: the noise filter looks one pixel beyond what is asked for.
     pub fn window(&self) -> Crop {
-        let border = if self.denoise == Denoise::Off { 0 } else { 1 };
-        self.crop_or_whole().grown(border, self.width, self.height)
+        self.crop_or_whole().grown(self.border(), self.width, self.height)
+    }
+
+    /// Pixels on each side of what is asked for that the noise filter reads.
+    pub(crate) fn border(&self) -> u32 {
+        if self.denoise == Denoise::Off { 0 } else { 1 }
     }
 }
 

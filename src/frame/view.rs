@@ -12,9 +12,9 @@ pub enum View {
     Normal,
     /// Each triangle in a colour of its own.
     Id,
-    /// What the pixel's rays read of the tree.
+    /// What the pixel's rays, all of them, read of the tree.
     Cost,
-    /// The pixel's rays.
+    /// The number of the pixel's rays, all of them.
     Rays,
 }
 
@@ -28,6 +28,11 @@ words!(View {
 });
 
 impl View {
+    /// Whether the hits of the primary rays alone decide it, so that no further ray is traced for it.
+    pub fn needs_primary_rays_only(self) -> bool {
+        matches!(self, Self::Depth | Self::Normal | Self::Id)
+    }
+
     /// As the kernel knows it; none for the picture.
     pub(crate) fn constant(self) -> Option<u32> {
         match self {

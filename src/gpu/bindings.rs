@@ -120,6 +120,7 @@ impl BindingSet {
     pub fn new(bindings: &Arc<Bindings>, name: &str, objects: &[(u32, Binding)]) -> Result<Self, GpuError> {
         assert_eq!(objects.len(), bindings.kinds.len(), "one object a binding");
         let context = &bindings.context;
+        context.count_creation("vkCreateDescriptorPool", name)?;
         let sizes: Vec<_> = bindings
             .kinds
             .iter()
@@ -133,6 +134,7 @@ impl BindingSet {
                 .create_descriptor_pool(&info, None)
                 .map_err(GpuError::call("vkCreateDescriptorPool", name))?;
             let mut set = Self { raw: vk::DescriptorSet::null(), pool, bindings: bindings.clone() };
+            context.count_creation("vkAllocateDescriptorSets", name)?;
             let layouts = [bindings.set_layout];
             let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
             set.raw = context

@@ -36,9 +36,11 @@ pub fn texel_bytes<T>() -> u64 {
     [16, 8].into_iter().find(|&bytes| size_of::<T>().is_multiple_of(bytes)).unwrap_or(4) as u64
 }
 
-/// `len` elements of `T` in the device's memory.
+/// `len` elements of `T` in the device's memory. A clone is a second handle to the same memory, which is released with
+/// its last handle.
+#[derive(Clone)]
 pub struct Buffer<T> {
-    any: AnyBuffer,
+    any: Arc<AnyBuffer>,
     len: usize,
     element: PhantomData<T>,
 }
@@ -61,12 +63,8 @@ impl<T: Pod> Buffer<T> {
     /// Beyond the device's limits, out of memory.
     pub fn new(context: &Arc<Context>, name: &str, len: usize, usage: BufferUse) -> Result<Self, GpuError> {
         let bytes = (len.max(1) * size_of::<T>()) as u64;
-        let limit = match usage {
-            BufferUse::Index | BufferUse::Texels | BufferUse::Address | BufferUse::Structure => {
-                context.limits().buffer_bytes
-            }
-            BufferUse::Storage | BufferUse::Uniform | BufferUse::Indirect => context.limits().storage_range,
-        };
+        let is_bound = matches!(usage, BufferUse::Storage | BufferUse::Uniform | BufferUse::Indirect);
+        let limit = if is_bound { context.limits().storage_range } else { context.limits().buffer_bytes };
         if bytes > limit {
             return Err(GpuError::TooLarge { object: name.to_owned(), bytes, limit });
         }
@@ -95,7 +93,7 @@ impl<T: Pod> Buffer<T> {
         if has_texels {
             any.add_texels(texel_bytes::<T>())?;
         }
-        Ok(Self { any, len, element: PhantomData })
+        Ok(Self { any: Arc::new(any), len, element: PhantomData })
     }
 
     /// A buffer that holds `data`.
@@ -204,6 +202,7 @@ impl AnyBuffer {
         usage: vk::BufferUsageFlags,
         location: MemoryLocation,
     ) -> Result<Self, GpuError> {
+        context.count_creation("vkCreateBuffer", name)?;
         let device = &context.device;
         let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
         // SAFETY: the raw buffer is destroyed on each way out that does not hand it to an owner.
@@ -237,6 +236,7 @@ impl AnyBuffer {
 
     /// As many of its texels as the device has in one buffer.
     fn add_texels(&mut self, texel_bytes: u64) -> Result<(), GpuError> {
+        self.context.count_creation("vkCreateBufferView", &self.name)?;
         let format = match texel_bytes {
             16 => vk::Format::R32G32B32A32_UINT,
             8 => vk::Format::R32G32_UINT,

@@ -65,6 +65,7 @@ impl CommandBuffer {
         timer: Option<&Timer>,
         body: impl FnOnce(&Commands),
     ) -> Result<Self, GpuError> {
+        context.count_creation("vkAllocateCommandBuffers", name)?;
         let device = &context.device;
         let info = vk::CommandBufferAllocateInfo::default().command_pool(context.command_pool).command_buffer_count(1);
         // SAFETY: the pool is used by one thread at a time.
@@ -276,6 +277,15 @@ impl Commands<'_> {
                 vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
                 vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
             ),
+            (vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::SHADER_STORAGE_READ, vk::ImageLayout::GENERAL),
+        );
+    }
+
+    /// Makes an ID target ready for kernels; its content is dropped.
+    pub fn discard_for_compute(&self, ids: &Target) {
+        self.transition(
+            ids,
+            (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED),
             (vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::SHADER_STORAGE_READ, vk::ImageLayout::GENERAL),
         );
     }

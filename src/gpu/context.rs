@@ -10,7 +10,7 @@ use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::Allocator;
 
 use super::{
-    Commands, DeviceInfo, DeviceSelector, GpuError, Limits, Screen, Surface,
+    Commands, DeviceInfo, DeviceOverrides, DeviceSelector, GpuError, Limits, Screen, Surface,
     commands::CommandBuffer,
     device::{DeviceExtras, Purpose},
     devices::{queue_family, select},
@@ -18,6 +18,7 @@ use super::{
     memory::create_allocator,
     probe,
     ray_tracing::RayTracingCalls,
+    refusal::Refusal,
     statistics::StatisticsCalls,
 };
 
@@ -28,6 +29,16 @@ pub struct ContextOptions {
     pub device: Option<DeviceSelector>,
     /// Run under the Khronos validation layer with synchronization validation.
     pub validate: bool,
+    /// What the device is taken for in tests.
+    #[doc(hidden)]
+    pub pretend: DeviceOverrides,
+}
+
+impl ContextOptions {
+    /// The best device, or the selected one, under the validation layer if `validate` says so.
+    pub fn new(device: Option<DeviceSelector>, validate: bool) -> Self {
+        Self { device, validate, pretend: DeviceOverrides::default() }
+    }
 }
 
 /// [`DeviceInfo::kind`] of a driver that computes on the CPU.
@@ -57,6 +68,9 @@ pub struct Context {
     limits: Limits,
     fuses_fma: OnceLock<bool>,
     n_lanes: OnceLock<u32>,
+    loop_limit: OnceLock<Option<u32>>,
+    pretend: DeviceOverrides,
+    pub(super) refusal: Refusal,
     #[cfg(feature = "hot-reload")]
     pub(super) replacements: Mutex<super::Replacements>,
     instance: Arc<Instance>,
@@ -70,7 +84,7 @@ impl Context {
     pub fn new(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::new(options.validate)?;
         let (physical, info) = select(&instance, options.device.as_ref(), None)?;
-        Self::open(instance, physical, info, Purpose::Compute)
+        Self::open(instance, physical, info, Purpose::Compute, &options.pretend)
     }
 
     /// As [`Context::new`], with the surface of a window that it can show pictures in.
@@ -81,7 +95,7 @@ impl Context {
         let instance = Instance::with_extensions(options.validate, &Surface::extensions(&*window)?)?;
         let surface = Surface::new(&instance, window)?;
         let (physical, info) = select(&instance, options.device.as_ref(), Some(&surface))?;
-        Ok((Self::open(instance, physical, info, Purpose::Window)?, surface))
+        Ok((Self::open(instance, physical, info, Purpose::Window, &options.pretend)?, surface))
     }
 
     /// As [`Context::new`], with the driver's own ray tracing, to compare with.
@@ -94,42 +108,7 @@ impl Context {
         if let Some(missing) = RayTracingCalls::missing(&instance, physical) {
             return Err(GpuError::Lacks { device: info.name, missing });
         }
-        Self::open(instance, physical, info, Purpose::RayTracing)
-    }
-
-    /// As [`Context::new`], as if no more than so many bytes of a storage buffer could be bound, and no more texels: small scenes
-    /// then meet what large ones meet elsewhere.
-    ///
-    /// # Errors
-    /// As [`Context::new`].
-    pub fn with_ranges(options: &ContextOptions, bytes: u64, n_texels: u32) -> Result<Arc<Self>, GpuError> {
-        let mut context = Self::new(options)?;
-        let limits = &mut Arc::get_mut(&mut context).expect("nothing has been made from it yet").limits;
-        limits.storage_range = limits.storage_range.min(bytes);
-        limits.n_texels = limits.n_texels.min(n_texels);
-        Ok(context)
-    }
-
-    /// As [`Context::new`], as if it had so many lanes that took branches of their own: a software device then runs what
-    /// GPUs run.
-    ///
-    /// # Errors
-    /// As [`Context::new`].
-    pub fn with_lanes(options: &ContextOptions, n_lanes: u32) -> Result<Arc<Self>, GpuError> {
-        let mut context = Self::new(options)?;
-        let own = Arc::get_mut(&mut context).expect("nothing has been made from it yet");
-        (own.runs_both_sides, own.n_lanes) = (false, OnceLock::from(n_lanes));
-        Ok(context)
-    }
-
-    /// As [`Context::new`], as if kernels had no atomics of 64 bits.
-    ///
-    /// # Errors
-    /// As [`Context::new`].
-    pub fn without_wide_atomics(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
-        let mut context = Self::new(options)?;
-        Arc::get_mut(&mut context).expect("nothing has been made from it yet").wide_atomics = false;
-        Ok(context)
+        Self::open(instance, physical, info, Purpose::RayTracing, &options.pretend)
     }
 
     fn open(
@@ -137,6 +116,7 @@ impl Context {
         physical: vk::PhysicalDevice,
         info: DeviceInfo,
         purpose: Purpose,
+        pretend: &DeviceOverrides,
     ) -> Result<Arc<Self>, GpuError> {
         let ray_tracing = purpose == Purpose::RayTracing;
         // SAFETY: the device belongs to the instance.
@@ -165,7 +145,7 @@ impl Context {
         Ok(Arc::new(Self {
             ray_tracing: ray_tracing.then(|| RayTracingCalls::new(&instance, physical, &device)),
             unchecked: extras.unchecked,
-            wide_atomics: extras.wide_atomics,
+            wide_atomics: extras.wide_atomics && !pretend.no_wide_atomics,
             statistics: extras.statistics.then(|| StatisticsCalls::new(&instance, &device)),
             debug_utils: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device)),
             presentation: (purpose == Purpose::Window).then(|| khr::swapchain::Device::new(&instance.raw, &device)),
@@ -176,13 +156,16 @@ impl Context {
             timestamp_valid_bits: families[family].timestamp_valid_bits,
             queue,
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
-            runs_both_sides: info.kind == SOFTWARE,
+            runs_both_sides: info.kind == SOFTWARE && pretend.n_lanes.is_none(),
             info,
             fuses_fma: OnceLock::new(),
-            n_lanes: OnceLock::new(),
+            n_lanes: pretend.n_lanes.map_or_else(OnceLock::new, OnceLock::from),
+            pretend: *pretend,
+            loop_limit: pretend.loop_limit.map_or_else(OnceLock::new, |limit| OnceLock::from(Some(limit))),
+            refusal: Refusal::never(),
             #[cfg(feature = "hot-reload")]
             replacements: Mutex::default(),
-            limits: Limits::of(&instance, physical),
+            limits: Limits::of(&instance, physical).reduced_to(pretend),
             instance,
         }))
     }
@@ -203,6 +186,11 @@ impl Context {
     /// Whether kernels run both sides of a branch for all lanes, where any lane takes it.
     pub fn runs_both_sides(&self) -> bool {
         self.runs_both_sides
+    }
+
+    /// Whether the device writes timestamps.
+    pub fn has_timestamps(&self) -> bool {
+        self.timestamp_valid_bits > 0
     }
 
     /// Whether kernels have atomics of 64 bits.
@@ -240,6 +228,25 @@ impl Context {
         }
         let n_lanes = if self.runs_both_sides { 0 } else { probe::n_lanes(self)? };
         Ok(*self.n_lanes.get_or_init(|| n_lanes))
+    }
+
+    /// How many turns the loops of a kernel may take together before the driver ends it without a word; none where they
+    /// may take any number. A kernel finds that out the first time. Only drivers that compute on the CPU are asked: a
+    /// GPU's loops are branches of its own code, which nothing counts.
+    ///
+    /// # Errors
+    /// The kernel does not run.
+    pub fn loop_limit(self: &Arc<Self>) -> Result<Option<u32>, GpuError> {
+        if let Some(&limit) = self.loop_limit.get() {
+            return Ok(limit);
+        }
+        let limit = if self.is_software() { probe::loop_limit(self)? } else { None };
+        Ok(*self.loop_limit.get_or_init(|| limit))
+    }
+
+    /// What tests make of the device.
+    pub(crate) fn pretend(&self) -> &DeviceOverrides {
+        &self.pretend
     }
 
     /// What the validation layer has said so far; empty without validation.

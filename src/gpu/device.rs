@@ -73,7 +73,9 @@ impl DeviceExtras {
             .dynamic_rendering(true)
             .synchronization2(true)
             .subgroup_size_control(true)
-            .compute_full_subgroups(true);
+            .compute_full_subgroups(true)
+            // Every Vulkan 1.3 device has it. Older GLSL compilers state workgroup sizes in a way that asks for it.
+            .maintenance4(true);
         let mut executables =
             vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
         let mut unchecked = vk::PhysicalDevicePipelineRobustnessFeaturesEXT::default().pipeline_robustness(true);

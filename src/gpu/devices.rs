@@ -5,7 +5,7 @@ use std::{ffi::CStr, fmt};
 use ash::{khr, vk};
 use serde::Serialize;
 
-use super::{GpuError, Surface, instance::Instance};
+use super::{DeviceOverrides, GpuError, Surface, instance::Instance};
 
 /// One Vulkan device.
 #[derive(Clone, Debug, Serialize)]
@@ -23,6 +23,13 @@ pub struct DeviceInfo {
     pub subgroup_size: u32,
     /// What kdray needs and the device has not; empty for a device that can be used.
     pub missing: Vec<String>,
+}
+
+impl DeviceInfo {
+    /// Whether the driver computes on the CPU.
+    pub fn is_software(&self) -> bool {
+        self.kind == "CPU"
+    }
 }
 
 /// How a user names a device.
@@ -77,6 +84,15 @@ impl Limits {
             n_groups: limits.max_compute_work_group_count[0],
         }
     }
+
+    /// The smaller ones of these limits and the overrides.
+    pub(super) fn reduced_to(self, overrides: &DeviceOverrides) -> Self {
+        Self {
+            storage_range: overrides.storage_range.map_or(self.storage_range, |bytes| bytes.min(self.storage_range)),
+            n_texels: overrides.n_texels.map_or(self.n_texels, |n| n.min(self.n_texels)),
+            ..self
+        }
+    }
 }
 
 /// All devices, usable or not.
@@ -86,6 +102,14 @@ impl Limits {
 pub fn devices() -> Result<Vec<DeviceInfo>, GpuError> {
     let instance = Instance::new(false)?;
     Ok(list(&instance)?.into_iter().map(|(_, info)| info).collect())
+}
+
+/// The device that [`Context::new`](super::Context::new) would open, without opening it.
+///
+/// # Errors
+/// No loader, driver or device of that name; a device that lacks a feature.
+pub fn chosen_device(selector: Option<&DeviceSelector>) -> Result<DeviceInfo, GpuError> {
+    Ok(select(&*Instance::new(false)?, selector, None)?.1)
 }
 
 pub(super) fn list(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, DeviceInfo)>, GpuError> {

@@ -23,8 +23,12 @@ pub enum GpuError {
     Call { call: &'static str, object: String, result: vk::Result },
     #[error("memory for `{object}` ({}): {source}", mebibytes(*bytes))]
     Memory { object: String, bytes: u64, source: gpu_allocator::AllocationError },
+    #[error("memory for the {object} ({}): the system has too little", mebibytes(*bytes))]
+    HostMemory { object: &'static str, bytes: u64 },
     #[error("`{object}` takes {}, more than this device's limit of {}", mebibytes(*bytes), mebibytes(*limit))]
     TooLarge { object: String, bytes: u64, limit: u64 },
+    #[error("{0}")]
+    Mismatch(String),
     #[error("{what}: {value} is beyond this device's limit of {limit}")]
     Limit { what: &'static str, value: u64, limit: u64 },
 }
@@ -37,6 +41,16 @@ impl GpuError {
             _ => return false,
         };
         matches!(result, vk::Result::ERROR_DEVICE_LOST | vk::Result::ERROR_SURFACE_LOST_KHR)
+    }
+
+    /// Whether the device or the system has too little memory.
+    pub fn is_out_of_memory(&self) -> bool {
+        let out_of_memory = [vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_OUT_OF_HOST_MEMORY];
+        match self {
+            Self::Memory { .. } | Self::HostMemory { .. } => true,
+            Self::Call { result, .. } => out_of_memory.contains(result),
+            _ => false,
+        }
     }
 
     /// Turns the result of `call` on `object` into an error.

@@ -62,6 +62,7 @@ impl Target {
             let value = u64::from(width.max(height));
             return Err(GpuError::Limit { what: "picture size in pixels", value, limit: u64::from(limit) });
         }
+        context.count_creation("vkCreateImage", name)?;
         let device = &context.device;
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
@@ -95,12 +96,24 @@ impl Target {
         }
     }
 
+    /// An ID target of one pixel, for sets in which kernels find an image that they never read. Its content is
+    /// undefined.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn unread(context: &Arc<Context>, name: &str) -> Result<Self, GpuError> {
+        let target = Self::new(context, name, TargetKind::Id, (1, 1))?;
+        context.run(name, |commands| commands.discard_for_compute(&target))?;
+        Ok(target)
+    }
+
     /// Width and height, pixels.
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)
     }
 
     fn create_view(&self, name: &str) -> Result<vk::ImageView, GpuError> {
+        self.context.count_creation("vkCreateImageView", name)?;
         let info = vk::ImageViewCreateInfo::default()
             .image(self.raw)
             .view_type(vk::ImageViewType::TYPE_2D)

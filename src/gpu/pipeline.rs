@@ -34,6 +34,7 @@ impl ComputePipeline {
     /// # Errors
     /// The driver refuses the module or is out of memory.
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &ComputeDesc) -> Result<Self, GpuError> {
+        context.count_creation("vkCreateComputePipelines", desc.name)?;
         let module = ShaderModule::new(context, desc.shader)?;
         let constants = Specialization::new(desc.constants, bindings);
         let constants = constants.info();
@@ -117,6 +118,7 @@ impl RasterPipeline {
     /// # Errors
     /// The driver refuses a module or is out of memory.
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &RasterDesc) -> Result<Self, GpuError> {
+        context.count_creation("vkCreateGraphicsPipelines", desc.name)?;
         let vertex = ShaderModule::new(context, desc.vertex)?;
         let fragment = ShaderModule::new(context, desc.fragment)?;
         let constants = Specialization::new(&[], bindings);

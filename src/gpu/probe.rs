@@ -14,6 +14,28 @@ const LANES: Shader = Shader { file: "lanes.comp", spirv: include_bytes!(concat!
 /// Of the probe, and of ray kernels.
 const GROUP_SIZE: u32 = 64;
 
+const LOOP_TURNS: Shader =
+    Shader { file: "loop_turns.comp", spirv: include_bytes!(concat!(env!("OUT_DIR"), "/loop_turns.comp.spv")) };
+
+/// How many turns of its loops a kernel may take before the driver ends it; none where it takes all that it wants to.
+/// The lavapipe of Mesa 22.3 ends every shader after 65,535 turns, that of Mesa 25.0 does not.
+pub(super) fn loop_limit(context: &Arc<Context>) -> Result<Option<u32>, GpuError> {
+    // Twice the limit that is known.
+    const N_TURNS: u32 = 1 << 17;
+    let counts = Buffer::with(context, "counts", &[0u32], BufferUse::Storage)?;
+    let bindings = Bindings::new(context, &[(0, BindingKind::Storage)], 4)?;
+    let set = BindingSet::new(&bindings, "loop_turns", &[(0, Binding::Buffer(counts.any()))])?;
+    let desc = ComputeDesc { name: "loop_turns", shader: LOOP_TURNS, constants: &[], full_subgroups: false };
+    let kernel = ComputePipeline::new(context, &bindings, &desc)?;
+    context.run("loop_turns", |commands| {
+        commands.bind(&set);
+        commands.dispatch(&kernel, None, &N_TURNS, Dispatch::Threads([1; 3], [1; 3]));
+        commands.barrier(Access::ComputeWrite, Access::TransferRead); // counts
+    })?;
+    let n_turns = counts.download()?[0];
+    Ok((n_turns < N_TURNS).then_some(n_turns))
+}
+
 /// Whether GLSL's `fma` rounds once on this device. Vulkan allows it to round twice, and software drivers do.
 pub(super) fn fuses_fma(context: &Arc<Context>) -> Result<bool, GpuError> {
     // Its square needs 25 bits.

@@ -1,5 +1,5 @@
-//! Kernels without bounds checks: their indices come from trees and queues of our own making, and a check of each load costs
-//! rays 3 to 4 % of their speed on an H200 (benches/EXPERIMENTS.md).
+//! Kernels without bounds checks: their indices come from queues of our own making and from trees and materials that are
+//! checked before they are uploaded (scene/mismatch.rs, kdtree/validate.rs). A check of each load costs rays 3 to 4 % of their speed on an H200 (benches/EXPERIMENTS.md).
 
 use std::ffi::CStr;
 

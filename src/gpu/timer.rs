@@ -43,6 +43,7 @@ impl Timer {
     /// # Errors
     /// Out of memory.
     pub fn new(context: &Arc<Context>, capacity: u32) -> Result<Self, GpuError> {
+        context.count_creation("vkCreateQueryPool", "timer")?;
         let info = vk::QueryPoolCreateInfo::default()
             .query_type(vk::QueryType::TIMESTAMP)
             .query_count(Self::n_queries(capacity));

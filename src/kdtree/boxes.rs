@@ -6,10 +6,10 @@ use crate::layout::KdBox;
 impl KdTree {
     /// One box a node; zeros for the unused node 1.
     pub fn boxes(&self) -> Vec<KdBox> {
-        let mut cells = vec![Bounds { min: [0.0; 3], max: [0.0; 3] }; self.nodes.len()];
-        cells[0] = Bounds { min: self.cell_min.to_array(), max: self.cell_max.to_array() };
+        let mut cells = vec![Bounds { min: [0.0; 3], max: [0.0; 3] }; self.nodes().len()];
+        cells[0] = Bounds { min: self.cell_min().to_array(), max: self.cell_max().to_array() };
         // Parents come before their children.
-        for node_ix in 0..self.nodes.len() {
+        for node_ix in 0..self.nodes().len() {
             if let Node::Split { axis, position, child } = self.node(node_ix as u32) {
                 let children = cells[node_ix].split(axis, position);
                 cells[child as usize..][..2].copy_from_slice(&children);
@@ -47,10 +47,10 @@ mod tests {
         for (node_ix, cell) in boxes.iter().enumerate().filter(|&(node_ix, _)| node_ix != 1) {
             let Node::Leaf { first, count } = tree.node(node_ix as u32) else { continue };
             filled += volume(cell);
-            for &triangle_ix in &tree.leaf_triangles[first as usize..][..count as usize] {
+            for &triangle_ix in &tree.leaf_triangles()[first as usize..][..count as usize] {
                 assert!(Bounds::of(&triangles[triangle_ix as usize]).touches(&Bounds::from(*cell)));
             }
         }
-        assert!(tree.nodes.len() > 40 && (filled / volume(&boxes[0]) - 1.0).abs() < 1e-6);
+        assert!(tree.nodes().len() > 40 && (filled / volume(&boxes[0]) - 1.0).abs() < 1e-6);
     }
 }

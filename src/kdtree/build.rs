@@ -47,8 +47,9 @@ impl KdTree {
         let n = references.len() as u64;
         let budget = (n * u64::from(options.max_references_per_triangle) + MIN_BUDGET).min(MAX_BUDGET.max(n));
         let cell = Cell { bounds, level: 0, budget };
-        let mut tree = flatten(grow(Input { triangles, options, margin }, references, cell), bounds);
-        tree.leaf_planes = planes_of(triangles, &tree.leaf_triangles);
+        let mut parts = flatten(grow(Input { triangles, options, margin }, references, cell), bounds);
+        parts.leaf_planes = planes_of(triangles, &parts.leaf_triangles);
+        let mut tree = KdTree { parts, n_triangles: triangles.len() };
         if options.slabs {
             tree.add_slabs(triangles);
         }

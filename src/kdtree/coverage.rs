@@ -58,7 +58,7 @@ impl Descent<'_> {
         }
         match self.tree.node(node) {
             Node::Leaf { first, count } => {
-                let entries = &self.tree.leaf_triangles[first as usize..][..count as usize];
+                let entries = &self.tree.leaf_triangles()[first as usize..][..count as usize];
                 entries.binary_search(&self.triangle_ix).is_err().then_some(Lack::Entry(node))
             }
             Node::Split { axis, position, child } => {

@@ -2,11 +2,11 @@
 
 use glam::Vec3;
 
-use super::{EMPTY_LEAF, KdTree, Node, bounds::Bounds, build::Top, subtree::Subtree};
+use super::{EMPTY_LEAF, Node, Parts, bounds::Bounds, build::Top, subtree::Subtree};
 
-/// The tree as the kernels read it.
-pub fn flatten(top: Top, cell: Bounds) -> KdTree {
-    let mut tree = KdTree {
+/// The tree as the kernels read it, without planes and slabs.
+pub fn flatten(top: Top, cell: Bounds) -> Parts {
+    let mut tree = Parts {
         nodes: vec![EMPTY_LEAF; 2],
         parents: vec![0],
         leaf_triangles: Vec::new(),
@@ -21,7 +21,7 @@ pub fn flatten(top: Top, cell: Bounds) -> KdTree {
 }
 
 /// Fills a slot, and appends all below it.
-fn append(tree: &mut KdTree, slot: usize, top: Top) {
+fn append(tree: &mut Parts, slot: usize, top: Top) {
     match top {
         Top::Subtree(subtree) => append_subtree(tree, slot, &subtree),
         Top::Split { axis, position, children } => {
@@ -37,7 +37,7 @@ fn append(tree: &mut KdTree, slot: usize, top: Top) {
 }
 
 /// The subtree's root goes to the slot, its other nodes behind all others.
-fn append_subtree(tree: &mut KdTree, slot: usize, subtree: &Subtree) {
+fn append_subtree(tree: &mut Parts, slot: usize, subtree: &Subtree) {
     let (first_node, first_triangle) = (tree.nodes.len() as u32, tree.leaf_triangles.len() as u32);
     let relocated = |node| match Node::from(node) {
         Node::Leaf { first, count } => Node::Leaf { first: first + first_triangle, count },

@@ -20,6 +20,7 @@ mod counted;
 mod coverage;
 mod extras;
 mod flatten;
+mod parts;
 mod planes;
 mod ropes;
 mod sah;
@@ -29,39 +30,28 @@ mod statistics;
 mod subtree;
 mod validate;
 
-use glam::Vec3;
-
-use crate::layout::{Frame, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_REACH, KdNode, Plane, Slab};
+use crate::layout::{Frame, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_REACH, KdNode};
 
 pub use extras::Extras;
+pub use parts::Parts;
 pub use statistics::Statistics;
 pub use validate::Invalid;
 
 /// A kd-tree over triangles, as the kernels read it.
+///
+/// Kernels read it without bounds checks. So a tree comes from [`KdTree::build`], which makes only valid ones, or from
+/// [`KdTree::from_parts`], which validates; and nothing can change it afterwards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KdTree {
-    /// Root 0; node 1 is unused (an empty leaf); the children of a split are neighbours at an even index. Depth-first:
-    /// a pair of children, then all below the first, then all below the second.
-    pub nodes: Vec<KdNode>,
-    /// `nodes.len() / 2` entries: `parents[n >> 1]` is the split whose children are `n & !1` and `n | 1`; entry 0 is 0.
-    pub parents: Vec<u32>,
-    /// Triangle indices, leaf after leaf in depth-first order, ascending in each leaf.
-    pub leaf_triangles: Vec<u32>,
-    /// The plane of each of `leaf_triangles`; without any, every triangle of a leaf is tested.
-    pub leaf_planes: Vec<Plane>,
-    /// One a node, zeros where that is not marked as having one; or none, if no node is.
-    pub slabs: Vec<Slab>,
-    /// The root's cell is the exact bounds of all triangles (a box of zeros for none).
-    pub cell_min: Vec3,
-    pub cell_max: Vec3,
-    /// Levels below the root, at most `KD_MAX_DEPTH - 2`.
-    pub depth: u32,
+    parts: Parts,
+    /// The number of triangles that the tree was built from: every index in its leaves is below it.
+    n_triangles: usize,
 }
 
 impl KdTree {
     /// What kernels have to know of the tree beside its arrays; the rest is zero.
     pub fn constants(&self) -> Frame {
-        let Self { cell_min, cell_max, .. } = *self;
+        let Parts { cell_min, cell_max, .. } = self.parts;
         let largest_coordinate = cell_min.abs().max(cell_max.abs()).max_element();
         Frame { cell_min, cell_max, plane_reach: KD_PLANE_REACH * largest_coordinate, ..Frame::default() }
     }
@@ -150,13 +140,6 @@ impl From<Node> for KdNode {
                 Self { split_or_first: position.to_bits(), axis_and_child: (child / 2) << KD_PAIR_SHIFT | axis as u32 }
             }
         }
-    }
-}
-
-impl KdTree {
-    /// The node at an index.
-    pub fn node(&self, node_ix: u32) -> Node {
-        self.nodes[node_ix as usize].into()
     }
 }
 

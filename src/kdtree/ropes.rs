@@ -10,9 +10,9 @@ const N_FACES: usize = 6;
 impl KdTree {
     /// Six ropes a node, below and above on x, y, z. `boxes` are the nodes' cells.
     pub fn ropes(&self, boxes: &[KdBox]) -> Vec<KdRope> {
-        let mut ropes = vec![[KdRope::default(); N_FACES]; self.nodes.len()];
+        let mut ropes = vec![[KdRope::default(); N_FACES]; self.nodes().len()];
         // Parents come before their children.
-        for node_ix in 0..self.nodes.len() {
+        for node_ix in 0..self.nodes().len() {
             let cell: Bounds = boxes[node_ix].into();
             for (face, rope) in ropes[node_ix].iter_mut().enumerate() {
                 let position = if face % 2 == 1 { cell.max[face / 2] } else { cell.min[face / 2] };
@@ -55,7 +55,7 @@ mod tests {
 
     /// A node and all above it, the root last.
     fn path(tree: &KdTree, node: u32) -> Vec<u32> {
-        let above = |&node: &u32| (node != 0).then(|| tree.parents[node as usize / 2]);
+        let above = |&node: &u32| (node != 0).then(|| tree.parents()[node as usize / 2]);
         std::iter::successors(Some(node), above).collect()
     }
 

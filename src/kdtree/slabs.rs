@@ -29,34 +29,35 @@ impl KdTree {
     /// Looks for flat pieces of the surface, and gives their nodes slabs.
     ///
     /// The same triangles and tree give the same slabs on any number of threads. Some 200 ns an entry of the leaves.
-    pub fn add_slabs(&mut self, triangles: &[Triangle]) {
-        let bounds = Bounds { min: self.cell_min.to_array(), max: self.cell_max.to_array() };
+    pub(super) fn add_slabs(&mut self, triangles: &[Triangle]) {
+        let bounds = Bounds { min: self.cell_min().to_array(), max: self.cell_max().to_array() };
         // The root's cell has the margin around it already: this one is larger by 2^-17 of itself.
         let margin = bounds.margin();
         let reach = f64::from(self.constants().plane_reach);
         let fitting = Fitting { tree: self, triangles, n_entries: self.entries_below(), margin, reach };
         let slabs: Vec<Slabs> = fitting.patches(bounds).par_iter().map(|patch| fitting.slabs_of(patch)).collect();
-        self.slabs = vec![Slab::default(); self.nodes.len()];
+        let parts = &mut self.parts;
+        parts.slabs = vec![Slab::default(); parts.nodes.len()];
         for (node, slab) in slabs.into_iter().flatten() {
-            self.slabs[node as usize] = slab;
-            self.nodes[node as usize].axis_and_child |= KD_IN_SLAB;
+            parts.slabs[node as usize] = slab;
+            parts.nodes[node as usize].axis_and_child |= KD_IN_SLAB;
         }
     }
 
     /// The node's, if it has one.
     pub fn slab_of(&self, node_ix: u32) -> Option<&Slab> {
-        self.is_in_slab(node_ix).then(|| &self.slabs[node_ix as usize])
+        self.is_in_slab(node_ix).then(|| &self.slabs()[node_ix as usize])
     }
 
     pub(super) fn is_in_slab(&self, node_ix: u32) -> bool {
-        self.nodes[node_ix as usize].axis_and_child & KD_IN_SLAB != 0
+        self.nodes()[node_ix as usize].axis_and_child & KD_IN_SLAB != 0
     }
 
     /// Of each node: entries of all leaves below.
     fn entries_below(&self) -> Vec<u32> {
-        let mut n_entries = vec![0; self.nodes.len()];
+        let mut n_entries = vec![0; self.nodes().len()];
         // Children come after their parents.
-        for node in (0..self.nodes.len()).rev() {
+        for node in (0..self.nodes().len()).rev() {
             n_entries[node] = match self.node(node as u32) {
                 Node::Leaf { count, .. } => count,
                 Node::Split { child, .. } => n_entries[child as usize] + n_entries[child as usize + 1],
@@ -119,7 +120,7 @@ impl Fitting<'_> {
         let (n_entries, first_corner) = (self.n_entries[patch.node as usize], surface.corners.len());
         let (area, thickest) = match self.tree.node(patch.node) {
             Node::Leaf { first, count } => {
-                let entries = &self.tree.leaf_triangles[first as usize..][..count as usize];
+                let entries = &self.tree.leaf_triangles()[first as usize..][..count as usize];
                 let area = entries.iter().fold(DVec3::ZERO, |area, &ix| {
                     let polygon = Polygon::near(&self.triangles[ix as usize], &patch.cell, self.margin);
                     towards(area, surface.add(&polygon))

@@ -31,17 +31,17 @@ impl KdTree {
     /// The tree in numbers. `options` are those it was built with (only their costs are read).
     pub fn statistics(&self, n_triangles: usize, options: &BuildOptions) -> Statistics {
         let mut statistics = Statistics {
-            depth: self.depth,
-            n_references: self.leaf_triangles.len() as u64,
-            references_per_triangle: self.leaf_triangles.len() as f64 / n_triangles.max(1) as f64,
-            bytes: (size_of_val(&*self.nodes)
-                + size_of_val(&*self.parents)
-                + size_of_val(&*self.leaf_triangles)
-                + size_of_val(&*self.leaf_planes)
-                + size_of_val(&*self.slabs)) as u64,
+            depth: self.depth(),
+            n_references: self.leaf_triangles().len() as u64,
+            references_per_triangle: self.leaf_triangles().len() as f64 / n_triangles.max(1) as f64,
+            bytes: (size_of_val(self.nodes())
+                + size_of_val(self.parents())
+                + size_of_val(self.leaf_triangles())
+                + size_of_val(self.leaf_planes())
+                + size_of_val(self.slabs())) as u64,
             ..Default::default()
         };
-        let root = (self.cell_min.as_dvec3().to_array(), self.cell_max.as_dvec3().to_array());
+        let root = (self.cell_min().as_dvec3().to_array(), self.cell_max().as_dvec3().to_array());
         let root_area = half_area(&root.0, &root.1);
         let mut stack = vec![(0, root)];
         while let Some((node_ix, (min, max))) = stack.pop() {

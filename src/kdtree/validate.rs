@@ -11,6 +11,8 @@ use crate::layout::{KD_MAX_DEPTH, Triangle};
 /// The first invariant found broken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Invalid {
+    #[error("the tree was built from {built_of} triangles, not from {given}")]
+    Triangles { built_of: usize, given: usize },
     #[error("{nodes} nodes, {parents} parents: nodes come in pairs, with a parent each")]
     Length { nodes: usize, parents: usize },
     #[error("the root's cell is not the bounds of all triangles and their margin")]
@@ -55,22 +57,26 @@ impl KdTree {
     /// Each triangle is cut up along the planes it meets, down to the leaves: each leaf within the margin of a part must
     /// have the triangle. Some microseconds a triangle.
     pub fn validate(&self, triangles: &[Triangle]) -> Result<(), Invalid> {
-        let (nodes, parents) = (self.nodes.len(), self.parents.len());
+        let (built_of, given) = (self.n_triangles, triangles.len());
+        if built_of != given {
+            return Err(Invalid::Triangles { built_of, given });
+        }
+        let (nodes, parents) = (self.nodes().len(), self.parents().len());
         if nodes < 2 || nodes != 2 * parents {
             return Err(Invalid::Length { nodes, parents });
         }
-        let root = Bounds { min: self.cell_min.to_array(), max: self.cell_max.to_array() };
+        let root = Bounds { min: self.cell_min().to_array(), max: self.cell_max().to_array() };
         let exact_bounds = Bounds::of_all(triangles);
         let margin = exact_bounds.margin();
         if root != exact_bounds.grown(margin) {
             return Err(Invalid::RootCell);
         }
-        if self.nodes[1] != EMPTY_LEAF || self.parents[0] != 0 {
+        if self.nodes()[1] != EMPTY_LEAF || self.parents()[0] != 0 {
             return Err(Invalid::Unused);
         }
         Walk::new(self, triangles, margin).run(root)?;
         coverage::check(self, triangles, margin)?;
-        let are_right = self.leaf_planes == planes_of(triangles, &self.leaf_triangles);
+        let are_right = self.leaf_planes() == planes_of(triangles, self.leaf_triangles());
         if are_right { Ok(()) } else { Err(Invalid::Planes) }
     }
 }
@@ -89,7 +95,7 @@ struct Walk<'a> {
 
 impl<'a> Walk<'a> {
     fn new(tree: &'a KdTree, triangles: &'a [Triangle], margin: f32) -> Self {
-        Self { tree, triangles, margin, seen: vec![false; tree.nodes.len()], n_entries: 0, depth: 0 }
+        Self { tree, triangles, margin, seen: vec![false; tree.nodes().len()], n_entries: 0, depth: 0 }
     }
 
     fn run(mut self, root: Bounds) -> Result<(), Invalid> {
@@ -97,7 +103,7 @@ impl<'a> Walk<'a> {
         let mut stack = vec![(0, 0, root)];
         self.seen[1] = true;
         while let Some((node, level, cell)) = stack.pop() {
-            let slabs = self.tree.slabs.len();
+            let slabs = self.tree.slabs().len();
             if self.tree.is_in_slab(node) && node as usize >= slabs {
                 return Err(Invalid::NoSlab { node, slabs });
             }
@@ -117,12 +123,12 @@ impl<'a> Walk<'a> {
         if let Some(node) = self.seen.iter().position(|seen| !seen) {
             return Err(Invalid::Orphan { node: node as u32 });
         }
-        let n_unused = self.tree.leaf_triangles.len() - self.n_entries;
+        let n_unused = self.tree.leaf_triangles().len() - self.n_entries;
         if n_unused > 0 {
             return Err(Invalid::UnusedEntries { n_unused });
         }
-        if self.depth != self.tree.depth || self.depth > KD_MAX_DEPTH - 2 {
-            return Err(Invalid::Depth { recorded: self.tree.depth, found: self.depth });
+        if self.depth != self.tree.depth() || self.depth > KD_MAX_DEPTH - 2 {
+            return Err(Invalid::Depth { recorded: self.tree.depth(), found: self.depth });
         }
         Ok(())
     }
@@ -131,10 +137,10 @@ impl<'a> Walk<'a> {
         if axis > 2 {
             return Err(Invalid::Axis { node });
         }
-        if child < 2 || child as usize + 1 >= self.tree.nodes.len() {
+        if child < 2 || child as usize + 1 >= self.tree.nodes().len() {
             return Err(Invalid::Child { node, child });
         }
-        let (pair, found) = (child / 2, self.tree.parents[child as usize / 2]);
+        let (pair, found) = (child / 2, self.tree.parents()[child as usize / 2]);
         if found != node {
             return Err(Invalid::Parent { pair, found, expected: node });
         }
@@ -144,12 +150,12 @@ impl<'a> Walk<'a> {
     }
 
     fn leaf(&mut self, node: u32, first: usize, count: usize, cell: &Bounds) -> Result<(), Invalid> {
-        if first != self.n_entries || count > self.tree.leaf_triangles.len() - first {
+        if first != self.n_entries || count > self.tree.leaf_triangles().len() - first {
             return Err(Invalid::LeafRange { node });
         }
         self.n_entries += count;
         let mut next = 0;
-        for &triangle in &self.tree.leaf_triangles[first..][..count] {
+        for &triangle in &self.tree.leaf_triangles()[first..][..count] {
             let Some(corners) = self.triangles.get(triangle as usize).filter(|_| triangle >= next) else {
                 return Err(Invalid::LeafOrder { node, triangle });
             };

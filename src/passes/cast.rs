@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Tree, binding, kernel, spirv, traversal_constants, tree};
+use super::{Round, Tree, binding, kernel, spirv, traversal_constants, tree};
 use crate::{
     bounce::lanes_log2,
     cast::Query,
@@ -75,11 +75,11 @@ impl Cast {
         self.kernel.statistics()
     }
 
-    /// Needs the first `n_rays` of cast_rays. Leaves as many cast_hits.
-    pub fn record(&self, commands: &Commands, resources: &CastResources, n_rays: u32) {
+    /// Needs the first `n_rays` of cast_rays. Leaves as many cast_hits, and marks where rays have stalled.
+    pub fn record(&self, commands: &Commands, resources: &CastResources, n_rays: u32, round: Round) {
         commands.bind(&resources.set);
         let lanes_log2 = lanes_log2(n_rays, self.n_lanes);
         let dispatch = Dispatch::Threads([n_rays << lanes_log2, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
-        commands.dispatch(&self.kernel, None, &CastBatch { n_rays, lanes_log2 }, dispatch);
+        commands.dispatch(&self.kernel, None, &CastBatch { n_rays, lanes_log2, round: round.constant() }, dispatch);
     }
 }

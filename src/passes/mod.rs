@@ -26,6 +26,7 @@ mod resolve;
 mod resources;
 mod shade;
 mod shadow;
+mod stalls;
 mod tonemap;
 mod trace;
 mod tree;
@@ -45,9 +46,10 @@ pub use self::{
     raster::Raster,
     rasterize::Rasterize,
     resolve::Resolve,
-    resources::Resources,
+    resources::{Needs, Resources},
     shade::Shade,
     shadow::Shadow,
+    stalls::{Round, Stalls},
     tonemap::Tonemap,
     trace::Trace,
     tree::{Reading, Tree},
@@ -62,22 +64,24 @@ macro_rules! spirv {
 }
 pub(crate) use spirv;
 
-/// All passes, ready to record.
+/// All passes, ready to record. A clone shares its pipelines with the original.
+#[derive(Clone)]
 pub struct Passes {
-    pub visibility: Visibility,
+    /// None unless the graphics pipeline finds the primary hits.
+    pub visibility: Option<Arc<Visibility>>,
     /// None where kernels do not rasterize.
-    pub rasterize: Option<Rasterize>,
-    pub primary_hit: PrimaryHit,
-    pub trace: Trace,
-    pub features: Features,
-    pub shadow: Shadow,
-    pub shade: Shade,
-    pub compact: Compact,
-    pub resolve: Resolve,
-    pub accumulate: Accumulate,
-    pub denoise: Denoise,
-    pub tonemap: Tonemap,
-    pub false_color: FalseColor,
+    pub rasterize: Option<Arc<Rasterize>>,
+    pub primary_hit: Arc<PrimaryHit>,
+    pub trace: Arc<Trace>,
+    pub features: Arc<Features>,
+    pub shadow: Arc<Shadow>,
+    pub shade: Arc<Shade>,
+    pub compact: Arc<Compact>,
+    pub resolve: Arc<Resolve>,
+    pub accumulate: Arc<Accumulate>,
+    pub denoise: Arc<Denoise>,
+    pub tonemap: Arc<Tonemap>,
+    pub false_color: Arc<FalseColor>,
 }
 
 impl Passes {
@@ -85,61 +89,71 @@ impl Passes {
     /// The driver refuses a shader.
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, options: &RenderOptions) -> Result<Self, GpuError> {
         Ok(Self {
-            visibility: Visibility::new(context, bindings)?,
+            visibility: Self::visibility(context, bindings, options)?,
             rasterize: Self::rasterize(context, bindings, options)?,
-            primary_hit: PrimaryHit::new(context, bindings, options)?,
-            trace: Trace::new(context, bindings, options)?,
-            features: Features::new(context, bindings)?,
-            shadow: Shadow::new(context, bindings, options)?,
-            shade: Shade::new(context, bindings, options)?,
-            compact: Compact::new(context, bindings)?,
-            resolve: Resolve::new(context, bindings)?,
-            accumulate: Accumulate::new(context, bindings)?,
-            denoise: Denoise::new(context, bindings)?,
-            false_color: FalseColor::new(context, bindings)?,
-            tonemap: Tonemap::new(context, bindings, options.tonemap)?,
+            primary_hit: PrimaryHit::new(context, bindings, options)?.into(),
+            trace: Trace::new(context, bindings, options)?.into(),
+            features: Features::new(context, bindings)?.into(),
+            shadow: Shadow::new(context, bindings, options)?.into(),
+            shade: Shade::new(context, bindings, options)?.into(),
+            compact: Compact::new(context, bindings)?.into(),
+            resolve: Resolve::new(context, bindings)?.into(),
+            accumulate: Accumulate::new(context, bindings)?.into(),
+            denoise: Denoise::new(context, bindings)?.into(),
+            false_color: FalseColor::new(context, bindings)?.into(),
+            tonemap: Tonemap::new(context, bindings, options.tonemap)?.into(),
         })
+    }
+
+    fn visibility(
+        context: &Arc<Context>,
+        bindings: &Arc<Bindings>,
+        options: &RenderOptions,
+    ) -> Result<Option<Arc<Visibility>>, GpuError> {
+        pixels::draws(options).then(|| Visibility::new(context, bindings).map(Arc::new)).transpose()
     }
 
     fn rasterize(
         context: &Arc<Context>,
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
-    ) -> Result<Option<Rasterize>, GpuError> {
-        (options.primary == Primary::Compute).then(|| Rasterize::new(context, bindings)).transpose()
+    ) -> Result<Option<Arc<Rasterize>>, GpuError> {
+        (options.primary == Primary::Compute).then(|| Rasterize::new(context, bindings).map(Arc::new)).transpose()
     }
 
-    /// Makes the kernels anew in which the options differ.
+    /// Makes the passes for other options. They share with these all pipelines in which the options do not differ.
     ///
     /// # Errors
-    /// The driver refuses a shader; then all are as before.
-    pub fn set_options(
-        &mut self,
+    /// The driver refuses a shader.
+    pub fn with_options(
+        &self,
         context: &Arc<Context>,
         bindings: &Arc<Bindings>,
         from: &RenderOptions,
         to: &RenderOptions,
-    ) -> Result<(), GpuError> {
+    ) -> Result<Self, GpuError> {
+        let mut next = self.clone();
         let counts = |options: &RenderOptions| (options.profile, options.features);
         if (from.traversal, counts(from)) != (to.traversal, counts(to)) {
-            self.shadow = Shadow::new(context, bindings, to)?;
+            next.shadow = Shadow::new(context, bindings, to)?.into();
         }
         if (from.traversal, from.primary, counts(from)) != (to.traversal, to.primary, counts(to)) {
-            self.trace = Trace::new(context, bindings, to)?;
+            next.trace = Trace::new(context, bindings, to)?.into();
         }
         if from.profile != to.profile {
-            self.shade = Shade::new(context, bindings, to)?;
+            next.shade = Shade::new(context, bindings, to)?.into();
         }
         if from.tonemap != to.tonemap {
-            self.tonemap = Tonemap::new(context, bindings, to.tonemap)?;
+            next.tonemap = Tonemap::new(context, bindings, to.tonemap)?.into();
         }
         if from.primary != to.primary {
-            self.rasterize = Self::rasterize(context, bindings, to)?;
+            next.visibility = Self::visibility(context, bindings, to)?;
+            next.rasterize = Self::rasterize(context, bindings, to)?;
         }
         if (from.primary, counts(from)) != (to.primary, counts(to)) {
-            self.primary_hit = PrimaryHit::new(context, bindings, to)?;
+            next.primary_hit = PrimaryHit::new(context, bindings, to)?.into();
         }
-        Ok(())
+        Ok(next)
     }
 }
 

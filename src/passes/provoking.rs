@@ -14,7 +14,7 @@ const MAX_INDEX: usize = (1 << 24) - 1;
 /// itself, and the order goes round as the corners do. None for so many triangles that devices need not draw them by
 /// indices.
 pub fn vertex_indices(triangles: &[Triangle]) -> Vec<u32> {
-    if 3 * triangles.len() > MAX_INDEX {
+    if !has_indices(triangles.len()) {
         return Vec::new();
     }
     let (points, n_points) = points_of(triangles);
@@ -39,6 +39,11 @@ pub fn vertex_indices(triangles: &[Triangle]) -> Vec<u32> {
         [vertex(triangle_ix, first), at(first + 1), at(first + 2)]
     };
     (0..).zip(points.iter().zip(&first_corners)).flat_map(indices_of).collect()
+}
+
+/// Whether devices have to draw so many triangles by indices.
+pub fn has_indices(n_triangles: usize) -> bool {
+    3 * n_triangles <= MAX_INDEX
 }
 
 fn vertex(triangle_ix: u32, corner: usize) -> u32 {

@@ -7,7 +7,9 @@ use crate::{
     layout::{Hit, Ray, SCAN_GROUP_SIZE},
 };
 
-/// Room for `queue_capacity` rays, those of all bounces of a batch, and what belongs to each.
+/// Room for `queue_capacity` rays, those of all bounces of a batch, and what belongs to each. A clone is a second
+/// handle to the same buffers.
+#[derive(Clone)]
 pub struct Queue {
     /// Bounce after bounce; `queue_capacity`, like what follows but for the last two. The camera's, which come first, are never
     /// stored: kernels make them anew from their places (glsl/shared/rays.glsl).

@@ -9,6 +9,8 @@ use crate::{
 };
 
 /// Triangles with large bounding rectangles, and their blocks. Without room where the options do not ask for these kernels.
+/// A clone is a second handle to the same buffers.
+#[derive(Clone)]
 pub struct Raster {
     /// One.
     pub groups: Buffer<RasterGroups>,

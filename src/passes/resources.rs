@@ -2,9 +2,14 @@
 
 use std::{mem::offset_of, sync::Arc};
 
-use super::{Pixels, Queue, Raster, Tree, binding, pixels::n_pixels, provoking::vertex_indices, tree};
+use super::{
+    Pixels, Queue, Raster, Tree, binding,
+    pixels::{draws, n_pixels},
+    provoking::{has_indices, vertex_indices},
+    tree,
+};
 use crate::{
-    frame::{RenderOptions, Traversal},
+    frame::RenderOptions,
     gpu::{Access, Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
     kdtree::KdTree,
     layout::{self, Batch, Bounce, COUNTER_PLACES, COUNTER_STRIDE, Counters, Frame, Light, Material},
@@ -21,10 +26,14 @@ const PUSH_BYTES: u32 = {
 const COUNTERS_A_ROW: usize = (COUNTER_PLACES * COUNTER_STRIDE) as usize;
 
 /// What the kernels read and write. A name is the same here, in the kernels, as debug label and as allocation.
+///
+/// A clone is a second handle to the same buffers. A change makes a successor, which shares with its predecessor all
+/// that it does not replace; whoever keeps the predecessor can go on with it if the change fails.
+#[derive(Clone)]
 pub struct Resources {
     pub tree: Tree,
-    /// Three a triangle, or none.
-    pub vertex_indices: Buffer<u32>,
+    /// Three a triangle, or empty where draws do without indices. None where the options draw no triangles.
+    pub vertex_indices: Option<Buffer<u32>>,
     pub materials: Buffer<Material>,
     /// `n_lights`.
     pub lights: Buffer<Light>,
@@ -36,43 +45,48 @@ pub struct Resources {
     counters: Buffer<Counters>,
     pub bindings: Arc<Bindings>,
     /// None while all else is made.
-    set: Option<BindingSet>,
+    set: Option<Arc<BindingSet>>,
     constants: Frame,
 }
 
+/// What a frame needs room for.
+pub struct Needs<'a> {
+    /// `queue_capacity` is the number of rays in the queue.
+    pub constants: &'a Frame,
+    pub options: &'a RenderOptions,
+    /// Rows of `bounces`: one a batch and bounce.
+    pub n_bounces: usize,
+}
+
 impl Resources {
-    /// Uploads the scene and makes room for `constants.queue_capacity` rays and `n_bounces` rows of `bounces`.
+    /// Uploads the scene with its tree, and makes room for what a frame needs.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
-    pub fn new(
-        context: &Arc<Context>,
-        scene: &Scene,
-        tree: &KdTree,
-        constants: &Frame,
-        options: &RenderOptions,
-        n_bounces: usize,
-    ) -> Result<Self, GpuError> {
+    /// Scene and tree do not fit together; too many triangles for brute force; beyond the device's limits, out of memory.
+    pub fn new(context: &Arc<Context>, scene: &Scene, tree: &KdTree, needs: &Needs) -> Result<Self, GpuError> {
+        scene.check(tree)?;
         let storage = BufferUse::Storage;
-        let mut tree = Tree::new(context, &scene.triangles, tree, constants)?;
-        tree.add_materials(context, &scene.triangle_materials)?;
+        let &Needs { constants, options, n_bounces } = needs;
+        let mut tree_buffers = Tree::new(context, &scene.triangles, tree, constants)?;
+        tree_buffers.add_materials(context, &scene.triangle_materials)?;
+        tree_buffers.add_extras(context, tree, options.traversal)?;
         let kinds: Vec<_> = (0..layout::N_BINDINGS).chain(tree::texel_bindings()).map(binding).collect();
-        let indices = vertex_indices(&scene.triangles);
+        let upload_indices = || new_vertex_indices(context, &vertex_indices(&scene.triangles));
         let mut resources = Self {
-            vertex_indices: Buffer::with(context, "vertex_indices", &indices, BufferUse::Index)?,
+            vertex_indices: draws(options).then(upload_indices).transpose()?,
             materials: Buffer::with(context, "materials", &scene.materials, storage)?,
             lights: Buffer::with(context, "lights", &scene.lights, storage)?,
             queue: Queue::new(context, constants.queue_capacity, constants.n_lights)?,
             pixels: Pixels::new(context, constants, options)?,
             raster: Raster::new(context, constants.n_triangles, options)?,
-            bounces: Buffer::new(context, "bounces", n_bounces, BufferUse::Indirect)?,
+            bounces: new_bounces(context, n_bounces)?,
             counters: new_counters(context, n_bounces)?,
-            bindings: Bindings::with_constants(context, &kinds, PUSH_BYTES, &tree.constants())?,
-            tree,
+            bindings: Bindings::with_constants(context, &kinds, PUSH_BYTES, &tree_buffers.constants())?,
+            tree: tree_buffers,
             set: None,
             constants: *constants,
         };
-        resources.set = Some(resources.make_set()?);
+        resources.set = Some(Arc::new(resources.make_set()?));
         Ok(resources)
     }
 
@@ -104,42 +118,62 @@ impl Resources {
         BindingSet::new(&self.bindings, "frame", &[&self.tree.objects(), &own[..]].concat())
     }
 
-    /// The kernels' constants from now on, with room for their picture, with or without features, and for `constants.queue_capacity` rays, or for as
-    /// many as there was room for. What they hold is undefined. Where there is no room, all is as before. True where the
-    /// buffers of pixels are the same, and hold what they held.
+    /// Makes the resources of another frame of the same scene. What they hold is undefined, but for the scene, and for
+    /// pixels whose buffers are large enough and therefore shared. `tree`: the scene's own, if the traversal is another
+    /// one.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
-    pub fn fit(
-        &mut self,
-        context: &Arc<Context>,
-        constants: &Frame,
-        options: &RenderOptions,
-    ) -> Result<bool, GpuError> {
-        let grows = self.queue.capacity() < constants.queue_capacity;
-        let queue = grows.then(|| Queue::new(context, constants.queue_capacity, constants.n_lights)).transpose()?;
-        let pixels =
-            (!self.pixels.fit(constants, options)).then(|| Pixels::new(context, constants, options)).transpose()?;
-        let n_triangles = constants.n_triangles;
-        let raster = (!self.raster.fits(n_triangles, options))
-            .then(|| Raster::new(context, n_triangles, options))
-            .transpose()?;
-        let keeps_pixels = pixels.is_none();
-        let has_room = queue.is_none() && keeps_pixels && raster.is_none();
-        if let Some(queue) = queue {
-            self.queue = queue;
-        }
-        if let Some(pixels) = pixels {
-            self.pixels = pixels;
-        }
-        if let Some(raster) = raster {
-            self.raster = raster;
-        }
-        self.constants = Frame { queue_capacity: self.queue.capacity(), ..*constants };
-        if !has_room {
-            self.set = Some(self.make_set()?);
-        }
-        Ok(keeps_pixels)
+    /// Too many triangles for brute force; beyond the device's limits, out of memory.
+    pub fn for_frame(&self, context: &Arc<Context>, tree: Option<&KdTree>, needs: &Needs) -> Result<Self, GpuError> {
+        let &Needs { constants, options, n_bounces } = needs;
+        self.changed(|next| {
+            if let Some(tree) = tree {
+                next.tree.add_extras(context, tree, options.traversal)?;
+            }
+            if draws(options) != next.vertex_indices.is_some() {
+                next.vertex_indices = draws(options).then(|| next.make_vertex_indices(context)).transpose()?;
+            }
+            if next.queue.capacity() < constants.queue_capacity {
+                next.queue = Queue::new(context, constants.queue_capacity, constants.n_lights)?;
+            }
+            if !next.pixels.fit(constants, options) {
+                next.pixels = Pixels::new(context, constants, options)?;
+            }
+            if !next.raster.fits(constants.n_triangles, options) {
+                next.raster = Raster::new(context, constants.n_triangles, options)?;
+            }
+            next.bounces = new_bounces(context, n_bounces)?;
+            next.counters = new_counters(context, n_bounces)?;
+            next.constants = Frame { queue_capacity: next.queue.capacity(), ..*constants };
+            Ok(())
+        })
+    }
+
+    /// Makes resources for another number of batches and bounces, whose contents are undefined.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn with_bounces(&self, context: &Arc<Context>, n_bounces: usize) -> Result<Self, GpuError> {
+        self.changed(|next| {
+            next.bounces = new_bounces(context, n_bounces)?;
+            next.counters = new_counters(context, n_bounces)?;
+            Ok(())
+        })
+    }
+
+    /// Makes a successor that `change` has changed, with a descriptor set over what it holds.
+    fn changed(&self, change: impl FnOnce(&mut Self) -> Result<(), GpuError>) -> Result<Self, GpuError> {
+        let mut next = self.clone();
+        change(&mut next)?;
+        next.set = Some(Arc::new(next.make_set()?));
+        Ok(next)
+    }
+
+    /// The indices of the triangles that are on the device, which are fetched if there are few enough to have indices.
+    fn make_vertex_indices(&self, context: &Arc<Context>) -> Result<Buffer<u32>, GpuError> {
+        let triangles = &self.tree.triangles;
+        let triangles = if has_indices(triangles.len()) { triangles.download()? } else { Vec::new() };
+        new_vertex_indices(context, &vertex_indices(&triangles))
     }
 
     /// Other constants for as many pixels and rays; the next frame brings them to the device.
@@ -147,45 +181,29 @@ impl Resources {
         self.constants = *constants;
     }
 
-    /// Uploads what the traversal reads beside the tree.
-    ///
-    /// # Errors
-    /// Too many triangles for brute force; beyond the device's limits, out of memory.
-    pub fn add_extras(&mut self, context: &Arc<Context>, tree: &KdTree, traversal: Traversal) -> Result<(), GpuError> {
-        self.tree.add_extras(context, tree, traversal)?;
-        self.set = Some(self.make_set()?);
-        Ok(())
-    }
-
-    /// Makes room for another number of batches and bounces; contents are undefined.
-    ///
-    /// # Errors
-    /// Out of memory.
-    pub fn resize_bounces(&mut self, context: &Arc<Context>, n_bounces: usize) -> Result<(), GpuError> {
-        self.bounces = Buffer::new(context, "bounces", n_bounces, BufferUse::Indirect)?;
-        self.counters = new_counters(context, n_bounces)?;
-        self.set = Some(self.make_set()?);
-        Ok(())
-    }
-
     /// Makes the first sample the sum of samples.
     ///
     /// # Errors
-    /// Out of memory, a failed copy.
+    /// Nothing has changed then. Out of memory, a failed copy.
     pub fn begin_sums(&mut self, context: &Arc<Context>) -> Result<(), GpuError> {
-        if self.pixels.pixel_accumulated.is_none() {
-            let n_pixels = self.pixels.pixel_radiance.len();
-            let sums = Buffer::new(context, "pixel_accumulated", n_pixels, BufferUse::Storage)?;
-            self.pixels.pixel_accumulated = Some(sums);
-            self.set = Some(self.make_set()?);
-        }
-        let (sample, sums) = (self.pixels.pixel_radiance.any(), self.pixels.accumulated().any());
+        let next = match self.pixels.pixel_accumulated {
+            Some(_) => self.clone(),
+            None => self.changed(|next| {
+                let n_pixels = next.pixels.pixel_radiance.len();
+                let sums = Buffer::new(context, "pixel_accumulated", n_pixels, BufferUse::Storage)?;
+                next.pixels.pixel_accumulated = Some(sums);
+                Ok(())
+            })?,
+        };
+        let (sample, sums) = (next.pixels.pixel_radiance.any(), next.pixels.accumulated().any());
         context.run("first sample", |commands| {
             commands.barrier(Access::ComputeWrite, Access::TransferRead); // pixel_radiance
             commands.barrier(Access::ComputeUpdate, Access::TransferWrite); // pixel_accumulated
             commands.copy_buffer(sample, sums, sample.bytes());
             commands.barrier(Access::TransferWrite, Access::AllReads); // pixel_accumulated
-        })
+        })?;
+        *self = next;
+        Ok(())
     }
 
     /// Sets all counters to 0.
@@ -260,6 +278,14 @@ impl Resources {
     pub(super) fn set(&self) -> &BindingSet {
         self.set.as_ref().expect("made with the resources")
     }
+}
+
+fn new_vertex_indices(context: &Arc<Context>, indices: &[u32]) -> Result<Buffer<u32>, GpuError> {
+    Buffer::with(context, "vertex_indices", indices, BufferUse::Index)
+}
+
+fn new_bounces(context: &Arc<Context>, n_bounces: usize) -> Result<Buffer<Bounce>, GpuError> {
+    Buffer::new(context, "bounces", n_bounces, BufferUse::Indirect)
 }
 
 fn new_counters(context: &Arc<Context>, n_bounces: usize) -> Result<Buffer<Counters>, GpuError> {

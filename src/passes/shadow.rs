@@ -25,7 +25,8 @@ impl Shadow {
         Ok(Self { kernel: kernel(context, bindings, "shadow", spirv!("shadow.comp"), &constants)? })
     }
 
-    /// Needs rays, hits of all the batch's bounces. Leaves light_visibility; updates pixel_features where the options ask for them.
+    /// Needs rays, hits of all the batch's bounces. Leaves light_visibility, and marks where segments have stalled; updates
+    /// pixel_features where the options ask for them. `batch.round` says which segments run.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, None, batch, resources.shadow_dispatch(batch));
     }

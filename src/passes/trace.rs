@@ -31,7 +31,8 @@ impl Trace {
         Ok(Self { kernel: from(false)?, from_camera })
     }
 
-    /// Needs rays, but for the camera's. Leaves hits; updates counters, and pixel_features where the options ask for them.
+    /// Needs rays, but for the camera's. Leaves hits, and marks where rays have stalled; updates counters, and
+    /// pixel_features where the options ask for them. `batch.round` says which rays run.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         let of_camera = self.from_camera.as_ref().filter(|_| batch.depth == 0);
         commands.dispatch(of_camera.unwrap_or(&self.kernel), Some(batch.depth), batch, resources.trace_dispatch(batch));

@@ -5,16 +5,19 @@ use std::sync::Arc;
 use bytemuck::Pod;
 use rayon::prelude::*;
 
+use super::Stalls;
 use crate::{
     frame::Traversal,
     gpu::{AnyBuffer, Binding, Buffer, BufferUse, Context, GpuError, texel_bytes},
     kdtree::{Extras, KdTree},
     layout::{
         Addresses, BIND_ADDRESSES, BIND_FRAME, BIND_KD_BOXES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_ROPES,
-        BIND_KD_SLABS, BIND_LEAF_PLANES, BIND_LEAF_TRIANGLES, BIND_TEXELS, BIND_TRIANGLE_MATERIALS, BIND_TRIANGLES,
-        BRUTE_MAX_TRIANGLES, CONSTANT_MASK_WORDS, CONSTANT_READING, Frame, KD_WORD_DEPTH, KdBox, KdNode, KdRope,
-        LeafTriangle, Plane, READING_ADDRESS, READING_BOUND, READING_TEXELS, Slab, Triangle,
+        BIND_KD_SLABS, BIND_LEAF_PLANES, BIND_LEAF_TRIANGLES, BIND_STALLS, BIND_TEXELS, BIND_TRIANGLE_MATERIALS,
+        BIND_TRIANGLES, BRUTE_MAX_TRIANGLES, CONSTANT_MASK_WORDS, CONSTANT_READING, CONSTANT_TURN_BUDGET, Frame,
+        KD_WORD_DEPTH, KdBox, KdNode, KdRope, LeafTriangle, Plane, READING_ADDRESS, READING_BOUND, READING_TEXELS,
+        Slab, Triangle,
     },
+    scene::Mismatch,
 };
 
 /// The numbers of what is read in one of three ways, in the order of [`Tree::arrays`].
@@ -32,7 +35,7 @@ const ARRAYS: [u32; 9] = [
 
 /// The bindings' numbers.
 pub(super) fn bindings() -> impl Iterator<Item = u32> {
-    [BIND_FRAME, BIND_ADDRESSES].into_iter().chain(ARRAYS).chain(texel_bindings())
+    [BIND_FRAME, BIND_ADDRESSES].into_iter().chain([BIND_STALLS]).chain(ARRAYS).chain(texel_bindings())
 }
 
 /// Those of texels.
@@ -71,7 +74,9 @@ impl Reading {
     }
 }
 
-/// Triangles, their kd-tree, and the constants that hold the root's cell.
+/// Triangles, their kd-tree, and the constants that hold the root's cell. A clone is a second handle to the same
+/// buffers.
+#[derive(Clone)]
 pub struct Tree {
     /// One.
     pub frame: Buffer<Frame>,
@@ -93,6 +98,8 @@ pub struct Tree {
     pub kd_boxes: Buffer<KdBox>,
     /// Six a node, after `add_extras`.
     pub kd_ropes: Buffer<KdRope>,
+    /// Rays that have stopped on their way through the tree.
+    pub stalls: Stalls,
     reading: Reading,
     /// Of the traversal's mask.
     mask_words: u32,
@@ -102,13 +109,14 @@ impl Tree {
     /// Uploads triangles, tree and constants.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
+    /// The tree is of another number of triangles; beyond the device's limits, out of memory.
     pub fn new(
         context: &Arc<Context>,
         triangles: &[Triangle],
         tree: &KdTree,
         constants: &Frame,
     ) -> Result<Self, GpuError> {
+        tree.check_triangles(triangles.len())?;
         let slabs = slabs_for(context, tree);
         let reading = Reading::of(context, &extents(triangles, tree, slabs));
         let usage = buffer_use(reading);
@@ -117,15 +125,16 @@ impl Tree {
             addresses: Buffer::new(context, "addresses", 1, BufferUse::Uniform)?,
             triangles: Buffer::with(context, "triangles", triangles, usage)?,
             triangle_materials: Buffer::new(context, "triangle_materials", 0, usage)?,
-            kd_nodes: Buffer::with(context, "kd_nodes", &tree.nodes, usage)?,
-            kd_parents: Buffer::with(context, "kd_parents", &tree.parents, usage)?,
+            kd_nodes: Buffer::with(context, "kd_nodes", tree.nodes(), usage)?,
+            kd_parents: Buffer::with(context, "kd_parents", tree.parents(), usage)?,
             leaf_triangles: leaf_triangles(context, triangles, tree, usage)?,
-            leaf_planes: Buffer::with(context, "leaf_planes", &tree.leaf_planes, usage)?,
+            leaf_planes: Buffer::with(context, "leaf_planes", tree.leaf_planes(), usage)?,
             kd_slabs: Buffer::with(context, "kd_slabs", slabs, usage)?,
             kd_boxes: Buffer::new(context, "kd_boxes", 0, usage)?,
             kd_ropes: Buffer::new(context, "kd_ropes", 0, usage)?,
+            stalls: Stalls::new(context)?,
             reading,
-            mask_words: if tree.depth <= KD_WORD_DEPTH { 1 } else { 2 },
+            mask_words: if tree.depth() <= KD_WORD_DEPTH { 1 } else { 2 },
         };
         made.addresses.upload(&[made.addresses()])?;
         Ok(made)
@@ -135,17 +144,24 @@ impl Tree {
     ///
     /// # Errors
     /// Beyond the device's limits, out of memory.
-    pub fn add_materials(&mut self, context: &Arc<Context>, triangle_materials: &[u32]) -> Result<(), GpuError> {
+    pub(super) fn add_materials(&mut self, context: &Arc<Context>, triangle_materials: &[u32]) -> Result<(), GpuError> {
         self.triangle_materials =
             Buffer::with(context, "triangle_materials", triangle_materials, buffer_use(self.reading))?;
         self.addresses.upload(&[self.addresses()])
     }
 
-    /// Uploads what the traversal reads beside the tree. Descriptor sets are to be made anew.
+    /// Uploads what the traversal reads beside the tree. Clones of this tree keep what they had. Descriptor sets are to
+    /// be made anew.
     ///
     /// # Errors
-    /// Too many triangles for brute force; beyond the device's limits, out of memory.
+    /// The tree is as before then. The given tree is another one than was uploaded; too many triangles for brute force;
+    /// beyond the device's limits, out of memory.
     pub fn add_extras(&mut self, context: &Arc<Context>, tree: &KdTree, traversal: Traversal) -> Result<(), GpuError> {
+        tree.check_triangles(self.triangles.len())?;
+        let (nodes, on_device) = (tree.nodes().len(), self.kd_nodes.len());
+        if nodes != on_device {
+            return Err(Mismatch::OtherTree { nodes, on_device }.into());
+        }
         let (value, limit) = (self.triangles.len() as u64, u64::from(BRUTE_MAX_TRIANGLES));
         if traversal == Traversal::Brute && value > limit {
             return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
@@ -155,7 +171,9 @@ impl Tree {
         let kd_boxes = Buffer::with(context, "kd_boxes", &extras.boxes, usage)?;
         let kd_ropes = Buffer::with(context, "kd_ropes", &extras.ropes, usage)?;
         let (boxes_at, ropes_at) = (self.address_of(&kd_boxes), self.address_of(&kd_ropes));
-        self.addresses.upload(&[Addresses { kd_boxes: boxes_at, kd_ropes: ropes_at, ..self.addresses() }])?;
+        let addresses = Addresses { kd_boxes: boxes_at, kd_ropes: ropes_at, ..self.addresses() };
+        // A buffer of its own, since clones of this tree still read the one before.
+        self.addresses = Buffer::with(context, "addresses", &[addresses], BufferUse::Uniform)?;
         (self.kd_boxes, self.kd_ropes) = (kd_boxes, kd_ropes);
         Ok(())
     }
@@ -166,8 +184,12 @@ impl Tree {
     }
 
     /// Specialization constants of all kernels that read it.
-    pub(super) fn constants(&self) -> [(u32, u32); 2] {
-        [(CONSTANT_READING, self.reading.constant()), (CONSTANT_MASK_WORDS, self.mask_words)]
+    pub(super) fn constants(&self) -> [(u32, u32); 3] {
+        [
+            (CONSTANT_READING, self.reading.constant()),
+            (CONSTANT_MASK_WORDS, self.mask_words),
+            (CONSTANT_TURN_BUDGET, self.stalls.turn_budget()),
+        ]
     }
 
     fn addresses(&self) -> Addresses {
@@ -211,7 +233,7 @@ impl Tree {
         let arrays = ARRAYS.into_iter().zip(self.arrays());
         let bound = arrays.clone().map(|(number, buffer)| (number, Binding::Buffer(buffer)));
         let texels = arrays.map(|(number, buffer)| (BIND_TEXELS + number, Binding::Texels(buffer)));
-        own.into_iter().chain(bound).chain(texels).collect()
+        own.into_iter().chain([self.stalls.object()]).chain(bound).chain(texels).collect()
     }
 }
 
@@ -226,7 +248,7 @@ fn leaf_triangles(
         let Triangle { v0, v1, v2, .. } = triangles[triangle_ix as usize];
         LeafTriangle { v0, triangle_ix, v1, v2, ..LeafTriangle::default() }
     };
-    let entries = &tree.leaf_triangles;
+    let entries = tree.leaf_triangles();
     Buffer::written_by(context, "leaf_triangles", entries.len(), usage, |first, part| {
         let numbers = &entries[first..][..part.len()];
         part.par_iter_mut().zip(numbers).for_each(|(entry, &triangle_ix)| *entry = entry_of(triangle_ix));
@@ -240,7 +262,7 @@ fn buffer_use(reading: Reading) -> BufferUse {
 
 /// What spares rays nodes, where the kernels look at it: not where they run both sides of every branch.
 fn slabs_for<'a>(context: &Context, tree: &'a KdTree) -> &'a [Slab] {
-    if context.runs_both_sides() { &[] } else { &tree.slabs }
+    if context.runs_both_sides() { &[] } else { tree.slabs() }
 }
 
 /// How much an array takes.
@@ -258,13 +280,13 @@ impl Extent {
 
 /// Of all arrays, with those that any traversal asks for: in the way that one can be read, all can.
 fn extents(triangles: &[Triangle], tree: &KdTree, slabs: &[Slab]) -> [Extent; 8] {
-    let n_nodes = tree.nodes.len();
+    let n_nodes = tree.nodes().len();
     [
         Extent::of::<Triangle>(triangles.len()),
         Extent::of::<KdNode>(n_nodes),
-        Extent::of::<u32>(tree.parents.len()),
-        Extent::of::<LeafTriangle>(tree.leaf_triangles.len()),
-        Extent::of::<Plane>(tree.leaf_planes.len()),
+        Extent::of::<u32>(tree.parents().len()),
+        Extent::of::<LeafTriangle>(tree.leaf_triangles().len()),
+        Extent::of::<Plane>(tree.leaf_planes().len()),
         Extent::of::<Slab>(slabs.len()),
         Extent::of::<KdBox>(n_nodes),
         Extent::of::<KdRope>(6 * n_nodes),

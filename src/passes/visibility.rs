@@ -25,8 +25,12 @@ impl Visibility {
     }
 
     /// Needs nothing. Leaves triangle_ids, ready for kernels.
+    ///
+    /// # Panics
+    /// The resources were made for options that draw nothing.
     pub fn record(&self, commands: &Commands, resources: &Resources) {
-        let (ids, depth) = (&resources.pixels.triangle_ids, &resources.pixels.depth);
+        let (ids, depth) = (&resources.pixels.triangle_ids, resources.pixels.depth.as_ref());
+        let depth = depth.expect("there is a depth target where triangles are drawn");
         let Frame { window_x: x, window_y: y, width, height, .. } = *resources.constants();
         let Frame { picture_width, picture_height, n_triangles, .. } = *resources.constants();
         commands.begin_targets(ids, depth);
@@ -36,7 +40,7 @@ impl Visibility {
             picture: (picture_width, picture_height),
             area: Area { x, y, width, height },
             n_triangles,
-            indices: &resources.vertex_indices,
+            indices: resources.vertex_indices.as_ref().expect("there are indices where triangles are drawn"),
         };
         commands.draw(&self.pipeline, &desc);
         commands.ids_to_compute(ids);

@@ -1,7 +1,14 @@
 //! What may change between frames: the scene and its tree stay on the device.
 
 use super::{Renderer, lanes_to_share, schedule::Schedule};
-use crate::{frame::RenderOptions, gpu::GpuError, kdtree::KdTree, layout::Frame, scene::Camera};
+use crate::{
+    frame::{Crop, RenderOptions},
+    gpu::GpuError,
+    kdtree::KdTree,
+    layout::Frame,
+    passes::{Needs, Resources},
+    scene::Camera,
+};
 
 impl Renderer {
     /// Looks from elsewhere from the next sample on, which is the first of a new picture.
@@ -34,10 +41,19 @@ impl Renderer {
     /// changes below that are cheap.
     ///
     /// # Errors
-    /// Beyond the device's limits or memory; then nothing has changed.
+    /// Beyond the device's limits or memory; then nothing has changed, and a sample that is begun goes on.
     pub fn resize(&mut self, width: u32, height: u32) -> Result<(), GpuError> {
         let options = RenderOptions { width, height, crop: None, ..self.options.clone() };
         self.remake(&options, None)
+    }
+
+    /// Renders another part of the picture from the next sample on, the first. Memory is kept as [`Renderer::resize`]
+    /// keeps it.
+    ///
+    /// # Errors
+    /// Beyond the device's limits or memory; then nothing has changed.
+    pub fn set_crop(&mut self, crop: Crop) -> Result<(), GpuError> {
+        self.remake(&RenderOptions { crop: Some(crop), ..self.options.clone() }, None)
     }
 
     /// Renders with other options from the next sample on. Kernels are made anew only where they differ. Samples are kept
@@ -45,7 +61,8 @@ impl Renderer {
     /// `tree`: the one that the renderer was made with, for what another traversal reads beside it.
     ///
     /// # Errors
-    /// Beyond the device's limits or memory, the driver refuses a kernel; the options are as before then.
+    /// Beyond the device's limits or memory, the driver refuses a kernel; then nothing has changed, and a sample that
+    /// is begun goes on.
     pub fn set_options(&mut self, options: &RenderOptions, tree: &KdTree) -> Result<(), GpuError> {
         self.remake(options, Some(tree))
     }
@@ -62,39 +79,45 @@ impl Renderer {
         Ok(())
     }
 
+    /// Makes all that other options need, and then puts it in its place by steps that cannot fail.
     fn remake(&mut self, options: &RenderOptions, tree: Option<&KdTree>) -> Result<(), GpuError> {
-        let before = self.options.clone();
-        // Its commands hold kernels and sets that may go.
-        self.pending = None;
-        if let Some(tree) = tree.filter(|_| before.traversal != options.traversal) {
-            self.resources.add_extras(&self.context, tree, options.traversal)?;
-        }
-        self.passes.set_options(&self.context, &self.resources.bindings, &before, options)?;
+        let (context, before) = (&self.context, &self.options);
         let mut constants = *self.resources.constants();
         constants.set_options(options);
-        if same_samples(&before, options) {
-            self.resources.set_constants(&constants);
-        } else {
-            self.make_room(constants, options)?;
-            self.reset_samples();
+        let tree = tree.filter(|_| before.traversal != options.traversal);
+        let room = (!same_samples(before, options)).then(|| self.with_room(constants, options, tree)).transpose()?;
+        let passes = self.passes.with_options(context, &self.resources.bindings, before, options)?;
+
+        // Its commands hold pipelines and sets that go now.
+        self.pending = None;
+        match room {
+            None => self.resources.set_constants(&constants),
+            Some((resources, schedule)) => {
+                if !std::ptr::eq(resources.pixels.pixel_display.any(), self.resources.pixels.pixel_display.any()) {
+                    self.displayed = None;
+                }
+                self.reset_samples();
+                (self.resources, self.schedule) = (resources, schedule);
+            }
         }
-        self.options = options.clone();
+        (self.passes, self.options) = (passes, options.clone());
         Ok(())
     }
 
     /// Buffers and batches for other sizes, another number of bounces, or other outputs.
-    fn make_room(&mut self, constants: Frame, options: &RenderOptions) -> Result<(), GpuError> {
+    fn with_room(
+        &self,
+        constants: Frame,
+        options: &RenderOptions,
+        tree: Option<&KdTree>,
+    ) -> Result<(Resources, Schedule), GpuError> {
         let queue_capacity = self.room.queue_capacity(self.context.limits(), &constants);
         let n_lanes = lanes_to_share(&self.context, options)?;
         let constants = Frame { queue_capacity, n_lanes, ..constants };
         let spans = self.room.spans(&constants, self.most_pixels);
         let schedule = Schedule::new(&self.context, &constants, spans, options.profile)?;
-        if !self.resources.fit(&self.context, &constants, options)? {
-            self.displayed = None;
-        }
-        self.resources.resize_bounces(&self.context, schedule.n_rows())?;
-        self.schedule = schedule;
-        Ok(())
+        let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
+        Ok((self.resources.for_frame(&self.context, tree, &needs)?, schedule))
     }
 }
 

@@ -1,18 +1,21 @@
 //! The frame: the order of passes, every barrier between them, one command buffer a bounce.
 
+mod bands;
 mod changes;
 mod parts;
 mod profile;
 mod schedule;
-mod ways;
 
 use std::sync::Arc;
 
 use tracing::info_span;
 
-pub use self::ways::{Ways, suited_primary, suited_traversal};
+pub use self::{
+    bands::{BandedRenderer, Drawn, Watcher},
+    parts::Displayed,
+};
 use self::{
-    parts::Pending,
+    parts::{Pending, Step, Traced, Until},
     schedule::{Room, Schedule},
 };
 use crate::{
@@ -21,7 +24,7 @@ use crate::{
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     kdtree::KdTree,
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
-    passes::{Passes, Rasterize, Resources},
+    passes::{Needs, Passes, Rasterize, Resources},
     scene::{Camera, Scene},
 };
 
@@ -38,21 +41,23 @@ pub struct Renderer {
     n_samples: u32,
     /// What is displayed in place of the picture, where there are features.
     false_color: Option<FalseColor>,
+    /// Whether the view asks for the hits of primary rays only, where there are features.
+    needs_primary_rays_only: bool,
     /// Whether what samples are added to holds the first one.
     has_sums: bool,
     /// A sample that is drawn in part.
     pending: Option<Pending>,
     /// Pixels of a batch at the most, where the caller has said so.
     most_pixels: Option<u32>,
-    /// Width and height of what pixel_display holds.
-    displayed: Option<(u32, u32)>,
+    /// What pixel_display holds.
+    displayed: Option<Displayed>,
 }
 
 impl Renderer {
     /// Uploads the scene and makes the passes.
     ///
     /// # Errors
-    /// The scene or the picture is beyond the device's limits or memory.
+    /// Scene and tree do not fit together; the scene or the picture is beyond the device's limits or memory.
     pub fn new(context: Arc<Context>, scene: &Scene, tree: &KdTree, options: &RenderOptions) -> Result<Self, GpuError> {
         Self::with_capacity(context, scene, tree, options, None)
     }
@@ -87,8 +92,8 @@ impl Renderer {
         let spans = room.spans(&constants, None);
         let schedule = Schedule::new(&context, &constants, spans, options.profile)?;
         let uploading = info_span!("upload scene").entered();
-        let mut resources = Resources::new(&context, scene, tree, &constants, options, schedule.n_rows())?;
-        resources.add_extras(&context, tree, options.traversal)?;
+        let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
+        let resources = Resources::new(&context, scene, tree, &needs)?;
         drop(uploading);
         let passes = info_span!("make pipelines").in_scope(|| Passes::new(&context, &resources.bindings, options))?;
         let (camera, options) = (scene.camera, options.clone());
@@ -102,6 +107,7 @@ impl Renderer {
             schedule,
             n_samples: 0,
             false_color: None,
+            needs_primary_rays_only: false,
             has_sums: false,
             pending: None,
             most_pixels: None,
@@ -135,7 +141,7 @@ impl Renderer {
     /// As [`Renderer::render`]. The next sample is the first again then.
     pub fn draw_sample(&mut self) -> Result<Profile, GpuError> {
         loop {
-            if let Some(profile) = self.go_on(usize::MAX)? {
+            if let Some(profile) = self.go_on(Until::End)? {
                 return Ok(profile);
             }
         }
@@ -191,18 +197,77 @@ impl Renderer {
     }
 
     /// Algorithm 1: one command buffer before, one a bounce, one for the light on all of a batch's rays, one after.
-    fn record(&self) -> Result<Vec<CommandBuffer>, GpuError> {
-        let mut frame = vec![self.command_buffer("begin frame", |commands| self.begin_frame(commands))?];
+    fn record(&self) -> Result<Vec<Step>, GpuError> {
+        let mut frame = vec![Step::plain(self.command_buffer("begin frame", |commands| self.begin_frame(commands))?)];
         for &batch in &self.schedule.batches {
-            for depth in 0..self.options.max_depth {
+            for depth in 0..self.n_bounces() {
                 let batch = Batch { bounce_ix: batch.bounce_ix + depth, depth, ..batch };
-                let name = format!("bounce {depth}");
-                frame.push(self.command_buffer(&name, |commands| self.bounce(commands, &batch))?);
+                let traced = (!self.is_rasterized(depth)).then_some(Traced::Rays(batch));
+                let hits = |commands: &Commands| self.find_hits(commands, &batch);
+                frame.extend(
+                    self.steps(&format!("bounce {depth}"), traced, hits, |commands| self.next_rays(commands, &batch))?,
+                );
             }
-            frame.push(self.command_buffer("light", |commands| self.light(commands, &batch))?);
+            if !self.draws_primary_rays_only() {
+                let traced = (self.resources.constants().n_lights > 0).then_some(Traced::Shadows(batch));
+                let shadows = |commands: &Commands| self.cast_shadows(commands, &batch);
+                frame.extend(self.steps("light", traced, shadows, |commands| self.light(commands, &batch))?);
+            }
+            frame.last_mut().expect("the steps of the batch").ends_batch = true;
         }
-        frame.push(self.command_buffer("end frame", |commands| self.end_frame(commands))?);
+        frame.push(Step::plain(self.command_buffer("end frame", |commands| self.end_frame(commands))?));
         Ok(frame)
+    }
+
+    /// What traces rays and what needs their results, in one command buffer. Where rays can stall they are two: the device
+    /// goes on with the second when the host has seen that all rays of the first have ended.
+    fn steps(
+        &self,
+        name: &str,
+        traced: Option<Traced>,
+        trace: impl Fn(&Commands),
+        rest: impl Fn(&Commands),
+    ) -> Result<Vec<Step>, GpuError> {
+        let Some(traced) = traced.filter(|_| self.resources.tree.stalls.can_occur()) else {
+            let both = |commands: &Commands| {
+                self.resources.bind(commands);
+                trace(commands);
+                rest(commands);
+            };
+            return Ok(vec![Step::plain(self.command_buffer(name, both)?)]);
+        };
+        let tracing = |commands: &Commands| {
+            self.resources.bind(commands);
+            self.resources.tree.stalls.reset(commands);
+            trace(commands);
+        };
+        let resting = |commands: &Commands| {
+            self.resources.bind(commands);
+            rest(commands);
+        };
+        Ok(vec![
+            Step::traced(self.command_buffer(name, tracing)?, traced),
+            Step::plain(self.command_buffer(name, resting)?),
+        ])
+    }
+
+    /// Brings the rays of a step that has run to their ends.
+    fn finish_rays(&self, traced: &Traced) -> Result<(), GpuError> {
+        let (passes, resources) = (&self.passes, &self.resources);
+        resources.tree.stalls.finish(&self.context, |commands, round| {
+            resources.bind(commands);
+            let round = round.constant();
+            match *traced {
+                Traced::Rays(batch) => passes.trace.record(commands, resources, &Batch { round, ..batch }),
+                Traced::Shadows(batch) => passes.shadow.record(commands, resources, &Batch { round, ..batch }),
+            }
+        })?;
+        Ok(())
+    }
+
+    /// Whether the hits of a level's rays are found without the tree.
+    fn is_rasterized(&self, depth: u32) -> bool {
+        depth == 0 && self.options.primary != Primary::Trace
     }
 
     fn command_buffer(&self, name: &str, body: impl FnOnce(&Commands)) -> Result<CommandBuffer, GpuError> {
@@ -223,10 +288,8 @@ impl Renderer {
         }
         // bounces, counters, pixel_features, raster_groups, raster_count
         commands.barrier(Access::TransferWrite, Access::AllReads);
-        if self.options.primary == Primary::Raster {
-            self.passes.visibility.record(commands, &self.resources);
-        } else {
-            self.resources.pixels.leave_unread(commands);
+        if let Some(visibility) = &self.passes.visibility {
+            visibility.record(commands, &self.resources);
         }
         if let Some(rasterize) = &self.passes.rasterize {
             rasterize.record(commands, &self.resources);
@@ -240,35 +303,41 @@ impl Renderer {
         commands.barrier(Access::TransferWrite, Access::AllReads); // frame
     }
 
-    /// One level of rays: hits, the next level's rays.
-    fn bounce(&self, commands: &Commands, batch: &Batch) {
-        let (passes, resources) = (&self.passes, &self.resources);
-        resources.bind(commands);
-        if batch.depth == 0 && self.options.primary != Primary::Trace {
-            passes.primary_hit.record(commands, batch);
+    /// The closest hits of one level of rays.
+    fn find_hits(&self, commands: &Commands, batch: &Batch) {
+        if self.is_rasterized(batch.depth) {
+            self.passes.primary_hit.record(commands, batch);
         } else {
-            passes.trace.record(commands, resources, batch);
+            self.passes.trace.record(commands, &self.resources, batch);
         }
         commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // hits, counters
+    }
+
+    /// The next level of rays, from the hits of this one.
+    fn next_rays(&self, commands: &Commands, batch: &Batch) {
+        let (passes, resources) = (&self.passes, &self.resources);
         if batch.depth == 0 && self.options.features {
             passes.features.record(commands, batch);
             commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_features
         }
-        if batch.depth + 1 < self.options.max_depth {
+        if batch.depth + 1 < self.n_bounces() {
             passes.compact.record(commands, resources, batch);
             commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // rays, first_children
         }
     }
 
-    /// What the lights give to the hits of all bounces, and that to the pixels. Ways through the tree end one by one, and a
-    /// dispatch with the last of its own: one for all shadows ends once.
-    fn light(&self, commands: &Commands, batch: &Batch) {
-        let (passes, resources) = (&self.passes, &self.resources);
-        resources.bind(commands);
-        if resources.constants().n_lights > 0 {
-            passes.shadow.record(commands, resources, batch);
+    /// Which lights the hits of all bounces see. A dispatch lasts as long as its longest ray; one for the shadows of all
+    /// bounces waits for such a ray once, not once a bounce.
+    fn cast_shadows(&self, commands: &Commands, batch: &Batch) {
+        if self.resources.constants().n_lights > 0 {
+            self.passes.shadow.record(commands, &self.resources, batch);
             commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // light_visibility
         }
+    }
+
+    /// What the lights give to the hits of all bounces, and that to the pixels.
+    fn light(&self, commands: &Commands, batch: &Batch) {
+        let (passes, resources) = (&self.passes, &self.resources);
         passes.shade.record(commands, resources, batch);
         commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // ray_radiance, counters
         passes.resolve.record(commands, batch);
@@ -277,7 +346,7 @@ impl Renderer {
 
     fn end_frame(&self, commands: &Commands) {
         self.resources.bind(commands);
-        if self.resources.constants().n_samples > 1 {
+        if self.resources.constants().n_samples > 1 && !self.draws_primary_rays_only() {
             self.passes.accumulate.record(commands, &self.resources);
             commands.barrier(Access::ComputeWrite, Access::ComputeRead); // pixel_radiance
         }
@@ -286,7 +355,7 @@ impl Renderer {
 
     /// From the mean of all samples to what a display shows.
     fn show_samples(&self, commands: &Commands) {
-        if self.options.denoise != Denoise::Off {
+        if self.options.denoise != Denoise::Off && !self.draws_primary_rays_only() {
             self.passes.denoise.record(commands, &self.resources);
             commands.barrier(Access::ComputeWrite, Access::ComputeRead); // pixel_filtered
         }

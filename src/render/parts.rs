@@ -6,19 +6,84 @@ use tracing::info_span;
 
 use super::{Renderer, schedule::Schedule};
 use crate::{
-    frame::{Profile, View},
+    frame::{Picture, Profile, View},
     gpu::{CommandBuffer, GpuError},
-    layout::{FalseColor, Frame},
+    layout::{Batch, FalseColor, Frame},
+    scene::Camera,
 };
+
+/// A command buffer of a frame.
+pub(super) struct Step {
+    commands: CommandBuffer,
+    /// Rays that can stall in it: they have to end before the next step.
+    traced: Option<Traced>,
+    /// Whether it is the last one of its batch.
+    pub ends_batch: bool,
+}
+
+/// Rays that a step takes through the tree.
+pub(super) enum Traced {
+    /// Those of a bounce.
+    Rays(Batch),
+    /// The shadow segments of all rays of a batch.
+    Shadows(Batch),
+}
+
+impl Step {
+    /// One without rays that can stall.
+    pub fn plain(commands: CommandBuffer) -> Self {
+        Self { commands, traced: None, ends_batch: false }
+    }
+
+    /// One whose rays can stall.
+    pub fn traced(commands: CommandBuffer, traced: Traced) -> Self {
+        Self { commands, traced: Some(traced), ends_batch: false }
+    }
+}
+
+/// How far a sample is to go on.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Until {
+    /// To the end of the next step.
+    Step,
+    /// To the end of the batch that is next, and with the last batch to the frame's end.
+    Batch,
+    /// To the frame's end.
+    End,
+}
 
 /// A sample that is drawn in part; nothing of it is under way.
 pub(super) struct Pending {
-    commands: Vec<CommandBuffer>,
-    /// How many of the commands have run.
+    steps: Vec<Step>,
+    /// How many of the steps have run.
     n_done: usize,
     sample_ix: u32,
     /// When its first commands were submitted.
     begun_at: Option<Instant>,
+}
+
+impl Pending {
+    /// The number of steps that have run when the sample has gone on so far.
+    fn end(&self, until: Until) -> usize {
+        if until == Until::Step {
+            return self.n_done + 1;
+        }
+        let ends_batch = |step: &Step| step.ends_batch;
+        let batch_end = self.steps[self.n_done..].iter().position(ends_batch).map(|place| self.n_done + place + 1);
+        match batch_end {
+            Some(end) if until == Until::Batch && self.steps[end..].iter().any(ends_batch) => end,
+            _ => self.steps.len(),
+        }
+    }
+}
+
+/// The picture that is displayed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Displayed {
+    /// Pixels.
+    pub size: (u32, u32),
+    /// Where it is seen from.
+    pub camera: Camera,
 }
 
 impl Renderer {
@@ -28,15 +93,26 @@ impl Renderer {
     /// # Errors
     /// As [`Renderer::draw_sample`].
     pub fn draw_part(&mut self) -> Result<Option<Profile>, GpuError> {
-        let a_batch = self.options.max_depth as usize + 1; // its bounces and their light
-        let (n_done, n_all) = match &self.pending {
-            Some(pending) => (pending.n_done, pending.commands.len()),
-            None => (0, 2 + a_batch * self.schedule.batches.len()),
-        };
-        // What begins the frame goes with the first batch, what ends it with the last one.
-        let with_first = if n_done == 0 { a_batch + 1 } else { a_batch };
-        let is_last = n_done + with_first + 1 >= n_all;
-        self.go_on(if is_last { with_first + 1 } else { with_first })
+        self.go_on(Until::Batch)
+    }
+
+    /// Draws one step of the sample that is begun, or of the next one: a bounce of a batch, or its light. Gives
+    /// the whole sample's profile with its last one. The picture changes with the last one only.
+    ///
+    /// # Errors
+    /// As [`Renderer::draw_sample`].
+    pub fn draw_step(&mut self) -> Result<Option<Profile>, GpuError> {
+        self.go_on(Until::Step)
+    }
+
+    /// Whether nothing but the hits of primary rays is drawn.
+    pub(super) fn draws_primary_rays_only(&self) -> bool {
+        self.options.features && self.needs_primary_rays_only
+    }
+
+    /// Levels of rays that a sample has, the primary one counted.
+    pub(super) fn n_bounces(&self) -> u32 {
+        if self.draws_primary_rays_only() { 1 } else { self.options.max_depth }
     }
 
     /// Whether a sample is begun.
@@ -46,21 +122,22 @@ impl Renderer {
 
     /// Share of the next sample that is drawn, 0 to 1.
     pub fn progress(&self) -> f32 {
-        self.pending.as_ref().map_or(0.0, |pending| pending.n_done as f32 / pending.commands.len() as f32)
+        self.pending.as_ref().map_or(0.0, |pending| pending.n_done as f32 / pending.steps.len() as f32)
     }
 
     /// Batches have so many pixels at the most from now on, or as many as the queues hold. The picture does not depend on
     /// it. A sample that is begun is begun anew.
     ///
     /// # Errors
-    /// Out of memory.
+    /// Out of memory; then nothing has changed, and a sample that is begun goes on.
     pub fn limit_batches(&mut self, most_pixels: Option<u32>) -> Result<(), GpuError> {
         if self.most_pixels == most_pixels {
             return Ok(());
         }
-        self.most_pixels = most_pixels;
         let spans = self.room.spans(self.resources.constants(), most_pixels);
-        self.reschedule(spans)
+        self.reschedule(spans)?;
+        self.most_pixels = most_pixels;
+        Ok(())
     }
 
     /// What `limit_batches` was told last.
@@ -69,38 +146,33 @@ impl Renderer {
     }
 
     fn reschedule(&mut self, spans: Vec<(u32, u32)>) -> Result<(), GpuError> {
-        self.pending = None;
         let timed = self.options.profile;
         let schedule = Schedule::new(&self.context, self.resources.constants(), spans, timed)?;
-        self.resources.resize_bounces(&self.context, schedule.n_rows())?;
-        self.schedule = schedule;
+        let resources = self.resources.with_bounces(&self.context, schedule.n_rows())?;
+        self.pending = None;
+        (self.resources, self.schedule) = (resources, schedule);
         Ok(())
     }
 
-    /// Runs so many command buffers more of the sample, as far as there are; gives its profile when all have run without
-    /// an overflow. None: there is more to do.
-    pub(super) fn go_on(&mut self, n_buffers: usize) -> Result<Option<Profile>, GpuError> {
-        let gone_on = self.try_to_go_on(n_buffers);
+    /// Runs the sample's next steps; gives its profile when all have run without an overflow. None: there is more to do.
+    pub(super) fn go_on(&mut self, until: Until) -> Result<Option<Profile>, GpuError> {
+        // Where no sample can begin, those that are complete stay.
+        let pending = self.pending.take().map_or_else(|| self.begin_sample(), Ok)?;
+        let gone_on = self.try_to_go_on(pending, until);
         if gone_on.is_err() {
             self.reset_samples();
         }
         gone_on
     }
 
-    fn try_to_go_on(&mut self, n_buffers: usize) -> Result<Option<Profile>, GpuError> {
-        let mut pending = match self.pending.take() {
-            Some(pending) => pending,
-            None => self.begin_sample()?,
-        };
-        let rest = &pending.commands[pending.n_done..];
-        let now = &rest[..n_buffers.min(rest.len())];
+    fn try_to_go_on(&mut self, mut pending: Pending, until: Until) -> Result<Option<Profile>, GpuError> {
         let running = info_span!("submit and wait").entered();
         let begun_at = *pending.begun_at.get_or_insert_with(Instant::now);
-        self.context.submit(&now.iter().collect::<Vec<_>>())?;
-        self.context.wait()?;
+        let end = pending.end(until);
+        self.run_steps(&pending.steps[pending.n_done..end])?;
         drop(running);
-        pending.n_done += now.len();
-        if pending.n_done < pending.commands.len() {
+        pending.n_done = end;
+        if end < pending.steps.len() {
             self.pending = Some(pending);
             return Ok(None);
         }
@@ -109,14 +181,27 @@ impl Renderer {
         if bounces.iter().any(|row| row.overflow != 0) {
             // At once and whole: pixel_display shows a picture without the rays that had no room.
             let spans = self.schedule.split(&bounces, self.resources.constants())?;
-            pending.commands.clear();
+            pending.steps.clear();
             self.reschedule(spans)?;
-            self.pending = Some(self.recorded(pending.sample_ix)?);
-            return self.try_to_go_on(usize::MAX);
+            let pending = self.recorded(pending.sample_ix)?;
+            return self.try_to_go_on(pending, Until::End);
         }
         self.n_samples = pending.sample_ix + 1;
         self.note_displayed();
         self.profile(&bounces, begun_at).map(Some)
+    }
+
+    /// Runs steps and waits for their end: all together, but for rays that can stall, which have to end before the next
+    /// step begins.
+    fn run_steps(&self, steps: &[Step]) -> Result<(), GpuError> {
+        for together in steps.split_inclusive(|step| step.traced.is_some()) {
+            self.context.submit(&together.iter().map(|step| &step.commands).collect::<Vec<_>>())?;
+            self.context.wait()?;
+            if let Some(traced) = together.last().and_then(|step| step.traced.as_ref()) {
+                self.finish_rays(traced)?;
+            }
+        }
+        Ok(())
     }
 
     fn begin_sample(&mut self) -> Result<Pending, GpuError> {
@@ -133,13 +218,14 @@ impl Renderer {
     }
 
     fn recorded(&self, sample_ix: u32) -> Result<Pending, GpuError> {
-        let commands = info_span!("record").in_scope(|| self.record())?;
-        Ok(Pending { commands, n_done: 0, sample_ix, begun_at: None })
+        let steps = info_span!("record").in_scope(|| self.record())?;
+        Ok(Pending { steps, n_done: 0, sample_ix, begun_at: None })
     }
 
     /// Displays one of the features in place of the picture, from the next sample on; only where the options ask for
     /// features. `brightest`: the value that is brightest, for cost and rays, or half as bright, for depth. True where
-    /// that is new; a sample that is begun is begun anew then.
+    /// that is new; a sample that is begun is begun anew then. Samples for a view that needs primary rays only have no
+    /// radiance: where that changes, the next sample is the first of a new picture.
     pub fn set_view(&mut self, view: View, brightest: f32) -> bool {
         let false_color = view.constant().map(|view| FalseColor { view, brightest });
         let is_new = false_color != self.false_color;
@@ -147,17 +233,33 @@ impl Renderer {
             self.pending = None;
             self.false_color = false_color;
         }
+        if self.needs_primary_rays_only != view.needs_primary_rays_only() {
+            self.needs_primary_rays_only = view.needs_primary_rays_only();
+            self.reset_samples();
+        }
         is_new
     }
 
-    /// Width and height of what pixel_display holds; none before there is a picture.
-    pub fn displayed(&self) -> Option<(u32, u32)> {
+    /// The picture that is displayed, while another one may be drawn; none before there is a picture.
+    pub fn displayed(&self) -> Option<Displayed> {
         self.displayed
+    }
+
+    /// The picture that is displayed, as large as it is there, while another one may be drawn; none before there is one. It
+    /// has no radiance, which the sample that is being drawn may have changed. Only for pictures without a crop.
+    ///
+    /// # Errors
+    /// A failed copy.
+    pub fn displayed_picture(&self) -> Result<Option<Picture>, GpuError> {
+        let Some(Displayed { size: (width, height), .. }) = self.displayed else { return Ok(None) };
+        let display = self.resources.pixels.pixel_display.download_first(width as usize * height as usize)?;
+        let display = display.into_iter().map(u32::to_le_bytes).collect();
+        Ok(Some(Picture { width, height, radiance: Vec::new(), display }))
     }
 
     /// The picture is complete.
     pub(super) fn note_displayed(&mut self) {
         let Frame { width, height, .. } = *self.resources.constants();
-        self.displayed = Some((width, height));
+        self.displayed = Some(Displayed { size: (width, height), camera: self.camera });
     }
 }

@@ -4,7 +4,7 @@ use std::{mem, sync::Arc};
 
 use crate::{
     gpu::{Buffer, BufferUse, Context, GpuError, Limits, Timer},
-    layout::{Batch, Bounce, Frame, RAY_GROUP_SIZE, Ray},
+    layout::{Batch, Bounce, Frame, RAY_GROUP_SIZE, ROUND_BEGIN, Ray},
 };
 
 /// Rays that go well into memory together, some 100 bytes each; enough to keep any device busy.
@@ -36,6 +36,7 @@ impl Schedule {
                 n_pixels,
                 bounce_ix: batch_ix * max_depth,
                 depth: 0,
+                round: ROUND_BEGIN,
             })
             .collect();
         let rows: Vec<_> = batches

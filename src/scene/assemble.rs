@@ -10,10 +10,11 @@ use super::{
     Camera, RenderDefaults, Scene,
     description::{CameraSpec, CommonSpec, DenoiseWord, Description, LightSpec, MeshSpec, RenderSpec, Source},
     error::{Checked, SceneError},
-    framing,
+    extent, framing,
+    generate::Budget,
     material::{MaterialSpec, colour, within},
     mesh::{MAX_COORDINATE, Mesh, finite},
-    obj::{Library, load_obj},
+    obj::{Library, parse_obj, read_obj},
     read::read_utf8,
 };
 use crate::{
@@ -78,12 +79,14 @@ fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> 
     if let Some(spec) = &description.render {
         scene.defaults = file.check("render", spec, render_defaults)?;
     }
+    let mut n_generated = 0;
     for (ix, table) in description.mesh.into_iter().enumerate() {
-        add_mesh(file, &mut scene, &materials, (ix, table))?;
+        n_generated += add_mesh(file, &mut scene, &materials, n_generated, (ix, table))?;
     }
     if scene.triangles.is_empty() {
         return Err(SceneError::file(file.path, "has no triangles"));
     }
+    extent::check(file.path, &scene.triangles)?;
     scene.camera = match &description.camera {
         Some(spec) => file.check("camera", spec, camera)?,
         None => framing::camera(&scene.triangles),
@@ -91,27 +94,34 @@ fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> 
     Ok(scene)
 }
 
+/// Adds a mesh's triangles to the scene, of which generators have made `n_generated` so far. Returns how many more they
+/// have made.
 fn add_mesh(
     file: &File,
     scene: &mut Scene,
     materials: &HashMap<String, u32>,
+    n_generated: u64,
     (ix, table): (usize, Spanned<toml::Table>),
-) -> Result<(), SceneError> {
+) -> Result<u64, SceneError> {
     let span = table.span();
     let object = format!("mesh {}", ix + 1);
     let failed = |what: String| file.at(&span, format!("{object}: {what}"));
     let MeshSpec { source, common } = MeshSpec::new(table.into_inner()).map_err(failed)?;
     let transform = common.transform.transform().map_err(failed)?;
     let named = named_materials(&common, materials).map_err(failed)?;
-    let (mesh, slots) = match source {
+    let n_loaded = scene.triangles.len();
+    let (mesh, slots, n_made) = match source {
         Source::File { path, shading } => {
-            let folder = file.path.parent().unwrap_or(Path::new(""));
-            let (mesh, library) = load_obj(&folder.join(path), shading)?;
+            let path = file.path.parent().unwrap_or(Path::new("")).join(path);
+            // The name may be misspelt in the scene file: the error says where that is.
+            let text = read_obj(&path).map_err(|error| failed(error.to_string()))?;
+            let (mesh, library) = parse_obj(&path, &text, shading, n_loaded)?;
             let slots = if named.is_empty() { scene.push_library(&library) } else { named };
-            (mesh, slots)
+            (mesh, slots, 0)
         }
         Source::Generator(generator) => {
-            let mut mesh = generator.build().map_err(failed)?;
+            let budget = Budget { n_generated, n_triangles: n_loaded as u64 };
+            let mut mesh = generator.build(&budget).map_err(failed)?;
             if mesh.faces.is_empty() {
                 return Err(failed("makes no triangles".to_owned()));
             }
@@ -119,12 +129,13 @@ fn add_mesh(
                 mesh.normals.fill([Vec3::ZERO; 3]);
             }
             let slots = if named.is_empty() { vec![scene.default_material()] } else { named };
-            (mesh, slots)
+            let n_made = mesh.faces.len() as u64;
+            (mesh, slots, n_made)
         }
     };
     scene.triangles.extend(mesh.to_world(&transform).map_err(failed)?);
     scene.push_slots(&mesh, &slots);
-    Ok(())
+    Ok(n_made)
 }
 
 /// Indices of the materials that a mesh names.

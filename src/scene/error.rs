@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use crate::text::one_line;
+
 /// A scene file that cannot be read, understood or drawn. Displays as one line: `FILE:LINE: what` or `FILE: object: what`.
 #[derive(Debug, thiserror::Error)]
 #[error("{place}: {what}")]
@@ -13,31 +15,23 @@ pub struct SceneError {
 impl SceneError {
     /// About a file as a whole.
     pub(super) fn file(path: &Path, what: impl AsRef<str>) -> Self {
-        Self { place: one_line(&path.display().to_string()), what: one_line(what.as_ref()) }
+        Self { place: quoted(&path.display().to_string()), what: quoted(what.as_ref()) }
     }
 
     /// About one line of a file, counted from 1.
     pub(super) fn line(path: &Path, line: usize, what: impl AsRef<str>) -> Self {
-        Self { place: format!("{}:{line}", one_line(&path.display().to_string())), what: one_line(what.as_ref()) }
+        Self { place: format!("{}:{line}", quoted(&path.display().to_string())), what: quoted(what.as_ref()) }
     }
 }
 
 /// What comes of a check before it is known which file and line it is about.
 pub(super) type Checked<T> = Result<T, String>;
 
-/// Text without line breaks and other control characters, of 300 characters at most: it may quote a hostile file.
-fn one_line(text: &str) -> String {
-    let mut line = String::new();
-    for (n, c) in text.trim().chars().enumerate() {
-        match c {
-            _ if n == 300 => {
-                line.push('…');
-                break;
-            }
-            '\n' | '\r' | '\t' => line.push(' '),
-            c if c.is_control() => line.extend(c.escape_default()),
-            c => line.push(c),
-        }
+/// Text on one line, of some 300 characters at most: it may quote a hostile file.
+fn quoted(text: &str) -> String {
+    let line = one_line(text);
+    match line.char_indices().nth(300) {
+        Some((end, _)) => format!("{}…", &line[..end]),
+        None => line,
     }
-    line
 }

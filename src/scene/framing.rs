@@ -21,8 +21,8 @@ pub fn bounds(triangles: &[Triangle]) -> (Vec3, Vec3) {
 pub(super) fn camera(triangles: &[Triangle]) -> Camera {
     let (min, max) = bounds(triangles);
     let centre = (min + max) / 2.0;
-    // All in one point: any distance will do, but the eye must move off it.
-    let radius = ((max - min).length() / 2.0).max(centre.abs().max_element() * 1e-3).max(1e-6);
+    // A small scene far from the origin: the eye must be farther away than rounding of its coordinates is.
+    let radius = ((max - min).length() / 2.0).max(centre.abs().max_element() * 1e-3);
     let distance = MARGIN * radius / (VERTICAL_FOV_DEGREES / 2.0).to_radians().sin();
     Camera {
         eye: centre + TOWARDS_EYE.normalize() * distance,

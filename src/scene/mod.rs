@@ -5,10 +5,14 @@
 mod assemble;
 mod description;
 mod error;
+mod extent;
 pub mod framing;
 pub mod generate;
+mod lighting;
 mod material;
 pub mod mesh;
+mod mismatch;
+mod needs;
 pub mod normal;
 mod obj;
 mod path;
@@ -20,7 +24,10 @@ use std::path::Path;
 
 use glam::Vec3;
 
-pub use self::{error::SceneError, material::illum_flags, path::CameraPath, sources::source_files};
+pub use self::{
+    error::SceneError, extent::MIN_EXTENT, material::illum_flags, mismatch::Mismatch, path::CameraPath,
+    sources::source_files,
+};
 use crate::{
     frame::{Denoise, RenderOptions, Tonemap},
     layout::{Light, Material, Triangle},
@@ -31,9 +38,10 @@ use crate::{
 pub struct Scene {
     /// The file's name without its folder and extension.
     pub name: String,
-    /// World space, at least one. Corners lie within `mesh::MAX_COORDINATE`.
+    /// World space, at least one. Corners lie within `mesh::MAX_COORDINATE`, and their longest side is [`MIN_EXTENT`]
+    /// or more.
     pub triangles: Vec<Triangle>,
-    /// One index into `materials` a triangle.
+    /// One index into `materials` a triangle. Renderers refuse a scene where this does not hold.
     pub triangle_materials: Vec<u32>,
     pub materials: Vec<Material>,
     /// One a material.
@@ -84,6 +92,10 @@ impl Default for RenderDefaults {
 
 impl Scene {
     /// Loads a `.toml` or `.obj` file. What is left out of the picture is a `tracing` warning.
+    ///
+    /// # Errors
+    /// The file, or one that it names, cannot be read or understood; the scene is too small to be traced
+    /// ([`MIN_EXTENT`]), reaches too far from the origin (`mesh::MAX_COORDINATE`), or needs more memory than there is.
     pub fn load(path: &Path) -> Result<Scene, SceneError> {
         let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
         match extension.as_ref().and_then(|extension| extension.to_str()) {
@@ -93,10 +105,15 @@ impl Scene {
         }
     }
 
+    /// The name of the scene in a file: the file's name without its folder and extension.
+    pub fn name_of(path: &Path) -> String {
+        path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
+    }
+
     /// Nothing yet, seen from nowhere.
     fn empty(path: &Path) -> Self {
         Self {
-            name: path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
+            name: Self::name_of(path),
             triangles: Vec::new(),
             triangle_materials: Vec::new(),
             materials: Vec::new(),
@@ -113,8 +130,10 @@ impl Scene {
 /// The mesh with its own materials, framed, under one light.
 fn load_bare_obj(path: &Path) -> Result<Scene, SceneError> {
     let mut scene = Scene::empty(path);
-    let (mesh, library) = obj::load_obj(path, obj::Shading { smooth: true, crease: obj::DEFAULT_CREASE })?;
+    let shading = obj::Shading { smooth: true, crease: obj::DEFAULT_CREASE };
+    let (mesh, library) = obj::parse_obj(path, &obj::read_obj(path)?, shading, 0)?;
     scene.triangles = mesh.to_world(&mesh::Transform::IDENTITY).map_err(|what| SceneError::file(path, what))?;
+    extent::check(path, &scene.triangles)?;
     let slots = scene.push_library(&library);
     scene.push_slots(&mesh, &slots);
     scene.camera = framing::camera(&scene.triangles);

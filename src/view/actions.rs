@@ -6,8 +6,10 @@ use glam::{Vec3, uvec2};
 
 use super::{error::Topic, input::Action, live::Live, pick::pick, session::Session};
 use crate::{
+    frame::RenderOptions,
     gpu::GpuError,
     output::{self, OutputError},
+    render::Displayed,
     scene::Camera,
 };
 
@@ -21,39 +23,67 @@ pub enum SaveError {
 }
 
 impl Session {
-    /// Does what the user asks for, but for what is the window's to do. `window`: pixels; `print`: to the terminal.
-    pub fn act(&mut self, action: Action, live: &mut Live, window: (u32, u32), print: fn(&str)) {
+    /// Does what the user asks for, but for what is the window's to do. `window`: pixels.
+    pub fn act(&mut self, action: Action, live: &Live, window: (u32, u32)) {
         match action {
-            Action::Save => self.save_next(live, print),
-            Action::PrintCamera => print(&to_toml(self.controller.camera())),
+            Action::Save => {
+                self.is_save_due = true;
+                self.save_if_due(live, window);
+            }
+            Action::PrintCamera => (self.print)(&to_toml(self.controller.camera())),
             Action::FrameScene => self.controller.frame_scene(window.0 as f32 / window.1 as f32),
             Action::GoHome => self.controller.go_home(),
             Action::Show(view) => self.settings.view = view,
-            Action::Pick { x, y } => self.pick(live, window, (x, y)),
-            Action::ToggleOverlay | Action::Quit => {}
+            Action::Pick { x, y } => {
+                if let Some(displayed) = live.renderer.displayed() {
+                    self.pick(live.renderer.options(), displayed, window, (x, y));
+                }
+            }
+            Action::TogglePanel | Action::ToggleKeys | Action::Quit => {}
         }
     }
 
-    /// Saves what is seen under the next free name in the working directory.
-    fn save_next(&mut self, live: &mut Live, print: fn(&str)) {
+    /// Saves what is seen, if the user has asked for it and it is as large as the window. Until then drawing goes on, and
+    /// nobody waits.
+    pub fn save_if_due(&mut self, live: &Live, window: (u32, u32)) {
+        let is_whole = |displayed: Displayed| displayed.size == window && displayed.camera == *self.controller.camera();
+        if live.renderer.displayed().is_some_and(is_whole) {
+            self.save_what_is_left(live);
+        }
+    }
+
+    /// Saves what is seen, if the user has asked for it: it is about to be replaced by something else.
+    pub fn save_what_is_left(&mut self, live: &Live) {
+        if !std::mem::take(&mut self.is_save_due) {
+            return;
+        }
         let path = next_free(&self.loaded.scene.name);
-        match self.complete(live).map_err(SaveError::from).and_then(|()| save(live, &path)) {
+        match save_displayed(live, &path) {
             Ok(()) => {
-                print(&format!("wrote {}\n", path.display()));
+                (self.print)(&format!("wrote {}\n", path.display()));
                 self.settle(Topic::File);
             }
             Err(error) => self.complain(Topic::File, &error.to_string()),
         }
     }
 
-    fn pick(&mut self, live: &Live, window: (u32, u32), (x, y): (f64, f64)) {
-        let options = live.renderer.options();
+    /// Follows the rays of the pixel that is seen at a place of the window, in the picture that is displayed.
+    fn pick(&mut self, options: &RenderOptions, displayed: Displayed, window: (u32, u32), (x, y): (f64, f64)) {
+        let (width, height) = displayed.size;
         let pixel = |at: f64, window: u32, picture: u32| {
             ((at / f64::from(window) * f64::from(picture)).max(0.0) as u32).min(picture - 1)
         };
-        let pixel = uvec2(pixel(x, window.0, options.width), pixel(y, window.1, options.height));
-        let camera = *live.renderer.camera();
-        self.picked = Some(pick(&self.loaded.scene, &self.loaded.tree, options, &camera, pixel));
+        let pixel = uvec2(pixel(x, window.0, width), pixel(y, window.1, height));
+        let options = RenderOptions { width, height, ..options.clone() };
+        self.picked = Some(pick(&self.loaded.scene, &self.loaded.tree, &options, &displayed.camera, pixel));
+    }
+}
+
+/// Writes the picture that is displayed as PNG; nothing before there is one.
+fn save_displayed(live: &Live, path: &Path) -> Result<(), SaveError> {
+    match live.renderer.displayed_picture()? {
+        Some(picture) => Ok(output::write_picture(path, &picture)?),
+        None => Ok(()),
     }
 }
 
@@ -82,6 +112,11 @@ mod tests {
     use glam::vec3;
 
     use super::*;
+    use crate::{
+        choices::{Engine, Request, Workload},
+        frame::View,
+        view::{LoadOptions, Loaded, Settings},
+    };
 
     #[test]
     fn a_scene_file_reads_the_printed_camera() {
@@ -96,5 +131,34 @@ mod tests {
         let mesh = "[[mesh]]\ngenerator = \"plane\"\nsize = [1.0, 1.0]\n";
         std::fs::write(&path, format!("{}{mesh}", to_toml(&camera))).unwrap();
         assert_eq!(crate::scene::Scene::load(&path).unwrap().camera, camera);
+    }
+
+    /// While a picture is drawn from elsewhere, the one before is seen, and clicked at.
+    #[test]
+    fn a_click_picks_in_the_picture_that_is_seen() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.toml");
+        let settings = Settings {
+            options: RenderOptions { width: 640, height: 480, ..RenderOptions::default() },
+            max_samples: 1,
+            budget_ms: 16.0,
+            vsync: true,
+            view: View::Picture,
+            gain: 1.0,
+        };
+        let load_options = LoadOptions {
+            request: Request::default(),
+            engine: Engine::SoftwareDriver,
+            workload: Workload::of_window((640, 480)),
+        };
+        let mut session = Session::new(Loaded::load(&path, load_options).unwrap(), settings.clone(), true, |_| ());
+        let seen = session.loaded.scene.camera;
+        let displayed = Displayed { size: (80, 60), camera: seen };
+        session.controller.look(0.5, 0.0);
+        session.pick(&settings.options, displayed, (640, 480), (320.0, 300.0));
+        let picked = session.picked.expect("rays");
+        assert_eq!(picked.pixel, uvec2(40, 37), "a pixel of the small picture that is seen");
+        let to_hit = picked.rays[0].hit.as_ref().expect("a hit").point_world - seen.eye;
+        let angle = to_hit.angle_between(seen.target - seen.eye).to_degrees();
+        assert!(angle < seen.vertical_fov_degrees / 4.0, "{angle} degrees off the middle");
     }
 }

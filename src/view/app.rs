@@ -8,9 +8,8 @@ use std::{
 use winit::{
     application::ApplicationHandler,
     dpi::PhysicalSize,
-    event::{ElementState, KeyEvent, WindowEvent},
+    event::WindowEvent,
     event_loop::{ActiveEventLoop, ControlFlow},
-    keyboard::{KeyCode, PhysicalKey},
     window::{Window, WindowId},
 };
 
@@ -19,13 +18,17 @@ use super::{
     error::{Topic, ViewError},
     input::{Action, Input},
     live::Live,
-    panel::Settings,
+    panel::{Layers, Settings},
     reload::{Reloader, Wake},
     script::Script,
     session::Session,
-    ui::{Layout, Ui},
+    ui::{Layout, Ui, is_press, is_tab, lay_out},
 };
-use crate::{frame::RenderOptions, gpu::GpuError, render::Ways};
+use crate::{
+    choices::{Choices, Request},
+    frame::RenderOptions,
+    gpu::GpuError,
+};
 
 /// The viewer, as the event loop drives it.
 pub(super) struct App {
@@ -36,7 +39,9 @@ pub(super) struct App {
     input: Input,
     /// None before the window is there.
     shown: Option<Shown>,
-    is_overlaid: bool,
+    /// What was chosen when the window was opened; none before.
+    choices: Option<Choices>,
+    layers: Layers,
     is_occluded: bool,
     /// Whether nothing was shown yet since the device was lost.
     is_reopened: bool,
@@ -54,12 +59,13 @@ impl App {
     pub fn new(session: Session, options: ViewOptions, script: Option<Script>, reloader: Reloader) -> Self {
         Self {
             session,
-            is_overlaid: options.overlay,
+            layers: Layers { panel: options.overlay, keys: false, hint: options.overlay && script.is_none() },
             options,
             script,
             reloader,
             input: Input::default(),
             shown: None,
+            choices: None,
             is_occluded: false,
             is_reopened: false,
             outcome: Ok(()),
@@ -73,8 +79,9 @@ impl App {
             .with_inner_size(PhysicalSize::new(options.width, options.height));
         let window = event_loop.create_window(attributes).map_err(|error| ViewError::Window(error.to_string()))?;
         let window = Arc::new(window);
-        let ViewOptions { device, ways, .. } = &self.options;
-        let live = Live::open(window.clone(), device, &self.session.loaded, options, *ways, *vsync)?;
+        let (device, loaded) = (&self.options.device, &self.session.loaded);
+        let live = Live::open(window.clone(), device, loaded, options, loaded.load_options.request, *vsync)?;
+        self.choices = Some(live.choices.clone());
         self.session.settings.options = live.renderer.options().clone();
         Ok(Shown { live, ui: Ui::new(&window), window })
     }
@@ -120,8 +127,10 @@ impl App {
             None => size,
         };
         let session = &mut self.session;
-        let layout = self.is_overlaid.then(|| lay_out(session, live, ui, window, self.input.is_flying()));
+        let layout =
+            self.layers.any().then(|| lay_out(session, live, (ui, window, self.layers), self.input.is_flying()));
         session.draw(live, picture)?;
+        session.save_if_due(live, picture);
         let frame = match layout {
             Some(Layout { frame, textures }) => {
                 live.update_textures(textures)?;
@@ -147,8 +156,10 @@ impl App {
         drop((live, ui));
         self.session.complain(Topic::Device, &format!("{error}; the device was opened anew"));
         let Settings { options, vsync, .. } = &self.session.settings;
-        let ways = Ways { traversal: Some(options.traversal), primary: Some(options.primary) };
-        match Live::open(window.clone(), &self.options.device, &self.session.loaded, options, ways, *vsync) {
+        let loaded = &self.session.loaded;
+        let (traversal, primary) = (Some(options.traversal), Some(options.primary));
+        let request = Request { traversal, primary, ..loaded.load_options.request };
+        match Live::open(window.clone(), &self.options.device, loaded, options, request, *vsync) {
             Ok(live) => {
                 self.is_reopened = true;
                 // What took the place of shaders went with the device.
@@ -164,22 +175,28 @@ impl App {
         let Some(Shown { live, window, .. }) = &mut self.shown else { return };
         let size = window.inner_size();
         match action {
-            Action::Quit => self.end(event_loop, Ok(())),
-            Action::ToggleOverlay => self.is_overlaid = !self.is_overlaid,
-            action => self.session.act(action, live, (size.width.max(1), size.height.max(1)), self.options.print),
+            Action::Quit if self.layers.keys => self.layers.keys = false,
+            Action::Quit => {
+                self.session.save_what_is_left(live);
+                self.end(event_loop, Ok(()));
+            }
+            Action::TogglePanel => self.layers.panel = !self.layers.panel,
+            Action::ToggleKeys => self.layers.keys = !self.layers.keys,
+            action => self.session.act(action, live, (size.width.max(1), size.height.max(1))),
         }
     }
 
     /// What the user does: the overlay's first, then the camera's.
     fn hear(&mut self, event_loop: &ActiveEventLoop, event: &WindowEvent) {
         let Some(Shown { ui, window, .. }) = &mut self.shown else { return };
-        let is_overlays = self.is_overlaid && !is_tab(event) && ui.take_event(window, event);
+        let is_overlays = self.layers.any() && !is_tab(event) && ui.take_event(window, event);
+        self.layers.hint &= !is_press(event);
         window.request_redraw();
         if is_overlays || self.script.is_some() {
             return;
         }
-        let now = Instant::now();
-        let heard = self.input.hear(event, window.inner_size().height, &mut self.session.controller);
+        let (now, size) = (Instant::now(), window.inner_size());
+        let heard = self.input.hear(event, (size.width, size.height), &mut self.session.controller);
         if heard.moves {
             self.session.pace.moved(now);
         }
@@ -197,32 +214,15 @@ impl App {
         let frames = &self.session.all_frames;
         let pace =
             PaceReport { frame_ms: frames.pace(), input_to_present_ms: frames.latency(), moving: frames.moving() };
-        let Some(Shown { live, ui, window }) = self.shown else {
+        let (Some(Shown { live, ui, window }), Some(choices)) = (self.shown, self.choices) else {
             return Err(ViewError::Window("it was closed before it was open".to_owned()));
         };
         let context = live.context.clone();
         // What the layer says of the end counts, too.
         drop((live, ui, window));
-        Ok(ViewReport { device: context.info().name.clone(), pace, validation: context.validation_messages() })
+        let (device, validation) = (context.info().name.clone(), context.validation_messages());
+        Ok(ViewReport { device, choices, pace, validation })
     }
-}
-
-fn lay_out(session: &mut Session, live: &Live, ui: &mut Ui, window: &Window, is_flying: bool) -> Layout {
-    let size = window.inner_size();
-    let mut settings = session.settings.clone();
-    let layout = ui.layout(window, &mut settings, &session.facts(live, (size.width, size.height), is_flying));
-    if settings != session.settings {
-        session.pace.hear(Instant::now());
-        session.settings = settings;
-    }
-    layout
-}
-
-fn is_tab(event: &WindowEvent) -> bool {
-    let tab = PhysicalKey::Code(KeyCode::Tab);
-    matches!(event, WindowEvent::KeyboardInput {
-        event: KeyEvent { physical_key, state: ElementState::Pressed, .. }, ..
-    } if *physical_key == tab)
 }
 
 impl ApplicationHandler<Wake> for App {
@@ -281,7 +281,7 @@ impl ApplicationHandler<Wake> for App {
         let Some(Shown { live, ui, window }) = &self.shown else { return };
         let (now, size) = (Instant::now(), window.inner_size());
         let is_busy = self.script.is_some() || self.session.is_busy(live, now, (size.width, size.height));
-        let wait = if is_busy || !self.is_overlaid { Duration::MAX } else { ui.repaint_after() };
+        let wait = if is_busy || !self.layers.any() { Duration::MAX } else { ui.repaint_after() };
         let has_area = size.width > 0 && size.height > 0;
         // A script goes on whoever looks.
         let is_seen = self.script.is_some() || !(self.is_occluded || window.is_minimized() == Some(true));

@@ -6,6 +6,8 @@ const N_STEPS: u32 = 16;
 const LEAST_STEP: u32 = 2;
 /// A larger picture is drawn where it is expected to take no more than this share of the budget.
 const ROOM: f64 = 0.85;
+/// Milliseconds that input waits for while a picture at rest is drawn, if all parts of it take as long.
+pub const PART_MS: f64 = 100.0;
 /// Weight of the newest frame in the mean cost.
 const NEWEST: f64 = 0.4;
 
@@ -48,6 +50,14 @@ impl Budget {
         self.full_ms
     }
 
+    /// Pixels of a picture of a window's size that are drawn in about [`PART_MS`]; none where all of them are.
+    pub fn part_pixels(&self, (width, height): (u32, u32)) -> Option<u32> {
+        let n_parts = (self.full_ms? / PART_MS).ceil();
+        // Powers of two, so that estimates that waver do not change them.
+        let n_parts = (n_parts as u32).clamp(1, 1 << 12).next_power_of_two();
+        (n_parts > 1).then(|| (width * height).div_ceil(n_parts))
+    }
+
     /// The window has `ratio` times as many pixels as before. What small windows cost says nothing of large ones: beyond
     /// a factor of two it is learned anew.
     pub fn resize(&mut self, ratio: f64) {
@@ -74,6 +84,14 @@ impl Budget {
         } else if self.step < N_STEPS && expected(self.step + 1) <= ROOM * self.budget_ms {
             self.step += 1;
         }
+    }
+}
+
+/// Whether parts of so many pixels would take half or twice as long as before.
+pub fn is_other_pace(a: Option<u32>, b: Option<u32>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => a >= 2 * b || b >= 2 * a,
+        (a, b) => a != b,
     }
 }
 

@@ -11,6 +11,8 @@ use crate::scene::Camera;
 const TURN_A_HEIGHT: f32 = PI;
 /// The view keeps this far, radians, from looking straight up or down.
 const POLE_MARGIN: f32 = 0.02;
+/// Factor on the distance to the target for one step of the wheel.
+const DISTANCE_A_STEP: f32 = 0.85;
 /// Room around the scene's bounding sphere when it is framed.
 const FRAME_MARGIN: f32 = 1.05;
 
@@ -64,6 +66,34 @@ impl Controller {
     pub fn orbit(&mut self, x: f32, y: f32) {
         let view = self.turned(self.camera.target - self.camera.eye, x, y);
         self.camera.eye = self.camera.target - view;
+    }
+
+    /// Moves sideways, up and down: what is seen at the target's distance goes with a drag by `x` to the right and `y` down,
+    /// in heights of the window.
+    pub fn pan(&mut self, x: f32, y: f32) {
+        let step = self.across(-x, -y);
+        self.camera.eye += step;
+        self.camera.target += step;
+    }
+
+    /// Goes nearer to the target by steps of the wheel, or farther away where they are negative. What is seen at the target's
+    /// distance, `x` to the right of the window's middle and `y` below it, in its heights, stays where it is seen.
+    pub fn zoom(&mut self, steps: f32, x: f32, y: f32) {
+        let distance = (self.camera.target - self.camera.eye).length();
+        // A scene may look closer than the wheel leads to, or from farther away: from there it only leads back.
+        let (least, most) = (distance.min(1e-4 * self.radius), distance.max(1e3 * self.radius));
+        let share = (distance * DISTANCE_A_STEP.powf(steps)).clamp(least, most) / distance;
+        let point = self.camera.target + self.across(x, y);
+        self.camera.eye = point + (self.camera.eye - point) * share;
+        self.camera.target = point + (self.camera.target - point) * share;
+    }
+
+    /// The way across the view at the target's distance, `x` to the right and `y` down, in heights of the window.
+    fn across(&self, x: f32, y: f32) -> Vec3 {
+        let Axes { forward, right, .. } = self.axes();
+        let distance = (self.camera.target - self.camera.eye).length();
+        let height = 2.0 * distance * (self.camera.vertical_fov_degrees.to_radians() / 2.0).tan();
+        (right * x - right.cross(forward) * y) * height
     }
 
     /// The view, turned to the right and down about the camera's axes, kept off the poles.
@@ -200,6 +230,57 @@ mod tests {
                 assert!(right.is_finite() && controller.camera().eye.is_finite());
             }
         }
+    }
+
+    /// Where a point is seen, right of the window's middle and below it, in its heights.
+    fn seen_at(controller: &Controller, point: Vec3) -> (f32, f32) {
+        let Axes { forward, right, .. } = controller.axes();
+        let view = point - controller.camera.eye;
+        let height = 2.0 * view.dot(forward) * (controller.camera.vertical_fov_degrees.to_radians() / 2.0).tan();
+        (view.dot(right) / height, -view.dot(right.cross(forward)) / height)
+    }
+
+    fn is_near(a: (f32, f32), b: (f32, f32)) -> bool {
+        (a.0 - b.0).hypot(a.1 - b.1) < 1e-4
+    }
+
+    #[test]
+    fn the_wheel_goes_to_what_the_mouse_points_at() {
+        for (steps, x, y) in [(1.0, 0.0, 0.0), (3.0, 0.3, -0.2), (-2.5, -0.6, 0.4)] {
+            let mut controller = controller();
+            let before = *controller.camera();
+            let point = before.target + controller.across(x, y);
+            assert!(is_near(seen_at(&controller, point), (x, y)));
+            controller.zoom(steps, x, y);
+            assert!(is_near(seen_at(&controller, point), (x, y)), "{steps} steps");
+            let Camera { eye, target, .. } = *controller.camera();
+            let share = (target - eye).length() / (before.target - before.eye).length();
+            assert!((share - DISTANCE_A_STEP.powf(steps)).abs() < 1e-4);
+            assert!((target - eye).angle_between(before.target - before.eye) < 1e-3, "it looks where it looked");
+            assert!((target == before.target) == (x == 0.0));
+            controller.zoom(-steps, x, y);
+            assert!(apart(controller.camera(), &before) < 1e-3, "and back");
+        }
+    }
+
+    #[test]
+    fn the_wheel_ends_somewhere() {
+        for steps in [1e9, -1e9] {
+            let mut controller = controller();
+            controller.zoom(steps, 0.1, 0.1);
+            let distance = (controller.camera.target - controller.camera.eye).length();
+            assert!(distance > 0.0 && distance.is_finite() && controller.axes().right.is_finite());
+        }
+    }
+
+    #[test]
+    fn a_pan_takes_the_target_along_with_the_mouse() {
+        let mut controller = controller();
+        let before = *controller.camera();
+        controller.pan(0.25, -0.1);
+        let after = *controller.camera();
+        assert!(is_near(seen_at(&controller, before.target), (0.25, -0.1)));
+        assert!(((after.target - after.eye) - (before.target - before.eye)).length() < 1e-5);
     }
 
     #[test]

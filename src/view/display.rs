@@ -16,14 +16,12 @@ use super::{
     session::Session,
     tour::Tour,
 };
-use crate::{gpu::ContextOptions, render::Ways};
+use crate::{choices::Choices, gpu::ContextOptions};
 
 /// What the viewer is asked for.
 pub struct ViewOptions {
     /// The options' size is the window's at first.
     pub settings: Settings,
-    /// In place of the settings'.
-    pub ways: Ways,
     pub device: ContextOptions,
     /// Whether there is an overlay; the user can hide it.
     pub overlay: bool,
@@ -41,6 +39,8 @@ pub struct ViewOptions {
 #[derive(Serialize)]
 pub struct ViewReport {
     pub device: String,
+    /// As they were when the window was opened.
+    pub choices: Choices,
     #[serde(flatten)]
     pub pace: PaceReport,
     /// What the validation layer has said.
@@ -86,8 +86,8 @@ impl Display {
     pub fn view(self, loaded: Loaded, options: ViewOptions) -> Result<ViewReport, ViewError> {
         let script =
             (options.tour.clone()).map(|tour| Script::new(tour, options.record.clone(), options.screenshot.clone()));
-        let reloader = Reloader::new(loaded.path.clone(), self.event_loop.create_proxy());
-        let session = Session::new(loaded, options.settings.clone(), script.is_none());
+        let reloader = Reloader::new(loaded.path.clone(), loaded.load_options, self.event_loop.create_proxy());
+        let session = Session::new(loaded, options.settings.clone(), script.is_none(), options.print);
         let mut app = App::new(session, options, script, reloader);
         self.event_loop.run_app(&mut app).map_err(|error| ViewError::Window(error.to_string()))?;
         app.report()

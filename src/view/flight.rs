@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-/// Factor on the speed for one step of the wheel.
+/// Factor on the speed for one step of the wheel, or one press of a key.
 const SPEED_A_STEP: f32 = 1.25;
 /// Factor on the speed while a key for it is held.
 const HASTE: f32 = 4.0;
@@ -65,8 +65,8 @@ impl Flight {
         *self = Self { speed: self.speed, ..Self::new(self.radius) };
     }
 
-    /// The wheel: steps up make it faster for good.
-    pub fn wheel(&mut self, steps: f32) {
+    /// Makes it faster for good by so many steps, or slower where they are negative.
+    pub fn change_speed(&mut self, steps: f32) {
         let speed = self.speed * SPEED_A_STEP.powf(steps);
         self.speed = speed.clamp(self.radius * 1e-4, self.radius * 1e3);
     }
@@ -133,21 +133,21 @@ mod tests {
     }
 
     #[test]
-    fn keys_and_the_wheel_change_the_speed_within_bounds() {
+    fn keys_and_steps_change_the_speed_within_bounds() {
         let mut flight = Flight::new(2.0);
         flight.hold(Fly::Up, true);
         for (faster, slower, speed) in [(true, false, 4.0), (false, true, 0.25), (true, true, 1.0)] {
             flight.hurry(faster, slower);
             assert_eq!(flight.velocity(&AXES), Vec3::Y * speed);
         }
-        flight.wheel(2.0);
-        flight.wheel(-2.0);
+        flight.change_speed(2.0);
+        flight.change_speed(-2.0);
         assert!((flight.speed() - 1.0).abs() < 1e-6);
-        flight.wheel(1.0);
+        flight.change_speed(1.0);
         assert_eq!(flight.speed(), SPEED_A_STEP);
-        flight.wheel(-1e9);
+        flight.change_speed(-1e9);
         assert!(flight.speed() > 0.0);
-        flight.wheel(1e9);
+        flight.change_speed(1e9);
         assert!(flight.speed().is_finite());
     }
 }

@@ -2,16 +2,18 @@
 
 use winit::{
     event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent},
-    keyboard::{KeyCode, PhysicalKey},
+    keyboard::{Key, KeyCode, ModifiersState, PhysicalKey},
 };
 
-use super::{controller::Controller, flight::Fly};
+use super::{
+    controller::Controller,
+    flight::Fly,
+    mouse::{Drag, Mouse},
+};
 use crate::frame::View;
 
 /// Pixels of the wheel's travel where it has no steps.
 const WHEEL_STEP_PX: f64 = 50.0;
-/// A press that moves less, in pixels, is a click.
-const CLICK_PX: f64 = 3.0;
 
 /// What the user wants done, once.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +22,8 @@ pub enum Action {
     PrintCamera,
     FrameScene,
     GoHome,
-    ToggleOverlay,
+    TogglePanel,
+    ToggleKeys,
     Show(View),
     /// What a place of the window shows, pixels from its upper left corner.
     Pick {
@@ -38,12 +41,11 @@ pub struct Heard {
     pub moves: bool,
 }
 
-/// The mouse between events, and what the keys mean.
+/// What keys and the mouse mean.
 #[derive(Debug, Default)]
 pub struct Input {
-    cursor: (f64, f64),
-    /// Of the first button that is down: which, where it went down, whether it was dragged.
-    press: Option<(MouseButton, (f64, f64), bool)>,
+    mouse: Mouse,
+    modifiers: ModifiersState,
     /// Whether S flies back: from the first key that flies until the camera is put somewhere or goes round.
     is_flying: bool,
 }
@@ -54,8 +56,8 @@ impl Input {
         self.is_flying
     }
 
-    /// Handles an event that is not the overlay's; `height`: the window's, pixels.
-    pub fn hear(&mut self, event: &WindowEvent, height: u32, controller: &mut Controller) -> Heard {
+    /// Handles an event that is not the overlay's; `window`: its size in pixels.
+    pub fn hear(&mut self, event: &WindowEvent, window: (u32, u32), controller: &mut Controller) -> Heard {
         match event {
             // Keys that are down when the window gets them: those pressed since are told of once more.
             WindowEvent::KeyboardInput { event, is_synthetic: true, .. } if event.state.is_pressed() => {
@@ -63,22 +65,22 @@ impl Input {
             }
             WindowEvent::KeyboardInput { event, .. } => self.key(event, controller),
             WindowEvent::ModifiersChanged(modifiers) => {
-                let state = modifiers.state();
-                controller.flight.hurry(state.shift_key(), state.control_key());
+                self.modifiers = modifiers.state();
+                controller.flight.hurry(self.modifiers.shift_key(), self.modifiers.control_key());
                 Heard::default()
             }
-            WindowEvent::CursorMoved { position, .. } => self.motion((position.x, position.y), height, controller),
+            WindowEvent::CursorMoved { position, .. } => self.motion((position.x, position.y), window, controller),
             WindowEvent::MouseInput { state, button, .. } => self.button(*state, *button),
             WindowEvent::MouseWheel { delta, .. } => {
-                controller.flight.wheel(match delta {
+                let steps = match delta {
                     MouseScrollDelta::LineDelta(_, y) => *y,
                     MouseScrollDelta::PixelDelta(position) => (position.y / WHEEL_STEP_PX) as f32,
-                });
-                Heard::default()
+                };
+                self.wheel(steps, window, controller)
             }
             WindowEvent::Focused(false) => {
                 controller.flight.release();
-                self.press = None;
+                self.mouse.release();
                 Heard::default()
             }
             _ => Heard::default(),
@@ -86,6 +88,11 @@ impl Input {
     }
 
     fn key(&mut self, event: &KeyEvent, controller: &mut Controller) -> Heard {
+        if let (ElementState::Pressed, Key::Character(symbol)) = (event.state, &event.logical_key)
+            && let Some(heard) = press_symbol(symbol, event.repeat, controller)
+        {
+            return heard;
+        }
         let PhysicalKey::Code(code) = event.physical_key else { return Heard::default() };
         self.press_key(code, event.state.is_pressed(), event.repeat, controller)
     }
@@ -102,7 +109,8 @@ impl Input {
             KeyCode::KeyP => Some(Action::PrintCamera),
             KeyCode::KeyF => Some(Action::FrameScene),
             KeyCode::Home => Some(Action::GoHome),
-            KeyCode::Tab => Some(Action::ToggleOverlay),
+            KeyCode::KeyH | KeyCode::F1 => Some(Action::ToggleKeys),
+            KeyCode::Tab => Some(Action::TogglePanel),
             KeyCode::Escape => Some(Action::Quit),
             KeyCode::Digit1 => Some(Action::Show(View::Picture)),
             KeyCode::Digit2 => Some(Action::Show(View::Depth)),
@@ -131,44 +139,47 @@ impl Input {
         }
     }
 
-    fn motion(&mut self, to: (f64, f64), height: u32, controller: &mut Controller) -> Heard {
-        let from = std::mem::replace(&mut self.cursor, to);
-        let Some((button, start, was_dragged)) = &mut self.press else { return Heard::default() };
-        *was_dragged |= (to.0 - start.0).hypot(to.1 - start.1) > CLICK_PX;
-        if !*was_dragged {
+    /// Goes nearer or farther, or changes the speed of flight.
+    fn wheel(&mut self, steps: f32, window: (u32, u32), controller: &mut Controller) -> Heard {
+        if self.modifiers.control_key() || self.modifiers.alt_key() {
+            controller.flight.change_speed(steps);
             return Heard::default();
         }
-        let height = f64::from(height.max(1));
-        let (x, y) = (((to.0 - from.0) / height) as f32, ((to.1 - from.1) / height) as f32);
-        match button {
-            MouseButton::Left => {
-                self.is_flying = false;
-                controller.flight.release();
-                controller.orbit(x, y);
-            }
-            MouseButton::Right => {
-                self.is_flying = true;
-                controller.look(x, y);
-            }
-            _ => return Heard::default(),
+        let (x, y) = self.mouse.offset_from_middle(window);
+        controller.zoom(steps, x, y);
+        Heard { moves: steps != 0.0, action: None }
+    }
+
+    fn motion(&mut self, to: (f64, f64), window: (u32, u32), controller: &mut Controller) -> Heard {
+        let Some((drag, (x, y))) = self.mouse.moves(to, window) else { return Heard::default() };
+        self.is_flying = drag == Drag::Look;
+        if !self.is_flying {
+            controller.flight.release();
+        }
+        match drag {
+            Drag::Orbit => controller.orbit(x, y),
+            Drag::Look => controller.look(x, y),
+            Drag::Pan => controller.pan(x, y),
         }
         Heard { moves: true, action: None }
     }
 
     fn button(&mut self, state: ElementState, button: MouseButton) -> Heard {
-        let action = match (state, self.press) {
-            (ElementState::Pressed, None) => {
-                self.press = Some((button, self.cursor, false));
-                None
-            }
-            (ElementState::Released, Some((held, (x, y), was_dragged))) if held == button => {
-                self.press = None;
-                (button == MouseButton::Left && !was_dragged).then_some(Action::Pick { x, y })
-            }
-            _ => None,
-        };
-        Heard { action, moves: false }
+        let click = self.mouse.button(state, button, self.modifiers.shift_key());
+        Heard { action: click.map(|(x, y)| Action::Pick { x, y }), moves: false }
     }
+}
+
+/// Handles keys that are known by what they write, wherever the keyboard has them; none for others.
+fn press_symbol(symbol: &str, is_repeat: bool, controller: &mut Controller) -> Option<Heard> {
+    match symbol {
+        "+" | "=" => controller.flight.change_speed(1.0),
+        "-" => controller.flight.change_speed(-1.0),
+        "?" if is_repeat => {}
+        "?" => return Some(Heard { action: Some(Action::ToggleKeys), moves: false }),
+        _ => return None,
+    }
+    Some(Heard::default())
 }
 
 #[cfg(test)]
@@ -177,6 +188,8 @@ mod tests {
 
     use super::*;
     use crate::scene::Camera;
+
+    const WINDOW: (u32, u32) = (200, 100);
 
     fn controller() -> Controller {
         let camera = Camera { eye: vec3(0.0, 1.0, 5.0), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 40.0 };
@@ -208,21 +221,79 @@ mod tests {
     fn a_click_picks_and_a_drag_turns() {
         let (mut input, mut controller) = (Input::default(), controller());
         let start = *controller.camera();
-        input.motion((10.0, 20.0), 100, &mut controller);
+        input.motion((10.0, 20.0), WINDOW, &mut controller);
         input.button(ElementState::Pressed, MouseButton::Left);
-        input.motion((11.0, 21.0), 100, &mut controller);
+        input.motion((11.0, 21.0), WINDOW, &mut controller);
         let click = input.button(ElementState::Released, MouseButton::Left);
         assert_eq!(click.action, Some(Action::Pick { x: 10.0, y: 20.0 }));
         assert_eq!(*controller.camera(), start);
         for button in [MouseButton::Left, MouseButton::Right] {
             let before = *controller.camera();
             input.button(ElementState::Pressed, button);
-            assert!(input.motion((50.0, 20.0), 100, &mut controller).moves);
+            assert!(input.motion((50.0, 20.0), WINDOW, &mut controller).moves);
             assert_eq!(input.button(ElementState::Released, button).action, None);
             let after = *controller.camera();
             assert_eq!(before.eye == after.eye, button == MouseButton::Right);
             assert_eq!(before.target == after.target, button == MouseButton::Left);
-            assert!(!input.motion((10.0, 20.0), 100, &mut controller).moves);
+            assert!(!input.motion((10.0, 20.0), WINDOW, &mut controller).moves);
+        }
+    }
+
+    /// Eye and target after a drag to the right.
+    fn dragged(button: MouseButton, modifiers: ModifiersState) -> (Vec3, Vec3) {
+        let (mut input, mut controller) = (Input { modifiers, ..Input::default() }, controller());
+        input.motion((10.0, 20.0), WINDOW, &mut controller);
+        input.button(ElementState::Pressed, button);
+        input.motion((50.0, 20.0), WINDOW, &mut controller);
+        let Camera { eye, target, .. } = *controller.camera();
+        (eye, target)
+    }
+
+    #[test]
+    fn middle_drags_and_shifted_left_ones_pan() {
+        let Camera { eye, target, .. } = *controller().camera();
+        let panned = dragged(MouseButton::Middle, ModifiersState::empty());
+        assert_eq!(panned, dragged(MouseButton::Left, ModifiersState::SHIFT));
+        assert!(panned.0 != eye && (panned.0 - eye - (panned.1 - target)).length() < 1e-5);
+        assert_eq!(dragged(MouseButton::Left, ModifiersState::empty()).1, target, "without Shift it goes around");
+    }
+
+    #[test]
+    fn the_wheel_goes_nearer_and_with_ctrl_or_alt_changes_the_speed() {
+        let (mut input, mut controller) = (Input::default(), controller());
+        let (before, speed) = (*controller.camera(), controller.flight.speed());
+        input.motion((100.0, 50.0), WINDOW, &mut controller);
+        assert!(input.wheel(2.0, WINDOW, &mut controller).moves);
+        let after = *controller.camera();
+        let distance = |camera: &Camera| (camera.target - camera.eye).length();
+        assert!(distance(&after) < 0.9 * distance(&before) && (after.target - before.target).length() < 1e-5);
+        input.motion((200.0, 50.0), WINDOW, &mut controller);
+        input.wheel(1.0, WINDOW, &mut controller);
+        let right = (before.target - before.eye).cross(before.up);
+        assert!((controller.camera().target - after.target).dot(right) > 0.0, "to where the mouse points");
+        assert_eq!(controller.flight.speed(), speed);
+        for modifiers in [ModifiersState::CONTROL, ModifiersState::ALT] {
+            let (camera, speed) = (*controller.camera(), controller.flight.speed());
+            input.modifiers = modifiers;
+            assert!(!input.wheel(1.0, WINDOW, &mut controller).moves);
+            assert!(*controller.camera() == camera && controller.flight.speed() > speed);
+        }
+    }
+
+    #[test]
+    fn symbols_change_the_speed_and_show_the_keys() {
+        let mut controller = controller();
+        let speed = controller.flight.speed();
+        press_symbol("+", false, &mut controller);
+        assert!(controller.flight.speed() > speed);
+        press_symbol("-", true, &mut controller);
+        assert!((controller.flight.speed() - speed).abs() < 1e-6);
+        let shows = Some(Heard { action: Some(Action::ToggleKeys), moves: false });
+        assert_eq!(press_symbol("?", false, &mut controller), shows);
+        assert_eq!(press_symbol("?", true, &mut controller), Some(Heard::default()));
+        assert_eq!(press_symbol("a", false, &mut controller), None);
+        for code in [KeyCode::KeyH, KeyCode::F1] {
+            assert_eq!(tap(&mut Input::default(), &mut controller, code), Some(Action::ToggleKeys));
         }
     }
 }

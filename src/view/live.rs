@@ -6,15 +6,18 @@ use egui::TexturesDelta;
 
 use super::loaded::Loaded;
 use crate::{
+    choices::{Cache, Choices, Request, Workload},
     frame::RenderOptions,
     gpu::{Context, ContextOptions, GpuError, Overlay, OverlayFrame, Presenter, Screen},
     passes::Present,
-    render::{Renderer, Ways},
+    render::Renderer,
 };
 
 /// A scene on a device that shows its pictures in a window.
 pub struct Live {
     pub renderer: Renderer,
+    /// What was chosen for the scene that it was opened with.
+    pub choices: Choices,
     present: Present,
     overlay: Overlay,
     pub presenter: Presenter,
@@ -22,7 +25,7 @@ pub struct Live {
 }
 
 impl Live {
-    /// Opens the device and uploads the scene. ways: in place of the options'.
+    /// Opens the device and uploads the scene. `request`: the methods that the user wants, in place of the options'.
     ///
     /// # Errors
     /// No device can do it; the scene or the picture is beyond its limits or memory.
@@ -31,18 +34,22 @@ impl Live {
         device: &ContextOptions,
         loaded: &Loaded,
         options: &RenderOptions,
-        ways: Ways,
+        request: Request,
         vsync: bool,
     ) -> Result<Self, GpuError> {
         let (context, surface) = Context::for_window(device, window)?;
         // In motion, where it has to be quick, a picture is smaller than its window.
         let moving = (options.width / 4, options.height / 4);
-        let options = ways.suited(options, Some(&context), loaded.scene.triangles.len(), moving);
+        let workload = Workload { size: moving, ..loaded.load_options.workload };
+        let (scene, build_options, cache) = ((&loaded.scene, &loaded.tree), &loaded.build_options, Cache::open());
+        let methods = request.methods(Some(&context), scene, build_options, &workload, &cache)?;
+        let options = methods.apply(options);
         let presenter = Presenter::new(&context, surface, vsync)?;
         let overlay = Overlay::new(&context, &presenter)?;
         let renderer = Renderer::new(context.clone(), &loaded.scene, &loaded.tree, &options)?;
         let present = Present::new(&context, renderer.resources(), &presenter)?;
-        Ok(Self { renderer, present, overlay, presenter, context })
+        let choices = Choices::of_pictures(loaded.tree_kind, methods);
+        Ok(Self { renderer, choices, present, overlay, presenter, context })
     }
 
     /// Puts another scene in the place of the last one, which stays where that fails.
@@ -90,8 +97,8 @@ impl Live {
     pub fn show(&mut self, window: (u32, u32), overlay: Option<&OverlayFrame>) -> Result<bool, GpuError> {
         let Self { renderer, present, overlay: drawer, presenter, .. } = self;
         presenter.present(window, |commands, image| {
-            if let Some(size) = renderer.displayed() {
-                present.record(commands, renderer.resources(), size, image);
+            if let Some(displayed) = renderer.displayed() {
+                present.record(commands, renderer.resources(), displayed.size, image);
             }
             match overlay {
                 Some(frame) => drawer.draw(commands, image, frame),

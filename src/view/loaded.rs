@@ -8,15 +8,27 @@ use std::{
 use glam::Vec3;
 
 use crate::{
+    choices::{Chosen, Engine, Request, TreeKind, Workload},
     kdtree::{BuildOptions, KdTree, Statistics},
     scene::{Scene, SceneError, framing},
 };
+
+/// What the choice of a scene's tree depends on, each time that the scene is read.
+#[derive(Clone, Copy, Debug)]
+pub struct LoadOptions {
+    pub request: Request,
+    pub engine: Engine,
+    pub workload: Workload,
+}
 
 /// A scene and its tree.
 pub struct Loaded {
     pub path: PathBuf,
     pub scene: Scene,
     pub tree: KdTree,
+    pub tree_kind: Chosen<TreeKind>,
+    pub build_options: BuildOptions,
+    pub load_options: LoadOptions,
     pub statistics: Statistics,
     pub build_ms: f64,
 }
@@ -26,18 +38,20 @@ impl Loaded {
     ///
     /// # Errors
     /// The scene cannot be loaded.
-    pub fn load(path: &Path) -> Result<Self, SceneError> {
-        Ok(Self::with_tree(path, Scene::load(path)?))
+    pub fn load(path: &Path, load_options: LoadOptions) -> Result<Self, SceneError> {
+        Ok(Self::with_tree(path, Scene::load(path)?, load_options))
     }
 
     /// Builds a scene's tree.
-    pub fn with_tree(path: &Path, scene: Scene) -> Self {
-        let options = BuildOptions::default();
+    pub fn with_tree(path: &Path, scene: Scene, load_options: LoadOptions) -> Self {
+        let LoadOptions { request, engine, workload } = load_options;
+        let tree_kind = request.tree(engine, scene.triangles.len(), &workload);
+        let build_options = tree_kind.value.options(engine);
         let start = Instant::now();
-        let tree = KdTree::build(&scene.triangles, &options);
+        let tree = KdTree::build(&scene.triangles, &build_options);
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
-        let statistics = tree.statistics(scene.triangles.len(), &options);
-        Self { path: path.to_owned(), scene, tree, statistics, build_ms }
+        let statistics = tree.statistics(scene.triangles.len(), &build_options);
+        Self { path: path.to_owned(), scene, tree, tree_kind, build_options, load_options, statistics, build_ms }
     }
 
     /// Smallest and largest coordinates.

@@ -11,6 +11,7 @@ pub mod history;
 mod input;
 mod live;
 pub mod loaded;
+mod mouse;
 mod pace;
 pub mod panel;
 pub mod pick;
@@ -26,7 +27,7 @@ pub mod watch;
 pub use self::{
     display::{Display, PaceReport, ViewOptions, ViewReport},
     error::ViewError,
-    loaded::Loaded,
+    loaded::{LoadOptions, Loaded},
     panel::Settings,
     tour::Tour,
 };

@@ -4,7 +4,13 @@ use std::{collections::BTreeSet, path::PathBuf, thread, time::Instant};
 
 use winit::event_loop::EventLoopProxy;
 
-use super::{error::Topic, live::Live, loaded::Loaded, session::Session, watch::Watch};
+use super::{
+    error::Topic,
+    live::Live,
+    loaded::{LoadOptions, Loaded},
+    session::Session,
+    watch::Watch,
+};
 use crate::scene::{SceneError, source_files};
 
 /// What wakes the viewer.
@@ -45,6 +51,7 @@ impl OneAtATime {
 /// Watches the scene's files and reads them again on a thread of its own.
 pub struct Reloader {
     path: PathBuf,
+    load_options: LoadOptions,
     /// All that the scene has named so far.
     files: BTreeSet<PathBuf>,
     proxy: EventLoopProxy<Wake>,
@@ -56,9 +63,10 @@ pub struct Reloader {
 }
 
 impl Reloader {
-    pub fn new(path: PathBuf, proxy: EventLoopProxy<Wake>) -> Self {
+    pub fn new(path: PathBuf, load_options: LoadOptions, proxy: EventLoopProxy<Wake>) -> Self {
         let mut reloader = Self {
             path,
+            load_options,
             files: BTreeSet::new(),
             #[cfg(feature = "hot-reload")]
             shaders: super::shaders::Shaders::new(proxy.clone()),
@@ -88,8 +96,9 @@ impl Reloader {
     /// Begins to read the scene again, or does so once it is read that is being read.
     pub fn load(&mut self) {
         if self.loading.begin() {
-            let (path, proxy) = (self.path.clone(), self.proxy.clone());
-            thread::spawn(move || drop(proxy.send_event(Wake::Reloaded(Box::new(Loaded::load(&path))))));
+            let (path, load_options, proxy) = (self.path.clone(), self.load_options, self.proxy.clone());
+            let load = move || Box::new(Loaded::load(&path, load_options));
+            thread::spawn(move || drop(proxy.send_event(Wake::Reloaded(load()))));
         }
     }
 

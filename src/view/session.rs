@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::{
-    budget::Budget,
+    budget::{Budget, PART_MS, is_other_pace},
     controller::Controller,
     error::Topic,
     history::{FrameRecord, History},
@@ -22,8 +22,6 @@ use crate::{
 const HISTORY_S: f64 = 5.0;
 /// Reads of the tree, for each of its levels, that are shown brightest: some rays of some ways down and up.
 const STEPS_A_LEVEL: u32 = 16;
-/// Milliseconds that input waits for at the most, as a rule, while a picture at rest is drawn.
-const PART_MS: f64 = 100.0;
 
 /// What is viewed, from where, how.
 pub struct Session {
@@ -35,7 +33,8 @@ pub struct Session {
     pub history: History,
     /// Of all the time, without passes.
     pub all_frames: History,
-    budget: Budget,
+    /// Of views that need all rays, and of those that need primary rays only.
+    budgets: [Budget; 2],
     profile: Profile,
     /// Whether nobody waits for pictures of full size.
     is_interactive: bool,
@@ -50,15 +49,19 @@ pub struct Session {
     /// Milliseconds of the sample that is being drawn.
     sample_ms: f64,
     pub(super) picked: Option<Picked>,
+    /// Whether the picture is to be saved once it is drawn in full.
+    pub(super) is_save_due: bool,
+    /// Writes to the terminal.
+    pub(super) print: fn(&str),
     message: Option<(Topic, String)>,
     start: Instant,
 }
 
 impl Session {
-    pub fn new(loaded: Loaded, settings: Settings, is_interactive: bool) -> Self {
+    pub fn new(loaded: Loaded, settings: Settings, is_interactive: bool, print: fn(&str)) -> Self {
         Self {
             controller: Controller::new(loaded.scene.camera, loaded.bounds()),
-            budget: Budget::new(settings.budget_ms),
+            budgets: [(); 2].map(|()| Budget::new(settings.budget_ms)),
             loaded,
             settings,
             pace: Pace::default(),
@@ -72,6 +75,8 @@ impl Session {
             room: (0, 0),
             window: (0, 0),
             picked: None,
+            is_save_due: false,
+            print,
             message: None,
             start: Instant::now(),
         }
@@ -85,17 +90,32 @@ impl Session {
             || self.controller.flight.is_under_way()
             || self.pace.is_moving(now)
             || self.is_learning()
+            || self.has_new_sample // what the overlay says of it comes a frame later
             || !self.is_done(live)
     }
 
     /// Whether it is not known yet how long a picture takes: small ones tell.
     fn is_learning(&self) -> bool {
-        self.is_interactive && self.budget.full_ms().is_none()
+        self.is_interactive && self.budget().full_ms().is_none()
     }
 
     /// Whether the picture at rest has all its samples.
     pub fn is_done(&self, live: &Live) -> bool {
-        !live.renderer.is_pending() && live.renderer.n_samples() >= self.settings.max_samples
+        !live.renderer.is_pending() && live.renderer.n_samples() >= self.n_wanted()
+    }
+
+    /// Samples a pixel at which the view is done: what primary rays meet is that of one sample.
+    fn n_wanted(&self) -> u32 {
+        if self.settings.view.needs_primary_rays_only() { 1 } else { self.settings.max_samples }
+    }
+
+    /// What such views cost.
+    fn budget(&self) -> &Budget {
+        &self.budgets[usize::from(self.settings.view.needs_primary_rays_only())]
+    }
+
+    fn budget_mut(&mut self) -> &mut Budget {
+        &mut self.budgets[usize::from(self.settings.view.needs_primary_rays_only())]
     }
 
     /// Draws what the frame needs: one sample more, of a smaller picture while the camera moves. `window`: pixels, not 0.
@@ -112,21 +132,25 @@ impl Session {
         // Frames in flight read what changes here.
         live.context.wait()?;
         live.presenter.set_vsync(self.settings.vsync);
-        self.budget.set_budget(self.settings.budget_ms);
+        self.budgets.iter_mut().for_each(|budget| budget.set_budget(self.settings.budget_ms));
         self.fit_window(live, window)?;
         let features = self.settings.view != View::Picture;
         let whole = RenderOptions { width: window.0, height: window.1, features, ..self.settings.options.clone() };
         let (view, brightest) = self.view();
         let is_other_view = live.renderer.set_view(view, brightest);
         let makes_room = !self.has_room(live, &whole);
-        if self.is_interactive && (is_other_view || makes_room) {
+        let is_elsewhere = self.controller.camera() != live.renderer.camera();
+        if is_elsewhere || is_other_view {
+            self.save_what_is_left(live);
+        }
+        if self.is_interactive && (is_elsewhere || is_other_view || makes_room) {
             // A small picture at once.
             live.renderer.reset_samples();
             self.pace.moved(now);
         }
         let is_moving = self.pace.is_moving(now) || self.is_learning();
         self.is_moving = self.pace.is_moving(now);
-        let (width, height) = if is_moving { self.budget.size(window) } else { window };
+        let (width, height) = if is_moving { self.budget().size(window) } else { window };
         let asked = RenderOptions { width, height, ..whole.clone() };
         let is_new = asked != *live.renderer.options();
         // Room for the whole picture before a small one is drawn: to make it later would lose that one.
@@ -137,7 +161,7 @@ impl Session {
                 break;
             }
         }
-        if self.controller.camera() != live.renderer.camera() {
+        if is_elsewhere {
             live.renderer.set_camera(self.controller.camera());
         }
         if self.is_learning() {
@@ -160,7 +184,8 @@ impl Session {
             return Ok(());
         }
         let n_pixels = |(width, height): (u32, u32)| f64::from(width) * f64::from(height);
-        self.budget.resize(n_pixels(window) / n_pixels(before));
+        let ratio = n_pixels(window) / n_pixels(before);
+        self.budgets.iter_mut().for_each(|budget| budget.resize(ratio));
         // Parts as small as a small window's would be too many for a large one.
         live.renderer.limit_batches(None)
     }
@@ -179,38 +204,25 @@ impl Session {
         let renderer = &mut live.renderer;
         if !renderer.is_pending() {
             self.sample_ms = 0.0;
-            let most_pixels = self.part_pixels(window).filter(|_| !is_moving);
+            let most_pixels = self.budget().part_pixels(window).filter(|_| !is_moving);
             if renderer.n_samples() == 0 || is_other_pace(most_pixels, renderer.most_pixels()) {
                 renderer.limit_batches(most_pixels)?;
             }
         }
         let start = Instant::now();
-        let complete = renderer.draw_part()?;
-        self.sample_ms += start.elapsed().as_secs_f64() * 1e3;
+        let spent_ms = || start.elapsed().as_secs_f64() * 1e3;
+        let mut complete = renderer.draw_part()?;
+        // Small pictures let parts seem slower than they are.
+        while complete.is_none() && spent_ms() < PART_MS / 2.0 {
+            complete = renderer.draw_part()?;
+        }
+        self.sample_ms += spent_ms();
         if let Some(profile) = complete {
             let share = f64::from(renderer.options().height) / f64::from(window.1);
-            self.budget.learn(share, self.sample_ms);
+            let sample_ms = self.sample_ms;
+            self.budget_mut().learn(share, sample_ms);
             self.profile = profile;
             self.has_new_sample = true;
-        }
-        Ok(())
-    }
-
-    /// Pixels that are drawn in about [`PART_MS`]; none where the whole picture is.
-    fn part_pixels(&self, (width, height): (u32, u32)) -> Option<u32> {
-        let n_parts = (self.budget.full_ms()? / PART_MS).ceil();
-        // Powers of two, so that estimates that waver do not change them.
-        let n_parts = (n_parts as u32).clamp(1, 1 << 12).next_power_of_two();
-        (n_parts > 1).then(|| (width * height).div_ceil(n_parts))
-    }
-
-    /// The picture as it is wanted by those who save it: a sample that is begun is completed.
-    ///
-    /// # Errors
-    /// A failed call.
-    pub fn complete(&self, live: &mut Live) -> Result<(), GpuError> {
-        if live.renderer.is_pending() || live.renderer.n_samples() == 0 {
-            live.renderer.draw_sample()?;
         }
         Ok(())
     }
@@ -262,9 +274,11 @@ impl Session {
             window,
             picture: (options.width, options.height),
             n_samples: live.renderer.n_samples(),
+            n_wanted: self.n_wanted(),
             progress: live.renderer.progress(),
             speed: self.controller.flight.speed(),
             is_flying,
+            is_save_due: self.is_save_due,
             profile: &self.profile,
             history: &self.history,
             memory: live.context.memory(),
@@ -282,13 +296,5 @@ impl Session {
     /// What went wrong there is right again.
     pub fn settle(&mut self, topic: Topic) {
         self.message.take_if(|(wrong, _)| *wrong == topic);
-    }
-}
-
-/// Whether parts of so many pixels would take half or twice as long as before.
-fn is_other_pace(a: Option<u32>, b: Option<u32>) -> bool {
-    match (a, b) {
-        (Some(a), Some(b)) => a >= 2 * b || b >= 2 * a,
-        (a, b) => a != b,
     }
 }

@@ -1,15 +1,20 @@
 //! egui between the window and the overlay.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use egui::{Context, Order, Popup, Pos2, TexturesDelta, ViewportId, pos2};
 use egui_winit::State;
 use winit::{
-    event::{ElementState, WindowEvent},
+    event::{ElementState, KeyEvent, WindowEvent},
+    keyboard::{KeyCode, PhysicalKey},
     window::Window,
 };
 
-use super::panel::{self, Facts, Settings};
+use super::{
+    live::Live,
+    panel::{self, Facts, Layers, Settings},
+    session::Session,
+};
 use crate::gpu::OverlayFrame;
 
 /// The overlay's state.
@@ -66,15 +71,50 @@ impl Ui {
     }
 
     /// Lays the overlay out; changes the settings as the user does.
-    pub fn layout(&mut self, window: &Window, settings: &mut Settings, facts: &Facts) -> Layout {
+    pub fn layout(&mut self, window: &Window, layers: Layers, settings: &mut Settings, facts: &Facts) -> Layout {
         let input = self.state.take_egui_input(window);
         let context = self.state.egui_ctx().clone();
-        let output = context.run_ui(input, |ui| panel::show(ui, settings, facts));
+        let output = context.run_ui(input, |ui| panel::show(ui, layers, settings, facts));
         self.state.handle_platform_output(window, output.platform_output);
         let root = output.viewport_output.get(&ViewportId::ROOT);
         self.repaint_after = root.map_or(Duration::MAX, |viewport| viewport.repaint_delay);
         let pixels_per_point = output.pixels_per_point;
         let primitives = context.tessellate(output.shapes, pixels_per_point);
         Layout { frame: OverlayFrame { primitives, pixels_per_point }, textures: output.textures_delta }
+    }
+}
+
+/// Lays out what lies over the session's picture; takes over what the user sets there.
+pub fn lay_out(
+    session: &mut Session,
+    live: &Live,
+    (ui, window, layers): (&mut Ui, &Window, Layers),
+    is_flying: bool,
+) -> Layout {
+    let size = window.inner_size();
+    let mut settings = session.settings.clone();
+    let facts = session.facts(live, (size.width, size.height), is_flying);
+    let layout = ui.layout(window, layers, &mut settings, &facts);
+    if settings != session.settings {
+        session.pace.hear(Instant::now());
+        session.settings = settings;
+    }
+    layout
+}
+
+/// Whether the event is the Tab key, which shows and hides the panel whatever has the keys.
+pub fn is_tab(event: &WindowEvent) -> bool {
+    let tab = PhysicalKey::Code(KeyCode::Tab);
+    matches!(event, WindowEvent::KeyboardInput {
+        event: KeyEvent { physical_key, state: ElementState::Pressed, .. }, ..
+    } if *physical_key == tab)
+}
+
+/// Whether a key or a button of the mouse goes down.
+pub fn is_press(event: &WindowEvent) -> bool {
+    match event {
+        WindowEvent::KeyboardInput { event, is_synthetic: false, .. } => event.state.is_pressed(),
+        WindowEvent::MouseInput { state, .. } => state.is_pressed(),
+        _ => false,
     }
 }

@@ -45,14 +45,15 @@ fn small_queues_give_the_same_bits_on_the_device() {
 fn small_queues_give_the_same_bits_on_the_cpu() {
     let (scene, options) = (glass_in_glass(), options(32, 24, 8));
     let tree = tree_of(&scene);
-    let (whole, one) = cpu::render(&scene, &tree, &options);
+    let (whole, one) = cpu::render(&scene, &tree, &options).expect("a scene and its tree");
     assert_eq!(one.n_batches, 1);
     for batching in [
         Batching { n_pixels: 100, ..Batching::default() },
         Batching { n_pixels: 1 << 16, queue_capacity: 300 },
         Batching { n_pixels: 768, queue_capacity: 1 },
     ] {
-        let (picture, profile) = cpu::render_in_batches(&scene, &tree, &options, batching);
+        let (picture, profile) =
+            cpu::render_in_batches(&scene, &tree, &options, batching).expect("a scene and its tree");
         assert!(profile.n_batches > 1);
         assert!(identical(&whole, &picture), "{batching:?}");
         assert_eq!(profile.bounces, one.bounces, "{batching:?}");
@@ -90,7 +91,7 @@ fn every_number_of_threads_gives_the_same_bits() {
     let tree = tree_of(&scene);
     let on_threads = |n| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("a pool");
-        pool.install(|| cpu::render(&scene, &tree, &options).0)
+        pool.install(|| cpu::render(&scene, &tree, &options).expect("a scene and its tree").0)
     };
     let picture = on_threads(1);
     assert!([2, 3, 8].into_iter().all(|n| identical(&picture, &on_threads(n))));
@@ -103,7 +104,7 @@ fn device_and_cpu_count_alike() {
     let context = device();
     let (_, device) =
         Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer").render().expect("a frame");
-    let (_, cpu) = cpu::render(&scene, &tree, &options);
+    let (_, cpu) = cpu::render(&scene, &tree, &options).expect("a scene and its tree");
     assert_eq!(device.bounces.len(), cpu.bounces.len());
     for (a, b) in device.bounces.iter().zip(&cpu.bounces) {
         let near = |a: u64, b: u64| a.abs_diff(b) <= b / 50;

@@ -33,7 +33,7 @@ fn on_cpu(scene: &Scene, options: &RenderOptions) -> Vec<Feature> {
 }
 
 fn on_cpu_by(tree: &KdTree, scene: &Scene, options: &RenderOptions) -> Vec<Feature> {
-    let mut renderer = cpu::Renderer::new(scene, tree, options, Batching::default());
+    let mut renderer = cpu::Renderer::new(scene, tree, options, Batching::default()).expect("a scene and its tree");
     renderer.draw_sample();
     renderer.features()
 }
@@ -105,10 +105,8 @@ fn device_and_cpu_agree() {
 fn device_and_cpu_count_the_same_steps() {
     let scene = scenes::mixed_outdoors();
     let tree = tree_of(&scene);
-    let mut tree_on_cpu = tree.clone();
-    if device().is_software() {
-        tree_on_cpu.slabs.clear();
-    }
+    let slabs = !device().is_software();
+    let tree_on_cpu = KdTree::build(&scene.triangles, &BuildOptions { slabs, ..BuildOptions::default() });
     for &traversal in Traversal::ALL.iter().filter(|&&traversal| traversal != Traversal::Brute) {
         let options = noting(RenderOptions { primary: Primary::Trace, traversal, ..options(60, 45, 3) });
         let (a, b) = (on_device_by(&tree, &scene, &options), on_cpu_by(&tree_on_cpu, &scene, &options));
@@ -127,7 +125,7 @@ fn steps_through_one_leaf_are_known() {
     scenes::add(&mut scene, scenes::room(0.5)[..2].to_vec(), scenes::diffuse(Vec3::ONE));
     let n_triangles = scene.triangles.len() as u32;
     let tree = KdTree::build(&scene.triangles, &BuildOptions { slabs: false, ..BuildOptions::default() });
-    assert_eq!(tree.nodes.len(), 2, "the root and the place beside it");
+    assert_eq!(tree.nodes().len(), 2, "the root and the place beside it");
     for features in [on_device_by, on_cpu_by]
         .map(|render| render(&tree, &scene, &noting(RenderOptions { primary: Primary::Trace, ..options(40, 30, 1) })))
     {
@@ -142,7 +140,8 @@ fn rays_are_counted_as_in_the_profile() {
     let (scene, options) = (scenes::mixed(), noting(options(40, 30, 4)));
     let tree = tree_of(&scene);
     let mut device = Renderer::new(device(), &scene, &tree, &options).expect("a renderer");
-    let mut cpu = cpu::Renderer::new(&scene, &tree, &options, Batching { n_pixels: 500, queue_capacity: 300 });
+    let batching = Batching { n_pixels: 500, queue_capacity: 300 };
+    let mut cpu = cpu::Renderer::new(&scene, &tree, &options, batching).expect("a scene and its tree");
     let profiles = [device.draw().expect("a frame"), cpu.draw_sample()];
     for (profile, features) in profiles.iter().zip([device.features().expect("features"), cpu.features()]) {
         let counted: u64 = features.iter().map(|feature| u64::from(feature.n_rays)).sum();

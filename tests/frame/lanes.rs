@@ -2,12 +2,12 @@
 
 use kdray::{
     frame::{Primary, RenderOptions},
-    gpu::{Context, ContextOptions},
+    gpu::Context,
     render::Renderer,
 };
 
 use super::studio::{assert_silent, device, identical, options, tree_of};
-use crate::support::scenes;
+use crate::support::{scenes, with_lanes};
 
 #[test]
 fn a_device_with_lanes_to_spare_gives_the_same_bits() {
@@ -23,9 +23,8 @@ fn a_device_with_lanes_to_spare_gives_the_same_bits() {
     };
     let (expected, lanes_log2) = picture(&plain);
     assert!(lanes_log2.iter().all(|&log2| log2 == 0), "{lanes_log2:?}");
-    let options = ContextOptions { device: None, validate: true };
     // Ever fewer rays have ever more lanes.
-    let spare = Context::with_lanes(&options, 3000).expect("a device with validation");
+    let spare = with_lanes(3000);
     let (found, lanes_log2) = picture(&spare);
     assert!(lanes_log2[0] == 1 && lanes_log2.is_sorted() && lanes_log2[3] > 1, "{lanes_log2:?}");
     assert!(identical(&expected, &found));

@@ -7,7 +7,7 @@ use glam::Vec3;
 use kdray::{
     cast::{CastRay, Caster, Query},
     frame::{Primary, RenderOptions, Traversal},
-    gpu::{Buffer, BufferUse, Context, ContextOptions, GpuError},
+    gpu::{Buffer, BufferUse, Context, DeviceOverrides, GpuError},
     kdtree::KdTree,
     layout::{Frame, KdRope, LargeTriangle, LeafTriangle},
     passes::{Reading, Tree},
@@ -16,14 +16,13 @@ use kdray::{
 };
 
 use super::studio::{assert_silent, device, identical, options, tree_of};
-use crate::support::{meshes, scenes};
+use crate::support::{meshes, pretended, scenes};
 
 /// What the device binds, bytes: enough for the pictures here.
 const RANGE: u64 = 48 << 10;
 
 fn device_with(bytes: u64, n_texels: u32) -> Arc<Context> {
-    let options = ContextOptions { device: None, validate: true };
-    Context::with_ranges(&options, bytes, n_texels).expect("a device with validation")
+    pretended(DeviceOverrides { storage_range: Some(bytes), n_texels: Some(n_texels), ..DeviceOverrides::default() })
 }
 
 fn small_device() -> Arc<Context> {
@@ -32,7 +31,7 @@ fn small_device() -> Arc<Context> {
 
 /// Ropes or the leaves' triangles have the most, one each and three each.
 fn most_texels(tree: &KdTree) -> u32 {
-    (6 * tree.nodes.len()).max(3 * tree.leaf_triangles.len()) as u32
+    (6 * tree.nodes().len()).max(3 * tree.leaf_triangles().len()) as u32
 }
 
 /// How a device reads what it can bind.
@@ -172,9 +171,9 @@ fn rays_through_a_scene_larger_than_what_the_device_binds_find_the_same_hits() {
 fn a_scene_is_read_by_address_only_where_something_of_it_cannot_be_bound() {
     let scene = scenes::mixed();
     let tree = tree_of(&scene);
-    let ropes = (6 * tree.nodes.len() * size_of::<KdRope>()) as u64;
-    let planes = size_of_val(&*tree.leaf_planes) as u64;
-    let leaf_triangles = (tree.leaf_triangles.len() * size_of::<LeafTriangle>()) as u64;
+    let ropes = (6 * tree.nodes().len() * size_of::<KdRope>()) as u64;
+    let planes = size_of_val(tree.leaf_planes()) as u64;
+    let leaf_triangles = (tree.leaf_triangles().len() * size_of::<LeafTriangle>()) as u64;
     let largest = leaf_triangles.max(size_of_val(&*scene.triangles) as u64).max(planes).max(ropes);
     let most_texels = most_texels(&tree);
     let usual = usual_reading(&device(), &tree);

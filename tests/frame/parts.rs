@@ -1,8 +1,9 @@
 //! A sample in parts is the sample in one, bit for bit, and shows nothing of itself before it is complete.
 
 use kdray::{
-    frame::{Picture, RenderOptions},
-    render::Renderer,
+    frame::{Picture, RenderOptions, View},
+    render::{Displayed, Renderer},
+    scene::Camera,
 };
 
 use super::{
@@ -103,14 +104,88 @@ fn the_picture_changes_with_the_last_part() {
     assert!(renderer.draw_part().expect("a part").is_none());
     assert_eq!(renderer.displayed(), None);
     assert!(renderer.draw_part().expect("a part").is_some());
-    assert_eq!(renderer.displayed(), Some((32, 24)));
+    let seen_from = |camera: Camera, size| Some(Displayed { size, camera });
+    assert_eq!(renderer.displayed(), seen_from(scene.camera, (32, 24)));
+    let elsewhere = Camera { vertical_fov_degrees: 20.0, ..scene.camera };
+    renderer.set_camera(&elsewhere);
+    let before = renderer.displayed_picture().expect("a picture");
+    assert!(renderer.draw_part().expect("a part").is_none());
+    assert_eq!(renderer.displayed(), seen_from(scene.camera, (32, 24)), "what is seen is still the one before");
+    assert_eq!(renderer.displayed_picture().expect("a picture"), before);
+    assert!(renderer.draw_part().expect("a part").is_some());
+    assert_eq!(renderer.displayed(), seen_from(elsewhere, (32, 24)));
     renderer.resize(16, 12).expect("a size");
     assert!(renderer.draw_part().expect("a part").is_some());
-    assert_eq!(renderer.displayed(), Some((16, 12)));
+    assert_eq!(renderer.displayed(), seen_from(elsewhere, (16, 12)));
     renderer.resize(32, 24).expect("a size");
     assert!(renderer.draw_part().expect("a part").is_none());
-    assert_eq!(renderer.displayed(), Some((16, 12)), "what is seen is still the small one");
+    assert_eq!(renderer.displayed(), seen_from(elsewhere, (16, 12)), "what is seen is still the small one");
+    let small = renderer.displayed_picture().expect("a picture").expect("one is shown");
+    assert_eq!((small.width, small.height, small.display.len()), (16, 12, 16 * 12));
     renderer.resize(64, 48).expect("a size");
     assert_eq!(renderer.displayed(), None, "larger buffers hold nothing yet");
+    assert_silent(&context);
+}
+
+#[test]
+fn steps_make_the_same_picture() {
+    let (scene, context) = (glass_in_glass(), device());
+    let tree = tree_of(&scene);
+    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options_of_parts()).expect("a renderer");
+    let whole = at_once(&mut renderer, 2);
+    renderer.reset_samples();
+    for _ in 0..2 {
+        let mut shares = vec![0.0];
+        while renderer.draw_step().expect("a step").is_none() {
+            shares.push(renderer.progress());
+        }
+        // What begins and ends the frame, its bounces and their light; more where rays can stall.
+        assert!(shares.len() >= options_of_parts().max_depth as usize + 3);
+        assert!(shares.is_sorted_by(|a, b| a < b) && shares.iter().all(|share| *share < 1.0), "{shares:?}");
+    }
+    assert!(identical(&renderer.picture().expect("a picture"), &whole));
+    assert_silent(&context);
+}
+
+/// Depth, normals and triangles: no ray but primary ones, the same features, and afterwards the same picture.
+#[test]
+fn views_of_first_hits_trace_primary_rays_only() {
+    let (scene, context) = (glass_in_glass(), device());
+    let tree = tree_of(&scene);
+    let options = RenderOptions { features: true, ..options_of_parts() };
+    let new = || Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
+    let (mut whole, mut renderer) = (new(), new());
+    let picture = at_once(&mut whole, 2);
+    whole.draw().expect("a frame");
+    let features = whole.features().expect("features");
+    for (view, most_pixels) in [(View::Depth, None), (View::Normal, Some(200)), (View::Id, None)] {
+        renderer.limit_batches(most_pixels).expect("batches");
+        assert!(renderer.set_view(view, 1.0));
+        assert!(renderer.draw_part().expect("a part").is_some() == most_pixels.is_none());
+        renderer.reset_samples();
+        let profile = renderer.draw_sample().expect("a sample");
+        let names: Vec<_> = profile.passes.iter().map(|pass| pass.name).collect();
+        for name in ["trace", "compact_reduce", "shadow", "shade", "resolve", "accumulate", "denoise"] {
+            assert!(!names.contains(&name), "{view} runs {name}");
+        }
+        assert!(names.contains(&"primary_hit") && names.last() == Some(&"false_color"), "{view}: {names:?}");
+        assert!(profile.bounces[0].n_rays == 32 * 24 && profile.bounces[1..].iter().all(|bounce| bounce.n_rays == 0));
+        for (found, expected) in renderer.features().expect("features").iter().zip(&features) {
+            assert_eq!((found.triangle_ix, found.depth), (expected.triangle_ix, expected.depth));
+            assert_eq!((found.normal_world, found.material_ix), (expected.normal_world, expected.material_ix));
+        }
+        renderer.show().expect("the view again");
+        // The picture again, and features with all rays.
+        renderer.set_view(View::Picture, 1.0);
+        assert_eq!(renderer.n_samples(), 0, "no sample of the picture is there yet");
+        assert!(identical(&in_parts(&mut renderer, 2).0, &picture), "after {view}");
+        renderer.draw().expect("a frame");
+        assert_eq!(renderer.features().expect("features"), features);
+    }
+    for view in [View::Cost, View::Rays] {
+        renderer.set_view(view, 1.0);
+        renderer.draw().expect("a frame");
+        assert_eq!(renderer.features().expect("features"), features, "{view} sums over all rays");
+    }
     assert_silent(&context);
 }

@@ -5,17 +5,17 @@ use std::collections::HashSet;
 use glam::UVec2;
 use kdray::{
     camera::frame_constants,
+    choices::{Engine, primary_by_rule, traversal_by_rule},
     cpu::{bindings::Bindings, primary_hit::camera_ray, traverser::Traverser},
     frame::{Crop, Picture, Primary, RenderOptions, Traversal},
-    gpu::{Context, ContextOptions},
     kdtree::KdTree,
     layout::Frame,
-    render::{Renderer, suited_primary, suited_traversal},
+    render::Renderer,
     scene::Scene,
 };
 
 use super::studio::{assert_silent, device, differing, identical, on_cpu, on_device, options, tree_of};
-use crate::support::scenes;
+use crate::support::{scenes, with_lanes, without_wide_atomics};
 
 /// Whether rays within 1/8 px of the pixel's centre meet more than one triangle. (Corners are snapped to a grid of
 /// 1/16 px or finer.)
@@ -89,16 +89,16 @@ fn compute_and_trace_are_the_same() {
 /// What takes less work, and what there is room for. A device that takes branches lane by lane is taken for a GPU.
 #[test]
 fn ways_suit_the_device() {
-    let gpu = Context::with_lanes(&ContextOptions::default(), 1000).expect("a device");
-    let suited = |n_triangles| suited_primary(Some(&gpu), n_triangles, (100, 80));
+    let gpu = with_lanes(1000);
+    let suited = |n_triangles| primary_by_rule(Some(&gpu), n_triangles, (100, 80));
     let by_kernels = if gpu.has_wide_atomics() { Primary::Compute } else { Primary::Trace };
     assert_eq!([suited(8001), suited(usize::MAX)], [by_kernels, Primary::Trace]);
-    let without = Context::without_wide_atomics(&ContextOptions::default()).expect("a device");
+    let without = without_wide_atomics();
     let n_raster = if without.runs_both_sides() { 4 * 8000 } else { 8000 };
-    let suited = [n_raster, n_raster + 1].map(|n| suited_primary(Some(&without), n, (100, 80)));
+    let suited = [n_raster, n_raster + 1].map(|n| primary_by_rule(Some(&without), n, (100, 80)));
     assert_eq!(suited, [Primary::Raster, Primary::Trace]);
     let way = if without.runs_both_sides() { Traversal::Ropes } else { Traversal::Mask };
-    let suited = [Some(&*gpu), Some(&*without), None].map(suited_traversal);
+    let suited = [Some(&*gpu), Some(&*without), None].map(|context| traversal_by_rule(Engine::of(context)));
     assert_eq!(suited, [Traversal::Mask, way, Traversal::Stack]);
 }
 

@@ -6,19 +6,19 @@ use glam::Vec3;
 use kdray::{
     cpu::{self, Batching},
     frame::{Picture, Primary, RenderOptions, Traversal},
-    gpu::{Context, ContextOptions},
+    gpu::Context,
     kdtree::{BuildOptions, KdTree},
-    layout::Feature,
+    layout::{Feature, Slab},
     render::Renderer,
     scene::Scene,
 };
 
 use super::studio::{assert_silent, identical, options};
-use crate::support::{meshes, scenes};
+use crate::support::{meshes, scenes, with_lanes};
 
 /// One whose kernels look at slabs, whatever the driver.
 fn device() -> Arc<Context> {
-    Context::with_lanes(&ContextOptions { device: None, validate: true }, 0).expect("a device with validation")
+    with_lanes(0)
 }
 
 /// A mirror of many small triangles, which rays graze.
@@ -45,7 +45,7 @@ fn render(context: &Arc<Context>, scene: &Scene, tree: &KdTree, traversal: Trave
 
 fn steps_on_cpu(scene: &Scene, tree: &KdTree, traversal: Traversal) -> u64 {
     let options = options_of(traversal);
-    let mut renderer = cpu::Renderer::new(scene, tree, &options, Batching::default());
+    let mut renderer = cpu::Renderer::new(scene, tree, &options, Batching::default()).expect("a scene and its tree");
     renderer.draw_sample();
     steps(&renderer.features())
 }
@@ -55,7 +55,7 @@ fn slabs_spare_steps_and_change_no_bit() {
     let (scene, context) = (scene(), device());
     let [with, without] =
         [true, false].map(|slabs| KdTree::build(&scene.triangles, &BuildOptions { slabs, ..Default::default() }));
-    assert!(without.slabs.is_empty());
+    assert!(without.slabs().is_empty());
     // What is kept on the way down, a way back by boxes, and ropes: each goes on from a slab in its own way.
     for traversal in [Traversal::Mask, Traversal::Backtrack, Traversal::Ropes] {
         let ((expected, all), (found, some)) =
@@ -72,8 +72,11 @@ fn slabs_spare_steps_and_change_no_bit() {
 #[test]
 fn slabs_beside_their_surface_lose_it() {
     let (scene, context) = (scene(), device());
-    let mut tree = KdTree::build(&scene.triangles, &BuildOptions::default());
-    let (expected, _) = render(&context, &scene, &tree, Traversal::Mask);
-    tree.slabs.iter_mut().for_each(|slab| slab.offset += 2.0);
-    assert!(!identical(&expected, &render(&context, &scene, &tree, Traversal::Mask).0));
+    let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
+    let options = options_of(Traversal::Mask);
+    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
+    let expected = renderer.render().expect("a frame").0;
+    let moved: Vec<Slab> = tree.slabs().iter().map(|slab| Slab { offset: slab.offset + 2.0, ..*slab }).collect();
+    renderer.resources().tree.kd_slabs.upload(&moved).expect("slabs");
+    assert!(!identical(&expected, &renderer.render().expect("a frame").0));
 }

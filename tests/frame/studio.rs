@@ -22,7 +22,7 @@ pub fn tree_of(scene: &Scene) -> KdTree {
 
 /// A device whose validation messages `assert_silent` looks at.
 pub fn device() -> Arc<Context> {
-    Context::new(&ContextOptions { device: None, validate: true }).expect("a device with validation")
+    Context::new(&ContextOptions::new(None, true)).expect("a device with validation")
 }
 
 pub fn assert_silent(context: &Context) {
@@ -39,7 +39,7 @@ pub fn on_device(scene: &Scene, options: &RenderOptions) -> Picture {
 }
 
 pub fn on_cpu(scene: &Scene, options: &RenderOptions) -> Picture {
-    cpu::render(scene, &tree_of(scene), options).0
+    cpu::render(scene, &tree_of(scene), options).expect("a scene and its tree").0
 }
 
 /// The mean of so many samples a pixel.
@@ -54,7 +54,7 @@ pub fn samples_on_device(scene: &Scene, options: &RenderOptions, n_samples: u32)
 /// As [`samples_on_device`].
 pub fn samples_on_cpu(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
     let tree = tree_of(scene);
-    let mut renderer = cpu::Renderer::new(scene, &tree, options, Batching::default());
+    let mut renderer = cpu::Renderer::new(scene, &tree, options, Batching::default()).expect("a scene and its tree");
     (0..n_samples).for_each(|_| drop(renderer.draw_sample()));
     renderer.picture()
 }

@@ -2,15 +2,15 @@
 
 use glam::Vec3;
 use kdray::{
-    kdtree::{BuildOptions, Invalid, KdTree, Node},
-    layout::{KD_MAX_DEPTH, KdNode, Slab, Triangle},
+    kdtree::{BuildOptions, Invalid, KdTree, Node, Parts},
+    layout::{KD_IN_SLAB, KD_MAX_DEPTH, KdNode, Slab, Triangle},
 };
 
 use crate::meshes::{boxed, room, triangle};
 
 struct Plant {
     triangles: Vec<Triangle>,
-    tree: KdTree,
+    tree: Parts,
 }
 
 impl Plant {
@@ -18,18 +18,18 @@ impl Plant {
         let triangles = room(12);
         let tree = KdTree::build(&triangles, &BuildOptions::default());
         assert_eq!(tree.validate(&triangles), Ok(()));
-        Self { triangles, tree }
+        Self { triangles, tree: tree.into_parts() }
     }
 
     /// What the validator says after a change.
-    fn after(mut self, change: impl FnOnce(&mut KdTree)) -> Invalid {
+    fn after(mut self, change: impl FnOnce(&mut Parts)) -> Invalid {
         change(&mut self.tree);
-        self.tree.validate(&self.triangles).expect_err("the planted error")
+        KdTree::from_parts(self.tree, &self.triangles).expect_err("the planted error")
     }
 }
 
 /// The last split, and its parts.
-fn last_split(tree: &KdTree) -> (u32, usize, f32, u32) {
+fn last_split(tree: &Parts) -> (u32, usize, f32, u32) {
     let split = |node| match tree.node(node) {
         Node::Split { axis, position, child } => Some((node, axis, position, child)),
         Node::Leaf { .. } => None,
@@ -38,7 +38,7 @@ fn last_split(tree: &KdTree) -> (u32, usize, f32, u32) {
 }
 
 /// The last leaf with so many triangles at least: node, first, count.
-fn last_leaf(tree: &KdTree, least: u32) -> (u32, u32, u32) {
+fn last_leaf(tree: &Parts, least: u32) -> (u32, u32, u32) {
     let leaf = |node| match tree.node(node) {
         Node::Leaf { first, count } if count >= least => Some((node, first, count)),
         _ => None,
@@ -46,12 +46,12 @@ fn last_leaf(tree: &KdTree, least: u32) -> (u32, u32, u32) {
     (0..tree.nodes.len() as u32).rev().find_map(leaf).expect("a leaf")
 }
 
-fn set(tree: &mut KdTree, node: u32, to: Node) {
+fn set(tree: &mut Parts, node: u32, to: Node) {
     tree.nodes[node as usize] = to.into();
 }
 
 /// Takes an entry out of a leaf, and moves those of the leaves behind.
-fn drop_entry(tree: &mut KdTree, entry: u32) {
+fn drop_entry(tree: &mut Parts, entry: u32) {
     tree.leaf_triangles.remove(entry as usize);
     tree.leaf_planes.remove(entry as usize);
     for node in (0..tree.nodes.len() as u32).filter(|&node| node != 1) {
@@ -72,10 +72,10 @@ fn any_dropped_reference() {
         let mut tree = plant.tree.clone();
         let triangle = tree.leaf_triangles[entry as usize];
         drop_entry(&mut tree, entry);
-        match tree.validate(&plant.triangles) {
+        match KdTree::from_parts(tree, &plant.triangles) {
             Err(Invalid::Missing { triangle: missing, .. }) => n_missing += u32::from(missing == triangle),
             // The conservative bounds of a triangle may reach into a leaf that it does not meet.
-            other => assert_eq!(other, Ok(())),
+            other => assert_eq!(other.err(), None),
         }
     }
     assert!(n_missing * 10 >= n_entries.div_ceil(7) * 9, "{n_missing} of {n_entries} / 7");
@@ -90,11 +90,12 @@ fn a_dropped_triangle_in_a_split_plane() {
     let options = BuildOptions { intersection_cost: 4.0, ..Default::default() };
     let tree = KdTree::build(&triangles, &options);
     assert_eq!(tree.validate(&triangles), Ok(()));
+    let tree = tree.into_parts();
     for entry in 0..tree.leaf_triangles.len() as u32 {
         let mut tree = tree.clone();
         let triangle = tree.leaf_triangles[entry as usize];
         drop_entry(&mut tree, entry);
-        let found = tree.validate(&triangles);
+        let found = KdTree::from_parts(tree, &triangles);
         assert!(matches!(found, Err(Invalid::Missing { triangle: t, .. }) if t == triangle), "{entry}: {found:?}");
     }
 }
@@ -235,8 +236,11 @@ fn a_wrong_plane() {
 }
 
 /// A node with a slab, and that.
-fn last_slab(tree: &KdTree) -> (u32, Slab) {
-    let slab = |node| tree.slab_of(node).map(|slab| (node, *slab));
+fn last_slab(tree: &Parts) -> (u32, Slab) {
+    let slab = |node: u32| {
+        let is_marked = tree.nodes[node as usize].axis_and_child & KD_IN_SLAB != 0;
+        is_marked.then(|| (node, tree.slabs[node as usize]))
+    };
     (0..tree.nodes.len() as u32).rev().find_map(slab).expect("a slab")
 }
 
@@ -267,11 +271,11 @@ fn a_slab_that_is_not_there() {
 fn a_stray_triangle() {
     let mut plant = Plant::new();
     plant.triangles[20] = plant.triangles[0];
-    let found = plant.tree.validate(&plant.triangles).expect_err("a triangle elsewhere");
+    let found = plant.after(|_| ());
     assert!(matches!(found, Invalid::Stray { triangle: 20, .. } | Invalid::RootCell), "{found}");
     let mut plant = Plant::new();
     plant.triangles[20].v0.x = f32::NAN;
-    let found = plant.tree.validate(&plant.triangles).expect_err("a triangle that is not finite");
+    let found = plant.after(|_| ());
     assert!(matches!(found, Invalid::Stray { triangle: 20, .. }), "{found}");
 }
 
@@ -287,7 +291,7 @@ fn a_wrong_depth() {
     // A chain of splits, one level more than the traversal can hold.
     let n_levels = KD_MAX_DEPTH - 1;
     let triangles = [triangle([Vec3::ZERO, Vec3::X, Vec3::Y])];
-    let mut tree = KdTree::build(&triangles, &BuildOptions { max_depth: Some(0), ..Default::default() });
+    let mut tree = KdTree::build(&triangles, &BuildOptions { max_depth: Some(0), ..Default::default() }).into_parts();
     let end = tree.cell_max.x;
     for level in 0..n_levels {
         let child = 2 * level + 2;
@@ -297,6 +301,15 @@ fn a_wrong_depth() {
         tree.parents.push(node);
     }
     tree.depth = n_levels;
-    let found = tree.validate(&triangles).expect_err("too deep");
+    let found = KdTree::from_parts(tree, &triangles).expect_err("too deep");
     assert_eq!(found, Invalid::Depth { recorded: n_levels, found: n_levels });
+}
+
+#[test]
+fn other_triangles() {
+    let Plant { mut triangles, tree } = Plant::new();
+    let built = KdTree::from_parts(tree, &triangles).expect("the tree as it was built");
+    let built_of = triangles.len();
+    triangles.pop();
+    assert_eq!(built.validate(&triangles), Err(Invalid::Triangles { built_of, given: built_of - 1 }));
 }

@@ -13,7 +13,7 @@ fn on_device(stage: &Stage, batch: &Batch) -> (Vec<Hit>, u32) {
     stage.set_n_rays(&[batch.n_pixels]);
     stage.set_hits(&[]);
     stage.run(|commands| {
-        stage.passes.visibility.record(commands, &stage.resources);
+        stage.draw_triangles(commands);
         stage.passes.primary_hit.record(commands, batch);
     });
     (stage.resources.queue.hits.download().expect("hits"), stage.counters()[0].n_hits)

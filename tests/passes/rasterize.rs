@@ -1,5 +1,7 @@
 //! Rasterize against the kd-tree: what it finds is what camera rays hit, to the last bit.
 
+use std::sync::Arc;
+
 use glam::{Vec3, uvec2, vec3};
 use kdray::{
     camera::frame_constants,
@@ -13,12 +15,12 @@ use kdray::{
 };
 
 use super::stage::{FIRST, Stage, options};
-use crate::support::{World, compare, meshes, random::Random, scenes};
+use crate::support::{World, compare, meshes, random::Random, scenes, without_wide_atomics};
 
 /// A stage whose kernels rasterize, and the pass that traces the same rays.
 struct View {
     stage: Stage,
-    trace: Trace,
+    trace: Arc<Trace>,
 }
 
 /// None where the device has no atomics of 64 bits.
@@ -33,14 +35,11 @@ fn view(scene: Scene, options: RenderOptions) -> Option<View> {
 }
 
 /// Hits of all pixels.
-fn hits_by(stage: &Stage, record: impl FnOnce(&Commands, &Batch)) -> Vec<Hit> {
+fn hits_by(stage: &Stage, record: impl Fn(&Commands, &Batch)) -> Vec<Hit> {
     let batch = Batch { n_pixels: stage.resources.n_pixels() as u32, ..FIRST };
     stage.set_n_rays(&[batch.n_pixels]);
     stage.set_hits(&[]);
-    stage.run(|commands| {
-        stage.resources.pixels.leave_unread(commands);
-        record(commands, &batch);
-    });
+    stage.trace(&batch, record);
     stage.resources.queue.hits.download().expect("hits")
 }
 
@@ -202,7 +201,7 @@ fn nothing_is_shown_of_an_empty_scene() {
 
 #[test]
 fn a_device_without_wide_atomics_is_told_so() {
-    let context = Context::without_wide_atomics(&ContextOptions::default()).expect("a device");
+    let context = without_wide_atomics();
     let scene = scenes::mixed();
     let options = RenderOptions { primary: Primary::Compute, ..options(9, 7) };
     let tree = World::new(scene.triangles.clone()).tree;

@@ -9,7 +9,7 @@ use kdray::{
     gpu::{Commands, Context, ContextOptions},
     kdtree::{BuildOptions, Extras, KdTree},
     layout::{Batch, Bounce, Counters, Frame, Hit, NO_TRIANGLE, RAY_GROUP_SIZE, Ray},
-    passes::{Passes, Resources},
+    passes::{Needs, Passes, Resources},
     scene::Scene,
 };
 
@@ -50,12 +50,11 @@ pub fn options(width: u32, height: u32) -> RenderOptions {
 impl Stage {
     /// A queue for `capacity` rays.
     pub fn new(scene: Scene, options: RenderOptions, capacity: u32) -> Self {
-        let context = Context::new(&ContextOptions { device: None, validate: true }).expect("a device with validation");
+        let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
         let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
         let constants = Frame { queue_capacity: capacity, ..frame_constants(&scene, &tree, &options) };
-        let mut resources = Resources::new(&context, &scene, &tree, &constants, &options, constants.max_depth as usize)
-            .expect("resources");
-        resources.add_extras(&context, &tree, options.traversal).expect("extras");
+        let needs = Needs { constants: &constants, options: &options, n_bounces: constants.max_depth as usize };
+        let resources = Resources::new(&context, &scene, &tree, &needs).expect("resources");
         let extras = Extras::new(&tree, options.traversal);
         let passes = Passes::new(&context, &resources.bindings, &options).expect("passes");
         Self { scene, tree, extras, options, resources, passes, context, expects_messages: Cell::new(false) }
@@ -73,6 +72,26 @@ impl Stage {
             record(commands);
         };
         self.context.run("test", body).expect("the commands run");
+    }
+
+    /// As [`Stage::run`], for kernels whose rays can stall: repeats the dispatch until all of them have ended. `record` is
+    /// given the batch for a round.
+    pub fn trace(&self, batch: &Batch, record: impl Fn(&Commands, &Batch)) {
+        let stalls = &self.resources.tree.stalls;
+        self.run(|commands| {
+            stalls.reset(commands);
+            record(commands, batch);
+        });
+        let resumed = stalls.finish(&self.context, |commands, round| {
+            self.resources.bind(commands);
+            record(commands, &Batch { round: round.constant(), ..*batch });
+        });
+        resumed.expect("all rays end");
+    }
+
+    /// Records visibility, which the stage's options ask for.
+    pub fn draw_triangles(&self, commands: &Commands) {
+        self.passes.visibility.as_ref().expect("the options ask for it").record(commands, &self.resources);
     }
 
     /// A batch of bounces of so many rays, one after the other, and none after these; all counters 0. Returns their rows.
@@ -128,7 +147,7 @@ impl Drop for Stage {
 }
 
 /// The first batch, and its bounce of depth 0.
-pub const FIRST: Batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, depth: 0 };
+pub const FIRST: Batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, depth: 0, round: 0 };
 
 /// `n` rays of every nasty kind at the stage's scene, with pixels and throughputs of their own.
 pub fn some_rays(stage: &Stage, n: u32) -> Vec<Ray> {

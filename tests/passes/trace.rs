@@ -18,7 +18,7 @@ fn check(stage: &Stage, n_rays: u32) {
     stage.set_n_rays(&[n_rays]);
     stage.set_rays(&rays);
     stage.set_hits(&[]);
-    stage.run(|commands| stage.passes.trace.record(commands, &stage.resources, &FIRST));
+    stage.trace(&FIRST, |commands, batch| stage.passes.trace.record(commands, &stage.resources, batch));
     let found = stage.resources.queue.hits.download().expect("hits");
     let n_outliers = stage.n_outliers(n_rays);
     if stage.context.is_software() {
@@ -59,7 +59,7 @@ fn camera_rays_are_traced_by_their_places() {
     stage.set_n_rays(&[batch.n_pixels]);
     stage.set_rays(&[]);
     stage.set_hits(&[]);
-    stage.run(|commands| stage.passes.trace.record(commands, &stage.resources, &batch));
+    stage.trace(&batch, |commands, batch| stage.passes.trace.record(commands, &stage.resources, batch));
     let mut rays = [UNTOUCHED_RAY; 150];
     cpu::primary_hit::primary_rays(stage.resources.constants(), batch.first_pixel, &mut rays);
     let mut hits = super::stage::hits_of(&stage, &rays);
@@ -75,7 +75,7 @@ fn nothing_is_hit_in_an_empty_scene() {
     let rays = vec![crate::support::rays::ray(glam::Vec3::ZERO, glam::Vec3::X); 9];
     stage.set_n_rays(&[9]);
     stage.set_rays(&rays);
-    stage.run(|commands| stage.passes.trace.record(commands, &stage.resources, &FIRST));
+    stage.trace(&FIRST, |commands, batch| stage.passes.trace.record(commands, &stage.resources, batch));
     compare::exact(&super::stage::hits_of(&stage, &rays), &stage.resources.queue.hits.download().expect("hits"))
         .unwrap();
 }

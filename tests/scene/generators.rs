@@ -3,7 +3,10 @@
 use std::collections::HashMap;
 
 use glam::Vec3;
-use kdray::scene::{generate::Generator, mesh::Mesh};
+use kdray::scene::{
+    generate::{Budget, Generator},
+    mesh::Mesh,
+};
 
 /// Closed bodies and their numbers of triangles.
 const CLOSED: [(&str, usize); 15] = [
@@ -40,7 +43,7 @@ const CLOSED: [(&str, usize); 15] = [
 fn build(toml: &str) -> Mesh {
     toml::from_str::<Generator>(toml)
         .unwrap_or_else(|e| panic!("{e}\n{toml}"))
-        .build()
+        .build(&Budget::default())
         .unwrap_or_else(|e| panic!("{e}\n{toml}"))
 }
 

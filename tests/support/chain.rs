@@ -2,7 +2,7 @@
 
 use glam::{Vec3, vec3};
 use kdray::{
-    kdtree::{BuildOptions, KdTree, Node},
+    kdtree::{BuildOptions, KdTree, Node, Parts},
     layout::{Plane, Triangle},
 };
 
@@ -25,20 +25,26 @@ fn slabs(n: u32) -> Vec<Triangle> {
 /// Rays that come from above leave the lower leaf of every level pending.
 pub fn chain(n_levels: u32) -> World {
     let triangles = slabs(n_levels + 1);
-    let mut tree = KdTree::build(&triangles, &BuildOptions { max_depth: Some(0), ..BuildOptions::default() });
+    let flat = KdTree::build(&triangles, &BuildOptions { max_depth: Some(0), ..BuildOptions::default() });
     let leaf = |ix: u32| Node::Leaf { first: ix, count: 1 }.into();
-    (tree.nodes, tree.parents, tree.depth) = (vec![leaf(0); 2], vec![0], n_levels);
+    let mut parts = Parts {
+        nodes: vec![leaf(0); 2],
+        parents: vec![0],
+        leaf_triangles: (0..triangles.len() as u32).collect(),
+        leaf_planes: triangles.iter().map(|t| Plane { normal: Vec3::X, distance: t.v0.x }).collect(),
+        slabs: Vec::new(),
+        depth: n_levels,
+        ..flat.into_parts()
+    };
     let mut node = 0;
     for level in 0..n_levels {
         let child = 2 * level + 2;
-        tree.nodes[node as usize] = Node::Split { axis: 0, position: (level + 1) as f32, child }.into();
-        tree.nodes.extend([leaf(level), leaf(level + 1)]);
-        tree.parents.push(node);
+        parts.nodes[node as usize] = Node::Split { axis: 0, position: (level + 1) as f32, child }.into();
+        parts.nodes.extend([leaf(level), leaf(level + 1)]);
+        parts.parents.push(node);
         node = child + 1;
     }
-    tree.nodes[1] = Node::Leaf { first: 0, count: 0 }.into();
-    tree.leaf_triangles = (0..triangles.len() as u32).collect();
-    tree.leaf_planes = triangles.iter().map(|t| Plane { normal: Vec3::X, distance: t.v0.x }).collect();
-    tree.validate(&triangles).expect("a tree");
+    parts.nodes[1] = Node::Leaf { first: 0, count: 0 }.into();
+    let tree = KdTree::from_parts(parts, &triangles).expect("a tree");
     World::with_tree(triangles, tree)
 }

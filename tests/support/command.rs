@@ -9,12 +9,18 @@ use std::{
 /// The command in a directory.
 pub fn kdray(directory: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kdray"));
-    command.current_dir(directory).args(arguments).stdin(Stdio::null());
+    // What a user has measured has no part in tests.
+    command.current_dir(directory).args(arguments).env("KDRAY_CACHE", "").stdin(Stdio::null());
     command
 }
 
 pub fn cornell() -> String {
-    let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "scenes", "cornell.toml"].iter().collect();
+    shipped("cornell.toml")
+}
+
+/// The path of a scene that comes with the program.
+pub fn shipped(scene: &str) -> String {
+    let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "scenes", scene].iter().collect();
     path.into_os_string().into_string().unwrap()
 }
 

@@ -11,12 +11,31 @@ pub mod random;
 pub mod rays;
 pub mod scenes;
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use kdray::{
     cpu::{bindings::Bindings, brute, kdtree::near_scene, probe::Probe},
+    gpu::{Context, ContextOptions, DeviceOverrides},
     kdtree::{BuildOptions, Extras, KdTree},
     layout::{Frame, Hit, NO_TRIANGLE, Ray, Triangle},
 };
+
+/// A device under validation, which is taken for what the overrides make of it.
+pub fn pretended(pretend: DeviceOverrides) -> Arc<Context> {
+    let options = ContextOptions { pretend, ..ContextOptions::new(None, true) };
+    Context::new(&options).expect("a device with validation")
+}
+
+/// A device under validation that runs kernels as a GPU of so many lanes does.
+pub fn with_lanes(n_lanes: u32) -> Arc<Context> {
+    pretended(DeviceOverrides { n_lanes: Some(n_lanes), ..DeviceOverrides::default() })
+}
+
+/// A device under validation whose kernels have no atomics of 64 bits.
+pub fn without_wide_atomics() -> Arc<Context> {
+    pretended(DeviceOverrides { no_wide_atomics: true, ..DeviceOverrides::default() })
+}
 
 /// Triangles and their tree, with no more of a frame than rays need.
 pub struct World {
@@ -49,11 +68,11 @@ impl World {
 
     /// The middle of the root's cell.
     pub fn centre(&self) -> Vec3 {
-        (self.tree.cell_min + self.tree.cell_max) / 2.0
+        (self.tree.cell_min() + self.tree.cell_max()) / 2.0
     }
 
     /// Half of the root cell's diagonal.
     pub fn radius(&self) -> f32 {
-        (self.tree.cell_max - self.tree.cell_min).length() / 2.0
+        (self.tree.cell_max() - self.tree.cell_min()).length() / 2.0
     }
 }

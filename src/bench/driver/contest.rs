@@ -70,7 +70,7 @@ pub fn hold(
 
 /// Milliseconds of each contender in each of `n_rounds`, after a round that is not counted: what ran before has left
 /// caches and clocks as it needs them.
-fn rounds(
+pub(crate) fn rounds(
     context: &Arc<Context>,
     contenders: &[Box<dyn Contender>],
     n_rounds: u16,

@@ -7,7 +7,7 @@ use crate::{
     cast::Query,
     frame::Traversal,
     gpu::{Access, Bindings, Commands, Context, GpuError},
-    passes::{Cast, CastResources},
+    passes::{Cast, CastResources, Round},
 };
 
 /// One way through the tree.
@@ -43,7 +43,7 @@ impl Contender for Kernel {
     }
 
     fn record(&self, commands: &Commands) {
-        self.cast.record(commands, &self.resources, self.resources.cast_rays.len() as u32);
+        self.cast.record(commands, &self.resources, self.resources.cast_rays.len() as u32, Round::Begin);
     }
 
     fn resources(&self) -> &Rc<CastResources> {

@@ -10,9 +10,6 @@ use crate::{
     render::Renderer,
 };
 
-/// The pass that turns triangles into hits, and ends what is timed.
-const LAST_PASS: &str = "primary_hit";
-
 /// Frames of a stage's view, and the times of their passes.
 pub struct Raster {
     primary: Primary,
@@ -54,10 +51,8 @@ impl Raster {
         self.renderer.draw()?;
         for _ in 0..n_frames {
             let passes = self.renderer.draw()?.passes;
-            let n_passes = passes.iter().position(|pass| pass.name == LAST_PASS).map_or(0, |last| last + 1);
-            self.frames.extend(
-                passes[..n_passes].iter().map(|pass| pass.ms.map(|ms| (pass.name, ms))).collect::<Option<Vec<_>>>(),
-            );
+            let tracing = passes.iter().filter(|pass| pass.pass().is_tracing());
+            self.frames.extend(tracing.map(|pass| pass.ms.map(|ms| (pass.name, ms))).collect::<Option<Vec<_>>>());
         }
         Ok(())
     }

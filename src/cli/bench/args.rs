@@ -1,6 +1,6 @@
 //! The words of `kdray bench`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Subcommand, value_parser};
 use kdray::{
@@ -13,6 +13,7 @@ use kdray::{
 use crate::cli::{
     args::{Size, device},
     error::CliError,
+    file_roles::FileRoles,
     picture_args::{way_help, ways_of_devices},
 };
 
@@ -139,11 +140,13 @@ pub struct FileArgs {
 }
 
 impl FileArgs {
-    /// Refuses files that cannot be written, before anything is measured.
-    pub fn check(&self) -> Result<(), CliError> {
-        if self.json.is_some() && self.json == self.svg {
-            return Err(CliError::Usage("--json and --svg name the same file".into()));
-        }
+    /// Refuses files that cannot be written, or that are a part of the `scenes` that are read, before anything is
+    /// measured.
+    pub fn check(&self, scenes: &[&Path]) -> Result<(), CliError> {
+        let mut roles = FileRoles::default();
+        scenes.iter().for_each(|scene| roles.read_scene("a scene", scene));
+        self.json.iter().try_for_each(|path| roles.write("--json", path))?;
+        self.svg.iter().try_for_each(|path| roles.write("--svg", path))?;
         Ok([&self.json, &self.svg].into_iter().flatten().try_for_each(|path| output::check(path))?)
     }
 

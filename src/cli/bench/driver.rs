@@ -10,6 +10,7 @@ use kdray::{
         rays::{RayKind, ray_sets},
         stage::Stage,
     },
+    choices::{Engine, TreeKind},
     gpu::{Context, ContextOptions},
     kdtree::BuildOptions,
     scene::Scene,
@@ -25,13 +26,14 @@ use crate::cli::{
 
 /// Loads the mesh, makes the rays, lets both trace them set by set. A device without ray tracing is refused first.
 pub fn run(args: &DriverArgs) -> Result<(), CliError> {
-    args.files.check()?;
-    let context = Context::with_ray_tracing(&ContextOptions { device: args.device.clone(), validate: false })?;
+    args.files.check(&[&args.mesh])?;
+    let context = Context::with_ray_tracing(&ContextOptions::new(args.device.clone(), false))?;
     let progress = Progress::new(false, 8);
     let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
     let scene = scene?;
+    let build_options = TreeKind::Best.options(Engine::of(Some(&context)));
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
-    let (stage, _) = progress.stage(&building, || stage(args, scene));
+    let (stage, _) = progress.stage(&building, || stage(args, scene, build_options));
     let (arena, _) = progress.stage("letting the driver build its tree", || Arena::new(&context, &stage));
     let mut arena = arena?;
     let (sets, _) = progress.stage("making rays", || ray_sets(&stage));
@@ -50,9 +52,10 @@ pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     check_hits(&report)
 }
 
-fn stage(args: &DriverArgs, scene: Scene) -> Stage {
+fn stage(args: &DriverArgs, scene: Scene, build_options: BuildOptions) -> Stage {
     let size = (args.size.width, args.size.height);
-    if args.no_room { Stage::open(scene, size) } else { Stage::in_room(scene, size) }
+    let make = if args.no_room { Stage::open } else { Stage::in_room };
+    make(scene, size, build_options)
 }
 
 fn empty_report(args: &DriverArgs, stage: &Stage, context: &Context, builds: Builds) -> Report {
@@ -66,7 +69,7 @@ fn empty_report(args: &DriverArgs, stage: &Stage, context: &Context, builds: Bui
         width: args.size.width,
         height: args.size.height,
         n_triangles,
-        tree: stage.tree.statistics(n_triangles, &BuildOptions::default()),
+        tree: stage.tree.statistics(n_triangles, &stage.build_options),
         n_times: args.repeat,
         t_tolerance: T_TOLERANCE,
         builds,

@@ -7,10 +7,10 @@ use kdray::{
         Spread,
         paper::{Report, Reported, Row, SCENES, SIZES, draw_on_cpu, draw_on_gpu, options},
     },
+    choices::{Engine, TreeKind, traversal_by_rule},
     frame::RenderOptions,
     gpu::{Context, ContextOptions},
-    kdtree::{BuildOptions, KdTree},
-    render::suited_traversal,
+    kdtree::KdTree,
     scene::Scene,
 };
 
@@ -24,14 +24,15 @@ use crate::cli::{
 
 /// Each scene at each size, scene by scene.
 pub fn run(args: &PaperArgs) -> Result<(), CliError> {
-    args.files.check()?;
+    let scenes = SCENES.map(|name| args.scenes.join(name).with_extension("toml"));
+    args.files.check(&scenes.each_ref().map(|scene| scene.as_path()))?;
     let sizes: Vec<_> = match &args.size[..] {
         [] => SIZES.to_vec(),
         asked => asked.iter().map(|size| (size.width, size.height)).collect(),
     };
     let progress = Progress::new(false, (SCENES.len() * (1 + sizes.len())) as u64);
-    let context = open_device(&ContextOptions { device: args.device.clone(), validate: false }, &progress)?;
-    let traversal = args.traversal.unwrap_or_else(|| suited_traversal(Some(&context)));
+    let context = open_device(&ContextOptions::new(args.device.clone(), false), &progress)?;
+    let traversal = args.traversal.unwrap_or_else(|| traversal_by_rule(Engine::of(Some(&context))));
     let mut report = Report {
         suite: "paper",
         device: context.info().name.clone(),
@@ -41,9 +42,10 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
         n_cpu_frames: if args.no_cpu { 0 } else { args.cpu_repeat },
         rows: Vec::new(),
     };
-    for name in SCENES {
-        let path = args.scenes.join(name).with_extension("toml");
-        let (loaded, _) = progress.stage(&format!("loading {}", path.display()), || load(&path));
+    // One tree for both: the CPU looks at slabs, whatever the device does.
+    let engine = if args.no_cpu { Engine::of(Some(&context)) } else { Engine::Cpu };
+    for (name, path) in SCENES.into_iter().zip(&scenes) {
+        let (loaded, _) = progress.stage(&format!("loading {}", path.display()), || load(path, engine));
         let (scene, tree) = loaded?;
         for &size in &sizes {
             let drawing = format!("drawing {name}, {}x{}", size.0, size.1);
@@ -57,9 +59,9 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
     print(&text(&report))
 }
 
-fn load(path: &Path) -> Result<(Scene, KdTree), CliError> {
+fn load(path: &Path, engine: Engine) -> Result<(Scene, KdTree), CliError> {
     let scene = Scene::load(path)?;
-    let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
+    let tree = KdTree::build(&scene.triangles, &TreeKind::Best.options(engine));
     Ok((scene, tree))
 }
 

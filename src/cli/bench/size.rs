@@ -7,9 +7,9 @@ use kdray::{
         rays::ray_sets,
         size::{RayGrowth, Report, Row, Sized},
     },
+    choices::{Engine, TreeKind, traversal_by_rule},
     frame::Traversal,
     gpu::{Context, ContextOptions, GpuError},
-    render::suited_traversal,
 };
 
 use super::args::SizeArgs;
@@ -22,15 +22,15 @@ use crate::cli::{
 
 /// Size by size, the least first.
 pub fn run(args: &SizeArgs) -> Result<(), CliError> {
-    args.files.check()?;
+    args.files.check(&[])?;
     let mut sizes = args.triangles.clone();
     sizes.sort_unstable();
     sizes.dedup();
     let progress = Progress::new(false, 3 * sizes.len() as u64);
-    let device = ContextOptions { device: args.device.clone(), validate: false };
+    let device = ContextOptions::new(args.device.clone(), false);
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
     let info = context.as_ref().map(|context| context.info());
-    let traversal = args.traversal.unwrap_or_else(|| suited_traversal(context.as_deref()));
+    let traversal = args.traversal.unwrap_or_else(|| traversal_by_rule(Engine::of(context.as_deref())));
     let n_threads = rayon::current_num_threads();
     let mut report = Report {
         suite: "size",
@@ -64,8 +64,9 @@ fn measure(
     progress: &Progress,
 ) -> Result<Row, GpuError> {
     let building = format!("building the kd-tree of {n_triangles} triangles");
+    let build_options = TreeKind::Best.options(Engine::of(context.map(|context| &**context)));
     let pixels = (args.size.width, args.size.height);
-    let (sized, _) = progress.stage(&building, || Sized::new(n_triangles, pixels));
+    let (sized, _) = progress.stage(&building, || Sized::new(n_triangles, pixels, build_options));
     let (sets, _) = progress.stage("making rays", || ray_sets(&sized.stage));
     let casting = format!("casting rays at {n_triangles} triangles");
     progress.stage(&casting, || sized.measure(context, traversal, &sets, args.repeat)).0

@@ -8,6 +8,7 @@ use kdray::{
         stage::Stage,
         traversal::{Report, SetResult, Tracers, VariantResult},
     },
+    choices::{Engine, TreeKind},
     frame::Traversal,
     gpu::{Context, ContextOptions},
     kdtree::BuildOptions,
@@ -24,15 +25,16 @@ use crate::cli::{
 
 /// Loads the mesh, makes the rays, casts set by set.
 pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
-    args.files.check()?;
+    args.files.check(&[&args.mesh])?;
     let progress = Progress::new(false, 7);
     let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
     let scene = scene?;
     let variants = variants(&args.variants);
-    let device = ContextOptions { device: args.device.clone(), validate: false };
+    let device = ContextOptions::new(args.device.clone(), false);
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
+    let build_options = TreeKind::Best.options(Engine::of(context.as_deref()));
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
-    let (stage, _) = progress.stage(&building, || stage(args, scene));
+    let (stage, _) = progress.stage(&building, || stage(args, scene, build_options));
     let (sets, _) = progress.stage("making rays", || ray_sets(&stage));
 
     let mut tracers = Tracers::new(context.as_ref(), &stage, &variants)?;
@@ -62,9 +64,10 @@ fn variants(asked: &[Traversal]) -> Vec<Traversal> {
     variants
 }
 
-fn stage(args: &TraversalArgs, scene: Scene) -> Stage {
+fn stage(args: &TraversalArgs, scene: Scene, build_options: BuildOptions) -> Stage {
     let size = (args.size.width, args.size.height);
-    if args.no_room { Stage::open(scene, size) } else { Stage::in_room(scene, size) }
+    let make = if args.no_room { Stage::open } else { Stage::in_room };
+    make(scene, size, build_options)
 }
 
 fn empty_report(args: &TraversalArgs, stage: &Stage, context: Option<&Arc<Context>>) -> Report {
@@ -79,7 +82,7 @@ fn empty_report(args: &TraversalArgs, stage: &Stage, context: Option<&Arc<Contex
         width: args.size.width,
         height: args.size.height,
         n_triangles,
-        tree: stage.tree.statistics(n_triangles, &BuildOptions::default()),
+        tree: stage.tree.statistics(n_triangles, &stage.build_options),
         n_times: args.repeat,
         sets: Vec::new(),
     }

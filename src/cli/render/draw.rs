@@ -1,14 +1,13 @@
 //! Drawing on the device, or on the CPU for want of one.
 
-use std::sync::Arc;
+use std::{borrow::Cow, sync::Arc};
 
 use kdray::{
     cpu::{self, Batching},
-    frame::{Picture, Profile, RenderOptions},
+    frame::{Picture, RenderOptions},
     gpu::{Context, GpuError},
     kdtree::KdTree,
-    layout::Feature,
-    render::Renderer,
+    render::{BandedRenderer, Drawn, Watcher},
     scene::{Camera, Scene},
 };
 use tracing::info_span;
@@ -17,16 +16,25 @@ use crate::cli::progress::Steps;
 
 /// Either renderer.
 pub enum Drawer<'a> {
-    Device(Box<Renderer>),
+    Device(Box<BandedRenderer>),
     Cpu(Box<cpu::Renderer<'a>>),
 }
 
-/// What comes of drawing, beside the picture.
-pub struct Drawn {
-    /// Of the first sample, at the pixels' centres; empty where the options do not ask for them.
-    pub features: Vec<Feature>,
-    /// All samples together.
-    pub profile: Profile,
+/// Moves the bar as far as a drawing is.
+struct Bar<'a, 'b>(&'a mut Steps<'b>);
+
+impl Watcher for Bar<'_, '_> {
+    fn sees_parts(&self) -> bool {
+        self.0.shows_parts
+    }
+
+    fn part(&mut self, share: f32) {
+        self.0.part(share);
+    }
+
+    fn sample(&mut self) {
+        self.0.step();
+    }
 }
 
 impl<'a> Drawer<'a> {
@@ -37,51 +45,50 @@ impl<'a> Drawer<'a> {
         options: &'a RenderOptions,
     ) -> Result<Self, GpuError> {
         Ok(match context {
-            Some(context) => Self::Device(Box::new(Renderer::new(Arc::clone(context), scene, tree, options)?)),
-            None => Self::Cpu(Box::new(cpu::Renderer::new(scene, tree, options, Batching::default()))),
+            Some(context) => Self::Device(Box::new(BandedRenderer::new(Arc::clone(context), scene, tree, options)?)),
+            None => Self::Cpu(Box::new(cpu::Renderer::new(scene, tree, options, Batching::default())?)),
         })
     }
 
-    /// Draws what a camera sees by so many samples a pixel.
+    /// Parts of the picture that are drawn one after the other.
+    pub fn n_bands(&self) -> u32 {
+        match self {
+            Self::Device(renderer) => renderer.n_bands(),
+            Self::Cpu(_) => 1,
+        }
+    }
+
+    /// Draws what a camera sees by so many samples a pixel. Each sample of each band is a step.
     pub fn draw(&mut self, camera: &Camera, n_samples: u32, steps: &mut Steps) -> Result<Drawn, GpuError> {
-        self.set_camera(camera);
-        let mut profile = self.draw_sample()?;
-        let features = self.features()?;
-        steps.step();
-        for _ in 1..n_samples {
-            profile.add(&self.draw_sample()?);
-            steps.step();
-        }
-        Ok(Drawn { features, profile })
-    }
-
-    fn set_camera(&mut self, camera: &Camera) {
         match self {
-            Self::Device(renderer) => renderer.set_camera(camera),
-            Self::Cpu(renderer) => renderer.set_camera(camera),
-        }
-    }
-
-    fn draw_sample(&mut self) -> Result<Profile, GpuError> {
-        match self {
-            Self::Device(renderer) => renderer.draw_sample(),
-            Self::Cpu(renderer) => Ok(info_span!("render").in_scope(|| renderer.draw_sample())),
-        }
-    }
-
-    fn features(&self) -> Result<Vec<Feature>, GpuError> {
-        match self {
-            Self::Device(renderer) if renderer.options().features => renderer.features(),
-            Self::Cpu(renderer) if renderer.options().features => Ok(renderer.features()),
-            _ => Ok(Vec::new()),
+            Self::Device(renderer) => {
+                renderer.set_camera(camera);
+                renderer.draw(n_samples, Bar(steps))
+            }
+            Self::Cpu(renderer) => {
+                renderer.set_camera(camera);
+                Ok(draw_on_cpu(renderer, n_samples, steps))
+            }
         }
     }
 
     /// The picture drawn last.
-    pub fn picture(&self) -> Result<Picture, GpuError> {
+    pub fn picture(&self) -> Result<Cow<'_, Picture>, GpuError> {
         match self {
             Self::Device(renderer) => renderer.picture(),
-            Self::Cpu(renderer) => Ok(renderer.picture()),
+            Self::Cpu(renderer) => Ok(Cow::Owned(renderer.picture())),
         }
     }
+}
+
+fn draw_on_cpu(renderer: &mut cpu::Renderer, n_samples: u32, steps: &mut Steps) -> Drawn {
+    let mut sample = |renderer: &mut cpu::Renderer| {
+        let profile = info_span!("render").in_scope(|| renderer.draw_sample_with(|share| steps.part(share)));
+        steps.step();
+        profile
+    };
+    let mut profile = sample(renderer);
+    let features = if renderer.options().features { renderer.features() } else { Vec::new() };
+    (1..n_samples).for_each(|_| profile.add(&sample(renderer)));
+    Drawn { features, profile }
 }

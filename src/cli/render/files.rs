@@ -6,9 +6,10 @@ use kdray::{
     frame::{Aov, Picture},
     layout::Feature,
     output::{self, Format, HeatMap},
+    scene::Scene,
 };
 
-use crate::cli::{args::RenderArgs, error::CliError};
+use crate::cli::{args::RenderArgs, error::CliError, file_roles::FileRoles};
 
 /// A picture's file and those beside it.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,6 +37,12 @@ impl Files {
         self.layers.iter().chain(&self.heat_map).filter(|path| **path != self.picture)
     }
 
+    /// Notes the files as outputs, and refuses those that are read, or written twice.
+    pub fn note(&self, roles: &mut FileRoles) -> Result<(), CliError> {
+        roles.write("--output", &self.picture)?;
+        self.beside().try_for_each(|path| roles.write("--aov", path))
+    }
+
     /// Refuses what cannot be written.
     pub fn check(&self) -> Result<(), CliError> {
         output::check(&self.picture)?;
@@ -57,6 +64,20 @@ impl Files {
     }
 }
 
+/// What the command reads and writes, but for the pictures of a path's frames, which are not known yet. Refuses outputs
+/// that are read, or written twice.
+pub fn roles(args: &RenderArgs) -> Result<FileRoles, CliError> {
+    let mut roles = FileRoles::default();
+    roles.read_scene("SCENE", &args.scene);
+    match &args.path {
+        Some(path) => roles.read("--path", path),
+        None => Files::of(output_of(args), &args.aov).note(&mut roles)?,
+    }
+    args.profile.iter().try_for_each(|path| roles.write("--profile", path))?;
+    args.trace.iter().try_for_each(|path| roles.write("--trace", path))?;
+    Ok(roles)
+}
+
 /// Refuses targets that cannot be written, as far as they are known before the scene is.
 pub fn check_outputs(args: &RenderArgs) -> Result<(), CliError> {
     if let Some(path) = &args.output {
@@ -69,8 +90,13 @@ pub fn check_outputs(args: &RenderArgs) -> Result<(), CliError> {
     Ok([&args.profile, &args.trace].into_iter().flatten().try_for_each(|path| output::check(path))?)
 }
 
+/// The picture's file, or the pattern for those of a path.
+pub fn output_of(args: &RenderArgs) -> PathBuf {
+    args.output.clone().unwrap_or_else(|| default_output(&Scene::name_of(&args.scene), args.path.is_some()))
+}
+
 /// A PNG of the scene's name in the working directory.
-pub fn default_output(scene_name: &str, is_numbered: bool) -> PathBuf {
+fn default_output(scene_name: &str, is_numbered: bool) -> PathBuf {
     let stem = output::stem_of(scene_name).replace('#', "-");
     format!("{stem}{}.png", if is_numbered { ".####" } else { "" }).into()
 }

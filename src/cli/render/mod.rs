@@ -2,11 +2,16 @@
 
 mod draw;
 mod files;
+mod memory;
 
-use std::time::{Duration, Instant};
+use std::{
+    path::Path,
+    time::{Duration, Instant},
+};
 
 use kdray::{
-    frame::{Profile, RenderOptions},
+    choices::{Cache, Choices, Engine, Workload},
+    frame::Profile,
     gpu::{Context, ContextOptions},
     kdtree::KdTree,
     output,
@@ -16,12 +21,14 @@ use tracing::info_span;
 
 use self::{
     draw::Drawer,
-    files::{Files, check_outputs, default_output, numbered},
+    files::{Files, check_outputs, numbered, output_of, roles},
+    memory::check_memory,
 };
 use super::{
     args::{Frames, RenderArgs},
-    complain,
+    build, complain,
     error::CliError,
+    file_roles::FileRoles,
     open_device, print,
     progress::Progress,
     report::{Report, Spread},
@@ -32,31 +39,34 @@ use super::{
 /// Loads, builds, renders, writes and reports. What can be refused is refused before the work that it would waste.
 pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     args.check()?;
+    let roles = roles(args)?;
     check_outputs(args)?;
     set_threads(args.threads)?;
 
     let (begun_at, spans) = (Instant::now(), Spans::default());
     let progress = Progress::with_spans(args.quiet, 3, args.trace.is_some().then_some(&spans));
-    let loading = format!("loading {}", args.scene.display());
-    let (scene, load_ms) = progress.stage(&loading, || info_span!("load scene").in_scope(|| Scene::load(&args.scene)));
-    let scene = scene?;
-    let views = views(args, &scene)?;
-    for view in &views {
-        view.files.check()?;
-    }
+    let (scene, load_ms) = load(args, &progress)?;
+    let views = views(args, &scene, roles)?;
     let options = args.options(&scene)?;
-    let device = ContextOptions { device: args.device.clone(), validate: args.validate };
+    check_memory(&options, args.spp, args.cpu)?;
+    let device = ContextOptions::new(args.device.clone(), args.validate);
     let opening = || info_span!("create device").in_scope(|| open_device(&device, &progress));
     let context = if args.cpu { None } else { Some(opening()?) };
 
     let n_triangles = scene.triangles.len();
-    let size = (options.width, options.height);
-    let options = args.picture.ways().suited(&options, context.as_deref(), n_triangles, size);
-    let n_rays = most_rays(args, &options, scene.lights.len(), views.len());
-    let build_options = args.build.options(context.as_deref(), n_triangles, n_rays);
+    let (request, engine) = (args.picture.request(), Engine::of(context.as_deref()));
+    let n_pictures = u64::from(args.spp) * views.len() as u64;
+    let cameras = views.iter().map(|view| &view.camera);
+    let workload = Workload::of_pictures(&options, scene.lights.len(), n_pictures).seen_by(cameras);
+    let tree_kind = request.tree(engine, n_triangles, &workload);
+    let build_options = tree_kind.value.options(engine);
+    build::check_memory(&build_options, n_triangles)?;
     let building = format!("building the kd-tree of {n_triangles} triangles");
     let build = || KdTree::build(&scene.triangles, &build_options);
     let (tree, build_ms) = progress.stage(&building, || info_span!("build tree").in_scope(build));
+    let (used, cache) = (context.as_ref(), Cache::open());
+    let methods = request.methods(used, (&scene, &tree), &build_options, &workload, &cache)?;
+    let options = methods.apply(&options);
     let crop = options.crop_or_whole();
     let rendering = format!("rendering {}x{}", crop.width(), crop.height());
     let (drawn, _) = progress.stage(&rendering, || {
@@ -64,7 +74,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         let drawer = Drawer::new(context.as_ref(), &scene, &tree, &options)?;
         draw_and_write(args, drawer, &views, (&progress, &rendering), begin)
     });
-    let (profiles, render_ms) = drawn?;
+    let (profiles, render_ms) = drawn.map_err(CliError::of_drawing)?;
     drop(progress);
 
     let repeated = Spread::of(&profiles);
@@ -77,6 +87,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         pictures: views.iter().map(|view| view.files.picture.clone()).collect(),
         extra_files: views.iter().flat_map(|view| view.files.beside()).cloned().collect(),
         options: (&options).into(),
+        choices: Choices::of_pictures(tree_kind, methods),
         samples: args.spp,
         triangles: n_triangles,
         tree: tree.statistics(n_triangles, &build_options),
@@ -95,13 +106,13 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     context.map_or(Ok(()), |context| report_validation(&context))
 }
 
-/// Rays of all frames, if every pixel's ray hits and is reflected once.
-fn most_rays(args: &RenderArgs, options: &RenderOptions, n_lights: usize, n_views: usize) -> u64 {
-    let crop = options.crop_or_whole();
-    let n_pixels = u64::from(crop.width()) * u64::from(crop.height());
-    let rays_a_sample = u64::from(options.max_depth.min(2)) * (1 + n_lights as u64);
-    let n_frames = n_views as u64 * u64::from(args.repeat);
-    [u64::from(args.spp), rays_a_sample, n_frames].into_iter().fold(n_pixels, u64::saturating_mul)
+/// The scene, and how many milliseconds it took to load it. Warns if nothing lights it.
+fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError> {
+    let loading = format!("loading {}", args.scene.display());
+    let (scene, load_ms) = progress.stage(&loading, || info_span!("load scene").in_scope(|| Scene::load(&args.scene)));
+    let scene = scene?;
+    scene.warn_if_unlit(&args.scene);
+    Ok((scene, load_ms))
 }
 
 /// A camera, and where what it sees is written.
@@ -110,12 +121,23 @@ struct View {
     files: Files,
 }
 
-/// The scene's own view, or one a frame of the path.
-fn views(args: &RenderArgs, scene: &Scene) -> Result<Vec<View>, CliError> {
-    let output = args.output.clone().unwrap_or_else(|| default_output(&scene.name, args.path.is_some()));
-    let Some(path_file) = &args.path else {
-        return Ok(vec![View { camera: scene.camera, files: Files::of(output, &args.aov) }]);
+/// The scene's own view, or one a frame of the path. Refuses those whose files cannot be written, or have another role.
+fn views(args: &RenderArgs, scene: &Scene, mut roles: FileRoles) -> Result<Vec<View>, CliError> {
+    let output = output_of(args);
+    let views = match &args.path {
+        None => vec![View { camera: scene.camera, files: Files::of(output, &args.aov) }],
+        Some(path) => {
+            let views = views_along(path, args, &output)?;
+            views.iter().try_for_each(|view| view.files.note(&mut roles))?;
+            views
+        }
     };
+    views.iter().try_for_each(|view| view.files.check())?;
+    Ok(views)
+}
+
+/// One view a frame of the path.
+fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec<View>, CliError> {
     let path = CameraPath::load(path_file)?;
     let Frames { first, last } =
         args.frames.unwrap_or(Frames { first: path.begin().ceil() as u32, last: path.end().floor() as u32 });
@@ -127,7 +149,7 @@ fn views(args: &RenderArgs, scene: &Scene) -> Result<Vec<View>, CliError> {
             let file = path_file.display();
             CliError::Usage(format!("{file}: at frame {frame}, eye, target and up span no picture"))
         })?;
-        Ok(View { camera, files: Files::of(numbered(&output, frame)?, &args.aov) })
+        Ok(View { camera, files: Files::of(numbered(output, frame)?, &args.aov) })
     };
     (first..=last).map(view).collect()
 }
@@ -141,7 +163,10 @@ fn draw_and_write(
     (progress, message): (&Progress, &str),
     begin: Instant,
 ) -> Result<(Vec<Profile>, f64), CliError> {
-    let mut steps = progress.steps(message, views.len() as u32 * args.spp * u32::from(args.repeat));
+    let n_steps = views.len() as u32 * args.spp * u32::from(args.repeat) * drawer.n_bands();
+    let mut steps = progress.steps(message, n_steps);
+    // What is measured is drawn without pauses.
+    steps.shows_parts &= args.profile.is_none() && args.trace.is_none() && args.repeat == 1;
     let (mut profiles, mut drawing, mut last) = (Vec::new(), Duration::ZERO, begin);
     for view in views {
         let mut features = Vec::new();

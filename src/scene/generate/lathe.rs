@@ -4,9 +4,8 @@ use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
 use super::{
-    count, length,
+    Budget, count, length,
     rings::{Rings, SurfacePoint, heading},
-    triangle_budget,
 };
 use crate::scene::{error::Checked, mesh::Mesh};
 
@@ -29,10 +28,10 @@ pub struct Lathe {
 type ProfilePoint = (DVec2, DVec2);
 
 impl Lathe {
-    pub fn build(&self) -> Checked<Mesh> {
+    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
         let segments = count("segments", self.segments, 3)?;
         let steps = count("steps", self.steps.unwrap_or(8), 1)?;
-        triangle_budget(2 * u64::from(segments) * u64::from(steps) * self.profile.len() as u64)?;
+        budget.require(2 * u64::from(segments) * u64::from(steps) * self.profile.len() as u64)?;
         let points = self.profile.iter().map(|[r, y]| profile_point(*r, *y)).collect::<Checked<Vec<DVec2>>>()?;
         let mut mesh = Mesh::default();
         for run in points.chunk_by(|a, b| a != b) {

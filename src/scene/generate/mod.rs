@@ -13,10 +13,12 @@ mod torus_knot;
 
 use serde::Deserialize;
 
-use super::{error::Checked, mesh::Mesh};
+use super::{error::Checked, mesh::Mesh, needs};
 
 /// Largest mesh of one generator: 0.8 GB of triangles.
 pub const MAX_TRIANGLES: u64 = 1 << 24;
+/// Triangles that all generators of a scene may make: 3.2 GB.
+pub const MAX_TRIANGLES_OF_SCENE: u64 = 1 << 26;
 
 /// `generator = "name"` and its own parameters; no others are accepted.
 #[derive(Debug, Deserialize)]
@@ -34,18 +36,19 @@ pub enum Generator {
 }
 
 impl Generator {
-    /// The mesh around the origin. The error says which parameter is out of range.
-    pub fn build(&self) -> Checked<Mesh> {
+    /// The mesh around the origin. The error says which parameter is out of range, or that the mesh is too large for
+    /// the `budget`.
+    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
         match self {
             Self::Box(cuboid) => cuboid.build(),
             Self::Room(room) => room.build(),
-            Self::Plane(plane) => plane.build(),
-            Self::Disc(disc) => disc.build(),
-            Self::Sphere(sphere) => sphere.build(),
-            Self::Geodesic(geodesic) => geodesic.build(),
-            Self::Superellipsoid(superellipsoid) => superellipsoid.build(),
-            Self::TorusKnot(knot) => knot.build(),
-            Self::Lathe(lathe) => lathe.build(),
+            Self::Plane(plane) => plane.build(budget),
+            Self::Disc(disc) => disc.build(budget),
+            Self::Sphere(sphere) => sphere.build(budget),
+            Self::Geodesic(geodesic) => geodesic.build(budget),
+            Self::Superellipsoid(superellipsoid) => superellipsoid.build(budget),
+            Self::TorusKnot(knot) => knot.build(budget),
+            Self::Lathe(lathe) => lathe.build(budget),
         }
     }
 }
@@ -61,11 +64,43 @@ fn count(name: &str, value: u32, min: u32) -> Checked<u32> {
     if (min..=MAX).contains(&value) { Ok(value) } else { Err(format!("{name} = {value} is outside {min} to {MAX}")) }
 }
 
-/// A number of triangles that one mesh may have.
-fn triangle_budget(n_triangles: u64) -> Checked<()> {
-    if n_triangles <= MAX_TRIANGLES {
-        Ok(())
-    } else {
-        Err(format!("makes {n_triangles} triangles: more than {MAX_TRIANGLES}"))
+/// What a scene holds already, which limits what its next generator may make.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Budget {
+    /// Triangles that generators have made.
+    pub n_generated: u64,
+    /// All triangles, those from files included.
+    pub n_triangles: u64,
+}
+
+impl Budget {
+    /// Refuses a mesh of more triangles than a mesh or a scene may have, or than fit in memory.
+    fn require(&self, n_triangles: u64) -> Checked<()> {
+        if n_triangles > MAX_TRIANGLES {
+            return Err(format!("makes {n_triangles} triangles: more than {MAX_TRIANGLES}"));
+        }
+        let n_generated = self.n_generated + n_triangles;
+        if n_generated > MAX_TRIANGLES_OF_SCENE {
+            return Err(format!(
+                "makes {n_triangles} triangles, with those of the generators before it {n_generated}: a scene may have \
+                 {MAX_TRIANGLES_OF_SCENE} from generators"
+            ));
+        }
+        needs::require_for_triangles(self.n_triangles, n_triangles)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_generators_of_a_scene_are_limited_together() {
+        let after = |n_generated: u64| Budget { n_generated, n_triangles: 0 };
+        after(0).require(12).unwrap();
+        assert!(after(0).require(MAX_TRIANGLES + 1).unwrap_err().contains("more than 16777216"));
+        after(MAX_TRIANGLES_OF_SCENE - 12).require(12).unwrap();
+        let error = after(MAX_TRIANGLES_OF_SCENE - 12).require(13).unwrap_err();
+        assert!(error.contains("67108865") && error.contains("67108864"), "{error}");
     }
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde::Deserialize;
 
-use super::{count, length, rings::heading, triangle_budget};
+use super::{Budget, count, length, rings::heading};
 use crate::scene::{error::Checked, mesh::Mesh};
 
 /// A rectangle of fields centred at the origin: 2 triangles a field. Field (i, k) has slot i + k: two materials make a
@@ -26,11 +26,11 @@ pub struct Disc {
 }
 
 impl Plane {
-    pub fn build(&self) -> Checked<Mesh> {
+    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
         let [width, depth] = [length("size", self.size[0])?, length("size", self.size[1])?];
         let [n_x, n_z] = self.fields.unwrap_or([1, 1]);
         let (n_x, n_z) = (count("fields", n_x, 1)?, count("fields", n_z, 1)?);
-        triangle_budget(2 * u64::from(n_x) * u64::from(n_z))?;
+        budget.require(2 * u64::from(n_x) * u64::from(n_z))?;
         let mut mesh = Mesh::default();
         for k in 0..=n_z {
             for i in 0..=n_x {
@@ -52,9 +52,10 @@ impl Plane {
 }
 
 impl Disc {
-    pub fn build(&self) -> Checked<Mesh> {
+    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
         let radius = length("radius", self.radius)?;
         let n = count("segments", self.segments, 3)?;
+        budget.require(u64::from(n))?;
         let mut mesh = Mesh::default();
         let centre = mesh.push_position(Vec3::ZERO);
         for ix in 0..n {

@@ -6,9 +6,8 @@ use glam::DVec3;
 use serde::Deserialize;
 
 use super::{
-    count, length,
+    Budget, count, length,
     rings::{Rings, SurfacePoint, heading},
-    triangle_budget,
 };
 use crate::scene::{error::Checked, mesh::Mesh};
 
@@ -32,9 +31,9 @@ pub struct Geodesic {
 }
 
 impl Sphere {
-    pub fn build(&self) -> Checked<Mesh> {
+    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
         let radius = length("radius", self.radius)?;
-        let rings = polar_rings(self.segments, self.rings, self.triangles)?;
+        let rings = polar_rings(self.segments, self.rings, self.triangles, budget)?;
         let point = |ring: usize, around: f64| -> SurfacePoint {
             let normal = polar_direction(&rings, ring, around);
             (radius * normal, normal)
@@ -45,18 +44,23 @@ impl Sphere {
 
 /// Rings between two poles, as asked for: even ones, or an exact number of triangles on rings of points in proportion
 /// to a sphere's circles.
-pub fn polar_rings(segments: Option<u32>, rings: Option<u32>, triangles: Option<u32>) -> Checked<Rings> {
+pub fn polar_rings(
+    segments: Option<u32>,
+    rings: Option<u32>,
+    triangles: Option<u32>,
+    budget: &Budget,
+) -> Checked<Rings> {
     match (segments, rings, triangles) {
         (Some(segments), Some(rings), None) => {
             let (segments, n_rings) = (count("segments", segments, 3)?, count("rings", rings, 1)?);
-            triangle_budget(2 * u64::from(segments) * u64::from(n_rings))?;
+            budget.require(2 * u64::from(segments) * u64::from(n_rings))?;
             let mut n_points = vec![segments; n_rings as usize + 2];
             n_points[0] = 1;
             n_points[n_rings as usize + 1] = 1;
             Ok(Rings { n_points, cyclic: false })
         }
         (None, None, Some(triangles)) => {
-            triangle_budget(u64::from(triangles))?;
+            budget.require(u64::from(triangles))?;
             // Almost equilateral: rows sqrt(3)/2 edges high, and rings of 2/pi of the equator's points on average.
             let n_rows = (f64::from(triangles) * PI / (4.0 * 3f64.sqrt())).sqrt().round() as u32;
             Rings::between_poles(triangles, n_rows.max(2) - 1, |down| (PI * down).sin())
@@ -119,10 +123,10 @@ fn icosahedron_corners() -> [DVec3; 12] {
 }
 
 impl Geodesic {
-    pub fn build(&self) -> Checked<Mesh> {
+    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
         let radius = length("radius", self.radius)?;
         let frequency = count("frequency", self.frequency, 1)?;
-        triangle_budget(20 * u64::from(frequency).pow(2))?;
+        budget.require(20 * u64::from(frequency).pow(2))?;
         let mut points =
             Points { radius, corners: icosahedron_corners(), by_weights: HashMap::new(), mesh: Mesh::default() };
         for face in ICOSAHEDRON {

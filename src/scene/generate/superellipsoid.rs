@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use serde::Deserialize;
 
 use super::{
-    length,
+    Budget, length,
     rings::SurfacePoint,
     sphere::{polar_direction, polar_rings},
 };
@@ -25,7 +25,7 @@ pub struct Superellipsoid {
 }
 
 impl Superellipsoid {
-    pub fn build(&self) -> Checked<Mesh> {
+    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
         for extent in self.size {
             length("size", extent)?;
         }
@@ -35,7 +35,7 @@ impl Superellipsoid {
             v: 2.0 / f64::from(within("exponents", v, 0.1, 1.9)?),
             h: 2.0 / f64::from(within("exponents", h, 0.1, 1.9)?),
         };
-        let rings = polar_rings(self.segments, self.rings, self.triangles)?;
+        let rings = polar_rings(self.segments, self.rings, self.triangles, budget)?;
         let point = |ring: usize, around: f64| -> SurfacePoint {
             let direction = polar_direction(&rings, ring, around);
             let point = direction / shape.gauge(direction);

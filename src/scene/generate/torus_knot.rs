@@ -6,9 +6,8 @@ use glam::DVec3;
 use serde::Deserialize;
 
 use super::{
-    count, length,
+    Budget, count, length,
     rings::{Rings, heading, normal_at},
-    triangle_budget,
 };
 use crate::scene::{error::Checked, material::within, mesh::Mesh};
 
@@ -46,9 +45,9 @@ struct Tube {
 }
 
 impl TorusKnot {
-    pub fn build(&self) -> Checked<Mesh> {
+    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
         let tube = self.tube()?;
-        let rings = self.rings()?;
+        let rings = self.rings(budget)?;
         let n_rings = rings.n_points.len() as f64;
         let position = |along, around| tube.position(along, around);
         Ok(rings.sweep(|ring, around| {
@@ -57,16 +56,16 @@ impl TorusKnot {
         }))
     }
 
-    fn rings(&self) -> Checked<Rings> {
+    fn rings(&self, budget: &Budget) -> Checked<Rings> {
         let segments = count("segments", self.segments, 3)?;
         match (self.sides, self.triangles) {
             (Some(sides), None) => {
                 let sides = count("sides", sides, 3)?;
-                triangle_budget(2 * u64::from(segments) * u64::from(sides))?;
+                budget.require(2 * u64::from(segments) * u64::from(sides))?;
                 Ok(Rings { n_points: vec![sides; segments as usize], cyclic: true })
             }
             (None, Some(triangles)) => {
-                triangle_budget(u64::from(triangles))?;
+                budget.require(u64::from(triangles))?;
                 Rings::cyclic(triangles, segments)
             }
             _ => Err("needs either `sides` or `triangles`".to_owned()),

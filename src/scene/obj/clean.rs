@@ -57,6 +57,8 @@ pub struct CleanObj {
     pub libraries: Vec<(usize, String)>,
     /// What `usemtl` names, and where first.
     pub used_materials: BTreeMap<String, usize>,
+    /// Triangles that the faces make, polygons cut into fans.
+    pub n_triangles: u64,
     /// First statement that the format does not have, if any.
     pub unknown: Option<(usize, String)>,
 }
@@ -172,6 +174,7 @@ impl Cleaner {
         if self.corners.len() < 3 {
             return Err(format!("a face of {} corners: it needs 3 or more", self.corners.len()));
         }
+        self.out.n_triangles += self.corners.len() as u64 - 2;
         let has_normals = self.corners.iter().all(|(_, normal)| normal.is_some());
         let group = if has_normals {
             NORMALS

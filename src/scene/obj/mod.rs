@@ -9,7 +9,13 @@ use glam::Vec3;
 
 use self::clean::{CleanObj, NORMALS, SMOOTH, clean_obj};
 pub(super) use self::mtl::Library;
-use super::{error::SceneError, mesh::Mesh, read::read_lossy, smooth::crease_normals};
+use super::{
+    error::SceneError,
+    mesh::Mesh,
+    needs::{require_for_text, require_for_triangles},
+    read::read_lossy,
+    smooth::crease_normals,
+};
 
 /// Degrees between faces beyond which their common edge is sharp.
 pub(super) const DEFAULT_CREASE: f32 = 40.0;
@@ -23,11 +29,24 @@ pub(super) struct Shading {
     pub crease: f32,
 }
 
-/// Reads a mesh and its materials. A face's slot is an index into the library; `library.materials.len()` stands for
-/// none, or one that the library lacks.
-pub(super) fn load_obj(path: &Path, shading: Shading) -> Result<(Mesh, Library), SceneError> {
-    let text = read_lossy(path)?;
-    let clean = clean_obj(&text).map_err(|(line, what)| SceneError::line(path, line, what))?;
+/// Reads the text of an OBJ file.
+pub(super) fn read_obj(path: &Path) -> Result<String, SceneError> {
+    require_for_text(path).map_err(|what| SceneError::file(path, what))?;
+    read_lossy(path)
+}
+
+/// Makes a mesh of an OBJ file's text, and reads its materials. A face's slot is an index into the library;
+/// `library.materials.len()` stands for none, or one that the library lacks. `n_loaded`: triangles that the scene has
+/// already.
+pub(super) fn parse_obj(
+    path: &Path,
+    text: &str,
+    shading: Shading,
+    n_loaded: usize,
+) -> Result<(Mesh, Library), SceneError> {
+    let clean = clean_obj(text).map_err(|(line, what)| SceneError::line(path, line, what))?;
+    let required = require_for_triangles(n_loaded as u64, clean.n_triangles);
+    required.map_err(|what| SceneError::file(path, what))?;
     let library = mtl::load_libraries(path, &clean.libraries)?;
     warn(path, &clean, &library);
     let models = parse(&clean, &library).map_err(|e| SceneError::file(path, e.to_string()))?;

@@ -3,7 +3,7 @@
 use egui::{Color32, Pos2, Rect, Sense, Stroke, StrokeKind, Ui, vec2};
 
 use crate::{
-    frame::Profile,
+    frame::{Pass, Profile},
     view::history::{FrameRecord, History},
 };
 
@@ -66,25 +66,9 @@ fn passes(profile: &Profile) -> Vec<(&'static str, Color32)> {
     names.into_iter().map(|name| (name, color(name))).collect()
 }
 
-/// The same for a pass, whatever others run.
 fn color(name: &str) -> Color32 {
-    const COLORS: [(&str, Color32); 14] = [
-        ("visibility", Color32::from_rgb(120, 190, 255)),
-        ("primary_hit", Color32::from_rgb(70, 130, 220)),
-        ("trace", Color32::from_rgb(240, 130, 60)),
-        ("shadow", Color32::from_rgb(150, 110, 200)),
-        ("shade", Color32::from_rgb(250, 210, 90)),
-        ("resolve", Color32::from_rgb(110, 200, 120)),
-        ("compact_reduce", Color32::from_rgb(200, 90, 110)),
-        ("compact_spine", Color32::from_rgb(225, 120, 135)),
-        ("compact_scatter", Color32::from_rgb(245, 160, 165)),
-        ("features", Color32::from_rgb(60, 160, 90)),
-        ("accumulate", Color32::from_rgb(210, 180, 240)),
-        ("denoise", Color32::from_rgb(80, 180, 180)),
-        ("false_color", Color32::from_rgb(190, 140, 140)),
-        ("tonemap", Color32::from_rgb(170, 170, 170)),
-    ];
-    COLORS.iter().find(|(pass, _)| *pass == name).map_or(Color32::WHITE, |(_, color)| *color)
+    let [r, g, b] = Pass::named(name).color;
+    Color32::from_rgb(r, g, b)
 }
 
 /// A round number that hardly any frame exceeds, so that one slow frame does not flatten the others.

@@ -2,6 +2,7 @@
 
 mod controls;
 mod graph;
+mod keys;
 mod tables;
 
 use egui::{Color32, CornerRadius, Frame, Margin, RichText, ScrollArea, Ui, Window};
@@ -34,6 +35,23 @@ pub struct Settings {
     pub gain: f32,
 }
 
+/// What lies over the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layers {
+    pub panel: bool,
+    /// The list of keys.
+    pub keys: bool,
+    /// The line that names the key for the list.
+    pub hint: bool,
+}
+
+impl Layers {
+    /// Whether there is anything.
+    pub fn any(self) -> bool {
+        self.panel || self.keys || self.hint
+    }
+}
+
 /// What the user reads.
 pub struct Facts<'a> {
     pub device: &'a str,
@@ -44,12 +62,16 @@ pub struct Facts<'a> {
     pub picture: (u32, u32),
     /// A pixel.
     pub n_samples: u32,
+    /// Samples a pixel at which the view is done.
+    pub n_wanted: u32,
     /// Share of the next sample that is drawn, 0 to 1.
     pub progress: f32,
     /// World units a second.
     pub speed: f32,
     /// Whether S flies back, rather than saves.
     pub is_flying: bool,
+    /// Whether the picture is to be saved once it is drawn in full.
+    pub is_save_due: bool,
     /// Of the last frame that was drawn.
     pub profile: &'a Profile,
     pub history: &'a History,
@@ -59,13 +81,24 @@ pub struct Facts<'a> {
     pub message: Option<&'a str>,
 }
 
-/// Lays the panel out; changes `settings` as the user does.
-pub fn show(ui: &mut Ui, settings: &mut Settings, facts: &Facts) {
+/// Lays out what lies over the picture; changes `settings` as the user does.
+pub fn show(ui: &mut Ui, layers: Layers, settings: &mut Settings, facts: &Facts) {
     let style = ui.ctx().global_style();
     let frame = Frame::window(&style)
         .fill(Color32::from_black_alpha(200))
         .corner_radius(CornerRadius::same(4))
         .inner_margin(Margin::same(8));
+    if layers.panel {
+        panel(ui, frame, settings, facts);
+    }
+    if layers.keys {
+        keys::show(ui, frame);
+    } else if layers.hint {
+        keys::hint(ui, frame);
+    }
+}
+
+fn panel(ui: &mut Ui, frame: Frame, settings: &mut Settings, facts: &Facts) {
     Window::new("kdray").frame(frame).default_pos([8.0, 8.0]).default_width(WIDTH).resizable([false, false]).show(
         ui.ctx(),
         |ui| {
@@ -84,7 +117,7 @@ fn sections(ui: &mut Ui, settings: &mut Settings, facts: &Facts) {
         ui.label(RichText::new(message).color(Color32::LIGHT_RED));
         ui.separator();
     }
-    status(ui, settings, facts);
+    status(ui, facts);
     if let Some(picked) = facts.picked {
         section(ui, "Pixel", true, |ui| tables::picked(ui, picked));
     }
@@ -93,21 +126,24 @@ fn sections(ui: &mut Ui, settings: &mut Settings, facts: &Facts) {
     section(ui, "Rays", true, |ui| tables::rays(ui, facts.profile));
     section(ui, "Tree", false, |ui| tables::tree(ui, facts.loaded));
     section(ui, "Memory", false, |ui| tables::memory(ui, &facts.memory));
-    section(ui, "Keys", false, keys);
 }
 
 fn section(ui: &mut Ui, name: &str, is_open: bool, body: impl FnOnce(&mut Ui)) {
     egui::CollapsingHeader::new(name).default_open(is_open).show(ui, body);
 }
 
-fn status(ui: &mut Ui, settings: &Settings, facts: &Facts) {
-    let Facts { loaded, picture, window, n_samples, .. } = facts;
+fn status(ui: &mut Ui, facts: &Facts) {
+    let Facts { loaded, picture, window, n_samples, n_wanted, .. } = facts;
     ui.label(format!("{}: {} triangles", loaded.scene.name, loaded.scene.triangles.len()));
     ui.label(facts.device);
     ui.label(format!("{}x{} in {}x{}", picture.0, picture.1, window.0, window.1));
     let way = if facts.is_flying { "fly" } else { "orbit" };
     let next = if facts.progress > 0.0 { format!(" + {:.0} %", 100.0 * facts.progress) } else { String::new() };
-    ui.label(format!("{n_samples}{next} of {} samples; {way}, speed {:.3}/s", settings.max_samples, facts.speed));
+    ui.label(format!("{n_samples}{next} of {n_wanted} samples; {way}, speed {:.3}/s", facts.speed));
+    if facts.is_save_due {
+        ui.label("to be saved once it is drawn in full");
+    }
+    ui.label("H: keys, Tab: hides this");
     ui.monospace("              p50     p95     p99");
     ui.monospace(percentiles("frame, ms ", facts.history.pace()));
     ui.monospace(percentiles("answer, ms", facts.history.latency()))
@@ -119,23 +155,4 @@ fn percentiles(name: &str, of: Option<Percentiles>) -> String {
         Some(Percentiles { p50, p95, p99, .. }) => format!("{name} {p50:7.1} {p95:7.1} {p99:7.1}"),
         None => format!("{name}       -       -       -"),
     }
-}
-
-fn keys(ui: &mut Ui) {
-    const KEYS: [(&str, &str); 13] = [
-        ("W S A D", "fly; S goes back only after another"),
-        ("E Q", "fly up, down"),
-        ("Shift, Ctrl", "faster, slower"),
-        ("wheel", "speed"),
-        ("left drag", "go around the target"),
-        ("right drag", "look around"),
-        ("click", "what the pixel shows"),
-        ("F", "frame the scene"),
-        ("Home", "back to the start"),
-        ("1 to 6", "picture, depth, normal, id, cost, rays"),
-        ("P", "print the camera"),
-        ("S, F12", "save the picture"),
-        ("Tab, Esc", "hide this, quit"),
-    ];
-    tables::grid(ui, "keys", KEYS.iter().map(|(key, does)| [(*key).to_owned(), (*does).to_owned()]));
 }

@@ -11,9 +11,6 @@ use crate::{
     },
 };
 
-/// Passes that find the closest hits of a bounce's rays.
-const TRACING: [&str; 3] = ["visibility", "primary_hit", "trace"];
-
 /// Rows of words under each other.
 pub fn grid<const N: usize>(ui: &mut Ui, name: &str, rows: impl IntoIterator<Item = [String; N]>) {
     Grid::new(name).num_columns(N).spacing([10.0, 1.0]).show(ui, |ui| {
@@ -26,8 +23,12 @@ pub fn grid<const N: usize>(ui: &mut Ui, name: &str, rows: impl IntoIterator<Ite
     });
 }
 
-/// Rays and their speed, a bounce a row, and all shadow rays in one.
+/// Shows rays and their speed, a bounce a row, and all shadow rays in one.
 pub fn rays(ui: &mut Ui, profile: &Profile) {
+    grid(ui, "rays", ray_rows(profile));
+}
+
+fn ray_rows(profile: &Profile) -> Vec<[String; 5]> {
     let head = ["", "rays", "hits", "shadow", "Mrays/s"].map(str::to_owned);
     let rows = profile.bounces.iter().enumerate().map(|(bounce, stats)| {
         [
@@ -35,19 +36,13 @@ pub fn rays(ui: &mut Ui, profile: &Profile) {
             stats.n_rays.to_string(),
             stats.n_hits.to_string(),
             stats.n_shadow_rays.to_string(),
-            rate(stats.n_rays, tracing_ms(profile, bounce as u32)),
+            rate(stats.n_rays, profile.tracing_ms(bounce as u32)),
         ]
     });
     let n_shadow_rays = profile.bounces.iter().map(|stats| stats.n_shadow_rays).sum::<u64>();
-    let shadow_rate = rate(n_shadow_rays, profile.pass_ms("shadow"));
+    let shadow_rate = rate(n_shadow_rays, profile.shadow_ms());
     let shadow = ["shadow".to_owned(), String::new(), String::new(), n_shadow_rays.to_string(), shadow_rate];
-    grid(ui, "rays", std::iter::once(head).chain(rows).chain([shadow]));
-}
-
-/// Of the closest hits of a bounce; a pass that runs once a frame and finds hits finds those of the primary rays.
-fn tracing_ms(profile: &Profile, bounce: u32) -> Option<f64> {
-    let passes = profile.passes.iter().filter(|pass| TRACING.contains(&pass.name));
-    passes.filter(|pass| pass.bounce.unwrap_or(0) == bounce).map(|pass| pass.ms).sum()
+    std::iter::once(head).chain(rows).chain([shadow]).collect()
 }
 
 fn rate(n_rays: u64, ms: Option<f64>) -> String {
@@ -121,22 +116,23 @@ fn picked_ray(ray: &PickedRay) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::PassTime;
+    use crate::frame::{BounceStats, PassTime};
 
     #[test]
     fn rates_count_the_passes_that_find_hits() {
         let pass = |name, bounce, ms| PassTime { name, bounce, ms: Some(ms), ..PassTime::default() };
         let passes = vec![
-            pass("visibility", None, 1.0),
+            pass("rasterize_triangles", None, 0.75),
+            pass("rasterize_blocks", None, 0.25),
             pass("primary_hit", Some(0), 1.0),
             pass("compact_scatter", Some(0), 9.0),
             pass("trace", Some(1), 3.0),
             pass("shadow", None, 4.0),
         ];
-        let profile = Profile { passes, ..Profile::default() };
-        assert_eq!(tracing_ms(&profile, 0), Some(2.0));
-        assert_eq!(tracing_ms(&profile, 1), Some(3.0));
-        assert_eq!(rate(4000, Some(2.0)), "2.00");
+        let bounces = [4000, 600].map(|n_rays| BounceStats { n_rays, n_hits: 0, n_shadow_rays: 1000 }).to_vec();
+        let rows = ray_rows(&Profile { passes, bounces, ..Profile::default() });
+        let rates: Vec<_> = rows.iter().map(|row| &*row[4]).collect();
+        assert_eq!(rates, ["Mrays/s", "2.00", "0.20", "0.50"]);
         assert_eq!((rate(1, None), rate(1, Some(0.0))), ("-".to_owned(), "-".to_owned()));
     }
 

@@ -1,0 +1,114 @@
+//! Choices with their reasons, as reports tell them.
+
+use std::fmt::{self, Display};
+
+use serde::{Serialize, Serializer, ser::SerializeStruct};
+
+use super::{Timings, TreeKind};
+use crate::frame::{Primary, RenderOptions, Traversal};
+
+/// Why something was chosen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reason {
+    /// The user said so.
+    Pinned,
+    Rule,
+    /// It was the quickest just now.
+    Measured,
+    /// It was the quickest when it was measured in an earlier run.
+    Cached,
+}
+
+words!(Reason { Pinned = "pinned", Rule = "rule", Measured = "measured", Cached = "cached" });
+
+/// A choice and its reason.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chosen<T> {
+    pub value: T,
+    pub by: Reason,
+}
+
+impl<T> Chosen<T> {
+    /// What the user asked for, or else what the rule says.
+    pub(super) fn pinned_or(pinned: Option<T>, rule: impl FnOnce() -> T) -> Self {
+        match pinned {
+            Some(value) => Self { value, by: Reason::Pinned },
+            None => Self { value: rule(), by: Reason::Rule },
+        }
+    }
+}
+
+impl<T: Display> Display for Chosen<T> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{} ({})", self.value, self.by)
+    }
+}
+
+impl<T: Display> Serialize for Chosen<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut words = serializer.serialize_struct("Chosen", 2)?;
+        words.serialize_field("value", &self.value.to_string())?;
+        words.serialize_field("by", &self.by.to_string())?;
+        words.end()
+    }
+}
+
+/// How rays are traced.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Methods {
+    pub traversal: Chosen<Traversal>,
+    pub primary: Chosen<Primary>,
+    /// What the traversals took, nanoseconds a ray, if that decided.
+    pub traversal_ns: Option<Timings>,
+    /// What frames of primary rays and their shadows took, nanoseconds a pixel, if that decided.
+    pub primary_ns: Option<Timings>,
+}
+
+impl Methods {
+    /// The options with these methods.
+    pub fn apply(&self, options: &RenderOptions) -> RenderOptions {
+        RenderOptions { traversal: self.traversal.value, primary: self.primary.value, ..options.clone() }
+    }
+}
+
+/// All that was chosen, for reports.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Choices {
+    pub build: Chosen<TreeKind>,
+    pub traversal: Chosen<Traversal>,
+    /// None for rays without a picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub primary: Option<Chosen<Primary>>,
+    /// [`Methods::traversal_ns`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub traversal_ns: Option<Timings>,
+    /// [`Methods::primary_ns`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub primary_ns: Option<Timings>,
+}
+
+impl Choices {
+    pub fn of_pictures(build: Chosen<TreeKind>, methods: Methods) -> Self {
+        let Methods { traversal, primary, traversal_ns, primary_ns } = methods;
+        Self { build, traversal, primary: Some(primary), traversal_ns, primary_ns }
+    }
+
+    /// Rays without a picture have no primary visibility.
+    pub fn of_rays(build: Chosen<TreeKind>, methods: Methods) -> Self {
+        Self { primary: None, ..Self::of_pictures(build, methods) }
+    }
+}
+
+impl Display for Choices {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let Self { build, traversal, primary, traversal_ns, primary_ns } = self;
+        write!(f, "chosen: tree {build}, traversal {traversal}")?;
+        if let Some(primary) = primary {
+            write!(f, ", primary rays {primary}")?;
+        }
+        if let Some(timings) = traversal_ns {
+            write!(f, "; {timings} ns a ray")?;
+        }
+        primary_ns.as_ref().map_or(Ok(()), |timings| write!(f, "; {timings} ns a pixel"))
+    }
+}

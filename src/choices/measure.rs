@@ -1,0 +1,118 @@
+//! What each method takes on a device, in a scene.
+//!
+//! Traversals are tried on rays of the scene's own camera, coherent, and one that bounces from each of their hits,
+//! scattered. They take turns, and the least time of each counts: a clock that rises meanwhile favours none.
+
+use std::{rc::Rc, sync::Arc};
+
+use bytemuck::Zeroable;
+
+use super::Timings;
+use crate::{
+    bench::{
+        driver::{
+            contest::{Contender, rounds},
+            kernel::Kernel,
+        },
+        rays::diffuse_rays,
+        traversal::cast_ray,
+    },
+    camera::frame_constants,
+    cast::Query,
+    cpu::{bindings::Bindings, primary_hit::primary_rays, trace::trace},
+    frame::{Denoise, Primary, RenderOptions, Traversal},
+    gpu::{Context, GpuError},
+    kdtree::KdTree,
+    layout::{CastRay, Frame, Hit, Ray},
+    passes::{CastResources, Tree},
+    render::Renderer,
+    scene::Scene,
+};
+
+/// As many camera rays as the device has lanes, within these: with fewer it would idle, and more only take longer.
+const FEWEST_RAYS: u32 = 1 << 12;
+const MOST_RAYS: u32 = 1 << 18;
+/// Timed casts of all rays by each traversal.
+const N_ROUNDS: u16 = 5;
+/// Timed frames of each kind of primary visibility, after as many that are not timed.
+const N_FRAMES: usize = 5;
+
+/// Traces rays by each traversal; none where the device has no timestamps. The traversals must need no more than ropes
+/// beside the tree.
+///
+/// # Errors
+/// Beyond the device's limits, out of memory, a failed call.
+pub fn measure_traversals(
+    context: &Arc<Context>,
+    scene: &Scene,
+    tree: &KdTree,
+    traversals: &[Traversal],
+) -> Result<Option<Timings>, GpuError> {
+    if !context.has_timestamps() {
+        return Ok(None);
+    }
+    let n_pixels = context.n_lanes()?.clamp(FEWEST_RAYS, MOST_RAYS);
+    let frame = frame_constants(scene, tree, &picture_of(scene, n_pixels));
+    let rays = some_rays(scene, tree, &frame);
+    let mut buffers = Tree::new(context, &scene.triangles, tree, &frame)?;
+    if traversals.contains(&Traversal::Ropes) {
+        buffers.add_extras(context, tree, Traversal::Ropes)?;
+    }
+    let bindings = CastResources::bindings(context, &buffers)?;
+    let resources = Rc::new(CastResources::new(context, &bindings, &buffers, rays.len())?);
+    resources.cast_rays.upload(&rays)?;
+    let kernel = |&traversal| -> Result<Box<dyn Contender>, GpuError> {
+        Ok(Box::new(Kernel::new(context, &bindings, &resources, (traversal, Query::Closest))?))
+    };
+    let kernels = traversals.iter().map(kernel).collect::<Result<Vec<_>, _>>()?;
+    let ms = rounds(context, &kernels, N_ROUNDS)?;
+    let ns_a_ray = |kernel_ix: usize| {
+        let own = ms.iter().skip(kernel_ix).step_by(kernels.len()).copied().collect::<Option<Vec<f64>>>()?;
+        let least = own.into_iter().min_by(f64::total_cmp)?;
+        Some((traversals[kernel_ix], least * 1e6 / rays.len() as f64))
+    };
+    Ok((0..kernels.len()).map(ns_a_ray).collect())
+}
+
+/// Rays of the scene's camera, and one from each of their hits into the hemisphere above it. They depend on no device.
+fn some_rays(scene: &Scene, tree: &KdTree, frame: &Frame) -> Vec<CastRay> {
+    let mut from_camera = vec![Ray::zeroed(); (frame.width * frame.height) as usize];
+    primary_rays(frame, 0, &mut from_camera);
+    let mut hits = vec![Hit::zeroed(); from_camera.len()];
+    trace(&Bindings::new(scene, tree, frame), Traversal::OF_CPU, &from_camera, &mut hits);
+    let bounced = diffuse_rays(&scene.triangles, &from_camera, &hits);
+    from_camera.iter().chain(&bounced).map(cast_ray).collect()
+}
+
+/// About so many pixels of the shape of the scene's own picture.
+fn picture_of(scene: &Scene, n_pixels: u32) -> RenderOptions {
+    let (width, height) = (f64::from(scene.defaults.width), f64::from(scene.defaults.height));
+    let scale = (f64::from(n_pixels) / (width * height)).sqrt();
+    let side = |pixels: f64| (pixels * scale).round().max(1.0) as u32;
+    RenderOptions { width: side(width), height: side(height), ..RenderOptions::default() }
+}
+
+/// Draws whole pictures of one bounce by each kind of primary visibility; none where the device has no timestamps.
+/// `options`: the picture's size, and the traversal.
+///
+/// # Errors
+/// Beyond the device's limits, out of memory, a failed call.
+pub fn measure_primaries(
+    context: &Arc<Context>,
+    (scene, tree): (&Scene, &KdTree),
+    options: &RenderOptions,
+    primaries: &[Primary],
+) -> Result<Option<Timings>, GpuError> {
+    let n_pixels = f64::from(options.width) * f64::from(options.height);
+    let options = RenderOptions { max_depth: 1, denoise: Denoise::Off, profile: true, ..options.clone() };
+    let mut renderer = Renderer::new(Arc::clone(context), scene, tree, &options)?;
+    let mut times = Vec::new();
+    for &primary in primaries {
+        renderer.set_options(&RenderOptions { primary, ..options.clone() }, tree)?;
+        let frames = (0..2 * N_FRAMES).map(|_| Ok(renderer.draw()?.frame_ms)).collect::<Result<Vec<_>, GpuError>>()?;
+        let timed = frames.into_iter().skip(N_FRAMES).collect::<Option<Vec<f64>>>();
+        let least = timed.and_then(|ms| ms.into_iter().min_by(f64::total_cmp));
+        times.push(least.map(|ms| (primary, ms * 1e6 / n_pixels)));
+    }
+    Ok(times.into_iter().collect())
+}

@@ -1,0 +1,211 @@
+//! What the user leaves open is chosen here, once for all commands: which tree is built, how rays find their way
+//! through it, and how primary rays find their triangles.
+//!
+//! ```text
+//! tree     which tree: by rule, from the numbers of rays and of triangles
+//! rule     traversal and primary visibility, by rule, from the device and the sizes of scene and picture
+//! trial    traversal and primary visibility, from the times of each candidate on the device
+//!   timings  the candidates, their times, the quickest
+//!   measure  scene, tree -> times, by a short measurement
+//!   cache    times, kept from one run to the next
+//! chosen   choices with their reasons, for reports
+//! ```
+//!
+//! Every traversal finds the same hits, bit for bit, so the quickest may be chosen by measurement. So may rasterization
+//! by kernels or tracing of primary rays, unless a camera may be so far away that they round otherwise. Whatever
+//! changes bits is chosen by rule: graphics or kernels for primary rays, and everything where the output holds what
+//! rays cost. All choices ask for the size of the whole picture, so that a part of it is rendered as the whole is.
+//!
+//! A measurement uploads the tree once more and makes ropes for it, which takes longer than a frame. Its result is
+//! kept, so any run may profit, but only runs pay for it that trace enough rays to win the time back: long casts, many
+//! samples, films, windows. It is never made where drivers run kernels on the CPU: to compile the kernels that it tries
+//! takes such a driver longer than another choice could spare.
+
+mod cache;
+mod chosen;
+mod measure;
+mod rule;
+mod timings;
+mod tree;
+mod trial;
+
+use std::sync::Arc;
+
+use self::trial::Trial;
+pub use self::{
+    cache::{Cache, Key},
+    chosen::{Choices, Chosen, Methods, Reason},
+    measure::{measure_primaries, measure_traversals},
+    rule::{primary_by_rule, traversal_by_rule},
+    timings::{Candidates, Timings},
+    tree::{BuildPolicy, TreeKind},
+};
+use crate::{
+    frame::{Primary, RenderOptions, Traversal},
+    gpu::{Context, DeviceInfo, GpuError},
+    kdtree::{BuildOptions, KdTree},
+    layout::KD_ORIGIN_REACH,
+    scene::{Camera, Scene},
+};
+
+/// What the user asks for; `None` and [`BuildPolicy::Auto`] leave it open.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Request {
+    pub build: BuildPolicy,
+    pub traversal: Option<Traversal>,
+    pub primary: Option<Primary>,
+}
+
+/// What traces rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Engine {
+    /// The CPU, without Vulkan.
+    Cpu,
+    /// A Vulkan driver that runs kernels on the CPU, both sides of each branch.
+    SoftwareDriver,
+    Gpu,
+}
+
+impl Engine {
+    /// The engine that an open device is; without one, the CPU.
+    pub fn of(context: Option<&Context>) -> Self {
+        match context {
+            None => Self::Cpu,
+            Some(context) if context.runs_both_sides() => Self::SoftwareDriver,
+            Some(_) => Self::Gpu,
+        }
+    }
+
+    /// The engine that a device will be once it is open.
+    pub fn of_device(info: &DeviceInfo) -> Self {
+        if info.is_software() { Self::SoftwareDriver } else { Self::Gpu }
+    }
+}
+
+/// The work that a choice is made for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Workload {
+    /// Width and height of the whole picture, pixels, whatever part of it is rendered.
+    pub size: (u32, u32),
+    /// Rays that the work takes, as far as that can be told before. A measurement's repetitions do not count: it shows
+    /// what a single run does.
+    pub n_rays: u64,
+    /// Whether the output holds what rays cost, which depends on tree and traversal.
+    pub shows_costs: bool,
+    /// The greatest absolute coordinate of any camera's eye; infinity where a camera may go anywhere.
+    pub farthest_eye: f32,
+}
+
+impl Workload {
+    /// The work of `n_pictures` pictures of one sample a pixel, if every pixel's ray hits and is reflected once.
+    pub fn of_pictures(options: &RenderOptions, n_lights: usize, n_pictures: u64) -> Self {
+        let size = (options.width, options.height);
+        let rays_a_pixel = u64::from(options.max_depth.min(2)) * (1 + n_lights as u64);
+        let factors = [u64::from(size.0), u64::from(size.1), rays_a_pixel, n_pictures];
+        let n_rays = factors.into_iter().fold(1, u64::saturating_mul);
+        Self { size, n_rays, shows_costs: options.features, farthest_eye: f32::INFINITY }
+    }
+
+    /// The same work, with all its cameras known.
+    #[must_use]
+    pub fn seen_by<'c>(self, cameras: impl Iterator<Item = &'c Camera>) -> Self {
+        Self { farthest_eye: cameras.map(|camera| camera.eye.abs().max_element()).fold(0.0, f32::max), ..self }
+    }
+
+    /// Whether primary rays find the same hits, bit for bit, traced and rasterized by kernels.
+    fn primaries_agree(&self, tree: &KdTree) -> bool {
+        let largest_coordinate = tree.cell_min().abs().max(tree.cell_max().abs()).max_element();
+        self.farthest_eye <= KD_ORIGIN_REACH * largest_coordinate
+    }
+
+    /// The work of a window, which goes on for as long as the user likes, from wherever the user likes.
+    pub fn of_window(size: (u32, u32)) -> Self {
+        Self { size, n_rays: u64::MAX, shows_costs: false, farthest_eye: f32::INFINITY }
+    }
+
+    /// The work of casting rays without a picture.
+    pub fn of_rays(n_rays: u64) -> Self {
+        Self { n_rays, ..Self::of_window((0, 0)) }
+    }
+}
+
+impl Request {
+    /// The tree to build for so many triangles.
+    pub fn tree(&self, engine: Engine, n_triangles: usize, workload: &Workload) -> Chosen<TreeKind> {
+        Chosen::pinned_or(self.build.pinned(), || TreeKind::by_rule(engine, n_triangles, workload.n_rays))
+    }
+
+    /// How to trace, without any measurement.
+    pub fn methods_by_rule(&self, context: Option<&Context>, n_triangles: usize, size: (u32, u32)) -> Methods {
+        Methods {
+            traversal: Chosen::pinned_or(self.traversal, || traversal_by_rule(Engine::of(context))),
+            primary: Chosen::pinned_or(self.primary, || primary_by_rule(context, n_triangles, size)),
+            traversal_ns: None,
+            primary_ns: None,
+        }
+    }
+
+    /// How to trace: by the times of an earlier run or by a measurement, where that changes no bit and pays; else by
+    /// rule. `build_options`: how the tree was built.
+    ///
+    /// # Errors
+    /// The device is lost. What else goes wrong with a measurement leaves the choice to the rule.
+    pub fn methods(
+        &self,
+        context: Option<&Arc<Context>>,
+        (scene, tree): (&Scene, &KdTree),
+        build_options: &BuildOptions,
+        workload: &Workload,
+        cache: &Cache,
+    ) -> Result<Methods, GpuError> {
+        let n_triangles = scene.triangles.len();
+        let by_rule = self.methods_by_rule(context.map(|context| &**context), n_triangles, workload.size);
+        let is_gpu = |context: &&Arc<Context>| Engine::of(Some(context)) == Engine::Gpu && !workload.shows_costs;
+        let Some(context) = context.filter(is_gpu) else { return Ok(by_rule) };
+        let trial = Trial { context, scene, tree, build_options, workload, cache };
+        let mut methods = by_rule;
+        if methods.traversal.by == Reason::Rule {
+            trial.choose_traversal(&mut methods)?;
+        }
+        let may_trace = methods.primary == Chosen { value: Primary::Compute, by: Reason::Rule };
+        if may_trace && workload.primaries_agree(tree) {
+            trial.choose_primary(&mut methods)?;
+        }
+        Ok(methods)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Crop;
+
+    #[test]
+    fn a_part_is_the_same_work_as_its_whole_picture() {
+        let whole = RenderOptions { width: 640, height: 480, max_depth: 5, ..RenderOptions::default() };
+        let crop = RenderOptions { crop: Some(Crop { x0: 3, y0: 4, x1: 5, y1: 6 }), ..whole.clone() };
+        let [whole, crop] = [whole, crop].map(|options| Workload::of_pictures(&options, 3, 2));
+        assert_eq!(whole, crop);
+        assert_eq!(whole.n_rays, 640 * 480 * 2 * 4 * 2);
+        let request = Request::default();
+        for engine in [Engine::Cpu, Engine::SoftwareDriver, Engine::Gpu] {
+            assert_eq!(request.tree(engine, 100_000, &whole), request.tree(engine, 100_000, &crop));
+        }
+        let candidates = [whole, crop].map(|workload| Candidates::of_traversals(100_000, workload.n_rays));
+        assert_eq!(candidates[0], candidates[1]);
+    }
+
+    #[test]
+    fn what_is_pinned_is_taken() {
+        let request =
+            Request { build: BuildPolicy::Best, traversal: Some(Traversal::Backtrack), primary: Some(Primary::Trace) };
+        let kind = request.tree(Engine::Gpu, usize::MAX, &Workload::of_rays(0));
+        assert_eq!(kind, Chosen { value: TreeKind::Best, by: Reason::Pinned });
+        let Methods { traversal, primary, traversal_ns, .. } = request.methods_by_rule(None, 10, (10, 10));
+        assert_eq!(
+            (traversal.to_string(), primary.to_string()),
+            ("backtrack (pinned)".into(), "trace (pinned)".into())
+        );
+        assert_eq!(traversal_ns, None);
+    }
+}

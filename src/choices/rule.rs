@@ -1,0 +1,27 @@
+//! How rays are traced where nothing is known but the device and the sizes of scene and picture.
+
+use super::Engine;
+use crate::{
+    frame::{Primary, Traversal},
+    gpu::Context,
+    passes::Raster,
+};
+
+/// The traversal that is fastest on an engine in most scenes.
+pub fn traversal_by_rule(engine: Engine) -> Traversal {
+    match engine {
+        Engine::Cpu => Traversal::OF_CPU,
+        Engine::SoftwareDriver => Traversal::OF_SOFTWARE_DRIVERS,
+        Engine::Gpu => Traversal::OF_GPUS,
+    }
+}
+
+/// The primary rays that a device finds soonest in a picture of that size; without a device, the CPU.
+pub fn primary_by_rule(context: Option<&Context>, n_triangles: usize, size: (u32, u32)) -> Primary {
+    match context {
+        // Mesa's lavapipe: 870,000 triangles in 72 ms, 790,000 rays in 242 (benches/EXPERIMENTS.md).
+        Some(context) if context.runs_both_sides() => Primary::suited_to(n_triangles, size, 4),
+        Some(context) if context.has_wide_atomics() && Raster::has_room(context, n_triangles) => Primary::Compute,
+        _ => Primary::suited_to(n_triangles, size, 1),
+    }
+}

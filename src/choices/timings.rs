@@ -1,0 +1,129 @@
+//! The methods that are tried, what each took, and which of them is taken. A method is a traversal or a kind of primary
+//! visibility.
+
+use std::{
+    collections::BTreeMap,
+    fmt::{self, Display},
+    str::FromStr,
+};
+
+use serde::{Deserialize, Serialize};
+
+use super::{Cache, Chosen, Key, Reason};
+use crate::frame::{Primary, Traversal};
+
+/// Scenes of fewer triangles are small enough for any traversal: their frames take longer elsewhere.
+const FEWEST_TRIANGLES: usize = 1000;
+/// Rays from which on a run wins back what a measurement takes, some 0.1 s and 0.3 us a triangle, by a tenth of the 1
+/// to 10 ns that a ray takes, in this run and a few that find its result in the cache.
+const RAYS_A_MEASUREMENT: u64 = 1 << 28;
+const RAYS_A_MEASURED_TRIANGLE: u64 = 500;
+/// Rays a triangle from which on ropes pay: to make them takes the CPU some 200 ns a triangle in each run, and they spare
+/// a ray about 0.2 ns where they are quicker.
+const RAYS_A_ROPED_TRIANGLE: u64 = 1000;
+/// Share of its time that another traversal must spare to be taken in place of the rule's: less is noise.
+const LEAST_GAIN: f64 = 0.03;
+
+/// What a few rays took on a device: nanoseconds a ray or pixel, by method.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Timings {
+    ns: BTreeMap<String, f64>,
+}
+
+impl<T: Display> FromIterator<(T, f64)> for Timings {
+    fn from_iter<I: IntoIterator<Item = (T, f64)>>(times: I) -> Self {
+        Self { ns: times.into_iter().map(|(method, ns)| (method.to_string(), ns)).collect() }
+    }
+}
+
+impl Timings {
+    /// What a method took.
+    pub fn of(&self, method: impl Display) -> Option<f64> {
+        self.ns.get(&method.to_string()).copied()
+    }
+
+    /// Whether all is as a measurement of such methods leaves it: known words, times above zero.
+    pub fn is_sound<T: FromStr>(&self) -> bool {
+        let is_sound = |(word, ns): (&String, &f64)| T::from_str(word).is_ok() && ns.is_finite() && *ns > 0.0;
+        !self.ns.is_empty() && self.ns.iter().all(is_sound)
+    }
+
+    /// The quickest of some methods: another than the rule's only if it spares more than noise.
+    fn quickest<T: Copy + Display>(&self, methods: &[T], rule: T) -> T {
+        let times = methods.iter().filter_map(|&method| Some((method, self.of(method)?)));
+        let best = times.min_by(|(_, a), (_, b)| a.total_cmp(b));
+        match (best, self.of(rule)) {
+            (Some((best, ns)), Some(of_rule)) if ns < (1.0 - LEAST_GAIN) * of_rule => best,
+            _ => rule,
+        }
+    }
+}
+
+impl Display for Timings {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let times: Vec<_> = self.ns.iter().map(|(method, ns)| format!("{method} {ns:.3}")).collect();
+        f.write_str(&times.join(", "))
+    }
+}
+
+/// The methods that come into question on a GPU, and whether it pays to try them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Candidates<T> {
+    pub methods: Vec<T>,
+    /// Whether a measurement pays in this run; if it does not, only an earlier one can help.
+    pub may_measure: bool,
+}
+
+impl Candidates<Traversal> {
+    /// Traversals for so many rays in a scene of so many triangles; none where any will do.
+    pub fn of_traversals(n_triangles: usize, n_rays: u64) -> Option<Self> {
+        let pay_for_ropes = n_rays >= RAYS_A_ROPED_TRIANGLE.saturating_mul(n_triangles as u64);
+        let ropes = pay_for_ropes.then_some(Traversal::Ropes);
+        Self::new([Traversal::Mask, Traversal::Stack].into_iter().chain(ropes).collect(), n_triangles, n_rays)
+    }
+}
+
+impl Candidates<Primary> {
+    /// Kinds of primary visibility that find the same hits, for so many rays in a scene of so many triangles; none
+    /// where any will do.
+    pub fn of_primaries(n_triangles: usize, n_rays: u64) -> Option<Self> {
+        Self::new(vec![Primary::Compute, Primary::Trace], n_triangles, n_rays)
+    }
+}
+
+impl<T: Copy + Display + FromStr> Candidates<T> {
+    fn new(methods: Vec<T>, n_triangles: usize, n_rays: u64) -> Option<Self> {
+        let for_triangles = RAYS_A_MEASURED_TRIANGLE.saturating_mul(n_triangles as u64);
+        let may_measure = n_rays >= RAYS_A_MEASUREMENT.saturating_add(for_triangles);
+        (n_triangles >= FEWEST_TRIANGLES).then_some(Self { methods, may_measure })
+    }
+
+    /// Chooses by what the cache holds, or by `measure` where that pays, and adds its result to the cache; else by
+    /// rule. `measure` gives the time of each method, or none where the device has no timestamps.
+    ///
+    /// # Errors
+    /// Those of `measure`.
+    pub fn choose<E>(
+        &self,
+        cache: &Cache,
+        key: &Key,
+        rule: T,
+        measure: impl FnOnce(&[T]) -> Result<Option<Timings>, E>,
+    ) -> Result<(Chosen<T>, Option<Timings>), E> {
+        let by = |timings: Timings, by| (Chosen { value: timings.quickest(&self.methods, rule), by }, Some(timings));
+        let is_complete = |timings: &Timings| self.methods.iter().all(|&method| timings.of(method).is_some());
+        let known = cache.get(key).filter(Timings::is_sound::<T>);
+        if let Some(timings) = known.filter(|timings| !self.may_measure || is_complete(timings)) {
+            return Ok(by(timings, Reason::Cached));
+        }
+        let measured = if self.may_measure { measure(&self.methods)? } else { None };
+        match measured.filter(Timings::is_sound::<T>) {
+            Some(timings) => {
+                cache.put(key, &timings);
+                Ok(by(timings, Reason::Measured))
+            }
+            None => Ok((Chosen { value: rule, by: Reason::Rule }, None)),
+        }
+    }
+}

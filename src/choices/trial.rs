@@ -1,0 +1,63 @@
+//! Choices by measurement, or by what was measured before.
+
+use std::sync::Arc;
+
+use super::{Cache, Candidates, Key, Methods, Timings, Workload, measure_primaries, measure_traversals};
+use crate::{
+    frame::{Primary, RenderOptions, Traversal},
+    gpu::{Context, GpuError},
+    kdtree::{BuildOptions, KdTree},
+    scene::Scene,
+};
+
+/// What a choice by measurement depends on.
+pub struct Trial<'a> {
+    pub context: &'a Arc<Context>,
+    pub scene: &'a Scene,
+    pub tree: &'a KdTree,
+    pub build_options: &'a BuildOptions,
+    pub workload: &'a Workload,
+    pub cache: &'a Cache,
+}
+
+impl Trial<'_> {
+    pub fn choose_traversal(&self, methods: &mut Methods) -> Result<(), GpuError> {
+        let n_triangles = self.scene.triangles.len();
+        let Some(candidates) = Candidates::of_traversals(n_triangles, self.workload.n_rays) else { return Ok(()) };
+        let _choosing = tracing::info_span!("choose traversal").entered();
+        let measure =
+            |traversals: &[Traversal]| unless_lost(measure_traversals(self.context, self.scene, self.tree, traversals));
+        (methods.traversal, methods.traversal_ns) =
+            candidates.choose(self.cache, &self.key(), methods.traversal.value, measure)?;
+        Ok(())
+    }
+
+    pub fn choose_primary(&self, methods: &mut Methods) -> Result<(), GpuError> {
+        let n_triangles = self.scene.triangles.len();
+        let Some(candidates) = Candidates::of_primaries(n_triangles, self.workload.n_rays) else { return Ok(()) };
+        let _choosing = tracing::info_span!("choose primary rays").entered();
+        let ((width, height), traversal) = (self.workload.size, methods.traversal.value);
+        let options = RenderOptions { width, height, traversal, ..RenderOptions::default() };
+        let measure = |primaries: &[Primary]| {
+            unless_lost(measure_primaries(self.context, (self.scene, self.tree), &options, primaries))
+        };
+        let key = self.key().of_primaries(self.workload.size, traversal);
+        (methods.primary, methods.primary_ns) = candidates.choose(self.cache, &key, methods.primary.value, measure)?;
+        Ok(())
+    }
+
+    fn key(&self) -> Key {
+        Key::new(self.context.info(), &self.scene.triangles, self.build_options)
+    }
+}
+
+/// What was measured, or nothing where that failed; a lost device stays an error.
+fn unless_lost(measured: Result<Option<Timings>, GpuError>) -> Result<Option<Timings>, GpuError> {
+    match measured {
+        Err(error) if !error.is_device_lost() => {
+            tracing::debug!("not measured: {error}");
+            Ok(None)
+        }
+        measured => measured,
+    }
+}

@@ -1,0 +1,75 @@
+//! Which files a command reads and which it writes, so that no output overwrites another one or a file that is read.
+
+use std::{
+    collections::HashMap,
+    path::{Path, PathBuf},
+};
+
+use kdray::{output::regular_file, scene::source_files};
+
+use super::error::CliError;
+
+/// What a command does with a file, and what its user calls the file.
+struct Role {
+    name: String,
+    is_read: bool,
+}
+
+/// The files of a command so far. Two paths are the same file if they lead to it by whatever spelling and links.
+#[derive(Default)]
+pub struct FileRoles {
+    roles: HashMap<PathBuf, Role>,
+    /// Scenes whose meshes and material libraries have not been looked up yet.
+    scenes: Vec<PathBuf>,
+}
+
+impl FileRoles {
+    /// Notes a file that is read.
+    pub fn read(&mut self, name: &str, path: &Path) {
+        self.roles.insert(key_of(path), Role { name: name.to_owned(), is_read: true });
+    }
+
+    /// Notes a scene or mesh file, and all files that it names.
+    pub fn read_scene(&mut self, name: &str, path: &Path) {
+        self.read(name, path);
+        self.scenes.push(path.to_owned());
+    }
+
+    /// Notes an output.
+    ///
+    /// # Errors
+    /// The file is read, or another output is written to it.
+    pub fn write(&mut self, name: &str, path: &Path) -> Result<(), CliError> {
+        // To find what a scene names takes reading it. An output that does not exist yet cannot be among that.
+        if path.exists() {
+            self.look_up_scenes();
+        }
+        let key = key_of(path);
+        match self.roles.get(&key) {
+            None => {
+                self.roles.insert(key, Role { name: name.to_owned(), is_read: false });
+                Ok(())
+            }
+            Some(Role { name: other, is_read: false }) => {
+                Err(CliError::Usage(format!("{other} and {name} name the same file, `{}`", path.display())))
+            }
+            Some(Role { name: other, is_read: true }) => {
+                Err(CliError::Usage(format!("{name} would overwrite `{}`, which is read as {other}", path.display())))
+            }
+        }
+    }
+
+    fn look_up_scenes(&mut self) {
+        for scene in std::mem::take(&mut self.scenes) {
+            for source in source_files(&scene) {
+                let role = || Role { name: format!("a part of `{}`", scene.display()), is_read: true };
+                self.roles.entry(key_of(&source)).or_insert_with(role);
+            }
+        }
+    }
+}
+
+/// The same for all paths to one regular file. A device or a pipe is compared by its spelling.
+fn key_of(path: &Path) -> PathBuf {
+    regular_file(path).unwrap_or_else(|| path.to_owned())
+}

@@ -1,0 +1,49 @@
+//! How much memory a picture takes, asked for before it is allocated.
+
+use kdray::{frame::RenderOptions, layout::Feature, memory::require};
+
+use crate::cli::error::CliError;
+
+/// Bytes of a pixel's colour as floats.
+const RADIANCE: u64 = size_of::<[f32; 4]>() as u64;
+/// Bytes of a pixel's colour for display.
+const DISPLAY: u64 = size_of::<[u8; 4]>() as u64;
+/// Bytes of a pixel on its way to a PNG: its colour alone, and encoded.
+const ENCODED: u64 = 6;
+
+/// Refuses a picture that does not fit in memory, with `--cpu` the buffers that it is rendered in included.
+pub fn check_memory(options: &RenderOptions, n_samples: u32, on_cpu: bool) -> Result<(), CliError> {
+    let (window, crop) = (options.window(), options.crop_or_whole());
+    let n_pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
+    let n_rendered = if on_cpu { n_pixels(window.width(), window.height()) } else { 0 };
+    let needed = n_rendered * rendered_bytes(options, n_samples)
+        + n_pixels(crop.width(), crop.height()) * (RADIANCE + DISPLAY + ENCODED + feature_bytes(options));
+    require(&format!("a picture of {}x{} pixels", crop.width(), crop.height()), needed)?;
+    Ok(())
+}
+
+/// Bytes a pixel of the CPU's buffers: the triangle that is seen there, the sample, the sum of samples, the filtered
+/// picture and the picture for display.
+fn rendered_bytes(options: &RenderOptions, n_samples: u32) -> u64 {
+    let sums = if n_samples > 1 { RADIANCE } else { 0 };
+    size_of::<u32>() as u64 + RADIANCE + sums + RADIANCE + DISPLAY + feature_bytes(options)
+}
+
+fn feature_bytes(options: &RenderOptions) -> u64 {
+    if options.features { size_of::<Feature>() as u64 } else { 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pixel_s_buffers_are_counted_and_a_usual_picture_is_not_refused() {
+        let usual = RenderOptions::default();
+        check_memory(&usual, 1, true).unwrap();
+        assert_eq!(rendered_bytes(&usual, 1), 40);
+        assert_eq!(rendered_bytes(&usual, 2), 56);
+        let with_features = RenderOptions { features: true, ..usual };
+        assert_eq!(rendered_bytes(&with_features, 1), 40 + size_of::<Feature>() as u64);
+    }
+}

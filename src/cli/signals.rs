@@ -1,0 +1,68 @@
+//! What signals do to the command.
+//!
+//! A signal that asks the process to end removes the temporary files of outputs first. A write beyond the limit on the
+//! size of files (`ulimit -f`) becomes an error of that write, in place of a signal that ends the process.
+
+use std::{
+    fs,
+    sync::{Arc, atomic::AtomicBool, mpsc},
+    thread,
+};
+
+use kdray::output;
+use signal_hook::{
+    consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ},
+    flag,
+    iterator::Signals,
+    low_level::emulate_default_handler,
+};
+
+/// Handles signals from now on. What the system refuses keeps its default.
+pub fn handle() {
+    let ending: Vec<_> = [SIGHUP, SIGINT, SIGTERM].into_iter().filter(|signal| !is_ignored(*signal)).collect();
+    let (ready, is_ready) = mpsc::channel();
+    let wait = move || {
+        let signals = Signals::new(ending);
+        // The receiver waits for this.
+        let _ = ready.send(());
+        signals.map(end_at_the_first)
+    };
+    if thread::Builder::new().name("signals".to_owned()).spawn(wait).is_ok() {
+        // An error means that the thread is gone, and with it the handlers.
+        let _ = is_ready.recv();
+    }
+    // Any handler will do: it lets `write` return the error. A flag that nobody reads is the simplest one.
+    let _ = flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
+}
+
+/// Waits for a signal, removes temporary files and ends the process as the signal does by default. A shell reports this
+/// as exit code 128 + signal.
+fn end_at_the_first(mut signals: Signals) {
+    if let Some(signal) = signals.forever().next() {
+        output::remove_temporaries();
+        let _ = emulate_default_handler(signal);
+    }
+}
+
+/// Whether whoever started the process had it ignore the signal, as `nohup` does with SIGHUP. It stays ignored.
+fn is_ignored(signal: i32) -> bool {
+    fs::read_to_string("/proc/self/status").is_ok_and(|status| ignored_signals(&status) >> (signal - 1) & 1 == 1)
+}
+
+/// The bit mask after `SigIgn:` in a process's status on Linux: bit n - 1 for signal n.
+fn ignored_signals(status: &str) -> u64 {
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ignored_signals_are_bits_of_the_status() {
+        let status = "Name:\tkdray\nSigBlk:\tffffffffffffffff\nSigIgn:\t0000000000001001\nSigCgt:\t0000000000000002\n";
+        assert_eq!(ignored_signals(status), 1 << (SIGHUP - 1) | 1 << (13 - 1));
+        assert_eq!(ignored_signals("Name:\tkdray\n"), 0);
+    }
+}

@@ -1,0 +1,45 @@
+//! Creations that fail on purpose, so that tests see what remains of a change that a driver refuses halfway.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use ash::vk;
+
+use super::{Context, GpuError};
+
+/// How many creations succeed until one fails.
+pub(super) struct Refusal {
+    /// [`Refusal::NEVER`] where none fails.
+    n_left: AtomicU32,
+}
+
+impl Refusal {
+    const NEVER: u32 = u32::MAX;
+
+    pub(super) fn never() -> Self {
+        Self { n_left: AtomicU32::new(Self::NEVER) }
+    }
+}
+
+impl Context {
+    /// Lets so many creations of buffers, images, pipelines, descriptor sets, query pools and command buffers succeed
+    /// from now on, and every later one fail as if memory were exhausted. `None` lets all succeed.
+    #[doc(hidden)]
+    pub fn refuse_creations_after(&self, n_creations: Option<u32>) {
+        self.refusal.n_left.store(n_creations.unwrap_or(Refusal::NEVER), Ordering::Relaxed);
+    }
+
+    /// Counts a creation by `call`, which is about to be made.
+    ///
+    /// # Errors
+    /// The creation is one of those that [`Context::refuse_creations_after`] lets fail.
+    pub(super) fn count_creation(&self, call: &'static str, object: &str) -> Result<(), GpuError> {
+        let count_down = |n_left| match n_left {
+            Refusal::NEVER => Some(n_left),
+            _ => u32::checked_sub(n_left, 1),
+        };
+        match self.refusal.n_left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, count_down) {
+            Ok(_) => Ok(()),
+            Err(_) => Err(GpuError::call(call, object)(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY)),
+        }
+    }
+}

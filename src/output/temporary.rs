@@ -1,0 +1,83 @@
+//! Temporary files beside their targets, none of which outlives the process that a signal ends.
+//!
+//! Every temporary file with a name is registered while it has that name. A signal handler's thread calls
+//! [`remove_temporaries`] before it ends the process. One lock covers the registry and the files themselves: no file
+//! gets or loses its temporary name without it. Only SIGKILL, which no handler sees, leaves a temporary file behind.
+
+#[cfg(unix)]
+use std::os::unix::fs::PermissionsExt;
+use std::{
+    collections::BTreeSet,
+    fs::{self, File},
+    io, mem,
+    path::{Path, PathBuf},
+    sync::{Mutex, MutexGuard, PoisonError},
+};
+
+use tempfile::NamedTempFile;
+
+/// Paths of all temporary files that exist now.
+static REGISTRY: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn registry() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    REGISTRY.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes every temporary file of this process, and lets no thread create or rename another one.
+///
+/// A process calls this when it is about to end, on a thread other than those that write. A thread that then begins or
+/// finishes an output waits until the process has ended, so that each target is as it was before or complete.
+pub fn remove_temporaries() {
+    let paths = registry();
+    for path in paths.iter() {
+        // A file that cannot be removed stays; there is nobody left to tell.
+        let _ = fs::remove_file(path);
+    }
+    // The lock is never released.
+    mem::forget(paths);
+}
+
+/// A file that can be renamed to any other of its directory. It is removed when it is dropped before that.
+pub struct Temporary {
+    /// None once the file has its final name.
+    file: Option<NamedTempFile>,
+}
+
+impl Temporary {
+    /// Creates a file in a directory, with the permissions that the umask leaves.
+    pub fn create_in(directory: &Path) -> io::Result<Self> {
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(".kdray-");
+        #[cfg(unix)]
+        builder.permissions(PermissionsExt::from_mode(0o666)); // less the umask
+        let mut paths = registry();
+        // The library's own message names the temporary file, which says nothing to the user.
+        let file = builder.tempfile_in(directory).map_err(|error| io::Error::from(error.kind()))?;
+        paths.insert(file.path().to_owned());
+        Ok(Self { file: Some(file) })
+    }
+
+    /// The open file.
+    pub fn as_file_mut(&mut self) -> &mut File {
+        self.file.as_mut().expect("only `persist` takes the file").as_file_mut()
+    }
+
+    /// Gives the file its final name, and so replaces what had this name.
+    pub fn persist(mut self, target: &Path) -> io::Result<()> {
+        let mut paths = registry();
+        let file = self.file.take().expect("only `persist` takes the file");
+        paths.remove(file.path());
+        // On failure the error holds the file, which goes while the lock is still held.
+        file.persist(target).map(|_: File| ()).map_err(|failed| failed.error)
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if let Some(file) = self.file.take() {
+            let mut paths = registry();
+            paths.remove(file.path());
+            drop(file);
+        }
+    }
+}

@@ -1,0 +1,243 @@
+//! Pictures that are larger than what a device holds at once: drawn in bands of full rows, one after the other, and
+//! joined.
+
+use std::{
+    borrow::Cow,
+    sync::Arc,
+    time::{Duration, Instant},
+};
+
+use super::Renderer;
+use crate::{
+    frame::{Crop, Picture, Profile, RenderOptions},
+    gpu::{Context, GpuError, Limits},
+    kdtree::KdTree,
+    layout::Feature,
+    passes::Pixels,
+    scene::{Camera, Scene},
+};
+
+/// Draws whole pictures of any size. Where all pixels would take more than a storage buffer can have, it draws bands of
+/// full rows; the joined picture has the same bits as one that is drawn at once.
+pub struct BandedRenderer {
+    renderer: Renderer,
+    /// From the top; together they are the picture, or the part of it that the options ask for.
+    bands: Vec<Crop>,
+    /// The picture that was drawn last. None where it is a single band, which stays on the device until it is fetched.
+    joined: Option<Picture>,
+    /// Whether the next sample is expected to be slow. A driver that runs kernels on the CPU is slow from the first on.
+    is_slow: bool,
+}
+
+/// Is told how far a drawing is.
+pub trait Watcher {
+    /// Whether [`Watcher::part`] is of use: to wait for the device within a sample takes time.
+    fn sees_parts(&self) -> bool {
+        false
+    }
+
+    /// So much of the sample that is drawn is done, 0 to 1.
+    fn part(&mut self, _share: f32) {}
+
+    /// A sample of a band is done.
+    fn sample(&mut self);
+}
+
+impl<F: FnMut()> Watcher for F {
+    fn sample(&mut self) {
+        self();
+    }
+}
+
+/// A sample that is expected to take longer is drawn in steps if somebody sees them. Waiting for the device after a step
+/// takes about 0.1 ms: less than a hundredth of such a sample, but as much as a step of a fast GPU's.
+const SLOW_SAMPLE: Duration = Duration::from_millis(500);
+
+/// What comes of a drawing, beside the picture.
+pub struct Drawn {
+    /// What the rays of each pixel met and cost, of the first sample; empty unless the options ask for it.
+    pub features: Vec<Feature>,
+    /// Times and counts of all samples of all bands.
+    pub profile: Profile,
+}
+
+impl BandedRenderer {
+    /// Uploads the scene and makes the passes.
+    ///
+    /// # Errors
+    /// The scene, or a single row of the picture, is beyond the device's limits or memory.
+    pub fn new(context: Arc<Context>, scene: &Scene, tree: &KdTree, options: &RenderOptions) -> Result<Self, GpuError> {
+        let bands = bands(context.limits(), options);
+        let is_slow = context.runs_both_sides();
+        let renderer = match largest(&bands, options) {
+            None => Renderer::new(context, scene, tree, options)?,
+            Some(crop) => Renderer::new(context, scene, tree, &RenderOptions { crop: Some(crop), ..options.clone() })?,
+        };
+        tracing::debug!(n_bands = bands.len(), "the picture's bands");
+        Ok(Self { renderer, bands, joined: None, is_slow })
+    }
+
+    /// Bands of which the picture consists.
+    pub fn n_bands(&self) -> u32 {
+        self.bands.len() as u32
+    }
+
+    /// Looks from elsewhere from the next drawing on.
+    pub fn set_camera(&mut self, camera: &Camera) {
+        self.renderer.set_camera(camera);
+    }
+
+    /// Draws a new picture of so many samples a pixel, at least one, and tells the watcher how far it is.
+    ///
+    /// # Errors
+    /// A failed call; one pixel alone makes more rays than a queue holds; out of memory.
+    pub fn draw(&mut self, n_samples: u32, mut watcher: impl Watcher) -> Result<Drawn, GpuError> {
+        if let [_] = self.bands[..] {
+            return self.draw_band(n_samples, &mut watcher);
+        }
+        let mut all = Drawn { features: Vec::new(), profile: Profile::default() };
+        let mut joined = self.room_for_all(&mut all.features)?;
+        for (band_ix, &band) in self.bands.clone().iter().enumerate() {
+            self.renderer.set_crop(band)?;
+            let drawn = self.draw_band(n_samples, &mut watcher)?;
+            let picture = self.renderer.picture()?;
+            joined.radiance.extend(picture.radiance);
+            joined.display.extend(picture.display);
+            all.features.extend(drawn.features);
+            if band_ix == 0 {
+                all.profile = drawn.profile;
+            } else {
+                all.profile.append(drawn.profile);
+            }
+        }
+        self.joined = Some(joined);
+        Ok(all)
+    }
+
+    /// The picture that was drawn last.
+    ///
+    /// # Errors
+    /// A failed copy.
+    pub fn picture(&self) -> Result<Cow<'_, Picture>, GpuError> {
+        match &self.joined {
+            Some(picture) => Ok(Cow::Borrowed(picture)),
+            None => self.renderer.picture().map(Cow::Owned),
+        }
+    }
+
+    fn draw_band(&mut self, n_samples: u32, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
+        self.renderer.reset_samples();
+        let mut profile = self.draw_sample(watcher)?;
+        let features = if self.renderer.options().features { self.renderer.features()? } else { Vec::new() };
+        for _ in 1..n_samples {
+            profile.add(&self.draw_sample(watcher)?);
+        }
+        Ok(Drawn { features, profile })
+    }
+
+    /// Draws a sample, in steps if it is expected to be slow and somebody sees them.
+    fn draw_sample(&mut self, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
+        let begin = Instant::now();
+        let profile = if self.is_slow && watcher.sees_parts() {
+            self.draw_steps(watcher)?
+        } else {
+            self.renderer.draw_sample()?
+        };
+        self.is_slow = begin.elapsed() > SLOW_SAMPLE;
+        watcher.sample();
+        Ok(profile)
+    }
+
+    fn draw_steps(&mut self, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
+        loop {
+            match self.renderer.draw_step()? {
+                Some(profile) => return Ok(profile),
+                None => watcher.part(self.renderer.progress()),
+            }
+        }
+    }
+
+    /// An empty picture and empty features with memory for all bands, so that a lack of it is known before the work is
+    /// done.
+    fn room_for_all(&mut self, features: &mut Vec<Feature>) -> Result<Picture, GpuError> {
+        self.joined = None;
+        let n_pixels = self.bands.iter().map(|band| band.width() as usize * band.height() as usize).sum();
+        let (width, height) = (self.bands[0].width(), self.bands.iter().map(Crop::height).sum());
+        let mut picture = Picture { width, height, radiance: Vec::new(), display: Vec::new() };
+        reserve("picture's radiance", &mut picture.radiance, n_pixels)?;
+        reserve("displayed picture", &mut picture.display, n_pixels)?;
+        if self.renderer.options().features {
+            reserve("picture's features", features, n_pixels)?;
+        }
+        Ok(picture)
+    }
+}
+
+fn reserve<T>(object: &'static str, elements: &mut Vec<T>, len: usize) -> Result<(), GpuError> {
+    let bytes = (len * size_of::<T>()) as u64;
+    elements.try_reserve_exact(len).map_err(|_| GpuError::HostMemory { object, bytes })
+}
+
+/// Bands of nearly equal height, as few as can be, each of which a device can hold with the rows beside it that the
+/// noise filter needs. A row that is too long for the device is a band, too.
+fn bands(limits: &Limits, options: &RenderOptions) -> Vec<Crop> {
+    let (asked, window) = (options.crop_or_whole(), options.window());
+    let row_bytes = u64::from(window.width()) * Pixels::bytes_a_pixel(options);
+    let most_rows = u32::try_from(limits.storage_range / row_bytes).unwrap_or(u32::MAX);
+    if window.height() <= most_rows {
+        return vec![asked];
+    }
+    let most_rows = most_rows.saturating_sub(2 * options.border()).max(1);
+    let n_rows = asked.height().div_ceil(asked.height().div_ceil(most_rows));
+    let band = |y0| Crop { y0, y1: (y0 + n_rows).min(asked.y1), ..asked };
+    (asked.y0..asked.y1).step_by(n_rows as usize).map(band).collect()
+}
+
+/// The band that needs the most memory; none where there is only one.
+fn largest(bands: &[Crop], options: &RenderOptions) -> Option<Crop> {
+    let height = |crop: &&Crop| RenderOptions { crop: Some(**crop), ..options.clone() }.window().height();
+    bands.iter().max_by_key(height).copied().filter(|_| bands.len() > 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::Denoise;
+
+    fn limits(storage_range: u64) -> Limits {
+        Limits { storage_range, n_texels: 0, buffer_bytes: u64::MAX, target_size: 1 << 14, n_groups: 65_535 }
+    }
+
+    #[test]
+    fn bands_are_the_picture_and_fit_the_device() {
+        let filter = Denoise::Paper { threshold: 1.0 };
+        let part = Crop { x0: 5, y0: 7, x1: 60, y1: 41 };
+        for (denoise, features, crop) in
+            [(Denoise::Off, false, None), (filter, false, None), (filter, true, None), (filter, false, Some(part))]
+        {
+            let options = RenderOptions { width: 64, height: 48, denoise, features, crop, ..RenderOptions::default() };
+            for range in [16 << 10, 20_000, 24 << 10, 48 << 10, 1 << 30] {
+                let (bands, asked) = (bands(&limits(range), &options), options.crop_or_whole());
+                let mut y = asked.y0;
+                for band in &bands {
+                    assert_eq!((band.x0, band.y0, band.x1), (asked.x0, y, asked.x1));
+                    y = band.y1;
+                    let window = RenderOptions { crop: Some(*band), ..options.clone() }.window();
+                    let n_pixels = u64::from(window.width()) * u64::from(window.height());
+                    assert!(n_pixels * Pixels::bytes_a_pixel(&options) <= range, "{range}: {band}");
+                }
+                assert_eq!(y, asked.y1);
+                assert_eq!(bands.len() == 1, largest(&bands, &options).is_none());
+            }
+        }
+    }
+
+    #[test]
+    fn there_are_no_more_bands_than_needed() {
+        let options = |denoise| RenderOptions { width: 64, height: 48, denoise, ..RenderOptions::default() };
+        let n_bands = |n_rows: u64, denoise| bands(&limits(n_rows * 64 * 16), &options(denoise)).len();
+        let filter = Denoise::Paper { threshold: 1.0 };
+        assert_eq!([48, 47, 24, 23, 1].map(|n_rows| n_bands(n_rows, Denoise::Off)), [1, 2, 2, 3, 48]);
+        assert_eq!([48, 47, 26, 25, 3].map(|n_rows| n_bands(n_rows, filter)), [1, 2, 2, 3, 48]);
+    }
+}

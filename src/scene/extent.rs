@@ -1,0 +1,49 @@
+//! How small a scene may be, and how far from the origin, for single precision to tell its triangles apart.
+
+use std::path::Path;
+
+use super::{SceneError, framing::bounds};
+use crate::layout::Triangle;
+
+/// Scenes whose longest side is less are refused: products of their coordinates would underflow.
+///
+/// Let L be the longest side and s the size of a triangle. The hit test multiplies coordinates across the ray, of size
+/// s, to edge functions of size s^2, sums these to the determinant, and multiplies them by depths of size L to find t.
+/// Devices may flush what is less than 2^-126 to zero, and t is right to single precision only if what is flushed is
+/// less than 2^-24 of the sum: s^2 L >= 2^-102. For edges that the ray meets, products are exact only if 2^-48 of s^2,
+/// the error of the rounded product's error, is kept: s^2 >= 2^-78. With L = 1e-8 > 2^-27, the first holds for s >=
+/// 2^-37.5 and the second for s >= 2^-39: for triangles as small as 2^-10.5 of the scene, of which a surface has some
+/// two million. All other products of the traversal and of shading are of lower degree, or of vectors scaled to unit
+/// length before.
+pub const MIN_EXTENT: f32 = 1e-8;
+
+/// Steps of single precision along a scene's longest side below which detail is lost that a picture could show: a
+/// sixteenth of a pixel in a picture 4096 pixels wide.
+const MIN_STEPS: f64 = 65_536.0;
+
+/// Refuses a scene that is too small to be traced, and warns of one that lies so far from the origin that its
+/// coordinates are coarse.
+pub(super) fn check(path: &Path, triangles: &[Triangle]) -> Result<(), SceneError> {
+    let (min, max) = bounds(triangles);
+    let extent = (max.as_dvec3() - min.as_dvec3()).max_element();
+    let largest = min.abs().max(max.abs()).max_element();
+    let spacing = f64::from(largest.next_up()) - f64::from(largest);
+    let is_coarse = extent < MIN_STEPS * spacing;
+    let precision = format!(
+        "its coordinates reach {largest:e}, where single-precision numbers are {spacing:.2e} apart, and its longest \
+         side is {extent:.2e}"
+    );
+    if extent < f64::from(MIN_EXTENT) {
+        let cure = if is_coarse && largest >= MIN_EXTENT { "move it to the origin" } else { "scale it up" };
+        let what = format!("is too small to be traced: {precision}, less than {MIN_EXTENT:e}; {cure}");
+        return Err(SceneError::file(path, what));
+    }
+    if is_coarse {
+        tracing::warn!(
+            "{}: {precision}: smaller details are lost; move the scene to the origin before it is saved in single \
+             precision",
+            path.display()
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,29 @@
+//! Whether anything lights a scene.
+
+use std::path::Path;
+
+use glam::Vec3;
+
+use super::Scene;
+
+impl Scene {
+    /// Warns if neither a light nor the ambient term gives any surface light, and says how to add one. `path` is the
+    /// scene's file.
+    pub fn warn_if_unlit(&self, path: &Path) {
+        let is_lit = self.ambient != Vec3::ZERO || self.lights.iter().any(|light| light.intensity != Vec3::ZERO);
+        if is_lit {
+            return;
+        }
+        let emission = if self.materials.iter().any(|material| material.ke != Vec3::ZERO) {
+            "; emission (Ke) shows on its own surface but lights no other one"
+        } else {
+            ""
+        };
+        tracing::warn!(
+            "{}: nothing lights the scene, since it has neither a [[light]] nor `ambient` above 0: surfaces are \
+             black{emission}; add `ambient = [0.3, 0.3, 0.3]` at the top, or at the end `[[light]]` with `kind = \
+             \"directional\"`, `direction = [-1, -2, -1]` and `irradiance = [1, 1, 1]`",
+            path.display()
+        );
+    }
+}

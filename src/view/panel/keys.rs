@@ -1,0 +1,68 @@
+//! The keys and the mouse: a list over the picture, and the line that names the key for it.
+
+use egui::{Align2, Area, Color32, Frame, Grid, Id, Order, RichText, ScrollArea, Ui, Window, vec2};
+
+/// What the user can press, and what it does. README.md has the same rows.
+pub const KEYS: [(&str, &str); 14] = [
+    ("left drag, right drag", "go around the target, look around"),
+    ("middle drag, Shift + left drag", "move sideways, up and down"),
+    ("wheel", "nearer, farther, to where the mouse points"),
+    ("click", "the rays of a pixel: triangles, materials, steps"),
+    ("W A S D, E Q", "fly, up and down; S goes back once another was pressed"),
+    ("Shift, Ctrl", "fly faster, slower, as long as it is held"),
+    ("+ -, Ctrl or Alt + wheel", "fly faster, slower from now on"),
+    ("F, Home", "frame the scene, back to the start"),
+    ("1, 2 3 4", "picture; depth, normals, triangles: primary rays only"),
+    ("5, 6", "steps, rays: sums over all rays, slow as the picture"),
+    ("P", "print the camera as a scene file has it"),
+    ("S, F12", "save what is seen, drawn in full"),
+    ("H, F1, ?", "show or hide these keys"),
+    ("Tab, Esc", "hide the panel, quit"),
+];
+
+/// Points between what lies over the picture and the window's edges.
+const MARGIN: f32 = 8.0;
+/// Points that the longest line fits into.
+const WIDTH: f32 = 640.0;
+
+/// Shows all keys in the middle of the picture; what does not fit can be scrolled to.
+pub fn show(ui: &Ui, frame: Frame) {
+    let room = (ui.ctx().content_rect().size() - vec2(6.0, 6.0) * MARGIN).max(vec2(80.0, 40.0));
+    Window::new("Keys")
+        .frame(frame.fill(Color32::from_black_alpha(245))) // it may lie over the panel's text
+        .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
+        .order(Order::Foreground)
+        .title_bar(false)
+        .resizable(false)
+        .default_size(room.min(vec2(WIDTH, f32::INFINITY)))
+        .show(ui.ctx(), |ui| {
+            ScrollArea::both().max_width(room.x).max_height(room.y).show(ui, |ui| {
+                Grid::new("keys").num_columns(2).spacing([16.0, 3.0]).show(ui, |ui| {
+                    for (keys, does) in KEYS {
+                        ui.label(RichText::new(keys).strong());
+                        ui.label(does);
+                        ui.end_row();
+                    }
+                });
+            });
+        });
+}
+
+/// Shows a line that names the key for the list.
+pub fn hint(ui: &Ui, frame: Frame) {
+    let corner = Align2::RIGHT_BOTTOM;
+    Area::new(Id::new("hint")).anchor(corner, [-MARGIN, -MARGIN]).interactable(false).show(ui.ctx(), |ui| {
+        frame.show(ui, |ui| ui.label(RichText::new("H, F1 or ? shows the keys").strong()));
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_readme_has_the_same_keys() {
+        let rows: String = KEYS.iter().map(|(keys, does)| format!("| {keys} | {does} |\n")).collect();
+        assert!(include_str!("../../../README.md").contains(&rows), "README.md lacks these rows:\n{rows}");
+    }
+}

@@ -1,0 +1,62 @@
+//! Pictures do not depend on the GLSL compiler that made the kernels: the system's library and the one that is built from
+//! source give the same.
+
+use std::path::Path;
+
+use kdray::{
+    frame::{Picture, Primary, RenderOptions},
+    render::Renderer,
+    scene::Scene,
+};
+
+use super::studio::{assert_silent, device, differing, on_cpu, options, tree_of};
+
+/// Part of a driver's device name, and the checksums that it gives for `cornell` and `paper2`. They have to be the same
+/// with the feature `shaderc-from-source` and without it. A change of a kernel's arithmetic changes them. Lavapipe gives
+/// the same with registers of 128 bits and of 256.
+const CHECKSUMS: [(&str, [u32; 2]); 2] =
+    [("llvmpipe", [496181928, 885076327]), ("SwiftShader", [2091055692, 1675913398])];
+
+/// CRC-32 of the displayed pixels.
+fn checksum(picture: &Picture) -> u32 {
+    crc32fast::hash(picture.display.as_flattened())
+}
+
+fn scene(name: &str) -> Scene {
+    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)).expect("a scene")
+}
+
+#[test]
+fn pictures_are_the_same_whichever_compiler_made_the_kernels() {
+    let context = device();
+    let name = &context.info().name;
+    let known = CHECKSUMS.iter().find(|(driver, _)| name.contains(driver)).map(|(_, checksums)| *checksums);
+    let scenes = ["cornell.toml", "paper2.toml"].map(scene);
+    let options = scenes
+        .each_ref()
+        .map(|scene| RenderOptions { primary: Primary::Trace, ..options(96, 72, scene.defaults.max_depth) });
+    let pictures: [Picture; 2] = std::array::from_fn(|i| {
+        let renderer = Renderer::new(context.clone(), &scenes[i], &tree_of(&scenes[i]), &options[i]);
+        renderer.expect("a renderer").render().expect("a frame").0
+    });
+    assert_silent(&context);
+    match known {
+        Some(expected) => {
+            let found = pictures.each_ref().map(checksum);
+            assert_eq!(found, expected, "{name}, kernels of {}", env!("KDRAY_SPIRV_COMPILER"));
+        }
+        // Another device may round differently, so that only few pixels have to be those of the CPU.
+        None => (0..2).for_each(|i| {
+            let n_differing = differing(&pictures[i], &on_cpu(&scenes[i], &options[i]), 2e-3).len();
+            assert!(n_differing <= 14, "{name}: {n_differing} of 6912 pixels differ from the CPU's");
+        }),
+    }
+}
+
+#[test]
+fn one_changed_pixel_changes_the_checksum() {
+    let picture = on_cpu(&scene("cornell.toml"), &options(16, 12, 2));
+    let mut changed = picture.clone();
+    changed.display[77][1] ^= 1;
+    assert_ne!(checksum(&picture), checksum(&changed));
+}

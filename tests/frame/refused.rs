@@ -1,0 +1,242 @@
+//! A change that the device refuses, at whichever of its steps, changes nothing: the picture stays, and the next one has
+//! the bits that a renderer draws which nobody has tried to change.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use kdray::{
+    frame::{Crop, Denoise, Picture, Primary, RenderOptions, Tonemap, Traversal},
+    gpu::{Context, DeviceOverrides, GpuError},
+    kdtree::KdTree,
+    passes::Reading,
+    render::Renderer,
+    scene::{Camera, Scene},
+};
+
+use super::studio::{assert_silent, device, identical, options, tree_of};
+use crate::support::{pretended, scenes, without_wide_atomics};
+
+/// From where all pictures here are seen; not the scene's own camera.
+const CAMERA: Camera =
+    Camera { eye: Vec3::new(0.4, 0.3, 3.9), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 50.0 };
+
+/// With few pixels, since each refused step draws two samples.
+fn small() -> RenderOptions {
+    options(15, 10, 2)
+}
+
+/// Pixels of a batch, so that a sample has several parts.
+const BATCH: u32 = 30;
+
+/// Draws one sample and a part of the second one.
+fn begin(renderer: &mut Renderer) {
+    renderer.draw().expect("a sample");
+    assert_eq!(renderer.draw_part().expect("a part"), None, "the sample has more parts");
+}
+
+/// Draws the rest of the second sample.
+fn finish(renderer: &mut Renderer) -> Picture {
+    renderer.draw_sample().expect("a sample");
+    assert_eq!(renderer.n_samples(), 2);
+    renderer.picture().expect("a picture")
+}
+
+/// What a user sees of a renderer.
+#[derive(Debug, PartialEq)]
+struct State {
+    options: RenderOptions,
+    camera: Camera,
+    n_samples: u32,
+    progress: Option<f32>,
+    most_pixels: Option<u32>,
+    displayed: Option<(u32, u32)>,
+}
+
+fn state(renderer: &Renderer) -> State {
+    State {
+        options: renderer.options().clone(),
+        camera: *renderer.camera(),
+        n_samples: renderer.n_samples(),
+        progress: renderer.is_pending().then(|| renderer.progress()),
+        most_pixels: renderer.most_pixels(),
+        displayed: renderer.displayed().map(|displayed| displayed.size),
+    }
+}
+
+/// A renderer that is changed again and again.
+struct Trial {
+    context: Arc<Context>,
+    scene: Scene,
+    tree: KdTree,
+    renderer: Renderer,
+    /// What new renderers draw by two samples, for each of the options so far.
+    untouched: Vec<(RenderOptions, Picture)>,
+}
+
+impl Trial {
+    fn new(context: Arc<Context>, start: &RenderOptions) -> Self {
+        let scene = scenes::mixed_outdoors();
+        let tree = tree_of(&scene);
+        let renderer = Self::renderer(&context, &scene, &tree, start);
+        Self { context, scene, tree, renderer, untouched: Vec::new() }
+    }
+
+    fn renderer(context: &Arc<Context>, scene: &Scene, tree: &KdTree, options: &RenderOptions) -> Renderer {
+        let mut renderer = Renderer::new(context.clone(), scene, tree, options).expect("a renderer");
+        renderer.set_camera(&CAMERA);
+        renderer.limit_batches(Some(BATCH)).expect("batches");
+        renderer
+    }
+
+    /// What a new renderer draws with the options of the changed one.
+    fn untouched(&mut self) -> Picture {
+        let options = self.renderer.options();
+        if let Some((_, picture)) = self.untouched.iter().find(|(known, _)| known == options) {
+            return picture.clone();
+        }
+        let mut renderer = Self::renderer(&self.context, &self.scene, &self.tree, options);
+        begin(&mut renderer);
+        let picture = finish(&mut renderer);
+        self.untouched.push((options.clone(), picture.clone()));
+        picture
+    }
+
+    /// Refuses the change at each of its creations in turn, until it succeeds. There are so many of them, at least.
+    fn refuse(&mut self, name: &str, least_creations: u32, change: &Change) {
+        let untouched = self.untouched();
+        let renderer = &mut self.renderer;
+        for n_creations in 0.. {
+            begin(renderer);
+            let (before, picture) = (state(renderer), renderer.picture().expect("a picture"));
+            self.context.refuse_creations_after(Some(n_creations));
+            let changed = change(renderer, &self.tree);
+            self.context.refuse_creations_after(None);
+            let Err(error) = changed else {
+                assert!(n_creations >= least_creations, "{name}: {n_creations} creations");
+                break;
+            };
+            assert!(matches!(error, GpuError::Call { .. }), "{name}, {n_creations}: {error}");
+            assert_eq!(state(renderer), before, "{name}, {n_creations}: {error}");
+            assert!(identical(&renderer.picture().expect("a picture"), &picture), "{name}, {n_creations}: {error}");
+            assert!(identical(&finish(renderer), &untouched), "{name}, {n_creations}: {error}");
+        }
+        self.renderer.draw().expect("a sample");
+        assert!(identical(&finish(&mut self.renderer), &self.untouched()), "{name}");
+    }
+
+    /// Goes from options to options, each of which the device refuses first.
+    fn walk(&mut self, steps: &[(RenderOptions, u32)]) {
+        for (to, least_creations) in steps {
+            let name = format!("{:?} to {to:?}", self.renderer.options());
+            self.refuse(&name, *least_creations, &|renderer, tree| renderer.set_options(to, tree));
+        }
+        assert_silent(&self.context);
+    }
+}
+
+type Change<'a> = dyn Fn(&mut Renderer, &KdTree) -> Result<(), GpuError> + 'a;
+
+#[test]
+fn another_traversal() {
+    let traversal = |traversal| (RenderOptions { traversal, ..small() }, 10);
+    let ways = [Traversal::Ropes, Traversal::MaskBoxes, Traversal::Mask].map(traversal);
+    Trial::new(device(), &small()).walk(&ways);
+}
+
+/// Kernels that read by address find the boxes and ropes by a buffer of addresses, which changes with them.
+#[test]
+fn another_traversal_of_arrays_that_are_read_by_address() {
+    let overrides = DeviceOverrides { storage_range: Some(48 << 10), n_texels: Some(1), ..DeviceOverrides::default() };
+    let ropes = RenderOptions { traversal: Traversal::Ropes, ..small() };
+    let mut trial = Trial::new(pretended(overrides), &ropes);
+    assert_eq!(trial.renderer.resources().tree.reading(), Reading::Address);
+    trial.walk(&[(small(), 10), (ropes, 10)]);
+}
+
+#[test]
+fn other_primary_rays() {
+    let primary = |primary| (RenderOptions { primary, ..small() }, 10);
+    let mut ways = vec![Primary::Trace, Primary::Raster];
+    if device().has_wide_atomics() {
+        ways.extend([Primary::Compute, Primary::Trace, Primary::Compute, Primary::Raster]);
+    }
+    Trial::new(device(), &small()).walk(&ways.into_iter().map(primary).collect::<Vec<_>>());
+}
+
+#[test]
+fn another_size() {
+    let size = |width, height| RenderOptions { width, height, ..small() };
+    let mut trial = Trial::new(device(), &small());
+    trial.walk(&[(size(23, 17), 20), (size(9, 8), 8)]);
+    trial.refuse("resize", 20, &|renderer, _| renderer.resize(30, 20));
+    let crop = Crop { x0: 2, y0: 3, x1: 9, y1: 12 };
+    trial.refuse("crop", 8, &|renderer, _| renderer.set_crop(crop));
+    assert_silent(&trial.context);
+}
+
+#[test]
+fn other_outputs_and_counts() {
+    let with_features = RenderOptions { features: true, ..small() };
+    let filtered = RenderOptions { denoise: Denoise::Paper { threshold: 0.3 }, ..small() };
+    let deeper = RenderOptions { max_depth: 4, ..small() };
+    let unprofiled = RenderOptions { profile: false, ..small() };
+    let back = small();
+    Trial::new(device(), &small()).walk(&[
+        (with_features, 15),
+        (filtered, 15),
+        (deeper, 10),
+        (unprofiled, 10),
+        (back, 10),
+    ]);
+}
+
+#[test]
+fn other_views_of_the_same_samples() {
+    let to = RenderOptions { tonemap: Tonemap::Agx, exposure: 2.0, ..small() };
+    Trial::new(device(), &small()).walk(&[(to, 1)]);
+}
+
+#[test]
+fn other_batches() {
+    let mut trial = Trial::new(device(), &small());
+    trial.refuse("batches", 6, &|renderer, _| renderer.limit_batches(Some(7)));
+    assert_silent(&trial.context);
+}
+
+/// The second sample begins with the sums of samples, which need memory.
+#[test]
+fn a_sample_that_cannot_begin_leaves_those_before() {
+    let mut trial = Trial::new(device(), &small());
+    let both = trial.untouched();
+    let (renderer, context) = (&mut trial.renderer, &trial.context);
+    renderer.draw().expect("a sample");
+    let first = renderer.picture().expect("a picture");
+    let begins = (0..).take_while(|&n_creations| {
+        context.refuse_creations_after(Some(n_creations));
+        let begun = renderer.draw_part();
+        context.refuse_creations_after(None);
+        let is_refused = begun.is_err() && renderer.n_samples() == 1;
+        assert!(!is_refused || identical(&renderer.picture().expect("a picture"), &first), "{n_creations}");
+        is_refused
+    });
+    let n_creations = begins.count();
+    assert!(n_creations >= 5, "{n_creations} creations");
+    renderer.draw().expect("a sample");
+    assert!(identical(&finish(renderer), &both));
+    assert_silent(context);
+}
+
+#[test]
+fn what_the_device_lacks() {
+    for primary in [Primary::Trace, Primary::Raster] {
+        let mut trial = Trial::new(without_wide_atomics(), &RenderOptions { primary, ..small() });
+        let untouched = trial.untouched();
+        begin(&mut trial.renderer);
+        let before = state(&trial.renderer);
+        let refused = trial.renderer.set_options(&RenderOptions { primary: Primary::Compute, ..small() }, &trial.tree);
+        assert!(matches!(refused, Err(GpuError::Lacks { .. })), "{:?}", refused.err());
+        assert_eq!(state(&trial.renderer), before);
+        assert!(identical(&finish(&mut trial.renderer), &untouched), "{primary}");
+        assert_silent(&trial.context);
+    }
+}

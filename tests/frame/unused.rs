@@ -1,0 +1,60 @@
+//! What the options do not ask for is not made: no memory, no time.
+
+use kdray::{
+    frame::{Primary, RenderOptions},
+    passes::Resources,
+    render::Renderer,
+    scene::Scene,
+};
+
+use super::studio::{assert_silent, device, identical, options, tree_of};
+use crate::support::scenes;
+
+const SIZE: (u32, u32) = (24, 18);
+
+fn with(primary: Primary) -> RenderOptions {
+    RenderOptions { primary, ..options(SIZE.0, SIZE.1, 2) }
+}
+
+/// Whether there is all that the graphics pipeline draws by and to, or, where nothing is drawn, none of it.
+fn assert_drawn_by(resources: &Resources, scene: &Scene, primary: Primary) {
+    let pixels = &resources.pixels;
+    let found = (
+        resources.vertex_indices.as_ref().map(|indices| indices.len()),
+        pixels.depth.as_ref().map(|depth| depth.size()),
+        pixels.triangle_ids.size(),
+    );
+    let expected = match primary {
+        Primary::Raster => (Some(3 * scene.triangles.len()), Some(SIZE), SIZE),
+        Primary::Compute | Primary::Trace => (None, None, (1, 1)),
+    };
+    assert_eq!(found, expected, "{primary}");
+}
+
+fn indices(renderer: &Renderer) -> Vec<u32> {
+    renderer.resources().vertex_indices.as_ref().expect("indices").download().expect("indices")
+}
+
+#[test]
+fn only_what_draws_has_indices_and_targets() {
+    let (scene, context) = (scenes::mixed_outdoors(), device());
+    let tree = tree_of(&scene);
+    let new = |primary| Renderer::new(context.clone(), &scene, &tree, &with(primary)).expect("a renderer");
+    let mut drawing = new(Primary::Raster);
+    let drawn = drawing.render().expect("a frame").0;
+    let ways = [Primary::Trace, Primary::Compute];
+    for from in ways.into_iter().filter(|&way| way == Primary::Trace || context.has_wide_atomics()) {
+        let mut renderer = new(from);
+        assert_drawn_by(renderer.resources(), &scene, from);
+        let before = renderer.render().expect("a frame").0;
+        renderer.set_options(&with(Primary::Raster), &tree).expect("options");
+        assert_drawn_by(renderer.resources(), &scene, Primary::Raster);
+        assert_eq!(indices(&renderer), indices(&drawing));
+        assert!(identical(&renderer.render().expect("a frame").0, &drawn), "{from}");
+        renderer.set_options(&with(from), &tree).expect("options");
+        assert_drawn_by(renderer.resources(), &scene, from);
+        assert!(identical(&renderer.render().expect("a frame").0, &before), "{from}");
+    }
+    assert_drawn_by(drawing.resources(), &scene, Primary::Raster);
+    assert_silent(&context);
+}

@@ -1,0 +1,111 @@
+//! What the command says beside its reports: warnings, once each, and names from files without control characters.
+
+mod support;
+
+use std::{fs, path::Path, process::Output};
+
+use support::command::{cornell, kdray, stderr, stdout, succeed};
+use tempfile::TempDir;
+
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+/// Renders a scene of the given text small, on the CPU.
+fn render(directory: &Path, name: &str, text: &str) -> Output {
+    fs::write(directory.join(name), text).unwrap();
+    succeed(directory, &["render", name, "--cpu", "--size", "16x12", "-o", "x.png"])
+}
+
+fn warnings(output: &Output) -> Vec<String> {
+    stderr(output).lines().filter(|line| line.starts_with("warning: ")).map(str::to_owned).collect()
+}
+
+#[test]
+fn a_scene_that_nothing_lights_is_named_once() {
+    let directory = TempDir::new().unwrap();
+    let disc = "[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 8\n";
+    let light = "[[light]]\nkind = 'directional'\ndirection = [-1, -2, -1]\nirradiance = [1, 1, 1]\n";
+    let off = light.replace("[1, 1, 1]", "[0, 0, 0]");
+    let emitter = format!("materials.m = {{ Ke = [1, 1, 1] }}\n{disc}material = 'm'\n");
+    for (text, emits) in [(disc, false), (&format!("{disc}{off}"), false), (&emitter, true)] {
+        let told = warnings(&render(directory.path(), "dark.toml", text));
+        let [line] = &told[..] else { panic!("{text}: {told:?}") };
+        for part in ["dark.toml: nothing lights the scene", "[[light]]", "ambient = [0.3, 0.3, 0.3]", "irradiance"] {
+            assert!(line.contains(part), "{line}");
+        }
+        assert_eq!(line.contains("Ke"), emits, "{line}");
+    }
+    let ambient = format!("ambient = [0.3, 0.3, 0.3]\n{disc}");
+    for (name, text) in [("a.toml", &ambient[..]), ("a.toml", &format!("{disc}{light}")), ("a.obj", TRIANGLE)] {
+        let told = warnings(&render(directory.path(), name, text));
+        assert!(told.is_empty(), "{text}: {told:?}");
+    }
+    let quiet = ["render", "dark.toml", "--cpu", "-q", "--size", "16x12", "-o", "x.png"];
+    assert!(succeed(directory.path(), &quiet).stderr.is_empty());
+}
+
+/// A square of a metre in a city that is given in UTM coordinates: y is rounded to halves of a metre.
+#[test]
+fn coordinates_far_from_the_origin_are_named_once() {
+    let directory = TempDir::new().unwrap();
+    let square = |x: f64, y: f64, side: f64| {
+        let corners = [(x, y), (x + side, y), (x + side, y + side), (x, y + side)];
+        corners.map(|(x, y)| format!("v {x} {y} 0\n")).concat() + "f 1 2 3 4\n"
+    };
+    let told = warnings(&render(directory.path(), "utm.obj", &square(5e5, 5.2e6, 1.0)));
+    let [line] = &told[..] else { panic!("{told:?}") };
+    for part in ["utm.obj: ", "reach 5.200001e6", "5.00e-1 apart", "longest side is 1.00e0", "to the origin"] {
+        assert!(line.contains(part), "{line}");
+    }
+    // From 256 times the extent on there are fewer than 2^16 steps of single precision across the scene.
+    for (x, n_warnings) in [(0.0, 0), (200.0, 0), (-200.0, 0), (256.0, 1), (-300.0, 1)] {
+        let told = warnings(&render(directory.path(), "a.obj", &square(x, 0.0, 1.0)));
+        assert_eq!(told.len(), n_warnings, "{x}: {told:?}");
+    }
+    assert!(warnings(&succeed(directory.path(), &["inspect", &cornell()])).is_empty());
+}
+
+/// Names of files and materials that would clear a terminal, set its title, forge a line or turn text around.
+#[test]
+fn control_characters_never_reach_the_terminal() {
+    let directory = TempDir::new().unwrap();
+    let path = |name: &str| directory.path().join(name);
+    let evil = "a\u{1b}[2J\u{7}\u{9b}31m\u{202e}b";
+    let mesh = format!("mtllib {evil}.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl {evil}\nevil\u{1b}[2J 1\nf 1 2 3\n");
+    fs::write(path(&format!("{evil}.obj")), mesh).unwrap();
+    let material = "\"a\\u001b[2J\\nerror: forged\\u0007\"";
+    let scene = format!(
+        "materials.{material} = {{ Kd = [1, 1, 1] }}\n[[mesh]]\nfile = '{evil}.obj'\n[[mesh]]\n\
+         generator = 'disc'\nradius = 1\nsegments = 8\nmaterial = {material}\n"
+    );
+    // TOML takes control characters in strings only as escapes.
+    let escape = |c: char| if c.is_control() && c != '\n' { format!("\\u{:04x}", c as u32) } else { c.to_string() };
+    let scene: String = scene.replace('\'', "\"").chars().map(escape).collect();
+    fs::write(path(&format!("{evil}.toml")), scene).unwrap();
+    let (obj, toml, none) = (format!("{evil}.obj"), format!("{evil}.toml"), format!("{evil}none.toml"));
+    let picture = format!("{evil}.png");
+    let cases: [(&[&str], i32); 6] = [
+        (&["render", &toml, "--cpu", "--size", "16x12", "-o", &picture], 0),
+        (&["inspect", &toml], 0),
+        (&["inspect", &obj], 0),
+        (&["render", &none, "--cpu"], 3),
+        (&["render", &toml, "--cpu", "-o", &none], 2),
+        (&["cast", &obj, &none, "-o", "x.npz", "--cpu"], 3),
+    ];
+    for (arguments, code) in cases {
+        let output = kdray(directory.path(), arguments).output().unwrap();
+        let text = stderr(&output) + &stdout(&output);
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {}", text.escape_debug());
+        let is_raw = |c: char| (c.is_control() && c != '\n') || c == '\u{202e}';
+        assert!(!text.contains(is_raw) && text.contains("\\u{1b}[2J"), "{arguments:?}: {}", text.escape_debug());
+        assert!(!text.lines().any(|line| line.starts_with("error: forged")), "{arguments:?}: {text}");
+    }
+}
+
+#[test]
+fn a_missing_mesh_is_reported_with_the_scene_s_line() {
+    let directory = TempDir::new().unwrap();
+    fs::write(directory.path().join("a.toml"), "ambient = [1, 1, 1]\n\n[[mesh]]\nfile = 'parts/none.obj'\n").unwrap();
+    let output = kdray(directory.path(), &["render", "a.toml", "--cpu", "-q"]).output().unwrap();
+    let text = stderr(&output);
+    assert!(text.starts_with("error: a.toml:3: mesh 1: parts/none.obj: cannot be read"), "{text}");
+}

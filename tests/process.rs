@@ -1,0 +1,224 @@
+//! What ends the command from outside: signals while it works, limits on the size of files and on memory.
+#![cfg(target_os = "linux")]
+
+mod support;
+
+use std::{
+    fs::{self, File},
+    os::unix::process::ExitStatusExt,
+    path::Path,
+    process::{Child, Command, ExitStatus, Output, Stdio},
+    thread,
+    time::{Duration, Instant},
+};
+
+use npyz::WriterBuilder;
+use rustix::process::{Pid, Signal, kill_process};
+use support::command::{cornell, kdray, names, stderr};
+use tempfile::TempDir;
+
+/// Longer than anything here takes on a busy machine.
+const PATIENCE: Duration = Duration::from_secs(120);
+const N_RAYS: u64 = 1_500_000;
+
+/// A triangle, and so many rays that writing their hits takes a while.
+fn with_rays() -> TempDir {
+    let directory = TempDir::new().unwrap();
+    fs::write(directory.path().join("mesh.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    let file = std::io::BufWriter::new(File::create(directory.path().join("rays.npy")).unwrap());
+    let mut array = npyz::WriteOptions::new().default_dtype().shape(&[N_RAYS, 6]).writer(file).begin_nd().unwrap();
+    for ix in 0..N_RAYS {
+        let x = ix as f32 / N_RAYS as f32;
+        [x, 0.25, 1.0, 0.0, 0.0, -1.0].iter().for_each(|number| array.push(number).unwrap());
+    }
+    array.finish().unwrap();
+    directory
+}
+
+const CAST: [&str; 9] = ["cast", "mesh.obj", "rays.npy", "-o", "hits.npz", "--cpu", "-q", "--threads", "2"];
+
+/// The command, which a signal ends even if whoever runs the tests has it ignored, as a shell does for SIGINT in the
+/// background.
+fn interruptible(directory: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new("env");
+    command.args(["--default-signal=INT,HUP,TERM", env!("CARGO_BIN_EXE_kdray")]).args(arguments);
+    command.current_dir(directory).stdin(Stdio::null());
+    command
+}
+
+/// A file that the command has begun to write under a temporary name.
+fn has_begun_to_write(directory: &Path) -> bool {
+    fs::read_dir(directory).unwrap().flatten().any(|entry| {
+        let is_temporary = entry.file_name().to_string_lossy().starts_with(".kdray-");
+        is_temporary && entry.metadata().is_ok_and(|metadata| metadata.len() > 0)
+    })
+}
+
+/// Waits until something is so, or the child has ended.
+fn wait_until(child: &mut Child, is_so: impl Fn() -> bool) {
+    let start = Instant::now();
+    while !is_so() && child.try_wait().unwrap().is_none() {
+        assert!(start.elapsed() < PATIENCE, "it never came to that");
+        thread::sleep(Duration::from_micros(200));
+    }
+}
+
+fn send(child: &Child, signal: Signal) {
+    // A child that has just ended is no error.
+    let _ = kill_process(Pid::from_child(child), signal);
+}
+
+/// Waits for the end of a child that was sent a signal.
+fn end_of(child: &mut Child) -> ExitStatus {
+    let start = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status;
+        }
+        assert!(start.elapsed() < PATIENCE, "the signal did not end it");
+        thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Casts the rays and sends the signals while the hits are written, `delay` after that has begun. Returns how it ended.
+fn interrupt(directory: &Path, signals: &[Signal], delay: Duration) -> ExitStatus {
+    let mut child = interruptible(directory, &CAST).stderr(Stdio::null()).spawn().unwrap();
+    wait_until(&mut child, || has_begun_to_write(directory));
+    thread::sleep(delay);
+    signals.iter().for_each(|signal| send(&child, *signal));
+    end_of(&mut child)
+}
+
+#[test]
+fn a_signal_leaves_the_target_whole_or_as_it_was_and_no_other_file() {
+    let directory = with_rays();
+    let target = directory.path().join("hits.npz");
+    assert!(kdray(directory.path(), &CAST).status().unwrap().success());
+    let whole = fs::read(&target).unwrap();
+    let mut n_interrupted = 0;
+    let all = [&[Signal::INT][..], &[Signal::TERM], &[Signal::HUP], &[Signal::INT, Signal::INT, Signal::TERM]];
+    for (turn, signals) in all.iter().cycle().take(16).enumerate() {
+        let before: &[u8] = if turn % 2 == 0 { b"old" } else { &whole[..0] };
+        if before.is_empty() {
+            let _ = fs::remove_file(&target);
+        } else {
+            fs::write(&target, before).unwrap();
+        }
+        let status = interrupt(directory.path(), signals, Duration::from_millis(turn as u64 * 4));
+        match status.signal() {
+            Some(signal) => {
+                assert!(signals.iter().any(|sent| sent.as_raw() == signal), "{status}");
+                n_interrupted += 1;
+                // The target may have been completed just before.
+                let found = fs::read(&target).unwrap_or_default();
+                assert!(found == before || found == whole, "turn {turn}: {} bytes", found.len());
+                let others: Vec<_> = names(directory.path()).into_iter().filter(|name| name != "hits.npz").collect();
+                assert_eq!(others, ["mesh.obj", "rays.npy"], "turn {turn}, {signals:?}");
+            }
+            None => assert!(status.success() && fs::read(&target).unwrap() == whole, "turn {turn}: {status}"),
+        }
+    }
+    assert!(n_interrupted >= 4, "only {n_interrupted} of 16 were interrupted while they wrote");
+}
+
+#[test]
+fn a_signal_that_was_ignored_stays_ignored() {
+    let directory = with_rays();
+    let mut child = Command::new("sh")
+        .args(["-c", "trap '' HUP; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_kdray")])
+        .args(CAST)
+        .current_dir(directory.path())
+        .spawn()
+        .unwrap();
+    wait_until(&mut child, || has_begun_to_write(directory.path()));
+    send(&child, Signal::HUP);
+    assert!(end_of(&mut child).success());
+    assert_eq!(names(directory.path()), ["hits.npz", "mesh.obj", "rays.npy"]);
+}
+
+#[test]
+fn a_long_rendering_ends_at_once() {
+    let directory = TempDir::new().unwrap();
+    let scene = cornell();
+    let arguments = ["render", &scene, "--cpu", "--size", "640x480", "--spp", "65536", "-o", "x.png"];
+    for signal in [Signal::INT, Signal::TERM] {
+        let log = directory.path().join("log");
+        let mut child =
+            interruptible(directory.path(), &arguments).stderr(File::create(&log).unwrap()).spawn().unwrap();
+        wait_until(&mut child, || fs::read_to_string(&log).unwrap().contains("rendering"));
+        let sent = Instant::now();
+        send(&child, signal);
+        assert_eq!(end_of(&mut child).signal(), Some(signal.as_raw()));
+        assert!(sent.elapsed() < Duration::from_secs(10), "{:?}", sent.elapsed());
+        assert_eq!(names(directory.path()), ["log"]);
+    }
+}
+
+/// Runs the command in a shell that first limits it.
+fn limited(directory: &Path, limit: &str, arguments: &[&str]) -> Output {
+    let mut command = Command::new("bash");
+    command.args(["-c", &format!("{limit}; exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_kdray")]).args(arguments);
+    command.current_dir(directory).stdin(Stdio::null()).output().unwrap()
+}
+
+/// Asserts an exit code and one line of error that says each of some words.
+fn assert_refused(output: &Output, code: i32, words: &[&str]) {
+    let text = stderr(output);
+    assert_eq!(output.status.code(), Some(code), "{}: {text}", output.status);
+    let errors: Vec<_> = text.lines().filter(|line| line.starts_with("error: ")).collect();
+    assert_eq!(errors.len(), 1, "{text}");
+    assert!(words.iter().all(|word| errors[0].contains(word)), "{words:?}: {}", errors[0]);
+}
+
+#[test]
+fn a_file_beyond_the_limit_on_files_is_an_error_of_its_output() {
+    let directory = with_rays();
+    for file in ["new.npz", "rays.npz"] {
+        fs::write(directory.path().join("rays.npz"), "old").unwrap();
+        let arguments = ["cast", "mesh.obj", "rays.npy", "-o", file, "--cpu", "-q"];
+        let output = limited(directory.path(), "ulimit -f 1000", &arguments);
+        assert_refused(&output, 5, &[file, "File too large"]);
+        assert_eq!(names(directory.path()), ["mesh.obj", "rays.npy", "rays.npz"]);
+        assert_eq!(fs::read(directory.path().join("rays.npz")).unwrap(), b"old");
+    }
+}
+
+/// Address space for a small scene on two threads, in KiB, and not for more.
+const LIMIT: &str = "ulimit -v 900000";
+
+#[test]
+fn a_scene_that_does_not_fit_in_memory_is_refused() {
+    let directory = TempDir::new().unwrap();
+    let path = |name: &str| directory.path().join(name);
+    let sphere = "[[mesh]]\ngenerator = 'sphere'\nradius = 1\ntriangles = 8000000\n";
+    fs::write(path("one.toml"), format!("ambient = [1, 1, 1]\n{sphere}")).unwrap();
+    let part = sphere.replace("8000000", "800000");
+    fs::write(path("parts.toml"), format!("ambient = [1, 1, 1]\n{}", part.repeat(12))).unwrap();
+    fs::write(path("mesh.obj"), format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{}", "f 1 2 3\n".repeat(8_000_000))).unwrap();
+    let cases: [(&str, &[&str]); 3] = [
+        ("one.toml", &["one.toml:2: mesh 1: a scene of 8000000 triangles needs some 1.4 GiB", "available"]),
+        ("parts.toml", &["parts.toml:", "of memory", "available"]),
+        ("mesh.obj", &["mesh.obj: a scene of 8000000 triangles needs some 1.4 GiB"]),
+    ];
+    for (scene, words) in cases {
+        let arguments = ["render", scene, "--cpu", "-q", "--threads", "2", "--size", "64x48", "-o", "x.png"];
+        assert_refused(&limited(directory.path(), LIMIT, &arguments), 3, words);
+    }
+    assert_eq!(names(directory.path()), ["mesh.obj", "one.toml", "parts.toml"]);
+}
+
+#[test]
+fn a_picture_that_does_not_fit_in_memory_is_refused() {
+    let directory = TempDir::new().unwrap();
+    let scene = cornell();
+    let render = |size: &str, more: &[&str]| {
+        let arguments = ["render", &scene, "--cpu", "-q", "--threads", "2", "-o", "x.exr", "--size", size];
+        limited(directory.path(), LIMIT, &[&arguments[..], more].concat())
+    };
+    assert_refused(&render("4096x4096", &[]), 3, &["a picture of 4096x4096 pixels needs some 1.0 GiB", "available"]);
+    assert_refused(&render("4000x3000", &["--spp", "2", "--aov", "depth"]), 3, &["a picture of 4000x3000 pixels"]);
+    assert!(names(directory.path()).is_empty());
+    assert_eq!(render("64x48", &[]).status.code(), Some(0));
+    let cropped = render("16384x16384", &["--crop", "8000,8000,8064,8048"]);
+    assert_eq!(cropped.status.code(), Some(0), "{}", stderr(&cropped));
+}

@@ -1,0 +1,135 @@
+//! How small a scene may be: just above the limit it is hit as the same scene at unit size is, below it is refused.
+
+use std::fmt::Write;
+
+use glam::{Vec3, vec3};
+use kdray::{
+    cast::{Caster, CpuCaster, Query},
+    frame::Traversal,
+    gpu::{Context, ContextOptions},
+    kdtree::{BuildOptions, KdTree},
+    layout::{CastRay, Hit, NO_TRIANGLE, Triangle},
+    scene::{MIN_EXTENT, Scene, SceneError},
+};
+
+use super::{
+    load,
+    support::{
+        compare,
+        meshes::{placed, torus},
+        random::Random,
+    },
+};
+
+/// A torus 2.8 units wide, and on its axis one that is 64 times smaller, of triangles down to 2^-13 of the scene.
+fn two_tori() -> Vec<Triangle> {
+    [torus(64, 32), placed(torus(64, 32), 1.0 / 64.0, vec3(0.0, 0.25, 0.0))].concat()
+}
+
+fn scaled(triangles: &[Triangle], scale: f32) -> Vec<Triangle> {
+    placed(triangles.to_vec(), scale, Vec3::ZERO)
+}
+
+/// Loads triangles from an OBJ file with all digits of their coordinates.
+fn load_triangles(triangles: &[Triangle]) -> Result<Scene, SceneError> {
+    let mut obj = String::new();
+    for (ix, t) in triangles.iter().enumerate() {
+        for v in [t.v0, t.v1, t.v2] {
+            writeln!(obj, "v {:e} {:e} {:e}", v.x, v.y, v.z).unwrap();
+        }
+        writeln!(obj, "f {} {} {}", 3 * ix + 1, 3 * ix + 2, 3 * ix + 3).unwrap();
+    }
+    load(&[("tori.obj", obj.as_bytes())])
+}
+
+/// Rays from around the scene at points of its triangles and of their edges, and some past it.
+fn rays(triangles: &[Triangle], n: usize) -> Vec<CastRay> {
+    let mut random = Random(7);
+    let ray = |_| {
+        let t = random.of(triangles);
+        let origin = 3.0 * random.direction() * random.unit();
+        let target = match random.below(8) {
+            0 => t.v0.lerp(t.v1, random.unit()),
+            1 => t.v0,
+            2 => origin + random.direction(),
+            _ => t.v0.lerp(t.v1, random.unit()).lerp(t.v2, random.unit()),
+        };
+        CastRay { origin, t_min: 0.0, direction: target - origin, t_max: f32::INFINITY }
+    };
+    (0..n).map(ray).collect()
+}
+
+fn cast_on_cpu(triangles: &[Triangle], traversal: Traversal, rays: &[CastRay]) -> Vec<Hit> {
+    let tree = KdTree::build(triangles, &BuildOptions::default());
+    CpuCaster::new(triangles, &tree, traversal).expect("a caster").cast(rays, Query::Closest)
+}
+
+fn cast_on_device(context: &std::sync::Arc<Context>, triangles: &[Triangle], rays: &[CastRay]) -> Vec<Hit> {
+    let tree = KdTree::build(triangles, &BuildOptions::default());
+    Caster::new(context, triangles, &tree, Traversal::Stack).unwrap().cast(rays, Query::Closest, 1).unwrap().hits
+}
+
+/// Rays that hit another triangle, or the same one elsewhere.
+fn n_differing(expected: &[Hit], found: &[Hit]) -> usize {
+    expected.iter().zip(found).filter(|(a, b)| a.triangle_ix != b.triangle_ix || a.t != b.t).count()
+}
+
+/// The same rays in the scaled scene. Directions are scaled, too, so that t stays as it is.
+fn scaled_rays(rays: &[CastRay], scale: f32) -> Vec<CastRay> {
+    rays.iter().map(|ray| CastRay { origin: scale * ray.origin, direction: scale * ray.direction, ..*ray }).collect()
+}
+
+#[test]
+fn just_above_the_limit_every_ray_hits_what_it_hits_at_unit_size() {
+    let unit = two_tori();
+    let scale = 2f32.powi(-28);
+    let small = load_triangles(&scaled(&unit, scale)).unwrap();
+    assert_eq!(small.triangles.iter().map(|t| t.v2).collect::<Vec<_>>(), {
+        scaled(&unit, scale).iter().map(|t| t.v2).collect::<Vec<_>>()
+    });
+    assert!(2.8 * scale < 1.05 * MIN_EXTENT, "the scene is just above the limit");
+    let rays = rays(&unit, 40_000);
+    let small_rays = scaled_rays(&rays, scale);
+    for traversal in [Traversal::Stack, Traversal::Mask] {
+        let expected = cast_on_cpu(&unit, traversal, &rays);
+        let n_hits = expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count();
+        assert!(n_hits > 20_000 && n_hits < 40_000, "{n_hits}");
+        let found = cast_on_cpu(&small.triangles, traversal, &small_rays);
+        assert_eq!(n_differing(&expected, &found), 0, "{traversal}");
+    }
+    let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
+    let expected = cast_on_device(&context, &unit, &rays);
+    let found = cast_on_device(&context, &small.triangles, &small_rays);
+    // Where rays meet a common edge, rounding decides which of two triangles is hit at the same distance.
+    compare::hits(0, &expected, &found).unwrap();
+    assert!(context.validation_messages().is_empty());
+}
+
+/// What the limit is for: far below it, the same comparison notices lost hits.
+#[test]
+fn far_below_the_limit_hits_are_lost() {
+    let (unit, scale) = (two_tori(), 2f32.powi(-70));
+    let rays = rays(&unit, 10_000);
+    let expected = cast_on_cpu(&unit, Traversal::Stack, &rays);
+    let found = cast_on_cpu(&scaled(&unit, scale), Traversal::Stack, &scaled_rays(&rays, scale));
+    let is_lost = |(a, b): &(&Hit, &Hit)| a.triangle_ix != NO_TRIANGLE && b.triangle_ix == NO_TRIANGLE;
+    assert!(expected.iter().zip(&found).filter(is_lost).count() > 100);
+}
+
+#[test]
+fn just_below_the_limit_a_scene_is_refused() {
+    let unit = two_tori();
+    let error = load_triangles(&scaled(&unit, 2f32.powi(-29))).unwrap_err().to_string();
+    for part in ["tori.obj: is too small", "longest side is 5.22e-9", "less than 1e-8", "scale it up"] {
+        assert!(error.contains(part), "{error}");
+    }
+    let disc = "[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 8\n";
+    let of_scale = |scale: &str| load(&[("a.toml", format!("{disc}transform.scale = {scale}").as_bytes())]);
+    assert!(of_scale("5.1e-9").is_ok());
+    let error = of_scale("4.9e-9").unwrap_err().to_string();
+    assert!(error.contains("a.toml: is too small to be traced") && error.contains("9.80e-9"), "{error}");
+    // Far from the origin all corners of a triangle may be rounded to one point.
+    let point = "v 500000 5200000.1 0\nv 500000.01 5200000.1 0\nv 500000 5200000.2 0\nf 1 2 3\n";
+    let error = load(&[("utm.obj", point.as_bytes())]).unwrap_err().to_string();
+    assert!(error.contains("5.00e-1 apart") && error.contains("move it to the origin"), "{error}");
+}

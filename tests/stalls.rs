@@ -1,0 +1,172 @@
+//! Rays that take more turns of a kernel's loops than a dispatch allows end in a further one, with the hits of rays that
+//! are never interrupted.
+
+mod support;
+
+use std::sync::Arc;
+
+use glam::{Vec3, vec3};
+use kdray::{
+    cast::{CastRay, Caster, Hit, NO_TRIANGLE, Query, cast_on_cpu},
+    frame::{Picture, Primary, Profile, RenderOptions, Traversal},
+    gpu::{Context, DeviceOverrides},
+    kdtree::{BuildOptions, KdTree},
+    layout::Feature,
+    render::Renderer,
+};
+use support::{World, compare, meshes, pretended, random::Random, rays::nasty_ray, scenes};
+
+/// The device as it is.
+fn plain_device() -> Arc<Context> {
+    pretended(DeviceOverrides::default())
+}
+
+/// A device that ends shaders after so many turns. `n_lanes`: of a GPU, in place of a software driver.
+fn limited_device(loop_limit: u32, n_lanes: Option<u32>, n_stall_slots: Option<usize>) -> Arc<Context> {
+    pretended(DeviceOverrides { loop_limit: Some(loop_limit), n_lanes, n_stall_slots, ..DeviceOverrides::default() })
+}
+
+fn assert_silent(context: &Context) {
+    assert_eq!(context.validation_messages(), Vec::<String>::new());
+}
+
+fn cast(context: &Arc<Context>, world: &World, traversal: Traversal, query: Query, rays: &[CastRay]) -> Vec<Hit> {
+    let mut caster = Caster::new(context, &world.triangles, &world.tree, traversal).expect("a caster");
+    caster.cast(rays, query, 1).expect("a cast").hits
+}
+
+fn nasty_rays(world: &World, n: usize) -> Vec<CastRay> {
+    let some_ray = |i: usize| {
+        let ray = nasty_ray(&mut Random(i as u64), world, i);
+        CastRay { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
+    };
+    (0..n).map(some_ray).collect()
+}
+
+/// One leaf of many copies of a triangle and, as the last entry, a triangle that lies a little above them. Rays come from
+/// above; those with an even number hit.
+fn copies(n: usize) -> (World, Vec<CastRay>) {
+    let [below, above] = [0.0, 1e-6].map(|y| meshes::triangle(vec3(0.0, y, 0.0), vec3(1.0, y, 0.0), vec3(0.0, y, 1.0)));
+    let mut triangles = vec![below; n];
+    triangles.push(above);
+    let ray = |i: u32| {
+        let x = if i.is_multiple_of(2) { 0.2 } else { 0.7 };
+        let origin = vec3(x, 1.0, 0.4 + 0.001 * i as f32);
+        CastRay { origin, t_min: 0.0, direction: Vec3::NEG_Y, t_max: f32::INFINITY }
+    };
+    (World::new(triangles), (0..200).map(ray).collect())
+}
+
+/// How many of the rays on `n` copies are right: the closest hit is that of the last triangle.
+fn n_right(n: usize, hits: &[Hit], query: Query) -> usize {
+    let is_right = |(i, hit): (usize, &Hit)| match (i.is_multiple_of(2), query) {
+        (false, _) => hit.triangle_ix == NO_TRIANGLE,
+        (true, Query::Closest) => hit.triangle_ix == n as u32 && hit.t < 1.0,
+        (true, Query::Any) => hit.triangle_ix != NO_TRIANGLE,
+    };
+    hits.iter().enumerate().filter(|hit| is_right(*hit)).count()
+}
+
+#[test]
+fn a_leaf_of_more_triangles_than_a_driver_takes_turns_is_searched_to_its_end() {
+    const N: usize = 70_000;
+    let (world, rays) = copies(N);
+    let context = plain_device();
+    for &traversal in Traversal::ALL.iter().filter(|&&traversal| traversal != Traversal::Brute) {
+        for query in [Query::Closest, Query::Any] {
+            let hits = cast(&context, &world, traversal, query, &rays);
+            assert_eq!(n_right(N, &hits, query), rays.len(), "{traversal} {query:?}");
+        }
+    }
+    assert_silent(&context);
+    // Where nobody counts turns, a driver with such a limit loses hits.
+    if context.loop_limit().expect("a probe").is_some() {
+        let careless = limited_device(u32::MAX, None, None);
+        let hits = cast(&careless, &world, Traversal::Mask, Query::Closest, &rays);
+        assert!(n_right(N, &hits, Query::Closest) < rays.len(), "the driver's limit is not met");
+    }
+}
+
+/// Far from the origin the tree's margin is larger than the triangles: its leaves have most of them.
+#[test]
+fn a_far_soup_of_small_triangles_is_as_on_the_cpu() {
+    let world = World::new(meshes::placed(meshes::soup(20_000, 3), 1.0, Vec3::splat(1e7)));
+    let rays = nasty_rays(&world, 280);
+    let context = plain_device();
+    for traversal in [Traversal::OF_SOFTWARE_DRIVERS, Traversal::OF_GPUS] {
+        let expected = cast_on_cpu(&world.triangles, &world.tree, traversal, &rays, Query::Closest).expect("hits");
+        let hits = cast(&context, &world, traversal, Query::Closest, &rays);
+        if context.is_software() {
+            compare::exact(&expected, &hits).unwrap();
+        } else {
+            compare::hits(rays.len() / 100, &expected, &hits).unwrap();
+        }
+    }
+    assert_silent(&context);
+}
+
+/// Whatever the budget, the number of slots and the kind of search.
+#[test]
+fn interrupted_casts_find_the_same() {
+    let world = World::new([meshes::soup(500, 1), meshes::torus(20, 10)].concat());
+    let rays = nasty_rays(&world, 700);
+    for n_lanes in [None, Some(1000)] {
+        let plain = pretended(DeviceOverrides { n_lanes, ..DeviceOverrides::default() });
+        let limited = [(1000, Some(100)), (5000, None)].map(|(turns, n_slots)| limited_device(turns, n_lanes, n_slots));
+        for &traversal in Traversal::ALL {
+            for query in [Query::Closest, Query::Any] {
+                let expected = cast(&plain, &world, traversal, query, &rays);
+                for context in &limited {
+                    let found = cast(context, &world, traversal, query, &rays);
+                    compare::exact(&expected, &found).unwrap_or_else(|e| panic!("{traversal} {query:?}: {e}"));
+                }
+            }
+        }
+        limited.iter().for_each(|context| assert_silent(context));
+    }
+}
+
+fn options(traversal: Traversal, primary: Primary) -> RenderOptions {
+    RenderOptions {
+        width: 40,
+        height: 30,
+        max_depth: 4,
+        traversal,
+        primary,
+        features: true,
+        ..RenderOptions::default()
+    }
+}
+
+/// A picture with what its rays cost.
+fn draw(context: &Arc<Context>, options: &RenderOptions) -> (Picture, Vec<Feature>, Profile) {
+    let scene = scenes::mixed();
+    let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
+    let mut renderer = Renderer::new(context.clone(), &scene, &tree, options).expect("a renderer");
+    let (picture, profile) = renderer.render().expect("a frame");
+    let features = renderer.features().expect("features");
+    (picture, features, profile)
+}
+
+#[test]
+fn interrupted_frames_are_the_same() {
+    let plain = plain_device();
+    for (traversal, primary) in [
+        (Traversal::Ropes, Primary::Trace),
+        (Traversal::Mask, Primary::Raster),
+        (Traversal::ShortStack, Primary::Trace),
+        (Traversal::Restart, Primary::Raster),
+    ] {
+        let options = options(traversal, primary);
+        let (picture, features, profile) = draw(&plain, &options);
+        for (loop_limit, n_slots) in [(200, Some(64)), (1000, None)] {
+            let limited = limited_device(loop_limit, None, n_slots);
+            let (found, found_features, found_profile) = draw(&limited, &options);
+            assert!(picture == found, "{traversal} {primary}, {loop_limit} turns");
+            compare::exact(&features, &found_features).unwrap();
+            assert_eq!(profile.bounces, found_profile.bounces, "{traversal} {primary}, {loop_limit} turns");
+            assert_silent(&limited);
+        }
+    }
+    assert_silent(&plain);
+}

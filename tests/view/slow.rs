@@ -1,0 +1,103 @@
+//! Pictures that take seconds: the window answers meanwhile.
+
+use std::{
+    path::Path,
+    process::Child,
+    thread,
+    time::{Duration, Instant},
+};
+
+use tempfile::TempDir;
+
+use super::{
+    ended,
+    support::{
+        command::{shipped, stdout, succeed},
+        display::{Display, Screen},
+    },
+    viewer_of_size,
+};
+
+/// The same way to the same picture, whatever suits a window or a picture.
+const SAME: [&str; 4] = ["--size", "320x240", "--primary", "trace"];
+
+/// A viewer of glass, a sample of which takes seconds on a software driver.
+fn slow_viewer(directory: &Path, display: &Display, n_samples: &str) -> Child {
+    let arguments = [&["--spp", n_samples, "--no-overlay", "-q"], &SAME[..]].concat();
+    viewer_of_size(directory, display, &shipped("paper3.toml"), &arguments)
+}
+
+/// A display whose middle, where the mouse pointer is, lies beside the window.
+fn wide_display() -> Display {
+    Display::start(700, 300)
+}
+
+/// The viewer's picture of one sample.
+fn picture(directory: &Path) -> Screen {
+    let scene = shipped("paper3.toml");
+    succeed(directory, &[&["render", &scene, "-q", "-o", "rendered.png"], &SAME[..]].concat());
+    Screen::load(&directory.join("rendered.png"))
+}
+
+/// Whether the screen, which was `framed`, shows something else for some time before it shows the picture.
+fn previews(display: &Display, framed: &Screen, picture: &Screen) -> bool {
+    let (start, mut before, mut is_previewed) = (Instant::now(), display.screen(), false);
+    loop {
+        thread::sleep(Duration::from_millis(10));
+        let screen = display.screen();
+        if picture.is_shown_on(&screen) {
+            return is_previewed;
+        }
+        // A screen that is being drawn is not the same twice.
+        is_previewed |= screen == before && screen != *framed;
+        before = screen;
+        assert!(start.elapsed() < Duration::from_secs(120), "the picture never came");
+    }
+}
+
+#[test]
+fn home_shows_a_small_picture_at_once() {
+    let (directory, display) = (TempDir::new().unwrap(), wide_display());
+    let picture = picture(directory.path());
+    let viewer = slow_viewer(directory.path(), &display, "1");
+    display.focus("kdray");
+    display.wait_until("the picture", |screen| picture.is_shown_on(screen));
+    display.act(&["key", "f"]);
+    display.wait_until("the framed scene", |screen| !picture.is_shown_on(screen));
+    thread::sleep(Duration::from_millis(500));
+    let framed = display.screen();
+    display.act(&["key", "Home"]);
+    assert!(previews(&display, &framed, &picture));
+    display.act(&["key", "Escape"]);
+    ended(viewer);
+}
+
+#[test]
+fn what_is_seen_is_saved_at_once() {
+    let (directory, display) = (TempDir::new().unwrap(), wide_display());
+    let picture = picture(directory.path());
+    let viewer = slow_viewer(directory.path(), &display, "256");
+    display.focus("kdray");
+    display.wait_until("the first sample", |screen| picture.is_shown_on(screen));
+    // While the second sample is drawn.
+    display.act(&["key", "s", "key", "p", "key", "Escape"]);
+    let output = ended(viewer);
+    assert!(stdout(&output).starts_with("wrote paper3-001.png\n[camera]\n"), "{}", stdout(&output));
+    assert!(Screen::load(&directory.path().join("paper3-001.png")) == picture);
+}
+
+#[test]
+fn a_picture_that_is_not_there_yet_is_saved_when_it_is_and_nobody_waits() {
+    let (directory, display) = (TempDir::new().unwrap(), wide_display());
+    let picture = picture(directory.path());
+    let viewer = slow_viewer(directory.path(), &display, "1");
+    display.focus("kdray");
+    let is_small = |screen: &Screen| screen.pixels.iter().any(|pixel| *pixel != [0; 3]) && !picture.is_shown_on(screen);
+    display.wait_until("a small picture", is_small);
+    display.act(&["key", "s", "key", "p"]);
+    display.wait_until("the picture", |screen| picture.is_shown_on(screen));
+    display.act(&["key", "Escape"]);
+    let text = stdout(&ended(viewer));
+    assert!(text.starts_with("[camera]\n") && text.ends_with("\nwrote paper3-001.png\n"), "{text}");
+    assert!(Screen::load(&directory.path().join("paper3-001.png")) == picture);
+}
