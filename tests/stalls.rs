@@ -109,7 +109,7 @@ fn a_far_soup_of_small_triangles_is_as_on_the_cpu() {
 #[test]
 fn interrupted_casts_find_the_same() {
     let world = World::new([meshes::soup(500, 1), meshes::torus(20, 10)].concat());
-    let rays = nasty_rays(&world, 700);
+    let rays = nasty_rays(&world, 300);
     for n_lanes in [None, Some(1000)] {
         let plain = pretended(DeviceOverrides { n_lanes, ..DeviceOverrides::default() });
         let limited = [(1000, Some(100)), (5000, None)].map(|(turns, n_slots)| limited_device(turns, n_lanes, n_slots));
@@ -128,8 +128,8 @@ fn interrupted_casts_find_the_same() {
 
 fn options(traversal: Traversal, primary: Primary) -> RenderOptions {
     RenderOptions {
-        width: 40,
-        height: 30,
+        width: 28,
+        height: 21,
         max_depth: 4,
         traversal,
         primary,
