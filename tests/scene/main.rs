@@ -1,15 +1,11 @@
 //! Scenes: what ships, what generators make, what OBJ files may say, and what is refused.
 
-#[path = "scene/errors.rs"]
 mod errors;
-#[path = "scene/extent.rs"]
 mod extent;
-#[path = "scene/generators.rs"]
 mod generators;
-#[path = "scene/obj.rs"]
 mod obj;
-#[path = "scene/path.rs"]
 mod path;
+#[path = "../support/mod.rs"]
 mod support;
 
 use std::{fs, path::Path};

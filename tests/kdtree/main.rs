@@ -1,11 +1,8 @@
 //! The kd-tree: valid and bounded on any input, the same on any number of threads, as cheap as a plain exact builder's,
 //! and right against brute force. The validator: each check fails on a planted error.
 
-#[path = "kdtree/meshes.rs"]
 mod meshes;
-#[path = "kdtree/oracle.rs"]
 mod oracle;
-#[path = "kdtree/plants.rs"]
 mod plants;
 
 use glam::Vec3;

@@ -1,11 +1,10 @@
 //! The viewer as its users meet it, in a window on a display of its own, under the validation layer.
 #![cfg(target_os = "linux")]
 
+#[path = "../support/mod.rs"]
 mod support;
 
-#[path = "view/failures.rs"]
 mod failures;
-#[path = "view/slow.rs"]
 mod slow;
 
 use std::{

@@ -1,0 +1,24 @@
+//! Whole frames on the device, under the validation layer, and on the CPU: against one another, against closed forms,
+//! and against themselves in other batches and on other numbers of threads.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod agreement;
+mod bands;
+mod batches;
+mod closed_forms;
+mod compiler;
+mod crop;
+mod features;
+mod lanes;
+mod large;
+mod living;
+mod mismatch;
+mod parts;
+mod primaries;
+mod refused;
+mod samples;
+mod slabs;
+mod studio;
+mod unused;
