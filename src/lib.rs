@@ -4,51 +4,50 @@
 //!
 //! ```text
 //! scene    files -> triangles, materials, lights, camera
-//! kdtree   triangles -> flat SAH kd-tree
-//! camera   scene + size + sample -> the frame's constants
+//! accel    triangles -> acceleration structure: what leads rays to triangles
+//!   kdtree   the flat SAH kd-tree and the ways of rays through it
+//! frame    options, picture and profile; scene + size + sample -> the frame's constants
 //! render   the frame: passes, barriers, batches -> picture
 //!   passes   one kernel and one file each, on
+//!   buffers  what kernels read and write, on
 //!   gpu      the Vulkan layer
 //! cast     rays -> hits, without a frame
 //! choices  what the user leaves open: which tree, which traversal, which primary rays
 //! cpu      both without Vulkan
-//! profile  times and counts -> each pass's rays
 //! output   picture -> file
-//! memory   what there is of it
 //! bench    all of it, timed
 //! view     all of it, in a window
+//!
+//! layout   the structs that kernels and Rust share
+//! util     names of variants, text that is safe to print, the host's memory
 //! ```
 
 #![deny(unsafe_code)]
 
 #[macro_use]
-mod words;
+pub mod util;
 
-mod bounce;
-pub mod frame;
 pub mod layout;
-mod profile;
 
 pub mod scene;
 
-pub mod kdtree;
+pub mod accel;
 
-pub mod camera;
-pub mod sampling;
+pub mod frame;
 
 pub mod cpu;
 
 pub mod gpu;
+
+pub mod buffers;
 pub mod passes;
 pub mod render;
 
 pub mod cast;
 
 pub mod choices;
-pub mod memory;
 
 pub mod output;
-pub mod text;
 
 pub mod bench;
 

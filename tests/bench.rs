@@ -10,6 +10,7 @@ use std::{
 
 use glam::Vec3;
 use kdray::{
+    accel::kdtree::{BuildOptions, KdTree, Traversal},
     bench::{
         difference::Difference,
         rays::{RayKind, RaySet, ray_sets},
@@ -17,8 +18,6 @@ use kdray::{
         traversal::Tracers,
     },
     cpu::traverser::Traverser,
-    frame::Traversal,
-    kdtree::{BuildOptions, KdTree},
     layout::{Hit, NO_TRIANGLE, Ray},
     scene::Scene,
 };

@@ -6,9 +6,9 @@ use std::{ops::RangeInclusive, sync::Arc};
 
 use glam::{Vec3, vec3};
 use kdray::{
-    cast::{CastRay, Caster, Hit, NO_TRIANGLE, Query, cast_on_cpu},
+    accel::{Query, kdtree::Traversal},
+    cast::{CastRay, Caster, Hit, NO_TRIANGLE, cast_on_cpu},
     cpu::{kdtree::near_scene, probe::Probe},
-    frame::Traversal,
     gpu::{Context, ContextOptions},
     layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, Ray},
 };

@@ -6,11 +6,14 @@ use std::{convert::Infallible, fs, path::PathBuf};
 
 use glam::Vec3;
 use kdray::{
-    cast::{CastRay, Caster, Query},
+    accel::{
+        Query,
+        kdtree::{BuildOptions, KdTree, Traversal},
+    },
+    cast::{CastRay, Caster},
     choices::{Cache, Candidates, Chosen, Key, Reason, Request, Timings, TreeKind, Workload, measure_traversals},
-    frame::{Primary, RenderOptions, Traversal},
+    frame::{Primary, RenderOptions},
     gpu::DeviceInfo,
-    kdtree::{BuildOptions, KdTree},
     layout::Triangle,
     render::Renderer,
     scene::{Camera, Scene},

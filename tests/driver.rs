@@ -6,6 +6,10 @@ mod support;
 use std::{fs, path::Path, rc::Rc, sync::Arc};
 
 use kdray::{
+    accel::{
+        Query,
+        kdtree::{BuildOptions, KdTree, Traversal},
+    },
     bench::{
         Spread,
         difference::Apart,
@@ -18,12 +22,10 @@ use kdray::{
         rays::{RayKind, RaySet, ray_sets},
         stage::Stage,
     },
-    cast::{CastRay, Query},
-    frame::Traversal,
+    buffers::{AccelBuffers, CastResources},
+    cast::CastRay,
     gpu::{Access, Commands, Context, ContextOptions, GpuError},
-    kdtree::{BuildOptions, KdTree},
     layout::NO_TRIANGLE,
-    passes::{CastResources, Tree},
 };
 use serde_json::Value;
 use support::{
@@ -45,13 +47,13 @@ fn stage() -> Stage {
 /// A kernel, and the tree that it walks.
 struct Walker {
     kernel: Kernel,
-    _tree: Tree,
+    _tree: AccelBuffers,
 }
 
 /// A stage's kernel on the rays of a set.
 fn walker(context: &Arc<Context>, stage: &Stage, set: &RaySet, traversal: Traversal) -> Box<dyn Contender> {
     let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
-    let tree = Tree::new(context, &stage.scene.triangles, &stage.tree, &stage.frame).expect("a tree");
+    let tree = AccelBuffers::new(context, &stage.scene.triangles, &stage.tree, &stage.frame).expect("a tree");
     let bindings = CastResources::bindings(context, &tree).expect("bindings");
     let resources = CastResources::new(context, &bindings, &tree, set.rays.len()).expect("resources");
     let cast = |ray: &kdray::layout::Ray| CastRay {

@@ -6,9 +6,9 @@ mod support;
 use fearless_simd::{Level, Simd};
 use glam::{DVec3, Vec3};
 use kdray::{
-    cast::{CastRay, Caster, Query, cast_on_cpu},
+    accel::{Query, kdtree::Traversal},
+    cast::{CastRay, Caster, cast_on_cpu},
     cpu::{probe::Probe, traverser::Traverser, triangle::Shear},
-    frame::Traversal,
     gpu::{Context, ContextOptions},
     layout::{Hit, NO_TRIANGLE, Ray, Triangle},
 };

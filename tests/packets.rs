@@ -8,6 +8,7 @@ use std::array::from_fn;
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 use glam::Vec3;
 use kdray::{
+    accel::kdtree::Traversal,
     cpu::{
         companions::Companions,
         kdtree::{TraversalRay, signs_of},
@@ -17,7 +18,6 @@ use kdray::{
         traverser::Traverser,
         triangle::Shear,
     },
-    frame::Traversal,
     layout::{Hit, NO_TRIANGLE, Ray, Triangle},
 };
 use support::{World, meshes, random::Random, rays::nasty_ray};

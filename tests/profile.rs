@@ -6,10 +6,10 @@ mod support;
 use std::{collections::BTreeSet, fs, path::Path, sync::Arc};
 
 use kdray::{
+    accel::kdtree::{BuildOptions, KdTree},
     cpu::{self, Batching},
     frame::{BounceStats, Pass, PassTime, Primary, Profile, RenderOptions, Scope, View},
     gpu::{Context, ContextOptions},
-    kdtree::{BuildOptions, KdTree},
     layout::Counters,
     render::Renderer,
     scene::Scene,

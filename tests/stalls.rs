@@ -7,10 +7,13 @@ use std::sync::Arc;
 
 use glam::{Vec3, vec3};
 use kdray::{
-    cast::{CastRay, Caster, Hit, NO_TRIANGLE, Query, cast_on_cpu},
-    frame::{Picture, Primary, Profile, RenderOptions, Traversal},
+    accel::{
+        Query,
+        kdtree::{BuildOptions, KdTree, Traversal},
+    },
+    cast::{CastRay, Caster, Hit, NO_TRIANGLE, cast_on_cpu},
+    frame::{Picture, Primary, Profile, RenderOptions},
     gpu::{Context, DeviceOverrides},
-    kdtree::{BuildOptions, KdTree},
     layout::Feature,
     render::Renderer,
 };

@@ -4,13 +4,14 @@ mod support;
 
 use glam::{Vec3, vec3};
 use kdray::{
-    cast::Query,
+    accel::{
+        Query,
+        kdtree::{BuildOptions, KdTree, Traversal},
+    },
     cpu::{
         bindings::Bindings, brute, kdtree::near_scene, probe::Probe, steps::count_steps, table::Table,
         traverser::Traverser,
     },
-    frame::Traversal,
-    kdtree::{BuildOptions, KdTree},
     layout::{Hit, NO_TRIANGLE, Ray, Slab, Triangle},
 };
 use rayon::prelude::*;

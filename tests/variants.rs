@@ -7,15 +7,15 @@ use std::sync::Arc;
 
 use glam::{Vec3, vec3};
 use kdray::{
-    camera::frame_constants,
-    frame::{RenderOptions, Traversal},
+    accel::kdtree::{BuildOptions, KdTree, Traversal},
+    buffers::{Needs, Resources},
+    frame::{RenderOptions, frame_constants},
     gpu::{Access, Context, ContextOptions, GpuError},
-    kdtree::{BuildOptions, KdTree},
     layout::{
         BRUTE_MAX_TRIANGLES, Batch, Bounce, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_LIT, LIGHT_POINT, LIGHT_SHADOWED,
         LIGHT_UNTESTED, Light, NO_TRIANGLE, Ray, Triangle,
     },
-    passes::{Needs, Passes, Resources},
+    passes::Passes,
     render::Renderer,
     scene::{Camera, RenderDefaults, Scene},
 };

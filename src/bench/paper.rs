@@ -11,11 +11,11 @@ use super::{
     warm_up,
 };
 use crate::{
+    accel::kdtree::{KdTree, Traversal},
     choices::{Request, primary_by_rule},
     cpu,
-    frame::{BounceStats, Profile, RenderOptions, Traversal},
+    frame::{BounceStats, Profile, RenderOptions},
     gpu::{Context, GpuError},
-    kdtree::KdTree,
     render::BandedRenderer,
     scene::Scene,
 };

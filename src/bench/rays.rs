@@ -9,13 +9,13 @@ use serde::Serialize;
 
 use super::stage::Stage;
 use crate::{
+    accel::kdtree::Traversal,
     cpu::{
         light::sample_light,
         primary_hit::primary_rays,
         surface::{Surface, surface_at},
         trace::trace,
     },
-    frame::Traversal,
     layout::{Hit, NO_TRIANGLE, Ray, Triangle},
 };
 

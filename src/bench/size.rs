@@ -15,9 +15,8 @@ use super::{
     traversal::{SetResult, StepsARay, Tracers},
 };
 use crate::{
-    frame::Traversal,
+    accel::kdtree::{BuildOptions, Statistics, Traversal},
     gpu::{Context, GpuError},
-    kdtree::{BuildOptions, Statistics},
     layout::Material,
     scene::{
         Camera, RenderDefaults, Scene,

@@ -5,10 +5,9 @@ use std::time::Instant;
 use glam::{BVec3, Vec3};
 
 use crate::{
-    camera::frame_constants,
+    accel::kdtree::{BuildOptions, Extras, KdTree},
     cpu::bindings::Bindings,
-    frame::RenderOptions,
-    kdtree::{BuildOptions, Extras, KdTree},
+    frame::{RenderOptions, frame_constants},
     layout::{FLAT_NORMAL, Frame, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
     scene::{Camera, Scene, framing},
 };

@@ -13,14 +13,16 @@ use super::{
     stage::Stage,
 };
 use crate::{
-    cast::{CastRay, Caster, Query},
+    accel::{
+        Query,
+        kdtree::{Statistics, Traversal},
+    },
+    cast::{CastRay, Caster},
     cpu::{
         self,
         steps::{Steps, count_steps},
     },
-    frame::Traversal,
     gpu::{Context, GpuError, Statistic, StatisticValue},
-    kdtree::Statistics,
     layout::{Hit, NO_TRIANGLE, Ray},
 };
 

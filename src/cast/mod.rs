@@ -19,23 +19,17 @@ pub use self::{
 };
 pub use crate::layout::{CastRay, Hit, NO_TRIANGLE};
 use crate::{
+    accel::{
+        Query,
+        kdtree::{Extras, KdTree, Traversal},
+    },
+    buffers::{AccelBuffers, CastResources, Round},
     cpu,
-    frame::Traversal,
     gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
-    kdtree::{Extras, KdTree},
     layout::{Frame, RAY_GROUP_SIZE, Triangle},
-    passes::{self, CastResources, Round, Tree},
+    passes,
     scene::Mismatch,
 };
-
-/// What is asked of a ray.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Query {
-    /// The hit of smallest t; of several at one t, the triangle of the lowest index.
-    Closest,
-    /// Whether there is a hit: one that need not be the closest.
-    Any,
-}
 
 /// What became of rays.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,7 +48,7 @@ pub const RAYS_PER_BATCH: usize = 1 << 21;
 /// Triangles and their tree on a device, ready for rays.
 pub struct Caster {
     context: Arc<Context>,
-    tree: Tree,
+    tree: AccelBuffers,
     bindings: Arc<Bindings>,
     traversal: Traversal,
     /// For [`Query::Closest`] and [`Query::Any`], once they have been asked.
@@ -75,7 +69,7 @@ impl Caster {
         tree: &KdTree,
         traversal: Traversal,
     ) -> Result<Self, GpuError> {
-        let mut buffers = Tree::new(context, triangles, tree, &constants(triangles, tree))?;
+        let mut buffers = AccelBuffers::new(context, triangles, tree, &constants(triangles, tree))?;
         buffers.add_extras(context, tree, traversal)?;
         let bindings = CastResources::bindings(context, &buffers)?;
         Ok(Self {

@@ -14,8 +14,9 @@ use npyz::{AutoSerialize, WriteOptions, WriterBuilder};
 use tempfile::SpooledTempFile;
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
-use super::{Hit, NO_TRIANGLE, Query};
+use super::{Hit, NO_TRIANGLE};
 use crate::{
+    accel::Query,
     layout::Triangle,
     output::{self, OutputError},
 };

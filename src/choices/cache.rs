@@ -15,7 +15,12 @@ use serde::{Deserialize, Serialize};
 use tempfile::NamedTempFile;
 
 use super::Timings;
-use crate::{frame::Traversal, gpu::DeviceInfo, kdtree::BuildOptions, layout::Triangle, passes::spirv};
+use crate::{
+    accel::kdtree::{BuildOptions, Traversal},
+    gpu::DeviceInfo,
+    layout::Triangle,
+    passes::spirv,
+};
 
 /// The environment variable that names another folder, or if it is empty, none.
 const FOLDER: &str = "KDRAY_CACHE";

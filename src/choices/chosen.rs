@@ -5,7 +5,10 @@ use std::fmt::{self, Display};
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
 use super::{Timings, TreeKind};
-use crate::frame::{Primary, RenderOptions, Traversal};
+use crate::{
+    accel::kdtree::Traversal,
+    frame::{Primary, RenderOptions},
+};
 
 /// Why something was chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +22,7 @@ pub enum Reason {
     Cached,
 }
 
-words!(Reason { Pinned = "pinned", Rule = "rule", Measured = "measured", Cached = "cached" });
+named_enum!(Reason { Pinned = "pinned", Rule = "rule", Measured = "measured", Cached = "cached" });
 
 /// A choice and its reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -9,6 +9,10 @@ use bytemuck::Zeroable;
 
 use super::Timings;
 use crate::{
+    accel::{
+        Query,
+        kdtree::{KdTree, Traversal},
+    },
     bench::{
         driver::{
             contest::{Contender, rounds},
@@ -17,14 +21,11 @@ use crate::{
         rays::diffuse_rays,
         traversal::cast_ray,
     },
-    camera::frame_constants,
-    cast::Query,
+    buffers::{AccelBuffers, CastResources},
     cpu::{bindings::Bindings, primary_hit::primary_rays, trace::trace},
-    frame::{Denoise, Primary, RenderOptions, Traversal},
+    frame::{Denoise, Primary, RenderOptions, frame_constants},
     gpu::{Context, GpuError},
-    kdtree::KdTree,
     layout::{CastRay, Frame, Hit, Ray},
-    passes::{CastResources, Tree},
     render::Renderer,
     scene::Scene,
 };
@@ -54,7 +55,7 @@ pub fn measure_traversals(
     let n_pixels = context.n_lanes()?.clamp(FEWEST_RAYS, MOST_RAYS);
     let frame = frame_constants(scene, tree, &picture_of(scene, n_pixels));
     let rays = some_rays(scene, tree, &frame);
-    let mut buffers = Tree::new(context, &scene.triangles, tree, &frame)?;
+    let mut buffers = AccelBuffers::new(context, &scene.triangles, tree, &frame)?;
     if traversals.contains(&Traversal::Ropes) {
         buffers.add_extras(context, tree, Traversal::Ropes)?;
     }

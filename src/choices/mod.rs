@@ -41,9 +41,9 @@ pub use self::{
     tree::{BuildPolicy, TreeKind},
 };
 use crate::{
-    frame::{Primary, RenderOptions, Traversal},
+    accel::kdtree::{BuildOptions, KdTree, Traversal},
+    frame::{Primary, RenderOptions},
     gpu::{Context, DeviceInfo, GpuError},
-    kdtree::{BuildOptions, KdTree},
     layout::KD_ORIGIN_REACH,
     scene::{Camera, Scene},
 };

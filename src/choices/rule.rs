@@ -1,11 +1,7 @@
 //! How rays are traced where nothing is known but the device and the sizes of scene and picture.
 
 use super::Engine;
-use crate::{
-    frame::{Primary, Traversal},
-    gpu::Context,
-    passes::Raster,
-};
+use crate::{accel::kdtree::Traversal, buffers::RasterQueue, frame::Primary, gpu::Context};
 
 /// The traversal that is fastest on an engine in most scenes.
 pub fn traversal_by_rule(engine: Engine) -> Traversal {
@@ -21,7 +17,7 @@ pub fn primary_by_rule(context: Option<&Context>, n_triangles: usize, size: (u32
     match context {
         // Mesa's lavapipe: 870,000 triangles in 72 ms, 790,000 rays in 242 (benches/EXPERIMENTS.md).
         Some(context) if context.runs_both_sides() => Primary::suited_to(n_triangles, size, 4),
-        Some(context) if context.has_wide_atomics() && Raster::has_room(context, n_triangles) => Primary::Compute,
+        Some(context) if context.has_wide_atomics() && RasterQueue::has_room(context, n_triangles) => Primary::Compute,
         _ => Primary::suited_to(n_triangles, size, 1),
     }
 }

@@ -10,7 +10,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{Cache, Chosen, Key, Reason};
-use crate::frame::{Primary, Traversal};
+use crate::{accel::kdtree::Traversal, frame::Primary};
 
 /// Scenes of fewer triangles are small enough for any traversal: their frames take longer elsewhere.
 const FEWEST_TRIANGLES: usize = 1000;

@@ -1,7 +1,7 @@
 //! Which tree to build: how much work pays for the rays that will be traced.
 
 use super::Engine;
-use crate::kdtree::BuildOptions;
+use crate::accel::kdtree::BuildOptions;
 
 /// How much work goes into the tree, as the user says it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -13,7 +13,7 @@ pub enum BuildPolicy {
     Best,
 }
 
-words!(BuildPolicy { Auto = "auto", Fast = "fast", Best = "best" });
+named_enum!(BuildPolicy { Auto = "auto", Fast = "fast", Best = "best" });
 
 impl BuildPolicy {
     /// The tree that the user wants, if that is a certain one.
@@ -36,7 +36,7 @@ pub enum TreeKind {
     Best,
 }
 
-words!(TreeKind { Fast = "fast", Best = "best" });
+named_enum!(TreeKind { Fast = "fast", Best = "best" });
 
 /// Rays a triangle from which on the best tree pays: it takes about a microsecond a triangle longer to build, with
 /// slabs a third of one more, and spares a ray some 10 to 25 ns on the CPU's threads and half of one to one on a GPU.

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::{Cache, Candidates, Key, Methods, Timings, Workload, measure_primaries, measure_traversals};
 use crate::{
-    frame::{Primary, RenderOptions, Traversal},
+    accel::kdtree::{BuildOptions, KdTree, Traversal},
+    frame::{Primary, RenderOptions},
     gpu::{Context, GpuError},
-    kdtree::{BuildOptions, KdTree},
     scene::Scene,
 };
 

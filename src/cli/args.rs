@@ -4,9 +4,9 @@ use std::{path::PathBuf, str::FromStr};
 
 use clap::{Parser, Subcommand, value_parser};
 use kdray::{
-    cast::Query,
+    accel::{Query, kdtree::Traversal},
     choices::{BuildPolicy, Request},
-    frame::{Aov, Crop, RenderOptions, Traversal},
+    frame::{Aov, Crop, RenderOptions},
     gpu::DeviceSelector,
     scene::Scene,
 };

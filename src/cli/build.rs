@@ -1,8 +1,8 @@
 //! What building a tree takes of the host's memory, asked before it is built.
 
 use kdray::{
-    kdtree::BuildOptions,
-    memory::{OutOfMemory, require},
+    accel::kdtree::BuildOptions,
+    util::memory::{OutOfMemory, require},
 };
 
 /// Bytes a triangle that building takes at its peak beside the triangles, measured on a sphere and a torus knot of a

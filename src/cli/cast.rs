@@ -3,11 +3,13 @@
 use std::{sync::Arc, time::Instant};
 
 use kdray::{
-    cast::{self, Cast, CastRay, Caster, CpuCaster, Hit, HitWriter, NO_TRIANGLE, Query, RAYS_PER_BATCH, RayReader},
+    accel::{
+        Query,
+        kdtree::{KdTree, Traversal},
+    },
+    cast::{self, Cast, CastRay, Caster, CpuCaster, Hit, HitWriter, NO_TRIANGLE, RAYS_PER_BATCH, RayReader},
     choices::{self, Cache, Choices, Workload},
-    frame::Traversal,
     gpu::{Context, ContextOptions, GpuError},
-    kdtree::KdTree,
     layout::Triangle,
     output,
     scene::Scene,

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use kdray::{choices::Choices, kdtree::Statistics};
+use kdray::{accel::kdtree::Statistics, choices::Choices};
 use serde::Serialize;
 
 use super::table::decimal;

@@ -3,7 +3,8 @@
 use std::io;
 
 use kdray::{
-    cast::RayFileError, gpu::GpuError, memory::OutOfMemory, output::OutputError, scene::SceneError, view::ViewError,
+    cast::RayFileError, gpu::GpuError, output::OutputError, scene::SceneError, util::memory::OutOfMemory,
+    view::ViewError,
 };
 
 /// Why a command failed. Displays as one line.

@@ -1,8 +1,8 @@
 //! `kdray inspect`: what a scene holds, and its kd-tree in numbers.
 
 use kdray::{
+    accel::kdtree::{KdTree, Statistics},
     choices::{Engine, TreeKind},
-    kdtree::{KdTree, Statistics},
     layout::{LIGHT_DIRECTIONAL, Light},
     scene::Scene,
 };

@@ -6,7 +6,7 @@ use std::{
 };
 
 use indicatif::ProgressBar;
-use kdray::text::one_line;
+use kdray::util::text::one_line;
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::{
     Layer,

@@ -37,7 +37,7 @@ use clap::Parser;
 use error::CliError;
 use kdray::{
     gpu::{Context, ContextOptions, GpuError},
-    text::{escape_controls, one_line},
+    util::text::{escape_controls, one_line},
 };
 use progress::Progress;
 

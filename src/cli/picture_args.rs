@@ -2,8 +2,9 @@
 
 use clap::{ValueEnum, value_parser};
 use kdray::{
+    accel::kdtree::Traversal,
     choices::{BuildPolicy, Request},
-    frame::{Denoise, Primary, RenderOptions, Tonemap, Traversal},
+    frame::{Denoise, Primary, RenderOptions, Tonemap},
     scene::Scene,
 };
 

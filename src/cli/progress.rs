@@ -7,7 +7,7 @@ use std::{
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use kdray::text::one_line;
+use kdray::util::text::one_line;
 
 use super::{complain, log, spans::Spans};
 

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use kdray::{
+    accel::kdtree::Statistics,
     choices::Choices,
     frame::{Denoise, PassTime, Profile, RenderOptions},
-    kdtree::Statistics,
 };
 use serde::Serialize;
 

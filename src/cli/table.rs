@@ -1,6 +1,6 @@
 //! Text in columns.
 
-use kdray::text::escape_controls;
+use kdray::util::text::escape_controls;
 
 /// Rows under a header: the first column to the left, the others to the right, no trailing blanks. Control characters
 /// of cells are escaped, so that a row stays a line.

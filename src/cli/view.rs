@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use kdray::{
+    accel::kdtree::BuildOptions,
     choices::{Engine, Workload},
     frame::View,
     gpu::{ContextOptions, chosen_device},
-    kdtree::BuildOptions,
     output::{self, Format, OutputError},
     scene::{Camera, CameraPath, Scene},
     view::{Display, LoadOptions, Loaded, Settings, Tour, ViewOptions, ViewReport},

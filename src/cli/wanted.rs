@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use kdray::frame::UnknownWord;
+use kdray::util::UnknownWord;
 
 /// What a user wants: a certain variant of an option, or whichever suits best.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

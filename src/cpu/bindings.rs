@@ -2,7 +2,7 @@
 
 use super::table::{Counted, ReadCounts, Table, Uncounted};
 use crate::{
-    kdtree::{Extras, KdTree},
+    accel::kdtree::{Extras, KdTree},
     layout::{Frame, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, Triangle},
     scene::Scene,
 };

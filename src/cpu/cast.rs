@@ -5,8 +5,7 @@ use rayon::prelude::*;
 
 use super::{RAYS_PER_TASK, bindings::Bindings, kdtree::min, probe::Probe, traverser::Traverser};
 use crate::{
-    cast::Query,
-    frame::Traversal,
+    accel::{Query, kdtree::Traversal},
     layout::{CastRay, Hit, NO_TRIANGLE},
 };
 

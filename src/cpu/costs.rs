@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{RAYS_PER_TASK, bindings::Bindings, shadow::shadow_segment, table::ReadCounts, traverser::Traverser};
 use crate::{
-    frame::Traversal,
+    accel::kdtree::Traversal,
     layout::{Feature, Hit, NO_TRIANGLE, Ray},
 };
 

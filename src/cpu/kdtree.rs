@@ -10,7 +10,7 @@ use super::{
     table::Reads,
 };
 use crate::{
-    kdtree::EMPTY_LEAF,
+    accel::kdtree::EMPTY_LEAF,
     layout::{Hit, KD_AXIS_MASK, KD_LEAF, KD_ORIGIN_REACH, KD_PAIR_SHIFT, KD_PLANE_REACH, KdNode, NO_TRIANGLE},
 };
 

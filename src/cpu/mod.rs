@@ -54,8 +54,8 @@ pub mod visibility;
 
 pub use self::render::{Batching, Renderer};
 use crate::{
+    accel::kdtree::KdTree,
     frame::{Picture, Profile, RenderOptions},
-    kdtree::KdTree,
     scene::{Mismatch, Scene},
 };
 

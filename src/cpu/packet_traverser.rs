@@ -14,7 +14,7 @@ use super::{
     table::Reads,
 };
 use crate::{
-    kdtree::EMPTY_LEAF,
+    accel::kdtree::EMPTY_LEAF,
     layout::{Hit, KD_MAX_DEPTH, KD_PAIR_SHIFT, KdNode},
 };
 

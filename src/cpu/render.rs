@@ -15,9 +15,8 @@ use super::{
     tonemap, trace, visibility,
 };
 use crate::{
-    camera::frame_constants,
-    frame::{BounceStats, Picture, Primary, Profile, RenderOptions},
-    kdtree::{Extras, KdTree},
+    accel::kdtree::{Extras, KdTree},
+    frame::{BounceStats, Picture, Primary, Profile, RenderOptions, frame_constants},
     layout::{Bounce, Feature, Frame, Hit, Ray, SCAN_GROUP_SIZE},
     scene::{Camera, Mismatch, Scene},
 };

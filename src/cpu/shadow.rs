@@ -10,7 +10,7 @@ use super::{
     traverser::Traverser,
 };
 use crate::{
-    frame::Traversal,
+    accel::kdtree::Traversal,
     layout::{Hit, LIGHT_LIT, LIGHT_SHADOWED, LIGHT_UNTESTED, Light, NO_TRIANGLE, Ray},
 };
 

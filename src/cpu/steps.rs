@@ -4,7 +4,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{RAYS_PER_TASK, bindings::Bindings, table::ReadCounts, traverser::Traverser};
-use crate::{cast::Query, frame::Traversal, layout::Ray};
+use crate::{
+    accel::{Query, kdtree::Traversal},
+    layout::Ray,
+};
 
 /// Reads for one or more rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -67,7 +70,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        kdtree::{BuildOptions, Extras, KdTree},
+        accel::kdtree::{BuildOptions, Extras, KdTree},
         layout::{NO_TRIANGLE, Triangle},
     };
 

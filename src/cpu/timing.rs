@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use crate::{
-    frame::{BounceStats, PassTime},
-    profile::{count_rays, is_in_batch},
+use crate::frame::{
+    BounceStats, PassTime,
+    counts::{count_rays, is_in_batch},
 };
 
 /// Times passes by name, bounce and batch.

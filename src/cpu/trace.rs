@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{RAYS_PER_TASK, bindings::Bindings, probe::Probe, traverser::Traverser};
 use crate::{
-    frame::Traversal,
+    accel::kdtree::Traversal,
     layout::{Hit, NO_TRIANGLE, Ray},
 };
 

@@ -16,7 +16,7 @@ use super::{
     ropes::follow_ropes,
     table::Reads,
 };
-use crate::{frame::Traversal, layout::Hit};
+use crate::{accel::kdtree::Traversal, layout::Hit};
 
 /// A traversal that remembers its working memory from ray to ray; one for each thread.
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]

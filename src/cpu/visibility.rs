@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use super::{RAYS_PER_TASK, bindings::Bindings, primary_hit::camera_ray, probe::Probe, traverser::Traverser};
-use crate::frame::Traversal;
+use crate::accel::kdtree::Traversal;
 
 /// Writes `triangle_ids` (`width * height`, rows from the top): the nearest triangle, or `NO_TRIANGLE`.
 pub fn visibility(bindings: &Bindings, traversal: Traversal, triangle_ids: &mut [u32]) {

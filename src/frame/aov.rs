@@ -23,7 +23,7 @@ pub enum Aov {
     Cost,
 }
 
-words!(Aov {
+named_enum!(Aov {
     Depth = "depth",
     Normal = "normal",
     Position = "position",

@@ -18,7 +18,7 @@ pub enum View {
     Rays,
 }
 
-words!(View {
+named_enum!(View {
     Picture = "picture",
     Depth = "depth",
     Normal = "normal",

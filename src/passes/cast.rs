@@ -2,49 +2,14 @@
 
 use std::sync::Arc;
 
-use super::{Round, Tree, binding, kernel, spirv, traversal_constants, tree};
+use super::{kernel, spirv, traversal_constants};
 use crate::{
-    bounce::lanes_log2,
-    cast::Query,
-    frame::Traversal,
-    gpu::{
-        Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, ComputePipeline, Context, Dispatch, GpuError,
-        Statistic,
-    },
-    layout::{BIND_CAST_HITS, BIND_CAST_RAYS, CastBatch, CastRay, Hit, RAY_GROUP_SIZE},
+    accel::{Query, kdtree::Traversal},
+    buffers::{CastResources, Round},
+    frame::bounce::lanes_log2,
+    gpu::{Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError, Statistic},
+    layout::{CastBatch, RAY_GROUP_SIZE},
 };
-
-/// A batch's buffers and the descriptor set over them and the tree.
-pub struct CastResources {
-    /// Room for a batch, like cast_hits.
-    pub cast_rays: Buffer<CastRay>,
-    pub cast_hits: Buffer<Hit>,
-    pub set: BindingSet,
-}
-
-impl CastResources {
-    /// The layout of the set, for kernels that read the tree.
-    ///
-    /// # Errors
-    /// Out of memory.
-    pub fn bindings(context: &Arc<Context>, tree: &Tree) -> Result<Arc<Bindings>, GpuError> {
-        let kinds: Vec<_> = tree::bindings().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
-        Bindings::with_constants(context, &kinds, size_of::<CastBatch>() as u32, &tree.constants())
-    }
-
-    /// Room for `len` rays.
-    ///
-    /// # Errors
-    /// Beyond the device's limits, out of memory.
-    pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, tree: &Tree, len: usize) -> Result<Self, GpuError> {
-        let cast_rays = Buffer::new(context, "cast_rays", len, BufferUse::Storage)?;
-        let cast_hits = Buffer::new(context, "cast_hits", len, BufferUse::Storage)?;
-        let own =
-            [(BIND_CAST_RAYS, Binding::Buffer(cast_rays.any())), (BIND_CAST_HITS, Binding::Buffer(cast_hits.any()))];
-        let set = BindingSet::new(bindings, "cast", &[&tree.objects(), &own[..]].concat())?;
-        Ok(Self { cast_rays, cast_hits, set })
-    }
-}
 
 /// The pass's kernel.
 pub struct Cast {

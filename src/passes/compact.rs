@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Resources, spirv};
+use super::spirv;
 use crate::{
+    buffers::Resources,
     gpu::{Access, Bindings, Commands, ComputeDesc, ComputePipeline, Context, Dispatch, GpuError},
     layout::Batch,
 };

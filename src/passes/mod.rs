@@ -4,9 +4,10 @@
 use std::sync::Arc;
 
 use crate::{
-    frame::{Primary, RenderOptions, Traversal},
-    gpu::{BindingKind, Bindings, ComputeDesc, ComputePipeline, Context, GpuError, Shader},
-    layout::{BIND_ADDRESSES, BIND_FRAME, BIND_TEXELS, BIND_TRIANGLE_IDS},
+    accel::kdtree::Traversal,
+    buffers::draws,
+    frame::{Primary, RenderOptions},
+    gpu::{Bindings, ComputeDesc, ComputePipeline, Context, GpuError, Shader},
 };
 
 mod accumulate;
@@ -15,45 +16,20 @@ mod compact;
 mod denoise;
 mod false_color;
 mod features;
-mod pixels;
 mod present;
 mod primary_hit;
-mod provoking;
-mod queue;
-mod raster;
 mod rasterize;
 mod resolve;
-mod resources;
 mod shade;
 mod shadow;
-mod stalls;
 mod tonemap;
 mod trace;
-mod tree;
 mod visibility;
 
 pub use self::{
-    accumulate::Accumulate,
-    cast::{Cast, CastResources},
-    compact::Compact,
-    denoise::Denoise,
-    false_color::FalseColor,
-    features::Features,
-    pixels::Pixels,
-    present::Present,
-    primary_hit::PrimaryHit,
-    queue::Queue,
-    raster::Raster,
-    rasterize::Rasterize,
-    resolve::Resolve,
-    resources::{Needs, Resources},
-    shade::Shade,
-    shadow::Shadow,
-    stalls::{Round, Stalls},
-    tonemap::Tonemap,
-    trace::Trace,
-    tree::{Reading, Tree},
-    visibility::Visibility,
+    accumulate::Accumulate, cast::Cast, compact::Compact, denoise::Denoise, false_color::FalseColor,
+    features::Features, present::Present, primary_hit::PrimaryHit, rasterize::Rasterize, resolve::Resolve,
+    shade::Shade, shadow::Shadow, tonemap::Tonemap, trace::Trace, visibility::Visibility,
 };
 
 /// A shader, as build.rs left it.
@@ -110,7 +86,7 @@ impl Passes {
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
     ) -> Result<Option<Arc<Visibility>>, GpuError> {
-        pixels::draws(options).then(|| Visibility::new(context, bindings).map(Arc::new)).transpose()
+        draws(options).then(|| Visibility::new(context, bindings).map(Arc::new)).transpose()
     }
 
     fn rasterize(
@@ -155,17 +131,6 @@ impl Passes {
         }
         Ok(next)
     }
-}
-
-/// A binding number of layout.glsl and what it holds.
-fn binding(number: u32) -> (u32, BindingKind) {
-    let kind = match number {
-        BIND_TEXELS.. => BindingKind::Texels,
-        BIND_FRAME | BIND_ADDRESSES => BindingKind::Uniform,
-        BIND_TRIANGLE_IDS => BindingKind::Image,
-        _ => BindingKind::Storage,
-    };
-    (number, kind)
 }
 
 /// Specialization constants of the kernels that traverse: their own are the two in the middle, and what follows.

@@ -3,8 +3,9 @@
 
 use std::sync::Arc;
 
-use super::{Resources, kernel, spirv};
+use super::{kernel, spirv};
 use crate::{
+    buffers::Resources,
     gpu::{Access, Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError},
     layout::{Frame, RASTER_GROUPS_X, RAY_GROUP_SIZE, RasterGroups, RasterPush},
 };

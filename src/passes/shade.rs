@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Resources, kernel, spirv};
+use super::{kernel, spirv};
 use crate::{
+    buffers::Resources,
     frame::RenderOptions,
     gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
     layout::Batch,

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Resources, kernel, spirv, traversal_constants};
+use super::{kernel, spirv, traversal_constants};
 use crate::{
+    buffers::Resources,
     frame::{Primary, RenderOptions},
     gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
     layout::Batch,

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Resources, spirv};
+use super::spirv;
 use crate::{
+    buffers::Resources,
     gpu::{Area, Bindings, Commands, Context, DrawDesc, GpuError, RasterDesc, RasterPipeline, RasterTargets},
     layout::Frame,
 };

@@ -9,11 +9,11 @@ use std::{
 
 use super::Renderer;
 use crate::{
+    accel::kdtree::KdTree,
+    buffers::Pixels,
     frame::{Crop, Picture, Profile, RenderOptions},
     gpu::{Context, GpuError, Limits},
-    kdtree::KdTree,
     layout::Feature,
-    passes::Pixels,
     scene::{Camera, Scene},
 };
 

@@ -2,11 +2,11 @@
 
 use super::{Renderer, lanes_to_share, schedule::Schedule};
 use crate::{
+    accel::kdtree::KdTree,
+    buffers::{Needs, Resources},
     frame::{Crop, RenderOptions},
     gpu::GpuError,
-    kdtree::KdTree,
     layout::Frame,
-    passes::{Needs, Resources},
     scene::Camera,
 };
 

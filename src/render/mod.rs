@@ -19,12 +19,12 @@ use self::{
     schedule::{Room, Schedule},
 };
 use crate::{
-    camera::frame_constants,
-    frame::{Denoise, Picture, Primary, Profile, RenderOptions},
+    accel::kdtree::KdTree,
+    buffers::{Needs, Resources},
+    frame::{Denoise, Picture, Primary, Profile, RenderOptions, frame_constants},
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
-    kdtree::KdTree,
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
-    passes::{Needs, Passes, Rasterize, Resources},
+    passes::{Passes, Rasterize},
     scene::{Camera, Scene},
 };
 
@@ -228,7 +228,7 @@ impl Renderer {
         trace: impl Fn(&Commands),
         rest: impl Fn(&Commands),
     ) -> Result<Vec<Step>, GpuError> {
-        let Some(traced) = traced.filter(|_| self.resources.tree.stalls.can_occur()) else {
+        let Some(traced) = traced.filter(|_| self.resources.accel.stalls.can_occur()) else {
             let both = |commands: &Commands| {
                 self.resources.bind(commands);
                 trace(commands);
@@ -238,7 +238,7 @@ impl Renderer {
         };
         let tracing = |commands: &Commands| {
             self.resources.bind(commands);
-            self.resources.tree.stalls.reset(commands);
+            self.resources.accel.stalls.reset(commands);
             trace(commands);
         };
         let resting = |commands: &Commands| {
@@ -254,7 +254,7 @@ impl Renderer {
     /// Brings the rays of a step that has run to their ends.
     fn finish_rays(&self, traced: &Traced) -> Result<(), GpuError> {
         let (passes, resources) = (&self.passes, &self.resources);
-        resources.tree.stalls.finish(&self.context, |commands, round| {
+        resources.accel.stalls.finish(&self.context, |commands, round| {
             resources.bind(commands);
             let round = round.constant();
             match *traced {
@@ -299,7 +299,7 @@ impl Renderer {
 
     fn update_constants(&self, commands: &Commands) {
         commands.barrier(Access::AllReads, Access::TransferWrite); // what the frame before still reads
-        commands.update_buffer(self.resources.tree.frame.any(), self.resources.constants());
+        commands.update_buffer(self.resources.accel.frame.any(), self.resources.constants());
         commands.barrier(Access::TransferWrite, Access::AllReads); // frame
     }
 

@@ -4,10 +4,12 @@ use std::time::Instant;
 
 use super::Renderer;
 use crate::{
-    frame::{PassTime, Profile},
+    frame::{
+        PassTime, Profile,
+        counts::{count_batches, device_counts, sum_of_batches},
+    },
     gpu::{GpuError, TimerRow},
     layout::Bounce,
-    profile::{count_batches, device_counts, sum_of_batches},
 };
 
 impl Renderer {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::text::one_line;
+use crate::util::text::one_line;
 
 /// A scene file that cannot be read, understood or drawn. Displays as one line: `FILE:LINE: what` or `FILE: object: what`.
 #[derive(Debug, thiserror::Error)]

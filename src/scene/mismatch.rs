@@ -2,7 +2,7 @@
 //! asks here first.
 
 use super::Scene;
-use crate::{gpu::GpuError, kdtree::KdTree};
+use crate::{accel::kdtree::KdTree, gpu::GpuError};
 
 /// Parts of a scene that do not fit together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

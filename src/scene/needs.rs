@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use super::error::Checked;
-use crate::memory::require;
+use crate::util::memory::require;
 
 /// Bytes of a loaded triangle: its corners and normals, and the index of its material.
 const TRIANGLE_BYTES: u64 = 52;

@@ -8,8 +8,8 @@ use std::{
 use glam::Vec3;
 
 use crate::{
+    accel::kdtree::{BuildOptions, KdTree, Statistics},
     choices::{Chosen, Engine, Request, TreeKind, Workload},
-    kdtree::{BuildOptions, KdTree, Statistics},
     scene::{Scene, SceneError, framing},
 };
 

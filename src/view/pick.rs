@@ -3,8 +3,10 @@
 use glam::{UVec2, Vec3};
 
 use crate::{
-    camera::frame_constants,
-    cast::Query,
+    accel::{
+        Query,
+        kdtree::{Extras, KdTree},
+    },
     cpu::{
         bindings::Bindings,
         children::{child_kinds_of, children_of},
@@ -12,8 +14,7 @@ use crate::{
         steps::{Steps, count_steps},
         trace::trace,
     },
-    frame::RenderOptions,
-    kdtree::{Extras, KdTree},
+    frame::{RenderOptions, frame_constants},
     layout::{Hit, NO_TRIANGLE, Ray},
     scene::{Camera, Scene},
 };

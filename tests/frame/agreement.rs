@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use kdray::{
-    frame::{Denoise, Primary, RenderOptions, Traversal},
+    accel::kdtree::Traversal,
+    frame::{Denoise, Primary, RenderOptions},
     scene::Scene,
 };
 

@@ -2,9 +2,9 @@
 
 use glam::{Vec3, vec3};
 use kdray::{
+    accel::kdtree::{BuildOptions, KdTree, Traversal},
     cpu::{self, Batching},
-    frame::{Crop, Primary, RenderOptions, Traversal},
-    kdtree::{BuildOptions, KdTree},
+    frame::{Crop, Primary, RenderOptions},
     layout::{Feature, NO_TRIANGLE},
     render::Renderer,
     scene::Scene,

@@ -5,12 +5,15 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use kdray::{
-    cast::{CastRay, Caster, Query},
-    frame::{Primary, RenderOptions, Traversal},
+    accel::{
+        Query,
+        kdtree::{KdTree, Traversal},
+    },
+    buffers::{AccelBuffers, SceneAccess},
+    cast::{CastRay, Caster},
+    frame::{Primary, RenderOptions},
     gpu::{Buffer, BufferUse, Context, DeviceOverrides, GpuError},
-    kdtree::KdTree,
     layout::{Frame, KdRope, LargeTriangle, LeafTriangle},
-    passes::{Reading, Tree},
     render::Renderer,
     scene::Scene,
 };
@@ -35,9 +38,9 @@ fn most_texels(tree: &KdTree) -> u32 {
 }
 
 /// How a device reads what it can bind.
-fn usual_reading(context: &Context, tree: &KdTree) -> Reading {
+fn usual_reading(context: &Context, tree: &KdTree) -> SceneAccess {
     let has_texels = most_texels(tree) <= context.limits().n_texels;
-    if context.runs_both_sides() && has_texels { Reading::Texels } else { Reading::Bound }
+    if context.runs_both_sides() && has_texels { SceneAccess::Texels } else { SceneAccess::Bound }
 }
 
 /// With a ring of 16,000 triangles: none of its arrays can be bound then.
@@ -49,7 +52,7 @@ fn large_scene() -> (Scene, KdTree) {
 }
 
 /// Of each array that grows with the scene, with whatever the traversal asks for.
-fn scene_bytes(tree: &Tree, traversal: Traversal) -> Vec<u64> {
+fn scene_bytes(tree: &AccelBuffers, traversal: Traversal) -> Vec<u64> {
     let mut buffers = vec![
         tree.triangles.any(),
         tree.triangle_materials.any(),
@@ -75,9 +78,9 @@ fn a_scene_larger_than_what_the_device_binds_gives_the_same_bits() {
             let options = RenderOptions { traversal, primary, features, ..options(24, 16, 3) };
             let [mut bound, mut by_address] = [&any, &small]
                 .map(|context| Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer"));
-            assert_eq!(bound.resources().tree.reading(), usual_reading(&any, &tree));
-            assert_eq!(by_address.resources().tree.reading(), Reading::Address);
-            let bytes = scene_bytes(&by_address.resources().tree, traversal);
+            assert_eq!(bound.resources().accel.access(), usual_reading(&any, &tree));
+            assert_eq!(by_address.resources().accel.access(), SceneAccess::Address);
+            let bytes = scene_bytes(&by_address.resources().accel, traversal);
             assert!(bytes.iter().all(|&bytes| bytes > RANGE), "{traversal}: {bytes:?}");
             let pictures = [&mut bound, &mut by_address].map(|renderer| renderer.render().expect("a frame").0);
             assert!(identical(&pictures[0], &pictures[1]), "{traversal} {primary}");
@@ -97,9 +100,9 @@ fn texels_and_what_is_bound_give_the_same_bits() {
     let ((scene, tree), any, bound) = (large_scene(), device(), device_with(u64::MAX, 1));
     for traversal in [Traversal::Mask, Traversal::MaskBoxes, Traversal::Ropes] {
         let options = RenderOptions { traversal, primary: Primary::Trace, ..options(24, 16, 3) };
-        let pictures = [(&any, usual_reading(&any, &tree)), (&bound, Reading::Bound)].map(|(context, reading)| {
+        let pictures = [(&any, usual_reading(&any, &tree)), (&bound, SceneAccess::Bound)].map(|(context, reading)| {
             let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
-            assert_eq!(renderer.resources().tree.reading(), reading);
+            assert_eq!(renderer.resources().accel.access(), reading);
             renderer.render().expect("a frame").0
         });
         assert!(identical(&pictures[0], &pictures[1]), "{traversal}");
@@ -119,7 +122,7 @@ fn triangles_that_are_not_bound_are_rasterized() {
     let n_bytes = (scene.triangles.len() * size_of::<LargeTriangle>()) as u64;
     let with_range = |bytes| Renderer::new(device_with(bytes, 1), &scene, &tree, &options);
     let mut by_address = with_range(n_bytes).expect("a renderer");
-    assert_eq!(by_address.resources().tree.reading(), Reading::Address);
+    assert_eq!(by_address.resources().accel.access(), SceneAccess::Address);
     let mut bound = Renderer::new(any.clone(), &scene, &tree, &options).expect("a renderer");
     let pictures = [&mut bound, &mut by_address].map(|renderer| renderer.render().expect("a frame").0);
     assert!(identical(&pictures[0], &pictures[1]));
@@ -178,14 +181,14 @@ fn a_scene_is_read_by_address_only_where_something_of_it_cannot_be_bound() {
     let most_texels = most_texels(&tree);
     let usual = usual_reading(&device(), &tree);
     for (range, n_texels, reading) in [
-        (largest - 1, 1, Reading::Address),
-        (largest, 1, Reading::Bound),
-        (largest, most_texels - 1, Reading::Bound),
+        (largest - 1, 1, SceneAccess::Address),
+        (largest, 1, SceneAccess::Bound),
+        (largest, most_texels - 1, SceneAccess::Bound),
         (largest, most_texels, usual),
     ] {
         let context = device_with(range, n_texels);
-        let made = Tree::new(&context, &scene.triangles, &tree, &Frame::default()).expect("a tree");
-        assert_eq!(made.reading(), reading, "{range} bytes, {n_texels} texels");
+        let made = AccelBuffers::new(&context, &scene.triangles, &tree, &Frame::default()).expect("a tree");
+        assert_eq!(made.access(), reading, "{range} bytes, {n_texels} texels");
         assert_silent(&context);
     }
 }

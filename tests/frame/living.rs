@@ -2,7 +2,8 @@
 
 use glam::vec3;
 use kdray::{
-    frame::{Denoise, Picture, Primary, RenderOptions, Tonemap, Traversal},
+    accel::kdtree::Traversal,
+    frame::{Denoise, Picture, Primary, RenderOptions, Tonemap},
     gpu::GpuError,
     render::Renderer,
     scene::{Camera, Scene},

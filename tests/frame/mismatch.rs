@@ -1,11 +1,13 @@
 //! What does not fit together is refused before a kernel, which checks no bounds, can read it.
 
 use kdray::{
-    cast::{Caster, Query, cast_on_cpu},
+    accel::{
+        Query,
+        kdtree::{BuildOptions, KdTree, Traversal},
+    },
+    cast::{Caster, cast_on_cpu},
     cpu,
-    frame::Traversal,
     gpu::GpuError,
-    kdtree::{BuildOptions, KdTree},
     layout::Triangle,
     render::Renderer,
     scene::{Mismatch, Scene},

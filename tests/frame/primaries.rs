@@ -4,11 +4,10 @@ use std::collections::HashSet;
 
 use glam::UVec2;
 use kdray::{
-    camera::frame_constants,
+    accel::kdtree::{KdTree, Traversal},
     choices::{Engine, primary_by_rule, traversal_by_rule},
     cpu::{bindings::Bindings, primary_hit::camera_ray, traverser::Traverser},
-    frame::{Crop, Picture, Primary, RenderOptions, Traversal},
-    kdtree::KdTree,
+    frame::{Crop, Picture, Primary, RenderOptions, frame_constants},
     layout::Frame,
     render::Renderer,
     scene::Scene,

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use kdray::{
-    frame::{Crop, Denoise, Picture, Primary, RenderOptions, Tonemap, Traversal},
+    accel::kdtree::{KdTree, Traversal},
+    buffers::SceneAccess,
+    frame::{Crop, Denoise, Picture, Primary, RenderOptions, Tonemap},
     gpu::{Context, DeviceOverrides, GpuError},
-    kdtree::KdTree,
-    passes::Reading,
     render::Renderer,
     scene::{Camera, Scene},
 };
@@ -149,7 +149,7 @@ fn another_traversal_of_arrays_that_are_read_by_address() {
     let overrides = DeviceOverrides { storage_range: Some(48 << 10), n_texels: Some(1), ..DeviceOverrides::default() };
     let ropes = RenderOptions { traversal: Traversal::Ropes, ..small() };
     let mut trial = Trial::new(pretended(overrides), &ropes);
-    assert_eq!(trial.renderer.resources().tree.reading(), Reading::Address);
+    assert_eq!(trial.renderer.resources().accel.access(), SceneAccess::Address);
     trial.walk(&[(small(), 10), (ropes, 10)]);
 }
 

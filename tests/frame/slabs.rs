@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use kdray::{
+    accel::kdtree::{BuildOptions, KdTree, Traversal},
     cpu::{self, Batching},
-    frame::{Picture, Primary, RenderOptions, Traversal},
+    frame::{Picture, Primary, RenderOptions},
     gpu::Context,
-    kdtree::{BuildOptions, KdTree},
     layout::{Feature, Slab},
     render::Renderer,
     scene::Scene,
@@ -77,6 +77,6 @@ fn slabs_beside_their_surface_lose_it() {
     let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
     let expected = renderer.render().expect("a frame").0;
     let moved: Vec<Slab> = tree.slabs().iter().map(|slab| Slab { offset: slab.offset + 2.0, ..*slab }).collect();
-    renderer.resources().tree.kd_slabs.upload(&moved).expect("slabs");
+    renderer.resources().accel.kd_slabs.upload(&moved).expect("slabs");
     assert!(!identical(&expected, &renderer.render().expect("a frame").0));
 }

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use kdray::{
+    accel::kdtree::{BuildOptions, KdTree},
     cpu::{self, Batching},
     frame::{Denoise, Picture, RenderOptions},
     gpu::{Context, ContextOptions},
-    kdtree::{BuildOptions, KdTree},
     render::Renderer,
     scene::Scene,
 };

@@ -1,8 +1,8 @@
 //! What the options do not ask for is not made: no memory, no time.
 
 use kdray::{
+    buffers::Resources,
     frame::{Primary, RenderOptions},
-    passes::Resources,
     render::Renderer,
     scene::Scene,
 };

@@ -7,7 +7,7 @@ mod plants;
 
 use glam::Vec3;
 use kdray::{
-    kdtree::{BuildOptions, KdTree, Node},
+    accel::kdtree::{BuildOptions, KdTree, Node},
     layout::{KD_MAX_DEPTH, Triangle},
 };
 use meshes::{Random, boxed, boxes, needles, room, soup, sphere, terrain, triangle};

@@ -1,7 +1,7 @@
 //! A plain exact builder: at every cell it sorts all ends on all axes and sweeps them (O(n log^2 n)), with clipped
 //! triangles and their margins, in f64. Only the tree's cost is kept.
 
-use kdray::{kdtree::BuildOptions, layout::Triangle};
+use kdray::{accel::kdtree::BuildOptions, layout::Triangle};
 
 type Point = [f64; 3];
 /// Min, max.

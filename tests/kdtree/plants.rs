@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use kdray::{
-    kdtree::{BuildOptions, Invalid, KdTree, Node, Parts},
+    accel::kdtree::{BuildOptions, Invalid, KdTree, Node, Parts},
     layout::{KD_IN_SLAB, KD_MAX_DEPTH, KdNode, Slab, Triangle},
 };
 

@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use glam::{Vec3, uvec2, vec3};
 use kdray::{
-    camera::frame_constants,
     cpu::primary_hit::camera_ray,
-    frame::{Crop, Primary, RenderOptions},
+    frame::{Crop, Primary, RenderOptions, frame_constants},
     gpu::{Access, Commands, Context, ContextOptions, GpuError},
     layout::{Batch, Hit, RASTER_GROUPS_X, RASTER_GROUPS_Y, Triangle},
     passes::{Passes, Rasterize, Trace},
@@ -63,7 +62,7 @@ impl View {
         let mut constants = *self.stage.resources.constants();
         constants.set_view(camera, 0);
         self.stage.resources.set_constants(&constants);
-        self.stage.resources.tree.frame.upload(&[constants]).expect("constants");
+        self.stage.resources.accel.frame.upload(&[constants]).expect("constants");
     }
 
     /// How many pixels show a triangle.

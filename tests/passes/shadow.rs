@@ -4,8 +4,9 @@ use std::collections::HashSet;
 
 use glam::Vec3;
 use kdray::{
+    accel::kdtree::Traversal,
     cpu::{self, shade::LitRays},
-    frame::{RenderOptions, Traversal},
+    frame::RenderOptions,
     layout::{Batch, FLAT_NORMAL, Hit, LIGHT_LIT, LIGHT_SHADOWED, LIGHT_UNTESTED, NO_TRIANGLE},
     scene::Scene,
 };

@@ -3,13 +3,13 @@
 use std::{cell::Cell, sync::Arc, thread};
 
 use kdray::{
-    camera::frame_constants,
+    accel::kdtree::{BuildOptions, Extras, KdTree},
+    buffers::{Needs, Resources},
     cpu::bindings::Bindings,
-    frame::{Denoise, RenderOptions},
+    frame::{Denoise, RenderOptions, frame_constants},
     gpu::{Commands, Context, ContextOptions},
-    kdtree::{BuildOptions, Extras, KdTree},
     layout::{Batch, Bounce, Counters, Frame, Hit, NO_TRIANGLE, RAY_GROUP_SIZE, Ray},
-    passes::{Needs, Passes, Resources},
+    passes::Passes,
     scene::Scene,
 };
 
@@ -77,7 +77,7 @@ impl Stage {
     /// As [`Stage::run`], for kernels whose rays can stall: repeats the dispatch until all of them have ended. `record` is
     /// given the batch for a round.
     pub fn trace(&self, batch: &Batch, record: impl Fn(&Commands, &Batch)) {
-        let stalls = &self.resources.tree.stalls;
+        let stalls = &self.resources.accel.stalls;
         self.run(|commands| {
             stalls.reset(commands);
             record(commands, batch);

@@ -1,8 +1,9 @@
 //! Trace against its twin, with ordinary rays and with those on which traversals fail.
 
 use kdray::{
+    accel::kdtree::Traversal,
     cpu,
-    frame::{Primary, RenderOptions, Traversal},
+    frame::{Primary, RenderOptions},
     layout::Batch,
     scene::Scene,
 };

@@ -4,10 +4,12 @@ use std::fmt::Write;
 
 use glam::{Vec3, vec3};
 use kdray::{
-    cast::{Caster, CpuCaster, Query},
-    frame::Traversal,
+    accel::{
+        Query,
+        kdtree::{BuildOptions, KdTree, Traversal},
+    },
+    cast::{Caster, CpuCaster},
     gpu::{Context, ContextOptions},
-    kdtree::{BuildOptions, KdTree},
     layout::{CastRay, Hit, NO_TRIANGLE, Triangle},
     scene::{MIN_EXTENT, Scene, SceneError},
 };

@@ -2,7 +2,7 @@
 
 use glam::{Vec3, vec3};
 use kdray::{
-    kdtree::{BuildOptions, KdTree, Node, Parts},
+    accel::kdtree::{BuildOptions, KdTree, Node, Parts},
     layout::{Plane, Triangle},
 };
 

@@ -15,9 +15,9 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use kdray::{
+    accel::kdtree::{BuildOptions, Extras, KdTree},
     cpu::{bindings::Bindings, brute, kdtree::near_scene, probe::Probe},
     gpu::{Context, ContextOptions, DeviceOverrides},
-    kdtree::{BuildOptions, Extras, KdTree},
     layout::{Frame, Hit, NO_TRIANGLE, Ray, Triangle},
 };
 

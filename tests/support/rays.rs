@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use kdray::{
-    kdtree::Node,
+    accel::kdtree::Node,
     layout::{NO_TRIANGLE, Ray, Triangle},
 };
 

@@ -8,9 +8,9 @@ use crate::{
         traversal::{CASTS_A_TURN, turns},
         warm_up,
     },
+    buffers::CastResources,
     gpu::{Access, CommandBuffer, Commands, Context, GpuError, Timer},
     layout::Hit,
-    passes::CastResources,
 };
 
 /// One way of tracing rays that are on the device.

@@ -4,10 +4,10 @@ use std::{rc::Rc, sync::Arc};
 
 use super::contest::Contender;
 use crate::{
-    cast::Query,
-    frame::Traversal,
+    accel::{Query, kdtree::Traversal},
+    buffers::{CastResources, Round},
     gpu::{Access, Bindings, Commands, Context, GpuError},
-    passes::{Cast, CastResources, Round},
+    passes::Cast,
 };
 
 /// One way through the tree.

@@ -30,10 +30,9 @@ use super::{
     traversal::cast_ray,
 };
 use crate::{
-    cast::Query,
-    frame::Traversal,
+    accel::{Query, kdtree::Traversal},
+    buffers::{AccelBuffers, CastResources},
     gpu::{Bindings, Context, GpuError, Scenery},
-    passes::{CastResources, Tree},
 };
 
 /// kdray's ways through the tree that are measured: the default one, the one that keeps a stack in memory, and the one that
@@ -45,7 +44,7 @@ const N_BUILDS: usize = 5;
 /// A stage on a device that has ray tracing, ready for rays.
 pub struct Arena {
     context: Arc<Context>,
-    tree: Tree,
+    tree: AccelBuffers,
     bindings: Arc<Bindings>,
     scenery: Rc<Scenery>,
     rasters: Vec<Raster>,
@@ -65,7 +64,7 @@ impl Arena {
             scenery = Scenery::new(context, triangles)?;
             build_ms.push(scenery.build_ms());
         }
-        let mut tree = Tree::new(context, triangles, &stage.tree, &stage.frame)?;
+        let mut tree = AccelBuffers::new(context, triangles, &stage.tree, &stage.frame)?;
         tree.add_extras(context, &stage.tree, Traversal::Ropes)?;
         Ok(Self {
             bindings: CastResources::bindings(context, &tree)?,

@@ -4,13 +4,14 @@ use std::{rc::Rc, sync::Arc};
 
 use super::contest::Contender;
 use crate::{
-    cast::Query,
+    accel::Query,
+    buffers::CastResources,
     gpu::{
         Access, Binding, BindingKind, BindingSet, Bindings, Commands, Context, GpuError, RayTracingDesc,
         RayTracingPipeline, Scenery,
     },
     layout::{BIND_CAST_HITS, BIND_CAST_RAYS, DriverCast},
-    passes::{CastResources, spirv},
+    passes::spirv,
 };
 
 /// The driver's own ray tracing.

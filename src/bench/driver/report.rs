@@ -4,13 +4,13 @@ use serde::Serialize;
 
 use super::contest::Trial;
 use crate::{
+    accel::kdtree::Statistics,
     bench::{
         Spread,
         chart::{BarChart, Scale, Series},
         difference::{Apart, is_hit},
         rays::RayKind,
     },
-    kdtree::Statistics,
 };
 
 /// Times of one tracer on one set of rays.

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Subcommand, value_parser};
 use kdray::{
+    accel::kdtree::Traversal,
     bench::size::{MIN_TRIANGLES, MOST_TRIANGLES, SIZES},
-    frame::Traversal,
     gpu::DeviceSelector,
     output,
 };

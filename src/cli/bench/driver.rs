@@ -1,6 +1,7 @@
 //! `kdray bench driver`: the traversal against the driver's own ray tracing.
 
 use kdray::{
+    accel::kdtree::BuildOptions,
     bench::{
         difference::T_TOLERANCE,
         driver::{
@@ -12,7 +13,6 @@ use kdray::{
     },
     choices::{Engine, TreeKind},
     gpu::{Context, ContextOptions},
-    kdtree::BuildOptions,
     scene::Scene,
 };
 
@@ -147,12 +147,12 @@ fn check_hits(report: &Report) -> Result<(), CliError> {
 #[cfg(test)]
 mod tests {
     use kdray::{
+        accel::kdtree::KdTree,
         bench::{
             Spread,
             driver::{contest::Trial, report::PassSpread},
         },
         cast::Hit,
-        kdtree::KdTree,
     };
 
     use super::*;

@@ -3,6 +3,7 @@
 use std::{path::Path, sync::Arc};
 
 use kdray::{
+    accel::kdtree::KdTree,
     bench::{
         Spread,
         paper::{Report, Reported, Row, SCENES, SIZES, draw_on_cpu, draw_on_gpu, options},
@@ -10,7 +11,6 @@ use kdray::{
     choices::{Engine, TreeKind, traversal_by_rule},
     frame::RenderOptions,
     gpu::{Context, ContextOptions},
-    kdtree::KdTree,
     scene::Scene,
 };
 

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use kdray::{
+    accel::kdtree::Traversal,
     bench::{
         rays::ray_sets,
         size::{RayGrowth, Report, Row, Sized},
     },
     choices::{Engine, TreeKind, traversal_by_rule},
-    frame::Traversal,
     gpu::{Context, ContextOptions, GpuError},
 };
 
@@ -131,8 +131,8 @@ fn check_hits(report: &Report) -> Result<(), CliError> {
 #[cfg(test)]
 mod tests {
     use kdray::{
+        accel::kdtree::{BuildOptions, KdTree},
         bench::{Spread, difference::Difference, rays::RayKind, size::RayCost, traversal::StepsARay},
-        kdtree::{BuildOptions, KdTree},
     };
 
     use super::*;

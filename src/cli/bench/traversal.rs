@@ -3,15 +3,14 @@
 use std::sync::Arc;
 
 use kdray::{
+    accel::kdtree::{BuildOptions, Traversal},
     bench::{
         rays::ray_sets,
         stage::Stage,
         traversal::{Report, SetResult, Tracers, VariantResult},
     },
     choices::{Engine, TreeKind},
-    frame::Traversal,
     gpu::{Context, ContextOptions},
-    kdtree::BuildOptions,
     scene::Scene,
 };
 

@@ -3,10 +3,10 @@
 use std::{borrow::Cow, sync::Arc};
 
 use kdray::{
+    accel::kdtree::KdTree,
     cpu::{self, Batching},
     frame::{Picture, RenderOptions},
     gpu::{Context, GpuError},
-    kdtree::KdTree,
     render::{BandedRenderer, Drawn, Watcher},
     scene::{Camera, Scene},
 };

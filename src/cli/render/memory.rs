@@ -1,6 +1,6 @@
 //! How much memory a picture takes, asked for before it is allocated.
 
-use kdray::{frame::RenderOptions, layout::Feature, memory::require};
+use kdray::{frame::RenderOptions, layout::Feature, util::memory::require};
 
 use crate::cli::error::CliError;
 

@@ -10,10 +10,10 @@ use std::{
 };
 
 use kdray::{
+    accel::kdtree::KdTree,
     choices::{Cache, Choices, Engine, Workload},
     frame::Profile,
     gpu::{Context, ContextOptions},
-    kdtree::KdTree,
     output,
     scene::{Camera, CameraPath, Scene},
 };

@@ -5,7 +5,10 @@ use std::fmt::Display;
 use egui::{ComboBox, Grid, Slider, Ui};
 
 use super::Settings;
-use crate::frame::{Denoise, Primary, Tonemap, Traversal, View};
+use crate::{
+    accel::kdtree::Traversal,
+    frame::{Denoise, Primary, Tonemap, View},
+};
 
 /// The controls; all take effect with the next frame.
 pub fn show(ui: &mut Ui, settings: &mut Settings) {

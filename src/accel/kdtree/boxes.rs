@@ -35,7 +35,7 @@ impl From<KdBox> for Bounds {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kdtree::{BuildOptions, tests::staircase};
+    use crate::accel::kdtree::{BuildOptions, tests::staircase};
 
     #[test]
     fn leaves_touch_their_triangles_and_fill_the_root() {

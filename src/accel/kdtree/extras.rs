@@ -2,7 +2,7 @@
 
 use super::KdTree;
 use crate::{
-    frame::Traversal,
+    accel::kdtree::Traversal,
     layout::{KdBox, KdRope},
 };
 

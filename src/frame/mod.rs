@@ -1,20 +1,24 @@
 //! What a frame is asked for, and what comes of it: the options, the picture and the profile, alike on GPU and CPU.
 
 mod aov;
+pub(crate) mod bounce;
+mod constants;
+pub(crate) mod counts;
 mod crop;
 mod pass;
 mod profile;
+pub mod sampling;
 mod view;
 
 pub use self::{
     aov::{Aov, Channel, Samples},
+    constants::frame_constants,
     crop::Crop,
     pass::{Pass, Role, Scope},
     profile::{BounceStats, PassTime, Profile},
     view::View,
 };
-use crate::layout;
-pub use crate::words::UnknownWord;
+use crate::{accel::kdtree::Traversal, layout};
 
 /// How a frame is rendered. The scene's own defaults fill what the user leaves open.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,60 +99,6 @@ impl Tonemap {
     }
 }
 
-/// How a ray finds its way through the kd-tree.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Traversal {
-    /// A bit a level says which siblings are still to be visited, and what waits there has its place in local memory.
-    Mask,
-    /// The paper's own: a bit a level says which siblings are done; their boxes tell whether to visit them.
-    MaskBoxes,
-    /// Every subtree that was left is found again from the root.
-    Restart,
-    /// Back to the deepest ancestor that the ray has not left, by its box.
-    Backtrack,
-    /// The eight newest far children; older ones by a restart.
-    ShortStack,
-    /// From leaf to leaf, by links to its neighbours.
-    Ropes,
-    /// An array of far children. On the CPU, sixteen rays go together.
-    Stack,
-    /// No tree: every triangle. For small meshes.
-    Brute,
-}
-
-impl Traversal {
-    /// The paper's idea; a stack and ropes are up to a tenth faster on some scenes (README.md's figures).
-    pub const OF_GPUS: Self = Self::Mask;
-    /// What is fastest where drivers run kernels on the CPU.
-    pub const OF_SOFTWARE_DRIVERS: Self = Self::Ropes;
-    /// What is fastest on the CPU itself.
-    pub const OF_CPU: Self = Self::Stack;
-
-    /// The kernels' specialization constant.
-    pub(crate) fn constant(self) -> u32 {
-        match self {
-            Self::Mask => layout::TRAVERSAL_MASK,
-            Self::MaskBoxes => layout::TRAVERSAL_MASK_BOXES,
-            Self::Restart => layout::TRAVERSAL_RESTART,
-            Self::Backtrack => layout::TRAVERSAL_BACKTRACK,
-            Self::ShortStack => layout::TRAVERSAL_SHORT_STACK,
-            Self::Ropes => layout::TRAVERSAL_ROPES,
-            Self::Stack => layout::TRAVERSAL_STACK,
-            Self::Brute => layout::TRAVERSAL_BRUTE,
-        }
-    }
-
-    /// Whether it reads the nodes' boxes.
-    pub(crate) fn needs_boxes(self) -> bool {
-        matches!(self, Self::MaskBoxes | Self::Backtrack)
-    }
-
-    /// Whether it reads the nodes' ropes.
-    pub(crate) fn needs_ropes(self) -> bool {
-        self == Self::Ropes
-    }
-}
-
 /// How primary rays find their triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Primary {
@@ -181,15 +131,5 @@ pub struct Picture {
     pub display: Vec<[u8; 4]>,
 }
 
-words!(Traversal {
-    Mask = "mask",
-    MaskBoxes = "mask-boxes",
-    Restart = "restart",
-    Backtrack = "backtrack",
-    ShortStack = "short-stack",
-    Ropes = "ropes",
-    Stack = "stack",
-    Brute = "brute"
-});
-words!(Tonemap { Linear = "linear", Agx = "agx", Aces = "aces" });
-words!(Primary { Raster = "raster", Compute = "compute", Trace = "trace" });
+named_enum!(Tonemap { Linear = "linear", Agx = "agx", Aces = "aces" });
+named_enum!(Primary { Raster = "raster", Compute = "compute", Trace = "trace" });

@@ -3,15 +3,14 @@
 use std::{mem::offset_of, sync::Arc};
 
 use super::{
-    Pixels, Queue, Raster, Tree, binding,
+    AccelBuffers, Pixels, Queue, RasterQueue, accel, binding,
     pixels::{draws, n_pixels},
-    provoking::{has_indices, vertex_indices},
-    tree,
+    vertex_indices::{has_indices, vertex_indices},
 };
 use crate::{
+    accel::kdtree::KdTree,
     frame::RenderOptions,
     gpu::{Access, Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
-    kdtree::KdTree,
     layout::{self, Batch, Bounce, COUNTER_PLACES, COUNTER_STRIDE, Counters, Frame, Light, Material},
     scene::Scene,
 };
@@ -31,7 +30,7 @@ const COUNTERS_A_ROW: usize = (COUNTER_PLACES * COUNTER_STRIDE) as usize;
 /// that it does not replace; whoever keeps the predecessor can go on with it if the change fails.
 #[derive(Clone)]
 pub struct Resources {
-    pub tree: Tree,
+    pub accel: AccelBuffers,
     /// Three a triangle, or empty where draws do without indices. None where the options draw no triangles.
     pub vertex_indices: Option<Buffer<u32>>,
     pub materials: Buffer<Material>,
@@ -39,7 +38,7 @@ pub struct Resources {
     pub lights: Buffer<Light>,
     pub queue: Queue,
     pub pixels: Pixels,
-    pub raster: Raster,
+    pub raster: RasterQueue,
     /// One a batch and bounce.
     pub bounces: Buffer<Bounce>,
     counters: Buffer<Counters>,
@@ -67,10 +66,10 @@ impl Resources {
         scene.check(tree)?;
         let storage = BufferUse::Storage;
         let &Needs { constants, options, n_bounces } = needs;
-        let mut tree_buffers = Tree::new(context, &scene.triangles, tree, constants)?;
-        tree_buffers.add_materials(context, &scene.triangle_materials)?;
-        tree_buffers.add_extras(context, tree, options.traversal)?;
-        let kinds: Vec<_> = (0..layout::N_BINDINGS).chain(tree::texel_bindings()).map(binding).collect();
+        let mut accel = AccelBuffers::new(context, &scene.triangles, tree, constants)?;
+        accel.add_materials(context, &scene.triangle_materials)?;
+        accel.add_extras(context, tree, options.traversal)?;
+        let kinds: Vec<_> = (0..layout::N_BINDINGS).chain(accel::texel_bindings()).map(binding).collect();
         let upload_indices = || new_vertex_indices(context, &vertex_indices(&scene.triangles));
         let mut resources = Self {
             vertex_indices: draws(options).then(upload_indices).transpose()?,
@@ -78,11 +77,11 @@ impl Resources {
             lights: Buffer::with(context, "lights", &scene.lights, storage)?,
             queue: Queue::new(context, constants.queue_capacity, constants.n_lights)?,
             pixels: Pixels::new(context, constants, options)?,
-            raster: Raster::new(context, constants.n_triangles, options)?,
+            raster: RasterQueue::new(context, constants.n_triangles, options)?,
             bounces: new_bounces(context, n_bounces)?,
             counters: new_counters(context, n_bounces)?,
-            bindings: Bindings::with_constants(context, &kinds, PUSH_BYTES, &tree_buffers.constants())?,
-            tree: tree_buffers,
+            bindings: Bindings::with_constants(context, &kinds, PUSH_BYTES, &accel.constants())?,
+            accel,
             set: None,
             constants: *constants,
         };
@@ -115,7 +114,7 @@ impl Resources {
             (layout::BIND_LARGE_TRIANGLES, Binding::Buffer(self.raster.large_triangles.any())),
             (layout::BIND_TRIANGLE_IDS, Binding::Image(&pixels.triangle_ids)),
         ];
-        BindingSet::new(&self.bindings, "frame", &[&self.tree.objects(), &own[..]].concat())
+        BindingSet::new(&self.bindings, "frame", &[&self.accel.objects(), &own[..]].concat())
     }
 
     /// Makes the resources of another frame of the same scene. What they hold is undefined, but for the scene, and for
@@ -128,7 +127,7 @@ impl Resources {
         let &Needs { constants, options, n_bounces } = needs;
         self.changed(|next| {
             if let Some(tree) = tree {
-                next.tree.add_extras(context, tree, options.traversal)?;
+                next.accel.add_extras(context, tree, options.traversal)?;
             }
             if draws(options) != next.vertex_indices.is_some() {
                 next.vertex_indices = draws(options).then(|| next.make_vertex_indices(context)).transpose()?;
@@ -140,7 +139,7 @@ impl Resources {
                 next.pixels = Pixels::new(context, constants, options)?;
             }
             if !next.raster.fits(constants.n_triangles, options) {
-                next.raster = Raster::new(context, constants.n_triangles, options)?;
+                next.raster = RasterQueue::new(context, constants.n_triangles, options)?;
             }
             next.bounces = new_bounces(context, n_bounces)?;
             next.counters = new_counters(context, n_bounces)?;
@@ -171,7 +170,7 @@ impl Resources {
 
     /// The indices of the triangles that are on the device, which are fetched if there are few enough to have indices.
     fn make_vertex_indices(&self, context: &Arc<Context>) -> Result<Buffer<u32>, GpuError> {
-        let triangles = &self.tree.triangles;
+        let triangles = &self.accel.triangles;
         let triangles = if has_indices(triangles.len()) { triangles.download()? } else { Vec::new() };
         new_vertex_indices(context, &vertex_indices(&triangles))
     }
@@ -275,7 +274,7 @@ impl Resources {
         commands.bind(self.set());
     }
 
-    pub(super) fn set(&self) -> &BindingSet {
+    pub(crate) fn set(&self) -> &BindingSet {
         self.set.as_ref().expect("made with the resources")
     }
 }

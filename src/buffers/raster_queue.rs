@@ -11,7 +11,7 @@ use crate::{
 /// Triangles with large bounding rectangles, and their blocks. Without room where the options do not ask for these kernels.
 /// A clone is a second handle to the same buffers.
 #[derive(Clone)]
-pub struct Raster {
+pub struct RasterQueue {
     /// One.
     pub groups: Buffer<RasterGroups>,
     /// One: large triangles in the upper half, their blocks in the lower.
@@ -20,7 +20,7 @@ pub struct Raster {
     pub large_triangles: Buffer<LargeTriangle>,
 }
 
-impl Raster {
+impl RasterQueue {
     /// # Errors
     /// Beyond the device's limits, out of memory.
     pub fn new(context: &Arc<Context>, n_triangles: u32, options: &RenderOptions) -> Result<Self, GpuError> {

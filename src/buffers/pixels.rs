@@ -87,7 +87,7 @@ impl Pixels {
 }
 
 /// Whether the graphics pipeline draws triangles.
-pub(super) fn draws(options: &RenderOptions) -> bool {
+pub(crate) fn draws(options: &RenderOptions) -> bool {
     options.primary == Primary::Raster
 }
 

@@ -3,10 +3,9 @@
 use glam::{DMat4, DVec2, DVec3, DVec4, dvec2};
 
 use crate::{
-    frame::{Crop, Denoise, RenderOptions},
-    kdtree::KdTree,
+    accel::kdtree::KdTree,
+    frame::{Crop, Denoise, RenderOptions, sampling::sample_offset},
     layout::Frame,
-    sampling::sample_offset,
     scene::{Camera, Scene},
 };
 
@@ -101,8 +100,8 @@ mod tests {
 
     use super::*;
     use crate::{
+        accel::kdtree::BuildOptions,
         cpu::camera::{camera_direction, in_picture},
-        kdtree::BuildOptions,
         layout::Triangle,
         scene::RenderDefaults,
     };

@@ -51,7 +51,7 @@ impl KdTree {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kdtree::{BuildOptions, tests::staircase};
+    use crate::accel::kdtree::{BuildOptions, tests::staircase};
 
     /// A node and all above it, the root last.
     fn path(tree: &KdTree, node: u32) -> Vec<u32> {

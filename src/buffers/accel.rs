@@ -7,9 +7,8 @@ use rayon::prelude::*;
 
 use super::Stalls;
 use crate::{
-    frame::Traversal,
+    accel::kdtree::{Extras, KdTree, Traversal},
     gpu::{AnyBuffer, Binding, Buffer, BufferUse, Context, GpuError, texel_bytes},
-    kdtree::{Extras, KdTree},
     layout::{
         Addresses, BIND_ADDRESSES, BIND_FRAME, BIND_KD_BOXES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_ROPES,
         BIND_KD_SLABS, BIND_LEAF_PLANES, BIND_LEAF_TRIANGLES, BIND_STALLS, BIND_TEXELS, BIND_TRIANGLE_MATERIALS,
@@ -45,7 +44,7 @@ pub(super) fn texel_bindings() -> impl Iterator<Item = u32> {
 
 /// How kernels read triangles and tree (glsl/shared/scene.glsl).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reading {
+pub enum SceneAccess {
     Bound,
     /// Software drivers, if no array has more texels than the device allows for.
     Texels,
@@ -53,7 +52,7 @@ pub enum Reading {
     Address,
 }
 
-impl Reading {
+impl SceneAccess {
     fn of(context: &Context, arrays: &[Extent]) -> Self {
         let limits = context.limits();
         if context.runs_both_sides() && arrays.iter().all(|array| array.n_texels <= u64::from(limits.n_texels)) {
@@ -77,7 +76,7 @@ impl Reading {
 /// Triangles, their kd-tree, and the constants that hold the root's cell. A clone is a second handle to the same
 /// buffers.
 #[derive(Clone)]
-pub struct Tree {
+pub struct AccelBuffers {
     /// One.
     pub frame: Buffer<Frame>,
     /// One: of the buffers below.
@@ -100,12 +99,12 @@ pub struct Tree {
     pub kd_ropes: Buffer<KdRope>,
     /// Rays that have stopped on their way through the tree.
     pub stalls: Stalls,
-    reading: Reading,
+    access: SceneAccess,
     /// Of the traversal's mask.
     mask_words: u32,
 }
 
-impl Tree {
+impl AccelBuffers {
     /// Uploads triangles, tree and constants.
     ///
     /// # Errors
@@ -118,8 +117,8 @@ impl Tree {
     ) -> Result<Self, GpuError> {
         tree.check_triangles(triangles.len())?;
         let slabs = slabs_for(context, tree);
-        let reading = Reading::of(context, &extents(triangles, tree, slabs));
-        let usage = buffer_use(reading);
+        let access = SceneAccess::of(context, &extents(triangles, tree, slabs));
+        let usage = buffer_use(access);
         let made = Self {
             frame: Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?,
             addresses: Buffer::new(context, "addresses", 1, BufferUse::Uniform)?,
@@ -133,7 +132,7 @@ impl Tree {
             kd_boxes: Buffer::new(context, "kd_boxes", 0, usage)?,
             kd_ropes: Buffer::new(context, "kd_ropes", 0, usage)?,
             stalls: Stalls::new(context)?,
-            reading,
+            access,
             mask_words: if tree.depth() <= KD_WORD_DEPTH { 1 } else { 2 },
         };
         made.addresses.upload(&[made.addresses()])?;
@@ -146,7 +145,7 @@ impl Tree {
     /// Beyond the device's limits, out of memory.
     pub(super) fn add_materials(&mut self, context: &Arc<Context>, triangle_materials: &[u32]) -> Result<(), GpuError> {
         self.triangle_materials =
-            Buffer::with(context, "triangle_materials", triangle_materials, buffer_use(self.reading))?;
+            Buffer::with(context, "triangle_materials", triangle_materials, buffer_use(self.access))?;
         self.addresses.upload(&[self.addresses()])
     }
 
@@ -167,7 +166,7 @@ impl Tree {
             return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
         }
         let extras = Extras::new(tree, traversal);
-        let usage = buffer_use(self.reading);
+        let usage = buffer_use(self.access);
         let kd_boxes = Buffer::with(context, "kd_boxes", &extras.boxes, usage)?;
         let kd_ropes = Buffer::with(context, "kd_ropes", &extras.ropes, usage)?;
         let (boxes_at, ropes_at) = (self.address_of(&kd_boxes), self.address_of(&kd_ropes));
@@ -179,14 +178,14 @@ impl Tree {
     }
 
     /// How kernels read it.
-    pub fn reading(&self) -> Reading {
-        self.reading
+    pub fn access(&self) -> SceneAccess {
+        self.access
     }
 
     /// Specialization constants of all kernels that read it.
     pub(super) fn constants(&self) -> [(u32, u32); 3] {
         [
-            (CONSTANT_READING, self.reading.constant()),
+            (CONSTANT_READING, self.access.constant()),
             (CONSTANT_MASK_WORDS, self.mask_words),
             (CONSTANT_TURN_BUDGET, self.stalls.turn_budget()),
         ]
@@ -208,7 +207,7 @@ impl Tree {
 
     /// 0 where it is not read by it.
     fn address_of<T: Pod>(&self, buffer: &Buffer<T>) -> [u32; 2] {
-        if self.reading == Reading::Address { buffer.address() } else { [0; 2] }
+        if self.access == SceneAccess::Address { buffer.address() } else { [0; 2] }
     }
 
     /// What is read in one of three ways.
@@ -256,8 +255,8 @@ fn leaf_triangles(
 }
 
 /// Of the arrays that are read so.
-fn buffer_use(reading: Reading) -> BufferUse {
-    if reading == Reading::Address { BufferUse::Address } else { BufferUse::Texels }
+fn buffer_use(access: SceneAccess) -> BufferUse {
+    if access == SceneAccess::Address { BufferUse::Address } else { BufferUse::Texels }
 }
 
 /// What spares rays nodes, where the kernels look at it: not where they run both sides of every branch.

@@ -28,7 +28,7 @@ mod tests {
     use glam::{Vec3, vec3};
 
     use super::*;
-    use crate::kdtree::tests::staircase;
+    use crate::accel::kdtree::tests::staircase;
 
     #[test]
     fn all_corners_lie_in_the_plane() {

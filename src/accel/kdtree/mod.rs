@@ -28,6 +28,7 @@ mod search;
 mod slabs;
 mod statistics;
 mod subtree;
+mod traversal;
 mod validate;
 
 use crate::layout::{Frame, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_REACH, KdNode};
@@ -35,6 +36,7 @@ use crate::layout::{Frame, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, K
 pub use extras::Extras;
 pub use parts::Parts;
 pub use statistics::Statistics;
+pub use traversal::Traversal;
 pub use validate::Invalid;
 
 /// A kd-tree over triangles, as the kernels read it.

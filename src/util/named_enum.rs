@@ -9,7 +9,7 @@ pub struct UnknownWord {
 }
 
 /// `ALL`, `words`, `FromStr` and `Display` of an enum without fields.
-macro_rules! words {
+macro_rules! named_enum {
     ($ty:ident { $($variant:ident = $word:literal),+ }) => {
         impl $ty {
             /// Every variant.
@@ -21,11 +21,11 @@ macro_rules! words {
             }
         }
         impl std::str::FromStr for $ty {
-            type Err = $crate::words::UnknownWord;
-            fn from_str(word: &str) -> Result<Self, $crate::words::UnknownWord> {
+            type Err = $crate::util::UnknownWord;
+            fn from_str(word: &str) -> Result<Self, $crate::util::UnknownWord> {
                 match word {
                     $($word => Ok(Self::$variant),)+
-                    _ => Err($crate::words::UnknownWord { word: word.to_owned(), expected: Self::words() }),
+                    _ => Err($crate::util::UnknownWord { word: word.to_owned(), expected: Self::words() }),
                 }
             }
         }

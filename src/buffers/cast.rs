@@ -1,0 +1,46 @@
+//! The buffers of a cast: rays of the caller's own, and their hits.
+
+use std::sync::Arc;
+
+use super::{AccelBuffers, accel, binding};
+use crate::{
+    gpu::{Binding, BindingSet, Bindings, Buffer, BufferUse, Context, GpuError},
+    layout::{BIND_CAST_HITS, BIND_CAST_RAYS, CastBatch, CastRay, Hit},
+};
+
+/// A batch's buffers and the descriptor set over them and the tree.
+pub struct CastResources {
+    /// Room for a batch, like cast_hits.
+    pub cast_rays: Buffer<CastRay>,
+    pub cast_hits: Buffer<Hit>,
+    pub set: BindingSet,
+}
+
+impl CastResources {
+    /// The layout of the set, for kernels that read the tree.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn bindings(context: &Arc<Context>, tree: &AccelBuffers) -> Result<Arc<Bindings>, GpuError> {
+        let kinds: Vec<_> = accel::bindings().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
+        Bindings::with_constants(context, &kinds, size_of::<CastBatch>() as u32, &tree.constants())
+    }
+
+    /// Room for `len` rays.
+    ///
+    /// # Errors
+    /// Beyond the device's limits, out of memory.
+    pub fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<Bindings>,
+        tree: &AccelBuffers,
+        len: usize,
+    ) -> Result<Self, GpuError> {
+        let cast_rays = Buffer::new(context, "cast_rays", len, BufferUse::Storage)?;
+        let cast_hits = Buffer::new(context, "cast_hits", len, BufferUse::Storage)?;
+        let own =
+            [(BIND_CAST_RAYS, Binding::Buffer(cast_rays.any())), (BIND_CAST_HITS, Binding::Buffer(cast_hits.any()))];
+        let set = BindingSet::new(bindings, "cast", &[&tree.objects(), &own[..]].concat())?;
+        Ok(Self { cast_rays, cast_hits, set })
+    }
+}

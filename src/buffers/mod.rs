@@ -1,0 +1,48 @@
+//! What kernels read and write: buffers, images and the descriptor sets over them, one file for each group that lives
+//! and grows together.
+//!
+//! ```text
+//! scene           triangles, materials and the acceleration structure, uploaded once
+//! queue           rays of a batch and what belongs to each
+//! pixels          samples, sums, filtered and displayed pixels
+//! raster_queue    large triangles, between the two kernels that rasterize
+//! vertex_indices  what the graphics pipeline draws
+//! stalls          rays that have spent a dispatch's loop turns
+//! resources       all of these, with the frame's descriptor set
+//! cast            given rays, their hits, and the cast's descriptor set
+//! ```
+
+mod accel;
+mod cast;
+mod pixels;
+mod queue;
+mod raster_queue;
+mod resources;
+mod stalls;
+mod vertex_indices;
+
+pub(crate) use self::pixels::draws;
+pub use self::{
+    accel::{AccelBuffers, SceneAccess},
+    cast::CastResources,
+    pixels::Pixels,
+    queue::Queue,
+    raster_queue::RasterQueue,
+    resources::{Needs, Resources},
+    stalls::{Round, Stalls},
+};
+use crate::{
+    gpu::BindingKind,
+    layout::{BIND_ADDRESSES, BIND_FRAME, BIND_TEXELS, BIND_TRIANGLE_IDS},
+};
+
+/// A binding number of layout.glsl and what it holds.
+fn binding(number: u32) -> (u32, BindingKind) {
+    let kind = match number {
+        BIND_TEXELS.. => BindingKind::Texels,
+        BIND_FRAME | BIND_ADDRESSES => BindingKind::Uniform,
+        BIND_TRIANGLE_IDS => BindingKind::Image,
+        _ => BindingKind::Storage,
+    };
+    (number, kind)
+}

@@ -1,0 +1,9 @@
+//! Helpers that know nothing of rays: names of an option's variants, text that is safe to print, the host's memory.
+
+#[macro_use]
+mod named_enum;
+
+pub mod memory;
+pub mod text;
+
+pub use self::named_enum::UnknownWord;
