@@ -6,6 +6,7 @@
 //! scene    files -> triangles, materials, lights, camera
 //! accel    triangles -> acceleration structure: what leads rays to triangles
 //!   kdtree   the flat SAH kd-tree and the ways of rays through it
+//! world    a scene with its acceleration structure
 //! frame    options, picture and profile; scene + size + sample -> the frame's constants
 //! render   the frame: passes, barriers, batches -> picture
 //!   passes   one kernel and one file each, on
@@ -32,6 +33,8 @@ pub mod layout;
 pub mod scene;
 
 pub mod accel;
+
+pub mod world;
 
 pub mod frame;
 

@@ -20,6 +20,7 @@ use kdray::{
     cpu::traverser::Traverser,
     layout::{Hit, NO_TRIANGLE, Ray},
     scene::Scene,
+    world::World,
 };
 use serde_json::Value;
 use support::meshes::torus;
@@ -55,7 +56,7 @@ fn rays(sets: &[RaySet; 4], kind: RayKind) -> &[Ray] {
 
 #[test]
 fn in_a_room_every_ray_but_the_lit_shadow_rays_hits() {
-    let stage = Stage::in_room(mesh(), SIZE, BuildOptions::default());
+    let stage = Stage::in_room(mesh(), SIZE, &BuildOptions::default());
     let sets = ray_sets(&stage);
     for set in &sets {
         assert_eq!(set.rays.len(), N_PIXELS, "{}", set.kind.name());
@@ -68,14 +69,14 @@ fn in_a_room_every_ray_but_the_lit_shadow_rays_hits() {
             assert_eq!(n_hits, N_PIXELS, "{}", set.kind.name());
         }
     }
-    let on_mesh = |hit: &Hit| hit.triangle_ix < stage.scene.triangles.len() as u32 - 12;
+    let on_mesh = |hit: &Hit| hit.triangle_ix < stage.scene().triangles.len() as u32 - 12;
     let n_on_mesh = closest_hits(&stage, rays(&sets, RayKind::Primary)).iter().filter(|hit| on_mesh(hit)).count();
     assert!((N_PIXELS / 20..N_PIXELS).contains(&n_on_mesh), "{n_on_mesh} of {N_PIXELS} see the mesh");
 }
 
 #[test]
 fn without_a_room_only_primary_hits_have_further_rays() {
-    let stage = Stage::open(mesh(), SIZE, BuildOptions::default());
+    let stage = Stage::open(mesh(), SIZE, &BuildOptions::default());
     let sets = ray_sets(&stage);
     let primary = rays(&sets, RayKind::Primary);
     let hits = closest_hits(&stage, primary);
@@ -93,7 +94,7 @@ fn without_a_room_only_primary_hits_have_further_rays() {
 
 #[test]
 fn primary_rays_go_tile_by_tile() {
-    let sets = ray_sets(&Stage::in_room(mesh(), SIZE, BuildOptions::default()));
+    let sets = ray_sets(&Stage::in_room(mesh(), SIZE, &BuildOptions::default()));
     let pixels: Vec<_> = rays(&sets, RayKind::Primary).iter().map(|ray| ray.pixel_ix).collect();
     let mut first_tile = pixels[..64].to_vec();
     first_tile.sort_unstable();
@@ -107,13 +108,13 @@ fn primary_rays_go_tile_by_tile() {
 
 #[test]
 fn rays_leave_the_hits_of_the_primary_rays() {
-    let stage = Stage::in_room(mesh(), SIZE, BuildOptions::default());
+    let stage = Stage::in_room(mesh(), SIZE, &BuildOptions::default());
     let sets = ray_sets(&stage);
     let primary = rays(&sets, RayKind::Primary);
     let hits = closest_hits(&stage, primary);
     for (ray_ix, (came, hit)) in primary.iter().zip(&hits).enumerate() {
         let point = came.origin + hit.t * came.direction;
-        let t = stage.scene.triangles[hit.triangle_ix as usize];
+        let t = stage.scene().triangles[hit.triangle_ix as usize];
         let normal = (t.v1 - t.v0).cross(t.v2 - t.v0).normalize();
         let side = |direction: Vec3| direction.dot(normal) * came.direction.dot(normal);
         let leaving = |kind| rays(&sets, kind)[ray_ix];
@@ -123,7 +124,7 @@ fn rays_leave_the_hits_of_the_primary_rays() {
         assert!(side(leaving(RayKind::Mirror).direction) < 0.0 && side(leaving(RayKind::Diffuse).direction) <= 1e-6);
         let shadow = leaving(RayKind::Shadow);
         assert!((shadow.origin + shadow.t_max * shadow.direction - stage.light.position).length() < 1e-3);
-        if hit.triangle_ix as usize >= stage.scene.triangles.len() - 12 {
+        if hit.triangle_ix as usize >= stage.scene().triangles.len() - 12 {
             let mirrored = came.direction - 2.0 * came.direction.dot(normal) * normal;
             assert!((leaving(RayKind::Mirror).direction - mirrored).length() < 1e-5);
         }
@@ -132,13 +133,13 @@ fn rays_leave_the_hits_of_the_primary_rays() {
 
 #[test]
 fn rays_are_the_same_each_time() {
-    let sets = || ray_sets(&Stage::in_room(mesh(), SIZE, BuildOptions::default()));
+    let sets = || ray_sets(&Stage::in_room(mesh(), SIZE, &BuildOptions::default()));
     assert_eq!(sets(), sets());
 }
 
 #[test]
 fn a_deliberately_wrong_hit_is_counted() {
-    let stage = Stage::in_room(mesh(), SIZE, BuildOptions::default());
+    let stage = Stage::in_room(mesh(), SIZE, &BuildOptions::default());
     let sets = ray_sets(&stage);
     let set = &sets[0];
     let right = closest_hits(&stage, &set.rays);
@@ -151,7 +152,7 @@ fn a_deliberately_wrong_hit_is_counted() {
 
 #[test]
 fn a_wrong_tree_is_noticed() {
-    let mut stage = Stage::in_room(mesh(), SIZE, BuildOptions::default());
+    let mut stage = Stage::in_room(mesh(), SIZE, &BuildOptions::default());
     let sets = ray_sets(&stage);
     let measured =
         |stage: &Stage| Tracers::new(None, stage, &[Traversal::Stack]).unwrap().measure(&sets[0], 1).unwrap();
@@ -159,12 +160,14 @@ fn a_wrong_tree_is_noticed() {
     assert!(right.n_hits == N_PIXELS && right.variants[0].difference == Difference::default());
     let seen = closest_hits(&stage, &sets[0].rays)[N_PIXELS / 2].triangle_ix;
     // A tree leaves out triangles that are not finite.
-    let mut without = stage.scene.triangles.clone();
+    let mut without = stage.scene().triangles.clone();
     without[seen as usize].v0 = Vec3::NAN;
-    stage.tree = KdTree::build(&without, &BuildOptions::default());
+    let options = BuildOptions::default();
+    let tree = KdTree::build(&without, &options);
+    stage.world = World::with_tree(stage.scene().clone(), tree, &options).expect("a world");
     assert_ne!(measured(&stage).n_hits, 0);
     let found = closest_hits(&stage, &sets[0].rays);
-    let right = closest_hits(&Stage::in_room(mesh(), SIZE, BuildOptions::default()), &sets[0].rays);
+    let right = closest_hits(&Stage::in_room(mesh(), SIZE, &BuildOptions::default()), &sets[0].rays);
     assert!(Difference::of(RayKind::Primary, &right, &found).n_differing > 0);
 }
 

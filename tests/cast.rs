@@ -14,7 +14,7 @@ use kdray::{
 };
 use rayon::prelude::*;
 use support::{
-    World,
+    MeshWithTree,
     chain::chain,
     compare, meshes,
     random::Random,
@@ -37,8 +37,8 @@ impl Device {
         Self(with_lanes(n_lanes))
     }
 
-    fn caster(&self, world: &World, traversal: Traversal) -> Caster {
-        Caster::new(&self.0, &world.triangles, &world.tree, traversal).expect("a caster")
+    fn caster(&self, world: &MeshWithTree, traversal: Traversal) -> Caster {
+        Caster::new(&self.0, world.geometry(), traversal).expect("a caster")
     }
 
     /// Rays that may differ from the CPU's: none where the arithmetic is exactly the CPU's; elsewhere divisions are
@@ -70,7 +70,7 @@ fn scaled(ray: &Ray, t_min: f32, scale: f32) -> CastRay {
 }
 
 /// Nasty rays with directions of all lengths, a fourth of them from behind their origins on or from before it.
-fn some_rays(world: &World, n: usize, scale_log2: RangeInclusive<f32>) -> Vec<CastRay> {
+fn some_rays(world: &MeshWithTree, n: usize, scale_log2: RangeInclusive<f32>) -> Vec<CastRay> {
     let some_ray = |i: usize| {
         let mut random = Random(i as u64);
         let ray = nasty_ray(&mut random, world, i);
@@ -82,13 +82,13 @@ fn some_rays(world: &World, n: usize, scale_log2: RangeInclusive<f32>) -> Vec<Ca
 }
 
 /// Without the tree, and with the direction as it is.
-fn by_brute_force(world: &World, cast: &CastRay) -> Hit {
+fn by_brute_force(world: &MeshWithTree, cast: &CastRay) -> Hit {
     let ray = Ray { t_max: cast.t_max, ..ray(cast.origin, cast.direction) };
     let hit = world.by_brute_force(&ray, cast.t_min);
     if hit.triangle_ix == NO_TRIANGLE { MISS } else { hit }
 }
 
-fn all_by_brute_force(world: &World, rays: &[CastRay]) -> Vec<Hit> {
+fn all_by_brute_force(world: &MeshWithTree, rays: &[CastRay]) -> Vec<Hit> {
     rays.par_iter().map(|ray| by_brute_force(world, ray)).collect()
 }
 
@@ -103,14 +103,14 @@ fn occluded(hits: &[Hit]) -> Vec<bool> {
     hits.iter().map(|hit| hit.triangle_ix != NO_TRIANGLE).collect()
 }
 
-fn check(device: &Device, world: &World, rays: &[CastRay]) {
+fn check(device: &Device, world: &MeshWithTree, rays: &[CastRay]) {
     let all_expected = all_by_brute_force(world, rays);
     for &traversal in Traversal::ALL {
         // The default one is asked more than the others, which have their own tests.
         let n = if traversal == Traversal::Mask { rays.len() } else { rays.len() / 20 };
         let (rays, expected) = (&rays[..n], &all_expected[..n]);
         let n_outliers = device.n_outliers(n);
-        let on_cpu = |query| cast_on_cpu(&world.triangles, &world.tree, traversal, rays, query).expect("hits");
+        let on_cpu = |query| cast_on_cpu(world.geometry(), traversal, rays, query);
         compare::exact(expected, &on_cpu(Query::Closest)).unwrap();
         assert_eq!(occluded(expected), occluded(&on_cpu(Query::Any)));
         let mut caster = device.caster(world, traversal);
@@ -124,7 +124,7 @@ fn check(device: &Device, world: &World, rays: &[CastRay]) {
 }
 
 /// Of all shapes, sizes and places.
-fn worlds() -> impl Iterator<Item = World> {
+fn worlds() -> impl Iterator<Item = MeshWithTree> {
     let meshes = [
         meshes::torus(40, 20),
         meshes::cube(9, 0.0),
@@ -135,7 +135,7 @@ fn worlds() -> impl Iterator<Item = World> {
         meshes::placed(meshes::torus(40, 20), 0.3, vec3(1000.0, -70.0, 3.0)),
         vec![meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z)],
     ];
-    meshes.into_iter().map(World::new)
+    meshes.into_iter().map(MeshWithTree::new)
 }
 
 #[test]
@@ -173,7 +173,7 @@ fn any_number_of_rays_in_batches_of_any_size() {
 }
 
 fn any_number_on(device: &Device) {
-    let world = World::new(meshes::torus(40, 20));
+    let world = MeshWithTree::new(meshes::torus(40, 20));
     for n in [0, 1, 63, 64, 65, 1000] {
         let rays = some_rays(&world, n, 0.0..=0.0);
         let expected = all_by_brute_force(&world, &rays);
@@ -192,7 +192,7 @@ fn any_number_on(device: &Device) {
 #[test]
 fn casts_follow_one_another() {
     let device = Device::new();
-    let world = World::new(meshes::cube(9, 0.0));
+    let world = MeshWithTree::new(meshes::cube(9, 0.0));
     let mut caster = device.caster(&world, Traversal::Mask).with_batches_of(300);
     for n in [10, 1000, 5, 0, 250] {
         let rays = some_rays(&world, n, -1.0..=1.0);
@@ -204,7 +204,7 @@ fn casts_follow_one_another() {
 #[test]
 fn repetitions_are_timed_one_by_one() {
     let device = Device::new();
-    let world = World::new(meshes::torus(40, 20));
+    let world = MeshWithTree::new(meshes::torus(40, 20));
     let rays = some_rays(&world, 1000, 0.0..=0.0);
     let mut caster = device.caster(&world, Traversal::Mask).with_batches_of(300);
     let once = caster.cast(&rays, Query::Closest, 1).expect("a cast");
@@ -219,13 +219,13 @@ fn repetitions_are_timed_one_by_one() {
 #[test]
 fn the_interval_s_ends_are_exact() {
     let device = Device::new();
-    let world = World::new(meshes::torus(40, 20));
+    let world = MeshWithTree::new(meshes::torus(40, 20));
     let is_near =
         |cast: &CastRay| near_scene(&world.bindings(), &Probe::from(&ray(cast.origin, cast.direction))).1 == 0.0;
     let rays: Vec<_> = some_rays(&world, 5000, -9.0..=9.0).into_iter().filter(is_near).collect();
     let mut caster = device.caster(&world, Traversal::Mask);
     let mut cast = |rays: &[CastRay]| {
-        let on_cpu = cast_on_cpu(&world.triangles, &world.tree, Traversal::Mask, rays, Query::Closest).expect("hits");
+        let on_cpu = cast_on_cpu(world.geometry(), Traversal::Mask, rays, Query::Closest);
         let found = caster.cast(rays, Query::Closest, 1).expect("a cast").hits;
         device.agree(&on_cpu, &found).unwrap();
         found
@@ -251,14 +251,14 @@ fn the_interval_s_ends_are_exact() {
 #[test]
 fn the_direction_s_length_is_the_unit_of_t() {
     let device = Device::new();
-    let world = World::new(meshes::torus(40, 20));
+    let world = MeshWithTree::new(meshes::torus(40, 20));
     let unit = ray(vec3(0.05, 3.0, 1.02), Vec3::NEG_Y);
     let expected = by_brute_force(&world, &scaled(&unit, 0.0, 1.0));
     assert!(expected.t > 2.0 && expected.t < 3.0);
     let exponents = -126..=127;
     let rays: Vec<_> = exponents.clone().map(|e| scaled(&unit, 0.0, 2f32.powi(e))).collect();
     let found = device.caster(&world, Traversal::Mask).cast(&rays, Query::Closest, 1).expect("a cast");
-    let on_cpu = cast_on_cpu(&world.triangles, &world.tree, Traversal::Mask, &rays, Query::Closest).expect("hits");
+    let on_cpu = cast_on_cpu(world.geometry(), Traversal::Mask, &rays, Query::Closest);
     for ((e, found), on_cpu) in exponents.zip(&found.hits).zip(&on_cpu) {
         let t = (f64::from(expected.t) / 2f64.powi(e)) as f32;
         // Beyond the greatest float there is no hit; below the least normal one a device may flush t to zero.
@@ -277,7 +277,7 @@ fn with(mut v: Vec3, axis: usize, value: f32) -> Vec3 {
 #[test]
 fn what_is_no_ray_misses_and_is_counted() {
     let device = Device::new();
-    let world = World::new(meshes::torus(40, 20));
+    let world = MeshWithTree::new(meshes::torus(40, 20));
     let good = CastRay { origin: vec3(0.05, 3.0, 1.02), t_min: 0.0, direction: Vec3::NEG_Y, t_max: f32::INFINITY };
     assert_ne!(by_brute_force(&world, &good), MISS);
     let mut none = vec![CastRay { t_min: f32::NAN, ..good }, CastRay { t_max: f32::NAN, ..good }];
@@ -299,7 +299,7 @@ fn what_is_no_ray_misses_and_is_counted() {
     for &traversal in Traversal::ALL {
         for query in [Query::Closest, Query::Any] {
             let cast = device.caster(&world, traversal).cast(&rays, query, 1).expect("a cast");
-            let on_cpu = cast_on_cpu(&world.triangles, &world.tree, traversal, &rays, query).expect("hits");
+            let on_cpu = cast_on_cpu(world.geometry(), traversal, &rays, query);
             for hits in [&cast.hits, &on_cpu] {
                 let n_misses = none.len() + must_miss.len();
                 assert!(hits[..n_misses].iter().all(|hit| *hit == MISS), "{traversal}, {query:?}: {hits:?}");
@@ -314,18 +314,18 @@ fn what_is_no_ray_misses_and_is_counted() {
 #[test]
 fn nothing_is_hit_in_an_empty_world() {
     let device = Device::new();
-    let world = World::new(Vec::new());
+    let world = MeshWithTree::new(Vec::new());
     let rays = [ray(Vec3::ZERO, Vec3::X), ray(Vec3::ONE, Vec3::NEG_ONE)].map(|ray| scaled(&ray, 0.0, 1.0));
     let cast = device.caster(&world, Traversal::Mask).cast(&rays, Query::Closest, 1).expect("a cast");
     assert_eq!(cast.hits, [MISS; 2]);
-    assert_eq!(cast_on_cpu(&[], &world.tree, Traversal::Mask, &rays, Query::Closest).expect("hits"), [MISS; 2]);
+    assert_eq!(cast_on_cpu(world.geometry(), Traversal::Mask, &rays, Query::Closest), [MISS; 2]);
 }
 
 #[test]
 fn a_wrong_hit_is_noticed() {
-    let world = World::new(meshes::torus(40, 20));
+    let world = MeshWithTree::new(meshes::torus(40, 20));
     let rays = some_rays(&world, 1000, 0.0..=0.0);
-    let hits = cast_on_cpu(&world.triangles, &world.tree, Traversal::Mask, &rays, Query::Closest).expect("hits");
+    let hits = cast_on_cpu(world.geometry(), Traversal::Mask, &rays, Query::Closest);
     compare::exact(&hits, &hits).unwrap();
     let struck = hits.iter().position(|hit| hit.triangle_ix != NO_TRIANGLE).expect("a hit");
     let wrong: [fn(&mut Hit); 4] =

@@ -8,7 +8,7 @@ use glam::Vec3;
 use kdray::{
     accel::{
         Query,
-        kdtree::{BuildOptions, KdTree, Traversal},
+        kdtree::{BuildOptions, Traversal},
     },
     cast::{CastRay, Caster},
     choices::{Cache, Candidates, Chosen, Key, Reason, Request, Timings, TreeKind, Workload, measure_traversals},
@@ -17,8 +17,9 @@ use kdray::{
     layout::Triangle,
     render::Renderer,
     scene::{Camera, Scene},
+    world::World,
 };
-use support::{meshes, pretended, random::Random, scenes, with_lanes};
+use support::{meshes, pretended, random::Random, scenes, with_lanes, world_by, world_of};
 use tempfile::TempDir;
 
 const RULE: Traversal = Traversal::OF_GPUS;
@@ -195,14 +196,14 @@ fn scene() -> Scene {
     scene
 }
 
-fn hits(context: &std::sync::Arc<kdray::gpu::Context>, scene: &Scene, tree: &KdTree, by: Traversal) -> Vec<[u32; 4]> {
+fn hits(context: &std::sync::Arc<kdray::gpu::Context>, world: &World, by: Traversal) -> Vec<[u32; 4]> {
     let mut random = Random(5);
     let ray = |_| {
         let (origin, target) = (3.0 * random.direction(), random.in_box(Vec3::NEG_ONE, Vec3::ONE));
         CastRay { origin, t_min: 0.0, direction: target - origin, t_max: f32::INFINITY }
     };
     let rays: Vec<_> = (0..3000).map(ray).collect();
-    let mut caster = Caster::new(context, &scene.triangles, tree, by).expect("a caster");
+    let mut caster = Caster::new(context, world.geometry(), by).expect("a caster");
     bytemuck::cast_slice(&caster.cast(&rays, Query::Closest, 1).expect("a cast").hits).to_vec()
 }
 
@@ -210,21 +211,20 @@ fn hits(context: &std::sync::Arc<kdray::gpu::Context>, scene: &Scene, tree: &KdT
 #[test]
 fn a_measurement_changes_no_bit_and_is_kept() {
     let (scene, folder, context) = (scene(), TempDir::new().unwrap(), with_lanes(5000));
-    let build_options = BuildOptions::default();
-    let tree = KdTree::build(&scene.triangles, &build_options);
+    let world = world_of(&scene);
     let tried = candidates().methods;
-    let timings = measure_traversals(&context, &scene, &tree, &tried).expect("a measurement").expect("timestamps");
+    let timings = measure_traversals(&context, &world, &tried).expect("a measurement").expect("timestamps");
     assert!(
         timings.is_sound::<Traversal>() && tried.iter().all(|&traversal| timings.of(traversal).is_some()),
         "{timings:?}"
     );
-    let expected = hits(&context, &scene, &tree, RULE);
+    let expected = hits(&context, &world, RULE);
     for traversal in tried {
-        assert!(hits(&context, &scene, &tree, traversal) == expected, "{traversal}");
+        assert!(hits(&context, &world, traversal) == expected, "{traversal}");
     }
     let cache = Cache::at(folder.path());
     let methods = |request: Request, workload| {
-        let methods = request.methods(Some(&context), (&scene, &tree), &build_options, &workload, &cache);
+        let methods = request.methods(Some(&context), &world, &workload, &cache);
         methods.expect("methods")
     };
     let window = Workload::of_window((160, 120));
@@ -247,13 +247,12 @@ fn a_measurement_changes_no_bit_and_is_kept() {
 fn primary_rays_are_measured_where_that_changes_no_bit() {
     let (scene, folder, context) = (scene(), TempDir::new().unwrap(), with_lanes(5000));
     assert!(context.has_wide_atomics(), "the device rasterizes by kernels");
-    let build_options = BuildOptions::default();
-    let tree = KdTree::build(&scene.triangles, &build_options);
+    let world = world_of(&scene);
     let cache = Cache::at(folder.path());
     let options = RenderOptions { width: 60, height: 45, max_depth: 2, ..RenderOptions::default() };
     let request = Request { traversal: Some(Traversal::Mask), ..Request::default() };
     let primary_of = |workload: Workload| {
-        let methods = request.methods(Some(&context), (&scene, &tree), &build_options, &workload, &cache);
+        let methods = request.methods(Some(&context), &world, &workload, &cache);
         methods.expect("methods").primary
     };
     let many = Workload { n_rays: u64::MAX, ..Workload::of_pictures(&options, 0, 1) };
@@ -268,7 +267,7 @@ fn primary_rays_are_measured_where_that_changes_no_bit() {
     assert_eq!(primary_of(other_size).by, Reason::Rule);
     let pictures = [Primary::Compute, Primary::Trace].map(|primary| {
         let options = RenderOptions { primary, ..options.clone() };
-        let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
+        let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
         renderer.render().expect("a frame").0
     });
     assert!(pictures[0] == pictures[1]);
@@ -279,12 +278,12 @@ fn primary_rays_are_measured_where_that_changes_no_bit() {
 fn nothing_is_measured_where_the_cpu_runs_the_kernels() {
     let (scene, folder, context) = (scene(), TempDir::new().unwrap(), pretended(Default::default()));
     let build_options = TreeKind::Best.options(kdray::choices::Engine::of(Some(&context)));
-    let tree = KdTree::build(&scene.triangles, &build_options);
+    let world = world_by(&scene, &build_options);
     let cache = Cache::at(folder.path());
     let window = Workload::of_window((160, 120));
     let used = if context.is_software() { vec![None, Some(&context)] } else { vec![None] };
     for context in used {
-        let methods = Request::default().methods(context, (&scene, &tree), &build_options, &window, &cache);
+        let methods = Request::default().methods(context, &world, &window, &cache);
         assert_eq!(methods.expect("methods").traversal.by, Reason::Rule);
     }
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);

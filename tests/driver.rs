@@ -26,6 +26,7 @@ use kdray::{
     cast::CastRay,
     gpu::{Access, Commands, Context, ContextOptions, GpuError},
     layout::NO_TRIANGLE,
+    world::World,
 };
 use serde_json::Value;
 use support::{
@@ -41,7 +42,7 @@ fn context() -> Arc<Context> {
 }
 
 fn stage() -> Stage {
-    Stage::in_room(scenes::mixed(), SIZE, BuildOptions::default())
+    Stage::in_room(scenes::mixed(), SIZE, &BuildOptions::default())
 }
 
 /// A kernel, and the tree that it walks.
@@ -53,7 +54,7 @@ struct Walker {
 /// A stage's kernel on the rays of a set.
 fn walker(context: &Arc<Context>, stage: &Stage, set: &RaySet, traversal: Traversal) -> Box<dyn Contender> {
     let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
-    let tree = AccelBuffers::new(context, &stage.scene.triangles, &stage.tree, &stage.frame).expect("a tree");
+    let tree = AccelBuffers::new(context, stage.world.geometry(), &stage.frame).expect("a tree");
     let bindings = CastResources::bindings(context, &tree).expect("bindings");
     let resources = CastResources::new(context, &bindings, &tree, set.rays.len()).expect("resources");
     let cast = |ray: &kdray::layout::Ray| CastRay {
@@ -134,10 +135,12 @@ fn contenders_are_timed_and_agree() {
 fn a_wrong_tree_is_noticed() {
     let (stage, mut wrong) = (stage(), stage());
     // The tree has triangles of the mesh where the walls are: rays that should hit them miss or hit elsewhere.
-    let first_wall = wrong.scene.triangles.len() - 12;
-    let mut swapped = wrong.scene.triangles.clone();
+    let first_wall = wrong.scene().triangles.len() - 12;
+    let mut swapped = wrong.scene().triangles.clone();
     (0..12).for_each(|i| swapped.swap(i, first_wall + i));
-    wrong.tree = KdTree::build(&swapped, &BuildOptions::default());
+    let options = BuildOptions::default();
+    let tree = KdTree::build(&swapped, &options);
+    wrong.world = World::with_tree(wrong.scene().clone(), tree, &options).expect("a world");
     for set in &ray_sets(&stage) {
         let result = SetResult::new(set.kind, &trials(&stage, &wrong, set));
         let apart = result.kdray[0].apart;

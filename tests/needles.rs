@@ -12,7 +12,7 @@ use kdray::{
     gpu::{Context, ContextOptions},
     layout::{Hit, NO_TRIANGLE, Ray, Triangle},
 };
-use support::{World, compare, meshes::triangle, random::Random, rays::ray, with_lanes};
+use support::{MeshWithTree, compare, meshes::triangle, random::Random, rays::ray, with_lanes};
 
 /// Half of the distance between 1 and the next float.
 const U: f64 = 1.0 / (1 << 24) as f64;
@@ -237,7 +237,7 @@ fn levels() -> Vec<Level> {
     levels
 }
 
-fn in_packets(world: &World, level: Level, rays: &[Ray]) -> Vec<Hit> {
+fn in_packets(world: &MeshWithTree, level: Level, rays: &[Ray]) -> Vec<Hit> {
     let mut hits: Vec<_> = rays.iter().map(|ray| Probe::from(ray).miss()).collect();
     let probes = hits.iter_mut().zip(rays.iter().map(Probe::from));
     Traverser::at_level(Traversal::Stack, level)
@@ -259,18 +259,18 @@ fn needles_in_a_tree_are_hit_where_they_are() {
     let ways = [(&context, Traversal::Mask), (&context, Traversal::Stack), (&with_lanes, Traversal::Ropes)];
     for short_edge in SHORT_EDGES {
         let mut random = Random(short_edge.to_bits().into());
-        let world = World::new((0..N_NEEDLES / N_RAYS_A_NEEDLE).map(|_| needle(&mut random, short_edge)).collect());
+        let world =
+            MeshWithTree::new((0..N_NEEDLES / N_RAYS_A_NEEDLE).map(|_| needle(&mut random, short_edge)).collect());
         let needles = world.triangles.iter().cycle().take(N_NEEDLES);
         let rays: Vec<Ray> = needles.map(|needle| steep_ray_at(&mut random, needle)).collect();
         let casts: Vec<CastRay> = rays.iter().map(cast_ray).collect();
-        let expected =
-            cast_on_cpu(&world.triangles, &world.tree, Traversal::Mask, &casts, Query::Closest).expect("hits");
+        let expected = cast_on_cpu(world.geometry(), Traversal::Mask, &casts, Query::Closest);
         check(&world, &rays, &expected);
         for level in levels() {
             compare::exact(&expected, &in_packets(&world, level, &rays)).unwrap();
         }
         for (context, traversal) in ways {
-            let mut caster = Caster::new(context, &world.triangles, &world.tree, traversal).expect("a caster");
+            let mut caster = Caster::new(context, world.geometry(), traversal).expect("a caster");
             let found = caster.cast(&casts, Query::Closest, 1).expect("a cast").hits;
             check(&world, &rays, &found);
             // Elsewhere divisions are 2.5 units in the last place off.
@@ -284,7 +284,7 @@ fn needles_in_a_tree_are_hit_where_they_are() {
     }
 }
 
-fn check(world: &World, rays: &[Ray], hits: &[Hit]) {
+fn check(world: &MeshWithTree, rays: &[Ray], hits: &[Hit]) {
     let struck = || rays.iter().zip(hits).filter(|(_, hit)| hit.triangle_ix != NO_TRIANGLE);
     let fault = struck().find_map(|(ray, hit)| fault(ray, &world.triangles[hit.triangle_ix as usize], hit));
     assert_eq!(fault, None);

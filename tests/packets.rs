@@ -20,7 +20,7 @@ use kdray::{
     },
     layout::{Hit, NO_TRIANGLE, Ray, Triangle},
 };
-use support::{World, meshes, random::Random, rays::nasty_ray};
+use support::{MeshWithTree, meshes, random::Random, rays::nasty_ray};
 
 /// The baseline first.
 fn levels() -> Vec<Level> {
@@ -85,7 +85,7 @@ fn odd_triangles() -> Vec<Triangle> {
 }
 
 /// Nasty rays, and some with numbers that no ray should have.
-fn rays_of_a_packet(random: &mut Random, world: &World) -> [Ray; LANES] {
+fn rays_of_a_packet(random: &mut Random, world: &MeshWithTree) -> [Ray; LANES] {
     let first = random.below(1000);
     let mut rays = from_fn(|lane| nasty_ray(random, world, first + lane));
     if random.below(10) == 0 {
@@ -99,7 +99,7 @@ fn rays_of_a_packet(random: &mut Random, world: &World) -> [Ray; LANES] {
 #[test]
 fn a_triangle_is_met_as_by_one_ray() {
     let mut triangles = meshes::cube(2, 0.0);
-    let world = World::new(triangles.clone());
+    let world = MeshWithTree::new(triangles.clone());
     triangles.extend(odd_triangles());
     for level in levels() {
         let (mut n_hits, mut n_at_edges) = (0, 0);
@@ -123,7 +123,7 @@ fn a_triangle_is_met_as_by_one_ray() {
     }
 }
 
-fn traced<const ANY_HIT: bool>(world: &World, level: Level, rays: &[Ray]) -> Vec<Hit> {
+fn traced<const ANY_HIT: bool>(world: &MeshWithTree, level: Level, rays: &[Ray]) -> Vec<Hit> {
     let mut hits = vec![None; rays.len()];
     let probes = hits.iter_mut().zip(rays.iter().map(Probe::from));
     let mut traverser = Traverser::at_level(Traversal::Stack, level);
@@ -136,7 +136,7 @@ fn traced<const ANY_HIT: bool>(world: &World, level: Level, rays: &[Ray]) -> Vec
 #[test]
 fn every_set_of_instructions_finds_the_same() {
     for triangles in [meshes::torus(40, 20), meshes::cube(9, 0.0), meshes::soup(1200, 7)] {
-        let world = World::new(triangles);
+        let world = MeshWithTree::new(triangles);
         let rays: Vec<_> = (0..1500).flat_map(|seed| rays_of_a_packet(&mut Random(seed), &world)).collect();
         let mut one = Traverser::new(Traversal::Mask);
         let expected: Vec<Hit> = rays.iter().map(|ray| one.traverse::<false>(&world.bindings(), &ray.into())).collect();
@@ -188,7 +188,7 @@ fn sixteen_rays_of_an_octant_are_a_packet() {
 /// The signs say in which order a ray comes to the children of a node, as `TraversalRay` has it.
 #[test]
 fn rays_of_an_octant_take_children_in_one_order() {
-    let world = World::new(meshes::cube(2, 0.0));
+    let world = MeshWithTree::new(meshes::cube(2, 0.0));
     for direction in directions_in_turn() {
         let ray = TraversalRay::new(&world.bindings(), &Probe::from(&support::rays::ray(Vec3::ZERO, direction)));
         for axis in 0..3 {

@@ -6,7 +6,6 @@ mod support;
 use std::{collections::BTreeSet, fs, path::Path, sync::Arc};
 
 use kdray::{
-    accel::kdtree::{BuildOptions, KdTree},
     cpu::{self, Batching},
     frame::{BounceStats, Pass, PassTime, Primary, Profile, RenderOptions, Scope, View},
     gpu::{Context, ContextOptions},
@@ -17,7 +16,7 @@ use kdray::{
 use serde_json::Value;
 use support::{
     command::{cornell, fail, succeed},
-    scenes,
+    scenes, world_of,
 };
 use tempfile::TempDir;
 
@@ -32,8 +31,8 @@ fn context() -> Arc<Context> {
 }
 
 fn renderer(context: &Arc<Context>, scene: &Scene, options: &RenderOptions, capacity: u32) -> Renderer {
-    let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
-    Renderer::with_queue_capacity(context.clone(), scene, &tree, options, capacity).expect("a renderer")
+    let world = world_of(scene);
+    Renderer::with_queue_capacity(context.clone(), &world, options, capacity).expect("a renderer")
 }
 
 fn n_rays_in(passes: &[PassTime], name: &str, bounce: Option<u32>) -> u64 {
@@ -64,7 +63,7 @@ fn checked_names(profile: &Profile, next: &str) -> Vec<&'static str> {
 #[test]
 fn the_table_has_every_pass_and_tracing_takes_all_that_find_primary_hits() {
     let (scene, context) = (scenes::mixed(), context());
-    let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
+    let world = world_of(&scene);
     let mut names = BTreeSet::new();
     for &primary in primaries(&context) {
         let options = RenderOptions { primary, features: true, ..options() };
@@ -75,8 +74,7 @@ fn the_table_has_every_pass_and_tracing_takes_all_that_find_primary_hits() {
                 names.extend(checked_names(&renderer.draw_sample().expect("a sample"), "features"));
             }
         }
-        let mut on_cpu =
-            cpu::Renderer::new(&scene, &tree, &options, Batching::default()).expect("a scene and its tree");
+        let mut on_cpu = cpu::Renderer::new(&world, &options, Batching::default());
         (0..2).for_each(|_sample| names.extend(checked_names(&on_cpu.draw_sample(), "features")));
     }
     let by_kernels = |name: &str| name.starts_with("rasterize_") && !context.has_wide_atomics();

@@ -7,17 +7,14 @@ use std::sync::Arc;
 
 use glam::{Vec3, vec3};
 use kdray::{
-    accel::{
-        Query,
-        kdtree::{BuildOptions, KdTree, Traversal},
-    },
+    accel::{Query, kdtree::Traversal},
     cast::{CastRay, Caster, Hit, NO_TRIANGLE, cast_on_cpu},
     frame::{Picture, Primary, Profile, RenderOptions},
     gpu::{Context, DeviceOverrides},
     layout::Feature,
     render::Renderer,
 };
-use support::{World, compare, meshes, pretended, random::Random, rays::nasty_ray, scenes};
+use support::{MeshWithTree, compare, meshes, pretended, random::Random, rays::nasty_ray, scenes, world_of};
 
 /// The device as it is.
 fn plain_device() -> Arc<Context> {
@@ -33,12 +30,18 @@ fn assert_silent(context: &Context) {
     assert_eq!(context.validation_messages(), Vec::<String>::new());
 }
 
-fn cast(context: &Arc<Context>, world: &World, traversal: Traversal, query: Query, rays: &[CastRay]) -> Vec<Hit> {
-    let mut caster = Caster::new(context, &world.triangles, &world.tree, traversal).expect("a caster");
+fn cast(
+    context: &Arc<Context>,
+    world: &MeshWithTree,
+    traversal: Traversal,
+    query: Query,
+    rays: &[CastRay],
+) -> Vec<Hit> {
+    let mut caster = Caster::new(context, world.geometry(), traversal).expect("a caster");
     caster.cast(rays, query, 1).expect("a cast").hits
 }
 
-fn nasty_rays(world: &World, n: usize) -> Vec<CastRay> {
+fn nasty_rays(world: &MeshWithTree, n: usize) -> Vec<CastRay> {
     let some_ray = |i: usize| {
         let ray = nasty_ray(&mut Random(i as u64), world, i);
         CastRay { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
@@ -48,7 +51,7 @@ fn nasty_rays(world: &World, n: usize) -> Vec<CastRay> {
 
 /// One leaf of many copies of a triangle and, as the last entry, a triangle that lies a little above them. Rays come from
 /// above; those with an even number hit.
-fn copies(n: usize) -> (World, Vec<CastRay>) {
+fn copies(n: usize) -> (MeshWithTree, Vec<CastRay>) {
     let [below, above] = [0.0, 1e-6].map(|y| meshes::triangle(vec3(0.0, y, 0.0), vec3(1.0, y, 0.0), vec3(0.0, y, 1.0)));
     let mut triangles = vec![below; n];
     triangles.push(above);
@@ -57,7 +60,7 @@ fn copies(n: usize) -> (World, Vec<CastRay>) {
         let origin = vec3(x, 1.0, 0.4 + 0.001 * i as f32);
         CastRay { origin, t_min: 0.0, direction: Vec3::NEG_Y, t_max: f32::INFINITY }
     };
-    (World::new(triangles), (0..200).map(ray).collect())
+    (MeshWithTree::new(triangles), (0..200).map(ray).collect())
 }
 
 /// How many of the rays on `n` copies are right: the closest hit is that of the last triangle.
@@ -93,11 +96,11 @@ fn a_leaf_of_more_triangles_than_a_driver_takes_turns_is_searched_to_its_end() {
 /// Far from the origin the tree's margin is larger than the triangles: its leaves have most of them.
 #[test]
 fn a_far_soup_of_small_triangles_is_as_on_the_cpu() {
-    let world = World::new(meshes::placed(meshes::soup(20_000, 3), 1.0, Vec3::splat(1e7)));
+    let world = MeshWithTree::new(meshes::placed(meshes::soup(20_000, 3), 1.0, Vec3::splat(1e7)));
     let rays = nasty_rays(&world, 280);
     let context = plain_device();
     for traversal in [Traversal::OF_SOFTWARE_DRIVERS, Traversal::OF_GPUS] {
-        let expected = cast_on_cpu(&world.triangles, &world.tree, traversal, &rays, Query::Closest).expect("hits");
+        let expected = cast_on_cpu(world.geometry(), traversal, &rays, Query::Closest);
         let hits = cast(&context, &world, traversal, Query::Closest, &rays);
         if context.is_software() {
             compare::exact(&expected, &hits).unwrap();
@@ -111,7 +114,7 @@ fn a_far_soup_of_small_triangles_is_as_on_the_cpu() {
 /// Whatever the budget, the number of slots and the kind of search.
 #[test]
 fn interrupted_casts_find_the_same() {
-    let world = World::new([meshes::soup(500, 1), meshes::torus(20, 10)].concat());
+    let world = MeshWithTree::new([meshes::soup(500, 1), meshes::torus(20, 10)].concat());
     let rays = nasty_rays(&world, 300);
     for n_lanes in [None, Some(1000)] {
         let plain = pretended(DeviceOverrides { n_lanes, ..DeviceOverrides::default() });
@@ -144,8 +147,8 @@ fn options(traversal: Traversal, primary: Primary) -> RenderOptions {
 /// A picture with what its rays cost.
 fn draw(context: &Arc<Context>, options: &RenderOptions) -> (Picture, Vec<Feature>, Profile) {
     let scene = scenes::mixed();
-    let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
-    let mut renderer = Renderer::new(context.clone(), &scene, &tree, options).expect("a renderer");
+    let world = world_of(&scene);
+    let mut renderer = Renderer::new(context.clone(), &world, options).expect("a renderer");
     let (picture, profile) = renderer.render().expect("a frame");
     let features = renderer.features().expect("features");
     (picture, features, profile)

@@ -16,7 +16,7 @@ use kdray::{
 };
 use rayon::prelude::*;
 use support::{
-    World, meshes,
+    MeshWithTree, meshes,
     random::Random,
     rays::{N_KINDS, edge_point, nasty_ray, ray},
 };
@@ -28,12 +28,12 @@ fn tree_traversals() -> impl Iterator<Item = Traversal> {
     Traversal::ALL.iter().copied().filter(|&traversal| traversal != Traversal::Brute)
 }
 
-fn rays_at(world: &World) -> Vec<Ray> {
+fn rays_at(world: &MeshWithTree) -> Vec<Ray> {
     (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), world, i)).collect()
 }
 
 /// The hits of rays that go together; they hit the same, bit for bit, alone, and no less where any hit will do.
-fn traced(world: &World, traversal: Traversal, rays: &[Ray]) -> Vec<Hit> {
+fn traced(world: &MeshWithTree, traversal: Traversal, rays: &[Ray]) -> Vec<Hit> {
     traced_through(&world.bindings(), traversal, rays)
 }
 
@@ -63,7 +63,7 @@ fn first_difference(rays: &[Ray], expected: &[Hit], found: &[Hit]) -> Option<Str
 }
 
 fn check_against_brute_force(name: &str, triangles: Vec<Triangle>) {
-    let world = World::new(triangles);
+    let world = MeshWithTree::new(triangles);
     let rays = rays_at(&world);
     let expected: Vec<Hit> = rays.par_iter().map(|ray| world.by_brute_force(ray, 0.0)).collect();
     let n_hits = expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count();
@@ -92,7 +92,7 @@ fn finds_what_brute_force_finds() {
 #[test]
 fn all_agree_in_larger_meshes() {
     for triangles in [meshes::torus(400, 200), meshes::cube(100, 0.3), meshes::soup(50_000, 3)] {
-        let world = World::new(triangles);
+        let world = MeshWithTree::new(triangles);
         let rays = rays_at(&world);
         let masked = traced(&world, Traversal::Mask, &rays);
         for traversal in tree_traversals() {
@@ -104,7 +104,7 @@ fn all_agree_in_larger_meshes() {
 
 #[test]
 fn a_wrong_bit_or_triangle_is_noticed() {
-    let world = World::new(meshes::torus(20, 10));
+    let world = MeshWithTree::new(meshes::torus(20, 10));
     let rays = rays_at(&world);
     let hits = traced(&world, Traversal::Mask, &rays);
     assert_eq!(first_difference(&rays, &hits, &hits), None);
@@ -118,19 +118,19 @@ fn a_wrong_bit_or_triangle_is_noticed() {
 
 #[test]
 fn a_missing_triangle_in_a_leaf_is_noticed() {
-    let mut world = World::new(meshes::torus(20, 10));
+    let mut world = MeshWithTree::new(meshes::torus(20, 10));
     let rays = rays_at(&world);
     let hits = traced(&world, Traversal::Mask, &rays);
     // A tree leaves out triangles that are not finite.
     let mut without = world.triangles.clone();
     without[world.tree.leaf_triangles()[0] as usize].v0 = Vec3::NAN;
-    world = World::with_tree(world.triangles, KdTree::build(&without, &BuildOptions::default()));
+    world = MeshWithTree::with_tree(world.triangles, KdTree::build(&without, &BuildOptions::default()));
     assert!(first_difference(&rays, &hits, &traced(&world, Traversal::Mask, &rays)).is_some());
 }
 
 #[test]
 fn slabs_spare_steps() {
-    let world = World::new(meshes::torus(120, 60));
+    let world = MeshWithTree::new(meshes::torus(120, 60));
     let rays = rays_at(&world);
     let bindings = world.bindings();
     let without = Bindings { kd_slabs: Table::from(&[][..]), ..bindings };
@@ -145,7 +145,7 @@ fn slabs_spare_steps() {
 
 #[test]
 fn slabs_beside_their_surface_are_noticed() {
-    let world = World::new(meshes::torus(120, 60));
+    let world = MeshWithTree::new(meshes::torus(120, 60));
     let rays = rays_at(&world);
     let bindings = world.bindings();
     let moved: Vec<Slab> = world.tree.slabs().iter().map(|slab| Slab { offset: slab.offset + 2.0, ..*slab }).collect();
@@ -159,7 +159,7 @@ fn slabs_beside_their_surface_are_noticed() {
 #[test]
 fn rays_from_inside_never_leak() {
     for (name, triangles) in [("sphere", meshes::cube(20, 1.0)), ("cube", meshes::cube(20, 0.0))] {
-        let world = World::new(triangles);
+        let world = MeshWithTree::new(triangles);
         let rays: Vec<Ray> = (0..300_000).map(|i| outward_ray(&mut Random(i), &world)).collect();
         for traversal in tree_traversals() {
             let n_leaks = traced(&world, traversal, &rays).iter().filter(|hit| hit.triangle_ix == NO_TRIANGLE).count();
@@ -169,7 +169,7 @@ fn rays_from_inside_never_leak() {
 }
 
 /// From somewhere inside a convex mesh around 0 exactly at a corner or a point of an edge.
-fn outward_ray(random: &mut Random, world: &World) -> Ray {
+fn outward_ray(random: &mut Random, world: &MeshWithTree) -> Ray {
     let t = *random.of(&world.triangles);
     let target = if random.below(2) == 0 { t.v0 } else { edge_point(random, &world.triangles) };
     let origin = if random.below(4) == 0 { Vec3::ZERO } else { 0.5 * random.unit() * random.direction() };
@@ -180,7 +180,7 @@ fn outward_ray(random: &mut Random, world: &World) -> Ray {
 fn a_hole_leaks() {
     let mut triangles = meshes::cube(20, 1.0);
     triangles.remove(7);
-    let world = World::new(triangles);
+    let world = MeshWithTree::new(triangles);
     let rays: Vec<Ray> = (0..100_000).map(|i| outward_ray(&mut Random(i), &world)).collect();
     assert!(traced(&world, Traversal::Mask, &rays).iter().any(|hit| hit.triangle_ix == NO_TRIANGLE));
 }
@@ -189,7 +189,7 @@ fn a_hole_leaks() {
 /// that are merely far from unit length but that they end.
 #[test]
 fn rays_that_are_none_end_and_miss() {
-    let world = World::new(meshes::torus(40, 20));
+    let world = MeshWithTree::new(meshes::torus(40, 20));
     let (nan, infinity) = (f32::NAN, f32::INFINITY);
     let mut must_miss = vec![ray(Vec3::ZERO, Vec3::ZERO), ray(Vec3::NAN, Vec3::NAN)];
     let mut must_end = Vec::new();
@@ -235,7 +235,7 @@ fn a_needle_is_not_hit_beside() {
 /// From so far away that rays start at the scene instead: the same triangles, by the test without that.
 #[test]
 fn rays_from_afar_hit_the_same() {
-    let world = World::new(meshes::torus(40, 20));
+    let world = MeshWithTree::new(meshes::torus(40, 20));
     for distance in [10.0, 300.0, 3000.0] {
         let afar = |i: usize| {
             let mut random = Random(i as u64);
@@ -260,7 +260,7 @@ fn rays_from_afar_hit_the_same() {
 
 #[test]
 fn nothing_is_hit_in_an_empty_world() {
-    let world = World::new(Vec::new());
+    let world = MeshWithTree::new(Vec::new());
     let hits = traced(&world, Traversal::Mask, &[ray(Vec3::ZERO, Vec3::X), ray(Vec3::ONE, Vec3::NEG_ONE.normalize())]);
     assert!(hits.iter().all(|hit| hit.triangle_ix == NO_TRIANGLE && hit.t == f32::INFINITY));
 }

@@ -18,12 +18,13 @@ use kdray::{
     passes::Passes,
     render::Renderer,
     scene::{Camera, RenderDefaults, Scene},
+    world::World,
 };
 use support::{
-    World, meshes,
+    MeshWithTree, meshes,
     random::Random,
     rays::{N_KINDS, nasty_ray},
-    scenes,
+    scenes, world_by,
 };
 
 const N_RAYS: usize = 4000;
@@ -63,7 +64,8 @@ fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], tr
     let options = RenderOptions { width: 8, height: 8, max_depth: 1, traversal, ..RenderOptions::default() };
     let constants = Frame { queue_capacity: rays.len() as u32, ..frame_constants(scene, tree, &options) };
     let needs = Needs { constants: &constants, options: &options, n_bounces: 1 };
-    let resources = Resources::new(context, scene, tree, &needs).expect("resources");
+    let world = World::with_tree(scene.clone(), tree.clone(), &BuildOptions::default()).expect("a world");
+    let resources = Resources::new(context, &world, &needs).expect("resources");
     let passes = Passes::new(context, &resources.bindings, &options).expect("passes");
     resources.queue.rays.upload(rays).expect("rays");
     resources.bounces.upload(&[Bounce::of(rays.len() as u32, &constants)]).expect("bounces");
@@ -95,7 +97,7 @@ fn difference(rays: &[Ray], expected: &Traced, found: &Traced) -> Option<String>
 }
 
 fn check(context: &Arc<Context>, name: &str, triangles: Vec<Triangle>) {
-    let world = World::new(triangles);
+    let world = MeshWithTree::new(triangles);
     let scene = scene(&world.triangles);
     let rays: Vec<Ray> = (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), &world, i)).collect();
     let without_tree = traced(context, &scene, &world.tree, &rays, Traversal::Brute);
@@ -112,7 +114,7 @@ fn check(context: &Arc<Context>, name: &str, triangles: Vec<Triangle>) {
 }
 
 /// A device's division may differ in the last bits, and with it a hit at an edge.
-fn check_against_cpu(name: &str, world: &World, rays: &[Ray], found: &Traced) {
+fn check_against_cpu(name: &str, world: &MeshWithTree, rays: &[Ray], found: &Traced) {
     let hits: &[Hit] = bytemuck::cast_slice(&found.hits);
     let differs = |(ray, hit): (&Ray, &Hit)| {
         let expected = world.by_brute_force(ray, 0.0);
@@ -140,7 +142,7 @@ fn all_kernels_find_the_same() {
 
 #[test]
 fn a_wrong_bit_is_noticed() {
-    let world = World::new(meshes::torus(20, 10));
+    let world = MeshWithTree::new(meshes::torus(20, 10));
     let rays: Vec<Ray> = (0..64).map(|i| nasty_ray(&mut Random(i), &world, i as usize)).collect();
     let context = context();
     let of = |traversal| traced(&context, &scene(&world.triangles), &world.tree, &rays, traversal);
@@ -161,8 +163,8 @@ fn a_wrong_bit_is_noticed() {
 #[test]
 fn brute_force_refuses_large_meshes() {
     let triangles = vec![meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z); BRUTE_MAX_TRIANGLES as usize + 1];
-    let (scene, tree) = (scene(&triangles), KdTree::build(&triangles, &BuildOptions::fast()));
+    let world = world_by(&scene(&triangles), &BuildOptions::fast());
     let options = RenderOptions { width: 8, height: 8, traversal: Traversal::Brute, ..RenderOptions::default() };
-    let refused = Renderer::new(context(), &scene, &tree, &options).err();
+    let refused = Renderer::new(context(), &world, &options).err();
     assert!(matches!(refused, Some(GpuError::Limit { value: 65_001, limit: 65_000, .. })), "{refused:?}");
 }

@@ -11,13 +11,14 @@ use super::{
     warm_up,
 };
 use crate::{
-    accel::kdtree::{KdTree, Traversal},
+    accel::kdtree::Traversal,
     choices::{Request, primary_by_rule},
     cpu,
     frame::{BounceStats, Profile, RenderOptions},
     gpu::{Context, GpuError},
     render::BandedRenderer,
     scene::Scene,
+    world::World,
 };
 
 /// The shipped scenes' names, in the paper's order.
@@ -70,14 +71,14 @@ pub fn options(scene: &Scene, (width, height): (u32, u32), traversal: Traversal)
 /// As [`BandedRenderer::new`] and [`BandedRenderer::draw`].
 pub fn draw_on_gpu(
     context: &Arc<Context>,
-    scene: &Scene,
-    tree: &KdTree,
+    world: &World,
     options: &RenderOptions,
     n_frames: u16,
 ) -> Result<Vec<Profile>, GpuError> {
+    let scene = world.scene();
     let primary = primary_by_rule(Some(context), scene.triangles.len(), (options.width, options.height));
     let options = &RenderOptions { primary, ..options.clone() };
-    let mut renderer = BandedRenderer::new(Arc::clone(context), scene, tree, options)?;
+    let mut renderer = BandedRenderer::new(Arc::clone(context), world, options)?;
     let mut draw = || renderer.draw(1, || ()).map(|drawn| drawn.profile);
     warm_up(|| draw().map(drop))?;
     (0..n_frames).map(|_| draw()).collect()
@@ -87,18 +88,14 @@ pub fn draw_on_gpu(
 ///
 /// # Errors
 /// The thread cannot be started.
-///
-/// # Panics
-/// Scene and tree do not fit together.
 pub fn draw_on_cpu(
-    scene: &Scene,
-    tree: &KdTree,
+    world: &World,
     options: &RenderOptions,
     n_frames: u16,
 ) -> Result<Vec<Profile>, ThreadPoolBuildError> {
     let size = (options.width, options.height);
-    let options = &Request::default().methods_by_rule(None, scene.triangles.len(), size).apply(options);
-    let draw = || cpu::render(scene, tree, options).expect("a scene and its tree");
+    let options = &Request::default().methods_by_rule(None, world.scene().triangles.len(), size).apply(options);
+    let draw = || cpu::render(world, options);
     let thread = ThreadPoolBuilder::new().num_threads(1).build()?;
     Ok(thread.install(|| (0..n_frames).map(|_| draw().1).collect()))
 }

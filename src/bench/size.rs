@@ -71,7 +71,7 @@ pub struct Sized {
 
 impl Sized {
     /// `size`: pixels, one primary ray each.
-    pub fn new(n_triangles: u32, size: (u32, u32), build_options: BuildOptions) -> Self {
+    pub fn new(n_triangles: u32, size: (u32, u32), build_options: &BuildOptions) -> Self {
         let begin = Instant::now();
         let scene = knot(n_triangles);
         let generate_ms = begin.elapsed().as_secs_f64() * 1e3;
@@ -97,7 +97,7 @@ impl Sized {
             generate_ms: self.generate_ms,
             build_ms: self.stage.tree_build_ms,
             rays: rays.collect::<Result<_, GpuError>>()?,
-            tree: self.stage.tree.statistics(self.stage.scene.triangles.len(), &self.stage.build_options),
+            tree: self.stage.tree().statistics(self.stage.scene().triangles.len(), self.stage.world.build_options()),
         })
     }
 }

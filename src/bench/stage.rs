@@ -10,6 +10,7 @@ use crate::{
     frame::{RenderOptions, frame_constants},
     layout::{FLAT_NORMAL, Frame, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
     scene::{Camera, Scene, framing},
+    world::World,
 };
 
 /// From the middle of the picture towards the eye, in a room: from the front, the right and above.
@@ -18,10 +19,8 @@ const VERTICAL_FOV_DEGREES: f32 = 60.0;
 
 /// A scene and its tree, ready for rays.
 pub struct Stage {
-    pub scene: Scene,
-    pub tree: KdTree,
-    /// How the tree was built.
-    pub build_options: BuildOptions,
+    /// The scene and its tree.
+    pub world: World,
     /// What it took to build the tree, wall-clock.
     pub tree_build_ms: f64,
     /// What any traversal reads beside the tree.
@@ -34,20 +33,23 @@ pub struct Stage {
 
 impl Stage {
     /// The scene seen by its own camera, lit by its first light (from above, if it has none).
-    pub fn open(scene: Scene, size: (u32, u32), build_options: BuildOptions) -> Self {
+    ///
+    /// # Panics
+    /// The scene has a triangle without a material.
+    pub fn open(scene: Scene, size: (u32, u32), build_options: &BuildOptions) -> Self {
         let above = Light { position: Vec3::Y, kind: LIGHT_DIRECTIONAL, intensity: Vec3::ONE, reserved: 0 };
         let light = scene.lights.first().copied().unwrap_or(above);
         let begin = Instant::now();
-        let tree = KdTree::build(&scene.triangles, &build_options);
+        let world = World::new(scene, build_options).expect("a material for each triangle");
         let tree_build_ms = begin.elapsed().as_secs_f64() * 1e3;
         let options = RenderOptions { width: size.0, height: size.1, ..RenderOptions::default() };
-        let frame = frame_constants(&scene, &tree, &options);
-        Self { scene, extras: Extras::all(&tree), tree, build_options, tree_build_ms, frame, light }
+        let frame = frame_constants(world.scene(), world.tree(), &options);
+        Self { extras: Extras::all(world.tree()), world, tree_build_ms, frame, light }
     }
 
     /// The scene on the floor of a closed room, seen from inside the room, with a point light under its ceiling.
     /// No ray from inside misses.
-    pub fn in_room(mut scene: Scene, size: (u32, u32), build_options: BuildOptions) -> Self {
+    pub fn in_room(mut scene: Scene, size: (u32, u32), build_options: &BuildOptions) -> Self {
         let room = Room::around(&scene.triangles);
         scene.triangles.extend(room.walls());
         scene.triangle_materials.resize(scene.triangles.len(), 0);
@@ -56,9 +58,19 @@ impl Stage {
         Self::open(scene, size, build_options)
     }
 
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        self.world.scene()
+    }
+
+    /// The scene's kd-tree.
+    pub fn tree(&self) -> &KdTree {
+        self.world.tree()
+    }
+
     /// What a traversal on the CPU reads.
     pub fn bindings(&self) -> Bindings<'_> {
-        Bindings::new(&self.scene, &self.tree, &self.frame).with_extras(&self.extras)
+        Bindings::new(self.scene(), self.tree(), &self.frame).with_extras(&self.extras)
     }
 }
 

@@ -43,7 +43,7 @@ impl<'a> Tracers<'a> {
     /// # Errors
     /// As [`Caster::new`].
     pub fn new(context: Option<&Arc<Context>>, stage: &'a Stage, variants: &'a [Traversal]) -> Result<Self, GpuError> {
-        let caster = |context, variant| Caster::new(context, &stage.scene.triangles, &stage.tree, variant);
+        let caster = |context, variant| Caster::new(context, stage.world.geometry(), variant);
         let casters = context.map(|context| variants.iter().map(|&variant| caster(context, variant)).collect());
         Ok(Self { stage, variants, casters: casters.transpose()? })
     }

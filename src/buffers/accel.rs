@@ -16,7 +16,7 @@ use crate::{
         KD_WORD_DEPTH, KdBox, KdNode, KdRope, LeafTriangle, Plane, READING_ADDRESS, READING_BOUND, READING_TEXELS,
         Slab, Triangle,
     },
-    scene::Mismatch,
+    world::Geometry,
 };
 
 /// The numbers of what is read in one of three ways, in the order of [`Tree::arrays`].
@@ -108,14 +108,9 @@ impl AccelBuffers {
     /// Uploads triangles, tree and constants.
     ///
     /// # Errors
-    /// The tree is of another number of triangles; beyond the device's limits, out of memory.
-    pub fn new(
-        context: &Arc<Context>,
-        triangles: &[Triangle],
-        tree: &KdTree,
-        constants: &Frame,
-    ) -> Result<Self, GpuError> {
-        tree.check_triangles(triangles.len())?;
+    /// Beyond the device's limits, out of memory.
+    pub fn new(context: &Arc<Context>, geometry: Geometry, constants: &Frame) -> Result<Self, GpuError> {
+        let (triangles, tree) = (geometry.triangles(), geometry.tree());
         let slabs = slabs_for(context, tree);
         let access = SceneAccess::of(context, &extents(triangles, tree, slabs));
         let usage = buffer_use(access);
@@ -149,18 +144,18 @@ impl AccelBuffers {
         self.addresses.upload(&[self.addresses()])
     }
 
-    /// Uploads what the traversal reads beside the tree. Clones of this tree keep what they had. Descriptor sets are to
+    /// Uploads what the traversal reads beside the tree, which is the uploaded one. Clones of this tree keep what they had. Descriptor sets are to
     /// be made anew.
     ///
     /// # Errors
-    /// The tree is as before then. The given tree is another one than was uploaded; too many triangles for brute force;
+    /// The tree is as before then. Too many triangles for brute force;
     /// beyond the device's limits, out of memory.
-    pub fn add_extras(&mut self, context: &Arc<Context>, tree: &KdTree, traversal: Traversal) -> Result<(), GpuError> {
-        tree.check_triangles(self.triangles.len())?;
-        let (nodes, on_device) = (tree.nodes().len(), self.kd_nodes.len());
-        if nodes != on_device {
-            return Err(Mismatch::OtherTree { nodes, on_device }.into());
-        }
+    pub(crate) fn add_extras(
+        &mut self,
+        context: &Arc<Context>,
+        tree: &KdTree,
+        traversal: Traversal,
+    ) -> Result<(), GpuError> {
         let (value, limit) = (self.triangles.len() as u64, u64::from(BRUTE_MAX_TRIANGLES));
         if traversal == Traversal::Brute && value > limit {
             return Err(GpuError::Limit { what: "triangles without a tree", value, limit });

@@ -12,7 +12,7 @@ use crate::{
     frame::RenderOptions,
     gpu::{Access, Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
     layout::{self, Batch, Bounce, COUNTER_PLACES, COUNTER_STRIDE, Counters, Frame, Light, Material},
-    scene::Scene,
+    world::World,
 };
 
 /// Of the longest push constants.
@@ -61,14 +61,14 @@ impl Resources {
     /// Uploads the scene with its tree, and makes room for what a frame needs.
     ///
     /// # Errors
-    /// Scene and tree do not fit together; too many triangles for brute force; beyond the device's limits, out of memory.
-    pub fn new(context: &Arc<Context>, scene: &Scene, tree: &KdTree, needs: &Needs) -> Result<Self, GpuError> {
-        scene.check(tree)?;
+    /// Too many triangles for brute force; beyond the device's limits, out of memory.
+    pub fn new(context: &Arc<Context>, world: &World, needs: &Needs) -> Result<Self, GpuError> {
+        let scene = world.scene();
         let storage = BufferUse::Storage;
         let &Needs { constants, options, n_bounces } = needs;
-        let mut accel = AccelBuffers::new(context, &scene.triangles, tree, constants)?;
+        let mut accel = AccelBuffers::new(context, world.geometry(), constants)?;
         accel.add_materials(context, &scene.triangle_materials)?;
-        accel.add_extras(context, tree, options.traversal)?;
+        accel.add_extras(context, world.tree(), options.traversal)?;
         let kinds: Vec<_> = (0..layout::N_BINDINGS).chain(accel::texel_bindings()).map(binding).collect();
         let upload_indices = || new_vertex_indices(context, &vertex_indices(&scene.triangles));
         let mut resources = Self {

@@ -21,14 +21,14 @@ pub use crate::layout::{CastRay, Hit, NO_TRIANGLE};
 use crate::{
     accel::{
         Query,
-        kdtree::{Extras, KdTree, Traversal},
+        kdtree::{Extras, Traversal},
     },
     buffers::{AccelBuffers, CastResources, Round},
     cpu,
     gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
-    layout::{Frame, RAY_GROUP_SIZE, Triangle},
+    layout::{Frame, RAY_GROUP_SIZE},
     passes,
-    scene::Mismatch,
+    world::Geometry,
 };
 
 /// What became of rays.
@@ -62,15 +62,10 @@ impl Caster {
     /// Uploads the triangles and their tree.
     ///
     /// # Errors
-    /// The tree is of another number of triangles; it is beyond the device's limits or memory; too many triangles for brute force.
-    pub fn new(
-        context: &Arc<Context>,
-        triangles: &[Triangle],
-        tree: &KdTree,
-        traversal: Traversal,
-    ) -> Result<Self, GpuError> {
-        let mut buffers = AccelBuffers::new(context, triangles, tree, &constants(triangles, tree))?;
-        buffers.add_extras(context, tree, traversal)?;
+    /// Beyond the device's limits or memory; too many triangles for brute force.
+    pub fn new(context: &Arc<Context>, geometry: Geometry, traversal: Traversal) -> Result<Self, GpuError> {
+        let mut buffers = AccelBuffers::new(context, geometry, &constants(geometry))?;
+        buffers.add_extras(context, geometry.tree(), traversal)?;
         let bindings = CastResources::bindings(context, &buffers)?;
         Ok(Self {
             resources: CastResources::new(context, &bindings, &buffers, 0)?,
@@ -176,8 +171,8 @@ fn most_rays(limits: &Limits) -> usize {
 }
 
 /// What the traversal reads of a frame.
-fn constants(triangles: &[Triangle], tree: &KdTree) -> Frame {
-    Frame { n_triangles: triangles.len() as u32, ..tree.constants() }
+fn constants(geometry: Geometry) -> Frame {
+    Frame { n_triangles: geometry.triangles().len() as u32, ..geometry.tree().constants() }
 }
 
 /// Rays that can only miss: with a NaN, an infinite origin or direction, or a direction of zero or so short that all
@@ -188,25 +183,22 @@ pub fn count_invalid(rays: &[CastRay]) -> u64 {
 
 /// As [`Caster`], on the current rayon pool.
 pub struct CpuCaster<'a> {
-    triangles: &'a [Triangle],
-    tree: &'a KdTree,
+    geometry: Geometry<'a>,
     traversal: Traversal,
     extras: Extras,
     frame: Frame,
 }
 
 impl<'a> CpuCaster<'a> {
-    /// # Errors
-    /// The tree is of another number of triangles.
-    pub fn new(triangles: &'a [Triangle], tree: &'a KdTree, traversal: Traversal) -> Result<Self, Mismatch> {
-        tree.check_triangles(triangles.len())?;
-        let (extras, frame) = (Extras::new(tree, traversal), constants(triangles, tree));
-        Ok(Self { triangles, tree, traversal, extras, frame })
+    /// Makes what the traversal reads beside the tree.
+    pub fn new(geometry: Geometry<'a>, traversal: Traversal) -> Self {
+        let extras = Extras::new(geometry.tree(), traversal);
+        Self { geometry, traversal, extras, frame: constants(geometry) }
     }
 
     /// One hit a ray.
     pub fn cast(&self, rays: &[CastRay], query: Query) -> Vec<Hit> {
-        let bindings = cpu::bindings::Bindings::of_tree(self.triangles, self.tree, &self.frame);
+        let bindings = cpu::bindings::Bindings::of_tree(self.geometry.triangles(), self.geometry.tree(), &self.frame);
         let mut hits = vec![Hit::zeroed(); rays.len()];
         cpu::cast::cast(&bindings.with_extras(&self.extras), self.traversal, query, rays, &mut hits);
         hits
@@ -214,15 +206,6 @@ impl<'a> CpuCaster<'a> {
 }
 
 /// The hits of a [`Caster`], found by a [`CpuCaster`].
-///
-/// # Errors
-/// The tree is of another number of triangles.
-pub fn cast_on_cpu(
-    triangles: &[Triangle],
-    tree: &KdTree,
-    traversal: Traversal,
-    rays: &[CastRay],
-    query: Query,
-) -> Result<Vec<Hit>, Mismatch> {
-    Ok(CpuCaster::new(triangles, tree, traversal)?.cast(rays, query))
+pub fn cast_on_cpu(geometry: Geometry, traversal: Traversal, rays: &[CastRay], query: Query) -> Vec<Hit> {
+    CpuCaster::new(geometry, traversal).cast(rays, query)
 }

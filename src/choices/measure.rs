@@ -28,6 +28,7 @@ use crate::{
     layout::{CastRay, Frame, Hit, Ray},
     render::Renderer,
     scene::Scene,
+    world::World,
 };
 
 /// As many camera rays as the device has lanes, within these: with fewer it would idle, and more only take longer.
@@ -45,17 +46,17 @@ const N_FRAMES: usize = 5;
 /// Beyond the device's limits, out of memory, a failed call.
 pub fn measure_traversals(
     context: &Arc<Context>,
-    scene: &Scene,
-    tree: &KdTree,
+    world: &World,
     traversals: &[Traversal],
 ) -> Result<Option<Timings>, GpuError> {
     if !context.has_timestamps() {
         return Ok(None);
     }
+    let (scene, tree) = (world.scene(), world.tree());
     let n_pixels = context.n_lanes()?.clamp(FEWEST_RAYS, MOST_RAYS);
     let frame = frame_constants(scene, tree, &picture_of(scene, n_pixels));
     let rays = some_rays(scene, tree, &frame);
-    let mut buffers = AccelBuffers::new(context, &scene.triangles, tree, &frame)?;
+    let mut buffers = AccelBuffers::new(context, world.geometry(), &frame)?;
     if traversals.contains(&Traversal::Ropes) {
         buffers.add_extras(context, tree, Traversal::Ropes)?;
     }
@@ -100,16 +101,16 @@ fn picture_of(scene: &Scene, n_pixels: u32) -> RenderOptions {
 /// Beyond the device's limits, out of memory, a failed call.
 pub fn measure_primaries(
     context: &Arc<Context>,
-    (scene, tree): (&Scene, &KdTree),
+    world: &World,
     options: &RenderOptions,
     primaries: &[Primary],
 ) -> Result<Option<Timings>, GpuError> {
     let n_pixels = f64::from(options.width) * f64::from(options.height);
     let options = RenderOptions { max_depth: 1, denoise: Denoise::Off, profile: true, ..options.clone() };
-    let mut renderer = Renderer::new(Arc::clone(context), scene, tree, &options)?;
+    let mut renderer = Renderer::new(Arc::clone(context), world, &options)?;
     let mut times = Vec::new();
     for &primary in primaries {
-        renderer.set_options(&RenderOptions { primary, ..options.clone() }, tree)?;
+        renderer.set_options(&RenderOptions { primary, ..options.clone() })?;
         let frames = (0..2 * N_FRAMES).map(|_| Ok(renderer.draw()?.frame_ms)).collect::<Result<Vec<_>, GpuError>>()?;
         let timed = frames.into_iter().skip(N_FRAMES).collect::<Option<Vec<f64>>>();
         let least = timed.and_then(|ms| ms.into_iter().min_by(f64::total_cmp));

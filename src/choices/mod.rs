@@ -41,11 +41,12 @@ pub use self::{
     tree::{BuildPolicy, TreeKind},
 };
 use crate::{
-    accel::kdtree::{BuildOptions, KdTree, Traversal},
+    accel::kdtree::{KdTree, Traversal},
     frame::{Primary, RenderOptions},
     gpu::{Context, DeviceInfo, GpuError},
     layout::KD_ORIGIN_REACH,
-    scene::{Camera, Scene},
+    scene::Camera,
+    world::World,
 };
 
 /// What the user asks for; `None` and [`BuildPolicy::Auto`] leave it open.
@@ -146,29 +147,28 @@ impl Request {
     }
 
     /// How to trace: by the times of an earlier run or by a measurement, where that changes no bit and pays; else by
-    /// rule. `build_options`: how the tree was built.
+    /// rule.
     ///
     /// # Errors
     /// The device is lost. What else goes wrong with a measurement leaves the choice to the rule.
     pub fn methods(
         &self,
         context: Option<&Arc<Context>>,
-        (scene, tree): (&Scene, &KdTree),
-        build_options: &BuildOptions,
+        world: &World,
         workload: &Workload,
         cache: &Cache,
     ) -> Result<Methods, GpuError> {
-        let n_triangles = scene.triangles.len();
+        let n_triangles = world.scene().triangles.len();
         let by_rule = self.methods_by_rule(context.map(|context| &**context), n_triangles, workload.size);
         let is_gpu = |context: &&Arc<Context>| Engine::of(Some(context)) == Engine::Gpu && !workload.shows_costs;
         let Some(context) = context.filter(is_gpu) else { return Ok(by_rule) };
-        let trial = Trial { context, scene, tree, build_options, workload, cache };
+        let trial = Trial { context, world, workload, cache };
         let mut methods = by_rule;
         if methods.traversal.by == Reason::Rule {
             trial.choose_traversal(&mut methods)?;
         }
         let may_trace = methods.primary == Chosen { value: Primary::Compute, by: Reason::Rule };
-        if may_trace && workload.primaries_agree(tree) {
+        if may_trace && workload.primaries_agree(world.tree()) {
             trial.choose_primary(&mut methods)?;
         }
         Ok(methods)

@@ -4,50 +4,46 @@ use std::sync::Arc;
 
 use super::{Cache, Candidates, Key, Methods, Timings, Workload, measure_primaries, measure_traversals};
 use crate::{
-    accel::kdtree::{BuildOptions, KdTree, Traversal},
+    accel::kdtree::Traversal,
     frame::{Primary, RenderOptions},
     gpu::{Context, GpuError},
-    scene::Scene,
+    world::World,
 };
 
 /// What a choice by measurement depends on.
 pub struct Trial<'a> {
     pub context: &'a Arc<Context>,
-    pub scene: &'a Scene,
-    pub tree: &'a KdTree,
-    pub build_options: &'a BuildOptions,
+    pub world: &'a World,
     pub workload: &'a Workload,
     pub cache: &'a Cache,
 }
 
 impl Trial<'_> {
     pub fn choose_traversal(&self, methods: &mut Methods) -> Result<(), GpuError> {
-        let n_triangles = self.scene.triangles.len();
+        let n_triangles = self.world.scene().triangles.len();
         let Some(candidates) = Candidates::of_traversals(n_triangles, self.workload.n_rays) else { return Ok(()) };
         let _choosing = tracing::info_span!("choose traversal").entered();
-        let measure =
-            |traversals: &[Traversal]| unless_lost(measure_traversals(self.context, self.scene, self.tree, traversals));
+        let measure = |traversals: &[Traversal]| unless_lost(measure_traversals(self.context, self.world, traversals));
         (methods.traversal, methods.traversal_ns) =
             candidates.choose(self.cache, &self.key(), methods.traversal.value, measure)?;
         Ok(())
     }
 
     pub fn choose_primary(&self, methods: &mut Methods) -> Result<(), GpuError> {
-        let n_triangles = self.scene.triangles.len();
+        let n_triangles = self.world.scene().triangles.len();
         let Some(candidates) = Candidates::of_primaries(n_triangles, self.workload.n_rays) else { return Ok(()) };
         let _choosing = tracing::info_span!("choose primary rays").entered();
         let ((width, height), traversal) = (self.workload.size, methods.traversal.value);
         let options = RenderOptions { width, height, traversal, ..RenderOptions::default() };
-        let measure = |primaries: &[Primary]| {
-            unless_lost(measure_primaries(self.context, (self.scene, self.tree), &options, primaries))
-        };
+        let measure =
+            |primaries: &[Primary]| unless_lost(measure_primaries(self.context, self.world, &options, primaries));
         let key = self.key().of_primaries(self.workload.size, traversal);
         (methods.primary, methods.primary_ns) = candidates.choose(self.cache, &key, methods.primary.value, measure)?;
         Ok(())
     }
 
     fn key(&self) -> Key {
-        Key::new(self.context.info(), &self.scene.triangles, self.build_options)
+        Key::new(self.context.info(), &self.world.scene().triangles, self.world.build_options())
     }
 }
 

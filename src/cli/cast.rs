@@ -3,16 +3,14 @@
 use std::{sync::Arc, time::Instant};
 
 use kdray::{
-    accel::{
-        Query,
-        kdtree::{KdTree, Traversal},
-    },
+    accel::{Query, kdtree::Traversal},
     cast::{self, Cast, CastRay, Caster, CpuCaster, Hit, HitWriter, NO_TRIANGLE, RAYS_PER_BATCH, RayReader},
     choices::{self, Cache, Choices, Workload},
     gpu::{Context, ContextOptions, GpuError},
     layout::Triangle,
     output,
     scene::Scene,
+    world::{Geometry, World},
 };
 
 use super::{
@@ -49,18 +47,19 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     let build_options = tree_kind.value.options(processor);
     build::check_memory(&build_options, n_triangles)?;
     let building = format!("building the kd-tree of {n_triangles} triangles");
-    let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &build_options));
+    let (world, build_ms) = progress.stage(&building, || World::new(scene, &build_options));
+    let world = world.map_err(GpuError::from)?;
     let casting = format!("casting {} rays", rays.n_rays());
     let (used, cache) = (context.as_ref(), Cache::open());
-    let methods = request.methods(used, (&scene, &tree), &build_options, &workload, &cache)?;
+    let methods = request.methods(used, &world, &workload, &cache)?;
     let traversal = methods.traversal.value;
-    let engine = Engine::new(context.as_ref(), &scene.triangles, &tree, traversal)?;
-    let (done, cast_ms) = progress.stage(&casting, || cast_all(args, rays, engine, &scene.triangles));
+    let engine = Engine::new(context.as_ref(), world.geometry(), traversal)?;
+    let (done, cast_ms) = progress.stage(&casting, || cast_all(args, rays, engine, &world.scene().triangles));
     let totals = done?;
     drop(progress);
 
     let report = CastReport {
-        scene: scene.name,
+        scene: world.scene().name.clone(),
         rays: args.rays.clone(),
         hits: args.output.clone(),
         query: if args.any { "any" } else { "closest" },
@@ -68,7 +67,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
         choices: Choices::of_rays(tree_kind, methods),
         device: context.as_ref().map_or_else(cpu_name, |context| context.info().name.clone()),
         triangles: n_triangles,
-        tree: tree.statistics(n_triangles, &build_options),
+        tree: world.tree().statistics(n_triangles, &build_options),
         n_rays: totals.n_rays,
         n_hits: totals.n_hits,
         n_invalid: totals.n_invalid,
@@ -107,15 +106,10 @@ enum Engine<'a> {
 
 impl<'a> Engine<'a> {
     /// The device, or the CPU for want of one.
-    fn new(
-        context: Option<&Arc<Context>>,
-        triangles: &'a [Triangle],
-        tree: &'a KdTree,
-        traversal: Traversal,
-    ) -> Result<Self, GpuError> {
+    fn new(context: Option<&Arc<Context>>, geometry: Geometry<'a>, traversal: Traversal) -> Result<Self, GpuError> {
         match context {
-            Some(context) => Ok(Self::Device(Box::new(Caster::new(context, triangles, tree, traversal)?))),
-            None => Ok(Self::Cpu(Box::new(CpuCaster::new(triangles, tree, traversal)?))),
+            Some(context) => Ok(Self::Device(Box::new(Caster::new(context, geometry, traversal)?))),
+            None => Ok(Self::Cpu(Box::new(CpuCaster::new(geometry, traversal)))),
         }
     }
 

@@ -56,7 +56,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
 
     let vsync = args.vsync == Switch::On;
     let settings = Settings { options, max_samples, budget_ms: args.budget_ms, vsync, view: View::Picture, gain: 1.0 };
-    let scene_name = loaded.scene.name.clone();
+    let scene_name = loaded.scene().name.clone();
     let report = display.view(
         loaded,
         ViewOptions {

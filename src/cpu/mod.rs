@@ -54,33 +54,21 @@ pub mod visibility;
 
 pub use self::render::{Batching, Renderer};
 use crate::{
-    accel::kdtree::KdTree,
     frame::{Picture, Profile, RenderOptions},
-    scene::{Mismatch, Scene},
+    world::World,
 };
 
 /// Rays that one thread handles at a time: enough to pay for handing them out, few enough to balance.
 const RAYS_PER_TASK: usize = 512;
 
 /// Renders a frame of one sample a pixel on the current rayon pool.
-///
-/// # Errors
-/// Scene and tree do not fit together.
-pub fn render(scene: &Scene, tree: &KdTree, options: &RenderOptions) -> Result<(Picture, Profile), Mismatch> {
-    render_in_batches(scene, tree, options, Batching::default())
+pub fn render(world: &World, options: &RenderOptions) -> (Picture, Profile) {
+    render_in_batches(world, options, Batching::default())
 }
 
 /// As [`render`], in batches of a given size.
-///
-/// # Errors
-/// Scene and tree do not fit together.
-pub fn render_in_batches(
-    scene: &Scene,
-    tree: &KdTree,
-    options: &RenderOptions,
-    batching: Batching,
-) -> Result<(Picture, Profile), Mismatch> {
-    let mut renderer = Renderer::new(scene, tree, options, batching)?;
+pub fn render_in_batches(world: &World, options: &RenderOptions, batching: Batching) -> (Picture, Profile) {
+    let mut renderer = Renderer::new(world, options, batching);
     let profile = renderer.draw_sample();
-    Ok((renderer.picture(), profile))
+    (renderer.picture(), profile)
 }

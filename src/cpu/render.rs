@@ -15,10 +15,11 @@ use super::{
     tonemap, trace, visibility,
 };
 use crate::{
-    accel::kdtree::{Extras, KdTree},
+    accel::kdtree::Extras,
     frame::{BounceStats, Picture, Primary, Profile, RenderOptions, frame_constants},
     layout::{Bounce, Feature, Frame, Hit, Ray, SCAN_GROUP_SIZE},
-    scene::{Camera, Mismatch, Scene},
+    scene::Camera,
+    world::World,
 };
 
 /// How a frame is cut into pieces. The picture does not depend on it.
@@ -38,11 +39,10 @@ impl Default for Batching {
 }
 
 /// A scene, and its picture in the making, sample by sample.
-pub struct Renderer<'a> {
-    scene: &'a Scene,
+pub struct Renderer {
+    world: World,
     camera: Camera,
-    tree: &'a KdTree,
-    options: &'a RenderOptions,
+    options: RenderOptions,
     batching: Batching,
     extras: Extras,
     frame: Frame,
@@ -64,25 +64,17 @@ pub struct Renderer<'a> {
     n_batches: u32,
 }
 
-impl<'a> Renderer<'a> {
-    /// # Errors
-    /// Scene and tree do not fit together.
-    pub fn new(
-        scene: &'a Scene,
-        tree: &'a KdTree,
-        options: &'a RenderOptions,
-        batching: Batching,
-    ) -> Result<Self, Mismatch> {
-        scene.check(tree)?;
-        let frame = frame_constants(scene, tree, options);
+impl Renderer {
+    /// Makes room for a picture of a world.
+    pub fn new(world: &World, options: &RenderOptions, batching: Batching) -> Self {
+        let frame = frame_constants(world.scene(), world.tree(), options);
         let n_pixels = frame.width as usize * frame.height as usize;
-        Ok(Self {
-            scene,
-            camera: scene.camera,
-            tree,
-            options,
+        Self {
+            camera: world.scene().camera,
+            world: world.clone(),
+            options: options.clone(),
             batching,
-            extras: Extras::new(tree, options.traversal),
+            extras: Extras::new(world.tree(), options.traversal),
             frame,
             triangle_ids: vec![0; n_pixels],
             pixel_radiance: vec![[0.0; 4]; n_pixels],
@@ -95,7 +87,7 @@ impl<'a> Renderer<'a> {
             clock: Clock::start(),
             bounces: Vec::new(),
             n_batches: 0,
-        })
+        }
     }
 
     /// Draws the frame by one sample more a pixel on the current rayon pool, the first at its centre; the picture is the
@@ -136,7 +128,7 @@ impl<'a> Renderer<'a> {
     }
 
     pub fn options(&self) -> &RenderOptions {
-        self.options
+        &self.options
     }
 
     /// The next sample is the first of a new picture.
@@ -165,7 +157,7 @@ impl<'a> Renderer<'a> {
     }
 
     fn visibility(&mut self) {
-        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
+        let bindings = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
         let (traversal, ids) = (self.options.traversal, &mut self.triangle_ids);
         self.clock.time("visibility", None, || visibility::visibility(&bindings, traversal, ids));
     }
@@ -212,7 +204,7 @@ impl<'a> Renderer<'a> {
 
     /// Fills the bounce's `hits`, and counts them.
     fn closest_hits(&mut self, depth: u32) -> BounceStats {
-        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
+        let bindings = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
         let Queue { rays, bounces, hits, .. } = &mut self.queue;
         hits.resize(rays.len(), Hit::zeroed());
         let places = bounces[depth as usize].rays();
@@ -229,14 +221,14 @@ impl<'a> Renderer<'a> {
 
     /// What primary rays meet.
     fn note_features(&mut self) {
-        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
+        let bindings = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
         let (Queue { rays, hits, .. }, pixels) = (&self.queue, &mut self.pixel_features);
         self.clock.time("features", Some(0), || features::features(&bindings, rays, hits, pixels));
     }
 
     /// What the rays of all bounces cost.
     fn note_costs(&mut self) {
-        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
+        let bindings = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
         let (traversal, pixels) = (self.options.traversal, &mut self.pixel_features);
         let Queue { rays, bounces, hits, .. } = &self.queue;
         let n_rasterized = if self.options.primary != Primary::Trace { bounces[0].n_rays as usize } else { 0 };
@@ -249,7 +241,7 @@ impl<'a> Renderer<'a> {
     /// Compacts the rays that go on from the bounce's hits, behind it; returns what the spine says of them.
     fn next_rays(&mut self, depth: u32, capacity: u32) -> Bounce {
         let constants = Frame { queue_capacity: capacity, ..self.frame };
-        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
+        let bindings = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
         let Queue { rays, bounces, hits, child_kinds, first_children, scan_blocks, .. } = &mut self.queue;
         let (this, mut next) = (bounces[depth as usize], Bounce::of(0, &self.frame));
         let places = this.rays();
@@ -276,7 +268,7 @@ impl<'a> Renderer<'a> {
     fn light(&mut self, stats: &mut [BounceStats]) {
         let Queue { rays, bounces, hits, first_children, ray_radiance, light_visibility, .. } = &mut self.queue;
         self.frame.queue_capacity = rays.len() as u32;
-        let bindings = Bindings::new(self.scene, self.tree, &self.frame).with_extras(&self.extras);
+        let bindings = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
         let traversal = self.options.traversal;
         light_visibility.resize(rays.len() * bindings.lights.len(), 0);
         ray_radiance.resize(rays.len(), [0.0; 4]);

@@ -9,12 +9,12 @@ use std::{
 
 use super::Renderer;
 use crate::{
-    accel::kdtree::KdTree,
     buffers::Pixels,
     frame::{Crop, Picture, Profile, RenderOptions},
     gpu::{Context, GpuError, Limits},
     layout::Feature,
-    scene::{Camera, Scene},
+    scene::Camera,
+    world::World,
 };
 
 /// Draws whole pictures of any size. Where all pixels would take more than a storage buffer can have, it draws bands of
@@ -66,12 +66,12 @@ impl BandedRenderer {
     ///
     /// # Errors
     /// The scene, or a single row of the picture, is beyond the device's limits or memory.
-    pub fn new(context: Arc<Context>, scene: &Scene, tree: &KdTree, options: &RenderOptions) -> Result<Self, GpuError> {
+    pub fn new(context: Arc<Context>, world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
         let bands = bands(context.limits(), options);
         let is_slow = context.runs_both_sides();
         let renderer = match largest(&bands, options) {
-            None => Renderer::new(context, scene, tree, options)?,
-            Some(crop) => Renderer::new(context, scene, tree, &RenderOptions { crop: Some(crop), ..options.clone() })?,
+            None => Renderer::new(context, world, options)?,
+            Some(crop) => Renderer::new(context, world, &RenderOptions { crop: Some(crop), ..options.clone() })?,
         };
         tracing::debug!(n_bands = bands.len(), "the picture's bands");
         Ok(Self { renderer, bands, joined: None, is_slow })

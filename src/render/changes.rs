@@ -2,7 +2,6 @@
 
 use super::{Renderer, lanes_to_share, schedule::Schedule};
 use crate::{
-    accel::kdtree::KdTree,
     buffers::{Needs, Resources},
     frame::{Crop, RenderOptions},
     gpu::GpuError,
@@ -44,7 +43,7 @@ impl Renderer {
     /// Beyond the device's limits or memory; then nothing has changed, and a sample that is begun goes on.
     pub fn resize(&mut self, width: u32, height: u32) -> Result<(), GpuError> {
         let options = RenderOptions { width, height, crop: None, ..self.options.clone() };
-        self.remake(&options, None)
+        self.remake(&options)
     }
 
     /// Renders another part of the picture from the next sample on, the first. Memory is kept as [`Renderer::resize`]
@@ -53,18 +52,17 @@ impl Renderer {
     /// # Errors
     /// Beyond the device's limits or memory; then nothing has changed.
     pub fn set_crop(&mut self, crop: Crop) -> Result<(), GpuError> {
-        self.remake(&RenderOptions { crop: Some(crop), ..self.options.clone() }, None)
+        self.remake(&RenderOptions { crop: Some(crop), ..self.options.clone() })
     }
 
     /// Renders with other options from the next sample on. Kernels are made anew only where they differ. Samples are kept
     /// where only what is done with them changes: the exposure, the curve, the filter's threshold; [`Renderer::show`] shows that.
-    /// `tree`: the one that the renderer was made with, for what another traversal reads beside it.
     ///
     /// # Errors
     /// Beyond the device's limits or memory, the driver refuses a kernel; then nothing has changed, and a sample that
     /// is begun goes on.
-    pub fn set_options(&mut self, options: &RenderOptions, tree: &KdTree) -> Result<(), GpuError> {
-        self.remake(options, Some(tree))
+    pub fn set_options(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
+        self.remake(options)
     }
 
     /// Makes all kernels anew, of shaders that have changed. The next sample is the first of a new picture.
@@ -80,12 +78,11 @@ impl Renderer {
     }
 
     /// Makes all that other options need, and then puts it in its place by steps that cannot fail.
-    fn remake(&mut self, options: &RenderOptions, tree: Option<&KdTree>) -> Result<(), GpuError> {
+    fn remake(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
         let (context, before) = (&self.context, &self.options);
         let mut constants = *self.resources.constants();
         constants.set_options(options);
-        let tree = tree.filter(|_| before.traversal != options.traversal);
-        let room = (!same_samples(before, options)).then(|| self.with_room(constants, options, tree)).transpose()?;
+        let room = (!same_samples(before, options)).then(|| self.with_room(constants, options)).transpose()?;
         let passes = self.passes.with_options(context, &self.resources.bindings, before, options)?;
 
         // Its commands hold pipelines and sets that go now.
@@ -105,18 +102,14 @@ impl Renderer {
     }
 
     /// Buffers and batches for other sizes, another number of bounces, or other outputs.
-    fn with_room(
-        &self,
-        constants: Frame,
-        options: &RenderOptions,
-        tree: Option<&KdTree>,
-    ) -> Result<(Resources, Schedule), GpuError> {
+    fn with_room(&self, constants: Frame, options: &RenderOptions) -> Result<(Resources, Schedule), GpuError> {
         let queue_capacity = self.room.queue_capacity(self.context.limits(), &constants);
         let n_lanes = lanes_to_share(&self.context, options)?;
         let constants = Frame { queue_capacity, n_lanes, ..constants };
         let spans = self.room.spans(&constants, self.most_pixels);
         let schedule = Schedule::new(&self.context, &constants, spans, options.profile)?;
         let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
+        let tree = (self.options.traversal != options.traversal).then(|| self.world.tree());
         Ok((self.resources.for_frame(&self.context, tree, &needs)?, schedule))
     }
 }

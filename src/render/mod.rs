@@ -19,18 +19,19 @@ use self::{
     schedule::{Room, Schedule},
 };
 use crate::{
-    accel::kdtree::KdTree,
     buffers::{Needs, Resources},
     frame::{Denoise, Picture, Primary, Profile, RenderOptions, frame_constants},
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
     passes::{Passes, Rasterize},
-    scene::{Camera, Scene},
+    scene::Camera,
+    world::World,
 };
 
 /// A scene on a device, ready to be drawn again and again: sample by sample, from other places, with other options.
 pub struct Renderer {
     context: Arc<Context>,
+    world: World,
     camera: Camera,
     options: RenderOptions,
     room: Room,
@@ -57,9 +58,9 @@ impl Renderer {
     /// Uploads the scene and makes the passes.
     ///
     /// # Errors
-    /// Scene and tree do not fit together; the scene or the picture is beyond the device's limits or memory.
-    pub fn new(context: Arc<Context>, scene: &Scene, tree: &KdTree, options: &RenderOptions) -> Result<Self, GpuError> {
-        Self::with_capacity(context, scene, tree, options, None)
+    /// The scene or the picture is beyond the device's limits or memory.
+    pub fn new(context: Arc<Context>, world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
+        Self::with_capacity(context, world, options, None)
     }
 
     /// As [`Renderer::new`], with room for so many rays in the queue. A frame that makes more is split into batches.
@@ -68,24 +69,23 @@ impl Renderer {
     /// As [`Renderer::new`].
     pub fn with_queue_capacity(
         context: Arc<Context>,
-        scene: &Scene,
-        tree: &KdTree,
+        world: &World,
         options: &RenderOptions,
         capacity: u32,
     ) -> Result<Self, GpuError> {
-        Self::with_capacity(context, scene, tree, options, Some(capacity))
+        Self::with_capacity(context, world, options, Some(capacity))
     }
 
     fn with_capacity(
         context: Arc<Context>,
-        scene: &Scene,
-        tree: &KdTree,
+        world: &World,
         options: &RenderOptions,
         fixed_capacity: Option<u32>,
     ) -> Result<Self, GpuError> {
+        let scene = world.scene();
         let both = MATERIAL_REFLECT | MATERIAL_REFRACT;
         let branches = scene.materials.iter().any(|material| material.flags & both == both);
-        let mut constants = frame_constants(scene, tree, options);
+        let mut constants = frame_constants(scene, world.tree(), options);
         constants.n_lanes = lanes_to_share(&context, options)?;
         let room = Room { fixed_capacity, branches };
         constants.queue_capacity = room.queue_capacity(context.limits(), &constants);
@@ -93,12 +93,13 @@ impl Renderer {
         let schedule = Schedule::new(&context, &constants, spans, options.profile)?;
         let uploading = info_span!("upload scene").entered();
         let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
-        let resources = Resources::new(&context, scene, tree, &needs)?;
+        let resources = Resources::new(&context, world, &needs)?;
         drop(uploading);
         let passes = info_span!("make pipelines").in_scope(|| Passes::new(&context, &resources.bindings, options))?;
         let (camera, options) = (scene.camera, options.clone());
         Ok(Self {
             context,
+            world: world.clone(),
             camera,
             options,
             room,

@@ -11,7 +11,6 @@ pub mod generate;
 mod lighting;
 mod material;
 pub mod mesh;
-mod mismatch;
 mod needs;
 pub mod normal;
 mod obj;
@@ -24,10 +23,7 @@ use std::path::Path;
 
 use glam::Vec3;
 
-pub use self::{
-    error::SceneError, extent::MIN_EXTENT, material::illum_flags, mismatch::Mismatch, path::CameraPath,
-    sources::source_files,
-};
+pub use self::{error::SceneError, extent::MIN_EXTENT, material::illum_flags, path::CameraPath, sources::source_files};
 use crate::{
     frame::{Denoise, RenderOptions, Tonemap},
     layout::{Light, Material, Triangle},

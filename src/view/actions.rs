@@ -57,7 +57,7 @@ impl Session {
         if !std::mem::take(&mut self.is_save_due) {
             return;
         }
-        let path = next_free(&self.loaded.scene.name);
+        let path = next_free(&self.loaded.scene().name);
         match save_displayed(live, &path) {
             Ok(()) => {
                 (self.print)(&format!("wrote {}\n", path.display()));
@@ -75,7 +75,7 @@ impl Session {
         };
         let pixel = uvec2(pixel(x, window.0, width), pixel(y, window.1, height));
         let options = RenderOptions { width, height, ..options.clone() };
-        self.picked = Some(pick(&self.loaded.scene, &self.loaded.tree, &options, &displayed.camera, pixel));
+        self.picked = Some(pick(&self.loaded.world, &options, &displayed.camera, pixel));
     }
 }
 
@@ -151,7 +151,7 @@ mod tests {
             workload: Workload::of_window((640, 480)),
         };
         let mut session = Session::new(Loaded::load(&path, load_options).unwrap(), settings.clone(), true, |_| ());
-        let seen = session.loaded.scene.camera;
+        let seen = session.loaded.scene().camera;
         let displayed = Displayed { size: (80, 60), camera: seen };
         session.controller.look(0.5, 0.0);
         session.pick(&settings.options, displayed, (640, 480), (320.0, 300.0));

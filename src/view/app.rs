@@ -75,7 +75,7 @@ impl App {
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<Shown, ViewError> {
         let Settings { options, vsync, .. } = &self.session.settings;
         let attributes = Window::default_attributes()
-            .with_title(format!("kdray: {}", self.session.loaded.scene.name))
+            .with_title(format!("kdray: {}", self.session.loaded.scene().name))
             .with_inner_size(PhysicalSize::new(options.width, options.height));
         let window = event_loop.create_window(attributes).map_err(|error| ViewError::Window(error.to_string()))?;
         let window = Arc::new(window);

@@ -41,12 +41,12 @@ impl Live {
         // In motion, where it has to be quick, a picture is smaller than its window.
         let moving = (options.width / 4, options.height / 4);
         let workload = Workload { size: moving, ..loaded.load_options.workload };
-        let (scene, build_options, cache) = ((&loaded.scene, &loaded.tree), &loaded.build_options, Cache::open());
-        let methods = request.methods(Some(&context), scene, build_options, &workload, &cache)?;
+        let cache = Cache::open();
+        let methods = request.methods(Some(&context), &loaded.world, &workload, &cache)?;
         let options = methods.apply(options);
         let presenter = Presenter::new(&context, surface, vsync)?;
         let overlay = Overlay::new(&context, &presenter)?;
-        let renderer = Renderer::new(context.clone(), &loaded.scene, &loaded.tree, &options)?;
+        let renderer = Renderer::new(context.clone(), &loaded.world, &options)?;
         let present = Present::new(&context, renderer.resources(), &presenter)?;
         let choices = Choices::of_pictures(loaded.tree_kind, methods);
         Ok(Self { renderer, choices, present, overlay, presenter, context })
@@ -58,7 +58,7 @@ impl Live {
     /// The scene is beyond the device's limits or memory.
     pub fn set_scene(&mut self, loaded: &Loaded) -> Result<(), GpuError> {
         let camera = *self.renderer.camera();
-        let mut renderer = Renderer::new(self.context.clone(), &loaded.scene, &loaded.tree, self.renderer.options())?;
+        let mut renderer = Renderer::new(self.context.clone(), &loaded.world, self.renderer.options())?;
         renderer.set_camera(&camera);
         self.context.wait()?;
         self.renderer = renderer;

@@ -8,9 +8,10 @@ use std::{
 use glam::Vec3;
 
 use crate::{
-    accel::kdtree::{BuildOptions, KdTree, Statistics},
+    accel::kdtree::Statistics,
     choices::{Chosen, Engine, Request, TreeKind, Workload},
     scene::{Scene, SceneError, framing},
+    world::World,
 };
 
 /// What the choice of a scene's tree depends on, each time that the scene is read.
@@ -24,10 +25,8 @@ pub struct LoadOptions {
 /// A scene and its tree.
 pub struct Loaded {
     pub path: PathBuf,
-    pub scene: Scene,
-    pub tree: KdTree,
+    pub world: World,
     pub tree_kind: Chosen<TreeKind>,
-    pub build_options: BuildOptions,
     pub load_options: LoadOptions,
     pub statistics: Statistics,
     pub build_ms: f64,
@@ -43,19 +42,27 @@ impl Loaded {
     }
 
     /// Builds a scene's tree.
+    ///
+    /// # Panics
+    /// The scene has a triangle without a material, which no loaded scene has.
     pub fn with_tree(path: &Path, scene: Scene, load_options: LoadOptions) -> Self {
         let LoadOptions { request, engine, workload } = load_options;
         let tree_kind = request.tree(engine, scene.triangles.len(), &workload);
         let build_options = tree_kind.value.options(engine);
         let start = Instant::now();
-        let tree = KdTree::build(&scene.triangles, &build_options);
+        let world = World::new(scene, &build_options).expect("a material for each triangle");
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
-        let statistics = tree.statistics(scene.triangles.len(), &build_options);
-        Self { path: path.to_owned(), scene, tree, tree_kind, build_options, load_options, statistics, build_ms }
+        let statistics = world.tree().statistics(world.scene().triangles.len(), &build_options);
+        Self { path: path.to_owned(), world, tree_kind, load_options, statistics, build_ms }
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        self.world.scene()
     }
 
     /// Smallest and largest coordinates.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        framing::bounds(&self.scene.triangles)
+        framing::bounds(&self.scene().triangles)
     }
 }

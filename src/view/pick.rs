@@ -3,10 +3,7 @@
 use glam::{UVec2, Vec3};
 
 use crate::{
-    accel::{
-        Query,
-        kdtree::{Extras, KdTree},
-    },
+    accel::{Query, kdtree::Extras},
     cpu::{
         bindings::Bindings,
         children::{child_kinds_of, children_of},
@@ -17,6 +14,7 @@ use crate::{
     frame::{RenderOptions, frame_constants},
     layout::{Hit, NO_TRIANGLE, Ray},
     scene::{Camera, Scene},
+    world::World,
 };
 
 /// Rays of one level that are followed; a pixel of glass can make more than anyone reads.
@@ -58,7 +56,8 @@ pub struct PickedHit {
 }
 
 /// Follows the rays of the pixel's middle, as seen from `camera`. `options.width` and `height` are the picture's that the pixel is counted in.
-pub fn pick(scene: &Scene, tree: &KdTree, options: &RenderOptions, camera: &Camera, pixel: UVec2) -> Picked {
+pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec2) -> Picked {
+    let (scene, tree) = (world.scene(), world.tree());
     let extras = Extras::new(tree, options.traversal);
     let mut frame = frame_constants(scene, tree, options);
     frame.set_view(camera, 0);

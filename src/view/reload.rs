@@ -120,7 +120,7 @@ impl Session {
         };
         match live.set_scene(&loaded) {
             Ok(()) => {
-                self.controller.set_scene(loaded.scene.camera, loaded.bounds());
+                self.controller.set_scene(loaded.scene().camera, loaded.bounds());
                 self.loaded = loaded;
                 self.picked = None;
                 // A small picture at once.

@@ -60,7 +60,7 @@ pub struct Session {
 impl Session {
     pub fn new(loaded: Loaded, settings: Settings, is_interactive: bool, print: fn(&str)) -> Self {
         Self {
-            controller: Controller::new(loaded.scene.camera, loaded.bounds()),
+            controller: Controller::new(loaded.scene().camera, loaded.bounds()),
             budgets: [(); 2].map(|()| Budget::new(settings.budget_ms)),
             loaded,
             settings,
@@ -156,7 +156,7 @@ impl Session {
         // Room for the whole picture before a small one is drawn: to make it later would lose that one.
         let steps = [(is_moving && makes_room).then_some(&whole), is_new.then_some(&asked)];
         for options in steps.into_iter().flatten() {
-            if let Err(error) = live.renderer.set_options(options, &self.loaded.tree) {
+            if let Err(error) = live.renderer.set_options(options) {
                 self.take_back(live, error)?;
                 break;
             }
@@ -259,7 +259,7 @@ impl Session {
         let automatic = match self.settings.view {
             View::Picture | View::Normal | View::Id => 1.0,
             View::Depth => self.controller.radius(),
-            View::Rays => (1 + self.loaded.scene.lights.len() as u32 * self.settings.options.max_depth) as f32,
+            View::Rays => (1 + self.loaded.scene().lights.len() as u32 * self.settings.options.max_depth) as f32,
             View::Cost => (STEPS_A_LEVEL * self.loaded.statistics.depth.max(1)) as f32,
         };
         (self.settings.view, automatic / self.settings.gain)

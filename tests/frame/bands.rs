@@ -12,7 +12,7 @@ use kdray::{
     scene::{Camera, Scene},
 };
 
-use super::studio::{assert_silent, device, identical, options, tree_of};
+use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::{meshes, pretended, scenes};
 
 /// Bytes of a row of 64 pixels without features.
@@ -49,7 +49,7 @@ struct Made {
 /// The pictures that several cameras see, drawn at once.
 fn at_once(context: &Arc<Context>, options: &RenderOptions, n_samples: u32) -> Vec<Made> {
     let scene = scene();
-    let mut renderer = Renderer::new(context.clone(), &scene, &tree_of(&scene), options).expect("a renderer");
+    let mut renderer = Renderer::new(context.clone(), &world_of(&scene), options).expect("a renderer");
     let made = [scene.camera, ELSEWHERE].map(|camera| {
         renderer.set_camera(&camera);
         let mut profile = renderer.draw_sample().expect("a sample");
@@ -63,7 +63,7 @@ fn at_once(context: &Arc<Context>, options: &RenderOptions, n_samples: u32) -> V
 /// The same in bands; how many there are, and how many samples of bands were told of.
 fn in_bands(context: &Arc<Context>, options: &RenderOptions, n_samples: u32) -> (Vec<Made>, u32) {
     let scene = scene();
-    let mut renderer = BandedRenderer::new(context.clone(), &scene, &tree_of(&scene), options).expect("a renderer");
+    let mut renderer = BandedRenderer::new(context.clone(), &world_of(&scene), options).expect("a renderer");
     let n_bands = renderer.n_bands();
     let made = [scene.camera, ELSEWHERE].map(|camera| {
         renderer.set_camera(&camera);
@@ -116,7 +116,7 @@ fn the_noise_filter_sees_beyond_a_band() {
     // Without it, the picture is another one.
     let scene = scene();
     let draw = |options: &RenderOptions| {
-        let mut renderer = Renderer::new(device(), &scene, &tree_of(&scene), options).expect("a renderer");
+        let mut renderer = Renderer::new(device(), &world_of(&scene), options).expect("a renderer");
         renderer.render().expect("a frame").0
     };
     assert!(!identical(&draw(&filtered), &draw(&options(64, 48, 2))));
@@ -148,7 +148,7 @@ fn a_device_that_holds_all_pixels_draws_one_band() {
 #[test]
 fn the_small_device_refuses_the_picture_at_once() {
     let scene = scene();
-    let refused = Renderer::new(small_device(), &scene, &tree_of(&scene), &options(64, 48, 2)).err();
+    let refused = Renderer::new(small_device(), &world_of(&scene), &options(64, 48, 2)).err();
     assert!(matches!(refused, Some(GpuError::TooLarge { .. })), "{refused:?}");
 }
 

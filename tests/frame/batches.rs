@@ -8,7 +8,7 @@ use kdray::{
     scene::Scene,
 };
 
-use super::studio::{assert_silent, device, identical, options, tree_of};
+use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::scenes;
 
 /// Glass in glass, nowhere dark: rays double at each of its surfaces.
@@ -26,9 +26,9 @@ pub fn glass_in_glass() -> Scene {
 #[test]
 fn small_queues_give_the_same_bits_on_the_device() {
     let (scene, options, context) = (glass_in_glass(), options(32, 24, 8), device());
-    let tree = tree_of(&scene);
+    let world = world_of(&scene);
     let render = |capacity| {
-        let renderer = Renderer::with_queue_capacity(context.clone(), &scene, &tree, &options, capacity);
+        let renderer = Renderer::with_queue_capacity(context.clone(), &world, &options, capacity);
         renderer.expect("a renderer").render().expect("a frame")
     };
     let (whole, profile) = render(100_000);
@@ -44,16 +44,15 @@ fn small_queues_give_the_same_bits_on_the_device() {
 #[test]
 fn small_queues_give_the_same_bits_on_the_cpu() {
     let (scene, options) = (glass_in_glass(), options(32, 24, 8));
-    let tree = tree_of(&scene);
-    let (whole, one) = cpu::render(&scene, &tree, &options).expect("a scene and its tree");
+    let world = world_of(&scene);
+    let (whole, one) = cpu::render(&world, &options);
     assert_eq!(one.n_batches, 1);
     for batching in [
         Batching { n_pixels: 100, ..Batching::default() },
         Batching { n_pixels: 1 << 16, queue_capacity: 300 },
         Batching { n_pixels: 768, queue_capacity: 1 },
     ] {
-        let (picture, profile) =
-            cpu::render_in_batches(&scene, &tree, &options, batching).expect("a scene and its tree");
+        let (picture, profile) = cpu::render_in_batches(&world, &options, batching);
         assert!(profile.n_batches > 1);
         assert!(identical(&whole, &picture), "{batching:?}");
         assert_eq!(profile.bounces, one.bounces, "{batching:?}");
@@ -64,7 +63,7 @@ fn small_queues_give_the_same_bits_on_the_cpu() {
 fn a_pixel_that_overflows_alone_is_an_error() {
     let (scene, context) = (glass_in_glass(), device());
     let mut renderer =
-        Renderer::with_queue_capacity(context, &scene, &tree_of(&scene), &options(8, 8, 8), 2).expect("a renderer");
+        Renderer::with_queue_capacity(context, &world_of(&scene), &options(8, 8, 8), 2).expect("a renderer");
     match renderer.render() {
         Err(GpuError::Limit { limit: 2, value, .. }) => assert!(value > 2),
         other => panic!("{:?}", other.map(|(_, profile)| profile)),
@@ -74,10 +73,10 @@ fn a_pixel_that_overflows_alone_is_an_error() {
 #[test]
 fn every_run_gives_the_same_bits() {
     let (scene, options) = (scenes::mixed_outdoors(), options(64, 48, 5));
-    let tree = tree_of(&scene);
+    let world = world_of(&scene);
     let context = device();
-    let mut first = Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
-    let mut second = Renderer::new(device(), &scene, &tree, &options).expect("a renderer");
+    let mut first = Renderer::new(context.clone(), &world, &options).expect("a renderer");
+    let mut second = Renderer::new(device(), &world, &options).expect("a renderer");
     let picture = first.render().expect("a frame").0;
     for again in [first.render(), second.render(), first.render()] {
         assert!(identical(&picture, &again.expect("a frame").0));
@@ -88,10 +87,10 @@ fn every_run_gives_the_same_bits() {
 #[test]
 fn every_number_of_threads_gives_the_same_bits() {
     let (scene, options) = (scenes::mixed_outdoors(), options(64, 48, 5));
-    let tree = tree_of(&scene);
+    let world = world_of(&scene);
     let on_threads = |n| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().expect("a pool");
-        pool.install(|| cpu::render(&scene, &tree, &options).expect("a scene and its tree").0)
+        pool.install(|| cpu::render(&world, &options).0)
     };
     let picture = on_threads(1);
     assert!([2, 3, 8].into_iter().all(|n| identical(&picture, &on_threads(n))));
@@ -100,11 +99,10 @@ fn every_number_of_threads_gives_the_same_bits() {
 #[test]
 fn device_and_cpu_count_alike() {
     let (scene, options) = (scenes::mixed(), options(40, 30, 4));
-    let tree = tree_of(&scene);
+    let world = world_of(&scene);
     let context = device();
-    let (_, device) =
-        Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer").render().expect("a frame");
-    let (_, cpu) = cpu::render(&scene, &tree, &options).expect("a scene and its tree");
+    let (_, device) = Renderer::new(context.clone(), &world, &options).expect("a renderer").render().expect("a frame");
+    let (_, cpu) = cpu::render(&world, &options);
     assert_eq!(device.bounces.len(), cpu.bounces.len());
     for (a, b) in device.bounces.iter().zip(&cpu.bounces) {
         let near = |a: u64, b: u64| a.abs_diff(b) <= b / 50;

@@ -9,7 +9,7 @@ use kdray::{
     scene::Scene,
 };
 
-use super::studio::{assert_silent, device, differing, on_cpu, options, tree_of};
+use super::studio::{assert_silent, device, differing, on_cpu, options, world_of};
 
 /// Part of a driver's device name, and the checksums that it gives for `cornell` and `paper2`. They have to be the same
 /// with the feature `shaderc-from-source` and without it. A change of a kernel's arithmetic changes them. Lavapipe gives
@@ -36,7 +36,7 @@ fn pictures_are_the_same_whichever_compiler_made_the_kernels() {
         .each_ref()
         .map(|scene| RenderOptions { primary: Primary::Trace, ..options(96, 72, scene.defaults.max_depth) });
     let pictures: [Picture; 2] = std::array::from_fn(|i| {
-        let renderer = Renderer::new(context.clone(), &scenes[i], &tree_of(&scenes[i]), &options[i]);
+        let renderer = Renderer::new(context.clone(), &world_of(&scenes[i]), &options[i]);
         renderer.expect("a renderer").render().expect("a frame").0
     });
     assert_silent(&context);

@@ -2,38 +2,39 @@
 
 use glam::{Vec3, vec3};
 use kdray::{
-    accel::kdtree::{BuildOptions, KdTree, Traversal},
+    accel::kdtree::{BuildOptions, Traversal},
     cpu::{self, Batching},
     frame::{Crop, Primary, RenderOptions},
     layout::{Feature, NO_TRIANGLE},
     render::Renderer,
     scene::Scene,
+    world::World,
 };
 
 use super::{
     batches::glass_in_glass,
-    studio::{assert_silent, device, identical, on_both, options, tree_of},
+    studio::{assert_silent, device, identical, on_both, options, world_of},
 };
-use crate::support::scenes;
+use crate::support::{scenes, world_by};
 
 fn on_device(scene: &Scene, options: &RenderOptions) -> Vec<Feature> {
-    on_device_by(&tree_of(scene), scene, options)
+    on_device_by(&world_of(scene), options)
 }
 
-fn on_device_by(tree: &KdTree, scene: &Scene, options: &RenderOptions) -> Vec<Feature> {
+fn on_device_by(world: &World, options: &RenderOptions) -> Vec<Feature> {
     let context = device();
-    let mut renderer = Renderer::new(context.clone(), scene, tree, options).expect("a renderer");
+    let mut renderer = Renderer::new(context.clone(), world, options).expect("a renderer");
     renderer.draw().expect("a frame");
     assert_silent(&context);
     renderer.features().expect("features")
 }
 
 fn on_cpu(scene: &Scene, options: &RenderOptions) -> Vec<Feature> {
-    on_cpu_by(&tree_of(scene), scene, options)
+    on_cpu_by(&world_of(scene), options)
 }
 
-fn on_cpu_by(tree: &KdTree, scene: &Scene, options: &RenderOptions) -> Vec<Feature> {
-    let mut renderer = cpu::Renderer::new(scene, tree, options, Batching::default()).expect("a scene and its tree");
+fn on_cpu_by(world: &World, options: &RenderOptions) -> Vec<Feature> {
+    let mut renderer = cpu::Renderer::new(world, options, Batching::default());
     renderer.draw_sample();
     renderer.features()
 }
@@ -104,12 +105,12 @@ fn device_and_cpu_agree() {
 #[test]
 fn device_and_cpu_count_the_same_steps() {
     let scene = scenes::mixed_outdoors();
-    let tree = tree_of(&scene);
+    let world = world_of(&scene);
     let slabs = !device().is_software();
-    let tree_on_cpu = KdTree::build(&scene.triangles, &BuildOptions { slabs, ..BuildOptions::default() });
+    let on_cpu = world_by(&scene, &BuildOptions { slabs, ..BuildOptions::default() });
     for &traversal in Traversal::ALL.iter().filter(|&&traversal| traversal != Traversal::Brute) {
         let options = noting(RenderOptions { primary: Primary::Trace, traversal, ..options(60, 45, 3) });
-        let (a, b) = (on_device_by(&tree, &scene, &options), on_cpu_by(&tree_on_cpu, &scene, &options));
+        let (a, b) = (on_device_by(&world, &options), on_cpu_by(&on_cpu, &options));
         let n_differing = a.iter().zip(&b).filter(|(a, b)| a.n_steps != b.n_steps).count();
         assert!(n_differing <= a.len() / 20, "{traversal}: {n_differing} of {} pixels", a.len());
         let sum = |features: &[Feature]| features.iter().map(|feature| f64::from(feature.n_steps)).sum::<f64>();
@@ -124,10 +125,10 @@ fn steps_through_one_leaf_are_known() {
     let mut scene = scenes::empty();
     scenes::add(&mut scene, scenes::room(0.5)[..2].to_vec(), scenes::diffuse(Vec3::ONE));
     let n_triangles = scene.triangles.len() as u32;
-    let tree = KdTree::build(&scene.triangles, &BuildOptions { slabs: false, ..BuildOptions::default() });
-    assert_eq!(tree.nodes().len(), 2, "the root and the place beside it");
+    let world = world_by(&scene, &BuildOptions { slabs: false, ..BuildOptions::default() });
+    assert_eq!(world.tree().nodes().len(), 2, "the root and the place beside it");
     for features in [on_device_by, on_cpu_by]
-        .map(|render| render(&tree, &scene, &noting(RenderOptions { primary: Primary::Trace, ..options(40, 30, 1) })))
+        .map(|render| render(&world, &noting(RenderOptions { primary: Primary::Trace, ..options(40, 30, 1) })))
     {
         let steps: std::collections::HashSet<_> = features.iter().map(|feature| feature.n_steps).collect();
         assert_eq!(steps, [0, 1 + n_triangles].into());
@@ -138,10 +139,10 @@ fn steps_through_one_leaf_are_known() {
 #[test]
 fn rays_are_counted_as_in_the_profile() {
     let (scene, options) = (scenes::mixed(), noting(options(40, 30, 4)));
-    let tree = tree_of(&scene);
-    let mut device = Renderer::new(device(), &scene, &tree, &options).expect("a renderer");
+    let world = world_of(&scene);
+    let mut device = Renderer::new(device(), &world, &options).expect("a renderer");
     let batching = Batching { n_pixels: 500, queue_capacity: 300 };
-    let mut cpu = cpu::Renderer::new(&scene, &tree, &options, batching).expect("a scene and its tree");
+    let mut cpu = cpu::Renderer::new(&world, &options, batching);
     let profiles = [device.draw().expect("a frame"), cpu.draw_sample()];
     for (profile, features) in profiles.iter().zip([device.features().expect("features"), cpu.features()]) {
         let counted: u64 = features.iter().map(|feature| u64::from(feature.n_rays)).sum();
@@ -153,9 +154,9 @@ fn rays_are_counted_as_in_the_profile() {
 #[test]
 fn neither_batches_nor_crops_nor_the_picture_are_changed_by_them() {
     let (scene, plain, context) = (glass_in_glass(), options(32, 24, 6), device());
-    let (tree, options) = (tree_of(&scene), noting(plain.clone()));
+    let (world, options) = (world_of(&scene), noting(plain.clone()));
     let features = |options: &RenderOptions, capacity| {
-        let renderer = Renderer::with_queue_capacity(context.clone(), &scene, &tree, options, capacity);
+        let renderer = Renderer::with_queue_capacity(context.clone(), &world, options, capacity);
         let mut renderer = renderer.expect("a renderer");
         renderer.draw_sample().expect("a sample");
         renderer.draw_sample().expect("a sample");

@@ -6,16 +6,16 @@ use kdray::{
     render::Renderer,
 };
 
-use super::studio::{assert_silent, device, identical, options, tree_of};
+use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::{scenes, with_lanes};
 
 #[test]
 fn a_device_with_lanes_to_spare_gives_the_same_bits() {
     let scene = scenes::mixed();
-    let (tree, plain) = (tree_of(&scene), device());
+    let (world, plain) = (world_of(&scene), device());
     let options = RenderOptions { primary: Primary::Trace, ..options(40, 30, 4) };
     let picture = |context: &std::sync::Arc<Context>| {
-        let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
+        let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
         let picture = renderer.render().expect("a frame").0;
         let lanes_log2: Vec<_> =
             renderer.resources().bounces.download().expect("bounces").iter().map(|row| row.trace_lanes_log2).collect();

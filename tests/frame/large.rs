@@ -15,10 +15,10 @@ use kdray::{
     gpu::{Buffer, BufferUse, Context, DeviceOverrides, GpuError},
     layout::{Frame, KdRope, LargeTriangle, LeafTriangle},
     render::Renderer,
-    scene::Scene,
+    world::World,
 };
 
-use super::studio::{assert_silent, device, identical, options, tree_of};
+use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::{meshes, pretended, scenes};
 
 /// What the device binds, bytes: enough for the pictures here.
@@ -44,11 +44,10 @@ fn usual_reading(context: &Context, tree: &KdTree) -> SceneAccess {
 }
 
 /// With a ring of 16,000 triangles: none of its arrays can be bound then.
-fn large_scene() -> (Scene, KdTree) {
+fn large_world() -> World {
     let mut scene = scenes::mixed();
     scenes::add(&mut scene, meshes::torus(200, 40), scenes::mirror(Vec3::splat(0.8)));
-    let tree = tree_of(&scene);
-    (scene, tree)
+    world_of(&scene)
 }
 
 /// Of each array that grows with the scene, with whatever the traversal asks for.
@@ -71,14 +70,14 @@ fn scene_bytes(tree: &AccelBuffers, traversal: Traversal) -> Vec<u64> {
 
 #[test]
 fn a_scene_larger_than_what_the_device_binds_gives_the_same_bits() {
-    let ((scene, tree), any, small) = (large_scene(), device(), small_device());
+    let (world, any, small) = (large_world(), device(), small_device());
     for &traversal in Traversal::ALL {
         for primary in [Primary::Raster, Primary::Trace] {
             let features = traversal == Traversal::Mask;
             let options = RenderOptions { traversal, primary, features, ..options(24, 16, 3) };
-            let [mut bound, mut by_address] = [&any, &small]
-                .map(|context| Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer"));
-            assert_eq!(bound.resources().accel.access(), usual_reading(&any, &tree));
+            let [mut bound, mut by_address] =
+                [&any, &small].map(|context| Renderer::new(context.clone(), &world, &options).expect("a renderer"));
+            assert_eq!(bound.resources().accel.access(), usual_reading(&any, world.tree()));
             assert_eq!(by_address.resources().accel.access(), SceneAccess::Address);
             let bytes = scene_bytes(&by_address.resources().accel, traversal);
             assert!(bytes.iter().all(|&bytes| bytes > RANGE), "{traversal}: {bytes:?}");
@@ -97,14 +96,15 @@ fn a_scene_larger_than_what_the_device_binds_gives_the_same_bits() {
 /// few texels, the two ways are one.
 #[test]
 fn texels_and_what_is_bound_give_the_same_bits() {
-    let ((scene, tree), any, bound) = (large_scene(), device(), device_with(u64::MAX, 1));
+    let (world, any, bound) = (large_world(), device(), device_with(u64::MAX, 1));
     for traversal in [Traversal::Mask, Traversal::MaskBoxes, Traversal::Ropes] {
         let options = RenderOptions { traversal, primary: Primary::Trace, ..options(24, 16, 3) };
-        let pictures = [(&any, usual_reading(&any, &tree)), (&bound, SceneAccess::Bound)].map(|(context, reading)| {
-            let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
-            assert_eq!(renderer.resources().accel.access(), reading);
-            renderer.render().expect("a frame").0
-        });
+        let pictures =
+            [(&any, usual_reading(&any, world.tree())), (&bound, SceneAccess::Bound)].map(|(context, reading)| {
+                let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
+                assert_eq!(renderer.resources().accel.access(), reading);
+                renderer.render().expect("a frame").0
+            });
         assert!(identical(&pictures[0], &pictures[1]), "{traversal}");
     }
     assert_silent(&any);
@@ -114,16 +114,16 @@ fn texels_and_what_is_bound_give_the_same_bits() {
 /// What kernels that rasterize note of large triangles is bound; the triangles need not be.
 #[test]
 fn triangles_that_are_not_bound_are_rasterized() {
-    let ((scene, tree), any) = (large_scene(), device());
+    let (world, any) = (large_world(), device());
     if !any.has_wide_atomics() {
         return;
     }
     let options = RenderOptions { primary: Primary::Compute, ..options(24, 16, 2) };
-    let n_bytes = (scene.triangles.len() * size_of::<LargeTriangle>()) as u64;
-    let with_range = |bytes| Renderer::new(device_with(bytes, 1), &scene, &tree, &options);
+    let n_bytes = (world.scene().triangles.len() * size_of::<LargeTriangle>()) as u64;
+    let with_range = |bytes| Renderer::new(device_with(bytes, 1), &world, &options);
     let mut by_address = with_range(n_bytes).expect("a renderer");
     assert_eq!(by_address.resources().accel.access(), SceneAccess::Address);
-    let mut bound = Renderer::new(any.clone(), &scene, &tree, &options).expect("a renderer");
+    let mut bound = Renderer::new(any.clone(), &world, &options).expect("a renderer");
     let pictures = [&mut bound, &mut by_address].map(|renderer| renderer.render().expect("a frame").0);
     assert!(identical(&pictures[0], &pictures[1]));
     let too_small = with_range(n_bytes - 1).err().expect("no room").to_string();
@@ -133,12 +133,12 @@ fn triangles_that_are_not_bound_are_rasterized() {
 
 #[test]
 fn another_traversal_of_a_renderer_that_is_there_reads_by_address_too() {
-    let ((scene, tree), small) = (large_scene(), small_device());
+    let (world, small) = (large_world(), small_device());
     let start = options(24, 16, 3);
-    let mut renderer = Renderer::new(small.clone(), &scene, &tree, &start).expect("a renderer");
+    let mut renderer = Renderer::new(small.clone(), &world, &start).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
     for traversal in [Traversal::Ropes, Traversal::MaskBoxes] {
-        renderer.set_options(&RenderOptions { traversal, ..start.clone() }, &tree).expect("options");
+        renderer.set_options(&RenderOptions { traversal, ..start.clone() }).expect("options");
         assert!(identical(&picture, &renderer.render().expect("a frame").0), "{traversal}");
     }
     assert_silent(&small);
@@ -146,7 +146,7 @@ fn another_traversal_of_a_renderer_that_is_there_reads_by_address_too() {
 
 #[test]
 fn rays_through_a_scene_larger_than_what_the_device_binds_find_the_same_hits() {
-    let ((scene, tree), any, small) = (large_scene(), device(), small_device());
+    let (world, any, small) = (large_world(), device(), small_device());
     let towards = |i: u16| Vec3::new((f32::from(i) * 0.7).sin(), (f32::from(i) * 0.31).cos(), -0.4);
     let ray = |i| CastRay { origin: Vec3::new(0.1, 0.2, 0.3), t_min: 0.0, direction: towards(i), t_max: f32::INFINITY };
     let rays: Vec<_> = (0..3000).map(ray).collect();
@@ -157,7 +157,7 @@ fn rays_through_a_scene_larger_than_what_the_device_binds_find_the_same_hits() {
         (Traversal::Stack, Query::Any),
     ] {
         let hits = [&any, &small].map(|context| {
-            let mut caster = Caster::new(context, &scene.triangles, &tree, traversal).expect("a caster");
+            let mut caster = Caster::new(context, world.geometry(), traversal).expect("a caster");
             caster.cast(&rays, query, 1).expect("a cast").hits
         });
         assert!(hits[0].iter().any(|hit| hit.t.is_finite()));
@@ -173,13 +173,14 @@ fn rays_through_a_scene_larger_than_what_the_device_binds_find_the_same_hits() {
 #[test]
 fn a_scene_is_read_by_address_only_where_something_of_it_cannot_be_bound() {
     let scene = scenes::mixed();
-    let tree = tree_of(&scene);
+    let world = world_of(&scene);
+    let tree = world.tree();
     let ropes = (6 * tree.nodes().len() * size_of::<KdRope>()) as u64;
     let planes = size_of_val(tree.leaf_planes()) as u64;
     let leaf_triangles = (tree.leaf_triangles().len() * size_of::<LeafTriangle>()) as u64;
     let largest = leaf_triangles.max(size_of_val(&*scene.triangles) as u64).max(planes).max(ropes);
-    let most_texels = most_texels(&tree);
-    let usual = usual_reading(&device(), &tree);
+    let most_texels = most_texels(tree);
+    let usual = usual_reading(&device(), tree);
     for (range, n_texels, reading) in [
         (largest - 1, 1, SceneAccess::Address),
         (largest, 1, SceneAccess::Bound),
@@ -187,7 +188,7 @@ fn a_scene_is_read_by_address_only_where_something_of_it_cannot_be_bound() {
         (largest, most_texels, usual),
     ] {
         let context = device_with(range, n_texels);
-        let made = AccelBuffers::new(&context, &scene.triangles, &tree, &Frame::default()).expect("a tree");
+        let made = AccelBuffers::new(&context, world.geometry(), &Frame::default()).expect("a tree");
         assert_eq!(made.access(), reading, "{range} bytes, {n_texels} texels");
         assert_silent(&context);
     }
@@ -196,9 +197,9 @@ fn a_scene_is_read_by_address_only_where_something_of_it_cannot_be_bound() {
 /// Without this, the small device would prove nothing.
 #[test]
 fn what_is_bound_is_held_against_the_range() {
-    let ((scene, tree), small) = (large_scene(), small_device());
+    let (world, small) = (large_world(), small_device());
     let capacity = RANGE as u32;
-    let queues = Renderer::with_queue_capacity(small.clone(), &scene, &tree, &options(8, 8, 2), capacity);
+    let queues = Renderer::with_queue_capacity(small.clone(), &world, &options(8, 8, 2), capacity);
     assert!(matches!(queues.err(), Some(GpuError::TooLarge { limit: RANGE, .. })));
     let buffer = |len, usage| Buffer::<u32>::new(&small, "words", len, usage).err().map(|error| error.to_string());
     let n_words = RANGE as usize / 4;

@@ -9,7 +9,7 @@ use kdray::{
     scene::{Camera, Scene},
 };
 
-use super::studio::{assert_silent, device, identical, on_device, options, tree_of};
+use super::studio::{assert_silent, device, identical, on_device, options, world_of};
 use crate::support::scenes;
 
 const ELSEWHERE: Camera =
@@ -26,13 +26,13 @@ fn sampled(renderer: &mut Renderer, n_samples: u32) -> Picture {
 }
 
 fn sampled_anew(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
-    sampled(&mut Renderer::new(device(), scene, &tree_of(scene), options).expect("a renderer"), n_samples)
+    sampled(&mut Renderer::new(device(), &world_of(scene), options).expect("a renderer"), n_samples)
 }
 
 #[test]
 fn other_options_draw_what_a_new_renderer_draws() {
     let scene = scenes::mixed_outdoors();
-    let (tree, context) = (tree_of(&scene), device());
+    let (world, context) = (world_of(&scene), device());
     let start = options(40, 30, 3);
     let filtered = RenderOptions { denoise: Denoise::Paper { threshold: 0.3 }, ..start.clone() };
     let steps = [
@@ -46,10 +46,10 @@ fn other_options_draw_what_a_new_renderer_draws() {
         RenderOptions { width: 17, height: 9, ..start.clone() },
         start.clone(),
     ];
-    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &start).expect("a renderer");
+    let mut renderer = Renderer::new(context.clone(), &world, &start).expect("a renderer");
     let before = sampled(&mut renderer, 2);
     for to in &steps {
-        renderer.set_options(to, &tree).expect("options");
+        renderer.set_options(to).expect("options");
         let n_samples = 1 + to.max_depth % 2;
         assert!(identical(&sampled(&mut renderer, n_samples), &sampled_anew(&scene, to, n_samples)), "{to:?}");
     }
@@ -60,8 +60,8 @@ fn other_options_draw_what_a_new_renderer_draws() {
 #[test]
 fn other_cameras_and_sizes_draw_what_a_new_renderer_draws() {
     let scene = scenes::mixed_outdoors();
-    let (tree, context) = (tree_of(&scene), device());
-    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options(40, 30, 3)).expect("a renderer");
+    let (world, context) = (world_of(&scene), device());
+    let mut renderer = Renderer::new(context.clone(), &world, &options(40, 30, 3)).expect("a renderer");
     renderer.draw_sample().expect("a sample");
     renderer.set_camera(&ELSEWHERE);
     assert_eq!((renderer.n_samples(), renderer.camera()), (0, &ELSEWHERE));
@@ -77,13 +77,13 @@ fn other_cameras_and_sizes_draw_what_a_new_renderer_draws() {
 #[test]
 fn exposure_curve_and_threshold_keep_the_samples() {
     let scene = scenes::mixed_outdoors();
-    let (tree, context) = (tree_of(&scene), device());
+    let (world, context) = (world_of(&scene), device());
     let denoise = |threshold| Denoise::Paper { threshold };
     let start = RenderOptions { denoise: denoise(2.0), ..options(40, 30, 3) };
-    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &start).expect("a renderer");
+    let mut renderer = Renderer::new(context.clone(), &world, &start).expect("a renderer");
     sampled(&mut renderer, 3);
     let to = RenderOptions { exposure: 2.0, denoise: denoise(0.2), tonemap: Tonemap::Agx, ..start };
-    renderer.set_options(&to, &tree).expect("options");
+    renderer.set_options(&to).expect("options");
     assert_eq!(renderer.n_samples(), 3);
     renderer.show().expect("the picture");
     let shown = renderer.picture().expect("a picture");
@@ -96,8 +96,8 @@ fn exposure_curve_and_threshold_keep_the_samples() {
 #[test]
 fn refused_options_change_nothing() {
     let scene = scenes::mixed_outdoors();
-    let (tree, context) = (tree_of(&scene), device());
-    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options(40, 30, 3)).expect("a renderer");
+    let (world, context) = (world_of(&scene), device());
+    let mut renderer = Renderer::new(context.clone(), &world, &options(40, 30, 3)).expect("a renderer");
     let before = sampled(&mut renderer, 1);
     let refused = renderer.resize(1 << 20, 1);
     assert!(matches!(refused, Err(GpuError::Limit { .. })), "{:?}", refused.err());

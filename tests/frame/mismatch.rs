@@ -1,47 +1,34 @@
 //! What does not fit together is refused before a kernel, which checks no bounds, can read it.
 
 use kdray::{
-    accel::{
-        Query,
-        kdtree::{BuildOptions, KdTree, Traversal},
-    },
-    cast::{Caster, cast_on_cpu},
-    cpu,
-    gpu::GpuError,
-    layout::Triangle,
-    render::Renderer,
-    scene::{Mismatch, Scene},
+    accel::kdtree::{BuildOptions, KdTree},
+    scene::Scene,
+    world::{Geometry, Mismatch, World},
 };
 
-use super::studio::{assert_silent, device, options, tree_of};
-use crate::support::{meshes, scenes};
+use crate::support::scenes;
 
-/// What the renderers of the device and of the CPU say of a scene and a tree; it must be the same.
-fn refusal(scene: &Scene, tree: &KdTree) -> String {
-    let (context, options) = (device(), options(8, 8, 2));
-    let on_device = Renderer::new(context.clone(), scene, tree, &options).err().expect("a refusal");
-    assert!(matches!(on_device, GpuError::Mismatch(_)), "{on_device}");
-    let on_cpu = cpu::render(scene, tree, &options).expect_err("a refusal");
-    assert_eq!(on_device.to_string(), on_cpu.to_string());
-    assert_silent(&context);
-    on_cpu.to_string()
+/// Why there is no world of the scene, whether it builds the tree or is given it. It must be the same.
+fn refusal(scene: &Scene) -> Mismatch {
+    let options = BuildOptions::default();
+    let built = World::new(scene.clone(), &options).expect_err("a refusal");
+    let given = World::with_tree(scene.clone(), KdTree::build(&scene.triangles, &options), &options);
+    assert_eq!(given.expect_err("a refusal"), built);
+    built
 }
 
 #[test]
 fn a_tree_of_other_triangles() {
-    let mut scene = scenes::mixed();
-    let (n, tree) = (scene.triangles.len(), tree_of(&scene));
+    let (mut scene, options) = (scenes::mixed(), BuildOptions::default());
+    let (tree, n) = (KdTree::build(&scene.triangles, &options), scene.triangles.len());
+    assert!(Geometry::new(&scene.triangles, &tree).is_ok());
     scene.triangles.pop();
     scene.triangle_materials.pop();
-    let expected = format!("the kd-tree was built from {n} triangles, but {} are given with it", n - 1);
-    assert_eq!(refusal(&scene, &tree), expected);
-    let cast = |triangles: &[Triangle]| {
-        let caster = Caster::new(&device(), triangles, &tree, Traversal::Mask).err().map(|error| error.to_string());
-        (caster, cast_on_cpu(triangles, &tree, Traversal::Mask, &[], Query::Closest).err())
-    };
-    let (triangles, tree) = (n - 1, n);
-    assert_eq!(cast(&scene.triangles), (Some(expected), Some(Mismatch::Tree { tree, triangles })));
-    assert_eq!(cast(&scenes::mixed().triangles), (None, None));
+    let expected = Mismatch::Tree { tree: n, triangles: n - 1 };
+    assert_eq!(Geometry::new(&scene.triangles, &tree).expect_err("a refusal"), expected);
+    assert_eq!(World::with_tree(scene, tree, &options).expect_err("a refusal"), expected);
+    let text = format!("the kd-tree was built from {n} triangles, but {} are given with it", n - 1);
+    assert_eq!(expected.to_string(), text);
 }
 
 #[test]
@@ -51,9 +38,8 @@ fn materials_of_more_or_fewer_triangles() {
     for change in changes {
         let mut scene = scenes::mixed();
         change(&mut scene);
-        let (n, n_materials) = (scene.triangles.len(), scene.triangle_materials.len());
-        let expected = format!("triangle_materials has {n_materials} entries for {n} triangles");
-        assert_eq!(refusal(&scene, &tree_of(&scene)), expected);
+        let (triangles, triangle_materials) = (scene.triangles.len(), scene.triangle_materials.len());
+        assert_eq!(refusal(&scene), Mismatch::TriangleMaterials { triangle_materials, triangles });
     }
 }
 
@@ -63,24 +49,7 @@ fn a_material_that_is_not_there() {
     let n_materials = scene.materials.len();
     scene.triangle_materials[7] = n_materials as u32;
     let expected = format!("triangle 7 has material {n_materials}, but there are {n_materials} materials");
-    assert_eq!(refusal(&scene, &tree_of(&scene)), expected);
+    assert_eq!(refusal(&scene).to_string(), expected);
     scene.triangle_materials[7] -= 1;
-    assert_eq!(scene.check(&tree_of(&scene)), Ok(()));
-}
-
-/// The renderer's own tree is on the device already: boxes and ropes of another one do not go with it.
-#[test]
-fn the_ropes_of_another_tree() {
-    let (mut scene, context) = (scenes::empty(), device());
-    scenes::add(&mut scene, meshes::torus(20, 10), scenes::BLACK);
-    let tree = tree_of(&scene);
-    let options = options(8, 8, 2);
-    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
-    let other = KdTree::build(&scene.triangles, &BuildOptions::fast());
-    assert_ne!(other.nodes().len(), tree.nodes().len());
-    let changed = kdray::frame::RenderOptions { traversal: Traversal::Backtrack, ..options };
-    let refused = renderer.set_options(&changed, &other).expect_err("a refusal").to_string();
-    assert!(refused.contains("but the one on the device has"), "{refused}");
-    renderer.set_options(&changed, &tree).expect("the renderer's own tree");
-    assert_silent(&context);
+    assert!(World::new(scene, &BuildOptions::default()).is_ok());
 }

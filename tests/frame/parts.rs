@@ -8,7 +8,7 @@ use kdray::{
 
 use super::{
     batches::glass_in_glass,
-    studio::{assert_silent, device, identical, options, tree_of},
+    studio::{assert_silent, device, identical, options, world_of},
 };
 
 fn options_of_parts() -> RenderOptions {
@@ -38,8 +38,8 @@ fn at_once(renderer: &mut Renderer, n_samples: u32) -> Picture {
 #[test]
 fn parts_make_the_same_picture() {
     let (scene, context) = (glass_in_glass(), device());
-    let tree = tree_of(&scene);
-    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options_of_parts()).expect("a renderer");
+    let world = world_of(&scene);
+    let mut renderer = Renderer::new(context.clone(), &world, &options_of_parts()).expect("a renderer");
     let whole = [1, 3].map(|n_samples| at_once(&mut renderer, n_samples));
     for (most_pixels, n_parts) in [(None, 1), (Some(768), 1), (Some(767), 2), (Some(100), 8)] {
         renderer.limit_batches(most_pixels).expect("batches");
@@ -58,8 +58,8 @@ fn parts_make_the_same_picture() {
 #[test]
 fn what_is_dropped_half_way_leaves_no_trace() {
     let (scene, context, options) = (glass_in_glass(), device(), options_of_parts());
-    let tree = tree_of(&scene);
-    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
+    let world = world_of(&scene);
+    let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
     let whole = at_once(&mut renderer, 3);
     renderer.limit_batches(Some(200)).expect("batches");
     for n_before in 0..3 {
@@ -73,10 +73,10 @@ fn what_is_dropped_half_way_leaves_no_trace() {
     }
     assert!(renderer.draw_part().expect("a part").is_none());
     let brighter = RenderOptions { exposure: 2.0, ..options.clone() };
-    renderer.set_options(&brighter, &tree).expect("options");
+    renderer.set_options(&brighter).expect("options");
     assert!(!renderer.is_pending() && renderer.n_samples() == 3);
     assert!(!identical(&in_parts(&mut renderer, 4).0, &at_once(&mut renderer, 3)));
-    renderer.set_options(&options, &tree).expect("options");
+    renderer.set_options(&options).expect("options");
     assert!(identical(&at_once(&mut renderer, 3), &whole));
     assert_silent(&context);
 }
@@ -84,10 +84,9 @@ fn what_is_dropped_half_way_leaves_no_trace() {
 #[test]
 fn parts_that_overflow_are_drawn_anew() {
     let (scene, context) = (glass_in_glass(), device());
-    let tree = tree_of(&scene);
+    let world = world_of(&scene);
     let new = |capacity| {
-        Renderer::with_queue_capacity(context.clone(), &scene, &tree, &options_of_parts(), capacity)
-            .expect("a renderer")
+        Renderer::with_queue_capacity(context.clone(), &world, &options_of_parts(), capacity).expect("a renderer")
     };
     let whole = at_once(&mut new(100_000), 3);
     assert!(identical(&in_parts(&mut new(600), 3).0, &whole));
@@ -97,8 +96,8 @@ fn parts_that_overflow_are_drawn_anew() {
 #[test]
 fn the_picture_changes_with_the_last_part() {
     let (scene, context) = (glass_in_glass(), device());
-    let tree = tree_of(&scene);
-    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options_of_parts()).expect("a renderer");
+    let world = world_of(&scene);
+    let mut renderer = Renderer::new(context.clone(), &world, &options_of_parts()).expect("a renderer");
     assert_eq!(renderer.displayed(), None);
     renderer.limit_batches(Some(400)).expect("batches");
     assert!(renderer.draw_part().expect("a part").is_none());
@@ -130,8 +129,8 @@ fn the_picture_changes_with_the_last_part() {
 #[test]
 fn steps_make_the_same_picture() {
     let (scene, context) = (glass_in_glass(), device());
-    let tree = tree_of(&scene);
-    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options_of_parts()).expect("a renderer");
+    let world = world_of(&scene);
+    let mut renderer = Renderer::new(context.clone(), &world, &options_of_parts()).expect("a renderer");
     let whole = at_once(&mut renderer, 2);
     renderer.reset_samples();
     for _ in 0..2 {
@@ -151,9 +150,9 @@ fn steps_make_the_same_picture() {
 #[test]
 fn views_of_first_hits_trace_primary_rays_only() {
     let (scene, context) = (glass_in_glass(), device());
-    let tree = tree_of(&scene);
+    let world = world_of(&scene);
     let options = RenderOptions { features: true, ..options_of_parts() };
-    let new = || Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
+    let new = || Renderer::new(context.clone(), &world, &options).expect("a renderer");
     let (mut whole, mut renderer) = (new(), new());
     let picture = at_once(&mut whole, 2);
     whole.draw().expect("a frame");

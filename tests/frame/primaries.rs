@@ -4,21 +4,23 @@ use std::collections::HashSet;
 
 use glam::UVec2;
 use kdray::{
-    accel::kdtree::{KdTree, Traversal},
+    accel::kdtree::Traversal,
     choices::{Engine, primary_by_rule, traversal_by_rule},
     cpu::{bindings::Bindings, primary_hit::camera_ray, traverser::Traverser},
     frame::{Crop, Picture, Primary, RenderOptions, frame_constants},
     layout::Frame,
     render::Renderer,
     scene::Scene,
+    world::World,
 };
 
-use super::studio::{assert_silent, device, differing, identical, on_cpu, on_device, options, tree_of};
+use super::studio::{assert_silent, device, differing, identical, on_cpu, on_device, options, world_of};
 use crate::support::{scenes, with_lanes, without_wide_atomics};
 
 /// Whether rays within 1/8 px of the pixel's centre meet more than one triangle. (Corners are snapped to a grid of
 /// 1/16 px or finer.)
-fn is_on_edge(scene: &Scene, tree: &KdTree, options: &RenderOptions, pixel_ix: usize) -> bool {
+fn is_on_edge(world: &World, options: &RenderOptions, pixel_ix: usize) -> bool {
+    let (scene, tree) = (world.scene(), world.tree());
     let frame = frame_constants(scene, tree, options);
     let pixel = UVec2::new(pixel_ix as u32 % frame.width, pixel_ix as u32 / frame.width);
     let mut traverser = Traverser::new(options.traversal);
@@ -37,10 +39,10 @@ fn is_on_edge(scene: &Scene, tree: &KdTree, options: &RenderOptions, pixel_ix: u
 
 /// How many pixels differ in any bit, and those of them that are on no edge.
 fn off_edges(scene: &Scene, options: &RenderOptions, a: &Picture, b: &Picture) -> (usize, Vec<usize>) {
-    let tree = tree_of(scene);
+    let world = world_of(scene);
     let differing = differing(a, b, 0.0);
     let n = differing.len();
-    (n, differing.into_iter().filter(|&i| !is_on_edge(scene, &tree, options, i)).collect())
+    (n, differing.into_iter().filter(|&i| !is_on_edge(&world, options, i)).collect())
 }
 
 #[test]
@@ -66,9 +68,9 @@ fn compute_and_trace_are_the_same() {
         let context = device();
         [Primary::Compute, Primary::Trace].map(|primary| {
             let (scene, options) = (scenes::mixed_outdoors(), RenderOptions { primary, ..options.clone() });
-            let tree = tree_of(&scene);
+            let world = world_of(&scene);
             let mut renderer =
-                Renderer::with_queue_capacity(context.clone(), &scene, &tree, &options, capacity).expect("a renderer");
+                Renderer::with_queue_capacity(context.clone(), &world, &options, capacity).expect("a renderer");
             (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
             assert_silent(&context);
             renderer.picture().expect("a picture")
@@ -106,13 +108,13 @@ fn ways_suit_the_device() {
 fn primaries_change_between_frames() {
     let context = device();
     let (scene, raster) = (scenes::mixed(), options(60, 45, 2));
-    let tree = tree_of(&scene);
-    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &raster).expect("a renderer");
+    let world = world_of(&scene);
+    let mut renderer = Renderer::new(context.clone(), &world, &raster).expect("a renderer");
     let mut pictures = Vec::new();
     let all = if context.has_wide_atomics() { Primary::ALL } else { &[Primary::Raster, Primary::Trace] };
     for &primary in all.iter().chain(all) {
         let options = RenderOptions { primary, ..raster.clone() };
-        renderer.set_options(&options, &tree).expect("other options");
+        renderer.set_options(&options).expect("other options");
         pictures.push((primary, renderer.render().expect("a frame").0));
         assert_eq!(pictures.last().unwrap().1, on_device(&scene, &options), "{primary}");
     }

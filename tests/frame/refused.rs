@@ -5,15 +5,16 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use kdray::{
-    accel::kdtree::{KdTree, Traversal},
+    accel::kdtree::Traversal,
     buffers::SceneAccess,
     frame::{Crop, Denoise, Picture, Primary, RenderOptions, Tonemap},
     gpu::{Context, DeviceOverrides, GpuError},
     render::Renderer,
-    scene::{Camera, Scene},
+    scene::Camera,
+    world::World,
 };
 
-use super::studio::{assert_silent, device, identical, options, tree_of};
+use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::{pretended, scenes, without_wide_atomics};
 
 /// From where all pictures here are seen; not the scene's own camera.
@@ -66,8 +67,7 @@ fn state(renderer: &Renderer) -> State {
 /// A renderer that is changed again and again.
 struct Trial {
     context: Arc<Context>,
-    scene: Scene,
-    tree: KdTree,
+    world: World,
     renderer: Renderer,
     /// What new renderers draw by two samples, for each of the options so far.
     untouched: Vec<(RenderOptions, Picture)>,
@@ -76,13 +76,13 @@ struct Trial {
 impl Trial {
     fn new(context: Arc<Context>, start: &RenderOptions) -> Self {
         let scene = scenes::mixed_outdoors();
-        let tree = tree_of(&scene);
-        let renderer = Self::renderer(&context, &scene, &tree, start);
-        Self { context, scene, tree, renderer, untouched: Vec::new() }
+        let world = world_of(&scene);
+        let renderer = Self::renderer(&context, &world, start);
+        Self { context, world, renderer, untouched: Vec::new() }
     }
 
-    fn renderer(context: &Arc<Context>, scene: &Scene, tree: &KdTree, options: &RenderOptions) -> Renderer {
-        let mut renderer = Renderer::new(context.clone(), scene, tree, options).expect("a renderer");
+    fn renderer(context: &Arc<Context>, world: &World, options: &RenderOptions) -> Renderer {
+        let mut renderer = Renderer::new(context.clone(), world, options).expect("a renderer");
         renderer.set_camera(&CAMERA);
         renderer.limit_batches(Some(BATCH)).expect("batches");
         renderer
@@ -94,7 +94,7 @@ impl Trial {
         if let Some((_, picture)) = self.untouched.iter().find(|(known, _)| known == options) {
             return picture.clone();
         }
-        let mut renderer = Self::renderer(&self.context, &self.scene, &self.tree, options);
+        let mut renderer = Self::renderer(&self.context, &self.world, options);
         begin(&mut renderer);
         let picture = finish(&mut renderer);
         self.untouched.push((options.clone(), picture.clone()));
@@ -109,7 +109,7 @@ impl Trial {
             begin(renderer);
             let (before, picture) = (state(renderer), renderer.picture().expect("a picture"));
             self.context.refuse_creations_after(Some(n_creations));
-            let changed = change(renderer, &self.tree);
+            let changed = change(renderer);
             self.context.refuse_creations_after(None);
             let Err(error) = changed else {
                 assert!(n_creations >= least_creations, "{name}: {n_creations} creations");
@@ -128,13 +128,13 @@ impl Trial {
     fn walk(&mut self, steps: &[(RenderOptions, u32)]) {
         for (to, least_creations) in steps {
             let name = format!("{:?} to {to:?}", self.renderer.options());
-            self.refuse(&name, *least_creations, &|renderer, tree| renderer.set_options(to, tree));
+            self.refuse(&name, *least_creations, &|renderer| renderer.set_options(to));
         }
         assert_silent(&self.context);
     }
 }
 
-type Change<'a> = dyn Fn(&mut Renderer, &KdTree) -> Result<(), GpuError> + 'a;
+type Change<'a> = dyn Fn(&mut Renderer) -> Result<(), GpuError> + 'a;
 
 #[test]
 fn another_traversal() {
@@ -168,9 +168,9 @@ fn another_size() {
     let size = |width, height| RenderOptions { width, height, ..small() };
     let mut trial = Trial::new(device(), &small());
     trial.walk(&[(size(23, 17), 20), (size(9, 8), 8)]);
-    trial.refuse("resize", 20, &|renderer, _| renderer.resize(30, 20));
+    trial.refuse("resize", 20, &|renderer| renderer.resize(30, 20));
     let crop = Crop { x0: 2, y0: 3, x1: 9, y1: 12 };
-    trial.refuse("crop", 8, &|renderer, _| renderer.set_crop(crop));
+    trial.refuse("crop", 8, &|renderer| renderer.set_crop(crop));
     assert_silent(&trial.context);
 }
 
@@ -192,7 +192,7 @@ fn other_views_of_the_same_samples() {
 #[test]
 fn other_batches() {
     let mut trial = Trial::new(device(), &small());
-    trial.refuse("batches", 6, &|renderer, _| renderer.limit_batches(Some(7)));
+    trial.refuse("batches", 6, &|renderer| renderer.limit_batches(Some(7)));
     assert_silent(&trial.context);
 }
 
@@ -226,7 +226,7 @@ fn what_the_device_lacks() {
         let untouched = trial.untouched();
         begin(&mut trial.renderer);
         let before = state(&trial.renderer);
-        let refused = trial.renderer.set_options(&RenderOptions { primary: Primary::Compute, ..small() }, &trial.tree);
+        let refused = trial.renderer.set_options(&RenderOptions { primary: Primary::Compute, ..small() });
         assert!(matches!(refused, Err(GpuError::Lacks { .. })), "{:?}", refused.err());
         assert_eq!(state(&trial.renderer), before);
         assert!(identical(&finish(&mut trial.renderer), &untouched), "{primary}");

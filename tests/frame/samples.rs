@@ -11,7 +11,7 @@ use super::{
     batches::glass_in_glass,
     studio::{
         assert_silent, device, differing, identical, on_both, options, samples_on_cpu as on_cpu,
-        samples_on_device as on_device, tree_of,
+        samples_on_device as on_device, world_of,
     },
 };
 use crate::support::{meshes, scenes};
@@ -76,9 +76,9 @@ fn one_sample_is_the_frame() {
 #[test]
 fn small_queues_give_the_same_bits() {
     let (scene, options, context) = (glass_in_glass(), options(31, 25, 6), device());
-    let tree = tree_of(&scene);
+    let world = world_of(&scene);
     let render = |capacity| {
-        let renderer = Renderer::with_queue_capacity(context.clone(), &scene, &tree, &options, capacity);
+        let renderer = Renderer::with_queue_capacity(context.clone(), &world, &options, capacity);
         let mut renderer = renderer.expect("a renderer");
         let profiles: Vec<_> = (0..9).map(|_| renderer.draw_sample().expect("a sample")).collect();
         (renderer.picture().expect("a picture"), profiles)

@@ -4,17 +4,18 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use kdray::{
-    accel::kdtree::{BuildOptions, KdTree, Traversal},
+    accel::kdtree::{BuildOptions, Traversal},
     cpu::{self, Batching},
     frame::{Picture, Primary, RenderOptions},
     gpu::Context,
     layout::{Feature, Slab},
     render::Renderer,
     scene::Scene,
+    world::World,
 };
 
 use super::studio::{assert_silent, identical, options};
-use crate::support::{meshes, scenes, with_lanes};
+use crate::support::{meshes, scenes, with_lanes, world_by, world_of};
 
 /// One whose kernels look at slabs, whatever the driver.
 fn device() -> Arc<Context> {
@@ -37,15 +38,15 @@ fn steps(features: &[Feature]) -> u64 {
 }
 
 /// The picture, and the steps of all its rays.
-fn render(context: &Arc<Context>, scene: &Scene, tree: &KdTree, traversal: Traversal) -> (Picture, u64) {
-    let mut renderer = Renderer::new(context.clone(), scene, tree, &options_of(traversal)).expect("a renderer");
+fn render(context: &Arc<Context>, world: &World, traversal: Traversal) -> (Picture, u64) {
+    let mut renderer = Renderer::new(context.clone(), world, &options_of(traversal)).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
     (picture, steps(&renderer.features().expect("features")))
 }
 
-fn steps_on_cpu(scene: &Scene, tree: &KdTree, traversal: Traversal) -> u64 {
+fn steps_on_cpu(world: &World, traversal: Traversal) -> u64 {
     let options = options_of(traversal);
-    let mut renderer = cpu::Renderer::new(scene, tree, &options, Batching::default()).expect("a scene and its tree");
+    let mut renderer = cpu::Renderer::new(world, &options, Batching::default());
     renderer.draw_sample();
     steps(&renderer.features())
 }
@@ -53,16 +54,15 @@ fn steps_on_cpu(scene: &Scene, tree: &KdTree, traversal: Traversal) -> u64 {
 #[test]
 fn slabs_spare_steps_and_change_no_bit() {
     let (scene, context) = (scene(), device());
-    let [with, without] =
-        [true, false].map(|slabs| KdTree::build(&scene.triangles, &BuildOptions { slabs, ..Default::default() }));
-    assert!(without.slabs().is_empty());
+    let [with, without] = [true, false].map(|slabs| world_by(&scene, &BuildOptions { slabs, ..Default::default() }));
+    assert!(without.tree().slabs().is_empty());
     // What is kept on the way down, a way back by boxes, and ropes: each goes on from a slab in its own way.
     for traversal in [Traversal::Mask, Traversal::Backtrack, Traversal::Ropes] {
         let ((expected, all), (found, some)) =
-            (render(&context, &scene, &without, traversal), render(&context, &scene, &with, traversal));
+            (render(&context, &without, traversal), render(&context, &with, traversal));
         assert!(identical(&expected, &found), "{traversal}");
         assert!(some < all * 97 / 100, "{traversal}: {some} steps of {all}");
-        let on_cpu = steps_on_cpu(&scene, &with, traversal);
+        let on_cpu = steps_on_cpu(&with, traversal);
         assert!(some.abs_diff(on_cpu) < all / 200, "{traversal}: {some} steps, {on_cpu} on the CPU");
     }
     assert_silent(&context);
@@ -72,11 +72,12 @@ fn slabs_spare_steps_and_change_no_bit() {
 #[test]
 fn slabs_beside_their_surface_lose_it() {
     let (scene, context) = (scene(), device());
-    let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
+    let world = world_of(&scene);
     let options = options_of(Traversal::Mask);
-    let mut renderer = Renderer::new(context.clone(), &scene, &tree, &options).expect("a renderer");
+    let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
     let expected = renderer.render().expect("a frame").0;
-    let moved: Vec<Slab> = tree.slabs().iter().map(|slab| Slab { offset: slab.offset + 2.0, ..*slab }).collect();
+    let moved: Vec<Slab> =
+        world.tree().slabs().iter().map(|slab| Slab { offset: slab.offset + 2.0, ..*slab }).collect();
     renderer.resources().accel.kd_slabs.upload(&moved).expect("slabs");
     assert!(!identical(&expected, &renderer.render().expect("a frame").0));
 }

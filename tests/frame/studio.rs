@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use kdray::{
-    accel::kdtree::{BuildOptions, KdTree},
     cpu::{self, Batching},
     frame::{Denoise, Picture, RenderOptions},
     gpu::{Context, ContextOptions},
@@ -11,13 +10,11 @@ use kdray::{
     scene::Scene,
 };
 
+pub use crate::support::world_of;
+
 /// Without a noise filter.
 pub fn options(width: u32, height: u32, max_depth: u32) -> RenderOptions {
     RenderOptions { width, height, max_depth, denoise: Denoise::Off, ..RenderOptions::default() }
-}
-
-pub fn tree_of(scene: &Scene) -> KdTree {
-    KdTree::build(&scene.triangles, &BuildOptions::default())
 }
 
 /// A device whose validation messages `assert_silent` looks at.
@@ -32,20 +29,20 @@ pub fn assert_silent(context: &Context) {
 
 pub fn on_device(scene: &Scene, options: &RenderOptions) -> Picture {
     let context = device();
-    let mut renderer = Renderer::new(context.clone(), scene, &tree_of(scene), options).expect("a renderer");
+    let mut renderer = Renderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
     assert_silent(&context);
     picture
 }
 
 pub fn on_cpu(scene: &Scene, options: &RenderOptions) -> Picture {
-    cpu::render(scene, &tree_of(scene), options).expect("a scene and its tree").0
+    cpu::render(&world_of(scene), options).0
 }
 
 /// The mean of so many samples a pixel.
 pub fn samples_on_device(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
     let context = device();
-    let mut renderer = Renderer::new(context.clone(), scene, &tree_of(scene), options).expect("a renderer");
+    let mut renderer = Renderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
     (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
     assert_silent(&context);
     renderer.picture().expect("a picture")
@@ -53,8 +50,8 @@ pub fn samples_on_device(scene: &Scene, options: &RenderOptions, n_samples: u32)
 
 /// As [`samples_on_device`].
 pub fn samples_on_cpu(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
-    let tree = tree_of(scene);
-    let mut renderer = cpu::Renderer::new(scene, &tree, options, Batching::default()).expect("a scene and its tree");
+    let world = world_of(scene);
+    let mut renderer = cpu::Renderer::new(&world, options, Batching::default());
     (0..n_samples).for_each(|_| drop(renderer.draw_sample()));
     renderer.picture()
 }

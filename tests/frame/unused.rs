@@ -7,7 +7,7 @@ use kdray::{
     scene::Scene,
 };
 
-use super::studio::{assert_silent, device, identical, options, tree_of};
+use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::scenes;
 
 const SIZE: (u32, u32) = (24, 18);
@@ -38,8 +38,8 @@ fn indices(renderer: &Renderer) -> Vec<u32> {
 #[test]
 fn only_what_draws_has_indices_and_targets() {
     let (scene, context) = (scenes::mixed_outdoors(), device());
-    let tree = tree_of(&scene);
-    let new = |primary| Renderer::new(context.clone(), &scene, &tree, &with(primary)).expect("a renderer");
+    let world = world_of(&scene);
+    let new = |primary| Renderer::new(context.clone(), &world, &with(primary)).expect("a renderer");
     let mut drawing = new(Primary::Raster);
     let drawn = drawing.render().expect("a frame").0;
     let ways = [Primary::Trace, Primary::Compute];
@@ -47,11 +47,11 @@ fn only_what_draws_has_indices_and_targets() {
         let mut renderer = new(from);
         assert_drawn_by(renderer.resources(), &scene, from);
         let before = renderer.render().expect("a frame").0;
-        renderer.set_options(&with(Primary::Raster), &tree).expect("options");
+        renderer.set_options(&with(Primary::Raster)).expect("options");
         assert_drawn_by(renderer.resources(), &scene, Primary::Raster);
         assert_eq!(indices(&renderer), indices(&drawing));
         assert!(identical(&renderer.render().expect("a frame").0, &drawn), "{from}");
-        renderer.set_options(&with(from), &tree).expect("options");
+        renderer.set_options(&with(from)).expect("options");
         assert_drawn_by(renderer.resources(), &scene, from);
         assert!(identical(&renderer.render().expect("a frame").0, &before), "{from}");
     }

@@ -14,7 +14,7 @@ use kdray::{
 };
 
 use super::stage::{FIRST, Stage, options};
-use crate::support::{World, compare, meshes, random::Random, scenes, without_wide_atomics};
+use crate::support::{MeshWithTree, compare, meshes, random::Random, scenes, without_wide_atomics, world_of};
 
 /// A stage whose kernels rasterize, and the pass that traces the same rays.
 struct View {
@@ -131,7 +131,7 @@ fn shows_what_camera_rays_hit_of_small_triangles() {
 fn shows_what_camera_rays_hit_of_slivers() {
     let (options, mut random) = (options(64, 48), Random(41));
     let mut scene = scenes::empty();
-    let tree = World::new(Vec::new()).tree;
+    let tree = MeshWithTree::new(Vec::new()).tree;
     let frame = frame_constants(&scene, &tree, &options);
     let mut sliver = || {
         let pixel = uvec2(random.below(64) as u32, random.below(48) as u32);
@@ -203,8 +203,7 @@ fn a_device_without_wide_atomics_is_told_so() {
     let context = without_wide_atomics();
     let scene = scenes::mixed();
     let options = RenderOptions { primary: Primary::Compute, ..options(9, 7) };
-    let tree = World::new(scene.triangles.clone()).tree;
-    match Renderer::new(context, &scene, &tree, &options).err() {
+    match Renderer::new(context, &world_of(&scene), &options).err() {
         Some(GpuError::Lacks { missing, .. }) => assert_eq!(missing, "shaderBufferInt64Atomics"),
         other => panic!("{other:?}"),
     }

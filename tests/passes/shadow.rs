@@ -34,7 +34,8 @@ fn check(stage: &Stage, batch: &Batch, n_rays: u32) -> Vec<u32> {
     queue.light_visibility.upload(&vec![UNTOUCHED_WORD; expected.len()]).expect("light_visibility");
     stage.trace(batch, |commands, batch| stage.passes.shadow.record(commands, &stage.resources, batch));
     let found = queue.light_visibility.download().expect("light_visibility");
-    compare::exact_but_for(stage.n_outliers(n_rays * stage.scene.lights.len() as u32), &expected, &found).unwrap();
+    compare::exact_but_for(stage.n_outliers(n_rays * stage.world.scene().lights.len() as u32), &expected, &found)
+        .unwrap();
     found
 }
 

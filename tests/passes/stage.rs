@@ -3,7 +3,7 @@
 use std::{cell::Cell, sync::Arc, thread};
 
 use kdray::{
-    accel::kdtree::{BuildOptions, Extras, KdTree},
+    accel::kdtree::{BuildOptions, Extras},
     buffers::{Needs, Resources},
     cpu::bindings::Bindings,
     frame::{Denoise, RenderOptions, frame_constants},
@@ -11,6 +11,7 @@ use kdray::{
     layout::{Batch, Bounce, Counters, Frame, Hit, NO_TRIANGLE, RAY_GROUP_SIZE, Ray},
     passes::Passes,
     scene::Scene,
+    world::World,
 };
 
 /// Numbers of rays around a workgroup's size.
@@ -31,8 +32,7 @@ pub const UNTOUCHED_WORD: u32 = 0xdead_beef;
 pub const UNTOUCHED_PIXEL: [f32; 4] = [-7.0; 4];
 
 pub struct Stage {
-    pub scene: Scene,
-    pub tree: KdTree,
+    pub world: World,
     pub extras: Extras,
     pub options: RenderOptions,
     pub resources: Resources,
@@ -51,18 +51,18 @@ impl Stage {
     /// A queue for `capacity` rays.
     pub fn new(scene: Scene, options: RenderOptions, capacity: u32) -> Self {
         let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
-        let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
-        let constants = Frame { queue_capacity: capacity, ..frame_constants(&scene, &tree, &options) };
+        let world = World::new(scene, &BuildOptions::default()).expect("a world");
+        let constants = Frame { queue_capacity: capacity, ..frame_constants(world.scene(), world.tree(), &options) };
         let needs = Needs { constants: &constants, options: &options, n_bounces: constants.max_depth as usize };
-        let resources = Resources::new(&context, &scene, &tree, &needs).expect("resources");
-        let extras = Extras::new(&tree, options.traversal);
+        let resources = Resources::new(&context, &world, &needs).expect("resources");
+        let extras = Extras::new(world.tree(), options.traversal);
         let passes = Passes::new(&context, &resources.bindings, &options).expect("passes");
-        Self { scene, tree, extras, options, resources, passes, context, expects_messages: Cell::new(false) }
+        Self { world, extras, options, resources, passes, context, expects_messages: Cell::new(false) }
     }
 
     /// The twin's view of the same scene.
     pub fn bindings(&self) -> Bindings<'_> {
-        Bindings::new(&self.scene, &self.tree, self.resources.constants()).with_extras(&self.extras)
+        Bindings::new(self.world.scene(), self.world.tree(), self.resources.constants()).with_extras(&self.extras)
     }
 
     /// Binds the descriptor set, records and runs.
@@ -151,8 +151,8 @@ pub const FIRST: Batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, dept
 
 /// `n` rays of every nasty kind at the stage's scene, with pixels and throughputs of their own.
 pub fn some_rays(stage: &Stage, n: u32) -> Vec<Ray> {
-    use crate::support::{World, random::Random, rays::nasty_ray};
-    let world = World::new(stage.scene.triangles.clone());
+    use crate::support::{MeshWithTree, random::Random, rays::nasty_ray};
+    let world = MeshWithTree::new(stage.world.scene().triangles.clone());
     (0..n)
         .map(|i| {
             let mut random = Random(u64::from(i));

@@ -60,7 +60,7 @@ fn is_met_nearby(stage: &Stage, pixel_ix: u32, id: u32) -> bool {
 fn is_touched(stage: &Stage, pixel_ix: u32, id: u32) -> bool {
     let (width, height) = (stage.options.width, stage.options.height);
     let centre = uvec2(pixel_ix % width, pixel_ix / width).as_dvec2() + 0.5;
-    let Some(triangle) = stage.scene.triangles.get(id as usize) else { return false };
+    let Some(triangle) = stage.world.scene().triangles.get(id as usize) else { return false };
     let clip = [triangle.v0, triangle.v1, triangle.v2]
         .map(|v| stage.resources.constants().clip_from_world.as_dmat4() * v.as_dvec3().extend(1.0));
     if clip.iter().any(|corner| corner.w <= 0.0) {

@@ -12,6 +12,7 @@ use kdray::{
     gpu::{Context, ContextOptions},
     layout::{CastRay, Hit, NO_TRIANGLE, Triangle},
     scene::{MIN_EXTENT, Scene, SceneError},
+    world::Geometry,
 };
 
 use super::{
@@ -63,12 +64,14 @@ fn rays(triangles: &[Triangle], n: usize) -> Vec<CastRay> {
 
 fn cast_on_cpu(triangles: &[Triangle], traversal: Traversal, rays: &[CastRay]) -> Vec<Hit> {
     let tree = KdTree::build(triangles, &BuildOptions::default());
-    CpuCaster::new(triangles, &tree, traversal).expect("a caster").cast(rays, Query::Closest)
+    let geometry = Geometry::new(triangles, &tree).expect("a tree of these triangles");
+    CpuCaster::new(geometry, traversal).cast(rays, Query::Closest)
 }
 
 fn cast_on_device(context: &std::sync::Arc<Context>, triangles: &[Triangle], rays: &[CastRay]) -> Vec<Hit> {
     let tree = KdTree::build(triangles, &BuildOptions::default());
-    Caster::new(context, triangles, &tree, Traversal::Stack).unwrap().cast(rays, Query::Closest, 1).unwrap().hits
+    let geometry = Geometry::new(triangles, &tree).expect("a tree of these triangles");
+    Caster::new(context, geometry, Traversal::Stack).unwrap().cast(rays, Query::Closest, 1).unwrap().hits
 }
 
 /// Rays that hit another triangle, or the same one elsewhere.

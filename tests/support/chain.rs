@@ -6,7 +6,7 @@ use kdray::{
     layout::{Plane, Triangle},
 };
 
-use super::{World, meshes::triangle};
+use super::{MeshWithTree, meshes::triangle};
 
 /// One triangle across x a leaf, that of the lower or of the upper half in turn.
 fn slabs(n: u32) -> Vec<Triangle> {
@@ -23,7 +23,7 @@ fn slabs(n: u32) -> Vec<Triangle> {
 }
 
 /// Rays that come from above leave the lower leaf of every level pending.
-pub fn chain(n_levels: u32) -> World {
+pub fn chain(n_levels: u32) -> MeshWithTree {
     let triangles = slabs(n_levels + 1);
     let flat = KdTree::build(&triangles, &BuildOptions { max_depth: Some(0), ..BuildOptions::default() });
     let leaf = |ix: u32| Node::Leaf { first: ix, count: 1 }.into();
@@ -46,5 +46,5 @@ pub fn chain(n_levels: u32) -> World {
     }
     parts.nodes[1] = Node::Leaf { first: 0, count: 0 }.into();
     let tree = KdTree::from_parts(parts, &triangles).expect("a tree");
-    World::with_tree(triangles, tree)
+    MeshWithTree::with_tree(triangles, tree)
 }

@@ -19,6 +19,8 @@ use kdray::{
     cpu::{bindings::Bindings, brute, kdtree::near_scene, probe::Probe},
     gpu::{Context, ContextOptions, DeviceOverrides},
     layout::{Frame, Hit, NO_TRIANGLE, Ray, Triangle},
+    scene::Scene,
+    world::{Geometry, World},
 };
 
 /// A device under validation, which is taken for what the overrides make of it.
@@ -37,15 +39,25 @@ pub fn without_wide_atomics() -> Arc<Context> {
     pretended(DeviceOverrides { no_wide_atomics: true, ..DeviceOverrides::default() })
 }
 
+/// The scene with its best tree.
+pub fn world_of(scene: &Scene) -> World {
+    world_by(scene, &BuildOptions::default())
+}
+
+/// The scene with a tree that is built so.
+pub fn world_by(scene: &Scene, build_options: &BuildOptions) -> World {
+    World::new(scene.clone(), build_options).expect("a material for each triangle")
+}
+
 /// Triangles and their tree, with no more of a frame than rays need.
-pub struct World {
+pub struct MeshWithTree {
     pub triangles: Vec<Triangle>,
     pub tree: KdTree,
     pub extras: Extras,
     pub frame: Frame,
 }
 
-impl World {
+impl MeshWithTree {
     pub fn new(triangles: Vec<Triangle>) -> Self {
         let tree = KdTree::build(&triangles, &BuildOptions::default());
         Self::with_tree(triangles, tree)
@@ -57,6 +69,11 @@ impl World {
 
     pub fn bindings(&self) -> Bindings<'_> {
         Bindings::of_tree(&self.triangles, &self.tree, &self.frame).with_extras(&self.extras)
+    }
+
+    /// What a cast goes through.
+    pub fn geometry(&self) -> Geometry<'_> {
+        Geometry::new(&self.triangles, &self.tree).expect("a tree of these triangles")
     }
 
     /// The closest hit beyond `t_min` over every triangle, of the ray as the traversal sees it.

@@ -6,7 +6,7 @@ use kdray::{
     layout::{NO_TRIANGLE, Ray, Triangle},
 };
 
-use super::{World, random::Random};
+use super::{MeshWithTree, random::Random};
 
 /// A ray of the length `t_max`, from no triangle.
 pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
@@ -32,7 +32,7 @@ fn axis_direction(random: &mut Random) -> Vec3 {
 }
 
 /// A point of a split plane of the tree, and the plane's axis.
-fn split_plane_point(random: &mut Random, world: &World, point: Vec3) -> (Vec3, usize) {
+fn split_plane_point(random: &mut Random, world: &MeshWithTree, point: Vec3) -> (Vec3, usize) {
     let mut point = point;
     for _ in 0..100 {
         if let Node::Split { axis, position, .. } = world.tree.node(random.below(world.tree.nodes().len()) as u32) {
@@ -44,7 +44,7 @@ fn split_plane_point(random: &mut Random, world: &World, point: Vec3) -> (Vec3, 
 }
 
 /// One of the kinds of rays below, in turn.
-pub fn nasty_ray(random: &mut Random, world: &World, kind: usize) -> Ray {
+pub fn nasty_ray(random: &mut Random, world: &MeshWithTree, kind: usize) -> Ray {
     let far = world.centre() + 3.0 * world.radius() * random.direction();
     let within = random.in_box(world.tree.cell_min(), world.tree.cell_max());
     let vertex = corner(random, &world.triangles);

@@ -57,15 +57,15 @@ impl Arena {
     /// # Errors
     /// Tree, structure or picture are beyond the device's limits or memory.
     pub fn new(context: &Arc<Context>, stage: &Stage) -> Result<Self, GpuError> {
-        let triangles = &stage.scene.triangles;
+        let triangles = &stage.scene().triangles;
         let mut scenery = Scenery::new(context, triangles)?;
         let mut build_ms = vec![scenery.build_ms()];
         for _ in 1..N_BUILDS {
             scenery = Scenery::new(context, triangles)?;
             build_ms.push(scenery.build_ms());
         }
-        let mut tree = AccelBuffers::new(context, triangles, &stage.tree, &stage.frame)?;
-        tree.add_extras(context, &stage.tree, Traversal::Ropes)?;
+        let mut tree = AccelBuffers::new(context, stage.world.geometry(), &stage.frame)?;
+        tree.add_extras(context, stage.tree(), Traversal::Ropes)?;
         Ok(Self {
             bindings: CastResources::bindings(context, &tree)?,
             tree,

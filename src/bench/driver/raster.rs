@@ -30,7 +30,7 @@ impl Raster {
             primary,
             ..RenderOptions::default()
         };
-        let renderer = Renderer::new(Arc::clone(context), &stage.scene, &stage.tree, &options)?;
+        let renderer = Renderer::new(Arc::clone(context), &stage.world, &options)?;
         Ok(Self { primary, renderer, frames: Vec::new() })
     }
 

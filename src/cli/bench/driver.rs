@@ -33,7 +33,7 @@ pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     let scene = scene?;
     let build_options = TreeKind::Best.options(Engine::of(Some(&context)));
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
-    let (stage, _) = progress.stage(&building, || stage(args, scene, build_options));
+    let (stage, _) = progress.stage(&building, || stage(args, scene, &build_options));
     let (arena, _) = progress.stage("letting the driver build its tree", || Arena::new(&context, &stage));
     let mut arena = arena?;
     let (sets, _) = progress.stage("making rays", || ray_sets(&stage));
@@ -52,24 +52,24 @@ pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     check_hits(&report)
 }
 
-fn stage(args: &DriverArgs, scene: Scene, build_options: BuildOptions) -> Stage {
+fn stage(args: &DriverArgs, scene: Scene, build_options: &BuildOptions) -> Stage {
     let size = (args.size.width, args.size.height);
     let make = if args.no_room { Stage::open } else { Stage::in_room };
     make(scene, size, build_options)
 }
 
 fn empty_report(args: &DriverArgs, stage: &Stage, context: &Context, builds: Builds) -> Report {
-    let n_triangles = stage.scene.triangles.len();
+    let n_triangles = stage.scene().triangles.len();
     Report {
         suite: "driver",
         device: context.info().name.clone(),
         driver: context.info().driver.clone(),
-        scene: stage.scene.name.clone(),
+        scene: stage.scene().name.clone(),
         room: !args.no_room,
         width: args.size.width,
         height: args.size.height,
         n_triangles,
-        tree: stage.tree.statistics(n_triangles, &stage.build_options),
+        tree: stage.tree().statistics(n_triangles, stage.world.build_options()),
         n_times: args.repeat,
         t_tolerance: T_TOLERANCE,
         builds,

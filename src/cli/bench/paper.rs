@@ -3,15 +3,15 @@
 use std::{path::Path, sync::Arc};
 
 use kdray::{
-    accel::kdtree::KdTree,
     bench::{
         Spread,
         paper::{Report, Reported, Row, SCENES, SIZES, draw_on_cpu, draw_on_gpu, options},
     },
     choices::{Engine, TreeKind, traversal_by_rule},
     frame::RenderOptions,
-    gpu::{Context, ContextOptions},
+    gpu::{Context, ContextOptions, GpuError},
     scene::Scene,
+    world::World,
 };
 
 use super::args::PaperArgs;
@@ -46,11 +46,11 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
     let engine = if args.no_cpu { Engine::of(Some(&context)) } else { Engine::Cpu };
     for (name, path) in SCENES.into_iter().zip(&scenes) {
         let (loaded, _) = progress.stage(&format!("loading {}", path.display()), || load(path, engine));
-        let (scene, tree) = loaded?;
+        let world = loaded?;
         for &size in &sizes {
             let drawing = format!("drawing {name}, {}x{}", size.0, size.1);
             let (row, _) = progress
-                .stage(&drawing, || measure(&context, (&scene, &tree), &options(&scene, size, traversal), &report));
+                .stage(&drawing, || measure(&context, &world, &options(world.scene(), size, traversal), &report));
             report.rows.push(row?);
         }
     }
@@ -59,22 +59,16 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
     print(&text(&report))
 }
 
-fn load(path: &Path, engine: Engine) -> Result<(Scene, KdTree), CliError> {
+fn load(path: &Path, engine: Engine) -> Result<World, CliError> {
     let scene = Scene::load(path)?;
-    let tree = KdTree::build(&scene.triangles, &TreeKind::Best.options(engine));
-    Ok((scene, tree))
+    Ok(World::new(scene, &TreeKind::Best.options(engine)).map_err(GpuError::from)?)
 }
 
-fn measure(
-    context: &Arc<Context>,
-    (scene, tree): (&Scene, &KdTree),
-    options: &RenderOptions,
-    report: &Report,
-) -> Result<Row, CliError> {
-    let on_gpu = draw_on_gpu(context, scene, tree, options, report.n_gpu_frames)?;
-    let on_cpu = draw_on_cpu(scene, tree, options, report.n_cpu_frames)
+fn measure(context: &Arc<Context>, world: &World, options: &RenderOptions, report: &Report) -> Result<Row, CliError> {
+    let on_gpu = draw_on_gpu(context, world, options, report.n_gpu_frames)?;
+    let on_cpu = draw_on_cpu(world, options, report.n_cpu_frames)
         .map_err(|error| CliError::Usage(format!("cannot start a thread: {error}")))?;
-    Ok(Row::new(scene, options, &on_gpu, &on_cpu))
+    Ok(Row::new(world.scene(), options, &on_gpu, &on_cpu))
 }
 
 /// The report as text that ends with a line break.

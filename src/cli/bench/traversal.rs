@@ -33,7 +33,7 @@ pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
     let build_options = TreeKind::Best.options(Engine::of(context.as_deref()));
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
-    let (stage, _) = progress.stage(&building, || stage(args, scene, build_options));
+    let (stage, _) = progress.stage(&building, || stage(args, scene, &build_options));
     let (sets, _) = progress.stage("making rays", || ray_sets(&stage));
 
     let mut tracers = Tracers::new(context.as_ref(), &stage, &variants)?;
@@ -63,25 +63,25 @@ fn variants(asked: &[Traversal]) -> Vec<Traversal> {
     variants
 }
 
-fn stage(args: &TraversalArgs, scene: Scene, build_options: BuildOptions) -> Stage {
+fn stage(args: &TraversalArgs, scene: Scene, build_options: &BuildOptions) -> Stage {
     let size = (args.size.width, args.size.height);
     let make = if args.no_room { Stage::open } else { Stage::in_room };
     make(scene, size, build_options)
 }
 
 fn empty_report(args: &TraversalArgs, stage: &Stage, context: Option<&Arc<Context>>) -> Report {
-    let n_triangles = stage.scene.triangles.len();
+    let n_triangles = stage.scene().triangles.len();
     let info = context.map(|context| context.info());
     Report {
         suite: "traversal",
         device: info.map_or_else(|| format!("CPU, {} threads", rayon::current_num_threads()), |info| info.name.clone()),
         driver: info.map(|info| info.driver.clone()),
-        scene: stage.scene.name.clone(),
+        scene: stage.scene().name.clone(),
         room: !args.no_room,
         width: args.size.width,
         height: args.size.height,
         n_triangles,
-        tree: stage.tree.statistics(n_triangles, &stage.build_options),
+        tree: stage.tree().statistics(n_triangles, stage.world.build_options()),
         n_times: args.repeat,
         sets: Vec::new(),
     }

@@ -3,21 +3,21 @@
 use std::{borrow::Cow, sync::Arc};
 
 use kdray::{
-    accel::kdtree::KdTree,
     cpu::{self, Batching},
     frame::{Picture, RenderOptions},
     gpu::{Context, GpuError},
     render::{BandedRenderer, Drawn, Watcher},
-    scene::{Camera, Scene},
+    scene::Camera,
+    world::World,
 };
 use tracing::info_span;
 
 use crate::cli::progress::Steps;
 
 /// Either renderer.
-pub enum Drawer<'a> {
+pub enum Drawer {
     Device(Box<BandedRenderer>),
-    Cpu(Box<cpu::Renderer<'a>>),
+    Cpu(Box<cpu::Renderer>),
 }
 
 /// Moves the bar as far as a drawing is.
@@ -37,16 +37,11 @@ impl Watcher for Bar<'_, '_> {
     }
 }
 
-impl<'a> Drawer<'a> {
-    pub fn new(
-        context: Option<&Arc<Context>>,
-        scene: &'a Scene,
-        tree: &'a KdTree,
-        options: &'a RenderOptions,
-    ) -> Result<Self, GpuError> {
+impl Drawer {
+    pub fn new(context: Option<&Arc<Context>>, world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
         Ok(match context {
-            Some(context) => Self::Device(Box::new(BandedRenderer::new(Arc::clone(context), scene, tree, options)?)),
-            None => Self::Cpu(Box::new(cpu::Renderer::new(scene, tree, options, Batching::default())?)),
+            Some(context) => Self::Device(Box::new(BandedRenderer::new(Arc::clone(context), world, options)?)),
+            None => Self::Cpu(Box::new(cpu::Renderer::new(world, options, Batching::default()))),
         })
     }
 

@@ -10,12 +10,12 @@ use std::{
 };
 
 use kdray::{
-    accel::kdtree::KdTree,
     choices::{Cache, Choices, Engine, Workload},
     frame::Profile,
-    gpu::{Context, ContextOptions},
+    gpu::{Context, ContextOptions, GpuError},
     output,
     scene::{Camera, CameraPath, Scene},
+    world::World,
 };
 use tracing::info_span;
 
@@ -62,16 +62,17 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let build_options = tree_kind.value.options(engine);
     build::check_memory(&build_options, n_triangles)?;
     let building = format!("building the kd-tree of {n_triangles} triangles");
-    let build = || KdTree::build(&scene.triangles, &build_options);
-    let (tree, build_ms) = progress.stage(&building, || info_span!("build tree").in_scope(build));
+    let build = || World::new(scene, &build_options);
+    let (world, build_ms) = progress.stage(&building, || info_span!("build tree").in_scope(build));
+    let world = world.map_err(GpuError::from)?;
     let (used, cache) = (context.as_ref(), Cache::open());
-    let methods = request.methods(used, (&scene, &tree), &build_options, &workload, &cache)?;
+    let methods = request.methods(used, &world, &workload, &cache)?;
     let options = methods.apply(&options);
     let crop = options.crop_or_whole();
     let rendering = format!("rendering {}x{}", crop.width(), crop.height());
     let (drawn, _) = progress.stage(&rendering, || {
         let begin = Instant::now();
-        let drawer = Drawer::new(context.as_ref(), &scene, &tree, &options)?;
+        let drawer = Drawer::new(context.as_ref(), &world, &options)?;
         draw_and_write(args, drawer, &views, (&progress, &rendering), begin)
     });
     let (profiles, render_ms) = drawn.map_err(CliError::of_drawing)?;
@@ -83,14 +84,14 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         output::write(path, &trace_json(begun_at, &spans.sorted(), &profile))?;
     }
     let report = Report {
-        scene: scene.name,
+        scene: world.scene().name.clone(),
         pictures: views.iter().map(|view| view.files.picture.clone()).collect(),
         extra_files: views.iter().flat_map(|view| view.files.beside()).cloned().collect(),
         options: (&options).into(),
         choices: Choices::of_pictures(tree_kind, methods),
         samples: args.spp,
         triangles: n_triangles,
-        tree: tree.statistics(n_triangles, &build_options),
+        tree: world.tree().statistics(n_triangles, &build_options),
         load_ms,
         build_ms,
         render_ms,

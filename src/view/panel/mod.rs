@@ -134,7 +134,7 @@ fn section(ui: &mut Ui, name: &str, is_open: bool, body: impl FnOnce(&mut Ui)) {
 
 fn status(ui: &mut Ui, facts: &Facts) {
     let Facts { loaded, picture, window, n_samples, n_wanted, .. } = facts;
-    ui.label(format!("{}: {} triangles", loaded.scene.name, loaded.scene.triangles.len()));
+    ui.label(format!("{}: {} triangles", loaded.scene().name, loaded.scene().triangles.len()));
     ui.label(facts.device);
     ui.label(format!("{}x{} in {}x{}", picture.0, picture.1, window.0, window.1));
     let way = if facts.is_flying { "fly" } else { "orbit" };

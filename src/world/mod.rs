@@ -1,0 +1,78 @@
+//! What is rendered: a scene with the acceleration structure over its triangles, consistent by construction.
+
+mod geometry;
+mod mismatch;
+
+use std::sync::Arc;
+
+pub use self::{geometry::Geometry, mismatch::Mismatch};
+use crate::{
+    accel::{
+        Accel,
+        kdtree::{BuildOptions, KdTree},
+    },
+    scene::Scene,
+};
+
+/// A scene and its acceleration structure.
+///
+/// Kernels read both without bounds checks. So a world checks that every index of the scene names an element of its
+/// arrays, builds the structure itself or checks that it fits, and nothing can change either of them afterwards. A clone
+/// is a second handle to the same world.
+#[derive(Clone, Debug)]
+pub struct World(Arc<Parts>);
+
+#[derive(Debug)]
+struct Parts {
+    scene: Scene,
+    accel: Accel,
+    build_options: BuildOptions,
+}
+
+impl World {
+    /// Builds the kd-tree of a scene on the current rayon pool.
+    ///
+    /// # Errors
+    /// The scene has a triangle without a material.
+    pub fn new(scene: Scene, build_options: &BuildOptions) -> Result<Self, Mismatch> {
+        mismatch::check_materials(&scene)?;
+        let tree = KdTree::build(&scene.triangles, build_options);
+        Self::with_tree(scene, tree, build_options)
+    }
+
+    /// Joins a scene and a kd-tree that was built elsewhere, with `build_options`.
+    ///
+    /// # Errors
+    /// The scene has a triangle without a material; the tree is one of more or fewer triangles.
+    pub fn with_tree(scene: Scene, tree: KdTree, build_options: &BuildOptions) -> Result<Self, Mismatch> {
+        mismatch::check_materials(&scene)?;
+        Geometry::new(&scene.triangles, &tree)?;
+        Ok(Self(Arc::new(Parts { scene, accel: Accel::KdTree(tree), build_options: build_options.clone() })))
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.0.scene
+    }
+
+    /// The acceleration structure over the scene's triangles.
+    pub fn accel(&self) -> &Accel {
+        &self.0.accel
+    }
+
+    /// The kd-tree over the scene's triangles.
+    pub fn tree(&self) -> &KdTree {
+        let Accel::KdTree(tree) = &self.0.accel;
+        tree
+    }
+
+    /// The options that the acceleration structure was built with.
+    pub fn build_options(&self) -> &BuildOptions {
+        &self.0.build_options
+    }
+
+    /// The triangles and their acceleration structure, which is all that casting rays needs.
+    pub fn geometry(&self) -> Geometry<'_> {
+        Geometry::of_world(self)
+    }
+}
