@@ -49,7 +49,7 @@ fn primaries(context: &Context) -> &'static [Primary] {
 /// whose last one comes before `next`. Gives the passes' names.
 fn checked_names(profile: &Profile, next: &str) -> Vec<&'static str> {
     for pass in &profile.passes {
-        let scope = pass.pass().scope;
+        let scope = pass.pass().scope();
         let (is_bounces, is_batches) = (scope == Scope::Bounce, scope != Scope::Frame);
         assert_eq!((pass.bounce.is_some(), pass.batch.is_some()), (is_bounces, is_batches), "{}", pass.name);
     }
@@ -78,7 +78,7 @@ fn the_table_has_every_pass_and_tracing_takes_all_that_find_primary_hits() {
         (0..2).for_each(|_sample| names.extend(checked_names(&on_cpu.draw_sample(), "features")));
     }
     let by_kernels = |name: &str| name.starts_with("rasterize_") && !context.has_wide_atomics();
-    let known = Pass::ALL.iter().map(|pass| pass.name).filter(|name| !by_kernels(name));
+    let known = Pass::all().map(Pass::name).filter(|name| !by_kernels(name));
     assert_eq!(names, known.collect::<BTreeSet<_>>());
     assert_eq!(context.validation_messages(), Vec::<String>::new());
 }

@@ -1,4 +1,4 @@
-//! The frame on the CPU: the order of passes, batch by batch.
+//! The frame on the CPU: what [`Plan`] says, batch by batch.
 
 use bytemuck::Zeroable;
 
@@ -16,7 +16,10 @@ use super::{
 };
 use crate::{
     accel::kdtree::Extras,
-    frame::{BounceStats, Picture, Primary, Profile, RenderOptions, frame_constants},
+    frame::{
+        BounceStats, Denoise, FrameKind, Pass, Picture, Plan, Primary, Profile, RenderOptions, frame_constants,
+        plan::passes,
+    },
     layout::{Bounce, Feature, Frame, Hit, Ray, SCAN_GROUP_SIZE},
     scene::Camera,
     world::World,
@@ -52,11 +55,16 @@ pub struct Renderer {
     pixel_radiance: Vec<[f32; 4]>,
     /// Sums of samples; empty before there is a second one.
     pixel_accumulated: Vec<[f32; 4]>,
+    /// Empty where there is no noise filter.
     pixel_filtered: Vec<[f32; 4]>,
     pixel_display: Vec<[u8; 4]>,
     /// Empty where the options do not ask for them.
     pixel_features: Vec<Feature>,
     queue: Queue,
+    /// Rays of the batch beyond which it is halved.
+    most_rays: u32,
+    /// One row a bounce of the batch.
+    batch_stats: Vec<BounceStats>,
     /// Samples a pixel that the picture holds.
     n_samples: u32,
     clock: Clock,
@@ -79,10 +87,12 @@ impl Renderer {
             triangle_ids: vec![0; n_pixels],
             pixel_radiance: vec![[0.0; 4]; n_pixels],
             pixel_accumulated: Vec::new(),
-            pixel_filtered: vec![[0.0; 4]; n_pixels],
+            pixel_filtered: Vec::new(),
             pixel_display: vec![[0; 4]; n_pixels],
             pixel_features: vec![Feature::default(); if options.features { n_pixels } else { 0 }],
             queue: Queue::default(),
+            most_rays: 0,
+            batch_stats: Vec::new(),
             n_samples: 0,
             clock: Clock::start(),
             bounces: Vec::new(),
@@ -107,16 +117,15 @@ impl Renderer {
             self.pixel_accumulated.clone_from(&self.pixel_radiance);
         }
         self.pixel_features.fill(Feature::default());
-        if self.options.primary != Primary::Trace {
-            self.visibility();
-        }
+        let plan = Plan::new(&self.frame_kind());
+        passes(&plan.visibility).for_each(|pass| self.run(pass, 0));
         let n_pixels = self.pixel_radiance.len() as u32;
         for first_pixel in (0..n_pixels).step_by(self.batching.n_pixels as usize) {
             let n_pixels_of_batch = self.batching.n_pixels.min(n_pixels - first_pixel);
-            self.batch(first_pixel, n_pixels_of_batch);
+            self.batch(&plan, first_pixel, n_pixels_of_batch);
             progress((first_pixel + n_pixels_of_batch) as f32 / n_pixels as f32);
         }
-        self.finish();
+        passes(&plan.image).for_each(|pass| self.run(pass, 0));
         self.n_samples += 1;
         self.profile()
     }
@@ -142,7 +151,7 @@ impl Renderer {
         Picture {
             width: crop.width(),
             height: crop.height(),
-            radiance: window.part(&self.pixel_filtered, &crop),
+            radiance: window.part(if self.filters() { &self.pixel_filtered } else { &self.pixel_radiance }, &crop),
             display: window.part(&self.pixel_display, &crop),
         }
     }
@@ -156,151 +165,206 @@ impl Renderer {
         self.options.window().part(&self.pixel_features, &self.options.crop_or_whole())
     }
 
-    fn visibility(&mut self) {
-        let bindings = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
-        let (traversal, ids) = (self.options.traversal, &mut self.triangle_ids);
-        self.clock.time("visibility", None, || visibility::visibility(&bindings, traversal, ids));
+    /// Which passes the next sample has. Kernels that rasterize are the device's alone.
+    fn frame_kind(&self) -> FrameKind {
+        let kind = FrameKind::new(&self.options, self.frame.n_lights);
+        let primary = if kind.primary == Primary::Trace { Primary::Trace } else { Primary::Raster };
+        FrameKind { primary, adds_samples: self.n_samples > 0, ..kind }
     }
 
-    /// Algorithm 1 for a batch of pixels: all bounces and their light, or those of its halves where there are more rays than the
+    /// Draws a batch of pixels: all bounces and their light, or those of its halves where there are more rays than the
     /// queue is meant to hold.
-    fn batch(&mut self, first_pixel: u32, n_pixels: u32) {
-        let capacity = if n_pixels == 1 { u32::MAX } else { self.batching.queue_capacity };
-        let mut stats = Vec::new();
-        self.primary_rays(first_pixel, n_pixels);
-        for depth in 0..self.options.max_depth {
-            stats.push(self.closest_hits(depth));
-            if depth == 0 && self.options.features {
-                self.note_features();
-            }
-            if depth + 1 == self.options.max_depth {
-                break;
-            }
-            let next = self.next_rays(depth, capacity);
-            if next.overflow != 0 {
-                self.clock.end_batch(&stats);
-                self.batch(first_pixel, n_pixels / 2);
-                self.batch(first_pixel + n_pixels / 2, n_pixels - n_pixels / 2);
-                return;
-            }
-            if next.n_rays == 0 {
-                break;
+    fn batch(&mut self, plan: &Plan, first_pixel: u32, n_pixels: u32) {
+        self.most_rays = if n_pixels == 1 { u32::MAX } else { self.batching.queue_capacity };
+        self.batch_stats.clear();
+        self.primary_rays(plan, first_pixel, n_pixels);
+        for (depth, bounce) in (0..).zip(&plan.bounces) {
+            passes(bounce).for_each(|pass| self.run(pass, depth));
+            match self.queue.bounces.get(depth as usize + 1) {
+                Some(next) if next.overflow != 0 => {
+                    self.clock.end_batch(&self.batch_stats);
+                    self.batch(plan, first_pixel, n_pixels / 2);
+                    self.batch(plan, first_pixel + n_pixels / 2, n_pixels - n_pixels / 2);
+                    return;
+                }
+                Some(next) if next.n_rays > 0 => (),
+                _ => break,
             }
         }
         if self.options.features {
             self.note_costs();
         }
-        self.light(&mut stats);
-        self.count(&stats);
+        passes(&plan.light).for_each(|pass| self.run(pass, 0));
+        self.count();
     }
 
-    fn primary_rays(&mut self, first_pixel: u32, n_pixels: u32) {
+    /// Runs a pass of a bounce of the batch, or one without a bounce.
+    fn run(&mut self, pass: Pass, depth: u32) {
+        match pass {
+            Pass::Visibility => self.visibility(),
+            Pass::PrimaryHit | Pass::Trace => self.closest_hits(pass, depth),
+            Pass::Features => self.note_features(),
+            Pass::CompactReduce => self.compact_reduce(depth),
+            Pass::CompactSpine => self.compact_spine(depth),
+            Pass::CompactScatter => self.compact_scatter(depth),
+            Pass::Shadow => self.shadow(),
+            Pass::Shade => self.shade(),
+            Pass::Resolve => self.resolve(),
+            Pass::Accumulate => self.accumulate(),
+            Pass::Denoise => self.denoise(),
+            Pass::Tonemap => self.tonemap(),
+            Pass::RasterizeTriangles | Pass::RasterizeBlocks | Pass::FalseColor => {
+                unreachable!("the CPU's plan has no `{}`", pass.name())
+            }
+        }
+    }
+
+    fn visibility(&mut self) {
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let (traversal, ids) = (self.options.traversal, &mut self.triangle_ids);
+        self.clock.time(Pass::Visibility, None, || visibility::visibility(&inputs, traversal, ids));
+    }
+
+    /// The queue's first rays, which on the device every kernel makes for itself. Their time is the first pass's.
+    fn primary_rays(&mut self, plan: &Plan, first_pixel: u32, n_pixels: u32) {
         let Queue { rays, bounces, .. } = &mut self.queue;
         *bounces = vec![Bounce::of(n_pixels, &self.frame)];
         rays.resize(n_pixels as usize, Ray::zeroed());
-        let of_pass = if self.options.primary != Primary::Trace { "primary_hit" } else { "trace" };
-        self.clock.time(of_pass, Some(0), || primary_hit::primary_rays(&self.frame, first_pixel, rays));
+        let first_pass = passes(&plan.bounces[0]).next().expect("a pass that finds hits");
+        self.clock.time(first_pass, Some(0), || primary_hit::primary_rays(&self.frame, first_pixel, rays));
     }
 
     /// Fills the bounce's `hits`, and counts them.
-    fn closest_hits(&mut self, depth: u32) -> BounceStats {
-        let bindings = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+    fn closest_hits(&mut self, pass: Pass, depth: u32) {
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
         let Queue { rays, bounces, hits, .. } = &mut self.queue;
         hits.resize(rays.len(), Hit::zeroed());
         let places = bounces[depth as usize].rays();
         let (rays, hits) = (&rays[places.clone()], &mut hits[places]);
-        let n_hits = if depth == 0 && self.options.primary != Primary::Trace {
-            let ids = &self.triangle_ids;
-            self.clock.time("primary_hit", Some(0), || primary_hit::primary_hit(&bindings, ids, rays, hits))
-        } else {
-            let traversal = self.options.traversal;
-            self.clock.time("trace", Some(depth), || trace::trace(&bindings, traversal, rays, hits))
-        };
-        BounceStats { n_rays: rays.len() as u64, n_hits: n_hits.into(), n_shadow_rays: 0 }
+        let (ids, traversal) = (&self.triangle_ids, self.options.traversal);
+        let n_hits = self.clock.time(pass, Some(depth), || match pass {
+            Pass::PrimaryHit => primary_hit::primary_hit(&inputs, ids, rays, hits),
+            _ => trace::trace(&inputs, traversal, rays, hits),
+        });
+        self.batch_stats.push(BounceStats { n_rays: rays.len() as u64, n_hits: n_hits.into(), n_shadow_rays: 0 });
     }
 
     /// What primary rays meet.
     fn note_features(&mut self) {
-        let bindings = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
         let (Queue { rays, hits, .. }, pixels) = (&self.queue, &mut self.pixel_features);
-        self.clock.time("features", Some(0), || features::features(&bindings, rays, hits, pixels));
+        self.clock.time(Pass::Features, Some(0), || features::features(&inputs, rays, hits, pixels));
     }
 
     /// What the rays of all bounces cost.
     fn note_costs(&mut self) {
-        let bindings = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
         let (traversal, pixels) = (self.options.traversal, &mut self.pixel_features);
         let Queue { rays, bounces, hits, .. } = &self.queue;
         let n_rasterized = if self.options.primary != Primary::Trace { bounces[0].n_rays as usize } else { 0 };
         let (rasterized, traced) = rays.split_at(n_rasterized);
         costs::count_rasterized(rasterized, hits, pixels);
-        costs::count_closest(&bindings, traversal, traced, pixels);
-        costs::count_shadow(&bindings, traversal, rays, hits, pixels);
+        costs::count_closest(&inputs, traversal, traced, pixels);
+        costs::count_shadow(&inputs, traversal, rays, hits, pixels);
     }
 
-    /// Compacts the rays that go on from the bounce's hits, behind it; returns what the spine says of them.
-    fn next_rays(&mut self, depth: u32, capacity: u32) -> Bounce {
-        let constants = Frame { queue_capacity: capacity, ..self.frame };
-        let bindings = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
-        let Queue { rays, bounces, hits, child_kinds, first_children, scan_blocks, .. } = &mut self.queue;
-        let (this, mut next) = (bounces[depth as usize], Bounce::of(0, &self.frame));
-        let places = this.rays();
+    /// Finds out which rays go on from the bounce's hits, and counts them.
+    fn compact_reduce(&mut self, depth: u32) {
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let Queue { rays, bounces, hits, child_kinds, scan_blocks, .. } = &mut self.queue;
+        let places = bounces[depth as usize].rays();
         child_kinds.resize(rays.len(), 0);
-        first_children.resize(rays.len(), 0);
         scan_blocks.resize(places.len().div_ceil(SCAN_GROUP_SIZE as usize), 0);
-        let (kinds, first_children) = (&mut child_kinds[places.clone()], &mut first_children[places.clone()]);
         let parents = Parents { rays: &rays[places.clone()], hits: &hits[places.clone()] };
-        self.clock.time("compact_reduce", Some(depth), || compact::reduce(&bindings, parents, kinds, scan_blocks));
-        self.clock.time("compact_spine", Some(depth), || compact::spine(scan_blocks, &constants, &this, &mut next));
+        let kinds = &mut child_kinds[places];
+        self.clock.time(Pass::CompactReduce, Some(depth), || compact::reduce(&inputs, parents, kinds, scan_blocks));
+    }
+
+    /// Sizes the next bounce.
+    fn compact_spine(&mut self, depth: u32) {
+        let constants = Frame { queue_capacity: self.most_rays, ..self.frame };
+        let Queue { bounces, scan_blocks, .. } = &mut self.queue;
+        let (this, mut next) = (bounces[depth as usize], Bounce::of(0, &self.frame));
+        let spine = || compact::spine(scan_blocks, &constants, &this, &mut next);
+        self.clock.time(Pass::CompactSpine, Some(depth), spine);
+        bounces.push(next);
+    }
+
+    /// Writes the next bounce's rays behind this one's, if there is room for them.
+    fn compact_scatter(&mut self, depth: u32) {
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let Queue { rays, bounces, hits, child_kinds, first_children, scan_blocks, .. } = &mut self.queue;
+        let (this, next) = (bounces[depth as usize], bounces[depth as usize + 1]);
+        if next.overflow != 0 {
+            return;
+        }
+        let places = this.rays();
+        first_children.resize(rays.len(), 0);
         rays.resize(next.rays().end, Ray::zeroed());
         let (so_far, next_rays) = rays.split_at_mut(next.rays().start);
-        let parents = Parents { rays: &so_far[places.clone()], hits: &hits[places] };
-        if next.overflow == 0 {
-            self.clock.time("compact_scatter", Some(depth), || {
-                compact::scatter(&bindings, parents, kinds, scan_blocks, next.first_ray, first_children, next_rays);
-            });
-        }
-        bounces.push(next);
-        next
+        let parents = Parents { rays: &so_far[places.clone()], hits: &hits[places.clone()] };
+        let (kinds, first_children) = (&child_kinds[places.clone()], &mut first_children[places]);
+        self.clock.time(Pass::CompactScatter, Some(depth), || {
+            compact::scatter(&inputs, parents, kinds, scan_blocks, next.first_ray, first_children, next_rays);
+        });
     }
 
-    /// Shadows and shading of all bounces, resolved to pixels; notes how many shadow segments were tested.
-    fn light(&mut self, stats: &mut [BounceStats]) {
-        let Queue { rays, bounces, hits, first_children, ray_radiance, light_visibility, .. } = &mut self.queue;
-        self.frame.queue_capacity = rays.len() as u32;
-        let bindings = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+    /// Tests the shadow segments of all bounces, and counts them.
+    fn shadow(&mut self) {
+        self.frame.queue_capacity = self.queue.rays.len() as u32;
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let Queue { rays, bounces, hits, light_visibility, .. } = &mut self.queue;
         let traversal = self.options.traversal;
-        light_visibility.resize(rays.len() * bindings.lights.len(), 0);
-        ray_radiance.resize(rays.len(), [0.0; 4]);
-        for (bounce, stats) in bounces.iter().zip(stats) {
+        light_visibility.resize(rays.len() * inputs.lights.len(), 0);
+        for (bounce, stats) in bounces.iter().zip(&mut self.batch_stats) {
             let of_bounce =
-                || shadow::shadow(&bindings, traversal, &bounce.rays(), (rays.as_slice(), hits), light_visibility);
-            stats.n_shadow_rays = self.clock.time("shadow", None, of_bounce).into();
+                || shadow::shadow(&inputs, traversal, &bounce.rays(), (rays.as_slice(), hits), light_visibility);
+            stats.n_shadow_rays = self.clock.time(Pass::Shadow, None, of_bounce).into();
         }
-        let lit = LitRays { rays, hits, light_visibility };
-        self.clock.time("shade", None, || shade::shade(&bindings, lit, ray_radiance));
-        let pixels = &mut self.pixel_radiance;
-        self.clock.time("resolve", None, || resolve::resolve(bounces, rays, ray_radiance, first_children, pixels));
     }
 
-    fn count(&mut self, stats: &[BounceStats]) {
+    fn shade(&mut self) {
+        self.frame.queue_capacity = self.queue.rays.len() as u32;
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let Queue { rays, hits, ray_radiance, light_visibility, .. } = &mut self.queue;
+        ray_radiance.resize(rays.len(), [0.0; 4]);
+        let lit = LitRays { rays, hits, light_visibility };
+        self.clock.time(Pass::Shade, None, || shade::shade(&inputs, lit, ray_radiance));
+    }
+
+    fn resolve(&mut self) {
+        let Queue { rays, bounces, first_children, ray_radiance, .. } = &self.queue;
+        let pixels = &mut self.pixel_radiance;
+        self.clock.time(Pass::Resolve, None, || resolve::resolve(bounces, rays, ray_radiance, first_children, pixels));
+    }
+
+    fn count(&mut self) {
+        let stats = &self.batch_stats;
         self.n_batches += 1;
         self.bounces.resize(self.bounces.len().max(stats.len()), BounceStats::default());
         self.bounces.iter_mut().zip(stats).for_each(|(sum, bounce)| sum.add(bounce));
         self.clock.end_batch(stats);
     }
 
-    /// The mean of the samples, and the post processes.
-    fn finish(&mut self) {
-        let (frame, radiance) = (&self.frame, &mut self.pixel_radiance);
-        if frame.n_samples > 1 {
-            let sums = &mut self.pixel_accumulated;
-            self.clock.time("accumulate", None, || accumulate::accumulate(frame, &[], radiance, sums));
-        }
-        let (filtered, display) = (&mut self.pixel_filtered, &mut self.pixel_display);
-        let curve = self.options.tonemap;
-        self.clock.time("denoise", None, || denoise::denoise(frame, radiance, filtered));
-        self.clock.time("tonemap", None, || tonemap::tonemap(frame, curve, filtered, display));
+    fn accumulate(&mut self) {
+        let (frame, radiance, sums) = (&self.frame, &mut self.pixel_radiance, &mut self.pixel_accumulated);
+        self.clock.time(Pass::Accumulate, None, || accumulate::accumulate(frame, &[], radiance, sums));
+    }
+
+    fn denoise(&mut self) {
+        let (frame, radiance, filtered) = (&self.frame, &self.pixel_radiance, &mut self.pixel_filtered);
+        filtered.resize(radiance.len(), [0.0; 4]);
+        self.clock.time(Pass::Denoise, None, || denoise::denoise(frame, radiance, filtered));
+    }
+
+    fn tonemap(&mut self) {
+        let filtered = if self.filters() { &self.pixel_filtered } else { &self.pixel_radiance };
+        let (frame, curve, display) = (&self.frame, self.options.tonemap, &mut self.pixel_display);
+        self.clock.time(Pass::Tonemap, None, || tonemap::tonemap(frame, curve, filtered, display));
+    }
+
+    fn filters(&self) -> bool {
+        self.options.denoise != Denoise::Off
     }
 
     fn profile(&self) -> Profile {

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::frame::{
-    BounceStats, PassTime,
+    BounceStats, Pass, PassTime,
     counts::{count_rays, is_in_batch},
 };
 
@@ -22,11 +22,12 @@ impl Clock {
     }
 
     /// Two runs on end count as one.
-    pub fn time<R>(&mut self, name: &'static str, bounce: Option<u32>, pass: impl FnOnce() -> R) -> R {
+    pub fn time<R>(&mut self, pass: Pass, bounce: Option<u32>, run: impl FnOnce() -> R) -> R {
         let start_ms = self.elapsed_ms();
-        let result = pass();
+        let result = run();
         let ms = self.elapsed_ms() - start_ms;
-        let mut pass = PassTime { name, bounce, start_ms: Some(start_ms), ms: Some(ms), ..PassTime::default() };
+        let mut pass =
+            PassTime { name: pass.name(), bounce, start_ms: Some(start_ms), ms: Some(ms), ..PassTime::default() };
         pass.batch = is_in_batch(&pass).then_some(self.batch_ix);
         let place = |pass: &PassTime| (pass.name, pass.bounce, pass.batch);
         match self.passes.last_mut().filter(|last| place(last) == place(&pass)) {

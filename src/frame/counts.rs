@@ -7,13 +7,13 @@ use crate::{
 
 /// Whether the pass runs once a batch, or once a bounce of a batch.
 pub(crate) fn is_in_batch(pass: &PassTime) -> bool {
-    pass.pass().scope != Scope::Frame
+    pass.pass().scope() != Scope::Frame
 }
 
 /// Fills in a pass's rays. `bounces`: of the pass's batch.
 pub(crate) fn count_rays(pass: &mut PassTime, bounces: &[BounceStats]) {
-    let role = pass.pass().role;
-    if pass.pass().scope == Scope::Batch {
+    let role = pass.pass().role();
+    if pass.pass().scope() == Scope::Batch {
         let sum = |count: fn(&BounceStats) -> u64| bounces.iter().map(count).sum();
         pass.n_rays_in = Some(sum(|bounce| bounce.n_rays));
         // The other passes of a batch make no rays: theirs end in pixels.

@@ -6,7 +6,9 @@ mod constants;
 pub(crate) mod counts;
 mod crop;
 mod pass;
+pub mod plan;
 mod profile;
+mod resource;
 pub mod sampling;
 mod view;
 
@@ -15,7 +17,9 @@ pub use self::{
     constants::frame_constants,
     crop::Crop,
     pass::{Pass, Role, Scope},
+    plan::{FrameKind, Plan, Section, Step, Touch},
     profile::{BounceStats, PassTime, Profile},
+    resource::Resource,
     view::View,
 };
 use crate::{accel::kdtree::Traversal, layout};

@@ -1,4 +1,13 @@
-//! The passes of a frame: what each one works for, and how often it runs.
+//! The passes of a frame: what each one works for, how often it runs, and what it reads and writes.
+
+use super::resource::{
+    Resource,
+    Resource::{
+        Bounces, ChildKinds, Counters, FirstChildren, Hits, LargeTriangles, LightVisibility, PixelAccumulated,
+        PixelDisplay, PixelFeatures, PixelFiltered, PixelNearest, PixelRadiance, RasterCount, RasterGroups,
+        RayRadiance, Rays, ScanBlocks, Stalls, TriangleIds,
+    },
+};
 
 /// What a pass works for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,53 +37,277 @@ pub enum Scope {
     Bounce,
 }
 
-/// One pass, by the name of its kernel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Pass {
-    pub name: &'static str,
-    pub role: Role,
-    pub scope: Scope,
-    /// The pass's colour in graphs, sRGB.
-    pub color: [u8; 3],
+/// One pass. [`Plan`](super::Plan) says when it runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Pass {
+    /// Rasterizes triangle indices by the graphics pipeline.
+    Visibility,
+    /// Rasterizes small triangles by a kernel, and notes large ones.
+    RasterizeTriangles,
+    /// Rasterizes the large triangles, block by block.
+    RasterizeBlocks,
+    /// Intersects each camera ray with the triangle that was rasterized in its pixel.
+    PrimaryHit,
+    /// Finds each ray's closest hit through the acceleration structure.
+    Trace,
+    /// Notes what each pixel shows.
+    Features,
+    /// Counts the rays that go on from the hits, block by block.
+    CompactReduce,
+    /// Turns the blocks' counts into prefix sums, and sizes the next bounce.
+    CompactSpine,
+    /// Writes the next bounce's rays.
+    CompactScatter,
+    /// Tests the segments from hits to lights.
+    Shadow,
+    /// Computes the light that each hit sends back along its ray.
+    Shade,
+    /// Adds up the light of each pixel's rays.
+    Resolve,
+    /// Turns the sample into the mean of all samples.
+    Accumulate,
+    /// Smooths pixels that stand out from their neighbours.
+    Denoise,
+    /// Displays a feature in place of the picture.
+    FalseColor,
+    /// Encodes radiance for display.
+    Tonemap,
 }
+
+/// What holds for a pass in every frame.
+struct Info {
+    pass: Pass,
+    name: &'static str,
+    role: Role,
+    scope: Scope,
+    color: [u8; 3],
+    reads: &'static [Resource],
+    writes: &'static [Resource],
+    /// The buffer that holds the size of its dispatch.
+    indirect: Option<Resource>,
+}
+
+/// A row for each pass, in the order of [`Pass`].
+const TABLE: [Info; 16] = [
+    Info {
+        pass: Pass::Visibility,
+        name: "visibility",
+        role: Role::PrimaryVisibility,
+        scope: Scope::Frame,
+        color: [120, 190, 255],
+        reads: &[],
+        writes: &[TriangleIds],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::RasterizeTriangles,
+        name: "rasterize_triangles",
+        role: Role::PrimaryVisibility,
+        scope: Scope::Frame,
+        color: [110, 225, 235],
+        reads: &[PixelNearest, LargeTriangles, RasterCount, RasterGroups],
+        writes: &[PixelNearest, LargeTriangles, RasterCount, RasterGroups],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::RasterizeBlocks,
+        name: "rasterize_blocks",
+        role: Role::PrimaryVisibility,
+        scope: Scope::Frame,
+        color: [60, 160, 170],
+        reads: &[PixelNearest, LargeTriangles, RasterCount],
+        writes: &[PixelNearest, LargeTriangles, RasterCount],
+        indirect: Some(RasterGroups),
+    },
+    Info {
+        pass: Pass::PrimaryHit,
+        name: "primary_hit",
+        role: Role::ClosestHit,
+        scope: Scope::Bounce,
+        color: [70, 130, 220],
+        reads: &[TriangleIds, PixelNearest, Counters, PixelFeatures],
+        writes: &[Hits, Counters, PixelFeatures],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::Trace,
+        name: "trace",
+        role: Role::ClosestHit,
+        scope: Scope::Bounce,
+        color: [240, 130, 60],
+        reads: &[Rays, Hits, Bounces, Counters, PixelFeatures, Stalls],
+        writes: &[Hits, Counters, PixelFeatures, Stalls],
+        indirect: Some(Bounces),
+    },
+    Info {
+        pass: Pass::Features,
+        name: "features",
+        role: Role::Image,
+        scope: Scope::Bounce,
+        color: [60, 160, 90],
+        reads: &[Rays, Hits, PixelFeatures],
+        writes: &[PixelFeatures],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::CompactReduce,
+        name: "compact_reduce",
+        role: Role::Compaction,
+        scope: Scope::Bounce,
+        color: [200, 90, 110],
+        reads: &[Rays, Hits, Bounces],
+        writes: &[ChildKinds, ScanBlocks],
+        indirect: Some(Bounces),
+    },
+    Info {
+        pass: Pass::CompactSpine,
+        name: "compact_spine",
+        role: Role::Compaction,
+        scope: Scope::Bounce,
+        color: [225, 120, 135],
+        reads: &[ScanBlocks, Bounces],
+        writes: &[ScanBlocks, Bounces],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::CompactScatter,
+        name: "compact_scatter",
+        role: Role::Compaction,
+        scope: Scope::Bounce,
+        color: [245, 160, 165],
+        reads: &[Rays, Hits, ChildKinds, ScanBlocks, Bounces],
+        writes: &[Rays, FirstChildren],
+        indirect: Some(Bounces),
+    },
+    Info {
+        pass: Pass::Shadow,
+        name: "shadow",
+        role: Role::Shadow,
+        scope: Scope::Batch,
+        color: [150, 110, 200],
+        reads: &[Rays, Hits, Bounces, LightVisibility, PixelFeatures, Stalls],
+        writes: &[LightVisibility, PixelFeatures, Stalls],
+        indirect: Some(Bounces),
+    },
+    Info {
+        pass: Pass::Shade,
+        name: "shade",
+        role: Role::Light,
+        scope: Scope::Batch,
+        color: [250, 210, 90],
+        reads: &[Rays, Hits, LightVisibility, Bounces, Counters],
+        writes: &[RayRadiance, Counters],
+        indirect: Some(Bounces),
+    },
+    Info {
+        pass: Pass::Resolve,
+        name: "resolve",
+        role: Role::Light,
+        scope: Scope::Batch,
+        color: [110, 200, 120],
+        reads: &[RayRadiance, FirstChildren, Bounces],
+        writes: &[PixelRadiance],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::Accumulate,
+        name: "accumulate",
+        role: Role::Image,
+        scope: Scope::Frame,
+        color: [210, 180, 240],
+        reads: &[Bounces, PixelAccumulated, PixelRadiance],
+        writes: &[PixelAccumulated, PixelRadiance],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::Denoise,
+        name: "denoise",
+        role: Role::Image,
+        scope: Scope::Frame,
+        color: [80, 180, 180],
+        reads: &[PixelRadiance],
+        writes: &[PixelFiltered],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::FalseColor,
+        name: "false_color",
+        role: Role::Image,
+        scope: Scope::Frame,
+        color: [190, 140, 140],
+        reads: &[PixelFeatures],
+        writes: &[PixelDisplay],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::Tonemap,
+        name: "tonemap",
+        role: Role::Image,
+        scope: Scope::Frame,
+        color: [170, 170, 170],
+        reads: &[PixelFiltered],
+        writes: &[PixelDisplay],
+        indirect: None,
+    },
+];
 
 impl Pass {
     /// Every pass that a frame can have, on the GPU and on the CPU.
-    pub const ALL: [Self; 16] = [
-        Self::new("visibility", Role::PrimaryVisibility, Scope::Frame, [120, 190, 255]),
-        Self::new("rasterize_triangles", Role::PrimaryVisibility, Scope::Frame, [110, 225, 235]),
-        Self::new("rasterize_blocks", Role::PrimaryVisibility, Scope::Frame, [60, 160, 170]),
-        Self::new("primary_hit", Role::ClosestHit, Scope::Bounce, [70, 130, 220]),
-        Self::new("trace", Role::ClosestHit, Scope::Bounce, [240, 130, 60]),
-        Self::new("features", Role::Image, Scope::Bounce, [60, 160, 90]),
-        Self::new("compact_reduce", Role::Compaction, Scope::Bounce, [200, 90, 110]),
-        Self::new("compact_spine", Role::Compaction, Scope::Bounce, [225, 120, 135]),
-        Self::new("compact_scatter", Role::Compaction, Scope::Bounce, [245, 160, 165]),
-        Self::new("shadow", Role::Shadow, Scope::Batch, [150, 110, 200]),
-        Self::new("shade", Role::Light, Scope::Batch, [250, 210, 90]),
-        Self::new("resolve", Role::Light, Scope::Batch, [110, 200, 120]),
-        Self::new("accumulate", Role::Image, Scope::Frame, [210, 180, 240]),
-        Self::new("denoise", Role::Image, Scope::Frame, [80, 180, 180]),
-        Self::new("false_color", Role::Image, Scope::Frame, [190, 140, 140]),
-        Self::new("tonemap", Role::Image, Scope::Frame, [170, 170, 170]),
-    ];
+    pub fn all() -> impl Iterator<Item = Self> {
+        TABLE.iter().map(|info| info.pass)
+    }
 
-    const fn new(name: &'static str, role: Role, scope: Scope, color: [u8; 3]) -> Self {
-        Self { name, role, scope, color }
+    fn info(self) -> &'static Info {
+        &TABLE[self as usize]
+    }
+
+    /// The name of its kernel's file, its debug label and its row in a profile.
+    pub fn name(self) -> &'static str {
+        self.info().name
+    }
+
+    /// What it works for.
+    pub fn role(self) -> Role {
+        self.info().role
+    }
+
+    /// How often a frame runs it.
+    pub fn scope(self) -> Scope {
+        self.info().scope
+    }
+
+    /// Its colour in graphs, sRGB.
+    pub fn color(self) -> [u8; 3] {
+        self.info().color
+    }
+
+    /// The resources that its kernel reads. The scene's arrays, which no pass writes, are left out.
+    pub fn reads(self) -> &'static [Resource] {
+        self.info().reads
+    }
+
+    /// The resources that its kernel writes. Most kernels write only parts of them.
+    pub fn writes(self) -> &'static [Resource] {
+        self.info().writes
+    }
+
+    /// The buffer that the device reads the size of its dispatch from.
+    pub fn indirect(self) -> Option<Resource> {
+        self.info().indirect
     }
 
     /// The pass of a name.
     ///
     /// # Panics
     /// No pass of a frame has that name.
-    pub fn named(name: &str) -> &'static Self {
-        let pass = Self::ALL.iter().find(|pass| pass.name == name);
-        pass.unwrap_or_else(|| panic!("`{name}` is missing in the table of a frame's passes"))
+    pub fn named(name: &str) -> Self {
+        let info = TABLE.iter().find(|info| info.name == name);
+        info.unwrap_or_else(|| panic!("`{name}` is missing in the table of a frame's passes")).pass
     }
 
     /// Whether the closest hits of rays have to wait for it.
-    pub fn is_tracing(&self) -> bool {
-        matches!(self.role, Role::PrimaryVisibility | Role::ClosestHit)
+    pub fn is_tracing(self) -> bool {
+        matches!(self.role(), Role::PrimaryVisibility | Role::ClosestHit)
     }
 }
 
@@ -85,10 +318,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_table_is_in_the_order_of_the_passes() {
+        assert!(Pass::all().enumerate().all(|(row, pass)| pass as usize == row));
+    }
+
+    #[test]
     fn each_pass_has_a_name_and_a_colour_of_its_own() {
-        let names: BTreeSet<_> = Pass::ALL.iter().map(|pass| pass.name).collect();
-        let colors: BTreeSet<_> = Pass::ALL.iter().map(|pass| pass.color).collect();
-        assert_eq!((names.len(), colors.len()), (Pass::ALL.len(), Pass::ALL.len()));
-        assert!(Pass::ALL.iter().all(|pass| Pass::named(pass.name) == pass && pass.color != [255; 3]));
+        let names: BTreeSet<_> = Pass::all().map(Pass::name).collect();
+        let colors: BTreeSet<_> = Pass::all().map(Pass::color).collect();
+        assert_eq!((names.len(), colors.len()), (TABLE.len(), TABLE.len()));
+        assert!(Pass::all().all(|pass| Pass::named(pass.name()) == pass && pass.color() != [255; 3]));
     }
 }

@@ -27,7 +27,7 @@ pub struct Profile {
 /// One pass, of one bounce of one batch as a rule.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PassTime {
-    /// The name of one of [`Pass::ALL`], of its debug label and of its kernel's file.
+    /// The name of a [`Pass`], of its debug label and of its kernel's file.
     pub name: &'static str,
     /// None for passes that run once a frame, or for all bounces of a batch at once: shadow, shade, resolve.
     pub bounce: Option<u32>,
@@ -45,7 +45,7 @@ pub struct PassTime {
 
 impl PassTime {
     /// What is known of the pass beside its time.
-    pub fn pass(&self) -> &'static Pass {
+    pub fn pass(&self) -> Pass {
         Pass::named(self.name)
     }
 
@@ -135,7 +135,7 @@ impl Profile {
 
     /// Milliseconds in which shadow rays were tested, or none where any pass lacks a timestamp.
     pub fn shadow_ms(&self) -> Option<f64> {
-        self.passes.iter().filter(|pass| pass.pass().role == Role::Shadow).map(|pass| pass.ms).sum()
+        self.passes.iter().filter(|pass| pass.pass().role() == Role::Shadow).map(|pass| pass.ms).sum()
     }
 }
 

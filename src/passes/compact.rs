@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::spirv;
 use crate::{
     buffers::Resources,
-    gpu::{Access, Bindings, Commands, ComputeDesc, ComputePipeline, Context, Dispatch, GpuError},
+    gpu::{Bindings, Commands, ComputeDesc, ComputePipeline, Context, Dispatch, GpuError},
     layout::Batch,
 };
 
@@ -29,15 +29,19 @@ impl Compact {
         })
     }
 
-    /// Needs rays, hits. Leaves the next row of bounces and its rays, first_children.
-    pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
-        let bounce = Some(batch.depth);
-        commands.dispatch(&self.reduce, bounce, batch, resources.scan_dispatch(batch));
-        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // child_kinds, scan_blocks
-        commands.barrier(Access::IndirectRead, Access::ComputeWrite); // bounces
-        commands.dispatch(&self.spine, bounce, batch, Dispatch::Threads([1, 1, 1], [1, 1, 1]));
-        commands.barrier(Access::ComputeWrite, Access::ComputeRead); // scan_blocks, bounces
-        commands.barrier(Access::ComputeWrite, Access::IndirectRead); // bounces
-        commands.dispatch(&self.scatter, bounce, batch, resources.scan_dispatch(batch));
+    /// Needs rays, hits. Leaves child_kinds, and in scan_blocks the number of each block's children.
+    pub fn reduce(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
+        commands.dispatch(&self.reduce, Some(batch.depth), batch, resources.scan_dispatch(batch));
+    }
+
+    /// Needs scan_blocks. Leaves their exclusive prefix sums there, and the next row of bounces.
+    pub fn spine(&self, commands: &Commands, batch: &Batch) {
+        commands.dispatch(&self.spine, Some(batch.depth), batch, Dispatch::Threads([1, 1, 1], [1, 1, 1]));
+    }
+
+    /// Needs rays, hits, child_kinds, scan_blocks and the next row of bounces. Leaves first_children and the next bounce's
+    /// rays.
+    pub fn scatter(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
+        commands.dispatch(&self.scatter, Some(batch.depth), batch, resources.scan_dispatch(batch));
     }
 }

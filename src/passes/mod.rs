@@ -19,6 +19,7 @@ mod features;
 mod present;
 mod primary_hit;
 mod rasterize;
+mod record;
 mod resolve;
 mod shade;
 mod shadow;
@@ -28,8 +29,8 @@ mod visibility;
 
 pub use self::{
     accumulate::Accumulate, cast::Cast, compact::Compact, denoise::Denoise, false_color::FalseColor,
-    features::Features, present::Present, primary_hit::PrimaryHit, rasterize::Rasterize, resolve::Resolve,
-    shade::Shade, shadow::Shadow, tonemap::Tonemap, trace::Trace, visibility::Visibility,
+    features::Features, present::Present, primary_hit::PrimaryHit, rasterize::Rasterize, record::Inputs,
+    resolve::Resolve, shade::Shade, shadow::Shadow, tonemap::Tonemap, trace::Trace, visibility::Visibility,
 };
 
 /// A shader, as build.rs left it.
@@ -65,8 +66,8 @@ impl Passes {
     /// The driver refuses a shader.
     pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, options: &RenderOptions) -> Result<Self, GpuError> {
         Ok(Self {
-            visibility: Self::visibility(context, bindings, options)?,
-            rasterize: Self::rasterize(context, bindings, options)?,
+            visibility: Self::new_visibility(context, bindings, options)?,
+            rasterize: Self::new_rasterize(context, bindings, options)?,
             primary_hit: PrimaryHit::new(context, bindings, options)?.into(),
             trace: Trace::new(context, bindings, options)?.into(),
             features: Features::new(context, bindings)?.into(),
@@ -81,7 +82,23 @@ impl Passes {
         })
     }
 
-    fn visibility(
+    /// The pass that rasterizes by graphics.
+    ///
+    /// # Panics
+    /// The options ask for other primary rays.
+    pub fn visibility(&self) -> &Visibility {
+        self.visibility.as_ref().expect("the options ask for graphics")
+    }
+
+    /// The kernels that rasterize.
+    ///
+    /// # Panics
+    /// The options ask for other primary rays.
+    pub fn rasterize(&self) -> &Rasterize {
+        self.rasterize.as_ref().expect("the options ask for kernels that rasterize")
+    }
+
+    fn new_visibility(
         context: &Arc<Context>,
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
@@ -89,7 +106,7 @@ impl Passes {
         draws(options).then(|| Visibility::new(context, bindings).map(Arc::new)).transpose()
     }
 
-    fn rasterize(
+    fn new_rasterize(
         context: &Arc<Context>,
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
@@ -123,8 +140,8 @@ impl Passes {
             next.tonemap = Tonemap::new(context, bindings, to.tonemap)?.into();
         }
         if from.primary != to.primary {
-            next.visibility = Self::visibility(context, bindings, to)?;
-            next.rasterize = Self::rasterize(context, bindings, to)?;
+            next.visibility = Self::new_visibility(context, bindings, to)?;
+            next.rasterize = Self::new_rasterize(context, bindings, to)?;
         }
         if (from.primary, counts(from)) != (to.primary, counts(to)) {
             next.primary_hit = PrimaryHit::new(context, bindings, to)?.into();

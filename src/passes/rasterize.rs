@@ -39,18 +39,21 @@ impl Rasterize {
         commands.update_buffer(resources.raster.count.any(), &0u64);
     }
 
-    /// Needs what `reset` leaves. Leaves pixel_nearest.
-    pub fn record(&self, commands: &Commands, resources: &Resources) {
-        let (pixels, raster, constants) = (&resources.pixels, &resources.raster, resources.constants());
+    /// Needs what `reset` leaves. Leaves small triangles in pixel_nearest; large_triangles, raster_count, raster_groups.
+    pub fn triangles(&self, commands: &Commands, resources: &Resources) {
+        let (pixels, constants) = (&resources.pixels, resources.constants());
         let push = RasterPush { block_log2: block_log2(constants) };
         let clear = || {
             commands.fill_buffer(pixels.pixel_nearest.any(), u32::MAX);
             commands.barrier(Access::TransferWrite, Access::ComputeUpdate); // pixel_nearest
         };
         commands.dispatch_after(clear, &self.triangles, None, &push, groups_for(constants.n_triangles));
-        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_nearest, large_triangles, raster_count
-        commands.barrier(Access::ComputeWrite, Access::IndirectRead); // raster_groups
-        commands.dispatch(&self.blocks, None, &push, Dispatch::Indirect(raster.groups.any(), 0));
+    }
+
+    /// Needs what `triangles` leaves. Leaves all triangles in pixel_nearest.
+    pub fn blocks(&self, commands: &Commands, resources: &Resources) {
+        let push = RasterPush { block_log2: block_log2(resources.constants()) };
+        commands.dispatch(&self.blocks, None, &push, Dispatch::Indirect(resources.raster.groups.any(), 0));
     }
 }
 

@@ -107,7 +107,7 @@ impl Renderer {
         let n_lanes = lanes_to_share(&self.context, options)?;
         let constants = Frame { queue_capacity, n_lanes, ..constants };
         let spans = self.room.spans(&constants, self.most_pixels);
-        let schedule = Schedule::new(&self.context, &constants, spans, options.profile)?;
+        let schedule = Schedule::new(&self.context, &constants, spans, options)?;
         let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
         let tree = (self.options.traversal != options.traversal).then(|| self.world.tree());
         Ok((self.resources.for_frame(&self.context, tree, &needs)?, schedule))

@@ -1,4 +1,4 @@
-//! The frame: the order of passes, every barrier between them, one command buffer a bounce.
+//! The frame on a device: what [`Plan`] says, recorded, in one command buffer a bounce.
 
 mod bands;
 mod changes;
@@ -15,15 +15,15 @@ pub use self::{
     parts::Displayed,
 };
 use self::{
-    parts::{Pending, Step, Traced, Until},
+    parts::{Part, Pending, Traced, Until},
     schedule::{Room, Schedule},
 };
 use crate::{
     buffers::{Needs, Resources},
-    frame::{Denoise, Picture, Primary, Profile, RenderOptions, frame_constants},
+    frame::{FrameKind, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step, frame_constants, plan},
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
-    passes::{Passes, Rasterize},
+    passes::{Inputs, Passes, Rasterize},
     scene::Camera,
     world::World,
 };
@@ -90,7 +90,7 @@ impl Renderer {
         let room = Room { fixed_capacity, branches };
         constants.queue_capacity = room.queue_capacity(context.limits(), &constants);
         let spans = room.spans(&constants, None);
-        let schedule = Schedule::new(&context, &constants, spans, options.profile)?;
+        let schedule = Schedule::new(&context, &constants, spans, options)?;
         let uploading = info_span!("upload scene").entered();
         let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
         let resources = Resources::new(&context, world, &needs)?;
@@ -156,7 +156,7 @@ impl Renderer {
         self.context.run("show", |commands| {
             self.resources.bind(commands);
             self.update_constants(commands);
-            self.show_samples(commands);
+            self.record_section(commands, &plan::display(&self.frame_kind()), &Batch::default());
         })?;
         self.note_displayed();
         Ok(())
@@ -197,85 +197,100 @@ impl Renderer {
         &self.resources
     }
 
-    /// Algorithm 1: one command buffer before, one a bounce, one for the light on all of a batch's rays, one after.
-    fn record(&self) -> Result<Vec<Step>, GpuError> {
-        let mut frame = vec![Step::plain(self.command_buffer("begin frame", |commands| self.begin_frame(commands))?)];
+    /// Records the plan: one command buffer before all batches, one a bounce, one for the light on all of a batch's rays, one
+    /// after all batches.
+    fn record(&self) -> Result<Vec<Part>, GpuError> {
+        let plan = Plan::new(&self.frame_kind());
+        let begin = self.command_buffer("begin frame", |commands| self.begin_frame(commands, &plan.visibility))?;
+        let mut frame = vec![Part::plain(begin)];
         for &batch in &self.schedule.batches {
-            for depth in 0..self.n_bounces() {
+            for (depth, bounce) in (0..).zip(&plan.bounces) {
                 let batch = Batch { bounce_ix: batch.bounce_ix + depth, depth, ..batch };
-                let traced = (!self.is_rasterized(depth)).then_some(Traced::Rays(batch));
-                let hits = |commands: &Commands| self.find_hits(commands, &batch);
-                frame.extend(
-                    self.steps(&format!("bounce {depth}"), traced, hits, |commands| self.next_rays(commands, &batch))?,
-                );
+                frame.extend(self.parts(&format!("bounce {depth}"), bounce, &batch)?);
             }
-            if !self.draws_primary_rays_only() {
-                let traced = (self.resources.constants().n_lights > 0).then_some(Traced::Shadows(batch));
-                let shadows = |commands: &Commands| self.cast_shadows(commands, &batch);
-                frame.extend(self.steps("light", traced, shadows, |commands| self.light(commands, &batch))?);
+            if !plan.light.is_empty() {
+                frame.extend(self.parts("light", &plan.light, &batch)?);
             }
-            frame.last_mut().expect("the steps of the batch").ends_batch = true;
+            frame.last_mut().expect("the parts of the batch").ends_batch = true;
         }
-        frame.push(Step::plain(self.command_buffer("end frame", |commands| self.end_frame(commands))?));
+        let end = self.command_buffer("end frame", |commands| {
+            self.resources.bind(commands);
+            self.record_section(commands, &plan.image, &Batch::default());
+        })?;
+        frame.push(Part::plain(end));
         Ok(frame)
     }
 
-    /// What traces rays and what needs their results, in one command buffer. Where rays can stall they are two: the device
-    /// goes on with the second when the host has seen that all rays of the first have ended.
-    fn steps(
-        &self,
-        name: &str,
-        traced: Option<Traced>,
-        trace: impl Fn(&Commands),
-        rest: impl Fn(&Commands),
-    ) -> Result<Vec<Step>, GpuError> {
-        let Some(traced) = traced.filter(|_| self.resources.accel.stalls.can_occur()) else {
-            let both = |commands: &Commands| {
+    /// Which passes the next sample has.
+    fn frame_kind(&self) -> FrameKind {
+        let only_primary_rays = self.draws_primary_rays_only();
+        let constants = self.resources.constants();
+        FrameKind {
+            n_bounces: if only_primary_rays { 1 } else { self.options.max_depth },
+            is_lit: !only_primary_rays,
+            adds_samples: constants.n_samples > 1,
+            shows_feature: self.options.features && self.false_color.is_some(),
+            ..FrameKind::new(&self.options, constants.n_lights)
+        }
+    }
+
+    /// Records a section of a batch in one command buffer. Where rays of the section can stall they are two: the device goes
+    /// on with the second when the host has seen that all rays of the first have ended.
+    fn parts(&self, name: &str, section: &[Step], batch: &Batch) -> Result<Vec<Part>, GpuError> {
+        let traced = self.traced(section, batch).filter(|_| self.resources.accel.stalls.can_occur());
+        let Some(traced) = traced else {
+            let all = |commands: &Commands| {
                 self.resources.bind(commands);
-                trace(commands);
-                rest(commands);
+                self.record_section(commands, section, batch);
             };
-            return Ok(vec![Step::plain(self.command_buffer(name, both)?)]);
+            return Ok(vec![Part::plain(self.command_buffer(name, all)?)]);
         };
+        // The pass and the barrier behind it.
+        let (trace, rest) = section.split_at(2);
         let tracing = |commands: &Commands| {
             self.resources.bind(commands);
             self.resources.accel.stalls.reset(commands);
-            trace(commands);
+            self.record_section(commands, trace, batch);
         };
         let resting = |commands: &Commands| {
             self.resources.bind(commands);
-            rest(commands);
+            self.record_section(commands, rest, batch);
         };
         Ok(vec![
-            Step::traced(self.command_buffer(name, tracing)?, traced),
-            Step::plain(self.command_buffer(name, resting)?),
+            Part::traced(self.command_buffer(name, tracing)?, traced),
+            Part::plain(self.command_buffer(name, resting)?),
         ])
     }
 
-    /// Brings the rays of a step that has run to their ends.
-    fn finish_rays(&self, traced: &Traced) -> Result<(), GpuError> {
-        let (passes, resources) = (&self.passes, &self.resources);
-        resources.accel.stalls.finish(&self.context, |commands, round| {
-            resources.bind(commands);
-            let round = round.constant();
-            match *traced {
-                Traced::Rays(batch) => passes.trace.record(commands, resources, &Batch { round, ..batch }),
-                Traced::Shadows(batch) => passes.shadow.record(commands, resources, &Batch { round, ..batch }),
-            }
-        })?;
-        Ok(())
+    /// The rays that a section's first pass takes through the acceleration structure.
+    fn traced(&self, section: &[Step], batch: &Batch) -> Option<Traced> {
+        match section.first()? {
+            Step::Run(Pass::Trace) => Some(Traced::Rays(*batch)),
+            Step::Run(Pass::Shadow) => Some(Traced::Shadows(*batch)),
+            _ => None,
+        }
     }
 
-    /// Whether the hits of a level's rays are found without the tree.
-    fn is_rasterized(&self, depth: u32) -> bool {
-        depth == 0 && self.options.primary != Primary::Trace
+    /// Brings the rays of a part that has run to their ends.
+    fn finish_rays(&self, traced: &Traced) -> Result<(), GpuError> {
+        self.resources.accel.stalls.finish(&self.context, |commands, round| {
+            self.resources.bind(commands);
+            let round = round.constant();
+            let (pass, batch) = match *traced {
+                Traced::Rays(batch) => (Pass::Trace, batch),
+                Traced::Shadows(batch) => (Pass::Shadow, batch),
+            };
+            self.record_section(commands, &[Step::Run(pass)], &Batch { round, ..batch });
+        })?;
+        Ok(())
     }
 
     fn command_buffer(&self, name: &str, body: impl FnOnce(&Commands)) -> Result<CommandBuffer, GpuError> {
         CommandBuffer::record(&self.context, name, self.schedule.timer.as_ref(), body)
     }
 
-    fn begin_frame(&self, commands: &Commands) {
+    /// What is there before the first pass: constants, rows of bounces, cleared counts. Then primary visibility.
+    fn begin_frame(&self, commands: &Commands, visibility: &[Step]) {
         commands.reset_timer();
         self.resources.bind(commands);
         self.update_constants(commands);
@@ -289,13 +304,7 @@ impl Renderer {
         }
         // bounces, counters, pixel_features, raster_groups, raster_count
         commands.barrier(Access::TransferWrite, Access::AllReads);
-        if let Some(visibility) = &self.passes.visibility {
-            visibility.record(commands, &self.resources);
-        }
-        if let Some(rasterize) = &self.passes.rasterize {
-            rasterize.record(commands, &self.resources);
-            commands.barrier(Access::ComputeWrite, Access::ComputeRead); // pixel_nearest
-        }
+        self.record_section(commands, visibility, &Batch::default());
     }
 
     fn update_constants(&self, commands: &Commands) {
@@ -304,66 +313,9 @@ impl Renderer {
         commands.barrier(Access::TransferWrite, Access::AllReads); // frame
     }
 
-    /// The closest hits of one level of rays.
-    fn find_hits(&self, commands: &Commands, batch: &Batch) {
-        if self.is_rasterized(batch.depth) {
-            self.passes.primary_hit.record(commands, batch);
-        } else {
-            self.passes.trace.record(commands, &self.resources, batch);
-        }
-        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // hits, counters
-    }
-
-    /// The next level of rays, from the hits of this one.
-    fn next_rays(&self, commands: &Commands, batch: &Batch) {
-        let (passes, resources) = (&self.passes, &self.resources);
-        if batch.depth == 0 && self.options.features {
-            passes.features.record(commands, batch);
-            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_features
-        }
-        if batch.depth + 1 < self.n_bounces() {
-            passes.compact.record(commands, resources, batch);
-            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // rays, first_children
-        }
-    }
-
-    /// Which lights the hits of all bounces see. A dispatch lasts as long as its longest ray; one for the shadows of all
-    /// bounces waits for such a ray once, not once a bounce.
-    fn cast_shadows(&self, commands: &Commands, batch: &Batch) {
-        if self.resources.constants().n_lights > 0 {
-            self.passes.shadow.record(commands, &self.resources, batch);
-            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // light_visibility
-        }
-    }
-
-    /// What the lights give to the hits of all bounces, and that to the pixels.
-    fn light(&self, commands: &Commands, batch: &Batch) {
-        let (passes, resources) = (&self.passes, &self.resources);
-        passes.shade.record(commands, resources, batch);
-        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // ray_radiance, counters
-        passes.resolve.record(commands, batch);
-        commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_radiance; the next batch overwrites the queue
-    }
-
-    fn end_frame(&self, commands: &Commands) {
-        self.resources.bind(commands);
-        if self.resources.constants().n_samples > 1 && !self.draws_primary_rays_only() {
-            self.passes.accumulate.record(commands, &self.resources);
-            commands.barrier(Access::ComputeWrite, Access::ComputeRead); // pixel_radiance
-        }
-        self.show_samples(commands);
-    }
-
-    /// From the mean of all samples to what a display shows.
-    fn show_samples(&self, commands: &Commands) {
-        if self.options.denoise != Denoise::Off && !self.draws_primary_rays_only() {
-            self.passes.denoise.record(commands, &self.resources);
-            commands.barrier(Access::ComputeWrite, Access::ComputeRead); // pixel_filtered
-        }
-        match &self.false_color {
-            Some(push) if self.options.features => self.passes.false_color.record(commands, &self.resources, push),
-            _ => self.passes.tonemap.record(commands, &self.resources),
-        }
+    fn record_section(&self, commands: &Commands, section: &[Step], batch: &Batch) {
+        let inputs = Inputs { batch: *batch, false_color: self.false_color };
+        self.passes.record_section(commands, &self.resources, section, &inputs);
     }
 }
 

@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// A command buffer of a frame.
-pub(super) struct Step {
+pub(super) struct Part {
     commands: CommandBuffer,
     /// Rays that can stall in it: they have to end before the next step.
     traced: Option<Traced>,
@@ -29,7 +29,7 @@ pub(super) enum Traced {
     Shadows(Batch),
 }
 
-impl Step {
+impl Part {
     /// One without rays that can stall.
     pub fn plain(commands: CommandBuffer) -> Self {
         Self { commands, traced: None, ends_batch: false }
@@ -54,8 +54,8 @@ pub(super) enum Until {
 
 /// A sample that is drawn in part; nothing of it is under way.
 pub(super) struct Pending {
-    steps: Vec<Step>,
-    /// How many of the steps have run.
+    parts: Vec<Part>,
+    /// How many of the parts have run.
     n_done: usize,
     sample_ix: u32,
     /// When its first commands were submitted.
@@ -63,16 +63,16 @@ pub(super) struct Pending {
 }
 
 impl Pending {
-    /// The number of steps that have run when the sample has gone on so far.
+    /// The number of parts that have run when the sample has gone on so far.
     fn end(&self, until: Until) -> usize {
         if until == Until::Step {
             return self.n_done + 1;
         }
-        let ends_batch = |step: &Step| step.ends_batch;
-        let batch_end = self.steps[self.n_done..].iter().position(ends_batch).map(|place| self.n_done + place + 1);
+        let ends_batch = |part: &Part| part.ends_batch;
+        let batch_end = self.parts[self.n_done..].iter().position(ends_batch).map(|place| self.n_done + place + 1);
         match batch_end {
-            Some(end) if until == Until::Batch && self.steps[end..].iter().any(ends_batch) => end,
-            _ => self.steps.len(),
+            Some(end) if until == Until::Batch && self.parts[end..].iter().any(ends_batch) => end,
+            _ => self.parts.len(),
         }
     }
 }
@@ -110,11 +110,6 @@ impl Renderer {
         self.options.features && self.needs_primary_rays_only
     }
 
-    /// Levels of rays that a sample has, the primary one counted.
-    pub(super) fn n_bounces(&self) -> u32 {
-        if self.draws_primary_rays_only() { 1 } else { self.options.max_depth }
-    }
-
     /// Whether a sample is begun.
     pub fn is_pending(&self) -> bool {
         self.pending.is_some()
@@ -122,7 +117,7 @@ impl Renderer {
 
     /// Share of the next sample that is drawn, 0 to 1.
     pub fn progress(&self) -> f32 {
-        self.pending.as_ref().map_or(0.0, |pending| pending.n_done as f32 / pending.steps.len() as f32)
+        self.pending.as_ref().map_or(0.0, |pending| pending.n_done as f32 / pending.parts.len() as f32)
     }
 
     /// Batches have so many pixels at the most from now on, or as many as the queues hold. The picture does not depend on
@@ -146,15 +141,14 @@ impl Renderer {
     }
 
     fn reschedule(&mut self, spans: Vec<(u32, u32)>) -> Result<(), GpuError> {
-        let timed = self.options.profile;
-        let schedule = Schedule::new(&self.context, self.resources.constants(), spans, timed)?;
+        let schedule = Schedule::new(&self.context, self.resources.constants(), spans, &self.options)?;
         let resources = self.resources.with_bounces(&self.context, schedule.n_rows())?;
         self.pending = None;
         (self.resources, self.schedule) = (resources, schedule);
         Ok(())
     }
 
-    /// Runs the sample's next steps; gives its profile when all have run without an overflow. None: there is more to do.
+    /// Runs the sample's next parts; gives its profile when all have run without an overflow. None: there is more to do.
     pub(super) fn go_on(&mut self, until: Until) -> Result<Option<Profile>, GpuError> {
         // Where no sample can begin, those that are complete stay.
         let pending = self.pending.take().map_or_else(|| self.begin_sample(), Ok)?;
@@ -169,10 +163,10 @@ impl Renderer {
         let running = info_span!("submit and wait").entered();
         let begun_at = *pending.begun_at.get_or_insert_with(Instant::now);
         let end = pending.end(until);
-        self.run_steps(&pending.steps[pending.n_done..end])?;
+        self.run_parts(&pending.parts[pending.n_done..end])?;
         drop(running);
         pending.n_done = end;
-        if end < pending.steps.len() {
+        if end < pending.parts.len() {
             self.pending = Some(pending);
             return Ok(None);
         }
@@ -181,7 +175,7 @@ impl Renderer {
         if bounces.iter().any(|row| row.overflow != 0) {
             // At once and whole: pixel_display shows a picture without the rays that had no room.
             let spans = self.schedule.split(&bounces, self.resources.constants())?;
-            pending.steps.clear();
+            pending.parts.clear();
             self.reschedule(spans)?;
             let pending = self.recorded(pending.sample_ix)?;
             return self.try_to_go_on(pending, Until::End);
@@ -191,13 +185,13 @@ impl Renderer {
         self.profile(&bounces, begun_at).map(Some)
     }
 
-    /// Runs steps and waits for their end: all together, but for rays that can stall, which have to end before the next
+    /// Runs parts and waits for their end: all together, but for rays that can stall, which have to end before the next
     /// step begins.
-    fn run_steps(&self, steps: &[Step]) -> Result<(), GpuError> {
-        for together in steps.split_inclusive(|step| step.traced.is_some()) {
-            self.context.submit(&together.iter().map(|step| &step.commands).collect::<Vec<_>>())?;
+    fn run_parts(&self, parts: &[Part]) -> Result<(), GpuError> {
+        for together in parts.split_inclusive(|part| part.traced.is_some()) {
+            self.context.submit(&together.iter().map(|part| &part.commands).collect::<Vec<_>>())?;
             self.context.wait()?;
-            if let Some(traced) = together.last().and_then(|step| step.traced.as_ref()) {
+            if let Some(traced) = together.last().and_then(|part| part.traced.as_ref()) {
                 self.finish_rays(traced)?;
             }
         }
@@ -218,8 +212,8 @@ impl Renderer {
     }
 
     fn recorded(&self, sample_ix: u32) -> Result<Pending, GpuError> {
-        let steps = info_span!("record").in_scope(|| self.record())?;
-        Ok(Pending { steps, n_done: 0, sample_ix, begun_at: None })
+        let parts = info_span!("record").in_scope(|| self.record())?;
+        Ok(Pending { parts, n_done: 0, sample_ix, begun_at: None })
     }
 
     /// Displays one of the features in place of the picture, from the next sample on; only where the options ask for

@@ -3,6 +3,7 @@
 use std::{mem, sync::Arc};
 
 use crate::{
+    frame::{FrameKind, Plan, RenderOptions},
     gpu::{Buffer, BufferUse, Context, GpuError, Limits, Timer},
     layout::{Batch, Bounce, Frame, RAY_GROUP_SIZE, ROUND_BEGIN, Ray},
 };
@@ -26,7 +27,7 @@ impl Schedule {
         context: &Arc<Context>,
         constants: &Frame,
         spans: Vec<(u32, u32)>,
-        timed: bool,
+        options: &RenderOptions,
     ) -> Result<Self, GpuError> {
         let max_depth = constants.max_depth;
         let batches: Vec<_> = (0..)
@@ -44,11 +45,10 @@ impl Schedule {
             .flat_map(|batch| (0..max_depth).map(|depth| if depth == 0 { batch.n_pixels } else { 0 }))
             .map(|n_rays| Bounce::of(n_rays, constants))
             .collect();
-        // The widest bounce has 6 kernels, a batch's light 3; rasterize's two, accumulate, denoise and tonemap stand outside.
-        let n_passes = 5 + 3 * batches.len() as u32 + 6 * rows.len() as u32;
+        let n_passes = Plan::new(&FrameKind::new(options, constants.n_lights)).n_passes(batches.len()) as u32;
         Ok(Self {
             first_bounces: Buffer::with(context, "first_bounces", &rows, BufferUse::Storage)?,
-            timer: timed.then(|| Timer::new(context, n_passes)).transpose()?,
+            timer: options.profile.then(|| Timer::new(context, n_passes)).transpose()?,
             batches,
         })
     }

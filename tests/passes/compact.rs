@@ -3,9 +3,11 @@
 use glam::{Vec3, vec3};
 use kdray::{
     cpu::{self, compact::Parents},
+    frame::plan,
     layout::{
         Batch, Bounce, CHILD_REFLECTED, CHILD_TRANSMITTED, Frame, Hit, NO_TRIANGLE, Ray, SCAN_GROUP_SIZE, SPINE_ITEMS,
     },
+    passes::Inputs,
 };
 
 use super::stage::{FIRST, Stage, UNTOUCHED_RAY, UNTOUCHED_WORD, options};
@@ -74,7 +76,10 @@ fn on_device(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
         words.upload(&vec![UNTOUCHED_WORD; words.len()]).expect("words");
     }
     let batch = Batch { depth: 1, bounce_ix: 1, ..FIRST };
-    stage.run(|commands| stage.passes.compact.record(commands, resources, &batch));
+    stage.run(|commands| {
+        let inputs = Inputs { batch, ..Inputs::default() };
+        stage.passes.record_section(commands, resources, &plan::next_rays(), &inputs);
+    });
     Compacted {
         rays: queue.rays.download().expect("rays"),
         child_kinds: queue.child_kinds.download().expect("child_kinds"),

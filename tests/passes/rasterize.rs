@@ -5,10 +5,10 @@ use std::sync::Arc;
 use glam::{Vec3, uvec2, vec3};
 use kdray::{
     cpu::primary_hit::camera_ray,
-    frame::{Crop, Primary, RenderOptions, frame_constants},
+    frame::{Crop, Primary, RenderOptions, frame_constants, plan},
     gpu::{Access, Commands, Context, ContextOptions, GpuError},
     layout::{Batch, Hit, RASTER_GROUPS_X, RASTER_GROUPS_Y, Triangle},
-    passes::{Passes, Rasterize, Trace},
+    passes::{Inputs, Passes, Rasterize, Trace},
     render::Renderer,
     scene::{Camera, Scene},
 };
@@ -48,8 +48,7 @@ impl View {
         hits_by(&self.stage, |commands, batch| {
             Rasterize::reset(commands, resources);
             commands.barrier(Access::TransferWrite, Access::AllReads); // raster_groups, raster_count
-            passes.rasterize.as_ref().expect("the options ask for it").record(commands, resources);
-            commands.barrier(Access::ComputeWrite, Access::ComputeUpdate); // pixel_nearest
+            passes.record_section(commands, resources, &plan::visibility(Primary::Compute), &Inputs::default());
             passes.primary_hit.record(commands, batch);
         })
     }

@@ -67,7 +67,7 @@ fn passes(profile: &Profile) -> Vec<(&'static str, Color32)> {
 }
 
 fn color(name: &str) -> Color32 {
-    let [r, g, b] = Pass::named(name).color;
+    let [r, g, b] = Pass::named(name).color();
     Color32::from_rgb(r, g, b)
 }
 

@@ -1,0 +1,190 @@
+//! The plan of a frame: every barrier that its passes need is there, and what the passes declare is what their kernels do.
+
+use std::{collections::BTreeSet, fs};
+
+use kdray::frame::{
+    FrameKind, Pass, Plan, Primary, RenderOptions, Resource, Step, Touch,
+    plan::{self, passes},
+};
+use spirq::{
+    ReflectConfig,
+    ty::{AccessType, DescriptorType},
+    var::Variable,
+};
+
+/// Frames with every combination of passes.
+fn kinds() -> Vec<FrameKind> {
+    let mut kinds = Vec::new();
+    for (&primary, n_bounces) in Primary::ALL.iter().zip([3, 2, 1]).chain(Primary::ALL.iter().zip([1, 3, 2])) {
+        for flags in 0..64_u32 {
+            let [features, is_lit, has_lights, adds_samples, denoises, shows_feature] =
+                std::array::from_fn(|bit| flags & (1 << bit) != 0);
+            let kind = FrameKind {
+                primary,
+                n_bounces,
+                features,
+                is_lit,
+                has_lights,
+                adds_samples,
+                denoises,
+                shows_feature: shows_feature && features,
+            };
+            kinds.push(kind);
+        }
+    }
+    kinds
+}
+
+/// All steps of a frame of two batches, one after the other.
+fn steps(plan: &Plan) -> Vec<Step> {
+    let batch = [plan.bounces.concat(), plan.light.clone()].concat();
+    [plan.visibility.clone(), batch.clone(), batch, plan.image.clone()].concat()
+}
+
+/// The resources that a pass touches. Two of them are left out: visibility and the host order them on their own.
+fn touches(pass: Pass, denoises: bool) -> Vec<(Resource, Touch)> {
+    // Without a filter the two are one buffer.
+    let same = |resource: &Resource| match resource {
+        Resource::PixelFiltered if !denoises => Resource::PixelRadiance,
+        other => *other,
+    };
+    let reads = pass.reads().iter().map(|resource| (same(resource), Touch::Read));
+    let writes = pass.writes().iter().map(|resource| (same(resource), Touch::Write));
+    let indirect = pass.indirect().map(|resource| (resource, Touch::Indirect));
+    let ordered = |(resource, _): &(Resource, Touch)| !matches!(resource, Resource::TriangleIds | Resource::Stalls);
+    reads.chain(writes).chain(indirect).filter(ordered).collect()
+}
+
+/// Whether a barrier orders a later touch of a resource behind an earlier one.
+fn orders(barrier: &Step, resource: Resource, earlier: Touch, later: Touch) -> bool {
+    let Step::Barrier { before, after, of } = *barrier else { return false };
+    let is_kernel = |touch| touch != Touch::Indirect;
+    // A write behind a read waits for the kernel or the indirect read; no memory has to be made visible.
+    if earlier != Touch::Write {
+        return is_kernel(before) == is_kernel(earlier) && is_kernel(after);
+    }
+    let is_written = matches!(before, Touch::Write | Touch::Update);
+    let is_visible = after == later || (after == Touch::Update && is_kernel(later));
+    let is_named = later == Touch::Write || of.contains(&resource);
+    is_written && is_visible && is_named
+}
+
+/// Pairs of passes of which the second may run too early.
+fn hazards(steps: &[Step], denoises: bool) -> Vec<String> {
+    let mut found = Vec::new();
+    for (j, later) in steps.iter().enumerate() {
+        let Step::Run(later) = later else { continue };
+        for (i, earlier) in steps[..j].iter().enumerate() {
+            let Step::Run(earlier) = earlier else { continue };
+            for (resource, first) in touches(*earlier, denoises) {
+                for (_, then) in touches(*later, denoises).into_iter().filter(|(other, _)| *other == resource) {
+                    let conflict = first == Touch::Write || then == Touch::Write;
+                    if conflict && !steps[i..j].iter().any(|step| orders(step, resource, first, then)) {
+                        found.push(format!("{earlier:?} {first:?}s {resource:?}, {later:?} {then:?}s it"));
+                    }
+                }
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn no_pass_runs_before_what_it_needs_is_there() {
+    for kind in kinds() {
+        let found = hazards(&steps(&Plan::new(&kind)), kind.denoises && kind.is_lit);
+        assert!(found.is_empty(), "{kind:?}: {found:#?}");
+    }
+}
+
+/// Without any one of the barriers, some pass could run too early.
+#[test]
+fn every_barrier_is_needed() {
+    let options = RenderOptions { features: true, max_depth: 3, primary: Primary::Compute, ..RenderOptions::default() };
+    let all = steps(&Plan::new(&FrameKind::new(&options, 1)));
+    let barriers: Vec<_> = (0..all.len()).filter(|&i| matches!(all[i], Step::Barrier { .. })).collect();
+    assert!(barriers.len() > 20);
+    for &i in &barriers {
+        let mut without = all.clone();
+        // A barrier of every batch and bounce that says the same.
+        without.retain(|step| *step != all[i]);
+        assert!(!hazards(&without, true).is_empty(), "{:?} is not needed", all[i]);
+    }
+}
+
+/// A barrier names what earlier passes have touched as it says, and what some later pass or batch touches.
+#[test]
+fn barriers_name_what_they_are_for() {
+    for kind in kinds() {
+        let all = steps(&Plan::new(&kind));
+        for (i, step) in all.iter().enumerate() {
+            let Step::Barrier { before, of, .. } = step else { continue };
+            let earlier: Vec<_> = passes(&all[..i]).flat_map(|pass| touches(pass, true)).collect();
+            for resource in *of {
+                assert!(earlier.contains(&(*resource, *before)), "{kind:?}: {resource:?} of {step:?}");
+            }
+        }
+    }
+}
+
+/// What the kernels of a pass read and write of the resources, by their SPIR-V.
+fn found_in_kernels(pass: Pass) -> (BTreeSet<Resource>, BTreeSet<Resource>) {
+    let files = match pass {
+        Pass::Visibility => vec!["visibility.vert.spv".to_owned(), "visibility.frag.spv".to_owned()],
+        _ => vec![format!("{}.comp.spv", pass.name())],
+    };
+    let (mut reads, mut writes) = (BTreeSet::new(), BTreeSet::new());
+    for file in files {
+        let spirv = fs::read(format!("{}/{file}", env!("OUT_DIR"))).expect("SPIR-V");
+        let entry_points = ReflectConfig::new().spv(spirv).reflect().expect("valid SPIR-V");
+        for variable in entry_points.into_iter().flat_map(|entry_point| entry_point.vars) {
+            let Variable::Descriptor { desc_bind, desc_ty, .. } = variable else { continue };
+            let resource = Resource::ALL.into_iter().find(|resource| resource.binding() == desc_bind.bind());
+            let access = match desc_ty {
+                DescriptorType::StorageBuffer(access) | DescriptorType::StorageImage(access) => access,
+                _ => AccessType::ReadOnly,
+            };
+            let Some(resource) = resource else { continue };
+            if access != AccessType::WriteOnly {
+                reads.insert(resource);
+            }
+            if access != AccessType::ReadOnly {
+                writes.insert(resource);
+            }
+        }
+    }
+    (reads, writes)
+}
+
+#[test]
+fn passes_declare_what_their_kernels_read_and_write() {
+    let mut wrong = Vec::new();
+    for pass in Pass::all() {
+        let (reads, writes) = found_in_kernels(pass);
+        // A graphics pass writes its target; it has no binding for it.
+        let target = (pass == Pass::Visibility).then_some(Resource::TriangleIds);
+        let writes: BTreeSet<_> = writes.into_iter().chain(target).collect();
+        let declared = (pass.reads().iter().copied().collect(), pass.writes().iter().copied().collect());
+        if declared != (reads.clone(), writes.clone()) {
+            wrong.push(format!("{pass:?} reads {reads:?}, writes {writes:?}; declared: {declared:?}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn a_missing_barrier_is_noticed() {
+    let section = plan::next_rays();
+    assert_eq!(hazards(&section, true), Vec::<String>::new());
+    let scatter_waits = |step: &Step| matches!(step, Step::Barrier { after: Touch::Read, .. });
+    let without: Vec<_> = section.into_iter().filter(|step| !scatter_waits(step)).collect();
+    assert!(hazards(&without, true).iter().any(|hazard| hazard.contains("CompactSpine Writes ScanBlocks")));
+}
+
+#[test]
+fn the_number_of_passes_is_that_of_the_steps() {
+    for kind in kinds() {
+        let plan = Plan::new(&kind);
+        assert_eq!(plan.n_passes(2), passes(&steps(&plan)).count());
+    }
+}
