@@ -13,8 +13,8 @@
 //!   buffers  what kernels read and write, on
 //!   gpu      the Vulkan layer
 //! cast     rays -> hits, without a frame
-//! choices  what the user leaves open: which tree, which traversal, which primary rays
 //! cpu      both without Vulkan
+//! engine   a device or the CPU: chooses what is left open, renders, casts
 //! output   picture -> file
 //! bench    all of it, timed
 //! view     all of it, in a window
@@ -48,7 +48,7 @@ pub mod render;
 
 pub mod cast;
 
-pub mod choices;
+pub mod engine;
 
 pub mod output;
 

@@ -11,7 +11,9 @@ use kdray::{
         kdtree::{BuildOptions, Traversal},
     },
     cast::{CastRay, Caster},
-    choices::{Cache, Candidates, Chosen, Key, Reason, Request, Timings, TreeKind, Workload, measure_traversals},
+    engine::choices::{
+        Cache, Candidates, Chosen, Key, Reason, Request, Timings, TreeKind, Workload, measure_traversals,
+    },
     frame::{Primary, RenderOptions},
     gpu::DeviceInfo,
     layout::Triangle,
@@ -277,7 +279,7 @@ fn primary_rays_are_measured_where_that_changes_no_bit() {
 #[test]
 fn nothing_is_measured_where_the_cpu_runs_the_kernels() {
     let (scene, folder, context) = (scene(), TempDir::new().unwrap(), pretended(Default::default()));
-    let build_options = TreeKind::Best.options(kdray::choices::Engine::of(Some(&context)));
+    let build_options = TreeKind::Best.options(kdray::engine::choices::Processor::of(Some(&context)));
     let world = world_by(&scene, &build_options);
     let cache = Cache::at(folder.path());
     let window = Workload::of_window((160, 120));

@@ -12,8 +12,8 @@ use super::{
 };
 use crate::{
     accel::kdtree::Traversal,
-    choices::{Request, primary_by_rule},
     cpu,
+    engine::choices::{Request, primary_by_rule},
     frame::{BounceStats, Profile, RenderOptions},
     gpu::{Context, GpuError},
     render::BandedRenderer,

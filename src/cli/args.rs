@@ -5,7 +5,7 @@ use std::{path::PathBuf, str::FromStr};
 use clap::{Parser, Subcommand, value_parser};
 use kdray::{
     accel::{Query, kdtree::Traversal},
-    choices::{BuildPolicy, Request},
+    engine::choices::{BuildPolicy, Request},
     frame::{Aov, Crop, RenderOptions},
     gpu::DeviceSelector,
     scene::Scene,

@@ -1,16 +1,15 @@
 //! `kdray cast`: rays of the user's own to hits, file to file.
 
-use std::{sync::Arc, time::Instant};
-
 use kdray::{
-    accel::{Query, kdtree::Traversal},
-    cast::{self, Cast, CastRay, Caster, CpuCaster, Hit, HitWriter, NO_TRIANGLE, RAYS_PER_BATCH, RayReader},
-    choices::{self, Cache, Choices, Workload},
-    gpu::{Context, ContextOptions, GpuError},
+    cast::{Cast, Hit, HitWriter, NO_TRIANGLE, RAYS_PER_BATCH, RayReader},
+    engine::{
+        Built, Caster, Engine,
+        choices::{Choices, Workload},
+    },
+    gpu::{ContextOptions, GpuError},
     layout::Triangle,
     output,
     scene::Scene,
-    world::{Geometry, World},
 };
 
 use super::{
@@ -40,21 +39,17 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     let device = ContextOptions::new(args.device.clone(), args.validate);
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
 
-    let n_triangles = scene.triangles.len();
-    let (request, processor) = (args.request(), choices::Engine::of(context.as_deref()));
-    let workload = Workload::of_rays(rays.n_rays());
-    let tree_kind = request.tree(processor, n_triangles, &workload);
-    let build_options = tree_kind.value.options(processor);
-    build::check_memory(&build_options, n_triangles)?;
+    let engine = context.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.request());
+    let (n_triangles, workload) = (scene.triangles.len(), Workload::of_rays(rays.n_rays()));
+    build::check_memory(engine.tree_kind(n_triangles, &workload).value, n_triangles)?;
     let building = format!("building the kd-tree of {n_triangles} triangles");
-    let (world, build_ms) = progress.stage(&building, || World::new(scene, &build_options));
-    let world = world.map_err(GpuError::from)?;
+    let (built, build_ms) = progress.stage(&building, || engine.build(scene, &workload));
+    let Built { world, tree_kind } = built.map_err(GpuError::from)?;
     let casting = format!("casting {} rays", rays.n_rays());
-    let (used, cache) = (context.as_ref(), Cache::open());
-    let methods = request.methods(used, &world, &workload, &cache)?;
+    let methods = engine.methods(&world, &workload)?;
     let traversal = methods.traversal.value;
-    let engine = Engine::new(context.as_ref(), world.geometry(), traversal)?;
-    let (done, cast_ms) = progress.stage(&casting, || cast_all(args, rays, engine, &world.scene().triangles));
+    let caster = engine.caster(world.geometry(), traversal)?;
+    let (done, cast_ms) = progress.stage(&casting, || cast_all(args, rays, caster, &world.scene().triangles));
     let totals = done?;
     drop(progress);
 
@@ -65,9 +60,9 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
         query: if args.any { "any" } else { "closest" },
         traversal: traversal.to_string(),
         choices: Choices::of_rays(tree_kind, methods),
-        device: context.as_ref().map_or_else(cpu_name, |context| context.info().name.clone()),
+        device: engine.device_name(),
         triangles: n_triangles,
-        tree: world.tree().statistics(n_triangles, &build_options),
+        tree: world.tree().statistics(n_triangles, world.build_options()),
         n_rays: totals.n_rays,
         n_hits: totals.n_hits,
         n_invalid: totals.n_invalid,
@@ -94,43 +89,6 @@ fn check_roles(args: &CastArgs) -> Result<(), CliError> {
     args.json.iter().try_for_each(|path| roles.write("--json", path))
 }
 
-fn cpu_name() -> String {
-    format!("CPU, {} threads", rayon::current_num_threads())
-}
-
-/// What casts.
-enum Engine<'a> {
-    Device(Box<Caster>),
-    Cpu(Box<CpuCaster<'a>>),
-}
-
-impl<'a> Engine<'a> {
-    /// The device, or the CPU for want of one.
-    fn new(context: Option<&Arc<Context>>, geometry: Geometry<'a>, traversal: Traversal) -> Result<Self, GpuError> {
-        match context {
-            Some(context) => Ok(Self::Device(Box::new(Caster::new(context, geometry, traversal)?))),
-            None => Ok(Self::Cpu(Box::new(CpuCaster::new(geometry, traversal)))),
-        }
-    }
-
-    /// The hits, and the milliseconds of each of `n_times` casts, whoever needed them.
-    fn cast(&mut self, rays: &[CastRay], query: Query, n_times: u32) -> Result<Cast, GpuError> {
-        match self {
-            Self::Device(caster) => caster.cast(rays, query, n_times),
-            Self::Cpu(caster) => {
-                let mut hits = Vec::new();
-                let mut ms = Vec::new();
-                for _ in 0..n_times {
-                    let start = Instant::now();
-                    hits = caster.cast(rays, query);
-                    ms.push(start.elapsed().as_secs_f64() * 1e3);
-                }
-                Ok(Cast { hits, gpu_ms: Some(ms), n_invalid: cast::count_invalid(rays) })
-            }
-        }
-    }
-}
-
 /// Sums over all batches.
 struct Totals {
     n_rays: u64,
@@ -154,7 +112,7 @@ impl Totals {
 fn cast_all(
     args: &CastArgs,
     mut rays: RayReader,
-    mut engine: Engine,
+    mut caster: Caster,
     triangles: &[Triangle],
 ) -> Result<Totals, CliError> {
     let (query, n_times) = (args.query(), u32::from(args.repeat));
@@ -165,7 +123,7 @@ fn cast_all(
         if batch.is_empty() {
             break;
         }
-        let cast = engine.cast(&batch, query, n_times)?;
+        let cast = caster.cast(&batch, query, n_times)?;
         totals.add(&cast);
         hits.push(&cast.hits)?;
     }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use kdray::{accel::kdtree::Statistics, choices::Choices};
+use kdray::{accel::kdtree::Statistics, engine::choices::Choices};
 use serde::Serialize;
 
 use super::table::decimal;

@@ -2,7 +2,7 @@
 
 use kdray::{
     accel::kdtree::{KdTree, Statistics},
-    choices::{Engine, TreeKind},
+    engine::choices::{Processor, TreeKind},
     layout::{LIGHT_DIRECTIONAL, Light},
     scene::Scene,
 };
@@ -17,8 +17,8 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let scene = scene?;
     let n_triangles = scene.triangles.len();
     let building = format!("building the kd-tree of {n_triangles} triangles");
-    let options = TreeKind::Best.options(Engine::Gpu);
-    build::check_memory(&options, n_triangles)?;
+    let options = TreeKind::Best.options(Processor::Gpu);
+    build::check_memory(TreeKind::Best, n_triangles)?;
     let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &options));
     drop(progress);
 

@@ -3,7 +3,7 @@
 use clap::{ValueEnum, value_parser};
 use kdray::{
     accel::kdtree::Traversal,
-    choices::{BuildPolicy, Request},
+    engine::choices::{BuildPolicy, Request},
     frame::{Denoise, Primary, RenderOptions, Tonemap},
     scene::Scene,
 };

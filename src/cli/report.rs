@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use kdray::{
     accel::kdtree::Statistics,
-    choices::Choices,
+    engine::choices::Choices,
     frame::{Denoise, PassTime, Profile, RenderOptions},
 };
 use serde::Serialize;

@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use kdray::{
-    accel::kdtree::BuildOptions,
-    choices::{Engine, Workload},
+    engine::choices::{Processor, TreeKind, Workload},
     frame::View,
     gpu::{ContextOptions, chosen_device},
     output::{self, Format, OutputError},
@@ -38,7 +37,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     let scene = scene?;
     scene.warn_if_unlit(&args.scene);
     let options = args.picture.options(&scene);
-    build::check_memory(&BuildOptions::default(), scene.triangles.len())?;
+    build::check_memory(TreeKind::Best, scene.triangles.len())?;
     let tour = tour(args, scene.camera)?;
     let max_samples = args.spp.unwrap_or(if tour.is_some() { 1 } else { SAMPLES_AT_REST });
     let workload = match &tour {
@@ -48,8 +47,8 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         }
         None => Workload::of_window((options.width, options.height)),
     };
-    let engine = Engine::of_device(&chosen_device(args.device.as_ref())?);
-    let load_options = LoadOptions { request: args.picture.request(), engine, workload };
+    let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
+    let load_options = LoadOptions { request: args.picture.request(), processor, workload };
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
     let (loaded, _) = progress.stage(&building, || Loaded::with_tree(&args.scene, scene, load_options));
     drop(progress);

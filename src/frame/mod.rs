@@ -5,6 +5,7 @@ pub(crate) mod bounce;
 mod constants;
 pub(crate) mod counts;
 mod crop;
+mod drawn;
 mod pass;
 pub mod plan;
 mod profile;
@@ -16,6 +17,7 @@ pub use self::{
     aov::{Aov, Channel, Samples},
     constants::frame_constants,
     crop::Crop,
+    drawn::{Drawn, Watcher},
     pass::{Pass, Role, Scope},
     plan::{FrameKind, Plan, Section, Step, Touch},
     profile::{BounceStats, PassTime, Profile},

@@ -10,7 +10,7 @@ use std::{
 use super::Renderer;
 use crate::{
     buffers::Pixels,
-    frame::{Crop, Picture, Profile, RenderOptions},
+    frame::{Crop, Drawn, Picture, Profile, RenderOptions, Watcher},
     gpu::{Context, GpuError, Limits},
     layout::Feature,
     scene::Camera,
@@ -29,37 +29,9 @@ pub struct BandedRenderer {
     is_slow: bool,
 }
 
-/// Is told how far a drawing is.
-pub trait Watcher {
-    /// Whether [`Watcher::part`] is of use: to wait for the device within a sample takes time.
-    fn sees_parts(&self) -> bool {
-        false
-    }
-
-    /// So much of the sample that is drawn is done, 0 to 1.
-    fn part(&mut self, _share: f32) {}
-
-    /// A sample of a band is done.
-    fn sample(&mut self);
-}
-
-impl<F: FnMut()> Watcher for F {
-    fn sample(&mut self) {
-        self();
-    }
-}
-
 /// A sample that is expected to take longer is drawn in steps if somebody sees them. Waiting for the device after a step
 /// takes about 0.1 ms: less than a hundredth of such a sample, but as much as a step of a fast GPU's.
 const SLOW_SAMPLE: Duration = Duration::from_millis(500);
-
-/// What comes of a drawing, beside the picture.
-pub struct Drawn {
-    /// What the rays of each pixel met and cost, of the first sample; empty unless the options ask for it.
-    pub features: Vec<Feature>,
-    /// Times and counts of all samples of all bands.
-    pub profile: Profile,
-}
 
 impl BandedRenderer {
     /// Uploads the scene and makes the passes.

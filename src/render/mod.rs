@@ -10,10 +10,7 @@ use std::sync::Arc;
 
 use tracing::info_span;
 
-pub use self::{
-    bands::{BandedRenderer, Drawn, Watcher},
-    parts::Displayed,
-};
+pub use self::{bands::BandedRenderer, parts::Displayed};
 use self::{
     parts::{Part, Pending, Traced, Until},
     schedule::{Room, Schedule},

@@ -113,7 +113,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        choices::{Engine, Request, Workload},
+        engine::choices::{Processor, Request, Workload},
         frame::View,
         view::{LoadOptions, Loaded, Settings},
     };
@@ -147,7 +147,7 @@ mod tests {
         };
         let load_options = LoadOptions {
             request: Request::default(),
-            engine: Engine::SoftwareDriver,
+            processor: Processor::SoftwareDriver,
             workload: Workload::of_window((640, 480)),
         };
         let mut session = Session::new(Loaded::load(&path, load_options).unwrap(), settings.clone(), true, |_| ());

@@ -25,7 +25,7 @@ use super::{
     ui::{Layout, Ui, is_press, is_tab, lay_out},
 };
 use crate::{
-    choices::{Choices, Request},
+    engine::choices::{Choices, Request},
     frame::RenderOptions,
     gpu::GpuError,
 };

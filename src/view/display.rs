@@ -16,7 +16,7 @@ use super::{
     session::Session,
     tour::Tour,
 };
-use crate::{choices::Choices, gpu::ContextOptions};
+use crate::{engine::choices::Choices, gpu::ContextOptions};
 
 /// What the viewer is asked for.
 pub struct ViewOptions {

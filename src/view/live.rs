@@ -6,7 +6,7 @@ use egui::TexturesDelta;
 
 use super::loaded::Loaded;
 use crate::{
-    choices::{Cache, Choices, Request, Workload},
+    engine::choices::{Cache, Choices, Request, Workload},
     frame::RenderOptions,
     gpu::{Context, ContextOptions, GpuError, Overlay, OverlayFrame, Presenter, Screen},
     passes::Present,

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use crate::{
     accel::kdtree::Statistics,
-    choices::{Chosen, Engine, Request, TreeKind, Workload},
+    engine::choices::{Chosen, Processor, Request, TreeKind, Workload},
     scene::{Scene, SceneError, framing},
     world::World,
 };
@@ -18,7 +18,7 @@ use crate::{
 #[derive(Clone, Copy, Debug)]
 pub struct LoadOptions {
     pub request: Request,
-    pub engine: Engine,
+    pub processor: Processor,
     pub workload: Workload,
 }
 
@@ -46,9 +46,9 @@ impl Loaded {
     /// # Panics
     /// The scene has a triangle without a material, which no loaded scene has.
     pub fn with_tree(path: &Path, scene: Scene, load_options: LoadOptions) -> Self {
-        let LoadOptions { request, engine, workload } = load_options;
-        let tree_kind = request.tree(engine, scene.triangles.len(), &workload);
-        let build_options = tree_kind.value.options(engine);
+        let LoadOptions { request, processor, workload } = load_options;
+        let tree_kind = request.tree(processor, scene.triangles.len(), &workload);
+        let build_options = tree_kind.value.options(processor);
         let start = Instant::now();
         let world = World::new(scene, &build_options).expect("a material for each triangle");
         let build_ms = start.elapsed().as_secs_f64() * 1e3;

@@ -5,8 +5,8 @@ use std::collections::HashSet;
 use glam::UVec2;
 use kdray::{
     accel::kdtree::Traversal,
-    choices::{Engine, primary_by_rule, traversal_by_rule},
     cpu::{bindings::Bindings, primary_hit::camera_ray, traverser::Traverser},
+    engine::choices::{Processor, primary_by_rule, traversal_by_rule},
     frame::{Crop, Picture, Primary, RenderOptions, frame_constants},
     layout::Frame,
     render::Renderer,
@@ -99,7 +99,7 @@ fn ways_suit_the_device() {
     let suited = [n_raster, n_raster + 1].map(|n| primary_by_rule(Some(&without), n, (100, 80)));
     assert_eq!(suited, [Primary::Raster, Primary::Trace]);
     let way = if without.runs_both_sides() { Traversal::Ropes } else { Traversal::Mask };
-    let suited = [Some(&*gpu), Some(&*without), None].map(|context| traversal_by_rule(Engine::of(context)));
+    let suited = [Some(&*gpu), Some(&*without), None].map(|context| traversal_by_rule(Processor::of(context)));
     assert_eq!(suited, [Traversal::Mask, way, Traversal::Stack]);
 }
 

@@ -11,7 +11,7 @@ use kdray::{
         rays::{RayKind, ray_sets},
         stage::Stage,
     },
-    choices::{Engine, TreeKind},
+    engine::choices::{Processor, TreeKind},
     gpu::{Context, ContextOptions},
     scene::Scene,
 };
@@ -31,7 +31,7 @@ pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     let progress = Progress::new(false, 8);
     let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
     let scene = scene?;
-    let build_options = TreeKind::Best.options(Engine::of(Some(&context)));
+    let build_options = TreeKind::Best.options(Processor::of(Some(&context)));
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
     let (stage, _) = progress.stage(&building, || stage(args, scene, &build_options));
     let (arena, _) = progress.stage("letting the driver build its tree", || Arena::new(&context, &stage));

@@ -7,7 +7,7 @@ use kdray::{
         Spread,
         paper::{Report, Reported, Row, SCENES, SIZES, draw_on_cpu, draw_on_gpu, options},
     },
-    choices::{Engine, TreeKind, traversal_by_rule},
+    engine::choices::{Processor, TreeKind, traversal_by_rule},
     frame::RenderOptions,
     gpu::{Context, ContextOptions, GpuError},
     scene::Scene,
@@ -32,7 +32,7 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
     };
     let progress = Progress::new(false, (SCENES.len() * (1 + sizes.len())) as u64);
     let context = open_device(&ContextOptions::new(args.device.clone(), false), &progress)?;
-    let traversal = args.traversal.unwrap_or_else(|| traversal_by_rule(Engine::of(Some(&context))));
+    let traversal = args.traversal.unwrap_or_else(|| traversal_by_rule(Processor::of(Some(&context))));
     let mut report = Report {
         suite: "paper",
         device: context.info().name.clone(),
@@ -43,9 +43,9 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
         rows: Vec::new(),
     };
     // One tree for both: the CPU looks at slabs, whatever the device does.
-    let engine = if args.no_cpu { Engine::of(Some(&context)) } else { Engine::Cpu };
+    let processor = if args.no_cpu { Processor::of(Some(&context)) } else { Processor::Cpu };
     for (name, path) in SCENES.into_iter().zip(&scenes) {
-        let (loaded, _) = progress.stage(&format!("loading {}", path.display()), || load(path, engine));
+        let (loaded, _) = progress.stage(&format!("loading {}", path.display()), || load(path, processor));
         let world = loaded?;
         for &size in &sizes {
             let drawing = format!("drawing {name}, {}x{}", size.0, size.1);
@@ -59,9 +59,9 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
     print(&text(&report))
 }
 
-fn load(path: &Path, engine: Engine) -> Result<World, CliError> {
+fn load(path: &Path, processor: Processor) -> Result<World, CliError> {
     let scene = Scene::load(path)?;
-    Ok(World::new(scene, &TreeKind::Best.options(engine)).map_err(GpuError::from)?)
+    Ok(World::new(scene, &TreeKind::Best.options(processor)).map_err(GpuError::from)?)
 }
 
 fn measure(context: &Arc<Context>, world: &World, options: &RenderOptions, report: &Report) -> Result<Row, CliError> {

@@ -8,7 +8,7 @@ use kdray::{
         rays::ray_sets,
         size::{RayGrowth, Report, Row, Sized},
     },
-    choices::{Engine, TreeKind, traversal_by_rule},
+    engine::choices::{Processor, TreeKind, traversal_by_rule},
     gpu::{Context, ContextOptions, GpuError},
 };
 
@@ -30,7 +30,7 @@ pub fn run(args: &SizeArgs) -> Result<(), CliError> {
     let device = ContextOptions::new(args.device.clone(), false);
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
     let info = context.as_ref().map(|context| context.info());
-    let traversal = args.traversal.unwrap_or_else(|| traversal_by_rule(Engine::of(context.as_deref())));
+    let traversal = args.traversal.unwrap_or_else(|| traversal_by_rule(Processor::of(context.as_deref())));
     let n_threads = rayon::current_num_threads();
     let mut report = Report {
         suite: "size",
@@ -64,7 +64,7 @@ fn measure(
     progress: &Progress,
 ) -> Result<Row, GpuError> {
     let building = format!("building the kd-tree of {n_triangles} triangles");
-    let build_options = TreeKind::Best.options(Engine::of(context.map(|context| &**context)));
+    let build_options = TreeKind::Best.options(Processor::of(context.map(|context| &**context)));
     let pixels = (args.size.width, args.size.height);
     let (sized, _) = progress.stage(&building, || Sized::new(n_triangles, pixels, &build_options));
     let (sets, _) = progress.stage("making rays", || ray_sets(&sized.stage));

@@ -9,7 +9,7 @@ use kdray::{
         stage::Stage,
         traversal::{Report, SetResult, Tracers, VariantResult},
     },
-    choices::{Engine, TreeKind},
+    engine::choices::{Processor, TreeKind},
     gpu::{Context, ContextOptions},
     scene::Scene,
 };
@@ -31,7 +31,7 @@ pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
     let variants = variants(&args.variants);
     let device = ContextOptions::new(args.device.clone(), false);
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
-    let build_options = TreeKind::Best.options(Engine::of(context.as_deref()));
+    let build_options = TreeKind::Best.options(Processor::of(context.as_deref()));
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
     let (stage, _) = progress.stage(&building, || stage(args, scene, &build_options));
     let (sets, _) = progress.stage("making rays", || ray_sets(&stage));

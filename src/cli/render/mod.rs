@@ -1,6 +1,5 @@
 //! `kdray render`: scene file to pictures.
 
-mod draw;
 mod files;
 mod memory;
 
@@ -10,17 +9,18 @@ use std::{
 };
 
 use kdray::{
-    choices::{Cache, Choices, Engine, Workload},
-    frame::Profile,
+    engine::{
+        Built, Engine, Renderer,
+        choices::{Choices, Workload},
+    },
+    frame::{Profile, Watcher},
     gpu::{Context, ContextOptions, GpuError},
     output,
     scene::{Camera, CameraPath, Scene},
-    world::World,
 };
 use tracing::info_span;
 
 use self::{
-    draw::Drawer,
     files::{Files, check_outputs, numbered, output_of, roles},
     memory::check_memory,
 };
@@ -30,7 +30,7 @@ use super::{
     error::CliError,
     file_roles::FileRoles,
     open_device, print,
-    progress::Progress,
+    progress::{Progress, Steps},
     report::{Report, Spread},
     spans::Spans,
     trace::trace_json,
@@ -53,27 +53,24 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let opening = || info_span!("create device").in_scope(|| open_device(&device, &progress));
     let context = if args.cpu { None } else { Some(opening()?) };
 
+    let engine = context.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.picture.request());
     let n_triangles = scene.triangles.len();
-    let (request, engine) = (args.picture.request(), Engine::of(context.as_deref()));
     let n_pictures = u64::from(args.spp) * views.len() as u64;
     let cameras = views.iter().map(|view| &view.camera);
     let workload = Workload::of_pictures(&options, scene.lights.len(), n_pictures).seen_by(cameras);
-    let tree_kind = request.tree(engine, n_triangles, &workload);
-    let build_options = tree_kind.value.options(engine);
-    build::check_memory(&build_options, n_triangles)?;
+    build::check_memory(engine.tree_kind(n_triangles, &workload).value, n_triangles)?;
     let building = format!("building the kd-tree of {n_triangles} triangles");
-    let build = || World::new(scene, &build_options);
-    let (world, build_ms) = progress.stage(&building, || info_span!("build tree").in_scope(build));
-    let world = world.map_err(GpuError::from)?;
-    let (used, cache) = (context.as_ref(), Cache::open());
-    let methods = request.methods(used, &world, &workload, &cache)?;
+    let build = || info_span!("build tree").in_scope(|| engine.build(scene, &workload));
+    let (built, build_ms) = progress.stage(&building, build);
+    let Built { world, tree_kind } = built.map_err(GpuError::from)?;
+    let methods = engine.methods(&world, &workload)?;
     let options = methods.apply(&options);
     let crop = options.crop_or_whole();
     let rendering = format!("rendering {}x{}", crop.width(), crop.height());
     let (drawn, _) = progress.stage(&rendering, || {
         let begin = Instant::now();
-        let drawer = Drawer::new(context.as_ref(), &world, &options)?;
-        draw_and_write(args, drawer, &views, (&progress, &rendering), begin)
+        let renderer = engine.renderer(&world, &options)?;
+        draw_and_write(args, renderer, &views, (&progress, &rendering), begin)
     });
     let (profiles, render_ms) = drawn.map_err(CliError::of_drawing)?;
     drop(progress);
@@ -91,7 +88,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         choices: Choices::of_pictures(tree_kind, methods),
         samples: args.spp,
         triangles: n_triangles,
-        tree: world.tree().statistics(n_triangles, &build_options),
+        tree: world.tree().statistics(n_triangles, world.build_options()),
         load_ms,
         build_ms,
         render_ms,
@@ -159,12 +156,12 @@ fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec
 /// `begin` to have the pictures in memory.
 fn draw_and_write(
     args: &RenderArgs,
-    mut drawer: Drawer,
+    mut renderer: Renderer,
     views: &[View],
     (progress, message): (&Progress, &str),
     begin: Instant,
 ) -> Result<(Vec<Profile>, f64), CliError> {
-    let n_steps = views.len() as u32 * args.spp * u32::from(args.repeat) * drawer.n_bands();
+    let n_steps = views.len() as u32 * args.spp * u32::from(args.repeat) * renderer.n_bands();
     let mut steps = progress.steps(message, n_steps);
     // What is measured is drawn without pauses.
     steps.shows_parts &= args.profile.is_none() && args.trace.is_none() && args.repeat == 1;
@@ -172,16 +169,33 @@ fn draw_and_write(
     for view in views {
         let mut features = Vec::new();
         for _ in 0..args.repeat {
-            let drawn = drawer.draw(&view.camera, args.spp, &mut steps)?;
+            let drawn = renderer.draw(&view.camera, args.spp, Bar(&mut steps))?;
             profiles.push(drawn.profile);
             features = drawn.features;
         }
-        let picture = drawer.picture()?;
+        let picture = renderer.picture()?;
         drawing += last.elapsed();
         view.files.write(&args.aov, &picture, &features)?;
         last = Instant::now();
     }
     Ok((profiles, drawing.as_secs_f64() * 1e3))
+}
+
+/// Moves the bar as far as a drawing is.
+struct Bar<'a, 'b>(&'a mut Steps<'b>);
+
+impl Watcher for Bar<'_, '_> {
+    fn sees_parts(&self) -> bool {
+        self.0.shows_parts
+    }
+
+    fn part(&mut self, share: f32) {
+        self.0.part(share);
+    }
+
+    fn sample(&mut self) {
+        self.0.step();
+    }
 }
 
 /// Sizes the pool for everything that follows.

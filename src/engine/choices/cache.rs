@@ -82,6 +82,7 @@ struct Entry {
 }
 
 /// A folder of measurements.
+#[derive(Clone, Debug)]
 pub struct Cache {
     /// None where the system has no such folder, or the user wants none.
     folder: Option<PathBuf>,

@@ -59,7 +59,7 @@ pub struct Request {
 
 /// What traces rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Engine {
+pub enum Processor {
     /// The CPU, without Vulkan.
     Cpu,
     /// A Vulkan driver that runs kernels on the CPU, both sides of each branch.
@@ -67,8 +67,8 @@ pub enum Engine {
     Gpu,
 }
 
-impl Engine {
-    /// The engine that an open device is; without one, the CPU.
+impl Processor {
+    /// The processor that an open device is; without one, the CPU.
     pub fn of(context: Option<&Context>) -> Self {
         match context {
             None => Self::Cpu,
@@ -77,7 +77,7 @@ impl Engine {
         }
     }
 
-    /// The engine that a device will be once it is open.
+    /// The processor that a device will be once it is open.
     pub fn of_device(info: &DeviceInfo) -> Self {
         if info.is_software() { Self::SoftwareDriver } else { Self::Gpu }
     }
@@ -132,14 +132,14 @@ impl Workload {
 
 impl Request {
     /// The tree to build for so many triangles.
-    pub fn tree(&self, engine: Engine, n_triangles: usize, workload: &Workload) -> Chosen<TreeKind> {
-        Chosen::pinned_or(self.build.pinned(), || TreeKind::by_rule(engine, n_triangles, workload.n_rays))
+    pub fn tree(&self, processor: Processor, n_triangles: usize, workload: &Workload) -> Chosen<TreeKind> {
+        Chosen::pinned_or(self.build.pinned(), || TreeKind::by_rule(processor, n_triangles, workload.n_rays))
     }
 
     /// How to trace, without any measurement.
     pub fn methods_by_rule(&self, context: Option<&Context>, n_triangles: usize, size: (u32, u32)) -> Methods {
         Methods {
-            traversal: Chosen::pinned_or(self.traversal, || traversal_by_rule(Engine::of(context))),
+            traversal: Chosen::pinned_or(self.traversal, || traversal_by_rule(Processor::of(context))),
             primary: Chosen::pinned_or(self.primary, || primary_by_rule(context, n_triangles, size)),
             traversal_ns: None,
             primary_ns: None,
@@ -160,7 +160,7 @@ impl Request {
     ) -> Result<Methods, GpuError> {
         let n_triangles = world.scene().triangles.len();
         let by_rule = self.methods_by_rule(context.map(|context| &**context), n_triangles, workload.size);
-        let is_gpu = |context: &&Arc<Context>| Engine::of(Some(context)) == Engine::Gpu && !workload.shows_costs;
+        let is_gpu = |context: &&Arc<Context>| Processor::of(Some(context)) == Processor::Gpu && !workload.shows_costs;
         let Some(context) = context.filter(is_gpu) else { return Ok(by_rule) };
         let trial = Trial { context, world, workload, cache };
         let mut methods = by_rule;
@@ -188,8 +188,8 @@ mod tests {
         assert_eq!(whole, crop);
         assert_eq!(whole.n_rays, 640 * 480 * 2 * 4 * 2);
         let request = Request::default();
-        for engine in [Engine::Cpu, Engine::SoftwareDriver, Engine::Gpu] {
-            assert_eq!(request.tree(engine, 100_000, &whole), request.tree(engine, 100_000, &crop));
+        for processor in [Processor::Cpu, Processor::SoftwareDriver, Processor::Gpu] {
+            assert_eq!(request.tree(processor, 100_000, &whole), request.tree(processor, 100_000, &crop));
         }
         let candidates = [whole, crop].map(|workload| Candidates::of_traversals(100_000, workload.n_rays));
         assert_eq!(candidates[0], candidates[1]);
@@ -199,7 +199,7 @@ mod tests {
     fn what_is_pinned_is_taken() {
         let request =
             Request { build: BuildPolicy::Best, traversal: Some(Traversal::Backtrack), primary: Some(Primary::Trace) };
-        let kind = request.tree(Engine::Gpu, usize::MAX, &Workload::of_rays(0));
+        let kind = request.tree(Processor::Gpu, usize::MAX, &Workload::of_rays(0));
         assert_eq!(kind, Chosen { value: TreeKind::Best, by: Reason::Pinned });
         let Methods { traversal, primary, traversal_ns, .. } = request.methods_by_rule(None, 10, (10, 10));
         assert_eq!(

@@ -1,6 +1,6 @@
 //! Which tree to build: how much work pays for the rays that will be traced.
 
-use super::Engine;
+use super::Processor;
 use crate::accel::kdtree::BuildOptions;
 
 /// How much work goes into the tree, as the user says it.
@@ -45,19 +45,19 @@ const RAYS_A_TRIANGLE_ON_GPU: u64 = 1000;
 
 impl TreeKind {
     /// The tree with which building and so many rays take the least time together.
-    pub fn by_rule(engine: Engine, n_triangles: usize, n_rays: u64) -> Self {
-        let rays_a_triangle = match engine {
-            Engine::Gpu => RAYS_A_TRIANGLE_ON_GPU,
-            Engine::Cpu | Engine::SoftwareDriver => RAYS_A_TRIANGLE_ON_CPU,
+    pub fn by_rule(processor: Processor, n_triangles: usize, n_rays: u64) -> Self {
+        let rays_a_triangle = match processor {
+            Processor::Gpu => RAYS_A_TRIANGLE_ON_GPU,
+            Processor::Cpu | Processor::SoftwareDriver => RAYS_A_TRIANGLE_ON_CPU,
         };
         if n_rays / rays_a_triangle < n_triangles as u64 { Self::Fast } else { Self::Best }
     }
 
-    /// How it is built for an engine: the kernels that software drivers run look at no slabs.
-    pub fn options(self, engine: Engine) -> BuildOptions {
+    /// How it is built for an processor: the kernels that software drivers run look at no slabs.
+    pub fn options(self, processor: Processor) -> BuildOptions {
         match self {
             Self::Fast => BuildOptions::fast(),
-            Self::Best => BuildOptions { slabs: engine != Engine::SoftwareDriver, ..BuildOptions::default() },
+            Self::Best => BuildOptions { slabs: processor != Processor::SoftwareDriver, ..BuildOptions::default() },
         }
     }
 }
@@ -68,17 +68,19 @@ mod tests {
 
     #[test]
     fn few_rays_get_a_fast_tree_and_many_the_best() {
-        for (engine, enough) in [(Engine::Cpu, 40_000), (Engine::SoftwareDriver, 40_000), (Engine::Gpu, 1_000_000)] {
-            let kinds = [enough - 1, enough].map(|n_rays| TreeKind::by_rule(engine, 1000, n_rays));
-            assert_eq!(kinds, [TreeKind::Fast, TreeKind::Best], "{engine:?}");
+        for (processor, enough) in
+            [(Processor::Cpu, 40_000), (Processor::SoftwareDriver, 40_000), (Processor::Gpu, 1_000_000)]
+        {
+            let kinds = [enough - 1, enough].map(|n_rays| TreeKind::by_rule(processor, 1000, n_rays));
+            assert_eq!(kinds, [TreeKind::Fast, TreeKind::Best], "{processor:?}");
         }
     }
 
     #[test]
     fn only_software_drivers_do_without_slabs() {
-        let slabs =
-            [Engine::Cpu, Engine::SoftwareDriver, Engine::Gpu].map(|engine| TreeKind::Best.options(engine).slabs);
+        let slabs = [Processor::Cpu, Processor::SoftwareDriver, Processor::Gpu]
+            .map(|processor| TreeKind::Best.options(processor).slabs);
         assert_eq!(slabs, [true, false, true]);
-        assert_eq!(TreeKind::Fast.options(Engine::Gpu), BuildOptions::fast());
+        assert_eq!(TreeKind::Fast.options(Processor::Gpu), BuildOptions::fast());
     }
 }

@@ -1,14 +1,14 @@
 //! How rays are traced where nothing is known but the device and the sizes of scene and picture.
 
-use super::Engine;
+use super::Processor;
 use crate::{accel::kdtree::Traversal, buffers::RasterQueue, frame::Primary, gpu::Context};
 
-/// The traversal that is fastest on an engine in most scenes.
-pub fn traversal_by_rule(engine: Engine) -> Traversal {
-    match engine {
-        Engine::Cpu => Traversal::OF_CPU,
-        Engine::SoftwareDriver => Traversal::OF_SOFTWARE_DRIVERS,
-        Engine::Gpu => Traversal::OF_GPUS,
+/// The traversal that is fastest on an processor in most scenes.
+pub fn traversal_by_rule(processor: Processor) -> Traversal {
+    match processor {
+        Processor::Cpu => Traversal::OF_CPU,
+        Processor::SoftwareDriver => Traversal::OF_SOFTWARE_DRIVERS,
+        Processor::Gpu => Traversal::OF_GPUS,
     }
 }
 

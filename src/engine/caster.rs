@@ -1,0 +1,54 @@
+//! Rays of the caller's own, cast by the device or by the CPU.
+
+use std::{sync::Arc, time::Instant};
+
+use crate::{
+    accel::{Query, kdtree::Traversal},
+    cast::{self, Cast, CastRay, CpuCaster},
+    gpu::{Context, GpuError},
+    world::Geometry,
+};
+
+/// What casts rays, on the device or on the CPU.
+pub struct Caster<'a>(Processor<'a>);
+
+enum Processor<'a> {
+    Device(Box<cast::Caster>),
+    Cpu(Box<CpuCaster<'a>>),
+}
+
+impl<'a> Caster<'a> {
+    /// Without a context, the CPU casts.
+    pub(super) fn new(
+        context: Option<&Arc<Context>>,
+        geometry: Geometry<'a>,
+        traversal: Traversal,
+    ) -> Result<Self, GpuError> {
+        Ok(Self(match context {
+            Some(context) => Processor::Device(Box::new(cast::Caster::new(context, geometry, traversal)?)),
+            None => Processor::Cpu(Box::new(CpuCaster::new(geometry, traversal))),
+        }))
+    }
+
+    /// Casts rays `n_times`, all of them with the same hits. The times of the result are those of the device's kernel,
+    /// or of the CPU's clock.
+    ///
+    /// # Errors
+    /// Out of memory, a failed call.
+    pub fn cast(&mut self, rays: &[CastRay], query: Query, n_times: u32) -> Result<Cast, GpuError> {
+        match &mut self.0 {
+            Processor::Device(caster) => caster.cast(rays, query, n_times),
+            Processor::Cpu(caster) => Ok(cast_on_cpu(caster, rays, query, n_times)),
+        }
+    }
+}
+
+fn cast_on_cpu(caster: &CpuCaster, rays: &[CastRay], query: Query, n_times: u32) -> Cast {
+    let (mut hits, mut ms) = (Vec::new(), Vec::new());
+    for _ in 0..n_times.max(1) {
+        let start = Instant::now();
+        hits = caster.cast(rays, query);
+        ms.push(start.elapsed().as_secs_f64() * 1e3);
+    }
+    Cast { hits, gpu_ms: Some(ms), n_invalid: cast::count_invalid(rays) }
+}

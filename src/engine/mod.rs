@@ -1,0 +1,153 @@
+//! What renders and casts: a Vulkan device, or the CPU. An engine opens it, makes every choice that the user leaves
+//! open, and draws.
+//!
+//! ```text
+//! Scene ─> Engine::build ─> World ─> Engine::render ─> Picture
+//!                             └────> Engine::cast ───> hits
+//! ```
+
+mod caster;
+pub mod choices;
+mod renderer;
+
+use std::sync::Arc;
+
+use self::choices::{Cache, Chosen, Methods, Processor, Request, TreeKind, Workload};
+pub use self::{
+    caster::Caster,
+    renderer::{Rendered, Renderer},
+};
+use crate::{
+    accel::{Query, kdtree::Traversal},
+    cast::{CastRay, Hit},
+    frame::RenderOptions,
+    gpu::{Context, ContextOptions, GpuError},
+    scene::Scene,
+    world::{Geometry, Mismatch, World},
+};
+
+/// A device that renders and casts, and the choices that are made for it. A clone is a second handle to the same device.
+#[derive(Clone)]
+pub struct Engine {
+    /// None on the CPU.
+    context: Option<Arc<Context>>,
+    request: Request,
+    cache: Cache,
+}
+
+/// A world, and which tree was chosen for it.
+#[derive(Clone, Debug)]
+pub struct Built {
+    /// The scene with its tree.
+    pub world: World,
+    /// The tree's kind, and why it was chosen.
+    pub tree_kind: Chosen<TreeKind>,
+}
+
+impl Engine {
+    /// Opens the best Vulkan device, or the one that the options name.
+    ///
+    /// # Errors
+    /// There is no Vulkan driver or no such device, or the device lacks what kdray needs.
+    pub fn open(options: &ContextOptions) -> Result<Self, GpuError> {
+        Context::new(options).map(Self::on_device)
+    }
+
+    /// Uses a Vulkan device that is open.
+    pub fn on_device(context: Arc<Context>) -> Self {
+        Self { context: Some(context), ..Self::on_cpu() }
+    }
+
+    /// Uses the CPU without Vulkan, on the current rayon pool.
+    pub fn on_cpu() -> Self {
+        Self { context: None, request: Request::default(), cache: Cache::open() }
+    }
+
+    /// The same engine with some choices pinned; it makes the others itself.
+    #[must_use]
+    pub fn with_request(self, request: Request) -> Self {
+        Self { request, ..self }
+    }
+
+    /// The Vulkan device; none on the CPU.
+    pub fn context(&self) -> Option<&Arc<Context>> {
+        self.context.as_ref()
+    }
+
+    /// What kind of processor the engine runs on.
+    pub fn processor(&self) -> Processor {
+        Processor::of(self.context.as_deref())
+    }
+
+    /// The device's own name, or the CPU with its number of threads.
+    pub fn device_name(&self) -> String {
+        match &self.context {
+            Some(context) => context.info().name.clone(),
+            None => format!("CPU, {} threads", rayon::current_num_threads()),
+        }
+    }
+
+    /// Chooses the tree for so many triangles: the one with which building and the workload take the least time
+    /// together.
+    pub fn tree_kind(&self, n_triangles: usize, workload: &Workload) -> Chosen<TreeKind> {
+        self.request.tree(self.processor(), n_triangles, workload)
+    }
+
+    /// Chooses a tree for the workload and builds it on the current rayon pool.
+    ///
+    /// # Errors
+    /// The scene has a triangle without a material.
+    pub fn build(&self, scene: Scene, workload: &Workload) -> Result<Built, Mismatch> {
+        let tree_kind = self.tree_kind(scene.triangles.len(), workload);
+        let world = World::new(scene, &tree_kind.value.options(self.processor()))?;
+        Ok(Built { world, tree_kind })
+    }
+
+    /// Chooses how to trace. A workload that is large enough pays for a short measurement, whose result is kept in the
+    /// user's cache folder.
+    ///
+    /// # Errors
+    /// The device is lost.
+    pub fn methods(&self, world: &World, workload: &Workload) -> Result<Methods, GpuError> {
+        self.request.methods(self.context.as_ref(), world, workload, &self.cache)
+    }
+
+    /// Makes what draws pictures of a world again and again.
+    ///
+    /// # Errors
+    /// The scene or a row of the picture is beyond the device's limits or memory.
+    pub fn renderer(&self, world: &World, options: &RenderOptions) -> Result<Renderer, GpuError> {
+        Renderer::new(self.context.as_ref(), world, options)
+    }
+
+    /// Makes what casts rays through triangles again and again.
+    ///
+    /// # Errors
+    /// The triangles are beyond the device's limits or memory, or too many for [`Traversal::Brute`].
+    pub fn caster<'a>(&self, geometry: Geometry<'a>, traversal: Traversal) -> Result<Caster<'a>, GpuError> {
+        Caster::new(self.context.as_ref(), geometry, traversal)
+    }
+
+    /// Draws one picture from the scene's own camera by one sample a pixel. The engine chooses traversal and primary
+    /// visibility in place of the options'.
+    ///
+    /// # Errors
+    /// Those of [`Engine::methods`] and [`Engine::renderer`]; a failed call.
+    pub fn render(&self, world: &World, options: &RenderOptions) -> Result<Rendered, GpuError> {
+        let scene = world.scene();
+        let workload = Workload::of_pictures(options, scene.lights.len(), 1).seen_by([&scene.camera].into_iter());
+        let options = self.methods(world, &workload)?.apply(options);
+        let mut renderer = self.renderer(world, &options)?;
+        let drawn = renderer.draw(&scene.camera, 1, || ())?;
+        Ok(Rendered { picture: renderer.picture()?.into_owned(), drawn })
+    }
+
+    /// Casts rays; gives one hit a ray. The engine chooses the traversal.
+    ///
+    /// # Errors
+    /// Those of [`Engine::methods`] and [`Engine::caster`]; a failed call.
+    pub fn cast(&self, world: &World, rays: &[CastRay], query: Query) -> Result<Vec<Hit>, GpuError> {
+        let traversal = self.methods(world, &Workload::of_rays(rays.len() as u64))?.traversal.value;
+        Ok(self.caster(world.geometry(), traversal)?.cast(rays, query, 1)?.hits)
+    }
+}

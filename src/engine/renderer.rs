@@ -1,0 +1,94 @@
+//! A world's pictures, drawn by the device or by the CPU.
+
+use std::{borrow::Cow, sync::Arc};
+
+use tracing::info_span;
+
+use crate::{
+    cpu::{self, Batching},
+    frame::{Drawn, Picture, RenderOptions, Watcher},
+    gpu::{Context, GpuError},
+    render::BandedRenderer,
+    scene::Camera,
+    world::World,
+};
+
+/// A picture, and what comes of drawing it.
+#[derive(Clone, Debug)]
+pub struct Rendered {
+    /// The picture.
+    pub picture: Picture,
+    /// Times, counts and features.
+    pub drawn: Drawn,
+}
+
+/// What draws pictures of a world, on the device or on the CPU.
+pub struct Renderer(Processor);
+
+enum Processor {
+    Device(Box<BandedRenderer>),
+    Cpu(Box<cpu::Renderer>),
+}
+
+impl Renderer {
+    /// Without a context, the CPU draws.
+    pub(super) fn new(
+        context: Option<&Arc<Context>>,
+        world: &World,
+        options: &RenderOptions,
+    ) -> Result<Self, GpuError> {
+        Ok(Self(match context {
+            Some(context) => Processor::Device(Box::new(BandedRenderer::new(Arc::clone(context), world, options)?)),
+            None => Processor::Cpu(Box::new(cpu::Renderer::new(world, options, Batching::default()))),
+        }))
+    }
+
+    /// The number of parts of the picture that are drawn one after the other.
+    pub fn n_bands(&self) -> u32 {
+        match &self.0 {
+            Processor::Device(renderer) => renderer.n_bands(),
+            Processor::Cpu(_) => 1,
+        }
+    }
+
+    /// Draws what a camera sees by so many samples a pixel, at least one. The watcher hears of each sample of each
+    /// band.
+    ///
+    /// # Errors
+    /// A failed call; one pixel alone makes more rays than a queue holds; out of memory.
+    pub fn draw(&mut self, camera: &Camera, n_samples: u32, mut watcher: impl Watcher) -> Result<Drawn, GpuError> {
+        match &mut self.0 {
+            Processor::Device(renderer) => {
+                renderer.set_camera(camera);
+                renderer.draw(n_samples, watcher)
+            }
+            Processor::Cpu(renderer) => {
+                renderer.set_camera(camera);
+                Ok(draw_on_cpu(renderer, n_samples, &mut watcher))
+            }
+        }
+    }
+
+    /// The picture that was drawn last.
+    ///
+    /// # Errors
+    /// A failed copy.
+    pub fn picture(&self) -> Result<Cow<'_, Picture>, GpuError> {
+        match &self.0 {
+            Processor::Device(renderer) => renderer.picture(),
+            Processor::Cpu(renderer) => Ok(Cow::Owned(renderer.picture())),
+        }
+    }
+}
+
+fn draw_on_cpu(renderer: &mut cpu::Renderer, n_samples: u32, watcher: &mut impl Watcher) -> Drawn {
+    let mut sample = |renderer: &mut cpu::Renderer| {
+        let profile = info_span!("render").in_scope(|| renderer.draw_sample_with(|share| watcher.part(share)));
+        watcher.sample();
+        profile
+    };
+    let mut profile = sample(renderer);
+    let features = if renderer.options().features { renderer.features() } else { Vec::new() };
+    (1..n_samples).for_each(|_| profile.add(&sample(renderer)));
+    Drawn { features, profile }
+}
