@@ -1,4 +1,39 @@
-//! kdray: ray tracing by depth-first kd-tree traversal in Vulkan compute.
+//! kdray traces rays on any Vulkan driver, without ray tracing hardware: a kd-tree is walked depth first in compute
+//! shaders, with a bit mask as the stack. It implements Cao Jiayin's paper on interactive ray tracing by depth-first
+//! kd-tree traversal (2010). A machine without Vulkan renders on the CPU.
+//!
+//! An [`Engine`](engine::Engine) opens a device, builds the tree of a scene, and renders pictures or casts rays:
+//!
+//! ```
+//! use kdray::engine::{Engine, choices::Workload};
+//! use kdray::frame::RenderOptions;
+//! use kdray::scene::Scene;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scene = Scene::load("scenes/cornell.toml".as_ref())?;
+//! let options = RenderOptions { width: 64, height: 64, ..RenderOptions::of_scene(&scene) };
+//! let workload = Workload::of_pictures(&options, scene.lights.len(), 1);
+//! let engine = Engine::on_cpu(); // or Engine::open(&ContextOptions::default())?
+//! let world = engine.build(scene, &workload)?.world;
+//! let picture = engine.render(&world, &options)?.picture;
+//! assert_eq!(picture.display.len(), 64 * 64); // sRGB, rows from the top
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! `examples/render.rs` and `examples/cast.rs` are whole programs.
+//!
+//! # Features
+//!
+//! - `cli`: the command `kdray`.
+//! - `view`: windows, for `kdray view`.
+//! - `bench`: measurements and their charts, for `kdray bench`.
+//! - `hot-reload`: `kdray view` compiles the shaders again when they change, and swaps them in.
+//! - `shaderc-from-source`: the build compiles the GLSL compiler shaderc from its C++ source.
+//!
+//! The first three are on by default. A program that only renders or casts needs none of them.
+//!
+//! # Modules
 //!
 //! The modules, in the order in which data flows through them:
 //!
@@ -52,6 +87,8 @@ pub mod engine;
 
 pub mod output;
 
+#[cfg(feature = "bench")]
 pub mod bench;
 
+#[cfg(feature = "view")]
 pub mod view;

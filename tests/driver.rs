@@ -14,8 +14,7 @@ use kdray::{
         Spread,
         difference::Apart,
         driver::{
-            contest::{Contender, Trial, hold},
-            kernel::Kernel,
+            contest::{Trial, hold},
             raster::Raster,
             report::{RasterResult, SetResult},
         },
@@ -23,7 +22,7 @@ use kdray::{
         stage::Stage,
     },
     buffers::{AccelBuffers, CastResources},
-    cast::CastRay,
+    cast::{CastRay, Contender, Kernel},
     gpu::{Access, Commands, Context, ContextOptions, GpuError},
     layout::NO_TRIANGLE,
     world::World,

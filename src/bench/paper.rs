@@ -52,17 +52,7 @@ impl Reported {
 
 /// The scene's own options at another size.
 pub fn options(scene: &Scene, (width, height): (u32, u32), traversal: Traversal) -> RenderOptions {
-    let scene = &scene.defaults;
-    RenderOptions {
-        traversal,
-        width,
-        height,
-        max_depth: scene.max_depth,
-        exposure: scene.exposure,
-        tonemap: scene.tonemap,
-        denoise: scene.denoise,
-        ..RenderOptions::default()
-    }
+    RenderOptions { traversal, width, height, ..RenderOptions::of_scene(scene) }
 }
 
 /// Frames drawn on a device by the primary rays that suit it, after a warm-up, which also finds how many batches the frame needs.

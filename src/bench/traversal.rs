@@ -17,13 +17,13 @@ use crate::{
         Query,
         kdtree::{Statistics, Traversal},
     },
-    cast::{CastRay, Caster},
+    cast::{CastRay, Caster, cast_ray},
     cpu::{
         self,
         steps::{Steps, count_steps},
     },
     gpu::{Context, GpuError, Statistic, StatisticValue},
-    layout::{Hit, NO_TRIANGLE, Ray},
+    layout::{Hit, NO_TRIANGLE},
 };
 
 /// Timed casts of one variant before it is the next one's turn.
@@ -121,11 +121,6 @@ impl<'a> Tracers<'a> {
         cpu::cast::cast(&self.stage.bindings(), variant, query, rays, &mut hits);
         hits
     }
-}
-
-/// A ray of the renderer as one that is cast.
-pub(crate) fn cast_ray(ray: &Ray) -> CastRay {
-    CastRay { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
 }
 
 /// How many casts each turn has: all together `n_times`.

@@ -5,7 +5,10 @@
 //!   .npy                                                                          .npz
 //! ```
 
+mod kernel;
+pub(crate) mod leaving;
 mod read;
+mod rounds;
 mod write;
 
 use std::{mem, sync::Arc, time::Instant};
@@ -13,8 +16,11 @@ use std::{mem, sync::Arc, time::Instant};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
+pub(crate) use self::rounds::rounds;
 pub use self::{
+    kernel::Kernel,
     read::{RayFileError, RayReader},
+    rounds::Contender,
     write::HitWriter,
 };
 pub use crate::layout::{CastRay, Hit, NO_TRIANGLE};
@@ -26,7 +32,7 @@ use crate::{
     buffers::{AccelBuffers, CastResources, Round},
     cpu,
     gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
-    layout::{Frame, RAY_GROUP_SIZE},
+    layout::{Frame, RAY_GROUP_SIZE, Ray},
     passes,
     world::Geometry,
 };
@@ -208,4 +214,9 @@ impl<'a> CpuCaster<'a> {
 /// The hits of a [`Caster`], found by a [`CpuCaster`].
 pub fn cast_on_cpu(geometry: Geometry, traversal: Traversal, rays: &[CastRay], query: Query) -> Vec<Hit> {
     CpuCaster::new(geometry, traversal).cast(rays, query)
+}
+
+/// A ray of the renderer as one that is cast.
+pub(crate) fn cast_ray(ray: &Ray) -> CastRay {
+    CastRay { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
 }

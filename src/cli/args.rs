@@ -11,9 +11,11 @@ use kdray::{
     scene::Scene,
 };
 
+#[cfg(feature = "bench")]
+use super::bench::Suite;
+#[cfg(feature = "view")]
 pub use super::view_args::ViewArgs;
 use super::{
-    bench::Suite,
     error::CliError,
     picture_args::{PictureArgs, build_help, way_help},
     wanted::Wanted,
@@ -32,6 +34,7 @@ pub struct Args {
 pub enum Command {
     /// Render a scene to a picture, and report where the time went
     Render(RenderArgs),
+    #[cfg(feature = "view")]
     /// Show a scene in a window, moved through with keys and mouse
     View(ViewArgs),
     /// Find what given rays hit in a scene or mesh
@@ -40,6 +43,7 @@ pub enum Command {
     Devices,
     /// Describe a scene and its kd-tree
     Inspect(InspectArgs),
+    #[cfg(feature = "bench")]
     /// Measure: whole frames, ways through the kd-tree, the driver's own ray tracing, cost against size
     #[command(subcommand)]
     Bench(Suite),

@@ -3,6 +3,7 @@
 //! What a command was asked for goes to standard output; progress, notes and errors go to standard error.
 
 mod args;
+#[cfg(feature = "bench")]
 mod bench;
 mod build;
 mod cast;
@@ -21,7 +22,9 @@ mod signals;
 mod spans;
 mod table;
 mod trace;
+#[cfg(feature = "view")]
 mod view;
+#[cfg(feature = "view")]
 mod view_args;
 mod wanted;
 
@@ -62,10 +65,12 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
 fn run(args: Args) -> Result<(), CliError> {
     match args.command {
         Command::Render(args) => render::run(&args),
+        #[cfg(feature = "view")]
         Command::View(args) => view::run(&args),
         Command::Cast(args) => cast::run(&args),
         Command::Devices => devices::run(),
         Command::Inspect(args) => inspect::run(&args),
+        #[cfg(feature = "bench")]
         Command::Bench(suite) => bench::run(&suite),
     }
 }

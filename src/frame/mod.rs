@@ -24,7 +24,11 @@ pub use self::{
     resource::Resource,
     view::View,
 };
-use crate::{accel::kdtree::Traversal, layout};
+use crate::{
+    accel::kdtree::Traversal,
+    layout,
+    scene::{RenderDefaults, Scene},
+};
 
 /// How a frame is rendered. The scene's own defaults fill what the user leaves open.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,6 +51,14 @@ pub struct RenderOptions {
     pub profile: bool,
     /// Note what the rays of each pixel meet and cost, too.
     pub features: bool,
+}
+
+impl RenderOptions {
+    /// The options that a scene asks for.
+    pub fn of_scene(scene: &Scene) -> Self {
+        let RenderDefaults { width, height, max_depth, exposure, tonemap, denoise } = scene.defaults;
+        Self { width, height, max_depth, exposure, tonemap, denoise, ..Self::default() }
+    }
 }
 
 impl Default for RenderOptions {

@@ -10,7 +10,7 @@ use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::Allocator;
 
 use super::{
-    Commands, DeviceInfo, DeviceOverrides, DeviceSelector, GpuError, Limits, Screen, Surface,
+    Commands, DeviceInfo, DeviceOverrides, DeviceSelector, GpuError, Limits,
     commands::CommandBuffer,
     device::{DeviceExtras, Purpose},
     devices::{queue_family, select},
@@ -59,6 +59,7 @@ pub struct Context {
     wide_atomics: bool,
     /// None where the device was opened without a window.
     pub(super) presentation: Option<khr::swapchain::Device>,
+    #[cfg(feature = "view")]
     pub(super) physical: vk::PhysicalDevice,
     pub(super) queue: vk::Queue,
     /// Shared with the overlay's renderer, which ends before the context.
@@ -83,7 +84,7 @@ impl Context {
     /// No loader, driver, device of that name or validation layer; a device that lacks a feature; a failed call.
     pub fn new(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::new(options.validate)?;
-        let (physical, info) = select(&instance, options.device.as_ref(), None)?;
+        let (physical, info) = select(&instance, options.device.as_ref(), |_| true)?;
         Self::open(instance, physical, info, Purpose::Compute, &options.pretend)
     }
 
@@ -91,10 +92,15 @@ impl Context {
     ///
     /// # Errors
     /// As [`Context::new`]; a device that cannot present to the window.
-    pub fn for_window(options: &ContextOptions, window: Arc<dyn Screen>) -> Result<(Arc<Self>, Surface), GpuError> {
-        let instance = Instance::with_extensions(options.validate, &Surface::extensions(&*window)?)?;
-        let surface = Surface::new(&instance, window)?;
-        let (physical, info) = select(&instance, options.device.as_ref(), Some(&surface))?;
+    #[cfg(feature = "view")]
+    pub fn for_window(
+        options: &ContextOptions,
+        window: Arc<dyn super::Screen>,
+    ) -> Result<(Arc<Self>, super::Surface), GpuError> {
+        let instance = Instance::with_extensions(options.validate, &super::Surface::extensions(&*window)?)?;
+        let surface = super::Surface::new(&instance, window)?;
+        let (physical, info) =
+            select(&instance, options.device.as_ref(), |device| surface.is_served_by(&instance, device))?;
         Ok((Self::open(instance, physical, info, Purpose::Window, &options.pretend)?, surface))
     }
 
@@ -104,7 +110,7 @@ impl Context {
     /// As [`Context::new`]; the device lacks that extension.
     pub fn with_ray_tracing(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::new(options.validate)?;
-        let (physical, info) = select(&instance, options.device.as_ref(), None)?;
+        let (physical, info) = select(&instance, options.device.as_ref(), |_| true)?;
         if let Some(missing) = RayTracingCalls::missing(&instance, physical) {
             return Err(GpuError::Lacks { device: info.name, missing });
         }
@@ -150,6 +156,7 @@ impl Context {
             debug_utils: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device)),
             presentation: (purpose == Purpose::Window).then(|| khr::swapchain::Device::new(&instance.raw, &device)),
             device,
+            #[cfg(feature = "view")]
             physical,
             command_pool,
             timestamp_period_ns: properties.limits.timestamp_period,

@@ -2,10 +2,10 @@
 
 use std::{ffi::CStr, fmt};
 
-use ash::{khr, vk};
+use ash::vk;
 use serde::Serialize;
 
-use super::{DeviceOverrides, GpuError, Surface, instance::Instance};
+use super::{DeviceOverrides, GpuError, instance::Instance};
 
 /// One Vulkan device.
 #[derive(Clone, Debug, Serialize)]
@@ -109,7 +109,7 @@ pub fn devices() -> Result<Vec<DeviceInfo>, GpuError> {
 /// # Errors
 /// No loader, driver or device of that name; a device that lacks a feature.
 pub fn chosen_device(selector: Option<&DeviceSelector>) -> Result<DeviceInfo, GpuError> {
-    Ok(select(&*Instance::new(false)?, selector, None)?.1)
+    Ok(select(&*Instance::new(false)?, selector, |_| true)?.1)
 }
 
 pub(super) fn list(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, DeviceInfo)>, GpuError> {
@@ -121,16 +121,16 @@ pub(super) fn list(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Devic
     if list.is_empty() { Err(GpuError::NoDriver) } else { Ok(list) }
 }
 
-/// The device that is meant: the named one, or the best of those that lack nothing. Where there is a surface, what
-/// cannot show pictures on it lacks that.
+/// The device that is meant: the named one, or the best of those that lack nothing. `presents`: whether a
+/// device can show pictures where it has to.
 pub(super) fn select(
     instance: &Instance,
     selector: Option<&DeviceSelector>,
-    surface: Option<&Surface>,
+    presents: impl Fn(vk::PhysicalDevice) -> bool,
 ) -> Result<(vk::PhysicalDevice, DeviceInfo), GpuError> {
     let mut list = list(instance)?;
     for (device, info) in &mut list {
-        if info.missing.is_empty() && surface.is_some_and(|surface| !presents(instance, *device, surface)) {
+        if info.missing.is_empty() && !presents(*device) {
             info.missing.push("presentation to this window".to_owned());
         }
     }
@@ -151,19 +151,6 @@ pub(super) fn select(
         return Err(GpuError::Lacks { device: info.name.clone(), missing: info.missing.join(", ") });
     }
     Ok((*device, info.clone()))
-}
-
-/// Whether the queue that renders can also present.
-fn presents(instance: &Instance, device: vk::PhysicalDevice, surface: &Surface) -> bool {
-    // SAFETY: the device belongs to the instance.
-    let (families, extensions) = unsafe {
-        (
-            instance.raw.get_physical_device_queue_family_properties(device),
-            instance.raw.enumerate_device_extension_properties(device).unwrap_or_default(),
-        )
-    };
-    let has_swapchain = extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::swapchain::NAME));
-    has_swapchain && queue_family(&families).is_some_and(|family| surface.is_served_by(device, family as u32))
 }
 
 fn rank(kind: &str) -> usize {

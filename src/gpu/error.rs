@@ -17,8 +17,8 @@ pub enum GpuError {
     NoValidationLayer,
     #[error("cannot show pictures in this window: {0}")]
     NoSurface(String),
-    #[error("the overlay: {0}")]
-    Overlay(#[from] egui_ash_renderer::RendererError),
+    #[error("{object}: {message}")]
+    Other { object: &'static str, message: String },
     #[error("{call} `{object}`: {result}")]
     Call { call: &'static str, object: String, result: vk::Result },
     #[error("memory for `{object}` ({}): {source}", mebibytes(*bytes))]
@@ -37,7 +37,7 @@ impl GpuError {
     /// Whether the device or the window's surface is gone, so that all that is on it has to be made anew.
     pub fn is_device_lost(&self) -> bool {
         let result = match self {
-            Self::Call { result, .. } | Self::Overlay(egui_ash_renderer::RendererError::Vulkan(result)) => *result,
+            Self::Call { result, .. } => *result,
             _ => return false,
         };
         matches!(result, vk::Result::ERROR_DEVICE_LOST | vk::Result::ERROR_SURFACE_LOST_KHR)

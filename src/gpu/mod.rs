@@ -16,20 +16,25 @@ mod error;
 mod image;
 mod instance;
 mod memory;
-mod overlay;
 mod overrides;
 mod pipeline;
+#[cfg(feature = "view")]
 mod presenter;
 mod probe;
+#[cfg(feature = "view")]
+mod raw;
 mod ray_tracing;
 mod refusal;
 mod robustness;
 mod shader;
 mod specialization;
 mod statistics;
+#[cfg(feature = "view")]
 mod surface;
+#[cfg(feature = "view")]
 mod swapchain;
 mod timer;
+#[cfg(feature = "view")]
 mod window;
 
 pub use acceleration::Scenery;
@@ -42,15 +47,16 @@ pub use devices::{DeviceInfo, DeviceSelector, Limits, chosen_device, devices};
 pub use error::GpuError;
 pub use image::{Target, TargetKind};
 pub use memory::MemoryUse;
-pub use overlay::{Overlay, OverlayFrame};
 #[doc(hidden)]
 pub use overrides::DeviceOverrides;
 pub use pipeline::{ComputeDesc, ComputePipeline, RasterDesc, RasterPipeline, RasterTargets};
-pub use presenter::{Presenter, WindowImage};
+#[cfg(feature = "view")]
+pub use presenter::{FRAMES_IN_FLIGHT, Presenter, WindowImage};
 pub use ray_tracing::{RayTracingDesc, RayTracingPipeline};
 #[cfg(feature = "hot-reload")]
 pub use shader::Replacements;
 pub use shader::Shader;
 pub use statistics::{Statistic, StatisticValue};
+#[cfg(feature = "view")]
 pub use surface::{Screen, Surface};
 pub use timer::{Timer, TimerRow};

@@ -5,7 +5,7 @@ use std::{ffi::CStr, sync::Arc};
 use ash::vk;
 
 use super::{
-    Bindings, Context, GpuError, Presenter, Shader, TargetKind, robustness::without_checks, shader::ShaderModule,
+    Bindings, Context, GpuError, Shader, TargetKind, robustness::without_checks, shader::ShaderModule,
     specialization::Specialization, statistics::capture_flags,
 };
 
@@ -74,36 +74,36 @@ impl Drop for ComputePipeline {
 
 /// What a raster pass draws to.
 #[derive(Clone, Copy)]
-pub enum RasterTargets<'a> {
+pub enum RasterTargets {
     /// One ID target, with reverse-Z depth.
     Ids,
-    /// A window's image.
-    Window(&'a Presenter),
+    /// One colour image of a format, without depth.
+    Color(vk::Format),
 }
 
-impl RasterTargets<'_> {
+impl RasterTargets {
     fn color_format(self) -> vk::Format {
         match self {
             Self::Ids => TargetKind::Id.format(),
-            Self::Window(presenter) => presenter.format(),
+            Self::Color(format) => format,
         }
     }
 
     fn depth_format(self) -> vk::Format {
         match self {
             Self::Ids => TargetKind::Depth.format(),
-            Self::Window(_) => vk::Format::UNDEFINED,
+            Self::Color(_) => vk::Format::UNDEFINED,
         }
     }
 }
 
 /// Shaders of a raster pass.
-pub struct RasterDesc<'a> {
+pub struct RasterDesc {
     /// Also the debug label and the timer.
     pub name: &'static str,
     pub vertex: Shader,
     pub fragment: Shader,
-    pub targets: RasterTargets<'a>,
+    pub targets: RasterTargets,
 }
 
 /// A raster pass over a triangle list without vertex buffers, two-sided.

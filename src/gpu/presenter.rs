@@ -56,7 +56,7 @@ impl Presenter {
     }
 
     /// The window's image format, which pipelines that draw into it have to know.
-    pub(super) fn format(&self) -> vk::Format {
+    pub(crate) fn format(&self) -> vk::Format {
         self.format
     }
 

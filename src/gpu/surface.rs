@@ -5,7 +5,7 @@ use std::{ffi::CStr, sync::Arc};
 use ash::{khr, vk};
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 
-use super::{GpuError, instance::Instance};
+use super::{GpuError, devices::queue_family, instance::Instance};
 
 /// What has a place on a screen: a window.
 pub trait Screen: HasDisplayHandle + HasWindowHandle {}
@@ -42,8 +42,20 @@ impl Surface {
         Ok(Self { raw, calls, _instance: instance.clone(), _window: window })
     }
 
-    /// Whether queues of the family can present to it.
-    pub(super) fn is_served_by(&self, device: vk::PhysicalDevice, family: u32) -> bool {
+    /// Whether the queue of a device that renders can also present to the surface.
+    pub(super) fn is_served_by(&self, instance: &Instance, device: vk::PhysicalDevice) -> bool {
+        // SAFETY: the device belongs to the instance.
+        let (families, extensions) = unsafe {
+            (
+                instance.raw.get_physical_device_queue_family_properties(device),
+                instance.raw.enumerate_device_extension_properties(device).unwrap_or_default(),
+            )
+        };
+        let has_swapchain = extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::swapchain::NAME));
+        has_swapchain && queue_family(&families).is_some_and(|family| self.is_served_by_family(device, family as u32))
+    }
+
+    fn is_served_by_family(&self, device: vk::PhysicalDevice, family: u32) -> bool {
         // SAFETY: device and surface belong to one instance.
         unsafe { self.calls.get_physical_device_surface_support(device, family, self.raw) }.unwrap_or(false)
     }

@@ -16,6 +16,7 @@ mod compact;
 mod denoise;
 mod false_color;
 mod features;
+#[cfg(feature = "view")]
 mod present;
 mod primary_hit;
 mod rasterize;
@@ -29,9 +30,12 @@ mod visibility;
 
 pub use self::{
     accumulate::Accumulate, cast::Cast, compact::Compact, denoise::Denoise, false_color::FalseColor,
-    features::Features, present::Present, primary_hit::PrimaryHit, rasterize::Rasterize, record::Inputs,
-    resolve::Resolve, shade::Shade, shadow::Shadow, tonemap::Tonemap, trace::Trace, visibility::Visibility,
+    features::Features, primary_hit::PrimaryHit, rasterize::Rasterize, record::Inputs, resolve::Resolve, shade::Shade,
+    shadow::Shadow, tonemap::Tonemap, trace::Trace, visibility::Visibility,
 };
+
+#[cfg(feature = "view")]
+pub use self::present::Present;
 
 /// A shader, as build.rs left it.
 macro_rules! spirv {

@@ -24,7 +24,7 @@ impl Present {
             name: "present",
             vertex: spirv!("present.vert"),
             fragment: spirv!("present.frag"),
-            targets: RasterTargets::Window(presenter),
+            targets: RasterTargets::Color(presenter.format()),
         };
         Ok(Self { pipeline: RasterPipeline::new(context, &resources.bindings, &desc)? })
     }

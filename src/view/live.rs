@@ -4,11 +4,14 @@ use std::sync::Arc;
 
 use egui::TexturesDelta;
 
-use super::loaded::Loaded;
+use super::{
+    loaded::Loaded,
+    overlay::{Overlay, OverlayFrame},
+};
 use crate::{
     engine::choices::{Cache, Choices, Request, Workload},
     frame::RenderOptions,
-    gpu::{Context, ContextOptions, GpuError, Overlay, OverlayFrame, Presenter, Screen},
+    gpu::{Context, ContextOptions, GpuError, Presenter, Screen},
     passes::Present,
     render::Renderer,
 };

@@ -12,6 +12,7 @@ mod input;
 mod live;
 pub mod loaded;
 mod mouse;
+mod overlay;
 mod pace;
 pub mod panel;
 pub mod pick;

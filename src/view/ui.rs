@@ -10,12 +10,12 @@ use winit::{
     window::Window,
 };
 
+use super::overlay::OverlayFrame;
 use super::{
     live::Live,
     panel::{self, Facts, Layers, Settings},
     session::Session,
 };
-use crate::gpu::OverlayFrame;
 
 /// The overlay's state.
 pub struct Ui {

@@ -2,14 +2,12 @@
 //!
 //! ```text
 //! contest   ways of tracing that take turns on a device -> times, hits
-//!   kernel    kdray's traversal is one
-//!   pipeline  VK_KHR_ray_tracing_pipeline another; nothing else uses that extension
+//!   pipeline  VK_KHR_ray_tracing_pipeline is one, beside kdray's own kernel; nothing else uses that extension
 //! raster    primary rays without a tree, by the passes that rasterize
 //! report    what came of it, in numbers and as a chart
 //! ```
 
 pub mod contest;
-pub mod kernel;
 mod pipeline;
 pub mod raster;
 pub mod report;
@@ -17,8 +15,7 @@ pub mod report;
 use std::{rc::Rc, sync::Arc};
 
 use self::{
-    contest::{Contender, hold},
-    kernel::Kernel,
+    contest::hold,
     pipeline::Pipeline,
     raster::Raster,
     report::{Builds, RasterResult, SetResult},
@@ -27,11 +24,11 @@ use super::{
     Spread,
     rays::{RayKind, RaySet},
     stage::Stage,
-    traversal::cast_ray,
 };
 use crate::{
     accel::{Query, kdtree::Traversal},
     buffers::{AccelBuffers, CastResources},
+    cast::{Contender, Kernel, cast_ray},
     gpu::{Bindings, Context, GpuError, Scenery},
 };
 

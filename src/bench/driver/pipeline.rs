@@ -2,10 +2,10 @@
 
 use std::{rc::Rc, sync::Arc};
 
-use super::contest::Contender;
 use crate::{
     accel::Query,
     buffers::CastResources,
+    cast::Contender,
     gpu::{
         Access, Binding, BindingKind, BindingSet, Bindings, Commands, Context, GpuError, RayTracingDesc,
         RayTracingPipeline, Scenery,

@@ -13,15 +13,8 @@ use crate::{
         Query,
         kdtree::{KdTree, Traversal},
     },
-    bench::{
-        driver::{
-            contest::{Contender, rounds},
-            kernel::Kernel,
-        },
-        rays::diffuse_rays,
-        traversal::cast_ray,
-    },
     buffers::{AccelBuffers, CastResources},
+    cast::{Contender, Kernel, cast_ray, leaving::diffuse_rays, rounds},
     cpu::{bindings::Bindings, primary_hit::primary_rays, trace::trace},
     frame::{Denoise, Primary, RenderOptions, frame_constants},
     gpu::{Context, GpuError},

@@ -2,7 +2,7 @@
 
 use std::{rc::Rc, sync::Arc};
 
-use super::contest::Contender;
+use super::Contender;
 use crate::{
     accel::{Query, kdtree::Traversal},
     buffers::{CastResources, Round},

@@ -1,15 +1,16 @@
 //! Draws what egui has laid out over a window's image.
 
-use std::{mem::ManuallyDrop, sync::Arc};
+use std::sync::Arc;
 
 use egui::{ClippedPrimitive, TextureId, TexturesDelta};
-use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer, allocator::GpuAllocator};
+use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer, RendererError, allocator::GpuAllocator};
 
-use super::{Commands, Context, GpuError, Presenter, WindowImage, presenter::FRAMES_IN_FLIGHT};
+use crate::gpu::{Commands, Context, FRAMES_IN_FLIGHT, GpuError, Presenter, WindowImage};
 
 /// egui's pipeline, textures and meshes.
 pub struct Overlay {
-    renderer: ManuallyDrop<Renderer<GpuAllocator>>,
+    /// None only while it is dropped.
+    renderer: Option<Renderer<GpuAllocator>>,
     /// Shown by the last frame for the last time.
     released: Vec<TextureId>,
     context: Arc<Context>,
@@ -32,9 +33,10 @@ impl Overlay {
             stencil_attachment_format: None,
         });
         let options = Options { in_flight_frames: FRAMES_IN_FLIGHT, ..Options::default() };
-        let allocator = Arc::clone(&context.allocator);
-        let renderer = Renderer::with_gpu_allocator(allocator, context.device.clone(), mode, options)?;
-        Ok(Self { renderer: ManuallyDrop::new(renderer), released: Vec::new(), context: context.clone() })
+        let allocator = context.allocator();
+        let renderer =
+            Renderer::with_gpu_allocator(allocator, context.device().clone(), mode, options).map_err(error)?;
+        Ok(Self { renderer: Some(renderer), released: Vec::new(), context: context.clone() })
     }
 
     /// Takes over new and changed textures; to be called before each `draw`.
@@ -47,12 +49,14 @@ impl Overlay {
         }
         // Frames in flight may still show what is replaced here.
         self.context.wait()?;
+        let renderer = self.renderer.as_mut().expect("a renderer");
         for id in self.released.drain(..) {
-            self.renderer.free_texture(id)?;
+            renderer.free_texture(id).map_err(error)?;
         }
         for (id, changes) in textures.set.drain() {
             for change in changes {
-                self.renderer.set_texture(self.context.queue, self.context.command_pool, id, &change)?;
+                let (queue, pool) = (self.context.queue(), self.context.command_pool());
+                renderer.set_texture(queue, pool, id, &change).map_err(error)?;
             }
         }
         self.released.extend(textures.free.drain());
@@ -64,14 +68,23 @@ impl Overlay {
     /// # Errors
     /// Out of memory.
     pub fn draw(&mut self, commands: &Commands, image: &WindowImage, frame: &OverlayFrame) -> Result<(), GpuError> {
-        Ok(self.renderer.cmd_draw(commands.raw, image.extent, frame.pixels_per_point, &frame.primitives)?)
+        let renderer = self.renderer.as_mut().expect("a renderer");
+        let drawn = renderer.cmd_draw(commands.raw(), image.extent(), frame.pixels_per_point, &frame.primitives);
+        drawn.map_err(error)
     }
 }
 
 impl Drop for Overlay {
     fn drop(&mut self) {
         let _ = self.context.wait();
-        // SAFETY: dropped once, here, with the device idle and alive.
-        unsafe { ManuallyDrop::drop(&mut self.renderer) };
+        drop(self.renderer.take());
+    }
+}
+
+/// The overlay's error as one of the Vulkan layer.
+fn error(error: RendererError) -> GpuError {
+    match error {
+        RendererError::Vulkan(result) => GpuError::Call { call: "drawing", object: "overlay".to_owned(), result },
+        other => GpuError::Other { object: "the overlay", message: other.to_string() },
     }
 }

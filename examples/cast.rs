@@ -1,0 +1,50 @@
+//! Casts a grid of rays at a scene from its camera, and prints what they hit as characters.
+//!
+//! ```sh
+//! cargo run --release --example cast -- scenes/cornell.toml
+//! ```
+
+use std::{env, error::Error, path::Path};
+
+use kdray::{
+    accel::Query,
+    cast::{CastRay, NO_TRIANGLE},
+    engine::{Built, Engine, choices::Workload},
+    gpu::ContextOptions,
+    scene::{Camera, Scene},
+};
+
+/// Columns and rows of characters.
+const SIZE: (u32, u32) = (64, 28);
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let path = env::args_os().nth(1).ok_or("usage: cast SCENE")?;
+    let scene = Scene::load(Path::new(&path))?;
+    let rays: Vec<_> =
+        (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y))).map(|(x, y)| ray(&scene.camera, x, y)).collect();
+    let engine = Engine::open(&ContextOptions::default()).unwrap_or_else(|_| Engine::on_cpu());
+    let Built { world, .. } = engine.build(scene, &Workload::of_rays(rays.len() as u64))?;
+    let hits = engine.cast(&world, &rays, Query::Closest)?;
+    for row in hits.chunks(SIZE.0 as usize) {
+        let letter = |material: u32| char::from(b'a' + (material % 26) as u8);
+        let of_hit = |triangle_ix: u32| match triangle_ix {
+            NO_TRIANGLE => ' ',
+            _ => letter(world.scene().triangle_materials[triangle_ix as usize]),
+        };
+        println!("{}", row.iter().map(|hit| of_hit(hit.triangle_ix)).collect::<String>());
+    }
+    Ok(())
+}
+
+/// The ray through the centre of a character, which is twice as high as it is wide.
+fn ray(camera: &Camera, x: u32, y: u32) -> CastRay {
+    let forward = (camera.target - camera.eye).normalize();
+    let right = forward.cross(camera.up).normalize();
+    let up = right.cross(forward);
+    let half_height = (camera.vertical_fov_degrees.to_radians() / 2.0).tan();
+    let half_width = half_height * SIZE.0 as f32 / (2 * SIZE.1) as f32;
+    let across = (2.0 * (x as f32 + 0.5) / SIZE.0 as f32 - 1.0) * half_width;
+    let above = (1.0 - 2.0 * (y as f32 + 0.5) / SIZE.1 as f32) * half_height;
+    let direction = (forward + across * right + above * up).normalize();
+    CastRay { origin: camera.eye, t_min: 0.0, direction, t_max: f32::INFINITY }
+}
