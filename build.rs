@@ -1,6 +1,10 @@
 //! Compiles `glsl/{passes,probes,driver}/*` to SPIR-V and turns `glsl/shared/layout.glsl` into Rust, both into `$OUT_DIR`.
 
+#[path = "src/layout/specialization.rs"]
+mod specialization;
+
 use std::{
+    collections::BTreeSet,
     env,
     fmt::Write,
     fs,
@@ -18,10 +22,14 @@ fn main() {
     }
 
     let layout = fs::read_to_string("glsl/shared/layout.glsl").expect("glsl/shared/layout.glsl");
-    fs::write(out_dir.join("layout.rs"), rust_layout(&layout)).expect("write layout.rs");
+    let constants = constants_of_shaders(&layout).unwrap_or_else(|error| {
+        println!("cargo::error={error}");
+        std::process::exit(1);
+    });
+    fs::write(out_dir.join("layout.rs"), rust_layout(&layout) + &constants).expect("write layout.rs");
 
     let compiler = shaderc::Compiler::new().expect("shaderc");
-    for path in shaders() {
+    for path in shaders_in_order() {
         let name = path.file_name().and_then(|n| n.to_str()).expect("a shader's name is UTF-8").to_owned();
         match compile(&compiler, &path, &name) {
             Ok(spirv) => {
@@ -37,6 +45,35 @@ fn main() {
     }
 }
 
+/// The specialization constants of all shaders as Rust; includes count as parts of the shaders.
+fn constants_of_shaders(layout: &str) -> Result<String, String> {
+    let numbers = specialization::numbers(layout)?;
+    let mut shaders = Vec::new();
+    for path in shaders_in_order() {
+        let name = path.file_name().and_then(|name| name.to_str()).expect("a shader's name is UTF-8").to_owned();
+        let mut declarations = Vec::new();
+        for file in with_includes(&path) {
+            let source = fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
+            let shown = file.strip_prefix("glsl").expect("a file of glsl").display().to_string();
+            declarations.extend(specialization::declarations(&shown, &source, &numbers)?);
+        }
+        shaders.push((name, declarations));
+    }
+    specialization::rust(&shaders)
+}
+
+/// A shader's file and all that it includes. Files that are missing are left to the compiler.
+fn with_includes(path: &Path) -> BTreeSet<PathBuf> {
+    let (mut files, mut open) = (BTreeSet::new(), vec![path.to_owned()]);
+    while let Some(file) = open.pop() {
+        let Ok(source) = fs::read_to_string(&file) else { continue };
+        let included = source.lines().filter_map(|line| line.trim().strip_prefix("#include \"")?.strip_suffix('"'));
+        open.extend(included.map(|name| Path::new("glsl/shared").join(name)).filter(|path| !files.contains(path)));
+        files.insert(file);
+    }
+    files
+}
+
 /// Tells the crate which compiler made the kernels: its SPIR-V version and its generator word (tool and its version),
 /// both from SPIR-V's header.
 fn name_compiler(spirv: &[u8]) {
@@ -45,7 +82,7 @@ fn name_compiler(spirv: &[u8]) {
 }
 
 /// The files of all folders, in a fixed order.
-fn shaders() -> Vec<PathBuf> {
+fn shaders_in_order() -> Vec<PathBuf> {
     let mut shaders: Vec<_> = ["glsl/passes", "glsl/probes", "glsl/driver"]
         .into_iter()
         .flat_map(|folder| fs::read_dir(folder).unwrap_or_else(|e| panic!("{folder}: {e}")))

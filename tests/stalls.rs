@@ -165,7 +165,7 @@ fn interrupted_frames_are_the_same() {
     ] {
         let options = options(traversal, primary);
         let (picture, features, profile) = draw(&plain, &options);
-        for (loop_limit, n_slots) in [(200, Some(64)), (1000, None)] {
+        for (loop_limit, n_slots) in [(400, Some(64)), (2000, None)] {
             let limited = limited_device(loop_limit, None, n_slots);
             let (found, found_features, found_profile) = draw(&limited, &options);
             assert!(picture == found, "{traversal} {primary}, {loop_limit} turns");

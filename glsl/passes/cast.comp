@@ -9,7 +9,7 @@ const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
 #include "lanes.glsl"
 
-layout(constant_id = 2) const bool ANY_HIT = false;
+layout(constant_id = CONSTANT_ANY_HIT) const bool ANY_HIT = false;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform CastBatchBlock { CastBatch batch; };

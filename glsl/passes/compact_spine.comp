@@ -13,7 +13,7 @@ layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; 
 layout(std430, set = 0, binding = BIND_SCAN_BLOCKS) buffer ScanBlocksBlock { uint scan_blocks[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) buffer BouncesBlock { Bounce bounces[]; };
 
-// As src/bounce.rs has it.
+// The same as in src/frame/bounce.rs.
 uint lanes_log2(uint n_rays) {
     uint n_lanes = frame.n_lanes / max(n_rays, 1u);
     return n_lanes == 0u ? 0u : min(uint(findMSB(n_lanes)), MOST_LANES_LOG2);

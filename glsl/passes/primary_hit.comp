@@ -18,11 +18,11 @@ layout(std430, set = 0, binding = BIND_PIXEL_NEAREST) readonly buffer PixelNeare
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 
 // Whether hits are counted.
-layout(constant_id = 2) const bool COUNTS = true;
+layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;
 // Whether what the ray costs is noted.
-layout(constant_id = 3) const bool COUNT_COSTS = false;
+layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 // Whether kernels have found the triangles.
-layout(constant_id = 4) const bool BY_KERNELS = false;
+layout(constant_id = CONSTANT_BY_KERNELS) const bool BY_KERNELS = false;
 
 uint triangle_of(uvec2 pixel) {
     if (BY_KERNELS) return pixel_nearest[pixel_ix_of(pixel)].x;

@@ -14,7 +14,7 @@
 #include "counters.glsl"
 
 // Whether shadow segments are counted.
-layout(constant_id = 0) const bool COUNTS = true;
+layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };

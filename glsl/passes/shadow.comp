@@ -7,7 +7,7 @@
 #include "layout.glsl"
 
 // Whether what segments cost is noted.
-layout(constant_id = 3) const bool COUNT_COSTS = false;
+layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
 #include "rays.glsl"
 #include "lanes.glsl"

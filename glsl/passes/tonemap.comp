@@ -12,7 +12,7 @@ layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; 
 layout(std430, set = 0, binding = BIND_PIXEL_FILTERED) readonly buffer PixelFilteredBlock { vec4 pixel_filtered[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_DISPLAY) writeonly buffer PixelDisplayBlock { uint pixel_display[]; };
 
-layout(constant_id = 0) const uint CURVE = TONEMAP_LINEAR;
+layout(constant_id = CONSTANT_CURVE) const uint CURVE = TONEMAP_LINEAR;
 
 void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;

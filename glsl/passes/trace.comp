@@ -7,7 +7,7 @@
 #include "layout.glsl"
 
 // Whether what rays cost is noted.
-layout(constant_id = 3) const bool COUNT_COSTS = false;
+layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 #include "kdtree.glsl"
 #include "rays.glsl"
 #include "lanes.glsl"
@@ -15,9 +15,9 @@ layout(constant_id = 3) const bool COUNT_COSTS = false;
 #include "counters.glsl"
 
 // Whether hits are counted.
-layout(constant_id = 2) const bool COUNTS = true;
+layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;
 // Whether the rays are the camera's.
-layout(constant_id = 5) const bool FROM_CAMERA = false;
+layout(constant_id = CONSTANT_FROM_CAMERA) const bool FROM_CAMERA = false;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };

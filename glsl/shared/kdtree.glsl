@@ -13,9 +13,9 @@
 #include "steps.glsl"
 #include "triangle.glsl"
 
-layout(constant_id = 0) const uint TRAVERSAL = TRAVERSAL_MASK;
+layout(constant_id = CONSTANT_TRAVERSAL) const uint TRAVERSAL = TRAVERSAL_MASK;
 // Whether the device runs both sides of a branch for all lanes, as software drivers do: lockstep.glsl.
-layout(constant_id = 4) const bool RUNS_BOTH_SIDES = false;
+layout(constant_id = CONSTANT_RUNS_BOTH_SIDES) const bool RUNS_BOTH_SIDES = false;
 
 struct Cell {
     // The node's place in kd_nodes, in bytes: what a split names its children by.

@@ -320,12 +320,39 @@ struct Addresses {
     uvec2 kd_ropes;
 };
 
-// Specialization constants that all kernels over one scene share: how they read it, and the words of the traversal's mask.
-// Numbers below are for kernels' own.
-#define CONSTANT_READING 31u
-#define CONSTANT_MASK_WORDS 30u
-// Turns of its loops that an invocation takes before its ray stalls; 0: any number.
+// Specialization constants. Each has one number, one type and one meaning in all kernels. A kernel that uses one declares it
+// as `layout(constant_id = CONSTANT_X) const TYPE X = DEFAULT;`, and Rust sets it as `constants::X`. build.rs refuses a number
+// that is another constant's, or that is missing here.
+
+// Which algorithm takes rays through the kd-tree: TRAVERSAL_MASK and its like.
+#define CONSTANT_TRAVERSAL 0u
+// Whether `fma` rounds once.
+#define CONSTANT_FUSED_FMA 1u
+// Whether hits and shadow segments are counted.
+#define CONSTANT_COUNTS 2u
+// Whether the nodes and triangles that a ray reads are counted.
+#define CONSTANT_COUNT_COSTS 3u
+// Whether the device runs both sides of a branch for all lanes, as software drivers do.
+#define CONSTANT_RUNS_BOTH_SIDES 4u
+// Whether the rays are the camera's, which are not stored.
+#define CONSTANT_FROM_CAMERA 5u
+// Far children that the traversal `short-stack` keeps.
+#define CONSTANT_SHORT_STACK_SIZE 6u
+// Whether any hit answers a ray, not the closest alone.
+#define CONSTANT_ANY_HIT 7u
+// The curve from radiance to display: TONEMAP_LINEAR and its like.
+#define CONSTANT_CURVE 8u
+// Whether kernels have found the triangles that pixels show, not the graphics pipeline.
+#define CONSTANT_BY_KERNELS 9u
+
+// Constants that all kernels over one scene share.
+
+// Loop turns that an invocation takes before its ray stalls; 0: any number.
 #define CONSTANT_TURN_BUDGET 29u
+// Words of the traversal's mask.
+#define CONSTANT_MASK_WORDS 30u
+// How kernels read the scene: READING_BOUND and its like.
+#define CONSTANT_READING 31u
 // Ways to read triangles and tree: as storage that is bound, as texels, by address.
 #define READING_BOUND 0u
 #define READING_TEXELS 1u

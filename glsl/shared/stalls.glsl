@@ -3,7 +3,7 @@
 // Some drivers end a shader after a number of turns of its loops, and say nothing: the lavapipe of Mesa 22.3 does so after
 // 65,535 turns of the eight lanes that it runs together. So an invocation counts its turns. When TURN_BUDGET of them are
 // spent, it stores the state of its ray in a slot and leaves a mark in place of the result; the host repeats the dispatch
-// until no ray is marked (src/passes/stalls.rs). Drivers without such a limit have a budget of 0, with which all of this
+// until no ray is marked (src/buffers/stalls.rs). Drivers without such a limit have a budget of 0, with which all of this
 // is compiled out.
 #ifndef KDRAY_STALLS
 #define KDRAY_STALLS

@@ -47,13 +47,13 @@ vec3 edge_functions(vec3 a, vec3 b, vec3 c) {
     return vec3(u, v, w);
 }
 
-// 1 where fma rounds once: a few instructions then do for what takes a dozen without.
-layout(constant_id = 1) const uint FUSED_FMA = 0u;
+// Whether fma rounds once: a few instructions then do for what takes a dozen without.
+layout(constant_id = CONSTANT_FUSED_FMA) const bool FUSED_FMA = false;
 
 // What rounding took from the product a * b (Dekker: A floating-point technique for extending the available precision,
 // Numerische Mathematik 18, 1971).
 float product_error(float a, float b) {
-    if (FUSED_FMA == 1u) {
+    if (FUSED_FMA) {
         precise float fused = fma(a, b, -(a * b));
         return fused;
     }

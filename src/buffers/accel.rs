@@ -8,13 +8,12 @@ use rayon::prelude::*;
 use super::Stalls;
 use crate::{
     accel::kdtree::{Extras, KdTree, Traversal},
-    gpu::{AnyBuffer, Binding, Buffer, BufferUse, Context, GpuError, texel_bytes},
+    gpu::{AnyBuffer, Binding, Buffer, BufferUse, Constants, Context, GpuError, texel_bytes},
     layout::{
         Addresses, BIND_ADDRESSES, BIND_FRAME, BIND_KD_BOXES, BIND_KD_NODES, BIND_KD_PARENTS, BIND_KD_ROPES,
         BIND_KD_SLABS, BIND_LEAF_PLANES, BIND_LEAF_TRIANGLES, BIND_STALLS, BIND_TEXELS, BIND_TRIANGLE_MATERIALS,
-        BIND_TRIANGLES, BRUTE_MAX_TRIANGLES, CONSTANT_MASK_WORDS, CONSTANT_READING, CONSTANT_TURN_BUDGET, Frame,
-        KD_WORD_DEPTH, KdBox, KdNode, KdRope, LeafTriangle, Plane, READING_ADDRESS, READING_BOUND, READING_TEXELS,
-        Slab, Triangle,
+        BIND_TRIANGLES, BRUTE_MAX_TRIANGLES, Frame, KD_WORD_DEPTH, KdBox, KdNode, KdRope, LeafTriangle, Plane,
+        READING_ADDRESS, READING_BOUND, READING_TEXELS, Slab, Triangle, constants,
     },
     world::Geometry,
 };
@@ -178,12 +177,11 @@ impl AccelBuffers {
     }
 
     /// Specialization constants of all kernels that read it.
-    pub(super) fn constants(&self) -> [(u32, u32); 3] {
-        [
-            (CONSTANT_READING, self.access.constant()),
-            (CONSTANT_MASK_WORDS, self.mask_words),
-            (CONSTANT_TURN_BUDGET, self.stalls.turn_budget()),
-        ]
+    pub(super) fn constants(&self) -> Constants {
+        Constants::new()
+            .set(constants::READING, self.access.constant())
+            .set(constants::MASK_WORDS, self.mask_words)
+            .set(constants::TURN_BUDGET, self.stalls.turn_budget())
     }
 
     fn addresses(&self) -> Addresses {

@@ -23,7 +23,7 @@ impl CastResources {
     /// Out of memory.
     pub fn bindings(context: &Arc<Context>, tree: &AccelBuffers) -> Result<Arc<Bindings>, GpuError> {
         let kinds: Vec<_> = accel::bindings().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
-        Bindings::with_constants(context, &kinds, size_of::<CastBatch>() as u32, &tree.constants())
+        Bindings::with_constants(context, &kinds, size_of::<CastBatch>() as u32, tree.constants())
     }
 
     /// Room for `len` rays.

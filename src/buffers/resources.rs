@@ -80,7 +80,7 @@ impl Resources {
             raster: RasterQueue::new(context, constants.n_triangles, options)?,
             bounces: new_bounces(context, n_bounces)?,
             counters: new_counters(context, n_bounces)?,
-            bindings: Bindings::with_constants(context, &kinds, PUSH_BYTES, &accel.constants())?,
+            bindings: Bindings::with_constants(context, &kinds, PUSH_BYTES, accel.constants())?,
             accel,
             set: None,
             constants: *constants,

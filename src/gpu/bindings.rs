@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::{AnyBuffer, Context, GpuError, Target};
+use super::{AnyBuffer, Constants, Context, GpuError, Target};
 
 /// What a binding number holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,24 +41,24 @@ pub struct Bindings {
     pub(super) pipeline_layout: vk::PipelineLayout,
     /// By binding number.
     kinds: Vec<(u32, BindingKind)>,
-    /// Numbers and values.
-    pub(super) constants: Vec<(u32, u32)>,
+    /// The same for all pipelines.
+    pub(super) constants: Constants,
     context: Arc<Context>,
 }
 
 impl Bindings {
     /// `kinds`: the bindings' numbers and what they hold; `push_bytes`: size of the push constants, for all stages.
     pub fn new(context: &Arc<Context>, kinds: &[(u32, BindingKind)], push_bytes: u32) -> Result<Arc<Self>, GpuError> {
-        Self::with_constants(context, kinds, push_bytes, &[])
+        Self::with_constants(context, kinds, push_bytes, Constants::new())
     }
 
-    /// As [`Bindings::new`]. `constants`: numbers and values of specialization constants that are the same for all
-    /// pipelines; a kernel need not know them.
+    /// As [`Bindings::new`]. `constants`: specialization constants that are the same for all pipelines; a kernel need
+    /// not declare them.
     pub fn with_constants(
         context: &Arc<Context>,
         kinds: &[(u32, BindingKind)],
         push_bytes: u32,
-        constants: &[(u32, u32)],
+        constants: Constants,
     ) -> Result<Arc<Self>, GpuError> {
         let stages = context.stages();
         let bindings: Vec<_> = kinds
@@ -82,7 +82,7 @@ impl Bindings {
                 set_layout,
                 pipeline_layout: vk::PipelineLayout::null(),
                 kinds: kinds.to_vec(),
-                constants: constants.to_vec(),
+                constants,
                 context: context.clone(),
             };
             let set_layouts = [set_layout];

@@ -56,6 +56,7 @@ pub use ray_tracing::{RayTracingDesc, RayTracingPipeline};
 #[cfg(feature = "hot-reload")]
 pub use shader::Replacements;
 pub use shader::Shader;
+pub use specialization::{Constant, ConstantValue, Constants};
 pub use statistics::{Statistic, StatisticValue};
 #[cfg(feature = "view")]
 pub use surface::{Screen, Surface};

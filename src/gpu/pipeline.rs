@@ -5,7 +5,7 @@ use std::{ffi::CStr, sync::Arc};
 use ash::vk;
 
 use super::{
-    Bindings, Context, GpuError, Shader, TargetKind, robustness::without_checks, shader::ShaderModule,
+    Bindings, Constants, Context, GpuError, Shader, TargetKind, robustness::without_checks, shader::ShaderModule,
     specialization::Specialization, statistics::capture_flags,
 };
 
@@ -16,8 +16,8 @@ pub struct ComputeDesc<'a> {
     /// Also the debug label and the timer.
     pub name: &'static str,
     pub shader: Shader,
-    /// Specialization constants 0, 1, ...
-    pub constants: &'a [u32],
+    /// Values of specialization constants that the shader declares.
+    pub constants: &'a Constants,
     /// Every subgroup has all its invocations; the workgroup's width must be a multiple of the subgroup size.
     pub full_subgroups: bool,
 }
@@ -121,7 +121,7 @@ impl RasterPipeline {
         context.count_creation("vkCreateGraphicsPipelines", desc.name)?;
         let vertex = ShaderModule::new(context, desc.vertex)?;
         let fragment = ShaderModule::new(context, desc.fragment)?;
-        let constants = Specialization::new(&[], bindings);
+        let constants = Specialization::new(&Constants::new(), bindings);
         let constants = constants.info();
         let stages = [(vk::ShaderStageFlags::VERTEX, vertex.raw), (vk::ShaderStageFlags::FRAGMENT, fragment.raw)].map(
             |(stage, module)| {

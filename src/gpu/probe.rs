@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    Access, Binding, BindingKind, BindingSet, Bindings, Buffer, BufferUse, ComputeDesc, ComputePipeline, Context,
-    Dispatch, GpuError, Shader,
+    Access, Binding, BindingKind, BindingSet, Bindings, Buffer, BufferUse, ComputeDesc, ComputePipeline, Constants,
+    Context, Dispatch, GpuError, Shader,
 };
 
 const FUSED_FMA: Shader =
@@ -25,7 +25,8 @@ pub(super) fn loop_limit(context: &Arc<Context>) -> Result<Option<u32>, GpuError
     let counts = Buffer::with(context, "counts", &[0u32], BufferUse::Storage)?;
     let bindings = Bindings::new(context, &[(0, BindingKind::Storage)], 4)?;
     let set = BindingSet::new(&bindings, "loop_turns", &[(0, Binding::Buffer(counts.any()))])?;
-    let desc = ComputeDesc { name: "loop_turns", shader: LOOP_TURNS, constants: &[], full_subgroups: false };
+    let desc =
+        ComputeDesc { name: "loop_turns", shader: LOOP_TURNS, constants: &Constants::new(), full_subgroups: false };
     let kernel = ComputePipeline::new(context, &bindings, &desc)?;
     context.run("loop_turns", |commands| {
         commands.bind(&set);
@@ -42,7 +43,8 @@ pub(super) fn fuses_fma(context: &Arc<Context>) -> Result<bool, GpuError> {
     let numbers = Buffer::with(context, "numbers", &[1.0 + 2f32.powi(-12), 0.0], BufferUse::Storage)?;
     let bindings = Bindings::new(context, &[(0, BindingKind::Storage)], 4)?;
     let set = BindingSet::new(&bindings, "fused_fma", &[(0, Binding::Buffer(numbers.any()))])?;
-    let desc = ComputeDesc { name: "fused_fma", shader: FUSED_FMA, constants: &[], full_subgroups: false };
+    let desc =
+        ComputeDesc { name: "fused_fma", shader: FUSED_FMA, constants: &Constants::new(), full_subgroups: false };
     let kernel = ComputePipeline::new(context, &bindings, &desc)?;
     context.run("fused_fma", |commands| {
         commands.bind(&set);
@@ -60,7 +62,7 @@ pub(super) fn n_lanes(context: &Arc<Context>) -> Result<u32, GpuError> {
     let counts = Buffer::with(context, "counts", &[0u32; 3], BufferUse::Storage)?;
     let bindings = Bindings::new(context, &[(0, BindingKind::Storage)], 4)?;
     let set = BindingSet::new(&bindings, "lanes", &[(0, Binding::Buffer(counts.any()))])?;
-    let desc = ComputeDesc { name: "lanes", shader: LANES, constants: &[], full_subgroups: false };
+    let desc = ComputeDesc { name: "lanes", shader: LANES, constants: &Constants::new(), full_subgroups: false };
     let kernel = ComputePipeline::new(context, &bindings, &desc)?;
     context.run("lanes", |commands| {
         commands.bind(&set);

@@ -6,8 +6,8 @@ use ash::{khr, vk};
 use bytemuck::Pod;
 
 use super::{
-    Bindings, Buffer, BufferUse, Commands, Context, GpuError, Shader, devices::text, instance::Instance,
-    pipeline::ENTRY_POINT, shader::ShaderModule,
+    Bindings, Buffer, BufferUse, Commands, Constants, Context, GpuError, Shader, devices::text, instance::Instance,
+    pipeline::ENTRY_POINT, shader::ShaderModule, specialization::Specialization,
 };
 
 /// The extensions' functions and limits.
@@ -60,8 +60,8 @@ pub struct RayTracingDesc {
     pub generation: Shader,
     pub miss: Shader,
     pub closest_hit: Shader,
-    /// Specialization constant 0 of the ray generation shader.
-    pub constant: u32,
+    /// Values of specialization constants of the ray generation shader.
+    pub constants: Constants,
 }
 
 /// A ray tracing pipeline with one group for each shader, and its table.
@@ -85,9 +85,8 @@ impl RayTracingPipeline {
         ];
         let modules =
             stages.iter().map(|(_, shader)| ShaderModule::new(context, *shader)).collect::<Result<Vec<_>, _>>()?;
-        let entries = [vk::SpecializationMapEntry { constant_id: 0, offset: 0, size: 4 }];
-        let constant = desc.constant.to_ne_bytes();
-        let constants = vk::SpecializationInfo::default().map_entries(&entries).data(&constant);
+        let constants = Specialization::new(&desc.constants, bindings);
+        let constants = constants.info();
         let stages: Vec<_> = (stages.iter().zip(&modules))
             .map(|((stage, _), module)| {
                 let info =

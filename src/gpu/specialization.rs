@@ -1,8 +1,69 @@
 //! Specialization constants of a pipeline: its own, and those that its bindings bring.
 
+use std::marker::PhantomData;
+
 use ash::vk;
 
 use super::Bindings;
+
+/// A specialization constant of shaders whose value is a `T`: a `u32` or a `bool`.
+#[derive(Debug)]
+pub struct Constant<T> {
+    name: &'static str,
+    id: u32,
+    value: PhantomData<T>,
+}
+
+impl<T> Constant<T> {
+    /// The constant of a name and number.
+    pub const fn new(name: &'static str, id: u32) -> Self {
+        Self { name, id, value: PhantomData }
+    }
+}
+
+/// A value that a constant can have: 32 bits for Vulkan.
+pub trait ConstantValue {
+    /// The bits.
+    fn word(self) -> u32;
+}
+
+impl ConstantValue for u32 {
+    fn word(self) -> u32 {
+        self
+    }
+}
+
+impl ConstantValue for bool {
+    fn word(self) -> u32 {
+        self.into()
+    }
+}
+
+/// Values of specialization constants.
+#[derive(Clone, Debug, Default)]
+pub struct Constants {
+    /// Name, number and bits of each.
+    values: Vec<(&'static str, u32, u32)>,
+}
+
+impl Constants {
+    /// No constants: each shader has its own values.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Gives a constant a value.
+    #[must_use]
+    pub fn set<T: ConstantValue>(mut self, constant: Constant<T>, value: T) -> Self {
+        self.values.push((constant.name, constant.id, value.word()));
+        self
+    }
+
+    /// The names of the constants that have values.
+    pub fn names(&self) -> impl Iterator<Item = &'static str> {
+        self.values.iter().map(|(name, ..)| *name)
+    }
+}
 
 /// Constants as Vulkan takes them: 32 bits each.
 pub(super) struct Specialization {
@@ -11,13 +72,13 @@ pub(super) struct Specialization {
 }
 
 impl Specialization {
-    /// `own`: constants 0, 1, ...
-    pub fn new(own: &[u32], bindings: &Bindings) -> Self {
-        let all = (0..).zip(own.iter().copied()).chain(bindings.constants.iter().copied());
+    /// A pipeline's own constants, and those of its bindings.
+    pub fn new(own: &Constants, bindings: &Bindings) -> Self {
         let (mut entries, mut values) = (Vec::new(), Vec::new());
-        for (constant_id, value) in all {
-            entries.push(vk::SpecializationMapEntry { constant_id, offset: 4 * values.len() as u32, size: 4 });
-            values.push(value);
+        for (_, constant_id, value) in own.values.iter().chain(&bindings.constants.values) {
+            let offset = 4 * values.len() as u32;
+            entries.push(vk::SpecializationMapEntry { constant_id: *constant_id, offset, size: 4 });
+            values.push(*value);
         }
         Self { entries, values }
     }

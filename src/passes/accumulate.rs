@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{kernel, spirv};
 use crate::{
     buffers::Resources,
-    gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
+    gpu::{Bindings, Commands, ComputePipeline, Constants, Context, GpuError},
     layout::Batch,
 };
 
@@ -16,7 +16,7 @@ pub struct Accumulate {
 
 impl Accumulate {
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
-        Ok(Self { kernel: kernel(context, bindings, "accumulate", spirv!("accumulate.comp"), &[])? })
+        Ok(Self { kernel: kernel(context, bindings, "accumulate", spirv!("accumulate.comp"), &Constants::new())? })
     }
 
     /// Needs pixel_radiance (a sample), pixel_accumulated (the sum of those before it), bounces. Leaves

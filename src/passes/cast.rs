@@ -8,7 +8,7 @@ use crate::{
     buffers::{CastResources, Round},
     frame::bounce::lanes_log2,
     gpu::{Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError, Statistic},
-    layout::{CastBatch, RAY_GROUP_SIZE},
+    layout::{CastBatch, RAY_GROUP_SIZE, constants},
 };
 
 /// The pass's kernel.
@@ -27,7 +27,7 @@ impl Cast {
         traversal: Traversal,
         query: Query,
     ) -> Result<Self, GpuError> {
-        let constants = traversal_constants(context, traversal, [query == Query::Any, false])?;
+        let constants = traversal_constants(context, traversal)?.set(constants::ANY_HIT, query == Query::Any);
         let n_lanes = context.n_lanes()?;
         Ok(Self { kernel: kernel(context, bindings, "cast", spirv!("cast.comp"), &constants)?, n_lanes })
     }

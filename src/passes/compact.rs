@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::spirv;
 use crate::{
     buffers::Resources,
-    gpu::{Bindings, Commands, ComputeDesc, ComputePipeline, Context, Dispatch, GpuError},
+    gpu::{Bindings, Commands, ComputeDesc, ComputePipeline, Constants, Context, Dispatch, GpuError},
     layout::Batch,
 };
 
@@ -19,7 +19,7 @@ pub struct Compact {
 impl Compact {
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
         let kernel = |name, shader| {
-            let desc = ComputeDesc { name, shader, constants: &[], full_subgroups: true };
+            let desc = ComputeDesc { name, shader, constants: &Constants::new(), full_subgroups: true };
             ComputePipeline::new(context, bindings, &desc)
         };
         Ok(Self {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{kernel, spirv};
 use crate::{
     buffers::Resources,
-    gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
+    gpu::{Bindings, Commands, ComputePipeline, Constants, Context, GpuError},
     layout,
 };
 
@@ -16,7 +16,7 @@ pub struct FalseColor {
 
 impl FalseColor {
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
-        Ok(Self { kernel: kernel(context, bindings, "false_color", spirv!("false_color.comp"), &[])? })
+        Ok(Self { kernel: kernel(context, bindings, "false_color", spirv!("false_color.comp"), &Constants::new())? })
     }
 
     /// Needs pixel_features. Leaves pixel_display.

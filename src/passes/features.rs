@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{kernel, spirv};
 use crate::{
-    gpu::{Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError},
+    gpu::{Bindings, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
     layout::{Batch, RAY_GROUP_SIZE},
 };
 
@@ -15,7 +15,7 @@ pub struct Features {
 
 impl Features {
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
-        Ok(Self { kernel: kernel(context, bindings, "features", spirv!("features.comp"), &[])? })
+        Ok(Self { kernel: kernel(context, bindings, "features", spirv!("features.comp"), &Constants::new())? })
     }
 
     /// Needs hits of camera rays, pixel_features (cleared). Leaves pixel_features, all but the counts.

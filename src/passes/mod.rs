@@ -7,7 +7,8 @@ use crate::{
     accel::kdtree::Traversal,
     buffers::draws,
     frame::{Primary, RenderOptions},
-    gpu::{Bindings, ComputeDesc, ComputePipeline, Context, GpuError, Shader},
+    gpu::{Bindings, ComputeDesc, ComputePipeline, Constants, Context, GpuError, Shader},
+    layout::{CONSTANTS_OF_SHADERS, constants},
 };
 
 mod accumulate;
@@ -154,20 +155,48 @@ impl Passes {
     }
 }
 
-/// Specialization constants of the kernels that traverse: their own are the two in the middle, and what follows.
-fn traversal_constants(context: &Arc<Context>, traversal: Traversal, own: [bool; 2]) -> Result<[u32; 5], GpuError> {
-    let runs_both_sides = context.runs_both_sides();
-    let [a, b] = own.map(u32::from);
-    Ok([traversal.constant(), context.fuses_fma()?.into(), a, b, runs_both_sides.into()])
+/// Specialization constants of all kernels that take rays through the kd-tree.
+fn traversal_constants(context: &Arc<Context>, traversal: Traversal) -> Result<Constants, GpuError> {
+    Ok(Constants::new()
+        .set(constants::TRAVERSAL, traversal.constant())
+        .set(constants::FUSED_FMA, context.fuses_fma()?)
+        .set(constants::RUNS_BOTH_SIDES, context.runs_both_sides()))
 }
 
 /// A kernel without subgroup requirements.
+///
+/// # Panics
+/// A constant has a value that the shader does not declare.
 fn kernel(
     context: &Arc<Context>,
     bindings: &Arc<Bindings>,
     name: &'static str,
     shader: Shader,
-    constants: &[u32],
+    constants: &Constants,
 ) -> Result<ComputePipeline, GpuError> {
+    if let Some(unknown) = undeclared(shader.file, constants) {
+        panic!("`{}` declares no constant {unknown}", shader.file);
+    }
     ComputePipeline::new(context, bindings, &ComputeDesc { name, shader, constants, full_subgroups: false })
+}
+
+/// A constant that the shader does not declare, if there is one.
+fn undeclared(file: &str, constants: &Constants) -> Option<&'static str> {
+    let declared = CONSTANTS_OF_SHADERS.iter().find(|(known, _)| *known == file);
+    let (_, declared) = declared.unwrap_or_else(|| panic!("`{file}` is a shader"));
+    constants.names().find(|name| !declared.contains(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_constant_that_a_shader_lacks_is_noticed() {
+        let curve = Constants::new().set(constants::CURVE, 0);
+        assert_eq!(undeclared("tonemap.comp", &curve), None);
+        assert_eq!(undeclared("tonemap.comp", &curve.set(constants::COUNTS, true)), Some("COUNTS"));
+        let fused = Constants::new().set(constants::FUSED_FMA, true);
+        assert_eq!(undeclared("trace.comp", &fused), None, "a shared file declares it");
+    }
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::{kernel, spirv};
 use crate::{
     frame::{Primary, RenderOptions},
-    gpu::{Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError},
-    layout::{Batch, RAY_GROUP_SIZE},
+    gpu::{Bindings, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
+    layout::{Batch, RAY_GROUP_SIZE, constants},
 };
 
 /// The pass's kernel.
@@ -20,9 +20,11 @@ impl PrimaryHit {
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        let fuses_fma = context.fuses_fma()?.into();
-        let by_kernels = options.primary == Primary::Compute;
-        let constants = [0, fuses_fma, options.profile.into(), options.features.into(), by_kernels.into()];
+        let constants = Constants::new()
+            .set(constants::FUSED_FMA, context.fuses_fma()?)
+            .set(constants::COUNTS, options.profile)
+            .set(constants::COUNT_COSTS, options.features)
+            .set(constants::BY_KERNELS, options.primary == Primary::Compute);
         Ok(Self { kernel: kernel(context, bindings, "primary_hit", spirv!("primary_hit.comp"), &constants)? })
     }
 

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use super::{kernel, spirv};
 use crate::{
     buffers::Resources,
-    gpu::{Access, Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError},
-    layout::{Frame, RASTER_GROUPS_X, RAY_GROUP_SIZE, RasterGroups, RasterPush},
+    gpu::{Access, Bindings, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
+    layout::{Frame, RASTER_GROUPS_X, RAY_GROUP_SIZE, RasterGroups, RasterPush, constants},
 };
 
 /// A workgroup of 64 goes over such a block in 16 steps.
@@ -24,7 +24,7 @@ impl Rasterize {
     /// The device lacks atomics of 64 bits; the driver refuses a shader.
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
         context.require_wide_atomics()?;
-        let constants = [0, context.fuses_fma()?.into()];
+        let constants = Constants::new().set(constants::FUSED_FMA, context.fuses_fma()?);
         let kernel = |name, shader| kernel(context, bindings, name, shader, &constants);
         Ok(Self {
             triangles: kernel("rasterize_triangles", spirv!("rasterize_triangles.comp"))?,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{kernel, spirv};
 use crate::{
-    gpu::{Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError},
+    gpu::{Bindings, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
     layout::{Batch, RAY_GROUP_SIZE},
 };
 
@@ -15,7 +15,7 @@ pub struct Resolve {
 
 impl Resolve {
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
-        Ok(Self { kernel: kernel(context, bindings, "resolve", spirv!("resolve.comp"), &[])? })
+        Ok(Self { kernel: kernel(context, bindings, "resolve", spirv!("resolve.comp"), &Constants::new())? })
     }
 
     /// Needs ray_radiance, first_children of all the batch's bounces. Leaves pixel_radiance.

@@ -6,8 +6,8 @@ use super::{kernel, spirv};
 use crate::{
     buffers::Resources,
     frame::RenderOptions,
-    gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
-    layout::Batch,
+    gpu::{Bindings, Commands, ComputePipeline, Constants, Context, GpuError},
+    layout::{Batch, constants},
 };
 
 /// The pass's kernel.
@@ -21,7 +21,8 @@ impl Shade {
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        Ok(Self { kernel: kernel(context, bindings, "shade", spirv!("shade.comp"), &[options.profile.into()])? })
+        let constants = Constants::new().set(constants::COUNTS, options.profile);
+        Ok(Self { kernel: kernel(context, bindings, "shade", spirv!("shade.comp"), &constants)? })
     }
 
     /// Needs rays, hits, light_visibility of all the batch's bounces. Leaves ray_radiance; updates counters.

@@ -7,7 +7,7 @@ use crate::{
     buffers::Resources,
     frame::RenderOptions,
     gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
-    layout::Batch,
+    layout::{Batch, constants},
 };
 
 /// The pass's kernel.
@@ -21,8 +21,8 @@ impl Shadow {
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        // Its segments are counted by shade.
-        let constants = traversal_constants(context, options.traversal, [false, options.features])?;
+        // Shade counts the segments.
+        let constants = traversal_constants(context, options.traversal)?.set(constants::COUNT_COSTS, options.features);
         Ok(Self { kernel: kernel(context, bindings, "shadow", spirv!("shadow.comp"), &constants)? })
     }
 

@@ -6,8 +6,8 @@ use super::{kernel, spirv};
 use crate::{
     buffers::Resources,
     frame,
-    gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
-    layout::Batch,
+    gpu::{Bindings, Commands, ComputePipeline, Constants, Context, GpuError},
+    layout::{Batch, constants},
 };
 
 /// The pass's kernel.
@@ -21,7 +21,7 @@ impl Tonemap {
         bindings: &Arc<Bindings>,
         curve: frame::Tonemap,
     ) -> Result<Self, GpuError> {
-        let constants = [curve.constant()];
+        let constants = Constants::new().set(constants::CURVE, curve.constant());
         Ok(Self { kernel: kernel(context, bindings, "tonemap", spirv!("tonemap.comp"), &constants)? })
     }
 

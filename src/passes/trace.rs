@@ -7,7 +7,7 @@ use crate::{
     buffers::Resources,
     frame::{Primary, RenderOptions},
     gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
-    layout::Batch,
+    layout::{Batch, constants},
 };
 
 /// The pass's kernels.
@@ -23,9 +23,11 @@ impl Trace {
         bindings: &Arc<Bindings>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        let constants = traversal_constants(context, options.traversal, [options.profile, options.features])?;
+        let constants = traversal_constants(context, options.traversal)?
+            .set(constants::COUNTS, options.profile)
+            .set(constants::COUNT_COSTS, options.features);
         let from = |camera: bool| {
-            let constants = [&constants[..], &[camera.into()]].concat();
+            let constants = constants.clone().set(constants::FROM_CAMERA, camera);
             kernel(context, bindings, "trace", spirv!("trace.comp"), &constants)
         };
         let from_camera = (options.primary == Primary::Trace).then(|| from(true)).transpose()?;

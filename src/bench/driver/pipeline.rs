@@ -7,10 +7,10 @@ use crate::{
     buffers::CastResources,
     cast::Contender,
     gpu::{
-        Access, Binding, BindingKind, BindingSet, Bindings, Commands, Context, GpuError, RayTracingDesc,
+        Access, Binding, BindingKind, BindingSet, Bindings, Commands, Constants, Context, GpuError, RayTracingDesc,
         RayTracingPipeline, Scenery,
     },
-    layout::{BIND_CAST_HITS, BIND_CAST_RAYS, DriverCast},
+    layout::{BIND_CAST_HITS, BIND_CAST_RAYS, DriverCast, constants},
     passes::spirv,
 };
 
@@ -42,7 +42,7 @@ impl Pipeline {
             generation: spirv!("driver.rgen"),
             miss: spirv!("driver.rmiss"),
             closest_hit: spirv!("driver.rchit"),
-            constant: (query == Query::Any).into(),
+            constants: Constants::new().set(constants::ANY_HIT, query == Query::Any),
         };
         Ok(Self {
             pipeline: RayTracingPipeline::new(context, &bindings, &desc)?,

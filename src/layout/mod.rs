@@ -1,5 +1,8 @@
 //! The structs, constants and bindings that the kernels share with the host, generated from `glsl/shared/layout.glsl`.
 
+#[cfg(test)]
+mod specialization;
+
 include!(concat!(env!("OUT_DIR"), "/layout.rs"));
 
 #[cfg(test)]
