@@ -48,7 +48,8 @@
 //!   buffers  what kernels read and write, on
 //!   gpu      the Vulkan layer
 //! cast     rays -> hits, without a frame
-//! cpu      both without Vulkan
+//! reference  every kernel again on the CPU, as simple as can be: the oracle of the tests
+//! cpu      frames and casts without Vulkan, fast
 //! engine   a device or the CPU: chooses what is left open, renders, casts
 //! output   picture -> file
 //! bench    all of it, timed
@@ -72,6 +73,8 @@ pub mod accel;
 pub mod world;
 
 pub mod frame;
+
+pub mod reference;
 
 pub mod cpu;
 

@@ -17,8 +17,8 @@ use kdray::{
         stage::Stage,
         traversal::Tracers,
     },
-    cpu::traverser::Traverser,
     layout::{Hit, NO_TRIANGLE, Ray},
+    reference::traverser::{Tracer, Traverser},
     scene::Scene,
     world::World,
 };

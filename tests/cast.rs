@@ -8,9 +8,9 @@ use glam::{Vec3, vec3};
 use kdray::{
     accel::{Query, kdtree::Traversal},
     cast::{CastRay, Caster, Hit, NO_TRIANGLE, cast_on_cpu},
-    cpu::{kdtree::near_scene, probe::Probe},
     gpu::{Context, ContextOptions},
     layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, Ray},
+    reference::{kdtree::near_scene, probe::Probe},
 };
 use rayon::prelude::*;
 use support::{

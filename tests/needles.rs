@@ -3,16 +3,22 @@
 
 mod support;
 
-use fearless_simd::{Level, Simd};
 use glam::{DVec3, Vec3};
 use kdray::{
     accel::{Query, kdtree::Traversal},
     cast::{CastRay, Caster, cast_on_cpu},
-    cpu::{probe::Probe, traverser::Traverser, triangle::Shear},
     gpu::{Context, ContextOptions},
     layout::{Hit, NO_TRIANGLE, Ray, Triangle},
+    reference::triangle::Shear,
 };
-use support::{MeshWithTree, compare, meshes::triangle, random::Random, rays::ray, with_lanes};
+use support::{
+    MeshWithTree, compare,
+    meshes::triangle,
+    packets::{levels, traced},
+    random::Random,
+    rays::ray,
+    with_lanes,
+};
 
 /// Half of the distance between 1 and the next float.
 const U: f64 = 1.0 / (1 << 24) as f64;
@@ -224,27 +230,6 @@ fn points_of_slivers_and_of_triangles_seen_edge_on_are_on_the_triangle() {
     assert!(n_hits.iter().all(|&n| n > 10_000), "{n_hits:?}");
 }
 
-/// The sets of instructions that the machine has.
-fn levels() -> Vec<Level> {
-    let mut levels = vec![Level::baseline()];
-    #[cfg(target_arch = "x86_64")]
-    {
-        let best = Level::new();
-        levels.extend(best.as_sse4_2().map(Simd::level));
-        levels.extend(best.as_avx2().map(Simd::level));
-        levels.extend(best.as_avx512().map(Simd::level));
-    }
-    levels
-}
-
-fn in_packets(world: &MeshWithTree, level: Level, rays: &[Ray]) -> Vec<Hit> {
-    let mut hits: Vec<_> = rays.iter().map(|ray| Probe::from(ray).miss()).collect();
-    let probes = hits.iter_mut().zip(rays.iter().map(Probe::from));
-    Traverser::at_level(Traversal::Stack, level)
-        .traverse_all::<false, _>(&world.bindings(), probes, |to, hit| *to = hit);
-    hits
-}
-
 fn cast_ray(ray: &Ray) -> CastRay {
     CastRay { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
 }
@@ -267,7 +252,7 @@ fn needles_in_a_tree_are_hit_where_they_are() {
         let expected = cast_on_cpu(world.geometry(), Traversal::Mask, &casts, Query::Closest);
         check(&world, &rays, &expected);
         for level in levels() {
-            compare::exact(&expected, &in_packets(&world, level, &rays)).unwrap();
+            compare::exact(&expected, &traced::<false>(&world, level, &rays)).unwrap();
         }
         for (context, traversal) in ways {
             let mut caster = Caster::new(context, world.geometry(), traversal).expect("a caster");

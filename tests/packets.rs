@@ -5,35 +5,25 @@ mod support;
 
 use std::array::from_fn;
 
-use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
+use fearless_simd::{Level, dispatch, f32x16, prelude::*};
 use glam::Vec3;
 use kdray::{
     accel::kdtree::Traversal,
-    cpu::{
-        companions::Companions,
+    cpu::{octant_bins::OctantBins, packet::LANES, packet_triangle::Shears},
+    layout::{Hit, NO_TRIANGLE, Ray, Triangle},
+    reference::{
         kdtree::{TraversalRay, signs_of},
-        packet::LANES,
-        packet_triangle::Shears,
         probe::Probe,
-        traverser::Traverser,
+        traverser::{Tracer, Traverser},
         triangle::Shear,
     },
-    layout::{Hit, NO_TRIANGLE, Ray, Triangle},
 };
-use support::{MeshWithTree, meshes, random::Random, rays::nasty_ray};
-
-/// The baseline first.
-fn levels() -> Vec<Level> {
-    let mut levels = vec![Level::baseline()];
-    #[cfg(target_arch = "x86_64")]
-    {
-        let best = Level::new();
-        levels.extend(best.as_sse4_2().map(Simd::level));
-        levels.extend(best.as_avx2().map(Simd::level));
-        levels.extend(best.as_avx512().map(Simd::level));
-    }
-    levels
-}
+use support::{
+    MeshWithTree, meshes,
+    packets::{levels, traced},
+    random::Random,
+    rays::nasty_ray,
+};
 
 #[test]
 #[cfg(target_arch = "x86_64")]
@@ -123,16 +113,6 @@ fn a_triangle_is_met_as_by_one_ray() {
     }
 }
 
-fn traced<const ANY_HIT: bool>(world: &MeshWithTree, level: Level, rays: &[Ray]) -> Vec<Hit> {
-    let mut hits = vec![None; rays.len()];
-    let probes = hits.iter_mut().zip(rays.iter().map(Probe::from));
-    let mut traverser = Traverser::at_level(Traversal::Stack, level);
-    traverser.traverse_all::<ANY_HIT, _>(&world.bindings(), probes, |place, hit| {
-        assert_eq!(place.replace(hit), None, "a ray has one hit");
-    });
-    hits.into_iter().map(|hit| hit.expect("a ray has a hit")).collect()
-}
-
 #[test]
 fn every_set_of_instructions_finds_the_same() {
     for triangles in [meshes::torus(40, 20), meshes::cube(9, 0.0), meshes::soup(1200, 7)] {
@@ -163,24 +143,24 @@ fn directions_in_turn() -> impl Iterator<Item = Vec3> {
 
 #[test]
 fn sixteen_rays_of_an_octant_are_a_packet() {
-    let mut companions = Companions::default();
+    let mut bins = OctantBins::default();
     let mut seen = vec![];
     let mut n_packets = 0;
     for (ray_ix, direction) in directions_in_turn().enumerate() {
         let probe = Probe::from(&support::rays::ray(Vec3::X * ray_ix as f32, direction));
-        let Some(waiting) = companions.join(ray_ix, &probe) else { continue };
+        let Some(bin) = bins.push(ray_ix, &probe) else { continue };
         n_packets += 1;
-        assert_eq!(waiting.keys.len(), LANES);
-        for (lane, ray_ix) in waiting.keys.drain(..).enumerate() {
-            let probe = waiting.probes.get(lane);
+        assert_eq!(bin.keys.len(), LANES);
+        for (lane, ray_ix) in bin.keys.drain(..).enumerate() {
+            let probe = bin.rays.get(lane);
             assert_eq!(probe.origin.x, ray_ix as f32, "the ray's own");
-            assert_eq!(signs_of(probe.direction), signs_of(waiting.probes.get(0).direction));
+            assert_eq!(signs_of(probe.direction), signs_of(bin.rays.get(0).direction));
             seen.push(ray_ix);
         }
     }
     assert!(n_packets > 1000 / LANES - 8);
-    companions.rest().for_each(|waiting| seen.extend(waiting.keys.drain(..)));
-    assert_eq!(companions.rest().count(), 0);
+    bins.rest().for_each(|bin| seen.extend(bin.keys.drain(..)));
+    assert_eq!(bins.rest().count(), 0);
     seen.sort_unstable();
     assert_eq!(seen, (0..1000).collect::<Vec<_>>());
 }

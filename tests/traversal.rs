@@ -8,11 +8,16 @@ use kdray::{
         Query,
         kdtree::{BuildOptions, KdTree, Traversal},
     },
-    cpu::{
-        bindings::Bindings, brute, kdtree::near_scene, probe::Probe, steps::count_steps, table::Table,
-        traverser::Traverser,
-    },
+    cpu::tracer::FastTracer,
     layout::{Hit, NO_TRIANGLE, Ray, Slab, Triangle},
+    reference::{
+        bindings::Bindings,
+        brute,
+        counting::{steps::count_steps, table::Table},
+        kdtree::near_scene,
+        probe::Probe,
+        traverser::{Tracer, Traverser},
+    },
 };
 use rayon::prelude::*;
 use support::{
@@ -32,24 +37,28 @@ fn rays_at(world: &MeshWithTree) -> Vec<Ray> {
     (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), world, i)).collect()
 }
 
-/// The hits of rays that go together; they hit the same, bit for bit, alone, and no less where any hit will do.
+/// The hits that the engine finds for rays that go together. They are the reference's, bit for bit, and where any hit
+/// answers, the same rays hit.
 fn traced(world: &MeshWithTree, traversal: Traversal, rays: &[Ray]) -> Vec<Hit> {
     traced_through(&world.bindings(), traversal, rays)
 }
 
 fn traced_through(bindings: &Bindings, traversal: Traversal, rays: &[Ray]) -> Vec<Hit> {
-    let of_task = |traverser: &mut Traverser, rays: &[Ray]| {
+    let of_task = |(engine, reference): &mut (FastTracer, Traverser), rays: &[Ray]| {
         let (mut closest, mut is_hit) = (vec![Hit::default(); rays.len()], vec![false; rays.len()]);
         let probes = || rays.iter().map(Probe::from).enumerate();
-        traverser.traverse_all::<false, _>(bindings, probes(), |i, hit| closest[i] = hit);
-        traverser.traverse_all::<true, _>(bindings, probes(), |i, hit| is_hit[i] = hit.triangle_ix != NO_TRIANGLE);
-        let alone = rays.iter().map(|ray| traverser.traverse::<false>(bindings, &ray.into())).collect::<Vec<_>>();
-        assert_eq!(first_difference(rays, &alone, &closest), None, "{traversal}: together");
+        engine.trace_all::<false, _>(bindings, probes(), |i, hit| closest[i] = hit);
+        engine.trace_all::<true, _>(bindings, probes(), |i, hit| is_hit[i] = hit.triangle_ix != NO_TRIANGLE);
+        let alone = rays.iter().map(|ray| reference.traverse::<false>(bindings, &ray.into())).collect::<Vec<_>>();
+        assert_eq!(first_difference(rays, &alone, &closest), None, "{traversal}: engine and reference");
         assert_eq!(is_hit, closest.iter().map(|hit| hit.triangle_ix != NO_TRIANGLE).collect::<Vec<_>>(), "{traversal}");
         closest
     };
     // Not a multiple of what goes together.
-    rays.par_chunks(1001).map_init(|| Traverser::new(traversal), of_task).flatten().collect()
+    rays.par_chunks(1001)
+        .map_init(|| (FastTracer::new(traversal), Traverser::new(traversal)), of_task)
+        .flatten()
+        .collect()
 }
 
 /// The first ray whose hits differ, in any bit.

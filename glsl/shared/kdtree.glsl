@@ -51,7 +51,7 @@ TraversalRay traversal_ray(Ray ray, float t_min) {
     r.t_min = 0.5 * t_min;
     r.shear.z *= 0.5;
     // A direction in the plane is taken as all but in it: finite everywhere, and one rule for all ties.
-    vec3 tiny = vec3(1e-12);
+    vec3 tiny = vec3(KD_LEAST_COMPONENT);
     r.inv_direction = 0.5 / mix(ray.direction, tiny, lessThan(abs(ray.direction), tiny));
     r.bias = -ray.origin * r.inv_direction;
     precise vec3 t0 = fma(frame.cell_min, r.inv_direction, r.bias);

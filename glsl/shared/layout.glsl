@@ -46,6 +46,24 @@
 // Times the scene's largest coordinate: a ray that keeps this far from a triangle's plane within a leaf has no hit there.
 // Twice the tree's margin: kdtree/planes.rs counts what rounding does to hits, planes and a ray's distance to a plane.
 #define KD_PLANE_REACH 0.000015258789
+// A direction's component of less magnitude is taken as this: inverse directions are finite everywhere, and rays in a split
+// plane have one rule. For unit directions it is far below one rounding of a direction, 2^-24.
+#define KD_LEAST_COMPONENT 1.0e-12
+// Far children that the traversal `short-stack` keeps.
+#define SHORT_STACK_SIZE 8u
+
+// Barycentric weights of shaded points are at least this, 2^-16: exactly on the edge of a corner of two walls, rounding may
+// put a point behind the other wall, and into that wall's shadow.
+#define LEAST_WEIGHT 0.000015258789
+// Times the corners' weighted magnitudes: how far rays that leave a surface start from it. 2^-18, 64 roundings, covers the
+// few roundings by which an interpolated point is off the plane, and those of the next ray's tests in the same plane.
+#define SURFACE_CLEARANCE 0.0000038146973
+// A shading normal whose interpolated square is less is no direction: the corners' normals cancel out.
+#define LEAST_NORMAL_SQUARED 1.0e-12
+// A reflectance below this, 2^-64, shows nowhere. A narrow highlight is darker almost all around, and is not lit there.
+#define LEAST_REFLECTANCE 5.421011e-20
+// The least cosine between a refracted ray and an interpolated normal, which can turn away from the viewer.
+#define LEAST_COSINE 1.0e-4
 
 // How rays find their way through the tree: the kernels' specialization constant TRAVERSAL.
 #define TRAVERSAL_MASK 0u
@@ -336,8 +354,6 @@ struct Addresses {
 #define CONSTANT_RUNS_BOTH_SIDES 4u
 // Whether the rays are the camera's, which are not stored.
 #define CONSTANT_FROM_CAMERA 5u
-// Far children that the traversal `short-stack` keeps.
-#define CONSTANT_SHORT_STACK_SIZE 6u
 // Whether any hit answers a ray, not the closest alone.
 #define CONSTANT_ANY_HIT 7u
 // The curve from radiance to display: TONEMAP_LINEAR and its like.

@@ -43,9 +43,6 @@ vec3 phong(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
     return reflectance;
 }
 
-// Below, a reflectance shows nowhere: 2^-64. A narrow highlight is darker almost all around, and need not be lit there.
-const float LEAST_REFLECTANCE = 5.421011e-20;
-
 // Whether a light from there can be seen in the surface.
 bool can_show(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
     // Without a power for what is not black.
@@ -84,7 +81,7 @@ Scattering scatter(Material material, Surface surface, vec3 direction) {
     }
     float eta = surface.from_inside ? material.ni : 1.0 / material.ni;
     // An interpolated normal can turn away from the viewer: grazing then.
-    float cos_in = max(dot(surface.shading, -direction), 1e-4);
+    float cos_in = max(dot(surface.shading, -direction), LEAST_COSINE);
     float cos_out = refraction_cosine(cos_in, eta);
     bool total = refracts && cos_out <= 0.0;
     bool has_fresnel = (material.flags & MATERIAL_FRESNEL) != 0u;

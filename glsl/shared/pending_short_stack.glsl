@@ -2,7 +2,6 @@
 // root (Horn, Sugerman, Houston, Hanrahan: Interactive k-D Tree GPU Raytracing, I3D 2007; there the ray restarts where it
 // left the leaf). Most rays lose none.
 
-layout(constant_id = CONSTANT_SHORT_STACK_SIZE) const uint SHORT_STACK_SIZE = 8u;
 // Node, and the bits of where the ray leaves it.
 uvec2 short_stack[SHORT_STACK_SIZE];
 // Where the next entry goes, and how many are kept.

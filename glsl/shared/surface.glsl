@@ -30,7 +30,7 @@ vec3 shading_normal(Triangle t, Hit hit, vec3 geometric) {
     if (t.n0 == FLAT_NORMAL || t.n1 == FLAT_NORMAL || t.n2 == FLAT_NORMAL) return geometric;
     vec3 n = (1.0 - hit.u - hit.v) * decode_normal(t.n0) + hit.u * decode_normal(t.n1) + hit.v * decode_normal(t.n2);
     float squared = dot(n, n);
-    return squared > 1e-12 ? n * inversesqrt(squared) : geometric;
+    return squared > LEAST_NORMAL_SQUARED ? n * inversesqrt(squared) : geometric;
 }
 
 // n with a non-negative component along `side`.
@@ -38,15 +38,13 @@ vec3 towards(vec3 n, vec3 side) {
     return dot(n, side) < 0.0 ? -n : n;
 }
 
-// Barycentric weights of a point that is not on an edge, but 2^-16 of the triangle inside: exactly on the edge of a
-// corner of two walls, rounding may put it behind the other wall, and into that wall's shadow.
+// Barycentric weights of a point that is not on an edge, but LEAST_WEIGHT of the triangle inside.
 vec3 inner_weights(Hit hit) {
-    vec3 weights = max(vec3(1.0 - hit.u - hit.v, hit.u, hit.v), vec3(exp2(-16.0)));
+    vec3 weights = max(vec3(1.0 - hit.u - hit.v, hit.u, hit.v), vec3(LEAST_WEIGHT));
     return weights / (weights.x + weights.y + weights.z);
 }
 
-// The point is interpolated from the corners, so it lies within a few roundings of the plane: 2^-18 of the corners'
-// weighted magnitudes, 64 roundings, covers those and the next ray's test of neighbours in the same plane.
+// The surface of a triangle at a hit, as the ray meets it. Its point is interpolated from the corners.
 Surface surface_at(Ray ray, Hit hit, Triangle t) {
     vec3 weights = inner_weights(hit);
     vec3 magnitude = abs(weights.x * t.v0) + abs(weights.y * t.v1) + abs(weights.z * t.v2);
@@ -60,7 +58,7 @@ Surface surface_at(Ray ray, Hit hit, Triangle t) {
     s.from_inside = dot(outward, ray.direction) > 0.0;
     s.geometric = s.from_inside ? -outward : outward;
     s.shading = towards(shading_normal(t, hit, outward), s.geometric);
-    s.clearance = exp2(-18.0) * dot(magnitude, abs(s.geometric));
+    s.clearance = SURFACE_CLEARANCE * dot(magnitude, abs(s.geometric));
     return s;
 }
 

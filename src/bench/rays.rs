@@ -8,8 +8,9 @@ use super::stage::Stage;
 use crate::{
     accel::kdtree::Traversal,
     cast::leaving::{diffuse_rays, leaving, rays_from_hits},
-    cpu::{light::sample_light, primary_hit::primary_rays, surface::Surface, trace::trace},
+    cpu::trace,
     layout::{Hit, Ray},
+    reference::{light::sample_light, primary_hit::primary_rays, surface::Surface},
 };
 
 /// What the rays of a set are for.

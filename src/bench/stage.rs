@@ -6,9 +6,9 @@ use glam::{BVec3, Vec3};
 
 use crate::{
     accel::kdtree::{BuildOptions, Extras, KdTree},
-    cpu::bindings::Bindings,
     frame::{RenderOptions, frame_constants},
     layout::{FLAT_NORMAL, Frame, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
+    reference::bindings::Bindings,
     scene::{Camera, Scene, framing},
     world::World,
 };

@@ -18,12 +18,10 @@ use crate::{
         kdtree::{Statistics, Traversal},
     },
     cast::{CastRay, Caster, cast_ray},
-    cpu::{
-        self,
-        steps::{Steps, count_steps},
-    },
+    cpu,
     gpu::{Context, GpuError, Statistic, StatisticValue},
     layout::{Hit, NO_TRIANGLE},
+    reference::counting::steps::{Steps, count_steps},
 };
 
 /// Timed casts of one variant before it is the next one's turn.
@@ -118,7 +116,7 @@ impl<'a> Tracers<'a> {
 
     fn cast_on_cpu(&self, variant: Traversal, rays: &[CastRay], query: Query) -> Vec<Hit> {
         let mut hits = vec![Hit::zeroed(); rays.len()];
-        cpu::cast::cast(&self.stage.bindings(), variant, query, rays, &mut hits);
+        cpu::cast(&self.stage.bindings(), variant, query, rays, &mut hits);
         hits
     }
 }

@@ -6,8 +6,8 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::{
-    cpu::surface::{Surface, surface_at},
     layout::{Hit, NO_TRIANGLE, Ray, Triangle},
+    reference::surface::{Surface, surface_at},
 };
 
 /// One ray for each hit, in their order, into the hemisphere above it, by the cosine.

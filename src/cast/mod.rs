@@ -33,7 +33,7 @@ use crate::{
     cpu,
     gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
     layout::{Frame, RAY_GROUP_SIZE, Ray},
-    passes,
+    passes, reference,
     world::Geometry,
 };
 
@@ -184,7 +184,7 @@ fn constants(geometry: Geometry) -> Frame {
 /// Rays that can only miss: with a NaN, an infinite origin or direction, or a direction of zero or so short that all
 /// its components are denormal (less than 2^-126).
 pub fn count_invalid(rays: &[CastRay]) -> u64 {
-    rays.par_iter().filter(|ray| !cpu::cast::is_ray(ray)).count() as u64
+    rays.par_iter().filter(|ray| !reference::cast::is_ray(ray)).count() as u64
 }
 
 /// As [`Caster`], on the current rayon pool.
@@ -204,9 +204,10 @@ impl<'a> CpuCaster<'a> {
 
     /// One hit a ray.
     pub fn cast(&self, rays: &[CastRay], query: Query) -> Vec<Hit> {
-        let bindings = cpu::bindings::Bindings::of_tree(self.geometry.triangles(), self.geometry.tree(), &self.frame);
+        let bindings =
+            reference::bindings::Bindings::of_tree(self.geometry.triangles(), self.geometry.tree(), &self.frame);
         let mut hits = vec![Hit::zeroed(); rays.len()];
-        cpu::cast::cast(&bindings.with_extras(&self.extras), self.traversal, query, rays, &mut hits);
+        cpu::cast(&bindings.with_extras(&self.extras), self.traversal, query, rays, &mut hits);
         hits
     }
 }

@@ -7,14 +7,18 @@ use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 use glam::{Vec3, Vec3A, Vec4};
 
 use super::{
-    bindings::Bindings,
-    columns::{HitColumns, ProbeColumns},
-    kdtree::{FLAT, TraversalRay, largest_coordinate, origin_reach, signs_of},
-    leaf::{Target, entries_of},
     packet_triangle::{Found, Shears},
-    table::Reads,
+    soa::{HitsSoa, RaysSoa},
 };
-use crate::layout::{Hit, KD_PLANE_REACH, KdNode, Slab};
+use crate::{
+    layout::{Hit, KD_LEAST_COMPONENT, KD_PLANE_REACH, KdNode, Slab},
+    reference::{
+        bindings::Bindings,
+        counting::table::Reads,
+        kdtree::{TraversalRay, largest_coordinate, origin_reach, signs_of},
+        leaf::{Target, entries_of},
+    },
+};
 
 /// Rays of a packet.
 pub const LANES: usize = 16;
@@ -90,7 +94,7 @@ fn row<S: Simd>(columns: &[f32x16<S>; 3], lane: usize) -> [f32; 4] {
 /// A direction in the plane is taken as all but in it.
 #[inline(always)]
 fn inverse<S: Simd>(direction: f32x16<S>) -> f32x16<S> {
-    let tiny = f32x16::splat(direction.simd, FLAT);
+    let tiny = f32x16::splat(direction.simd, KD_LEAST_COMPONENT);
     1.0 / direction.abs().simd_lt(tiny).select(tiny, direction)
 }
 
@@ -112,7 +116,7 @@ fn dot<S: Simd>(normal: Vec3, v: &[f32x16<S>; 3]) -> f32x16<S> {
 impl<S: Simd> Packet<S> {
     /// The first `n_rays`, and where they are in the root's cell: the operations of `TraversalRay::new`.
     #[inline(always)]
-    pub fn new(simd: S, bindings: &Bindings<impl Reads>, probes: &ProbeColumns, n_rays: usize) -> (Self, Interval<S>) {
+    pub fn new(simd: S, bindings: &Bindings<impl Reads>, probes: &RaysSoa, n_rays: usize) -> (Self, Interval<S>) {
         let (origin, direction) = (columns(simd, &probes.origin), columns(simd, &probes.direction));
         let inv_direction = [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])];
         let bias = [-origin[0] * inv_direction[0], -origin[1] * inv_direction[1], -origin[2] * inv_direction[2]];
@@ -255,9 +259,9 @@ impl<S: Simd> Packet<S> {
 
     /// What the rays have found.
     #[inline(always)]
-    pub fn hits(&self) -> HitColumns {
+    pub fn hits(&self) -> HitsSoa {
         let best = &self.best;
-        HitColumns {
+        HitsSoa {
             t: best.t.to_array(),
             triangle_ix: best.triangle_ix.to_array(),
             u: best.u.to_array(),

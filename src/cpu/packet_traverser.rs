@@ -5,17 +5,19 @@
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use super::{
-    bindings::Bindings,
-    columns::{HitColumns, ProbeColumns},
-    kdtree::{Cell, Pending, TraversalRay, axis_of, hit_from_near, is_leaf, search, search_cell},
     packet::{Interval, LANES, Packet},
-    pending_stack::PendingStack,
-    slab::slab_of,
-    table::Reads,
+    soa::{HitsSoa, RaysSoa},
 };
 use crate::{
     accel::kdtree::EMPTY_LEAF,
     layout::{Hit, KD_MAX_DEPTH, KD_PAIR_SHIFT, KdNode},
+    reference::{
+        bindings::Bindings,
+        counting::table::Reads,
+        kdtree::{Cell, Pending, TraversalRay, axis_of, hit_from_near, is_leaf, search, search_cell},
+        pending_stack::PendingStack,
+        slab::slab_of,
+    },
 };
 
 /// The working memory of a thread.
@@ -140,9 +142,9 @@ impl PacketTraverser {
         &mut self,
         simd: S,
         bindings: &Bindings<impl Reads>,
-        probes: &ProbeColumns,
+        probes: &RaysSoa,
         n_rays: usize,
-    ) -> HitColumns {
+    ) -> HitsSoa {
         let (mut packet, whole) = Packet::new(simd, bindings, probes, n_rays);
         if !packet.is_within_reach(bindings) {
             return self.traverse_one_by_one::<ANY_HIT>(bindings, probes, n_rays);
@@ -157,10 +159,10 @@ impl PacketTraverser {
     fn traverse_one_by_one<const ANY_HIT: bool>(
         &mut self,
         bindings: &Bindings<impl Reads>,
-        probes: &ProbeColumns,
+        probes: &RaysSoa,
         n_rays: usize,
-    ) -> HitColumns {
-        let mut hits = HitColumns::default();
+    ) -> HitsSoa {
+        let mut hits = HitsSoa::default();
         for lane in 0..n_rays {
             let hit = hit_from_near(bindings, &probes.get(lane), |near, best| {
                 self.traverse_alone::<ANY_HIT>(bindings, &TraversalRay::new(bindings, near), best);
@@ -174,9 +176,9 @@ impl PacketTraverser {
     pub fn traverse<const ANY_HIT: bool>(
         &mut self,
         bindings: &Bindings<impl Reads>,
-        probes: &ProbeColumns,
+        probes: &RaysSoa,
         n_rays: usize,
-    ) -> HitColumns {
+    ) -> HitsSoa {
         dispatch!(self.level, simd => self.traverse_at::<_, ANY_HIT>(simd, bindings, probes, n_rays))
     }
 

@@ -3,11 +3,11 @@
 
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 
-use super::{
-    packet::Lanes,
-    triangle::{LEAST_EXACT_SUM, Shear, axis_last},
+use super::packet::Lanes;
+use crate::{
+    layout::{Hit, NO_TRIANGLE, Triangle},
+    reference::triangle::{LEAST_EXACT_SUM, Shear, axis_last},
 };
-use crate::layout::{Hit, NO_TRIANGLE, Triangle};
 
 /// The shears of sixteen rays.
 pub struct Shears<S: Simd> {

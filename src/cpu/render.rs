@@ -2,18 +2,7 @@
 
 use bytemuck::Zeroable;
 
-use super::{
-    accumulate,
-    bindings::Bindings,
-    compact::{self, Parents},
-    costs, denoise, features, primary_hit,
-    queue::Queue,
-    resolve,
-    shade::{self, LitRays},
-    shadow,
-    timing::Clock,
-    tonemap, trace, visibility,
-};
+use super::{queue::Queue, timing::Clock};
 use crate::{
     accel::kdtree::Extras,
     frame::{
@@ -21,6 +10,15 @@ use crate::{
         plan::passes,
     },
     layout::{Bounce, Feature, Frame, Hit, Ray, SCAN_GROUP_SIZE},
+    reference::{
+        accumulate,
+        bindings::Bindings,
+        compact::{self, Parents},
+        counting::costs,
+        denoise, features, primary_hit, resolve,
+        shade::{self, LitRays},
+        tonemap,
+    },
     scene::Camera,
     world::World,
 };
@@ -222,7 +220,7 @@ impl Renderer {
     fn visibility(&mut self) {
         let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
         let (traversal, ids) = (self.options.traversal, &mut self.triangle_ids);
-        self.clock.time(Pass::Visibility, None, || visibility::visibility(&inputs, traversal, ids));
+        self.clock.time(Pass::Visibility, None, || super::visibility(&inputs, traversal, ids));
     }
 
     /// The queue's first rays, which on the device every kernel makes for itself. Their time is the first pass's.
@@ -244,7 +242,7 @@ impl Renderer {
         let (ids, traversal) = (&self.triangle_ids, self.options.traversal);
         let n_hits = self.clock.time(pass, Some(depth), || match pass {
             Pass::PrimaryHit => primary_hit::primary_hit(&inputs, ids, rays, hits),
-            _ => trace::trace(&inputs, traversal, rays, hits),
+            _ => super::trace(&inputs, traversal, rays, hits),
         });
         self.batch_stats.push(BounceStats { n_rays: rays.len() as u64, n_hits: n_hits.into(), n_shadow_rays: 0 });
     }
@@ -318,7 +316,7 @@ impl Renderer {
         light_visibility.resize(rays.len() * inputs.lights.len(), 0);
         for (bounce, stats) in bounces.iter().zip(&mut self.batch_stats) {
             let of_bounce =
-                || shadow::shadow(&inputs, traversal, &bounce.rays(), (rays.as_slice(), hits), light_visibility);
+                || super::shadow(&inputs, traversal, &bounce.rays(), (rays.as_slice(), hits), light_visibility);
             stats.n_shadow_rays = self.clock.time(Pass::Shadow, None, of_bounce).into();
         }
     }

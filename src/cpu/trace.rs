@@ -1,28 +1,36 @@
-//! Trace (the paper's section 2.3): each ray's closest hit through the kd-tree. Twin of `trace.comp`.
+//! The reference's passes that take rays through the tree, by the engine's tracer.
 
-use rayon::prelude::*;
+use std::ops::Range;
 
-use super::{RAYS_PER_TASK, bindings::Bindings, probe::Probe, traverser::Traverser};
+use super::tracer::FastTracer;
 use crate::{
-    accel::kdtree::Traversal,
-    layout::{Hit, NO_TRIANGLE, Ray},
+    accel::{Query, kdtree::Traversal},
+    layout::{CastRay, Hit, Ray},
+    reference::{self, bindings::Bindings},
 };
 
-/// Writes `hits`, one a ray; returns how many are hits.
+/// Does what [`reference::trace::trace`] does.
 pub fn trace(bindings: &Bindings, traversal: Traversal, rays: &[Ray], hits: &mut [Hit]) -> u32 {
-    rays.par_chunks(RAYS_PER_TASK)
-        .zip(hits.par_chunks_mut(RAYS_PER_TASK))
-        .map_init(
-            || Traverser::new(traversal),
-            |traverser, (rays, hits)| {
-                let mut n_hits = 0;
-                let probes = rays.iter().map(Probe::from);
-                traverser.traverse_all::<false, _>(bindings, hits.iter_mut().zip(probes), |hit, found| {
-                    *hit = found;
-                    n_hits += u32::from(found.triangle_ix != NO_TRIANGLE);
-                });
-                n_hits
-            },
-        )
-        .sum()
+    reference::trace::trace_by::<FastTracer>(bindings, traversal, rays, hits)
+}
+
+/// Does what [`reference::shadow::shadow`] does.
+pub fn shadow(
+    bindings: &Bindings,
+    traversal: Traversal,
+    places: &Range<usize>,
+    rays_and_hits: (&[Ray], &[Hit]),
+    light_visibility: &mut [u32],
+) -> u32 {
+    reference::shadow::shadow_by::<FastTracer>(bindings, traversal, places, rays_and_hits, light_visibility)
+}
+
+/// Does what [`reference::visibility::visibility`] does.
+pub fn visibility(bindings: &Bindings, traversal: Traversal, triangle_ids: &mut [u32]) {
+    reference::visibility::visibility_by::<FastTracer>(bindings, traversal, triangle_ids);
+}
+
+/// Does what [`reference::cast::cast`] does.
+pub fn cast(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[CastRay], hits: &mut [Hit]) {
+    reference::cast::cast_by::<FastTracer>(bindings, traversal, query, rays, hits);
 }

@@ -101,8 +101,8 @@ mod tests {
     use super::*;
     use crate::{
         accel::kdtree::BuildOptions,
-        cpu::camera::{camera_direction, in_picture},
         layout::Triangle,
+        reference::camera::{camera_direction, in_picture},
         scene::RenderDefaults,
     };
 

@@ -45,8 +45,12 @@ pub fn numbers(layout: &str) -> Result<Numbers, String> {
 pub fn declarations(file: &str, source: &str, numbers: &Numbers) -> Result<Vec<Declaration>, String> {
     let mut declarations = Vec::new();
     for (line_ix, line) in source.lines().enumerate() {
-        let Some(rest) = line.trim().strip_prefix("layout(constant_id = ") else { continue };
+        let code = line.split("//").next().unwrap_or_default().trim();
+        if !code.contains("constant_id") {
+            continue;
+        }
         let wrong = |what: &str| format!("glsl/{file}:{}: {what}: {}", line_ix + 1, line.trim());
+        let rest = code.strip_prefix("layout(constant_id = ").ok_or_else(|| wrong("write `layout(constant_id = `"))?;
         let (number, rest) = rest.split_once(") const ").ok_or_else(|| wrong("no specialization constant"))?;
         let mut words = rest.split_whitespace();
         let (glsl_type, name) = words.next().zip(words.next()).ok_or_else(|| wrong("no type or name"))?;
@@ -128,6 +132,8 @@ mod tests {
         assert!(literal.contains("another constant's number"), "{literal}");
         let unknown = refusal("layout(constant_id = CONSTANT_NEW) const bool NEW = true;");
         assert!(unknown.contains("no number"), "{unknown}");
+        let spaced = refusal("layout(constant_id=2) const bool COUNTS = true;");
+        assert!(spaced.contains("write `layout"), "{spaced}");
         let of_type = refusal("layout(constant_id = CONSTANT_COUNTS) const float COUNTS = 1.0;");
         assert!(of_type.contains("a uint or a bool"), "{of_type}");
     }

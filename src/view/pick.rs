@@ -4,15 +4,15 @@ use glam::{UVec2, Vec3};
 
 use crate::{
     accel::{Query, kdtree::Extras},
-    cpu::{
-        bindings::Bindings,
-        children::{child_kinds_of, children_of},
-        primary_hit::camera_ray,
-        steps::{Steps, count_steps},
-        trace::trace,
-    },
+    cpu::trace,
     frame::{RenderOptions, frame_constants},
     layout::{Hit, NO_TRIANGLE, Ray},
+    reference::{
+        bindings::Bindings,
+        children::{child_kinds_of, children_of},
+        counting::steps::{Steps, count_steps},
+        primary_hit::camera_ray,
+    },
     scene::{Camera, Scene},
     world::World,
 };

@@ -1,8 +1,8 @@
 //! A part of a picture is the same, bit for bit, as that part of the whole.
 
 use kdray::{
-    cpu,
     frame::{Crop, Denoise, Picture, Primary, RenderOptions},
+    reference,
 };
 
 use super::studio::{identical, options, samples_on_cpu as on_cpu, samples_on_device as on_device};
@@ -61,6 +61,6 @@ fn the_filter_s_border_matters() {
         ..Default::default()
     };
     let mut filtered = unfiltered.radiance.clone();
-    cpu::denoise::denoise(&frame, &unfiltered.radiance, &mut filtered);
+    reference::denoise::denoise(&frame, &unfiltered.radiance, &mut filtered);
     assert_ne!(filtered, cut(&whole, crop).radiance);
 }

@@ -5,10 +5,14 @@ use std::collections::HashSet;
 use glam::UVec2;
 use kdray::{
     accel::kdtree::Traversal,
-    cpu::{bindings::Bindings, primary_hit::camera_ray, traverser::Traverser},
     engine::choices::{Processor, primary_by_rule, traversal_by_rule},
     frame::{Crop, Picture, Primary, RenderOptions, frame_constants},
     layout::Frame,
+    reference::{
+        bindings::Bindings,
+        primary_hit::camera_ray,
+        traverser::{Tracer, Traverser},
+    },
     render::Renderer,
     scene::Scene,
     world::World,

@@ -1,8 +1,8 @@
 //! Accumulate against its twin: sums exactly, means to the rounding of a division.
 
 use kdray::{
-    cpu,
     layout::{Bounce, Frame},
+    reference,
 };
 
 use super::stage::{Stage, options};
@@ -46,7 +46,7 @@ fn agrees_with_its_twin() {
         let (sample, sums) = (some(n, 1), some(n, 2));
         let (found, found_sums) = accumulated(&stage, &quiet, &sample, &sums);
         let (mut expected, mut expected_sums) = (sample.clone(), sums.clone());
-        cpu::accumulate::accumulate(stage.resources.constants(), &quiet, &mut expected, &mut expected_sums);
+        reference::accumulate::accumulate(stage.resources.constants(), &quiet, &mut expected, &mut expected_sums);
         compare::exact(&expected_sums, &found_sums).unwrap();
         compare::pixels(1e-5, 0, &expected, &found).unwrap();
         assert!(compare::exact(&sums, &found_sums).is_err() && compare::pixels(1e-5, 0, &sample, &found).is_err());
@@ -60,7 +60,7 @@ fn the_mean_of_whole_numbers_is_known() {
     for n in 2..=100_u32 {
         radiance[0] = [n as f32; 4];
         let frame = Frame { n_samples: n, ..Frame::default() };
-        cpu::accumulate::accumulate(&frame, &[], &mut radiance, &mut sums);
+        reference::accumulate::accumulate(&frame, &[], &mut radiance, &mut sums);
         assert_eq!((sums[0], radiance[0]), ([(n * (n + 1) / 2) as f32; 4], [(n + 1) as f32 / 2.0; 4]));
     }
 }
@@ -75,6 +75,6 @@ fn nothing_is_added_where_a_queue_overflowed() {
     compare::exact(&sample, &found).unwrap();
     compare::exact(&sums, &found_sums).unwrap();
     let (mut twin, mut twin_sums) = (sample.clone(), sums.clone());
-    cpu::accumulate::accumulate(stage.resources.constants(), &bounces, &mut twin, &mut twin_sums);
+    reference::accumulate::accumulate(stage.resources.constants(), &bounces, &mut twin, &mut twin_sums);
     assert_eq!((twin, twin_sums), (sample.clone(), sums.clone()));
 }

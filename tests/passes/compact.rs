@@ -2,12 +2,12 @@
 
 use glam::{Vec3, vec3};
 use kdray::{
-    cpu::{self, compact::Parents},
     frame::plan,
     layout::{
         Batch, Bounce, CHILD_REFLECTED, CHILD_TRANSMITTED, Frame, Hit, NO_TRIANGLE, Ray, SCAN_GROUP_SIZE, SPINE_ITEMS,
     },
     passes::Inputs,
+    reference::{self, compact::Parents},
 };
 
 use super::stage::{FIRST, Stage, UNTOUCHED_RAY, UNTOUCHED_WORD, options};
@@ -104,11 +104,11 @@ fn on_cpu(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
     let places = n_before as usize..n_before as usize + n;
     let mut scan_blocks = vec![0; n.div_ceil(SCAN_GROUP_SIZE as usize)];
     let parents = Parents { rays: &rays, hits: &hits };
-    cpu::compact::reduce(&bindings, parents, &mut child_kinds[places.clone()], &mut scan_blocks);
+    reference::compact::reduce(&bindings, parents, &mut child_kinds[places.clone()], &mut scan_blocks);
     let (this, mut next) = (bounces[1], bounces[2]);
-    cpu::compact::spine(&mut scan_blocks, constants, &this, &mut next);
+    reference::compact::spine(&mut scan_blocks, constants, &this, &mut next);
     if next.overflow == 0 {
-        cpu::compact::scatter(
+        reference::compact::scatter(
             &bindings,
             parents,
             &child_kinds[places.clone()],

@@ -1,8 +1,8 @@
 //! Denoise against its twin.
 
 use kdray::{
-    cpu,
     frame::{Denoise, RenderOptions},
+    reference,
 };
 
 use super::stage::{Stage, UNTOUCHED_PIXEL, options};
@@ -38,7 +38,7 @@ fn agrees_with_its_twin() {
         let stage = empty_stage(RenderOptions { exposure: 1.3, ..options(width, height) });
         let pixels = noisy((width * height) as usize);
         let mut expected = vec![UNTOUCHED_PIXEL; pixels.len()];
-        cpu::denoise::denoise(stage.resources.constants(), &pixels, &mut expected);
+        reference::denoise::denoise(stage.resources.constants(), &pixels, &mut expected);
         // A difference of almost the threshold may fall on either side of it.
         compare::pixels(1e-6, pixels.len() / 5000, &expected, &filtered(&stage, &pixels)).unwrap();
         let n_smoothed = pixels.iter().zip(&expected).filter(|(before, after)| before != after).count();

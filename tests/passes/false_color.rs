@@ -2,8 +2,8 @@
 
 use glam::{Vec3, vec3};
 use kdray::{
-    cpu,
     layout::{FalseColor, Feature, NO_TRIANGLE, VIEW_COST, VIEW_DEPTH, VIEW_ID, VIEW_NORMAL, VIEW_RAYS},
+    reference,
 };
 
 use super::stage::{Stage, UNTOUCHED_WORD, options};
@@ -47,7 +47,7 @@ fn agrees_with_its_twin() {
         for view in VIEWS {
             let push = FalseColor { view, brightest: if view == VIEW_COST { 2000.0 } else { 20.0 } };
             let mut expected = vec![[0; 4]; features.len()];
-            cpu::false_color::false_color(&push, &features, &mut expected);
+            reference::false_color::false_color(&push, &features, &mut expected);
             compare::bytes(1, &expected, &displayed(&stage, &push, &features)).unwrap();
         }
     }

@@ -4,9 +4,9 @@ use std::collections::HashSet;
 
 use glam::vec3;
 use kdray::{
-    cpu,
     frame::RenderOptions,
     layout::{Batch, Feature, NO_TRIANGLE, Ray},
+    reference,
     scene::Camera,
 };
 
@@ -16,7 +16,7 @@ use crate::support::scenes;
 /// The camera's first rays.
 fn primary_rays(stage: &Stage, n: u32) -> Vec<Ray> {
     let mut rays = vec![UNTOUCHED_RAY; n as usize];
-    cpu::primary_hit::primary_rays(stage.resources.constants(), 0, &mut rays);
+    reference::primary_hit::primary_rays(stage.resources.constants(), 0, &mut rays);
     rays
 }
 
@@ -59,7 +59,7 @@ fn agrees_with_its_twin() {
         // Cleared but for the counts, which stay.
         let before: Vec<_> = (0..2000).map(|i| Feature { n_rays: i, n_steps: 7 * i, ..Feature::default() }).collect();
         let mut expected = before.clone();
-        cpu::features::features(&stage.bindings(), &rays, &hits_of(&stage, &rays), &mut expected);
+        reference::features::features(&stage.bindings(), &rays, &hits_of(&stage, &rays), &mut expected);
         let found = noted(&stage, &rays, &before);
         assert_eq!(difference(&expected, &found), None);
         let with_ray: HashSet<_> = rays.iter().map(|ray| ray.pixel_ix as usize).collect();

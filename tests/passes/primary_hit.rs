@@ -1,8 +1,8 @@
 //! Primary hit against its twin, from the same triangle IDs.
 
 use kdray::{
-    cpu,
     layout::{Batch, Hit},
+    reference,
 };
 
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_HIT, UNTOUCHED_RAY, options};
@@ -23,12 +23,12 @@ fn on_device(stage: &Stage, batch: &Batch) -> (Vec<Hit>, u32) {
 fn on_cpu(stage: &Stage, batch: &Batch, found: &[Hit]) -> (Vec<Hit>, u32) {
     let n = batch.n_pixels as usize;
     let (mut rays, mut hits) = (vec![UNTOUCHED_RAY; n], vec![UNTOUCHED_HIT; found.len()]);
-    cpu::primary_hit::primary_rays(stage.resources.constants(), batch.first_pixel, &mut rays);
+    reference::primary_hit::primary_rays(stage.resources.constants(), batch.first_pixel, &mut rays);
     let mut ids = vec![0; (stage.options.width * stage.options.height) as usize];
     for (ray, hit) in rays.iter().zip(found) {
         ids[ray.pixel_ix as usize] = hit.triangle_ix;
     }
-    let n_hits = cpu::primary_hit::primary_hit(&stage.bindings(), &ids, &rays, &mut hits[..n]);
+    let n_hits = reference::primary_hit::primary_hit(&stage.bindings(), &ids, &rays, &mut hits[..n]);
     (hits, n_hits)
 }
 

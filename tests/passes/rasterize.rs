@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use glam::{Vec3, uvec2, vec3};
 use kdray::{
-    cpu::primary_hit::camera_ray,
     frame::{Crop, Primary, RenderOptions, frame_constants, plan},
     gpu::{Access, Commands, Context, ContextOptions, GpuError},
     layout::{Batch, Hit, RASTER_GROUPS_X, RASTER_GROUPS_Y, Triangle},
     passes::{Inputs, Passes, Rasterize, Trace},
+    reference::primary_hit::camera_ray,
     render::Renderer,
     scene::{Camera, Scene},
 };

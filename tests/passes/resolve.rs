@@ -1,8 +1,8 @@
 //! Resolve against its twin and against the sum of a pixel's rays in the queue's order: the same to the last bit.
 
 use kdray::{
-    cpu,
     layout::{Batch, Ray},
+    reference,
 };
 
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_PIXEL, UNTOUCHED_RAY, options};
@@ -22,7 +22,7 @@ struct Family {
 fn family(stage: &Stage, n_primary: u32, n_bounces: usize, most_children: usize) -> Family {
     let mut random = Random(9);
     let mut rays = vec![UNTOUCHED_RAY; n_primary as usize];
-    cpu::primary_hit::primary_rays(stage.resources.constants(), FIRST_PIXEL, &mut rays);
+    reference::primary_hit::primary_rays(stage.resources.constants(), FIRST_PIXEL, &mut rays);
     let (mut first_children, mut n_rays) = (Vec::new(), vec![n_primary]);
     for _ in 1..n_bounces {
         let parents = first_children.len()..rays.len();
@@ -49,7 +49,7 @@ fn check(stage: &Stage, family: &Family) {
     }
     let bounces = stage.set_n_rays(n_rays);
     let mut expected = before.clone();
-    cpu::resolve::resolve(&bounces[..n_rays.len()], rays, &radiance, first_children, &mut expected);
+    reference::resolve::resolve(&bounces[..n_rays.len()], rays, &radiance, first_children, &mut expected);
     compare::exact(&sums, &expected).unwrap();
     resources.queue.ray_radiance.upload(&radiance).expect("ray_radiance");
     resources.queue.first_children.upload(first_children).expect("first_children");

@@ -5,9 +5,9 @@ use std::collections::HashSet;
 use glam::Vec3;
 use kdray::{
     accel::kdtree::Traversal,
-    cpu::{self, shade::LitRays},
     frame::RenderOptions,
     layout::{Batch, FLAT_NORMAL, Hit, LIGHT_LIT, LIGHT_SHADOWED, LIGHT_UNTESTED, NO_TRIANGLE},
+    reference::{self, shade::LitRays},
     scene::Scene,
 };
 
@@ -23,7 +23,7 @@ fn check(stage: &Stage, batch: &Batch, n_rays: u32) -> Vec<u32> {
     let mut expected = vec![UNTOUCHED_WORD; queue.light_visibility.len()];
     for row in &bounces[..2] {
         let (bindings, rays) = (stage.bindings(), (rays.as_slice(), hits.as_slice()));
-        let n_tested = cpu::shadow::shadow(&bindings, stage.options.traversal, &row.rays(), rays, &mut expected);
+        let n_tested = reference::shadow::shadow(&bindings, stage.options.traversal, &row.rays(), rays, &mut expected);
         let is_tested = |state: &&u32| [LIGHT_LIT, LIGHT_SHADOWED].contains(state);
         let of_lights = expected.chunks(queue.capacity() as usize);
         let n_marked: usize = of_lights.map(|of_light| of_light[row.rays()].iter().filter(is_tested).count()).sum();
@@ -73,11 +73,17 @@ fn lights_that_are_not_asked_for_could_not_be_seen() {
     let hits = hits_of(&stage, &rays);
     let mut asked_for = vec![UNTOUCHED_WORD; stage.resources.queue.light_visibility.len()];
     let traversal = stage.options.traversal;
-    cpu::shadow::shadow(&stage.bindings(), traversal, &(0..n), (rays.as_slice(), hits.as_slice()), &mut asked_for);
+    reference::shadow::shadow(
+        &stage.bindings(),
+        traversal,
+        &(0..n),
+        (rays.as_slice(), hits.as_slice()),
+        &mut asked_for,
+    );
     let shaded = |light_visibility: &[u32]| {
         let mut radiance = vec![[0.0; 4]; n];
         let lit = LitRays { rays: &rays, hits: &hits, light_visibility };
-        cpu::shade::shade(&stage.bindings(), lit, &mut radiance);
+        reference::shade::shade(&stage.bindings(), lit, &mut radiance);
         radiance
     };
     let instead =

@@ -5,11 +5,11 @@ use std::{cell::Cell, sync::Arc, thread};
 use kdray::{
     accel::kdtree::{BuildOptions, Extras},
     buffers::{Needs, Resources},
-    cpu::bindings::Bindings,
     frame::{Denoise, RenderOptions, frame_constants},
     gpu::{Commands, Context, ContextOptions},
     layout::{Batch, Bounce, Counters, Frame, Hit, NO_TRIANGLE, RAY_GROUP_SIZE, Ray},
     passes::Passes,
+    reference::bindings::Bindings,
     scene::Scene,
     world::World,
 };
@@ -169,7 +169,7 @@ pub fn rays_of(stage: &Stage, batch: &Batch, n: u32) -> (Vec<Ray>, Vec<Ray>) {
     let mut rays = some_rays(stage, n);
     let mut stored = rays.clone();
     let n_camera = batch.n_pixels as usize;
-    kdray::cpu::primary_hit::primary_rays(stage.resources.constants(), batch.first_pixel, &mut rays[..n_camera]);
+    kdray::reference::primary_hit::primary_rays(stage.resources.constants(), batch.first_pixel, &mut rays[..n_camera]);
     stored[..n_camera].fill(UNTOUCHED_RAY);
     (rays, stored)
 }
@@ -177,6 +177,6 @@ pub fn rays_of(stage: &Stage, batch: &Batch, n: u32) -> (Vec<Ray>, Vec<Ray>) {
 /// The twin's hits of `rays`.
 pub fn hits_of(stage: &Stage, rays: &[Ray]) -> Vec<Hit> {
     let mut hits = vec![Hit { triangle_ix: NO_TRIANGLE, ..UNTOUCHED_HIT }; rays.len()];
-    kdray::cpu::trace::trace(&stage.bindings(), stage.options.traversal, rays, &mut hits);
+    kdray::reference::trace::trace(&stage.bindings(), stage.options.traversal, rays, &mut hits);
     hits
 }

@@ -1,8 +1,8 @@
 //! Tonemap against its twin: within one level, since `pow` is not exact.
 
 use kdray::{
-    cpu,
     frame::{RenderOptions, Tonemap},
+    reference,
 };
 
 use super::stage::{Stage, UNTOUCHED_WORD, options};
@@ -31,7 +31,7 @@ fn agrees_with_its_twin() {
             let mut channel = |_| random.unit() * random.unit() * 2.0;
             let pixels: Vec<[f32; 4]> = (0..width * height).map(|_| [0; 4].map(&mut channel)).collect();
             let mut expected = vec![[0; 4]; pixels.len()];
-            cpu::tonemap::tonemap(stage.resources.constants(), tonemap, &pixels, &mut expected);
+            reference::tonemap::tonemap(stage.resources.constants(), tonemap, &pixels, &mut expected);
             let found = encoded(&stage, &pixels);
             compare::bytes(1, &expected, &found).unwrap();
             let n_off = expected.iter().zip(&found).filter(|(a, b)| a != b).count();

@@ -2,9 +2,9 @@
 
 use kdray::{
     accel::kdtree::Traversal,
-    cpu,
     frame::{Primary, RenderOptions},
     layout::Batch,
+    reference,
     scene::Scene,
 };
 
@@ -15,7 +15,7 @@ fn check(stage: &Stage, n_rays: u32) {
     let n = n_rays as usize;
     let rays = some_rays(stage, n_rays);
     let mut expected = vec![UNTOUCHED_HIT; stage.resources.queue.hits.len()];
-    let n_hits = cpu::trace::trace(&stage.bindings(), stage.options.traversal, &rays, &mut expected[..n]);
+    let n_hits = reference::trace::trace(&stage.bindings(), stage.options.traversal, &rays, &mut expected[..n]);
     stage.set_n_rays(&[n_rays]);
     stage.set_rays(&rays);
     stage.set_hits(&[]);
@@ -62,7 +62,7 @@ fn camera_rays_are_traced_by_their_places() {
     stage.set_hits(&[]);
     stage.trace(&batch, |commands, batch| stage.passes.trace.record(commands, &stage.resources, batch));
     let mut rays = [UNTOUCHED_RAY; 150];
-    cpu::primary_hit::primary_rays(stage.resources.constants(), batch.first_pixel, &mut rays);
+    reference::primary_hit::primary_rays(stage.resources.constants(), batch.first_pixel, &mut rays);
     let mut hits = super::stage::hits_of(&stage, &rays);
     hits.resize(250, UNTOUCHED_HIT);
     compare::hits(0, &hits, &stage.resources.queue.hits.download().expect("hits")).unwrap();

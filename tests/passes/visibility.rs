@@ -3,8 +3,13 @@
 
 use glam::{DVec2, dvec2, swizzles::Vec4Swizzles, uvec2, vec3};
 use kdray::{
-    cpu::{self, camera::pixel_of, primary_hit::camera_ray, traverser::Traverser},
     layout::{Batch, Frame, NO_TRIANGLE},
+    reference::{
+        self,
+        camera::pixel_of,
+        primary_hit::camera_ray,
+        traverser::{Tracer, Traverser},
+    },
 };
 
 use super::stage::{FIRST, Stage, options};
@@ -34,7 +39,7 @@ fn rasterized(stage: &Stage) -> Vec<u32> {
 /// The same from the kd-tree.
 fn on_cpu(stage: &Stage) -> Vec<u32> {
     let mut ids = vec![0xdead; (stage.options.width * stage.options.height) as usize];
-    cpu::visibility::visibility(&stage.bindings(), stage.options.traversal, &mut ids);
+    reference::visibility::visibility(&stage.bindings(), stage.options.traversal, &mut ids);
     ids
 }
 

@@ -7,6 +7,7 @@ pub mod command;
 pub mod compare;
 pub mod display;
 pub mod meshes;
+pub mod packets;
 pub mod random;
 pub mod rays;
 pub mod scenes;
@@ -16,9 +17,9 @@ use std::sync::Arc;
 use glam::Vec3;
 use kdray::{
     accel::kdtree::{BuildOptions, Extras, KdTree},
-    cpu::{bindings::Bindings, brute, kdtree::near_scene, probe::Probe},
     gpu::{Context, ContextOptions, DeviceOverrides},
     layout::{Frame, Hit, NO_TRIANGLE, Ray, Triangle},
+    reference::{bindings::Bindings, brute, kdtree::near_scene, probe::Probe},
     scene::Scene,
     world::{Geometry, World},
 };

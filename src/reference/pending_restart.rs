@@ -2,9 +2,9 @@
 
 use super::{
     bindings::Bindings,
+    counting::table::Reads,
     kdtree::{Cell, TraversalRay, min},
     pending_mask::Mask,
-    table::Reads,
 };
 
 /// The way down to the cell's node.

@@ -6,8 +6,13 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::{
-    RAYS_PER_TASK, bindings::Bindings, light::sample_light, material::can_show, probe::Probe, surface::surface_at,
-    traverser::Traverser,
+    RAYS_PER_TASK,
+    bindings::Bindings,
+    light::sample_light,
+    material::can_show,
+    probe::Probe,
+    surface::surface_at,
+    traverser::{Tracer, Traverser},
 };
 use crate::{
     accel::kdtree::Traversal,
@@ -15,7 +20,7 @@ use crate::{
 };
 
 /// The segment to the light, or none where the surface turns its back on it or would not show it.
-pub(super) fn shadow_segment(bindings: &Bindings, ray: &Ray, hit: &Hit, light: &Light) -> Option<Ray> {
+pub(crate) fn shadow_segment(bindings: &Bindings, ray: &Ray, hit: &Hit, light: &Light) -> Option<Ray> {
     let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
     let to_light = sample_light(light, surface.point_world);
     // Not `<=`: a NaN is unlit.
@@ -38,9 +43,20 @@ pub fn shadow(
     (rays, hits): (&[Ray], &[Hit]),
     light_visibility: &mut [u32],
 ) -> u32 {
+    shadow_by::<Traverser>(bindings, traversal, places, (rays, hits), light_visibility)
+}
+
+/// Does what [`shadow`] does, by another tracer.
+pub fn shadow_by<T: Tracer>(
+    bindings: &Bindings,
+    traversal: Traversal,
+    places: &Range<usize>,
+    (rays, hits): (&[Ray], &[Hit]),
+    light_visibility: &mut [u32],
+) -> u32 {
     let (rays, hits) = (&rays[places.clone()], &hits[places.clone()]);
     let of_light = |(light, visibility): (&Light, &mut [u32])| -> u32 {
-        let of_task = |traverser: &mut Traverser, ((rays, hits), visibility): ((&[Ray], &[Hit]), &mut [u32])| {
+        let of_task = |traverser: &mut T, ((rays, hits), visibility): ((&[Ray], &[Hit]), &mut [u32])| {
             let mut n_tested = 0;
             let segments = rays.iter().zip(hits).zip(visibility).filter_map(|((ray, hit), visible)| {
                 *visible = LIGHT_UNTESTED;
@@ -49,7 +65,7 @@ pub fn shadow(
                 n_tested += 1;
                 Some((visible, Probe::from(&segment)))
             });
-            traverser.traverse_all::<true, _>(bindings, segments, |visible, hit| {
+            traverser.trace_all::<true, _>(bindings, segments, |visible, hit| {
                 *visible = if hit.triangle_ix == NO_TRIANGLE { LIGHT_LIT } else { LIGHT_SHADOWED };
             });
             n_tested
@@ -57,7 +73,7 @@ pub fn shadow(
         rays.par_chunks(RAYS_PER_TASK)
             .zip(hits.par_chunks(RAYS_PER_TASK))
             .zip(visibility[places.clone()].par_chunks_mut(RAYS_PER_TASK))
-            .map_init(|| Traverser::new(traversal), of_task)
+            .map_init(|| T::new(traversal), of_task)
             .sum()
     };
     let stride = bindings.frame.queue_capacity as usize;

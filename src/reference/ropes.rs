@@ -2,10 +2,10 @@
 
 use super::{
     bindings::Bindings,
+    counting::table::Reads,
     kdtree::{TraversalRay, is_done, is_leaf, min},
     leaf::intersect_leaf,
     slab::slab_of,
-    table::Reads,
 };
 use crate::layout::{Hit, KdNode};
 

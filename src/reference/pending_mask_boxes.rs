@@ -2,8 +2,8 @@
 
 use super::{
     bindings::Bindings,
+    counting::table::Reads,
     kdtree::{Cell, Pending, TraversalRay, min},
-    table::Reads,
 };
 
 pub struct PendingMaskBoxes {

@@ -3,7 +3,13 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{RAYS_PER_TASK, bindings::Bindings, kdtree::min, probe::Probe, traverser::Traverser};
+use super::{
+    RAYS_PER_TASK,
+    bindings::Bindings,
+    kdtree::min,
+    probe::Probe,
+    traverser::{Tracer, Traverser},
+};
 use crate::{
     accel::{Query, kdtree::Traversal},
     layout::{CastRay, Hit, NO_TRIANGLE},
@@ -53,9 +59,9 @@ fn scaled(ray: &CastRay) -> Probe {
     if is_ray(ray) { scaled } else { nowhere }
 }
 
-fn cast_all<const ANY_HIT: bool>(bindings: &Bindings, traverser: &mut Traverser, rays: &[CastRay], hits: &mut [Hit]) {
+fn cast_all<const ANY_HIT: bool>(bindings: &Bindings, traverser: &mut impl Tracer, rays: &[CastRay], hits: &mut [Hit]) {
     let probes = rays.iter().zip(hits).map(|(ray, hit)| ((ray, hit), scaled(ray)));
-    traverser.traverse_all::<ANY_HIT, _>(bindings, probes, |(ray, hit), found| {
+    traverser.trace_all::<ANY_HIT, _>(bindings, probes, |(ray, hit), found| {
         let [scale, _] = scales_of(ray.direction);
         *hit = if found.triangle_ix == NO_TRIANGLE { MISS } else { Hit { t: found.t * scale, ..found } };
     });
@@ -63,8 +69,13 @@ fn cast_all<const ANY_HIT: bool>(bindings: &Bindings, traverser: &mut Traverser,
 
 /// Writes `hits`, one a ray.
 pub fn cast(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[CastRay], hits: &mut [Hit]) {
+    cast_by::<Traverser>(bindings, traversal, query, rays, hits);
+}
+
+/// Does what [`cast`] does, by another tracer.
+pub fn cast_by<T: Tracer>(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[CastRay], hits: &mut [Hit]) {
     rays.par_chunks(RAYS_PER_TASK).zip(hits.par_chunks_mut(RAYS_PER_TASK)).for_each_init(
-        || Traverser::new(traversal),
+        || T::new(traversal),
         |traverser, (rays, hits)| match query {
             Query::Closest => cast_all::<false>(bindings, traverser, rays, hits),
             Query::Any => cast_all::<true>(bindings, traverser, rays, hits),

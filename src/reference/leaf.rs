@@ -2,7 +2,9 @@
 
 use glam::{Mat4, Vec3A, Vec4};
 
-use super::{bindings::Bindings, kdtree::TraversalRay, probe::Probe, slab::Stretch, table::Reads, triangle::Shear};
+use super::{
+    bindings::Bindings, counting::table::Reads, kdtree::TraversalRay, probe::Probe, slab::Stretch, triangle::Shear,
+};
 use crate::layout::{Hit, KD_PAIR_SHIFT, KdNode, Plane};
 
 /// What tells a ray's hits from what it passes by.

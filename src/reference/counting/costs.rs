@@ -4,7 +4,13 @@
 
 use rayon::prelude::*;
 
-use super::{RAYS_PER_TASK, bindings::Bindings, shadow::shadow_segment, table::ReadCounts, traverser::Traverser};
+use super::table::ReadCounts;
+use crate::reference::{
+    RAYS_PER_TASK,
+    bindings::Bindings,
+    shadow::shadow_segment,
+    traverser::{Tracer, Traverser},
+};
 use crate::{
     accel::kdtree::Traversal,
     layout::{Feature, Hit, NO_TRIANGLE, Ray},

@@ -2,8 +2,8 @@
 
 use super::{
     bindings::Bindings,
+    counting::table::Reads,
     kdtree::{Cell, Pending, TraversalRay},
-    table::Reads,
 };
 use crate::layout::KD_MAX_DEPTH;
 

@@ -3,7 +3,12 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{RAYS_PER_TASK, bindings::Bindings, table::ReadCounts, traverser::Traverser};
+use super::table::ReadCounts;
+use crate::reference::{
+    RAYS_PER_TASK,
+    bindings::Bindings,
+    traverser::{Tracer, Traverser},
+};
 use crate::{
     accel::{Query, kdtree::Traversal},
     layout::Ray,

@@ -1,7 +1,7 @@
 //! Whether a ray keeps clear of the slab around a node's surface. Twin of `slab.glsl`; the planes of triangles are in `leaf.rs`,
 //! slabs for sixteen rays in `packet.rs`.
 
-use super::{bindings::Bindings, kdtree::TraversalRay, table::Reads};
+use super::{bindings::Bindings, counting::table::Reads, kdtree::TraversalRay};
 use crate::layout::{KD_IN_SLAB, KdNode, Slab};
 
 /// The node's slab, if it has one.

@@ -2,9 +2,9 @@
 
 use super::{
     bindings::Bindings,
+    counting::table::Reads,
     kdtree::{Cell, Pending, TraversalRay},
     pending_restart::Trail,
-    table::Reads,
 };
 
 /// The `N` newest entries (a power of two, or none) and the trail of all.

@@ -1,6 +1,6 @@
 //! What the kernels only read, under the kernels' names.
 
-use super::table::{Counted, ReadCounts, Table, Uncounted};
+use super::counting::table::{Counted, ReadCounts, Table, Uncounted};
 use crate::{
     accel::kdtree::{Extras, KdTree},
     layout::{Frame, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, Triangle},

@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::layout::{FLAT_NORMAL, Hit, Ray, Triangle};
+use crate::layout::{FLAT_NORMAL, Hit, LEAST_NORMAL_SQUARED, LEAST_WEIGHT, Ray, SURFACE_CLEARANCE, Triangle};
 
 /// Where a ray met a triangle.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +40,7 @@ fn shading_normal(t: &Triangle, hit: &Hit, geometric: Vec3) -> Vec3 {
     }
     let n = (1.0 - hit.u - hit.v) * decode_normal(t.n0) + hit.u * decode_normal(t.n1) + hit.v * decode_normal(t.n2);
     let squared = n.dot(n);
-    if squared > 1e-12 { n * (1.0 / squared.sqrt()) } else { geometric }
+    if squared > LEAST_NORMAL_SQUARED { n * (1.0 / squared.sqrt()) } else { geometric }
 }
 
 /// n with a non-negative component along `side`.
@@ -48,9 +48,9 @@ fn towards(n: Vec3, side: Vec3) -> Vec3 {
     if n.dot(side) < 0.0 { -n } else { n }
 }
 
-/// Barycentric weights of a point that is not on an edge, but 2^-16 of the triangle inside.
+/// Barycentric weights of a point that is not on an edge, but [`LEAST_WEIGHT`] of the triangle inside.
 fn inner_weights(hit: &Hit) -> Vec3 {
-    let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v).max(Vec3::splat(1.0 / 65_536.0));
+    let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v).max(Vec3::splat(LEAST_WEIGHT));
     weights / (weights.x + weights.y + weights.z)
 }
 
@@ -69,7 +69,7 @@ pub fn surface_at(ray: &Ray, hit: &Hit, t: &Triangle) -> Surface {
         point_world: weights.x * t.v0 + weights.y * t.v1 + weights.z * t.v2,
         geometric,
         shading: towards(shading_normal(t, hit, outward), geometric),
-        clearance: 2f32.powi(-18) * magnitude.dot(geometric.abs()),
+        clearance: SURFACE_CLEARANCE * magnitude.dot(geometric.abs()),
         from_inside,
     }
 }

@@ -47,11 +47,11 @@ use crate::layout::{Hit, Triangle};
 #[derive(Clone, Copy, Debug)]
 pub struct Shear {
     /// Cyclic, so that winding is kept: the axis after the longest one first, the longest one last.
-    pub(super) origin: [f32; 3],
-    pub(super) x: f32,
-    pub(super) y: f32,
-    pub(super) z: f32,
-    pub(super) axis: usize,
+    pub(crate) origin: [f32; 3],
+    pub(crate) x: f32,
+    pub(crate) y: f32,
+    pub(crate) z: f32,
+    pub(crate) axis: usize,
 }
 
 /// A triangle's corners seen from a ray, as columns: the test treats all three alike, at once. Fourth lanes are void.
@@ -64,7 +64,7 @@ struct Corners {
 
 /// v with component `axis` last.
 #[inline(always)]
-pub(super) fn axis_last<T: Copy>([x, y, z]: [T; 3], axis: usize) -> [T; 3] {
+pub(crate) fn axis_last<T: Copy>([x, y, z]: [T; 3], axis: usize) -> [T; 3] {
     match axis {
         0 => [y, z, x],
         1 => [z, x, y],
@@ -158,7 +158,7 @@ fn product_errors(a: Vec4, b: Vec4) -> Vec4 {
 }
 
 /// Where edge functions have a smaller sum, 2^-90, the errors of their products may underflow.
-pub(super) const LEAST_EXACT_SUM: f32 = f32::from_bits((127 - 90) << 23);
+pub(crate) const LEAST_EXACT_SUM: f32 = f32::from_bits((127 - 90) << 23);
 
 /// Returns the edge functions, each right to 2^-23 of itself.
 #[inline(always)]

@@ -3,20 +3,31 @@
 
 use rayon::prelude::*;
 
-use super::{RAYS_PER_TASK, bindings::Bindings, primary_hit::camera_ray, probe::Probe, traverser::Traverser};
+use super::{
+    RAYS_PER_TASK,
+    bindings::Bindings,
+    primary_hit::camera_ray,
+    probe::Probe,
+    traverser::{Tracer, Traverser},
+};
 use crate::accel::kdtree::Traversal;
 
 /// Writes `triangle_ids` (`width * height`, rows from the top): the nearest triangle, or `NO_TRIANGLE`.
 pub fn visibility(bindings: &Bindings, traversal: Traversal, triangle_ids: &mut [u32]) {
+    visibility_by::<Traverser>(bindings, traversal, triangle_ids);
+}
+
+/// Does what [`visibility`] does, by another tracer.
+pub fn visibility_by<T: Tracer>(bindings: &Bindings, traversal: Traversal, triangle_ids: &mut [u32]) {
     let width = bindings.frame.width;
     triangle_ids.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each_init(
-        || Traverser::new(traversal),
+        || T::new(traversal),
         |traverser, (task, ids)| {
             let probes = (task * RAYS_PER_TASK..).map(|pixel_ix| {
                 let pixel = glam::uvec2(pixel_ix as u32 % width, pixel_ix as u32 / width);
                 Probe::from(&camera_ray(bindings.frame, pixel))
             });
-            traverser.traverse_all::<false, _>(bindings, ids.iter_mut().zip(probes), |id, hit| *id = hit.triangle_ix);
+            traverser.trace_all::<false, _>(bindings, ids.iter_mut().zip(probes), |id, hit| *id = hit.triangle_ix);
         },
     );
 }

@@ -2,8 +2,8 @@
 
 use super::{
     bindings::Bindings,
+    counting::table::Reads,
     kdtree::{TraversalRay, max, min},
-    table::Reads,
 };
 
 /// Where a ray meets the planes of a node's cell on each axis: those it comes to first, and the far ones.

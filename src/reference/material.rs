@@ -3,7 +3,9 @@
 use glam::Vec3;
 
 use super::surface::Surface;
-use crate::layout::{MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR, Material};
+use crate::layout::{
+    LEAST_COSINE, LEAST_REFLECTANCE, MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR, Material,
+};
 
 /// Where light goes on from a surface, and what share of it. A weight of zero: no ray.
 #[derive(Clone, Copy, Debug)]
@@ -43,9 +45,6 @@ pub fn phong(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3)
     }
     reflectance
 }
-
-/// Below, a reflectance shows nowhere: 2^-64.
-const LEAST_REFLECTANCE: f32 = 5.421_011e-20;
 
 /// Whether a light from there can be seen in the surface.
 pub fn can_show(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3) -> bool {
@@ -91,7 +90,7 @@ pub fn scatter(material: &Material, surface: &Surface, direction: Vec3) -> Scatt
     }
     let eta = if surface.from_inside { material.ni } else { 1.0 / material.ni };
     // An interpolated normal can turn away from the viewer: grazing then.
-    let cos_in = surface.shading.dot(-direction).max(1e-4);
+    let cos_in = surface.shading.dot(-direction).max(LEAST_COSINE);
     let cos_out = refraction_cosine(cos_in, eta);
     let total = refracts && cos_out <= 0.0;
     let has_fresnel = material.flags & MATERIAL_FRESNEL != 0;

@@ -4,14 +4,17 @@ use glam::{Vec3, Vec3A};
 
 use super::{
     bindings::Bindings,
+    counting::table::Reads,
     leaf::{Target, intersect_leaf},
     probe::Probe,
     slab::slab_of,
-    table::Reads,
 };
 use crate::{
     accel::kdtree::EMPTY_LEAF,
-    layout::{Hit, KD_AXIS_MASK, KD_LEAF, KD_ORIGIN_REACH, KD_PAIR_SHIFT, KD_PLANE_REACH, KdNode, NO_TRIANGLE},
+    layout::{
+        Hit, KD_AXIS_MASK, KD_LEAF, KD_LEAST_COMPONENT, KD_ORIGIN_REACH, KD_PAIR_SHIFT, KD_PLANE_REACH, KdNode,
+        NO_TRIANGLE,
+    },
 };
 
 /// A node and the interval that the ray spends in it.
@@ -49,13 +52,10 @@ pub fn max(x: f32, y: f32) -> f32 {
     if x < y { y } else { x }
 }
 
-/// A component of less magnitude is taken as this: finite everywhere, and one rule for all ties.
-pub const FLAT: f32 = 1e-12;
-
 /// Bit i: on axis i, the ray comes to the upper child first.
 #[inline(always)]
 pub fn signs_of(direction: Vec3) -> u32 {
-    let is_below = |d: f32| u32::from(d <= -FLAT);
+    let is_below = |d: f32| u32::from(d <= -KD_LEAST_COMPONENT);
     is_below(direction.x) | is_below(direction.y) << 1 | is_below(direction.z) << 2
 }
 
@@ -65,7 +65,8 @@ impl TraversalRay {
         let origin = ray.origin.to_array();
         let cell_min = bindings.frame.cell_min.to_array();
         let cell_max = bindings.frame.cell_max.to_array();
-        let direction = ray.direction.to_array().map(|d| if d.abs() < FLAT { FLAT } else { d });
+        let direction =
+            ray.direction.to_array().map(|d| if d.abs() < KD_LEAST_COMPONENT { KD_LEAST_COMPONENT } else { d });
         let inv_direction = direction.map(|d| 1.0 / d);
         let bias = [0, 1, 2].map(|i| -origin[i] * inv_direction[i]);
         let t0 = [0, 1, 2].map(|i| cell_min[i] * inv_direction[i] + bias[i]);
@@ -198,13 +199,13 @@ fn descend<P: Pending>(
 }
 
 #[inline(always)]
-pub(super) fn is_done<const ANY_HIT: bool>(best: &Hit) -> bool {
+pub(crate) fn is_done<const ANY_HIT: bool>(best: &Hit) -> bool {
     ANY_HIT && best.triangle_ix != NO_TRIANGLE
 }
 
 /// All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
 #[inline(always)]
-pub(super) fn search<P: Pending, const ANY_HIT: bool>(
+pub(crate) fn search<P: Pending, const ANY_HIT: bool>(
     bindings: &Bindings<impl Reads>,
     ray: &TraversalRay,
     pending: &mut P,
@@ -219,7 +220,7 @@ pub(super) fn search<P: Pending, const ANY_HIT: bool>(
 
 /// As [`search`], in a cell that the ray is in.
 #[inline(always)]
-pub(super) fn search_cell<P: Pending, const ANY_HIT: bool>(
+pub(crate) fn search_cell<P: Pending, const ANY_HIT: bool>(
     bindings: &Bindings<impl Reads>,
     ray: &TraversalRay,
     pending: &mut P,

@@ -2,13 +2,13 @@
 
 use glam::Vec3;
 
-use super::{packet::LANES, probe::Probe};
-use crate::layout::Hit;
+use super::packet::LANES;
+use crate::{layout::Hit, reference::probe::Probe};
 
 /// The rays of a packet.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
-pub struct ProbeColumns {
+pub struct RaysSoa {
     pub origin: [[f32; LANES]; 3],
     pub direction: [[f32; LANES]; 3],
     pub t_min: [f32; LANES],
@@ -19,14 +19,14 @@ pub struct ProbeColumns {
 /// The hits of a packet.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(align(64))]
-pub struct HitColumns {
+pub struct HitsSoa {
     pub t: [f32; LANES],
     pub triangle_ix: [u32; LANES],
     pub u: [f32; LANES],
     pub v: [f32; LANES],
 }
 
-impl ProbeColumns {
+impl RaysSoa {
     #[inline(always)]
     pub fn set(&mut self, lane: usize, probe: &Probe) {
         for axis in 0..3 {
@@ -57,7 +57,7 @@ impl ProbeColumns {
     }
 }
 
-impl HitColumns {
+impl HitsSoa {
     #[inline(always)]
     pub fn set(&mut self, lane: usize, hit: &Hit) {
         self.t[lane] = hit.t;

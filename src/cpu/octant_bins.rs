@@ -1,0 +1,46 @@
+//! Bins that collect rays of one octant until they are a packet. Rays whose directions have the same signs come to the two
+//! children of any node in the same order.
+
+use arrayvec::ArrayVec;
+
+use super::{packet::LANES, soa::RaysSoa};
+use crate::reference::{kdtree::signs_of, probe::Probe};
+
+/// Rays of one octant, at most as many as a packet has, each with the key that its hit is reported by.
+pub struct Bin<Key> {
+    pub rays: RaysSoa,
+    pub keys: ArrayVec<Key, LANES>,
+}
+
+impl<Key> Default for Bin<Key> {
+    fn default() -> Self {
+        Self { rays: RaysSoa::default(), keys: ArrayVec::new() }
+    }
+}
+
+/// One bin for each octant.
+pub struct OctantBins<Key> {
+    octants: [Bin<Key>; 8],
+}
+
+impl<Key> Default for OctantBins<Key> {
+    fn default() -> Self {
+        Self { octants: Default::default() }
+    }
+}
+
+impl<Key> OctantBins<Key> {
+    /// Adds a ray to the bin of its octant. Returns the bin if it is full now; the caller has to empty it.
+    #[inline(always)]
+    pub fn push(&mut self, key: Key, probe: &Probe) -> Option<&mut Bin<Key>> {
+        let octant = &mut self.octants[signs_of(probe.direction) as usize & 7];
+        octant.rays.set(octant.keys.len(), probe);
+        octant.keys.push(key);
+        octant.keys.is_full().then_some(octant)
+    }
+
+    /// The bins that hold rays.
+    pub fn rest(&mut self) -> impl Iterator<Item = &mut Bin<Key>> {
+        self.octants.iter_mut().filter(|octant| !octant.keys.is_empty())
+    }
+}

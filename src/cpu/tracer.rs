@@ -1,0 +1,81 @@
+//! The engine's tracer: with a stack, rays of one octant go through the tree as packets; by any other algorithm, one
+//! after the other.
+
+use fearless_simd::Level;
+
+use super::{
+    octant_bins::{Bin, OctantBins},
+    packet_traverser::PacketTraverser,
+};
+use crate::{
+    accel::kdtree::Traversal,
+    layout::Hit,
+    reference::{
+        bindings::Bindings,
+        counting::table::Reads,
+        kdtree::{TraversalRay, hit_from_near},
+        probe::Probe,
+        traverser::{Tracer, Traverser},
+    },
+};
+
+/// A thread's tracer.
+#[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
+pub enum FastTracer {
+    /// [`Traversal::Stack`].
+    Packets(PacketTraverser),
+    /// All other algorithms.
+    Single(Traverser),
+}
+
+impl FastTracer {
+    /// Uses the instructions of a level, which the machine must have. The hits are the same at every level, bit for
+    /// bit.
+    pub fn at_level(traversal: Traversal, level: Level) -> Self {
+        match traversal {
+            Traversal::Stack => Self::Packets(PacketTraverser::new(level)),
+            other => Self::Single(Traverser::new(other)),
+        }
+    }
+
+    /// Finds one ray's hit, as [`Traverser::traverse`] does.
+    #[inline]
+    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl Reads>, probe: &Probe) -> Hit {
+        match self {
+            Self::Packets(packets) => hit_from_near(bindings, probe, |near, best| {
+                packets.traverse_alone::<ANY_HIT>(bindings, &TraversalRay::new(bindings, near), best);
+            }),
+            Self::Single(traverser) => traverser.traverse::<ANY_HIT>(bindings, probe),
+        }
+    }
+}
+
+impl Tracer for FastTracer {
+    fn new(traversal: Traversal) -> Self {
+        Self::at_level(traversal, Level::new())
+    }
+
+    #[inline]
+    fn trace_all<const ANY_HIT: bool, Key>(
+        &mut self,
+        bindings: &Bindings<impl Reads>,
+        probes: impl Iterator<Item = (Key, Probe)>,
+        mut found: impl FnMut(Key, Hit),
+    ) {
+        let packets = match self {
+            Self::Packets(packets) => packets,
+            Self::Single(traverser) => return traverser.trace_all::<ANY_HIT, Key>(bindings, probes, found),
+        };
+        let mut bins = OctantBins::default();
+        let mut traverse = |Bin { rays, keys }: &mut Bin<Key>| {
+            let hits = packets.traverse::<ANY_HIT>(bindings, rays, keys.len());
+            keys.drain(..).enumerate().for_each(|(lane, key)| found(key, hits.get(lane)));
+        };
+        for (key, probe) in probes {
+            if let Some(packet) = bins.push(key, &probe) {
+                traverse(packet);
+            }
+        }
+        bins.rest().for_each(traverse);
+    }
+}

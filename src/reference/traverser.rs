@@ -1,0 +1,92 @@
+//! The algorithms that take rays through the tree, behind one interface: one ray after the other.
+
+use super::{
+    bindings::Bindings,
+    brute,
+    counting::table::Reads,
+    kdtree::{Pending, TraversalRay, hit_from_near, search},
+    pending_backtrack::PendingBacktrack,
+    pending_mask::PendingMask,
+    pending_mask_boxes::PendingMaskBoxes,
+    pending_short_stack::PendingMarked,
+    pending_stack::PendingStack,
+    probe::Probe,
+    ropes::follow_ropes,
+};
+use crate::{
+    accel::kdtree::Traversal,
+    layout::{Hit, SHORT_STACK_SIZE},
+};
+
+/// What finds the hits of many rays; each thread has one of its own.
+pub trait Tracer {
+    /// A tracer by an algorithm.
+    fn new(traversal: Traversal) -> Self;
+
+    /// Tells `found` each ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest, in
+    /// any order. A miss keeps t = t_max.
+    fn trace_all<const ANY_HIT: bool, Key>(
+        &mut self,
+        bindings: &Bindings<impl Reads>,
+        probes: impl Iterator<Item = (Key, Probe)>,
+        found: impl FnMut(Key, Hit),
+    );
+}
+
+/// An algorithm with its working memory, which is kept from ray to ray.
+pub enum Traverser {
+    Mask(PendingMask),
+    MaskBoxes(PendingMaskBoxes),
+    Restart(PendingMarked<0>),
+    Backtrack(PendingBacktrack),
+    ShortStack(PendingMarked<{ SHORT_STACK_SIZE as usize }>),
+    Ropes,
+    Stack(PendingStack),
+    Brute,
+}
+
+impl Traverser {
+    /// Finds a ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps
+    /// t = t_max.
+    #[inline]
+    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl Reads>, probe: &Probe) -> Hit {
+        hit_from_near(bindings, probe, |near, best| {
+            let ray = &TraversalRay::new(bindings, near);
+            match self {
+                Self::Mask(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
+                Self::MaskBoxes(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
+                Self::Restart(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
+                Self::Backtrack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
+                Self::ShortStack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
+                Self::Stack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
+                Self::Ropes => follow_ropes::<ANY_HIT>(bindings, ray, best),
+                Self::Brute => *best = brute::closest_hit(bindings.triangles, near),
+            }
+        })
+    }
+}
+
+impl Tracer for Traverser {
+    fn new(traversal: Traversal) -> Self {
+        match traversal {
+            Traversal::Mask => Self::Mask(Pending::new()),
+            Traversal::MaskBoxes => Self::MaskBoxes(Pending::new()),
+            Traversal::Restart => Self::Restart(Pending::new()),
+            Traversal::Backtrack => Self::Backtrack(Pending::new()),
+            Traversal::ShortStack => Self::ShortStack(Pending::new()),
+            Traversal::Ropes => Self::Ropes,
+            Traversal::Stack => Self::Stack(Pending::new()),
+            Traversal::Brute => Self::Brute,
+        }
+    }
+
+    #[inline]
+    fn trace_all<const ANY_HIT: bool, Key>(
+        &mut self,
+        bindings: &Bindings<impl Reads>,
+        probes: impl Iterator<Item = (Key, Probe)>,
+        mut found: impl FnMut(Key, Hit),
+    ) {
+        probes.for_each(|(key, probe)| found(key, self.traverse::<ANY_HIT>(bindings, &probe)));
+    }
+}

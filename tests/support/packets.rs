@@ -1,0 +1,35 @@
+//! Rays that go through the tree as packets.
+
+use fearless_simd::{Level, Simd};
+use kdray::{
+    accel::kdtree::Traversal,
+    cpu::tracer::FastTracer,
+    layout::{Hit, Ray},
+    reference::{probe::Probe, traverser::Tracer},
+};
+
+use super::MeshWithTree;
+
+/// The sets of instructions that the machine has, the baseline first.
+pub fn levels() -> Vec<Level> {
+    let mut levels = vec![Level::baseline()];
+    #[cfg(target_arch = "x86_64")]
+    {
+        let best = Level::new();
+        levels.extend(best.as_sse4_2().map(Simd::level));
+        levels.extend(best.as_avx2().map(Simd::level));
+        levels.extend(best.as_avx512().map(Simd::level));
+    }
+    levels
+}
+
+/// The hits of rays that go as packets, with the instructions of a level.
+pub fn traced<const ANY_HIT: bool>(world: &MeshWithTree, level: Level, rays: &[Ray]) -> Vec<Hit> {
+    let mut hits = vec![None; rays.len()];
+    let probes = hits.iter_mut().zip(rays.iter().map(Probe::from));
+    let mut tracer = FastTracer::at_level(Traversal::Stack, level);
+    tracer.trace_all::<ANY_HIT, _>(&world.bindings(), probes, |place, hit| {
+        assert_eq!(place.replace(hit), None, "a ray has one hit");
+    });
+    hits.into_iter().map(|hit| hit.expect("a ray has a hit")).collect()
+}
