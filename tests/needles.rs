@@ -1,5 +1,5 @@
 //! Hits of needles and other narrow triangles: t, and the point that the weights name, against the bounds that the
-//! documentation of `cpu::triangle` proves.
+//! documentation of `reference::triangle` proves.
 
 mod support;
 

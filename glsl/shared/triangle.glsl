@@ -107,7 +107,7 @@ vec3 exact_edges(vec3 edges, vec3 errors) {
     return abs(sum_of(exact)) < LEAST_EXACT_SUM ? with_exact_signs(edges, errors) : exact;
 }
 
-// Returns t and barycentric weights from edge functions whose sum is not 0. src/cpu/triangle.rs proves how far off they
+// Returns t and barycentric weights from edge functions whose sum is not 0. src/reference/triangle.rs proves how far off they
 // are.
 Hit weighted_hit(Shear shear, vec3 edges, vec3 z, uint triangle_ix) {
     precise float inv_det = 1.0 / sum_of(edges);

@@ -10,7 +10,7 @@ use crate::layout::Triangle;
 /// Proof: let m be the largest coordinate, u = 2^-24, and |o| <= 4 m (`KD_ORIGIN_REACH`) where the ray starts. With
 /// divisions right to 2.5 units in the last place, as Vulkan has them, a plane's crossing at p is off by u (|o| + |p| +
 /// 6 |p - o|) <= 35 u m in space. The point at a hit's t is off the triangle by u (11.5 D + 14 L) on each axis, as
-/// `cpu::triangle` proves. D, from o to the farthest corner, is at most 5 m, and L, between two corners, at most 2 m,
+/// `reference::triangle` proves. D, from o to the farthest corner, is at most 5 m, and L, between two corners, at most 2 m,
 /// so this is 85.5 u m. Together it is 120.5 u m, of 128.
 pub const MARGIN: f32 = 1.0 / (1 << 17) as f32;
 
