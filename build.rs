@@ -1,5 +1,8 @@
-//! Compiles `glsl/{passes,probes,driver}/*` to SPIR-V and turns `glsl/shared/layout.glsl` into Rust, both into `$OUT_DIR`.
+//! Compiles `glsl/{passes,probes,driver}/*` to SPIR-V and turns `glsl/shared/{layout,scene_arrays}.glsl` into Rust, both
+//! into `$OUT_DIR`.
 
+#[path = "src/layout/scene_arrays.rs"]
+mod scene_arrays;
 #[path = "src/layout/specialization.rs"]
 mod specialization;
 
@@ -21,12 +24,11 @@ fn main() {
         println!("cargo::rustc-env=KDRAY_SHADER_COMPILER={}", compiler.display());
     }
 
-    let layout = fs::read_to_string("glsl/shared/layout.glsl").expect("glsl/shared/layout.glsl");
-    let constants = constants_of_shaders(&layout).unwrap_or_else(|error| {
+    let layout = layout_in_rust().unwrap_or_else(|error| {
         println!("cargo::error={error}");
         std::process::exit(1);
     });
-    fs::write(out_dir.join("layout.rs"), rust_layout(&layout) + &constants).expect("write layout.rs");
+    fs::write(out_dir.join("layout.rs"), layout).expect("write layout.rs");
 
     let compiler = shaderc::Compiler::new().expect("shaderc");
     for path in shaders_in_order() {
@@ -43,6 +45,15 @@ fn main() {
             }
         }
     }
+}
+
+/// All that shaders and Rust share, as Rust.
+fn layout_in_rust() -> Result<String, String> {
+    let read = |path: &str| fs::read_to_string(path).map_err(|error| format!("{path}: {error}"));
+    let layout = read("glsl/shared/layout.glsl")?;
+    let arrays = scene_arrays::rows(&read("glsl/shared/scene_arrays.glsl")?)?;
+    scene_arrays::check_bindings(&arrays, &layout)?;
+    Ok(rust_layout(&layout, &arrays) + &scene_arrays::rust(&arrays) + &constants_of_shaders(&layout)?)
 }
 
 /// The specialization constants of all shaders as Rust; includes count as parts of the shaders.
@@ -120,7 +131,7 @@ fn compile(compiler: &shaderc::Compiler, path: &Path, name: &str) -> Result<Vec<
 }
 
 /// Rust constants and structs for layout.glsl. Panics on a member that std430 would pad.
-fn rust_layout(glsl: &str) -> String {
+fn rust_layout(glsl: &str, arrays: &[scene_arrays::Row]) -> String {
     let mut rust = String::new();
     let mut doc = String::new();
     let mut structs = String::new(); // the same again as data, for the test against SPIR-V
@@ -131,7 +142,21 @@ fn rust_layout(glsl: &str) -> String {
             continue;
         }
         if let Some((name, offset, widest)) = layout.as_mut() {
-            if line == "};" {
+            if line == "#include \"scene_arrays.glsl\"" {
+                for scene_arrays::Row { name: array, .. } in arrays {
+                    assert_eq!(*offset % 8, 0, "layout.glsl: std430 pads {name}.{array} (offset {offset})");
+                    writeln!(rust, "    pub {array}: [u32; 2],").unwrap();
+                    write!(structs, "(\"[u32; 2]\", std::mem::offset_of!({name}, {array})),").unwrap();
+                    *offset += 8;
+                }
+                // However many arrays there are, the struct ends where GLSL's does.
+                if *offset % *widest != 0 {
+                    writeln!(rust, "    pub reserved: [u32; 2],").unwrap();
+                    *offset += 8;
+                }
+            } else if line.starts_with('#') {
+                // ARRAY, as GLSL sees it.
+            } else if line == "};" {
                 assert_eq!(*offset % *widest, 0, "layout.glsl: std430 pads the end of {name} ({offset} bytes)");
                 writeln!(rust, "}}\nconst _: () = assert!(size_of::<{name}>() == {offset});").unwrap();
                 write!(structs, "]),").unwrap();

@@ -53,7 +53,7 @@ struct Walker {
 /// A stage's kernel on the rays of a set.
 fn walker(context: &Arc<Context>, stage: &Stage, set: &RaySet, traversal: Traversal) -> Box<dyn Contender> {
     let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
-    let tree = AccelBuffers::new(context, stage.world.geometry(), &stage.frame).expect("a tree");
+    let tree = AccelBuffers::new(context, stage.world.geometry()).expect("a tree");
     let bindings = CastResources::bindings(context, &tree).expect("bindings");
     let resources = CastResources::new(context, &bindings, &tree, set.rays.len()).expect("resources");
     let cast = |ray: &kdray::layout::Ray| CastRay {

@@ -62,9 +62,9 @@ struct Traced {
 
 fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], traversal: Traversal) -> Traced {
     let options = RenderOptions { width: 8, height: 8, max_depth: 1, traversal, ..RenderOptions::default() };
-    let constants = Frame { queue_capacity: rays.len() as u32, ..frame_constants(scene, tree, &options) };
-    let needs = Needs { constants: &constants, options: &options, n_bounces: 1 };
     let world = World::with_tree(scene.clone(), tree.clone(), &BuildOptions::default()).expect("a world");
+    let constants = Frame { queue_capacity: rays.len() as u32, ..frame_constants(&world, &options) };
+    let needs = Needs { constants: &constants, options: &options, n_bounces: 1 };
     let resources = Resources::new(context, &world, &needs).expect("resources");
     let passes = Passes::new(context, &resources.bindings, &options).expect("passes");
     resources.queue.rays.upload(rays).expect("rays");

@@ -25,7 +25,7 @@ void main() {
         return; // the vectors were cleared
     }
     Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
-    uint material_ix = triangle_material_at(hit.triangle_ix);
+    uint material_ix = load_triangle_materials(hit.triangle_ix);
     pixel_features[pixel_ix].position_world = surface.point_world;
     pixel_features[pixel_ix].normal_world = surface.shading;
     pixel_features[pixel_ix].material_ix = material_ix;

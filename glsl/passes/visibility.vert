@@ -12,6 +12,6 @@ layout(location = 0) flat out uint triangle_ix;
 
 void main() {
     triangle_ix = uint(gl_VertexIndex) / 3u;
-    vec3 position_world = triangle_row(uint(gl_VertexIndex)).xyz;
+    vec3 position_world = load_triangles(uint(gl_VertexIndex)).xyz;
     gl_Position = frame.clip_from_world * vec4(position_world, 1.0);
 }

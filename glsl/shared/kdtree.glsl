@@ -7,7 +7,6 @@
 #define KDRAY_KDTREE
 
 #include "layout.glsl"
-#include "frame.glsl"
 #include "scene.glsl"
 #include "stalls.glsl"
 #include "steps.glsl"
@@ -54,8 +53,8 @@ TraversalRay traversal_ray(Ray ray, float t_min) {
     vec3 tiny = vec3(KD_LEAST_COMPONENT);
     r.inv_direction = 0.5 / mix(ray.direction, tiny, lessThan(abs(ray.direction), tiny));
     r.bias = -ray.origin * r.inv_direction;
-    precise vec3 t0 = fma(frame.cell_min, r.inv_direction, r.bias);
-    precise vec3 t1 = fma(frame.cell_max, r.inv_direction, r.bias);
+    precise vec3 t0 = fma(accel.cell_min, r.inv_direction, r.bias);
+    precise vec3 t1 = fma(accel.cell_max, r.inv_direction, r.bias);
     vec3 near = min(t0, t1);
     vec3 far = max(t0, t1);
     r.t_enter = max(max(near.x, near.y), max(near.z, 0.5 * t_min));
@@ -74,7 +73,7 @@ Cell whole(TraversalRay ray) {
 }
 
 float largest_coordinate() {
-    vec3 largest = max(abs(frame.cell_min), abs(frame.cell_max));
+    vec3 largest = max(abs(accel.cell_min), abs(accel.cell_max));
     return max(largest.x, max(largest.y, largest.z));
 }
 
@@ -111,7 +110,7 @@ uint sibling_of(uint node_at) {
 KdNode kd_node(uint node_at) {
     count_steps(1u);
     count_turn();
-    return kd_node_of(index_of(node_at));
+    return kd_node_at(index_of(node_at));
 }
 
 bool is_leaf(KdNode node) {
@@ -286,7 +285,7 @@ bool find_candidate(TraversalRay ray, inout Visit visit, out uint entry_ix) {
         count_turn();
         entry_ix = visit.entry_ix;
         visit.entry_ix += 1u;
-        if (!is_clear(ray, visit.way, leaf_plane_at(entry_ix), frame.plane_reach)) return true;
+        if (!is_clear(ray, visit.way, load_leaf_planes(entry_ix), accel.plane_epsilon)) return true;
     }
     return false;
 }

@@ -45,7 +45,7 @@
 #define KD_ORIGIN_REACH 4.0
 // Times the scene's largest coordinate: a ray that keeps this far from a triangle's plane within a leaf has no hit there.
 // Twice the tree's margin: kdtree/planes.rs counts what rounding does to hits, planes and a ray's distance to a plane.
-#define KD_PLANE_REACH 0.000015258789
+#define KD_PLANE_EPSILON 0.000015258789
 // A direction's component of less magnitude is taken as this: inverse directions are finite everywhere, and rays in a split
 // plane have one rule. For unit directions it is far below one rounding of a direction, 2^-24.
 #define KD_LEAST_COMPONENT 1.0e-12
@@ -232,8 +232,7 @@ struct Hit {
 //         + (1 - 2 (window_y + y + sample_y) / picture_height) * up.
 // clip_from_world is the whole picture's, moved so that the sample lies in the middle of its pixel.
 // n_samples: how many samples a pixel there are with this frame's.
-// plane_reach: KD_PLANE_REACH in world units. n_lanes: lanes that the device has, to be shared out among fewer rays; 0: each
-// ray gets one.
+// n_lanes: lanes that the device has, to be shared out among fewer rays; 0: each ray gets one.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -248,9 +247,7 @@ struct Frame {
     float exposure;
     vec3 background;
     float denoise_threshold;
-    vec3 cell_min;
     uint max_depth;
-    vec3 cell_max;
     uint queue_capacity;
     uint picture_width;
     uint picture_height;
@@ -259,11 +256,9 @@ struct Frame {
     float sample_x;
     float sample_y;
     uint n_samples;
-    float plane_reach;
     uint n_lanes;
     uint reserved0;
     uint reserved1;
-    uint reserved2;
 };
 
 // One a batch and bounce, 80 bytes, sized by the bounce before: each `groups` is a VkDispatchIndirectCommand. trace and shadow
@@ -324,18 +319,18 @@ struct Feature {
     uint reserved1;
 };
 
-// Where the buffers of these names lie on the device, low word first (a uniform buffer): for kernels that read them by
-// address, as scene.glsl says. Zeros where they are bound.
-struct Addresses {
-    uvec2 triangles;
-    uvec2 triangle_materials;
-    uvec2 kd_nodes;
-    uvec2 kd_parents;
-    uvec2 leaf_triangles;
-    uvec2 leaf_planes;
-    uvec2 kd_slabs;
-    uvec2 kd_boxes;
-    uvec2 kd_ropes;
+// What kernels know of the scene's triangles and acceleration structure beside the arrays (a uniform buffer).
+// cell_min, cell_max: the box that holds all triangles, with the structure's rounding margin (world units).
+// plane_epsilon: KD_PLANE_EPSILON in world units. n_triangles: the scene's triangles.
+// Then the device address of each of the scene's arrays, low word first; 0 where kernels read the array by its binding.
+struct AccelConstants {
+    vec3 cell_min;
+    float plane_epsilon;
+    vec3 cell_max;
+    uint n_triangles;
+#define ARRAY(name, element, row, number) uvec2 name;
+#include "scene_arrays.glsl"
+#undef ARRAY
 };
 
 // Specialization constants. Each has one number, one type and one meaning in all kernels. A kernel that uses one declares it
@@ -441,15 +436,10 @@ struct DriverCast {
     uint scenery_high;
 };
 
-// Bindings of the frame's descriptor set.
+// Bindings of the frame's descriptor set. scene_arrays.glsl has those of the scene's arrays.
 #define BIND_FRAME 0u
-#define BIND_TRIANGLES 1u
-#define BIND_TRIANGLE_MATERIALS 2u
 #define BIND_MATERIALS 3u
 #define BIND_LIGHTS 4u
-#define BIND_KD_NODES 5u
-#define BIND_KD_PARENTS 6u
-#define BIND_LEAF_TRIANGLES 7u
 #define BIND_RAYS 8u
 #define BIND_CHILD_KINDS 9u
 #define BIND_FIRST_CHILDREN 10u
@@ -463,13 +453,9 @@ struct DriverCast {
 #define BIND_PIXEL_DISPLAY 18u
 #define BIND_TRIANGLE_IDS 19u
 #define BIND_COUNTERS 20u
-#define BIND_KD_BOXES 21u
-#define BIND_KD_ROPES 22u
-#define BIND_LEAF_PLANES 23u
 #define BIND_PIXEL_ACCUMULATED 24u
 #define BIND_PIXEL_FEATURES 25u
-#define BIND_ADDRESSES 26u
-#define BIND_KD_SLABS 27u
+#define BIND_ACCEL 26u
 #define BIND_PIXEL_NEAREST 28u
 #define BIND_RASTER_GROUPS 29u
 #define BIND_RASTER_COUNT 30u
@@ -477,10 +463,10 @@ struct DriverCast {
 #define BIND_STALLS 32u
 #define N_BINDINGS 33u
 
-// The same buffers of triangles and tree as texels: each at this and its own binding.
+// The scene's arrays as texels: each at this plus its own binding.
 #define BIND_TEXELS 64u
 
-// A cast's descriptor set has these and what the traversal reads: the frame, the triangles, the tree.
+// A cast's descriptor set has these and what the traversal reads: the scene's arrays and AccelConstants.
 #define BIND_CAST_RAYS 33u
 #define BIND_CAST_HITS 34u
 

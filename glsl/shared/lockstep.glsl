@@ -7,14 +7,14 @@
 // lavapipe (Mesa 22.3) would otherwise take what a loop leaves behind from its last turn, for lanes that left it before as
 // well.
 
-// As `find_candidate`; the candidate is the entry before the visit's. reach: frame.plane_reach. To load it in each turn takes
+// As `find_candidate`; the candidate is the entry before the visit's. reach: accel.plane_epsilon. To load it in each turn takes
 // lavapipe 23 instructions of 145.
 bool find_candidate_in_step(TraversalRay ray, float reach, inout Visit visit) {
     bool found = false;
     bool looks = visit.entry_ix < visit.end_ix && has_turns();
     while (looks) {
         count_turn();
-        found = !is_clear(ray, visit.way, leaf_plane_at(visit.entry_ix), reach);
+        found = !is_clear(ray, visit.way, load_leaf_planes(visit.entry_ix), reach);
         visit.entry_ix += 1u;
         looks = !found && visit.entry_ix < visit.end_ix && has_turns();
         if (!looks) break;
@@ -57,7 +57,7 @@ uint search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
     Cell cell = whole(ray);
     // At the root, as in a leaf that is done with.
     Visit visit = Visit(0u, 0u, stretch(0.0, 0.0));
-    float reach = frame.plane_reach;
+    float reach = accel.plane_epsilon;
     bool begins = true;
     bool goes_on = is_in(ray);
     uint mark = 0u;

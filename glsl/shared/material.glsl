@@ -10,7 +10,7 @@ layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock
 
 // Of what the ray has hit.
 Material material_at(Hit hit) {
-    return materials[triangle_material_at(hit.triangle_ix)];
+    return materials[load_triangle_materials(hit.triangle_ix)];
 }
 
 // Where light goes on from a surface, and what share of it. A weight of zero: no ray.

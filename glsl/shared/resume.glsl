@@ -25,7 +25,7 @@ void walk_to(TraversalRay ray, uint node_at) {
     while (n_levels > 0u) {
         n_levels -= 1u;
         uint is_above = ((n_levels < 32u ? path.x : path.y) >> (n_levels % 32u)) & 1u;
-        KdNode node = kd_node_of(index_of(cell.node_at));
+        KdNode node = kd_node_at(index_of(cell.node_at));
         float t_cross = crossing(ray, node);
         bool meets_both = !(t_cross < cell.t_enter) && t_cross <= cell.t_exit;
         go_down();

@@ -33,6 +33,6 @@ bool has_slab(KdNode node) {
 KdNode enter_slab(TraversalRay ray, float t_best, Cell cell, KdNode node) {
     count_steps(1u);
     Stretch way = stretch(cell.t_enter, min(cell.t_exit, t_best));
-    if (is_clear(ray, way, kd_slab_of(index_of(cell.node_at)), 1.0)) return KdNode(0u, KD_LEAF);
+    if (is_clear(ray, way, load_kd_slabs(index_of(cell.node_at)), 1.0)) return KdNode(0u, KD_LEAF);
     return KdNode(node.split_or_first, node.axis_and_child & ~KD_IN_SLAB);
 }

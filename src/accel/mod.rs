@@ -3,6 +3,8 @@
 pub mod kdtree;
 mod query;
 
+use glam::Vec3;
+
 pub use self::query::Query;
 
 /// An acceleration structure over the triangles of a world, as the host has it.
@@ -27,6 +29,13 @@ impl Accel {
     pub fn kind(&self) -> AccelKind {
         match self {
             Self::KdTree(_) => AccelKind::KdTree,
+        }
+    }
+
+    /// The least and the greatest corner of a box that holds all triangles (world units).
+    pub fn bounds(&self) -> [Vec3; 2] {
+        match self {
+            Self::KdTree(tree) => tree.bounds(),
         }
     }
 }

@@ -43,7 +43,7 @@ impl Stage {
         let world = World::new(scene, build_options).expect("a material for each triangle");
         let tree_build_ms = begin.elapsed().as_secs_f64() * 1e3;
         let options = RenderOptions { width: size.0, height: size.1, ..RenderOptions::default() };
-        let frame = frame_constants(world.scene(), world.tree(), &options);
+        let frame = frame_constants(&world, &options);
         Self { extras: Extras::all(world.tree()), world, tree_build_ms, frame, light }
     }
 

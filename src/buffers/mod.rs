@@ -2,7 +2,7 @@
 //! and grows together.
 //!
 //! ```text
-//! scene           triangles, materials and the acceleration structure, uploaded once
+//! accel           triangles and their acceleration structure, with the arrays of scene_arrays
 //! queue           rays of a batch and what belongs to each
 //! pixels          samples, sums, filtered and displayed pixels
 //! raster_queue    large triangles, between the two kernels that rasterize
@@ -18,29 +18,31 @@ mod pixels;
 mod queue;
 mod raster_queue;
 mod resources;
+mod scene_arrays;
 mod stalls;
 mod vertex_indices;
 
 pub(crate) use self::pixels::draws;
 pub use self::{
-    accel::{AccelBuffers, SceneAccess},
+    accel::AccelBuffers,
     cast::CastResources,
     pixels::Pixels,
     queue::Queue,
     raster_queue::RasterQueue,
     resources::{Needs, Resources},
+    scene_arrays::{SceneAccess, SceneArrays},
     stalls::{Round, Stalls},
 };
 use crate::{
     gpu::BindingKind,
-    layout::{BIND_ADDRESSES, BIND_FRAME, BIND_TEXELS, BIND_TRIANGLE_IDS},
+    layout::{BIND_ACCEL, BIND_FRAME, BIND_TEXELS, BIND_TRIANGLE_IDS},
 };
 
 /// A binding number of layout.glsl and what it holds.
 fn binding(number: u32) -> (u32, BindingKind) {
     let kind = match number {
         BIND_TEXELS.. => BindingKind::Texels,
-        BIND_FRAME | BIND_ADDRESSES => BindingKind::Uniform,
+        BIND_FRAME | BIND_ACCEL => BindingKind::Uniform,
         BIND_TRIANGLE_IDS => BindingKind::Image,
         _ => BindingKind::Storage,
     };

@@ -3,7 +3,7 @@
 use std::{mem::offset_of, sync::Arc};
 
 use super::{
-    AccelBuffers, Pixels, Queue, RasterQueue, accel, binding,
+    AccelBuffers, Pixels, Queue, RasterQueue, SceneArrays, binding,
     pixels::{draws, n_pixels},
     vertex_indices::{has_indices, vertex_indices},
 };
@@ -30,6 +30,8 @@ const COUNTERS_A_ROW: usize = (COUNTER_PLACES * COUNTER_STRIDE) as usize;
 /// that it does not replace; whoever keeps the predecessor can go on with it if the change fails.
 #[derive(Clone)]
 pub struct Resources {
+    /// One.
+    pub frame: Buffer<Frame>,
     pub accel: AccelBuffers,
     /// Three a triangle, or empty where draws do without indices. None where the options draw no triangles.
     pub vertex_indices: Option<Buffer<u32>>,
@@ -66,12 +68,13 @@ impl Resources {
         let scene = world.scene();
         let storage = BufferUse::Storage;
         let &Needs { constants, options, n_bounces } = needs;
-        let mut accel = AccelBuffers::new(context, world.geometry(), constants)?;
+        let mut accel = AccelBuffers::new(context, world.geometry())?;
         accel.add_materials(context, &scene.triangle_materials)?;
         accel.add_extras(context, world.tree(), options.traversal)?;
-        let kinds: Vec<_> = (0..layout::N_BINDINGS).chain(accel::texel_bindings()).map(binding).collect();
+        let kinds: Vec<_> = (0..layout::N_BINDINGS).chain(SceneArrays::texel_bindings()).map(binding).collect();
         let upload_indices = || new_vertex_indices(context, &vertex_indices(&scene.triangles));
         let mut resources = Self {
+            frame: Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?,
             vertex_indices: draws(options).then(upload_indices).transpose()?,
             materials: Buffer::with(context, "materials", &scene.materials, storage)?,
             lights: Buffer::with(context, "lights", &scene.lights, storage)?,
@@ -92,6 +95,7 @@ impl Resources {
     fn make_set(&self) -> Result<BindingSet, GpuError> {
         let (queue, pixels) = (&self.queue, &self.pixels);
         let own = [
+            (layout::BIND_FRAME, Binding::Buffer(self.frame.any())),
             (layout::BIND_MATERIALS, Binding::Buffer(self.materials.any())),
             (layout::BIND_LIGHTS, Binding::Buffer(self.lights.any())),
             (layout::BIND_RAYS, Binding::Buffer(queue.rays.any())),
@@ -170,7 +174,7 @@ impl Resources {
 
     /// The indices of the triangles that are on the device, which are fetched if there are few enough to have indices.
     fn make_vertex_indices(&self, context: &Arc<Context>) -> Result<Buffer<u32>, GpuError> {
-        let triangles = &self.accel.triangles;
+        let triangles = &self.accel.arrays.triangles;
         let triangles = if has_indices(triangles.len()) { triangles.download()? } else { Vec::new() };
         new_vertex_indices(context, &vertex_indices(&triangles))
     }

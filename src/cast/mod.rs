@@ -32,7 +32,7 @@ use crate::{
     buffers::{AccelBuffers, CastResources, Round},
     cpu,
     gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
-    layout::{Frame, RAY_GROUP_SIZE, Ray},
+    layout::{RAY_GROUP_SIZE, Ray},
     passes, reference,
     world::Geometry,
 };
@@ -70,7 +70,7 @@ impl Caster {
     /// # Errors
     /// Beyond the device's limits or memory; too many triangles for brute force.
     pub fn new(context: &Arc<Context>, geometry: Geometry, traversal: Traversal) -> Result<Self, GpuError> {
-        let mut buffers = AccelBuffers::new(context, geometry, &constants(geometry))?;
+        let mut buffers = AccelBuffers::new(context, geometry)?;
         buffers.add_extras(context, geometry.tree(), traversal)?;
         let bindings = CastResources::bindings(context, &buffers)?;
         Ok(Self {
@@ -176,11 +176,6 @@ fn most_rays(limits: &Limits) -> usize {
     (limits.storage_range / bytes_a_ray).min(in_groups) as usize
 }
 
-/// What the traversal reads of a frame.
-fn constants(geometry: Geometry) -> Frame {
-    Frame { n_triangles: geometry.triangles().len() as u32, ..geometry.tree().constants() }
-}
-
 /// Rays that can only miss: with a NaN, an infinite origin or direction, or a direction of zero or so short that all
 /// its components are denormal (less than 2^-126).
 pub fn count_invalid(rays: &[CastRay]) -> u64 {
@@ -192,20 +187,18 @@ pub struct CpuCaster<'a> {
     geometry: Geometry<'a>,
     traversal: Traversal,
     extras: Extras,
-    frame: Frame,
 }
 
 impl<'a> CpuCaster<'a> {
     /// Makes what the traversal reads beside the tree.
     pub fn new(geometry: Geometry<'a>, traversal: Traversal) -> Self {
         let extras = Extras::new(geometry.tree(), traversal);
-        Self { geometry, traversal, extras, frame: constants(geometry) }
+        Self { geometry, traversal, extras }
     }
 
     /// One hit a ray.
     pub fn cast(&self, rays: &[CastRay], query: Query) -> Vec<Hit> {
-        let bindings =
-            reference::bindings::Bindings::of_tree(self.geometry.triangles(), self.geometry.tree(), &self.frame);
+        let bindings = reference::bindings::Bindings::of_tree(self.geometry.triangles(), self.geometry.tree());
         let mut hits = vec![Hit::zeroed(); rays.len()];
         cpu::cast(&bindings.with_extras(&self.extras), self.traversal, query, rays, &mut hits);
         hits

@@ -11,7 +11,7 @@ use super::{
     soa::{HitsSoa, RaysSoa},
 };
 use crate::{
-    layout::{Hit, KD_LEAST_COMPONENT, KD_PLANE_REACH, KdNode, Slab},
+    layout::{Hit, KD_LEAST_COMPONENT, KD_PLANE_EPSILON, KdNode, Slab},
     reference::{
         bindings::Bindings,
         counting::table::Reads,
@@ -51,7 +51,7 @@ pub struct Packet<S: Simd> {
     pub first_is_above: [u32; 3],
     /// Where the rays meet the plane at 0 on each axis, in t.
     pub bias: [f32x16<S>; 3],
-    plane_reach: f32,
+    plane_epsilon: f32,
     shears: Shears<S>,
     t_min: f32x16<S>,
     source_triangle: u32x16<S>,
@@ -120,8 +120,8 @@ impl<S: Simd> Packet<S> {
         let (origin, direction) = (columns(simd, &probes.origin), columns(simd, &probes.direction));
         let inv_direction = [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])];
         let bias = [-origin[0] * inv_direction[0], -origin[1] * inv_direction[1], -origin[2] * inv_direction[2]];
-        let [x0, y0, z0] = times_plus(bindings.frame.cell_min.to_array(), &inv_direction, &bias);
-        let [x1, y1, z1] = times_plus(bindings.frame.cell_max.to_array(), &inv_direction, &bias);
+        let [x0, y0, z0] = times_plus(bindings.cell_min.to_array(), &inv_direction, &bias);
+        let [x1, y1, z1] = times_plus(bindings.cell_max.to_array(), &inv_direction, &bias);
         let t_min = f32x16::load_array_ref(simd, &probes.t_min);
         let t_max = f32x16::load_array_ref(simd, &probes.t_max);
         let whole = Interval {
@@ -134,7 +134,7 @@ impl<S: Simd> Packet<S> {
             inv_direction,
             first_is_above: [0, 1, 2].map(|axis| signs_of(probes.direction(0)) >> axis & 1),
             bias,
-            plane_reach: KD_PLANE_REACH * largest_coordinate(bindings),
+            plane_epsilon: KD_PLANE_EPSILON * largest_coordinate(bindings),
             shears: Shears::of(&origin, &direction),
             t_min,
             source_triangle: u32x16::load_array_ref(simd, &probes.source_triangle),
@@ -194,7 +194,7 @@ impl<S: Simd> Packet<S> {
             let mut near = [in_cell; BLOCK];
             for (lanes, entry) in near.iter_mut().zip(first..first + triangles.len()) {
                 let Some(plane) = bindings.leaf_planes.get(entry) else { break };
-                *lanes &= self.lanes_near(&ways, plane.normal, plane.distance, self.plane_reach);
+                *lanes &= self.lanes_near(&ways, plane.normal, plane.distance, self.plane_epsilon);
             }
             for (&triangle_ix, lanes) in triangles.iter().zip(near) {
                 if lanes != 0 {
@@ -243,7 +243,7 @@ impl<S: Simd> Packet<S> {
             },
             origin: Vec3A::from_vec4(Vec4::from_array(row(&self.origin, lane))),
             direction: Vec3A::from_vec4(Vec4::from_array(row(&self.direction, lane))),
-            plane_reach: self.plane_reach,
+            plane_epsilon: self.plane_epsilon,
             inv_direction: row(&self.inv_direction, lane),
             bias: row(&self.bias, lane),
             t_enter: 0.0,

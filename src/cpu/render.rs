@@ -73,7 +73,7 @@ pub struct Renderer {
 impl Renderer {
     /// Makes room for a picture of a world.
     pub fn new(world: &World, options: &RenderOptions, batching: Batching) -> Self {
-        let frame = frame_constants(world.scene(), world.tree(), options);
+        let frame = frame_constants(world, options);
         let n_pixels = frame.width as usize * frame.height as usize;
         Self {
             camera: world.scene().camera,
@@ -110,7 +110,7 @@ impl Renderer {
         self.clock = Clock::start();
         self.bounces.clear();
         self.n_batches = 0;
-        self.frame.set_view(&self.camera, self.n_samples);
+        self.frame.set_view(&self.camera, self.world.bounds(), self.n_samples);
         if self.n_samples == 1 {
             self.pixel_accumulated.clone_from(&self.pixel_radiance);
         }

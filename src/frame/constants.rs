@@ -1,12 +1,12 @@
 //! The frame's constants: one camera for the rasterizer's matrix and for the rays, on GPU and CPU alike.
 
-use glam::{DMat4, DVec2, DVec3, DVec4, dvec2};
+use glam::{DMat4, DVec2, DVec3, DVec4, Vec3, dvec2};
 
 use crate::{
-    accel::kdtree::KdTree,
     frame::{Crop, Denoise, RenderOptions, sampling::sample_offset},
     layout::Frame,
-    scene::{Camera, Scene},
+    scene::Camera,
+    world::World,
 };
 
 /// The near plane lies at this share of the scene's farthest distance from the eye: nothing that can be seen is
@@ -14,16 +14,17 @@ use crate::{
 const NEAR_SHARE: f64 = 1.0 / (1 << 20) as f64;
 
 /// What the kernels know of a frame of first samples. `queue_capacity` is left 0: the caller's queues decide.
-pub fn frame_constants(scene: &Scene, tree: &KdTree, options: &RenderOptions) -> Frame {
+pub fn frame_constants(world: &World, options: &RenderOptions) -> Frame {
+    let scene = world.scene();
     let mut frame = Frame {
         n_triangles: scene.triangles.len() as u32,
         n_lights: scene.lights.len() as u32,
         ambient: scene.ambient,
         background: scene.background,
-        ..tree.constants()
+        ..Frame::default()
     };
     frame.set_options(options);
-    frame.set_view(&scene.camera, 0);
+    frame.set_view(&scene.camera, world.bounds(), 0);
     frame
 }
 
@@ -45,13 +46,15 @@ impl Frame {
         };
     }
 
-    /// The camera, and which of a pixel's samples the frame shows, counted from 0.
-    pub fn set_view(&mut self, camera: &Camera, sample_ix: u32) {
+    /// Sets the camera, and which of a pixel's samples the frame shows, counted from 0. `bounds`: the least and the greatest
+    /// corner of a box that holds the scene, world units.
+    pub fn set_view(&mut self, camera: &Camera, bounds: [Vec3; 2], sample_ix: u32) {
         let size = dvec2(self.picture_width.into(), self.picture_height.into());
         let offset = sample_offset(sample_ix);
         let image_plane = ImagePlane::new(camera, size.x / size.y);
         let eye = camera.eye;
-        let reach = (self.cell_min - eye).abs().max((self.cell_max - eye).abs()).as_dvec3().length();
+        let [least, greatest] = bounds;
+        let reach = (least - eye).abs().max((greatest - eye).abs()).as_dvec3().length();
         let near = if reach > 0.0 { reach * NEAR_SHARE } else { NEAR_SHARE };
         let clip_from_world = moved_by(-2.0 * offset / size) * image_plane.clip_from_world(eye.as_dvec3(), near);
         self.clip_from_world = clip_from_world.as_mat4();
@@ -103,7 +106,7 @@ mod tests {
         accel::kdtree::BuildOptions,
         layout::Triangle,
         reference::camera::{camera_direction, in_picture},
-        scene::RenderDefaults,
+        scene::{RenderDefaults, Scene},
     };
 
     /// A view of one triangle.
@@ -126,9 +129,9 @@ mod tests {
             background: Vec3::ZERO,
             defaults: RenderDefaults::default(),
         };
-        let tree = KdTree::build(&scene.triangles, &BuildOptions::default());
-        let mut frame = frame_constants(&scene, &tree, &options);
-        frame.set_view(&scene.camera, sample_ix);
+        let world = World::new(scene, &BuildOptions::default()).expect("a material for each triangle");
+        let mut frame = frame_constants(&world, &options);
+        frame.set_view(&camera, world.bounds(), sample_ix);
         frame
     }
 

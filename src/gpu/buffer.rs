@@ -31,9 +31,13 @@ pub enum BufferUse {
     Structure,
 }
 
-/// Of the widest texel that elements are made of.
-pub fn texel_bytes<T>() -> u64 {
-    [16, 8].into_iter().find(|&bytes| size_of::<T>().is_multiple_of(bytes)).unwrap_or(4) as u64
+/// The size of the widest texel of which a `T` can be made: 16, 8 or 4 bytes.
+pub const fn texel_bytes<T>() -> u64 {
+    match size_of::<T>() % 16 {
+        0 => 16,
+        8 => 8,
+        _ => 4,
+    }
 }
 
 /// `len` elements of `T` in the device's memory. A clone is a second handle to the same memory, which is released with

@@ -1,6 +1,8 @@
 //! The structs, constants and bindings that the kernels share with the host, generated from `glsl/shared/layout.glsl`.
 
 #[cfg(test)]
+mod scene_arrays;
+#[cfg(test)]
 mod specialization;
 
 include!(concat!(env!("OUT_DIR"), "/layout.rs"));
@@ -20,23 +22,19 @@ mod tests {
 
     use super::*;
 
-    /// Which struct's array, or single struct, stands at a binding; none for words and vectors.
+    /// The struct of which a binding has one or an array; none for words and vectors.
     fn struct_at(binding: u32) -> Option<&'static str> {
+        if let Some((_, element)) = SCENE_ARRAYS.iter().find(|(number, _)| *number == binding) {
+            return (*element != "uint").then_some(element);
+        }
         match binding {
             BIND_FRAME => Some("Frame"),
-            BIND_TRIANGLES => Some("Triangle"),
-            BIND_ADDRESSES => Some("Addresses"),
+            BIND_ACCEL => Some("AccelConstants"),
             BIND_MATERIALS => Some("Material"),
             BIND_LIGHTS => Some("Light"),
-            BIND_KD_NODES => Some("KdNode"),
             BIND_RAYS => Some("Ray"),
             BIND_BOUNCES => Some("Bounce"),
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
-            BIND_KD_BOXES => Some("KdBox"),
-            BIND_KD_ROPES => Some("KdRope"),
-            BIND_LEAF_TRIANGLES => Some("LeafTriangle"),
-            BIND_LEAF_PLANES => Some("Plane"),
-            BIND_KD_SLABS => Some("Slab"),
             BIND_CAST_RAYS => Some("CastRay"),
             BIND_PIXEL_FEATURES => Some("Feature"),
             BIND_COUNTERS => Some("Counters"),

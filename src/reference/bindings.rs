@@ -1,5 +1,7 @@
 //! What the kernels only read, under the kernels' names.
 
+use glam::Vec3;
+
 use super::counting::table::{Counted, ReadCounts, Table, Uncounted};
 use crate::{
     accel::kdtree::{Extras, KdTree},
@@ -10,7 +12,11 @@ use crate::{
 /// The scene, its tree and the frame's constants. `R`: who is told of reads of the tree.
 #[derive(Clone, Copy, Debug)]
 pub struct Bindings<'a, R = Uncounted> {
-    pub frame: &'a Frame,
+    /// None for rays that no frame makes.
+    pub frame: Option<&'a Frame>,
+    /// The box that holds all triangles, with the tree's rounding margin (world units).
+    pub cell_min: Vec3,
+    pub cell_max: Vec3,
     pub triangles: &'a [Triangle],
     /// One index into `materials` a triangle.
     pub triangle_materials: &'a [u32],
@@ -30,20 +36,34 @@ pub struct Bindings<'a, R = Uncounted> {
     pub kd_ropes: Table<'a, KdRope, R>,
 }
 
+impl<'a, R> Bindings<'a, R> {
+    /// The frame's constants.
+    ///
+    /// # Panics
+    /// The rays are no frame's.
+    #[inline(always)]
+    pub fn frame(&self) -> &'a Frame {
+        self.frame.expect("rays of a frame")
+    }
+}
+
 impl<'a> Bindings<'a> {
     pub fn new(scene: &'a Scene, tree: &'a KdTree, frame: &'a Frame) -> Self {
         Self {
             triangle_materials: &scene.triangle_materials,
             materials: &scene.materials,
             lights: &scene.lights,
-            ..Self::of_tree(&scene.triangles, tree, frame)
+            frame: Some(frame),
+            ..Self::of_tree(&scene.triangles, tree)
         }
     }
 
     /// What the traversal reads, without materials and lights.
-    pub fn of_tree(triangles: &'a [Triangle], tree: &'a KdTree, frame: &'a Frame) -> Self {
+    pub fn of_tree(triangles: &'a [Triangle], tree: &'a KdTree) -> Self {
         Self {
-            frame,
+            frame: None,
+            cell_min: tree.cell_min(),
+            cell_max: tree.cell_max(),
             triangles,
             triangle_materials: &[],
             materials: &[],
@@ -62,6 +82,8 @@ impl<'a> Bindings<'a> {
     pub fn counted<'c>(self, counts: &'c ReadCounts) -> Bindings<'a, Counted<'c>> {
         Bindings {
             frame: self.frame,
+            cell_min: self.cell_min,
+            cell_max: self.cell_max,
             triangles: self.triangles,
             triangle_materials: self.triangle_materials,
             materials: self.materials,

@@ -25,7 +25,7 @@ fn feature_of(bindings: &Bindings, ray: &Ray, hit: &Hit) -> Feature {
         normal_world: surface.shading,
         material_ix,
         albedo: bindings.materials[material_ix as usize].kd,
-        depth: (surface.point_world - bindings.frame.eye).dot(bindings.frame.forward),
+        depth: (surface.point_world - bindings.frame().eye).dot(bindings.frame().forward),
         ..Feature::default()
     }
 }

@@ -12,7 +12,7 @@ use super::{
 use crate::{
     accel::kdtree::EMPTY_LEAF,
     layout::{
-        Hit, KD_AXIS_MASK, KD_LEAF, KD_LEAST_COMPONENT, KD_ORIGIN_REACH, KD_PAIR_SHIFT, KD_PLANE_REACH, KdNode,
+        Hit, KD_AXIS_MASK, KD_LEAF, KD_LEAST_COMPONENT, KD_ORIGIN_REACH, KD_PAIR_SHIFT, KD_PLANE_EPSILON, KdNode,
         NO_TRIANGLE,
     },
 };
@@ -32,7 +32,7 @@ pub struct TraversalRay {
     pub origin: Vec3A,
     pub direction: Vec3A,
     /// How far a segment has to keep from a plane to be clear of it.
-    pub plane_reach: f32,
+    pub plane_epsilon: f32,
     pub inv_direction: [f32; 4],
     /// Where the ray meets the plane at 0 on each axis, in t.
     pub bias: [f32; 4],
@@ -63,8 +63,8 @@ impl TraversalRay {
     #[inline]
     pub fn new(bindings: &Bindings<impl Reads>, ray: &Probe) -> Self {
         let origin = ray.origin.to_array();
-        let cell_min = bindings.frame.cell_min.to_array();
-        let cell_max = bindings.frame.cell_max.to_array();
+        let cell_min = bindings.cell_min.to_array();
+        let cell_max = bindings.cell_max.to_array();
         let direction =
             ray.direction.to_array().map(|d| if d.abs() < KD_LEAST_COMPONENT { KD_LEAST_COMPONENT } else { d });
         let inv_direction = direction.map(|d| 1.0 / d);
@@ -77,7 +77,7 @@ impl TraversalRay {
             target: Target::of(ray),
             origin: ray.origin.into(),
             direction: ray.direction.into(),
-            plane_reach: KD_PLANE_REACH * largest_coordinate(bindings),
+            plane_epsilon: KD_PLANE_EPSILON * largest_coordinate(bindings),
             inv_direction: by_axis(inv_direction),
             bias: by_axis(bias),
             t_enter: max(max(near[0], near[1]), max(near[2], ray.t_min)),
@@ -102,7 +102,7 @@ impl TraversalRay {
 
 #[inline(always)]
 pub fn largest_coordinate(bindings: &Bindings<impl Reads>) -> f32 {
-    bindings.frame.cell_min.abs().max(bindings.frame.cell_max.abs()).max_element()
+    bindings.cell_min.abs().max(bindings.cell_max.abs()).max_element()
 }
 
 /// How far from 0, by its largest coordinate, a ray may start for the margins of the leaves to cover its rounding.

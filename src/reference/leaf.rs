@@ -60,7 +60,7 @@ fn four_planes(planes: &[Plane], first: usize) -> Mat4 {
 fn near_planes(ray: &TraversalRay, way: Stretch, planes: &Mat4) -> u32 {
     let dot = |v: Vec3A| planes.x_axis * v.x + planes.y_axis * v.y + planes.z_axis * v.z;
     let (height, slope) = (dot(ray.origin) - planes.w_axis, dot(ray.direction));
-    let is_clear = (way.middle * slope + height).abs().cmpgt(way.half * slope.abs() + Vec4::splat(ray.plane_reach));
+    let is_clear = (way.middle * slope + height).abs().cmpgt(way.half * slope.abs() + Vec4::splat(ray.plane_epsilon));
     !is_clear.bitmask()
 }
 

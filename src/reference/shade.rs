@@ -29,7 +29,7 @@ fn local_radiance(
     surface: &Surface,
     material: &Material,
 ) -> Vec3 {
-    let mut radiance = material.ke + material.ka * bindings.frame.ambient;
+    let mut radiance = material.ke + material.ka * bindings.frame().ambient;
     for (light_ix, light) in bindings.lights.iter().enumerate() {
         if !is_lit(light_ix) {
             continue;
@@ -43,7 +43,7 @@ fn local_radiance(
 /// Its throughput included.
 fn radiance_of(bindings: &Bindings, (ray, hit): (&Ray, &Hit), is_lit: impl Fn(usize) -> bool) -> Vec3 {
     if hit.triangle_ix == NO_TRIANGLE {
-        return ray.throughput * bindings.frame.background;
+        return ray.throughput * bindings.frame().background;
     }
     let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
     ray.throughput * local_radiance(bindings, is_lit, ray, &surface, bindings.material_at(hit))
@@ -51,7 +51,7 @@ fn radiance_of(bindings: &Bindings, (ray, hit): (&Ray, &Hit), is_lit: impl Fn(us
 
 /// Writes `ray_radiance`, one a ray, weighted by its throughput.
 pub fn shade(bindings: &Bindings, lit: LitRays, ray_radiance: &mut [[f32; 4]]) {
-    let stride = bindings.frame.queue_capacity as usize;
+    let stride = bindings.frame().queue_capacity as usize;
     ray_radiance.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each(|(task, radiance)| {
         for (ray_ix, radiance) in (task * RAYS_PER_TASK..).zip(radiance) {
             let is_lit = |light_ix: usize| lit.light_visibility[light_ix * stride + ray_ix] == LIGHT_LIT;

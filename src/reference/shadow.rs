@@ -76,6 +76,6 @@ pub fn shadow_by<T: Tracer>(
             .map_init(|| T::new(traversal), of_task)
             .sum()
     };
-    let stride = bindings.frame.queue_capacity as usize;
+    let stride = bindings.frame().queue_capacity as usize;
     bindings.lights.iter().zip(light_visibility.chunks_mut(stride)).map(of_light).sum()
 }

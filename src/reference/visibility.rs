@@ -19,13 +19,13 @@ pub fn visibility(bindings: &Bindings, traversal: Traversal, triangle_ids: &mut 
 
 /// Does what [`visibility`] does, by another tracer.
 pub fn visibility_by<T: Tracer>(bindings: &Bindings, traversal: Traversal, triangle_ids: &mut [u32]) {
-    let width = bindings.frame.width;
+    let width = bindings.frame().width;
     triangle_ids.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each_init(
         || T::new(traversal),
         |traverser, (task, ids)| {
             let probes = (task * RAYS_PER_TASK..).map(|pixel_ix| {
                 let pixel = glam::uvec2(pixel_ix as u32 % width, pixel_ix as u32 / width);
-                Probe::from(&camera_ray(bindings.frame, pixel))
+                Probe::from(&camera_ray(bindings.frame(), pixel))
             });
             traverser.trace_all::<false, _>(bindings, ids.iter_mut().zip(probes), |id, hit| *id = hit.triangle_ix);
         },

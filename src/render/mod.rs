@@ -82,7 +82,7 @@ impl Renderer {
         let scene = world.scene();
         let both = MATERIAL_REFLECT | MATERIAL_REFRACT;
         let branches = scene.materials.iter().any(|material| material.flags & both == both);
-        let mut constants = frame_constants(scene, world.tree(), options);
+        let mut constants = frame_constants(world, options);
         constants.n_lanes = lanes_to_share(&context, options)?;
         let room = Room { fixed_capacity, branches };
         constants.queue_capacity = room.queue_capacity(context.limits(), &constants);
@@ -306,7 +306,7 @@ impl Renderer {
 
     fn update_constants(&self, commands: &Commands) {
         commands.barrier(Access::AllReads, Access::TransferWrite); // what the frame before still reads
-        commands.update_buffer(self.resources.accel.frame.any(), self.resources.constants());
+        commands.update_buffer(self.resources.frame.any(), self.resources.constants());
         commands.barrier(Access::TransferWrite, Access::AllReads); // frame
     }
 

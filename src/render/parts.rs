@@ -206,7 +206,7 @@ impl Renderer {
             self.has_sums = true;
         }
         let mut constants = *self.resources.constants();
-        constants.set_view(&self.camera, sample_ix);
+        constants.set_view(&self.camera, self.world.bounds(), sample_ix);
         self.resources.set_constants(&constants);
         self.recorded(sample_ix)
     }

@@ -59,8 +59,8 @@ pub struct PickedHit {
 pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec2) -> Picked {
     let (scene, tree) = (world.scene(), world.tree());
     let extras = Extras::new(tree, options.traversal);
-    let mut frame = frame_constants(scene, tree, options);
-    frame.set_view(camera, 0);
+    let mut frame = frame_constants(world, options);
+    frame.set_view(camera, world.bounds(), 0);
     let bindings = Bindings::new(scene, tree, &frame).with_extras(&extras);
     let mut rays = vec![camera_ray(&frame, pixel)];
     let mut picked = Picked { pixel, rays: Vec::new(), n_more: 0 };

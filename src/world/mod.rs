@@ -5,6 +5,8 @@ mod mismatch;
 
 use std::sync::Arc;
 
+use glam::Vec3;
+
 pub use self::{geometry::Geometry, mismatch::Mismatch};
 use crate::{
     accel::{
@@ -64,6 +66,11 @@ impl World {
     pub fn tree(&self) -> &KdTree {
         let Accel::KdTree(tree) = &self.0.accel;
         tree
+    }
+
+    /// The least and the greatest corner of a box that holds all triangles (world units).
+    pub fn bounds(&self) -> [Vec3; 2] {
+        self.0.accel.bounds()
     }
 
     /// The options that the acceleration structure was built with.

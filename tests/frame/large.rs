@@ -9,11 +9,11 @@ use kdray::{
         Query,
         kdtree::{KdTree, Traversal},
     },
-    buffers::{AccelBuffers, SceneAccess},
+    buffers::{AccelBuffers, SceneAccess, SceneArrays},
     cast::{CastRay, Caster},
     frame::{Primary, RenderOptions},
     gpu::{Buffer, BufferUse, Context, DeviceOverrides, GpuError},
-    layout::{Frame, KdRope, LargeTriangle, LeafTriangle},
+    layout::{KdRope, LargeTriangle, LeafTriangle},
     render::Renderer,
     world::World,
 };
@@ -51,7 +51,7 @@ fn large_world() -> World {
 }
 
 /// Of each array that grows with the scene, with whatever the traversal asks for.
-fn scene_bytes(tree: &AccelBuffers, traversal: Traversal) -> Vec<u64> {
+fn scene_bytes(tree: &SceneArrays, traversal: Traversal) -> Vec<u64> {
     let mut buffers = vec![
         tree.triangles.any(),
         tree.triangle_materials.any(),
@@ -79,7 +79,7 @@ fn a_scene_larger_than_what_the_device_binds_gives_the_same_bits() {
                 [&any, &small].map(|context| Renderer::new(context.clone(), &world, &options).expect("a renderer"));
             assert_eq!(bound.resources().accel.access(), usual_reading(&any, world.tree()));
             assert_eq!(by_address.resources().accel.access(), SceneAccess::Address);
-            let bytes = scene_bytes(&by_address.resources().accel, traversal);
+            let bytes = scene_bytes(&by_address.resources().accel.arrays, traversal);
             assert!(bytes.iter().all(|&bytes| bytes > RANGE), "{traversal}: {bytes:?}");
             let pictures = [&mut bound, &mut by_address].map(|renderer| renderer.render().expect("a frame").0);
             assert!(identical(&pictures[0], &pictures[1]), "{traversal} {primary}");
@@ -188,7 +188,7 @@ fn a_scene_is_read_by_address_only_where_something_of_it_cannot_be_bound() {
         (largest, most_texels, usual),
     ] {
         let context = device_with(range, n_texels);
-        let made = AccelBuffers::new(&context, world.geometry(), &Frame::default()).expect("a tree");
+        let made = AccelBuffers::new(&context, world.geometry()).expect("a tree");
         assert_eq!(made.access(), reading, "{range} bytes, {n_texels} texels");
         assert_silent(&context);
     }

@@ -25,7 +25,7 @@ use crate::support::{scenes, with_lanes, without_wide_atomics};
 /// 1/16 px or finer.)
 fn is_on_edge(world: &World, options: &RenderOptions, pixel_ix: usize) -> bool {
     let (scene, tree) = (world.scene(), world.tree());
-    let frame = frame_constants(scene, tree, options);
+    let frame = frame_constants(world, options);
     let pixel = UVec2::new(pixel_ix as u32 % frame.width, pixel_ix as u32 / frame.width);
     let mut traverser = Traverser::new(options.traversal);
     let ids: HashSet<u32> = (0..25 * 25)

@@ -78,6 +78,6 @@ fn slabs_beside_their_surface_lose_it() {
     let expected = renderer.render().expect("a frame").0;
     let moved: Vec<Slab> =
         world.tree().slabs().iter().map(|slab| Slab { offset: slab.offset + 2.0, ..*slab }).collect();
-    renderer.resources().accel.kd_slabs.upload(&moved).expect("slabs");
+    renderer.resources().accel.arrays.kd_slabs.upload(&moved).expect("slabs");
     assert!(!identical(&expected, &renderer.render().expect("a frame").0));
 }

@@ -15,7 +15,7 @@ fn stage(width: u32, height: u32, n_samples: u32) -> Stage {
     scenes::add(&mut scene, Vec::new(), scenes::BLACK);
     let mut stage = Stage::new(scene, options(width, height), 1);
     let constants = Frame { n_samples, ..*stage.resources.constants() };
-    stage.resources.accel.frame.upload(&[constants]).expect("frame");
+    stage.resources.frame.upload(&[constants]).expect("frame");
     stage.resources.set_constants(&constants);
     stage.resources.begin_sums(&stage.context).expect("pixel_accumulated");
     stage

@@ -150,7 +150,7 @@ fn lanes_to_spare_are_shared_out_as_on_the_cpu() {
     let mut stage = stage(10_000);
     let constants = Frame { n_lanes: 5000, n_lights: 3, ..*stage.resources.constants() };
     stage.resources.set_constants(&constants);
-    stage.resources.accel.frame.upload(&[constants]).expect("frame");
+    stage.resources.frame.upload(&[constants]).expect("frame");
     for n_rays in [0, 1, 50, 160, 1250, 1251, 2500, 2501, 5000] {
         let lanes = 1 << check(&stage, 0, &vec![1; n_rays]).bounces[2].trace_lanes_log2;
         assert!(lanes == 1 || lanes * n_rays <= 5000, "{n_rays}: {lanes}");

@@ -14,7 +14,7 @@ use kdray::{
 };
 
 use super::stage::{FIRST, Stage, options};
-use crate::support::{MeshWithTree, compare, meshes, random::Random, scenes, without_wide_atomics, world_of};
+use crate::support::{compare, meshes, random::Random, scenes, without_wide_atomics, world_of};
 
 /// A stage whose kernels rasterize, and the pass that traces the same rays.
 struct View {
@@ -59,9 +59,9 @@ impl View {
 
     fn look(&mut self, camera: &Camera) {
         let mut constants = *self.stage.resources.constants();
-        constants.set_view(camera, 0);
+        constants.set_view(camera, self.stage.world.bounds(), 0);
         self.stage.resources.set_constants(&constants);
-        self.stage.resources.accel.frame.upload(&[constants]).expect("constants");
+        self.stage.resources.frame.upload(&[constants]).expect("constants");
     }
 
     /// How many pixels show a triangle.
@@ -130,8 +130,8 @@ fn shows_what_camera_rays_hit_of_small_triangles() {
 fn shows_what_camera_rays_hit_of_slivers() {
     let (options, mut random) = (options(64, 48), Random(41));
     let mut scene = scenes::empty();
-    let tree = MeshWithTree::new(Vec::new()).tree;
-    let frame = frame_constants(&scene, &tree, &options);
+    let world = world_of(&scene);
+    let frame = frame_constants(&world, &options);
     let mut sliver = || {
         let pixel = uvec2(random.below(64) as u32, random.below(48) as u32);
         let ray = camera_ray(&frame, pixel);

@@ -52,7 +52,7 @@ impl Stage {
     pub fn new(scene: Scene, options: RenderOptions, capacity: u32) -> Self {
         let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
         let world = World::new(scene, &BuildOptions::default()).expect("a world");
-        let constants = Frame { queue_capacity: capacity, ..frame_constants(world.scene(), world.tree(), &options) };
+        let constants = Frame { queue_capacity: capacity, ..frame_constants(&world, &options) };
         let needs = Needs { constants: &constants, options: &options, n_bounces: constants.max_depth as usize };
         let resources = Resources::new(&context, &world, &needs).expect("resources");
         let extras = Extras::new(world.tree(), options.traversal);

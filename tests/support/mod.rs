@@ -18,7 +18,7 @@ use glam::Vec3;
 use kdray::{
     accel::kdtree::{BuildOptions, Extras, KdTree},
     gpu::{Context, ContextOptions, DeviceOverrides},
-    layout::{Frame, Hit, NO_TRIANGLE, Ray, Triangle},
+    layout::{Hit, NO_TRIANGLE, Ray, Triangle},
     reference::{bindings::Bindings, brute, kdtree::near_scene, probe::Probe},
     scene::Scene,
     world::{Geometry, World},
@@ -50,12 +50,11 @@ pub fn world_by(scene: &Scene, build_options: &BuildOptions) -> World {
     World::new(scene.clone(), build_options).expect("a material for each triangle")
 }
 
-/// Triangles and their tree, with no more of a frame than rays need.
+/// Triangles and their tree.
 pub struct MeshWithTree {
     pub triangles: Vec<Triangle>,
     pub tree: KdTree,
     pub extras: Extras,
-    pub frame: Frame,
 }
 
 impl MeshWithTree {
@@ -65,11 +64,11 @@ impl MeshWithTree {
     }
 
     pub fn with_tree(triangles: Vec<Triangle>, tree: KdTree) -> Self {
-        Self { triangles, extras: Extras::all(&tree), frame: tree.constants(), tree }
+        Self { triangles, extras: Extras::all(&tree), tree }
     }
 
     pub fn bindings(&self) -> Bindings<'_> {
-        Bindings::of_tree(&self.triangles, &self.tree, &self.frame).with_extras(&self.extras)
+        Bindings::of_tree(&self.triangles, &self.tree).with_extras(&self.extras)
     }
 
     /// What a cast goes through.

@@ -29,7 +29,7 @@ enum Lack {
 
 /// The first triangle, by index, that a leaf within `margin` lacks, or a node's slab.
 pub fn check(tree: &KdTree, triangles: &[Triangle], margin: f32) -> Result<(), Invalid> {
-    let reach = CHECKED * f64::from(tree.constants().plane_reach);
+    let reach = CHECKED * f64::from(tree.constants().plane_epsilon);
     let missing = triangles.par_iter().enumerate().find_map_first(|(ix, triangle)| {
         let corners = [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3());
         let descent = Descent { tree, triangle_ix: ix as u32, margin: CHECKED * f64::from(margin), reach };

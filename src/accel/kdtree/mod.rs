@@ -31,7 +31,7 @@ mod subtree;
 mod traversal;
 mod validate;
 
-use crate::layout::{Frame, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_REACH, KdNode};
+use crate::layout::{AccelConstants, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_EPSILON, KdNode};
 
 pub use extras::Extras;
 pub use parts::Parts;
@@ -51,11 +51,12 @@ pub struct KdTree {
 }
 
 impl KdTree {
-    /// What kernels have to know of the tree beside its arrays; the rest is zero.
-    pub fn constants(&self) -> Frame {
+    /// What kernels have to know of the tree beside its arrays. The rest is 0.
+    pub fn constants(&self) -> AccelConstants {
         let Parts { cell_min, cell_max, .. } = self.parts;
         let largest_coordinate = cell_min.abs().max(cell_max.abs()).max_element();
-        Frame { cell_min, cell_max, plane_reach: KD_PLANE_REACH * largest_coordinate, ..Frame::default() }
+        let plane_epsilon = KD_PLANE_EPSILON * largest_coordinate;
+        AccelConstants { cell_min, cell_max, plane_epsilon, ..AccelConstants::default() }
     }
 }
 

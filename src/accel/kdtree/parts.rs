@@ -84,6 +84,11 @@ impl KdTree {
         self.parts.cell_max
     }
 
+    /// The least and the greatest corner of the root's cell, which holds all triangles.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        [self.cell_min(), self.cell_max()]
+    }
+
     /// [`Parts::depth`].
     pub fn depth(&self) -> u32 {
         self.parts.depth

@@ -2,7 +2,7 @@
 //! A ray that passes by a surface goes through many cells that have a part of it; where it keeps clear of a cell's slab it
 //! need not go down to the leaves.
 //!
-//! A slab holds what comes within the tree's margin (bounds.rs) of the cell, and reaches `KD_PLANE_REACH` beyond: as far as
+//! A slab holds what comes within the tree's margin (bounds.rs) of the cell, and reaches `KD_PLANE_EPSILON` beyond: as far as
 //! a ray has to keep from a triangle's plane, and for the same reasons (planes.rs), but that rounding moves a slab by 5 of
 //! the units there, where a plane is off by 4.
 
@@ -33,7 +33,7 @@ impl KdTree {
         let bounds = Bounds { min: self.cell_min().to_array(), max: self.cell_max().to_array() };
         // The root's cell has the margin around it already: this one is larger by 2^-17 of itself.
         let margin = bounds.margin();
-        let reach = f64::from(self.constants().plane_reach);
+        let reach = f64::from(self.constants().plane_epsilon);
         let fitting = Fitting { tree: self, triangles, n_entries: self.entries_below(), margin, reach };
         let slabs: Vec<Slabs> = fitting.patches(bounds).par_iter().map(|patch| fitting.slabs_of(patch)).collect();
         let parts = &mut self.parts;

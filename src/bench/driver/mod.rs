@@ -61,7 +61,7 @@ impl Arena {
             scenery = Scenery::new(context, triangles)?;
             build_ms.push(scenery.build_ms());
         }
-        let mut tree = AccelBuffers::new(context, stage.world.geometry(), &stage.frame)?;
+        let mut tree = AccelBuffers::new(context, stage.world.geometry())?;
         tree.add_extras(context, stage.tree(), Traversal::Ropes)?;
         Ok(Self {
             bindings: CastResources::bindings(context, &tree)?,

@@ -48,9 +48,9 @@ pub fn measure_traversals(
     }
     let (scene, tree) = (world.scene(), world.tree());
     let n_pixels = context.n_lanes()?.clamp(FEWEST_RAYS, MOST_RAYS);
-    let frame = frame_constants(scene, tree, &picture_of(scene, n_pixels));
+    let frame = frame_constants(world, &picture_of(scene, n_pixels));
     let rays = some_rays(scene, tree, &frame);
-    let mut buffers = AccelBuffers::new(context, world.geometry(), &frame)?;
+    let mut buffers = AccelBuffers::new(context, world.geometry())?;
     if traversals.contains(&Traversal::Ropes) {
         buffers.add_extras(context, tree, Traversal::Ropes)?;
     }

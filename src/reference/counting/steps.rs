@@ -100,9 +100,8 @@ mod tests {
         let triangles = two_triangles();
         let options = BuildOptions { traversal_cost: 1e-3, ..options };
         let tree = KdTree::build(&triangles, &options);
-        let frame = tree.constants();
         let extras = Extras::all(&tree);
-        count_steps(&Bindings::of_tree(&triangles, &tree, &frame).with_extras(&extras), traversal, query, rays)
+        count_steps(&Bindings::of_tree(&triangles, &tree).with_extras(&extras), traversal, query, rays)
     }
 
     fn ray(origin: Vec3, direction: Vec3) -> Ray {
