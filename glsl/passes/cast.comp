@@ -6,7 +6,7 @@
 #include "layout.glsl"
 
 const bool COUNT_COSTS = false;
-#include "kdtree.glsl"
+#include "accel.glsl"
 #include "lanes.glsl"
 
 layout(constant_id = CONSTANT_ANY_HIT) const bool ANY_HIT = false;
@@ -23,37 +23,17 @@ Hit miss() {
     return Hit(uintBitsToFloat(INFINITY_BITS), NO_TRIANGLE, 0.0, 0.0);
 }
 
-// By bits, in which magnitudes keep their order: a device may flush a denormal, and need not know a NaN from a number.
-uint magnitude_bits(float x) {
-    return floatBitsToUint(x) & 0x7fffffffu;
-}
-
-uint longest_bits(vec3 v) {
-    return max(max(magnitude_bits(v.x), magnitude_bits(v.y)), magnitude_bits(v.z));
-}
-
-// The longest component's exponent as the bits hold it, 1..254; 0: all but zero, 255: infinite or NaN.
-uint exponent_of(vec3 direction) {
-    return longest_bits(direction) >> 23;
-}
-
 bool is_ray(CastRay ray) {
     uint exponent = exponent_of(ray.direction);
     return exponent > 0u && exponent < 255u && longest_bits(ray.origin) < INFINITY_BITS
         && magnitude_bits(ray.t_min) <= INFINITY_BITS && magnitude_bits(ray.t_max) <= INFINITY_BITS;
 }
 
-// The traversal wants a direction of about unit length. Scaled by a power of two it keeps its bits, and so does t: the
-// hit is that of the direction as it was given. A hit beyond the greatest t is none.
+// A hit beyond the greatest t is none.
 Hit cast_ray(CastRay ray) {
-    uint exponent = min(exponent_of(ray.direction), 253u);
-    float scale = uintBitsToFloat((254u - exponent) << 23); // 2^(127 - exponent)
-    float inv_scale = uintBitsToFloat(exponent << 23);
-    float t_max = min(ray.t_max, GREATEST) * inv_scale;
-    Ray scaled = Ray(ray.origin, 0u, ray.direction * scale, NO_TRIANGLE, vec3(0.0), t_max);
-    Hit hit = traverse(scaled, ray.t_min * inv_scale, ANY_HIT);
+    Ray bounded = Ray(ray.origin, 0u, ray.direction, NO_TRIANGLE, vec3(0.0), min(ray.t_max, GREATEST));
+    Hit hit = traverse_any_length(bounded, ray.t_min, ANY_HIT);
     if (hit.triangle_ix == NO_TRIANGLE) return miss();
-    hit.t *= scale;
     return hit;
 }
 

@@ -8,7 +8,7 @@
 
 // Whether what rays cost is noted.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
-#include "kdtree.glsl"
+#include "accel.glsl"
 #include "rays.glsl"
 #include "lanes.glsl"
 #include "store.glsl"

@@ -1,0 +1,27 @@
+// Candidates: triangles that a search comes to, against the nearest hit so far. A part of accel.glsl.
+
+// The nearest hit so far; where it lies in its triangle is in local memory.
+struct Nearest {
+    float t;
+    uint triangle_ix;
+};
+
+// Whether a hit is the ray's, and nearer than the best; of two hits at one t the lower index wins, whatever the order of triangles.
+bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
+    bool nearer = t < best.t || (t == best.t && triangle_ix < best.triangle_ix);
+    return t > ray.t_min && nearer && triangle_ix != ray.source_triangle;
+}
+
+// A triangle against the ray.
+void intersect(TraversalRay ray, Triangle triangle, uint triangle_ix, inout Nearest best) {
+    Hit hit;
+    if (!intersect_triangle(ray.shear, triangle, triangle_ix, hit)) return;
+    if (is_better(ray, hit.t, triangle_ix, best)) {
+        best = Nearest(hit.t, triangle_ix);
+        keep_pair(WEIGHTS_PLACE, hit.u, hit.v);
+    }
+}
+
+bool is_done(bool any_hit, Nearest best) {
+    return any_hit && best.triangle_ix != NO_TRIANGLE;
+}
