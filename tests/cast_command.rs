@@ -160,6 +160,7 @@ fn usage_mistakes_are_refused() {
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--json", "x.npz"], "same file"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--repeat", "0"], "--repeat"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--traversal", "bvh"], "mask"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--accel", "bvh"], "kdtree"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--cpu", "--validate"], "--cpu"),
     ];
     for (arguments, named) in cases {

@@ -44,6 +44,7 @@ fn usage_mistakes_are_refused_before_the_scene_is_read() {
         (&["render", "none.toml", "--path", "p.toml", "-o", "x.png"], "####"),
         (&["render", "none.toml", "--path", "p.toml", "-o", "x#.#.png"], "more than one"),
         (&["render", "none.toml", "--traversal", "bvh"], "short-stack, "),
+        (&["render", "none.toml", "--accel", "bvh"], "kdtree"),
         (&["render", "none.toml", "--primary", "rays"], "raster, compute, trace"),
         (&["render", "none.toml", "--threads", "0"], "--threads"),
         (&["render", "none.toml", "--cpu", "--device", "0"], "--device"),

@@ -23,6 +23,8 @@
 
 // A ray that hits nothing, a pixel that no triangle covers.
 #define NO_TRIANGLE 0xffffffffu
+// A triangle that rays pass through, in place of the index of its material.
+#define TRIANGLE_HIDDEN 0x80000000u
 // In place of an encoded shading normal: use the triangle's own plane. No snorm pair encodes to it.
 #define FLAT_NORMAL 0x80008000u
 
@@ -358,6 +360,8 @@ struct AccelConstants {
 
 // Constants that all kernels over one scene share.
 
+// Whether rays pass through triangles with TRIANGLE_HIDDEN in `triangle_materials`.
+#define CONSTANT_FILTERS 28u
 // Loop turns that an invocation takes before its ray stalls; 0: any number.
 #define CONSTANT_TURN_BUDGET 29u
 // Words of the traversal's mask.

@@ -30,6 +30,7 @@ void intersect_in_step(TraversalRay ray, LeafTriangle entry, bool tests, inout N
     Hit hit = weighted_hit(ray.shear, exact_edges(edges, errors), vec3(a.z, b.z, c.z), entry.triangle_ix);
     bool is_hit = tests && is_inside(with_exact_signs(edges, errors));
     bool is_new = is_hit && is_better(ray, hit.t, entry.triangle_ix, best);
+    if (FILTERS) is_new = is_new && is_accepted(entry.triangle_ix, hit.u, hit.v);
     vec2 weights = kept_pair(WEIGHTS_PLACE);
     best.t = is_new ? hit.t : best.t;
     best.triangle_ix = is_new ? entry.triangle_ix : best.triangle_ix;

@@ -9,7 +9,7 @@
 
 // The triangles, in the order of the scene. Three rows each: a corner, and its shading normal in the fourth word.
 ARRAY(triangles, Triangle, vec4, 1u)
-// One for each triangle: the index of its material.
+// One for each triangle: the index of its material; for casts with a filter, TRIANGLE_HIDDEN or 0.
 ARRAY(triangle_materials, uint, uint, 2u)
 
 // The nodes of the kd-tree.

@@ -12,8 +12,8 @@ use crate::{
     accel::kdtree::{Extras, KdTree, Traversal},
     gpu::{Binding, Buffer, BufferUse, Constants, Context, GpuError},
     layout::{
-        AccelConstants, BIND_ACCEL, BIND_STALLS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, LeafTriangle, Slab, Triangle,
-        constants,
+        AccelConstants, BIND_ACCEL, BIND_STALLS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, LeafTriangle, Slab,
+        TRIANGLE_HIDDEN, Triangle, constants,
     },
     world::Geometry,
 };
@@ -34,6 +34,8 @@ pub struct AccelBuffers {
     access: SceneAccess,
     /// Words of the traversal's mask.
     mask_words: u32,
+    /// Whether rays pass through some of the triangles.
+    filters: bool,
     /// What `constants` holds.
     uploaded: AccelConstants,
 }
@@ -66,6 +68,7 @@ impl AccelBuffers {
             arrays,
             stalls: Stalls::new(context)?,
             access,
+            filters: false,
             mask_words: if tree.depth() <= KD_WORD_DEPTH { 1 } else { 2 },
             uploaded,
         };
@@ -108,6 +111,21 @@ impl AccelBuffers {
         Ok(())
     }
 
+    /// Makes rays pass through the triangles of these indices. Frames over these buffers lose their materials by it: it is
+    /// for casts. Descriptor sets and kernels over these buffers have to be made again.
+    ///
+    /// # Errors
+    /// Nothing has changed then. Beyond the device's limits, out of memory.
+    ///
+    /// # Panics
+    /// There is no triangle of an index.
+    pub(crate) fn hide(&mut self, context: &Arc<Context>, hidden: &[u32]) -> Result<(), GpuError> {
+        let mut next = self.clone();
+        next.add_materials(context, &hidden_words(self.arrays.triangles.len(), hidden))?;
+        *self = Self { filters: true, ..next };
+        Ok(())
+    }
+
     /// How kernels read the arrays.
     pub fn access(&self) -> SceneAccess {
         self.access
@@ -117,6 +135,7 @@ impl AccelBuffers {
     pub(super) fn constants(&self) -> Constants {
         Constants::new()
             .set(constants::READING, self.access.constant())
+            .set(constants::FILTERS, self.filters)
             .set(constants::MASK_WORDS, self.mask_words)
             .set(constants::TURN_BUDGET, self.stalls.turn_budget())
     }
@@ -145,6 +164,13 @@ fn leaf_triangles(triangles: &[Triangle], tree: &KdTree, first: usize, part: &mu
         let Triangle { v0, v1, v2, .. } = triangles[triangle_ix as usize];
         *entry = LeafTriangle { v0, triangle_ix, v1, v2, ..LeafTriangle::default() };
     });
+}
+
+/// For each of the triangles, `TRIANGLE_HIDDEN` if its index is one of the hidden ones, else 0.
+pub(crate) fn hidden_words(n_triangles: usize, hidden: &[u32]) -> Vec<u32> {
+    let mut words = vec![0; n_triangles];
+    hidden.iter().for_each(|&triangle_ix| words[triangle_ix as usize] = TRIANGLE_HIDDEN);
+    words
 }
 
 /// The slabs, if the device's kernels look at them: those that run both sides of every branch do not.

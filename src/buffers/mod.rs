@@ -22,7 +22,6 @@ mod scene_arrays;
 mod stalls;
 mod vertex_indices;
 
-pub(crate) use self::pixels::draws;
 pub use self::{
     accel::AccelBuffers,
     cast::CastResources,
@@ -33,6 +32,7 @@ pub use self::{
     scene_arrays::{SceneAccess, SceneArrays},
     stalls::{Round, Stalls},
 };
+pub(crate) use self::{accel::hidden_words, pixels::draws};
 use crate::{
     gpu::BindingKind,
     layout::{BIND_ACCEL, BIND_FRAME, BIND_TEXELS, BIND_TRIANGLE_IDS},

@@ -29,7 +29,7 @@ use crate::{
         Query,
         kdtree::{Extras, Traversal},
     },
-    buffers::{AccelBuffers, CastResources, Round},
+    buffers::{AccelBuffers, CastResources, Round, hidden_words},
     cpu,
     gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
     layout::{RAY_GROUP_SIZE, Ray},
@@ -83,6 +83,21 @@ impl Caster {
             closest: None,
             any: None,
         })
+    }
+
+    /// Makes rays pass through the triangles of these indices.
+    ///
+    /// # Errors
+    /// Beyond the device's limits, out of memory.
+    ///
+    /// # Panics
+    /// There is no triangle of an index.
+    pub fn hiding(mut self, triangles: &[u32]) -> Result<Self, GpuError> {
+        self.tree.hide(&self.context, triangles)?;
+        self.bindings = CastResources::bindings(&self.context, &self.tree)?;
+        self.resources = CastResources::new(&self.context, &self.bindings, &self.tree, 0)?;
+        (self.closest, self.any) = (None, None);
+        Ok(self)
     }
 
     /// With batches of at most so many rays, as far as the device's limits go.
@@ -187,18 +202,33 @@ pub struct CpuCaster<'a> {
     geometry: Geometry<'a>,
     traversal: Traversal,
     extras: Extras,
+    /// As `TRIANGLE_HIDDEN` says, if there are hidden triangles.
+    hidden: Option<Vec<u32>>,
 }
 
 impl<'a> CpuCaster<'a> {
     /// Makes what the traversal reads beside the tree.
     pub fn new(geometry: Geometry<'a>, traversal: Traversal) -> Self {
         let extras = Extras::new(geometry.tree(), traversal);
-        Self { geometry, traversal, extras }
+        Self { geometry, traversal, extras, hidden: None }
+    }
+
+    /// Makes rays pass through the triangles of these indices.
+    ///
+    /// # Panics
+    /// There is no triangle of an index.
+    #[must_use]
+    pub fn hiding(self, triangles: &[u32]) -> Self {
+        Self { hidden: Some(hidden_words(self.geometry.triangles().len(), triangles)), ..self }
     }
 
     /// One hit a ray.
     pub fn cast(&self, rays: &[CastRay], query: Query) -> Vec<Hit> {
         let bindings = reference::bindings::Bindings::of_tree(self.geometry.triangles(), self.geometry.tree());
+        let bindings = match &self.hidden {
+            Some(words) => bindings.with_hidden(words),
+            None => bindings,
+        };
         let mut hits = vec![Hit::zeroed(); rays.len()];
         cpu::cast(&bindings.with_extras(&self.extras), self.traversal, query, rays, &mut hits);
         hits

@@ -4,7 +4,7 @@ use std::{path::PathBuf, str::FromStr};
 
 use clap::{Parser, Subcommand, value_parser};
 use kdray::{
-    accel::{Query, kdtree::Traversal},
+    accel::{AccelKind, Query, kdtree::Traversal},
     engine::choices::{BuildPolicy, Request},
     frame::{Aov, Crop, RenderOptions},
     gpu::DeviceSelector,
@@ -17,7 +17,7 @@ use super::bench::Suite;
 pub use super::view_args::ViewArgs;
 use super::{
     error::CliError,
-    picture_args::{PictureArgs, build_help, way_help},
+    picture_args::{PictureArgs, accel_help, build_help, traversal_help},
     wanted::Wanted,
 };
 
@@ -44,7 +44,7 @@ pub enum Command {
     /// Describe a scene and its kd-tree
     Inspect(InspectArgs),
     #[cfg(feature = "bench")]
-    /// Measure: whole frames, ways through the kd-tree, the driver's own ray tracing, cost against size
+    /// Measure whole frames, traversals of the kd-tree, the driver's own ray tracing, or cost against size
     #[command(subcommand)]
     Bench(Suite),
 }
@@ -113,8 +113,10 @@ pub struct CastArgs {
     /// Find out only whether rays hit anything: occluded
     #[arg(long)]
     pub any: bool,
-    #[arg(long, value_name = "WAY")]
-    #[arg(help = way_help(), default_value = "auto", hide_default_value = true)]
+    #[arg(long, value_name = "KIND", help = accel_help(), default_value_t)]
+    pub accel: AccelKind,
+    #[arg(long, value_name = "ALGORITHM")]
+    #[arg(help = traversal_help(), default_value = "auto", hide_default_value = true)]
     pub traversal: Wanted<Traversal>,
     #[arg(long, value_name = "TREE", default_value_t = BuildPolicy::Auto)]
     #[arg(help = build_help())]
@@ -188,7 +190,7 @@ impl CastArgs {
 
     /// The choices asked for.
     pub fn request(&self) -> Request {
-        Request { build: self.build, traversal: self.traversal.pinned(), primary: None }
+        Request { accel: self.accel, build: self.build, traversal: self.traversal.pinned(), primary: None }
     }
 
     /// What is asked of the rays.

@@ -2,7 +2,7 @@
 
 use clap::{ValueEnum, value_parser};
 use kdray::{
-    accel::kdtree::Traversal,
+    accel::{AccelKind, kdtree::Traversal},
     engine::choices::{BuildPolicy, Request},
     frame::{Denoise, Primary, RenderOptions, Tonemap},
     scene::Scene,
@@ -30,8 +30,10 @@ pub struct PictureArgs {
     #[arg(long, value_name = "CURVE")]
     #[arg(help = format!("From radiance to what a display shows: {} [default: the scene's]", Tonemap::words()))]
     pub tonemap: Option<Tonemap>,
-    #[arg(long, value_name = "WAY")]
-    #[arg(help = way_help(), default_value = "auto", hide_default_value = true)]
+    #[arg(long, value_name = "KIND", help = accel_help(), default_value_t)]
+    pub accel: AccelKind,
+    #[arg(long, value_name = "ALGORITHM")]
+    #[arg(help = traversal_help(), default_value = "auto", hide_default_value = true)]
     pub traversal: Wanted<Traversal>,
     /// How primary rays find their triangles: rasterized by the device's graphics or by kernels, or traced; auto: what
     /// suits the device and the sizes of scene and picture, or what a measurement has found to be quicker
@@ -42,16 +44,21 @@ pub struct PictureArgs {
     pub build: BuildPolicy,
 }
 
-/// What `--traversal` says of itself.
-pub fn way_help() -> String {
-    let (words, of_devices, of_cpu) = (Traversal::words(), ways_of_devices(), Traversal::OF_CPU);
+/// The help of `--accel`.
+pub fn accel_help() -> String {
+    format!("The acceleration structure that leads rays to triangles: {}", AccelKind::words())
+}
+
+/// The help of `--traversal`.
+pub fn traversal_help() -> String {
+    let (words, of_devices, of_cpu) = (Traversal::words(), traversals_of_devices(), Traversal::OF_CPU);
     format!(
-        "How rays find their way through the tree: {words}, or auto: {of_devices}, with --cpu {of_cpu}, or what a \
-         measurement on this GPU and scene has found to be quicker [default: auto]"
+        "The algorithm by which rays go through the kd-tree: {words}, or auto: {of_devices}, with --cpu {of_cpu}, or \
+         what a measurement on this GPU and scene has found to be quicker [default: auto]"
     )
 }
 
-/// What `--build` says of itself.
+/// The help of `--build`.
 pub fn build_help() -> String {
     format!(
         "Which kd-tree to build: {}. best traces fastest; fast is built in half of the time, and rays take up to a \
@@ -60,8 +67,8 @@ pub fn build_help() -> String {
     )
 }
 
-/// What devices take by default.
-pub fn ways_of_devices() -> String {
+/// The default traversals of devices.
+pub fn traversals_of_devices() -> String {
     format!("{}, {} on software drivers", Traversal::OF_GPUS, Traversal::OF_SOFTWARE_DRIVERS)
 }
 
@@ -76,7 +83,12 @@ impl PictureArgs {
 
     /// The choices asked for.
     pub fn request(&self) -> Request {
-        Request { build: self.build, traversal: self.traversal.pinned(), primary: self.primary.pinned() }
+        Request {
+            accel: self.accel,
+            build: self.build,
+            traversal: self.traversal.pinned(),
+            primary: self.primary.pinned(),
+        }
     }
 
     /// The options asked for; the scene's own fill what was left open, but for what depends on the device:

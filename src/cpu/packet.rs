@@ -218,7 +218,10 @@ impl<S: Simd> Packet<S> {
                 let nearer = found.t.simd_lt(self.best.t)
                     | (found.t.simd_eq(self.best.t) & found.triangle_ix.simd_lt(self.best.triangle_ix));
                 let is_new = found.t.simd_gt(self.t_min) & found.triangle_ix.simd_ne(self.source_triangle);
-                self.best = found.or(self.best, hit & nearer & is_new);
+                let is_better = hit & nearer & is_new;
+                if bindings.is_accepted(triangle_ix) {
+                    self.best = found.or(self.best, is_better);
+                }
             }
         }
     }

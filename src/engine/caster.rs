@@ -30,6 +30,20 @@ impl<'a> Caster<'a> {
         }))
     }
 
+    /// Makes rays pass through the triangles of these indices.
+    ///
+    /// # Errors
+    /// Beyond the device's limits, out of memory.
+    ///
+    /// # Panics
+    /// There is no triangle of an index.
+    pub fn hiding(self, triangles: &[u32]) -> Result<Self, GpuError> {
+        Ok(Self(match self.0 {
+            Processor::Device(caster) => Processor::Device(Box::new(caster.hiding(triangles)?)),
+            Processor::Cpu(caster) => Processor::Cpu(Box::new(caster.hiding(triangles))),
+        }))
+    }
+
     /// Casts rays `n_times`, all of them with the same hits. The times of the result are those of the device's kernel,
     /// or of the CPU's clock.
     ///

@@ -18,7 +18,7 @@ pub use self::{
     renderer::{Rendered, Renderer},
 };
 use crate::{
-    accel::{Query, kdtree::Traversal},
+    accel::{AccelKind, Query, kdtree::Traversal},
     cast::{CastRay, Hit},
     frame::RenderOptions,
     gpu::{Context, ContextOptions, GpuError},
@@ -99,7 +99,9 @@ impl Engine {
     /// The scene has a triangle without a material.
     pub fn build(&self, scene: Scene, workload: &Workload) -> Result<Built, Mismatch> {
         let tree_kind = self.tree_kind(scene.triangles.len(), workload);
-        let world = World::new(scene, &tree_kind.value.options(self.processor()))?;
+        let world = match self.request.accel {
+            AccelKind::KdTree => World::new(scene, &tree_kind.value.options(self.processor()))?,
+        };
         Ok(Built { world, tree_kind })
     }
 

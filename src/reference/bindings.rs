@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::counting::table::{Counted, ReadCounts, Table, Uncounted};
 use crate::{
     accel::kdtree::{Extras, KdTree},
-    layout::{Frame, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, Triangle},
+    layout::{Frame, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN, Triangle},
     scene::Scene,
 };
 
@@ -18,8 +18,10 @@ pub struct Bindings<'a, R = Uncounted> {
     pub cell_min: Vec3,
     pub cell_max: Vec3,
     pub triangles: &'a [Triangle],
-    /// One index into `materials` a triangle.
+    /// One index into `materials` a triangle, or with `filters`, `TRIANGLE_HIDDEN` or 0.
     pub triangle_materials: &'a [u32],
+    /// Whether rays pass through triangles with `TRIANGLE_HIDDEN`.
+    pub filters: bool,
     pub materials: &'a [Material],
     pub lights: &'a [Light],
     pub kd_nodes: Table<'a, KdNode, R>,
@@ -45,6 +47,12 @@ impl<'a, R> Bindings<'a, R> {
     pub fn frame(&self) -> &'a Frame {
         self.frame.expect("rays of a frame")
     }
+
+    /// Whether a hit of the triangle counts.
+    #[inline(always)]
+    pub fn is_accepted(&self, triangle_ix: u32) -> bool {
+        !self.filters || self.triangle_materials[triangle_ix as usize] & TRIANGLE_HIDDEN == 0
+    }
 }
 
 impl<'a> Bindings<'a> {
@@ -66,6 +74,7 @@ impl<'a> Bindings<'a> {
             cell_max: tree.cell_max(),
             triangles,
             triangle_materials: &[],
+            filters: false,
             materials: &[],
             lights: &[],
             kd_nodes: Table::from(tree.nodes()),
@@ -86,6 +95,7 @@ impl<'a> Bindings<'a> {
             cell_max: self.cell_max,
             triangles: self.triangles,
             triangle_materials: self.triangle_materials,
+            filters: self.filters,
             materials: self.materials,
             lights: self.lights,
             kd_nodes: self.kd_nodes.told_to(Counted(&counts.n_nodes)),
@@ -101,6 +111,11 @@ impl<'a> Bindings<'a> {
     /// Of the triangle that was hit.
     pub fn material_at(&self, hit: &Hit) -> &'a Material {
         &self.materials[self.triangle_materials[hit.triangle_ix as usize] as usize]
+    }
+
+    /// The same, with rays that pass through triangles whose word is `TRIANGLE_HIDDEN`.
+    pub fn with_hidden(self, words: &'a [u32]) -> Self {
+        Self { triangle_materials: words, filters: true, ..self }
     }
 
     pub fn with_extras(self, extras: &'a Extras) -> Self {

@@ -29,7 +29,8 @@ pub fn intersect(bindings: &Bindings<impl Reads>, target: &Target, triangle_ix: 
     let triangle = &bindings.triangles[triangle_ix as usize];
     let Some(hit) = target.shear.intersect_triangle(triangle, triangle_ix) else { return };
     let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
-    if hit.t > target.t_min && nearer && triangle_ix != target.source_triangle {
+    let is_of_ray = hit.t > target.t_min && triangle_ix != target.source_triangle;
+    if is_of_ray && nearer && bindings.is_accepted(triangle_ix) {
         *best = hit;
     }
 }

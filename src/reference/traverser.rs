@@ -60,7 +60,9 @@ impl Traverser {
                 Self::ShortStack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
                 Self::Stack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
                 Self::Ropes => follow_ropes::<ANY_HIT>(bindings, ray, best),
-                Self::Brute => *best = brute::closest_hit(bindings.triangles, near),
+                Self::Brute => {
+                    *best = brute::closest_hit_of(bindings.triangles, near, |ix| bindings.is_accepted(ix));
+                }
             }
         })
     }

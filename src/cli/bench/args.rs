@@ -14,7 +14,7 @@ use crate::cli::{
     args::{Size, device},
     error::CliError,
     file_roles::FileRoles,
-    picture_args::{way_help, ways_of_devices},
+    picture_args::{traversal_help, traversals_of_devices},
 };
 
 /// What is measured.
@@ -22,7 +22,7 @@ use crate::cli::{
 pub enum Suite {
     /// The paper's table: its four scenes, whole frames on the GPU and on one CPU thread, beside its own times
     Paper(PaperArgs),
-    /// Every way through the kd-tree, on primary, shadow, mirror and diffuse rays of a mesh
+    /// All traversals of the kd-tree, on primary, shadow, mirror and diffuse rays of a mesh
     Traversal(TraversalArgs),
     /// The traversal against the driver's own ray tracing, on the same rays; exits with 4 where the device lacks it
     Driver(DriverArgs),
@@ -38,8 +38,8 @@ pub struct PaperArgs {
     /// Pixels, as 640x480,1024x768 [default: the paper's three sizes]
     #[arg(long, value_name = "WxH", value_delimiter = ',')]
     pub size: Vec<Size>,
-    #[arg(long, value_name = "WAY")]
-    #[arg(help = format!("Way through the tree on the GPU: {} [default: {}]", Traversal::words(), ways_of_devices()))]
+    #[arg(long, value_name = "ALGORITHM")]
+    #[arg(help = format!("Algorithm by which rays go through the kd-tree on the GPU: {} [default: {}]", Traversal::words(), traversals_of_devices()))]
     pub traversal: Option<Traversal>,
     /// Frames on the GPU
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
@@ -112,8 +112,8 @@ pub struct SizeArgs {
     /// Pixels, one primary ray each
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,
-    #[arg(long, value_name = "WAY")]
-    #[arg(help = way_help())]
+    #[arg(long, value_name = "ALGORITHM")]
+    #[arg(help = traversal_help())]
     pub traversal: Option<Traversal>,
     /// Timed casts of each set of rays
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]

@@ -41,7 +41,10 @@ pub use self::{
     tree::{BuildPolicy, TreeKind},
 };
 use crate::{
-    accel::kdtree::{KdTree, Traversal},
+    accel::{
+        AccelKind,
+        kdtree::{KdTree, Traversal},
+    },
     frame::{Primary, RenderOptions},
     gpu::{Context, DeviceInfo, GpuError},
     layout::KD_ORIGIN_REACH,
@@ -52,6 +55,8 @@ use crate::{
 /// What the user asks for; `None` and [`BuildPolicy::Auto`] leave it open.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Request {
+    /// The kind of the acceleration structure.
+    pub accel: AccelKind,
     pub build: BuildPolicy,
     pub traversal: Option<Traversal>,
     pub primary: Option<Primary>,
@@ -197,8 +202,12 @@ mod tests {
 
     #[test]
     fn what_is_pinned_is_taken() {
-        let request =
-            Request { build: BuildPolicy::Best, traversal: Some(Traversal::Backtrack), primary: Some(Primary::Trace) };
+        let request = Request {
+            build: BuildPolicy::Best,
+            traversal: Some(Traversal::Backtrack),
+            primary: Some(Primary::Trace),
+            ..Request::default()
+        };
         let kind = request.tree(Processor::Gpu, usize::MAX, &Workload::of_rays(0));
         assert_eq!(kind, Chosen { value: TreeKind::Best, by: Reason::Pinned });
         let Methods { traversal, primary, traversal_ns, .. } = request.methods_by_rule(None, 10, (10, 10));

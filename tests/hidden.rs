@@ -1,0 +1,136 @@
+//! Rays that pass through hidden triangles find what they would find in a mesh without these, on the device and on the CPU.
+
+mod support;
+
+use glam::Vec3;
+use kdray::{
+    accel::{Query, kdtree::Traversal},
+    cast::{CastRay, Caster, CpuCaster, Hit, NO_TRIANGLE},
+    gpu::{Context, ContextOptions},
+    layout::{TRIANGLE_HIDDEN, Triangle},
+    reference::{
+        brute,
+        kdtree::hit_from_near,
+        probe::Probe,
+        traverser::{Tracer, Traverser},
+    },
+};
+use support::{MeshWithTree, compare, meshes, random::Random, rays::nasty_ray};
+
+const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
+
+/// A mesh, and the indices of those of its triangles that are hidden.
+struct Case {
+    mesh: MeshWithTree,
+    hidden: Vec<u32>,
+}
+
+impl Case {
+    /// Hides about half of the triangles.
+    fn new(triangles: Vec<Triangle>) -> Self {
+        let mut random = Random(5);
+        let hidden = (0..triangles.len() as u32).filter(|_| random.below(2) == 0).collect();
+        Self { mesh: MeshWithTree::new(triangles), hidden }
+    }
+
+    fn rays(&self) -> Vec<CastRay> {
+        let ray = |i| nasty_ray(&mut Random(i as u64), &self.mesh, i);
+        let cast_ray =
+            |i| CastRay { origin: ray(i).origin, t_min: 0.0, direction: ray(i).direction, t_max: ray(i).t_max };
+        (0..3000).map(cast_ray).collect()
+    }
+
+    /// The closest hits among the triangles that are not hidden, each of which is tested.
+    fn by_brute_force(&self, rays: &[CastRay]) -> Vec<Hit> {
+        let all = &self.mesh.triangles;
+        let visible: Vec<u32> = (0..all.len() as u32).filter(|ix| !self.hidden.contains(ix)).collect();
+        let triangles: Vec<Triangle> = visible.iter().map(|&ix| all[ix as usize]).collect();
+        let hit_of = |ray: &CastRay| {
+            let &CastRay { origin, t_min, direction, t_max } = ray;
+            let probe = Probe { origin, t_min, direction, t_max, source_triangle: NO_TRIANGLE };
+            let hit = hit_from_near(&self.mesh.bindings(), &probe, |near, best| {
+                *best = brute::closest_hit(&triangles, near);
+            });
+            if hit.triangle_ix == NO_TRIANGLE {
+                return MISS;
+            }
+            Hit { triangle_ix: visible[hit.triangle_ix as usize], ..hit }
+        };
+        rays.iter().map(hit_of).collect()
+    }
+}
+
+/// Each triangle of the second mesh is there three times: with one of them hidden, another has the hit.
+fn cases() -> [Case; 3] {
+    [meshes::soup(600, 3), meshes::threefold(meshes::torus(20, 10)), meshes::cube(6, 0.0)].map(Case::new)
+}
+
+fn occluded(hits: &[Hit]) -> Vec<bool> {
+    hits.iter().map(|hit| hit.triangle_ix != NO_TRIANGLE).collect()
+}
+
+#[test]
+fn the_device_finds_what_is_not_hidden() {
+    let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
+    let n_outliers = |n_rays: usize| if context.is_software() { 0 } else { n_rays.div_ceil(500) };
+    for case in cases() {
+        let rays = case.rays();
+        let expected = case.by_brute_force(&rays);
+        for &traversal in Traversal::ALL {
+            let caster = Caster::new(&context, case.mesh.geometry(), traversal).expect("a caster");
+            let mut caster = caster.hiding(&case.hidden).expect("hidden triangles");
+            let closest = caster.cast(&rays, Query::Closest, 1).expect("a cast").hits;
+            compare::hits(n_outliers(rays.len()), &expected, &closest).unwrap_or_else(|e| panic!("{traversal}: {e}"));
+            let any = caster.cast(&rays, Query::Any, 1).expect("a cast").hits;
+            let differing = occluded(&expected).iter().zip(occluded(&any)).filter(|(a, b)| *a != b).count();
+            assert!(differing <= n_outliers(rays.len()), "{traversal}: {differing}");
+            assert!(any.iter().all(|hit| !case.hidden.contains(&hit.triangle_ix)), "{traversal}");
+        }
+    }
+    assert_eq!(context.validation_messages(), Vec::<String>::new());
+}
+
+#[test]
+fn the_cpu_finds_what_is_not_hidden() {
+    for case in cases() {
+        let rays = case.rays();
+        let expected = case.by_brute_force(&rays);
+        for &traversal in Traversal::ALL {
+            let caster = CpuCaster::new(case.mesh.geometry(), traversal).hiding(&case.hidden);
+            compare::exact(&expected, &caster.cast(&rays, Query::Closest))
+                .unwrap_or_else(|e| panic!("{traversal}: {e}"));
+            let any = caster.cast(&rays, Query::Any);
+            assert_eq!(occluded(&expected), occluded(&any), "{traversal}");
+            assert!(any.iter().all(|hit| !case.hidden.contains(&hit.triangle_ix)), "{traversal}");
+        }
+    }
+}
+
+/// The tests above would prove nothing of rays that meet the same triangles with and without a filter.
+#[test]
+fn without_a_filter_hidden_triangles_are_hit() {
+    for case in cases() {
+        let rays = case.rays();
+        let expected = case.by_brute_force(&rays);
+        let found = CpuCaster::new(case.mesh.geometry(), Traversal::Mask).cast(&rays, Query::Closest);
+        assert!(compare::exact(&expected, &found).is_err());
+        assert!(found.iter().filter(|hit| case.hidden.contains(&hit.triangle_ix)).count() > 100);
+    }
+}
+
+#[test]
+fn a_mesh_of_which_all_is_hidden_is_not_there() {
+    let mesh = MeshWithTree::new(meshes::cube(2, 0.0));
+    let mut traverser = Traverser::new(Traversal::Mask);
+    let into = Probe {
+        origin: Vec3::new(0.1, 0.2, 9.0),
+        t_min: 0.0,
+        direction: -Vec3::Z,
+        t_max: f32::INFINITY,
+        source_triangle: NO_TRIANGLE,
+    };
+    assert_ne!(traverser.traverse::<false>(&mesh.bindings(), &into).triangle_ix, NO_TRIANGLE);
+    let words = vec![TRIANGLE_HIDDEN; mesh.triangles.len()];
+    let bindings = mesh.bindings().with_hidden(&words);
+    assert_eq!(traverser.traverse::<false>(&bindings, &into).triangle_ix, NO_TRIANGLE);
+}
