@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("usage: render SCENE PICTURE".into());
     };
     let scene = Scene::load(&scene)?;
-    let options = RenderOptions::of_scene(&scene);
+    let options = RenderOptions::of_defaults(&scene.defaults);
     // The engine chooses a tree that suits the number of rays.
     let workload = Workload::of_pictures(&options, scene.lights.len(), 1);
     // A machine without a Vulkan driver renders on the CPU.

@@ -19,11 +19,10 @@ use kdray::{
     },
     layout::{Hit, NO_TRIANGLE, Ray},
     reference::traverser::{Tracer, Traverser},
-    scene::Scene,
-    world::World,
+    world::{FlatScene, World},
 };
 use serde_json::Value;
-use support::meshes::torus;
+use support::{meshes::torus, scenes};
 use tempfile::TempDir;
 
 const SIZE: (u32, u32) = (33, 23);
@@ -40,9 +39,9 @@ fn write_mesh(directory: &Path) -> PathBuf {
     path
 }
 
-fn mesh() -> Scene {
+fn mesh() -> FlatScene {
     let directory = TempDir::new().unwrap();
-    Scene::load(&write_mesh(directory.path())).unwrap()
+    scenes::load(&write_mesh(directory.path()))
 }
 
 fn closest_hits(stage: &Stage, rays: &[Ray]) -> Vec<Hit> {

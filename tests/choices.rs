@@ -18,8 +18,8 @@ use kdray::{
     gpu::DeviceInfo,
     layout::Triangle,
     render::Renderer,
-    scene::{Camera, Scene},
-    world::World,
+    scene::Camera,
+    world::{FlatScene, World},
 };
 use support::{meshes, pretended, random::Random, scenes, with_lanes, world_by, world_of};
 use tempfile::TempDir;
@@ -192,7 +192,7 @@ fn small_scenes_and_short_runs_are_not_measured() {
 }
 
 /// A knot of some thousand triangles.
-fn scene() -> Scene {
+fn scene() -> FlatScene {
     let mut scene = scenes::empty();
     scenes::add(&mut scene, meshes::torus(80, 40), scenes::diffuse(Vec3::ONE));
     scene

@@ -22,7 +22,7 @@ fn an_engine_renders_and_casts_alike_on_device_and_cpu() {
     let engines = [device.clone(), Engine::on_cpu()];
     let rendered = engines.map(|engine| {
         let workload = Workload::of_pictures(&options, scene.lights.len(), 1);
-        let Built { world, .. } = engine.build(scene.clone(), &workload).expect("a world");
+        let Built { world, .. } = engine.build_flat(scene.clone(), &workload).expect("a world");
         let picture = engine.render(&world, &options).expect("a picture").picture;
         let eye = scene.camera.eye;
         let ray = |i: u32| CastRay {

@@ -11,7 +11,7 @@ use kdray::{
     gpu::{Context, ContextOptions},
     layout::Counters,
     render::Renderer,
-    scene::Scene,
+    world::FlatScene,
 };
 use serde_json::Value;
 use support::{
@@ -30,7 +30,7 @@ fn context() -> Arc<Context> {
     Context::new(&ContextOptions::new(None, true)).expect("a device with validation")
 }
 
-fn renderer(context: &Arc<Context>, scene: &Scene, options: &RenderOptions, capacity: u32) -> Renderer {
+fn renderer(context: &Arc<Context>, scene: &FlatScene, options: &RenderOptions, capacity: u32) -> Renderer {
     let world = world_of(scene);
     Renderer::with_queue_capacity(context.clone(), &world, options, capacity).expect("a renderer")
 }

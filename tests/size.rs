@@ -4,7 +4,7 @@ mod support;
 
 use std::{collections::HashMap, fs};
 
-use kdray::{bench::size::knot, layout::BRUTE_MAX_TRIANGLES};
+use kdray::{bench::size::knot, layout::BRUTE_MAX_TRIANGLES, world::FlatScene};
 use serde_json::Value;
 use support::command::{fail, kdray, names, stderr, stdout, succeed};
 use tempfile::TempDir;
@@ -12,7 +12,7 @@ use tempfile::TempDir;
 #[test]
 fn knots_of_all_sizes_are_closed_and_alike() {
     let size = |n_triangles| {
-        let triangles = knot(n_triangles).triangles;
+        let triangles = FlatScene::new(&knot(n_triangles)).expect("a knot").triangles;
         assert_eq!(triangles.len(), n_triangles as usize & !1);
         let mut edges = HashMap::new();
         for t in &triangles {

@@ -17,8 +17,8 @@ use kdray::{
     },
     passes::Passes,
     render::Renderer,
-    scene::{Camera, RenderDefaults, Scene},
-    world::World,
+    scene::{Camera, RenderDefaults},
+    world::{FlatScene, World},
 };
 use support::{
     MeshWithTree, meshes,
@@ -34,10 +34,10 @@ fn context() -> Arc<Context> {
 }
 
 /// The triangles under a lamp and a sun.
-fn scene(triangles: &[Triangle]) -> Scene {
+fn scene(triangles: &[Triangle]) -> FlatScene {
     let lamp = Light { position: vec3(0.3, 1.5, 0.2), kind: LIGHT_POINT, intensity: Vec3::ONE, reserved: 0 };
     let sun = Light { position: vec3(0.48, 0.6, 0.64), kind: LIGHT_DIRECTIONAL, ..lamp };
-    Scene {
+    FlatScene {
         name: "variants".into(),
         triangles: triangles.to_vec(),
         triangle_materials: vec![0; triangles.len()],
@@ -60,7 +60,7 @@ struct Traced {
     n_hits: u32,
 }
 
-fn traced(context: &Arc<Context>, scene: &Scene, tree: &KdTree, rays: &[Ray], traversal: Traversal) -> Traced {
+fn traced(context: &Arc<Context>, scene: &FlatScene, tree: &KdTree, rays: &[Ray], traversal: Traversal) -> Traced {
     let options = RenderOptions { width: 8, height: 8, max_depth: 1, traversal, ..RenderOptions::default() };
     let world = World::with_tree(scene.clone(), tree.clone(), &BuildOptions::default()).expect("a world");
     let constants = Frame { queue_capacity: rays.len() as u32, ..frame_constants(&world, &options) };

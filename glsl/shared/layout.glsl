@@ -187,7 +187,7 @@ struct Material {
     vec3 ke;
     uint flags;
     vec3 tf;
-    uint illum;
+    uint reserved;
 };
 
 // 32 bytes. Point: position, intensity in power per steradian (falls with the square of distance).

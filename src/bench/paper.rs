@@ -17,8 +17,7 @@ use crate::{
     frame::{BounceStats, Profile, RenderOptions},
     gpu::{Context, GpuError},
     render::BandedRenderer,
-    scene::Scene,
-    world::World,
+    world::{FlatScene, World},
 };
 
 /// The shipped scenes' names, in the paper's order.
@@ -51,8 +50,8 @@ impl Reported {
 }
 
 /// The scene's own options at another size.
-pub fn options(scene: &Scene, (width, height): (u32, u32), traversal: Traversal) -> RenderOptions {
-    RenderOptions { traversal, width, height, ..RenderOptions::of_scene(scene) }
+pub fn options(scene: &FlatScene, (width, height): (u32, u32), traversal: Traversal) -> RenderOptions {
+    RenderOptions { traversal, width, height, ..RenderOptions::of_defaults(&scene.defaults) }
 }
 
 /// Frames drawn on a device by the primary rays that suit it, after a warm-up, which also finds how many batches the frame needs.
@@ -116,7 +115,7 @@ pub struct Row {
 
 impl Row {
     /// From the profiles of frames drawn on a device, at least one, and on one thread.
-    pub fn new(scene: &Scene, options: &RenderOptions, on_gpu: &[Profile], on_cpu: &[Profile]) -> Self {
+    pub fn new(scene: &FlatScene, options: &RenderOptions, on_gpu: &[Profile], on_cpu: &[Profile]) -> Self {
         let size = (options.width, options.height);
         let times = |frames: &[Profile]| Spread::of(frames.iter().filter_map(|frame| frame.frame_ms));
         let bounces = on_gpu.first().map_or(&[][..], |frame| &frame.bounces);

@@ -17,12 +17,11 @@ use super::{
 use crate::{
     accel::kdtree::{BuildOptions, Statistics, Traversal},
     gpu::{Context, GpuError},
-    layout::Material,
     scene::{
-        Camera, RenderDefaults, Scene,
+        Camera, Instance, Material, RenderDefaults, Scene, Transform,
         generate::{Budget, Generator, MAX_TRIANGLES},
-        mesh::Transform,
     },
+    world::FlatScene,
 };
 
 /// Numbers of triangles that are measured unless others are asked for.
@@ -47,13 +46,11 @@ pub fn knot(n_triangles: u32) -> Scene {
     );
     let generator: Generator = toml::from_str(&description).expect("the generator knows its words");
     let mesh = generator.build(&Budget::default()).expect("numbers within its limits and memory");
-    let triangles = mesh.to_world(&Transform::IDENTITY).expect("a knot of a few units");
     Scene {
         name: "knot".to_owned(),
-        triangle_materials: vec![0; triangles.len()],
-        triangles,
+        meshes: vec![mesh],
+        instances: vec![Instance { mesh_ix: 0, transform: Transform::IDENTITY, materials: vec![0] }],
         materials: vec![Material::default()],
-        material_names: vec!["none".to_owned()],
         lights: Vec::new(),
         camera: Camera { eye: Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 60.0 },
         ambient: Vec3::ZERO,
@@ -73,7 +70,7 @@ impl Sized {
     /// `size`: pixels, one primary ray each.
     pub fn new(n_triangles: u32, size: (u32, u32), build_options: &BuildOptions) -> Self {
         let begin = Instant::now();
-        let scene = knot(n_triangles);
+        let scene = FlatScene::new(&knot(n_triangles)).expect("a knot of a few units");
         let generate_ms = begin.elapsed().as_secs_f64() * 1e3;
         Self { n_triangles: scene.triangles.len(), stage: Stage::in_room(scene, size, build_options), generate_ms }
     }

@@ -9,8 +9,8 @@ use crate::{
     frame::{RenderOptions, frame_constants},
     layout::{FLAT_NORMAL, Frame, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
     reference::bindings::Bindings,
-    scene::{Camera, Scene, framing},
-    world::World,
+    scene::Camera,
+    world::{FlatScene, World},
 };
 
 /// From the middle of the picture towards the eye, in a room: from the front, the right and above.
@@ -36,11 +36,11 @@ impl Stage {
     ///
     /// # Panics
     /// The scene has a triangle without a material.
-    pub fn open(scene: Scene, size: (u32, u32), build_options: &BuildOptions) -> Self {
+    pub fn open(scene: FlatScene, size: (u32, u32), build_options: &BuildOptions) -> Self {
         let above = Light { position: Vec3::Y, kind: LIGHT_DIRECTIONAL, intensity: Vec3::ONE, reserved: 0 };
         let light = scene.lights.first().copied().unwrap_or(above);
         let begin = Instant::now();
-        let world = World::new(scene, build_options).expect("a material for each triangle");
+        let world = World::of_flat(scene, build_options).expect("a material for each triangle");
         let tree_build_ms = begin.elapsed().as_secs_f64() * 1e3;
         let options = RenderOptions { width: size.0, height: size.1, ..RenderOptions::default() };
         let frame = frame_constants(&world, &options);
@@ -49,8 +49,8 @@ impl Stage {
 
     /// The scene on the floor of a closed room, seen from inside the room, with a point light under its ceiling.
     /// No ray from inside misses.
-    pub fn in_room(mut scene: Scene, size: (u32, u32), build_options: &BuildOptions) -> Self {
-        let room = Room::around(&scene.triangles);
+    pub fn in_room(mut scene: FlatScene, size: (u32, u32), build_options: &BuildOptions) -> Self {
+        let room = Room::around(scene.bounds());
         scene.triangles.extend(room.walls());
         scene.triangle_materials.resize(scene.triangles.len(), 0);
         scene.camera = room.camera;
@@ -59,7 +59,7 @@ impl Stage {
     }
 
     /// The scene.
-    pub fn scene(&self) -> &Scene {
+    pub fn scene(&self) -> &FlatScene {
         self.world.scene()
     }
 
@@ -86,8 +86,7 @@ impl Room {
     /// Lengths are in radii of the sphere around the mesh's bounding box: walls 2 from the middle, the ceiling 1.5
     /// above it, the floor 0.05 below the mesh, the eye where it sees the whole sphere (2.1), the light 0.1 below
     /// the ceiling.
-    fn around(triangles: &[Triangle]) -> Self {
-        let (min, max) = framing::bounds(triangles);
+    fn around((min, max): (Vec3, Vec3)) -> Self {
         let centre = (min + max) / 2.0;
         // All in one point: any radius will do, but it must change the coordinates.
         let radius = ((max - min).length() / 2.0).max(centre.abs().max_element() * 1e-3).max(1e-6);
@@ -139,7 +138,7 @@ mod tests {
     fn camera_light_and_mesh_are_inside_the_room() {
         let corners = [vec3(5.0, -1.0, 2.0), vec3(9.0, 0.0, 2.5), vec3(5.5, 3.0, 2.0)];
         let [v0, v1, v2] = corners;
-        let room = Room::around(&[Triangle { v0, v1, v2, ..Triangle::default() }]);
+        let room = Room::around((v0.min(v1).min(v2), v0.max(v1).max(v2)));
         for p in corners.iter().chain([&room.camera.eye, &room.light.position]) {
             assert!(p.cmpgt(room.min).all() && p.cmplt(room.max).all(), "{p} in {} to {}", room.min, room.max);
         }
@@ -147,7 +146,7 @@ mod tests {
 
     #[test]
     fn six_walls_close_the_room() {
-        let room = Room::around(&[Triangle { v0: Vec3::X, v1: Vec3::Y, v2: Vec3::Z, ..Triangle::default() }]);
+        let room = Room::around((Vec3::ZERO, Vec3::ONE));
         let walls = room.walls();
         let area = |t: &Triangle| (t.v1 - t.v0).cross(t.v2 - t.v0).length() / 2.0;
         let size = room.max - room.min;
@@ -159,7 +158,7 @@ mod tests {
     #[test]
     fn a_mesh_of_one_point_gets_a_room_all_the_same() {
         let v = vec3(100.0, 0.0, 0.0);
-        let room = Room::around(&[Triangle { v0: v, v1: v, v2: v, ..Triangle::default() }]);
+        let room = Room::around((v, v));
         assert!(room.min.cmplt(v).all() && room.max.cmpgt(v).all() && room.camera.eye != v);
     }
 }

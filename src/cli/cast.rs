@@ -40,7 +40,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
 
     let engine = context.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.request());
-    let (n_triangles, workload) = (scene.triangles.len(), Workload::of_rays(rays.n_rays()));
+    let (n_triangles, workload) = (scene.n_triangles(), Workload::of_rays(rays.n_rays()));
     build::check_memory(engine.tree_kind(n_triangles, &workload).value, n_triangles)?;
     let building = format!("building the kd-tree of {n_triangles} triangles");
     let (built, build_ms) = progress.stage(&building, || engine.build(scene, &workload));

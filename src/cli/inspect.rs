@@ -3,8 +3,10 @@
 use kdray::{
     accel::kdtree::{KdTree, Statistics},
     engine::choices::{Processor, TreeKind},
+    gpu::GpuError,
     layout::{LIGHT_DIRECTIONAL, Light},
     scene::Scene,
+    world::FlatScene,
 };
 use serde::Serialize;
 
@@ -14,7 +16,7 @@ use super::{args::InspectArgs, build, error::CliError, print, print_raw, progres
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let progress = Progress::new(false, 2);
     let (scene, load_ms) = progress.stage(&format!("loading {}", args.scene.display()), || Scene::load(&args.scene));
-    let scene = scene?;
+    let scene = FlatScene::new(&scene?).map_err(GpuError::from)?;
     let n_triangles = scene.triangles.len();
     let building = format!("building the kd-tree of {n_triangles} triangles");
     let options = TreeKind::Best.options(Processor::Gpu);
@@ -77,7 +79,7 @@ impl From<&Light> for LightUse {
     }
 }
 
-fn material_uses(scene: &Scene) -> Vec<MaterialUse> {
+fn material_uses(scene: &FlatScene) -> Vec<MaterialUse> {
     let mut uses: Vec<_> =
         scene.material_names.iter().map(|name| MaterialUse { name: name.clone(), triangles: 0 }).collect();
     for &material_ix in &scene.triangle_materials {

@@ -37,7 +37,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     let scene = scene?;
     scene.warn_if_unlit(&args.scene);
     let options = args.picture.options(&scene);
-    build::check_memory(TreeKind::Best, scene.triangles.len())?;
+    build::check_memory(TreeKind::Best, scene.n_triangles())?;
     let tour = tour(args, scene.camera)?;
     let max_samples = args.spp.unwrap_or(if tour.is_some() { 1 } else { SAMPLES_AT_REST });
     let workload = match &tour {
@@ -49,7 +49,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     };
     let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
     let load_options = LoadOptions { request: args.picture.request(), processor, workload };
-    let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
+    let building = format!("building the kd-tree of {} triangles", scene.n_triangles());
     let (loaded, _) = progress.stage(&building, || Loaded::with_tree(&args.scene, scene, load_options));
     drop(progress);
 

@@ -23,7 +23,7 @@ use crate::{
     frame::RenderOptions,
     gpu::{Context, ContextOptions, GpuError},
     scene::Scene,
-    world::{Geometry, Mismatch, World},
+    world::{FlatScene, Geometry, Mismatch, World},
 };
 
 /// A device that renders and casts, and the choices that are made for it. A clone is a second handle to the same device.
@@ -96,11 +96,22 @@ impl Engine {
     /// Chooses a tree for the workload and builds it on the current rayon pool.
     ///
     /// # Errors
-    /// The scene has a triangle without a material.
+    /// The scene does not fit together: see [`Mismatch`].
     pub fn build(&self, scene: Scene, workload: &Workload) -> Result<Built, Mismatch> {
+        let flat = FlatScene::new(&scene)?;
+        // The tree needs the memory.
+        drop(scene);
+        self.build_flat(flat, workload)
+    }
+
+    /// Does what [`Engine::build`] does with a scene that is flattened already.
+    ///
+    /// # Errors
+    /// The scene has a triangle without a material.
+    pub fn build_flat(&self, scene: FlatScene, workload: &Workload) -> Result<Built, Mismatch> {
         let tree_kind = self.tree_kind(scene.triangles.len(), workload);
         let world = match self.request.accel {
-            AccelKind::KdTree => World::new(scene, &tree_kind.value.options(self.processor()))?,
+            AccelKind::KdTree => World::of_flat(scene, &tree_kind.value.options(self.processor()))?,
         };
         Ok(Built { world, tree_kind })
     }

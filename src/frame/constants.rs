@@ -106,7 +106,8 @@ mod tests {
         accel::kdtree::BuildOptions,
         layout::Triangle,
         reference::camera::{camera_direction, in_picture},
-        scene::{RenderDefaults, Scene},
+        scene::RenderDefaults,
+        world::FlatScene,
     };
 
     /// A view of one triangle.
@@ -117,7 +118,7 @@ mod tests {
     fn part(camera: Camera, options: RenderOptions, sample_ix: u32) -> Frame {
         let corner = |direction| camera.target + 3.0 * (camera.target - camera.eye).length() * direction;
         let triangle = Triangle { v0: corner(Vec3::X), v1: corner(Vec3::Y), v2: corner(Vec3::Z), ..Default::default() };
-        let scene = Scene {
+        let scene = FlatScene {
             name: String::new(),
             triangles: vec![triangle],
             triangle_materials: vec![0],
@@ -129,7 +130,7 @@ mod tests {
             background: Vec3::ZERO,
             defaults: RenderDefaults::default(),
         };
-        let world = World::new(scene, &BuildOptions::default()).expect("a material for each triangle");
+        let world = World::of_flat(scene, &BuildOptions::default()).expect("a material for each triangle");
         let mut frame = frame_constants(&world, &options);
         frame.set_view(&camera, world.bounds(), sample_ix);
         frame

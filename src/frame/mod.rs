@@ -24,11 +24,7 @@ pub use self::{
     resource::Resource,
     view::View,
 };
-use crate::{
-    accel::kdtree::Traversal,
-    layout,
-    scene::{RenderDefaults, Scene},
-};
+use crate::{accel::kdtree::Traversal, layout, scene::RenderDefaults};
 
 /// How a frame is rendered. The scene's own defaults fill what the user leaves open.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,8 +51,8 @@ pub struct RenderOptions {
 
 impl RenderOptions {
     /// The options that a scene asks for.
-    pub fn of_scene(scene: &Scene) -> Self {
-        let RenderDefaults { width, height, max_depth, exposure, tonemap, denoise } = scene.defaults;
+    pub fn of_defaults(defaults: &RenderDefaults) -> Self {
+        let &RenderDefaults { width, height, max_depth, exposure, tonemap, denoise } = defaults;
         Self { width, height, max_depth, exposure, tonemap, denoise, ..Self::default() }
     }
 }

@@ -1,5 +1,6 @@
 //! The structs, constants and bindings that the kernels share with the host, generated from `glsl/shared/layout.glsl`.
 
+pub mod normal;
 #[cfg(test)]
 mod scene_arrays;
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::counting::table::{Counted, ReadCounts, Table, Uncounted};
 use crate::{
     accel::kdtree::{Extras, KdTree},
     layout::{Frame, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN, Triangle},
-    scene::Scene,
+    world::FlatScene,
 };
 
 /// The scene, its tree and the frame's constants. `R`: who is told of reads of the tree.
@@ -56,7 +56,7 @@ impl<'a, R> Bindings<'a, R> {
 }
 
 impl<'a> Bindings<'a> {
-    pub fn new(scene: &'a Scene, tree: &'a KdTree, frame: &'a Frame) -> Self {
+    pub fn new(scene: &'a FlatScene, tree: &'a KdTree, frame: &'a Frame) -> Self {
         Self {
             triangle_materials: &scene.triangle_materials,
             materials: &scene.materials,

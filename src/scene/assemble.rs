@@ -7,20 +7,18 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use super::{
-    Camera, RenderDefaults, Scene,
+    Camera, Light, Material, RenderDefaults, Scene,
     description::{CameraSpec, CommonSpec, DenoiseWord, Description, LightSpec, MeshSpec, RenderSpec, Source},
     error::{Checked, SceneError},
     extent, framing,
     generate::Budget,
     material::{MaterialSpec, colour, within},
-    mesh::{MAX_COORDINATE, Mesh, finite},
+    mesh::MAX_COORDINATE,
     obj::{Library, parse_obj, read_obj},
     read::read_utf8,
+    transform::finite,
 };
-use crate::{
-    frame::Denoise,
-    layout::{LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Material},
-};
+use crate::frame::Denoise;
 
 /// Loads a scene file, and the meshes that it names relative to its folder.
 pub(super) fn load_toml(path: &Path) -> Result<Scene, SceneError> {
@@ -64,8 +62,8 @@ fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> 
     let mut scene = Scene::empty(file.path);
     let mut materials = HashMap::new();
     for (name, spec) in &description.materials {
-        let material = file.check(&format!("material `{name}`"), spec, MaterialSpec::material)?;
-        materials.insert(name.clone(), scene.push_material(name, material));
+        let material = file.check(&format!("material `{name}`"), spec, |spec| spec.material(name))?;
+        materials.insert(name.clone(), scene.push_material(material));
     }
     for (ix, spec) in description.light.iter().enumerate() {
         scene.lights.push(file.check(&format!("light {}", ix + 1), spec, light)?);
@@ -83,13 +81,14 @@ fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> 
     for (ix, table) in description.mesh.into_iter().enumerate() {
         n_generated += add_mesh(file, &mut scene, &materials, n_generated, (ix, table))?;
     }
-    if scene.triangles.is_empty() {
+    if scene.n_triangles() == 0 {
         return Err(SceneError::file(file.path, "has no triangles"));
     }
-    extent::check(file.path, &scene.triangles)?;
+    let bounds = scene.bounds();
+    extent::check(file.path, bounds)?;
     scene.camera = match &description.camera {
         Some(spec) => file.check("camera", spec, camera)?,
-        None => framing::camera(&scene.triangles),
+        None => framing::camera(bounds),
     };
     Ok(scene)
 }
@@ -109,14 +108,14 @@ fn add_mesh(
     let MeshSpec { source, common } = MeshSpec::new(table.into_inner()).map_err(failed)?;
     let transform = common.transform.transform().map_err(failed)?;
     let named = named_materials(&common, materials).map_err(failed)?;
-    let n_loaded = scene.triangles.len();
+    let n_loaded = scene.n_triangles();
     let (mesh, slots, n_made) = match source {
         Source::File { path, shading } => {
             let path = file.path.parent().unwrap_or(Path::new("")).join(path);
             // The name may be misspelt in the scene file: the error says where that is.
             let text = read_obj(&path).map_err(|error| failed(error.to_string()))?;
             let (mesh, library) = parse_obj(&path, &text, shading, n_loaded)?;
-            let slots = if named.is_empty() { scene.push_library(&library) } else { named };
+            let slots = if named.is_empty() { scene.push_library(library) } else { named };
             (mesh, slots, 0)
         }
         Source::Generator(generator) => {
@@ -133,8 +132,7 @@ fn add_mesh(
             (mesh, slots, n_made)
         }
     };
-    scene.triangles.extend(mesh.to_world(&transform).map_err(failed)?);
-    scene.push_slots(&mesh, &slots);
+    scene.push_mesh(mesh, transform, slots).map_err(failed)?;
     Ok(n_made)
 }
 
@@ -147,48 +145,41 @@ fn named_materials(common: &CommonSpec, materials: &HashMap<String, u32>) -> Che
 }
 
 impl Scene {
-    pub(super) fn push_material(&mut self, name: &str, material: Material) -> u32 {
+    fn push_material(&mut self, material: Material) -> u32 {
         self.materials.push(material);
-        self.material_names.push(name.to_owned());
         (self.materials.len() - 1) as u32
     }
 
     /// Index of the material of meshes that have none.
-    pub(super) fn default_material(&mut self) -> u32 {
+    fn default_material(&mut self) -> u32 {
         const NAME: &str = "(default)";
-        if let Some(ix) = self.material_names.iter().position(|name| name == NAME) {
+        if let Some(ix) = self.materials.iter().position(|material| material.name == NAME) {
             return ix as u32;
         }
-        let material = MaterialSpec::default().material().expect("defaults are in range");
-        self.push_material(NAME, material)
+        self.push_material(MaterialSpec::default().material(NAME).expect("defaults are in range"))
     }
 
     /// Adds a library's materials; returns the slots of the mesh that came with it, the last one for no material.
-    pub(super) fn push_library(&mut self, library: &Library) -> Vec<u32> {
-        let materials = library.names.iter().zip(&library.materials);
-        let mut slots: Vec<u32> = materials.map(|(name, material)| self.push_material(name, *material)).collect();
+    pub(super) fn push_library(&mut self, library: Library) -> Vec<u32> {
+        let mut slots: Vec<u32> = library.materials.into_iter().map(|material| self.push_material(material)).collect();
         slots.push(self.default_material());
         slots
-    }
-
-    /// One material a triangle of the mesh; slots beyond the last material start over.
-    pub(super) fn push_slots(&mut self, mesh: &Mesh, materials: &[u32]) {
-        self.triangle_materials.extend(mesh.slots.iter().map(|slot| materials[*slot as usize % materials.len()]));
     }
 }
 
 fn light(spec: &LightSpec) -> Checked<Light> {
-    let (kind, position, intensity) = match *spec {
-        LightSpec::Point { position, intensity } => {
-            (LIGHT_POINT, point("position", position)?, colour("intensity", Some(intensity), Vec3::ZERO)?)
-        }
+    match *spec {
+        LightSpec::Point { position, intensity } => Ok(Light::Point {
+            position: point("position", position)?,
+            intensity: colour("intensity", Some(intensity), Vec3::ZERO)?,
+        }),
         LightSpec::Directional { direction, irradiance } => {
             let travels = finite("direction", direction)?.try_normalize();
             let travels = travels.ok_or_else(|| format!("direction = {direction:?} has no direction"))?;
-            (LIGHT_DIRECTIONAL, -travels.as_vec3(), colour("irradiance", Some(irradiance), Vec3::ZERO)?)
+            let irradiance = colour("irradiance", Some(irradiance), Vec3::ZERO)?;
+            Ok(Light::Directional { towards: -travels.as_vec3(), irradiance })
         }
-    };
-    Ok(Light { position, kind, intensity, reserved: 0 })
+    }
 }
 
 pub(super) fn camera(spec: &CameraSpec) -> Checked<Camera> {

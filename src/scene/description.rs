@@ -9,8 +9,8 @@ use super::{
     error::Checked,
     generate::Generator,
     material::MaterialSpec,
-    mesh::TransformSpec,
     obj::{DEFAULT_CREASE, Shading},
+    transform::TransformSpec,
 };
 
 /// A scene file. Vectors are arrays of three numbers; colours are linear RGB.

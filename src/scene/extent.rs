@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use super::{SceneError, framing::bounds};
-use crate::layout::Triangle;
+use glam::Vec3;
+
+use super::SceneError;
 
 /// Scenes whose longest side is less are refused: products of their coordinates would underflow.
 ///
@@ -22,9 +23,8 @@ pub const MIN_EXTENT: f32 = 1e-8;
 const MIN_STEPS: f64 = 65_536.0;
 
 /// Refuses a scene that is too small to be traced, and warns of one that lies so far from the origin that its
-/// coordinates are coarse.
-pub(super) fn check(path: &Path, triangles: &[Triangle]) -> Result<(), SceneError> {
-    let (min, max) = bounds(triangles);
+/// coordinates are coarse. The bounds are those of all triangles.
+pub(super) fn check(path: &Path, (min, max): (Vec3, Vec3)) -> Result<(), SceneError> {
     let extent = (max.as_dvec3() - min.as_dvec3()).max_element();
     let largest = min.abs().max(max.abs()).max_element();
     let spacing = f64::from(largest.next_up()) - f64::from(largest);

@@ -2,8 +2,7 @@
 
 use glam::Vec3;
 
-use super::Camera;
-use crate::layout::{LIGHT_DIRECTIONAL, Light, Triangle};
+use super::{Camera, Light};
 
 /// From the middle of the picture towards the eye: from the front, the right and above.
 const TOWARDS_EYE: Vec3 = Vec3::new(0.45, 0.35, 1.0);
@@ -11,15 +10,8 @@ const VERTICAL_FOV_DEGREES: f32 = 40.0;
 /// Room around the bounding sphere.
 const MARGIN: f32 = 1.05;
 
-/// Smallest and largest coordinates of all corners.
-pub fn bounds(triangles: &[Triangle]) -> (Vec3, Vec3) {
-    let corners = triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]);
-    corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
-}
-
 /// Sees the whole bounding sphere of the bounding box, in any picture that is not higher than wide.
-pub(super) fn camera(triangles: &[Triangle]) -> Camera {
-    let (min, max) = bounds(triangles);
+pub(super) fn camera((min, max): (Vec3, Vec3)) -> Camera {
     let centre = (min + max) / 2.0;
     // A small scene far from the origin: the eye must be farther away than rounding of its coordinates is.
     let radius = ((max - min).length() / 2.0).max(centre.abs().max_element() * 1e-3);
@@ -34,10 +26,5 @@ pub(super) fn camera(triangles: &[Triangle]) -> Camera {
 
 /// From over the camera's left shoulder.
 pub(super) fn light() -> Light {
-    Light {
-        position: Vec3::new(-0.4, 0.8, 0.7).normalize(),
-        kind: LIGHT_DIRECTIONAL,
-        intensity: Vec3::splat(0.8),
-        reserved: 0,
-    }
+    Light::Directional { towards: Vec3::new(-0.4, 0.8, 0.7).normalize(), irradiance: Vec3::splat(0.8) }
 }

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use super::Scene;
+use super::{Light, Scene};
 
 impl Scene {
     /// Warns if neither a light nor the ambient term gives any surface light, and says how to add one. `path` is the
     /// scene's file.
     pub fn warn_if_unlit(&self, path: &Path) {
-        let is_lit = self.ambient != Vec3::ZERO || self.lights.iter().any(|light| light.intensity != Vec3::ZERO);
+        let is_lit = self.ambient != Vec3::ZERO || !self.lights.iter().all(Light::is_black);
         if is_lit {
             return;
         }

@@ -18,7 +18,51 @@ use glam::Vec3;
 use serde::Deserialize;
 
 use super::error::Checked;
-use crate::layout::{MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR, Material};
+
+/// A material, with MTL's terms. Colours are linear RGB.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// The name in its file, by which meshes refer to it.
+    pub name: String,
+    /// Share of the ambient light.
+    pub ka: Vec3,
+    /// Diffuse reflectance.
+    pub kd: Vec3,
+    /// Reflectance of the highlight and of the mirror.
+    pub ks: Vec3,
+    /// Radiance that the surface gives off.
+    pub ke: Vec3,
+    /// Share of light that refraction lets through.
+    pub tf: Vec3,
+    /// Exponent of the highlight, at least 1.
+    pub ns: f32,
+    /// Index of refraction, above 0.
+    pub ni: f32,
+    /// Opacity, 0 to 1.
+    pub d: f32,
+    /// What light does at the surface beside diffuse reflection.
+    pub lobes: Lobes,
+}
+
+/// A grey diffuse surface without a name.
+impl Default for Material {
+    fn default() -> Self {
+        MaterialSpec::default().material("").expect("defaults are in range")
+    }
+}
+
+/// What light does at a surface beside diffuse reflection.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Lobes {
+    /// Lights make a highlight.
+    pub highlight: bool,
+    /// The surface is a mirror.
+    pub reflection: bool,
+    /// Light goes through, bent.
+    pub refraction: bool,
+    /// The shares of reflection and refraction follow Fresnel's equations.
+    pub fresnel: bool,
+}
 
 /// A material as written. Everything may be left out.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -54,24 +98,28 @@ pub(super) struct MaterialSpec {
     pub illum: Option<u8>,
 }
 
-/// What happens at a surface of MTL's illumination model; none beyond 10.
-pub fn illum_flags(illum: u32) -> Option<u32> {
-    const REFLECT: u32 = MATERIAL_SPECULAR | MATERIAL_REFLECT;
-    match illum {
-        0 | 1 => Some(0),
-        2 | 10 => Some(MATERIAL_SPECULAR),
-        3 | 8 => Some(REFLECT),
-        4 | 6 => Some(REFLECT | MATERIAL_REFRACT),
-        5 => Some(REFLECT | MATERIAL_FRESNEL),
-        7 => Some(REFLECT | MATERIAL_REFRACT | MATERIAL_FRESNEL),
-        9 => Some(MATERIAL_SPECULAR | MATERIAL_REFRACT),
-        _ => None,
+impl Lobes {
+    /// The lobes of MTL's illumination model of a number; none beyond 10.
+    pub fn of_illum(illum: u32) -> Option<Self> {
+        let diffuse = Self::default();
+        let highlight = Self { highlight: true, ..diffuse };
+        let mirror = Self { reflection: true, ..highlight };
+        match illum {
+            0 | 1 => Some(diffuse),
+            2 | 10 => Some(highlight),
+            3 | 8 => Some(mirror),
+            4 | 6 => Some(Self { refraction: true, ..mirror }),
+            5 => Some(Self { fresnel: true, ..mirror }),
+            7 => Some(Self { refraction: true, fresnel: true, ..mirror }),
+            9 => Some(Self { refraction: true, ..highlight }),
+            _ => None,
+        }
     }
 }
 
 impl MaterialSpec {
     /// The material with its defaults filled in. The error says which term is out of range.
-    pub fn material(&self) -> Checked<Material> {
+    pub fn material(&self, name: &str) -> Checked<Material> {
         let kd = colour("Kd", self.kd, Vec3::splat(0.8))?;
         let ks = colour("Ks", self.ks, Vec3::ZERO)?;
         let illum = self.illum.map_or(if ks == Vec3::ZERO { 1 } else { 2 }, u32::from);
@@ -83,6 +131,7 @@ impl MaterialSpec {
         // Some exporters write 0 for "does not bend".
         let ni = self.ni.map(|ni| if ni == 0.0 { 1.0 } else { ni }).unwrap_or(1.5);
         Ok(Material {
+            name: name.to_owned(),
             ka: colour("Ka", self.ka, kd)?,
             // An exponent of 0 would be a highlight without a shape, and pow(0, 0) is undefined in GLSL.
             ns: within("Ns", self.ns.unwrap_or(32.0), 0.0, 1e6)?.max(1.0),
@@ -91,9 +140,8 @@ impl MaterialSpec {
             ks,
             ni: within("Ni", ni, 0.001, 100.0)?,
             ke: colour("Ke", self.ke, Vec3::ZERO)?,
-            flags: illum_flags(illum).ok_or_else(|| format!("illum {illum} is not one of 0 to 10"))?,
+            lobes: Lobes::of_illum(illum).ok_or_else(|| format!("illum {illum} is not one of 0 to 10"))?,
             tf: colour("Tf", self.tf, Vec3::ONE)?,
-            illum,
         })
     }
 }

@@ -1,6 +1,7 @@
-//! Scene files to what a frame is rendered from: world-space triangles, materials, lights, a camera.
+//! Scenes as files and programs describe them: meshes, their instances in the world, materials, lights, a camera. Nothing
+//! here depends on how kernels lay data out; `world` flattens a scene for tracing.
 //!
-//! A scene is a TOML file (`description` lists what it may say) or a bare OBJ file.
+//! A scene file is a TOML file (`description` lists what it may say) or a bare OBJ file.
 
 mod assemble;
 mod description;
@@ -8,40 +9,45 @@ mod error;
 mod extent;
 pub mod framing;
 pub mod generate;
+mod light;
 mod lighting;
 mod material;
 pub mod mesh;
 mod needs;
-pub mod normal;
 mod obj;
 mod path;
 mod read;
 mod smooth;
 mod sources;
+mod transform;
 
 use std::path::Path;
 
 use glam::Vec3;
 
-pub use self::{error::SceneError, extent::MIN_EXTENT, material::illum_flags, path::CameraPath, sources::source_files};
-use crate::{
-    frame::{Denoise, RenderOptions, Tonemap},
-    layout::{Light, Material, Triangle},
+pub use self::{
+    error::SceneError,
+    extent::MIN_EXTENT,
+    light::Light,
+    material::{Lobes, Material},
+    mesh::Mesh,
+    path::CameraPath,
+    sources::source_files,
+    transform::Transform,
 };
+use crate::frame::{Denoise, RenderOptions, Tonemap};
 
 /// Everything that a frame shows. World space is right-handed, +y up by default.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// The file's name without its folder and extension.
     pub name: String,
-    /// World space, at least one. Corners lie within `mesh::MAX_COORDINATE`, and their longest side is [`MIN_EXTENT`]
-    /// or more.
-    pub triangles: Vec<Triangle>,
-    /// One index into `materials` a triangle. Renderers refuse a scene where this does not hold.
-    pub triangle_materials: Vec<u32>,
+    /// Meshes, each of which may have several instances.
+    pub meshes: Vec<Mesh>,
+    /// Where the meshes are. A loaded scene has at least one triangle, all triangles lie within `mesh::MAX_COORDINATE`, and
+    /// their bounding box has a side of [`MIN_EXTENT`] or more.
+    pub instances: Vec<Instance>,
     pub materials: Vec<Material>,
-    /// One a material.
-    pub material_names: Vec<String>,
     /// May be none.
     pub lights: Vec<Light>,
     pub camera: Camera,
@@ -50,6 +56,17 @@ pub struct Scene {
     /// Radiance of rays that leave the scene.
     pub background: Vec3,
     pub defaults: RenderDefaults,
+}
+
+/// A mesh that is placed in the world.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Instance {
+    /// Index into the scene's meshes.
+    pub mesh_ix: usize,
+    /// World from object.
+    pub transform: Transform,
+    /// Indices into the scene's materials, at least one. A face of slot i has material `i % materials.len()`.
+    pub materials: Vec<u32>,
 }
 
 /// A pinhole. `eye`, `target` and `up` span a plane.
@@ -106,14 +123,42 @@ impl Scene {
         path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
     }
 
+    /// The number of triangles of all instances.
+    pub fn n_triangles(&self) -> usize {
+        let mesh_of = |instance: &Instance| self.meshes.get(instance.mesh_ix);
+        self.instances.iter().filter_map(mesh_of).map(|mesh| mesh.faces.len()).sum()
+    }
+
+    /// The smallest and the largest coordinates of all triangles, world space.
+    ///
+    /// # Panics
+    /// An index names nothing.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        let corners = self.instances.iter().flat_map(|Instance { mesh_ix, transform, .. }| {
+            let mesh = &self.meshes[*mesh_ix];
+            mesh.faces.as_flattened().iter().map(|ix| transform.point(mesh.positions[*ix as usize]))
+        });
+        corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
+    }
+
+    /// Adds a mesh that is placed once. `materials`: [`Instance::materials`].
+    ///
+    /// # Errors
+    /// The mesh reaches beyond `mesh::MAX_COORDINATE`, in words.
+    pub(crate) fn push_mesh(&mut self, mesh: Mesh, transform: Transform, materials: Vec<u32>) -> Result<(), String> {
+        mesh.placed(&transform)?;
+        self.instances.push(Instance { mesh_ix: self.meshes.len(), transform, materials });
+        self.meshes.push(mesh);
+        Ok(())
+    }
+
     /// Nothing yet, seen from nowhere.
     fn empty(path: &Path) -> Self {
         Self {
             name: Self::name_of(path),
-            triangles: Vec::new(),
-            triangle_materials: Vec::new(),
+            meshes: Vec::new(),
+            instances: Vec::new(),
             materials: Vec::new(),
-            material_names: Vec::new(),
             lights: Vec::new(),
             camera: Camera { eye: Vec3::ZERO, target: Vec3::NEG_Z, up: Vec3::Y, vertical_fov_degrees: 45.0 },
             ambient: Vec3::ZERO,
@@ -128,11 +173,11 @@ fn load_bare_obj(path: &Path) -> Result<Scene, SceneError> {
     let mut scene = Scene::empty(path);
     let shading = obj::Shading { smooth: true, crease: obj::DEFAULT_CREASE };
     let (mesh, library) = obj::parse_obj(path, &obj::read_obj(path)?, shading, 0)?;
-    scene.triangles = mesh.to_world(&mesh::Transform::IDENTITY).map_err(|what| SceneError::file(path, what))?;
-    extent::check(path, &scene.triangles)?;
-    let slots = scene.push_library(&library);
-    scene.push_slots(&mesh, &slots);
-    scene.camera = framing::camera(&scene.triangles);
+    let slots = scene.push_library(library);
+    scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
+    let bounds = scene.bounds();
+    extent::check(path, bounds)?;
+    scene.camera = framing::camera(bounds);
     scene.lights = vec![framing::light()];
     scene.ambient = Vec3::splat(0.25);
     scene.background = Vec3::new(0.32, 0.36, 0.42);

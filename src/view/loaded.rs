@@ -10,8 +10,8 @@ use glam::Vec3;
 use crate::{
     accel::kdtree::Statistics,
     engine::choices::{Chosen, Processor, Request, TreeKind, Workload},
-    scene::{Scene, SceneError, framing},
-    world::World,
+    scene::{Scene, SceneError},
+    world::{FlatScene, World},
 };
 
 /// What the choice of a scene's tree depends on, each time that the scene is read.
@@ -47,22 +47,25 @@ impl Loaded {
     /// The scene has a triangle without a material, which no loaded scene has.
     pub fn with_tree(path: &Path, scene: Scene, load_options: LoadOptions) -> Self {
         let LoadOptions { request, processor, workload } = load_options;
-        let tree_kind = request.tree(processor, scene.triangles.len(), &workload);
+        let tree_kind = request.tree(processor, scene.n_triangles(), &workload);
         let build_options = tree_kind.value.options(processor);
+        let flat = FlatScene::new(&scene).expect("a loaded scene fits together");
+        // The tree needs the memory.
+        drop(scene);
         let start = Instant::now();
-        let world = World::new(scene, &build_options).expect("a material for each triangle");
+        let world = World::of_flat(flat, &build_options).expect("a material for each triangle");
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
         let statistics = world.tree().statistics(world.scene().triangles.len(), &build_options);
         Self { path: path.to_owned(), world, tree_kind, load_options, statistics, build_ms }
     }
 
     /// The scene.
-    pub fn scene(&self) -> &Scene {
+    pub fn scene(&self) -> &FlatScene {
         self.world.scene()
     }
 
     /// Smallest and largest coordinates.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        framing::bounds(&self.scene().triangles)
+        self.scene().bounds()
     }
 }

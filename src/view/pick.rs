@@ -13,8 +13,8 @@ use crate::{
         counting::steps::{Steps, count_steps},
         primary_hit::camera_ray,
     },
-    scene::{Camera, Scene},
-    world::World,
+    scene::Camera,
+    world::{FlatScene, World},
 };
 
 /// Rays of one level that are followed; a pixel of glass can make more than anyone reads.
@@ -84,7 +84,7 @@ pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec
     picked
 }
 
-fn found(scene: &Scene, ray: &Ray, hit: &Hit) -> Option<PickedHit> {
+fn found(scene: &FlatScene, ray: &Ray, hit: &Hit) -> Option<PickedHit> {
     (hit.triangle_ix != NO_TRIANGLE).then(|| {
         let material_ix = scene.triangle_materials[hit.triangle_ix as usize];
         PickedHit {

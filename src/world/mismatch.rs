@@ -1,9 +1,10 @@
 //! Parts of a world that do not fit together.
 
-use crate::{gpu::GpuError, scene::Scene};
+use super::FlatScene;
+use crate::gpu::GpuError;
 
 /// Why a scene's arrays, or its triangles and a tree, do not fit together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Mismatch {
     /// The tree is one of other triangles.
     #[error("the kd-tree was built from {tree} triangles, but {triangles} are given with it")]
@@ -20,6 +21,20 @@ pub enum Mismatch {
         triangle_materials: usize,
         /// Triangles.
         triangles: usize,
+    },
+    /// An instance of a scene names a mesh that the scene does not have.
+    #[error("instance {instance} of the scene has no mesh")]
+    Mesh {
+        /// Index of the instance.
+        instance: usize,
+    },
+    /// An instance of a scene cannot be traced.
+    #[error("instance {instance} of the scene: {what}")]
+    Instance {
+        /// Index of the instance.
+        instance: usize,
+        /// What is wrong with it.
+        what: String,
     },
     /// A triangle's material is missing.
     #[error("triangle {triangle} has material {material}, but there are {materials} materials")]
@@ -43,7 +58,7 @@ impl From<Mismatch> for GpuError {
 ///
 /// # Errors
 /// The first thing that does not fit.
-pub(super) fn check_materials(scene: &Scene) -> Result<(), Mismatch> {
+pub(super) fn check_materials(scene: &FlatScene) -> Result<(), Mismatch> {
     let (triangle_materials, triangles) = (scene.triangle_materials.len(), scene.triangles.len());
     if triangle_materials != triangles {
         return Err(Mismatch::TriangleMaterials { triangle_materials, triangles });

@@ -1,5 +1,6 @@
 //! What is rendered: a scene with the acceleration structure over its triangles, consistent by construction.
 
+mod flat;
 mod geometry;
 mod mismatch;
 
@@ -7,7 +8,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 
-pub use self::{geometry::Geometry, mismatch::Mismatch};
+pub use self::{flat::FlatScene, geometry::Geometry, mismatch::Mismatch};
 use crate::{
     accel::{
         Accel,
@@ -26,17 +27,25 @@ pub struct World(Arc<Parts>);
 
 #[derive(Debug)]
 struct Parts {
-    scene: Scene,
+    scene: FlatScene,
     accel: Accel,
     build_options: BuildOptions,
 }
 
 impl World {
-    /// Builds the kd-tree of a scene on the current rayon pool.
+    /// Flattens a scene and builds its kd-tree on the current rayon pool.
+    ///
+    /// # Errors
+    /// The scene does not fit together: see [`Mismatch`].
+    pub fn new(scene: &Scene, build_options: &BuildOptions) -> Result<Self, Mismatch> {
+        Self::of_flat(FlatScene::new(scene)?, build_options)
+    }
+
+    /// Builds the kd-tree of a flattened scene on the current rayon pool.
     ///
     /// # Errors
     /// The scene has a triangle without a material.
-    pub fn new(scene: Scene, build_options: &BuildOptions) -> Result<Self, Mismatch> {
+    pub fn of_flat(scene: FlatScene, build_options: &BuildOptions) -> Result<Self, Mismatch> {
         mismatch::check_materials(&scene)?;
         let tree = KdTree::build(&scene.triangles, build_options);
         Self::with_tree(scene, tree, build_options)
@@ -46,14 +55,14 @@ impl World {
     ///
     /// # Errors
     /// The scene has a triangle without a material; the tree is one of more or fewer triangles.
-    pub fn with_tree(scene: Scene, tree: KdTree, build_options: &BuildOptions) -> Result<Self, Mismatch> {
+    pub fn with_tree(scene: FlatScene, tree: KdTree, build_options: &BuildOptions) -> Result<Self, Mismatch> {
         mismatch::check_materials(&scene)?;
         Geometry::new(&scene.triangles, &tree)?;
         Ok(Self(Arc::new(Parts { scene, accel: Accel::KdTree(tree), build_options: build_options.clone() })))
     }
 
-    /// The scene.
-    pub fn scene(&self) -> &Scene {
+    /// The scene as it is traced.
+    pub fn scene(&self) -> &FlatScene {
         &self.0.scene
     }
 

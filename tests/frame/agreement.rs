@@ -5,7 +5,7 @@ use std::path::Path;
 use kdray::{
     accel::kdtree::Traversal,
     frame::{Denoise, Primary, RenderOptions},
-    scene::Scene,
+    world::FlatScene,
 };
 
 use super::studio::{differing, on_both, options};
@@ -16,7 +16,7 @@ const TOLERANCE: f32 = 2e-3;
 
 /// Few pixels may differ more: where the rasterizer's snapped edges, or the rounding of another `sqrt` or `pow`, send a
 /// ray past the other side of an edge. Glass multiplies such rays.
-fn check(name: &str, scene: &Scene, options: &RenderOptions, share: f64) {
+fn check(name: &str, scene: &FlatScene, options: &RenderOptions, share: f64) {
     let [device, cpu] = on_both(scene, options);
     let n_differing = differing(&device, &cpu, TOLERANCE).len();
     let n_allowed = (share * device.radiance.len() as f64) as usize;
@@ -27,10 +27,10 @@ fn check(name: &str, scene: &Scene, options: &RenderOptions, share: f64) {
 
 #[test]
 fn device_and_cpu_agree_on_the_scenes_that_ship() {
-    let depth = |scene: &Scene| scene.defaults.max_depth;
+    let depth = |scene: &FlatScene| scene.defaults.max_depth;
     for name in ["cornell", "paper2", "paper3", "paper4"] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(format!("{name}.toml"));
-        let scene = Scene::load(&path).expect("a scene");
+        let scene = scenes::load(&path);
         let raster = options(96, 72, depth(&scene));
         check(name, &scene, &RenderOptions { primary: Primary::Trace, ..raster.clone() }, 0.002);
         // Snapped to 1/16 px, the outlines of triangles of less than a pixel are many and far off.

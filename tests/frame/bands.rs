@@ -9,7 +9,8 @@ use kdray::{
     gpu::{Context, DeviceOverrides, GpuError},
     layout::Feature,
     render::{BandedRenderer, Renderer},
-    scene::{Camera, Scene},
+    scene::Camera,
+    world::FlatScene,
 };
 
 use super::studio::{assert_silent, device, identical, options, world_of};
@@ -27,7 +28,7 @@ fn small_device() -> Arc<Context> {
 }
 
 /// Mirrors, and no glass: rays do not branch, so that a batch has enough pixels even on a device that binds little.
-fn scene() -> Scene {
+fn scene() -> FlatScene {
     let mut scene = scenes::empty();
     scenes::add(&mut scene, scenes::room(5.0), scenes::diffuse(vec3(0.7, 0.6, 0.5)));
     let torus = meshes::placed(meshes::torus(12, 8), 1.3, vec3(0.1, -0.6, 0.0));

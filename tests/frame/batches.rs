@@ -5,14 +5,14 @@ use kdray::{
     cpu::{self, Batching},
     gpu::GpuError,
     render::Renderer,
-    scene::Scene,
+    world::FlatScene,
 };
 
 use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::scenes;
 
 /// Glass in glass, nowhere dark: rays double at each of its surfaces.
-pub fn glass_in_glass() -> Scene {
+pub fn glass_in_glass() -> FlatScene {
     let mut scene = scenes::empty();
     scenes::add(&mut scene, scenes::smooth_sphere(6, 1.4, Vec3::ZERO), scenes::glass(1.5));
     scenes::add(&mut scene, scenes::smooth_sphere(5, 0.9, Vec3::ZERO), scenes::glass(1.2));

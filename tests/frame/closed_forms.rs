@@ -3,7 +3,8 @@
 use glam::{Vec3, vec3};
 use kdray::{
     frame::{Picture, Primary, RenderOptions},
-    scene::{Camera, Scene},
+    scene::Camera,
+    world::FlatScene,
 };
 
 use super::studio::{differing, on_both, options};
@@ -54,7 +55,7 @@ fn ambient_light_is_ka_times_ambient() {
 }
 
 /// A room of differently glowing walls.
-fn colourful_room() -> Scene {
+fn colourful_room() -> FlatScene {
     let mut scene = scenes::empty();
     for (i, wall) in meshes::cube(4, 0.0).chunks(7).enumerate() {
         let colour = vec3((i * 37 % 11) as f32, (i * 53 % 13) as f32, (i * 71 % 7) as f32) / 12.0;
@@ -90,7 +91,7 @@ fn glass_of_index_one_is_invisible() {
 /// A plane mirror shows what would be seen if the world behind it were the world before it, mirrored.
 #[test]
 fn a_mirror_shows_the_mirrored_world() {
-    let things = |scene: &mut Scene, side: f32| {
+    let things = |scene: &mut FlatScene, side: f32| {
         for (i, (position, scale)) in
             [(vec3(0.5, 0.2, 3.5), 0.5), (vec3(-0.8, 0.5, 3.0), 0.4), (vec3(0.1, -0.9, 2.5), 0.3)]
                 .into_iter()
@@ -105,11 +106,11 @@ fn a_mirror_shows_the_mirrored_world() {
     };
     // The camera stands between the mirror (z = 0) and the things, which it turns its back on.
     let camera = Camera { eye: vec3(0.1, 0.0, 1.5), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 50.0 };
-    let mut before = Scene { camera, background: vec3(0.1, 0.1, 0.2), ..scenes::empty() };
+    let mut before = FlatScene { camera, background: vec3(0.1, 0.1, 0.2), ..scenes::empty() };
     things(&mut before, 1.0);
     let plane = meshes::triangle(vec3(-90.0, -50.0, 0.0), vec3(90.0, -50.0, 0.0), vec3(0.0, 99.0, 0.0));
     scenes::add(&mut before, vec![plane], scenes::mirror(vec3(1.0, 0.5, 0.25)));
-    let mut behind = Scene { camera, background: vec3(0.1, 0.1, 0.2), ..scenes::empty() };
+    let mut behind = FlatScene { camera, background: vec3(0.1, 0.1, 0.2), ..scenes::empty() };
     things(&mut behind, -1.0);
     for (mirrored, mut direct) in
         on_both(&before, &options(80, 60, 2)).iter().zip(on_both(&behind, &options(80, 60, 2)))

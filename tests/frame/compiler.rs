@@ -6,10 +6,11 @@ use std::path::Path;
 use kdray::{
     frame::{Picture, Primary, RenderOptions},
     render::Renderer,
-    scene::Scene,
+    world::FlatScene,
 };
 
 use super::studio::{assert_silent, device, differing, on_cpu, options, world_of};
+use crate::support::scenes;
 
 /// Part of a driver's device name, and the checksums that it gives for `cornell` and `paper2`. They have to be the same
 /// with the feature `shaderc-from-source` and without it. A change of a kernel's arithmetic changes them. Lavapipe gives
@@ -22,8 +23,8 @@ fn checksum(picture: &Picture) -> u32 {
     crc32fast::hash(picture.display.as_flattened())
 }
 
-fn scene(name: &str) -> Scene {
-    Scene::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)).expect("a scene")
+fn scene(name: &str) -> FlatScene {
+    scenes::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name))
 }
 
 #[test]

@@ -7,8 +7,7 @@ use kdray::{
     frame::{Crop, Primary, RenderOptions},
     layout::{Feature, NO_TRIANGLE},
     render::Renderer,
-    scene::Scene,
-    world::World,
+    world::{FlatScene, World},
 };
 
 use super::{
@@ -17,7 +16,7 @@ use super::{
 };
 use crate::support::{scenes, world_by};
 
-fn on_device(scene: &Scene, options: &RenderOptions) -> Vec<Feature> {
+fn on_device(scene: &FlatScene, options: &RenderOptions) -> Vec<Feature> {
     on_device_by(&world_of(scene), options)
 }
 
@@ -29,7 +28,7 @@ fn on_device_by(world: &World, options: &RenderOptions) -> Vec<Feature> {
     renderer.features().expect("features")
 }
 
-fn on_cpu(scene: &Scene, options: &RenderOptions) -> Vec<Feature> {
+fn on_cpu(scene: &FlatScene, options: &RenderOptions) -> Vec<Feature> {
     on_cpu_by(&world_of(scene), options)
 }
 

@@ -6,7 +6,8 @@ use kdray::{
     frame::{Denoise, Picture, Primary, RenderOptions, Tonemap},
     gpu::GpuError,
     render::Renderer,
-    scene::{Camera, Scene},
+    scene::Camera,
+    world::FlatScene,
 };
 
 use super::studio::{assert_silent, device, identical, on_device, options, world_of};
@@ -25,7 +26,7 @@ fn sampled(renderer: &mut Renderer, n_samples: u32) -> Picture {
     renderer.picture().expect("a picture")
 }
 
-fn sampled_anew(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
+fn sampled_anew(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
     sampled(&mut Renderer::new(device(), &world_of(scene), options).expect("a renderer"), n_samples)
 }
 
@@ -65,7 +66,7 @@ fn other_cameras_and_sizes_draw_what_a_new_renderer_draws() {
     renderer.draw_sample().expect("a sample");
     renderer.set_camera(&ELSEWHERE);
     assert_eq!((renderer.n_samples(), renderer.camera()), (0, &ELSEWHERE));
-    let from_there = Scene { camera: ELSEWHERE, ..scene };
+    let from_there = FlatScene { camera: ELSEWHERE, ..scene };
     for (width, height) in [(40, 30), (90, 20), (12, 60), (41, 30)] {
         renderer.resize(width, height).expect("another size");
         let expected = on_device(&from_there, &options(width, height, 3));

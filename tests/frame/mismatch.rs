@@ -2,16 +2,15 @@
 
 use kdray::{
     accel::kdtree::{BuildOptions, KdTree},
-    scene::Scene,
-    world::{Geometry, Mismatch, World},
+    world::{FlatScene, Geometry, Mismatch, World},
 };
 
 use crate::support::scenes;
 
 /// Why there is no world of the scene, whether it builds the tree or is given it. It must be the same.
-fn refusal(scene: &Scene) -> Mismatch {
+fn refusal(scene: &FlatScene) -> Mismatch {
     let options = BuildOptions::default();
-    let built = World::new(scene.clone(), &options).expect_err("a refusal");
+    let built = World::of_flat(scene.clone(), &options).expect_err("a refusal");
     let given = World::with_tree(scene.clone(), KdTree::build(&scene.triangles, &options), &options);
     assert_eq!(given.expect_err("a refusal"), built);
     built
@@ -33,7 +32,7 @@ fn a_tree_of_other_triangles() {
 
 #[test]
 fn materials_of_more_or_fewer_triangles() {
-    let changes: [fn(&mut Scene); 2] =
+    let changes: [fn(&mut FlatScene); 2] =
         [|scene| _ = scene.triangle_materials.pop(), |scene| scene.triangle_materials.push(0)];
     for change in changes {
         let mut scene = scenes::mixed();
@@ -51,5 +50,5 @@ fn a_material_that_is_not_there() {
     let expected = format!("triangle 7 has material {n_materials}, but there are {n_materials} materials");
     assert_eq!(refusal(&scene).to_string(), expected);
     scene.triangle_materials[7] -= 1;
-    assert!(World::new(scene, &BuildOptions::default()).is_ok());
+    assert!(World::of_flat(scene, &BuildOptions::default()).is_ok());
 }

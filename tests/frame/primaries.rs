@@ -14,8 +14,7 @@ use kdray::{
         traverser::{Tracer, Traverser},
     },
     render::Renderer,
-    scene::Scene,
-    world::World,
+    world::{FlatScene, World},
 };
 
 use super::studio::{assert_silent, device, differing, identical, on_cpu, on_device, options, world_of};
@@ -42,7 +41,7 @@ fn is_on_edge(world: &World, options: &RenderOptions, pixel_ix: usize) -> bool {
 }
 
 /// How many pixels differ in any bit, and those of them that are on no edge.
-fn off_edges(scene: &Scene, options: &RenderOptions, a: &Picture, b: &Picture) -> (usize, Vec<usize>) {
+fn off_edges(scene: &FlatScene, options: &RenderOptions, a: &Picture, b: &Picture) -> (usize, Vec<usize>) {
     let world = world_of(scene);
     let differing = differing(a, b, 0.0);
     let n = differing.len();

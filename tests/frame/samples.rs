@@ -4,7 +4,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     frame::{Picture, Primary, RenderOptions},
     render::Renderer,
-    scene::Scene,
+    world::FlatScene,
 };
 
 use super::{
@@ -17,7 +17,7 @@ use super::{
 use crate::support::{meshes, scenes};
 
 /// White to the left of x = `edge` in the plane z = 0, black elsewhere; a pixel of a picture 30 high is 1/10 wide there.
-fn half_plane(edge: f32) -> Scene {
+fn half_plane(edge: f32) -> FlatScene {
     let mut scene = scenes::empty();
     let corner = |x: f32, y: f32| vec3(x, y, 0.0);
     let plane = meshes::triangle(corner(edge, -90.0), corner(edge, 90.0), corner(-90.0, 0.0));

@@ -10,8 +10,7 @@ use kdray::{
     gpu::Context,
     layout::{Feature, Slab},
     render::Renderer,
-    scene::Scene,
-    world::World,
+    world::{FlatScene, World},
 };
 
 use super::studio::{assert_silent, identical, options};
@@ -23,7 +22,7 @@ fn device() -> Arc<Context> {
 }
 
 /// A mirror of many small triangles, which rays graze.
-fn scene() -> Scene {
+fn scene() -> FlatScene {
     let mut scene = scenes::mixed();
     scenes::add(&mut scene, meshes::torus(120, 60), scenes::mirror(Vec3::splat(0.8)));
     scene

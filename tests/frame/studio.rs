@@ -7,7 +7,7 @@ use kdray::{
     frame::{Denoise, Picture, RenderOptions},
     gpu::{Context, ContextOptions},
     render::Renderer,
-    scene::Scene,
+    world::FlatScene,
 };
 
 pub use crate::support::world_of;
@@ -27,7 +27,7 @@ pub fn assert_silent(context: &Context) {
     assert!(messages.is_empty(), "{}", messages.join("\n"));
 }
 
-pub fn on_device(scene: &Scene, options: &RenderOptions) -> Picture {
+pub fn on_device(scene: &FlatScene, options: &RenderOptions) -> Picture {
     let context = device();
     let mut renderer = Renderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
@@ -35,12 +35,12 @@ pub fn on_device(scene: &Scene, options: &RenderOptions) -> Picture {
     picture
 }
 
-pub fn on_cpu(scene: &Scene, options: &RenderOptions) -> Picture {
+pub fn on_cpu(scene: &FlatScene, options: &RenderOptions) -> Picture {
     cpu::render(&world_of(scene), options).0
 }
 
 /// The mean of so many samples a pixel.
-pub fn samples_on_device(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
+pub fn samples_on_device(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
     let context = device();
     let mut renderer = Renderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
     (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
@@ -49,7 +49,7 @@ pub fn samples_on_device(scene: &Scene, options: &RenderOptions, n_samples: u32)
 }
 
 /// As [`samples_on_device`].
-pub fn samples_on_cpu(scene: &Scene, options: &RenderOptions, n_samples: u32) -> Picture {
+pub fn samples_on_cpu(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
     let world = world_of(scene);
     let mut renderer = cpu::Renderer::new(&world, options, Batching::default());
     (0..n_samples).for_each(|_| drop(renderer.draw_sample()));
@@ -57,7 +57,7 @@ pub fn samples_on_cpu(scene: &Scene, options: &RenderOptions, n_samples: u32) ->
 }
 
 /// The device's picture and the CPU's: what holds for one has to hold for the other.
-pub fn on_both(scene: &Scene, options: &RenderOptions) -> [Picture; 2] {
+pub fn on_both(scene: &FlatScene, options: &RenderOptions) -> [Picture; 2] {
     [on_device(scene, options), on_cpu(scene, options)]
 }
 

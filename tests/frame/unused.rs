@@ -4,7 +4,7 @@ use kdray::{
     buffers::Resources,
     frame::{Primary, RenderOptions},
     render::Renderer,
-    scene::Scene,
+    world::FlatScene,
 };
 
 use super::studio::{assert_silent, device, identical, options, world_of};
@@ -17,7 +17,7 @@ fn with(primary: Primary) -> RenderOptions {
 }
 
 /// Whether there is all that the graphics pipeline draws by and to, or, where nothing is drawn, none of it.
-fn assert_drawn_by(resources: &Resources, scene: &Scene, primary: Primary) {
+fn assert_drawn_by(resources: &Resources, scene: &FlatScene, primary: Primary) {
     let pixels = &resources.pixels;
     let found = (
         resources.vertex_indices.as_ref().map(|indices| indices.len()),

@@ -10,7 +10,8 @@ use kdray::{
     passes::{Inputs, Passes, Rasterize, Trace},
     reference::primary_hit::camera_ray,
     render::Renderer,
-    scene::{Camera, Scene},
+    scene::Camera,
+    world::FlatScene,
 };
 
 use super::stage::{FIRST, Stage, options};
@@ -23,7 +24,7 @@ struct View {
 }
 
 /// None where the device has no atomics of 64 bits.
-fn view(scene: Scene, options: RenderOptions) -> Option<View> {
+fn view(scene: FlatScene, options: RenderOptions) -> Option<View> {
     let context = Context::new(&ContextOptions::default()).expect("a device");
     let crop = options.crop_or_whole();
     let options = RenderOptions { primary: Primary::Compute, ..options };
@@ -72,7 +73,7 @@ impl View {
     }
 }
 
-fn check(scene: Scene, options: RenderOptions) -> usize {
+fn check(scene: FlatScene, options: RenderOptions) -> usize {
     view(scene, options).map_or(usize::MAX, |view| view.check())
 }
 

@@ -8,7 +8,7 @@ use kdray::{
     frame::RenderOptions,
     layout::{Batch, FLAT_NORMAL, Hit, LIGHT_LIT, LIGHT_SHADOWED, LIGHT_UNTESTED, NO_TRIANGLE},
     reference::{self, shade::LitRays},
-    scene::Scene,
+    world::FlatScene,
 };
 
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_WORD, hits_of, options, rays_of, some_rays};
@@ -57,7 +57,7 @@ fn agrees_where_the_first_rays_are_the_cameras() {
 }
 
 /// Flat surfaces, which show no light that they turn their backs on: plaster, a narrow highlight, black.
-fn flat() -> Scene {
+fn flat() -> FlatScene {
     let mut scene = scenes::mixed_outdoors();
     scene.triangles.iter_mut().for_each(|t| [t.n0, t.n1, t.n2] = [FLAT_NORMAL; 3]);
     let materials = [scenes::diffuse(Vec3::splat(0.5)), scenes::glossy(Vec3::ZERO, Vec3::ONE, 300.0), scenes::BLACK];

@@ -10,8 +10,7 @@ use kdray::{
     layout::{Batch, Bounce, Counters, Frame, Hit, NO_TRIANGLE, RAY_GROUP_SIZE, Ray},
     passes::Passes,
     reference::bindings::Bindings,
-    scene::Scene,
-    world::World,
+    world::{FlatScene, World},
 };
 
 /// Numbers of rays around a workgroup's size.
@@ -49,9 +48,9 @@ pub fn options(width: u32, height: u32) -> RenderOptions {
 
 impl Stage {
     /// A queue for `capacity` rays.
-    pub fn new(scene: Scene, options: RenderOptions, capacity: u32) -> Self {
+    pub fn new(scene: FlatScene, options: RenderOptions, capacity: u32) -> Self {
         let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
-        let world = World::new(scene, &BuildOptions::default()).expect("a world");
+        let world = World::of_flat(scene, &BuildOptions::default()).expect("a world");
         let constants = Frame { queue_capacity: capacity, ..frame_constants(&world, &options) };
         let needs = Needs { constants: &constants, options: &options, n_bounces: constants.max_depth as usize };
         let resources = Resources::new(&context, &world, &needs).expect("resources");

@@ -5,7 +5,7 @@ use kdray::{
     frame::{Primary, RenderOptions},
     layout::Batch,
     reference,
-    scene::Scene,
+    world::FlatScene,
 };
 
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_HIT, UNTOUCHED_RAY, options, some_rays};
@@ -30,7 +30,7 @@ fn check(stage: &Stage, n_rays: u32) {
     assert!(stage.counters()[0].n_hits.abs_diff(n_hits) as usize <= n_outliers, "{n_rays} rays");
 }
 
-fn check_all(scene: &Scene, counts: &[u32]) {
+fn check_all(scene: &FlatScene, counts: &[u32]) {
     for &traversal in Traversal::ALL {
         let capacity = counts.iter().max().expect("some") + 9;
         let stage = Stage::new(scene.clone(), RenderOptions { traversal, ..options(8, 8) }, capacity);

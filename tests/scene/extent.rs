@@ -11,8 +11,8 @@ use kdray::{
     cast::{Caster, CpuCaster},
     gpu::{Context, ContextOptions},
     layout::{CastRay, Hit, NO_TRIANGLE, Triangle},
-    scene::{MIN_EXTENT, Scene, SceneError},
-    world::Geometry,
+    scene::{MIN_EXTENT, SceneError},
+    world::{FlatScene, Geometry},
 };
 
 use super::{
@@ -34,7 +34,7 @@ fn scaled(triangles: &[Triangle], scale: f32) -> Vec<Triangle> {
 }
 
 /// Loads triangles from an OBJ file with all digits of their coordinates.
-fn load_triangles(triangles: &[Triangle]) -> Result<Scene, SceneError> {
+fn load_triangles(triangles: &[Triangle]) -> Result<FlatScene, SceneError> {
     let mut obj = String::new();
     for (ix, t) in triangles.iter().enumerate() {
         for v in [t.v0, t.v1, t.v2] {

@@ -3,6 +3,7 @@
 mod errors;
 mod extent;
 mod generators;
+mod instances;
 mod obj;
 mod path;
 #[path = "../support/mod.rs"]
@@ -16,24 +17,27 @@ use kdray::{
     layout::{
         FLAT_NORMAL, LIGHT_DIRECTIONAL, LIGHT_POINT, MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT,
         MATERIAL_SPECULAR, Triangle,
-    },
-    scene::{
-        Scene, SceneError, illum_flags,
         normal::{decode_octahedral, encode_octahedral},
     },
+    scene::{Lobes, Scene, SceneError},
+    world::FlatScene,
 };
 
-/// Loads the first of some files that are written to one folder.
-fn load(files: &[(&str, &[u8])]) -> Result<Scene, SceneError> {
+/// Loads the first of some files that are written to one folder, and flattens it.
+fn load(files: &[(&str, &[u8])]) -> Result<FlatScene, SceneError> {
     let folder = tempfile::tempdir().unwrap();
     for (name, content) in files {
         fs::write(folder.path().join(name), content).unwrap();
     }
-    Scene::load(&folder.path().join(files[0].0))
+    Scene::load(&folder.path().join(files[0].0)).map(|scene| flattened(&scene))
+}
+
+fn flattened(scene: &Scene) -> FlatScene {
+    FlatScene::new(scene).expect("a loaded scene fits together")
 }
 
 /// Loads a scene file.
-fn load_toml(text: &str) -> Scene {
+fn load_toml(text: &str) -> FlatScene {
     load(&[("scene.toml", text.as_bytes())]).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
@@ -46,7 +50,7 @@ fn facet_normal(t: &Triangle) -> Vec3 {
 fn shipped_scenes_have_the_papers_counts() {
     for (name, n_triangles) in [("cornell", 34), ("paper2", 11_141), ("paper3", 193_598), ("paper4", 872_870)] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name).with_extension("toml");
-        let scene = Scene::load(&path).unwrap();
+        let scene = flattened(&Scene::load(&path).unwrap());
         assert_eq!((scene.name.as_str(), scene.triangles.len()), (name, n_triangles));
         assert_eq!(scene.triangle_materials.len(), n_triangles);
         assert_eq!(scene.material_names.len(), scene.materials.len());
@@ -92,13 +96,12 @@ fn illum_maps_to_flags() {
     let (s, l, r, f) = (MATERIAL_SPECULAR, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_FRESNEL);
     let expected = [0, 0, s, s | l, s | l | r, s | l | f, s | l | r, s | l | r | f, s | l, s | r, s];
     for (illum, flags) in expected.into_iter().enumerate() {
-        assert_eq!(illum_flags(illum as u32), Some(flags), "illum {illum}");
         let scene = load_toml(&format!(
             "materials.m = {{ illum = {illum} }}\n[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 3\nmaterial = 'm'"
         ));
-        assert_eq!((scene.materials[0].flags, scene.materials[0].illum), (flags, illum as u32));
+        assert_eq!(scene.materials[0].flags, flags, "illum {illum}");
     }
-    assert_eq!(illum_flags(11), None);
+    assert_eq!(Lobes::of_illum(11), None);
 }
 
 #[test]
@@ -109,8 +112,8 @@ fn materials_have_documented_defaults() {
     );
     let [a, b] = scene.materials[..] else { panic!("two materials") };
     assert_eq!((a.ka, a.kd, a.ks, a.ke, a.tf), (a.kd, Vec3::splat(0.8), Vec3::ZERO, Vec3::ZERO, Vec3::ONE));
-    assert_eq!((a.ns, a.ni, a.d, a.illum, a.flags), (32.0, 1.5, 1.0, 1, 0));
-    assert_eq!((b.ka, b.ns, b.ni, b.d, b.illum), (Vec3::new(0.1, 0.2, 0.3), 1.0, 1.0, 0.75, 2));
+    assert_eq!((a.ns, a.ni, a.d, a.flags), (32.0, 1.5, 1.0, 0));
+    assert_eq!((b.ka, b.ns, b.ni, b.d, b.flags), (Vec3::new(0.1, 0.2, 0.3), 1.0, 1.0, 0.75, MATERIAL_SPECULAR));
     assert_eq!(scene.triangle_materials, [0, 0, 1, 1]);
 }
 

@@ -4,8 +4,10 @@ use std::fmt::Write;
 
 use glam::Vec3;
 use kdray::{
-    layout::FLAT_NORMAL,
-    scene::{Scene, framing::bounds, normal::decode_octahedral},
+    layout::{
+        FLAT_NORMAL, MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR, normal::decode_octahedral,
+    },
+    world::FlatScene,
 };
 
 use super::{facet_normal, load};
@@ -15,21 +17,21 @@ const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 const CUBE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nv 0 0 1\nv 1 0 1\nv 0 1 1\nv 1 1 1\n\
     f 1 5 7 3\nf 6 2 4 8\nf 1 2 6 5\nf 7 8 4 3\nf 2 1 3 4\nf 5 6 8 7\n";
 
-fn load_obj(text: &str) -> Scene {
+fn load_obj(text: &str) -> FlatScene {
     load(&[("mesh.obj", text.as_bytes())]).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-fn load_with(toml: &str, obj: &str) -> Scene {
+fn load_with(toml: &str, obj: &str) -> FlatScene {
     load(&[("scene.toml", toml.as_bytes()), ("mesh.obj", obj.as_bytes())]).unwrap_or_else(|e| panic!("{e}"))
 }
 
-fn load_mtl(mtl: &str) -> Scene {
+fn load_mtl(mtl: &str) -> FlatScene {
     let obj = format!("mtllib a b.mtl\n{TRIANGLE}usemtl my own\nf 1 2 3\n");
     load(&[("mesh.obj", obj.as_bytes()), ("a b.mtl", mtl.as_bytes())]).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// Encoded normals of all corners.
-fn normals(scene: &Scene) -> Vec<u32> {
+fn normals(scene: &FlatScene) -> Vec<u32> {
     scene.triangles.iter().flat_map(|t| [t.n0, t.n1, t.n2]).collect()
 }
 
@@ -129,9 +131,10 @@ fn mtl_terms_become_the_kernels() {
         Ni 1.3\nTr 0.4\nTf 0.7 0.8 0.9\nillum 7\nmap_Kd x.png\nsharpness 60\n";
     let scene = load_mtl(mtl);
     assert_eq!(scene.material_names, ["other", "my own", "(default)"]);
+    let all = MATERIAL_SPECULAR | MATERIAL_REFLECT | MATERIAL_REFRACT | MATERIAL_FRESNEL;
     let m = scene.materials[scene.triangle_materials[0] as usize];
     assert_eq!((m.ka, m.kd, m.ke), (Vec3::splat(0.5), Vec3::new(0.1, 0.2, 0.3), Vec3::new(2.0, 0.0, 0.0)));
-    assert_eq!((m.ns, m.ni, m.d, m.tf, m.illum), (10.0, 1.3, 0.6, Vec3::new(0.7, 0.8, 0.9), 7));
+    assert_eq!((m.ns, m.ni, m.d, m.tf, m.flags), (10.0, 1.3, 0.6, Vec3::new(0.7, 0.8, 0.9), all));
     // d counts where a file gives both.
     assert_eq!(load_mtl("newmtl my own\nTr 1\nd -halo 0.5\n").materials[0].d, 0.5);
 }
@@ -164,7 +167,7 @@ fn a_bare_obj_is_framed_and_lit() {
         }
         let scene = load_obj(&format!("{obj}f 1 2 3\nf 1 3 4\n"));
         assert_eq!((scene.name.as_str(), scene.lights.len()), ("mesh", 1));
-        let (min, max) = bounds(&scene.triangles);
+        let (min, max) = scene.bounds();
         let (camera, half) = (scene.camera, scene.camera.vertical_fov_degrees.to_radians() / 2.0);
         let forward = (camera.target - camera.eye).normalize();
         let right = forward.cross(camera.up).normalize();

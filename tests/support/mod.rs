@@ -20,8 +20,7 @@ use kdray::{
     gpu::{Context, ContextOptions, DeviceOverrides},
     layout::{Hit, NO_TRIANGLE, Ray, Triangle},
     reference::{bindings::Bindings, brute, kdtree::near_scene, probe::Probe},
-    scene::Scene,
-    world::{Geometry, World},
+    world::{FlatScene, Geometry, World},
 };
 
 /// A device under validation, which is taken for what the overrides make of it.
@@ -41,13 +40,13 @@ pub fn without_wide_atomics() -> Arc<Context> {
 }
 
 /// The scene with its best tree.
-pub fn world_of(scene: &Scene) -> World {
+pub fn world_of(scene: &FlatScene) -> World {
     world_by(scene, &BuildOptions::default())
 }
 
 /// The scene with a tree that is built so.
-pub fn world_by(scene: &Scene, build_options: &BuildOptions) -> World {
-    World::new(scene.clone(), build_options).expect("a material for each triangle")
+pub fn world_by(scene: &FlatScene, build_options: &BuildOptions) -> World {
+    World::of_flat(scene.clone(), build_options).expect("a material for each triangle")
 }
 
 /// Triangles and their tree.

@@ -1,19 +1,27 @@
 //! Small scenes in code.
 
+use std::path::Path;
+
 use glam::{Vec3, vec3};
 use kdray::{
     layout::{
         LIGHT_DIRECTIONAL, LIGHT_POINT, Light, MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR,
-        Material, Triangle,
+        Material, Triangle, normal::encode_octahedral,
     },
-    scene::{Camera, RenderDefaults, Scene, normal::encode_octahedral},
+    scene::{Camera, RenderDefaults, Scene},
+    world::FlatScene,
 };
 
 use super::meshes;
 
+/// A scene file, flattened.
+pub fn load(path: &Path) -> FlatScene {
+    FlatScene::new(&Scene::load(path).expect("a scene")).expect("a loaded scene fits together")
+}
+
 /// A scene without triangles and lights, seen from z = 4.
-pub fn empty() -> Scene {
-    Scene {
+pub fn empty() -> FlatScene {
+    FlatScene {
         name: "test".to_owned(),
         triangles: Vec::new(),
         triangle_materials: Vec::new(),
@@ -28,7 +36,7 @@ pub fn empty() -> Scene {
 }
 
 /// Adds a mesh of one material.
-pub fn add(scene: &mut Scene, triangles: Vec<Triangle>, material: Material) {
+pub fn add(scene: &mut FlatScene, triangles: Vec<Triangle>, material: Material) {
     scene.triangle_materials.extend(triangles.iter().map(|_| scene.materials.len() as u32));
     scene.triangles.extend(triangles);
     scene.material_names.push(format!("material {}", scene.materials.len()));
@@ -46,7 +54,7 @@ pub const BLACK: Material = Material {
     ke: Vec3::ZERO,
     flags: 0,
     tf: Vec3::ONE,
-    illum: 0,
+    reserved: 0,
 };
 
 pub fn diffuse(kd: Vec3) -> Material {
@@ -112,7 +120,7 @@ pub fn room(half: f32) -> Vec<Triangle> {
 }
 
 /// Every material in a room, under a lamp and a far light.
-pub fn mixed() -> Scene {
+pub fn mixed() -> FlatScene {
     let mut scene = empty();
     add(&mut scene, room(5.0), diffuse(vec3(0.7, 0.6, 0.5)));
     add(
@@ -140,7 +148,7 @@ pub fn mixed() -> Scene {
 }
 
 /// The room of `mixed` with the front taken off, so that some rays leave.
-pub fn mixed_outdoors() -> Scene {
+pub fn mixed_outdoors() -> FlatScene {
     let scene = mixed();
     let keep: Vec<bool> = scene
         .triangles

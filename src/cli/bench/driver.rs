@@ -12,8 +12,9 @@ use kdray::{
         stage::Stage,
     },
     engine::choices::{Processor, TreeKind},
-    gpu::{Context, ContextOptions},
+    gpu::{Context, ContextOptions, GpuError},
     scene::Scene,
+    world::FlatScene,
 };
 
 use super::args::DriverArgs;
@@ -30,7 +31,7 @@ pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     let context = Context::with_ray_tracing(&ContextOptions::new(args.device.clone(), false))?;
     let progress = Progress::new(false, 8);
     let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
-    let scene = scene?;
+    let scene = FlatScene::new(&scene?).map_err(GpuError::from)?;
     let build_options = TreeKind::Best.options(Processor::of(Some(&context)));
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
     let (stage, _) = progress.stage(&building, || stage(args, scene, &build_options));
@@ -52,7 +53,7 @@ pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     check_hits(&report)
 }
 
-fn stage(args: &DriverArgs, scene: Scene, build_options: &BuildOptions) -> Stage {
+fn stage(args: &DriverArgs, scene: FlatScene, build_options: &BuildOptions) -> Stage {
     let size = (args.size.width, args.size.height);
     let make = if args.no_room { Stage::open } else { Stage::in_room };
     make(scene, size, build_options)

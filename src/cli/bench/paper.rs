@@ -61,7 +61,7 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
 
 fn load(path: &Path, processor: Processor) -> Result<World, CliError> {
     let scene = Scene::load(path)?;
-    Ok(World::new(scene, &TreeKind::Best.options(processor)).map_err(GpuError::from)?)
+    Ok(World::new(&scene, &TreeKind::Best.options(processor)).map_err(GpuError::from)?)
 }
 
 fn measure(context: &Arc<Context>, world: &World, options: &RenderOptions, report: &Report) -> Result<Row, CliError> {

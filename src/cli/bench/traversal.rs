@@ -10,8 +10,9 @@ use kdray::{
         traversal::{Report, SetResult, Tracers, VariantResult},
     },
     engine::choices::{Processor, TreeKind},
-    gpu::{Context, ContextOptions},
+    gpu::{Context, ContextOptions, GpuError},
     scene::Scene,
+    world::FlatScene,
 };
 
 use super::args::TraversalArgs;
@@ -27,7 +28,7 @@ pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
     args.files.check(&[&args.mesh])?;
     let progress = Progress::new(false, 7);
     let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
-    let scene = scene?;
+    let scene = FlatScene::new(&scene?).map_err(GpuError::from)?;
     let variants = variants(&args.variants);
     let device = ContextOptions::new(args.device.clone(), false);
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
@@ -63,7 +64,7 @@ fn variants(asked: &[Traversal]) -> Vec<Traversal> {
     variants
 }
 
-fn stage(args: &TraversalArgs, scene: Scene, build_options: &BuildOptions) -> Stage {
+fn stage(args: &TraversalArgs, scene: FlatScene, build_options: &BuildOptions) -> Stage {
     let size = (args.size.width, args.size.height);
     let make = if args.no_room { Stage::open } else { Stage::in_room };
     make(scene, size, build_options)

@@ -54,7 +54,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let context = if args.cpu { None } else { Some(opening()?) };
 
     let engine = context.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.picture.request());
-    let n_triangles = scene.triangles.len();
+    let n_triangles = scene.n_triangles();
     let n_pictures = u64::from(args.spp) * views.len() as u64;
     let cameras = views.iter().map(|view| &view.camera);
     let workload = Workload::of_pictures(&options, scene.lights.len(), n_pictures).seen_by(cameras);

@@ -21,8 +21,7 @@ use crate::{
     layout::{CastRay, Frame, Hit, Ray},
     reference::{bindings::Bindings, primary_hit::primary_rays},
     render::Renderer,
-    scene::Scene,
-    world::World,
+    world::{FlatScene, World},
 };
 
 /// As many camera rays as the device has lanes, within these: with fewer it would idle, and more only take longer.
@@ -71,7 +70,7 @@ pub fn measure_traversals(
 }
 
 /// Rays of the scene's camera, and one from each of their hits into the hemisphere above it. They depend on no device.
-fn some_rays(scene: &Scene, tree: &KdTree, frame: &Frame) -> Vec<CastRay> {
+fn some_rays(scene: &FlatScene, tree: &KdTree, frame: &Frame) -> Vec<CastRay> {
     let mut from_camera = vec![Ray::zeroed(); (frame.width * frame.height) as usize];
     primary_rays(frame, 0, &mut from_camera);
     let mut hits = vec![Hit::zeroed(); from_camera.len()];
@@ -81,7 +80,7 @@ fn some_rays(scene: &Scene, tree: &KdTree, frame: &Frame) -> Vec<CastRay> {
 }
 
 /// About so many pixels of the shape of the scene's own picture.
-fn picture_of(scene: &Scene, n_pixels: u32) -> RenderOptions {
+fn picture_of(scene: &FlatScene, n_pixels: u32) -> RenderOptions {
     let (width, height) = (f64::from(scene.defaults.width), f64::from(scene.defaults.height));
     let scale = (f64::from(n_pixels) / (width * height)).sqrt();
     let side = |pixels: f64| (pixels * scale).round().max(1.0) as u32;

@@ -63,7 +63,7 @@ fn warn(path: &Path, clean: &CleanObj, library: &Library) {
     if let Some((line, statement)) = &clean.unknown {
         tracing::warn!("{path}:{line}: unknown statement `{}`", statement.escape_debug());
     }
-    if let Some((name, line)) = clean.used_materials.iter().find(|(name, _)| !library.names.contains(name)) {
+    if let Some((name, line)) = clean.used_materials.iter().find(|(name, _)| !library.has(name)) {
         tracing::warn!(
             "{path}:{line}: no library defines material `{}`: it becomes the default one",
             name.escape_debug()
@@ -74,7 +74,7 @@ fn warn(path: &Path, clean: &CleanObj, library: &Library) {
 fn parse(clean: &CleanObj, library: &Library) -> Result<Vec<tobj::Model>, tobj::LoadError> {
     let options =
         tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
-    let by_name = library.names.iter().cloned().zip(0..).collect();
+    let by_name = library.materials.iter().map(|material| material.name.clone()).zip(0..).collect();
     // tobj only looks names up; the materials themselves are in the library.
     let materials = |_: &Path| Ok((vec![tobj::Material::default()], std::clone::Clone::clone(&by_name)));
     tobj::load_obj_buf(&mut clean.text.as_bytes(), &options, materials).map(|(models, _)| models)

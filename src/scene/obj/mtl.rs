@@ -8,20 +8,23 @@ use std::{
 };
 
 use super::clean::{split_keyword, statements};
-use crate::{
-    layout::Material,
-    scene::{
-        error::{Checked, SceneError},
-        material::MaterialSpec,
-        read::read_lossy,
-    },
+use crate::scene::{
+    error::{Checked, SceneError},
+    material::{Material, MaterialSpec},
+    read::read_lossy,
 };
 
-/// Materials by name; the last of a name counts.
+/// Materials; the last of a name counts.
 #[derive(Clone, Debug, Default)]
 pub struct Library {
-    pub names: Vec<String>,
     pub materials: Vec<Material>,
+}
+
+impl Library {
+    /// Whether there is a material of this name.
+    pub fn has(&self, name: &str) -> bool {
+        self.materials.iter().any(|material| material.name == name)
+    }
 }
 
 /// Reads what the `mtllib` lines of an OBJ file name, relative to it. A file that is not there is a warning.
@@ -68,8 +71,7 @@ fn load_library(path: &Path, library: &mut Library) -> Result<(), SceneError> {
     for material in materials {
         let spec = spec(&material);
         let named = |what| SceneError::file(path, format!("material `{}`: {what}", material.name));
-        library.materials.push(spec.material().map_err(named)?);
-        library.names.push(material.name.clone());
+        library.materials.push(spec.material(&material.name).map_err(named)?);
     }
     Ok(())
 }

@@ -1,0 +1,128 @@
+//! How a mesh is placed in the world.
+
+use glam::{DMat3, DQuat, DVec3, Vec3};
+use serde::Deserialize;
+
+use super::error::Checked;
+
+/// How a mesh is placed: scaled, then rotated, then translated.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TransformSpec {
+    translate: Option<[f32; 3]>,
+    rotate: Option<RotationSpec>,
+    scale: Option<ScaleSpec>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged, expecting = "expected [x, y, z] in degrees or { axis = [x, y, z], angle = degrees }")]
+enum RotationSpec {
+    /// Degrees about x, then y, then z.
+    Euler([f32; 3]),
+    AxisAngle(AxisAngle),
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AxisAngle {
+    axis: [f32; 3],
+    /// Degrees.
+    angle: f32,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged, expecting = "expected a number or [x, y, z]")]
+enum ScaleSpec {
+    Uniform(f32),
+    Axes([f32; 3]),
+}
+
+/// World from object. Computed in f64, so that the identity leaves every bit as it was.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Transform {
+    linear: DMat3,
+    translation: DVec3,
+    /// The inverse transpose of `linear`, but for a positive factor.
+    normals: DMat3,
+    /// A reflection: corners change their order so that outside stays outside.
+    mirrors: bool,
+}
+
+impl Transform {
+    /// Leaves every bit of a point as it is.
+    pub const IDENTITY: Self =
+        Self { linear: DMat3::IDENTITY, translation: DVec3::ZERO, normals: DMat3::IDENTITY, mirrors: false };
+
+    /// A mesh is scaled along its axes, then rotated, then moved. A negative factor of `scale` reflects the mesh.
+    ///
+    /// # Errors
+    /// A factor of `scale` is 0, or a number is not finite, in words.
+    pub fn new(scale: DVec3, rotation: DQuat, translation: DVec3) -> Result<Self, String> {
+        if !(scale.is_finite() && rotation.is_finite() && translation.is_finite()) {
+            return Err("the transform has a number that is not finite".to_owned());
+        }
+        if scale.abs().min_element() == 0.0 {
+            return Err(format!("scale = {:?} flattens the mesh: no factor may be 0", scale.to_array()));
+        }
+        let rotation = DMat3::from_quat(rotation);
+        // Relative to the smallest factor, so that tiny scales do not overflow.
+        let inverse_scale = scale.abs().min_element() / scale;
+        Ok(Self {
+            linear: rotation * DMat3::from_diagonal(scale),
+            translation,
+            normals: rotation * DMat3::from_diagonal(inverse_scale),
+            mirrors: scale.x * scale.y * scale.z < 0.0,
+        })
+    }
+
+    /// A point in world space.
+    pub fn point(&self, p: Vec3) -> Vec3 {
+        (self.linear * p.as_dvec3() + self.translation).as_vec3()
+    }
+
+    /// A surface normal in world space: unit length, or zero if `n` is zero.
+    pub fn normal(&self, n: Vec3) -> Vec3 {
+        (self.normals * n.as_dvec3()).normalize_or_zero().as_vec3()
+    }
+
+    /// Whether the transform is a reflection, by which a triangle's corners change their order.
+    pub fn mirrors(&self) -> bool {
+        self.mirrors
+    }
+}
+
+impl TransformSpec {
+    /// The transform, where it is finite and can be inverted.
+    pub fn transform(&self) -> Checked<Transform> {
+        let translation = finite("translate", self.translate.unwrap_or_default())?;
+        let scale = match self.scale {
+            None => [1.0; 3],
+            Some(ScaleSpec::Uniform(factor)) => [factor; 3],
+            Some(ScaleSpec::Axes(factors)) => factors,
+        };
+        let scale = finite("scale", scale)?;
+        Transform::new(scale, self.rotation()?, translation)
+    }
+
+    fn rotation(&self) -> Checked<DQuat> {
+        match &self.rotate {
+            None => Ok(DQuat::IDENTITY),
+            Some(RotationSpec::Euler(degrees)) => {
+                let [x, y, z] = finite("rotate", *degrees)?.to_array().map(f64::to_radians);
+                Ok(DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x))
+            }
+            Some(RotationSpec::AxisAngle(AxisAngle { axis, angle })) => {
+                let direction = finite("rotate.axis", *axis)?.try_normalize();
+                let direction = direction.ok_or_else(|| format!("rotate.axis = {axis:?} has no direction"))?;
+                let angle = finite("rotate.angle", [*angle, 0.0, 0.0])?.x;
+                Ok(DQuat::from_axis_angle(direction, angle.to_radians()))
+            }
+        }
+    }
+}
+
+/// Three finite numbers.
+pub(super) fn finite(name: &str, value: [f32; 3]) -> Checked<DVec3> {
+    let vector = Vec3::from_array(value);
+    if vector.is_finite() { Ok(vector.as_dvec3()) } else { Err(format!("{name} = {value:?} is not finite")) }
+}

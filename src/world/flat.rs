@@ -1,0 +1,137 @@
+//! A scene as it is traced: world-space triangles, and materials and lights as kernels read them.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::Mismatch;
+use crate::{
+    layout::{
+        FLAT_NORMAL, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT,
+        MATERIAL_SPECULAR, Material, Triangle, normal::encode_octahedral,
+    },
+    scene::{self, Camera, Instance, Lobes, Mesh, RenderDefaults, Scene},
+};
+
+/// Everything that a frame shows, with all meshes in world space.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FlatScene {
+    /// The scene's name.
+    pub name: String,
+    /// World space: those of the first instance, in the order of its mesh's faces, then those of the next.
+    pub triangles: Vec<Triangle>,
+    /// For each triangle, its index into `materials`.
+    pub triangle_materials: Vec<u32>,
+    pub materials: Vec<Material>,
+    /// One for each material.
+    pub material_names: Vec<String>,
+    /// May be none.
+    pub lights: Vec<Light>,
+    pub camera: Camera,
+    /// Irradiance that every point receives, weighted by its Ka.
+    pub ambient: Vec3,
+    /// Radiance of rays that leave the scene.
+    pub background: Vec3,
+    pub defaults: RenderDefaults,
+}
+
+impl FlatScene {
+    /// Places all meshes of a scene in the world, on the current rayon pool.
+    ///
+    /// # Errors
+    /// An index that names nothing, arrays of different lengths, or a vertex too far from the origin.
+    pub fn new(scene: &Scene) -> Result<Self, Mismatch> {
+        let mut triangles = Vec::with_capacity(scene.n_triangles());
+        let mut triangle_materials = Vec::with_capacity(triangles.capacity());
+        for (instance_ix, instance) in scene.instances.iter().enumerate() {
+            let mesh = scene.meshes.get(instance.mesh_ix).ok_or(Mismatch::Mesh { instance: instance_ix })?;
+            check(mesh, instance).map_err(|what| Mismatch::Instance { instance: instance_ix, what })?;
+            push_triangles(mesh, instance, &mut triangles)
+                .map_err(|what| Mismatch::Instance { instance: instance_ix, what })?;
+            let material_of = |slot: &u32| instance.materials[*slot as usize % instance.materials.len()];
+            triangle_materials.extend(mesh.slots.iter().map(material_of));
+        }
+        Ok(Self {
+            name: scene.name.clone(),
+            triangles,
+            triangle_materials,
+            materials: scene.materials.iter().map(Material::from).collect(),
+            material_names: scene.materials.iter().map(|material| material.name.clone()).collect(),
+            lights: scene.lights.iter().map(Light::from).collect(),
+            camera: scene.camera,
+            ambient: scene.ambient,
+            background: scene.background,
+            defaults: scene.defaults,
+        })
+    }
+
+    /// The smallest and the largest coordinates of all triangles.
+    pub fn bounds(&self) -> (Vec3, Vec3) {
+        let corners = self.triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]);
+        corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
+    }
+}
+
+/// Checks that a mesh's arrays belong together, and that there is a material for its faces.
+fn check(mesh: &Mesh, instance: &Instance) -> Result<(), String> {
+    let Mesh { positions, faces, normals, slots } = mesh;
+    if (normals.len(), slots.len()) != (faces.len(), faces.len()) {
+        return Err(format!("its mesh has {} faces, {} normals, {} slots", faces.len(), normals.len(), slots.len()));
+    }
+    if instance.materials.is_empty() && !faces.is_empty() {
+        return Err("it has no material".to_owned());
+    }
+    match faces.as_flattened().par_iter().find_first(|ix| **ix as usize >= positions.len()) {
+        Some(ix) => Err(format!("a face of its mesh has vertex {ix} of {}", positions.len())),
+        None => Ok(()),
+    }
+}
+
+/// Adds a world-space triangle for each face, in their order.
+fn push_triangles(mesh: &Mesh, instance: &Instance, triangles: &mut Vec<Triangle>) -> Result<(), String> {
+    let transform = &instance.transform;
+    let world = mesh.placed(transform)?;
+    let encoded = |n: Vec3| match transform.normal(n) {
+        Vec3::ZERO => FLAT_NORMAL,
+        normal => encode_octahedral(normal),
+    };
+    let triangle = |(face, normals): (&[u32; 3], &[Vec3; 3])| {
+        let [a, b, c] = if transform.mirrors() { [0, 2, 1] } else { [0, 1, 2] };
+        Triangle {
+            v0: world[face[a] as usize],
+            n0: encoded(normals[a]),
+            v1: world[face[b] as usize],
+            n1: encoded(normals[b]),
+            v2: world[face[c] as usize],
+            n2: encoded(normals[c]),
+        }
+    };
+    triangles.par_extend(mesh.faces.par_iter().zip(&mesh.normals).map(triangle));
+    Ok(())
+}
+
+impl From<&scene::Material> for Material {
+    fn from(material: &scene::Material) -> Self {
+        let &scene::Material { ka, kd, ks, ke, tf, ns, ni, d, lobes, .. } = material;
+        Self { ka, ns, kd, d, ks, ni, ke, flags: flags_of(lobes), tf, reserved: 0 }
+    }
+}
+
+/// The flags of a [`Material`].
+fn flags_of(lobes: Lobes) -> u32 {
+    let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
+    flag(lobes.highlight, MATERIAL_SPECULAR)
+        | flag(lobes.reflection, MATERIAL_REFLECT)
+        | flag(lobes.refraction, MATERIAL_REFRACT)
+        | flag(lobes.fresnel, MATERIAL_FRESNEL)
+}
+
+impl From<&scene::Light> for Light {
+    fn from(light: &scene::Light) -> Self {
+        match *light {
+            scene::Light::Point { position, intensity } => Self { position, kind: LIGHT_POINT, intensity, reserved: 0 },
+            scene::Light::Directional { towards, irradiance } => {
+                Self { position: towards, kind: LIGHT_DIRECTIONAL, intensity: irradiance, reserved: 0 }
+            }
+        }
+    }
+}
