@@ -60,6 +60,7 @@
 //! ```
 
 #![deny(unsafe_code)]
+#![warn(missing_docs)]
 
 #[macro_use]
 pub mod util;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{AccelBuffers, accel, binding};
 use crate::{
-    gpu::{Binding, BindingSet, Bindings, Buffer, BufferUse, Context, GpuError},
+    gpu::{Binding, BindingSet, Bindings, Buffer, BufferUse, Context, GivenBuffer, GpuError},
     layout::{BIND_CAST_HITS, BIND_CAST_RAYS, CastBatch, CastRay, Hit},
 };
 
@@ -24,6 +24,20 @@ impl CastResources {
     pub fn bindings(context: &Arc<Context>, tree: &AccelBuffers) -> Result<Arc<Bindings>, GpuError> {
         let kinds: Vec<_> = accel::bindings().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
         Bindings::with_constants(context, &kinds, size_of::<CastBatch>() as u32, tree.constants())
+    }
+
+    /// The set over rays and hits of the caller's own.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn given(
+        bindings: &Arc<Bindings>,
+        tree: &AccelBuffers,
+        rays: GivenBuffer,
+        hits: GivenBuffer,
+    ) -> Result<BindingSet, GpuError> {
+        let own = [(BIND_CAST_RAYS, Binding::Given(rays)), (BIND_CAST_HITS, Binding::Given(hits))];
+        BindingSet::new(bindings, "recorded cast", &[&tree.objects(), &own[..]].concat())
     }
 
     /// Room for `len` rays.

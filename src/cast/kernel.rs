@@ -43,7 +43,7 @@ impl Contender for Kernel {
     }
 
     fn record(&self, commands: &Commands) {
-        self.cast.record(commands, &self.resources, self.resources.cast_rays.len() as u32, Round::Begin);
+        self.cast.record(commands, &self.resources.set, self.resources.cast_rays.len() as u32, Round::Begin);
     }
 
     fn resources(&self) -> &Rc<CastResources> {

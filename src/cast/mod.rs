@@ -8,10 +8,11 @@
 mod kernel;
 pub(crate) mod leaving;
 mod read;
+mod recorded;
 mod rounds;
 mod write;
 
-use std::{mem, sync::Arc, time::Instant};
+use std::{mem, rc::Rc, sync::Arc, time::Instant};
 
 use bytemuck::Zeroable;
 use rayon::prelude::*;
@@ -20,6 +21,7 @@ pub(crate) use self::rounds::rounds;
 pub use self::{
     kernel::Kernel,
     read::{RayFileError, RayReader},
+    recorded::RecordedCast,
     rounds::Contender,
     write::HitWriter,
 };
@@ -58,8 +60,8 @@ pub struct Caster {
     bindings: Arc<Bindings>,
     traversal: Traversal,
     /// For [`Query::Closest`] and [`Query::Any`], once they have been asked.
-    closest: Option<passes::Cast>,
-    any: Option<passes::Cast>,
+    closest: Option<Rc<passes::Cast>>,
+    any: Option<Rc<passes::Cast>>,
     resources: CastResources,
     rays_per_batch: usize,
 }
@@ -132,18 +134,25 @@ impl Caster {
             Query::Closest => &self.closest,
             Query::Any => &self.any,
         };
-        kernel.as_ref().map_or(Ok(Vec::new()), passes::Cast::statistics)
+        kernel.as_ref().map_or(Ok(Vec::new()), |kernel| kernel.statistics())
     }
 
-    /// Makes the query's kernel and room for a batch, unless they are there.
-    fn prepare(&mut self, query: Query, n_rays: usize) -> Result<(), GpuError> {
+    /// Makes the query's kernel, unless it is there.
+    fn prepare_kernel(&mut self, query: Query) -> Result<Rc<passes::Cast>, GpuError> {
         let kernel = match query {
             Query::Closest => &mut self.closest,
             Query::Any => &mut self.any,
         };
-        if kernel.is_none() {
-            *kernel = Some(passes::Cast::new(&self.context, &self.bindings, self.traversal, query)?);
+        if let Some(kernel) = kernel {
+            return Ok(Rc::clone(kernel));
         }
+        let made = Rc::new(passes::Cast::new(&self.context, &self.bindings, self.traversal, query)?);
+        Ok(Rc::clone(kernel.insert(made)))
+    }
+
+    /// Makes the query's kernel and room for a batch, unless they are there.
+    fn prepare(&mut self, query: Query, n_rays: usize) -> Result<(), GpuError> {
+        self.prepare_kernel(query)?;
         let len = n_rays.min(self.rays_per_batch);
         if self.resources.cast_rays.len() < len {
             self.resources = CastResources::new(&self.context, &self.bindings, &self.tree, len)?;
@@ -167,7 +176,7 @@ impl Caster {
                 // The repetition before has written what this one overwrites: cast_hits.
                 commands.barrier(Access::ComputeWrite, Access::ComputeUpdate);
                 self.tree.stalls.reset(commands);
-                kernel.record(commands, &self.resources, n_rays, Round::Begin);
+                kernel.record(commands, &self.resources.set, n_rays, Round::Begin);
             })
         };
         let buffers = (0..n_times).map(record).collect::<Result<Vec<_>, _>>()?;
@@ -175,7 +184,7 @@ impl Caster {
         self.context.wait()?;
         let began_ms = Instant::now();
         let n_rounds = self.tree.stalls.finish(&self.context, |commands, round| {
-            kernel.record(commands, &self.resources, n_rays, round);
+            kernel.record(commands, &self.resources.set, n_rays, round);
         })?;
         // Every repetition stalls alike, but only the last one's rays go on.
         let stalled_ms = if n_rounds > 0 { began_ms.elapsed().as_secs_f64() * 1e3 } else { 0.0 };

@@ -7,7 +7,7 @@ use tracing::info_span;
 use crate::{
     cpu::{self, Batching},
     frame::{Drawn, Picture, RenderOptions, Watcher},
-    gpu::{Context, GpuError},
+    gpu::{Context, GivenImage, GpuError, TimelinePoint},
     render::BandedRenderer,
     scene::Camera,
     world::World,
@@ -65,6 +65,26 @@ impl Renderer {
             Processor::Cpu(renderer) => {
                 renderer.set_camera(camera);
                 Ok(draw_on_cpu(renderer, n_samples, &mut watcher))
+            }
+        }
+    }
+
+    /// Copies the displayed picture that was drawn last into the upper left corner of an image of the caller's own: sRGB, 8
+    /// bits a channel. The device begins after `after` and signals `then`; the host does not wait for it.
+    ///
+    /// # Errors
+    /// The CPU draws; the picture is so large that it does not stay on the device; the image is smaller than the picture;
+    /// a failed call. Then nothing is signalled.
+    pub fn copy_picture_to(
+        &self,
+        image: &GivenImage,
+        after: Option<TimelinePoint>,
+        then: Option<TimelinePoint>,
+    ) -> Result<(), GpuError> {
+        match &self.0 {
+            Processor::Device(renderer) => renderer.copy_picture_to(image, after, then),
+            Processor::Cpu(_) => {
+                Err(GpuError::Lacks { device: "CPU".to_owned(), missing: "images to copy a picture into".to_owned() })
             }
         }
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::{AnyBuffer, Constants, Context, GpuError, Target};
+use super::{AnyBuffer, Constants, Context, GivenBuffer, GpuError, Target};
 
 /// What a binding number holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +33,8 @@ pub enum Binding<'a> {
     /// Of a buffer for [`BufferUse::Texels`](super::BufferUse::Texels) or [`BufferUse::Address`](super::BufferUse::Address).
     Texels(&'a AnyBuffer),
     Image(&'a Target),
+    /// A storage buffer of the caller's own.
+    Given(GivenBuffer),
 }
 
 /// The layout of a set, shared by all pipelines that use it, with the specialization constants that they share.
@@ -163,6 +165,10 @@ impl BindingSet {
                 Binding::Buffer(buffer) => {
                     let bytes = buffer.bytes().min(most_bytes);
                     buffer_info = [vk::DescriptorBufferInfo::default().buffer(buffer.raw()).range(bytes)];
+                    write.buffer_info(&buffer_info)
+                }
+                Binding::Given(GivenBuffer { raw, offset, bytes }) => {
+                    buffer_info = [vk::DescriptorBufferInfo::default().buffer(*raw).offset(*offset).range(*bytes)];
                     write.buffer_info(&buffer_info)
                 }
                 Binding::Texels(buffer) => {

@@ -5,7 +5,10 @@ use std::{cell::Cell, ffi::CString, sync::Arc};
 use ash::vk;
 use bytemuck::Pod;
 
-use super::{Access, AnyBuffer, BindingSet, Buffer, ComputePipeline, Context, GpuError, RasterPipeline, Target, Timer};
+use super::{
+    Access, AnyBuffer, BindingSet, Buffer, ComputePipeline, Context, GivenImage, GpuError, RasterPipeline, Target,
+    Timer,
+};
 
 /// A recorded command buffer.
 pub struct CommandBuffer {
@@ -90,12 +93,24 @@ impl CommandBuffer {
     pub(super) fn raw(&self) -> vk::CommandBuffer {
         self.raw
     }
+
+    /// Leaves the buffer to the context, which frees it when the device has ended all work.
+    pub(super) fn leave(mut self) {
+        self.context.leave_commands(std::mem::take(&mut self.raw));
+    }
 }
 
 impl Drop for CommandBuffer {
     fn drop(&mut self) {
-        // SAFETY: its owner has waited for the device.
+        // SAFETY: its owner has waited for the device, or has left the buffer to the context; then the handle is null.
         unsafe { self.context.device.free_command_buffers(self.context.command_pool, &[self.raw]) };
+    }
+}
+
+impl<'a> Commands<'a> {
+    /// Commands of a buffer that the caller records and submits.
+    pub(super) fn to_given(context: &'a Context, raw: vk::CommandBuffer) -> Self {
+        Self { raw, context, timer: None, has_passes: Cell::new(false) }
     }
 }
 
@@ -291,9 +306,13 @@ impl Commands<'_> {
     }
 
     fn transition(&self, target: &Target, from: LayoutState, to: LayoutState) {
+        self.transition_image(target.raw, target.range(), from, to);
+    }
+
+    fn transition_image(&self, image: vk::Image, range: vk::ImageSubresourceRange, from: LayoutState, to: LayoutState) {
         let barrier = [vk::ImageMemoryBarrier2::default()
-            .image(target.raw)
-            .subresource_range(target.range())
+            .image(image)
+            .subresource_range(range)
             .src_stage_mask(from.0)
             .src_access_mask(from.1)
             .old_layout(from.2)
@@ -334,6 +353,46 @@ impl Commands<'_> {
         let region = [vk::BufferCopy::default().dst_offset(begin).size(bytes)];
         // SAFETY: both buffers hold that many bytes, which their owners have checked.
         unsafe { self.context.device.cmd_copy_buffer(self.raw, source.raw(), destination.raw(), &region) };
+    }
+}
+
+/// A rectangle of pixels in a buffer of rows, 4 bytes a pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct PixelRows {
+    /// The byte at which the first pixel is.
+    pub offset: u64,
+    /// Pixels from a row to the next.
+    pub stride: u32,
+    /// Width and height, pixels.
+    pub size: (u32, u32),
+}
+
+impl Commands<'_> {
+    /// Copies pixels into an image of the caller's own, from its upper left corner on. Needs `Access::TransferRead` of the
+    /// buffer. The image has its last layout afterwards, and what waits for the end of the commands sees the pixels.
+    pub fn copy_to_given(&self, source: &AnyBuffer, rows: &PixelRows, image: &GivenImage) {
+        let (width, height) = rows.size;
+        assert!(width <= image.size.0 && height <= image.size.1, "the image has room for the pixels");
+        let layers = vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1);
+        let region = [vk::BufferImageCopy::default()
+            .buffer_offset(rows.offset)
+            .buffer_row_length(rows.stride)
+            .image_subresource(layers)
+            .image_extent(vk::Extent3D { width, height, depth: 1 })];
+        let [before, after] = image.layouts;
+        let (copy, written) = (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE);
+        let copying = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+        self.transition_given(image, (copy, vk::AccessFlags2::NONE, before), (copy, written, copying));
+        // SAFETY: the buffer holds the rows, which its owner has checked; the image is in this layout.
+        unsafe { self.context.device.cmd_copy_buffer_to_image(self.raw, source.raw(), image.raw, copying, &region) };
+        // The semaphore that is signalled next waits for copies.
+        self.transition_given(image, (copy, written, copying), (copy, vk::AccessFlags2::NONE, after));
+    }
+
+    fn transition_given(&self, image: &GivenImage, from: LayoutState, to: LayoutState) {
+        let range =
+            vk::ImageSubresourceRange::default().aspect_mask(vk::ImageAspectFlags::COLOR).level_count(1).layer_count(1);
+        self.transition_image(image.raw, range, from, to);
     }
 }
 

@@ -3,17 +3,17 @@
 use std::{
     ffi::CString,
     mem::ManuallyDrop,
-    sync::{Arc, Mutex, OnceLock},
+    sync::{Arc, Mutex, OnceLock, PoisonError},
 };
 
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::Allocator;
 
 use super::{
-    Commands, DeviceInfo, DeviceOverrides, DeviceSelector, GpuError, Limits,
+    Commands, DeviceInfo, DeviceOverrides, DeviceSelector, GivenDevice, GpuError, Limits, TimelinePoint,
     commands::CommandBuffer,
     device::{DeviceExtras, Purpose},
-    devices::{queue_family, select},
+    devices::{list, queue_family, select},
     instance::Instance,
     memory::create_allocator,
     probe,
@@ -74,7 +74,23 @@ pub struct Context {
     pub(super) refusal: Refusal,
     #[cfg(feature = "hot-reload")]
     pub(super) replacements: Mutex<super::Replacements>,
+    /// Command buffers that nobody waits for, freed when the queue is idle.
+    left_commands: Mutex<Vec<vk::CommandBuffer>>,
+    /// The caller of the library destroys the device.
+    is_given: bool,
     instance: Arc<Instance>,
+}
+
+/// A device that is open, and what is known of it.
+struct Opened {
+    physical: vk::PhysicalDevice,
+    device: ash::Device,
+    queue: vk::Queue,
+    /// The index of the queue's family.
+    family: usize,
+    info: DeviceInfo,
+    extras: DeviceExtras,
+    is_given: bool,
 }
 
 impl Context {
@@ -124,28 +140,60 @@ impl Context {
         purpose: Purpose,
         pretend: &DeviceOverrides,
     ) -> Result<Arc<Self>, GpuError> {
-        let ray_tracing = purpose == Purpose::RayTracing;
         // SAFETY: the device belongs to the instance.
-        let (families, properties) = unsafe {
-            (
-                instance.raw.get_physical_device_queue_family_properties(physical),
-                instance.raw.get_physical_device_properties(physical),
-            )
-        };
+        let families = unsafe { instance.raw.get_physical_device_queue_family_properties(physical) };
         let family = queue_family(&families).expect("`select` refuses a device without such a queue");
         let extras = DeviceExtras::of(&instance, physical, purpose)
             .map_err(GpuError::call("vkEnumerateDeviceExtensionProperties", &info.name))?;
         let device = extras
             .create_device(&instance, physical, family as u32)
             .map_err(GpuError::call("vkCreateDevice", &info.name))?;
-        // SAFETY: the queue was asked for at creation; the pool belongs to its family.
-        let (queue, command_pool) = unsafe {
+        // SAFETY: the queue was asked for at creation.
+        let queue = unsafe { device.get_device_queue(family as u32, 0) };
+        let opened = Opened { physical, device, queue, family, info, extras, is_given: false };
+        Self::with_device(instance, opened, purpose, pretend)
+    }
+
+    /// For [`Context::on_given`](Self::on_given), which says what must hold.
+    pub(super) fn open_given(given: GivenDevice, pretend: &DeviceOverrides) -> Result<Arc<Self>, GpuError> {
+        let instance = Instance::given(given.entry, given.instance);
+        let (physical, info) = list(&instance)?
+            .into_iter()
+            .find(|(physical, _)| *physical == given.physical)
+            .ok_or_else(|| GpuError::NoSuchDevice { wanted: "given".into(), available: "others".into() })?;
+        if !info.missing.is_empty() {
+            return Err(GpuError::Lacks { device: info.name, missing: info.missing.join(", ") });
+        }
+        let opened = Opened {
+            physical,
+            device: given.device,
+            queue: given.queue,
+            family: given.queue_family as usize,
+            info,
+            extras: DeviceExtras::of_given(given.wide_atomics),
+            is_given: true,
+        };
+        Self::with_device(instance, opened, Purpose::Compute, pretend)
+    }
+
+    fn with_device(
+        instance: Arc<Instance>,
+        opened: Opened,
+        purpose: Purpose,
+        pretend: &DeviceOverrides,
+    ) -> Result<Arc<Self>, GpuError> {
+        let Opened { physical, device, queue, family, info, extras, is_given } = opened;
+        let ray_tracing = purpose == Purpose::RayTracing;
+        // SAFETY: the device belongs to the instance; the pool belongs to its family.
+        let (families, properties, command_pool) = unsafe {
             let pool = vk::CommandPoolCreateInfo::default()
                 .queue_family_index(family as u32)
                 .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
-            let pool =
-                device.create_command_pool(&pool, None).map_err(GpuError::call("vkCreateCommandPool", "kdray"))?;
-            (device.get_device_queue(family as u32, 0), pool)
+            (
+                instance.raw.get_physical_device_queue_family_properties(physical),
+                instance.raw.get_physical_device_properties(physical),
+                device.create_command_pool(&pool, None).map_err(GpuError::call("vkCreateCommandPool", "kdray"))?,
+            )
         };
         let allocator = create_allocator(&instance, &device, physical)?;
         Ok(Arc::new(Self {
@@ -173,6 +221,8 @@ impl Context {
             #[cfg(feature = "hot-reload")]
             replacements: Mutex::default(),
             limits: Limits::of(&instance, physical).reduced_to(pretend),
+            left_commands: Mutex::default(),
+            is_given,
             instance,
         }))
     }
@@ -281,10 +331,53 @@ impl Context {
             .map_err(|error| GpuError::call("vkQueueSubmit2", &names())(error))
     }
 
+    /// Starts a command buffer of copies between two values of timeline semaphores, and does not wait for its end. Without
+    /// `then`, nothing says when it has ended but [`Context::wait`].
+    ///
+    /// # Errors
+    /// A failed call: the commands have not begun.
+    pub fn submit_copies(
+        &self,
+        buffer: CommandBuffer,
+        after: Option<TimelinePoint>,
+        then: Option<TimelinePoint>,
+    ) -> Result<(), GpuError> {
+        let semaphore = |point: TimelinePoint| {
+            vk::SemaphoreSubmitInfo::default()
+                .semaphore(point.semaphore)
+                .value(point.value)
+                .stage_mask(vk::PipelineStageFlags2::COPY)
+        };
+        let (waits, signals) = (after.map(semaphore), then.map(semaphore));
+        let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(buffer.raw())];
+        let submits = [vk::SubmitInfo2::default()
+            .wait_semaphore_infos(waits.as_slice())
+            .command_buffer_infos(&commands)
+            .signal_semaphore_infos(signals.as_slice())];
+        // SAFETY: the buffer is recorded, and is left to the context until the queue is idle; whoever made the points
+        // vouches for the semaphores.
+        unsafe { self.device.queue_submit2(self.queue, &submits, vk::Fence::null()) }
+            .map_err(GpuError::call("vkQueueSubmit2", buffer.name()))?;
+        buffer.leave();
+        Ok(())
+    }
+
+    /// Takes over a command buffer that was submitted.
+    pub(super) fn leave_commands(&self, raw: vk::CommandBuffer) {
+        self.left_commands.lock().unwrap_or_else(PoisonError::into_inner).push(raw);
+    }
+
     /// Waits until all that was submitted has ended.
     pub fn wait(&self) -> Result<(), GpuError> {
         // SAFETY: the queue is used by one thread at a time.
-        unsafe { self.device.queue_wait_idle(self.queue) }.map_err(GpuError::call("vkQueueWaitIdle", &self.info.name))
+        unsafe { self.device.queue_wait_idle(self.queue) }
+            .map_err(GpuError::call("vkQueueWaitIdle", &self.info.name))?;
+        let left = std::mem::take(&mut *self.left_commands.lock().unwrap_or_else(PoisonError::into_inner));
+        if !left.is_empty() {
+            // SAFETY: the queue has ended all work.
+            unsafe { self.device.free_command_buffers(self.command_pool, &left) };
+        }
+        Ok(())
     }
 
     /// Shader stages that see bindings and push constants.
@@ -312,10 +405,14 @@ impl Drop for Context {
     fn drop(&mut self) {
         // SAFETY: every object made from the context holds it, so none is left; the allocator goes before the device.
         unsafe {
-            let _ = self.device.device_wait_idle();
+            // Other queues of a given device are not kdray's to wait for.
+            let _ =
+                if self.is_given { self.device.queue_wait_idle(self.queue) } else { self.device.device_wait_idle() };
             ManuallyDrop::drop(&mut self.allocator);
             self.device.destroy_command_pool(self.command_pool, None);
-            self.device.destroy_device(None);
+            if !self.is_given {
+                self.device.destroy_device(None);
+            }
         }
     }
 }

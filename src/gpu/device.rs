@@ -4,7 +4,9 @@ use std::ffi::{CStr, c_char};
 
 use ash::{khr, prelude::VkResult, vk};
 
-use super::{instance::Instance, ray_tracing::RayTracingCalls, robustness, statistics::StatisticsCalls};
+use super::{
+    RequiredFeatures, instance::Instance, ray_tracing::RayTracingCalls, robustness, statistics::StatisticsCalls,
+};
 
 /// What a device is opened for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +48,11 @@ impl DeviceExtras {
         })
     }
 
+    /// A device that the caller has created.
+    pub fn of_given(wide_atomics: bool) -> Self {
+        Self { portability: false, statistics: false, unchecked: false, wide_atomics, purpose: Purpose::Compute }
+    }
+
     fn extensions(self) -> Vec<*const c_char> {
         let mut names = Vec::new();
         names.extend(self.portability.then_some(khr::portability_subset::NAME));
@@ -69,26 +76,16 @@ impl DeviceExtras {
         let extensions = self.extensions();
         let priorities = [1.0];
         let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
-        let mut features = vk::PhysicalDeviceVulkan13Features::default()
-            .dynamic_rendering(true)
-            .synchronization2(true)
-            .subgroup_size_control(true)
-            .compute_full_subgroups(true)
-            // Every Vulkan 1.3 device has it. Older GLSL compilers state workgroup sizes in a way that asks for it.
-            .maintenance4(true);
+        let RequiredFeatures { of_1_0, mut of_1_2, mut of_1_3 } = RequiredFeatures::new(self.wide_atomics);
         let mut executables =
             vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
         let mut unchecked = vk::PhysicalDevicePipelineRobustnessFeaturesEXT::default().pipeline_robustness(true);
-        let mut of_1_2 = vk::PhysicalDeviceVulkan12Features::default()
-            .buffer_device_address(true)
-            .shader_buffer_int64_atomics(self.wide_atomics);
-        let of_1_0 = vk::PhysicalDeviceFeatures::default().shader_int64(self.wide_atomics);
         let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
         let mut pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
         let mut create = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions)
-            .push_next(&mut features)
+            .push_next(&mut of_1_3)
             .enabled_features(&of_1_0)
             .push_next(&mut of_1_2);
         if self.statistics {

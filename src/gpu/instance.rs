@@ -21,6 +21,8 @@ pub(super) struct Instance {
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     // Boxed, so that the messenger's pointer to it stays good when the instance moves.
     messages: Box<Messages>,
+    /// The caller of the library destroys it.
+    is_given: bool,
 }
 
 impl Instance {
@@ -44,11 +46,17 @@ impl Instance {
         }
         let messages = Box::<Messages>::default();
         let raw = create(&entry, validate, has_debug_utils, window)?;
-        let mut instance = Self { entry, raw, has_debug_utils, messenger: None, messages };
+        let mut instance = Self { entry, raw, has_debug_utils, messenger: None, messages, is_given: false };
         if validate && has_debug_utils {
             instance.listen()?;
         }
         Ok(Arc::new(instance))
+    }
+
+    /// An instance of the caller's own.
+    pub fn given(entry: ash::Entry, raw: ash::Instance) -> Arc<Self> {
+        let messages = Box::default();
+        Arc::new(Self { entry, raw, has_debug_utils: false, messenger: None, messages, is_given: true })
     }
 
     pub fn messages(&self) -> Vec<String> {
@@ -74,7 +82,9 @@ impl Drop for Instance {
             if let Some((debug_utils, messenger)) = self.messenger.take() {
                 debug_utils.destroy_debug_utils_messenger(messenger, None);
             }
-            self.raw.destroy_instance(None);
+            if !self.is_given {
+                self.raw.destroy_instance(None);
+            }
         }
     }
 }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use super::{kernel, spirv, traversal_constants};
 use crate::{
     accel::{Query, kdtree::Traversal},
-    buffers::{CastResources, Round},
+    buffers::Round,
     frame::bounce::lanes_log2,
-    gpu::{Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError, Statistic},
+    gpu::{BindingSet, Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError, Statistic},
     layout::{CastBatch, RAY_GROUP_SIZE, constants},
 };
 
@@ -41,8 +41,8 @@ impl Cast {
     }
 
     /// Needs the first `n_rays` of cast_rays. Leaves as many cast_hits, and marks where rays have stalled.
-    pub fn record(&self, commands: &Commands, resources: &CastResources, n_rays: u32, round: Round) {
-        commands.bind(&resources.set);
+    pub fn record(&self, commands: &Commands, set: &BindingSet, n_rays: u32, round: Round) {
+        commands.bind(set);
         let lanes_log2 = lanes_log2(n_rays, self.n_lanes);
         let dispatch = Dispatch::Threads([n_rays << lanes_log2, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, None, &CastBatch { n_rays, lanes_log2, round: round.constant() }, dispatch);

@@ -11,7 +11,7 @@ use super::Renderer;
 use crate::{
     buffers::Pixels,
     frame::{Crop, Drawn, Picture, Profile, RenderOptions, Watcher},
-    gpu::{Context, GpuError, Limits},
+    gpu::{Context, GivenImage, GpuError, Limits, TimelinePoint},
     layout::Feature,
     scene::Camera,
     world::World,
@@ -95,6 +95,23 @@ impl BandedRenderer {
             Some(picture) => Ok(Cow::Borrowed(picture)),
             None => self.renderer.picture().map(Cow::Owned),
         }
+    }
+
+    /// Copies the displayed picture into an image of the caller's own: see [`Renderer::copy_picture_to`].
+    ///
+    /// # Errors
+    /// The picture was drawn in several bands, so that it is not on the device; as [`Renderer::copy_picture_to`].
+    pub fn copy_picture_to(
+        &self,
+        image: &GivenImage,
+        after: Option<TimelinePoint>,
+        then: Option<TimelinePoint>,
+    ) -> Result<(), GpuError> {
+        if self.bands.len() > 1 {
+            let value = self.bands.len() as u64;
+            return Err(GpuError::Limit { what: "bands of a picture that stays on the device", value, limit: 1 });
+        }
+        self.renderer.copy_picture_to(image, after, then)
     }
 
     fn draw_band(&mut self, n_samples: u32, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {

@@ -2,6 +2,7 @@
 
 mod bands;
 mod changes;
+mod given;
 mod parts;
 mod profile;
 mod schedule;

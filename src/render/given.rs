@@ -1,0 +1,42 @@
+//! The picture in an image of the caller's own.
+
+use super::Renderer;
+use crate::gpu::{Access, CommandBuffer, GivenImage, GpuError, PixelRows, TimelinePoint};
+
+impl Renderer {
+    /// Copies the displayed picture, as [`Renderer::picture`] has it, into the upper left corner of an image. The device
+    /// begins after `after` and signals `then`; the host does not wait for it.
+    ///
+    /// # Errors
+    /// The image is smaller than the picture. Out of memory, a failed call; then nothing is signalled.
+    pub fn copy_picture_to(
+        &self,
+        image: &GivenImage,
+        after: Option<TimelinePoint>,
+        then: Option<TimelinePoint>,
+    ) -> Result<(), GpuError> {
+        let (window, crop) = (self.options.window(), self.options.crop_or_whole());
+        let (width, height) = image.size();
+        if crop.width() > width || crop.height() > height {
+            let (value, limit) = (u64::from(crop.width().max(crop.height())), u64::from(width.min(height)));
+            return Err(GpuError::Limit { what: "pixels of a side of the picture, in this image", value, limit });
+        }
+        let first = u64::from(crop.y0 - window.y0) * u64::from(window.width()) + u64::from(crop.x0 - window.x0);
+        let rows = PixelRows { offset: 4 * first, stride: window.width(), size: (crop.width(), crop.height()) };
+        let display = self.resources.pixels.pixel_display.any();
+        let copy = CommandBuffer::record(&self.context, "copy picture", None, |commands| {
+            commands.barrier(Access::ComputeWrite, Access::TransferRead); // pixel_display
+            commands.copy_to_given(display, &rows, image);
+            commands.barrier(Access::TransferRead, Access::ComputeWrite); // pixel_display, of the next frame
+        })?;
+        self.context.submit_copies(copy, after, then)
+    }
+}
+
+/// The picture may still be copied.
+impl Drop for Renderer {
+    fn drop(&mut self) {
+        // A device that is lost has ended all work.
+        let _ = self.context.wait();
+    }
+}
