@@ -36,3 +36,36 @@ fn cast_draws_the_materials_that_the_camera_sees() {
     assert!(left != right && left != ' ' && right != ' ', "{printed}");
     assert_eq!(rows[0][0], ' ', "{printed}");
 }
+
+/// Runs an example under the validation layer with synchronization validation, which must have nothing to say.
+fn run_validated(example: &str, arguments: &[&str]) -> String {
+    let folder = PathBuf::from(env!("CARGO_BIN_EXE_kdray")).with_file_name("examples");
+    let output = Command::new(folder.join(example))
+        .args(arguments)
+        .env("VK_INSTANCE_LAYERS", "VK_LAYER_KHRONOS_validation")
+        .env("VK_LAYER_ENABLES", "VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT")
+        .output()
+        .expect("the example runs");
+    let [printed, errors] = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+    assert!(output.status.success(), "{example}: {errors}");
+    assert!(!printed.contains("Validation") && !errors.contains("Validation"), "{example}: {printed}{errors}");
+    printed
+}
+
+#[test]
+fn a_program_with_a_device_of_its_own_gets_the_picture_that_the_command_writes() {
+    let directory = TempDir::new().unwrap();
+    let path = |name: &str| directory.path().join(name).to_str().unwrap().to_owned();
+    run_validated("own_device", &[&shipped("cornell.toml"), &path("example.png")]);
+    succeed(directory.path(), &["render", &shipped("cornell.toml"), "-q", "-o", "command.png"]);
+    let pixels = |name: &str| image::open(path(name)).unwrap().into_rgb8();
+    assert!(pixels("example.png") == pixels("command.png"));
+}
+
+/// The box is open in front.
+#[test]
+fn a_program_casts_in_its_own_command_buffer() {
+    let printed = run_validated("record_cast", &[&shipped("cornell.toml")]);
+    let n_hits: u32 = printed.split(' ').next().and_then(|word| word.parse().ok()).expect("a number");
+    assert!((60_000..95_000).contains(&n_hits), "{printed}");
+}

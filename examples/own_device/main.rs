@@ -1,0 +1,76 @@
+//! Renders inside a program that has a Vulkan device of its own, into one of its own images. A timeline semaphore orders
+//! the program's commands and kdray's on the device.
+//!
+//! ```sh
+//! cargo run --release --example own_device -- scenes/cornell.toml picture.png
+//! ```
+
+mod program;
+mod target;
+
+use std::{env, error::Error, path::PathBuf};
+
+use ash::vk;
+use kdray::{
+    engine::{Built, Engine, choices::Workload},
+    frame::RenderOptions,
+    gpu::{Context, GivenImage, TimelinePoint},
+    scene::Scene,
+};
+use program::Program;
+use target::Target;
+
+/// The values of the timeline semaphore: the image is cleared, kdray has written it, the program has read it.
+const CLEARED: u64 = 1;
+const WRITTEN: u64 = 2;
+const READ: u64 = 3;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = env::args_os().skip(1).map(PathBuf::from);
+    let (Some(scene), Some(picture)) = (arguments.next(), arguments.next()) else {
+        return Err("usage: own_device SCENE PICTURE".into());
+    };
+    let scene = Scene::load(&scene)?;
+    let options = RenderOptions::of_defaults(&scene.defaults);
+    // SAFETY: the program destroys what it has made after kdray's objects are gone and the device is idle.
+    unsafe {
+        let program = Program::new()?;
+        let target = Target::new(&program, options.width, options.height)?;
+        program.submit(&target.clear, None, Some(CLEARED))?;
+        render(&program, &target, scene, &options)?;
+        program.submit(&target.read_back, Some(WRITTEN), Some(READ))?;
+        program.wait_for(READ)?;
+        let pixels = target.pixels(&program)?;
+        image::save_buffer(&picture, &pixels, options.width, options.height, image::ColorType::Rgba8)?;
+        target.destroy(&program);
+        program.destroy();
+    }
+    println!("{}", picture.display());
+    Ok(())
+}
+
+/// Has kdray draw the scene and write the picture into the target.
+unsafe fn render(
+    program: &Program,
+    target: &Target,
+    scene: Scene,
+    options: &RenderOptions,
+) -> Result<(), Box<dyn Error>> {
+    // SAFETY: the handles are the program's, which lives longer than the context; it has one thread.
+    let (context, image, [cleared, written]) = unsafe {
+        let layouts = [vk::ImageLayout::TRANSFER_DST_OPTIMAL, vk::ImageLayout::TRANSFER_SRC_OPTIMAL];
+        (
+            Context::on_given(program.given())?,
+            GivenImage::new(target.image, (options.width, options.height), layouts),
+            [CLEARED, WRITTEN].map(|value| TimelinePoint::new(program.timeline, value)),
+        )
+    };
+    let workload = Workload::of_pictures(options, scene.lights.len(), 1);
+    let engine = Engine::on_device(context);
+    let Built { world, .. } = engine.build(scene, &workload)?;
+    let options = engine.methods(&world, &workload)?.apply(options);
+    let mut renderer = engine.renderer(&world, &options)?;
+    renderer.draw(&world.scene().camera, 1, || ())?;
+    renderer.copy_picture_to(&image, Some(cleared), Some(written))?;
+    Ok(())
+}
