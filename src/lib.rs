@@ -65,6 +65,7 @@
 #[macro_use]
 pub mod util;
 
+#[doc(hidden)]
 pub mod layout;
 
 pub mod scene;
@@ -75,14 +76,19 @@ pub mod world;
 
 pub mod frame;
 
+#[doc(hidden)]
 pub mod reference;
 
+#[doc(hidden)]
 pub mod cpu;
 
 pub mod gpu;
 
+#[doc(hidden)]
 pub mod buffers;
+#[doc(hidden)]
 pub mod passes;
+#[doc(hidden)]
 pub mod render;
 
 pub mod cast;
@@ -92,7 +98,9 @@ pub mod engine;
 pub mod output;
 
 #[cfg(feature = "bench")]
+#[doc(hidden)]
 pub mod bench;
 
 #[cfg(feature = "view")]
+#[doc(hidden)]
 pub mod view;

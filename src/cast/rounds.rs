@@ -9,6 +9,7 @@ use crate::{
 
 /// One way of tracing rays that are on the device.
 pub trait Contender {
+    /// The name in reports.
     fn name(&self) -> String;
 
     /// How it touches rays and hits.

@@ -37,7 +37,7 @@ pub fn render(world: &World, options: &RenderOptions) -> (Picture, Profile) {
     render_in_batches(world, options, Batching::default())
 }
 
-/// As [`render`], in batches of a given size.
+/// As `render`, in batches of a given size.
 pub fn render_in_batches(world: &World, options: &RenderOptions, batching: Batching) -> (Picture, Profile) {
     let mut renderer = Renderer::new(world, options, batching);
     let profile = renderer.draw_sample();

@@ -39,13 +39,16 @@ named_enum!(Aov {
 pub struct Channel {
     /// Layer, dot, component.
     pub name: String,
+    /// The samples of all pixels, rows from the top.
     pub samples: Samples,
 }
 
 /// One a pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Samples {
+    /// Single-precision numbers.
     Float(Vec<f32>),
+    /// Counts and indices.
     Uint(Vec<u32>),
 }
 

@@ -7,9 +7,13 @@ use super::{Denoise, RenderOptions};
 /// The pixels of a picture with `x0 <= x < x1` and `y0 <= y < y1`, from the upper left corner; at least one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Crop {
+    /// The first column.
     pub x0: u32,
+    /// The first row.
     pub y0: u32,
+    /// The column after the last one.
     pub x1: u32,
+    /// The row after the last one.
     pub y1: u32,
 }
 
@@ -19,10 +23,12 @@ impl Crop {
         Self { x0: 0, y0: 0, x1: width, y1: height }
     }
 
+    /// Columns.
     pub fn width(&self) -> u32 {
         self.x1 - self.x0
     }
 
+    /// Rows.
     pub fn height(&self) -> u32 {
         self.y1 - self.y0
     }

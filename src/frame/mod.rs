@@ -39,9 +39,13 @@ pub struct RenderOptions {
     pub max_depth: u32,
     /// Factor on radiance before it is encoded for display.
     pub exposure: f32,
+    /// The curve from radiance to display.
     pub tonemap: Tonemap,
+    /// The noise filter.
     pub denoise: Denoise,
+    /// The algorithm by which rays go through the kd-tree.
     pub traversal: Traversal,
+    /// How primary rays find their triangles.
     pub primary: Primary,
     /// Whether the device takes times and counts; without them its frames have empty profiles.
     pub profile: bool,
@@ -78,6 +82,7 @@ impl Default for RenderOptions {
 /// The post process of the paper's section 2.4.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Denoise {
+    /// No filter.
     Off,
     /// Smooths a pixel whose luminance differences to its four neighbours add up to more than the threshold.
     Paper {
@@ -137,7 +142,9 @@ impl Primary {
 /// A rendered frame, or the part of it that was asked for. Rows from the top, left to right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
+    /// Pixels.
     pub width: u32,
+    /// Pixels.
     pub height: u32,
     /// `width * height` linear RGB radiances before exposure (fourth: 1).
     pub radiance: Vec<[f32; 4]>,

@@ -35,6 +35,7 @@ pub struct PassTime {
     pub batch: Option<u32>,
     /// Since the frame's first pass began; none where the device has no timestamps, like `ms`.
     pub start_ms: Option<f64>,
+    /// Milliseconds; none if the device has no timestamps.
     pub ms: Option<f64>,
     /// Rays of the bounce, or of all the batch's; none where a pass has pixels.
     pub n_rays_in: Option<u64>,

@@ -5,6 +5,7 @@ use crate::layout;
 /// What a window shows of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
+    /// The picture.
     Picture,
     /// The nearer, the brighter.
     Depth,

@@ -5,15 +5,21 @@ use ash::vk::{AccessFlags2 as A, PipelineStageFlags2 as S};
 /// Who touches memory, and how.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
+    /// Reads of a kernel.
     ComputeRead,
+    /// Writes of a kernel.
     ComputeWrite,
     /// Reads and writes of a kernel that updates in place.
     ComputeUpdate,
     /// Storage that a raster pass reads.
     FragmentRead,
+    /// Reads of the sizes of an indirect dispatch.
     IndirectRead,
+    /// Reads of a copy.
     TransferRead,
+    /// Writes of a copy, an update or a clear.
     TransferWrite,
+    /// Reads of the host.
     HostRead,
     /// Reads and writes of a ray generation shader, and the driver's reads of its structure. Only on a context with
     /// ray tracing, like `StructureBuild`.

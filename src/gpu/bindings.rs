@@ -9,9 +9,13 @@ use super::{AnyBuffer, Constants, Context, GivenBuffer, GpuError, Target};
 /// What a binding number holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BindingKind {
+    /// A uniform buffer.
     Uniform,
+    /// A storage buffer.
     Storage,
+    /// A uniform texel buffer.
     Texels,
+    /// A storage image.
     Image,
 }
 
@@ -29,9 +33,11 @@ impl BindingKind {
 /// The object behind a binding number.
 #[derive(Clone, Copy)]
 pub enum Binding<'a> {
+    /// A uniform or storage buffer.
     Buffer(&'a AnyBuffer),
     /// Of a buffer for [`BufferUse::Texels`](super::BufferUse::Texels) or [`BufferUse::Address`](super::BufferUse::Address).
     Texels(&'a AnyBuffer),
+    /// A storage image.
     Image(&'a Target),
     /// A storage buffer of the caller's own.
     Given(GivenBuffer),

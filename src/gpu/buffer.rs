@@ -16,7 +16,9 @@ const ROW_BYTES: u64 = 16;
 /// What kernels do with a buffer. Every buffer can be copied from and to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BufferUse {
+    /// A storage buffer that is bound.
     Storage,
+    /// A uniform buffer.
     Uniform,
     /// Storage that also sizes indirect dispatches.
     Indirect,
@@ -132,6 +134,7 @@ impl<T: Pod> Buffer<T> {
         self.len
     }
 
+    /// Whether there are no elements.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -187,6 +190,7 @@ impl<T: Pod> Buffer<T> {
         Ok(data)
     }
 
+    /// The buffer without its element type.
     pub fn any(&self) -> &AnyBuffer {
         &self.any
     }
@@ -279,6 +283,7 @@ impl AnyBuffer {
         unsafe { self.context.device.get_buffer_device_address(&info) }
     }
 
+    /// The buffer's debug label.
     pub fn name(&self) -> &str {
         &self.name
     }

@@ -37,15 +37,21 @@ pub enum Dispatch<'a> {
 /// A rectangle of pixels, from the upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Area {
+    /// The first column.
     pub x: u32,
+    /// The first row.
     pub y: u32,
+    /// Columns.
     pub width: u32,
+    /// Rows.
     pub height: u32,
 }
 
 /// What is drawn, and where.
 pub struct DrawDesc<'a> {
+    /// Takes the triangle's index of each pixel.
     pub ids: &'a Target,
+    /// Takes the depth of each pixel.
     pub depth: &'a Target,
     /// Width and height of the picture that clip space spans, pixels; the targets are no smaller.
     pub picture: (u32, u32),
@@ -86,6 +92,7 @@ impl CommandBuffer {
         Ok(buffer)
     }
 
+    /// The buffer's debug label.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -128,7 +135,7 @@ impl Commands<'_> {
 
     fn labelled(&self, name: &str, body: impl FnOnce()) {
         let label = CString::new(name).unwrap_or_default();
-        let debug_utils = self.context.debug_utils.as_ref();
+        let debug_utils = self.context.debug_utils.as_ref().filter(|_| self.context.has_labels);
         // SAFETY: the commands are being recorded; begin and end come in pairs.
         unsafe {
             if let Some(debug_utils) = debug_utils {

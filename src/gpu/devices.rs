@@ -18,6 +18,7 @@ pub struct DeviceInfo {
     pub kind: String,
     /// The driver's name and version.
     pub driver: String,
+    /// The version of Vulkan, as `1.3.290`.
     pub api_version: String,
     /// Invocations of a subgroup.
     pub subgroup_size: u32,
@@ -35,6 +36,7 @@ impl DeviceInfo {
 /// How a user names a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceSelector {
+    /// Place in the loader's list.
     Index(usize),
     /// Part of the name, upper and lower case alike.
     Name(String),

@@ -1,43 +1,124 @@
 //! What can go wrong with a driver, each in one line that names the call and the object.
 
+use std::{error, fmt};
+
 use ash::vk;
 
-/// Anything that stops a device from doing its work.
+/// Anything that stops a device from doing its work. Displays as one line.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum GpuError {
+    /// The machine has no Vulkan loader.
     #[error("no Vulkan loader ({0}); ./setup installs it")]
     NoLoader(String),
+    /// The loader finds no driver.
     #[error("no Vulkan driver found; ./setup installs Mesa's lavapipe, which needs no GPU")]
     NoDriver,
+    /// No device has the index or name that is asked for.
     #[error("no Vulkan device `{wanted}`; there are: {available}")]
-    NoSuchDevice { wanted: String, available: String },
+    NoSuchDevice {
+        /// What is asked for.
+        wanted: String,
+        /// The devices that there are.
+        available: String,
+    },
+    /// A device lacks a feature, an extension or an ability.
     #[error("device `{device}` lacks {missing}")]
-    Lacks { device: String, missing: String },
+    Lacks {
+        /// The device's name.
+        device: String,
+        /// What it lacks.
+        missing: String,
+    },
+    /// The machine has no validation layer.
     #[error("no validation layer VK_LAYER_KHRONOS_validation; ./setup installs it")]
     NoValidationLayer,
+    /// No device can present to a window.
     #[error("cannot show pictures in this window: {0}")]
     NoSurface(String),
+    /// A library that kdray uses has failed.
     #[error("{object}: {message}")]
-    Other { object: &'static str, message: String },
+    Other {
+        /// What it was to do or to make.
+        object: &'static str,
+        /// The library's message.
+        message: String,
+    },
+    /// A Vulkan call has failed.
     #[error("{call} `{object}`: {result}")]
-    Call { call: &'static str, object: String, result: vk::Result },
+    Call {
+        /// The function's name.
+        call: &'static str,
+        /// The name of the object that it was called for.
+        object: String,
+        /// What it returned.
+        result: CallResult,
+    },
+    /// The device has too little memory.
     #[error("memory for `{object}` ({}): {source}", mebibytes(*bytes))]
-    Memory { object: String, bytes: u64, source: gpu_allocator::AllocationError },
+    Memory {
+        /// The name of the buffer or image.
+        object: String,
+        /// Bytes that it takes.
+        bytes: u64,
+        /// Why it gets none.
+        source: Box<dyn error::Error + Send + Sync>,
+    },
+    /// The system has too little memory.
     #[error("memory for the {object} ({}): the system has too little", mebibytes(*bytes))]
-    HostMemory { object: &'static str, bytes: u64 },
+    HostMemory {
+        /// What the memory is for.
+        object: &'static str,
+        /// Bytes that it takes.
+        bytes: u64,
+    },
+    /// A buffer or image is larger than the device allows for.
     #[error("`{object}` takes {}, more than this device's limit of {}", mebibytes(*bytes), mebibytes(*limit))]
-    TooLarge { object: String, bytes: u64, limit: u64 },
+    TooLarge {
+        /// The name of the buffer or image.
+        object: String,
+        /// Bytes that it takes.
+        bytes: u64,
+        /// Bytes that it may take.
+        limit: u64,
+    },
+    /// A scene and its acceleration structure do not fit together: a [`Mismatch`](crate::world::Mismatch) in words.
     #[error("{0}")]
     Mismatch(String),
+    /// A number is beyond a limit of the device.
     #[error("{what}: {value} is beyond this device's limit of {limit}")]
-    Limit { what: &'static str, value: u64, limit: u64 },
+    Limit {
+        /// What is counted.
+        what: &'static str,
+        /// The number.
+        value: u64,
+        /// The greatest number that is possible.
+        limit: u64,
+    },
+}
+
+/// The result of a Vulkan call that has failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CallResult(pub(super) vk::Result);
+
+impl CallResult {
+    /// Vulkan's number for it.
+    pub fn code(&self) -> i32 {
+        self.0.as_raw()
+    }
+}
+
+impl fmt::Display for CallResult {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        self.0.fmt(f)
+    }
 }
 
 impl GpuError {
     /// Whether the device or the window's surface is gone, so that all that is on it has to be made anew.
     pub fn is_device_lost(&self) -> bool {
         let result = match self {
-            Self::Call { result, .. } => *result,
+            Self::Call { result: CallResult(result), .. } => *result,
             _ => return false,
         };
         matches!(result, vk::Result::ERROR_DEVICE_LOST | vk::Result::ERROR_SURFACE_LOST_KHR)
@@ -48,15 +129,15 @@ impl GpuError {
         let out_of_memory = [vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, vk::Result::ERROR_OUT_OF_HOST_MEMORY];
         match self {
             Self::Memory { .. } | Self::HostMemory { .. } => true,
-            Self::Call { result, .. } => out_of_memory.contains(result),
+            Self::Call { result: CallResult(result), .. } => out_of_memory.contains(result),
             _ => false,
         }
     }
 
     /// Turns the result of `call` on `object` into an error.
-    pub(super) fn call(call: &'static str, object: &str) -> impl FnOnce(vk::Result) -> GpuError {
+    pub(crate) fn call(call: &'static str, object: &str) -> impl FnOnce(vk::Result) -> GpuError {
         let object = object.to_owned();
-        move |result| GpuError::Call { call, object, result }
+        move |result| GpuError::Call { call, object, result: CallResult(result) }
     }
 }
 

@@ -59,6 +59,11 @@ impl Instance {
         Arc::new(Self { entry, raw, has_debug_utils: false, messenger: None, messages, is_given: true })
     }
 
+    /// Whether the validation layer reports to this instance.
+    pub fn validates(&self) -> bool {
+        self.messenger.is_some()
+    }
+
     pub fn messages(&self) -> Vec<String> {
         self.messages.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -122,7 +127,7 @@ fn create(entry: &ash::Entry, validate: bool, debug_utils: bool, window: &[&CStr
     // SAFETY: all that `info` points to lives until the call returns.
     unsafe { entry.create_instance(&info, None) }.map_err(|result| match result {
         vk::Result::ERROR_INCOMPATIBLE_DRIVER => GpuError::NoDriver,
-        result => GpuError::Call { call: "vkCreateInstance", object: "kdray".into(), result },
+        result => GpuError::call("vkCreateInstance", "kdray")(result),
     })
 }
 

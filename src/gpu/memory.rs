@@ -15,6 +15,7 @@ use super::{Context, GpuError, instance::Instance};
 pub struct MemoryUse {
     /// The buffer's or image's.
     pub name: String,
+    /// Bytes of the device's memory.
     pub bytes: u64,
 }
 
@@ -33,11 +34,9 @@ impl Context {
             linear,
             allocation_scheme: AllocationScheme::GpuAllocatorManaged,
         };
-        self.allocator
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .allocate(&desc)
-            .map_err(|source| GpuError::Memory { object: name.to_owned(), bytes: requirements.size, source })
+        self.allocator.lock().unwrap_or_else(PoisonError::into_inner).allocate(&desc).map_err(|source| {
+            GpuError::Memory { object: name.to_owned(), bytes: requirements.size, source: source.into() }
+        })
     }
 
     /// What memory is in use for, the most first; objects of one name together.
@@ -80,5 +79,5 @@ pub(super) fn create_allocator(
         buffer_device_address: true,
         allocation_sizes: sizes,
     })
-    .map_err(|source| GpuError::Memory { object: "allocator".into(), bytes: 0, source })
+    .map_err(|source| GpuError::Memory { object: "allocator".into(), bytes: 0, source: source.into() })
 }

@@ -45,7 +45,7 @@ pub use buffer::{AnyBuffer, Buffer, BufferUse, texel_bytes};
 pub use commands::{Area, CommandBuffer, Commands, Dispatch, DrawDesc, PixelRows};
 pub use context::{Context, ContextOptions};
 pub use devices::{DeviceInfo, DeviceSelector, Limits, chosen_device, devices};
-pub use error::GpuError;
+pub use error::{CallResult, GpuError};
 pub use given::{GivenBuffer, GivenCommands, GivenDevice, GivenImage, RequiredFeatures, TimelinePoint};
 pub use image::{Target, TargetKind};
 pub use memory::MemoryUse;

@@ -15,6 +15,7 @@ pub(super) const ENTRY_POINT: &CStr = c"main";
 pub struct ComputeDesc<'a> {
     /// Also the debug label and the timer.
     pub name: &'static str,
+    /// The compute shader.
     pub shader: Shader,
     /// Values of specialization constants that the shader declares.
     pub constants: &'a Constants,
@@ -101,8 +102,11 @@ impl RasterTargets {
 pub struct RasterDesc {
     /// Also the debug label and the timer.
     pub name: &'static str,
+    /// The vertex shader.
     pub vertex: Shader,
+    /// The fragment shader.
     pub fragment: Shader,
+    /// What is drawn to.
     pub targets: RasterTargets,
 }
 

@@ -57,8 +57,11 @@ impl RayTracingCalls {
 pub struct RayTracingDesc {
     /// Also the debug label and the timer.
     pub name: &'static str,
+    /// The ray generation shader.
     pub generation: Shader,
+    /// The miss shader.
     pub miss: Shader,
+    /// The closest-hit shader.
     pub closest_hit: Shader,
     /// Values of specialization constants of the ray generation shader.
     pub constants: Constants,

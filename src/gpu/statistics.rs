@@ -12,7 +12,9 @@ use super::{ComputePipeline, Context, GpuError, devices::text, instance::Instanc
 pub struct Statistic {
     /// Of several executables of one kernel, which.
     pub executable: String,
+    /// The driver's name for the number.
     pub name: String,
+    /// The number.
     pub value: StatisticValue,
 }
 
@@ -20,9 +22,13 @@ pub struct Statistic {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum StatisticValue {
+    /// Yes or no.
     Flag(bool),
+    /// An integer.
     Signed(i64),
+    /// A count.
     Unsigned(u64),
+    /// A real number.
     Real(f64),
 }
 

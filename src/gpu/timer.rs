@@ -9,6 +9,7 @@ use super::{Context, GpuError};
 /// A row of the profile: when a pass began and ended, in milliseconds since the frame's first pass began.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimerRow {
+    /// The pass's name.
     pub name: &'static str,
     /// The bounce that the pass belongs to, if any.
     pub bounce: Option<u32>,

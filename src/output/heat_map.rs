@@ -18,7 +18,9 @@ use super::{OutputError, write};
 pub struct HeatMap<'a> {
     /// What is counted.
     pub title: &'a str,
+    /// Pixels.
     pub width: u32,
+    /// Pixels.
     pub height: u32,
     /// `width * height`.
     pub values: Vec<u32>,
@@ -44,9 +46,7 @@ impl HeatMap<'_> {
     /// As [`write()`].
     pub fn write(&self, path: &Path) -> Result<(), OutputError> {
         let mut file = std::io::Cursor::new(Vec::new());
-        self.draw()
-            .write_to(&mut file, ImageFormat::Png)
-            .map_err(|source| OutputError::Encode { path: path.to_owned(), source })?;
+        self.draw().write_to(&mut file, ImageFormat::Png).map_err(|source| OutputError::encode(path, source))?;
         write(path, &file.into_inner())
     }
 

@@ -22,7 +22,7 @@ use crate::{
 pub fn write_layers(path: &Path, picture: &Picture, aovs: &[Aov], features: &[Feature]) -> Result<(), OutputError> {
     let n_pixels = picture.width as usize * picture.height as usize;
     if picture.radiance.len() != n_pixels || (!aovs.is_empty() && features.len() != n_pixels) {
-        return Err(OutputError::Encode { path: path.to_owned(), source: dimension_mismatch() });
+        return Err(OutputError::encode(path, dimension_mismatch()));
     }
     let colour = |name: &str, component: usize| Channel {
         name: name.to_owned(),
@@ -37,7 +37,7 @@ pub fn write_layers(path: &Path, picture: &Picture, aovs: &[Aov], features: &[Fe
     let size = (picture.width as usize, picture.height as usize);
     let bytes = info_span!("encode picture").in_scope(|| encode(size, channels));
     let _writing = info_span!("write picture").entered();
-    write(path, &bytes.map_err(|source| OutputError::EncodeLayers { path: path.to_owned(), source })?)
+    write(path, &bytes.map_err(|source| OutputError::encode(path, source))?)
 }
 
 fn encode(size: (usize, usize), channels: Vec<Channel>) -> Result<Vec<u8>, exr::error::Error> {

@@ -5,6 +5,7 @@
 //! process leaves none either, if its handler calls [`remove_temporaries`].
 
 use std::{
+    error::Error,
     fs::{self, File, OpenOptions},
     io::{self, Cursor, Seek, Write},
     path::{Path, PathBuf},
@@ -31,19 +32,50 @@ const SPOOL_IN_MEMORY: usize = 64 << 20;
 
 /// Why a file was not written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum OutputError {
+    /// The file's name does not say in which format it is to be written.
     #[error("cannot write `{path}`: a picture's name must end in .png or .exr")]
-    UnknownEnding { path: PathBuf },
+    UnknownEnding {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file's folder is not there.
     #[error("cannot write `{path}`: `{directory}` is not a directory")]
-    NoDirectory { path: PathBuf, directory: PathBuf },
+    NoDirectory {
+        /// The file.
+        path: PathBuf,
+        /// The folder.
+        directory: PathBuf,
+    },
+    /// There is a folder of the file's name.
     #[error("cannot write `{path}`: it is a directory")]
-    IsDirectory { path: PathBuf },
+    IsDirectory {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The pixels cannot be encoded.
     #[error("cannot encode `{path}`: {source}")]
-    Encode { path: PathBuf, source: ImageError },
-    #[error("cannot encode `{path}`: {source}")]
-    EncodeLayers { path: PathBuf, source: exr::error::Error },
+    Encode {
+        /// The file.
+        path: PathBuf,
+        /// The encoder's error.
+        source: Box<dyn Error + Send + Sync>,
+    },
+    /// The file cannot be written.
     #[error("cannot write `{path}`: {source}")]
-    Write { path: PathBuf, source: io::Error },
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The system's error.
+        source: io::Error,
+    },
+}
+
+impl OutputError {
+    fn encode(path: &Path, source: impl Error + Send + Sync + 'static) -> Self {
+        Self::Encode { path: path.to_owned(), source: Box::new(source) }
+    }
 }
 
 /// What a picture's file holds.
@@ -92,7 +124,7 @@ pub fn write_picture(path: &Path, picture: &Picture) -> Result<(), OutputError> 
     }
     let bytes = info_span!("encode picture").in_scope(|| encode(picture, rgb(&picture.display), ImageFormat::Png));
     let _writing = info_span!("write picture").entered();
-    write(path, &bytes.map_err(|source| OutputError::Encode { path: path.to_owned(), source })?)
+    write(path, &bytes.map_err(|source| OutputError::encode(path, source))?)
 }
 
 /// Writes a file whole or not at all. Devices and pipes are written to directly.

@@ -47,14 +47,17 @@ pub struct Scene {
     /// Where the meshes are. A loaded scene has at least one triangle, all triangles lie within `mesh::MAX_COORDINATE`, and
     /// their bounding box has a side of [`MIN_EXTENT`] or more.
     pub instances: Vec<Instance>,
+    /// What the instances refer to by index.
     pub materials: Vec<Material>,
     /// May be none.
     pub lights: Vec<Light>,
+    /// The camera that renders the scene unless another one is set.
     pub camera: Camera,
     /// Irradiance that every point receives, weighted by its Ka.
     pub ambient: Vec3,
     /// Radiance of rays that leave the scene.
     pub background: Vec3,
+    /// The options that the scene is rendered with unless others are set.
     pub defaults: RenderDefaults,
 }
 
@@ -91,8 +94,11 @@ pub struct RenderDefaults {
     pub height: u32,
     /// Levels of rays, the primary one counted.
     pub max_depth: u32,
+    /// Factor on radiance before the tone curve.
     pub exposure: f32,
+    /// The curve from radiance to display.
     pub tonemap: Tonemap,
+    /// The noise filter.
     pub denoise: Denoise,
 }
 

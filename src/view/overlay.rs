@@ -84,7 +84,7 @@ impl Drop for Overlay {
 /// The overlay's error as one of the Vulkan layer.
 fn error(error: RendererError) -> GpuError {
     match error {
-        RendererError::Vulkan(result) => GpuError::Call { call: "drawing", object: "overlay".to_owned(), result },
+        RendererError::Vulkan(result) => GpuError::call("drawing", "overlay")(result),
         other => GpuError::Other { object: "the overlay", message: other.to_string() },
     }
 }

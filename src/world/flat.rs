@@ -21,16 +21,19 @@ pub struct FlatScene {
     pub triangles: Vec<Triangle>,
     /// For each triangle, its index into `materials`.
     pub triangle_materials: Vec<u32>,
+    /// Materials as kernels read them.
     pub materials: Vec<Material>,
     /// One for each material.
     pub material_names: Vec<String>,
     /// May be none.
     pub lights: Vec<Light>,
+    /// The camera that renders the scene unless another one is set.
     pub camera: Camera,
     /// Irradiance that every point receives, weighted by its Ka.
     pub ambient: Vec3,
     /// Radiance of rays that leave the scene.
     pub background: Vec3,
+    /// The options that the scene is rendered with unless others are set.
     pub defaults: RenderDefaults,
 }
 

@@ -113,9 +113,21 @@ impl BuildOptions {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Node {
     /// The children are `child` (below `position`), which is even, and `child + 1` (above).
-    Split { axis: usize, position: f32, child: u32 },
+    Split {
+        /// 0, 1 or 2.
+        axis: usize,
+        /// Where the plane meets its axis, world units.
+        position: f32,
+        /// Index of the child below the plane.
+        child: u32,
+    },
     /// `leaf_triangles[first .. first + count]`.
-    Leaf { first: u32, count: u32 },
+    Leaf {
+        /// Index of its first entry.
+        first: u32,
+        /// The number of its triangles.
+        count: u32,
+    },
 }
 
 /// A leaf without triangles.

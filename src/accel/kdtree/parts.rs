@@ -21,6 +21,7 @@ pub struct Parts {
     pub slabs: Vec<Slab>,
     /// The root's cell is the exact bounds of all triangles (a box of zeros for none).
     pub cell_min: Vec3,
+    /// The greatest corner of the root's cell, world units.
     pub cell_max: Vec3,
     /// Levels below the root, at most `KD_MAX_DEPTH - 2`.
     pub depth: u32,

@@ -9,6 +9,7 @@ use super::{BuildOptions, KdTree, Node};
 pub struct Statistics {
     /// Splits and leaves; the unused node 1 is not counted.
     pub n_nodes: u64,
+    /// Leaves, with the empty ones.
     pub n_leaves: u64,
     /// Leaves without triangles.
     pub n_empty_leaves: u64,

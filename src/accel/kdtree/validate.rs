@@ -10,6 +10,8 @@ use crate::layout::{KD_MAX_DEPTH, Triangle};
 
 /// The first invariant found broken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[expect(missing_docs, reason = "the messages say what the variants mean")]
 pub enum Invalid {
     #[error("the tree was built from {built_of} triangles, not from {given}")]
     Triangles { built_of: usize, given: usize },

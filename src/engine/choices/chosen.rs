@@ -15,6 +15,7 @@ use crate::{
 pub enum Reason {
     /// The user said so.
     Pinned,
+    /// A rule says so, from the device and from sizes.
     Rule,
     /// It was the quickest just now.
     Measured,
@@ -27,7 +28,9 @@ named_enum!(Reason { Pinned = "pinned", Rule = "rule", Measured = "measured", Ca
 /// A choice and its reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Chosen<T> {
+    /// What was chosen.
     pub value: T,
+    /// Why it was chosen.
     pub by: Reason,
 }
 
@@ -59,7 +62,9 @@ impl<T: Display> Serialize for Chosen<T> {
 /// How rays are traced.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Methods {
+    /// The algorithm by which rays go through the kd-tree.
     pub traversal: Chosen<Traversal>,
+    /// How primary rays find their triangles.
     pub primary: Chosen<Primary>,
     /// What the traversals took, nanoseconds a ray, if that decided.
     pub traversal_ns: Option<Timings>,
@@ -77,7 +82,9 @@ impl Methods {
 /// All that was chosen, for reports.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choices {
+    /// Which tree is built.
     pub build: Chosen<TreeKind>,
+    /// The algorithm by which rays go through the kd-tree.
     pub traversal: Chosen<Traversal>,
     /// None for rays without a picture.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -91,6 +98,7 @@ pub struct Choices {
 }
 
 impl Choices {
+    /// The choices for pictures.
     pub fn of_pictures(build: Chosen<TreeKind>, methods: Methods) -> Self {
         let Methods { traversal, primary, traversal_ns, primary_ns } = methods;
         Self { build, traversal, primary: Some(primary), traversal_ns, primary_ns }

@@ -57,8 +57,11 @@ use crate::{
 pub struct Request {
     /// The kind of the acceleration structure.
     pub accel: AccelKind,
+    /// Which tree is built.
     pub build: BuildPolicy,
+    /// The algorithm by which rays go through the kd-tree.
     pub traversal: Option<Traversal>,
+    /// How primary rays find their triangles.
     pub primary: Option<Primary>,
 }
 
@@ -69,6 +72,7 @@ pub enum Processor {
     Cpu,
     /// A Vulkan driver that runs kernels on the CPU, both sides of each branch.
     SoftwareDriver,
+    /// A GPU.
     Gpu,
 }
 

@@ -70,6 +70,7 @@ impl Display for Timings {
 /// The methods that come into question on a GPU, and whether it pays to try them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Candidates<T> {
+    /// The methods to try.
     pub methods: Vec<T>,
     /// Whether a measurement pays in this run; if it does not, only an earlier one can help.
     pub may_measure: bool,

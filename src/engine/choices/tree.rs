@@ -9,7 +9,9 @@ pub enum BuildPolicy {
     /// The quicker of the two, with building counted, by the number of rays.
     #[default]
     Auto,
+    /// The tree that is built quickly.
     Fast,
+    /// The tree that traces fastest.
     Best,
 }
 

@@ -24,14 +24,23 @@ pub const MAX_TRIANGLES_OF_SCENE: u64 = 1 << 26;
 #[derive(Debug, Deserialize)]
 #[serde(tag = "generator", rename_all = "snake_case")]
 pub enum Generator {
+    /// A box.
     Box(cuboid::Cuboid),
+    /// A box whose faces look inwards, with a material for each wall.
     Room(cuboid::Room),
+    /// A rectangle, which may be checkered.
     Plane(plane::Plane),
+    /// A disc.
     Disc(plane::Disc),
+    /// A sphere of rings and segments.
     Sphere(sphere::Sphere),
+    /// A sphere of about equal triangles.
     Geodesic(sphere::Geodesic),
+    /// A shape between box, sphere and octahedron.
     Superellipsoid(superellipsoid::Superellipsoid),
+    /// A tube around a torus knot.
     TorusKnot(torus_knot::TorusKnot),
+    /// A profile that turns around an axis.
     Lathe(lathe::Lathe),
 }
 
