@@ -17,8 +17,8 @@ bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
 
 // Whether a hit counts. Without FILTERS each does, and nothing is read. u, v: barycentric weights of the hit.
 bool is_accepted(uint triangle_ix, float u, float v) {
-    if (!FILTERS) return true;
-    return (load_triangle_materials(triangle_ix) & TRIANGLE_HIDDEN) == 0u;
+    if (FILTERS) return (load_triangle_materials(triangle_ix) & TRIANGLE_HIDDEN) == 0u;
+    return true;
 }
 
 // A triangle against the ray.

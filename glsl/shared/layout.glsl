@@ -465,13 +465,12 @@ struct DriverCast {
 #define BIND_RASTER_COUNT 30u
 #define BIND_LARGE_TRIANGLES 31u
 #define BIND_STALLS 32u
-#define N_BINDINGS 33u
 
-// The scene's arrays as texels: each at this plus its own binding.
+// The scene's arrays as texels: each at this plus its own binding. All other bindings are below it.
 #define BIND_TEXELS 64u
 
 // A cast's descriptor set has these and what the traversal reads: the scene's arrays and AccelConstants.
-#define BIND_CAST_RAYS 33u
-#define BIND_CAST_HITS 34u
+#define BIND_CAST_RAYS 62u
+#define BIND_CAST_HITS 63u
 
 #endif

@@ -3,7 +3,7 @@
 use std::{mem::offset_of, sync::Arc};
 
 use super::{
-    AccelBuffers, Pixels, Queue, RasterQueue, SceneArrays, binding,
+    AccelBuffers, Pixels, Queue, RasterQueue, accel, binding,
     pixels::{draws, n_pixels},
     vertex_indices::{has_indices, vertex_indices},
 };
@@ -20,6 +20,32 @@ const PUSH_BYTES: u32 = {
     let (batch, present) = (size_of::<Batch>(), size_of::<layout::Present>());
     if batch > present { batch as u32 } else { present as u32 }
 };
+
+/// Bindings of the frame's descriptor set beside those of the scene.
+const OWN_BINDINGS: [u32; 22] = [
+    layout::BIND_FRAME,
+    layout::BIND_MATERIALS,
+    layout::BIND_LIGHTS,
+    layout::BIND_RAYS,
+    layout::BIND_CHILD_KINDS,
+    layout::BIND_FIRST_CHILDREN,
+    layout::BIND_SCAN_BLOCKS,
+    layout::BIND_BOUNCES,
+    layout::BIND_HITS,
+    layout::BIND_LIGHT_VISIBILITY,
+    layout::BIND_RAY_RADIANCE,
+    layout::BIND_PIXEL_RADIANCE,
+    layout::BIND_PIXEL_ACCUMULATED,
+    layout::BIND_PIXEL_FILTERED,
+    layout::BIND_PIXEL_DISPLAY,
+    layout::BIND_PIXEL_FEATURES,
+    layout::BIND_COUNTERS,
+    layout::BIND_PIXEL_NEAREST,
+    layout::BIND_RASTER_GROUPS,
+    layout::BIND_RASTER_COUNT,
+    layout::BIND_LARGE_TRIANGLES,
+    layout::BIND_TRIANGLE_IDS,
+];
 
 /// Of a batch and bounce, those between the places included.
 const COUNTERS_A_ROW: usize = (COUNTER_PLACES * COUNTER_STRIDE) as usize;
@@ -71,7 +97,7 @@ impl Resources {
         let mut accel = AccelBuffers::new(context, world.geometry())?;
         accel.add_materials(context, &scene.triangle_materials)?;
         accel.add_extras(context, world.tree(), options.traversal)?;
-        let kinds: Vec<_> = (0..layout::N_BINDINGS).chain(SceneArrays::texel_bindings()).map(binding).collect();
+        let kinds: Vec<_> = OWN_BINDINGS.into_iter().chain(accel::bindings()).map(binding).collect();
         let upload_indices = || new_vertex_indices(context, &vertex_indices(&scene.triangles));
         let mut resources = Self {
             frame: Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?,

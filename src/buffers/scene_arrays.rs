@@ -140,12 +140,7 @@ for_scene_arrays!(declare);
 impl SceneArrays {
     /// The bindings of the arrays, as [`SceneArrays::objects`] has them.
     pub fn bindings() -> impl Iterator<Item = u32> {
-        NUMBERS.iter().copied().chain(Self::texel_bindings())
-    }
-
-    /// The bindings of the arrays as texels.
-    pub fn texel_bindings() -> impl Iterator<Item = u32> {
-        NUMBERS.iter().map(|number| BIND_TEXELS + number)
+        NUMBERS.iter().copied().chain(NUMBERS.iter().map(|number| BIND_TEXELS + number))
     }
 
     /// What the bindings hold: each array as a buffer and as texels.

@@ -70,19 +70,21 @@ pub fn rows(source: &str) -> Result<Vec<Row>, String> {
 /// Holds the arrays' bindings against those that layout.glsl gives to other buffers.
 ///
 /// # Errors
-/// A binding that is also another buffer's, or that is not below `N_BINDINGS`.
+/// A binding that is also another buffer's, or that is not below `BIND_TEXELS`.
 pub fn check_bindings(rows: &[Row], layout: &str) -> Result<(), String> {
     let number_of = |value: &str| value.trim().trim_end_matches('u').parse::<u32>().ok();
     let defines = layout.lines().filter_map(|line| line.strip_prefix("#define ")?.split_once(' '));
     let numbers: Vec<_> = defines.filter_map(|(name, value)| Some((name, number_of(value)?))).collect();
-    let n_bindings = numbers.iter().find(|(name, _)| *name == "N_BINDINGS").map_or(u32::MAX, |(_, number)| *number);
+    let end = numbers.iter().find(|(name, _)| *name == "BIND_TEXELS").map_or(u32::MAX, |(_, number)| *number);
     for Row { name, binding, .. } in rows {
-        if let Some((other, _)) = numbers.iter().find(|(other, n)| other.starts_with("BIND_") && n == binding) {
+        if let Some((other, _)) =
+            numbers.iter().find(|(other, n)| other.starts_with("BIND_") && *n == *binding && *n != end)
+        {
             return Err(format!("glsl/shared/scene_arrays.glsl: {name} has the binding {binding} of {other}"));
         }
-        if *binding >= n_bindings {
+        if *binding >= end {
             return Err(format!(
-                "glsl/shared/scene_arrays.glsl: {name} has the binding {binding}, not below N_BINDINGS"
+                "glsl/shared/scene_arrays.glsl: {name} has the binding {binding}, not below BIND_TEXELS"
             ));
         }
     }
@@ -150,11 +152,11 @@ mod tests {
     #[test]
     fn bindings_of_other_buffers_are_refused() {
         let list = rows(LIST).unwrap();
-        let layout = "#define N_BINDINGS 7u\n#define BIND_RAYS 4u\n";
+        let layout = "#define BIND_TEXELS 7u\n#define BIND_RAYS 4u\n";
         assert_eq!(check_bindings(&list, layout), Ok(()));
         let taken = check_bindings(&list, "#define BIND_RAYS 6u\n").expect_err("a refusal");
         assert_eq!(taken, "glsl/shared/scene_arrays.glsl: links has the binding 6 of BIND_RAYS");
-        let beyond = check_bindings(&list, "#define N_BINDINGS 6u\n").expect_err("a refusal");
-        assert!(beyond.ends_with("links has the binding 6, not below N_BINDINGS"), "{beyond}");
+        let beyond = check_bindings(&list[1..], "#define BIND_TEXELS 6u\n").expect_err("a refusal");
+        assert!(beyond.ends_with("links has the binding 6, not below BIND_TEXELS"), "{beyond}");
     }
 }
