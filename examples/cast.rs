@@ -8,7 +8,7 @@ use std::{env, error::Error, path::Path};
 
 use kdray::{
     accel::Query,
-    cast::{CastRay, NO_TRIANGLE},
+    cast::{NO_TRIANGLE, Ray},
     engine::{Built, Engine, choices::Workload},
     gpu::ContextOptions,
     scene::{Camera, Scene},
@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// The ray through the centre of a character, which is twice as high as it is wide.
-fn ray(camera: &Camera, x: u32, y: u32) -> CastRay {
+fn ray(camera: &Camera, x: u32, y: u32) -> Ray {
     let forward = (camera.target - camera.eye).normalize();
     let right = forward.cross(camera.up).normalize();
     let up = right.cross(forward);
@@ -46,5 +46,5 @@ fn ray(camera: &Camera, x: u32, y: u32) -> CastRay {
     let across = (2.0 * (x as f32 + 0.5) / SIZE.0 as f32 - 1.0) * half_width;
     let above = (1.0 - 2.0 * (y as f32 + 0.5) / SIZE.1 as f32) * half_height;
     let direction = (forward + across * right + above * up).normalize();
-    CastRay { origin: camera.eye, t_min: 0.0, direction, t_max: f32::INFINITY }
+    Ray { origin: camera.eye, t_min: 0.0, direction, t_max: f32::INFINITY }
 }

@@ -17,7 +17,7 @@ use kdray::{
         stage::Stage,
         traversal::Tracers,
     },
-    layout::{Hit, NO_TRIANGLE, Ray},
+    layout::{Hit, NO_TRIANGLE, PathRay},
     reference::traverser::{Tracer, Traverser},
     world::{FlatScene, World},
 };
@@ -44,12 +44,12 @@ fn mesh() -> FlatScene {
     scenes::load(&write_mesh(directory.path()))
 }
 
-fn closest_hits(stage: &Stage, rays: &[Ray]) -> Vec<Hit> {
+fn closest_hits(stage: &Stage, rays: &[PathRay]) -> Vec<Hit> {
     let mut traverser = Traverser::new(Traversal::Mask);
     rays.iter().map(|ray| traverser.traverse::<false>(&stage.bindings(), &ray.into())).collect()
 }
 
-fn rays(sets: &[RaySet; 4], kind: RayKind) -> &[Ray] {
+fn rays(sets: &[RaySet; 4], kind: RayKind) -> &[PathRay] {
     &sets.iter().find(|set| set.kind == kind).unwrap().rays
 }
 

@@ -7,10 +7,10 @@ use std::{ops::RangeInclusive, sync::Arc};
 use glam::{Vec3, vec3};
 use kdray::{
     accel::{Query, kdtree::Traversal},
-    cast::{CastRay, Caster, Hit, NO_TRIANGLE, cast_on_cpu},
+    cast::{Caster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
     gpu::{Context, ContextOptions},
-    layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, Ray},
-    reference::{kdtree::near_scene, probe::Probe},
+    layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, PathRay},
+    reference::{kdtree::near_scene, search_ray::SearchRay},
 };
 use rayon::prelude::*;
 use support::{
@@ -65,12 +65,12 @@ impl Drop for Device {
 }
 
 /// A ray of the traversal's tests, with a direction of another length.
-fn scaled(ray: &Ray, t_min: f32, scale: f32) -> CastRay {
-    CastRay { origin: ray.origin, t_min, direction: ray.direction * scale, t_max: ray.t_max / scale }
+fn scaled(ray: &PathRay, t_min: f32, scale: f32) -> Ray {
+    Ray { origin: ray.origin, t_min, direction: ray.direction * scale, t_max: ray.t_max / scale }
 }
 
 /// Nasty rays with directions of all lengths, a fourth of them from behind their origins on or from before it.
-fn some_rays(world: &MeshWithTree, n: usize, scale_log2: RangeInclusive<f32>) -> Vec<CastRay> {
+fn some_rays(world: &MeshWithTree, n: usize, scale_log2: RangeInclusive<f32>) -> Vec<Ray> {
     let some_ray = |i: usize| {
         let mut random = Random(i as u64);
         let ray = nasty_ray(&mut random, world, i);
@@ -82,13 +82,13 @@ fn some_rays(world: &MeshWithTree, n: usize, scale_log2: RangeInclusive<f32>) ->
 }
 
 /// Without the tree, and with the direction as it is.
-fn by_brute_force(world: &MeshWithTree, cast: &CastRay) -> Hit {
-    let ray = Ray { t_max: cast.t_max, ..ray(cast.origin, cast.direction) };
+fn by_brute_force(world: &MeshWithTree, cast: &Ray) -> Hit {
+    let ray = PathRay { t_max: cast.t_max, ..ray(cast.origin, cast.direction) };
     let hit = world.by_brute_force(&ray, cast.t_min);
     if hit.triangle_ix == NO_TRIANGLE { MISS } else { hit }
 }
 
-fn all_by_brute_force(world: &MeshWithTree, rays: &[CastRay]) -> Vec<Hit> {
+fn all_by_brute_force(world: &MeshWithTree, rays: &[Ray]) -> Vec<Hit> {
     rays.par_iter().map(|ray| by_brute_force(world, ray)).collect()
 }
 
@@ -103,7 +103,7 @@ fn occluded(hits: &[Hit]) -> Vec<bool> {
     hits.iter().map(|hit| hit.triangle_ix != NO_TRIANGLE).collect()
 }
 
-fn check(device: &Device, world: &MeshWithTree, rays: &[CastRay]) {
+fn check(device: &Device, world: &MeshWithTree, rays: &[Ray]) {
     let all_expected = all_by_brute_force(world, rays);
     for &traversal in Traversal::ALL {
         // The default one is asked more than the others, which have their own tests.
@@ -221,10 +221,10 @@ fn the_interval_s_ends_are_exact() {
     let device = Device::new();
     let world = MeshWithTree::new(meshes::torus(40, 20));
     let is_near =
-        |cast: &CastRay| near_scene(&world.bindings(), &Probe::from(&ray(cast.origin, cast.direction))).1 == 0.0;
+        |cast: &Ray| near_scene(&world.bindings(), &SearchRay::from(&ray(cast.origin, cast.direction))).1 == 0.0;
     let rays: Vec<_> = some_rays(&world, 5000, -9.0..=9.0).into_iter().filter(is_near).collect();
     let mut caster = device.caster(&world, Traversal::Mask);
-    let mut cast = |rays: &[CastRay]| {
+    let mut cast = |rays: &[Ray]| {
         let on_cpu = cast_on_cpu(world.geometry(), Traversal::Mask, rays, Query::Closest);
         let found = caster.cast(rays, Query::Closest, 1).expect("a cast").hits;
         device.agree(&on_cpu, &found).unwrap();
@@ -233,17 +233,17 @@ fn the_interval_s_ends_are_exact() {
     let first = cast(&rays);
     let (rays, first): (Vec<_>, Vec<_>) = rays.into_iter().zip(first).filter(|(_, hit)| hit.t.is_normal()).unzip();
     assert!(first.len() > 1000);
-    let with = |ends: &dyn Fn(&CastRay, f32) -> CastRay| -> Vec<_> {
+    let with = |ends: &dyn Fn(&Ray, f32) -> Ray| -> Vec<_> {
         rays.iter().zip(&first).map(|(ray, hit)| ends(ray, hit.t)).collect()
     };
-    let before = cast(&with(&|ray, t| CastRay { t_max: t.next_down(), ..*ray }));
+    let before = cast(&with(&|ray, t| Ray { t_max: t.next_down(), ..*ray }));
     let wrong = before.iter().position(|hit| *hit != MISS).map(|i| (&rays[i], &first[i], &before[i]));
     assert_eq!(wrong, None, "a hit beyond the end");
-    assert_eq!(cast(&with(&|ray, t| CastRay { t_max: t, ..*ray })), first);
-    assert_eq!(cast(&with(&|ray, t| CastRay { t_min: t.next_down(), ..*ray })), first);
-    let behind = cast(&with(&|ray, t| CastRay { t_min: t, ..*ray }));
+    assert_eq!(cast(&with(&|ray, t| Ray { t_max: t, ..*ray })), first);
+    assert_eq!(cast(&with(&|ray, t| Ray { t_min: t.next_down(), ..*ray })), first);
+    let behind = cast(&with(&|ray, t| Ray { t_min: t, ..*ray }));
     assert!(behind.iter().zip(&first).all(|(hit, first)| hit.t > first.t));
-    let empty = cast(&with(&|ray, t| CastRay { t_min: t.next_up(), t_max: t.next_down(), ..*ray }));
+    let empty = cast(&with(&|ray, t| Ray { t_min: t.next_up(), t_max: t.next_down(), ..*ray }));
     assert!(empty.iter().all(|hit| *hit == MISS));
 }
 
@@ -278,22 +278,22 @@ fn with(mut v: Vec3, axis: usize, value: f32) -> Vec3 {
 fn what_is_no_ray_misses_and_is_counted() {
     let device = Device::new();
     let world = MeshWithTree::new(meshes::torus(40, 20));
-    let good = CastRay { origin: vec3(0.05, 3.0, 1.02), t_min: 0.0, direction: Vec3::NEG_Y, t_max: f32::INFINITY };
+    let good = Ray { origin: vec3(0.05, 3.0, 1.02), t_min: 0.0, direction: Vec3::NEG_Y, t_max: f32::INFINITY };
     assert_ne!(by_brute_force(&world, &good), MISS);
-    let mut none = vec![CastRay { t_min: f32::NAN, ..good }, CastRay { t_max: f32::NAN, ..good }];
-    none.extend([0.0, -0.0, 1e-40, -1e-45].map(|short| CastRay { direction: Vec3::splat(short), ..good }));
+    let mut none = vec![Ray { t_min: f32::NAN, ..good }, Ray { t_max: f32::NAN, ..good }];
+    none.extend([0.0, -0.0, 1e-40, -1e-45].map(|short| Ray { direction: Vec3::splat(short), ..good }));
     for axis in 0..3 {
         for wrong in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-            none.push(CastRay { origin: with(good.origin, axis, wrong), ..good });
-            none.push(CastRay { direction: with(good.direction, axis, wrong), ..good });
+            none.push(Ray { origin: with(good.origin, axis, wrong), ..good });
+            none.push(Ray { direction: with(good.direction, axis, wrong), ..good });
         }
     }
     let empty = [(1.0, 1.0), (5.0, -5.0), (f32::INFINITY, f32::INFINITY), (0.0, f32::NEG_INFINITY), (0.0, 0.0)];
-    let must_miss: Vec<_> = empty.map(|(t_min, t_max)| CastRay { t_min, t_max, ..good }).into();
-    let mut far = vec![CastRay { t_min: f32::NEG_INFINITY, ..good }];
+    let must_miss: Vec<_> = empty.map(|(t_min, t_max)| Ray { t_min, t_max, ..good }).into();
+    let mut far = vec![Ray { t_min: f32::NEG_INFINITY, ..good }];
     for wrong in [f32::MAX, f32::MIN_POSITIVE, 1e-40, -1e30, 1e20] {
-        far.extend((0..3).map(|axis| CastRay { origin: with(good.origin, axis, wrong), ..good }));
-        far.extend([0, 2].map(|axis| CastRay { direction: with(good.direction, axis, wrong), ..good }));
+        far.extend((0..3).map(|axis| Ray { origin: with(good.origin, axis, wrong), ..good }));
+        far.extend([0, 2].map(|axis| Ray { direction: with(good.direction, axis, wrong), ..good }));
     }
     let rays = [&none[..], &must_miss, &far, &[good]].concat();
     for &traversal in Traversal::ALL {

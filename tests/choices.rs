@@ -10,7 +10,7 @@ use kdray::{
         Query,
         kdtree::{BuildOptions, Traversal},
     },
-    cast::{CastRay, Caster},
+    cast::{Caster, Ray},
     engine::choices::{
         Cache, Candidates, Chosen, Key, Reason, Request, Timings, TreeKind, Workload, measure_traversals,
     },
@@ -202,7 +202,7 @@ fn hits(context: &std::sync::Arc<kdray::gpu::Context>, world: &World, by: Traver
     let mut random = Random(5);
     let ray = |_| {
         let (origin, target) = (3.0 * random.direction(), random.in_box(Vec3::NEG_ONE, Vec3::ONE));
-        CastRay { origin, t_min: 0.0, direction: target - origin, t_max: f32::INFINITY }
+        Ray { origin, t_min: 0.0, direction: target - origin, t_max: f32::INFINITY }
     };
     let rays: Vec<_> = (0..3000).map(ray).collect();
     let mut caster = Caster::new(context, world.geometry(), by).expect("a caster");

@@ -22,7 +22,7 @@ use kdray::{
         stage::Stage,
     },
     buffers::{AccelBuffers, CastResources},
-    cast::{CastRay, Contender, Kernel},
+    cast::{Contender, Kernel, Ray},
     gpu::{Access, Commands, Context, ContextOptions, GpuError},
     layout::NO_TRIANGLE,
     world::World,
@@ -56,7 +56,7 @@ fn walker(context: &Arc<Context>, stage: &Stage, set: &RaySet, traversal: Traver
     let tree = AccelBuffers::new(context, stage.world.geometry()).expect("a tree");
     let bindings = CastResources::bindings(context, &tree).expect("bindings");
     let resources = CastResources::new(context, &bindings, &tree, set.rays.len()).expect("resources");
-    let cast = |ray: &kdray::layout::Ray| CastRay {
+    let cast = |ray: &kdray::layout::PathRay| Ray {
         origin: ray.origin,
         t_min: 0.0,
         direction: ray.direction,

@@ -7,7 +7,7 @@ use kdray::{
         Query,
         kdtree::{BuildOptions, Traversal},
     },
-    cast::{CastRay, CpuCaster, NO_TRIANGLE},
+    cast::{CpuCaster, NO_TRIANGLE, Ray},
     engine::{Built, Engine, choices::Workload},
     frame::RenderOptions,
     gpu::ContextOptions,
@@ -25,7 +25,7 @@ fn an_engine_renders_and_casts_alike_on_device_and_cpu() {
         let Built { world, .. } = engine.build_flat(scene.clone(), &workload).expect("a world");
         let picture = engine.render(&world, &options).expect("a picture").picture;
         let eye = scene.camera.eye;
-        let ray = |i: u32| CastRay {
+        let ray = |i: u32| Ray {
             origin: eye,
             t_min: 0.0,
             direction: scene.camera.target - eye + 0.01 * glam::Vec3::splat(i as f32),
@@ -50,7 +50,7 @@ fn an_engine_renders_and_casts_alike_on_device_and_cpu() {
 #[test]
 fn trees_of_either_kind_give_the_same_hits() {
     let scene = scenes::mixed();
-    let ray = CastRay {
+    let ray = Ray {
         origin: scene.camera.eye,
         t_min: 0.0,
         direction: scene.camera.target - scene.camera.eye,

@@ -5,13 +5,13 @@ mod support;
 use glam::Vec3;
 use kdray::{
     accel::{Query, kdtree::Traversal},
-    cast::{CastRay, Caster, CpuCaster, Hit, NO_TRIANGLE},
+    cast::{Caster, CpuCaster, Hit, NO_TRIANGLE, Ray},
     gpu::{Context, ContextOptions},
     layout::{TRIANGLE_HIDDEN, Triangle},
     reference::{
         brute,
         kdtree::hit_from_near,
-        probe::Probe,
+        search_ray::SearchRay,
         traverser::{Tracer, Traverser},
     },
 };
@@ -33,21 +33,20 @@ impl Case {
         Self { mesh: MeshWithTree::new(triangles), hidden }
     }
 
-    fn rays(&self) -> Vec<CastRay> {
+    fn rays(&self) -> Vec<Ray> {
         let ray = |i| nasty_ray(&mut Random(i as u64), &self.mesh, i);
-        let cast_ray =
-            |i| CastRay { origin: ray(i).origin, t_min: 0.0, direction: ray(i).direction, t_max: ray(i).t_max };
+        let cast_ray = |i| Ray { origin: ray(i).origin, t_min: 0.0, direction: ray(i).direction, t_max: ray(i).t_max };
         (0..3000).map(cast_ray).collect()
     }
 
     /// The closest hits among the triangles that are not hidden, each of which is tested.
-    fn by_brute_force(&self, rays: &[CastRay]) -> Vec<Hit> {
+    fn by_brute_force(&self, rays: &[Ray]) -> Vec<Hit> {
         let all = &self.mesh.triangles;
         let visible: Vec<u32> = (0..all.len() as u32).filter(|ix| !self.hidden.contains(ix)).collect();
         let triangles: Vec<Triangle> = visible.iter().map(|&ix| all[ix as usize]).collect();
-        let hit_of = |ray: &CastRay| {
-            let &CastRay { origin, t_min, direction, t_max } = ray;
-            let probe = Probe { origin, t_min, direction, t_max, source_triangle: NO_TRIANGLE };
+        let hit_of = |ray: &Ray| {
+            let &Ray { origin, t_min, direction, t_max } = ray;
+            let probe = SearchRay { origin, t_min, direction, t_max, source_triangle: NO_TRIANGLE };
             let hit = hit_from_near(&self.mesh.bindings(), &probe, |near, best| {
                 *best = brute::closest_hit(&triangles, near);
             });
@@ -122,7 +121,7 @@ fn without_a_filter_hidden_triangles_are_hit() {
 fn a_mesh_of_which_all_is_hidden_is_not_there() {
     let mesh = MeshWithTree::new(meshes::cube(2, 0.0));
     let mut traverser = Traverser::new(Traversal::Mask);
-    let into = Probe {
+    let into = SearchRay {
         origin: Vec3::new(0.1, 0.2, 9.0),
         t_min: 0.0,
         direction: -Vec3::Z,

@@ -6,9 +6,9 @@ mod support;
 use glam::{DVec3, Vec3};
 use kdray::{
     accel::{Query, kdtree::Traversal},
-    cast::{CastRay, Caster, cast_on_cpu},
+    cast::{Caster, Ray, cast_on_cpu},
     gpu::{Context, ContextOptions},
-    layout::{Hit, NO_TRIANGLE, Ray, Triangle},
+    layout::{Hit, NO_TRIANGLE, PathRay, Triangle},
     reference::triangle::Shear,
 };
 use support::{
@@ -46,7 +46,7 @@ struct Exact {
 }
 
 impl Exact {
-    fn of(ray: &Ray, triangle: &Triangle) -> Self {
+    fn of(ray: &PathRay, triangle: &Triangle) -> Self {
         let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
         let [v0, v1, v2] = corners(triangle);
         let normal = (v1 - v0).cross(v2 - v0);
@@ -82,7 +82,7 @@ impl Exact {
 }
 
 /// The greatest coordinate by which the point at t differs from the one that the weights name.
-fn gap(ray: &Ray, triangle: &Triangle, hit: &Hit) -> f64 {
+fn gap(ray: &PathRay, triangle: &Triangle, hit: &Hit) -> f64 {
     let [v0, v1, v2] = corners(triangle);
     let [t, u, v] = [hit.t, hit.u, hit.v].map(f64::from);
     let at_weights = v0 + u * (v1 - v0) + v * (v2 - v0);
@@ -90,7 +90,7 @@ fn gap(ray: &Ray, triangle: &Triangle, hit: &Hit) -> f64 {
 }
 
 /// Why a hit is wrong, if it is.
-fn fault(ray: &Ray, triangle: &Triangle, hit: &Hit) -> Option<String> {
+fn fault(ray: &PathRay, triangle: &Triangle, hit: &Hit) -> Option<String> {
     let exact = Exact::of(ray, triangle);
     let (error, gap) = (exact.error(hit), gap(ray, triangle, hit));
     // 8 u L more than the proof's point Q, for the weights.
@@ -110,7 +110,7 @@ fn needle(random: &mut Random, short_edge: f32) -> Triangle {
 }
 
 /// Towards a point of the triangle, from a distance of 0.5 to 3.
-fn ray_at(random: &mut Random, triangle: &Triangle, direction: Vec3) -> Ray {
+fn ray_at(random: &mut Random, triangle: &Triangle, direction: Vec3) -> PathRay {
     let (share, along) = (random.unit().sqrt(), random.unit());
     let [v0, v1, v2] = corners(triangle);
     let target = v0 + f64::from(share) * (v1 - v0 + f64::from(along) * (v2 - v1));
@@ -119,7 +119,7 @@ fn ray_at(random: &mut Random, triangle: &Triangle, direction: Vec3) -> Ray {
 }
 
 /// A ray that meets the triangle's plane at more than the least cosine.
-fn steep_ray_at(random: &mut Random, triangle: &Triangle) -> Ray {
+fn steep_ray_at(random: &mut Random, triangle: &Triangle) -> PathRay {
     loop {
         let direction = random.direction();
         let ray = ray_at(random, triangle, direction);
@@ -129,13 +129,13 @@ fn steep_ray_at(random: &mut Random, triangle: &Triangle) -> Ray {
     }
 }
 
-fn alone(ray: &Ray, triangle: &Triangle) -> Option<Hit> {
+fn alone(ray: &PathRay, triangle: &Triangle) -> Option<Hit> {
     Shear::of(ray.origin.to_array(), ray.direction.to_array()).intersect_triangle(triangle, 0)
 }
 
 /// The hit by rounded edge functions, as Woop, Benthin and Wald have it: t is a mean of the corners' depths. The signs
 /// of these edge functions are made exact, so the same triangles are hit.
-fn by_rounded_edges(ray: &Ray, triangle: &Triangle) -> Option<Hit> {
+fn by_rounded_edges(ray: &PathRay, triangle: &Triangle) -> Option<Hit> {
     let longest = ray.direction.abs().max_position();
     let last = |v: Vec3| Vec3::from_array([1, 2, 3].map(|i| v[(longest + i) % 3]));
     let direction = last(ray.direction);
@@ -230,8 +230,8 @@ fn points_of_slivers_and_of_triangles_seen_edge_on_are_on_the_triangle() {
     assert!(n_hits.iter().all(|&n| n > 10_000), "{n_hits:?}");
 }
 
-fn cast_ray(ray: &Ray) -> CastRay {
-    CastRay { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
+fn cast_ray(ray: &PathRay) -> Ray {
+    Ray { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
 }
 
 /// All the ways through a tree find the same, and it is right: on a device, on the CPU, alone and in packets.
@@ -247,8 +247,8 @@ fn needles_in_a_tree_are_hit_where_they_are() {
         let world =
             MeshWithTree::new((0..N_NEEDLES / N_RAYS_A_NEEDLE).map(|_| needle(&mut random, short_edge)).collect());
         let needles = world.triangles.iter().cycle().take(N_NEEDLES);
-        let rays: Vec<Ray> = needles.map(|needle| steep_ray_at(&mut random, needle)).collect();
-        let casts: Vec<CastRay> = rays.iter().map(cast_ray).collect();
+        let rays: Vec<PathRay> = needles.map(|needle| steep_ray_at(&mut random, needle)).collect();
+        let casts: Vec<Ray> = rays.iter().map(cast_ray).collect();
         let expected = cast_on_cpu(world.geometry(), Traversal::Mask, &casts, Query::Closest);
         check(&world, &rays, &expected);
         for level in levels() {
@@ -269,7 +269,7 @@ fn needles_in_a_tree_are_hit_where_they_are() {
     }
 }
 
-fn check(world: &MeshWithTree, rays: &[Ray], hits: &[Hit]) {
+fn check(world: &MeshWithTree, rays: &[PathRay], hits: &[Hit]) {
     let struck = || rays.iter().zip(hits).filter(|(_, hit)| hit.triangle_ix != NO_TRIANGLE);
     let fault = struck().find_map(|(ray, hit)| fault(ray, &world.triangles[hit.triangle_ix as usize], hit));
     assert_eq!(fault, None);

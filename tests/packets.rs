@@ -10,10 +10,10 @@ use glam::Vec3;
 use kdray::{
     accel::kdtree::Traversal,
     cpu::{octant_bins::OctantBins, packet::LANES, packet_triangle::Shears},
-    layout::{Hit, NO_TRIANGLE, Ray, Triangle},
+    layout::{Hit, NO_TRIANGLE, PathRay, Triangle},
     reference::{
         kdtree::{TraversalRay, signs_of},
-        probe::Probe,
+        search_ray::SearchRay,
         traverser::{Tracer, Traverser},
         triangle::Shear,
     },
@@ -38,9 +38,9 @@ fn bits(hit: &Hit) -> [u32; 4] {
     bytemuck::cast(*hit)
 }
 
-fn together(level: Level, rays: &[Ray; LANES], triangle: &Triangle, triangle_ix: u32) -> [Option<Hit>; LANES] {
+fn together(level: Level, rays: &[PathRay; LANES], triangle: &Triangle, triangle_ix: u32) -> [Option<Hit>; LANES] {
     dispatch!(level, simd => {
-        let columns = |of: fn(&Ray) -> Vec3| -> [_; 3] {
+        let columns = |of: fn(&PathRay) -> Vec3| -> [_; 3] {
             from_fn(|axis| f32x16::load_array(simd, from_fn(|lane| of(&rays[lane])[axis])))
         };
         let shears = Shears::of(&columns(|ray| ray.origin), &columns(|ray| ray.direction));
@@ -57,7 +57,7 @@ fn together(level: Level, rays: &[Ray; LANES], triangle: &Triangle, triangle_ix:
     })
 }
 
-fn alone(ray: &Ray, triangle: &Triangle, triangle_ix: u32) -> Option<Hit> {
+fn alone(ray: &PathRay, triangle: &Triangle, triangle_ix: u32) -> Option<Hit> {
     Shear::of(ray.origin.to_array(), ray.direction.to_array()).intersect_triangle(triangle, triangle_ix)
 }
 
@@ -75,7 +75,7 @@ fn odd_triangles() -> Vec<Triangle> {
 }
 
 /// Nasty rays, and some with numbers that no ray should have.
-fn rays_of_a_packet(random: &mut Random, world: &MeshWithTree) -> [Ray; LANES] {
+fn rays_of_a_packet(random: &mut Random, world: &MeshWithTree) -> [PathRay; LANES] {
     let first = random.below(1000);
     let mut rays = from_fn(|lane| nasty_ray(random, world, first + lane));
     if random.below(10) == 0 {
@@ -147,7 +147,7 @@ fn sixteen_rays_of_an_octant_are_a_packet() {
     let mut seen = vec![];
     let mut n_packets = 0;
     for (ray_ix, direction) in directions_in_turn().enumerate() {
-        let probe = Probe::from(&support::rays::ray(Vec3::X * ray_ix as f32, direction));
+        let probe = SearchRay::from(&support::rays::ray(Vec3::X * ray_ix as f32, direction));
         let Some(bin) = bins.push(ray_ix, &probe) else { continue };
         n_packets += 1;
         assert_eq!(bin.keys.len(), LANES);
@@ -170,7 +170,7 @@ fn sixteen_rays_of_an_octant_are_a_packet() {
 fn rays_of_an_octant_take_children_in_one_order() {
     let world = MeshWithTree::new(meshes::cube(2, 0.0));
     for direction in directions_in_turn() {
-        let ray = TraversalRay::new(&world.bindings(), &Probe::from(&support::rays::ray(Vec3::ZERO, direction)));
+        let ray = TraversalRay::new(&world.bindings(), &SearchRay::from(&support::rays::ray(Vec3::ZERO, direction)));
         for axis in 0..3 {
             assert_eq!(signs_of(direction) >> axis & 1 == 1, ray.inv_direction[axis] < 0.0, "{direction}");
         }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use glam::{Vec3, vec3};
 use kdray::{
     accel::{Query, kdtree::Traversal},
-    cast::{CastRay, Caster, Hit, NO_TRIANGLE, cast_on_cpu},
+    cast::{Caster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
     frame::{Picture, Primary, Profile, RenderOptions},
     gpu::{Context, DeviceOverrides},
     layout::Feature,
@@ -30,35 +30,29 @@ fn assert_silent(context: &Context) {
     assert_eq!(context.validation_messages(), Vec::<String>::new());
 }
 
-fn cast(
-    context: &Arc<Context>,
-    world: &MeshWithTree,
-    traversal: Traversal,
-    query: Query,
-    rays: &[CastRay],
-) -> Vec<Hit> {
+fn cast(context: &Arc<Context>, world: &MeshWithTree, traversal: Traversal, query: Query, rays: &[Ray]) -> Vec<Hit> {
     let mut caster = Caster::new(context, world.geometry(), traversal).expect("a caster");
     caster.cast(rays, query, 1).expect("a cast").hits
 }
 
-fn nasty_rays(world: &MeshWithTree, n: usize) -> Vec<CastRay> {
+fn nasty_rays(world: &MeshWithTree, n: usize) -> Vec<Ray> {
     let some_ray = |i: usize| {
         let ray = nasty_ray(&mut Random(i as u64), world, i);
-        CastRay { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
+        Ray { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
     };
     (0..n).map(some_ray).collect()
 }
 
 /// One leaf of many copies of a triangle and, as the last entry, a triangle that lies a little above them. Rays come from
 /// above; those with an even number hit.
-fn copies(n: usize) -> (MeshWithTree, Vec<CastRay>) {
+fn copies(n: usize) -> (MeshWithTree, Vec<Ray>) {
     let [below, above] = [0.0, 1e-6].map(|y| meshes::triangle(vec3(0.0, y, 0.0), vec3(1.0, y, 0.0), vec3(0.0, y, 1.0)));
     let mut triangles = vec![below; n];
     triangles.push(above);
     let ray = |i: u32| {
         let x = if i.is_multiple_of(2) { 0.2 } else { 0.7 };
         let origin = vec3(x, 1.0, 0.4 + 0.001 * i as f32);
-        CastRay { origin, t_min: 0.0, direction: Vec3::NEG_Y, t_max: f32::INFINITY }
+        Ray { origin, t_min: 0.0, direction: Vec3::NEG_Y, t_max: f32::INFINITY }
     };
     (MeshWithTree::new(triangles), (0..200).map(ray).collect())
 }

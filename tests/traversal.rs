@@ -9,13 +9,13 @@ use kdray::{
         kdtree::{BuildOptions, KdTree, Traversal},
     },
     cpu::tracer::FastTracer,
-    layout::{Hit, NO_TRIANGLE, Ray, Slab, Triangle},
+    layout::{Hit, NO_TRIANGLE, PathRay, Slab, Triangle},
     reference::{
         bindings::Bindings,
         brute,
-        counting::{steps::count_steps, table::Table},
+        counting::{steps::count_steps, table::CountedSlice},
         kdtree::near_scene,
-        probe::Probe,
+        search_ray::SearchRay,
         traverser::{Tracer, Traverser},
     },
 };
@@ -33,20 +33,20 @@ fn tree_traversals() -> impl Iterator<Item = Traversal> {
     Traversal::ALL.iter().copied().filter(|&traversal| traversal != Traversal::Brute)
 }
 
-fn rays_at(world: &MeshWithTree) -> Vec<Ray> {
+fn rays_at(world: &MeshWithTree) -> Vec<PathRay> {
     (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), world, i)).collect()
 }
 
 /// The hits that the engine finds for rays that go together. They are the reference's, bit for bit, and where any hit
 /// answers, the same rays hit.
-fn traced(world: &MeshWithTree, traversal: Traversal, rays: &[Ray]) -> Vec<Hit> {
+fn traced(world: &MeshWithTree, traversal: Traversal, rays: &[PathRay]) -> Vec<Hit> {
     traced_through(&world.bindings(), traversal, rays)
 }
 
-fn traced_through(bindings: &Bindings, traversal: Traversal, rays: &[Ray]) -> Vec<Hit> {
-    let of_task = |(engine, reference): &mut (FastTracer, Traverser), rays: &[Ray]| {
+fn traced_through(bindings: &Bindings, traversal: Traversal, rays: &[PathRay]) -> Vec<Hit> {
+    let of_task = |(engine, reference): &mut (FastTracer, Traverser), rays: &[PathRay]| {
         let (mut closest, mut is_hit) = (vec![Hit::default(); rays.len()], vec![false; rays.len()]);
-        let probes = || rays.iter().map(Probe::from).enumerate();
+        let probes = || rays.iter().map(SearchRay::from).enumerate();
         engine.trace_all::<false, _>(bindings, probes(), |i, hit| closest[i] = hit);
         engine.trace_all::<true, _>(bindings, probes(), |i, hit| is_hit[i] = hit.triangle_ix != NO_TRIANGLE);
         let alone = rays.iter().map(|ray| reference.traverse::<false>(bindings, &ray.into())).collect::<Vec<_>>();
@@ -62,7 +62,7 @@ fn traced_through(bindings: &Bindings, traversal: Traversal, rays: &[Ray]) -> Ve
 }
 
 /// The first ray whose hits differ, in any bit.
-fn first_difference(rays: &[Ray], expected: &[Hit], found: &[Hit]) -> Option<String> {
+fn first_difference(rays: &[PathRay], expected: &[Hit], found: &[Hit]) -> Option<String> {
     assert_eq!(expected.len(), found.len());
     let bits = |hit: &Hit| (hit.t.to_bits(), hit.triangle_ix, hit.u.to_bits(), hit.v.to_bits());
     let differ = |i: &usize| bits(&expected[*i]) != bits(&found[*i]);
@@ -142,7 +142,7 @@ fn slabs_spare_steps() {
     let world = MeshWithTree::new(meshes::torus(120, 60));
     let rays = rays_at(&world);
     let bindings = world.bindings();
-    let without = Bindings { kd_slabs: Table::from(&[][..]), ..bindings };
+    let without = Bindings { kd_slabs: CountedSlice::from(&[][..]), ..bindings };
     for traversal in tree_traversals() {
         let [some, all] = [bindings, without].map(|bindings| {
             let steps = count_steps(&bindings, traversal, Query::Closest, &rays);
@@ -158,7 +158,7 @@ fn slabs_beside_their_surface_are_noticed() {
     let rays = rays_at(&world);
     let bindings = world.bindings();
     let moved: Vec<Slab> = world.tree.slabs().iter().map(|slab| Slab { offset: slab.offset + 2.0, ..*slab }).collect();
-    let moved = Bindings { kd_slabs: Table::from(&moved[..]), ..bindings };
+    let moved = Bindings { kd_slabs: CountedSlice::from(&moved[..]), ..bindings };
     for traversal in tree_traversals() {
         let [expected, found] = [&bindings, &moved].map(|bindings| traced_through(bindings, traversal, &rays));
         assert!(first_difference(&rays, &expected, &found).is_some(), "{traversal}");
@@ -169,7 +169,7 @@ fn slabs_beside_their_surface_are_noticed() {
 fn rays_from_inside_never_leak() {
     for (name, triangles) in [("sphere", meshes::cube(20, 1.0)), ("cube", meshes::cube(20, 0.0))] {
         let world = MeshWithTree::new(triangles);
-        let rays: Vec<Ray> = (0..300_000).map(|i| outward_ray(&mut Random(i), &world)).collect();
+        let rays: Vec<PathRay> = (0..300_000).map(|i| outward_ray(&mut Random(i), &world)).collect();
         for traversal in tree_traversals() {
             let n_leaks = traced(&world, traversal, &rays).iter().filter(|hit| hit.triangle_ix == NO_TRIANGLE).count();
             assert_eq!(n_leaks, 0, "{name}, {traversal}");
@@ -178,7 +178,7 @@ fn rays_from_inside_never_leak() {
 }
 
 /// From somewhere inside a convex mesh around 0 exactly at a corner or a point of an edge.
-fn outward_ray(random: &mut Random, world: &MeshWithTree) -> Ray {
+fn outward_ray(random: &mut Random, world: &MeshWithTree) -> PathRay {
     let t = *random.of(&world.triangles);
     let target = if random.below(2) == 0 { t.v0 } else { edge_point(random, &world.triangles) };
     let origin = if random.below(4) == 0 { Vec3::ZERO } else { 0.5 * random.unit() * random.direction() };
@@ -190,7 +190,7 @@ fn a_hole_leaks() {
     let mut triangles = meshes::cube(20, 1.0);
     triangles.remove(7);
     let world = MeshWithTree::new(triangles);
-    let rays: Vec<Ray> = (0..100_000).map(|i| outward_ray(&mut Random(i), &world)).collect();
+    let rays: Vec<PathRay> = (0..100_000).map(|i| outward_ray(&mut Random(i), &world)).collect();
     assert!(traced(&world, Traversal::Mask, &rays).iter().any(|hit| hit.triangle_ix == NO_TRIANGLE));
 }
 
@@ -215,7 +215,7 @@ fn rays_that_are_none_end_and_miss() {
                 }
             }
             must_end.extend([1e-38, 1e-44, 1e38].map(|scale| ray(origin, direction * scale)));
-            must_miss.extend([nan, 0.0, -1.0, -infinity].map(|t_max| Ray { t_max, ..ray(origin, direction) }));
+            must_miss.extend([nan, 0.0, -1.0, -infinity].map(|t_max| PathRay { t_max, ..ray(origin, direction) }));
         }
     }
     for &traversal in Traversal::ALL {
@@ -238,7 +238,7 @@ fn a_needle_is_not_hit_beside() {
     let triangles = meshes::soup(1200, 7);
     let origin = vec3(-1.7435632, -4.7086616, -7.629315);
     let needle = ray(origin, vec3(0.40416333, 0.5116821, 0.75817764));
-    assert_eq!(brute::closest_hit(&triangles, &Probe::from(&needle)).triangle_ix, NO_TRIANGLE);
+    assert_eq!(brute::closest_hit(&triangles, &SearchRay::from(&needle)).triangle_ix, NO_TRIANGLE);
 }
 
 /// From so far away that rays start at the scene instead: the same triangles, by the test without that.
@@ -252,10 +252,10 @@ fn rays_from_afar_hit_the_same() {
             let origin = world.centre() + distance * world.radius() * random.direction();
             ray(origin, (within - origin).normalize())
         };
-        let rays: Vec<Ray> = (0..N_RAYS / 10).map(afar).collect();
-        assert!(rays.iter().all(|ray| near_scene(&world.bindings(), &Probe::from(ray)).1 > 0.0));
+        let rays: Vec<PathRay> = (0..N_RAYS / 10).map(afar).collect();
+        assert!(rays.iter().all(|ray| near_scene(&world.bindings(), &SearchRay::from(ray)).1 > 0.0));
         let unmoved: Vec<Hit> =
-            rays.par_iter().map(|ray| brute::closest_hit(&world.triangles, &Probe::from(ray))).collect();
+            rays.par_iter().map(|ray| brute::closest_hit(&world.triangles, &SearchRay::from(ray))).collect();
         for traversal in tree_traversals() {
             let found = traced(&world, traversal, &rays);
             let differs = |(a, b): &(&Hit, &Hit)| a.triangle_ix != b.triangle_ix || (a.t - b.t).abs() > 1e-6 * a.t;

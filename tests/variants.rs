@@ -13,7 +13,7 @@ use kdray::{
     gpu::{Access, Context, ContextOptions, GpuError},
     layout::{
         BRUTE_MAX_TRIANGLES, Batch, Bounce, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_LIT, LIGHT_POINT, LIGHT_SHADOWED,
-        LIGHT_UNTESTED, Light, NO_TRIANGLE, Ray, Triangle,
+        LIGHT_UNTESTED, Light, NO_TRIANGLE, PathRay, Triangle,
     },
     passes::Passes,
     render::Renderer,
@@ -60,7 +60,7 @@ struct Traced {
     n_hits: u32,
 }
 
-fn traced(context: &Arc<Context>, scene: &FlatScene, tree: &KdTree, rays: &[Ray], traversal: Traversal) -> Traced {
+fn traced(context: &Arc<Context>, scene: &FlatScene, tree: &KdTree, rays: &[PathRay], traversal: Traversal) -> Traced {
     let options = RenderOptions { width: 8, height: 8, max_depth: 1, traversal, ..RenderOptions::default() };
     let world = World::with_tree(scene.clone(), tree.clone(), &BuildOptions::default()).expect("a world");
     let constants = Frame { queue_capacity: rays.len() as u32, ..frame_constants(&world, &options) };
@@ -87,7 +87,7 @@ fn traced(context: &Arc<Context>, scene: &FlatScene, tree: &KdTree, rays: &[Ray]
 }
 
 /// The first ray that two variants do not agree on.
-fn difference(rays: &[Ray], expected: &Traced, found: &Traced) -> Option<String> {
+fn difference(rays: &[PathRay], expected: &Traced, found: &Traced) -> Option<String> {
     let wrong = (0..rays.len()).find(|&i| expected.hits[i] != found.hits[i]);
     let describe = |i: usize| {
         let [expected, found]: [Hit; 2] = bytemuck::cast([expected.hits[i], found.hits[i]]);
@@ -99,7 +99,7 @@ fn difference(rays: &[Ray], expected: &Traced, found: &Traced) -> Option<String>
 fn check(context: &Arc<Context>, name: &str, triangles: Vec<Triangle>) {
     let world = MeshWithTree::new(triangles);
     let scene = scene(&world.triangles);
-    let rays: Vec<Ray> = (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), &world, i)).collect();
+    let rays: Vec<PathRay> = (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), &world, i)).collect();
     let without_tree = traced(context, &scene, &world.tree, &rays, Traversal::Brute);
     check_against_cpu(name, &world, &rays, &without_tree);
     let wrong: Vec<String> = Traversal::ALL
@@ -114,9 +114,9 @@ fn check(context: &Arc<Context>, name: &str, triangles: Vec<Triangle>) {
 }
 
 /// A device's division may differ in the last bits, and with it a hit at an edge.
-fn check_against_cpu(name: &str, world: &MeshWithTree, rays: &[Ray], found: &Traced) {
+fn check_against_cpu(name: &str, world: &MeshWithTree, rays: &[PathRay], found: &Traced) {
     let hits: &[Hit] = bytemuck::cast_slice(&found.hits);
-    let differs = |(ray, hit): (&Ray, &Hit)| {
+    let differs = |(ray, hit): (&PathRay, &Hit)| {
         let expected = world.by_brute_force(ray, 0.0);
         let is_near = (hit.t - expected.t).abs() <= 1e-5 * expected.t || hit.t == expected.t;
         !is_near || hit.triangle_ix != expected.triangle_ix
@@ -143,7 +143,7 @@ fn all_kernels_find_the_same() {
 #[test]
 fn a_wrong_bit_is_noticed() {
     let world = MeshWithTree::new(meshes::torus(20, 10));
-    let rays: Vec<Ray> = (0..64).map(|i| nasty_ray(&mut Random(i), &world, i as usize)).collect();
+    let rays: Vec<PathRay> = (0..64).map(|i| nasty_ray(&mut Random(i), &world, i as usize)).collect();
     let context = context();
     let of = |traversal| traced(&context, &scene(&world.triangles), &world.tree, &rays, traversal);
     let expected = of(Traversal::Mask);

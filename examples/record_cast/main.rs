@@ -14,7 +14,7 @@ use ash::vk;
 use glam::Vec3;
 use kdray::{
     accel::{Query, kdtree::Traversal},
-    cast::{CastRay, Caster, Hit, NO_TRIANGLE},
+    cast::{Caster, Hit, NO_TRIANGLE, Ray},
     engine::{Built, Engine, choices::Workload},
     gpu::{Context, GivenBuffer, GivenCommands},
     scene::Scene,
@@ -43,12 +43,12 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Rays from a point in all directions, on a spiral.
-fn rays(origin: Vec3) -> Vec<CastRay> {
+fn rays(origin: Vec3) -> Vec<Ray> {
     let ray = |i: usize| {
         let height = 1.0 - (2 * i + 1) as f32 / N_RAYS as f32;
         let (sin, cos) = (2.4 * i as f32).sin_cos();
         let around = (1.0 - height * height).sqrt();
-        CastRay { origin, t_min: 0.0, direction: Vec3::new(around * cos, height, around * sin), t_max: f32::INFINITY }
+        Ray { origin, t_min: 0.0, direction: Vec3::new(around * cos, height, around * sin), t_max: f32::INFINITY }
     };
     (0..N_RAYS).map(ray).collect()
 }
@@ -86,7 +86,7 @@ unsafe fn cast(program: &Program, buffers: &Buffers, scene: Scene) -> Result<(),
 }
 
 /// Bytes of the rays and of the hits.
-const SIZES: [u64; 2] = [(N_RAYS * size_of::<CastRay>()) as u64, (N_RAYS * size_of::<Hit>()) as u64];
+const SIZES: [u64; 2] = [(N_RAYS * size_of::<Ray>()) as u64, (N_RAYS * size_of::<Hit>()) as u64];
 
 /// Buffers that the host writes and reads.
 struct Buffers {
@@ -113,7 +113,7 @@ impl Buffers {
         Ok(made)
     }
 
-    unsafe fn write(&self, rays: &[CastRay]) {
+    unsafe fn write(&self, rays: &[Ray]) {
         let bytes: &[u8] = bytemuck::cast_slice(rays);
         // SAFETY: the memory is mapped, and the device does not use it yet.
         unsafe { self.mapped[0].copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) };

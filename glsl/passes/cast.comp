@@ -13,7 +13,7 @@ layout(constant_id = CONSTANT_ANY_HIT) const bool ANY_HIT = false;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(push_constant) uniform CastBatchBlock { CastBatch batch; };
-layout(std430, set = 0, binding = BIND_CAST_RAYS) readonly buffer CastRaysBlock { CastRay cast_rays[]; };
+layout(std430, set = 0, binding = BIND_CAST_RAYS) readonly buffer CastRaysBlock { Ray cast_rays[]; };
 layout(std430, set = 0, binding = BIND_CAST_HITS) buffer CastHitsBlock { Hit cast_hits[]; };
 
 const uint INFINITY_BITS = 0x7f800000u;
@@ -23,15 +23,15 @@ Hit miss() {
     return Hit(uintBitsToFloat(INFINITY_BITS), NO_TRIANGLE, 0.0, 0.0);
 }
 
-bool is_ray(CastRay ray) {
+bool is_ray(Ray ray) {
     uint exponent = exponent_of(ray.direction);
     return exponent > 0u && exponent < 255u && longest_bits(ray.origin) < INFINITY_BITS
         && magnitude_bits(ray.t_min) <= INFINITY_BITS && magnitude_bits(ray.t_max) <= INFINITY_BITS;
 }
 
 // A hit beyond the greatest t is none.
-Hit cast_ray(CastRay ray) {
-    Ray bounded = Ray(ray.origin, 0u, ray.direction, NO_TRIANGLE, vec3(0.0), min(ray.t_max, GREATEST));
+Hit cast_ray(Ray ray) {
+    PathRay bounded = PathRay(ray.origin, 0u, ray.direction, NO_TRIANGLE, vec3(0.0), min(ray.t_max, GREATEST));
     Hit hit = traverse_any_length(bounded, ray.t_min, ANY_HIT);
     if (hit.triangle_ix == NO_TRIANGLE) return miss();
     return hit;
@@ -40,6 +40,6 @@ Hit cast_ray(CastRay ray) {
 void main() {
     uint ray_ix = ray_of_lane(gl_GlobalInvocationID.x, batch.lanes_log2);
     if (ray_ix >= batch.n_rays || !runs_in_round(batch.round, cast_hits[ray_ix].triangle_ix)) return;
-    CastRay ray = cast_rays[ray_ix];
+    Ray ray = cast_rays[ray_ix];
     cast_hits[ray_ix] = is_ray(ray) ? cast_ray(ray) : miss();
 }

@@ -18,7 +18,7 @@ layout(std430, set = 0, binding = BIND_FIRST_CHILDREN) writeonly buffer FirstChi
 layout(std430, set = 0, binding = BIND_SCAN_BLOCKS) readonly buffer ScanBlocksBlock { uint scan_blocks[]; };
 
 void make_children(uint ray_ix, uint kinds, uint child_ix) {
-    Ray ray = ray_at(ray_ix);
+    PathRay ray = ray_at(ray_ix);
     Hit hit = hits[ray_ix];
     Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
     Scattering next = scatter(material_at(hit), surface, ray.direction);

@@ -15,7 +15,7 @@ layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock
 void main() {
     uint ray_ix = gl_GlobalInvocationID.x;
     if (ray_ix >= batch.n_pixels) return;
-    Ray ray = ray_at(ray_ix);
+    PathRay ray = ray_at(ray_ix);
     Hit hit = hits[ray_ix];
     uint pixel_ix = ray.pixel_ix;
     pixel_features[pixel_ix].triangle_ix = hit.triangle_ix;

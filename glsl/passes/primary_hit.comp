@@ -29,7 +29,7 @@ uint triangle_of(uvec2 pixel) {
     return imageLoad(triangle_ids, ivec2(in_picture(pixel))).x;
 }
 
-Hit hit_of(Ray ray, uint triangle_ix) {
+Hit hit_of(PathRay ray, uint triangle_ix) {
     Shear shear = shear_of(ray.origin, ray.direction);
     Triangle triangle = triangle_at(triangle_ix);
     Hit hit;
@@ -42,7 +42,7 @@ void main() {
     bool is_hit = false;
     if (ray_ix < batch.n_pixels) {
         uvec2 pixel = pixel_of_ray(ray_ix);
-        Ray ray = camera_ray(pixel);
+        PathRay ray = camera_ray(pixel);
         uint triangle_ix = triangle_of(pixel);
         Hit hit = Hit(ray.t_max, NO_TRIANGLE, 0.0, 0.0);
         is_hit = triangle_ix != NO_TRIANGLE;

@@ -23,7 +23,7 @@ layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hit
 layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) readonly buffer LightVisibilityBlock { uint light_visibility[]; };
 layout(std430, set = 0, binding = BIND_RAY_RADIANCE) writeonly buffer RayRadianceBlock { vec4 ray_radiance[]; };
 
-vec3 local_radiance(Ray ray, uint ray_ix, Surface surface, Material material) {
+vec3 local_radiance(PathRay ray, uint ray_ix, Surface surface, Material material) {
     vec3 radiance = material.ke + material.ka * frame.ambient;
     for (uint light_ix = 0u; light_ix < frame.n_lights; ++light_ix) {
         if (light_visibility[light_ix * frame.queue_capacity + ray_ix] != LIGHT_LIT) continue;
@@ -33,7 +33,7 @@ vec3 local_radiance(Ray ray, uint ray_ix, Surface surface, Material material) {
     return radiance * local_weight(material);
 }
 
-vec3 radiance_of(Ray ray, uint ray_ix) {
+vec3 radiance_of(PathRay ray, uint ray_ix) {
     Hit hit = hits[ray_ix];
     if (hit.triangle_ix == NO_TRIANGLE) return ray.throughput * frame.background;
     Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));

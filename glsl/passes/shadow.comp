@@ -23,7 +23,7 @@ layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { B
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 
 // The segment to the light, or false where the surface turns its back on it or would not show it.
-bool shadow_segment(Ray ray, Hit hit, Light light, out Ray segment) {
+bool shadow_segment(PathRay ray, Hit hit, Light light, out PathRay segment) {
     Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
     LightSample to_light = sample_light(light, surface.point_world);
     if (!(dot(surface.geometric, to_light.direction) > 0.0)) return false;
@@ -35,7 +35,7 @@ bool shadow_segment(Ray ray, Hit hit, Light light, out Ray segment) {
 
 uint visibility_of(Light light, uint ray_ix) {
     Hit hit = hits[ray_ix];
-    Ray segment;
+    PathRay segment;
     if (hit.triangle_ix == NO_TRIANGLE || !shadow_segment(ray_at(ray_ix), hit, light, segment)) return LIGHT_UNTESTED;
     uint found = traverse(segment, 0.0, true).triangle_ix;
     if (is_stalled(found)) return found;

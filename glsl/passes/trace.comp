@@ -29,7 +29,7 @@ void main() {
     bool is_hit = false;
     uint ray_ix = bounces[batch.bounce_ix].first_ray + place;
     if (place < bounces[batch.bounce_ix].n_rays && runs_in_round(batch.round, hits[ray_ix].triangle_ix)) {
-        Ray ray;
+        PathRay ray;
         if (FROM_CAMERA) ray = camera_ray(pixel_of_ray(ray_ix));
         else ray = rays[ray_ix];
         Hit hit = traverse(ray, 0.0, false);

@@ -15,7 +15,7 @@
 #include "triangle.glsl"
 
 // Whether the device runs both sides of a branch for all lanes, as software drivers do: lockstep.glsl.
-layout(constant_id = CONSTANT_RUNS_BOTH_SIDES) const bool RUNS_BOTH_SIDES = false;
+layout(constant_id = CONSTANT_PREDICATES_BRANCHES) const bool PREDICATES_BRANCHES = false;
 
 #include "traversal_ray.glsl"
 #include "local_memory.glsl"
@@ -24,17 +24,17 @@ layout(constant_id = CONSTANT_RUNS_BOTH_SIDES) const bool RUNS_BOTH_SIDES = fals
 
 // The closest hit in (t_min, t_max], or with any_hit one that need not be the closest. The direction has about unit length. A
 // miss keeps t = t_max. If the ray has stalled, the hit's triangle_ix is its mark.
-Hit traverse(Ray ray_in, float t_min, bool any_hit) {
+Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
     float t_start;
-    Ray ray_near = near_scene(ray_in, t_start);
+    PathRay ray_near = near_scene(ray_in, t_start);
     TraversalRay ray = traversal_ray(ray_near, t_min - t_start);
-    keep_pair(LENGTHS_PLACE, t_start, ray_in.t_max);
+    spill_pair(LENGTHS_SLOT, t_start, ray_in.t_max);
     Nearest best = Nearest(0.5 * ray_near.t_max, NO_TRIANGLE);
     uint mark = search_kdtree(ray, any_hit, best);
     if (CAN_STALL && mark != 0u) return Hit(0.0, mark, 0.0, 0.0);
-    vec2 lengths = kept_pair(LENGTHS_PLACE);
+    vec2 lengths = spilled_pair(LENGTHS_SLOT);
     if (best.triangle_ix == NO_TRIANGLE) return Hit(lengths.y, NO_TRIANGLE, 0.0, 0.0);
-    vec2 weights = kept_pair(WEIGHTS_PLACE);
+    vec2 weights = spilled_pair(WEIGHTS_SLOT);
     return Hit(2.0 * best.t + lengths.x, best.triangle_ix, weights.x, weights.y);
 }
 
@@ -56,7 +56,7 @@ uint exponent_of(vec3 direction) {
 // instance: t is in units of the direction. The exponent of the direction's longest component must be 1 to 254.
 //
 // The direction is scaled by a power of two, by which it and t keep their bits.
-Hit traverse_any_length(Ray ray, float t_min, bool any_hit) {
+Hit traverse_any_length(PathRay ray, float t_min, bool any_hit) {
     uint exponent = min(exponent_of(ray.direction), 253u);
     float scale = uintBitsToFloat((254u - exponent) << 23); // 2^(127 - exponent)
     float inv_scale = uintBitsToFloat(exponent << 23);

@@ -57,9 +57,9 @@ uint pixel_ix_of(uvec2 pixel) {
 }
 
 // The ray through the pixel's sample.
-Ray camera_ray(uvec2 pixel) {
+PathRay camera_ray(uvec2 pixel) {
     float infinity = uintBitsToFloat(0x7f800000u);
-    return Ray(frame.eye, pixel_ix_of(pixel), camera_direction(pixel), NO_TRIANGLE, vec3(1.0), infinity);
+    return PathRay(frame.eye, pixel_ix_of(pixel), camera_direction(pixel), NO_TRIANGLE, vec3(1.0), infinity);
 }
 
 #endif

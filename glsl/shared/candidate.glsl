@@ -27,7 +27,7 @@ void intersect(TraversalRay ray, Triangle triangle, uint triangle_ix, inout Near
     if (!intersect_triangle(ray.shear, triangle, triangle_ix, hit)) return;
     if (is_better(ray, hit.t, triangle_ix, best) && is_accepted(triangle_ix, hit.u, hit.v)) {
         best = Nearest(hit.t, triangle_ix);
-        keep_pair(WEIGHTS_PLACE, hit.u, hit.v);
+        spill_pair(WEIGHTS_SLOT, hit.u, hit.v);
     }
 }
 

@@ -7,12 +7,12 @@
 #include "surface.glsl"
 #include "material.glsl"
 
-bool carries_light(Ray ray, vec3 weight) {
+bool carries_light(PathRay ray, vec3 weight) {
     return any(greaterThan(ray.throughput * weight, vec3(0.0)));
 }
 
 // Bits of CHILD_*: of the ray's children, those that carry light.
-uint child_kinds_of(Ray ray, Hit hit) {
+uint child_kinds_of(PathRay ray, Hit hit) {
     if (hit.triangle_ix == NO_TRIANGLE || !scatters_light(material_at(hit))) return 0u;
     Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
     Scattering next = scatter(material_at(hit), surface, ray.direction);

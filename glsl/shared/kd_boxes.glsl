@@ -1,21 +1,21 @@
 // The cells of nodes as boxes, one a node, for traversals that ask for them.
 
 // Where the ray meets the planes of a node's cell on each axis: those it comes to first, and the far ones.
-struct Slabs {
+struct BoxPlanes {
     vec3 near;
     vec3 far;
 };
 
-Slabs slabs_of(TraversalRay ray, uint node_ix) {
+BoxPlanes box_planes_of(TraversalRay ray, uint node_ix) {
     KdBox box = kd_box_of(node_ix);
     precise vec3 t0 = fma(vec3(box.min_x, box.min_y, box.min_z), ray.inv_direction, ray.bias);
     precise vec3 t1 = fma(vec3(box.max_x, box.max_y, box.max_z), ray.inv_direction, ray.bias);
-    return Slabs(min(t0, t1), max(t0, t1));
+    return BoxPlanes(min(t0, t1), max(t0, t1));
 }
 
 // The ray's interval in a node's cell: the planes that `descend` meets on the way there.
 vec2 interval_in(TraversalRay ray, uint node_ix) {
-    Slabs slabs = slabs_of(ray, node_ix);
+    BoxPlanes slabs = box_planes_of(ray, node_ix);
     return vec2(max(max(slabs.near.x, slabs.near.y), max(slabs.near.z, ray.t_enter)),
                 min(min(slabs.far.x, slabs.far.y), min(slabs.far.z, ray.t_exit)));
 }

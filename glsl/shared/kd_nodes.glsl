@@ -2,7 +2,7 @@
 
 struct Cell {
     // The node's place in kd_nodes, in bytes: what a split names its children by.
-    uint node_at;
+    uint node_offset;
     float t_enter;
     float t_exit;
 };
@@ -12,22 +12,22 @@ Cell whole(TraversalRay ray) {
     return Cell(0u, ray.t_enter, ray.t_exit);
 }
 
-uint index_of(uint node_at) {
-    return node_at / KD_NODE_BYTES;
+uint node_ix_of(uint node_offset) {
+    return node_offset / KD_NODE_BYTES;
 }
 
-uint place_of(uint node_ix) {
+uint offset_of(uint node_ix) {
     return KD_NODE_BYTES * node_ix;
 }
 
-uint sibling_of(uint node_at) {
-    return node_at ^ KD_NODE_BYTES;
+uint sibling_of(uint node_offset) {
+    return node_offset ^ KD_NODE_BYTES;
 }
 
-KdNode kd_node(uint node_at) {
+KdNode kd_node(uint node_offset) {
     count_steps(1u);
     count_turn();
-    return kd_node_at(index_of(node_at));
+    return kd_node_at(node_ix_of(node_offset));
 }
 
 bool is_leaf(KdNode node) {
@@ -49,7 +49,7 @@ float along_split(vec3 v, KdNode node) {
 float plane_of(KdNode node) {
     const int LEAF_BIT = findMSB(KD_LEAF);
     uint bits = node.split_or_first;
-    if (RUNS_BOTH_SIDES) bits &= ~uint(bitfieldExtract(int(node.axis_and_child), LEAF_BIT, 1));
+    if (PREDICATES_BRANCHES) bits &= ~uint(bitfieldExtract(int(node.axis_and_child), LEAF_BIT, 1));
     return uintBitsToFloat(bits);
 }
 

@@ -18,8 +18,8 @@ KdNode step_down(TraversalRay ray, KdNode node, inout Cell cell) {
     float t_cross = crossing(ray, node);
     bool only_second = t_cross < cell.t_enter;
     go_down();
-    cell.node_at = child_of(ray, node, only_second);
-    node = kd_node(cell.node_at);
+    cell.node_offset = child_of(ray, node, only_second);
+    node = kd_node(cell.node_offset);
     if (!only_second && t_cross <= cell.t_exit) {
         push_pending(cell);
         cell.t_exit = t_cross;
@@ -29,7 +29,7 @@ KdNode step_down(TraversalRay ray, KdNode node, inout Cell cell) {
 
 // Down to the leaf where the ray enters the cell, or to a slab that it keeps clear of, as if that were an empty leaf.
 KdNode descend(TraversalRay ray, float t_best, inout Cell cell) {
-    KdNode node = kd_node(cell.node_at);
+    KdNode node = kd_node(cell.node_offset);
     for (;;) {
         while (is_open_split(node)) node = step_down(ray, node, cell);
         if (!has_slab(node)) return node;
@@ -39,7 +39,7 @@ KdNode descend(TraversalRay ray, float t_best, inout Cell cell) {
 
 // Down to the leaf where the ray enters the cell, for lockstep.glsl.
 KdNode descend_in_step(TraversalRay ray, inout Cell cell) {
-    KdNode node = kd_node(cell.node_at);
+    KdNode node = kd_node(cell.node_offset);
     while (!is_leaf(node)) {
         node = step_down(ray, node, cell);
         if (is_leaf(node)) break;
@@ -50,7 +50,7 @@ KdNode descend_in_step(TraversalRay ray, inout Cell cell) {
 Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
     KdNode leaf;
     if (TRAVERSAL == TRAVERSAL_ROPES) leaf = descend_to_rope(ray, t_best, cell);
-    else if (RUNS_BOTH_SIDES) leaf = descend_in_step(ray, cell);
+    else if (PREDICATES_BRANCHES) leaf = descend_in_step(ray, cell);
     else leaf = descend(ray, t_best, cell);
     return visit_leaf(leaf, cell.t_enter, min(cell.t_exit, t_best));
 }
@@ -95,6 +95,6 @@ uint search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
 uint search_kdtree(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (TRAVERSAL == TRAVERSAL_BRUTE) return intersect_all(ray, any_hit, best);
     clear_pending();
-    if (RUNS_BOTH_SIDES) return search_in_step(ray, any_hit, best);
+    if (PREDICATES_BRANCHES) return search_in_step(ray, any_hit, best);
     return search_by_turns(ray, any_hit, best);
 }

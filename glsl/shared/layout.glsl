@@ -33,7 +33,7 @@
 // Bit 2: the node is a leaf.
 #define KD_LEAF 4u
 // Bit 3: the node has a slab, which is to be looked at first.
-#define KD_IN_SLAB 8u
+#define KD_HAS_SLAB 8u
 // Bits 4..31: p of a split, whose children are nodes 2 p and 2 p + 1; of a leaf, how many triangles it has. With the lower
 // bits cleared, a split's word is the place of its children in bytes.
 #define KD_PAIR_SHIFT 4u
@@ -44,7 +44,7 @@
 
 // Times the scene's largest coordinate: rays that start farther away are moved up to the scene first (the tree's
 // rounding margin is derived for this).
-#define KD_ORIGIN_REACH 4.0
+#define KD_MAX_ORIGIN_DISTANCE 4.0
 // Times the scene's largest coordinate: a ray that keeps this far from a triangle's plane within a leaf has no hit there.
 // Twice the tree's margin: kdtree/planes.rs counts what rounding does to hits, planes and a ray's distance to a plane.
 #define KD_PLANE_EPSILON 0.000015258789
@@ -200,7 +200,7 @@ struct Light {
 };
 
 // 48 bytes. direction: unit length; t in (0, t_max]; source_triangle: where the ray starts, never hit again.
-struct Ray {
+struct PathRay {
     vec3 origin;
     uint pixel_ix;
     vec3 direction;
@@ -211,8 +211,8 @@ struct Ray {
 
 // 32 bytes. A ray that is cast, not rendered: direction of any length, which is the unit of t; t in (t_min, t_max], any
 // bounds, but those below 2^-126 may count as 0. Bounds are kept to the last bit where the origin lies within
-// KD_ORIGIN_REACH, elsewhere to 2^-24 of the way to the scene.
-struct CastRay {
+// KD_MAX_ORIGIN_DISTANCE, elsewhere to 2^-24 of the way to the scene.
+struct Ray {
     vec3 origin;
     float t_min;
     vec3 direction;
@@ -348,7 +348,7 @@ struct AccelConstants {
 // Whether the nodes and triangles that a ray reads are counted.
 #define CONSTANT_COUNT_COSTS 3u
 // Whether the device runs both sides of a branch for all lanes, as software drivers do.
-#define CONSTANT_RUNS_BOTH_SIDES 4u
+#define CONSTANT_PREDICATES_BRANCHES 4u
 // Whether the rays are the camera's, which are not stored.
 #define CONSTANT_FROM_CAMERA 5u
 // Whether any hit answers a ray, not the closest alone.

@@ -4,13 +4,13 @@
 struct Visit {
     uint entry_ix;
     uint end_ix;
-    Stretch way;
+    Segment way;
 };
 
 Visit visit_leaf(KdNode leaf, float t_enter, float t_exit) {
     uint n_entries = leaf.axis_and_child >> KD_PAIR_SHIFT;
     count_steps(n_entries);
-    return Visit(leaf.split_or_first, leaf.split_or_first + n_entries, stretch(t_enter, t_exit));
+    return Visit(leaf.split_or_first, leaf.split_or_first + n_entries, segment_of(t_enter, t_exit));
 }
 
 // On to the leaf's next triangle whose plane the ray meets on its way. It may meet the others' planes elsewhere, in leaves

@@ -1,4 +1,4 @@
-// The search for devices that run both sides of a branch for all lanes, as software drivers do (RUNS_BOTH_SIDES). Nothing is
+// The search for devices that run both sides of a branch for all lanes, as software drivers do (PREDICATES_BRANCHES). Nothing is
 // spared there by `if`: what not all lanes ask for costs as if they did, and so does what none asks for. A loop ends as soon as
 // no lane goes on, but runs its body at least once. A ray finds the same hits, in the same order, as in kdtree.glsl, of which this
 // is a part.
@@ -31,10 +31,10 @@ void intersect_in_step(TraversalRay ray, LeafTriangle entry, bool tests, inout N
     bool is_hit = tests && is_inside(with_exact_signs(edges, errors));
     bool is_new = is_hit && is_better(ray, hit.t, entry.triangle_ix, best);
     if (FILTERS) is_new = is_new && is_accepted(entry.triangle_ix, hit.u, hit.v);
-    vec2 weights = kept_pair(WEIGHTS_PLACE);
+    vec2 weights = spilled_pair(WEIGHTS_SLOT);
     best.t = is_new ? hit.t : best.t;
     best.triangle_ix = is_new ? entry.triangle_ix : best.triangle_ix;
-    keep_pair(WEIGHTS_PLACE, is_new ? hit.u : weights.x, is_new ? hit.v : weights.y);
+    spill_pair(WEIGHTS_SLOT, is_new ? hit.u : weights.x, is_new ? hit.v : weights.y);
 }
 
 // On to the next leaf, if there is one, where this one is done with; from the beginning to the root's first.
@@ -57,7 +57,7 @@ bool go_on_in_step(TraversalRay ray, float t_best, inout bool begins, inout Cell
 uint search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
     Cell cell = whole(ray);
     // At the root, as in a leaf that is done with.
-    Visit visit = Visit(0u, 0u, stretch(0.0, 0.0));
+    Visit visit = Visit(0u, 0u, segment_of(0.0, 0.0));
     float reach = accel.plane_epsilon;
     bool begins = true;
     bool goes_on = is_in(ray);

@@ -43,7 +43,7 @@ bool find_pending(TraversalRay ray, float t_best, inout Cell cell) {
     if (TRAVERSAL == TRAVERSAL_STACK) return has_time && stack_size > 0u;
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return has_time && climb_by_boxes(ray, t_best, cell);
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return has_time && backtrack(ray, t_best, cell);
-    if (TRAVERSAL == TRAVERSAL_ROPES) return has_time && cell.node_at != 0u;
+    if (TRAVERSAL == TRAVERSAL_ROPES) return has_time && cell.node_offset != 0u;
     return has_time && pending_mask != uvec2(0u);
 }
 

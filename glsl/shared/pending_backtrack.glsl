@@ -7,18 +7,18 @@
 // split plane lies before its exit.
 
 bool backtrack(TraversalRay ray, float t_best, inout Cell cell) {
-    while (cell.node_at != 0u) {
-        uint parent_ix = kd_parent_of(index_of(cell.node_at));
-        KdNode parent = kd_node(place_of(parent_ix));
-        if (cell.node_at == first_child(ray, parent)) {
+    while (cell.node_offset != 0u) {
+        uint parent_ix = kd_parent_of(node_ix_of(cell.node_offset));
+        KdNode parent = kd_node(offset_of(parent_ix));
+        if (cell.node_offset == first_child(ray, parent)) {
             float t_enter = crossing(ray, parent);
             float t_exit = interval_in(ray, parent_ix).y;
             if (t_enter <= min(t_exit, t_best)) {
-                cell = Cell(sibling_of(cell.node_at), max(t_enter, ray.t_enter), t_exit);
+                cell = Cell(sibling_of(cell.node_offset), max(t_enter, ray.t_enter), t_exit);
                 return true;
             }
         }
-        cell.node_at = place_of(parent_ix);
+        cell.node_offset = offset_of(parent_ix);
     }
     return false;
 }

@@ -8,18 +8,18 @@
 uvec2 siblings_done;
 
 bool climb_by_boxes(TraversalRay ray, float t_best, inout Cell cell) {
-    while (cell.node_at != 0u) {
+    while (cell.node_offset != 0u) {
         count_turn();
         if ((siblings_done.x & 1u) == 0u) {
-            vec2 interval = interval_in(ray, index_of(sibling_of(cell.node_at)));
+            vec2 interval = interval_in(ray, node_ix_of(sibling_of(cell.node_offset)));
             if (interval.x <= min(interval.y, t_best)) {
                 siblings_done.x |= 1u;
-                cell = Cell(sibling_of(cell.node_at), interval.x, interval.y);
+                cell = Cell(sibling_of(cell.node_offset), interval.x, interval.y);
                 return true;
             }
         }
         siblings_done = above(siblings_done, 1u);
-        cell.node_at = place_of(kd_parent_of(index_of(cell.node_at)));
+        cell.node_offset = offset_of(kd_parent_of(node_ix_of(cell.node_offset)));
     }
     return false;
 }

@@ -12,14 +12,14 @@ uint trail_length;
 // From the root to the lowest pending node, which is pending no more.
 void retrace(TraversalRay ray, inout Cell cell) {
     trail_length -= mask_up();
-    cell.node_at = 0u;
+    cell.node_offset = 0u;
     cell.t_exit = ray.t_exit;
     for (uint n_left = trail_length; n_left > 0u; --n_left) {
-        KdNode node = kd_node(cell.node_at);
+        KdNode node = kd_node(cell.node_offset);
         float t_cross = crossing(ray, node);
         bool to_first = is_pending(n_left - 1u);
         bool in_second = t_cross <= cell.t_exit;
-        cell.node_at = child_of(ray, node, in_second && !to_first);
+        cell.node_offset = child_of(ray, node, in_second && !to_first);
         if (to_first) cell.t_exit = min(cell.t_exit, t_cross);
     }
 }

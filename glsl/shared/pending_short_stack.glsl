@@ -9,7 +9,7 @@ uint short_stack_top;
 uint short_stack_size;
 
 void short_stack_push(Cell cell) {
-    short_stack[short_stack_top % SHORT_STACK_SIZE] = uvec2(cell.node_at, floatBitsToUint(cell.t_exit));
+    short_stack[short_stack_top % SHORT_STACK_SIZE] = uvec2(cell.node_offset, floatBitsToUint(cell.t_exit));
     short_stack_top += 1u;
     short_stack_size = min(short_stack_size + 1u, SHORT_STACK_SIZE);
 }

@@ -7,14 +7,14 @@
 #include "camera.glsl"
 
 layout(push_constant) uniform BatchBlock { Batch batch; };
-layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { Ray rays[]; };
+layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { PathRay rays[]; };
 
 // The window's pixel that a ray of the camera goes through.
 uvec2 pixel_of_ray(uint ray_ix) {
     return pixel_of(batch.first_pixel + ray_ix, frame.width, frame.height);
 }
 
-Ray ray_at(uint ray_ix) {
+PathRay ray_at(uint ray_ix) {
     if (ray_ix < batch.n_pixels) return camera_ray(pixel_of_ray(ray_ix));
     return rays[ray_ix];
 }

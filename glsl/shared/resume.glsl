@@ -2,21 +2,21 @@
 
 // Stores where the ray is, and returns the mark for its result.
 uint stall_at(Cell cell, Visit visit, Nearest best) {
-    vec2 weights = kept_pair(WEIGHTS_PLACE);
+    vec2 weights = spilled_pair(WEIGHTS_SLOT);
     return stall(StalledRay(
-        cell.node_at, cell.t_enter, cell.t_exit, visit.entry_ix, visit.end_ix,
+        cell.node_offset, cell.t_enter, cell.t_exit, visit.entry_ix, visit.end_ix,
         best.t, best.triangle_ix, weights.x, weights.y, steps_so_far(), siblings_done
     ));
 }
 
 // Walks from the root to a node, so that the same subtrees are pending as when the ray first came to the node. The links
 // to parents tell the path. Every crossing is computed by the same operations as before, so it has the same bits.
-void walk_to(TraversalRay ray, uint node_at) {
+void walk_to(TraversalRay ray, uint node_offset) {
     // Bit i: whether the node i levels above the last one is the child above its split's plane.
     uvec2 path = uvec2(0u);
     uint n_levels = 0u;
-    for (uint at = node_at; at != 0u; at = place_of(kd_parent_of(index_of(at)))) {
-        uint bit = (index_of(at) & 1u) << (n_levels % 32u);
+    for (uint at = node_offset; at != 0u; at = offset_of(kd_parent_of(node_ix_of(at)))) {
+        uint bit = (node_ix_of(at) & 1u) << (n_levels % 32u);
         if (n_levels < 32u) path.x |= bit;
         else path.y |= bit;
         n_levels += 1u;
@@ -25,14 +25,14 @@ void walk_to(TraversalRay ray, uint node_at) {
     while (n_levels > 0u) {
         n_levels -= 1u;
         uint is_above = ((n_levels < 32u ? path.x : path.y) >> (n_levels % 32u)) & 1u;
-        KdNode node = kd_node_at(index_of(cell.node_at));
+        KdNode node = kd_node_at(node_ix_of(cell.node_offset));
         float t_cross = crossing(ray, node);
         bool meets_both = !(t_cross < cell.t_enter) && t_cross <= cell.t_exit;
         go_down();
         uint first_at = first_child(ray, node);
-        cell.node_at = (first_at & ~KD_NODE_BYTES) | (is_above * KD_NODE_BYTES);
+        cell.node_offset = (first_at & ~KD_NODE_BYTES) | (is_above * KD_NODE_BYTES);
         if (!meets_both) continue;
-        if (cell.node_at == first_at) {
+        if (cell.node_offset == first_at) {
             push_pending(cell);
             cell.t_exit = t_cross;
         } else {
@@ -44,15 +44,15 @@ void walk_to(TraversalRay ray, uint node_at) {
 // Takes up the ray's stored state.
 void resume(TraversalRay ray, out Cell cell, out Visit visit, out Nearest best) {
     StalledRay state = stalled_rays[resumed_slot];
-    cell = Cell(state.node_at, state.t_enter, state.t_exit);
+    cell = Cell(state.node_offset, state.t_enter, state.t_exit);
     best = Nearest(state.t_best, state.triangle_ix);
-    keep_pair(WEIGHTS_PLACE, state.u, state.v);
-    visit = Visit(state.entry_ix, state.end_ix, stretch(cell.t_enter, min(cell.t_exit, best.t)));
+    spill_pair(WEIGHTS_SLOT, state.u, state.v);
+    visit = Visit(state.entry_ix, state.end_ix, segment_of(cell.t_enter, min(cell.t_exit, best.t)));
     count_steps(state.n_steps);
     siblings_done = state.siblings_done;
     // These find what is pending on their way back, or by a rope.
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;
     if (TRAVERSAL == TRAVERSAL_ROPES) return;
-    walk_to(ray, cell.node_at);
+    walk_to(ray, cell.node_offset);
 }

@@ -29,17 +29,17 @@ Exit exit_of(TraversalRay ray, uint leaf_ix) {
 }
 
 // Down to the leaf where the ray is at t_enter, through all slabs but the leaf's own: to find out where the ray leaves other cells
-// costs more than their slabs spare (benches/EXPERIMENTS.md). Then node_at is where the rope of the face leads to by which the ray leaves it.
+// costs more than their slabs spare (benches/EXPERIMENTS.md). Then node_offset is where the rope of the face leads to by which the ray leaves it.
 KdNode descend_to_rope(TraversalRay ray, float t_best, inout Cell cell) {
-    KdNode node = kd_node(cell.node_at);
+    KdNode node = kd_node(cell.node_offset);
     while (!is_leaf(node)) {
-        cell.node_at = child_of(ray, node, cell.t_enter > crossing(ray, node));
-        node = kd_node(cell.node_at);
-        if (RUNS_BOTH_SIDES && is_leaf(node)) break;
+        cell.node_offset = child_of(ray, node, cell.t_enter > crossing(ray, node));
+        node = kd_node(cell.node_offset);
+        if (PREDICATES_BRANCHES && is_leaf(node)) break;
     }
-    Exit exit = exit_of(ray, index_of(cell.node_at));
+    Exit exit = exit_of(ray, node_ix_of(cell.node_offset));
     cell.t_exit = exit.t;
     if (has_slab(node)) node = enter_slab(ray, t_best, cell, node);
-    cell.node_at = place_of(exit.node_ix);
+    cell.node_offset = offset_of(exit.node_ix);
     return node;
 }

@@ -13,11 +13,11 @@
 layout(constant_id = CONSTANT_TURN_BUDGET) const uint TURN_BUDGET = 0u;
 const bool CAN_STALL = TURN_BUDGET != 0u;
 
-// STALLED_RAY_ROWS rows: the state of a ray that has stalled. The cell that it is in (node_at: its node's place in kd_nodes, in bytes;
+// STALLED_RAY_ROWS rows: the state of a ray that has stalled. The cell that it is in (node_offset: its node's place in kd_nodes, in bytes;
 // t in halves of the ray's own), the entries of the leaf that are still to be tested, and the nearest hit so far.
 // siblings_done: the words of the mask of TRAVERSAL_MASK_BOXES; other traversals find their pending subtrees again.
 struct StalledRay {
-    uint node_at;
+    uint node_offset;
     float t_enter;
     float t_exit;
     uint entry_ix;

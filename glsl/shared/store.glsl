@@ -16,7 +16,7 @@ uvec4 words_of(Hit hit) {
     return uvec4(floatBitsToUint(hit.t), hit.triangle_ix, floatBitsToUint(vec2(hit.u, hit.v)));
 }
 
-void store_ray(uint ray_ix, Ray ray) {
+void store_ray(uint ray_ix, PathRay ray) {
     stored_rays[3u * ray_ix] = words_of(ray.origin, ray.pixel_ix);
     stored_rays[3u * ray_ix + 1u] = words_of(ray.direction, ray.source_triangle);
     stored_rays[3u * ray_ix + 2u] = words_of(ray.throughput, floatBitsToUint(ray.t_max));

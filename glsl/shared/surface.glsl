@@ -45,7 +45,7 @@ vec3 inner_weights(Hit hit) {
 }
 
 // The surface of a triangle at a hit, as the ray meets it. Its point is interpolated from the corners.
-Surface surface_at(Ray ray, Hit hit, Triangle t) {
+Surface surface_at(PathRay ray, Hit hit, Triangle t) {
     vec3 weights = inner_weights(hit);
     vec3 magnitude = abs(weights.x * t.v0) + abs(weights.y * t.v1) + abs(weights.z * t.v2);
     Surface s;
@@ -63,9 +63,9 @@ Surface surface_at(Ray ray, Hit hit, Triangle t) {
 }
 
 // A ray from the surface: starts on the side that it leaves to.
-Ray ray_from(Surface s, vec3 direction, uint triangle_ix, Ray parent, vec3 throughput) {
+PathRay ray_from(Surface s, vec3 direction, uint triangle_ix, PathRay parent, vec3 throughput) {
     float side = dot(direction, s.geometric) < 0.0 ? -s.clearance : s.clearance;
-    return Ray(s.point_world + side * s.geometric, parent.pixel_ix, direction, triangle_ix, throughput, parent.t_max);
+    return PathRay(s.point_world + side * s.geometric, parent.pixel_ix, direction, triangle_ix, throughput, parent.t_max);
 }
 
 #endif

@@ -20,7 +20,7 @@ struct TraversalRay {
     uint source_triangle;
 };
 
-TraversalRay traversal_ray(Ray ray, float t_min) {
+TraversalRay traversal_ray(PathRay ray, float t_min) {
     TraversalRay r;
     r.shear = shear_of(ray.origin, ray.direction);
     r.direction = ray.direction;
@@ -50,11 +50,11 @@ float largest_coordinate() {
     return max(largest.x, max(largest.y, largest.z));
 }
 
-// The ray with its origin moved along it to lie within KD_ORIGIN_REACH. t_start: how far; 0 for all but cameras far away.
-Ray near_scene(Ray ray, out float t_start) {
+// The ray with its origin moved along it to lie within KD_MAX_ORIGIN_DISTANCE. t_start: how far; 0 for all but cameras far away.
+PathRay near_scene(PathRay ray, out float t_start) {
     vec3 away = abs(ray.origin);
     t_start = 0.0;
-    if (max(away.x, max(away.y, away.z)) <= KD_ORIGIN_REACH * largest_coordinate()) return ray;
+    if (max(away.x, max(away.y, away.z)) <= KD_MAX_ORIGIN_DISTANCE * largest_coordinate()) return ray;
     t_start = 2.0 * max(traversal_ray(ray, 0.0).t_enter, 0.0);
     precise vec3 origin = ray.origin + t_start * ray.direction;
     ray.origin = origin;

@@ -6,7 +6,7 @@ mod query;
 use glam::Vec3;
 
 pub use self::query::Query;
-pub use crate::layout::{CastRay, Hit, NO_TRIANGLE};
+pub use crate::layout::{Hit, NO_TRIANGLE, Ray};
 
 /// An acceleration structure over the triangles of a world, as the host has it.
 #[derive(Clone, Debug, PartialEq)]

@@ -9,7 +9,7 @@ use crate::{
     accel::kdtree::Traversal,
     cast::leaving::{diffuse_rays, leaving, rays_from_hits},
     cpu::trace,
-    layout::{Hit, Ray},
+    layout::{Hit, PathRay},
     reference::{light::sample_light, primary_hit::primary_rays, surface::Surface},
 };
 
@@ -51,14 +51,14 @@ impl RayKind {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RaySet {
     pub kind: RayKind,
-    pub rays: Vec<Ray>,
+    pub rays: Vec<PathRay>,
 }
 
 /// The four sets, in the order of [`RayKind::ALL`]: `width * height` primary rays, and one ray of each other kind for
 /// each of their hits. The same stage gives the same rays.
 pub fn ray_sets(stage: &Stage) -> [RaySet; 4] {
     let bindings = stage.bindings();
-    let mut primary = vec![Ray::zeroed(); (stage.frame.width * stage.frame.height) as usize];
+    let mut primary = vec![PathRay::zeroed(); (stage.frame.width * stage.frame.height) as usize];
     primary_rays(&stage.frame, 0, &mut primary);
     let mut hits = vec![Hit::zeroed(); primary.len()];
     trace(&bindings, Traversal::Mask, &primary, &mut hits);
@@ -66,7 +66,7 @@ pub fn ray_sets(stage: &Stage) -> [RaySet; 4] {
     let triangles = bindings.triangles;
     let shadow = rays_from_hits(triangles, &primary, &hits, |ray, surface| {
         let to_light = sample_light(&stage.light, surface.point_world);
-        Ray { t_max: to_light.distance, ..leaving(surface, ray, to_light.direction) }
+        PathRay { t_max: to_light.distance, ..leaving(surface, ray, to_light.direction) }
     });
     let mirror = rays_from_hits(triangles, &primary, &hits, |ray, surface| {
         leaving(surface, ray, mirrored(ray.direction, surface))

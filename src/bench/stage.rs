@@ -5,7 +5,7 @@ use std::time::Instant;
 use glam::{BVec3, Vec3};
 
 use crate::{
-    accel::kdtree::{BuildOptions, Extras, KdTree},
+    accel::kdtree::{BuildOptions, KdTree, TraversalLinks},
     frame::{RenderOptions, frame_constants},
     layout::{FLAT_NORMAL, Frame, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
     reference::bindings::Bindings,
@@ -24,7 +24,7 @@ pub struct Stage {
     /// What it took to build the tree, wall-clock.
     pub tree_build_ms: f64,
     /// What any traversal reads beside the tree.
-    pub extras: Extras,
+    pub links: TraversalLinks,
     /// The camera's constants. `queue_capacity` is 0: there is no queue.
     pub frame: Frame,
     /// Where shadow rays go to.
@@ -44,7 +44,7 @@ impl Stage {
         let tree_build_ms = begin.elapsed().as_secs_f64() * 1e3;
         let options = RenderOptions { width: size.0, height: size.1, ..RenderOptions::default() };
         let frame = frame_constants(&world, &options);
-        Self { extras: Extras::all(world.tree()), world, tree_build_ms, frame, light }
+        Self { links: TraversalLinks::all(world.tree()), world, tree_build_ms, frame, light }
     }
 
     /// The scene on the floor of a closed room, seen from inside the room, with a point light under its ceiling.
@@ -70,7 +70,7 @@ impl Stage {
 
     /// What a traversal on the CPU reads.
     pub fn bindings(&self) -> Bindings<'_> {
-        Bindings::new(self.scene(), self.tree(), &self.frame).with_extras(&self.extras)
+        Bindings::new(self.scene(), self.tree(), &self.frame).with_links(&self.links)
     }
 }
 

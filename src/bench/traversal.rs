@@ -17,7 +17,7 @@ use crate::{
         Query,
         kdtree::{Statistics, Traversal},
     },
-    cast::{CastRay, Caster, cast_ray},
+    cast::{Caster, Ray, cast_ray},
     cpu,
     gpu::{Context, GpuError, Statistic, StatisticValue},
     layout::{Hit, NO_TRIANGLE},
@@ -86,7 +86,7 @@ impl<'a> Tracers<'a> {
 
     /// Casts that each turn begins with, untimed: the rays have just been uploaded, another variant's tree is in the
     /// caches, and while the CPU compared hits the device's clock may have fallen. One at least.
-    fn n_warm_up(&mut self, rays: &[CastRay], query: Query) -> Result<u16, GpuError> {
+    fn n_warm_up(&mut self, rays: &[Ray], query: Query) -> Result<u16, GpuError> {
         let Some(caster) = self.casters.as_mut().and_then(|casters| casters.first_mut()) else { return Ok(1) };
         let once_ms = caster.cast(rays, query, 1)?.gpu_ms.map_or(f64::INFINITY, |ms| ms.iter().sum());
         Ok((WARM_UP.as_secs_f64() * 1e3 / once_ms.max(1e-2)).clamp(1.0, 1000.0) as u16)
@@ -96,7 +96,7 @@ impl<'a> Tracers<'a> {
     fn cast(
         &mut self,
         variant_ix: usize,
-        rays: &[CastRay],
+        rays: &[Ray],
         query: Query,
         n_times: u16,
     ) -> Result<(Vec<Hit>, Option<Vec<f64>>), GpuError> {
@@ -114,7 +114,7 @@ impl<'a> Tracers<'a> {
         Ok((hits, Some(ms)))
     }
 
-    fn cast_on_cpu(&self, variant: Traversal, rays: &[CastRay], query: Query) -> Vec<Hit> {
+    fn cast_on_cpu(&self, variant: Traversal, rays: &[Ray], query: Query) -> Vec<Hit> {
         let mut hits = vec![Hit::zeroed(); rays.len()];
         cpu::cast(&self.stage.bindings(), variant, query, rays, &mut hits);
         hits

@@ -9,7 +9,7 @@ use super::{
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
 };
 use crate::{
-    accel::kdtree::{Extras, KdTree, Traversal},
+    accel::kdtree::{KdTree, Traversal, TraversalLinks},
     gpu::{Binding, Buffer, BufferUse, Constants, Context, GpuError},
     layout::{
         AccelConstants, BIND_ACCEL, BIND_STALLS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, LeafTriangle, Slab,
@@ -92,7 +92,7 @@ impl AccelBuffers {
     ///
     /// # Errors
     /// Nothing has changed then. Too many triangles for brute force; beyond the device's limits, out of memory.
-    pub(crate) fn add_extras(
+    pub(crate) fn add_links(
         &mut self,
         context: &Arc<Context>,
         tree: &KdTree,
@@ -102,10 +102,10 @@ impl AccelBuffers {
         if traversal == Traversal::Brute && value > limit {
             return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
         }
-        let extras = Extras::new(tree, traversal);
+        let links = TraversalLinks::new(tree, traversal);
         let mut next = self.clone();
-        next.arrays.kd_boxes = Content::Elements(&extras.boxes).upload(context, "kd_boxes", self.access)?;
-        next.arrays.kd_ropes = Content::Elements(&extras.ropes).upload(context, "kd_ropes", self.access)?;
+        next.arrays.kd_boxes = Content::Elements(&links.boxes).upload(context, "kd_boxes", self.access)?;
+        next.arrays.kd_ropes = Content::Elements(&links.ropes).upload(context, "kd_ropes", self.access)?;
         next.upload_constants(context)?;
         *self = next;
         Ok(())
@@ -175,5 +175,5 @@ pub(crate) fn hidden_words(n_triangles: usize, hidden: &[u32]) -> Vec<u32> {
 
 /// The slabs, if the device's kernels look at them: those that run both sides of every branch do not.
 fn slabs_for<'a>(context: &Context, tree: &'a KdTree) -> &'a [Slab] {
-    if context.runs_both_sides() { &[] } else { tree.slabs() }
+    if context.predicates_branches() { &[] } else { tree.slabs() }
 }

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use super::{AccelBuffers, accel, binding};
 use crate::{
     gpu::{Binding, BindingSet, Bindings, Buffer, BufferUse, Context, GivenBuffer, GpuError},
-    layout::{BIND_CAST_HITS, BIND_CAST_RAYS, CastBatch, CastRay, Hit},
+    layout::{BIND_CAST_HITS, BIND_CAST_RAYS, CastBatch, Hit, Ray},
 };
 
 /// A batch's buffers and the descriptor set over them and the tree.
 pub struct CastResources {
     /// Room for a batch, like cast_hits.
-    pub cast_rays: Buffer<CastRay>,
+    pub cast_rays: Buffer<Ray>,
     pub cast_hits: Buffer<Hit>,
     pub set: BindingSet,
 }

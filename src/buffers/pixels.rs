@@ -41,7 +41,7 @@ impl Pixels {
         let filters = frame.denoise_threshold.is_finite();
         let (triangle_ids, depth) = if draws(options) {
             let target = |name, kind| Target::new(context, name, kind, size).map(Arc::new);
-            (target("triangle_ids", TargetKind::Id)?, Some(target("depth", TargetKind::Depth)?))
+            (target("triangle_ids", TargetKind::Uint)?, Some(target("depth", TargetKind::Depth)?))
         } else {
             (Arc::new(Target::unread(context, "triangle_ids")?), None)
         };

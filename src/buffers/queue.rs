@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::{
     gpu::{Buffer, BufferUse, Context, GpuError},
-    layout::{Hit, Ray, SCAN_GROUP_SIZE},
+    layout::{Hit, PathRay, SCAN_GROUP_SIZE},
 };
 
 /// Room for `queue_capacity` rays, those of all bounces of a batch, and what belongs to each. A clone is a second
@@ -13,7 +13,7 @@ use crate::{
 pub struct Queue {
     /// Bounce after bounce; `queue_capacity`, like what follows but for the last two. The camera's, which come first, are never
     /// stored: kernels make them anew from their places (glsl/shared/rays.glsl).
-    pub rays: Buffer<Ray>,
+    pub rays: Buffer<PathRay>,
     pub hits: Buffer<Hit>,
     pub child_kinds: Buffer<u32>,
     /// Where a ray's children begin in `rays`, or would if it had any.

@@ -96,7 +96,7 @@ impl Resources {
         let &Needs { constants, options, n_bounces } = needs;
         let mut accel = AccelBuffers::new(context, world.geometry())?;
         accel.add_materials(context, &scene.triangle_materials)?;
-        accel.add_extras(context, world.tree(), options.traversal)?;
+        accel.add_links(context, world.tree(), options.traversal)?;
         let kinds: Vec<_> = OWN_BINDINGS.into_iter().chain(accel::bindings()).map(binding).collect();
         let upload_indices = || new_vertex_indices(context, &vertex_indices(&scene.triangles));
         let mut resources = Self {
@@ -157,7 +157,7 @@ impl Resources {
         let &Needs { constants, options, n_bounces } = needs;
         self.changed(|next| {
             if let Some(tree) = tree {
-                next.accel.add_extras(context, tree, options.traversal)?;
+                next.accel.add_links(context, tree, options.traversal)?;
             }
             if draws(options) != next.vertex_indices.is_some() {
                 next.vertex_indices = draws(options).then(|| next.make_vertex_indices(context)).transpose()?;

@@ -27,7 +27,7 @@ impl SceneAccess {
     /// The fastest way that the device has for arrays of these sizes.
     pub fn of(context: &Context, contents: &Contents) -> Self {
         let (limits, sizes) = (context.limits(), contents.sizes());
-        if context.runs_both_sides() && sizes.iter().all(|size| size.n_texels <= u64::from(limits.n_texels)) {
+        if context.predicates_branches() && sizes.iter().all(|size| size.n_texels <= u64::from(limits.n_texels)) {
             Self::Texels
         } else if sizes.iter().all(|size| size.bytes <= limits.storage_range) {
             Self::Bound

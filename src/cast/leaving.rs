@@ -6,12 +6,12 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::{
-    layout::{Hit, NO_TRIANGLE, Ray, Triangle},
+    layout::{Hit, NO_TRIANGLE, PathRay, Triangle},
     reference::surface::{Surface, surface_at},
 };
 
 /// One ray for each hit, in their order, into the hemisphere above it, by the cosine.
-pub fn diffuse_rays(triangles: &[Triangle], rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
+pub fn diffuse_rays(triangles: &[Triangle], rays: &[PathRay], hits: &[Hit]) -> Vec<PathRay> {
     rays_from_hits(triangles, rays, hits, |ray, surface| {
         leaving(surface, ray, cosine_distributed(surface.geometric, uniform_pair(ray.pixel_ix)))
     })
@@ -20,11 +20,11 @@ pub fn diffuse_rays(triangles: &[Triangle], rays: &[Ray], hits: &[Hit]) -> Vec<R
 /// One ray for each hit, in their order.
 pub fn rays_from_hits(
     triangles: &[Triangle],
-    rays: &[Ray],
+    rays: &[PathRay],
     hits: &[Hit],
-    next: impl Fn(&Ray, &Surface) -> Ray + Sync,
-) -> Vec<Ray> {
-    let of_hit = |(ray, hit): (&Ray, &Hit)| {
+    next: impl Fn(&PathRay, &Surface) -> PathRay + Sync,
+) -> Vec<PathRay> {
+    let of_hit = |(ray, hit): (&PathRay, &Hit)| {
         let triangle = triangles.get(hit.triangle_ix as usize)?;
         Some(next(ray, &surface_at(ray, hit, triangle)))
     };
@@ -32,7 +32,7 @@ pub fn rays_from_hits(
 }
 
 /// The ray that leaves a surface in a direction, with all of its parent's light.
-pub fn leaving(surface: &Surface, parent: &Ray, direction: Vec3) -> Ray {
+pub fn leaving(surface: &Surface, parent: &PathRay, direction: Vec3) -> PathRay {
     surface.ray_from(direction, NO_TRIANGLE, parent, Vec3::ONE)
 }
 

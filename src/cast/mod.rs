@@ -25,16 +25,16 @@ pub use self::{
     rounds::Contender,
     write::HitWriter,
 };
-pub use crate::layout::{CastRay, Hit, NO_TRIANGLE};
+pub use crate::layout::{Hit, NO_TRIANGLE, Ray};
 use crate::{
     accel::{
         Query,
-        kdtree::{Extras, Traversal},
+        kdtree::{Traversal, TraversalLinks},
     },
     buffers::{AccelBuffers, CastResources, Round, hidden_words},
     cpu,
     gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
-    layout::{RAY_GROUP_SIZE, Ray},
+    layout::{PathRay, RAY_GROUP_SIZE},
     passes, reference,
     world::Geometry,
 };
@@ -73,7 +73,7 @@ impl Caster {
     /// Beyond the device's limits or memory; too many triangles for brute force.
     pub fn new(context: &Arc<Context>, geometry: Geometry, traversal: Traversal) -> Result<Self, GpuError> {
         let mut buffers = AccelBuffers::new(context, geometry)?;
-        buffers.add_extras(context, geometry.tree(), traversal)?;
+        buffers.add_links(context, geometry.tree(), traversal)?;
         let bindings = CastResources::bindings(context, &buffers)?;
         Ok(Self {
             resources: CastResources::new(context, &bindings, &buffers, 0)?,
@@ -112,7 +112,7 @@ impl Caster {
     ///
     /// # Errors
     /// Out of memory, a failed call.
-    pub fn cast(&mut self, rays: &[CastRay], query: Query, n_times: u32) -> Result<Cast, GpuError> {
+    pub fn cast(&mut self, rays: &[Ray], query: Query, n_times: u32) -> Result<Cast, GpuError> {
         self.prepare(query, rays.len())?;
         let mut hits = Vec::with_capacity(rays.len());
         let mut gpu_ms = Some(vec![0.0; n_times.max(1) as usize]);
@@ -195,14 +195,14 @@ impl Caster {
 
 /// Rays that a batch can have on a device.
 fn most_rays(limits: &Limits) -> usize {
-    let bytes_a_ray = mem::size_of::<CastRay>().max(mem::size_of::<Hit>()) as u64;
+    let bytes_a_ray = mem::size_of::<Ray>().max(mem::size_of::<Hit>()) as u64;
     let in_groups = u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE);
     (limits.storage_range / bytes_a_ray).min(in_groups) as usize
 }
 
 /// Rays that can only miss: with a NaN, an infinite origin or direction, or a direction of zero or so short that all
 /// its components are denormal (less than 2^-126).
-pub fn count_invalid(rays: &[CastRay]) -> u64 {
+pub fn count_invalid(rays: &[Ray]) -> u64 {
     rays.par_iter().filter(|ray| !reference::cast::is_ray(ray)).count() as u64
 }
 
@@ -210,7 +210,7 @@ pub fn count_invalid(rays: &[CastRay]) -> u64 {
 pub struct CpuCaster<'a> {
     geometry: Geometry<'a>,
     traversal: Traversal,
-    extras: Extras,
+    links: TraversalLinks,
     /// As `TRIANGLE_HIDDEN` says, if there are hidden triangles.
     hidden: Option<Vec<u32>>,
 }
@@ -218,8 +218,8 @@ pub struct CpuCaster<'a> {
 impl<'a> CpuCaster<'a> {
     /// Makes what the traversal reads beside the tree.
     pub fn new(geometry: Geometry<'a>, traversal: Traversal) -> Self {
-        let extras = Extras::new(geometry.tree(), traversal);
-        Self { geometry, traversal, extras, hidden: None }
+        let links = TraversalLinks::new(geometry.tree(), traversal);
+        Self { geometry, traversal, links, hidden: None }
     }
 
     /// Makes rays pass through the triangles of these indices.
@@ -232,24 +232,24 @@ impl<'a> CpuCaster<'a> {
     }
 
     /// One hit a ray.
-    pub fn cast(&self, rays: &[CastRay], query: Query) -> Vec<Hit> {
+    pub fn cast(&self, rays: &[Ray], query: Query) -> Vec<Hit> {
         let bindings = reference::bindings::Bindings::of_tree(self.geometry.triangles(), self.geometry.tree());
         let bindings = match &self.hidden {
             Some(words) => bindings.with_hidden(words),
             None => bindings,
         };
         let mut hits = vec![Hit::zeroed(); rays.len()];
-        cpu::cast(&bindings.with_extras(&self.extras), self.traversal, query, rays, &mut hits);
+        cpu::cast(&bindings.with_links(&self.links), self.traversal, query, rays, &mut hits);
         hits
     }
 }
 
 /// The hits of a [`Caster`], found by a [`CpuCaster`].
-pub fn cast_on_cpu(geometry: Geometry, traversal: Traversal, rays: &[CastRay], query: Query) -> Vec<Hit> {
+pub fn cast_on_cpu(geometry: Geometry, traversal: Traversal, rays: &[Ray], query: Query) -> Vec<Hit> {
     CpuCaster::new(geometry, traversal).cast(rays, query)
 }
 
 /// A ray of the renderer as one that is cast.
-pub(crate) fn cast_ray(ray: &Ray) -> CastRay {
-    CastRay { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
+pub(crate) fn cast_ray(ray: &PathRay) -> Ray {
+    Ray { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
 }

@@ -9,7 +9,7 @@ use std::{
 use glam::Vec3;
 use npyz::{NpyFile, NpyHeader, NpyReader, Order};
 
-use super::CastRay;
+use super::Ray;
 
 /// Why rays could not be read. Displays as one line.
 #[derive(Debug, thiserror::Error)]
@@ -68,7 +68,7 @@ impl RayReader {
     ///
     /// # Errors
     /// The file ends early, or cannot be read.
-    pub fn next_batch(&mut self, most: usize) -> Result<Vec<CastRay>, RayFileError> {
+    pub fn next_batch(&mut self, most: usize) -> Result<Vec<Ray>, RayFileError> {
         let n = (self.n_rays - self.n_read).min(most as u64) as usize;
         let mut rays = Vec::with_capacity(n);
         for _ in 0..n {
@@ -79,13 +79,13 @@ impl RayReader {
         Ok(rays)
     }
 
-    fn next_ray(&mut self) -> io::Result<CastRay> {
+    fn next_ray(&mut self) -> io::Result<Ray> {
         let mut row = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, f32::INFINITY];
         for number in &mut row[..self.n_columns] {
             *number = self.numbers.next().ok_or(io::ErrorKind::UnexpectedEof)??;
         }
         let [ox, oy, oz, dx, dy, dz, t_min, t_max] = row;
-        Ok(CastRay { origin: Vec3::new(ox, oy, oz), t_min, direction: Vec3::new(dx, dy, dz), t_max })
+        Ok(Ray { origin: Vec3::new(ox, oy, oz), t_min, direction: Vec3::new(dx, dy, dz), t_max })
     }
 
     fn broken_off(&self, error: &io::Error) -> RayFileError {

@@ -2,7 +2,7 @@
 
 use std::{rc::Rc, sync::Arc};
 
-use super::{CastRay, Caster, Hit, most_rays};
+use super::{Caster, Hit, Ray, most_rays};
 use crate::{
     accel::Query,
     buffers::{CastResources, Round, Stalls},
@@ -20,13 +20,13 @@ pub struct RecordedCast {
 }
 
 impl Caster {
-    /// Prepares a cast of rays that a program has on the device. `rays`: elements of [`CastRay`]. `hits`: as many elements of
+    /// Prepares a cast of rays that a program has on the device. `rays`: elements of [`Ray`]. `hits`: as many elements of
     /// [`Hit`], to be written.
     ///
     /// # Errors
     /// `hits` has too little room; more rays than a dispatch or a storage buffer can have; out of memory, a failed call.
     pub fn recorded(&mut self, rays: GivenBuffer, hits: GivenBuffer, query: Query) -> Result<RecordedCast, GpuError> {
-        let n_rays = rays.bytes() / size_of::<CastRay>() as u64;
+        let n_rays = rays.bytes() / size_of::<Ray>() as u64;
         let room = (hits.bytes() / size_of::<Hit>() as u64).min(most_rays(self.context.limits()) as u64);
         if n_rays > room {
             return Err(GpuError::Limit { what: "rays of a recorded cast", value: n_rays, limit: room });

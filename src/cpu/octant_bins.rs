@@ -4,7 +4,7 @@
 use arrayvec::ArrayVec;
 
 use super::{packet::LANES, soa::RaysSoa};
-use crate::reference::{kdtree::signs_of, probe::Probe};
+use crate::reference::{kdtree::signs_of, search_ray::SearchRay};
 
 /// Rays of one octant, at most as many as a packet has, each with the key that its hit is reported by.
 pub struct Bin<Key> {
@@ -32,7 +32,7 @@ impl<Key> Default for OctantBins<Key> {
 impl<Key> OctantBins<Key> {
     /// Adds a ray to the bin of its octant. Returns the bin if it is full now; the caller has to empty it.
     #[inline(always)]
-    pub fn push(&mut self, key: Key, probe: &Probe) -> Option<&mut Bin<Key>> {
+    pub fn push(&mut self, key: Key, probe: &SearchRay) -> Option<&mut Bin<Key>> {
         let octant = &mut self.octants[signs_of(probe.direction) as usize & 7];
         octant.rays.set(octant.keys.len(), probe);
         octant.keys.push(key);

@@ -14,7 +14,7 @@ use crate::{
     layout::{Hit, KD_LEAST_COMPONENT, KD_PLANE_EPSILON, KdNode, Slab},
     reference::{
         bindings::Bindings,
-        counting::table::Reads,
+        counting::table::ReadCounter,
         kdtree::{TraversalRay, largest_coordinate, origin_reach, signs_of},
         leaf::{Target, entries_of},
     },
@@ -37,7 +37,7 @@ pub struct Interval<S: Simd> {
 }
 
 /// The middles of the rays' ways through a cell, and half their lengths, in t.
-struct Stretches<S: Simd> {
+struct Segments<S: Simd> {
     middle: f32x16<S>,
     half: f32x16<S>,
 }
@@ -116,7 +116,7 @@ fn dot<S: Simd>(normal: Vec3, v: &[f32x16<S>; 3]) -> f32x16<S> {
 impl<S: Simd> Packet<S> {
     /// The first `n_rays`, and where they are in the root's cell: the operations of `TraversalRay::new`.
     #[inline(always)]
-    pub fn new(simd: S, bindings: &Bindings<impl Reads>, probes: &RaysSoa, n_rays: usize) -> (Self, Interval<S>) {
+    pub fn new(simd: S, bindings: &Bindings<impl ReadCounter>, probes: &RaysSoa, n_rays: usize) -> (Self, Interval<S>) {
         let (origin, direction) = (columns(simd, &probes.origin), columns(simd, &probes.direction));
         let inv_direction = [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])];
         let bias = [-origin[0] * inv_direction[0], -origin[1] * inv_direction[1], -origin[2] * inv_direction[2]];
@@ -147,7 +147,7 @@ impl<S: Simd> Packet<S> {
     /// Whether all rays start within reach. Missing ones are asked, too: they are those of an earlier packet, and near as a
     /// rule.
     #[inline(always)]
-    pub fn is_within_reach(&self, bindings: &Bindings<impl Reads>) -> bool {
+    pub fn is_within_reach(&self, bindings: &Bindings<impl ReadCounter>) -> bool {
         let reach = origin_reach(bindings);
         let [x, y, z] = [self.origin[0].abs(), self.origin[1].abs(), self.origin[2].abs()];
         (x.simd_gt(reach) | y.simd_gt(reach) | z.simd_gt(reach)).all_false()
@@ -155,14 +155,14 @@ impl<S: Simd> Packet<S> {
 
     /// The rays' ways through the cell, but for what lies beyond their best hits.
     #[inline(always)]
-    fn ways(&self, cell: &Interval<S>) -> Stretches<S> {
+    fn ways(&self, cell: &Interval<S>) -> Segments<S> {
         let exit = cell.exit.min(self.t_best);
-        Stretches { middle: (cell.enter + exit) * 0.5, half: (exit - cell.enter) * 0.5 }
+        Segments { middle: (cell.enter + exit) * 0.5, half: (exit - cell.enter) * 0.5 }
     }
 
     /// Which of the rays do not keep to one side of a plane on their ways, farther from it than `reach`.
     #[inline(always)]
-    fn lanes_near(&self, ways: &Stretches<S>, normal: Vec3, distance: f32, reach: f32) -> Lanes {
+    fn lanes_near(&self, ways: &Segments<S>, normal: Vec3, distance: f32, reach: f32) -> Lanes {
         let height = dot(normal, &self.origin) - distance;
         let slope = dot(normal, &self.direction);
         let is_clear = (ways.middle * slope + height).abs().simd_gt(ways.half * slope.abs() + reach);
@@ -179,7 +179,7 @@ impl<S: Simd> Packet<S> {
     #[inline(always)]
     pub fn intersect_leaf<const ANY_HIT: bool>(
         &mut self,
-        bindings: &Bindings<impl Reads>,
+        bindings: &Bindings<impl ReadCounter>,
         leaf: KdNode,
         cell: &Interval<S>,
     ) {
@@ -207,7 +207,7 @@ impl<S: Simd> Packet<S> {
 
     /// A triangle against some of the rays: `leaf::intersect` for all at once.
     #[inline(always)]
-    fn intersect(&mut self, bindings: &Bindings<impl Reads>, triangle_ix: u32, lanes: Lanes) {
+    fn intersect(&mut self, bindings: &Bindings<impl ReadCounter>, triangle_ix: u32, lanes: Lanes) {
         let triangle = &bindings.triangles[triangle_ix as usize];
         for axis in 0..3 {
             let lanes = lanes & self.shears.lanes_of_axis[axis];

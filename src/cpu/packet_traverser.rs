@@ -13,7 +13,7 @@ use crate::{
     layout::{Hit, KD_MAX_DEPTH, KD_PAIR_SHIFT, KdNode},
     reference::{
         bindings::Bindings,
-        counting::table::Reads,
+        counting::table::ReadCounter,
         kdtree::{Cell, Pending, TraversalRay, axis_of, hit_from_near, is_leaf, search, search_cell},
         pending_stack::PendingStack,
         slab::slab_of,
@@ -54,7 +54,7 @@ impl PacketTraverser {
     #[inline(always)]
     fn descend<S: Simd>(
         &mut self,
-        bindings: &Bindings<impl Reads>,
+        bindings: &Bindings<impl ReadCounter>,
         packet: &Packet<S>,
         node_ix: &mut u32,
         cell: &mut Interval<S>,
@@ -110,7 +110,7 @@ impl PacketTraverser {
     #[inline(always)]
     fn search<S: Simd, const ANY_HIT: bool>(
         &mut self,
-        bindings: &Bindings<impl Reads>,
+        bindings: &Bindings<impl ReadCounter>,
         packet: &mut Packet<S>,
         whole: Interval<S>,
     ) {
@@ -141,7 +141,7 @@ impl PacketTraverser {
     fn traverse_at<S: Simd, const ANY_HIT: bool>(
         &mut self,
         simd: S,
-        bindings: &Bindings<impl Reads>,
+        bindings: &Bindings<impl ReadCounter>,
         probes: &RaysSoa,
         n_rays: usize,
     ) -> HitsSoa {
@@ -158,7 +158,7 @@ impl PacketTraverser {
     #[cold]
     fn traverse_one_by_one<const ANY_HIT: bool>(
         &mut self,
-        bindings: &Bindings<impl Reads>,
+        bindings: &Bindings<impl ReadCounter>,
         probes: &RaysSoa,
         n_rays: usize,
     ) -> HitsSoa {
@@ -175,7 +175,7 @@ impl PacketTraverser {
     /// The hits of the first `n_rays`, which are of one octant; void beyond them.
     pub fn traverse<const ANY_HIT: bool>(
         &mut self,
-        bindings: &Bindings<impl Reads>,
+        bindings: &Bindings<impl ReadCounter>,
         probes: &RaysSoa,
         n_rays: usize,
     ) -> HitsSoa {
@@ -185,7 +185,7 @@ impl PacketTraverser {
     /// A ray for itself.
     pub fn traverse_alone<const ANY_HIT: bool>(
         &mut self,
-        bindings: &Bindings<impl Reads>,
+        bindings: &Bindings<impl ReadCounter>,
         ray: &TraversalRay,
         best: &mut Hit,
     ) {

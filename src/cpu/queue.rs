@@ -1,11 +1,11 @@
 //! A batch's buffers, as long as its rays need; kept from batch to batch.
 
-use crate::layout::{Bounce, Hit, Ray};
+use crate::layout::{Bounce, Hit, PathRay};
 
 #[derive(Default)]
 pub struct Queue {
     /// Bounce after bounce.
-    pub rays: Vec<Ray>,
+    pub rays: Vec<PathRay>,
     /// One a bounce.
     pub bounces: Vec<Bounce>,
     /// One a ray, like what follows but for the last two.

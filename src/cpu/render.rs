@@ -4,12 +4,12 @@ use bytemuck::Zeroable;
 
 use super::{queue::Queue, timing::Clock};
 use crate::{
-    accel::kdtree::Extras,
+    accel::kdtree::TraversalLinks,
     frame::{
         BounceStats, Denoise, FrameKind, Pass, Picture, Plan, Primary, Profile, RenderOptions, frame_constants,
         plan::passes,
     },
-    layout::{Bounce, Feature, Frame, Hit, Ray, SCAN_GROUP_SIZE},
+    layout::{Bounce, Feature, Frame, Hit, PathRay, SCAN_GROUP_SIZE},
     reference::{
         accumulate,
         bindings::Bindings,
@@ -45,7 +45,7 @@ pub struct Renderer {
     camera: Camera,
     options: RenderOptions,
     batching: Batching,
-    extras: Extras,
+    links: TraversalLinks,
     frame: Frame,
     /// Like `pixel_radiance`: `width * height` of the window, rows from the top.
     triangle_ids: Vec<u32>,
@@ -80,7 +80,7 @@ impl Renderer {
             world: world.clone(),
             options: options.clone(),
             batching,
-            extras: Extras::new(world.tree(), options.traversal),
+            links: TraversalLinks::new(world.tree(), options.traversal),
             frame,
             triangle_ids: vec![0; n_pixels],
             pixel_radiance: vec![[0.0; 4]; n_pixels],
@@ -218,7 +218,7 @@ impl Renderer {
     }
 
     fn visibility(&mut self) {
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let (traversal, ids) = (self.options.traversal, &mut self.triangle_ids);
         self.clock.time(Pass::Visibility, None, || super::visibility(&inputs, traversal, ids));
     }
@@ -227,14 +227,14 @@ impl Renderer {
     fn primary_rays(&mut self, plan: &Plan, first_pixel: u32, n_pixels: u32) {
         let Queue { rays, bounces, .. } = &mut self.queue;
         *bounces = vec![Bounce::of(n_pixels, &self.frame)];
-        rays.resize(n_pixels as usize, Ray::zeroed());
+        rays.resize(n_pixels as usize, PathRay::zeroed());
         let first_pass = passes(&plan.bounces[0]).next().expect("a pass that finds hits");
         self.clock.time(first_pass, Some(0), || primary_hit::primary_rays(&self.frame, first_pixel, rays));
     }
 
     /// Fills the bounce's `hits`, and counts them.
     fn closest_hits(&mut self, pass: Pass, depth: u32) {
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, .. } = &mut self.queue;
         hits.resize(rays.len(), Hit::zeroed());
         let places = bounces[depth as usize].rays();
@@ -249,14 +249,14 @@ impl Renderer {
 
     /// What primary rays meet.
     fn note_features(&mut self) {
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let (Queue { rays, hits, .. }, pixels) = (&self.queue, &mut self.pixel_features);
         self.clock.time(Pass::Features, Some(0), || features::features(&inputs, rays, hits, pixels));
     }
 
     /// What the rays of all bounces cost.
     fn note_costs(&mut self) {
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let (traversal, pixels) = (self.options.traversal, &mut self.pixel_features);
         let Queue { rays, bounces, hits, .. } = &self.queue;
         let n_rasterized = if self.options.primary != Primary::Trace { bounces[0].n_rays as usize } else { 0 };
@@ -268,7 +268,7 @@ impl Renderer {
 
     /// Finds out which rays go on from the bounce's hits, and counts them.
     fn compact_reduce(&mut self, depth: u32) {
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, child_kinds, scan_blocks, .. } = &mut self.queue;
         let places = bounces[depth as usize].rays();
         child_kinds.resize(rays.len(), 0);
@@ -290,7 +290,7 @@ impl Renderer {
 
     /// Writes the next bounce's rays behind this one's, if there is room for them.
     fn compact_scatter(&mut self, depth: u32) {
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, child_kinds, first_children, scan_blocks, .. } = &mut self.queue;
         let (this, next) = (bounces[depth as usize], bounces[depth as usize + 1]);
         if next.overflow != 0 {
@@ -298,7 +298,7 @@ impl Renderer {
         }
         let places = this.rays();
         first_children.resize(rays.len(), 0);
-        rays.resize(next.rays().end, Ray::zeroed());
+        rays.resize(next.rays().end, PathRay::zeroed());
         let (so_far, next_rays) = rays.split_at_mut(next.rays().start);
         let parents = Parents { rays: &so_far[places.clone()], hits: &hits[places.clone()] };
         let (kinds, first_children) = (&child_kinds[places.clone()], &mut first_children[places]);
@@ -310,7 +310,7 @@ impl Renderer {
     /// Tests the shadow segments of all bounces, and counts them.
     fn shadow(&mut self) {
         self.frame.queue_capacity = self.queue.rays.len() as u32;
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, light_visibility, .. } = &mut self.queue;
         let traversal = self.options.traversal;
         light_visibility.resize(rays.len() * inputs.lights.len(), 0);
@@ -323,7 +323,7 @@ impl Renderer {
 
     fn shade(&mut self) {
         self.frame.queue_capacity = self.queue.rays.len() as u32;
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_extras(&self.extras);
+        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let Queue { rays, hits, ray_radiance, light_visibility, .. } = &mut self.queue;
         ray_radiance.resize(rays.len(), [0.0; 4]);
         let lit = LitRays { rays, hits, light_visibility };

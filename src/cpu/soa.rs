@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::packet::LANES;
-use crate::{layout::Hit, reference::probe::Probe};
+use crate::{layout::Hit, reference::search_ray::SearchRay};
 
 /// The rays of a packet.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,7 +28,7 @@ pub struct HitsSoa {
 
 impl RaysSoa {
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, probe: &Probe) {
+    pub fn set(&mut self, lane: usize, probe: &SearchRay) {
         for axis in 0..3 {
             self.origin[axis][lane] = probe.origin[axis];
             self.direction[axis][lane] = probe.direction[axis];
@@ -45,9 +45,9 @@ impl RaysSoa {
     }
 
     #[inline(always)]
-    pub fn get(&self, lane: usize) -> Probe {
+    pub fn get(&self, lane: usize) -> SearchRay {
         let [x, y, z] = &self.origin;
-        Probe {
+        SearchRay {
             origin: Vec3::new(x[lane], y[lane], z[lane]),
             t_min: self.t_min[lane],
             direction: self.direction(lane),

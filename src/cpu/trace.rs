@@ -5,12 +5,12 @@ use std::ops::Range;
 use super::tracer::FastTracer;
 use crate::{
     accel::{Query, kdtree::Traversal},
-    layout::{CastRay, Hit, Ray},
+    layout::{Hit, PathRay, Ray},
     reference::{self, bindings::Bindings},
 };
 
 /// Does what [`reference::trace::trace`] does.
-pub fn trace(bindings: &Bindings, traversal: Traversal, rays: &[Ray], hits: &mut [Hit]) -> u32 {
+pub fn trace(bindings: &Bindings, traversal: Traversal, rays: &[PathRay], hits: &mut [Hit]) -> u32 {
     reference::trace::trace_by::<FastTracer>(bindings, traversal, rays, hits)
 }
 
@@ -19,7 +19,7 @@ pub fn shadow(
     bindings: &Bindings,
     traversal: Traversal,
     places: &Range<usize>,
-    rays_and_hits: (&[Ray], &[Hit]),
+    rays_and_hits: (&[PathRay], &[Hit]),
     light_visibility: &mut [u32],
 ) -> u32 {
     reference::shadow::shadow_by::<FastTracer>(bindings, traversal, places, rays_and_hits, light_visibility)
@@ -31,6 +31,6 @@ pub fn visibility(bindings: &Bindings, traversal: Traversal, triangle_ids: &mut 
 }
 
 /// Does what [`reference::cast::cast`] does.
-pub fn cast(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[CastRay], hits: &mut [Hit]) {
+pub fn cast(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
     reference::cast::cast_by::<FastTracer>(bindings, traversal, query, rays, hits);
 }

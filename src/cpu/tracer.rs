@@ -12,9 +12,9 @@ use crate::{
     layout::Hit,
     reference::{
         bindings::Bindings,
-        counting::table::Reads,
+        counting::table::ReadCounter,
         kdtree::{TraversalRay, hit_from_near},
-        probe::Probe,
+        search_ray::SearchRay,
         traverser::{Tracer, Traverser},
     },
 };
@@ -40,7 +40,7 @@ impl FastTracer {
 
     /// Finds one ray's hit, as [`Traverser::traverse`] does.
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl Reads>, probe: &Probe) -> Hit {
+    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl ReadCounter>, probe: &SearchRay) -> Hit {
         match self {
             Self::Packets(packets) => hit_from_near(bindings, probe, |near, best| {
                 packets.traverse_alone::<ANY_HIT>(bindings, &TraversalRay::new(bindings, near), best);
@@ -58,8 +58,8 @@ impl Tracer for FastTracer {
     #[inline]
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,
-        bindings: &Bindings<impl Reads>,
-        probes: impl Iterator<Item = (Key, Probe)>,
+        bindings: &Bindings<impl ReadCounter>,
+        probes: impl Iterator<Item = (Key, SearchRay)>,
         mut found: impl FnMut(Key, Hit),
     ) {
         let packets = match self {

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Instant};
 
 use crate::{
     accel::{Query, kdtree::Traversal},
-    cast::{self, Cast, CastRay, CpuCaster},
+    cast::{self, Cast, CpuCaster, Ray},
     gpu::{Context, GpuError},
     world::Geometry,
 };
@@ -49,7 +49,7 @@ impl<'a> Caster<'a> {
     ///
     /// # Errors
     /// Out of memory, a failed call.
-    pub fn cast(&mut self, rays: &[CastRay], query: Query, n_times: u32) -> Result<Cast, GpuError> {
+    pub fn cast(&mut self, rays: &[Ray], query: Query, n_times: u32) -> Result<Cast, GpuError> {
         match &mut self.0 {
             Processor::Device(caster) => caster.cast(rays, query, n_times),
             Processor::Cpu(caster) => Ok(cast_on_cpu(caster, rays, query, n_times)),
@@ -57,7 +57,7 @@ impl<'a> Caster<'a> {
     }
 }
 
-fn cast_on_cpu(caster: &CpuCaster, rays: &[CastRay], query: Query, n_times: u32) -> Cast {
+fn cast_on_cpu(caster: &CpuCaster, rays: &[Ray], query: Query, n_times: u32) -> Cast {
     let (mut hits, mut ms) = (Vec::new(), Vec::new());
     for _ in 0..n_times.max(1) {
         let start = Instant::now();

@@ -19,7 +19,7 @@ pub use self::{
 };
 use crate::{
     accel::{AccelKind, Query, kdtree::Traversal},
-    cast::{CastRay, Hit},
+    cast::{Hit, Ray},
     frame::RenderOptions,
     gpu::{Context, ContextOptions, GpuError},
     scene::Scene,
@@ -159,7 +159,7 @@ impl Engine {
     ///
     /// # Errors
     /// Those of [`Engine::methods`] and [`Engine::caster`]; a failed call.
-    pub fn cast(&self, world: &World, rays: &[CastRay], query: Query) -> Result<Vec<Hit>, GpuError> {
+    pub fn cast(&self, world: &World, rays: &[Ray], query: Query) -> Result<Vec<Hit>, GpuError> {
         let traversal = self.methods(world, &Workload::of_rays(rays.len() as u64))?.traversal.value;
         Ok(self.caster(world.geometry(), traversal)?.cast(rays, query, 1)?.hits)
     }

@@ -124,7 +124,7 @@ pub enum Primary {
     /// By rasterized triangle IDs and a ray-plane test.
     Raster,
     /// By triangles that kernels rasterize with the test of rays, so that hits are those of `Trace`, bit for bit, unless the camera lies
-    /// beyond `KD_ORIGIN_REACH`. Needs atomics of 64 bits. The CPU has no such kernels: there it is `Raster`.
+    /// beyond `KD_MAX_ORIGIN_DISTANCE`. Needs atomics of 64 bits. The CPU has no such kernels: there it is `Raster`.
     Compute,
     /// Through the kd-tree.
     Trace,

@@ -291,7 +291,7 @@ impl Commands<'_> {
     }
 
     /// Hands drawn IDs to kernels.
-    pub fn ids_to_compute(&self, ids: &Target) {
+    pub fn color_to_compute(&self, ids: &Target) {
         self.transition(
             ids,
             (

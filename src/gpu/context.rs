@@ -68,7 +68,7 @@ pub struct Context {
     /// Shared with the overlay's renderer, which ends before the context.
     pub(super) allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
     info: DeviceInfo,
-    runs_both_sides: bool,
+    predicates_branches: bool,
     limits: Limits,
     fuses_fma: OnceLock<bool>,
     n_lanes: OnceLock<u32>,
@@ -215,7 +215,7 @@ impl Context {
             timestamp_valid_bits: families[family].timestamp_valid_bits,
             queue,
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
-            runs_both_sides: info.kind == SOFTWARE && pretend.n_lanes.is_none(),
+            predicates_branches: info.kind == SOFTWARE && pretend.n_lanes.is_none(),
             info,
             fuses_fma: OnceLock::new(),
             n_lanes: pretend.n_lanes.map_or_else(OnceLock::new, OnceLock::from),
@@ -247,8 +247,8 @@ impl Context {
     }
 
     /// Whether kernels run both sides of a branch for all lanes, where any lane takes it.
-    pub fn runs_both_sides(&self) -> bool {
-        self.runs_both_sides
+    pub fn predicates_branches(&self) -> bool {
+        self.predicates_branches
     }
 
     /// Whether the device writes timestamps.
@@ -289,7 +289,7 @@ impl Context {
         if let Some(&n_lanes) = self.n_lanes.get() {
             return Ok(n_lanes);
         }
-        let n_lanes = if self.runs_both_sides { 0 } else { probe::n_lanes(self)? };
+        let n_lanes = if self.predicates_branches { 0 } else { probe::n_lanes(self)? };
         Ok(*self.n_lanes.get_or_init(|| n_lanes))
     }
 

@@ -11,7 +11,7 @@ use super::{Context, GpuError};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TargetKind {
     /// One u32 a pixel, readable by kernels as a storage image.
-    Id,
+    Uint,
     /// One f32 a pixel.
     Depth,
 }
@@ -19,21 +19,21 @@ pub enum TargetKind {
 impl TargetKind {
     pub(super) fn format(self) -> vk::Format {
         match self {
-            Self::Id => vk::Format::R32_UINT,
+            Self::Uint => vk::Format::R32_UINT,
             Self::Depth => vk::Format::D32_SFLOAT,
         }
     }
 
     pub(super) fn aspect(self) -> vk::ImageAspectFlags {
         match self {
-            Self::Id => vk::ImageAspectFlags::COLOR,
+            Self::Uint => vk::ImageAspectFlags::COLOR,
             Self::Depth => vk::ImageAspectFlags::DEPTH,
         }
     }
 
     fn usage(self) -> vk::ImageUsageFlags {
         match self {
-            Self::Id => vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::STORAGE,
+            Self::Uint => vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::STORAGE,
             Self::Depth => vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
         }
     }
@@ -102,7 +102,7 @@ impl Target {
     /// # Errors
     /// Out of memory.
     pub fn unread(context: &Arc<Context>, name: &str) -> Result<Self, GpuError> {
-        let target = Self::new(context, name, TargetKind::Id, (1, 1))?;
+        let target = Self::new(context, name, TargetKind::Uint, (1, 1))?;
         context.run(name, |commands| commands.discard_for_compute(&target))?;
         Ok(target)
     }

@@ -77,7 +77,7 @@ impl Drop for ComputePipeline {
 #[derive(Clone, Copy)]
 pub enum RasterTargets {
     /// One ID target, with reverse-Z depth.
-    Ids,
+    Uint,
     /// One colour image of a format, without depth.
     Color(vk::Format),
 }
@@ -85,14 +85,14 @@ pub enum RasterTargets {
 impl RasterTargets {
     fn color_format(self) -> vk::Format {
         match self {
-            Self::Ids => TargetKind::Id.format(),
+            Self::Uint => TargetKind::Uint.format(),
             Self::Color(format) => format,
         }
     }
 
     fn depth_format(self) -> vk::Format {
         match self {
-            Self::Ids => TargetKind::Depth.format(),
+            Self::Uint => TargetKind::Depth.format(),
             Self::Color(_) => vk::Format::UNDEFINED,
         }
     }

@@ -160,7 +160,7 @@ fn traversal_constants(context: &Arc<Context>, traversal: Traversal) -> Result<C
     Ok(Constants::new()
         .set(constants::TRAVERSAL, traversal.constant())
         .set(constants::FUSED_FMA, context.fuses_fma()?)
-        .set(constants::RUNS_BOTH_SIDES, context.runs_both_sides()))
+        .set(constants::PREDICATES_BRANCHES, context.predicates_branches()))
 }
 
 /// A kernel without subgroup requirements.

@@ -20,7 +20,7 @@ impl Visibility {
             name: "visibility",
             vertex: spirv!("visibility.vert"),
             fragment: spirv!("visibility.frag"),
-            targets: RasterTargets::Ids,
+            targets: RasterTargets::Uint,
         };
         Ok(Self { pipeline: RasterPipeline::new(context, bindings, &desc)? })
     }
@@ -44,6 +44,6 @@ impl Visibility {
             indices: resources.vertex_indices.as_ref().expect("there are indices where triangles are drawn"),
         };
         commands.draw(&self.pipeline, &desc);
-        commands.ids_to_compute(ids);
+        commands.color_to_compute(ids);
     }
 }

@@ -2,16 +2,16 @@
 
 use glam::Vec3;
 
-use super::counting::table::{Counted, ReadCounts, Table, Uncounted};
+use super::counting::table::{Counted, CountedSlice, NoCounter, ReadCounts};
 use crate::{
-    accel::kdtree::{Extras, KdTree},
+    accel::kdtree::{KdTree, TraversalLinks},
     layout::{Frame, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN, Triangle},
     world::FlatScene,
 };
 
 /// The scene, its tree and the frame's constants. `R`: who is told of reads of the tree.
 #[derive(Clone, Copy, Debug)]
-pub struct Bindings<'a, R = Uncounted> {
+pub struct Bindings<'a, R = NoCounter> {
     /// None for rays that no frame makes.
     pub frame: Option<&'a Frame>,
     /// The box that holds all triangles, with the tree's rounding margin (world units).
@@ -24,18 +24,18 @@ pub struct Bindings<'a, R = Uncounted> {
     pub filters: bool,
     pub materials: &'a [Material],
     pub lights: &'a [Light],
-    pub kd_nodes: Table<'a, KdNode, R>,
+    pub kd_nodes: CountedSlice<'a, KdNode, R>,
     /// One a pair of nodes.
-    pub kd_parents: Table<'a, u32, R>,
-    pub leaf_triangles: Table<'a, u32, R>,
+    pub kd_parents: CountedSlice<'a, u32, R>,
+    pub leaf_triangles: CountedSlice<'a, u32, R>,
     /// One an entry of `leaf_triangles`, or none.
     pub leaf_planes: &'a [Plane],
     /// One a node, or none.
-    pub kd_slabs: Table<'a, Slab, R>,
+    pub kd_slabs: CountedSlice<'a, Slab, R>,
     /// One a node, or none where the traversal does not ask for them.
-    pub kd_boxes: Table<'a, KdBox, R>,
+    pub kd_boxes: CountedSlice<'a, KdBox, R>,
     /// Six a node, or none.
-    pub kd_ropes: Table<'a, KdRope, R>,
+    pub kd_ropes: CountedSlice<'a, KdRope, R>,
 }
 
 impl<'a, R> Bindings<'a, R> {
@@ -77,13 +77,13 @@ impl<'a> Bindings<'a> {
             filters: false,
             materials: &[],
             lights: &[],
-            kd_nodes: Table::from(tree.nodes()),
-            kd_parents: Table::from(tree.parents()),
-            leaf_triangles: Table::from(tree.leaf_triangles()),
+            kd_nodes: CountedSlice::from(tree.nodes()),
+            kd_parents: CountedSlice::from(tree.parents()),
+            leaf_triangles: CountedSlice::from(tree.leaf_triangles()),
             leaf_planes: tree.leaf_planes(),
-            kd_slabs: Table::from(tree.slabs()),
-            kd_boxes: Table::from(&[][..]),
-            kd_ropes: Table::from(&[][..]),
+            kd_slabs: CountedSlice::from(tree.slabs()),
+            kd_boxes: CountedSlice::from(&[][..]),
+            kd_ropes: CountedSlice::from(&[][..]),
         }
     }
 
@@ -98,13 +98,13 @@ impl<'a> Bindings<'a> {
             filters: self.filters,
             materials: self.materials,
             lights: self.lights,
-            kd_nodes: self.kd_nodes.told_to(Counted(&counts.n_nodes)),
-            kd_parents: self.kd_parents.told_to(Counted(&counts.n_links)),
-            leaf_triangles: self.leaf_triangles.told_to(Counted(&counts.n_triangles)),
+            kd_nodes: self.kd_nodes.with_counter(Counted(&counts.n_nodes)),
+            kd_parents: self.kd_parents.with_counter(Counted(&counts.n_links)),
+            leaf_triangles: self.leaf_triangles.with_counter(Counted(&counts.n_triangles)),
             leaf_planes: self.leaf_planes,
-            kd_slabs: self.kd_slabs.told_to(Counted(&counts.n_nodes)),
-            kd_boxes: self.kd_boxes.told_to(Counted(&counts.n_boxes)),
-            kd_ropes: self.kd_ropes.told_to(Counted(&counts.n_links)),
+            kd_slabs: self.kd_slabs.with_counter(Counted(&counts.n_nodes)),
+            kd_boxes: self.kd_boxes.with_counter(Counted(&counts.n_boxes)),
+            kd_ropes: self.kd_ropes.with_counter(Counted(&counts.n_links)),
         }
     }
 
@@ -118,7 +118,7 @@ impl<'a> Bindings<'a> {
         Self { triangle_materials: words, filters: true, ..self }
     }
 
-    pub fn with_extras(self, extras: &'a Extras) -> Self {
-        Self { kd_boxes: Table::from(&*extras.boxes), kd_ropes: Table::from(&*extras.ropes), ..self }
+    pub fn with_links(self, links: &'a TraversalLinks) -> Self {
+        Self { kd_boxes: CountedSlice::from(&*links.boxes), kd_ropes: CountedSlice::from(&*links.ropes), ..self }
     }
 }

@@ -1,15 +1,15 @@
 //! Closest hit over every triangle, without a tree: what the traversal must find. Twin of `brute.glsl`.
 
-use super::{probe::Probe, triangle::Shear};
+use super::{search_ray::SearchRay, triangle::Shear};
 use crate::layout::{Hit, NO_TRIANGLE, Triangle};
 
 /// The hit of smallest t in (t_min, t_max]; at one t, that of the lowest index. A miss keeps t = t_max.
-pub fn closest_hit(triangles: &[Triangle], ray: &Probe) -> Hit {
+pub fn closest_hit(triangles: &[Triangle], ray: &SearchRay) -> Hit {
     closest_hit_of(triangles, ray, |_| true)
 }
 
 /// The same, of the triangles of which `is_accepted` says so by their indices.
-pub fn closest_hit_of(triangles: &[Triangle], ray: &Probe, is_accepted: impl Fn(u32) -> bool) -> Hit {
+pub fn closest_hit_of(triangles: &[Triangle], ray: &SearchRay, is_accepted: impl Fn(u32) -> bool) -> Hit {
     let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
     let mut best = ray.miss();
     for (triangle_ix, triangle) in (0..).zip(triangles) {

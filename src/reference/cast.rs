@@ -7,12 +7,12 @@ use super::{
     RAYS_PER_TASK,
     bindings::Bindings,
     kdtree::min,
-    probe::Probe,
+    search_ray::SearchRay,
     traverser::{Tracer, Traverser},
 };
 use crate::{
     accel::{Query, kdtree::Traversal},
-    layout::{CastRay, Hit, NO_TRIANGLE},
+    layout::{Hit, NO_TRIANGLE, Ray},
 };
 
 const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
@@ -27,7 +27,7 @@ fn exponent_of(v: Vec3) -> u32 {
 /// False for what can only miss: a NaN anywhere, an infinite origin or direction, a direction of zero (or one so short
 /// that it is denormal).
 #[inline(always)]
-pub fn is_ray(ray: &CastRay) -> bool {
+pub fn is_ray(ray: &Ray) -> bool {
     // All is asked at once: a branch each takes longer.
     (1..255).contains(&exponent_of(ray.direction))
         & (exponent_of(ray.origin) < 255)
@@ -45,11 +45,11 @@ fn scales_of(direction: Vec3) -> [f32; 2] {
 
 /// As the traversal wants it. What can only miss is in no cell.
 #[inline(always)]
-fn scaled(ray: &CastRay) -> Probe {
+fn scaled(ray: &Ray) -> SearchRay {
     let [scale, inv_scale] = scales_of(ray.direction);
     let nowhere =
-        Probe { origin: Vec3::ZERO, t_min: 1.0, direction: Vec3::X, t_max: 0.0, source_triangle: NO_TRIANGLE };
-    let scaled = Probe {
+        SearchRay { origin: Vec3::ZERO, t_min: 1.0, direction: Vec3::X, t_max: 0.0, source_triangle: NO_TRIANGLE };
+    let scaled = SearchRay {
         origin: ray.origin,
         t_min: ray.t_min * inv_scale,
         direction: ray.direction * scale,
@@ -59,7 +59,7 @@ fn scaled(ray: &CastRay) -> Probe {
     if is_ray(ray) { scaled } else { nowhere }
 }
 
-fn cast_all<const ANY_HIT: bool>(bindings: &Bindings, traverser: &mut impl Tracer, rays: &[CastRay], hits: &mut [Hit]) {
+fn cast_all<const ANY_HIT: bool>(bindings: &Bindings, traverser: &mut impl Tracer, rays: &[Ray], hits: &mut [Hit]) {
     let probes = rays.iter().zip(hits).map(|(ray, hit)| ((ray, hit), scaled(ray)));
     traverser.trace_all::<ANY_HIT, _>(bindings, probes, |(ray, hit), found| {
         let [scale, _] = scales_of(ray.direction);
@@ -68,12 +68,12 @@ fn cast_all<const ANY_HIT: bool>(bindings: &Bindings, traverser: &mut impl Trace
 }
 
 /// Writes `hits`, one a ray.
-pub fn cast(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[CastRay], hits: &mut [Hit]) {
+pub fn cast(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
     cast_by::<Traverser>(bindings, traversal, query, rays, hits);
 }
 
 /// Does what [`cast`] does, by another tracer.
-pub fn cast_by<T: Tracer>(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[CastRay], hits: &mut [Hit]) {
+pub fn cast_by<T: Tracer>(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
     rays.par_chunks(RAYS_PER_TASK).zip(hits.par_chunks_mut(RAYS_PER_TASK)).for_each_init(
         || T::new(traversal),
         |traverser, (rays, hits)| match query {

@@ -7,16 +7,16 @@ use super::{
     material::{Scattering, scatter, scatters_light},
     surface::{Surface, surface_at},
 };
-use crate::layout::{CHILD_REFLECTED, CHILD_TRANSMITTED, Hit, NO_TRIANGLE, Ray};
+use crate::layout::{CHILD_REFLECTED, CHILD_TRANSMITTED, Hit, NO_TRIANGLE, PathRay};
 
-fn scattering_at(bindings: &Bindings, ray: &Ray, hit: &Hit) -> (Surface, Scattering) {
+fn scattering_at(bindings: &Bindings, ray: &PathRay, hit: &Hit) -> (Surface, Scattering) {
     let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
     let scattering = scatter(bindings.material_at(hit), &surface, ray.direction);
     (surface, scattering)
 }
 
 /// Bits of `CHILD_*`: of the ray's children, those that carry light.
-pub fn child_kinds_of(bindings: &Bindings, ray: &Ray, hit: &Hit) -> u32 {
+pub fn child_kinds_of(bindings: &Bindings, ray: &PathRay, hit: &Hit) -> u32 {
     if hit.triangle_ix == NO_TRIANGLE || !scatters_light(bindings.material_at(hit)) {
         return 0;
     }
@@ -28,7 +28,7 @@ pub fn child_kinds_of(bindings: &Bindings, ray: &Ray, hit: &Hit) -> u32 {
 }
 
 /// The children of these kinds, in order.
-pub fn children_of(bindings: &Bindings, ray: &Ray, hit: &Hit, kinds: u32) -> impl Iterator<Item = Ray> {
+pub fn children_of(bindings: &Bindings, ray: &PathRay, hit: &Hit, kinds: u32) -> impl Iterator<Item = PathRay> {
     let scattering = (kinds != 0).then(|| scattering_at(bindings, ray, hit));
     let children = scattering.map(|(surface, next)| {
         [

@@ -8,7 +8,7 @@ use super::{
     bindings::Bindings,
     children::{child_kinds_of, children_of},
 };
-use crate::layout::{Bounce, Frame, Hit, Ray, SCAN_GROUP_SIZE};
+use crate::layout::{Bounce, Frame, Hit, PathRay, SCAN_GROUP_SIZE};
 
 const BLOCK: usize = SCAN_GROUP_SIZE as usize;
 const BLOCKS_PER_TASK: usize = RAYS_PER_TASK.div_ceil(BLOCK);
@@ -16,7 +16,7 @@ const BLOCKS_PER_TASK: usize = RAYS_PER_TASK.div_ceil(BLOCK);
 /// The rays of a bounce.
 #[derive(Clone, Copy)]
 pub struct Parents<'a> {
-    pub rays: &'a [Ray],
+    pub rays: &'a [PathRay],
     /// One a ray.
     pub hits: &'a [Hit],
 }
@@ -62,7 +62,7 @@ pub fn scatter(
     scan_blocks: &[u32],
     first_ray: u32,
     first_children: &mut [u32],
-    next_rays: &mut [Ray],
+    next_rays: &mut [PathRay],
 ) {
     let mut places = Vec::with_capacity(scan_blocks.len());
     let mut rest = next_rays;

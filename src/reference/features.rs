@@ -1,10 +1,10 @@
 //! Features: what each pixel shows, for other uses than light. Twin of `features.comp`.
 
 use super::{bindings::Bindings, surface::surface_at};
-use crate::layout::{Feature, Hit, NO_TRIANGLE, Ray};
+use crate::layout::{Feature, Hit, NO_TRIANGLE, PathRay};
 
 /// Writes `pixel_features` of the primary rays' pixels, all but the counts.
-pub fn features(bindings: &Bindings, rays: &[Ray], hits: &[Hit], pixel_features: &mut [Feature]) {
+pub fn features(bindings: &Bindings, rays: &[PathRay], hits: &[Hit], pixel_features: &mut [Feature]) {
     for (ray, hit) in rays.iter().zip(hits) {
         let feature = &mut pixel_features[ray.pixel_ix as usize];
         let Feature { n_rays, n_steps, .. } = *feature;
@@ -12,7 +12,7 @@ pub fn features(bindings: &Bindings, rays: &[Ray], hits: &[Hit], pixel_features:
     }
 }
 
-fn feature_of(bindings: &Bindings, ray: &Ray, hit: &Hit) -> Feature {
+fn feature_of(bindings: &Bindings, ray: &PathRay, hit: &Hit) -> Feature {
     if hit.triangle_ix == NO_TRIANGLE {
         let depth = f32::INFINITY;
         return Feature { triangle_ix: NO_TRIANGLE, material_ix: NO_TRIANGLE, depth, ..Feature::default() };

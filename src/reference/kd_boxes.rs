@@ -2,30 +2,30 @@
 
 use super::{
     bindings::Bindings,
-    counting::table::Reads,
+    counting::table::ReadCounter,
     kdtree::{TraversalRay, max, min},
 };
 
 /// Where a ray meets the planes of a node's cell on each axis: those it comes to first, and the far ones.
-pub struct Slabs {
+pub struct BoxPlanes {
     pub near: [f32; 3],
     pub far: [f32; 3],
 }
 
 impl TraversalRay {
     #[inline(always)]
-    pub fn slabs_of(&self, bindings: &Bindings<impl Reads>, node_ix: u32) -> Slabs {
+    pub fn box_planes_of(&self, bindings: &Bindings<impl ReadCounter>, node_ix: u32) -> BoxPlanes {
         let cell = &bindings.kd_boxes[node_ix as usize];
         let (low, high) = ([cell.min_x, cell.min_y, cell.min_z], [cell.max_x, cell.max_y, cell.max_z]);
         let t0 = [0, 1, 2].map(|i| low[i] * self.inv_direction[i] + self.bias[i]);
         let t1 = [0, 1, 2].map(|i| high[i] * self.inv_direction[i] + self.bias[i]);
-        Slabs { near: [0, 1, 2].map(|i| min(t0[i], t1[i])), far: [0, 1, 2].map(|i| max(t0[i], t1[i])) }
+        BoxPlanes { near: [0, 1, 2].map(|i| min(t0[i], t1[i])), far: [0, 1, 2].map(|i| max(t0[i], t1[i])) }
     }
 
     /// The ray's interval in a node's cell: the planes that `descend` meets on the way there.
     #[inline(always)]
-    pub fn interval_in(&self, bindings: &Bindings<impl Reads>, node_ix: u32) -> [f32; 2] {
-        let Slabs { near, far } = self.slabs_of(bindings, node_ix);
+    pub fn interval_in(&self, bindings: &Bindings<impl ReadCounter>, node_ix: u32) -> [f32; 2] {
+        let BoxPlanes { near, far } = self.box_planes_of(bindings, node_ix);
         [max(max(near[0], near[1]), max(near[2], self.t_enter)), min(min(far[0], far[1]), min(far[2], self.t_exit))]
     }
 }

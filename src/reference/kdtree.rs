@@ -4,16 +4,16 @@ use glam::{Vec3, Vec3A};
 
 use super::{
     bindings::Bindings,
-    counting::table::Reads,
+    counting::table::ReadCounter,
     leaf::{Target, intersect_leaf},
-    probe::Probe,
+    search_ray::SearchRay,
     slab::slab_of,
 };
 use crate::{
     accel::kdtree::EMPTY_LEAF,
     layout::{
-        Hit, KD_AXIS_MASK, KD_LEAF, KD_LEAST_COMPONENT, KD_ORIGIN_REACH, KD_PAIR_SHIFT, KD_PLANE_EPSILON, KdNode,
-        NO_TRIANGLE,
+        Hit, KD_AXIS_MASK, KD_LEAF, KD_LEAST_COMPONENT, KD_MAX_ORIGIN_DISTANCE, KD_PAIR_SHIFT, KD_PLANE_EPSILON,
+        KdNode, NO_TRIANGLE,
     },
 };
 
@@ -61,7 +61,7 @@ pub fn signs_of(direction: Vec3) -> u32 {
 
 impl TraversalRay {
     #[inline]
-    pub fn new(bindings: &Bindings<impl Reads>, ray: &Probe) -> Self {
+    pub fn new(bindings: &Bindings<impl ReadCounter>, ray: &SearchRay) -> Self {
         let origin = ray.origin.to_array();
         let cell_min = bindings.cell_min.to_array();
         let cell_max = bindings.cell_max.to_array();
@@ -101,36 +101,40 @@ impl TraversalRay {
 }
 
 #[inline(always)]
-pub fn largest_coordinate(bindings: &Bindings<impl Reads>) -> f32 {
+pub fn largest_coordinate(bindings: &Bindings<impl ReadCounter>) -> f32 {
     bindings.cell_min.abs().max(bindings.cell_max.abs()).max_element()
 }
 
 /// How far from 0, by its largest coordinate, a ray may start for the margins of the leaves to cover its rounding.
 #[inline(always)]
-pub fn origin_reach(bindings: &Bindings<impl Reads>) -> f32 {
-    KD_ORIGIN_REACH * largest_coordinate(bindings)
+pub fn origin_reach(bindings: &Bindings<impl ReadCounter>) -> f32 {
+    KD_MAX_ORIGIN_DISTANCE * largest_coordinate(bindings)
 }
 
 /// Whether the ray starts within reach.
 #[inline(always)]
-fn is_within_reach(bindings: &Bindings<impl Reads>, ray: &Probe) -> bool {
+fn is_within_reach(bindings: &Bindings<impl ReadCounter>, ray: &SearchRay) -> bool {
     ray.origin.abs().max_element() <= origin_reach(bindings)
 }
 
-/// The ray with its origin moved along it to lie within `KD_ORIGIN_REACH`, and how far: 0 for all but cameras far away.
+/// The ray with its origin moved along it to lie within `KD_MAX_ORIGIN_DISTANCE`, and how far: 0 for all but cameras far away.
 #[inline(always)]
-pub fn near_scene(bindings: &Bindings<impl Reads>, ray: &Probe) -> (Probe, f32) {
+pub fn near_scene(bindings: &Bindings<impl ReadCounter>, ray: &SearchRay) -> (SearchRay, f32) {
     if is_within_reach(bindings, ray) {
         return (*ray, 0.0);
     }
-    let t_start = max(TraversalRay::new(bindings, &Probe { t_min: 0.0, ..*ray }).t_enter, 0.0);
+    let t_start = max(TraversalRay::new(bindings, &SearchRay { t_min: 0.0, ..*ray }).t_enter, 0.0);
     let origin = ray.origin + t_start * ray.direction;
-    (Probe { origin, t_min: ray.t_min - t_start, t_max: ray.t_max - t_start, ..*ray }, t_start)
+    (SearchRay { origin, t_min: ray.t_min - t_start, t_max: ray.t_max - t_start, ..*ray }, t_start)
 }
 
 /// What `search` finds from near the scene, as seen from where the ray starts. A miss keeps t = t_max.
 #[inline(always)]
-pub fn hit_from_near(bindings: &Bindings<impl Reads>, probe: &Probe, search: impl FnOnce(&Probe, &mut Hit)) -> Hit {
+pub fn hit_from_near(
+    bindings: &Bindings<impl ReadCounter>,
+    probe: &SearchRay,
+    search: impl FnOnce(&SearchRay, &mut Hit),
+) -> Hit {
     let (near, t_start) = near_scene(bindings, probe);
     let mut best = near.miss();
     search(&near, &mut best);
@@ -161,14 +165,14 @@ pub trait Pending {
     fn go_down(&mut self) {}
     fn push(&mut self, second_ix: u32, cell: &Cell);
     /// The next pending cell that may hold a hit nearer than `t_best`, or false.
-    fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool;
+    fn pop(&mut self, bindings: &Bindings<impl ReadCounter>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool;
 }
 
 /// Down to the leaf where the ray enters the cell, or to a slab that it keeps clear of, as if that were an empty leaf. A NaN
 /// fails both tests and goes to the first child: it ends.
 #[inline(always)]
 fn descend<P: Pending>(
-    bindings: &Bindings<impl Reads>,
+    bindings: &Bindings<impl ReadCounter>,
     ray: &TraversalRay,
     t_best: f32,
     pending: &mut P,
@@ -206,7 +210,7 @@ pub(crate) fn is_done<const ANY_HIT: bool>(best: &Hit) -> bool {
 /// All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
 #[inline(always)]
 pub(crate) fn search<P: Pending, const ANY_HIT: bool>(
-    bindings: &Bindings<impl Reads>,
+    bindings: &Bindings<impl ReadCounter>,
     ray: &TraversalRay,
     pending: &mut P,
     best: &mut Hit,
@@ -221,7 +225,7 @@ pub(crate) fn search<P: Pending, const ANY_HIT: bool>(
 /// As [`search`], in a cell that the ray is in.
 #[inline(always)]
 pub(crate) fn search_cell<P: Pending, const ANY_HIT: bool>(
-    bindings: &Bindings<impl Reads>,
+    bindings: &Bindings<impl ReadCounter>,
     ray: &TraversalRay,
     pending: &mut P,
     mut cell: Cell,

@@ -3,7 +3,8 @@
 use glam::{Mat4, Vec3A, Vec4};
 
 use super::{
-    bindings::Bindings, counting::table::Reads, kdtree::TraversalRay, probe::Probe, slab::Stretch, triangle::Shear,
+    bindings::Bindings, counting::table::ReadCounter, kdtree::TraversalRay, search_ray::SearchRay, slab::Segment,
+    triangle::Shear,
 };
 use crate::layout::{Hit, KD_PAIR_SHIFT, KdNode, Plane};
 
@@ -17,7 +18,7 @@ pub struct Target {
 
 impl Target {
     #[inline(always)]
-    pub fn of(ray: &Probe) -> Self {
+    pub fn of(ray: &SearchRay) -> Self {
         let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
         Self { shear, t_min: ray.t_min, source_triangle: ray.source_triangle }
     }
@@ -25,7 +26,7 @@ impl Target {
 
 /// A triangle against the ray; of two hits at one t the lower index wins, whatever the order of triangles.
 #[inline(always)]
-pub fn intersect(bindings: &Bindings<impl Reads>, target: &Target, triangle_ix: u32, best: &mut Hit) {
+pub fn intersect(bindings: &Bindings<impl ReadCounter>, target: &Target, triangle_ix: u32, best: &mut Hit) {
     let triangle = &bindings.triangles[triangle_ix as usize];
     let Some(hit) = target.shear.intersect_triangle(triangle, triangle_ix) else { return };
     let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
@@ -58,7 +59,7 @@ fn four_planes(planes: &[Plane], first: usize) -> Mat4 {
 /// Bit i is set where the ray does not keep to one side of plane i on its way, so far from it that no rounding of the hit test
 /// reaches across.
 #[inline(always)]
-fn near_planes(ray: &TraversalRay, way: Stretch, planes: &Mat4) -> u32 {
+fn near_planes(ray: &TraversalRay, way: Segment, planes: &Mat4) -> u32 {
     let dot = |v: Vec3A| planes.x_axis * v.x + planes.y_axis * v.y + planes.z_axis * v.z;
     let (height, slope) = (dot(ray.origin) - planes.w_axis, dot(ray.direction));
     let is_clear = (way.middle * slope + height).abs().cmpgt(way.half * slope.abs() + Vec4::splat(ray.plane_epsilon));
@@ -69,7 +70,7 @@ fn near_planes(ray: &TraversalRay, way: Stretch, planes: &Mat4) -> u32 {
 /// planes.
 #[inline(always)]
 pub fn intersect_leaf(
-    bindings: &Bindings<impl Reads>,
+    bindings: &Bindings<impl ReadCounter>,
     ray: &TraversalRay,
     leaf: KdNode,
     [t_enter, t_exit]: [f32; 2],
@@ -80,7 +81,7 @@ pub fn intersect_leaf(
     if bindings.leaf_planes.is_empty() {
         return triangles.iter().for_each(|&ix| intersect(bindings, &ray.target, ix, best));
     }
-    let way = Stretch::new(t_enter, t_exit);
+    let way = Segment::new(t_enter, t_exit);
     for (four, first) in triangles.chunks(4).zip(entries.step_by(4)) {
         let planes = four_planes(bindings.leaf_planes, first);
         let mut near = near_planes(ray, way, &planes) & ((1 << four.len()) - 1);

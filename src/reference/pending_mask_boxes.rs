@@ -2,7 +2,7 @@
 
 use super::{
     bindings::Bindings,
-    counting::table::Reads,
+    counting::table::ReadCounter,
     kdtree::{Cell, Pending, TraversalRay, min},
 };
 
@@ -30,7 +30,7 @@ impl Pending for PendingMaskBoxes {
     fn push(&mut self, _: u32, _: &Cell) {}
 
     #[inline(always)]
-    fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+    fn pop(&mut self, bindings: &Bindings<impl ReadCounter>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
         // What has not been visited begins where the leaf ends, or later.
         if t_best < cell.t_exit {
             return false;

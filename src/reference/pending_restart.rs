@@ -2,7 +2,7 @@
 
 use super::{
     bindings::Bindings,
-    counting::table::Reads,
+    counting::table::ReadCounter,
     kdtree::{Cell, TraversalRay, min},
     pending_mask::Mask,
 };
@@ -30,7 +30,7 @@ impl Trail {
 
     /// The same, and the cell from the root down to there.
     #[inline(always)]
-    pub fn retrace(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, cell: &mut Cell) {
+    pub fn retrace(&mut self, bindings: &Bindings<impl ReadCounter>, ray: &TraversalRay, cell: &mut Cell) {
         self.go_up();
         *cell = Cell { node_ix: 0, t_exit: ray.t_exit, ..*cell };
         for n_left in (0..self.length).rev() {

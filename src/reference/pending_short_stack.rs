@@ -2,7 +2,7 @@
 
 use super::{
     bindings::Bindings,
-    counting::table::Reads,
+    counting::table::ReadCounter,
     kdtree::{Cell, Pending, TraversalRay},
     pending_restart::Trail,
 };
@@ -45,7 +45,7 @@ impl<const N: usize> Pending for PendingMarked<N> {
     }
 
     #[inline(always)]
-    fn pop(&mut self, bindings: &Bindings<impl Reads>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+    fn pop(&mut self, bindings: &Bindings<impl ReadCounter>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
         cell.t_enter = cell.t_exit;
         if self.trail.mask.is_empty() || t_best < cell.t_enter {
             return false;

@@ -10,11 +10,11 @@ use super::{
     camera::{camera_direction, pixel_of},
     triangle::Shear,
 };
-use crate::layout::{Frame, Hit, NO_TRIANGLE, Ray};
+use crate::layout::{Frame, Hit, NO_TRIANGLE, PathRay};
 
 /// The ray through a pixel's sample.
-pub fn camera_ray(frame: &Frame, pixel: UVec2) -> Ray {
-    Ray {
+pub fn camera_ray(frame: &Frame, pixel: UVec2) -> PathRay {
+    PathRay {
         origin: frame.eye,
         pixel_ix: pixel.y * frame.width + pixel.x,
         direction: camera_direction(frame, pixel),
@@ -25,7 +25,7 @@ pub fn camera_ray(frame: &Frame, pixel: UVec2) -> Ray {
 }
 
 /// Writes the rays of the pixels from place `first_pixel` on, in tile order, as many as `rays` holds.
-pub fn primary_rays(frame: &Frame, first_pixel: u32, rays: &mut [Ray]) {
+pub fn primary_rays(frame: &Frame, first_pixel: u32, rays: &mut [PathRay]) {
     rays.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each(|(task, rays)| {
         for (order, ray) in (first_pixel + (task * RAYS_PER_TASK) as u32..).zip(rays) {
             *ray = camera_ray(frame, pixel_of(order, frame.width, frame.height));
@@ -34,8 +34,8 @@ pub fn primary_rays(frame: &Frame, first_pixel: u32, rays: &mut [Ray]) {
 }
 
 /// Writes `hits`, one a ray, from `triangle_ids` (rows from the top); returns how many are hits.
-pub fn primary_hit(bindings: &Bindings, triangle_ids: &[u32], rays: &[Ray], hits: &mut [Hit]) -> u32 {
-    let of_task = |(rays, hits): (&[Ray], &mut [Hit])| {
+pub fn primary_hit(bindings: &Bindings, triangle_ids: &[u32], rays: &[PathRay], hits: &mut [Hit]) -> u32 {
+    let of_task = |(rays, hits): (&[PathRay], &mut [Hit])| {
         let mut n_hits = 0;
         for (ray, hit) in rays.iter().zip(hits) {
             let triangle_ix = triangle_ids[ray.pixel_ix as usize];

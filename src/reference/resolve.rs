@@ -4,13 +4,13 @@ use std::ops::Range;
 
 use glam::Vec3;
 
-use crate::layout::{Bounce, Ray};
+use crate::layout::{Bounce, PathRay};
 
 /// Writes the pixels of the first bounce's rays: of each the sum of its ray's `ray_radiance` and that of all rays that came of
 /// it, bounce after bounce.
 pub fn resolve(
     bounces: &[Bounce],
-    rays: &[Ray],
+    rays: &[PathRay],
     ray_radiance: &[[f32; 4]],
     first_children: &[u32],
     pixel_radiance: &mut [[f32; 4]],

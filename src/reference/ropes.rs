@@ -2,7 +2,7 @@
 
 use super::{
     bindings::Bindings,
-    counting::table::Reads,
+    counting::table::ReadCounter,
     kdtree::{TraversalRay, is_done, is_leaf, min},
     leaf::intersect_leaf,
     slab::slab_of,
@@ -11,7 +11,7 @@ use crate::layout::{Hit, KdNode};
 
 /// The leaf in `node_ix` where the ray is at t.
 #[inline(always)]
-fn leaf_at(bindings: &Bindings<impl Reads>, ray: &TraversalRay, t: f32, node_ix: &mut u32) -> KdNode {
+fn leaf_at(bindings: &Bindings<impl ReadCounter>, ray: &TraversalRay, t: f32, node_ix: &mut u32) -> KdNode {
     let mut node = bindings.kd_nodes[*node_ix as usize];
     while !is_leaf(node) {
         *node_ix = ray.first_child(node) ^ u32::from(t > ray.crossing(node));
@@ -22,7 +22,7 @@ fn leaf_at(bindings: &Bindings<impl Reads>, ray: &TraversalRay, t: f32, node_ix:
 
 /// Where the ray leaves a leaf's cell, and the node that is there, 0 outside the root's: by the face that it comes to first.
 #[inline(always)]
-fn exit_of(bindings: &Bindings<impl Reads>, ray: &TraversalRay, leaf_ix: u32) -> (f32, u32) {
+fn exit_of(bindings: &Bindings<impl ReadCounter>, ray: &TraversalRay, leaf_ix: u32) -> (f32, u32) {
     let exits = [0, 1, 2].map(|axis| {
         let is_above = usize::from(!(ray.inv_direction[axis] < 0.0));
         let rope = bindings.kd_ropes[6 * leaf_ix as usize + 2 * axis + is_above];
@@ -33,7 +33,7 @@ fn exit_of(bindings: &Bindings<impl Reads>, ray: &TraversalRay, leaf_ix: u32) ->
 
 /// The closest hit, or with `ANY_HIT` one that need not be the closest.
 #[inline]
-pub fn follow_ropes<const ANY_HIT: bool>(bindings: &Bindings<impl Reads>, ray: &TraversalRay, best: &mut Hit) {
+pub fn follow_ropes<const ANY_HIT: bool>(bindings: &Bindings<impl ReadCounter>, ray: &TraversalRay, best: &mut Hit) {
     if !(ray.t_enter <= ray.t_exit) {
         return;
     }

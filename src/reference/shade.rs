@@ -10,12 +10,12 @@ use super::{
     material::{local_weight, phong},
     surface::{Surface, surface_at},
 };
-use crate::layout::{Hit, LIGHT_LIT, Material, NO_TRIANGLE, Ray};
+use crate::layout::{Hit, LIGHT_LIT, Material, NO_TRIANGLE, PathRay};
 
 /// What there is to shade.
 #[derive(Clone, Copy)]
 pub struct LitRays<'a> {
-    pub rays: &'a [Ray],
+    pub rays: &'a [PathRay],
     /// One a ray.
     pub hits: &'a [Hit],
     /// `[light * queue_capacity + ray]`, `LIGHT_*`.
@@ -25,7 +25,7 @@ pub struct LitRays<'a> {
 fn local_radiance(
     bindings: &Bindings,
     is_lit: impl Fn(usize) -> bool,
-    ray: &Ray,
+    ray: &PathRay,
     surface: &Surface,
     material: &Material,
 ) -> Vec3 {
@@ -41,7 +41,7 @@ fn local_radiance(
 }
 
 /// Its throughput included.
-fn radiance_of(bindings: &Bindings, (ray, hit): (&Ray, &Hit), is_lit: impl Fn(usize) -> bool) -> Vec3 {
+fn radiance_of(bindings: &Bindings, (ray, hit): (&PathRay, &Hit), is_lit: impl Fn(usize) -> bool) -> Vec3 {
     if hit.triangle_ix == NO_TRIANGLE {
         return ray.throughput * bindings.frame().background;
     }

@@ -10,17 +10,17 @@ use super::{
     bindings::Bindings,
     light::sample_light,
     material::can_show,
-    probe::Probe,
+    search_ray::SearchRay,
     surface::surface_at,
     traverser::{Tracer, Traverser},
 };
 use crate::{
     accel::kdtree::Traversal,
-    layout::{Hit, LIGHT_LIT, LIGHT_SHADOWED, LIGHT_UNTESTED, Light, NO_TRIANGLE, Ray},
+    layout::{Hit, LIGHT_LIT, LIGHT_SHADOWED, LIGHT_UNTESTED, Light, NO_TRIANGLE, PathRay},
 };
 
 /// The segment to the light, or none where the surface turns its back on it or would not show it.
-pub(crate) fn shadow_segment(bindings: &Bindings, ray: &Ray, hit: &Hit, light: &Light) -> Option<Ray> {
+pub(crate) fn shadow_segment(bindings: &Bindings, ray: &PathRay, hit: &Hit, light: &Light) -> Option<PathRay> {
     let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
     let to_light = sample_light(light, surface.point_world);
     // Not `<=`: a NaN is unlit.
@@ -31,7 +31,7 @@ pub(crate) fn shadow_segment(bindings: &Bindings, ray: &Ray, hit: &Hit, light: &
         return None;
     }
     let segment = surface.ray_from(to_light.direction, hit.triangle_ix, ray, Vec3::ZERO);
-    Some(Ray { t_max: to_light.distance, ..segment })
+    Some(PathRay { t_max: to_light.distance, ..segment })
 }
 
 /// Writes `light_visibility[light * queue_capacity + ray]` (`LIGHT_*`) of a bounce's rays, whose places are given; returns how many
@@ -40,7 +40,7 @@ pub fn shadow(
     bindings: &Bindings,
     traversal: Traversal,
     places: &Range<usize>,
-    (rays, hits): (&[Ray], &[Hit]),
+    (rays, hits): (&[PathRay], &[Hit]),
     light_visibility: &mut [u32],
 ) -> u32 {
     shadow_by::<Traverser>(bindings, traversal, places, (rays, hits), light_visibility)
@@ -51,19 +51,19 @@ pub fn shadow_by<T: Tracer>(
     bindings: &Bindings,
     traversal: Traversal,
     places: &Range<usize>,
-    (rays, hits): (&[Ray], &[Hit]),
+    (rays, hits): (&[PathRay], &[Hit]),
     light_visibility: &mut [u32],
 ) -> u32 {
     let (rays, hits) = (&rays[places.clone()], &hits[places.clone()]);
     let of_light = |(light, visibility): (&Light, &mut [u32])| -> u32 {
-        let of_task = |traverser: &mut T, ((rays, hits), visibility): ((&[Ray], &[Hit]), &mut [u32])| {
+        let of_task = |traverser: &mut T, ((rays, hits), visibility): ((&[PathRay], &[Hit]), &mut [u32])| {
             let mut n_tested = 0;
             let segments = rays.iter().zip(hits).zip(visibility).filter_map(|((ray, hit), visible)| {
                 *visible = LIGHT_UNTESTED;
                 let is_hit = hit.triangle_ix != NO_TRIANGLE;
                 let segment = is_hit.then(|| shadow_segment(bindings, ray, hit, light)).flatten()?;
                 n_tested += 1;
-                Some((visible, Probe::from(&segment)))
+                Some((visible, SearchRay::from(&segment)))
             });
             traverser.trace_all::<true, _>(bindings, segments, |visible, hit| {
                 *visible = if hit.triangle_ix == NO_TRIANGLE { LIGHT_LIT } else { LIGHT_SHADOWED };

@@ -1,23 +1,23 @@
 //! Whether a ray keeps clear of the slab around a node's surface. Twin of `slab.glsl`; the planes of triangles are in `leaf.rs`,
 //! slabs for sixteen rays in `packet.rs`.
 
-use super::{bindings::Bindings, counting::table::Reads, kdtree::TraversalRay};
-use crate::layout::{KD_IN_SLAB, KdNode, Slab};
+use super::{bindings::Bindings, counting::table::ReadCounter, kdtree::TraversalRay};
+use crate::layout::{KD_HAS_SLAB, KdNode, Slab};
 
 /// The node's slab, if it has one.
 #[inline(always)]
-pub fn slab_of<'a>(bindings: &Bindings<'a, impl Reads>, node: KdNode, node_ix: u32) -> Option<&'a Slab> {
-    if node.axis_and_child & KD_IN_SLAB == 0 { None } else { bindings.kd_slabs.get(node_ix as usize) }
+pub fn slab_of<'a>(bindings: &Bindings<'a, impl ReadCounter>, node: KdNode, node_ix: u32) -> Option<&'a Slab> {
+    if node.axis_and_child & KD_HAS_SLAB == 0 { None } else { bindings.kd_slabs.get(node_ix as usize) }
 }
 
 /// The middle of a ray's way through a cell, and half its length, in t.
 #[derive(Clone, Copy)]
-pub struct Stretch {
+pub struct Segment {
     pub middle: f32,
     pub half: f32,
 }
 
-impl Stretch {
+impl Segment {
     #[inline(always)]
     pub fn new(t_enter: f32, t_exit: f32) -> Self {
         Self { middle: 0.5 * (t_enter + t_exit), half: 0.5 * (t_exit - t_enter) }
@@ -28,7 +28,7 @@ impl TraversalRay {
     /// Whether the ray keeps to one side of the slab on its way from `t_enter` to `t_exit`.
     #[inline(always)]
     pub fn is_clear_of(&self, slab: &Slab, [t_enter, t_exit]: [f32; 2]) -> bool {
-        let way = Stretch::new(t_enter, t_exit);
+        let way = Segment::new(t_enter, t_exit);
         let height = slab.normal.dot(self.origin.into()) - slab.offset;
         let slope = slab.normal.dot(self.direction.into());
         (way.middle * slope + height).abs() > way.half * slope.abs() + 1.0

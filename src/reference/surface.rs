@@ -2,7 +2,7 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::layout::{FLAT_NORMAL, Hit, LEAST_NORMAL_SQUARED, LEAST_WEIGHT, Ray, SURFACE_CLEARANCE, Triangle};
+use crate::layout::{FLAT_NORMAL, Hit, LEAST_NORMAL_SQUARED, LEAST_WEIGHT, PathRay, SURFACE_CLEARANCE, Triangle};
 
 /// Where a ray met a triangle.
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +55,7 @@ fn inner_weights(hit: &Hit) -> Vec3 {
 }
 
 /// The surface of triangle `t` at `hit` as `ray` meets it.
-pub fn surface_at(ray: &Ray, hit: &Hit, t: &Triangle) -> Surface {
+pub fn surface_at(ray: &PathRay, hit: &Hit, t: &Triangle) -> Surface {
     let weights = inner_weights(hit);
     let magnitude = (weights.x * t.v0).abs() + (weights.y * t.v1).abs() + (weights.z * t.v2).abs();
     // Edges at unit scale: the cross product of a tiny triangle would underflow.
@@ -76,9 +76,9 @@ pub fn surface_at(ray: &Ray, hit: &Hit, t: &Triangle) -> Surface {
 
 impl Surface {
     /// A ray from the surface: starts on the side that it leaves to.
-    pub fn ray_from(&self, direction: Vec3, triangle_ix: u32, parent: &Ray, throughput: Vec3) -> Ray {
+    pub fn ray_from(&self, direction: Vec3, triangle_ix: u32, parent: &PathRay, throughput: Vec3) -> PathRay {
         let side = if direction.dot(self.geometric) < 0.0 { -self.clearance } else { self.clearance };
-        Ray {
+        PathRay {
             origin: self.point_world + side * self.geometric,
             pixel_ix: parent.pixel_ix,
             direction,

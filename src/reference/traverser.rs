@@ -3,15 +3,15 @@
 use super::{
     bindings::Bindings,
     brute,
-    counting::table::Reads,
+    counting::table::ReadCounter,
     kdtree::{Pending, TraversalRay, hit_from_near, search},
     pending_backtrack::PendingBacktrack,
     pending_mask::PendingMask,
     pending_mask_boxes::PendingMaskBoxes,
     pending_short_stack::PendingMarked,
     pending_stack::PendingStack,
-    probe::Probe,
     ropes::follow_ropes,
+    search_ray::SearchRay,
 };
 use crate::{
     accel::kdtree::Traversal,
@@ -27,8 +27,8 @@ pub trait Tracer {
     /// any order. A miss keeps t = t_max.
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,
-        bindings: &Bindings<impl Reads>,
-        probes: impl Iterator<Item = (Key, Probe)>,
+        bindings: &Bindings<impl ReadCounter>,
+        probes: impl Iterator<Item = (Key, SearchRay)>,
         found: impl FnMut(Key, Hit),
     );
 }
@@ -49,7 +49,7 @@ impl Traverser {
     /// Finds a ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps
     /// t = t_max.
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl Reads>, probe: &Probe) -> Hit {
+    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl ReadCounter>, probe: &SearchRay) -> Hit {
         hit_from_near(bindings, probe, |near, best| {
             let ray = &TraversalRay::new(bindings, near);
             match self {
@@ -85,8 +85,8 @@ impl Tracer for Traverser {
     #[inline]
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,
-        bindings: &Bindings<impl Reads>,
-        probes: impl Iterator<Item = (Key, Probe)>,
+        bindings: &Bindings<impl ReadCounter>,
+        probes: impl Iterator<Item = (Key, SearchRay)>,
         mut found: impl FnMut(Key, Hit),
     ) {
         probes.for_each(|(key, probe)| found(key, self.traverse::<ANY_HIT>(bindings, &probe)));

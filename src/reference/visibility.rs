@@ -7,7 +7,7 @@ use super::{
     RAYS_PER_TASK,
     bindings::Bindings,
     primary_hit::camera_ray,
-    probe::Probe,
+    search_ray::SearchRay,
     traverser::{Tracer, Traverser},
 };
 use crate::accel::kdtree::Traversal;
@@ -25,7 +25,7 @@ pub fn visibility_by<T: Tracer>(bindings: &Bindings, traversal: Traversal, trian
         |traverser, (task, ids)| {
             let probes = (task * RAYS_PER_TASK..).map(|pixel_ix| {
                 let pixel = glam::uvec2(pixel_ix as u32 % width, pixel_ix as u32 / width);
-                Probe::from(&camera_ray(bindings.frame(), pixel))
+                SearchRay::from(&camera_ray(bindings.frame(), pixel))
             });
             traverser.trace_all::<false, _>(bindings, ids.iter_mut().zip(probes), |id, hit| *id = hit.triangle_ix);
         },

@@ -40,7 +40,7 @@ impl BandedRenderer {
     /// The scene, or a single row of the picture, is beyond the device's limits or memory.
     pub fn new(context: Arc<Context>, world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
         let bands = bands(context.limits(), options);
-        let is_slow = context.runs_both_sides();
+        let is_slow = context.predicates_branches();
         let renderer = match largest(&bands, options) {
             None => Renderer::new(context, world, options)?,
             Some(crop) => Renderer::new(context, world, &RenderOptions { crop: Some(crop), ..options.clone() })?,

@@ -1,20 +1,20 @@
 //! The frame on a device: what [`Plan`] says, recorded, in one command buffer a bounce.
 
 mod bands;
-mod changes;
 mod given;
-mod parts;
+mod incremental;
 mod profile;
+mod reconfigure;
 mod schedule;
 
 use std::sync::Arc;
 
 use tracing::info_span;
 
-pub use self::{bands::BandedRenderer, parts::Displayed};
+pub use self::{bands::BandedRenderer, incremental::Displayed};
 use self::{
-    parts::{Part, Pending, Traced, Until},
-    schedule::{Room, Schedule},
+    incremental::{Part, Pending, Traced, Until},
+    schedule::{QueueBudget, Schedule},
 };
 use crate::{
     buffers::{Needs, Resources},
@@ -32,7 +32,7 @@ pub struct Renderer {
     world: World,
     camera: Camera,
     options: RenderOptions,
-    room: Room,
+    budget: QueueBudget,
     resources: Resources,
     passes: Passes,
     schedule: Schedule,
@@ -85,9 +85,9 @@ impl Renderer {
         let branches = scene.materials.iter().any(|material| material.flags & both == both);
         let mut constants = frame_constants(world, options);
         constants.n_lanes = lanes_to_share(&context, options)?;
-        let room = Room { fixed_capacity, branches };
-        constants.queue_capacity = room.queue_capacity(context.limits(), &constants);
-        let spans = room.spans(&constants, None);
+        let budget = QueueBudget { fixed_capacity, branches };
+        constants.queue_capacity = budget.queue_capacity(context.limits(), &constants);
+        let spans = budget.spans(&constants, None);
         let schedule = Schedule::new(&context, &constants, spans, options)?;
         let uploading = info_span!("upload scene").entered();
         let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
@@ -100,7 +100,7 @@ impl Renderer {
             world: world.clone(),
             camera,
             options,
-            room,
+            budget,
             resources,
             passes,
             schedule,

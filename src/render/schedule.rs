@@ -5,7 +5,7 @@ use std::{mem, sync::Arc};
 use crate::{
     frame::{FrameKind, Plan, RenderOptions},
     gpu::{Buffer, BufferUse, Context, GpuError, Limits, Timer},
-    layout::{Batch, Bounce, Frame, RAY_GROUP_SIZE, ROUND_BEGIN, Ray},
+    layout::{Batch, Bounce, Frame, PathRay, RAY_GROUP_SIZE, ROUND_BEGIN},
 };
 
 /// Rays that go well into memory together, some 100 bytes each; enough to keep any device busy.
@@ -85,14 +85,14 @@ impl Schedule {
 
 /// How much room there is for rays, and what they are expected to take.
 #[derive(Clone, Copy)]
-pub struct Room {
+pub struct QueueBudget {
     /// Rays in the queue, where the caller has said so; it is then for as many pixels.
     pub fixed_capacity: Option<u32>,
     /// Whether a hit can have two children.
     pub branches: bool,
 }
 
-impl Room {
+impl QueueBudget {
     /// Rays that the queue should hold: all of the picture's, as far as that is no more than [`MOST_RAYS`] and the device's
     /// limits go.
     pub fn queue_capacity(&self, limits: &Limits, constants: &Frame) -> u32 {
@@ -101,7 +101,7 @@ impl Room {
         }
         let n_pixels = u64::from(constants.width) * u64::from(constants.height);
         // rays and light_visibility are the widest buffers of a ray.
-        let bytes_a_ray = mem::size_of::<Ray>().max(4 * constants.n_lights as usize) as u64;
+        let bytes_a_ray = mem::size_of::<PathRay>().max(4 * constants.n_lights as usize) as u64;
         let most = (limits.storage_range / bytes_a_ray).min(u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE));
         let wanted = n_pixels * u64::from(self.rays_a_pixel(constants.max_depth));
         wanted.min(MOST_RAYS).min(most).max(1) as u32
@@ -142,19 +142,19 @@ mod tests {
         };
         for (width, height, max_depth) in [(1, 1, 1), (1024, 768, 5), (3840, 2160, 8), (7, 9, 64)] {
             for (branches, fixed_capacity) in [(false, None), (true, None), (true, Some(50))] {
-                let room = Room { fixed_capacity, branches };
+                let budget = QueueBudget { fixed_capacity, branches };
                 let mut constants = Frame { width, height, max_depth, n_lights: 3, ..Frame::default() };
-                constants.queue_capacity = room.queue_capacity(&limits, &constants);
+                constants.queue_capacity = budget.queue_capacity(&limits, &constants);
                 assert!(u64::from(constants.queue_capacity) * 48 <= limits.storage_range);
                 for most_pixels in [None, Some(0), Some(10), Some(u32::MAX)] {
-                    let spans = room.spans(&constants, most_pixels);
+                    let spans = budget.spans(&constants, most_pixels);
                     let ends = spans.iter().scan(0, |end, &(first, n)| {
                         assert_eq!(first, *end);
                         *end += n;
                         Some(*end)
                     });
                     assert_eq!(ends.last(), Some(width * height));
-                    let most = constants.queue_capacity / room.rays_a_pixel(max_depth);
+                    let most = constants.queue_capacity / budget.rays_a_pixel(max_depth);
                     let fits =
                         |n: u32| n > 0 && n <= most.max(1) && most_pixels.is_none_or(|pixels| n <= pixels.max(1));
                     assert!(spans.iter().all(|&(_, n)| fits(n)), "{width}x{height}: {spans:?}");

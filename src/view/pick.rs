@@ -3,10 +3,10 @@
 use glam::{UVec2, Vec3};
 
 use crate::{
-    accel::{Query, kdtree::Extras},
+    accel::{Query, kdtree::TraversalLinks},
     cpu::trace,
     frame::{RenderOptions, frame_constants},
-    layout::{Hit, NO_TRIANGLE, Ray},
+    layout::{Hit, NO_TRIANGLE, PathRay},
     reference::{
         bindings::Bindings,
         children::{child_kinds_of, children_of},
@@ -58,10 +58,10 @@ pub struct PickedHit {
 /// Follows the rays of the pixel's middle, as seen from `camera`. `options.width` and `height` are the picture's that the pixel is counted in.
 pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec2) -> Picked {
     let (scene, tree) = (world.scene(), world.tree());
-    let extras = Extras::new(tree, options.traversal);
+    let links = TraversalLinks::new(tree, options.traversal);
     let mut frame = frame_constants(world, options);
     frame.set_view(camera, world.bounds(), 0);
-    let bindings = Bindings::new(scene, tree, &frame).with_extras(&extras);
+    let bindings = Bindings::new(scene, tree, &frame).with_links(&links);
     let mut rays = vec![camera_ray(&frame, pixel)];
     let mut picked = Picked { pixel, rays: Vec::new(), n_more: 0 };
     for depth in 0..options.max_depth {
@@ -84,7 +84,7 @@ pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec
     picked
 }
 
-fn found(scene: &FlatScene, ray: &Ray, hit: &Hit) -> Option<PickedHit> {
+fn found(scene: &FlatScene, ray: &PathRay, hit: &Hit) -> Option<PickedHit> {
     (hit.triangle_ix != NO_TRIANGLE).then(|| {
         let material_ix = scene.triangle_materials[hit.triangle_ix as usize];
         PickedHit {
@@ -97,7 +97,7 @@ fn found(scene: &FlatScene, ray: &Ray, hit: &Hit) -> Option<PickedHit> {
 }
 
 /// The rays of the next level.
-fn next_rays(bindings: &Bindings, rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
+fn next_rays(bindings: &Bindings, rays: &[PathRay], hits: &[Hit]) -> Vec<PathRay> {
     let of_ray = |(ray, hit)| children_of(bindings, ray, hit, child_kinds_of(bindings, ray, hit));
     rays.iter().zip(hits).flat_map(of_ray).collect()
 }

@@ -10,7 +10,7 @@ use kdray::{
         kdtree::{KdTree, Traversal},
     },
     buffers::{AccelBuffers, SceneAccess, SceneArrays},
-    cast::{CastRay, Caster},
+    cast::{Caster, Ray},
     frame::{Primary, RenderOptions},
     gpu::{Buffer, BufferUse, Context, DeviceOverrides, GpuError},
     layout::{KdRope, LargeTriangle, LeafTriangle},
@@ -40,7 +40,7 @@ fn most_texels(tree: &KdTree) -> u32 {
 /// How a device reads what it can bind.
 fn usual_reading(context: &Context, tree: &KdTree) -> SceneAccess {
     let has_texels = most_texels(tree) <= context.limits().n_texels;
-    if context.runs_both_sides() && has_texels { SceneAccess::Texels } else { SceneAccess::Bound }
+    if context.predicates_branches() && has_texels { SceneAccess::Texels } else { SceneAccess::Bound }
 }
 
 /// With a ring of 16,000 triangles: none of its arrays can be bound then.
@@ -148,7 +148,7 @@ fn another_traversal_of_a_renderer_that_is_there_reads_by_address_too() {
 fn rays_through_a_scene_larger_than_what_the_device_binds_find_the_same_hits() {
     let (world, any, small) = (large_world(), device(), small_device());
     let towards = |i: u16| Vec3::new((f32::from(i) * 0.7).sin(), (f32::from(i) * 0.31).cos(), -0.4);
-    let ray = |i| CastRay { origin: Vec3::new(0.1, 0.2, 0.3), t_min: 0.0, direction: towards(i), t_max: f32::INFINITY };
+    let ray = |i| Ray { origin: Vec3::new(0.1, 0.2, 0.3), t_min: 0.0, direction: towards(i), t_max: f32::INFINITY };
     let rays: Vec<_> = (0..3000).map(ray).collect();
     for (traversal, query) in [
         (Traversal::Mask, Query::Closest),

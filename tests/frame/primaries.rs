@@ -98,10 +98,10 @@ fn ways_suit_the_device() {
     let by_kernels = if gpu.has_wide_atomics() { Primary::Compute } else { Primary::Trace };
     assert_eq!([suited(8001), suited(usize::MAX)], [by_kernels, Primary::Trace]);
     let without = without_wide_atomics();
-    let n_raster = if without.runs_both_sides() { 4 * 8000 } else { 8000 };
+    let n_raster = if without.predicates_branches() { 4 * 8000 } else { 8000 };
     let suited = [n_raster, n_raster + 1].map(|n| primary_by_rule(Some(&without), n, (100, 80)));
     assert_eq!(suited, [Primary::Raster, Primary::Trace]);
-    let way = if without.runs_both_sides() { Traversal::Ropes } else { Traversal::Mask };
+    let way = if without.predicates_branches() { Traversal::Ropes } else { Traversal::Mask };
     let suited = [Some(&*gpu), Some(&*without), None].map(|context| traversal_by_rule(Processor::of(context)));
     assert_eq!(suited, [Traversal::Mask, way, Traversal::Stack]);
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use kdray::{
     accel::kdtree::{BuildOptions, Invalid, KdTree, Node, Parts},
-    layout::{KD_IN_SLAB, KD_MAX_DEPTH, KdNode, Slab, Triangle},
+    layout::{KD_HAS_SLAB, KD_MAX_DEPTH, KdNode, Slab, Triangle},
 };
 
 use crate::meshes::{boxed, room, triangle};
@@ -238,7 +238,7 @@ fn a_wrong_plane() {
 /// A node with a slab, and that.
 fn last_slab(tree: &Parts) -> (u32, Slab) {
     let slab = |node: u32| {
-        let is_marked = tree.nodes[node as usize].axis_and_child & KD_IN_SLAB != 0;
+        let is_marked = tree.nodes[node as usize].axis_and_child & KD_HAS_SLAB != 0;
         is_marked.then(|| (node, tree.slabs[node as usize]))
     };
     (0..tree.nodes.len() as u32).rev().find_map(slab).expect("a slab")

@@ -4,7 +4,8 @@ use glam::{Vec3, vec3};
 use kdray::{
     frame::plan,
     layout::{
-        Batch, Bounce, CHILD_REFLECTED, CHILD_TRANSMITTED, Frame, Hit, NO_TRIANGLE, Ray, SCAN_GROUP_SIZE, SPINE_ITEMS,
+        Batch, Bounce, CHILD_REFLECTED, CHILD_TRANSMITTED, Frame, Hit, NO_TRIANGLE, PathRay, SCAN_GROUP_SIZE,
+        SPINE_ITEMS,
     },
     passes::Inputs,
     reference::{self, compact::Parents},
@@ -42,8 +43,8 @@ fn stage(capacity: u32) -> Stage {
 }
 
 /// A ray that says which one it is, and its hit.
-fn parent(i: usize, n_children: u32) -> (Ray, Hit) {
-    let ray = Ray {
+fn parent(i: usize, n_children: u32) -> (PathRay, Hit) {
+    let ray = PathRay {
         origin: vec3(0.3, 1.0, 0.3),
         pixel_ix: i as u32,
         direction: vec3(0.1, -1.0, 0.2).normalize(),
@@ -56,7 +57,7 @@ fn parent(i: usize, n_children: u32) -> (Ray, Hit) {
 
 /// What compaction leaves.
 struct Compacted {
-    rays: Vec<Ray>,
+    rays: Vec<PathRay>,
     child_kinds: Vec<u32>,
     first_children: Vec<u32>,
     bounces: Vec<Bounce>,

@@ -1,7 +1,7 @@
 //! The comparers that the other tests rely on.
 
 use glam::Vec3;
-use kdray::layout::{Hit, Ray};
+use kdray::layout::{Hit, PathRay};
 
 use super::stage::{UNTOUCHED_HIT as HIT, UNTOUCHED_RAY as RAY};
 use crate::support::compare::{bytes, exact, exact_but_for, hits, near, pixels, rays};
@@ -18,12 +18,12 @@ fn each_comparer_notices_one_element() {
     one(&|| hits(0, &[HIT], &[Hit { u: -7.1, ..HIT }]));
     one(&|| hits(0, &[HIT], &[Hit { v: f32::NAN, ..HIT }]));
     one(&|| hits(0, &[HIT], &[Hit { triangle_ix: u32::MAX, ..HIT }]));
-    one(&|| rays(1e-5, 0, &[RAY], &[Ray { pixel_ix: 1, ..RAY }]));
-    one(&|| rays(1e-5, 0, &[RAY], &[Ray { source_triangle: 1, ..RAY }]));
-    one(&|| rays(1e-5, 0, &[RAY], &[Ray { origin: RAY.origin + 1e-3 * Vec3::X, ..RAY }]));
-    one(&|| rays(1e-5, 0, &[RAY], &[Ray { direction: RAY.direction + 1e-3 * Vec3::Y, ..RAY }]));
-    one(&|| rays(1e-5, 0, &[RAY], &[Ray { throughput: RAY.throughput + 1e-3 * Vec3::Z, ..RAY }]));
-    one(&|| rays(1e-5, 0, &[RAY], &[Ray { t_max: f32::INFINITY, ..RAY }]));
+    one(&|| rays(1e-5, 0, &[RAY], &[PathRay { pixel_ix: 1, ..RAY }]));
+    one(&|| rays(1e-5, 0, &[RAY], &[PathRay { source_triangle: 1, ..RAY }]));
+    one(&|| rays(1e-5, 0, &[RAY], &[PathRay { origin: RAY.origin + 1e-3 * Vec3::X, ..RAY }]));
+    one(&|| rays(1e-5, 0, &[RAY], &[PathRay { direction: RAY.direction + 1e-3 * Vec3::Y, ..RAY }]));
+    one(&|| rays(1e-5, 0, &[RAY], &[PathRay { throughput: RAY.throughput + 1e-3 * Vec3::Z, ..RAY }]));
+    one(&|| rays(1e-5, 0, &[RAY], &[PathRay { t_max: f32::INFINITY, ..RAY }]));
     one(&|| bytes(1, &[[0, 5, 9, 255]], &[[0, 5, 11, 255]]));
     assert!(hits(0, &[HIT], &[HIT]).is_ok() && rays(1e-5, 0, &[RAY], &[RAY]).is_ok());
     assert!(near(f32::INFINITY, f32::INFINITY, 0.0) && !near(f32::INFINITY, 1.0, 1.0));

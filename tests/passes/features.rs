@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use glam::vec3;
 use kdray::{
     frame::RenderOptions,
-    layout::{Batch, Feature, NO_TRIANGLE, Ray},
+    layout::{Batch, Feature, NO_TRIANGLE, PathRay},
     reference,
     scene::Camera,
 };
@@ -14,13 +14,13 @@ use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_RAY, hits_of, options};
 use crate::support::scenes;
 
 /// The camera's first rays.
-fn primary_rays(stage: &Stage, n: u32) -> Vec<Ray> {
+fn primary_rays(stage: &Stage, n: u32) -> Vec<PathRay> {
     let mut rays = vec![UNTOUCHED_RAY; n as usize];
     reference::primary_hit::primary_rays(stage.resources.constants(), 0, &mut rays);
     rays
 }
 
-fn noted(stage: &Stage, rays: &[Ray], before: &[Feature]) -> Vec<Feature> {
+fn noted(stage: &Stage, rays: &[PathRay], before: &[Feature]) -> Vec<Feature> {
     let hits = hits_of(stage, rays);
     let batch = Batch { n_pixels: rays.len() as u32, ..FIRST };
     stage.set_n_rays(&[batch.n_pixels]);

@@ -1,7 +1,7 @@
 //! Resolve against its twin and against the sum of a pixel's rays in the queue's order: the same to the last bit.
 
 use kdray::{
-    layout::{Batch, Ray},
+    layout::{Batch, PathRay},
     reference,
 };
 
@@ -13,7 +13,7 @@ const FIRST_PIXEL: u32 = 200;
 
 /// A batch's rays, bounce after bounce.
 struct Family {
-    rays: Vec<Ray>,
+    rays: Vec<PathRay>,
     first_children: Vec<u32>,
     n_rays: Vec<u32>,
 }

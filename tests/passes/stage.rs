@@ -3,11 +3,11 @@
 use std::{cell::Cell, sync::Arc, thread};
 
 use kdray::{
-    accel::kdtree::{BuildOptions, Extras},
+    accel::kdtree::{BuildOptions, TraversalLinks},
     buffers::{Needs, Resources},
     frame::{Denoise, RenderOptions, frame_constants},
     gpu::{Commands, Context, ContextOptions},
-    layout::{Batch, Bounce, Counters, Frame, Hit, NO_TRIANGLE, RAY_GROUP_SIZE, Ray},
+    layout::{Batch, Bounce, Counters, Frame, Hit, NO_TRIANGLE, PathRay, RAY_GROUP_SIZE},
     passes::Passes,
     reference::bindings::Bindings,
     world::{FlatScene, World},
@@ -18,7 +18,7 @@ pub const RAY_COUNTS: [u32; 7] =
     [0, 1, RAY_GROUP_SIZE - 1, RAY_GROUP_SIZE, RAY_GROUP_SIZE + 1, 5 * RAY_GROUP_SIZE + 7, 2000];
 
 /// What stands in buffers before a kernel runs: where it still stands, nothing was written.
-pub const UNTOUCHED_RAY: Ray = Ray {
+pub const UNTOUCHED_RAY: PathRay = PathRay {
     origin: glam::Vec3::splat(-7.0),
     pixel_ix: 0xdead,
     direction: glam::Vec3::splat(-7.0),
@@ -32,7 +32,7 @@ pub const UNTOUCHED_PIXEL: [f32; 4] = [-7.0; 4];
 
 pub struct Stage {
     pub world: World,
-    pub extras: Extras,
+    pub links: TraversalLinks,
     pub options: RenderOptions,
     pub resources: Resources,
     pub passes: Passes,
@@ -54,14 +54,14 @@ impl Stage {
         let constants = Frame { queue_capacity: capacity, ..frame_constants(&world, &options) };
         let needs = Needs { constants: &constants, options: &options, n_bounces: constants.max_depth as usize };
         let resources = Resources::new(&context, &world, &needs).expect("resources");
-        let extras = Extras::new(world.tree(), options.traversal);
+        let links = TraversalLinks::new(world.tree(), options.traversal);
         let passes = Passes::new(&context, &resources.bindings, &options).expect("passes");
-        Self { world, extras, options, resources, passes, context, expects_messages: Cell::new(false) }
+        Self { world, links, options, resources, passes, context, expects_messages: Cell::new(false) }
     }
 
     /// The twin's view of the same scene.
     pub fn bindings(&self) -> Bindings<'_> {
-        Bindings::new(self.world.scene(), self.world.tree(), self.resources.constants()).with_extras(&self.extras)
+        Bindings::new(self.world.scene(), self.world.tree(), self.resources.constants()).with_links(&self.links)
     }
 
     /// Binds the descriptor set, records and runs.
@@ -110,7 +110,7 @@ impl Stage {
     }
 
     /// The first `rays.len()` of the queue; untouched ones behind.
-    pub fn set_rays(&self, rays: &[Ray]) {
+    pub fn set_rays(&self, rays: &[PathRay]) {
         let mut queue = vec![UNTOUCHED_RAY; self.resources.queue.rays.len()];
         queue[..rays.len()].copy_from_slice(rays);
         self.resources.queue.rays.upload(&queue).expect("rays");
@@ -149,7 +149,7 @@ impl Drop for Stage {
 pub const FIRST: Batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, depth: 0, round: 0 };
 
 /// `n` rays of every nasty kind at the stage's scene, with pixels and throughputs of their own.
-pub fn some_rays(stage: &Stage, n: u32) -> Vec<Ray> {
+pub fn some_rays(stage: &Stage, n: u32) -> Vec<PathRay> {
     use crate::support::{MeshWithTree, random::Random, rays::nasty_ray};
     let world = MeshWithTree::new(stage.world.scene().triangles.clone());
     (0..n)
@@ -164,7 +164,7 @@ pub fn some_rays(stage: &Stage, n: u32) -> Vec<Ray> {
 }
 
 /// As `some_rays`, but that the first are the batch's camera rays; and what of them is in memory, where those are not.
-pub fn rays_of(stage: &Stage, batch: &Batch, n: u32) -> (Vec<Ray>, Vec<Ray>) {
+pub fn rays_of(stage: &Stage, batch: &Batch, n: u32) -> (Vec<PathRay>, Vec<PathRay>) {
     let mut rays = some_rays(stage, n);
     let mut stored = rays.clone();
     let n_camera = batch.n_pixels as usize;
@@ -174,7 +174,7 @@ pub fn rays_of(stage: &Stage, batch: &Batch, n: u32) -> (Vec<Ray>, Vec<Ray>) {
 }
 
 /// The twin's hits of `rays`.
-pub fn hits_of(stage: &Stage, rays: &[Ray]) -> Vec<Hit> {
+pub fn hits_of(stage: &Stage, rays: &[PathRay]) -> Vec<Hit> {
     let mut hits = vec![Hit { triangle_ix: NO_TRIANGLE, ..UNTOUCHED_HIT }; rays.len()];
     kdray::reference::trace::trace(&stage.bindings(), stage.options.traversal, rays, &mut hits);
     hits

@@ -10,7 +10,7 @@ use kdray::{
     },
     cast::{Caster, CpuCaster},
     gpu::{Context, ContextOptions},
-    layout::{CastRay, Hit, NO_TRIANGLE, Triangle},
+    layout::{Hit, NO_TRIANGLE, Ray, Triangle},
     scene::{MIN_EXTENT, SceneError},
     world::{FlatScene, Geometry},
 };
@@ -46,7 +46,7 @@ fn load_triangles(triangles: &[Triangle]) -> Result<FlatScene, SceneError> {
 }
 
 /// Rays from around the scene at points of its triangles and of their edges, and some past it.
-fn rays(triangles: &[Triangle], n: usize) -> Vec<CastRay> {
+fn rays(triangles: &[Triangle], n: usize) -> Vec<Ray> {
     let mut random = Random(7);
     let ray = |_| {
         let t = random.of(triangles);
@@ -57,18 +57,18 @@ fn rays(triangles: &[Triangle], n: usize) -> Vec<CastRay> {
             2 => origin + random.direction(),
             _ => t.v0.lerp(t.v1, random.unit()).lerp(t.v2, random.unit()),
         };
-        CastRay { origin, t_min: 0.0, direction: target - origin, t_max: f32::INFINITY }
+        Ray { origin, t_min: 0.0, direction: target - origin, t_max: f32::INFINITY }
     };
     (0..n).map(ray).collect()
 }
 
-fn cast_on_cpu(triangles: &[Triangle], traversal: Traversal, rays: &[CastRay]) -> Vec<Hit> {
+fn cast_on_cpu(triangles: &[Triangle], traversal: Traversal, rays: &[Ray]) -> Vec<Hit> {
     let tree = KdTree::build(triangles, &BuildOptions::default());
     let geometry = Geometry::new(triangles, &tree).expect("a tree of these triangles");
     CpuCaster::new(geometry, traversal).cast(rays, Query::Closest)
 }
 
-fn cast_on_device(context: &std::sync::Arc<Context>, triangles: &[Triangle], rays: &[CastRay]) -> Vec<Hit> {
+fn cast_on_device(context: &std::sync::Arc<Context>, triangles: &[Triangle], rays: &[Ray]) -> Vec<Hit> {
     let tree = KdTree::build(triangles, &BuildOptions::default());
     let geometry = Geometry::new(triangles, &tree).expect("a tree of these triangles");
     Caster::new(context, geometry, Traversal::Stack).unwrap().cast(rays, Query::Closest, 1).unwrap().hits
@@ -80,8 +80,8 @@ fn n_differing(expected: &[Hit], found: &[Hit]) -> usize {
 }
 
 /// The same rays in the scaled scene. Directions are scaled, too, so that t stays as it is.
-fn scaled_rays(rays: &[CastRay], scale: f32) -> Vec<CastRay> {
-    rays.iter().map(|ray| CastRay { origin: scale * ray.origin, direction: scale * ray.direction, ..*ray }).collect()
+fn scaled_rays(rays: &[Ray], scale: f32) -> Vec<Ray> {
+    rays.iter().map(|ray| Ray { origin: scale * ray.origin, direction: scale * ray.direction, ..*ray }).collect()
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 
 use glam::Vec3;
-use kdray::layout::{Hit, Ray};
+use kdray::layout::{Hit, PathRay};
 
 /// Ok where all pairs agree; at most `n_outliers` may not.
 fn all_agree<T: Debug>(
@@ -64,7 +64,7 @@ pub fn hits(n_outliers: usize, expected: &[Hit], found: &[Hit]) -> Result<(), St
 }
 
 /// Integers equal, the rest near.
-pub fn rays(relative: f32, n_outliers: usize, expected: &[Ray], found: &[Ray]) -> Result<(), String> {
+pub fn rays(relative: f32, n_outliers: usize, expected: &[PathRay], found: &[PathRay]) -> Result<(), String> {
     all_agree(expected, found, n_outliers, |a, b| {
         a.pixel_ix == b.pixel_ix
             && a.source_triangle == b.source_triangle

@@ -16,10 +16,10 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use kdray::{
-    accel::kdtree::{BuildOptions, Extras, KdTree},
+    accel::kdtree::{BuildOptions, KdTree, TraversalLinks},
     gpu::{Context, ContextOptions, DeviceOverrides},
-    layout::{Hit, NO_TRIANGLE, Ray, Triangle},
-    reference::{bindings::Bindings, brute, kdtree::near_scene, probe::Probe},
+    layout::{Hit, NO_TRIANGLE, PathRay, Triangle},
+    reference::{bindings::Bindings, brute, kdtree::near_scene, search_ray::SearchRay},
     world::{FlatScene, Geometry, World},
 };
 
@@ -53,7 +53,7 @@ pub fn world_by(scene: &FlatScene, build_options: &BuildOptions) -> World {
 pub struct MeshWithTree {
     pub triangles: Vec<Triangle>,
     pub tree: KdTree,
-    pub extras: Extras,
+    pub links: TraversalLinks,
 }
 
 impl MeshWithTree {
@@ -63,11 +63,11 @@ impl MeshWithTree {
     }
 
     pub fn with_tree(triangles: Vec<Triangle>, tree: KdTree) -> Self {
-        Self { triangles, extras: Extras::all(&tree), tree }
+        Self { triangles, links: TraversalLinks::all(&tree), tree }
     }
 
     pub fn bindings(&self) -> Bindings<'_> {
-        Bindings::of_tree(&self.triangles, &self.tree).with_extras(&self.extras)
+        Bindings::of_tree(&self.triangles, &self.tree).with_links(&self.links)
     }
 
     /// What a cast goes through.
@@ -76,8 +76,8 @@ impl MeshWithTree {
     }
 
     /// The closest hit beyond `t_min` over every triangle, of the ray as the traversal sees it.
-    pub fn by_brute_force(&self, ray: &Ray, t_min: f32) -> Hit {
-        let (near, t_start) = near_scene(&self.bindings(), &Probe { t_min, ..Probe::from(ray) });
+    pub fn by_brute_force(&self, ray: &PathRay, t_min: f32) -> Hit {
+        let (near, t_start) = near_scene(&self.bindings(), &SearchRay { t_min, ..SearchRay::from(ray) });
         let hit = brute::closest_hit(&self.triangles, &near);
         Hit { t: if hit.triangle_ix == NO_TRIANGLE { ray.t_max } else { hit.t + t_start }, ..hit }
     }

@@ -4,8 +4,8 @@ use fearless_simd::{Level, Simd};
 use kdray::{
     accel::kdtree::Traversal,
     cpu::tracer::FastTracer,
-    layout::{Hit, Ray},
-    reference::{probe::Probe, traverser::Tracer},
+    layout::{Hit, PathRay},
+    reference::{search_ray::SearchRay, traverser::Tracer},
 };
 
 use super::MeshWithTree;
@@ -24,9 +24,9 @@ pub fn levels() -> Vec<Level> {
 }
 
 /// The hits of rays that go as packets, with the instructions of a level.
-pub fn traced<const ANY_HIT: bool>(world: &MeshWithTree, level: Level, rays: &[Ray]) -> Vec<Hit> {
+pub fn traced<const ANY_HIT: bool>(world: &MeshWithTree, level: Level, rays: &[PathRay]) -> Vec<Hit> {
     let mut hits = vec![None; rays.len()];
-    let probes = hits.iter_mut().zip(rays.iter().map(Probe::from));
+    let probes = hits.iter_mut().zip(rays.iter().map(SearchRay::from));
     let mut tracer = FastTracer::at_level(Traversal::Stack, level);
     tracer.trace_all::<ANY_HIT, _>(&world.bindings(), probes, |place, hit| {
         assert_eq!(place.replace(hit), None, "a ray has one hit");

@@ -3,14 +3,21 @@
 use glam::Vec3;
 use kdray::{
     accel::kdtree::Node,
-    layout::{NO_TRIANGLE, Ray, Triangle},
+    layout::{NO_TRIANGLE, PathRay, Triangle},
 };
 
 use super::{MeshWithTree, random::Random};
 
 /// A ray of the length `t_max`, from no triangle.
-pub fn ray(origin: Vec3, direction: Vec3) -> Ray {
-    Ray { origin, pixel_ix: 0, direction, source_triangle: NO_TRIANGLE, throughput: Vec3::ONE, t_max: f32::INFINITY }
+pub fn ray(origin: Vec3, direction: Vec3) -> PathRay {
+    PathRay {
+        origin,
+        pixel_ix: 0,
+        direction,
+        source_triangle: NO_TRIANGLE,
+        throughput: Vec3::ONE,
+        t_max: f32::INFINITY,
+    }
 }
 
 fn corner(random: &mut Random, triangles: &[Triangle]) -> Vec3 {
@@ -44,7 +51,7 @@ fn split_plane_point(random: &mut Random, world: &MeshWithTree, point: Vec3) -> 
 }
 
 /// One of the kinds of rays below, in turn.
-pub fn nasty_ray(random: &mut Random, world: &MeshWithTree, kind: usize) -> Ray {
+pub fn nasty_ray(random: &mut Random, world: &MeshWithTree, kind: usize) -> PathRay {
     let far = world.centre() + 3.0 * world.radius() * random.direction();
     let within = random.in_box(world.tree.cell_min(), world.tree.cell_max());
     let vertex = corner(random, &world.triangles);

@@ -7,7 +7,7 @@ use crate::layout::Triangle;
 /// Times the largest coordinate: a leaf has every triangle that comes so near to its cell.
 ///
 /// So the traversal may take its own arithmetic as exact: the leaf in which it finds itself at a hit's t has the triangle.
-/// Proof: let m be the largest coordinate, u = 2^-24, and |o| <= 4 m (`KD_ORIGIN_REACH`) where the ray starts. With
+/// Proof: let m be the largest coordinate, u = 2^-24, and |o| <= 4 m (`KD_MAX_ORIGIN_DISTANCE`) where the ray starts. With
 /// divisions right to 2.5 units in the last place, as Vulkan has them, a plane's crossing at p is off by u (|o| + |p| +
 /// 6 |p - o|) <= 35 u m in space. The point at a hit's t is off the triangle by u (11.5 D + 14 L) on each axis, as
 /// `reference::triangle` proves. D, from o to the farthest corner, is at most 5 m, and L, between two corners, at most 2 m,

@@ -18,8 +18,8 @@ mod build;
 mod clip;
 mod counted;
 mod coverage;
-mod extras;
 mod flatten;
+mod links;
 mod parts;
 mod planes;
 mod ropes;
@@ -33,7 +33,7 @@ mod validate;
 
 use crate::layout::{AccelConstants, KD_AXIS_MASK, KD_LEAF, KD_MAX_DEPTH, KD_PAIR_SHIFT, KD_PLANE_EPSILON, KdNode};
 
-pub use extras::Extras;
+pub use links::TraversalLinks;
 pub use parts::Parts;
 pub use statistics::Statistics;
 pub use traversal::Traversal;

@@ -1,7 +1,7 @@
 //! The planes of the leaves' triangles: where a ray keeps clear of a plane, its triangle need not be tested.
 //!
 //! How clear it has to keep, `KD_PLANE_EPSILON`, is twice the tree's margin: 256 units of 2^-24 times the largest
-//! coordinate. With origins as far away as `KD_ORIGIN_REACH` allows, the point at a hit's t is off the triangle by 86
+//! coordinate. With origins as far away as `KD_MAX_ORIGIN_DISTANCE` allows, the point at a hit's t is off the triangle by 86
 //! units on each axis (bounds.rs), so by 149 across its plane. What rounding does to the plane and to the ray's heights
 //! above it is: the plane 4, the origin's height 30, the slope over the ray's length 26, the middle of its way through
 //! the leaf and half of that way 9 each, their two heights 4 each. Together it is 235, of 256.

@@ -10,7 +10,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{KdTree, Node, bounds::Bounds, clip::Polygon};
-use crate::layout::{KD_IN_SLAB, Slab, Triangle};
+use crate::layout::{KD_HAS_SLAB, Slab, Triangle};
 
 /// Entries below a node at most: on the way down, the first node with no more than each of these gets a slab, if the surface
 /// there is flat enough to be passed by. Larger pieces hardly are (benches/EXPERIMENTS.md).
@@ -40,7 +40,7 @@ impl KdTree {
         parts.slabs = vec![Slab::default(); parts.nodes.len()];
         for (node, slab) in slabs.into_iter().flatten() {
             parts.slabs[node as usize] = slab;
-            parts.nodes[node as usize].axis_and_child |= KD_IN_SLAB;
+            parts.nodes[node as usize].axis_and_child |= KD_HAS_SLAB;
         }
     }
 
@@ -50,7 +50,7 @@ impl KdTree {
     }
 
     pub(super) fn is_in_slab(&self, node_ix: u32) -> bool {
-        self.nodes()[node_ix as usize].axis_and_child & KD_IN_SLAB != 0
+        self.nodes()[node_ix as usize].axis_and_child & KD_HAS_SLAB != 0
     }
 
     /// Of each node: entries of all leaves below.

@@ -18,7 +18,7 @@ use crate::{
     cpu::trace,
     frame::{Denoise, Primary, RenderOptions, frame_constants},
     gpu::{Context, GpuError},
-    layout::{CastRay, Frame, Hit, Ray},
+    layout::{Frame, Hit, PathRay, Ray},
     reference::{bindings::Bindings, primary_hit::primary_rays},
     render::Renderer,
     world::{FlatScene, World},
@@ -51,7 +51,7 @@ pub fn measure_traversals(
     let rays = some_rays(scene, tree, &frame);
     let mut buffers = AccelBuffers::new(context, world.geometry())?;
     if traversals.contains(&Traversal::Ropes) {
-        buffers.add_extras(context, tree, Traversal::Ropes)?;
+        buffers.add_links(context, tree, Traversal::Ropes)?;
     }
     let bindings = CastResources::bindings(context, &buffers)?;
     let resources = Rc::new(CastResources::new(context, &bindings, &buffers, rays.len())?);
@@ -70,8 +70,8 @@ pub fn measure_traversals(
 }
 
 /// Rays of the scene's camera, and one from each of their hits into the hemisphere above it. They depend on no device.
-fn some_rays(scene: &FlatScene, tree: &KdTree, frame: &Frame) -> Vec<CastRay> {
-    let mut from_camera = vec![Ray::zeroed(); (frame.width * frame.height) as usize];
+fn some_rays(scene: &FlatScene, tree: &KdTree, frame: &Frame) -> Vec<Ray> {
+    let mut from_camera = vec![PathRay::zeroed(); (frame.width * frame.height) as usize];
     primary_rays(frame, 0, &mut from_camera);
     let mut hits = vec![Hit::zeroed(); from_camera.len()];
     trace(&Bindings::new(scene, tree, frame), Traversal::OF_CPU, &from_camera, &mut hits);

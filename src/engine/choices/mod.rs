@@ -47,7 +47,7 @@ use crate::{
     },
     frame::{Primary, RenderOptions},
     gpu::{Context, DeviceInfo, GpuError},
-    layout::KD_ORIGIN_REACH,
+    layout::KD_MAX_ORIGIN_DISTANCE,
     scene::Camera,
     world::World,
 };
@@ -81,7 +81,7 @@ impl Processor {
     pub fn of(context: Option<&Context>) -> Self {
         match context {
             None => Self::Cpu,
-            Some(context) if context.runs_both_sides() => Self::SoftwareDriver,
+            Some(context) if context.predicates_branches() => Self::SoftwareDriver,
             Some(_) => Self::Gpu,
         }
     }
@@ -125,7 +125,7 @@ impl Workload {
     /// Whether primary rays find the same hits, bit for bit, traced and rasterized by kernels.
     fn primaries_agree(&self, tree: &KdTree) -> bool {
         let largest_coordinate = tree.cell_min().abs().max(tree.cell_max().abs()).max_element();
-        self.farthest_eye <= KD_ORIGIN_REACH * largest_coordinate
+        self.farthest_eye <= KD_MAX_ORIGIN_DISTANCE * largest_coordinate
     }
 
     /// The work of a window, which goes on for as long as the user likes, from wherever the user likes.

@@ -16,7 +16,7 @@ pub fn traversal_by_rule(processor: Processor) -> Traversal {
 pub fn primary_by_rule(context: Option<&Context>, n_triangles: usize, size: (u32, u32)) -> Primary {
     match context {
         // Mesa's lavapipe: 870,000 triangles in 72 ms, 790,000 rays in 242 (benches/EXPERIMENTS.md).
-        Some(context) if context.runs_both_sides() => Primary::suited_to(n_triangles, size, 4),
+        Some(context) if context.predicates_branches() => Primary::suited_to(n_triangles, size, 4),
         Some(context) if context.has_wide_atomics() && RasterQueue::has_room(context, n_triangles) => Primary::Compute,
         _ => Primary::suited_to(n_triangles, size, 1),
     }

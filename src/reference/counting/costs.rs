@@ -13,11 +13,11 @@ use crate::reference::{
 };
 use crate::{
     accel::kdtree::Traversal,
-    layout::{Feature, Hit, NO_TRIANGLE, Ray},
+    layout::{Feature, Hit, NO_TRIANGLE, PathRay},
 };
 
 /// Primary rays whose triangles the rasterizer found: one test each.
-pub fn count_rasterized(rays: &[Ray], hits: &[Hit], pixel_features: &mut [Feature]) {
+pub fn count_rasterized(rays: &[PathRay], hits: &[Hit], pixel_features: &mut [Feature]) {
     for (ray, hit) in rays.iter().zip(hits) {
         let feature = &mut pixel_features[ray.pixel_ix as usize];
         feature.n_rays = 1;
@@ -26,7 +26,7 @@ pub fn count_rasterized(rays: &[Ray], hits: &[Hit], pixel_features: &mut [Featur
 }
 
 /// Rays whose closest hit was found through the tree.
-pub fn count_closest(bindings: &Bindings, traversal: Traversal, rays: &[Ray], pixel_features: &mut [Feature]) {
+pub fn count_closest(bindings: &Bindings, traversal: Traversal, rays: &[PathRay], pixel_features: &mut [Feature]) {
     let steps: Vec<_> = (rays.par_iter().with_min_len(RAYS_PER_TASK))
         .map_init(|| Traverser::new(traversal), |traverser, ray| steps_of::<false>(bindings, traverser, ray))
         .collect();
@@ -39,7 +39,7 @@ pub fn count_closest(bindings: &Bindings, traversal: Traversal, rays: &[Ray], pi
 pub fn count_shadow(
     bindings: &Bindings,
     traversal: Traversal,
-    rays: &[Ray],
+    rays: &[PathRay],
     hits: &[Hit],
     pixel_features: &mut [Feature],
 ) {
@@ -62,7 +62,7 @@ pub fn count_shadow(
     }
 }
 
-fn steps_of<const ANY: bool>(bindings: &Bindings, traverser: &mut Traverser, ray: &Ray) -> u32 {
+fn steps_of<const ANY: bool>(bindings: &Bindings, traverser: &mut Traverser, ray: &PathRay) -> u32 {
     if matches!(traverser, Traverser::Brute) {
         return bindings.triangles.len() as u32;
     }
@@ -71,7 +71,7 @@ fn steps_of<const ANY: bool>(bindings: &Bindings, traverser: &mut Traverser, ray
     (counts.n_nodes.get() + counts.n_triangles.get()) as u32
 }
 
-fn add(pixel_features: &mut [Feature], ray: &Ray, n_steps: u32) {
+fn add(pixel_features: &mut [Feature], ray: &PathRay, n_steps: u32) {
     let feature = &mut pixel_features[ray.pixel_ix as usize];
     feature.n_rays += 1;
     feature.n_steps += n_steps;

@@ -11,7 +11,7 @@ use crate::reference::{
 };
 use crate::{
     accel::{Query, kdtree::Traversal},
-    layout::Ray,
+    layout::PathRay,
 };
 
 /// Reads for one or more rays.
@@ -51,11 +51,11 @@ impl From<ReadCounts> for Steps {
 
 /// The reads of all rays together. The kernels' are the same, but where rounding sends a ray another way. Brute force
 /// tests every triangle, whatever is asked.
-pub fn count_steps(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[Ray]) -> Steps {
+pub fn count_steps(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[PathRay]) -> Steps {
     if traversal == Traversal::Brute {
         return Steps { n_triangles: (rays.len() * bindings.triangles.len()) as u64, ..Steps::default() };
     }
-    let of_task = |traverser: &mut Traverser, rays: &[Ray]| {
+    let of_task = |traverser: &mut Traverser, rays: &[PathRay]| {
         let counts = ReadCounts::default();
         let counted = bindings.counted(&counts);
         for ray in rays {
@@ -75,7 +75,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        accel::kdtree::{BuildOptions, Extras, KdTree},
+        accel::kdtree::{BuildOptions, KdTree, TraversalLinks},
         layout::{NO_TRIANGLE, Triangle},
     };
 
@@ -91,22 +91,22 @@ mod tests {
     }
 
     /// Without slabs.
-    fn steps(max_depth: u32, traversal: Traversal, query: Query, rays: &[Ray]) -> Steps {
+    fn steps(max_depth: u32, traversal: Traversal, query: Query, rays: &[PathRay]) -> Steps {
         let options = BuildOptions { max_depth: Some(max_depth), slabs: false, ..BuildOptions::default() };
         steps_through(options, traversal, query, rays)
     }
 
-    fn steps_through(options: BuildOptions, traversal: Traversal, query: Query, rays: &[Ray]) -> Steps {
+    fn steps_through(options: BuildOptions, traversal: Traversal, query: Query, rays: &[PathRay]) -> Steps {
         let triangles = two_triangles();
         let options = BuildOptions { traversal_cost: 1e-3, ..options };
         let tree = KdTree::build(&triangles, &options);
-        let extras = Extras::all(&tree);
-        count_steps(&Bindings::of_tree(&triangles, &tree).with_extras(&extras), traversal, query, rays)
+        let links = TraversalLinks::all(&tree);
+        count_steps(&Bindings::of_tree(&triangles, &tree).with_links(&links), traversal, query, rays)
     }
 
-    fn ray(origin: Vec3, direction: Vec3) -> Ray {
+    fn ray(origin: Vec3, direction: Vec3) -> PathRay {
         let t_max = f32::INFINITY;
-        Ray { origin, pixel_ix: 0, direction, source_triangle: NO_TRIANGLE, throughput: Vec3::ONE, t_max }
+        PathRay { origin, pixel_ix: 0, direction, source_triangle: NO_TRIANGLE, throughput: Vec3::ONE, t_max }
     }
 
     #[test]

@@ -6,16 +6,16 @@ use std::{
 };
 
 /// Who is told of reads.
-pub trait Reads: Copy {
+pub trait ReadCounter: Copy {
     /// `n` elements are read.
     fn read(self, n: usize);
 }
 
 /// Nobody.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Uncounted;
+pub struct NoCounter;
 
-impl Reads for Uncounted {
+impl ReadCounter for NoCounter {
     #[inline(always)]
     fn read(self, _: usize) {}
 }
@@ -24,7 +24,7 @@ impl Reads for Uncounted {
 #[derive(Clone, Copy, Debug)]
 pub struct Counted<'c>(pub &'c Cell<u64>);
 
-impl Reads for Counted<'_> {
+impl ReadCounter for Counted<'_> {
     #[inline(always)]
     fn read(self, n: usize) {
         self.0.set(self.0.get() + n as u64);
@@ -45,25 +45,25 @@ pub struct ReadCounts {
 
 /// A slice and who is told of its reads.
 #[derive(Clone, Copy, Debug)]
-pub struct Table<'a, T, R = Uncounted> {
+pub struct CountedSlice<'a, T, R = NoCounter> {
     items: &'a [T],
     reads: R,
 }
 
-impl<'a, T> From<&'a [T]> for Table<'a, T> {
+impl<'a, T> From<&'a [T]> for CountedSlice<'a, T> {
     fn from(items: &'a [T]) -> Self {
-        Self { items, reads: Uncounted }
+        Self { items, reads: NoCounter }
     }
 }
 
-impl<'a, T, R> Table<'a, T, R> {
+impl<'a, T, R> CountedSlice<'a, T, R> {
     /// The same slice, with another told of reads.
-    pub fn told_to<S>(self, reads: S) -> Table<'a, T, S> {
-        Table { items: self.items, reads }
+    pub fn with_counter<S>(self, reads: S) -> CountedSlice<'a, T, S> {
+        CountedSlice { items: self.items, reads }
     }
 }
 
-impl<'a, T, R: Reads> Table<'a, T, R> {
+impl<'a, T, R: ReadCounter> CountedSlice<'a, T, R> {
     /// The element, if there is one: only then it is read.
     #[inline(always)]
     pub fn get(&self, ix: usize) -> Option<&'a T> {
@@ -73,7 +73,7 @@ impl<'a, T, R: Reads> Table<'a, T, R> {
     }
 }
 
-impl<T, R: Reads> Index<usize> for Table<'_, T, R> {
+impl<T, R: ReadCounter> Index<usize> for CountedSlice<'_, T, R> {
     type Output = T;
 
     #[inline(always)]
@@ -83,7 +83,7 @@ impl<T, R: Reads> Index<usize> for Table<'_, T, R> {
     }
 }
 
-impl<T, R: Reads> Index<Range<usize>> for Table<'_, T, R> {
+impl<T, R: ReadCounter> Index<Range<usize>> for CountedSlice<'_, T, R> {
     type Output = [T];
 
     #[inline(always)]
@@ -101,7 +101,7 @@ mod tests {
     #[test]
     fn every_element_that_is_read_counts_once() {
         let n = Cell::new(0);
-        let table = Table::from(&[5, 6, 7, 8][..]).told_to(Counted(&n));
+        let table = CountedSlice::from(&[5, 6, 7, 8][..]).with_counter(Counted(&n));
         assert_eq!((table[1], &table[1..4], n.get()), (6, &[6, 7, 8][..], 4));
         assert_eq!((table[2..2].len(), n.get()), (0, 4));
         assert_eq!((table.get(3), table.get(4), n.get()), (Some(&8), None, 5));

@@ -129,7 +129,7 @@ impl Renderer {
         if self.most_pixels == most_pixels {
             return Ok(());
         }
-        let spans = self.room.spans(self.resources.constants(), most_pixels);
+        let spans = self.budget.spans(self.resources.constants(), most_pixels);
         self.reschedule(spans)?;
         self.most_pixels = most_pixels;
         Ok(())

@@ -103,10 +103,10 @@ impl Renderer {
 
     /// Buffers and batches for other sizes, another number of bounces, or other outputs.
     fn with_room(&self, constants: Frame, options: &RenderOptions) -> Result<(Resources, Schedule), GpuError> {
-        let queue_capacity = self.room.queue_capacity(self.context.limits(), &constants);
+        let queue_capacity = self.budget.queue_capacity(self.context.limits(), &constants);
         let n_lanes = lanes_to_share(&self.context, options)?;
         let constants = Frame { queue_capacity, n_lanes, ..constants };
-        let spans = self.room.spans(&constants, self.most_pixels);
+        let spans = self.budget.spans(&constants, self.most_pixels);
         let schedule = Schedule::new(&self.context, &constants, spans, options)?;
         let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
         let tree = (self.options.traversal != options.traversal).then(|| self.world.tree());

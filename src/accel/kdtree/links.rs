@@ -8,14 +8,14 @@ use crate::{
 
 /// Empty where a traversal asks for nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Extras {
+pub struct TraversalLinks {
     /// One a node.
     pub boxes: Vec<KdBox>,
     /// Six a node: below and above on x, y, z.
     pub ropes: Vec<KdRope>,
 }
 
-impl Extras {
+impl TraversalLinks {
     /// What the traversal reads of the tree.
     pub fn new(tree: &KdTree, traversal: Traversal) -> Self {
         let boxes = if traversal.needs_boxes() { tree.boxes() } else { Vec::new() };
