@@ -46,7 +46,7 @@ fn mesh() -> FlatScene {
 
 fn closest_hits(stage: &Stage, rays: &[PathRay]) -> Vec<Hit> {
     let mut traverser = Traverser::new(Traversal::Mask);
-    rays.iter().map(|ray| traverser.traverse::<false>(&stage.bindings(), &ray.into())).collect()
+    rays.iter().map(|ray| traverser.traverse::<false>(&stage.inputs(), &ray.into())).collect()
 }
 
 fn rays(sets: &[RaySet; 4], kind: RayKind) -> &[PathRay] {

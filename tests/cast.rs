@@ -221,7 +221,7 @@ fn the_interval_s_ends_are_exact() {
     let device = Device::new();
     let world = MeshWithTree::new(meshes::torus(40, 20));
     let is_near =
-        |cast: &Ray| near_scene(&world.bindings(), &SearchRay::from(&ray(cast.origin, cast.direction))).1 == 0.0;
+        |cast: &Ray| near_scene(&world.inputs(), &SearchRay::from(&ray(cast.origin, cast.direction))).1 == 0.0;
     let rays: Vec<_> = some_rays(&world, 5000, -9.0..=9.0).into_iter().filter(is_near).collect();
     let mut caster = device.caster(&world, Traversal::Mask);
     let mut cast = |rays: &[Ray]| {

@@ -47,7 +47,7 @@ impl Case {
         let hit_of = |ray: &Ray| {
             let &Ray { origin, t_min, direction, t_max } = ray;
             let probe = SearchRay { origin, t_min, direction, t_max, source_triangle: NO_TRIANGLE };
-            let hit = hit_from_near(&self.mesh.bindings(), &probe, |near, best| {
+            let hit = hit_from_near(&self.mesh.inputs(), &probe, |near, best| {
                 *best = brute::closest_hit(&triangles, near);
             });
             if hit.triangle_ix == NO_TRIANGLE {
@@ -128,8 +128,8 @@ fn a_mesh_of_which_all_is_hidden_is_not_there() {
         t_max: f32::INFINITY,
         source_triangle: NO_TRIANGLE,
     };
-    assert_ne!(traverser.traverse::<false>(&mesh.bindings(), &into).triangle_ix, NO_TRIANGLE);
+    assert_ne!(traverser.traverse::<false>(&mesh.inputs(), &into).triangle_ix, NO_TRIANGLE);
     let words = vec![TRIANGLE_HIDDEN; mesh.triangles.len()];
-    let bindings = mesh.bindings().with_hidden(&words);
+    let bindings = mesh.inputs().with_hidden(&words);
     assert_eq!(traverser.traverse::<false>(&bindings, &into).triangle_ix, NO_TRIANGLE);
 }

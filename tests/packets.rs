@@ -119,7 +119,7 @@ fn every_set_of_instructions_finds_the_same() {
         let world = MeshWithTree::new(triangles);
         let rays: Vec<_> = (0..1500).flat_map(|seed| rays_of_a_packet(&mut Random(seed), &world)).collect();
         let mut one = Traverser::new(Traversal::Mask);
-        let expected: Vec<Hit> = rays.iter().map(|ray| one.traverse::<false>(&world.bindings(), &ray.into())).collect();
+        let expected: Vec<Hit> = rays.iter().map(|ray| one.traverse::<false>(&world.inputs(), &ray.into())).collect();
         assert!(expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count() > rays.len() / 5);
         for level in levels() {
             let closest = traced::<false>(&world, level, &rays);
@@ -170,7 +170,7 @@ fn sixteen_rays_of_an_octant_are_a_packet() {
 fn rays_of_an_octant_take_children_in_one_order() {
     let world = MeshWithTree::new(meshes::cube(2, 0.0));
     for direction in directions_in_turn() {
-        let ray = TraversalRay::new(&world.bindings(), &SearchRay::from(&support::rays::ray(Vec3::ZERO, direction)));
+        let ray = TraversalRay::new(&world.inputs(), &SearchRay::from(&support::rays::ray(Vec3::ZERO, direction)));
         for axis in 0..3 {
             assert_eq!(signs_of(direction) >> axis & 1 == 1, ray.inv_direction[axis] < 0.0, "{direction}");
         }

@@ -11,9 +11,9 @@ use kdray::{
     cpu::tracer::FastTracer,
     layout::{Hit, NO_TRIANGLE, PathRay, Slab, Triangle},
     reference::{
-        bindings::Bindings,
         brute,
         counting::{steps::count_steps, table::CountedSlice},
+        inputs::KernelInputs,
         kdtree::near_scene,
         search_ray::SearchRay,
         traverser::{Tracer, Traverser},
@@ -40,10 +40,10 @@ fn rays_at(world: &MeshWithTree) -> Vec<PathRay> {
 /// The hits that the engine finds for rays that go together. They are the reference's, bit for bit, and where any hit
 /// answers, the same rays hit.
 fn traced(world: &MeshWithTree, traversal: Traversal, rays: &[PathRay]) -> Vec<Hit> {
-    traced_through(&world.bindings(), traversal, rays)
+    traced_through(&world.inputs(), traversal, rays)
 }
 
-fn traced_through(bindings: &Bindings, traversal: Traversal, rays: &[PathRay]) -> Vec<Hit> {
+fn traced_through(bindings: &KernelInputs, traversal: Traversal, rays: &[PathRay]) -> Vec<Hit> {
     let of_task = |(engine, reference): &mut (FastTracer, Traverser), rays: &[PathRay]| {
         let (mut closest, mut is_hit) = (vec![Hit::default(); rays.len()], vec![false; rays.len()]);
         let probes = || rays.iter().map(SearchRay::from).enumerate();
@@ -141,8 +141,8 @@ fn a_missing_triangle_in_a_leaf_is_noticed() {
 fn slabs_spare_steps() {
     let world = MeshWithTree::new(meshes::torus(120, 60));
     let rays = rays_at(&world);
-    let bindings = world.bindings();
-    let without = Bindings { kd_slabs: CountedSlice::from(&[][..]), ..bindings };
+    let bindings = world.inputs();
+    let without = KernelInputs { kd_slabs: CountedSlice::from(&[][..]), ..bindings };
     for traversal in tree_traversals() {
         let [some, all] = [bindings, without].map(|bindings| {
             let steps = count_steps(&bindings, traversal, Query::Closest, &rays);
@@ -156,9 +156,9 @@ fn slabs_spare_steps() {
 fn slabs_beside_their_surface_are_noticed() {
     let world = MeshWithTree::new(meshes::torus(120, 60));
     let rays = rays_at(&world);
-    let bindings = world.bindings();
+    let bindings = world.inputs();
     let moved: Vec<Slab> = world.tree.slabs().iter().map(|slab| Slab { offset: slab.offset + 2.0, ..*slab }).collect();
-    let moved = Bindings { kd_slabs: CountedSlice::from(&moved[..]), ..bindings };
+    let moved = KernelInputs { kd_slabs: CountedSlice::from(&moved[..]), ..bindings };
     for traversal in tree_traversals() {
         let [expected, found] = [&bindings, &moved].map(|bindings| traced_through(bindings, traversal, &rays));
         assert!(first_difference(&rays, &expected, &found).is_some(), "{traversal}");
@@ -253,7 +253,7 @@ fn rays_from_afar_hit_the_same() {
             ray(origin, (within - origin).normalize())
         };
         let rays: Vec<PathRay> = (0..N_RAYS / 10).map(afar).collect();
-        assert!(rays.iter().all(|ray| near_scene(&world.bindings(), &SearchRay::from(ray)).1 > 0.0));
+        assert!(rays.iter().all(|ray| near_scene(&world.inputs(), &SearchRay::from(ray)).1 > 0.0));
         let unmoved: Vec<Hit> =
             rays.par_iter().map(|ray| brute::closest_hit(&world.triangles, &SearchRay::from(ray))).collect();
         for traversal in tree_traversals() {

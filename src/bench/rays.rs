@@ -57,7 +57,7 @@ pub struct RaySet {
 /// The four sets, in the order of [`RayKind::ALL`]: `width * height` primary rays, and one ray of each other kind for
 /// each of their hits. The same stage gives the same rays.
 pub fn ray_sets(stage: &Stage) -> [RaySet; 4] {
-    let bindings = stage.bindings();
+    let bindings = stage.inputs();
     let mut primary = vec![PathRay::zeroed(); (stage.frame.width * stage.frame.height) as usize];
     primary_rays(&stage.frame, 0, &mut primary);
     let mut hits = vec![Hit::zeroed(); primary.len()];

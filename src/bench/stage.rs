@@ -8,7 +8,7 @@ use crate::{
     accel::kdtree::{BuildOptions, KdTree, TraversalLinks},
     frame::{RenderOptions, frame_constants},
     layout::{FLAT_NORMAL, Frame, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
-    reference::bindings::Bindings,
+    reference::inputs::KernelInputs,
     scene::Camera,
     world::{FlatScene, World},
 };
@@ -69,8 +69,8 @@ impl Stage {
     }
 
     /// What a traversal on the CPU reads.
-    pub fn bindings(&self) -> Bindings<'_> {
-        Bindings::new(self.scene(), self.tree(), &self.frame).with_links(&self.links)
+    pub fn inputs(&self) -> KernelInputs<'_> {
+        KernelInputs::new(self.scene(), self.tree(), &self.frame).with_links(&self.links)
     }
 }
 

@@ -63,7 +63,7 @@ impl<'a> Tracers<'a> {
                 *difference = difference.max(Difference::of(set.kind, &expected, &hits));
             }
         }
-        let bindings = self.stage.bindings();
+        let bindings = self.stage.inputs();
         let result = |(variant_ix, (ms, difference)): (usize, (Option<Vec<f64>>, _))| {
             let variant = self.variants[variant_ix];
             let ms = ms.and_then(Spread::of);
@@ -116,7 +116,7 @@ impl<'a> Tracers<'a> {
 
     fn cast_on_cpu(&self, variant: Traversal, rays: &[Ray], query: Query) -> Vec<Hit> {
         let mut hits = vec![Hit::zeroed(); rays.len()];
-        cpu::cast(&self.stage.bindings(), variant, query, rays, &mut hits);
+        cpu::cast(&self.stage.inputs(), variant, query, rays, &mut hits);
         hits
     }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{AccelBuffers, accel, binding};
 use crate::{
-    gpu::{Binding, BindingSet, Bindings, Buffer, BufferUse, Context, GivenBuffer, GpuError},
+    gpu::{Binding, BindingLayout, BindingSet, Buffer, BufferUse, Context, GivenBuffer, GpuError},
     layout::{BIND_CAST_HITS, BIND_CAST_RAYS, CastBatch, Hit, Ray},
 };
 
@@ -21,9 +21,9 @@ impl CastResources {
     ///
     /// # Errors
     /// Out of memory.
-    pub fn bindings(context: &Arc<Context>, tree: &AccelBuffers) -> Result<Arc<Bindings>, GpuError> {
+    pub fn bindings(context: &Arc<Context>, tree: &AccelBuffers) -> Result<Arc<BindingLayout>, GpuError> {
         let kinds: Vec<_> = accel::bindings().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
-        Bindings::with_constants(context, &kinds, size_of::<CastBatch>() as u32, tree.constants())
+        BindingLayout::with_constants(context, &kinds, size_of::<CastBatch>() as u32, tree.constants())
     }
 
     /// The set over rays and hits of the caller's own.
@@ -31,7 +31,7 @@ impl CastResources {
     /// # Errors
     /// Out of memory.
     pub fn given(
-        bindings: &Arc<Bindings>,
+        bindings: &Arc<BindingLayout>,
         tree: &AccelBuffers,
         rays: GivenBuffer,
         hits: GivenBuffer,
@@ -46,7 +46,7 @@ impl CastResources {
     /// Beyond the device's limits, out of memory.
     pub fn new(
         context: &Arc<Context>,
-        bindings: &Arc<Bindings>,
+        bindings: &Arc<BindingLayout>,
         tree: &AccelBuffers,
         len: usize,
     ) -> Result<Self, GpuError> {

@@ -10,7 +10,7 @@ use super::{
 use crate::{
     accel::kdtree::KdTree,
     frame::RenderOptions,
-    gpu::{Access, Binding, BindingSet, Bindings, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
+    gpu::{Access, Binding, BindingLayout, BindingSet, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
     layout::{self, Batch, Bounce, COUNTER_PLACES, COUNTER_STRIDE, Counters, Frame, Light, Material},
     world::World,
 };
@@ -21,7 +21,7 @@ const PUSH_BYTES: u32 = {
     if batch > present { batch as u32 } else { present as u32 }
 };
 
-/// Bindings of the frame's descriptor set beside those of the scene.
+/// BindingLayout of the frame's descriptor set beside those of the scene.
 const OWN_BINDINGS: [u32; 22] = [
     layout::BIND_FRAME,
     layout::BIND_MATERIALS,
@@ -70,7 +70,7 @@ pub struct Resources {
     /// One a batch and bounce.
     pub bounces: Buffer<Bounce>,
     counters: Buffer<Counters>,
-    pub bindings: Arc<Bindings>,
+    pub bindings: Arc<BindingLayout>,
     /// None while all else is made.
     set: Option<Arc<BindingSet>>,
     constants: Frame,
@@ -109,7 +109,7 @@ impl Resources {
             raster: RasterQueue::new(context, constants.n_triangles, options)?,
             bounces: new_bounces(context, n_bounces)?,
             counters: new_counters(context, n_bounces)?,
-            bindings: Bindings::with_constants(context, &kinds, PUSH_BYTES, accel.constants())?,
+            bindings: BindingLayout::with_constants(context, &kinds, PUSH_BYTES, accel.constants())?,
             accel,
             set: None,
             constants: *constants,

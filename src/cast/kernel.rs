@@ -6,7 +6,7 @@ use super::Contender;
 use crate::{
     accel::{Query, kdtree::Traversal},
     buffers::{CastResources, Round},
-    gpu::{Access, Bindings, Commands, Context, GpuError},
+    gpu::{Access, BindingLayout, Commands, Context, GpuError},
     passes::Cast,
 };
 
@@ -24,7 +24,7 @@ impl Kernel {
     /// The driver refuses the shader.
     pub fn new(
         context: &Arc<Context>,
-        bindings: &Arc<Bindings>,
+        bindings: &Arc<BindingLayout>,
         resources: &Rc<CastResources>,
         (traversal, query): (Traversal, Query),
     ) -> Result<Self, GpuError> {

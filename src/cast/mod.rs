@@ -33,7 +33,7 @@ use crate::{
     },
     buffers::{AccelBuffers, CastResources, Round, hidden_words},
     cpu,
-    gpu::{Access, Bindings, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
+    gpu::{Access, BindingLayout, CommandBuffer, Context, GpuError, Limits, Statistic, Timer},
     layout::{PathRay, RAY_GROUP_SIZE},
     passes, reference,
     world::Geometry,
@@ -57,7 +57,7 @@ pub const RAYS_PER_BATCH: usize = 1 << 21;
 pub struct Caster {
     context: Arc<Context>,
     tree: AccelBuffers,
-    bindings: Arc<Bindings>,
+    bindings: Arc<BindingLayout>,
     traversal: Traversal,
     /// For [`Query::Closest`] and [`Query::Any`], once they have been asked.
     closest: Option<Rc<passes::Cast>>,
@@ -233,7 +233,7 @@ impl<'a> CpuCaster<'a> {
 
     /// One hit a ray.
     pub fn cast(&self, rays: &[Ray], query: Query) -> Vec<Hit> {
-        let bindings = reference::bindings::Bindings::of_tree(self.geometry.triangles(), self.geometry.tree());
+        let bindings = reference::inputs::KernelInputs::of_tree(self.geometry.triangles(), self.geometry.tree());
         let bindings = match &self.hidden {
             Some(words) => bindings.with_hidden(words),
             None => bindings,

@@ -13,8 +13,8 @@ use super::{
 use crate::{
     layout::{Hit, KD_LEAST_COMPONENT, KD_PLANE_EPSILON, KdNode, Slab},
     reference::{
-        bindings::Bindings,
         counting::table::ReadCounter,
+        inputs::KernelInputs,
         kdtree::{TraversalRay, largest_coordinate, origin_reach, signs_of},
         leaf::{Target, entries_of},
     },
@@ -116,12 +116,17 @@ fn dot<S: Simd>(normal: Vec3, v: &[f32x16<S>; 3]) -> f32x16<S> {
 impl<S: Simd> Packet<S> {
     /// The first `n_rays`, and where they are in the root's cell: the operations of `TraversalRay::new`.
     #[inline(always)]
-    pub fn new(simd: S, bindings: &Bindings<impl ReadCounter>, probes: &RaysSoa, n_rays: usize) -> (Self, Interval<S>) {
+    pub fn new(
+        simd: S,
+        inputs: &KernelInputs<impl ReadCounter>,
+        probes: &RaysSoa,
+        n_rays: usize,
+    ) -> (Self, Interval<S>) {
         let (origin, direction) = (columns(simd, &probes.origin), columns(simd, &probes.direction));
         let inv_direction = [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])];
         let bias = [-origin[0] * inv_direction[0], -origin[1] * inv_direction[1], -origin[2] * inv_direction[2]];
-        let [x0, y0, z0] = times_plus(bindings.cell_min.to_array(), &inv_direction, &bias);
-        let [x1, y1, z1] = times_plus(bindings.cell_max.to_array(), &inv_direction, &bias);
+        let [x0, y0, z0] = times_plus(inputs.cell_min.to_array(), &inv_direction, &bias);
+        let [x1, y1, z1] = times_plus(inputs.cell_max.to_array(), &inv_direction, &bias);
         let t_min = f32x16::load_array_ref(simd, &probes.t_min);
         let t_max = f32x16::load_array_ref(simd, &probes.t_max);
         let whole = Interval {
@@ -134,7 +139,7 @@ impl<S: Simd> Packet<S> {
             inv_direction,
             first_is_above: [0, 1, 2].map(|axis| signs_of(probes.direction(0)) >> axis & 1),
             bias,
-            plane_epsilon: KD_PLANE_EPSILON * largest_coordinate(bindings),
+            plane_epsilon: KD_PLANE_EPSILON * largest_coordinate(inputs),
             shears: Shears::of(&origin, &direction),
             t_min,
             source_triangle: u32x16::load_array_ref(simd, &probes.source_triangle),
@@ -147,8 +152,8 @@ impl<S: Simd> Packet<S> {
     /// Whether all rays start within reach. Missing ones are asked, too: they are those of an earlier packet, and near as a
     /// rule.
     #[inline(always)]
-    pub fn is_within_reach(&self, bindings: &Bindings<impl ReadCounter>) -> bool {
-        let reach = origin_reach(bindings);
+    pub fn is_within_reach(&self, inputs: &KernelInputs<impl ReadCounter>) -> bool {
+        let reach = origin_reach(inputs);
         let [x, y, z] = [self.origin[0].abs(), self.origin[1].abs(), self.origin[2].abs()];
         (x.simd_gt(reach) | y.simd_gt(reach) | z.simd_gt(reach)).all_false()
     }
@@ -179,7 +184,7 @@ impl<S: Simd> Packet<S> {
     #[inline(always)]
     pub fn intersect_leaf<const ANY_HIT: bool>(
         &mut self,
-        bindings: &Bindings<impl ReadCounter>,
+        inputs: &KernelInputs<impl ReadCounter>,
         leaf: KdNode,
         cell: &Interval<S>,
     ) {
@@ -190,15 +195,15 @@ impl<S: Simd> Packet<S> {
         let in_cell = cell.lanes();
         let ways = self.ways(cell);
         // Planes first, triangles after: so that the loads of several triangles are on their way at once.
-        for (triangles, first) in bindings.leaf_triangles[entries.clone()].chunks(BLOCK).zip(entries.step_by(BLOCK)) {
+        for (triangles, first) in inputs.leaf_triangles[entries.clone()].chunks(BLOCK).zip(entries.step_by(BLOCK)) {
             let mut near = [in_cell; BLOCK];
             for (lanes, entry) in near.iter_mut().zip(first..first + triangles.len()) {
-                let Some(plane) = bindings.leaf_planes.get(entry) else { break };
+                let Some(plane) = inputs.leaf_planes.get(entry) else { break };
                 *lanes &= self.lanes_near(&ways, plane.normal, plane.distance, self.plane_epsilon);
             }
             for (&triangle_ix, lanes) in triangles.iter().zip(near) {
                 if lanes != 0 {
-                    self.intersect(bindings, triangle_ix, lanes);
+                    self.intersect(inputs, triangle_ix, lanes);
                 }
             }
         }
@@ -207,8 +212,8 @@ impl<S: Simd> Packet<S> {
 
     /// A triangle against some of the rays: `leaf::intersect` for all at once.
     #[inline(always)]
-    fn intersect(&mut self, bindings: &Bindings<impl ReadCounter>, triangle_ix: u32, lanes: Lanes) {
-        let triangle = &bindings.triangles[triangle_ix as usize];
+    fn intersect(&mut self, inputs: &KernelInputs<impl ReadCounter>, triangle_ix: u32, lanes: Lanes) {
+        let triangle = &inputs.triangles[triangle_ix as usize];
         for axis in 0..3 {
             let lanes = lanes & self.shears.lanes_of_axis[axis];
             if lanes == 0 {
@@ -219,7 +224,7 @@ impl<S: Simd> Packet<S> {
                     | (found.t.simd_eq(self.best.t) & found.triangle_ix.simd_lt(self.best.triangle_ix));
                 let is_new = found.t.simd_gt(self.t_min) & found.triangle_ix.simd_ne(self.source_triangle);
                 let is_better = hit & nearer & is_new;
-                if bindings.is_accepted(triangle_ix) {
+                if inputs.is_accepted(triangle_ix) {
                     self.best = found.or(self.best, is_better);
                 }
             }

@@ -12,8 +12,8 @@ use crate::{
     accel::kdtree::EMPTY_LEAF,
     layout::{Hit, KD_MAX_DEPTH, KD_PAIR_SHIFT, KdNode},
     reference::{
-        bindings::Bindings,
         counting::table::ReadCounter,
+        inputs::KernelInputs,
         kdtree::{Cell, Pending, TraversalRay, axis_of, hit_from_near, is_leaf, search, search_cell},
         pending_stack::PendingStack,
         slab::slab_of,
@@ -54,14 +54,14 @@ impl PacketTraverser {
     #[inline(always)]
     fn descend<S: Simd>(
         &mut self,
-        bindings: &Bindings<impl ReadCounter>,
+        inputs: &KernelInputs<impl ReadCounter>,
         packet: &Packet<S>,
         node_ix: &mut u32,
         cell: &mut Interval<S>,
     ) -> KdNode {
-        let mut node = bindings.kd_nodes[*node_ix as usize];
+        let mut node = inputs.kd_nodes[*node_ix as usize];
         loop {
-            if let Some(slab) = slab_of(bindings, node, *node_ix) {
+            if let Some(slab) = slab_of(inputs, node, *node_ix) {
                 *cell = cell.of(packet.lanes_in_slab(slab, cell));
                 if cell.lanes() == 0 {
                     return EMPTY_LEAF;
@@ -86,7 +86,7 @@ impl PacketTraverser {
                     (first_ix, first)
                 }
             };
-            node = bindings.kd_nodes[*node_ix as usize];
+            node = inputs.kd_nodes[*node_ix as usize];
         }
     }
 
@@ -110,7 +110,7 @@ impl PacketTraverser {
     #[inline(always)]
     fn search<S: Simd, const ANY_HIT: bool>(
         &mut self,
-        bindings: &Bindings<impl ReadCounter>,
+        inputs: &KernelInputs<impl ReadCounter>,
         packet: &mut Packet<S>,
         whole: Interval<S>,
     ) {
@@ -123,11 +123,11 @@ impl PacketTraverser {
                 let (t_enter, t_exit) = (cell.enter.as_array()[lane], cell.exit.as_array()[lane]);
                 let (ray, alone) = (packet.ray(lane), Cell { node_ix, t_enter, t_exit });
                 let mut best = packet.hit(lane);
-                search_cell::<_, ANY_HIT>(bindings, &ray, &mut self.single, alone, &mut best);
+                search_cell::<_, ANY_HIT>(inputs, &ray, &mut self.single, alone, &mut best);
                 packet.set_hit::<ANY_HIT>(lane, &best);
             } else {
-                let leaf = self.descend(bindings, packet, &mut node_ix, &mut cell);
-                packet.intersect_leaf::<ANY_HIT>(bindings, leaf, &cell);
+                let leaf = self.descend(inputs, packet, &mut node_ix, &mut cell);
+                packet.intersect_leaf::<ANY_HIT>(inputs, leaf, &cell);
             }
             match self.pop(packet.t_best) {
                 Some(next) => (node_ix, cell) = next,
@@ -141,16 +141,16 @@ impl PacketTraverser {
     fn traverse_at<S: Simd, const ANY_HIT: bool>(
         &mut self,
         simd: S,
-        bindings: &Bindings<impl ReadCounter>,
+        inputs: &KernelInputs<impl ReadCounter>,
         probes: &RaysSoa,
         n_rays: usize,
     ) -> HitsSoa {
-        let (mut packet, whole) = Packet::new(simd, bindings, probes, n_rays);
-        if !packet.is_within_reach(bindings) {
-            return self.traverse_one_by_one::<ANY_HIT>(bindings, probes, n_rays);
+        let (mut packet, whole) = Packet::new(simd, inputs, probes, n_rays);
+        if !packet.is_within_reach(inputs) {
+            return self.traverse_one_by_one::<ANY_HIT>(inputs, probes, n_rays);
         }
         if whole.lanes() != 0 {
-            self.search::<_, ANY_HIT>(bindings, &mut packet, whole);
+            self.search::<_, ANY_HIT>(inputs, &mut packet, whole);
         }
         packet.hits()
     }
@@ -158,14 +158,14 @@ impl PacketTraverser {
     #[cold]
     fn traverse_one_by_one<const ANY_HIT: bool>(
         &mut self,
-        bindings: &Bindings<impl ReadCounter>,
+        inputs: &KernelInputs<impl ReadCounter>,
         probes: &RaysSoa,
         n_rays: usize,
     ) -> HitsSoa {
         let mut hits = HitsSoa::default();
         for lane in 0..n_rays {
-            let hit = hit_from_near(bindings, &probes.get(lane), |near, best| {
-                self.traverse_alone::<ANY_HIT>(bindings, &TraversalRay::new(bindings, near), best);
+            let hit = hit_from_near(inputs, &probes.get(lane), |near, best| {
+                self.traverse_alone::<ANY_HIT>(inputs, &TraversalRay::new(inputs, near), best);
             });
             hits.set(lane, &hit);
         }
@@ -175,20 +175,20 @@ impl PacketTraverser {
     /// The hits of the first `n_rays`, which are of one octant; void beyond them.
     pub fn traverse<const ANY_HIT: bool>(
         &mut self,
-        bindings: &Bindings<impl ReadCounter>,
+        inputs: &KernelInputs<impl ReadCounter>,
         probes: &RaysSoa,
         n_rays: usize,
     ) -> HitsSoa {
-        dispatch!(self.level, simd => self.traverse_at::<_, ANY_HIT>(simd, bindings, probes, n_rays))
+        dispatch!(self.level, simd => self.traverse_at::<_, ANY_HIT>(simd, inputs, probes, n_rays))
     }
 
     /// A ray for itself.
     pub fn traverse_alone<const ANY_HIT: bool>(
         &mut self,
-        bindings: &Bindings<impl ReadCounter>,
+        inputs: &KernelInputs<impl ReadCounter>,
         ray: &TraversalRay,
         best: &mut Hit,
     ) {
-        dispatch!(self.level, _simd => search::<_, ANY_HIT>(bindings, ray, &mut self.single, best));
+        dispatch!(self.level, _simd => search::<_, ANY_HIT>(inputs, ray, &mut self.single, best));
     }
 }

@@ -12,10 +12,11 @@ use crate::{
     layout::{Bounce, Feature, Frame, Hit, PathRay, SCAN_GROUP_SIZE},
     reference::{
         accumulate,
-        bindings::Bindings,
         compact::{self, Parents},
         counting::costs,
-        denoise, features, primary_hit, resolve,
+        denoise, features,
+        inputs::KernelInputs,
+        primary_hit, resolve,
         shade::{self, LitRays},
         tonemap,
     },
@@ -218,7 +219,7 @@ impl Renderer {
     }
 
     fn visibility(&mut self) {
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let (traversal, ids) = (self.options.traversal, &mut self.triangle_ids);
         self.clock.time(Pass::Visibility, None, || super::visibility(&inputs, traversal, ids));
     }
@@ -234,7 +235,7 @@ impl Renderer {
 
     /// Fills the bounce's `hits`, and counts them.
     fn closest_hits(&mut self, pass: Pass, depth: u32) {
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, .. } = &mut self.queue;
         hits.resize(rays.len(), Hit::zeroed());
         let places = bounces[depth as usize].rays();
@@ -249,14 +250,14 @@ impl Renderer {
 
     /// What primary rays meet.
     fn note_features(&mut self) {
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let (Queue { rays, hits, .. }, pixels) = (&self.queue, &mut self.pixel_features);
         self.clock.time(Pass::Features, Some(0), || features::features(&inputs, rays, hits, pixels));
     }
 
     /// What the rays of all bounces cost.
     fn note_costs(&mut self) {
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let (traversal, pixels) = (self.options.traversal, &mut self.pixel_features);
         let Queue { rays, bounces, hits, .. } = &self.queue;
         let n_rasterized = if self.options.primary != Primary::Trace { bounces[0].n_rays as usize } else { 0 };
@@ -268,7 +269,7 @@ impl Renderer {
 
     /// Finds out which rays go on from the bounce's hits, and counts them.
     fn compact_reduce(&mut self, depth: u32) {
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, child_kinds, scan_blocks, .. } = &mut self.queue;
         let places = bounces[depth as usize].rays();
         child_kinds.resize(rays.len(), 0);
@@ -290,7 +291,7 @@ impl Renderer {
 
     /// Writes the next bounce's rays behind this one's, if there is room for them.
     fn compact_scatter(&mut self, depth: u32) {
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, child_kinds, first_children, scan_blocks, .. } = &mut self.queue;
         let (this, next) = (bounces[depth as usize], bounces[depth as usize + 1]);
         if next.overflow != 0 {
@@ -310,7 +311,7 @@ impl Renderer {
     /// Tests the shadow segments of all bounces, and counts them.
     fn shadow(&mut self) {
         self.frame.queue_capacity = self.queue.rays.len() as u32;
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, light_visibility, .. } = &mut self.queue;
         let traversal = self.options.traversal;
         light_visibility.resize(rays.len() * inputs.lights.len(), 0);
@@ -323,7 +324,7 @@ impl Renderer {
 
     fn shade(&mut self) {
         self.frame.queue_capacity = self.queue.rays.len() as u32;
-        let inputs = Bindings::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
         let Queue { rays, hits, ray_radiance, light_visibility, .. } = &mut self.queue;
         ray_radiance.resize(rays.len(), [0.0; 4]);
         let lit = LitRays { rays, hits, light_visibility };

@@ -6,31 +6,31 @@ use super::tracer::FastTracer;
 use crate::{
     accel::{Query, kdtree::Traversal},
     layout::{Hit, PathRay, Ray},
-    reference::{self, bindings::Bindings},
+    reference::{self, inputs::KernelInputs},
 };
 
 /// Does what [`reference::trace::trace`] does.
-pub fn trace(bindings: &Bindings, traversal: Traversal, rays: &[PathRay], hits: &mut [Hit]) -> u32 {
-    reference::trace::trace_by::<FastTracer>(bindings, traversal, rays, hits)
+pub fn trace(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay], hits: &mut [Hit]) -> u32 {
+    reference::trace::trace_by::<FastTracer>(inputs, traversal, rays, hits)
 }
 
 /// Does what [`reference::shadow::shadow`] does.
 pub fn shadow(
-    bindings: &Bindings,
+    inputs: &KernelInputs,
     traversal: Traversal,
     places: &Range<usize>,
     rays_and_hits: (&[PathRay], &[Hit]),
     light_visibility: &mut [u32],
 ) -> u32 {
-    reference::shadow::shadow_by::<FastTracer>(bindings, traversal, places, rays_and_hits, light_visibility)
+    reference::shadow::shadow_by::<FastTracer>(inputs, traversal, places, rays_and_hits, light_visibility)
 }
 
 /// Does what [`reference::visibility::visibility`] does.
-pub fn visibility(bindings: &Bindings, traversal: Traversal, triangle_ids: &mut [u32]) {
-    reference::visibility::visibility_by::<FastTracer>(bindings, traversal, triangle_ids);
+pub fn visibility(inputs: &KernelInputs, traversal: Traversal, triangle_ids: &mut [u32]) {
+    reference::visibility::visibility_by::<FastTracer>(inputs, traversal, triangle_ids);
 }
 
 /// Does what [`reference::cast::cast`] does.
-pub fn cast(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
-    reference::cast::cast_by::<FastTracer>(bindings, traversal, query, rays, hits);
+pub fn cast(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
+    reference::cast::cast_by::<FastTracer>(inputs, traversal, query, rays, hits);
 }

@@ -11,8 +11,8 @@ use crate::{
     accel::kdtree::Traversal,
     layout::Hit,
     reference::{
-        bindings::Bindings,
         counting::table::ReadCounter,
+        inputs::KernelInputs,
         kdtree::{TraversalRay, hit_from_near},
         search_ray::SearchRay,
         traverser::{Tracer, Traverser},
@@ -40,12 +40,12 @@ impl FastTracer {
 
     /// Finds one ray's hit, as [`Traverser::traverse`] does.
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl ReadCounter>, probe: &SearchRay) -> Hit {
+    pub fn traverse<const ANY_HIT: bool>(&mut self, inputs: &KernelInputs<impl ReadCounter>, probe: &SearchRay) -> Hit {
         match self {
-            Self::Packets(packets) => hit_from_near(bindings, probe, |near, best| {
-                packets.traverse_alone::<ANY_HIT>(bindings, &TraversalRay::new(bindings, near), best);
+            Self::Packets(packets) => hit_from_near(inputs, probe, |near, best| {
+                packets.traverse_alone::<ANY_HIT>(inputs, &TraversalRay::new(inputs, near), best);
             }),
-            Self::Single(traverser) => traverser.traverse::<ANY_HIT>(bindings, probe),
+            Self::Single(traverser) => traverser.traverse::<ANY_HIT>(inputs, probe),
         }
     }
 }
@@ -58,17 +58,17 @@ impl Tracer for FastTracer {
     #[inline]
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,
-        bindings: &Bindings<impl ReadCounter>,
+        inputs: &KernelInputs<impl ReadCounter>,
         probes: impl Iterator<Item = (Key, SearchRay)>,
         mut found: impl FnMut(Key, Hit),
     ) {
         let packets = match self {
             Self::Packets(packets) => packets,
-            Self::Single(traverser) => return traverser.trace_all::<ANY_HIT, Key>(bindings, probes, found),
+            Self::Single(traverser) => return traverser.trace_all::<ANY_HIT, Key>(inputs, probes, found),
         };
         let mut bins = OctantBins::default();
         let mut traverse = |Bin { rays, keys }: &mut Bin<Key>| {
-            let hits = packets.traverse::<ANY_HIT>(bindings, rays, keys.len());
+            let hits = packets.traverse::<ANY_HIT>(inputs, rays, keys.len());
             keys.drain(..).enumerate().for_each(|(lane, key)| found(key, hits.get(lane)));
         };
         for (key, probe) in probes {

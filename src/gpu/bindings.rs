@@ -44,7 +44,7 @@ pub enum Binding<'a> {
 }
 
 /// The layout of a set, shared by all pipelines that use it, with the specialization constants that they share.
-pub struct Bindings {
+pub struct BindingLayout {
     pub(super) set_layout: vk::DescriptorSetLayout,
     pub(super) pipeline_layout: vk::PipelineLayout,
     /// By binding number.
@@ -54,13 +54,13 @@ pub struct Bindings {
     context: Arc<Context>,
 }
 
-impl Bindings {
+impl BindingLayout {
     /// `kinds`: the bindings' numbers and what they hold; `push_bytes`: size of the push constants, for all stages.
     pub fn new(context: &Arc<Context>, kinds: &[(u32, BindingKind)], push_bytes: u32) -> Result<Arc<Self>, GpuError> {
         Self::with_constants(context, kinds, push_bytes, Constants::new())
     }
 
-    /// As [`Bindings::new`]. `constants`: specialization constants that are the same for all pipelines; a kernel need
+    /// As [`BindingLayout::new`]. `constants`: specialization constants that are the same for all pipelines; a kernel need
     /// not declare them.
     pub fn with_constants(
         context: &Arc<Context>,
@@ -105,7 +105,7 @@ impl Bindings {
     }
 }
 
-impl Drop for Bindings {
+impl Drop for BindingLayout {
     fn drop(&mut self) {
         // SAFETY: pipelines and sets hold the bindings, so none is left.
         unsafe {
@@ -119,13 +119,13 @@ impl Drop for Bindings {
 pub struct BindingSet {
     pub(super) raw: vk::DescriptorSet,
     pool: vk::DescriptorPool,
-    pub(super) bindings: Arc<Bindings>,
+    pub(super) bindings: Arc<BindingLayout>,
 }
 
 impl BindingSet {
     /// `objects`: one for each of the bindings, with its number. A buffer that is larger than what the device binds is
     /// bound in part: kernels read it another way.
-    pub fn new(bindings: &Arc<Bindings>, name: &str, objects: &[(u32, Binding)]) -> Result<Self, GpuError> {
+    pub fn new(bindings: &Arc<BindingLayout>, name: &str, objects: &[(u32, Binding)]) -> Result<Self, GpuError> {
         assert_eq!(objects.len(), bindings.kinds.len(), "one object a binding");
         let context = &bindings.context;
         context.count_creation("vkCreateDescriptorPool", name)?;

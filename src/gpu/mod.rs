@@ -40,7 +40,7 @@ mod window;
 
 pub use acceleration::Scenery;
 pub use barrier::Access;
-pub use bindings::{Binding, BindingKind, BindingSet, Bindings};
+pub use bindings::{Binding, BindingKind, BindingLayout, BindingSet};
 pub use buffer::{AnyBuffer, Buffer, BufferUse, texel_bytes};
 pub use commands::{Area, CommandBuffer, Commands, Dispatch, DrawDesc, PixelRows};
 pub use context::{Context, ContextOptions};

@@ -5,7 +5,7 @@ use std::{ffi::CStr, sync::Arc};
 use ash::vk;
 
 use super::{
-    Bindings, Constants, Context, GpuError, Shader, TargetKind, robustness::without_checks, shader::ShaderModule,
+    BindingLayout, Constants, Context, GpuError, Shader, TargetKind, robustness::without_checks, shader::ShaderModule,
     specialization::Specialization, statistics::capture_flags,
 };
 
@@ -26,7 +26,7 @@ pub struct ComputeDesc<'a> {
 /// A kernel, ready to run.
 pub struct ComputePipeline {
     pub(super) raw: vk::Pipeline,
-    pub(super) bindings: Arc<Bindings>,
+    pub(super) bindings: Arc<BindingLayout>,
     pub(super) name: &'static str,
     pub(super) context: Arc<Context>,
 }
@@ -34,7 +34,7 @@ pub struct ComputePipeline {
 impl ComputePipeline {
     /// # Errors
     /// The driver refuses the module or is out of memory.
-    pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &ComputeDesc) -> Result<Self, GpuError> {
+    pub fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, desc: &ComputeDesc) -> Result<Self, GpuError> {
         context.count_creation("vkCreateComputePipelines", desc.name)?;
         let module = ShaderModule::new(context, desc.shader)?;
         let constants = Specialization::new(desc.constants, bindings);
@@ -113,7 +113,7 @@ pub struct RasterDesc {
 /// A raster pass over a triangle list without vertex buffers, two-sided.
 pub struct RasterPipeline {
     pub(super) raw: vk::Pipeline,
-    _bindings: Arc<Bindings>,
+    _bindings: Arc<BindingLayout>,
     pub(super) name: &'static str,
     context: Arc<Context>,
 }
@@ -121,7 +121,7 @@ pub struct RasterPipeline {
 impl RasterPipeline {
     /// # Errors
     /// The driver refuses a module or is out of memory.
-    pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &RasterDesc) -> Result<Self, GpuError> {
+    pub fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, desc: &RasterDesc) -> Result<Self, GpuError> {
         context.count_creation("vkCreateGraphicsPipelines", desc.name)?;
         let vertex = ShaderModule::new(context, desc.vertex)?;
         let fragment = ShaderModule::new(context, desc.fragment)?;

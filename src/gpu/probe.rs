@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    Access, Binding, BindingKind, BindingSet, Bindings, Buffer, BufferUse, ComputeDesc, ComputePipeline, Constants,
-    Context, Dispatch, GpuError, Shader,
+    Access, Binding, BindingKind, BindingLayout, BindingSet, Buffer, BufferUse, ComputeDesc, ComputePipeline,
+    Constants, Context, Dispatch, GpuError, Shader,
 };
 
 const FUSED_FMA: Shader =
@@ -23,7 +23,7 @@ pub(super) fn loop_limit(context: &Arc<Context>) -> Result<Option<u32>, GpuError
     // Twice the limit that is known.
     const N_TURNS: u32 = 1 << 17;
     let counts = Buffer::with(context, "counts", &[0u32], BufferUse::Storage)?;
-    let bindings = Bindings::new(context, &[(0, BindingKind::Storage)], 4)?;
+    let bindings = BindingLayout::new(context, &[(0, BindingKind::Storage)], 4)?;
     let set = BindingSet::new(&bindings, "loop_turns", &[(0, Binding::Buffer(counts.any()))])?;
     let desc =
         ComputeDesc { name: "loop_turns", shader: LOOP_TURNS, constants: &Constants::new(), full_subgroups: false };
@@ -41,7 +41,7 @@ pub(super) fn loop_limit(context: &Arc<Context>) -> Result<Option<u32>, GpuError
 pub(super) fn fuses_fma(context: &Arc<Context>) -> Result<bool, GpuError> {
     // Its square needs 25 bits.
     let numbers = Buffer::with(context, "numbers", &[1.0 + 2f32.powi(-12), 0.0], BufferUse::Storage)?;
-    let bindings = Bindings::new(context, &[(0, BindingKind::Storage)], 4)?;
+    let bindings = BindingLayout::new(context, &[(0, BindingKind::Storage)], 4)?;
     let set = BindingSet::new(&bindings, "fused_fma", &[(0, Binding::Buffer(numbers.any()))])?;
     let desc =
         ComputeDesc { name: "fused_fma", shader: FUSED_FMA, constants: &Constants::new(), full_subgroups: false };
@@ -60,7 +60,7 @@ pub(super) fn n_lanes(context: &Arc<Context>) -> Result<u32, GpuError> {
     const N_GROUPS: u32 = 16_384;
     const N_TURNS: u32 = 2500;
     let counts = Buffer::with(context, "counts", &[0u32; 3], BufferUse::Storage)?;
-    let bindings = Bindings::new(context, &[(0, BindingKind::Storage)], 4)?;
+    let bindings = BindingLayout::new(context, &[(0, BindingKind::Storage)], 4)?;
     let set = BindingSet::new(&bindings, "lanes", &[(0, Binding::Buffer(counts.any()))])?;
     let desc = ComputeDesc { name: "lanes", shader: LANES, constants: &Constants::new(), full_subgroups: false };
     let kernel = ComputePipeline::new(context, &bindings, &desc)?;

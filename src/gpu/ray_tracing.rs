@@ -6,8 +6,8 @@ use ash::{khr, vk};
 use bytemuck::Pod;
 
 use super::{
-    Bindings, Buffer, BufferUse, Commands, Constants, Context, GpuError, Shader, devices::text, instance::Instance,
-    pipeline::ENTRY_POINT, shader::ShaderModule, specialization::Specialization,
+    BindingLayout, Buffer, BufferUse, Commands, Constants, Context, GpuError, Shader, devices::text,
+    instance::Instance, pipeline::ENTRY_POINT, shader::ShaderModule, specialization::Specialization,
 };
 
 /// The extensions' functions and limits.
@@ -71,7 +71,7 @@ pub struct RayTracingDesc {
 pub struct RayTracingPipeline {
     raw: vk::Pipeline,
     table: Buffer<u8>,
-    bindings: Arc<Bindings>,
+    bindings: Arc<BindingLayout>,
     name: &'static str,
     context: Arc<Context>,
 }
@@ -79,7 +79,7 @@ pub struct RayTracingPipeline {
 impl RayTracingPipeline {
     /// # Errors
     /// The driver refuses a shader. Panics on a context without ray tracing.
-    pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, desc: &RayTracingDesc) -> Result<Self, GpuError> {
+    pub fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, desc: &RayTracingDesc) -> Result<Self, GpuError> {
         let calls = RayTracingCalls::of(context);
         let stages = [
             (vk::ShaderStageFlags::RAYGEN_KHR, desc.generation),

@@ -4,7 +4,7 @@ use std::marker::PhantomData;
 
 use ash::vk;
 
-use super::Bindings;
+use super::BindingLayout;
 
 /// A specialization constant of shaders whose value is a `T`: a `u32` or a `bool`.
 #[derive(Debug)]
@@ -73,7 +73,7 @@ pub(super) struct Specialization {
 
 impl Specialization {
     /// A pipeline's own constants, and those of its bindings.
-    pub fn new(own: &Constants, bindings: &Bindings) -> Self {
+    pub fn new(own: &Constants, bindings: &BindingLayout) -> Self {
         let (mut entries, mut values) = (Vec::new(), Vec::new());
         for (_, constant_id, value) in own.values.iter().chain(&bindings.constants.values) {
             let offset = 4 * values.len() as u32;

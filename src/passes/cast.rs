@@ -7,7 +7,7 @@ use crate::{
     accel::{Query, kdtree::Traversal},
     buffers::Round,
     frame::bounce::lanes_log2,
-    gpu::{BindingSet, Bindings, Commands, ComputePipeline, Context, Dispatch, GpuError, Statistic},
+    gpu::{BindingLayout, BindingSet, Commands, ComputePipeline, Context, Dispatch, GpuError, Statistic},
     layout::{CastBatch, RAY_GROUP_SIZE, constants},
 };
 
@@ -23,7 +23,7 @@ impl Cast {
     /// The driver refuses the shader.
     pub fn new(
         context: &Arc<Context>,
-        bindings: &Arc<Bindings>,
+        bindings: &Arc<BindingLayout>,
         traversal: Traversal,
         query: Query,
     ) -> Result<Self, GpuError> {

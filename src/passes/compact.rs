@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::spirv;
 use crate::{
     buffers::Resources,
-    gpu::{Bindings, Commands, ComputeDesc, ComputePipeline, Constants, Context, Dispatch, GpuError},
+    gpu::{BindingLayout, Commands, ComputeDesc, ComputePipeline, Constants, Context, Dispatch, GpuError},
     layout::Batch,
 };
 
@@ -17,7 +17,7 @@ pub struct Compact {
 }
 
 impl Compact {
-    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
+    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
         let kernel = |name, shader| {
             let desc = ComputeDesc { name, shader, constants: &Constants::new(), full_subgroups: true };
             ComputePipeline::new(context, bindings, &desc)

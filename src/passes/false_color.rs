@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{kernel, spirv};
 use crate::{
     buffers::Resources,
-    gpu::{Bindings, Commands, ComputePipeline, Constants, Context, GpuError},
+    gpu::{BindingLayout, Commands, ComputePipeline, Constants, Context, GpuError},
     layout,
 };
 
@@ -15,7 +15,7 @@ pub struct FalseColor {
 }
 
 impl FalseColor {
-    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
+    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
         Ok(Self { kernel: kernel(context, bindings, "false_color", spirv!("false_color.comp"), &Constants::new())? })
     }
 

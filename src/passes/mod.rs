@@ -7,7 +7,7 @@ use crate::{
     accel::kdtree::Traversal,
     buffers::draws,
     frame::{Primary, RenderOptions},
-    gpu::{Bindings, ComputeDesc, ComputePipeline, Constants, Context, GpuError, Shader},
+    gpu::{BindingLayout, ComputeDesc, ComputePipeline, Constants, Context, GpuError, Shader},
     layout::{CONSTANTS_OF_SHADERS, constants},
 };
 
@@ -69,7 +69,11 @@ pub struct Passes {
 impl Passes {
     /// # Errors
     /// The driver refuses a shader.
-    pub fn new(context: &Arc<Context>, bindings: &Arc<Bindings>, options: &RenderOptions) -> Result<Self, GpuError> {
+    pub fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<BindingLayout>,
+        options: &RenderOptions,
+    ) -> Result<Self, GpuError> {
         Ok(Self {
             visibility: Self::new_visibility(context, bindings, options)?,
             rasterize: Self::new_rasterize(context, bindings, options)?,
@@ -105,7 +109,7 @@ impl Passes {
 
     fn new_visibility(
         context: &Arc<Context>,
-        bindings: &Arc<Bindings>,
+        bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Option<Arc<Visibility>>, GpuError> {
         draws(options).then(|| Visibility::new(context, bindings).map(Arc::new)).transpose()
@@ -113,7 +117,7 @@ impl Passes {
 
     fn new_rasterize(
         context: &Arc<Context>,
-        bindings: &Arc<Bindings>,
+        bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Option<Arc<Rasterize>>, GpuError> {
         (options.primary == Primary::Compute).then(|| Rasterize::new(context, bindings).map(Arc::new)).transpose()
@@ -126,7 +130,7 @@ impl Passes {
     pub fn with_options(
         &self,
         context: &Arc<Context>,
-        bindings: &Arc<Bindings>,
+        bindings: &Arc<BindingLayout>,
         from: &RenderOptions,
         to: &RenderOptions,
     ) -> Result<Self, GpuError> {
@@ -169,7 +173,7 @@ fn traversal_constants(context: &Arc<Context>, traversal: Traversal) -> Result<C
 /// A constant has a value that the shader does not declare.
 fn kernel(
     context: &Arc<Context>,
-    bindings: &Arc<Bindings>,
+    bindings: &Arc<BindingLayout>,
     name: &'static str,
     shader: Shader,
     constants: &Constants,

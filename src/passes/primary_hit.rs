@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{kernel, spirv};
 use crate::{
     frame::{Primary, RenderOptions},
-    gpu::{Bindings, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
+    gpu::{BindingLayout, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
     layout::{Batch, RAY_GROUP_SIZE, constants},
 };
 
@@ -17,7 +17,7 @@ pub struct PrimaryHit {
 impl PrimaryHit {
     pub(super) fn new(
         context: &Arc<Context>,
-        bindings: &Arc<Bindings>,
+        bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
         let constants = Constants::new()

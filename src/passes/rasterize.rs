@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{kernel, spirv};
 use crate::{
     buffers::Resources,
-    gpu::{Access, Bindings, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
+    gpu::{Access, BindingLayout, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
     layout::{Frame, RASTER_GROUPS_X, RAY_GROUP_SIZE, RasterGroups, RasterPush, constants},
 };
 
@@ -22,7 +22,7 @@ pub struct Rasterize {
 impl Rasterize {
     /// # Errors
     /// The device lacks atomics of 64 bits; the driver refuses a shader.
-    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
+    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
         context.require_wide_atomics()?;
         let constants = Constants::new().set(constants::FUSED_FMA, context.fuses_fma()?);
         let kernel = |name, shader| kernel(context, bindings, name, shader, &constants);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{kernel, spirv};
 use crate::{
-    gpu::{Bindings, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
+    gpu::{BindingLayout, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
     layout::{Batch, RAY_GROUP_SIZE},
 };
 
@@ -14,7 +14,7 @@ pub struct Resolve {
 }
 
 impl Resolve {
-    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
+    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
         Ok(Self { kernel: kernel(context, bindings, "resolve", spirv!("resolve.comp"), &Constants::new())? })
     }
 

@@ -6,7 +6,7 @@ use super::{kernel, spirv};
 use crate::{
     buffers::Resources,
     frame::RenderOptions,
-    gpu::{Bindings, Commands, ComputePipeline, Constants, Context, GpuError},
+    gpu::{BindingLayout, Commands, ComputePipeline, Constants, Context, GpuError},
     layout::{Batch, constants},
 };
 
@@ -18,7 +18,7 @@ pub struct Shade {
 impl Shade {
     pub(super) fn new(
         context: &Arc<Context>,
-        bindings: &Arc<Bindings>,
+        bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
         let constants = Constants::new().set(constants::COUNTS, options.profile);

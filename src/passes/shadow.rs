@@ -6,7 +6,7 @@ use super::{kernel, spirv, traversal_constants};
 use crate::{
     buffers::Resources,
     frame::RenderOptions,
-    gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
+    gpu::{BindingLayout, Commands, ComputePipeline, Context, GpuError},
     layout::{Batch, constants},
 };
 
@@ -18,7 +18,7 @@ pub struct Shadow {
 impl Shadow {
     pub(super) fn new(
         context: &Arc<Context>,
-        bindings: &Arc<Bindings>,
+        bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
         // Shade counts the segments.

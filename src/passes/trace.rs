@@ -6,7 +6,7 @@ use super::{kernel, spirv, traversal_constants};
 use crate::{
     buffers::Resources,
     frame::{Primary, RenderOptions},
-    gpu::{Bindings, Commands, ComputePipeline, Context, GpuError},
+    gpu::{BindingLayout, Commands, ComputePipeline, Context, GpuError},
     layout::{Batch, constants},
 };
 
@@ -20,7 +20,7 @@ pub struct Trace {
 impl Trace {
     pub(super) fn new(
         context: &Arc<Context>,
-        bindings: &Arc<Bindings>,
+        bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
         let constants = traversal_constants(context, options.traversal)?

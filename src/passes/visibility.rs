@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::spirv;
 use crate::{
     buffers::Resources,
-    gpu::{Area, Bindings, Commands, Context, DrawDesc, GpuError, RasterDesc, RasterPipeline, RasterTargets},
+    gpu::{Area, BindingLayout, Commands, Context, DrawDesc, GpuError, RasterDesc, RasterPipeline, RasterTargets},
     layout::Frame,
 };
 
@@ -15,7 +15,7 @@ pub struct Visibility {
 }
 
 impl Visibility {
-    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<Bindings>) -> Result<Self, GpuError> {
+    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
         let desc = RasterDesc {
             name: "visibility",
             vertex: spirv!("visibility.vert"),

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     RAYS_PER_TASK,
-    bindings::Bindings,
+    inputs::KernelInputs,
     kdtree::min,
     search_ray::SearchRay,
     traverser::{Tracer, Traverser},
@@ -59,26 +59,26 @@ fn scaled(ray: &Ray) -> SearchRay {
     if is_ray(ray) { scaled } else { nowhere }
 }
 
-fn cast_all<const ANY_HIT: bool>(bindings: &Bindings, traverser: &mut impl Tracer, rays: &[Ray], hits: &mut [Hit]) {
+fn cast_all<const ANY_HIT: bool>(inputs: &KernelInputs, traverser: &mut impl Tracer, rays: &[Ray], hits: &mut [Hit]) {
     let probes = rays.iter().zip(hits).map(|(ray, hit)| ((ray, hit), scaled(ray)));
-    traverser.trace_all::<ANY_HIT, _>(bindings, probes, |(ray, hit), found| {
+    traverser.trace_all::<ANY_HIT, _>(inputs, probes, |(ray, hit), found| {
         let [scale, _] = scales_of(ray.direction);
         *hit = if found.triangle_ix == NO_TRIANGLE { MISS } else { Hit { t: found.t * scale, ..found } };
     });
 }
 
 /// Writes `hits`, one a ray.
-pub fn cast(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
-    cast_by::<Traverser>(bindings, traversal, query, rays, hits);
+pub fn cast(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
+    cast_by::<Traverser>(inputs, traversal, query, rays, hits);
 }
 
 /// Does what [`cast`] does, by another tracer.
-pub fn cast_by<T: Tracer>(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
+pub fn cast_by<T: Tracer>(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
     rays.par_chunks(RAYS_PER_TASK).zip(hits.par_chunks_mut(RAYS_PER_TASK)).for_each_init(
         || T::new(traversal),
         |traverser, (rays, hits)| match query {
-            Query::Closest => cast_all::<false>(bindings, traverser, rays, hits),
-            Query::Any => cast_all::<true>(bindings, traverser, rays, hits),
+            Query::Closest => cast_all::<false>(inputs, traverser, rays, hits),
+            Query::Any => cast_all::<true>(inputs, traverser, rays, hits),
         },
     );
 }

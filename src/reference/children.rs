@@ -3,33 +3,33 @@
 use glam::Vec3;
 
 use super::{
-    bindings::Bindings,
+    inputs::KernelInputs,
     material::{Scattering, scatter, scatters_light},
     surface::{Surface, surface_at},
 };
 use crate::layout::{CHILD_REFLECTED, CHILD_TRANSMITTED, Hit, NO_TRIANGLE, PathRay};
 
-fn scattering_at(bindings: &Bindings, ray: &PathRay, hit: &Hit) -> (Surface, Scattering) {
-    let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
-    let scattering = scatter(bindings.material_at(hit), &surface, ray.direction);
+fn scattering_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, Scattering) {
+    let surface = surface_at(ray, hit, &inputs.triangles[hit.triangle_ix as usize]);
+    let scattering = scatter(inputs.material_at(hit), &surface, ray.direction);
     (surface, scattering)
 }
 
 /// Bits of `CHILD_*`: of the ray's children, those that carry light.
-pub fn child_kinds_of(bindings: &Bindings, ray: &PathRay, hit: &Hit) -> u32 {
-    if hit.triangle_ix == NO_TRIANGLE || !scatters_light(bindings.material_at(hit)) {
+pub fn child_kinds_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> u32 {
+    if hit.triangle_ix == NO_TRIANGLE || !scatters_light(inputs.material_at(hit)) {
         return 0;
     }
     let carries_light = |weight: Vec3| (ray.throughput * weight).cmpgt(Vec3::ZERO).any();
-    let (_, next) = scattering_at(bindings, ray, hit);
+    let (_, next) = scattering_at(inputs, ray, hit);
     let reflected = if carries_light(next.reflected_weight) { CHILD_REFLECTED } else { 0 };
     let transmitted = if carries_light(next.transmitted_weight) { CHILD_TRANSMITTED } else { 0 };
     reflected | transmitted
 }
 
 /// The children of these kinds, in order.
-pub fn children_of(bindings: &Bindings, ray: &PathRay, hit: &Hit, kinds: u32) -> impl Iterator<Item = PathRay> {
-    let scattering = (kinds != 0).then(|| scattering_at(bindings, ray, hit));
+pub fn children_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, kinds: u32) -> impl Iterator<Item = PathRay> {
+    let scattering = (kinds != 0).then(|| scattering_at(inputs, ray, hit));
     let children = scattering.map(|(surface, next)| {
         [
             (CHILD_REFLECTED, next.reflected, next.reflected_weight),

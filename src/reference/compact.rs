@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use super::{
     RAYS_PER_TASK,
-    bindings::Bindings,
     children::{child_kinds_of, children_of},
+    inputs::KernelInputs,
 };
 use crate::layout::{Bounce, Frame, Hit, PathRay, SCAN_GROUP_SIZE};
 
@@ -22,13 +22,13 @@ pub struct Parents<'a> {
 }
 
 /// Writes which rays go on from each hit, and how many from the hits of each block of `SCAN_GROUP_SIZE` rays.
-pub fn reduce(bindings: &Bindings, parents: Parents, child_kinds: &mut [u32], scan_blocks: &mut [u32]) {
+pub fn reduce(inputs: &KernelInputs, parents: Parents, child_kinds: &mut [u32], scan_blocks: &mut [u32]) {
     (parents.rays.par_chunks(BLOCK).zip(parents.hits.par_chunks(BLOCK)))
         .zip(child_kinds.par_chunks_mut(BLOCK).zip(scan_blocks))
         .with_min_len(BLOCKS_PER_TASK)
         .for_each(|((rays, hits), (kinds, sum))| {
             for ((ray, hit), kinds) in rays.iter().zip(hits).zip(&mut *kinds) {
-                *kinds = child_kinds_of(bindings, ray, hit);
+                *kinds = child_kinds_of(inputs, ray, hit);
             }
             *sum = kinds.iter().map(|kinds| kinds.count_ones()).sum();
         });
@@ -56,7 +56,7 @@ fn size_next_bounce(n_wanted: u32, constants: &Frame, this: &Bounce, next: &mut 
 
 /// Makes the rays that go on, `next_rays`, whose first is the queue's `first_ray`, and tells of each hit which is its first.
 pub fn scatter(
-    bindings: &Bindings,
+    inputs: &KernelInputs,
     parents: Parents,
     child_kinds: &[u32],
     scan_blocks: &[u32],
@@ -79,7 +79,7 @@ pub fn scatter(
             let mut n_made = 0;
             for (((ray, hit), &kinds), first_child) in rays.iter().zip(hits).zip(kinds).zip(first_children) {
                 *first_child = first_ray + begin + n_made as u32;
-                for child in children_of(bindings, ray, hit, kinds) {
+                for child in children_of(inputs, ray, hit, kinds) {
                     place[n_made] = child;
                     n_made += 1;
                 }

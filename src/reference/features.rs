@@ -1,31 +1,31 @@
 //! Features: what each pixel shows, for other uses than light. Twin of `features.comp`.
 
-use super::{bindings::Bindings, surface::surface_at};
+use super::{inputs::KernelInputs, surface::surface_at};
 use crate::layout::{Feature, Hit, NO_TRIANGLE, PathRay};
 
 /// Writes `pixel_features` of the primary rays' pixels, all but the counts.
-pub fn features(bindings: &Bindings, rays: &[PathRay], hits: &[Hit], pixel_features: &mut [Feature]) {
+pub fn features(inputs: &KernelInputs, rays: &[PathRay], hits: &[Hit], pixel_features: &mut [Feature]) {
     for (ray, hit) in rays.iter().zip(hits) {
         let feature = &mut pixel_features[ray.pixel_ix as usize];
         let Feature { n_rays, n_steps, .. } = *feature;
-        *feature = Feature { n_rays, n_steps, ..feature_of(bindings, ray, hit) };
+        *feature = Feature { n_rays, n_steps, ..feature_of(inputs, ray, hit) };
     }
 }
 
-fn feature_of(bindings: &Bindings, ray: &PathRay, hit: &Hit) -> Feature {
+fn feature_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> Feature {
     if hit.triangle_ix == NO_TRIANGLE {
         let depth = f32::INFINITY;
         return Feature { triangle_ix: NO_TRIANGLE, material_ix: NO_TRIANGLE, depth, ..Feature::default() };
     }
-    let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
-    let material_ix = bindings.triangle_materials[hit.triangle_ix as usize];
+    let surface = surface_at(ray, hit, &inputs.triangles[hit.triangle_ix as usize]);
+    let material_ix = inputs.triangle_materials[hit.triangle_ix as usize];
     Feature {
         position_world: surface.point_world,
         triangle_ix: hit.triangle_ix,
         normal_world: surface.shading,
         material_ix,
-        albedo: bindings.materials[material_ix as usize].kd,
-        depth: (surface.point_world - bindings.frame().eye).dot(bindings.frame().forward),
+        albedo: inputs.materials[material_ix as usize].kd,
+        depth: (surface.point_world - inputs.frame().eye).dot(inputs.frame().forward),
         ..Feature::default()
     }
 }

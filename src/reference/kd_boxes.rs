@@ -1,8 +1,8 @@
 //! The cells of nodes as boxes, for traversals that ask for them. Twin of `kd_boxes.glsl`.
 
 use super::{
-    bindings::Bindings,
     counting::table::ReadCounter,
+    inputs::KernelInputs,
     kdtree::{TraversalRay, max, min},
 };
 
@@ -14,8 +14,8 @@ pub struct BoxPlanes {
 
 impl TraversalRay {
     #[inline(always)]
-    pub fn box_planes_of(&self, bindings: &Bindings<impl ReadCounter>, node_ix: u32) -> BoxPlanes {
-        let cell = &bindings.kd_boxes[node_ix as usize];
+    pub fn box_planes_of(&self, inputs: &KernelInputs<impl ReadCounter>, node_ix: u32) -> BoxPlanes {
+        let cell = &inputs.kd_boxes[node_ix as usize];
         let (low, high) = ([cell.min_x, cell.min_y, cell.min_z], [cell.max_x, cell.max_y, cell.max_z]);
         let t0 = [0, 1, 2].map(|i| low[i] * self.inv_direction[i] + self.bias[i]);
         let t1 = [0, 1, 2].map(|i| high[i] * self.inv_direction[i] + self.bias[i]);
@@ -24,8 +24,8 @@ impl TraversalRay {
 
     /// The ray's interval in a node's cell: the planes that `descend` meets on the way there.
     #[inline(always)]
-    pub fn interval_in(&self, bindings: &Bindings<impl ReadCounter>, node_ix: u32) -> [f32; 2] {
-        let BoxPlanes { near, far } = self.box_planes_of(bindings, node_ix);
+    pub fn interval_in(&self, inputs: &KernelInputs<impl ReadCounter>, node_ix: u32) -> [f32; 2] {
+        let BoxPlanes { near, far } = self.box_planes_of(inputs, node_ix);
         [max(max(near[0], near[1]), max(near[2], self.t_enter)), min(min(far[0], far[1]), min(far[2], self.t_exit))]
     }
 }

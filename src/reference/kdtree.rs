@@ -3,8 +3,8 @@
 use glam::{Vec3, Vec3A};
 
 use super::{
-    bindings::Bindings,
     counting::table::ReadCounter,
+    inputs::KernelInputs,
     leaf::{Target, intersect_leaf},
     search_ray::SearchRay,
     slab::slab_of,
@@ -61,10 +61,10 @@ pub fn signs_of(direction: Vec3) -> u32 {
 
 impl TraversalRay {
     #[inline]
-    pub fn new(bindings: &Bindings<impl ReadCounter>, ray: &SearchRay) -> Self {
+    pub fn new(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> Self {
         let origin = ray.origin.to_array();
-        let cell_min = bindings.cell_min.to_array();
-        let cell_max = bindings.cell_max.to_array();
+        let cell_min = inputs.cell_min.to_array();
+        let cell_max = inputs.cell_max.to_array();
         let direction =
             ray.direction.to_array().map(|d| if d.abs() < KD_LEAST_COMPONENT { KD_LEAST_COMPONENT } else { d });
         let inv_direction = direction.map(|d| 1.0 / d);
@@ -77,7 +77,7 @@ impl TraversalRay {
             target: Target::of(ray),
             origin: ray.origin.into(),
             direction: ray.direction.into(),
-            plane_epsilon: KD_PLANE_EPSILON * largest_coordinate(bindings),
+            plane_epsilon: KD_PLANE_EPSILON * largest_coordinate(inputs),
             inv_direction: by_axis(inv_direction),
             bias: by_axis(bias),
             t_enter: max(max(near[0], near[1]), max(near[2], ray.t_min)),
@@ -101,29 +101,29 @@ impl TraversalRay {
 }
 
 #[inline(always)]
-pub fn largest_coordinate(bindings: &Bindings<impl ReadCounter>) -> f32 {
-    bindings.cell_min.abs().max(bindings.cell_max.abs()).max_element()
+pub fn largest_coordinate(inputs: &KernelInputs<impl ReadCounter>) -> f32 {
+    inputs.cell_min.abs().max(inputs.cell_max.abs()).max_element()
 }
 
 /// How far from 0, by its largest coordinate, a ray may start for the margins of the leaves to cover its rounding.
 #[inline(always)]
-pub fn origin_reach(bindings: &Bindings<impl ReadCounter>) -> f32 {
-    KD_MAX_ORIGIN_DISTANCE * largest_coordinate(bindings)
+pub fn origin_reach(inputs: &KernelInputs<impl ReadCounter>) -> f32 {
+    KD_MAX_ORIGIN_DISTANCE * largest_coordinate(inputs)
 }
 
 /// Whether the ray starts within reach.
 #[inline(always)]
-fn is_within_reach(bindings: &Bindings<impl ReadCounter>, ray: &SearchRay) -> bool {
-    ray.origin.abs().max_element() <= origin_reach(bindings)
+fn is_within_reach(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> bool {
+    ray.origin.abs().max_element() <= origin_reach(inputs)
 }
 
 /// The ray with its origin moved along it to lie within `KD_MAX_ORIGIN_DISTANCE`, and how far: 0 for all but cameras far away.
 #[inline(always)]
-pub fn near_scene(bindings: &Bindings<impl ReadCounter>, ray: &SearchRay) -> (SearchRay, f32) {
-    if is_within_reach(bindings, ray) {
+pub fn near_scene(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> (SearchRay, f32) {
+    if is_within_reach(inputs, ray) {
         return (*ray, 0.0);
     }
-    let t_start = max(TraversalRay::new(bindings, &SearchRay { t_min: 0.0, ..*ray }).t_enter, 0.0);
+    let t_start = max(TraversalRay::new(inputs, &SearchRay { t_min: 0.0, ..*ray }).t_enter, 0.0);
     let origin = ray.origin + t_start * ray.direction;
     (SearchRay { origin, t_min: ray.t_min - t_start, t_max: ray.t_max - t_start, ..*ray }, t_start)
 }
@@ -131,11 +131,11 @@ pub fn near_scene(bindings: &Bindings<impl ReadCounter>, ray: &SearchRay) -> (Se
 /// What `search` finds from near the scene, as seen from where the ray starts. A miss keeps t = t_max.
 #[inline(always)]
 pub fn hit_from_near(
-    bindings: &Bindings<impl ReadCounter>,
+    inputs: &KernelInputs<impl ReadCounter>,
     probe: &SearchRay,
     search: impl FnOnce(&SearchRay, &mut Hit),
 ) -> Hit {
-    let (near, t_start) = near_scene(bindings, probe);
+    let (near, t_start) = near_scene(inputs, probe);
     let mut best = near.miss();
     search(&near, &mut best);
     best.t = if best.triangle_ix == NO_TRIANGLE { probe.t_max } else { best.t + t_start };
@@ -165,22 +165,28 @@ pub trait Pending {
     fn go_down(&mut self) {}
     fn push(&mut self, second_ix: u32, cell: &Cell);
     /// The next pending cell that may hold a hit nearer than `t_best`, or false.
-    fn pop(&mut self, bindings: &Bindings<impl ReadCounter>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool;
+    fn pop(
+        &mut self,
+        inputs: &KernelInputs<impl ReadCounter>,
+        ray: &TraversalRay,
+        t_best: f32,
+        cell: &mut Cell,
+    ) -> bool;
 }
 
 /// Down to the leaf where the ray enters the cell, or to a slab that it keeps clear of, as if that were an empty leaf. A NaN
 /// fails both tests and goes to the first child: it ends.
 #[inline(always)]
 fn descend<P: Pending>(
-    bindings: &Bindings<impl ReadCounter>,
+    inputs: &KernelInputs<impl ReadCounter>,
     ray: &TraversalRay,
     t_best: f32,
     pending: &mut P,
     cell: &mut Cell,
 ) -> KdNode {
-    let mut node = bindings.kd_nodes[cell.node_ix as usize];
+    let mut node = inputs.kd_nodes[cell.node_ix as usize];
     loop {
-        if let Some(slab) = slab_of(bindings, node, cell.node_ix)
+        if let Some(slab) = slab_of(inputs, node, cell.node_ix)
             && ray.is_clear_of(slab, [cell.t_enter, min(cell.t_exit, t_best)])
         {
             return EMPTY_LEAF;
@@ -198,7 +204,7 @@ fn descend<P: Pending>(
             pending.push(first_ix ^ 1, cell);
             cell.t_exit = t_cross;
         }
-        node = bindings.kd_nodes[cell.node_ix as usize];
+        node = inputs.kd_nodes[cell.node_ix as usize];
     }
 }
 
@@ -210,7 +216,7 @@ pub(crate) fn is_done<const ANY_HIT: bool>(best: &Hit) -> bool {
 /// All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
 #[inline(always)]
 pub(crate) fn search<P: Pending, const ANY_HIT: bool>(
-    bindings: &Bindings<impl ReadCounter>,
+    inputs: &KernelInputs<impl ReadCounter>,
     ray: &TraversalRay,
     pending: &mut P,
     best: &mut Hit,
@@ -218,14 +224,14 @@ pub(crate) fn search<P: Pending, const ANY_HIT: bool>(
     // Not `>`: a NaN misses.
     if ray.t_enter <= ray.t_exit {
         let root = Cell { node_ix: 0, t_enter: ray.t_enter, t_exit: ray.t_exit };
-        search_cell::<_, ANY_HIT>(bindings, ray, pending, root, best);
+        search_cell::<_, ANY_HIT>(inputs, ray, pending, root, best);
     }
 }
 
 /// As [`search`], in a cell that the ray is in.
 #[inline(always)]
 pub(crate) fn search_cell<P: Pending, const ANY_HIT: bool>(
-    bindings: &Bindings<impl ReadCounter>,
+    inputs: &KernelInputs<impl ReadCounter>,
     ray: &TraversalRay,
     pending: &mut P,
     mut cell: Cell,
@@ -233,9 +239,9 @@ pub(crate) fn search_cell<P: Pending, const ANY_HIT: bool>(
 ) {
     pending.clear();
     loop {
-        let leaf = descend(bindings, ray, best.t, pending, &mut cell);
-        intersect_leaf(bindings, ray, leaf, [cell.t_enter, min(cell.t_exit, best.t)], best);
-        if is_done::<ANY_HIT>(best) || !pending.pop(bindings, ray, best.t, &mut cell) {
+        let leaf = descend(inputs, ray, best.t, pending, &mut cell);
+        intersect_leaf(inputs, ray, leaf, [cell.t_enter, min(cell.t_exit, best.t)], best);
+        if is_done::<ANY_HIT>(best) || !pending.pop(inputs, ray, best.t, &mut cell) {
             return;
         }
     }

@@ -3,7 +3,7 @@
 use glam::{Mat4, Vec3A, Vec4};
 
 use super::{
-    bindings::Bindings, counting::table::ReadCounter, kdtree::TraversalRay, search_ray::SearchRay, slab::Segment,
+    counting::table::ReadCounter, inputs::KernelInputs, kdtree::TraversalRay, search_ray::SearchRay, slab::Segment,
     triangle::Shear,
 };
 use crate::layout::{Hit, KD_PAIR_SHIFT, KdNode, Plane};
@@ -26,12 +26,12 @@ impl Target {
 
 /// A triangle against the ray; of two hits at one t the lower index wins, whatever the order of triangles.
 #[inline(always)]
-pub fn intersect(bindings: &Bindings<impl ReadCounter>, target: &Target, triangle_ix: u32, best: &mut Hit) {
-    let triangle = &bindings.triangles[triangle_ix as usize];
+pub fn intersect(inputs: &KernelInputs<impl ReadCounter>, target: &Target, triangle_ix: u32, best: &mut Hit) {
+    let triangle = &inputs.triangles[triangle_ix as usize];
     let Some(hit) = target.shear.intersect_triangle(triangle, triangle_ix) else { return };
     let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
     let is_of_ray = hit.t > target.t_min && triangle_ix != target.source_triangle;
-    if is_of_ray && nearer && bindings.is_accepted(triangle_ix) {
+    if is_of_ray && nearer && inputs.is_accepted(triangle_ix) {
         *best = hit;
     }
 }
@@ -70,23 +70,23 @@ fn near_planes(ray: &TraversalRay, way: Segment, planes: &Mat4) -> u32 {
 /// planes.
 #[inline(always)]
 pub fn intersect_leaf(
-    bindings: &Bindings<impl ReadCounter>,
+    inputs: &KernelInputs<impl ReadCounter>,
     ray: &TraversalRay,
     leaf: KdNode,
     [t_enter, t_exit]: [f32; 2],
     best: &mut Hit,
 ) {
     let entries = entries_of(leaf);
-    let triangles = &bindings.leaf_triangles[entries.clone()];
-    if bindings.leaf_planes.is_empty() {
-        return triangles.iter().for_each(|&ix| intersect(bindings, &ray.target, ix, best));
+    let triangles = &inputs.leaf_triangles[entries.clone()];
+    if inputs.leaf_planes.is_empty() {
+        return triangles.iter().for_each(|&ix| intersect(inputs, &ray.target, ix, best));
     }
     let way = Segment::new(t_enter, t_exit);
     for (four, first) in triangles.chunks(4).zip(entries.step_by(4)) {
-        let planes = four_planes(bindings.leaf_planes, first);
+        let planes = four_planes(inputs.leaf_planes, first);
         let mut near = near_planes(ray, way, &planes) & ((1 << four.len()) - 1);
         while near != 0 {
-            intersect(bindings, &ray.target, four[near.trailing_zeros() as usize], best);
+            intersect(inputs, &ray.target, four[near.trailing_zeros() as usize], best);
             near &= near - 1;
         }
     }

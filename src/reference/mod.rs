@@ -12,12 +12,11 @@
 //!               kdtree, leaf, slab, ropes, brute and the pending_* of each algorithm
 //! geometry    triangle, surface, camera, probe (a ray as the traversal takes it)
 //! light       light, material, children, display, tone_curves
-//! bindings    what kernels only read
+//! inputs    what kernels only read
 //! counting    the same traversal, with its reads counted
 //! ```
 
 pub mod accumulate;
-pub mod bindings;
 pub mod brute;
 pub mod camera;
 pub mod cast;
@@ -28,6 +27,7 @@ pub mod denoise;
 pub mod display;
 pub mod false_color;
 pub mod features;
+pub mod inputs;
 pub mod kd_boxes;
 pub mod kdtree;
 pub mod leaf;

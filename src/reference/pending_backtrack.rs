@@ -1,8 +1,8 @@
 //! Pending subtrees without any memory, by the ancestors' boxes. Twin of `pending_backtrack.glsl`.
 
 use super::{
-    bindings::Bindings,
     counting::table::ReadCounter,
+    inputs::KernelInputs,
     kdtree::{Cell, Pending, TraversalRay, max, min},
 };
 
@@ -20,17 +20,23 @@ impl Pending for PendingBacktrack {
     fn push(&mut self, _: u32, _: &Cell) {}
 
     #[inline(always)]
-    fn pop(&mut self, bindings: &Bindings<impl ReadCounter>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+    fn pop(
+        &mut self,
+        inputs: &KernelInputs<impl ReadCounter>,
+        ray: &TraversalRay,
+        t_best: f32,
+        cell: &mut Cell,
+    ) -> bool {
         // What has not been visited begins where the leaf ends, or later.
         if t_best < cell.t_exit {
             return false;
         }
         while cell.node_ix != 0 {
-            let parent_ix = bindings.kd_parents[cell.node_ix as usize >> 1];
-            let parent = bindings.kd_nodes[parent_ix as usize];
+            let parent_ix = inputs.kd_parents[cell.node_ix as usize >> 1];
+            let parent = inputs.kd_nodes[parent_ix as usize];
             if cell.node_ix == ray.first_child(parent) {
                 let t_enter = ray.crossing(parent);
-                let [_, t_exit] = ray.interval_in(bindings, parent_ix);
+                let [_, t_exit] = ray.interval_in(inputs, parent_ix);
                 if t_enter <= min(t_exit, t_best) {
                     cell.node_ix ^= 1;
                     cell.t_enter = max(t_enter, ray.t_enter);

@@ -1,8 +1,8 @@
 //! Pending subtrees by the paper's bit mask: one bit a level. Twin of `pending_mask.glsl`.
 
 use super::{
-    bindings::Bindings,
     counting::table::ReadCounter,
+    inputs::KernelInputs,
     kdtree::{Cell, Pending, TraversalRay},
 };
 use crate::layout::KD_MAX_DEPTH;
@@ -78,7 +78,7 @@ impl Pending for PendingMask {
     }
 
     #[inline(always)]
-    fn pop(&mut self, _: &Bindings<impl ReadCounter>, _: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+    fn pop(&mut self, _: &KernelInputs<impl ReadCounter>, _: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
         cell.t_enter = cell.t_exit;
         if self.mask.is_empty() || t_best < cell.t_enter {
             return false;

@@ -1,8 +1,8 @@
 //! Pending subtrees by the paper's mask and the siblings' boxes. Twin of `pending_mask_boxes.glsl`.
 
 use super::{
-    bindings::Bindings,
     counting::table::ReadCounter,
+    inputs::KernelInputs,
     kdtree::{Cell, Pending, TraversalRay, min},
 };
 
@@ -30,14 +30,20 @@ impl Pending for PendingMaskBoxes {
     fn push(&mut self, _: u32, _: &Cell) {}
 
     #[inline(always)]
-    fn pop(&mut self, bindings: &Bindings<impl ReadCounter>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+    fn pop(
+        &mut self,
+        inputs: &KernelInputs<impl ReadCounter>,
+        ray: &TraversalRay,
+        t_best: f32,
+        cell: &mut Cell,
+    ) -> bool {
         // What has not been visited begins where the leaf ends, or later.
         if t_best < cell.t_exit {
             return false;
         }
         while cell.node_ix != 0 {
             if self.siblings_done & 1 == 0 {
-                let [t_enter, t_exit] = ray.interval_in(bindings, cell.node_ix ^ 1);
+                let [t_enter, t_exit] = ray.interval_in(inputs, cell.node_ix ^ 1);
                 if t_enter <= min(t_exit, t_best) {
                     self.siblings_done |= 1;
                     *cell = Cell { node_ix: cell.node_ix ^ 1, t_enter, t_exit };
@@ -45,7 +51,7 @@ impl Pending for PendingMaskBoxes {
                 }
             }
             self.siblings_done >>= 1;
-            cell.node_ix = bindings.kd_parents[cell.node_ix as usize >> 1];
+            cell.node_ix = inputs.kd_parents[cell.node_ix as usize >> 1];
         }
         false
     }

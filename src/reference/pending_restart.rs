@@ -1,8 +1,8 @@
 //! Pending subtrees found again from the root, along the mask's trail. Twin of `pending_restart.glsl`.
 
 use super::{
-    bindings::Bindings,
     counting::table::ReadCounter,
+    inputs::KernelInputs,
     kdtree::{Cell, TraversalRay, min},
     pending_mask::Mask,
 };
@@ -30,11 +30,11 @@ impl Trail {
 
     /// The same, and the cell from the root down to there.
     #[inline(always)]
-    pub fn retrace(&mut self, bindings: &Bindings<impl ReadCounter>, ray: &TraversalRay, cell: &mut Cell) {
+    pub fn retrace(&mut self, inputs: &KernelInputs<impl ReadCounter>, ray: &TraversalRay, cell: &mut Cell) {
         self.go_up();
         *cell = Cell { node_ix: 0, t_exit: ray.t_exit, ..*cell };
         for n_left in (0..self.length).rev() {
-            let node = bindings.kd_nodes[cell.node_ix as usize];
+            let node = inputs.kd_nodes[cell.node_ix as usize];
             let t_cross = ray.crossing(node);
             let to_first = self.mask.has(n_left);
             let in_second = t_cross <= cell.t_exit;

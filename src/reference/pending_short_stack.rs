@@ -1,8 +1,8 @@
 //! The newest pending subtrees on a ring, older ones by the mask. Twin of `pending_short_stack.glsl`.
 
 use super::{
-    bindings::Bindings,
     counting::table::ReadCounter,
+    inputs::KernelInputs,
     kdtree::{Cell, Pending, TraversalRay},
     pending_restart::Trail,
 };
@@ -45,7 +45,13 @@ impl<const N: usize> Pending for PendingMarked<N> {
     }
 
     #[inline(always)]
-    fn pop(&mut self, bindings: &Bindings<impl ReadCounter>, ray: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+    fn pop(
+        &mut self,
+        inputs: &KernelInputs<impl ReadCounter>,
+        ray: &TraversalRay,
+        t_best: f32,
+        cell: &mut Cell,
+    ) -> bool {
         cell.t_enter = cell.t_exit;
         if self.trail.mask.is_empty() || t_best < cell.t_enter {
             return false;
@@ -56,7 +62,7 @@ impl<const N: usize> Pending for PendingMarked<N> {
             (cell.node_ix, cell.t_exit) = self.entries[self.top & N.wrapping_sub(1)];
             self.trail.go_up();
         } else {
-            self.trail.retrace(bindings, ray, cell);
+            self.trail.retrace(inputs, ray, cell);
         }
         true
     }

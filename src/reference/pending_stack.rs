@@ -1,8 +1,8 @@
 //! Pending subtrees on an array: no bits, no climbing. Twin of `pending_stack.glsl`.
 
 use super::{
-    bindings::Bindings,
     counting::table::ReadCounter,
+    inputs::KernelInputs,
     kdtree::{Cell, Pending, TraversalRay},
 };
 use crate::layout::KD_MAX_DEPTH;
@@ -31,7 +31,7 @@ impl Pending for PendingStack {
     }
 
     #[inline(always)]
-    fn pop(&mut self, _: &Bindings<impl ReadCounter>, _: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
+    fn pop(&mut self, _: &KernelInputs<impl ReadCounter>, _: &TraversalRay, t_best: f32, cell: &mut Cell) -> bool {
         cell.t_enter = cell.t_exit;
         if self.size == 0 || t_best < cell.t_enter {
             return false;

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::{
     RAYS_PER_TASK,
-    bindings::Bindings,
     camera::{camera_direction, pixel_of},
+    inputs::KernelInputs,
     triangle::Shear,
 };
 use crate::layout::{Frame, Hit, NO_TRIANGLE, PathRay};
@@ -34,7 +34,7 @@ pub fn primary_rays(frame: &Frame, first_pixel: u32, rays: &mut [PathRay]) {
 }
 
 /// Writes `hits`, one a ray, from `triangle_ids` (rows from the top); returns how many are hits.
-pub fn primary_hit(bindings: &Bindings, triangle_ids: &[u32], rays: &[PathRay], hits: &mut [Hit]) -> u32 {
+pub fn primary_hit(inputs: &KernelInputs, triangle_ids: &[u32], rays: &[PathRay], hits: &mut [Hit]) -> u32 {
     let of_task = |(rays, hits): (&[PathRay], &mut [Hit])| {
         let mut n_hits = 0;
         for (ray, hit) in rays.iter().zip(hits) {
@@ -42,7 +42,7 @@ pub fn primary_hit(bindings: &Bindings, triangle_ids: &[u32], rays: &[PathRay], 
             *hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
             if triangle_ix != NO_TRIANGLE {
                 let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
-                *hit = shear.clamp_to_triangle(&bindings.triangles[triangle_ix as usize], triangle_ix);
+                *hit = shear.clamp_to_triangle(&inputs.triangles[triangle_ix as usize], triangle_ix);
                 n_hits += 1;
             }
         }

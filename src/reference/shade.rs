@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     RAYS_PER_TASK,
-    bindings::Bindings,
+    inputs::KernelInputs,
     light::sample_light,
     material::{local_weight, phong},
     surface::{Surface, surface_at},
@@ -23,14 +23,14 @@ pub struct LitRays<'a> {
 }
 
 fn local_radiance(
-    bindings: &Bindings,
+    inputs: &KernelInputs,
     is_lit: impl Fn(usize) -> bool,
     ray: &PathRay,
     surface: &Surface,
     material: &Material,
 ) -> Vec3 {
-    let mut radiance = material.ke + material.ka * bindings.frame().ambient;
-    for (light_ix, light) in bindings.lights.iter().enumerate() {
+    let mut radiance = material.ke + material.ka * inputs.frame().ambient;
+    for (light_ix, light) in inputs.lights.iter().enumerate() {
         if !is_lit(light_ix) {
             continue;
         }
@@ -41,22 +41,22 @@ fn local_radiance(
 }
 
 /// Its throughput included.
-fn radiance_of(bindings: &Bindings, (ray, hit): (&PathRay, &Hit), is_lit: impl Fn(usize) -> bool) -> Vec3 {
+fn radiance_of(inputs: &KernelInputs, (ray, hit): (&PathRay, &Hit), is_lit: impl Fn(usize) -> bool) -> Vec3 {
     if hit.triangle_ix == NO_TRIANGLE {
-        return ray.throughput * bindings.frame().background;
+        return ray.throughput * inputs.frame().background;
     }
-    let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
-    ray.throughput * local_radiance(bindings, is_lit, ray, &surface, bindings.material_at(hit))
+    let surface = surface_at(ray, hit, &inputs.triangles[hit.triangle_ix as usize]);
+    ray.throughput * local_radiance(inputs, is_lit, ray, &surface, inputs.material_at(hit))
 }
 
 /// Writes `ray_radiance`, one a ray, weighted by its throughput.
-pub fn shade(bindings: &Bindings, lit: LitRays, ray_radiance: &mut [[f32; 4]]) {
-    let stride = bindings.frame().queue_capacity as usize;
+pub fn shade(inputs: &KernelInputs, lit: LitRays, ray_radiance: &mut [[f32; 4]]) {
+    let stride = inputs.frame().queue_capacity as usize;
     ray_radiance.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each(|(task, radiance)| {
         for (ray_ix, radiance) in (task * RAYS_PER_TASK..).zip(radiance) {
             let is_lit = |light_ix: usize| lit.light_visibility[light_ix * stride + ray_ix] == LIGHT_LIT;
             let ray = (&lit.rays[ray_ix], &lit.hits[ray_ix]);
-            *radiance = radiance_of(bindings, ray, is_lit).extend(0.0).to_array();
+            *radiance = radiance_of(inputs, ray, is_lit).extend(0.0).to_array();
         }
     });
 }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     RAYS_PER_TASK,
-    bindings::Bindings,
+    inputs::KernelInputs,
     light::sample_light,
     material::can_show,
     search_ray::SearchRay,
@@ -20,14 +20,14 @@ use crate::{
 };
 
 /// The segment to the light, or none where the surface turns its back on it or would not show it.
-pub(crate) fn shadow_segment(bindings: &Bindings, ray: &PathRay, hit: &Hit, light: &Light) -> Option<PathRay> {
-    let surface = surface_at(ray, hit, &bindings.triangles[hit.triangle_ix as usize]);
+pub(crate) fn shadow_segment(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, light: &Light) -> Option<PathRay> {
+    let surface = surface_at(ray, hit, &inputs.triangles[hit.triangle_ix as usize]);
     let to_light = sample_light(light, surface.point_world);
     // Not `<=`: a NaN is unlit.
     if !(surface.geometric.dot(to_light.direction) > 0.0) {
         return None;
     }
-    if !can_show(bindings.material_at(hit), surface.shading, -ray.direction, to_light.direction) {
+    if !can_show(inputs.material_at(hit), surface.shading, -ray.direction, to_light.direction) {
         return None;
     }
     let segment = surface.ray_from(to_light.direction, hit.triangle_ix, ray, Vec3::ZERO);
@@ -37,18 +37,18 @@ pub(crate) fn shadow_segment(bindings: &Bindings, ray: &PathRay, hit: &Hit, ligh
 /// Writes `light_visibility[light * queue_capacity + ray]` (`LIGHT_*`) of a bounce's rays, whose places are given; returns how many
 /// segments were tested.
 pub fn shadow(
-    bindings: &Bindings,
+    inputs: &KernelInputs,
     traversal: Traversal,
     places: &Range<usize>,
     (rays, hits): (&[PathRay], &[Hit]),
     light_visibility: &mut [u32],
 ) -> u32 {
-    shadow_by::<Traverser>(bindings, traversal, places, (rays, hits), light_visibility)
+    shadow_by::<Traverser>(inputs, traversal, places, (rays, hits), light_visibility)
 }
 
 /// Does what [`shadow`] does, by another tracer.
 pub fn shadow_by<T: Tracer>(
-    bindings: &Bindings,
+    inputs: &KernelInputs,
     traversal: Traversal,
     places: &Range<usize>,
     (rays, hits): (&[PathRay], &[Hit]),
@@ -61,11 +61,11 @@ pub fn shadow_by<T: Tracer>(
             let segments = rays.iter().zip(hits).zip(visibility).filter_map(|((ray, hit), visible)| {
                 *visible = LIGHT_UNTESTED;
                 let is_hit = hit.triangle_ix != NO_TRIANGLE;
-                let segment = is_hit.then(|| shadow_segment(bindings, ray, hit, light)).flatten()?;
+                let segment = is_hit.then(|| shadow_segment(inputs, ray, hit, light)).flatten()?;
                 n_tested += 1;
                 Some((visible, SearchRay::from(&segment)))
             });
-            traverser.trace_all::<true, _>(bindings, segments, |visible, hit| {
+            traverser.trace_all::<true, _>(inputs, segments, |visible, hit| {
                 *visible = if hit.triangle_ix == NO_TRIANGLE { LIGHT_LIT } else { LIGHT_SHADOWED };
             });
             n_tested
@@ -76,6 +76,6 @@ pub fn shadow_by<T: Tracer>(
             .map_init(|| T::new(traversal), of_task)
             .sum()
     };
-    let stride = bindings.frame().queue_capacity as usize;
-    bindings.lights.iter().zip(light_visibility.chunks_mut(stride)).map(of_light).sum()
+    let stride = inputs.frame().queue_capacity as usize;
+    inputs.lights.iter().zip(light_visibility.chunks_mut(stride)).map(of_light).sum()
 }

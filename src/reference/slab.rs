@@ -1,13 +1,13 @@
 //! Whether a ray keeps clear of the slab around a node's surface. Twin of `slab.glsl`; the planes of triangles are in `leaf.rs`,
 //! slabs for sixteen rays in `packet.rs`.
 
-use super::{bindings::Bindings, counting::table::ReadCounter, kdtree::TraversalRay};
+use super::{counting::table::ReadCounter, inputs::KernelInputs, kdtree::TraversalRay};
 use crate::layout::{KD_HAS_SLAB, KdNode, Slab};
 
 /// The node's slab, if it has one.
 #[inline(always)]
-pub fn slab_of<'a>(bindings: &Bindings<'a, impl ReadCounter>, node: KdNode, node_ix: u32) -> Option<&'a Slab> {
-    if node.axis_and_child & KD_HAS_SLAB == 0 { None } else { bindings.kd_slabs.get(node_ix as usize) }
+pub fn slab_of<'a>(inputs: &KernelInputs<'a, impl ReadCounter>, node: KdNode, node_ix: u32) -> Option<&'a Slab> {
+    if node.axis_and_child & KD_HAS_SLAB == 0 { None } else { inputs.kd_slabs.get(node_ix as usize) }
 }
 
 /// The middle of a ray's way through a cell, and half its length, in t.

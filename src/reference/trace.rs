@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{
     RAYS_PER_TASK,
-    bindings::Bindings,
+    inputs::KernelInputs,
     search_ray::SearchRay,
     traverser::{Tracer, Traverser},
 };
@@ -14,12 +14,12 @@ use crate::{
 };
 
 /// Writes `hits`, one a ray; returns how many are hits.
-pub fn trace(bindings: &Bindings, traversal: Traversal, rays: &[PathRay], hits: &mut [Hit]) -> u32 {
-    trace_by::<Traverser>(bindings, traversal, rays, hits)
+pub fn trace(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay], hits: &mut [Hit]) -> u32 {
+    trace_by::<Traverser>(inputs, traversal, rays, hits)
 }
 
 /// Does what [`trace`] does, by another tracer.
-pub fn trace_by<T: Tracer>(bindings: &Bindings, traversal: Traversal, rays: &[PathRay], hits: &mut [Hit]) -> u32 {
+pub fn trace_by<T: Tracer>(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay], hits: &mut [Hit]) -> u32 {
     rays.par_chunks(RAYS_PER_TASK)
         .zip(hits.par_chunks_mut(RAYS_PER_TASK))
         .map_init(
@@ -27,7 +27,7 @@ pub fn trace_by<T: Tracer>(bindings: &Bindings, traversal: Traversal, rays: &[Pa
             |traverser, (rays, hits)| {
                 let mut n_hits = 0;
                 let probes = rays.iter().map(SearchRay::from);
-                traverser.trace_all::<false, _>(bindings, hits.iter_mut().zip(probes), |hit, found| {
+                traverser.trace_all::<false, _>(inputs, hits.iter_mut().zip(probes), |hit, found| {
                     *hit = found;
                     n_hits += u32::from(found.triangle_ix != NO_TRIANGLE);
                 });

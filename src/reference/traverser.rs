@@ -1,9 +1,9 @@
 //! The algorithms that take rays through the tree, behind one interface: one ray after the other.
 
 use super::{
-    bindings::Bindings,
     brute,
     counting::table::ReadCounter,
+    inputs::KernelInputs,
     kdtree::{Pending, TraversalRay, hit_from_near, search},
     pending_backtrack::PendingBacktrack,
     pending_mask::PendingMask,
@@ -27,7 +27,7 @@ pub trait Tracer {
     /// any order. A miss keeps t = t_max.
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,
-        bindings: &Bindings<impl ReadCounter>,
+        inputs: &KernelInputs<impl ReadCounter>,
         probes: impl Iterator<Item = (Key, SearchRay)>,
         found: impl FnMut(Key, Hit),
     );
@@ -49,19 +49,19 @@ impl Traverser {
     /// Finds a ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps
     /// t = t_max.
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(&mut self, bindings: &Bindings<impl ReadCounter>, probe: &SearchRay) -> Hit {
-        hit_from_near(bindings, probe, |near, best| {
-            let ray = &TraversalRay::new(bindings, near);
+    pub fn traverse<const ANY_HIT: bool>(&mut self, inputs: &KernelInputs<impl ReadCounter>, probe: &SearchRay) -> Hit {
+        hit_from_near(inputs, probe, |near, best| {
+            let ray = &TraversalRay::new(inputs, near);
             match self {
-                Self::Mask(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
-                Self::MaskBoxes(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
-                Self::Restart(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
-                Self::Backtrack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
-                Self::ShortStack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
-                Self::Stack(pending) => search::<_, ANY_HIT>(bindings, ray, pending, best),
-                Self::Ropes => follow_ropes::<ANY_HIT>(bindings, ray, best),
+                Self::Mask(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
+                Self::MaskBoxes(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
+                Self::Restart(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
+                Self::Backtrack(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
+                Self::ShortStack(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
+                Self::Stack(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
+                Self::Ropes => follow_ropes::<ANY_HIT>(inputs, ray, best),
                 Self::Brute => {
-                    *best = brute::closest_hit_of(bindings.triangles, near, |ix| bindings.is_accepted(ix));
+                    *best = brute::closest_hit_of(inputs.triangles, near, |ix| inputs.is_accepted(ix));
                 }
             }
         })
@@ -85,10 +85,10 @@ impl Tracer for Traverser {
     #[inline]
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,
-        bindings: &Bindings<impl ReadCounter>,
+        inputs: &KernelInputs<impl ReadCounter>,
         probes: impl Iterator<Item = (Key, SearchRay)>,
         mut found: impl FnMut(Key, Hit),
     ) {
-        probes.for_each(|(key, probe)| found(key, self.traverse::<ANY_HIT>(bindings, &probe)));
+        probes.for_each(|(key, probe)| found(key, self.traverse::<ANY_HIT>(inputs, &probe)));
     }
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::{
     RAYS_PER_TASK,
-    bindings::Bindings,
+    inputs::KernelInputs,
     primary_hit::camera_ray,
     search_ray::SearchRay,
     traverser::{Tracer, Traverser},
@@ -13,21 +13,21 @@ use super::{
 use crate::accel::kdtree::Traversal;
 
 /// Writes `triangle_ids` (`width * height`, rows from the top): the nearest triangle, or `NO_TRIANGLE`.
-pub fn visibility(bindings: &Bindings, traversal: Traversal, triangle_ids: &mut [u32]) {
-    visibility_by::<Traverser>(bindings, traversal, triangle_ids);
+pub fn visibility(inputs: &KernelInputs, traversal: Traversal, triangle_ids: &mut [u32]) {
+    visibility_by::<Traverser>(inputs, traversal, triangle_ids);
 }
 
 /// Does what [`visibility`] does, by another tracer.
-pub fn visibility_by<T: Tracer>(bindings: &Bindings, traversal: Traversal, triangle_ids: &mut [u32]) {
-    let width = bindings.frame().width;
+pub fn visibility_by<T: Tracer>(inputs: &KernelInputs, traversal: Traversal, triangle_ids: &mut [u32]) {
+    let width = inputs.frame().width;
     triangle_ids.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each_init(
         || T::new(traversal),
         |traverser, (task, ids)| {
             let probes = (task * RAYS_PER_TASK..).map(|pixel_ix| {
                 let pixel = glam::uvec2(pixel_ix as u32 % width, pixel_ix as u32 / width);
-                SearchRay::from(&camera_ray(bindings.frame(), pixel))
+                SearchRay::from(&camera_ray(inputs.frame(), pixel))
             });
-            traverser.trace_all::<false, _>(bindings, ids.iter_mut().zip(probes), |id, hit| *id = hit.triangle_ix);
+            traverser.trace_all::<false, _>(inputs, ids.iter_mut().zip(probes), |id, hit| *id = hit.triangle_ix);
         },
     );
 }

@@ -8,9 +8,9 @@ use crate::{
     frame::{RenderOptions, frame_constants},
     layout::{Hit, NO_TRIANGLE, PathRay},
     reference::{
-        bindings::Bindings,
         children::{child_kinds_of, children_of},
         counting::steps::{Steps, count_steps},
+        inputs::KernelInputs,
         primary_hit::camera_ray,
     },
     scene::Camera,
@@ -61,7 +61,7 @@ pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec
     let links = TraversalLinks::new(tree, options.traversal);
     let mut frame = frame_constants(world, options);
     frame.set_view(camera, world.bounds(), 0);
-    let bindings = Bindings::new(scene, tree, &frame).with_links(&links);
+    let bindings = KernelInputs::new(scene, tree, &frame).with_links(&links);
     let mut rays = vec![camera_ray(&frame, pixel)];
     let mut picked = Picked { pixel, rays: Vec::new(), n_more: 0 };
     for depth in 0..options.max_depth {
@@ -97,7 +97,7 @@ fn found(scene: &FlatScene, ray: &PathRay, hit: &Hit) -> Option<PickedHit> {
 }
 
 /// The rays of the next level.
-fn next_rays(bindings: &Bindings, rays: &[PathRay], hits: &[Hit]) -> Vec<PathRay> {
+fn next_rays(bindings: &KernelInputs, rays: &[PathRay], hits: &[Hit]) -> Vec<PathRay> {
     let of_ray = |(ray, hit)| children_of(bindings, ray, hit, child_kinds_of(bindings, ray, hit));
     rays.iter().zip(hits).flat_map(of_ray).collect()
 }

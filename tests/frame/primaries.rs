@@ -9,7 +9,7 @@ use kdray::{
     frame::{Crop, Picture, Primary, RenderOptions, frame_constants},
     layout::Frame,
     reference::{
-        bindings::Bindings,
+        inputs::KernelInputs,
         primary_hit::camera_ray,
         traverser::{Tracer, Traverser},
     },
@@ -33,7 +33,7 @@ fn is_on_edge(world: &World, options: &RenderOptions, pixel_ix: usize) -> bool {
             let shift = frame.right * (2.0 * x / frame.width as f32) - frame.up * (2.0 * y / frame.height as f32);
             let frame = Frame { forward: frame.forward + shift, ..frame };
             traverser
-                .traverse::<false>(&Bindings::new(scene, tree, &frame), &(&camera_ray(&frame, pixel)).into())
+                .traverse::<false>(&KernelInputs::new(scene, tree, &frame), &(&camera_ray(&frame, pixel)).into())
                 .triangle_ix
         })
         .collect();

@@ -90,7 +90,7 @@ fn on_device(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
 }
 
 fn on_cpu(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
-    let (bindings, constants) = (stage.bindings(), stage.resources.constants());
+    let (bindings, constants) = (stage.inputs(), stage.resources.constants());
     let capacity = stage.resources.queue.rays.len();
     let parents = child_counts.iter().enumerate().map(|(i, &n)| parent(i, n));
     let (rays, hits): (Vec<_>, Vec<_>) = parents.unzip();

@@ -28,7 +28,7 @@ fn on_cpu(stage: &Stage, batch: &Batch, found: &[Hit]) -> (Vec<Hit>, u32) {
     for (ray, hit) in rays.iter().zip(found) {
         ids[ray.pixel_ix as usize] = hit.triangle_ix;
     }
-    let n_hits = reference::primary_hit::primary_hit(&stage.bindings(), &ids, &rays, &mut hits[..n]);
+    let n_hits = reference::primary_hit::primary_hit(&stage.inputs(), &ids, &rays, &mut hits[..n]);
     (hits, n_hits)
 }
 

@@ -17,7 +17,7 @@ fn check(stage: &Stage, batch: &Batch, n_rays: u32) {
     let light_visibility: Vec<u32> = (0..queue.light_visibility.len()).map(|_| random.below(3) as u32).collect();
     let mut expected = vec![UNTOUCHED_PIXEL; rays.len()];
     let lit = LitRays { rays: &rays, hits: &hits, light_visibility: &light_visibility };
-    reference::shade::shade(&stage.bindings(), lit, &mut expected);
+    reference::shade::shade(&stage.inputs(), lit, &mut expected);
     expected.resize(queue.hits.len(), UNTOUCHED_PIXEL);
 
     let bounces = stage.set_n_rays(&[n_rays / 3, n_rays - n_rays / 3]);

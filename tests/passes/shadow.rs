@@ -22,7 +22,7 @@ fn check(stage: &Stage, batch: &Batch, n_rays: u32) -> Vec<u32> {
     let bounces = stage.set_n_rays(&[n_rays / 3, n_rays - n_rays / 3]);
     let mut expected = vec![UNTOUCHED_WORD; queue.light_visibility.len()];
     for row in &bounces[..2] {
-        let (bindings, rays) = (stage.bindings(), (rays.as_slice(), hits.as_slice()));
+        let (bindings, rays) = (stage.inputs(), (rays.as_slice(), hits.as_slice()));
         let n_tested = reference::shadow::shadow(&bindings, stage.options.traversal, &row.rays(), rays, &mut expected);
         let is_tested = |state: &&u32| [LIGHT_LIT, LIGHT_SHADOWED].contains(state);
         let of_lights = expected.chunks(queue.capacity() as usize);
@@ -73,17 +73,11 @@ fn lights_that_are_not_asked_for_could_not_be_seen() {
     let hits = hits_of(&stage, &rays);
     let mut asked_for = vec![UNTOUCHED_WORD; stage.resources.queue.light_visibility.len()];
     let traversal = stage.options.traversal;
-    reference::shadow::shadow(
-        &stage.bindings(),
-        traversal,
-        &(0..n),
-        (rays.as_slice(), hits.as_slice()),
-        &mut asked_for,
-    );
+    reference::shadow::shadow(&stage.inputs(), traversal, &(0..n), (rays.as_slice(), hits.as_slice()), &mut asked_for);
     let shaded = |light_visibility: &[u32]| {
         let mut radiance = vec![[0.0; 4]; n];
         let lit = LitRays { rays: &rays, hits: &hits, light_visibility };
-        reference::shade::shade(&stage.bindings(), lit, &mut radiance);
+        reference::shade::shade(&stage.inputs(), lit, &mut radiance);
         radiance
     };
     let instead =
@@ -98,7 +92,7 @@ fn lights_that_are_not_asked_for_could_not_be_seen() {
     assert!(greatest_difference(&instead(LIGHT_SHADOWED)) > 0.1);
     // More are spared than those of black surfaces and behind a surface's back, but not all of the glossy.
     let is_glossy = |hit: &Hit| {
-        hit.triangle_ix != NO_TRIANGLE && stage.bindings().triangle_materials[hit.triangle_ix as usize] % 3 == 1
+        hit.triangle_ix != NO_TRIANGLE && stage.inputs().triangle_materials[hit.triangle_ix as usize] % 3 == 1
     };
     let of_glossy = |state: u32| (0..n).filter(|&i| is_glossy(&hits[i]) && asked_for[i] == state).count();
     assert!(

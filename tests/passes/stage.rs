@@ -9,7 +9,7 @@ use kdray::{
     gpu::{Commands, Context, ContextOptions},
     layout::{Batch, Bounce, Counters, Frame, Hit, NO_TRIANGLE, PathRay, RAY_GROUP_SIZE},
     passes::Passes,
-    reference::bindings::Bindings,
+    reference::inputs::KernelInputs,
     world::{FlatScene, World},
 };
 
@@ -60,8 +60,8 @@ impl Stage {
     }
 
     /// The twin's view of the same scene.
-    pub fn bindings(&self) -> Bindings<'_> {
-        Bindings::new(self.world.scene(), self.world.tree(), self.resources.constants()).with_links(&self.links)
+    pub fn inputs(&self) -> KernelInputs<'_> {
+        KernelInputs::new(self.world.scene(), self.world.tree(), self.resources.constants()).with_links(&self.links)
     }
 
     /// Binds the descriptor set, records and runs.
@@ -176,6 +176,6 @@ pub fn rays_of(stage: &Stage, batch: &Batch, n: u32) -> (Vec<PathRay>, Vec<PathR
 /// The twin's hits of `rays`.
 pub fn hits_of(stage: &Stage, rays: &[PathRay]) -> Vec<Hit> {
     let mut hits = vec![Hit { triangle_ix: NO_TRIANGLE, ..UNTOUCHED_HIT }; rays.len()];
-    kdray::reference::trace::trace(&stage.bindings(), stage.options.traversal, rays, &mut hits);
+    kdray::reference::trace::trace(&stage.inputs(), stage.options.traversal, rays, &mut hits);
     hits
 }

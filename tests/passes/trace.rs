@@ -15,7 +15,7 @@ fn check(stage: &Stage, n_rays: u32) {
     let n = n_rays as usize;
     let rays = some_rays(stage, n_rays);
     let mut expected = vec![UNTOUCHED_HIT; stage.resources.queue.hits.len()];
-    let n_hits = reference::trace::trace(&stage.bindings(), stage.options.traversal, &rays, &mut expected[..n]);
+    let n_hits = reference::trace::trace(&stage.inputs(), stage.options.traversal, &rays, &mut expected[..n]);
     stage.set_n_rays(&[n_rays]);
     stage.set_rays(&rays);
     stage.set_hits(&[]);

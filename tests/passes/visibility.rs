@@ -39,7 +39,7 @@ fn rasterized(stage: &Stage) -> Vec<u32> {
 /// The same from the kd-tree.
 fn on_cpu(stage: &Stage) -> Vec<u32> {
     let mut ids = vec![0xdead; (stage.options.width * stage.options.height) as usize];
-    reference::visibility::visibility(&stage.bindings(), stage.options.traversal, &mut ids);
+    reference::visibility::visibility(&stage.inputs(), stage.options.traversal, &mut ids);
     ids
 }
 
@@ -56,7 +56,7 @@ fn is_met_nearby(stage: &Stage, pixel_ix: u32, id: u32) -> bool {
     (0..17 * 17).any(|i| {
         let offset = |i: i32| (i - 8) as f32 / 8.0 * SNAP_PX;
         let ray = camera_ray(&shifted(offset(i % 17), offset(i / 17)), pixel);
-        traverser.traverse::<false>(&stage.bindings(), &(&ray).into()).triangle_ix == id
+        traverser.traverse::<false>(&stage.inputs(), &(&ray).into()).triangle_ix == id
     })
 }
 

@@ -19,7 +19,7 @@ use kdray::{
     accel::kdtree::{BuildOptions, KdTree, TraversalLinks},
     gpu::{Context, ContextOptions, DeviceOverrides},
     layout::{Hit, NO_TRIANGLE, PathRay, Triangle},
-    reference::{bindings::Bindings, brute, kdtree::near_scene, search_ray::SearchRay},
+    reference::{brute, inputs::KernelInputs, kdtree::near_scene, search_ray::SearchRay},
     world::{FlatScene, Geometry, World},
 };
 
@@ -66,8 +66,8 @@ impl MeshWithTree {
         Self { triangles, links: TraversalLinks::all(&tree), tree }
     }
 
-    pub fn bindings(&self) -> Bindings<'_> {
-        Bindings::of_tree(&self.triangles, &self.tree).with_links(&self.links)
+    pub fn inputs(&self) -> KernelInputs<'_> {
+        KernelInputs::of_tree(&self.triangles, &self.tree).with_links(&self.links)
     }
 
     /// What a cast goes through.
@@ -77,7 +77,7 @@ impl MeshWithTree {
 
     /// The closest hit beyond `t_min` over every triangle, of the ray as the traversal sees it.
     pub fn by_brute_force(&self, ray: &PathRay, t_min: f32) -> Hit {
-        let (near, t_start) = near_scene(&self.bindings(), &SearchRay { t_min, ..SearchRay::from(ray) });
+        let (near, t_start) = near_scene(&self.inputs(), &SearchRay { t_min, ..SearchRay::from(ray) });
         let hit = brute::closest_hit(&self.triangles, &near);
         Hit { t: if hit.triangle_ix == NO_TRIANGLE { ray.t_max } else { hit.t + t_start }, ..hit }
     }

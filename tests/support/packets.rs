@@ -28,7 +28,7 @@ pub fn traced<const ANY_HIT: bool>(world: &MeshWithTree, level: Level, rays: &[P
     let mut hits = vec![None; rays.len()];
     let probes = hits.iter_mut().zip(rays.iter().map(SearchRay::from));
     let mut tracer = FastTracer::at_level(Traversal::Stack, level);
-    tracer.trace_all::<ANY_HIT, _>(&world.bindings(), probes, |place, hit| {
+    tracer.trace_all::<ANY_HIT, _>(&world.inputs(), probes, |place, hit| {
         assert_eq!(place.replace(hit), None, "a ray has one hit");
     });
     hits.into_iter().map(|hit| hit.expect("a ray has a hit")).collect()

@@ -29,7 +29,7 @@ use crate::{
     accel::{Query, kdtree::Traversal},
     buffers::{AccelBuffers, CastResources},
     cast::{Contender, Kernel, cast_ray},
-    gpu::{Bindings, Context, GpuError, Scenery},
+    gpu::{BindingLayout, Context, GpuError, Scenery},
 };
 
 /// kdray's ways through the tree that are measured: the default one, the one that keeps a stack in memory, and the one that
@@ -42,7 +42,7 @@ const N_BUILDS: usize = 5;
 pub struct Arena {
     context: Arc<Context>,
     tree: AccelBuffers,
-    bindings: Arc<Bindings>,
+    bindings: Arc<BindingLayout>,
     scenery: Rc<Scenery>,
     rasters: Vec<Raster>,
     builds: Builds,

@@ -7,8 +7,8 @@ use crate::{
     buffers::CastResources,
     cast::Contender,
     gpu::{
-        Access, Binding, BindingKind, BindingSet, Bindings, Commands, Constants, Context, GpuError, RayTracingDesc,
-        RayTracingPipeline, Scenery,
+        Access, Binding, BindingKind, BindingLayout, BindingSet, Commands, Constants, Context, GpuError,
+        RayTracingDesc, RayTracingPipeline, Scenery,
     },
     layout::{BIND_CAST_HITS, BIND_CAST_RAYS, DriverCast, constants},
     passes::spirv,
@@ -32,7 +32,7 @@ impl Pipeline {
         query: Query,
     ) -> Result<Self, GpuError> {
         let kinds = [(BIND_CAST_RAYS, BindingKind::Storage), (BIND_CAST_HITS, BindingKind::Storage)];
-        let bindings = Bindings::new(context, &kinds, size_of::<DriverCast>() as u32)?;
+        let bindings = BindingLayout::new(context, &kinds, size_of::<DriverCast>() as u32)?;
         let buffers = [
             (BIND_CAST_RAYS, Binding::Buffer(resources.cast_rays.any())),
             (BIND_CAST_HITS, Binding::Buffer(resources.cast_hits.any())),

@@ -19,7 +19,7 @@ use crate::{
     frame::{Denoise, Primary, RenderOptions, frame_constants},
     gpu::{Context, GpuError},
     layout::{Frame, Hit, PathRay, Ray},
-    reference::{bindings::Bindings, primary_hit::primary_rays},
+    reference::{inputs::KernelInputs, primary_hit::primary_rays},
     render::Renderer,
     world::{FlatScene, World},
 };
@@ -74,7 +74,7 @@ fn some_rays(scene: &FlatScene, tree: &KdTree, frame: &Frame) -> Vec<Ray> {
     let mut from_camera = vec![PathRay::zeroed(); (frame.width * frame.height) as usize];
     primary_rays(frame, 0, &mut from_camera);
     let mut hits = vec![Hit::zeroed(); from_camera.len()];
-    trace(&Bindings::new(scene, tree, frame), Traversal::OF_CPU, &from_camera, &mut hits);
+    trace(&KernelInputs::new(scene, tree, frame), Traversal::OF_CPU, &from_camera, &mut hits);
     let bounced = diffuse_rays(&scene.triangles, &from_camera, &hits);
     from_camera.iter().chain(&bounced).map(cast_ray).collect()
 }

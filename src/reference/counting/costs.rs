@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::table::ReadCounts;
 use crate::reference::{
     RAYS_PER_TASK,
-    bindings::Bindings,
+    inputs::KernelInputs,
     shadow::shadow_segment,
     traverser::{Tracer, Traverser},
 };
@@ -26,9 +26,9 @@ pub fn count_rasterized(rays: &[PathRay], hits: &[Hit], pixel_features: &mut [Fe
 }
 
 /// Rays whose closest hit was found through the tree.
-pub fn count_closest(bindings: &Bindings, traversal: Traversal, rays: &[PathRay], pixel_features: &mut [Feature]) {
+pub fn count_closest(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay], pixel_features: &mut [Feature]) {
     let steps: Vec<_> = (rays.par_iter().with_min_len(RAYS_PER_TASK))
-        .map_init(|| Traverser::new(traversal), |traverser, ray| steps_of::<false>(bindings, traverser, ray))
+        .map_init(|| Traverser::new(traversal), |traverser, ray| steps_of::<false>(inputs, traverser, ray))
         .collect();
     for (ray, n_steps) in rays.iter().zip(steps) {
         add(pixel_features, ray, n_steps);
@@ -37,20 +37,20 @@ pub fn count_closest(bindings: &Bindings, traversal: Traversal, rays: &[PathRay]
 
 /// Segments from the hits to all lights that their surfaces face.
 pub fn count_shadow(
-    bindings: &Bindings,
+    inputs: &KernelInputs,
     traversal: Traversal,
     rays: &[PathRay],
     hits: &[Hit],
     pixel_features: &mut [Feature],
 ) {
-    for light in bindings.lights {
+    for light in inputs.lights {
         let steps: Vec<_> = (rays.par_iter().zip(hits).with_min_len(RAYS_PER_TASK))
             .map_init(
                 || Traverser::new(traversal),
                 |traverser, (ray, hit)| {
                     let is_hit = hit.triangle_ix != NO_TRIANGLE;
-                    let segment = is_hit.then(|| shadow_segment(bindings, ray, hit, light)).flatten()?;
-                    Some(steps_of::<true>(bindings, traverser, &segment))
+                    let segment = is_hit.then(|| shadow_segment(inputs, ray, hit, light)).flatten()?;
+                    Some(steps_of::<true>(inputs, traverser, &segment))
                 },
             )
             .collect();
@@ -62,12 +62,12 @@ pub fn count_shadow(
     }
 }
 
-fn steps_of<const ANY: bool>(bindings: &Bindings, traverser: &mut Traverser, ray: &PathRay) -> u32 {
+fn steps_of<const ANY: bool>(inputs: &KernelInputs, traverser: &mut Traverser, ray: &PathRay) -> u32 {
     if matches!(traverser, Traverser::Brute) {
-        return bindings.triangles.len() as u32;
+        return inputs.triangles.len() as u32;
     }
     let counts = ReadCounts::default();
-    traverser.traverse::<ANY>(&bindings.counted(&counts), &ray.into());
+    traverser.traverse::<ANY>(&inputs.counted(&counts), &ray.into());
     (counts.n_nodes.get() + counts.n_triangles.get()) as u32
 }
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::table::ReadCounts;
 use crate::reference::{
     RAYS_PER_TASK,
-    bindings::Bindings,
+    inputs::KernelInputs,
     traverser::{Tracer, Traverser},
 };
 use crate::{
@@ -51,13 +51,13 @@ impl From<ReadCounts> for Steps {
 
 /// The reads of all rays together. The kernels' are the same, but where rounding sends a ray another way. Brute force
 /// tests every triangle, whatever is asked.
-pub fn count_steps(bindings: &Bindings, traversal: Traversal, query: Query, rays: &[PathRay]) -> Steps {
+pub fn count_steps(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[PathRay]) -> Steps {
     if traversal == Traversal::Brute {
-        return Steps { n_triangles: (rays.len() * bindings.triangles.len()) as u64, ..Steps::default() };
+        return Steps { n_triangles: (rays.len() * inputs.triangles.len()) as u64, ..Steps::default() };
     }
     let of_task = |traverser: &mut Traverser, rays: &[PathRay]| {
         let counts = ReadCounts::default();
-        let counted = bindings.counted(&counts);
+        let counted = inputs.counted(&counts);
         for ray in rays {
             match query {
                 Query::Closest => traverser.traverse::<false>(&counted, &ray.into()),
@@ -101,7 +101,7 @@ mod tests {
         let options = BuildOptions { traversal_cost: 1e-3, ..options };
         let tree = KdTree::build(&triangles, &options);
         let links = TraversalLinks::all(&tree);
-        count_steps(&Bindings::of_tree(&triangles, &tree).with_links(&links), traversal, query, rays)
+        count_steps(&KernelInputs::of_tree(&triangles, &tree).with_links(&links), traversal, query, rays)
     }
 
     fn ray(origin: Vec3, direction: Vec3) -> PathRay {

@@ -11,7 +11,7 @@ use crate::{
 
 /// The scene, its tree and the frame's constants. `R`: who is told of reads of the tree.
 #[derive(Clone, Copy, Debug)]
-pub struct Bindings<'a, R = NoCounter> {
+pub struct KernelInputs<'a, R = NoCounter> {
     /// None for rays that no frame makes.
     pub frame: Option<&'a Frame>,
     /// The box that holds all triangles, with the tree's rounding margin (world units).
@@ -38,7 +38,7 @@ pub struct Bindings<'a, R = NoCounter> {
     pub kd_ropes: CountedSlice<'a, KdRope, R>,
 }
 
-impl<'a, R> Bindings<'a, R> {
+impl<'a, R> KernelInputs<'a, R> {
     /// The frame's constants.
     ///
     /// # Panics
@@ -55,7 +55,7 @@ impl<'a, R> Bindings<'a, R> {
     }
 }
 
-impl<'a> Bindings<'a> {
+impl<'a> KernelInputs<'a> {
     pub fn new(scene: &'a FlatScene, tree: &'a KdTree, frame: &'a Frame) -> Self {
         Self {
             triangle_materials: &scene.triangle_materials,
@@ -88,8 +88,8 @@ impl<'a> Bindings<'a> {
     }
 
     /// The same, with reads of the tree counted.
-    pub fn counted<'c>(self, counts: &'c ReadCounts) -> Bindings<'a, Counted<'c>> {
-        Bindings {
+    pub fn counted<'c>(self, counts: &'c ReadCounts) -> KernelInputs<'a, Counted<'c>> {
+        KernelInputs {
             frame: self.frame,
             cell_min: self.cell_min,
             cell_max: self.cell_max,
