@@ -123,9 +123,9 @@ impl<'a> Commands<'a> {
 
 impl Commands<'_> {
     /// One pass: its name is the debug label and the timer's row.
-    pub(super) fn pass(&self, name: &'static str, bounce: Option<u32>, body: impl FnOnce()) {
+    pub(super) fn pass(&self, name: &'static str, number: Option<u32>, body: impl FnOnce()) {
         if let Some(timer) = self.timer {
-            timer.begin(self.raw, name, bounce, !self.has_passes.replace(true));
+            timer.begin(self.raw, name, number, !self.has_passes.replace(true));
         }
         self.labelled(name, body);
         if let Some(timer) = self.timer {
@@ -169,9 +169,9 @@ impl Commands<'_> {
         }
     }
 
-    /// Runs a kernel with the bound set, as a pass of its name and of a bounce, if it belongs to one.
-    pub fn dispatch(&self, pipeline: &ComputePipeline, bounce: Option<u32>, push: &impl Pod, dispatch: Dispatch) {
-        self.dispatch_after(|| (), pipeline, bounce, push, dispatch);
+    /// Runs a kernel with the bound set, as a pass of its name. `number` goes beside the name in the timer's row.
+    pub fn dispatch(&self, pipeline: &ComputePipeline, number: Option<u32>, push: &impl Pod, dispatch: Dispatch) {
+        self.dispatch_after(|| (), pipeline, number, push, dispatch);
     }
 
     /// As [`Commands::dispatch`], with transfers and barriers that are a part of the pass.
@@ -179,11 +179,11 @@ impl Commands<'_> {
         &self,
         prepare: impl FnOnce(),
         pipeline: &ComputePipeline,
-        bounce: Option<u32>,
+        number: Option<u32>,
         push: &impl Pod,
         dispatch: Dispatch,
     ) {
-        self.pass(pipeline.name, bounce, || {
+        self.pass(pipeline.name, number, || {
             prepare();
             self.launch(pipeline, push, dispatch);
         });

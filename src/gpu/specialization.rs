@@ -53,8 +53,12 @@ impl Constants {
     }
 
     /// Gives a constant a value.
+    ///
+    /// # Panics
+    /// The constant has one already.
     #[must_use]
     pub fn set<T: ConstantValue>(mut self, constant: Constant<T>, value: T) -> Self {
+        assert!(self.names().all(|name| name != constant.name), "{} is set twice", constant.name);
         self.values.push((constant.name, constant.id, value.word()));
         self
     }

@@ -11,8 +11,8 @@ use super::{Context, GpuError};
 pub struct TimerRow {
     /// The pass's name.
     pub name: &'static str,
-    /// The bounce that the pass belongs to, if any.
-    pub bounce: Option<u32>,
+    /// The number that tells the pass from others of its name, if any.
+    pub number: Option<u32>,
     /// None where the device's queue has no timestamps.
     pub span_ms: Option<(f64, f64)>,
 }
@@ -34,7 +34,7 @@ struct Recorded {
 
 struct Row {
     name: &'static str,
-    bounce: Option<u32>,
+    number: Option<u32>,
     /// Numbers of its timestamps.
     begin: u32,
     end: u32,
@@ -73,7 +73,7 @@ impl Timer {
     }
 
     /// Opens the next row. `is_first`: of its command buffer.
-    pub(super) fn begin(&self, commands: vk::CommandBuffer, name: &'static str, bounce: Option<u32>, is_first: bool) {
+    pub(super) fn begin(&self, commands: vk::CommandBuffer, name: &'static str, number: Option<u32>, is_first: bool) {
         let n_rows = self.recorded.borrow().rows.len() as u32;
         assert!(n_rows < self.capacity, "the timer has room for {} passes", self.capacity);
         if is_first {
@@ -81,7 +81,7 @@ impl Timer {
         }
         let mut recorded = self.recorded.borrow_mut();
         let begin = recorded.n_timestamps - 1;
-        recorded.rows.push(Row { name, bounce, begin, end: begin });
+        recorded.rows.push(Row { name, number, begin, end: begin });
     }
 
     /// Closes the last row.
@@ -116,7 +116,7 @@ impl Timer {
         let ms = |tick: u64| tick.saturating_sub(start) as f64 * f64::from(self.context.timestamp_period_ns) * 1e-6;
         let time = |timestamp: u32| ticks.get(timestamp as usize).map(|&tick| ms(tick));
         let row =
-            |row: &Row| TimerRow { name: row.name, bounce: row.bounce, span_ms: time(row.begin).zip(time(row.end)) };
+            |row: &Row| TimerRow { name: row.name, number: row.number, span_ms: time(row.begin).zip(time(row.end)) };
         Ok(rows.iter().map(row).collect())
     }
 

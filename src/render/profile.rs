@@ -22,7 +22,7 @@ impl Renderer {
         let ends_ms = rows.iter().map(|row| row.span_ms.map(|(_, end)| end));
         let pass = |row: &TimerRow| PassTime {
             name: row.name,
-            bounce: row.bounce,
+            bounce: row.number,
             start_ms: row.span_ms.map(|(begin, _)| begin),
             ms: row.span_ms.map(|(begin, end)| end - begin),
             ..PassTime::default()
