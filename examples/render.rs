@@ -8,7 +8,6 @@ use std::{env, error::Error, path::PathBuf};
 
 use kdray::{
     engine::{Built, Engine, choices::Workload},
-    frame::RenderOptions,
     gpu::ContextOptions,
     output,
     scene::Scene,
@@ -20,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("usage: render SCENE PICTURE".into());
     };
     let scene = Scene::load(&scene)?;
-    let options = RenderOptions::of_defaults(&scene.defaults);
+    let options = scene.defaults.options();
     // The engine chooses a tree that suits the number of rays.
     let workload = Workload::of_pictures(&options, scene.lights.len(), 1);
     // A machine without a Vulkan driver renders on the CPU.

@@ -11,7 +11,7 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scene = Scene::load("scenes/cornell.toml".as_ref())?;
-//! let options = RenderOptions { width: 64, height: 64, ..RenderOptions::of_defaults(&scene.defaults) };
+//! let options = RenderOptions { width: 64, height: 64, ..scene.defaults.options() };
 //! let workload = Workload::of_pictures(&options, scene.lights.len(), 1);
 //! let engine = Engine::on_cpu(); // or Engine::open(&ContextOptions::default())?
 //! let world = engine.build(scene, &workload)?.world;

@@ -10,7 +10,7 @@ use kdray::{
     cast::{Caster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
     gpu::{Context, ContextOptions},
     layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, PathRay},
-    reference::{kdtree::near_scene, search_ray::SearchRay},
+    reference::{search_ray::SearchRay, traversal_ray::near_scene},
 };
 use rayon::prelude::*;
 use support::{

@@ -10,8 +10,8 @@ use kdray::{
     layout::{TRIANGLE_HIDDEN, Triangle},
     reference::{
         brute,
-        kdtree::hit_from_near,
         search_ray::SearchRay,
+        traversal_ray::hit_from_near,
         traverser::{Tracer, Traverser},
     },
 };

@@ -9,11 +9,11 @@ use fearless_simd::{Level, dispatch, f32x16, prelude::*};
 use glam::Vec3;
 use kdray::{
     accel::kdtree::Traversal,
-    cpu::{octant_bins::OctantBins, packet::LANES, packet_triangle::Shears},
+    cpu::{lanes::LANES, octant_bins::OctantBins, packet_triangle::Shears},
     layout::{Hit, NO_TRIANGLE, PathRay, Triangle},
     reference::{
-        kdtree::{TraversalRay, signs_of},
         search_ray::SearchRay,
+        traversal_ray::{TraversalRay, signs_of},
         traverser::{Tracer, Traverser},
         triangle::Shear,
     },

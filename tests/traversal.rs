@@ -14,8 +14,8 @@ use kdray::{
         brute,
         counting::{steps::count_steps, table::CountedSlice},
         inputs::KernelInputs,
-        kdtree::near_scene,
         search_ray::SearchRay,
+        traversal_ray::near_scene,
         traverser::{Tracer, Traverser},
     },
 };

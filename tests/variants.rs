@@ -9,7 +9,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     accel::kdtree::{BuildOptions, KdTree, Traversal},
     buffers::{Needs, Resources},
-    frame::{RenderOptions, frame_constants},
+    frame::RenderOptions,
     gpu::{Access, Context, ContextOptions, GpuError},
     layout::{
         BRUTE_MAX_TRIANGLES, Batch, Bounce, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_LIT, LIGHT_POINT, LIGHT_SHADOWED,
@@ -63,7 +63,7 @@ struct Traced {
 fn traced(context: &Arc<Context>, scene: &FlatScene, tree: &KdTree, rays: &[PathRay], traversal: Traversal) -> Traced {
     let options = RenderOptions { width: 8, height: 8, max_depth: 1, traversal, ..RenderOptions::default() };
     let world = World::with_tree(scene.clone(), tree.clone(), &BuildOptions::default()).expect("a world");
-    let constants = Frame { queue_capacity: rays.len() as u32, ..frame_constants(&world, &options) };
+    let constants = Frame { queue_capacity: rays.len() as u32, ..world.frame_constants(&options) };
     let needs = Needs { constants: &constants, options: &options, n_bounces: 1 };
     let resources = Resources::new(context, &world, &needs).expect("resources");
     let passes = Passes::new(context, &resources.bindings, &options).expect("passes");

@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("usage: own_device SCENE PICTURE".into());
     };
     let scene = Scene::load(&scene)?;
-    let options = RenderOptions::of_defaults(&scene.defaults);
+    let options = scene.defaults.options();
     // SAFETY: the program destroys what it has made after kdray's objects are gone and the device is idle.
     unsafe {
         let program = Program::new()?;

@@ -51,7 +51,7 @@ impl Reported {
 
 /// The scene's own options at another size.
 pub fn options(scene: &FlatScene, (width, height): (u32, u32), traversal: Traversal) -> RenderOptions {
-    RenderOptions { traversal, width, height, ..RenderOptions::of_defaults(&scene.defaults) }
+    RenderOptions { traversal, width, height, ..scene.defaults.options() }
 }
 
 /// Frames drawn on a device by the primary rays that suit it, after a warm-up, which also finds how many batches the frame needs.

@@ -6,7 +6,7 @@ use glam::{BVec3, Vec3};
 
 use crate::{
     accel::kdtree::{BuildOptions, KdTree, TraversalLinks},
-    frame::{RenderOptions, frame_constants},
+    frame::RenderOptions,
     layout::{FLAT_NORMAL, Frame, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
     reference::inputs::KernelInputs,
     scene::Camera,
@@ -43,7 +43,7 @@ impl Stage {
         let world = World::of_flat(scene, build_options).expect("a material for each triangle");
         let tree_build_ms = begin.elapsed().as_secs_f64() * 1e3;
         let options = RenderOptions { width: size.0, height: size.1, ..RenderOptions::default() };
-        let frame = frame_constants(&world, &options);
+        let frame = world.frame_constants(&options);
         Self { links: TraversalLinks::all(world.tree()), world, tree_build_ms, frame, light }
     }
 

@@ -12,6 +12,7 @@
 //!     packet, packet_triangle, packet_traverser   sixteen rays through the tree together
 //! ```
 
+pub mod lanes;
 pub mod octant_bins;
 pub mod packet;
 pub mod packet_traverser;

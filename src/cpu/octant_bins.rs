@@ -3,8 +3,8 @@
 
 use arrayvec::ArrayVec;
 
-use super::{packet::LANES, soa::RaysSoa};
-use crate::reference::{kdtree::signs_of, search_ray::SearchRay};
+use super::{lanes::LANES, soa::RaysSoa};
+use crate::reference::{search_ray::SearchRay, traversal_ray::signs_of};
 
 /// Rays of one octant, at most as many as a packet has, each with the key that its hit is reported by.
 pub struct Bin<Key> {

@@ -7,27 +7,23 @@ use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 use glam::{Vec3, Vec3A, Vec4};
 
 use super::{
+    lanes::{LANES, LaneMask},
     packet_triangle::{Found, Shears},
     soa::{HitsSoa, RaysSoa},
 };
 use crate::{
     layout::{Hit, KD_LEAST_COMPONENT, KD_PLANE_EPSILON, KdNode, Slab},
     reference::{
+        candidate::Target,
         counting::table::ReadCounter,
         inputs::KernelInputs,
-        kdtree::{TraversalRay, largest_coordinate, origin_reach, signs_of},
-        leaf::{Target, entries_of},
+        leaf::entries_of,
+        traversal_ray::{TraversalRay, largest_coordinate, origin_reach, signs_of},
     },
 };
 
-/// Rays of a packet.
-pub const LANES: usize = 16;
-
 /// Triangles of a leaf whose planes are tried before the first of them is tested.
 const BLOCK: usize = 8;
-
-/// One bit a ray.
-pub type Lanes = u32;
 
 /// Where the rays are in a cell. A ray that is not in it enters after it leaves.
 #[derive(Clone, Copy)]
@@ -63,13 +59,13 @@ pub struct Packet<S: Simd> {
 impl<S: Simd> Interval<S> {
     /// The rays that are in the cell.
     #[inline(always)]
-    pub fn lanes(&self) -> Lanes {
-        self.enter.simd_le(self.exit).to_bitmask() as Lanes
+    pub fn lanes(&self) -> LaneMask {
+        self.enter.simd_le(self.exit).to_bitmask() as LaneMask
     }
 
     /// Without the other rays.
     #[inline(always)]
-    pub fn of(self, lanes: Lanes) -> Self {
+    pub fn of(self, lanes: LaneMask) -> Self {
         let simd = self.enter.simd;
         let is_in = mask32x16::from_bitmask(simd, lanes.into());
         Self {
@@ -167,16 +163,16 @@ impl<S: Simd> Packet<S> {
 
     /// Which of the rays do not keep to one side of a plane on their ways, farther from it than `reach`.
     #[inline(always)]
-    fn lanes_near(&self, ways: &Segments<S>, normal: Vec3, distance: f32, reach: f32) -> Lanes {
+    fn lanes_near(&self, ways: &Segments<S>, normal: Vec3, distance: f32, reach: f32) -> LaneMask {
         let height = dot(normal, &self.origin) - distance;
         let slope = dot(normal, &self.direction);
         let is_clear = (ways.middle * slope + height).abs().simd_gt(ways.half * slope.abs() + reach);
-        !is_clear.to_bitmask() as Lanes
+        !is_clear.to_bitmask() as LaneMask
     }
 
     /// Which of the rays come into a slab within the cell.
     #[inline(always)]
-    pub fn lanes_in_slab(&self, slab: &Slab, cell: &Interval<S>) -> Lanes {
+    pub fn lanes_in_slab(&self, slab: &Slab, cell: &Interval<S>) -> LaneMask {
         self.lanes_near(&self.ways(cell), slab.normal, slab.offset, 1.0)
     }
 
@@ -210,9 +206,9 @@ impl<S: Simd> Packet<S> {
         self.note_best::<ANY_HIT>();
     }
 
-    /// A triangle against some of the rays: `leaf::intersect` for all at once.
+    /// A triangle against some of the rays: `candidate::intersect` for all at once.
     #[inline(always)]
-    fn intersect(&mut self, inputs: &KernelInputs<impl ReadCounter>, triangle_ix: u32, lanes: Lanes) {
+    fn intersect(&mut self, inputs: &KernelInputs<impl ReadCounter>, triangle_ix: u32, lanes: LaneMask) {
         let triangle = &inputs.triangles[triangle_ix as usize];
         for axis in 0..3 {
             let lanes = lanes & self.shears.lanes_of_axis[axis];

@@ -5,7 +5,8 @@
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use super::{
-    packet::{Interval, LANES, Packet},
+    lanes::LANES,
+    packet::{Interval, Packet},
     soa::{HitsSoa, RaysSoa},
 };
 use crate::{
@@ -14,9 +15,10 @@ use crate::{
     reference::{
         counting::table::ReadCounter,
         inputs::KernelInputs,
-        kdtree::{Cell, Pending, TraversalRay, axis_of, hit_from_near, is_leaf, search, search_cell},
+        kdtree::{Cell, Pending, axis_of, is_leaf, search, search_cell},
         pending_stack::PendingStack,
         slab::slab_of,
+        traversal_ray::{TraversalRay, hit_from_near},
     },
 };
 

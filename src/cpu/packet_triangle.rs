@@ -3,7 +3,7 @@
 
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 
-use super::packet::Lanes;
+use super::lanes::LaneMask;
 use crate::{
     layout::{Hit, NO_TRIANGLE, Triangle},
     reference::triangle::{LEAST_EXACT_SUM, Shear, axis_last},
@@ -17,7 +17,7 @@ pub struct Shears<S: Simd> {
     y: f32x16<S>,
     z: f32x16<S>,
     /// The rays whose longest axis it is.
-    pub lanes_of_axis: [Lanes; 3],
+    pub lanes_of_axis: [LaneMask; 3],
 }
 
 /// Sixteen hits.
@@ -80,7 +80,7 @@ impl<S: Simd> Shears<S> {
         let is_x = x.simd_ge(y) & x.simd_ge(z);
         let is_y = !is_x & y.simd_ge(z);
         let [x, y, z] = axes_last(direction, is_x, is_y);
-        let (lanes_of_x, lanes_of_y) = (is_x.to_bitmask() as Lanes, is_y.to_bitmask() as Lanes);
+        let (lanes_of_x, lanes_of_y) = (is_x.to_bitmask() as LaneMask, is_y.to_bitmask() as LaneMask);
         Self {
             origin: axes_last(origin, is_x, is_y),
             x: x / z,
@@ -114,7 +114,7 @@ impl<S: Simd> Shears<S> {
         triangle: &Triangle,
         triangle_ix: u32,
         axis: usize,
-        lanes: Lanes,
+        lanes: LaneMask,
     ) -> Option<(Found<S>, mask32x16<S>)> {
         let simd = self.x.simd;
         let [x0, y0, z0] = self.corner(axis_last(triangle.v0.to_array(), axis));

@@ -5,10 +5,7 @@ use bytemuck::Zeroable;
 use super::{queue::Queue, timing::Clock};
 use crate::{
     accel::kdtree::TraversalLinks,
-    frame::{
-        BounceStats, Denoise, FrameKind, Pass, Picture, Plan, Primary, Profile, RenderOptions, frame_constants,
-        plan::passes,
-    },
+    frame::{BounceStats, Denoise, FrameKind, Pass, Picture, Plan, Primary, Profile, RenderOptions, plan::passes},
     layout::{Bounce, Feature, Frame, Hit, PathRay, SCAN_GROUP_SIZE},
     reference::{
         accumulate,
@@ -74,7 +71,7 @@ pub struct Renderer {
 impl Renderer {
     /// Makes room for a picture of a world.
     pub fn new(world: &World, options: &RenderOptions, batching: Batching) -> Self {
-        let frame = frame_constants(world, options);
+        let frame = world.frame_constants(options);
         let n_pixels = frame.width as usize * frame.height as usize;
         Self {
             camera: world.scene().camera,

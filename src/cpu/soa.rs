@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::packet::LANES;
+use super::lanes::LANES;
 use crate::{layout::Hit, reference::search_ray::SearchRay};
 
 /// The rays of a packet.

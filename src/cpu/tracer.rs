@@ -13,8 +13,8 @@ use crate::{
     reference::{
         counting::table::ReadCounter,
         inputs::KernelInputs,
-        kdtree::{TraversalRay, hit_from_near},
         search_ray::SearchRay,
+        traversal_ray::{TraversalRay, hit_from_near},
         traverser::{Tracer, Traverser},
     },
 };

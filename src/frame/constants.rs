@@ -6,27 +6,11 @@ use crate::{
     frame::{Crop, Denoise, RenderOptions, sampling::sample_offset},
     layout::Frame,
     scene::Camera,
-    world::World,
 };
 
 /// The near plane lies at this share of the scene's farthest distance from the eye: nothing that can be seen is
 /// nearer, and reverse-Z in floating point loses no precision by it.
 const NEAR_SHARE: f64 = 1.0 / (1 << 20) as f64;
-
-/// What the kernels know of a frame of first samples. `queue_capacity` is left 0: the caller's queues decide.
-pub fn frame_constants(world: &World, options: &RenderOptions) -> Frame {
-    let scene = world.scene();
-    let mut frame = Frame {
-        n_triangles: scene.triangles.len() as u32,
-        n_lights: scene.lights.len() as u32,
-        ambient: scene.ambient,
-        background: scene.background,
-        ..Frame::default()
-    };
-    frame.set_options(options);
-    frame.set_view(&scene.camera, world.bounds(), 0);
-    frame
-}
 
 impl Frame {
     /// What follows from the options alone. The view has to be set after it.
@@ -102,37 +86,18 @@ mod tests {
     use glam::{UVec2, Vec3, uvec2, vec3};
 
     use super::*;
-    use crate::{
-        accel::kdtree::BuildOptions,
-        layout::Triangle,
-        reference::camera::{camera_direction, in_picture},
-        scene::RenderDefaults,
-        world::FlatScene,
-    };
+    use crate::reference::camera::{camera_direction, in_picture};
 
-    /// A view of one triangle.
+    /// A view of what lies around its target.
     fn frame(camera: Camera, width: u32, height: u32) -> Frame {
         part(camera, RenderOptions { width, height, ..RenderOptions::default() }, 0)
     }
 
     fn part(camera: Camera, options: RenderOptions, sample_ix: u32) -> Frame {
-        let corner = |direction| camera.target + 3.0 * (camera.target - camera.eye).length() * direction;
-        let triangle = Triangle { v0: corner(Vec3::X), v1: corner(Vec3::Y), v2: corner(Vec3::Z), ..Default::default() };
-        let scene = FlatScene {
-            name: String::new(),
-            triangles: vec![triangle],
-            triangle_materials: vec![0],
-            materials: vec![Default::default()],
-            material_names: vec![String::new()],
-            lights: Vec::new(),
-            camera,
-            ambient: Vec3::ZERO,
-            background: Vec3::ZERO,
-            defaults: RenderDefaults::default(),
-        };
-        let world = World::of_flat(scene, &BuildOptions::default()).expect("a material for each triangle");
-        let mut frame = frame_constants(&world, &options);
-        frame.set_view(&camera, world.bounds(), sample_ix);
+        let reach = Vec3::splat(3.0 * (camera.target - camera.eye).length());
+        let mut frame = Frame::default();
+        frame.set_options(&options);
+        frame.set_view(&camera, [camera.target - reach, camera.target + reach], sample_ix);
         frame
     }
 

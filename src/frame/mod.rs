@@ -15,7 +15,6 @@ mod view;
 
 pub use self::{
     aov::{Aov, Channel, Samples},
-    constants::frame_constants,
     crop::Crop,
     drawn::{Drawn, Watcher},
     pass::{Pass, Role, Scope},
@@ -24,7 +23,7 @@ pub use self::{
     resource::Resource,
     view::View,
 };
-use crate::{accel::kdtree::Traversal, layout, scene::RenderDefaults};
+use crate::{accel::kdtree::Traversal, layout};
 
 /// How a frame is rendered. The scene's own defaults fill what the user leaves open.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,14 +50,6 @@ pub struct RenderOptions {
     pub profile: bool,
     /// Note what the rays of each pixel meet and cost, too.
     pub features: bool,
-}
-
-impl RenderOptions {
-    /// The options that a scene asks for.
-    pub fn of_defaults(defaults: &RenderDefaults) -> Self {
-        let &RenderDefaults { width, height, max_depth, exposure, tonemap, denoise } = defaults;
-        Self { width, height, max_depth, exposure, tonemap, denoise, ..Self::default() }
-    }
 }
 
 impl Default for RenderOptions {

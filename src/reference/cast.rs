@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use super::{
     RAYS_PER_TASK,
     inputs::KernelInputs,
-    kdtree::min,
     search_ray::SearchRay,
+    traversal_ray::min,
     traverser::{Tracer, Traverser},
 };
 use crate::{

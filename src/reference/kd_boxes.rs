@@ -3,7 +3,7 @@
 use super::{
     counting::table::ReadCounter,
     inputs::KernelInputs,
-    kdtree::{TraversalRay, max, min},
+    traversal_ray::{TraversalRay, max, min},
 };
 
 /// Where a ray meets the planes of a node's cell on each axis: those it comes to first, and the far ones.

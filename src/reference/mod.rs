@@ -9,16 +9,17 @@
 //! passes      primary_hit, trace, features, compact, shadow, shade, resolve, accumulate, denoise, false_color, tonemap,
 //!             cast; visibility, which the device rasterizes
 //! traversal   traverser: one ray by any algorithm
-//!               kdtree, leaf, slab, ropes, brute and the pending_* of each algorithm
-//! geometry    triangle, surface, camera, probe (a ray as the traversal takes it)
+//!               kdtree, leaf, slab, ropes, brute and the pending_* of each algorithm; candidate
+//! geometry    triangle, surface, camera; search_ray and traversal_ray: a ray as the traversal takes it
 //! light       light, material, children, display, tone_curves
-//! inputs    what kernels only read
+//! inputs      what kernels only read
 //! counting    the same traversal, with its reads counted
 //! ```
 
 pub mod accumulate;
 pub mod brute;
 pub mod camera;
+pub mod candidate;
 pub mod cast;
 pub mod children;
 pub mod compact;
@@ -50,6 +51,7 @@ pub mod surface;
 pub mod tone_curves;
 pub mod tonemap;
 pub mod trace;
+pub mod traversal_ray;
 pub mod traverser;
 pub mod triangle;
 pub mod visibility;

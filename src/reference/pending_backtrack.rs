@@ -3,7 +3,8 @@
 use super::{
     counting::table::ReadCounter,
     inputs::KernelInputs,
-    kdtree::{Cell, Pending, TraversalRay, max, min},
+    kdtree::{Cell, Pending},
+    traversal_ray::{TraversalRay, max, min},
 };
 
 /// Nothing is remembered.

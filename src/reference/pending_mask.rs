@@ -3,7 +3,8 @@
 use super::{
     counting::table::ReadCounter,
     inputs::KernelInputs,
-    kdtree::{Cell, Pending, TraversalRay},
+    kdtree::{Cell, Pending},
+    traversal_ray::TraversalRay,
 };
 use crate::layout::KD_MAX_DEPTH;
 

@@ -3,7 +3,8 @@
 use super::{
     counting::table::ReadCounter,
     inputs::KernelInputs,
-    kdtree::{Cell, Pending, TraversalRay, min},
+    kdtree::{Cell, Pending},
+    traversal_ray::{TraversalRay, min},
 };
 
 pub struct PendingMaskBoxes {

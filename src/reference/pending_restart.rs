@@ -3,8 +3,9 @@
 use super::{
     counting::table::ReadCounter,
     inputs::KernelInputs,
-    kdtree::{Cell, TraversalRay, min},
+    kdtree::Cell,
     pending_mask::Mask,
+    traversal_ray::{TraversalRay, min},
 };
 
 /// The way down to the cell's node.

@@ -3,8 +3,9 @@
 use super::{
     counting::table::ReadCounter,
     inputs::KernelInputs,
-    kdtree::{Cell, Pending, TraversalRay},
+    kdtree::{Cell, Pending},
     pending_restart::Trail,
+    traversal_ray::TraversalRay,
 };
 
 /// The `N` newest entries (a power of two, or none) and the trail of all.

@@ -3,9 +3,10 @@
 use super::{
     counting::table::ReadCounter,
     inputs::KernelInputs,
-    kdtree::{TraversalRay, is_done, is_leaf, min},
+    kdtree::{is_done, is_leaf},
     leaf::intersect_leaf,
     slab::slab_of,
+    traversal_ray::{TraversalRay, min},
 };
 use crate::layout::{Hit, KdNode};
 

@@ -1,7 +1,7 @@
 //! Whether a ray keeps clear of the slab around a node's surface. Twin of `slab.glsl`; the planes of triangles are in `leaf.rs`,
 //! slabs for sixteen rays in `packet.rs`.
 
-use super::{counting::table::ReadCounter, inputs::KernelInputs, kdtree::TraversalRay};
+use super::{counting::table::ReadCounter, inputs::KernelInputs, traversal_ray::TraversalRay};
 use crate::layout::{KD_HAS_SLAB, KdNode, Slab};
 
 /// The node's slab, if it has one.

@@ -4,7 +4,7 @@ use super::{
     brute,
     counting::table::ReadCounter,
     inputs::KernelInputs,
-    kdtree::{Pending, TraversalRay, hit_from_near, search},
+    kdtree::{Pending, search},
     pending_backtrack::PendingBacktrack,
     pending_mask::PendingMask,
     pending_mask_boxes::PendingMaskBoxes,
@@ -12,6 +12,7 @@ use super::{
     pending_stack::PendingStack,
     ropes::follow_ropes,
     search_ray::SearchRay,
+    traversal_ray::{TraversalRay, hit_from_near},
 };
 use crate::{
     accel::kdtree::Traversal,

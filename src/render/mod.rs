@@ -18,7 +18,7 @@ use self::{
 };
 use crate::{
     buffers::{Needs, Resources},
-    frame::{FrameKind, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step, frame_constants, plan},
+    frame::{FrameKind, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step, plan},
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
     passes::{Inputs, Passes, Rasterize},
@@ -83,7 +83,7 @@ impl Renderer {
         let scene = world.scene();
         let both = MATERIAL_REFLECT | MATERIAL_REFRACT;
         let branches = scene.materials.iter().any(|material| material.flags & both == both);
-        let mut constants = frame_constants(world, options);
+        let mut constants = world.frame_constants(options);
         constants.n_lanes = lanes_to_share(&context, options)?;
         let budget = QueueBudget { fixed_capacity, branches };
         constants.queue_capacity = budget.queue_capacity(context.limits(), &constants);

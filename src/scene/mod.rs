@@ -4,6 +4,7 @@
 //! A scene file is a TOML file (`description` lists what it may say) or a bare OBJ file.
 
 mod assemble;
+mod defaults;
 mod description;
 mod error;
 mod extent;
@@ -26,6 +27,7 @@ use std::path::Path;
 use glam::Vec3;
 
 pub use self::{
+    defaults::RenderDefaults,
     error::SceneError,
     extent::MIN_EXTENT,
     light::Light,
@@ -35,7 +37,6 @@ pub use self::{
     sources::source_files,
     transform::Transform,
 };
-use crate::frame::{Denoise, RenderOptions, Tonemap};
 
 /// Everything that a frame shows. World space is right-handed, +y up by default.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,30 +84,6 @@ pub struct Camera {
     pub up: Vec3,
     /// Between the picture's lower and upper edge.
     pub vertical_fov_degrees: f32,
-}
-
-/// What a scene asks to be rendered with, unless the user says otherwise.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RenderDefaults {
-    /// Pixels.
-    pub width: u32,
-    /// Pixels.
-    pub height: u32,
-    /// Levels of rays, the primary one counted.
-    pub max_depth: u32,
-    /// Factor on radiance before the tone curve.
-    pub exposure: f32,
-    /// The curve from radiance to display.
-    pub tonemap: Tonemap,
-    /// The noise filter.
-    pub denoise: Denoise,
-}
-
-impl Default for RenderDefaults {
-    fn default() -> Self {
-        let RenderOptions { width, height, max_depth, exposure, tonemap, denoise, .. } = RenderOptions::default();
-        Self { width, height, max_depth, exposure, tonemap, denoise }
-    }
 }
 
 impl Scene {

@@ -5,7 +5,7 @@ use glam::{UVec2, Vec3};
 use crate::{
     accel::{Query, kdtree::TraversalLinks},
     cpu::trace,
-    frame::{RenderOptions, frame_constants},
+    frame::RenderOptions,
     layout::{Hit, NO_TRIANGLE, PathRay},
     reference::{
         children::{child_kinds_of, children_of},
@@ -59,7 +59,7 @@ pub struct PickedHit {
 pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec2) -> Picked {
     let (scene, tree) = (world.scene(), world.tree());
     let links = TraversalLinks::new(tree, options.traversal);
-    let mut frame = frame_constants(world, options);
+    let mut frame = world.frame_constants(options);
     frame.set_view(camera, world.bounds(), 0);
     let bindings = KernelInputs::new(scene, tree, &frame).with_links(&links);
     let mut rays = vec![camera_ray(&frame, pixel)];

@@ -1,6 +1,7 @@
 //! What is rendered: a scene with the acceleration structure over its triangles, consistent by construction.
 
 mod flat;
+mod frame_constants;
 mod geometry;
 mod mismatch;
 

@@ -6,7 +6,7 @@ use glam::UVec2;
 use kdray::{
     accel::kdtree::Traversal,
     engine::choices::{Processor, primary_by_rule, traversal_by_rule},
-    frame::{Crop, Picture, Primary, RenderOptions, frame_constants},
+    frame::{Crop, Picture, Primary, RenderOptions},
     layout::Frame,
     reference::{
         inputs::KernelInputs,
@@ -24,7 +24,7 @@ use crate::support::{scenes, with_lanes, without_wide_atomics};
 /// 1/16 px or finer.)
 fn is_on_edge(world: &World, options: &RenderOptions, pixel_ix: usize) -> bool {
     let (scene, tree) = (world.scene(), world.tree());
-    let frame = frame_constants(world, options);
+    let frame = world.frame_constants(options);
     let pixel = UVec2::new(pixel_ix as u32 % frame.width, pixel_ix as u32 / frame.width);
     let mut traverser = Traverser::new(options.traversal);
     let ids: HashSet<u32> = (0..25 * 25)

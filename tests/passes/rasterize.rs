@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{Vec3, uvec2, vec3};
 use kdray::{
-    frame::{Crop, Primary, RenderOptions, frame_constants, plan},
+    frame::{Crop, Primary, RenderOptions, plan},
     gpu::{Access, Commands, Context, ContextOptions, GpuError},
     layout::{Batch, Hit, RASTER_GROUPS_X, RASTER_GROUPS_Y, Triangle},
     passes::{Inputs, Passes, Rasterize, Trace},
@@ -132,7 +132,7 @@ fn shows_what_camera_rays_hit_of_slivers() {
     let (options, mut random) = (options(64, 48), Random(41));
     let mut scene = scenes::empty();
     let world = world_of(&scene);
-    let frame = frame_constants(&world, &options);
+    let frame = world.frame_constants(&options);
     let mut sliver = || {
         let pixel = uvec2(random.below(64) as u32, random.below(48) as u32);
         let ray = camera_ray(&frame, pixel);

@@ -5,7 +5,7 @@ use std::{cell::Cell, sync::Arc, thread};
 use kdray::{
     accel::kdtree::{BuildOptions, TraversalLinks},
     buffers::{Needs, Resources},
-    frame::{Denoise, RenderOptions, frame_constants},
+    frame::{Denoise, RenderOptions},
     gpu::{Commands, Context, ContextOptions},
     layout::{Batch, Bounce, Counters, Frame, Hit, NO_TRIANGLE, PathRay, RAY_GROUP_SIZE},
     passes::Passes,
@@ -51,7 +51,7 @@ impl Stage {
     pub fn new(scene: FlatScene, options: RenderOptions, capacity: u32) -> Self {
         let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
         let world = World::of_flat(scene, &BuildOptions::default()).expect("a world");
-        let constants = Frame { queue_capacity: capacity, ..frame_constants(&world, &options) };
+        let constants = Frame { queue_capacity: capacity, ..world.frame_constants(&options) };
         let needs = Needs { constants: &constants, options: &options, n_bounces: constants.max_depth as usize };
         let resources = Resources::new(&context, &world, &needs).expect("resources");
         let links = TraversalLinks::new(world.tree(), options.traversal);

@@ -19,7 +19,7 @@ use kdray::{
     accel::kdtree::{BuildOptions, KdTree, TraversalLinks},
     gpu::{Context, ContextOptions, DeviceOverrides},
     layout::{Hit, NO_TRIANGLE, PathRay, Triangle},
-    reference::{brute, inputs::KernelInputs, kdtree::near_scene, search_ray::SearchRay},
+    reference::{brute, inputs::KernelInputs, search_ray::SearchRay, traversal_ray::near_scene},
     world::{FlatScene, Geometry, World},
 };
 

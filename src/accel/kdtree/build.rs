@@ -7,11 +7,11 @@ use rayon::prelude::*;
 use super::{
     BuildOptions, KdTree,
     bounds::{Bounds, Reference, is_finite},
-    flatten::flatten,
+    flatten::{Top, flatten},
     planes::planes_of,
     sah::Split,
     search::Search,
-    subtree::{self, Cell, Input, Subtree, sort_out},
+    subtree::{self, Cell, Input, sort_out},
 };
 use crate::layout::Triangle;
 
@@ -23,12 +23,6 @@ const CHUNK: usize = 1 << 15;
 const MIN_BUDGET: u64 = 1024;
 /// Cutting off empty space makes up to 14 nodes a reference; so many references stay below the 2^29 nodes of a link.
 const MAX_BUDGET: u64 = 1 << 25;
-
-/// The upper part of a tree.
-pub enum Top {
-    Split { axis: usize, position: f32, children: Box<[Top; 2]> },
-    Subtree(Subtree),
-}
 
 impl KdTree {
     /// Builds the tree of `triangles`. Those of a zero area stay in it, those with a corner that is not finite do not.

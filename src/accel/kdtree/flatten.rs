@@ -2,7 +2,13 @@
 
 use glam::Vec3;
 
-use super::{EMPTY_LEAF, Node, Parts, bounds::Bounds, build::Top, subtree::Subtree};
+use super::{EMPTY_LEAF, Node, Parts, bounds::Bounds, subtree::Subtree};
+
+/// The upper part of a tree.
+pub enum Top {
+    Split { axis: usize, position: f32, children: Box<[Top; 2]> },
+    Subtree(Subtree),
+}
 
 /// The tree as the kernels read it, without planes and slabs.
 pub fn flatten(top: Top, cell: Bounds) -> Parts {

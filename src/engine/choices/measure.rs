@@ -16,7 +16,7 @@ use crate::{
     buffers::{AccelBuffers, CastResources},
     cast::{Contender, Kernel, cast_ray, leaving::diffuse_rays, rounds},
     cpu::trace,
-    frame::{Denoise, Primary, RenderOptions, frame_constants},
+    frame::{Denoise, Primary, RenderOptions},
     gpu::{Context, GpuError},
     layout::{Frame, Hit, PathRay, Ray},
     reference::{inputs::KernelInputs, primary_hit::primary_rays},
@@ -47,7 +47,7 @@ pub fn measure_traversals(
     }
     let (scene, tree) = (world.scene(), world.tree());
     let n_pixels = context.n_lanes()?.clamp(FEWEST_RAYS, MOST_RAYS);
-    let frame = frame_constants(world, &picture_of(scene, n_pixels));
+    let frame = world.frame_constants(&picture_of(scene, n_pixels));
     let rays = some_rays(scene, tree, &frame);
     let mut buffers = AccelBuffers::new(context, world.geometry())?;
     if traversals.contains(&Traversal::Ropes) {
