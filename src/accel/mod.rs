@@ -1,5 +1,7 @@
 //! Acceleration structures: what leads a ray to the triangles that it can hit.
 
+mod bounds;
+pub mod grid;
 pub mod kdtree;
 mod query;
 

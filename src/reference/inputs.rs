@@ -4,7 +4,10 @@ use glam::Vec3;
 
 use super::counting::table::{Counted, CountedSlice, NoCounter, ReadCounts};
 use crate::{
-    accel::kdtree::{KdTree, TraversalLinks},
+    accel::{
+        grid::{Grid, GridCell, Lattice},
+        kdtree::{KdTree, TraversalLinks},
+    },
     layout::{Frame, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN, Triangle},
     world::FlatScene,
 };
@@ -36,6 +39,12 @@ pub struct KernelInputs<'a, R = NoCounter> {
     pub kd_boxes: CountedSlice<'a, KdBox, R>,
     /// Six a node, or none.
     pub kd_ropes: CountedSlice<'a, KdRope, R>,
+    /// The upper cells of a grid; none where the acceleration structure is another one.
+    pub lattice: Option<&'a Lattice>,
+    /// The cells of a grid, see [`Grid::cells`].
+    pub grid_cells: CountedSlice<'a, GridCell, R>,
+    /// The levels of a grid's cells, 1 or 2.
+    pub n_grid_levels: u32,
 }
 
 impl<'a, R> KernelInputs<'a, R> {
@@ -84,6 +93,34 @@ impl<'a> KernelInputs<'a> {
             kd_slabs: CountedSlice::from(tree.slabs()),
             kd_boxes: CountedSlice::from(&[][..]),
             kd_ropes: CountedSlice::from(&[][..]),
+            lattice: None,
+            grid_cells: CountedSlice::from(&[][..]),
+            n_grid_levels: 0,
+        }
+    }
+
+    /// What the search through a grid reads, without materials and lights.
+    pub fn of_grid(triangles: &'a [Triangle], grid: &'a Grid) -> Self {
+        let [cell_min, cell_max] = grid.bounds();
+        Self {
+            frame: None,
+            cell_min,
+            cell_max,
+            triangles,
+            triangle_materials: &[],
+            filters: false,
+            materials: &[],
+            lights: &[],
+            kd_nodes: CountedSlice::from(&[][..]),
+            kd_parents: CountedSlice::from(&[][..]),
+            leaf_triangles: CountedSlice::from(grid.leaf_triangles()),
+            leaf_planes: grid.leaf_planes(),
+            kd_slabs: CountedSlice::from(&[][..]),
+            kd_boxes: CountedSlice::from(&[][..]),
+            kd_ropes: CountedSlice::from(&[][..]),
+            lattice: Some(grid.lattice()),
+            grid_cells: CountedSlice::from(grid.cells()),
+            n_grid_levels: grid.n_levels(),
         }
     }
 
@@ -105,6 +142,9 @@ impl<'a> KernelInputs<'a> {
             kd_slabs: self.kd_slabs.with_counter(Counted(&counts.n_nodes)),
             kd_boxes: self.kd_boxes.with_counter(Counted(&counts.n_boxes)),
             kd_ropes: self.kd_ropes.with_counter(Counted(&counts.n_links)),
+            lattice: self.lattice,
+            grid_cells: self.grid_cells.with_counter(Counted(&counts.n_nodes)),
+            n_grid_levels: self.n_grid_levels,
         }
     }
 

@@ -1,4 +1,6 @@
-//! A leaf's triangles against a ray, but those whose planes it does not meet there. Part of `kdtree.glsl`'s twin.
+//! A leaf's triangles against a ray, but those whose planes it does not meet there. Twin of `leaf.glsl`.
+
+use std::ops::Range;
 
 use glam::{Mat4, Vec3A, Vec4};
 
@@ -10,7 +12,7 @@ use crate::layout::{Hit, KD_PAIR_SHIFT, KdNode, Plane};
 
 /// The leaf's entries: indices into `leaf_triangles` and `leaf_planes`.
 #[inline(always)]
-pub fn entries_of(leaf: KdNode) -> std::ops::Range<usize> {
+pub fn entries_of(leaf: KdNode) -> Range<usize> {
     let first = leaf.split_or_first as usize;
     first..first + (leaf.axis_and_child >> KD_PAIR_SHIFT) as usize
 }
@@ -38,17 +40,28 @@ fn near_planes(ray: &TraversalRay, way: Segment, planes: &Mat4) -> u32 {
     !is_clear.bitmask()
 }
 
-/// The leaf's triangles, but those whose planes the ray does not meet within the cell; all of them where the tree has no
-/// planes.
+/// The leaf's triangles against the ray: see [`intersect_entries`].
 #[inline(always)]
 pub fn intersect_leaf(
     inputs: &KernelInputs<impl ReadCounter>,
     ray: &TraversalRay,
     leaf: KdNode,
+    way: [f32; 2],
+    best: &mut Hit,
+) {
+    intersect_entries(inputs, ray, entries_of(leaf), way, best);
+}
+
+/// The triangles of some entries against the ray, but those whose planes it does not meet from `t_enter` to `t_exit`; all of
+/// them where there are no planes.
+#[inline(always)]
+pub fn intersect_entries(
+    inputs: &KernelInputs<impl ReadCounter>,
+    ray: &TraversalRay,
+    entries: Range<usize>,
     [t_enter, t_exit]: [f32; 2],
     best: &mut Hit,
 ) {
-    let entries = entries_of(leaf);
     let triangles = &inputs.leaf_triangles[entries.clone()];
     if inputs.leaf_planes.is_empty() {
         return triangles.iter().for_each(|&ix| intersect(inputs, &ray.target, ix, best));

@@ -9,7 +9,7 @@
 //! passes      primary_hit, trace, features, compact, shadow, shade, resolve, accumulate, denoise, false_color, tonemap,
 //!             cast; visibility, which the device rasterizes
 //! traversal   traverser: one ray by any algorithm
-//!               kdtree, leaf, slab, ropes, brute and the pending_* of each algorithm; candidate
+//!               kdtree, leaf, slab, ropes, brute and the pending_* of each algorithm; grid; candidate
 //! geometry    triangle, surface, camera; search_ray and traversal_ray: a ray as the traversal takes it
 //! light       light, material, children, display, tone_curves
 //! inputs      what kernels only read
@@ -28,6 +28,7 @@ pub mod denoise;
 pub mod display;
 pub mod false_color;
 pub mod features;
+pub mod grid;
 pub mod inputs;
 pub mod kd_boxes;
 pub mod kdtree;

@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use super::{
     BuildOptions,
-    bounds::{Bounds, Reference},
     sah::{Shares, Split},
 };
+use crate::accel::bounds::{Bounds, Reference};
 
 /// Three axes of begins, ends and flags in 27 KiB: they fit the L1 cache.
 const MAX_BINS: usize = 1024;

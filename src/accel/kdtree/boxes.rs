@@ -1,7 +1,7 @@
 //! The cells of all nodes.
 
-use super::{KdTree, Node, bounds::Bounds};
-use crate::layout::KdBox;
+use super::{KdTree, Node};
+use crate::{accel::bounds::Bounds, layout::KdBox};
 
 impl KdTree {
     /// One box a node; zeros for the unused node 1.

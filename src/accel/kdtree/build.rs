@@ -6,14 +6,16 @@ use rayon::prelude::*;
 
 use super::{
     BuildOptions, KdTree,
-    bounds::{Bounds, Reference, is_finite},
     flatten::{Top, flatten},
     planes::planes_of,
     sah::Split,
     search::Search,
     subtree::{self, Cell, Input, sort_out},
 };
-use crate::layout::Triangle;
+use crate::{
+    accel::bounds::{Bounds, Reference, is_finite},
+    layout::Triangle,
+};
 
 /// A cell with at most this many references is built by one thread: some 5 ms.
 const TASK_REFERENCES: usize = 4096;

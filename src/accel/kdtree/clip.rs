@@ -4,8 +4,7 @@
 //! Sutherland-Hodgman in f64: coordinates are f32, so a computed point is off by some 2^-52 of them, which the margin is
 //! larger than by far.
 
-use super::bounds::Bounds;
-use crate::layout::Triangle;
+use crate::{accel::bounds::Bounds, layout::Triangle};
 
 /// Three corners, and one more for each of the six faces of a cell.
 const MAX_CORNERS: usize = 9;

@@ -5,9 +5,9 @@
 
 use super::{
     BuildOptions,
-    bounds::{Bounds, Reference},
     sah::{Shares, Split},
 };
+use crate::accel::bounds::{Bounds, Reference};
 
 /// More references than this are binned.
 pub const MAX_REFERENCES: usize = 32;

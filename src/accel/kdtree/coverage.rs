@@ -4,8 +4,8 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{Invalid, KdTree, Node, bounds::is_finite};
-use crate::layout::Triangle;
+use super::{Invalid, KdTree, Node};
+use crate::{accel::bounds::is_finite, layout::Triangle};
 
 /// Of the margin: what is checked. The rest is room for rounding: of bounds to f32, and of points cut by seven planes,
 /// each off by four times 2^-53 of the coordinates.

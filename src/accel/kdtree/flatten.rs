@@ -2,7 +2,8 @@
 
 use glam::Vec3;
 
-use super::{EMPTY_LEAF, Node, Parts, bounds::Bounds, subtree::Subtree};
+use super::{EMPTY_LEAF, Node, Parts, subtree::Subtree};
+use crate::accel::bounds::Bounds;
 
 /// The upper part of a tree.
 pub enum Top {

@@ -12,7 +12,6 @@
 //! Wald and Havran, "On building fast kd-trees for ray tracing, and on doing that in O(N log N)", 2006.
 
 mod binned;
-mod bounds;
 mod boxes;
 mod build;
 mod clip;

@@ -1,8 +1,11 @@
 //! Links from the faces of cells to their neighbours (Popov, Günther, Seidel, Slusallek: Stackless KD-Tree Traversal for
 //! High Performance GPU Ray Tracing, Eurographics 2007, section 3).
 
-use super::{KdTree, Node, bounds::Bounds};
-use crate::layout::{KdBox, KdRope};
+use super::{KdTree, Node};
+use crate::{
+    accel::bounds::Bounds,
+    layout::{KdBox, KdRope},
+};
 
 /// Faces of a cell: below and above on x, y, z.
 const N_FACES: usize = 6;

@@ -5,7 +5,8 @@
 //! (MacDonald and Booth 1990). Along an axis the weight is linear between the ends of triangles, so only planes through
 //! these need be tried.
 
-use super::{BuildOptions, bounds::Bounds};
+use super::BuildOptions;
+use crate::accel::bounds::Bounds;
 
 /// 2^-115: 1024 bins by an extent of at least this are a finite f32, and so is a plane's distance from the cell's face by
 /// an extent of at most `f32::MAX`. Cells beyond that are not split on the axis.

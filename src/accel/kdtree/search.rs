@@ -1,12 +1,7 @@
 //! The cheapest split of a cell.
 
-use super::{
-    BuildOptions,
-    binned::BinnedSearch,
-    bounds::{Bounds, Reference},
-    counted,
-    sah::Split,
-};
+use super::{BuildOptions, binned::BinnedSearch, counted, sah::Split};
+use crate::accel::bounds::{Bounds, Reference};
 
 /// Buffers of a search, to be used again for the next cell.
 #[derive(Default)]

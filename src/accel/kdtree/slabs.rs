@@ -9,8 +9,11 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{KdTree, Node, bounds::Bounds, clip::Polygon};
-use crate::layout::{KD_HAS_SLAB, Slab, Triangle};
+use super::{KdTree, Node, clip::Polygon};
+use crate::{
+    accel::bounds::Bounds,
+    layout::{KD_HAS_SLAB, Slab, Triangle},
+};
 
 /// Entries below a node at most: on the way down, the first node with no more than each of these gets a slab, if the surface
 /// there is flat enough to be passed by. Larger pieces hardly are (benches/EXPERIMENTS.md).

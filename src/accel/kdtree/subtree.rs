@@ -2,14 +2,11 @@
 
 use std::ops::Range;
 
-use super::{
-    BuildOptions, EMPTY_LEAF, Node,
-    bounds::{Bounds, Reference},
-    clip::split_bounds,
-    sah::Split,
-    search::Search,
+use super::{BuildOptions, EMPTY_LEAF, Node, clip::split_bounds, sah::Split, search::Search};
+use crate::{
+    accel::bounds::{Bounds, Reference},
+    layout::{KD_WORD_DEPTH, KdNode, Triangle},
 };
-use crate::layout::{KD_WORD_DEPTH, KdNode, Triangle};
 
 /// What a build reads.
 #[derive(Clone, Copy)]

@@ -1,12 +1,10 @@
 //! Checks every invariant of a tree: its structure here, what its leaves hold in `coverage`.
 
-use super::{
-    EMPTY_LEAF, KdTree, Node,
-    bounds::{Bounds, is_finite},
-    coverage,
-    planes::planes_of,
+use super::{EMPTY_LEAF, KdTree, Node, coverage, planes::planes_of};
+use crate::{
+    accel::bounds::{Bounds, is_finite},
+    layout::{KD_MAX_DEPTH, Triangle},
 };
-use crate::layout::{KD_MAX_DEPTH, Triangle};
 
 /// The first invariant found broken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

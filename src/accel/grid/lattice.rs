@@ -1,0 +1,180 @@
+//! Cubes of one size that fill a box, and how large they are.
+
+use glam::Vec3;
+
+use super::GRID_MAX_RESOLUTION;
+use crate::accel::bounds::Bounds;
+
+/// Cubes side by side that fill a box from its least corner on. At its greatest corner the box may cut some of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lattice {
+    /// The box's least corner, world units.
+    pub min: [f32; 3],
+    /// The box's greatest corner, world units.
+    pub max: [f32; 3],
+    /// The length of a cube's edge, world units.
+    pub cell_size: f32,
+    /// The number of cubes along each axis, 1 to `GRID_MAX_RESOLUTION`.
+    pub n_cells: [u32; 3],
+}
+
+impl Lattice {
+    /// The lattice of the smallest cubes of which no more than `max_cells` fill a box, and which are not smaller than the
+    /// margin of the box.
+    pub fn of_density(bounds: &Bounds, max_cells: f32) -> Self {
+        // Bits of positive numbers are in the order of the numbers. More and more of the highest bits are known: below `bits`,
+        // cubes are too small.
+        let mut bits = 0;
+        for bit in (0..31).rev() {
+            let next = f32::from_bits(bits | (1 << bit));
+            if next.is_finite() && !Self::fits(bounds, next, max_cells) {
+                bits |= 1 << bit;
+            }
+        }
+        Self::of_size(bounds, f32::from_bits(bits + 1).max(bounds.margin()).min(f32::MAX))
+    }
+
+    /// The lattice of cubes of a size, which is one that [`Lattice::of_density`] has found, or larger.
+    pub fn of_size(bounds: &Bounds, cell_size: f32) -> Self {
+        let mut lattice = Self { min: bounds.min, max: bounds.max, cell_size, n_cells: [1; 3] };
+        lattice.n_cells = [0, 1, 2].map(|axis| Self::n_cubes_along(bounds, axis, cell_size));
+        lattice
+    }
+
+    fn fits(bounds: &Bounds, cell_size: f32, max_cells: f32) -> bool {
+        let n_cells = [0, 1, 2].map(|axis| Self::n_cubes_along(bounds, axis, cell_size));
+        let product = n_cells.iter().map(|&n| u64::from(n)).product::<u64>();
+        n_cells.iter().all(|&n| n <= GRID_MAX_RESOLUTION) && product as f32 <= max_cells.max(1.0)
+    }
+
+    /// How many cubes reach from one side of the box to the other; more than `GRID_MAX_RESOLUTION` for any such number.
+    fn n_cubes_along(bounds: &Bounds, axis: usize, cell_size: f32) -> u32 {
+        let (min, max) = (bounds.min[axis], bounds.max[axis]);
+        // Not the quotient of the difference, which may be infinite.
+        let quotient = max / cell_size - min / cell_size;
+        if !(quotient <= 2.0 * GRID_MAX_RESOLUTION as f32) {
+            return 2 * GRID_MAX_RESOLUTION;
+        }
+        // The quotient may be off in its last bits. The answer is exact: the least n at which the cubes reach the end.
+        let reaches = |n: u32| min + n as f32 * cell_size >= max;
+        let mut n = (quotient as u32).max(1);
+        while !reaches(n) {
+            n += 1;
+        }
+        while n > 1 && reaches(n - 1) {
+            n -= 1;
+        }
+        n
+    }
+
+    /// Where the cubes of index `i` on an axis begin, and those before them end.
+    #[inline(always)]
+    pub fn plane(&self, axis: usize, i: u32) -> f32 {
+        let at = self.min[axis] + i as f32 * self.cell_size;
+        if self.max[axis] < at { self.max[axis] } else { at }
+    }
+
+    /// The index on an axis of about the cube that has a coordinate.
+    #[inline(always)]
+    pub fn index_near(&self, axis: usize, at: f32) -> u32 {
+        // A cast of a negative number, or of a NaN, is 0.
+        (((at - self.min[axis]) / self.cell_size) as u32).min(self.n_cells[axis] - 1)
+    }
+
+    /// The first and the last index of cubes that meet an interval on an axis; the cubes are closed. An interval beside the box
+    /// meets the cubes at its border.
+    pub fn indices_in(&self, axis: usize, least: f32, greatest: f32) -> [u32; 2] {
+        let last_ix = self.n_cells[axis] - 1;
+        let mut first = self.index_near(axis, least);
+        while first > 0 && self.plane(axis, first) >= least {
+            first -= 1;
+        }
+        while first < last_ix && self.plane(axis, first + 1) < least {
+            first += 1;
+        }
+        let mut last = self.index_near(axis, greatest);
+        while last < last_ix && self.plane(axis, last + 1) <= greatest {
+            last += 1;
+        }
+        while last > 0 && self.plane(axis, last) > greatest {
+            last -= 1;
+        }
+        [first, last]
+    }
+
+    /// The place of a cube in the order of all: x fastest, then y.
+    #[inline(always)]
+    pub fn place_of(&self, [x, y, z]: [u32; 3]) -> u32 {
+        x + self.n_cells[0] * (y + self.n_cells[1] * z)
+    }
+
+    /// The number of all cubes.
+    pub fn n_cubes(&self) -> usize {
+        self.n_cells.iter().map(|&n| n as usize).product()
+    }
+
+    /// The lattice that cuts a cube into `resolution` cubes along each axis.
+    pub fn within(&self, cell: [u32; 3], resolution: u32) -> Self {
+        Self {
+            min: [0, 1, 2].map(|axis| self.plane(axis, cell[axis])),
+            max: [0, 1, 2].map(|axis| self.plane(axis, cell[axis] + 1)),
+            // The reciprocal is rounded first, as in the kernels' table of them.
+            cell_size: self.cell_size * (1.0 / resolution as f32),
+            n_cells: [resolution; 3],
+        }
+    }
+
+    /// The indices of the cube at a place.
+    pub fn cube_at(&self, place: u32) -> [u32; 3] {
+        let [n_x, n_y, _] = self.n_cells;
+        [place % n_x, place / n_x % n_y, place / n_x / n_y]
+    }
+
+    /// The least and the greatest corner of the box.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        [self.min.into(), self.max.into()]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unit_box(height: f32) -> Bounds {
+        Bounds { min: [0.0; 3], max: [1.0, height, 1.0] }
+    }
+
+    #[test]
+    fn cubes_are_as_small_as_their_number_allows() {
+        for (height, max_cells, expected) in [(1.0, 8.0, [2, 2, 2]), (0.5, 5.0, [2, 1, 2]), (1e-3, 99.0, [9, 1, 9])] {
+            let lattice = Lattice::of_density(&unit_box(height), max_cells);
+            assert_eq!(lattice.n_cells, expected, "{height} {max_cells}");
+        }
+    }
+
+    #[test]
+    fn a_box_of_any_size_is_filled() {
+        for scale in [1e-30, 1e-6, 1.0, 1e6, 1e30, f32::MAX] {
+            let bounds = Bounds { min: [-scale, 0.0, 0.3 * scale], max: [scale, 0.1 * scale, 0.4 * scale] };
+            let lattice = Lattice::of_density(&bounds, 1e5);
+            assert!(lattice.n_cubes() <= 100_000 && lattice.n_cubes() > 50_000, "{scale}: {:?}", lattice.n_cells);
+            (0..3).for_each(|axis| assert_eq!(lattice.plane(axis, lattice.n_cells[axis]), bounds.max[axis]));
+        }
+    }
+
+    #[test]
+    fn cubes_are_never_smaller_than_the_margin() {
+        let bounds = Bounds { min: [1e5; 3], max: [100_000.5; 3] };
+        let lattice = Lattice::of_density(&bounds, 1e6);
+        assert!(lattice.cell_size >= bounds.margin());
+    }
+
+    #[test]
+    fn an_interval_meets_the_cubes_that_it_touches() {
+        let lattice = Lattice::of_size(&unit_box(1.0), 0.25);
+        assert_eq!(lattice.indices_in(0, 0.3, 0.4), [1, 1]);
+        assert_eq!(lattice.indices_in(0, 0.25, 0.5), [0, 2]);
+        assert_eq!(lattice.indices_in(0, -5.0, -4.0), [0, 0]);
+        assert_eq!(lattice.indices_in(0, 4.0, 5.0), [3, 3]);
+    }
+}

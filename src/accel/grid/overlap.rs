@@ -1,0 +1,231 @@
+//! Which cubes of a lattice a triangle comes near to.
+//!
+//! A triangle's box is gone through in columns along the axis that its normal points along most. A column is passed over where
+//! the triangle, seen along that axis, is beside it. Within a column, the triangle's plane is in few cubes. Each of them is
+//! tested against the plane, and against the triangle as it is seen along the other two axes (Schwarz and Seidel, "Fast
+//! parallel surface and solid voxelization on GPUs", 2010).
+
+use super::Lattice;
+use crate::{accel::bounds::Bounds, layout::Triangle};
+
+/// Times the margin of the triangles' box: how far from a cube a triangle is still taken as in it. The traversal needs the
+/// margin itself (bounds.rs). A sixteenth of it is 8 units of 2^-24 times the largest coordinate, of which the cubes' rounded
+/// middles and half edges take 4.
+const MARGIN_FACTOR: f32 = 1.0625;
+/// Times a product of two lengths, each a sum of a vector's magnitudes: how far a rounded product of vectors is off, 16 units
+/// of 2^-24. Edges are rounded by 1 unit each, products of two components by 1, their difference by 1: 4 for a normal. Its
+/// product with a third vector adds 4.
+const PRODUCT_ERROR: f32 = 1.0 / (1 << 20) as f32;
+
+/// A triangle and the columns of its box.
+pub struct Columns<'a> {
+    lattice: &'a Lattice,
+    corners: [[f32; 3]; 3],
+    /// Not of unit length.
+    normal: [f32; 3],
+    /// How far the normal's components may be off.
+    normal_error: f32,
+    /// Half of a cube's edge, and the margin.
+    half: f32,
+    /// The axes of a row of columns, of the rows, and along the columns.
+    axes: [usize; 3],
+    /// The first and the last index of the box's cubes on each axis.
+    range: [[u32; 2]; 3],
+}
+
+impl<'a> Columns<'a> {
+    /// `margin`: of the box of all triangles.
+    pub fn new(lattice: &'a Lattice, triangle: &Triangle, margin: f32) -> Self {
+        let corners = [triangle.v0, triangle.v1, triangle.v2].map(|corner| corner.to_array());
+        let margin = MARGIN_FACTOR * margin;
+        let bounds = Bounds::of(triangle).grown(margin);
+        let (a, b) = (difference(corners[1], corners[0]), difference(corners[2], corners[0]));
+        let normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+        let [x, y, z] = normal.map(f32::abs);
+        let along = if z >= x && z >= y { 2 } else { usize::from(y >= x) };
+        Self {
+            lattice,
+            corners,
+            normal,
+            normal_error: PRODUCT_ERROR * (magnitude(a) * magnitude(b)),
+            half: 0.5 * lattice.cell_size + margin,
+            axes: [(along + 1) % 3, (along + 2) % 3, along],
+            range: [0, 1, 2].map(|axis| lattice.indices_in(axis, bounds.min[axis], bounds.max[axis])),
+        }
+    }
+
+    /// The number of columns.
+    pub fn n_columns(&self) -> u32 {
+        let n_on = |[first, last]: [u32; 2]| last - first + 1;
+        n_on(self.range[self.axes[0]]) * n_on(self.range[self.axes[1]])
+    }
+
+    /// Calls `found` with the indices of each cube of a column that the triangle comes near to.
+    pub fn cubes_of(&self, column_ix: u32, mut found: impl FnMut([u32; 3])) {
+        let [u, v, w] = self.axes;
+        let n_in_row = self.range[u][1] - self.range[u][0] + 1;
+        let mut cube = [0; 3];
+        cube[u] = self.range[u][0] + column_ix % n_in_row;
+        cube[v] = self.range[v][0] + column_ix / n_in_row;
+        let mut middle = [0.0; 3];
+        middle[u] = self.middle(u, cube[u]);
+        middle[v] = self.middle(v, cube[v]);
+        if self.is_beside(w, middle) {
+            return;
+        }
+        let [first, last] = self.near_plane(middle);
+        for i in first..=last {
+            cube[w] = i;
+            middle[w] = self.middle(w, i);
+            if self.meets_plane(middle) && !self.is_beside(u, middle) && !self.is_beside(v, middle) {
+                found(cube);
+            }
+        }
+    }
+
+    fn middle(&self, axis: usize, i: u32) -> f32 {
+        0.5 * self.lattice.plane(axis, i) + 0.5 * self.lattice.plane(axis, i + 1)
+    }
+
+    /// Whether a cube of this middle is beyond an edge, seen along an axis `w`. What is not certain is not beside.
+    ///
+    /// A point of a triangle is on the left of all edges or on the right of all, whichever way round they go. So a needle, whose
+    /// area's sign is not certain, is no exception.
+    fn is_beside(&self, w: usize, middle: [f32; 3]) -> bool {
+        let [u, v] = [(w + 1) % 3, (w + 2) % 3];
+        let (mut is_right, mut is_left) = (false, false);
+        for [from, to] in [[0, 1], [1, 2], [2, 0]] {
+            let (from, to) = (self.corners[from], self.corners[to]);
+            let along = [to[u] - from[u], to[v] - from[v]];
+            let way = [middle[u] - from[u], middle[v] - from[v]];
+            let span = along[0].abs() + along[1].abs();
+            let height = along[0] * way[1] - along[1] * way[0];
+            let reach = span * self.half + PRODUCT_ERROR * (span * (way[0].abs() + way[1].abs()));
+            is_right |= height < -reach;
+            is_left |= height > reach;
+        }
+        is_right && is_left
+    }
+
+    /// The first and the last index on a column of cubes that may meet the plane: one more than do, for the quotient is not
+    /// exact.
+    fn near_plane(&self, middle: [f32; 3]) -> [u32; 2] {
+        let [u, v, w] = self.axes;
+        let [first, last] = self.range[w];
+        let slope = 1.0 / self.normal[w].abs();
+        let way = [middle[u] - self.corners[0][u], middle[v] - self.corners[0][v]];
+        let extent = self.lattice.plane(w, last + 1) - self.lattice.plane(w, first);
+        let error = self.normal_error * (way[0].abs() + way[1].abs() + extent + self.half) * slope;
+        if !(error < 0.25 * self.lattice.cell_size) {
+            return [first, last];
+        }
+        let height = self.normal[u] * way[0] + self.normal[v] * way[1];
+        let at = self.corners[0][w] - if self.normal[w] < 0.0 { -height } else { height } * slope;
+        let spread = ((self.normal[u].abs() + self.normal[v].abs()) * slope + 1.0) * self.half;
+        let reach = spread + self.lattice.cell_size;
+        let [near_first, near_last] = [at - reach, at + reach].map(|at| self.lattice.index_near(w, at));
+        [first.max(near_first), last.min(near_last)]
+    }
+
+    /// Whether the triangle's plane comes near to a cube of this middle. What is not certain does.
+    fn meets_plane(&self, middle: [f32; 3]) -> bool {
+        let way = difference(middle, self.corners[0]);
+        let [x, y, z] = self.normal;
+        let height = x * way[0] + y * way[1] + z * way[2];
+        let error = self.normal_error * (magnitude(way) + 3.0 * self.half);
+        let reach = magnitude(self.normal) * self.half + error;
+        !(height.abs() > reach)
+    }
+}
+
+fn difference(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// The sum of a vector's magnitudes, which is no less than its length.
+fn magnitude([x, y, z]: [f32; 3]) -> f32 {
+    x.abs() + y.abs() + z.abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec3, vec3};
+
+    use super::*;
+
+    fn cubes_of(lattice: &Lattice, triangle: &Triangle, margin: f32) -> Vec<[u32; 3]> {
+        let columns = Columns::new(lattice, triangle, margin);
+        let mut cubes = Vec::new();
+        (0..columns.n_columns()).for_each(|column_ix| columns.cubes_of(column_ix, |cube| cubes.push(cube)));
+        cubes
+    }
+
+    fn lattice(n: u32) -> Lattice {
+        Lattice { min: [-1.0; 3], max: [1.0; 3], cell_size: 2.0 / n as f32, n_cells: [n; 3] }
+    }
+
+    /// Points of a triangle, on its edges, too.
+    fn points_of(triangle: &Triangle, n: u32) -> impl Iterator<Item = Vec3> {
+        let Triangle { v0, v1, v2, .. } = *triangle;
+        let shares = (0..=n).flat_map(move |i| (0..=n - i).map(move |j| [i, j].map(|i| i as f32 / n as f32)));
+        shares.map(move |[i, j]| v0 + i * (v1 - v0) + j * (v2 - v0))
+    }
+
+    fn triangles() -> Vec<Triangle> {
+        let at = |i: u32| {
+            let unit = |j: u32| ((i * 3 + j).wrapping_mul(2_654_435_761) >> 8) as f32 / (1 << 23) as f32 - 1.0;
+            0.9 * vec3(unit(0), unit(1), unit(2))
+        };
+        let any = (0..200).map(|i| [at(3 * i), at(3 * i + 1), at(3 * i + 2)]);
+        let small = (0..200).map(|i| [at(i), at(i) + 0.05 * at(i + 77), at(i) + 0.05 * at(i + 99)]);
+        let needles = (0..50).map(|i| [at(i), at(i + 7), at(i).lerp(at(i + 7), 0.3) + 1e-5 * at(i + 3)]);
+        let flat = (0..3).map(|axis| {
+            let mut corners = [at(1), at(2), at(3)];
+            corners.iter_mut().for_each(|corner| corner[axis] = 0.25);
+            corners
+        });
+        let points = (0..9).map(|i| [at(i); 3]);
+        let corners = any.chain(small).chain(needles).chain(flat).chain(points);
+        corners.map(|[v0, v1, v2]| Triangle { v0, v1, v2, ..Triangle::default() }).collect()
+    }
+
+    #[test]
+    fn every_point_is_in_a_cube_of_its_triangle() {
+        for n in [1, 3, 16, 50] {
+            let lattice = lattice(n);
+            for triangle in triangles() {
+                let cubes = cubes_of(&lattice, &triangle, 1e-6);
+                for point in points_of(&triangle, 64) {
+                    let is_in = |cube: &[u32; 3]| {
+                        (0..3).all(|axis| {
+                            let [least, greatest] = [0, 1].map(|side| lattice.plane(axis, cube[axis] + side));
+                            (least..=greatest).contains(&point[axis])
+                        })
+                    };
+                    assert!(cubes.iter().any(is_in), "{point} of {triangle:?} in {n} cubes");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn no_cube_is_found_twice_and_few_in_vain() {
+        let lattice = lattice(20);
+        let (mut n_found, mut n_needed) = (0, 0);
+        for triangle in triangles() {
+            let mut cubes = cubes_of(&lattice, &triangle, 1e-6);
+            cubes.sort();
+            let n = cubes.len();
+            cubes.dedup();
+            assert_eq!(cubes.len(), n, "{triangle:?}");
+            let mut needed: Vec<_> = points_of(&triangle, 400)
+                .map(|point| [0, 1, 2].map(|axis| lattice.index_near(axis, point[axis])))
+                .collect();
+            needed.sort();
+            needed.dedup();
+            n_found += n;
+            n_needed += needed.len();
+        }
+        assert!(n_found < n_needed * 13 / 10, "{n_found} cubes where {n_needed} would do");
+    }
+}
