@@ -1,4 +1,4 @@
-//! The searches through grids against every triangle of the mesh, with the rays on which traversals fail.
+//! Tests that the search through a grid finds what a test of every triangle finds, for rays on which traversals fail.
 
 mod support;
 
@@ -15,14 +15,16 @@ use kdray::{
 };
 use rayon::prelude::*;
 use support::{
-    MeshWithTree, meshes,
+    MeshWithTree,
+    compare::first_difference,
+    meshes,
     random::Random,
-    rays::{edge_point, nasty_ray, ray},
+    rays::{nasty_ray, outward_ray, ray},
 };
 
 const N_RAYS: usize = 100_000;
 
-/// Both kinds of grids.
+/// Returns the options of both kinds of grids, each with its name.
 fn kinds() -> [(&'static str, GridOptions); 2] {
     [("uniform", GridOptions::uniform()), ("two levels", GridOptions::two_level())]
 }
@@ -36,7 +38,8 @@ fn traced<const ANY_HIT: bool>(inputs: &KernelInputs, rays: &[PathRay]) -> Vec<H
     rays.par_iter().map(hit).collect()
 }
 
-/// A ray that lies in a plane between cells, or in the line where two such planes meet, or starts there.
+/// Returns a ray that starts in one to three planes between cells. Most of these rays also lie in the plane, or in the
+/// line where two planes meet, or almost do so.
 fn ray_in_planes(random: &mut Random, grid: &Grid) -> PathRay {
     let lattice = grid.lattice();
     let [least, greatest] = grid.bounds();
@@ -66,15 +69,6 @@ fn rays_at(world: &MeshWithTree, grid: &Grid) -> Vec<PathRay> {
     (0..N_RAYS).into_par_iter().map(ray).collect()
 }
 
-/// The first ray whose hits differ, in any bit.
-fn first_difference(rays: &[PathRay], expected: &[Hit], found: &[Hit]) -> Option<String> {
-    let bits = |hit: &Hit| (hit.t.to_bits(), hit.triangle_ix, hit.u.to_bits(), hit.v.to_bits());
-    let differ = |i: &usize| bits(&expected[*i]) != bits(&found[*i]);
-    let n = (0..rays.len()).filter(differ).count();
-    let i = (0..rays.len()).find(differ)?;
-    Some(format!("{n} rays; ray {i}: {:?}: {:?}, not {:?}", rays[i], found[i], expected[i]))
-}
-
 fn check_against_brute_force(name: &str, triangles: Vec<Triangle>) {
     let world = MeshWithTree::new(triangles);
     for (kind, options) in kinds() {
@@ -102,7 +96,7 @@ fn finds_what_brute_force_finds() {
     check_against_brute_force("huge", meshes::placed(meshes::torus(40, 20), 1e6, Vec3::ZERO));
     check_against_brute_force("far", meshes::placed(meshes::torus(40, 20), 0.3, vec3(1000.0, -70.0, 3.0)));
     check_against_brute_force("farther", meshes::placed(meshes::torus(40, 20), 10.0, vec3(1e5, -1e5, 3.0)));
-    check_against_brute_force("one", vec![meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z); 1]);
+    check_against_brute_force("one", vec![meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z)]);
 }
 
 #[test]
@@ -116,14 +110,6 @@ fn rays_from_inside_never_leak() {
             assert_eq!(n_leaks, 0, "{name}, {kind}");
         }
     }
-}
-
-/// From somewhere inside a convex mesh around 0 exactly at a corner or a point of an edge.
-fn outward_ray(random: &mut Random, triangles: &[Triangle]) -> PathRay {
-    let t = *random.of(triangles);
-    let target = if random.below(2) == 0 { t.v0 } else { edge_point(random, triangles) };
-    let origin = if random.below(4) == 0 { Vec3::ZERO } else { 0.5 * random.unit() * random.direction() };
-    ray(origin, (target - origin).normalize())
 }
 
 #[test]
@@ -143,13 +129,9 @@ fn a_triangle_that_no_cell_has_is_noticed() {
 
 #[test]
 fn limits_of_memory_make_cells_larger() {
-    // Large triangles through one another: each is in very many cells.
-    let triangles = meshes::placed(meshes::soup(3000, 5), 1.0, Vec3::ZERO);
-    let corner = |triangle: &Triangle, scale: f32| Triangle {
-        v1: triangle.v0 + scale * (triangle.v1 - triangle.v0),
-        ..*triangle
-    };
-    let triangles: Vec<Triangle> = triangles.iter().map(|triangle| corner(triangle, 30.0)).collect();
+    // Each of these long triangles is in very many cells.
+    let lengthened = |triangle: Triangle| Triangle { v1: triangle.v0 + 30.0 * (triangle.v1 - triangle.v0), ..triangle };
+    let triangles: Vec<Triangle> = meshes::soup(3000, 5).into_iter().map(lengthened).collect();
     for (kind, options) in kinds() {
         let limited = GridOptions { max_references_per_triangle: 3, ..options.clone() };
         let statistics = Grid::build(&triangles, &limited).statistics();

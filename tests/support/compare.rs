@@ -63,6 +63,16 @@ pub fn hits(n_outliers: usize, expected: &[Hit], found: &[Hit]) -> Result<(), St
     })
 }
 
+/// Says which ray is the first whose two hits differ in any bit, and how many rays do; None where all hits are equal.
+pub fn first_difference(rays: &[PathRay], expected: &[Hit], found: &[Hit]) -> Option<String> {
+    assert_eq!([expected.len(), found.len()], [rays.len(); 2]);
+    let bits = |hit: &Hit| (hit.t.to_bits(), hit.triangle_ix, hit.u.to_bits(), hit.v.to_bits());
+    let differ = |i: &usize| bits(&expected[*i]) != bits(&found[*i]);
+    let n = (0..rays.len()).filter(differ).count();
+    let i = (0..rays.len()).find(differ)?;
+    Some(format!("{n} rays; ray {i}: {:?}: {:?}, not {:?}", rays[i], found[i], expected[i]))
+}
+
 /// Integers equal, the rest near.
 pub fn rays(relative: f32, n_outliers: usize, expected: &[PathRay], found: &[PathRay]) -> Result<(), String> {
     all_agree(expected, found, n_outliers, |a, b| {

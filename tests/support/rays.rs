@@ -26,7 +26,7 @@ fn corner(random: &mut Random, triangles: &[Triangle]) -> Vec3 {
 }
 
 /// The middle of an edge, or a point elsewhere on it.
-pub fn edge_point(random: &mut Random, triangles: &[Triangle]) -> Vec3 {
+fn edge_point(random: &mut Random, triangles: &[Triangle]) -> Vec3 {
     let t = random.of(triangles);
     let (a, b) = *random.of(&[(t.v0, t.v1), (t.v1, t.v2), (t.v2, t.v0)]);
     let share = if random.below(2) == 0 { 0.5 } else { random.unit() };
@@ -89,3 +89,11 @@ pub fn nasty_ray(random: &mut Random, world: &MeshWithTree, kind: usize) -> Path
 
 /// Kinds of rays that `nasty_ray` makes.
 pub const N_KINDS: usize = 14;
+
+/// Returns a ray from inside a convex mesh around 0 to a corner or a point of an edge.
+pub fn outward_ray(random: &mut Random, triangles: &[Triangle]) -> PathRay {
+    let t = *random.of(triangles);
+    let target = if random.below(2) == 0 { t.v0 } else { edge_point(random, triangles) };
+    let origin = if random.below(4) == 0 { Vec3::ZERO } else { 0.5 * random.unit() * random.direction() };
+    ray(origin, (target - origin).normalize())
+}
