@@ -45,7 +45,7 @@ fn mesh() -> FlatScene {
 }
 
 fn closest_hits(stage: &Stage, rays: &[PathRay]) -> Vec<Hit> {
-    let mut traverser = Traverser::new(Traversal::Mask);
+    let mut traverser = Traverser::new(&stage.inputs(), Traversal::Mask);
     rays.iter().map(|ray| traverser.traverse::<false>(&stage.inputs(), &ray.into())).collect()
 }
 

@@ -158,7 +158,7 @@ fn lanes_apart_find_the_same() {
 #[test]
 fn a_mask_of_two_words_finds_the_same() {
     let world = chain(KD_MAX_DEPTH - 2);
-    assert!(world.tree.depth() > KD_WORD_DEPTH);
+    assert!(world.tree().depth() > KD_WORD_DEPTH);
     for device in [Device::new(), Device::with_lanes(5000)] {
         // Towards the chain's root every level is pending.
         check(&device, &world, &some_rays(&world, 4000, 0.0..=0.0));

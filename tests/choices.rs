@@ -7,7 +7,7 @@ use std::{convert::Infallible, fs, path::PathBuf};
 use glam::Vec3;
 use kdray::{
     accel::{
-        Query,
+        AccelOptions, Query,
         kdtree::{BuildOptions, Traversal},
     },
     cast::{Caster, Ray},
@@ -40,7 +40,7 @@ fn device() -> DeviceInfo {
 }
 
 fn key() -> Key {
-    Key::new(&device(), &meshes::torus(40, 20), &BuildOptions::default())
+    Key::new(&device(), &meshes::torus(40, 20), &AccelOptions::KdTree(BuildOptions::default()))
 }
 
 /// Enough rays for all of them, and for a measurement.
@@ -125,14 +125,14 @@ fn another_device_driver_scene_or_tree_is_measured_anew() {
     let folder = TempDir::new().unwrap();
     let cache = Cache::at(folder.path());
     choose(&cache, &key(), Some(timings(1.0, 0.9, 0.95)));
-    let (triangles, options) = (meshes::torus(40, 20), BuildOptions::default());
+    let (triangles, options) = (meshes::torus(40, 20), AccelOptions::KdTree(BuildOptions::default()));
     let mut moved = triangles.clone();
     moved[7].v1.x = moved[7].v1.x.next_up();
     let others = [
         Key::new(&DeviceInfo { name: "Abacus 10".to_owned(), ..device() }, &triangles, &options),
         Key::new(&DeviceInfo { driver: "beads 1.3".to_owned(), ..device() }, &triangles, &options),
         Key::new(&device(), &moved, &options),
-        Key::new(&device(), &triangles, &BuildOptions::fast()),
+        Key::new(&device(), &triangles, &AccelOptions::KdTree(BuildOptions::fast())),
     ];
     for other in &others {
         assert_eq!(cache.get(other), None, "{other:?}");
@@ -296,7 +296,7 @@ fn nothing_is_measured_where_the_cpu_runs_the_kernels() {
 fn keys_see_the_order_of_triangles() {
     let triangles: Vec<Triangle> = meshes::torus(40, 20);
     let reversed: Vec<Triangle> = triangles.iter().rev().copied().collect();
-    let key = |triangles: &[Triangle]| Key::new(&device(), triangles, &BuildOptions::default());
+    let key = |triangles: &[Triangle]| Key::new(&device(), triangles, &AccelOptions::KdTree(BuildOptions::default()));
     assert_eq!(key(&triangles), key(&triangles.clone()));
     assert_ne!(key(&triangles), key(&reversed));
 }

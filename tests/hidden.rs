@@ -120,7 +120,7 @@ fn without_a_filter_hidden_triangles_are_hit() {
 #[test]
 fn a_mesh_of_which_all_is_hidden_is_not_there() {
     let mesh = MeshWithTree::new(meshes::cube(2, 0.0));
-    let mut traverser = Traverser::new(Traversal::Mask);
+    let mut traverser = Traverser::new(&mesh.inputs(), Traversal::Mask);
     let into = SearchRay {
         origin: Vec3::new(0.1, 0.2, 9.0),
         t_min: 0.0,

@@ -118,7 +118,7 @@ fn every_set_of_instructions_finds_the_same() {
     for triangles in [meshes::torus(40, 20), meshes::cube(9, 0.0), meshes::soup(1200, 7)] {
         let world = MeshWithTree::new(triangles);
         let rays: Vec<_> = (0..1500).flat_map(|seed| rays_of_a_packet(&mut Random(seed), &world)).collect();
-        let mut one = Traverser::new(Traversal::Mask);
+        let mut one = Traverser::new(&world.inputs(), Traversal::Mask);
         let expected: Vec<Hit> = rays.iter().map(|ray| one.traverse::<false>(&world.inputs(), &ray.into())).collect();
         assert!(expected.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count() > rays.len() / 5);
         for level in levels() {

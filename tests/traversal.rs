@@ -58,7 +58,7 @@ fn traced_through(bindings: &KernelInputs, traversal: Traversal, rays: &[PathRay
     };
     // Not a multiple of what goes together.
     rays.par_chunks(1001)
-        .map_init(|| (FastTracer::new(traversal), Traverser::new(traversal)), of_task)
+        .map_init(|| (FastTracer::new(bindings, traversal), Traverser::new(bindings, traversal)), of_task)
         .flatten()
         .collect()
 }
@@ -124,7 +124,7 @@ fn a_missing_triangle_in_a_leaf_is_noticed() {
     let hits = traced(&world, Traversal::Mask, &rays);
     // A tree leaves out triangles that are not finite.
     let mut without = world.triangles.clone();
-    without[world.tree.leaf_triangles()[0] as usize].v0 = Vec3::NAN;
+    without[world.tree().leaf_triangles()[0] as usize].v0 = Vec3::NAN;
     world = MeshWithTree::with_tree(world.triangles, KdTree::build(&without, &BuildOptions::default()));
     assert!(first_difference(&rays, &hits, &traced(&world, Traversal::Mask, &rays)).is_some());
 }
@@ -149,7 +149,8 @@ fn slabs_beside_their_surface_are_noticed() {
     let world = MeshWithTree::new(meshes::torus(120, 60));
     let rays = rays_at(&world);
     let bindings = world.inputs();
-    let moved: Vec<Slab> = world.tree.slabs().iter().map(|slab| Slab { offset: slab.offset + 2.0, ..*slab }).collect();
+    let moved: Vec<Slab> =
+        world.tree().slabs().iter().map(|slab| Slab { offset: slab.offset + 2.0, ..*slab }).collect();
     let moved = KernelInputs { kd_slabs: CountedSlice::from(&moved[..]), ..bindings };
     for traversal in tree_traversals() {
         let [expected, found] = [&bindings, &moved].map(|bindings| traced_through(bindings, traversal, &rays));
@@ -232,7 +233,7 @@ fn rays_from_afar_hit_the_same() {
     for distance in [10.0, 300.0, 3000.0] {
         let afar = |i: usize| {
             let mut random = Random(i as u64);
-            let within = random.in_box(world.tree.cell_min(), world.tree.cell_max());
+            let within = random.in_box(world.tree().cell_min(), world.tree().cell_max());
             let origin = world.centre() + distance * world.radius() * random.direction();
             ray(origin, (within - origin).normalize())
         };

@@ -100,12 +100,12 @@ fn check(context: &Arc<Context>, name: &str, triangles: Vec<Triangle>) {
     let world = MeshWithTree::new(triangles);
     let scene = scene(&world.triangles);
     let rays: Vec<PathRay> = (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), &world, i)).collect();
-    let without_tree = traced(context, &scene, &world.tree, &rays, Traversal::Brute);
+    let without_tree = traced(context, &scene, world.tree(), &rays, Traversal::Brute);
     check_against_cpu(name, &world, &rays, &without_tree);
     let wrong: Vec<String> = Traversal::ALL
         .iter()
         .filter_map(|&traversal| {
-            let found = traced(context, &scene, &world.tree, &rays, traversal);
+            let found = traced(context, &scene, world.tree(), &rays, traversal);
             let difference = difference(&rays, &without_tree, &found)?;
             Some(format!("{name}, {traversal}: {difference}"))
         })
@@ -145,7 +145,7 @@ fn a_wrong_bit_is_noticed() {
     let world = MeshWithTree::new(meshes::torus(20, 10));
     let rays: Vec<PathRay> = (0..64).map(|i| nasty_ray(&mut Random(i), &world, i as usize)).collect();
     let context = context();
-    let of = |traversal| traced(&context, &scene(&world.triangles), &world.tree, &rays, traversal);
+    let of = |traversal| traced(&context, &scene(&world.triangles), world.tree(), &rays, traversal);
     let expected = of(Traversal::Mask);
     for wrong in 0..4 {
         let mut found = of(Traversal::Mask);

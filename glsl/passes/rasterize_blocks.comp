@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Rasterize, 2 of 2: one workgroup a block of a large triangle's bounding rectangle tests the pixels that may be covered.
-// Reads triangles, large_triangles, raster_count; writes pixel_nearest.
+// Reads triangles, large_triangles, raster_groups; writes pixel_nearest.
 #include "layout.glsl"
 #include "rasterize.glsl"
 #include "footprint.glsl"

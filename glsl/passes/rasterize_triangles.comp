@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 // Rasterize, 1 of 2: one invocation a triangle finds the pixels that it may cover. Those of small triangles are shared out
 // among the workgroup and tested; large ones are left to workgroups of their own.
-// Reads triangles; writes pixel_nearest, large_triangles, raster_count, raster_groups.
+// Reads triangles; writes pixel_nearest, large_triangles, raster_groups.
 #include "layout.glsl"
 #include "rasterize.glsl"
 #include "footprint.glsl"

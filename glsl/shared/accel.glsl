@@ -2,7 +2,8 @@
 // `traverse_any_length`.
 //
 //   traversal_ray.glsl   the ray, cut to the structure's box
-//   kdtree.glsl          the search through the structure
+//   kdtree.glsl          the search through a kd-tree
+//   grid.glsl            the search through a grid
 //   candidate.glsl       triangles that the search comes to, against the nearest hit so far
 //   local_memory.glsl    what is kept out of registers meanwhile
 #ifndef KDRAY_ACCEL
@@ -21,6 +22,13 @@ layout(constant_id = CONSTANT_PREDICATES_BRANCHES) const bool PREDICATES_BRANCHE
 #include "local_memory.glsl"
 #include "candidate.glsl"
 #include "kdtree.glsl"
+#include "grid.glsl"
+
+// The search through whichever structure the scene has. Returns 0, or the mark of a ray that has stalled.
+uint search(TraversalRay ray, bool any_hit, inout Nearest best) {
+    if (GRID_LEVELS == 0u) return search_kdtree(ray, any_hit, best);
+    return search_grid(ray, any_hit, best);
+}
 
 // The closest hit in (t_min, t_max], or with any_hit one that need not be the closest. The direction has about unit length. A
 // miss keeps t = t_max. If the ray has stalled, the hit's triangle_ix is its mark.
@@ -30,7 +38,7 @@ Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
     TraversalRay ray = traversal_ray(ray_near, t_min - t_start);
     spill_pair(LENGTHS_SLOT, t_start, ray_in.t_max);
     Nearest best = Nearest(0.5 * ray_near.t_max, NO_TRIANGLE);
-    uint mark = search_kdtree(ray, any_hit, best);
+    uint mark = search(ray, any_hit, best);
     if (CAN_STALL && mark != 0u) return Hit(0.0, mark, 0.0, 0.0);
     vec2 lengths = spilled_pair(LENGTHS_SLOT);
     if (best.triangle_ix == NO_TRIANGLE) return Hit(lengths.y, NO_TRIANGLE, 0.0, 0.0);

@@ -54,6 +54,11 @@
 // Far children that the traversal `short-stack` keeps.
 #define SHORT_STACK_SIZE 8u
 
+// The most cells of a grid along an axis.
+#define GRID_MAX_RESOLUTION 1024u
+// The most cells along each axis into which a grid of two levels cuts a cell of the upper level.
+#define GRID_MAX_BLOCK_RESOLUTION 32u
+
 // Barycentric weights of shaded points are at least this, 2^-16: exactly on the edge of a corner of two walls, rounding may
 // put a point behind the other wall, and into that wall's shadow.
 #define LEAST_WEIGHT 0.000015258789
@@ -174,6 +179,14 @@ struct KdBox {
 struct KdRope {
     float position;
     uint node_ix;
+};
+
+// 8 bytes: a cell of a grid. At the lowest level, its triangles are the `count` entries of leaf_triangles from `first` on. At the
+// upper level of two, it is cut into count x count x count cells, of which grid_cells[first] is the first, x fastest; a count
+// of 0 means that it has no triangles.
+struct GridCell {
+    uint first;
+    uint count;
 };
 
 // 80 bytes, named as in Wavefront MTL.
@@ -324,12 +337,18 @@ struct Feature {
 // What kernels know of the scene's triangles and acceleration structure beside the arrays (a uniform buffer).
 // cell_min, cell_max: the box that holds all triangles, with the structure's rounding margin (world units).
 // plane_epsilon: KD_PLANE_EPSILON in world units. n_triangles: the scene's triangles.
+// For grids: the number of cells of the upper level along each axis, and the length of a cell's edge (world units). cell_min is
+// the least corner of the first cell.
 // Then the device address of each of the scene's arrays, low word first; 0 where kernels read the array by its binding.
 struct AccelConstants {
     vec3 cell_min;
     float plane_epsilon;
     vec3 cell_max;
     uint n_triangles;
+    uint n_cells_x;
+    uint n_cells_y;
+    uint n_cells_z;
+    float cell_size;
 #define ARRAY(name, element, row, number) uvec2 name;
 #include "scene_arrays.glsl"
 #undef ARRAY
@@ -362,6 +381,8 @@ struct AccelConstants {
 
 // Whether rays pass through triangles with TRIANGLE_HIDDEN in `triangle_materials`.
 #define CONSTANT_FILTERS 28u
+// How many levels of cells the scene's grid has, 1 or 2; 0: the scene has a kd-tree.
+#define CONSTANT_GRID_LEVELS 27u
 // Loop turns that an invocation takes before its ray stalls; 0: any number.
 #define CONSTANT_TURN_BUDGET 29u
 // Words of the traversal's mask.
@@ -414,7 +435,8 @@ struct LargeTriangle {
     uint size;
 };
 
-// 16 bytes: how many workgroups go over the blocks, a VkDispatchIndirectCommand.
+// 16 bytes: how many workgroups go over the blocks, a VkDispatchIndirectCommand. Behind it, in the same buffer, are 8 bytes of
+// counts: large triangles in the upper half, their blocks in the lower.
 struct RasterGroups {
     uint x;
     uint y;
@@ -462,7 +484,6 @@ struct DriverCast {
 #define BIND_ACCEL 26u
 #define BIND_PIXEL_NEAREST 28u
 #define BIND_RASTER_GROUPS 29u
-#define BIND_RASTER_COUNT 30u
 #define BIND_LARGE_TRIANGLES 31u
 #define BIND_STALLS 32u
 

@@ -14,9 +14,12 @@
 layout(std430, set = 0, binding = BIND_PIXEL_NEAREST) buffer PixelNearestBlock { uint64_t pixel_nearest[]; };
 
 layout(push_constant) uniform RasterPushBlock { RasterPush raster; };
-layout(std430, set = 0, binding = BIND_RASTER_GROUPS) buffer RasterGroupsBlock { RasterGroups raster_groups; };
-// Large triangles in the upper half, their blocks in the lower.
-layout(std430, set = 0, binding = BIND_RASTER_COUNT) buffer RasterCountBlock { uint64_t raster_count; };
+// raster_count: large triangles in the upper half, their blocks in the lower. One buffer holds both, since some devices bind no
+// more than 30 in a stage.
+layout(std430, set = 0, binding = BIND_RASTER_GROUPS) buffer RasterGroupsBlock {
+    RasterGroups raster_groups;
+    uint64_t raster_count;
+};
 layout(std430, set = 0, binding = BIND_LARGE_TRIANGLES) buffer LargeTrianglesBlock { LargeTriangle large_triangles[]; };
 
 // How many blocks it is cut into, each way.

@@ -16,6 +16,10 @@ ARRAY(triangle_materials, uint, uint, 2u)
 ARRAY(kd_nodes, KdNode, uvec2, 5u)
 // One for each pair of nodes: the index of their parent.
 ARRAY(kd_parents, uint, uint, 6u)
+// The cells of a grid: the upper level's, x fastest, then y, and behind them the blocks of the lower level, in the order of the
+// upper cells.
+ARRAY(grid_cells, GridCell, uvec2, 30u)
+
 // One for each triangle of each leaf, in the order of the leaves. Three rows each: a corner, and in the first row's fourth
 // word the triangle's index.
 ARRAY(leaf_triangles, LeafTriangle, vec4, 7u)

@@ -94,7 +94,7 @@ impl Sized {
             generate_ms: self.generate_ms,
             build_ms: self.stage.tree_build_ms,
             rays: rays.collect::<Result<_, GpuError>>()?,
-            tree: self.stage.tree().statistics(self.stage.scene().triangles.len(), self.stage.world.build_options()),
+            tree: self.stage.tree_statistics(),
         })
     }
 }

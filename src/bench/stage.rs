@@ -5,7 +5,10 @@ use std::time::Instant;
 use glam::{BVec3, Vec3};
 
 use crate::{
-    accel::kdtree::{BuildOptions, KdTree, TraversalLinks},
+    accel::{
+        Statistics,
+        kdtree::{self, BuildOptions, KdTree, TraversalLinks},
+    },
     frame::RenderOptions,
     layout::{FLAT_NORMAL, Frame, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
     reference::inputs::KernelInputs,
@@ -68,9 +71,17 @@ impl Stage {
         self.world.tree()
     }
 
+    /// The kd-tree in numbers.
+    pub fn tree_statistics(&self) -> kdtree::Statistics {
+        match self.world.statistics() {
+            Statistics::KdTree(tree) => tree,
+            Statistics::Grid(_) => unreachable!("a stage's world has a kd-tree"),
+        }
+    }
+
     /// What a traversal on the CPU reads.
     pub fn inputs(&self) -> KernelInputs<'_> {
-        KernelInputs::new(self.scene(), self.tree(), &self.frame).with_links(&self.links)
+        KernelInputs::new(&self.world, &self.frame).with_links(&self.links)
     }
 }
 

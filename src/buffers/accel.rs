@@ -9,7 +9,11 @@ use super::{
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
 };
 use crate::{
-    accel::kdtree::{KdTree, Traversal, TraversalLinks},
+    accel::{
+        Accel,
+        grid::Grid,
+        kdtree::{KdTree, Traversal, TraversalLinks},
+    },
     gpu::{Binding, Buffer, BufferUse, Constants, Context, GpuError},
     layout::{
         AccelConstants, BIND_ACCEL, BIND_STALLS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, LeafTriangle, Slab,
@@ -23,7 +27,16 @@ pub(super) fn bindings() -> impl Iterator<Item = u32> {
     [BIND_ACCEL, BIND_STALLS].into_iter().chain(SceneArrays::bindings())
 }
 
-/// Triangles, their kd-tree, and what kernels know of both. A clone is a second handle to the same buffers.
+/// What kernels are specialized for.
+#[derive(Clone, Copy)]
+enum Structure {
+    /// `mask_words`: the number of words of the traversal's bit mask.
+    KdTree { mask_words: u32 },
+    /// `n_levels`: the number of levels of cells, 1 or 2.
+    Grid { n_levels: u32 },
+}
+
+/// Triangles, their acceleration structure, and what kernels know of both. A clone is a second handle to the same buffers.
 #[derive(Clone)]
 pub struct AccelBuffers {
     /// One.
@@ -32,8 +45,7 @@ pub struct AccelBuffers {
     /// Rays that have stopped on their way through the tree.
     pub stalls: Stalls,
     access: SceneAccess,
-    /// Words of the traversal's mask.
-    mask_words: u32,
+    structure: Structure,
     /// Whether rays pass through some of the triangles.
     filters: bool,
     /// What `constants` holds.
@@ -41,35 +53,65 @@ pub struct AccelBuffers {
 }
 
 impl AccelBuffers {
-    /// Uploads triangles and tree.
+    /// Uploads triangles and their structure.
     ///
     /// # Errors
     /// Beyond the device's limits, out of memory.
     pub fn new(context: &Arc<Context>, geometry: Geometry) -> Result<Self, GpuError> {
-        let (triangles, tree) = (geometry.triangles(), geometry.tree());
+        let triangles = geometry.triangles();
+        match geometry.accel() {
+            Accel::KdTree(tree) => Self::of_tree(context, triangles, tree),
+            Accel::Grid(grid) => Self::of_grid(context, triangles, grid.get(triangles)),
+        }
+    }
+
+    fn of_tree(context: &Arc<Context>, triangles: &[Triangle], tree: &KdTree) -> Result<Self, GpuError> {
         let n_nodes = tree.nodes().len();
-        let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, tree, first, part);
+        let entries = tree.leaf_triangles();
+        let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);
         let contents = Contents {
-            triangles: Content::Elements(triangles),
-            triangle_materials: Content::Reserved(triangles.len()),
             kd_nodes: Content::Elements(tree.nodes()),
             kd_parents: Content::Elements(tree.parents()),
-            leaf_triangles: Content::Written { len: tree.leaf_triangles().len(), write: &write_entries },
+            leaf_triangles: Content::Written { len: entries.len(), write: &write_entries },
             leaf_planes: Content::Elements(tree.leaf_planes()),
             kd_slabs: Content::Elements(slabs_for(context, tree)),
             kd_boxes: Content::Reserved(n_nodes),
             kd_ropes: Content::Reserved(6 * n_nodes),
+            ..Contents::of_triangles(triangles)
         };
+        let mask_words = if tree.depth() <= KD_WORD_DEPTH { 1 } else { 2 };
+        Self::with(context, contents, &tree.constants(), Structure::KdTree { mask_words })
+    }
+
+    fn of_grid(context: &Arc<Context>, triangles: &[Triangle], grid: &Grid) -> Result<Self, GpuError> {
+        let entries = grid.leaf_triangles();
+        let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);
+        let contents = Contents {
+            grid_cells: Content::Elements(grid.cells()),
+            leaf_triangles: Content::Written { len: entries.len(), write: &write_entries },
+            leaf_planes: Content::Elements(grid.leaf_planes()),
+            ..Contents::of_triangles(triangles)
+        };
+        Self::with(context, contents, &grid.constants(), Structure::Grid { n_levels: grid.n_levels() })
+    }
+
+    /// Uploads the arrays. `constants`: all but the number of triangles and the arrays' addresses.
+    fn with(
+        context: &Arc<Context>,
+        contents: Contents,
+        constants: &AccelConstants,
+        structure: Structure,
+    ) -> Result<Self, GpuError> {
         let access = SceneAccess::of(context, &contents);
         let arrays = contents.upload(context, access)?;
-        let uploaded = AccelConstants { n_triangles: triangles.len() as u32, ..tree.constants() };
+        let uploaded = AccelConstants { n_triangles: arrays.triangles.len() as u32, ..*constants };
         let mut made = Self {
             constants: Buffer::new(context, "accel", 1, BufferUse::Uniform)?,
             arrays,
             stalls: Stalls::new(context)?,
             access,
             filters: false,
-            mask_words: if tree.depth() <= KD_WORD_DEPTH { 1 } else { 2 },
+            structure,
             uploaded,
         };
         made.upload_constants(context)?;
@@ -87,7 +129,7 @@ impl AccelBuffers {
         self.upload_constants(context)
     }
 
-    /// Uploads what the traversal reads beside the tree, which is the uploaded one. Clones of these buffers keep what
+    /// Uploads what the traversal reads beside the structure, which is the uploaded one: nothing for a grid. Clones of these buffers keep what
     /// they had. Descriptor sets over these buffers have to be made again.
     ///
     /// # Errors
@@ -95,9 +137,10 @@ impl AccelBuffers {
     pub(crate) fn add_links(
         &mut self,
         context: &Arc<Context>,
-        tree: &KdTree,
+        accel: &Accel,
         traversal: Traversal,
     ) -> Result<(), GpuError> {
+        let Accel::KdTree(tree) = accel else { return Ok(()) };
         let (value, limit) = (self.arrays.triangles.len() as u64, u64::from(BRUTE_MAX_TRIANGLES));
         if traversal == Traversal::Brute && value > limit {
             return Err(GpuError::Limit { what: "triangles without a tree", value, limit });
@@ -133,10 +176,15 @@ impl AccelBuffers {
 
     /// Specialization constants of all kernels that read the arrays.
     pub(super) fn constants(&self) -> Constants {
+        let (mask_words, n_levels) = match self.structure {
+            Structure::KdTree { mask_words } => (mask_words, 0),
+            Structure::Grid { n_levels } => (1, n_levels),
+        };
         Constants::new()
             .set(constants::READING, self.access.constant())
             .set(constants::FILTERS, self.filters)
-            .set(constants::MASK_WORDS, self.mask_words)
+            .set(constants::MASK_WORDS, mask_words)
+            .set(constants::GRID_LEVELS, n_levels)
             .set(constants::TURN_BUDGET, self.stalls.turn_budget())
     }
 
@@ -157,9 +205,9 @@ impl AccelBuffers {
     }
 }
 
-/// Writes the triangles of the leaves, from entry `first` on.
-fn leaf_triangles(triangles: &[Triangle], tree: &KdTree, first: usize, part: &mut [LeafTriangle]) {
-    let numbers = &tree.leaf_triangles()[first..][..part.len()];
+/// Writes the triangles of the leaves' entries, from entry `first` on.
+fn leaf_triangles(triangles: &[Triangle], entries: &[u32], first: usize, part: &mut [LeafTriangle]) {
+    let numbers = &entries[first..][..part.len()];
     part.par_iter_mut().zip(numbers).for_each(|(entry, &triangle_ix)| {
         let Triangle { v0, v1, v2, .. } = triangles[triangle_ix as usize];
         *entry = LeafTriangle { v0, triangle_ix, v1, v2, ..LeafTriangle::default() };

@@ -27,7 +27,7 @@ pub use self::{
     cast::CastResources,
     pixels::Pixels,
     queue::Queue,
-    raster_queue::RasterQueue,
+    raster_queue::{RasterQueue, RasterState},
     resources::{Needs, Resources},
     scene_arrays::{SceneAccess, SceneArrays},
     stalls::{Round, Stalls},

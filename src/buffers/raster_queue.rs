@@ -8,14 +8,22 @@ use crate::{
     layout::{LargeTriangle, RasterGroups},
 };
 
+/// What the kernel that rasterizes small triangles tells the one that rasterizes large ones.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct RasterState {
+    /// The dispatch over the blocks of large triangles.
+    pub groups: RasterGroups,
+    /// The number of large triangles in the upper half, of their blocks in the lower.
+    pub count: u64,
+}
+
 /// Triangles with large bounding rectangles, and their blocks. Without room where the options do not ask for these kernels.
 /// A clone is a second handle to the same buffers.
 #[derive(Clone)]
 pub struct RasterQueue {
     /// One.
-    pub groups: Buffer<RasterGroups>,
-    /// One: large triangles in the upper half, their blocks in the lower.
-    pub count: Buffer<u64>,
+    pub groups: Buffer<RasterState>,
     /// One a triangle: all may be large.
     pub large_triangles: Buffer<LargeTriangle>,
 }
@@ -27,7 +35,6 @@ impl RasterQueue {
         let n_large = if options.primary == Primary::Compute { n_triangles as usize } else { 0 };
         Ok(Self {
             groups: Buffer::new(context, "raster_groups", 1, BufferUse::Indirect)?,
-            count: Buffer::new(context, "raster_count", 1, BufferUse::Storage)?,
             large_triangles: Buffer::new(context, "large_triangles", n_large, BufferUse::Storage)?,
         })
     }

@@ -8,7 +8,7 @@ use super::{
     vertex_indices::{has_indices, vertex_indices},
 };
 use crate::{
-    accel::kdtree::KdTree,
+    accel::Accel,
     frame::RenderOptions,
     gpu::{Access, Binding, BindingLayout, BindingSet, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
     layout::{self, Batch, Bounce, COUNTER_PLACES, COUNTER_STRIDE, Counters, Frame, Light, Material},
@@ -22,7 +22,7 @@ const PUSH_BYTES: u32 = {
 };
 
 /// BindingLayout of the frame's descriptor set beside those of the scene.
-const OWN_BINDINGS: [u32; 22] = [
+const OWN_BINDINGS: [u32; 21] = [
     layout::BIND_FRAME,
     layout::BIND_MATERIALS,
     layout::BIND_LIGHTS,
@@ -42,7 +42,6 @@ const OWN_BINDINGS: [u32; 22] = [
     layout::BIND_COUNTERS,
     layout::BIND_PIXEL_NEAREST,
     layout::BIND_RASTER_GROUPS,
-    layout::BIND_RASTER_COUNT,
     layout::BIND_LARGE_TRIANGLES,
     layout::BIND_TRIANGLE_IDS,
 ];
@@ -96,7 +95,7 @@ impl Resources {
         let &Needs { constants, options, n_bounces } = needs;
         let mut accel = AccelBuffers::new(context, world.geometry())?;
         accel.add_materials(context, &scene.triangle_materials)?;
-        accel.add_links(context, world.tree(), options.traversal)?;
+        accel.add_links(context, world.accel(), options.traversal)?;
         let kinds: Vec<_> = OWN_BINDINGS.into_iter().chain(accel::bindings()).map(binding).collect();
         let upload_indices = || new_vertex_indices(context, &vertex_indices(&scene.triangles));
         let mut resources = Self {
@@ -140,7 +139,6 @@ impl Resources {
             (layout::BIND_COUNTERS, Binding::Buffer(self.counters.any())),
             (layout::BIND_PIXEL_NEAREST, Binding::Buffer(pixels.pixel_nearest.any())),
             (layout::BIND_RASTER_GROUPS, Binding::Buffer(self.raster.groups.any())),
-            (layout::BIND_RASTER_COUNT, Binding::Buffer(self.raster.count.any())),
             (layout::BIND_LARGE_TRIANGLES, Binding::Buffer(self.raster.large_triangles.any())),
             (layout::BIND_TRIANGLE_IDS, Binding::Image(&pixels.triangle_ids)),
         ];
@@ -148,16 +146,16 @@ impl Resources {
     }
 
     /// Makes the resources of another frame of the same scene. What they hold is undefined, but for the scene, and for
-    /// pixels whose buffers are large enough and therefore shared. `tree`: the scene's own, if the traversal is another
+    /// pixels whose buffers are large enough and therefore shared. `accel`: the scene's own, if the traversal is another
     /// one.
     ///
     /// # Errors
     /// Too many triangles for brute force; beyond the device's limits, out of memory.
-    pub fn for_frame(&self, context: &Arc<Context>, tree: Option<&KdTree>, needs: &Needs) -> Result<Self, GpuError> {
+    pub fn for_frame(&self, context: &Arc<Context>, accel: Option<&Accel>, needs: &Needs) -> Result<Self, GpuError> {
         let &Needs { constants, options, n_bounces } = needs;
         self.changed(|next| {
-            if let Some(tree) = tree {
-                next.accel.add_links(context, tree, options.traversal)?;
+            if let Some(accel) = accel {
+                next.accel.add_links(context, accel, options.traversal)?;
             }
             if draws(options) != next.vertex_indices.is_some() {
                 next.vertex_indices = draws(options).then(|| next.make_vertex_indices(context)).transpose()?;

@@ -7,8 +7,8 @@ use bytemuck::Pod;
 use crate::{
     gpu::{AnyBuffer, Binding, Buffer, BufferUse, Context, GpuError, texel_bytes},
     layout::{
-        AccelConstants, BIND_TEXELS, KdBox, KdNode, KdRope, LeafTriangle, Plane, READING_ADDRESS, READING_BOUND,
-        READING_TEXELS, Slab, Triangle, for_scene_arrays,
+        AccelConstants, BIND_TEXELS, GridCell, KdBox, KdNode, KdRope, LeafTriangle, Plane, READING_ADDRESS,
+        READING_BOUND, READING_TEXELS, Slab, Triangle, for_scene_arrays,
     },
 };
 
@@ -107,7 +107,16 @@ macro_rules! declare {
         /// The numbers of the arrays' bindings.
         const NUMBERS: &[u32] = &[$($number),*];
 
-        impl Contents<'_> {
+        impl<'a> Contents<'a> {
+            /// Triangles, room for their materials, and no structure.
+            pub fn of_triangles(triangles: &'a [Triangle]) -> Self {
+                Self {
+                    triangles: Content::Elements(triangles),
+                    triangle_materials: Content::Reserved(triangles.len()),
+                    ..Self { $($name: Content::Reserved(0),)* }
+                }
+            }
+
             fn sizes(&self) -> [Size; NUMBERS.len()] {
                 [$(self.$name.size()),*]
             }

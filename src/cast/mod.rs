@@ -73,7 +73,7 @@ impl Caster {
     /// Beyond the device's limits or memory; too many triangles for brute force.
     pub fn new(context: &Arc<Context>, geometry: Geometry, traversal: Traversal) -> Result<Self, GpuError> {
         let mut buffers = AccelBuffers::new(context, geometry)?;
-        buffers.add_links(context, geometry.tree(), traversal)?;
+        buffers.add_links(context, geometry.accel(), traversal)?;
         let bindings = CastResources::bindings(context, &buffers)?;
         Ok(Self {
             resources: CastResources::new(context, &bindings, &buffers, 0)?,
@@ -218,7 +218,7 @@ pub struct CpuCaster<'a> {
 impl<'a> CpuCaster<'a> {
     /// Makes what the traversal reads beside the tree.
     pub fn new(geometry: Geometry<'a>, traversal: Traversal) -> Self {
-        let links = TraversalLinks::new(geometry.tree(), traversal);
+        let links = TraversalLinks::of(geometry.accel(), traversal);
         Self { geometry, traversal, links, hidden: None }
     }
 
@@ -233,7 +233,7 @@ impl<'a> CpuCaster<'a> {
 
     /// One hit a ray.
     pub fn cast(&self, rays: &[Ray], query: Query) -> Vec<Hit> {
-        let bindings = reference::inputs::KernelInputs::of_tree(self.geometry.triangles(), self.geometry.tree());
+        let bindings = reference::inputs::KernelInputs::of_geometry(self.geometry);
         let bindings = match &self.hidden {
             Some(words) => bindings.with_hidden(words),
             None => bindings,

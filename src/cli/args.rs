@@ -17,7 +17,7 @@ use super::bench::Suite;
 pub use super::view_args::ViewArgs;
 use super::{
     error::CliError,
-    picture_args::{PictureArgs, accel_help, build_help, traversal_help},
+    picture_args::{PictureArgs, accel_help, build_help, check_accel, traversal_help},
     wanted::Wanted,
 };
 
@@ -41,7 +41,7 @@ pub enum Command {
     Cast(CastArgs),
     /// List the Vulkan devices
     Devices,
-    /// Describe a scene and its kd-tree
+    /// Describe a scene and its acceleration structure
     Inspect(InspectArgs),
     #[cfg(feature = "bench")]
     /// Measure whole frames, traversals of the kd-tree, the driver's own ray tracing, or cost against size
@@ -148,6 +148,8 @@ pub struct CastArgs {
 pub struct InspectArgs {
     /// Scene file
     pub scene: PathBuf,
+    #[arg(long, value_name = "KIND", help = accel_help(), default_value_t)]
+    pub accel: AccelKind,
     /// Describe it as JSON
     #[arg(long)]
     pub json: bool,
@@ -181,6 +183,7 @@ impl RenderArgs {
 impl CastArgs {
     /// Refuses words that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
+        check_accel(self.accel, self.traversal, self.build)?;
         if self.output.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("npz")) {
             let path = self.output.display();
             return Err(CliError::Usage(format!("cannot write `{path}`: the name of a file of hits must end in .npz")));

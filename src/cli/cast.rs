@@ -41,10 +41,10 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
 
     let engine = context.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.request());
     let (n_triangles, workload) = (scene.n_triangles(), Workload::of_rays(rays.n_rays()));
-    build::check_memory(engine.tree_kind(n_triangles, &workload).value, n_triangles)?;
-    let building = format!("building the kd-tree of {n_triangles} triangles");
-    let (built, build_ms) = progress.stage(&building, || engine.build(scene, &workload));
-    let Built { world, tree_kind } = built.map_err(GpuError::from)?;
+    let accel = engine.choose_accel(n_triangles, &workload);
+    build::check_memory(accel, n_triangles)?;
+    let (built, build_ms) = progress.stage(&build::building(accel, n_triangles), || engine.build(scene, &workload));
+    let Built { world, accel } = built.map_err(GpuError::from)?;
     let casting = format!("casting {} rays", rays.n_rays());
     let methods = engine.methods(&world, &workload)?;
     let traversal = methods.traversal.value;
@@ -58,11 +58,11 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
         rays: args.rays.clone(),
         hits: args.output.clone(),
         query: if args.any { "any" } else { "closest" },
-        traversal: traversal.to_string(),
-        choices: Choices::of_rays(tree_kind, methods),
+        traversal: accel.tree_kind().map(|_| traversal.to_string()),
+        choices: Choices::of_rays(accel, methods),
         device: engine.device_name(),
         triangles: n_triangles,
-        tree: world.tree().statistics(n_triangles, world.build_options()),
+        accel: world.statistics(),
         n_rays: totals.n_rays,
         n_hits: totals.n_hits,
         n_invalid: totals.n_invalid,

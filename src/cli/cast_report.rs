@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use kdray::{accel::kdtree::Statistics, engine::choices::Choices};
+use kdray::{accel::Statistics, engine::choices::Choices};
 use serde::Serialize;
 
 use super::table::decimal;
@@ -14,12 +14,16 @@ pub struct CastReport {
     pub rays: PathBuf,
     pub hits: PathBuf,
     pub query: &'static str,
-    pub traversal: String,
+    /// None for grids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub traversal: Option<String>,
     /// What the user left open, and why it is so.
     pub choices: Choices,
     pub device: String,
     pub triangles: usize,
-    pub tree: Statistics,
+    /// As `tree` or `grid`.
+    #[serde(flatten)]
+    pub accel: Statistics,
     pub n_rays: u64,
     pub n_hits: u64,
     /// Rays that can only miss: with a NaN, an infinite origin or direction, or a direction of zero or so short that
@@ -70,11 +74,12 @@ impl CastReport {
         let times = self.times.as_ref().map_or_else(|| "no timestamps".to_owned(), Times::text);
         let invalid = if *n_invalid > 0 { format!(", {n_invalid} invalid") } else { String::new() };
         format!(
-            "{scene}: {triangles} triangles, loaded in {load_ms:.0} ms, kd-tree built in {build_ms:.0} ms\n\
+            "{scene}: {triangles} triangles, loaded in {load_ms:.0} ms, {} built in {build_ms:.0} ms\n\
              {choices}\n\
              {device}: {times}\n\
              {n_rays} rays, {n_hits} hits{invalid}\n\
              wrote {}\n",
+            self.accel.kind().name(),
             self.hits.display()
         )
     }

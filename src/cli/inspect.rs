@@ -1,38 +1,46 @@
-//! `kdray inspect`: what a scene holds, and its kd-tree in numbers.
+//! `kdray inspect`: what a scene holds, and its acceleration structure in numbers.
 
 use kdray::{
-    accel::kdtree::{KdTree, Statistics},
-    engine::choices::{Processor, TreeKind},
+    accel::Statistics,
+    engine::choices::{BuildPolicy, Processor, Request, Workload},
     gpu::GpuError,
     layout::{LIGHT_DIRECTIONAL, Light},
     scene::Scene,
-    world::FlatScene,
+    world::{FlatScene, Mismatch, World},
 };
 use serde::Serialize;
 
 use super::{args::InspectArgs, build, error::CliError, print, print_raw, progress::Progress, table::table};
 
-/// Loads the scene, builds its tree, describes both.
+/// Loads the scene, builds its structure, describes both.
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let progress = Progress::new(false, 2);
     let (scene, load_ms) = progress.stage(&format!("loading {}", args.scene.display()), || Scene::load(&args.scene));
     let scene = FlatScene::new(&scene?).map_err(GpuError::from)?;
     let n_triangles = scene.triangles.len();
-    let building = format!("building the kd-tree of {n_triangles} triangles");
-    let options = TreeKind::Best.options(Processor::Gpu);
-    build::check_memory(TreeKind::Best, n_triangles)?;
-    let (tree, build_ms) = progress.stage(&building, || KdTree::build(&scene.triangles, &options));
+    let request = Request { accel: args.accel, build: BuildPolicy::Best, ..Request::default() };
+    let accel = request.choose_accel(Processor::Gpu, n_triangles, &Workload::of_rays(0));
+    build::check_memory(accel, n_triangles)?;
+    let options = accel.options(Processor::Gpu);
+    let build = || {
+        let world = World::with_accel(scene, &options)?;
+        let statistics = world.statistics(); // builds a grid
+        Ok::<_, Mismatch>((world, statistics))
+    };
+    let (built, build_ms) = progress.stage(&build::building(accel, n_triangles), build);
+    let (world, statistics) = built.map_err(GpuError::from)?;
+    let scene = world.scene();
     drop(progress);
 
     let inspection = Inspection {
         triangles: n_triangles,
-        bounds: [tree.cell_min().to_array(), tree.cell_max().to_array()],
-        materials: material_uses(&scene),
+        bounds: world.bounds().map(|corner| corner.to_array()),
+        materials: material_uses(scene),
         lights: scene.lights.iter().map(LightUse::from).collect(),
-        tree: tree.statistics(n_triangles, &options),
+        accel: statistics,
         load_ms,
         build_ms,
-        scene: scene.name,
+        scene: scene.name.clone(),
     };
     if args.json {
         let json = serde_json::to_string_pretty(&inspection).expect("plain structs of numbers and words");
@@ -50,7 +58,9 @@ struct Inspection {
     bounds: [[f32; 3]; 2],
     materials: Vec<MaterialUse>,
     lights: Vec<LightUse>,
-    tree: Statistics,
+    /// As `tree` or `grid`.
+    #[serde(flatten)]
+    accel: Statistics,
     load_ms: f64,
     build_ms: f64,
 }
@@ -102,25 +112,16 @@ impl Inspection {
             .collect();
         text += &table(["light", "position or direction", "intensity"], &lights);
         text.push('\n');
-        text += &self.tree_text();
+        text += &self.accel_text();
         text
     }
 
-    fn tree_text(&self) -> String {
-        let tree = &self.tree;
-        let rows = [
-            ["nodes".to_owned(), tree.n_nodes.to_string()],
-            ["leaves".to_owned(), tree.n_leaves.to_string()],
-            ["empty leaves".to_owned(), tree.n_empty_leaves.to_string()],
-            ["slabs".to_owned(), tree.n_slabs.to_string()],
-            ["depth".to_owned(), tree.depth.to_string()],
-            ["references".to_owned(), tree.n_references.to_string()],
-            ["references a triangle".to_owned(), format!("{:.2}", tree.references_per_triangle)],
-            ["SAH cost".to_owned(), format!("{:.2}", tree.sah_cost)],
-            ["bytes".to_owned(), tree.bytes.to_string()],
-            ["build ms".to_owned(), format!("{:.1}", self.build_ms)],
-        ];
-        table(["kd-tree", ""], &rows)
+    fn accel_text(&self) -> String {
+        let bytes = ("bytes", self.accel.bytes().to_string());
+        let build_ms = ("build ms", format!("{:.1}", self.build_ms));
+        let rows = self.accel.rows().into_iter().chain([bytes, build_ms]);
+        let rows: Vec<_> = rows.map(|(name, value)| [name.to_owned(), value]).collect();
+        table([self.accel.kind().name(), ""], &rows)
     }
 }
 

@@ -49,6 +49,25 @@ pub fn accel_help() -> String {
     format!("The acceleration structure that leads rays to triangles: {}", AccelKind::words())
 }
 
+/// Refuses words about kd-trees where a grid is asked for.
+pub fn check_accel(accel: AccelKind, traversal: Wanted<Traversal>, build: BuildPolicy) -> Result<(), CliError> {
+    if accel == AccelKind::KdTree {
+        return Ok(());
+    }
+    if traversal.pinned().is_some() {
+        return Err(CliError::Usage(format!(
+            "--traversal names an algorithm for the kd-tree: with --accel {accel}, rays go through a grid, for which there \
+             is one algorithm"
+        )));
+    }
+    if build != BuildPolicy::Auto {
+        return Err(CliError::Usage(format!(
+            "--build says how much work goes into the kd-tree: with --accel {accel}, a grid is built"
+        )));
+    }
+    Ok(())
+}
+
 /// The help of `--traversal`.
 pub fn traversal_help() -> String {
     let (words, of_devices, of_cpu) = (Traversal::words(), traversals_of_devices(), Traversal::OF_CPU);
@@ -75,6 +94,7 @@ pub fn traversals_of_devices() -> String {
 impl PictureArgs {
     /// Refuses words that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
+        check_accel(self.accel, self.traversal, self.build)?;
         if matches!(self.denoise, Some(DenoiseWord::Off)) && self.denoise_threshold.is_some() {
             return Err(CliError::Usage("--denoise-threshold has no meaning with --denoise off".into()));
         }

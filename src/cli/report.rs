@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use kdray::{
-    accel::kdtree::Statistics,
+    accel::Statistics,
     engine::choices::Choices,
     frame::{Denoise, PassTime, Profile, RenderOptions},
 };
@@ -25,7 +25,9 @@ pub struct Report {
     /// A pixel.
     pub samples: u32,
     pub triangles: usize,
-    pub tree: Statistics,
+    /// As `tree` or `grid`.
+    #[serde(flatten)]
+    pub accel: Statistics,
     pub load_ms: f64,
     pub build_ms: f64,
     /// From the finished tree to the picture in memory: uploading, compiling and copying back included.
@@ -198,12 +200,8 @@ impl Report {
         let Options { width, height, crop, .. } = &self.options;
         let crop = crop.as_ref().map(|crop| format!(" ({crop} of it)")).unwrap_or_default();
         let samples = if self.samples > 1 { format!(", {} samples a pixel,", self.samples) } else { String::new() };
-        let tree = &self.tree;
         let mut text = format!("{}: {} triangles, loaded in {:.0} ms\n", self.scene, self.triangles, self.load_ms);
-        text += &format!(
-            "kd-tree: {} nodes, depth {}, {:.2} references a triangle, built in {:.0} ms\n",
-            tree.n_nodes, tree.depth, tree.references_per_triangle, self.build_ms
-        );
+        text += &format!("{}, built in {:.0} ms\n", self.accel, self.build_ms);
         text += &format!(
             "{width}x{height}{crop}{samples} on {}: picture after {:.0} ms\n{}\n\n",
             self.frame.device, self.render_ms, self.choices

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use kdray::{
-    engine::choices::{Processor, TreeKind, Workload},
+    engine::choices::{Processor, Workload},
     frame::View,
     gpu::{ContextOptions, chosen_device},
     output::{self, Format, OutputError},
@@ -37,7 +37,6 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     let scene = scene?;
     scene.warn_if_unlit(&args.scene);
     let options = args.picture.options(&scene);
-    build::check_memory(TreeKind::Best, scene.n_triangles())?;
     let tour = tour(args, scene.camera)?;
     let max_samples = args.spp.unwrap_or(if tour.is_some() { 1 } else { SAMPLES_AT_REST });
     let workload = match &tour {
@@ -49,7 +48,9 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     };
     let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
     let load_options = LoadOptions { request: args.picture.request(), processor, workload };
-    let building = format!("building the kd-tree of {} triangles", scene.n_triangles());
+    let accel = load_options.request.choose_accel(processor, scene.n_triangles(), &workload);
+    build::check_memory(accel, scene.n_triangles())?;
+    let building = build::building(accel, scene.n_triangles());
     let (loaded, _) = progress.stage(&building, || Loaded::with_tree(&args.scene, scene, load_options));
     drop(progress);
 

@@ -78,7 +78,7 @@ impl Renderer {
             world: world.clone(),
             options: options.clone(),
             batching,
-            links: TraversalLinks::new(world.tree(), options.traversal),
+            links: TraversalLinks::of(world.accel(), options.traversal),
             frame,
             triangle_ids: vec![0; n_pixels],
             pixel_radiance: vec![[0.0; 4]; n_pixels],
@@ -216,7 +216,7 @@ impl Renderer {
     }
 
     fn visibility(&mut self) {
-        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let (traversal, ids) = (self.options.traversal, &mut self.triangle_ids);
         self.clock.time(Pass::Visibility, None, || super::visibility(&inputs, traversal, ids));
     }
@@ -232,7 +232,7 @@ impl Renderer {
 
     /// Fills the bounce's `hits`, and counts them.
     fn closest_hits(&mut self, pass: Pass, depth: u32) {
-        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, .. } = &mut self.queue;
         hits.resize(rays.len(), Hit::zeroed());
         let places = bounces[depth as usize].rays();
@@ -247,14 +247,14 @@ impl Renderer {
 
     /// What primary rays meet.
     fn note_features(&mut self) {
-        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let (Queue { rays, hits, .. }, pixels) = (&self.queue, &mut self.pixel_features);
         self.clock.time(Pass::Features, Some(0), || features::features(&inputs, rays, hits, pixels));
     }
 
     /// What the rays of all bounces cost.
     fn note_costs(&mut self) {
-        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let (traversal, pixels) = (self.options.traversal, &mut self.pixel_features);
         let Queue { rays, bounces, hits, .. } = &self.queue;
         let n_rasterized = if self.options.primary != Primary::Trace { bounces[0].n_rays as usize } else { 0 };
@@ -266,7 +266,7 @@ impl Renderer {
 
     /// Finds out which rays go on from the bounce's hits, and counts them.
     fn compact_reduce(&mut self, depth: u32) {
-        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, child_kinds, scan_blocks, .. } = &mut self.queue;
         let places = bounces[depth as usize].rays();
         child_kinds.resize(rays.len(), 0);
@@ -288,7 +288,7 @@ impl Renderer {
 
     /// Writes the next bounce's rays behind this one's, if there is room for them.
     fn compact_scatter(&mut self, depth: u32) {
-        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, child_kinds, first_children, scan_blocks, .. } = &mut self.queue;
         let (this, next) = (bounces[depth as usize], bounces[depth as usize + 1]);
         if next.overflow != 0 {
@@ -308,7 +308,7 @@ impl Renderer {
     /// Tests the shadow segments of all bounces, and counts them.
     fn shadow(&mut self) {
         self.frame.queue_capacity = self.queue.rays.len() as u32;
-        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, light_visibility, .. } = &mut self.queue;
         let traversal = self.options.traversal;
         light_visibility.resize(rays.len() * inputs.lights.len(), 0);
@@ -321,7 +321,7 @@ impl Renderer {
 
     fn shade(&mut self) {
         self.frame.queue_capacity = self.queue.rays.len() as u32;
-        let inputs = KernelInputs::new(self.world.scene(), self.world.tree(), &self.frame).with_links(&self.links);
+        let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let Queue { rays, hits, ray_radiance, light_visibility, .. } = &mut self.queue;
         ray_radiance.resize(rays.len(), [0.0; 4]);
         let lit = LitRays { rays, hits, light_visibility };

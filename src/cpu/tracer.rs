@@ -1,4 +1,4 @@
-//! The engine's tracer: with a stack, rays of one octant go through the tree as packets; by any other algorithm, one
+//! The engine's tracer: with a stack, rays of one octant go through the tree as packets; by any other algorithm, or through a grid, one
 //! after the other.
 
 use fearless_simd::Level;
@@ -22,19 +22,19 @@ use crate::{
 /// A thread's tracer.
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
 pub enum FastTracer {
-    /// [`Traversal::Stack`].
+    /// [`Traversal::Stack`], through a kd-tree.
     Packets(PacketTraverser),
-    /// All other algorithms.
+    /// All other algorithms, and grids.
     Single(Traverser),
 }
 
 impl FastTracer {
     /// Uses the instructions of a level, which the machine must have. The hits are the same at every level, bit for
     /// bit.
-    pub fn at_level(traversal: Traversal, level: Level) -> Self {
+    pub fn at_level(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal, level: Level) -> Self {
         match traversal {
-            Traversal::Stack => Self::Packets(PacketTraverser::new(level)),
-            other => Self::Single(Traverser::new(other)),
+            Traversal::Stack if inputs.lattice.is_none() => Self::Packets(PacketTraverser::new(level)),
+            other => Self::Single(Traverser::new(inputs, other)),
         }
     }
 
@@ -51,8 +51,8 @@ impl FastTracer {
 }
 
 impl Tracer for FastTracer {
-    fn new(traversal: Traversal) -> Self {
-        Self::at_level(traversal, Level::new())
+    fn new(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal) -> Self {
+        Self::at_level(inputs, traversal, Level::new())
     }
 
     #[inline]

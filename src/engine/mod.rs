@@ -12,13 +12,13 @@ mod renderer;
 
 use std::sync::Arc;
 
-use self::choices::{Cache, Chosen, Methods, Processor, Request, TreeKind, Workload};
+use self::choices::{Cache, ChosenAccel, Methods, Processor, Request, Workload};
 pub use self::{
     caster::Caster,
     renderer::{Rendered, Renderer},
 };
 use crate::{
-    accel::{AccelKind, Query, kdtree::Traversal},
+    accel::{Query, kdtree::Traversal},
     cast::{Hit, Ray},
     frame::RenderOptions,
     gpu::{Context, ContextOptions, GpuError},
@@ -35,13 +35,13 @@ pub struct Engine {
     cache: Cache,
 }
 
-/// A world, and which tree was chosen for it.
+/// A world, and which acceleration structure was chosen for it.
 #[derive(Clone, Debug)]
 pub struct Built {
-    /// The scene with its tree.
+    /// The scene with its acceleration structure.
     pub world: World,
-    /// The tree's kind, and why it was chosen.
-    pub tree_kind: Chosen<TreeKind>,
+    /// The structure, and for a kd-tree why it was chosen.
+    pub accel: ChosenAccel,
 }
 
 impl Engine {
@@ -87,19 +87,19 @@ impl Engine {
         }
     }
 
-    /// Chooses the tree for so many triangles: the one with which building and the workload take the least time
-    /// together.
-    pub fn tree_kind(&self, n_triangles: usize, workload: &Workload) -> Chosen<TreeKind> {
-        self.request.tree(self.processor(), n_triangles, workload)
+    /// Chooses the acceleration structure for so many triangles. Of kd-trees it takes the one with which building and the
+    /// workload take the least time together.
+    pub fn choose_accel(&self, n_triangles: usize, workload: &Workload) -> ChosenAccel {
+        self.request.choose_accel(self.processor(), n_triangles, workload)
     }
 
-    /// Chooses a tree for the workload and builds it on the current rayon pool.
+    /// Chooses an acceleration structure for the workload and builds it on the current rayon pool.
     ///
     /// # Errors
     /// The scene does not fit together: see [`Mismatch`].
     pub fn build(&self, scene: Scene, workload: &Workload) -> Result<Built, Mismatch> {
         let flat = FlatScene::new(&scene)?;
-        // The tree needs the memory.
+        // The structure needs the memory.
         drop(scene);
         self.build_flat(flat, workload)
     }
@@ -109,11 +109,9 @@ impl Engine {
     /// # Errors
     /// The scene has a triangle without a material.
     pub fn build_flat(&self, scene: FlatScene, workload: &Workload) -> Result<Built, Mismatch> {
-        let tree_kind = self.tree_kind(scene.triangles.len(), workload);
-        let world = match self.request.accel {
-            AccelKind::KdTree => World::of_flat(scene, &tree_kind.value.options(self.processor()))?,
-        };
-        Ok(Built { world, tree_kind })
+        let accel = self.choose_accel(scene.triangles.len(), workload);
+        let world = World::with_accel(scene, &accel.options(self.processor()))?;
+        Ok(Built { world, accel })
     }
 
     /// Chooses how to trace. A workload that is large enough pays for a short measurement, whose result is kept in the

@@ -4,8 +4,8 @@ use super::resource::{
     Resource,
     Resource::{
         Bounces, ChildKinds, Counters, FirstChildren, Hits, LargeTriangles, LightVisibility, PixelAccumulated,
-        PixelDisplay, PixelFeatures, PixelFiltered, PixelNearest, PixelRadiance, RasterCount, RasterGroups,
-        RayRadiance, Rays, ScanBlocks, Stalls, TriangleIds,
+        PixelDisplay, PixelFeatures, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups, RayRadiance, Rays,
+        ScanBlocks, Stalls, TriangleIds,
     },
 };
 
@@ -105,8 +105,8 @@ const TABLE: [Info; 16] = [
         role: Role::PrimaryVisibility,
         scope: Scope::Frame,
         color: [110, 225, 235],
-        reads: &[PixelNearest, LargeTriangles, RasterCount, RasterGroups],
-        writes: &[PixelNearest, LargeTriangles, RasterCount, RasterGroups],
+        reads: &[PixelNearest, LargeTriangles, RasterGroups],
+        writes: &[PixelNearest, LargeTriangles, RasterGroups],
         indirect: None,
     },
     Info {
@@ -115,8 +115,8 @@ const TABLE: [Info; 16] = [
         role: Role::PrimaryVisibility,
         scope: Scope::Frame,
         color: [60, 160, 170],
-        reads: &[PixelNearest, LargeTriangles, RasterCount],
-        writes: &[PixelNearest, LargeTriangles, RasterCount],
+        reads: &[PixelNearest, LargeTriangles, RasterGroups],
+        writes: &[PixelNearest, LargeTriangles, RasterGroups],
         indirect: Some(RasterGroups),
     },
     Info {

@@ -7,8 +7,7 @@ use super::{
         Resource,
         Resource::{
             Bounces, ChildKinds, Counters, FirstChildren, Hits, LargeTriangles, LightVisibility, PixelAccumulated,
-            PixelFeatures, PixelFiltered, PixelNearest, PixelRadiance, RasterCount, RasterGroups, RayRadiance, Rays,
-            ScanBlocks,
+            PixelFeatures, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups, RayRadiance, Rays, ScanBlocks,
         },
     },
     {Denoise, Primary, RenderOptions},
@@ -130,7 +129,7 @@ pub fn visibility(primary: Primary) -> Section {
         Primary::Raster => vec![Step::Run(Pass::Visibility)], // which leaves triangle_ids ready for kernels
         Primary::Compute => vec![
             Step::Run(Pass::RasterizeTriangles),
-            barrier(Touch::Write, Touch::Update, &[PixelNearest, LargeTriangles, RasterCount]),
+            barrier(Touch::Write, Touch::Update, &[PixelNearest, LargeTriangles, RasterGroups]),
             barrier(Touch::Write, Touch::Indirect, &[RasterGroups]),
             Step::Run(Pass::RasterizeBlocks),
             barrier(Touch::Write, Touch::Read, &[PixelNearest]),

@@ -35,10 +35,8 @@ pub enum Resource {
     TriangleIds,
     /// The triangle and the distance that the kernels which rasterize found in each pixel.
     PixelNearest,
-    /// The dispatch of `RasterizeBlocks`.
+    /// The dispatch of `RasterizeBlocks`, and the numbers of large triangles and of their blocks.
     RasterGroups,
-    /// The numbers of large triangles and of their blocks.
-    RasterCount,
     /// Triangles that cover many pixels.
     LargeTriangles,
     /// Numbers of hits and of shadow segments of each bounce.
@@ -49,7 +47,7 @@ pub enum Resource {
 
 impl Resource {
     /// Every resource.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 19] = [
         Self::Rays,
         Self::Hits,
         Self::ChildKinds,
@@ -66,7 +64,6 @@ impl Resource {
         Self::TriangleIds,
         Self::PixelNearest,
         Self::RasterGroups,
-        Self::RasterCount,
         Self::LargeTriangles,
         Self::Counters,
         Self::Stalls,
@@ -91,7 +88,6 @@ impl Resource {
             Self::TriangleIds => layout::BIND_TRIANGLE_IDS,
             Self::PixelNearest => layout::BIND_PIXEL_NEAREST,
             Self::RasterGroups => layout::BIND_RASTER_GROUPS,
-            Self::RasterCount => layout::BIND_RASTER_COUNT,
             Self::LargeTriangles => layout::BIND_LARGE_TRIANGLES,
             Self::Counters => layout::BIND_COUNTERS,
             Self::Stalls => layout::BIND_STALLS,

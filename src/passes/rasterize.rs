@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::{kernel, spirv};
 use crate::{
-    buffers::Resources,
+    buffers::{RasterState, Resources},
     gpu::{Access, BindingLayout, Commands, ComputePipeline, Constants, Context, Dispatch, GpuError},
     layout::{Frame, RASTER_GROUPS_X, RAY_GROUP_SIZE, RasterGroups, RasterPush, constants},
 };
@@ -32,14 +32,13 @@ impl Rasterize {
         })
     }
 
-    /// Leaves raster_groups and raster_count as `record` needs them, by transfers.
+    /// Leaves raster_groups as `record` needs it, by a transfer.
     pub fn reset(commands: &Commands, resources: &Resources) {
-        let none = RasterGroups { x: RASTER_GROUPS_X, y: 0, z: 1, reserved: 0 };
-        commands.update_buffer(resources.raster.groups.any(), &none);
-        commands.update_buffer(resources.raster.count.any(), &0u64);
+        let groups = RasterGroups { x: RASTER_GROUPS_X, y: 0, z: 1, reserved: 0 };
+        commands.update_buffer(resources.raster.groups.any(), &RasterState { groups, count: 0 });
     }
 
-    /// Needs what `reset` leaves. Leaves small triangles in pixel_nearest; large_triangles, raster_count, raster_groups.
+    /// Needs what `reset` leaves. Leaves small triangles in pixel_nearest; large_triangles, raster_groups.
     pub fn triangles(&self, commands: &Commands, resources: &Resources) {
         let (pixels, constants) = (&resources.pixels, resources.constants());
         let push = RasterPush { block_log2: block_log2(constants) };

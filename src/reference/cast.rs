@@ -75,7 +75,7 @@ pub fn cast(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[R
 /// Does what [`cast`] does, by another tracer.
 pub fn cast_by<T: Tracer>(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
     rays.par_chunks(RAYS_PER_TASK).zip(hits.par_chunks_mut(RAYS_PER_TASK)).for_each_init(
-        || T::new(traversal),
+        || T::new(inputs, traversal),
         |traverser, (rays, hits)| match query {
             Query::Closest => cast_all::<false>(inputs, traverser, rays, hits),
             Query::Any => cast_all::<true>(inputs, traverser, rays, hits),

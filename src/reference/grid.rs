@@ -13,7 +13,10 @@ use super::{
     leaf::intersect_entries,
     traversal_ray::{TraversalRay, min},
 };
-use crate::{accel::grid::Lattice, layout::Hit};
+use crate::{
+    accel::grid::Lattice,
+    layout::{GridCell, Hit},
+};
 
 /// A ray's way through the cubes of a lattice: the cube that it is in, and where it leaves that by each axis, in t.
 struct Walk<'a> {
@@ -136,25 +139,21 @@ pub fn search_grid<const ANY_HIT: bool>(inputs: &KernelInputs<impl ReadCounter>,
         return;
     }
     let lattice = inputs.lattice.expect("a grid");
-    let mut visit_leaf = |cell_ix: u32, [t_enter, t_leave]: [f32; 2]| {
-        let cell = inputs.grid_cells[cell_ix as usize];
+    let mut visit_leaf = |cell: GridCell, [t_enter, t_leave]: [f32; 2]| {
         if cell.count > 0 {
             let entries = cell.first as usize..(cell.first + cell.count) as usize;
             intersect_entries(inputs, ray, entries, [t_enter, min(t_leave, best.t)], best);
         }
         is_done::<ANY_HIT>(best) || best.t < t_leave
     };
-    let way = [ray.t_enter, ray.t_exit];
-    if inputs.n_grid_levels == 1 {
-        walk(lattice, ray, way, visit_leaf);
-        return;
-    }
-    walk(lattice, ray, way, |cell_ix, way| {
-        let block = inputs.grid_cells[cell_ix as usize];
-        if block.count == 0 {
-            return visit_leaf(cell_ix, way);
+    // A box whose corners are near the largest number may have an exit at infinity, which no border's exit may be.
+    let way = [ray.t_enter, min(ray.t_exit, f32::MAX)];
+    walk(lattice, ray, way, |place, way| {
+        let cell = inputs.grid_cells[place as usize];
+        if inputs.n_grid_levels == 1 || cell.count == 0 {
+            return visit_leaf(cell, way);
         }
-        let cubes = lattice.within(lattice.cube_at(cell_ix), block.count);
-        walk(&cubes, ray, way, |place, way| visit_leaf(block.first + place, way))
+        let block = lattice.within(lattice.cube_at(place), cell.count);
+        walk(&block, ray, way, |place, way| visit_leaf(inputs.grid_cells[(cell.first + place) as usize], way))
     });
 }

@@ -5,11 +5,12 @@ use glam::Vec3;
 use super::counting::table::{Counted, CountedSlice, NoCounter, ReadCounts};
 use crate::{
     accel::{
-        grid::{Grid, GridCell, Lattice},
+        Accel,
+        grid::{Grid, Lattice},
         kdtree::{KdTree, TraversalLinks},
     },
-    layout::{Frame, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN, Triangle},
-    world::FlatScene,
+    layout::{Frame, GridCell, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN, Triangle},
+    world::{Geometry, World},
 };
 
 /// The scene, its tree and the frame's constants. `R`: who is told of reads of the tree.
@@ -65,43 +66,53 @@ impl<'a, R> KernelInputs<'a, R> {
 }
 
 impl<'a> KernelInputs<'a> {
-    pub fn new(scene: &'a FlatScene, tree: &'a KdTree, frame: &'a Frame) -> Self {
+    /// What a frame's kernels read.
+    pub fn new(world: &'a World, frame: &'a Frame) -> Self {
+        let scene = world.scene();
         Self {
             triangle_materials: &scene.triangle_materials,
             materials: &scene.materials,
             lights: &scene.lights,
             frame: Some(frame),
-            ..Self::of_tree(&scene.triangles, tree)
+            ..Self::of_geometry(world.geometry())
         }
     }
 
-    /// What the traversal reads, without materials and lights.
+    /// What a search reads, without materials and lights. The host builds the grid, unless it has done so already.
+    pub fn of_geometry(geometry: Geometry<'a>) -> Self {
+        let triangles = geometry.triangles();
+        match geometry.accel() {
+            Accel::KdTree(tree) => Self::of_tree(triangles, tree),
+            Accel::Grid(grid) => Self::of_grid(triangles, grid.get(triangles)),
+        }
+    }
+
+    /// What the traversal of a kd-tree reads, without materials and lights.
     pub fn of_tree(triangles: &'a [Triangle], tree: &'a KdTree) -> Self {
         Self {
-            frame: None,
-            cell_min: tree.cell_min(),
-            cell_max: tree.cell_max(),
-            triangles,
-            triangle_materials: &[],
-            filters: false,
-            materials: &[],
-            lights: &[],
             kd_nodes: CountedSlice::from(tree.nodes()),
             kd_parents: CountedSlice::from(tree.parents()),
             leaf_triangles: CountedSlice::from(tree.leaf_triangles()),
             leaf_planes: tree.leaf_planes(),
             kd_slabs: CountedSlice::from(tree.slabs()),
-            kd_boxes: CountedSlice::from(&[][..]),
-            kd_ropes: CountedSlice::from(&[][..]),
-            lattice: None,
-            grid_cells: CountedSlice::from(&[][..]),
-            n_grid_levels: 0,
+            ..Self::without_accel(triangles, [tree.cell_min(), tree.cell_max()])
         }
     }
 
     /// What the search through a grid reads, without materials and lights.
     pub fn of_grid(triangles: &'a [Triangle], grid: &'a Grid) -> Self {
-        let [cell_min, cell_max] = grid.bounds();
+        Self {
+            leaf_triangles: CountedSlice::from(grid.leaf_triangles()),
+            leaf_planes: grid.leaf_planes(),
+            lattice: Some(grid.lattice()),
+            grid_cells: CountedSlice::from(grid.cells()),
+            n_grid_levels: grid.n_levels(),
+            ..Self::without_accel(triangles, grid.bounds())
+        }
+    }
+
+    /// Triangles with the box that holds them, and nothing else.
+    fn without_accel(triangles: &'a [Triangle], [cell_min, cell_max]: [Vec3; 2]) -> Self {
         Self {
             frame: None,
             cell_min,
@@ -113,14 +124,14 @@ impl<'a> KernelInputs<'a> {
             lights: &[],
             kd_nodes: CountedSlice::from(&[][..]),
             kd_parents: CountedSlice::from(&[][..]),
-            leaf_triangles: CountedSlice::from(grid.leaf_triangles()),
-            leaf_planes: grid.leaf_planes(),
+            leaf_triangles: CountedSlice::from(&[][..]),
+            leaf_planes: &[],
             kd_slabs: CountedSlice::from(&[][..]),
             kd_boxes: CountedSlice::from(&[][..]),
             kd_ropes: CountedSlice::from(&[][..]),
-            lattice: Some(grid.lattice()),
-            grid_cells: CountedSlice::from(grid.cells()),
-            n_grid_levels: grid.n_levels(),
+            lattice: None,
+            grid_cells: CountedSlice::from(&[][..]),
+            n_grid_levels: 0,
         }
     }
 

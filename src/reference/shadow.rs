@@ -73,7 +73,7 @@ pub fn shadow_by<T: Tracer>(
         rays.par_chunks(RAYS_PER_TASK)
             .zip(hits.par_chunks(RAYS_PER_TASK))
             .zip(visibility[places.clone()].par_chunks_mut(RAYS_PER_TASK))
-            .map_init(|| T::new(traversal), of_task)
+            .map_init(|| T::new(inputs, traversal), of_task)
             .sum()
     };
     let stride = inputs.frame().queue_capacity as usize;

@@ -23,7 +23,7 @@ pub fn trace_by<T: Tracer>(inputs: &KernelInputs, traversal: Traversal, rays: &[
     rays.par_chunks(RAYS_PER_TASK)
         .zip(hits.par_chunks_mut(RAYS_PER_TASK))
         .map_init(
-            || T::new(traversal),
+            || T::new(inputs, traversal),
             |traverser, (rays, hits)| {
                 let mut n_hits = 0;
                 let probes = rays.iter().map(SearchRay::from);

@@ -1,8 +1,9 @@
-//! The algorithms that take rays through the tree, behind one interface: one ray after the other.
+//! The algorithms that take rays through a kd-tree, and the search through a grid, behind one interface: one ray after the other.
 
 use super::{
     brute,
     counting::table::ReadCounter,
+    grid::search_grid,
     inputs::KernelInputs,
     kdtree::{Pending, search},
     pending_backtrack::PendingBacktrack,
@@ -21,8 +22,8 @@ use crate::{
 
 /// What finds the hits of many rays; each thread has one of its own.
 pub trait Tracer {
-    /// A tracer by an algorithm.
-    fn new(traversal: Traversal) -> Self;
+    /// A tracer through the structure of the inputs; through a kd-tree by an algorithm.
+    fn new(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal) -> Self;
 
     /// Tells `found` each ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest, in
     /// any order. A miss keeps t = t_max.
@@ -44,6 +45,7 @@ pub enum Traverser {
     Ropes,
     Stack(PendingStack),
     Brute,
+    Grid,
 }
 
 impl Traverser {
@@ -60,6 +62,7 @@ impl Traverser {
                 Self::Backtrack(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
                 Self::ShortStack(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
                 Self::Stack(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
+                Self::Grid => search_grid::<ANY_HIT>(inputs, ray, best),
                 Self::Ropes => follow_ropes::<ANY_HIT>(inputs, ray, best),
                 Self::Brute => {
                     *best = brute::closest_hit_of(inputs.triangles, near, |ix| inputs.is_accepted(ix));
@@ -70,8 +73,9 @@ impl Traverser {
 }
 
 impl Tracer for Traverser {
-    fn new(traversal: Traversal) -> Self {
+    fn new(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal) -> Self {
         match traversal {
+            _ if inputs.lattice.is_some() => Self::Grid,
             Traversal::Mask => Self::Mask(Pending::new()),
             Traversal::MaskBoxes => Self::MaskBoxes(Pending::new()),
             Traversal::Restart => Self::Restart(Pending::new()),

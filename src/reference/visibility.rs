@@ -21,7 +21,7 @@ pub fn visibility(inputs: &KernelInputs, traversal: Traversal, triangle_ids: &mu
 pub fn visibility_by<T: Tracer>(inputs: &KernelInputs, traversal: Traversal, triangle_ids: &mut [u32]) {
     let width = inputs.frame().width;
     triangle_ids.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each_init(
-        || T::new(traversal),
+        || T::new(inputs, traversal),
         |traverser, (task, ids)| {
             let probes = (task * RAYS_PER_TASK..).map(|pixel_ix| {
                 let pixel = glam::uvec2(pixel_ix as u32 % width, pixel_ix as u32 / width);

@@ -300,7 +300,7 @@ impl Renderer {
         if self.options.primary == Primary::Compute {
             Rasterize::reset(commands, &self.resources);
         }
-        // bounces, counters, pixel_features, raster_groups, raster_count
+        // bounces, counters, pixel_features, raster_groups
         commands.barrier(Access::TransferWrite, Access::AllReads);
         self.record_section(commands, visibility, &Batch::default());
     }

@@ -109,8 +109,8 @@ impl Renderer {
         let spans = self.budget.spans(&constants, self.most_pixels);
         let schedule = Schedule::new(&self.context, &constants, spans, options)?;
         let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
-        let tree = (self.options.traversal != options.traversal).then(|| self.world.tree());
-        Ok((self.resources.for_frame(&self.context, tree, &needs)?, schedule))
+        let accel = (self.options.traversal != options.traversal).then(|| self.world.accel());
+        Ok((self.resources.for_frame(&self.context, accel, &needs)?, schedule))
     }
 }
 

@@ -51,7 +51,7 @@ impl Live {
         let overlay = Overlay::new(&context, &presenter)?;
         let renderer = Renderer::new(context.clone(), &loaded.world, &options)?;
         let present = Present::new(&context, renderer.resources(), &presenter)?;
-        let choices = Choices::of_pictures(loaded.tree_kind, methods);
+        let choices = Choices::of_pictures(loaded.accel, methods);
         Ok(Self { renderer, choices, present, overlay, presenter, context })
     }
 

@@ -8,8 +8,8 @@ use std::{
 use glam::Vec3;
 
 use crate::{
-    accel::kdtree::Statistics,
-    engine::choices::{Chosen, Processor, Request, TreeKind, Workload},
+    accel::Statistics,
+    engine::choices::{ChosenAccel, Processor, Request, Workload},
     scene::{Scene, SceneError},
     world::{FlatScene, World},
 };
@@ -26,7 +26,7 @@ pub struct LoadOptions {
 pub struct Loaded {
     pub path: PathBuf,
     pub world: World,
-    pub tree_kind: Chosen<TreeKind>,
+    pub accel: ChosenAccel,
     pub load_options: LoadOptions,
     pub statistics: Statistics,
     pub build_ms: f64,
@@ -47,16 +47,15 @@ impl Loaded {
     /// The scene has a triangle without a material, which no loaded scene has.
     pub fn with_tree(path: &Path, scene: Scene, load_options: LoadOptions) -> Self {
         let LoadOptions { request, processor, workload } = load_options;
-        let tree_kind = request.tree(processor, scene.n_triangles(), &workload);
-        let build_options = tree_kind.value.options(processor);
+        let accel = request.choose_accel(processor, scene.n_triangles(), &workload);
         let flat = FlatScene::new(&scene).expect("a loaded scene fits together");
-        // The tree needs the memory.
+        // The structure needs the memory.
         drop(scene);
         let start = Instant::now();
-        let world = World::of_flat(flat, &build_options).expect("a material for each triangle");
+        let world = World::with_accel(flat, &accel.options(processor)).expect("a material for each triangle");
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
-        let statistics = world.tree().statistics(world.scene().triangles.len(), &build_options);
-        Self { path: path.to_owned(), world, tree_kind, load_options, statistics, build_ms }
+        let statistics = world.statistics();
+        Self { path: path.to_owned(), world, accel, load_options, statistics, build_ms }
     }
 
     /// The scene.

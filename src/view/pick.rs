@@ -57,11 +57,11 @@ pub struct PickedHit {
 
 /// Follows the rays of the pixel's middle, as seen from `camera`. `options.width` and `height` are the picture's that the pixel is counted in.
 pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec2) -> Picked {
-    let (scene, tree) = (world.scene(), world.tree());
-    let links = TraversalLinks::new(tree, options.traversal);
+    let scene = world.scene();
+    let links = TraversalLinks::of(world.accel(), options.traversal);
     let mut frame = world.frame_constants(options);
     frame.set_view(camera, world.bounds(), 0);
-    let bindings = KernelInputs::new(scene, tree, &frame).with_links(&links);
+    let bindings = KernelInputs::new(world, &frame).with_links(&links);
     let mut rays = vec![camera_ray(&frame, pixel)];
     let mut picked = Picked { pixel, rays: Vec::new(), n_more: 0 };
     for depth in 0..options.max_depth {

@@ -14,6 +14,7 @@ use super::{
     pick::Picked,
 };
 use crate::{
+    accel::Statistics,
     frame::{Denoise, Profile, RenderOptions, View},
     gpu::GpuError,
 };
@@ -22,6 +23,15 @@ use crate::{
 const HISTORY_S: f64 = 5.0;
 /// Reads of the tree, for each of its levels, that are shown brightest: some rays of some ways down and up.
 const STEPS_A_LEVEL: u32 = 16;
+
+/// The number of reads that is shown brightest. A ray goes through as many cells of a grid as it has along all axes, at the most;
+/// a few such rays make a pixel.
+fn brightest_cost(statistics: &Statistics) -> u32 {
+    match statistics {
+        Statistics::KdTree(tree) => STEPS_A_LEVEL * tree.depth.max(1),
+        Statistics::Grid(grid) => 2 * grid.resolution.iter().sum::<u32>().max(8),
+    }
+}
 
 /// What is viewed, from where, how.
 pub struct Session {
@@ -260,7 +270,7 @@ impl Session {
             View::Picture | View::Normal | View::Id => 1.0,
             View::Depth => self.controller.radius(),
             View::Rays => (1 + self.loaded.scene().lights.len() as u32 * self.settings.options.max_depth) as f32,
-            View::Cost => (STEPS_A_LEVEL * self.loaded.statistics.depth.max(1)) as f32,
+            View::Cost => brightest_cost(&self.loaded.statistics) as f32,
         };
         (self.settings.view, automatic / self.settings.gain)
     }

@@ -1,29 +1,29 @@
 //! Triangles with an acceleration structure over them.
 
 use super::{Mismatch, World};
-use crate::{accel::kdtree::KdTree, layout::Triangle};
+use crate::{accel::Accel, layout::Triangle};
 
-/// Borrowed triangles and the kd-tree over them; every index in the tree names one of the triangles.
+/// Borrowed triangles and the acceleration structure over them; every index in the structure names one of the triangles.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry<'a> {
     triangles: &'a [Triangle],
-    tree: &'a KdTree,
+    accel: &'a Accel,
 }
 
 impl<'a> Geometry<'a> {
-    /// Joins triangles and the kd-tree that was built from them.
+    /// Joins triangles and the structure that was built from them.
     ///
     /// # Errors
-    /// The tree is one of more or fewer triangles.
-    pub fn new(triangles: &'a [Triangle], tree: &'a KdTree) -> Result<Self, Mismatch> {
-        match (tree.n_triangles(), triangles.len()) {
-            (of_tree, given) if of_tree == given => Ok(Self { triangles, tree }),
-            (tree, triangles) => Err(Mismatch::Tree { tree, triangles }),
+    /// The structure is one of more or fewer triangles.
+    pub fn new(triangles: &'a [Triangle], accel: &'a Accel) -> Result<Self, Mismatch> {
+        match (accel.n_triangles(), triangles.len()) {
+            (of_accel, given) if of_accel == given => Ok(Self { triangles, accel }),
+            (accel, triangles) => Err(Mismatch::Accel { accel, triangles }),
         }
     }
 
     pub(super) fn of_world(world: &'a World) -> Self {
-        Self { triangles: &world.scene().triangles, tree: world.tree() }
+        Self { triangles: &world.scene().triangles, accel: world.accel() }
     }
 
     /// World-space triangles.
@@ -31,8 +31,8 @@ impl<'a> Geometry<'a> {
         self.triangles
     }
 
-    /// The kd-tree over the triangles.
-    pub fn tree(&self) -> &'a KdTree {
-        self.tree
+    /// The acceleration structure over the triangles.
+    pub fn accel(&self) -> &'a Accel {
+        self.accel
     }
 }

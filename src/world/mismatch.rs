@@ -3,14 +3,14 @@
 use super::FlatScene;
 use crate::gpu::GpuError;
 
-/// Why a scene's arrays, or its triangles and a tree, do not fit together.
+/// Why a scene's arrays, or its triangles and their structure, do not fit together.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Mismatch {
-    /// The tree is one of other triangles.
-    #[error("the kd-tree was built from {tree} triangles, but {triangles} are given with it")]
-    Tree {
-        /// Triangles that the tree was built from.
-        tree: usize,
+    /// The acceleration structure is one of other triangles.
+    #[error("the acceleration structure was built from {accel} triangles, but {triangles} are given with it")]
+    Accel {
+        /// Triangles that the structure was built from.
+        accel: usize,
         /// Triangles that are given.
         triangles: usize,
     },

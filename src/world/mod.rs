@@ -12,7 +12,7 @@ use glam::Vec3;
 pub use self::{flat::FlatScene, geometry::Geometry, mismatch::Mismatch};
 use crate::{
     accel::{
-        Accel,
+        Accel, AccelOptions, Statistics,
         kdtree::{BuildOptions, KdTree},
     },
     scene::Scene,
@@ -30,7 +30,7 @@ pub struct World(Arc<Parts>);
 struct Parts {
     scene: FlatScene,
     accel: Accel,
-    build_options: BuildOptions,
+    accel_options: AccelOptions,
 }
 
 impl World {
@@ -47,9 +47,17 @@ impl World {
     /// # Errors
     /// The scene has a triangle without a material.
     pub fn of_flat(scene: FlatScene, build_options: &BuildOptions) -> Result<Self, Mismatch> {
+        Self::with_accel(scene, &AccelOptions::KdTree(build_options.clone()))
+    }
+
+    /// Builds an acceleration structure over a flattened scene on the current rayon pool.
+    ///
+    /// # Errors
+    /// The scene has a triangle without a material.
+    pub fn with_accel(scene: FlatScene, options: &AccelOptions) -> Result<Self, Mismatch> {
         mismatch::check_materials(&scene)?;
-        let tree = KdTree::build(&scene.triangles, build_options);
-        Self::with_tree(scene, tree, build_options)
+        let accel = Accel::new(&scene.triangles, options);
+        Ok(Self(Arc::new(Parts { scene, accel, accel_options: options.clone() })))
     }
 
     /// Joins a scene and a kd-tree that was built elsewhere, with `build_options`.
@@ -58,8 +66,9 @@ impl World {
     /// The scene has a triangle without a material; the tree is one of more or fewer triangles.
     pub fn with_tree(scene: FlatScene, tree: KdTree, build_options: &BuildOptions) -> Result<Self, Mismatch> {
         mismatch::check_materials(&scene)?;
-        Geometry::new(&scene.triangles, &tree)?;
-        Ok(Self(Arc::new(Parts { scene, accel: Accel::KdTree(tree), build_options: build_options.clone() })))
+        let (accel, accel_options) = (Accel::KdTree(tree), AccelOptions::KdTree(build_options.clone()));
+        Geometry::new(&scene.triangles, &accel)?;
+        Ok(Self(Arc::new(Parts { scene, accel, accel_options })))
     }
 
     /// The scene as it is traced.
@@ -73,9 +82,11 @@ impl World {
     }
 
     /// The kd-tree over the scene's triangles.
+    ///
+    /// # Panics
+    /// The acceleration structure is another one.
     pub fn tree(&self) -> &KdTree {
-        let Accel::KdTree(tree) = &self.0.accel;
-        tree
+        self.0.accel.as_kdtree().expect("the world has a kd-tree")
     }
 
     /// The least and the greatest corner of a box that holds all triangles (world units).
@@ -84,8 +95,20 @@ impl World {
     }
 
     /// The options that the acceleration structure was built with.
-    pub fn build_options(&self) -> &BuildOptions {
-        &self.0.build_options
+    pub fn accel_options(&self) -> &AccelOptions {
+        &self.0.accel_options
+    }
+
+    /// The acceleration structure in numbers. The host builds a grid for them, unless it has done so already.
+    pub fn statistics(&self) -> Statistics {
+        let Parts { scene, accel, accel_options } = &*self.0;
+        match (accel, accel_options) {
+            (Accel::KdTree(tree), AccelOptions::KdTree(options)) => {
+                Statistics::KdTree(tree.statistics(scene.triangles.len(), options))
+            }
+            (Accel::Grid(grid), _) => Statistics::Grid(grid.get(&scene.triangles).statistics()),
+            (Accel::KdTree(_), AccelOptions::Grid(_)) => unreachable!("a world's structure is of its options' kind"),
+        }
     }
 
     /// The triangles and their acceleration structure, which is all that casting rays needs.

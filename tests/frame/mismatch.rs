@@ -1,7 +1,10 @@
 //! What does not fit together is refused before a kernel, which checks no bounds, can read it.
 
 use kdray::{
-    accel::kdtree::{BuildOptions, KdTree},
+    accel::{
+        Accel,
+        kdtree::{BuildOptions, KdTree},
+    },
     world::{FlatScene, Geometry, Mismatch, World},
 };
 
@@ -20,13 +23,14 @@ fn refusal(scene: &FlatScene) -> Mismatch {
 fn a_tree_of_other_triangles() {
     let (mut scene, options) = (scenes::mixed(), BuildOptions::default());
     let (tree, n) = (KdTree::build(&scene.triangles, &options), scene.triangles.len());
-    assert!(Geometry::new(&scene.triangles, &tree).is_ok());
+    let accel = Accel::KdTree(tree.clone());
+    assert!(Geometry::new(&scene.triangles, &accel).is_ok());
     scene.triangles.pop();
     scene.triangle_materials.pop();
-    let expected = Mismatch::Tree { tree: n, triangles: n - 1 };
-    assert_eq!(Geometry::new(&scene.triangles, &tree).expect_err("a refusal"), expected);
+    let expected = Mismatch::Accel { accel: n, triangles: n - 1 };
+    assert_eq!(Geometry::new(&scene.triangles, &accel).expect_err("a refusal"), expected);
     assert_eq!(World::with_tree(scene, tree, &options).expect_err("a refusal"), expected);
-    let text = format!("the kd-tree was built from {n} triangles, but {} are given with it", n - 1);
+    let text = format!("the acceleration structure was built from {n} triangles, but {} are given with it", n - 1);
     assert_eq!(expected.to_string(), text);
 }
 

@@ -23,17 +23,16 @@ use crate::support::{scenes, with_lanes, without_wide_atomics};
 /// Whether rays within 1/8 px of the pixel's centre meet more than one triangle. (Corners are snapped to a grid of
 /// 1/16 px or finer.)
 fn is_on_edge(world: &World, options: &RenderOptions, pixel_ix: usize) -> bool {
-    let (scene, tree) = (world.scene(), world.tree());
     let frame = world.frame_constants(options);
     let pixel = UVec2::new(pixel_ix as u32 % frame.width, pixel_ix as u32 / frame.width);
-    let mut traverser = Traverser::new(options.traversal);
+    let mut traverser = Traverser::new(&KernelInputs::new(world, &frame), options.traversal);
     let ids: HashSet<u32> = (0..25 * 25)
         .map(|i| {
             let [x, y] = [i % 25, i / 25].map(|i| (i - 12) as f32 / 96.0);
             let shift = frame.right * (2.0 * x / frame.width as f32) - frame.up * (2.0 * y / frame.height as f32);
             let frame = Frame { forward: frame.forward + shift, ..frame };
             traverser
-                .traverse::<false>(&KernelInputs::new(scene, tree, &frame), &(&camera_ray(&frame, pixel)).into())
+                .traverse::<false>(&KernelInputs::new(world, &frame), &(&camera_ray(&frame, pixel)).into())
                 .triangle_ix
         })
         .collect();

@@ -48,7 +48,7 @@ impl View {
         let Stage { passes, resources, .. } = &self.stage;
         hits_by(&self.stage, |commands, batch| {
             Rasterize::reset(commands, resources);
-            commands.barrier(Access::TransferWrite, Access::AllReads); // raster_groups, raster_count
+            commands.barrier(Access::TransferWrite, Access::AllReads); // raster_groups
             passes.record_section(commands, resources, &plan::visibility(Primary::Compute), &Inputs::default());
             passes.primary_hit.record(commands, batch);
         })

@@ -54,14 +54,14 @@ impl Stage {
         let constants = Frame { queue_capacity: capacity, ..world.frame_constants(&options) };
         let needs = Needs { constants: &constants, options: &options, n_bounces: constants.max_depth as usize };
         let resources = Resources::new(&context, &world, &needs).expect("resources");
-        let links = TraversalLinks::new(world.tree(), options.traversal);
+        let links = TraversalLinks::of(world.accel(), options.traversal);
         let passes = Passes::new(&context, &resources.bindings, &options).expect("passes");
         Self { world, links, options, resources, passes, context, expects_messages: Cell::new(false) }
     }
 
     /// The twin's view of the same scene.
     pub fn inputs(&self) -> KernelInputs<'_> {
-        KernelInputs::new(self.world.scene(), self.world.tree(), self.resources.constants()).with_links(&self.links)
+        KernelInputs::new(&self.world, self.resources.constants()).with_links(&self.links)
     }
 
     /// Binds the descriptor set, records and runs.

@@ -45,7 +45,7 @@ fn on_cpu(stage: &Stage) -> Vec<u32> {
 
 /// Whether some ray within `SNAP_PX` of the pixel's centre meets triangle `id` first.
 fn is_met_nearby(stage: &Stage, pixel_ix: u32, id: u32) -> bool {
-    let mut traverser = Traverser::new(stage.options.traversal);
+    let mut traverser = Traverser::new(&stage.inputs(), stage.options.traversal);
     let frame = stage.resources.constants();
     let pixel = uvec2(pixel_ix % frame.width, pixel_ix / frame.width);
     let shifted = |dx: f32, dy: f32| Frame {

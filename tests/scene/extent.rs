@@ -5,7 +5,7 @@ use std::fmt::Write;
 use glam::{Vec3, vec3};
 use kdray::{
     accel::{
-        Query,
+        Accel, Query,
         kdtree::{BuildOptions, KdTree, Traversal},
     },
     cast::{Caster, CpuCaster},
@@ -63,14 +63,14 @@ fn rays(triangles: &[Triangle], n: usize) -> Vec<Ray> {
 }
 
 fn cast_on_cpu(triangles: &[Triangle], traversal: Traversal, rays: &[Ray]) -> Vec<Hit> {
-    let tree = KdTree::build(triangles, &BuildOptions::default());
-    let geometry = Geometry::new(triangles, &tree).expect("a tree of these triangles");
+    let accel = Accel::KdTree(KdTree::build(triangles, &BuildOptions::default()));
+    let geometry = Geometry::new(triangles, &accel).expect("a tree of these triangles");
     CpuCaster::new(geometry, traversal).cast(rays, Query::Closest)
 }
 
 fn cast_on_device(context: &std::sync::Arc<Context>, triangles: &[Triangle], rays: &[Ray]) -> Vec<Hit> {
-    let tree = KdTree::build(triangles, &BuildOptions::default());
-    let geometry = Geometry::new(triangles, &tree).expect("a tree of these triangles");
+    let accel = Accel::KdTree(KdTree::build(triangles, &BuildOptions::default()));
+    let geometry = Geometry::new(triangles, &accel).expect("a tree of these triangles");
     Caster::new(context, geometry, Traversal::Stack).unwrap().cast(rays, Query::Closest, 1).unwrap().hits
 }
 

@@ -16,7 +16,10 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use kdray::{
-    accel::kdtree::{BuildOptions, KdTree, TraversalLinks},
+    accel::{
+        Accel,
+        kdtree::{BuildOptions, KdTree, TraversalLinks},
+    },
     gpu::{Context, ContextOptions, DeviceOverrides},
     layout::{Hit, NO_TRIANGLE, PathRay, Triangle},
     reference::{brute, inputs::KernelInputs, search_ray::SearchRay, traversal_ray::near_scene},
@@ -52,7 +55,7 @@ pub fn world_by(scene: &FlatScene, build_options: &BuildOptions) -> World {
 /// Triangles and their tree.
 pub struct MeshWithTree {
     pub triangles: Vec<Triangle>,
-    pub tree: KdTree,
+    pub accel: Accel,
     pub links: TraversalLinks,
 }
 
@@ -63,16 +66,20 @@ impl MeshWithTree {
     }
 
     pub fn with_tree(triangles: Vec<Triangle>, tree: KdTree) -> Self {
-        Self { triangles, links: TraversalLinks::all(&tree), tree }
+        Self { triangles, links: TraversalLinks::all(&tree), accel: Accel::KdTree(tree) }
+    }
+
+    pub fn tree(&self) -> &KdTree {
+        self.accel.as_kdtree().expect("a mesh with a kd-tree")
     }
 
     pub fn inputs(&self) -> KernelInputs<'_> {
-        KernelInputs::of_tree(&self.triangles, &self.tree).with_links(&self.links)
+        KernelInputs::of_tree(&self.triangles, self.tree()).with_links(&self.links)
     }
 
     /// What a cast goes through.
     pub fn geometry(&self) -> Geometry<'_> {
-        Geometry::new(&self.triangles, &self.tree).expect("a tree of these triangles")
+        Geometry::new(&self.triangles, &self.accel).expect("a tree of these triangles")
     }
 
     /// The closest hit beyond `t_min` over every triangle, of the ray as the traversal sees it.
@@ -84,11 +91,11 @@ impl MeshWithTree {
 
     /// The middle of the root's cell.
     pub fn centre(&self) -> Vec3 {
-        (self.tree.cell_min() + self.tree.cell_max()) / 2.0
+        (self.tree().cell_min() + self.tree().cell_max()) / 2.0
     }
 
     /// Half of the root cell's diagonal.
     pub fn radius(&self) -> f32 {
-        (self.tree.cell_max() - self.tree.cell_min()).length() / 2.0
+        (self.tree().cell_max() - self.tree().cell_min()).length() / 2.0
     }
 }

@@ -27,7 +27,7 @@ pub fn levels() -> Vec<Level> {
 pub fn traced<const ANY_HIT: bool>(world: &MeshWithTree, level: Level, rays: &[PathRay]) -> Vec<Hit> {
     let mut hits = vec![None; rays.len()];
     let probes = hits.iter_mut().zip(rays.iter().map(SearchRay::from));
-    let mut tracer = FastTracer::at_level(Traversal::Stack, level);
+    let mut tracer = FastTracer::at_level(&world.inputs(), Traversal::Stack, level);
     tracer.trace_all::<ANY_HIT, _>(&world.inputs(), probes, |place, hit| {
         assert_eq!(place.replace(hit), None, "a ray has one hit");
     });

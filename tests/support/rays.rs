@@ -42,7 +42,7 @@ fn axis_direction(random: &mut Random) -> Vec3 {
 fn split_plane_point(random: &mut Random, world: &MeshWithTree, point: Vec3) -> (Vec3, usize) {
     let mut point = point;
     for _ in 0..100 {
-        if let Node::Split { axis, position, .. } = world.tree.node(random.below(world.tree.nodes().len()) as u32) {
+        if let Node::Split { axis, position, .. } = world.tree().node(random.below(world.tree().nodes().len()) as u32) {
             point[axis] = position;
             return (point, axis);
         }
@@ -53,7 +53,7 @@ fn split_plane_point(random: &mut Random, world: &MeshWithTree, point: Vec3) -> 
 /// One of the kinds of rays below, in turn.
 pub fn nasty_ray(random: &mut Random, world: &MeshWithTree, kind: usize) -> PathRay {
     let far = world.centre() + 3.0 * world.radius() * random.direction();
-    let within = random.in_box(world.tree.cell_min(), world.tree.cell_max());
+    let within = random.in_box(world.tree().cell_min(), world.tree().cell_max());
     let vertex = corner(random, &world.triangles);
     let edge = edge_point(random, &world.triangles);
     let (on_plane, axis) = split_plane_point(random, world, within);

@@ -136,7 +136,7 @@ fn lower_level(input: Input, upper: &Lattice, cells: &mut Vec<GridCell>, upper_p
 /// than the margin; then halved so many times.
 fn resolution_for(input: Input, upper: &Lattice, n_triangles: u32, n_halvings: u32) -> u32 {
     let max_cells = input.options.lower_density * n_triangles as f32;
-    let fits = |r: u32| (r * r * r) as f32 <= max_cells && upper.cell_size * (1.0 / r as f32) >= input.margin;
+    let fits = |r: u32| (r * r * r) as f32 <= max_cells && upper.cell_size_within(r) >= input.margin;
     let finest = (2..=GRID_MAX_BLOCK_RESOLUTION).take_while(|&r| fits(r)).last().unwrap_or(1);
     if n_triangles == 0 { 0 } else { (finest >> n_halvings).max(1) }
 }

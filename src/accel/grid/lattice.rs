@@ -118,10 +118,17 @@ impl Lattice {
         Self {
             min: [0, 1, 2].map(|axis| self.plane(axis, cell[axis])),
             max: [0, 1, 2].map(|axis| self.plane(axis, cell[axis] + 1)),
-            // The reciprocal is rounded first, as in the kernels' table of them.
-            cell_size: self.cell_size * (1.0 / resolution as f32),
+            cell_size: self.cell_size_within(resolution),
             n_cells: [resolution; 3],
         }
+    }
+
+    /// The edge's length of the cubes that a cube is cut into.
+    ///
+    /// 1 / resolution is rounded up to a multiple of 2^-16, which takes integers alone: the last bit of a quotient of floats is
+    /// not the same on every device. So the last cube along each axis is up to 2 % smaller than the others.
+    pub fn cell_size_within(&self, resolution: u32) -> f32 {
+        self.cell_size * ((1_u32 << 16).div_ceil(resolution) as f32 * (1.0 / 65_536.0))
     }
 
     /// The indices of the cube at a place.

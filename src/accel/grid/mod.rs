@@ -15,30 +15,17 @@
 
 mod build;
 mod lattice;
+mod lazy;
 mod overlap;
 mod planes;
 mod statistics;
 
 use glam::Vec3;
 
-pub use self::{lattice::Lattice, statistics::Statistics};
-use crate::layout::Plane;
-
-/// The most cells of a grid along an axis.
-pub const GRID_MAX_RESOLUTION: u32 = 1024;
-/// The most cells along each axis of one block of a grid's lower level.
-pub const GRID_MAX_BLOCK_RESOLUTION: u32 = 32;
-
-/// A cell of a grid.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct GridCell {
-    /// At the lowest level, the index of the cell's first entry in [`Grid::leaf_triangles`]. At the upper level of two, the index of
-    /// the first cell of the block that the cell is cut into.
-    pub first: u32,
-    /// At the lowest level, how many entries the cell has. At the upper level of two, the number of the block's cells along
-    /// each axis, 0 where the cell has no triangles.
-    pub count: u32,
-}
+pub use self::{lattice::Lattice, lazy::LazyGrid, statistics::Statistics};
+use crate::layout::{
+    AccelConstants, GRID_MAX_BLOCK_RESOLUTION, GRID_MAX_RESOLUTION, GridCell, KD_PLANE_EPSILON, Plane,
+};
 
 /// A grid over triangles, as the kernels read it. It comes from [`Grid::build`] alone, and nothing can change it afterwards.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,6 +73,22 @@ impl GridOptions {
 }
 
 impl Grid {
+    /// What kernels know of a grid beside its arrays.
+    pub fn constants(&self) -> AccelConstants {
+        let Lattice { min, max, cell_size, n_cells } = self.lattice;
+        let (cell_min, cell_max) = (Vec3::from(min), Vec3::from(max));
+        AccelConstants {
+            cell_min,
+            plane_epsilon: KD_PLANE_EPSILON * cell_min.abs().max(cell_max.abs()).max_element(),
+            cell_max,
+            n_cells_x: n_cells[0],
+            n_cells_y: n_cells[1],
+            n_cells_z: n_cells[2],
+            cell_size,
+            ..AccelConstants::default()
+        }
+    }
+
     /// The cells of the upper level.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice

@@ -9,6 +9,8 @@ use super::Grid;
 pub struct Statistics {
     /// The number of cells of the upper level along x, y and z.
     pub resolution: [u32; 3],
+    /// The number of levels of cells, 1 or 2.
+    pub n_levels: u32,
     /// Cells of the upper level.
     pub n_upper_cells: u64,
     /// Cells that hold triangles or could: those of the lowest level, and cells of the upper one that are not cut.
@@ -34,6 +36,7 @@ impl Grid {
         let lowest = if self.n_levels == 1 { upper } else { lower };
         Statistics {
             resolution: self.lattice.n_cells,
+            n_levels: self.n_levels,
             n_upper_cells: n_upper as u64,
             n_cells: (lowest.len() + n_uncut) as u64,
             n_empty_cells: (lowest.iter().filter(|cell| cell.count == 0).count() + n_uncut) as u64,

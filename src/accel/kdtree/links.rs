@@ -2,7 +2,7 @@
 
 use super::KdTree;
 use crate::{
-    accel::kdtree::Traversal,
+    accel::{Accel, kdtree::Traversal},
     layout::{KdBox, KdRope},
 };
 
@@ -16,6 +16,14 @@ pub struct TraversalLinks {
 }
 
 impl TraversalLinks {
+    /// What the traversal reads beside the scene's structure: nothing where that is a grid.
+    pub fn of(accel: &Accel, traversal: Traversal) -> Self {
+        match accel {
+            Accel::KdTree(tree) => Self::new(tree, traversal),
+            Accel::Grid(_) => Self::default(),
+        }
+    }
+
     /// What the traversal reads of the tree.
     pub fn new(tree: &KdTree, traversal: Traversal) -> Self {
         let boxes = if traversal.needs_boxes() { tree.boxes() } else { Vec::new() };

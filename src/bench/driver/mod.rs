@@ -62,7 +62,7 @@ impl Arena {
             build_ms.push(scenery.build_ms());
         }
         let mut tree = AccelBuffers::new(context, stage.world.geometry())?;
-        tree.add_links(context, stage.tree(), Traversal::Ropes)?;
+        tree.add_links(context, stage.world.accel(), Traversal::Ropes)?;
         Ok(Self {
             bindings: CastResources::bindings(context, &tree)?,
             tree,

@@ -70,7 +70,7 @@ fn empty_report(args: &DriverArgs, stage: &Stage, context: &Context, builds: Bui
         width: args.size.width,
         height: args.size.height,
         n_triangles,
-        tree: stage.tree().statistics(n_triangles, stage.world.build_options()),
+        tree: stage.tree_statistics(),
         n_times: args.repeat,
         t_tolerance: T_TOLERANCE,
         builds,

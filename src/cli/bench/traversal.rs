@@ -82,7 +82,7 @@ fn empty_report(args: &TraversalArgs, stage: &Stage, context: Option<&Arc<Contex
         width: args.size.width,
         height: args.size.height,
         n_triangles,
-        tree: stage.tree().statistics(n_triangles, stage.world.build_options()),
+        tree: stage.tree_statistics(),
         n_times: args.repeat,
         sets: Vec::new(),
     }

@@ -58,11 +58,12 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let n_pictures = u64::from(args.spp) * views.len() as u64;
     let cameras = views.iter().map(|view| &view.camera);
     let workload = Workload::of_pictures(&options, scene.lights.len(), n_pictures).seen_by(cameras);
-    build::check_memory(engine.tree_kind(n_triangles, &workload).value, n_triangles)?;
-    let building = format!("building the kd-tree of {n_triangles} triangles");
+    let accel = engine.choose_accel(n_triangles, &workload);
+    build::check_memory(accel, n_triangles)?;
+    let building = build::building(accel, n_triangles);
     let build = || info_span!("build tree").in_scope(|| engine.build(scene, &workload));
     let (built, build_ms) = progress.stage(&building, build);
-    let Built { world, tree_kind } = built.map_err(GpuError::from)?;
+    let Built { world, accel } = built.map_err(GpuError::from)?;
     let methods = engine.methods(&world, &workload)?;
     let options = methods.apply(&options);
     let crop = options.crop_or_whole();
@@ -85,10 +86,10 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         pictures: views.iter().map(|view| view.files.picture.clone()).collect(),
         extra_files: views.iter().flat_map(|view| view.files.beside()).cloned().collect(),
         options: (&options).into(),
-        choices: Choices::of_pictures(tree_kind, methods),
+        choices: Choices::of_pictures(accel, methods),
         samples: args.spp,
         triangles: n_triangles,
-        tree: world.tree().statistics(n_triangles, world.build_options()),
+        accel: world.statistics(),
         load_ms,
         build_ms,
         render_ms,

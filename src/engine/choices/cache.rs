@@ -16,7 +16,7 @@ use tempfile::NamedTempFile;
 
 use super::Timings;
 use crate::{
-    accel::kdtree::{BuildOptions, Traversal},
+    accel::{AccelOptions, kdtree::Traversal},
     gpu::DeviceInfo,
     layout::Triangle,
     passes::spirv,
@@ -45,14 +45,14 @@ pub struct Key {
 
 impl Key {
     /// The key of traversals.
-    pub fn new(device: &DeviceInfo, triangles: &[Triangle], build_options: &BuildOptions) -> Self {
+    pub fn new(device: &DeviceInfo, triangles: &[Triangle], accel_options: &AccelOptions) -> Self {
         Self {
             device: device.name.clone(),
             driver: device.driver.clone(),
             subject: "traversals".to_owned(),
             kernel: hash(spirv!("cast.comp").spirv),
             triangles: hash(bytemuck::cast_slice(triangles)),
-            build: format!("{build_options:?}"),
+            build: format!("{accel_options:?}"),
         }
     }
 

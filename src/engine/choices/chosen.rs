@@ -4,9 +4,9 @@ use std::fmt::{self, Display};
 
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
-use super::{Timings, TreeKind};
+use super::{ChosenAccel, Timings, TreeKind};
 use crate::{
-    accel::kdtree::Traversal,
+    accel::{AccelKind, kdtree::Traversal},
     frame::{Primary, RenderOptions},
 };
 
@@ -82,10 +82,15 @@ impl Methods {
 /// All that was chosen, for reports.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choices {
-    /// Which tree is built.
-    pub build: Chosen<TreeKind>,
-    /// The algorithm by which rays go through the kd-tree.
-    pub traversal: Chosen<Traversal>,
+    /// The kind of the acceleration structure.
+    #[serde(serialize_with = "as_word")]
+    pub accel: AccelKind,
+    /// Which kd-tree is built; none for grids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub build: Option<Chosen<TreeKind>>,
+    /// The algorithm by which rays go through the kd-tree; none for grids.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub traversal: Option<Chosen<Traversal>>,
     /// None for rays without a picture.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub primary: Option<Chosen<Primary>>,
@@ -97,23 +102,33 @@ pub struct Choices {
     pub primary_ns: Option<Timings>,
 }
 
+/// Serializes a value as the word that it is displayed by.
+fn as_word<S: Serializer>(value: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(value)
+}
+
 impl Choices {
     /// The choices for pictures.
-    pub fn of_pictures(build: Chosen<TreeKind>, methods: Methods) -> Self {
+    pub fn of_pictures(accel: ChosenAccel, methods: Methods) -> Self {
         let Methods { traversal, primary, traversal_ns, primary_ns } = methods;
-        Self { build, traversal, primary: Some(primary), traversal_ns, primary_ns }
+        let build = accel.tree_kind();
+        let traversal = build.map(|_| traversal);
+        Self { accel: accel.kind(), build, traversal, primary: Some(primary), traversal_ns, primary_ns }
     }
 
     /// Rays without a picture have no primary visibility.
-    pub fn of_rays(build: Chosen<TreeKind>, methods: Methods) -> Self {
-        Self { primary: None, ..Self::of_pictures(build, methods) }
+    pub fn of_rays(accel: ChosenAccel, methods: Methods) -> Self {
+        Self { primary: None, ..Self::of_pictures(accel, methods) }
     }
 }
 
 impl Display for Choices {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Self { build, traversal, primary, traversal_ns, primary_ns } = self;
-        write!(f, "chosen: tree {build}, traversal {traversal}")?;
+        let Self { accel, build, traversal, primary, traversal_ns, primary_ns } = self;
+        match (build, traversal) {
+            (Some(build), Some(traversal)) => write!(f, "chosen: tree {build}, traversal {traversal}")?,
+            _ => write!(f, "chosen: {}", accel.name())?,
+        }
         if let Some(primary) = primary {
             write!(f, ", primary rays {primary}")?;
         }

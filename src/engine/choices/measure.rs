@@ -9,10 +9,7 @@ use bytemuck::Zeroable;
 
 use super::Timings;
 use crate::{
-    accel::{
-        Query,
-        kdtree::{KdTree, Traversal},
-    },
+    accel::{Query, kdtree::Traversal},
     buffers::{AccelBuffers, CastResources},
     cast::{Contender, Kernel, cast_ray, leaving::diffuse_rays, rounds},
     cpu::trace,
@@ -45,13 +42,13 @@ pub fn measure_traversals(
     if !context.has_timestamps() {
         return Ok(None);
     }
-    let (scene, tree) = (world.scene(), world.tree());
+    let scene = world.scene();
     let n_pixels = context.n_lanes()?.clamp(FEWEST_RAYS, MOST_RAYS);
     let frame = world.frame_constants(&picture_of(scene, n_pixels));
-    let rays = some_rays(scene, tree, &frame);
+    let rays = some_rays(world, &frame);
     let mut buffers = AccelBuffers::new(context, world.geometry())?;
     if traversals.contains(&Traversal::Ropes) {
-        buffers.add_links(context, tree, Traversal::Ropes)?;
+        buffers.add_links(context, world.accel(), Traversal::Ropes)?;
     }
     let bindings = CastResources::bindings(context, &buffers)?;
     let resources = Rc::new(CastResources::new(context, &bindings, &buffers, rays.len())?);
@@ -70,12 +67,12 @@ pub fn measure_traversals(
 }
 
 /// Rays of the scene's camera, and one from each of their hits into the hemisphere above it. They depend on no device.
-fn some_rays(scene: &FlatScene, tree: &KdTree, frame: &Frame) -> Vec<Ray> {
+fn some_rays(world: &World, frame: &Frame) -> Vec<Ray> {
     let mut from_camera = vec![PathRay::zeroed(); (frame.width * frame.height) as usize];
     primary_rays(frame, 0, &mut from_camera);
     let mut hits = vec![Hit::zeroed(); from_camera.len()];
-    trace(&KernelInputs::new(scene, tree, frame), Traversal::OF_CPU, &from_camera, &mut hits);
-    let bounced = diffuse_rays(&scene.triangles, &from_camera, &hits);
+    trace(&KernelInputs::new(world, frame), Traversal::OF_CPU, &from_camera, &mut hits);
+    let bounced = diffuse_rays(&world.scene().triangles, &from_camera, &hits);
     from_camera.iter().chain(&bounced).map(cast_ray).collect()
 }
 

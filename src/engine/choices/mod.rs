@@ -2,7 +2,8 @@
 //! through it, and how primary rays find their triangles.
 //!
 //! ```text
-//! tree     which tree: by rule, from the numbers of rays and of triangles
+//! accel    which acceleration structure
+//! tree     which kd-tree: by rule, from the numbers of rays and of triangles
 //! rule     traversal and primary visibility, by rule, from the device and the sizes of scene and picture
 //! trial    traversal and primary visibility, from the times of each candidate on the device
 //!   timings  the candidates, their times, the quickest
@@ -21,6 +22,7 @@
 //! samples, films, windows. It is never made where drivers run kernels on the CPU: to compile the kernels that it tries
 //! takes such a driver longer than another choice could spare.
 
+mod accel;
 mod cache;
 mod chosen;
 mod measure;
@@ -33,6 +35,7 @@ use std::sync::Arc;
 
 use self::trial::Trial;
 pub use self::{
+    accel::ChosenAccel,
     cache::{Cache, Key},
     chosen::{Choices, Chosen, Methods, Reason},
     measure::{measure_primaries, measure_traversals},
@@ -41,10 +44,7 @@ pub use self::{
     tree::{BuildPolicy, TreeKind},
 };
 use crate::{
-    accel::{
-        AccelKind,
-        kdtree::{KdTree, Traversal},
-    },
+    accel::{AccelKind, kdtree::Traversal},
     frame::{Primary, RenderOptions},
     gpu::{Context, DeviceInfo, GpuError},
     layout::KD_MAX_ORIGIN_DISTANCE,
@@ -123,8 +123,9 @@ impl Workload {
     }
 
     /// Whether primary rays find the same hits, bit for bit, traced and rasterized by kernels.
-    fn primaries_agree(&self, tree: &KdTree) -> bool {
-        let largest_coordinate = tree.cell_min().abs().max(tree.cell_max().abs()).max_element();
+    fn primaries_agree(&self, world: &World) -> bool {
+        let [least, greatest] = world.bounds();
+        let largest_coordinate = least.abs().max(greatest.abs()).max_element();
         self.farthest_eye <= KD_MAX_ORIGIN_DISTANCE * largest_coordinate
     }
 
@@ -140,9 +141,14 @@ impl Workload {
 }
 
 impl Request {
-    /// The tree to build for so many triangles.
-    pub fn tree(&self, processor: Processor, n_triangles: usize, workload: &Workload) -> Chosen<TreeKind> {
-        Chosen::pinned_or(self.build.pinned(), || TreeKind::by_rule(processor, n_triangles, workload.n_rays))
+    /// The acceleration structure to build for so many triangles.
+    pub fn choose_accel(&self, processor: Processor, n_triangles: usize, workload: &Workload) -> ChosenAccel {
+        let by_rule = || TreeKind::by_rule(processor, n_triangles, workload.n_rays);
+        match self.accel {
+            AccelKind::KdTree => ChosenAccel::KdTree(Chosen::pinned_or(self.build.pinned(), by_rule)),
+            AccelKind::Grid => ChosenAccel::Grid,
+            AccelKind::Grid2 => ChosenAccel::Grid2,
+        }
     }
 
     /// How to trace, without any measurement.
@@ -173,11 +179,11 @@ impl Request {
         let Some(context) = context.filter(is_gpu) else { return Ok(by_rule) };
         let trial = Trial { context, world, workload, cache };
         let mut methods = by_rule;
-        if methods.traversal.by == Reason::Rule {
+        if methods.traversal.by == Reason::Rule && world.accel().kind() == AccelKind::KdTree {
             trial.choose_traversal(&mut methods)?;
         }
         let may_trace = methods.primary == Chosen { value: Primary::Compute, by: Reason::Rule };
-        if may_trace && workload.primaries_agree(world.tree()) {
+        if may_trace && workload.primaries_agree(world) {
             trial.choose_primary(&mut methods)?;
         }
         Ok(methods)
@@ -198,7 +204,8 @@ mod tests {
         assert_eq!(whole.n_rays, 640 * 480 * 2 * 4 * 2);
         let request = Request::default();
         for processor in [Processor::Cpu, Processor::SoftwareDriver, Processor::Gpu] {
-            assert_eq!(request.tree(processor, 100_000, &whole), request.tree(processor, 100_000, &crop));
+            let choose = |workload| request.choose_accel(processor, 100_000, workload);
+            assert_eq!(choose(&whole), choose(&crop));
         }
         let candidates = [whole, crop].map(|workload| Candidates::of_traversals(100_000, workload.n_rays));
         assert_eq!(candidates[0], candidates[1]);
@@ -212,8 +219,8 @@ mod tests {
             primary: Some(Primary::Trace),
             ..Request::default()
         };
-        let kind = request.tree(Processor::Gpu, usize::MAX, &Workload::of_rays(0));
-        assert_eq!(kind, Chosen { value: TreeKind::Best, by: Reason::Pinned });
+        let accel = request.choose_accel(Processor::Gpu, usize::MAX, &Workload::of_rays(0));
+        assert_eq!(accel, ChosenAccel::KdTree(Chosen { value: TreeKind::Best, by: Reason::Pinned }));
         let Methods { traversal, primary, traversal_ns, .. } = request.methods_by_rule(None, 10, (10, 10));
         assert_eq!(
             (traversal.to_string(), primary.to_string()),

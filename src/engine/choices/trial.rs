@@ -43,7 +43,7 @@ impl Trial<'_> {
     }
 
     fn key(&self) -> Key {
-        Key::new(self.context.info(), &self.world.scene().triangles, self.world.build_options())
+        Key::new(self.context.info(), &self.world.scene().triangles, self.world.accel_options())
     }
 }
 

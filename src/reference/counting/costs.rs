@@ -28,7 +28,7 @@ pub fn count_rasterized(rays: &[PathRay], hits: &[Hit], pixel_features: &mut [Fe
 /// Rays whose closest hit was found through the tree.
 pub fn count_closest(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay], pixel_features: &mut [Feature]) {
     let steps: Vec<_> = (rays.par_iter().with_min_len(RAYS_PER_TASK))
-        .map_init(|| Traverser::new(traversal), |traverser, ray| steps_of::<false>(inputs, traverser, ray))
+        .map_init(|| Traverser::new(inputs, traversal), |traverser, ray| steps_of::<false>(inputs, traverser, ray))
         .collect();
     for (ray, n_steps) in rays.iter().zip(steps) {
         add(pixel_features, ray, n_steps);
@@ -46,7 +46,7 @@ pub fn count_shadow(
     for light in inputs.lights {
         let steps: Vec<_> = (rays.par_iter().zip(hits).with_min_len(RAYS_PER_TASK))
             .map_init(
-                || Traverser::new(traversal),
+                || Traverser::new(inputs, traversal),
                 |traverser, (ray, hit)| {
                     let is_hit = hit.triangle_ix != NO_TRIANGLE;
                     let segment = is_hit.then(|| shadow_segment(inputs, ray, hit, light)).flatten()?;

@@ -66,7 +66,9 @@ pub fn count_steps(inputs: &KernelInputs, traversal: Traversal, query: Query, ra
         }
         Steps::from(counts)
     };
-    rays.par_chunks(RAYS_PER_TASK).map_init(|| Traverser::new(traversal), of_task).reduce(Steps::default, Steps::plus)
+    rays.par_chunks(RAYS_PER_TASK)
+        .map_init(|| Traverser::new(inputs, traversal), of_task)
+        .reduce(Steps::default, Steps::plus)
 }
 
 #[cfg(test)]

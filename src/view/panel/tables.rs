@@ -52,21 +52,13 @@ fn rate(n_rays: u64, ms: Option<f64>) -> String {
     }
 }
 
-/// The tree's figures.
-pub fn tree(ui: &mut Ui, loaded: &Loaded) {
-    let tree = &loaded.statistics;
-    let row = |name: &str, value: String| [name.to_owned(), value];
-    let rows = [
-        row("nodes", tree.n_nodes.to_string()),
-        row("leaves", tree.n_leaves.to_string()),
-        row("empty leaves", tree.n_empty_leaves.to_string()),
-        row("depth", tree.depth.to_string()),
-        row("references a triangle", format!("{:.2}", tree.references_per_triangle)),
-        row("SAH cost", format!("{:.2}", tree.sah_cost)),
-        row("size", bytes(tree.bytes)),
-        row("built in", format!("{:.0} ms", loaded.build_ms)),
-    ];
-    grid(ui, "tree", rows);
+/// The acceleration structure's figures.
+pub fn accel(ui: &mut Ui, loaded: &Loaded) {
+    let statistics = &loaded.statistics;
+    let size = ("size", bytes(statistics.bytes()));
+    let built_in = ("built in", format!("{:.0} ms", loaded.build_ms));
+    let rows = statistics.rows().into_iter().chain([size, built_in]);
+    grid(ui, "tree", rows.map(|(name, value)| [name.to_owned(), value]));
 }
 
 /// The device's memory by what it holds.

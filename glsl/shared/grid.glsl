@@ -1,0 +1,233 @@
+// The search through a grid, from cell to cell along the ray: a 3D digital differential analyzer (Amanatides and Woo, "A fast voxel
+// traversal algorithm for ray tracing", 1987; on GPUs first Purcell, Buck, Mark and Hanrahan, "Ray tracing on programmable
+// graphics hardware", SIGGRAPH 2002). In a grid of two levels the ray goes through a block of smaller cells wherever a cell of
+// the upper level has triangles. A part of accel.glsl, which calls `search_grid`.
+//
+// Where the ray meets a plane between cells is computed from the plane itself and never summed up from cell to cell. So the kd-tree's
+// proof holds: rounding puts the ray no farther from its place than the margin, and a cell has all triangles so near to it
+// (src/accel/bounds.rs).
+
+#include "lattice.glsl"
+
+// How many levels of cells the scene's grid has; 0: the scene has a kd-tree.
+layout(constant_id = CONSTANT_GRID_LEVELS) const uint GRID_LEVELS = 0u;
+
+// In place of a packed cube of the upper level: the ray is in that level itself.
+const uint IN_UPPER_LEVEL = 0xffffffffu;
+// What finite times stay below.
+const float LARGEST_T = 3.4028235e38;
+
+// A ray's way through the cells of one lattice. first_cell: the index of the lattice's first cell in grid_cells. upper_cube: the
+// cell of the upper level that is this lattice, packed. t_next: where the ray leaves its cube by each axis. t_enter: where it has come
+// into its cube; t_exit: where it leaves the lattice.
+struct GridWalk {
+    Lattice lattice;
+    uint first_cell;
+    uint upper_cube;
+    uvec3 cube;
+    vec3 t_next;
+    float t_enter;
+    float t_exit;
+};
+
+Lattice upper_lattice() {
+    uvec3 n_cells = uvec3(accel.n_cells_x, accel.n_cells_y, accel.n_cells_z);
+    return Lattice(accel.cell_min, accel.cell_size, accel.cell_max, n_cells);
+}
+
+// Indices below GRID_MAX_RESOLUTION take 10 bits each.
+uint pack_cube(uvec3 cube) {
+    return cube.x | (cube.y << 10) | (cube.z << 20);
+}
+
+uvec3 unpack_cube(uint packed) {
+    return uvec3(packed, packed >> 10, packed >> 20) & (GRID_MAX_RESOLUTION - 1u);
+}
+
+// Where the ray leaves cubes of these indices by each axis. It never leaves those at the border: the search ends there.
+vec3 exits_of(Lattice lattice, TraversalRay ray, uvec3 cube) {
+    uvec3 faces = cube + uvec3(greaterThanEqual(ray.inv_direction, vec3(0.0)));
+    precise vec3 t = fma(planes_of(lattice, faces), ray.inv_direction, ray.bias);
+    bvec3 are_inner = lessThan(faces - 1u, lattice.n_cells - 1u); // a face of 0 wraps around
+    return mix(vec3(uintBitsToFloat(0x7f800000u)), t, are_inner);
+}
+
+// The ray goes up where its direction's component is positive: +1, else -1.
+ivec3 steps_of(TraversalRay ray) {
+    return 2 * ivec3(greaterThanEqual(ray.inv_direction, vec3(0.0))) - 1;
+}
+
+// Enters the lattice at t_enter: in the first cube on the ray's way that it leaves at t_enter or later. What is reckoned from the
+// point at t_enter is off by 1 or so.
+void enter_lattice(TraversalRay ray, inout GridWalk walk) {
+    ivec3 steps = steps_of(ray);
+    ivec3 cube = ivec3(cube_near(walk.lattice, ray.shear.origin + 2.0 * walk.t_enter * ray.direction));
+    ivec3 last = ivec3(walk.lattice.n_cells) - 1;
+    bool moves = true;
+    while (moves) {
+        count_turn();
+        ivec3 before = clamp(cube - steps, ivec3(0), last);
+        bvec3 are_late = lessThan(exits_of(walk.lattice, ray, uvec3(cube)), vec3(walk.t_enter));
+        bvec3 are_early = greaterThanEqual(exits_of(walk.lattice, ray, uvec3(before)), vec3(walk.t_enter));
+        ivec3 next = clamp(cube + steps * (ivec3(are_late) - ivec3(are_early)), ivec3(0), last);
+        moves = any(notEqual(next, cube));
+        cube = next;
+        if (!moves) break;
+    }
+    walk.cube = uvec3(cube);
+    walk.t_next = exits_of(walk.lattice, ray, walk.cube);
+}
+
+// Where the ray comes into the box that holds all triangles.
+GridWalk enter_grid(TraversalRay ray) {
+    GridWalk walk;
+    walk.lattice = upper_lattice();
+    walk.first_cell = 0u;
+    walk.upper_cube = IN_UPPER_LEVEL;
+    walk.t_enter = ray.t_enter;
+    walk.t_exit = min(ray.t_exit, LARGEST_T);
+    enter_lattice(ray, walk);
+    return walk;
+}
+
+float least_of(vec3 v) {
+    return min(v.x, min(v.y, v.z));
+}
+
+// Where the ray leaves its cube, or the lattice before that.
+float t_leave_of(GridWalk walk) {
+    return min(least_of(walk.t_next), walk.t_exit);
+}
+
+// From a cube of the upper level into the block of cells that it is cut into.
+void enter_block(TraversalRay ray, GridCell block, inout GridWalk walk) {
+    walk.t_exit = t_leave_of(walk);
+    walk.upper_cube = pack_cube(walk.cube);
+    walk.lattice = lattice_within(walk.lattice, walk.cube, block.count);
+    walk.first_cell = block.first;
+    enter_lattice(ray, walk);
+}
+
+// Back to the cube of the upper level that the ray's block is.
+void leave_block(TraversalRay ray, inout GridWalk walk) {
+    walk.lattice = upper_lattice();
+    walk.first_cell = 0u;
+    walk.cube = unpack_cube(walk.upper_cube);
+    walk.upper_cube = IN_UPPER_LEVEL;
+    walk.t_next = exits_of(walk.lattice, ray, walk.cube);
+    walk.t_exit = min(ray.t_exit, LARGEST_T);
+}
+
+GridCell cell_of(GridWalk walk) {
+    count_steps(1u);
+    uvec2 words = load_grid_cells(walk.first_cell + place_of(walk.lattice, walk.cube));
+    return GridCell(words.x, words.y);
+}
+
+// The triangles of the cell that the ray is in, after it has entered that cell's block.
+Visit visit_cell(TraversalRay ray, float t_best, inout GridWalk walk) {
+    GridCell cell = cell_of(walk);
+    if (GRID_LEVELS == 2u && walk.upper_cube == IN_UPPER_LEVEL && cell.count > 0u) {
+        enter_block(ray, cell, walk);
+        cell = cell_of(walk);
+    }
+    count_steps(cell.count);
+    return Visit(cell.first, cell.first + cell.count, segment_of(walk.t_enter, min(t_leave_of(walk), t_best)));
+}
+
+// On to the ray's next cube, in the block or behind it. False where nothing nearer than t_best can follow.
+bool step_on(TraversalRay ray, float t_best, inout GridWalk walk) {
+    float t = least_of(walk.t_next);
+    if (GRID_LEVELS == 2u && walk.upper_cube != IN_UPPER_LEVEL && !(t <= walk.t_exit)) {
+        leave_block(ray, walk);
+        t = least_of(walk.t_next);
+    }
+    if (!(t <= walk.t_exit) || t_best < t) return false;
+    bool is_x = walk.t_next.x == t;
+    bool is_y = !is_x && walk.t_next.y == t;
+    ivec3 steps = steps_of(ray) * ivec3(is_x, is_y, !is_x && !is_y);
+    walk.cube = uvec3(ivec3(walk.cube) + steps);
+    walk.t_next = exits_of(walk.lattice, ray, walk.cube);
+    walk.t_enter = t;
+    return true;
+}
+
+// On to the next cell that has triangles. False where nothing nearer than t_best can follow.
+bool find_cell(TraversalRay ray, float t_best, inout GridWalk walk, inout Visit visit) {
+    bool goes_on = true;
+    bool seeks = true;
+    while (seeks) {
+        count_turn();
+        goes_on = step_on(ray, t_best, walk);
+        if (goes_on) visit = visit_cell(ray, t_best, walk);
+        seeks = goes_on && visit.entry_ix >= visit.end_ix && has_turns();
+        if (!seeks) break;
+    }
+    return goes_on;
+}
+
+// Stores where the ray is, and returns the mark for its result.
+uint stall_in_grid(GridWalk walk, Visit visit, Nearest best) {
+    vec2 weights = spilled_pair(WEIGHTS_SLOT);
+    return stall(StalledRay(
+        pack_cube(walk.cube), walk.t_enter, 0.0, visit.entry_ix, visit.end_ix,
+        best.t, best.triangle_ix, weights.x, weights.y, steps_so_far(), uvec2(walk.upper_cube, 0u)
+    ));
+}
+
+// Takes up the ray's stored state. All times are computed by the same operations as before, so they have the same bits.
+void resume_in_grid(TraversalRay ray, out GridWalk walk, out Visit visit, out Nearest best) {
+    StalledRay state = stalled_rays[resumed_slot];
+    walk.lattice = upper_lattice();
+    walk.first_cell = 0u;
+    walk.upper_cube = IN_UPPER_LEVEL;
+    walk.t_exit = min(ray.t_exit, LARGEST_T);
+    if (state.siblings_done.x != IN_UPPER_LEVEL) {
+        walk.upper_cube = state.siblings_done.x;
+        uvec3 upper = unpack_cube(walk.upper_cube);
+        uvec2 block = load_grid_cells(place_of(walk.lattice, upper));
+        walk.t_exit = min(least_of(exits_of(walk.lattice, ray, upper)), walk.t_exit);
+        walk.lattice = lattice_within(walk.lattice, upper, block.y);
+        walk.first_cell = block.x;
+    }
+    walk.cube = unpack_cube(state.node_offset);
+    walk.t_next = exits_of(walk.lattice, ray, walk.cube);
+    walk.t_enter = state.t_enter;
+    best = Nearest(state.t_best, state.triangle_ix);
+    spill_pair(WEIGHTS_SLOT, state.u, state.v);
+    visit = Visit(state.entry_ix, state.end_ix, segment_of(walk.t_enter, min(t_leave_of(walk), best.t)));
+    count_steps(state.n_steps);
+}
+
+// Goes through all cells that the ray meets in [t_enter, t_exit], until nothing nearer can follow. Each turn tests one triangle or
+// goes on to the next cell that has some. Returns 0, or the mark of a ray that has stalled.
+uint search_grid(TraversalRay ray, bool any_hit, inout Nearest best) {
+    if (!is_in(ray)) return 0u;
+    GridWalk walk;
+    Visit visit;
+    if (is_resumed()) {
+        resume_in_grid(ray, walk, visit, best);
+    } else {
+        walk = enter_grid(ray);
+        visit = visit_cell(ray, best.t, walk);
+    }
+    uint mark = 0u;
+    bool goes_on = true;
+    while (goes_on) {
+        count_turn();
+        uint entry_ix;
+        if (find_candidate(ray, visit, entry_ix)) {
+            LeafTriangle entry = leaf_triangle_at(entry_ix);
+            intersect(ray, corners_of(entry), entry.triangle_ix, best);
+            goes_on = !is_done(any_hit, best);
+        } else if (has_turns()) {
+            goes_on = find_cell(ray, best.t, walk, visit);
+        }
+        if (goes_on && !has_turns()) {
+            mark = stall_in_grid(walk, visit, best);
+            goes_on = false;
+        }
+        if (!goes_on) break;
+    }
+    return mark;
+}

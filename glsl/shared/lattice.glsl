@@ -1,0 +1,49 @@
+// Cubes side by side that fill a box from its least corner on: the cells of a grid, or those of a block of its lower level. At its
+// greatest corner the box may cut some of them. Twin of src/accel/grid/lattice.rs; all bits are the same.
+#ifndef KDRAY_LATTICE
+#define KDRAY_LATTICE
+
+#include "layout.glsl"
+
+// Lengths and coordinates in world units. n_cells: the number of cubes along each axis.
+struct Lattice {
+    vec3 least;
+    float cell_size;
+    vec3 greatest;
+    uvec3 n_cells;
+};
+
+// Where the cubes of these indices begin on each axis, and those before them end. `precise`: a triangle is in a cell by the
+// same planes by which a ray is.
+vec3 planes_of(Lattice lattice, uvec3 cube) {
+    precise vec3 offsets = vec3(cube) * lattice.cell_size;
+    precise vec3 planes = lattice.least + offsets;
+    return min(planes, lattice.greatest);
+}
+
+// About the cube that has a point, or else one at the border.
+uvec3 cube_near(Lattice lattice, vec3 point) {
+    vec3 indices = (point - lattice.least) / lattice.cell_size;
+    return uvec3(clamp(indices, vec3(0.0), vec3(lattice.n_cells - 1u)));
+}
+
+// The place of a cube in the order of all: x fastest, then y.
+uint place_of(Lattice lattice, uvec3 cube) {
+    return cube.x + lattice.n_cells.x * (cube.y + lattice.n_cells.y * cube.z);
+}
+
+// The edge's length of the cubes that a cube is cut into. 1 / resolution is rounded up to a multiple of 2^-16, by integers alone:
+// the last bit of a quotient of floats is not the same on every device.
+float cell_size_within(Lattice lattice, uint resolution) {
+    uint share = ((1u << 16) + resolution - 1u) / resolution;
+    precise float cell_size = lattice.cell_size * (float(share) * (1.0 / 65536.0));
+    return cell_size;
+}
+
+// The lattice that cuts a cube into `resolution` cubes along each axis.
+Lattice lattice_within(Lattice lattice, uvec3 cube, uint resolution) {
+    float cell_size = cell_size_within(lattice, resolution);
+    return Lattice(planes_of(lattice, cube), cell_size, planes_of(lattice, cube + 1u), uvec3(resolution));
+}
+
+#endif

@@ -1,0 +1,94 @@
+//! What an acceleration structure holds.
+
+use std::fmt::{self, Display};
+
+use serde::Serialize;
+
+use super::{AccelKind, grid, kdtree};
+
+/// An acceleration structure in numbers. As JSON it is a member `tree` or `grid`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub enum Statistics {
+    /// A kd-tree in numbers.
+    #[serde(rename = "tree")]
+    KdTree(kdtree::Statistics),
+    /// A grid in numbers.
+    #[serde(rename = "grid")]
+    Grid(grid::Statistics),
+}
+
+impl Statistics {
+    /// The kind of the structure.
+    pub fn kind(&self) -> AccelKind {
+        match self {
+            Self::KdTree(_) => AccelKind::KdTree,
+            Self::Grid(grid) if grid.n_levels == 1 => AccelKind::Grid,
+            Self::Grid(_) => AccelKind::Grid2,
+        }
+    }
+
+    /// The memory that the structure takes, bytes.
+    pub fn bytes(&self) -> u64 {
+        match self {
+            Self::KdTree(tree) => tree.bytes,
+            Self::Grid(grid) => grid.bytes,
+        }
+    }
+
+    /// Names and values for a table, all but the memory.
+    pub fn rows(&self) -> Vec<(&'static str, String)> {
+        match self {
+            Self::KdTree(tree) => vec![
+                ("nodes", tree.n_nodes.to_string()),
+                ("leaves", tree.n_leaves.to_string()),
+                ("empty leaves", tree.n_empty_leaves.to_string()),
+                ("slabs", tree.n_slabs.to_string()),
+                ("depth", tree.depth.to_string()),
+                ("references", tree.n_references.to_string()),
+                ("references a triangle", format!("{:.2}", tree.references_per_triangle)),
+                ("SAH cost", format!("{:.2}", tree.sah_cost)),
+            ],
+            Self::Grid(grid) => vec![
+                ("resolution", resolution(grid)),
+                ("cells", grid.n_cells.to_string()),
+                ("empty cells", grid.n_empty_cells.to_string()),
+                ("references", grid.n_references.to_string()),
+                ("references a triangle", format!("{:.2}", grid.references_per_triangle)),
+                ("times coarsened", grid.n_coarser.to_string()),
+            ],
+        }
+    }
+}
+
+/// The number of cells of the upper level along each axis.
+fn resolution(grid: &grid::Statistics) -> String {
+    let [x, y, z] = grid.resolution;
+    format!("{x} x {y} x {z}")
+}
+
+/// One line, which begins with the structure's name.
+impl Display for Statistics {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}: ", self.kind().name())?;
+        match self {
+            Self::KdTree(tree) => {
+                let kdtree::Statistics { n_nodes, depth, references_per_triangle, .. } = tree;
+                write!(f, "{n_nodes} nodes, depth {depth}, {references_per_triangle:.2} references a triangle")
+            }
+            Self::Grid(grid) => {
+                let empty = 100.0 * grid.n_empty_cells as f64 / grid.n_cells.max(1) as f64;
+                let (resolution, references) = (resolution(grid), grid.references_per_triangle);
+                let upper = if grid.n_levels == 1 { "" } else { " on the upper level" };
+                write!(
+                    f,
+                    "{resolution} cells{upper}, {} in all, {empty:.0} % of them empty, {references:.2} references a triangle",
+                    grid.n_cells
+                )?;
+                match grid.n_coarser {
+                    0 => Ok(()),
+                    n => write!(f, "; made coarser {n} times to keep to the limit of memory"),
+                }
+            }
+        }
+    }
+}
