@@ -16,6 +16,7 @@ use kdray::{
         rays::{RayKind, RaySet, ray_sets},
         stage::Stage,
         traversal::Tracers,
+        variant::Variant,
     },
     layout::{Hit, NO_TRIANGLE, PathRay},
     reference::traverser::{Tracer, Traverser},
@@ -153,8 +154,9 @@ fn a_deliberately_wrong_hit_is_counted() {
 fn a_wrong_tree_is_noticed() {
     let mut stage = Stage::in_room(mesh(), SIZE, &BuildOptions::default());
     let sets = ray_sets(&stage);
-    let measured =
-        |stage: &Stage| Tracers::new(None, stage, &[Traversal::Stack]).unwrap().measure(&sets[0], 1).unwrap();
+    let measured = |stage: &Stage| {
+        Tracers::new(None, stage, &[Variant::KdTree(Traversal::Stack)]).unwrap().measure(&sets[0], 1).unwrap()
+    };
     let right = measured(&stage);
     assert!(right.n_hits == N_PIXELS && right.variants[0].difference == Difference::default());
     let seen = closest_hits(&stage, &sets[0].rays)[N_PIXELS / 2].triangle_ix;
@@ -217,7 +219,7 @@ fn traversal_measures_every_variant_on_every_set() {
         assert_eq!(names, ["primary", "shadow", "mirror", "diffuse"]);
         for set in sets {
             let variants = set["variants"].as_array().unwrap();
-            assert_eq!(variants.len(), if more.contains(&"--variants") { 2 } else { Traversal::ALL.len() - 1 });
+            assert_eq!(variants.len(), if more.contains(&"--variants") { 2 } else { Variant::all().len() });
             for variant in variants {
                 let name = variant["traversal"].as_str().unwrap();
                 assert!(text.contains(name) && svg.contains(name), "{name}");

@@ -7,12 +7,13 @@ use std::sync::Arc;
 
 use glam::{Vec3, vec3};
 use kdray::{
-    accel::{Query, kdtree::Traversal},
+    accel::{Accel, AccelOptions, Query, grid::GridOptions, kdtree::Traversal},
     cast::{Caster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
     frame::{Picture, Primary, Profile, RenderOptions},
     gpu::{Context, DeviceOverrides},
     layout::Feature,
     render::Renderer,
+    world::Geometry,
 };
 use support::{MeshWithTree, compare, meshes, pretended, random::Random, rays::nasty_ray, scenes, world_of};
 
@@ -123,6 +124,31 @@ fn interrupted_casts_find_the_same() {
             }
         }
         limited.iter().for_each(|context| assert_silent(context));
+    }
+}
+
+#[test]
+fn interrupted_casts_through_grids_find_the_same() {
+    let world = MeshWithTree::new([meshes::soup(500, 1), meshes::torus(20, 10)].concat());
+    let rays = nasty_rays(&world, 300);
+    let options = [GridOptions::uniform(), GridOptions::two_level()].map(AccelOptions::Grid);
+    for accel in options.map(|options| Accel::new(&world.triangles, &options)) {
+        let geometry = Geometry::new(&world.triangles, &accel).expect("a grid of these triangles");
+        let cast = |context: &Arc<Context>, query| {
+            let mut caster = Caster::new(context, geometry, Traversal::OF_GPUS).expect("a caster");
+            caster.cast(&rays, query, 1).expect("a cast").hits
+        };
+        for n_lanes in [None, Some(1000)] {
+            let plain = pretended(DeviceOverrides { n_lanes, ..DeviceOverrides::default() });
+            for (turns, n_slots) in [(1000, Some(100)), (1000, None), (5000, None)] {
+                let limited = limited_device(turns, n_lanes, n_slots);
+                for query in [Query::Closest, Query::Any] {
+                    compare::exact(&cast(&plain, query), &cast(&limited, query))
+                        .unwrap_or_else(|e| panic!("{} {query:?}: {e}", accel.kind()));
+                }
+                assert_silent(&limited);
+            }
+        }
     }
 }
 

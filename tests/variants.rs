@@ -1,13 +1,13 @@
-//! The kernels' traversals on the device: each finds, bit for bit, what the kernel without a tree finds, and that finds
-//! what brute force on the CPU finds. Under the validation layer.
+//! The kernels' searches on the device, through kd-trees and grids: each finds, bit for bit, what the kernel without a
+//! structure finds, and that finds what brute force on the CPU finds. Under the validation layer.
 
 mod support;
 
-use std::sync::Arc;
+use std::{fmt::Display, sync::Arc};
 
 use glam::{Vec3, vec3};
 use kdray::{
-    accel::kdtree::{BuildOptions, KdTree, Traversal},
+    accel::kdtree::{BuildOptions, Traversal},
     buffers::{Needs, Resources},
     frame::RenderOptions,
     gpu::{Access, Context, ContextOptions, GpuError},
@@ -60,12 +60,11 @@ struct Traced {
     n_hits: u32,
 }
 
-fn traced(context: &Arc<Context>, scene: &FlatScene, tree: &KdTree, rays: &[PathRay], traversal: Traversal) -> Traced {
+fn traced(context: &Arc<Context>, world: &World, rays: &[PathRay], traversal: Traversal) -> Traced {
     let options = RenderOptions { width: 8, height: 8, max_depth: 1, traversal, ..RenderOptions::default() };
-    let world = World::with_tree(scene.clone(), tree.clone(), &BuildOptions::default()).expect("a world");
     let constants = Frame { queue_capacity: rays.len() as u32, ..world.frame_constants(&options) };
     let needs = Needs { constants: &constants, options: &options, n_bounces: 1 };
-    let resources = Resources::new(context, &world, &needs).expect("resources");
+    let resources = Resources::new(context, world, &needs).expect("resources");
     let passes = Passes::new(context, &resources.bindings, &options).expect("passes");
     resources.queue.rays.upload(rays).expect("rays");
     resources.bounces.upload(&[Bounce::of(rays.len() as u32, &constants)]).expect("bounces");
@@ -96,21 +95,28 @@ fn difference(rays: &[PathRay], expected: &Traced, found: &Traced) -> Option<Str
     wrong.map(describe).or_else(|| (expected != found).then(|| "light_visibility or counters".to_owned()))
 }
 
+fn world_of_tree(mesh: &MeshWithTree) -> World {
+    let (scene, tree) = (scene(&mesh.triangles), mesh.tree().clone());
+    World::with_tree(scene, tree, &BuildOptions::default()).expect("a world")
+}
+
 fn check(context: &Arc<Context>, name: &str, triangles: Vec<Triangle>) {
     let world = MeshWithTree::new(triangles);
-    let scene = scene(&world.triangles);
+    let with_tree = world_of_tree(&world);
     let rays: Vec<PathRay> = (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), &world, i)).collect();
-    let without_tree = traced(context, &scene, world.tree(), &rays, Traversal::Brute);
+    let without_tree = traced(context, &with_tree, &rays, Traversal::Brute);
     check_against_cpu(name, &world, &rays, &without_tree);
-    let wrong: Vec<String> = Traversal::ALL
-        .iter()
-        .filter_map(|&traversal| {
-            let found = traced(context, &scene, world.tree(), &rays, traversal);
-            let difference = difference(&rays, &without_tree, &found)?;
-            Some(format!("{name}, {traversal}: {difference}"))
-        })
-        .collect();
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    let assert_same = |variant: &dyn Display, found: &Traced| {
+        if let Some(difference) = difference(&rays, &without_tree, found) {
+            panic!("{name}, {variant}: {difference}");
+        }
+    };
+    for &traversal in Traversal::ALL {
+        assert_same(&traversal, &traced(context, &with_tree, &rays, traversal));
+    }
+    for with_grid in support::grid_worlds(with_tree.scene()) {
+        assert_same(&with_grid.accel().kind(), &traced(context, &with_grid, &rays, Traversal::Mask));
+    }
 }
 
 /// A device's division may differ in the last bits, and with it a hit at an edge.
@@ -145,7 +151,7 @@ fn a_wrong_bit_is_noticed() {
     let world = MeshWithTree::new(meshes::torus(20, 10));
     let rays: Vec<PathRay> = (0..64).map(|i| nasty_ray(&mut Random(i), &world, i as usize)).collect();
     let context = context();
-    let of = |traversal| traced(&context, &scene(&world.triangles), world.tree(), &rays, traversal);
+    let of = |traversal| traced(&context, &world_of_tree(&world), &rays, traversal);
     let expected = of(Traversal::Mask);
     for wrong in 0..4 {
         let mut found = of(Traversal::Mask);

@@ -27,6 +27,30 @@ impl Statistics {
         }
     }
 
+    /// What the structure is made of: `nodes` or `cells`.
+    pub fn parts(&self) -> &'static str {
+        match self {
+            Self::KdTree(_) => "nodes",
+            Self::Grid(_) => "cells",
+        }
+    }
+
+    /// The number of nodes or cells.
+    pub fn n_parts(&self) -> u64 {
+        match self {
+            Self::KdTree(tree) => tree.n_nodes,
+            Self::Grid(grid) => grid.n_cells,
+        }
+    }
+
+    /// The number of entries of all leaves or cells.
+    pub fn n_references(&self) -> u64 {
+        match self {
+            Self::KdTree(tree) => tree.n_references,
+            Self::Grid(grid) => grid.n_references,
+        }
+    }
+
     /// The memory that the structure takes, bytes.
     pub fn bytes(&self) -> u64 {
         match self {

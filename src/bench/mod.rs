@@ -22,6 +22,7 @@ pub mod rays;
 pub mod size;
 pub mod stage;
 pub mod traversal;
+pub mod variant;
 
 use std::time::{Duration, Instant};
 

@@ -13,9 +13,10 @@ use super::{
     rays::{RayKind, RaySet},
     stage::Stage,
     traversal::{SetResult, StepsARay, Tracers},
+    variant::Variant,
 };
 use crate::{
-    accel::kdtree::{BuildOptions, Statistics, Traversal},
+    accel::{AccelKind, Statistics, kdtree::BuildOptions},
     gpu::{Context, GpuError},
     scene::{
         Camera, Instance, Material, RenderDefaults, Scene, Transform,
@@ -75,6 +76,14 @@ impl Sized {
         Self { n_triangles: scene.triangles.len(), stage: Stage::in_room(scene, size, build_options), generate_ms }
     }
 
+    /// The structure that a variant searches in numbers, and what it took to build it.
+    fn build(&self, variant: Variant) -> (Statistics, f64) {
+        let begin = Instant::now();
+        let statistics = self.stage.statistics(variant); // builds a grid
+        let grid_ms = begin.elapsed().as_secs_f64() * 1e3;
+        (statistics, if variant.accel() == AccelKind::KdTree { self.stage.tree_build_ms } else { grid_ms })
+    }
+
     /// Casts the rays `n_times` on a device, or without one on the current rayon pool.
     ///
     /// # Errors
@@ -82,19 +91,20 @@ impl Sized {
     pub fn measure(
         &self,
         context: Option<&Arc<Context>>,
-        traversal: Traversal,
+        variant: Variant,
         sets: &[RaySet],
         n_times: u16,
     ) -> Result<Row, GpuError> {
-        let variants = [traversal];
+        let (accel, build_ms) = self.build(variant);
+        let variants = [variant];
         let mut tracers = Tracers::new(context, &self.stage, &variants)?;
         let rays = sets.iter().map(|set| Ok(RayCost::new(&tracers.measure(set, n_times)?)));
         Ok(Row {
             n_triangles: self.n_triangles,
             generate_ms: self.generate_ms,
-            build_ms: self.stage.tree_build_ms,
+            build_ms,
             rays: rays.collect::<Result<_, GpuError>>()?,
-            tree: self.stage.tree_statistics(),
+            accel,
         })
     }
 }
@@ -106,9 +116,11 @@ pub struct Row {
     pub n_triangles: usize,
     /// The mesh, wall-clock.
     pub generate_ms: f64,
-    /// The kd-tree, wall-clock.
+    /// The structure, wall-clock.
     pub build_ms: f64,
-    pub tree: Statistics,
+    /// As `tree` or `grid`.
+    #[serde(flatten)]
+    pub accel: Statistics,
     /// One a set.
     pub rays: Vec<RayCost>,
 }
@@ -187,6 +199,11 @@ pub struct RayGrowth {
 }
 
 impl Report {
+    /// What the structure is made of: `nodes` or `cells`.
+    pub fn parts(&self) -> &'static str {
+        self.rows.first().map_or("nodes", |row| row.accel.parts())
+    }
+
     /// None of fewer than two sizes.
     pub fn growth(&self) -> Option<Growth> {
         let [first, .., last] = &self.rows[..] else { return None };

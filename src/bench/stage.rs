@@ -4,16 +4,18 @@ use std::time::Instant;
 
 use glam::{BVec3, Vec3};
 
+use super::variant::Variant;
 use crate::{
     accel::{
-        Statistics,
+        Accel, AccelOptions, Statistics,
+        grid::GridOptions,
         kdtree::{self, BuildOptions, KdTree, TraversalLinks},
     },
     frame::RenderOptions,
     layout::{FLAT_NORMAL, Frame, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
     reference::inputs::KernelInputs,
     scene::Camera,
-    world::{FlatScene, World},
+    world::{FlatScene, Geometry, World},
 };
 
 /// From the middle of the picture towards the eye, in a room: from the front, the right and above.
@@ -28,6 +30,7 @@ pub struct Stage {
     pub tree_build_ms: f64,
     /// What any traversal reads beside the tree.
     pub links: TraversalLinks,
+    grids: [Accel; 2],
     /// The camera's constants. `queue_capacity` is 0: there is no queue.
     pub frame: Frame,
     /// Where shadow rays go to.
@@ -47,7 +50,9 @@ impl Stage {
         let tree_build_ms = begin.elapsed().as_secs_f64() * 1e3;
         let options = RenderOptions { width: size.0, height: size.1, ..RenderOptions::default() };
         let frame = world.frame_constants(&options);
-        Self { links: TraversalLinks::all(world.tree()), world, tree_build_ms, frame, light }
+        let grids = [GridOptions::uniform(), GridOptions::two_level()]
+            .map(|options| Accel::new(&world.scene().triangles, &AccelOptions::Grid(options)));
+        Self { links: TraversalLinks::all(world.tree()), world, grids, tree_build_ms, frame, light }
     }
 
     /// The scene on the floor of a closed room, seen from inside the room, with a point light under its ceiling.
@@ -79,7 +84,30 @@ impl Stage {
         }
     }
 
-    /// What a traversal on the CPU reads.
+    /// The triangles with the structure that a variant searches.
+    pub fn geometry(&self, variant: Variant) -> Geometry<'_> {
+        let accel = match variant {
+            Variant::KdTree(_) => return self.world.geometry(),
+            Variant::Grid => &self.grids[0],
+            Variant::Grid2 => &self.grids[1],
+        };
+        Geometry::new(&self.scene().triangles, accel).expect("a grid of these triangles")
+    }
+
+    /// The structure that a variant searches in numbers. The host builds a grid, unless it has done so already.
+    pub fn statistics(&self, variant: Variant) -> Statistics {
+        match self.geometry(variant).accel() {
+            Accel::KdTree(_) => self.world.statistics(),
+            Accel::Grid(grid) => Statistics::Grid(grid.get(&self.scene().triangles).statistics()),
+        }
+    }
+
+    /// What a variant on the CPU reads.
+    pub fn inputs_of(&self, variant: Variant) -> KernelInputs<'_> {
+        KernelInputs::of_geometry(self.geometry(variant)).with_links(&self.links)
+    }
+
+    /// What a traversal of the kd-tree on the CPU reads.
     pub fn inputs(&self) -> KernelInputs<'_> {
         KernelInputs::new(&self.world, &self.frame).with_links(&self.links)
     }

@@ -1,4 +1,4 @@
-//! Every way through the kd-tree on the same rays: how fast, and whether all find the same.
+//! Every search through the kd-tree and through grids on the same rays: how fast, and whether all find the same.
 
 use std::{sync::Arc, time::Instant};
 
@@ -11,6 +11,7 @@ use super::{
     difference::Difference,
     rays::{RayKind, RaySet},
     stage::Stage,
+    variant::Variant,
 };
 use crate::{
     accel::{
@@ -30,7 +31,7 @@ pub const CASTS_A_TURN: u16 = 5;
 /// The variants on one stage, ready for rays.
 pub struct Tracers<'a> {
     stage: &'a Stage,
-    variants: &'a [Traversal],
+    variants: &'a [Variant],
     /// One a variant; none: all threads of the CPU.
     casters: Option<Vec<Caster>>,
 }
@@ -40,8 +41,8 @@ impl<'a> Tracers<'a> {
     ///
     /// # Errors
     /// As [`Caster::new`].
-    pub fn new(context: Option<&Arc<Context>>, stage: &'a Stage, variants: &'a [Traversal]) -> Result<Self, GpuError> {
-        let caster = |context, variant| Caster::new(context, stage.world.geometry(), variant);
+    pub fn new(context: Option<&Arc<Context>>, stage: &'a Stage, variants: &'a [Variant]) -> Result<Self, GpuError> {
+        let caster = |context, variant: Variant| Caster::new(context, stage.geometry(variant), variant.traversal());
         let casters = context.map(|context| variants.iter().map(|&variant| caster(context, variant)).collect());
         Ok(Self { stage, variants, casters: casters.transpose()? })
     }
@@ -53,7 +54,7 @@ impl<'a> Tracers<'a> {
     pub fn measure(&mut self, set: &RaySet, n_times: u16) -> Result<SetResult, GpuError> {
         let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
         let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
-        let expected = self.cast_on_cpu(Traversal::Mask, &rays, query);
+        let expected = self.cast_on_cpu(Variant::KdTree(Traversal::Mask), &rays, query);
         let mut results = vec![(Some(Vec::new()), Difference::default()); self.variants.len()];
         let n_warm_up = self.n_warm_up(&rays, query)?;
         for n_casts in turns(n_times) {
@@ -63,12 +64,12 @@ impl<'a> Tracers<'a> {
                 *difference = difference.max(Difference::of(set.kind, &expected, &hits));
             }
         }
-        let bindings = self.stage.inputs();
         let result = |(variant_ix, (ms, difference)): (usize, (Option<Vec<f64>>, _))| {
             let variant = self.variants[variant_ix];
             let ms = ms.and_then(Spread::of);
             let mrays_per_s = ms.and_then(|ms| ms.mrays_per_s(rays.len() as u64));
-            let steps = count_steps(&bindings, variant, query, &set.rays);
+            let inputs = self.stage.inputs_of(variant);
+            let steps = count_steps(&inputs, variant.traversal(), query, &set.rays);
             let steps_a_ray = StepsARay::new(&steps, rays.len());
             let kernel = match &self.casters {
                 Some(casters) => casters[variant_ix].statistics(query)?,
@@ -84,7 +85,7 @@ impl<'a> Tracers<'a> {
         })
     }
 
-    /// Casts that each turn begins with, untimed: the rays have just been uploaded, another variant's tree is in the
+    /// Casts that each turn begins with, untimed: the rays have just been uploaded, another variant's structure is in the
     /// caches, and while the CPU compared hits the device's clock may have fallen. One at least.
     fn n_warm_up(&mut self, rays: &[Ray], query: Query) -> Result<u16, GpuError> {
         let Some(caster) = self.casters.as_mut().and_then(|casters| casters.first_mut()) else { return Ok(1) };
@@ -114,9 +115,9 @@ impl<'a> Tracers<'a> {
         Ok((hits, Some(ms)))
     }
 
-    fn cast_on_cpu(&self, variant: Traversal, rays: &[Ray], query: Query) -> Vec<Hit> {
+    fn cast_on_cpu(&self, variant: Variant, rays: &[Ray], query: Query) -> Vec<Hit> {
         let mut hits = vec![Hit::zeroed(); rays.len()];
-        cpu::cast(&self.stage.inputs(), variant, query, rays, &mut hits);
+        cpu::cast(&self.stage.inputs_of(variant), variant.traversal(), query, rays, &mut hits);
         hits
     }
 }
@@ -160,9 +161,10 @@ impl VariantResult {
     }
 }
 
-/// What is read of the tree, in the mean of a set's rays.
+/// What is read of the structure, in the mean of a set's rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct StepsARay {
+    /// Nodes of a kd-tree, cells of a grid.
     pub nodes: f64,
     /// Links to parents, and ropes.
     pub links: f64,

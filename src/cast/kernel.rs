@@ -10,9 +10,9 @@ use crate::{
     passes::Cast,
 };
 
-/// One way through the tree.
+/// A search through an acceleration structure.
 pub struct Kernel {
-    traversal: Traversal,
+    name: String,
     cast: Cast,
     resources: Rc<CastResources>,
 }
@@ -29,13 +29,19 @@ impl Kernel {
         (traversal, query): (Traversal, Query),
     ) -> Result<Self, GpuError> {
         let cast = Cast::new(context, bindings, traversal, query)?;
-        Ok(Self { traversal, cast, resources: Rc::clone(resources) })
+        Ok(Self { name: traversal.to_string(), cast, resources: Rc::clone(resources) })
+    }
+
+    /// The same under another name than the traversal's.
+    #[must_use]
+    pub fn named(self, name: String) -> Self {
+        Self { name, ..self }
     }
 }
 
 impl Contender for Kernel {
     fn name(&self) -> String {
-        self.traversal.to_string()
+        self.name.clone()
     }
 
     fn access(&self) -> Access {

@@ -51,18 +51,21 @@ pub fn accel_help() -> String {
 
 /// Refuses words about kd-trees where a grid is asked for.
 pub fn check_accel(accel: AccelKind, traversal: Wanted<Traversal>, build: BuildPolicy) -> Result<(), CliError> {
-    if accel == AccelKind::KdTree {
-        return Ok(());
+    check_traversal(accel, traversal.pinned())?;
+    if accel != AccelKind::KdTree && build != BuildPolicy::Auto {
+        return Err(CliError::Usage(format!(
+            "--build says how much work goes into the kd-tree: with --accel {accel}, a grid is built"
+        )));
     }
-    if traversal.pinned().is_some() {
+    Ok(())
+}
+
+/// Refuses a traversal of the kd-tree where a grid is asked for.
+pub fn check_traversal(accel: AccelKind, traversal: Option<Traversal>) -> Result<(), CliError> {
+    if accel != AccelKind::KdTree && traversal.is_some() {
         return Err(CliError::Usage(format!(
             "--traversal names an algorithm for the kd-tree: with --accel {accel}, rays go through a grid, for which there \
              is one algorithm"
-        )));
-    }
-    if build != BuildPolicy::Auto {
-        return Err(CliError::Usage(format!(
-            "--build says how much work goes into the kd-tree: with --accel {accel}, a grid is built"
         )));
     }
     Ok(())

@@ -22,9 +22,9 @@ use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::{meshes, pretended, scenes};
 
 /// What the device binds, bytes: enough for the pictures here.
-const RANGE: u64 = 48 << 10;
+pub const RANGE: u64 = 48 << 10;
 
-fn device_with(bytes: u64, n_texels: u32) -> Arc<Context> {
+pub fn device_with(bytes: u64, n_texels: u32) -> Arc<Context> {
     pretended(DeviceOverrides { storage_range: Some(bytes), n_texels: Some(n_texels), ..DeviceOverrides::default() })
 }
 
@@ -44,7 +44,7 @@ fn usual_reading(context: &Context, tree: &KdTree) -> SceneAccess {
 }
 
 /// With a ring of 16,000 triangles: none of its arrays can be bound then.
-fn large_world() -> World {
+pub fn large_world() -> World {
     let mut scene = scenes::mixed();
     scenes::add(&mut scene, meshes::torus(200, 40), scenes::mirror(Vec3::splat(0.8)));
     world_of(&scene)

@@ -11,6 +11,7 @@ mod closed_forms;
 mod compiler;
 mod crop;
 mod features;
+mod grids;
 mod lanes;
 mod large;
 mod living;

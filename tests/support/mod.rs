@@ -17,7 +17,8 @@ use std::sync::Arc;
 use glam::Vec3;
 use kdray::{
     accel::{
-        Accel,
+        Accel, AccelOptions,
+        grid::GridOptions,
         kdtree::{BuildOptions, KdTree, TraversalLinks},
     },
     gpu::{Context, ContextOptions, DeviceOverrides},
@@ -50,6 +51,13 @@ pub fn world_of(scene: &FlatScene) -> World {
 /// The scene with a tree that is built so.
 pub fn world_by(scene: &FlatScene, build_options: &BuildOptions) -> World {
     World::of_flat(scene.clone(), build_options).expect("a material for each triangle")
+}
+
+/// The scene with a grid of each kind.
+pub fn grid_worlds(scene: &FlatScene) -> [World; 2] {
+    [GridOptions::uniform(), GridOptions::two_level()].map(|options| {
+        World::with_accel(scene.clone(), &AccelOptions::Grid(options)).expect("a material for each triangle")
+    })
 }
 
 /// Triangles and their tree.

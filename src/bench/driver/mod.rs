@@ -1,4 +1,4 @@
-//! kdray's traversal against the driver's own ray tracing, on the same rays and triangles in one run.
+//! kdray's searches against the driver's own ray tracing, on the same rays and triangles in one run.
 //!
 //! ```text
 //! contest   ways of tracing that take turns on a device -> times, hits
@@ -24,25 +24,64 @@ use super::{
     Spread,
     rays::{RayKind, RaySet},
     stage::Stage,
+    variant::Variant,
 };
 use crate::{
-    accel::{Query, kdtree::Traversal},
+    accel::{AccelKind, Query, kdtree::Traversal},
     buffers::{AccelBuffers, CastResources},
-    cast::{Contender, Kernel, cast_ray},
+    cast::{Contender, Kernel, Ray, cast_ray},
     gpu::{BindingLayout, Context, GpuError, Scenery},
 };
 
-/// kdray's ways through the tree that are measured: the default one, the one that keeps a stack in memory, and the one that
-/// needs neither, but six words more a node.
-pub const VARIANTS: [Traversal; 3] = [Traversal::Mask, Traversal::Stack, Traversal::Ropes];
+/// The searches of kdray that are measured. Of the kd-tree's, the first is the default one, the second keeps a stack in memory,
+/// and the third needs neither, but six words more a node.
+pub const VARIANTS: [Variant; 5] = [
+    Variant::KdTree(Traversal::Mask),
+    Variant::KdTree(Traversal::Stack),
+    Variant::KdTree(Traversal::Ropes),
+    Variant::Grid,
+    Variant::Grid2,
+];
 /// Builds of the driver's structure, of which the median counts.
 const N_BUILDS: usize = 5;
+
+/// One of kdray's structures on the device, with all that the searches of [`VARIANTS`] read of it.
+struct Structure {
+    kind: AccelKind,
+    buffers: AccelBuffers,
+    bindings: Arc<BindingLayout>,
+}
+
+impl Structure {
+    fn new(context: &Arc<Context>, stage: &Stage, variant: Variant) -> Result<Self, GpuError> {
+        let geometry = stage.geometry(variant);
+        let mut buffers = AccelBuffers::new(context, geometry)?;
+        buffers.add_links(context, geometry.accel(), Traversal::Ropes)?;
+        Ok(Self { kind: variant.accel(), bindings: CastResources::bindings(context, &buffers)?, buffers })
+    }
+
+    /// The searches through the structure, which are to trace these rays.
+    fn contenders(
+        &self,
+        context: &Arc<Context>,
+        rays: &[Ray],
+        query: Query,
+    ) -> Result<(Rc<CastResources>, Vec<Box<dyn Contender>>), GpuError> {
+        let resources = Rc::new(CastResources::new(context, &self.bindings, &self.buffers, rays.len())?);
+        resources.cast_rays.upload(rays)?;
+        let mut contenders: Vec<Box<dyn Contender>> = Vec::new();
+        for variant in VARIANTS.into_iter().filter(|variant| variant.accel() == self.kind) {
+            let kernel = Kernel::new(context, &self.bindings, &resources, (variant.traversal(), query))?;
+            contenders.push(Box::new(kernel.named(variant.to_string())));
+        }
+        Ok((resources, contenders))
+    }
+}
 
 /// A stage on a device that has ray tracing, ready for rays.
 pub struct Arena {
     context: Arc<Context>,
-    tree: AccelBuffers,
-    bindings: Arc<BindingLayout>,
+    structures: Vec<Structure>,
     scenery: Rc<Scenery>,
     rasters: Vec<Raster>,
     builds: Builds,
@@ -61,11 +100,10 @@ impl Arena {
             scenery = Scenery::new(context, triangles)?;
             build_ms.push(scenery.build_ms());
         }
-        let mut tree = AccelBuffers::new(context, stage.world.geometry())?;
-        tree.add_links(context, stage.world.accel(), Traversal::Ropes)?;
+        let structures = [VARIANTS[0], Variant::Grid, Variant::Grid2];
+        let structures = structures.map(|variant| Structure::new(context, stage, variant));
         Ok(Self {
-            bindings: CastResources::bindings(context, &tree)?,
-            tree,
+            structures: structures.into_iter().collect::<Result<_, _>>()?,
             scenery: Rc::new(scenery),
             rasters: Raster::all(context, stage)?,
             builds: Builds {
@@ -90,13 +128,13 @@ impl Arena {
     pub fn measure(&mut self, set: &RaySet, n_times: u16) -> Result<(SetResult, Vec<RasterResult>), GpuError> {
         let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
         let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
-        let resources = Rc::new(CastResources::new(&self.context, &self.bindings, &self.tree, rays.len())?);
-        resources.cast_rays.upload(&rays)?;
-
-        let mut contenders: Vec<Box<dyn Contender>> =
-            vec![Box::new(Pipeline::new(&self.context, &self.scenery, &resources, query)?)];
-        for variant in VARIANTS {
-            contenders.push(Box::new(Kernel::new(&self.context, &self.bindings, &resources, (variant, query))?));
+        let mut contenders: Vec<Box<dyn Contender>> = Vec::new();
+        for structure in &self.structures {
+            let (resources, kernels) = structure.contenders(&self.context, &rays, query)?;
+            if contenders.is_empty() {
+                contenders.push(Box::new(Pipeline::new(&self.context, &self.scenery, &resources, query)?));
+            }
+            contenders.extend(kernels);
         }
         let rasterizes = set.kind == RayKind::Primary;
         let trials = hold(&self.context, &contenders, n_times, |n_rounds| {

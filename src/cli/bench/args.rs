@@ -4,8 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::{Subcommand, value_parser};
 use kdray::{
-    accel::kdtree::Traversal,
-    bench::size::{MIN_TRIANGLES, MOST_TRIANGLES, SIZES},
+    accel::{AccelKind, kdtree::Traversal},
+    bench::{
+        size::{MIN_TRIANGLES, MOST_TRIANGLES, SIZES},
+        variant::Variant,
+    },
     gpu::DeviceSelector,
     output,
 };
@@ -14,7 +17,7 @@ use crate::cli::{
     args::{Size, device},
     error::CliError,
     file_roles::FileRoles,
-    picture_args::{traversal_help, traversals_of_devices},
+    picture_args::{accel_help, traversal_help, traversals_of_devices},
 };
 
 /// What is measured.
@@ -22,7 +25,7 @@ use crate::cli::{
 pub enum Suite {
     /// The paper's table: its four scenes, whole frames on the GPU and on one CPU thread, beside its own times
     Paper(PaperArgs),
-    /// All traversals of the kd-tree, on primary, shadow, mirror and diffuse rays of a mesh
+    /// All traversals of the kd-tree, and grids, on primary, shadow, mirror and diffuse rays of a mesh
     Traversal(TraversalArgs),
     /// The traversal against the driver's own ray tracing, on the same rays; exits with 4 where the device lacks it
     Driver(DriverArgs),
@@ -65,8 +68,8 @@ pub struct TraversalArgs {
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    #[arg(help = format!("Ways through the tree, as mask,stack: {} [default: all but brute]", Traversal::words()))]
-    pub variants: Vec<Traversal>,
+    #[arg(help = format!("Traversals of the kd-tree and grids, as mask,stack,grid: {} [default: all but brute]", Variant::words()))]
+    pub variants: Vec<Variant>,
     /// Timed casts of each set of rays
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
@@ -112,6 +115,8 @@ pub struct SizeArgs {
     /// Pixels, one primary ray each
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,
+    #[arg(long, value_name = "KIND", help = accel_help(), default_value_t)]
+    pub accel: AccelKind,
     #[arg(long, value_name = "ALGORITHM")]
     #[arg(help = traversal_help())]
     pub traversal: Option<Traversal>,

@@ -3,10 +3,11 @@
 use std::sync::Arc;
 
 use kdray::{
-    accel::kdtree::Traversal,
+    accel::AccelKind,
     bench::{
         rays::ray_sets,
         size::{RayGrowth, Report, Row, Sized},
+        variant::Variant,
     },
     engine::choices::{Processor, TreeKind, traversal_by_rule},
     gpu::{Context, ContextOptions, GpuError},
@@ -15,7 +16,9 @@ use kdray::{
 use super::args::SizeArgs;
 use crate::cli::{
     error::CliError,
-    open_device, print,
+    open_device,
+    picture_args::check_traversal,
+    print,
     progress::Progress,
     table::{decimal, table},
 };
@@ -23,6 +26,7 @@ use crate::cli::{
 /// Size by size, the least first.
 pub fn run(args: &SizeArgs) -> Result<(), CliError> {
     args.files.check(&[])?;
+    check_traversal(args.accel, args.traversal)?;
     let mut sizes = args.triangles.clone();
     sizes.sort_unstable();
     sizes.dedup();
@@ -30,13 +34,13 @@ pub fn run(args: &SizeArgs) -> Result<(), CliError> {
     let device = ContextOptions::new(args.device.clone(), false);
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
     let info = context.as_ref().map(|context| context.info());
-    let traversal = args.traversal.unwrap_or_else(|| traversal_by_rule(Processor::of(context.as_deref())));
+    let variant = variant(args, Processor::of(context.as_deref()));
     let n_threads = rayon::current_num_threads();
     let mut report = Report {
         suite: "size",
         device: info.map_or_else(|| format!("CPU, {n_threads} threads"), |info| info.name.clone()),
         driver: info.map(|info| info.driver.clone()),
-        traversal: traversal.to_string(),
+        traversal: variant.to_string(),
         width: args.size.width,
         height: args.size.height,
         n_threads,
@@ -45,7 +49,7 @@ pub fn run(args: &SizeArgs) -> Result<(), CliError> {
     };
     // A size that is too large for the device leaves the smaller ones' results.
     let done = sizes.into_iter().try_for_each(|n_triangles| {
-        report.rows.push(measure(args, context.as_ref(), traversal, n_triangles, &progress)?);
+        report.rows.push(measure(args, context.as_ref(), variant, n_triangles, &progress)?);
         Ok(())
     });
     drop(progress);
@@ -56,10 +60,19 @@ pub fn run(args: &SizeArgs) -> Result<(), CliError> {
     done.and_then(|()| check_hits(&report))
 }
 
+/// The structure that was asked for; of the kd-tree's traversals the one that was, or that suits the processor.
+fn variant(args: &SizeArgs, processor: Processor) -> Variant {
+    match args.accel {
+        AccelKind::KdTree => Variant::KdTree(args.traversal.unwrap_or_else(|| traversal_by_rule(processor))),
+        AccelKind::Grid => Variant::Grid,
+        AccelKind::Grid2 => Variant::Grid2,
+    }
+}
+
 fn measure(
     args: &SizeArgs,
     context: Option<&Arc<Context>>,
-    traversal: Traversal,
+    variant: Variant,
     n_triangles: u32,
     progress: &Progress,
 ) -> Result<Row, GpuError> {
@@ -69,7 +82,7 @@ fn measure(
     let (sized, _) = progress.stage(&building, || Sized::new(n_triangles, pixels, &build_options));
     let (sets, _) = progress.stage("making rays", || ray_sets(&sized.stage));
     let casting = format!("casting rays at {n_triangles} triangles");
-    progress.stage(&casting, || sized.measure(context, traversal, &sets, args.repeat)).0
+    progress.stage(&casting, || sized.measure(context, variant, &sets, args.repeat)).0
 }
 
 /// The report as text that ends with a line break.
@@ -77,10 +90,11 @@ fn text(report: &Report) -> String {
     let mut text = format!("{}x{} on {}", report.width, report.height, report.device);
     text += &report.driver.as_ref().map_or_else(String::new, |driver| format!(", {driver}"));
     text += &format!(", `{}`, medians of {}\n\n", report.traversal, report.n_times);
-    let header = ["triangles", "nodes", "depth", "build ms", "primary ns", "shadow ns", "mirror ns", "diffuse ns"];
+    let header =
+        ["triangles", report.parts(), "references", "build ms", "primary ns", "shadow ns", "mirror ns", "diffuse ns"];
     text += &table(header, &report.rows.iter().map(cells).collect::<Vec<_>>());
     text += &format!(
-        "\nA rippled knot in a closed room; trees built on {} threads; ns: time of a ray.\n",
+        "\nA rippled knot in a closed room; structures built on {} threads; ns: time of a ray.\n",
         report.n_threads
     );
     if let Some(growth) = report.growth() {
@@ -105,8 +119,8 @@ fn cells(row: &Row) -> [String; 8] {
     };
     [
         row.n_triangles.to_string(),
-        row.tree.n_nodes.to_string(),
-        row.tree.depth.to_string(),
+        row.accel.n_parts().to_string(),
+        row.accel.n_references().to_string(),
         decimal(Some(row.build_ms), 0),
         ns(0),
         ns(1),
@@ -131,7 +145,10 @@ fn check_hits(report: &Report) -> Result<(), CliError> {
 #[cfg(test)]
 mod tests {
     use kdray::{
-        accel::kdtree::{BuildOptions, KdTree},
+        accel::{
+            Statistics,
+            kdtree::{BuildOptions, KdTree},
+        },
         bench::{Spread, difference::Difference, rays::RayKind, size::RayCost, traversal::StepsARay},
     };
 
@@ -143,7 +160,9 @@ mod tests {
             n_triangles,
             generate_ms: 1.0,
             build_ms: 7.0,
-            tree: KdTree::build(&[], &BuildOptions::default()).statistics(0, &BuildOptions::default()),
+            accel: Statistics::KdTree(
+                KdTree::build(&[], &BuildOptions::default()).statistics(0, &BuildOptions::default()),
+            ),
             rays: RayKind::ALL
                 .map(|rays| RayCost {
                     rays,

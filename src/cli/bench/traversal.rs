@@ -1,13 +1,14 @@
-//! `kdray bench traversal`: every way through the kd-tree, side by side.
+//! `kdray bench traversal`: every search through the kd-tree and through grids, side by side.
 
 use std::sync::Arc;
 
 use kdray::{
-    accel::kdtree::{BuildOptions, Traversal},
+    accel::kdtree::BuildOptions,
     bench::{
         rays::ray_sets,
         stage::Stage,
         traversal::{Report, SetResult, Tracers, VariantResult},
+        variant::Variant,
     },
     engine::choices::{Processor, TreeKind},
     gpu::{Context, ContextOptions, GpuError},
@@ -50,10 +51,10 @@ pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
     check_hits(&report)
 }
 
-/// Those asked for, each once; where none is, all that walk the tree.
-fn variants(asked: &[Traversal]) -> Vec<Traversal> {
+/// Those asked for, each once; where none is, all but brute force.
+fn variants(asked: &[Variant]) -> Vec<Variant> {
     if asked.is_empty() {
-        return Traversal::ALL.iter().copied().filter(|variant| *variant != Traversal::Brute).collect();
+        return Variant::all();
     }
     let mut variants = Vec::new();
     for variant in asked {
@@ -113,7 +114,7 @@ fn text(report: &Report) -> String {
         "grazing",
     ];
     text += &table(header, &rows);
-    text += "\nNodes and slabs, links to parents or neighbours, boxes, triangle tests: the mean of a ray, counted on the CPU.\nDiffering: from the CPU's hits.\n";
+    text += "\nNodes and slabs, or cells; links to parents or neighbours, boxes, triangle tests: the mean of a ray, counted on the CPU.\nDiffering: from the CPU's hits.\n";
     if report.sets.iter().flat_map(|set| &set.variants).any(|variant| variant.ms.is_none()) {
         text += "This device has no timestamps: speeds are unknown.\n";
     }
