@@ -227,7 +227,9 @@ fn traversal_measures_every_variant_on_every_set() {
                 let rate = |key: &str| variant["mrays_per_s"][key].as_f64().unwrap();
                 assert!(rate("min") <= rate("median") && rate("median") <= rate("max") && rate("min") > 0.0);
                 let steps = &variant["steps_a_ray"];
-                assert_eq!(steps["nodes"].as_f64() >= Some(1.0), name != "brute", "{name}: {steps}");
+                // A ray that misses the box of a grid reads no cell.
+                let fewest = if name.starts_with("grid") { 0.5 } else { 1.0 };
+                assert_eq!(steps["nodes"].as_f64() >= Some(fewest), name != "brute", "{name}: {steps}");
                 assert!(steps["triangles"].as_f64() > Some(0.0), "{name}: {steps}");
                 // The mask keeps the newest pending cells; a mesh so small has no more.
                 let has_links = ["mask-boxes", "backtrack", "ropes"].contains(&name);

@@ -71,7 +71,8 @@ fn hits_are_as_open3d_names_them() {
     let directory = with_mesh();
     let path = |name: &str| directory.path().join(name);
     save(&path("rays.npy"), &RAYS);
-    for device in [&["--validate"][..], &["--cpu"], &["--traversal", "stack"]] {
+    let grids = [&["--accel", "grid", "--validate"][..], &["--accel", "grid2", "--cpu"]];
+    for device in [&["--validate"][..], &["--cpu"], &["--traversal", "stack"]].into_iter().chain(grids) {
         let output = succeed(directory.path(), &[&["cast", "mesh.obj", "rays.npy", "-o", "hits.npz"], device].concat());
         assert!(stdout(&output).contains("7 rays, 4 hits, 1 invalid\n"), "{}", stdout(&output));
         let expected = ["t_hit.npy", "primitive_ids.npy", "primitive_uvs.npy", "primitive_normals.npy"];
@@ -160,7 +161,9 @@ fn usage_mistakes_are_refused() {
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--json", "x.npz"], "same file"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--repeat", "0"], "--repeat"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--traversal", "bvh"], "mask"),
-        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--accel", "bvh"], "kdtree"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--accel", "bvh"], "kdtree, grid, grid2"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--accel", "grid", "--traversal", "mask"], "--accel grid"),
+        (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--accel", "grid2", "--build", "fast"], "--accel grid2"),
         (&["cast", "m.obj", "r.npy", "-o", "x.npz", "--cpu", "--validate"], "--cpu"),
     ];
     for (arguments, named) in cases {

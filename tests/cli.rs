@@ -44,7 +44,20 @@ fn usage_mistakes_are_refused_before_the_scene_is_read() {
         (&["render", "none.toml", "--path", "p.toml", "-o", "x.png"], "####"),
         (&["render", "none.toml", "--path", "p.toml", "-o", "x#.#.png"], "more than one"),
         (&["render", "none.toml", "--traversal", "bvh"], "short-stack, "),
-        (&["render", "none.toml", "--accel", "bvh"], "kdtree"),
+        (&["render", "none.toml", "--accel", "bvh"], "kdtree, grid, grid2"),
+        (
+            &["render", "none.toml", "--accel", "grid", "--traversal", "mask"],
+            "--traversal names an algorithm for the kd-tree",
+        ),
+        (
+            &["render", "none.toml", "--accel", "grid2", "--build", "best"],
+            "--build says how much work goes into the kd-tree",
+        ),
+        (
+            &["bench", "size", "--accel", "grid2", "--traversal", "mask"],
+            "--traversal names an algorithm for the kd-tree",
+        ),
+        (&["bench", "traversal", "none.obj", "--variants", "grid3"], "grid, grid2"),
         (&["render", "none.toml", "--primary", "rays"], "raster, compute, trace"),
         (&["render", "none.toml", "--threads", "0"], "--threads"),
         (&["render", "none.toml", "--cpu", "--device", "0"], "--device"),
@@ -153,6 +166,45 @@ fn inspect_describes_the_scene_and_its_tree() {
     }
     for row in ["nodes", "leaves", "empty leaves", "depth", "references a triangle", "SAH cost", "bytes", "build ms"] {
         assert!(text.lines().any(|line| line.starts_with(row)), "{row}: {text}");
+    }
+}
+
+#[test]
+fn inspect_describes_grids() {
+    let directory = TempDir::new().unwrap();
+    for (kind, name) in [("grid", "grid"), ("grid2", "two-level grid")] {
+        let text = stdout(&succeed(directory.path(), &["inspect", &cornell(), "--accel", kind]));
+        let json = stdout(&succeed(directory.path(), &["inspect", &cornell(), "--accel", kind, "--json"]));
+        let json: Value = serde_json::from_str(&json).unwrap();
+        let grid = &json["grid"];
+        assert!(grid["n_cells"].as_u64() > grid["n_empty_cells"].as_u64() && json["tree"].is_null(), "{json}");
+        assert!(grid["n_references"].as_u64() >= json["triangles"].as_u64());
+        for row in [name, "resolution", "cells", "empty cells", "references", "times coarsened", "bytes", "build ms"] {
+            assert!(text.lines().any(|line| line.starts_with(row)), "{row}: {text}");
+        }
+    }
+}
+
+/// Grids give the kd-tree's picture, and report no traversal.
+#[test]
+fn render_takes_grids() {
+    let directory = TempDir::new().unwrap();
+    for more in [&[][..], &["--cpu"]] {
+        let picture = |accel: &str| {
+            let files = ["-o", "x.png", "--profile", "x.json", "--aov", "depth,normal,cost", "--validate"];
+            let files = &files[..files.len() - more.len()];
+            let text = stdout(&render_small(directory.path(), &[files, &["--accel", accel], more].concat()));
+            let json: Value = serde_json::from_slice(&fs::read(directory.path().join("x.json")).unwrap()).unwrap();
+            (fs::read(directory.path().join("x.png")).unwrap(), text, json)
+        };
+        let (expected, _, tree) = picture("kdtree");
+        assert!(tree["choices"]["traversal"].is_object() && tree["choices"]["accel"] == "kdtree");
+        for accel in ["grid", "grid2"] {
+            let (found, text, json) = picture(accel);
+            assert!(found == expected, "{accel} {more:?}");
+            assert!(text.contains("cells") && json["grid"]["n_cells"].is_u64(), "{text}");
+            assert!(json["choices"]["traversal"].is_null() && json["choices"]["accel"] == accel, "{json}");
+        }
     }
 }
 

@@ -6,12 +6,12 @@ use egui::{ComboBox, Grid, Slider, Ui};
 
 use super::Settings;
 use crate::{
-    accel::kdtree::Traversal,
+    accel::{AccelKind, kdtree::Traversal},
     frame::{Denoise, Primary, Tonemap, View},
 };
 
-/// The controls; all take effect with the next frame.
-pub fn show(ui: &mut Ui, settings: &mut Settings) {
+/// The controls; all take effect with the next frame. A grid has no choice of traversals.
+pub fn show(ui: &mut Ui, settings: &mut Settings, accel: AccelKind) {
     Grid::new("controls").num_columns(2).spacing([10.0, 3.0]).show(ui, |ui| {
         let Settings { options, max_samples, budget_ms, vsync, view, gain } = settings;
         choice(ui, "view", view, View::ALL);
@@ -23,7 +23,9 @@ pub fn show(ui: &mut Ui, settings: &mut Settings) {
         row(ui, "exposure", |ui| ui.add(Slider::new(&mut options.exposure, 0.01..=100.0).logarithmic(true)));
         choice(ui, "tone curve", &mut options.tonemap, Tonemap::ALL);
         denoise(ui, &mut options.denoise);
-        choice(ui, "traversal", &mut options.traversal, Traversal::ALL);
+        if accel == AccelKind::KdTree {
+            choice(ui, "traversal", &mut options.traversal, Traversal::ALL);
+        }
         choice(ui, "primary rays", &mut options.primary, Primary::ALL);
         row(ui, "budget, ms", |ui| ui.add(Slider::new(budget_ms, 1.0..=200.0).logarithmic(true)));
         row(ui, "vsync", |ui| ui.checkbox(vsync, ""));

@@ -122,7 +122,7 @@ fn sections(ui: &mut Ui, settings: &mut Settings, facts: &Facts) {
         section(ui, "Pixel", true, |ui| tables::picked(ui, picked));
     }
     section(ui, "Passes", true, |ui| graph::show(ui, facts.history, facts.profile));
-    section(ui, "Picture", true, |ui| controls::show(ui, settings));
+    section(ui, "Picture", true, |ui| controls::show(ui, settings, facts.loaded.world.accel().kind()));
     section(ui, "Rays", true, |ui| tables::rays(ui, facts.profile));
     section(ui, "Acceleration structure", false, |ui| tables::accel(ui, facts.loaded));
     section(ui, "Memory", false, |ui| tables::memory(ui, &facts.memory));
