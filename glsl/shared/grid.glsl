@@ -14,6 +14,7 @@ layout(constant_id = CONSTANT_GRID_LEVELS) const uint GRID_LEVELS = 0u;
 
 // In place of a packed cube of the upper level: the ray is in that level itself.
 const uint IN_UPPER_LEVEL = 0xffffffffu;
+const uint STEPS_A_TURN = 4u;
 // What finite times stay below.
 const float LARGEST_T = 3.4028235e38;
 
@@ -44,10 +45,15 @@ uvec3 unpack_cube(uint packed) {
     return uvec3(packed, packed >> 10, packed >> 20) & (GRID_MAX_RESOLUTION - 1u);
 }
 
-// Where the ray leaves cubes of these indices by each axis. It never leaves those at the border: the search ends there.
+// Where the ray leaves cubes of these indices by each axis. The planes are those of the lattice (lattice.glsl), but for the
+// border's: the upper level's border is not where the box ends but where its last cubes do, so the ray leaves the box first.
+// A block's border may be off by rounding, so the ray never leaves a block by it.
 vec3 exits_of(Lattice lattice, TraversalRay ray, uvec3 cube) {
     uvec3 faces = cube + uvec3(greaterThanEqual(ray.inv_direction, vec3(0.0)));
-    precise vec3 t = fma(planes_of(lattice, faces), ray.inv_direction, ray.bias);
+    precise vec3 offsets = vec3(faces) * lattice.cell_size;
+    precise vec3 planes = lattice.least + offsets;
+    precise vec3 t = fma(planes, ray.inv_direction, ray.bias);
+    if (GRID_LEVELS == 1u) return t;
     bvec3 are_inner = lessThan(faces - 1u, lattice.n_cells - 1u); // a face of 0 wraps around
     return mix(vec3(uintBitsToFloat(0x7f800000u)), t, are_inner);
 }
@@ -138,11 +144,11 @@ Visit visit_cell(TraversalRay ray, float t_best, inout GridWalk walk) {
 // On to the ray's next cube, in the block or behind it. False where nothing nearer than t_best can follow.
 bool step_on(TraversalRay ray, float t_best, inout GridWalk walk) {
     float t = least_of(walk.t_next);
-    if (GRID_LEVELS == 2u && walk.upper_cube != IN_UPPER_LEVEL && !(t <= walk.t_exit)) {
+    if (GRID_LEVELS == 2u && walk.upper_cube != IN_UPPER_LEVEL && !(t < walk.t_exit)) {
         leave_block(ray, walk);
         t = least_of(walk.t_next);
     }
-    if (!(t <= walk.t_exit) || t_best < t) return false;
+    if (!(t < walk.t_exit) || t_best < t) return false;
     bool is_x = walk.t_next.x == t;
     bool is_y = !is_x && walk.t_next.y == t;
     ivec3 steps = steps_of(ray) * ivec3(is_x, is_y, !is_x && !is_y);
@@ -152,15 +158,17 @@ bool step_on(TraversalRay ray, float t_best, inout GridWalk walk) {
     return true;
 }
 
-// On to the next cell that has triangles. False where nothing nearer than t_best can follow.
+// On to the next cell that has triangles, but no more than STEPS_A_TURN cells. False where nothing nearer than t_best can follow.
 bool find_cell(TraversalRay ray, float t_best, inout GridWalk walk, inout Visit visit) {
     bool goes_on = true;
     bool seeks = true;
+    uint n_steps_left = STEPS_A_TURN;
     while (seeks) {
         count_turn();
         goes_on = step_on(ray, t_best, walk);
         if (goes_on) visit = visit_cell(ray, t_best, walk);
-        seeks = goes_on && visit.entry_ix >= visit.end_ix && has_turns();
+        n_steps_left -= 1u;
+        seeks = goes_on && visit.entry_ix >= visit.end_ix && n_steps_left > 0u && has_turns();
         if (!seeks) break;
     }
     return goes_on;

@@ -115,7 +115,7 @@ fn walk(
     loop {
         let axis = walk.exit_axis();
         let t = walk.t_next[axis];
-        let goes_on = t <= t_exit;
+        let goes_on = t < t_exit;
         let t_leave = if goes_on { t } else { t_exit };
         if visit(lattice.place_of(walk.cube), [t_enter, t_leave]) {
             return true;

@@ -18,24 +18,21 @@ use super::{
 use crate::support::{grid_worlds, scenes, world_of};
 
 /// A frame and its features, whose costs are set to 0.
-fn drawn(mut renderer: Renderer) -> (Picture, Vec<Feature>) {
-    let picture = renderer.render().expect("a frame").0;
-    let features = renderer.features().expect("features").into_iter();
-    (picture, features.map(|feature| Feature { n_steps: 0, ..feature }).collect())
-}
-
 fn on_device(world: &World, options: &RenderOptions) -> (Picture, Vec<Feature>) {
     let context = device();
-    let drawn = drawn(Renderer::new(context.clone(), world, options).expect("a renderer"));
+    let options = RenderOptions { features: true, ..options.clone() };
+    let mut renderer = Renderer::new(context.clone(), world, &options).expect("a renderer");
+    let picture = renderer.render().expect("a frame").0;
+    let features = renderer.features().expect("features").into_iter();
     assert_silent(&context);
-    drawn
+    (picture, features.map(|feature| Feature { n_steps: 0, ..feature }).collect())
 }
 
 #[test]
 fn frames_on_the_device_are_the_kd_trees() {
     for scene in [scenes::mixed(), scenes::mixed_outdoors()] {
         for primary in [Primary::Raster, Primary::Trace] {
-            let options = RenderOptions { primary, features: true, ..options(80, 60, 5) };
+            let options = RenderOptions { primary, ..options(80, 60, 5) };
             let expected = on_device(&world_of(&scene), &options);
             for world in grid_worlds(&scene) {
                 let found = on_device(&world, &options);
