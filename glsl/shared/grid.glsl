@@ -14,9 +14,14 @@ layout(constant_id = CONSTANT_GRID_LEVELS) const uint GRID_LEVELS = 0u;
 
 // In place of a packed cube of the upper level: the ray is in that level itself.
 const uint IN_UPPER_LEVEL = 0xffffffffu;
-const uint STEPS_A_TURN = 4u;
 // What finite times stay below.
 const float LARGEST_T = 3.4028235e38;
+
+// Lanes of a subgroup that look for cells wait for those that look for triangles, and these for those. So either search ends its turn
+// after a few looks. On an H200, 4 cells give rays of a dragon in a room 1.2 to 2 times the speed of any number; 4 triangles
+// give 1.1 to 1.6 times the speed in uniform grids, whose cells hold many, and cost 5 % in grids of two levels.
+const uint CELLS_A_TURN = 4u;
+const uint TRIANGLES_A_TURN = 4u;
 
 // A ray's way through the cells of one lattice. first_cell: the index of the lattice's first cell in grid_cells. upper_cube: the
 // cell of the upper level that is this lattice, packed. t_next: where the ray leaves its cube by each axis. t_enter: where it has come
@@ -158,20 +163,30 @@ bool step_on(TraversalRay ray, float t_best, inout GridWalk walk) {
     return true;
 }
 
-// On to the next cell that has triangles, but no more than STEPS_A_TURN cells. False where nothing nearer than t_best can follow.
+// On to the next cell that has triangles, but no farther than CELLS_A_TURN cells. False where nothing nearer than t_best can follow.
 bool find_cell(TraversalRay ray, float t_best, inout GridWalk walk, inout Visit visit) {
     bool goes_on = true;
     bool seeks = true;
-    uint n_steps_left = STEPS_A_TURN;
+    uint n_left = CELLS_A_TURN;
     while (seeks) {
         count_turn();
         goes_on = step_on(ray, t_best, walk);
         if (goes_on) visit = visit_cell(ray, t_best, walk);
-        n_steps_left -= 1u;
-        seeks = goes_on && visit.entry_ix >= visit.end_ix && n_steps_left > 0u && has_turns();
+        n_left -= 1u;
+        seeks = goes_on && visit.entry_ix >= visit.end_ix && n_left > 0u && has_turns();
         if (!seeks) break;
     }
     return goes_on;
+}
+
+// On to the cell's next triangle whose plane the ray meets on its way, but in uniform grids no farther than TRIANGLES_A_TURN.
+bool find_candidate_soon(TraversalRay ray, inout Visit visit, out uint entry_ix) {
+    if (GRID_LEVELS == 2u) return find_candidate(ray, visit, entry_ix);
+    uint end_ix = visit.end_ix;
+    visit.end_ix = min(end_ix, visit.entry_ix + TRIANGLES_A_TURN);
+    bool found = find_candidate(ray, visit, entry_ix);
+    visit.end_ix = end_ix;
+    return found;
 }
 
 // Stores where the ray is, and returns the mark for its result.
@@ -224,11 +239,11 @@ uint search_grid(TraversalRay ray, bool any_hit, inout Nearest best) {
     while (goes_on) {
         count_turn();
         uint entry_ix;
-        if (find_candidate(ray, visit, entry_ix)) {
+        if (find_candidate_soon(ray, visit, entry_ix)) {
             LeafTriangle entry = leaf_triangle_at(entry_ix);
             intersect(ray, corners_of(entry), entry.triangle_ix, best);
             goes_on = !is_done(any_hit, best);
-        } else if (has_turns()) {
+        } else if (visit.entry_ix >= visit.end_ix && has_turns()) {
             goes_on = find_cell(ray, best.t, walk, visit);
         }
         if (goes_on && !has_turns()) {
