@@ -1,41 +1,41 @@
 //! Which cubes of a lattice a triangle comes near to.
 //!
-//! A triangle's box is gone through in columns along the axis that its normal points along most. A column is passed over where
-//! the triangle, seen along that axis, is beside it. Within a column, the triangle's plane is in few cubes. Each of them is
-//! tested against the plane, and against the triangle as it is seen along the other two axes (Schwarz and Seidel, "Fast
-//! parallel surface and solid voxelization on GPUs", 2010).
+//! The triangle's box is cut into columns of cubes along the axis that the triangle's normal points along most. A
+//! column is skipped if the triangle is beside it, as seen along that axis. Within a column, the triangle's plane is in
+//! few cubes. Each of these is tested against the plane, and against the triangle as seen along the other two axes
+//! (Schwarz and Seidel, "Fast parallel surface and solid voxelization on GPUs", 2010).
 
 use super::Lattice;
 use crate::{accel::bounds::Bounds, layout::Triangle};
 
-/// Times the margin of the triangles' box: how far from a cube a triangle is still taken as in it. The traversal needs the
-/// margin itself (bounds.rs). A sixteenth of it is 8 units of 2^-24 times the largest coordinate, of which the cubes' rounded
-/// middles and half edges take 4.
+/// A triangle counts as inside a cube if it comes nearer than this times the margin of the triangles' box. The
+/// traversal needs the margin itself (bounds.rs). The sixteenth more is 8 units of 2^-24 times the largest coordinate,
+/// of which the rounding of the cubes' middles and half edges takes 4.
 const MARGIN_FACTOR: f32 = 1.0625;
-/// Times a product of two lengths, each a sum of a vector's magnitudes: how far a rounded product of vectors is off, 16 units
-/// of 2^-24. Edges are rounded by 1 unit each, products of two components by 1, their difference by 1: 4 for a normal. Its
-/// product with a third vector adds 4.
+/// How far a rounded product of vectors is off, as a multiple of the product of the vectors' sums of magnitudes: 16
+/// units of 2^-24. The rounding of an edge takes 1 unit, that of a product of two components 1, that of their
+/// difference 1: together 4 for a normal. Its product with a third vector adds 4.
 const PRODUCT_ERROR: f32 = 1.0 / (1 << 20) as f32;
 
 /// A triangle and the columns of its box.
-pub struct Columns<'a> {
-    lattice: &'a Lattice,
+pub struct Columns {
+    lattice: Lattice,
     corners: [[f32; 3]; 3],
-    /// Not of unit length.
+    /// The product of two edges, which is not of unit length.
     normal: [f32; 3],
-    /// How far the normal's components may be off.
+    /// A bound of the error of the normal's components.
     normal_error: f32,
     /// Half of a cube's edge, and the margin.
     half: f32,
-    /// The axes of a row of columns, of the rows, and along the columns.
+    /// The axes u, v and w. Columns are numbered along u first, then v; a column extends along w.
     axes: [usize; 3],
     /// The first and the last index of the box's cubes on each axis.
     range: [[u32; 2]; 3],
 }
 
-impl<'a> Columns<'a> {
-    /// `margin`: of the box of all triangles.
-    pub fn new(lattice: &'a Lattice, triangle: &Triangle, margin: f32) -> Self {
+impl Columns {
+    /// Finds the columns of a triangle. `margin` is that of the box of all triangles.
+    pub fn new(lattice: Lattice, triangle: &Triangle, margin: f32) -> Self {
         let corners = [triangle.v0, triangle.v1, triangle.v2].map(|corner| corner.to_array());
         let margin = MARGIN_FACTOR * margin;
         let bounds = Bounds::of(triangle).grown(margin);
@@ -87,10 +87,10 @@ impl<'a> Columns<'a> {
         0.5 * self.lattice.plane(axis, i) + 0.5 * self.lattice.plane(axis, i + 1)
     }
 
-    /// Whether a cube of this middle is beyond an edge, seen along an axis `w`. What is not certain is not beside.
+    /// Whether the triangle is certainly beside the cube of this middle, seen along an axis `w`.
     ///
-    /// A point of a triangle is on the left of all edges or on the right of all, whichever way round they go. So a needle, whose
-    /// area's sign is not certain, is no exception.
+    /// A point of the triangle is on the left of all edges or on the right of all. So the cube is beside if it is on
+    /// the right of one edge and on the left of another. This needs no winding, which rounding may hide in a needle.
     fn is_beside(&self, w: usize, middle: [f32; 3]) -> bool {
         let [u, v] = [(w + 1) % 3, (w + 2) % 3];
         let (mut is_right, mut is_left) = (false, false);
@@ -107,8 +107,8 @@ impl<'a> Columns<'a> {
         is_right && is_left
     }
 
-    /// The first and the last index on a column of cubes that may meet the plane: one more than do, for the quotient is not
-    /// exact.
+    /// The first and the last index of the cubes of a column that may meet the triangle's plane. The interval is up to
+    /// a cube wider on each side than `meets_plane` needs, so it may be computed by divisions that are not exact.
     fn near_plane(&self, middle: [f32; 3]) -> [u32; 2] {
         let [u, v, w] = self.axes;
         let [first, last] = self.range[w];
@@ -127,7 +127,7 @@ impl<'a> Columns<'a> {
         [first.max(near_first), last.min(near_last)]
     }
 
-    /// Whether the triangle's plane comes near to a cube of this middle. What is not certain does.
+    /// Whether the triangle's plane may come near to the cube of this middle.
     fn meets_plane(&self, middle: [f32; 3]) -> bool {
         let way = difference(middle, self.corners[0]);
         let [x, y, z] = self.normal;
@@ -142,7 +142,7 @@ fn difference(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// The sum of a vector's magnitudes, which is no less than its length.
+/// The sum of the magnitudes of a vector's components, which is no less than its length.
 fn magnitude([x, y, z]: [f32; 3]) -> f32 {
     x.abs() + y.abs() + z.abs()
 }
@@ -154,7 +154,7 @@ mod tests {
     use super::*;
 
     fn cubes_of(lattice: &Lattice, triangle: &Triangle, margin: f32) -> Vec<[u32; 3]> {
-        let columns = Columns::new(lattice, triangle, margin);
+        let columns = Columns::new(*lattice, triangle, margin);
         let mut cubes = Vec::new();
         (0..columns.n_columns()).for_each(|column_ix| columns.cubes_of(column_ix, |cube| cubes.push(cube)));
         cubes
@@ -164,7 +164,7 @@ mod tests {
         Lattice { min: [-1.0; 3], max: [1.0; 3], cell_size: 2.0 / n as f32, n_cells: [n; 3] }
     }
 
-    /// Points of a triangle, on its edges, too.
+    /// Points of a triangle, some of them on its edges.
     fn points_of(triangle: &Triangle, n: u32) -> impl Iterator<Item = Vec3> {
         let Triangle { v0, v1, v2, .. } = *triangle;
         let shares = (0..=n).flat_map(move |i| (0..=n - i).map(move |j| [i, j].map(|i| i as f32 / n as f32)));
