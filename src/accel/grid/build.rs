@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::{Grid, GridLevels, GridOptions, Lattice, overlap::Columns, planes::plane_of};
 use crate::{
     accel::bounds::{Bounds, is_finite},
-    layout::{GRID_MAX_ATTEMPTS, GRID_MAX_BLOCK_RESOLUTION, GRID_MAX_COUNT, GridCell, Triangle},
+    layout::{GRID_MAX_ATTEMPTS, GRID_MAX_BLOCK_RESOLUTION, GRID_MAX_COUNT, GRID_MAX_HALVINGS, GridCell, Triangle},
 };
 
 /// The index of a cell and the index of a triangle.
@@ -111,8 +111,7 @@ fn lower_level(input: &Input, lattice: &Lattice, upper: Level, density: f32) -> 
                 return Level { cells: [blocks, lower_cells].concat(), pairs, n_coarser: upper.n_coarser + n_halvings };
             }
             Err(count) => {
-                let coarsest = GRID_MAX_BLOCK_RESOLUTION.ilog2();
-                n_halvings = (n_halvings + n_steps(input, count, n_attempts)).min(coarsest);
+                n_halvings = (n_halvings + n_steps(input, count, n_attempts)).min(GRID_MAX_HALVINGS);
             }
         }
     }

@@ -17,7 +17,7 @@ const MARGIN_FACTOR: f32 = 1.0625;
 /// difference 1: together 4 for a normal. Its product with a third vector adds 4.
 const PRODUCT_ERROR: f32 = 1.0 / (1 << 20) as f32;
 
-/// A triangle and the columns of its box.
+/// A triangle and the columns of its box. The axes are turned so that columns extend along the last one.
 pub struct Columns {
     lattice: Lattice,
     corners: [[f32; 3]; 3],
@@ -27,10 +27,10 @@ pub struct Columns {
     normal_error: f32,
     /// Half of a cube's edge, and the margin.
     half: f32,
-    /// The axes u, v and w. Columns are numbered along u first, then v; a column extends along w.
-    axes: [usize; 3],
     /// The first and the last index of the box's cubes on each axis.
     range: [[u32; 2]; 3],
+    /// The lattice's own axis that is the last one here.
+    axis: usize,
 }
 
 impl Columns {
@@ -42,43 +42,45 @@ impl Columns {
         let (a, b) = (difference(corners[1], corners[0]), difference(corners[2], corners[0]));
         let normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
         let [x, y, z] = normal.map(f32::abs);
-        let along = if z >= x && z >= y { 2 } else { usize::from(y >= x) };
+        let axis = if z >= x && z >= y { 2 } else { usize::from(y >= x) };
+        let range = [0, 1, 2].map(|axis| lattice.indices_in(axis, bounds.min[axis], bounds.max[axis]));
         Self {
-            lattice,
-            corners,
-            normal,
+            lattice: Lattice {
+                min: axis_last(lattice.min, axis),
+                max: axis_last(lattice.max, axis),
+                n_cells: axis_last(lattice.n_cells, axis),
+                ..lattice
+            },
+            corners: corners.map(|corner| axis_last(corner, axis)),
+            normal: axis_last(normal, axis),
             normal_error: PRODUCT_ERROR * (magnitude(a) * magnitude(b)),
             half: 0.5 * lattice.cell_size + margin,
-            axes: [(along + 1) % 3, (along + 2) % 3, along],
-            range: [0, 1, 2].map(|axis| lattice.indices_in(axis, bounds.min[axis], bounds.max[axis])),
+            range: axis_last(range, axis),
+            axis,
         }
     }
 
     /// The number of columns.
     pub fn n_columns(&self) -> u32 {
         let n_on = |[first, last]: [u32; 2]| last - first + 1;
-        n_on(self.range[self.axes[0]]) * n_on(self.range[self.axes[1]])
+        n_on(self.range[0]) * n_on(self.range[1])
     }
 
-    /// Calls `found` with the indices of each cube of a column that the triangle comes near to.
+    /// Calls `found` with the indices of each cube of a column that the triangle comes near to. Columns are numbered along
+    /// the first axis, then the second.
     pub fn cubes_of(&self, column_ix: u32, mut found: impl FnMut([u32; 3])) {
-        let [u, v, w] = self.axes;
-        let n_in_row = self.range[u][1] - self.range[u][0] + 1;
-        let mut cube = [0; 3];
-        cube[u] = self.range[u][0] + column_ix % n_in_row;
-        cube[v] = self.range[v][0] + column_ix / n_in_row;
-        let mut middle = [0.0; 3];
-        middle[u] = self.middle(u, cube[u]);
-        middle[v] = self.middle(v, cube[v]);
-        if self.is_beside(w, middle) {
+        let [[first_x, last_x], [first_y, _], _] = self.range;
+        let n_in_row = last_x - first_x + 1;
+        let [x, y] = [first_x + column_ix % n_in_row, first_y + column_ix / n_in_row];
+        let mut middle = [self.middle(0, x), self.middle(1, y), 0.0];
+        if self.is_beside(2, middle) {
             return;
         }
         let [first, last] = self.near_plane(middle);
-        for i in first..=last {
-            cube[w] = i;
-            middle[w] = self.middle(w, i);
-            if self.meets_plane(middle) && !self.is_beside(u, middle) && !self.is_beside(v, middle) {
-                found(cube);
+        for z in first..=last {
+            middle[2] = self.middle(2, z);
+            if self.meets_plane(middle) && !self.is_beside(0, middle) && !self.is_beside(1, middle) {
+                found(axis_back([x, y, z], self.axis));
             }
         }
     }
@@ -87,12 +89,12 @@ impl Columns {
         0.5 * self.lattice.plane(axis, i) + 0.5 * self.lattice.plane(axis, i + 1)
     }
 
-    /// Whether the triangle is certainly beside the cube of this middle, seen along an axis `w`.
+    /// Whether the triangle is certainly beside the cube of this middle, seen along an axis.
     ///
-    /// A point of the triangle is on the left of all edges or on the right of all. So the cube is beside if it is on
-    /// the right of one edge and on the left of another. This needs no winding, which rounding may hide in a needle.
-    fn is_beside(&self, w: usize, middle: [f32; 3]) -> bool {
-        let [u, v] = [(w + 1) % 3, (w + 2) % 3];
+    /// A point of the triangle is on the left of all edges or on the right of all. So the cube is beside if it is on the
+    /// right of one edge and on the left of another. This needs no winding, which rounding may hide in a needle.
+    fn is_beside(&self, axis: usize, middle: [f32; 3]) -> bool {
+        let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
         let (mut is_right, mut is_left) = (false, false);
         for [from, to] in [[0, 1], [1, 2], [2, 0]] {
             let (from, to) = (self.corners[from], self.corners[to]);
@@ -107,23 +109,21 @@ impl Columns {
         is_right && is_left
     }
 
-    /// The first and the last index of the cubes of a column that may meet the triangle's plane. The interval is up to
-    /// a cube wider on each side than `meets_plane` needs, so it may be computed by divisions that are not exact.
+    /// The first and the last index of the cubes of a column that may meet the triangle's plane. The interval is up to a
+    /// cube wider on each side than `meets_plane` needs, so it may be computed by divisions that are not exact.
     fn near_plane(&self, middle: [f32; 3]) -> [u32; 2] {
-        let [u, v, w] = self.axes;
-        let [first, last] = self.range[w];
-        let slope = 1.0 / self.normal[w].abs();
-        let way = [middle[u] - self.corners[0][u], middle[v] - self.corners[0][v]];
-        let extent = self.lattice.plane(w, last + 1) - self.lattice.plane(w, first);
+        let ([x, y, z], [first, last]) = (self.normal, self.range[2]);
+        let slope = 1.0 / z.abs();
+        let way = [middle[0] - self.corners[0][0], middle[1] - self.corners[0][1]];
+        let extent = self.lattice.plane(2, last + 1) - self.lattice.plane(2, first);
         let error = self.normal_error * (way[0].abs() + way[1].abs() + extent + self.half) * slope;
         if !(error < 0.25 * self.lattice.cell_size) {
             return [first, last];
         }
-        let height = self.normal[u] * way[0] + self.normal[v] * way[1];
-        let at = self.corners[0][w] - if self.normal[w] < 0.0 { -height } else { height } * slope;
-        let spread = ((self.normal[u].abs() + self.normal[v].abs()) * slope + 1.0) * self.half;
-        let reach = spread + self.lattice.cell_size;
-        let [near_first, near_last] = [at - reach, at + reach].map(|at| self.lattice.index_near(w, at));
+        let height = x * way[0] + y * way[1];
+        let at = self.corners[0][2] - if z < 0.0 { -height } else { height } * slope;
+        let reach = ((x.abs() + y.abs()) * slope + 1.0) * self.half + self.lattice.cell_size;
+        let [near_first, near_last] = [at - reach, at + reach].map(|at| self.lattice.index_near(2, at));
         [first.max(near_first), last.min(near_last)]
     }
 
@@ -136,6 +136,17 @@ impl Columns {
         let reach = magnitude(self.normal) * self.half + error;
         !(height.abs() > reach)
     }
+}
+
+/// Turns the axes so that `axis` is the last one.
+fn axis_last<T: Copy>(v: [T; 3], axis: usize) -> [T; 3] {
+    [v[(axis + 1) % 3], v[(axis + 2) % 3], v[axis]]
+}
+
+/// Turns the axes back.
+fn axis_back<T: Copy>(v: [T; 3], axis: usize) -> [T; 3] {
+    // A turn by one axis takes back a turn by two.
+    axis_last(v, [1, 0, 2][axis])
 }
 
 fn difference(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
