@@ -23,7 +23,7 @@ vec3 planes_of(Lattice lattice, uvec3 cube) {
 
 // About the cube that has a point, or else one at the border.
 uvec3 cube_near(Lattice lattice, vec3 point) {
-    vec3 indices = (point - lattice.least) / lattice.cell_size;
+    precise vec3 indices = (point - lattice.least) / lattice.cell_size;
     return uvec3(clamp(indices, vec3(0.0), vec3(lattice.n_cells - 1u)));
 }
 

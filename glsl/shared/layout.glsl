@@ -377,6 +377,16 @@ struct AccelConstants {
 // Whether kernels have found the triangles that pixels show, not the graphics pipeline.
 #define CONSTANT_BY_KERNELS 9u
 
+// Whether kernels build the lower level of a grid.
+#define CONSTANT_LOWER 10u
+// What a scan of a grid's build adds up: GRID_SCANS_CELLS and its like, which are the numbers of GRID_COUNTS_CELLS and
+// its like.
+#define CONSTANT_SCANS 11u
+#define GRID_SCANS_CELLS 0u
+#define GRID_SCANS_COLUMNS 1u
+#define GRID_SCANS_PAIRS 2u
+#define GRID_SCANS_DIGITS 3u
+
 // Constants that all kernels over one scene share.
 
 // Whether rays pass through triangles with TRIANGLE_HIDDEN in `triangle_materials`.
@@ -462,6 +472,107 @@ struct DriverCast {
     uint scenery_high;
 };
 
+// The build of a grid (src/passes/grid).
+
+// The most attempts to build a level of cells within the limit of references. The last one has the largest cells.
+#define GRID_MAX_ATTEMPTS 4u
+// Halvings after which the finest block, of GRID_MAX_BLOCK_RESOLUTION cells along each axis, is one cell.
+#define GRID_MAX_HALVINGS 5u
+// Counts above this are all taken as 2^32 - 1.
+#define GRID_MAX_COUNT 0x7fffffffu
+// Rows of SCAN_GROUP_SIZE entries, one for each invocation, that a workgroup goes through.
+#define GRID_ROWS 8u
+// The entries of these rows.
+#define GRID_BLOCK_SIZE 1024u
+// Workgroups of a dispatch side by side. More are in further rows, since a device need not take more than 65,535.
+#define GRID_GROUPS_X 1024u
+// Bits of the cells' indices that one pass of the sort looks at, and the number of values that they have.
+#define GRID_DIGIT_BITS 4u
+#define GRID_DIGITS 16u
+// The most workgroups of a pass of the sort. Each sorts several blocks one after the other if there are more blocks.
+#define GRID_MAX_SORT_GROUPS 1024u
+
+// What a level's build counts next: the cells of the lower level; the columns of cells that the boxes of triangles
+// take; the pairs of a cell and a triangle. Last, all is counted.
+#define GRID_COUNTS_CELLS 0u
+#define GRID_COUNTS_COLUMNS 1u
+#define GRID_COUNTS_PAIRS 2u
+#define GRID_IS_COUNTED 3u
+
+// The state of a grid's build. The host writes it before the build and reads it afterwards. cell_min, cell_max,
+// cell_size, n_cells_*: the lattice of the uniform grid or of the upper level. margin: see src/accel/bounds.rs.
+// least_*, greatest_*: the bounds of the finite triangles, as integers of the same order (grid_bounds.comp).
+// upper_density, lower_density: cells for each triangle. max_references: the limit of columns, of pairs and of lower
+// cells. n_items: triangles at the upper level, pairs of the upper level at the lower one. n_columns, n_pairs: of these
+// items. n_upper: cells of the upper level, or of the only one. n_lower: cells of the lower level. n_coarser: how many
+// times edges were doubled. n_halvings: the same, at the lower level. n_attempts: of this level. counts:
+// GRID_COUNTS_CELLS and its like. columns_begin, pairs_begin, cells_begin: where the sums of blocks of columns, pairs
+// and cells begin in scan_blocks. tiles_a_group: blocks that a workgroup of the sort goes through. The rest is sizes of
+// indirect dispatches, over items, columns and so on. Those over `counted` are 0 until all is counted.
+struct GridBuild {
+    vec3 cell_min;
+    float cell_size;
+    vec3 cell_max;
+    float margin;
+    uint n_cells_x;
+    uint n_cells_y;
+    uint n_cells_z;
+    float largest_coordinate;
+    uint least_x;
+    uint least_y;
+    uint least_z;
+    uint n_finite;
+    uint greatest_x;
+    uint greatest_y;
+    uint greatest_z;
+    uint n_triangles;
+    float upper_density;
+    float lower_density;
+    uint max_references;
+    uint n_items;
+    uint n_columns;
+    uint n_pairs;
+    uint n_upper;
+    uint n_lower;
+    uint n_coarser;
+    uint n_halvings;
+    uint n_attempts;
+    uint counts;
+    uint columns_begin;
+    uint pairs_begin;
+    uint cells_begin;
+    uint tiles_a_group;
+    uint cell_groups_x;
+    uint cell_groups_y;
+    uint cell_groups_z;
+    uint item_groups_x;
+    uint item_groups_y;
+    uint item_groups_z;
+    uint column_groups_x;
+    uint column_groups_y;
+    uint column_groups_z;
+    uint counted_column_groups_x;
+    uint counted_column_groups_y;
+    uint counted_column_groups_z;
+    uint counted_pair_groups_x;
+    uint counted_pair_groups_y;
+    uint counted_pair_groups_z;
+    uint counted_cell_groups_x;
+    uint counted_cell_groups_y;
+    uint counted_cell_groups_z;
+    uint sort_groups_x;
+    uint sort_groups_y;
+    uint sort_groups_z;
+    uint reserved0;
+    uint reserved1;
+    uint reserved2;
+};
+
+// Push constants of the sort: the lowest bit of the digit that a pass sorts by.
+struct GridSort {
+    uint first_bit;
+};
+
 // Bindings of the frame's descriptor set. scene_arrays.glsl has those of the scene's arrays.
 #define BIND_FRAME 0u
 #define BIND_MATERIALS 3u
@@ -493,5 +604,19 @@ struct DriverCast {
 // A cast's descriptor set has these and what the traversal reads: the scene's arrays and AccelConstants.
 #define BIND_CAST_RAYS 62u
 #define BIND_CAST_HITS 63u
+
+// The descriptor set of a grid's build.
+#define BIND_GRID_BUILD 40u
+#define BIND_GRID_TRIANGLES 41u
+#define BIND_GRID_UPPER_PAIRS 42u
+#define BIND_GRID_FIRST_COLUMNS 43u
+#define BIND_GRID_SCAN_BLOCKS 44u
+#define BIND_GRID_PAIRS_FROM 45u
+#define BIND_GRID_PAIRS_TO 46u
+#define BIND_GRID_CELLS 47u
+#define BIND_GRID_BLOCKS 48u
+#define BIND_GRID_LEAF_TRIANGLES 49u
+#define BIND_GRID_LEAF_PLANES 50u
+#define BIND_GRID_FIRST_PAIRS 51u
 
 #endif

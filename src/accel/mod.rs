@@ -80,7 +80,7 @@ impl Accel {
     pub fn kind(&self) -> AccelKind {
         match self {
             Self::KdTree(_) => AccelKind::KdTree,
-            Self::Grid(grid) if grid.options().n_levels == 1 => AccelKind::Grid,
+            Self::Grid(grid) if grid.options().levels.n_levels() == 1 => AccelKind::Grid,
             Self::Grid(_) => AccelKind::Grid2,
         }
     }

@@ -9,11 +9,13 @@
 //! vertex_indices  what the graphics pipeline draws
 //! stalls          rays that have spent a dispatch's loop turns
 //! resources       all of these, with the frame's descriptor set
+//! grid            the build of a grid
 //! cast            given rays, their hits, and the cast's descriptor set
 //! ```
 
 mod accel;
 mod cast;
+mod grid;
 mod pixels;
 mod queue;
 mod raster_queue;
@@ -25,6 +27,7 @@ mod vertex_indices;
 pub use self::{
     accel::AccelBuffers,
     cast::CastResources,
+    grid::{GridBuffers, GridCapacities, PairSets},
     pixels::Pixels,
     queue::Queue,
     raster_queue::{RasterQueue, RasterState},

@@ -11,6 +11,8 @@ pub enum Access {
     ComputeWrite,
     /// Reads and writes of a kernel that updates in place.
     ComputeUpdate,
+    /// Reads and writes of a kernel, and the reads of the sizes of its indirect dispatch.
+    KernelUpdate,
     /// Storage that a raster pass reads.
     FragmentRead,
     /// Reads of the sizes of an indirect dispatch.
@@ -35,6 +37,7 @@ impl Access {
     pub(super) fn stages(self) -> S {
         match self {
             Self::ComputeRead | Self::ComputeWrite | Self::ComputeUpdate => S::COMPUTE_SHADER,
+            Self::KernelUpdate => S::COMPUTE_SHADER | S::DRAW_INDIRECT,
             Self::FragmentRead => S::FRAGMENT_SHADER,
             Self::IndirectRead => S::DRAW_INDIRECT,
             Self::TransferRead => S::COPY,
@@ -54,6 +57,7 @@ impl Access {
             Self::ComputeRead => A::SHADER_STORAGE_READ | A::UNIFORM_READ,
             Self::ComputeWrite => A::SHADER_STORAGE_WRITE,
             Self::ComputeUpdate => A::SHADER_STORAGE_READ | A::SHADER_STORAGE_WRITE,
+            Self::KernelUpdate => A::SHADER_STORAGE_READ | A::SHADER_STORAGE_WRITE | A::INDIRECT_COMMAND_READ,
             Self::FragmentRead => A::SHADER_STORAGE_READ,
             Self::IndirectRead => A::INDIRECT_COMMAND_READ,
             Self::TransferRead => A::TRANSFER_READ,

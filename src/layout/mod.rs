@@ -41,6 +41,11 @@ mod tests {
             BIND_COUNTERS => Some("Counters"),
             BIND_RASTER_GROUPS => Some("RasterGroups"),
             BIND_LARGE_TRIANGLES => Some("LargeTriangle"),
+            BIND_GRID_BUILD => Some("GridBuild"),
+            BIND_GRID_TRIANGLES => Some("Triangle"),
+            BIND_GRID_CELLS => Some("GridCell"),
+            BIND_GRID_LEAF_TRIANGLES => Some("LeafTriangle"),
+            BIND_GRID_LEAF_PLANES => Some("Plane"),
             _ => None,
         }
     }
@@ -52,6 +57,7 @@ mod tests {
             "driver.rgen" => "DriverCast",
             "false_color.comp" => "FalseColor",
             "present.frag" => "Present",
+            "grid_sort_count.comp" | "grid_sort_scatter.comp" => "GridSort",
             "rasterize_triangles.comp" | "rasterize_blocks.comp" => "RasterPush",
             _ => "Batch",
         }

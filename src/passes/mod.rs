@@ -17,6 +17,7 @@ mod compact;
 mod denoise;
 mod false_color;
 mod features;
+pub mod grid;
 #[cfg(feature = "view")]
 mod present;
 mod primary_hit;

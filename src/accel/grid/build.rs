@@ -1,159 +1,189 @@
-//! Pairs of a cell and a triangle, put in the order of the cells.
+//! The build: pairs of a cell and a triangle, which are then put in the order of the cells.
 
 use rayon::prelude::*;
 
-use super::{GRID_MAX_BLOCK_RESOLUTION, Grid, GridCell, GridOptions, Lattice, overlap::Columns, planes::plane_of};
+use super::{Grid, GridLevels, GridOptions, Lattice, overlap::Columns, planes::plane_of};
 use crate::{
     accel::bounds::{Bounds, is_finite},
-    layout::Triangle,
+    layout::{GRID_MAX_ATTEMPTS, GRID_MAX_BLOCK_RESOLUTION, GRID_MAX_COUNT, GRID_MAX_HALVINGS, GridCell, Triangle},
 };
 
-/// A cell's place and a triangle's index.
+/// The index of a cell and the index of a triangle.
 type Pair = (u32, u32);
 
 /// What all steps of a build read.
-#[derive(Clone, Copy)]
 struct Input<'a> {
     triangles: &'a [Triangle],
-    options: &'a GridOptions,
+    /// How far outside a cell a triangle still counts as inside ([`Bounds::margin`]).
     margin: f32,
     max_references: u64,
 }
 
-/// The lower level's cells of an upper one.
-struct Block {
+/// A triangle and the lattice whose cells get it.
+struct Item {
+    triangle_ix: u32,
     lattice: Lattice,
+    /// The index of the lattice's first cell.
     first_cell: u32,
 }
 
+/// Cells and, in their order, the pairs of the lowest of them.
+struct Level {
+    cells: Vec<GridCell>,
+    pairs: Vec<Pair>,
+    /// How many times the cells' edges were doubled to keep to the limits.
+    n_coarser: u32,
+}
+
 impl Grid {
-    /// Builds the grid of `triangles`. Those of a zero area stay in it, those with a corner that is not finite do not.
+    /// Builds the grid of `triangles`. Triangles without area are in it, and those with a corner that is not finite are
+    /// not.
     ///
     /// The same triangles and options give the same grid on any number of threads.
     pub fn build(triangles: &[Triangle], options: &GridOptions) -> Self {
         let exact_bounds = Bounds::of_all(triangles);
         let margin = exact_bounds.margin();
-        let input = Input { triangles, options, margin, max_references: options.max_references(triangles.len()) };
-        let (lattice, pairs, n_coarser) = upper_level(input, &exact_bounds.grown(margin));
-        let mut cells = cells_of(lattice.n_cubes(), 0, &pairs);
-        let mut grid = Self {
-            lattice,
-            n_levels: options.n_levels,
-            cells: Vec::new(),
-            leaf_triangles: Vec::new(),
-            leaf_planes: Vec::new(),
-            n_triangles: triangles.len(),
-            n_coarser,
+        let input = Input { triangles, margin, max_references: options.max_references_of(triangles.len()).into() };
+        let (lattice, upper) = upper_level(&input, &exact_bounds.grown(margin), options.levels.upper_density());
+        let lowest = match options.levels {
+            GridLevels::Uniform { .. } => upper,
+            GridLevels::Two { lower_density, .. } => lower_level(&input, &lattice, upper, lower_density),
         };
-        let entries = match options.n_levels {
-            1 => pairs,
-            _ => {
-                let (lower_pairs, n_coarser) = lower_level(input, &lattice, &mut cells, &pairs);
-                grid.n_coarser += n_coarser;
-                lower_pairs
-            }
-        };
-        let [least, greatest] = lattice.bounds();
-        let largest_coordinate = least.abs().max(greatest.abs()).max_element();
-        grid.cells = cells;
-        grid.leaf_triangles = entries.par_iter().map(|&(_, triangle_ix)| triangle_ix).collect();
+        let largest_coordinate = lattice.largest_coordinate();
+        let leaf_triangles: Vec<u32> = lowest.pairs.into_par_iter().map(|(_, triangle_ix)| triangle_ix).collect();
         let plane = |&ix: &u32| plane_of(&triangles[ix as usize], largest_coordinate);
-        grid.leaf_planes = grid.leaf_triangles.par_iter().map(plane).collect();
-        grid
+        Self {
+            lattice,
+            n_levels: options.levels.n_levels(),
+            cells: lowest.cells,
+            leaf_planes: leaf_triangles.par_iter().map(plane).collect(),
+            leaf_triangles,
+            n_triangles: triangles.len(),
+            n_coarser: lowest.n_coarser,
+        }
     }
 }
 
-/// The cells and the sorted pairs of a uniform grid, or of the upper level of two. Last: how many times the cells' edges had to
-/// be doubled to keep to the limits.
-fn upper_level(input: Input, bounds: &Bounds) -> (Lattice, Vec<Pair>, u32) {
-    let finite: Vec<u32> = (0..input.triangles.len() as u32)
-        .into_par_iter()
-        .filter(|&ix| is_finite(&input.triangles[ix as usize]))
-        .collect();
-    let density = if input.options.n_levels == 1 { input.options.density } else { input.options.upper_density };
-    let mut lattice = Lattice::of_density(bounds, density * finite.len() as f32);
+/// Returns the lattice, the cells and the pairs of a uniform grid, or of the upper level of two.
+fn upper_level(input: &Input, bounds: &Bounds, density: f32) -> (Lattice, Level) {
+    let n_finite = input.triangles.par_iter().filter(|triangle| is_finite(triangle)).count();
+    let mut lattice = Lattice::of_density(bounds, (density * n_finite as f32) as u32);
     let mut n_coarser = 0;
-    loop {
-        let columns = |&ix: &u32| Columns::new(&lattice, &input.triangles[ix as usize], input.margin);
-        let n_columns: u64 = finite.par_iter().map(|ix| u64::from(columns(ix).n_columns())).sum();
-        let is_coarsest = lattice.n_cubes() == 1 || lattice.cell_size == f32::MAX;
-        if n_columns <= input.max_references || is_coarsest {
-            let pairs_of = |ix: &u32| pairs_of(&columns(ix), |cube| lattice.place_of(cube), *ix);
-            let pairs: Vec<Pair> = finite.par_iter().flat_map_iter(pairs_of).collect();
-            if pairs.len() as u64 <= input.max_references || is_coarsest {
-                return (lattice, in_order(pairs), n_coarser);
+    for n_attempts in 1.. {
+        let item = |triangle_ix: usize| {
+            let item = Item { triangle_ix: triangle_ix as u32, lattice, first_cell: 0 };
+            is_finite(&input.triangles[triangle_ix]).then_some(item)
+        };
+        match pairs_of(input, input.triangles.len(), item) {
+            Ok(pairs) => {
+                let pairs = in_order(pairs);
+                return (lattice, Level { cells: cells_of(lattice.n_cubes(), 0, &pairs), pairs, n_coarser });
+            }
+            Err(count) => {
+                let n_doublings;
+                (lattice, n_doublings) = lattice.coarser(n_steps(input, count, n_attempts));
+                n_coarser += n_doublings;
             }
         }
-        lattice = Lattice::of_size(bounds, (2.0 * lattice.cell_size).min(f32::MAX));
-        n_coarser += 1;
     }
+    unreachable!("a grid of one cell keeps to the limits")
 }
 
-/// Cuts the upper cells, which have these pairs, into blocks, and gives the blocks' cells their triangles. Returns the sorted pairs
-/// of the lower cells, and how many times the blocks' resolutions had to be halved to keep to the limits.
-fn lower_level(input: Input, upper: &Lattice, cells: &mut Vec<GridCell>, upper_pairs: &[Pair]) -> (Vec<Pair>, u32) {
-    let n_upper = cells.len();
-    let counts: Vec<u32> = cells.iter().map(|cell| cell.count).collect();
-    for n_coarser in 0.. {
-        let mut first_cell = n_upper as u64;
-        for (cell, &n_triangles) in cells.iter_mut().zip(&counts) {
-            let resolution = resolution_for(input, upper, n_triangles, n_coarser);
-            *cell = GridCell { first: first_cell as u32, count: resolution };
-            first_cell += u64::from(resolution).pow(3);
-        }
-        let n_lower = first_cell - n_upper as u64;
-        let is_coarsest = cells.iter().all(|cell| cell.count <= 1);
-        if n_lower > input.max_references && !is_coarsest {
-            continue;
-        }
-        let blocks = |pair: &Pair| {
-            let GridCell { first: first_cell, count: resolution } = cells[pair.0 as usize];
-            Block { lattice: upper.within(upper.cube_at(pair.0), resolution), first_cell }
+/// Cuts the cells of the upper level into blocks of cells and sorts the triangles of each upper cell into its block.
+fn lower_level(input: &Input, lattice: &Lattice, upper: Level, density: f32) -> Level {
+    let n_upper = upper.cells.len() as u32;
+    let finest: Vec<u32> =
+        upper.cells.iter().map(|cell| finest_resolution(input, lattice, density * cell.count as f32)).collect();
+    let mut n_halvings = 0;
+    for n_attempts in 1.. {
+        let resolution = |ix: usize| if upper.cells[ix].count == 0 { 0 } else { (finest[ix] >> n_halvings).max(1) };
+        let (blocks, n_lower) = blocks_of(n_upper, resolution);
+        let item = |pair_ix: usize| {
+            let (cell_ix, triangle_ix) = upper.pairs[pair_ix];
+            let GridCell { first: first_cell, count: resolution } = blocks[cell_ix as usize];
+            Some(Item { triangle_ix, lattice: lattice.within(lattice.cube_at(cell_ix), resolution), first_cell })
         };
-        let columns = |block: &Block, ix: u32| {
-            Columns::new(&block.lattice, &input.triangles[ix as usize], input.margin).n_columns()
-        };
-        let n_columns: u64 = upper_pairs.par_iter().map(|pair| u64::from(columns(&blocks(pair), pair.1))).sum();
-        if n_columns > input.max_references && !is_coarsest {
-            continue;
-        }
-        let pairs_of = |pair: &Pair| {
-            let Block { lattice, first_cell } = blocks(pair);
-            let columns = Columns::new(&lattice, &input.triangles[pair.1 as usize], input.margin);
-            pairs_of(&columns, |cube| first_cell + lattice.place_of(cube), pair.1)
-        };
-        let pairs: Vec<Pair> = upper_pairs.par_iter().flat_map_iter(pairs_of).collect();
-        if pairs.len() as u64 <= input.max_references || is_coarsest {
-            let pairs = in_order(pairs);
-            cells.extend(cells_of(n_lower as usize, n_upper as u32, &pairs));
-            return (pairs, n_coarser);
+        let pairs = input.check(n_lower).and_then(|()| pairs_of(input, upper.pairs.len(), item));
+        match pairs {
+            Ok(pairs) => {
+                let pairs = in_order(pairs);
+                let lower_cells = cells_of(n_lower as usize, n_upper, &pairs);
+                return Level { cells: [blocks, lower_cells].concat(), pairs, n_coarser: upper.n_coarser + n_halvings };
+            }
+            Err(count) => {
+                n_halvings = (n_halvings + n_steps(input, count, n_attempts)).min(GRID_MAX_HALVINGS);
+            }
         }
     }
     unreachable!("blocks of one cell keep to the limits")
 }
 
-/// Along each axis: the most cells of which no more than `lower_density` for each triangle make a block, and which are not smaller
-/// than the margin; then halved so many times.
-fn resolution_for(input: Input, upper: &Lattice, n_triangles: u32, n_halvings: u32) -> u32 {
-    let max_cells = input.options.lower_density * n_triangles as f32;
+/// Returns the upper cells as blocks of so many cells along each axis, and the number of the blocks' cells.
+fn blocks_of(n_upper: u32, resolution: impl Fn(usize) -> u32) -> (Vec<GridCell>, u64) {
+    let mut n_lower = 0;
+    let block = |ix: usize| {
+        let block = GridCell { first: (u64::from(n_upper) + n_lower) as u32, count: resolution(ix) };
+        n_lower += u64::from(block.count).pow(3);
+        block
+    };
+    ((0..n_upper as usize).map(block).collect(), n_lower)
+}
+
+/// Returns the most cells along each axis of a block that has no more than `max_cells` of them, none smaller than the
+/// margin.
+fn finest_resolution(input: &Input, upper: &Lattice, max_cells: f32) -> u32 {
     let fits = |r: u32| (r * r * r) as f32 <= max_cells && upper.cell_size_within(r) >= input.margin;
-    let finest = (2..=GRID_MAX_BLOCK_RESOLUTION).take_while(|&r| fits(r)).last().unwrap_or(1);
-    if n_triangles == 0 { 0 } else { (finest >> n_halvings).max(1) }
+    (2..=GRID_MAX_BLOCK_RESOLUTION).take_while(|&r| fits(r)).last().unwrap_or(1)
 }
 
-fn pairs_of(columns: &Columns, place_of: impl Fn([u32; 3]) -> u32, triangle_ix: u32) -> Vec<Pair> {
-    let mut pairs = Vec::new();
-    (0..columns.n_columns()).for_each(|ix| columns.cubes_of(ix, |cube| pairs.push((place_of(cube), triangle_ix))));
-    pairs
+/// Returns the pairs of all items in the order of the items, their columns and the columns' cells.
+///
+/// # Errors
+/// The number of columns or of pairs, where that is more than the limit.
+fn pairs_of(input: &Input, n_items: usize, item: impl Fn(usize) -> Option<Item> + Sync) -> Result<Vec<Pair>, u64> {
+    let items = || (0..n_items).into_par_iter().filter_map(&item);
+    let columns = |item: &Item| Columns::new(item.lattice, &input.triangles[item.triangle_ix as usize], input.margin);
+    input.check(items().map(|item| u64::from(columns(&item).n_columns())).sum())?;
+    let pairs_of_item = |item: Item| {
+        let (columns, mut pairs) = (columns(&item), Vec::new());
+        for column_ix in 0..columns.n_columns() {
+            let found = |cube| pairs.push((item.first_cell + item.lattice.place_of(cube), item.triangle_ix));
+            columns.cubes_of(column_ix, found);
+        }
+        pairs
+    };
+    let pairs: Vec<Pair> = items().flat_map_iter(pairs_of_item).collect();
+    input.check(pairs.len() as u64)?;
+    Ok(pairs)
 }
 
-/// In the order of the cells; within a cell the order stays that of the triangles.
+impl Input<'_> {
+    /// Returns the count as an error where it is more than the limit of references.
+    fn check(&self, count: u64) -> Result<(), u64> {
+        if count <= self.max_references { Ok(()) } else { Err(count) }
+    }
+}
+
+/// Returns how many times the cells' edges are doubled after an attempt with this count of columns, pairs or cells,
+/// which is more than the limit. At each step, the number of cells that a surface meets falls to about a quarter. The
+/// last attempt has cells that are as large as can be.
+///
+/// `n_attempts`: how many attempts there have been.
+fn n_steps(input: &Input, count: u64, n_attempts: u32) -> u32 {
+    if n_attempts + 1 >= GRID_MAX_ATTEMPTS {
+        return 32;
+    }
+    let count = if count > u64::from(GRID_MAX_COUNT) { u64::from(u32::MAX) } else { count };
+    (1..).find(|n| count >> (2 * n) <= input.max_references).expect("0 is within the limit")
+}
+
+/// Puts pairs in the order of their cells. Within a cell the order stays that of the triangles.
 fn in_order(mut pairs: Vec<Pair>) -> Vec<Pair> {
     pairs.par_sort_by_key(|&(cell_ix, _)| cell_ix);
     pairs
 }
 
-/// Cells whose entries are the pairs' triangles. `first_cell`: the place of the first of them.
+/// Returns cells whose entries are the pairs' triangles. `first_cell`: the index of the first of them.
 fn cells_of(n_cells: usize, first_cell: u32, pairs: &[Pair]) -> Vec<GridCell> {
     let mut cells = vec![GridCell::default(); n_cells];
     for (entry_ix, &(cell_ix, _)) in pairs.iter().enumerate() {

@@ -2,8 +2,7 @@
 
 use glam::Vec3;
 
-use super::GRID_MAX_RESOLUTION;
-use crate::accel::bounds::Bounds;
+use crate::{accel::bounds::Bounds, layout::GRID_MAX_RESOLUTION};
 
 /// Cubes side by side that fill a box from its least corner on. At its greatest corner the box may cut some of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,70 +18,80 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// The lattice of the smallest cubes of which no more than `max_cells` fill a box, and which are not smaller than the
-    /// margin of the box.
-    pub fn of_density(bounds: &Bounds, max_cells: f32) -> Self {
-        // Bits of positive numbers are in the order of the numbers. More and more of the highest bits are known: below `bits`,
-        // cubes are too small.
+    /// The lattice of the smallest cubes of which no more than `max_cells` fill a box, and which are not smaller than
+    /// the margin of the box.
+    pub fn of_density(bounds: &Bounds, max_cells: u32) -> Self {
+        let margin = bounds.margin();
+        // The bits of positive numbers have the same order as the numbers. The search finds the highest bits first:
+        // cubes of the size that `bits` stand for are always too small.
         let mut bits = 0;
         for bit in (0..31).rev() {
             let next = f32::from_bits(bits | (1 << bit));
-            if next.is_finite() && !Self::fits(bounds, next, max_cells) {
+            if next.is_finite() && (next < margin || !Self::fits(bounds, next, max_cells)) {
                 bits |= 1 << bit;
             }
         }
-        Self::of_size(bounds, f32::from_bits(bits + 1).max(bounds.margin()).min(f32::MAX))
+        Self::of_size(bounds, f32::from_bits(bits + 1).min(f32::MAX))
     }
 
-    /// The lattice of cubes of a size, which is one that [`Lattice::of_density`] has found, or larger.
-    pub fn of_size(bounds: &Bounds, cell_size: f32) -> Self {
+    /// The lattice of cubes of a size that [`Lattice::of_density`] has found, or of a larger one. Cubes of the largest
+    /// size are taken to reach from one side of any box to the other.
+    fn of_size(bounds: &Bounds, cell_size: f32) -> Self {
         let mut lattice = Self { min: bounds.min, max: bounds.max, cell_size, n_cells: [1; 3] };
-        lattice.n_cells = [0, 1, 2].map(|axis| Self::n_cubes_along(bounds, axis, cell_size));
+        if cell_size < f32::MAX {
+            lattice.n_cells = [0, 1, 2].map(|axis| Self::n_cubes_along(bounds, axis, cell_size));
+        }
         lattice
     }
 
-    fn fits(bounds: &Bounds, cell_size: f32, max_cells: f32) -> bool {
-        let n_cells = [0, 1, 2].map(|axis| Self::n_cubes_along(bounds, axis, cell_size));
-        let product = n_cells.iter().map(|&n| u64::from(n)).product::<u64>();
-        n_cells.iter().all(|&n| n <= GRID_MAX_RESOLUTION) && product as f32 <= max_cells.max(1.0)
+    /// The lattice of cubes that are 2^n as long, or as long as it takes for one cube to fill the box, if that is less.
+    /// Also returns n.
+    pub fn coarser(&self, n_doublings: u32) -> (Self, u32) {
+        let bounds = Bounds { min: self.min, max: self.max };
+        let mut lattice = *self;
+        for n in 0..n_doublings {
+            if lattice.n_cubes() == 1 {
+                return (lattice, n);
+            }
+            lattice = Self::of_size(&bounds, (2.0 * lattice.cell_size).min(f32::MAX));
+        }
+        (lattice, n_doublings)
     }
 
-    /// How many cubes reach from one side of the box to the other; more than `GRID_MAX_RESOLUTION` for any such number.
+    fn fits(bounds: &Bounds, cell_size: f32, max_cells: u32) -> bool {
+        let [n_x, n_y, n_z] = [0, 1, 2].map(|axis| Self::n_cubes_along(bounds, axis, cell_size));
+        n_x.max(n_y).max(n_z) <= GRID_MAX_RESOLUTION && n_x * n_y * n_z <= max_cells.max(1)
+    }
+
+    /// The least number of cubes that reach from one side of the box to the other; more than `GRID_MAX_RESOLUTION` for
+    /// any such number.
     fn n_cubes_along(bounds: &Bounds, axis: usize, cell_size: f32) -> u32 {
-        let (min, max) = (bounds.min[axis], bounds.max[axis]);
-        // Not the quotient of the difference, which may be infinite.
-        let quotient = max / cell_size - min / cell_size;
-        if !(quotient <= 2.0 * GRID_MAX_RESOLUTION as f32) {
-            return 2 * GRID_MAX_RESOLUTION;
+        let mut n_too_few = 0;
+        for bit in (0..=GRID_MAX_RESOLUTION.ilog2()).rev() {
+            let n = n_too_few + (1 << bit);
+            if bounds.min[axis] + n as f32 * cell_size < bounds.max[axis] {
+                n_too_few = n;
+            }
         }
-        // The quotient may be off in its last bits. The answer is exact: the least n at which the cubes reach the end.
-        let reaches = |n: u32| min + n as f32 * cell_size >= max;
-        let mut n = (quotient as u32).max(1);
-        while !reaches(n) {
-            n += 1;
-        }
-        while n > 1 && reaches(n - 1) {
-            n -= 1;
-        }
-        n
+        n_too_few + 1
     }
 
-    /// Where the cubes of index `i` on an axis begin, and those before them end.
+    /// The coordinate at which the cubes of index `i` on an axis begin, and those before them end.
     #[inline(always)]
     pub fn plane(&self, axis: usize, i: u32) -> f32 {
         let at = self.min[axis] + i as f32 * self.cell_size;
         if self.max[axis] < at { self.max[axis] } else { at }
     }
 
-    /// The index on an axis of about the cube that has a coordinate.
+    /// About the index on an axis of the cubes that have a coordinate: the quotient is not exact on a device.
     #[inline(always)]
     pub fn index_near(&self, axis: usize, at: f32) -> u32 {
         // A cast of a negative number, or of a NaN, is 0.
         (((at - self.min[axis]) / self.cell_size) as u32).min(self.n_cells[axis] - 1)
     }
 
-    /// The first and the last index of cubes that meet an interval on an axis; the cubes are closed. An interval beside the box
-    /// meets the cubes at its border.
+    /// The first and the last index of the closed cubes that meet an interval on an axis. An interval outside the box
+    /// meets the cubes at the box's side.
     pub fn indices_in(&self, axis: usize, least: f32, greatest: f32) -> [u32; 2] {
         let last_ix = self.n_cells[axis] - 1;
         let mut first = self.index_near(axis, least);
@@ -125,8 +134,8 @@ impl Lattice {
 
     /// The edge's length of the cubes that a cube is cut into.
     ///
-    /// 1 / resolution is rounded up to a multiple of 2^-16, which takes integers alone: the last bit of a quotient of floats is
-    /// not the same on every device. So the last cube along each axis is up to 2 % smaller than the others.
+    /// 1 / resolution is rounded up to a multiple of 2^-16, which takes integers alone: the last bit of a quotient of
+    /// floats is not the same on every device. So the last cube along each axis is up to 2 % smaller than the others.
     pub fn cell_size_within(&self, resolution: u32) -> f32 {
         self.cell_size * ((1_u32 << 16).div_ceil(resolution) as f32 * (1.0 / 65_536.0))
     }
@@ -141,6 +150,11 @@ impl Lattice {
     pub fn bounds(&self) -> [Vec3; 2] {
         [self.min.into(), self.max.into()]
     }
+
+    /// The largest magnitude among the coordinates of the box.
+    pub fn largest_coordinate(&self) -> f32 {
+        self.min.iter().chain(&self.max).fold(0.0, |largest: f32, x| largest.max(x.abs()))
+    }
 }
 
 #[cfg(test)]
@@ -153,7 +167,7 @@ mod tests {
 
     #[test]
     fn cubes_are_as_small_as_their_number_allows() {
-        for (height, max_cells, expected) in [(1.0, 8.0, [2, 2, 2]), (0.5, 5.0, [2, 1, 2]), (1e-3, 99.0, [9, 1, 9])] {
+        for (height, max_cells, expected) in [(1.0, 8, [2, 2, 2]), (0.5, 5, [2, 1, 2]), (1e-3, 99, [9, 1, 9])] {
             let lattice = Lattice::of_density(&unit_box(height), max_cells);
             assert_eq!(lattice.n_cells, expected, "{height} {max_cells}");
         }
@@ -163,16 +177,29 @@ mod tests {
     fn a_box_of_any_size_is_filled() {
         for scale in [1e-30, 1e-6, 1.0, 1e6, 1e30, f32::MAX] {
             let bounds = Bounds { min: [-scale, 0.0, 0.3 * scale], max: [scale, 0.1 * scale, 0.4 * scale] };
-            let lattice = Lattice::of_density(&bounds, 1e5);
+            let lattice = Lattice::of_density(&bounds, 100_000);
             assert!(lattice.n_cubes() <= 100_000 && lattice.n_cubes() > 50_000, "{scale}: {:?}", lattice.n_cells);
             (0..3).for_each(|axis| assert_eq!(lattice.plane(axis, lattice.n_cells[axis]), bounds.max[axis]));
         }
     }
 
     #[test]
+    fn doubled_cubes_end_as_one() {
+        for scale in [1e-6, 1.0, 1e30, f32::MAX] {
+            let bounds = Bounds { min: [-scale, 0.0, 0.3 * scale], max: [scale, 0.1 * scale, 0.4 * scale] };
+            let lattice = Lattice::of_density(&bounds, 100_000);
+            let (twice, n) = lattice.coarser(1);
+            assert_eq!((n, twice.cell_size), (1, 2.0 * lattice.cell_size));
+            assert_eq!(twice.n_cells, lattice.n_cells.map(|n| n.div_ceil(2)), "{scale}");
+            let (one, n) = lattice.coarser(32);
+            assert!(one.n_cubes() == 1 && n <= 11, "{scale}: {n}");
+        }
+    }
+
+    #[test]
     fn cubes_are_never_smaller_than_the_margin() {
         let bounds = Bounds { min: [1e5; 3], max: [100_000.5; 3] };
-        let lattice = Lattice::of_density(&bounds, 1e6);
+        let lattice = Lattice::of_density(&bounds, 1_000_000);
         assert!(lattice.cell_size >= bounds.margin());
     }
 

@@ -1,5 +1,6 @@
-//! Triangles to a grid: a box cut into cubes of one size, of which each has the list of its triangles; and in a grid of two
-//! levels, each such cube is cut once more, the finer the more triangles it has.
+//! Grids. A uniform grid is a box that is cut into cubes of one size, its cells, each with a list of the triangles that
+//! come near to it. In a grid of two levels, each cell of the upper level is cut once more, into a block of cells, the
+//! finer the more triangles it has.
 //!
 //! ```text
 //! triangles ─> lattice ───> overlap ─────────> build ─> Grid
@@ -7,11 +8,12 @@
 //!              cells        and a triangle     of the cells
 //! ```
 //!
-//! The build is the twin of the kernels that build grids on a device. So its arithmetic is that of f32, it has no division
-//! whose last bit matters, and the order of all that it adds up or sorts is fixed.
+//! The build is the twin of the kernels that build grids on a device (passes/grid): both make the same grid, bit for
+//! bit. So its arithmetic is that of f32, no division's last bit matters, and whatever it adds up or sorts has a fixed
+//! order.
 //!
-//! Kalojanov and Slusallek, "A parallel algorithm for construction of uniform grids", 2009; Kalojanov, Billeter and Slusallek,
-//! "Two-level grids for ray tracing on GPUs", 2011.
+//! Kalojanov and Slusallek, "A parallel algorithm for construction of uniform grids", 2009; Kalojanov, Billeter and
+//! Slusallek, "Two-level grids for ray tracing on GPUs", 2011.
 
 mod build;
 mod lattice;
@@ -23,11 +25,10 @@ mod statistics;
 use glam::Vec3;
 
 pub use self::{lattice::Lattice, lazy::LazyGrid, statistics::Statistics};
-use crate::layout::{
-    AccelConstants, GRID_MAX_BLOCK_RESOLUTION, GRID_MAX_RESOLUTION, GridCell, KD_PLANE_EPSILON, Plane,
-};
+use crate::layout::{AccelConstants, GRID_MAX_COUNT, GridCell, KD_PLANE_EPSILON, Plane};
 
-/// A grid over triangles, as the kernels read it. It comes from [`Grid::build`] alone, and nothing can change it afterwards.
+/// A grid over triangles, as the kernels read it. It comes from [`Grid::build`] alone, and nothing can change it
+/// afterwards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     lattice: Lattice,
@@ -42,33 +43,68 @@ pub struct Grid {
 /// How a grid is built.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GridOptions {
-    /// How many levels of cells there are, 1 or 2.
-    pub n_levels: u32,
-    /// The number of cells for each triangle, in a grid of one level.
-    pub density: f32,
-    /// The number of cells of the upper level for each triangle, in a grid of two levels.
-    pub upper_density: f32,
-    /// The number of cells of the lower level for each triangle of a cell of the upper one.
-    pub lower_density: f32,
-    /// The most references, as a multiple of the triangles; 1024 more are allowed in any case. Where a grid would have more,
-    /// its cells become larger.
+    /// The levels of cells, and how many cells they have.
+    pub levels: GridLevels,
+    /// The most references as a multiple of the number of triangles; 1024 more are allowed in any case. Where a grid
+    /// would have more, its cells become larger.
     pub max_references_per_triangle: u32,
+    /// The most references of all triangles together, but no less than one for each triangle. A device sets it to what
+    /// its memory holds.
+    pub max_references: u32,
+}
+
+/// The levels of a grid's cells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum GridLevels {
+    /// One level.
+    Uniform {
+        /// The number of cells for each triangle.
+        density: f32,
+    },
+    /// Two levels: each cell of the upper level is cut into a block of cells.
+    Two {
+        /// The number of cells of the upper level for each triangle.
+        upper_density: f32,
+        /// The number of cells of a block for each triangle of its upper cell.
+        lower_density: f32,
+    },
+}
+
+impl GridLevels {
+    /// The number of levels.
+    pub fn n_levels(&self) -> u32 {
+        match self {
+            Self::Uniform { .. } => 1,
+            Self::Two { .. } => 2,
+        }
+    }
+
+    /// The number of cells for each triangle, of the only level or of the upper one.
+    pub fn upper_density(&self) -> f32 {
+        match *self {
+            Self::Uniform { density } => density,
+            Self::Two { upper_density, .. } => upper_density,
+        }
+    }
 }
 
 impl GridOptions {
     /// A uniform grid.
     pub fn uniform() -> Self {
-        Self { n_levels: 1, density: 4.0, upper_density: 0.125, lower_density: 2.0, max_references_per_triangle: 16 }
+        let levels = GridLevels::Uniform { density: 4.0 };
+        Self { levels, max_references_per_triangle: 8, max_references: 1 << 28 }
     }
 
     /// A grid of two levels.
     pub fn two_level() -> Self {
-        Self { n_levels: 2, ..Self::uniform() }
+        Self { levels: GridLevels::Two { upper_density: 0.125, lower_density: 2.0 }, ..Self::uniform() }
     }
 
     /// The most references that a grid of so many triangles may have.
-    fn max_references(&self, n_triangles: usize) -> u64 {
-        (n_triangles as u64 * u64::from(self.max_references_per_triangle) + 1024).min(1 << 28).max(n_triangles as u64)
+    pub(crate) fn max_references_of(&self, n_triangles: usize) -> u32 {
+        let n_triangles = n_triangles as u64;
+        let most = n_triangles * u64::from(self.max_references_per_triangle) + 1024;
+        most.min(u64::from(self.max_references)).max(n_triangles).min(u64::from(GRID_MAX_COUNT)) as u32
     }
 }
 

@@ -1,84 +1,86 @@
 //! Which cubes of a lattice a triangle comes near to.
 //!
-//! A triangle's box is gone through in columns along the axis that its normal points along most. A column is passed over where
-//! the triangle, seen along that axis, is beside it. Within a column, the triangle's plane is in few cubes. Each of them is
-//! tested against the plane, and against the triangle as it is seen along the other two axes (Schwarz and Seidel, "Fast
-//! parallel surface and solid voxelization on GPUs", 2010).
+//! The triangle's box is cut into columns of cubes along the axis that the triangle's normal points along most. A
+//! column is skipped if the triangle is beside it, as seen along that axis. Within a column, the triangle's plane is in
+//! few cubes. Each of these is tested against the plane, and against the triangle as seen along the other two axes
+//! (Schwarz and Seidel, "Fast parallel surface and solid voxelization on GPUs", 2010).
 
 use super::Lattice;
 use crate::{accel::bounds::Bounds, layout::Triangle};
 
-/// Times the margin of the triangles' box: how far from a cube a triangle is still taken as in it. The traversal needs the
-/// margin itself (bounds.rs). A sixteenth of it is 8 units of 2^-24 times the largest coordinate, of which the cubes' rounded
-/// middles and half edges take 4.
+/// A triangle counts as inside a cube if it comes nearer than this times the margin of the triangles' box. The
+/// traversal needs the margin itself (bounds.rs). The sixteenth more is 8 units of 2^-24 times the largest coordinate,
+/// of which the rounding of the cubes' middles and half edges takes 4.
 const MARGIN_FACTOR: f32 = 1.0625;
-/// Times a product of two lengths, each a sum of a vector's magnitudes: how far a rounded product of vectors is off, 16 units
-/// of 2^-24. Edges are rounded by 1 unit each, products of two components by 1, their difference by 1: 4 for a normal. Its
-/// product with a third vector adds 4.
+/// How far a rounded product of vectors is off, as a multiple of the product of the vectors' sums of magnitudes: 16
+/// units of 2^-24. The rounding of an edge takes 1 unit, that of a product of two components 1, that of their
+/// difference 1: together 4 for a normal. Its product with a third vector adds 4.
 const PRODUCT_ERROR: f32 = 1.0 / (1 << 20) as f32;
 
-/// A triangle and the columns of its box.
-pub struct Columns<'a> {
-    lattice: &'a Lattice,
+/// A triangle and the columns of its box. The axes are turned so that columns extend along the last one.
+pub struct Columns {
+    lattice: Lattice,
     corners: [[f32; 3]; 3],
-    /// Not of unit length.
+    /// The product of two edges, which is not of unit length.
     normal: [f32; 3],
-    /// How far the normal's components may be off.
+    /// A bound of the error of the normal's components.
     normal_error: f32,
     /// Half of a cube's edge, and the margin.
     half: f32,
-    /// The axes of a row of columns, of the rows, and along the columns.
-    axes: [usize; 3],
     /// The first and the last index of the box's cubes on each axis.
     range: [[u32; 2]; 3],
+    /// The lattice's own axis that is the last one here.
+    axis: usize,
 }
 
-impl<'a> Columns<'a> {
-    /// `margin`: of the box of all triangles.
-    pub fn new(lattice: &'a Lattice, triangle: &Triangle, margin: f32) -> Self {
+impl Columns {
+    /// Finds the columns of a triangle. `margin` is that of the box of all triangles.
+    pub fn new(lattice: Lattice, triangle: &Triangle, margin: f32) -> Self {
         let corners = [triangle.v0, triangle.v1, triangle.v2].map(|corner| corner.to_array());
         let margin = MARGIN_FACTOR * margin;
         let bounds = Bounds::of(triangle).grown(margin);
         let (a, b) = (difference(corners[1], corners[0]), difference(corners[2], corners[0]));
         let normal = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
         let [x, y, z] = normal.map(f32::abs);
-        let along = if z >= x && z >= y { 2 } else { usize::from(y >= x) };
+        let axis = if z >= x && z >= y { 2 } else { usize::from(y >= x) };
+        let range = [0, 1, 2].map(|axis| lattice.indices_in(axis, bounds.min[axis], bounds.max[axis]));
         Self {
-            lattice,
-            corners,
-            normal,
+            lattice: Lattice {
+                min: axis_last(lattice.min, axis),
+                max: axis_last(lattice.max, axis),
+                n_cells: axis_last(lattice.n_cells, axis),
+                ..lattice
+            },
+            corners: corners.map(|corner| axis_last(corner, axis)),
+            normal: axis_last(normal, axis),
             normal_error: PRODUCT_ERROR * (magnitude(a) * magnitude(b)),
             half: 0.5 * lattice.cell_size + margin,
-            axes: [(along + 1) % 3, (along + 2) % 3, along],
-            range: [0, 1, 2].map(|axis| lattice.indices_in(axis, bounds.min[axis], bounds.max[axis])),
+            range: axis_last(range, axis),
+            axis,
         }
     }
 
     /// The number of columns.
     pub fn n_columns(&self) -> u32 {
         let n_on = |[first, last]: [u32; 2]| last - first + 1;
-        n_on(self.range[self.axes[0]]) * n_on(self.range[self.axes[1]])
+        n_on(self.range[0]) * n_on(self.range[1])
     }
 
-    /// Calls `found` with the indices of each cube of a column that the triangle comes near to.
+    /// Calls `found` with the indices of each cube of a column that the triangle comes near to. Columns are numbered along
+    /// the first axis, then the second.
     pub fn cubes_of(&self, column_ix: u32, mut found: impl FnMut([u32; 3])) {
-        let [u, v, w] = self.axes;
-        let n_in_row = self.range[u][1] - self.range[u][0] + 1;
-        let mut cube = [0; 3];
-        cube[u] = self.range[u][0] + column_ix % n_in_row;
-        cube[v] = self.range[v][0] + column_ix / n_in_row;
-        let mut middle = [0.0; 3];
-        middle[u] = self.middle(u, cube[u]);
-        middle[v] = self.middle(v, cube[v]);
-        if self.is_beside(w, middle) {
+        let [[first_x, last_x], [first_y, _], _] = self.range;
+        let n_in_row = last_x - first_x + 1;
+        let [x, y] = [first_x + column_ix % n_in_row, first_y + column_ix / n_in_row];
+        let mut middle = [self.middle(0, x), self.middle(1, y), 0.0];
+        if self.is_beside(2, middle) {
             return;
         }
         let [first, last] = self.near_plane(middle);
-        for i in first..=last {
-            cube[w] = i;
-            middle[w] = self.middle(w, i);
-            if self.meets_plane(middle) && !self.is_beside(u, middle) && !self.is_beside(v, middle) {
-                found(cube);
+        for z in first..=last {
+            middle[2] = self.middle(2, z);
+            if self.meets_plane(middle) && !self.is_beside(0, middle) && !self.is_beside(1, middle) {
+                found(axis_back([x, y, z], self.axis));
             }
         }
     }
@@ -87,12 +89,12 @@ impl<'a> Columns<'a> {
         0.5 * self.lattice.plane(axis, i) + 0.5 * self.lattice.plane(axis, i + 1)
     }
 
-    /// Whether a cube of this middle is beyond an edge, seen along an axis `w`. What is not certain is not beside.
+    /// Whether the triangle is certainly beside the cube of this middle, seen along an axis.
     ///
-    /// A point of a triangle is on the left of all edges or on the right of all, whichever way round they go. So a needle, whose
-    /// area's sign is not certain, is no exception.
-    fn is_beside(&self, w: usize, middle: [f32; 3]) -> bool {
-        let [u, v] = [(w + 1) % 3, (w + 2) % 3];
+    /// A point of the triangle is on the left of all edges or on the right of all. So the cube is beside if it is on the
+    /// right of one edge and on the left of another. This needs no winding, which rounding may hide in a needle.
+    fn is_beside(&self, axis: usize, middle: [f32; 3]) -> bool {
+        let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
         let (mut is_right, mut is_left) = (false, false);
         for [from, to] in [[0, 1], [1, 2], [2, 0]] {
             let (from, to) = (self.corners[from], self.corners[to]);
@@ -107,27 +109,25 @@ impl<'a> Columns<'a> {
         is_right && is_left
     }
 
-    /// The first and the last index on a column of cubes that may meet the plane: one more than do, for the quotient is not
-    /// exact.
+    /// The first and the last index of the cubes of a column that may meet the triangle's plane. The interval is up to a
+    /// cube wider on each side than `meets_plane` needs, so it may be computed by divisions that are not exact.
     fn near_plane(&self, middle: [f32; 3]) -> [u32; 2] {
-        let [u, v, w] = self.axes;
-        let [first, last] = self.range[w];
-        let slope = 1.0 / self.normal[w].abs();
-        let way = [middle[u] - self.corners[0][u], middle[v] - self.corners[0][v]];
-        let extent = self.lattice.plane(w, last + 1) - self.lattice.plane(w, first);
+        let ([x, y, z], [first, last]) = (self.normal, self.range[2]);
+        let slope = 1.0 / z.abs();
+        let way = [middle[0] - self.corners[0][0], middle[1] - self.corners[0][1]];
+        let extent = self.lattice.plane(2, last + 1) - self.lattice.plane(2, first);
         let error = self.normal_error * (way[0].abs() + way[1].abs() + extent + self.half) * slope;
         if !(error < 0.25 * self.lattice.cell_size) {
             return [first, last];
         }
-        let height = self.normal[u] * way[0] + self.normal[v] * way[1];
-        let at = self.corners[0][w] - if self.normal[w] < 0.0 { -height } else { height } * slope;
-        let spread = ((self.normal[u].abs() + self.normal[v].abs()) * slope + 1.0) * self.half;
-        let reach = spread + self.lattice.cell_size;
-        let [near_first, near_last] = [at - reach, at + reach].map(|at| self.lattice.index_near(w, at));
+        let height = x * way[0] + y * way[1];
+        let at = self.corners[0][2] - if z < 0.0 { -height } else { height } * slope;
+        let reach = ((x.abs() + y.abs()) * slope + 1.0) * self.half + self.lattice.cell_size;
+        let [near_first, near_last] = [at - reach, at + reach].map(|at| self.lattice.index_near(2, at));
         [first.max(near_first), last.min(near_last)]
     }
 
-    /// Whether the triangle's plane comes near to a cube of this middle. What is not certain does.
+    /// Whether the triangle's plane may come near to the cube of this middle.
     fn meets_plane(&self, middle: [f32; 3]) -> bool {
         let way = difference(middle, self.corners[0]);
         let [x, y, z] = self.normal;
@@ -138,11 +138,22 @@ impl<'a> Columns<'a> {
     }
 }
 
+/// Turns the axes so that `axis` is the last one.
+fn axis_last<T: Copy>(v: [T; 3], axis: usize) -> [T; 3] {
+    [v[(axis + 1) % 3], v[(axis + 2) % 3], v[axis]]
+}
+
+/// Turns the axes back.
+fn axis_back<T: Copy>(v: [T; 3], axis: usize) -> [T; 3] {
+    // A turn by one axis takes back a turn by two.
+    axis_last(v, [1, 0, 2][axis])
+}
+
 fn difference(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// The sum of a vector's magnitudes, which is no less than its length.
+/// The sum of the magnitudes of a vector's components, which is no less than its length.
 fn magnitude([x, y, z]: [f32; 3]) -> f32 {
     x.abs() + y.abs() + z.abs()
 }
@@ -154,7 +165,7 @@ mod tests {
     use super::*;
 
     fn cubes_of(lattice: &Lattice, triangle: &Triangle, margin: f32) -> Vec<[u32; 3]> {
-        let columns = Columns::new(lattice, triangle, margin);
+        let columns = Columns::new(*lattice, triangle, margin);
         let mut cubes = Vec::new();
         (0..columns.n_columns()).for_each(|column_ix| columns.cubes_of(column_ix, |cube| cubes.push(cube)));
         cubes
@@ -164,7 +175,7 @@ mod tests {
         Lattice { min: [-1.0; 3], max: [1.0; 3], cell_size: 2.0 / n as f32, n_cells: [n; 3] }
     }
 
-    /// Points of a triangle, on its edges, too.
+    /// Points of a triangle, some of them on its edges.
     fn points_of(triangle: &Triangle, n: u32) -> impl Iterator<Item = Vec3> {
         let Triangle { v0, v1, v2, .. } = *triangle;
         let shares = (0..=n).flat_map(move |i| (0..=n - i).map(move |j| [i, j].map(|i| i as f32 / n as f32)));

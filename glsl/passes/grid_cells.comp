@@ -1,0 +1,37 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Grid, cells: one invocation a pair, in the order of the cells. The first pair of a cell writes where the cell's
+// entries begin and how many there are. All other cells are cleared before. Reads build, pairs_from; writes cells.
+#include "grid_build.glsl"
+
+layout(local_size_x = SCAN_GROUP_SIZE) in;
+layout(std430, set = 0, binding = BIND_GRID_PAIRS_FROM) readonly buffer PairsFromBlock { uvec2 pairs_from[]; };
+layout(std430, set = 0, binding = BIND_GRID_CELLS) writeonly buffer CellsBlock { GridCell cells[]; };
+
+// One beyond the last pair of a cell: steps of twice the length each while the cell goes on, and then halves of the
+// last step.
+uint end_of_cell(uint cell_ix, uint first) {
+    uint low = first, step = 1u;
+    while (low + step < build.n_pairs && pairs_from[low + step].x == cell_ix) {
+        low += step;
+        step *= 2u;
+    }
+    uint high = min(low + step, build.n_pairs);
+    while (high - low > 1u) {
+        uint middle = (low + high) / 2u;
+        if (pairs_from[middle].x == cell_ix) low = middle; else high = middle;
+    }
+    return high;
+}
+
+void main() {
+    uint begin = block_of_group() * GRID_BLOCK_SIZE + gl_LocalInvocationIndex;
+    for (uint row = 0u; row < GRID_ROWS; ++row) {
+        uint entry_ix = begin + row * SCAN_GROUP_SIZE;
+        if (entry_ix >= build.n_pairs) break;
+        uint cell_ix = pairs_from[entry_ix].x;
+        if (entry_ix > 0u && pairs_from[entry_ix - 1u].x == cell_ix) continue;
+        uint count = end_of_cell(cell_ix, entry_ix) - entry_ix;
+        cells[cell_ix + (LOWER ? build.n_upper : 0u)] = GridCell(entry_ix, count);
+    }
+}

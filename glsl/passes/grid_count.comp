@@ -1,0 +1,39 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+// Grid, count: one workgroup counts the pairs of a cell and a triangle of a block of columns, each of which one
+// invocation goes through. Reads build, triangles, first_columns, scan_blocks, and at the lower level upper_pairs and
+// blocks; writes
+// first_pairs and the block's sum.
+#include "grid_items.glsl"
+#include "scan.glsl"
+
+layout(local_size_x = SCAN_GROUP_SIZE) in;
+// Of each column: the place of its first pair among those of its block of GRID_BLOCK_SIZE columns.
+layout(std430, set = 0, binding = BIND_GRID_FIRST_PAIRS) writeonly buffer FirstPairsBlock { uint first_pairs[]; };
+
+uint n_pairs_of(uint column_ix) {
+    uint item_ix = item_of_column(column_ix);
+    Columns columns = columns_of(item_at(item_ix));
+    uvec2 column = column_at(columns, column_in_item(column_ix, item_ix));
+    uvec2 cubes = cubes_of(columns, column);
+    uint n = 0u;
+    for (uint i = cubes.x; i < cubes.y; ++i) n += is_near(columns, uvec3(column, i)) ? 1u : 0u;
+    return n;
+}
+
+void main() {
+    uint block = block_of_group();
+    uint sum = 0u;
+    for (uint row = 0u; row < GRID_ROWS; ++row) {
+        uint column_ix = block * GRID_BLOCK_SIZE + row * SCAN_GROUP_SIZE + scan_rank();
+        bool is_column = column_ix < build.n_columns;
+        uint total;
+        uint before = sum + workgroup_exclusive_add(is_column ? n_pairs_of(column_ix) : 0u, total);
+        if (is_column) first_pairs[column_ix] = before;
+        sum += total;
+    }
+    if (gl_LocalInvocationIndex == 0u && block < blocks_of(build.n_columns)) {
+        scan_blocks[build.pairs_begin + block] = sum;
+    }
+}

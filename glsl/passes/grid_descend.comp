@@ -1,0 +1,14 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Grid, descend: one invocation makes the pairs of the upper level the items of the lower one, and prepares the first
+// attempt. Reads and writes build.
+#include "grid_attempt.glsl"
+
+layout(local_size_x = 1) in;
+
+void main() {
+    build.n_items = build.n_pairs;
+    build.n_attempts = 0u;
+    build.counts = GRID_COUNTS_CELLS;
+    size_dispatches();
+}

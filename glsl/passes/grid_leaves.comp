@@ -1,0 +1,51 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// Grid, leaves: one invocation a pair, in the order of the cells, writes the triangle as a leaf has it, and its plane.
+// Twin of src/accel/grid/planes.rs. Reads build, pairs_from, triangles; writes leaf_triangles, leaf_planes.
+#include "grid_build.glsl"
+
+layout(local_size_x = SCAN_GROUP_SIZE) in;
+layout(std430, set = 0, binding = BIND_GRID_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
+layout(std430, set = 0, binding = BIND_GRID_PAIRS_FROM) readonly buffer PairsFromBlock { uvec2 pairs_from[]; };
+// Three rows each, as in LeafTriangle.
+layout(std430, set = 0, binding = BIND_GRID_LEAF_TRIANGLES) writeonly buffer LeafTrianglesBlock { uvec4 leaf_triangles[]; };
+layout(std430, set = 0, binding = BIND_GRID_LEAF_PLANES) writeonly buffer LeafPlanesBlock { vec4 leaf_planes[]; };
+
+const float MAX_ERROR = 16.0;
+
+float magnitude(vec3 v) {
+    precise float sum = abs(v.x) + abs(v.y) + abs(v.z);
+    return sum;
+}
+
+// Normal and distance, or zeros if rounding may put the plane too far off.
+vec4 plane_of(Triangle triangle) {
+    precise vec3 a = triangle.v1 - triangle.v0;
+    precise vec3 b = triangle.v2 - triangle.v0;
+    precise vec3 normal = a.yzx * b.zxy - a.zxy * b.yzx;
+    float longest = max(abs(normal.x), max(abs(normal.y), abs(normal.z)));
+    precise float edges = magnitude(a) * magnitude(b);
+    float reach = max(magnitude(a), magnitude(b));
+    precise float error = 4.0 * edges * reach;
+    precise float limit = MAX_ERROR * (build.largest_coordinate * longest);
+    uint exponent = floatBitsToUint(longest) >> 23;
+    if (!(error <= limit) || exponent < 3u || exponent >= 250u) return vec4(0.0);
+    precise vec3 scaled = normal * uintBitsToFloat((252u - exponent) << 23);
+    precise vec3 products = scaled * triangle.v0;
+    precise float distance = products.x + products.y + products.z;
+    return vec4(scaled, distance);
+}
+
+void main() {
+    uint begin = block_of_group() * GRID_BLOCK_SIZE + gl_LocalInvocationIndex;
+    for (uint row = 0u; row < GRID_ROWS; ++row) {
+        uint entry_ix = begin + row * SCAN_GROUP_SIZE;
+        if (entry_ix >= build.n_pairs) break;
+        uint triangle_ix = pairs_from[entry_ix].y;
+        Triangle triangle = triangles[triangle_ix];
+        leaf_triangles[3u * entry_ix] = uvec4(floatBitsToUint(triangle.v0), triangle_ix);
+        leaf_triangles[3u * entry_ix + 1u] = uvec4(floatBitsToUint(triangle.v1), 0u);
+        leaf_triangles[3u * entry_ix + 2u] = uvec4(floatBitsToUint(triangle.v2), 0u);
+        leaf_planes[entry_ix] = plane_of(triangle);
+    }
+}

@@ -1,0 +1,105 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+// Grid, sort, 3 of 3: one workgroup writes the pairs of its tiles in the order of one digit. Pairs of the same digit
+// keep their order. A tile is put in order in shared memory first, so that neighbours are written to neighbouring
+// places. Reads build, pairs_from, scan_blocks; writes pairs_to.
+#include "grid_build.glsl"
+#include "grid_digits.glsl"
+#include "scan.glsl"
+
+layout(local_size_x = SCAN_GROUP_SIZE) in;
+layout(std430, set = 0, binding = BIND_GRID_PAIRS_FROM) readonly buffer PairsFromBlock { uvec2 pairs_from[]; };
+layout(std430, set = 0, binding = BIND_GRID_PAIRS_TO) writeonly buffer PairsToBlock { uvec2 pairs_to[]; };
+layout(std430, set = 0, binding = BIND_GRID_SCAN_BLOCKS) readonly buffer ScanBlocksBlock { uint scan_blocks[]; };
+
+// Of each digit and subgroup, the digit first: how many pairs the subgroup has, then where they begin in the tile. 32
+// subgroups at the most.
+shared uint places[GRID_DIGITS * SCAN_GROUP_SIZE / 4u];
+shared uvec2 tile[GRID_BLOCK_SIZE];
+// Of each digit: where the group's next pairs go.
+shared uint next_places[GRID_DIGITS];
+
+// Each subgroup has a part of the tile, row by row.
+uint place_in_tile(uint row) {
+    return (gl_SubgroupID * GRID_ROWS + row) * gl_SubgroupSize + gl_SubgroupInvocationID;
+}
+
+uint slot_of(uint digit) {
+    return digit * gl_NumSubgroups + gl_SubgroupID;
+}
+
+// Counts the subgroup's pairs by digit. Returns how many pairs of its digit are before this one in the subgroup's part.
+uint rank_of(uint digit, bool has_pair) {
+    uvec4 peers = peers_of(digit, has_pair);
+    uint before = places[slot_of(digit)];
+    subgroupBarrier();
+    if (has_pair && subgroupBallotFindLSB(peers) == gl_SubgroupInvocationID) {
+        places[slot_of(digit)] = before + subgroupBallotBitCount(peers);
+    }
+    subgroupMemoryBarrierShared();
+    subgroupBarrier();
+    return before + subgroupBallotExclusiveBitCount(peers);
+}
+
+// Turns the counts into the places where each subgroup's pairs of each digit begin.
+void scan_places() {
+    uint n = GRID_DIGITS * gl_NumSubgroups;
+    uint n_each = (n + SCAN_GROUP_SIZE - 1u) / SCAN_GROUP_SIZE;
+    uint begin = min(scan_rank() * n_each, n), end = min(begin + n_each, n);
+    uint sum = 0u;
+    for (uint i = begin; i < end; ++i) sum += places[i];
+    uint total;
+    uint before = workgroup_exclusive_add(sum, total);
+    for (uint i = begin; i < end; ++i) {
+        uint n_pairs = places[i];
+        places[i] = before;
+        before += n_pairs;
+    }
+}
+
+void sort_tile(uint first, uint n_pairs) {
+    for (uint i = gl_LocalInvocationIndex; i < GRID_DIGITS * gl_NumSubgroups; i += SCAN_GROUP_SIZE) places[i] = 0u;
+    barrier();
+    uvec2 pairs[GRID_ROWS];
+    uint ranks[GRID_ROWS];
+    for (uint row = 0u; row < GRID_ROWS; ++row) {
+        uint place = place_in_tile(row);
+        pairs[row] = place < n_pairs ? pairs_from[first + place] : uvec2(0u);
+    }
+    for (uint row = 0u; row < GRID_ROWS; ++row) {
+        ranks[row] = rank_of(digit_of(pairs[row].x), place_in_tile(row) < n_pairs);
+    }
+    barrier();
+    scan_places();
+    barrier();
+    for (uint row = 0u; row < GRID_ROWS; ++row) {
+        if (place_in_tile(row) < n_pairs) tile[places[slot_of(digit_of(pairs[row].x))] + ranks[row]] = pairs[row];
+    }
+    barrier();
+}
+
+// Where the tile's pairs of a digit begin.
+uint first_of(uint digit, uint n_pairs) {
+    return digit < GRID_DIGITS ? places[digit * gl_NumSubgroups] : n_pairs;
+}
+
+void main() {
+    uint rank = gl_LocalInvocationIndex;
+    if (rank < GRID_DIGITS) next_places[rank] = scan_blocks[rank * gl_NumWorkGroups.x + gl_WorkGroupID.x];
+    uint begin = gl_WorkGroupID.x * build.tiles_a_group * GRID_BLOCK_SIZE;
+    uint end = min(begin + build.tiles_a_group * GRID_BLOCK_SIZE, build.n_pairs);
+    for (uint first = begin; first < end; first += GRID_BLOCK_SIZE) {
+        uint n_pairs = min(end - first, GRID_BLOCK_SIZE);
+        sort_tile(first, n_pairs);
+        for (uint i = rank; i < n_pairs; i += SCAN_GROUP_SIZE) {
+            uvec2 pair = tile[i];
+            uint digit = digit_of(pair.x);
+            pairs_to[next_places[digit] + i - first_of(digit, n_pairs)] = pair;
+        }
+        barrier();
+        if (rank < GRID_DIGITS) next_places[rank] += first_of(rank + 1u, n_pairs) - first_of(rank, n_pairs);
+        barrier();
+    }
+}

@@ -1,0 +1,70 @@
+// A level is built in attempts. Each one counts the columns of its triangles and then the pairs of a cell and a
+// triangle; at the lower level it counts the cells first. If a count is above the limit of references, the next attempt
+// has larger cells. The kernels of further attempts have no workgroups once all is counted. Twin of
+// src/accel/grid/build.rs.
+#ifndef KDRAY_GRID_ATTEMPT
+#define KDRAY_GRID_ATTEMPT
+
+#include "grid_build.glsl"
+#include "grid_size.glsl"
+
+// Side by side and in rows.
+uvec2 groups_for(uint n_groups) {
+    return uvec2(min(n_groups, GRID_GROUPS_X), (n_groups + GRID_GROUPS_X - 1u) / GRID_GROUPS_X);
+}
+
+// Sizes the dispatches that go over items, columns and so on: 0 for those whose turn it is not.
+void size_dispatches() {
+    uvec2 cells = groups_for(build.counts == GRID_COUNTS_CELLS ? blocks_of(build.n_upper) : 0u);
+    uvec2 items = groups_for(build.counts == GRID_COUNTS_COLUMNS ? blocks_of(build.n_items) : 0u);
+    uvec2 columns = groups_for(build.counts == GRID_COUNTS_PAIRS ? blocks_of(build.n_columns) : 0u);
+    build.cell_groups_x = cells.x;
+    build.cell_groups_y = cells.y;
+    build.item_groups_x = items.x;
+    build.item_groups_y = items.y;
+    build.column_groups_x = columns.x;
+    build.column_groups_y = columns.y;
+    bool is_counted = build.counts == GRID_IS_COUNTED;
+    uvec2 counted_columns = groups_for(is_counted ? blocks_of(build.n_columns) : 0u);
+    uvec2 counted_pairs = groups_for(is_counted ? blocks_of(build.n_pairs) : 0u);
+    uvec2 counted_cells = groups_for(is_counted ? blocks_of(build.n_upper) : 0u);
+    build.counted_column_groups_x = counted_columns.x;
+    build.counted_column_groups_y = counted_columns.y;
+    build.counted_pair_groups_x = counted_pairs.x;
+    build.counted_pair_groups_y = counted_pairs.y;
+    build.counted_cell_groups_x = counted_cells.x;
+    build.counted_cell_groups_y = counted_cells.y;
+    uint n_tiles = is_counted ? blocks_of(build.n_pairs) : 0u;
+    build.tiles_a_group = max((n_tiles + GRID_MAX_SORT_GROUPS - 1u) / GRID_MAX_SORT_GROUPS, 1u);
+    build.sort_groups_x = (n_tiles + build.tiles_a_group - 1u) / build.tiles_a_group;
+    build.sort_groups_y = 1u;
+}
+
+// How many times the cells' edges are doubled after an attempt with this count. The number of cells that a surface
+// meets falls to about a quarter each time. The last attempt has cells that are as large as can be.
+uint n_steps(uint count) {
+    if (build.n_attempts + 1u >= GRID_MAX_ATTEMPTS) return 32u;
+    uint n = 1u;
+    while (n < 15u && count >> (2u * n) > build.max_references) ++n;
+    return n;
+}
+
+// Ends an attempt with this count, which is above the limit, and makes the cells of the next one larger.
+void coarsen(uint count) {
+    build.n_attempts += 1u;
+    uint steps = n_steps(count);
+    if (LOWER) {
+        build.n_halvings = min(build.n_halvings + steps, GRID_MAX_HALVINGS);
+        build.counts = GRID_COUNTS_CELLS;
+        return;
+    }
+    Lattice lattice = upper_lattice();
+    for (uint i = 0u; i < steps && n_cubes(lattice) > 1u; ++i) {
+        lattice = with_doubled_edges(lattice);
+        build.n_coarser += 1u;
+    }
+    set_upper_lattice(lattice);
+    build.counts = GRID_COUNTS_COLUMNS;
+}
+
+#endif

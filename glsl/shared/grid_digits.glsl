@@ -1,0 +1,24 @@
+// Digits of the cells' indices, by which pairs are sorted: GRID_DIGIT_BITS bits from sort.first_bit on.
+#ifndef KDRAY_GRID_DIGITS
+#define KDRAY_GRID_DIGITS
+
+#include "layout.glsl"
+
+layout(push_constant) uniform SortBlock { GridSort sort; };
+
+uint digit_of(uint cell_ix) {
+    return bitfieldExtract(cell_ix, int(sort.first_bit), int(GRID_DIGIT_BITS));
+}
+
+// The invocations of the subgroup that have a pair whose digit is the same as this invocation's.
+uvec4 peers_of(uint digit, bool has_pair) {
+    uvec4 peers = subgroupBallot(has_pair);
+    for (uint bit = 0u; bit < GRID_DIGIT_BITS; ++bit) {
+        bool is_set = (digit >> bit & 1u) != 0u;
+        uvec4 others = subgroupBallot(is_set);
+        peers &= is_set ? others : ~others;
+    }
+    return peers;
+}
+
+#endif

@@ -1,0 +1,68 @@
+// The items of a level, each a triangle and the lattice whose cells get it: all triangles at the upper level, and the
+// pairs of the upper level at the lower one. The box of an item is cut into columns of cells, which are numbered over
+// all items.
+#ifndef KDRAY_GRID_ITEMS
+#define KDRAY_GRID_ITEMS
+
+#include "grid_build.glsl"
+#include "grid_overlap.glsl"
+
+layout(std430, set = 0, binding = BIND_GRID_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
+// Of the upper level: a cell's index and a triangle's.
+layout(std430, set = 0, binding = BIND_GRID_UPPER_PAIRS) readonly buffer UpperPairsBlock { uvec2 upper_pairs[]; };
+// Of each upper cell: the place of its first lower cell among those of its block of GRID_BLOCK_SIZE upper cells; the
+// number of lower cells along each axis.
+layout(std430, set = 0, binding = BIND_GRID_BLOCKS) readonly buffer BlocksBlock { uvec2 blocks[]; };
+// Of each item: the place of its first column among those of its block of GRID_BLOCK_SIZE items.
+layout(std430, set = 0, binding = BIND_GRID_FIRST_COLUMNS) buffer FirstColumnsBlock { uint first_columns[]; };
+// Sums of blocks, after the scan the sums of all blocks before.
+layout(std430, set = 0, binding = BIND_GRID_SCAN_BLOCKS) buffer ScanBlocksBlock { uint scan_blocks[]; };
+
+// first_cell: the index of the lattice's first cell at its level.
+struct Item {
+    uint triangle_ix;
+    uint first_cell;
+    Lattice lattice;
+};
+
+uvec3 cube_at(Lattice lattice, uint place) {
+    uvec2 n = lattice.n_cells.xy;
+    return uvec3(place % n.x, place / n.x % n.y, place / n.x / n.y);
+}
+
+Item item_at(uint item_ix) {
+    if (!LOWER) return Item(item_ix, 0u, upper_lattice());
+    uvec2 pair = upper_pairs[item_ix];
+    uvec2 block = blocks[pair.x];
+    uint first_cell = scan_blocks[build.cells_begin + pair.x / GRID_BLOCK_SIZE] + block.x;
+    Lattice upper = upper_lattice();
+    return Item(pair.y, first_cell, lattice_within(upper, cube_at(upper, pair.x), block.y));
+}
+
+Columns columns_of(Item item) {
+    return columns_of(item.lattice, triangles[item.triangle_ix], build.margin);
+}
+
+// The column's item: the last one that begins at it or before. Items without columns begin where the next one does.
+uint item_of_column(uint column) {
+    uint low = 0u, high = blocks_of(build.n_items);
+    while (high - low > 1u) {
+        uint middle = (low + high) / 2u;
+        if (scan_blocks[build.columns_begin + middle] <= column) low = middle; else high = middle;
+    }
+    uint rest = column - scan_blocks[build.columns_begin + low];
+    low *= GRID_BLOCK_SIZE;
+    high = min(low + GRID_BLOCK_SIZE, build.n_items);
+    while (high - low > 1u) {
+        uint middle = (low + high) / 2u;
+        if (first_columns[middle] <= rest) low = middle; else high = middle;
+    }
+    return low;
+}
+
+// The place of a column among those of its item.
+uint column_in_item(uint column, uint item_ix) {
+    return column - scan_blocks[build.columns_begin + item_ix / GRID_BLOCK_SIZE] - first_columns[item_ix];
+}
+
+#endif

@@ -1,0 +1,197 @@
+// Which cubes of a lattice a triangle comes near to. Twin of src/accel/grid/overlap.rs, which has the reasons and the
+// bounds of the errors. Everything is `precise`, so that all bits are the same; what a division rounds in another way
+// makes no difference.
+//
+// Scenes whose triangles have corners with magnitudes from 2^-30 to 2^30, or of 0, need no numbers beyond the normal
+// range.
+#ifndef KDRAY_GRID_OVERLAP
+#define KDRAY_GRID_OVERLAP
+
+#include "lattice.glsl"
+
+const float MARGIN_FACTOR = 1.0625;
+const float PRODUCT_ERROR = 1.0 / 1048576.0;
+
+// A triangle and the columns of its box. The axes are turned so that columns extend along z. first, last: the box's
+// cubes on each axis. half_size: half of a cube's edge, and the margin. axis: the lattice's own axis that is z here.
+struct Columns {
+    Lattice lattice;
+    vec3 v0;
+    vec3 v1;
+    vec3 v2;
+    vec3 normal;
+    float normal_error;
+    float half_size;
+    uvec3 first;
+    uvec3 last;
+    uint axis;
+};
+
+// v with component `axis` last; cyclic.
+vec3 axis_last(vec3 v, uint axis) {
+    return axis == 2u ? v : (axis == 0u ? v.yzx : v.zxy);
+}
+
+uvec3 axis_last(uvec3 v, uint axis) {
+    return axis == 2u ? v : (axis == 0u ? v.yzx : v.zxy);
+}
+
+// The inverse of axis_last.
+uvec3 axis_back(uvec3 v, uint axis) {
+    return axis == 2u ? v : (axis == 0u ? v.zxy : v.yzx);
+}
+
+float magnitude(vec3 v) {
+    precise float sum = abs(v.x) + abs(v.y) + abs(v.z);
+    return sum;
+}
+
+// The first of the closed cubes that meet an interval from `least` on, on each axis.
+uvec3 first_cubes(Lattice lattice, vec3 least) {
+    uvec3 first = cube_near(lattice, least);
+    bool moves = true;
+    while (moves) {
+        bvec3 are_late = greaterThanEqual(planes_of(lattice, first), least);
+        bvec3 are_early = lessThan(planes_of(lattice, first + 1u), least);
+        uvec3 down = uvec3(are_late) * uvec3(greaterThan(first, uvec3(0u)));
+        uvec3 up = uvec3(are_early) * uvec3(lessThan(first, lattice.n_cells - 1u));
+        first = first + up - down;
+        moves = any(notEqual(up + down, uvec3(0u)));
+        if (!moves) break;
+    }
+    return first;
+}
+
+// The last of the closed cubes that meet an interval up to `greatest`, on each axis.
+uvec3 last_cubes(Lattice lattice, vec3 greatest) {
+    uvec3 last = cube_near(lattice, greatest);
+    bool moves = true;
+    while (moves) {
+        bvec3 are_late = greaterThan(planes_of(lattice, last), greatest);
+        bvec3 are_early = lessThanEqual(planes_of(lattice, last + 1u), greatest);
+        uvec3 down = uvec3(are_late) * uvec3(greaterThan(last, uvec3(0u)));
+        uvec3 up = uvec3(are_early) * uvec3(lessThan(last, lattice.n_cells - 1u));
+        last = last + up - down;
+        moves = any(notEqual(up + down, uvec3(0u)));
+        if (!moves) break;
+    }
+    return last;
+}
+
+// `margin`: of the box of all triangles.
+Columns columns_of(Lattice lattice, Triangle triangle, float margin) {
+    precise float grown = MARGIN_FACTOR * margin;
+    precise vec3 a = triangle.v1 - triangle.v0;
+    precise vec3 b = triangle.v2 - triangle.v0;
+    precise vec3 normal = a.yzx * b.zxy - a.zxy * b.yzx;
+    precise float normal_error = PRODUCT_ERROR * (magnitude(a) * magnitude(b));
+    vec3 n = abs(normal);
+    uint axis = n.z >= n.x && n.z >= n.y ? 2u : (n.y >= n.x ? 1u : 0u);
+    Columns columns;
+    columns.lattice = Lattice(
+        axis_last(lattice.least, axis), lattice.cell_size, axis_last(lattice.greatest, axis),
+        axis_last(lattice.n_cells, axis)
+    );
+    columns.v0 = axis_last(triangle.v0, axis);
+    columns.v1 = axis_last(triangle.v1, axis);
+    columns.v2 = axis_last(triangle.v2, axis);
+    columns.normal = axis_last(normal, axis);
+    columns.normal_error = normal_error;
+    precise float half_size = 0.5 * lattice.cell_size + grown;
+    columns.half_size = half_size;
+    precise vec3 least = min(columns.v0, min(columns.v1, columns.v2)) - grown;
+    precise vec3 greatest = max(columns.v0, max(columns.v1, columns.v2)) + grown;
+    columns.first = first_cubes(columns.lattice, least);
+    columns.last = last_cubes(columns.lattice, greatest);
+    columns.axis = axis;
+    return columns;
+}
+
+uint n_columns_of(Columns columns) {
+    uvec3 n = columns.last - columns.first + 1u;
+    return n.x * n.y;
+}
+
+// Whether an edge certainly has a square of this middle on its right and on its left.
+bvec2 sides_of(vec2 from, vec2 to, vec2 middle, float half_size) {
+    precise vec2 along = to - from;
+    precise vec2 way = middle - from;
+    precise float span = abs(along.x) + abs(along.y);
+    precise float height = along.x * way.y - along.y * way.x;
+    precise float reach = span * half_size + PRODUCT_ERROR * (span * (abs(way.x) + abs(way.y)));
+    return bvec2(height < -reach, height > reach);
+}
+
+// Whether a triangle of these corners is certainly beside a square. A point of the triangle is on the left of all edges
+// or on the right of all.
+bool is_beside(vec2 a, vec2 b, vec2 c, vec2 middle, float half_size) {
+    bvec2 ab = sides_of(a, b, middle, half_size);
+    bvec2 bc = sides_of(b, c, middle, half_size);
+    bvec2 ca = sides_of(c, a, middle, half_size);
+    return (ab.x || bc.x || ca.x) && (ab.y || bc.y || ca.y);
+}
+
+bool meets_plane(Columns columns, vec3 middle) {
+    precise vec3 way = middle - columns.v0;
+    vec3 n = columns.normal;
+    precise float height = n.x * way.x + n.y * way.y + n.z * way.z;
+    precise float error = columns.normal_error * (magnitude(way) + 3.0 * columns.half_size);
+    precise float reach = magnitude(n) * columns.half_size + error;
+    return !(abs(height) > reach);
+}
+
+// About the cube of a column that has a coordinate.
+uint index_near(Lattice lattice, float at) {
+    precise float index = (at - lattice.least.z) / lattice.cell_size;
+    return uint(clamp(index, 0.0, float(lattice.n_cells.z - 1u)));
+}
+
+// The first and the last index of the cubes of a column that may meet the triangle's plane. The interval is up to a
+// cube wider on each side than `meets_plane` needs, so its last bits make no difference.
+uvec2 near_plane(Columns columns, uvec2 column) {
+    Lattice lattice = columns.lattice;
+    uint first = columns.first.z, last = columns.last.z;
+    vec3 low = planes_of(lattice, uvec3(column, first));
+    vec3 high = planes_of(lattice, uvec3(column + 1u, last + 1u));
+    precise vec2 way = 0.5 * low.xy + 0.5 * high.xy - columns.v0.xy;
+    vec3 n = columns.normal;
+    precise float slope = 1.0 / abs(n.z);
+    precise float extent = high.z - low.z;
+    precise float error = columns.normal_error * (abs(way.x) + abs(way.y) + extent + columns.half_size) * slope;
+    precise float most_error = 0.25 * lattice.cell_size;
+    if (!(error < most_error)) return uvec2(first, last);
+    precise float height = n.x * way.x + n.y * way.y;
+    precise float at = columns.v0.z - (n.z < 0.0 ? -height : height) * slope;
+    precise float reach = ((abs(n.x) + abs(n.y)) * slope + 1.0) * columns.half_size + lattice.cell_size;
+    precise float low_end = at - reach;
+    precise float high_end = at + reach;
+    return uvec2(max(first, index_near(lattice, low_end)), min(last, index_near(lattice, high_end)));
+}
+
+vec3 middle_of(Lattice lattice, uvec3 cube) {
+    precise vec3 middle = 0.5 * planes_of(lattice, cube) + 0.5 * planes_of(lattice, cube + 1u);
+    return middle;
+}
+
+uvec2 column_at(Columns columns, uint column_ix) {
+    uint n_in_row = columns.last.x - columns.first.x + 1u;
+    return columns.first.xy + uvec2(column_ix % n_in_row, column_ix / n_in_row);
+}
+
+// The first cube of a column that the triangle may come near to, and one beyond the last.
+uvec2 cubes_of(Columns columns, uvec2 column) {
+    vec2 middle = middle_of(columns.lattice, uvec3(column, columns.first.z)).xy;
+    if (is_beside(columns.v0.xy, columns.v1.xy, columns.v2.xy, middle, columns.half_size)) return uvec2(0u);
+    return near_plane(columns, column) + uvec2(0u, 1u);
+}
+
+// Whether the triangle comes near to a cube of such a column.
+bool is_near(Columns columns, uvec3 cube) {
+    vec3 middle = middle_of(columns.lattice, cube);
+    float half_size = columns.half_size;
+    return meets_plane(columns, middle)
+        && !is_beside(columns.v0.yz, columns.v1.yz, columns.v2.yz, middle.yz, half_size)
+        && !is_beside(columns.v0.zx, columns.v1.zx, columns.v2.zx, middle.zx, half_size);
+}
+
+#endif

@@ -1,0 +1,69 @@
+// How large the cells of a uniform grid or of the upper level are. Twin of src/accel/grid/lattice.rs.
+#ifndef KDRAY_GRID_SIZE
+#define KDRAY_GRID_SIZE
+
+#include "grid_build.glsl"
+
+// The largest finite number.
+const float LARGEST = 3.4028235e38;
+
+uint n_cubes(Lattice lattice) {
+    return lattice.n_cells.x * lattice.n_cells.y * lattice.n_cells.z;
+}
+
+// The least number of cubes of a size that reach from one side of a box to the other; more than GRID_MAX_RESOLUTION for
+// any such number.
+uint n_cubes_along(float least, float greatest, float cell_size) {
+    uint n_too_few = 0u;
+    for (uint bit = 2u * GRID_MAX_RESOLUTION; bit > 1u; bit >>= 1u) {
+        uint n = n_too_few + (bit >> 1u);
+        precise float reached = least + float(n) * cell_size;
+        if (reached < greatest) n_too_few = n;
+    }
+    return n_too_few + 1u;
+}
+
+// Cubes of the largest size are taken to reach from one side of any box to the other.
+Lattice lattice_of_size(vec3 least, vec3 greatest, float cell_size) {
+    uvec3 n_cells = uvec3(1u);
+    if (cell_size < LARGEST) {
+        n_cells.x = n_cubes_along(least.x, greatest.x, cell_size);
+        n_cells.y = n_cubes_along(least.y, greatest.y, cell_size);
+        n_cells.z = n_cubes_along(least.z, greatest.z, cell_size);
+    }
+    return Lattice(least, cell_size, greatest, n_cells);
+}
+
+Lattice with_doubled_edges(Lattice lattice) {
+    precise float cell_size = 2.0 * lattice.cell_size;
+    return lattice_of_size(lattice.least, lattice.greatest, min(cell_size, LARGEST));
+}
+
+// The lattice of the smallest cubes of which no more than max_cells fill a box, and which are not smaller than the
+// margin.
+Lattice lattice_of_density(vec3 least, vec3 greatest, float margin, uint max_cells) {
+    // The bits of positive numbers have the same order as the numbers. The search finds the highest bits first: cubes
+    // of the size that `bits` stand for are always too small.
+    uint bits = 0u;
+    for (uint bit = 1u << 30; bit > 0u; bit >>= 1u) {
+        float next = uintBitsToFloat(bits | bit);
+        if ((bits | bit) >= 0x7f800000u) continue; // not finite
+        Lattice lattice = lattice_of_size(least, greatest, next);
+        uvec3 n = lattice.n_cells;
+        bool is_coarse = max(n.x, max(n.y, n.z)) <= GRID_MAX_RESOLUTION && n_cubes(lattice) <= max(max_cells, 1u);
+        if (next < margin || !is_coarse) bits |= bit;
+    }
+    return lattice_of_size(least, greatest, min(uintBitsToFloat(bits + 1u), LARGEST));
+}
+
+void set_upper_lattice(Lattice lattice) {
+    build.cell_min = lattice.least;
+    build.cell_size = lattice.cell_size;
+    build.cell_max = lattice.greatest;
+    build.n_cells_x = lattice.n_cells.x;
+    build.n_cells_y = lattice.n_cells.y;
+    build.n_cells_z = lattice.n_cells.z;
+    build.n_upper = n_cubes(lattice);
+}
+
+#endif

@@ -1,0 +1,260 @@
+//! The buffers of a grid's build, and the descriptor sets over them.
+
+use std::sync::Arc;
+
+use super::binding;
+use crate::{
+    accel::grid::{GridLevels, GridOptions},
+    gpu::{Binding, BindingLayout, BindingSet, Buffer, BufferUse, Context, GpuError},
+    layout::{
+        BIND_GRID_BLOCKS, BIND_GRID_BUILD, BIND_GRID_CELLS, BIND_GRID_FIRST_COLUMNS, BIND_GRID_FIRST_PAIRS,
+        BIND_GRID_LEAF_PLANES, BIND_GRID_LEAF_TRIANGLES, BIND_GRID_PAIRS_FROM, BIND_GRID_PAIRS_TO,
+        BIND_GRID_SCAN_BLOCKS, BIND_GRID_TRIANGLES, BIND_GRID_UPPER_PAIRS, GRID_BLOCK_SIZE, GRID_DIGITS,
+        GRID_MAX_RESOLUTION, GRID_MAX_SORT_GROUPS, GridBuild, GridCell, GridSort, LeafTriangle, Plane, Triangle,
+    },
+};
+
+/// The bindings of the set.
+const BINDINGS: [u32; 12] = [
+    BIND_GRID_BUILD,
+    BIND_GRID_TRIANGLES,
+    BIND_GRID_UPPER_PAIRS,
+    BIND_GRID_FIRST_COLUMNS,
+    BIND_GRID_FIRST_PAIRS,
+    BIND_GRID_SCAN_BLOCKS,
+    BIND_GRID_PAIRS_FROM,
+    BIND_GRID_PAIRS_TO,
+    BIND_GRID_CELLS,
+    BIND_GRID_BLOCKS,
+    BIND_GRID_LEAF_TRIANGLES,
+    BIND_GRID_LEAF_PLANES,
+];
+
+/// The most entries of each kind that a build can have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct GridCapacities {
+    pub n_triangles: u32,
+    /// Columns, pairs and lower cells.
+    pub n_references: u32,
+    /// Cells of the upper level, or of the only one.
+    pub n_upper: u32,
+    /// Cells of the lower level.
+    pub n_lower: u32,
+}
+
+impl GridCapacities {
+    /// What a build over so many triangles needs.
+    pub fn new(n_triangles: u32, options: &GridOptions) -> Self {
+        let max_references = options.max_references_of(n_triangles as usize);
+        let most_cells = GRID_MAX_RESOLUTION.pow(3);
+        let n_upper = ((options.levels.upper_density() * n_triangles as f32) as u32).clamp(1, most_cells);
+        let n_lower = match options.levels {
+            GridLevels::Uniform { .. } => 0,
+            GridLevels::Two { .. } => max_references,
+        };
+        Self { n_triangles, n_references: max_references, n_upper, n_lower }
+    }
+}
+
+/// The state of a build, and the arrays that its kernels hand to one another.
+pub struct GridBuffers {
+    pub capacities: GridCapacities,
+    /// One.
+    pub build: Buffer<GridBuild>,
+    /// The cells of the upper level, then those of the lower one.
+    pub cells: Buffer<GridCell>,
+    pub leaf_triangles: Buffer<LeafTriangle>,
+    pub leaf_planes: Buffer<Plane>,
+    /// For the upper level and for the lower one.
+    pub levels: Vec<PairSets>,
+    initial: GridBuild,
+    arrays: Arrays,
+}
+
+/// The descriptor sets of a level, over two arrays of pairs. The sort goes to and fro between the arrays and ends in the first
+/// one.
+pub struct PairSets {
+    /// By the array from which kernels take pairs.
+    sets: [BindingSet; 2],
+    /// The number of the sort's passes.
+    pub n_passes: u32,
+}
+
+impl PairSets {
+    /// The set for the kernels that come before a pass of the sort and write what it reads, or for the kernels after the last
+    /// pass.
+    pub fn reading_for(&self, pass_ix: u32) -> &BindingSet {
+        &self.sets[((self.n_passes - pass_ix) % 2) as usize]
+    }
+
+    /// The set for the kernel that writes the pairs that the sort starts from.
+    pub fn writing_unsorted(&self) -> &BindingSet {
+        &self.sets[((self.n_passes + 1) % 2) as usize]
+    }
+}
+
+/// The number of the sort's passes for so many cells.
+fn n_sort_passes(n_cells: u32) -> u32 {
+    let n_bits = u32::BITS - n_cells.saturating_sub(1).leading_zeros();
+    n_bits.div_ceil(GRID_DIGITS.ilog2())
+}
+
+impl GridBuffers {
+    /// The layout of the sets.
+    ///
+    /// # Errors
+    /// Out of memory.
+    pub fn bindings(context: &Arc<Context>) -> Result<Arc<BindingLayout>, GpuError> {
+        BindingLayout::new(context, &BINDINGS.map(binding), size_of::<GridSort>() as u32)
+    }
+
+    /// Makes room for a build over the triangles.
+    ///
+    /// # Errors
+    /// Beyond the device's limits, out of memory.
+    pub fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<BindingLayout>,
+        triangles: &Buffer<Triangle>,
+        options: &GridOptions,
+    ) -> Result<Self, GpuError> {
+        let capacities = GridCapacities::new(triangles.len() as u32, options);
+        let GridCapacities { n_triangles, n_references, n_upper, n_lower } = capacities;
+        let is_two_level = n_lower > 0;
+        let storage = BufferUse::Storage;
+        let pairs = |name, n: u32| Buffer::<[u32; 2]>::new(context, name, n as usize, storage);
+        let n_items = n_triangles.max(if is_two_level { n_references } else { 0 });
+        let regions = ScanRegions::new(n_items, n_references, if is_two_level { n_upper } else { 0 });
+        let arrays = Arrays {
+            triangles: triangles.clone(),
+            first_columns: Buffer::new(context, "grid_first_columns", n_items as usize, storage)?,
+            first_pairs: Buffer::new(context, "grid_first_pairs", n_references as usize, storage)?,
+            scan_blocks: Buffer::new(context, "grid_scan_blocks", regions.len as usize, storage)?,
+            blocks: pairs("grid_blocks", if is_two_level { n_upper } else { 0 })?,
+            pairs: [
+                pairs("grid_upper_pairs", n_references)?,
+                pairs("grid_pairs", n_references)?,
+                pairs("grid_lower_pairs", if is_two_level { n_references } else { 0 })?,
+            ],
+        };
+        let build = Buffer::new(context, "grid_build", 1, BufferUse::Indirect)?;
+        let cells = Buffer::new(context, "grid_build_cells", n_upper as usize + n_lower as usize, storage)?;
+        let leaf_triangles = Buffer::new(context, "grid_build_leaf_triangles", n_references as usize, storage)?;
+        let leaf_planes = Buffer::new(context, "grid_build_leaf_planes", n_references as usize, storage)?;
+        let mut buffers = Self {
+            capacities,
+            build,
+            cells,
+            leaf_triangles,
+            leaf_planes,
+            levels: Vec::new(),
+            initial: initial_build(capacities, options, &regions),
+            arrays,
+        };
+        buffers.levels.push(buffers.pair_sets(bindings, [0, 1], n_sort_passes(n_upper))?);
+        if is_two_level {
+            buffers.levels.push(buffers.pair_sets(bindings, [1, 2], n_sort_passes(n_lower))?);
+        }
+        Ok(buffers)
+    }
+
+    /// What the host writes into `build` before a build.
+    pub fn initial(&self) -> &GridBuild {
+        &self.initial
+    }
+
+    /// The sets over two of the arrays of pairs, by their numbers.
+    fn pair_sets(
+        &self,
+        bindings: &Arc<BindingLayout>,
+        [a, b]: [usize; 2],
+        n_passes: u32,
+    ) -> Result<PairSets, GpuError> {
+        let arrays = &self.arrays;
+        let set = |from: usize, to: usize| {
+            let objects = [
+                self.build.any(),
+                arrays.triangles.any(),
+                arrays.pairs[0].any(),
+                arrays.first_columns.any(),
+                arrays.first_pairs.any(),
+                arrays.scan_blocks.any(),
+                arrays.pairs[from].any(),
+                arrays.pairs[to].any(),
+                self.cells.any(),
+                arrays.blocks.any(),
+                self.leaf_triangles.any(),
+                self.leaf_planes.any(),
+            ];
+            let objects: Vec<_> = BINDINGS.into_iter().zip(objects.map(Binding::Buffer)).collect();
+            BindingSet::new(bindings, "grid", &objects)
+        };
+        Ok(PairSets { sets: [set(a, b)?, set(b, a)?], n_passes })
+    }
+}
+
+/// The arrays that only kernels see.
+struct Arrays {
+    triangles: Buffer<Triangle>,
+    first_columns: Buffer<u32>,
+    first_pairs: Buffer<u32>,
+    scan_blocks: Buffer<u32>,
+    blocks: Buffer<[u32; 2]>,
+    /// The first one has the upper level's pairs in the end.
+    pairs: [Buffer<[u32; 2]>; 3],
+}
+
+/// Where the sums of each scan begin in scan_blocks. Those of the sort begin at 0.
+struct ScanRegions {
+    columns_begin: u32,
+    pairs_begin: u32,
+    cells_begin: u32,
+    len: u32,
+}
+
+impl ScanRegions {
+    fn new(n_items: u32, n_columns: u32, n_upper: u32) -> Self {
+        let columns_begin = GRID_DIGITS * GRID_MAX_SORT_GROUPS;
+        let pairs_begin = columns_begin + n_items.div_ceil(GRID_BLOCK_SIZE);
+        let cells_begin = pairs_begin + n_columns.div_ceil(GRID_BLOCK_SIZE);
+        Self { columns_begin, pairs_begin, cells_begin, len: cells_begin + n_upper.div_ceil(GRID_BLOCK_SIZE) }
+    }
+}
+
+fn initial_build(capacities: GridCapacities, options: &GridOptions, regions: &ScanRegions) -> GridBuild {
+    let lower_density = match options.levels {
+        GridLevels::Uniform { .. } => 0.0,
+        GridLevels::Two { lower_density, .. } => lower_density,
+    };
+    GridBuild {
+        least_x: u32::MAX,
+        least_y: u32::MAX,
+        least_z: u32::MAX,
+        n_triangles: capacities.n_triangles,
+        upper_density: options.levels.upper_density(),
+        lower_density,
+        max_references: capacities.n_references,
+        columns_begin: regions.columns_begin,
+        pairs_begin: regions.pairs_begin,
+        cells_begin: regions.cells_begin,
+        tiles_a_group: 1,
+        cell_groups_z: 1,
+        item_groups_z: 1,
+        column_groups_z: 1,
+        counted_column_groups_z: 1,
+        counted_pair_groups_z: 1,
+        counted_cell_groups_z: 1,
+        sort_groups_z: 1,
+        ..GridBuild::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_bit_of_a_cell_is_in_a_pass() {
+        assert_eq!([0, 1, 2, 16, 17, 256, 257, 1 << 22, (1 << 22) + 1].map(n_sort_passes), [0, 0, 1, 1, 2, 2, 3, 6, 6]);
+    }
+}

@@ -1,0 +1,130 @@
+//! Builds on a device, from its triangles to arrays of their right sizes.
+
+use std::sync::Arc;
+
+use super::GridPasses;
+use crate::{
+    accel::grid::{GridOptions, Lattice},
+    buffers::GridBuffers,
+    gpu::{Access, Buffer, BufferUse, CommandBuffer, Context, GpuError, Timer, TimerRow},
+    layout::{GRID_IS_COUNTED, GridBuild, GridCell, LeafTriangle, Plane, Triangle},
+};
+
+/// Kernels and memory to build the grid of some triangles, as often as is wanted.
+pub struct GridBuilder {
+    context: Arc<Context>,
+    options: GridOptions,
+    passes: GridPasses,
+    buffers: GridBuffers,
+}
+
+/// A grid in a device's memory: [`Grid`](crate::accel::grid::Grid), bit for bit.
+pub struct DeviceGrid {
+    /// The lattice of the upper level.
+    pub lattice: Lattice,
+    /// 1 or 2.
+    pub n_levels: u32,
+    /// How many times the edges of all cells were doubled to keep to the limit of references.
+    pub n_coarser: u32,
+    /// The cells of the upper level, then those of the lower one.
+    pub cells: Buffer<GridCell>,
+    /// The triangles, cell after cell.
+    pub leaf_triangles: Buffer<LeafTriangle>,
+    /// The plane of each of `leaf_triangles`.
+    pub leaf_planes: Buffer<Plane>,
+    /// The build's profile, if it was given a timer.
+    pub stages: Vec<TimerRow>,
+}
+
+impl GridBuilder {
+    /// Makes kernels and memory for builds over the triangles.
+    ///
+    /// # Errors
+    /// Beyond the device's limits, out of memory; the driver refuses a shader.
+    pub fn new(context: &Arc<Context>, triangles: &Buffer<Triangle>, options: &GridOptions) -> Result<Self, GpuError> {
+        let options = Self::options_for(context, options);
+        let bindings = GridBuffers::bindings(context)?;
+        Ok(Self {
+            buffers: GridBuffers::new(context, &bindings, triangles, &options)?,
+            passes: GridPasses::new(context, &bindings, options.levels.n_levels())?,
+            context: context.clone(),
+            options,
+        })
+    }
+
+    /// The options, with a limit of references that the device can bind. The host's build with these makes the same grid.
+    pub fn options_for(context: &Context, options: &GridOptions) -> GridOptions {
+        let most = context.limits().storage_range / size_of::<LeafTriangle>() as u64;
+        let max_references = options.max_references.min(u32::try_from(most).unwrap_or(u32::MAX));
+        GridOptions { max_references, ..options.clone() }
+    }
+
+    /// The options of the builds.
+    pub fn options(&self) -> &GridOptions {
+        &self.options
+    }
+
+    /// The number of rows that a build takes in a timer.
+    pub fn n_stages(&self) -> u32 {
+        self.passes.n_stages(&self.buffers)
+    }
+
+    /// Builds the grid. Its buffers get the `usage`. Waits for the device.
+    ///
+    /// # Errors
+    /// Out of memory, a failed call.
+    pub fn build(&self, timer: Option<&Timer>, usage: BufferUse) -> Result<DeviceGrid, GpuError> {
+        let commands = CommandBuffer::record(&self.context, "grid_build", timer, |commands| {
+            commands.reset_timer();
+            self.passes.record(commands, &self.buffers);
+        })?;
+        self.context.submit(&[&commands])?;
+        self.context.wait()?;
+        let build = self.buffers.build.download()?[0];
+        assert_eq!(build.counts, GRID_IS_COUNTED, "the last attempt keeps to the limit");
+        let mut grid = self.with_room(&build, usage)?;
+        self.copy_to(&grid)?;
+        grid.stages = timer.map_or(Ok(Vec::new()), Timer::rows)?;
+        Ok(grid)
+    }
+
+    /// The finished build's grid, without its arrays' elements.
+    fn with_room(&self, build: &GridBuild, usage: BufferUse) -> Result<DeviceGrid, GpuError> {
+        let lattice = Lattice {
+            min: build.cell_min.to_array(),
+            max: build.cell_max.to_array(),
+            cell_size: build.cell_size,
+            n_cells: [build.n_cells_x, build.n_cells_y, build.n_cells_z],
+        };
+        let n_cells = build.n_upper as usize + build.n_lower as usize;
+        let n_references = build.n_pairs as usize;
+        Ok(DeviceGrid {
+            lattice,
+            n_levels: self.options.levels.n_levels(),
+            n_coarser: build.n_coarser + build.n_halvings,
+            cells: Buffer::new(&self.context, "grid_cells", n_cells, usage)?,
+            leaf_triangles: Buffer::new(&self.context, "leaf_triangles", n_references, usage)?,
+            leaf_planes: Buffer::new(&self.context, "leaf_planes", n_references, usage)?,
+            stages: Vec::new(),
+        })
+    }
+
+    fn copy_to(&self, grid: &DeviceGrid) -> Result<(), GpuError> {
+        let copies = [
+            (self.buffers.cells.any(), grid.cells.any(), grid.cells.len() * size_of::<GridCell>()),
+            (
+                self.buffers.leaf_triangles.any(),
+                grid.leaf_triangles.any(),
+                grid.leaf_triangles.len() * size_of::<LeafTriangle>(),
+            ),
+            (self.buffers.leaf_planes.any(), grid.leaf_planes.any(), grid.leaf_planes.len() * size_of::<Plane>()),
+        ];
+        self.context.run("grid_copy", |commands| {
+            commands.barrier(Access::ComputeWrite, Access::TransferRead); // the build's arrays
+            for (from, to, bytes) in copies.into_iter().filter(|(.., bytes)| *bytes > 0) {
+                commands.copy_buffer(from, to, bytes as u64);
+            }
+            commands.barrier(Access::TransferWrite, Access::AllReads); // the grid
+        })
+    }
+}

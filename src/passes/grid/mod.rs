@@ -1,0 +1,193 @@
+//! Grid: builds a uniform grid or one of two levels from triangles, in one command buffer. `accel::grid` is the twin of
+//! all its kernels: both make the same grid, bit for bit.
+//!
+//! ```text
+//! bounds       the box of the triangles
+//! lattice      the size of its cells
+//! upper level                               lower level
+//!                                           descend      pairs become items
+//!   4 attempts, until                         4 attempts, until
+//!   the counts keep to the limit              the counts keep to the limit
+//!                                               resolutions  cells of each upper cell
+//!     columns   boxes of items in cells         columns
+//!     count     pairs of a cell and a           count
+//!               triangle
+//!   emit      writes the pairs                emit
+//!   sort      in the order of the cells       sort
+//!   cells     their entries                   cells
+//!                                           blocks       lower cells of each upper cell
+//! leaves       triangles and planes, in the order of the cells
+//! ```
+//!
+//! An item is a triangle and the lattice whose cells get it. Scans find where each item's columns and each column's pairs
+//! begin, so that the order of all pairs is fixed. Each scan has three steps, as in compaction: sums of blocks, the spine
+//! over these sums, and places within blocks. The spines also decide how an attempt goes on, and size all dispatches that
+//! follow: once all is counted, the kernels of further attempts have no workgroups.
+//!
+//! Kalojanov and Slusallek, "A parallel algorithm for construction of uniform grids", 2009; Kalojanov, Billeter and
+//! Slusallek, "Two-level grids for ray tracing on GPUs", 2011.
+
+mod builder;
+mod level;
+
+use std::{mem::offset_of, sync::Arc};
+
+pub use self::builder::{DeviceGrid, GridBuilder};
+use self::level::Level;
+use super::{kernel, spirv, undeclared};
+use crate::{
+    buffers::{GridBuffers, PairSets},
+    gpu::{
+        Access, BindingLayout, Commands, ComputeDesc, ComputePipeline, Constants, Context, Dispatch, GpuError, Shader,
+    },
+    layout::{GRID_BLOCK_SIZE, GRID_GROUPS_X, GRID_MAX_ATTEMPTS, GRID_SCANS_CELLS, GridBuild, GridSort, constants},
+};
+
+/// All kernels of a build, ready to record.
+struct GridPasses {
+    bounds: ComputePipeline,
+    lattice: ComputePipeline,
+    upper: Level,
+    /// None for a uniform grid.
+    lower: Option<Lower>,
+    leaves: ComputePipeline,
+}
+
+/// The kernels of the lower level.
+struct Lower {
+    descend: ComputePipeline,
+    cut: Cut,
+    level: Level,
+    blocks: ComputePipeline,
+}
+
+/// The kernels that cut the upper cells, before each attempt at the lower level.
+struct Cut {
+    resolutions: ComputePipeline,
+    spine: ComputePipeline,
+}
+
+impl GridPasses {
+    /// # Errors
+    /// The driver refuses a shader.
+    fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, n_levels: u32) -> Result<Self, GpuError> {
+        let none = Constants::new();
+        let kernels = Kernels { context, bindings };
+        let lower = if n_levels == 2 { Some(Lower::new(&kernels)?) } else { None };
+        Ok(Self {
+            bounds: kernels.of_blocks("grid_bounds", spirv!("grid_bounds.comp"), &none)?,
+            lattice: kernels.of_one("grid_lattice", spirv!("grid_lattice.comp"), &none)?,
+            upper: Level::upper(&kernels)?,
+            lower,
+            leaves: kernels.of_blocks("grid_leaves", spirv!("grid_leaves.comp"), &none)?,
+        })
+    }
+
+    /// Needs triangles. Leaves build, cells, leaf_triangles and leaf_planes.
+    fn record(&self, commands: &Commands, buffers: &GridBuffers) {
+        commands.bind(buffers.levels[0].writing_unsorted());
+        self.bounds(commands, buffers);
+        then(commands);
+        dispatch(commands, &self.lattice, ONE_GROUP);
+        then(commands);
+        self.upper.record(commands, buffers, &buffers.levels[0], None);
+        if let Some(lower) = &self.lower {
+            then(commands);
+            dispatch(commands, &lower.descend, ONE_GROUP);
+            then(commands);
+            lower.level.record(commands, buffers, &buffers.levels[1], Some(&lower.cut));
+            then(commands);
+            dispatch(commands, &lower.blocks, sized_by(buffers, offset_of!(GridBuild, counted_cell_groups_x)));
+        }
+        // Beside `cells` and `blocks`: it reads what they read.
+        dispatch(commands, &self.leaves, sized_by(buffers, offset_of!(GridBuild, counted_pair_groups_x)));
+    }
+
+    /// The number of dispatches of a build.
+    fn n_stages(&self, buffers: &GridBuffers) -> u32 {
+        let of_level = |sets: &PairSets| Level::n_stages(sets);
+        let own = if self.lower.is_some() { 5 + 2 * GRID_MAX_ATTEMPTS } else { 3 };
+        own + buffers.levels.iter().map(of_level).sum::<u32>()
+    }
+
+    /// Needs triangles. Leaves the box in build, and cells without entries.
+    fn bounds(&self, commands: &Commands, buffers: &GridBuffers) {
+        let reset = || {
+            commands.update_buffer(buffers.build.any(), buffers.initial());
+            commands.clear_buffer(buffers.cells.any());
+            commands.barrier(Access::TransferWrite, Access::KernelUpdate); // build, cells
+        };
+        let n_groups = buffers.capacities.n_triangles.div_ceil(GRID_BLOCK_SIZE);
+        let groups = [n_groups.min(GRID_GROUPS_X), n_groups.div_ceil(GRID_GROUPS_X), 1];
+        let dispatch = Dispatch::Threads(groups, [1, 1, 1]);
+        commands.dispatch_after(reset, &self.bounds, None, &GridSort::default(), dispatch);
+    }
+}
+
+impl Lower {
+    fn new(kernels: &Kernels) -> Result<Self, GpuError> {
+        let lower = Constants::new().set(constants::LOWER, true);
+        let scans_cells = lower.clone().set(constants::SCANS, GRID_SCANS_CELLS);
+        Ok(Self {
+            descend: kernels.of_one("grid_descend", spirv!("grid_descend.comp"), &lower)?,
+            cut: Cut {
+                resolutions: kernels.of_blocks("grid_resolutions", spirv!("grid_resolutions.comp"), &lower)?,
+                spine: kernels.of_blocks("grid_spine_cells", spirv!("grid_spine.comp"), &scans_cells)?,
+            },
+            level: Level::lower(kernels)?,
+            blocks: kernels.of_blocks("grid_blocks", spirv!("grid_blocks.comp"), &lower)?,
+        })
+    }
+}
+
+impl Cut {
+    /// Needs build, cells. Leaves blocks, the number of lower cells, and how the attempt goes on.
+    fn record(&self, commands: &Commands, buffers: &GridBuffers, attempt: u32) {
+        let cells = sized_by(buffers, offset_of!(GridBuild, cell_groups_x));
+        commands.dispatch(&self.resolutions, Some(attempt), &GridSort::default(), cells);
+        then(commands);
+        commands.dispatch(&self.spine, Some(attempt), &GridSort::default(), ONE_GROUP);
+        then(commands);
+    }
+}
+
+/// What the kernels of a build are made for.
+struct Kernels<'a> {
+    context: &'a Arc<Context>,
+    bindings: &'a Arc<BindingLayout>,
+}
+
+impl Kernels<'_> {
+    /// A kernel whose workgroups go through blocks of entries.
+    fn of_blocks(
+        &self,
+        name: &'static str,
+        shader: Shader,
+        constants: &Constants,
+    ) -> Result<ComputePipeline, GpuError> {
+        assert_eq!(undeclared(shader.file, constants), None, "constants of {}", shader.file);
+        let desc = ComputeDesc { name, shader, constants, full_subgroups: true };
+        ComputePipeline::new(self.context, self.bindings, &desc)
+    }
+
+    /// A kernel of one invocation.
+    fn of_one(&self, name: &'static str, shader: Shader, constants: &Constants) -> Result<ComputePipeline, GpuError> {
+        kernel(self.context, self.bindings, name, shader, constants)
+    }
+}
+
+const ONE_GROUP: Dispatch<'static> = Dispatch::Threads([1, 1, 1], [1, 1, 1]);
+
+/// The workgroups whose numbers are at an offset of build.
+fn sized_by(buffers: &GridBuffers, offset: usize) -> Dispatch<'_> {
+    Dispatch::Indirect(buffers.build.any(), offset as u64)
+}
+
+fn dispatch(commands: &Commands, kernel: &ComputePipeline, dispatch: Dispatch) {
+    commands.dispatch(kernel, None, &GridSort::default(), dispatch);
+}
+
+/// Makes a kernel wait for the one before it: for what that has written, and for the sizes of dispatches among it.
+fn then(commands: &Commands) {
+    commands.barrier(Access::KernelUpdate, Access::KernelUpdate); // the build's arrays
+}
