@@ -1,7 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
 // Grid, cells: one invocation a pair, in the order of the cells. The first pair of a cell writes where the cell's
-// entries begin and how many there are. All other cells are cleared before. Reads build, pairs_from; writes cells.
+// entries begin and how many there are. All other cells are cleared before. Atomics count the cells that have
+// entries; the sum is the same in every order. Reads build, pairs_from; writes cells, and n_filled_* of build.
 #include "grid_build.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
@@ -25,6 +27,7 @@ uint end_of_cell(uint cell_ix, uint first) {
 }
 
 void main() {
+    uint n_filled = 0u;
     uint begin = block_of_group() * GRID_BLOCK_SIZE + gl_LocalInvocationIndex;
     for (uint row = 0u; row < GRID_ROWS; ++row) {
         uint entry_ix = begin + row * SCAN_GROUP_SIZE;
@@ -33,5 +36,10 @@ void main() {
         if (entry_ix > 0u && pairs_from[entry_ix - 1u].x == cell_ix) continue;
         uint count = end_of_cell(cell_ix, entry_ix) - entry_ix;
         cells[cell_ix + (LOWER ? build.n_upper : 0u)] = GridCell(entry_ix, count);
+        n_filled += 1u;
     }
+    n_filled = subgroupAdd(n_filled);
+    if (gl_SubgroupInvocationID != 0u || n_filled == 0u) return;
+    if (LOWER) atomicAdd(build.n_filled_lower, n_filled);
+    else atomicAdd(build.n_filled_upper, n_filled);
 }

@@ -564,8 +564,8 @@ struct GridBuild {
     uint sort_groups_y;
     uint sort_groups_z;
     uint reserved0;
-    uint reserved1;
-    uint reserved2;
+    uint n_filled_upper;
+    uint n_filled_lower;
 };
 
 // Push constants of the sort: the lowest bit of the digit that a pass sorts by.

@@ -94,11 +94,12 @@ impl Stage {
         Geometry::new(&self.scene().triangles, accel).expect("a grid of these triangles")
     }
 
-    /// The structure that a variant searches in numbers. The host builds a grid, unless it has done so already.
+    /// The structure that a variant searches in numbers. If no device has built a grid, the host
+    /// builds it.
     pub fn statistics(&self, variant: Variant) -> Statistics {
         match self.geometry(variant).accel() {
             Accel::KdTree(_) => self.world.statistics(),
-            Accel::Grid(grid) => Statistics::Grid(grid.get(&self.scene().triangles).statistics()),
+            Accel::Grid(grid) => Statistics::Grid(grid.statistics(&self.scene().triangles)),
         }
     }
 

@@ -11,14 +11,15 @@ use super::{
 use crate::{
     accel::{
         Accel,
-        grid::Grid,
+        grid::{Grid, LazyGrid},
         kdtree::{KdTree, Traversal, TraversalLinks},
     },
-    gpu::{Binding, Buffer, BufferUse, Constants, Context, GpuError},
+    gpu::{Binding, Buffer, BufferUse, Constants, Context, GpuError, Timer},
     layout::{
         AccelConstants, BIND_ACCEL, BIND_STALLS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, LeafTriangle, Slab,
         TRIANGLE_HIDDEN, Triangle, constants,
     },
+    passes::grid::GridBuilder,
     world::Geometry,
 };
 
@@ -61,6 +62,9 @@ impl AccelBuffers {
         let triangles = geometry.triangles();
         match geometry.accel() {
             Accel::KdTree(tree) => Self::of_tree(context, triangles, tree),
+            Accel::Grid(grid) if GridBuilder::has_room(context, triangles.len()) => {
+                Self::of_device_grid(context, triangles, grid)
+            }
             Accel::Grid(grid) => Self::of_grid(context, triangles, grid.get(triangles)),
         }
     }
@@ -83,6 +87,26 @@ impl AccelBuffers {
         Self::with(context, contents, &tree.constants(), Structure::KdTree { mask_words })
     }
 
+    /// Uploads triangles, of which the device builds the grid.
+    fn of_device_grid(context: &Arc<Context>, triangles: &[Triangle], grid: &LazyGrid) -> Result<Self, GpuError> {
+        let on_device = Buffer::with(context, "triangles", triangles, BufferUse::Texels)?;
+        let builder = GridBuilder::new(context, &on_device, grid.options())?;
+        let timer = Timer::new(context, builder.n_stages())?;
+        let built = builder.build(Some(&timer), BufferUse::Texels)?;
+        drop(builder); // its memory is larger than the grid's
+        grid.note(built.report(triangles.len()));
+        let (constants, structure) = (built.constants(), Structure::Grid { n_levels: built.n_levels });
+        let contents = Contents {
+            triangles: Content::OnDevice(on_device),
+            grid_cells: Content::OnDevice(built.cells),
+            leaf_triangles: Content::OnDevice(built.leaf_triangles),
+            leaf_planes: Content::OnDevice(built.leaf_planes),
+            ..Contents::of_triangles(triangles)
+        };
+        Self::with(context, contents, &constants, structure)
+    }
+
+    /// Uploads triangles and the host's grid, where the triangles are more than the device binds.
     fn of_grid(context: &Arc<Context>, triangles: &[Triangle], grid: &Grid) -> Result<Self, GpuError> {
         let entries = grid.leaf_triangles();
         let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);

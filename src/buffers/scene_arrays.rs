@@ -57,6 +57,8 @@ pub enum Content<'a, T> {
     Elements(&'a [T]),
     /// So many elements, which `write(first, part)` makes in parts: those from element `first` on.
     Written { len: usize, write: &'a dyn Fn(usize, &mut [T]) },
+    /// The elements of a buffer, which must be for [`BufferUse::Texels`].
+    OnDevice(Buffer<T>),
     /// Nothing. Later the array may be replaced by one of up to so many elements.
     Reserved(usize),
 }
@@ -72,6 +74,7 @@ impl<T: Pod> Content<'_, T> {
         let len = match self {
             Self::Elements(elements) => elements.len(),
             Self::Written { len, .. } | Self::Reserved(len) => *len,
+            Self::OnDevice(buffer) => buffer.len(),
         };
         let bytes = (len * size_of::<T>()) as u64;
         Size { bytes, n_texels: bytes / texel_bytes::<T>() }
@@ -86,6 +89,10 @@ impl<T: Pod> Content<'_, T> {
         match self {
             Self::Elements(elements) => Buffer::with(context, name, elements, usage),
             Self::Written { len, write } => Buffer::written_by(context, name, len, usage, write),
+            Self::OnDevice(buffer) => {
+                assert_eq!(usage, BufferUse::Texels, "what was made on the device is not read by address");
+                Ok(buffer)
+            }
             Self::Reserved(_) => Buffer::new(context, name, 0, usage),
         }
     }

@@ -2,10 +2,13 @@
 
 use std::path::PathBuf;
 
-use kdray::{accel::Statistics, engine::choices::Choices};
+use kdray::{
+    accel::{Statistics, grid::DeviceBuild},
+    engine::choices::Choices,
+};
 use serde::Serialize;
 
-use super::table::decimal;
+use super::{report::built_in, table::decimal};
 
 /// What was cast, on what, and how long it took.
 #[derive(Serialize)]
@@ -24,6 +27,9 @@ pub struct CastReport {
     /// As `tree` or `grid`.
     #[serde(flatten)]
     pub accel: Statistics,
+    /// Times of the grid's build; none where no device has built one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grid_build: Option<DeviceBuild>,
     pub n_rays: u64,
     pub n_hits: u64,
     /// Rays that can only miss: with a NaN, an infinite origin or direction, or a direction of zero or so short that
@@ -74,12 +80,13 @@ impl CastReport {
         let times = self.times.as_ref().map_or_else(|| "no timestamps".to_owned(), Times::text);
         let invalid = if *n_invalid > 0 { format!(", {n_invalid} invalid") } else { String::new() };
         format!(
-            "{scene}: {triangles} triangles, loaded in {load_ms:.0} ms, {} built in {build_ms:.0} ms\n\
+            "{scene}: {triangles} triangles, loaded in {load_ms:.0} ms, {} {}\n\
              {choices}\n\
              {device}: {times}\n\
              {n_rays} rays, {n_hits} hits{invalid}\n\
              wrote {}\n",
             self.accel.kind().name(),
+            built_in(*build_ms, self.grid_build.as_ref()),
             self.hits.display()
         )
     }

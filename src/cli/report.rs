@@ -3,13 +3,21 @@
 use std::path::PathBuf;
 
 use kdray::{
-    accel::Statistics,
+    accel::{Statistics, grid::DeviceBuild},
     engine::choices::Choices,
     frame::{Denoise, PassTime, Profile, RenderOptions},
 };
 use serde::Serialize;
 
 use super::table::{decimal, table};
+
+/// How long the acceleration structure took to build, in words. `on_host`: milliseconds, if the host has built it.
+pub fn built_in(on_host: f64, on_device: Option<&DeviceBuild>) -> String {
+    match on_device {
+        Some(build) => format!("built in {} ms on the device", decimal(build.ms, 3)),
+        None => format!("built in {on_host:.0} ms"),
+    }
+}
 
 /// What was rendered, how, and how long it took.
 #[derive(Serialize)]
@@ -28,6 +36,9 @@ pub struct Report {
     /// As `tree` or `grid`.
     #[serde(flatten)]
     pub accel: Statistics,
+    /// Times of the grid's build; none where no device has built one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub grid_build: Option<DeviceBuild>,
     pub load_ms: f64,
     pub build_ms: f64,
     /// From the finished tree to the picture in memory: uploading, compiling and copying back included.
@@ -201,7 +212,7 @@ impl Report {
         let crop = crop.as_ref().map(|crop| format!(" ({crop} of it)")).unwrap_or_default();
         let samples = if self.samples > 1 { format!(", {} samples a pixel,", self.samples) } else { String::new() };
         let mut text = format!("{}: {} triangles, loaded in {:.0} ms\n", self.scene, self.triangles, self.load_ms);
-        text += &format!("{}, built in {:.0} ms\n", self.accel, self.build_ms);
+        text += &format!("{}, {}\n", self.accel, built_in(self.build_ms, self.grid_build.as_ref()));
         text += &format!(
             "{width}x{height}{crop}{samples} on {}: picture after {:.0} ms\n{}\n\n",
             self.frame.device, self.render_ms, self.choices

@@ -13,6 +13,7 @@ pub use self::{flat::FlatScene, geometry::Geometry, mismatch::Mismatch};
 use crate::{
     accel::{
         Accel, AccelOptions, Statistics,
+        grid::DeviceBuild,
         kdtree::{BuildOptions, KdTree},
     },
     scene::Scene,
@@ -99,15 +100,23 @@ impl World {
         &self.0.accel_options
     }
 
-    /// The acceleration structure in numbers. The host builds a grid for them, unless it has done so already.
+    /// The acceleration structure in numbers. If no device has built a grid, the host builds it for them.
     pub fn statistics(&self) -> Statistics {
         let Parts { scene, accel, accel_options } = &*self.0;
         match (accel, accel_options) {
             (Accel::KdTree(tree), AccelOptions::KdTree(options)) => {
                 Statistics::KdTree(tree.statistics(scene.triangles.len(), options))
             }
-            (Accel::Grid(grid), _) => Statistics::Grid(grid.get(&scene.triangles).statistics()),
+            (Accel::Grid(grid), _) => Statistics::Grid(grid.statistics(&scene.triangles)),
             (Accel::KdTree(_), AccelOptions::Grid(_)) => unreachable!("a world's structure is of its options' kind"),
+        }
+    }
+
+    /// What the first device that has built the world's grid tells of it.
+    pub fn grid_build(&self) -> Option<&DeviceBuild> {
+        match &self.0.accel {
+            Accel::KdTree(_) => None,
+            Accel::Grid(grid) => grid.device_build(),
         }
     }
 

@@ -2,7 +2,10 @@
 
 use glam::Vec3;
 
-use crate::{accel::bounds::Bounds, layout::GRID_MAX_RESOLUTION};
+use crate::{
+    accel::bounds::Bounds,
+    layout::{AccelConstants, GRID_MAX_RESOLUTION, KD_PLANE_EPSILON},
+};
 
 /// Cubes side by side that fill a box from its least corner on. At its greatest corner the box may cut some of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -144,6 +147,22 @@ impl Lattice {
     pub fn cube_at(&self, place: u32) -> [u32; 3] {
         let [n_x, n_y, _] = self.n_cells;
         [place % n_x, place / n_x % n_y, place / n_x / n_y]
+    }
+
+    /// What kernels know of a grid with these cells on its upper level.
+    pub fn constants(&self) -> AccelConstants {
+        let [cell_min, cell_max] = self.bounds();
+        let [n_cells_x, n_cells_y, n_cells_z] = self.n_cells;
+        AccelConstants {
+            cell_min,
+            plane_epsilon: KD_PLANE_EPSILON * cell_min.abs().max(cell_max.abs()).max_element(),
+            cell_max,
+            n_cells_x,
+            n_cells_y,
+            n_cells_z,
+            cell_size: self.cell_size,
+            ..AccelConstants::default()
+        }
     }
 
     /// The least and the greatest corner of the box.

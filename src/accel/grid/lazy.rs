@@ -1,19 +1,43 @@
-//! A grid that the host builds when it needs it: a device builds its own, of the same bits.
+//! A grid of which the host knows how it is built. A device builds it for itself; the host does, too, when it needs the
+//! grid. Both have the same bits.
 
 use std::sync::OnceLock;
 
 use glam::Vec3;
+use serde::Serialize;
 
-use super::{Grid, GridOptions};
+use super::{Grid, GridOptions, Statistics};
 use crate::{accel::bounds::Bounds, layout::Triangle};
 
-/// How a grid over some triangles is built, and the host's grid as soon as it has been asked for.
+/// How a grid over some triangles is built, and what has been learnt of it so far.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LazyGrid {
     options: GridOptions,
     n_triangles: usize,
     bounds: [Vec3; 2],
-    built: OnceLock<Grid>,
+    on_host: OnceLock<Grid>,
+    on_device: OnceLock<DeviceBuild>,
+}
+
+/// What a device tells of a grid that it has built.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DeviceBuild {
+    /// The grid in numbers.
+    #[serde(skip)]
+    pub statistics: Statistics,
+    /// The milliseconds of the build; none where the device has no timestamps.
+    pub ms: Option<f64>,
+    /// The stages in the order of execution.
+    pub stages: Vec<BuildStage>,
+}
+
+/// A kernel of a build, all of its dispatches together.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BuildStage {
+    /// The kernel's name.
+    pub name: &'static str,
+    /// Milliseconds; none where the device has no timestamps.
+    pub ms: Option<f64>,
 }
 
 impl LazyGrid {
@@ -21,7 +45,13 @@ impl LazyGrid {
     pub fn new(triangles: &[Triangle], options: GridOptions) -> Self {
         let bounds = Bounds::of_all(triangles);
         let Bounds { min, max } = bounds.grown(bounds.margin());
-        Self { options, n_triangles: triangles.len(), bounds: [min.into(), max.into()], built: OnceLock::new() }
+        Self {
+            options,
+            n_triangles: triangles.len(),
+            bounds: [min.into(), max.into()],
+            on_host: OnceLock::new(),
+            on_device: OnceLock::new(),
+        }
     }
 
     /// The host's grid. The first call builds it on the current rayon pool.
@@ -30,7 +60,26 @@ impl LazyGrid {
     /// There are more or fewer triangles than the grid is over.
     pub fn get(&self, triangles: &[Triangle]) -> &Grid {
         assert_eq!(triangles.len(), self.n_triangles, "the triangles of the grid");
-        self.built.get_or_init(|| Grid::build(triangles, &self.options))
+        self.on_host.get_or_init(|| Grid::build(triangles, &self.options))
+    }
+
+    /// Keeps what a device tells of its build, if it is the first one.
+    pub(crate) fn note(&self, build: DeviceBuild) {
+        // Later builds are over the same triangles by the same options.
+        let _ = self.on_device.set(build);
+    }
+
+    /// What the first device that has built the grid tells of it.
+    pub fn device_build(&self) -> Option<&DeviceBuild> {
+        self.on_device.get()
+    }
+
+    /// The grid in numbers, by a device that has built it. If there is none, the host builds the grid.
+    pub fn statistics(&self, triangles: &[Triangle]) -> Statistics {
+        match self.on_device.get() {
+            Some(build) => build.statistics.clone(),
+            None => self.get(triangles).statistics(),
+        }
     }
 
     /// How the grid is built.

@@ -24,8 +24,12 @@ mod statistics;
 
 use glam::Vec3;
 
-pub use self::{lattice::Lattice, lazy::LazyGrid, statistics::Statistics};
-use crate::layout::{AccelConstants, GRID_MAX_COUNT, GridCell, KD_PLANE_EPSILON, Plane};
+pub use self::{
+    lattice::Lattice,
+    lazy::{BuildStage, DeviceBuild, LazyGrid},
+    statistics::Statistics,
+};
+use crate::layout::{AccelConstants, GRID_MAX_COUNT, GridCell, Plane};
 
 /// A grid over triangles, as the kernels read it. It comes from [`Grid::build`] alone, and nothing can change it
 /// afterwards.
@@ -97,7 +101,7 @@ impl GridOptions {
 
     /// A grid of two levels.
     pub fn two_level() -> Self {
-        Self { levels: GridLevels::Two { upper_density: 0.125, lower_density: 2.0 }, ..Self::uniform() }
+        Self { levels: GridLevels::Two { upper_density: 1.0 / 32.0, lower_density: 2.0 }, ..Self::uniform() }
     }
 
     /// The most references that a grid of so many triangles may have.
@@ -111,18 +115,7 @@ impl GridOptions {
 impl Grid {
     /// What kernels know of a grid beside its arrays.
     pub fn constants(&self) -> AccelConstants {
-        let Lattice { min, max, cell_size, n_cells } = self.lattice;
-        let (cell_min, cell_max) = (Vec3::from(min), Vec3::from(max));
-        AccelConstants {
-            cell_min,
-            plane_epsilon: KD_PLANE_EPSILON * cell_min.abs().max(cell_max.abs()).max_element(),
-            cell_max,
-            n_cells_x: n_cells[0],
-            n_cells_y: n_cells[1],
-            n_cells_z: n_cells[2],
-            cell_size,
-            ..AccelConstants::default()
-        }
+        self.lattice.constants()
     }
 
     /// The cells of the upper level.

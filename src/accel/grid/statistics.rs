@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::Grid;
+use crate::layout::{GridCell, Plane};
 
 /// A grid in numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -27,6 +28,13 @@ pub struct Statistics {
     pub bytes: u64,
 }
 
+impl Statistics {
+    /// What so many cells, and so many references with their planes, take of memory.
+    pub(crate) fn bytes_of(n_cells: usize, n_references: usize) -> u64 {
+        (n_cells * size_of::<GridCell>() + n_references * (size_of::<u32>() + size_of::<Plane>())) as u64
+    }
+}
+
 impl Grid {
     /// The grid in numbers.
     pub fn statistics(&self) -> Statistics {
@@ -43,8 +51,7 @@ impl Grid {
             n_references: self.leaf_triangles.len() as u64,
             references_per_triangle: self.leaf_triangles.len() as f64 / self.n_triangles.max(1) as f64,
             n_coarser: self.n_coarser,
-            bytes: (size_of_val(&*self.cells) + size_of_val(&*self.leaf_triangles) + size_of_val(&*self.leaf_planes))
-                as u64,
+            bytes: Statistics::bytes_of(self.cells.len(), self.leaf_triangles.len()),
         }
     }
 }

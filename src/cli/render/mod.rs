@@ -90,6 +90,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         samples: args.spp,
         triangles: n_triangles,
         accel: world.statistics(),
+        grid_build: world.grid_build().cloned(),
         load_ms,
         build_ms,
         render_ms,

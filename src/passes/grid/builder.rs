@@ -32,6 +32,8 @@ pub struct DeviceGrid {
     pub leaf_triangles: Buffer<LeafTriangle>,
     /// The plane of each of `leaf_triangles`.
     pub leaf_planes: Buffer<Plane>,
+    /// The number of cells with triangles, of the upper level and of the lower one.
+    pub n_filled: [u32; 2],
     /// The build's profile, if it was given a timer.
     pub stages: Vec<TimerRow>,
 }
@@ -50,6 +52,11 @@ impl GridBuilder {
             context: context.clone(),
             options,
         })
+    }
+
+    /// Whether the device binds so many triangles.
+    pub fn has_room(context: &Context, n_triangles: usize) -> bool {
+        (n_triangles as u64).saturating_mul(size_of::<Triangle>() as u64) <= context.limits().storage_range
     }
 
     /// The options, with a limit of references that the device can bind. The host's build with these makes the same grid.
@@ -105,6 +112,7 @@ impl GridBuilder {
             cells: Buffer::new(&self.context, "grid_cells", n_cells, usage)?,
             leaf_triangles: Buffer::new(&self.context, "leaf_triangles", n_references, usage)?,
             leaf_planes: Buffer::new(&self.context, "leaf_planes", n_references, usage)?,
+            n_filled: [build.n_filled_upper, build.n_filled_lower],
             stages: Vec::new(),
         })
     }

@@ -29,6 +29,7 @@
 
 mod builder;
 mod level;
+mod report;
 
 use std::{mem::offset_of, sync::Arc};
 

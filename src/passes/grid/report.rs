@@ -1,0 +1,63 @@
+//! What a device tells of a grid that it has built.
+
+use super::DeviceGrid;
+use crate::{
+    accel::grid::{BuildStage, DeviceBuild, Statistics},
+    gpu::TimerRow,
+    layout::AccelConstants,
+};
+
+impl DeviceGrid {
+    /// What the kernels that search the grid know beside its arrays.
+    pub fn constants(&self) -> AccelConstants {
+        self.lattice.constants()
+    }
+
+    /// The grid in numbers; the same as those of the host's grid.
+    pub fn statistics(&self, n_triangles: usize) -> Statistics {
+        let n_upper = self.lattice.n_cubes() as u64;
+        let [n_filled_upper, n_filled_lower] = self.n_filled.map(u64::from);
+        // Cells of the upper level without triangles are not cut.
+        let (n_cells, n_filled) = match self.n_levels {
+            1 => (n_upper, n_filled_upper),
+            _ => (self.cells.len() as u64 - n_filled_upper, n_filled_lower),
+        };
+        let n_references = self.leaf_triangles.len() as u64;
+        Statistics {
+            resolution: self.lattice.n_cells,
+            n_levels: self.n_levels,
+            n_upper_cells: n_upper,
+            n_cells,
+            n_empty_cells: n_cells - n_filled,
+            n_references,
+            references_per_triangle: n_references as f64 / n_triangles.max(1) as f64,
+            n_coarser: self.n_coarser,
+            bytes: Statistics::bytes_of(self.cells.len(), self.leaf_triangles.len()),
+        }
+    }
+
+    /// The grid in numbers, and the times of its build.
+    pub fn report(&self, n_triangles: usize) -> DeviceBuild {
+        let span = |row: &TimerRow| row.span_ms;
+        let begin = self.stages.first().and_then(span).map(|(begin, _)| begin);
+        let end = self.stages.last().and_then(span).map(|(_, end)| end);
+        DeviceBuild {
+            statistics: self.statistics(n_triangles),
+            ms: begin.zip(end).map(|(begin, end)| end - begin),
+            stages: stages_of(&self.stages),
+        }
+    }
+}
+
+/// The sums of the rows of each name.
+fn stages_of(rows: &[TimerRow]) -> Vec<BuildStage> {
+    let mut stages: Vec<BuildStage> = Vec::new();
+    for row in rows {
+        let ms = row.span_ms.map(|(begin, end)| end - begin);
+        match stages.iter_mut().find(|stage| stage.name == row.name) {
+            Some(stage) => stage.ms = stage.ms.zip(ms).map(|(sum, ms)| sum + ms),
+            None => stages.push(BuildStage { name: row.name, ms }),
+        }
+    }
+    stages
+}
