@@ -1,12 +1,14 @@
 //! kdray's searches against the driver's own ray tracing, on the same rays and triangles in one run.
 //!
 //! ```text
+//! builds    the structures of both over the same triangles
 //! contest   ways of tracing that take turns on a device -> times, hits
 //!   pipeline  VK_KHR_ray_tracing_pipeline is one, beside kdray's own kernel; nothing else uses that extension
 //! raster    primary rays without a tree, by the passes that rasterize
 //! report    what came of it, in numbers and as a chart
 //! ```
 
+pub mod builds;
 pub mod contest;
 mod pipeline;
 pub mod raster;
@@ -15,13 +17,13 @@ pub mod report;
 use std::{rc::Rc, sync::Arc};
 
 use self::{
+    builds::Builds,
     contest::hold,
     pipeline::Pipeline,
     raster::Raster,
-    report::{Builds, RasterResult, SetResult},
+    report::{RasterResult, SetResult},
 };
 use super::{
-    Spread,
     rays::{RayKind, RaySet},
     stage::Stage,
     variant::Variant,
@@ -42,8 +44,6 @@ pub const VARIANTS: [Variant; 5] = [
     Variant::Grid,
     Variant::Grid2,
 ];
-/// Builds of the driver's structure, of which the median counts.
-const N_BUILDS: usize = 5;
 
 /// One of kdray's structures on the device, with all that the searches of [`VARIANTS`] read of it.
 struct Structure {
@@ -93,32 +93,21 @@ impl Arena {
     /// # Errors
     /// Tree, structure or picture are beyond the device's limits or memory.
     pub fn new(context: &Arc<Context>, stage: &Stage) -> Result<Self, GpuError> {
-        let triangles = &stage.scene().triangles;
-        let mut scenery = Scenery::new(context, triangles)?;
-        let mut build_ms = vec![scenery.build_ms()];
-        for _ in 1..N_BUILDS {
-            scenery = Scenery::new(context, triangles)?;
-            build_ms.push(scenery.build_ms());
-        }
+        let (builds, scenery) = Builds::measure(context, stage)?;
         let structures = [VARIANTS[0], Variant::Grid, Variant::Grid2];
         let structures = structures.map(|variant| Structure::new(context, stage, variant));
         Ok(Self {
             structures: structures.into_iter().collect::<Result<_, _>>()?,
             scenery: Rc::new(scenery),
             rasters: Raster::all(context, stage)?,
-            builds: Builds {
-                tree_ms: stage.tree_build_ms,
-                n_threads: rayon::current_num_threads(),
-                bvh_ms: Spread::of(build_ms.into_iter().flatten()),
-                n_bvh_builds: N_BUILDS,
-            },
+            builds,
             context: Arc::clone(context),
         })
     }
 
-    /// What it took to build the two trees.
-    pub fn builds(&self) -> Builds {
-        self.builds
+    /// What it took to build the structures.
+    pub fn builds(&self) -> &Builds {
+        &self.builds
     }
 
     /// Traces the rays `n_times` by the driver and by each of [`VARIANTS`], in turn. Primary rays are rasterized, too.

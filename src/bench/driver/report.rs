@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::contest::Trial;
+use super::{builds::Builds, contest::Trial};
 use crate::{
     accel::kdtree::Statistics,
     bench::{
@@ -109,18 +109,6 @@ impl RasterResult {
         let timing = Timing::new(ms, primary_rays.n_rays);
         Self { primary, passes, timing, ratio: timing.ratio_to(&primary_rays.driver) }
     }
-}
-
-/// What the two trees over the same triangles cost.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Builds {
-    /// kdray's kd-tree on the CPU, wall-clock.
-    pub tree_ms: f64,
-    /// For the kd-tree.
-    pub n_threads: usize,
-    /// The driver's structure over the triangles, on the GPU; none where the device has no timestamps.
-    pub bvh_ms: Option<Spread>,
-    pub n_bvh_builds: usize,
 }
 
 /// What the suite found.

@@ -6,7 +6,8 @@ use kdray::{
         difference::T_TOLERANCE,
         driver::{
             Arena,
-            report::{Builds, RasterResult, Report, SetResult, Timing},
+            builds::Builds,
+            report::{RasterResult, Report, SetResult, Timing},
         },
         rays::{RayKind, ray_sets},
         stage::Stage,
@@ -39,7 +40,7 @@ pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     let mut arena = arena?;
     let (sets, _) = progress.stage("making rays", || ray_sets(&stage));
 
-    let mut report = empty_report(args, &stage, &context, arena.builds());
+    let mut report = empty_report(args, &stage, &context, arena.builds().clone());
     for set in &sets {
         let casting = format!("casting {} {} rays", set.rays.len(), set.kind.name());
         let (result, _) = progress.stage(&casting, || arena.measure(set, args.repeat));
@@ -125,12 +126,16 @@ fn passes_text(raster: &RasterResult) -> String {
 }
 
 fn builds_text(builds: &Builds) -> String {
-    let Builds { tree_ms, n_threads, bvh_ms, n_bvh_builds } = builds;
+    let Builds { tree_ms, n_threads, bvh_ms, n_bvh_builds, grids } = builds;
     let bvh_ms = decimal(bvh_ms.map(|ms| ms.median), 3);
-    format!(
+    let mut text = format!(
         "Built: the driver's tree in {bvh_ms} ms of the GPU (median of {n_bvh_builds}), the kd-tree in {tree_ms:.0} ms of \
-         {n_threads} CPU threads.\n"
-    )
+         {n_threads} CPU threads"
+    );
+    for grid in grids {
+        text += &format!(", `{}` in {} ms of the GPU", grid.accel, decimal(grid.ms.map(|ms| ms.median), 3));
+    }
+    text + ".\n"
 }
 
 /// The speed of wrong answers is none.
@@ -151,7 +156,7 @@ mod tests {
         accel::kdtree::KdTree,
         bench::{
             Spread,
-            driver::{contest::Trial, report::PassSpread},
+            driver::{builds::GridBuilds, contest::Trial, report::PassSpread},
         },
         cast::Hit,
     };
@@ -187,7 +192,13 @@ mod tests {
             tree: KdTree::build(&[], &BuildOptions::default()).statistics(0, &BuildOptions::default()),
             n_times: 3,
             t_tolerance: T_TOLERANCE,
-            builds: Builds { tree_ms: 1234.5, n_threads: 2, bvh_ms: ms(1.5), n_bvh_builds: 5 },
+            builds: Builds {
+                tree_ms: 1234.5,
+                n_threads: 2,
+                bvh_ms: ms(1.5),
+                n_bvh_builds: 5,
+                grids: vec![GridBuilds { accel: "grid".to_owned(), ms: ms(0.5), stages: Vec::new() }],
+            },
             raster: vec![
                 RasterResult::new(
                     "raster".to_owned(),
@@ -210,7 +221,9 @@ mod tests {
         assert!(rows.contains(&vec!["diffuse", "4", "4", "mask", "4.000", "0.0", "2.00", "0"]), "{text}");
         assert_eq!(rows.iter().filter(|row| row.get(1) == Some(&"4")).count(), 4 * 3 + 2, "{text}");
         assert!(
-            text.contains("in 1.500 ms of the GPU (median of 5), the kd-tree in 1234 ms of 2 CPU threads"),
+            text.contains(
+                "in 1.500 ms of the GPU (median of 5), the kd-tree in 1234 ms of 2 CPU threads, `grid` in 0.500 ms"
+            ),
             "{text}"
         );
         assert!(text.contains("`raster`: visibility 0.500 ms, primary_hit 1.500 ms."), "{text}");

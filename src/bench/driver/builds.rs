@@ -1,0 +1,88 @@
+//! What it takes to build the structures over the same triangles: the driver's and kdray's own.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+
+use crate::{
+    accel::grid::{BuildStage, GridOptions},
+    bench::{Spread, stage::Stage, variant::Variant, warm_up},
+    gpu::{Buffer, BufferUse, Context, GpuError, Scenery, Timer},
+    passes::grid::GridBuilder,
+};
+
+/// Builds of each structure on the GPU, of which the median counts.
+const N_BUILDS: usize = 9;
+
+/// What the structures over the same triangles cost.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Builds {
+    /// kdray's kd-tree on the CPU, wall-clock.
+    pub tree_ms: f64,
+    /// For the kd-tree.
+    pub n_threads: usize,
+    /// The driver's structure over the triangles, on the GPU; none where the device has no timestamps.
+    pub bvh_ms: Option<Spread>,
+    /// The number of builds of each structure on the GPU.
+    pub n_bvh_builds: usize,
+    /// kdray's grids on the GPU.
+    pub grids: Vec<GridBuilds>,
+}
+
+/// The builds of a kind of grid.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct GridBuilds {
+    /// `grid` or `grid2`.
+    pub accel: String,
+    /// From the first kernel's begin to the last one's end; none where the device has no timestamps.
+    pub ms: Option<Spread>,
+    /// The stages of the last build.
+    pub stages: Vec<BuildStage>,
+}
+
+impl Builds {
+    /// Builds the driver's structure, which it gives back, and both grids.
+    ///
+    /// # Errors
+    /// A structure is beyond the device's limits or memory.
+    pub fn measure(context: &Arc<Context>, stage: &Stage) -> Result<(Self, Scenery), GpuError> {
+        let triangles = &stage.scene().triangles;
+        let mut scenery = Scenery::new(context, triangles)?;
+        let mut bvh_ms = Vec::new();
+        for _ in 0..N_BUILDS {
+            scenery = Scenery::new(context, triangles)?;
+            bvh_ms.push(scenery.build_ms());
+        }
+        let grids = [(Variant::Grid, GridOptions::uniform()), (Variant::Grid2, GridOptions::two_level())];
+        let builds = Self {
+            tree_ms: stage.tree_build_ms,
+            n_threads: rayon::current_num_threads(),
+            bvh_ms: Spread::of(bvh_ms.into_iter().flatten()),
+            n_bvh_builds: N_BUILDS,
+            grids: (grids.iter())
+                .map(|(variant, options)| GridBuilds::measure(context, stage, *variant, options))
+                .collect::<Result<_, _>>()?,
+        };
+        Ok((builds, scenery))
+    }
+}
+
+impl GridBuilds {
+    fn measure(
+        context: &Arc<Context>,
+        stage: &Stage,
+        variant: Variant,
+        options: &GridOptions,
+    ) -> Result<Self, GpuError> {
+        let triangles = &stage.scene().triangles;
+        let on_device = Buffer::with(context, "triangles", triangles, BufferUse::Texels)?;
+        let builder = GridBuilder::new(context, &on_device, options)?;
+        let timer = Timer::new(context, builder.n_stages())?;
+        let build = || Ok::<_, GpuError>(builder.build(Some(&timer), BufferUse::Texels)?.report(triangles.len()));
+        warm_up(|| build().map(drop))?;
+        let reports = (0..N_BUILDS).map(|_| build()).collect::<Result<Vec<_>, _>>()?;
+        let ms = Spread::of(reports.iter().filter_map(|report| report.ms));
+        let stages = reports.into_iter().next_back().map_or_else(Vec::new, |report| report.stages);
+        Ok(Self { accel: variant.to_string(), ms, stages })
+    }
+}
