@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use glam::{Vec3, vec3};
 use kdray::{
-    accel::grid::{Grid, GridOptions},
-    gpu::{Buffer, BufferUse, Context, ContextOptions, Timer},
-    layout::{GRID_BLOCK_SIZE, GridCell, LeafTriangle, Plane, Triangle},
+    accel::grid::{Grid, GridLevels, GridOptions},
+    gpu::{Buffer, BufferUse, Context, ContextOptions, DeviceOverrides, Timer},
+    layout::{GRID_BLOCK_SIZE, GRID_GROUPS_X, GRID_MAX_SORT_GROUPS, GridCell, LeafTriangle, Plane, Triangle},
     passes::grid::{DeviceGrid, GridBuilder},
 };
 use support::{meshes, random::Random};
@@ -192,13 +192,38 @@ fn triangles_above_the_limit_have_the_hosts_grid() {
     assert_silent(&context);
 }
 
-/// More blocks than a workgroup has invocations, and several tiles for each workgroup of the sort.
+/// Several rows of workgroups, and several tiles for each workgroup of the sort.
 #[test]
 fn many_triangles_have_the_hosts_grid() {
     let context = device();
-    let triangles = meshes::torus(500, 140);
-    assert!(triangles.len() > 128 * GRID_BLOCK_SIZE as usize);
-    check_both(&context, "many", &triangles);
+    let triangles = meshes::torus(720, 180);
+    let fine = [GridLevels::Uniform { density: 16.0 }, GridLevels::Two { upper_density: 0.5, lower_density: 2.0 }];
+    for ((kind, options), levels) in kinds().into_iter().zip(fine) {
+        let options = GridOptions { levels, ..options };
+        let statistics = check(&context, "many", &triangles, &options).statistics();
+        let n_blocks = statistics.n_references.div_ceil(GRID_BLOCK_SIZE.into());
+        assert!(n_blocks > GRID_MAX_SORT_GROUPS.max(GRID_GROUPS_X).into(), "{kind}: {statistics:?}");
+    }
+    assert_silent(&context);
+}
+
+/// A device that binds little memory gets larger cells, and an error if it cannot bind the triangles.
+#[test]
+fn what_a_device_binds_is_a_limit() {
+    let n = 2000;
+    let of_range = |storage_range| {
+        support::pretended(DeviceOverrides { storage_range: Some(storage_range), ..DeviceOverrides::default() })
+    };
+    let triangles = long_soup(n);
+    let context = of_range(2 * n as u64 * size_of::<LeafTriangle>() as u64);
+    for (kind, options) in kinds() {
+        let statistics = check(&context, "limited", &triangles, &options).statistics();
+        assert!(statistics.n_coarser > 0 && statistics.n_references <= 2 * n as u64, "{kind}: {statistics:?}");
+    }
+    let context = of_range(size_of::<Triangle>() as u64 * (n as u64 - 1));
+    let buffer = Buffer::with(&context, "triangles", &triangles, BufferUse::Texels).expect("triangles");
+    let error = GridBuilder::new(&context, &buffer, &GridOptions::uniform()).err().expect("an error").to_string();
+    assert!(error.starts_with("`triangles` takes 0.1 MiB, more than this device's limit"), "{error}");
     assert_silent(&context);
 }
 
@@ -222,7 +247,8 @@ fn one_changed_number_is_noticed() {
     for (kind, options) in kinds() {
         let content = Content::of_host(&triangles, &Grid::build(&triangles, &options));
         assert_eq!(content.difference(&content.clone()), None);
-        let plants: [&dyn Fn(&mut Content, usize); 6] = [
+        type Plant = dyn Fn(&mut Content, usize);
+        let plants: [&Plant; 6] = [
             &|content, i| content.lattice[i % 7] ^= 1,
             &|content, _| content.n_coarser += 1,
             &|content, i| content.cells[i % 1000].first ^= 1,

@@ -5,7 +5,7 @@
 // invocation goes through. Reads build, triangles, first_columns, scan_blocks, and at the lower level upper_pairs and
 // blocks; writes
 // first_pairs and the block's sum.
-#include "grid_items.glsl"
+#include "grid_columns.glsl"
 #include "scan.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
@@ -13,9 +13,9 @@ layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_FIRST_PAIRS) writeonly buffer FirstPairsBlock { uint first_pairs[]; };
 
 uint n_pairs_of(uint column_ix) {
-    uint item_ix = item_of_column(column_ix);
-    Columns columns = columns_of(item_at(item_ix));
-    uvec2 column = column_at(columns, column_in_item(column_ix, item_ix));
+    Columns columns;
+    uvec2 column;
+    item_of(column_ix, columns, column);
     uvec2 cubes = cubes_of(columns, column);
     uint n = 0u;
     for (uint i = cubes.x; i < cubes.y; ++i) n += is_near(columns, uvec3(column, i)) ? 1u : 0u;
@@ -24,6 +24,7 @@ uint n_pairs_of(uint column_ix) {
 
 void main() {
     uint block = block_of_group();
+    find_end_items(block);
     uint sum = 0u;
     for (uint row = 0u; row < GRID_ROWS; ++row) {
         uint column_ix = block * GRID_BLOCK_SIZE + row * SCAN_GROUP_SIZE + scan_rank();

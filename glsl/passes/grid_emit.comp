@@ -1,20 +1,18 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Grid, emit: one workgroup writes the pairs of a cell and a triangle of a block of columns, in the order of the columns and
-// their cells. One invocation goes through a column.
-// Reads build, triangles, first_columns, first_pairs, scan_blocks, and at the lower level upper_pairs and blocks; writes
-// pairs_to.
-#include "grid_items.glsl"
+// Grid, emit: one workgroup writes the pairs of a cell and a triangle of a block of columns, in the order of the
+// columns and their cells. One invocation goes through a column. Reads build, triangles, first_columns, first_pairs,
+// scan_blocks, and at the lower level upper_pairs and blocks; writes pairs_to.
+#include "grid_columns.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_FIRST_PAIRS) readonly buffer FirstPairsBlock { uint first_pairs[]; };
 layout(std430, set = 0, binding = BIND_GRID_PAIRS_TO) writeonly buffer PairsToBlock { uvec2 pairs_to[]; };
 
 void emit(uint column_ix, uint pair_ix) {
-    uint item_ix = item_of_column(column_ix);
-    Item item = item_at(item_ix);
-    Columns columns = columns_of(item);
-    uvec2 column = column_at(columns, column_in_item(column_ix, item_ix));
+    Columns columns;
+    uvec2 column;
+    Item item = item_of(column_ix, columns, column);
     uvec2 cubes = cubes_of(columns, column);
     for (uint i = cubes.x; i < cubes.y; ++i) {
         uvec3 cube = uvec3(column, i);
@@ -28,6 +26,7 @@ void emit(uint column_ix, uint pair_ix) {
 
 void main() {
     uint block = block_of_group();
+    find_end_items(block);
     for (uint row = 0u; row < GRID_ROWS; ++row) {
         uint column_ix = block * GRID_BLOCK_SIZE + row * SCAN_GROUP_SIZE + gl_LocalInvocationIndex;
         if (column_ix < build.n_columns) {

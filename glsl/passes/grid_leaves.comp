@@ -8,7 +8,9 @@ layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
 layout(std430, set = 0, binding = BIND_GRID_PAIRS_FROM) readonly buffer PairsFromBlock { uvec2 pairs_from[]; };
 // Three rows each, as in LeafTriangle.
-layout(std430, set = 0, binding = BIND_GRID_LEAF_TRIANGLES) writeonly buffer LeafTrianglesBlock { uvec4 leaf_triangles[]; };
+layout(std430, set = 0, binding = BIND_GRID_LEAF_TRIANGLES) writeonly buffer LeafTrianglesBlock {
+    uvec4 leaf_triangles[];
+};
 layout(std430, set = 0, binding = BIND_GRID_LEAF_PLANES) writeonly buffer LeafPlanesBlock { vec4 leaf_planes[]; };
 
 const float MAX_ERROR = 16.0;

@@ -29,7 +29,6 @@ void main() {
         }
     }
     barrier();
-    if (gl_LocalInvocationIndex < GRID_DIGITS) {
-        scan_blocks[gl_LocalInvocationIndex * gl_NumWorkGroups.x + gl_WorkGroupID.x] = n_by_digit[gl_LocalInvocationIndex];
-    }
+    uint digit = gl_LocalInvocationIndex;
+    if (digit < GRID_DIGITS) scan_blocks[digit * gl_NumWorkGroups.x + gl_WorkGroupID.x] = n_by_digit[digit];
 }

@@ -14,7 +14,7 @@ const uint N_AT_ONCE = 16u;
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_SCAN_BLOCKS) buffer ScanBlocksBlock { uint scan_blocks[]; };
 
-// Where the sums begin, and how many there are: none if it is not their turn.
+// Where the sums begin, and how many there are. There are none if something else is to be counted.
 uvec2 sums() {
     switch (SCANS) {
         case GRID_SCANS_CELLS:
@@ -34,10 +34,11 @@ void finish(uint total) {
     if (SCANS == GRID_SCANS_CELLS) build.n_lower = total;
     if (SCANS == GRID_SCANS_COLUMNS) build.n_columns = total;
     if (SCANS == GRID_SCANS_PAIRS) build.n_pairs = total;
-    if (total <= build.max_references) {
+    uint limit = SCANS == GRID_SCANS_COLUMNS ? build.max_columns : build.max_references;
+    if (total <= limit) {
         build.counts += 1u;
     } else {
-        coarsen(total);
+        coarsen(total, limit);
     }
     size_dispatches();
 }
@@ -59,7 +60,7 @@ void main() {
     }
     uint total, n_65536;
     uint before = workgroup_exclusive_add(sum, total);
-    // No sum of so many halves wraps around.
+    // The upper halves alone cannot wrap around: they tell whether the total has done so.
     workgroup_exclusive_add(sum >> 16, n_65536);
     for (uint first = mine; first < end; first += N_AT_ONCE) {
         uint part[N_AT_ONCE];

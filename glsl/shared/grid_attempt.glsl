@@ -8,12 +8,12 @@
 #include "grid_build.glsl"
 #include "grid_size.glsl"
 
-// Side by side and in rows.
+// So many workgroups side by side and, where these are too many, in several rows.
 uvec2 groups_for(uint n_groups) {
     return uvec2(min(n_groups, GRID_GROUPS_X), (n_groups + GRID_GROUPS_X - 1u) / GRID_GROUPS_X);
 }
 
-// Sizes the dispatches that go over items, columns and so on: 0 for those whose turn it is not.
+// Sizes the dispatches that follow. Those for which something else has to be counted first get no workgroups.
 void size_dispatches() {
     uvec2 cells = groups_for(build.counts == GRID_COUNTS_CELLS ? blocks_of(build.n_upper) : 0u);
     uvec2 items = groups_for(build.counts == GRID_COUNTS_COLUMNS ? blocks_of(build.n_items) : 0u);
@@ -40,19 +40,20 @@ void size_dispatches() {
     build.sort_groups_y = 1u;
 }
 
-// How many times the cells' edges are doubled after an attempt with this count. The number of cells that a surface
-// meets falls to about a quarter each time. The last attempt has cells that are as large as can be.
-uint n_steps(uint count) {
+// How many times the cells' edges are doubled after an attempt with this count, which is above its limit. At each
+// doubling, the number of cells that a surface meets falls to about a quarter. The more attempts have failed, the
+// farther the next one goes, and the last one has cells that are as large as can be.
+uint n_steps(uint count, uint limit) {
     if (build.n_attempts + 1u >= GRID_MAX_ATTEMPTS) return 32u;
-    uint n = 1u;
-    while (n < 15u && count >> (2u * n) > build.max_references) ++n;
-    return n;
+    uint expected = 1u;
+    while (expected < 15u && count >> (2u * expected) > limit) ++expected;
+    return expected + build.n_attempts - 1u;
 }
 
-// Ends an attempt with this count, which is above the limit, and makes the cells of the next one larger.
-void coarsen(uint count) {
+// Ends an attempt with this count, which is above its limit, and makes the cells of the next one larger.
+void coarsen(uint count, uint limit) {
     build.n_attempts += 1u;
-    uint steps = n_steps(count);
+    uint steps = n_steps(count, limit);
     if (LOWER) {
         build.n_halvings = min(build.n_halvings + steps, GRID_MAX_HALVINGS);
         build.counts = GRID_COUNTS_CELLS;

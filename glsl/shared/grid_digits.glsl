@@ -7,7 +7,7 @@
 layout(push_constant) uniform SortBlock { GridSort sort; };
 
 uint digit_of(uint cell_ix) {
-    return bitfieldExtract(cell_ix, int(sort.first_bit), int(GRID_DIGIT_BITS));
+    return cell_ix >> sort.first_bit & GRID_DIGITS - 1u;
 }
 
 // The invocations of the subgroup that have a pair whose digit is the same as this invocation's.

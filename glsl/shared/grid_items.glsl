@@ -30,39 +30,39 @@ uvec3 cube_at(Lattice lattice, uint place) {
     return uvec3(place % n.x, place / n.x % n.y, place / n.x / n.y);
 }
 
-Item item_at(uint item_ix) {
-    if (!LOWER) return Item(item_ix, 0u, upper_lattice());
-    uvec2 pair = upper_pairs[item_ix];
+Item upper_item(uint triangle_ix) {
+    return Item(triangle_ix, 0u, upper_lattice());
+}
+
+Item lower_item(uvec2 pair) {
     uvec2 block = blocks[pair.x];
     uint first_cell = scan_blocks[build.cells_begin + pair.x / GRID_BLOCK_SIZE] + block.x;
     Lattice upper = upper_lattice();
     return Item(pair.y, first_cell, lattice_within(upper, cube_at(upper, pair.x), block.y));
 }
 
+Item item_at(uint item_ix) {
+    if (LOWER) return lower_item(upper_pairs[item_ix]);
+    return upper_item(item_ix);
+}
+
 Columns columns_of(Item item) {
     return columns_of(item.lattice, triangles[item.triangle_ix], build.margin);
 }
 
-// The column's item: the last one that begins at it or before. Items without columns begin where the next one does.
-uint item_of_column(uint column) {
-    uint low = 0u, high = blocks_of(build.n_items);
-    while (high - low > 1u) {
-        uint middle = (low + high) / 2u;
-        if (scan_blocks[build.columns_begin + middle] <= column) low = middle; else high = middle;
-    }
-    uint rest = column - scan_blocks[build.columns_begin + low];
-    low *= GRID_BLOCK_SIZE;
-    high = min(low + GRID_BLOCK_SIZE, build.n_items);
-    while (high - low > 1u) {
-        uint middle = (low + high) / 2u;
-        if (first_columns[middle] <= rest) low = middle; else high = middle;
-    }
-    return low;
+// The number of an item's first column.
+uint first_column_of(uint item_ix) {
+    return scan_blocks[build.columns_begin + item_ix / GRID_BLOCK_SIZE] + first_columns[item_ix];
 }
 
-// The place of a column among those of its item.
-uint column_in_item(uint column, uint item_ix) {
-    return column - scan_blocks[build.columns_begin + item_ix / GRID_BLOCK_SIZE] - first_columns[item_ix];
+// The item of a column, which is one of [low, high): the last one that begins at the column or before. Items without
+// columns begin where the next one does.
+uint item_of_column(uint column_ix, uint low, uint high) {
+    while (high - low > 1u) {
+        uint middle = (low + high) / 2u;
+        if (first_column_of(middle) <= column_ix) low = middle; else high = middle;
+    }
+    return low;
 }
 
 #endif

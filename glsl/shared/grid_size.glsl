@@ -11,26 +11,21 @@ uint n_cubes(Lattice lattice) {
     return lattice.n_cells.x * lattice.n_cells.y * lattice.n_cells.z;
 }
 
-// The least number of cubes of a size that reach from one side of a box to the other; more than GRID_MAX_RESOLUTION for
-// any such number.
-uint n_cubes_along(float least, float greatest, float cell_size) {
-    uint n_too_few = 0u;
-    for (uint bit = 2u * GRID_MAX_RESOLUTION; bit > 1u; bit >>= 1u) {
-        uint n = n_too_few + (bit >> 1u);
-        precise float reached = least + float(n) * cell_size;
-        if (reached < greatest) n_too_few = n;
+// The least number of cubes of a size that reach from one side of a box to the other, on each axis; more than
+// GRID_MAX_RESOLUTION for any such number.
+uvec3 n_cubes_along(vec3 least, vec3 greatest, float cell_size) {
+    uvec3 n_too_few = uvec3(0u);
+    for (uint step = GRID_MAX_RESOLUTION; step > 0u; step >>= 1u) {
+        uvec3 n = n_too_few + step;
+        precise vec3 reached = least + vec3(n) * cell_size;
+        n_too_few = mix(n_too_few, n, lessThan(reached, greatest));
     }
     return n_too_few + 1u;
 }
 
 // Cubes of the largest size are taken to reach from one side of any box to the other.
 Lattice lattice_of_size(vec3 least, vec3 greatest, float cell_size) {
-    uvec3 n_cells = uvec3(1u);
-    if (cell_size < LARGEST) {
-        n_cells.x = n_cubes_along(least.x, greatest.x, cell_size);
-        n_cells.y = n_cubes_along(least.y, greatest.y, cell_size);
-        n_cells.z = n_cubes_along(least.z, greatest.z, cell_size);
-    }
+    uvec3 n_cells = cell_size < LARGEST ? n_cubes_along(least, greatest, cell_size) : uvec3(1u);
     return Lattice(least, cell_size, greatest, n_cells);
 }
 

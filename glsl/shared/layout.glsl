@@ -379,8 +379,8 @@ struct AccelConstants {
 
 // Whether kernels build the lower level of a grid.
 #define CONSTANT_LOWER 10u
-// What a scan of a grid's build adds up: GRID_SCANS_CELLS and its like, which are the numbers of GRID_COUNTS_CELLS and
-// its like.
+// What a scan of a grid's build adds up: GRID_SCANS_CELLS and its like. The first three are numbered as
+// GRID_COUNTS_CELLS and its like are.
 #define CONSTANT_SCANS 11u
 #define GRID_SCANS_CELLS 0u
 #define GRID_SCANS_COLUMNS 1u
@@ -476,6 +476,9 @@ struct DriverCast {
 
 // The most attempts to build a level of cells within the limit of references. The last one has the largest cells.
 #define GRID_MAX_ATTEMPTS 4u
+// The most columns as a multiple of the most references. In many columns of a long triangle's box there is no cell with
+// it.
+#define GRID_COLUMNS_PER_REFERENCE 4u
 // Halvings after which the finest block, of GRID_MAX_BLOCK_RESOLUTION cells along each axis, is one cell.
 #define GRID_MAX_HALVINGS 5u
 // Counts above this are all taken as 2^32 - 1.
@@ -499,17 +502,10 @@ struct DriverCast {
 #define GRID_COUNTS_PAIRS 2u
 #define GRID_IS_COUNTED 3u
 
-// The state of a grid's build. The host writes it before the build and reads it afterwards. cell_min, cell_max,
-// cell_size, n_cells_*: the lattice of the uniform grid or of the upper level. margin: see src/accel/bounds.rs.
-// least_*, greatest_*: the bounds of the finite triangles, as integers of the same order (grid_bounds.comp).
-// upper_density, lower_density: cells for each triangle. max_references: the limit of columns, of pairs and of lower
-// cells. n_items: triangles at the upper level, pairs of the upper level at the lower one. n_columns, n_pairs: of these
-// items. n_upper: cells of the upper level, or of the only one. n_lower: cells of the lower level. n_coarser: how many
-// times edges were doubled. n_halvings: the same, at the lower level. n_attempts: of this level. counts:
-// GRID_COUNTS_CELLS and its like. columns_begin, pairs_begin, cells_begin: where the sums of blocks of columns, pairs
-// and cells begin in scan_blocks. tiles_a_group: blocks that a workgroup of the sort goes through. The rest is sizes of
-// indirect dispatches, over items, columns and so on. Those over `counted` are 0 until all is counted.
+// The state of a grid's build. The host writes it before the build and reads it afterwards.
 struct GridBuild {
+    // The lattice of the uniform grid or of the upper level: its box and the edge's length of a cell, world units.
+    // margin: how far outside a cell a triangle still counts as inside, world units.
     vec3 cell_min;
     float cell_size;
     vec3 cell_max;
@@ -518,6 +514,7 @@ struct GridBuild {
     uint n_cells_y;
     uint n_cells_z;
     float largest_coordinate;
+    // The bounds of the finite triangles, as integers of the same order (grid_bounds.comp), and the triangles' numbers.
     uint least_x;
     uint least_y;
     uint least_z;
@@ -526,22 +523,37 @@ struct GridBuild {
     uint greatest_y;
     uint greatest_z;
     uint n_triangles;
+    // What is wanted: cells for each triangle; the most pairs, which is also the most lower cells; the most columns.
     float upper_density;
     float lower_density;
     uint max_references;
+    uint max_columns;
+    // What is counted. n_items: triangles at the upper level, pairs of the upper level at the lower one. n_columns,
+    // n_pairs: of these items. n_upper: cells of the upper level, or of the only one. n_lower: cells of the lower
+    // level. n_filled_*: those of them that have triangles.
     uint n_items;
     uint n_columns;
     uint n_pairs;
     uint n_upper;
     uint n_lower;
+    uint n_filled_upper;
+    uint n_filled_lower;
+    // How the build goes on. n_coarser: how many times the upper level's edges were doubled. n_halvings: how many times
+    // the blocks' resolutions were halved. n_attempts: failed attempts at this level. counts: GRID_COUNTS_CELLS and its
+    // like.
     uint n_coarser;
     uint n_halvings;
     uint n_attempts;
     uint counts;
+    // Where the sums of blocks of columns, of pairs and of upper cells begin in scan_blocks. Those of the sort begin at
+    // 0.
     uint columns_begin;
     uint pairs_begin;
     uint cells_begin;
+    // Blocks that a workgroup of the sort goes through.
     uint tiles_a_group;
+    // Workgroups of indirect dispatches, over upper cells, items and columns, in the order in which an attempt counts.
+    // Only those whose turn it is are not 0.
     uint cell_groups_x;
     uint cell_groups_y;
     uint cell_groups_z;
@@ -551,6 +563,7 @@ struct GridBuild {
     uint column_groups_x;
     uint column_groups_y;
     uint column_groups_z;
+    // Workgroups over columns, pairs and upper cells, and of the sort, once all is counted.
     uint counted_column_groups_x;
     uint counted_column_groups_y;
     uint counted_column_groups_z;
@@ -563,9 +576,6 @@ struct GridBuild {
     uint sort_groups_x;
     uint sort_groups_y;
     uint sort_groups_z;
-    uint reserved0;
-    uint n_filled_upper;
-    uint n_filled_lower;
 };
 
 // Push constants of the sort: the lowest bit of the digit that a pass sorts by.

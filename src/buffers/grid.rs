@@ -34,8 +34,9 @@ const BINDINGS: [u32; 12] = [
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GridCapacities {
     pub n_triangles: u32,
-    /// Columns, pairs and lower cells.
+    /// Pairs.
     pub n_references: u32,
+    pub n_columns: u32,
     /// Cells of the upper level, or of the only one.
     pub n_upper: u32,
     /// Cells of the lower level.
@@ -52,7 +53,13 @@ impl GridCapacities {
             GridLevels::Uniform { .. } => 0,
             GridLevels::Two { .. } => max_references,
         };
-        Self { n_triangles, n_references: max_references, n_upper, n_lower }
+        Self {
+            n_triangles,
+            n_references: max_references,
+            n_columns: GridOptions::max_columns_of(max_references),
+            n_upper,
+            n_lower,
+        }
     }
 }
 
@@ -71,8 +78,8 @@ pub struct GridBuffers {
     arrays: Arrays,
 }
 
-/// The descriptor sets of a level, over two arrays of pairs. The sort goes to and fro between the arrays and ends in the first
-/// one.
+/// The descriptor sets of a level, over two arrays of pairs. The sort goes to and fro between the arrays and ends in
+/// the first one.
 pub struct PairSets {
     /// By the array from which kernels take pairs.
     sets: [BindingSet; 2],
@@ -81,8 +88,8 @@ pub struct PairSets {
 }
 
 impl PairSets {
-    /// The set for the kernels that come before a pass of the sort and write what it reads, or for the kernels after the last
-    /// pass.
+    /// The set for the kernels that come before a pass of the sort and write what it reads, or for the kernels after
+    /// the last pass.
     pub fn reading_for(&self, pass_ix: u32) -> &BindingSet {
         &self.sets[((self.n_passes - pass_ix) % 2) as usize]
     }
@@ -119,16 +126,16 @@ impl GridBuffers {
         options: &GridOptions,
     ) -> Result<Self, GpuError> {
         let capacities = GridCapacities::new(triangles.len() as u32, options);
-        let GridCapacities { n_triangles, n_references, n_upper, n_lower } = capacities;
+        let GridCapacities { n_triangles, n_references, n_columns, n_upper, n_lower } = capacities;
         let is_two_level = n_lower > 0;
         let storage = BufferUse::Storage;
         let pairs = |name, n: u32| Buffer::<[u32; 2]>::new(context, name, n as usize, storage);
         let n_items = n_triangles.max(if is_two_level { n_references } else { 0 });
-        let regions = ScanRegions::new(n_items, n_references, if is_two_level { n_upper } else { 0 });
+        let regions = ScanRegions::new(n_items, n_columns, if is_two_level { n_upper } else { 0 });
         let arrays = Arrays {
             triangles: triangles.clone(),
             first_columns: Buffer::new(context, "grid_first_columns", n_items as usize, storage)?,
-            first_pairs: Buffer::new(context, "grid_first_pairs", n_references as usize, storage)?,
+            first_pairs: Buffer::new(context, "grid_first_pairs", n_columns as usize, storage)?,
             scan_blocks: Buffer::new(context, "grid_scan_blocks", regions.len as usize, storage)?,
             blocks: pairs("grid_blocks", if is_two_level { n_upper } else { 0 })?,
             pairs: [
@@ -234,6 +241,7 @@ fn initial_build(capacities: GridCapacities, options: &GridOptions, regions: &Sc
         upper_density: options.levels.upper_density(),
         lower_density,
         max_references: capacities.n_references,
+        max_columns: capacities.n_columns,
         columns_begin: regions.columns_begin,
         pairs_begin: regions.pairs_begin,
         cells_begin: regions.cells_begin,

@@ -1,5 +1,5 @@
 //! The passes, one file each: its pipeline and how it is recorded. The kernel of the same name is in `glsl/passes`,
-//! its CPU twin in `cpu`, its test in `tests/passes`.
+//! its CPU twin in `cpu`, its test in `tests/passes`. The passes that build a grid have a folder, `grid`.
 
 use std::sync::Arc;
 

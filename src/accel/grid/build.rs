@@ -16,7 +16,13 @@ struct Input<'a> {
     triangles: &'a [Triangle],
     /// How far outside a cell a triangle still counts as inside ([`Bounds::margin`]).
     margin: f32,
-    max_references: u64,
+    max_references: u32,
+}
+
+/// A number of columns, pairs or cells, and the limit that it is above.
+struct TooMany {
+    count: u64,
+    limit: u32,
 }
 
 /// A triangle and the lattice whose cells get it.
@@ -43,7 +49,7 @@ impl Grid {
     pub fn build(triangles: &[Triangle], options: &GridOptions) -> Self {
         let exact_bounds = Bounds::of_all(triangles);
         let margin = exact_bounds.margin();
-        let input = Input { triangles, margin, max_references: options.max_references_of(triangles.len()).into() };
+        let input = Input { triangles, margin, max_references: options.max_references_of(triangles.len()) };
         let (lattice, upper) = upper_level(&input, &exact_bounds.grown(margin), options.levels.upper_density());
         let lowest = match options.levels {
             GridLevels::Uniform { .. } => upper,
@@ -79,9 +85,9 @@ fn upper_level(input: &Input, bounds: &Bounds, density: f32) -> (Lattice, Level)
                 let pairs = in_order(pairs);
                 return (lattice, Level { cells: cells_of(lattice.n_cubes(), 0, &pairs), pairs, n_coarser });
             }
-            Err(count) => {
+            Err(too_many) => {
                 let n_doublings;
-                (lattice, n_doublings) = lattice.coarser(n_steps(input, count, n_attempts));
+                (lattice, n_doublings) = lattice.coarser(too_many.n_steps(n_attempts));
                 n_coarser += n_doublings;
             }
         }
@@ -103,15 +109,15 @@ fn lower_level(input: &Input, lattice: &Lattice, upper: Level, density: f32) -> 
             let GridCell { first: first_cell, count: resolution } = blocks[cell_ix as usize];
             Some(Item { triangle_ix, lattice: lattice.within(lattice.cube_at(cell_ix), resolution), first_cell })
         };
-        let pairs = input.check(n_lower).and_then(|()| pairs_of(input, upper.pairs.len(), item));
+        let pairs = check(n_lower, input.max_references).and_then(|()| pairs_of(input, upper.pairs.len(), item));
         match pairs {
             Ok(pairs) => {
                 let pairs = in_order(pairs);
                 let lower_cells = cells_of(n_lower as usize, n_upper, &pairs);
                 return Level { cells: [blocks, lower_cells].concat(), pairs, n_coarser: upper.n_coarser + n_halvings };
             }
-            Err(count) => {
-                n_halvings = (n_halvings + n_steps(input, count, n_attempts)).min(GRID_MAX_HALVINGS);
+            Err(too_many) => {
+                n_halvings = (n_halvings + too_many.n_steps(n_attempts)).min(GRID_MAX_HALVINGS);
             }
         }
     }
@@ -139,11 +145,12 @@ fn finest_resolution(input: &Input, upper: &Lattice, max_cells: f32) -> u32 {
 /// Returns the pairs of all items in the order of the items, their columns and the columns' cells.
 ///
 /// # Errors
-/// The number of columns or of pairs, where that is more than the limit.
-fn pairs_of(input: &Input, n_items: usize, item: impl Fn(usize) -> Option<Item> + Sync) -> Result<Vec<Pair>, u64> {
+/// There are too many columns or pairs.
+fn pairs_of(input: &Input, n_items: usize, item: impl Fn(usize) -> Option<Item> + Sync) -> Result<Vec<Pair>, TooMany> {
     let items = || (0..n_items).into_par_iter().filter_map(&item);
     let columns = |item: &Item| Columns::new(item.lattice, &input.triangles[item.triangle_ix as usize], input.margin);
-    input.check(items().map(|item| u64::from(columns(&item).n_columns())).sum())?;
+    let n_columns = items().map(|item| u64::from(columns(&item).n_columns())).sum();
+    check(n_columns, GridOptions::max_columns_of(input.max_references))?;
     let pairs_of_item = |item: Item| {
         let (columns, mut pairs) = (columns(&item), Vec::new());
         for column_ix in 0..columns.n_columns() {
@@ -153,28 +160,28 @@ fn pairs_of(input: &Input, n_items: usize, item: impl Fn(usize) -> Option<Item> 
         pairs
     };
     let pairs: Vec<Pair> = items().flat_map_iter(pairs_of_item).collect();
-    input.check(pairs.len() as u64)?;
+    check(pairs.len() as u64, input.max_references)?;
     Ok(pairs)
 }
 
-impl Input<'_> {
-    /// Returns the count as an error where it is more than the limit of references.
-    fn check(&self, count: u64) -> Result<(), u64> {
-        if count <= self.max_references { Ok(()) } else { Err(count) }
-    }
+fn check(count: u64, limit: u32) -> Result<(), TooMany> {
+    if count <= u64::from(limit) { Ok(()) } else { Err(TooMany { count, limit }) }
 }
 
-/// Returns how many times the cells' edges are doubled after an attempt with this count of columns, pairs or cells,
-/// which is more than the limit. At each step, the number of cells that a surface meets falls to about a quarter. The
-/// last attempt has cells that are as large as can be.
-///
-/// `n_attempts`: how many attempts there have been.
-fn n_steps(input: &Input, count: u64, n_attempts: u32) -> u32 {
-    if n_attempts + 1 >= GRID_MAX_ATTEMPTS {
-        return 32;
+impl TooMany {
+    /// Returns how many times the cells' edges are doubled for the next attempt. At each doubling, the number of cells
+    /// that a surface meets falls to about a quarter. The more attempts have failed, the farther the next one goes, and
+    /// the last one has cells that are as large as can be.
+    ///
+    /// `n_attempts`: how many attempts there have been.
+    fn n_steps(&self, n_attempts: u32) -> u32 {
+        if n_attempts + 1 >= GRID_MAX_ATTEMPTS {
+            return 32;
+        }
+        let count = if self.count > u64::from(GRID_MAX_COUNT) { u32::MAX } else { self.count as u32 };
+        let expected = (1..15).find(|n| count >> (2 * n) <= self.limit).unwrap_or(15);
+        expected + n_attempts - 1
     }
-    let count = if count > u64::from(GRID_MAX_COUNT) { u64::from(u32::MAX) } else { count };
-    (1..).find(|n| count >> (2 * n) <= input.max_references).expect("0 is within the limit")
 }
 
 /// Puts pairs in the order of their cells. Within a cell the order stays that of the triangles.

@@ -29,7 +29,7 @@ pub use self::{
     lazy::{BuildStage, DeviceBuild, LazyGrid},
     statistics::Statistics,
 };
-use crate::layout::{AccelConstants, GRID_MAX_COUNT, GridCell, Plane};
+use crate::layout::{AccelConstants, GRID_COLUMNS_PER_REFERENCE, GRID_MAX_COUNT, GridCell, Plane};
 
 /// A grid over triangles, as the kernels read it. It comes from [`Grid::build`] alone, and nothing can change it
 /// afterwards.
@@ -109,6 +109,11 @@ impl GridOptions {
         let n_triangles = n_triangles as u64;
         let most = n_triangles * u64::from(self.max_references_per_triangle) + 1024;
         most.min(u64::from(self.max_references)).max(n_triangles).min(u64::from(GRID_MAX_COUNT)) as u32
+    }
+
+    /// The most columns of cells that the boxes of triangles may take in a grid of so many references at the most.
+    pub(crate) fn max_columns_of(max_references: u32) -> u32 {
+        max_references.saturating_mul(GRID_COLUMNS_PER_REFERENCE).min(GRID_MAX_COUNT)
     }
 }
 

@@ -66,8 +66,8 @@ impl Columns {
         n_on(self.range[0]) * n_on(self.range[1])
     }
 
-    /// Calls `found` with the indices of each cube of a column that the triangle comes near to. Columns are numbered along
-    /// the first axis, then the second.
+    /// Calls `found` with the indices of each cube of a column that the triangle comes near to. Columns are numbered
+    /// along the first axis, then the second.
     pub fn cubes_of(&self, column_ix: u32, mut found: impl FnMut([u32; 3])) {
         let [[first_x, last_x], [first_y, _], _] = self.range;
         let n_in_row = last_x - first_x + 1;
@@ -91,8 +91,8 @@ impl Columns {
 
     /// Whether the triangle is certainly beside the cube of this middle, seen along an axis.
     ///
-    /// A point of the triangle is on the left of all edges or on the right of all. So the cube is beside if it is on the
-    /// right of one edge and on the left of another. This needs no winding, which rounding may hide in a needle.
+    /// A point of the triangle is on the left of all edges or on the right of all. So the cube is beside if it is on
+    /// the right of one edge and on the left of another. This needs no winding, which rounding may hide in a needle.
     fn is_beside(&self, axis: usize, middle: [f32; 3]) -> bool {
         let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
         let (mut is_right, mut is_left) = (false, false);
@@ -109,8 +109,8 @@ impl Columns {
         is_right && is_left
     }
 
-    /// The first and the last index of the cubes of a column that may meet the triangle's plane. The interval is up to a
-    /// cube wider on each side than `meets_plane` needs, so it may be computed by divisions that are not exact.
+    /// The first and the last index of the cubes of a column that may meet the triangle's plane. The interval is up to
+    /// a cube wider on each side than `meets_plane` needs, so it may be computed by divisions that are not exact.
     fn near_plane(&self, middle: [f32; 3]) -> [u32; 2] {
         let ([x, y, z], [first, last]) = (self.normal, self.range[2]);
         let slope = 1.0 / z.abs();

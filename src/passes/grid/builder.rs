@@ -44,6 +44,10 @@ impl GridBuilder {
     /// # Errors
     /// Beyond the device's limits, out of memory; the driver refuses a shader.
     pub fn new(context: &Arc<Context>, triangles: &Buffer<Triangle>, options: &GridOptions) -> Result<Self, GpuError> {
+        if !Self::has_room(context, triangles.len()) {
+            let (object, limit) = (triangles.any().name().to_owned(), context.limits().storage_range);
+            return Err(GpuError::TooLarge { object, bytes: triangles.any().bytes(), limit });
+        }
         let options = Self::options_for(context, options);
         let bindings = GridBuffers::bindings(context)?;
         Ok(Self {
@@ -59,7 +63,8 @@ impl GridBuilder {
         (n_triangles as u64).saturating_mul(size_of::<Triangle>() as u64) <= context.limits().storage_range
     }
 
-    /// The options, with a limit of references that the device can bind. The host's build with these makes the same grid.
+    /// The options, with a limit of references that the device can bind. The host's build with these makes the same
+    /// grid.
     pub fn options_for(context: &Context, options: &GridOptions) -> GridOptions {
         let most = context.limits().storage_range / size_of::<LeafTriangle>() as u64;
         let max_references = options.max_references.min(u32::try_from(most).unwrap_or(u32::MAX));

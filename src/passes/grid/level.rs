@@ -104,8 +104,8 @@ impl Level {
         4 * GRID_MAX_ATTEMPTS + 1 + 3 * sets.n_passes + 1
     }
 
-    /// Needs build, and for the lower level what the upper one has left. Leaves the level's cells and its sorted pairs, and
-    /// the set bound by which kernels read these. `cut`: makes the lower level's lattices before each attempt.
+    /// Needs build, and for the lower level what the upper one has left. Leaves the level's cells and its sorted pairs,
+    /// and the set bound by which kernels read these. `cut`: makes the lower level's lattices before each attempt.
     pub fn record(&self, commands: &Commands, buffers: &GridBuffers, sets: &PairSets, cut: Option<&Cut>) {
         commands.bind(sets.writing_unsorted());
         for attempt in 0..GRID_MAX_ATTEMPTS {
@@ -125,8 +125,8 @@ impl Level {
         dispatch(commands, &self.cells, sized_by(buffers, offset_of!(GridBuild, counted_pair_groups_x)));
     }
 
-    /// One attempt. Needs build, and at the lower level blocks. Leaves in first_columns, first_pairs and scan_blocks where each item's
-    /// columns and each column's pairs begin, and how the build goes on.
+    /// One attempt. Needs build, and at the lower level blocks. Leaves in first_columns, first_pairs and scan_blocks
+    /// where each item's columns and each column's pairs begin, and how the build goes on.
     fn count(&self, commands: &Commands, buffers: &GridBuffers, attempt: u32) {
         let none = GridSort::default();
         let items = sized_by(buffers, offset_of!(GridBuild, item_groups_x));

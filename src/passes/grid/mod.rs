@@ -1,28 +1,27 @@
-//! Grid: builds a uniform grid or one of two levels from triangles, in one command buffer. `accel::grid` is the twin of
-//! all its kernels: both make the same grid, bit for bit.
+//! Grid: builds a uniform grid or a grid of two levels over triangles, in one command buffer. `accel::grid` is the twin
+//! of these kernels: both make the same grid, bit for bit.
 //!
 //! ```text
-//! bounds       the box of the triangles
-//! lattice      the size of its cells
-//! upper level                               lower level
-//!                                           descend      pairs become items
-//!   4 attempts, until                         4 attempts, until
-//!   the counts keep to the limit              the counts keep to the limit
-//!                                               resolutions  cells of each upper cell
-//!     columns   boxes of items in cells         columns
-//!     count     pairs of a cell and a           count
-//!               triangle
-//!   emit      writes the pairs                emit
-//!   sort      in the order of the cells       sort
-//!   cells     their entries                   cells
-//!                                           blocks       lower cells of each upper cell
-//! leaves       triangles and planes, in the order of the cells
+//! bounds             finds the box of the triangles
+//! lattice            chooses the size of the cells
+//! each level
+//!   descend          (lower level) makes the pairs of the upper level the items of this one
+//!   4 attempts       each with larger cells, until all counts keep to their limits
+//!     resolutions    (lower level) chooses into how many cells each upper cell is cut
+//!     columns        counts the columns of cells in each item's box
+//!     count          counts the pairs of a cell and a triangle in each column
+//!   emit             writes the pairs
+//!   sort             puts the pairs in the order of their cells, digit by digit
+//!   cells            finds each cell's pairs
+//!   blocks           (lower level) writes into which cells each upper cell is cut
+//! leaves             writes triangles and planes in the order of the pairs
 //! ```
 //!
-//! An item is a triangle and the lattice whose cells get it. Scans find where each item's columns and each column's pairs
-//! begin, so that the order of all pairs is fixed. Each scan has three steps, as in compaction: sums of blocks, the spine
-//! over these sums, and places within blocks. The spines also decide how an attempt goes on, and size all dispatches that
-//! follow: once all is counted, the kernels of further attempts have no workgroups.
+//! An item is a triangle and the lattice whose cells get it. Scans find where each item's columns and each column's
+//! pairs begin, so that the order of all pairs is fixed. Each scan has three steps, as in compaction: the sums of
+//! blocks of entries, the spine over these sums, and the places within each block. The spine also decides how the
+//! attempt goes on and sizes the dispatches that follow. Once all is counted, the kernels of further attempts have no
+//! workgroups.
 //!
 //! Kalojanov and Slusallek, "A parallel algorithm for construction of uniform grids", 2009; Kalojanov, Billeter and
 //! Slusallek, "Two-level grids for ray tracing on GPUs", 2011.
@@ -191,4 +190,48 @@ fn dispatch(commands: &Commands, kernel: &ComputePipeline, dispatch: Dispatch) {
 /// Makes a kernel wait for the one before it: for what that has written, and for the sizes of dispatches among it.
 fn then(commands: &Commands) {
     commands.barrier(Access::KernelUpdate, Access::KernelUpdate); // the build's arrays
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The numbers of SPIR-V's instructions and of a decoration.
+    const OP_DECORATE: u32 = 71;
+    const NO_CONTRACTION: u32 = 42;
+    /// Sums, differences and products of floats, of vectors by scalars, by matrices, and of two vectors.
+    const ARITHMETIC: [u32; 8] = [129, 131, 133, 142, 143, 144, 145, 148];
+
+    /// How many arithmetic instructions of a module a device may contract to others that round differently.
+    fn n_contractible(spirv: &[u8]) -> usize {
+        let words: Vec<u32> = spirv.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect();
+        let (mut results, mut exact) = (Vec::new(), Vec::new());
+        let mut rest = &words[5..];
+        while let [first, operands @ ..] = rest {
+            match (first & 0xffff, operands) {
+                (OP_DECORATE, [result, NO_CONTRACTION, ..]) => exact.push(*result),
+                (op, [_, result, ..]) if ARITHMETIC.contains(&op) => results.push(*result),
+                _ => {}
+            }
+            rest = &rest[(first >> 16) as usize..];
+        }
+        results.iter().filter(|result| !exact.contains(result)).count()
+    }
+
+    #[test]
+    fn no_arithmetic_may_be_contracted() {
+        let kernels = [
+            spirv!("grid_columns.comp"),
+            spirv!("grid_count.comp"),
+            spirv!("grid_emit.comp"),
+            spirv!("grid_lattice.comp"),
+            spirv!("grid_leaves.comp"),
+            spirv!("grid_resolutions.comp"),
+            spirv!("grid_spine.comp"),
+        ];
+        for Shader { file, spirv } in kernels {
+            assert_eq!(n_contractible(spirv), 0, "{file}");
+        }
+        assert!(n_contractible(spirv!("shade.comp").spirv) > 0, "shading is not precise");
+    }
 }
