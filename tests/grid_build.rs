@@ -251,10 +251,10 @@ fn one_changed_number_is_noticed() {
         let plants: [&Plant; 6] = [
             &|content, i| content.lattice[i % 7] ^= 1,
             &|content, _| content.n_coarser += 1,
-            &|content, i| content.cells[i % 1000].first ^= 1,
-            &|content, i| content.cells[i % 1000].count += 1,
-            &|content, i| content.leaf_triangles[i % 1000][i % 12] ^= 1,
-            &|content, i| content.leaf_planes[i % 1000][i % 4] ^= 1,
+            &|content, i| content.cells[i % 500].first ^= 1,
+            &|content, i| content.cells[i % 500].count += 1,
+            &|content, i| content.leaf_triangles[i % 500][i % 12] ^= 1,
+            &|content, i| content.leaf_planes[i % 500][i % 4] ^= 1,
         ];
         for plant in plants {
             let mut planted = content.clone();
