@@ -14,6 +14,7 @@ layout(std430, set = 0, binding = BIND_GRID_LEAF_TRIANGLES) writeonly buffer Lea
 layout(std430, set = 0, binding = BIND_GRID_LEAF_PLANES) writeonly buffer LeafPlanesBlock { vec4 leaf_planes[]; };
 
 const float MAX_ERROR = 16.0;
+const float LEAST_NORMAL = 1.17549435e-38;
 
 float magnitude(vec3 v) {
     precise float sum = abs(v.x) + abs(v.y) + abs(v.z);
@@ -31,7 +32,9 @@ vec4 plane_of(Triangle triangle) {
     precise float error = 4.0 * edges * reach;
     precise float limit = MAX_ERROR * (build.largest_coordinate * longest);
     uint exponent = floatBitsToUint(longest) >> 23;
-    if (!(error <= limit) || exponent < 3u || exponent >= 250u) return vec4(0.0);
+    // Where the limit is denormal, a device may take both for 0.
+    bool is_certain = limit >= LEAST_NORMAL && error <= limit;
+    if (!is_certain || exponent < 3u || exponent >= 250u) return vec4(0.0);
     precise vec3 scaled = normal * uintBitsToFloat((252u - exponent) << 23);
     precise vec3 products = scaled * triangle.v0;
     precise float distance = products.x + products.y + products.z;

@@ -2,8 +2,8 @@
 // bounds of the errors. Everything is `precise`, so that all bits are the same; what a division rounds in another way
 // makes no difference.
 //
-// Scenes whose triangles have corners with magnitudes from 2^-30 to 2^30, or of 0, need no numbers beyond the normal
-// range.
+// No intermediate result is denormal in scenes whose largest coordinate is 2^-20 or more and whose edges are 0 or at
+// least 2^-20 times that. In smaller scenes, a device that flushes denormals may build a grid with a few other entries.
 #ifndef KDRAY_GRID_OVERLAP
 #define KDRAY_GRID_OVERLAP
 

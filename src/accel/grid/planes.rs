@@ -24,7 +24,9 @@ pub fn plane_of(triangle: &Triangle, largest_coordinate: f32) -> Plane {
     // farther from the first corner than the edges are long.
     let edges = a.abs().element_sum() * b.abs().element_sum();
     let reach = a.abs().element_sum().max(b.abs().element_sum());
-    let is_certain = 4.0 * edges * reach <= MAX_ERROR * (largest_coordinate * longest);
+    let (error, limit) = (4.0 * edges * reach, MAX_ERROR * (largest_coordinate * longest));
+    // Where the limit is denormal, a device may take both for 0.
+    let is_certain = limit >= f32::MIN_POSITIVE && error <= limit;
     let exponent = longest.to_bits() >> 23;
     if !is_certain || !(3..250).contains(&exponent) {
         return Plane::default();
