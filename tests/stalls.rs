@@ -11,7 +11,7 @@ use kdray::{
     cast::{Caster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
     frame::{Picture, Primary, Profile, RenderOptions},
     gpu::{Context, DeviceOverrides},
-    layout::Feature,
+    layout::{Feature, Triangle},
     render::Renderer,
     world::Geometry,
 };
@@ -34,6 +34,12 @@ fn assert_silent(context: &Context) {
 fn cast(context: &Arc<Context>, world: &MeshWithTree, traversal: Traversal, query: Query, rays: &[Ray]) -> Vec<Hit> {
     let mut caster = Caster::new(context, world.geometry(), traversal).expect("a caster");
     caster.cast(rays, query, 1).expect("a cast").hits
+}
+
+/// A grid of each kind.
+fn grids(triangles: &[Triangle]) -> [Accel; 2] {
+    let options = [GridOptions::uniform(), GridOptions::two_level()].map(AccelOptions::Grid);
+    options.map(|options| Accel::new(triangles, &options))
 }
 
 fn nasty_rays(world: &MeshWithTree, n: usize) -> Vec<Ray> {
@@ -77,6 +83,14 @@ fn a_leaf_of_more_triangles_than_a_driver_takes_turns_is_searched_to_its_end() {
         for query in [Query::Closest, Query::Any] {
             let hits = cast(&context, &world, traversal, query, &rays);
             assert_eq!(n_right(N, &hits, query), rays.len(), "{traversal} {query:?}");
+        }
+    }
+    for accel in grids(&world.triangles) {
+        let geometry = Geometry::new(&world.triangles, &accel).expect("a grid of these triangles");
+        for query in [Query::Closest, Query::Any] {
+            let mut caster = Caster::new(&context, geometry, Traversal::OF_GPUS).expect("a caster");
+            let hits = caster.cast(&rays, query, 1).expect("a cast").hits;
+            assert_eq!(n_right(N, &hits, query), rays.len(), "{} {query:?}", accel.kind());
         }
     }
     assert_silent(&context);
@@ -131,8 +145,7 @@ fn interrupted_casts_find_the_same() {
 fn interrupted_casts_through_grids_find_the_same() {
     let world = MeshWithTree::new([meshes::soup(500, 1), meshes::torus(20, 10)].concat());
     let rays = nasty_rays(&world, 300);
-    let options = [GridOptions::uniform(), GridOptions::two_level()].map(AccelOptions::Grid);
-    for accel in options.map(|options| Accel::new(&world.triangles, &options)) {
+    for accel in grids(&world.triangles) {
         let geometry = Geometry::new(&world.triangles, &accel).expect("a grid of these triangles");
         let cast = |context: &Arc<Context>, query| {
             let mut caster = Caster::new(context, geometry, Traversal::OF_GPUS).expect("a caster");

@@ -16,7 +16,7 @@ use super::{
     variant::Variant,
 };
 use crate::{
-    accel::{AccelKind, Statistics, kdtree::BuildOptions},
+    accel::{Accel, Statistics, kdtree::BuildOptions},
     gpu::{Context, GpuError},
     scene::{
         Camera, Instance, Material, RenderDefaults, Scene, Transform,
@@ -76,14 +76,6 @@ impl Sized {
         Self { n_triangles: scene.triangles.len(), stage: Stage::in_room(scene, size, build_options), generate_ms }
     }
 
-    /// The structure that a variant searches in numbers, and what it took to build it.
-    fn build(&self, variant: Variant) -> (Statistics, f64) {
-        let begin = Instant::now();
-        let statistics = self.stage.statistics(variant); // builds a grid
-        let grid_ms = begin.elapsed().as_secs_f64() * 1e3;
-        (statistics, if variant.accel() == AccelKind::KdTree { self.stage.tree_build_ms } else { grid_ms })
-    }
-
     /// Casts the rays `n_times` on a device, or without one on the current rayon pool.
     ///
     /// # Errors
@@ -95,9 +87,15 @@ impl Sized {
         sets: &[RaySet],
         n_times: u16,
     ) -> Result<Row, GpuError> {
-        let (accel, build_ms) = self.build(variant);
         let variants = [variant];
-        let mut tracers = Tracers::new(context, &self.stage, &variants)?;
+        let begin = Instant::now();
+        let mut tracers = Tracers::new(context, &self.stage, &variants)?; // on a device it builds a grid
+        let accel = self.stage.statistics(variant); // on the host this does
+        let grid_ms = begin.elapsed().as_secs_f64() * 1e3;
+        let build_ms = match self.stage.geometry(variant).accel() {
+            Accel::KdTree(_) => self.stage.tree_build_ms,
+            Accel::Grid(grid) => grid.device_build().and_then(|build| build.ms).unwrap_or(grid_ms),
+        };
         let rays = sets.iter().map(|set| Ok(RayCost::new(&tracers.measure(set, n_times)?)));
         Ok(Row {
             n_triangles: self.n_triangles,
@@ -116,7 +114,7 @@ pub struct Row {
     pub n_triangles: usize,
     /// The mesh, wall-clock.
     pub generate_ms: f64,
-    /// The structure, wall-clock.
+    /// The structure: a kd-tree wall-clock; a grid on the GPU, or wall-clock where the host builds it.
     pub build_ms: f64,
     /// As `tree` or `grid`.
     #[serde(flatten)]

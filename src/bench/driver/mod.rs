@@ -52,6 +52,12 @@ struct Structure {
     bindings: Arc<BindingLayout>,
 }
 
+/// The searches through a structure, and the rays that they trace.
+struct Contenders {
+    resources: Rc<CastResources>,
+    contenders: Vec<Box<dyn Contender>>,
+}
+
 impl Structure {
     fn new(context: &Arc<Context>, stage: &Stage, variant: Variant) -> Result<Self, GpuError> {
         let geometry = stage.geometry(variant);
@@ -61,12 +67,7 @@ impl Structure {
     }
 
     /// The searches through the structure, which are to trace these rays.
-    fn contenders(
-        &self,
-        context: &Arc<Context>,
-        rays: &[Ray],
-        query: Query,
-    ) -> Result<(Rc<CastResources>, Vec<Box<dyn Contender>>), GpuError> {
+    fn contenders(&self, context: &Arc<Context>, rays: &[Ray], query: Query) -> Result<Contenders, GpuError> {
         let resources = Rc::new(CastResources::new(context, &self.bindings, &self.buffers, rays.len())?);
         resources.cast_rays.upload(rays)?;
         let mut contenders: Vec<Box<dyn Contender>> = Vec::new();
@@ -74,7 +75,7 @@ impl Structure {
             let kernel = Kernel::new(context, &self.bindings, &resources, (variant.traversal(), query))?;
             contenders.push(Box::new(kernel.named(variant.to_string())));
         }
-        Ok((resources, contenders))
+        Ok(Contenders { resources, contenders })
     }
 }
 
@@ -119,7 +120,7 @@ impl Arena {
         let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
         let mut contenders: Vec<Box<dyn Contender>> = Vec::new();
         for structure in &self.structures {
-            let (resources, kernels) = structure.contenders(&self.context, &rays, query)?;
+            let Contenders { resources, contenders: kernels } = structure.contenders(&self.context, &rays, query)?;
             if contenders.is_empty() {
                 contenders.push(Box::new(Pipeline::new(&self.context, &self.scenery, &resources, query)?));
             }

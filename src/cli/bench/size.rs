@@ -94,7 +94,7 @@ fn text(report: &Report) -> String {
         ["triangles", report.parts(), "references", "build ms", "primary ns", "shadow ns", "mirror ns", "diffuse ns"];
     text += &table(header, &report.rows.iter().map(cells).collect::<Vec<_>>());
     text += &format!(
-        "\nA rippled knot in a closed room; structures built on {} threads; ns: time of a ray.\n",
+        "\nA rippled knot in a closed room; ns: time of a ray. kd-trees are built on {} threads, grids on the device if there is one.\n",
         report.n_threads
     );
     if let Some(growth) = report.growth() {
@@ -121,7 +121,7 @@ fn cells(row: &Row) -> [String; 8] {
         row.n_triangles.to_string(),
         row.accel.n_parts().to_string(),
         row.accel.n_references().to_string(),
-        decimal(Some(row.build_ms), 0),
+        decimal(Some(row.build_ms), 1),
         ns(0),
         ns(1),
         ns(2),

@@ -1,0 +1,137 @@
+#!/usr/bin/env python3
+"""Measures grids against the kd-tree where grids do well and where they do badly.
+
+    python3 benches/grids.py target/release/kdray [--mesh dragon.obj] [--size 1920x1080] [--json all.json]
+
+Four scenes: a soup of equal triangles in even distribution, the interior of scenes/paper4.toml, a mesh in a closed room
+(the OBJ file that --mesh names, or a generated knot), and a small detailed body in the middle of a stadium. On each of
+them, `kdray bench traversal` casts the same rays through all structures. Prints Markdown tables of million rays a second.
+"""
+
+import argparse
+import json
+import pathlib
+import random
+import subprocess
+import sys
+import tempfile
+
+VARIANTS = ["mask", "ropes", "grid", "grid2"]
+REPOSITORY = pathlib.Path(__file__).resolve().parent.parent
+
+KNOT = """\
+[camera]
+eye = [0.0, 0.0, 6.0]
+target = [0.0, 0.0, 0.0]
+vertical_fov = 45
+
+[[mesh]]
+generator = "torus_knot"
+p = 2
+q = 5
+radius = 1.35
+swing = 0.62
+tube = 0.36
+segments = 2300
+triangles = 800000
+ripples = [14, 4]
+ripple_depth = 0.07
+"""
+
+# A bowl of 100 units' radius with the body of 1 unit on its ground: the "teapot in a stadium".
+STADIUM = """\
+[camera]
+eye = [1.4, 1.1, 2.2]
+target = [0.0, 0.5, 0.0]
+vertical_fov = 45
+
+[[light]]
+kind = "point"
+position = [20.0, 60.0, 30.0]
+intensity = [5000.0, 5000.0, 5000.0]
+
+[[mesh]]
+generator = "lathe"
+segments = 256
+steps = 8
+profile = [
+    [100.0, 60.0], [98.0, 40.0], [90.0, 40.0], [84.0, 32.0], [76.0, 24.0], [68.0, 16.0], [60.0, 8.0],
+    [54.0, 4.0], [54.0, 0.0], [54.0, 0.0], [0.0, 0.0],
+]
+
+[[mesh]]
+generator = "torus_knot"
+p = 2
+q = 3
+radius = 0.5
+swing = 0.24
+tube = 0.145
+segments = 400
+triangles = 40000
+transform = { translate = [0.0, 0.6, 0.0] }
+"""
+
+
+def write_soup(path, n_triangles):
+    """Writes triangles of one size, at even distribution in a cube of 2 units."""
+    rng = random.Random(7)
+    size = 1.5 / n_triangles ** (1 / 3)
+    with open(path, "w") as file:
+        for _ in range(n_triangles):
+            center = [rng.uniform(-1, 1) for _ in range(3)]
+            for _ in range(3):
+                corner = [x + rng.uniform(-size, size) for x in center]
+                file.write("v %.6f %.6f %.6f\n" % tuple(corner))
+        for i in range(n_triangles):
+            file.write("f %d %d %d\n" % (3 * i + 1, 3 * i + 2, 3 * i + 3))
+
+
+def measure(binary, scene, options, size):
+    """Returns the report of `kdray bench traversal` as JSON."""
+    with tempfile.NamedTemporaryFile(suffix=".json") as report:
+        words = [binary, "bench", "traversal", str(scene), "--size", size, "--variants", ",".join(VARIANTS)]
+        subprocess.run(words + options + ["--json", report.name], check=True, stdout=subprocess.DEVNULL)
+        return json.load(open(report.name))
+
+
+def table(name, report):
+    """Returns a scene's table: a row for each kind of rays, a column for each structure."""
+    lines = ["%s: %d triangles, on %s" % (name, report["n_triangles"], report["device"]), ""]
+    lines.append("| rays | " + " | ".join("`%s`, Mrays/s" % variant for variant in VARIANTS) + " | `grid2` / `mask` |")
+    lines.append("|---|" + "---:|" * (len(VARIANTS) + 1))
+    for rays in report["sets"]:
+        rates = {variant["traversal"]: variant["mrays_per_s"]["median"] for variant in rays["variants"]}
+        cells = ["%.1f" % rates[variant] for variant in VARIANTS] + ["%.2f" % (rates["grid2"] / rates["mask"])]
+        lines.append("| %s | %s |" % (rays["rays"], " | ".join(cells)))
+    return "\n".join(lines) + "\n"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("binary", help="the program `kdray`")
+    parser.add_argument("--mesh", help="an OBJ file for the mesh in a room, such as the Stanford dragon")
+    parser.add_argument("--size", default="1920x1080", help="pixels, one primary ray each")
+    parser.add_argument("--json", help="write all reports to this file")
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        folder = pathlib.Path(folder)
+        write_soup(folder / "soup.obj", 200_000)
+        (folder / "knot.toml").write_text(KNOT)
+        (folder / "stadium.toml").write_text(STADIUM)
+        scenes = [
+            ("Even soup in a room", folder / "soup.obj", []),
+            ("Interior", REPOSITORY / "scenes" / "paper4.toml", ["--no-room"]),
+            ("Mesh in a room", args.mesh or folder / "knot.toml", []),
+            ("Body in a stadium", folder / "stadium.toml", ["--no-room"]),
+        ]
+        reports = {}
+        for name, scene, options in scenes:
+            print("measuring: %s" % name, file=sys.stderr)
+            reports[name] = measure(args.binary, scene, options, args.size)
+            print(table(name, reports[name]), flush=True)
+    if args.json:
+        pathlib.Path(args.json).write_text(json.dumps(reports, indent=2))
+
+
+if __name__ == "__main__":
+    main()
