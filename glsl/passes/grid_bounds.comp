@@ -31,7 +31,7 @@ void main() {
     least = subgroupMin(least);
     greatest = subgroupMax(greatest);
     n_finite = subgroupAdd(n_finite);
-    if (gl_SubgroupInvocationID != 0u || n_finite == 0u) return;
+    if (!subgroupElect() || n_finite == 0u) return;
     atomicMin(build.least_x, least.x);
     atomicMin(build.least_y, least.y);
     atomicMin(build.least_z, least.z);

@@ -39,7 +39,7 @@ void main() {
         n_filled += 1u;
     }
     n_filled = subgroupAdd(n_filled);
-    if (gl_SubgroupInvocationID != 0u || n_filled == 0u) return;
+    if (!subgroupElect() || n_filled == 0u) return;
     if (LOWER) atomicAdd(build.n_filled_lower, n_filled);
     else atomicAdd(build.n_filled_upper, n_filled);
 }
