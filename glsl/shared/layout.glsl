@@ -182,7 +182,7 @@ struct KdRope {
 };
 
 // 8 bytes: a cell of a grid. At the lowest level, its triangles are the `count` entries of leaf_triangles from `first` on. At the
-// upper level of two, it is cut into count x count x count cells, of which grid_cells[first] is the first, x fastest; a count
+// upper level of two, it is cut into count x count x count cells, of which `grid_cells[first]` is the first, x fastest; a count
 // of 0 means that it has no triangles.
 struct GridCell {
     uint first;
