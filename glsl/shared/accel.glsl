@@ -1,11 +1,14 @@
-// The acceleration structure: from a ray to its hit. All that a kernel calls is `traverse`, or for a direction of any length
-// `traverse_any_length`.
+// The acceleration structure: finds the hit of a ray.
 //
-//   traversal_ray.glsl   the ray, cut to the structure's box
+// Needs a constant `bool COUNT_COSTS`, which the kernel declares before this file (steps.glsl). Provides `traverse`,
+// and `traverse_any_length` for directions of any length, which are all that a kernel calls to find a hit. Kernels
+// also use `is_stalled` and `runs_in_round` of stalls.glsl.
+//
+//   traversal_ray.glsl   the ray, clipped to the structure's box
 //   kdtree.glsl          the search through a kd-tree
 //   grid.glsl            the search through a grid
-//   candidate.glsl       triangles that the search comes to, against the nearest hit so far
-//   local_memory.glsl    what is kept out of registers meanwhile
+//   candidate.glsl       the test of a triangle that the search comes to, against the nearest hit so far
+//   local_memory.glsl    values that are kept out of registers during the search
 #ifndef KDRAY_ACCEL
 #define KDRAY_ACCEL
 
@@ -15,7 +18,7 @@
 #include "steps.glsl"
 #include "triangle.glsl"
 
-// Whether the device runs both sides of a branch for all lanes, as software drivers do: lockstep.glsl.
+// Whether the device runs both sides of a branch for all lanes, as software drivers do (lockstep.glsl).
 layout(constant_id = CONSTANT_PREDICATES_BRANCHES) const bool PREDICATES_BRANCHES = false;
 
 #include "traversal_ray.glsl"
@@ -24,14 +27,14 @@ layout(constant_id = CONSTANT_PREDICATES_BRANCHES) const bool PREDICATES_BRANCHE
 #include "kdtree.glsl"
 #include "grid.glsl"
 
-// The search through whichever structure the scene has. Returns 0, or the mark of a ray that has stalled.
+// Searches the structure that the scene has. Returns 0, or the mark of a ray that has stalled (stalls.glsl).
 uint search(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (GRID_LEVELS == 0u) return search_kdtree(ray, any_hit, best);
     return search_grid(ray, any_hit, best);
 }
 
-// The closest hit in (t_min, t_max], or with any_hit one that need not be the closest. The direction has about unit length. A
-// miss keeps t = t_max. If the ray has stalled, the hit's triangle_ix is its mark.
+// Returns the closest hit in (t_min, t_max], or with any_hit one that need not be the closest. The direction has
+// about unit length. A miss has t = t_max. If the ray has stalled, the hit's triangle_ix is its mark.
 Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
     float t_start;
     PathRay ray_near = near_scene(ray_in, t_start);
@@ -46,7 +49,8 @@ Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
     return Hit(2.0 * best.t + lengths.x, best.triangle_ix, weights.x, weights.y);
 }
 
-// Magnitudes by bits, which keep their order: a device may flush a denormal, and need not know a NaN from a number.
+// The bits of a magnitude, which have the order of the magnitudes. Integers are used since a device may flush
+// denormals and need not tell a NaN from a number.
 uint magnitude_bits(float x) {
     return floatBitsToUint(x) & 0x7fffffffu;
 }
@@ -55,15 +59,16 @@ uint longest_bits(vec3 v) {
     return max(max(magnitude_bits(v.x), magnitude_bits(v.y)), magnitude_bits(v.z));
 }
 
-// The longest component's exponent as the bits hold it, 1..254; 0: all but zero, 255: infinite or NaN.
+// The biased exponent of the component of largest magnitude, 1..254. It is 0 if that component is zero or denormal,
+// and 255 if it is infinite or NaN.
 uint exponent_of(vec3 direction) {
     return longest_bits(direction) >> 23;
 }
 
-// Does what `traverse` does for a ray whose direction has any length, such as one that a transform has taken to the space of an
-// instance: t is in units of the direction. The exponent of the direction's longest component must be 1 to 254.
+// Does what `traverse` does, for a ray whose direction has any length, such as a ray that was transformed to the
+// space of an instance. t is in units of the direction. `exponent_of` the direction must be 1..254.
 //
-// The direction is scaled by a power of two, by which it and t keep their bits.
+// The direction and t are scaled by a power of two, which loses none of their bits.
 Hit traverse_any_length(PathRay ray, float t_min, bool any_hit) {
     uint exponent = min(exponent_of(ray.direction), 253u);
     float scale = uintBitsToFloat((254u - exponent) << 23); // 2^(127 - exponent)

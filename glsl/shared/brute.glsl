@@ -1,7 +1,10 @@
-// Every triangle, without a tree, as the first ray tracing on GPUs did (Carr, Hall, Hart: The Ray Engine, Graphics
-// Hardware 2002). For at most BRUTE_MAX_TRIANGLES.
+// Brute force: tests every triangle without a tree, as the first ray tracing on GPUs did (Carr, Hall, Hart: The Ray
+// Engine, Graphics Hardware 2002). For at most BRUTE_MAX_TRIANGLES. A part of kdtree.glsl.
+//
+// Needs scene.glsl, stalls.glsl, steps.glsl, candidate.glsl, kd_nodes.glsl, leaf.glsl and resume.glsl. Provides
+// `intersect_all`.
 
-// Returns 0, or the mark of a ray that has stalled.
+// Tests all triangles. Returns 0, or the mark of a ray that has stalled.
 uint intersect_all(TraversalRay ray, bool any_hit, inout Nearest best) {
     Cell cell = whole(ray);
     Visit all = Visit(0u, accel.n_triangles, segment_of(0.0, 0.0));

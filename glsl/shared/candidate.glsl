@@ -1,27 +1,32 @@
-// Candidates: triangles that a search comes to, against the nearest hit so far. A part of accel.glsl.
+// Candidates, which are the triangles that a search comes to, and their test against the nearest hit so far. A part
+// of accel.glsl.
+//
+// Needs scene.glsl, triangle.glsl, traversal_ray.glsl and local_memory.glsl. Provides `Nearest`, `intersect`,
+// `is_better`, `is_accepted` and `is_done`.
 
 // Whether rays pass through some of the triangles.
 layout(constant_id = CONSTANT_FILTERS) const bool FILTERS = false;
 
-// The nearest hit so far; where it lies in its triangle is in local memory.
+// The nearest hit so far, with the traversal's t. Its barycentric weights are in local memory (WEIGHTS_SLOT).
 struct Nearest {
     float t;
     uint triangle_ix;
 };
 
-// Whether a hit is the ray's, and nearer than the best; of two hits at one t the lower index wins, whatever the order of triangles.
+// Whether a hit is in the ray's interval, not on its source triangle, and nearer than the best one. Of two hits at
+// the same t, the one with the lower triangle index wins, so the order of tests does not matter.
 bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
     bool nearer = t < best.t || (t == best.t && triangle_ix < best.triangle_ix);
     return t > ray.t_min && nearer && triangle_ix != ray.source_triangle;
 }
 
-// Whether a hit counts. Without FILTERS each does, and nothing is read. u, v: barycentric weights of the hit.
+// Whether a hit counts. Without FILTERS every hit does, and nothing is read. u, v: barycentric weights of the hit.
 bool is_accepted(uint triangle_ix, float u, float v) {
     if (FILTERS) return (load_triangle_materials(triangle_ix) & TRIANGLE_HIDDEN) == 0u;
     return true;
 }
 
-// A triangle against the ray.
+// Tests a triangle against the ray, and keeps the hit in `best` if it is nearer.
 void intersect(TraversalRay ray, Triangle triangle, uint triangle_ix, inout Nearest best) {
     Hit hit;
     if (!intersect_triangle(ray.shear, triangle, triangle_ix, hit)) return;
@@ -31,6 +36,7 @@ void intersect(TraversalRay ray, Triangle triangle, uint triangle_ix, inout Near
     }
 }
 
+// Whether the search can end because it needs only one hit and has one.
 bool is_done(bool any_hit, Nearest best) {
     return any_hit && best.triangle_ix != NO_TRIANGLE;
 }

@@ -1,4 +1,4 @@
-// Rays that go on from a hit: how many, and which.
+// The child rays that start at a hit: reflected, transmitted, both or none. Twin of src/reference/children.rs.
 #ifndef KDRAY_CHILDREN
 #define KDRAY_CHILDREN
 
@@ -7,11 +7,12 @@
 #include "surface.glsl"
 #include "material.glsl"
 
+// Whether a child whose weight this is has any throughput.
 bool carries_light(PathRay ray, vec3 weight) {
     return any(greaterThan(ray.throughput * weight, vec3(0.0)));
 }
 
-// Bits of CHILD_*: of the ray's children, those that carry light.
+// The ray's children that carry light, as bits CHILD_*.
 uint child_kinds_of(PathRay ray, Hit hit) {
     if (hit.triangle_ix == NO_TRIANGLE || !scatters_light(material_at(hit))) return 0u;
     Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));

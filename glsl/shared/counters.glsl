@@ -1,4 +1,6 @@
-// What the kernels count for the profile.
+// Counters of the kernels for the profile: hits and shadow rays of each bounce. Needs
+// GL_KHR_shader_subgroup_arithmetic. Invocations of a subgroup add once together. Each bounce has COUNTER_PLACES
+// counters, whose sum is the count, so that as many workgroups can add at the same time.
 #ifndef KDRAY_COUNTERS
 #define KDRAY_COUNTERS
 
@@ -6,19 +8,23 @@
 
 layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters counters[]; };
 
+// The index in `counters` of one of a bounce's counters.
 uint counters_of(uint bounce_ix, uint place) {
     return (bounce_ix * COUNTER_PLACES + place % COUNTER_PLACES) * COUNTER_STRIDE;
 }
 
-// place: the same for a workgroup, and others for its neighbours, if they all come at once.
+// Counts a hit of this invocation. place: any number; the same in a workgroup, and different in neighbouring
+// workgroups if these add at the same time.
 void count_hits(uint bounce_ix, uint place, bool is_hit) {
     uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
     if (subgroupElect() && n_hits > 0u) atomicAdd(counters[counters_of(bounce_ix, place)].n_hits, n_hits);
 }
 
+// Counts n_of_lane shadow rays of this invocation. place: as for `count_hits`.
 void count_shadow_rays(uint bounce_ix, uint place, uint n_of_lane) {
     uint n_segments = subgroupAdd(n_of_lane);
-    if (subgroupElect() && n_segments > 0u) atomicAdd(counters[counters_of(bounce_ix, place)].n_shadow_rays, n_segments);
+    if (subgroupElect() && n_segments > 0u)
+        atomicAdd(counters[counters_of(bounce_ix, place)].n_shadow_rays, n_segments);
 }
 
 #endif

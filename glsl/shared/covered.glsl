@@ -1,4 +1,5 @@
-// Which pixels of a small rectangle a triangle may cover, as bits, row by row.
+// Coverage masks: which pixels of a small rectangle a triangle may cover, one bit per pixel, row by row. All
+// coordinates are in pixels; (0, 0) is the sample of the rectangle's first pixel.
 #ifndef KDRAY_COVERED
 #define KDRAY_COVERED
 
@@ -6,8 +7,9 @@
 
 #include "layout.glsl"
 
-// The pixels of a row that a triangle may cover lie between the lines of its edges, x = at_first + y * step on row y. An edge
-// ends a row or begins it, and in the other bound has an infinity.
+// The lines of a triangle's edges, x = at_first + y * step in row y, one edge per component. They bound the pixels of
+// a row that the triangle may cover. Each edge is either a lower or an upper bound of x; its other line is at -FAR or
+// FAR.
 struct EdgeLines {
     vec3 low_at_first;
     vec3 low_step;
@@ -17,20 +19,22 @@ struct EdgeLines {
 
 const float FAR = 1e9;
 
-// Corners from the rectangle's first pixel.
+// The lines of the edges of a triangle a, b, c. slack: how far outside an edge a pixel still counts as covered.
 EdgeLines edge_lines(vec2 a, vec2 b, vec2 c, float slack) {
     vec3 along_x = vec3(b.x - a.x, c.x - b.x, a.x - c.x);
     vec3 along_y = vec3(b.y - a.y, c.y - b.y, a.y - c.y);
     vec3 from_x = vec3(a.x, b.x, c.x), from_y = vec3(a.y, b.y, c.y);
     float area = along_x.x * along_y.y - along_y.x * along_x.y;
     vec3 spans = slack * (abs(along_x) + abs(along_y));
-    // A sliver has no side that is certain.
+    // Rounding may have turned a sliver's winding around, so its edges bound nothing.
     bool is_sliver = abs(area) <= 4.0 * (spans.x + spans.y + spans.z);
     float side = area < 0.0 ? -1.0 : 1.0;
-    // Twice the area that an edge spans with a pixel is at_first + x * step_x + y * step_y, and not below 0 if it is covered.
+    // Twice the signed area that an edge spans with a pixel, and the slack, is at_first + x * step_x + y * step_y. It
+    // is not below 0 for a covered pixel.
     vec3 step_x = -side * along_y, step_y = side * along_x;
     vec3 at_first = side * (along_y * from_x - along_x * from_y) + spans;
-    // An edge along the row: beyond all pixels on one side of it, before all on the other.
+    // An edge along the rows gets a tiny slope: it crosses a row beyond all pixels if the row is on one side of it,
+    // and before all pixels if on the other.
     step_x = mix(step_x, vec3(1e-6), lessThan(abs(step_x), vec3(1e-6)));
     vec3 crossing = -at_first / step_x, step = -step_y / step_x;
     bvec3 is_low = greaterThan(step_x, vec3(0.0)), is_high = not(is_low);
@@ -41,7 +45,7 @@ EdgeLines edge_lines(vec2 a, vec2 b, vec2 c, float slack) {
     );
 }
 
-// Of a row of the rectangle, from `first` on: as bits, from the lowest on.
+// The mask of row y of a rectangle; bit 0 is the row's first pixel. width: 32 at most.
 uint covered_of_row(EdgeLines lines, float y, float width) {
     vec3 low = lines.low_at_first + y * lines.low_step, high = lines.high_at_first + y * lines.high_step;
     float first = clamp(ceil(max(low.x, max(low.y, low.z))), 0.0, width);
@@ -49,7 +53,7 @@ uint covered_of_row(EdgeLines lines, float y, float width) {
     return bitfieldInsert(0u, 0xffffffffu, int(first), int(end - first));
 }
 
-// Of a rectangle of RASTER_SMALL pixels at the most, in rows of 32 at the most.
+// The mask of a rectangle, low word first. The rectangle has at most RASTER_SMALL pixels, in rows of at most 32.
 uvec2 covered_of(uvec2 size, EdgeLines lines) {
     uint64_t bits = uint64_t(0);
     uint n = 0u;

@@ -1,4 +1,5 @@
-// Where a triangle may lie in the window. All corners are given from the eye.
+// The pixels of the window that a triangle may cover. All points are relative to the eye, with world axes and units.
+// "Depth" is the distance along the camera's `forward`.
 #ifndef KDRAY_FOOTPRINT
 #define KDRAY_FOOTPRINT
 
@@ -6,7 +7,7 @@
 #include "frame.glsl"
 #include "camera.glsl"
 
-// Pixels from `first` on, `size` of them each way.
+// A rectangle of the window's pixels.
 struct Rectangle {
     uvec2 first;
     uvec2 size;
@@ -16,21 +17,23 @@ uint area_of(Rectangle rectangle) {
     return rectangle.size.x * rectangle.size.y;
 }
 
-// Three planes stand on a triangle's edges and meet in the eye. How high above them, towards the triangle, the direction through
-// a rectangle's pixel points: at its first one, and with each step. Not below 0 where a ray meets the triangle, whatever has been
-// rounded.
+// Heights of the directions through a rectangle's pixels above three planes, positive towards the triangle. Each
+// plane contains the eye and one edge of the triangle. Heights are linear in the pixel: at_first is that of the
+// rectangle's first pixel, step_x and step_y are the changes per pixel. The slack in at_first keeps a height from
+// being below 0 if the ray meets the triangle, whatever has been rounded.
 struct EdgeHeights {
     vec3 at_first;
     vec3 step_x;
     vec3 step_y;
 };
 
-// Longer than the direction through any pixel.
+// A bound of the length of the directions through pixels before they are normalized.
 float longest_in_image() {
     return length(abs(frame.forward) + abs(frame.right) + abs(frame.up));
 }
 
-// Where the triangle is seen edge-on, the planes say nothing.
+// The heights for a triangle a, b, c. If the triangle is seen edge-on, rounding may turn the planes around. Then all
+// heights are at the slack, and no pixel is excluded.
 EdgeHeights edge_heights(vec3 a, vec3 b, vec3 c, Rectangle rectangle) {
     vec3 across_a = cross(b, c), across_b = cross(c, a), across_c = cross(a, b);
     float volume = dot(a, across_a);
@@ -43,25 +46,27 @@ EdgeHeights edge_heights(vec3 a, vec3 b, vec3 c, Rectangle rectangle) {
     return EdgeHeights(at_first, pixel.x * frame.right * normals, -pixel.y * frame.up * normals);
 }
 
-// Whether no ray through the rectangle's pixels meets the triangle: all of them lie beyond one edge.
+// Whether certainly no ray through the rectangle's pixels meets the triangle: all of them pass outside one edge.
 bool misses(EdgeHeights heights, Rectangle rectangle) {
     vec2 last = vec2(rectangle.size) - 1.0;
     vec3 highest = heights.at_first + last.x * max(heights.step_x, vec3(0.0)) + last.y * max(heights.step_y, vec3(0.0));
     return any(lessThan(highest, vec3(0.0)));
 }
 
-// As `misses`, of one of its pixels.
+// Whether certainly the ray through one of the rectangle's pixels does not meet the triangle.
 bool misses_pixel(EdgeHeights heights, uvec2 offset) {
     vec3 height = heights.at_first + float(offset.x) * heights.step_x + float(offset.y) * heights.step_y;
     return any(lessThan(height, vec3(0.0)));
 }
 
-// Of the picture's longer side: what a projected corner is off at the most, if it is not steeper than STEEPEST.
+// The largest error of a projected corner that is not steeper than STEEPEST, as a fraction of the picture's longer
+// side.
 const float SLACK = exp2(-15.0);
-// How far to the side of the way ahead a point may be, in that way's lengths. Twice as steep ones lie outside every window.
+// The steepness of a point is its distance from the eye divided by its depth. Up to this steepness, SLACK bounds the
+// error of the projection. Points of twice this steepness are outside every window.
 const float STEEPEST = 20.0;
 
-// Where a point is projected to, pixels of the window, where 0 is the first pixel's sample. ahead: its way along `forward`.
+// Projects a point to pixels of the window; (0, 0) is the first pixel's sample. ahead: the point's depth.
 vec2 projected(vec3 point, float ahead) {
     mat4 m = frame.clip_from_world;
     vec2 clip = vec2(dot(point, vec3(m[0].x, m[1].x, m[2].x)), dot(point, vec3(m[0].y, m[1].y, m[2].y)));
@@ -69,22 +74,24 @@ vec2 projected(vec3 point, float ahead) {
     return at - vec2(frame.window_x, frame.window_y);
 }
 
+// Whether a corner is steeper than STEEPEST, or not in front of the eye. ahead: its depth.
 bool is_steep(vec3 corner, float ahead) {
     return !(ahead > 0.0) || ahead * ahead * STEEPEST * STEEPEST < dot(corner, corner);
 }
 
-// A box in the picture, and how far beyond it what is in it may lie.
+// A box of projected points, pixels of the window. slack: how far outside it they may be because of rounding.
 struct Bounds {
     vec2 low;
     vec2 high;
     float slack;
 };
 
+// The slack of points that are not steep, pixels.
 float least_slack() {
     return SLACK * float(max(frame.picture_width, frame.picture_height));
 }
 
-// The window's pixels whose samples lie within; none where the bounds fall between samples.
+// The window's pixels whose samples are within the bounds. It is empty if the bounds fall between samples.
 Rectangle rectangle_of(Bounds bounds) {
     vec2 window = vec2(frame.width, frame.height);
     vec2 first = clamp(ceil(bounds.low - bounds.slack), vec2(0.0), window);
@@ -92,7 +99,8 @@ Rectangle rectangle_of(Bounds bounds) {
     return Rectangle(uvec2(first), uvec2(end - first));
 }
 
-// reach: the largest length that the point was reckoned from.
+// Extends the bounds by a point of depth `ahead`. reach: the largest distance from the eye of the points that it was
+// computed from.
 void include(inout Bounds bounds, vec3 point, float ahead, float reach) {
     vec2 at = projected(point, ahead);
     bounds.low = min(bounds.low, at);
@@ -100,7 +108,8 @@ void include(inout Bounds bounds, vec3 point, float ahead, float reach) {
     bounds.slack = max(bounds.slack, least_slack() / STEEPEST * reach / ahead);
 }
 
-// What of the edge lies as far ahead as `nearest`, but for its end q.
+// Extends the bounds by the part of an edge whose depth is at least `nearest`, except its end q, which the next edge
+// adds. ahead: the depths of p and q.
 void include_edge(inout Bounds bounds, vec3 p, vec3 q, vec2 ahead, float nearest) {
     if (ahead.x >= nearest) include(bounds, p, ahead.x, length(p));
     if (ahead.x >= nearest == ahead.y >= nearest) return;
@@ -108,8 +117,9 @@ void include_edge(inout Bounds bounds, vec3 p, vec3 q, vec2 ahead, float nearest
     include(bounds, between, nearest, max(length(p), length(q)));
 }
 
-// Of a triangle that lies beside the eye in part: cut off there, where it is too steep for the window. It keeps a distance from
-// the eye, so what is less far ahead than a fraction of that is steep.
+// The rectangle of a triangle that is partly beside or behind the eye. The triangle is cut off where it is too steep
+// for any window: none of its points is nearer to the eye than its plane is, so points whose depth is less than a
+// fraction of the plane's distance are steep. ahead: the depths of a, b and c.
 Rectangle rectangle_beside_eye(vec3 a, vec3 b, vec3 c, vec3 ahead) {
     Rectangle window = Rectangle(uvec2(0u), uvec2(frame.width, frame.height));
     vec3 normal = cross(b - a, c - a);

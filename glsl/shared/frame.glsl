@@ -1,4 +1,4 @@
-// The frame's constants.
+// Provides the frame's constants, the uniform buffer `frame`.
 #ifndef KDRAY_FRAME
 #define KDRAY_FRAME
 

@@ -1,31 +1,37 @@
-// The search through a grid, from cell to cell along the ray: a 3D digital differential analyzer (Amanatides and Woo, "A fast voxel
-// traversal algorithm for ray tracing", 1987; on GPUs first Purcell, Buck, Mark and Hanrahan, "Ray tracing on programmable
-// graphics hardware", SIGGRAPH 2002). In a grid of two levels the ray goes through a block of smaller cells wherever a cell of
-// the upper level has triangles. A part of accel.glsl, which calls `search_grid`.
+// The search through a grid, from cell to cell along the ray: a 3D digital differential analyzer (Amanatides and Woo,
+// "A fast voxel traversal algorithm for ray tracing", 1987; on GPUs first Purcell, Buck, Mark and Hanrahan, "Ray
+// tracing on programmable graphics hardware", SIGGRAPH 2002). In a grid of two levels, each cell of the upper level
+// that has triangles is cut into a block of lower cells, which the ray traverses. A part of accel.glsl, which calls
+// `search_grid`.
 //
-// Where the ray meets a plane between cells is computed from the plane itself and never summed up from cell to cell. So the kd-tree's
-// proof holds: rounding puts the ray no farther from its place than the margin, and a cell has all triangles so near to it
-// (src/accel/bounds.rs).
+// A cube is a cell by its indices in a lattice (lattice.glsl). All t are half of the ray's own (traversal_ray.glsl).
+//
+// The t at which the ray meets a plane between cells is computed from the plane itself, not summed up from cell to
+// cell. So the kd-tree's proof holds: rounding moves the ray by no more than the margin, and a cell has all triangles
+// that come within the margin (src/accel/bounds.rs).
 
 #include "lattice.glsl"
 
-// How many levels of cells the scene's grid has; 0: the scene has a kd-tree.
+// The number of levels of cells in the scene's grid, 1 or 2. It is 0 if the scene has a kd-tree.
 layout(constant_id = CONSTANT_GRID_LEVELS) const uint GRID_LEVELS = 0u;
 
-// In place of a packed cube of the upper level: the ray is in that level itself.
+// The value of GridWalk.upper_cube, in place of a packed cube, if the ray is in the upper level itself.
 const uint IN_UPPER_LEVEL = 0xffffffffu;
-// What finite times stay below.
+// The largest finite number. t_exit is at most this, so that exits at borders, which may be infinite, come later.
 const float LARGEST_T = 3.4028235e38;
 
-// Lanes of a subgroup that look for cells wait for those that look for triangles, and these for those. So either search ends its turn
-// after a few looks. On an H200, 4 cells give rays of a dragon in a room 1.2 to 2 times the speed of any number; 4 triangles
-// give 1.1 to 1.6 times the speed in uniform grids, whose cells hold many, and cost 5 % in grids of two levels.
+// How many cells, or triangles' planes, an invocation tests in one turn of the search. Lanes that search for cells
+// wait for lanes of their subgroup that search for triangles, and the reverse, so each search is limited. Measured on
+// an H200 with rays of a dragon in a room: the limit of 4 cells makes the search 1.2 to 2 times as fast as no limit.
+// The limit of 4 triangles makes it 1.1 to 1.6 times as fast in uniform grids, whose cells have many triangles. In
+// grids of two levels it would cost 5 %, so there it does not apply.
 const uint CELLS_A_TURN = 4u;
 const uint TRIANGLES_A_TURN = 4u;
 
-// A ray's way through the cells of one lattice. first_cell: the index of the lattice's first cell in grid_cells. upper_cube: the
-// cell of the upper level that is this lattice, packed. t_next: where the ray leaves its cube by each axis. t_enter: where it has come
-// into its cube; t_exit: where it leaves the lattice.
+// A ray's position on its way through the cells of one lattice. first_cell: the index of the lattice's first cell in
+// grid_cells. upper_cube: the packed cube of the upper level that this lattice is the block of, or IN_UPPER_LEVEL.
+// cube: the cube that the ray is in. t_next: the t at which the ray leaves this cube on each axis. t_enter: the t at
+// which it enters the cube. t_exit: the t at which it leaves the lattice.
 struct GridWalk {
     Lattice lattice;
     uint first_cell;
@@ -36,12 +42,13 @@ struct GridWalk {
     float t_exit;
 };
 
+// The lattice of the uniform grid, or of the upper level.
 Lattice upper_lattice() {
     uvec3 n_cells = uvec3(accel.n_cells_x, accel.n_cells_y, accel.n_cells_z);
     return Lattice(accel.cell_min, accel.cell_size, accel.cell_max, n_cells);
 }
 
-// Indices below GRID_MAX_RESOLUTION take 10 bits each.
+// Packs a cube's indices, which are below GRID_MAX_RESOLUTION, into 10 bits each.
 uint pack_cube(uvec3 cube) {
     return cube.x | (cube.y << 10) | (cube.z << 20);
 }
@@ -50,9 +57,10 @@ uvec3 unpack_cube(uint packed) {
     return uvec3(packed, packed >> 10, packed >> 20) & (GRID_MAX_RESOLUTION - 1u);
 }
 
-// Where the ray leaves cubes of these indices by each axis. The planes are those of the lattice (lattice.glsl), but for the
-// border's: the upper level's border is not where the box ends but where its last cubes do, so the ray leaves the box first.
-// A block's border may be off by rounding, so the ray never leaves a block by it.
+// The t at which the ray leaves cubes of these indices on each axis. The planes are those of `planes_of`, except at
+// the border. In a uniform grid, the border is where the last cubes end, not where the box does, so the ray leaves
+// the box first. In a grid of two levels, the ray never leaves a lattice by its border, whose t is infinity: a
+// block's border may be off by rounding. There t_exit ends the way.
 vec3 exits_of(Lattice lattice, TraversalRay ray, uvec3 cube) {
     uvec3 faces = cube + uvec3(greaterThanEqual(ray.inv_direction, vec3(0.0)));
     precise vec3 offsets = vec3(faces) * lattice.cell_size;
@@ -63,13 +71,13 @@ vec3 exits_of(Lattice lattice, TraversalRay ray, uvec3 cube) {
     return mix(vec3(uintBitsToFloat(0x7f800000u)), t, are_inner);
 }
 
-// The ray goes up where its direction's component is positive: +1, else -1.
+// The ray's step on each axis: +1 if the direction's component is positive or almost 0, else -1.
 ivec3 steps_of(TraversalRay ray) {
     return 2 * ivec3(greaterThanEqual(ray.inv_direction, vec3(0.0))) - 1;
 }
 
-// Enters the lattice at t_enter: in the first cube on the ray's way that it leaves at t_enter or later. What is reckoned from the
-// point at t_enter is off by 1 or so.
+// Enters the lattice at t_enter: finds the first cube on the ray's way that the ray leaves at t_enter or later. The
+// loop corrects the cube that is computed from the point at t_enter, whose indices are off by about 1.
 void enter_lattice(TraversalRay ray, inout GridWalk walk) {
     ivec3 steps = steps_of(ray);
     ivec3 cube = ivec3(cube_near(walk.lattice, ray.shear.origin + 2.0 * walk.t_enter * ray.direction));
@@ -89,7 +97,7 @@ void enter_lattice(TraversalRay ray, inout GridWalk walk) {
     walk.t_next = exits_of(walk.lattice, ray, walk.cube);
 }
 
-// Where the ray comes into the box that holds all triangles.
+// Enters the upper level where the ray enters the box that holds all triangles.
 GridWalk enter_grid(TraversalRay ray) {
     GridWalk walk;
     walk.lattice = upper_lattice();
@@ -101,16 +109,17 @@ GridWalk enter_grid(TraversalRay ray) {
     return walk;
 }
 
+// The least component.
 float least_of(vec3 v) {
     return min(v.x, min(v.y, v.z));
 }
 
-// Where the ray leaves its cube, or the lattice before that.
+// The t at which the ray leaves its cube, or the lattice if that is earlier.
 float t_leave_of(GridWalk walk) {
     return min(least_of(walk.t_next), walk.t_exit);
 }
 
-// From a cube of the upper level into the block of cells that it is cut into.
+// Goes from a cube of the upper level into the block of cells that it is cut into.
 void enter_block(TraversalRay ray, GridCell block, inout GridWalk walk) {
     walk.t_exit = t_leave_of(walk);
     walk.upper_cube = pack_cube(walk.cube);
@@ -119,7 +128,7 @@ void enter_block(TraversalRay ray, GridCell block, inout GridWalk walk) {
     enter_lattice(ray, walk);
 }
 
-// Back to the cube of the upper level that the ray's block is.
+// Goes back to the cube of the upper level whose block the ray is in.
 void leave_block(TraversalRay ray, inout GridWalk walk) {
     walk.lattice = upper_lattice();
     walk.first_cell = 0u;
@@ -129,13 +138,14 @@ void leave_block(TraversalRay ray, inout GridWalk walk) {
     walk.t_exit = min(ray.t_exit, LARGEST_T);
 }
 
+// Loads the cell that the ray is in.
 GridCell cell_of(GridWalk walk) {
     count_steps(1u);
     uvec2 words = load_grid_cells(walk.first_cell + place_of(walk.lattice, walk.cube));
     return GridCell(words.x, words.y);
 }
 
-// The triangles of the cell that the ray is in, after it has entered that cell's block.
+// The triangles of the lowest cell that the ray is in. Enters the block of an upper cell that has one.
 Visit visit_cell(TraversalRay ray, float t_best, inout GridWalk walk) {
     GridCell cell = cell_of(walk);
     if (GRID_LEVELS == 2u && walk.upper_cube == IN_UPPER_LEVEL && cell.count > 0u) {
@@ -146,7 +156,7 @@ Visit visit_cell(TraversalRay ray, float t_best, inout GridWalk walk) {
     return Visit(cell.first, cell.first + cell.count, segment_of(walk.t_enter, min(t_leave_of(walk), t_best)));
 }
 
-// On to the ray's next cube, in the block or behind it. False where nothing nearer than t_best can follow.
+// Goes to the ray's next cube, in the block or after it. Returns false if nothing nearer than t_best can follow.
 bool step_on(TraversalRay ray, float t_best, inout GridWalk walk) {
     float t = least_of(walk.t_next);
     if (GRID_LEVELS == 2u && walk.upper_cube != IN_UPPER_LEVEL && !(t < walk.t_exit)) {
@@ -163,7 +173,8 @@ bool step_on(TraversalRay ray, float t_best, inout GridWalk walk) {
     return true;
 }
 
-// On to the next cell that has triangles, but no farther than CELLS_A_TURN cells. False where nothing nearer than t_best can follow.
+// Goes to the next cell that has triangles, but no farther than CELLS_A_TURN cells. Returns false if nothing nearer
+// than t_best can follow.
 bool find_cell(TraversalRay ray, float t_best, inout GridWalk walk, inout Visit visit) {
     bool goes_on = true;
     bool seeks = true;
@@ -179,7 +190,8 @@ bool find_cell(TraversalRay ray, float t_best, inout GridWalk walk, inout Visit 
     return goes_on;
 }
 
-// On to the cell's next triangle whose plane the ray meets on its way, but in uniform grids no farther than TRIANGLES_A_TURN.
+// Finds the cell's next triangle whose plane the ray meets within the cell. In uniform grids it tests at most
+// TRIANGLES_A_TURN planes.
 bool find_candidate_soon(TraversalRay ray, inout Visit visit, out uint entry_ix) {
     if (GRID_LEVELS == 2u) return find_candidate(ray, visit, entry_ix);
     uint end_ix = visit.end_ix;
@@ -189,7 +201,7 @@ bool find_candidate_soon(TraversalRay ray, inout Visit visit, out uint entry_ix)
     return found;
 }
 
-// Stores where the ray is, and returns the mark for its result.
+// Stores the ray's state, and returns the mark that takes the place of its result (stalls.glsl).
 uint stall_in_grid(GridWalk walk, Visit visit, Nearest best) {
     vec2 weights = spilled_pair(WEIGHTS_SLOT);
     return stall(StalledRay(
@@ -198,7 +210,8 @@ uint stall_in_grid(GridWalk walk, Visit visit, Nearest best) {
     ));
 }
 
-// Takes up the ray's stored state. All times are computed by the same operations as before, so they have the same bits.
+// Loads the ray's stored state. All t are computed by the same operations as in the first search, so they have the
+// same bits.
 void resume_in_grid(TraversalRay ray, out GridWalk walk, out Visit visit, out Nearest best) {
     StalledRay state = stalled_rays[resumed_slot];
     walk.lattice = upper_lattice();
@@ -222,8 +235,8 @@ void resume_in_grid(TraversalRay ray, out GridWalk walk, out Visit visit, out Ne
     count_steps(state.n_steps);
 }
 
-// Goes through all cells that the ray meets in [t_enter, t_exit], until nothing nearer can follow. Each turn tests one triangle or
-// goes on to the next cell that has some. Returns 0, or the mark of a ray that has stalled.
+// Searches all cells that the ray meets in [t_enter, t_exit], until nothing nearer can follow. Each turn of the loop
+// tests one triangle or goes to the next cell that has triangles. Returns 0, or the mark of a stalled ray.
 uint search_grid(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (!is_in(ray)) return 0u;
     GridWalk walk;

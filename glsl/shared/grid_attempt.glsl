@@ -1,19 +1,19 @@
-// A level is built in attempts. Each one counts the columns of its triangles and then the pairs of a cell and a
-// triangle; at the lower level it counts the cells first. If a count is above the limit of references, the next attempt
-// has larger cells. The kernels of further attempts have no workgroups once all is counted. Twin of
-// src/accel/grid/build.rs.
+// Attempts to build a level. Each one counts the columns of its triangles and then the pairs of a cell and a
+// triangle; at the lower level it counts the cells first. If a count is above its limit, the next attempt has larger
+// cells. Once everything is counted, the kernels of further attempts get no workgroups. Twin of
+// src/accel/grid/build.rs. Needs nothing before it; includes grid_build.glsl and grid_size.glsl.
 #ifndef KDRAY_GRID_ATTEMPT
 #define KDRAY_GRID_ATTEMPT
 
 #include "grid_build.glsl"
 #include "grid_size.glsl"
 
-// So many workgroups side by side and, where these are too many, in several rows.
+// The size of a dispatch of n_groups workgroups, in rows of at most GRID_GROUPS_X.
 uvec2 groups_for(uint n_groups) {
     return uvec2(min(n_groups, GRID_GROUPS_X), (n_groups + GRID_GROUPS_X - 1u) / GRID_GROUPS_X);
 }
 
-// Sizes the dispatches that follow. Those for which something else has to be counted first get no workgroups.
+// Sizes the dispatches that follow. Those that need something that is not counted yet get no workgroups.
 void size_dispatches() {
     uvec2 cells = groups_for(build.counts == GRID_COUNTS_CELLS ? blocks_of(build.n_upper) : 0u);
     uvec2 items = groups_for(build.counts == GRID_COUNTS_COLUMNS ? blocks_of(build.n_items) : 0u);
@@ -40,9 +40,9 @@ void size_dispatches() {
     build.sort_groups_y = 1u;
 }
 
-// How many times the cells' edges are doubled after an attempt with this count, which is above its limit. At each
-// doubling, the number of cells that a surface meets falls to about a quarter. The more attempts have failed, the
-// farther the next one goes, and the last one has cells that are as large as can be.
+// How many times the cells' edges are doubled after an attempt whose count is above its limit. At each doubling, the
+// number of cells that a surface meets falls to about a quarter. Each further failed attempt adds one more doubling,
+// and the last attempt has the largest cells possible.
 uint n_steps(uint count, uint limit) {
     if (build.n_attempts + 1u >= GRID_MAX_ATTEMPTS) return 32u;
     uint expected = 1u;
@@ -50,7 +50,7 @@ uint n_steps(uint count, uint limit) {
     return expected + build.n_attempts - 1u;
 }
 
-// Ends an attempt with this count, which is above its limit, and makes the cells of the next one larger.
+// Ends an attempt whose count is above its limit, and makes the cells of the next one larger.
 void coarsen(uint count, uint limit) {
     build.n_attempts += 1u;
     uint steps = n_steps(count, limit);

@@ -1,6 +1,14 @@
-// The state of a grid's build, which its kernels hand to one another (src/passes/grid). Kernels that go through entries
-// have workgroups of SCAN_GROUP_SIZE invocations, each of which takes a block of GRID_BLOCK_SIZE entries in GRID_ROWS
-// rows.
+// The state of a grid's build, `build`, which its kernels hand to one another (src/passes/grid). The terms of the
+// build:
+//
+//   pair     the index of a cell, and the index of a triangle that comes near to it
+//   item     a triangle, and the lattice into whose cells it is sorted (grid_items.glsl)
+//   column   the cells of an item's box that are in line along one axis (grid_overlap.glsl)
+//   block    GRID_BLOCK_SIZE consecutive items, columns, pairs or upper cells, whose sum is one of scan_blocks. A block
+//            of lower cells (`blocks`) is something else: the cells that an upper cell is cut into.
+//
+// Kernels over blocks have workgroups of SCAN_GROUP_SIZE invocations. A workgroup takes one block, in GRID_ROWS rows
+// of one entry per invocation.
 #ifndef KDRAY_GRID_BUILD
 #define KDRAY_GRID_BUILD
 
@@ -18,20 +26,22 @@ Lattice upper_lattice() {
     return Lattice(build.cell_min, build.cell_size, build.cell_max, n_cells);
 }
 
+// The number of blocks of n_entries entries.
 uint blocks_of(uint n_entries) {
     return (n_entries + GRID_BLOCK_SIZE - 1u) / GRID_BLOCK_SIZE;
 }
 
-// The number of the workgroup's block. The last row of workgroups may go beyond the last block.
+// The index of the workgroup's block. In the last row of workgroups, it may be beyond the last block.
 uint block_of_group() {
     return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
 }
 
+// Whether all components are finite. Tests the bits, since a compiler may assume that no number is NaN.
 bool is_finite(vec3 v) {
     return all(notEqual(floatBitsToUint(v) & 0x7f800000u, uvec3(0x7f800000u)));
 }
 
-// Of bits: a compiler may take it that no number is NaN.
+// Whether all corners are finite.
 bool is_finite(Triangle triangle) {
     return is_finite(triangle.v0) && is_finite(triangle.v1) && is_finite(triangle.v2);
 }

@@ -1,4 +1,5 @@
-// Digits of the cells' indices, by which pairs are sorted: GRID_DIGIT_BITS bits from sort.first_bit on.
+// Digits of the cells' indices, by which pairs are sorted: GRID_DIGIT_BITS bits from sort.first_bit on. Needs
+// GL_KHR_shader_subgroup_ballot; provides the push constants `sort`.
 #ifndef KDRAY_GRID_DIGITS
 #define KDRAY_GRID_DIGITS
 
@@ -10,7 +11,7 @@ uint digit_of(uint cell_ix) {
     return cell_ix >> sort.first_bit & GRID_DIGITS - 1u;
 }
 
-// The invocations of the subgroup that have a pair whose digit is the same as this invocation's.
+// The peers of an invocation: a ballot of the invocations of the subgroup that have a pair with the same digit.
 uvec4 peers_of(uint digit, bool has_pair) {
     uvec4 peers = subgroupBallot(has_pair);
     for (uint bit = 0u; bit < GRID_DIGIT_BITS; ++bit) {

@@ -1,6 +1,7 @@
-// The items of a level, each a triangle and the lattice whose cells get it: all triangles at the upper level, and the
-// pairs of the upper level at the lower one. The box of an item is cut into columns of cells, which are numbered over
-// all items.
+// The items of a level, each a triangle and the lattice into whose cells it is sorted. At the upper level, each
+// triangle is an item; at the lower level, each pair of the upper level is. The box of an item is cut into columns of
+// cells, whose indices are consecutive over all items. Needs nothing before it; includes grid_build.glsl and
+// grid_overlap.glsl.
 #ifndef KDRAY_GRID_ITEMS
 #define KDRAY_GRID_ITEMS
 
@@ -8,14 +9,14 @@
 #include "grid_overlap.glsl"
 
 layout(std430, set = 0, binding = BIND_GRID_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
-// Of the upper level: a cell's index and a triangle's.
+// The pairs of the upper level: a cell's index and a triangle's.
 layout(std430, set = 0, binding = BIND_GRID_UPPER_PAIRS) readonly buffer UpperPairsBlock { uvec2 upper_pairs[]; };
-// Of each upper cell: the place of its first lower cell among those of its block of GRID_BLOCK_SIZE upper cells; the
-// number of lower cells along each axis.
+// For each upper cell: the index of its first lower cell among those of its block of GRID_BLOCK_SIZE upper cells; the
+// number of its lower cells along each axis.
 layout(std430, set = 0, binding = BIND_GRID_BLOCKS) readonly buffer BlocksBlock { uvec2 blocks[]; };
-// Of each item: the place of its first column among those of its block of GRID_BLOCK_SIZE items.
+// For each item: the index of its first column among those of its block of GRID_BLOCK_SIZE items.
 layout(std430, set = 0, binding = BIND_GRID_FIRST_COLUMNS) buffer FirstColumnsBlock { uint first_columns[]; };
-// Sums of blocks, after the scan the sums of all blocks before.
+// The sums of blocks; after the scan, for each block the sum of all blocks before it.
 layout(std430, set = 0, binding = BIND_GRID_SCAN_BLOCKS) buffer ScanBlocksBlock { uint scan_blocks[]; };
 
 // first_cell: the index of the lattice's first cell at its level.
@@ -25,6 +26,7 @@ struct Item {
     Lattice lattice;
 };
 
+// The indices of the cube at a place (`place_of`).
 uvec3 cube_at(Lattice lattice, uint place) {
     uvec2 n = lattice.n_cells.xy;
     return uvec3(place % n.x, place / n.x % n.y, place / n.x / n.y);
@@ -50,13 +52,13 @@ Columns columns_of(Item item) {
     return columns_of(item.lattice, triangles[item.triangle_ix], build.margin);
 }
 
-// The number of an item's first column.
+// The index of an item's first column among all columns.
 uint first_column_of(uint item_ix) {
     return scan_blocks[build.columns_begin + item_ix / GRID_BLOCK_SIZE] + first_columns[item_ix];
 }
 
-// The item of a column, which is one of [low, high): the last one that begins at the column or before. Items without
-// columns begin where the next one does.
+// The item of a column, searched in [low, high): the last item whose first column is this one or an earlier one.
+// Items without columns begin where the next item does.
 uint item_of_column(uint column_ix, uint low, uint high) {
     while (high - low > 1u) {
         uint middle = (low + high) / 2u;

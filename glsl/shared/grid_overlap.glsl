@@ -1,9 +1,10 @@
-// Which cubes of a lattice a triangle comes near to. Twin of src/accel/grid/overlap.rs, which has the reasons and the
-// bounds of the errors. Everything is `precise`, so that all bits are the same; what a division rounds in another way
-// makes no difference.
+// Tests which cubes of a lattice a triangle comes near to. Twin of src/accel/grid/overlap.rs, which explains the
+// method and derives the bounds of the errors. All arithmetic is `precise`, so that it gives the same bits as the
+// twin; divisions may round differently, which does not change the result.
 //
 // No intermediate result is denormal in scenes whose largest coordinate is 2^-20 or more and whose edges are 0 or at
-// least 2^-20 times that. In smaller scenes, a device that flushes denormals may build a grid with a few other entries.
+// least 2^-20 times that. In smaller scenes, a device that flushes denormals may build a grid with a few
+// different entries.
 #ifndef KDRAY_GRID_OVERLAP
 #define KDRAY_GRID_OVERLAP
 
@@ -12,8 +13,10 @@
 const float MARGIN_FACTOR = 1.0625;
 const float PRODUCT_ERROR = 1.0 / 1048576.0;
 
-// A triangle and the columns of its box. The axes are turned so that columns extend along z. first, last: the box's
-// cubes on each axis. half_size: half of a cube's edge, and the margin. axis: the lattice's own axis that is z here.
+// A triangle and the columns of its box. The axes are permuted so that columns extend along z, which is the axis of
+// the normal's longest component. normal: not of unit length. normal_error: a bound of its components' error.
+// half_size: half of a cube's edge plus the margin. first, last: the first and the last index of the box's cubes on
+// each axis, inclusive. axis: the lattice's own axis that is z here.
 struct Columns {
     Lattice lattice;
     vec3 v0;
@@ -27,7 +30,7 @@ struct Columns {
     uint axis;
 };
 
-// v with component `axis` last; cyclic.
+// v rotated cyclically so that component `axis` is last.
 vec3 axis_last(vec3 v, uint axis) {
     return axis == 2u ? v : (axis == 0u ? v.yzx : v.zxy);
 }
@@ -41,12 +44,13 @@ uvec3 axis_back(uvec3 v, uint axis) {
     return axis == 2u ? v : (axis == 0u ? v.zxy : v.yzx);
 }
 
+// The sum of the components' magnitudes, which is no less than the length.
 float magnitude(vec3 v) {
     precise float sum = abs(v.x) + abs(v.y) + abs(v.z);
     return sum;
 }
 
-// The first of the closed cubes that meet an interval from `least` on, on each axis.
+// The first index, on each axis, of the closed cubes that meet an interval from `least` on.
 uvec3 first_cubes(Lattice lattice, vec3 least) {
     uvec3 first = cube_near(lattice, least);
     bool moves = true;
@@ -62,7 +66,7 @@ uvec3 first_cubes(Lattice lattice, vec3 least) {
     return first;
 }
 
-// The last of the closed cubes that meet an interval up to `greatest`, on each axis.
+// The last index, on each axis, of the closed cubes that meet an interval up to `greatest`.
 uvec3 last_cubes(Lattice lattice, vec3 greatest) {
     uvec3 last = cube_near(lattice, greatest);
     bool moves = true;
@@ -78,7 +82,7 @@ uvec3 last_cubes(Lattice lattice, vec3 greatest) {
     return last;
 }
 
-// `margin`: of the box of all triangles.
+// The columns of a triangle. margin: that of the box of all triangles.
 Columns columns_of(Lattice lattice, Triangle triangle, float margin) {
     precise float grown = MARGIN_FACTOR * margin;
     precise vec3 a = triangle.v1 - triangle.v0;
@@ -112,7 +116,8 @@ uint n_columns_of(Columns columns) {
     return n.x * n.y;
 }
 
-// Whether an edge certainly has a square of this middle on its right and on its left.
+// Whether a square is certainly on the right of an edge, and whether it is certainly on its left. middle:
+// that of the square.
 bvec2 sides_of(vec2 from, vec2 to, vec2 middle, float half_size) {
     precise vec2 along = to - from;
     precise vec2 way = middle - from;
@@ -122,8 +127,8 @@ bvec2 sides_of(vec2 from, vec2 to, vec2 middle, float half_size) {
     return bvec2(height < -reach, height > reach);
 }
 
-// Whether a triangle of these corners is certainly beside a square. A point of the triangle is on the left of all edges
-// or on the right of all.
+// Whether a square is certainly outside a triangle. A point of the triangle is on the left of all edges or on the
+// right of all, so the square is outside if it is on the right of one edge and on the left of another.
 bool is_beside(vec2 a, vec2 b, vec2 c, vec2 middle, float half_size) {
     bvec2 ab = sides_of(a, b, middle, half_size);
     bvec2 bc = sides_of(b, c, middle, half_size);
@@ -131,6 +136,7 @@ bool is_beside(vec2 a, vec2 b, vec2 c, vec2 middle, float half_size) {
     return (ab.x || bc.x || ca.x) && (ab.y || bc.y || ca.y);
 }
 
+// Whether the triangle's plane may come near to the cube of this middle.
 bool meets_plane(Columns columns, vec3 middle) {
     precise vec3 way = middle - columns.v0;
     vec3 n = columns.normal;
@@ -140,7 +146,7 @@ bool meets_plane(Columns columns, vec3 middle) {
     return !(abs(height) > reach);
 }
 
-// About the cube of a column that has a coordinate.
+// About the index of the cube of a column that contains a coordinate; the cube at the border if none does.
 uint index_near(Lattice lattice, float at) {
     precise float index = (at - lattice.least.z) / lattice.cell_size;
     return uint(clamp(index, 0.0, float(lattice.n_cells.z - 1u)));
@@ -168,24 +174,26 @@ uvec2 near_plane(Columns columns, uvec2 column) {
     return uvec2(max(first, index_near(lattice, low_end)), min(last, index_near(lattice, high_end)));
 }
 
+// The middle of a cube.
 vec3 middle_of(Lattice lattice, uvec3 cube) {
     precise vec3 middle = 0.5 * planes_of(lattice, cube) + 0.5 * planes_of(lattice, cube + 1u);
     return middle;
 }
 
+// The indices of a column's cubes on the first two axes. Columns are numbered along x, then y.
 uvec2 column_at(Columns columns, uint column_ix) {
     uint n_in_row = columns.last.x - columns.first.x + 1u;
     return columns.first.xy + uvec2(column_ix % n_in_row, column_ix / n_in_row);
 }
 
-// The first cube of a column that the triangle may come near to, and one beyond the last.
+// The first index along z of a column's cubes that the triangle may come near to, and one beyond the last.
 uvec2 cubes_of(Columns columns, uvec2 column) {
     vec2 middle = middle_of(columns.lattice, uvec3(column, columns.first.z)).xy;
     if (is_beside(columns.v0.xy, columns.v1.xy, columns.v2.xy, middle, columns.half_size)) return uvec2(0u);
     return near_plane(columns, column) + uvec2(0u, 1u);
 }
 
-// Whether the triangle comes near to a cube of such a column.
+// Whether the triangle comes near to a cube that is in the range of `cubes_of`.
 bool is_near(Columns columns, uvec3 cube) {
     vec3 middle = middle_of(columns.lattice, cube);
     float half_size = columns.half_size;

@@ -1,4 +1,5 @@
-// How large the cells of a uniform grid or of the upper level are. Twin of src/accel/grid/lattice.rs.
+// The size of the cells of a uniform grid or of the upper level. Twin of src/accel/grid/lattice.rs. Needs nothing
+// before it; includes grid_build.glsl.
 #ifndef KDRAY_GRID_SIZE
 #define KDRAY_GRID_SIZE
 
@@ -7,12 +8,13 @@
 // The largest finite number.
 const float LARGEST = 3.4028235e38;
 
+// The number of all cubes.
 uint n_cubes(Lattice lattice) {
     return lattice.n_cells.x * lattice.n_cells.y * lattice.n_cells.z;
 }
 
-// The least number of cubes of a size that reach from one side of a box to the other, on each axis; more than
-// GRID_MAX_RESOLUTION for any such number.
+// The least number of cubes of a size that reach from one side of a box to the other, on each axis. If it is above
+// GRID_MAX_RESOLUTION, any number above that is returned.
 uvec3 n_cubes_along(vec3 least, vec3 greatest, float cell_size) {
     uvec3 n_too_few = uvec3(0u);
     for (uint step = GRID_MAX_RESOLUTION; step > 0u; step >>= 1u) {
@@ -23,12 +25,13 @@ uvec3 n_cubes_along(vec3 least, vec3 greatest, float cell_size) {
     return n_too_few + 1u;
 }
 
-// Cubes of the largest size are taken to reach from one side of any box to the other.
+// The lattice of cubes of a size that fill a box. One cube of the largest size is assumed to fill any box.
 Lattice lattice_of_size(vec3 least, vec3 greatest, float cell_size) {
     uvec3 n_cells = cell_size < LARGEST ? n_cubes_along(least, greatest, cell_size) : uvec3(1u);
     return Lattice(least, cell_size, greatest, n_cells);
 }
 
+// The lattice of cubes that are twice as long and fill the same box.
 Lattice with_doubled_edges(Lattice lattice) {
     precise float cell_size = 2.0 * lattice.cell_size;
     return lattice_of_size(lattice.least, lattice.greatest, min(cell_size, LARGEST));
@@ -37,8 +40,8 @@ Lattice with_doubled_edges(Lattice lattice) {
 // The lattice of the smallest cubes of which no more than max_cells fill a box, and which are not smaller than the
 // margin.
 Lattice lattice_of_density(vec3 least, vec3 greatest, float margin, uint max_cells) {
-    // The bits of positive numbers have the same order as the numbers. The search finds the highest bits first: cubes
-    // of the size that `bits` stand for are always too small.
+    // The bits of positive numbers have the same order as the numbers. The search finds the highest bits first, and
+    // cubes of the size that `bits` encode are always too small.
     uint bits = 0u;
     for (uint bit = 1u << 30; bit > 0u; bit >>= 1u) {
         float next = uintBitsToFloat(bits | bit);
@@ -51,6 +54,7 @@ Lattice lattice_of_density(vec3 least, vec3 greatest, float margin, uint max_cel
     return lattice_of_size(least, greatest, min(uintBitsToFloat(bits + 1u), LARGEST));
 }
 
+// Stores the lattice of the uniform grid or of the upper level in build.
 void set_upper_lattice(Lattice lattice) {
     build.cell_min = lattice.least;
     build.cell_size = lattice.cell_size;

@@ -1,6 +1,9 @@
-// The cells of nodes as boxes, one a node, for traversals that ask for them.
+// The cells of nodes as boxes, one for each node, for traversals that use them. A part of pending.glsl.
+//
+// Needs scene.glsl and traversal_ray.glsl. Provides `interval_in`.
 
-// Where the ray meets the planes of a node's cell on each axis: those it comes to first, and the far ones.
+// The t at which the ray meets the planes of a node's cell on each axis: the near plane, which it meets first, and
+// the far plane.
 struct BoxPlanes {
     vec3 near;
     vec3 far;
@@ -13,7 +16,8 @@ BoxPlanes box_planes_of(TraversalRay ray, uint node_ix) {
     return BoxPlanes(min(t0, t1), max(t0, t1));
 }
 
-// The ray's interval in a node's cell: the planes that `descend` meets on the way there.
+// The ray's interval in a node's cell, as (t_enter, t_exit). The planes of the box are the split planes that
+// `descend` crosses on the way to the node.
 vec2 interval_in(TraversalRay ray, uint node_ix) {
     BoxPlanes slabs = box_planes_of(ray, node_ix);
     return vec2(max(max(slabs.near.x, slabs.near.y), max(slabs.near.z, ray.t_enter)),

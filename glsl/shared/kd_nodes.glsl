@@ -1,13 +1,18 @@
 // Nodes of the kd-tree and the cells that a ray goes through. A part of kdtree.glsl.
+//
+// Needs scene.glsl, stalls.glsl, steps.glsl, traversal_ray.glsl and PREDICATES_BRANCHES. Provides `Cell`, `kd_node`,
+// the offsets of children, siblings and indices, and `crossing`.
+
+// A node and the interval that the ray spends in it, in the traversal's t.
 
 struct Cell {
-    // The node's place in kd_nodes, in bytes: what a split names its children by.
+    // Offset of the node in kd_nodes, in bytes. A split stores the same kind of offset for its children.
     uint node_offset;
     float t_enter;
     float t_exit;
 };
 
-// The root.
+// The root, and the ray's whole interval.
 Cell whole(TraversalRay ray) {
     return Cell(0u, ray.t_enter, ray.t_exit);
 }
@@ -24,6 +29,7 @@ uint sibling_of(uint node_offset) {
     return node_offset ^ KD_NODE_BYTES;
 }
 
+// Reads a node. Counts the read and a loop turn.
 KdNode kd_node(uint node_offset) {
     count_steps(1u);
     count_turn();
@@ -38,14 +44,15 @@ float along(vec3 v, uint axis) {
     return axis == 0u ? v.x : (axis == 1u ? v.y : v.z);
 }
 
-// Along a split's axis, whose two bits choose at once.
+// The component along a split's axis. The two bits of the axis are tested directly.
 float along_split(vec3 v, KdNode node) {
     return (node.axis_and_child & 2u) != 0u ? v.z : ((node.axis_and_child & 1u) != 0u ? v.y : v.x);
 }
 
-// Where a split's plane meets its axis. A leaf's number of an entry, which lanes that wait hold in lockstep, is no number to
-// compute with: it is denormal as a float, and lavapipe's kernels spent a sixth of their time on its products. Its mask is made of its bits, since a
-// compiler takes away what asks for a leaf where a branch has asked before.
+// Position of a split's plane on its axis. In a leaf this word is an index, which is a denormal float. On lavapipe
+// idle lanes that hold a leaf still compute with it, and products of denormals took a sixth of the kernel's time. So
+// it is masked to zero there. The mask is computed from the node's bits, since a compiler removes a test for a leaf
+// where a branch has already made that test.
 float plane_of(KdNode node) {
     const int LEAF_BIT = findMSB(KD_LEAF);
     uint bits = node.split_or_first;
@@ -53,13 +60,14 @@ float plane_of(KdNode node) {
     return uintBitsToFloat(bits);
 }
 
-// Where the ray meets the split plane. `precise`: a traversal that comes the same way again must come to the same bits.
+// The t at which the ray meets the split plane. `precise`: a traversal that takes the same path again must compute
+// the same bits.
 float crossing(TraversalRay ray, KdNode node) {
     precise float t = fma(plane_of(node), along_split(ray.inv_direction, node), along_split(ray.bias, node));
     return t;
 }
 
-// The child on the side that the ray comes from, or the other one.
+// Offset of the first child, on the side that the ray comes from, or of the second one.
 uint child_of(TraversalRay ray, KdNode node, bool second) {
     bool is_above = (along_split(ray.inv_direction, node) < 0.0) != second;
     uint pair_at = node.axis_and_child & ~((1u << KD_PAIR_SHIFT) - 1u);

@@ -1,8 +1,13 @@
-// Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2), closest hit or any hit.
+// Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2), closest hit or any hit. A part of
+// accel.glsl.
 //
-// A cell is a node and the interval [t_enter, t_exit] that the ray spends in it. Children come in the ray's order:
-// `first` is the one on the side that the ray comes from. A subtree that is left for later is pending; how pending
-// subtrees are kept is the variant (pending_*.glsl). A part of accel.glsl, which calls `search_kdtree`.
+// A cell is a node and the interval [t_enter, t_exit] that the ray spends in it. Children are visited in the ray's
+// order: the first child is the one on the side that the ray comes from, the second child is the other one. A subtree
+// that is left for later is pending. The variants of the traversal differ in how they keep pending subtrees
+// (pending_*.glsl).
+//
+// Needs scene.glsl, stalls.glsl, steps.glsl, traversal_ray.glsl, local_memory.glsl, candidate.glsl and
+// PREDICATES_BRANCHES. Provides `search_kdtree`, and with leaf.glsl the `Visit` that grid.glsl uses, too.
 
 layout(constant_id = CONSTANT_TRAVERSAL) const uint TRAVERSAL = TRAVERSAL_MASK;
 
@@ -13,7 +18,8 @@ layout(constant_id = CONSTANT_TRAVERSAL) const uint TRAVERSAL = TRAVERSAL_MASK;
 #include "leaf.glsl"
 #include "resume.glsl"
 
-// From a split to the child where the ray enters the cell. A NaN fails both tests and goes to the first child: it ends.
+// Steps from a split to the child in which the ray enters the cell. If t_cross is NaN, both comparisons fail and the
+// ray goes to the first child alone, so that the traversal ends.
 KdNode step_down(TraversalRay ray, KdNode node, inout Cell cell) {
     float t_cross = crossing(ray, node);
     bool only_second = t_cross < cell.t_enter;
@@ -27,7 +33,8 @@ KdNode step_down(TraversalRay ray, KdNode node, inout Cell cell) {
     return node;
 }
 
-// Down to the leaf where the ray enters the cell, or to a slab that it keeps clear of, as if that were an empty leaf.
+// Descends to the leaf in which the ray enters the cell. If the ray keeps clear of a node's slab on the way, returns
+// an empty leaf in place of that node.
 KdNode descend(TraversalRay ray, float t_best, inout Cell cell) {
     KdNode node = kd_node(cell.node_offset);
     for (;;) {
@@ -37,7 +44,7 @@ KdNode descend(TraversalRay ray, float t_best, inout Cell cell) {
     }
 }
 
-// Down to the leaf where the ray enters the cell, for lockstep.glsl.
+// Descends to the leaf in which the ray enters the cell, for lockstep.glsl. Ignores slabs.
 KdNode descend_in_step(TraversalRay ray, inout Cell cell) {
     KdNode node = kd_node(cell.node_offset);
     while (!is_leaf(node)) {
@@ -55,8 +62,9 @@ Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
     return visit_leaf(leaf, cell.t_enter, min(cell.t_exit, t_best));
 }
 
-// Turn by turn, each a test or a leaf: lanes that test and lanes that go on each keep together. Of two loops in one another
-// the outer waits, for all lanes' leaves or for each lane's tests. Returns 0, or the mark of a ray that has stalled.
+// Searches in one loop, each of whose turns either tests a triangle or goes on to a leaf. So lanes that test stay
+// together, and so do lanes that go on. If the loops were nested, the outer loop would wait for all lanes' leaves or
+// for each lane's tests. Returns 0, or the mark of a ray that has stalled.
 uint search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (!is_in(ray)) return 0u;
     Cell cell = whole(ray);
@@ -90,8 +98,8 @@ uint search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
 #include "lockstep.glsl"
 #include "brute.glsl"
 
-// Goes through all leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow. Returns 0, or the mark of
-// a ray that has stalled.
+// Visits all leaves that the ray meets in [t_enter, t_exit], until no nearer hit can follow. Returns 0, or the mark
+// of a ray that has stalled.
 uint search_kdtree(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (TRAVERSAL == TRAVERSAL_BRUTE) return intersect_all(ray, any_hit, best);
     clear_pending();

@@ -1,11 +1,13 @@
-// Cubes side by side that fill a box from its least corner on: the cells of a grid, or those of a block of its lower level. At its
-// greatest corner the box may cut some of them. Twin of src/accel/grid/lattice.rs; all bits are the same.
+// Lattices: adjacent cubes that fill a box from its least corner on. A lattice's cubes are the cells of a grid, or
+// those of a block of its lower level. At the greatest corner, the box may cut some of them. Twin of
+// src/accel/grid/lattice.rs, with the same results to the last bit.
 #ifndef KDRAY_LATTICE
 #define KDRAY_LATTICE
 
 #include "layout.glsl"
 
-// Lengths and coordinates in world units. n_cells: the number of cubes along each axis.
+// least, greatest: the box's corners, world units. cell_size: the length of a cube's edge, world units. n_cells: the
+// number of cubes along each axis.
 struct Lattice {
     vec3 least;
     float cell_size;
@@ -13,27 +15,27 @@ struct Lattice {
     uvec3 n_cells;
 };
 
-// Where the cubes of these indices begin on each axis, and those before them end. `precise`: a triangle is in a cell by the
-// same planes by which a ray is.
+// The coordinates on each axis at which cubes of these indices begin and those before them end. They are `precise`,
+// so that the build sorts triangles into cells by the same planes that rays meet.
 vec3 planes_of(Lattice lattice, uvec3 cube) {
     precise vec3 offsets = vec3(cube) * lattice.cell_size;
     precise vec3 planes = lattice.least + offsets;
     return min(planes, lattice.greatest);
 }
 
-// About the cube that has a point, or else one at the border.
+// About the cube that contains a point, or the one at the border if the point is outside the box.
 uvec3 cube_near(Lattice lattice, vec3 point) {
     precise vec3 indices = (point - lattice.least) / lattice.cell_size;
     return uvec3(clamp(indices, vec3(0.0), vec3(lattice.n_cells - 1u)));
 }
 
-// The place of a cube in the order of all: x fastest, then y.
+// A cube's place, its index among all cubes of the lattice: x fastest, then y.
 uint place_of(Lattice lattice, uvec3 cube) {
     return cube.x + lattice.n_cells.x * (cube.y + lattice.n_cells.y * cube.z);
 }
 
-// The edge's length of the cubes that a cube is cut into. 1 / resolution is rounded up to a multiple of 2^-16, by integers alone:
-// the last bit of a quotient of floats is not the same on every device.
+// The length of the edges of the cubes that a cube is cut into, world units. 1 / resolution is rounded up to a
+// multiple of 2^-16 by integer arithmetic, since the last bit of a quotient of floats differs between devices.
 float cell_size_within(Lattice lattice, uint resolution) {
     uint share = ((1u << 16) + resolution - 1u) / resolution;
     precise float cell_size = lattice.cell_size * (float(share) * (1.0 / 65536.0));

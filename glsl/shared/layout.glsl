@@ -1,55 +1,63 @@
-// What the host and the kernels share: constants, structs and bindings, once.
+// The constants, structs and bindings that the host and the kernels share, defined once.
 //
-// build.rs turns this file into src/layout.rs's contents: `#define NAME 1u` becomes a `pub const NAME: u32` (1.0: f32), a struct
-// a `#[repr(C)]` one with a size assert. Members are laid out by std430 without padding: a vec3 is always followed
-// by a 4-byte scalar, which fills its fourth word; whatever std430 would pad is refused by the build.
+// build.rs translates this file into the contents of src/layout.rs. `#define NAME 1u` becomes a `pub const NAME: u32`
+// (1.0: f32), and a struct becomes a `#[repr(C)]` struct whose size is asserted. The comment above a constant or a
+// struct becomes its documentation. Members are laid out by std430 without padding: a vec3 is always followed by a
+// 4-byte scalar, which fills its fourth word. The build refuses a member that std430 would pad.
 #ifndef KDRAY_LAYOUT
 #define KDRAY_LAYOUT
 
-// Invocations of a workgroup: ray kernels (one ray each), pixel kernels (8 x 8 pixels), scans.
+// Invocations of a workgroup in ray kernels. Each invocation handles one ray.
 #define RAY_GROUP_SIZE 64u
+// Sides of a workgroup in pixel kernels, 8 x 8 pixels, and of the tiles in whose order pixels are rendered.
 #define TILE_SIZE 8u
-// Of as many lanes for one ray, one works, where a device has lanes to spare.
+// Logarithm of the most lanes that one ray gets. If a dispatch has fewer rays than the device has lanes, each ray
+// gets 2^n lanes, of which only the first works, so that divergent rays do not share a subgroup.
 #define MOST_LANES_LOG2 5u
-// Vulkan guarantees 128 invocations on every device.
+// Invocations of a workgroup in prefix sums. Vulkan guarantees 128 invocations on every device.
 #define SCAN_GROUP_SIZE 128u
-// Triangles that kernels rasterize: pixels of a bounding rectangle that one invocation looks at alone; workgroups in
-// the dispatch over the blocks that larger ones are cut into: side by side, and rows at the most.
+// The most pixels in the bounding rectangle of a triangle that one invocation of `rasterize_triangles.comp` handles
+// alone. The rectangles of larger triangles are cut into blocks.
 #define RASTER_SMALL 64u
+// Workgroups side by side in the dispatch over the blocks of large triangles (`rasterize_blocks.comp`).
 #define RASTER_GROUPS_X 256u
+// The most rows of workgroups in that dispatch.
 #define RASTER_GROUPS_Y 1024u
-// Blocks of SCAN_GROUP_SIZE rays of which one invocation of the spine adds up the counts.
+// Blocks of `SCAN_GROUP_SIZE` rays whose counts one invocation of `compact_spine.comp` adds up at a time.
 #define SPINE_ITEMS 8u
 
-// A ray that hits nothing, a pixel that no triangle covers.
+// Triangle index of a ray that hits nothing, and of a pixel that no triangle covers.
 #define NO_TRIANGLE 0xffffffffu
-// A triangle that rays pass through, in place of the index of its material.
+// Marks a triangle that rays pass through. It replaces the index of the triangle's material.
 #define TRIANGLE_HIDDEN 0x80000000u
-// In place of an encoded shading normal: use the triangle's own plane. No snorm pair encodes to it.
+// Replaces an encoded shading normal: use the normal of the triangle's own plane. No snorm pair encodes to it.
 #define FLAT_NORMAL 0x80008000u
 
-// KdNode.axis_and_child, bits 0..1: the axis of a split, 0, 1 or 2; 0 in a leaf.
+// `KdNode.axis_and_child`, bits 0..1: the axis of a split, 0, 1 or 2. The bits are 0 in a leaf.
 #define KD_AXIS_MASK 3u
-// Bit 2: the node is a leaf.
+// `KdNode.axis_and_child`, bit 2: the node is a leaf.
 #define KD_LEAF 4u
-// Bit 3: the node has a slab, which is to be looked at first.
+// `KdNode.axis_and_child`, bit 3: the node has a slab, which is tested before anything below the node.
 #define KD_HAS_SLAB 8u
-// Bits 4..31: p of a split, whose children are nodes 2 p and 2 p + 1; of a leaf, how many triangles it has. With the lower
-// bits cleared, a split's word is the place of its children in bytes.
+// `KdNode.axis_and_child`, bits 4..31. In a split, p, whose children are nodes 2 p and 2 p + 1. In a leaf, the number
+// of its triangles. With the lower bits cleared, a split's word is the offset of its children in bytes.
 #define KD_PAIR_SHIFT 4u
+// Size of a `KdNode`.
 #define KD_NODE_BYTES 8u
-// Levels below the root that the traversal's bit mask can hold: one word's, and two words'.
+// The most levels below the root that one word of the traversal's bit mask can hold.
 #define KD_WORD_DEPTH 32u
+// The most levels below the root that two words of the traversal's bit mask can hold.
 #define KD_MAX_DEPTH 64u
 
-// Times the scene's largest coordinate: rays that start farther away are moved up to the scene first (the tree's
-// rounding margin is derived for this).
+// The farthest that a ray may start from the scene, as a multiple of the scene's largest coordinate. Origins of rays
+// that start farther away are first moved up to the scene. The tree's rounding margin is derived for this distance.
 #define KD_MAX_ORIGIN_DISTANCE 4.0
-// Times the scene's largest coordinate: a ray that keeps this far from a triangle's plane within a leaf has no hit there.
-// Twice the tree's margin: kdtree/planes.rs counts what rounding does to hits, planes and a ray's distance to a plane.
+// A ray has no hit on a triangle if it keeps this far from the triangle's plane within a leaf. The distance is a
+// multiple of the scene's largest coordinate. It is twice the tree's margin: kdtree/planes.rs adds up what rounding
+// does to hits, to planes and to a ray's distance from a plane.
 #define KD_PLANE_EPSILON 0.000015258789
-// A direction's component of less magnitude is taken as this: inverse directions are finite everywhere, and rays in a split
-// plane have one rule. For unit directions it is far below one rounding of a direction, 2^-24.
+// A component of a direction is replaced by this if its magnitude is less. So inverse directions are finite, and rays
+// in a split plane follow one rule. For unit directions it is far below one rounding of a direction, 2^-24.
 #define KD_LEAST_COMPONENT 1.0e-12
 // Far children that the traversal `short-stack` keeps.
 #define SHORT_STACK_SIZE 8u
@@ -59,20 +67,23 @@
 // The most cells along each axis into which a grid of two levels cuts a cell of the upper level.
 #define GRID_MAX_BLOCK_RESOLUTION 32u
 
-// Barycentric weights of shaded points are at least this, 2^-16: exactly on the edge of a corner of two walls, rounding may
-// put a point behind the other wall, and into that wall's shadow.
+// Lower bound of the barycentric weights of shaded points, 2^-16. Rounding could put a point that is exactly on the
+// edge where two walls meet behind the other wall, and thus into that wall's shadow.
 #define LEAST_WEIGHT 0.000015258789
-// Times the corners' weighted magnitudes: how far rays that leave a surface start from it. 2^-18, 64 roundings, covers the
-// few roundings by which an interpolated point is off the plane, and those of the next ray's tests in the same plane.
+// Distance from a surface at which rays that leave it start, as a multiple of the weighted magnitudes of the
+// triangle's corners. 2^-18, which is 64 roundings, covers the few roundings by which an interpolated point is off
+// the plane, and those of the next ray's tests in the same plane.
 #define SURFACE_CLEARANCE 0.0000038146973
-// A shading normal whose interpolated square is less is no direction: the corners' normals cancel out.
+// Squared length below which an interpolated shading normal has no direction: the corners' normals cancel out.
 #define LEAST_NORMAL_SQUARED 1.0e-12
-// A reflectance below this, 2^-64, shows nowhere. A narrow highlight is darker almost all around, and is not lit there.
+// Reflectance, 2^-64, below which light is never visible. A narrow highlight is darker than this almost all around,
+// and no shadow rays are traced there.
 #define LEAST_REFLECTANCE 5.421011e-20
-// The least cosine between a refracted ray and an interpolated normal, which can turn away from the viewer.
+// Lower bound of the cosine between an interpolated normal and the direction back along the ray. Such a normal can
+// turn away from the viewer.
 #define LEAST_COSINE 1.0e-4
 
-// How rays find their way through the tree: the kernels' specialization constant TRAVERSAL.
+// Values of the specialization constant `TRAVERSAL`: the algorithm that takes rays through the kd-tree.
 #define TRAVERSAL_MASK 0u
 #define TRAVERSAL_STACK 1u
 #define TRAVERSAL_BRUTE 2u
@@ -81,47 +92,58 @@
 #define TRAVERSAL_MASK_BOXES 5u
 #define TRAVERSAL_BACKTRACK 6u
 #define TRAVERSAL_ROPES 7u
-// Triangles that brute force takes.
+// The most triangles that brute force accepts.
 #define BRUTE_MAX_TRIANGLES 65000u
 
-// How radiance becomes what a display shows: the kernel's specialization constant CURVE.
+// Values of the specialization constant `CURVE`: how radiance is mapped to the range of a display.
 #define TONEMAP_LINEAR 0u
 #define TONEMAP_AGX 1u
 #define TONEMAP_ACES 2u
 
-// Material.flags
+// `Material.flags`: the material has a Phong highlight.
 #define MATERIAL_SPECULAR 1u
+// `Material.flags`: the material reflects rays as a mirror does.
 #define MATERIAL_REFLECT 2u
+// `Material.flags`: the material refracts rays.
 #define MATERIAL_REFRACT 4u
+// `Material.flags`: the share of reflected light follows Fresnel's equations.
 #define MATERIAL_FRESNEL 8u
 
-// Which rays go on from a hit: child_kinds. In this order they stand in the queue.
+// Bit of `child_kinds`: a reflected ray continues from the hit. It precedes a transmitted one in the queue.
 #define CHILD_REFLECTED 1u
+// Bit of `child_kinds`: a transmitted ray continues from the hit.
 #define CHILD_TRANSMITTED 2u
 
-// What light_visibility says of a ray's hit and a light: not asked for, since the light could not be seen there; lit by it;
-// in the shadow of something.
+// `light_visibility` of a ray's hit and a light: no shadow ray was traced, since the hit would not show the light.
 #define LIGHT_UNTESTED 0u
+// `light_visibility` of a ray's hit and a light: the light reaches the hit.
 #define LIGHT_LIT 1u
+// `light_visibility` of a ray's hit and a light: something is in between.
 #define LIGHT_SHADOWED 2u
 
-// A mark in place of a hit's triangle or a light's visibility, where a ray's traversal has stopped before its end: this
-// bit, and below it the slot that holds the ray's state, or NO_SLOT if there was none left. Never NO_TRIANGLE.
+// Mark of a ray whose traversal has stopped before its end. It replaces the triangle of the ray's hit, or the light's
+// visibility. The bits below it are the slot that holds the ray's state, or `NO_SLOT`. The mark never equals
+// `NO_TRIANGLE`.
 #define STALLED 0x80000000u
+// Slot of a stalled ray that found all slots taken.
 #define NO_SLOT 0x7ffffffeu
-// Rows of four words that a slot takes in `stalls`; one row of counts comes before the slots.
+// Rows of four words that a slot takes in `stalls`. One row of counts precedes the slots.
 #define STALLED_RAY_ROWS 3u
-// Which rays a dispatch takes: all, from their beginning; those that have stalled, from their slots; those that found no
-// slot, from their beginning.
+// `round` of a dispatch that takes all rays, from their beginning.
 #define ROUND_BEGIN 0u
+// `round` of a dispatch that takes the rays that have stalled, from the state in their slots.
 #define ROUND_RESUME 1u
+// `round` of a dispatch that takes the stalled rays that found no slot, from their beginning.
 #define ROUND_RESTART 2u
 
-// Light.kind
+// Value of `Light.kind`.
 #define LIGHT_POINT 0u
 #define LIGHT_DIRECTIONAL 1u
 
-// 48 bytes: world-space corners, counter-clockwise seen from outside; n*: octahedral 2 x snorm16 shading normals.
+// A triangle, 48 bytes.
+//
+// - `v0`, `v1`, `v2`: corners in world space, counter-clockwise seen from outside.
+// - `n0`, `n1`, `n2`: shading normals of the corners, octahedral 2 x snorm16, or `FLAT_NORMAL`.
 struct Triangle {
     vec3 v0;
     uint n0;
@@ -131,8 +153,11 @@ struct Triangle {
     uint n2;
 };
 
-// 48 bytes: a triangle as a leaf has it, so that a ray's test waits for one load, not for an index and then a triangle. Corners as
-// in Triangle; triangle_ix: its number.
+// A triangle as a leaf stores it, 48 bytes. With it, a ray's test waits for one load instead of an index and then a
+// triangle.
+//
+// - `v0`, `v1`, `v2`: the corners, as in `Triangle`.
+// - `triangle_ix`: the triangle's index in `triangles`.
 struct LeafTriangle {
     vec3 v0;
     uint triangle_ix;
@@ -142,29 +167,40 @@ struct LeafTriangle {
     uint reserved1;
 };
 
-// 8 bytes. Split: split_or_first = bits of the plane's position on the axis (world units).
-// Leaf: split_or_first = index of its first entry in leaf_triangles. Children of a split are neighbours at an even
-// index, so a node's sibling is `index ^ 1`; the root is node 0 and node 1 is unused.
+// A node of the kd-tree, 8 bytes. The children of a split are neighbours at an even index, so a node's sibling is
+// `index ^ 1`. The root is node 0, and node 1 is unused.
+//
+// - `split_or_first`: in a split, the bits of the plane's position on the axis (a float, world units). In a leaf, the
+//   index of its first entry in `leaf_triangles`.
+// - `axis_and_child`: bits 0..1 are the axis of a split, bit 2 is `KD_LEAF`, bit 3 is `KD_HAS_SLAB`. For bits 4..31
+//   see `KD_PAIR_SHIFT`.
 struct KdNode {
     uint split_or_first;
     uint axis_and_child;
 };
 
-// 16 bytes: the plane of a leaf's triangle, at once beside the leaf's other planes. normal: unit length, or 0 where the
-// triangle has no area; a point p lies dot(normal, p) - distance above it.
+// The plane of a leaf's triangle, 16 bytes. The planes of a leaf are side by side in memory, apart from its
+// triangles. A point p is `dot(normal, p) - distance` above the plane (world units).
+//
+// - `normal`: unit length, or 0 if the triangle has no area or its plane is not certain. No ray is clear of a plane
+//   of 0.
+// - `distance`: of the plane from the world's origin, along the normal (world units).
 struct Plane {
     vec3 normal;
     float distance;
 };
 
-// 16 bytes: between two planes, whatever of its triangles comes near a node's cell (Kay, Kajiya: Ray Tracing Complex Scenes,
-// SIGGRAPH 1986). A point p lies in the slab where |dot(normal, p) - offset| <= 1: the shorter the normal, the thicker.
+// The space between two planes that holds those parts of a node's triangles that come near its cell, 16 bytes (Kay,
+// Kajiya: Ray Tracing Complex Scenes, SIGGRAPH 1986). A point p is in the slab if `|dot(normal, p) - offset| <= 1`.
+//
+// - `normal`: the shorter it is, the thicker is the slab, whose half thickness is `1 / length(normal)` (world units).
+// - `offset`: without unit, as `dot(normal, p)` is.
 struct Slab {
     vec3 normal;
     float offset;
 };
 
-// 24 bytes: a node's cell, world units. Only some traversals need it.
+// A node's cell, 24 bytes: the least and the greatest corner (world units). Only some traversals need it.
 struct KdBox {
     float min_x;
     float min_y;
@@ -174,22 +210,33 @@ struct KdBox {
     float max_z;
 };
 
-// 8 bytes: a face of a node's cell. position: where it lies on its axis (world units); node_ix: the smallest node that has all of its
-// other side, 0 where that is outside the root's cell.
+// A face of a node's cell and its link to the other side, 8 bytes.
+//
+// - `position`: of the face on its axis (world units).
+// - `node_ix`: the smallest node that contains everything on the other side of the face. 0 if the other side is
+//   outside the root's cell.
 struct KdRope {
     float position;
     uint node_ix;
 };
 
-// 8 bytes: a cell of a grid. At the lowest level, its triangles are the `count` entries of leaf_triangles from `first` on. At the
-// upper level of two, it is cut into count x count x count cells, of which `grid_cells[first]` is the first, x fastest; a count
-// of 0 means that it has no triangles.
+// A cell of a grid, 8 bytes. At the lowest level, its triangles are the `count` entries of `leaf_triangles` from
+// `first` on. At the upper level of two, it is cut into count x count x count cells, of which `grid_cells[first]` is
+// the first, x fastest. A count of 0 means that the cell has no triangles.
 struct GridCell {
     uint first;
     uint count;
 };
 
-// 80 bytes, named as in Wavefront MTL.
+// A material, 80 bytes. The members are named as in Wavefront MTL.
+//
+// - `ka`, `kd`, `ks`: ambient, diffuse and specular reflectance.
+// - `ns`: exponent of the Phong highlight.
+// - `d`: opacity, 0..1.
+// - `ni`: index of refraction.
+// - `ke`: emitted radiance.
+// - `flags`: bits of `MATERIAL_SPECULAR` and its like.
+// - `tf`: weight of refracted light by colour.
 struct Material {
     vec3 ka;
     float ns;
@@ -203,8 +250,12 @@ struct Material {
     uint reserved;
 };
 
-// 32 bytes. Point: position, intensity in power per steradian (falls with the square of distance).
-// Directional: unit vector towards the light, irradiance on a surface that faces it.
+// A light, 32 bytes.
+//
+// - `position`: of a point light, in world space. Of a directional light, the unit vector towards the light.
+// - `kind`: `LIGHT_POINT` or `LIGHT_DIRECTIONAL`.
+// - `intensity`: of a point light, power per steradian; its irradiance falls with the square of the distance. Of a
+//   directional light, the irradiance on a surface that faces it.
 struct Light {
     vec3 position;
     uint kind;
@@ -212,7 +263,14 @@ struct Light {
     uint reserved;
 };
 
-// 48 bytes. direction: unit length; t in (0, t_max]; source_triangle: where the ray starts, never hit again.
+// A ray of a picture, 48 bytes. Its hits have t in `(0, t_max]`.
+//
+// - `origin`: world units.
+// - `pixel_ix`: index of the pixel that receives the ray's light, rows from the top of the window.
+// - `direction`: unit length.
+// - `source_triangle`: the triangle on which the ray starts, which it never hits again, or `NO_TRIANGLE`.
+// - `throughput`: the weight of the ray's radiance in its pixel.
+// - `t_max`: world units.
 struct PathRay {
     vec3 origin;
     uint pixel_ix;
@@ -222,9 +280,10 @@ struct PathRay {
     float t_max;
 };
 
-// 32 bytes. A ray that is cast, not rendered: direction of any length, which is the unit of t; t in (t_min, t_max], any
-// bounds, but those below 2^-126 may count as 0. Bounds are kept to the last bit where the origin lies within
-// KD_MAX_ORIGIN_DISTANCE, elsewhere to 2^-24 of the way to the scene.
+// A ray that is cast by itself, not for a picture, 32 bytes. The length of `direction` is arbitrary; it is the unit
+// of t. Hits have t in `(t_min, t_max]`. All bounds are valid, but those below 2^-126 may count as 0. Bounds are
+// exact to the last bit if the origin is within `KD_MAX_ORIGIN_DISTANCE`, and otherwise to 2^-24 of the way to the
+// scene.
 struct Ray {
     vec3 origin;
     float t_min;
@@ -232,7 +291,11 @@ struct Ray {
     float t_max;
 };
 
-// 16 bytes. u, v: barycentric weights of v1 and v2. A miss: t = infinity, triangle_ix = NO_TRIANGLE.
+// The hit of a ray, 16 bytes.
+//
+// - `t`: in units of the ray's direction. Infinity for a miss.
+// - `triangle_ix`: index of the triangle. `NO_TRIANGLE` for a miss.
+// - `u`, `v`: barycentric weights of `v1` and `v2`.
 struct Hit {
     float t;
     uint triangle_ix;
@@ -240,14 +303,30 @@ struct Hit {
     float v;
 };
 
-// The frame's constants (a uniform buffer, std140-compatible). width, height: of the window, the part of the picture
-// that is rendered; it begins at the picture's pixel (window_x, window_y). sample_x, sample_y: where the frame's sample
-// lies in each pixel, px from its upper left corner. Camera ray of the window's pixel (x, y):
+// The frame's constants, 208 bytes (a uniform buffer, std140-compatible). The window is the part of the picture that
+// is rendered. The camera ray of the window's pixel (x, y) has the direction
+//
+// ```text
 // forward + (2 (window_x + x + sample_x) / picture_width - 1) * right
-//         + (1 - 2 (window_y + y + sample_y) / picture_height) * up.
-// clip_from_world is the whole picture's, moved so that the sample lies in the middle of its pixel.
-// n_samples: how many samples a pixel there are with this frame's.
-// n_lanes: lanes that the device has, to be shared out among fewer rays; 0: each ray gets one.
+//         + (1 - 2 (window_y + y + sample_y) / picture_height) * up
+// ```
+//
+// - `clip_from_world`: of the whole picture, moved so that the sample is in the middle of its pixel.
+// - `eye`: world space. `forward`: unit length. `right`, `up`: from the middle of the image plane, which is at
+//   distance 1, to its right and its upper edge.
+// - `width`, `height`: of the window (pixels).
+// - `n_triangles`, `n_lights`: of the scene.
+// - `ambient`: radiance, weighted by `Material.ka`. `background`: radiance of rays that hit nothing.
+// - `exposure`: factor of radiance before the tone curve.
+// - `denoise_threshold`: a pixel is smoothed if its luminance differs from that of its four neighbours by more in
+//   sum.
+// - `max_depth`: levels of rays, of which the camera's are the first.
+// - `queue_capacity`: rays that the ray queue has room for.
+// - `picture_width`, `picture_height`: of the whole picture (pixels).
+// - `window_x`, `window_y`: the picture's pixel at which the window begins.
+// - `sample_x`, `sample_y`: position of the frame's sample in each pixel (pixels from its upper left corner).
+// - `n_samples`: samples of each pixel so far, including this frame's.
+// - `n_lanes`: lanes of the device, which are shared out if there are fewer rays. 0: each ray gets one lane.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -276,12 +355,19 @@ struct Frame {
     uint reserved1;
 };
 
-// One a batch and bounce, 80 bytes, sized by the bounce before: each `groups` is a VkDispatchIndirectCommand. trace and shadow
-// have 2^lanes_log2 lanes for a ray, or a segment, of which the first works (bounce.rs). Those of shadow and shade are for all
-// rays of the batch up to this bounce's last one.
-// Rays of a batch stand in one queue, bounce after bounce: this one's are first_ray and the n_rays from there on.
-// n_wanted: rays that the bounce before made; overflow: 1 where the queue has no room for them. Then n_rays is 0,
-// and the batch has to be split. any_overflow: of the first row only, 1 where one of all the frame's has an overflow.
+// The rays of one bounce of one batch, 80 bytes. The bounce before fills it in, and the host the first one. The rays
+// of a batch are in one queue, bounce after bounce. Each `groups` is a `VkDispatchIndirectCommand`.
+//
+// - `first_ray`, `n_rays`: the bounce's rays in the queue.
+// - `n_wanted`: rays that the bounce before made.
+// - `overflow`: 1 if the queue has no room for them. Then `n_rays` is 0, and the batch has to be split.
+// - `trace_groups`: over the bounce's rays, each of which has `2^trace_lanes_log2` lanes. Only the first of them
+//   works (src/frame/bounce.rs).
+// - `shadow_groups`: over a segment for each light and each ray of the batch up to the last one of this bounce, each
+//   with `2^shadow_lanes_log2` lanes.
+// - `scan_groups`: over the bounce's rays.
+// - `any_overflow`: in the first row only, 1 if any row of the frame has an overflow.
+// - `shade_groups`: over all rays of the batch up to the last one of this bounce.
 struct Bounce {
     uint first_ray;
     uint n_rays;
@@ -305,20 +391,31 @@ struct Bounce {
     uint reserved0;
 };
 
-// Counters of a bounce, of which the sum counts: as many workgroups as there are places can add to them at once. They stand so far
-// apart, in counters, that they do not share a cache line.
+// Copies of a bounce's `Counters`, whose sum is the count. This many workgroups can add to them at the same time.
 #define COUNTER_PLACES 16u
+// Distance of these copies in `counters`, in elements. It keeps them from sharing a cache line.
 #define COUNTER_STRIDE 16u
 
-// COUNTER_PLACES a batch and bounce, 8 bytes: for the profile. Integer sums, the same in every order of arrival.
+// Counts for the profile, 8 bytes. Each batch and bounce has `COUNTER_PLACES` of them. Integer sums are the same in
+// every order of arrival.
+//
+// - `n_hits`: rays that hit a triangle.
+// - `n_shadow_rays`: segments that were tested.
 struct Counters {
     uint n_hits;
     uint n_shadow_rays;
 };
 
-// 64 bytes: what the primary ray of a pixel's sample hits, and what all rays of the sample cost. normal: the shading
-// normal, unit length, towards the eye; albedo: Kd; depth: along the camera's view. Where nothing is hit, depth is
-// infinity, both indices are NO_TRIANGLE, the vectors 0.
+// The first hit of a pixel's sample, and the cost of all rays of the sample, 64 bytes. If nothing is hit, `depth` is
+// infinity, both indices are `NO_TRIANGLE`, and the vectors are 0.
+//
+// - `position_world`: world units.
+// - `triangle_ix`, `material_ix`: indices of the triangle and of its material.
+// - `normal_world`: the shading normal, unit length, towards the eye.
+// - `albedo`: the material's `kd`.
+// - `depth`: distance from the eye along `Frame.forward` (world units).
+// - `n_rays`: primary, secondary and shadow rays.
+// - `n_steps`: nodes and triangles of leaves that all of these rays read.
 struct Feature {
     vec3 position_world;
     uint triangle_ix;
@@ -326,20 +423,22 @@ struct Feature {
     uint material_ix;
     vec3 albedo;
     float depth;
-    // Primary, secondary and shadow rays.
     uint n_rays;
-    // Of all of them: nodes read, and leaves' triangles.
     uint n_steps;
     uint reserved0;
     uint reserved1;
 };
 
-// What kernels know of the scene's triangles and acceleration structure beside the arrays (a uniform buffer).
-// cell_min, cell_max: the box that holds all triangles, with the structure's rounding margin (world units).
-// plane_epsilon: KD_PLANE_EPSILON in world units. n_triangles: the scene's triangles.
-// For grids: the number of cells of the upper level along each axis, and the length of a cell's edge (world units). cell_min is
-// the least corner of the first cell.
-// Then the device address of each of the scene's arrays, low word first; 0 where kernels read the array by its binding.
+// What kernels need of the scene's triangles and acceleration structure besides the arrays (a uniform buffer).
+//
+// - `cell_min`, `cell_max`: the box that holds all triangles, with the structure's rounding margin (world units). In
+//   a grid, `cell_min` is the least corner of the first cell.
+// - `plane_epsilon`: `KD_PLANE_EPSILON` times the scene's largest coordinate (world units).
+// - `n_triangles`: of the scene.
+// - `n_cells_x`, `n_cells_y`, `n_cells_z`: cells of a grid's upper level along each axis.
+// - `cell_size`: edge of a cell of a grid's upper level (world units).
+// - The rest: the device address of each of the scene's arrays, low word first. 0 if kernels read the array by its
+//   binding.
 struct AccelConstants {
     vec3 cell_min;
     float plane_epsilon;
@@ -354,58 +453,65 @@ struct AccelConstants {
 #undef ARRAY
 };
 
-// Specialization constants. Each has one number, one type and one meaning in all kernels. A kernel that uses one declares it
-// as `layout(constant_id = CONSTANT_X) const TYPE X = DEFAULT;`, and Rust sets it as `constants::X`. build.rs refuses a number
-// that is another constant's, or that is missing here.
+// Specialization constants. Each has one number, one type and one meaning in all kernels. A kernel that uses one
+// declares it as `layout(constant_id = CONSTANT_X) const TYPE X = DEFAULT;`, and Rust sets it as `constants::X`.
+// build.rs refuses a number that is another constant's, or that is missing here.
 
-// Which algorithm takes rays through the kd-tree: TRAVERSAL_MASK and its like.
+// The algorithm that takes rays through the kd-tree: `TRAVERSAL_MASK` and its like.
 #define CONSTANT_TRAVERSAL 0u
-// Whether `fma` rounds once.
+// Whether `fma` rounds once on the device.
 #define CONSTANT_FUSED_FMA 1u
 // Whether hits and shadow segments are counted.
 #define CONSTANT_COUNTS 2u
 // Whether the nodes and triangles that a ray reads are counted.
 #define CONSTANT_COUNT_COSTS 3u
-// Whether the device runs both sides of a branch for all lanes, as software drivers do.
+// Whether the device runs both sides of a branch for all lanes (predication), as software drivers do.
 #define CONSTANT_PREDICATES_BRANCHES 4u
 // Whether the rays are the camera's, which are not stored.
 #define CONSTANT_FROM_CAMERA 5u
-// Whether any hit answers a ray, not the closest alone.
+// Whether any hit ends a ray, not only the closest.
 #define CONSTANT_ANY_HIT 7u
-// The curve from radiance to display: TONEMAP_LINEAR and its like.
+// The curve that maps radiance to the display's range: `TONEMAP_LINEAR` and its like.
 #define CONSTANT_CURVE 8u
-// Whether kernels have found the triangles that pixels show, not the graphics pipeline.
+// Whether compute kernels found the triangles that pixels show, rather than the graphics pipeline.
 #define CONSTANT_BY_KERNELS 9u
 
-// Whether kernels build the lower level of a grid.
+// Whether a kernel builds the lower level of a grid.
 #define CONSTANT_LOWER 10u
-// What a scan of a grid's build adds up: GRID_SCANS_CELLS and its like. The first three are numbered as
-// GRID_COUNTS_CELLS and its like are.
+// What a scan of a grid's build adds up: `GRID_SCANS_CELLS` and its like. The first three have the numbers of
+// `GRID_COUNTS_CELLS` and its like.
 #define CONSTANT_SCANS 11u
 #define GRID_SCANS_CELLS 0u
 #define GRID_SCANS_COLUMNS 1u
 #define GRID_SCANS_PAIRS 2u
 #define GRID_SCANS_DIGITS 3u
 
-// Constants that all kernels over one scene share.
+// Constants that have the same value in all kernels over one scene.
 
-// Whether rays pass through triangles with TRIANGLE_HIDDEN in `triangle_materials`.
+// Whether rays pass through triangles with `TRIANGLE_HIDDEN` in `triangle_materials`.
 #define CONSTANT_FILTERS 28u
-// How many levels of cells the scene's grid has, 1 or 2; 0: the scene has a kd-tree.
+// Levels of cells of the scene's grid, 1 or 2. 0: the scene has a kd-tree.
 #define CONSTANT_GRID_LEVELS 27u
-// Loop turns that an invocation takes before its ray stalls; 0: any number.
+// Loop turns that an invocation takes before its ray stalls. 0: any number.
 #define CONSTANT_TURN_BUDGET 29u
-// Words of the traversal's mask.
+// Words of the traversal's bit mask, 1 or 2.
 #define CONSTANT_MASK_WORDS 30u
-// How kernels read the scene: READING_BOUND and its like.
+// How kernels read the scene: `READING_BOUND` and its like.
 #define CONSTANT_READING 31u
-// Ways to read triangles and tree: as storage that is bound, as texels, by address.
+// Kernels read the scene's arrays as bound storage buffers.
 #define READING_BOUND 0u
+// Kernels read the scene's arrays as texels.
 #define READING_TEXELS 1u
+// Kernels read the scene's arrays by device address.
 #define READING_ADDRESS 2u
 
-// Push constants: the batch's pixels [first_pixel, first_pixel + n_pixels) in tile order, and the row of `bounces` of its bounce
-// of this depth; for what lights all of its rays, depth is 0 and the row its first. round: one of ROUND_*.
+// Push constants of the kernels of a frame.
+//
+// - `first_pixel`, `n_pixels`: the batch's pixels, `[first_pixel, first_pixel + n_pixels)` in tile order.
+// - `bounce_ix`: the row of `bounces` for the batch's bounce of this depth. Kernels that light all rays of the batch
+//   get its first row.
+// - `depth`: of the bounce, 0 for the camera's rays and for kernels that light all rays.
+// - `round`: `ROUND_BEGIN` and its like.
 struct Batch {
     uint first_pixel;
     uint n_pixels;
@@ -414,21 +520,24 @@ struct Batch {
     uint round;
 };
 
-// What is displayed of features.
+// Values of `FalseColor.view`: the member of `Feature` that is displayed.
 #define VIEW_DEPTH 1u
 #define VIEW_NORMAL 2u
 #define VIEW_ID 3u
 #define VIEW_COST 4u
 #define VIEW_RAYS 5u
 
-// Push constants of what displays features: which of them; the value that is brightest, for cost and rays, or half as
-// bright, for depth.
+// Push constants of `false_color.comp`.
+//
+// - `view`: `VIEW_DEPTH` and its like.
+// - `brightest`: for cost and rays, the value that is brightest. For depth, the value of half brightness (world
+//   units).
 struct FalseColor {
     uint view;
     float brightest;
 };
 
-// Push constants of what shows a picture in a window: the sizes of both, pixels.
+// Push constants of `present.frag`, which shows a picture in a window: the sizes of both (pixels).
 struct Present {
     uint width;
     uint height;
@@ -436,8 +545,13 @@ struct Present {
     uint window_height;
 };
 
-// 16 bytes: a triangle with a large bounding rectangle, which is cut into blocks, numbered from first_block on, row by row.
-// first, size: the window's pixels, x in the lower half, y in the upper.
+// A triangle with a large bounding rectangle, 16 bytes. The rectangle is cut into blocks, which are numbered row by
+// row.
+//
+// - `triangle_ix`: the triangle's index.
+// - `first_block`: number of the triangle's first block among those of all large triangles.
+// - `first`, `size`: the rectangle's first pixel in the window, and its sides (pixels). x is in bits 0..15, y in
+//   16..31.
 struct LargeTriangle {
     uint triangle_ix;
     uint first_block;
@@ -445,8 +559,9 @@ struct LargeTriangle {
     uint size;
 };
 
-// 16 bytes: how many workgroups go over the blocks, a VkDispatchIndirectCommand. Behind it, in the same buffer, are 8 bytes of
-// counts: large triangles in the upper half, their blocks in the lower.
+// The workgroups over the blocks of large triangles, 16 bytes: a `VkDispatchIndirectCommand`. In the same buffer, 8
+// bytes of counts follow it: the number of large triangles in the upper half, the number of their blocks in the
+// lower.
 struct RasterGroups {
     uint x;
     uint y;
@@ -454,19 +569,23 @@ struct RasterGroups {
     uint reserved;
 };
 
-// Push constants of what rasterizes: sides of blocks are 2^block_log2 pixels.
+// Push constants of the kernels that rasterize. The sides of blocks are `2^block_log2` pixels.
 struct RasterPush {
     uint block_log2;
 };
 
-// Push constants of a cast: its rays, and 2^lanes_log2 lanes for each, of which the first works. round: one of ROUND_*.
+// Push constants of a cast.
+//
+// - `n_rays`: rays of the cast.
+// - `lanes_log2`: each ray has `2^lanes_log2` lanes, of which the first works.
+// - `round`: `ROUND_BEGIN` and its like.
 struct CastBatch {
     uint n_rays;
     uint lanes_log2;
     uint round;
 };
 
-// Push constants of a cast by the driver's own ray tracing: the address of its structure.
+// Push constants of a cast by the driver's own ray tracing: the device address of its acceleration structure.
 struct DriverCast {
     uint scenery_low;
     uint scenery_high;
@@ -476,45 +595,51 @@ struct DriverCast {
 
 // The most attempts to build a level of cells within the limit of references. The last one has the largest cells.
 #define GRID_MAX_ATTEMPTS 4u
-// The most columns as a multiple of the most references. In many columns of a long triangle's box there is no cell with
-// it.
+// The most columns, as a multiple of the most references. In many columns of a long triangle's box, no cell contains
+// the triangle.
 #define GRID_COLUMNS_PER_REFERENCE 4u
-// Halvings after which the finest block, of GRID_MAX_BLOCK_RESOLUTION cells along each axis, is one cell.
+// Halvings after which the finest block, of `GRID_MAX_BLOCK_RESOLUTION` cells along each axis, is one cell.
 #define GRID_MAX_HALVINGS 5u
-// Counts above this are all taken as 2^32 - 1.
+// Counts above this are all replaced by 2^32 - 1.
 #define GRID_MAX_COUNT 0x7fffffffu
-// Rows of SCAN_GROUP_SIZE entries, one for each invocation, that a workgroup goes through.
+// Rows of `SCAN_GROUP_SIZE` entries, one for each invocation, that a workgroup goes through.
 #define GRID_ROWS 8u
 // The entries of these rows.
 #define GRID_BLOCK_SIZE 1024u
-// Workgroups of a dispatch side by side. More are in further rows, since a device need not take more than 65,535.
+// Workgroups of a dispatch side by side. More are in further rows, since a device need not accept more than 65,535.
 #define GRID_GROUPS_X 1024u
-// Bits of the cells' indices that one pass of the sort looks at, and the number of values that they have.
+// Bits of the cells' indices by which one pass of the sort sorts.
 #define GRID_DIGIT_BITS 4u
+// The number of values that these bits have.
 #define GRID_DIGITS 16u
 // The most workgroups of a pass of the sort. Each sorts several blocks one after the other if there are more blocks.
 #define GRID_MAX_SORT_GROUPS 1024u
 
-// What a level's build counts next: the cells of the lower level; the columns of cells that the boxes of triangles
-// take; the pairs of a cell and a triangle. Last, all is counted.
+// Value of `GridBuild.counts`: the build of the level next counts the cells of the lower level.
 #define GRID_COUNTS_CELLS 0u
+// Value of `GridBuild.counts`: next come the columns of cells that the boxes of triangles take.
 #define GRID_COUNTS_COLUMNS 1u
+// Value of `GridBuild.counts`: next come the pairs of a cell and a triangle.
 #define GRID_COUNTS_PAIRS 2u
+// Value of `GridBuild.counts`: everything is counted.
 #define GRID_IS_COUNTED 3u
 
 // The state of a grid's build. The host writes it before the build and reads it afterwards.
 struct GridBuild {
-    // The lattice of the uniform grid or of the upper level: its box and the edge's length of a cell, world units.
-    // margin: how far outside a cell a triangle still counts as inside, world units.
+    // The lattice of the uniform grid or of the upper level: its box and the edge of a cell (world units).
+    // margin: a triangle counts as inside a cell up to this distance outside (world units).
     vec3 cell_min;
     float cell_size;
     vec3 cell_max;
     float margin;
+    // n_cells_*: cells of this lattice along each axis.
+    // largest_coordinate: the greatest magnitude of a coordinate of the finite triangles' bounds (world units).
     uint n_cells_x;
     uint n_cells_y;
     uint n_cells_z;
     float largest_coordinate;
-    // The bounds of the finite triangles, as integers of the same order (grid_bounds.comp), and the triangles' numbers.
+    // The bounds of the finite triangles, as integers of the same order (grid_bounds.comp), the number of these
+    // triangles, and the number of all triangles.
     uint least_x;
     uint least_y;
     uint least_z;
@@ -523,14 +648,15 @@ struct GridBuild {
     uint greatest_y;
     uint greatest_z;
     uint n_triangles;
-    // What is wanted: cells for each triangle; the most pairs, which is also the most lower cells; the most columns.
+    // What is required. *_density: cells for each triangle. max_references: the most pairs, which is also the most
+    // lower cells. max_columns: the most columns.
     float upper_density;
     float lower_density;
     uint max_references;
     uint max_columns;
-    // What is counted. n_items: triangles at the upper level, pairs of the upper level at the lower one. n_columns,
-    // n_pairs: of these items. n_upper: cells of the upper level, or of the only one. n_lower: cells of the lower
-    // level. n_filled_*: those of them that have triangles.
+    // What is counted. n_items: at the upper level its triangles, at the lower level the pairs of the upper level.
+    // n_columns, n_pairs: of these items. n_upper: cells of the upper level, or of the only one. n_lower: cells of
+    // the lower level. n_filled_*: those of these cells that have triangles.
     uint n_items;
     uint n_columns;
     uint n_pairs;
@@ -538,22 +664,22 @@ struct GridBuild {
     uint n_lower;
     uint n_filled_upper;
     uint n_filled_lower;
-    // How the build goes on. n_coarser: how many times the upper level's edges were doubled. n_halvings: how many times
-    // the blocks' resolutions were halved. n_attempts: failed attempts at this level. counts: GRID_COUNTS_CELLS and its
-    // like.
+    // How the build continues. n_coarser: how many times the edges of the upper level's cells were doubled.
+    // n_halvings: how many times the blocks' resolutions were halved. n_attempts: failed attempts at this level.
+    // counts: GRID_COUNTS_CELLS and its like.
     uint n_coarser;
     uint n_halvings;
     uint n_attempts;
     uint counts;
-    // Where the sums of blocks of columns, of pairs and of upper cells begin in scan_blocks. Those of the sort begin at
-    // 0.
+    // The indices in scan_blocks at which the sums of blocks of columns, of pairs and of upper cells begin. Those of
+    // the sort begin at 0.
     uint columns_begin;
     uint pairs_begin;
     uint cells_begin;
     // Blocks that a workgroup of the sort goes through.
     uint tiles_a_group;
-    // Workgroups of indirect dispatches, over upper cells, items and columns, in the order in which an attempt counts.
-    // Only those whose turn it is are not 0.
+    // Workgroups of indirect dispatches, over upper cells, items and columns, in the order in which an attempt
+    // counts. Only those whose turn it is are not 0.
     uint cell_groups_x;
     uint cell_groups_y;
     uint cell_groups_z;
@@ -563,7 +689,7 @@ struct GridBuild {
     uint column_groups_x;
     uint column_groups_y;
     uint column_groups_z;
-    // Workgroups over columns, pairs and upper cells, and of the sort, once all is counted.
+    // Workgroups over columns, pairs and upper cells, and of the sort, once everything is counted.
     uint counted_column_groups_x;
     uint counted_column_groups_y;
     uint counted_column_groups_z;
@@ -583,50 +709,94 @@ struct GridSort {
     uint first_bit;
 };
 
-// Bindings of the frame's descriptor set. scene_arrays.glsl has those of the scene's arrays.
+// Bindings of the frame's descriptor set. scene_arrays.glsl has those of the scene's arrays. Below, "rays" are the
+// `Frame.queue_capacity` rays of the queue, and "pixels" are the window's, rows from the top.
+
+// One `Frame`.
 #define BIND_FRAME 0u
+// One `Material` for each material of the scene.
 #define BIND_MATERIALS 3u
+// `Frame.n_lights` of `Light`.
 #define BIND_LIGHTS 4u
+// One `PathRay` for each ray, bounce after bounce. The camera's rays are not stored.
 #define BIND_RAYS 8u
+// A word for each ray: bits of `CHILD_REFLECTED` and its like.
 #define BIND_CHILD_KINDS 9u
+// A word for each ray: the index of its first child in the queue, or where that would be.
 #define BIND_FIRST_CHILDREN 10u
+// A word for each `SCAN_GROUP_SIZE` rays: the number of their children, after the scan that of all blocks before.
 #define BIND_SCAN_BLOCKS 11u
+// One `Bounce` for each batch and bounce.
 #define BIND_BOUNCES 12u
+// One `Hit` for each ray.
 #define BIND_HITS 13u
+// A word for each light and ray, at `light * queue_capacity + ray`: `LIGHT_UNTESTED` and its like.
 #define BIND_LIGHT_VISIBILITY 14u
+// A vec4 for each ray: its radiance, weighted by its throughput.
 #define BIND_RAY_RADIANCE 15u
+// A vec4 for each pixel: the sample's radiance, or the mean of all samples.
 #define BIND_PIXEL_RADIANCE 16u
+// A vec4 for each pixel: the radiance after noise reduction.
 #define BIND_PIXEL_FILTERED 17u
+// A word for each pixel: what is displayed, 8 bits a channel, R in the lowest byte.
 #define BIND_PIXEL_DISPLAY 18u
+// The visibility buffer, an R32_UINT image: the index of the triangle that each pixel of the picture shows.
 #define BIND_TRIANGLE_IDS 19u
+// `COUNTER_PLACES` of `Counters` for each batch and bounce, `COUNTER_STRIDE` elements apart.
 #define BIND_COUNTERS 20u
+// A vec4 for each pixel: the sum of its samples' radiance.
 #define BIND_PIXEL_ACCUMULATED 24u
+// One `Feature` for each pixel.
 #define BIND_PIXEL_FEATURES 25u
+// One `AccelConstants`.
 #define BIND_ACCEL 26u
+// Two words for each pixel: index of the nearest triangle, and above it the bits of its distance.
 #define BIND_PIXEL_NEAREST 28u
+// One `RasterGroups` and 8 bytes of counts.
 #define BIND_RASTER_GROUPS 29u
+// One `LargeTriangle` for each triangle of the scene.
 #define BIND_LARGE_TRIANGLES 31u
+// A row of counts, then `STALLED_RAY_ROWS` rows of four words for each slot (stalls.glsl).
 #define BIND_STALLS 32u
 
-// The scene's arrays as texels: each at this plus its own binding. All other bindings are below it.
+// The scene's arrays as texels: the binding of each is this plus its own. All other bindings are below it.
 #define BIND_TEXELS 64u
 
-// A cast's descriptor set has these and what the traversal reads: the scene's arrays and AccelConstants.
+// Bindings of a cast's descriptor set, which also has those that the traversal reads: the scene's arrays,
+// `BIND_ACCEL` and `BIND_STALLS`.
+
+// One `Ray` for each ray of the cast.
 #define BIND_CAST_RAYS 62u
+// One `Hit` for each ray of the cast.
 #define BIND_CAST_HITS 63u
 
-// The descriptor set of a grid's build.
+// The descriptor set of a grid's build. "Level" is the level that is built; "block" is one of `GRID_BLOCK_SIZE`
+// entries.
+
+// One `GridBuild`.
 #define BIND_GRID_BUILD 40u
+// The scene's triangles.
 #define BIND_GRID_TRIANGLES 41u
+// The upper level's pairs of a cell's and a triangle's index, two words each.
 #define BIND_GRID_UPPER_PAIRS 42u
+// A word for each item of the level: its first column, counted from the first one of its block.
 #define BIND_GRID_FIRST_COLUMNS 43u
+// Sums of blocks; after the scan, the sums of all blocks before.
 #define BIND_GRID_SCAN_BLOCKS 44u
+// The pairs that a kernel reads, two words each.
 #define BIND_GRID_PAIRS_FROM 45u
+// The pairs that a kernel writes, two words each.
 #define BIND_GRID_PAIRS_TO 46u
+// One `GridCell` for each cell.
 #define BIND_GRID_CELLS 47u
+// Two words for each upper cell: its first lower cell, counted from the first one of its block, and the number of
+// lower cells along each axis.
 #define BIND_GRID_BLOCKS 48u
+// One `LeafTriangle` for each pair.
 #define BIND_GRID_LEAF_TRIANGLES 49u
+// One `Plane` for each pair.
 #define BIND_GRID_LEAF_PLANES 50u
+// A word for each column: its first pair, counted from the first one of its block.
 #define BIND_GRID_FIRST_PAIRS 51u
 
 #endif

@@ -1,22 +1,28 @@
-// The triangles of a leaf, of which a ray is tested only against those whose planes it meets there. A part of kdtree.glsl.
+// The triangles of a leaf. A ray is tested only against those whose planes it meets within the leaf. A part of
+// kdtree.glsl, and used by grid.glsl, too.
+//
+// Needs scene.glsl, stalls.glsl, steps.glsl and slab.glsl. Provides `Visit`, `visit_leaf` and `find_candidate`.
 
-// A ray's way through a leaf, with the entries that are still to be looked at.
+// A ray's visit to a leaf: the entries of leaf_triangles that are still to be tested, from entry_ix to before end_ix,
+// and the ray's segment within the leaf.
 struct Visit {
     uint entry_ix;
     uint end_ix;
     Segment way;
 };
 
+// The visit to a leaf of the kd-tree, from t_enter to t_exit (the traversal's t).
 Visit visit_leaf(KdNode leaf, float t_enter, float t_exit) {
     uint n_entries = leaf.axis_and_child >> KD_PAIR_SHIFT;
     count_steps(n_entries);
     return Visit(leaf.split_or_first, leaf.split_or_first + n_entries, segment_of(t_enter, t_exit));
 }
 
-// On to the leaf's next triangle whose plane the ray meets on its way. It may meet the others' planes elsewhere, in leaves
-// that have those triangles too: most are in several, so most tests are spared.
+// Goes on to the leaf's next triangle whose plane the ray meets within the leaf. The ray may meet the other planes
+// elsewhere, in leaves that also have those triangles. Most triangles are in several leaves, so this saves most
+// tests.
 bool find_candidate(TraversalRay ray, inout Visit visit, out uint entry_ix) {
-    // What is left undefined is kept from turn to turn, in a register.
+    // If it were left undefined, it would be kept from turn to turn, in a register.
     entry_ix = 0u;
     while (visit.entry_ix < visit.end_ix && has_turns()) {
         count_turn();

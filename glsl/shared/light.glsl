@@ -1,14 +1,15 @@
-// Point and directional lights, as a surface point sees them.
+// Point and directional lights, as seen from a point of a surface. Twin of src/reference/light.rs.
 #ifndef KDRAY_LIGHT
 #define KDRAY_LIGHT
 
 #include "layout.glsl"
 
+// What arrives from a light at a point.
 struct LightSample {
-    // Unit vector to the light, and how far it is (infinity for a directional one).
+    // Unit vector to the light, and the light's distance in world units (infinity for a directional light).
     vec3 direction;
     float distance;
-    // On a surface that faces the light.
+    // Irradiance on a surface that faces the light.
     vec3 irradiance;
 };
 

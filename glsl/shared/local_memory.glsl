@@ -1,14 +1,17 @@
-// What waits in an invocation's local memory: subtrees that are left for later, and what is not needed before the end. In
-// registers the latter would cost: fewer rays run at a time on an H200, diffuse ones a twentieth slower (benches/EXPERIMENTS.md).
-// Software drivers have registers enough, and pay for each store: there it stays in them. A part of
-// accel.glsl.
+// Values in an invocation's local memory: pending subtrees, and values that are not needed before the end of the
+// search. The latter would lower the occupancy if they were in registers: an H200 would run fewer rays at a time, and
+// diffuse rays would be a twentieth slower (benches/EXPERIMENTS.md). Software drivers have enough registers and pay
+// for each store, so there these values stay in registers. A part of accel.glsl.
+//
+// Needs layout.glsl and PREDICATES_BRANCHES. Provides `local_memory`, `spill_pair`, `spilled_pair` and their slots.
 
-// One pair of words for each level of a kd-tree (local_cells.glsl), then the two of spill_pair.
+// A pair of words for each level of a kd-tree (local_cells.glsl), then two pairs for spill_pair.
 uvec2 local_memory[KD_MAX_DEPTH + 2u];
-// Places of spill_pair: the bits of the nearest hit's weights u and v, and of two lengths of the ray's.
+// Slots for spill_pair: the barycentric weights u and v of the nearest hit; the ray's t_start and t_max.
 const uint WEIGHTS_SLOT = KD_MAX_DEPTH;
 const uint LENGTHS_SLOT = KD_MAX_DEPTH + 1u;
 
+// The pairs of spill_pair on devices that keep them in registers.
 vec2 unspilled_pairs[2];
 
 void spill_pair(uint place, float x, float y) {

@@ -1,14 +1,16 @@
-// The search for devices that run both sides of a branch for all lanes, as software drivers do (PREDICATES_BRANCHES). Nothing is
-// spared there by `if`: what not all lanes ask for costs as if they did, and so does what none asks for. A loop ends as soon as
-// no lane goes on, but runs its body at least once. A ray finds the same hits, in the same order, as in kdtree.glsl, of which this
-// is a part.
+// The search for devices that run both sides of a branch for all lanes, as software drivers do (predication,
+// PREDICATES_BRANCHES). There an `if` saves nothing: its body costs the same whether all lanes, some lanes or no lane
+// take it. A loop ends as soon as no lane continues, but runs its body at least once. A ray finds the same hits, in
+// the same order, as by `search_by_turns`. A part of kdtree.glsl.
 //
-// So loops ask at their ends whether to go on, which spares a turn that no lane is in. They ask at their beginnings, too:
-// lavapipe (Mesa 22.3) would otherwise take what a loop leaves behind from its last turn, for lanes that left it before as
-// well.
+// So loops test at their end whether to continue, which saves a turn in which no lane takes part. They test at their
+// beginning, too. Otherwise lavapipe (Mesa 22.3) would take the values that a loop leaves behind from the loop's last
+// turn, also for lanes that left it earlier.
+//
+// Needs everything that kdtree.glsl includes, and its `next_leaf`. Provides `search_in_step`.
 
-// As `find_candidate`; the candidate is the entry before the visit's. reach: accel.plane_epsilon. To load it in each turn takes
-// lavapipe 23 instructions of 145.
+// Does what `find_candidate` does. The candidate is the entry before the visit's entry_ix. reach:
+// accel.plane_epsilon, which is passed in since loading it in each turn takes lavapipe 23 instructions of 145.
 bool find_candidate_in_step(TraversalRay ray, float reach, inout Visit visit) {
     bool found = false;
     bool looks = visit.entry_ix < visit.end_ix && has_turns();
@@ -22,7 +24,7 @@ bool find_candidate_in_step(TraversalRay ray, float reach, inout Visit visit) {
     return found;
 }
 
-// As `intersect`, without a branch.
+// Does what `intersect` does if `tests` is true, without a branch.
 void intersect_in_step(TraversalRay ray, LeafTriangle entry, bool tests, inout Nearest best) {
     vec3 a, b, c;
     vec3 edges = seen_edges(ray.shear, corners_of(entry), a, b, c);
@@ -37,7 +39,8 @@ void intersect_in_step(TraversalRay ray, LeafTriangle entry, bool tests, inout N
     spill_pair(WEIGHTS_SLOT, is_new ? hit.u : weights.x, is_new ? hit.v : weights.y);
 }
 
-// On to the next leaf, if there is one, where this one is done with; from the beginning to the root's first.
+// If the visit to this leaf is finished, goes on to the next leaf, or at the beginning to the first one. Returns
+// false if no leaf follows.
 bool go_on_in_step(TraversalRay ray, float t_best, inout bool begins, inout Cell cell, inout Visit visit) {
     bool goes_on = true;
     if (visit.entry_ix >= visit.end_ix) {
@@ -51,12 +54,12 @@ bool go_on_in_step(TraversalRay ray, float t_best, inout bool begins, inout Cell
     return goes_on;
 }
 
-// Turn by turn: on to a leaf, and to one more if nothing is to be tested in the first, then at most one test. To go on until all
-// lanes have something to test would let most of them wait; to test after every leaf is often done for none. Returns 0, or the
-// mark of a ray that has stalled.
+// Searches in turns. Each turn goes on to a leaf, to one more if that leaf has nothing to test, and then makes at
+// most one test. If a turn went on until all lanes have something to test, most lanes would wait. If it tested after
+// every leaf, often no lane would have anything to test. Returns 0, or the mark of a ray that has stalled.
 uint search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
     Cell cell = whole(ray);
-    // At the root, as in a leaf that is done with.
+    // The ray starts at the root, with a visit that has nothing left to test.
     Visit visit = Visit(0u, 0u, segment_of(0.0, 0.0));
     float reach = accel.plane_epsilon;
     bool begins = true;

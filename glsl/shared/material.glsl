@@ -1,4 +1,4 @@
-// Wavefront MTL's materials: local light by Phong, mirrors, glass, transparency.
+// Materials of Wavefront MTL: local light by Phong, mirrors, glass, transparency. Twin of src/reference/material.rs.
 #ifndef KDRAY_MATERIAL
 #define KDRAY_MATERIAL
 
@@ -8,12 +8,13 @@
 
 layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
 
-// Of what the ray has hit.
+// The material of the triangle that was hit.
 Material material_at(Hit hit) {
     return materials[load_triangle_materials(hit.triangle_ix)];
 }
 
-// Where light goes on from a surface, and what share of it. A weight of zero: no ray.
+// The directions in which a ray continues from a surface, and the factors of its throughput. A weight of zero means
+// that there is no such ray.
 struct Scattering {
     vec3 reflected;
     vec3 reflected_weight;
@@ -21,17 +22,19 @@ struct Scattering {
     vec3 transmitted_weight;
 };
 
-// The share of the surface's own light: what a see-through material (d < 1) covers.
+// The weight of the light that the surface itself reflects and emits: a see-through material (d < 1) covers only a
+// share d of what is behind it.
 float local_weight(Material material) {
     return (material.flags & MATERIAL_REFRACT) != 0u ? 1.0 : material.d;
 }
 
-// Whether light goes on from the surface.
+// Whether rays may continue from the surface.
 bool scatters_light(Material material) {
     return (material.flags & (MATERIAL_REFLECT | MATERIAL_REFRACT)) != 0u || material.d < 1.0;
 }
 
-// Diffuse and specular reflectance towards the viewer. All vectors point away from the surface.
+// The sum of the diffuse reflectance, times the cosine of the light's direction, and the specular reflectance towards
+// the viewer. All vectors are unit vectors that point away from the surface.
 vec3 phong(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
     float cos_light = dot(normal, to_light);
     if (!(cos_light > 0.0)) return vec3(0.0);
@@ -43,17 +46,18 @@ vec3 phong(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
     return reflectance;
 }
 
-// Whether a light from there can be seen in the surface.
+// Whether a light in the direction to_light is visible in the surface: whether it reflects more than
+// LEAST_REFLECTANCE.
 bool can_show(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
-    // Without a power for what is not black.
+    // The diffuse part decides most cases without the specular part's power.
     vec3 diffuse = material.kd * dot(normal, to_light) * local_weight(material);
     if (any(greaterThan(diffuse, vec3(LEAST_REFLECTANCE)))) return true;
     vec3 reflectance = phong(material, normal, to_viewer, to_light) * local_weight(material);
     return any(greaterThan(reflectance, vec3(LEAST_REFLECTANCE)));
 }
 
-// Unpolarized Fresnel reflectance of a smooth dielectric; 1 in total internal reflection.
-// cos_in > 0; eta: index on the ray's side over index beyond; cos_out from refraction_cosine.
+// Unpolarized Fresnel reflectance of a smooth dielectric; 1 in total internal reflection. cos_in: above 0. cos_out:
+// from refraction_cosine. eta: refractive index on the ray's side divided by that beyond the surface.
 float fresnel(float cos_in, float cos_out, float eta) {
     if (cos_out <= 0.0) return 1.0;
     float parallel = (cos_in - eta * cos_out) / (cos_in + eta * cos_out);
@@ -61,16 +65,17 @@ float fresnel(float cos_in, float cos_out, float eta) {
     return 0.5 * (parallel * parallel + perpendicular * perpendicular);
 }
 
-// Cosine of the refracted ray by Snell's law; 0 in total internal reflection.
+// Cosine between the refracted ray and the normal by Snell's law; 0 in total internal reflection.
 float refraction_cosine(float cos_in, float eta) {
     return sqrt(max(0.0, 1.0 - eta * eta * (1.0 - cos_in * cos_in)));
 }
 
-// A direction that an interpolated normal has put on the wrong side of the surface, mirrored back to `side`.
+// The direction, mirrored back to the surface's `side` if an interpolated normal has put it on the other one.
 vec3 keep_side(vec3 direction, vec3 side) {
     return direction - 2.0 * min(dot(direction, side), 0.0) * side;
 }
 
+// How a ray of this direction continues from a surface.
 Scattering scatter(Material material, Surface surface, vec3 direction) {
     Scattering s = Scattering(vec3(0.0), vec3(0.0), direction, vec3(0.0));
     bool reflects = (material.flags & MATERIAL_REFLECT) != 0u;
@@ -80,7 +85,7 @@ Scattering scatter(Material material, Surface surface, vec3 direction) {
         return s;
     }
     float eta = surface.from_inside ? material.ni : 1.0 / material.ni;
-    // An interpolated normal can turn away from the viewer: grazing then.
+    // An interpolated normal can turn away from the viewer. The ray then counts as grazing.
     float cos_in = max(dot(surface.shading, -direction), LEAST_COSINE);
     float cos_out = refraction_cosine(cos_in, eta);
     bool total = refracts && cos_out <= 0.0;

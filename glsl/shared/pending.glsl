@@ -1,4 +1,8 @@
-// Pending subtrees, kept as the constant TRAVERSAL says: one file for each way. A part of kdtree.glsl.
+// Pending subtrees, which the ray visits later. The constant TRAVERSAL selects how they are kept; each way has its
+// own file. A part of kdtree.glsl.
+//
+// Needs TRAVERSAL, kd_nodes.glsl, local_cells.glsl and slab.glsl. Provides `clear_pending`, `go_down`,
+// `push_pending`, `find_pending` and `take_pending`, and `descend_to_rope` of ropes.glsl.
 
 #include "kd_boxes.glsl"
 #include "pending_mask.glsl"
@@ -9,6 +13,7 @@
 #include "pending_backtrack.glsl"
 #include "ropes.glsl"
 
+// Forgets all pending subtrees: a new ray begins.
 void clear_pending() {
     pending_mask = uvec2(0u);
     stack_size = 0u;
@@ -18,7 +23,7 @@ void clear_pending() {
     siblings_done = uvec2(0u);
 }
 
-// A level down, where a bit is kept for each.
+// Notes that the ray goes one level down. Only ways that keep a bit for each level do anything.
 void go_down() {
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) siblings_done = below(siblings_done);
     if (TRAVERSAL == TRAVERSAL_MASK) mask_down();
@@ -26,9 +31,9 @@ void go_down() {
     if (TRAVERSAL == TRAVERSAL_SHORT_STACK) marked_down();
 }
 
-// The sibling of the cell's node, to which the ray comes later, until it leaves the cell.
+// Makes the sibling of the cell's node pending. The ray leaves it at the cell's t_exit.
 void push_pending(Cell cell) {
-    // These find out on the way back.
+    // These ways find pending subtrees on the way back up.
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;
     if (TRAVERSAL == TRAVERSAL_MASK) mask_push(cell);
@@ -36,9 +41,10 @@ void push_pending(Cell cell) {
     else marked_push(cell);
 }
 
-// Whether a pending cell may hold a hit nearer than t_best. Ways that have to look for it are in it then.
+// Returns whether there is a pending cell that may hold a hit nearer than t_best. Ways that have to search for that
+// cell (TRAVERSAL_MASK_BOXES and TRAVERSAL_BACKTRACK) write it to `cell`.
 bool find_pending(TraversalRay ray, float t_best, inout Cell cell) {
-    // What has not been visited begins where the leaf ends, or later.
+    // Every cell that has not been visited begins where the leaf ends, or later.
     bool has_time = !(t_best < cell.t_exit);
     if (TRAVERSAL == TRAVERSAL_STACK) return has_time && stack_size > 0u;
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return has_time && climb_by_boxes(ray, t_best, cell);
@@ -47,7 +53,8 @@ bool find_pending(TraversalRay ray, float t_best, inout Cell cell) {
     return has_time && pending_mask != uvec2(0u);
 }
 
-// To the pending cell that was found, but for those that are there. It begins where the ray has left the last one.
+// Takes the pending cell that was found, unless `find_pending` has already done so. The cell begins at the t where
+// the ray left the last one.
 void take_pending(TraversalRay ray, inout Cell cell) {
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;

@@ -1,10 +1,16 @@
-// Pending subtrees without any memory: back to the deepest ancestor whose box the ray has not left, and down from there
-// (Foley, Sugerman: KD-Tree Acceleration Structures for a GPU Raytracer, Graphics Hardware 2005, "kd-backtrack").
+// Pending subtrees without any memory: the ray goes back to the deepest ancestor whose box it has not left, and down
+// from there (Foley, Sugerman: KD-Tree Acceleration Structures for a GPU Raytracer, Graphics Hardware 2005,
+// "kd-backtrack"). A part of pending.glsl.
 //
-// The paper compares the ancestor's exit with the leaf's: where cells end at the same t, that could lead back into the
-// leaf. But the ray comes to an ancestor from its first child or from its second, and the
-// direction alone says which is which: from the second the ancestor is done; from the first, it is left unless its
-// split plane lies before its exit.
+// The paper compares the ancestor's exit with the leaf's. If cells end at the same t, that could lead back into the
+// leaf. This version uses that the ray comes back to an ancestor from its first child or from its second, and that
+// the ray's direction alone tells which child that is. From the second child, the ancestor is done. From the first
+// child, the second one is pending if the ray crosses the split plane before it leaves the ancestor.
+//
+// Needs kd_nodes.glsl and kd_boxes.glsl. Provides `backtrack`.
+
+// Finds the next pending cell upwards from the cell's node. Returns false if there is none that may hold a hit nearer
+// than t_best.
 
 bool backtrack(TraversalRay ray, float t_best, inout Cell cell) {
     while (cell.node_offset != 0u) {

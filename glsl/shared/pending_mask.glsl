@@ -1,25 +1,29 @@
-// Pending subtrees by the paper's bit mask: one bit a level, set where the sibling on that level is still to be
-// visited (the paper stores the opposite, "sibling done"; 32 levels in one word).
+// Pending subtrees by the paper's bit mask. It has one bit for each level, which is set if the sibling on that level
+// is still to be visited. (The paper stores the opposite, "sibling done", of 32 levels in one word.) A part of
+// pending.glsl.
 //
-// The paper counts levels from the root, and climbs one after the other to test the sibling's box. Here the mask is shifted
-// as the ray goes down: the lowest bit is the level of the cell's node, so that no depth is kept, and the lowest bit that is set
-// tells at once how far to go up. What is pending stands in local memory in the bits' order (local_cells.glsl), without gaps: with
-// a place for each level, rays that part soon spread over memory that the first cache cannot hold, and take up to a quarter
-// longer (benches/EXPERIMENTS.md).
+// The paper counts levels from the root, and climbs them one by one to test the sibling's box. Here the mask is
+// shifted as the ray goes down. So the lowest bit is the level of the cell's node, no depth has to be kept, and the
+// lowest set bit tells directly how many levels to go up. The pending cells are in local memory in the order of the
+// bits, without gaps (local_cells.glsl). With a slot for each level, divergent rays would soon spread over more
+// memory than the first cache holds, and would take up to a quarter longer (benches/EXPERIMENTS.md).
+//
+// Needs kd_nodes.glsl and local_cells.glsl. Provides `mask_down`, `mask_push` and `mask_pop`. Other ways also use the
+// mask itself: `below`, `above`, `is_pending`, `mark` and `mask_up`.
 
-// 1 where no leaf lies deeper than KD_WORD_DEPTH, as in most trees: a mask of one word is shifted and searched faster. The same
-// for all kernels over one tree.
+// 1 if no leaf is deeper than KD_WORD_DEPTH, as in most trees; else 2. A mask of one word is shifted and searched
+// faster. The value is the same for all kernels over one tree.
 layout(constant_id = CONSTANT_MASK_WORDS) const uint MASK_WORDS = 2u;
 
-// Bit i, of the words together: the sibling i levels above the cell's node.
+// Bit i, counted over both words: whether the sibling i levels above the cell's node is pending.
 uvec2 pending_mask;
 
-// A mask as it is one level farther down.
+// The mask as seen from one level farther down.
 uvec2 below(uvec2 mask) {
     return uvec2(mask.x << 1, MASK_WORDS == 1u ? 0u : (mask.y << 1) | (mask.x >> (KD_WORD_DEPTH - 1u)));
 }
 
-// And n levels farther up, fewer than a word's.
+// The mask as seen from n levels farther up, n < KD_WORD_DEPTH.
 uvec2 above(uvec2 mask, uint n) {
     if (MASK_WORDS == 1u) return uvec2(mask.x >> n, 0u);
     return uvec2((mask.x >> n) | ((mask.y << 1) << (KD_WORD_DEPTH - 1u - n)), mask.y >> n);
@@ -40,12 +44,12 @@ void mask_down() {
     pending_mask = below(pending_mask);
 }
 
-// The sibling of the cell's node is pending.
+// Marks the sibling of the cell's node as pending.
 void mark() {
     pending_mask.x |= 1u;
 }
 
-// Up to the lowest sibling that is pending, and is no more. By how many levels. The mask is not empty.
+// Goes up to the lowest pending sibling and clears its bit. Returns the number of levels. The mask must not be empty.
 uint mask_up() {
     bool is_high = MASK_WORDS == 2u && pending_mask.x == 0u;
     if (is_high) pending_mask = uvec2(pending_mask.y, 0u);
@@ -55,12 +59,13 @@ uint mask_up() {
     return is_high ? KD_WORD_DEPTH + n : n;
 }
 
-// Where the last of what is pending is kept.
+// Slot of the last pending cell in local memory.
 uint last_place() {
     return n_pending() - 1u;
 }
 
-// A cell's place is asked for where the mask has its bit: NVIDIA's compiler takes 48 registers, not 40, where it has not.
+// Both functions compute a cell's slot while the cell's bit is set in the mask. Otherwise NVIDIA's compiler uses 48
+// registers instead of 40.
 void mask_push(Cell cell) {
     mark();
     keep_cell(last_place(), cell);

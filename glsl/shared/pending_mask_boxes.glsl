@@ -1,12 +1,19 @@
-// Pending subtrees as the paper has them (Algorithm 2): nothing is noted on the way down. On the way up, a level at a
-// time, a bit says that the sibling has been visited; where it has not, its box is tested.
+// Pending subtrees as in the paper's Algorithm 2. Nothing is stored on the way down. On the way up, which goes level
+// by level, a bit tells whether the sibling has been visited. If it has not, its box is tested. A part of
+// pending.glsl.
 //
-// Corrected: 64 levels for 31; a failed test leaves the entry point alone; and a hit ends the search
-// only where no other cell can hold a nearer one, not as soon as a leaf has any.
+// This version corrects the paper in three points. There are 64 levels instead of 31. A failed test does not change
+// the entry point. A hit ends the search only if no other cell can hold a nearer one, not as soon as any leaf has a
+// hit.
+//
+// Needs kd_nodes.glsl, kd_boxes.glsl and pending_mask.glsl. Provides `climb_by_boxes` and `siblings_done`.
 
-// As pending_mask.glsl has them, from the cell's node upward.
+// Bit i, counted over both words: whether the sibling i levels above the cell's node has been visited. Shifted as
+// `pending_mask` is.
 uvec2 siblings_done;
 
+// Finds the next pending cell upwards from the cell's node. Returns false if there is none that may hold a hit nearer
+// than t_best.
 bool climb_by_boxes(TraversalRay ray, float t_best, inout Cell cell) {
     while (cell.node_offset != 0u) {
         count_turn();

@@ -1,15 +1,19 @@
-// Pending subtrees found again from the root (Foley, Sugerman: KD-Tree Acceleration Structures for a GPU Raytracer,
-// Graphics Hardware 2005). No parent links, and nothing is kept but a bit a level.
+// Pending subtrees by restarts: each is found from the root (Foley, Sugerman: KD-Tree Acceleration Structures for a
+// GPU Raytracer, Graphics Hardware 2005). There are no parent links, and only one bit for each level is kept. A part
+// of pending.glsl.
 //
-// The paper keeps not even that: it enters the root again where the ray left the leaf. But cells that meet in one t have
-// to be told apart, lest the old leaf be entered for ever. The bits are the trail of the way down (Laine: Restart Trail for Stackless BVH Traversal, HPG 2010), read as
-// pending_mask.glsl writes them: at a set bit the way went to the first child; at one that is not set to the second,
-// where the ray enters it at all. Each restart clears the lowest set bit and only sets lower ones: it ends.
+// The paper does not keep these bits: it enters the root again at the t where the ray left the leaf. But cells that
+// meet at one t have to be told apart, or the old leaf would be entered for ever. The bits are the trail of the path
+// down (Laine: Restart Trail for Stackless BVH Traversal, HPG 2010), in the form that pending_mask.glsl writes. At a
+// set bit, the path went to the first child. At a cleared bit, it went to the second child if the ray enters that
+// child at all. Each restart clears the lowest set bit and sets only lower ones, so the traversal ends.
+//
+// Needs kd_nodes.glsl and pending_mask.glsl. Provides `trail_length` and `retrace`.
 
-// Levels from the root down to the cell's node.
+// Levels from the root to the cell's node.
 uint trail_length;
 
-// From the root to the lowest pending node, which is pending no more.
+// Walks from the root to the lowest pending node, whose bit it clears.
 void retrace(TraversalRay ray, inout Cell cell) {
     trail_length -= mask_up();
     cell.node_offset = 0u;

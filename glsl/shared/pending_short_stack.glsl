@@ -1,10 +1,14 @@
-// The newest pending subtrees on a short stack, a ring; older ones, which it has lost, by the mask, down to them from the
-// root (Horn, Sugerman, Houston, Hanrahan: Interactive k-D Tree GPU Raytracing, I3D 2007; there the ray restarts where it
-// left the leaf). Most rays lose none.
+// Pending subtrees on a short stack, which is a ring and keeps the newest ones (Horn, Sugerman, Houston, Hanrahan:
+// Interactive k-D Tree GPU Raytracing, I3D 2007). Older ones, which the ring has lost, are found from the root by the
+// mask (pending_restart.glsl). In the paper, the ray restarts at the t where it left the leaf. Most rays lose no
+// entry. A part of pending.glsl.
+//
+// Needs kd_nodes.glsl, pending_mask.glsl and pending_restart.glsl. Provides `marked_down`, `marked_push` and
+// `marked_pop`, which serve both TRAVERSAL_SHORT_STACK and TRAVERSAL_RESTART: the latter never pushes to the ring.
 
-// Node, and the bits of where the ray leaves it.
+// Each entry: offset of the node whose sibling is pending, and the bits of the t at which the ray leaves the sibling.
 uvec2 short_stack[SHORT_STACK_SIZE];
-// Where the next entry goes, and how many are kept.
+// Number of the next entry, whose slot is its remainder by the ring's size; number of entries that the ring holds.
 uint short_stack_top;
 uint short_stack_size;
 

@@ -1,5 +1,8 @@
-// Pending subtrees on a stack in local memory (local_cells.glsl): no bits, no levels.
+// Pending subtrees on a stack in local memory, without bits and levels. A part of pending.glsl.
+//
+// Needs local_cells.glsl. Provides `stack_size`, `stack_push` and `stack_pop`.
 
+// Entries on the stack.
 uint stack_size;
 
 void stack_push(Cell cell) {

@@ -1,6 +1,9 @@
-// How a stalled ray's traversal is stored, and begun again where it stopped. A part of kdtree.glsl.
+// Storing of a stalled ray's traversal, and resuming it where it stopped. A part of kdtree.glsl.
+//
+// Needs stalls.glsl, steps.glsl, local_memory.glsl, candidate.glsl, kd_nodes.glsl, pending.glsl and leaf.glsl.
+// Provides `stall_at` and `resume`.
 
-// Stores where the ray is, and returns the mark for its result.
+// Stores the state of the ray, and returns the mark for its result.
 uint stall_at(Cell cell, Visit visit, Nearest best) {
     vec2 weights = spilled_pair(WEIGHTS_SLOT);
     return stall(StalledRay(
@@ -9,10 +12,12 @@ uint stall_at(Cell cell, Visit visit, Nearest best) {
     ));
 }
 
-// Walks from the root to a node, so that the same subtrees are pending as when the ray first came to the node. The links
-// to parents tell the path. Every crossing is computed by the same operations as before, so it has the same bits.
+// Walks from the root to a node, so that the same subtrees are pending as when the ray first came to the node. The
+// path is found by the links to parents. Every crossing is computed by the same operations as the first time, so it
+// has the same bits.
 void walk_to(TraversalRay ray, uint node_offset) {
-    // Bit i: whether the node i levels above the last one is the child above its split's plane.
+    // Bit i, counted over both words: whether the node i levels above the last one is the child above its parent's
+    // plane.
     uvec2 path = uvec2(0u);
     uint n_levels = 0u;
     for (uint at = node_offset; at != 0u; at = offset_of(kd_parent_of(node_ix_of(at)))) {
@@ -41,7 +46,7 @@ void walk_to(TraversalRay ray, uint node_offset) {
     }
 }
 
-// Takes up the ray's stored state.
+// Loads the ray's stored state.
 void resume(TraversalRay ray, out Cell cell, out Visit visit, out Nearest best) {
     StalledRay state = stalled_rays[resumed_slot];
     cell = Cell(state.node_offset, state.t_enter, state.t_exit);
@@ -50,7 +55,7 @@ void resume(TraversalRay ray, out Cell cell, out Visit visit, out Nearest best) 
     visit = Visit(state.entry_ix, state.end_ix, segment_of(cell.t_enter, min(cell.t_exit, best.t)));
     count_steps(state.n_steps);
     siblings_done = state.siblings_done;
-    // These find what is pending on their way back, or by a rope.
+    // These ways find pending subtrees on the way back up, or by a rope.
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;
     if (TRAVERSAL == TRAVERSAL_ROPES) return;

@@ -1,17 +1,19 @@
-// From leaf to leaf by ropes, without a stack (Popov, Günther, Seidel, Slusallek: Stackless KD-Tree Traversal for High
-// Performance GPU Ray Tracing, Eurographics 2007). A rope leads from a face of a leaf to the smallest node that has all
-// of the face's other side.
+// Traversal from leaf to leaf by ropes, without a stack (Popov, Günther, Seidel, Slusallek: Stackless KD-Tree
+// Traversal for High Performance GPU Ray Tracing, Eurographics 2007). A rope leads from a face of a leaf to the
+// smallest node that contains everything on the other side of the face. A part of pending.glsl.
 //
-// The leaves on the way end and begin at the same t, so every hit's t is in one of them; which of several that meet there
-// does not matter.
+// Each leaf on the ray's path begins at the t at which the leaf before it ends, so every hit's t is in one of them.
+// If several leaves meet at that t, it does not matter which of them the ray enters.
+//
+// Needs scene.glsl, kd_nodes.glsl and slab.glsl. Provides `descend_to_rope`.
 
-// Where the ray leaves a cell, and the node that is there.
+// The t at which the ray leaves a cell, and the node that it enters there: 0 if it leaves the root's cell.
 struct Exit {
     float t;
     uint node_ix;
 };
 
-// By the face that it comes to along an axis.
+// The exit through the far face on one axis.
 Exit exit_along(TraversalRay ray, uint leaf_ix, uint axis) {
     float inv_direction = along(ray.inv_direction, axis);
     KdRope rope = kd_rope_of(leaf_ix, 2u * axis + (inv_direction < 0.0 ? 0u : 1u));
@@ -19,7 +21,7 @@ Exit exit_along(TraversalRay ray, uint leaf_ix, uint axis) {
     return Exit(t, rope.node_ix);
 }
 
-// By the face that it comes to first.
+// The exit through the face that the ray comes to first.
 Exit exit_of(TraversalRay ray, uint leaf_ix) {
     Exit x = exit_along(ray, leaf_ix, 0u);
     Exit y = exit_along(ray, leaf_ix, 1u);
@@ -28,8 +30,10 @@ Exit exit_of(TraversalRay ray, uint leaf_ix) {
     return Exit(t, x.t == t ? x.node_ix : (y.t == t ? y.node_ix : z.node_ix));
 }
 
-// Down to the leaf where the ray is at t_enter, through all slabs but the leaf's own: to find out where the ray leaves other cells
-// costs more than their slabs spare (benches/EXPERIMENTS.md). Then node_offset is where the rope of the face leads to by which the ray leaves it.
+// Descends to the leaf that contains the ray at t_enter. Of all slabs, only the leaf's own is tested: the others
+// would require the t at which the ray leaves their cells, which costs more than these slabs save
+// (benches/EXPERIMENTS.md). Afterwards, the cell's node_offset is that of the node to which the rope leads from the
+// face by which the ray leaves the leaf.
 KdNode descend_to_rope(TraversalRay ray, float t_best, inout Cell cell) {
     KdNode node = kd_node(cell.node_offset);
     while (!is_leaf(node)) {

@@ -1,19 +1,20 @@
-// Prefix sums over a workgroup of SCAN_GROUP_SIZE invocations, for every subgroup size from 4 to 128.
-// Needs full subgroups. Include in kernels with that workgroup size.
+// Prefix sums over a workgroup of SCAN_GROUP_SIZE invocations, for every subgroup size from 4 to 128. The kernel that
+// includes this file must have that workgroup size, full subgroups and GL_KHR_shader_subgroup_arithmetic.
 #ifndef KDRAY_SCAN
 #define KDRAY_SCAN
 
 #include "layout.glsl"
 
-// One total a subgroup: 32 subgroups at the most, of 4 invocations.
+// One total per subgroup. There are at most 32 subgroups, of 4 invocations.
 shared uint subgroup_totals[SCAN_GROUP_SIZE / 4u];
 
-// This invocation's place in the order that subgroup scans follow (gl_LocalInvocationIndex need not be in that order).
+// The invocation's index in the order of subgroup scans, which need not be that of gl_LocalInvocationIndex.
 uint scan_rank() {
     return gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID;
 }
 
-// Sum of `value` over the invocations of lower rank; `total` over all of them. Uniform control flow only.
+// The sum of `value` over the invocations of lower rank. total: the sum over all invocations. Needs uniform control
+// flow.
 uint workgroup_exclusive_add(uint value, out uint total) {
     uint before = subgroupExclusiveAdd(value);
     if (gl_SubgroupInvocationID == gl_SubgroupSize - 1u) subgroup_totals[gl_SubgroupID] = before + value;

@@ -1,11 +1,15 @@
-// The scene's triangles and their acceleration structure, as kernels read them. There are three ways, one for all kernels
-// over a scene:
+// Access to the scene's triangles and their acceleration structure. All kernels over a scene read them in the same
+// one of three ways:
 //
-// - as storage buffers that are bound, on GPUs;
-// - as texels of the same buffers, on software drivers: lavapipe fetches the texels of eight lanes side by side, and loads
-//   from storage lane by lane, by which rays take 1.2 to 1.4 times as long;
-// - by address if an array is larger than what the device binds. The traversal loses up to 7 % of its speed by it on a large
-//   GPU.
+// - GPUs read them as bound storage buffers.
+// - Software drivers read them as texels of the same buffers. lavapipe fetches the texels of eight lanes side by
+//   side, but loads from storage buffers lane by lane, with which rays take 1.2 to 1.4 times as long.
+// - If an array is larger than what the device binds, it is read by its device address. This costs the traversal up
+//   to 7 % of its speed on a large GPU.
+//
+// Needs nothing: it includes layout.glsl, and declares all bindings of the scene's arrays. Provides `accel`, the
+// function `load_NAME` for each array, and functions that assemble an element: `triangle_at`, `kd_node_at`,
+// `kd_parent_of`, `leaf_triangle_at`, `corners_of`, `kd_box_of` and `kd_rope_of`.
 #ifndef KDRAY_SCENE
 #define KDRAY_SCENE
 
@@ -18,7 +22,7 @@ layout(constant_id = CONSTANT_READING) const uint READING = READING_BOUND;
 
 layout(std140, set = 0, binding = BIND_ACCEL) uniform AccelBlock { AccelConstants accel; };
 
-// A row of each type, by address and as a texel.
+// For each type of row: a reference by device address, and a function that reads a texel.
 layout(std430, buffer_reference, buffer_reference_align = 16) readonly buffer vec4_array { vec4 at[]; };
 layout(std430, buffer_reference, buffer_reference_align = 8) readonly buffer uvec2_array { uvec2 at[]; };
 layout(std430, buffer_reference, buffer_reference_align = 4) readonly buffer uint_array { uint at[]; };
@@ -35,7 +39,7 @@ uint uint_texel(usamplerBuffer texels, uint row_ix) {
     return texelFetch(texels, int(row_ix)).x;
 }
 
-// For each array: its buffer, the same as texels, and the function that loads a row.
+// For each array: its buffer, the same buffer as texels, and the function that loads a row.
 #define ARRAY(name, element, row, number) \
     layout(std430, set = 0, binding = number) readonly buffer name##_block { row name[]; }; \
     layout(set = 0, binding = BIND_TEXELS + number) uniform usamplerBuffer name##_texels; \
@@ -59,7 +63,7 @@ KdNode kd_node_at(uint node_ix) {
     return KdNode(words.x, words.y);
 }
 
-// The parent of a node, which it shares with its sibling.
+// The parent of a node. Siblings share one entry.
 uint kd_parent_of(uint node_ix) {
     return load_kd_parents(node_ix >> 1);
 }
@@ -71,7 +75,7 @@ LeafTriangle leaf_triangle_at(uint entry_ix) {
     return LeafTriangle(v0.xyz, floatBitsToUint(v0.w), v1.xyz, 0u, v2.xyz, 0u);
 }
 
-// The corners of a leaf's triangle, which are all that a test needs.
+// The corners of a leaf's triangle, without shading normals: a test needs only the corners.
 Triangle corners_of(LeafTriangle entry) {
     return Triangle(entry.v0, 0u, entry.v1, 0u, entry.v2, 0u);
 }
@@ -83,7 +87,7 @@ KdBox kd_box_of(uint node_ix) {
     return KdBox(a.x, a.y, b.x, b.y, c.x, c.y);
 }
 
-// side: below and above on x, y, z.
+// side: 0..5, below and above on x, y, z.
 KdRope kd_rope_of(uint node_ix, uint side) {
     uvec2 words = load_kd_ropes(6u * node_ix + side);
     return KdRope(uintBitsToFloat(words.x), words.y);

@@ -1,33 +1,35 @@
-// The arrays of the scene: what kernels read of its triangles and of its acceleration structure.
+// List of the scene's arrays, which hold its triangles and its acceleration structure.
 //
-// Each row gives an array's name, the type of an element, the type that a kernel loads at once, and the number of the array's
-// binding. A kernel reads row i of an array by `load_NAME(i)`. Elements that are wider than a row take several rows.
+// Each line below gives an array's name, the type of an element, the type that a kernel loads at once (a row), and
+// the number of the array's binding. A kernel reads row i of an array by `load_NAME(i)`. An element that is wider
+// than a row takes several rows.
 //
-// Whoever includes this file says by ARRAY what becomes of a row: layout.glsl makes members of AccelConstants, scene.glsl
-// buffers and functions, and build.rs the types in Rust. A new array takes two edits: a row here, and its contents in
+// Needs the macro ARRAY(name, element, row, number), and provides one expansion of it for each array. layout.glsl
+// turns the expansions into members of AccelConstants, scene.glsl into buffers and functions. build.rs reads this
+// file itself and writes the types in Rust. A new array takes two edits: a line here, and its contents in
 // src/buffers/accel.rs.
 
-// The triangles, in the order of the scene. Three rows each: a corner, and its shading normal in the fourth word.
+// The triangles, in the order of the scene. Each has three rows: a corner, and its shading normal in the fourth word.
 ARRAY(triangles, Triangle, vec4, 1u)
-// One for each triangle: the index of its material; for casts with a filter, TRIANGLE_HIDDEN or 0.
+// One word for each triangle: the index of its material. For casts with a filter, it is TRIANGLE_HIDDEN or 0.
 ARRAY(triangle_materials, uint, uint, 2u)
 
 // The nodes of the kd-tree.
 ARRAY(kd_nodes, KdNode, uvec2, 5u)
-// One for each pair of nodes: the index of their parent.
+// One word for each pair of siblings: the index of their parent.
 ARRAY(kd_parents, uint, uint, 6u)
-// The cells of a grid: the upper level's, x fastest, then y, and behind them the blocks of the lower level, in the order of the
-// upper cells.
+// The cells of a grid: those of the upper level, x fastest, then y. The blocks of the lower level follow, in the
+// order of the upper cells.
 ARRAY(grid_cells, GridCell, uvec2, 30u)
 
-// One for each triangle of each leaf, in the order of the leaves. Three rows each: a corner, and in the first row's fourth
-// word the triangle's index.
+// One entry for each triangle of each leaf, in the order of the leaves. Each has three rows: a corner, and in the
+// first row's fourth word the triangle's index.
 ARRAY(leaf_triangles, LeafTriangle, vec4, 7u)
-// One for each of `leaf_triangles`: the plane of the triangle.
+// One plane for each entry of `leaf_triangles`: the plane of its triangle.
 ARRAY(leaf_planes, Plane, vec4, 23u)
-// One for each node, or none: the slab that holds what the node's triangles have within its cell.
+// One slab for each node, or none at all: it holds the parts of the node's triangles that are within its cell.
 ARRAY(kd_slabs, Slab, vec4, 27u)
-// One for each node, or none: the cell. Three rows each. For some traversals.
+// One box for each node, or none at all: the node's cell, three rows each. Only some traversals read them.
 ARRAY(kd_boxes, KdBox, uvec2, 21u)
-// Six for each node, or none: below and above on x, y, z. For the traversal by ropes.
+// Six ropes for each node, or none at all: below and above on x, y, z. Only the traversal by ropes reads them.
 ARRAY(kd_ropes, KdRope, uvec2, 22u)

@@ -1,25 +1,30 @@
-// What spares a ray tests: where it keeps clear of the slab around a node's surface, all that is below; where it keeps clear of
-// a triangle's plane, the triangle.
+// Two ways to save tests. If a ray keeps clear of the slab around a node's surface, everything below the node is
+// skipped. If it keeps clear of a triangle's plane, the triangle is skipped. A part of kdtree.glsl.
+//
+// Needs scene.glsl, steps.glsl, traversal_ray.glsl, kd_nodes.glsl and PREDICATES_BRANCHES. Provides `Segment`,
+// `is_clear`, `is_open_split`, `has_slab` and `enter_slab`.
 
-// A way from t_middle - t_half to t_middle + t_half, in the ray's own t.
+// A segment of the ray, from t_middle - t_half to t_middle + t_half in the ray's own t.
 struct Segment {
     float t_middle;
     float t_half;
 };
 
-// In the traversal's t, which are half as large.
+// The segment between two t of the traversal, which are half of the ray's own.
 Segment segment_of(float t_enter, float t_exit) {
     return Segment(t_enter + t_exit, t_exit - t_enter);
 }
 
-// Whether the ray keeps to one side of a plane (normal, distance from the origin) on its way, farther from it than `reach`.
+// Whether the segment `way` of the ray stays on one side of a plane (normal, distance from the world's origin),
+// farther from it than `reach`, which is in the units of that distance.
 bool is_clear(TraversalRay ray, Segment way, vec4 plane, float reach) {
     float height = dot(plane.xyz, ray.shear.origin) - plane.w;
     float slope = dot(plane.xyz, ray.direction);
     return abs(fma(way.t_middle, slope, height)) > fma(way.t_half, abs(slope), reach);
 }
 
-// A split that has no slab, or none that is looked at.
+// Whether the node is a split whose children can be visited: it has no slab, or the ray has already passed the slab's
+// test.
 bool is_open_split(KdNode node) {
     return (node.axis_and_child & (KD_LEAF | KD_HAS_SLAB)) == 0u;
 }
@@ -29,7 +34,8 @@ bool has_slab(KdNode node) {
     return (node.axis_and_child & KD_HAS_SLAB) != 0u;
 }
 
-// The node as it is within its slab; an empty leaf, if the ray does not come into that in its way through the cell.
+// Tests the node's slab. Returns the node without the mark of a slab if the ray comes into the slab on its way
+// through the cell, and otherwise an empty leaf.
 KdNode enter_slab(TraversalRay ray, float t_best, Cell cell, KdNode node) {
     count_steps(1u);
     Segment way = segment_of(cell.t_enter, min(cell.t_exit, t_best));

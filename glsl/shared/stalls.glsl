@@ -1,10 +1,13 @@
-// Rays that stop on their way through the tree, and go on in a further dispatch.
+// Stalled rays, which stop during the search and continue in a further dispatch.
 //
-// Some drivers end a shader after a number of turns of its loops, and say nothing: the lavapipe of Mesa 22.3 does so after
-// 65,535 turns of the eight lanes that it runs together. So an invocation counts its turns. When TURN_BUDGET of them are
-// spent, it stores the state of its ray in a slot and leaves a mark in place of the result; the host repeats the dispatch
-// until no ray is marked (src/buffers/stalls.rs). Drivers without such a limit have a budget of 0, with which all of this
-// is compiled out.
+// Some drivers silently end a shader after a number of loop turns: lavapipe of Mesa 22.3 does so after 65,535 turns
+// of the eight lanes that it runs together. So an invocation counts its turns. When TURN_BUDGET turns are spent, it
+// stores the state of its ray in a slot, and writes a mark in place of the result. The host repeats the dispatch
+// until no ray is marked (src/buffers/stalls.rs). Drivers without such a limit have a budget of 0, with which all of
+// this is compiled out.
+//
+// Needs nothing: it includes layout.glsl and declares the binding. Provides `count_turn` and `has_turns` for loops,
+// `StalledRay`, `stall`, `is_resumed` and `resumed_slot` for searches, `is_stalled` and `runs_in_round` for kernels.
 #ifndef KDRAY_STALLS
 #define KDRAY_STALLS
 
@@ -13,9 +16,13 @@
 layout(constant_id = CONSTANT_TURN_BUDGET) const uint TURN_BUDGET = 0u;
 const bool CAN_STALL = TURN_BUDGET != 0u;
 
-// STALLED_RAY_ROWS rows: the state of a ray that has stalled. The cell that it is in (node_offset: its node's place in kd_nodes, in bytes;
-// t in halves of the ray's own), the entries of the leaf that are still to be tested, and the nearest hit so far.
-// siblings_done: the words of the mask of TRAVERSAL_MASK_BOXES; other traversals find their pending subtrees again.
+// The state of a ray that has stalled, STALLED_RAY_ROWS rows. All t are the traversal's, half of the ray's own.
+//
+// node_offset, t_enter, t_exit: the cell that the ray is in (kd_nodes.glsl). entry_ix, end_ix: the entries of the
+// leaf that are still to be tested. t_best, triangle_ix, u, v: the nearest hit so far. n_steps: reads so far
+// (steps.glsl). siblings_done: the mask of TRAVERSAL_MASK_BOXES; the other traversals of the kd-tree rebuild their
+// pending subtrees. grid.glsl stores the ray's cube in node_offset, and the cube of the upper level in
+// siblings_done.x.
 struct StalledRay {
     uint node_offset;
     float t_enter;
@@ -30,8 +37,8 @@ struct StalledRay {
     uvec2 siblings_done;
 };
 
-// One row. n_slots: slots that have been asked for; n_stalled: rays of the last dispatch that have stalled and have a
-// slot; n_waiting: rays that have none.
+// One row. n_slots: slots that rays have requested, which can be more than there are. n_stalled: rays of the last
+// dispatch that have stalled and have a slot. n_waiting: stalled rays that have no slot.
 struct StallCounts {
     uint n_slots;
     uint n_stalled;
@@ -39,7 +46,7 @@ struct StallCounts {
     uint reserved;
 };
 
-// One buffer for both: some devices bind no more than 30 in a stage.
+// One buffer holds both, since some devices bind no more than 30 buffers in a stage.
 layout(std430, set = 0, binding = BIND_STALLS) buffer StallsBlock {
     StallCounts stall_counts;
     StalledRay stalled_rays[];
@@ -48,27 +55,30 @@ layout(std430, set = 0, binding = BIND_STALLS) buffer StallsBlock {
 // Turns that this invocation has taken.
 uint n_turns = 0u;
 
-// To be called in every turn of every loop of a traversal.
+// Counts a turn. Every loop of a search calls this in every turn.
 void count_turn() {
     if (CAN_STALL) n_turns += 1u;
 }
 
+// Whether the invocation may take further turns.
 bool has_turns() {
     return TURN_BUDGET == 0u || n_turns < TURN_BUDGET;
 }
 
-// Slot of the ray's stored state, or NO_SLOT for a ray that begins.
+// Slot of the ray's stored state, or NO_SLOT if the ray begins.
 uint resumed_slot = NO_SLOT;
 
 bool is_resumed() {
     return CAN_STALL && resumed_slot != NO_SLOT;
 }
 
+// Whether a result is the mark of a stalled ray.
 bool is_stalled(uint mark) {
     return CAN_STALL && mark >= STALLED && mark != NO_TRIANGLE;
 }
 
-// Whether a ray runs in this round (ROUND_*). mark: what the round before has left in place of its result.
+// Whether a ray runs in this round (ROUND_*). Sets `resumed_slot` in ROUND_RESUME. mark: the word that the round
+// before has written as the ray's result.
 bool runs_in_round(uint round, uint mark) {
     if (TURN_BUDGET == 0u || round == ROUND_BEGIN) return true;
     if (!is_stalled(mark)) return false;
@@ -77,7 +87,7 @@ bool runs_in_round(uint round, uint mark) {
     return (slot == NO_SLOT) == (round == ROUND_RESTART);
 }
 
-// Stores a ray's state in the ray's slot, or in a new one. Returns the mark that is to take the place of its result. A ray
+// Stores a ray's state in the ray's slot, or in a new one. Returns the mark that replaces the ray's result. A ray
 // that finds no slot begins again in a later round.
 uint stall(StalledRay state) {
     uint slot = resumed_slot;

@@ -1,9 +1,11 @@
-// What an invocation's rays read of the tree. Who includes this says before whether to count, by COUNT_COSTS, a constant;
-// where it is false, nothing is left of the counting.
+// Counts of what an invocation's rays read of the acceleration structure.
+//
+// Needs a constant `bool COUNT_COSTS`, which the includer declares before. If it is false, the counting is compiled
+// out. Provides `count_steps`, `steps_so_far` and `n_steps`.
 #ifndef KDRAY_STEPS
 #define KDRAY_STEPS
 
-// Nodes, and triangles of leaves, so far.
+// Reads so far: nodes, slabs, cells of a grid, and triangles of leaves.
 uint n_steps = 0u;
 
 void count_steps(uint n) {

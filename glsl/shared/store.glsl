@@ -1,5 +1,5 @@
-// Rays and hits to memory, a whole vector at once. A struct's members are stored one by one by some drivers, and a ray that is
-// written in nine pieces takes three times as long (benches/EXPERIMENTS.md).
+// Stores of rays and hits, by whole vectors. Some drivers store a struct member by member, and a ray that is written
+// in nine pieces takes three times as long (benches/EXPERIMENTS.md).
 #ifndef KDRAY_STORE
 #define KDRAY_STORE
 

@@ -1,22 +1,23 @@
-// The surface at a hit, and rays that leave it.
+// The surface at a hit, and the rays that leave it. Twin of src/reference/surface.rs.
 #ifndef KDRAY_SURFACE
 #define KDRAY_SURFACE
 
 #include "layout.glsl"
 
+// The surface of a triangle at a hit, as the ray meets it.
 struct Surface {
     vec3 point_world;
-    // Unit normals on the side that the ray came from: the plane's, and the interpolated one.
+    // Unit normals on the side that the ray comes from: the triangle's plane's, and the interpolated one.
     vec3 geometric;
     vec3 shading;
-    // Distance along `geometric` at which a new ray starts clear of this surface.
+    // Distance along `geometric` at which a new ray starts so that it does not hit this surface, world units.
     float clearance;
-    // The ray met the triangle's back: it leaves a solid.
+    // Whether the ray meets the triangle's back: then it is inside a solid.
     bool from_inside;
 };
 
-// Unit vector of an octahedral 2 x snorm16 code (Cigolle et al.: Survey of Efficient Representations for Independent
-// Unit Vectors, JCGT 2014).
+// The unit vector of an octahedral 2 x snorm16 code (Cigolle et al.: Survey of Efficient Representations for
+// Independent Unit Vectors, JCGT 2014).
 vec3 decode_normal(uint code) {
     vec2 p = unpackSnorm2x16(code);
     vec3 n = vec3(p, 1.0 - abs(p.x) - abs(p.y));
@@ -26,6 +27,7 @@ vec3 decode_normal(uint code) {
     return normalize(n);
 }
 
+// The interpolated unit normal, or `geometric` if a corner has none or the corners' normals cancel out.
 vec3 shading_normal(Triangle t, Hit hit, vec3 geometric) {
     if (t.n0 == FLAT_NORMAL || t.n1 == FLAT_NORMAL || t.n2 == FLAT_NORMAL) return geometric;
     vec3 n = (1.0 - hit.u - hit.v) * decode_normal(t.n0) + hit.u * decode_normal(t.n1) + hit.v * decode_normal(t.n2);
@@ -33,24 +35,25 @@ vec3 shading_normal(Triangle t, Hit hit, vec3 geometric) {
     return squared > LEAST_NORMAL_SQUARED ? n * inversesqrt(squared) : geometric;
 }
 
-// n with a non-negative component along `side`.
+// n or -n, whichever has a non-negative component along `side`.
 vec3 towards(vec3 n, vec3 side) {
     return dot(n, side) < 0.0 ? -n : n;
 }
 
-// Barycentric weights of a point that is not on an edge, but LEAST_WEIGHT of the triangle inside.
+// Barycentric weights of the hit, at least LEAST_WEIGHT each before they are normalized, so that the point is not on
+// an edge.
 vec3 inner_weights(Hit hit) {
     vec3 weights = max(vec3(1.0 - hit.u - hit.v, hit.u, hit.v), vec3(LEAST_WEIGHT));
     return weights / (weights.x + weights.y + weights.z);
 }
 
-// The surface of a triangle at a hit, as the ray meets it. Its point is interpolated from the corners.
+// The surface of triangle t at a hit. Its point is interpolated from the corners.
 Surface surface_at(PathRay ray, Hit hit, Triangle t) {
     vec3 weights = inner_weights(hit);
     vec3 magnitude = abs(weights.x * t.v0) + abs(weights.y * t.v1) + abs(weights.z * t.v2);
     Surface s;
     s.point_world = weights.x * t.v0 + weights.y * t.v1 + weights.z * t.v2;
-    // Edges at unit scale: the cross product of a tiny triangle would underflow.
+    // The edges are scaled to about 1, since the cross product of a tiny triangle would underflow.
     vec3 e1 = t.v1 - t.v0, e2 = t.v2 - t.v0;
     vec3 span = max(abs(e1), abs(e2));
     float scale = 1.0 / max(span.x, max(span.y, span.z));
@@ -62,10 +65,13 @@ Surface surface_at(PathRay ray, Hit hit, Triangle t) {
     return s;
 }
 
-// A ray from the surface: starts on the side that it leaves to.
+// A ray from the surface, which starts on the side that it leaves to. triangle_ix: the surface's triangle, which the
+// ray does not hit.
 PathRay ray_from(Surface s, vec3 direction, uint triangle_ix, PathRay parent, vec3 throughput) {
     float side = dot(direction, s.geometric) < 0.0 ? -s.clearance : s.clearance;
-    return PathRay(s.point_world + side * s.geometric, parent.pixel_ix, direction, triangle_ix, throughput, parent.t_max);
+    return PathRay(
+        s.point_world + side * s.geometric, parent.pixel_ix, direction, triangle_ix, throughput, parent.t_max
+    );
 }
 
 #endif

@@ -1,14 +1,15 @@
-// From exposed radiance, which knows no bounds, to a display's 0..1, both linear in Rec. 709 primaries.
+// Tone curves: from exposed radiance, which has no upper bound, to a display's 0..1. Both are linear in Rec. 709
+// primaries.
 #ifndef KDRAY_TONE_CURVES
 #define KDRAY_TONE_CURVES
 
 #include "layout.glsl"
 
-// Beyond it every curve shows white; infinities would become NaN.
+// Exposed radiance is clamped to this, since infinities would become NaN. Every curve shows white above it.
 const float BRIGHTEST = 65504.0;
 
 // ACES: S. Hill's fit of the reference rendering and output transforms for sRGB (T. Pettineo, BakingLab, 2016).
-// Matrices by rows, as all here: `v * rows` is the product of matrix and column vector.
+// All matrices in this file are given by rows, so `v * rows` is the product of the matrix and the column vector.
 vec3 aces(vec3 exposed) {
     const mat3 to_ap1 = mat3(0.59719, 0.35458, 0.04823, 0.07600, 0.90834, 0.01566, 0.02840, 0.13383, 0.83777);
     const mat3 from_ap1 = mat3(1.60475, -0.53108, -0.07367, -0.10208, 1.10813, -0.00605, -0.00327, -0.07276, 1.07602);
@@ -18,8 +19,9 @@ vec3 aces(vec3 exposed) {
     return (numerator / denominator) * from_ap1;
 }
 
-// AgX (T. Sobotka, 2022) as B. Wrensch fitted it (Minimal AgX Implementation, 2023): inset, logarithm over 16.5 stops,
-// a polynomial for the contrast curve, outset, and the display's power of 2.2 taken back.
+// AgX (T. Sobotka, 2022) in B. Wrensch's fit (Minimal AgX Implementation, 2023): the inset matrix, a logarithm over
+// 16.5 stops, a polynomial for the contrast curve, the outset matrix, and a power of 2.2, which undoes the display's
+// encoding.
 vec3 agx(vec3 exposed) {
     const mat3 inset = mat3(0.842479062253094, 0.0784335999999992, 0.0792237451477643,
                             0.0423282422610123, 0.878468636469772, 0.0791661274605434,
@@ -35,7 +37,7 @@ vec3 agx(vec3 exposed) {
     return pow(max(curve * outset, vec3(0.0)), vec3(2.2));
 }
 
-// curve: TONEMAP_*.
+// Applies the exposure and a curve, one of TONEMAP_*. Returns linear display values, 0..1.
 vec3 tone_mapped(uint curve, vec3 radiance, float exposure) {
     vec3 exposed = clamp(radiance * exposure, vec3(0.0), vec3(BRIGHTEST));
     if (curve == TONEMAP_AGX) exposed = agx(exposed);

@@ -1,14 +1,20 @@
-// A ray as a search through an acceleration structure takes it, and the part of it that is in the structure's box. A part of
-// accel.glsl.
+// A ray in the form that searches through an acceleration structure use, and its interval in the structure's box. A
+// part of accel.glsl.
+//
+// Needs scene.glsl and triangle.glsl. Provides `TraversalRay`, `traversal_ray`, `is_in` and `near_scene`.
 
-// What the traversal needs of a ray. It meets the plane at x on an axis at t = x * inv_direction + bias.
+// A ray in the form that the traversal uses. It meets the plane at x on an axis at t = x * inv_direction + bias.
 //
-// All t of the traversal are half of the ray's own: the middle of an interval then is the sum of its ends, and half its length
-// their difference (slab.glsl). Halving loses no bits.
+// All t of the traversal are half of the ray's own. So the middle of an interval, in the ray's own t, is the sum of
+// its ends, and half its length is their difference (slab.glsl). Halving loses no bits.
 //
-// This t is rounded, and taken as exact: that is the same as if the plane lay a little off, and a leaf has all triangles
-// that come so near to it (kdtree/bounds.rs). The hit test's rounding is allowed for there too. So what brute force
-// finds, the traversal finds, along planes and through corners of cells as elsewhere.
+// The t of a plane is rounded, but the traversal treats it as exact. That has the effect of a plane that is slightly
+// off its place, and a leaf has all triangles that are so near to its cell (src/accel/bounds.rs). The margin there
+// also covers the rounding of the hit test. So the traversal finds what brute force finds, also for rays along planes
+// and through corners of cells.
+//
+// t_enter, t_exit: the part of the ray's interval that is in the structure's box. source_triangle: the triangle that
+// the ray never hits.
 struct TraversalRay {
     Shear shear;
     vec3 direction;
@@ -27,7 +33,8 @@ TraversalRay traversal_ray(PathRay ray, float t_min) {
     r.source_triangle = ray.source_triangle;
     r.t_min = 0.5 * t_min;
     r.shear.z *= 0.5;
-    // A direction in the plane is taken as all but in it: finite everywhere, and one rule for all ties.
+    // A direction in a split plane is replaced by one that is almost in it. So all values are finite, and all ties
+    // follow one rule.
     vec3 tiny = vec3(KD_LEAST_COMPONENT);
     r.inv_direction = 0.5 / mix(ray.direction, tiny, lessThan(abs(ray.direction), tiny));
     r.bias = -ray.origin * r.inv_direction;
@@ -40,7 +47,7 @@ TraversalRay traversal_ray(PathRay ray, float t_min) {
     return r;
 }
 
-// Whether the ray meets the box that holds all triangles.
+// Whether the ray meets the box that holds all triangles. False also if an end of its interval is NaN.
 bool is_in(TraversalRay ray) {
     return ray.t_enter <= ray.t_exit;
 }
@@ -50,7 +57,8 @@ float largest_coordinate() {
     return max(largest.x, max(largest.y, largest.z));
 }
 
-// The ray with its origin moved along it to lie within KD_MAX_ORIGIN_DISTANCE. t_start: how far; 0 for all but cameras far away.
+// Returns the ray with its origin moved along it to within KD_MAX_ORIGIN_DISTANCE. t_start: the distance of the move,
+// in the ray's own t. It is 0 unless the ray starts far away from the scene.
 PathRay near_scene(PathRay ray, out float t_start) {
     vec3 away = abs(ray.origin);
     t_start = 0.0;

@@ -1,10 +1,14 @@
-// Rays against one triangle: the watertight test, and the surface at a hit.
+// The watertight test of a ray against one triangle.
+//
+// Needs nothing: it includes layout.glsl. Provides `Shear`, `shear_of`, `intersect_triangle` and `clamp_to_triangle`.
+// lockstep.glsl also calls the steps of the test.
 #ifndef KDRAY_TRIANGLE
 #define KDRAY_TRIANGLE
 
 #include "layout.glsl"
 
-// A ray's shear: maps the ray onto the z axis of a space in which `axis`, its direction's longest component, is z.
+// A ray's shear, which maps the ray onto the z axis of a space in which `axis`, the axis of the direction's longest
+// component, is z. x, y: the direction's other components by the longest one. z: the inverse of the longest one.
 struct Shear {
     vec3 origin;
     float x;
@@ -13,7 +17,7 @@ struct Shear {
     uint axis;
 };
 
-// v with component `axis` last; cyclic, so that winding is kept.
+// v with component `axis` last. The components are permuted cyclically, so that winding is kept.
 vec3 axis_last(vec3 v, uint axis) {
     return axis == 2u ? v : (axis == 0u ? v.yzx : v.zxy);
 }
@@ -29,8 +33,9 @@ Shear shear_of(vec3 origin, vec3 direction) {
     return Shear(origin, d.x / d.z, d.y / d.z, 1.0 / d.z, axis);
 }
 
-// A corner seen from the ray: xy across it, z along it in units of the direction's longest component.
-// `precise` forbids contraction to fma: the same corner lands on the same point from every triangle that shares it.
+// A corner as seen from the ray: xy across the ray, z along it in units of the direction's longest component.
+// `precise` forbids contraction to fma, so that a corner is mapped to the same point for every triangle that shares
+// it.
 vec3 sheared(Shear shear, vec3 corner) {
     precise vec3 p = axis_last(corner - shear.origin, shear.axis);
     precise float x = p.x - shear.x * p.z;
@@ -38,8 +43,8 @@ vec3 sheared(Shear shear, vec3 corner) {
     return vec3(x, y, p.z);
 }
 
-// Twice the signed areas that the ray's axis spans with the edges opposite to v0, v1, v2. A rounded product never
-// passes another one, so a sign is right or zero.
+// The edge functions: twice the signed areas that the ray's axis spans with the edges opposite to v0, v1, v2.
+// Rounding never reverses the order of two products, so each sign is right or the value is zero.
 vec3 edge_functions(vec3 a, vec3 b, vec3 c) {
     precise float u = c.x * b.y - c.y * b.x;
     precise float v = a.x * c.y - a.y * c.x;
@@ -47,10 +52,10 @@ vec3 edge_functions(vec3 a, vec3 b, vec3 c) {
     return vec3(u, v, w);
 }
 
-// Whether fma rounds once: a few instructions then do for what takes a dozen without.
+// Whether fma rounds once. The error of a product then takes a few instructions, and otherwise a dozen.
 layout(constant_id = CONSTANT_FUSED_FMA) const bool FUSED_FMA = false;
 
-// What rounding took from the product a * b (Dekker: A floating-point technique for extending the available precision,
+// The rounding error of the product a * b (Dekker: A floating-point technique for extending the available precision,
 // Numerische Mathematik 18, 1971).
 float product_error(float a, float b) {
     if (FUSED_FMA) {
@@ -64,19 +69,20 @@ float product_error(float a, float b) {
     return error;
 }
 
-// What rounding took from the products of the edge function a.x * b.y - a.y * b.x.
+// The rounding error of the products of the edge function a.x * b.y - a.y * b.x.
 float edge_error(vec3 a, vec3 b) {
     precise float error = product_error(a.x, b.y) - product_error(a.y, b.x);
     return error;
 }
 
-// The errors of `edge_functions`.
+// The rounding errors of the products in `edge_functions`.
 vec3 edge_errors(vec3 a, vec3 b, vec3 c) {
     return vec3(edge_error(c, b), edge_error(a, c), edge_error(b, a));
 }
 
-// The edge functions with right signs: where the two products round to one value, their errors are the edge function.
-// Zero then means that the ray meets the edge. Without this a needle, seen from its end, is hit at whatever corner.
+// The edge functions with right signs. If the two products round to one value, their errors are the edge function.
+// Zero then means that the ray meets the edge. Without this, a needle that is seen from its end would be hit at an
+// arbitrary corner.
 vec3 with_exact_signs(vec3 edges, vec3 errors) {
     return mix(edges, errors, equal(edges, vec3(0.0)));
 }
@@ -90,25 +96,25 @@ float sum_of(vec3 v) {
     return sum;
 }
 
-// Tells by edge functions with exact signs whether the ray goes through the triangle or its edges. False also for a
-// triangle without area and for NaN.
+// Returns whether the ray goes through the triangle or its edges, by edge functions with exact signs. Returns false
+// also for a triangle without area and for NaN.
 bool is_inside(vec3 edges) {
     return !is_outside(edges) && abs(sum_of(edges)) > 0.0;
 }
 
-// Where edge functions have a smaller sum, the errors of their products may underflow.
+// If the sum of the edge functions is smaller than this, the errors of their products may underflow.
 const float LEAST_EXACT_SUM = 8.077935669e-28; // 2^-90
 
 // Returns the edge functions, each right to 2^-23 of itself (Muller: On the error of computing ab + cd using Cornea,
-// Harrison and Tang's method, ACM TOMS 41, 2015). If the triangle is narrow, its rounded products differ by little more
-// than their errors: weights made of them would lie anywhere along a needle.
+// Harrison and Tang's method, ACM TOMS 41, 2015). If the triangle is narrow, its rounded products differ by little
+// more than their errors: weights made of them would lie anywhere along a needle.
 vec3 exact_edges(vec3 edges, vec3 errors) {
     precise vec3 exact = edges + errors;
     return abs(sum_of(exact)) < LEAST_EXACT_SUM ? with_exact_signs(edges, errors) : exact;
 }
 
-// Returns t and barycentric weights from edge functions whose sum is not 0. src/reference/triangle.rs proves how far off they
-// are.
+// Returns t and barycentric weights from edge functions whose sum is not 0. src/reference/triangle.rs proves bounds
+// of their errors.
 Hit weighted_hit(Shear shear, vec3 edges, vec3 z, uint triangle_ix) {
     precise float inv_det = 1.0 / sum_of(edges);
     precise float u = edges.y * inv_det;
@@ -125,8 +131,9 @@ vec3 seen_edges(Shear shear, Triangle triangle, out vec3 a, out vec3 b, out vec3
     return edge_functions(a, b, c);
 }
 
-// Watertight and two-sided (Woop, Benthin, Wald: Watertight Ray/Triangle Intersection, JCGT 2013), edges included.
-// False also for a triangle without area and for NaN. t may be negative.
+// Tests a triangle. The test is watertight, two-sided and includes edges (Woop, Benthin, Wald: Watertight
+// Ray/Triangle Intersection, JCGT 2013). Returns false also for a triangle without area and for NaN. The hit's t may
+// be negative.
 bool intersect_triangle(Shear shear, Triangle triangle, uint triangle_ix, out Hit hit) {
     vec3 a, b, c;
     vec3 edges = seen_edges(shear, triangle, a, b, c);
@@ -137,14 +144,15 @@ bool intersect_triangle(Shear shear, Triangle triangle, uint triangle_ix, out Hi
     return true;
 }
 
-// Where the ray meets the triangle's plane, moved to the triangle's edge where that lies outside: a rasterizer snaps
-// corners to its sub-pixel grid and so covers samples that the exact triangle just misses.
+// Returns the point at which the ray meets the triangle's plane, moved to the triangle's edge if it is outside. A
+// rasterizer snaps corners to its sub-pixel grid, and so covers samples that the exact triangle just misses.
 Hit clamp_to_triangle(Shear shear, Triangle triangle, uint triangle_ix) {
     vec3 a, b, c;
     vec3 edges = seen_edges(shear, triangle, a, b, c);
     edges = exact_edges(edges, edge_errors(a, b, c));
     vec3 inside = max(sum_of(edges) < 0.0 ? -edges : edges, vec3(0.0));
-    // Seen exactly edge-on the areas say nothing: its middle is the nearest certain point.
+    // If the triangle is seen exactly edge-on, the areas carry no information: its middle is the nearest certain
+    // point.
     if (!(sum_of(inside) > 0.0)) inside = vec3(1.0);
     return weighted_hit(shear, inside, vec3(a.z, b.z, c.z), triangle_ix);
 }

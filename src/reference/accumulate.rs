@@ -1,12 +1,12 @@
-//! Accumulate: adds a sample to those before it. Twin of `accumulate.comp`.
+//! Accumulate: averages the frame's sample with the earlier ones. Twin of `accumulate.comp`.
 
 use glam::Vec4;
 use rayon::prelude::*;
 
 use crate::layout::{Bounce, Frame};
 
-/// Adds `pixel_radiance`, the frame's sample, to the sums in `pixel_accumulated`, and puts the mean of all samples in its
-/// place; nothing where the first of `bounces` says that one overflowed.
+/// Adds the frame's sample, `pixel_radiance`, to the sums in `pixel_accumulated`, and replaces it by the mean of all
+/// samples. Does nothing if a bounce overflowed, which the first of `bounces` says.
 pub fn accumulate(
     frame: &Frame,
     bounces: &[Bounce],

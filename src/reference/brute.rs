@@ -1,14 +1,15 @@
-//! Closest hit over every triangle, without a tree: what the traversal must find. Twin of `brute.glsl`.
+//! The closest hit over all triangles, without a tree. The traversal must find the same hit. Twin of `brute.glsl`.
 
 use super::{search_ray::SearchRay, triangle::Shear};
 use crate::layout::{Hit, NO_TRIANGLE, Triangle};
 
-/// The hit of smallest t in (t_min, t_max]; at one t, that of the lowest index. A miss keeps t = t_max.
+/// Returns the hit of smallest t in (t_min, t_max]. Of several at the same t, it is the one with the lowest triangle
+/// index. A miss has t = t_max.
 pub fn closest_hit(triangles: &[Triangle], ray: &SearchRay) -> Hit {
     closest_hit_of(triangles, ray, |_| true)
 }
 
-/// The same, of the triangles of which `is_accepted` says so by their indices.
+/// Does what [`closest_hit`] does, over the triangles whose indices `is_accepted` accepts.
 pub fn closest_hit_of(triangles: &[Triangle], ray: &SearchRay, is_accepted: impl Fn(u32) -> bool) -> Hit {
     let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
     let mut best = ray.miss();

@@ -1,23 +1,23 @@
-//! Pixels in the order of the ray queue, and the camera's rays. Twin of `camera.glsl`.
+//! The order of pixels in the ray queue, and the directions of the camera's rays. Twin of `camera.glsl`.
 
 use glam::{UVec2, Vec3, uvec2, vec2};
 
 use crate::layout::{Frame, TILE_SIZE};
 
-/// Every second bit of a number below 64.
+/// Bits 0, 2 and 4 of a number below 64, packed.
 fn every_second_bit(n: u32) -> u32 {
     n & 1 | n >> 1 & 2 | n >> 2 & 4
 }
 
-/// The `k`-th of `n` bands from the middle outward, those below and above in turn; the last is the lowest one.
+/// The `k`-th of `n` bands from the middle outward, alternately above and below; the last is the bottom one.
 fn band_outward(k: u32, n: u32) -> u32 {
     let n_left = n - 1 - k;
     if n_left.is_multiple_of(2) { n - 1 - n_left / 2 } else { n_left / 2 }
 }
 
-/// The pixel at place `order` when the image is walked tile by tile, each tile along a Z-curve, so that neighbours in the
-/// queue are blocks of the image; row by row where the border cuts the tile. Without gaps. The bands of tiles come from the
-/// middle outward.
+/// The pixel at index `order` of the queue, whose indices have no gaps. Pixels are ordered tile by tile, and in each
+/// tile along a Z-curve, so that neighbours in the queue are blocks of the image. Tiles that the border cuts are
+/// ordered row by row. The bands of tiles come from the middle outward.
 pub fn pixel_of(order: u32, width: u32, height: u32) -> UVec2 {
     let nth_band = order / (TILE_SIZE * width);
     let in_band = order - nth_band * TILE_SIZE * width;
@@ -35,12 +35,12 @@ pub fn pixel_of(order: u32, width: u32, height: u32) -> UVec2 {
     TILE_SIZE * uvec2(tile, band) + at
 }
 
-/// The window's pixel in the whole picture.
+/// The pixel of the whole picture that a pixel of the window is.
 pub fn in_picture(frame: &Frame, pixel: UVec2) -> UVec2 {
     pixel + uvec2(frame.window_x, frame.window_y)
 }
 
-/// Unit direction through the sample of the window's pixel, the one that the rasterizer tests.
+/// The unit direction through the sample of the window's pixel, the one that the rasterizer tests.
 pub fn camera_direction(frame: &Frame, pixel: UVec2) -> Vec3 {
     let at_px = in_picture(frame, pixel).as_vec2() + vec2(frame.sample_x, frame.sample_y);
     let at = at_px / uvec2(frame.picture_width, frame.picture_height).as_vec2() * 2.0 - 1.0;

@@ -1,9 +1,10 @@
-//! Candidates: triangles that a search comes to, against the nearest hit so far. Twin of `candidate.glsl`.
+//! Candidates, which are the triangles that a search comes to, and their test against the nearest hit so far. Twin of
+//! `candidate.glsl`.
 
 use super::{counting::table::ReadCounter, inputs::KernelInputs, search_ray::SearchRay, triangle::Shear};
 use crate::layout::Hit;
 
-/// What tells a ray's hits from what it passes by.
+/// The data by which a triangle is tested and its hit accepted: t in (`t_min`, best t], not on `source_triangle`.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
     pub shear: Shear,
@@ -12,6 +13,7 @@ pub struct Target {
 }
 
 impl Target {
+    /// The target of a ray.
     #[inline(always)]
     pub fn of(ray: &SearchRay) -> Self {
         let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
@@ -19,7 +21,8 @@ impl Target {
     }
 }
 
-/// A triangle against the ray; of two hits at one t the lower index wins, whatever the order of triangles.
+/// Tests a triangle against the ray, and keeps its hit in `best` if it is nearer. Of two hits at the same t, the one
+/// with the lower triangle index wins, so the order of tests does not matter.
 #[inline(always)]
 pub fn intersect(inputs: &KernelInputs<impl ReadCounter>, target: &Target, triangle_ix: u32, best: &mut Hit) {
     let triangle = &inputs.triangles[triangle_ix as usize];

@@ -1,4 +1,4 @@
-//! Cast: each given ray's closest hit through the kd-tree, or any hit. Twin of `cast.comp`.
+//! Cast: the closest hit, or any hit, of each given ray. Twin of `cast.comp`.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -15,35 +15,37 @@ use crate::{
     layout::{Hit, NO_TRIANGLE, Ray},
 };
 
+/// The result of a ray that hits nothing.
 const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
 
-/// The longest component's exponent as the bits hold it, 1 to 254; 0: all but zero, 255: infinite or NaN.
+/// The biased exponent of the longest component, 1 to 254; 0 if it is zero or denormal, 255 if it is infinite or NaN.
 #[inline(always)]
 fn exponent_of(v: Vec3) -> u32 {
     let [x, y, z] = v.to_array().map(|x| x.to_bits() & 0x7fff_ffff);
     x.max(y).max(z) >> 23
 }
 
-/// False for what can only miss: a NaN anywhere, an infinite origin or direction, a direction of zero (or one so short
-/// that it is denormal).
+/// Whether a ray can hit anything. False for a NaN anywhere, an infinite origin or direction, and a direction that is
+/// zero (or so short that it is denormal).
 #[inline(always)]
 pub fn is_ray(ray: &Ray) -> bool {
-    // All is asked at once: a branch each takes longer.
+    // All conditions are evaluated; a branch for each takes longer.
     (1..255).contains(&exponent_of(ray.direction))
         & (exponent_of(ray.origin) < 255)
         & !ray.t_min.is_nan()
         & !ray.t_max.is_nan()
 }
 
-/// A direction's scale to about unit length, which the traversal wants, and its inverse: powers of two, so that direction and t
-/// keep their bits.
+/// The factor that scales a direction to about unit length, which the traversal needs, and the factor's inverse. Both
+/// are powers of two, so that direction and t keep their bits.
 #[inline(always)]
 fn scales_of(direction: Vec3) -> [f32; 2] {
     let exponent = exponent_of(direction).min(253);
     [254 - exponent, exponent].map(|exponent| f32::from_bits(exponent << 23))
 }
 
-/// As the traversal wants it. What can only miss is in no cell.
+/// The ray with a direction of about unit length. A ray that can only miss gets an empty interval of t, so it is in
+/// no cell.
 #[inline(always)]
 fn scaled(ray: &Ray) -> SearchRay {
     let [scale, inv_scale] = scales_of(ray.direction);
@@ -59,6 +61,7 @@ fn scaled(ray: &Ray) -> SearchRay {
     if is_ray(ray) { scaled } else { nowhere }
 }
 
+/// Writes the hits of one task's rays.
 fn cast_all<const ANY_HIT: bool>(inputs: &KernelInputs, traverser: &mut impl Tracer, rays: &[Ray], hits: &mut [Hit]) {
     let probes = rays.iter().zip(hits).map(|(ray, hit)| ((ray, hit), scaled(ray)));
     traverser.trace_all::<ANY_HIT, _>(inputs, probes, |(ray, hit), found| {
@@ -67,12 +70,12 @@ fn cast_all<const ANY_HIT: bool>(inputs: &KernelInputs, traverser: &mut impl Tra
     });
 }
 
-/// Writes `hits`, one a ray.
+/// Casts `rays` and writes `hits`, one for each ray. A miss has an infinite t.
 pub fn cast(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
     cast_by::<Traverser>(inputs, traversal, query, rays, hits);
 }
 
-/// Does what [`cast`] does, by another tracer.
+/// Does what [`cast`] does, by the tracer `T`.
 pub fn cast_by<T: Tracer>(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[Ray], hits: &mut [Hit]) {
     rays.par_chunks(RAYS_PER_TASK).zip(hits.par_chunks_mut(RAYS_PER_TASK)).for_each_init(
         || T::new(inputs, traversal),

@@ -1,4 +1,4 @@
-//! Rays that go on from a hit: how many, and which. Twin of `children.glsl`.
+//! The child rays that start at a hit: reflected, transmitted, both or none. Twin of `children.glsl`.
 
 use glam::Vec3;
 
@@ -15,7 +15,7 @@ fn scattering_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, S
     (surface, scattering)
 }
 
-/// Bits of `CHILD_*`: of the ray's children, those that carry light.
+/// The ray's children that carry light, as bits `CHILD_*`.
 pub fn child_kinds_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> u32 {
     if hit.triangle_ix == NO_TRIANGLE || !scatters_light(inputs.material_at(hit)) {
         return 0;
@@ -27,7 +27,7 @@ pub fn child_kinds_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> u32 {
     reflected | transmitted
 }
 
-/// The children of these kinds, in order.
+/// The ray's children of these kinds (bits `CHILD_*`), the reflected one first.
 pub fn children_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, kinds: u32) -> impl Iterator<Item = PathRay> {
     let scattering = (kinds != 0).then(|| scattering_at(inputs, ray, hit));
     let children = scattering.map(|(surface, next)| {

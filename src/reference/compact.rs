@@ -1,5 +1,5 @@
-//! Compact: the rays that go on from all hits of a bounce, in order and without gaps, by a prefix sum over their counts. Twin of
-//! `compact_reduce.comp`, `compact_spine.comp` and `compact_scatter.comp`.
+//! Compact: writes the child rays of all hits of a bounce in order and without gaps, by a prefix sum over their
+//! counts. Twin of `compact_reduce.comp`, `compact_spine.comp` and `compact_scatter.comp`.
 
 use rayon::prelude::*;
 
@@ -13,15 +13,16 @@ use crate::layout::{Bounce, Frame, Hit, PathRay, SCAN_GROUP_SIZE};
 const BLOCK: usize = SCAN_GROUP_SIZE as usize;
 const BLOCKS_PER_TASK: usize = RAYS_PER_TASK.div_ceil(BLOCK);
 
-/// The rays of a bounce.
+/// The rays of a bounce, whose children make up the next bounce.
 #[derive(Clone, Copy)]
 pub struct Parents<'a> {
     pub rays: &'a [PathRay],
-    /// One a ray.
+    /// One for each ray.
     pub hits: &'a [Hit],
 }
 
-/// Writes which rays go on from each hit, and how many from the hits of each block of `SCAN_GROUP_SIZE` rays.
+/// Writes which child rays start at each hit (`child_kinds`, bits `CHILD_*`), and how many start at the hits of each
+/// block of `SCAN_GROUP_SIZE` rays (`scan_blocks`).
 pub fn reduce(inputs: &KernelInputs, parents: Parents, child_kinds: &mut [u32], scan_blocks: &mut [u32]) {
     (parents.rays.par_chunks(BLOCK).zip(parents.hits.par_chunks(BLOCK)))
         .zip(child_kinds.par_chunks_mut(BLOCK).zip(scan_blocks))
@@ -34,8 +35,9 @@ pub fn reduce(inputs: &KernelInputs, parents: Parents, child_kinds: &mut [u32], 
         });
 }
 
-/// Turns the blocks' sums into their exclusive prefix sums and sizes the next bounce. Where a queue of
-/// `constants.queue_capacity` has no room for that many rays more, the next bounce is empty and says `overflow`.
+/// Turns the blocks' sums into their exclusive prefix sums and sizes the next bounce. If the queue, which holds
+/// `constants.queue_capacity` rays, has no room for the next bounce's rays, that bounce is empty and its `overflow`
+/// is set.
 pub fn spine(scan_blocks: &mut [u32], constants: &Frame, this: &Bounce, next: &mut Bounce) {
     let mut carry = 0;
     for block in scan_blocks {
@@ -54,7 +56,8 @@ fn size_next_bounce(n_wanted: u32, constants: &Frame, this: &Bounce, next: &mut 
     next.set_rays(first_ray, n_rays, constants);
 }
 
-/// Makes the rays that go on, `next_rays`, whose first is the queue's `first_ray`, and tells of each hit which is its first.
+/// Writes the child rays to `next_rays`, which is the queue from `first_ray` on, and the queue index of each hit's
+/// first child to `first_children`.
 pub fn scatter(
     inputs: &KernelInputs,
     parents: Parents,

@@ -1,4 +1,5 @@
-//! Denoise (the paper's section 2.4): smooths pixels that differ much from their neighbours. Twin of `denoise.comp`.
+//! Denoise (the paper's section 2.4): smooths pixels that differ strongly from their neighbours. Twin of
+//! `denoise.comp`.
 
 use glam::Vec4;
 use rayon::prelude::*;
@@ -6,13 +7,13 @@ use rayon::prelude::*;
 use super::display::luminance;
 use crate::layout::Frame;
 
-/// Writes `pixel_filtered`: where the luminance differences of a pixel to its four neighbours add up to more than the
-/// threshold, the mean of the five; elsewhere the pixel.
+/// Writes `pixel_filtered`. If the luminance differences of a pixel to its four neighbours add up to more than the
+/// threshold, it is the mean of the five; else it is the pixel itself.
 pub fn denoise(frame: &Frame, pixel_radiance: &[[f32; 4]], pixel_filtered: &mut [[f32; 4]]) {
     let (width, height) = (frame.width as usize, frame.height as usize);
     pixel_filtered.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
         for (x, filtered) in row.iter_mut().enumerate() {
-            // At the border the pixel itself stands in for a neighbour that is not there.
+            // At the border, the pixel itself replaces a missing neighbour.
             let (left, right) = (x.max(1) - 1, (x + 1).min(width - 1));
             let (above, below) = (y.max(1) - 1, (y + 1).min(height - 1));
             let at = |x: usize, y: usize| Vec4::from(pixel_radiance[y * width + x]);

@@ -1,10 +1,11 @@
-//! False colour: a feature of each pixel, displayed. Twin of `false_color.comp`.
+//! False colour: displays one of the features of each pixel. Twin of `false_color.comp`.
 
 use glam::{Vec3, vec3};
 
 use crate::layout::{FalseColor, Feature, NO_TRIANGLE, VIEW_COST, VIEW_ID, VIEW_NORMAL, VIEW_RAYS};
 
-/// Neighbouring numbers get unlike colours: the low bits of a multiplicative hash (Knuth 6.4).
+/// A colour for an index. Neighbouring indices get different colours: the low bits of a multiplicative hash (Knuth
+/// 6.4).
 fn id_color(id: u32) -> Vec3 {
     let hash = id.wrapping_mul(2_654_435_761);
     let hash = hash ^ hash >> 15;
@@ -12,7 +13,7 @@ fn id_color(id: u32) -> Vec3 {
     0.25 + 0.75 * vec3(channel(0), channel(8), channel(16)) / 255.0
 }
 
-/// From black over violet, red and yellow to white for x from 0 to 1.
+/// A heat map: from black over violet, red and yellow to white as x rises from 0 to 1.
 fn heat_color(x: f32) -> Vec3 {
     let rising = (3.0 * x - vec3(0.0, 1.0, 2.0)).clamp(Vec3::ZERO, Vec3::ONE);
     rising + vec3(0.0, 0.0, 0.5 * (1.0 - (6.0 * x - 1.5).abs() / 1.5).max(0.0))
@@ -29,7 +30,7 @@ fn color(feature: &Feature, push: &FalseColor) -> Vec3 {
     }
 }
 
-/// Writes `pixel_display` (RGBA, opaque).
+/// Writes `pixel_display` (RGBA, opaque): the view `push.view`, one of `VIEW_*`.
 pub fn false_color(push: &FalseColor, pixel_features: &[Feature], pixel_display: &mut [[u8; 4]]) {
     for (feature, display) in pixel_features.iter().zip(pixel_display) {
         let [r, g, b] = color(feature, push).clamp(Vec3::ZERO, Vec3::ONE).to_array().map(|x| (x * 255.0 + 0.5) as u8);

@@ -1,9 +1,10 @@
-//! Features: what each pixel shows, for other uses than light. Twin of `features.comp`.
+//! Features: the first-hit AOVs of each pixel (position, normal, albedo, depth and the indices of the triangle and
+//! its material). Twin of `features.comp`.
 
 use super::{inputs::KernelInputs, surface::surface_at};
 use crate::layout::{Feature, Hit, NO_TRIANGLE, PathRay};
 
-/// Writes `pixel_features` of the primary rays' pixels, all but the counts.
+/// Writes `pixel_features` of the primary rays' pixels, except the counts `n_rays` and `n_steps`.
 pub fn features(inputs: &KernelInputs, rays: &[PathRay], hits: &[Hit], pixel_features: &mut [Feature]) {
     for (ray, hit) in rays.iter().zip(hits) {
         let feature = &mut pixel_features[ray.pixel_ix as usize];

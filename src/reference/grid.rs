@@ -1,10 +1,12 @@
-//! The search through a grid, cell after cell along the ray (a 3D-DDA: Amanatides and Woo, "A fast voxel traversal algorithm for
-//! ray tracing", 1987). Twin of `grid.glsl`.
+//! The search through a grid, from cell to cell along the ray (a 3D-DDA: Amanatides and Woo, "A fast voxel traversal
+//! algorithm for ray tracing", 1987). Twin of `grid.glsl`.
 //!
-//! Where the ray meets a plane between cells is computed from the plane itself, by the operations of the kd-tree's traversal, and
-//! never summed up from cell to cell. So the ray visits what it would visit in a kd-tree that is split at all of these planes:
-//! the cell where it takes itself to be at a t is off by no more than there, and the same margin covers it
-//! (accel/bounds.rs).
+//! The t at which the ray meets a plane between cells is computed from the plane itself, by the operations of the
+//! kd-tree's traversal, not summed up from cell to cell. So the ray visits the cells that it would visit in a kd-tree
+//! that is split at all of these planes. The cell in which the search finds the ray at a t is off by no more than in
+//! that kd-tree, and the same margin covers the error (accel/bounds.rs).
+//!
+//! A cube is a cell by its indices in a lattice.
 
 use super::{
     counting::table::ReadCounter,
@@ -18,7 +20,8 @@ use crate::{
     layout::{GridCell, Hit},
 };
 
-/// A ray's way through the cubes of a lattice: the cube that it is in, and where it leaves that by each axis, in t.
+/// A ray's position on its way through the cubes of a lattice: the cube that it is in, and the t at which it leaves
+/// the cube on each axis.
 struct Walk<'a> {
     lattice: &'a Lattice,
     cube: [u32; 3],
@@ -26,7 +29,7 @@ struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    /// In the first cube that the ray meets at `t` or later.
+    /// The position in the first cube that the ray meets at `t` or later.
     #[inline(always)]
     fn new(lattice: &'a Lattice, ray: &TraversalRay, t: f32) -> Self {
         let mut walk = Self { lattice, cube: [0; 3], t_next: [0.0; 3] };
@@ -37,12 +40,14 @@ impl<'a> Walk<'a> {
         walk
     }
 
+    /// Whether the ray goes towards greater coordinates on an axis.
     #[inline(always)]
     fn goes_up(ray: &TraversalRay, axis: usize) -> bool {
         !(ray.inv_direction[axis] < 0.0)
     }
 
-    /// Where the ray leaves the cubes of index `i` on an axis, in t: never those at the border, where the search ends.
+    /// The t at which the ray leaves the cubes of index `i` on an axis. It is infinity for those at the border, where
+    /// the search ends.
     #[inline(always)]
     fn exit_at(&self, ray: &TraversalRay, axis: usize, i: u32) -> f32 {
         let goes_up = Self::goes_up(ray, axis);
@@ -58,7 +63,8 @@ impl<'a> Walk<'a> {
     fn index_at(&self, ray: &TraversalRay, axis: usize, t: f32) -> u32 {
         let last_ix = self.lattice.n_cells[axis] - 1;
         let mut i = self.lattice.index_near(axis, ray.origin[axis] + t * ray.direction[axis]);
-        // The index is off by rounding alone, which the margin is wider than, as are cubes: by 1 or so.
+        // The index is off by about 1: only rounding makes it wrong, and the margin and the cubes are wider than
+        // that.
         if Self::goes_up(ray, axis) {
             while i > 0 && self.exit_at(ray, axis, i - 1) >= t {
                 i -= 1;
@@ -90,7 +96,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// To the next cube.
+    /// Goes to the next cube.
     #[inline(always)]
     fn step(&mut self, ray: &TraversalRay, axis: usize) {
         if Self::goes_up(ray, axis) {
@@ -102,8 +108,8 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Visits the cubes that the ray meets from `t_enter` to `t_exit` with the place of each and the ray's way in it, until `visit` says that
-/// nothing more is wanted, and returns whether it has said so.
+/// Calls `visit` for the cubes that the ray meets from `t_enter` to `t_exit`, with the place of each
+/// ([`Lattice::place_of`]) and the ray's interval of t in it, until `visit` returns true. Returns whether it did.
 #[inline(always)]
 fn walk(
     lattice: &Lattice,
@@ -128,10 +134,10 @@ fn walk(
     }
 }
 
-/// Goes through all cells that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
+/// Searches all cells that the ray meets in `[t_enter, t_exit]`, until nothing nearer can follow.
 ///
 /// # Panics
-/// The acceleration structure is no grid.
+/// The acceleration structure is not a grid.
 #[inline]
 pub fn search_grid<const ANY_HIT: bool>(inputs: &KernelInputs<impl ReadCounter>, ray: &TraversalRay, best: &mut Hit) {
     // Not `>`: a NaN misses.
@@ -146,7 +152,8 @@ pub fn search_grid<const ANY_HIT: bool>(inputs: &KernelInputs<impl ReadCounter>,
         }
         is_done::<ANY_HIT>(best) || best.t < t_leave
     };
-    // A box whose corners are near the largest number may have an exit at infinity, which no border's exit may be.
+    // The exit of a box whose corners are near the largest number may be at infinity. It must be before the exits at
+    // the border, which are infinite, too.
     let way = [ray.t_enter, min(ray.t_exit, f32::MAX)];
     walk(lattice, ray, way, |place, way| {
         let cell = inputs.grid_cells[place as usize];

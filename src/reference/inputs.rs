@@ -1,4 +1,4 @@
-//! What the kernels only read, under the kernels' names.
+//! The data that kernels only read, under the kernels' names.
 
 use glam::Vec3;
 
@@ -13,38 +13,40 @@ use crate::{
     world::{Geometry, World},
 };
 
-/// The scene, its tree and the frame's constants. `R`: who is told of reads of the tree.
+/// The scene, its acceleration structure and the frame's constants. `R` counts reads of the structure.
 #[derive(Clone, Copy, Debug)]
 pub struct KernelInputs<'a, R = NoCounter> {
-    /// None for rays that no frame makes.
+    /// The frame's constants; `None` for rays that do not belong to a frame.
     pub frame: Option<&'a Frame>,
-    /// The box that holds all triangles, with the tree's rounding margin (world units).
+    /// Least corner of the box that holds all triangles, with the structure's rounding margin (world units).
     pub cell_min: Vec3,
+    /// Greatest corner of this box.
     pub cell_max: Vec3,
     pub triangles: &'a [Triangle],
-    /// One index into `materials` a triangle, or with `filters`, `TRIANGLE_HIDDEN` or 0.
+    /// One word for each triangle: an index into `materials`, or with `filters`, `TRIANGLE_HIDDEN` or 0.
     pub triangle_materials: &'a [u32],
     /// Whether rays pass through triangles with `TRIANGLE_HIDDEN`.
     pub filters: bool,
     pub materials: &'a [Material],
     pub lights: &'a [Light],
     pub kd_nodes: CountedSlice<'a, KdNode, R>,
-    /// One a pair of nodes.
+    /// The parents: one for each pair of siblings.
     pub kd_parents: CountedSlice<'a, u32, R>,
+    /// The entries of leaves or of a grid's cells: indices into `triangles`.
     pub leaf_triangles: CountedSlice<'a, u32, R>,
-    /// One an entry of `leaf_triangles`, or none.
+    /// One for each entry of `leaf_triangles`, or none at all.
     pub leaf_planes: &'a [Plane],
-    /// One a node, or none.
+    /// One for each node, or none at all.
     pub kd_slabs: CountedSlice<'a, Slab, R>,
-    /// One a node, or none where the traversal does not ask for them.
+    /// One for each node, or none at all if the traversal does not use them.
     pub kd_boxes: CountedSlice<'a, KdBox, R>,
-    /// Six a node, or none.
+    /// Six for each node, or none at all if the traversal does not use them.
     pub kd_ropes: CountedSlice<'a, KdRope, R>,
-    /// The upper cells of a grid; none where the acceleration structure is another one.
+    /// The lattice of a grid's upper cells; `None` for a kd-tree.
     pub lattice: Option<&'a Lattice>,
-    /// The cells of a grid, see [`Grid::cells`].
+    /// The cells of a grid (see [`Grid::cells`]); empty for a kd-tree.
     pub grid_cells: CountedSlice<'a, GridCell, R>,
-    /// The levels of a grid's cells, 1 or 2.
+    /// The levels of a grid's cells, 1 or 2; 0 for a kd-tree.
     pub n_grid_levels: u32,
 }
 
@@ -52,13 +54,13 @@ impl<'a, R> KernelInputs<'a, R> {
     /// The frame's constants.
     ///
     /// # Panics
-    /// The rays are no frame's.
+    /// The rays do not belong to a frame.
     #[inline(always)]
     pub fn frame(&self) -> &'a Frame {
         self.frame.expect("rays of a frame")
     }
 
-    /// Whether a hit of the triangle counts.
+    /// Returns whether a hit on the triangle counts.
     #[inline(always)]
     pub fn is_accepted(&self, triangle_ix: u32) -> bool {
         !self.filters || self.triangle_materials[triangle_ix as usize] & TRIANGLE_HIDDEN == 0
@@ -66,7 +68,7 @@ impl<'a, R> KernelInputs<'a, R> {
 }
 
 impl<'a> KernelInputs<'a> {
-    /// What a frame's kernels read.
+    /// The inputs of a frame's kernels.
     pub fn new(world: &'a World, frame: &'a Frame) -> Self {
         let scene = world.scene();
         Self {
@@ -78,7 +80,8 @@ impl<'a> KernelInputs<'a> {
         }
     }
 
-    /// What a search reads, without materials and lights. The host builds the grid, unless it has done so already.
+    /// The inputs of a search, without materials and lights. If the structure is a grid, the host builds it unless it
+    /// has done so already.
     pub fn of_geometry(geometry: Geometry<'a>) -> Self {
         let triangles = geometry.triangles();
         match geometry.accel() {
@@ -87,7 +90,7 @@ impl<'a> KernelInputs<'a> {
         }
     }
 
-    /// What the traversal of a kd-tree reads, without materials and lights.
+    /// The inputs of the traversal of a kd-tree, without materials and lights, boxes and ropes.
     pub fn of_tree(triangles: &'a [Triangle], tree: &'a KdTree) -> Self {
         Self {
             kd_nodes: CountedSlice::from(tree.nodes()),
@@ -99,7 +102,7 @@ impl<'a> KernelInputs<'a> {
         }
     }
 
-    /// What the search through a grid reads, without materials and lights.
+    /// The inputs of the search through a grid, without materials and lights.
     pub fn of_grid(triangles: &'a [Triangle], grid: &'a Grid) -> Self {
         Self {
             leaf_triangles: CountedSlice::from(grid.leaf_triangles()),
@@ -111,7 +114,7 @@ impl<'a> KernelInputs<'a> {
         }
     }
 
-    /// Triangles with the box that holds them, and nothing else.
+    /// Inputs of triangles and the box that holds them alone.
     fn without_accel(triangles: &'a [Triangle], [cell_min, cell_max]: [Vec3; 2]) -> Self {
         Self {
             frame: None,
@@ -135,7 +138,7 @@ impl<'a> KernelInputs<'a> {
         }
     }
 
-    /// The same, with reads of the tree counted.
+    /// Returns the same inputs, with reads of the structure counted in `counts`.
     pub fn counted<'c>(self, counts: &'c ReadCounts) -> KernelInputs<'a, Counted<'c>> {
         KernelInputs {
             frame: self.frame,
@@ -159,16 +162,21 @@ impl<'a> KernelInputs<'a> {
         }
     }
 
-    /// Of the triangle that was hit.
+    /// Returns the material of the triangle that was hit.
+    ///
+    /// # Panics
+    /// Nothing was hit.
     pub fn material_at(&self, hit: &Hit) -> &'a Material {
         &self.materials[self.triangle_materials[hit.triangle_ix as usize] as usize]
     }
 
-    /// The same, with rays that pass through triangles whose word is `TRIANGLE_HIDDEN`.
+    /// Returns the same inputs, but rays pass through triangles whose word is `TRIANGLE_HIDDEN`. There is one word
+    /// for each triangle.
     pub fn with_hidden(self, words: &'a [u32]) -> Self {
         Self { triangle_materials: words, filters: true, ..self }
     }
 
+    /// Returns the same inputs with a kd-tree's boxes and ropes.
     pub fn with_links(self, links: &'a TraversalLinks) -> Self {
         Self { kd_boxes: CountedSlice::from(&*links.boxes), kd_ropes: CountedSlice::from(&*links.ropes), ..self }
     }

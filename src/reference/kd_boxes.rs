@@ -1,4 +1,4 @@
-//! The cells of nodes as boxes, for traversals that ask for them. Twin of `kd_boxes.glsl`.
+//! The cells of nodes as boxes, for traversals that use them. Twin of `kd_boxes.glsl`.
 
 use super::{
     counting::table::ReadCounter,
@@ -6,13 +6,16 @@ use super::{
     traversal_ray::{TraversalRay, max, min},
 };
 
-/// Where a ray meets the planes of a node's cell on each axis: those it comes to first, and the far ones.
+/// The t at which a ray meets the planes of a node's cell on each axis.
 pub struct BoxPlanes {
+    /// Of the planes that the ray meets first.
     pub near: [f32; 3],
+    /// Of the opposite planes.
     pub far: [f32; 3],
 }
 
 impl TraversalRay {
+    /// Returns the t of the planes of a node's cell.
     #[inline(always)]
     pub fn box_planes_of(&self, inputs: &KernelInputs<impl ReadCounter>, node_ix: u32) -> BoxPlanes {
         let cell = &inputs.kd_boxes[node_ix as usize];
@@ -22,7 +25,8 @@ impl TraversalRay {
         BoxPlanes { near: [0, 1, 2].map(|i| min(t0[i], t1[i])), far: [0, 1, 2].map(|i| max(t0[i], t1[i])) }
     }
 
-    /// The ray's interval in a node's cell: the planes that `descend` meets on the way there.
+    /// Returns `[t_enter, t_exit]` of the ray in a node's cell. The planes of the box are the split planes that
+    /// `descend` crosses on the way to the node.
     #[inline(always)]
     pub fn interval_in(&self, inputs: &KernelInputs<impl ReadCounter>, node_ix: u32) -> [f32; 2] {
         let BoxPlanes { near, far } = self.box_planes_of(inputs, node_ix);

@@ -1,4 +1,5 @@
-//! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree.glsl`.
+//! Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2). Twin of `kdtree.glsl`, which defines
+//! cells, first and second children, and pending subtrees.
 
 use super::{
     counting::table::ReadCounter,
@@ -21,14 +22,14 @@ pub struct Cell {
 }
 
 impl TraversalRay {
-    /// Where the ray meets the split plane.
+    /// Returns the t at which the ray meets the split plane.
     #[inline(always)]
     pub fn crossing(&self, node: KdNode) -> f32 {
         let axis = axis_of(node) as usize;
         f32::from_bits(node.split_or_first) * self.inv_direction[axis] + self.bias[axis]
     }
 
-    /// The child on the side that the ray comes from; the other is `^ 1`.
+    /// Returns the index of the first child, on the side that the ray comes from. The second child's index is `^ 1`.
     #[inline(always)]
     pub fn first_child(&self, node: KdNode) -> u32 {
         let first_is_above = u32::from(self.inv_direction[axis_of(node) as usize] < 0.0);
@@ -36,25 +37,31 @@ impl TraversalRay {
     }
 }
 
-/// Of a split.
+/// Returns the axis of a split, 0, 1 or 2.
 #[inline(always)]
 pub fn axis_of(node: KdNode) -> u32 {
     node.axis_and_child & KD_AXIS_MASK
 }
 
+/// Returns whether the node is a leaf.
 #[inline(always)]
 pub fn is_leaf(node: KdNode) -> bool {
     node.axis_and_child & KD_LEAF != 0
 }
 
-/// How subtrees that are left for later are kept.
+/// The pending subtrees, which the ray visits later. Implementations differ in how they keep them.
 pub trait Pending {
+    /// Working memory for any number of rays, one after the other.
     fn new() -> Self;
+    /// Forgets all pending subtrees: a new ray begins.
     fn clear(&mut self);
-    /// A level down, where a bit is kept for each.
+    /// Notes that the ray goes one level down. Only implementations that keep a bit for each level do anything.
     fn go_down(&mut self) {}
+    /// Makes the node `second_ix` pending. The ray leaves it at the cell's `t_exit`. It is the sibling of the cell's
+    /// node.
     fn push(&mut self, second_ix: u32, cell: &Cell);
-    /// The next pending cell that may hold a hit nearer than `t_best`, or false.
+    /// Sets `cell` to the next pending cell that may hold a hit nearer than `t_best`, or returns false if there is
+    /// none.
     fn pop(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
@@ -64,8 +71,9 @@ pub trait Pending {
     ) -> bool;
 }
 
-/// Down to the leaf where the ray enters the cell, or to a slab that it keeps clear of, as if that were an empty leaf. A NaN
-/// fails both tests and goes to the first child: it ends.
+/// Descends to the leaf in which the ray enters the cell. If the ray keeps clear of a node's slab on the way, returns
+/// an empty leaf in place of that node. If the t of a plane is NaN, both comparisons fail and the ray goes to the
+/// first child alone, so that the traversal ends.
 #[inline(always)]
 fn descend<P: Pending>(
     inputs: &KernelInputs<impl ReadCounter>,
@@ -98,12 +106,13 @@ fn descend<P: Pending>(
     }
 }
 
+/// Returns whether the search can end because it needs only one hit and has one.
 #[inline(always)]
 pub(crate) fn is_done<const ANY_HIT: bool>(best: &Hit) -> bool {
     ANY_HIT && best.triangle_ix != NO_TRIANGLE
 }
 
-/// All leaves that the ray meets in [t_enter, t_exit], until nothing nearer can follow.
+/// Visits all leaves that the ray meets from `t_enter` to `t_exit`, until no nearer hit can follow.
 #[inline(always)]
 pub(crate) fn search<P: Pending, const ANY_HIT: bool>(
     inputs: &KernelInputs<impl ReadCounter>,
@@ -111,14 +120,14 @@ pub(crate) fn search<P: Pending, const ANY_HIT: bool>(
     pending: &mut P,
     best: &mut Hit,
 ) {
-    // Not `>`: a NaN misses.
+    // The comparison is not `>` with an early return, since a NaN has to miss.
     if ray.t_enter <= ray.t_exit {
         let root = Cell { node_ix: 0, t_enter: ray.t_enter, t_exit: ray.t_exit };
         search_cell::<_, ANY_HIT>(inputs, ray, pending, root, best);
     }
 }
 
-/// As [`search`], in a cell that the ray is in.
+/// Does what [`search`] does, from a cell that the ray is in.
 #[inline(always)]
 pub(crate) fn search_cell<P: Pending, const ANY_HIT: bool>(
     inputs: &KernelInputs<impl ReadCounter>,

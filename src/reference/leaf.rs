@@ -1,4 +1,5 @@
-//! A leaf's triangles against a ray, but those whose planes it does not meet there. Twin of `leaf.glsl`.
+//! Tests of a leaf's triangles. A ray is tested only against those whose planes it meets within the leaf. Twin of
+//! `leaf.glsl`.
 
 use std::ops::Range;
 
@@ -10,14 +11,15 @@ use super::{
 };
 use crate::layout::{Hit, KD_PAIR_SHIFT, KdNode, Plane};
 
-/// The leaf's entries: indices into `leaf_triangles` and `leaf_planes`.
+/// Returns the leaf's entries: indices into `leaf_triangles` and `leaf_planes`.
 #[inline(always)]
 pub fn entries_of(leaf: KdNode) -> Range<usize> {
     let first = leaf.split_or_first as usize;
     first..first + (leaf.axis_and_child >> KD_PAIR_SHIFT) as usize
 }
 
-/// Four planes, of which the last may be void, as columns: normal's x, y, z and distance.
+/// Returns the four planes from `first` on as a structure of arrays: the columns are the normals' x, y and z, and the
+/// distances. Planes beyond the last one are zero.
 #[inline(always)]
 fn four_planes(planes: &[Plane], first: usize) -> Mat4 {
     let columns = |planes: &[Plane; 4]| {
@@ -30,8 +32,8 @@ fn four_planes(planes: &[Plane], first: usize) -> Mat4 {
     }
 }
 
-/// Bit i is set where the ray does not keep to one side of plane i on its way, so far from it that no rounding of the hit test
-/// reaches across.
+/// Returns a mask of the planes that the ray may meet in the segment `way`. Bit i is cleared if the ray stays on one
+/// side of plane i, so far from it that no rounding of the hit test reaches across.
 #[inline(always)]
 fn near_planes(ray: &TraversalRay, way: Segment, planes: &Mat4) -> u32 {
     let dot = |v: Vec3A| planes.x_axis * v.x + planes.y_axis * v.y + planes.z_axis * v.z;
@@ -40,7 +42,7 @@ fn near_planes(ray: &TraversalRay, way: Segment, planes: &Mat4) -> u32 {
     !is_clear.bitmask()
 }
 
-/// The leaf's triangles against the ray: see [`intersect_entries`].
+/// Tests the leaf's triangles against the ray, as [`intersect_entries`] does. `way`: `t_enter` and `t_exit`.
 #[inline(always)]
 pub fn intersect_leaf(
     inputs: &KernelInputs<impl ReadCounter>,
@@ -52,8 +54,8 @@ pub fn intersect_leaf(
     intersect_entries(inputs, ray, entries_of(leaf), way, best);
 }
 
-/// The triangles of some entries against the ray, but those whose planes it does not meet from `t_enter` to `t_exit`; all of
-/// them where there are no planes.
+/// Tests the triangles of some entries against the ray, except those whose planes it does not meet from `t_enter` to
+/// `t_exit`. Tests all of them if there are no planes. Keeps the nearest hit in `best`.
 #[inline(always)]
 pub fn intersect_entries(
     inputs: &KernelInputs<impl ReadCounter>,

@@ -1,4 +1,4 @@
-//! Point and directional lights, as a surface point sees them. Twin of `light.glsl`.
+//! Point and directional lights, as seen from a point of a surface. Twin of `light.glsl`.
 
 use glam::Vec3;
 
@@ -9,12 +9,13 @@ use crate::layout::{LIGHT_DIRECTIONAL, Light};
 pub struct LightSample {
     /// Unit vector to the light.
     pub direction: Vec3,
-    /// How far it is (infinity for a directional one).
+    /// The light's distance, world units (infinity for a directional light).
     pub distance: f32,
-    /// On a surface that faces the light.
+    /// Irradiance on a surface that faces the light.
     pub irradiance: Vec3,
 }
 
+/// Returns what arrives from a light at a point.
 pub fn sample_light(light: &Light, point_world: Vec3) -> LightSample {
     if light.kind == LIGHT_DIRECTIONAL {
         return LightSample { direction: light.position, distance: f32::INFINITY, irradiance: light.intensity };

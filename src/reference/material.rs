@@ -1,4 +1,4 @@
-//! Wavefront MTL's materials: local light by Phong, mirrors, glass, transparency. Twin of `material.glsl`.
+//! Materials of Wavefront MTL: local light by Phong, mirrors, glass, transparency. Twin of `material.glsl`.
 
 use glam::Vec3;
 
@@ -7,7 +7,8 @@ use crate::layout::{
     LEAST_COSINE, LEAST_REFLECTANCE, MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR, Material,
 };
 
-/// Where light goes on from a surface, and what share of it. A weight of zero: no ray.
+/// The directions in which a ray continues from a surface, and the factors of its throughput. A weight of zero means
+/// that there is no such ray.
 #[derive(Clone, Copy, Debug)]
 pub struct Scattering {
     pub reflected: Vec3,
@@ -16,7 +17,8 @@ pub struct Scattering {
     pub transmitted_weight: Vec3,
 }
 
-/// The share of the surface's own light: what a see-through material (d < 1) covers.
+/// The weight of the light that the surface itself reflects and emits: a see-through material (d < 1) covers only a
+/// share d of what is behind it.
 pub fn local_weight(material: &Material) -> f32 {
     if material.flags & MATERIAL_REFRACT != 0 { 1.0 } else { material.d }
 }
@@ -26,12 +28,13 @@ fn reflect(incident: Vec3, normal: Vec3) -> Vec3 {
     incident - 2.0 * normal.dot(incident) * normal
 }
 
-/// Whether light goes on from the surface.
+/// Whether rays may continue from the surface.
 pub fn scatters_light(material: &Material) -> bool {
     material.flags & (MATERIAL_REFLECT | MATERIAL_REFRACT) != 0 || material.d < 1.0
 }
 
-/// Diffuse and specular reflectance towards the viewer. All vectors point away from the surface.
+/// The sum of the diffuse reflectance, times the cosine of the light's direction, and the specular reflectance towards
+/// the viewer. All vectors are unit vectors that point away from the surface.
 pub fn phong(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3) -> Vec3 {
     let cos_light = normal.dot(to_light);
     // Not `<=`: a NaN is dark.
@@ -46,16 +49,18 @@ pub fn phong(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3)
     reflectance
 }
 
-/// Whether a light from there can be seen in the surface.
+/// Whether a light in the direction `to_light` is visible in the surface: whether it reflects more than
+/// [`LEAST_REFLECTANCE`].
 pub fn can_show(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3) -> bool {
     let least = Vec3::splat(LEAST_REFLECTANCE);
-    // Without a power for what is not black.
+    // The diffuse part decides most cases without the specular part's power.
     let diffuse = material.kd * normal.dot(to_light) * local_weight(material);
     diffuse.cmpgt(least).any()
         || (phong(material, normal, to_viewer, to_light) * local_weight(material)).cmpgt(least).any()
 }
 
-/// Unpolarized Fresnel reflectance of a smooth dielectric; 1 in total internal reflection.
+/// Unpolarized Fresnel reflectance of a smooth dielectric; 1 in total internal reflection. `eta`: the refractive
+/// index on the ray's side divided by that beyond the surface.
 fn fresnel(cos_in: f32, cos_out: f32, eta: f32) -> f32 {
     if cos_out <= 0.0 {
         return 1.0;
@@ -65,16 +70,17 @@ fn fresnel(cos_in: f32, cos_out: f32, eta: f32) -> f32 {
     0.5 * (parallel * parallel + perpendicular * perpendicular)
 }
 
-/// Cosine of the refracted ray by Snell's law; 0 in total internal reflection.
+/// Cosine between the refracted ray and the normal by Snell's law; 0 in total internal reflection.
 fn refraction_cosine(cos_in: f32, eta: f32) -> f32 {
     (1.0 - eta * eta * (1.0 - cos_in * cos_in)).max(0.0).sqrt()
 }
 
-/// A direction that an interpolated normal has put on the wrong side of the surface, mirrored back to `side`.
+/// The direction, mirrored back to the surface's `side` if an interpolated normal has put it on the other one.
 fn keep_side(direction: Vec3, side: Vec3) -> Vec3 {
     direction - 2.0 * direction.dot(side).min(0.0) * side
 }
 
+/// Returns how a ray of this direction continues from a surface.
 pub fn scatter(material: &Material, surface: &Surface, direction: Vec3) -> Scattering {
     let mut s = Scattering {
         reflected: Vec3::ZERO,
@@ -89,7 +95,7 @@ pub fn scatter(material: &Material, surface: &Surface, direction: Vec3) -> Scatt
         return s;
     }
     let eta = if surface.from_inside { material.ni } else { 1.0 / material.ni };
-    // An interpolated normal can turn away from the viewer: grazing then.
+    // An interpolated normal can turn away from the viewer. The ray then counts as grazing.
     let cos_in = surface.shading.dot(-direction).max(LEAST_COSINE);
     let cos_out = refraction_cosine(cos_in, eta);
     let total = refracts && cos_out <= 0.0;

@@ -1,19 +1,19 @@
-//! The reference: every kernel again over slices, without Vulkan. It is the oracle of the kernels' tests, and what is
-//! not worth more speed on the CPU.
+//! The reference: every kernel as a function over slices, without Vulkan. The kernels' tests compare with it. The CPU
+//! renderer also uses it for the passes that are not worth a faster version.
 //!
-//! A file is the twin of the kernel or the shared GLSL file of its name: the same operations in the same order, so that
-//! hits agree to the last bits. Nothing here is clever. Rays are handled in tasks of a fixed size, so the picture does
-//! not depend on the number of threads.
+//! Each file is the twin of the kernel or shared GLSL file of the same name. It does the same operations in the same
+//! order, so that hits agree to the last bits. The code is as plain as possible. Rays are handled in tasks of a fixed
+//! size, so the picture does not depend on the number of threads.
 //!
 //! ```text
-//! passes      primary_hit, trace, features, compact, shadow, shade, resolve, accumulate, denoise, false_color, tonemap,
-//!             cast; visibility, which the device rasterizes
+//! passes      primary_hit, trace, features, compact, shadow, shade, resolve, accumulate, denoise, false_color,
+//!             tonemap, cast; visibility, for which the device rasterizes
 //! traversal   traverser: one ray by any algorithm
 //!               kdtree, leaf, slab, ropes, brute and the pending_* of each algorithm; grid; candidate
-//! geometry    triangle, surface, camera; search_ray and traversal_ray: a ray as the traversal takes it
+//! geometry    triangle, surface, camera; search_ray and traversal_ray: a ray in the form that searches use
 //! light       light, material, children, display, tone_curves
-//! inputs      what kernels only read
-//! counting    the same traversal, with its reads counted
+//! inputs      the data that kernels only read
+//! counting    the same traversal with its reads counted
 //! ```
 
 pub mod accumulate;
@@ -57,5 +57,6 @@ pub mod traverser;
 pub mod triangle;
 pub mod visibility;
 
-/// Rays that one thread handles at a time: enough to pay for handing them out, few enough to balance.
+/// Rays that one thread handles at a time. A task of this size is worth its scheduling, and small enough to balance
+/// the threads' load.
 const RAYS_PER_TASK: usize = 512;

@@ -1,4 +1,4 @@
-//! Pending subtrees without any memory, by the ancestors' boxes. Twin of `pending_backtrack.glsl`.
+//! Pending subtrees without any memory, found by the ancestors' boxes. Twin of `pending_backtrack.glsl`.
 
 use super::{
     counting::table::ReadCounter,
@@ -7,7 +7,7 @@ use super::{
     traversal_ray::{TraversalRay, max, min},
 };
 
-/// Nothing is remembered.
+/// Pending subtrees that are found on the way back up; nothing is stored.
 pub struct PendingBacktrack;
 
 impl Pending for PendingBacktrack {
@@ -28,7 +28,7 @@ impl Pending for PendingBacktrack {
         t_best: f32,
         cell: &mut Cell,
     ) -> bool {
-        // What has not been visited begins where the leaf ends, or later.
+        // Every cell that has not been visited begins where the leaf ends, or later.
         if t_best < cell.t_exit {
             return false;
         }

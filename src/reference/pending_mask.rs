@@ -1,4 +1,4 @@
-//! Pending subtrees by the paper's bit mask: one bit a level. Twin of `pending_mask.glsl`.
+//! Pending subtrees by the paper's bit mask, which has one bit for each level. Twin of `pending_mask.glsl`.
 
 use super::{
     counting::table::ReadCounter,
@@ -8,40 +8,44 @@ use super::{
 };
 use crate::layout::KD_MAX_DEPTH;
 
-/// Which siblings on the way to the root are still to be visited. Bit i: the one i levels above the cell's node; one word for
-/// the kernel's two.
+/// The siblings that are still to be visited on the way to the root. Bit i is set if the sibling i levels above the
+/// cell's node is pending. This one word replaces the kernel's two.
 #[derive(Clone, Copy, Default)]
 pub struct Mask(u64);
 
 impl Mask {
+    /// Returns whether nothing is pending.
     #[inline(always)]
     pub fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Where the last of what is pending is kept.
+    /// Returns the slot of the last pending cell.
     #[inline(always)]
     fn last_place(self) -> usize {
         self.0.count_ones() as usize - 1
     }
 
+    /// Returns whether the sibling `n_levels_up` above the cell's node is pending.
     #[inline(always)]
     pub fn has(self, n_levels_up: u32) -> bool {
         self.0 >> n_levels_up & 1 != 0
     }
 
+    /// Shifts the mask as the ray goes one level down.
     #[inline(always)]
     pub fn go_down(&mut self) {
         self.0 <<= 1;
     }
 
-    /// The sibling of the cell's node is pending.
+    /// Marks the sibling of the cell's node as pending.
     #[inline(always)]
     pub fn mark(&mut self) {
         self.0 |= 1;
     }
 
-    /// Up to the lowest sibling that is pending, and is no more. By how many levels. The mask is not empty.
+    /// Goes up to the lowest pending sibling and clears its bit. Returns the number of levels. The mask must not be
+    /// empty.
     #[inline(always)]
     pub fn go_up(&mut self) -> u32 {
         let n = self.0.trailing_zeros();
@@ -50,10 +54,10 @@ impl Mask {
     }
 }
 
-/// The mask, and the pending cells in its bits' order.
+/// Pending subtrees: the mask, and the cells in the order of its bits.
 pub struct PendingMask {
     mask: Mask,
-    /// Node, and where the ray leaves it.
+    /// Each entry: the pending node, and the t at which the ray leaves it.
     cells: [(u32, f32); KD_MAX_DEPTH as usize],
 }
 

@@ -1,4 +1,4 @@
-//! Pending subtrees by the paper's mask and the siblings' boxes. Twin of `pending_mask_boxes.glsl`.
+//! Pending subtrees by the paper's mask, and by tests of the siblings' boxes. Twin of `pending_mask_boxes.glsl`.
 
 use super::{
     counting::table::ReadCounter,
@@ -7,8 +7,9 @@ use super::{
     traversal_ray::{TraversalRay, min},
 };
 
+/// Pending subtrees that are found on the way back up: the mask of the siblings that have been visited.
 pub struct PendingMaskBoxes {
-    /// Bit i: the sibling i levels above the cell's node.
+    /// Bit i is set if the sibling i levels above the cell's node has been visited.
     siblings_done: u64,
 }
 
@@ -38,7 +39,7 @@ impl Pending for PendingMaskBoxes {
         t_best: f32,
         cell: &mut Cell,
     ) -> bool {
-        // What has not been visited begins where the leaf ends, or later.
+        // Every cell that has not been visited begins where the leaf ends, or later.
         if t_best < cell.t_exit {
             return false;
         }

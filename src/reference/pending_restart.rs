@@ -1,4 +1,4 @@
-//! Pending subtrees found again from the root, along the mask's trail. Twin of `pending_restart.glsl`.
+//! Pending subtrees by restarts from the root, along the trail that the mask stores. Twin of `pending_restart.glsl`.
 
 use super::{
     counting::table::ReadCounter,
@@ -8,28 +8,30 @@ use super::{
     traversal_ray::{TraversalRay, min},
 };
 
-/// The way down to the cell's node.
+/// The trail of the path down from the root to the cell's node.
 #[derive(Clone, Copy, Default)]
 pub struct Trail {
+    /// At a set bit, the path went to the first child.
     pub mask: Mask,
-    /// Levels.
+    /// Levels from the root to the cell's node.
     length: u32,
 }
 
 impl Trail {
+    /// Extends the trail by one level.
     #[inline(always)]
     pub fn go_down(&mut self) {
         self.mask.go_down();
         self.length += 1;
     }
 
-    /// Up to the lowest sibling that is pending, and is no more.
+    /// Goes up to the lowest pending sibling and clears its bit.
     #[inline(always)]
     pub fn go_up(&mut self) {
         self.length -= self.mask.go_up();
     }
 
-    /// The same, and the cell from the root down to there.
+    /// Does what [`Trail::go_up`] does, and walks from the root to that sibling, which becomes the cell.
     #[inline(always)]
     pub fn retrace(&mut self, inputs: &KernelInputs<impl ReadCounter>, ray: &TraversalRay, cell: &mut Cell) {
         self.go_up();

@@ -1,4 +1,5 @@
-//! The newest pending subtrees on a ring, older ones by the mask. Twin of `pending_short_stack.glsl`.
+//! Pending subtrees on a short stack: a ring keeps the newest ones, and the mask leads to older ones. Twin of
+//! `pending_short_stack.glsl`.
 
 use super::{
     counting::table::ReadCounter,
@@ -8,13 +9,15 @@ use super::{
     traversal_ray::TraversalRay,
 };
 
-/// The `N` newest entries (a power of two, or none) and the trail of all.
+/// Pending subtrees: the `N` newest ones, and the trail of all. `N` is a power of two, or 0 for the traversal by
+/// restarts.
 pub struct PendingMarked<const N: usize> {
     trail: Trail,
-    /// Node, and where the ray leaves it.
+    /// Each entry: the pending node, and the t at which the ray leaves it.
     entries: [(u32, f32); N],
-    /// Where the next entry goes, and how many are kept.
+    /// Number of the next entry, whose slot is its remainder by `N`.
     top: usize,
+    /// Number of entries that the ring holds.
     size: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Pending subtrees on an array: no bits, no climbing. Twin of `pending_stack.glsl`.
+//! Pending subtrees on a stack, without bits and without climbing. Twin of `pending_stack.glsl`.
 
 use super::{
     counting::table::ReadCounter,
@@ -8,9 +8,10 @@ use super::{
 };
 use crate::layout::KD_MAX_DEPTH;
 
-/// Node and exit of each pending subtree. Where one begins is not kept: it is where the ray has just left the cell before
-/// it.
+/// Pending subtrees on a stack.
 pub struct PendingStack {
+    /// Each entry: the pending node, and the t at which the ray leaves it. The t at which the ray enters is not
+    /// stored: it is the t at which the ray has just left the cell before.
     entries: [(u32, f32); KD_MAX_DEPTH as usize],
     size: usize,
 }

@@ -1,4 +1,4 @@
-//! Primary hit (the paper's section 2.2): the camera's rays, and where they meet the triangles that visibility found.
+//! Primary hit (the paper's section 2.2): the camera's rays, and their hits on the triangles that visibility found.
 //! Twin of `primary_hit.comp`.
 
 use glam::{UVec2, Vec3};
@@ -12,7 +12,7 @@ use super::{
 };
 use crate::layout::{Frame, Hit, NO_TRIANGLE, PathRay};
 
-/// The ray through a pixel's sample.
+/// The camera ray through a pixel's sample.
 pub fn camera_ray(frame: &Frame, pixel: UVec2) -> PathRay {
     PathRay {
         origin: frame.eye,
@@ -24,7 +24,7 @@ pub fn camera_ray(frame: &Frame, pixel: UVec2) -> PathRay {
     }
 }
 
-/// Writes the rays of the pixels from place `first_pixel` on, in tile order, as many as `rays` holds.
+/// Fills `rays` with the camera rays of the pixels from index `first_pixel` on, in the queue's order ([`pixel_of`]).
 pub fn primary_rays(frame: &Frame, first_pixel: u32, rays: &mut [PathRay]) {
     rays.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each(|(task, rays)| {
         for (order, ray) in (first_pixel + (task * RAYS_PER_TASK) as u32..).zip(rays) {
@@ -33,7 +33,8 @@ pub fn primary_rays(frame: &Frame, first_pixel: u32, rays: &mut [PathRay]) {
     });
 }
 
-/// Writes `hits`, one a ray, from `triangle_ids` (rows from the top); returns how many are hits.
+/// Writes `hits`, one for each ray, from `triangle_ids` (one for each pixel, rows from the top). Returns the number
+/// of rays that hit something.
 pub fn primary_hit(inputs: &KernelInputs, triangle_ids: &[u32], rays: &[PathRay], hits: &mut [Hit]) -> u32 {
     let of_task = |(rays, hits): (&[PathRay], &mut [Hit])| {
         let mut n_hits = 0;

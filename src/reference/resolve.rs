@@ -1,4 +1,4 @@
-//! Resolve: the light of all rays of a pixel. Twin of `resolve.comp`.
+//! Resolve: sums the radiance of all rays of a pixel. Twin of `resolve.comp`.
 
 use std::ops::Range;
 
@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use crate::layout::{Bounce, PathRay};
 
-/// Writes the pixels of the first bounce's rays: of each the sum of its ray's `ray_radiance` and that of all rays that came of
-/// it, bounce after bounce.
+/// Writes the pixels of the first bounce's rays. Each is the sum of the `ray_radiance` of its ray and of all the
+/// ray's descendants, bounce after bounce.
 pub fn resolve(
     bounces: &[Bounce],
     rays: &[PathRay],
@@ -29,10 +29,10 @@ pub fn resolve(
     }
 }
 
-/// The children, in the bounce `next`, of a span of rays of the bounce before.
+/// The children, in the bounce `next`, of a span of rays of the previous bounce.
 fn children_of(span: &Range<usize>, next: &Bounce, first_children: &[u32]) -> Range<usize> {
     let Range { start, end } = next.rays();
-    // Behind the last ray of a bounce stands none of it.
+    // The children end where those of the next ray begin. After a bounce's last ray there is no such ray.
     let end = if span.end < start { first_children[span.end] as usize } else { end };
     first_children[span.start] as usize..end
 }

@@ -1,4 +1,4 @@
-//! From leaf to leaf by ropes, without a stack. Twin of `ropes.glsl`.
+//! Traversal from leaf to leaf by ropes, without a stack. Twin of `ropes.glsl`.
 
 use super::{
     counting::table::ReadCounter,
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::layout::{Hit, KdNode};
 
-/// The leaf in `node_ix` where the ray is at t.
+/// Descends from the node to the leaf that contains the ray at t. Returns the leaf, and its index in `node_ix`.
 #[inline(always)]
 fn leaf_at(inputs: &KernelInputs<impl ReadCounter>, ray: &TraversalRay, t: f32, node_ix: &mut u32) -> KdNode {
     let mut node = inputs.kd_nodes[*node_ix as usize];
@@ -21,7 +21,8 @@ fn leaf_at(inputs: &KernelInputs<impl ReadCounter>, ray: &TraversalRay, t: f32, 
     node
 }
 
-/// Where the ray leaves a leaf's cell, and the node that is there, 0 outside the root's: by the face that it comes to first.
+/// Returns the t at which the ray leaves a leaf's cell, through the face that it comes to first, and the node behind
+/// that face. The node is 0 outside the root's cell.
 #[inline(always)]
 fn exit_of(inputs: &KernelInputs<impl ReadCounter>, ray: &TraversalRay, leaf_ix: u32) -> (f32, u32) {
     let exits = [0, 1, 2].map(|axis| {
@@ -32,7 +33,8 @@ fn exit_of(inputs: &KernelInputs<impl ReadCounter>, ray: &TraversalRay, leaf_ix:
     exits.into_iter().reduce(|first, other| if other.0 < first.0 { other } else { first }).expect("three")
 }
 
-/// The closest hit, or with `ANY_HIT` one that need not be the closest.
+/// Finds the closest hit nearer than `best`, or with `ANY_HIT` one that need not be the closest, and keeps it in
+/// `best`.
 #[inline]
 pub fn follow_ropes<const ANY_HIT: bool>(inputs: &KernelInputs<impl ReadCounter>, ray: &TraversalRay, best: &mut Hit) {
     if !(ray.t_enter <= ray.t_exit) {

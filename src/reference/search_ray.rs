@@ -1,18 +1,19 @@
-//! What the traversal is told of a ray.
+//! The part of a ray that a search needs.
 
 use glam::Vec3;
 
 use crate::layout::{Hit, NO_TRIANGLE, PathRay};
 
-/// A ray that is to be traced in (t_min, t_max].
+/// A ray whose hits have t in (t_min, t_max].
 #[derive(Clone, Copy, Debug)]
 pub struct SearchRay {
+    /// World units.
     pub origin: Vec3,
     pub t_min: f32,
-    /// Of about unit length.
+    /// About unit length.
     pub direction: Vec3,
     pub t_max: f32,
-    /// Which it does not hit.
+    /// The triangle that the ray never hits, or `NO_TRIANGLE`.
     pub source_triangle: u32,
 }
 
@@ -24,7 +25,7 @@ impl From<&PathRay> for SearchRay {
 }
 
 impl SearchRay {
-    /// What is there before anything is hit.
+    /// The hit before anything is hit: no triangle, at `t_max`.
     pub fn miss(&self) -> Hit {
         Hit { t: self.t_max, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 }
     }

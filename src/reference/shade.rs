@@ -1,4 +1,4 @@
-//! Shade (the paper's section 2.1): light that leaves each hit. Twin of `shade.comp`.
+//! Shade (the paper's section 2.1): the light that leaves each hit towards the viewer. Twin of `shade.comp`.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -12,16 +12,18 @@ use super::{
 };
 use crate::layout::{Hit, LIGHT_LIT, Material, NO_TRIANGLE, PathRay};
 
-/// What there is to shade.
+/// The rays to shade, with the lights that their hits see.
 #[derive(Clone, Copy)]
 pub struct LitRays<'a> {
     pub rays: &'a [PathRay],
-    /// One a ray.
+    /// One for each ray.
     pub hits: &'a [Hit],
-    /// `[light * queue_capacity + ray]`, `LIGHT_*`.
+    /// One of `LIGHT_*` at each `[light * queue_capacity + ray]`.
     pub light_visibility: &'a [u32],
 }
 
+/// The radiance that the surface itself emits and reflects towards the viewer, from the ambient light and all lights
+/// that it sees.
 fn local_radiance(
     inputs: &KernelInputs,
     is_lit: impl Fn(usize) -> bool,
@@ -40,7 +42,7 @@ fn local_radiance(
     radiance * local_weight(material)
 }
 
-/// Its throughput included.
+/// The radiance that a ray adds to its pixel, its throughput included.
 fn radiance_of(inputs: &KernelInputs, (ray, hit): (&PathRay, &Hit), is_lit: impl Fn(usize) -> bool) -> Vec3 {
     if hit.triangle_ix == NO_TRIANGLE {
         return ray.throughput * inputs.frame().background;
@@ -49,7 +51,7 @@ fn radiance_of(inputs: &KernelInputs, (ray, hit): (&PathRay, &Hit), is_lit: impl
     ray.throughput * local_radiance(inputs, is_lit, ray, &surface, inputs.material_at(hit))
 }
 
-/// Writes `ray_radiance`, one a ray, weighted by its throughput.
+/// Writes `ray_radiance`, one for each ray, weighted by the ray's throughput.
 pub fn shade(inputs: &KernelInputs, lit: LitRays, ray_radiance: &mut [[f32; 4]]) {
     let stride = inputs.frame().queue_capacity as usize;
     ray_radiance.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each(|(task, radiance)| {

@@ -1,4 +1,4 @@
-//! Shadow (the paper's section 2.1): which lights each hit sees. Twin of `shadow.comp`.
+//! Shadow (the paper's section 2.1): tests which lights each hit sees. Twin of `shadow.comp`.
 
 use std::ops::Range;
 
@@ -19,7 +19,7 @@ use crate::{
     layout::{Hit, LIGHT_LIT, LIGHT_SHADOWED, LIGHT_UNTESTED, Light, NO_TRIANGLE, PathRay},
 };
 
-/// The segment to the light, or none where the surface turns its back on it or would not show it.
+/// The segment to the light, or none if the surface faces away from the light or would not show it.
 pub(crate) fn shadow_segment(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, light: &Light) -> Option<PathRay> {
     let surface = surface_at(ray, hit, &inputs.triangles[hit.triangle_ix as usize]);
     let to_light = sample_light(light, surface.point_world);
@@ -34,8 +34,8 @@ pub(crate) fn shadow_segment(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, li
     Some(PathRay { t_max: to_light.distance, ..segment })
 }
 
-/// Writes `light_visibility[light * queue_capacity + ray]` (`LIGHT_*`) of a bounce's rays, whose places are given; returns how many
-/// segments were tested.
+/// Writes `light_visibility[light * queue_capacity + ray]`, one of `LIGHT_*`, for a bounce's rays. `places`: the
+/// rays' indices in the queue. Returns the number of segments that were tested.
 pub fn shadow(
     inputs: &KernelInputs,
     traversal: Traversal,
@@ -46,7 +46,7 @@ pub fn shadow(
     shadow_by::<Traverser>(inputs, traversal, places, (rays, hits), light_visibility)
 }
 
-/// Does what [`shadow`] does, by another tracer.
+/// Does what [`shadow`] does, by the tracer `T`.
 pub fn shadow_by<T: Tracer>(
     inputs: &KernelInputs,
     traversal: Traversal,

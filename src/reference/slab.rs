@@ -1,16 +1,16 @@
-//! Whether a ray keeps clear of the slab around a node's surface. Twin of `slab.glsl`; the planes of triangles are in `leaf.rs`,
-//! slabs for sixteen rays in `packet.rs`.
+//! Tests whether a ray keeps clear of the slab around a node's surface. Twin of `slab.glsl`. `leaf.rs` has the test
+//! for the planes of triangles, and `packet.rs` the test of slabs for sixteen rays.
 
 use super::{counting::table::ReadCounter, inputs::KernelInputs, traversal_ray::TraversalRay};
 use crate::layout::{KD_HAS_SLAB, KdNode, Slab};
 
-/// The node's slab, if it has one.
+/// Returns the node's slab, if it has one.
 #[inline(always)]
 pub fn slab_of<'a>(inputs: &KernelInputs<'a, impl ReadCounter>, node: KdNode, node_ix: u32) -> Option<&'a Slab> {
     if node.axis_and_child & KD_HAS_SLAB == 0 { None } else { inputs.kd_slabs.get(node_ix as usize) }
 }
 
-/// The middle of a ray's way through a cell, and half its length, in t.
+/// A segment of a ray, such as the one within a cell: the middle and half the length, in t.
 #[derive(Clone, Copy)]
 pub struct Segment {
     pub middle: f32,
@@ -18,6 +18,7 @@ pub struct Segment {
 }
 
 impl Segment {
+    /// The segment from `t_enter` to `t_exit`.
     #[inline(always)]
     pub fn new(t_enter: f32, t_exit: f32) -> Self {
         Self { middle: 0.5 * (t_enter + t_exit), half: 0.5 * (t_exit - t_enter) }
@@ -25,7 +26,7 @@ impl Segment {
 }
 
 impl TraversalRay {
-    /// Whether the ray keeps to one side of the slab on its way from `t_enter` to `t_exit`.
+    /// Returns whether the ray stays on one side of the slab, outside of it, from `t_enter` to `t_exit`.
     #[inline(always)]
     pub fn is_clear_of(&self, slab: &Slab, [t_enter, t_exit]: [f32; 2]) -> bool {
         let way = Segment::new(t_enter, t_exit);

@@ -1,20 +1,20 @@
-//! The surface at a hit, and rays that leave it. Twin of `surface.glsl`.
+//! The surface at a hit, and the rays that leave it. Twin of `surface.glsl`.
 
 use glam::{Vec2, Vec3};
 
 use crate::layout::{FLAT_NORMAL, Hit, LEAST_NORMAL_SQUARED, LEAST_WEIGHT, PathRay, SURFACE_CLEARANCE, Triangle};
 
-/// Where a ray met a triangle.
+/// The surface of a triangle at a hit, as the ray meets it.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
     pub point_world: Vec3,
-    /// The plane's unit normal on the side that the ray came from.
+    /// The unit normal of the triangle's plane, on the side that the ray comes from.
     pub geometric: Vec3,
     /// The interpolated unit normal, on the same side.
     pub shading: Vec3,
-    /// Distance along `geometric` at which a new ray starts clear of this surface.
+    /// Distance along `geometric` at which a new ray starts so that it does not hit this surface, world units.
     pub clearance: f32,
-    /// The ray met the triangle's back: it leaves a solid.
+    /// Whether the ray meets the triangle's back: then it is inside a solid.
     pub from_inside: bool,
 }
 
@@ -24,7 +24,7 @@ fn unpack_snorm_2x16(code: u32) -> Vec2 {
     Vec2::new(component(code), component(code >> 16))
 }
 
-/// Unit vector of an octahedral 2 x snorm16 code.
+/// The unit vector of an octahedral 2 x snorm16 code.
 pub fn decode_normal(code: u32) -> Vec3 {
     let p = unpack_snorm_2x16(code);
     let mut n = Vec3::new(p.x, p.y, 1.0 - p.x.abs() - p.y.abs());
@@ -34,6 +34,7 @@ pub fn decode_normal(code: u32) -> Vec3 {
     n.normalize()
 }
 
+/// The interpolated unit normal, or `geometric` if a corner has none or the corners' normals cancel out.
 fn shading_normal(t: &Triangle, hit: &Hit, geometric: Vec3) -> Vec3 {
     if [t.n0, t.n1, t.n2].contains(&FLAT_NORMAL) {
         return geometric;
@@ -43,22 +44,23 @@ fn shading_normal(t: &Triangle, hit: &Hit, geometric: Vec3) -> Vec3 {
     if squared > LEAST_NORMAL_SQUARED { n * (1.0 / squared.sqrt()) } else { geometric }
 }
 
-/// n with a non-negative component along `side`.
+/// `n` or `-n`, whichever has a non-negative component along `side`.
 fn towards(n: Vec3, side: Vec3) -> Vec3 {
     if n.dot(side) < 0.0 { -n } else { n }
 }
 
-/// Barycentric weights of a point that is not on an edge, but [`LEAST_WEIGHT`] of the triangle inside.
+/// Barycentric weights of the hit, at least [`LEAST_WEIGHT`] each before they are normalized, so that the point is
+/// not on an edge.
 fn inner_weights(hit: &Hit) -> Vec3 {
     let weights = Vec3::new(1.0 - hit.u - hit.v, hit.u, hit.v).max(Vec3::splat(LEAST_WEIGHT));
     weights / (weights.x + weights.y + weights.z)
 }
 
-/// The surface of triangle `t` at `hit` as `ray` meets it.
+/// The surface of triangle `t` at a hit. Its point is interpolated from the corners.
 pub fn surface_at(ray: &PathRay, hit: &Hit, t: &Triangle) -> Surface {
     let weights = inner_weights(hit);
     let magnitude = (weights.x * t.v0).abs() + (weights.y * t.v1).abs() + (weights.z * t.v2).abs();
-    // Edges at unit scale: the cross product of a tiny triangle would underflow.
+    // The edges are scaled to about 1, since the cross product of a tiny triangle would underflow.
     let (e1, e2) = (t.v1 - t.v0, t.v2 - t.v0);
     let span = e1.abs().max(e2.abs());
     let scale = 1.0 / span.x.max(span.y.max(span.z));
@@ -75,7 +77,8 @@ pub fn surface_at(ray: &PathRay, hit: &Hit, t: &Triangle) -> Surface {
 }
 
 impl Surface {
-    /// A ray from the surface: starts on the side that it leaves to.
+    /// A ray from the surface, which starts on the side that it leaves to. `triangle_ix`: the surface's triangle,
+    /// which the ray does not hit.
     pub fn ray_from(&self, direction: Vec3, triangle_ix: u32, parent: &PathRay, throughput: Vec3) -> PathRay {
         let side = if direction.dot(self.geometric) < 0.0 { -self.clearance } else { self.clearance };
         PathRay {

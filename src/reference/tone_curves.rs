@@ -1,13 +1,14 @@
-//! From exposed radiance to a display's 0..1, both linear. Twin of `tone_curves.glsl`, which names the sources.
+//! Tone curves: from exposed radiance to a display's 0..1, both linear. Twin of `tone_curves.glsl`, which names the
+//! sources.
 
 use glam::{Mat3, Vec3};
 
 use crate::layout::{TONEMAP_ACES, TONEMAP_AGX};
 
-/// Beyond it every curve shows white; infinities would become NaN.
+/// Exposed radiance is clamped to this, since infinities would become NaN. Every curve shows white above it.
 const BRIGHTEST: f32 = 65504.0;
 
-/// A matrix by rows.
+/// The matrix with these rows.
 const fn rows(r: [f32; 3], g: [f32; 3], b: [f32; 3]) -> Mat3 {
     Mat3::from_cols_array_2d(&[[r[0], g[0], b[0]], [r[1], g[1], b[1]], [r[2], g[2], b[2]]])
 }
@@ -41,7 +42,7 @@ fn agx(exposed: Vec3) -> Vec3 {
     (OUTSET * curve).map(|x| x.max(0.0).powf(2.2))
 }
 
-/// `curve`: `TONEMAP_*`. Black for NaN.
+/// Applies the exposure and a curve, one of `TONEMAP_*`. Returns linear display values, 0..1; black for NaN.
 #[expect(clippy::manual_clamp, reason = "`clamp` keeps NaN")]
 pub fn tone_mapped(curve: u32, radiance: Vec3, exposure: f32) -> Vec3 {
     let exposed = (radiance * exposure).map(|x| x.max(0.0).min(BRIGHTEST));
@@ -86,7 +87,8 @@ mod tests {
         assert!((grey(TONEMAP_AGX, 0.18) - 0.21452).abs().max_element() < 2e-4, "{}", grey(TONEMAP_AGX, 0.18));
     }
 
-    /// What a clipped channel turns yellow, the others turn to white.
+    /// As the exposure rises, the linear curve clips one channel after the other. The other curves fade the colour
+    /// towards white.
     #[test]
     fn bright_colours_fade() {
         let orange = Vec3::new(20.0, 8.0, 1.0);

@@ -1,4 +1,4 @@
-//! Tonemap: radiance to sRGB, 8 bits a channel. Twin of `tonemap.comp`.
+//! Tonemap: applies a tone curve and encodes the result as sRGB with 8 bits per channel. Twin of `tonemap.comp`.
 
 use glam::Vec3;
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! Trace (the paper's section 2.3): each ray's closest hit through the kd-tree. Twin of `trace.comp`.
+//! Trace (the paper's section 2.3): the closest hit of each ray. Twin of `trace.comp`.
 
 use rayon::prelude::*;
 
@@ -13,12 +13,12 @@ use crate::{
     layout::{Hit, NO_TRIANGLE, PathRay},
 };
 
-/// Writes `hits`, one a ray; returns how many are hits.
+/// Writes `hits`, one for each ray. Returns the number of rays that hit something.
 pub fn trace(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay], hits: &mut [Hit]) -> u32 {
     trace_by::<Traverser>(inputs, traversal, rays, hits)
 }
 
-/// Does what [`trace`] does, by another tracer.
+/// Does what [`trace`] does, by the tracer `T`.
 pub fn trace_by<T: Tracer>(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay], hits: &mut [Hit]) -> u32 {
     rays.par_chunks(RAYS_PER_TASK)
         .zip(hits.par_chunks_mut(RAYS_PER_TASK))

@@ -1,39 +1,43 @@
-//! A ray as a search through an acceleration structure takes it, and the part of it that is in the structure's box. Twin of
-//! `traversal_ray.glsl`.
+//! A ray in the form that searches through an acceleration structure use, and its interval in the structure's box.
+//! Twin of `traversal_ray.glsl`. Here all t are the ray's own; there they are halves.
 
 use glam::{Vec3, Vec3A};
 
 use super::{candidate::Target, counting::table::ReadCounter, inputs::KernelInputs, search_ray::SearchRay};
 use crate::layout::{Hit, KD_LEAST_COMPONENT, KD_MAX_ORIGIN_DISTANCE, KD_PLANE_EPSILON, NO_TRIANGLE};
 
-/// What the traversal needs of a ray. Arrays by axis have a fourth entry so that two bits index them without a check.
+/// A ray in the form that the traversal uses. Arrays by axis have a fourth entry, so that two bits index them without
+/// a check.
 #[derive(Clone, Copy, Debug)]
 pub struct TraversalRay {
     pub target: Target,
     pub origin: Vec3A,
     pub direction: Vec3A,
-    /// How far a segment has to keep from a plane to be clear of it.
+    /// Distance from a plane beyond which a segment of the ray is clear of it (world units).
     pub plane_epsilon: f32,
+    /// Finite: components below `KD_LEAST_COMPONENT` are replaced by it.
     pub inv_direction: [f32; 4],
-    /// Where the ray meets the plane at 0 on each axis, in t.
+    /// The t at which the ray meets the plane at 0 on each axis.
     pub bias: [f32; 4],
+    /// The t at which the ray enters the structure's box, or `t_min`.
     pub t_enter: f32,
+    /// The t at which the ray leaves the structure's box, or `t_max`.
     pub t_exit: f32,
 }
 
-/// GLSL's `min`: the first operand where either is NaN.
+/// GLSL's `min`: returns the first operand if either is NaN.
 #[inline(always)]
 pub fn min(x: f32, y: f32) -> f32 {
     if y < x { y } else { x }
 }
 
-/// GLSL's `max`: the first operand where either is NaN.
+/// GLSL's `max`: returns the first operand if either is NaN.
 #[inline(always)]
 pub fn max(x: f32, y: f32) -> f32 {
     if x < y { y } else { x }
 }
 
-/// Bit i: on axis i, the ray comes to the upper child first.
+/// Returns a word whose bit i tells that on axis i the ray comes to the upper child first.
 #[inline(always)]
 pub fn signs_of(direction: Vec3) -> u32 {
     let is_below = |d: f32| u32::from(d <= -KD_LEAST_COMPONENT);
@@ -41,6 +45,8 @@ pub fn signs_of(direction: Vec3) -> u32 {
 }
 
 impl TraversalRay {
+    /// Prepares a ray for the traversal and clips it to the structure's box. If the ray misses the box, `t_enter` is
+    /// greater than `t_exit`.
     #[inline]
     pub fn new(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> Self {
         let origin = ray.origin.to_array();
@@ -67,24 +73,27 @@ impl TraversalRay {
     }
 }
 
+/// Returns the greatest magnitude of a coordinate of the structure's box (world units).
 #[inline(always)]
 pub fn largest_coordinate(inputs: &KernelInputs<impl ReadCounter>) -> f32 {
     inputs.cell_min.abs().max(inputs.cell_max.abs()).max_element()
 }
 
-/// How far from 0, by its largest coordinate, a ray may start for the margins of the leaves to cover its rounding.
+/// Returns the greatest magnitude that a coordinate of a ray's origin may have for the margins of leaves to cover the
+/// ray's rounding (world units).
 #[inline(always)]
 pub fn origin_reach(inputs: &KernelInputs<impl ReadCounter>) -> f32 {
     KD_MAX_ORIGIN_DISTANCE * largest_coordinate(inputs)
 }
 
-/// Whether the ray starts within reach.
+/// Returns whether the ray's origin is within [`origin_reach`].
 #[inline(always)]
 fn is_within_reach(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> bool {
     ray.origin.abs().max_element() <= origin_reach(inputs)
 }
 
-/// The ray with its origin moved along it to lie within `KD_MAX_ORIGIN_DISTANCE`, and how far: 0 for all but cameras far away.
+/// Returns the ray with its origin moved along it to within `KD_MAX_ORIGIN_DISTANCE`, and the t of the move, which is
+/// 0 unless the ray starts far away from the scene.
 #[inline(always)]
 pub fn near_scene(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> (SearchRay, f32) {
     if is_within_reach(inputs, ray) {
@@ -95,7 +104,8 @@ pub fn near_scene(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> (
     (SearchRay { origin, t_min: ray.t_min - t_start, t_max: ray.t_max - t_start, ..*ray }, t_start)
 }
 
-/// What `search` finds from near the scene, as seen from where the ray starts. A miss keeps t = t_max.
+/// Calls `search` with the ray moved near the scene, and returns its hit with t counted from the ray's own origin. A
+/// miss has t = t_max.
 #[inline(always)]
 pub fn hit_from_near(
     inputs: &KernelInputs<impl ReadCounter>,

@@ -1,4 +1,5 @@
-//! The algorithms that take rays through a kd-tree, and the search through a grid, behind one interface: one ray after the other.
+//! One interface for the algorithms that take rays through a kd-tree and for the search through a grid. Rays are
+//! traced one after the other.
 
 use super::{
     brute,
@@ -20,13 +21,13 @@ use crate::{
     layout::{Hit, SHORT_STACK_SIZE},
 };
 
-/// What finds the hits of many rays; each thread has one of its own.
+/// Finds the hits of many rays. Each thread has its own tracer.
 pub trait Tracer {
-    /// A tracer through the structure of the inputs; through a kd-tree by an algorithm.
+    /// A tracer through the structure of the inputs. `traversal` is the algorithm if this is a kd-tree.
     fn new(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal) -> Self;
 
-    /// Tells `found` each ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest, in
-    /// any order. A miss keeps t = t_max.
+    /// Calls `found` with each ray's key and its closest hit in (t_min, t_max], or with `ANY_HIT` one that need not
+    /// be the closest. The calls come in any order. A miss has t = t_max.
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
@@ -35,7 +36,7 @@ pub trait Tracer {
     );
 }
 
-/// An algorithm with its working memory, which is kept from ray to ray.
+/// An algorithm with its working memory, which is reused from ray to ray.
 pub enum Traverser {
     Mask(PendingMask),
     MaskBoxes(PendingMaskBoxes),
@@ -49,7 +50,7 @@ pub enum Traverser {
 }
 
 impl Traverser {
-    /// Finds a ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss keeps
+    /// Finds a ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss has
     /// t = t_max.
     #[inline]
     pub fn traverse<const ANY_HIT: bool>(&mut self, inputs: &KernelInputs<impl ReadCounter>, probe: &SearchRay) -> Hit {

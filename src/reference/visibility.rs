@@ -1,5 +1,5 @@
-//! Visibility (the paper's section 2.2): the triangle that each pixel shows. The kernels rasterize; here the camera's
-//! rays go through the kd-tree, which is what the rasterizer's answer means.
+//! Visibility (the paper's section 2.2): the triangle that each pixel shows. The device rasterizes; here the camera's
+//! rays are traced, which defines what the rasterizer is to find.
 
 use rayon::prelude::*;
 
@@ -12,12 +12,12 @@ use super::{
 };
 use crate::accel::kdtree::Traversal;
 
-/// Writes `triangle_ids` (`width * height`, rows from the top): the nearest triangle, or `NO_TRIANGLE`.
+/// Writes `triangle_ids` (`width * height`, rows from the top): the index of the nearest triangle, or `NO_TRIANGLE`.
 pub fn visibility(inputs: &KernelInputs, traversal: Traversal, triangle_ids: &mut [u32]) {
     visibility_by::<Traverser>(inputs, traversal, triangle_ids);
 }
 
-/// Does what [`visibility`] does, by another tracer.
+/// Does what [`visibility`] does, by the tracer `T`.
 pub fn visibility_by<T: Tracer>(inputs: &KernelInputs, traversal: Traversal, triangle_ids: &mut [u32]) {
     let width = inputs.frame().width;
     triangle_ids.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each_init(

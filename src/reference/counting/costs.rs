@@ -1,6 +1,6 @@
-//! What the rays of a pixel cost: how many there are, and how many nodes, and triangles of leaves, they read. The kernels count in
-//! passing; here rays go through the tree once more, so that uncounted ones cost nothing. Brute force tests every triangle
-//! here, where a kernel ends at a shadow ray's first hit.
+//! The cost of a pixel's rays: their number, and the number of nodes and of triangles of leaves that they read. The
+//! kernels count while they trace. Here rays are traced a second time to be counted, so that tracing without counts
+//! costs nothing. Brute force counts every triangle here, but a kernel ends at a shadow ray's first hit.
 
 use rayon::prelude::*;
 
@@ -16,7 +16,7 @@ use crate::{
     layout::{Feature, Hit, NO_TRIANGLE, PathRay},
 };
 
-/// Primary rays whose triangles the rasterizer found: one test each.
+/// Counts primary rays whose triangles the rasterizer found: one test for each hit.
 pub fn count_rasterized(rays: &[PathRay], hits: &[Hit], pixel_features: &mut [Feature]) {
     for (ray, hit) in rays.iter().zip(hits) {
         let feature = &mut pixel_features[ray.pixel_ix as usize];
@@ -25,7 +25,7 @@ pub fn count_rasterized(rays: &[PathRay], hits: &[Hit], pixel_features: &mut [Fe
     }
 }
 
-/// Rays whose closest hit was found through the tree.
+/// Adds the cost of rays whose closest hits were found by a search.
 pub fn count_closest(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRay], pixel_features: &mut [Feature]) {
     let steps: Vec<_> = (rays.par_iter().with_min_len(RAYS_PER_TASK))
         .map_init(|| Traverser::new(inputs, traversal), |traverser, ray| steps_of::<false>(inputs, traverser, ray))
@@ -35,7 +35,7 @@ pub fn count_closest(inputs: &KernelInputs, traversal: Traversal, rays: &[PathRa
     }
 }
 
-/// Segments from the hits to all lights that their surfaces face.
+/// Adds the cost of the shadow segments from the hits to all lights that the hits can show.
 pub fn count_shadow(
     inputs: &KernelInputs,
     traversal: Traversal,
@@ -62,6 +62,7 @@ pub fn count_shadow(
     }
 }
 
+/// Returns the number of nodes and triangles that a ray reads.
 fn steps_of<const ANY: bool>(inputs: &KernelInputs, traverser: &mut Traverser, ray: &PathRay) -> u32 {
     if matches!(traverser, Traverser::Brute) {
         return inputs.triangles.len() as u32;
@@ -71,6 +72,7 @@ fn steps_of<const ANY: bool>(inputs: &KernelInputs, traverser: &mut Traverser, r
     (counts.n_nodes.get() + counts.n_triangles.get()) as u32
 }
 
+/// Adds a ray and its steps to its pixel.
 fn add(pixel_features: &mut [Feature], ray: &PathRay, n_steps: u32) {
     let feature = &mut pixel_features[ray.pixel_ix as usize];
     feature.n_rays += 1;

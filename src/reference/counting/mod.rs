@@ -1,9 +1,9 @@
-//! Counts of what a traversal reads of the tree.
+//! Counts of a traversal's reads of the acceleration structure.
 //!
 //! ```text
-//! table   slices that count their reads, or do not
+//! table   slices that count their reads, and slices that do not
 //! steps   the reads of all rays together, for benchmarks
-//! costs   the reads of each pixel's rays, for pictures of costs
+//! costs   the reads of each pixel's rays, for false-colour pictures of costs
 //! ```
 
 pub mod costs;

@@ -1,4 +1,4 @@
-//! What a traversal reads of a tree, counted exactly.
+//! Exact counts of a traversal's reads of the acceleration structure.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -14,16 +14,16 @@ use crate::{
     layout::PathRay,
 };
 
-/// Reads for one or more rays.
+/// Reads of one or more rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Steps {
-    /// Nodes, on the way down and on the way back alike, and slabs.
+    /// Nodes, both on the way down and on the way back up, slabs, and cells of a grid.
     pub n_nodes: u64,
     /// Links to parents, and ropes.
     pub n_links: u64,
     /// Boxes of nodes.
     pub n_boxes: u64,
-    /// Triangles that were tested, once a leaf.
+    /// Entries of the leaves that were visited. A triangle counts once for each of its leaves.
     pub n_triangles: u64,
 }
 
@@ -49,8 +49,8 @@ impl From<ReadCounts> for Steps {
     }
 }
 
-/// The reads of all rays together. The kernels' are the same, but where rounding sends a ray another way. Brute force
-/// tests every triangle, whatever is asked.
+/// Returns the reads of all rays together. The kernels' reads are the same, unless rounding sends a ray another way.
+/// Brute force counts every triangle for both kinds of query.
 pub fn count_steps(inputs: &KernelInputs, traversal: Traversal, query: Query, rays: &[PathRay]) -> Steps {
     if traversal == Traversal::Brute {
         return Steps { n_triangles: (rays.len() * inputs.triangles.len()) as u64, ..Steps::default() };
@@ -81,7 +81,7 @@ mod tests {
         layout::{NO_TRIANGLE, Triangle},
     };
 
-    /// Two triangles far apart along x: split planes lie between and beside them.
+    /// Two triangles far apart along x. Split planes are between them and beside them.
     fn two_triangles() -> Vec<Triangle> {
         let at = |x: f32| Triangle {
             v0: vec3(x, 0.0, 0.0),
@@ -92,7 +92,7 @@ mod tests {
         vec![at(0.0), at(10.0)]
     }
 
-    /// Without slabs.
+    /// Counts the steps through a tree without slabs.
     fn steps(max_depth: u32, traversal: Traversal, query: Query, rays: &[PathRay]) -> Steps {
         let options = BuildOptions { max_depth: Some(max_depth), slabs: false, ..BuildOptions::default() };
         steps_through(options, traversal, query, rays)
@@ -139,7 +139,7 @@ mod tests {
         }
     }
 
-    /// Down to the first leaf, which is missed, and to the second: by the root again, or by one link.
+    /// The ray goes to the first leaf, where it misses, and to the second one by the root or by one link.
     #[test]
     fn the_way_to_the_other_side_is_counted() {
         let past_first = [ray(vec3(-5.0, 0.9, 0.0), Vec3::X)];

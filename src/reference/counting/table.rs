@@ -1,17 +1,17 @@
-//! A buffer that the kernels read, whose reads can be counted at no cost where nobody counts.
+//! Slices that stand for the kernels' buffers and whose reads can be counted. Slices without a counter cost nothing.
 
 use std::{
     cell::Cell,
     ops::{Index, Range},
 };
 
-/// Who is told of reads.
+/// Counts reads of a slice.
 pub trait ReadCounter: Copy {
-    /// `n` elements are read.
+    /// Counts a read of `n` elements.
     fn read(self, n: usize);
 }
 
-/// Nobody.
+/// Counts nothing, and is compiled away.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoCounter;
 
@@ -20,7 +20,7 @@ impl ReadCounter for NoCounter {
     fn read(self, _: usize) {}
 }
 
-/// A number that reads are added to.
+/// Adds reads to a number.
 #[derive(Clone, Copy, Debug)]
 pub struct Counted<'c>(pub &'c Cell<u64>);
 
@@ -31,19 +31,20 @@ impl ReadCounter for Counted<'_> {
     }
 }
 
-/// Reads of a tree by a thread.
+/// Reads of an acceleration structure by one thread.
 #[derive(Clone, Debug, Default)]
 pub struct ReadCounts {
-    /// And slabs.
+    /// Nodes, slabs, and cells of a grid.
     pub n_nodes: Cell<u64>,
     /// Links to parents, and ropes.
     pub n_links: Cell<u64>,
+    /// Boxes of nodes.
     pub n_boxes: Cell<u64>,
-    /// Leaves' entries: each is a triangle that is tested.
+    /// Entries of leaves: each is a triangle.
     pub n_triangles: Cell<u64>,
 }
 
-/// A slice and who is told of its reads.
+/// A slice and the counter of its reads.
 #[derive(Clone, Copy, Debug)]
 pub struct CountedSlice<'a, T, R = NoCounter> {
     items: &'a [T],
@@ -57,14 +58,14 @@ impl<'a, T> From<&'a [T]> for CountedSlice<'a, T> {
 }
 
 impl<'a, T, R> CountedSlice<'a, T, R> {
-    /// The same slice, with another told of reads.
+    /// Returns the same slice with another counter.
     pub fn with_counter<S>(self, reads: S) -> CountedSlice<'a, T, S> {
         CountedSlice { items: self.items, reads }
     }
 }
 
 impl<'a, T, R: ReadCounter> CountedSlice<'a, T, R> {
-    /// The element, if there is one: only then it is read.
+    /// Returns the element if there is one. Only then is a read counted.
     #[inline(always)]
     pub fn get(&self, ix: usize) -> Option<&'a T> {
         let item = self.items.get(ix)?;
