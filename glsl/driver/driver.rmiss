@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_ray_tracing : require
-// Driver: the ray of driver.rgen hits nothing.
+// Driver: one invocation per ray that hits nothing stores a miss in the payload of driver.rgen.
 #include "layout.glsl"
 
 layout(location = 0) rayPayloadInEXT Hit hit;

@@ -1,8 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Cast: one working lane a ray finds its closest hit in (t_min, t_max] through the kd-tree, or with ANY_HIT one that need
-// not be the closest.
-// Reads cast_rays and the tree; writes cast_hits, where a ray that has stalled leaves its mark.
+// Cast: finds each ray's closest hit in (t_min, t_max], or with ANY_HIT one that need not be the closest. There are
+// 2^lanes_log2 invocations per ray, the first of which works (lanes.glsl).
+// Reads cast_rays and the acceleration structure; updates cast_hits, in which a stalled ray leaves its mark
+// (stalls.glsl).
 #include "layout.glsl"
 
 const bool COUNT_COSTS = false;
@@ -19,17 +20,20 @@ layout(std430, set = 0, binding = BIND_CAST_HITS) buffer CastHitsBlock { Hit cas
 const uint INFINITY_BITS = 0x7f800000u;
 const float GREATEST = 3.40282347e38;
 
+// The result of a ray that hits nothing.
 Hit miss() {
     return Hit(uintBitsToFloat(INFINITY_BITS), NO_TRIANGLE, 0.0, 0.0);
 }
 
+// Whether a ray can hit anything: it has no NaN, a finite origin, and a direction that is finite and neither zero nor
+// denormal.
 bool is_ray(Ray ray) {
     uint exponent = exponent_of(ray.direction);
     return exponent > 0u && exponent < 255u && longest_bits(ray.origin) < INFINITY_BITS
         && magnitude_bits(ray.t_min) <= INFINITY_BITS && magnitude_bits(ray.t_max) <= INFINITY_BITS;
 }
 
-// A hit beyond the greatest t is none.
+// Finds the hit of a valid ray. t_max is at most the greatest finite number, so a hit beyond it is a miss.
 Hit cast_ray(Ray ray) {
     PathRay bounded = PathRay(ray.origin, 0u, ray.direction, NO_TRIANGLE, vec3(0.0), min(ray.t_max, GREATEST));
     Hit hit = traverse_any_length(bounded, ray.t_min, ANY_HIT);

@@ -1,8 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Compact, 1 of 3: one workgroup finds out which rays go on from the hits of SCAN_GROUP_SIZE rays, and counts them.
-// Reads rays, hits, bounces and the scene; writes child_kinds, scan_blocks[block].
+// Compact, 1 of 3: one invocation per ray of the bounce determines which child rays start at its hit. Each workgroup
+// counts those of its SCAN_GROUP_SIZE rays.
+// Reads rays, hits, bounces and the scene; writes child_kinds and scan_blocks[workgroup].
 #include "layout.glsl"
 #include "rays.glsl"
 #include "children.glsl"

@@ -1,9 +1,11 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Compact, 3 of 3: one workgroup makes the rays that go on from the hits of SCAN_GROUP_SIZE rays, at their places in the queue,
-// in order and without gaps (after Harris, Sengupta, Owens: Parallel Prefix Sum (Scan) with CUDA, GPU Gems 3).
-// Reads rays, hits, child_kinds, scan_blocks, bounces and the scene; writes first_children, the next bounce's rays.
+// Compact, 3 of 3: one invocation per ray of the bounce, in workgroups of SCAN_GROUP_SIZE, writes the child rays that
+// start at its hit to the queue, in order and without gaps (after Harris, Sengupta, Owens: Parallel Prefix Sum (Scan)
+// with CUDA, GPU Gems 3).
+// Reads rays, hits, child_kinds, scan_blocks, bounces and the scene; writes first_children and the next bounce's
+// rays.
 #include "layout.glsl"
 #include "rays.glsl"
 #include "children.glsl"
@@ -17,6 +19,7 @@ layout(std430, set = 0, binding = BIND_CHILD_KINDS) readonly buffer ChildKindsBl
 layout(std430, set = 0, binding = BIND_FIRST_CHILDREN) writeonly buffer FirstChildrenBlock { uint first_children[]; };
 layout(std430, set = 0, binding = BIND_SCAN_BLOCKS) readonly buffer ScanBlocksBlock { uint scan_blocks[]; };
 
+// Writes a ray's children to the queue from child_ix on, the reflected one first.
 void make_children(uint ray_ix, uint kinds, uint child_ix) {
     PathRay ray = ray_at(ray_ix);
     Hit hit = hits[ray_ix];

@@ -1,9 +1,10 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Compact, 2 of 3: one workgroup turns the blocks' sums into their exclusive prefix sums and sizes the next bounce.
-// Where the queue has no room for that many rays, the next bounce is empty and says `overflow`, and the first row `any_overflow`.
-// Reads and writes scan_blocks, bounces.
+// Compact, 2 of 3: the only workgroup turns the sums of the blocks of SCAN_GROUP_SIZE rays into exclusive prefix sums
+// and sizes the next bounce. If the queue has no room for the next bounce's rays, that bounce is empty and its
+// `overflow` is set, as is `any_overflow` of the first row of bounces.
+// Reads and writes scan_blocks and bounces.
 #include "layout.glsl"
 #include "scan.glsl"
 
@@ -13,7 +14,7 @@ layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; 
 layout(std430, set = 0, binding = BIND_SCAN_BLOCKS) buffer ScanBlocksBlock { uint scan_blocks[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) buffer BouncesBlock { Bounce bounces[]; };
 
-// The same as in src/frame/bounce.rs.
+// The logarithm of the number of lanes that each of n_rays rays gets. Twin of `lanes_log2` in src/frame/bounce.rs.
 uint lanes_log2(uint n_rays) {
     uint n_lanes = frame.n_lanes / max(n_rays, 1u);
     return n_lanes == 0u ? 0u : min(uint(findMSB(n_lanes)), MOST_LANES_LOG2);
@@ -48,7 +49,7 @@ void main() {
     uint carry = 0u;
     for (uint first = 0u; first < n_blocks; first += SCAN_GROUP_SIZE * SPINE_ITEMS) {
         uint begin = first + scan_rank() * SPINE_ITEMS;
-        // Loaded before any is needed, so that one does not wait for another.
+        // All are loaded before the first is used, so that no load waits for another.
         uint n_children[SPINE_ITEMS];
         for (uint i = 0u; i < SPINE_ITEMS; ++i) n_children[i] = begin + i < n_blocks ? scan_blocks[begin + i] : 0u;
         uint sum = 0u;

@@ -1,7 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Denoise (the paper's section 2.4): one invocation a pixel. Where the luminance differences to the four neighbours
-// add up to more than the threshold, the pixel is replaced by the mean of the five.
+// Denoise (the paper's section 2.4): one invocation per pixel of the window, in tiles, compares the pixel with its
+// four neighbours. If the luminance differences add up to more than the threshold, it replaces the pixel by the mean
+// of the five.
 // Reads pixel_radiance; writes pixel_filtered.
 #include "layout.glsl"
 #include "display.glsl"
@@ -15,7 +16,7 @@ void main() {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     uvec2 size = uvec2(frame.width, frame.height);
     if (any(greaterThanEqual(pixel, size))) return;
-    // At the border the pixel itself stands in for a neighbour that is not there.
+    // At the border, the pixel itself replaces a missing neighbour.
     uvec2 low = max(pixel, uvec2(1u)) - 1u;
     uvec2 high = min(pixel + 1u, size - 1u);
     vec4 centre = pixel_radiance[pixel.y * size.x + pixel.x];

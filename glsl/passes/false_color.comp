@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// False colour: one invocation a pixel displays one of the features that were found with it, in place of its picture.
+// False colour: one invocation per pixel of the window, in tiles, displays one of the pixel's features (VIEW_*) in
+// place of its colour.
 // Reads pixel_features; writes pixel_display (R in the lowest byte).
 #include "layout.glsl"
 #include "false_color.glsl"

@@ -1,7 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Features: one invocation a primary ray notes what its pixel shows, for other uses than light.
-// Reads hits and the scene; writes pixel_features, all but n_rays and n_steps.
+// Features: one invocation per primary ray of the batch writes the first-hit AOVs of its pixel: position, normal,
+// albedo, depth and the indices of the triangle and its material.
+// Reads hits and the scene; writes pixel_features, except n_rays and n_steps.
 #include "layout.glsl"
 #include "rays.glsl"
 #include "scene.glsl"
@@ -22,7 +23,7 @@ void main() {
     if (hit.triangle_ix == NO_TRIANGLE) {
         pixel_features[pixel_ix].material_ix = NO_TRIANGLE;
         pixel_features[pixel_ix].depth = uintBitsToFloat(0x7f800000u);
-        return; // the vectors were cleared
+        return; // the host has cleared the vectors
     }
     Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
     uint material_ix = load_triangle_materials(hit.triangle_ix);

@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Grid, blocks: one invocation an upper cell writes where the cell's block of lower cells begins, and its resolution.
+// Grid, blocks: writes where each upper cell's block of lower cells begins, and the block's resolution. One workgroup
+// per GRID_BLOCK_SIZE upper cells; an invocation writes one cell per row.
 // Reads build, blocks, scan_blocks; writes cells.
 #include "grid_build.glsl"
 

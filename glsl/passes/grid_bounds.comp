@@ -1,15 +1,15 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Grid, bounds: one workgroup finds the bounds of the finite triangles of a block, and counts them. Atomics bring the
-// blocks together; a minimum, a maximum and a sum of integers are the same in every order. Reads triangles; writes
-// least, greatest and n_finite of build.
+// Grid, bounds: one workgroup per block of GRID_BLOCK_SIZE triangles finds the bounds of the finite ones and counts
+// them. Atomics combine the blocks; a minimum, a maximum and a sum of integers are the same in every order.
+// Reads triangles and n_triangles of build; updates least, greatest and n_finite of build.
 #include "grid_build.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
 
-// Integers of the same order: a negative number has all bits turned, another one its sign.
+// Maps floats to integers of the same order: a negative number has all bits inverted, any other only its sign bit.
 uvec3 ordered(vec3 v) {
     uvec3 bits = floatBitsToUint(v);
     return bits ^ mix(uvec3(0x80000000u), uvec3(0xffffffffu), greaterThan(bits, uvec3(0x7fffffffu)));

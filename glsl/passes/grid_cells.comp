@@ -1,17 +1,18 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Grid, cells: one invocation a pair, in the order of the cells. The first pair of a cell writes where the cell's
-// entries begin and how many there are. All other cells are cleared before. Atomics count the cells that have
-// entries; the sum is the same in every order. Reads build, pairs_from; writes cells, and n_filled_* of build.
+// Grid, cells: one workgroup per block of GRID_BLOCK_SIZE pairs, which are sorted by their cells. The invocation at a
+// cell's first pair writes where the cell's entries begin and how many there are. All other cells have been cleared.
+// Atomics count the cells that have entries; the sum is the same in every order.
+// Reads build, pairs_from; writes cells and n_filled_* of build.
 #include "grid_build.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_PAIRS_FROM) readonly buffer PairsFromBlock { uvec2 pairs_from[]; };
 layout(std430, set = 0, binding = BIND_GRID_CELLS) writeonly buffer CellsBlock { GridCell cells[]; };
 
-// One beyond the last pair of a cell: steps of twice the length each while the cell goes on, and then halves of the
-// last step.
+// Returns the index one beyond the last pair of a cell. The search doubles its step as long as the pairs are of the
+// cell, and then bisects the last step.
 uint end_of_cell(uint cell_ix, uint first) {
     uint low = first, step = 1u;
     while (low + step < build.n_pairs && pairs_from[low + step].x == cell_ix) {

@@ -1,8 +1,10 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Grid, columns: one workgroup counts the columns of cells that a block of items takes.
-// Reads build, triangles, and at the lower level upper_pairs and blocks; writes first_columns and the block's sum.
+// Grid, columns: counts the columns of cells in the items' boxes. One workgroup per block of GRID_BLOCK_SIZE items;
+// an invocation counts those of one item per row.
+// Reads build, triangles, and at the lower level upper_pairs, blocks and scan_blocks; writes first_columns and the
+// block's sum in scan_blocks.
 #include "grid_items.glsl"
 #include "scan.glsl"
 

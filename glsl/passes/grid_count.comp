@@ -1,15 +1,15 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Grid, count: one workgroup counts the pairs of a cell and a triangle of a block of columns, each of which one
-// invocation goes through. Reads build, triangles, first_columns, scan_blocks, and at the lower level upper_pairs and
-// blocks; writes
-// first_pairs and the block's sum.
+// Grid, count: counts the pairs of a cell and a triangle. One workgroup per block of GRID_BLOCK_SIZE columns; an
+// invocation tests the cells of one column per row.
+// Reads build, triangles, first_columns, scan_blocks, and at the lower level upper_pairs and blocks; writes
+// first_pairs and the block's sum in scan_blocks.
 #include "grid_columns.glsl"
 #include "scan.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
-// Of each column: the place of its first pair among those of its block of GRID_BLOCK_SIZE columns.
+// For each column: the index of its first pair among those of its block of GRID_BLOCK_SIZE columns.
 layout(std430, set = 0, binding = BIND_GRID_FIRST_PAIRS) writeonly buffer FirstPairsBlock { uint first_pairs[]; };
 
 uint n_pairs_of(uint column_ix) {

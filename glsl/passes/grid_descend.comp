@@ -1,7 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Grid, descend: one invocation makes the pairs of the upper level the items of the lower one, and prepares the first
-// attempt. Reads and writes build.
+// Grid, descend: the only invocation makes the pairs of the upper level the items of the lower one and prepares the
+// first attempt.
+// Reads and writes build.
 #include "grid_attempt.glsl"
 
 layout(local_size_x = 1) in;

@@ -1,14 +1,16 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Grid, emit: one workgroup writes the pairs of a cell and a triangle of a block of columns, in the order of the
-// columns and their cells. One invocation goes through a column. Reads build, triangles, first_columns, first_pairs,
-// scan_blocks, and at the lower level upper_pairs and blocks; writes pairs_to.
+// Grid, emit: writes the pairs of a cell and a triangle, in the order of the columns and their cells. One workgroup
+// per block of GRID_BLOCK_SIZE columns; an invocation writes the pairs of one column per row.
+// Reads build, triangles, first_columns, first_pairs, scan_blocks, and at the lower level upper_pairs and blocks;
+// writes pairs_to.
 #include "grid_columns.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_FIRST_PAIRS) readonly buffer FirstPairsBlock { uint first_pairs[]; };
 layout(std430, set = 0, binding = BIND_GRID_PAIRS_TO) writeonly buffer PairsToBlock { uvec2 pairs_to[]; };
 
+// Writes the pairs of a column from pair_ix on.
 void emit(uint column_ix, uint pair_ix) {
     Columns columns;
     uvec2 column;

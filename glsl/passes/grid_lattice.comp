@@ -1,12 +1,14 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Grid, lattice: one invocation finds the size of the cells of a uniform grid or of the upper level, and prepares the
-// first attempt. Reads the bounds of build; writes its lattice, margin, largest_coordinate and sizes of dispatches.
+// Grid, lattice: the only invocation finds the size of the cells of a uniform grid or of the upper level, and
+// prepares the first attempt.
+// Reads the bounds in build; writes build's lattice, margin, largest_coordinate and sizes of dispatches.
 #include "grid_attempt.glsl"
 
 layout(local_size_x = 1) in;
 
-// Twin of src/accel/bounds.rs: the margin is never 0.
+// The margin as a multiple of the largest coordinate, and the least margin: it is never 0. Twin of
+// src/accel/bounds.rs.
 const float MARGIN = 1.0 / 131072.0;
 const float LEAST_MARGIN = 1.17549435e-38;
 

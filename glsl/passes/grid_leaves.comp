@@ -1,18 +1,21 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Grid, leaves: one invocation a pair, in the order of the cells, writes the triangle as a leaf has it, and its plane.
-// Twin of src/accel/grid/planes.rs. Reads build, pairs_from, triangles; writes leaf_triangles, leaf_planes.
+// Grid, leaves: writes the leaf entries, a triangle and its plane for each pair, in the order of the cells. One
+// workgroup per block of GRID_BLOCK_SIZE pairs; an invocation writes one entry per row. Twin of
+// src/accel/grid/planes.rs.
+// Reads build, pairs_from, triangles; writes leaf_triangles, leaf_planes.
 #include "grid_build.glsl"
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
 layout(std430, set = 0, binding = BIND_GRID_PAIRS_FROM) readonly buffer PairsFromBlock { uvec2 pairs_from[]; };
-// Three rows each, as in LeafTriangle.
+// Three rows per entry, which make up a LeafTriangle.
 layout(std430, set = 0, binding = BIND_GRID_LEAF_TRIANGLES) writeonly buffer LeafTrianglesBlock {
     uvec4 leaf_triangles[];
 };
 layout(std430, set = 0, binding = BIND_GRID_LEAF_PLANES) writeonly buffer LeafPlanesBlock { vec4 leaf_planes[]; };
 
+// The bound of a plane's error; src/accel/grid/planes.rs derives it.
 const float MAX_ERROR = 16.0;
 const float LEAST_NORMAL = 1.17549435e-38;
 
@@ -21,7 +24,7 @@ float magnitude(vec3 v) {
     return sum;
 }
 
-// Normal and distance, or zeros if rounding may put the plane too far off.
+// Returns a plane's normal and distance, or zeros if rounding may put the plane too far off.
 vec4 plane_of(Triangle triangle) {
     precise vec3 a = triangle.v1 - triangle.v0;
     precise vec3 b = triangle.v2 - triangle.v0;
@@ -32,7 +35,7 @@ vec4 plane_of(Triangle triangle) {
     precise float error = 4.0 * edges * reach;
     precise float limit = MAX_ERROR * (build.largest_coordinate * longest);
     uint exponent = floatBitsToUint(longest) >> 23;
-    // Where the limit is denormal, a device may take both for 0.
+    // If the limit is denormal, a device may flush both to 0.
     bool is_certain = limit >= LEAST_NORMAL && error <= limit;
     if (!is_certain || exponent < 3u || exponent >= 250u) return vec4(0.0);
     precise vec3 scaled = normal * uintBitsToFloat((252u - exponent) << 23);

@@ -1,8 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Grid, resolutions: one workgroup finds how many cells each upper cell of a block of them is cut into along each axis.
-// Reads build, cells; writes blocks and the sum of the block's lower cells.
+// Grid, resolutions: determines into how many lower cells each upper cell is cut along each axis. One workgroup per
+// block of GRID_BLOCK_SIZE upper cells; an invocation takes one cell per row.
+// Reads build, cells; writes blocks and, in scan_blocks, the number of lower cells of the block.
 #include "grid_build.glsl"
 #include "scan.glsl"
 
@@ -11,13 +12,14 @@ layout(std430, set = 0, binding = BIND_GRID_CELLS) readonly buffer CellsBlock { 
 layout(std430, set = 0, binding = BIND_GRID_BLOCKS) writeonly buffer BlocksBlock { uvec2 blocks[]; };
 layout(std430, set = 0, binding = BIND_GRID_SCAN_BLOCKS) writeonly buffer ScanBlocksBlock { uint scan_blocks[]; };
 
-// Whether a block of so many cells along each axis has no more cells than wanted, and none smaller than the margin.
+// Whether a block of `resolution` cells along each axis has no more than max_cells, and none smaller than the margin.
 bool fits(uint resolution, float max_cells) {
     float n_cells = float(resolution * resolution * resolution);
     return n_cells <= max_cells && cell_size_within(upper_lattice(), resolution) >= build.margin;
 }
 
-// Twin of `finest_resolution` in src/accel/grid/build.rs, then halved for each attempt that had too many cells.
+// The resolution of an upper cell with n_triangles. It is the finest one that fits (twin of `finest_resolution` in
+// src/accel/grid/build.rs), halved build.n_halvings times after attempts that exceeded a limit.
 uint resolution_for(uint n_triangles) {
     precise float max_cells = build.lower_density * float(n_triangles);
     uint finest = 1u;

@@ -2,8 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_ballot : require
 // Grid, sort, 1 of 3 (a least-significant-digit radix sort: Satish, Harris, Garland, "Designing efficient sorting
-// algorithms for manycore GPUs", 2009): one workgroup counts the pairs of its tiles by one digit of their cells'
-// indices. Reads build, pairs_from; writes scan_blocks[digit * groups + group].
+// algorithms for manycore GPUs", 2009): each workgroup counts the pairs of its build.tiles_a_group tiles of
+// GRID_BLOCK_SIZE pairs by one digit of their cells' indices. grid_spine.comp is the second kernel of the sort.
+// Reads build, pairs_from; writes scan_blocks[digit * workgroups + workgroup].
 #include "grid_build.glsl"
 #include "grid_digits.glsl"
 
@@ -23,7 +24,7 @@ void main() {
         bool has_pair = pair_ix < end;
         uint digit = has_pair ? digit_of(pairs_from[pair_ix].x) : 0u;
         uvec4 peers = peers_of(digit, has_pair);
-        // One of the peers adds them all.
+        // One of the peers adds the number of all.
         if (has_pair && subgroupBallotFindLSB(peers) == gl_SubgroupInvocationID) {
             atomicAdd(n_by_digit[digit], subgroupBallotBitCount(peers));
         }

@@ -2,9 +2,10 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_KHR_shader_subgroup_ballot : require
-// Grid, sort, 3 of 3: one workgroup writes the pairs of its tiles in the order of one digit. Pairs of the same digit
-// keep their order. A tile is put in order in shared memory first, so that neighbours are written to neighbouring
-// places. Reads build, pairs_from, scan_blocks; writes pairs_to.
+// Grid, sort, 3 of 3: each workgroup writes the pairs of its build.tiles_a_group tiles of GRID_BLOCK_SIZE pairs in
+// the order of one digit. Pairs of the same digit keep their order. A tile is sorted in shared memory first, so that
+// neighbouring invocations write to neighbouring addresses.
+// Reads build, pairs_from, scan_blocks; writes pairs_to.
 #include "grid_build.glsl"
 #include "grid_digits.glsl"
 #include "scan.glsl"
@@ -14,23 +15,25 @@ layout(std430, set = 0, binding = BIND_GRID_PAIRS_FROM) readonly buffer PairsFro
 layout(std430, set = 0, binding = BIND_GRID_PAIRS_TO) writeonly buffer PairsToBlock { uvec2 pairs_to[]; };
 layout(std430, set = 0, binding = BIND_GRID_SCAN_BLOCKS) readonly buffer ScanBlocksBlock { uint scan_blocks[]; };
 
-// Of each digit and subgroup, the digit first: how many pairs the subgroup has, then where they begin in the tile. 32
-// subgroups at the most.
+// For each digit and each subgroup, ordered by digit and then subgroup: first the number of the subgroup's pairs with
+// this digit, then where they begin in the tile. There are at most 32 subgroups.
 shared uint places[GRID_DIGITS * SCAN_GROUP_SIZE / 4u];
 shared uvec2 tile[GRID_BLOCK_SIZE];
-// Of each digit: where the group's next pairs go.
+// For each digit: where the workgroup's next pair with this digit is written in pairs_to.
 shared uint next_places[GRID_DIGITS];
 
-// Each subgroup has a part of the tile, row by row.
+// The index in the tile of the invocation's pair in a row. Each subgroup has a contiguous part of the tile.
 uint place_in_tile(uint row) {
     return (gl_SubgroupID * GRID_ROWS + row) * gl_SubgroupSize + gl_SubgroupInvocationID;
 }
 
+// The index in `places` of a digit of this subgroup.
 uint slot_of(uint digit) {
     return digit * gl_NumSubgroups + gl_SubgroupID;
 }
 
-// Counts the subgroup's pairs by digit. Returns how many pairs of its digit are before this one in the subgroup's part.
+// Adds a row of pairs to the subgroup's counts. Returns how many pairs with the same digit come before this
+// invocation's pair in the subgroup's part of the tile.
 uint rank_of(uint digit, bool has_pair) {
     uvec4 peers = peers_of(digit, has_pair);
     uint before = places[slot_of(digit)];
@@ -59,6 +62,7 @@ void scan_places() {
     }
 }
 
+// Sorts the n_pairs pairs from `first` on into `tile`, and leaves in `places` where each digit begins there.
 void sort_tile(uint first, uint n_pairs) {
     for (uint i = gl_LocalInvocationIndex; i < GRID_DIGITS * gl_NumSubgroups; i += SCAN_GROUP_SIZE) places[i] = 0u;
     barrier();

@@ -1,20 +1,21 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Grid, spine: one workgroup turns the sums of blocks into the sums of all blocks before them. Each invocation adds up
-// its part of them. The total decides how the attempt goes on. Reads and writes scan_blocks and build.
+// Grid, spine: the only workgroup turns the sums of blocks into exclusive prefix sums. Each invocation scans a
+// contiguous part of the sums. The total decides how the attempt continues.
+// Reads and writes scan_blocks and build.
 #include "grid_attempt.glsl"
 #include "scan.glsl"
 
-// What is added up: lower cells, columns, pairs, or pairs by the digits that they are sorted by.
+// What is summed: lower cells, columns, pairs, or pairs by the digit that the sort takes.
 layout(constant_id = CONSTANT_SCANS) const uint SCANS = GRID_SCANS_COLUMNS;
-// Sums that an invocation loads before any is needed, so that one does not wait for another.
+// The number of sums that an invocation loads before it uses the first, so that no load waits for another.
 const uint N_AT_ONCE = 16u;
 
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_GRID_SCAN_BLOCKS) buffer ScanBlocksBlock { uint scan_blocks[]; };
 
-// Where the sums begin, and how many there are. There are none if something else is to be counted.
+// Returns where the sums begin and how many there are. There are none if the build counts something else next.
 uvec2 sums() {
     switch (SCANS) {
         case GRID_SCANS_CELLS:
@@ -28,7 +29,7 @@ uvec2 sums() {
     }
 }
 
-// Goes on with this total, or with larger cells if it is above the limit.
+// Stores the total, and continues the attempt. If the total is above its limit, the next attempt has larger cells.
 void finish(uint total) {
     if (SCANS == GRID_SCANS_DIGITS || build.counts != SCANS) return;
     if (SCANS == GRID_SCANS_CELLS) build.n_lower = total;
@@ -60,7 +61,7 @@ void main() {
     }
     uint total, n_65536;
     uint before = workgroup_exclusive_add(sum, total);
-    // The upper halves alone cannot wrap around: they tell whether the total has done so.
+    // The total may wrap around. The sum of the upper halves cannot, so it tells whether the total has.
     workgroup_exclusive_add(sum >> 16, n_65536);
     for (uint first = mine; first < end; first += N_AT_ONCE) {
         uint part[N_AT_ONCE];

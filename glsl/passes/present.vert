@@ -1,5 +1,6 @@
 #version 460
-// Present: one triangle that covers the window, its right angle in the upper left corner.
+// Present: one invocation per vertex of a triangle that covers the window, with its right angle in the upper left
+// corner.
 
 void main() {
     vec2 corner = vec2(gl_VertexIndex == 1 ? 3.0 : -1.0, gl_VertexIndex == 2 ? 3.0 : -1.0);

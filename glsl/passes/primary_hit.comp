@@ -1,9 +1,10 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Primary hit (the paper's section 2.2): one invocation a pixel of the batch intersects the ray of its sample with the
-// plane of the triangle that the rasterizer found there.
-// Reads triangle_ids or pixel_nearest, triangles; writes hits, counters (n_hits), pixel_features (n_rays, n_steps).
+// Primary hit (the paper's section 2.2): one invocation per pixel of the batch intersects the camera ray of its
+// sample with the triangle that the rasterizer found there.
+// Reads triangle_ids or pixel_nearest, triangles; writes hits, pixel_features (n_rays, n_steps); updates counters
+// (n_hits).
 #include "layout.glsl"
 #include "scene.glsl"
 #include "rays.glsl"
@@ -19,9 +20,9 @@ layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock
 
 // Whether hits are counted.
 layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;
-// Whether what the ray costs is noted.
+// Whether the ray's cost is written to pixel_features.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
-// Whether kernels have found the triangles.
+// Whether the triangles were found by kernels, in pixel_nearest, not by the graphics pipeline, in triangle_ids.
 layout(constant_id = CONSTANT_BY_KERNELS) const bool BY_KERNELS = false;
 
 uint triangle_of(uvec2 pixel) {
@@ -29,6 +30,8 @@ uint triangle_of(uvec2 pixel) {
     return imageLoad(triangle_ids, ivec2(in_picture(pixel))).x;
 }
 
+// The camera ray's hit. Kernels find only triangles that the ray hits; the graphics pipeline may find one that it
+// just misses, whose hit is moved to the triangle's edge.
 Hit hit_of(PathRay ray, uint triangle_ix) {
     Shear shear = shear_of(ray.origin, ray.direction);
     Triangle triangle = triangle_at(triangle_ix);

@@ -1,14 +1,15 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Rasterize, 2 of 2: one workgroup a block of a large triangle's bounding rectangle tests the pixels that may be covered.
-// Reads triangles, large_triangles, raster_groups; writes pixel_nearest.
+// Rasterize, 2 of 2: tests the pixels that large triangles may cover. One workgroup per block of a large triangle's
+// bounding rectangle; if there are more blocks than workgroups, each workgroup takes several.
+// Reads triangles, large_triangles, raster_count; updates pixel_nearest.
 #include "layout.glsl"
 #include "rasterize.glsl"
 #include "footprint.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 
-// The last large triangle that begins with this block or before.
+// The large triangle that a block belongs to: the last one whose first block is this one or an earlier one.
 LargeTriangle triangle_of(uint block_ix, uint n_large) {
     uint first = 0u;
     for (uint n = n_large; n > 1u; ) {
@@ -20,10 +21,13 @@ LargeTriangle triangle_of(uint block_ix, uint n_large) {
     return large_triangles[first];
 }
 
+// The lower and the upper 16 bits.
 uvec2 halves(uint packed) {
     return uvec2(packed & 0xffffu, packed >> 16);
 }
 
+// Tests the pixels of a block that the triangle may cover. Each invocation takes one pixel of each tile of TILE_SIZE x
+// TILE_SIZE pixels.
 void rasterize(Triangle triangle, uint triangle_ix, Rectangle block) {
     vec3 a = triangle.v0 - frame.eye, b = triangle.v1 - frame.eye, c = triangle.v2 - frame.eye;
     EdgeHeights heights = edge_heights(a, b, c, block);

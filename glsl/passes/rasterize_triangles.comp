@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Rasterize, 1 of 2: one invocation a triangle finds the pixels that it may cover. Those of small triangles are shared out
-// among the workgroup and tested; large ones are left to workgroups of their own.
-// Reads triangles; writes pixel_nearest, large_triangles, raster_groups.
+// Rasterize, 1 of 2: one invocation per triangle finds the pixels that it may cover. The workgroup tests the pixels
+// of its small triangles together; large triangles are left to rasterize_blocks.comp.
+// Reads triangles; writes large_triangles; updates pixel_nearest, raster_groups, raster_count.
 #include "layout.glsl"
 #include "rasterize.glsl"
 #include "footprint.glsl"
@@ -10,17 +10,19 @@
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 
-// Tests of small triangles: the triangle's place in the workgroup and, above it, the pixel's in its rectangle, x and y.
+// Tests of small triangles against pixels. Bits from the lowest on: the triangle's index in the workgroup
+// (PLACE_BITS), then the pixel's x (OFFSET_BITS) and y in the triangle's rectangle.
 const uint N_TESTS = 512u;
 const uint PLACE_BITS = 6u; // RAY_GROUP_SIZE
 const uint OFFSET_BITS = 6u; // RASTER_SMALL
 shared uint tests[N_TESTS];
-// Of all triangles of the workgroup, in turns of N_TESTS.
+// The number of tests of all triangles of the workgroup. They run in rounds of N_TESTS.
 shared uint n_tests;
-// Of each triangle's rectangle, the window's first pixel, x in the lower half.
+// The first pixel of each triangle's rectangle, px of the window: x in the lower half, y in the upper.
 shared uint first_pixels[RAY_GROUP_SIZE];
 
-// The pixels of one invocation's triangle that are still to be tested, and the place of the first one among all tests.
+// The pixels of one invocation's triangle that are still to be tested, and the index of the first among all tests.
+// covered: one bit per pixel of the rectangle (covered.glsl).
 struct Pending {
     Rectangle rectangle;
     uvec2 covered;
@@ -31,12 +33,13 @@ Pending nothing_pending() {
     return Pending(Rectangle(uvec2(0u), uvec2(0u)), uvec2(0u), 0u);
 }
 
+// Reserves the tests of the covered pixels.
 Pending pending_of(Rectangle rectangle, uvec2 covered) {
     first_pixels[gl_LocalInvocationIndex] = rectangle.first.x | rectangle.first.y << 16;
     return Pending(rectangle, covered, atomicAdd(n_tests, bitCount(covered.x) + bitCount(covered.y)));
 }
 
-// Takes the next pixel, a bit.
+// Removes the next pixel and returns its bit's index.
 uint take_pixel(inout Pending pending) {
     uint word = pending.covered.x != 0u ? 0u : 1u;
     uint left = pending.covered[word];
@@ -45,7 +48,7 @@ uint take_pixel(inout Pending pending) {
     return 32u * word + uint(findLSB(left));
 }
 
-// Those of the tests before `end` that are the invocation's.
+// Writes those of the invocation's tests whose index is below `end`.
 void put_tests(inout Pending pending, uint end) {
     float rows_a_pixel = 1.0 / float(pending.rectangle.size.x);
     while (pending.covered != uvec2(0u) && pending.place < end) {
@@ -59,10 +62,12 @@ void run_test(uint test, uint first_triangle) {
     uint place = bitfieldExtract(test, 0, int(PLACE_BITS));
     uvec2 offset = uvec2(bitfieldExtract(test, int(PLACE_BITS), int(OFFSET_BITS)), test >> (PLACE_BITS + OFFSET_BITS));
     uint first = first_pixels[place];
-    test_pixel(uvec2(first & 0xffffu, first >> 16) + offset, triangle_at(first_triangle + place), first_triangle + place);
+    test_pixel(
+        uvec2(first & 0xffffu, first >> 16) + offset, triangle_at(first_triangle + place), first_triangle + place
+    );
 }
 
-// Numbered by one atomic for both counts, large triangles stand in the order of their blocks.
+// Appends a large triangle. One atomic advances both counts, so large triangles are in the order of their blocks.
 void add_large(uint triangle_ix, Rectangle rectangle) {
     uvec2 n = blocks_of(rectangle.size);
     uvec2 before = unpackUint2x32(atomicAdd(raster_count, packUint2x32(uvec2(n.x * n.y, 1u))));
@@ -73,12 +78,14 @@ void add_large(uint triangle_ix, Rectangle rectangle) {
     atomicMax(raster_groups.y, min((n_groups - 1u) / RASTER_GROUPS_X + 1u, RASTER_GROUPS_Y));
 }
 
+// Appends a triangle that is too steep to be projected (STEEPEST), unless its rectangle is certainly missed.
 void rasterize_beside_eye(uint triangle_ix, vec3 a, vec3 b, vec3 c, vec3 ahead) {
     Rectangle rectangle = rectangle_beside_eye(a, b, c, ahead);
     if (area_of(rectangle) == 0u || misses(edge_heights(a, b, c, rectangle), rectangle)) return;
     add_large(triangle_ix, rectangle);
 }
 
+// Returns the pixels of a small triangle. Appends a large one to large_triangles, and then nothing is pending.
 Pending rasterize(Triangle triangle, uint triangle_ix) {
     vec3 a = triangle.v0 - frame.eye, b = triangle.v1 - frame.eye, c = triangle.v2 - frame.eye;
     vec3 ahead = vec3(dot(a, frame.forward), dot(b, frame.forward), dot(c, frame.forward));
@@ -96,7 +103,9 @@ Pending rasterize(Triangle triangle, uint triangle_ix) {
         return nothing_pending();
     }
     vec2 first = vec2(rectangle.first);
-    return pending_of(rectangle, covered_of(rectangle.size, edge_lines(a_px - first, b_px - first, c_px - first, bounds.slack)));
+    return pending_of(
+        rectangle, covered_of(rectangle.size, edge_lines(a_px - first, b_px - first, c_px - first, bounds.slack))
+    );
 }
 
 void main() {

@@ -1,7 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Resolve: the light of all rays of a pixel. Compaction keeps order, so those of a bounce stand together, and one invocation a
-// primary ray goes from bounce to bounce by the places of their children: one writer a pixel, always in the same order.
+// Resolve: one invocation per primary ray of the batch sums the radiance of all rays of its pixel. Compaction keeps
+// the order of rays, so a pixel's rays are contiguous in each bounce, and the invocation follows them from bounce to
+// bounce by first_children. Each pixel has one writer, which always sums in the same order.
 // Reads ray_radiance, first_children, bounces; writes pixel_radiance.
 #include "layout.glsl"
 #include "rays.glsl"
@@ -12,17 +13,17 @@ layout(std430, set = 0, binding = BIND_FIRST_CHILDREN) readonly buffer FirstChil
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_RADIANCE) writeonly buffer PixelRadianceBlock { vec4 pixel_radiance[]; };
 
-// The rays of a pixel in one bounce.
+// The rays of a pixel in one bounce, [begin, end) in the queue.
 struct Span {
     uint begin;
     uint end;
 };
 
-// Their children, which are in the bounce of the row.
+// The children of a pixel's rays. bounce_ix: the row of the bounce that the children are in.
 Span children_of(Span rays_of_pixel, uint bounce_ix) {
     uint first_ray = bounces[bounce_ix].first_ray;
     uint end = first_ray + bounces[bounce_ix].n_rays;
-    // Behind the last ray of a bounce stands none of it.
+    // The children end where those of the next ray begin. After a bounce's last ray there is no such ray.
     if (rays_of_pixel.end < first_ray) end = first_children[rays_of_pixel.end];
     return Span(first_children[rays_of_pixel.begin], end);
 }

@@ -1,9 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Shade (the paper's section 2.1): one invocation a ray of the batch, of any bounce, adds up ambient, diffuse, specular and
-// emitted light at its hit.
-// Reads rays, hits, light_visibility, bounces and the scene; writes ray_radiance (weighted by throughput),
+// Shade (the paper's section 2.1): one invocation per ray of the batch, of all bounces, sums the ambient, diffuse,
+// specular and emitted light at the ray's hit.
+// Reads rays, hits, light_visibility, bounces and the scene; writes ray_radiance (weighted by throughput); updates
 // counters (n_shadow_rays).
 #include "layout.glsl"
 #include "rays.glsl"
@@ -13,16 +13,20 @@
 #include "material.glsl"
 #include "counters.glsl"
 
-// Whether shadow segments are counted.
+// Whether shadow rays are counted.
 layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
-layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) readonly buffer LightVisibilityBlock { uint light_visibility[]; };
+layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) readonly buffer LightVisibilityBlock {
+    uint light_visibility[];
+};
 layout(std430, set = 0, binding = BIND_RAY_RADIANCE) writeonly buffer RayRadianceBlock { vec4 ray_radiance[]; };
 
+// The radiance that the surface itself emits and reflects towards the viewer, from the ambient light and all lights
+// that it sees.
 vec3 local_radiance(PathRay ray, uint ray_ix, Surface surface, Material material) {
     vec3 radiance = material.ke + material.ka * frame.ambient;
     for (uint light_ix = 0u; light_ix < frame.n_lights; ++light_ix) {
@@ -33,6 +37,7 @@ vec3 local_radiance(PathRay ray, uint ray_ix, Surface surface, Material material
     return radiance * local_weight(material);
 }
 
+// The radiance that a ray adds to its pixel, its throughput included.
 vec3 radiance_of(PathRay ray, uint ray_ix) {
     Hit hit = hits[ray_ix];
     if (hit.triangle_ix == NO_TRIANGLE) return ray.throughput * frame.background;
@@ -40,7 +45,7 @@ vec3 radiance_of(PathRay ray, uint ray_ix) {
     return ray.throughput * local_radiance(ray, ray_ix, surface, material_at(hit));
 }
 
-// Adds the ray's shadow segments to those of its bounce.
+// Adds the number of the ray's shadow rays to the counter of its bounce.
 void count_segments(uint ray_ix) {
     uint n_segments = 0u;
     for (uint light_ix = 0u; light_ix < frame.n_lights; ++light_ix) {

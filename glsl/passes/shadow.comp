@@ -1,12 +1,13 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Shadow (the paper's section 2.1): one working lane a ray of the batch, of any bounce, and a light tests the segment from the
-// ray's hit to the light against the tree, if the light could be seen there; any hit before its end puts the light out.
-// Reads rays, hits, bounces and the scene; writes light_visibility[light * queue_capacity + ray], where a segment that has
-// stalled leaves its mark, pixel_features (n_rays, n_steps).
+// Shadow (the paper's section 2.1): tests the shadow rays, or segments, from the hit of each ray of the batch, of all
+// bounces, to each light that could be visible in the surface. A light is in shadow if anything is hit before it.
+// There are 2^shadow_lanes_log2 invocations per ray and light, the first of which works (lanes.glsl).
+// Reads rays, hits, bounces and the scene; updates light_visibility[light * queue_capacity + ray], in which a stalled
+// segment leaves its mark (stalls.glsl), and pixel_features (n_rays, n_steps).
 #include "layout.glsl"
 
-// Whether what segments cost is noted.
+// Whether the segments' cost is added to pixel_features.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 #include "accel.glsl"
 #include "rays.glsl"
@@ -22,7 +23,7 @@ layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) buffer LightVisibilityB
 layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
 
-// The segment to the light, or false where the surface turns its back on it or would not show it.
+// Computes the segment to the light. Returns false if the surface faces away from the light or would not show it.
 bool shadow_segment(PathRay ray, Hit hit, Light light, out PathRay segment) {
     Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
     LightSample to_light = sample_light(light, surface.point_world);
@@ -33,6 +34,7 @@ bool shadow_segment(PathRay ray, Hit hit, Light light, out PathRay segment) {
     return true;
 }
 
+// One of LIGHT_*, or the mark of a stalled segment.
 uint visibility_of(Light light, uint ray_ix) {
     Hit hit = hits[ray_ix];
     PathRay segment;
@@ -48,7 +50,8 @@ uint visibility_of(Light light, uint ray_ix) {
 
 void main() {
     uint last_ix = batch.bounce_ix + frame.max_depth - 1u;
-    // Lights take turns, so that the rays of the queue's front, which begin early, do so for each light.
+    // Consecutive workgroups take the same rays and different lights. So the rays at the queue's front start early
+    // for every light.
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint light_ix = group % frame.n_lights;
     uint lane = (group / frame.n_lights) * RAY_GROUP_SIZE + gl_LocalInvocationIndex;

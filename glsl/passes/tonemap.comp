@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Tonemap: one invocation a pixel applies the exposure and a curve and encodes the rest for display, sRGB, 8 bits a
-// channel.
+// Tonemap: one invocation per pixel of the window, in tiles, applies the exposure and a tone curve and encodes the
+// result as sRGB with 8 bits per channel.
 // Reads pixel_filtered; writes pixel_display (R in the lowest byte).
 #include "layout.glsl"
 #include "display.glsl"
@@ -12,6 +12,7 @@ layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; 
 layout(std430, set = 0, binding = BIND_PIXEL_FILTERED) readonly buffer PixelFilteredBlock { vec4 pixel_filtered[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_DISPLAY) writeonly buffer PixelDisplayBlock { uint pixel_display[]; };
 
+// The tone curve, one of TONEMAP_*.
 layout(constant_id = CONSTANT_CURVE) const uint CURVE = TONEMAP_LINEAR;
 
 void main() {

@@ -1,12 +1,13 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-// Trace (the paper's section 2.3): one working lane a ray of the bounce finds its closest hit through the kd-tree.
-// Reads rays and the tree; writes hits, where a ray that has stalled leaves its mark, counters (n_hits), pixel_features
-// (n_rays, n_steps).
+// Trace (the paper's section 2.3): finds the closest hit of each ray of the bounce. There are 2^trace_lanes_log2
+// invocations per ray, the first of which works (lanes.glsl).
+// Reads rays, bounces and the acceleration structure; updates hits, in which a stalled ray leaves its mark
+// (stalls.glsl), counters (n_hits) and pixel_features (n_rays, n_steps).
 #include "layout.glsl"
 
-// Whether what rays cost is noted.
+// Whether the rays' cost is added to pixel_features.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 #include "accel.glsl"
 #include "rays.glsl"
@@ -16,7 +17,7 @@ layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 
 // Whether hits are counted.
 layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;
-// Whether the rays are the camera's.
+// Whether the rays are the camera's, which are computed here, not loaded.
 layout(constant_id = CONSTANT_FROM_CAMERA) const bool FROM_CAMERA = false;
 
 layout(local_size_x = RAY_GROUP_SIZE) in;

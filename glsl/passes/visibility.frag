@@ -1,5 +1,6 @@
 #version 460
-// Visibility (the paper's section 2.2): the nearest triangle's index into each pixel of the R32_UINT target.
+// Visibility (the paper's section 2.2): one invocation per fragment writes its triangle's index to the R32_UINT
+// target, in which the depth test leaves the nearest triangle of each pixel.
 layout(location = 0) flat in uint triangle_ix;
 layout(location = 0) out uint triangle_id;
 

@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Visibility (the paper's section 2.2): one vertex an invocation, number 3 * triangle + corner.
-// Reads triangles; the triangle's index goes on, flat, to visibility.frag: that of the vertex that the triangle drawn
-// begins with.
+// Visibility (the paper's section 2.2): one invocation per vertex projects the corner of index 3 * triangle + corner.
+// Reads triangles; passes the triangle's index on to visibility.frag, flat: a fragment gets that of the drawn
+// triangle's first vertex. The other two vertices may be shared with other triangles (src/buffers/vertex_indices.rs).
 #include "layout.glsl"
 #include "scene.glsl"
 

@@ -1,7 +1,7 @@
 #version 460
-// Does fma round once? One invocation subtracts a rounded square from the square: what rounding took, or zero where fma
-// is a product and a sum.
-// Reads and writes numbers: [0] the number, [1] the result.
+// Tests whether fma rounds once. The only invocation computes fma(x, x, -square), where `square` is the rounded
+// square of x. The result is the rounding error of the square if fma rounds once, and 0 if it is a product and a sum.
+// Reads x in numbers[0]; writes the result to numbers[1].
 layout(local_size_x = 1) in;
 layout(std430, set = 0, binding = 0) buffer NumbersBlock { float numbers[]; };
 

@@ -1,7 +1,7 @@
 #version 460
-// How many turns does a loop take? One invocation counts them, up to the number that it is given. Some drivers end a
-// shader without a word after a certain number of turns.
-// Writes counts: [0] the number of turns.
+// Measures how many turns a loop may take: some drivers silently end a shader after a certain number of turns. The
+// only invocation counts the turns of a loop of n_turns.
+// Writes the number of turns to counts[0].
 layout(local_size_x = 1) in;
 layout(std430, set = 0, binding = 0) buffer CountsBlock { uint counts[]; };
 layout(push_constant) uniform TurnsBlock { uint n_turns; };
