@@ -1,5 +1,5 @@
-//! Compiles `glsl/{passes,probes,driver}/*` to SPIR-V and turns `glsl/shared/{layout,scene_arrays}.glsl` into Rust, both
-//! into `$OUT_DIR`.
+//! Compiles `glsl/{passes,probes,driver}/*` to SPIR-V, and turns `glsl/shared/{layout,scene_arrays}.glsl` into Rust.
+//! Both go into `$OUT_DIR`.
 
 #[path = "src/layout/scene_arrays.rs"]
 mod scene_arrays;
@@ -18,7 +18,8 @@ fn main() {
     let out_dir = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
     let out_dir = Path::new(&out_dir);
     println!("cargo::rerun-if-changed=glsl");
-    // With hot reload the program runs this one again: shaders are compiled here only, and with one set of options.
+    // With hot reload, kdray runs this build program again, so that shaders are compiled only here and with one set
+    // of options.
     if env::var_os("CARGO_FEATURE_HOT_RELOAD").is_some() {
         let compiler = env::current_exe().expect("this program's path");
         println!("cargo::rustc-env=KDRAY_SHADER_COMPILER={}", compiler.display());
@@ -38,7 +39,7 @@ fn main() {
                 name_compiler(&spirv);
                 fs::write(out_dir.join(format!("{name}.spv")), spirv).expect("write SPIR-V");
             }
-            // One line an error, as the compiler prints it, so that an editor can jump to it.
+            // Each error is one line, as the compiler prints it, so that an editor can jump to it.
             Err(error) => {
                 error.lines().for_each(|line| println!("cargo::error={line}"));
                 std::process::exit(1);
@@ -47,7 +48,7 @@ fn main() {
     }
 }
 
-/// All that shaders and Rust share, as Rust.
+/// Generates Rust for everything that shaders and Rust share.
 fn layout_in_rust() -> Result<String, String> {
     let read = |path: &str| fs::read_to_string(path).map_err(|error| format!("{path}: {error}"));
     let layout = read("glsl/shared/layout.glsl")?;
@@ -56,7 +57,7 @@ fn layout_in_rust() -> Result<String, String> {
     Ok(rust_layout(&layout, &arrays) + &scene_arrays::rust(&arrays) + &constants_of_shaders(&layout)?)
 }
 
-/// The specialization constants of all shaders as Rust; includes count as parts of the shaders.
+/// Generates Rust for the specialization constants of all shaders. Includes count as parts of the shaders.
 fn constants_of_shaders(layout: &str) -> Result<String, String> {
     let numbers = specialization::numbers(layout)?;
     let mut shaders = Vec::new();
@@ -73,7 +74,7 @@ fn constants_of_shaders(layout: &str) -> Result<String, String> {
     specialization::rust(&shaders)
 }
 
-/// A shader's file and all that it includes. Files that are missing are left to the compiler.
+/// Returns a shader's file and all files that it includes. Missing files are left to the compiler to report.
 fn with_includes(path: &Path) -> BTreeSet<PathBuf> {
     let (mut files, mut open) = (BTreeSet::new(), vec![path.to_owned()]);
     while let Some(file) = open.pop() {
@@ -92,7 +93,7 @@ fn name_compiler(spirv: &[u8]) {
     println!("cargo::rustc-env=KDRAY_SPIRV_COMPILER=SPIR-V {:#x}, generator {:#010x}", word(1), word(2));
 }
 
-/// The files of all folders, in a fixed order.
+/// Returns the shaders of all folders, in a fixed order.
 fn shaders_in_order() -> Vec<PathBuf> {
     let mut shaders: Vec<_> = ["glsl/passes", "glsl/probes", "glsl/driver"]
         .into_iter()
@@ -103,7 +104,7 @@ fn shaders_in_order() -> Vec<PathBuf> {
     shaders
 }
 
-/// One shader, optimized, for Vulkan 1.3; `#include "x.glsl"` reads from glsl/shared.
+/// Compiles a shader for Vulkan 1.3, optimized. `#include "x.glsl"` reads from glsl/shared.
 fn compile(compiler: &shaderc::Compiler, path: &Path, name: &str) -> Result<Vec<u8>, String> {
     let kind = match path.extension().and_then(|e| e.to_str()) {
         Some("comp") => shaderc::ShaderKind::Compute,
@@ -130,11 +131,14 @@ fn compile(compiler: &shaderc::Compiler, path: &Path, name: &str) -> Result<Vec<
     Ok(artifact.as_binary_u8().to_vec())
 }
 
-/// Rust constants and structs for layout.glsl. Panics on a member that std430 would pad.
+/// Generates Rust constants and structs from layout.glsl.
+///
+/// # Panics
+/// std430 would pad a struct.
 fn rust_layout(glsl: &str, arrays: &[scene_arrays::Row]) -> String {
     let mut rust = String::new();
     let mut doc = String::new();
-    let mut structs = String::new(); // the same again as data, for the test against SPIR-V
+    let mut structs = String::new(); // the structs as data, for the test against SPIR-V
     let mut layout: Option<(String, usize, usize)> = None; // struct name, bytes so far, widest alignment
     for line in glsl.lines().map(str::trim) {
         if let Some(comment) = line.strip_prefix("//") {
@@ -149,13 +153,13 @@ fn rust_layout(glsl: &str, arrays: &[scene_arrays::Row]) -> String {
                     write!(structs, "(\"[u32; 2]\", std::mem::offset_of!({name}, {array})),").unwrap();
                     *offset += 8;
                 }
-                // However many arrays there are, the struct ends where GLSL's does.
+                // The struct ends where GLSL's does, whatever the number of arrays.
                 if *offset % *widest != 0 {
                     writeln!(rust, "    pub reserved: [u32; 2],").unwrap();
                     *offset += 8;
                 }
             } else if line.starts_with('#') {
-                // ARRAY, as GLSL sees it.
+                // ARRAY is defined for GLSL only.
             } else if line == "};" {
                 assert_eq!(*offset % *widest, 0, "layout.glsl: std430 pads the end of {name} ({offset} bytes)");
                 writeln!(rust, "}}\nconst _: () = assert!(size_of::<{name}>() == {offset});").unwrap();
@@ -171,7 +175,13 @@ fn rust_layout(glsl: &str, arrays: &[scene_arrays::Row]) -> String {
             }
         } else if let Some(rest) = line.strip_prefix("struct ") {
             let name = rest.trim_end_matches(" {");
-            writeln!(rust, "{doc}#[repr(C)]\n#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]\npub struct {name} {{").unwrap();
+            writeln!(
+                rust,
+                "{doc}#[repr(C)]\n\
+                 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]\n\
+                 pub struct {name} {{"
+            )
+            .unwrap();
             write!(structs, "({name:?}, size_of::<{name}>(), &[").unwrap();
             layout = Some((name.to_owned(), 0, 4));
         } else if let Some((name, value)) = line.strip_prefix("#define ").and_then(|rest| rest.split_once(' ')) {
@@ -186,7 +196,7 @@ fn rust_layout(glsl: &str, arrays: &[scene_arrays::Row]) -> String {
     rust
 }
 
-/// Rust type, size and std430 alignment in bytes of a GLSL type.
+/// Returns the Rust type, the size in bytes and the std430 alignment in bytes of a GLSL type.
 fn rust_type(glsl: &str) -> (&'static str, usize, usize) {
     match glsl {
         "uint" => ("u32", 4, 4),

@@ -1,20 +1,22 @@
-//! Axis-aligned boxes and the references of triangles to the cells that they meet.
+//! Axis-aligned boxes, and references: entries of triangles in the cells that they come near to.
 
 use rayon::prelude::*;
 
 use crate::layout::Triangle;
 
-/// Times the largest coordinate: a leaf has every triangle that comes so near to its cell.
+/// Rounding margin of a cell, as a multiple of the largest coordinate: 128 units of 2^-24. A leaf has every triangle
+/// that comes nearer to its cell than this.
 ///
-/// So the traversal may take its own arithmetic as exact: the leaf in which it finds itself at a hit's t has the triangle.
-/// Proof: let m be the largest coordinate, u = 2^-24, and |o| <= 4 m (`KD_MAX_ORIGIN_DISTANCE`) where the ray starts. With
-/// divisions right to 2.5 units in the last place, as Vulkan has them, a plane's crossing at p is off by u (|o| + |p| +
-/// 6 |p - o|) <= 35 u m in space. The point at a hit's t is off the triangle by u (11.5 D + 14 L) on each axis, as
-/// `reference::triangle` proves. D, from o to the farthest corner, is at most 5 m, and L, between two corners, at most 2 m,
-/// so this is 85.5 u m. Together it is 120.5 u m, of 128.
+/// Thanks to the margin, the traversal may treat its own arithmetic as exact: the leaf that it is in at a hit's t has
+/// the triangle that is hit. Proof: let m be the largest coordinate, u = 2^-24, and o the ray's origin. |o| is at
+/// most 4 m (`KD_MAX_ORIGIN_DISTANCE`). Divisions are right to 2.5 units in the last place, as Vulkan guarantees.
+/// Then the crossing of a plane at p is off by u (|o| + |p| + 6 |p - o|) <= 35 u m in space. The point at a hit's t
+/// is off the triangle by u (11.5 D + 14 L) on each axis, as `reference::triangle` proves. D, the greatest coordinate
+/// difference between o and a corner, is at most 5 m. L, that between two corners, is at most 2 m. So the point is
+/// off by at most 85.5 u m. The sum is 120.5 u m, of the margin's 128 u m.
 pub const MARGIN: f32 = 1.0 / (1 << 17) as f32;
 
-/// A closed box, world units.
+/// Closed axis-aligned box, world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     pub min: [f32; 3],
@@ -22,31 +24,31 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The exact bounds of a triangle.
+    /// Returns the exact bounds of a triangle.
     pub fn of(triangle: &Triangle) -> Self {
         let [v0, v1, v2] = [triangle.v0, triangle.v1, triangle.v2];
         Self { min: v0.min(v1).min(v2).to_array(), max: v0.max(v1).max(v2).to_array() }
     }
 
-    /// The bounds of all triangles whose corners are finite; a box of zeros for none.
+    /// Returns the bounds of all triangles whose corners are finite, or a box of zeros if there are none.
     pub fn of_all(triangles: &[Triangle]) -> Self {
         let finite = triangles.par_iter().filter(|triangle| is_finite(triangle));
         finite.map(Self::of).reduce_with(|a, b| a.union(&b)).unwrap_or(Self { min: [0.0; 3], max: [0.0; 3] })
     }
 
-    /// The box with all faces moved outwards by a margin; it stays finite.
+    /// Returns the box with all faces moved outwards by a margin, world units. It stays finite.
     pub fn grown(&self, margin: f32) -> Self {
         Self { min: self.min.map(|x| (x - margin).max(f32::MIN)), max: self.max.map(|x| (x + margin).min(f32::MAX)) }
     }
 
-    /// How far from a cell a triangle is still taken as in it, if this box has all triangles (see [`MARGIN`]). Never
-    /// zero: no grown box is flat.
+    /// Returns the distance from a cell within which a triangle counts as inside the cell, world units (see
+    /// [`MARGIN`]). This box must hold all triangles. The margin is never zero, so no grown box is flat.
     pub fn margin(&self) -> f32 {
         let largest = self.min.iter().chain(&self.max).fold(0.0, |largest: f32, x| largest.max(x.abs()));
         (MARGIN * largest).max(f32::MIN_POSITIVE)
     }
 
-    /// The smallest box around both.
+    /// Returns the smallest box that contains both.
     pub fn union(mut self, other: &Self) -> Self {
         for axis in 0..3 {
             self.min[axis] = self.min[axis].min(other.min[axis]);
@@ -55,7 +57,7 @@ impl Bounds {
         self
     }
 
-    /// What both contain.
+    /// Returns the part that both boxes contain.
     pub fn intersection(mut self, other: &Self) -> Self {
         for axis in 0..3 {
             self.min[axis] = self.min[axis].max(other.min[axis]);
@@ -64,12 +66,12 @@ impl Bounds {
         self
     }
 
-    /// Do the closed boxes have a point in common?
+    /// Whether the closed boxes have a point in common.
     pub fn touches(&self, other: &Self) -> bool {
         (0..3).all(|axis| self.min[axis] <= other.max[axis] && self.max[axis] >= other.min[axis])
     }
 
-    /// The two parts on either side of a plane: below, above.
+    /// Returns the two parts on either side of a plane: below, above.
     pub fn split(&self, axis: usize, position: f32) -> [Self; 2] {
         let (mut below, mut above) = (*self, *self);
         below.max[axis] = position;
@@ -77,18 +79,18 @@ impl Bounds {
         [below, above]
     }
 
-    /// Side lengths. In f64 no finite box overflows, nor do products of two.
+    /// Returns the side lengths. In f64 no finite box overflows, nor does a product of two side lengths.
     pub fn extent(&self) -> [f64; 3] {
         [0, 1, 2].map(|axis| f64::from(self.max[axis]) - f64::from(self.min[axis]))
     }
 }
 
-/// No NaN and no infinity among a triangle's corners.
+/// Whether no corner of a triangle has a coordinate that is NaN or infinite.
 pub fn is_finite(triangle: &Triangle) -> bool {
     triangle.v0.is_finite() && triangle.v1.is_finite() && triangle.v2.is_finite()
 }
 
-/// A triangle in a cell: 28 bytes.
+/// Reference: the entry of a triangle in a cell that it comes near to. 28 bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct Reference {
     /// Bounds of the part of the triangle that comes within the margin of the cell, grown by the margin.

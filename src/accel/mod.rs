@@ -1,4 +1,4 @@
-//! Acceleration structures: what leads a ray to the triangles that it can hit.
+//! Acceleration structures: kd-trees and grids, which find the triangles that a ray may hit.
 
 mod bounds;
 pub mod grid;
@@ -21,26 +21,26 @@ pub use crate::layout::{Hit, NO_TRIANGLE, Ray};
 pub enum Accel {
     /// A kd-tree, which the host builds.
     KdTree(KdTree),
-    /// A grid, which a device builds, or the host when it needs it.
+    /// A grid. Each device builds the grid for itself; the host builds one only when it needs it.
     Grid(LazyGrid),
 }
 
-/// How an acceleration structure is built.
+/// Build options of an acceleration structure.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AccelOptions {
-    /// How a kd-tree is built.
+    /// Options of a kd-tree.
     KdTree(BuildOptions),
-    /// How a grid is built.
+    /// Options of a grid.
     Grid(GridOptions),
 }
 
 /// The kinds of acceleration structures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AccelKind {
-    /// A kd-tree: it traces fastest, and `--traversal` has several algorithms for it.
+    /// A kd-tree: traces fastest, and `--traversal` has several algorithms for it.
     #[default]
     KdTree,
-    /// A uniform grid: it is built fastest, and traces well where triangles are spread evenly.
+    /// A uniform grid: builds fastest, and traces well where triangles are spread evenly.
     Grid,
     /// A grid of two levels: cells with many triangles are cut once more.
     Grid2,
@@ -49,7 +49,7 @@ pub enum AccelKind {
 named_enum!(AccelKind { KdTree = "kdtree", Grid = "grid", Grid2 = "grid2" });
 
 impl AccelKind {
-    /// The structure's name in a sentence.
+    /// The structure's name, as it is written in a sentence.
     pub fn name(self) -> &'static str {
         match self {
             Self::KdTree => "kd-tree",
@@ -60,7 +60,8 @@ impl AccelKind {
 }
 
 impl Accel {
-    /// Builds a structure over triangles on the current rayon pool. A grid is built when it is first asked for.
+    /// Builds a structure over triangles on the current rayon pool. A grid is not built here, but when it is first
+    /// needed.
     pub fn new(triangles: &[Triangle], options: &AccelOptions) -> Self {
         match options {
             AccelOptions::KdTree(options) => Self::KdTree(KdTree::build(triangles, options)),
@@ -68,7 +69,7 @@ impl Accel {
         }
     }
 
-    /// The kd-tree, if the structure is one.
+    /// The kd-tree, or none if the structure is a grid.
     pub fn as_kdtree(&self) -> Option<&KdTree> {
         match self {
             Self::KdTree(tree) => Some(tree),
@@ -85,7 +86,7 @@ impl Accel {
         }
     }
 
-    /// The number of triangles that the structure is over.
+    /// The number of triangles that the structure was made for.
     pub fn n_triangles(&self) -> usize {
         match self {
             Self::KdTree(tree) => tree.n_triangles(),
@@ -93,7 +94,7 @@ impl Accel {
         }
     }
 
-    /// The least and the greatest corner of a box that holds all triangles (world units).
+    /// The least and the greatest corner of a box that holds all triangles, world units.
     pub fn bounds(&self) -> [Vec3; 2] {
         match self {
             Self::KdTree(tree) => tree.bounds(),

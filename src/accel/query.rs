@@ -1,10 +1,11 @@
-//! Questions that can be asked about a ray.
+//! Kinds of ray queries.
 
-/// What is asked of a ray.
+/// Kind of ray query.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Query {
-    /// The hit of smallest t; of several at one t, the triangle of the lowest index.
+    /// The closest hit: the one of smallest t. If several triangles are hit at this t, the one of the lowest index
+    /// counts.
     Closest,
-    /// Whether there is a hit: one that need not be the closest.
+    /// Any hit: whether there is one. The hit that is found need not be the closest.
     Any,
 }

@@ -1,4 +1,4 @@
-//! What an acceleration structure holds.
+//! Sizes of acceleration structures.
 
 use std::fmt::{self, Display};
 
@@ -6,13 +6,13 @@ use serde::Serialize;
 
 use super::{AccelKind, grid, kdtree};
 
-/// An acceleration structure in numbers. As JSON it is a member `tree` or `grid`.
+/// Statistics of an acceleration structure. As JSON it is a member `tree` or `grid`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub enum Statistics {
-    /// A kd-tree in numbers.
+    /// Statistics of a kd-tree.
     #[serde(rename = "tree")]
     KdTree(kdtree::Statistics),
-    /// A grid in numbers.
+    /// Statistics of a grid.
     #[serde(rename = "grid")]
     Grid(grid::Statistics),
 }
@@ -27,7 +27,7 @@ impl Statistics {
         }
     }
 
-    /// What the structure is made of: `nodes` or `cells`.
+    /// The plural name of the structure's parts: `nodes` or `cells`.
     pub fn parts(&self) -> &'static str {
         match self {
             Self::KdTree(_) => "nodes",
@@ -43,7 +43,7 @@ impl Statistics {
         }
     }
 
-    /// The number of entries of all leaves or cells.
+    /// The number of references: entries of triangles in all leaves or cells.
     pub fn n_references(&self) -> u64 {
         match self {
             Self::KdTree(tree) => tree.n_references,
@@ -51,7 +51,7 @@ impl Statistics {
         }
     }
 
-    /// The memory that the structure takes, bytes.
+    /// The size of the structure in memory, bytes.
     pub fn bytes(&self) -> u64 {
         match self {
             Self::KdTree(tree) => tree.bytes,
@@ -59,7 +59,7 @@ impl Statistics {
         }
     }
 
-    /// Names and values for a table, all but the memory.
+    /// Returns the names and values of a table's rows: everything but the memory.
     pub fn rows(&self) -> Vec<(&'static str, String)> {
         match self {
             Self::KdTree(tree) => vec![
@@ -84,13 +84,13 @@ impl Statistics {
     }
 }
 
-/// The number of cells of the upper level along each axis.
+/// Formats the number of cells of the upper level along each axis.
 fn resolution(grid: &grid::Statistics) -> String {
     let [x, y, z] = grid.resolution;
     format!("{x} x {y} x {z}")
 }
 
-/// One line, which begins with the structure's name.
+/// Formats one line, which begins with the structure's name.
 impl Display for Statistics {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{}: ", self.kind().name())?;
@@ -105,7 +105,8 @@ impl Display for Statistics {
                 let upper = if grid.n_levels == 1 { "" } else { " on the upper level" };
                 write!(
                     f,
-                    "{resolution} cells{upper}, {} in all, {empty:.0} % of them empty, {references:.2} references a triangle",
+                    "{resolution} cells{upper}, {} in all, {empty:.0} % of them empty, \
+                     {references:.2} references a triangle",
                     grid.n_cells
                 )?;
                 match grid.n_coarser {

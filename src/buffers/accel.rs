@@ -1,4 +1,4 @@
-//! The scene's triangles with their acceleration structure on a device: a part of every descriptor set.
+//! Buffers of the scene's triangles and their acceleration structure, which are a part of every descriptor set.
 
 use std::sync::Arc;
 
@@ -23,33 +23,34 @@ use crate::{
     world::Geometry,
 };
 
-/// The bindings' numbers.
+/// Returns the numbers of the bindings of [`AccelBuffers`].
 pub(super) fn bindings() -> impl Iterator<Item = u32> {
     [BIND_ACCEL, BIND_STALLS].into_iter().chain(SceneArrays::bindings())
 }
 
-/// What kernels are specialized for.
+/// Kind of acceleration structure, for which kernels are specialized.
 #[derive(Clone, Copy)]
 enum Structure {
-    /// `mask_words`: the number of words of the traversal's bit mask.
+    /// A kd-tree. `mask_words`: the number of words of the traversal's bit mask, 1 or 2.
     KdTree { mask_words: u32 },
-    /// `n_levels`: the number of levels of cells, 1 or 2.
+    /// A grid. `n_levels`: the number of levels of cells, 1 or 2.
     Grid { n_levels: u32 },
 }
 
-/// Triangles, their acceleration structure, and what kernels know of both. A clone is a second handle to the same buffers.
+/// Buffers of triangles, of their acceleration structure and of the constants of both. A clone is a second handle to
+/// the same buffers.
 #[derive(Clone)]
 pub struct AccelBuffers {
-    /// One.
+    /// The constants: one element.
     constants: Buffer<AccelConstants>,
     pub arrays: SceneArrays,
-    /// Rays that have stopped on their way through the tree.
+    /// Rays that have stalled on their way through the tree.
     pub stalls: Stalls,
     access: SceneAccess,
     structure: Structure,
     /// Whether rays pass through some of the triangles.
     filters: bool,
-    /// What `constants` holds.
+    /// The contents of `constants`.
     uploaded: AccelConstants,
 }
 
@@ -57,7 +58,7 @@ impl AccelBuffers {
     /// Uploads triangles and their structure.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
+    /// A buffer is beyond the device's limits, or memory runs out.
     pub fn new(context: &Arc<Context>, geometry: Geometry) -> Result<Self, GpuError> {
         let triangles = geometry.triangles();
         match geometry.accel() {
@@ -69,6 +70,7 @@ impl AccelBuffers {
         }
     }
 
+    /// Uploads triangles and their kd-tree.
     fn of_tree(context: &Arc<Context>, triangles: &[Triangle], tree: &KdTree) -> Result<Self, GpuError> {
         let n_nodes = tree.nodes().len();
         let entries = tree.leaf_triangles();
@@ -87,7 +89,7 @@ impl AccelBuffers {
         Self::with(context, contents, &tree.constants(), Structure::KdTree { mask_words })
     }
 
-    /// Uploads triangles, of which the device builds the grid.
+    /// Uploads triangles, whose grid the device builds.
     fn of_device_grid(context: &Arc<Context>, triangles: &[Triangle], grid: &LazyGrid) -> Result<Self, GpuError> {
         let on_device = Buffer::with(context, "triangles", triangles, BufferUse::Texels)?;
         let builder = GridBuilder::new(context, &on_device, grid.options())?;
@@ -106,7 +108,7 @@ impl AccelBuffers {
         Self::with(context, contents, &constants, structure)
     }
 
-    /// Uploads triangles and the host's grid, where the triangles are more than the device binds.
+    /// Uploads triangles and the grid that the host has built. This is for more triangles than the device can bind.
     fn of_grid(context: &Arc<Context>, triangles: &[Triangle], grid: &Grid) -> Result<Self, GpuError> {
         let entries = grid.leaf_triangles();
         let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);
@@ -119,7 +121,7 @@ impl AccelBuffers {
         Self::with(context, contents, &grid.constants(), Structure::Grid { n_levels: grid.n_levels() })
     }
 
-    /// Uploads the arrays. `constants`: all but the number of triangles and the arrays' addresses.
+    /// Uploads the arrays. `constants`: all constants but the number of triangles and the arrays' addresses.
     fn with(
         context: &Arc<Context>,
         contents: Contents,
@@ -142,22 +144,24 @@ impl AccelBuffers {
         Ok(made)
     }
 
-    /// Uploads the triangles' materials, for which a cast has no use. Descriptor sets over these buffers have to be made
-    /// again.
+    /// Uploads the triangles' materials, which a cast does not need. Descriptor sets over these buffers have to be
+    /// made again.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
+    /// A buffer is beyond the device's limits, or memory runs out.
     pub(super) fn add_materials(&mut self, context: &Arc<Context>, triangle_materials: &[u32]) -> Result<(), GpuError> {
         let materials = Content::Elements(triangle_materials);
         self.arrays.triangle_materials = materials.upload(context, "triangle_materials", self.access)?;
         self.upload_constants(context)
     }
 
-    /// Uploads what the traversal reads beside the structure, which is the uploaded one: nothing for a grid. Clones of these buffers keep what
-    /// they had. Descriptor sets over these buffers have to be made again.
+    /// Uploads the arrays that the traversal reads beside the structure; for a grid there are none. `accel`: the
+    /// structure that is uploaded. Clones of these buffers keep their own arrays. Descriptor sets over these buffers
+    /// have to be made again.
     ///
     /// # Errors
-    /// Nothing has changed then. Too many triangles for brute force; beyond the device's limits, out of memory.
+    /// There are too many triangles for brute force, a buffer is beyond the device's limits, or memory runs out.
+    /// Nothing has changed then.
     pub(crate) fn add_links(
         &mut self,
         context: &Arc<Context>,
@@ -178,14 +182,14 @@ impl AccelBuffers {
         Ok(())
     }
 
-    /// Makes rays pass through the triangles of these indices. Frames over these buffers lose their materials by it: it is
-    /// for casts. Descriptor sets and kernels over these buffers have to be made again.
+    /// Makes rays pass through the triangles with the indices `hidden`. This is for casts only, since the triangles'
+    /// materials are overwritten. Descriptor sets and kernels over these buffers have to be made again.
     ///
     /// # Errors
-    /// Nothing has changed then. Beyond the device's limits, out of memory.
+    /// A buffer is beyond the device's limits, or memory runs out. Nothing has changed then.
     ///
     /// # Panics
-    /// There is no triangle of an index.
+    /// An index is not that of a triangle.
     pub(crate) fn hide(&mut self, context: &Arc<Context>, hidden: &[u32]) -> Result<(), GpuError> {
         let mut next = self.clone();
         next.add_materials(context, &hidden_words(self.arrays.triangles.len(), hidden))?;
@@ -193,12 +197,12 @@ impl AccelBuffers {
         Ok(())
     }
 
-    /// How kernels read the arrays.
+    /// The way in which kernels read the arrays.
     pub fn access(&self) -> SceneAccess {
         self.access
     }
 
-    /// Specialization constants of all kernels that read the arrays.
+    /// The specialization constants of all kernels that read the arrays.
     pub(super) fn constants(&self) -> Constants {
         let (mask_words, n_levels) = match self.structure {
             Structure::KdTree { mask_words } => (mask_words, 0),
@@ -212,8 +216,8 @@ impl AccelBuffers {
             .set(constants::TURN_BUDGET, self.stalls.turn_budget())
     }
 
-    /// Makes the constants' buffer hold the arrays' addresses. It is another buffer then, since clones still read the one
-    /// before.
+    /// Uploads the constants, with the arrays' addresses if kernels read by address. They go to a new buffer, since
+    /// clones still read the previous one.
     fn upload_constants(&mut self, context: &Arc<Context>) -> Result<(), GpuError> {
         if self.access == SceneAccess::Address {
             self.arrays.write_addresses(&mut self.uploaded);
@@ -222,14 +226,14 @@ impl AccelBuffers {
         Ok(())
     }
 
-    /// For [`bindings`].
+    /// Returns the objects that [`bindings`] are bound to.
     pub(super) fn objects(&self) -> Vec<(u32, Binding<'_>)> {
         let own = [(BIND_ACCEL, Binding::Buffer(self.constants.any())), self.stalls.object()];
         own.into_iter().chain(self.arrays.objects()).collect()
     }
 }
 
-/// Writes the triangles of the leaves' entries, from entry `first` on.
+/// Writes the triangles of the leaves' entries from entry `first` on. `entries`: the index of each entry's triangle.
 fn leaf_triangles(triangles: &[Triangle], entries: &[u32], first: usize, part: &mut [LeafTriangle]) {
     let numbers = &entries[first..][..part.len()];
     part.par_iter_mut().zip(numbers).for_each(|(entry, &triangle_ix)| {
@@ -238,14 +242,14 @@ fn leaf_triangles(triangles: &[Triangle], entries: &[u32], first: usize, part: &
     });
 }
 
-/// For each of the triangles, `TRIANGLE_HIDDEN` if its index is one of the hidden ones, else 0.
+/// Returns for each triangle `TRIANGLE_HIDDEN` if its index is in `hidden`, else 0.
 pub(crate) fn hidden_words(n_triangles: usize, hidden: &[u32]) -> Vec<u32> {
     let mut words = vec![0; n_triangles];
     hidden.iter().for_each(|&triangle_ix| words[triangle_ix as usize] = TRIANGLE_HIDDEN);
     words
 }
 
-/// The slabs, if the device's kernels look at them: those that run both sides of every branch do not.
+/// Returns the tree's slabs, or none if the device runs both sides of every branch: its kernels do not read slabs.
 fn slabs_for<'a>(context: &Context, tree: &'a KdTree) -> &'a [Slab] {
     if context.predicates_branches() { &[] } else { tree.slabs() }
 }

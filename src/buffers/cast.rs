@@ -1,4 +1,4 @@
-//! The buffers of a cast: rays of the caller's own, and their hits.
+//! Buffers of a cast: rays that the caller gives, and their hits.
 
 use std::sync::Arc;
 
@@ -8,28 +8,29 @@ use crate::{
     layout::{BIND_CAST_HITS, BIND_CAST_RAYS, CastBatch, Hit, Ray},
 };
 
-/// A batch's buffers and the descriptor set over them and the tree.
+/// Buffers of a batch of rays, and the descriptor set over them and the acceleration structure.
 pub struct CastResources {
-    /// Room for a batch, like cast_hits.
+    /// The rays of a batch.
     pub cast_rays: Buffer<Ray>,
+    /// The hits of these rays, as many as rays.
     pub cast_hits: Buffer<Hit>,
     pub set: BindingSet,
 }
 
 impl CastResources {
-    /// The layout of the set, for kernels that read the tree.
+    /// Makes the layout of the set, for kernels that read the acceleration structure.
     ///
     /// # Errors
-    /// Out of memory.
+    /// Memory runs out.
     pub fn bindings(context: &Arc<Context>, tree: &AccelBuffers) -> Result<Arc<BindingLayout>, GpuError> {
         let kinds: Vec<_> = accel::bindings().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
         BindingLayout::with_constants(context, &kinds, size_of::<CastBatch>() as u32, tree.constants())
     }
 
-    /// The set over rays and hits of the caller's own.
+    /// Makes the set over buffers of rays and hits that the caller gives.
     ///
     /// # Errors
-    /// Out of memory.
+    /// Memory runs out.
     pub fn given(
         bindings: &Arc<BindingLayout>,
         tree: &AccelBuffers,
@@ -40,10 +41,10 @@ impl CastResources {
         BindingSet::new(bindings, "recorded cast", &[&tree.objects(), &own[..]].concat())
     }
 
-    /// Room for `len` rays.
+    /// Makes buffers for `len` rays, and the set over them.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
+    /// A buffer is beyond the device's limits, or memory runs out.
     pub fn new(
         context: &Arc<Context>,
         bindings: &Arc<BindingLayout>,

@@ -1,4 +1,4 @@
-//! The buffers of a grid's build, and the descriptor sets over them.
+//! Buffers of a grid's build, and the descriptor sets over them.
 
 use std::sync::Arc;
 
@@ -30,21 +30,22 @@ const BINDINGS: [u32; 12] = [
     BIND_GRID_LEAF_PLANES,
 ];
 
-/// The most entries of each kind that a build can have.
+/// Capacities of a build: the most entries of each kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GridCapacities {
     pub n_triangles: u32,
-    /// Pairs.
+    /// Pairs of a cell and a triangle.
     pub n_references: u32,
+    /// Columns of cells in the boxes of all triangles.
     pub n_columns: u32,
-    /// Cells of the upper level, or of the only one.
+    /// Cells of the upper level, or of the only level.
     pub n_upper: u32,
     /// Cells of the lower level.
     pub n_lower: u32,
 }
 
 impl GridCapacities {
-    /// What a build over so many triangles needs.
+    /// Returns the capacities for a build over `n_triangles` triangles.
     pub fn new(n_triangles: u32, options: &GridOptions) -> Self {
         let max_references = options.max_references_of(n_triangles as usize);
         let most_cells = GRID_MAX_RESOLUTION.pow(3);
@@ -63,62 +64,61 @@ impl GridCapacities {
     }
 }
 
-/// The state of a build, and the arrays that its kernels hand to one another.
+/// Buffers of a build: its state, and the arrays that its kernels hand to one another.
 pub struct GridBuffers {
     pub capacities: GridCapacities,
-    /// One.
+    /// The state of the build: one element.
     pub build: Buffer<GridBuild>,
     /// The cells of the upper level, then those of the lower one.
     pub cells: Buffer<GridCell>,
     pub leaf_triangles: Buffer<LeafTriangle>,
     pub leaf_planes: Buffer<Plane>,
-    /// For the upper level and for the lower one.
+    /// The descriptor sets of the upper level and, in a grid of two levels, of the lower one.
     pub levels: Vec<PairSets>,
     initial: GridBuild,
     arrays: Arrays,
 }
 
-/// The descriptor sets of a level, over two arrays of pairs. The sort goes to and fro between the arrays and ends in
-/// the first one.
+/// Descriptor sets of a level, over two arrays of pairs. Each pass of the sort reads one array and writes the other;
+/// the last pass writes the first array.
 pub struct PairSets {
-    /// By the array from which kernels take pairs.
+    /// The sets whose kernels read pairs from the first and from the second array.
     sets: [BindingSet; 2],
     /// The number of the sort's passes.
     pub n_passes: u32,
 }
 
 impl PairSets {
-    /// The set for the kernels that come before a pass of the sort and write what it reads, or for the kernels after
-    /// the last pass.
+    /// The set for a pass of the sort or, if `pass_ix` is `n_passes`, for the kernels after the last pass.
     pub fn reading_for(&self, pass_ix: u32) -> &BindingSet {
         &self.sets[((self.n_passes - pass_ix) % 2) as usize]
     }
 
-    /// The set for the kernel that writes the pairs that the sort starts from.
+    /// The set for the kernel that writes the unsorted pairs, from which the first pass of the sort reads.
     pub fn writing_unsorted(&self) -> &BindingSet {
         &self.sets[((self.n_passes + 1) % 2) as usize]
     }
 }
 
-/// The number of the sort's passes for so many cells.
+/// Returns the number of the sort's passes for `n_cells` cells.
 fn n_sort_passes(n_cells: u32) -> u32 {
     let n_bits = u32::BITS - n_cells.saturating_sub(1).leading_zeros();
     n_bits.div_ceil(GRID_DIGITS.ilog2())
 }
 
 impl GridBuffers {
-    /// The layout of the sets.
+    /// Makes the layout of the sets.
     ///
     /// # Errors
-    /// Out of memory.
+    /// Memory runs out.
     pub fn bindings(context: &Arc<Context>) -> Result<Arc<BindingLayout>, GpuError> {
         BindingLayout::new(context, &BINDINGS.map(binding), size_of::<GridSort>() as u32)
     }
 
-    /// Makes room for a build over the triangles.
+    /// Makes the buffers and sets of a build over the triangles.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
+    /// A buffer is beyond the device's limits, or memory runs out.
     pub fn new(
         context: &Arc<Context>,
         bindings: &Arc<BindingLayout>,
@@ -165,12 +165,12 @@ impl GridBuffers {
         Ok(buffers)
     }
 
-    /// What the host writes into `build` before a build.
+    /// The state that the host writes into `build` before a build.
     pub fn initial(&self) -> &GridBuild {
         &self.initial
     }
 
-    /// The sets over two of the arrays of pairs, by their numbers.
+    /// Makes the sets over two of the arrays of pairs, which are given by their indices.
     fn pair_sets(
         &self,
         bindings: &Arc<BindingLayout>,
@@ -200,18 +200,18 @@ impl GridBuffers {
     }
 }
 
-/// The arrays that only kernels see.
+/// Arrays that only kernels access.
 struct Arrays {
     triangles: Buffer<Triangle>,
     first_columns: Buffer<u32>,
     first_pairs: Buffer<u32>,
     scan_blocks: Buffer<u32>,
     blocks: Buffer<[u32; 2]>,
-    /// The first one has the upper level's pairs in the end.
+    /// Arrays of pairs. The sort of the upper level ends in the first one, that of the lower level in the second one.
     pairs: [Buffer<[u32; 2]>; 3],
 }
 
-/// Where the sums of each scan begin in scan_blocks. Those of the sort begin at 0.
+/// Regions of scan_blocks: the index at which the sums of each scan begin. Those of the sort begin at 0.
 struct ScanRegions {
     columns_begin: u32,
     pairs_begin: u32,
@@ -228,6 +228,7 @@ impl ScanRegions {
     }
 }
 
+/// Returns the state of a build before it begins.
 fn initial_build(capacities: GridCapacities, options: &GridOptions, regions: &ScanRegions) -> GridBuild {
     let lower_density = match options.levels {
         GridLevels::Uniform { .. } => 0.0,

@@ -1,12 +1,12 @@
-//! What kernels read and write: buffers, images and the descriptor sets over them, one file for each group that lives
-//! and grows together.
+//! Buffers and images that kernels read and write, and the descriptor sets over them. Each file has a group of them
+//! that is made and grows together.
 //!
 //! ```text
 //! accel           triangles and their acceleration structure, with the arrays of scene_arrays
 //! queue           rays of a batch and what belongs to each
 //! pixels          samples, sums, filtered and displayed pixels
 //! raster_queue    large triangles, between the two kernels that rasterize
-//! vertex_indices  what the graphics pipeline draws
+//! vertex_indices  the vertices that the graphics pipeline draws
 //! stalls          rays that have spent a dispatch's loop turns
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid
@@ -41,7 +41,7 @@ use crate::{
     layout::{BIND_ACCEL, BIND_FRAME, BIND_TEXELS, BIND_TRIANGLE_IDS},
 };
 
-/// A binding number of layout.glsl and what it holds.
+/// Returns a binding number of layout.glsl with the kind of object that it is bound to.
 fn binding(number: u32) -> (u32, BindingKind) {
     let kind = match number {
         BIND_TEXELS.. => BindingKind::Texels,

@@ -1,4 +1,4 @@
-//! The buffers and images of pixels.
+//! Buffers and images of pixels.
 
 use std::sync::Arc;
 
@@ -8,31 +8,37 @@ use crate::{
     layout::{Feature, Frame},
 };
 
-/// Room for the window's pixels, rows from the top; buffers may be longer. A clone is a second handle to the same
-/// memory.
+/// Buffers and images of the window's pixels, rows from the top. Buffers may be longer than the window needs. A clone
+/// is a second handle to the same memory.
 #[derive(Clone)]
 pub struct Pixels {
-    /// `width * height`, like all buffers here: the frame's sample, then the mean of all samples.
+    /// The radiance of the frame's sample, then the mean of all samples. `width * height` elements, as in all buffers
+    /// here.
     pub pixel_radiance: Buffer<[f32; 4]>,
-    /// Sums of samples; none before there is a second one.
+    /// The sums of all samples; none before there is a second sample.
     pub pixel_accumulated: Option<Buffer<[f32; 4]>>,
-    /// None without a noise filter: what follows it then reads pixel_radiance.
+    /// The radiance after the noise filter. None without a noise filter, in which case later kernels read
+    /// `pixel_radiance`.
     pub pixel_filtered: Option<Buffer<[f32; 4]>>,
+    /// The displayed colour, 8 bits each: red in the lowest byte, green, blue, 255.
     pub pixel_display: Buffer<u32>,
-    /// The nearest hit's triangle, and above it, its distance's bits. Empty where the options do not ask for it.
+    /// The nearest hit: the triangle's index in the lower half, the bits of the distance in the upper half. Empty
+    /// unless the options have kernels rasterize.
     pub pixel_nearest: Buffer<u64>,
-    /// Empty where the options do not ask for them.
+    /// The first-hit features. Empty unless the options request them.
     pub pixel_features: Buffer<Feature>,
-    /// The nearest triangles of the whole picture, of which only the window's part is drawn. One pixel that no kernel
-    /// reads where the options do not ask for the graphics pipeline.
+    /// The index of the nearest triangle at each pixel of the whole picture, of which only the window's part is
+    /// drawn. If the options do not use the graphics pipeline, this is one pixel that no kernel reads.
     pub triangle_ids: Arc<Target>,
-    /// Depth that belongs to `triangle_ids`; none where nothing is drawn.
+    /// The depth image for `triangle_ids`; none where nothing is drawn.
     pub depth: Option<Arc<Target>>,
 }
 
 impl Pixels {
+    /// Makes the buffers and images that a frame needs.
+    ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
+    /// A buffer or image is beyond the device's limits, or memory runs out.
     pub fn new(context: &Arc<Context>, frame: &Frame, options: &RenderOptions) -> Result<Self, GpuError> {
         let n_pixels = n_pixels(frame);
         let size = (frame.picture_width, frame.picture_height);
@@ -57,13 +63,13 @@ impl Pixels {
         })
     }
 
-    /// Bytes of a pixel in the widest buffer that the options ask for.
+    /// Returns the bytes of a pixel in the widest buffer that the options need.
     pub fn bytes_a_pixel(options: &RenderOptions) -> u64 {
         let widest = if options.features { size_of::<Feature>() } else { 0 };
         widest.max(size_of::<[f32; 4]>()).max(size_of::<u64>()) as u64
     }
 
-    /// Whether the frame's pixels have room, and no more buffers than the frame uses.
+    /// Whether the buffers and images are large enough for the frame, and none is there that the frame does not use.
     pub fn fit(&self, frame: &Frame, options: &RenderOptions) -> bool {
         let (width, height) = self.triangle_ids.size();
         let has_targets = width >= frame.picture_width && height >= frame.picture_height;
@@ -75,12 +81,12 @@ impl Pixels {
             && self.pixel_filtered.is_some() == frame.denoise_threshold.is_finite()
     }
 
-    /// The image after the noise filter, or the one without it.
+    /// The radiance after the noise filter, or without it if there is none.
     pub fn filtered(&self) -> &Buffer<[f32; 4]> {
         self.pixel_filtered.as_ref().unwrap_or(&self.pixel_radiance)
     }
 
-    /// The sums; unread and unwritten before there are any.
+    /// The sums of samples. Before there are any, this is a buffer that takes their place in the descriptor set.
     pub(super) fn accumulated(&self) -> &Buffer<[f32; 4]> {
         self.pixel_accumulated.as_ref().unwrap_or(&self.pixel_radiance)
     }
@@ -91,7 +97,7 @@ pub(crate) fn draws(options: &RenderOptions) -> bool {
     options.primary == Primary::Raster
 }
 
-/// Of the window.
+/// The number of the window's pixels.
 pub fn n_pixels(frame: &Frame) -> usize {
     frame.width as usize * frame.height as usize
 }

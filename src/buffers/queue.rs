@@ -1,4 +1,4 @@
-//! The buffers of rays.
+//! Buffers of rays.
 
 use std::sync::Arc;
 
@@ -7,27 +7,30 @@ use crate::{
     layout::{Hit, PathRay, SCAN_GROUP_SIZE},
 };
 
-/// Room for `queue_capacity` rays, those of all bounces of a batch, and what belongs to each. A clone is a second
-/// handle to the same buffers.
+/// Queue of the rays of all bounces of a batch, at most `queue_capacity`, and what belongs to each ray. A clone is a
+/// second handle to the same buffers.
 #[derive(Clone)]
 pub struct Queue {
-    /// Bounce after bounce; `queue_capacity`, like what follows but for the last two. The camera's, which come first, are never
-    /// stored: kernels make them anew from their places (glsl/shared/rays.glsl).
+    /// The rays, bounce after bounce. There are `queue_capacity` elements, as in all buffers here but the last two.
+    /// The camera's rays come first and are never stored: kernels compute them from their indices
+    /// (glsl/shared/rays.glsl).
     pub rays: Buffer<PathRay>,
     pub hits: Buffer<Hit>,
     pub child_kinds: Buffer<u32>,
-    /// Where a ray's children begin in `rays`, or would if it had any.
+    /// The index in `rays` at which a ray's children begin, or would begin if it had any.
     pub first_children: Buffer<u32>,
     pub ray_radiance: Buffer<[f32; 4]>,
-    /// `n_lights * queue_capacity`, lights outermost.
+    /// `n_lights * queue_capacity` elements, lights outermost.
     pub light_visibility: Buffer<u32>,
-    /// `queue_capacity / SCAN_GROUP_SIZE`, rounded up.
+    /// `queue_capacity / SCAN_GROUP_SIZE` elements, rounded up.
     pub scan_blocks: Buffer<u32>,
 }
 
 impl Queue {
+    /// Makes the buffers for `capacity` rays and `n_lights` lights.
+    ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
+    /// A buffer is beyond the device's limits, or memory runs out.
     pub fn new(context: &Arc<Context>, capacity: u32, n_lights: u32) -> Result<Self, GpuError> {
         let storage = BufferUse::Storage;
         let (capacity, n_lights) = (capacity as usize, n_lights as usize);
@@ -43,7 +46,7 @@ impl Queue {
         })
     }
 
-    /// Rays.
+    /// The number of rays for which there is room.
     pub fn capacity(&self) -> u32 {
         self.hits.len() as u32
     }

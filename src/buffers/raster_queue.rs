@@ -1,4 +1,4 @@
-//! What the kernels that rasterize hand to one another.
+//! Buffers that the kernels that rasterize hand to one another.
 
 use std::sync::Arc;
 
@@ -8,29 +8,31 @@ use crate::{
     layout::{LargeTriangle, RasterGroups},
 };
 
-/// What the kernel that rasterizes small triangles tells the one that rasterizes large ones.
+/// State that the kernel for small triangles leaves to the one for large triangles.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct RasterState {
     /// The dispatch over the blocks of large triangles.
     pub groups: RasterGroups,
-    /// The number of large triangles in the upper half, of their blocks in the lower.
+    /// The number of large triangles in the upper half, that of their blocks in the lower half.
     pub count: u64,
 }
 
-/// Triangles with large bounding rectangles, and their blocks. Without room where the options do not ask for these kernels.
-/// A clone is a second handle to the same buffers.
+/// Triangles with large bounding rectangles, and their blocks. There is no room for any unless the options have
+/// kernels rasterize. A clone is a second handle to the same buffers.
 #[derive(Clone)]
 pub struct RasterQueue {
-    /// One.
+    /// The state: one element.
     pub groups: Buffer<RasterState>,
-    /// One a triangle: all may be large.
+    /// The large triangles, with room for all triangles.
     pub large_triangles: Buffer<LargeTriangle>,
 }
 
 impl RasterQueue {
+    /// Makes the buffers for `n_triangles` triangles.
+    ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
+    /// A buffer is beyond the device's limits, or memory runs out.
     pub fn new(context: &Arc<Context>, n_triangles: u32, options: &RenderOptions) -> Result<Self, GpuError> {
         let n_large = if options.primary == Primary::Compute { n_triangles as usize } else { 0 };
         Ok(Self {
@@ -39,12 +41,12 @@ impl RasterQueue {
         })
     }
 
-    /// Whether a device binds what so many triangles take here.
+    /// Whether the device can bind the buffer for `n_triangles` large triangles.
     pub fn has_room(context: &Context, n_triangles: usize) -> bool {
         (n_triangles as u64).saturating_mul(size_of::<LargeTriangle>() as u64) <= context.limits().storage_range
     }
 
-    /// Whether there is room where the options ask for it, and none where they do not.
+    /// Whether there is room if the options need it, and none if they do not.
     pub fn fits(&self, n_triangles: u32, options: &RenderOptions) -> bool {
         let has_room = self.large_triangles.len() == n_triangles as usize;
         if options.primary == Primary::Compute { has_room } else { self.large_triangles.is_empty() }

@@ -1,4 +1,4 @@
-//! What a frame needs on the device, and the descriptor set over it.
+//! Resources of a frame on the device, and the descriptor set over them.
 
 use std::{mem::offset_of, sync::Arc};
 
@@ -15,13 +15,13 @@ use crate::{
     world::World,
 };
 
-/// Of the longest push constants.
+/// The size of the longest push constants, bytes.
 const PUSH_BYTES: u32 = {
     let (batch, present) = (size_of::<Batch>(), size_of::<layout::Present>());
     if batch > present { batch as u32 } else { present as u32 }
 };
 
-/// BindingLayout of the frame's descriptor set beside those of the scene.
+/// The bindings of the frame's descriptor set beside those of the acceleration structure.
 const OWN_BINDINGS: [u32; 21] = [
     layout::BIND_FRAME,
     layout::BIND_MATERIALS,
@@ -46,49 +46,52 @@ const OWN_BINDINGS: [u32; 21] = [
     layout::BIND_TRIANGLE_IDS,
 ];
 
-/// Of a batch and bounce, those between the places included.
+/// The number of counters of a bounce of a batch, including the unused ones between the places.
 const COUNTERS_A_ROW: usize = (COUNTER_PLACES * COUNTER_STRIDE) as usize;
 
-/// What the kernels read and write. A name is the same here, in the kernels, as debug label and as allocation.
+/// Resources that the frame's kernels read and write. Each has the same name here, in the kernels, as debug label and
+/// as allocation.
 ///
 /// A clone is a second handle to the same buffers. A change makes a successor, which shares with its predecessor all
-/// that it does not replace; whoever keeps the predecessor can go on with it if the change fails.
+/// that it does not replace. If the change fails, the predecessor can still be used.
 #[derive(Clone)]
 pub struct Resources {
-    /// One.
+    /// The constants: one element.
     pub frame: Buffer<Frame>,
     pub accel: AccelBuffers,
-    /// Three a triangle, or empty where draws do without indices. None where the options draw no triangles.
+    /// Three for each triangle, or empty if triangles are drawn without indices. None if the options draw no
+    /// triangles.
     pub vertex_indices: Option<Buffer<u32>>,
     pub materials: Buffer<Material>,
-    /// `n_lights`.
+    /// `n_lights` elements.
     pub lights: Buffer<Light>,
     pub queue: Queue,
     pub pixels: Pixels,
     pub raster: RasterQueue,
-    /// One a batch and bounce.
+    /// A row for each bounce of each batch.
     pub bounces: Buffer<Bounce>,
     counters: Buffer<Counters>,
     pub bindings: Arc<BindingLayout>,
-    /// None while all else is made.
+    /// None until everything else is made.
     set: Option<Arc<BindingSet>>,
+    /// The constants that the next frame uploads.
     constants: Frame,
 }
 
-/// What a frame needs room for.
+/// Requirements of a frame.
 pub struct Needs<'a> {
-    /// `queue_capacity` is the number of rays in the queue.
+    /// The frame's constants. Their `queue_capacity` is the number of rays for which the queue has room.
     pub constants: &'a Frame,
     pub options: &'a RenderOptions,
-    /// Rows of `bounces`: one a batch and bounce.
+    /// The number of rows of `bounces`: one for each bounce of each batch.
     pub n_bounces: usize,
 }
 
 impl Resources {
-    /// Uploads the scene with its tree, and makes room for what a frame needs.
+    /// Uploads the scene with its acceleration structure, and makes the buffers and images that a frame needs.
     ///
     /// # Errors
-    /// Too many triangles for brute force; beyond the device's limits, out of memory.
+    /// There are too many triangles for brute force, a buffer is beyond the device's limits, or memory runs out.
     pub fn new(context: &Arc<Context>, world: &World, needs: &Needs) -> Result<Self, GpuError> {
         let scene = world.scene();
         let storage = BufferUse::Storage;
@@ -145,12 +148,12 @@ impl Resources {
         BindingSet::new(&self.bindings, "frame", &[&self.accel.objects(), &own[..]].concat())
     }
 
-    /// Makes the resources of another frame of the same scene. What they hold is undefined, but for the scene, and for
-    /// pixels whose buffers are large enough and therefore shared. `accel`: the scene's own, if the traversal is another
-    /// one.
+    /// Makes the resources for another frame of the same scene. Their contents are undefined, but for the scene, and
+    /// for pixels whose buffers fit the frame and are therefore shared. `accel`: the scene's structure if the
+    /// traversal changes, else none.
     ///
     /// # Errors
-    /// Too many triangles for brute force; beyond the device's limits, out of memory.
+    /// There are too many triangles for brute force, a buffer is beyond the device's limits, or memory runs out.
     pub fn for_frame(&self, context: &Arc<Context>, accel: Option<&Accel>, needs: &Needs) -> Result<Self, GpuError> {
         let &Needs { constants, options, n_bounces } = needs;
         self.changed(|next| {
@@ -176,10 +179,11 @@ impl Resources {
         })
     }
 
-    /// Makes resources for another number of batches and bounces, whose contents are undefined.
+    /// Makes resources for another number of batches and bounces. The contents of `bounces` and the counters are
+    /// undefined.
     ///
     /// # Errors
-    /// Out of memory.
+    /// Memory runs out.
     pub fn with_bounces(&self, context: &Arc<Context>, n_bounces: usize) -> Result<Self, GpuError> {
         self.changed(|next| {
             next.bounces = new_bounces(context, n_bounces)?;
@@ -188,7 +192,7 @@ impl Resources {
         })
     }
 
-    /// Makes a successor that `change` has changed, with a descriptor set over what it holds.
+    /// Makes a successor that `change` has changed, with a descriptor set over the successor's buffers.
     fn changed(&self, change: impl FnOnce(&mut Self) -> Result<(), GpuError>) -> Result<Self, GpuError> {
         let mut next = self.clone();
         change(&mut next)?;
@@ -196,22 +200,23 @@ impl Resources {
         Ok(next)
     }
 
-    /// The indices of the triangles that are on the device, which are fetched if there are few enough to have indices.
+    /// Makes the vertex indices of the triangles that are on the device. The triangles are downloaded if they are few
+    /// enough to have indices.
     fn make_vertex_indices(&self, context: &Arc<Context>) -> Result<Buffer<u32>, GpuError> {
         let triangles = &self.accel.arrays.triangles;
         let triangles = if has_indices(triangles.len()) { triangles.download()? } else { Vec::new() };
         new_vertex_indices(context, &vertex_indices(&triangles))
     }
 
-    /// Other constants for as many pixels and rays; the next frame brings them to the device.
+    /// Replaces the constants, for the same number of pixels and rays. The next frame uploads them.
     pub fn set_constants(&mut self, constants: &Frame) {
         self.constants = *constants;
     }
 
-    /// Makes the first sample the sum of samples.
+    /// Copies the first sample into the sum of samples. Its buffer is made if there is none.
     ///
     /// # Errors
-    /// Nothing has changed then. Out of memory, a failed copy.
+    /// Memory runs out, or a copy fails. Nothing has changed then.
     pub fn begin_sums(&mut self, context: &Arc<Context>) -> Result<(), GpuError> {
         let next = match self.pixels.pixel_accumulated {
             Some(_) => self.clone(),
@@ -238,10 +243,10 @@ impl Resources {
         commands.clear_buffer(self.counters.any());
     }
 
-    /// What the kernels counted, a row a batch and bounce.
+    /// Downloads the sums of the kernels' counters, an element for each bounce of each batch.
     ///
     /// # Errors
-    /// A failed copy.
+    /// A copy fails.
     pub fn counters(&self) -> Result<Vec<Counters>, GpuError> {
         let sum = |row: &[Counters]| {
             row.iter().step_by(COUNTER_STRIDE as usize).fold(Counters::default(), |sum, place| Counters {
@@ -252,52 +257,53 @@ impl Resources {
         Ok(self.counters.download()?.chunks_exact(COUNTERS_A_ROW).map(sum).collect())
     }
 
-    /// Pixels of the window.
+    /// The number of the window's pixels.
     pub fn n_pixels(&self) -> usize {
         n_pixels(&self.constants)
     }
 
-    /// The constants that the kernels read.
+    /// The constants that the kernels read, from the next frame on.
     pub fn constants(&self) -> &Frame {
         &self.constants
     }
 
-    /// The lanes of each of the bounce's rays.
+    /// A dispatch of the lanes of all rays of the bounce.
     pub fn trace_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
         self.indirect(batch.bounce_ix, offset_of!(Bounce, trace_groups_x))
     }
 
-    /// One invocation a ray of the bounce.
+    /// A dispatch of one invocation for each ray of the bounce.
     pub fn scan_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
         self.indirect(batch.bounce_ix, offset_of!(Bounce, scan_groups_x))
     }
 
-    /// The lanes of each of the batch's rays, of all bounces, for each light.
+    /// A dispatch of the lanes of all rays of the batch, of all bounces, for each light.
     pub fn shadow_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
         self.indirect(self.last_bounce(batch), offset_of!(Bounce, shadow_groups_x))
     }
 
-    /// One invocation a ray of the batch, of all bounces.
+    /// A dispatch of one invocation for each ray of the batch, of all bounces.
     pub fn shade_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
         self.indirect(self.last_bounce(batch), offset_of!(Bounce, shade_groups_x))
     }
 
-    /// The last row of a batch whose first one is given.
+    /// Returns the row of a batch's last bounce. `batch.bounce_ix`: the row of its first bounce.
     fn last_bounce(&self, batch: &Batch) -> u32 {
         batch.bounce_ix + self.constants.max_depth - 1
     }
 
+    /// A dispatch whose workgroups are in a member of a row of `bounces`. `member`: its offset, bytes.
     fn indirect(&self, bounce_ix: u32, member: usize) -> Dispatch<'_> {
         Dispatch::Indirect(self.bounces.any(), (bounce_ix as usize * size_of::<Bounce>() + member) as u64)
     }
 
-    /// One invocation a pixel.
+    /// A dispatch of one invocation for each pixel of the window.
     pub fn pixel_dispatch(&self) -> Dispatch<'_> {
         let tile = layout::TILE_SIZE;
         Dispatch::Threads([self.constants.width, self.constants.height, 1], [tile, tile, 1])
     }
 
-    /// Binds all that the kernels read and write.
+    /// Binds everything that the kernels read and write.
     pub fn bind(&self, commands: &Commands) {
         commands.bind(self.set());
     }

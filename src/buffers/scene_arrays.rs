@@ -1,4 +1,5 @@
-//! The arrays of the scene on a device, as glsl/shared/scene_arrays.glsl lists them, and how kernels read them.
+//! Arrays of the scene on a device, as glsl/shared/scene_arrays.glsl lists them, and the way in which kernels read
+//! them.
 
 use std::sync::Arc;
 
@@ -12,19 +13,19 @@ use crate::{
     },
 };
 
-/// How kernels read the scene's arrays (glsl/shared/scene.glsl). All arrays are read in the same way.
+/// Way in which kernels read the scene's arrays (glsl/shared/scene.glsl). It is the same for all arrays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SceneAccess {
-    /// As storage buffers that are bound.
+    /// As bound storage buffers.
     Bound,
-    /// As texels: on software drivers, if no array has more texels than the device allows for.
+    /// As texels. For software drivers, if no array has more texels than the device allows.
     Texels,
-    /// By device address, if an array is larger than what the device binds.
+    /// By device address. For scenes with an array that is larger than the device can bind.
     Address,
 }
 
 impl SceneAccess {
-    /// The fastest way that the device has for arrays of these sizes.
+    /// Returns the fastest way that the device has for arrays of these sizes.
     pub fn of(context: &Context, contents: &Contents) -> Self {
         let (limits, sizes) = (context.limits(), contents.sizes());
         if context.predicates_branches() && sizes.iter().all(|size| size.n_texels <= u64::from(limits.n_texels)) {
@@ -45,25 +46,25 @@ impl SceneAccess {
         }
     }
 
-    /// The use of a buffer that is read so.
+    /// The use of buffers that are read in this way.
     fn buffer_use(self) -> BufferUse {
         if self == Self::Address { BufferUse::Address } else { BufferUse::Texels }
     }
 }
 
-/// What an array of `T` holds when it is made.
+/// Contents of an array of `T` when it is made.
 pub enum Content<'a, T> {
-    /// These elements, which are uploaded.
+    /// Elements that are uploaded.
     Elements(&'a [T]),
-    /// So many elements, which `write(first, part)` makes in parts: those from element `first` on.
+    /// `len` elements, which `write(first, part)` makes in parts: `part` is the elements from `first` on.
     Written { len: usize, write: &'a dyn Fn(usize, &mut [T]) },
-    /// The elements of a buffer, which must be for [`BufferUse::Texels`].
+    /// The elements of a buffer, which must have been made for [`BufferUse::Texels`].
     OnDevice(Buffer<T>),
-    /// Nothing. Later the array may be replaced by one of up to so many elements.
+    /// No elements. Later the array may be replaced by one of up to this many elements.
     Reserved(usize),
 }
 
-/// What an array takes, or may take later.
+/// Size of an array, or the size that it may have later.
 struct Size {
     bytes: u64,
     n_texels: u64,
@@ -80,10 +81,10 @@ impl<T: Pod> Content<'_, T> {
         Size { bytes, n_texels: bytes / texel_bytes::<T>() }
     }
 
-    /// Makes the array.
+    /// Makes the array. `name`: its debug label.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
+    /// A buffer is beyond the device's limits, or memory runs out.
     pub fn upload(self, context: &Arc<Context>, name: &str, access: SceneAccess) -> Result<Buffer<T>, GpuError> {
         let usage = access.buffer_use();
         match self {
@@ -100,13 +101,13 @@ impl<T: Pod> Content<'_, T> {
 
 macro_rules! declare {
     ($($(#[doc = $doc:literal])* $name:ident: $element:ty = $number:literal,)*) => {
-        /// The scene's arrays. A clone is a second handle to the same buffers.
+        /// Buffers of the scene's arrays. A clone is a second handle to the same buffers.
         #[derive(Clone)]
         pub struct SceneArrays {
             $($(#[doc = $doc])* pub $name: Buffer<$element>,)*
         }
 
-        /// What each of the scene's arrays holds when it is made.
+        /// Contents of each of the scene's arrays when it is made.
         pub struct Contents<'a> {
             $($(#[doc = $doc])* pub $name: Content<'a, $element>,)*
         }
@@ -115,7 +116,8 @@ macro_rules! declare {
         const NUMBERS: &[u32] = &[$($number),*];
 
         impl<'a> Contents<'a> {
-            /// Triangles, room for their materials, and no structure.
+            /// Returns the contents of a scene that has triangles, room for their materials, and no acceleration
+            /// structure.
             pub fn of_triangles(triangles: &'a [Triangle]) -> Self {
                 Self {
                     triangles: Content::Elements(triangles),
@@ -131,19 +133,20 @@ macro_rules! declare {
             /// Makes all arrays.
             ///
             /// # Errors
-            /// Beyond the device's limits, out of memory.
+            /// A buffer is beyond the device's limits, or memory runs out.
             pub fn upload(self, context: &Arc<Context>, access: SceneAccess) -> Result<SceneArrays, GpuError> {
                 Ok(SceneArrays { $($name: self.$name.upload(context, stringify!($name), access)?,)* })
             }
         }
 
         impl SceneArrays {
-            /// In the order of `NUMBERS`.
+            /// Returns the buffers in the order of `NUMBERS`.
             fn buffers(&self) -> [&AnyBuffer; NUMBERS.len()] {
                 [$(self.$name.any()),*]
             }
 
-            /// Sets the addresses of the arrays, of which all must be for [`SceneAccess::Address`].
+            /// Writes the arrays' addresses into the constants. All arrays must have been made for
+            /// [`SceneAccess::Address`].
             pub fn write_addresses(&self, constants: &mut AccelConstants) {
                 $(constants.$name = self.$name.address();)*
             }
@@ -154,12 +157,12 @@ macro_rules! declare {
 for_scene_arrays!(declare);
 
 impl SceneArrays {
-    /// The bindings of the arrays, as [`SceneArrays::objects`] has them.
+    /// Returns the bindings of the arrays, in the order of [`SceneArrays::objects`].
     pub fn bindings() -> impl Iterator<Item = u32> {
         NUMBERS.iter().copied().chain(NUMBERS.iter().map(|number| BIND_TEXELS + number))
     }
 
-    /// What the bindings hold: each array as a buffer and as texels.
+    /// Returns the objects that the bindings are bound to: each array as a buffer and as texels.
     pub fn objects(&self) -> impl Iterator<Item = (u32, Binding<'_>)> {
         let arrays = NUMBERS.iter().copied().zip(self.buffers());
         let bound = arrays.clone().map(|(number, buffer)| (number, Binding::Buffer(buffer)));

@@ -1,8 +1,9 @@
-//! Rays that stop on their way through the tree, and go on in further dispatches (glsl/shared/stalls.glsl).
+//! Stalled rays: rays that stop on their way through the tree, and go on in further dispatches
+//! (glsl/shared/stalls.glsl).
 //!
-//! Some drivers end a shader after a number of loop turns without a word. On such a device a ray that has spent its turns
-//! stores its state and leaves a mark in place of its result. The host repeats the dispatch until no ray is marked, so no
-//! ray ends early and no dispatch is unbounded.
+//! Some drivers silently end a shader after a number of loop turns. On such a device, a ray that has spent its turns
+//! stores its state and leaves a mark in place of its result. The host repeats the dispatch until no ray is marked.
+//! So no ray ends early, and no dispatch is unbounded.
 
 use std::sync::Arc;
 
@@ -11,26 +12,26 @@ use crate::{
     layout::{BIND_STALLS, KD_MAX_DEPTH, ROUND_BEGIN, ROUND_RESTART, ROUND_RESUME, STALLED_RAY_ROWS},
 };
 
-/// Rays whose state is stored at a time: 3 MiB. Further ones begin again when there is room.
+/// The most rays whose state is stored at a time: 3 MiB. Further rays begin again when there is room.
 const N_SLOTS: usize = 1 << 16;
 
-/// The first row of `stalls`: how many slots have been asked for, how many rays of the last dispatch have stalled and have
-/// a slot, how many have none; and a word that nobody reads.
+/// First row of `stalls`. Its words are the number of slots that have been requested, the number of rays of the last
+/// dispatch that have stalled and have a slot, the number of rays that have no slot, and an unused word.
 type Counts = [u32; 4];
 
-/// Which rays a dispatch takes.
+/// Round of a dispatch: the rays that it traces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Round {
     /// All rays, from their beginning.
     Begin,
     /// Rays that have stalled, from where they stopped.
     Resume,
-    /// Rays that have stalled when no slot was left, from their beginning.
+    /// Rays that stalled when no slot was left, from their beginning.
     Restart,
 }
 
 impl Round {
-    /// The value of the push constants' `round`.
+    /// The value of the push constant `round`.
     pub fn constant(self) -> u32 {
         match self {
             Self::Begin => ROUND_BEGIN,
@@ -40,19 +41,21 @@ impl Round {
     }
 }
 
-/// The buffer of stalled rays. Without slots where the device has no limit of turns. A clone is a second handle to the same
-/// buffer.
+/// Buffer of stalled rays. It has no slots if the device has no limit of turns. A clone is a second handle to the
+/// same buffer.
 #[derive(Clone)]
 pub struct Stalls {
-    /// The counts, then `STALLED_RAY_ROWS` a slot.
+    /// The counts, then `STALLED_RAY_ROWS` rows for each slot.
     rows: Buffer<[u32; 4]>,
-    /// Turns that a ray takes in a dispatch; 0: any number.
+    /// The turns that a ray takes in a dispatch; 0: any number.
     turn_budget: u32,
 }
 
 impl Stalls {
+    /// Makes the buffer. The first call on a device probes its limit of turns.
+    ///
     /// # Errors
-    /// Out of memory.
+    /// Memory runs out, or the probe does not run.
     pub fn new(context: &Arc<Context>) -> Result<Self, GpuError> {
         let turn_budget = context.loop_limit()?.map_or(0, |limit| turn_budget(limit, context.info().subgroup_size));
         let most_rows = context.limits().storage_range as usize / size_of::<Counts>();
@@ -68,17 +71,17 @@ impl Stalls {
         self.turn_budget > 0
     }
 
-    /// The value of the kernels' specialization constant TURN_BUDGET.
+    /// The value of the kernels' specialization constant `TURN_BUDGET`.
     pub(super) fn turn_budget(&self) -> u32 {
         self.turn_budget
     }
 
-    /// Its binding's number, and the buffer for it.
+    /// The number of the buffer's binding, and the buffer.
     pub(super) fn object(&self) -> (u32, Binding<'_>) {
         (BIND_STALLS, Binding::Buffer(self.rows.any()))
     }
 
-    /// Empties all slots. To be recorded before a dispatch of [`Round::Begin`]; needs nothing.
+    /// Empties all slots. It is recorded before a dispatch of [`Round::Begin`]. Needs nothing.
     pub fn reset(&self, commands: &Commands) {
         if self.can_occur() {
             self.set_counts(commands, &Counts::default());
@@ -86,16 +89,16 @@ impl Stalls {
     }
 
     fn set_counts(&self, commands: &Commands, counts: &Counts) {
-        commands.barrier(Access::ComputeUpdate, Access::TransferWrite); // stalls, of the dispatch before
+        commands.barrier(Access::ComputeUpdate, Access::TransferWrite); // stalls of the previous dispatch
         commands.update_buffer(self.rows.any(), counts);
         commands.barrier(Access::TransferWrite, Access::ComputeUpdate); // stalls
     }
 
-    /// Repeats a dispatch that has run as [`Round::Begin`] until every ray has ended; returns how often. `record` records it
-    /// for a round.
+    /// Repeats a dispatch that has run as [`Round::Begin`] until every ray has ended. Returns the number of
+    /// repetitions. `record`: records the dispatch for a round.
     ///
     /// # Errors
-    /// A failed call.
+    /// A Vulkan call fails.
     pub fn finish(&self, context: &Arc<Context>, record: impl Fn(&Commands, Round)) -> Result<u32, GpuError> {
         if !self.can_occur() {
             return Ok(0);
@@ -103,7 +106,7 @@ impl Stalls {
         let mut n_rounds = 0;
         loop {
             let [n_slots, n_stalled, n_waiting, _] = self.rows.download_first(1)?[0];
-            // Rays that wait for a slot do not run in rounds of the others, and remain counted.
+            // Rays that wait for a slot do not run in the rounds of the others, so their count is kept.
             let (round, counts) = match (n_stalled, n_waiting) {
                 (1.., _) => (Round::Resume, [n_slots, 0, n_waiting, 0]),
                 (0, 1..) => (Round::Restart, Counts::default()),
@@ -120,14 +123,15 @@ impl Stalls {
     }
 }
 
-/// Turns that one invocation may take, such that its subgroup stays below the device's limit.
+/// Returns the loop turns that one invocation may take so that its subgroup stays below the device's limit.
 ///
-/// The driver counts the turns of a subgroup: a loop goes on while any lane is in it, and takes one turn even if no lane is
-/// in it. So a turn of the outer loop costs up to `TURNS_OF_ALL` turns whatever its lanes do: its own, two of the loop that
-/// goes from leaf to leaf, and in each of those one of every loop inside. All further turns are taken by some lane. If no
-/// lane takes more than `b` turns, outer and inner ones together, the subgroup thus takes no more than
-/// `(TURNS_OF_ALL + subgroup_size) b`. When its turns are spent, a lane still ends the step that it is in, and before that
-/// it may have walked back to where it stopped: `TURNS_ASIDE`, four times a tree's depth.
+/// The driver counts the turns of a subgroup. A loop goes on while any lane is in it, and takes one turn even if no
+/// lane is in it. So a turn of the outer loop costs up to `TURNS_OF_ALL` turns whatever its lanes do: its own, two of
+/// the loop that goes from leaf to leaf, and in each of those two, one of every loop inside. All further turns are
+/// taken by some lane. So if no lane takes more than `b` turns, outer and inner ones together, the subgroup takes no
+/// more than `(TURNS_OF_ALL + subgroup_size) b`. When its turns are spent, a lane still finishes its step, and before
+/// that it may have walked back to where it stopped. These are up to `TURNS_ASIDE` turns a lane, four times a tree's
+/// greatest depth.
 fn turn_budget(limit: u32, subgroup_size: u32) -> u32 {
     const TURNS_OF_ALL: u32 = 12;
     const TURNS_ASIDE: u32 = 4 * KD_MAX_DEPTH;

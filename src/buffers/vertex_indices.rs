@@ -1,24 +1,24 @@
-//! In which order visibility draws vertices. A pixel learns its triangle from the triangle's first vertex, so that each
-//! triangle needs one of its own; the other two may be any that lie at the same points. Shared like that, a device
-//! transforms about a vertex a triangle in place of three.
+//! Vertex indices of the visibility pass. A pixel gets its triangle's index from the first vertex of the triangle, so
+//! each triangle needs a first vertex of its own. The other two may be any vertices at the same points. With vertices
+//! shared like this, a device transforms about one vertex a triangle instead of three.
 
 use glam::Vec3;
 use hashbrown::HashMap;
 
 use crate::layout::Triangle;
 
-/// Devices need not draw by greater indices than this.
+/// The greatest index that every device can draw by.
 const MAX_INDEX: usize = (1 << 24) - 1;
 
-/// Three indices a triangle, each `3 * triangle + corner` of a corner at the same point; the first is of the triangle
-/// itself, and the order goes round as the corners do. None for so many triangles that devices need not draw them by
-/// indices.
+/// Returns three indices for each triangle. Each is `3 * triangle + corner` of a corner at the same point. The first
+/// one is of the triangle itself, and the corners keep their order round the triangle. The result is empty for more
+/// triangles than every device can draw by indices.
 pub fn vertex_indices(triangles: &[Triangle]) -> Vec<u32> {
     if !has_indices(triangles.len()) {
         return Vec::new();
     }
     let (points, n_points) = points_of(triangles);
-    // For each point a corner there, if possible one that a triangle begins with.
+    // For each point, the index of a corner there, if possible of one that is a triangle's first.
     let mut vertex_at = vec![u32::MAX; n_points];
     let mut first_corners = Vec::with_capacity(triangles.len());
     for (triangle_ix, corners) in (0..).zip(&points) {
@@ -41,16 +41,18 @@ pub fn vertex_indices(triangles: &[Triangle]) -> Vec<u32> {
     (0..).zip(points.iter().zip(&first_corners)).flat_map(indices_of).collect()
 }
 
-/// Whether devices have to draw so many triangles by indices.
+/// Whether every device can draw this many triangles by indices.
 pub fn has_indices(n_triangles: usize) -> bool {
     3 * n_triangles <= MAX_INDEX
 }
 
+/// Returns the index of a triangle's corner.
 fn vertex(triangle_ix: u32, corner: usize) -> u32 {
     3 * triangle_ix + corner as u32
 }
 
-/// Numbers of the corners' points, and how many there are. Points of one number have the same bits.
+/// Returns the numbers of the corners' points, and how many points there are. Points with the same number have the
+/// same bits.
 fn points_of(triangles: &[Triangle]) -> (Vec<[u32; 3]>, usize) {
     let mut numbers = HashMap::with_capacity(triangles.len());
     let mut number_of = |p: Vec3| {
@@ -74,7 +76,7 @@ mod tests {
         [t.v0, t.v1, t.v2][vertex as usize % 3]
     }
 
-    /// A square of n x n cells, two triangles each.
+    /// Makes a square of n x n cells, two triangles each.
     fn grid(n: usize) -> Vec<Triangle> {
         let at = |x: usize, y: usize| vec3(x as f32, y as f32, 0.0);
         let triangle = |v0, v1, v2| Triangle { v0, v1, v2, ..Triangle::default() };

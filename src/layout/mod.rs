@@ -9,6 +9,7 @@ mod specialization;
 include!(concat!(env!("OUT_DIR"), "/layout.rs"));
 
 #[cfg(test)]
+/// Name, size in bytes, and each member's type and offset in bytes.
 type Struct = (&'static str, usize, &'static [(&'static str, usize)]);
 
 #[cfg(test)]
@@ -23,7 +24,7 @@ mod tests {
 
     use super::*;
 
-    /// The struct of which a binding has one or an array; none for words and vectors.
+    /// Returns the name of the struct that a binding holds, one or an array of it; none for words and vectors.
     fn struct_at(binding: u32) -> Option<&'static str> {
         if let Some((_, element)) = SCENE_ARRAYS.iter().find(|(number, _)| *number == binding) {
             return (*element != "uint").then_some(element);
@@ -50,7 +51,7 @@ mod tests {
         }
     }
 
-    /// The struct of a shader's push constants.
+    /// Returns the name of the struct of a shader's push constants.
     fn pushed_to(shader: &str) -> &'static str {
         match shader {
             "cast.comp" => "CastBatch",
@@ -78,11 +79,11 @@ mod tests {
         }
     }
 
-    /// Type and offset of each.
+    /// Type and offset of each member of a struct.
     type Members = Vec<(&'static str, usize)>;
 
-    /// Types and offsets of a block's only member, a struct or an array of structs, and the array's stride. No members
-    /// where it is an array of vectors, which the kernel makes structs of itself.
+    /// Returns the members of a block's only member, which is a struct or an array of structs, and the array's stride
+    /// in bytes. There are no members for an array of vectors, of which the kernel makes structs itself.
     fn members_of(block: &Type) -> (Option<Members>, Option<usize>) {
         let Type::Struct(block) = block else { panic!("{block:?} is no block") };
         let (element, stride) = match &block.members[0].ty {
@@ -97,7 +98,7 @@ mod tests {
         }
     }
 
-    /// Ok where the kernels see this struct as Rust does.
+    /// Checks that the kernels see a struct as Rust does.
     fn check(name: &str, block: &Type, structs: &[Struct]) -> Result<(), String> {
         let (_, size, members) = structs.iter().find(|(known, ..)| *known == name).expect("a struct of that name");
         let (found, stride) = members_of(block);
@@ -111,7 +112,8 @@ mod tests {
         Ok(())
     }
 
-    /// Struct name and block of every binding and push constant of every pass's shaders.
+    /// Returns the struct name and the block of every binding and push constant of all shaders in `passes` and
+    /// `driver`.
     fn blocks() -> Vec<(&'static str, Type)> {
         let folders = ["passes", "driver"].map(|name| format!("{}/glsl/{name}", env!("CARGO_MANIFEST_DIR")));
         let sources = folders.iter().flat_map(|folder| fs::read_dir(folder).expect("a folder of shaders"));

@@ -5,16 +5,18 @@
 
 use glam::{Vec2, Vec3};
 
-/// Two snorm16 as GLSL's `packSnorm2x16` lays them out. No vector encodes to `FLAT_NORMAL`: no half is ever 0x8000.
+/// Encodes a direction as two snorm16, in the layout of GLSL's `packSnorm2x16`. No direction encodes to
+/// `FLAT_NORMAL`, since no half is ever 0x8000.
 ///
-/// `n` need not have unit length; what is zero or not finite encodes +z.
+/// `n` need not have unit length. A zero vector and one with a NaN encode +z. One with an infinity encodes some unit
+/// vector.
 pub fn encode_octahedral(n: Vec3) -> u32 {
     let p = n / (n.x.abs() + n.y.abs() + n.z.abs());
     let folded = if p.z >= 0.0 { Vec2::new(p.x, p.y) } else { Vec2::new(fold(p.x, p.y), fold(p.y, p.x)) };
     u32::from(snorm16(folded.x)) | u32::from(snorm16(folded.y)) << 16
 }
 
-/// The unit vector of an encoded one, by the same steps as the kernels take.
+/// Decodes a unit vector, by the same steps as the kernels.
 pub fn decode_octahedral(encoded: u32) -> Vec3 {
     let x = from_snorm16(encoded as u16);
     let y = from_snorm16((encoded >> 16) as u16);
@@ -23,17 +25,17 @@ pub fn decode_octahedral(encoded: u32) -> Vec3 {
     Vec3::new(x - below.copysign(x), y - below.copysign(y), z).normalize()
 }
 
-/// Folds one coordinate of the lower half over the octahedron's edge.
+/// Folds one coordinate of the lower half over the octahedron's edge. `b` is the other coordinate.
 fn fold(a: f32, b: f32) -> f32 {
     (1.0 - b.abs()).copysign(a)
 }
 
-/// -32767..=32767 as bits; NaN becomes 0.
+/// Maps -1..=1 to -32767..=32767 and returns the bits. A NaN becomes 0.
 fn snorm16(x: f32) -> u16 {
     (x.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16
 }
 
-/// GLSL's `unpackSnorm2x16` of one half.
+/// Decodes one half as GLSL's `unpackSnorm2x16` does.
 fn from_snorm16(bits: u16) -> f32 {
     (f32::from(bits as i16) / 32767.0).clamp(-1.0, 1.0)
 }

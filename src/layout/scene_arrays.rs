@@ -1,9 +1,9 @@
-//! The scene's arrays, as glsl/shared/scene_arrays.glsl lists them. build.rs reads them by this file and makes Rust's of
-//! them.
+//! Parser of the list of the scene's arrays, glsl/shared/scene_arrays.glsl. build.rs uses this file to generate Rust
+//! from the list.
 
 use std::fmt::Write;
 
-/// A row of the list.
+/// Row of the list: one array.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Row {
     /// The comment above the row, without `//`, line by line.
@@ -14,11 +14,12 @@ pub struct Row {
     pub element: String,
     /// The type that a kernel loads at once: `uint`, `uvec2` or `vec4`.
     pub row: String,
-    /// The number of its binding.
+    /// The number of the array's binding.
     pub binding: u32,
 }
 
 impl Row {
+    /// The size of the type that a kernel loads at once, bytes.
     fn row_bytes(&self) -> usize {
         match self.row.as_str() {
             "uint" => 4,
@@ -27,16 +28,17 @@ impl Row {
         }
     }
 
+    /// The type of an element in Rust.
     fn rust_element(&self) -> &str {
         if self.element == "uint" { "u32" } else { &self.element }
     }
 }
 
-/// Reads the list.
+/// Parses the list.
 ///
 /// # Errors
-/// A line that is neither a comment nor `ARRAY(name, element, row, number)`, an unknown type of rows, a name or a number that
-/// is there twice.
+/// A line is neither a comment nor `ARRAY(name, element, row, number)`, the type of a row is unknown, or two rows
+/// have the same name or number.
 pub fn rows(source: &str) -> Result<Vec<Row>, String> {
     let mut rows: Vec<Row> = Vec::new();
     let mut doc = Vec::new();
@@ -67,10 +69,10 @@ pub fn rows(source: &str) -> Result<Vec<Row>, String> {
     Ok(rows)
 }
 
-/// Holds the arrays' bindings against those that layout.glsl gives to other buffers.
+/// Checks the arrays' bindings against those that layout.glsl gives to other buffers.
 ///
 /// # Errors
-/// A binding that is also another buffer's, or that is not below `BIND_TEXELS`.
+/// An array has the binding of another buffer, or one that is not below `BIND_TEXELS`.
 pub fn check_bindings(rows: &[Row], layout: &str) -> Result<(), String> {
     let number_of = |value: &str| value.trim().trim_end_matches('u').parse::<u32>().ok();
     let defines = layout.lines().filter_map(|line| line.strip_prefix("#define ")?.split_once(' '));
@@ -91,8 +93,9 @@ pub fn check_bindings(rows: &[Row], layout: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Writes the list as a macro of Rust, `for_scene_arrays!(with)`, which calls the macro `with` with a row
-/// `/// doc name: element = binding,` for each array. A row of another size than what kernels load does not compile.
+/// Generates Rust from the list: a macro, `for_scene_arrays!(with)`. It calls the macro `with` with a row
+/// `/// doc name: element = binding,` for each array. The Rust does not compile if a row of the list has another size
+/// than the widest texel of which an element can be made.
 pub fn rust(rows: &[Row]) -> String {
     let (mut list, mut checks, mut elements) = (String::new(), String::new(), String::new());
     for row in rows {
@@ -105,7 +108,8 @@ pub fn rust(rows: &[Row]) -> String {
         write!(elements, "({binding}, {element:?}), ").unwrap();
     }
     format!(
-        "/// Calls a macro with the scene's arrays.\nmacro_rules! for_scene_arrays {{ ($with:ident) => {{ $with! {{\n{list}    }} }} }}\n\
+        "/// Calls a macro with the scene's arrays.\n\
+         macro_rules! for_scene_arrays {{ ($with:ident) => {{ $with! {{\n{list}    }} }} }}\n\
          pub(crate) use for_scene_arrays;\n{checks}\n\
          /// The binding of each of the scene's arrays, and the type of its elements in GLSL.\n\
          #[cfg(test)]\nconst SCENE_ARRAYS: &[(u32, &str)] = &[{elements}];\n\n"

@@ -1,28 +1,30 @@
-//! Specialization constants, as the shaders declare them. build.rs reads them by this file and makes Rust's of them.
+//! Parser of the specialization constants that the shaders declare. build.rs uses this file to generate Rust from
+//! them.
 //!
-//! Each has one number, one name and one type in all shaders: `layout(constant_id = CONSTANT_X) const bool X = false;`,
-//! with `#define CONSTANT_X 7u` in layout.glsl.
+//! Each constant has one number, one name and one type in all shaders. A shader declares it as
+//! `layout(constant_id = CONSTANT_X) const bool X = false;`, and layout.glsl gives its number by
+//! `#define CONSTANT_X 7u`.
 
 use std::collections::BTreeMap;
 
-/// A constant that a shader declares.
+/// Declaration of a constant in a shader.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Declaration {
-    /// Its name in GLSL and in Rust.
+    /// The constant's name in GLSL and in Rust.
     pub name: String,
     /// `uint` or `bool`.
     pub glsl_type: String,
-    /// Its number.
+    /// The constant's number.
     pub id: u32,
 }
 
-/// The numbers that layout.glsl gives to constants, by name without `CONSTANT_`.
+/// Numbers that layout.glsl gives to constants, by the constants' names without `CONSTANT_`.
 pub type Numbers = BTreeMap<String, u32>;
 
 /// Reads the numbers from layout.glsl.
 ///
 /// # Errors
-/// Two constants have the same number; a number is none.
+/// Two constants have the same number, or what follows a name is not a number.
 pub fn numbers(layout: &str) -> Result<Numbers, String> {
     let mut numbers = Numbers::new();
     for line in layout.lines() {
@@ -41,7 +43,8 @@ pub fn numbers(layout: &str) -> Result<Numbers, String> {
 /// Reads the constants that one file declares, without those of the files that it includes.
 ///
 /// # Errors
-/// A constant without a number in layout.glsl, with the number of another one, or of a type that Rust does not know.
+/// A constant has no number in layout.glsl, it has the number of another one, or Rust does not know its type. A
+/// declaration is not written as this file expects.
 pub fn declarations(file: &str, source: &str, numbers: &Numbers) -> Result<Vec<Declaration>, String> {
     let mut declarations = Vec::new();
     for (line_ix, line) in source.lines().enumerate() {
@@ -66,7 +69,7 @@ pub fn declarations(file: &str, source: &str, numbers: &Numbers) -> Result<Vec<D
     Ok(declarations)
 }
 
-/// Writes the constants of all shaders as Rust, and for each shader, the names of those that it declares.
+/// Generates Rust for the constants of all shaders, with the names of the constants that each shader declares.
 ///
 /// # Errors
 /// Two shaders give one constant different types.

@@ -1,4 +1,4 @@
-//! A scene as it is traced: world-space triangles, and materials and lights as kernels read them.
+//! Flat scenes: world-space triangles, and materials and lights as kernels read them.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -12,26 +12,27 @@ use crate::{
     scene::{self, Camera, Instance, Lobes, Mesh, RenderDefaults, Scene},
 };
 
-/// Everything that a frame shows, with all meshes in world space.
+/// Scene as it is traced: everything that a frame shows, with all meshes in world space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FlatScene {
     /// The scene's name.
     pub name: String,
-    /// World space: those of the first instance, in the order of its mesh's faces, then those of the next.
+    /// The triangles in world space. Those of the first instance come first, in the order of its mesh's faces, then
+    /// those of the next instance.
     pub triangles: Vec<Triangle>,
-    /// For each triangle, its index into `materials`.
+    /// For each triangle, the index of its material in `materials`.
     pub triangle_materials: Vec<u32>,
-    /// Materials as kernels read them.
+    /// The materials.
     pub materials: Vec<Material>,
-    /// One for each material.
+    /// The name of each material.
     pub material_names: Vec<String>,
-    /// May be none.
+    /// The lights; there may be none.
     pub lights: Vec<Light>,
     /// The camera that renders the scene unless another one is set.
     pub camera: Camera,
-    /// Irradiance that every point receives, weighted by its Ka.
+    /// The irradiance that every point receives, which is weighted by the point's Ka.
     pub ambient: Vec3,
-    /// Radiance of rays that leave the scene.
+    /// The radiance of rays that leave the scene.
     pub background: Vec3,
     /// The options that the scene is rendered with unless others are set.
     pub defaults: RenderDefaults,
@@ -41,7 +42,7 @@ impl FlatScene {
     /// Places all meshes of a scene in the world, on the current rayon pool.
     ///
     /// # Errors
-    /// An index that names nothing, arrays of different lengths, or a vertex too far from the origin.
+    /// An index names nothing, arrays have different lengths, or a vertex is too far from the origin.
     pub fn new(scene: &Scene) -> Result<Self, Mismatch> {
         let mut triangles = Vec::with_capacity(scene.n_triangles());
         let mut triangle_materials = Vec::with_capacity(triangles.capacity());
@@ -67,14 +68,15 @@ impl FlatScene {
         })
     }
 
-    /// The smallest and the largest coordinates of all triangles.
+    /// Returns the smallest and the largest coordinates of all triangles, world units. Without triangles these are
+    /// infinity and minus infinity.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         let corners = self.triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]);
         corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
     }
 }
 
-/// Checks that a mesh's arrays belong together, and that there is a material for its faces.
+/// Checks that a mesh's arrays belong together, and that its faces have a material.
 fn check(mesh: &Mesh, instance: &Instance) -> Result<(), String> {
     let Mesh { positions, faces, normals, slots } = mesh;
     if (normals.len(), slots.len()) != (faces.len(), faces.len()) {
@@ -89,7 +91,7 @@ fn check(mesh: &Mesh, instance: &Instance) -> Result<(), String> {
     }
 }
 
-/// Adds a world-space triangle for each face, in their order.
+/// Appends a world-space triangle for each face, in the order of the faces.
 fn push_triangles(mesh: &Mesh, instance: &Instance, triangles: &mut Vec<Triangle>) -> Result<(), String> {
     let transform = &instance.transform;
     let world = mesh.placed(transform)?;
@@ -119,7 +121,7 @@ impl From<&scene::Material> for Material {
     }
 }
 
-/// The flags of a [`Material`].
+/// Returns the flags of a [`Material`].
 fn flags_of(lobes: Lobes) -> u32 {
     let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
     flag(lobes.highlight, MATERIAL_SPECULAR)

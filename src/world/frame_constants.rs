@@ -1,10 +1,10 @@
-//! What the kernels are told of a world and of a frame of it.
+//! Constants of a frame of a world, as the kernels read them.
 
 use crate::{frame::RenderOptions, layout::Frame, world::World};
 
 impl World {
-    /// The constants of a frame that shows each pixel's first sample from the scene's own camera. `queue_capacity` is
-    /// left 0: who makes the queues sets it.
+    /// Returns the constants of a frame that shows the first sample of each pixel from the scene's own camera.
+    /// `queue_capacity` is left 0; the code that makes the queues sets it.
     pub fn frame_constants(&self, options: &RenderOptions) -> Frame {
         let scene = self.scene();
         let mut frame = Frame {

@@ -3,7 +3,8 @@
 use super::{Mismatch, World};
 use crate::{accel::Accel, layout::Triangle};
 
-/// Borrowed triangles and the acceleration structure over them; every index in the structure names one of the triangles.
+/// Borrowed triangles and the acceleration structure over them. Every index in the structure names one of the
+/// triangles.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry<'a> {
     triangles: &'a [Triangle],
@@ -14,7 +15,7 @@ impl<'a> Geometry<'a> {
     /// Joins triangles and the structure that was built from them.
     ///
     /// # Errors
-    /// The structure is one of more or fewer triangles.
+    /// The structure was built from more or fewer triangles.
     pub fn new(triangles: &'a [Triangle], accel: &'a Accel) -> Result<Self, Mismatch> {
         match (accel.n_triangles(), triangles.len()) {
             (of_accel, given) if of_accel == given => Ok(Self { triangles, accel }),

@@ -1,4 +1,4 @@
-//! Parts of a world that do not fit together.
+//! Errors of worlds whose parts do not fit together.
 
 use super::FlatScene;
 use crate::gpu::GpuError;
@@ -6,20 +6,20 @@ use crate::gpu::GpuError;
 /// Why a scene's arrays, or its triangles and their structure, do not fit together.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Mismatch {
-    /// The acceleration structure is one of other triangles.
+    /// The acceleration structure was built from more or fewer triangles.
     #[error("the acceleration structure was built from {accel} triangles, but {triangles} are given with it")]
     Accel {
-        /// Triangles that the structure was built from.
+        /// The number of triangles that the structure was built from.
         accel: usize,
-        /// Triangles that are given.
+        /// The number of triangles that are given.
         triangles: usize,
     },
-    /// The scene does not have one entry of `triangle_materials` a triangle.
+    /// The scene's `triangle_materials` does not have one entry for each triangle.
     #[error("triangle_materials has {triangle_materials} entries for {triangles} triangles")]
     TriangleMaterials {
-        /// Entries.
+        /// The number of entries.
         triangle_materials: usize,
-        /// Triangles.
+        /// The number of triangles.
         triangles: usize,
     },
     /// An instance of a scene names a mesh that the scene does not have.
@@ -36,12 +36,12 @@ pub enum Mismatch {
         /// What is wrong with it.
         what: String,
     },
-    /// A triangle's material is missing.
+    /// The material of a triangle is missing.
     #[error("triangle {triangle} has material {material}, but there are {materials} materials")]
     Material {
         /// Index of the triangle.
         triangle: usize,
-        /// Index of its material.
+        /// Index of the triangle's material.
         material: u32,
         /// Number of materials.
         materials: usize,
@@ -57,7 +57,7 @@ impl From<Mismatch> for GpuError {
 /// Checks that every triangle has a material, in one pass over `triangle_materials`.
 ///
 /// # Errors
-/// The first thing that does not fit.
+/// The first mismatch.
 pub(super) fn check_materials(scene: &FlatScene) -> Result<(), Mismatch> {
     let (triangle_materials, triangles) = (scene.triangle_materials.len(), scene.triangles.len());
     if triangle_materials != triangles {

@@ -1,4 +1,5 @@
-//! What is rendered: a scene with the acceleration structure over its triangles, consistent by construction.
+//! Worlds: what is rendered. A world is a scene with the acceleration structure over its triangles, and is consistent
+//! by construction.
 
 mod flat;
 mod frame_constants;
@@ -22,8 +23,8 @@ use crate::{
 /// A scene and its acceleration structure.
 ///
 /// Kernels read both without bounds checks. So a world checks that every index of the scene names an element of its
-/// arrays, builds the structure itself or checks that it fits, and nothing can change either of them afterwards. A clone
-/// is a second handle to the same world.
+/// arrays. It builds the structure itself, or checks that the structure fits. Nothing can change either of them
+/// afterwards. A clone is a second handle to the same world.
 #[derive(Clone, Debug)]
 pub struct World(Arc<Parts>);
 
@@ -38,7 +39,7 @@ impl World {
     /// Flattens a scene and builds its kd-tree on the current rayon pool.
     ///
     /// # Errors
-    /// The scene does not fit together: see [`Mismatch`].
+    /// The scene's parts do not fit together: see [`Mismatch`].
     pub fn new(scene: &Scene, build_options: &BuildOptions) -> Result<Self, Mismatch> {
         Self::of_flat(FlatScene::new(scene)?, build_options)
     }
@@ -64,7 +65,7 @@ impl World {
     /// Joins a scene and a kd-tree that was built elsewhere, with `build_options`.
     ///
     /// # Errors
-    /// The scene has a triangle without a material; the tree is one of more or fewer triangles.
+    /// The scene has a triangle without a material, or the tree was built from more or fewer triangles.
     pub fn with_tree(scene: FlatScene, tree: KdTree, build_options: &BuildOptions) -> Result<Self, Mismatch> {
         mismatch::check_materials(&scene)?;
         let (accel, accel_options) = (Accel::KdTree(tree), AccelOptions::KdTree(build_options.clone()));
@@ -72,7 +73,7 @@ impl World {
         Ok(Self(Arc::new(Parts { scene, accel, accel_options })))
     }
 
-    /// The scene as it is traced.
+    /// The flattened scene.
     pub fn scene(&self) -> &FlatScene {
         &self.0.scene
     }
@@ -85,12 +86,12 @@ impl World {
     /// The kd-tree over the scene's triangles.
     ///
     /// # Panics
-    /// The acceleration structure is another one.
+    /// The acceleration structure is a grid.
     pub fn tree(&self) -> &KdTree {
         self.0.accel.as_kdtree().expect("the world has a kd-tree")
     }
 
-    /// The least and the greatest corner of a box that holds all triangles (world units).
+    /// The least and the greatest corner of a box that holds all triangles, world units.
     pub fn bounds(&self) -> [Vec3; 2] {
         self.0.accel.bounds()
     }
@@ -100,7 +101,8 @@ impl World {
         &self.0.accel_options
     }
 
-    /// The acceleration structure in numbers. If no device has built a grid, the host builds it for them.
+    /// Computes the statistics of the acceleration structure. If no device has built a grid, the host builds it for
+    /// this.
     pub fn statistics(&self) -> Statistics {
         let Parts { scene, accel, accel_options } = &*self.0;
         match (accel, accel_options) {
@@ -112,7 +114,7 @@ impl World {
         }
     }
 
-    /// What the first device that has built the world's grid tells of it.
+    /// The report of the first device that has built the world's grid, if there is one.
     pub fn grid_build(&self) -> Option<&DeviceBuild> {
         match &self.0.accel {
             Accel::KdTree(_) => None,
@@ -120,7 +122,7 @@ impl World {
         }
     }
 
-    /// The triangles and their acceleration structure, which is all that casting rays needs.
+    /// The triangles and their acceleration structure, which are all that a cast of rays needs.
     pub fn geometry(&self) -> Geometry<'_> {
         Geometry::of_world(self)
     }

@@ -1,4 +1,4 @@
-//! The build: pairs of a cell and a triangle, which are then put in the order of the cells.
+//! Build of grids: makes the pairs of a cell and a triangle in it, and puts them in the order of the cells.
 
 use rayon::prelude::*;
 
@@ -11,21 +11,21 @@ use crate::{
 /// The index of a cell and the index of a triangle.
 type Pair = (u32, u32);
 
-/// What all steps of a build read.
+/// Inputs of all steps of a build.
 struct Input<'a> {
     triangles: &'a [Triangle],
-    /// How far outside a cell a triangle still counts as inside ([`Bounds::margin`]).
+    /// Distance from a cell within which a triangle counts as inside the cell, world units ([`Bounds::margin`]).
     margin: f32,
     max_references: u32,
 }
 
-/// A number of columns, pairs or cells, and the limit that it is above.
+/// A number of columns, pairs or cells that is above its limit.
 struct TooMany {
     count: u64,
     limit: u32,
 }
 
-/// A triangle and the lattice whose cells get it.
+/// A triangle and the lattice whose cells it is sorted into.
 struct Item {
     triangle_ix: u32,
     lattice: Lattice,
@@ -33,17 +33,17 @@ struct Item {
     first_cell: u32,
 }
 
-/// Cells and, in their order, the pairs of the lowest of them.
+/// The cells of all levels so far and, in the order of the lowest level's cells, their pairs.
 struct Level {
     cells: Vec<GridCell>,
     pairs: Vec<Pair>,
-    /// How many times the cells' edges were doubled to keep to the limits.
+    /// The number of times that the cells' edges were doubled to keep to the limits.
     n_coarser: u32,
 }
 
 impl Grid {
-    /// Builds the grid of `triangles`. Triangles without area are in it, and those with a corner that is not finite are
-    /// not.
+    /// Builds the grid of `triangles`. Triangles without area are in it, and those with a corner that is not finite
+    /// are not.
     ///
     /// The same triangles and options give the same grid on any number of threads.
     pub fn build(triangles: &[Triangle], options: &GridOptions) -> Self {
@@ -124,7 +124,8 @@ fn lower_level(input: &Input, lattice: &Lattice, upper: Level, density: f32) -> 
     unreachable!("blocks of one cell keep to the limits")
 }
 
-/// Returns the upper cells as blocks of so many cells along each axis, and the number of the blocks' cells.
+/// Returns the upper cells as blocks, and the number of all blocks' cells. `resolution`: the number of a block's
+/// cells along each axis.
 fn blocks_of(n_upper: u32, resolution: impl Fn(usize) -> u32) -> (Vec<GridCell>, u64) {
     let mut n_lower = 0;
     let block = |ix: usize| {
@@ -135,14 +136,14 @@ fn blocks_of(n_upper: u32, resolution: impl Fn(usize) -> u32) -> (Vec<GridCell>,
     ((0..n_upper as usize).map(block).collect(), n_lower)
 }
 
-/// Returns the most cells along each axis of a block that has no more than `max_cells` of them, none smaller than the
-/// margin.
+/// Returns the largest number of cells along each axis with which a block has no more than `max_cells` cells, and
+/// none smaller than the margin.
 fn finest_resolution(input: &Input, upper: &Lattice, max_cells: f32) -> u32 {
     let fits = |r: u32| (r * r * r) as f32 <= max_cells && upper.cell_size_within(r) >= input.margin;
     (2..=GRID_MAX_BLOCK_RESOLUTION).take_while(|&r| fits(r)).last().unwrap_or(1)
 }
 
-/// Returns the pairs of all items in the order of the items, their columns and the columns' cells.
+/// Returns the pairs of all items, in the order of the items, of each item's columns and of each column's cells.
 ///
 /// # Errors
 /// There are too many columns or pairs.
@@ -164,16 +165,17 @@ fn pairs_of(input: &Input, n_items: usize, item: impl Fn(usize) -> Option<Item> 
     Ok(pairs)
 }
 
+/// Checks a count against its limit.
 fn check(count: u64, limit: u32) -> Result<(), TooMany> {
     if count <= u64::from(limit) { Ok(()) } else { Err(TooMany { count, limit }) }
 }
 
 impl TooMany {
-    /// Returns how many times the cells' edges are doubled for the next attempt. At each doubling, the number of cells
-    /// that a surface meets falls to about a quarter. The more attempts have failed, the farther the next one goes, and
-    /// the last one has cells that are as large as can be.
+    /// Returns how many times the cells' edges are doubled for the next attempt. At each doubling, the number of
+    /// cells that a surface meets falls to about a quarter. The more attempts have failed, the more doublings there
+    /// are. The last attempt has the largest possible cells.
     ///
-    /// `n_attempts`: how many attempts there have been.
+    /// `n_attempts`: the number of failed attempts.
     fn n_steps(&self, n_attempts: u32) -> u32 {
         if n_attempts + 1 >= GRID_MAX_ATTEMPTS {
             return 32;
@@ -190,7 +192,7 @@ fn in_order(mut pairs: Vec<Pair>) -> Vec<Pair> {
     pairs
 }
 
-/// Returns cells whose entries are the pairs' triangles. `first_cell`: the index of the first of them.
+/// Returns cells whose entries are the pairs' triangles. `first_cell`: the index of the first cell.
 fn cells_of(n_cells: usize, first_cell: u32, pairs: &[Pair]) -> Vec<GridCell> {
     let mut cells = vec![GridCell::default(); n_cells];
     for (entry_ix, &(cell_ix, _)) in pairs.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Cubes of one size that fill a box, and how large they are.
+//! Lattices: cubes of one size that fill a box. The cubes are the cells of a grid, or of a block.
 
 use glam::Vec3;
 
@@ -7,7 +7,8 @@ use crate::{
     layout::{AccelConstants, GRID_MAX_RESOLUTION, KD_PLANE_EPSILON},
 };
 
-/// Cubes side by side that fill a box from its least corner on. At its greatest corner the box may cut some of them.
+/// Cubes side by side that fill a box, beginning at its least corner. At its greatest corner the box may cut some of
+/// the cubes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
     /// The box's least corner, world units.
@@ -21,12 +22,12 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// The lattice of the smallest cubes of which no more than `max_cells` fill a box, and which are not smaller than
-    /// the margin of the box.
+    /// Returns the lattice of the smallest cubes with which the box has no more than `max_cells` cubes, each no
+    /// smaller than the margin of the box.
     pub fn of_density(bounds: &Bounds, max_cells: u32) -> Self {
         let margin = bounds.margin();
-        // The bits of positive numbers have the same order as the numbers. The search finds the highest bits first:
-        // cubes of the size that `bits` stand for are always too small.
+        // The bits of positive floats, as integers, have the same order as the floats. The search fixes the highest
+        // bits first. Cubes of the size with these bits are always too small.
         let mut bits = 0;
         for bit in (0..31).rev() {
             let next = f32::from_bits(bits | (1 << bit));
@@ -37,8 +38,8 @@ impl Lattice {
         Self::of_size(bounds, f32::from_bits(bits + 1).min(f32::MAX))
     }
 
-    /// The lattice of cubes of a size that [`Lattice::of_density`] has found, or of a larger one. Cubes of the largest
-    /// size are taken to reach from one side of any box to the other.
+    /// Returns the lattice of cubes of a size that [`Lattice::of_density`] has found, or of a larger one. A cube of
+    /// the largest size counts as filling any box.
     fn of_size(bounds: &Bounds, cell_size: f32) -> Self {
         let mut lattice = Self { min: bounds.min, max: bounds.max, cell_size, n_cells: [1; 3] };
         if cell_size < f32::MAX {
@@ -47,8 +48,8 @@ impl Lattice {
         lattice
     }
 
-    /// The lattice of cubes that are 2^n as long, or as long as it takes for one cube to fill the box, if that is less.
-    /// Also returns n.
+    /// Returns the lattice after doubling the edges of the cubes n times, and n. This is `n_doublings`, or fewer if
+    /// one cube fills the box before.
     pub fn coarser(&self, n_doublings: u32) -> (Self, u32) {
         let bounds = Bounds { min: self.min, max: self.max };
         let mut lattice = *self;
@@ -61,13 +62,15 @@ impl Lattice {
         (lattice, n_doublings)
     }
 
+    /// Whether cubes of a size fill the box within the limits: at most `GRID_MAX_RESOLUTION` on each axis,
+    /// `max_cells` in all.
     fn fits(bounds: &Bounds, cell_size: f32, max_cells: u32) -> bool {
         let [n_x, n_y, n_z] = [0, 1, 2].map(|axis| Self::n_cubes_along(bounds, axis, cell_size));
         n_x.max(n_y).max(n_z) <= GRID_MAX_RESOLUTION && n_x * n_y * n_z <= max_cells.max(1)
     }
 
-    /// The least number of cubes that reach from one side of the box to the other; more than `GRID_MAX_RESOLUTION` for
-    /// any such number.
+    /// Returns the least number of cubes that reach from one side of the box to the other. If this is more than
+    /// `GRID_MAX_RESOLUTION`, the result is some number above that.
     fn n_cubes_along(bounds: &Bounds, axis: usize, cell_size: f32) -> u32 {
         let mut n_too_few = 0;
         for bit in (0..=GRID_MAX_RESOLUTION.ilog2()).rev() {
@@ -79,22 +82,24 @@ impl Lattice {
         n_too_few + 1
     }
 
-    /// The coordinate at which the cubes of index `i` on an axis begin, and those before them end.
+    /// Returns the coordinate at which the cubes of index `i` on an axis begin and those before them end, world
+    /// units.
     #[inline(always)]
     pub fn plane(&self, axis: usize, i: u32) -> f32 {
         let at = self.min[axis] + i as f32 * self.cell_size;
         if self.max[axis] < at { self.max[axis] } else { at }
     }
 
-    /// About the index on an axis of the cubes that have a coordinate: the quotient is not exact on a device.
+    /// Returns an estimate of the index on an axis of the cubes that contain a coordinate. It may be off, since
+    /// quotients on a device are not exact.
     #[inline(always)]
     pub fn index_near(&self, axis: usize, at: f32) -> u32 {
-        // A cast of a negative number, or of a NaN, is 0.
+        // A negative number and a NaN are cast to 0.
         (((at - self.min[axis]) / self.cell_size) as u32).min(self.n_cells[axis] - 1)
     }
 
-    /// The first and the last index of the closed cubes that meet an interval on an axis. An interval outside the box
-    /// meets the cubes at the box's side.
+    /// Returns the first and the last index of the closed cubes that meet an interval on an axis. An interval outside
+    /// the box meets the cubes at the box's side.
     pub fn indices_in(&self, axis: usize, least: f32, greatest: f32) -> [u32; 2] {
         let last_ix = self.n_cells[axis] - 1;
         let mut first = self.index_near(axis, least);
@@ -114,7 +119,7 @@ impl Lattice {
         [first, last]
     }
 
-    /// The place of a cube in the order of all: x fastest, then y.
+    /// Returns the index of a cube in the order of all cubes: x fastest, then y.
     #[inline(always)]
     pub fn place_of(&self, [x, y, z]: [u32; 3]) -> u32 {
         x + self.n_cells[0] * (y + self.n_cells[1] * z)
@@ -125,7 +130,7 @@ impl Lattice {
         self.n_cells.iter().map(|&n| n as usize).product()
     }
 
-    /// The lattice that cuts a cube into `resolution` cubes along each axis.
+    /// Returns the lattice that cuts a cube into `resolution` cubes along each axis.
     pub fn within(&self, cell: [u32; 3], resolution: u32) -> Self {
         Self {
             min: [0, 1, 2].map(|axis| self.plane(axis, cell[axis])),
@@ -135,21 +140,21 @@ impl Lattice {
         }
     }
 
-    /// The edge's length of the cubes that a cube is cut into.
+    /// Returns the edge's length of the cubes into which a cube is cut, world units.
     ///
-    /// 1 / resolution is rounded up to a multiple of 2^-16, which takes integers alone: the last bit of a quotient of
+    /// 1 / resolution is rounded up to a multiple of 2^-16 by integer arithmetic, since the last bit of a quotient of
     /// floats is not the same on every device. So the last cube along each axis is up to 2 % smaller than the others.
     pub fn cell_size_within(&self, resolution: u32) -> f32 {
         self.cell_size * ((1_u32 << 16).div_ceil(resolution) as f32 * (1.0 / 65_536.0))
     }
 
-    /// The indices of the cube at a place.
+    /// Returns a cube's indices on the axes from its index in the order of all cubes.
     pub fn cube_at(&self, place: u32) -> [u32; 3] {
         let [n_x, n_y, _] = self.n_cells;
         [place % n_x, place / n_x % n_y, place / n_x / n_y]
     }
 
-    /// What kernels know of a grid with these cells on its upper level.
+    /// Returns the uniform constants that kernels need of a grid with these cells on its upper level.
     pub fn constants(&self) -> AccelConstants {
         let [cell_min, cell_max] = self.bounds();
         let [n_cells_x, n_cells_y, n_cells_z] = self.n_cells;
@@ -165,12 +170,12 @@ impl Lattice {
         }
     }
 
-    /// The least and the greatest corner of the box.
+    /// The least and the greatest corner of the box, world units.
     pub fn bounds(&self) -> [Vec3; 2] {
         [self.min.into(), self.max.into()]
     }
 
-    /// The largest magnitude among the coordinates of the box.
+    /// The largest magnitude of the box's coordinates, world units.
     pub fn largest_coordinate(&self) -> f32 {
         self.min.iter().chain(&self.max).fold(0.0, |largest: f32, x| largest.max(x.abs()))
     }

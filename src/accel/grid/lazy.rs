@@ -1,5 +1,5 @@
-//! A grid of which the host knows how it is built. A device builds it for itself; the host does, too, when it needs the
-//! grid. Both have the same bits.
+//! Grids that are built when they are needed. The host keeps the options; each device builds the grid for itself, and
+//! the host builds one when it needs it. Both grids have the same bits.
 
 use std::sync::OnceLock;
 
@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::{Grid, GridOptions, Statistics};
 use crate::{accel::bounds::Bounds, layout::Triangle};
 
-/// How a grid over some triangles is built, and what has been learnt of it so far.
+/// Options of a grid over some triangles, with what is known of the grid so far.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LazyGrid {
     options: GridOptions,
@@ -19,29 +19,29 @@ pub struct LazyGrid {
     on_device: OnceLock<DeviceBuild>,
 }
 
-/// What a device tells of a grid that it has built.
+/// Report of a device on a grid that it has built.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeviceBuild {
-    /// The grid in numbers.
+    /// The grid's statistics.
     #[serde(skip)]
     pub statistics: Statistics,
-    /// The milliseconds of the build; none where the device has no timestamps.
+    /// The duration of the build, milliseconds; none if the device has no timestamps.
     pub ms: Option<f64>,
-    /// The stages in the order of execution.
+    /// The stages of the build, in the order of execution.
     pub stages: Vec<BuildStage>,
 }
 
-/// A kernel of a build, all of its dispatches together.
+/// Stage of a build: all dispatches of one kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BuildStage {
     /// The kernel's name.
     pub name: &'static str,
-    /// Milliseconds; none where the device has no timestamps.
+    /// The duration of the stage, milliseconds; none if the device has no timestamps.
     pub ms: Option<f64>,
 }
 
 impl LazyGrid {
-    /// Notes how the grid of these triangles is to be built.
+    /// Makes a grid that is not built yet over these triangles.
     pub fn new(triangles: &[Triangle], options: GridOptions) -> Self {
         let bounds = Bounds::of_all(triangles);
         let Bounds { min, max } = bounds.grown(bounds.margin());
@@ -54,27 +54,29 @@ impl LazyGrid {
         }
     }
 
-    /// The host's grid. The first call builds it on the current rayon pool.
+    /// Returns the host's grid, which the first call builds on the current rayon pool. `triangles`: those of
+    /// [`LazyGrid::new`].
     ///
     /// # Panics
-    /// There are more or fewer triangles than the grid is over.
+    /// There are more or fewer triangles than [`LazyGrid::new`] was given.
     pub fn get(&self, triangles: &[Triangle]) -> &Grid {
         assert_eq!(triangles.len(), self.n_triangles, "the triangles of the grid");
         self.on_host.get_or_init(|| Grid::build(triangles, &self.options))
     }
 
-    /// Keeps what a device tells of its build, if it is the first one.
+    /// Keeps a device's report, if it is the first one.
     pub(crate) fn note(&self, build: DeviceBuild) {
-        // Later builds are over the same triangles by the same options.
+        // Later builds have the same triangles and options, so their statistics are the same.
         let _ = self.on_device.set(build);
     }
 
-    /// What the first device that has built the grid tells of it.
+    /// The report of the first device that has built the grid, if there is one.
     pub fn device_build(&self) -> Option<&DeviceBuild> {
         self.on_device.get()
     }
 
-    /// The grid in numbers, by a device that has built it. If there is none, the host builds the grid.
+    /// Returns the grid's statistics, from a device that has built it if there is one. If there is none, the host
+    /// builds the grid.
     pub fn statistics(&self, triangles: &[Triangle]) -> Statistics {
         match self.on_device.get() {
             Some(build) => build.statistics.clone(),
@@ -82,17 +84,17 @@ impl LazyGrid {
         }
     }
 
-    /// How the grid is built.
+    /// The options that the grid is built with.
     pub fn options(&self) -> &GridOptions {
         &self.options
     }
 
-    /// The number of triangles that the grid is over.
+    /// The number of triangles that the grid is made for.
     pub fn n_triangles(&self) -> usize {
         self.n_triangles
     }
 
-    /// The least and the greatest corner of the grid's box, which holds all triangles (world units).
+    /// The least and the greatest corner of the grid's box, which holds all triangles, world units.
     pub fn bounds(&self) -> [Vec3; 2] {
         self.bounds
     }

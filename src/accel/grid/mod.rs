@@ -1,6 +1,6 @@
-//! Grids. A uniform grid is a box that is cut into cubes of one size, its cells, each with a list of the triangles that
-//! come near to it. In a grid of two levels, each cell of the upper level is cut once more, into a block of cells, the
-//! finer the more triangles it has.
+//! Grids. A uniform grid is a box that is cut into cubes of one size, its cells. Each cell has a list of the
+//! triangles that come near to it. In a grid of two levels, each cell of the upper level is cut once more, into a
+//! block of cells. The more triangles the upper cell has, the finer is its block.
 //!
 //! ```text
 //! triangles ─> lattice ───> overlap ─────────> build ─> Grid
@@ -9,7 +9,7 @@
 //! ```
 //!
 //! The build is the twin of the kernels that build grids on a device (passes/grid): both make the same grid, bit for
-//! bit. So its arithmetic is that of f32, no division's last bit matters, and whatever it adds up or sorts has a fixed
+//! bit. So its arithmetic is in f32, no result depends on a division's last bit, and all sums and sorts have a fixed
 //! order.
 //!
 //! Kalojanov and Slusallek, "A parallel algorithm for construction of uniform grids", 2009; Kalojanov, Billeter and
@@ -31,7 +31,7 @@ pub use self::{
 };
 use crate::layout::{AccelConstants, GRID_COLUMNS_PER_REFERENCE, GRID_MAX_COUNT, GridCell, Plane};
 
-/// A grid over triangles, as the kernels read it. It comes from [`Grid::build`] alone, and nothing can change it
+/// A grid over triangles, as the kernels read it. Only [`Grid::build`] makes one, and nothing can change it
 /// afterwards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
@@ -44,32 +44,32 @@ pub struct Grid {
     n_coarser: u32,
 }
 
-/// How a grid is built.
+/// Build options of a grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GridOptions {
-    /// The levels of cells, and how many cells they have.
+    /// The levels of cells, and the densities of their cells.
     pub levels: GridLevels,
-    /// The most references as a multiple of the number of triangles; 1024 more are allowed in any case. Where a grid
-    /// would have more, its cells become larger.
+    /// Limit of the number of references, as a multiple of the number of triangles; 1024 more are always allowed. A
+    /// grid that would have more references gets larger cells.
     pub max_references_per_triangle: u32,
-    /// The most references of all triangles together, but no less than one for each triangle. A device sets it to what
+    /// Limit of the number of references. One for each triangle is always allowed. A device sets the limit to what
     /// its memory holds.
     pub max_references: u32,
 }
 
-/// The levels of a grid's cells.
+/// Levels of a grid's cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GridLevels {
     /// One level.
     Uniform {
-        /// The number of cells for each triangle.
+        /// The number of cells divided by the number of triangles.
         density: f32,
     },
     /// Two levels: each cell of the upper level is cut into a block of cells.
     Two {
-        /// The number of cells of the upper level for each triangle.
+        /// The number of cells of the upper level divided by the number of triangles.
         upper_density: f32,
-        /// The number of cells of a block for each triangle of its upper cell.
+        /// The number of cells of a block divided by the number of triangles of its upper cell.
         lower_density: f32,
     },
 }
@@ -83,7 +83,7 @@ impl GridLevels {
         }
     }
 
-    /// The number of cells for each triangle, of the only level or of the upper one.
+    /// The number of cells divided by the number of triangles, for the only level or the upper one.
     pub fn upper_density(&self) -> f32 {
         match *self {
             Self::Uniform { density } => density,
@@ -93,37 +93,38 @@ impl GridLevels {
 }
 
 impl GridOptions {
-    /// A uniform grid.
+    /// Returns the options of a uniform grid.
     pub fn uniform() -> Self {
         let levels = GridLevels::Uniform { density: 4.0 };
         Self { levels, max_references_per_triangle: 8, max_references: 1 << 28 }
     }
 
-    /// A grid of two levels.
+    /// Returns the options of a grid of two levels.
     pub fn two_level() -> Self {
         Self { levels: GridLevels::Two { upper_density: 1.0 / 32.0, lower_density: 2.0 }, ..Self::uniform() }
     }
 
-    /// The most references that a grid of so many triangles may have.
+    /// Returns the most references that a grid of `n_triangles` triangles may have.
     pub(crate) fn max_references_of(&self, n_triangles: usize) -> u32 {
         let n_triangles = n_triangles as u64;
         let most = n_triangles * u64::from(self.max_references_per_triangle) + 1024;
         most.min(u64::from(self.max_references)).max(n_triangles).min(u64::from(GRID_MAX_COUNT)) as u32
     }
 
-    /// The most columns of cells that the boxes of triangles may take in a grid of so many references at the most.
+    /// Returns the most columns of cells that the boxes of all triangles may take together, in a grid of at most
+    /// `max_references` references.
     pub(crate) fn max_columns_of(max_references: u32) -> u32 {
         max_references.saturating_mul(GRID_COLUMNS_PER_REFERENCE).min(GRID_MAX_COUNT)
     }
 }
 
 impl Grid {
-    /// What kernels know of a grid beside its arrays.
+    /// Returns the uniform constants that kernels need beside the grid's arrays.
     pub fn constants(&self) -> AccelConstants {
         self.lattice.constants()
     }
 
-    /// The cells of the upper level.
+    /// The lattice of the upper level's cells.
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }
@@ -133,23 +134,23 @@ impl Grid {
         self.n_levels
     }
 
-    /// The cells of the upper level, x fastest, then y; after them the cells of the lower level, block by block in the
-    /// order of the upper cells. See [`GridCell`] for what a cell says.
+    /// The cells of the upper level, x fastest, then y. After them come the cells of the lower level, block by block
+    /// in the order of the upper cells. [`GridCell`] says what the members mean.
     pub fn cells(&self) -> &[GridCell] {
         &self.cells
     }
 
-    /// The triangles' indices, cell after cell, ascending in each cell.
+    /// The indices of the triangles, cell after cell, ascending in each cell.
     pub fn leaf_triangles(&self) -> &[u32] {
         &self.leaf_triangles
     }
 
-    /// The plane of each of [`Grid::leaf_triangles`].
+    /// The plane of each triangle in [`Grid::leaf_triangles`].
     pub fn leaf_planes(&self) -> &[Plane] {
         &self.leaf_planes
     }
 
-    /// The least and the greatest corner of the grid's box, which holds all triangles (world units).
+    /// The least and the greatest corner of the grid's box, which holds all triangles, world units.
     pub fn bounds(&self) -> [Vec3; 2] {
         self.lattice.bounds()
     }

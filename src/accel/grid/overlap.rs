@@ -1,35 +1,35 @@
-//! Which cubes of a lattice a triangle comes near to.
+//! Overlap of triangles and lattices: finds the cubes that a triangle comes near to.
 //!
-//! The triangle's box is cut into columns of cubes along the axis that the triangle's normal points along most. A
-//! column is skipped if the triangle is beside it, as seen along that axis. Within a column, the triangle's plane is in
-//! few cubes. Each of these is tested against the plane, and against the triangle as seen along the other two axes
+//! The triangle's box is cut into columns of cubes along the axis on which the triangle's normal is longest. A column
+//! is skipped if the triangle is beside it, as seen along that axis. Within a column, the triangle's plane meets few
+//! cubes. Each of these is tested against the plane, and against the triangle as seen along the other two axes
 //! (Schwarz and Seidel, "Fast parallel surface and solid voxelization on GPUs", 2010).
 
 use super::Lattice;
 use crate::{accel::bounds::Bounds, layout::Triangle};
 
-/// A triangle counts as inside a cube if it comes nearer than this times the margin of the triangles' box. The
-/// traversal needs the margin itself (bounds.rs). The sixteenth more is 8 units of 2^-24 times the largest coordinate,
-/// of which the rounding of the cubes' middles and half edges takes 4.
+/// Factor on the margin of the triangles' box. A triangle that comes nearer to a cube than this counts as inside it.
+/// The traversal needs the margin itself (bounds.rs). The additional sixteenth is 8 units of 2^-24 times the largest
+/// coordinate. The rounding of the cubes' middles and half edges takes 4 of these.
 const MARGIN_FACTOR: f32 = 1.0625;
-/// How far a rounded product of vectors is off, as a multiple of the product of the vectors' sums of magnitudes: 16
-/// units of 2^-24. The rounding of an edge takes 1 unit, that of a product of two components 1, that of their
-/// difference 1: together 4 for a normal. Its product with a third vector adds 4.
+/// Error of a rounded product of two vectors, as a multiple of the product of their sums of magnitudes: 16 units of
+/// 2^-24. For a normal the error is 4 units: the rounding of an edge takes 1 unit, that of a product of two
+/// components 1, that of their difference 1. The product of a normal with a third vector adds 4.
 const PRODUCT_ERROR: f32 = 1.0 / (1 << 20) as f32;
 
-/// A triangle and the columns of its box. The axes are turned so that columns extend along the last one.
+/// A triangle and the columns of its box. The axes are permuted so that columns extend along the last one.
 pub struct Columns {
     lattice: Lattice,
     corners: [[f32; 3]; 3],
-    /// The product of two edges, which is not of unit length.
+    /// The cross product of two edges, which is not of unit length.
     normal: [f32; 3],
     /// A bound of the error of the normal's components.
     normal_error: f32,
-    /// Half of a cube's edge, and the margin.
+    /// The sum of half of a cube's edge and the margin, world units.
     half: f32,
     /// The first and the last index of the box's cubes on each axis.
     range: [[u32; 2]; 3],
-    /// The lattice's own axis that is the last one here.
+    /// The axis of the lattice that is the last one here.
     axis: usize,
 }
 
@@ -85,14 +85,16 @@ impl Columns {
         }
     }
 
+    /// Returns the middle of the cubes of index `i` on an axis.
     fn middle(&self, axis: usize, i: u32) -> f32 {
         0.5 * self.lattice.plane(axis, i) + 0.5 * self.lattice.plane(axis, i + 1)
     }
 
-    /// Whether the triangle is certainly beside the cube of this middle, seen along an axis.
+    /// Whether the triangle is certainly beside the cube with this middle, as seen along an axis.
     ///
-    /// A point of the triangle is on the left of all edges or on the right of all. So the cube is beside if it is on
-    /// the right of one edge and on the left of another. This needs no winding, which rounding may hide in a needle.
+    /// A point of the triangle is either on the left of all edges or on the right of all. So the cube is beside the
+    /// triangle if it is on the right of one edge and on the left of another. This test does not need the winding,
+    /// which rounding may hide in a needle.
     fn is_beside(&self, axis: usize, middle: [f32; 3]) -> bool {
         let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
         let (mut is_right, mut is_left) = (false, false);
@@ -109,8 +111,9 @@ impl Columns {
         is_right && is_left
     }
 
-    /// The first and the last index of the cubes of a column that may meet the triangle's plane. The interval is up to
-    /// a cube wider on each side than `meets_plane` needs, so it may be computed by divisions that are not exact.
+    /// Returns the first and the last index of the cubes of a column that may meet the triangle's plane. The interval
+    /// is up to a cube wider on each side than `meets_plane` needs, so it may be computed by divisions that are not
+    /// exact.
     fn near_plane(&self, middle: [f32; 3]) -> [u32; 2] {
         let ([x, y, z], [first, last]) = (self.normal, self.range[2]);
         let slope = 1.0 / z.abs();
@@ -127,7 +130,7 @@ impl Columns {
         [first.max(near_first), last.min(near_last)]
     }
 
-    /// Whether the triangle's plane may come near to the cube of this middle.
+    /// Whether the triangle's plane may come near to the cube with this middle.
     fn meets_plane(&self, middle: [f32; 3]) -> bool {
         let way = difference(middle, self.corners[0]);
         let [x, y, z] = self.normal;
@@ -138,14 +141,14 @@ impl Columns {
     }
 }
 
-/// Turns the axes so that `axis` is the last one.
+/// Permutes the axes cyclically so that `axis` is the last one.
 fn axis_last<T: Copy>(v: [T; 3], axis: usize) -> [T; 3] {
     [v[(axis + 1) % 3], v[(axis + 2) % 3], v[axis]]
 }
 
-/// Turns the axes back.
+/// Undoes the permutation of `axis_last`.
 fn axis_back<T: Copy>(v: [T; 3], axis: usize) -> [T; 3] {
-    // A turn by one axis takes back a turn by two.
+    // A permutation by one axis undoes one by two.
     axis_last(v, [1, 0, 2][axis])
 }
 
@@ -153,7 +156,7 @@ fn difference(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
-/// The sum of the magnitudes of a vector's components, which is no less than its length.
+/// Returns the sum of the magnitudes of a vector's components, which is no less than the vector's length.
 fn magnitude([x, y, z]: [f32; 3]) -> f32 {
     x.abs() + y.abs() + z.abs()
 }
@@ -175,7 +178,7 @@ mod tests {
         Lattice { min: [-1.0; 3], max: [1.0; 3], cell_size: 2.0 / n as f32, n_cells: [n; 3] }
     }
 
-    /// Points of a triangle, some of them on its edges.
+    /// Returns points of a triangle, some of them on its edges.
     fn points_of(triangle: &Triangle, n: u32) -> impl Iterator<Item = Vec3> {
         let Triangle { v0, v1, v2, .. } = *triangle;
         let shares = (0..=n).flat_map(move |i| (0..=n - i).map(move |j| [i, j].map(|i| i as f32 / n as f32)));

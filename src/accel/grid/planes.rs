@@ -1,19 +1,20 @@
-//! The planes of the cells' triangles. A ray that keeps clear of a triangle's plane needs no test of the triangle
+//! Planes of the cells' triangles. Where a ray keeps clear of a triangle's plane, the triangle need not be tested
 //! (kdtree/planes.rs). Only arithmetic that is exact on every device is used.
 
 use crate::layout::{Plane, Triangle};
 
-/// The largest error of the heights of a triangle's points above its plane that comes from the rounding of the normal,
-/// in units of 2^-24 times the largest coordinate, with a factor of two to spare. The plane's distance is off by 4
-/// units more, so a height is off by 8 + 4 = 12 units. The planes of a kd-tree are off by 4 units, and their proof
-/// leaves 21 of the 256 units of `KD_PLANE_EPSILON` unused.
+/// The largest error of the heights of a triangle's points above its plane that comes from the rounding of the
+/// normal, in units of 2^-24 times the largest coordinate. It includes a factor of two to spare, so the error itself
+/// is at most 8 units. The plane's distance is off by 4 units more, so a height is off by 8 + 4 = 12 units. The
+/// planes of a kd-tree are off by 4 units, and their proof leaves 21 of the 256 units of `KD_PLANE_EPSILON` unused.
 const MAX_ERROR: f32 = 16.0;
 
 /// Returns the plane of a triangle, or a plane with a normal of 0 if rounding may put the plane too far off. No ray is
 /// clear of a plane with such a normal.
 ///
-/// The normal is scaled by a power of two, since a square root is not exact on a device. Its longest component is in
-/// [1/4, 1/2). So its length is below 1, and a height above the plane is less than the true one.
+/// The normal is scaled by a power of two and not by its length, since a square root is not exact on a device. Its
+/// longest component is in [1/4, 1/2). So its length is below 1, and a height above the plane is less than the true
+/// one.
 pub fn plane_of(triangle: &Triangle, largest_coordinate: f32) -> Plane {
     let a = triangle.v1 - triangle.v0;
     let b = triangle.v2 - triangle.v0;
@@ -25,7 +26,7 @@ pub fn plane_of(triangle: &Triangle, largest_coordinate: f32) -> Plane {
     let edges = a.abs().element_sum() * b.abs().element_sum();
     let reach = a.abs().element_sum().max(b.abs().element_sum());
     let (error, limit) = (4.0 * edges * reach, MAX_ERROR * (largest_coordinate * longest));
-    // Where the limit is denormal, a device may take both for 0.
+    // If the limit is denormal, a device may take both for 0.
     let is_certain = limit >= f32::MIN_POSITIVE && error <= limit;
     let exponent = longest.to_bits() >> 23;
     if !is_certain || !(3..250).contains(&exponent) {

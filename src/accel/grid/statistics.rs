@@ -1,42 +1,43 @@
-//! What a grid holds.
+//! Sizes of grids.
 
 use serde::Serialize;
 
 use super::Grid;
 use crate::layout::{GridCell, Plane};
 
-/// A grid in numbers.
+/// Statistics of a grid.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Statistics {
     /// The number of cells of the upper level along x, y and z.
     pub resolution: [u32; 3],
     /// The number of levels of cells, 1 or 2.
     pub n_levels: u32,
-    /// Cells of the upper level.
+    /// The number of cells of the upper level.
     pub n_upper_cells: u64,
-    /// Cells that hold triangles or could: those of the lowest level, and cells of the upper one that are not cut.
+    /// The number of cells that hold triangles or could hold some: those of the lowest level, and those of the upper
+    /// level that are not cut.
     pub n_cells: u64,
-    /// Those of `n_cells` without triangles.
+    /// The number of cells in `n_cells` without triangles.
     pub n_empty_cells: u64,
-    /// Entries of all cells.
+    /// References: entries of all cells.
     pub n_references: u64,
-    /// References by the number of triangles; 0 for none.
+    /// References divided by the number of triangles; 0 if there are no triangles.
     pub references_per_triangle: f64,
-    /// How many times the edges of all cells had to be doubled to keep to the limits of memory.
+    /// The number of times that the edges of all cells were doubled to keep to the limits of memory.
     pub n_coarser: u32,
-    /// Cells, leaves and their planes, in memory.
+    /// Size in memory of cells, entries and their planes, bytes.
     pub bytes: u64,
 }
 
 impl Statistics {
-    /// What so many cells, and so many references with their planes, take of memory.
+    /// Returns the size in memory of a grid's cells, and of its references with their planes, bytes.
     pub(crate) fn bytes_of(n_cells: usize, n_references: usize) -> u64 {
         (n_cells * size_of::<GridCell>() + n_references * (size_of::<u32>() + size_of::<Plane>())) as u64
     }
 }
 
 impl Grid {
-    /// The grid in numbers.
+    /// Computes the grid's statistics.
     pub fn statistics(&self) -> Statistics {
         let n_upper = self.lattice.n_cubes();
         let (upper, lower) = self.cells.split_at(n_upper);

@@ -1,8 +1,10 @@
-//! The cheapest split of a large cell: the same plane that a sweep over all sorted ends would find, without sorting them.
+//! Search for the cheapest split of a large cell. It finds the same plane as a sweep over all sorted events would,
+//! without sorting them all. An event is where a triangle's bounds begin or end on an axis.
 //!
-//! Counting ends by bins gives the weight at every edge between bins, hence an upper bound of the best weight, and a
-//! lower bound of every weight within a bin. Only bins whose lower bound does not exceed the upper bound can hold the
-//! best plane, so only their ends are sorted and swept (the sweep of Wald and Havran 2006): O(n) in practice.
+//! Counting events by bins gives the weight at every edge between two bins, and so an upper bound of the best weight.
+//! It also gives a lower bound of every weight within a bin. Only bins whose lower bound does not exceed the upper
+//! bound can hold the best plane, so only their events are sorted and swept (the sweep of Wald and Havran 2006). This
+//! takes O(n) time in practice.
 
 use rayon::prelude::*;
 
@@ -12,24 +14,26 @@ use super::{
 };
 use crate::accel::bounds::{Bounds, Reference};
 
-/// Three axes of begins, ends and flags in 27 KiB: they fit the L1 cache.
+/// The most bins on an axis. Begins, ends and flags of three axes take 27 KiB, which fits the L1 cache.
 const MAX_BINS: usize = 1024;
-/// References that one task counts: 900 KB.
+/// The number of references that one task counts: 900 KB.
 const CHUNK: usize = 1 << 15;
-/// f32 rounding of weights, with room to spare: no bin is passed over for it.
+/// Factor on lower bounds of weights. It allows for more than their f32 rounding, so that rounding never excludes a
+/// bin.
 const ROUNDING: f32 = 1.0 - 1e-5;
 
-/// A number an axis and bin; one more bin, for what lies after the last.
+/// A value for each axis and bin, and one more behind the last bin.
 type PerBin<T> = [[T; MAX_BINS + 1]; 3];
 
-/// Buffers of a search.
+/// Buffers of a search, which are used again for the next cell.
 pub struct BinnedSearch {
-    /// Begins and ends in a bin; then triangles that begin before it, and those that end in it or after it.
+    /// At first the number of begins in each bin, then the number of references that begin before the bin.
     n_below: Box<PerBin<u32>>,
+    /// At first the number of ends in each bin, then the number of references that end in the bin or after it.
     n_above: Box<PerBin<u32>>,
-    /// Bins to be swept.
+    /// Whether each bin is to be swept.
     flags: Box<PerBin<bool>>,
-    /// Sorted: the ends in flagged bins.
+    /// The events in flagged bins, sorted by axis and position.
     events: Vec<Event>,
 }
 
@@ -44,11 +48,11 @@ impl Default for BinnedSearch {
     }
 }
 
-/// Bins of one axis.
+/// The bins of one axis.
 #[derive(Clone, Copy)]
 struct Bins {
     shares: Shares,
-    /// Bin of a position: `(position - min) * scale`, rounded to the nearest.
+    /// Factor from positions to bins: the bin is `(position - min) * scale`, rounded to the nearest integer.
     scale: f32,
 }
 
@@ -57,7 +61,8 @@ impl Bins {
         Self { shares, scale: (n_bins - 1) as f32 * shares.per_extent }
     }
 
-    /// Never decreases as the position grows. Adding 2^23 rounds to an integer, in the lowest bits.
+    /// Returns the bin of a position, which never decreases as the position grows. Adding 2^23 rounds the number to
+    /// an integer, which is then in the lowest bits.
     #[inline]
     fn bin(&self, position: f32) -> usize {
         ((position - self.shares.min) * self.scale + 8_388_608.0).to_bits() as usize & (MAX_BINS - 1)
@@ -65,7 +70,7 @@ impl Bins {
 }
 
 impl BinnedSearch {
-    /// The cheapest split of a cell; its weight is infinite where there is none.
+    /// Returns the cheapest split of a cell. Its weight is infinite if there is none.
     pub fn best_split(&mut self, references: &[Reference], cell: &Bounds, options: &BuildOptions) -> Split {
         let n_bins = (references.len() / 4).next_power_of_two().clamp(32, MAX_BINS);
         let bins = [0, 1, 2].map(|axis| Shares::new(cell, axis, options).map(|shares| Bins::new(shares, n_bins)));
@@ -84,7 +89,8 @@ impl BinnedSearch {
             }
             self.collect(references, &bins);
             let best = self.sweep(&bins);
-            // An edge next to the cell's face can beat every end of a triangle: then look again, with what there is.
+            // An edge next to the cell's face can have a lower weight than all events. Then the search is repeated
+            // with the lowest weight that was found.
             if best.weight <= limit || limit == f32::INFINITY {
                 return best;
             }
@@ -114,7 +120,7 @@ impl BinnedSearch {
         });
     }
 
-    /// Turns counts into sums, and returns the edge of the least weight.
+    /// Turns the counts into sums, and returns the edge of the least weight.
     fn best_edge(&mut self, n: u32, bins: &[Option<Bins>; 3], n_bins: usize) -> Edge {
         let mut best = Edge { axis: 0, bin: 0, weight: f32::INFINITY };
         for (axis, bins) in bins.iter().enumerate() {
@@ -157,7 +163,7 @@ impl BinnedSearch {
         n_flagged
     }
 
-    /// Gathers and sorts the ends in flagged bins.
+    /// Gathers and sorts the events in flagged bins.
     fn collect(&mut self, references: &[Reference], bins: &[Option<Bins>; 3]) {
         self.events.clear();
         if references.len() <= CHUNK {
@@ -175,7 +181,7 @@ impl BinnedSearch {
         self.events.par_sort_unstable();
     }
 
-    /// Weighs the planes through all collected ends.
+    /// Returns the cheapest split at a plane through one of the collected events.
     fn sweep(&self, bins: &[Option<Bins>; 3]) -> Split {
         let mut best = Split::NONE;
         for on_axis in self.events.chunk_by(|a, b| a.axis() == b.axis()) {
@@ -201,7 +207,7 @@ impl BinnedSearch {
     }
 }
 
-/// Where a bin ends and the next one begins.
+/// The edge between `bin` and the next bin, and the weight of a split there.
 struct Edge {
     axis: usize,
     bin: usize,
@@ -209,18 +215,18 @@ struct Edge {
 }
 
 impl Edge {
-    /// The plane there; none where it does not lie inside the cell.
+    /// Returns the split at the edge, or none if its plane is not inside the cell.
     fn split(&self, references: &[Reference], bins: &[Option<Bins>; 3], n_bins: usize) -> Option<Split> {
         let shares = bins[self.axis]?.shares;
         let fraction = (self.bin as f32 + 0.5) / (n_bins - 1) as f32;
         let position = shares.min + fraction / shares.per_extent;
         let is_inside = self.weight < f32::INFINITY && position > shares.min && position < shares.max;
-        // A position is binned with rounding: which side it lies on is for the plane itself to say.
+        // Binning rounds a position, so the references are counted again, against the plane itself.
         is_inside.then(|| shares.split(position, count_sides(references, self.axis, position)))
     }
 }
 
-/// References that reach below and above a plane.
+/// Returns how many references reach below and how many reach above a plane.
 fn count_sides(references: &[Reference], axis: usize, position: f32) -> [u32; 2] {
     let count = |references: &[Reference]| {
         references.iter().fold([0; 2], |[below, above], Reference { bounds, .. }| {
@@ -233,14 +239,15 @@ fn count_sides(references: &[Reference], axis: usize, position: f32) -> [u32; 2]
     references.par_chunks(CHUNK).map(count).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
 }
 
-/// The begin or end of a triangle's bounds on an axis, as a number that sorts by axis and position.
+/// An event: the begin or end of a triangle's bounds on an axis, as an integer that sorts by axis and position.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Event(u64);
 
 impl Event {
     #[inline]
     fn new(axis: usize, position: f32, is_begin: bool) -> Self {
-        // 0.0 - 0.0 for -0.0, which is the same plane; then the usual map of floats to integers of the same order.
+        // Adding 0.0 turns -0.0, which is the same plane, into 0.0. Then comes the usual map of floats to integers of
+        // the same order.
         let bits = (position + 0.0).to_bits();
         let ordered = bits ^ if bits >> 31 == 1 { u32::MAX } else { 1 << 31 };
         Self((axis as u64) << 33 | u64::from(ordered) << 1 | u64::from(is_begin))
@@ -276,7 +283,7 @@ fn add(sum: &mut PerBin<u32>, other: &PerBin<u32>) {
     sum.as_flattened_mut().iter_mut().zip(other.as_flattened()).for_each(|(sum, n)| *sum += n);
 }
 
-/// Appends the ends in flagged bins.
+/// Appends the events in flagged bins.
 fn collect(references: &[Reference], bins: &[Option<Bins>; 3], flags: &PerBin<bool>, events: &mut Vec<Event>) {
     for axis in 0..3 {
         let Some(bins) = bins[axis] else { continue };

@@ -1,10 +1,10 @@
-//! The cells of all nodes.
+//! Cells of all nodes, which some traversals read.
 
 use super::{KdTree, Node};
 use crate::{accel::bounds::Bounds, layout::KdBox};
 
 impl KdTree {
-    /// One box a node; zeros for the unused node 1.
+    /// Returns the cell of each node, zeros for the unused node 1.
     pub fn boxes(&self) -> Vec<KdBox> {
         let mut cells = vec![Bounds { min: [0.0; 3], max: [0.0; 3] }; self.nodes().len()];
         cells[0] = Bounds { min: self.cell_min().to_array(), max: self.cell_max().to_array() };

@@ -1,6 +1,6 @@
-//! The upper part of a tree: large cells, whose references are counted and sorted out by all threads, and whose children
-//! are built side by side. Sums of counts and the order of references do not depend on the threads, so neither does the
-//! tree.
+//! Build of the upper part of a tree: large cells. All threads count and separate the references of such a cell, and
+//! its children are built in parallel. The sums of counts and the order of references do not depend on the threads,
+//! so the tree does not either.
 
 use rayon::prelude::*;
 
@@ -17,20 +17,22 @@ use crate::{
     layout::Triangle,
 };
 
-/// A cell with at most this many references is built by one thread: some 5 ms.
+/// The most references of a cell that is built by one thread: some 5 ms.
 const TASK_REFERENCES: usize = 4096;
-/// References that one thread sorts out at a time.
+/// The number of references that one thread separates at a time.
 const CHUNK: usize = 1 << 15;
-/// References that the budget allows in any case.
+/// The number of references that the budget allows beside a multiple of the number of triangles.
 const MIN_BUDGET: u64 = 1024;
-/// Cutting off empty space makes up to 14 nodes a reference; so many references stay below the 2^29 nodes of a link.
+/// The most references of a tree, unless it has more triangles. Cutting off empty space makes up to 14 nodes a
+/// reference, so this many references stay below the 2^29 nodes that a link can reach.
 const MAX_BUDGET: u64 = 1 << 25;
 
 impl KdTree {
-    /// Builds the tree of `triangles`. Those of a zero area stay in it, those with a corner that is not finite do not.
+    /// Builds the kd-tree of `triangles`. Triangles without area are in it, and those with a corner that is not
+    /// finite are not.
     ///
-    /// The same triangles and options give the same tree on any number of threads. O(n log n) time; some 200 bytes a
-    /// triangle while it runs.
+    /// The same triangles and options give the same tree on any number of threads. The build takes O(n log n) time,
+    /// and some 200 bytes a triangle while it runs.
     pub fn build(triangles: &[Triangle], options: &BuildOptions) -> KdTree {
         let exact_bounds = Bounds::of_all(triangles);
         let margin = exact_bounds.margin();
@@ -53,12 +55,13 @@ impl KdTree {
     }
 }
 
+/// Builds the node of a cell and all nodes below it.
 fn grow(input: Input, references: Vec<Reference>, cell: Cell) -> Top {
     if references.len() <= TASK_REFERENCES {
         return Top::Subtree(subtree::build(input, references, cell));
     }
     let Some((split, cells)) = cell.split(&references, input.options, &mut Search::default()) else {
-        // Rare: nearly all of them coincide, or are too many for the budget. A leaf.
+        // The cell becomes a leaf. This is rare: nearly all of its triangles coincide, or a split exceeds the budget.
         return Top::Subtree(subtree::build(input, references, cell));
     };
     let [below, above] = partition(input, references, &cell.bounds, &split);
@@ -66,7 +69,7 @@ fn grow(input: Input, references: Vec<Reference>, cell: Cell) -> Top {
     Top::Split { axis: split.axis, position: split.position, children: Box::new([below, above]) }
 }
 
-/// The references of both children, in the order of their parent's.
+/// Returns the references of both children, in the order of their parent's references.
 fn partition(input: Input, references: Vec<Reference>, cell: &Bounds, split: &Split) -> [Vec<Reference>; 2] {
     match split.n_references {
         [0, _] => return [Vec::new(), references],

@@ -1,22 +1,23 @@
-//! What of a triangle comes near a cell, and "perfect splits" (Havran 2000): the bounds of what a plane leaves of that on
-//! either side.
+//! Clipping of triangles to cells, and "perfect splits" (Havran 2000): the bounds of what a plane leaves of a clipped
+//! triangle on either side.
 //!
-//! Sutherland-Hodgman in f64: coordinates are f32, so a computed point is off by some 2^-52 of them, which the margin is
-//! larger than by far.
+//! The clipping is Sutherland-Hodgman's, in f64. Coordinates are f32, so a computed point is off by some 2^-52 of
+//! them, which is far less than the margin.
 
 use crate::{accel::bounds::Bounds, layout::Triangle};
 
-/// Three corners, and one more for each of the six faces of a cell.
+/// The most corners of a clipped triangle: three, and one more for each of the six faces of a cell.
 const MAX_CORNERS: usize = 9;
 
-/// A convex polygon.
+/// Convex polygon, which may be empty.
 pub struct Polygon {
     corners: [[f64; 3]; MAX_CORNERS],
     len: usize,
 }
 
-/// Bounds of the parts of `triangle` below and above a plane through the cell, all grown by a margin: of what comes
-/// within the margin of the cell, and of the plane from its other side. None: no such part.
+/// Returns the bounds of the parts of `triangle` below and above a plane through the cell, grown by the margin. Each
+/// part is what comes within the margin of the cell and is on its side of the plane, or within the margin of the
+/// plane on the other side. None: there is no such part. `plane`: its axis and its coordinate there, world units.
 pub fn split_bounds(triangle: &Triangle, cell: &Bounds, plane: (usize, f32), margin: f32) -> [Option<Bounds>; 2] {
     let polygon = Polygon::near(triangle, cell, margin);
     let (axis, position, margin) = (plane.0, f64::from(plane.1), f64::from(margin));
@@ -25,7 +26,7 @@ pub fn split_bounds(triangle: &Triangle, cell: &Bounds, plane: (usize, f32), mar
 }
 
 impl Polygon {
-    /// The part of `triangle` within a margin of a cell.
+    /// Returns the part of `triangle` within a margin of a cell.
     pub fn near(triangle: &Triangle, cell: &Bounds, margin: f32) -> Self {
         let corner = |v: glam::Vec3| v.as_dvec3().to_array();
         let mut polygon = Polygon { corners: [[0.0; 3]; MAX_CORNERS], len: 3 };
@@ -38,12 +39,12 @@ impl Polygon {
         polygon
     }
 
-    /// In order; none where no such part is.
+    /// Returns the corners in their order round the polygon; none if the polygon is empty.
     pub fn corners(&self) -> &[[f64; 3]] {
         &self.corners[..self.len]
     }
 
-    /// Cuts off what lies above (`KEEP_BELOW`) or below a plane.
+    /// Cuts off the part above (`KEEP_BELOW`) or below a plane.
     fn clip<const KEEP_BELOW: bool>(&mut self, axis: usize, position: f64) {
         let outside = |p: &[f64; 3]| if KEEP_BELOW { p[axis] > position } else { p[axis] < position };
         if !self.corners[..self.len].iter().any(outside) {
@@ -55,7 +56,7 @@ impl Polygon {
             if !outside(a) {
                 kept.push(*a);
             }
-            // An edge that ends on the plane brings its end as a corner.
+            // The end of an edge that ends on the plane is a corner already.
             if outside(a) != outside(b) && a[axis] != position && b[axis] != position {
                 kept.push(crossing(a, b, axis, position));
             }
@@ -63,13 +64,14 @@ impl Polygon {
         *self = kept;
     }
 
-    /// A convex polygon never needs more than `MAX_CORNERS`; one bent by rounding may lose a corner to the last place.
+    /// Appends a corner. A convex polygon never needs more than `MAX_CORNERS`. If rounding has bent a polygon,
+    /// further corners replace the last one.
     fn push(&mut self, corner: [f64; 3]) {
         self.corners[self.len.min(MAX_CORNERS - 1)] = corner;
         self.len = (self.len + 1).min(MAX_CORNERS);
     }
 
-    /// Bounds of the part below (`KEEP_BELOW`) or above a plane.
+    /// Returns the bounds of the part below (`KEEP_BELOW`) or above a plane.
     fn bounds_in<const KEEP_BELOW: bool>(&self, axis: usize, position: f64) -> Box3 {
         let mut part = Box3::EMPTY;
         for ix in 0..self.len {
@@ -85,7 +87,7 @@ impl Polygon {
     }
 }
 
-/// Where the edge from `a` to `b`, which lie on different sides, crosses a plane.
+/// Returns the point where the edge from `a` to `b` crosses a plane. The two are on different sides of it.
 fn crossing(a: &[f64; 3], b: &[f64; 3], axis: usize, position: f64) -> [f64; 3] {
     let t = (position - a[axis]) / (b[axis] - a[axis]);
     let mut point = [0, 1, 2].map(|k| a[k] + t * (b[k] - a[k]));
@@ -93,7 +95,7 @@ fn crossing(a: &[f64; 3], b: &[f64; 3], axis: usize, position: f64) -> [f64; 3] 
     point
 }
 
-/// A box in f64.
+/// Axis-aligned box in f64.
 struct Box3 {
     min: [f64; 3],
     max: [f64; 3],
@@ -109,20 +111,20 @@ impl Box3 {
         }
     }
 
-    /// The smallest f32 box around it and a margin; none around nothing.
+    /// Returns the smallest f32 box around this box and a margin, or none if this box is empty.
     fn grown(&self, margin: f64) -> Option<Bounds> {
         let (min, max) = (self.min.map(|x| round_down(x - margin)), self.max.map(|x| round_up(x + margin)));
         (self.min[0] <= self.max[0]).then_some(Bounds { min, max })
     }
 }
 
-/// The largest f32 not above `x`.
+/// Returns the largest f32 not above `x`.
 fn round_down(x: f64) -> f32 {
     let nearest = x as f32;
     if f64::from(nearest) > x { nearest.next_down() } else { nearest }
 }
 
-/// The smallest f32 not below `x`.
+/// Returns the smallest f32 not below `x`.
 fn round_up(x: f64) -> f32 {
     let nearest = x as f32;
     if f64::from(nearest) < x { nearest.next_up() } else { nearest }

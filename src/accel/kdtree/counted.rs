@@ -1,7 +1,7 @@
-//! The cheapest split of a small cell, by counting the triangles on either side of every plane.
+//! Search for the cheapest split of a small cell. It counts the triangles on either side of every plane.
 //!
-//! n references make up to 2 n planes an axis, so this is 4 n^2 comparisons, but without a branch that depends on them
-//! and eight planes at a time: quicker than sorting so few.
+//! n references give up to 2 n planes on each axis, so there are 4 n^2 comparisons. No branch depends on their
+//! results, and eight planes are compared at a time, which is faster than sorting so few references.
 
 use super::{
     BuildOptions,
@@ -9,12 +9,12 @@ use super::{
 };
 use crate::accel::bounds::{Bounds, Reference};
 
-/// More references than this are binned.
+/// The most references of a small cell. Cells with more are searched by bins (binned.rs).
 pub const MAX_REFERENCES: usize = 32;
-/// Planes that are counted together: two SSE registers.
+/// The number of planes that are counted together: two SSE registers.
 const LANES: usize = 8;
 
-/// The cheapest split of a cell with at most [`MAX_REFERENCES`]; its weight is infinite where there is none.
+/// Returns the cheapest split of a cell with at most [`MAX_REFERENCES`]. Its weight is infinite if there is none.
 pub fn best_split(references: &[Reference], cell: &Bounds, options: &BuildOptions) -> Split {
     let mut best = Split::NONE;
     for axis in 0..3 {
@@ -27,12 +27,13 @@ pub fn best_split(references: &[Reference], cell: &Bounds, options: &BuildOption
     best
 }
 
-/// The ends of the references on one axis.
+/// The sides of the references' bounds on one axis, and the planes through those sides that are inside the cell.
 struct Planes {
     min: [f32; MAX_REFERENCES],
     max: [f32; MAX_REFERENCES],
     n_references: usize,
-    /// Ends strictly inside the cell, padded with NaN, which no comparison counts and no weight beats.
+    /// Sides strictly inside the cell, padded with NaN. Every comparison with NaN is false, so padding is never the
+    /// cheapest.
     positions: [f32; 2 * MAX_REFERENCES + LANES],
     n_positions: usize,
 }
@@ -51,7 +52,7 @@ impl Planes {
             let (min, max) = (reference.bounds.min[shares.axis], reference.bounds.max[shares.axis]);
             planes.min[ix] = min;
             planes.max[ix] = max;
-            // Written always, kept where inside: no branch.
+            // Each side is written in any case and kept only if it is inside the cell, so there is no branch.
             planes.positions[n_positions] = min;
             n_positions += usize::from(min > shares.min && min < shares.max);
             planes.positions[n_positions] = max;
@@ -62,7 +63,7 @@ impl Planes {
         planes
     }
 
-    /// The cheapest plane.
+    /// Returns the split at the cheapest plane.
     fn best(&self, shares: &Shares) -> Split {
         let mut best = Split::NONE;
         for first in (0..self.n_positions).step_by(LANES) {

@@ -1,5 +1,5 @@
-//! Is every triangle in all leaves whose cells it comes near, and in the slabs on the way there? By cutting up each one, in
-//! f64 and independently of the builder's own clipping.
+//! Check that each triangle is in all leaves whose cells it comes near to, and within the slabs on the way there.
+//! Each triangle is cut up in f64, independently of the builder's own clipping.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -7,27 +7,32 @@ use rayon::prelude::*;
 use super::{Invalid, KdTree, Node};
 use crate::{accel::bounds::is_finite, layout::Triangle};
 
-/// Of the margin: what is checked. The rest is room for rounding: of bounds to f32, and of points cut by seven planes,
-/// each off by four times 2^-53 of the coordinates.
+/// Share of the margin, and of the reach of slabs, that is checked. The rest is room for rounding: of bounds to f32,
+/// and of points that are cut by seven planes, each off by four times 2^-53 of the coordinates.
 const CHECKED: f64 = 0.96;
 
-/// One triangle on its way down a tree.
+/// A triangle on its way down a tree.
 struct Descent<'a> {
     tree: &'a KdTree,
     triangle_ix: u32,
-    /// World units.
+    /// Distance from a cell within which a leaf must have the triangle, world units.
     margin: f64,
-    /// How far slabs reach beyond their triangles, world units.
+    /// Distance by which slabs must reach beyond their triangles, world units.
     reach: f64,
 }
 
-/// What a node does not have of a triangle.
+/// What a node lacks of a triangle.
 enum Lack {
+    /// The leaf of this index has no entry of the triangle.
     Entry(u32),
+    /// The node of this index has a slab that does not hold the triangle.
     Slab(u32),
 }
 
-/// The first triangle, by index, that a leaf within `margin` lacks, or a node's slab.
+/// Checks that every leaf within `margin` of a triangle has it, and that no triangle reaches out of a node's slab.
+///
+/// # Errors
+/// The first triangle, by index, for which this does not hold, and the node.
 pub fn check(tree: &KdTree, triangles: &[Triangle], margin: f32) -> Result<(), Invalid> {
     let reach = CHECKED * f64::from(tree.constants().plane_epsilon);
     let missing = triangles.par_iter().enumerate().find_map_first(|(ix, triangle)| {
@@ -43,8 +48,8 @@ pub fn check(tree: &KdTree, triangles: &[Triangle], margin: f32) -> Result<(), I
 }
 
 impl Descent<'_> {
-    /// The first node, from one down, that comes near a polygon: a leaf that does not have the triangle, or any with a slab
-    /// out of which the polygon reaches.
+    /// Returns the first node, from `node` down, that lacks a part of the triangle: a leaf that comes near the
+    /// polygon and does not have the triangle, or a node with a slab that the polygon reaches out of.
     fn lack_below(&self, node: u32, polygon: &[DVec3]) -> Option<Lack> {
         if polygon.is_empty() {
             return None;
@@ -71,7 +76,7 @@ impl Descent<'_> {
     }
 }
 
-/// What of a polygon has a height of 0 or more (Sutherland-Hodgman).
+/// Returns the part of a polygon whose height is 0 or more (Sutherland-Hodgman).
 fn clip(polygon: &[DVec3], height: impl Fn(DVec3) -> f64) -> Vec<DVec3> {
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     let following = polygon.iter().cycle().skip(1);

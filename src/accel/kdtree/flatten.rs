@@ -1,17 +1,17 @@
-//! The upper part of a tree and the subtrees below it, one behind the other in depth-first order.
+//! Joins the upper part of a tree and the subtrees below it, in depth-first order.
 
 use glam::Vec3;
 
 use super::{EMPTY_LEAF, Node, Parts, subtree::Subtree};
 use crate::accel::bounds::Bounds;
 
-/// The upper part of a tree.
+/// Upper part of a tree, with the subtrees below it.
 pub enum Top {
     Split { axis: usize, position: f32, children: Box<[Top; 2]> },
     Subtree(Subtree),
 }
 
-/// The tree as the kernels read it, without planes and slabs.
+/// Makes the tree's arrays as kernels read them, without planes and slabs. `cell`: the root's cell.
 pub fn flatten(top: Top, cell: Bounds) -> Parts {
     let mut tree = Parts {
         nodes: vec![EMPTY_LEAF; 2],
@@ -27,7 +27,7 @@ pub fn flatten(top: Top, cell: Bounds) -> Parts {
     tree
 }
 
-/// Fills a slot, and appends all below it.
+/// Writes a node into a slot, and appends all nodes below it.
 fn append(tree: &mut Parts, slot: usize, top: Top) {
     match top {
         Top::Subtree(subtree) => append_subtree(tree, slot, &subtree),
@@ -43,7 +43,7 @@ fn append(tree: &mut Parts, slot: usize, top: Top) {
     }
 }
 
-/// The subtree's root goes to the slot, its other nodes behind all others.
+/// Writes a subtree's root into a slot, and appends the subtree's other nodes and its entries.
 fn append_subtree(tree: &mut Parts, slot: usize, subtree: &Subtree) {
     let (first_node, first_triangle) = (tree.nodes.len() as u32, tree.leaf_triangles.len() as u32);
     let relocated = |node| match Node::from(node) {

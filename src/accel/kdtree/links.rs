@@ -1,4 +1,5 @@
-//! What some traversals read beside the tree.
+//! Arrays that some traversals read beside the tree: the cells of nodes, and ropes from their faces to their
+//! neighbours.
 
 use super::KdTree;
 use crate::{
@@ -6,17 +7,17 @@ use crate::{
     layout::{KdBox, KdRope},
 };
 
-/// Empty where a traversal asks for nothing.
+/// Arrays of a tree that only some traversals read. An array that the traversal does not read is empty.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TraversalLinks {
-    /// One a node.
+    /// The cell of each node.
     pub boxes: Vec<KdBox>,
-    /// Six a node: below and above on x, y, z.
+    /// Six ropes for each node: below and above on x, y, z.
     pub ropes: Vec<KdRope>,
 }
 
 impl TraversalLinks {
-    /// What the traversal reads beside the scene's structure: nothing where that is a grid.
+    /// Returns what the traversal reads beside the scene's structure. For a grid, all arrays are empty.
     pub fn of(accel: &Accel, traversal: Traversal) -> Self {
         match accel {
             Accel::KdTree(tree) => Self::new(tree, traversal),
@@ -24,14 +25,14 @@ impl TraversalLinks {
         }
     }
 
-    /// What the traversal reads of the tree.
+    /// Returns what the traversal reads beside the tree.
     pub fn new(tree: &KdTree, traversal: Traversal) -> Self {
         let boxes = if traversal.needs_boxes() { tree.boxes() } else { Vec::new() };
         let ropes = if traversal.needs_ropes() { tree.ropes(&tree.boxes()) } else { Vec::new() };
         Self { boxes, ropes }
     }
 
-    /// What any traversal reads.
+    /// Returns all arrays, for any traversal.
     pub fn all(tree: &KdTree) -> Self {
         let boxes = tree.boxes();
         Self { ropes: tree.ropes(&boxes), boxes }

@@ -1,12 +1,12 @@
-//! Triangles to a flat kd-tree built by the surface area heuristic (SAH), its statistics and its validator.
+//! Kd-trees built from triangles by the surface area heuristic (SAH), with their statistics and their validator.
 //!
 //! ```text
 //! triangles ─> build ─────> subtree ─────> flatten ─> KdTree ─> statistics
-//!              large cells, └ small cells,            ├─> planes, slabs: what spares rays most triangles
+//!              large cells, └ small cells,            ├─> planes, slabs: let rays skip most triangles
 //!              all threads    a thread each           └─> validate, coverage
 //!                   │              │
 //!                   └──> search <──┘   binned: counts by bins, sweeps the few that may hold the best plane
-//!                        and clip      counted: counts at every plane, for some dozens of triangles
+//!                        and clip      counted: counts at every plane, for cells of at most 32 triangles
 //! ```
 //!
 //! Wald and Havran, "On building fast kd-trees for ray tracing, and on doing that in O(N log N)", 2006.
@@ -40,8 +40,8 @@ pub use validate::Invalid;
 
 /// A kd-tree over triangles, as the kernels read it.
 ///
-/// Kernels read it without bounds checks. So a tree comes from [`KdTree::build`], which makes only valid ones, or from
-/// [`KdTree::from_parts`], which validates; and nothing can change it afterwards.
+/// Kernels read it without bounds checks. So a tree comes either from [`KdTree::build`], which makes only valid
+/// trees, or from [`KdTree::from_parts`], which validates. Nothing can change it afterwards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct KdTree {
     parts: Parts,
@@ -50,7 +50,7 @@ pub struct KdTree {
 }
 
 impl KdTree {
-    /// What kernels have to know of the tree beside its arrays. The rest is 0.
+    /// Returns the uniform constants that kernels need beside the tree's arrays. All other members are 0.
     pub fn constants(&self) -> AccelConstants {
         let Parts { cell_min, cell_max, .. } = self.parts;
         let largest_coordinate = cell_min.abs().max(cell_max.abs()).max_element();
@@ -59,28 +59,30 @@ impl KdTree {
     }
 }
 
-/// How a tree is built. Costs are in any one unit; only their ratio matters.
+/// Build options of a kd-tree. Costs may be in any unit; only their ratio matters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BuildOptions {
     /// Cost of a step from a split to a child.
     pub traversal_cost: f32,
     /// Cost of a ray-triangle test.
     pub intersection_cost: f32,
-    /// Share of its intersection cost by which a split that cuts off empty space is favoured, 0 to 1.
+    /// Bonus for a split that cuts off empty space: the share by which its intersection cost is reduced, 0 to 1.
     pub empty_bonus: f32,
-    /// Levels below the root; never more than `KD_MAX_DEPTH - 2`, which is also what `None` means.
+    /// The most levels below the root. It is never more than `KD_MAX_DEPTH - 2`, which is also what `None` means.
     pub max_depth: Option<u32>,
-    /// No more references than this many times the triangles, plus 1024; a leaf for all of them always fits.
+    /// Limit of the number of references, as a multiple of the number of triangles; 1024 more are always allowed. So
+    /// is a single leaf of all triangles.
     pub max_references_per_triangle: u32,
-    /// Whether cells of more than 32 references are split at the very best end of a triangle; else at the best of up to 1023 planes
-    /// on each axis, which are found sooner.
+    /// Whether a cell of more than 32 references is split at the best of all planes through the sides of its
+    /// triangles' bounds. If not, it is split at the best of up to 1023 planes on each axis, which are found sooner.
     pub exact_planes: bool,
-    /// Whether nodes get slabs, which the CPU and GPUs make use of, software drivers not; some 200 ns a reference.
+    /// Whether nodes get slabs, which takes some 200 ns a reference. The CPU and GPUs use slabs, software drivers do
+    /// not.
     pub slabs: bool,
 }
 
-/// What traces fastest on a GPU (benches/EXPERIMENTS.md). An intersection cost of 0.7 makes a tree half as large again
-/// that is no faster.
+/// Options of the tree that traces fastest on a GPU (benches/EXPERIMENTS.md). An intersection cost of 0.7 makes a
+/// tree that is half as large again and no faster.
 impl Default for BuildOptions {
     fn default() -> Self {
         Self {
@@ -96,35 +98,35 @@ impl Default for BuildOptions {
 }
 
 impl BuildOptions {
-    /// A tree of a fifth of the nodes and without slabs, built in half of the time. Rays take up to a tenth longer on the CPU,
-    /// up to twice as long on a GPU.
+    /// Options of a tree that is built in half the time of the default one, with a fifth of its nodes and without
+    /// slabs. Rays take up to a tenth longer on the CPU and up to twice as long on a GPU.
     pub fn fast() -> Self {
         Self { intersection_cost: 0.15, exact_planes: false, slabs: false, ..Self::default() }
     }
 
-    /// Levels below the root that the tree may have.
+    /// Returns the most levels below the root that the tree may have.
     pub fn depth_limit(&self) -> u32 {
         self.max_depth.unwrap_or(u32::MAX).min(KD_MAX_DEPTH - 2)
     }
 }
 
-/// A node, decoded.
+/// Node of a kd-tree, decoded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Node {
-    /// The children are `child` (below `position`), which is even, and `child + 1` (above).
+    /// A split. The child below `position` has the index `child`, which is even; the child above has `child + 1`.
     Split {
-        /// 0, 1 or 2.
+        /// The axis that the plane is perpendicular to: 0, 1 or 2.
         axis: usize,
-        /// Where the plane meets its axis, world units.
+        /// The plane's coordinate on the axis, world units.
         position: f32,
         /// Index of the child below the plane.
         child: u32,
     },
-    /// `leaf_triangles[first .. first + count]`.
+    /// A leaf. Its triangles are `leaf_triangles[first .. first + count]`.
     Leaf {
-        /// Index of its first entry.
+        /// Index of the leaf's first entry.
         first: u32,
-        /// The number of its triangles.
+        /// The number of the leaf's triangles.
         count: u32,
     },
 }
@@ -163,7 +165,7 @@ mod tests {
 
     use crate::layout::Triangle;
 
-    /// Small triangles up a winding stair.
+    /// Makes `n` small triangles in the shape of a winding stair.
     pub fn staircase(n: usize) -> Vec<Triangle> {
         let corner = |i: usize| vec3((i as f32 * 0.7).cos(), i as f32 * 0.1, (i as f32 * 0.7).sin());
         let step = |i| Triangle { v0: corner(i), v1: corner(i + 1), v2: 0.5 * corner(i), ..Triangle::default() };

@@ -1,41 +1,45 @@
-//! The arrays of a tree: anybody can make and change them, but only valid ones become a [`KdTree`].
+//! Arrays of a kd-tree. Anyone can make and change them, but only valid ones become a [`KdTree`].
 
 use glam::Vec3;
 
 use super::{Invalid, KdTree, Node};
 use crate::layout::{KdNode, Plane, Slab, Triangle};
 
-/// The arrays of a kd-tree and its root's cell.
+/// Arrays of a kd-tree and the cell of its root.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parts {
-    /// Root 0; node 1 is unused (an empty leaf); the children of a split are neighbours at an even index. Depth-first:
-    /// a pair of children, then all below the first, then all below the second.
+    /// The nodes. Node 0 is the root, and node 1 is unused (an empty leaf). The two children of a split are
+    /// neighbours, the first one at an even index. The order is depth-first: a pair of children, then all nodes below
+    /// the first, then all nodes below the second.
     pub nodes: Vec<KdNode>,
-    /// `nodes.len() / 2` entries: `parents[n >> 1]` is the split whose children are `n & !1` and `n | 1`; entry 0 is 0.
+    /// The parents, `nodes.len() / 2` entries. Entry `n >> 1` is the split whose children are `n & !1` and `n | 1`.
+    /// Entry 0 is 0.
     pub parents: Vec<u32>,
     /// Triangle indices, leaf after leaf in depth-first order, ascending in each leaf.
     pub leaf_triangles: Vec<u32>,
-    /// The plane of each of `leaf_triangles`.
+    /// The plane of each triangle in `leaf_triangles`.
     pub leaf_planes: Vec<Plane>,
-    /// One slab a node, zeros where the node is not marked as having one; or no slabs, if no node is marked.
+    /// A slab for each node, zeros for a node that is not marked with `KD_HAS_SLAB`. The array may be empty if no
+    /// node is marked.
     pub slabs: Vec<Slab>,
-    /// The root's cell is the exact bounds of all triangles (a box of zeros for none).
+    /// The least corner of the root's cell, world units. The root's cell is the exact bounds of all triangles (a box
+    /// of zeros for none), grown by the rounding margin.
     pub cell_min: Vec3,
     /// The greatest corner of the root's cell, world units.
     pub cell_max: Vec3,
-    /// Levels below the root, at most `KD_MAX_DEPTH - 2`.
+    /// The number of levels below the root, at most `KD_MAX_DEPTH - 2`.
     pub depth: u32,
 }
 
 impl Parts {
-    /// The node at an index.
+    /// Returns the node at an index, decoded.
     pub fn node(&self, node_ix: u32) -> Node {
         self.nodes[node_ix as usize].into()
     }
 }
 
 impl KdTree {
-    /// Makes a tree of its arrays, which may come from anywhere, over the triangles that its leaves name.
+    /// Makes a tree from arrays of any origin. `triangles`: those that the leaves' entries index.
     ///
     /// # Errors
     /// The first of [`KdTree::validate`]'s invariants that does not hold.
@@ -45,7 +49,7 @@ impl KdTree {
         Ok(tree)
     }
 
-    /// The tree's arrays, to be changed and made a tree again.
+    /// Returns the tree's arrays. [`KdTree::from_parts`] makes them a tree again.
     pub fn into_parts(self) -> Parts {
         self.parts
     }
@@ -75,17 +79,17 @@ impl KdTree {
         &self.parts.slabs
     }
 
-    /// The least corner of the root's cell.
+    /// The least corner of the root's cell, world units.
     pub fn cell_min(&self) -> Vec3 {
         self.parts.cell_min
     }
 
-    /// The greatest corner of the root's cell.
+    /// The greatest corner of the root's cell, world units.
     pub fn cell_max(&self) -> Vec3 {
         self.parts.cell_max
     }
 
-    /// The least and the greatest corner of the root's cell, which holds all triangles.
+    /// The least and the greatest corner of the root's cell, which holds all triangles, world units.
     pub fn bounds(&self) -> [Vec3; 2] {
         [self.cell_min(), self.cell_max()]
     }
@@ -100,7 +104,7 @@ impl KdTree {
         self.n_triangles
     }
 
-    /// The node at an index.
+    /// Returns the node at an index, decoded.
     pub fn node(&self, node_ix: u32) -> Node {
         self.parts.node(node_ix)
     }

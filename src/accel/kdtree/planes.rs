@@ -1,21 +1,32 @@
-//! The planes of the leaves' triangles: where a ray keeps clear of a plane, its triangle need not be tested.
+//! Planes of the leaves' triangles. Where a ray keeps clear of a triangle's plane, the triangle need not be tested.
 //!
-//! How clear it has to keep, `KD_PLANE_EPSILON`, is twice the tree's margin: 256 units of 2^-24 times the largest
-//! coordinate. With origins as far away as `KD_MAX_ORIGIN_DISTANCE` allows, the point at a hit's t is off the triangle by 86
-//! units on each axis (bounds.rs), so by 149 across its plane. What rounding does to the plane and to the ray's heights
-//! above it is: the plane 4, the origin's height 30, the slope over the ray's length 26, the middle of its way through
-//! the leaf and half of that way 9 each, their two heights 4 each. Together it is 235, of 256.
+//! A ray is clear of a plane if its distance from the plane is more than `KD_PLANE_EPSILON` all along its t interval
+//! in the leaf. This epsilon is twice the tree's margin: 256 units of 2^-24 times the largest coordinate. The table
+//! lists the errors in these units, with origins as far away as `KD_MAX_ORIGIN_DISTANCE` allows.
+//!
+//! ```text
+//! error of                                                   units
+//! the point at a hit's t, off the triangle across its plane    149   (86 on each axis: bounds.rs)
+//! the plane                                                      4
+//! the origin's height above the plane                           30
+//! the slope over the ray's length                               26
+//! the middle of the t interval                                   9
+//! half of the t interval                                         9
+//! the heights that belong to these two                       4 + 4
+//! sum                                                          235   of 256
+//! ```
 
 use rayon::prelude::*;
 
 use crate::layout::{Plane, Triangle};
 
-/// The plane of each entry's triangle.
+/// Returns the plane of each entry's triangle.
 pub fn planes_of(triangles: &[Triangle], entries: &[u32]) -> Vec<Plane> {
     entries.par_iter().map(|&ix| plane_of(&triangles[ix as usize])).collect()
 }
 
-/// The rounded normal, and the distance at which a plane of that normal passes through the triangle's middle.
+/// Returns a triangle's plane: the rounded normal, and the distance at which a plane with that normal passes through
+/// the triangle's middle. The normal is 0 if the triangle has no area.
 pub fn plane_of(triangle: &Triangle) -> Plane {
     let [v0, v1, v2] = [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3());
     let normal = (v1 - v0).cross(v2 - v0).normalize_or_zero().as_vec3();

@@ -1,5 +1,7 @@
-//! Links from the faces of cells to their neighbours (Popov, Günther, Seidel, Slusallek: Stackless KD-Tree Traversal for
-//! High Performance GPU Ray Tracing, Eurographics 2007, section 3).
+//! Ropes: links from the faces of cells to their neighbours. The rope of a face leads to the smallest node whose cell
+//! contains all that is on the other side of the face, or to node 0 where that is outside the root's cell (Popov,
+//! Günther, Seidel, Slusallek: Stackless KD-Tree Traversal for High Performance GPU Ray Tracing, Eurographics 2007,
+//! section 3).
 
 use super::{KdTree, Node};
 use crate::{
@@ -7,11 +9,11 @@ use crate::{
     layout::{KdBox, KdRope},
 };
 
-/// Faces of a cell: below and above on x, y, z.
+/// The number of a cell's faces: below and above on x, y, z.
 const N_FACES: usize = 6;
 
 impl KdTree {
-    /// Six ropes a node, below and above on x, y, z. `boxes` are the nodes' cells.
+    /// Returns six ropes for each node: below and above on x, y, z. `boxes`: the cells of the nodes.
     pub fn ropes(&self, boxes: &[KdBox]) -> Vec<KdRope> {
         let mut ropes = vec![[KdRope::default(); N_FACES]; self.nodes().len()];
         // Parents come before their children.
@@ -32,7 +34,8 @@ impl KdTree {
         ropes.into_flattened()
     }
 
-    /// Down from a rope's end while one child has all of the face's other side.
+    /// Descends from the node at a rope's end while one child contains all of the face's other side. Returns the node
+    /// where the descent ends.
     fn tightened(&self, mut rope: u32, face: usize, cell: &Bounds) -> u32 {
         let (face_axis, is_above) = (face / 2, face % 2 == 1);
         while rope != 0 {
@@ -56,13 +59,13 @@ mod tests {
     use super::*;
     use crate::accel::kdtree::{BuildOptions, tests::staircase};
 
-    /// A node and all above it, the root last.
+    /// Returns a node and all its ancestors, the root last.
     fn path(tree: &KdTree, node: u32) -> Vec<u32> {
         let above = |&node: &u32| (node != 0).then(|| tree.parents()[node as usize / 2]);
         std::iter::successors(Some(node), above).collect()
     }
 
-    /// Leaves with more than an edge in common with a face, on its other side.
+    /// Returns the leaves on the other side of a face that have more than an edge in common with it.
     fn neighbours(tree: &KdTree, cells: &[Bounds], leaf: usize, face: usize) -> Vec<u32> {
         let (axis, cell) = (face / 2, cells[leaf]);
         let is_neighbour = |other: &Bounds| {

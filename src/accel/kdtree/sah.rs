@@ -1,34 +1,36 @@
-//! The surface area heuristic: what a split of a cell costs.
+//! Surface area heuristic (SAH): the cost of splits of a cell.
 //!
-//! Splits of a cell are compared by their *weights*: the expected number of ray-triangle tests below a split,
-//! `p_below * n_below + p_above * n_above`, where p is the share of the cell's surface that the child's cell has
-//! (MacDonald and Booth 1990). Along an axis the weight is linear between the ends of triangles, so only planes through
-//! these need be tried.
+//! Splits of a cell are compared by their *weights*. A weight is the expected number of ray-triangle tests below a
+//! split, `p_below * n_below + p_above * n_above`, where p is the child's share of the cell's surface (MacDonald and
+//! Booth 1990). Along an axis the weight is linear between the places where triangles' bounds begin or end, so only
+//! planes through these need be tried.
 
 use super::BuildOptions;
 use crate::accel::bounds::Bounds;
 
-/// 2^-115: 1024 bins by an extent of at least this are a finite f32, and so is a plane's distance from the cell's face by
-/// an extent of at most `f32::MAX`. Cells beyond that are not split on the axis.
+/// Least extent on an axis of a cell that is split there, world units: 2^-115. With at least this extent, 1024 bins
+/// divided by the extent are a finite f32. With an extent of at most `f32::MAX`, so is a plane's distance from the
+/// cell's face. Other cells are not split on the axis.
 const MIN_EXTENT: f64 = f32::MIN_POSITIVE as f64 * 2048.0;
 
-/// A plane through a cell, and its weight.
+/// A plane that splits a cell, and the weight of the split.
 #[derive(Clone, Copy, Debug)]
 pub struct Split {
     pub axis: usize,
     pub position: f32,
     /// Expected ray-triangle tests of a ray through the cell, after the bonus for cutting off empty space.
     pub weight: f32,
-    /// Triangles below and above; both sides count those that straddle the plane.
+    /// The number of triangles below and above. Triangles that straddle the plane count on both sides.
     pub n_references: [u32; 2],
 }
 
 impl Split {
-    /// Worse than any other.
+    /// No split: its weight is worse than any other.
     pub const NONE: Self = Self { axis: 0, position: 0.0, weight: f32::INFINITY, n_references: [0; 2] };
 }
 
-/// The shares of a cell's surface on either side of a plane: linear in the plane's position.
+/// Surface areas of the two parts of a cell on either side of a plane, as shares of the cell's surface area. They are
+/// linear in the plane's position.
 #[derive(Clone, Copy, Debug)]
 pub struct Shares {
     pub axis: usize,
@@ -36,15 +38,17 @@ pub struct Shares {
     pub max: f32,
     /// 1 / extent on the axis.
     pub per_extent: f32,
-    /// Share of a cell of zero thickness, and what the whole thickness adds to it.
+    /// Share of a part of no thickness.
     base: f32,
+    /// What the whole thickness of the cell adds to the share.
     slope: f32,
     /// Factor on the weight of a split with an empty side.
     empty_factor: f32,
 }
 
 impl Shares {
-    /// None where no plane can split the cell: no thickness to speak of on this axis, or no surface at all.
+    /// Returns none where no plane can split the cell: its extent on this axis is too small or too large, or it has
+    /// no surface.
     pub fn new(cell: &Bounds, axis: usize, options: &BuildOptions) -> Option<Self> {
         let extent = cell.extent();
         let [along, u, v] = [extent[axis], extent[(axis + 1) % 3], extent[(axis + 2) % 3]];
@@ -60,25 +64,27 @@ impl Shares {
         })
     }
 
-    /// Where a plane lies in the cell, 0 to 1.
+    /// Returns the position of a plane in the cell as a fraction of the extent, 0 to 1.
     #[inline]
     pub fn fraction(&self, position: f32) -> f32 {
         (position - self.min) * self.per_extent
     }
 
-    /// The shares at a fraction of the extent.
+    /// Returns the shares below and above a plane at a fraction of the extent.
     #[inline]
     fn shares(&self, fraction: f32) -> [f32; 2] {
         [self.base + self.slope * fraction, self.base + self.slope * (1.0 - fraction)]
     }
 
-    /// Weight of a split at a fraction of the extent, with so many triangles on either side.
+    /// Returns the weight of a split at a fraction of the extent, with `n_below` and `n_above` triangles on its
+    /// sides.
     #[inline]
     pub fn weight(&self, fraction: f32, n_below: f32, n_above: f32) -> f32 {
         self.lower_bound(fraction, fraction, n_below, n_above)
     }
 
-    /// No weight between two fractions is less, with at least so many triangles on either side.
+    /// Returns a lower bound of the weights of splits between two fractions of the extent, each with at least
+    /// `n_below` and `n_above` triangles on its sides.
     #[inline]
     pub fn lower_bound(&self, from: f32, to: f32, n_below: f32, n_above: f32) -> f32 {
         let (below, above) = (self.shares(from)[0], self.shares(to)[1]);
@@ -86,7 +92,8 @@ impl Shares {
         factor * (below * n_below + above * n_above)
     }
 
-    /// The split at a position strictly inside the cell, with so many triangles below and above.
+    /// Returns the split at a position strictly inside the cell. `n_references`: the number of triangles below and
+    /// above.
     #[inline]
     pub fn split(&self, position: f32, n_references: [u32; 2]) -> Split {
         let weight = self.weight(self.fraction(position), n_references[0] as f32, n_references[1] as f32);

@@ -1,16 +1,16 @@
-//! The cheapest split of a cell.
+//! Search for the cheapest split of a cell.
 
 use super::{BuildOptions, binned::BinnedSearch, counted, sah::Split};
 use crate::accel::bounds::{Bounds, Reference};
 
-/// Buffers of a search, to be used again for the next cell.
+/// Buffers of a search, which are used again for the next cell.
 #[derive(Default)]
 pub struct Search {
     binned: BinnedSearch,
 }
 
 impl Search {
-    /// The cheapest split; its weight is infinite where there is none.
+    /// Returns the cheapest split. Its weight is infinite if there is none.
     pub fn best_split(&mut self, references: &[Reference], cell: &Bounds, options: &BuildOptions) -> Split {
         if references.len() <= counted::MAX_REFERENCES {
             counted::best_split(references, cell, options)

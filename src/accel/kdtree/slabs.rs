@@ -1,10 +1,10 @@
-//! A slab around the surface in a cell, between two parallel planes (Kay, Kajiya: Ray Tracing Complex Scenes, SIGGRAPH 1986).
-//! A ray that passes by a surface goes through many cells that have a part of it; where it keeps clear of a cell's slab it
-//! need not go down to the leaves.
+//! Slabs: the space between two parallel planes that holds the surface in a cell (Kay, Kajiya: Ray Tracing Complex
+//! Scenes, SIGGRAPH 1986). A ray that passes by a surface goes through many cells that have a part of it. Where the
+//! ray keeps clear of a cell's slab, it need not go down to the leaves.
 //!
-//! A slab holds what comes within the tree's margin (bounds.rs) of the cell, and reaches `KD_PLANE_EPSILON` beyond: as far as
-//! a ray has to keep from a triangle's plane, and for the same reasons (planes.rs), but that rounding moves a slab by 5 of
-//! the units there, where a plane is off by 4.
+//! A slab holds the parts of triangles within the tree's margin (bounds.rs) of the cell, and reaches
+//! `KD_PLANE_EPSILON` beyond them. That is as far as a ray has to keep from a triangle's plane, and the reasons are
+//! the same (planes.rs), except that rounding moves a slab by 5 of the units there, and a plane by 4.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -15,26 +15,31 @@ use crate::{
     layout::{KD_HAS_SLAB, Slab, Triangle},
 };
 
-/// Entries below a node at most: on the way down, the first node with no more than each of these gets a slab, if the surface
-/// there is flat enough to be passed by. Larger pieces hardly are (benches/EXPERIMENTS.md).
+/// The most entries below nodes that get slabs. For each of these numbers, the first node on each path down that has
+/// no more entries gets a slab, if the surface there is flat enough. Larger pieces of the surface hardly ever are
+/// (benches/EXPERIMENTS.md).
 const MOST_ENTRIES: [u32; 5] = [8, 32, 128, 512, LARGEST_PATCH];
+/// The largest of `MOST_ENTRIES`.
 const LARGEST_PATCH: u32 = 2048;
-/// Entries of a leaf at least; a single one's plane does as well.
+/// The fewest entries of a leaf that gets a slab. For a single entry, the plane of its triangle does as well.
 const LEAF_ENTRIES: u32 = 2;
-/// Of the longest side of a cell: how thick the slab of a split may be, and of a leaf.
+/// The greatest thickness of a split's slab, as a share of the longest side of the cell.
 const THICKEST_SPLIT: f64 = 0.2;
+/// The greatest thickness of a leaf's slab, as a share of the longest side of the cell.
 const THICKEST_LEAF: f64 = 0.3;
 
-/// The slabs of a tree's nodes: index, slab.
+/// Slabs of a tree's nodes: the node's index and its slab.
 type Slabs = Vec<(u32, Slab)>;
 
 impl KdTree {
-    /// Looks for flat pieces of the surface, and gives their nodes slabs.
+    /// Finds flat pieces of the surface, and gives slabs to their nodes.
     ///
-    /// The same triangles and tree give the same slabs on any number of threads. Some 200 ns an entry of the leaves.
+    /// The same triangles and tree give the same slabs on any number of threads. This takes some 200 ns for each
+    /// entry of the leaves.
     pub(super) fn add_slabs(&mut self, triangles: &[Triangle]) {
         let bounds = Bounds { min: self.cell_min().to_array(), max: self.cell_max().to_array() };
-        // The root's cell has the margin around it already: this one is larger by 2^-17 of itself.
+        // The root's cell has the margin around it already, so this margin is larger than the tree's by 2^-17 of
+        // itself.
         let margin = bounds.margin();
         let reach = f64::from(self.constants().plane_epsilon);
         let fitting = Fitting { tree: self, triangles, n_entries: self.entries_below(), margin, reach };
@@ -47,19 +52,20 @@ impl KdTree {
         }
     }
 
-    /// The node's, if it has one.
+    /// Returns the slab of a node, if it has one.
     pub fn slab_of(&self, node_ix: u32) -> Option<&Slab> {
         self.is_in_slab(node_ix).then(|| &self.slabs()[node_ix as usize])
     }
 
+    /// Whether a node has a slab.
     pub(super) fn is_in_slab(&self, node_ix: u32) -> bool {
         self.nodes()[node_ix as usize].axis_and_child & KD_HAS_SLAB != 0
     }
 
-    /// Of each node: entries of all leaves below.
+    /// Returns for each node the number of entries of all leaves below it.
     fn entries_below(&self) -> Vec<u32> {
         let mut n_entries = vec![0; self.nodes().len()];
-        // Children come after their parents.
+        // Children come after their parents, so the reverse order visits them first.
         for node in (0..self.nodes().len()).rev() {
             n_entries[node] = match self.node(node as u32) {
                 Node::Leaf { count, .. } => count,
@@ -76,26 +82,27 @@ struct Patch {
     cell: Bounds,
 }
 
+/// Inputs of the search for slabs.
 struct Fitting<'a> {
     tree: &'a KdTree,
     triangles: &'a [Triangle],
     n_entries: Vec<u32>,
-    /// World units.
+    /// Rounding margin of the cells, world units.
     margin: f32,
-    /// World units.
+    /// Distance by which a slab reaches beyond its triangles, world units.
     reach: f64,
 }
 
-/// What the leaves below a node have of the surface.
+/// The part of the surface that is in the leaves below a node, and the slabs that were found there.
 #[derive(Default)]
 struct Surface {
-    /// Of all polygons, leaf after leaf.
+    /// The corners of all polygons, leaf after leaf.
     corners: Vec<DVec3>,
     slabs: Slabs,
 }
 
 impl Fitting<'_> {
-    /// The largest pieces that may get a slab.
+    /// Returns the topmost nodes with no more than `LARGEST_PATCH` entries below them, and all leaves above those.
     fn patches(&self, root: Bounds) -> Vec<Patch> {
         let mut patches = Vec::new();
         let mut stack = vec![Patch { node: 0, cell: root }];
@@ -111,14 +118,15 @@ impl Fitting<'_> {
         patches
     }
 
+    /// Returns the slabs of a node and of all nodes below it.
     fn slabs_of(&self, patch: &Patch) -> Slabs {
         let mut surface = Surface::default();
         self.fit(patch, u32::MAX, &mut surface);
         surface.slabs
     }
 
-    /// Adds what is below a node to the surface, and its slabs; `n_above`: entries below the parent. Returns the sum of its
-    /// areas as vectors, turned to one side.
+    /// Adds the polygons below a node to the surface, and the slabs there. `n_above`: the number of entries below the
+    /// parent. Returns the sum of the polygons' area vectors, each turned to the side of the others.
     fn fit(&self, patch: &Patch, n_above: u32, surface: &mut Surface) -> DVec3 {
         let (n_entries, first_corner) = (self.n_entries[patch.node as usize], surface.corners.len());
         let (area, thickest) = match self.tree.node(patch.node) {
@@ -146,7 +154,8 @@ impl Fitting<'_> {
         area
     }
 
-    /// Across the surface's mean normal; none if the surface is thicker, or faces all ways alike.
+    /// Returns the slab whose planes are perpendicular to the surface's mean normal. Returns none if the surface is
+    /// thicker than `thickest` (world units), or if its normals cancel out.
     fn slab_around(&self, corners: &[DVec3], area: DVec3, thickest: f64) -> Option<Slab> {
         let across = area.try_normalize()?;
         let (low, high) = extent_along(corners, across);
@@ -160,7 +169,7 @@ impl Fitting<'_> {
 }
 
 impl Surface {
-    /// Returns the polygon's area as a vector.
+    /// Adds a polygon's corners. Returns its area vector, whose length is twice the area.
     fn add(&mut self, polygon: &Polygon) -> DVec3 {
         let first_corner = self.corners.len();
         self.corners.extend(polygon.corners().iter().map(|&corner| DVec3::from_array(corner)));
@@ -169,11 +178,12 @@ impl Surface {
     }
 }
 
-/// The sum of two areas, the second turned to the side of the first.
+/// Returns the sum of two area vectors, the second one turned to the side of the first.
 fn towards(area: DVec3, other: DVec3) -> DVec3 {
     if area.dot(other) < 0.0 { area - other } else { area + other }
 }
 
+/// Returns the least and the greatest height of corners along a direction.
 fn extent_along(corners: &[DVec3], direction: DVec3) -> (f64, f64) {
     corners.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), corner| {
         let height = corner.dot(direction);

@@ -1,35 +1,35 @@
-//! What a tree holds and what it costs.
+//! Sizes and cost of kd-trees.
 
 use serde::Serialize;
 
 use super::{BuildOptions, KdTree, Node};
 
-/// A tree in numbers.
+/// Statistics of a kd-tree.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Statistics {
-    /// Splits and leaves; the unused node 1 is not counted.
+    /// Splits and leaves, without the unused node 1.
     pub n_nodes: u64,
-    /// Leaves, with the empty ones.
+    /// Leaves, including the empty ones.
     pub n_leaves: u64,
     /// Leaves without triangles.
     pub n_empty_leaves: u64,
     /// Nodes with a slab around their triangles.
     pub n_slabs: u64,
-    /// Levels below the root.
+    /// The number of levels below the root.
     pub depth: u32,
-    /// Entries of all leaves.
+    /// References: entries of all leaves.
     pub n_references: u64,
-    /// References by the number of triangles; 0 for none.
+    /// References divided by the number of triangles; 0 if there are no triangles.
     pub references_per_triangle: f64,
-    /// Expected cost of a ray that crosses the root's cell, in the unit of the build's costs (MacDonald and Booth 1990):
-    /// the sum over all nodes of their own cost times the share of the root's surface that their cell has.
+    /// Expected cost of a ray that crosses the root's cell, in the unit of the build's costs (MacDonald and Booth
+    /// 1990). It is the sum over all nodes of the node's own cost times its cell's share of the root's surface.
     pub sah_cost: f64,
-    /// Nodes, parents, leaves with their planes, and slabs, in memory.
+    /// Size in memory of nodes, parents, leaves with their planes, and slabs, bytes.
     pub bytes: u64,
 }
 
 impl KdTree {
-    /// The tree in numbers. `options` are those it was built with (only their costs are read).
+    /// Computes the tree's statistics. `options`: those that it was built with, of which only the costs are read.
     pub fn statistics(&self, n_triangles: usize, options: &BuildOptions) -> Statistics {
         let mut statistics = Statistics {
             depth: self.depth(),
@@ -46,7 +46,7 @@ impl KdTree {
         let root_area = half_area(&root.0, &root.1);
         let mut stack = vec![(0, root)];
         while let Some((node_ix, (min, max))) = stack.pop() {
-            // A cell without a surface (a point, a line) counts like the root itself.
+            // If the root's cell has no surface (a point, a line), all cells count like the root.
             let share = if root_area > 0.0 { half_area(&min, &max) / root_area } else { 1.0 };
             statistics.n_nodes += 1;
             statistics.n_slabs += u64::from(self.is_in_slab(node_ix));
@@ -70,7 +70,7 @@ impl KdTree {
     }
 }
 
-/// Half of a box's surface.
+/// Returns half of a box's surface.
 fn half_area(min: &[f64; 3], max: &[f64; 3]) -> f64 {
     let [x, y, z] = [max[0] - min[0], max[1] - min[1], max[2] - min[2]];
     x * y + y * z + z * x

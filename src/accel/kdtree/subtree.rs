@@ -1,4 +1,5 @@
-//! A subtree by one thread: recursion with the references of the cells on the way in one growing and shrinking array.
+//! Build of a subtree by one thread. It is recursive; the references of the cells on the path are in one array that
+//! grows and shrinks like a stack.
 
 use std::ops::Range;
 
@@ -8,31 +9,32 @@ use crate::{
     layout::{KD_WORD_DEPTH, KdNode, Triangle},
 };
 
-/// What a build reads.
+/// Inputs of a build.
 #[derive(Clone, Copy)]
 pub struct Input<'a> {
     pub triangles: &'a [Triangle],
     pub options: &'a BuildOptions,
-    /// How far from a cell a triangle is still taken as in it, world units.
+    /// Distance from a cell within which a triangle counts as inside the cell, world units.
     pub margin: f32,
 }
 
-/// A cell to be built, without its references.
+/// A cell that is to be built, without its references.
 #[derive(Clone, Copy)]
 pub struct Cell {
     pub bounds: Bounds,
-    /// Levels below the root.
+    /// The number of levels below the root.
     pub level: u32,
-    /// References that the leaves in the cell may have.
+    /// The most references that all leaves in the cell may have together.
     pub budget: u64,
 }
 
-/// So many are not worth the second word of the traversal's mask, which slows all rays down: a cell at the first word's end
-/// is split for more only. Meshes of a million triangles have hardly a leaf of as many there (benches/EXPERIMENTS.md).
+/// Number of references that does not justify the second word of the traversal's bit mask, which slows all rays down.
+/// A cell at or below the level where the first word ends is split only if it has more. Meshes of a million triangles
+/// have hardly a leaf of as many there (benches/EXPERIMENTS.md).
 const FEW_REFERENCES: usize = 64;
 
 impl Cell {
-    /// The split to be made and its children's cells; none where a leaf is cheaper or a limit is reached.
+    /// Returns the best split and its children's cells, or none where a leaf is cheaper or a limit is reached.
     pub fn split(
         self,
         references: &[Reference],
@@ -40,7 +42,7 @@ impl Cell {
         search: &mut Search,
     ) -> Option<(Split, [Cell; 2])> {
         let leaf_cost = options.intersection_cost * references.len() as f32;
-        // A split costs a step at least.
+        // A split costs at least one step.
         if leaf_cost <= options.traversal_cost || self.level >= options.depth_limit() {
             return None;
         }
@@ -55,14 +57,15 @@ impl Cell {
             return None;
         }
         let bounds = self.bounds.split(split.axis, split.position);
-        // In proportion to the references: what a cell may have does not depend on what is built before it.
+        // The budget is divided in proportion to the references, so a cell's share does not depend on what is built
+        // before it.
         let budget = n.map(|n| self.budget * n / n_both);
         let child = |side: usize| Cell { bounds: bounds[side], level: self.level + 1, budget: budget[side] };
         Some((split, [child(0), child(1)]))
     }
 }
 
-/// The reference's parts below and above a split of its cell.
+/// Returns the reference's parts below and above a split of its cell.
 #[inline]
 pub fn sort_out(input: Input, reference: &Reference, cell: &Bounds, split: &Split) -> [Option<Reference>; 2] {
     if reference.bounds.max[split.axis] <= split.position {
@@ -73,16 +76,16 @@ pub fn sort_out(input: Input, reference: &Reference, cell: &Bounds, split: &Spli
     }
     let triangle = &input.triangles[reference.triangle_ix as usize];
     let parts = split_bounds(triangle, cell, (split.axis, split.position), input.margin);
-    // Bounds only ever shrink: each is rounded outwards by itself.
+    // Each part is rounded outwards by itself, so it is cut with the reference's own bounds: bounds only shrink.
     let limits = reference.bounds.split(split.axis, split.position);
     [0, 1].map(|side| parts[side].map(|part| Reference { bounds: part.intersection(&limits[side]), ..*reference }))
 }
 
-/// A subtree on its own: node 0 is its root and node 1 unused, as in a whole tree.
+/// A subtree on its own. Node 0 is its root and node 1 is unused, as in a whole tree.
 pub struct Subtree {
     pub nodes: Vec<KdNode>,
     pub leaf_triangles: Vec<u32>,
-    /// Levels of the deepest leaf below the whole tree's root.
+    /// Level of the deepest leaf, counted from the root of the whole tree.
     pub depth: u32,
 }
 
@@ -95,18 +98,19 @@ pub fn build(input: Input, references: Vec<Reference>, cell: Cell) -> Subtree {
     builder.subtree
 }
 
+/// State of a build.
 struct Builder<'a> {
     input: Input<'a>,
-    /// The references of the cells on the way, and of their siblings still to be built; the newest last.
+    /// The references of the cells on the path, and of their siblings that are still to be built; the newest last.
     references: Vec<Reference>,
-    /// Of the upper child, while both are sorted out.
+    /// The references of the upper child while those of both children are separated.
     above: Vec<Reference>,
     search: Search,
     subtree: Subtree,
 }
 
 impl Builder<'_> {
-    /// Builds the node of a cell into a slot, and all below it behind the last node.
+    /// Builds the node of a cell into a slot, and appends all nodes below it.
     fn node(&mut self, slot: usize, range: Range<usize>, cell: Cell) {
         let references = &self.references[range.clone()];
         let Some((split, cells)) = cell.split(references, self.input.options, &mut self.search) else {
@@ -131,7 +135,8 @@ impl Builder<'_> {
         self.subtree.depth = self.subtree.depth.max(level);
     }
 
-    /// Appends the references of both children, the lower one's first. What lies on one side only stays where it is.
+    /// Appends the references of both children, those of the lower one first, and returns their ranges. If one child
+    /// gets all references, they stay where they are.
     fn partition(&mut self, range: Range<usize>, cell: &Bounds, split: &Split) -> [Range<usize>; 2] {
         let none = range.end..range.end;
         match split.n_references {

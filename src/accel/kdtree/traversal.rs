@@ -1,37 +1,42 @@
-//! The ways of rays through a kd-tree.
+//! Algorithms that take rays through a kd-tree. They differ in how they find the pending subtrees: far children that
+//! the ray has passed and still has to visit. The paper is the one that README.md names.
 
 use crate::layout;
 
-/// How a ray finds its way through the kd-tree.
+/// Algorithm that takes a ray through the kd-tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Traversal {
-    /// A bit a level says which siblings are still to be visited, and what waits there has its place in local memory.
+    /// A bit mask: one bit a level says whether the sibling there is still to be visited. Pending subtrees are kept
+    /// in local memory, in the order of the bits.
     Mask,
-    /// The paper's own: a bit a level says which siblings are done; their boxes tell whether to visit them.
+    /// The paper's own bit mask: one bit a level says whether the sibling there is done. The siblings' boxes tell
+    /// whether the ray visits them.
     MaskBoxes,
-    /// Every subtree that was left is found again from the root.
+    /// Restarts: each pending subtree is found again from the root.
     Restart,
-    /// Back to the deepest ancestor that the ray has not left, by its box.
+    /// Backtracking: the ray goes back to the deepest ancestor that it has not left, which it finds by the nodes'
+    /// boxes.
     Backtrack,
-    /// The eight newest far children; older ones by a restart.
+    /// A short stack: the eight newest pending subtrees are kept, and older ones are found by a restart.
     ShortStack,
-    /// From leaf to leaf, by links to its neighbours.
+    /// Ropes: links from each leaf to its neighbours.
     Ropes,
-    /// An array of far children. On the CPU, sixteen rays go together.
+    /// A stack: an array of pending subtrees. On the CPU, packets of sixteen rays are traced.
     Stack,
-    /// No tree: every triangle. For small meshes.
+    /// Brute force: every triangle is tested, without a tree. For small meshes.
     Brute,
 }
 
 impl Traversal {
-    /// The paper's idea; a stack and ropes are up to a tenth faster on some scenes (README.md's figures).
+    /// The algorithm for GPUs: the paper's idea. A stack and ropes are up to a tenth faster on some scenes
+    /// (README.md's figures).
     pub const OF_GPUS: Self = Self::Mask;
-    /// What is fastest where drivers run kernels on the CPU.
+    /// The fastest algorithm on software drivers, which run kernels on the CPU.
     pub const OF_SOFTWARE_DRIVERS: Self = Self::Ropes;
-    /// What is fastest on the CPU itself.
+    /// The fastest algorithm on the CPU without a driver.
     pub const OF_CPU: Self = Self::Stack;
 
-    /// The kernels' specialization constant.
+    /// The value of the kernels' specialization constant `TRAVERSAL`.
     pub(crate) fn constant(self) -> u32 {
         match self {
             Self::Mask => layout::TRAVERSAL_MASK,
@@ -45,12 +50,12 @@ impl Traversal {
         }
     }
 
-    /// Whether it reads the nodes' boxes.
+    /// Whether the algorithm reads the nodes' boxes.
     pub(crate) fn needs_boxes(self) -> bool {
         matches!(self, Self::MaskBoxes | Self::Backtrack)
     }
 
-    /// Whether it reads the nodes' ropes.
+    /// Whether the algorithm reads the nodes' ropes.
     pub(crate) fn needs_ropes(self) -> bool {
         self == Self::Ropes
     }

@@ -1,4 +1,4 @@
-//! Checks every invariant of a tree: its structure here, what its leaves hold in `coverage`.
+//! Check of all invariants of a tree: of its structure here, of what its leaves hold in `coverage`.
 
 use super::{EMPTY_LEAF, KdTree, Node, coverage, planes::planes_of};
 use crate::{
@@ -6,7 +6,7 @@ use crate::{
     layout::{KD_MAX_DEPTH, Triangle},
 };
 
-/// The first invariant found broken.
+/// The first invariant that was found broken.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 #[expect(missing_docs, reason = "the messages say what the variants mean")]
@@ -54,8 +54,11 @@ pub enum Invalid {
 impl KdTree {
     /// Checks the tree against the triangles it was built from.
     ///
-    /// Each triangle is cut up along the planes it meets, down to the leaves: each leaf within the margin of a part must
-    /// have the triangle. Some microseconds a triangle.
+    /// Each triangle is cut up along the planes that it meets, down to the leaves. Each leaf within the margin of a
+    /// part must have the triangle. The check takes some microseconds a triangle.
+    ///
+    /// # Errors
+    /// The first invariant that does not hold.
     pub fn validate(&self, triangles: &[Triangle]) -> Result<(), Invalid> {
         let (built_of, given) = (self.n_triangles, triangles.len());
         if built_of != given {
@@ -85,10 +88,10 @@ impl KdTree {
 struct Walk<'a> {
     tree: &'a KdTree,
     triangles: &'a [Triangle],
-    /// World units.
+    /// Distance from a cell within which a triangle counts as inside the cell, world units.
     margin: f32,
     seen: Vec<bool>,
-    /// Entries of the leaves so far.
+    /// The number of entries of the leaves so far.
     n_entries: usize,
     depth: u32,
 }
@@ -99,7 +102,7 @@ impl<'a> Walk<'a> {
     }
 
     fn run(mut self, root: Bounds) -> Result<(), Invalid> {
-        // Each node is entered once, so links in a circle end too.
+        // Each node is entered once, so the walk ends even if links form a circle.
         let mut stack = vec![(0, 0, root)];
         self.seen[1] = true;
         while let Some((node, level, cell)) = stack.pop() {
@@ -144,7 +147,7 @@ impl<'a> Walk<'a> {
         if found != node {
             return Err(Invalid::Parent { pair, found, expected: node });
         }
-        // False for NaN.
+        // A NaN is not inside.
         let is_inside = position >= cell.min[axis] && position <= cell.max[axis];
         if is_inside { Ok(()) } else { Err(Invalid::Position { node, axis, position }) }
     }
