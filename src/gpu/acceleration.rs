@@ -1,4 +1,4 @@
-//! The driver's own acceleration structure over triangles, to compare with.
+//! The driver's own acceleration structure over triangles, with which kdray's structures are compared.
 
 use std::sync::Arc;
 
@@ -9,21 +9,21 @@ use super::{
     Access, Buffer, BufferUse, CommandBuffer, Commands, Context, GpuError, Timer, ray_tracing::RayTracingCalls,
 };
 
-/// A bottom level over all triangles, and a top level of one instance.
+/// The driver's acceleration structure: a bottom level over all triangles and a top level of one instance.
 pub struct Scenery {
     top: Level,
     _bottom: Level,
     build_ms: Option<f64>,
 }
 
-/// One acceleration structure and its memory.
+/// One level of the structure and its memory.
 struct Level {
     raw: vk::AccelerationStructureKHR,
     bytes: Buffer<u8>,
     context: Arc<Context>,
 }
 
-/// Geometry of a level, and how many primitives it has.
+/// Geometry of a level and its number of primitives.
 struct Contents<'a> {
     name: &'static str,
     ty: vk::AccelerationStructureTypeKHR,
@@ -32,10 +32,11 @@ struct Contents<'a> {
 }
 
 impl Scenery {
-    /// Builds both levels for fast tracing. `triangles`: elements whose first three 16-byte words begin with a corner.
+    /// Builds both levels for fast tracing. An element of `triangles` has 48 bytes: three 16-byte rows, each of which
+    /// begins with a corner.
     ///
     /// # Errors
-    /// Out of memory. Panics on a context without ray tracing.
+    /// Memory is exhausted. Panics on a context without ray tracing.
     pub fn new<T: Pod>(context: &Arc<Context>, triangles: &[T]) -> Result<Self, GpuError> {
         let corners = Buffer::with(context, "scenery corners", triangles, BufferUse::Structure)?;
         let data = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
@@ -70,18 +71,19 @@ impl Scenery {
         Ok(Self { top, _bottom: bottom, build_ms })
     }
 
-    /// Of the top level: what a ray generation shader takes as `accelerationStructureEXT`.
+    /// Returns the address of the top level, which a ray generation shader takes as `accelerationStructureEXT`.
     pub fn address(&self) -> u64 {
         self.top.address()
     }
 
-    /// GPU time of the bottom level's build; none without timestamps.
+    /// Returns the GPU time of the bottom level's build, milliseconds. `None` without timestamps.
     pub fn build_ms(&self) -> Option<f64> {
         self.build_ms
     }
 }
 
-/// VkAccelerationStructureInstanceKHR as 16 words: identity, mask 0xff, no custom index, the bottom level's address.
+/// Returns a `VkAccelerationStructureInstanceKHR` as 16 words, with the identity transform, the mask 0xff, no custom
+/// index and the bottom level's address.
 fn instance_of(address: u64) -> [u32; 16] {
     let one = 1f32.to_bits();
     let rows = [one, 0, 0, 0, 0, one, 0, 0, 0, 0, one, 0];
@@ -94,6 +96,8 @@ fn instance_of(address: u64) -> [u32; 16] {
 }
 
 impl Level {
+    /// Builds a level on the device and waits for it. Also returns the GPU time of the build, milliseconds, unless
+    /// the queue writes no timestamps.
     fn build(context: &Arc<Context>, contents: &Contents) -> Result<(Self, Option<f64>), GpuError> {
         let calls = RayTracingCalls::of(context);
         let geometries = [contents.geometry];
@@ -104,7 +108,7 @@ impl Level {
             .geometries(&geometries);
         let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
         let by_device = vk::AccelerationStructureBuildTypeKHR::DEVICE;
-        // SAFETY: one count for the one geometry.
+        // SAFETY: `info` has one geometry, and one count is given for it.
         unsafe {
             calls.structures.get_acceleration_structure_build_sizes(
                 by_device,
@@ -119,13 +123,13 @@ impl Level {
             .buffer(bytes.any().raw())
             .size(sizes.acceleration_structure_size)
             .ty(contents.ty);
-        // SAFETY: the buffer has the size that was asked for, and lives as long as the level.
+        // SAFETY: the buffer has the size that the driver requires, and lives as long as the level.
         let raw = unsafe { calls.structures.create_acceleration_structure(&create, None) }
             .map_err(GpuError::call("vkCreateAccelerationStructureKHR", contents.name))?;
         context.set_name(raw, contents.name);
         let level = Self { raw, bytes, context: context.clone() };
 
-        // Room to round the address up.
+        // The extra bytes leave room to round the address up.
         let alignment = u64::from(calls.scratch_alignment);
         let n_scratch = (sizes.build_scratch_size + alignment) as usize;
         let scratch = Buffer::<u8>::new(context, "scratch", n_scratch, BufferUse::Structure)?;
@@ -159,7 +163,8 @@ fn build(
     n_primitives: u32,
 ) {
     let range = vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(n_primitives);
-    // SAFETY: inputs, scratch and destination are buffers of the sizes asked for, kept until the device has ended.
+    // SAFETY: inputs, scratch and destination are buffers of the required sizes, which live until the device has
+    // ended the build.
     unsafe {
         calls.structures.cmd_build_acceleration_structures(commands.raw, std::slice::from_ref(info), &[&[range]]);
     }
@@ -168,7 +173,7 @@ fn build(
 impl Drop for Level {
     fn drop(&mut self) {
         let _ = &self.bytes;
-        // SAFETY: the device has ended all work with it.
+        // SAFETY: the device has ended all work with the structure.
         unsafe { RayTracingCalls::of(&self.context).structures.destroy_acceleration_structure(self.raw, None) };
     }
 }

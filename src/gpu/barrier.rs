@@ -1,35 +1,35 @@
-//! Accesses by name, for barriers that read as sentences.
+//! Named accesses to memory, between which barriers are recorded.
 
 use ash::vk::{AccessFlags2 as A, PipelineStageFlags2 as S};
 
-/// Who touches memory, and how.
+/// An access to memory: its pipeline stages, and whether it reads or writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// Reads of a kernel.
+    /// Reads of a kernel, from storage and uniform buffers.
     ComputeRead,
     /// Writes of a kernel.
     ComputeWrite,
     /// Reads and writes of a kernel that updates in place.
     ComputeUpdate,
-    /// Reads and writes of a kernel, and the reads of the sizes of its indirect dispatch.
+    /// Reads and writes of a kernel, and reads of its indirect dispatch's workgroup counts.
     KernelUpdate,
-    /// Storage that a raster pass reads.
+    /// A fragment shader's reads of storage.
     FragmentRead,
-    /// Reads of the sizes of an indirect dispatch.
+    /// Reads of an indirect dispatch's workgroup counts.
     IndirectRead,
     /// Reads of a copy.
     TransferRead,
-    /// Writes of a copy, an update or a clear.
+    /// Writes of a copy, or of an update or a fill of a buffer.
     TransferWrite,
     /// Reads of the host.
     HostRead,
-    /// Reads and writes of a ray generation shader, and the driver's reads of its structure. Only on a context with
-    /// ray tracing, like `StructureBuild`.
+    /// Reads and writes of a ray generation shader, and its reads of the driver's acceleration structure. Like
+    /// `StructureBuild`, it is valid only on a context with ray tracing.
     RayTracingUpdate,
-    /// What a build of the driver's structure reads and writes.
+    /// Reads and writes of a build of the driver's acceleration structure.
     StructureBuild,
-    /// Index, vertex, compute, uniform and indirect reads and transfers: between an upload and whatever uses it, or a frame and
-    /// the next one's uploads.
+    /// Index, vertex, compute, uniform and indirect reads, compute writes and transfers. It is for barriers between
+    /// an upload and whatever uses it, and between a frame and the next one's uploads.
     AllReads,
 }
 
@@ -41,7 +41,7 @@ impl Access {
             Self::FragmentRead => S::FRAGMENT_SHADER,
             Self::IndirectRead => S::DRAW_INDIRECT,
             Self::TransferRead => S::COPY,
-            // Updates are no copies, but clears.
+            // Vulkan counts updates and fills of buffers as clears, not as copies.
             Self::TransferWrite => S::COPY | S::CLEAR,
             Self::HostRead => S::HOST,
             Self::RayTracingUpdate => S::RAY_TRACING_SHADER_KHR,
@@ -66,7 +66,7 @@ impl Access {
             Self::RayTracingUpdate => {
                 A::SHADER_STORAGE_READ | A::SHADER_STORAGE_WRITE | A::ACCELERATION_STRUCTURE_READ_KHR
             }
-            // Corners and instances are inputs that count as shader reads.
+            // Vulkan counts the reads of the build's inputs, corners and instances, as shader reads.
             Self::StructureBuild => {
                 A::SHADER_READ | A::ACCELERATION_STRUCTURE_READ_KHR | A::ACCELERATION_STRUCTURE_WRITE_KHR
             }

@@ -6,7 +6,7 @@ use ash::vk;
 
 use super::{AnyBuffer, Constants, Context, GivenBuffer, GpuError, Target};
 
-/// What a binding number holds.
+/// Kind of the object at a binding number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BindingKind {
     /// A uniform buffer.
@@ -30,38 +30,40 @@ impl BindingKind {
     }
 }
 
-/// The object behind a binding number.
+/// Object at a binding number.
 #[derive(Clone, Copy)]
 pub enum Binding<'a> {
     /// A uniform or storage buffer.
     Buffer(&'a AnyBuffer),
-    /// Of a buffer for [`BufferUse::Texels`](super::BufferUse::Texels) or [`BufferUse::Address`](super::BufferUse::Address).
+    /// The texels of a buffer for [`BufferUse::Texels`](super::BufferUse::Texels) or
+    /// [`BufferUse::Address`](super::BufferUse::Address).
     Texels(&'a AnyBuffer),
     /// A storage image.
     Image(&'a Target),
-    /// A storage buffer of the caller's own.
+    /// A storage buffer that the library's caller owns.
     Given(GivenBuffer),
 }
 
-/// The layout of a set, shared by all pipelines that use it, with the specialization constants that they share.
+/// Layout of a descriptor set. The pipelines that use it also share its specialization constants.
 pub struct BindingLayout {
     pub(super) set_layout: vk::DescriptorSetLayout,
     pub(super) pipeline_layout: vk::PipelineLayout,
-    /// By binding number.
+    /// Binding numbers and their kinds.
     kinds: Vec<(u32, BindingKind)>,
-    /// The same for all pipelines.
+    /// Specialization constants that have the same values in all pipelines.
     pub(super) constants: Constants,
     context: Arc<Context>,
 }
 
 impl BindingLayout {
-    /// `kinds`: the bindings' numbers and what they hold; `push_bytes`: size of the push constants, for all stages.
+    /// Creates a layout. `kinds` lists the binding numbers and their kinds. `push_bytes` is the size of the push
+    /// constants, which all stages see, in bytes.
     pub fn new(context: &Arc<Context>, kinds: &[(u32, BindingKind)], push_bytes: u32) -> Result<Arc<Self>, GpuError> {
         Self::with_constants(context, kinds, push_bytes, Constants::new())
     }
 
-    /// As [`BindingLayout::new`]. `constants`: specialization constants that are the same for all pipelines; a kernel need
-    /// not declare them.
+    /// Creates a layout as [`BindingLayout::new`] does. `constants` are specialization constants that have the same
+    /// values in all pipelines. A kernel need not declare them.
     pub fn with_constants(
         context: &Arc<Context>,
         kinds: &[(u32, BindingKind)],
@@ -80,7 +82,7 @@ impl BindingLayout {
             })
             .collect();
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-        // SAFETY: all that the infos point to lives until the calls return; `Drop` takes what was made.
+        // SAFETY: all that the infos point to lives until the calls return, and `Drop` releases what was made.
         unsafe {
             let set_layout = context
                 .device
@@ -107,7 +109,7 @@ impl BindingLayout {
 
 impl Drop for BindingLayout {
     fn drop(&mut self) {
-        // SAFETY: pipelines and sets hold the bindings, so none is left.
+        // SAFETY: pipelines and sets hold the layout, so none is left.
         unsafe {
             self.context.device.destroy_pipeline_layout(self.pipeline_layout, None);
             self.context.device.destroy_descriptor_set_layout(self.set_layout, None);
@@ -115,7 +117,7 @@ impl Drop for BindingLayout {
     }
 }
 
-/// One set, complete. Its buffers and images must outlive the commands that use it.
+/// A complete descriptor set. Its buffers and images must outlive the commands that use it.
 pub struct BindingSet {
     pub(super) raw: vk::DescriptorSet,
     pool: vk::DescriptorPool,
@@ -123,8 +125,11 @@ pub struct BindingSet {
 }
 
 impl BindingSet {
-    /// `objects`: one for each of the bindings, with its number. A buffer that is larger than what the device binds is
-    /// bound in part: kernels read it another way.
+    /// Creates a set. `objects` has one object for each binding of the layout, with its number. If a buffer exceeds
+    /// what the device can bind, only its first part is bound: kernels read it as texels or by address instead.
+    ///
+    /// # Panics
+    /// An object is missing or has no binding in the layout.
     pub fn new(bindings: &Arc<BindingLayout>, name: &str, objects: &[(u32, Binding)]) -> Result<Self, GpuError> {
         assert_eq!(objects.len(), bindings.kinds.len(), "one object a binding");
         let context = &bindings.context;
@@ -135,7 +140,7 @@ impl BindingSet {
             .map(|(_, kind)| vk::DescriptorPoolSize { ty: kind.descriptor(), descriptor_count: 1 })
             .collect();
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
-        // SAFETY: the pool has room for exactly this set and goes with it.
+        // SAFETY: the pool has room for exactly this set, and is destroyed with it.
         unsafe {
             let pool = context
                 .device
@@ -196,7 +201,7 @@ impl BindingSet {
 
 impl Drop for BindingSet {
     fn drop(&mut self) {
-        // SAFETY: the device has ended all work with it; the pool takes the set along.
+        // SAFETY: the device has ended all work with the set, which is freed with its pool.
         unsafe { self.bindings.context.device.destroy_descriptor_pool(self.pool, None) };
     }
 }

@@ -1,4 +1,4 @@
-//! Typed buffers.
+//! Typed buffers in the device's memory, with uploads and downloads.
 
 use std::{marker::PhantomData, mem::ManuallyDrop, sync::Arc};
 
@@ -8,32 +8,32 @@ use gpu_allocator::{MemoryLocation, vulkan::Allocation};
 
 use super::{Access, Context, GpuError};
 
-/// What an upload copies at a time, at most, so that it takes little memory beside the buffer's own.
+/// Greatest size of one part of an upload, bytes. It bounds the memory that an upload takes beside the buffer's own.
 const MOST_STAGING_BYTES: usize = 64 << 20;
-/// Of a vector of four: what a kernel reads at once by address.
+/// Size of a vector of four words, bytes. Kernels read as much at once by address.
 const ROW_BYTES: u64 = 16;
 
-/// What kernels do with a buffer. Every buffer can be copied from and to.
+/// How kernels use a buffer. Every buffer can also be copied from and to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BufferUse {
-    /// A storage buffer that is bound.
+    /// A bound storage buffer.
     Storage,
-    /// A uniform buffer.
+    /// A bound uniform buffer.
     Uniform,
-    /// Storage that also sizes indirect dispatches.
+    /// A bound storage buffer that also holds workgroup counts of indirect dispatches.
     Indirect,
-    /// Vertices' numbers, for draws alone.
+    /// Vertex indices, only for draws.
     Index,
-    /// Storage that kernels may fetch as texels, of four words, of two or of one, as its elements are made of: it may be larger
-    /// than what can be bound.
+    /// Storage that kernels may fetch as texels. The size of the elements decides whether a texel has four words, two
+    /// or one. The buffer may be larger than what can be bound.
     Texels,
-    /// The same, and read by its address.
+    /// As `Texels`, and kernels may read the buffer by its address.
     Address,
-    /// Whatever the driver's own ray tracing reads and writes, by address.
+    /// Data that the driver's own ray tracing reads and writes by address.
     Structure,
 }
 
-/// The size of the widest texel of which a `T` can be made: 16, 8 or 4 bytes.
+/// Returns the size of the widest texel that divides a `T` evenly: 16, 8 or 4 bytes.
 pub const fn texel_bytes<T>() -> u64 {
     match size_of::<T>() % 16 {
         0 => 16,
@@ -42,8 +42,8 @@ pub const fn texel_bytes<T>() -> u64 {
     }
 }
 
-/// `len` elements of `T` in the device's memory. A clone is a second handle to the same memory, which is released with
-/// its last handle.
+/// A buffer of `len` elements of `T` in the device's memory. A clone is a second handle to the same memory, which is
+/// released with its last handle.
 #[derive(Clone)]
 pub struct Buffer<T> {
     any: Arc<AnyBuffer>,
@@ -51,22 +51,23 @@ pub struct Buffer<T> {
     element: PhantomData<T>,
 }
 
-/// A buffer of unnamed element type: what descriptors and copies take.
+/// A buffer without its element type, as descriptors and copies take it.
 pub struct AnyBuffer {
     raw: vk::Buffer,
     allocation: ManuallyDrop<Allocation>,
     bytes: u64,
-    /// Null where it has no texels.
+    /// Texel view of the buffer. Null if its use includes no texels.
     texels: vk::BufferView,
     name: String,
     context: Arc<Context>,
 }
 
 impl<T: Pod> Buffer<T> {
-    /// An empty buffer has room for one element, since Vulkan knows none without bytes. Contents are undefined.
+    /// Creates a buffer of `len` elements with undefined contents. An empty buffer has room for one element, since
+    /// Vulkan has no buffers of 0 bytes.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
+    /// The buffer exceeds the device's limits, or memory is exhausted.
     pub fn new(context: &Arc<Context>, name: &str, len: usize, usage: BufferUse) -> Result<Self, GpuError> {
         let bytes = (len.max(1) * size_of::<T>()) as u64;
         let is_bound = matches!(usage, BufferUse::Storage | BufferUse::Uniform | BufferUse::Indirect);
@@ -102,21 +103,21 @@ impl<T: Pod> Buffer<T> {
         Ok(Self { any: Arc::new(any), len, element: PhantomData })
     }
 
-    /// A buffer that holds `data`.
+    /// Creates a buffer that holds `data`.
     ///
     /// # Errors
-    /// As [`Buffer::new`]; a failed copy.
+    /// Fails as [`Buffer::new`] does, or if a copy fails.
     pub fn with(context: &Arc<Context>, name: &str, data: &[T], usage: BufferUse) -> Result<Self, GpuError> {
         let buffer = Self::new(context, name, data.len(), usage)?;
         buffer.upload(data)?;
         Ok(buffer)
     }
 
-    /// A buffer of `len` elements, which `write(first, part)` makes in parts: those from element `first` on. They are never
-    /// in the host's memory together.
+    /// Creates a buffer of `len` elements, which `write(first, part)` makes part by part: `part` begins with element
+    /// `first`. At most 64 MiB of the elements are in the host's memory at a time.
     ///
     /// # Errors
-    /// As [`Buffer::new`]; a failed copy.
+    /// Fails as [`Buffer::new`] does, or if a copy fails.
     pub fn written_by(
         context: &Arc<Context>,
         name: &str,
@@ -129,7 +130,7 @@ impl<T: Pod> Buffer<T> {
         Ok(buffer)
     }
 
-    /// Elements.
+    /// Returns the number of elements.
     pub fn len(&self) -> usize {
         self.len
     }
@@ -139,13 +140,16 @@ impl<T: Pod> Buffer<T> {
         self.len == 0
     }
 
-    /// Overwrites the first `data.len()` elements; waits for the device.
+    /// Overwrites the first `data.len()` elements and waits for the device.
+    ///
+    /// # Panics
+    /// The buffer has fewer elements.
     pub fn upload(&self, data: &[T]) -> Result<(), GpuError> {
         assert!(data.len() <= self.len, "`{}` holds {} elements, not {}", self.any.name, self.len, data.len());
         self.upload_by(data.len(), |first, part| part.copy_from_slice(&data[first..][..part.len()]))
     }
 
-    /// Overwrites the first `len` elements, part by part, with what `write` makes of them; waits for the device.
+    /// Overwrites the first `len` elements with what `write` makes, part by part, and waits for the device.
     fn upload_by(&self, len: usize, mut write: impl FnMut(usize, &mut [T])) -> Result<(), GpuError> {
         if len == 0 {
             return Ok(());
@@ -166,12 +170,15 @@ impl<T: Pod> Buffer<T> {
         Ok(())
     }
 
-    /// All elements; waits for the device.
+    /// Downloads all elements and waits for the device.
     pub fn download(&self) -> Result<Vec<T>, GpuError> {
         self.download_first(self.len)
     }
 
-    /// The first `len` elements; waits for the device.
+    /// Downloads the first `len` elements and waits for the device.
+    ///
+    /// # Panics
+    /// The buffer has fewer elements.
     pub fn download_first(&self, len: usize) -> Result<Vec<T>, GpuError> {
         assert!(len <= self.len, "`{}` holds {} elements, not {len}", self.any.name, self.len);
         let bytes = len * size_of::<T>();
@@ -190,12 +197,13 @@ impl<T: Pod> Buffer<T> {
         Ok(data)
     }
 
-    /// The buffer without its element type.
+    /// Returns the buffer without its element type.
     pub fn any(&self) -> &AnyBuffer {
         &self.any
     }
 
-    /// Of a buffer for [`BufferUse::Address`], low word first, as kernels take it. A multiple of 16.
+    /// Returns the address of a buffer for [`BufferUse::Address`], low word first, as kernels take it. It is a
+    /// multiple of 16.
     pub fn address(&self) -> [u32; 2] {
         let address = self.any.address();
         [address as u32, (address >> 32) as u32]
@@ -213,11 +221,11 @@ impl AnyBuffer {
         context.count_creation("vkCreateBuffer", name)?;
         let device = &context.device;
         let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
-        // SAFETY: the raw buffer is destroyed on each way out that does not hand it to an owner.
+        // SAFETY: the raw buffer is destroyed on every path that does not hand it to an owner.
         unsafe {
             let raw = device.create_buffer(&info, None).map_err(GpuError::call("vkCreateBuffer", name))?;
             let mut requirements = device.get_buffer_memory_requirements(raw);
-            // By address, kernels read whole rows.
+            // Kernels that read by address read four aligned words at once.
             requirements.alignment = requirements.alignment.max(ROW_BYTES);
             let allocation = match context.allocate(name, requirements, location, true) {
                 Ok(allocation) => ManuallyDrop::new(allocation),
@@ -242,7 +250,7 @@ impl AnyBuffer {
         }
     }
 
-    /// As many of its texels as the device has in one buffer.
+    /// Adds a view of the buffer's texels, as many as the device allows in one view.
     fn add_texels(&mut self, texel_bytes: u64) -> Result<(), GpuError> {
         self.context.count_creation("vkCreateBufferView", &self.name)?;
         let format = match texel_bytes {
@@ -252,17 +260,19 @@ impl AnyBuffer {
         };
         let range = self.bytes.min(u64::from(self.context.limits().n_texels) * texel_bytes);
         let info = vk::BufferViewCreateInfo::default().buffer(self.raw).format(format).range(range);
-        // SAFETY: the buffer was created with the usage that allows it; all devices have these formats.
+        // SAFETY: the buffer was created with the usage that allows texel views, and all devices have these formats.
         self.texels = unsafe { self.context.device.create_buffer_view(&info, None) }
             .map_err(GpuError::call("vkCreateBufferView", &self.name))?;
         Ok(())
     }
 
+    /// Creates a host-visible buffer for an upload or a download.
     fn staging(context: &Arc<Context>, name: &str, bytes: u64, location: MemoryLocation) -> Result<Self, GpuError> {
         let usage = vk::BufferUsageFlags::TRANSFER_SRC | vk::BufferUsageFlags::TRANSFER_DST;
         Self::new(context, &format!("{name} staging"), bytes, usage, location)
     }
 
+    /// Returns the bytes of a host-visible buffer.
     fn mapped(&mut self) -> &mut [u8] {
         self.allocation.mapped_slice_mut().expect("host-visible memory stays mapped")
     }
@@ -271,24 +281,24 @@ impl AnyBuffer {
         self.raw
     }
 
-    /// Of a buffer for [`BufferUse::Texels`] or [`BufferUse::Address`].
+    /// Returns the texel view of a buffer for [`BufferUse::Texels`] or [`BufferUse::Address`].
     pub(super) fn texels(&self) -> vk::BufferView {
         self.texels
     }
 
-    /// Of a buffer for [`BufferUse::Address`] or [`BufferUse::Structure`].
+    /// Returns the address of a buffer for [`BufferUse::Address`] or [`BufferUse::Structure`].
     pub(super) fn address(&self) -> vk::DeviceAddress {
         let info = vk::BufferDeviceAddressInfo::default().buffer(self.raw);
-        // SAFETY: the buffer was created with the usage that allows it.
+        // SAFETY: the buffer was created with the usage that allows addresses.
         unsafe { self.context.device.get_buffer_device_address(&info) }
     }
 
-    /// The buffer's debug label.
+    /// Returns the buffer's debug label.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Size in bytes.
+    /// Returns the size in bytes.
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
@@ -296,7 +306,8 @@ impl AnyBuffer {
 
 impl Drop for AnyBuffer {
     fn drop(&mut self) {
-        // SAFETY: the device has ended all work on it: `Context::run` waits, and a frame's owner does.
+        // SAFETY: the device has ended all work on the buffer: `Context::run` waits for it, and so does a frame's
+        // owner.
         unsafe {
             self.context.device.destroy_buffer_view(self.texels, None);
             self.context.device.destroy_buffer(self.raw, None);

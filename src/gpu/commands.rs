@@ -1,4 +1,4 @@
-//! Recording commands.
+//! Command buffers, and the commands that are recorded in them.
 
 use std::{cell::Cell, ffi::CString, sync::Arc};
 
@@ -17,7 +17,7 @@ pub struct CommandBuffer {
     context: Arc<Context>,
 }
 
-/// What is being recorded: the body of [`CommandBuffer::record`].
+/// A command buffer that is being recorded. [`CommandBuffer::record`] hands it to its body.
 pub struct Commands<'a> {
     pub(super) raw: vk::CommandBuffer,
     pub(super) context: &'a Context,
@@ -25,49 +25,51 @@ pub struct Commands<'a> {
     has_passes: Cell<bool>,
 }
 
-/// How many invocations a kernel runs with.
+/// The grid of a dispatch.
 #[derive(Clone, Copy)]
 pub enum Dispatch<'a> {
-    /// Invocations and workgroup size, each x, y, z.
+    /// Numbers of invocations along x, y and z, rounded up to whole workgroups, and the workgroup's size along x, y
+    /// and z.
     Threads([u32; 3], [u32; 3]),
-    /// Workgroups x, y, z at a byte offset of a buffer.
+    /// A buffer and the byte offset at which it holds the numbers of workgroups along x, y and z.
     Indirect(&'a AnyBuffer, u64),
 }
 
-/// A rectangle of pixels, from the upper left corner.
+/// A rectangle of pixels. Rows and columns count from the upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Area {
     /// The first column.
     pub x: u32,
     /// The first row.
     pub y: u32,
-    /// Columns.
+    /// The number of columns.
     pub width: u32,
-    /// Rows.
+    /// The number of rows.
     pub height: u32,
 }
 
-/// What is drawn, and where.
+/// Description of a draw: its triangles and its targets.
 pub struct DrawDesc<'a> {
-    /// Takes the triangle's index of each pixel.
+    /// Takes the index of each pixel's triangle.
     pub ids: &'a Target,
     /// Takes the depth of each pixel.
     pub depth: &'a Target,
-    /// Width and height of the picture that clip space spans, pixels; the targets are no smaller.
+    /// Width and height of the picture that clip space spans, pixels. The targets are no smaller.
     pub picture: (u32, u32),
-    /// The part of it to draw: the same, bit for bit, as if all of it were drawn. The rest stays as it is.
+    /// The part of the picture to draw. Its pixels are the same, bit for bit, as if the whole picture were drawn. The
+    /// rest of the targets is left unchanged.
     pub area: Area,
-    /// Three vertices a triangle.
+    /// Number of triangles. It is used only without `indices`.
     pub n_triangles: u32,
-    /// The vertices' numbers; without any, they are 0, 1, 2 and so on.
+    /// Vertex indices, three for each triangle. If the buffer is empty, they are 0, 1, 2 and so on.
     pub indices: &'a Buffer<u32>,
 }
 
 impl CommandBuffer {
-    /// Records `body` under a debug label; with a timer each pass in it gets a row.
+    /// Records `body` under a debug label. With a timer, each pass in it gets a row.
     ///
     /// # Errors
-    /// Out of memory.
+    /// Memory is exhausted.
     pub fn record(
         context: &Arc<Context>,
         name: &str,
@@ -77,22 +79,22 @@ impl CommandBuffer {
         context.count_creation("vkAllocateCommandBuffers", name)?;
         let device = &context.device;
         let info = vk::CommandBufferAllocateInfo::default().command_pool(context.command_pool).command_buffer_count(1);
-        // SAFETY: the pool is used by one thread at a time.
+        // SAFETY: only one thread uses the pool at a time.
         let raw = unsafe { device.allocate_command_buffers(&info) }
             .map_err(GpuError::call("vkAllocateCommandBuffers", name))?[0];
         let buffer = Self { raw, name: name.to_owned(), context: context.clone() };
         context.set_name(raw, name);
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: the buffer is new.
+        // SAFETY: the buffer is new, so nothing else uses it.
         unsafe { device.begin_command_buffer(raw, &begin) }.map_err(GpuError::call("vkBeginCommandBuffer", name))?;
         let commands = Commands { raw, context, timer, has_passes: Cell::new(false) };
         commands.labelled(name, || body(&commands));
-        // SAFETY: it is being recorded.
+        // SAFETY: the buffer is being recorded.
         unsafe { device.end_command_buffer(raw) }.map_err(GpuError::call("vkEndCommandBuffer", name))?;
         Ok(buffer)
     }
 
-    /// The buffer's debug label.
+    /// Returns the buffer's debug label.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -109,20 +111,21 @@ impl CommandBuffer {
 
 impl Drop for CommandBuffer {
     fn drop(&mut self) {
-        // SAFETY: its owner has waited for the device, or has left the buffer to the context; then the handle is null.
+        // SAFETY: its owner has waited for the device, or has left the buffer to the context. In the second case the
+        // handle is null, which Vulkan ignores.
         unsafe { self.context.device.free_command_buffers(self.context.command_pool, &[self.raw]) };
     }
 }
 
 impl<'a> Commands<'a> {
-    /// Commands of a buffer that the caller records and submits.
+    /// Wraps a command buffer that the caller records and submits. Its passes are not timed.
     pub(super) fn to_given(context: &'a Context, raw: vk::CommandBuffer) -> Self {
         Self { raw, context, timer: None, has_passes: Cell::new(false) }
     }
 }
 
 impl Commands<'_> {
-    /// One pass: its name is the debug label and the timer's row.
+    /// Records one pass. Its name is its debug label and its row of the timer, which shows `number` beside it.
     pub(super) fn pass(&self, name: &'static str, number: Option<u32>, body: impl FnOnce()) {
         if let Some(timer) = self.timer {
             timer.begin(self.raw, name, number, !self.has_passes.replace(true));
@@ -133,10 +136,11 @@ impl Commands<'_> {
         }
     }
 
+    /// Records `body` under a debug label, if commands get labels.
     fn labelled(&self, name: &str, body: impl FnOnce()) {
         let label = CString::new(name).unwrap_or_default();
         let debug_utils = self.context.debug_utils.as_ref().filter(|_| self.context.has_labels);
-        // SAFETY: the commands are being recorded; begin and end come in pairs.
+        // SAFETY: the commands are being recorded, and each label that begins also ends.
         unsafe {
             if let Some(debug_utils) = debug_utils {
                 let label = vk::DebugUtilsLabelEXT::default().label_name(&label);
@@ -149,16 +153,16 @@ impl Commands<'_> {
         }
     }
 
-    /// Starts the timer's frame.
+    /// Begins the timer's frame, if there is a timer.
     pub fn reset_timer(&self) {
         if let Some(timer) = self.timer {
             timer.reset(self.raw);
         }
     }
 
-    /// Binds the set for all kernels of this command buffer.
+    /// Binds the set for all pipelines of this command buffer.
     pub fn bind(&self, set: &BindingSet) {
-        // SAFETY: the set is complete, and its layout is every pipeline's.
+        // SAFETY: the set is complete, and all pipelines have its layout.
         unsafe {
             let ray_tracing = self.context.ray_tracing.as_ref().map(|_| vk::PipelineBindPoint::RAY_TRACING_KHR);
             let points = [vk::PipelineBindPoint::COMPUTE, vk::PipelineBindPoint::GRAPHICS];
@@ -169,12 +173,14 @@ impl Commands<'_> {
         }
     }
 
-    /// Runs a kernel with the bound set, as a pass of its name. `number` goes beside the name in the timer's row.
+    /// Runs a kernel with the bound set, as a pass of the kernel's name. `number` is shown beside the name in the
+    /// timer's row.
     pub fn dispatch(&self, pipeline: &ComputePipeline, number: Option<u32>, push: &impl Pod, dispatch: Dispatch) {
         self.dispatch_after(|| (), pipeline, number, push, dispatch);
     }
 
-    /// As [`Commands::dispatch`], with transfers and barriers that are a part of the pass.
+    /// Runs a kernel as [`Commands::dispatch`] does, after the transfers and barriers that `prepare` records in the
+    /// same pass.
     pub fn dispatch_after(
         &self,
         prepare: impl FnOnce(),
@@ -192,7 +198,7 @@ impl Commands<'_> {
     fn launch(&self, pipeline: &ComputePipeline, push: &impl Pod, dispatch: Dispatch) {
         let device = &self.context.device;
         let stages = self.context.stages();
-        // SAFETY: the set is bound; push constants fit the layout's range.
+        // SAFETY: the set is bound, and the push constants fit the layout's range.
         unsafe {
             device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.raw);
             let layout = pipeline.bindings.pipeline_layout;
@@ -206,7 +212,7 @@ impl Commands<'_> {
         }
     }
 
-    /// Rasterizes triangles into the cleared area of the targets: IDs to u32::MAX, depth to 0 (far).
+    /// Clears the area of the targets, IDs to `u32::MAX` and depth to 0 (far), and rasterizes triangles into it.
     pub fn draw(&self, pipeline: &RasterPipeline, desc: &DrawDesc) {
         self.pass(pipeline.name, None, || self.rasterize(pipeline, desc));
     }
@@ -240,7 +246,7 @@ impl Commands<'_> {
             max_depth: 1.0,
             ..vk::Viewport::default()
         };
-        // SAFETY: the targets are in the named layouts (`begin_targets`), the set is bound.
+        // SAFETY: `begin_targets` has put the targets into the named layouts, and the set is bound.
         unsafe {
             device.cmd_begin_rendering(self.raw, &rendering);
             device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::GRAPHICS, pipeline.raw);
@@ -256,7 +262,7 @@ impl Commands<'_> {
         }
     }
 
-    /// Everything that `source` did before is seen by `destination` after.
+    /// Makes everything that `source` did before visible to `destination` after.
     pub fn barrier(&self, source: Access, destination: Access) {
         let barrier = [vk::MemoryBarrier2::default()
             .src_stage_mask(source.stages())
@@ -264,14 +270,14 @@ impl Commands<'_> {
             .dst_stage_mask(destination.stages())
             .dst_access_mask(destination.accesses())];
         let info = vk::DependencyInfo::default().memory_barriers(&barrier);
-        // SAFETY: the commands are being recorded, outside rendering.
+        // SAFETY: the commands are being recorded, and no rendering is open.
         unsafe { self.context.device.cmd_pipeline_barrier2(self.raw, &info) };
     }
 
-    /// Makes the targets ready to be drawn to; their contents are dropped.
+    /// Prepares the targets for drawing and discards their contents.
     pub fn begin_targets(&self, ids: &Target, depth: &Target) {
         let tests = vk::PipelineStageFlags2::EARLY_FRAGMENT_TESTS | vk::PipelineStageFlags2::LATE_FRAGMENT_TESTS;
-        // Kernels of the frame before may still read the IDs, its tests still write the depth.
+        // Kernels of the previous frame may still read the IDs, and its depth tests may still write the depth.
         self.transition(
             ids,
             (vk::PipelineStageFlags2::COMPUTE_SHADER, vk::AccessFlags2::NONE, vk::ImageLayout::UNDEFINED),
@@ -290,7 +296,7 @@ impl Commands<'_> {
         );
     }
 
-    /// Hands drawn IDs to kernels.
+    /// Makes drawn IDs visible to kernels.
     pub fn color_to_compute(&self, ids: &Target) {
         self.transition(
             ids,
@@ -303,7 +309,7 @@ impl Commands<'_> {
         );
     }
 
-    /// Makes an ID target ready for kernels; its content is dropped.
+    /// Prepares an ID target for kernels and discards its contents.
     pub fn discard_for_compute(&self, ids: &Target) {
         self.transition(
             ids,
@@ -316,6 +322,7 @@ impl Commands<'_> {
         self.transition_image(target.raw, target.range(), from, to);
     }
 
+    /// Records a layout transition between two states of an image.
     fn transition_image(&self, image: vk::Image, range: vk::ImageSubresourceRange, from: LayoutState, to: LayoutState) {
         let barrier = [vk::ImageMemoryBarrier2::default()
             .image(image)
@@ -327,15 +334,18 @@ impl Commands<'_> {
             .dst_access_mask(to.1)
             .new_layout(to.2)];
         let info = vk::DependencyInfo::default().image_memory_barriers(&barrier);
-        // SAFETY: the commands are being recorded, outside rendering.
+        // SAFETY: the commands are being recorded, and no rendering is open.
         unsafe { self.context.device.cmd_pipeline_barrier2(self.raw, &info) };
     }
 
-    /// Overwrites the first bytes with data that travels in the command buffer: 64 KiB at most.
+    /// Overwrites the first bytes of a buffer with data that is stored in the command buffer.
+    ///
+    /// # Panics
+    /// The data exceeds 64 KiB or the buffer, or is not a multiple of 4 bytes.
     pub fn update_buffer(&self, destination: &AnyBuffer, data: &impl Pod) {
         let bytes = bytemuck::bytes_of(data);
         assert!(bytes.len() as u64 <= destination.bytes() && bytes.len() <= 1 << 16 && bytes.len().is_multiple_of(4));
-        // SAFETY: the commands are being recorded, outside rendering, and the buffer holds that many bytes.
+        // SAFETY: the commands are being recorded, no rendering is open, and the buffer holds that many bytes.
         unsafe { self.context.device.cmd_update_buffer(self.raw, destination.raw(), 0, bytes) };
     }
 
@@ -344,21 +354,21 @@ impl Commands<'_> {
         self.fill_buffer(buffer, 0);
     }
 
-    /// Fills a buffer with a word.
+    /// Fills a buffer with copies of a word.
     pub fn fill_buffer(&self, buffer: &AnyBuffer, word: u32) {
-        // SAFETY: the commands are being recorded, outside rendering.
+        // SAFETY: the commands are being recorded, and no rendering is open.
         unsafe { self.context.device.cmd_fill_buffer(self.raw, buffer.raw(), 0, vk::WHOLE_SIZE, word) };
     }
 
-    /// Copies the first `bytes`.
+    /// Copies the source's first `bytes` bytes to the beginning of the destination.
     pub fn copy_buffer(&self, source: &AnyBuffer, destination: &AnyBuffer, bytes: u64) {
         self.copy_buffer_to((destination, 0), source, bytes);
     }
 
-    /// Copies the source's first `bytes` to where the destination's byte `begin` stands.
+    /// Copies the source's first `bytes` bytes to the destination, from its byte `begin` on.
     pub fn copy_buffer_to(&self, (destination, begin): (&AnyBuffer, u64), source: &AnyBuffer, bytes: u64) {
         let region = [vk::BufferCopy::default().dst_offset(begin).size(bytes)];
-        // SAFETY: both buffers hold that many bytes, which their owners have checked.
+        // SAFETY: both buffers hold that many bytes, as their owners have checked.
         unsafe { self.context.device.cmd_copy_buffer(self.raw, source.raw(), destination.raw(), &region) };
     }
 }
@@ -366,17 +376,21 @@ impl Commands<'_> {
 /// A rectangle of pixels in a buffer of rows, 4 bytes a pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct PixelRows {
-    /// The byte at which the first pixel is.
+    /// Offset of the first pixel, bytes.
     pub offset: u64,
-    /// Pixels from a row to the next.
+    /// Distance from one row to the next, pixels.
     pub stride: u32,
     /// Width and height, pixels.
     pub size: (u32, u32),
 }
 
 impl Commands<'_> {
-    /// Copies pixels into an image of the caller's own, from its upper left corner on. Needs `Access::TransferRead` of the
-    /// buffer. The image has its last layout afterwards, and what waits for the end of the commands sees the pixels.
+    /// Copies pixels to the upper left corner of an image that the caller owns. Needs a barrier to
+    /// `Access::TransferRead` of the buffer. Leaves the image in the second of its layouts. Whoever waits for the end
+    /// of the commands sees the pixels.
+    ///
+    /// # Panics
+    /// The image is smaller than the rectangle.
     pub fn copy_to_given(&self, source: &AnyBuffer, rows: &PixelRows, image: &GivenImage) {
         let (width, height) = rows.size;
         assert!(width <= image.size.0 && height <= image.size.1, "the image has room for the pixels");
@@ -390,9 +404,9 @@ impl Commands<'_> {
         let (copy, written) = (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE);
         let copying = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
         self.transition_given(image, (copy, vk::AccessFlags2::NONE, before), (copy, written, copying));
-        // SAFETY: the buffer holds the rows, which its owner has checked; the image is in this layout.
+        // SAFETY: the buffer holds the rows, as its owner has checked, and the image is in this layout.
         unsafe { self.context.device.cmd_copy_buffer_to_image(self.raw, source.raw(), image.raw, copying, &region) };
-        // The semaphore that is signalled next waits for copies.
+        // `Context::submit_copies` signals its semaphore at the stage COPY, so the transition ends at this stage.
         self.transition_given(image, (copy, written, copying), (copy, vk::AccessFlags2::NONE, after));
     }
 
@@ -403,5 +417,5 @@ impl Commands<'_> {
     }
 }
 
-/// Stages and accesses on one side of a layout transition.
+/// Stages, accesses and image layout on one side of a layout transition.
 type LayoutState = (vk::PipelineStageFlags2, vk::AccessFlags2, vk::ImageLayout);

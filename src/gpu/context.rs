@@ -1,4 +1,4 @@
-//! A device in use: its queue, its memory, its limits.
+//! The context: an open Vulkan device with its queue, its memory and its limits.
 
 use std::{
     ffi::CString,
@@ -22,74 +22,79 @@ use super::{
     statistics::StatisticsCalls,
 };
 
-/// Which device to use, and how.
+/// Options of a context: which device it opens, and how.
 #[derive(Clone, Debug, Default)]
 pub struct ContextOptions {
-    /// None: the best GPU, a software driver where there is none.
+    /// The device to open. `None` selects the best GPU, or a software driver if there is no GPU.
     pub device: Option<DeviceSelector>,
-    /// Run under the Khronos validation layer with synchronization validation. Commands have no debug labels then.
+    /// Whether the Khronos validation layer runs, with synchronization validation. Commands then have no debug
+    /// labels.
     pub validate: bool,
-    /// What the device is taken for in tests.
+    /// Properties that tests substitute for the device's own.
     #[doc(hidden)]
     pub pretend: DeviceOverrides,
 }
 
 impl ContextOptions {
-    /// The best device, or the selected one, under the validation layer if `validate` says so.
+    /// Returns options for the selected device, or for the best one if `device` is `None`. `validate` turns the
+    /// validation layer on.
     pub fn new(device: Option<DeviceSelector>, validate: bool) -> Self {
         Self { device, validate, pretend: DeviceOverrides::default() }
     }
 }
 
-/// [`DeviceInfo::kind`] of a driver that computes on the CPU.
+/// The [`DeviceInfo::kind`] of a driver that computes on the CPU.
 const SOFTWARE: &str = "CPU";
 
 /// A Vulkan device with one queue for graphics and compute.
 pub struct Context {
     pub(super) device: ash::Device,
     pub(super) debug_utils: Option<ext::debug_utils::Device>,
-    /// Whether commands get debug labels. Not under the validation layer: that of Debian 12 (1.3.239) corrupts its heap after
-    /// some ten thousand labelled command buffers.
+    /// Whether commands get debug labels. They get none under the validation layer, because that of Debian 12
+    /// (1.3.239) corrupts its heap after some ten thousand labelled command buffers.
     pub(super) has_labels: bool,
     pub(super) command_pool: vk::CommandPool,
     pub(super) timestamp_period_ns: f32,
     pub(super) timestamp_valid_bits: u32,
+    /// `None` if the context was opened without the driver's ray tracing.
     pub(super) ray_tracing: Option<RayTracingCalls>,
-    /// None where the device lacks the extension.
+    /// `None` if the device lacks `VK_KHR_pipeline_executable_properties`.
     pub(super) statistics: Option<StatisticsCalls>,
-    /// Kernels can do without bounds checks.
+    /// Whether pipelines can be made without bounds checks.
     pub(super) unchecked: bool,
+    /// Whether kernels have 64-bit atomics on buffers.
     wide_atomics: bool,
-    /// None where the device was opened without a window.
+    /// Functions of the swapchain extension. `None` if the device was opened without a window.
     pub(super) presentation: Option<khr::swapchain::Device>,
     #[cfg(feature = "view")]
     pub(super) physical: vk::PhysicalDevice,
     pub(super) queue: vk::Queue,
-    /// Shared with the overlay's renderer, which ends before the context.
+    /// Shared with the overlay's renderer, which is dropped before the context.
     pub(super) allocator: ManuallyDrop<Arc<Mutex<Allocator>>>,
     info: DeviceInfo,
     predicates_branches: bool,
     limits: Limits,
     fuses_fma: OnceLock<bool>,
     n_lanes: OnceLock<u32>,
+    /// See [`Context::loop_limit`].
     loop_limit: OnceLock<Option<u32>>,
     pretend: DeviceOverrides,
     pub(super) refusal: Refusal,
     #[cfg(feature = "hot-reload")]
     pub(super) replacements: Mutex<super::Replacements>,
-    /// Command buffers that nobody waits for, freed when the queue is idle.
+    /// Submitted command buffers that have no owner. They are freed when the queue is idle.
     left_commands: Mutex<Vec<vk::CommandBuffer>>,
-    /// The caller of the library destroys the device.
+    /// Whether the caller of the library owns the device and destroys it.
     is_given: bool,
     instance: Arc<Instance>,
 }
 
-/// A device that is open, and what is known of it.
+/// An open device and its properties, from which a context is made.
 struct Opened {
     physical: vk::PhysicalDevice,
     device: ash::Device,
     queue: vk::Queue,
-    /// The index of the queue's family.
+    /// Index of the queue's family.
     family: usize,
     info: DeviceInfo,
     extras: DeviceExtras,
@@ -100,17 +105,18 @@ impl Context {
     /// Opens a device.
     ///
     /// # Errors
-    /// No loader, driver, device of that name or validation layer; a device that lacks a feature; a failed call.
+    /// There is no loader, driver, device of that name or validation layer; the device lacks a feature; or a call
+    /// fails.
     pub fn new(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::new(options.validate)?;
         let (physical, info) = select(&instance, options.device.as_ref(), |_| true)?;
         Self::open(instance, physical, info, Purpose::Compute, &options.pretend)
     }
 
-    /// As [`Context::new`], with the surface of a window that it can show pictures in.
+    /// Opens a device and makes the surface of a window, in which the context can show pictures.
     ///
     /// # Errors
-    /// As [`Context::new`]; a device that cannot present to the window.
+    /// Fails as [`Context::new`] does, or if the device cannot present to the window.
     #[cfg(feature = "view")]
     pub fn for_window(
         options: &ContextOptions,
@@ -123,10 +129,10 @@ impl Context {
         Ok((Self::open(instance, physical, info, Purpose::Window, &options.pretend)?, surface))
     }
 
-    /// As [`Context::new`], with the driver's own ray tracing, to compare with.
+    /// Opens a device with the driver's own ray tracing, with which kdray is compared.
     ///
     /// # Errors
-    /// As [`Context::new`]; the device lacks that extension.
+    /// Fails as [`Context::new`] does, or if the device lacks a ray tracing extension.
     pub fn with_ray_tracing(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::new(options.validate)?;
         let (physical, info) = select(&instance, options.device.as_ref(), |_| true)?;
@@ -143,7 +149,7 @@ impl Context {
         purpose: Purpose,
         pretend: &DeviceOverrides,
     ) -> Result<Arc<Self>, GpuError> {
-        // SAFETY: the device belongs to the instance.
+        // SAFETY: the physical device belongs to the instance.
         let families = unsafe { instance.raw.get_physical_device_queue_family_properties(physical) };
         let family = queue_family(&families).expect("`select` refuses a device without such a queue");
         let extras = DeviceExtras::of(&instance, physical, purpose)
@@ -151,13 +157,13 @@ impl Context {
         let device = extras
             .create_device(&instance, physical, family as u32)
             .map_err(GpuError::call("vkCreateDevice", &info.name))?;
-        // SAFETY: the queue was asked for at creation.
+        // SAFETY: the device was created with one queue of this family.
         let queue = unsafe { device.get_device_queue(family as u32, 0) };
         let opened = Opened { physical, device, queue, family, info, extras, is_given: false };
         Self::with_device(instance, opened, purpose, pretend)
     }
 
-    /// For [`Context::on_given`](Self::on_given), which says what must hold.
+    /// Opens a context on the caller's device. [`Context::on_given`](Self::on_given) states the conditions.
     pub(super) fn open_given(given: GivenDevice, pretend: &DeviceOverrides) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::given(given.entry, given.instance);
         let (physical, info) = list(&instance)?
@@ -187,7 +193,7 @@ impl Context {
     ) -> Result<Arc<Self>, GpuError> {
         let Opened { physical, device, queue, family, info, extras, is_given } = opened;
         let ray_tracing = purpose == Purpose::RayTracing;
-        // SAFETY: the device belongs to the instance; the pool belongs to its family.
+        // SAFETY: the physical device belongs to the instance, and the device has a queue of this family.
         let (families, properties, command_pool) = unsafe {
             let pool = vk::CommandPoolCreateInfo::default()
                 .queue_family_index(family as u32)
@@ -231,44 +237,47 @@ impl Context {
         }))
     }
 
-    /// What the device is.
+    /// Describes the device.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
     }
 
-    /// The limits that sizes are held against.
+    /// Returns the device's limits, against which sizes are checked.
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
 
-    /// True for a driver that computes on the CPU.
+    /// Whether the driver computes on the CPU.
     pub fn is_software(&self) -> bool {
         self.info.kind == SOFTWARE
     }
 
-    /// Whether kernels run both sides of a branch for all lanes, where any lane takes it.
+    /// Whether the driver predicates branches: if any lane takes a side of a branch, all lanes execute that side.
+    /// Software drivers do.
     pub fn predicates_branches(&self) -> bool {
         self.predicates_branches
     }
 
-    /// Whether the device writes timestamps.
+    /// Whether the device's queue writes timestamps.
     pub fn has_timestamps(&self) -> bool {
         self.timestamp_valid_bits > 0
     }
 
-    /// Whether kernels have atomics of 64 bits.
+    /// Whether kernels have 64-bit atomics on buffers.
     pub fn has_wide_atomics(&self) -> bool {
         self.wide_atomics
     }
 
+    /// Checks that kernels have 64-bit atomics on buffers.
+    ///
     /// # Errors
-    /// Kernels have no atomics of 64 bits.
+    /// Kernels have no such atomics.
     pub fn require_wide_atomics(&self) -> Result<(), GpuError> {
         let missing = "shaderBufferInt64Atomics".to_owned();
         if self.wide_atomics { Ok(()) } else { Err(GpuError::Lacks { device: self.info.name.clone(), missing }) }
     }
 
-    /// Whether `fma` rounds once in this device's kernels; found out by one of them, the first time.
+    /// Whether `fma` rounds once in this device's kernels. The first call runs a kernel to find out.
     ///
     /// # Errors
     /// The kernel does not run.
@@ -280,8 +289,8 @@ impl Context {
         Ok(*self.fuses_fma.get_or_init(|| fuses))
     }
 
-    /// How many lanes the device runs at once; found out by a kernel, the first time. 0 where lanes are not the device's
-    /// own, so that leaving some of them idle spares nothing.
+    /// Returns the number of lanes that the device runs at once. The first call runs a kernel to find out. The result
+    /// is 0 if the driver predicates branches: lanes are then SIMD lanes of the CPU, and an idle lane saves no time.
     ///
     /// # Errors
     /// The kernel does not run.
@@ -293,9 +302,9 @@ impl Context {
         Ok(*self.n_lanes.get_or_init(|| n_lanes))
     }
 
-    /// How many turns the loops of a kernel may take together before the driver ends it without a word; none where they
-    /// may take any number. A kernel finds that out the first time. Only drivers that compute on the CPU are asked: a
-    /// GPU's loops are branches of its own code, which nothing counts.
+    /// Returns the number of turns (iterations) that the loops of a kernel may take together before the driver ends
+    /// it without an error, or `None` if there is no limit. The first call runs a kernel to find out. Only software
+    /// drivers are tested: a GPU executes a loop as branches of the kernel's own code, which nothing counts.
     ///
     /// # Errors
     /// The kernel does not run.
@@ -307,25 +316,26 @@ impl Context {
         Ok(*self.loop_limit.get_or_init(|| limit))
     }
 
-    /// What tests make of the device.
+    /// Returns the properties that tests substitute for the device's own.
     pub(crate) fn pretend(&self) -> &DeviceOverrides {
         &self.pretend
     }
 
-    /// What the validation layer has said so far; empty without validation.
+    /// Returns the validation layer's messages so far. There are none without validation.
     pub fn validation_messages(&self) -> Vec<String> {
         self.instance.messages()
     }
 
-    /// Records commands, runs them and waits for their end. For uploads, downloads and tests.
+    /// Records commands, submits them and waits for their end. Serves uploads, downloads, probes and tests.
     pub fn run(self: &Arc<Self>, name: &str, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
         let buffer = CommandBuffer::record(self, name, None, record)?;
         self.submit(&[&buffer])?;
         self.wait()
     }
 
-    /// Starts command buffers in order, a submit each: a driver's watchdog looks at submits. One call for all of them, which
-    /// otherwise cost an H200 6 us each. Where that fails, none has begun.
+    /// Submits command buffers in order, each in its own submit, since a driver's watchdog times each submit. One
+    /// call takes them all, because a call for each costs an H200 6 us a command buffer. If the call fails, no
+    /// command buffer has begun.
     pub fn submit(&self, buffers: &[&CommandBuffer]) -> Result<(), GpuError> {
         let infos: Vec<_> = (buffers.iter())
             .map(|buffer| [vk::CommandBufferSubmitInfo::default().command_buffer(buffer.raw())])
@@ -337,11 +347,11 @@ impl Context {
             .map_err(|error| GpuError::call("vkQueueSubmit2", &names())(error))
     }
 
-    /// Starts a command buffer of copies between two values of timeline semaphores, and does not wait for its end. Without
-    /// `then`, nothing says when it has ended but [`Context::wait`].
+    /// Submits a command buffer of copies, and does not wait for its end. The copies wait for the point `after` and
+    /// signal the point `then`. Without `then`, only [`Context::wait`] tells when they have ended.
     ///
     /// # Errors
-    /// A failed call: the commands have not begun.
+    /// The call fails: the commands have not begun.
     pub fn submit_copies(
         &self,
         buffer: CommandBuffer,
@@ -360,20 +370,20 @@ impl Context {
             .wait_semaphore_infos(waits.as_slice())
             .command_buffer_infos(&commands)
             .signal_semaphore_infos(signals.as_slice())];
-        // SAFETY: the buffer is recorded, and is left to the context until the queue is idle; whoever made the points
-        // vouches for the semaphores.
+        // SAFETY: the buffer is recorded, and the context keeps it until the queue is idle; whoever made the points
+        // has guaranteed that their semaphores are valid.
         unsafe { self.device.queue_submit2(self.queue, &submits, vk::Fence::null()) }
             .map_err(GpuError::call("vkQueueSubmit2", buffer.name()))?;
         buffer.leave();
         Ok(())
     }
 
-    /// Takes over a command buffer that was submitted.
+    /// Takes over a submitted command buffer, and frees it once the queue is idle.
     pub(super) fn leave_commands(&self, raw: vk::CommandBuffer) {
         self.left_commands.lock().unwrap_or_else(PoisonError::into_inner).push(raw);
     }
 
-    /// Waits until all that was submitted has ended.
+    /// Waits until all submitted work has ended, and frees the command buffers that have no owner.
     pub fn wait(&self) -> Result<(), GpuError> {
         // SAFETY: the queue is used by one thread at a time.
         unsafe { self.device.queue_wait_idle(self.queue) }
@@ -386,7 +396,7 @@ impl Context {
         Ok(())
     }
 
-    /// Shader stages that see bindings and push constants.
+    /// Returns the shader stages that see bindings and push constants.
     pub(super) fn stages(&self) -> vk::ShaderStageFlags {
         let mut stages = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX;
         if self.ray_tracing.is_some() {
@@ -398,20 +408,21 @@ impl Context {
         stages
     }
 
-    /// Gives a handle its name in the debuggers' and the validation layer's eyes.
+    /// Names a handle for debuggers and the validation layer.
     pub(super) fn set_name(&self, handle: impl vk::Handle, name: &str) {
         let (Some(debug_utils), Ok(name)) = (&self.debug_utils, CString::new(name)) else { return };
         let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
-        // SAFETY: the handle is one of this device's. A name that is not taken is no loss.
+        // SAFETY: the handle belongs to this device. An error is ignored, since a missing name does no harm.
         let _ = unsafe { debug_utils.set_debug_utils_object_name(&info) };
     }
 }
 
 impl Drop for Context {
     fn drop(&mut self) {
-        // SAFETY: every object made from the context holds it, so none is left; the allocator goes before the device.
+        // SAFETY: every object made from the context holds it, so none is left; the allocator is dropped before the
+        // device.
         unsafe {
-            // Other queues of a given device are not kdray's to wait for.
+            // A given device may have other queues, for which kdray must not wait.
             let _ =
                 if self.is_given { self.device.queue_wait_idle(self.queue) } else { self.device.device_wait_idle() };
             ManuallyDrop::drop(&mut self.allocator);
@@ -427,7 +438,8 @@ impl Drop for Context {
 mod tests {
     use super::*;
 
-    /// With labels, the layer of Debian 12 ends the process after some ten thousand command buffers on a busy machine.
+    /// With labels, Debian 12's validation layer ends the process after some ten thousand command buffers on a busy
+    /// machine.
     #[test]
     fn commands_have_no_labels_under_validation() {
         let validated = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");

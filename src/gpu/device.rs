@@ -1,4 +1,4 @@
-//! The logical device: its queue, its extensions, its features.
+//! The logical device: its queue, its extensions and its features.
 
 use std::ffi::{CStr, c_char};
 
@@ -8,35 +8,36 @@ use super::{
     RequiredFeatures, instance::Instance, ray_tracing::RayTracingCalls, robustness, statistics::StatisticsCalls,
 };
 
-/// What a device is opened for.
+/// Purpose for which a device is opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Purpose {
-    /// Pictures and numbers in memory.
+    /// The device computes pictures and other results in memory.
     Compute,
-    /// To compare with the driver's own ray tracing, too.
+    /// The device also runs the driver's own ray tracing, for comparison.
     RayTracing,
-    /// To show pictures in a window, too.
+    /// The device also shows pictures in a window.
     Window,
 }
 
-/// What a device is asked for beside Vulkan's core.
+/// Extensions and optional features with which a device is created.
 #[derive(Clone, Copy)]
 pub(super) struct DeviceExtras {
-    /// A driver that is not fully conformant wants to be told that this is known.
+    /// Whether `VK_KHR_portability_subset` is enabled, as a driver that is not fully conformant requires.
     portability: bool,
-    /// Kernels can be asked for their statistics.
+    /// Whether the driver reports statistics of kernels.
     pub statistics: bool,
-    /// Pipelines can do without bounds checks.
+    /// Whether pipelines can be made without bounds checks.
     pub unchecked: bool,
-    /// Kernels have atomics of 64 bits on buffers.
+    /// Whether kernels have 64-bit atomics on buffers.
     pub wide_atomics: bool,
     purpose: Purpose,
 }
 
 impl DeviceExtras {
-    /// All that the device has and kdray can use; of ray tracing and presentation, what is asked for.
+    /// Returns all extras that the device has and kdray can use. Those that `purpose` requires are included
+    /// unchecked: the caller has chosen a device that has them.
     pub fn of(instance: &Instance, physical: vk::PhysicalDevice, purpose: Purpose) -> VkResult<Self> {
-        // SAFETY: the device belongs to the instance.
+        // SAFETY: the physical device belongs to the instance.
         let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }?;
         let has = |name: &CStr| available.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         Ok(Self {
@@ -48,7 +49,7 @@ impl DeviceExtras {
         })
     }
 
-    /// A device that the caller has created.
+    /// Returns the extras of a device that the library's caller has created: at most 64-bit atomics.
     pub fn of_given(wide_atomics: bool) -> Self {
         Self { portability: false, statistics: false, unchecked: false, wide_atomics, purpose: Purpose::Compute }
     }
@@ -66,7 +67,7 @@ impl DeviceExtras {
         names.into_iter().map(CStr::as_ptr).collect()
     }
 
-    /// A device with one queue of the family.
+    /// Creates a device with one queue of the family.
     pub fn create_device(
         self,
         instance: &Instance,
@@ -105,7 +106,7 @@ impl DeviceExtras {
 fn has_wide_atomics(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
     let mut of_1_2 = vk::PhysicalDeviceVulkan12Features::default();
     let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut of_1_2);
-    // SAFETY: the device has Vulkan 1.3, which knows the struct.
+    // SAFETY: the device supports Vulkan 1.3, which defines the struct.
     unsafe { instance.raw.get_physical_device_features2(physical, &mut all) };
     all.features.shader_int64 == vk::TRUE && of_1_2.shader_buffer_int64_atomics == vk::TRUE
 }

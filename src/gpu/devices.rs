@@ -1,4 +1,4 @@
-//! The machine's Vulkan devices: what they are, what they lack, which one is meant.
+//! The machine's Vulkan devices: their properties, the features that they lack, and the choice of one.
 
 use std::{ffi::CStr, fmt};
 
@@ -10,19 +10,19 @@ use super::{DeviceOverrides, GpuError, instance::Instance};
 /// One Vulkan device.
 #[derive(Clone, Debug, Serialize)]
 pub struct DeviceInfo {
-    /// Place in the loader's list.
+    /// Index in the loader's list.
     pub index: usize,
-    /// The device's own name.
+    /// Name that the driver gives the device.
     pub name: String,
     /// `discrete GPU`, `integrated GPU`, `virtual GPU`, `CPU` or `other`.
     pub kind: String,
-    /// The driver's name and version.
+    /// Name and version of the driver.
     pub driver: String,
-    /// The version of Vulkan, as `1.3.290`.
+    /// Version of Vulkan that the device supports, such as `1.3.290`.
     pub api_version: String,
-    /// Invocations of a subgroup.
+    /// Number of invocations in a subgroup. 0 if the device lacks Vulkan 1.3.
     pub subgroup_size: u32,
-    /// What kdray needs and the device has not; empty for a device that can be used.
+    /// Features that kdray needs and the device lacks. The list of a usable device is empty.
     pub missing: Vec<String>,
 }
 
@@ -33,12 +33,12 @@ impl DeviceInfo {
     }
 }
 
-/// How a user names a device.
+/// A user's choice of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum DeviceSelector {
-    /// Place in the loader's list.
+    /// Index in the loader's list.
     Index(usize),
-    /// Part of the name, upper and lower case alike.
+    /// Part of the name. Case is ignored.
     Name(String),
 }
 
@@ -51,28 +51,28 @@ impl fmt::Display for DeviceSelector {
     }
 }
 
-/// The limits that sizes are held against.
+/// Limits of a device, against which sizes are checked.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Bytes of one storage buffer that is bound.
+    /// Greatest size of a bound storage buffer, bytes.
     pub storage_range: u64,
-    /// Texels of one buffer.
+    /// Greatest number of texels in a texel view of a buffer.
     pub n_texels: u32,
-    /// Bytes of one buffer that is read by its address.
+    /// Greatest size of a buffer that kernels read by its address, or that is not bound as a whole, bytes.
     pub buffer_bytes: u64,
-    /// Pixels of a render target's side.
+    /// Greatest width and height of a render target, pixels.
     pub target_size: u32,
-    /// Workgroups of one dimension of a dispatch.
+    /// Greatest number of workgroups along x in a dispatch.
     pub n_groups: u32,
 }
 
 impl Limits {
-    /// Of a device with Vulkan 1.3.
+    /// Queries the limits of a device with Vulkan 1.3.
     pub(super) fn of(instance: &Instance, device: vk::PhysicalDevice) -> Self {
         let mut of_1_1 = vk::PhysicalDeviceVulkan11Properties::default();
         let mut of_1_3 = vk::PhysicalDeviceVulkan13Properties::default();
         let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut of_1_1).push_next(&mut of_1_3);
-        // SAFETY: the device belongs to the instance and knows both structs.
+        // SAFETY: the device belongs to the instance, and Vulkan 1.3 defines both structs.
         unsafe { instance.raw.get_physical_device_properties2(device, &mut all) };
         let limits = all.properties.limits;
         Self {
@@ -87,7 +87,7 @@ impl Limits {
         }
     }
 
-    /// The smaller ones of these limits and the overrides.
+    /// Returns these limits, each reduced to its override if that is smaller.
     pub(super) fn reduced_to(self, overrides: &DeviceOverrides) -> Self {
         Self {
             storage_range: overrides.storage_range.map_or(self.storage_range, |bytes| bytes.min(self.storage_range)),
@@ -97,19 +97,19 @@ impl Limits {
     }
 }
 
-/// All devices, usable or not.
+/// Lists all devices, usable or not.
 ///
 /// # Errors
-/// No loader, no driver.
+/// There is no loader or no driver, or a call fails.
 pub fn devices() -> Result<Vec<DeviceInfo>, GpuError> {
     let instance = Instance::new(false)?;
     Ok(list(&instance)?.into_iter().map(|(_, info)| info).collect())
 }
 
-/// The device that [`Context::new`](super::Context::new) would open, without opening it.
+/// Returns the device that [`Context::new`](super::Context::new) would open, without opening it.
 ///
 /// # Errors
-/// No loader, driver or device of that name; a device that lacks a feature.
+/// There is no loader, driver or device of that name; the device lacks a feature; or a call fails.
 pub fn chosen_device(selector: Option<&DeviceSelector>) -> Result<DeviceInfo, GpuError> {
     Ok(select(&*Instance::new(false)?, selector, |_| true)?.1)
 }
@@ -123,8 +123,8 @@ pub(super) fn list(instance: &Instance) -> Result<Vec<(vk::PhysicalDevice, Devic
     if list.is_empty() { Err(GpuError::NoDriver) } else { Ok(list) }
 }
 
-/// The device that is meant: the named one, or the best of those that lack nothing. `presents`: whether a
-/// device can show pictures where it has to.
+/// Selects a device: the named one, or the best of those that lack nothing. `presents` says whether a device can show
+/// pictures in the window; without a window, it is always true.
 pub(super) fn select(
     instance: &Instance,
     selector: Option<&DeviceSelector>,
@@ -141,7 +141,7 @@ pub(super) fn select(
         Some(DeviceSelector::Name(name)) => {
             list.iter().find(|(_, info)| info.name.to_lowercase().contains(&name.to_lowercase()))
         }
-        // Of equals the first: the loader's order is the user's.
+        // Among equal kinds the first device is chosen, since the loader's order is the user's.
         None => list.iter().min_by_key(|(_, info)| (!info.missing.is_empty(), rank(&info.kind), info.index)),
     };
     let Some((device, info)) = chosen else {
@@ -155,11 +155,12 @@ pub(super) fn select(
     Ok((*device, info.clone()))
 }
 
+/// Returns the kind's place in [`KINDS`], 0 for the best.
 fn rank(kind: &str) -> usize {
     KINDS.iter().position(|(_, name)| *name == kind).unwrap_or(KINDS.len())
 }
 
-/// Best first.
+/// Kinds of devices, the best first.
 const KINDS: [(vk::PhysicalDeviceType, &str); 4] = [
     (vk::PhysicalDeviceType::DISCRETE_GPU, "discrete GPU"),
     (vk::PhysicalDeviceType::INTEGRATED_GPU, "integrated GPU"),
@@ -194,7 +195,7 @@ fn describe(instance: &Instance, device: vk::PhysicalDevice, index: usize) -> De
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
     let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut subgroup);
-    // SAFETY: a Vulkan 1.3 device knows both structs.
+    // SAFETY: the device supports Vulkan 1.3, which defines both structs.
     unsafe { instance.raw.get_physical_device_properties2(device, &mut all) };
     info.driver = format!(
         "{} {}",
@@ -210,6 +211,7 @@ pub(super) fn text(raw: &CStr) -> String {
     raw.to_string_lossy().trim().to_owned()
 }
 
+/// Lists the features that kdray needs and the device lacks.
 fn missing(
     instance: &Instance,
     device: vk::PhysicalDevice,
@@ -218,7 +220,7 @@ fn missing(
     let mut features_1_2 = vk::PhysicalDeviceVulkan12Features::default();
     let mut features_1_3 = vk::PhysicalDeviceVulkan13Features::default();
     let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut features_1_2).push_next(&mut features_1_3);
-    // SAFETY: the device has Vulkan 1.3.
+    // SAFETY: the device belongs to the instance and supports Vulkan 1.3, which defines the structs.
     let (families, targets) = unsafe {
         instance.raw.get_physical_device_features2(device, &mut features);
         (
@@ -242,7 +244,7 @@ fn missing(
     needs.iter().filter(|(has, _)| !has).map(|(_, name)| (*name).to_owned()).collect()
 }
 
-/// The first family that does graphics and compute.
+/// Returns the first family that supports graphics and compute.
 pub(super) fn queue_family(families: &[vk::QueueFamilyProperties]) -> Option<usize> {
     let both = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
     families.iter().position(|family| family.queue_flags.contains(both))

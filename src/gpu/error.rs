@@ -1,10 +1,10 @@
-//! What can go wrong with a driver, each in one line that names the call and the object.
+//! Errors of the Vulkan layer. Each displays as one line, which names the call and the object if a call has failed.
 
 use std::{error, fmt};
 
 use ash::vk;
 
-/// Anything that stops a device from doing its work. Displays as one line.
+/// An error that stops a device from doing its work. It displays as one line.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GpuError {
@@ -14,12 +14,12 @@ pub enum GpuError {
     /// The loader finds no driver.
     #[error("no Vulkan driver found; ./setup installs Mesa's lavapipe, which needs no GPU")]
     NoDriver,
-    /// No device has the index or name that is asked for.
+    /// No device has the requested index or name.
     #[error("no Vulkan device `{wanted}`; there are: {available}")]
     NoSuchDevice {
-        /// What is asked for.
+        /// The requested index or name.
         wanted: String,
-        /// The devices that there are.
+        /// The available devices.
         available: String,
     },
     /// A device lacks a feature, an extension or an ability.
@@ -27,7 +27,7 @@ pub enum GpuError {
     Lacks {
         /// The device's name.
         device: String,
-        /// What it lacks.
+        /// The missing features, extensions or abilities.
         missing: String,
     },
     /// The machine has no validation layer.
@@ -39,7 +39,7 @@ pub enum GpuError {
     /// A library that kdray uses has failed.
     #[error("{object}: {message}")]
     Other {
-        /// What it was to do or to make.
+        /// What the library was to do or to make.
         object: &'static str,
         /// The library's message.
         message: String,
@@ -49,9 +49,9 @@ pub enum GpuError {
     Call {
         /// The function's name.
         call: &'static str,
-        /// The name of the object that it was called for.
+        /// The name of the object for which it was called.
         object: String,
-        /// What it returned.
+        /// The result that it returned.
         result: CallResult,
     },
     /// The device has too little memory.
@@ -59,9 +59,9 @@ pub enum GpuError {
     Memory {
         /// The name of the buffer or image.
         object: String,
-        /// Bytes that it takes.
+        /// The size of the buffer or image, bytes.
         bytes: u64,
-        /// Why it gets none.
+        /// The allocator's error.
         source: Box<dyn error::Error + Send + Sync>,
     },
     /// The system has too little memory.
@@ -69,30 +69,31 @@ pub enum GpuError {
     HostMemory {
         /// What the memory is for.
         object: &'static str,
-        /// Bytes that it takes.
+        /// The memory's size, bytes.
         bytes: u64,
     },
-    /// A buffer or image is larger than the device allows for.
+    /// A buffer or image is larger than the device allows.
     #[error("`{object}` takes {}, more than this device's limit of {}", mebibytes(*bytes), mebibytes(*limit))]
     TooLarge {
         /// The name of the buffer or image.
         object: String,
-        /// Bytes that it takes.
+        /// The size of the buffer or image, bytes.
         bytes: u64,
-        /// Bytes that it may take.
+        /// The greatest size that the device allows, bytes.
         limit: u64,
     },
-    /// A scene and its acceleration structure do not fit together: a [`Mismatch`](crate::world::Mismatch) in words.
+    /// A scene and its acceleration structure do not match. The text describes the
+    /// [`Mismatch`](crate::world::Mismatch).
     #[error("{0}")]
     Mismatch(String),
     /// A number is beyond a limit of the device.
     #[error("{what}: {value} is beyond this device's limit of {limit}")]
     Limit {
-        /// What is counted.
+        /// The name of the number.
         what: &'static str,
         /// The number.
         value: u64,
-        /// The greatest number that is possible.
+        /// The greatest number that the device allows.
         limit: u64,
     },
 }
@@ -102,7 +103,7 @@ pub enum GpuError {
 pub struct CallResult(pub(super) vk::Result);
 
 impl CallResult {
-    /// Vulkan's number for it.
+    /// Returns Vulkan's number for the result.
     pub fn code(&self) -> i32 {
         self.0.as_raw()
     }
@@ -115,7 +116,7 @@ impl fmt::Display for CallResult {
 }
 
 impl GpuError {
-    /// Whether the device or the window's surface is gone, so that all that is on it has to be made anew.
+    /// Whether the device or the window's surface is lost, so that all objects on it have to be made again.
     pub fn is_device_lost(&self) -> bool {
         let result = match self {
             Self::Call { result: CallResult(result), .. } => *result,
@@ -134,7 +135,7 @@ impl GpuError {
         }
     }
 
-    /// Turns the result of `call` on `object` into an error.
+    /// Returns a function that turns the result of `call` on `object` into an error.
     pub(crate) fn call(call: &'static str, object: &str) -> impl FnOnce(vk::Result) -> GpuError {
         let object = object.to_owned();
         move |result| GpuError::Call { call, object, result: CallResult(result) }

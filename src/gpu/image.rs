@@ -7,12 +7,12 @@ use gpu_allocator::{MemoryLocation, vulkan::Allocation};
 
 use super::{Context, GpuError};
 
-/// What a target holds.
+/// Kind of a target's pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TargetKind {
-    /// One u32 a pixel, readable by kernels as a storage image.
+    /// One `u32` a pixel, readable by kernels as a storage image.
     Uint,
-    /// One f32 a pixel.
+    /// One `f32` a pixel.
     Depth,
 }
 
@@ -51,10 +51,10 @@ pub struct Target {
 }
 
 impl Target {
-    /// Contents are undefined.
+    /// Creates a target with undefined contents.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
+    /// The size exceeds the device's limits, or memory is exhausted.
     pub fn new(context: &Arc<Context>, name: &str, kind: TargetKind, size: (u32, u32)) -> Result<Self, GpuError> {
         let (width, height) = size;
         let limit = context.limits().target_size;
@@ -73,7 +73,7 @@ impl Target {
             .samples(vk::SampleCountFlags::TYPE_1)
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(kind.usage());
-        // SAFETY: the raw image is destroyed on each way out that does not hand it to an owner.
+        // SAFETY: the raw image is destroyed on every path that does not hand it to an owner.
         unsafe {
             let raw = device.create_image(&info, None).map_err(GpuError::call("vkCreateImage", name))?;
             let requirements = device.get_image_memory_requirements(raw);
@@ -96,18 +96,18 @@ impl Target {
         }
     }
 
-    /// An ID target of one pixel, for sets in which kernels find an image that they never read. Its content is
-    /// undefined.
+    /// Creates an ID target of one pixel, for descriptor sets whose kernels need an image but never read it. Its
+    /// contents are undefined.
     ///
     /// # Errors
-    /// Out of memory.
+    /// Memory is exhausted.
     pub fn unread(context: &Arc<Context>, name: &str) -> Result<Self, GpuError> {
         let target = Self::new(context, name, TargetKind::Uint, (1, 1))?;
         context.run(name, |commands| commands.discard_for_compute(&target))?;
         Ok(target)
     }
 
-    /// Width and height, pixels.
+    /// Returns the width and height, pixels.
     pub fn size(&self) -> (u32, u32) {
         (self.width, self.height)
     }
@@ -130,7 +130,7 @@ impl Target {
 
 impl Drop for Target {
     fn drop(&mut self) {
-        // SAFETY: the device has ended all work on it; a null view is ignored.
+        // SAFETY: the device has ended all work on the image, and Vulkan ignores a null view.
         unsafe {
             self.context.device.destroy_image_view(self.view, None);
             self.context.device.destroy_image(self.raw, None);

@@ -1,4 +1,4 @@
-//! The loader and the instance, with the validation layer where it is asked for.
+//! The Vulkan loader and the instance, with the validation layer if it is requested.
 
 use std::{
     ffi::{CStr, c_void},
@@ -19,21 +19,22 @@ pub(super) struct Instance {
     pub raw: ash::Instance,
     pub has_debug_utils: bool,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
-    // Boxed, so that the messenger's pointer to it stays good when the instance moves.
+    // The messages are boxed, so that the messenger's pointer to them stays valid when the instance moves.
     messages: Box<Messages>,
-    /// The caller of the library destroys it.
+    /// Whether the caller of the library owns the instance and destroys it.
     is_given: bool,
 }
 
 impl Instance {
-    /// `validate`: with synchronization validation, its messages kept.
+    /// Creates an instance. `validate` turns on the validation layer with synchronization validation and keeps its
+    /// messages.
     pub fn new(validate: bool) -> Result<Arc<Self>, GpuError> {
         Self::with_extensions(validate, &[])
     }
 
-    /// As [`Instance::new`], with extensions that a window needs.
+    /// Creates an instance as [`Instance::new`] does, with the extensions that a window needs.
     pub fn with_extensions(validate: bool, window: &[&CStr]) -> Result<Arc<Self>, GpuError> {
-        // SAFETY: loads the system's Vulkan loader; its initialization code is trusted as any driver's is.
+        // SAFETY: the call loads the system's Vulkan loader, whose initialization code is trusted as any driver's is.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| GpuError::NoLoader(e.to_string()))?;
         if validate && !has_layer(&entry)? {
             return Err(GpuError::NoValidationLayer);
@@ -53,7 +54,7 @@ impl Instance {
         Ok(Arc::new(instance))
     }
 
-    /// An instance of the caller's own.
+    /// Wraps an instance that the library's caller owns.
     pub fn given(entry: ash::Entry, raw: ash::Instance) -> Arc<Self> {
         let messages = Box::default();
         Arc::new(Self { entry, raw, has_debug_utils: false, messenger: None, messages, is_given: true })
@@ -68,6 +69,7 @@ impl Instance {
         self.messages.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
+    /// Creates the messenger, which keeps the validation layer's messages.
     fn listen(&mut self) -> Result<(), GpuError> {
         let debug_utils = ext::debug_utils::Instance::new(&self.entry, &self.raw);
         let user_data = (&raw const *self.messages).cast_mut().cast();
@@ -99,7 +101,7 @@ fn create(entry: &ash::Entry, validate: bool, debug_utils: bool, window: &[&CStr
         .application_name(c"kdray")
         .engine_name(c"kdray")
         .api_version(vk::API_VERSION_1_3);
-    // SAFETY: reads the list of extensions.
+    // SAFETY: the call only reads the list of extensions.
     let available = unsafe { entry.enumerate_instance_extension_properties(None) }.unwrap_or_default();
     let portability =
         available.iter().any(|e| e.extension_name_as_c_str() == Ok(ash::khr::portability_enumeration::NAME));
@@ -109,7 +111,7 @@ fn create(entry: &ash::Entry, validate: bool, debug_utils: bool, window: &[&CStr
     }
     let mut flags = vk::InstanceCreateFlags::empty();
     if portability {
-        // MoltenVK is listed only to those who ask for drivers that are not fully conformant.
+        // The loader lists MoltenVK only to programs that accept drivers that are not fully conformant.
         extensions.push(ash::khr::portability_enumeration::NAME.as_ptr());
         flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
     }
@@ -132,15 +134,16 @@ fn create(entry: &ash::Entry, validate: bool, debug_utils: bool, window: &[&CStr
 }
 
 fn has_layer(entry: &ash::Entry) -> Result<bool, GpuError> {
-    // SAFETY: reads the list of layers.
+    // SAFETY: the call only reads the list of layers.
     let layers = unsafe { entry.enumerate_instance_layer_properties() }
         .map_err(GpuError::call("vkEnumerateInstanceLayerProperties", "loader"))?;
     Ok(layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)))
 }
 
+/// Whether the loader, a driver or the given layer has an instance extension.
 fn has_extension(entry: &ash::Entry, name: &CStr, layer: Option<&CStr>) -> Result<bool, GpuError> {
     for source in [None, layer] {
-        // SAFETY: reads the list of extensions.
+        // SAFETY: the call only reads the list of extensions.
         let extensions = unsafe { entry.enumerate_instance_extension_properties(source) }
             .map_err(GpuError::call("vkEnumerateInstanceExtensionProperties", "loader"))?;
         if extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name)) {
@@ -164,7 +167,8 @@ unsafe extern "system" fn keep_message(
     data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
     user_data: *mut c_void,
 ) -> vk::Bool32 {
-    // SAFETY: the layer hands over valid data for the call's duration; user_data is `Instance::messages`.
+    // SAFETY: the layer passes data that is valid for the call's duration, and `user_data` points to
+    // `Instance::messages`.
     unsafe {
         let messages = &*user_data.cast::<Messages>();
         let text = (*data).message_as_c_str().map_or_else(|| "(no text)".into(), CStr::to_string_lossy);

@@ -1,4 +1,4 @@
-//! A device's memory: who has how much of it.
+//! Allocation of a device's memory, and a report of its uses.
 
 use std::sync::PoisonError;
 
@@ -10,12 +10,12 @@ use gpu_allocator::{
 
 use super::{Context, GpuError, instance::Instance};
 
-/// What a part of the device's memory is for.
+/// Memory that the buffers and images of one name take.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryUse {
-    /// The buffer's or image's.
+    /// Name of the buffers and images.
     pub name: String,
-    /// Bytes of the device's memory.
+    /// Size of their memory, bytes.
     pub bytes: u64,
 }
 
@@ -39,12 +39,12 @@ impl Context {
         })
     }
 
-    /// What memory is in use for, the most first; objects of one name together.
+    /// Lists the uses of memory, the largest first. Objects of one name share an entry.
     pub fn memory(&self) -> Vec<MemoryUse> {
         let report = self.allocator.lock().unwrap_or_else(PoisonError::into_inner).generate_report();
         let mut uses: Vec<MemoryUse> = Vec::new();
         for allocation in report.allocations {
-            // egui's renderer gives its own no names.
+            // egui's renderer gives its allocations no names.
             let name = if allocation.name.is_empty() { "overlay".to_owned() } else { allocation.name };
             match uses.iter_mut().find(|known| known.name == name) {
                 Some(known) => known.bytes += allocation.size,

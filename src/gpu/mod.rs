@@ -1,7 +1,8 @@
-//! The Vulkan layer: devices, memory, pipelines, commands. It knows nothing of rays.
+//! The Vulkan layer: devices, memory, pipelines and commands. It knows nothing about rays.
 //!
 //! All of the crate's `unsafe` is here. Every handle is released by its owner's `Drop`, and every owner holds the
-//! [`Context`] that it was made from. One context is used by one thread at a time.
+//! [`Context`] that it was made from. Only one thread uses a context at a time. Names that begin with `Given` are
+//! Vulkan objects that the library's caller owns.
 #![allow(unsafe_code)]
 
 mod acceleration;

@@ -1,19 +1,20 @@
-//! What tests make of a device: one that has less than it has, or runs kernels in another way.
+//! Overrides with which tests give a device less than it has, or make it run kernels in another way.
 
 /// Properties that a context reports and acts on in place of the device's own. All default to the device's own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DeviceOverrides {
-    /// Bytes of a storage buffer that can be bound, if the device binds more. Small scenes then meet what large ones
-    /// meet elsewhere.
+    /// Greatest size of a bound storage buffer, bytes, if the device allows more. Small scenes then take the paths
+    /// that otherwise only large scenes take.
     pub storage_range: Option<u64>,
-    /// Texels of a buffer, if the device has more.
+    /// Greatest number of texels in a view of a buffer, if the device allows more.
     pub n_texels: Option<u32>,
-    /// Lanes of a device that takes branches lane by lane. A software driver then runs what GPUs run.
+    /// Number of lanes, of a device that takes branches lane by lane. A software driver then runs the code that GPUs
+    /// run.
     pub n_lanes: Option<u32>,
-    /// Whether kernels lack atomics of 64 bits.
+    /// Whether kernels lack 64-bit atomics.
     pub no_wide_atomics: bool,
-    /// Turns of a kernel's loops after which the driver ends it.
+    /// Number of turns (iterations) of a kernel's loops after which the driver ends the kernel.
     pub loop_limit: Option<u32>,
-    /// Rays whose state is stored at a time, where kernels have to stop before that limit.
+    /// Number of rays whose state can be stored at a time, if kernels have to stop before the loop limit.
     pub n_stall_slots: Option<usize>,
 }

@@ -11,19 +11,20 @@ use super::{
 
 pub(super) const ENTRY_POINT: &CStr = c"main";
 
-/// A kernel and its variant.
+/// Description of a compute pipeline: a kernel and its variant.
 pub struct ComputeDesc<'a> {
-    /// Also the debug label and the timer.
+    /// Name of the pipeline, of its debug label and of its row of the timer.
     pub name: &'static str,
     /// The compute shader.
     pub shader: Shader,
     /// Values of specialization constants that the shader declares.
     pub constants: &'a Constants,
-    /// Every subgroup has all its invocations; the workgroup's width must be a multiple of the subgroup size.
+    /// Whether every subgroup has all its invocations. If so, the workgroup's width must be a multiple of the
+    /// subgroup size.
     pub full_subgroups: bool,
 }
 
-/// A kernel, ready to run.
+/// A compute pipeline: a kernel that is ready to run.
 pub struct ComputePipeline {
     pub(super) raw: vk::Pipeline,
     pub(super) bindings: Arc<BindingLayout>,
@@ -32,6 +33,8 @@ pub struct ComputePipeline {
 }
 
 impl ComputePipeline {
+    /// Creates the pipeline.
+    ///
     /// # Errors
     /// The driver refuses the module or is out of memory.
     pub fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, desc: &ComputeDesc) -> Result<Self, GpuError> {
@@ -68,17 +71,17 @@ impl ComputePipeline {
 
 impl Drop for ComputePipeline {
     fn drop(&mut self) {
-        // SAFETY: the device has ended all work with it.
+        // SAFETY: the device has ended all work with the pipeline.
         unsafe { self.context.device.destroy_pipeline(self.raw, None) };
     }
 }
 
-/// What a raster pass draws to.
+/// Targets of a raster pass.
 #[derive(Clone, Copy)]
 pub enum RasterTargets {
-    /// One ID target, with reverse-Z depth.
+    /// An ID target, with reverse-Z depth.
     Uint,
-    /// One colour image of a format, without depth.
+    /// A colour image of the given format, without depth.
     Color(vk::Format),
 }
 
@@ -98,19 +101,19 @@ impl RasterTargets {
     }
 }
 
-/// Shaders of a raster pass.
+/// Description of a raster pipeline: its shaders and its targets.
 pub struct RasterDesc {
-    /// Also the debug label and the timer.
+    /// Name of the pipeline, of its debug label and of its row of the timer.
     pub name: &'static str,
     /// The vertex shader.
     pub vertex: Shader,
     /// The fragment shader.
     pub fragment: Shader,
-    /// What is drawn to.
+    /// The targets that the pass draws to.
     pub targets: RasterTargets,
 }
 
-/// A raster pass over a triangle list without vertex buffers, two-sided.
+/// A raster pipeline for triangle lists, two-sided and without vertex buffers.
 pub struct RasterPipeline {
     pub(super) raw: vk::Pipeline,
     _bindings: Arc<BindingLayout>,
@@ -119,6 +122,8 @@ pub struct RasterPipeline {
 }
 
 impl RasterPipeline {
+    /// Creates the pipeline.
+    ///
     /// # Errors
     /// The driver refuses a module or is out of memory.
     pub fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, desc: &RasterDesc) -> Result<Self, GpuError> {
@@ -181,7 +186,7 @@ impl RasterPipeline {
 
 impl Drop for RasterPipeline {
     fn drop(&mut self) {
-        // SAFETY: the device has ended all work with it.
+        // SAFETY: the device has ended all work with the pipeline.
         unsafe { self.context.device.destroy_pipeline(self.raw, None) };
     }
 }

@@ -1,4 +1,4 @@
-//! Frames into a window: what each needs until it is shown.
+//! Presentation of frames in a window, and the objects that each frame needs until it is shown.
 
 use std::sync::Arc;
 
@@ -9,16 +9,17 @@ use super::{
     swapchain::{Outcome, Swapchain, SwapchainImage, format},
 };
 
-/// Frames that may be recorded or drawn at a time.
+/// Number of frames that may be recorded or drawn at a time.
 pub const FRAMES_IN_FLIGHT: usize = 2;
 
 /// Draws frames into a window and shows them.
 pub struct Presenter {
-    // In the order of release.
+    // The order of the fields is the order of their release.
     slots: [Slot; FRAMES_IN_FLIGHT],
     next_slot: usize,
-    /// None while the window has no area.
+    /// `None` while the window has no area.
     swapchain: Option<Swapchain>,
+    /// Whether the next frame makes a new swapchain.
     stale: bool,
     vsync: bool,
     surface: Surface,
@@ -26,21 +27,23 @@ pub struct Presenter {
     context: Arc<Context>,
 }
 
-/// The image of a window that is being drawn.
+/// The image of a window in which a frame is being drawn.
 pub struct WindowImage {
     pub(super) extent: vk::Extent2D,
 }
 
 impl WindowImage {
-    /// Width and height, pixels.
+    /// Returns the width and height, pixels.
     pub fn size(&self) -> (u32, u32) {
         (self.extent.width, self.extent.height)
     }
 }
 
 impl Presenter {
+    /// Creates a presenter. `vsync` makes frames wait for the screen's refresh.
+    ///
     /// # Errors
-    /// The window takes no images that can be drawn; out of memory.
+    /// The window offers no image format that kdray can draw, or memory is exhausted.
     pub fn new(context: &Arc<Context>, surface: Surface, vsync: bool) -> Result<Self, GpuError> {
         let format = format(context, &surface)?.format;
         Ok(Self {
@@ -55,28 +58,29 @@ impl Presenter {
         })
     }
 
-    /// The window's image format, which pipelines that draw into it have to know.
+    /// Returns the window's image format, which pipelines that draw into the window must know.
     pub(crate) fn format(&self) -> vk::Format {
         self.format
     }
 
-    /// The window has changed: its images are made anew with the next frame.
+    /// Notes that the window has changed. The next frame makes new images.
     pub fn mark_stale(&mut self) {
         self.stale = true;
     }
 
-    /// Whether frames wait for the screen's refresh; takes effect with the next one.
+    /// Sets whether frames wait for the screen's refresh, from the next frame on.
     pub fn set_vsync(&mut self, vsync: bool) {
         self.stale |= vsync != self.vsync;
         self.vsync = vsync;
     }
 
-    /// Draws a frame by `body`, within rendering to the window's image, and shows it. Its shaders see what kernels wrote
-    /// before, and kernels may overwrite that afterwards. `size`: the window's, where the
-    /// window system does not say. False where the window has no area or has just changed: nothing was drawn.
+    /// Draws a frame and shows it. `body` draws it while rendering to the window's image is open. Its shaders see
+    /// what earlier kernels wrote, and later kernels may overwrite that. `size` is the window's size, pixels, used if
+    /// the window system does not report one. Returns false, without drawing, if the window has no area or has just
+    /// changed.
     ///
     /// # Errors
-    /// A failed call; those of `body`.
+    /// A call or `body` fails.
     pub fn present(
         &mut self,
         size: (u32, u32),
@@ -103,19 +107,21 @@ impl Presenter {
         let shown = WindowImage { extent: swapchain.extent };
         let mut drawn = Ok(());
         let commands = CommandBuffer::record(&self.context, "window", None, |commands| {
-            commands.barrier(Access::ComputeWrite, Access::FragmentRead); // what the frame's kernels leave
+            commands.barrier(Access::ComputeWrite, Access::FragmentRead); // the results of the frame's kernels
             commands.begin_window(image, swapchain.extent);
             drawn = body(commands, &shown);
             commands.end_window(image);
-            commands.barrier(Access::FragmentRead, Access::ComputeWrite); // what the next frame's overwrite
+            commands.barrier(Access::FragmentRead, Access::ComputeWrite); // the next frame's kernels overwrite them
         })?;
-        // What was acquired has to be shown, else it is never released.
+        // An acquired image has to be shown, or else it is never released. So the frame is submitted even if `body`
+        // has failed.
         slot.submit(&self.context, commands, image)?;
         self.next_slot = (self.next_slot + 1) % FRAMES_IN_FLIGHT;
         self.stale |= !matches!(swapchain.present(image_ix)?, Outcome::Good(()));
         drawn.map(|()| true)
     }
 
+    /// Makes a new swapchain in place of the old one.
     fn renew(&mut self, size: (u32, u32)) -> Result<(), GpuError> {
         let old = self.swapchain.take();
         self.swapchain = Swapchain::new(&self.context, &self.surface, old.as_ref(), self.vsync, size)?;
@@ -126,12 +132,12 @@ impl Presenter {
 
 impl Drop for Presenter {
     fn drop(&mut self) {
-        // SAFETY: nothing is submitted meanwhile. What failed has ended, too.
+        // SAFETY: nothing is submitted meanwhile. An error is ignored, since work that has failed has ended, too.
         let _ = unsafe { self.context.device.device_wait_idle() };
     }
 }
 
-/// What one frame in flight needs.
+/// The objects that one frame in flight needs.
 struct Slot {
     /// Signalled when the frame's image can be drawn.
     acquired: vk::Semaphore,
@@ -146,7 +152,7 @@ impl Slot {
         let mut slot =
             Self { acquired: vk::Semaphore::null(), done: vk::Fence::null(), commands: None, context: context.clone() };
         let signalled = vk::FenceCreateInfo::default().flags(vk::FenceCreateFlags::SIGNALED);
-        // SAFETY: plain creations; `Drop` takes what was made.
+        // SAFETY: the calls only create objects, which `Drop` releases.
         unsafe {
             slot.acquired = (context.device.create_semaphore(&Default::default(), None))
                 .map_err(GpuError::call("vkCreateSemaphore", "acquired"))?;
@@ -165,11 +171,12 @@ impl Slot {
         Ok(())
     }
 
-    /// Starts the frame's commands; the slot's last frame has been waited for.
+    /// Submits the frame's commands. The slot's last frame must have been waited for.
     fn submit(&mut self, context: &Context, commands: CommandBuffer, image: &SwapchainImage) -> Result<(), GpuError> {
         let stage = vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT;
         let wait = [vk::SemaphoreSubmitInfo::default().semaphore(self.acquired).stage_mask(stage)];
-        // The image's way to the screen ends the commands.
+        // The drawing ends with the image's transition to the presentation layout, so the signal waits for all
+        // graphics stages.
         let signal = [vk::SemaphoreSubmitInfo::default()
             .semaphore(image.drawn)
             .stage_mask(vk::PipelineStageFlags2::ALL_GRAPHICS)];
@@ -178,7 +185,7 @@ impl Slot {
             .wait_semaphore_infos(&wait)
             .command_buffer_infos(&buffers)
             .signal_semaphore_infos(&signal)];
-        // SAFETY: nothing else uses the fence; the slot keeps the commands until it is signalled.
+        // SAFETY: nothing else uses the fence, and the slot keeps the commands until it is signalled.
         unsafe {
             context.device.reset_fences(&[self.done]).map_err(GpuError::call("vkResetFences", "frame"))?;
             (context.device.queue_submit2(context.queue, &submit, self.done))
@@ -191,7 +198,7 @@ impl Slot {
 
 impl Drop for Slot {
     fn drop(&mut self) {
-        // SAFETY: the presenter has waited for the device; null handles are ignored.
+        // SAFETY: the presenter has waited for the device, and Vulkan ignores null handles.
         unsafe {
             self.context.device.destroy_semaphore(self.acquired, None);
             self.context.device.destroy_fence(self.done, None);

@@ -1,4 +1,4 @@
-//! What a device does that no property tells.
+//! Probes: kernels that find out what no property of a device tells.
 
 use std::sync::Arc;
 
@@ -11,16 +11,16 @@ const FUSED_FMA: Shader =
     Shader { file: "fused_fma.comp", spirv: include_bytes!(concat!(env!("OUT_DIR"), "/fused_fma.comp.spv")) };
 
 const LANES: Shader = Shader { file: "lanes.comp", spirv: include_bytes!(concat!(env!("OUT_DIR"), "/lanes.comp.spv")) };
-/// Of the probe, and of ray kernels.
+/// Workgroup size of the lane probe. It is that of ray kernels.
 const GROUP_SIZE: u32 = 64;
 
 const LOOP_TURNS: Shader =
     Shader { file: "loop_turns.comp", spirv: include_bytes!(concat!(env!("OUT_DIR"), "/loop_turns.comp.spv")) };
 
-/// How many turns of its loops a kernel may take before the driver ends it; none where it takes all that it wants to.
-/// The lavapipe of Mesa 22.3 ends every shader after 65,535 turns, that of Mesa 25.0 does not.
+/// Returns the number of turns (iterations) of its loops after which the driver ends a kernel, or `None` if the probe
+/// meets no limit. The lavapipe of Mesa 22.3 ends every shader after 65,535 turns, that of Mesa 25.0 does not.
 pub(super) fn loop_limit(context: &Arc<Context>) -> Result<Option<u32>, GpuError> {
-    // Twice the limit that is known.
+    // The number of turns that the probe tries is twice the known limit.
     const N_TURNS: u32 = 1 << 17;
     let counts = Buffer::with(context, "counts", &[0u32], BufferUse::Storage)?;
     let bindings = BindingLayout::new(context, &[(0, BindingKind::Storage)], 4)?;
@@ -39,7 +39,7 @@ pub(super) fn loop_limit(context: &Arc<Context>) -> Result<Option<u32>, GpuError
 
 /// Whether GLSL's `fma` rounds once on this device. Vulkan allows it to round twice, and software drivers do.
 pub(super) fn fuses_fma(context: &Arc<Context>) -> Result<bool, GpuError> {
-    // Its square needs 25 bits.
+    // The square of this number needs 25 bits, one more than a float's significand has.
     let numbers = Buffer::with(context, "numbers", &[1.0 + 2f32.powi(-12), 0.0], BufferUse::Storage)?;
     let bindings = BindingLayout::new(context, &[(0, BindingKind::Storage)], 4)?;
     let set = BindingSet::new(&bindings, "fused_fma", &[(0, Binding::Buffer(numbers.any()))])?;
@@ -54,9 +54,11 @@ pub(super) fn fuses_fma(context: &Arc<Context>) -> Result<bool, GpuError> {
     Ok(numbers.download()?[1] != 0.0)
 }
 
-/// How many lanes the device runs at once, in workgroups of a light kernel: those that were seen side by side.
+/// Returns the number of lanes that the device runs at once in workgroups of a light kernel. It is the greatest
+/// number that the kernel has seen side by side.
 pub(super) fn n_lanes(context: &Arc<Context>) -> Result<u32, GpuError> {
-    // More than any device has room for; each stays for some 20,000 cycles, longer than it takes to begin them all.
+    // These are more workgroups than any device has room for. Each runs for some 20,000 cycles, longer than it takes
+    // to begin them all.
     const N_GROUPS: u32 = 16_384;
     const N_TURNS: u32 = 2500;
     let counts = Buffer::with(context, "counts", &[0u32; 3], BufferUse::Storage)?;

@@ -1,4 +1,4 @@
-//! The driver's own ray tracing pipeline, to compare with. Nothing else in kdray uses it.
+//! The driver's own ray tracing pipeline, with which kdray's kernels are compared. Nothing else in kdray uses it.
 
 use std::{ffi::CStr, sync::Arc};
 
@@ -10,13 +10,15 @@ use super::{
     instance::Instance, pipeline::ENTRY_POINT, shader::ShaderModule, specialization::Specialization,
 };
 
-/// The extensions' functions and limits.
+/// Functions and limits of the ray tracing extensions.
 pub(super) struct RayTracingCalls {
     pub structures: khr::acceleration_structure::Device,
+    /// Alignment of a build's scratch address, bytes.
     pub scratch_alignment: u32,
     pipelines: khr::ray_tracing_pipeline::Device,
+    /// Size of a shader group's handle, bytes.
     handle_bytes: usize,
-    /// Of a shader group's place in the table.
+    /// Alignment of a shader group's entry in the shader binding table, bytes.
     table_alignment: usize,
 }
 
@@ -24,9 +26,9 @@ impl RayTracingCalls {
     pub const EXTENSIONS: [&'static CStr; 3] =
         [khr::acceleration_structure::NAME, khr::ray_tracing_pipeline::NAME, khr::deferred_host_operations::NAME];
 
-    /// Those of the extensions that a device lacks, with commas; none where it has all.
+    /// Lists the extensions that a device lacks, separated by commas. `None` if it has all of [`Self::EXTENSIONS`].
     pub fn missing(instance: &Instance, physical: vk::PhysicalDevice) -> Option<String> {
-        // SAFETY: the device belongs to the instance.
+        // SAFETY: the physical device belongs to the instance.
         let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }.unwrap_or_default();
         let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         let missing: Vec<_> = Self::EXTENSIONS.iter().filter(|name| !has(name)).map(|name| text(name)).collect();
@@ -37,7 +39,7 @@ impl RayTracingCalls {
         let mut structures = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
         let mut pipelines = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
         let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut structures).push_next(&mut pipelines);
-        // SAFETY: the device has both extensions.
+        // SAFETY: the physical device has both extensions, which define the structs.
         unsafe { instance.raw.get_physical_device_properties2(physical, &mut all) };
         Self {
             structures: khr::acceleration_structure::Device::new(&instance.raw, device),
@@ -53,9 +55,9 @@ impl RayTracingCalls {
     }
 }
 
-/// A pipeline's three shaders.
+/// Description of a ray tracing pipeline: its three shaders.
 pub struct RayTracingDesc {
-    /// Also the debug label and the timer.
+    /// Name of the pipeline, of its debug label and of its row of the timer.
     pub name: &'static str,
     /// The ray generation shader.
     pub generation: Shader,
@@ -67,7 +69,7 @@ pub struct RayTracingDesc {
     pub constants: Constants,
 }
 
-/// A ray tracing pipeline with one group for each shader, and its table.
+/// A ray tracing pipeline with one group for each shader, and its shader binding table.
 pub struct RayTracingPipeline {
     raw: vk::Pipeline,
     table: Buffer<u8>,
@@ -77,8 +79,10 @@ pub struct RayTracingPipeline {
 }
 
 impl RayTracingPipeline {
+    /// Creates the pipeline and its table.
+    ///
     /// # Errors
-    /// The driver refuses a shader. Panics on a context without ray tracing.
+    /// The driver refuses a shader or is out of memory. Panics on a context without ray tracing.
     pub fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, desc: &RayTracingDesc) -> Result<Self, GpuError> {
         let calls = RayTracingCalls::of(context);
         let stages = [
@@ -111,7 +115,7 @@ impl RayTracingPipeline {
         let table = match table(context, calls, raw, groups.len()) {
             Ok(table) => table,
             Err(error) => {
-                // SAFETY: nothing uses it yet.
+                // SAFETY: nothing uses the pipeline yet.
                 unsafe { context.device.destroy_pipeline(raw, None) };
                 return Err(error);
             }
@@ -119,9 +123,10 @@ impl RayTracingPipeline {
         Ok(Self { raw, table, bindings: bindings.clone(), name: desc.name, context: context.clone() })
     }
 
+    /// Returns the part of the table that holds a group's entry.
     fn region(&self, group_ix: u64) -> vk::StridedDeviceAddressRegionKHR {
         let stride = RayTracingCalls::of(&self.context).table_alignment as u64;
-        // One place of the table stays free in front, to round its address up.
+        // The table has room for one entry more, so that its address can be rounded up.
         let base = self.table.any().address().next_multiple_of(stride);
         vk::StridedDeviceAddressRegionKHR { device_address: base + group_ix * stride, stride, size: stride }
     }
@@ -140,7 +145,7 @@ fn hit_group(shader_ix: u32) -> vk::RayTracingShaderGroupCreateInfoKHR<'static> 
     group(vk::SHADER_UNUSED_KHR).ty(vk::RayTracingShaderGroupTypeKHR::TRIANGLES_HIT_GROUP).closest_hit_shader(shader_ix)
 }
 
-/// One handle each `table_alignment` bytes from the first aligned address on.
+/// Makes the shader binding table: one handle every `table_alignment` bytes, from the first aligned address on.
 fn table(
     context: &Arc<Context>,
     calls: &RayTracingCalls,
@@ -166,20 +171,21 @@ fn table(
 
 impl Drop for RayTracingPipeline {
     fn drop(&mut self) {
-        // SAFETY: the device has ended all work with it.
+        // SAFETY: the device has ended all work with the pipeline.
         unsafe { self.context.device.destroy_pipeline(self.raw, None) };
     }
 }
 
 impl Commands<'_> {
-    /// Runs the ray generation shader so many times with the bound set, as a pass of the pipeline's name.
+    /// Runs `n_rays` invocations of the ray generation shader with the bound set, as a pass of the pipeline's name.
     pub fn trace_rays(&self, pipeline: &RayTracingPipeline, push: &impl Pod, n_rays: u32) {
         let calls = RayTracingCalls::of(self.context);
         let device = &self.context.device;
         let none = vk::StridedDeviceAddressRegionKHR::default();
         let [generation, miss, hit] = [0, 1, 2].map(|group_ix| pipeline.region(group_ix));
         self.pass(pipeline.name, None, || {
-            // SAFETY: the set is bound; push constants fit the layout's range; the table has the three groups.
+            // SAFETY: the set is bound, the push constants fit the layout's range, and the table has the three
+            // groups.
             unsafe {
                 device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::RAY_TRACING_KHR, pipeline.raw);
                 let (layout, stages) = (pipeline.bindings.pipeline_layout, self.context.stages());

@@ -1,4 +1,5 @@
-//! Creations that fail on purpose, so that tests see what remains of a change that a driver refuses halfway.
+//! Creations of Vulkan objects that fail on purpose, with which tests find out what remains of a change that a driver
+//! refuses halfway.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -6,9 +7,9 @@ use ash::vk;
 
 use super::{Context, GpuError};
 
-/// How many creations succeed until one fails.
+/// A countdown of the creations that succeed before one fails.
 pub(super) struct Refusal {
-    /// [`Refusal::NEVER`] where none fails.
+    /// Number of creations that still succeed. [`Refusal::NEVER`] if none fails.
     n_left: AtomicU32,
 }
 
@@ -21,14 +22,14 @@ impl Refusal {
 }
 
 impl Context {
-    /// Lets so many creations of buffers, images, pipelines, descriptor sets, query pools and command buffers succeed
-    /// from now on, and every later one fail as if memory were exhausted. `None` lets all succeed.
+    /// Lets the next `n_creations` creations of buffers, images, pipelines, descriptor sets, query pools and command
+    /// buffers succeed, and every later one fail as if memory were exhausted. `None` lets all succeed.
     #[doc(hidden)]
     pub fn refuse_creations_after(&self, n_creations: Option<u32>) {
         self.refusal.n_left.store(n_creations.unwrap_or(Refusal::NEVER), Ordering::Relaxed);
     }
 
-    /// Counts a creation by `call`, which is about to be made.
+    /// Counts a creation that is about to be made by `call`.
     ///
     /// # Errors
     /// The creation is one of those that [`Context::refuse_creations_after`] lets fail.

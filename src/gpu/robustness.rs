@@ -1,5 +1,6 @@
-//! Kernels without bounds checks: their indices come from queues of our own making and from trees and materials that are
-//! checked before they are uploaded (scene/mismatch.rs, kdtree/validate.rs). A check of each load costs rays 3 to 4 % of their speed on an H200 (benches/EXPERIMENTS.md).
+//! Kernels without bounds checks. Their indices come from queues that kdray's own kernels write, and from trees and
+//! materials that are checked before they are uploaded (world/mismatch.rs, accel/kdtree/validate.rs). A check of each
+//! load costs rays 3 to 4 % of their speed on an H200 (benches/EXPERIMENTS.md).
 
 use std::ffi::CStr;
 
@@ -7,10 +8,11 @@ use ash::{ext, vk};
 
 use super::instance::Instance;
 
-/// Some drivers check every access to a buffer unless they are told, by this, that a pipeline does not need it.
+/// The extension with which a pipeline declares that it needs no bounds checks. Without it, some drivers check every
+/// access to a buffer.
 pub(super) const EXTENSION: &CStr = ext::pipeline_robustness::NAME;
 
-/// Whether a device that has the extension has its feature.
+/// Whether a device that has the extension also has its feature.
 pub(super) fn has_feature(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
     let mut feature = vk::PhysicalDevicePipelineRobustnessFeaturesEXT::default();
     let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut feature);
@@ -19,7 +21,7 @@ pub(super) fn has_feature(instance: &Instance, physical: vk::PhysicalDevice) -> 
     feature.pipeline_robustness == vk::TRUE
 }
 
-/// How a pipeline says so.
+/// Returns the structure with which a pipeline turns off bounds checks of storage and uniform buffers.
 pub(super) fn without_checks() -> vk::PipelineRobustnessCreateInfoEXT<'static> {
     vk::PipelineRobustnessCreateInfoEXT::default()
         .storage_buffers(vk::PipelineRobustnessBufferBehaviorEXT::DISABLED)

@@ -1,4 +1,4 @@
-//! Shaders as build.rs has compiled them, and what takes their place while the program runs.
+//! Shaders that build.rs has compiled, and their replacements while the program runs (hot reload).
 
 use std::io::Cursor;
 
@@ -6,29 +6,29 @@ use ash::vk;
 
 use super::{Context, GpuError};
 
-/// A shader that the program brings along.
+/// A shader that is compiled into the program.
 #[derive(Clone, Copy)]
 pub struct Shader {
-    /// Its file's name in glsl/passes, say.
+    /// Name of the shader's file, such as one in glsl/passes.
     pub file: &'static str,
     /// The SPIR-V module's bytes.
     pub spirv: &'static [u8],
 }
 
-/// SPIR-V modules that take the place of those that the program brings along, by their files' names.
+/// SPIR-V modules that replace those that are compiled into the program, by their files' names.
 #[cfg(feature = "hot-reload")]
 pub type Replacements = std::collections::HashMap<String, Vec<u8>>;
 
 #[cfg(feature = "hot-reload")]
 impl Context {
-    /// Pipelines that are made from now on are made of these; gives what they were made of before.
+    /// Sets the replacements from which later pipelines are made, and returns the earlier replacements.
     pub fn replace_shaders(&self, replacements: Replacements) -> Replacements {
         let mut current = self.replacements.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         std::mem::replace(&mut current, replacements)
     }
 }
 
-/// A module, needed only while a pipeline is made of it.
+/// A shader module, which is needed only while a pipeline is made from it.
 pub(super) struct ShaderModule<'a> {
     pub(super) raw: vk::ShaderModule,
     context: &'a Context,
@@ -58,7 +58,7 @@ impl<'a> ShaderModule<'a> {
 
 impl Drop for ShaderModule<'_> {
     fn drop(&mut self) {
-        // SAFETY: pipelines do not need their modules once made.
+        // SAFETY: a pipeline does not need its modules once it is made.
         unsafe { self.context.device.destroy_shader_module(self.raw, None) };
     }
 }

@@ -1,4 +1,4 @@
-//! Specialization constants of a pipeline: its own, and those that its bindings bring.
+//! Specialization constants of a pipeline: its own, and those of its binding layout.
 
 use std::marker::PhantomData;
 
@@ -10,20 +10,21 @@ use super::BindingLayout;
 #[derive(Debug)]
 pub struct Constant<T> {
     name: &'static str,
+    /// The `constant_id` in GLSL.
     id: u32,
     value: PhantomData<T>,
 }
 
 impl<T> Constant<T> {
-    /// The constant of a name and number.
+    /// Defines the constant with a name and a `constant_id`.
     pub const fn new(name: &'static str, id: u32) -> Self {
         Self { name, id, value: PhantomData }
     }
 }
 
-/// A value that a constant can have: 32 bits for Vulkan.
+/// A value that a constant can have. Vulkan takes it as 32 bits.
 pub trait ConstantValue {
-    /// The bits.
+    /// Returns the value's bits.
     fn word(self) -> u32;
 }
 
@@ -42,20 +43,20 @@ impl ConstantValue for bool {
 /// Values of specialization constants.
 #[derive(Clone, Debug, Default)]
 pub struct Constants {
-    /// Name, number and bits of each.
+    /// Name, `constant_id` and bits of each constant.
     values: Vec<(&'static str, u32, u32)>,
 }
 
 impl Constants {
-    /// No constants: each shader has its own values.
+    /// Returns no constants: each shader keeps its own values.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Gives a constant a value.
+    /// Sets the value of a constant.
     ///
     /// # Panics
-    /// The constant has one already.
+    /// The constant already has a value.
     #[must_use]
     pub fn set<T: ConstantValue>(mut self, constant: Constant<T>, value: T) -> Self {
         assert!(self.names().all(|name| name != constant.name), "{} is set twice", constant.name);
@@ -63,7 +64,7 @@ impl Constants {
         self
     }
 
-    /// The names of the constants that have values.
+    /// Returns the names of the constants that have values.
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
         self.values.iter().map(|(name, ..)| *name)
     }
@@ -76,7 +77,7 @@ pub(super) struct Specialization {
 }
 
 impl Specialization {
-    /// A pipeline's own constants, and those of its bindings.
+    /// Combines a pipeline's own constants with those of its binding layout.
     pub fn new(own: &Constants, bindings: &BindingLayout) -> Self {
         let (mut entries, mut values) = (Vec::new(), Vec::new());
         for (_, constant_id, value) in own.values.iter().chain(&bindings.constants.values) {

@@ -1,4 +1,4 @@
-//! What a driver tells of the code that it made of a kernel: registers, spills, instructions.
+//! Statistics that a driver reports of its code for a kernel, such as registers, spills and instructions.
 
 use std::{ffi::CStr, fmt};
 
@@ -7,26 +7,26 @@ use serde::Serialize;
 
 use super::{ComputePipeline, Context, GpuError, devices::text, instance::Instance};
 
-/// One number, under the driver's own name.
+/// One statistic, under the driver's own name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Statistic {
-    /// Of several executables of one kernel, which.
+    /// Name of the executable. A driver may make several from one kernel.
     pub executable: String,
-    /// The driver's name for the number.
+    /// The driver's name for the statistic.
     pub name: String,
-    /// The number.
+    /// The value.
     pub value: StatisticValue,
 }
 
-/// What kinds of numbers there are.
+/// Value of a statistic.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum StatisticValue {
     /// Yes or no.
     Flag(bool),
-    /// An integer.
+    /// A signed integer.
     Signed(i64),
-    /// A count.
+    /// An unsigned integer.
     Unsigned(u64),
     /// A real number.
     Real(f64),
@@ -43,13 +43,13 @@ impl fmt::Display for StatisticValue {
     }
 }
 
-/// The functions of VK_KHR_pipeline_executable_properties.
+/// The functions of `VK_KHR_pipeline_executable_properties`.
 pub(super) struct StatisticsCalls(khr::pipeline_executable_properties::Device);
 
 impl StatisticsCalls {
     pub const EXTENSION: &'static CStr = khr::pipeline_executable_properties::NAME;
 
-    /// Whether a device that has the extension has its feature.
+    /// Whether a device that has the extension also has its feature.
     pub fn has_feature(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
         let mut feature = vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default();
         let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut feature);
@@ -63,7 +63,7 @@ impl StatisticsCalls {
     }
 }
 
-/// How a pipeline is made, so that it has statistics where the device knows any.
+/// Returns the creation flags with which a pipeline has statistics, if the device reports any.
 pub(super) fn capture_flags(context: &Context) -> vk::PipelineCreateFlags {
     match context.statistics {
         Some(_) => vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR,
@@ -72,10 +72,11 @@ pub(super) fn capture_flags(context: &Context) -> vk::PipelineCreateFlags {
 }
 
 impl ComputePipeline {
-    /// All that the driver tells of it; nothing where it has no VK_KHR_pipeline_executable_properties.
+    /// Returns all statistics that the driver reports of the kernel. There are none if the driver lacks
+    /// `VK_KHR_pipeline_executable_properties`.
     ///
     /// # Errors
-    /// Out of memory.
+    /// Memory is exhausted.
     pub fn statistics(&self) -> Result<Vec<Statistic>, GpuError> {
         let Some(StatisticsCalls(calls)) = &self.context.statistics else { return Ok(Vec::new()) };
         let pipeline = vk::PipelineInfoKHR::default().pipeline(self.raw);
@@ -86,7 +87,8 @@ impl ComputePipeline {
         for (executable_ix, executable) in (0..).zip(&executables) {
             let name = text(executable.name_as_c_str().unwrap_or_default());
             let info = vk::PipelineExecutableInfoKHR::default().pipeline(self.raw).executable_index(executable_ix);
-            // SAFETY: as above; the pipeline was made with `capture_flags`.
+            // SAFETY: the pipeline belongs to the device, whose feature is enabled, and was made with
+            // `capture_flags`.
             let known = unsafe { calls.get_pipeline_executable_statistics(&info) }
                 .map_err(GpuError::call("vkGetPipelineExecutableStatisticsKHR", self.name))?;
             statistics.extend(known.iter().map(|raw| statistic(&name, raw)));

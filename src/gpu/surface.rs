@@ -1,4 +1,4 @@
-//! The surface of a window: where pictures are shown.
+//! The surface of a window, on which pictures are shown.
 
 use std::{ffi::CStr, sync::Arc};
 
@@ -7,12 +7,12 @@ use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 
 use super::{GpuError, devices::queue_family, instance::Instance};
 
-/// What has a place on a screen: a window.
+/// A window, with the handles of its display and of itself.
 pub trait Screen: HasDisplayHandle + HasWindowHandle {}
 
 impl<T: HasDisplayHandle + HasWindowHandle> Screen for T {}
 
-/// A window's surface, which keeps the window.
+/// A window's surface. It keeps the window alive.
 pub struct Surface {
     pub(super) raw: vk::SurfaceKHR,
     pub(super) calls: khr::surface::Instance,
@@ -21,7 +21,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Instance extensions that a surface of this window needs.
+    /// Lists the instance extensions that a surface of this window needs.
     pub(super) fn extensions(window: &dyn Screen) -> Result<Vec<&'static CStr>, GpuError> {
         let display = window.display_handle().map_err(|error| GpuError::NoSurface(error.to_string()))?;
         let names = ash_window::enumerate_required_extensions(display.as_raw())
@@ -30,21 +30,21 @@ impl Surface {
         Ok(names.iter().map(|name| unsafe { CStr::from_ptr(*name) }).collect())
     }
 
-    /// The instance has the extensions that the window needs.
+    /// Creates the surface of a window. The instance must have the extensions that the window needs.
     pub(super) fn new(instance: &Arc<Instance>, window: Arc<dyn Screen>) -> Result<Self, GpuError> {
         let no_surface = |error: raw_window_handle::HandleError| GpuError::NoSurface(error.to_string());
         let display = window.display_handle().map_err(no_surface)?.as_raw();
         let handle = window.window_handle().map_err(no_surface)?.as_raw();
-        // SAFETY: the handles are the window's, which the surface keeps.
+        // SAFETY: the handles belong to the window, which the surface keeps alive.
         let raw = unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, handle, None) }
             .map_err(GpuError::call("vkCreateSurfaceKHR", "window"))?;
         let calls = khr::surface::Instance::new(&instance.entry, &instance.raw);
         Ok(Self { raw, calls, _instance: instance.clone(), _window: window })
     }
 
-    /// Whether the queue of a device that renders can also present to the surface.
+    /// Whether a device's queue for rendering can also present to the surface.
     pub(super) fn is_served_by(&self, instance: &Instance, device: vk::PhysicalDevice) -> bool {
-        // SAFETY: the device belongs to the instance.
+        // SAFETY: the physical device belongs to the instance.
         let (families, extensions) = unsafe {
             (
                 instance.raw.get_physical_device_queue_family_properties(device),
@@ -56,14 +56,14 @@ impl Surface {
     }
 
     fn is_served_by_family(&self, device: vk::PhysicalDevice, family: u32) -> bool {
-        // SAFETY: device and surface belong to one instance.
+        // SAFETY: the physical device and the surface belong to the same instance.
         unsafe { self.calls.get_physical_device_surface_support(device, family, self.raw) }.unwrap_or(false)
     }
 }
 
 impl Drop for Surface {
     fn drop(&mut self) {
-        // SAFETY: the swapchain that holds the surface has ended before it.
+        // SAFETY: the swapchain of the surface is destroyed before it.
         unsafe { self.calls.destroy_surface(self.raw, None) };
     }
 }

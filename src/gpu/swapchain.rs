@@ -1,4 +1,4 @@
-//! The images of a window, in one size.
+//! The swapchain: images of one size that a window shows in turn.
 
 use std::{slice, sync::Arc};
 
@@ -6,10 +6,10 @@ use ash::{khr, vk};
 
 use super::{Context, GpuError, Surface};
 
-/// One is shown, one waits to be shown, one is drawn.
+/// Number of images: one is shown, one waits to be shown and one is drawn.
 const N_IMAGES: u32 = 3;
 
-/// Images of one size that are drawn and shown in turns.
+/// Images of one size that are drawn and shown in turn.
 pub(super) struct Swapchain {
     pub raw: vk::SwapchainKHR,
     pub images: Vec<SwapchainImage>,
@@ -17,26 +17,28 @@ pub(super) struct Swapchain {
     context: Arc<Context>,
 }
 
-/// An image to show.
+/// An image of the swapchain.
 pub(super) struct SwapchainImage {
     pub raw: vk::Image,
     pub view: vk::ImageView,
-    /// Signalled when it is drawn. One an image: nothing tells when a presentation has waited for it, but that the
-    /// image can be acquired again.
+    /// Signalled when the image is drawn. Each image has its own semaphore: only when the image can be acquired again
+    /// is it certain that a presentation has waited for it.
     pub drawn: vk::Semaphore,
 }
 
-/// What became of a call that the window's changes can upset.
+/// Outcome of a call that can fail because the window has changed.
 pub(super) enum Outcome<T> {
+    /// The call worked.
     Good(T),
-    /// It worked, though the images no longer fit the window.
+    /// The call worked, though the images no longer fit the window.
     Suboptimal(T),
-    /// It did not: the images have to be made anew.
+    /// The call failed: new images have to be made.
     OutOfDate,
 }
 
 impl Swapchain {
-    /// None for a window without area. `size`: pixels, where the window system leaves them to us; `old` is retired.
+    /// Creates a swapchain, or returns `None` for a window without area. `size`, in pixels, is used if the window
+    /// system leaves the size to the program. `old` is retired.
     pub fn new(
         context: &Arc<Context>,
         surface: &Surface,
@@ -70,7 +72,7 @@ impl Swapchain {
             .clipped(true)
             .old_swapchain(old.map_or(vk::SwapchainKHR::null(), |old| old.raw));
         let calls = calls(context);
-        // SAFETY: `info` asks for what the surface offers; `Drop` takes what was made.
+        // SAFETY: `info` requests only what the surface offers, and `Drop` releases what was made.
         let raw =
             unsafe { calls.create_swapchain(&info, None) }.map_err(GpuError::call("vkCreateSwapchainKHR", "window"))?;
         let mut swapchain = Self { raw, images: Vec::new(), extent, context: context.clone() };
@@ -96,7 +98,7 @@ impl Swapchain {
             .view_type(vk::ImageViewType::TYPE_2D)
             .format(format)
             .subresource_range(range);
-        // SAFETY: the image is the swapchain's; what is made is released with it.
+        // SAFETY: the image belongs to the swapchain, with which the view and the semaphore are released.
         unsafe {
             let view = device.create_image_view(&info, None).map_err(GpuError::call("vkCreateImageView", "window"))?;
             let drawn = vk::Semaphore::null();
@@ -109,7 +111,7 @@ impl Swapchain {
         Ok(())
     }
 
-    /// The next image to draw; `acquired` is signalled when the screen has let go of it.
+    /// Acquires the next image to draw. `acquired` is signalled when the screen has released it.
     pub fn acquire(&self, acquired: vk::Semaphore) -> Result<Outcome<usize>, GpuError> {
         // SAFETY: the semaphore is unsignalled and nothing waits for it.
         let result =
@@ -142,7 +144,7 @@ impl Swapchain {
 
 impl Drop for Swapchain {
     fn drop(&mut self) {
-        // SAFETY: the device is idle, the screen's share of it included; null handles are ignored.
+        // SAFETY: the device is idle, including its work for the screen, and Vulkan ignores null handles.
         unsafe {
             let _ = self.context.device.device_wait_idle();
             for image in &self.images {
@@ -158,7 +160,8 @@ fn calls(context: &Context) -> &khr::swapchain::Device {
     context.presentation.as_ref().expect("a context with a surface was opened for a window")
 }
 
-/// Eight bits a channel, written as they are: the tone mapper has encoded them for display.
+/// Chooses a format of 8 bits a channel whose values are stored unchanged, since the tone mapper has already encoded
+/// them for display.
 pub(super) fn format(context: &Context, surface: &Surface) -> Result<vk::SurfaceFormatKHR, GpuError> {
     // SAFETY: the surface belongs to the device's instance.
     let offered = unsafe { surface.calls.get_physical_device_surface_formats(context.physical, surface.raw) }
@@ -172,18 +175,19 @@ pub(super) fn format(context: &Context, surface: &Surface) -> Result<vk::Surface
         .ok_or_else(|| GpuError::NoSurface("it takes no images of 8 bits a channel".to_owned()))
 }
 
-/// With `vsync` the screen's pace; without it as soon as may be.
+/// Chooses how images are shown: at the screen's refresh with `vsync`, else as soon as possible.
 fn present_mode(context: &Context, surface: &Surface, vsync: bool) -> Result<vk::PresentModeKHR, GpuError> {
     // SAFETY: the surface belongs to the device's instance.
     let offered = unsafe { surface.calls.get_physical_device_surface_present_modes(context.physical, surface.raw) }
         .map_err(GpuError::call("vkGetPhysicalDeviceSurfacePresentModesKHR", "window"))?;
     let unpaced = [vk::PresentModeKHR::IMMEDIATE, vk::PresentModeKHR::MAILBOX];
     let found = unpaced.into_iter().find(|mode| !vsync && offered.contains(mode));
-    // Every device has this one.
+    // Every device supports FIFO.
     Ok(found.unwrap_or(vk::PresentModeKHR::FIFO))
 }
 
-/// The window's size, or `size` within bounds where the window takes that of its images.
+/// Returns the window's size. If the window takes the size of its images instead, returns `size`, clamped to the
+/// surface's bounds.
 fn extent(able: &vk::SurfaceCapabilitiesKHR, size: (u32, u32)) -> vk::Extent2D {
     if able.current_extent.width != u32::MAX {
         return able.current_extent;

@@ -1,4 +1,4 @@
-//! GPU times of passes by timestamp queries.
+//! GPU times of passes, measured by timestamp queries.
 
 use std::{cell::RefCell, sync::Arc};
 
@@ -6,19 +6,20 @@ use ash::vk;
 
 use super::{Context, GpuError};
 
-/// A row of the profile: when a pass began and ended, in milliseconds since the frame's first pass began.
+/// A row of the profile: the time that a pass took.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimerRow {
     /// The pass's name.
     pub name: &'static str,
-    /// The number that tells the pass from others of its name, if any.
+    /// The number that distinguishes the pass from others of its name, if any.
     pub number: Option<u32>,
-    /// None where the device's queue has no timestamps.
+    /// Begin and end of the pass, milliseconds since the frame's first pass began. `None` if the device's queue
+    /// writes no timestamps.
     pub span_ms: Option<(f64, f64)>,
 }
 
-/// Timestamps of up to `capacity` passes a frame. A pass begins where the one before it in its command buffer has ended: a
-/// timestamp costs an H200 more than a microsecond.
+/// Timestamps of up to `capacity` passes a frame. A pass begins at the timestamp with which the previous pass of its
+/// command buffer ended, because a timestamp costs an H200 more than a microsecond.
 pub struct Timer {
     pool: vk::QueryPool,
     capacity: u32,
@@ -26,53 +27,57 @@ pub struct Timer {
     context: Arc<Context>,
 }
 
+/// Rows and timestamps that the current frame has so far.
 #[derive(Default)]
 struct Recorded {
     rows: Vec<Row>,
     n_timestamps: u32,
 }
 
+/// A recorded pass.
 struct Row {
     name: &'static str,
     number: Option<u32>,
-    /// Numbers of its timestamps.
+    /// Indices of the timestamps at which the pass begins and ends.
     begin: u32,
     end: u32,
 }
 
 impl Timer {
+    /// Creates a timer.
+    ///
     /// # Errors
-    /// Out of memory.
+    /// Memory is exhausted.
     pub fn new(context: &Arc<Context>, capacity: u32) -> Result<Self, GpuError> {
         context.count_creation("vkCreateQueryPool", "timer")?;
         let info = vk::QueryPoolCreateInfo::default()
             .query_type(vk::QueryType::TIMESTAMP)
             .query_count(Self::n_queries(capacity));
-        // SAFETY: a plain creation.
+        // SAFETY: the call only creates a pool, which `Drop` destroys.
         let pool = unsafe { context.device.create_query_pool(&info, None) }
             .map_err(GpuError::call("vkCreateQueryPool", "timer"))?;
         context.set_name(pool, "timer");
         Ok(Self { pool, capacity, recorded: RefCell::default(), context: context.clone() })
     }
 
-    /// Begin, end and two dummies a pass (see [`Timer::write`]).
+    /// Returns the number of queries: a begin, an end and two dummies for each pass (see [`Timer::write`]).
     fn n_queries(capacity: u32) -> u32 {
         4 * capacity
     }
 
-    /// Passes it has room for.
+    /// Returns the number of passes that the timer has room for.
     pub fn capacity(&self) -> u32 {
         self.capacity
     }
 
-    /// Forgets all rows; to be recorded before the frame's first pass.
+    /// Forgets all rows. It must be recorded before the frame's first pass.
     pub(super) fn reset(&self, commands: vk::CommandBuffer) {
         self.recorded.take();
-        // SAFETY: the commands are being recorded, outside rendering.
+        // SAFETY: the commands are being recorded, and no rendering is open.
         unsafe { self.context.device.cmd_reset_query_pool(commands, self.pool, 0, Self::n_queries(self.capacity)) };
     }
 
-    /// Opens the next row. `is_first`: of its command buffer.
+    /// Opens the next row. `is_first` says whether the pass is the first of its command buffer.
     pub(super) fn begin(&self, commands: vk::CommandBuffer, name: &'static str, number: Option<u32>, is_first: bool) {
         let n_rows = self.recorded.borrow().rows.len() as u32;
         assert!(n_rows < self.capacity, "the timer has room for {} passes", self.capacity);
@@ -93,8 +98,9 @@ impl Timer {
         }
     }
 
-    /// Written twice: on Mesa 22.3's lavapipe a compute timestamp holds the one before it once any render pass has
-    /// run; the second write, to a dummy, pushes the first one into its place.
+    /// Writes the next timestamp, and writes it twice. On Mesa 22.3's lavapipe, once any render pass has run, the
+    /// query of a compute timestamp gets the value of the timestamp before it. The second write, to a dummy query,
+    /// pushes the first value into its place.
     fn write(&self, commands: vk::CommandBuffer) {
         let timestamp = self.recorded.borrow().n_timestamps;
         self.recorded.borrow_mut().n_timestamps += 1;
@@ -103,12 +109,12 @@ impl Timer {
         }
         let stage = vk::PipelineStageFlags2::BOTTOM_OF_PIPE;
         for query in [2 * timestamp, 2 * timestamp + 1] {
-            // SAFETY: the commands are being recorded; the query was reset at the frame's start.
+            // SAFETY: the commands are being recorded, and the query was reset at the frame's start.
             unsafe { self.context.device.cmd_write_timestamp2(commands, stage, self.pool, query) };
         }
     }
 
-    /// The frame's rows in the order of recording; the device must have ended the frame.
+    /// Returns the frame's rows in the order of recording. The device must have ended the frame.
     pub fn rows(&self) -> Result<Vec<TimerRow>, GpuError> {
         let Recorded { rows, n_timestamps } = &*self.recorded.borrow();
         let ticks = self.ticks(*n_timestamps as usize)?;
@@ -120,7 +126,7 @@ impl Timer {
         Ok(rows.iter().map(row).collect())
     }
 
-    /// All timestamps; none where the queue has none.
+    /// Returns all timestamps in ticks, or none if the queue writes none.
     fn ticks(&self, n_timestamps: usize) -> Result<Vec<u64>, GpuError> {
         let bits = self.context.timestamp_valid_bits;
         if bits == 0 || n_timestamps == 0 {
@@ -138,7 +144,7 @@ impl Timer {
 
 impl Drop for Timer {
     fn drop(&mut self) {
-        // SAFETY: the device has ended all work with it.
+        // SAFETY: the device has ended all work with the pool.
         unsafe { self.context.device.destroy_query_pool(self.pool, None) };
     }
 }

@@ -6,10 +6,10 @@ use bytemuck::Pod;
 use super::{BindingSet, Commands, RasterPipeline, WindowImage, swapchain::SwapchainImage};
 
 impl Commands<'_> {
-    /// Makes the image black and ready to be drawn to, and begins that.
+    /// Prepares the image for drawing and begins rendering to it, which clears it to black.
     pub(super) fn begin_window(&self, image: &SwapchainImage, extent: vk::Extent2D) {
         let output = vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT;
-        // The submit's wait for the acquired image ends at this stage.
+        // The submit waits at this stage until the image is acquired.
         let barrier = image_barrier(image)
             .src_stage_mask(output)
             .old_layout(vk::ImageLayout::UNDEFINED)
@@ -24,13 +24,13 @@ impl Commands<'_> {
         let area = vk::Rect2D { extent, ..Default::default() };
         let rendering = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color);
         self.image_barrier(barrier);
-        // SAFETY: the commands are being recorded; the image is in the named layout.
+        // SAFETY: the commands are being recorded, and the image is in the named layout.
         unsafe { self.context.device.cmd_begin_rendering(self.raw, &rendering) };
     }
 
-    /// Hands the image to the screen.
+    /// Ends rendering and hands the image to the screen.
     pub(super) fn end_window(&self, image: &SwapchainImage) {
-        // SAFETY: `begin_window` began it.
+        // SAFETY: `begin_window` has begun the rendering.
         unsafe { self.context.device.cmd_end_rendering(self.raw) };
         let barrier = image_barrier(image)
             .src_stage_mask(vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT)
@@ -41,7 +41,7 @@ impl Commands<'_> {
         self.image_barrier(barrier);
     }
 
-    /// Draws one triangle that covers the window.
+    /// Draws one triangle that covers the window, as a pass of the pipeline's name.
     pub fn cover(&self, pipeline: &RasterPipeline, set: &BindingSet, push: &impl Pod, image: &WindowImage) {
         let device = &self.context.device;
         let (width, height) = image.size();
@@ -49,7 +49,7 @@ impl Commands<'_> {
             vk::Viewport { width: width as f32, height: height as f32, max_depth: 1.0, ..Default::default() };
         let area = vk::Rect2D { extent: image.extent, ..Default::default() };
         self.pass(pipeline.name, None, || {
-            // SAFETY: rendering to the window has begun; the set's layout is the pipeline's.
+            // SAFETY: rendering to the window has begun, and the set's layout is the pipeline's.
             unsafe {
                 let layout = set.bindings.pipeline_layout;
                 let point = vk::PipelineBindPoint::GRAPHICS;
@@ -66,7 +66,7 @@ impl Commands<'_> {
     fn image_barrier(&self, barrier: vk::ImageMemoryBarrier2) {
         let barriers = [barrier];
         let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
-        // SAFETY: the commands are being recorded, outside rendering.
+        // SAFETY: the commands are being recorded, and no rendering is open.
         unsafe { self.context.device.cmd_pipeline_barrier2(self.raw, &info) };
     }
 }

@@ -1,4 +1,4 @@
-//! Counts in colours, with the scale that says which is which.
+//! Heat maps: counts shown as colours, beside a scale that says which count each colour is.
 
 use std::{convert::Infallible, path::Path};
 
@@ -14,36 +14,38 @@ use image::{ImageFormat, Rgb, RgbImage};
 
 use super::{OutputError, write};
 
-/// A count a pixel, rows from the top.
+/// A heat map: one count for each pixel.
 pub struct HeatMap<'a> {
     /// What is counted.
     pub title: &'a str,
-    /// Pixels.
+    /// Width, pixels.
     pub width: u32,
-    /// Pixels.
+    /// Height, pixels.
     pub height: u32,
-    /// `width * height`.
+    /// Counts, `width * height` of them, row by row from the top.
     pub values: Vec<u32>,
 }
 
 const BACKGROUND: Rgb<u8> = Rgb([24, 24, 24]);
-/// Pixels around everything.
+/// Width of the space around each part of the picture, pixels.
 const MARGIN: u32 = 8;
-/// Of a line of text, pixels.
+/// Height of a line of text, pixels.
 const LINE: u32 = 16;
-/// The colour bar's, pixels.
+/// Width of the colour bar, pixels.
 const BAR_WIDTH: u32 = 16;
+/// Least height of the colour bar, pixels.
 const LEAST_BAR_HEIGHT: u32 = 120;
-/// For the numbers beside the bar, pixels.
+/// Width of the space for the numbers beside the bar, pixels.
 const LABEL_WIDTH: u32 = 60;
-/// The share of pixels that the scale reaches: a few that stand out would leave all others dark.
+/// Share of the pixels whose counts the scale covers. If it covered all, a few large counts would leave all others
+/// dark.
 const SHARE_BELOW_TOP: f64 = 0.995;
 
 impl HeatMap<'_> {
-    /// Writes a PNG: the map, to its right the scale, above both what it shows.
+    /// Writes a PNG with the map, the scale to its right and a heading above both.
     ///
     /// # Errors
-    /// As [`write()`].
+    /// Fails as [`write()`] does.
     pub fn write(&self, path: &Path) -> Result<(), OutputError> {
         let mut file = std::io::Cursor::new(Vec::new());
         self.draw().write_to(&mut file, ImageFormat::Png).map_err(|source| OutputError::encode(path, source))?;
@@ -84,7 +86,7 @@ fn mean(values: &[u32]) -> f64 {
     values.iter().map(|value| f64::from(*value)).sum::<f64>() / (values.len() as f64).max(1.0)
 }
 
-/// From 0 to `top`, linear, with a tick every `step`.
+/// A linear scale from 0 to `top`, with a tick every `step`.
 #[derive(Debug, PartialEq)]
 struct Scale {
     top: u64,
@@ -92,7 +94,7 @@ struct Scale {
 }
 
 impl Scale {
-    /// Reaches all values but the very few largest, by some five steps of round numbers.
+    /// Makes a scale that covers all values but the very few largest, in about five steps of a round number.
     fn of(values: &[u32]) -> Self {
         let mut sorted = values.to_vec();
         let rank = (values.len() as f64 * SHARE_BELOW_TOP) as usize;
@@ -113,15 +115,15 @@ impl Scale {
     }
 }
 
-/// The least of 1, 2, 5, 10, 20, 50, ... that is no less.
+/// Returns the least of 1, 2, 5, 10, 20, 50, ... that is not below `least`.
 fn round_number(least: u64) -> u64 {
     let decades = (0..18).map(|exponent| 10_u64.pow(exponent));
     let mut numbers = decades.flat_map(|ten| [1, 2, 5].map(|n| n * ten));
     numbers.find(|number| *number >= least).expect("counts have fewer digits")
 }
 
-/// The perceptually even colour map viridis (S. van der Walt, N. Smith, 2015), 0 to 1, as M. Zucker fitted polynomials to
-/// it (shadertoy.com/view/WlfXRN, 2019).
+/// Returns the colour of `x`, from 0 to 1, in the perceptually even colour map viridis (S. van der Walt, N. Smith,
+/// 2015). The polynomials are those that M. Zucker fitted to it (shadertoy.com/view/WlfXRN, 2019).
 fn viridis(x: f64) -> Rgb<u8> {
     const COEFFICIENTS: [[f64; 3]; 7] = [
         [0.277_727_327, 0.005_407_345, 0.334_099_805],
@@ -136,7 +138,7 @@ fn viridis(x: f64) -> Rgb<u8> {
     Rgb([0, 1, 2].map(|i| (channel(i).clamp(0.0, 1.0) * 255.0 + 0.5) as u8))
 }
 
-/// What text is drawn on.
+/// The picture as a target that text can be drawn on.
 struct Canvas(RgbImage);
 
 impl Canvas {
@@ -176,7 +178,7 @@ impl DrawTarget for Canvas {
 mod tests {
     use super::*;
 
-    /// Of the published table's first, middle and last rows.
+    /// The expected colours are the first, middle and last rows of the published table.
     #[test]
     fn colours_are_viridis() {
         for (x, expected) in [(0.0, [68, 1, 84]), (0.5, [33, 145, 140]), (1.0, [253, 231, 37])] {
@@ -196,7 +198,7 @@ mod tests {
             assert_eq!(Scale::of(&none), Scale { top: 1, step: 1 });
         }
         assert_eq!(upto(90).ticks().collect::<Vec<_>>(), [0, 20, 40, 60, 80, 100]);
-        // One of a thousand does not stretch the scale.
+        // One large value in a thousand does not stretch the scale.
         let mut outlier = vec![10; 1000];
         outlier[7] = 1_000_000;
         assert_eq!(Scale::of(&outlier), Scale { top: 10, step: 2 });
@@ -216,7 +218,7 @@ mod tests {
         let column: Vec<_> = (0..LEAST_BAR_HEIGHT).map(|y| *image.get_pixel(bar, 2 * MARGIN + LINE + y)).collect();
         assert_eq!(*column.last().unwrap(), viridis(0.5 / 120.0));
         assert_eq!(column[0], viridis(1.0 - 0.5 / 120.0));
-        // Digits are white, beside each tick.
+        // White digits are beside each tick.
         let white = |x: u32, y: u32| *image.get_pixel(x, y) == Rgb([255; 3]);
         for tick in 0..=5 {
             let y = 2 * MARGIN + LINE + 119 - 119 * tick / 5;

@@ -1,4 +1,4 @@
-//! A picture with more than colour: one OpenEXR file of many channels.
+//! Pictures with outputs beside colour (AOVs), as one OpenEXR file of many channels.
 
 use std::{io::Cursor, path::Path};
 
@@ -14,11 +14,11 @@ use crate::{
     layout::Feature,
 };
 
-/// Writes the radiance as R, G, B, and each output's channels beside it, whole or not at all: 32-bit floats, numbers of
-/// things as 32-bit integers.
+/// Writes the radiance as R, G and B, and the channels of each AOV beside it, whole or not at all. The values are
+/// 32-bit floats, but counts and indices are 32-bit integers.
 ///
 /// # Errors
-/// As [`write()`].
+/// Fails as [`write()`] does, or if the pixels cannot be encoded.
 pub fn write_layers(path: &Path, picture: &Picture, aovs: &[Aov], features: &[Feature]) -> Result<(), OutputError> {
     let n_pixels = picture.width as usize * picture.height as usize;
     if picture.radiance.len() != n_pixels || (!aovs.is_empty() && features.len() != n_pixels) {
@@ -51,7 +51,8 @@ fn encode(size: (usize, usize), channels: Vec<Channel>) -> Result<Vec<u8>, exr::
             AnyChannel::new(channel.name.as_str(), samples)
         })
         .collect();
-    // Blocks are compressed in parallel; in order, the same picture is always the same file.
+    // Blocks are compressed in parallel. They are written in order, so that the same picture always gives the same
+    // file.
     let encoding = Encoding { line_order: LineOrder::Increasing, ..Encoding::FAST_LOSSLESS };
     let layer = Layer::new(size, LayerAttributes::default(), encoding, AnyChannels::sort(channels));
     let mut file = Cursor::new(Vec::new());

@@ -1,8 +1,8 @@
 //! Writes pixels to a file, whole or not at all.
 //!
 //! A file is encoded in memory, if it fits there, written beside its target under a temporary name, synchronized and
-//! renamed. So a full disk leaves what was there before, and no truncated or temporary file. A signal that ends the
-//! process leaves none either, if its handler calls [`remove_temporaries`].
+//! renamed. So if the disk is full, the earlier file stays as it was, and no truncated or temporary file is left. A
+//! signal that ends the process leaves none either, if its handler calls [`remove_temporaries`].
 
 use std::{
     error::Error,
@@ -27,20 +27,20 @@ mod layers;
 mod target;
 mod temporary;
 
-/// Bytes beyond which a spool goes to disk.
+/// Size beyond which a spool goes to disk, bytes.
 const SPOOL_IN_MEMORY: usize = 64 << 20;
 
-/// Why a file was not written.
+/// The reason why a file was not written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutputError {
-    /// The file's name does not say in which format it is to be written.
+    /// The file's name does not tell the format in which to write it.
     #[error("cannot write `{path}`: a picture's name must end in .png or .exr")]
     UnknownEnding {
         /// The file.
         path: PathBuf,
     },
-    /// The file's folder is not there.
+    /// The file's folder does not exist.
     #[error("cannot write `{path}`: `{directory}` is not a directory")]
     NoDirectory {
         /// The file.
@@ -48,7 +48,7 @@ pub enum OutputError {
         /// The folder.
         directory: PathBuf,
     },
-    /// There is a folder of the file's name.
+    /// The file's name is that of a folder.
     #[error("cannot write `{path}`: it is a directory")]
     IsDirectory {
         /// The file.
@@ -78,7 +78,7 @@ impl OutputError {
     }
 }
 
-/// What a picture's file holds.
+/// Format of a picture's file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// 8 bits a channel, sRGB: [`Picture::display`].
@@ -88,7 +88,10 @@ pub enum Format {
 }
 
 impl Format {
-    /// The format that a file's ending names, in whatever case.
+    /// Returns the format that a file's ending names, in upper or lower case.
+    ///
+    /// # Errors
+    /// The ending names no format.
     pub fn of(path: &Path) -> Result<Self, OutputError> {
         let ending = path.extension().unwrap_or_default();
         if ending.eq_ignore_ascii_case("png") {
@@ -101,13 +104,17 @@ impl Format {
     }
 }
 
-/// A file's name without its ending for pictures of a scene, in the working directory.
+/// Returns a file name without ending for pictures of a scene. The name leads to the working directory, since `-`
+/// replaces path separators and control characters.
 pub fn stem_of(scene_name: &str) -> String {
     let name = scene_name.replace(|c: char| std::path::is_separator(c) || c.is_control(), "-");
     if name.is_empty() { "picture".to_owned() } else { name }
 }
 
-/// Finds out whether a file can be created or replaced at `path`, before minutes are spent on what it shall hold.
+/// Checks that a file can be created or replaced at `path`, before minutes are spent on its contents.
+///
+/// # Errors
+/// No file can be created or replaced there.
 pub fn check(path: &Path) -> Result<(), OutputError> {
     match Target::at(path)? {
         Target::Stream => Ok(()),
@@ -129,8 +136,8 @@ pub fn write_picture(path: &Path, picture: &Picture) -> Result<(), OutputError> 
 
 /// Writes a file whole or not at all. Devices and pipes are written to directly.
 ///
-/// A symbolic link is followed, and a link that leads nowhere gets the file that it names. An existing file must be
-/// writable and keeps its permissions; a new one gets those that the umask leaves.
+/// A symbolic link is followed. If it leads nowhere, the file that it names is created. An existing file must be
+/// writable and keeps its permissions. A new file gets the permissions that the umask leaves.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     match Target::at(path)? {
         Target::Stream => open_stream(path).and_then(|mut stream| stream.write_all(bytes)),
@@ -139,7 +146,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     .map_err(|source| OutputError::Write { path: path.to_owned(), source })
 }
 
-/// As [`write()`], for what is too large to encode in memory: `body` writes the file, and may seek in it.
+/// Writes a file as [`write()`] does, for contents that are too large to encode in memory. `body` writes the file and
+/// may seek in it.
 pub fn write_with(path: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), OutputError> {
     match Target::at(path)? {
         Target::Stream => write_stream(path, body),
@@ -148,7 +156,8 @@ pub fn write_with(path: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -
     .map_err(|source| OutputError::Write { path: path.to_owned(), source })
 }
 
-/// A place for what is on its way to the file at `path`: in memory while it is small, then on the same disk.
+/// Makes a spool: a temporary file for data that will be written to the file at `path`. It is in memory while it is
+/// small, then on the same disk as the file. For a device or a pipe, it is then in the system's temporary directory.
 pub fn spool(path: &Path) -> Result<SpooledTempFile, OutputError> {
     let directory = match Target::at(path)? {
         Target::Stream => std::env::temp_dir(),
@@ -161,7 +170,7 @@ fn open_stream(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).open(path)
 }
 
-/// A pipe cannot be sought in: what it gets is put together in a temporary file.
+/// Writes to a device or a pipe by way of a temporary file, because `body` may seek and a pipe cannot.
 fn write_stream(path: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -> io::Result<()> {
     let mut whole = tempfile::tempfile()?;
     body(&mut whole)?;
@@ -182,6 +191,7 @@ fn replace(directory: &Path, file: &Path, body: impl FnOnce(&mut File) -> io::Re
     temporary.persist(file)
 }
 
+/// Returns the pixels without alpha, three values each.
 fn rgb<T: Copy>(rgba: &[[T; 4]]) -> Vec<T> {
     rgba.iter().flat_map(|&[r, g, b, _]| [r, g, b]).collect()
 }
@@ -200,7 +210,7 @@ where
     Ok(file.into_inner())
 }
 
-/// A picture does not have the pixels that its size promises.
+/// Returns the error that a picture does not have as many pixels as its size says.
 fn dimension_mismatch() -> ImageError {
     ImageError::Parameter(ParameterError::from_kind(ParameterErrorKind::DimensionMismatch))
 }

@@ -1,4 +1,4 @@
-//! What a path of an output leads to.
+//! Targets of outputs: what their paths lead to.
 
 use std::{
     fs::{self, OpenOptions},
@@ -7,10 +7,10 @@ use std::{
 
 use super::OutputError;
 
-/// Symbolic links, one behind another, that Linux follows before it gives up.
+/// Number of symbolic links, one after another, that Linux follows before it gives up.
 const MAX_LINKS: usize = 40;
 
-/// What a path leads to.
+/// The target of a path.
 pub enum Target {
     /// A device or a pipe, which cannot be replaced.
     Stream,
@@ -19,14 +19,15 @@ pub enum Target {
 }
 
 impl Target {
-    /// Follows the path's links and finds out whether a file can be written at their end.
+    /// Follows the path's links and checks that a file can be written at their end.
     pub fn at(path: &Path) -> Result<Self, OutputError> {
         let failed = |source| OutputError::Write { path: path.to_owned(), source };
         let file = match fs::metadata(path) {
             Ok(metadata) if metadata.is_dir() => return Err(OutputError::IsDirectory { path: path.to_owned() }),
             Ok(metadata) if !metadata.is_file() => return Ok(Self::Stream),
             Ok(_) => {
-                // Renaming asks nothing of the file that it replaces: a write-protected one is refused here.
+                // Renaming ignores the permissions of the file that it replaces. So write-protected files are refused
+                // here.
                 OpenOptions::new().write(true).open(path).map_err(failed)?;
                 fs::canonicalize(path).map_err(failed)?
             }
@@ -40,8 +41,8 @@ impl Target {
     }
 }
 
-/// The absolute path of the regular file that `path` leads to, without links. The file need not exist, but its
-/// directory must. None for a directory, a device or a pipe.
+/// Returns the absolute path, without links, of the regular file that `path` leads to. The file need not exist, but
+/// its directory must. `None` for a directory, a device or a pipe.
 pub fn regular_file(path: &Path) -> Option<PathBuf> {
     match fs::metadata(path) {
         Ok(metadata) if metadata.is_file() => fs::canonicalize(path).ok(),
@@ -54,8 +55,8 @@ pub fn regular_file(path: &Path) -> Option<PathBuf> {
     }
 }
 
-/// What the last link of a chain of symbolic links names, whether it exists or not; the path itself if it is no link.
-/// None for links in a circle.
+/// Returns the path that the last link of a chain of symbolic links names, whether it exists or not. It is the path
+/// itself if that is no link. `None` for a circle of links, or for a chain of [`MAX_LINKS`] links or more.
 fn end_of_links(path: &Path) -> Option<PathBuf> {
     let mut file = path.to_owned();
     for _ in 0..MAX_LINKS {

@@ -1,4 +1,4 @@
-//! Temporary files beside their targets, none of which outlives the process that a signal ends.
+//! Temporary files beside their targets. None of them outlives the process, even if a signal ends it.
 //!
 //! Every temporary file with a name is registered while it has that name. A signal handler's thread calls
 //! [`remove_temporaries`] before it ends the process. One lock covers the registry and the files themselves: no file
@@ -25,21 +25,21 @@ fn registry() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 
 /// Removes every temporary file of this process, and lets no thread create or rename another one.
 ///
-/// A process calls this when it is about to end, on a thread other than those that write. A thread that then begins or
-/// finishes an output waits until the process has ended, so that each target is as it was before or complete.
+/// A process that is about to end calls this, on a thread other than those that write. A thread that then begins or
+/// finishes an output waits until the process has ended. So each target is either as it was before or complete.
 pub fn remove_temporaries() {
     let paths = registry();
     for path in paths.iter() {
-        // A file that cannot be removed stays; there is nobody left to tell.
+        // A file that cannot be removed stays: the process is ending and reports nothing more.
         let _ = fs::remove_file(path);
     }
-    // The lock is never released.
+    // The lock is never released, so that no other thread can create or rename a file.
     mem::forget(paths);
 }
 
-/// A file that can be renamed to any other of its directory. It is removed when it is dropped before that.
+/// A temporary file that can be renamed to any name in its directory. If it is dropped before that, it is removed.
 pub struct Temporary {
-    /// None once the file has its final name.
+    /// `None` once the file has its final name.
     file: Option<NamedTempFile>,
 }
 
@@ -51,23 +51,23 @@ impl Temporary {
         #[cfg(unix)]
         builder.permissions(PermissionsExt::from_mode(0o666)); // less the umask
         let mut paths = registry();
-        // The library's own message names the temporary file, which says nothing to the user.
+        // The library's own message names the temporary file, whose name means nothing to the user.
         let file = builder.tempfile_in(directory).map_err(|error| io::Error::from(error.kind()))?;
         paths.insert(file.path().to_owned());
         Ok(Self { file: Some(file) })
     }
 
-    /// The open file.
+    /// Returns the open file.
     pub fn as_file_mut(&mut self) -> &mut File {
         self.file.as_mut().expect("only `persist` takes the file").as_file_mut()
     }
 
-    /// Gives the file its final name, and so replaces what had this name.
+    /// Gives the file its final name. It replaces any file that had this name.
     pub fn persist(mut self, target: &Path) -> io::Result<()> {
         let mut paths = registry();
         let file = self.file.take().expect("only `persist` takes the file");
         paths.remove(file.path());
-        // On failure the error holds the file, which goes while the lock is still held.
+        // On failure the error holds the file, which is removed while the lock is still held.
         file.persist(target).map(|_: File| ()).map_err(|failed| failed.error)
     }
 }

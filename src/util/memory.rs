@@ -1,14 +1,14 @@
-//! How much memory is left, so that what cannot fit is refused before it is allocated.
+//! The host memory that is left. Work that cannot fit is refused before it allocates.
 //!
 //! Rust ends a process that cannot allocate, without a way to clean up or to say what was too large. Linux often
 //! grants the allocation and ends the process later, when the memory is used.
 
 use sysinfo::{MemoryRefreshKind, RefreshKind, System};
 
-/// What fits without being asked for. Below this, estimates are not worth their time.
+/// Size that is assumed to fit, bytes. Smaller estimates are not worth the time of a check.
 const NEGLIGIBLE: u64 = 64 << 20;
 
-/// Something needs more memory than there is.
+/// The error that something needs more memory than is available.
 #[derive(Debug, thiserror::Error)]
 #[error("{what} needs some {} of memory, and {} are available", in_words(*.needed), in_words(*.available))]
 pub struct OutOfMemory {
@@ -17,7 +17,10 @@ pub struct OutOfMemory {
     available: u64,
 }
 
-/// Refuses what needs more bytes than are available. `what` begins the error's message.
+/// Checks that `needed` bytes are available. `what` begins the error's message.
+///
+/// # Errors
+/// Fewer bytes are available.
 pub fn require(what: &str, needed: u64) -> Result<(), OutOfMemory> {
     if needed <= NEGLIGIBLE {
         return Ok(());
@@ -28,19 +31,20 @@ pub fn require(what: &str, needed: u64) -> Result<(), OutOfMemory> {
     }
 }
 
-/// Bytes that the process can still allocate: what the machine has left with its swap space, the container's limit and
-/// the limit on the process's address space (`ulimit -v`), whichever is least. None where the system does not tell.
+/// Returns the number of bytes that the process can still allocate. It is the least of what the machine has left with
+/// its swap space, what the container's limit leaves and what the limit on the process's address space (`ulimit -v`)
+/// leaves. `None` if the system does not tell.
 pub fn available() -> Option<u64> {
     let memory = RefreshKind::nothing().with_memory(MemoryRefreshKind::everything());
     let system = System::new_with_specifics(memory).ok().filter(|system| system.total_memory() > 0);
     let of_machine = system.as_ref().map(|system| system.available_memory().saturating_add(system.free_swap()));
-    // `free_memory` counts the container's page cache as used, which the kernel would give up.
+    // `free_memory` counts the container's page cache as used, although the kernel would give it up.
     let of_container = system.as_ref().and_then(System::cgroup_limits);
     let of_container = of_container.map(|it| it.total_memory.saturating_sub(it.rss).saturating_add(it.free_swap));
     [of_machine, of_container, address_space_left()].into_iter().flatten().min()
 }
 
-/// Bytes up to the limit on the process's address space. None without a limit.
+/// Returns the number of bytes up to the limit on the process's address space. `None` without a limit.
 #[cfg(target_os = "linux")]
 fn address_space_left() -> Option<u64> {
     let limit = rustix::process::getrlimit(rustix::process::Resource::As).current?;
@@ -54,7 +58,7 @@ fn address_space_left() -> Option<u64> {
     None
 }
 
-/// A size with a decimal, in the largest unit that leaves a whole part.
+/// Formats a size: below 1 GiB in whole MiB, otherwise in GiB with one decimal.
 fn in_words(bytes: u64) -> String {
     let mebibytes = bytes as f64 / f64::from(1 << 20);
     if mebibytes < 1024.0 { format!("{mebibytes:.0} MiB") } else { format!("{:.1} GiB", mebibytes / 1024.0) }

@@ -1,4 +1,5 @@
-//! Helpers that know nothing of rays: names of an option's variants, text that is safe to print, the host's memory.
+//! Helpers that know nothing about rays: names of an option's variants, text that is safe to print, the host's
+//! memory.
 
 #[macro_use]
 mod named_enum;

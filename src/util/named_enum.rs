@@ -1,4 +1,4 @@
-//! Words for an option's variants, for the command line, scene files and JSON alike.
+//! Words that name an option's variants, the same on the command line, in scene files and in JSON.
 
 /// A word that names no variant of an option.
 #[derive(Debug, thiserror::Error)]
@@ -8,14 +8,14 @@ pub struct UnknownWord {
     pub(crate) expected: String,
 }
 
-/// `ALL`, `words`, `FromStr` and `Display` of an enum without fields.
+/// Implements `ALL`, `words`, `FromStr` and `Display` for an enum without fields.
 macro_rules! named_enum {
     ($ty:ident { $($variant:ident = $word:literal),+ }) => {
         impl $ty {
             /// Every variant.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
 
-            /// The words of all variants, with commas.
+            /// Returns the words of all variants, separated by commas.
             pub fn words() -> String {
                 [$($word),+].join(", ")
             }

@@ -1,9 +1,9 @@
-//! Text that quotes a file or a file's name, made fit for a terminal.
+//! Text that quotes a file or a file's name, made safe to print on a terminal.
 
 use std::borrow::Cow;
 
-/// Escapes control characters, as in `\u{1b}` or `\n`: a terminal would obey them. So does it with characters that
-/// turn the direction of text around, and those that end a line.
+/// Escapes control characters, as in `\u{1b}` or `\n`, because a terminal would obey them. It also escapes characters
+/// that change the direction of text and those that end a line.
 pub fn escape_controls(text: &str) -> Cow<'_, str> {
     if !text.contains(is_obeyed) {
         return Cow::Borrowed(text);
@@ -18,12 +18,14 @@ pub fn escape_controls(text: &str) -> Cow<'_, str> {
     Cow::Owned(escaped)
 }
 
-/// As [`escape_controls`], but white space of any kind and length becomes one space, and none is left at the ends.
+/// Escapes text as [`escape_controls`] does, and makes it one line. White space of any kind and length becomes one
+/// space, and none is left at the ends.
 pub fn one_line(text: &str) -> String {
     let words: Vec<_> = text.split_whitespace().collect();
     escape_controls(&words.join(" ")).into_owned()
 }
 
+/// Whether a terminal would obey a character instead of printing it.
 fn is_obeyed(c: char) -> bool {
     c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
