@@ -1,25 +1,25 @@
-//! What a pixel shows beside its colour (AOVs: arbitrary output variables), by the names that users know.
+//! AOVs (arbitrary output variables): what a pixel shows and costs beside its colour, by the names that users see.
 
 use crate::layout::Feature;
 
-/// One output. World space and units.
+/// An output variable, in world space and world units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Aov {
-    /// Distance from the eye along the camera's view; infinity where nothing is.
+    /// Distance from the eye to the first hit along the camera's view direction; infinity for a miss.
     Depth,
-    /// The shading normal, unit length, towards the eye; 0 where nothing is.
+    /// The shading normal of the first hit, unit length, towards the eye; 0 for a miss.
     Normal,
-    /// The point that is seen; 0 where nothing is.
+    /// The point of the first hit; 0 for a miss.
     Position,
-    /// Kd of what is seen, linear.
+    /// Kd of the material at the first hit, linear; 0 for a miss.
     Albedo,
-    /// The triangle's number in the scene's order; 4294967295 where nothing is.
+    /// Index of the first hit's triangle, in the scene's order; 4294967295 for a miss.
     Id,
-    /// Its material's number; 4294967295 where nothing is.
+    /// Index of the first hit's material; 4294967295 for a miss.
     Material,
-    /// Rays that the pixel took: primary, secondary and shadow rays.
+    /// Number of the pixel's rays: primary, secondary and shadow rays.
     Rays,
-    /// What they read of the tree: nodes, and leaves' triangles.
+    /// Number of reads of the acceleration structure by the pixel's rays, such as nodes and triangles of leaves.
     Cost,
 }
 
@@ -34,16 +34,16 @@ named_enum!(Aov {
     Cost = "cost"
 });
 
-/// A named number of each pixel.
+/// A named channel, with a number for each pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// Layer, dot, component.
+    /// The name of the layer, a dot, the component, as in `normal.X`.
     pub name: String,
     /// The samples of all pixels, rows from the top.
     pub samples: Samples,
 }
 
-/// One a pixel.
+/// Samples of a channel, one for each pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Samples {
     /// Single-precision numbers.
@@ -53,7 +53,7 @@ pub enum Samples {
 }
 
 impl Aov {
-    /// Its channels, from a picture's features.
+    /// Returns the output's channels, from a picture's features.
     pub fn channels(self, features: &[Feature]) -> Vec<Channel> {
         let float = |component: &str, value: fn(&Feature) -> f32| Channel {
             name: format!("{self}.{component}"),

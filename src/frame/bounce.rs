@@ -1,12 +1,12 @@
-//! Rows of `bounces`: how many rays a level has, and what that makes of its dispatches. `compact_spine.comp` does the same on
-//! the device.
+//! Rows of `bounces`, one for each bounce of each batch: the number of rays, and the sizes of dispatches that follow
+//! from it. Twin of `compact_spine.comp`, which computes them on the device.
 
 use std::ops::Range;
 
 use crate::layout::{Bounce, Frame, MOST_LANES_LOG2, RAY_GROUP_SIZE, SCAN_GROUP_SIZE};
 
 impl Bounce {
-    /// A batch's first level, of `n_rays`, all of which there is room for.
+    /// Returns the row of a batch's first bounce, of `n_rays` rays, for all of which the queue has room.
     pub fn of(n_rays: u32, constants: &Frame) -> Self {
         let mut row = Self {
             n_wanted: n_rays,
@@ -24,7 +24,7 @@ impl Bounce {
         row
     }
 
-    /// The level's place in the queue; sizes the dispatches along x.
+    /// Sets the bounce's range of rays in the queue, and the sizes of its dispatches along x.
     pub fn set_rays(&mut self, first_ray: u32, n_rays: u32, constants: &Frame) {
         let n_so_far = first_ray + n_rays;
         let for_rays = lanes_log2(n_rays, constants.n_lanes);
@@ -39,14 +39,18 @@ impl Bounce {
         self.shade_groups_x = n_so_far.div_ceil(RAY_GROUP_SIZE);
     }
 
-    /// The places of its rays in the queue.
+    /// Returns the indices of its rays in the queue.
     pub fn rays(&self) -> Range<usize> {
         self.first_ray as usize..(self.first_ray + self.n_rays) as usize
     }
 }
 
-/// Logarithm of the lanes that each of so many rays gets of a device's, of which one works: a power of two, as far as they go
-/// round. Rays of one subgroup wait for one another wherever their ways part; with lanes to spare, they need not.
+/// Returns n, where each ray gets 2^n lanes, of which only the first works. `n_lanes`: the lanes of the device, or 0,
+/// with which each ray gets one.
+///
+/// Divergent rays of a subgroup wait for one another. So if a dispatch has fewer rays than the device has lanes, the
+/// rays are spread over all lanes, and fewer of them share a subgroup. n is the largest for which the device has
+/// enough lanes, and at most [`MOST_LANES_LOG2`].
 pub fn lanes_log2(n_rays: u32, n_lanes: u32) -> u32 {
     (n_lanes / n_rays.max(1)).checked_ilog2().map_or(0, |log2| log2.min(MOST_LANES_LOG2))
 }

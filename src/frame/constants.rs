@@ -1,4 +1,5 @@
-//! The frame's constants: one camera for the rasterizer's matrix and for the rays, on GPU and CPU alike.
+//! The frame's constants, the same on GPU and CPU. The rasterizer's matrix and the camera rays come from one camera
+//! here.
 
 use glam::{DMat4, DVec2, DVec3, DVec4, Vec3, dvec2};
 
@@ -8,12 +9,15 @@ use crate::{
     scene::Camera,
 };
 
-/// The near plane lies at this share of the scene's farthest distance from the eye: nothing that can be seen is
-/// nearer, and reverse-Z in floating point loses no precision by it.
+/// Distance of the near plane from the eye, as a share of the scene's farthest distance from it. Nothing that can be
+/// seen is nearer, and reverse-Z in floating point loses no precision by so near a plane.
 const NEAR_SHARE: f64 = 1.0 / (1 << 20) as f64;
 
 impl Frame {
-    /// What follows from the options alone. The view has to be set after it.
+    /// Sets what follows from the options alone. [`Frame::set_view`] must be called after it.
+    ///
+    /// # Panics
+    /// The crop exceeds the picture.
     pub fn set_options(&mut self, options: &RenderOptions) {
         let window = options.window();
         let Crop { x1, y1, .. } = window;
@@ -30,8 +34,8 @@ impl Frame {
         };
     }
 
-    /// Sets the camera, and which of a pixel's samples the frame shows, counted from 0. `bounds`: the least and the greatest
-    /// corner of a box that holds the scene, world units.
+    /// Sets the camera and the frame's sample, whose index counts from 0. `bounds`: the least and the greatest corner
+    /// of a box that contains the scene, world units.
     pub fn set_view(&mut self, camera: &Camera, bounds: [Vec3; 2], sample_ix: u32) {
         let size = dvec2(self.picture_width.into(), self.picture_height.into());
         let offset = sample_offset(sample_ix);
@@ -51,13 +55,14 @@ impl Frame {
     }
 }
 
-/// Moves what is seen within the picture, in units of half its sides: the viewport could not, since a device need not
-/// place one between pixels.
+/// Returns the matrix that moves the image by `step`, in units of half the picture's sides. A
+/// viewport could not move it by fractions of a pixel, since a device need not place viewports between pixels.
 fn moved_by(step: DVec2) -> DMat4 {
     DMat4::from_cols(DVec4::X, DVec4::Y, DVec4::Z, step.extend(0.0).extend(1.0))
 }
 
-/// The image plane at unit distance: its middle, and from there to its right and its upper edge.
+/// The image plane at unit distance from the eye: the vectors from the eye to its centre, and from its centre to its
+/// right and to its upper edge, world space.
 struct ImagePlane {
     forward: DVec3,
     right: DVec3,
@@ -72,7 +77,7 @@ impl ImagePlane {
         Self { forward, right: right * (aspect * half_height), up: right.cross(forward) * half_height }
     }
 
-    /// Vulkan's clip space: y down, depth 1 at the near plane and 0 at infinity.
+    /// Returns the projection to Vulkan's clip space: y down, depth 1 at the near plane and 0 at infinity.
     fn clip_from_world(&self, eye: DVec3, near: f64) -> DMat4 {
         let x = self.right / self.right.length_squared();
         let y = -self.up / self.up.length_squared();
@@ -88,7 +93,7 @@ mod tests {
     use super::*;
     use crate::reference::camera::{camera_direction, in_picture};
 
-    /// A view of what lies around its target.
+    /// Returns the constants of a view of what is around the camera's target.
     fn frame(camera: Camera, width: u32, height: u32) -> Frame {
         part(camera, RenderOptions { width, height, ..RenderOptions::default() }, 0)
     }
@@ -115,7 +120,7 @@ mod tests {
         ]
     }
 
-    /// Where Vulkan's viewport transform puts a point, in pixels from the upper left corner, and its depth.
+    /// Returns x and y of a point after Vulkan's viewport transform, px from the upper left corner, and its depth.
     fn project(frame: &Frame, point: DVec3) -> (f64, f64, f64) {
         let clip = frame.clip_from_world.as_dmat4() * point.extend(1.0);
         let ndc = clip.truncate() / clip.w;
@@ -123,7 +128,8 @@ mod tests {
         ((ndc.x + 1.0) / 2.0 * width, (ndc.y + 1.0) / 2.0 * height, ndc.z)
     }
 
-    /// Farthest that a point of a camera ray is projected from its pixel's centre, px, whatever sample it goes through.
+    /// Returns the largest distance, px, between the projection of a point on a camera ray and the ray's pixel
+    /// centre. Rays of every sample are projected to the centre.
     fn worst_distance(frame: &Frame) -> f64 {
         let pixels = (0..50).map(|i| uvec2(i * 7919 % frame.width, i * 104_729 % frame.height));
         let corners = [UVec2::ZERO, uvec2(frame.width - 1, frame.height - 1)];

@@ -1,4 +1,4 @@
-//! Which rays go into each pass and come out of it, alike on GPU and CPU.
+//! Counts of the rays that go into each pass and come out of it, the same on GPU and CPU.
 
 use crate::{
     frame::{BounceStats, PassTime, Role, Scope},
@@ -10,13 +10,13 @@ pub(crate) fn is_in_batch(pass: &PassTime) -> bool {
     pass.pass().scope() != Scope::Frame
 }
 
-/// Fills in a pass's rays. `bounces`: of the pass's batch.
+/// Fills in a pass's counts of rays. `bounces`: the counts of the pass's batch, one row a bounce.
 pub(crate) fn count_rays(pass: &mut PassTime, bounces: &[BounceStats]) {
     let role = pass.pass().role();
     if pass.pass().scope() == Scope::Batch {
         let sum = |count: fn(&BounceStats) -> u64| bounces.iter().map(count).sum();
         pass.n_rays_in = Some(sum(|bounce| bounce.n_rays));
-        // The other passes of a batch make no rays: theirs end in pixels.
+        // Shade and resolve, the other passes with this scope, make no rays.
         pass.n_rays_out = (role == Role::Shadow).then(|| sum(|bounce| bounce.n_shadow_rays));
         return;
     }
@@ -30,7 +30,7 @@ pub(crate) fn count_rays(pass: &mut PassTime, bounces: &[BounceStats]) {
     };
 }
 
-/// The counts that a device has left, one row a batch and bounce.
+/// Returns the counts that a device has left, one row for each bounce of each batch.
 pub(crate) fn device_counts(bounces: &[Bounce], counters: &[Counters]) -> Vec<BounceStats> {
     let row = |(bounce, counters): (&Bounce, &Counters)| BounceStats {
         n_rays: bounce.n_rays.into(),
@@ -40,11 +40,11 @@ pub(crate) fn device_counts(bounces: &[Bounce], counters: &[Counters]) -> Vec<Bo
     bounces.iter().zip(counters).map(row).collect()
 }
 
-/// Fills in the batch and the rays of each pass of a device's frame. `counts`: as [`device_counts`] gives them,
-/// `max_depth` rows a batch.
+/// Fills in the batch and the counts of rays of each pass of a device's frame. `counts`: the rows of
+/// [`device_counts`], `max_depth` for each batch.
 pub(crate) fn count_batches(passes: &mut [PassTime], counts: &[BounceStats], max_depth: u32) {
     let batches = || (0..).zip(counts.chunks_exact(max_depth as usize));
-    // Every batch is recorded alike, whatever becomes of its rays.
+    // All batches have the same passes, no matter how many rays they have.
     let passes_a_batch = passes.iter().filter(|pass| is_in_batch(pass)).count() / batches().count().max(1);
     let mut in_batches = passes.iter_mut().filter(|pass| is_in_batch(pass));
     for (batch_ix, bounces) in batches() {
@@ -55,7 +55,7 @@ pub(crate) fn count_batches(passes: &mut [PassTime], counts: &[BounceStats], max
     }
 }
 
-/// The batches' counts added up, one row a bounce.
+/// Returns the sums of all batches, one row a bounce.
 pub(crate) fn sum_of_batches(counts: &[BounceStats], max_depth: u32) -> Vec<BounceStats> {
     let mut sums = vec![BounceStats::default(); max_depth as usize];
     for batch in counts.chunks_exact(max_depth as usize) {

@@ -1,10 +1,11 @@
-//! Parts of a picture.
+//! Rectangular parts of a picture.
 
 use std::{fmt, str::FromStr};
 
 use super::{Denoise, RenderOptions};
 
-/// The pixels of a picture with `x0 <= x < x1` and `y0 <= y < y1`, from the upper left corner; at least one.
+/// The pixels (x, y) of a picture with `x0 <= x < x1` and `y0 <= y < y1`, counted from the upper left corner. There
+/// is at least one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Crop {
     /// The first column.
@@ -18,22 +19,22 @@ pub struct Crop {
 }
 
 impl Crop {
-    /// All of a picture.
+    /// Returns the crop that is the whole picture.
     pub fn whole(width: u32, height: u32) -> Self {
         Self { x0: 0, y0: 0, x1: width, y1: height }
     }
 
-    /// Columns.
+    /// Number of columns.
     pub fn width(&self) -> u32 {
         self.x1 - self.x0
     }
 
-    /// Rows.
+    /// Number of rows.
     pub fn height(&self) -> u32 {
         self.y1 - self.y0
     }
 
-    /// With so many pixels more on each side, as far as the picture goes.
+    /// Returns the crop with `border` more pixels on each side, as far as the picture extends.
     fn grown(&self, border: u32, width: u32, height: u32) -> Self {
         Self {
             x0: self.x0.saturating_sub(border),
@@ -43,7 +44,8 @@ impl Crop {
         }
     }
 
-    /// The part of `pixels`, rows of this window from the top, that `crop` holds, which lies in it.
+    /// Copies the pixels of `crop`, which must be inside this window. `pixels`: those of this window, rows from the
+    /// top.
     pub(crate) fn part<T: Copy>(&self, pixels: &[T], crop: &Crop) -> Vec<T> {
         let (left, width) = ((crop.x0 - self.x0) as usize, crop.width() as usize);
         let rows = pixels.chunks_exact(self.width() as usize).skip((crop.y0 - self.y0) as usize);
@@ -52,17 +54,18 @@ impl Crop {
 }
 
 impl RenderOptions {
-    /// The part of the picture that is asked for.
+    /// Returns the part of the picture that the options ask for.
     pub fn crop_or_whole(&self) -> Crop {
         self.crop.unwrap_or(Crop::whole(self.width, self.height))
     }
 
-    /// The part of the picture that has to be rendered: the noise filter looks one pixel beyond what is asked for.
+    /// Returns the window, the part of the picture to be rendered: the crop and the border around it that the noise
+    /// filter reads.
     pub fn window(&self) -> Crop {
         self.crop_or_whole().grown(self.border(), self.width, self.height)
     }
 
-    /// Pixels on each side of what is asked for that the noise filter reads.
+    /// Returns the width of the border around the crop that the noise filter reads, pixels.
     pub(crate) fn border(&self) -> u32 {
         if self.denoise == Denoise::Off { 0 } else { 1 }
     }

@@ -1,4 +1,14 @@
-//! What a frame is asked for, and what comes of it: the options, the picture and the profile, alike on GPU and CPU.
+//! A frame's options, its plan of passes, and its results, the picture and the profile: the same on GPU and CPU.
+//!
+//! ```text
+//! options    RenderOptions, crop: what to render, and by which methods
+//! constants  the uniform buffer of the kernels; sampling: the positions of samples in their pixels
+//! plan       the order of passes and the barriers between them, of
+//!   pass       what each pass does, reads and writes
+//!   resource   the buffers and images that passes write
+//! bounce     sizes of a bounce's dispatches
+//! results    drawn; profile and counts; aov and view: features beside the picture
+//! ```
 
 mod aov;
 pub(crate) mod bounce;
@@ -25,30 +35,30 @@ pub use self::{
 };
 use crate::{accel::kdtree::Traversal, layout};
 
-/// How a frame is rendered. The scene's own defaults fill what the user leaves open.
+/// How a frame is rendered. The scene's own defaults fill in what the user does not set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// Of the whole picture, pixels.
+    /// Width of the whole picture, pixels.
     pub width: u32,
-    /// As `width`.
+    /// Height of the whole picture, pixels.
     pub height: u32,
-    /// The part of the picture to render, within it; none for all.
+    /// The part of the picture to render, which is inside the picture. None: all of it.
     pub crop: Option<Crop>,
-    /// Levels of rays, the primary one counted: 1 is ray casting with shadows (Algorithm 1's `maximumDepth`).
+    /// Number of bounces, the primary rays included: 1 is ray casting with shadows (Algorithm 1's `maximumDepth`).
     pub max_depth: u32,
-    /// Factor on radiance before it is encoded for display.
+    /// Factor by which radiance is multiplied before it is encoded for display.
     pub exposure: f32,
     /// The curve from radiance to display.
     pub tonemap: Tonemap,
     /// The noise filter.
     pub denoise: Denoise,
-    /// The algorithm by which rays go through the kd-tree.
+    /// The algorithm by which rays traverse the kd-tree.
     pub traversal: Traversal,
     /// How primary rays find their triangles.
     pub primary: Primary,
-    /// Whether the device takes times and counts; without them its frames have empty profiles.
+    /// Whether the device measures times and counts rays. If not, its frames have empty profiles.
     pub profile: bool,
-    /// Note what the rays of each pixel meet and cost, too.
+    /// Whether features are noted: what the rays of each pixel hit and cost.
     pub features: bool,
 }
 
@@ -70,27 +80,28 @@ impl Default for RenderOptions {
     }
 }
 
-/// The post process of the paper's section 2.4.
+/// The noise filter, a post-process (the paper's section 2.4).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Denoise {
     /// No filter.
     Off,
-    /// Smooths a pixel whose luminance differences to its four neighbours add up to more than the threshold.
+    /// Smooths a pixel if its luminance differences to its four neighbours add up to more than the threshold.
     Paper {
-        /// In units of display white, 0 to 4.
+        /// Sum of the differences, in units of display white, 0 to 4.
         threshold: f32,
     },
 }
 
 impl Denoise {
-    /// A straight edge between black and white adds up to 1, a corner or a thin line to 2, a lone pixel to 4.
+    /// The default threshold. A pixel's differences add up to 1 on a straight edge between black and white, to 2 at a
+    /// corner or on a thin line, and to 4 if it stands alone.
     pub const DEFAULT_THRESHOLD: f32 = 2.5;
 }
 
-/// How radiance, which knows no bounds, becomes what a display shows.
+/// The curve that maps radiance, which has no upper bound, to the range of a display.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tonemap {
-    /// As it is, cut off at white.
+    /// Radiance as it is, clipped at white.
     Linear,
     /// AgX: bright colours fade to white, dark ones keep their hue.
     Agx,
@@ -99,7 +110,7 @@ pub enum Tonemap {
 }
 
 impl Tonemap {
-    /// The kernel's specialization constant.
+    /// Returns the value of the kernel's specialization constant `CURVE`.
     pub(crate) fn constant(self) -> u32 {
         match self {
             Self::Linear => layout::TONEMAP_LINEAR,
@@ -112,32 +123,34 @@ impl Tonemap {
 /// How primary rays find their triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Primary {
-    /// By rasterized triangle IDs and a ray-plane test.
+    /// The graphics pipeline rasterizes triangle IDs; then each ray is intersected with its triangle's plane.
     Raster,
-    /// By triangles that kernels rasterize with the test of rays, so that hits are those of `Trace`, bit for bit, unless the camera lies
-    /// beyond `KD_MAX_ORIGIN_DISTANCE`. Needs atomics of 64 bits. The CPU has no such kernels: there it is `Raster`.
+    /// Compute kernels rasterize triangles with the ray-triangle test of the traversal. So hits are those of `Trace`,
+    /// bit for bit, unless the camera is farther from the scene than `KD_MAX_ORIGIN_DISTANCE` allows. Needs 64-bit
+    /// atomics. The CPU has no such kernels and takes `Raster` instead.
     Compute,
-    /// Through the kd-tree.
+    /// Rays are traced through the acceleration structure.
     Trace,
 }
 
 impl Primary {
-    /// What takes less work: the rasterizer goes over all triangles, tracing over all pixels of the whole picture.
-    /// `triangles_a_ray`: how many triangles are rasterized while one ray is traced.
+    /// Returns the method with less work, `Raster` or `Trace`: the rasterizer processes all triangles, tracing
+    /// processes all pixels of the whole picture. `triangles_a_ray`: the number of triangles that are rasterized in
+    /// the time in which one ray is traced.
     pub fn suited_to(n_triangles: usize, (width, height): (u32, u32), triangles_a_ray: u64) -> Self {
         let n_rays = u64::from(width) * u64::from(height);
         if n_triangles as u64 <= triangles_a_ray * n_rays { Self::Raster } else { Self::Trace }
     }
 }
 
-/// A rendered frame, or the part of it that was asked for. Rows from the top, left to right.
+/// A rendered frame or its crop. Pixels are in rows from the top, left to right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Pixels.
+    /// Width, pixels.
     pub width: u32,
-    /// Pixels.
+    /// Height, pixels.
     pub height: u32,
-    /// `width * height` linear RGB radiances before exposure (fourth: 1).
+    /// `width * height` linear RGB radiances before exposure; the fourth component is 1.
     pub radiance: Vec<[f32; 4]>,
     /// `width * height` sRGB-encoded RGBA pixels.
     pub display: Vec<[u8; 4]>,

@@ -1,4 +1,4 @@
-//! The passes of a frame: what each one works for, how often it runs, and what it reads and writes.
+//! The passes of a frame: the role of each one, how often it runs, and what it reads and writes.
 
 use super::resource::{
     Resource,
@@ -9,16 +9,16 @@ use super::resource::{
     },
 };
 
-/// What a pass works for.
+/// The purpose of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// Finds the triangle that each pixel shows, before there is any ray.
+    /// Finds the triangle that each pixel shows, by rasterization, before any ray is traced.
     PrimaryVisibility,
     /// Finds the closest hits of a bounce's rays.
     ClosestHit,
-    /// Tests the segments between hits and lights.
+    /// Tests the segments between hits and lights, the shadow rays.
     Shadow,
-    /// Computes radiance at the hits and adds it to the pixels.
+    /// Computes radiance at the hits, or adds it up in the pixels.
     Light,
     /// Makes the rays of the next bounce, without gaps between them.
     Compaction,
@@ -40,9 +40,9 @@ pub enum Scope {
 /// One pass. [`Plan`](super::Plan) says when it runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Pass {
-    /// Rasterizes triangle indices by the graphics pipeline.
+    /// Rasterizes triangle indices with the graphics pipeline.
     Visibility,
-    /// Rasterizes small triangles by a kernel, and notes large ones.
+    /// Rasterizes small triangles with a compute kernel, and lists the large ones.
     RasterizeTriangles,
     /// Rasterizes the large triangles, block by block.
     RasterizeBlocks,
@@ -50,9 +50,9 @@ pub enum Pass {
     PrimaryHit,
     /// Finds each ray's closest hit through the acceleration structure.
     Trace,
-    /// Notes what each pixel shows.
+    /// Writes what each pixel's primary ray hits: depth, normal, position, albedo and indices.
     Features,
-    /// Counts the rays that go on from the hits, block by block.
+    /// Counts the rays that go on from the hits, the child rays, for each block of rays.
     CompactReduce,
     /// Turns the blocks' counts into prefix sums, and sizes the next bounce.
     CompactSpine,
@@ -60,13 +60,13 @@ pub enum Pass {
     CompactScatter,
     /// Tests the segments from hits to lights.
     Shadow,
-    /// Computes the light that each hit sends back along its ray.
+    /// Computes the radiance that each hit sends back along its ray.
     Shade,
-    /// Adds up the light of each pixel's rays.
+    /// Adds up the radiance of each pixel's rays.
     Resolve,
     /// Turns the sample into the mean of all samples.
     Accumulate,
-    /// Smooths pixels that stand out from their neighbours.
+    /// Smooths pixels that differ much from their neighbours.
     Denoise,
     /// Displays a feature in place of the picture.
     FalseColor,
@@ -74,7 +74,7 @@ pub enum Pass {
     Tonemap,
 }
 
-/// What holds for a pass in every frame.
+/// The properties of a pass, the same in every frame.
 struct Info {
     pass: Pass,
     name: &'static str,
@@ -83,7 +83,7 @@ struct Info {
     color: [u8; 3],
     reads: &'static [Resource],
     writes: &'static [Resource],
-    /// The buffer that holds the size of its dispatch.
+    /// The buffer that holds the size of its indirect dispatch; None if the host sets the size.
     indirect: Option<Resource>,
 }
 
@@ -252,7 +252,7 @@ const TABLE: [Info; 16] = [
 ];
 
 impl Pass {
-    /// Every pass that a frame can have, on the GPU and on the CPU.
+    /// Returns every pass that a frame can have, on the GPU and on the CPU.
     pub fn all() -> impl Iterator<Item = Self> {
         TABLE.iter().map(|info| info.pass)
     }
@@ -261,42 +261,42 @@ impl Pass {
         &TABLE[self as usize]
     }
 
-    /// The name of its kernel's file, its debug label and its row in a profile.
+    /// Returns the name of its kernel's file, which is also its debug label and its name in a profile.
     pub fn name(self) -> &'static str {
         self.info().name
     }
 
-    /// What it works for.
+    /// Returns its purpose.
     pub fn role(self) -> Role {
         self.info().role
     }
 
-    /// How often a frame runs it.
+    /// Returns how often a frame runs it.
     pub fn scope(self) -> Scope {
         self.info().scope
     }
 
-    /// Its colour in graphs, sRGB.
+    /// Returns its colour in graphs, sRGB.
     pub fn color(self) -> [u8; 3] {
         self.info().color
     }
 
-    /// The resources that its kernel reads. The scene's arrays, which no pass writes, are left out.
+    /// Returns the resources that its kernel reads, without the scene's arrays, which no pass writes.
     pub fn reads(self) -> &'static [Resource] {
         self.info().reads
     }
 
-    /// The resources that its kernel writes. Most kernels write only parts of them.
+    /// Returns the resources that its kernel writes. Most kernels write only parts of them.
     pub fn writes(self) -> &'static [Resource] {
         self.info().writes
     }
 
-    /// The buffer that the device reads the size of its dispatch from.
+    /// Returns the buffer from which the device reads the size of its dispatch, if it is an indirect one.
     pub fn indirect(self) -> Option<Resource> {
         self.info().indirect
     }
 
-    /// The pass of a name.
+    /// Returns the pass of this name.
     ///
     /// # Panics
     /// No pass of a frame has that name.
@@ -305,7 +305,7 @@ impl Pass {
         info.unwrap_or_else(|| panic!("`{name}` is missing in the table of a frame's passes")).pass
     }
 
-    /// Whether the closest hits of rays have to wait for it.
+    /// Whether it is one of the passes that find the closest hits of rays, primary visibility included.
     pub fn is_tracing(self) -> bool {
         matches!(self.role(), Role::PrimaryVisibility | Role::ClosestHit)
     }

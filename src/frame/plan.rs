@@ -1,5 +1,6 @@
-//! The frame: the order of passes, and every barrier between them. GPU and CPU follow it; the GPU records one command
-//! buffer a section.
+//! The plan of a frame: the order of its passes and every barrier between them. GPU and CPU follow it.
+//!
+//! A section is a sequence of passes and barriers; the GPU records each section in one or two command buffers.
 
 use super::{
     pass::Pass,
@@ -13,16 +14,16 @@ use super::{
     {Denoise, Primary, RenderOptions},
 };
 
-/// How passes touch what a barrier orders.
+/// How passes access the resources of a barrier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Touch {
-    /// Kernels read it.
+    /// Kernels read them.
     Read,
-    /// Kernels write it.
+    /// Kernels write them.
     Write,
-    /// Kernels read or write it.
+    /// Kernels read or write them.
     Update,
-    /// The device reads the size of a dispatch from it.
+    /// The device reads the size of an indirect dispatch from them.
     Indirect,
 }
 
@@ -31,30 +32,30 @@ pub enum Touch {
 pub enum Step {
     /// A pass runs.
     Run(Pass),
-    /// What later passes do with the resources waits for what earlier passes do with them.
+    /// The accesses of later passes to the resources wait for those of earlier passes.
     Barrier {
-        /// What earlier passes do.
+        /// The accesses of earlier passes.
         before: Touch,
-        /// What later passes do.
+        /// The accesses of later passes.
         after: Touch,
-        /// What the barrier is for. Vulkan's barrier orders all memory that is touched so.
+        /// The resources that the barrier is for. The Vulkan barrier orders such accesses to all memory.
         of: &'static [Resource],
     },
 }
 
-/// Passes and barriers in their order.
+/// Passes and barriers in the order of execution.
 pub type Section = Vec<Step>;
 
-/// Which passes a frame has.
+/// What decides which passes a frame has.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameKind {
     /// How primary rays find their triangles.
     pub primary: Primary,
-    /// Levels of rays, the primary one counted.
+    /// Number of bounces, the primary rays included.
     pub n_bounces: u32,
-    /// Whether what each pixel shows is noted.
+    /// Whether features are noted: what each pixel shows.
     pub features: bool,
-    /// Whether hits are lit; they are not where only the hits of primary rays are asked for.
+    /// Whether hits are lit. They are not if a frame finds only the hits of primary rays.
     pub is_lit: bool,
     /// Whether the scene has lights that cast shadows.
     pub has_lights: bool,
@@ -67,7 +68,8 @@ pub struct FrameKind {
 }
 
 impl FrameKind {
-    /// A lit frame of several samples by the options, which has all the passes that they can ask for.
+    /// Returns the kind of a lit frame of several samples, which has all the passes that frames of these options can
+    /// have, except that it displays the picture and no feature.
     pub fn new(options: &RenderOptions, n_lights: u32) -> Self {
         Self {
             primary: options.primary,
@@ -82,21 +84,25 @@ impl FrameKind {
     }
 }
 
-/// Algorithm 1: the passes of a frame.
+/// The passes of a frame in the order of execution: the paper's Algorithm 1.
+///
+/// A batch is a part of the picture's pixels, with their primary rays and all rays that descend from these. Bounce 0
+/// is the primary rays, and each further bounce is the reflected and refracted rays from the hits of the bounce
+/// before.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Plan {
-    /// Finds the triangles of the whole picture, once a frame.
+    /// Finds the triangles that the pixels show, once a frame.
     pub visibility: Section,
-    /// For each bounce of a batch: finds the closest hits, and makes the next bounce's rays.
+    /// Finds the closest hits of a bounce and makes the next bounce's rays. One section a bounce, run for each batch.
     pub bounces: Vec<Section>,
-    /// For each batch: lights the hits of all its bounces, and adds the light to their pixels.
+    /// Lights the hits of all bounces and adds up the light in the pixels, once a batch.
     pub light: Section,
-    /// Turns samples into what a display shows, once a frame.
+    /// Turns the samples into the displayed picture, once a frame.
     pub image: Section,
 }
 
 impl Plan {
-    /// The passes of such a frame.
+    /// Returns the passes of a frame of this kind.
     pub fn new(kind: &FrameKind) -> Self {
         Self {
             visibility: visibility(kind.primary),
@@ -106,7 +112,7 @@ impl Plan {
         }
     }
 
-    /// The number of passes that run in so many batches.
+    /// Returns the number of passes that a frame of `n_batches` batches runs.
     pub fn n_passes(&self, n_batches: usize) -> usize {
         let in_batch: usize = self.bounces.iter().map(|bounce| passes(bounce).count()).sum();
         let in_frame = passes(&self.visibility).count() + passes(&self.image).count();
@@ -114,7 +120,7 @@ impl Plan {
     }
 }
 
-/// The passes of a section.
+/// Returns the passes of a section, without its barriers.
 pub fn passes(section: &[Step]) -> impl Iterator<Item = Pass> {
     section.iter().filter_map(|step| match step {
         Step::Run(pass) => Some(*pass),
@@ -122,11 +128,11 @@ pub fn passes(section: &[Step]) -> impl Iterator<Item = Pass> {
     })
 }
 
-/// The triangles that the pixels show. Where primary rays are traced, nothing has to be known before.
+/// Finds the triangles that the pixels show by rasterization. The section is empty if primary rays are traced.
 pub fn visibility(primary: Primary) -> Section {
     match primary {
         Primary::Trace => Section::new(),
-        Primary::Raster => vec![Step::Run(Pass::Visibility)], // which leaves triangle_ids ready for kernels
+        Primary::Raster => vec![Step::Run(Pass::Visibility)], // it leaves triangle_ids visible to kernels
         Primary::Compute => vec![
             Step::Run(Pass::RasterizeTriangles),
             barrier(Touch::Write, Touch::Update, &[PixelNearest, LargeTriangles, RasterGroups]),
@@ -137,7 +143,7 @@ pub fn visibility(primary: Primary) -> Section {
     }
 }
 
-/// The closest hits of one level of rays, and from them, the next level of rays.
+/// Finds the closest hits of one bounce's rays and, from these, makes the next bounce's rays.
 fn bounce(kind: &FrameKind, depth: u32) -> Section {
     let mut bounce = closest_hits(kind, depth);
     if depth == 0 && kind.features {
@@ -149,7 +155,8 @@ fn bounce(kind: &FrameKind, depth: u32) -> Section {
     bounce
 }
 
-/// The hits of primary rays come from what was rasterized, those of all others from the acceleration structure.
+/// Finds the closest hits of one bounce: those of primary rays from the rasterized triangles, if there are any, and
+/// all others through the acceleration structure.
 fn closest_hits(kind: &FrameKind, depth: u32) -> Section {
     let is_rasterized = depth == 0 && kind.primary != Primary::Trace;
     vec![
@@ -158,7 +165,7 @@ fn closest_hits(kind: &FrameKind, depth: u32) -> Section {
     ]
 }
 
-/// Compaction (the paper's section 2.1): the rays that go on from the hits, without gaps, by a prefix sum.
+/// Compaction (the paper's section 2.1): makes the rays that go on from the hits, without gaps, by a prefix sum.
 pub fn next_rays() -> Section {
     vec![
         Step::Run(Pass::CompactReduce),
@@ -172,8 +179,8 @@ pub fn next_rays() -> Section {
     ]
 }
 
-/// What the lights give to the hits of all bounces, and that to the pixels. A dispatch lasts as long as its longest ray; one
-/// for the shadows of all bounces waits for such a ray once, not once a bounce.
+/// Lights the hits of all bounces, and adds up the light in the pixels. A dispatch lasts as long as its longest ray:
+/// one dispatch for the shadow rays of all bounces waits for such a ray once, not once a bounce.
 fn light(has_lights: bool) -> Section {
     let mut light = Section::new();
     if has_lights {
@@ -184,13 +191,13 @@ fn light(has_lights: bool) -> Section {
         Step::Run(Pass::Shade),
         barrier(Touch::Write, Touch::Update, &[RayRadiance, Counters]),
         Step::Run(Pass::Resolve),
-        // The next batch overwrites the queue, too.
+        // This barrier also protects the ray queue, which the next batch overwrites.
         barrier(Touch::Write, Touch::Update, &[PixelRadiance]),
     ]);
     light
 }
 
-/// The mean of all samples.
+/// Turns the frame's sample into the mean of all samples.
 fn samples(kind: &FrameKind) -> Section {
     if !kind.is_lit || !kind.adds_samples {
         return Section::new();
@@ -198,7 +205,7 @@ fn samples(kind: &FrameKind) -> Section {
     vec![Step::Run(Pass::Accumulate), barrier(Touch::Write, Touch::Read, &[PixelAccumulated, PixelRadiance])]
 }
 
-/// From the mean of all samples to what a display shows.
+/// Turns the mean of all samples into the displayed picture, or displays a feature in its place.
 pub fn display(kind: &FrameKind) -> Section {
     let mut display = Section::new();
     if kind.is_lit && kind.denoises {

@@ -1,4 +1,4 @@
-//! Where a frame's time went.
+//! The profile of a frame: times and counts of rays.
 
 use std::time::Instant;
 
@@ -6,51 +6,53 @@ use serde::Serialize;
 
 use super::pass::{Pass, Role};
 
-/// Where a frame's time went; nothing where nobody asked.
+/// The profile of a frame. It is empty if the options do not ask for one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Profile {
-    /// The device's own name.
+    /// The name that the device reports.
     pub device: String,
-    /// In the order of execution.
+    /// The passes in the order of execution.
     pub passes: Vec<PassTime>,
-    /// One row a bounce, 0 = primary rays; batches added up.
+    /// Counts of rays, the sums of all batches. One row a bounce; row 0: primary rays.
     pub bounces: Vec<BounceStats>,
-    /// Ray batches that the frame was split into; the most of any, where several frames are added up.
+    /// Number of batches that the frame was split into; the largest one if several frames are added up.
     pub n_batches: u32,
-    /// From the first pass's start to the last one's end; none where the device has no timestamps.
+    /// Milliseconds from the first pass's start to the last one's end; None if the device has no timestamps.
     pub frame_ms: Option<f64>,
-    /// When the device was given its first command, or the CPU began.
+    /// When the first commands were submitted to the device, or the CPU began.
     #[serde(skip)]
     pub begun_at: Option<Instant>,
 }
 
-/// One pass, of one bounce of one batch as a rule.
+/// One run of a pass: of one bounce of one batch, of a batch, or of the frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PassTime {
     /// The name of a [`Pass`], of its debug label and of its kernel's file.
     pub name: &'static str,
-    /// None for passes that run once a frame, or for all bounces of a batch at once: shadow, shade, resolve.
+    /// The bounce. None for passes that run once a frame, and for those that run for all bounces of a batch at once:
+    /// shadow, shade, resolve.
     pub bounce: Option<u32>,
-    /// In the order of execution; none for passes that run once a frame.
+    /// Index of the batch, in the order of execution. None for passes that run once a frame.
     pub batch: Option<u32>,
-    /// Since the frame's first pass began; none where the device has no timestamps, like `ms`.
+    /// Milliseconds from the start of the frame's first pass to that of this one; None if the device has no
+    /// timestamps.
     pub start_ms: Option<f64>,
-    /// Milliseconds; none if the device has no timestamps.
+    /// Duration in milliseconds; None if the device has no timestamps.
     pub ms: Option<f64>,
-    /// Rays of the bounce, or of all the batch's; none where a pass has pixels.
+    /// Number of rays of the bounce, or of all bounces of the batch. None for passes that run once a frame.
     pub n_rays_in: Option<u64>,
-    /// Of what finds hits: rays that hit; of shadow: segments that were tested; of compaction: rays of the next bounce.
-    /// None where a pass makes no rays.
+    /// Number of rays that come out of the pass. For passes that find closest hits: rays that hit. For shadow:
+    /// segments that were tested. For compaction: rays of the next bounce. None for all other passes.
     pub n_rays_out: Option<u64>,
 }
 
 impl PassTime {
-    /// What is known of the pass beside its time.
+    /// Returns the pass itself, with its properties.
     pub fn pass(&self) -> Pass {
         Pass::named(self.name)
     }
 
-    /// Adds the same pass of another frame.
+    /// Adds time and counts of the same pass of another frame.
     fn add(&mut self, other: &Self) {
         let sum = |a: Option<u64>, b: Option<u64>| a.zip(b).map(|(a, b)| a + b);
         self.ms = self.ms.zip(other.ms).map(|(a, b)| a + b);
@@ -59,19 +61,19 @@ impl PassTime {
     }
 }
 
-/// Rays of one bounce.
+/// Counts of one bounce's rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct BounceStats {
     /// Rays whose closest hit was found.
     pub n_rays: u64,
-    /// Those that hit something.
+    /// Rays that hit something.
     pub n_hits: u64,
     /// Shadow segments that were tested.
     pub n_shadow_rays: u64,
 }
 
 impl BounceStats {
-    /// Adds another batch's.
+    /// Adds the counts of another batch.
     pub fn add(&mut self, other: &Self) {
         self.n_rays += other.n_rays;
         self.n_hits += other.n_hits;
@@ -80,7 +82,8 @@ impl BounceStats {
 }
 
 impl Profile {
-    /// Adds a frame's times and counts to those of others of the same options; passes begin when they first began.
+    /// Adds the times and counts of another frame of the same options. `start_ms` of a pass stays that of the first
+    /// frame which has the pass.
     pub fn add(&mut self, frame: &Profile) {
         let mut next = 0;
         let place = |pass: &PassTime| (pass.name, pass.bounce, pass.batch);
@@ -102,7 +105,7 @@ impl Profile {
         self.n_batches = self.n_batches.max(frame.n_batches);
     }
 
-    /// Puts the frame of another part of the picture behind this one. Its batches are counted on.
+    /// Appends the profile of another part of the picture. The numbers of its batches follow those of this profile.
     pub fn append(&mut self, part: Profile) {
         let delay = self.begun_at.zip(part.begun_at).map(|(first, later)| later.saturating_duration_since(first));
         let delay_ms = delay.unwrap_or_default().as_secs_f64() * 1e3;
@@ -122,19 +125,19 @@ impl Profile {
         self.bounces.iter_mut().zip(bounces).for_each(|(sum, bounce)| sum.add(bounce));
     }
 
-    /// Milliseconds of all passes of one name, or none where any lacks a timestamp.
+    /// Returns the milliseconds of all passes of one name together, or None if one of the passes lacks a timestamp.
     pub fn pass_ms(&self, name: &str) -> Option<f64> {
         self.passes.iter().filter(|pass| pass.name == name).map(|pass| pass.ms).sum()
     }
 
-    /// Milliseconds in which the closest hits of a bounce's rays were found, or none where any pass lacks a timestamp.
-    /// Passes that find primary visibility once a frame belong to bounce 0.
+    /// Returns the milliseconds of the passes that find the closest hits of a bounce's rays, or None if one of the
+    /// passes lacks a timestamp. Those that find primary visibility once a frame belong to bounce 0.
     pub fn tracing_ms(&self, bounce: u32) -> Option<f64> {
         let passes = self.passes.iter().filter(|pass| pass.pass().is_tracing());
         passes.filter(|pass| pass.bounce.unwrap_or(0) == bounce).map(|pass| pass.ms).sum()
     }
 
-    /// Milliseconds in which shadow rays were tested, or none where any pass lacks a timestamp.
+    /// Returns the milliseconds of the passes that test shadow rays, or None if one of the passes lacks a timestamp.
     pub fn shadow_ms(&self) -> Option<f64> {
         self.passes.iter().filter(|pass| pass.pass().role() == Role::Shadow).map(|pass| pass.ms).sum()
     }

@@ -1,47 +1,47 @@
-//! What the passes of a frame hand to one another.
+//! The buffers and images by which the passes of a frame hand data to one another.
 
 use crate::layout;
 
-/// A buffer or image that some pass writes, by the name that it has in the kernels.
+/// A buffer or image that some pass writes. Its name is that in the kernels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Resource {
-    /// Rays of all bounces of a batch.
+    /// Rays of all bounces of a batch: the ray queue.
     Rays,
     /// The closest hit of each ray.
     Hits,
-    /// Which rays go on from each hit.
+    /// The kinds of rays that go on from each hit, its ray's children: reflected, refracted, both or none.
     ChildKinds,
-    /// Where each ray's children begin in `Rays`.
+    /// Index in `Rays` at which each ray's children begin, or would begin if it had any.
     FirstChildren,
-    /// Counts, then prefix sums, of each block of rays.
+    /// The number of children of each block of rays, then the exclusive prefix sums of these numbers.
     ScanBlocks,
     /// The number of rays of each bounce, and the sizes of its dispatches.
     Bounces,
-    /// Whether each hit sees each light.
+    /// For each light and each hit: whether the light is visible.
     LightVisibility,
-    /// The radiance that each ray brings to its pixel.
+    /// The radiance that each ray contributes to its pixel.
     RayRadiance,
     /// The sample's radiance in each pixel, then the mean of all samples.
     PixelRadiance,
-    /// The sum of samples in each pixel.
+    /// The sum of all samples in each pixel.
     PixelAccumulated,
-    /// Each pixel after the noise filter; the same buffer as `PixelRadiance` where there is no filter.
+    /// The radiance of each pixel after the noise filter; the same buffer as `PixelRadiance` if there is no filter.
     PixelFiltered,
-    /// Each pixel as it is displayed.
+    /// Each pixel as it is displayed, sRGB bytes.
     PixelDisplay,
     /// What each pixel shows, and what its rays cost.
     PixelFeatures,
-    /// The triangle that the graphics pipeline found in each pixel.
+    /// Index of the triangle that the graphics pipeline found in each pixel.
     TriangleIds,
-    /// The triangle and the distance that the kernels which rasterize found in each pixel.
+    /// The nearest triangle in each pixel and its distance, as found by the compute kernels that rasterize.
     PixelNearest,
-    /// The dispatch of `RasterizeBlocks`, and the numbers of large triangles and of their blocks.
+    /// The size of the dispatch of `RasterizeBlocks`, and the numbers of large triangles and of their blocks.
     RasterGroups,
-    /// Triangles that cover many pixels.
+    /// Triangles with large bounding rectangles, which `RasterizeBlocks` rasterizes.
     LargeTriangles,
     /// Numbers of hits and of shadow segments of each bounce.
     Counters,
-    /// Rays that have spent a dispatch's loop turns.
+    /// States of rays that have spent the loop turns of a dispatch, and go on in the next one.
     Stalls,
 }
 
@@ -69,7 +69,7 @@ impl Resource {
         Self::Stalls,
     ];
 
-    /// Its binding in the frame's descriptor set.
+    /// Returns its binding in the frame's descriptor set.
     pub fn binding(self) -> u32 {
         match self {
             Self::Rays => layout::BIND_RAYS,

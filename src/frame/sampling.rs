@@ -1,29 +1,30 @@
-//! Where samples lie in their pixels.
+//! Positions of samples in their pixels.
 //!
-//! The rasterizer tests one place in all pixels, so a frame is one sample of each, all moved alike. Samples are spread
-//! as the reconstruction filter is (M. Ernst, M. Stamminger, G. Greiner, Filter Importance Sampling, 2006), so that
-//! each counts the same and a pixel is their mean.
+//! The rasterizer tests the same position in all pixels. So a frame is one sample of each pixel, all with the same
+//! offset. Samples are distributed as the reconstruction filter is (M. Ernst, M. Stamminger, G. Greiner, Filter
+//! Importance Sampling, 2006), so that all have the same weight and a pixel is their mean.
 
 use glam::{DVec2, dvec2};
 
-/// 2^32 / g and 2^32 / g^2, where g^3 = g + 1: the step of the R2 sequence (M. Roberts, The Unreasonable Effectiveness of
-/// Quasirandom Sequences, 2018) in units of 2^-32.
+/// 2^32 / g and 2^32 / g^2, where g^3 = g + 1: the step of the R2 sequence (M. Roberts, The Unreasonable
+/// Effectiveness of Quasirandom Sequences, 2018) in units of 2^-32.
 const R2_STEP: [u32; 2] = [3_242_174_889, 2_447_445_414];
 
-/// The sample's distance from the centre of its pixel, px, each axis -1 to 1, as a tent filter of radius 1 px weighs
-/// them. Sample 0 is the centre.
+/// Returns the sample's offset from the centre of its pixel, px, -1 to 1 on each axis. Offsets are distributed as a
+/// tent filter of radius 1 px weighs them. Sample 0 is the centre.
 pub fn sample_offset(sample_ix: u32) -> DVec2 {
     let [x, y] = R2_STEP.map(|step| tent(quasirandom(sample_ix, step)));
     dvec2(x, y)
 }
 
-/// Above 0 and below 1, 1/2 for index 0. The sequence starts over after 2^32.
+/// Returns an element of the sequence, above 0 and below 1; 1/2 for index 0. The sequence repeats after 2^32
+/// elements.
 fn quasirandom(ix: u32, step: u32) -> f64 {
     let bits = (1_u32 << 31).wrapping_add(ix.wrapping_mul(step));
     f64::from(bits.max(1)) / (1_u64 << 32) as f64
 }
 
-/// Where a tent over -1 to 1 has the share `u` of its area to its left.
+/// Returns the position, -1 to 1, to whose left a tent over -1 to 1 has the share `u` of its area.
 fn tent(u: f64) -> f64 {
     if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 * (1.0 - u)).sqrt() }
 }
@@ -32,7 +33,7 @@ fn tent(u: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The share of a tent's area to the left of `x`.
+    /// Returns the share of a tent's area to the left of `x`.
     fn left_of(x: f64) -> f64 {
         0.5 + x - x * x.abs() / 2.0
     }
@@ -56,7 +57,7 @@ mod tests {
         for u in [0.0, 1e-9, 0.1, 0.5, 0.77, 1.0] {
             assert!((left_of(tent(u)) - u).abs() < 1e-15);
         }
-        // A tent's mean is 0, its variance 1/6 on each axis, its axes are independent.
+        // A tent has mean 0 and variance 1/6 on each axis, and its axes are independent.
         let n = 4096;
         let mean = |f: &dyn Fn(DVec2) -> f64| (0..n).map(|i| f(sample_offset(i))).sum::<f64>() / f64::from(n);
         assert!(mean(&|p| p.x).abs() < 1e-3 && mean(&|p| p.y).abs() < 1e-3);
@@ -64,8 +65,8 @@ mod tests {
         assert!(mean(&|p| p.x * p.y).abs() < 1e-3);
     }
 
-    /// Any number of first samples is spread evenly: no half plane through the pixel has more than its share by much,
-    /// as it would of random ones.
+    /// The first n samples are spread evenly, for any n: no half plane along an axis has much more than its share of
+    /// them, as it would have of random samples.
     #[test]
     fn few_samples_are_spread_evenly() {
         for n in [16, 64, 256, 1024] {

@@ -1,21 +1,21 @@
-//! What a window can show of a picture.
+//! The views of a picture that a window can show.
 
 use crate::layout;
 
-/// What a window shows of a picture.
+/// A view: the picture, or a feature of it in false colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
     /// The picture.
     Picture,
-    /// The nearer, the brighter.
+    /// Depth of the first hit: the nearer, the brighter.
     Depth,
-    /// The shading normal, each axis a channel.
+    /// The shading normal of the first hit: one colour channel for each axis.
     Normal,
-    /// Each triangle in a colour of its own.
+    /// The triangle of the first hit: a colour for each index.
     Id,
-    /// What the pixel's rays, all of them, read of the tree.
+    /// Number of reads of the acceleration structure by all rays of the pixel.
     Cost,
-    /// The number of the pixel's rays, all of them.
+    /// Number of all rays of the pixel.
     Rays,
 }
 
@@ -29,12 +29,12 @@ named_enum!(View {
 });
 
 impl View {
-    /// Whether the hits of the primary rays alone decide it, so that no further ray is traced for it.
+    /// Whether the view depends on the hits of primary rays only, so that no further rays are traced for it.
     pub fn needs_primary_rays_only(self) -> bool {
         matches!(self, Self::Depth | Self::Normal | Self::Id)
     }
 
-    /// As the kernel knows it; none for the picture.
+    /// Returns the value that the kernel has for it, `VIEW_*`; None for the picture.
     pub(crate) fn constant(self) -> Option<u32> {
         match self {
             Self::Picture => None,

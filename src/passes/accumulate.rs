@@ -1,4 +1,4 @@
-//! Accumulate: the mean of the samples so far.
+//! Accumulate: turns each pixel's sample into the mean of all samples so far.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::{
     layout::Batch,
 };
 
-/// The pass's kernel.
+/// The pipeline of the pass.
 pub struct Accumulate {
     kernel: ComputePipeline,
 }
@@ -19,8 +19,9 @@ impl Accumulate {
         Ok(Self { kernel: kernel(context, bindings, "accumulate", spirv!("accumulate.comp"), &Constants::new())? })
     }
 
-    /// Needs pixel_radiance (a sample), pixel_accumulated (the sum of those before it), bounces. Leaves
-    /// pixel_accumulated (with the sample), pixel_radiance (the mean).
+    /// Needs `pixel_radiance` with the sample, `pixel_accumulated` with the sum of the samples before it, and
+    /// `bounces`. Leaves the sum of all samples in `pixel_accumulated` and their mean in `pixel_radiance`. If a
+    /// bounce of the frame has overflowed, it leaves both as they are.
     pub fn record(&self, commands: &Commands, resources: &Resources) {
         commands.dispatch(&self.kernel, None, &Batch::default(), resources.pixel_dispatch());
     }

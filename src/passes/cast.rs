@@ -1,4 +1,5 @@
-//! Cast: each given ray's closest hit through the kd-tree, or any hit; without a frame.
+//! Cast: finds the closest hit, or any hit, of each ray of an array, through the acceleration structure. It is no
+//! pass of a frame.
 
 use std::sync::Arc;
 
@@ -11,14 +12,16 @@ use crate::{
     layout::{CastBatch, RAY_GROUP_SIZE, constants},
 };
 
-/// The pass's kernel.
+/// The pipeline of the pass.
 pub struct Cast {
     kernel: ComputePipeline,
-    /// That the device shares out among rays.
+    /// Lanes of the device, which are shared among the rays; 0: each ray gets one lane.
     n_lanes: u32,
 }
 
 impl Cast {
+    /// Creates the pipeline.
+    ///
     /// # Errors
     /// The driver refuses the shader.
     pub fn new(
@@ -32,15 +35,16 @@ impl Cast {
         Ok(Self { kernel: kernel(context, bindings, "cast", spirv!("cast.comp"), &constants)?, n_lanes })
     }
 
-    /// What the driver tells of the kernel.
+    /// Returns the statistics that the driver reports of the kernel.
     ///
     /// # Errors
-    /// As [`ComputePipeline::statistics`].
+    /// Fails as [`ComputePipeline::statistics`] does.
     pub fn statistics(&self) -> Result<Vec<Statistic>, GpuError> {
         self.kernel.statistics()
     }
 
-    /// Needs the first `n_rays` of cast_rays. Leaves as many cast_hits, and marks where rays have stalled.
+    /// Needs the first `n_rays` of `cast_rays`. Leaves as many of `cast_hits`; a ray that has stalled leaves a mark
+    /// in place of its hit. `round`: the rays that run, all or those that have stalled.
     pub fn record(&self, commands: &Commands, set: &BindingSet, n_rays: u32, round: Round) {
         commands.bind(set);
         let lanes_log2 = lanes_log2(n_rays, self.n_lanes);

@@ -1,4 +1,8 @@
-//! Compact (the paper's section 2.1): the next level's rays, without gaps behind this one's, by a prefix sum.
+//! Compact (the paper's section 2.1): writes the rays of the next bounce to the queue by a prefix sum, without gaps,
+//! after those of this bounce.
+//!
+//! Each ray counts its child rays, those that go on from its hit. A block is the `SCAN_GROUP_SIZE` rays of one
+//! workgroup.
 
 use std::sync::Arc;
 
@@ -9,7 +13,7 @@ use crate::{
     layout::Batch,
 };
 
-/// The pass's three kernels.
+/// The three pipelines of the pass.
 pub struct Compact {
     reduce: ComputePipeline,
     spine: ComputePipeline,
@@ -29,18 +33,19 @@ impl Compact {
         })
     }
 
-    /// Needs rays, hits. Leaves child_kinds, and in scan_blocks the number of each block's children.
+    /// Needs `rays` and `hits` of the bounce. Leaves the children of each ray in `child_kinds`, and the number of
+    /// each block's children in `scan_blocks`.
     pub fn reduce(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.reduce, Some(batch.depth), batch, resources.scan_dispatch(batch));
     }
 
-    /// Needs scan_blocks. Leaves their exclusive prefix sums there, and the next row of bounces.
+    /// Needs `scan_blocks`. Leaves their exclusive prefix sums there, and the next bounce's row of `bounces`.
     pub fn spine(&self, commands: &Commands, batch: &Batch) {
         commands.dispatch(&self.spine, Some(batch.depth), batch, Dispatch::Threads([1, 1, 1], [1, 1, 1]));
     }
 
-    /// Needs rays, hits, child_kinds, scan_blocks and the next row of bounces. Leaves first_children and the next bounce's
-    /// rays.
+    /// Needs `rays` and `hits` of the bounce, `child_kinds`, `scan_blocks` and the next bounce's row of `bounces`.
+    /// Leaves `first_children` and the next bounce's `rays`.
     pub fn scatter(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.scatter, Some(batch.depth), batch, resources.scan_dispatch(batch));
     }

@@ -1,4 +1,4 @@
-//! Denoise (the paper's section 2.4): smooths pixels that stand out from their neighbours.
+//! Denoise (the paper's section 2.4): smooths pixels that differ much from their neighbours.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::{
     layout::Batch,
 };
 
-/// The pass's kernel.
+/// The pipeline of the pass.
 pub struct Denoise {
     kernel: ComputePipeline,
 }
@@ -19,7 +19,7 @@ impl Denoise {
         Ok(Self { kernel: kernel(context, bindings, "denoise", spirv!("denoise.comp"), &Constants::new())? })
     }
 
-    /// Needs pixel_radiance. Leaves pixel_filtered.
+    /// Needs `pixel_radiance`. Leaves `pixel_filtered`.
     pub fn record(&self, commands: &Commands, resources: &Resources) {
         commands.dispatch(&self.kernel, None, &Batch::default(), resources.pixel_dispatch());
     }

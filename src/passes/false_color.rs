@@ -1,4 +1,4 @@
-//! False colour: a feature of each pixel, displayed.
+//! False colour: displays a feature of each pixel in place of the picture.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::{
     layout,
 };
 
-/// The pass's kernel.
+/// The pipeline of the pass.
 pub struct FalseColor {
     kernel: ComputePipeline,
 }
@@ -19,7 +19,7 @@ impl FalseColor {
         Ok(Self { kernel: kernel(context, bindings, "false_color", spirv!("false_color.comp"), &Constants::new())? })
     }
 
-    /// Needs pixel_features. Leaves pixel_display.
+    /// Needs `pixel_features`. Leaves `pixel_display`.
     pub fn record(&self, commands: &Commands, resources: &Resources, push: &layout::FalseColor) {
         commands.dispatch(&self.kernel, None, push, resources.pixel_dispatch());
     }

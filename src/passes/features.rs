@@ -1,4 +1,4 @@
-//! Features: what each pixel shows, for other uses than light.
+//! Features: writes the first-hit AOVs of each pixel: position, normal, albedo, depth and indices.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use crate::{
     layout::{Batch, RAY_GROUP_SIZE},
 };
 
-/// The pass's kernel.
+/// The pipeline of the pass.
 pub struct Features {
     kernel: ComputePipeline,
 }
@@ -18,7 +18,8 @@ impl Features {
         Ok(Self { kernel: kernel(context, bindings, "features", spirv!("features.comp"), &Constants::new())? })
     }
 
-    /// Needs hits of camera rays, pixel_features (cleared). Leaves pixel_features, all but the counts.
+    /// Needs `hits` of the camera rays, and `pixel_features` that have been cleared. Leaves all of `pixel_features`
+    /// but the counts of rays and steps.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, Some(batch.depth), batch, dispatch);

@@ -1,5 +1,21 @@
-//! The passes, one file each: its pipeline and how it is recorded. The kernel of the same name is in `glsl/passes`,
-//! its CPU twin in `cpu`, its test in `tests/passes`. The passes that build a grid have a folder, `grid`.
+//! The passes of a frame, one file each, with the pipelines of the pass and the functions that record its dispatches.
+//! The kernel of the same name is in `glsl/passes`, its twin on the CPU in `reference`, its test in `tests/passes`.
+//! The kernels that build a grid have a folder, `grid`.
+//!
+//! # Needs and leaves
+//!
+//! The documentation of a function that records a dispatch states its contract with other dispatches:
+//!
+//! - "Needs `a` and `b`." The dispatch reads these buffers. Earlier dispatches or transfers have written them, and a
+//!   barrier has made them visible.
+//! - "Leaves `c`." The dispatch writes this buffer. It is complete when the dispatch has ended, and a barrier must
+//!   make it visible before the next dispatch reads it.
+//! - "Updates `d`." The dispatch does both in place.
+//!
+//! The names are those of the buffers in the kernels, which are fields of [`Resources`](crate::buffers::Resources)
+//! and its parts. Not mentioned are the scene's arrays, which no pass writes, and `bounces` where it only gives a
+//! pass its range of rays and the size of its dispatch. The barriers between the passes of a frame are in
+//! [`plan`](crate::frame::plan). Only the build of a grid and the transfers within a pass have their own.
 
 use std::sync::Arc;
 
@@ -39,7 +55,7 @@ pub use self::{
 #[cfg(feature = "view")]
 pub use self::present::Present;
 
-/// A shader, as build.rs left it.
+/// A shader in SPIR-V, which build.rs has compiled.
 macro_rules! spirv {
     ($name:literal) => {
         $crate::gpu::Shader { file: $name, spirv: include_bytes!(concat!(env!("OUT_DIR"), "/", $name, ".spv")) }
@@ -47,12 +63,12 @@ macro_rules! spirv {
 }
 pub(crate) use spirv;
 
-/// All passes, ready to record. A clone shares its pipelines with the original.
+/// All passes of a frame. A clone shares its pipelines with the original.
 #[derive(Clone)]
 pub struct Passes {
-    /// None unless the graphics pipeline finds the primary hits.
+    /// None unless the graphics pipeline rasterizes the triangles that pixels show.
     pub visibility: Option<Arc<Visibility>>,
-    /// None where kernels do not rasterize.
+    /// None unless compute kernels rasterize them.
     pub rasterize: Option<Arc<Rasterize>>,
     pub primary_hit: Arc<PrimaryHit>,
     pub trace: Arc<Trace>,
@@ -68,6 +84,8 @@ pub struct Passes {
 }
 
 impl Passes {
+    /// Creates the pipelines.
+    ///
     /// # Errors
     /// The driver refuses a shader.
     pub fn new(
@@ -92,18 +110,18 @@ impl Passes {
         })
     }
 
-    /// The pass that rasterizes by graphics.
+    /// Returns the pass that rasterizes by the graphics pipeline.
     ///
     /// # Panics
-    /// The options ask for other primary rays.
+    /// The options have another [`Primary`].
     pub fn visibility(&self) -> &Visibility {
         self.visibility.as_ref().expect("the options ask for graphics")
     }
 
-    /// The kernels that rasterize.
+    /// Returns the kernels that rasterize.
     ///
     /// # Panics
-    /// The options ask for other primary rays.
+    /// The options have another [`Primary`].
     pub fn rasterize(&self) -> &Rasterize {
         self.rasterize.as_ref().expect("the options ask for kernels that rasterize")
     }
@@ -124,7 +142,8 @@ impl Passes {
         (options.primary == Primary::Compute).then(|| Rasterize::new(context, bindings).map(Arc::new)).transpose()
     }
 
-    /// Makes the passes for other options. They share with these all pipelines in which the options do not differ.
+    /// Creates the passes for the options `to`. They share with these passes, which were created for the options
+    /// `from`, all pipelines for which the options do not differ.
     ///
     /// # Errors
     /// The driver refuses a shader.
@@ -160,7 +179,7 @@ impl Passes {
     }
 }
 
-/// Specialization constants of all kernels that take rays through the kd-tree.
+/// Returns the specialization constants that all kernels which trace rays have in common.
 fn traversal_constants(context: &Arc<Context>, traversal: Traversal) -> Result<Constants, GpuError> {
     Ok(Constants::new()
         .set(constants::TRAVERSAL, traversal.constant())
@@ -168,10 +187,10 @@ fn traversal_constants(context: &Arc<Context>, traversal: Traversal) -> Result<C
         .set(constants::PREDICATES_BRANCHES, context.predicates_branches()))
 }
 
-/// A kernel without subgroup requirements.
+/// Creates a kernel without requirements on its subgroups.
 ///
 /// # Panics
-/// A constant has a value that the shader does not declare.
+/// `constants` has a constant that the shader does not declare.
 fn kernel(
     context: &Arc<Context>,
     bindings: &Arc<BindingLayout>,
@@ -185,7 +204,7 @@ fn kernel(
     ComputePipeline::new(context, bindings, &ComputeDesc { name, shader, constants, full_subgroups: false })
 }
 
-/// A constant that the shader does not declare, if there is one.
+/// Returns a constant that the shader does not declare, if there is one.
 fn undeclared(file: &str, constants: &Constants) -> Option<&'static str> {
     let declared = CONSTANTS_OF_SHADERS.iter().find(|(known, _)| *known == file);
     let (_, declared) = declared.unwrap_or_else(|| panic!("`{file}` is a shader"));

@@ -1,4 +1,4 @@
-//! Present: the displayed picture into a window.
+//! Present: draws the displayed picture into a window.
 
 use std::sync::Arc;
 
@@ -9,13 +9,13 @@ use crate::{
     layout,
 };
 
-/// The pass's pipeline.
+/// The pipeline of the pass.
 pub struct Present {
     pipeline: RasterPipeline,
 }
 
 impl Present {
-    /// For pictures of resources like these.
+    /// Creates the pipeline, for pictures of resources with the same bindings.
     ///
     /// # Errors
     /// The driver refuses a shader.
@@ -29,7 +29,7 @@ impl Present {
         Ok(Self { pipeline: RasterPipeline::new(context, &resources.bindings, &desc)? })
     }
 
-    /// Needs pixel_display of `size` pixels, readable by fragments. Leaves the window's image, all of it.
+    /// Needs `pixel_display` of `size` pixels, visible to fragment shaders. Leaves the whole of the window's image.
     pub fn record(&self, commands: &Commands, resources: &Resources, size: (u32, u32), image: &WindowImage) {
         let ((width, height), (window_width, window_height)) = (size, image.size());
         let push = layout::Present { width, height, window_width, window_height };

@@ -1,4 +1,5 @@
-//! Primary hit (the paper's section 2.2): the hits of camera rays with the planes of the rasterized triangles.
+//! Primary hit (the paper's section 2.2): intersects each camera ray with the plane of the triangle that was
+//! rasterized in its pixel.
 
 use std::sync::Arc;
 
@@ -9,7 +10,7 @@ use crate::{
     layout::{Batch, RAY_GROUP_SIZE, constants},
 };
 
-/// The pass's kernel.
+/// The pipeline of the pass.
 pub struct PrimaryHit {
     kernel: ComputePipeline,
 }
@@ -28,7 +29,8 @@ impl PrimaryHit {
         Ok(Self { kernel: kernel(context, bindings, "primary_hit", spirv!("primary_hit.comp"), &constants)? })
     }
 
-    /// Needs triangle_ids, or pixel_nearest. Leaves hits; updates counters, and pixel_features where the options ask for them.
+    /// Needs `triangle_ids`, or `pixel_nearest` if kernels rasterize. Leaves `hits` of the camera rays. Updates the
+    /// counters and, if the options ask for features, `pixel_features`.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, Some(batch.depth), batch, dispatch);

@@ -1,5 +1,9 @@
-//! Rasterize: what visibility does (the paper's section 2.2), by kernels, for devices with few units for graphics. The
-//! triangle of each pixel is the one that its camera ray hits, to the last bit.
+//! Rasterize: finds the triangle of each pixel as visibility does (the paper's section 2.2), but by compute kernels,
+//! for devices with few units for graphics. The triangle of each pixel is the one that its camera ray hits, to the
+//! last bit.
+//!
+//! One kernel rasterizes the triangles with small bounding rectangles. The rectangles of the large triangles are cut
+//! into blocks, squares of pixels, which the other kernel rasterizes.
 
 use std::sync::Arc;
 
@@ -10,10 +14,10 @@ use crate::{
     layout::{Frame, RASTER_GROUPS_X, RAY_GROUP_SIZE, RasterGroups, RasterPush, constants},
 };
 
-/// A workgroup of 64 goes over such a block in 16 steps.
+/// The smallest blocks have 32 x 32 pixels. A workgroup of 64 invocations tests such a block in 16 steps.
 const SMALLEST_BLOCK_LOG2: u32 = 5;
 
-/// The pass's two kernels.
+/// The two pipelines of the pass.
 pub struct Rasterize {
     triangles: ComputePipeline,
     blocks: ComputePipeline,
@@ -21,7 +25,7 @@ pub struct Rasterize {
 
 impl Rasterize {
     /// # Errors
-    /// The device lacks atomics of 64 bits; the driver refuses a shader.
+    /// The device lacks 64-bit atomics, or the driver refuses a shader.
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
         context.require_wide_atomics()?;
         let constants = Constants::new().set(constants::FUSED_FMA, context.fuses_fma()?);
@@ -32,13 +36,14 @@ impl Rasterize {
         })
     }
 
-    /// Leaves raster_groups as `record` needs it, by a transfer.
+    /// Leaves `raster_groups` without blocks, by a transfer, as [`Rasterize::triangles`] needs it.
     pub fn reset(commands: &Commands, resources: &Resources) {
         let groups = RasterGroups { x: RASTER_GROUPS_X, y: 0, z: 1, reserved: 0 };
         commands.update_buffer(resources.raster.groups.any(), &RasterState { groups, count: 0 });
     }
 
-    /// Needs what `reset` leaves. Leaves small triangles in pixel_nearest; large_triangles, raster_groups.
+    /// Needs what [`Rasterize::reset`] leaves. Leaves the hits of small triangles in `pixel_nearest`, the others in
+    /// `large_triangles`, and the size of the next dispatch in `raster_groups`.
     pub fn triangles(&self, commands: &Commands, resources: &Resources) {
         let (pixels, constants) = (&resources.pixels, resources.constants());
         let push = RasterPush { block_log2: block_log2(constants) };
@@ -49,14 +54,15 @@ impl Rasterize {
         commands.dispatch_after(clear, &self.triangles, None, &push, groups_for(constants.n_triangles));
     }
 
-    /// Needs what `triangles` leaves. Leaves all triangles in pixel_nearest.
+    /// Needs what [`Rasterize::triangles`] leaves. Leaves the nearest hits of all triangles in `pixel_nearest`.
     pub fn blocks(&self, commands: &Commands, resources: &Resources) {
         let push = RasterPush { block_log2: block_log2(resources.constants()) };
         commands.dispatch(&self.blocks, None, &push, Dispatch::Indirect(resources.raster.groups.any(), 0));
     }
 }
 
-/// Sides of blocks: as small as can be, if the blocks of all triangles are to have numbers even where each fills the window.
+/// Returns log2 of a block's side in pixels. Blocks are as small as possible. Yet a u32 must number the blocks of all
+/// triangles, even if each triangle fills the window.
 fn block_log2(constants: &Frame) -> u32 {
     let n_blocks = |log2: u32| {
         let along = |pixels: u32| u64::from(pixels.div_ceil(1 << log2));
@@ -65,7 +71,8 @@ fn block_log2(constants: &Frame) -> u32 {
     (SMALLEST_BLOCK_LOG2..16).find(|&log2| u32::try_from(n_blocks(log2)).is_ok()).unwrap_or(16)
 }
 
-/// One invocation a triangle, in rows of workgroups, since a device need not take more than 65,535 in one.
+/// Returns the workgroups for one invocation per triangle. They are in several rows, since a device need not accept
+/// more than 65,535 workgroups in a row.
 fn groups_for(n_triangles: u32) -> Dispatch<'static> {
     const GROUPS_OF_ROW: u32 = 1 << 10;
     let n_groups = n_triangles.div_ceil(RAY_GROUP_SIZE);

@@ -1,4 +1,4 @@
-//! How a section of the frame's plan is recorded: each pass by its own file, each barrier by its accesses.
+//! Records a section of the frame's plan: each pass by the functions in its file, each barrier by its accesses.
 
 use super::Passes;
 use crate::{
@@ -8,17 +8,17 @@ use crate::{
     layout::{Batch, FalseColor},
 };
 
-/// What passes are told beside their resources.
+/// The inputs of passes beside their resources.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs {
-    /// The rays to work on, for passes of a batch or bounce.
+    /// The rays that passes of a batch or of a bounce work on.
     pub batch: Batch,
-    /// The feature to display, for [`Pass::FalseColor`].
+    /// The feature that [`Pass::FalseColor`] displays.
     pub false_color: Option<FalseColor>,
 }
 
 impl Passes {
-    /// Records passes and the barriers between them. The resources have to be bound.
+    /// Records passes and the barriers between them. The resources must be bound.
     pub fn record_section(&self, commands: &Commands, resources: &Resources, section: &[Step], inputs: &Inputs) {
         for step in section {
             match *step {
@@ -28,10 +28,10 @@ impl Passes {
         }
     }
 
-    /// Records one pass. The resources have to be bound.
+    /// Records one pass. The resources must be bound.
     ///
     /// # Panics
-    /// The passes were made for options that do not have this one, or it lacks its input.
+    /// The passes were created for options without this one, or `inputs` lacks the feature that it displays.
     pub fn record(&self, commands: &Commands, resources: &Resources, pass: Pass, inputs: &Inputs) {
         let batch = &inputs.batch;
         match pass {
@@ -58,7 +58,7 @@ impl Passes {
     }
 }
 
-/// The device's word for how kernels touch memory.
+/// Returns the access of a barrier for the use of memory by passes.
 fn access(touch: Touch) -> Access {
     match touch {
         Touch::Read => Access::ComputeRead,

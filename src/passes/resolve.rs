@@ -1,4 +1,4 @@
-//! Resolve: the light of all rays of a pixel, in the queue's order.
+//! Resolve: adds up the radiance of all rays of each pixel, in the order of the queue.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use crate::{
     layout::{Batch, RAY_GROUP_SIZE},
 };
 
-/// The pass's kernel.
+/// The pipeline of the pass.
 pub struct Resolve {
     kernel: ComputePipeline,
 }
@@ -18,7 +18,7 @@ impl Resolve {
         Ok(Self { kernel: kernel(context, bindings, "resolve", spirv!("resolve.comp"), &Constants::new())? })
     }
 
-    /// Needs ray_radiance, first_children of all the batch's bounces. Leaves pixel_radiance.
+    /// Needs `ray_radiance` and `first_children` of all bounces of the batch, and `bounces`. Leaves `pixel_radiance`.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, None, batch, dispatch);

@@ -1,4 +1,4 @@
-//! Shade (the paper's section 2.1): local light at each hit.
+//! Shade (the paper's section 2.1): computes the local illumination at each hit.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::{
     layout::{Batch, constants},
 };
 
-/// The pass's kernel.
+/// The pipeline of the pass.
 pub struct Shade {
     kernel: ComputePipeline,
 }
@@ -25,7 +25,8 @@ impl Shade {
         Ok(Self { kernel: kernel(context, bindings, "shade", spirv!("shade.comp"), &constants)? })
     }
 
-    /// Needs rays, hits, light_visibility of all the batch's bounces. Leaves ray_radiance; updates counters.
+    /// Needs `rays`, `hits` and `light_visibility` of all bounces of the batch. Leaves `ray_radiance`. Updates the
+    /// counters.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, None, batch, resources.shade_dispatch(batch));
     }

@@ -1,4 +1,5 @@
-//! Shadow (the paper's section 2.1): is there anything between a hit and a light?
+//! Shadow (the paper's section 2.1): tests whether anything is between each hit and each light. A segment is the
+//! shadow ray from a hit to a light.
 
 use std::sync::Arc;
 
@@ -10,7 +11,7 @@ use crate::{
     layout::{Batch, constants},
 };
 
-/// The pass's kernel.
+/// The pipeline of the pass.
 pub struct Shadow {
     kernel: ComputePipeline,
 }
@@ -21,13 +22,14 @@ impl Shadow {
         bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        // Shade counts the segments.
+        // `COUNTS` is not set, since the pass shade counts the segments.
         let constants = traversal_constants(context, options.traversal)?.set(constants::COUNT_COSTS, options.features);
         Ok(Self { kernel: kernel(context, bindings, "shadow", spirv!("shadow.comp"), &constants)? })
     }
 
-    /// Needs rays, hits of all the batch's bounces. Leaves light_visibility, and marks where segments have stalled; updates
-    /// pixel_features where the options ask for them. `batch.round` says which segments run.
+    /// Needs `rays` and `hits` of all bounces of the batch. Leaves `light_visibility`; a segment that has stalled
+    /// leaves a mark in its place. Updates `pixel_features` if the options ask for features. `batch.round`: the
+    /// segments that run, all or those that have stalled.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, None, batch, resources.shadow_dispatch(batch));
     }

@@ -1,4 +1,4 @@
-//! Tonemap: radiance to sRGB bytes.
+//! Tonemap: encodes radiance as sRGB bytes.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::{
     layout::{Batch, constants},
 };
 
-/// The pass's kernel.
+/// The pipeline of the pass.
 pub struct Tonemap {
     kernel: ComputePipeline,
 }
@@ -25,7 +25,7 @@ impl Tonemap {
         Ok(Self { kernel: kernel(context, bindings, "tonemap", spirv!("tonemap.comp"), &constants)? })
     }
 
-    /// Needs pixel_filtered. Leaves pixel_display.
+    /// Needs `pixel_filtered`. Leaves `pixel_display`.
     pub fn record(&self, commands: &Commands, resources: &Resources) {
         commands.dispatch(&self.kernel, None, &Batch::default(), resources.pixel_dispatch());
     }

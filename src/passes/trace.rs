@@ -1,4 +1,4 @@
-//! Trace (the paper's section 2.3): each ray's closest hit through the kd-tree.
+//! Trace (the paper's section 2.3): finds each ray's closest hit through the acceleration structure.
 
 use std::sync::Arc;
 
@@ -10,10 +10,10 @@ use crate::{
     layout::{Batch, constants},
 };
 
-/// The pass's kernels.
+/// The pipelines of the pass.
 pub struct Trace {
     kernel: ComputePipeline,
-    /// Of camera rays; none where the rasterizer finds their hits.
+    /// The kernel of camera rays. None if their triangles are rasterized.
     from_camera: Option<ComputePipeline>,
 }
 
@@ -34,8 +34,9 @@ impl Trace {
         Ok(Self { kernel: from(false)?, from_camera })
     }
 
-    /// Needs rays, but for the camera's. Leaves hits, and marks where rays have stalled; updates counters, and
-    /// pixel_features where the options ask for them. `batch.round` says which rays run.
+    /// Needs `rays` of the bounce; those of the camera are computed, not read. Leaves `hits`; a ray that has stalled
+    /// leaves a mark in place of its hit. Updates the counters and, if the options ask for features,
+    /// `pixel_features`. `batch.round`: the rays that run, all or those that have stalled.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         let of_camera = self.from_camera.as_ref().filter(|_| batch.depth == 0);
         commands.dispatch(of_camera.unwrap_or(&self.kernel), Some(batch.depth), batch, resources.trace_dispatch(batch));

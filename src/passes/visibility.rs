@@ -1,4 +1,4 @@
-//! Visibility (the paper's section 2.2): the nearest triangle's index in each pixel's sample, by rasterization.
+//! Visibility (the paper's section 2.2): rasterizes the index of the nearest triangle at each pixel's sample.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::{
     layout::Frame,
 };
 
-/// The pass's pipeline.
+/// The pipeline of the pass.
 pub struct Visibility {
     pipeline: RasterPipeline,
 }
@@ -25,10 +25,10 @@ impl Visibility {
         Ok(Self { pipeline: RasterPipeline::new(context, bindings, &desc)? })
     }
 
-    /// Needs nothing. Leaves triangle_ids, ready for kernels.
+    /// Needs no buffer of another pass. Leaves `triangle_ids`, which are already visible to kernels.
     ///
     /// # Panics
-    /// The resources were made for options that draw nothing.
+    /// The resources were created for options by which the graphics pipeline draws nothing.
     pub fn record(&self, commands: &Commands, resources: &Resources) {
         let (ids, depth) = (&resources.pixels.triangle_ids, resources.pixels.depth.as_ref());
         let depth = depth.expect("there is a depth target where triangles are drawn");

@@ -1,5 +1,5 @@
-//! Pictures that are larger than what a device holds at once: drawn in bands of full rows, one after the other, and
-//! joined.
+//! Draws pictures that are larger than a device can hold at once: in bands of full rows, one after the other, which
+//! the host joins.
 
 use std::{
     borrow::Cow,
@@ -17,27 +17,31 @@ use crate::{
     world::World,
 };
 
-/// Draws whole pictures of any size. Where all pixels would take more than a storage buffer can have, it draws bands of
-/// full rows; the joined picture has the same bits as one that is drawn at once.
+/// Draws whole pictures of any size. If all pixels together exceed the device's limit of a storage buffer, it draws
+/// bands of full rows. The joined picture has the same bits as one that is drawn at once.
 pub struct BandedRenderer {
     renderer: Renderer,
-    /// From the top; together they are the picture, or the part of it that the options ask for.
+    /// The bands from top to bottom. Together they are the picture, or its crop.
     bands: Vec<Crop>,
-    /// The picture that was drawn last. None where it is a single band, which stays on the device until it is fetched.
+    /// The picture that was drawn last. None if there is a single band, which stays on the device until it is
+    /// downloaded.
     joined: Option<Picture>,
-    /// Whether the next sample is expected to be slow. A driver that runs kernels on the CPU is slow from the first on.
+    /// Whether the next sample is expected to be slow, as the last one was. The first one is expected to be slow if
+    /// the driver runs kernels on the CPU.
     is_slow: bool,
 }
 
-/// A sample that is expected to take longer is drawn in steps if somebody sees them. Waiting for the device after a step
-/// takes about 0.1 ms: less than a hundredth of such a sample, but as much as a step of a fast GPU's.
+/// A sample that takes longer is slow. It is drawn in steps if the watcher shows them. The wait for the device after
+/// a step takes about 0.1 ms: less than a hundredth of a slow sample, but as much as a whole step takes on a fast
+/// GPU.
 const SLOW_SAMPLE: Duration = Duration::from_millis(500);
 
 impl BandedRenderer {
-    /// Uploads the scene and makes the passes.
+    /// Uploads the scene and creates the pipelines.
     ///
     /// # Errors
-    /// The scene, or a single row of the picture, is beyond the device's limits or memory.
+    /// The scene, or a single row of the picture, exceeds the device's limits or memory, or the driver refuses a
+    /// shader.
     pub fn new(context: Arc<Context>, world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
         let bands = bands(context.limits(), options);
         let is_slow = context.predicates_branches();
@@ -49,20 +53,20 @@ impl BandedRenderer {
         Ok(Self { renderer, bands, joined: None, is_slow })
     }
 
-    /// Bands of which the picture consists.
+    /// Number of bands of the picture.
     pub fn n_bands(&self) -> u32 {
         self.bands.len() as u32
     }
 
-    /// Looks from elsewhere from the next drawing on.
+    /// Sets the camera of the next pictures.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.renderer.set_camera(camera);
     }
 
-    /// Draws a new picture of so many samples a pixel, at least one, and tells the watcher how far it is.
+    /// Draws a new picture of `n_samples` samples a pixel, at least one, and reports its progress to the watcher.
     ///
     /// # Errors
-    /// A failed call; one pixel alone makes more rays than a queue holds; out of memory.
+    /// A call fails; one pixel alone makes more rays than the queue holds; out of memory.
     pub fn draw(&mut self, n_samples: u32, mut watcher: impl Watcher) -> Result<Drawn, GpuError> {
         if let [_] = self.bands[..] {
             return self.draw_band(n_samples, &mut watcher);
@@ -86,10 +90,10 @@ impl BandedRenderer {
         Ok(all)
     }
 
-    /// The picture that was drawn last.
+    /// Returns the picture that was drawn last. It is downloaded if it is still on the device.
     ///
     /// # Errors
-    /// A failed copy.
+    /// A copy fails.
     pub fn picture(&self) -> Result<Cow<'_, Picture>, GpuError> {
         match &self.joined {
             Some(picture) => Ok(Cow::Borrowed(picture)),
@@ -97,10 +101,11 @@ impl BandedRenderer {
         }
     }
 
-    /// Copies the displayed picture into an image of the caller's own: see [`Renderer::copy_picture_to`].
+    /// Copies the displayed picture into an image that the caller owns, as [`Renderer::copy_picture_to`] does.
     ///
     /// # Errors
-    /// The picture was drawn in several bands, so that it is not on the device; as [`Renderer::copy_picture_to`].
+    /// The picture was drawn in several bands, so that it is not on the device. Also fails as
+    /// [`Renderer::copy_picture_to`] does.
     pub fn copy_picture_to(
         &self,
         image: &GivenImage,
@@ -124,7 +129,7 @@ impl BandedRenderer {
         Ok(Drawn { features, profile })
     }
 
-    /// Draws a sample, in steps if it is expected to be slow and somebody sees them.
+    /// Draws a sample, in steps if it is expected to be slow and the watcher shows them.
     fn draw_sample(&mut self, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
         let begin = Instant::now();
         let profile = if self.is_slow && watcher.sees_parts() {
@@ -146,8 +151,8 @@ impl BandedRenderer {
         }
     }
 
-    /// An empty picture and empty features with memory for all bands, so that a lack of it is known before the work is
-    /// done.
+    /// Reserves memory for the pictures and the features of all bands, so that a lack of memory is found before the
+    /// work is done. Returns the empty picture.
     fn room_for_all(&mut self, features: &mut Vec<Feature>) -> Result<Picture, GpuError> {
         self.joined = None;
         let n_pixels = self.bands.iter().map(|band| band.width() as usize * band.height() as usize).sum();
@@ -167,8 +172,8 @@ fn reserve<T>(object: &'static str, elements: &mut Vec<T>, len: usize) -> Result
     elements.try_reserve_exact(len).map_err(|_| GpuError::HostMemory { object, bytes })
 }
 
-/// Bands of nearly equal height, as few as can be, each of which a device can hold with the rows beside it that the
-/// noise filter needs. A row that is too long for the device is a band, too.
+/// Returns bands of nearly equal height, as few as possible. The device can hold each of them together with the rows
+/// beside it that the noise filter reads. A band has at least one row, even if the row is too long for the device.
 fn bands(limits: &Limits, options: &RenderOptions) -> Vec<Crop> {
     let (asked, window) = (options.crop_or_whole(), options.window());
     let row_bytes = u64::from(window.width()) * Pixels::bytes_a_pixel(options);
@@ -182,7 +187,7 @@ fn bands(limits: &Limits, options: &RenderOptions) -> Vec<Crop> {
     (asked.y0..asked.y1).step_by(n_rows as usize).map(band).collect()
 }
 
-/// The band that needs the most memory; none where there is only one.
+/// Returns the band that needs the most memory, or None if there is only one band.
 fn largest(bands: &[Crop], options: &RenderOptions) -> Option<Crop> {
     let height = |crop: &&Crop| RenderOptions { crop: Some(**crop), ..options.clone() }.window().height();
     bands.iter().max_by_key(height).copied().filter(|_| bands.len() > 1)

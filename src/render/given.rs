@@ -1,14 +1,14 @@
-//! The picture in an image of the caller's own.
+//! Copies the picture into an image that the caller owns.
 
 use super::Renderer;
 use crate::gpu::{Access, CommandBuffer, GivenImage, GpuError, PixelRows, TimelinePoint};
 
 impl Renderer {
-    /// Copies the displayed picture, as [`Renderer::picture`] has it, into the upper left corner of an image. The device
-    /// begins after `after` and signals `then`; the host does not wait for it.
+    /// Copies the displayed picture, as [`Renderer::picture`] returns it, into the upper left corner of an image. The
+    /// device waits for `after`, copies, and signals `then`. The host does not wait.
     ///
     /// # Errors
-    /// The image is smaller than the picture. Out of memory, a failed call; then nothing is signalled.
+    /// The image is smaller than the picture; out of memory; a call fails. Then nothing is signalled.
     pub fn copy_picture_to(
         &self,
         image: &GivenImage,
@@ -27,16 +27,16 @@ impl Renderer {
         let copy = CommandBuffer::record(&self.context, "copy picture", None, |commands| {
             commands.barrier(Access::ComputeWrite, Access::TransferRead); // pixel_display
             commands.copy_to_given(display, &rows, image);
-            commands.barrier(Access::TransferRead, Access::ComputeWrite); // pixel_display, of the next frame
+            commands.barrier(Access::TransferRead, Access::ComputeWrite); // pixel_display, for the next frame
         })?;
         self.context.submit_copies(copy, after, then)
     }
 }
 
-/// The picture may still be copied.
+/// Waits for the device, which may still be copying the picture.
 impl Drop for Renderer {
     fn drop(&mut self) {
-        // A device that is lost has ended all work.
+        // An error can be ignored: a device that is lost has ended all work.
         let _ = self.context.wait();
     }
 }

@@ -1,4 +1,6 @@
-//! A sample in parts, for those who have to do something else meanwhile.
+//! Draws a sample in parts, so that the caller can do something else in between.
+//!
+//! A part is a command buffer of the frame. A sample is pending while some of its parts have run and others have not.
 
 use std::time::Instant;
 
@@ -15,55 +17,55 @@ use crate::{
 /// A command buffer of a frame.
 pub(super) struct Part {
     commands: CommandBuffer,
-    /// Rays that can stall in it: they have to end before the next step.
+    /// Its rays that can stall, if it has such: they must end before the next part begins.
     traced: Option<Traced>,
-    /// Whether it is the last one of its batch.
+    /// Whether it is the last part of its batch.
     pub ends_batch: bool,
 }
 
-/// Rays that a step takes through the tree.
+/// Rays that a part traces through the acceleration structure.
 pub(super) enum Traced {
-    /// Those of a bounce.
+    /// Rays of a bounce.
     Rays(Batch),
-    /// The shadow segments of all rays of a batch.
+    /// Shadow rays from the hits of all bounces of a batch.
     Shadows(Batch),
 }
 
 impl Part {
-    /// One without rays that can stall.
+    /// Creates a part without rays that can stall.
     pub fn plain(commands: CommandBuffer) -> Self {
         Self { commands, traced: None, ends_batch: false }
     }
 
-    /// One whose rays can stall.
+    /// Creates a part whose rays can stall.
     pub fn traced(commands: CommandBuffer, traced: Traced) -> Self {
         Self { commands, traced: Some(traced), ends_batch: false }
     }
 }
 
-/// How far a sample is to go on.
+/// The point up to which a sample is drawn.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Until {
-    /// To the end of the next step.
+    /// The end of the next part.
     Step,
-    /// To the end of the batch that is next, and with the last batch to the frame's end.
+    /// The end of the next batch, or the frame's end if that is the last batch.
     Batch,
-    /// To the frame's end.
+    /// The frame's end.
     End,
 }
 
-/// A sample that is drawn in part; nothing of it is under way.
+/// A sample of which some parts have run. The device is not working on any of them.
 pub(super) struct Pending {
     parts: Vec<Part>,
-    /// How many of the parts have run.
+    /// Number of parts that have run.
     n_done: usize,
     sample_ix: u32,
-    /// When its first commands were submitted.
+    /// When its first commands were submitted; None before.
     begun_at: Option<Instant>,
 }
 
 impl Pending {
-    /// The number of parts that have run when the sample has gone on so far.
+    /// Returns the number of parts that have run when the sample is drawn up to `until`.
     fn end(&self, until: Until) -> usize {
         if until == Until::Step {
             return self.n_done + 1;
@@ -80,51 +82,53 @@ impl Pending {
 /// The picture that is displayed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Displayed {
-    /// Pixels.
+    /// Width and height, pixels.
     pub size: (u32, u32),
-    /// Where it is seen from.
+    /// The camera that it was drawn from.
     pub camera: Camera,
 }
 
 impl Renderer {
-    /// Draws one batch of the sample that is begun, or of the next one; gives the whole sample's profile with its last
-    /// batch. The picture changes with the last one only. Whatever begins a new picture drops what is begun.
+    /// Draws one batch of the pending sample, or of the next one if none is pending. Returns the whole sample's
+    /// profile with its last batch, and None before. The displayed picture changes with the last batch only. Whatever
+    /// begins a new picture drops the pending sample.
     ///
     /// # Errors
-    /// As [`Renderer::draw_sample`].
+    /// Fails as [`Renderer::draw_sample`] does.
     pub fn draw_part(&mut self) -> Result<Option<Profile>, GpuError> {
         self.go_on(Until::Batch)
     }
 
-    /// Draws one step of the sample that is begun, or of the next one: a bounce of a batch, or its light. Gives
-    /// the whole sample's profile with its last one. The picture changes with the last one only.
+    /// Draws one part of the pending sample, or of the next one if none is pending: a bounce of a batch, or its
+    /// light. Returns the whole sample's profile with its last part, and None before. The displayed picture changes
+    /// with the last part only.
     ///
     /// # Errors
-    /// As [`Renderer::draw_sample`].
+    /// Fails as [`Renderer::draw_sample`] does.
     pub fn draw_step(&mut self) -> Result<Option<Profile>, GpuError> {
         self.go_on(Until::Step)
     }
 
-    /// Whether nothing but the hits of primary rays is drawn.
+    /// Whether samples find the hits of primary rays only, and no light.
     pub(super) fn draws_primary_rays_only(&self) -> bool {
         self.options.features && self.needs_primary_rays_only
     }
 
-    /// Whether a sample is begun.
+    /// Whether a sample is pending.
     pub fn is_pending(&self) -> bool {
         self.pending.is_some()
     }
 
-    /// Share of the next sample that is drawn, 0 to 1.
+    /// Share of the pending sample's parts that have run, 0 to 1; 0 if no sample is pending.
     pub fn progress(&self) -> f32 {
         self.pending.as_ref().map_or(0.0, |pending| pending.n_done as f32 / pending.parts.len() as f32)
     }
 
-    /// Batches have so many pixels at the most from now on, or as many as the queues hold. The picture does not depend on
-    /// it. A sample that is begun is begun anew.
+    /// Limits batches to `most_pixels` pixels or, with None, only to what the queue holds. The picture does not
+    /// depend on this. A pending sample is dropped, and drawn again from its beginning.
     ///
     /// # Errors
-    /// Out of memory; then nothing has changed, and a sample that is begun goes on.
+    /// Out of memory. Then nothing has changed, and a pending sample stays pending.
     pub fn limit_batches(&mut self, most_pixels: Option<u32>) -> Result<(), GpuError> {
         if self.most_pixels == most_pixels {
             return Ok(());
@@ -135,7 +139,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// What `limit_batches` was told last.
+    /// Returns the limit that [`Renderer::limit_batches`] has set.
     pub fn most_pixels(&self) -> Option<u32> {
         self.most_pixels
     }
@@ -148,9 +152,10 @@ impl Renderer {
         Ok(())
     }
 
-    /// Runs the sample's next parts; gives its profile when all have run without an overflow. None: there is more to do.
+    /// Runs the next parts of the pending or the next sample. Returns the sample's profile when all parts have run
+    /// without an overflow, and None while parts are left.
     pub(super) fn go_on(&mut self, until: Until) -> Result<Option<Profile>, GpuError> {
-        // Where no sample can begin, those that are complete stay.
+        // An error here keeps the samples that are complete; a later one drops them.
         let pending = self.pending.take().map_or_else(|| self.begin_sample(), Ok)?;
         let gone_on = self.try_to_go_on(pending, until);
         if gone_on.is_err() {
@@ -173,7 +178,8 @@ impl Renderer {
         let _fetching = info_span!("fetch counts").entered();
         let bounces = self.resources.bounces.download()?;
         if bounces.iter().any(|row| row.overflow != 0) {
-            // At once and whole: pixel_display shows a picture without the rays that had no room.
+            // The sample is drawn again without a return to the caller, since `pixel_display` now holds a picture
+            // that lacks the rays for which there was no room.
             let spans = self.schedule.split(&bounces, self.resources.constants())?;
             pending.parts.clear();
             self.reschedule(spans)?;
@@ -185,8 +191,8 @@ impl Renderer {
         self.profile(&bounces, begun_at).map(Some)
     }
 
-    /// Runs parts and waits for their end: all together, but for rays that can stall, which have to end before the next
-    /// step begins.
+    /// Runs parts and waits for their end. They are submitted together, except that rays which can stall must end
+    /// before the next part begins.
     fn run_parts(&self, parts: &[Part]) -> Result<(), GpuError> {
         for together in parts.split_inclusive(|part| part.traced.is_some()) {
             self.context.submit(&together.iter().map(|part| &part.commands).collect::<Vec<_>>())?;
@@ -200,7 +206,7 @@ impl Renderer {
 
     fn begin_sample(&mut self) -> Result<Pending, GpuError> {
         let sample_ix = self.n_samples;
-        // A second sample that is begun anew finds them begun.
+        // If the second sample was dropped and is drawn again, the sums are there already.
         if sample_ix == 1 && !self.has_sums {
             self.resources.begin_sums(&self.context)?;
             self.has_sums = true;
@@ -216,10 +222,13 @@ impl Renderer {
         Ok(Pending { parts, n_done: 0, sample_ix, begun_at: None })
     }
 
-    /// Displays one of the features in place of the picture, from the next sample on; only where the options ask for
-    /// features. `brightest`: the value that is brightest, for cost and rays, or half as bright, for depth. True where
-    /// that is new; a sample that is begun is begun anew then. Samples for a view that needs primary rays only have no
-    /// radiance: where that changes, the next sample is the first of a new picture.
+    /// Sets the view that is displayed from the next sample on: the picture, or a feature in its place. A feature
+    /// needs options that ask for features. `brightest`: the cost or number of rays that is displayed brightest, or
+    /// the depth that is displayed half as bright as depth 0.
+    ///
+    /// Returns whether this is a change, which drops a pending sample. Samples of a view that needs primary rays only
+    /// have no radiance. So the next sample is the first of a new picture if one of the old and the new view needs
+    /// primary rays only and the other needs all rays.
     pub fn set_view(&mut self, view: View, brightest: f32) -> bool {
         let false_color = view.constant().map(|view| FalseColor { view, brightest });
         let is_new = false_color != self.false_color;
@@ -234,16 +243,16 @@ impl Renderer {
         is_new
     }
 
-    /// The picture that is displayed, while another one may be drawn; none before there is a picture.
+    /// Returns size and camera of the displayed picture, also while another one is drawn; None before there is one.
     pub fn displayed(&self) -> Option<Displayed> {
         self.displayed
     }
 
-    /// The picture that is displayed, as large as it is there, while another one may be drawn; none before there is one. It
-    /// has no radiance, which the sample that is being drawn may have changed. Only for pictures without a crop.
+    /// Downloads the displayed picture in its own size, also while another one is drawn; None before there is one.
+    /// Its radiance is empty, since a pending sample may have overwritten it. Only for pictures without a crop.
     ///
     /// # Errors
-    /// A failed copy.
+    /// A copy fails.
     pub fn displayed_picture(&self) -> Result<Option<Picture>, GpuError> {
         let Some(Displayed { size: (width, height), .. }) = self.displayed else { return Ok(None) };
         let display = self.resources.pixels.pixel_display.download_first(width as usize * height as usize)?;
@@ -251,7 +260,7 @@ impl Renderer {
         Ok(Some(Picture { width, height, radiance: Vec::new(), display }))
     }
 
-    /// The picture is complete.
+    /// Notes that `pixel_display` holds a complete picture.
     pub(super) fn note_displayed(&mut self) {
         let Frame { width, height, .. } = *self.resources.constants();
         self.displayed = Some(Displayed { size: (width, height), camera: self.camera });

@@ -1,4 +1,17 @@
-//! The frame on a device: what [`Plan`] says, recorded, in one command buffer a bounce.
+//! Draws frames on a device: records the passes and barriers of a [`Plan`] and submits them.
+//!
+//! A frame draws one sample of each pixel, as the paper's Algorithm 1 does:
+//!
+//! ```text
+//! begin frame    constants, cleared counters; the triangle of each pixel, where primary rays are rasterized
+//! each batch     a part of the picture's pixels, whose rays fit in the ray queue
+//!   bounce 0 ..  closest hits of the bounce's rays, then the next bounce's rays
+//!   light        shadows and shading at the hits of all bounces, then the sum of each pixel
+//! end frame      mean of all samples, noise filter, encoding for display
+//! ```
+//!
+//! Each line but `each batch` is one command buffer. A bounce or `light` is two where rays can stall: where a driver
+//! limits the loop turns of a kernel, a ray that has spent its turns goes on in a further dispatch.
 
 mod bands;
 mod given;
@@ -26,7 +39,7 @@ use crate::{
     world::World,
 };
 
-/// A scene on a device, ready to be drawn again and again: sample by sample, from other places, with other options.
+/// A scene on a device, which can be drawn any number of times: sample by sample, from any camera, with any options.
 pub struct Renderer {
     context: Arc<Context>,
     world: World,
@@ -36,35 +49,36 @@ pub struct Renderer {
     resources: Resources,
     passes: Passes,
     schedule: Schedule,
-    /// Samples a pixel that the picture holds.
+    /// Number of samples a pixel in the picture.
     n_samples: u32,
-    /// What is displayed in place of the picture, where there are features.
+    /// The feature that is displayed in place of the picture. Used only if the options ask for features.
     false_color: Option<FalseColor>,
-    /// Whether the view asks for the hits of primary rays only, where there are features.
+    /// Whether the view needs only the hits of primary rays. Used only if the options ask for features.
     needs_primary_rays_only: bool,
-    /// Whether what samples are added to holds the first one.
+    /// Whether `pixel_accumulated`, to which samples are added, contains the first sample.
     has_sums: bool,
-    /// A sample that is drawn in part.
+    /// The sample of which only some command buffers have run, if there is one.
     pending: Option<Pending>,
-    /// Pixels of a batch at the most, where the caller has said so.
+    /// The most pixels of a batch, if the caller has set a limit.
     most_pixels: Option<u32>,
-    /// What pixel_display holds.
+    /// The picture in `pixel_display`; None before there is one.
     displayed: Option<Displayed>,
 }
 
 impl Renderer {
-    /// Uploads the scene and makes the passes.
+    /// Uploads the scene and creates the pipelines.
     ///
     /// # Errors
-    /// The scene or the picture is beyond the device's limits or memory.
+    /// The scene or the picture exceeds the device's limits or memory, or the driver refuses a shader.
     pub fn new(context: Arc<Context>, world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
         Self::with_capacity(context, world, options, None)
     }
 
-    /// As [`Renderer::new`], with room for so many rays in the queue. A frame that makes more is split into batches.
+    /// Does what [`Renderer::new`] does, with a ray queue of `capacity` rays. A frame that makes more rays is split
+    /// into batches.
     ///
     /// # Errors
-    /// As [`Renderer::new`].
+    /// Fails as [`Renderer::new`] does.
     pub fn with_queue_capacity(
         context: Arc<Context>,
         world: &World,
@@ -114,30 +128,31 @@ impl Renderer {
         })
     }
 
-    /// Draws the frame and fetches its picture.
+    /// Draws a new picture with one sample a pixel and downloads it.
     ///
     /// # Errors
-    /// A failed call; one pixel alone makes more rays than a queue holds.
+    /// A call fails, or one pixel alone makes more rays than the queue holds.
     pub fn render(&mut self) -> Result<(Picture, Profile), GpuError> {
         let profile = self.draw()?;
         Ok((self.picture()?, profile))
     }
 
-    /// Draws the frame by one sample a pixel, at its centre. The picture stays on the device.
+    /// Draws a new picture with one sample a pixel, at the pixel's centre. The picture stays on the device.
     ///
     /// # Errors
-    /// As [`Renderer::render`].
+    /// Fails as [`Renderer::render`] does.
     pub fn draw(&mut self) -> Result<Profile, GpuError> {
         self.reset_samples();
         self.draw_sample()
     }
 
-    /// Draws the frame by one sample more a pixel, the first at its centre; the picture, which stays on the device, is the
-    /// mean of all. Where a queue was too small, the batches that it broke off are halved and the sample is drawn anew;
-    /// later ones keep the smaller batches.
+    /// Draws one more sample a pixel; the first is at the pixel's centre. The picture, which stays on the device, is
+    /// the mean of all samples. If the ray queue overflows in a batch, the batch is halved and the sample is drawn
+    /// again. Later samples keep the smaller batches.
     ///
     /// # Errors
-    /// As [`Renderer::render`]. The next sample is the first again then.
+    /// Fails as [`Renderer::render`] does. The next sample is then the first of a new picture, unless the sample
+    /// could not even begin.
     pub fn draw_sample(&mut self) -> Result<Profile, GpuError> {
         loop {
             if let Some(profile) = self.go_on(Until::End)? {
@@ -146,10 +161,10 @@ impl Renderer {
         }
     }
 
-    /// Filters and encodes the samples that are there anew, with options that have changed since; no sample is begun.
+    /// Filters and encodes the samples of the picture again, with the options as they are. Draws no sample.
     ///
     /// # Errors
-    /// A failed call.
+    /// A call fails.
     pub fn show(&mut self) -> Result<(), GpuError> {
         self.context.run("show", |commands| {
             self.resources.bind(commands);
@@ -160,10 +175,11 @@ impl Renderer {
         Ok(())
     }
 
-    /// The picture as it was last drawn or shown, of a sample that is complete.
+    /// Downloads the picture as it was last drawn or shown. The last sample must be complete: one that is drawn in
+    /// part has overwritten some of the radiance.
     ///
     /// # Errors
-    /// A failed copy.
+    /// A copy fails.
     pub fn picture(&self) -> Result<Picture, GpuError> {
         let _fetching = info_span!("fetch picture").entered();
         let (pixels, n_pixels) = (&self.resources.pixels, self.resources.n_pixels());
@@ -177,35 +193,36 @@ impl Renderer {
         })
     }
 
-    /// What the rays of each of the picture's pixels met and cost, of the sample drawn last.
+    /// Downloads what the rays of each of the picture's pixels hit and cost in the last sample.
     ///
     /// # Panics
     /// The options do not ask for features.
     ///
     /// # Errors
-    /// A failed copy.
+    /// A copy fails.
     pub fn features(&self) -> Result<Vec<Feature>, GpuError> {
         assert!(self.options.features, "the options ask for features");
         let features = self.resources.pixels.pixel_features.download_first(self.resources.n_pixels())?;
         Ok(self.options.window().part(&features, &self.options.crop_or_whole()))
     }
 
-    /// The frame's buffers, as the last frame left them.
+    /// Returns the frame's buffers, with the contents that the last frame left.
     pub fn resources(&self) -> &Resources {
         &self.resources
     }
 
-    /// Records the plan: one command buffer before all batches, one a bounce, one for the light on all of a batch's rays, one
-    /// after all batches.
+    /// Records the plan, in the command buffers that this file's first lines list.
     fn record(&self) -> Result<Vec<Part>, GpuError> {
         let plan = Plan::new(&self.frame_kind());
         let begin = self.command_buffer("begin frame", |commands| self.begin_frame(commands, &plan.visibility))?;
         let mut frame = vec![Part::plain(begin)];
         for &batch in &self.schedule.batches {
+            // The closest hits of each bounce decide the rays of the next one.
             for (depth, bounce) in (0..).zip(&plan.bounces) {
                 let batch = Batch { bounce_ix: batch.bounce_ix + depth, depth, ..batch };
                 frame.extend(self.parts(&format!("bounce {depth}"), bounce, &batch)?);
             }
+            // Light is computed for the hits of all bounces together.
             if !plan.light.is_empty() {
                 frame.extend(self.parts("light", &plan.light, &batch)?);
             }
@@ -219,7 +236,7 @@ impl Renderer {
         Ok(frame)
     }
 
-    /// Which passes the next sample has.
+    /// Returns which passes the next sample has.
     fn frame_kind(&self) -> FrameKind {
         let only_primary_rays = self.draws_primary_rays_only();
         let constants = self.resources.constants();
@@ -232,8 +249,8 @@ impl Renderer {
         }
     }
 
-    /// Records a section of a batch in one command buffer. Where rays of the section can stall they are two: the device goes
-    /// on with the second when the host has seen that all rays of the first have ended.
+    /// Records a section of a batch in one command buffer, or in two if rays of the section can stall: the host
+    /// submits the second when all rays of the first have ended.
     fn parts(&self, name: &str, section: &[Step], batch: &Batch) -> Result<Vec<Part>, GpuError> {
         let traced = self.traced(section, batch).filter(|_| self.resources.accel.stalls.can_occur());
         let Some(traced) = traced else {
@@ -243,7 +260,7 @@ impl Renderer {
             };
             return Ok(vec![Part::plain(self.command_buffer(name, all)?)]);
         };
-        // The pass and the barrier behind it.
+        // `trace` is the pass that traces the rays, and the barrier after it.
         let (trace, rest) = section.split_at(2);
         let tracing = |commands: &Commands| {
             self.resources.bind(commands);
@@ -260,7 +277,7 @@ impl Renderer {
         ])
     }
 
-    /// The rays that a section's first pass takes through the acceleration structure.
+    /// Returns the rays that a section's first pass traces through the acceleration structure, if it is such a pass.
     fn traced(&self, section: &[Step], batch: &Batch) -> Option<Traced> {
         match section.first()? {
             Step::Run(Pass::Trace) => Some(Traced::Rays(*batch)),
@@ -269,7 +286,7 @@ impl Renderer {
         }
     }
 
-    /// Brings the rays of a part that has run to their ends.
+    /// Repeats the tracing pass of a part that has run until none of its rays is stalled.
     fn finish_rays(&self, traced: &Traced) -> Result<(), GpuError> {
         self.resources.accel.stalls.finish(&self.context, |commands, round| {
             self.resources.bind(commands);
@@ -287,7 +304,8 @@ impl Renderer {
         CommandBuffer::record(&self.context, name, self.schedule.timer.as_ref(), body)
     }
 
-    /// What is there before the first pass: constants, rows of bounces, cleared counts. Then primary visibility.
+    /// Records the constants, the rows of `bounces` and the cleared counters that all passes need, then primary
+    /// visibility.
     fn begin_frame(&self, commands: &Commands, visibility: &[Step]) {
         commands.reset_timer();
         self.resources.bind(commands);
@@ -306,7 +324,7 @@ impl Renderer {
     }
 
     fn update_constants(&self, commands: &Commands) {
-        commands.barrier(Access::AllReads, Access::TransferWrite); // what the frame before still reads
+        commands.barrier(Access::AllReads, Access::TransferWrite); // frame, bounces and all that the last frame reads
         commands.update_buffer(self.resources.frame.any(), self.resources.constants());
         commands.barrier(Access::TransferWrite, Access::AllReads); // frame
     }
@@ -317,7 +335,8 @@ impl Renderer {
     }
 }
 
-/// Lanes that are shared out among rays. Where what rays cost is shown, each has one, as if it went alone.
+/// Returns the number of lanes to share among rays, or 0, with which each ray gets one lane. It is 0 if the options
+/// ask for what rays cost.
 fn lanes_to_share(context: &Arc<Context>, options: &RenderOptions) -> Result<u32, GpuError> {
     if options.features { Ok(0) } else { context.n_lanes() }
 }

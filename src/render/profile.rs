@@ -1,4 +1,4 @@
-//! What a frame says of itself.
+//! The profile of a frame: times and counts of its passes.
 
 use std::time::Instant;
 
@@ -13,7 +13,11 @@ use crate::{
 };
 
 impl Renderer {
-    /// Times and counts of a frame that was begun then; nothing without a profile.
+    /// Returns times and counts of the frame that was begun at `begun_at`. They are empty if the options do not ask
+    /// for a profile.
+    ///
+    /// # Errors
+    /// A copy fails.
     pub(super) fn profile(&self, bounces: &[Bounce], begun_at: Instant) -> Result<Profile, GpuError> {
         let Some(timer) = &self.schedule.timer else { return Ok(Profile::default()) };
         let rows = timer.rows()?;

@@ -1,4 +1,5 @@
-//! What may change between frames: the scene and its tree stay on the device.
+//! Changes between frames: of the camera, the size, the crop and the options. The scene and its tree stay on the
+//! device.
 
 use super::{Renderer, lanes_to_share, schedule::Schedule};
 use crate::{
@@ -10,7 +11,7 @@ use crate::{
 };
 
 impl Renderer {
-    /// Looks from elsewhere from the next sample on, which is the first of a new picture.
+    /// Sets the camera. The next sample is the first of a new picture.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.camera = *camera;
         self.reset_samples();
@@ -20,14 +21,14 @@ impl Renderer {
         &self.camera
     }
 
-    /// The next sample is the first of a new picture.
+    /// Drops all samples, so that the next one is the first of a new picture.
     pub fn reset_samples(&mut self) {
         self.n_samples = 0;
         self.has_sums = false;
         self.pending = None;
     }
 
-    /// Samples a pixel that the picture is the mean of.
+    /// Number of samples a pixel, of which the picture is the mean.
     pub fn n_samples(&self) -> u32 {
         self.n_samples
     }
@@ -36,39 +37,41 @@ impl Renderer {
         &self.options
     }
 
-    /// Renders all of a picture of another size from the next sample on, the first. Memory is kept for the largest yet, so
-    /// changes below that are cheap.
+    /// Sets the picture's size, pixels, and removes its crop. The next sample is the first of a new picture. The
+    /// buffers of the largest picture so far are kept, so that changes below its size are cheap.
     ///
     /// # Errors
-    /// Beyond the device's limits or memory; then nothing has changed, and a sample that is begun goes on.
+    /// The picture exceeds the device's limits or memory. Then nothing has changed, and a pending sample stays
+    /// pending.
     pub fn resize(&mut self, width: u32, height: u32) -> Result<(), GpuError> {
         let options = RenderOptions { width, height, crop: None, ..self.options.clone() };
         self.remake(&options)
     }
 
-    /// Renders another part of the picture from the next sample on, the first. Memory is kept as [`Renderer::resize`]
-    /// keeps it.
+    /// Sets the part of the picture to render. The next sample is the first of a new picture. Buffers are kept as
+    /// [`Renderer::resize`] keeps them.
     ///
     /// # Errors
-    /// Beyond the device's limits or memory; then nothing has changed.
+    /// The part exceeds the device's limits or memory. Then nothing has changed.
     pub fn set_crop(&mut self, crop: Crop) -> Result<(), GpuError> {
         self.remake(&RenderOptions { crop: Some(crop), ..self.options.clone() })
     }
 
-    /// Renders with other options from the next sample on. Kernels are made anew only where they differ. Samples are kept
-    /// where only what is done with them changes: the exposure, the curve, the filter's threshold; [`Renderer::show`] shows that.
+    /// Sets the options of the next samples. Only kernels that depend on a changed option are created again. Samples
+    /// are kept if only their display changes: the exposure, the tone curve or the filter's threshold.
+    /// [`Renderer::show`] then displays them by the new options. A pending sample is dropped.
     ///
     /// # Errors
-    /// Beyond the device's limits or memory, the driver refuses a kernel; then nothing has changed, and a sample that
-    /// is begun goes on.
+    /// The options exceed the device's limits or memory, or the driver refuses a kernel. Then nothing has changed,
+    /// and a pending sample stays pending.
     pub fn set_options(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
         self.remake(options)
     }
 
-    /// Makes all kernels anew, of shaders that have changed. The next sample is the first of a new picture.
+    /// Creates all kernels again, from shaders that have changed. The next sample is the first of a new picture.
     ///
     /// # Errors
-    /// The driver refuses a shader; then all are as before.
+    /// The driver refuses a shader. Then all kernels are as before.
     #[cfg(feature = "hot-reload")]
     pub fn remake_passes(&mut self) -> Result<(), GpuError> {
         let passes = crate::passes::Passes::new(&self.context, &self.resources.bindings, &self.options)?;
@@ -77,7 +80,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Makes all that other options need, and then puts it in its place by steps that cannot fail.
+    /// Creates all that the options need, and then installs it by steps that cannot fail.
     fn remake(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
         let (context, before) = (&self.context, &self.options);
         let mut constants = *self.resources.constants();
@@ -85,7 +88,7 @@ impl Renderer {
         let room = (!same_samples(before, options)).then(|| self.with_room(constants, options)).transpose()?;
         let passes = self.passes.with_options(context, &self.resources.bindings, before, options)?;
 
-        // Its commands hold pipelines and sets that go now.
+        // The commands of a pending sample use pipelines and descriptor sets that are released here.
         self.pending = None;
         match room {
             None => self.resources.set_constants(&constants),
@@ -101,7 +104,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Buffers and batches for other sizes, another number of bounces, or other outputs.
+    /// Creates the buffers and the batches for another size, number of bounces or set of outputs.
     fn with_room(&self, constants: Frame, options: &RenderOptions) -> Result<(Resources, Schedule), GpuError> {
         let queue_capacity = self.budget.queue_capacity(self.context.limits(), &constants);
         let n_lanes = lanes_to_share(&self.context, options)?;
@@ -114,7 +117,7 @@ impl Renderer {
     }
 }
 
-/// Whether all that differs is what becomes of the samples, with the same buffers.
+/// Whether the options differ at most in what is done with the samples, and need the same buffers for it.
 fn same_samples(a: &RenderOptions, b: &RenderOptions) -> bool {
     let (denoise, tonemap) = (a.denoise, a.tonemap);
     let of_samples = |options: &RenderOptions| RenderOptions { exposure: 1.0, denoise, tonemap, ..options.clone() };

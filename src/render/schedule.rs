@@ -1,4 +1,5 @@
-//! The batches of a frame: no ray is dropped, so what the queue cannot hold is drawn in parts.
+//! Batches of a frame: parts of the picture's pixels whose rays fit in the ray queue. No ray is dropped: a batch for
+//! which the queue was too small is halved and drawn again.
 
 use std::{mem, sync::Arc};
 
@@ -8,21 +9,25 @@ use crate::{
     layout::{Batch, Bounce, Frame, PathRay, RAY_GROUP_SIZE, ROUND_BEGIN},
 };
 
-/// Rays that go well into memory together, some 100 bytes each; enough to keep any device busy.
+/// The most rays that the queue is made for, unless the caller sets its capacity. They keep any device busy, and fit
+/// well into memory: they take some 100 bytes each, 1.7 GB together.
 const MOST_RAYS: u64 = 1 << 24;
 
-/// The batches of a frame, and what depends on their number.
+/// The batches of a frame, and the objects whose size depends on their number.
 pub struct Schedule {
-    /// depth 0; bounce_ix is the batch's first row.
+    /// Each batch at depth 0; `bounce_ix` is its first row of `bounces`.
     pub batches: Vec<Batch>,
-    /// What `bounces` holds when a frame begins.
+    /// The contents of `bounces` when a frame begins: a ray for each pixel at depth 0, and none at further depths.
     pub first_bounces: Buffer<Bounce>,
-    /// None without a profile.
+    /// None if the options do not ask for a profile.
     pub timer: Option<Timer>,
 }
 
 impl Schedule {
-    /// `spans`: first pixel and number of pixels of each batch.
+    /// Creates the batches. `spans`: first pixel and number of pixels of each.
+    ///
+    /// # Errors
+    /// Out of memory.
     pub fn new(
         context: &Arc<Context>,
         constants: &Frame,
@@ -53,12 +58,12 @@ impl Schedule {
         })
     }
 
-    /// Rows of `bounces`: one a batch and bounce.
+    /// Number of rows of `bounces`: one for each bounce of each batch.
     pub fn n_rows(&self) -> usize {
         self.first_bounces.len()
     }
 
-    /// Spans for the next attempt: each batch in which a bounce overflowed is halved.
+    /// Returns the spans for the next attempt: each batch in which a bounce overflowed is halved.
     ///
     /// # Errors
     /// One pixel alone makes more rays than the queue holds.
@@ -83,32 +88,33 @@ impl Schedule {
     }
 }
 
-/// How much room there is for rays, and what they are expected to take.
+/// The number of rays that the queue has room for, and the number that a pixel is expected to make.
 #[derive(Clone, Copy)]
 pub struct QueueBudget {
-    /// Rays in the queue, where the caller has said so; it is then for as many pixels.
+    /// Rays in the queue, if the caller has set them. A batch then has as many pixels.
     pub fixed_capacity: Option<u32>,
-    /// Whether a hit can have two children.
+    /// Whether a hit can have two child rays, a reflected and a refracted one.
     pub branches: bool,
 }
 
 impl QueueBudget {
-    /// Rays that the queue should hold: all of the picture's, as far as that is no more than [`MOST_RAYS`] and the device's
-    /// limits go.
+    /// Returns the number of rays that the queue should hold: those that the whole picture is expected to make, but
+    /// no more than [`MOST_RAYS`] and than the device's limits allow.
     pub fn queue_capacity(&self, limits: &Limits, constants: &Frame) -> u32 {
         if let Some(capacity) = self.fixed_capacity {
             return capacity;
         }
         let n_pixels = u64::from(constants.width) * u64::from(constants.height);
-        // rays and light_visibility are the widest buffers of a ray.
+        // `rays` and `light_visibility` have the most bytes a ray of all buffers of the queue.
         let bytes_a_ray = mem::size_of::<PathRay>().max(4 * constants.n_lights as usize) as u64;
         let most = (limits.storage_range / bytes_a_ray).min(u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE));
         let wanted = n_pixels * u64::from(self.rays_a_pixel(constants.max_depth));
         wanted.min(MOST_RAYS).min(most).max(1) as u32
     }
 
-    /// Spans of equal size, first pixel and number of pixels, whose rays are expected to find room in the queue of
-    /// `constants.queue_capacity`; of no more pixels than `most_pixels`, if it is given.
+    /// Returns the first pixel and the number of pixels of each span. Spans are of equal size, but for the last one.
+    /// The rays of each are expected to fit in a queue of `constants.queue_capacity`, and none has more than
+    /// `most_pixels` pixels, if that is given.
     pub fn spans(&self, constants: &Frame, most_pixels: Option<u32>) -> Vec<(u32, u32)> {
         let n_pixels = constants.width * constants.height;
         let with_room = (constants.queue_capacity / self.rays_a_pixel(constants.max_depth)).max(1);
@@ -117,7 +123,7 @@ impl QueueBudget {
         (0..n_batches).map(|i| (i * size, size.min(n_pixels - i * size))).collect()
     }
 
-    /// As many as most scenes make on so many levels.
+    /// Returns the rays that a pixel is expected to make, primary and secondary: as many as most scenes make.
     fn rays_a_pixel(&self, max_depth: u32) -> u32 {
         match self {
             Self { fixed_capacity: Some(_), .. } => 1,

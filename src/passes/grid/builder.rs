@@ -1,4 +1,5 @@
-//! Builds on a device, from its triangles to arrays of their right sizes.
+//! Builds a grid on a device: runs the kernels over its triangles and copies the grid to arrays of the sizes that it
+//! has.
 
 use std::sync::Arc;
 
@@ -10,7 +11,7 @@ use crate::{
     layout::{GRID_IS_COUNTED, GridBuild, GridCell, LeafTriangle, Plane, Triangle},
 };
 
-/// Kernels and memory to build the grid of some triangles, as often as is wanted.
+/// Kernels and memory to build the grid of some triangles, any number of times.
 pub struct GridBuilder {
     context: Arc<Context>,
     options: GridOptions,
@@ -18,31 +19,31 @@ pub struct GridBuilder {
     buffers: GridBuffers,
 }
 
-/// A grid in a device's memory: [`Grid`](crate::accel::grid::Grid), bit for bit.
+/// A grid in a device's memory, the same as the host's [`Grid`](crate::accel::grid::Grid), bit for bit.
 pub struct DeviceGrid {
     /// The lattice of the upper level.
     pub lattice: Lattice,
-    /// 1 or 2.
+    /// The number of levels, 1 or 2.
     pub n_levels: u32,
-    /// How many times the edges of all cells were doubled to keep to the limit of references.
+    /// The number of times that the edges of all cells of a level were doubled to keep to the limit of references.
     pub n_coarser: u32,
     /// The cells of the upper level, then those of the lower one.
     pub cells: Buffer<GridCell>,
-    /// The triangles, cell after cell.
+    /// The triangles of each cell, one cell after the other.
     pub leaf_triangles: Buffer<LeafTriangle>,
     /// The plane of each of `leaf_triangles`.
     pub leaf_planes: Buffer<Plane>,
     /// The number of cells with triangles, of the upper level and of the lower one.
     pub n_filled: [u32; 2],
-    /// The build's profile, if it was given a timer.
+    /// Times of the build's dispatches; empty without a timer.
     pub stages: Vec<TimerRow>,
 }
 
 impl GridBuilder {
-    /// Makes kernels and memory for builds over the triangles.
+    /// Creates the kernels and the memory for builds over the triangles.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory; the driver refuses a shader.
+    /// The build exceeds the device's limits; out of memory; the driver refuses a shader.
     pub fn new(context: &Arc<Context>, triangles: &Buffer<Triangle>, options: &GridOptions) -> Result<Self, GpuError> {
         if !Self::has_room(context, triangles.len()) {
             let (object, limit) = (triangles.any().name().to_owned(), context.limits().storage_range);
@@ -58,33 +59,33 @@ impl GridBuilder {
         })
     }
 
-    /// Whether the device binds so many triangles.
+    /// Whether the device can bind an array of `n_triangles` triangles.
     pub fn has_room(context: &Context, n_triangles: usize) -> bool {
         (n_triangles as u64).saturating_mul(size_of::<Triangle>() as u64) <= context.limits().storage_range
     }
 
-    /// The options, with a limit of references that the device can bind. The host's build with these makes the same
-    /// grid.
+    /// Returns the options, with the limit of references lowered to what the device can bind. The host's build with
+    /// these makes the same grid.
     pub fn options_for(context: &Context, options: &GridOptions) -> GridOptions {
         let most = context.limits().storage_range / size_of::<LeafTriangle>() as u64;
         let max_references = options.max_references.min(u32::try_from(most).unwrap_or(u32::MAX));
         GridOptions { max_references, ..options.clone() }
     }
 
-    /// The options of the builds.
+    /// Returns the options of the builds, as [`GridBuilder::options_for`] has made them.
     pub fn options(&self) -> &GridOptions {
         &self.options
     }
 
-    /// The number of rows that a build takes in a timer.
+    /// Returns the number of rows that a build takes in a timer.
     pub fn n_stages(&self) -> u32 {
         self.passes.n_stages(&self.buffers)
     }
 
-    /// Builds the grid. Its buffers get the `usage`. Waits for the device.
+    /// Builds the grid and waits for the device. The grid's buffers get the `usage`.
     ///
     /// # Errors
-    /// Out of memory, a failed call.
+    /// Out of memory; a call fails.
     pub fn build(&self, timer: Option<&Timer>, usage: BufferUse) -> Result<DeviceGrid, GpuError> {
         let commands = CommandBuffer::record(&self.context, "grid_build", timer, |commands| {
             commands.reset_timer();
@@ -100,7 +101,7 @@ impl GridBuilder {
         Ok(grid)
     }
 
-    /// The finished build's grid, without its arrays' elements.
+    /// Creates the grid of a finished build, with arrays whose contents are undefined.
     fn with_room(&self, build: &GridBuild, usage: BufferUse) -> Result<DeviceGrid, GpuError> {
         let lattice = Lattice {
             min: build.cell_min.to_array(),

@@ -1,4 +1,4 @@
-//! One level of a grid: the pairs of a cell and a triangle, in the order of the cells.
+//! Builds one level of a grid: the pairs of a cell and a triangle, in the order of the cells.
 
 use std::mem::offset_of;
 
@@ -68,12 +68,16 @@ const LOWER: Names = Names {
 };
 
 impl Level {
+    /// Creates the kernels of the upper level, or of the only one.
+    ///
     /// # Errors
     /// The driver refuses a shader.
     pub fn upper(kernels: &Kernels) -> Result<Self, GpuError> {
         Self::new(kernels, &UPPER, &Constants::new().set(constants::LOWER, false))
     }
 
+    /// Creates the kernels of the lower level.
+    ///
     /// # Errors
     /// The driver refuses a shader.
     pub fn lower(kernels: &Kernels) -> Result<Self, GpuError> {
@@ -99,13 +103,14 @@ impl Level {
         })
     }
 
-    /// The number of a level's dispatches, without those of a cut.
+    /// Returns the number of a level's dispatches, without those of a `Cut`.
     pub fn n_stages(sets: &PairSets) -> u32 {
         4 * GRID_MAX_ATTEMPTS + 1 + 3 * sets.n_passes + 1
     }
 
-    /// Needs build, and for the lower level what the upper one has left. Leaves the level's cells and its sorted pairs,
-    /// and the set bound by which kernels read these. `cut`: makes the lower level's lattices before each attempt.
+    /// Records the build of the level. Needs `build`, and for the lower level what the upper one leaves. Leaves the
+    /// level's `cells` and its sorted pairs, which kernels can read as `pairs_from` of the set that stays bound.
+    /// `cut`: the kernels that make the lattices of the lower level before each attempt.
     pub fn record(&self, commands: &Commands, buffers: &GridBuffers, sets: &PairSets, cut: Option<&Cut>) {
         commands.bind(sets.writing_unsorted());
         for attempt in 0..GRID_MAX_ATTEMPTS {
@@ -125,8 +130,9 @@ impl Level {
         dispatch(commands, &self.cells, sized_by(buffers, offset_of!(GridBuild, counted_pair_groups_x)));
     }
 
-    /// One attempt. Needs build, and at the lower level blocks. Leaves in first_columns, first_pairs and scan_blocks
-    /// where each item's columns and each column's pairs begin, and how the build goes on.
+    /// Records one attempt. Needs `build`, and at the lower level `blocks`. Leaves the beginnings of each item's
+    /// columns and of each column's pairs in `first_columns`, `first_pairs` and `scan_blocks`, and in `build` how it
+    /// goes on.
     fn count(&self, commands: &Commands, buffers: &GridBuffers, attempt: u32) {
         let none = GridSort::default();
         let items = sized_by(buffers, offset_of!(GridBuild, item_groups_x));
@@ -143,7 +149,7 @@ impl Level {
 }
 
 impl Sort {
-    /// Needs pairs_from. Leaves pairs_to, in the order of the pass's digit.
+    /// Records one pass. Needs `pairs_from`. Leaves the same pairs in `pairs_to`, in the order of the pass's digit.
     fn record(&self, commands: &Commands, buffers: &GridBuffers, pass_ix: u32) {
         let push = GridSort { first_bit: pass_ix * GRID_DIGIT_BITS };
         let groups = || sized_by(buffers, offset_of!(GridBuild, sort_groups_x));

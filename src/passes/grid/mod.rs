@@ -1,5 +1,5 @@
-//! Grid: builds a uniform grid or a grid of two levels over triangles, in one command buffer. `accel::grid` is the twin
-//! of these kernels: both make the same grid, bit for bit.
+//! Grid: builds a uniform grid or a grid of two levels over triangles, in one command buffer.
+//! [`accel::grid`](crate::accel::grid) is the twin of these kernels on the CPU: both make the same grid, bit for bit.
 //!
 //! ```text
 //! bounds             finds the box of the triangles
@@ -17,11 +17,14 @@
 //! leaves             writes triangles and planes in the order of the pairs
 //! ```
 //!
-//! An item is a triangle and the lattice whose cells get it. Scans find where each item's columns and each column's
-//! pairs begin, so that the order of all pairs is fixed. Each scan has three steps, as in compaction: the sums of
-//! blocks of entries, the spine over these sums, and the places within each block. The spine also decides how the
-//! attempt goes on and sizes the dispatches that follow. Once all is counted, the kernels of further attempts have no
-//! workgroups.
+//! An item is a triangle and the lattice whose cells get it: at the upper level the whole grid's, at the lower level
+//! that of the block into which an upper cell is cut. A pair is a cell and a triangle in it. A column is the cells of
+//! an item's box in a line along one axis.
+//!
+//! Scans find where each item's columns and each column's pairs begin, so that the order of all pairs is fixed. Each
+//! scan has three steps, as in compaction: the sums of blocks of entries, the spine over these sums, and the
+//! positions within each block. The spine also decides how the attempt goes on and sizes the dispatches that follow.
+//! When all is counted, the kernels of further attempts have no workgroups.
 //!
 //! Kalojanov and Slusallek, "A parallel algorithm for construction of uniform grids", 2009; Kalojanov, Billeter and
 //! Slusallek, "Two-level grids for ray tracing on GPUs", 2011.
@@ -43,7 +46,7 @@ use crate::{
     layout::{GRID_BLOCK_SIZE, GRID_GROUPS_X, GRID_MAX_ATTEMPTS, GRID_SCANS_CELLS, GridBuild, GridSort, constants},
 };
 
-/// All kernels of a build, ready to record.
+/// All kernels of a build.
 struct GridPasses {
     bounds: ComputePipeline,
     lattice: ComputePipeline,
@@ -68,6 +71,8 @@ struct Cut {
 }
 
 impl GridPasses {
+    /// Creates the pipelines for a grid of `n_levels` levels, 1 or 2.
+    ///
     /// # Errors
     /// The driver refuses a shader.
     fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, n_levels: u32) -> Result<Self, GpuError> {
@@ -83,7 +88,7 @@ impl GridPasses {
         })
     }
 
-    /// Needs triangles. Leaves build, cells, leaf_triangles and leaf_planes.
+    /// Records the build. Needs `triangles`. Leaves `build`, `cells`, `leaf_triangles` and `leaf_planes`.
     fn record(&self, commands: &Commands, buffers: &GridBuffers) {
         commands.bind(buffers.levels[0].writing_unsorted());
         self.bounds(commands, buffers);
@@ -99,18 +104,18 @@ impl GridPasses {
             then(commands);
             dispatch(commands, &lower.blocks, sized_by(buffers, offset_of!(GridBuild, counted_cell_groups_x)));
         }
-        // Beside `cells` and `blocks`: it reads what they read.
+        // No barrier: `leaves` reads what `cells` and `blocks` read, and nothing that they write.
         dispatch(commands, &self.leaves, sized_by(buffers, offset_of!(GridBuild, counted_pair_groups_x)));
     }
 
-    /// The number of dispatches of a build.
+    /// Returns the number of dispatches of a build.
     fn n_stages(&self, buffers: &GridBuffers) -> u32 {
         let of_level = |sets: &PairSets| Level::n_stages(sets);
         let own = if self.lower.is_some() { 5 + 2 * GRID_MAX_ATTEMPTS } else { 3 };
         own + buffers.levels.iter().map(of_level).sum::<u32>()
     }
 
-    /// Needs triangles. Leaves the box in build, and cells without entries.
+    /// Needs `triangles`. Leaves their bounding box in `build`, and `cells` without entries.
     fn bounds(&self, commands: &Commands, buffers: &GridBuffers) {
         let reset = || {
             commands.update_buffer(buffers.build.any(), buffers.initial());
@@ -141,7 +146,8 @@ impl Lower {
 }
 
 impl Cut {
-    /// Needs build, cells. Leaves blocks, the number of lower cells, and how the attempt goes on.
+    /// Needs `build` and `cells`. Leaves `blocks`, and in `build` the number of lower cells and how the attempt goes
+    /// on.
     fn record(&self, commands: &Commands, buffers: &GridBuffers, attempt: u32) {
         let cells = sized_by(buffers, offset_of!(GridBuild, cell_groups_x));
         commands.dispatch(&self.resolutions, Some(attempt), &GridSort::default(), cells);
@@ -151,14 +157,14 @@ impl Cut {
     }
 }
 
-/// What the kernels of a build are made for.
+/// Creates the kernels of a build, for one device and one layout of bindings.
 struct Kernels<'a> {
     context: &'a Arc<Context>,
     bindings: &'a Arc<BindingLayout>,
 }
 
 impl Kernels<'_> {
-    /// A kernel whose workgroups go through blocks of entries.
+    /// Creates a kernel whose workgroups go through blocks of entries.
     fn of_blocks(
         &self,
         name: &'static str,
@@ -170,7 +176,7 @@ impl Kernels<'_> {
         ComputePipeline::new(self.context, self.bindings, &desc)
     }
 
-    /// A kernel of one invocation.
+    /// Creates a kernel of one invocation.
     fn of_one(&self, name: &'static str, shader: Shader, constants: &Constants) -> Result<ComputePipeline, GpuError> {
         kernel(self.context, self.bindings, name, shader, constants)
     }
@@ -178,7 +184,7 @@ impl Kernels<'_> {
 
 const ONE_GROUP: Dispatch<'static> = Dispatch::Threads([1, 1, 1], [1, 1, 1]);
 
-/// The workgroups whose numbers are at an offset of build.
+/// Returns the indirect dispatch whose size is at a byte offset of `build`.
 fn sized_by(buffers: &GridBuffers, offset: usize) -> Dispatch<'_> {
     Dispatch::Indirect(buffers.build.any(), offset as u64)
 }
@@ -187,7 +193,7 @@ fn dispatch(commands: &Commands, kernel: &ComputePipeline, dispatch: Dispatch) {
     commands.dispatch(kernel, None, &GridSort::default(), dispatch);
 }
 
-/// Makes a kernel wait for the one before it: for what that has written, and for the sizes of dispatches among it.
+/// Makes the next kernel wait for the one before it, and for the sizes of dispatches that this has written.
 fn then(commands: &Commands) {
     commands.barrier(Access::KernelUpdate, Access::KernelUpdate); // the build's arrays
 }
@@ -196,13 +202,14 @@ fn then(commands: &Commands) {
 mod tests {
     use super::*;
 
-    /// The numbers of SPIR-V's instructions and of a decoration.
+    /// The opcode of a decoration in SPIR-V, and the decoration that forbids contraction.
     const OP_DECORATE: u32 = 71;
     const NO_CONTRACTION: u32 = 42;
-    /// Sums, differences and products of floats, of vectors by scalars, by matrices, and of two vectors.
+    /// Opcodes of sums, differences and products: of floats, of vectors and scalars, with matrices, and of two
+    /// vectors.
     const ARITHMETIC: [u32; 8] = [129, 131, 133, 142, 143, 144, 145, 148];
 
-    /// How many arithmetic instructions of a module a device may contract to others that round differently.
+    /// Returns how many arithmetic instructions of a module a device may contract to others that round differently.
     fn n_contractible(spirv: &[u8]) -> usize {
         let words: Vec<u32> = spirv.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect();
         let (mut results, mut exact) = (Vec::new(), Vec::new());

@@ -1,4 +1,4 @@
-//! What a device tells of a grid that it has built.
+//! Statistics and times of a grid that a device has built.
 
 use super::DeviceGrid;
 use crate::{
@@ -8,16 +8,16 @@ use crate::{
 };
 
 impl DeviceGrid {
-    /// What the kernels that search the grid know beside its arrays.
+    /// Returns the constants for kernels that trace rays through the grid.
     pub fn constants(&self) -> AccelConstants {
         self.lattice.constants()
     }
 
-    /// The grid in numbers; the same as those of the host's grid.
+    /// Returns the grid's statistics, which are the same as those of the host's grid.
     pub fn statistics(&self, n_triangles: usize) -> Statistics {
         let n_upper = self.lattice.n_cubes() as u64;
         let [n_filled_upper, n_filled_lower] = self.n_filled.map(u64::from);
-        // Cells of the upper level without triangles are not cut.
+        // Upper cells with triangles are cut, and only their lower cells count. The others are cells of their own.
         let (n_cells, n_filled) = match self.n_levels {
             1 => (n_upper, n_filled_upper),
             _ => (self.cells.len() as u64 - n_filled_upper, n_filled_lower),
@@ -36,7 +36,7 @@ impl DeviceGrid {
         }
     }
 
-    /// The grid in numbers, and the times of its build.
+    /// Returns the grid's statistics and the times of its build, by kernel.
     pub fn report(&self, n_triangles: usize) -> DeviceBuild {
         let span = |row: &TimerRow| row.span_ms;
         let begin = self.stages.first().and_then(span).map(|(begin, _)| begin);
@@ -49,7 +49,7 @@ impl DeviceGrid {
     }
 }
 
-/// The sums of the rows of each name.
+/// Returns the summed times of the rows of each name.
 fn stages_of(rows: &[TimerRow]) -> Vec<BuildStage> {
     let mut stages: Vec<BuildStage> = Vec::new();
     for row in rows {
