@@ -14,7 +14,7 @@ use kdray::{
     scene::{Camera, Scene},
 };
 
-/// Columns and rows of characters.
+/// Numbers of columns and rows of characters.
 const SIZE: (u32, u32) = (64, 28);
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The ray through the centre of a character, which is twice as high as it is wide.
+/// Returns the ray through the centre of a character, which is twice as high as it is wide.
 fn ray(camera: &Camera, x: u32, y: u32) -> Ray {
     let forward = (camera.target - camera.eye).normalize();
     let right = forward.cross(camera.up).normalize();

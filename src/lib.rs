@@ -1,5 +1,5 @@
-//! kdray traces rays on any Vulkan driver, without ray tracing hardware: a kd-tree is walked depth first in compute
-//! shaders, with a bit mask as the stack. It implements Cao Jiayin's paper on interactive ray tracing by depth-first
+//! kdray traces rays on any Vulkan driver, without ray tracing hardware: compute shaders traverse a kd-tree depth
+//! first, with a bit mask as the stack. It implements Cao Jiayin's paper on interactive ray tracing by depth-first
 //! kd-tree traversal (2010). A machine without Vulkan renders on the CPU.
 //!
 //! An [`Engine`](engine::Engine) opens a device, builds the tree of a scene, and renders pictures or casts rays:
@@ -21,7 +21,7 @@
 //! # }
 //! ```
 //!
-//! `examples/render.rs` and `examples/cast.rs` are whole programs.
+//! `examples/render.rs` and `examples/cast.rs` are complete programs.
 //!
 //! # Features
 //!
@@ -39,16 +39,16 @@
 //!
 //! ```text
 //! scene    files -> triangles, materials, lights, camera
-//! accel    triangles -> acceleration structure: what leads rays to triangles
-//!   kdtree   the flat SAH kd-tree and the ways of rays through it
+//! accel    triangles -> acceleration structure, which leads rays to triangles
+//!   kdtree   the flat SAH kd-tree and its traversals
 //! world    a scene with its acceleration structure
 //! frame    options, picture and profile; scene + size + sample -> the frame's constants
 //! render   the frame: passes, barriers, batches -> picture
-//!   passes   one kernel and one file each, on
-//!   buffers  what kernels read and write, on
-//!   gpu      the Vulkan layer
+//!   passes   one kernel and one file each
+//!   buffers  what kernels read and write
+//!   gpu      the Vulkan layer, on which the three above are built
 //! cast     rays -> hits, without a frame
-//! reference  every kernel again on the CPU, as simple as can be: the oracle of the tests
+//! reference  every kernel in simple CPU code: the oracle of the tests
 //! cpu      frames and casts without Vulkan, fast
 //! engine   a device or the CPU: chooses what is left open, renders, casts
 //! output   picture -> file

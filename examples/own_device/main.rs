@@ -1,5 +1,5 @@
-//! Renders inside a program that has a Vulkan device of its own, into one of its own images. A timeline semaphore orders
-//! the program's commands and kdray's on the device.
+//! Renders inside a program that has a Vulkan device of its own, into one of the program's images. A timeline
+//! semaphore orders the commands of the program and of kdray on the device.
 //!
 //! ```sh
 //! cargo run --release --example own_device -- scenes/cornell.toml picture.png
@@ -20,7 +20,8 @@ use kdray::{
 use program::Program;
 use target::Target;
 
-/// The values of the timeline semaphore: the image is cleared, kdray has written it, the program has read it.
+/// The values of the timeline semaphore, in order: the image is cleared, kdray has written it, the program has read
+/// it.
 const CLEARED: u64 = 1;
 const WRITTEN: u64 = 2;
 const READ: u64 = 3;
@@ -49,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Has kdray draw the scene and write the picture into the target.
+/// Draws the scene with kdray, and writes the picture into the target.
 unsafe fn render(
     program: &Program,
     target: &Target,

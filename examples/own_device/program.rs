@@ -1,4 +1,4 @@
-//! A program's own device: as little Vulkan as the examples need.
+//! A program's own device, with as little Vulkan as the examples need.
 
 use std::error::Error;
 
@@ -53,7 +53,7 @@ impl Program {
         }
     }
 
-    /// The device, as kdray takes it.
+    /// Returns the device in the form in which kdray takes it.
     pub fn given(&self) -> GivenDevice {
         GivenDevice {
             entry: self.entry.clone(),
@@ -79,7 +79,7 @@ impl Program {
         }
     }
 
-    /// Submits a command buffer between two values of the timeline.
+    /// Submits a command buffer. It waits for the timeline's value `after`, and signals `then`.
     pub unsafe fn submit(
         &self,
         buffer: &vk::CommandBuffer,
@@ -110,7 +110,7 @@ impl Program {
         unsafe { self.device.wait_semaphores(&info, u64::MAX) }
     }
 
-    /// Memory of a kind, which the caller binds.
+    /// Allocates memory with the properties `wanted`. The caller binds it.
     pub unsafe fn allocate(
         &self,
         requirements: &vk::MemoryRequirements,
@@ -140,7 +140,7 @@ impl Program {
     }
 }
 
-/// The first device that has a queue for graphics and compute, and the queue's family.
+/// Returns the first device that has a queue for graphics and compute, and the queue's family.
 unsafe fn choose_device(instance: &ash::Instance) -> Option<(vk::PhysicalDevice, u32)> {
     let both = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
     // SAFETY: the instance is alive.

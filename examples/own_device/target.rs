@@ -46,7 +46,7 @@ impl Target {
         }
     }
 
-    /// The pixels that were read back, 4 bytes each.
+    /// Returns the pixels that were read back, 4 bytes each.
     pub unsafe fn pixels(&self, program: &Program) -> Result<Vec<u8>, vk::Result> {
         let [_, memory] = self.memory;
         // SAFETY: the device has written the buffer, and the memory is coherent.
@@ -66,12 +66,12 @@ impl Target {
     }
 }
 
-/// The one layer and level of a colour image.
+/// Returns the range of a colour image that has one layer and one level.
 fn whole() -> vk::ImageSubresourceRange {
     vk::ImageSubresourceRange::default().aspect_mask(vk::ImageAspectFlags::COLOR).level_count(1).layer_count(1)
 }
 
-/// What another program might draw before kdray: a background.
+/// Clears the image to a background, in place of what another program might draw before kdray.
 unsafe fn clear(device: &ash::Device, commands: vk::CommandBuffer, image: vk::Image) {
     let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
     let barrier = [vk::ImageMemoryBarrier2::default()
@@ -88,7 +88,7 @@ unsafe fn clear(device: &ash::Device, commands: vk::CommandBuffer, image: vk::Im
     }
 }
 
-/// Copies the image, in the layout in which kdray leaves it.
+/// Copies the image to the buffer. The image is in the layout in which kdray leaves it.
 unsafe fn read_back(
     device: &ash::Device,
     commands: vk::CommandBuffer,

@@ -1,5 +1,5 @@
-//! Records a cast into a command buffer of the program's own, over buffers of its own: kdray as a part of another program's
-//! work on the device. Prints how many rays of a sphere around the scene's middle hit something.
+//! Records a cast into the program's own command buffer, over the program's own buffers: kdray is a part of another
+//! program's work on the device. Prints how many rays from the middle of the scene, in all directions, hit something.
 //!
 //! ```sh
 //! cargo run --release --example record_cast -- scenes/cornell.toml
@@ -42,7 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Rays from a point in all directions, on a spiral.
+/// Returns rays from a point in all directions, along a spiral.
 fn rays(origin: Vec3) -> Vec<Ray> {
     let ray = |i: usize| {
         let height = 1.0 - (2 * i + 1) as f32 / N_RAYS as f32;
@@ -53,7 +53,7 @@ fn rays(origin: Vec3) -> Vec<Ray> {
     (0..N_RAYS).map(ray).collect()
 }
 
-/// The values of the timeline semaphore: nothing, the hits are written.
+/// The value of the timeline semaphore when the hits are written. It begins at 0.
 const WRITTEN: u64 = 1;
 
 /// Casts the rays in a command buffer of the program.
@@ -80,15 +80,15 @@ unsafe fn cast(program: &Program, buffers: &Buffers, scene: Scene) -> Result<(),
         program.submit(&commands, None, Some(WRITTEN))?;
         program.wait_for(WRITTEN)?;
     }
-    // A few drivers end long rays; they go on now.
+    // A few drivers end rays that take long. Such rays are finished here.
     cast.finish()?;
     Ok(())
 }
 
-/// Bytes of the rays and of the hits.
+/// Sizes of the rays and of the hits in bytes.
 const SIZES: [u64; 2] = [(N_RAYS * size_of::<Ray>()) as u64, (N_RAYS * size_of::<Hit>()) as u64];
 
-/// Buffers that the host writes and reads.
+/// Two buffers that the host writes and reads: rays and hits.
 struct Buffers {
     raw: [vk::Buffer; 2],
     memory: [vk::DeviceMemory; 2],

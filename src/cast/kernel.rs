@@ -1,4 +1,4 @@
-//! kdray's traversal as a contender.
+//! kdray's cast kernels as a [`Contender`], to be timed against others.
 
 use std::{rc::Rc, sync::Arc};
 
@@ -10,7 +10,7 @@ use crate::{
     passes::Cast,
 };
 
-/// A search through an acceleration structure.
+/// A kernel that casts rays by one traversal for one query.
 pub struct Kernel {
     name: String,
     cast: Cast,
@@ -18,7 +18,8 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// `resources`: of the bindings, with rays. The traversal must need nothing beside the tree.
+    /// Creates the kernel. `resources` are made for `bindings`, hold the rays, and must hold what the traversal reads
+    /// beside the tree.
     ///
     /// # Errors
     /// The driver refuses the shader.
@@ -32,7 +33,7 @@ impl Kernel {
         Ok(Self { name: traversal.to_string(), cast, resources: Rc::clone(resources) })
     }
 
-    /// The same under another name than the traversal's.
+    /// Returns the kernel under another name than that of the traversal.
     #[must_use]
     pub fn named(self, name: String) -> Self {
         Self { name, ..self }

@@ -10,14 +10,15 @@ use crate::{
     reference::surface::{Surface, surface_at},
 };
 
-/// One ray for each hit, in their order, into the hemisphere above it, by the cosine.
+/// Returns a ray for each hit, in the order of the hits. It goes into the hemisphere above the hit, with a density
+/// proportional to the cosine. Misses give no ray.
 pub fn diffuse_rays(triangles: &[Triangle], rays: &[PathRay], hits: &[Hit]) -> Vec<PathRay> {
     rays_from_hits(triangles, rays, hits, |ray, surface| {
         leaving(surface, ray, cosine_distributed(surface.geometric, uniform_pair(ray.pixel_ix)))
     })
 }
 
-/// One ray for each hit, in their order.
+/// Returns the ray that `next` makes from each hit, in the order of the hits. Misses give no ray.
 pub fn rays_from_hits(
     triangles: &[Triangle],
     rays: &[PathRay],
@@ -31,12 +32,12 @@ pub fn rays_from_hits(
     rays.par_iter().zip(hits).filter_map(of_hit).collect()
 }
 
-/// The ray that leaves a surface in a direction, with all of its parent's light.
+/// Returns the ray that leaves a surface in a direction, with the whole throughput of its parent.
 pub fn leaving(surface: &Surface, parent: &PathRay, direction: Vec3) -> PathRay {
     surface.ray_from(direction, NO_TRIANGLE, parent, Vec3::ONE)
 }
 
-/// A unit vector about a unit normal with a density of cosine / pi, of two numbers from 0 to 1.
+/// Maps two uniform numbers from 0 to 1 to a unit vector around a unit normal, with a density of cosine / pi.
 fn cosine_distributed(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
     let (tangent, bitangent) = normal.any_orthonormal_pair();
     let (sin_azimuth, cos_azimuth) = (TAU * v).sin_cos();
@@ -45,8 +46,8 @@ fn cosine_distributed(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
     (on_disc + (1.0 - u).max(0.0).sqrt() * normal).normalize()
 }
 
-/// Two numbers from 0 to 1, without 1, by a hash of the pixel (pcg2d; Jarzynski and Olano: Hash Functions for GPU
-/// Rendering, JCGT 2020).
+/// Returns two numbers from 0 to 1, 1 excluded, from a hash of the pixel (pcg2d; Jarzynski and Olano: Hash Functions
+/// for GPU Rendering, JCGT 2020).
 fn uniform_pair(pixel_ix: u32) -> [f32; 2] {
     let step = |x: u32| x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
     let (mut x, mut y) = (step(pixel_ix), step(0));
@@ -73,11 +74,12 @@ mod tests {
             assert!((0.0..1.0).contains(&u) && (0.0..1.0).contains(&v));
             cells[(u * 8.0) as usize * 8 + (v * 8.0) as usize] += 1;
         }
-        // 1024 a cell, standard deviation 32.
+        // Each cell has 1024 on average, with a standard deviation of 32.
         assert!(cells.iter().all(|n| n.abs_diff(N / 64) < 160), "{cells:?}");
     }
 
-    /// Of a density of cosine / pi: mean cosine 2/3, mean squared cosine 1/2, no preferred azimuth.
+    /// For a density of cosine / pi, the mean cosine is 2/3, the mean squared cosine is 1/2, and no azimuth is
+    /// preferred.
     #[test]
     fn diffuse_directions_have_the_moments_of_the_cosine() {
         const N: u32 = 1 << 16;

@@ -1,4 +1,4 @@
-//! Rays of the caller's own to hits, on a device or on the CPU, without a frame.
+//! Casts the caller's rays on a device or on the CPU, and returns their hits. No frame is involved.
 //!
 //! ```text
 //! RayReader ─> batches ─> Caster (the kernel, as often as it is to be timed) ─> HitWriter
@@ -39,38 +39,41 @@ use crate::{
     world::Geometry,
 };
 
-/// What became of rays.
+/// The result of a cast.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cast {
-    /// One a ray; t in units of the ray's direction. A miss: t = infinity, triangle_ix = `NO_TRIANGLE`.
+    /// One hit for each ray, with t in units of the ray's direction. A miss has an infinite t and the index
+    /// `NO_TRIANGLE`.
     pub hits: Vec<Hit>,
-    /// The kernel's milliseconds, one entry a repetition, batches added up. None where the device has no timestamps.
+    /// Milliseconds of the kernel, one entry for each repetition, summed over batches. None where the device has no
+    /// timestamps.
     pub gpu_ms: Option<Vec<f64>>,
-    /// As [`count_invalid`] counts them.
+    /// Number of rays that can only miss: see [`count_invalid`].
     pub n_invalid: u64,
 }
 
-/// Rays of a batch: 64 MiB of rays and 32 MiB of hits, enough to fill a large GPU many times over.
+/// Number of rays in a batch: 64 MiB of rays and 32 MiB of hits, enough to fill a large GPU many times over.
 pub const RAYS_PER_BATCH: usize = 1 << 21;
 
-/// Triangles and their tree on a device, ready for rays.
+/// Casts rays on a device, which holds the triangles and their acceleration structure.
 pub struct Caster {
     context: Arc<Context>,
     tree: AccelBuffers,
     bindings: Arc<BindingLayout>,
     traversal: Traversal,
-    /// For [`Query::Closest`] and [`Query::Any`], once they have been asked.
+    /// The kernel for [`Query::Closest`], created at its first use.
     closest: Option<Rc<passes::Cast>>,
+    /// The kernel for [`Query::Any`], created at its first use.
     any: Option<Rc<passes::Cast>>,
     resources: CastResources,
     rays_per_batch: usize,
 }
 
 impl Caster {
-    /// Uploads the triangles and their tree.
+    /// Uploads the triangles and their acceleration structure.
     ///
     /// # Errors
-    /// Beyond the device's limits or memory; too many triangles for brute force.
+    /// The triangles are beyond the device's limits or memory, or too many for brute force.
     pub fn new(context: &Arc<Context>, geometry: Geometry, traversal: Traversal) -> Result<Self, GpuError> {
         let mut buffers = AccelBuffers::new(context, geometry)?;
         buffers.add_links(context, geometry.accel(), traversal)?;
@@ -87,13 +90,13 @@ impl Caster {
         })
     }
 
-    /// Makes rays pass through the triangles of these indices.
+    /// Makes rays pass through the triangles with these indices.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
+    /// The buffers are beyond the device's limits or memory.
     ///
     /// # Panics
-    /// There is no triangle of an index.
+    /// There is no triangle with one of the indices.
     pub fn hiding(mut self, triangles: &[u32]) -> Result<Self, GpuError> {
         self.tree.hide(&self.context, triangles)?;
         self.bindings = CastResources::bindings(&self.context, &self.tree)?;
@@ -102,16 +105,17 @@ impl Caster {
         Ok(self)
     }
 
-    /// With batches of at most so many rays, as far as the device's limits go.
+    /// Limits batches to `n_rays` rays, at least 1 and at most what the device allows.
     #[must_use]
     pub fn with_batches_of(self, n_rays: usize) -> Self {
         Self { rays_per_batch: n_rays.clamp(1, most_rays(self.context.limits())), ..self }
     }
 
-    /// Casts rays, batch by batch, each batch `n_times` (at least once), all of them with the same hits.
+    /// Casts rays, batch by batch. Each batch runs `n_times` (at least once), and every repetition finds the same
+    /// hits.
     ///
     /// # Errors
-    /// Out of memory, a failed call.
+    /// Memory runs out, or a call fails.
     pub fn cast(&mut self, rays: &[Ray], query: Query, n_times: u32) -> Result<Cast, GpuError> {
         self.prepare(query, rays.len())?;
         let mut hits = Vec::with_capacity(rays.len());
@@ -125,10 +129,10 @@ impl Caster {
         Ok(Cast { hits, gpu_ms, n_invalid: count_invalid(rays) })
     }
 
-    /// What the driver tells of the query's kernel; nothing before the first cast.
+    /// Returns the driver's statistics of the query's kernel. They are empty before the first cast.
     ///
     /// # Errors
-    /// Out of memory.
+    /// Memory runs out.
     pub fn statistics(&self, query: Query) -> Result<Vec<Statistic>, GpuError> {
         let kernel = match query {
             Query::Closest => &self.closest,
@@ -137,7 +141,7 @@ impl Caster {
         kernel.as_ref().map_or(Ok(Vec::new()), |kernel| kernel.statistics())
     }
 
-    /// Makes the query's kernel, unless it is there.
+    /// Returns the query's kernel, which is created at its first use.
     fn prepare_kernel(&mut self, query: Query) -> Result<Rc<passes::Cast>, GpuError> {
         let kernel = match query {
             Query::Closest => &mut self.closest,
@@ -150,7 +154,7 @@ impl Caster {
         Ok(Rc::clone(kernel.insert(made)))
     }
 
-    /// Makes the query's kernel and room for a batch, unless they are there.
+    /// Creates the query's kernel and buffers for a batch, unless they exist.
     fn prepare(&mut self, query: Query, n_rays: usize) -> Result<(), GpuError> {
         self.prepare_kernel(query)?;
         let len = n_rays.min(self.rays_per_batch);
@@ -160,7 +164,7 @@ impl Caster {
         Ok(())
     }
 
-    /// Runs the kernel on the uploaded batch, one submit a repetition; returns their milliseconds.
+    /// Runs the kernel on the uploaded batch, with one submit for each repetition. Returns the milliseconds of each.
     fn run(&self, query: Query, n_rays: u32, n_times: u32) -> Result<Option<Vec<f64>>, GpuError> {
         let kernel = match query {
             Query::Closest => &self.closest,
@@ -173,7 +177,7 @@ impl Caster {
                 if repetition == 0 {
                     commands.reset_timer();
                 }
-                // The repetition before has written what this one overwrites: cast_hits.
+                // This repetition overwrites what the previous one has written: cast_hits.
                 commands.barrier(Access::ComputeWrite, Access::ComputeUpdate);
                 self.tree.stalls.reset(commands);
                 kernel.record(commands, &self.resources.set, n_rays, Round::Begin);
@@ -186,52 +190,53 @@ impl Caster {
         let n_rounds = self.tree.stalls.finish(&self.context, |commands, round| {
             kernel.record(commands, &self.resources.set, n_rays, round);
         })?;
-        // Every repetition stalls alike, but only the last one's rays go on.
+        // Rays stall alike in every repetition, but only those of the last one are resumed. Their time counts for
+        // each.
         let stalled_ms = if n_rounds > 0 { began_ms.elapsed().as_secs_f64() * 1e3 } else { 0.0 };
         let rows = timer.rows()?;
         Ok(rows.iter().map(|row| row.span_ms.map(|(begin, end)| end - begin + stalled_ms)).collect())
     }
 }
 
-/// Rays that a batch can have on a device.
+/// Returns the largest number of rays in a batch on a device.
 fn most_rays(limits: &Limits) -> usize {
     let bytes_a_ray = mem::size_of::<Ray>().max(mem::size_of::<Hit>()) as u64;
     let in_groups = u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE);
     (limits.storage_range / bytes_a_ray).min(in_groups) as usize
 }
 
-/// Rays that can only miss: with a NaN, an infinite origin or direction, or a direction of zero or so short that all
-/// its components are denormal (less than 2^-126).
+/// Counts the rays that can only miss. They have a NaN, an infinite origin or direction, or a direction that is zero
+/// or so short that all its components are denormal (less than 2^-126).
 pub fn count_invalid(rays: &[Ray]) -> u64 {
     rays.par_iter().filter(|ray| !reference::cast::is_ray(ray)).count() as u64
 }
 
-/// As [`Caster`], on the current rayon pool.
+/// Casts rays on the current rayon pool, as [`Caster`] does on a device.
 pub struct CpuCaster<'a> {
     geometry: Geometry<'a>,
     traversal: Traversal,
     links: TraversalLinks,
-    /// As `TRIANGLE_HIDDEN` says, if there are hidden triangles.
+    /// For each triangle, `TRIANGLE_HIDDEN` or 0. None if no triangle is hidden.
     hidden: Option<Vec<u32>>,
 }
 
 impl<'a> CpuCaster<'a> {
-    /// Makes what the traversal reads beside the tree.
+    /// Creates a caster, and computes what the traversal reads beside the tree.
     pub fn new(geometry: Geometry<'a>, traversal: Traversal) -> Self {
         let links = TraversalLinks::of(geometry.accel(), traversal);
         Self { geometry, traversal, links, hidden: None }
     }
 
-    /// Makes rays pass through the triangles of these indices.
+    /// Makes rays pass through the triangles with these indices.
     ///
     /// # Panics
-    /// There is no triangle of an index.
+    /// There is no triangle with one of the indices.
     #[must_use]
     pub fn hiding(self, triangles: &[u32]) -> Self {
         Self { hidden: Some(hidden_words(self.geometry.triangles().len(), triangles)), ..self }
     }
 
-    /// One hit a ray.
+    /// Casts rays, and returns one hit for each.
     pub fn cast(&self, rays: &[Ray], query: Query) -> Vec<Hit> {
         let bindings = reference::inputs::KernelInputs::of_geometry(self.geometry);
         let bindings = match &self.hidden {
@@ -244,12 +249,12 @@ impl<'a> CpuCaster<'a> {
     }
 }
 
-/// The hits of a [`Caster`], found by a [`CpuCaster`].
+/// Casts rays by a [`CpuCaster`], and returns the hits that a [`Caster`] finds.
 pub fn cast_on_cpu(geometry: Geometry, traversal: Traversal, rays: &[Ray], query: Query) -> Vec<Hit> {
     CpuCaster::new(geometry, traversal).cast(rays, query)
 }
 
-/// A ray of the renderer as one that is cast.
+/// Returns a ray of the renderer as a ray to cast, from t = 0.
 pub(crate) fn cast_ray(ray: &PathRay) -> Ray {
     Ray { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
 }

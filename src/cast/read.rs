@@ -1,4 +1,4 @@
-//! Rays from a NumPy file, batch by batch.
+//! Reads rays from a NumPy file, batch by batch.
 
 use std::{
     fs::File,
@@ -11,7 +11,7 @@ use npyz::{NpyFile, NpyHeader, NpyReader, Order};
 
 use super::Ray;
 
-/// Why rays could not be read. Displays as one line.
+/// Error that says why rays could not be read. It displays as one line.
 #[derive(Debug, thiserror::Error)]
 #[error("{}: {what}", path.display())]
 pub struct RayFileError {
@@ -19,10 +19,12 @@ pub struct RayFileError {
     what: String,
 }
 
-/// Bytes of a header beyond which it describes no plain array. Its size is the file's own word, and allocated.
+/// Size in bytes of the largest header that is accepted: that of a plain array is smaller. The reader allocates as
+/// many bytes as the file claims, so the size is checked first.
 const MAX_HEADER: u32 = 1024;
 
-/// A `.npy` file of float32, K x 8 (origin, direction, t_min, t_max) or K x 6 (origin, direction; t from 0 to infinity).
+/// Reads a `.npy` file of float32, K x 8 (origin, direction, t_min, t_max) or K x 6 (origin, direction; t from 0 to
+/// infinity).
 pub struct RayReader {
     path: PathBuf,
     numbers: NpyReader<f32, BufReader<File>>,
@@ -32,10 +34,11 @@ pub struct RayReader {
 }
 
 impl RayReader {
-    /// Reads the header. A file that can tell its size must hold what that promises.
+    /// Opens a file and reads its header. If the file has a known size, it must hold the rays that the header
+    /// promises.
     ///
     /// # Errors
-    /// No `.npy` file of such an array.
+    /// The file cannot be read, or is no `.npy` file of such an array.
     pub fn open(path: &Path) -> Result<Self, RayFileError> {
         let failed = |what| RayFileError { path: path.to_owned(), what };
         let unreadable = |e: io::Error| failed(format!("cannot be read: {e}"));
@@ -59,12 +62,12 @@ impl RayReader {
         Ok(Self { path: path.to_owned(), numbers, n_columns, n_rays, n_read: 0 })
     }
 
-    /// Rays of the whole file.
+    /// Returns the number of rays in the whole file.
     pub fn n_rays(&self) -> u64 {
         self.n_rays
     }
 
-    /// The next rays, at most so many; none at the end.
+    /// Reads the next rays, at most `most`. Returns none at the end.
     ///
     /// # Errors
     /// The file ends early, or cannot be read.
@@ -97,7 +100,7 @@ impl RayReader {
     }
 }
 
-/// Refuses headers that no plain array has, before they are read: see `MAX_HEADER`.
+/// Refuses a header that is too large for a plain array, before it is read: see `MAX_HEADER`.
 fn check_header_size(file: &mut BufReader<File>) -> Result<(), String> {
     let start = file.fill_buf().map_err(|e| format!("cannot be read: {e}"))?;
     let size = match start {
@@ -111,7 +114,7 @@ fn check_header_size(file: &mut BufReader<File>) -> Result<(), String> {
     Ok(())
 }
 
-/// Rays and columns of an array of rays.
+/// Returns the numbers of rays and of columns of an array of rays.
 fn check_header(header: &NpyHeader) -> Result<(u64, usize), String> {
     let dtype = header.dtype().descr();
     if !matches!(dtype.as_str(), "'<f4'" | "'>f4'") {
@@ -125,7 +128,7 @@ fn check_header(header: &NpyHeader) -> Result<(u64, usize), String> {
     if header.order() != Order::C {
         return Err("is in Fortran order: rays are rows, as of `numpy.ascontiguousarray(rays)`".to_owned());
     }
-    // npyz counts the numbers in 64 bits.
+    // npyz counts the array's numbers in 64 bits.
     if n_rays.checked_mul(n_columns as u64).is_none() {
         return Err(format!("has {n_rays} rays: too many"));
     }

@@ -1,4 +1,4 @@
-//! A cast in a command buffer of the caller's own, over buffers of the caller's own.
+//! A cast that is recorded into the caller's own command buffer, over the caller's own buffers.
 
 use std::{rc::Rc, sync::Arc};
 
@@ -20,11 +20,12 @@ pub struct RecordedCast {
 }
 
 impl Caster {
-    /// Prepares a cast of rays that a program has on the device. `rays`: elements of [`Ray`]. `hits`: as many elements of
-    /// [`Hit`], to be written.
+    /// Prepares a cast of rays that a program has on the device. `rays` holds elements of [`Ray`]. `hits` has room
+    /// for as many elements of [`Hit`], which the cast writes.
     ///
     /// # Errors
-    /// `hits` has too little room; more rays than a dispatch or a storage buffer can have; out of memory, a failed call.
+    /// `hits` has too little room, there are more rays than a dispatch or a storage buffer can have, memory runs out,
+    /// or a call fails.
     pub fn recorded(&mut self, rays: GivenBuffer, hits: GivenBuffer, query: Query) -> Result<RecordedCast, GpuError> {
         let n_rays = rays.bytes() / size_of::<Ray>() as u64;
         let room = (hits.bytes() / size_of::<Hit>() as u64).min(most_rays(self.context.limits()) as u64);
@@ -42,9 +43,9 @@ impl Caster {
 }
 
 impl RecordedCast {
-    /// Records the cast. It needs the rays to be visible to compute shaders as storage, and leaves the hits written by a
-    /// compute shader: the caller records the barriers before and after it. The cast binds its own pipeline, descriptor set
-    /// and push constants for compute, and its descriptor set for graphics.
+    /// Records the cast. The rays must be visible to compute shaders as storage, and a compute shader writes the
+    /// hits: the caller records the barriers before and after the cast. The cast binds its own pipeline, descriptor
+    /// set and push constants for compute, and its descriptor set for graphics.
     ///
     /// Only one cast of a [`Caster`] may run at a time. The cast must live until the device has run the commands.
     pub fn record(&self, commands: &GivenCommands) {
@@ -53,12 +54,12 @@ impl RecordedCast {
         self.kernel.record(&commands, &self.set, self.n_rays, Round::Begin);
     }
 
-    /// Brings rays to their ends that a driver would not let run that long: to be called after the device has run the
-    /// commands, before the hits are read. Most drivers need nothing, and it does nothing. Returns the number of further
-    /// dispatches, for whose end it waits.
+    /// Finishes rays that the driver would not let run long enough. It must be called after the device has run the
+    /// commands, and before the hits are read. With most drivers there is nothing to do. Returns the number of
+    /// further dispatches, after waiting for their end.
     ///
     /// # Errors
-    /// A failed call.
+    /// A call fails.
     pub fn finish(&self) -> Result<u32, GpuError> {
         self.stalls.finish(&self.context, |commands, round| {
             self.kernel.record(commands, &self.set, self.n_rays, round);

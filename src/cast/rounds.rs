@@ -1,4 +1,4 @@
-//! Kernels that trace the same rays on a device, timed in turn.
+//! Timing of kernels that trace the same rays on a device. The kernels are contenders, and run in turn.
 
 use std::{rc::Rc, sync::Arc};
 
@@ -7,23 +7,24 @@ use crate::{
     gpu::{Access, CommandBuffer, Commands, Context, GpuError, Timer},
 };
 
-/// One way of tracing rays that are on the device.
+/// A kernel that traces rays on the device and is timed against others.
 pub trait Contender {
-    /// The name in reports.
+    /// Returns the name in reports.
     fn name(&self) -> String;
 
-    /// How it touches rays and hits.
+    /// Returns how the kernel accesses rays and hits.
     fn access(&self) -> Access;
 
-    /// One pass. Needs cast_rays; leaves cast_hits, one a ray.
+    /// Records one pass. It needs cast_rays, and leaves cast_hits, one for each ray.
     fn record(&self, commands: &Commands);
 
-    /// Its rays and hits; contenders may share them.
+    /// Returns the buffers of rays and hits. Contenders may share them.
     fn resources(&self) -> &Rc<CastResources>;
 }
 
-/// Milliseconds of each contender in each of `n_rounds`, after a round that is not counted: what ran before has left
-/// caches and clocks as it needs them.
+/// Returns the milliseconds of each contender in each of `n_rounds` rounds, one round after the other. An entry is
+/// None where the device has no timestamps. A first round is not counted, because caches and clocks are then in the
+/// state in which earlier work has left them.
 pub(crate) fn rounds(
     context: &Arc<Context>,
     contenders: &[Box<dyn Contender>],

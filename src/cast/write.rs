@@ -1,7 +1,7 @@
-//! Hits to a NumPy archive, named as Open3D's `cast_rays` names them.
+//! Writes hits to a NumPy archive, with the names that Open3D's `cast_rays` uses.
 //!
-//! An archive holds one array after the other, hits come all arrays at a time: so they wait in a spool, and are read
-//! again for each array. Memory stays bounded, whatever the number of rays.
+//! An archive holds one array after the other, while each hit has a part of every array. So the hits wait in a spool,
+//! which is read again for each array. Memory use is bounded, whatever the number of rays.
 
 use std::{
     fs::File,
@@ -21,14 +21,15 @@ use crate::{
     output::{self, OutputError},
 };
 
-/// Hits that are read from the spool at a time: 1 MiB.
+/// Number of hits that are read from the spool at a time: 1 MiB.
 const HITS_AT_A_TIME: usize = 1 << 16;
 
-/// A `.npz` file in the making; nothing of it is there before [`HitWriter::finish`].
+/// Writes a `.npz` file. The file does not exist before [`HitWriter::finish`].
 ///
-/// Closest: `t_hit` (float32 K, infinity on a miss), `primitive_ids` (uint32 K, 4294967295 on a miss), `primitive_uvs`
-/// (float32 K x 2, the weights of the triangle's second and third corner) and `primitive_normals` (float32 K x 3, unit
-/// length, towards whom the corners go round counter-clockwise; zero on a miss). Any: `occluded` (bool K).
+/// The arrays for [`Query::Closest`] are `t_hit` (float32 K, infinity on a miss), `primitive_ids` (uint32 K,
+/// 4294967295 on a miss), `primitive_uvs` (float32 K x 2, the weights of the triangle's second and third corner) and
+/// `primitive_normals` (float32 K x 3, unit length, zero on a miss). The normal is on the side from which the corners
+/// go round counter-clockwise. The array for [`Query::Any`] is `occluded` (bool K).
 pub struct HitWriter {
     path: PathBuf,
     spool: SpooledTempFile,
@@ -36,26 +37,28 @@ pub struct HitWriter {
 }
 
 impl HitWriter {
+    /// Creates a writer with an empty spool.
+    ///
     /// # Errors
-    /// The path leads to no file that could be written.
+    /// No file can be written at this path.
     pub fn new(path: &Path) -> Result<Self, OutputError> {
         Ok(Self { path: path.to_owned(), spool: output::spool(path)?, n_hits: 0 })
     }
 
-    /// Takes the hits of the next rays.
+    /// Appends the hits of the next rays.
     ///
     /// # Errors
-    /// The disk is full.
+    /// The disk is full, or a write fails.
     pub fn push(&mut self, hits: &[Hit]) -> Result<(), OutputError> {
         self.n_hits += hits.len() as u64;
         let written = self.spool.write_all(bytemuck::cast_slice(hits));
         written.map_err(|source| OutputError::Write { path: self.path.clone(), source })
     }
 
-    /// Writes the file whole or not at all, as [`output::write`] does. `triangles`: those that were hit.
+    /// Writes the whole file or nothing, as [`output::write`] does. The hits' indices refer to `triangles`.
     ///
     /// # Errors
-    /// The disk is full.
+    /// The disk is full, or a write fails.
     pub fn finish(self, triangles: &[Triangle], query: Query) -> Result<(), OutputError> {
         let mut hits = Hits { spool: self.spool, n: self.n_hits };
         output::write_with(&self.path, |file| {
@@ -75,22 +78,22 @@ impl HitWriter {
     }
 }
 
-/// The unit normal of the triangle by its winding; zero on a miss, or on a triangle without area.
+/// Returns the unit normal of the hit triangle by its winding. It is zero on a miss and for a triangle without area.
 fn normal_at(triangles: &[Triangle], hit: &Hit) -> [f32; 3] {
     let Some(triangle) = triangles.get(hit.triangle_ix as usize) else { return [0.0; 3] };
-    // In double precision the squares of the least edges are still numbers.
+    // In double precision, the squares of the shortest edges do not underflow.
     let [v0, v1, v2] = [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3());
     (v1 - v0).cross(v2 - v0).normalize_or_zero().as_vec3().to_array()
 }
 
-/// What was spooled.
+/// The spooled hits.
 struct Hits {
     spool: SpooledTempFile,
     n: u64,
 }
 
 impl Hits {
-    /// An array of `N` columns, one-dimensional where that is one.
+    /// Writes an array of `N` columns, one-dimensional if `N` is 1.
     fn write<T: AutoSerialize + npyz::Serialize, const N: usize>(
         &mut self,
         archive: &mut ZipWriter<FailsOnce>,
@@ -125,8 +128,8 @@ impl Hits {
     }
 }
 
-/// A file whose first error is its last: what the archive's writer tries when it is dropped after one, and would
-/// complain about by itself, goes nowhere.
+/// A file that reports one error only. If the archive's writer is dropped after an error, it writes again and would
+/// itself print the error of that. Such writes are discarded.
 struct FailsOnce<'a> {
     file: &'a mut File,
     failed: bool,

@@ -1,15 +1,15 @@
-//! The CPU engine: frames and casts without Vulkan, as fast as the CPU goes. What is no traversal comes from the
-//! [reference](crate::reference).
+//! The fast CPU engine: renders frames and casts rays without Vulkan. Only its traversal is its own; all other
+//! kernels are those of the [reference](crate::reference).
 //!
 //! ```text
-//! render   the frame, batch by batch, as the plan says
+//! render   the frame, batch by batch, in the order of its plan
 //!   queue    the rays of a batch
 //!   timing   wall-clock times of passes
-//! trace    the reference's passes that trace rays, by
-//!   tracer   rays one after the other, or as packets:
-//!     octant_bins        rays of one octant, until they are a packet
+//! trace    the reference's passes that trace rays, run with
+//!   tracer   traces rays one after the other, or as packets:
+//!     octant_bins        collect rays of one octant until they fill a packet
 //!     soa                rays and hits as structures of arrays
-//!     packet, packet_triangle, packet_traverser   sixteen rays through the tree together
+//!     packet, packet_triangle, packet_traverser   trace sixteen rays through the tree together
 //! ```
 
 pub mod lanes;
@@ -38,7 +38,7 @@ pub fn render(world: &World, options: &RenderOptions) -> (Picture, Profile) {
     render_in_batches(world, options, Batching::default())
 }
 
-/// As `render`, in batches of a given size.
+/// Renders as [`render()`] does, in batches of a given size. The picture does not depend on the size.
 pub fn render_in_batches(world: &World, options: &RenderOptions, batching: Batching) -> (Picture, Profile) {
     let mut renderer = Renderer::new(world, options, batching);
     let profile = renderer.draw_sample();

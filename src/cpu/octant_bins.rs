@@ -1,12 +1,12 @@
-//! Bins that collect rays of one octant until they are a packet. Rays whose directions have the same signs come to the two
-//! children of any node in the same order.
+//! Bins that collect rays of one octant until they fill a packet. An octant holds the rays whose directions have the
+//! same signs. They visit the two children of any node in the same order.
 
 use arrayvec::ArrayVec;
 
 use super::{lanes::LANES, soa::RaysSoa};
 use crate::reference::{search_ray::SearchRay, traversal_ray::signs_of};
 
-/// Rays of one octant, at most as many as a packet has, each with the key that its hit is reported by.
+/// Rays of one octant, at most one packet, each with the key under which its hit is reported.
 pub struct Bin<Key> {
     pub rays: RaysSoa,
     pub keys: ArrayVec<Key, LANES>,
@@ -30,7 +30,7 @@ impl<Key> Default for OctantBins<Key> {
 }
 
 impl<Key> OctantBins<Key> {
-    /// Adds a ray to the bin of its octant. Returns the bin if it is full now; the caller has to empty it.
+    /// Adds a ray to the bin of its octant. Returns the bin if it is now full; the caller has to empty it.
     #[inline(always)]
     pub fn push(&mut self, key: Key, probe: &SearchRay) -> Option<&mut Bin<Key>> {
         let octant = &mut self.octants[signs_of(probe.direction) as usize & 7];
@@ -39,7 +39,7 @@ impl<Key> OctantBins<Key> {
         octant.keys.is_full().then_some(octant)
     }
 
-    /// The bins that hold rays.
+    /// Returns the bins that hold rays.
     pub fn rest(&mut self) -> impl Iterator<Item = &mut Bin<Key>> {
         self.octants.iter_mut().filter(|octant| !octant.keys.is_empty())
     }

@@ -1,7 +1,8 @@
-//! Sixteen rays as columns: where they are in a cell, and a leaf's triangles against those that are in it.
+//! A packet: sixteen rays as a structure of arrays, their t intervals in a cell, and the test of a leaf's triangles
+//! against the rays that are in it. A *column* is one component of all sixteen rays.
 //!
-//! Whatever computes with columns is inlined into the function that `dispatch!` compiles for a set of instructions, and
-//! does so in no closure: elsewhere, each operation would be a call.
+//! `dispatch!` compiles a function for an instruction set. Code that computes with columns has to be inlined into
+//! that function, and must not be in a closure: otherwise each operation would be a call.
 
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 use glam::{Vec3, Vec3A, Vec4};
@@ -22,48 +23,50 @@ use crate::{
     },
 };
 
-/// Triangles of a leaf whose planes are tried before the first of them is tested.
+/// Number of a leaf's triangles whose planes are tested before the first of these triangles is.
 const BLOCK: usize = 8;
 
-/// Where the rays are in a cell. A ray that is not in it enters after it leaves.
+/// The rays' t intervals in a cell. A ray that is not in the cell has `enter` above `exit`.
 #[derive(Clone, Copy)]
 pub struct Interval<S: Simd> {
     pub enter: f32x16<S>,
     pub exit: f32x16<S>,
 }
 
-/// The middles of the rays' ways through a cell, and half their lengths, in t.
+/// The rays' t intervals in a cell, as middles and half lengths.
 struct Segments<S: Simd> {
     middle: f32x16<S>,
     half: f32x16<S>,
 }
 
-/// The rays as columns, and what each has found.
+/// Sixteen rays of one octant as columns, and the best hit of each so far.
 pub struct Packet<S: Simd> {
     origin: [f32x16<S>; 3],
     direction: [f32x16<S>; 3],
+    /// Inverse of `direction`, whose components are first brought away from 0: see `inverse`.
     pub inv_direction: [f32x16<S>; 3],
-    /// By axis, whether the rays come to the upper child first.
+    /// For each axis, 1 if the rays come to the upper child first, else 0.
     pub first_is_above: [u32; 3],
-    /// Where the rays meet the plane at 0 on each axis, in t.
+    /// For each axis, the t at which the rays meet the plane at coordinate 0.
     pub bias: [f32x16<S>; 3],
+    /// A ray counts as near a triangle's plane up to this distance (world units).
     plane_epsilon: f32,
     shears: Shears<S>,
     t_min: f32x16<S>,
     source_triangle: u32x16<S>,
     best: Found<S>,
-    /// The rays' `best` t; before everything where a ray is done.
+    /// The t of the rays' `best` hits. It is minus infinity for a ray that is done, so no cell is left for it.
     pub t_best: f32x16<S>,
 }
 
 impl<S: Simd> Interval<S> {
-    /// The rays that are in the cell.
+    /// Returns the rays that are in the cell.
     #[inline(always)]
     pub fn lanes(&self) -> LaneMask {
         self.enter.simd_le(self.exit).to_bitmask() as LaneMask
     }
 
-    /// Without the other rays.
+    /// Returns the intervals of `lanes`. All other rays are not in the returned cell.
     #[inline(always)]
     pub fn of(self, lanes: LaneMask) -> Self {
         let simd = self.enter.simd;
@@ -75,26 +78,26 @@ impl<S: Simd> Interval<S> {
     }
 }
 
-/// Of vectors, one a ray.
+/// Loads vectors, one for each ray, as columns.
 #[inline(always)]
 pub fn columns<S: Simd>(simd: S, [x, y, z]: &[[f32; LANES]; 3]) -> [f32x16<S>; 3] {
     [f32x16::load_array_ref(simd, x), f32x16::load_array_ref(simd, y), f32x16::load_array_ref(simd, z)]
 }
 
-/// One ray's, by axis; a fourth is 0.
+/// Returns one ray's components, followed by a 0.
 #[inline(always)]
 fn row<S: Simd>(columns: &[f32x16<S>; 3], lane: usize) -> [f32; 4] {
     [columns[0].as_array()[lane], columns[1].as_array()[lane], columns[2].as_array()[lane], 0.0]
 }
 
-/// A direction in the plane is taken as all but in it.
+/// Returns 1 / direction. A component whose magnitude is below `KD_LEAST_COMPONENT` is replaced by that.
 #[inline(always)]
 fn inverse<S: Simd>(direction: f32x16<S>) -> f32x16<S> {
     let tiny = f32x16::splat(direction.simd, KD_LEAST_COMPONENT);
     1.0 / direction.abs().simd_lt(tiny).select(tiny, direction)
 }
 
-/// a * b + c, rounded twice.
+/// Returns `a * b + c` for each axis. Product and sum are rounded separately, as without fused multiply-add.
 #[inline(always)]
 fn times_plus<S: Simd, A: std::ops::Mul<f32x16<S>, Output = f32x16<S>>>(
     [ax, ay, az]: [A; 3],
@@ -110,7 +113,8 @@ fn dot<S: Simd>(normal: Vec3, v: &[f32x16<S>; 3]) -> f32x16<S> {
 }
 
 impl<S: Simd> Packet<S> {
-    /// The first `n_rays`, and where they are in the root's cell: the operations of `TraversalRay::new`.
+    /// Makes a packet of the first `n_rays` rays, and returns it with the rays' t intervals in the root's cell. The
+    /// operations are those of `TraversalRay::new`.
     #[inline(always)]
     pub fn new(
         simd: S,
@@ -145,8 +149,8 @@ impl<S: Simd> Packet<S> {
         (packet, whole.of((1 << n_rays) - 1))
     }
 
-    /// Whether all rays start within reach. Missing ones are asked, too: they are those of an earlier packet, and near as a
-    /// rule.
+    /// Tells whether all rays start within `origin_reach`. It also tests unused lanes, which still hold rays of an
+    /// earlier packet. A far ray among these only costs the slow path.
     #[inline(always)]
     pub fn is_within_reach(&self, inputs: &KernelInputs<impl ReadCounter>) -> bool {
         let reach = origin_reach(inputs);
@@ -154,14 +158,14 @@ impl<S: Simd> Packet<S> {
         (x.simd_gt(reach) | y.simd_gt(reach) | z.simd_gt(reach)).all_false()
     }
 
-    /// The rays' ways through the cell, but for what lies beyond their best hits.
+    /// Returns the rays' t intervals in the cell, cut off at their best hits.
     #[inline(always)]
     fn ways(&self, cell: &Interval<S>) -> Segments<S> {
         let exit = cell.exit.min(self.t_best);
         Segments { middle: (cell.enter + exit) * 0.5, half: (exit - cell.enter) * 0.5 }
     }
 
-    /// Which of the rays do not keep to one side of a plane on their ways, farther from it than `reach`.
+    /// Returns the rays that cross a plane or come within `reach` of it in their t intervals. A NaN counts as near.
     #[inline(always)]
     fn lanes_near(&self, ways: &Segments<S>, normal: Vec3, distance: f32, reach: f32) -> LaneMask {
         let height = dot(normal, &self.origin) - distance;
@@ -170,13 +174,13 @@ impl<S: Simd> Packet<S> {
         !is_clear.to_bitmask() as LaneMask
     }
 
-    /// Which of the rays come into a slab within the cell.
+    /// Returns the rays that enter a slab within the cell.
     #[inline(always)]
     pub fn lanes_in_slab(&self, slab: &Slab, cell: &Interval<S>) -> LaneMask {
         self.lanes_near(&self.ways(cell), slab.normal, slab.offset, 1.0)
     }
 
-    /// The leaf's triangles against the rays that are in it.
+    /// Tests the leaf's triangles against the rays that are in it.
     #[inline(always)]
     pub fn intersect_leaf<const ANY_HIT: bool>(
         &mut self,
@@ -190,7 +194,7 @@ impl<S: Simd> Packet<S> {
         }
         let in_cell = cell.lanes();
         let ways = self.ways(cell);
-        // Planes first, triangles after: so that the loads of several triangles are on their way at once.
+        // A block's planes are tested before its triangles, so that the loads of several triangles overlap.
         for (triangles, first) in inputs.leaf_triangles[entries.clone()].chunks(BLOCK).zip(entries.step_by(BLOCK)) {
             let mut near = [in_cell; BLOCK];
             for (lanes, entry) in near.iter_mut().zip(first..first + triangles.len()) {
@@ -206,7 +210,7 @@ impl<S: Simd> Packet<S> {
         self.note_best::<ANY_HIT>();
     }
 
-    /// A triangle against some of the rays: `candidate::intersect` for all at once.
+    /// Tests a triangle against the rays of `lanes`, as `candidate::intersect` does for one ray.
     #[inline(always)]
     fn intersect(&mut self, inputs: &KernelInputs<impl ReadCounter>, triangle_ix: u32, lanes: LaneMask) {
         let triangle = &inputs.triangles[triangle_ix as usize];
@@ -227,6 +231,7 @@ impl<S: Simd> Packet<S> {
         }
     }
 
+    /// Updates `t_best` from `best`. With `ANY_HIT`, rays with a hit are done.
     #[inline(always)]
     pub fn note_best<const ANY_HIT: bool>(&mut self) {
         let best = &self.best;
@@ -236,7 +241,7 @@ impl<S: Simd> Packet<S> {
         }
     }
 
-    /// One of the rays, for itself.
+    /// Returns one ray for traversal outside the packet. Its t interval is not set.
     #[inline(always)]
     pub fn ray(&self, lane: usize) -> TraversalRay {
         TraversalRay {
@@ -255,13 +260,13 @@ impl<S: Simd> Packet<S> {
         }
     }
 
-    /// What a ray has found.
+    /// Returns a ray's best hit.
     #[inline(always)]
     pub fn hit(&self, lane: usize) -> Hit {
         self.best.of_lane(lane)
     }
 
-    /// What the rays have found.
+    /// Returns the rays' best hits.
     #[inline(always)]
     pub fn hits(&self) -> HitsSoa {
         let best = &self.best;
@@ -273,7 +278,7 @@ impl<S: Simd> Packet<S> {
         }
     }
 
-    /// A ray has found this by itself.
+    /// Stores a hit that a ray has found outside the packet.
     #[inline(always)]
     pub fn set_hit<const ANY_HIT: bool>(&mut self, lane: usize, hit: &Hit) {
         self.best.set_lane(lane, hit);

@@ -1,6 +1,6 @@
-//! Sixteen rays through the tree together (Wald et al., "Interactive rendering with coherent ray tracing", 2001): a node is
-//! read and a plane is tried once for all that are there. A ray is tested where it would be alone, and finds the same, bit
-//! for bit.
+//! Packet traversal: sixteen rays go through the kd-tree together (Wald et al., "Interactive rendering with coherent
+//! ray tracing", 2001). A node is read and a plane is tested once for all rays in the cell. Each ray is tested where
+//! it would be tested alone, and finds the same hit, bit for bit.
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
@@ -22,15 +22,17 @@ use crate::{
     },
 };
 
-/// The working memory of a thread.
+/// Traverses packets on one thread, whose working memory it owns.
 pub struct PacketTraverser {
     level: Level,
+    /// The stack for rays that are traced outside a packet.
     single: PendingStack,
+    /// The stack of pending subtrees, of which the first `size` are in use.
     entries: [Entry; KD_MAX_DEPTH as usize],
     size: usize,
 }
 
-/// A pending subtree: node, and where the rays are in its cell.
+/// A pending subtree: the index of its root, and the rays' t intervals in its cell.
 #[derive(Clone, Copy, Default)]
 #[repr(C, align(64))]
 struct Entry {
@@ -39,20 +41,21 @@ struct Entry {
     node_ix: u32,
 }
 
-/// Whether a ray that is left alone in a cell is there faster by itself than as a packet: where a packet takes several
-/// instructions for one (benches/EXPERIMENTS.md).
+/// Tells whether a ray that is the only one in a cell is traced faster outside its packet. This is so if one
+/// operation on a packet takes several instructions (benches/EXPERIMENTS.md).
 const fn goes_on_alone<S: Simd>() -> bool {
     size_of::<S::f32s>() < size_of::<f32x16<S>>()
 }
 
 impl PacketTraverser {
-    /// With the instructions of that level.
+    /// Creates a traverser that uses the instructions of `level`, which the machine must have.
     pub fn new(level: Level) -> Self {
         Self { level, single: Pending::new(), entries: [Entry::default(); KD_MAX_DEPTH as usize], size: 0 }
     }
 
-    /// Down to the leaf where the rays of `cell` enter, or to a slab that all of them keep clear of, as if that were an empty
-    /// leaf. A ray that is not in the cell goes nowhere.
+    /// Descends to the first leaf that rays of `cell` enter, and narrows `cell` to it. Rays that keep clear of a
+    /// node's slab leave the cell. If none is left, the node counts as an empty leaf. A ray that is not in the cell
+    /// decides nothing.
     #[inline(always)]
     fn descend<S: Simd>(
         &mut self,
@@ -75,7 +78,7 @@ impl PacketTraverser {
             let axis = axis_of(node) as usize;
             let t_cross = f32::from_bits(node.split_or_first) * packet.inv_direction[axis] + packet.bias[axis];
             let first_ix = 2 * (node.axis_and_child >> KD_PAIR_SHIFT) + packet.first_is_above[axis];
-            // Those in neither have met a NaN, or are not in the cell.
+            // A ray that is in neither child has met a NaN, or is not in the cell.
             let first = Interval { enter: cell.enter, exit: t_cross.min(cell.exit) };
             let second = Interval { enter: t_cross.max(cell.enter), exit: cell.exit };
             (*node_ix, *cell) = match (first.lanes() != 0, second.lanes() != 0) {
@@ -92,7 +95,7 @@ impl PacketTraverser {
         }
     }
 
-    /// The next pending cell in which a ray may hit something nearer than it has, or none.
+    /// Returns the next pending cell in which a ray may have a hit nearer than its best one, or none.
     #[inline(always)]
     fn pop<S: Simd>(&mut self, t_best: f32x16<S>) -> Option<(u32, Interval<S>)> {
         while self.size > 0 {
@@ -108,7 +111,7 @@ impl PacketTraverser {
         None
     }
 
-    /// All leaves that the rays meet in `whole`.
+    /// Traverses all leaves that the rays meet in the root's cell, `whole`, unless they are beyond the best hits.
     #[inline(always)]
     fn search<S: Simd, const ANY_HIT: bool>(
         &mut self,
@@ -138,7 +141,7 @@ impl PacketTraverser {
         }
     }
 
-    /// What starts far away is rare, and goes alone.
+    /// Traces the first `n_rays` rays. If a ray starts far from the scene, which is rare, each is traced alone.
     #[inline(always)]
     fn traverse_at<S: Simd, const ANY_HIT: bool>(
         &mut self,
@@ -157,6 +160,7 @@ impl PacketTraverser {
         packet.hits()
     }
 
+    /// Traces each ray alone, from an origin near the scene.
     #[cold]
     fn traverse_one_by_one<const ANY_HIT: bool>(
         &mut self,
@@ -174,7 +178,8 @@ impl PacketTraverser {
         hits
     }
 
-    /// The hits of the first `n_rays`, which are of one octant; void beyond them.
+    /// Returns the hits of the first `n_rays` rays, which must be of one octant. Further lanes of the result are
+    /// void.
     pub fn traverse<const ANY_HIT: bool>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
@@ -184,7 +189,7 @@ impl PacketTraverser {
         dispatch!(self.level, simd => self.traverse_at::<_, ANY_HIT>(simd, inputs, probes, n_rays))
     }
 
-    /// A ray for itself.
+    /// Traces one ray.
     pub fn traverse_alone<const ANY_HIT: bool>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,

@@ -1,5 +1,5 @@
-//! A triangle against sixteen rays: the operations of `triangle.rs` on columns, so that each ray finds the same, bit for
-//! bit.
+//! The test of one triangle against sixteen rays. It does the operations of `reference/triangle.rs` on columns, so
+//! that each ray finds the same hit, bit for bit.
 
 use fearless_simd::{Simd, f32x16, mask32x16, prelude::*, u32x16};
 
@@ -9,18 +9,18 @@ use crate::{
     reference::triangle::{LEAST_EXACT_SUM, Shear, axis_last},
 };
 
-/// The shears of sixteen rays.
+/// The shears of sixteen rays as columns: see [`Shear`].
 pub struct Shears<S: Simd> {
-    /// As `Shear` has it: each ray's longest axis last.
+    /// The axes are permuted as in [`Shear`]: each ray's longest axis is last.
     origin: [f32x16<S>; 3],
     x: f32x16<S>,
     y: f32x16<S>,
     z: f32x16<S>,
-    /// The rays whose longest axis it is.
+    /// For each axis, the rays whose directions are longest along it.
     pub lanes_of_axis: [LaneMask; 3],
 }
 
-/// Sixteen hits.
+/// Sixteen hits as columns.
 #[derive(Clone, Copy)]
 pub struct Found<S: Simd> {
     pub t: f32x16<S>,
@@ -30,14 +30,14 @@ pub struct Found<S: Simd> {
 }
 
 impl<S: Simd> Found<S> {
-    /// Misses.
+    /// Returns misses, with t = `t_max`.
     #[inline(always)]
     pub fn nothing(t_max: f32x16<S>) -> Self {
         let zero = f32x16::splat(t_max.simd, 0.0);
         Self { t: t_max, triangle_ix: u32x16::splat(t_max.simd, NO_TRIANGLE), u: zero, v: zero }
     }
 
-    /// These where `mask` is set, others elsewhere.
+    /// Returns these hits where `mask` is set, and those of `other` elsewhere.
     #[inline(always)]
     pub fn or(self, other: Self, mask: mask32x16<S>) -> Self {
         Self {
@@ -73,7 +73,7 @@ impl<S: Simd> Found<S> {
 }
 
 impl<S: Simd> Shears<S> {
-    /// As `Shear::of`.
+    /// Computes the shears, as [`Shear::of`] does for one ray.
     #[inline(always)]
     pub fn of(origin: &[f32x16<S>; 3], direction: &[f32x16<S>; 3]) -> Self {
         let [x, y, z] = [direction[0].abs(), direction[1].abs(), direction[2].abs()];
@@ -99,15 +99,15 @@ impl<S: Simd> Shears<S> {
         Shear { origin, x, y, z, axis }
     }
 
-    /// A corner, the rays' longest axis last, as each ray sees it.
+    /// Returns a corner in the sheared space of each ray. `[x, y, z]` has the rays' longest axis last.
     #[inline(always)]
     fn corner(&self, [x, y, z]: [f32; 3]) -> [f32x16<S>; 3] {
         let z = z - self.origin[2];
         [(x - self.origin[0]) - self.x * z, (y - self.origin[1]) - self.y * z, z]
     }
 
-    /// Finds what `Shear::intersect_triangle` finds for each of `lanes`, whose longest axis is `axis`. Returns columns
-    /// and which of their lanes are hits, or nothing if no ray comes near.
+    /// Finds what [`Shear::intersect_triangle`] finds for each ray of `lanes`, whose longest axis is `axis`. Returns
+    /// the hits and the lanes in which they are valid, or nothing if no ray comes near the triangle.
     #[inline(always)]
     pub fn intersect_triangle(
         &self,
@@ -135,19 +135,20 @@ impl<S: Simd> Shears<S> {
     }
 }
 
-/// What rounding took from the products of the edge function `a.x * b.y - a.y * b.x`.
+/// Returns the rounding error of the products in the edge function `a.x * b.y - a.y * b.x`: its exact value less that
+/// of the rounded products.
 #[inline(always)]
 fn edge_error<S: Simd>(a: [f32x16<S>; 2], b: [f32x16<S>; 2]) -> f32x16<S> {
     product_error(a[0], b[1]) - product_error(a[1], b[0])
 }
 
-/// What rounding took from a product.
+/// Returns the exact product less the rounded one.
 #[inline(always)]
 fn product_error<S: Simd>(a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
     a.mul_sub_precise(b, a * b)
 }
 
-/// Returns the edge functions, each right to 2^-23 of itself, as those of `triangle.rs` are.
+/// Returns the edge functions, each with a relative error of at most 2^-23, as `triangle.rs` does.
 #[inline(always)]
 fn exact_edges<S: Simd>(edges: [f32x16<S>; 3], errors: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
     let exact = [edges[0] + errors[0], edges[1] + errors[1], edges[2] + errors[2]];
@@ -163,8 +164,8 @@ fn exact_edges<S: Simd>(edges: [f32x16<S>; 3], errors: [f32x16<S>; 3]) -> [f32x1
     ]
 }
 
-/// Returns the edge functions with right signs: where the two products round to one value, their errors are the edge
-/// function.
+/// Returns the edge functions with exact signs. Where the two products round to the same value, the edge function is
+/// the error of the products.
 #[inline(always)]
 fn with_exact_signs<S: Simd>(edges: [f32x16<S>; 3], errors: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
     [
@@ -179,8 +180,8 @@ fn sum_of<S: Simd>(edges: [f32x16<S>; 3]) -> f32x16<S> {
     edges[0] + edges[1] + edges[2]
 }
 
-/// Tells by edge functions with exact signs whether the rays go through the triangle or its edges. False also for a
-/// triangle without area and for NaN.
+/// Tells from edge functions with exact signs whether the rays go through the triangle or its edges. The result is
+/// false also for a triangle without area and for NaN.
 #[inline(always)]
 fn is_inside<S: Simd>(edges: [f32x16<S>; 3]) -> mask32x16<S> {
     !is_outside(edges) & sum_of(edges).abs().simd_gt(0.0)
@@ -193,7 +194,7 @@ fn is_outside<S: Simd>(edges: [f32x16<S>; 3]) -> mask32x16<S> {
     below & above
 }
 
-/// Vectors with a component last: x, y or else z.
+/// Returns vectors with their components rotated until x, y or z is last: x where `is_x`, y where `is_y`, else z.
 #[inline(always)]
 fn axes_last<S: Simd>([x, y, z]: &[f32x16<S>; 3], is_x: mask32x16<S>, is_y: mask32x16<S>) -> [f32x16<S>; 3] {
     [is_x.select(*y, is_y.select(*z, *x)), is_x.select(*z, is_y.select(*x, *y)), is_x.select(*x, is_y.select(*y, *z))]

@@ -1,20 +1,21 @@
-//! A batch's buffers, as long as its rays need; kept from batch to batch.
+//! The buffers of a batch. They are as long as its rays require, and their memory is reused by the next batch.
 
 use crate::layout::{Bounce, Hit, PathRay};
 
+/// The ray queue of a batch, and what belongs to its rays.
 #[derive(Default)]
 pub struct Queue {
-    /// Bounce after bounce.
+    /// The rays of all bounces, one bounce after the other.
     pub rays: Vec<PathRay>,
-    /// One a bounce.
+    /// One for each bounce.
     pub bounces: Vec<Bounce>,
-    /// One a ray, like what follows but for the last two.
+    /// One for each ray, like `child_kinds`, `first_children` and `ray_radiance`.
     pub hits: Vec<Hit>,
     pub child_kinds: Vec<u32>,
     pub first_children: Vec<u32>,
     pub ray_radiance: Vec<[f32; 4]>,
-    /// `[light * rays.len() + ray]`, `LIGHT_*`.
+    /// `LIGHT_*` of each light and ray, at `[light * rays.len() + ray]`.
     pub light_visibility: Vec<u32>,
-    /// One a block of `SCAN_GROUP_SIZE` rays of a bounce.
+    /// One for each block of `SCAN_GROUP_SIZE` rays of a bounce.
     pub scan_blocks: Vec<u32>,
 }

@@ -1,4 +1,4 @@
-//! The frame on the CPU: what [`Plan`] says, batch by batch.
+//! Renders a frame on the CPU: runs the passes of its [`Plan`], batch by batch.
 
 use bytemuck::Zeroable;
 
@@ -21,23 +21,23 @@ use crate::{
     world::World,
 };
 
-/// How a frame is cut into pieces. The picture does not depend on it.
+/// How a frame is cut into batches. The picture does not depend on it.
 #[derive(Clone, Copy, Debug)]
 pub struct Batching {
-    /// Pixels whose rays are traced together.
+    /// Number of pixels in a batch, whose rays are traced together.
     pub n_pixels: u32,
-    /// Rays of all bounces beyond which a batch of more than one pixel is halved.
+    /// A batch of more than one pixel is halved if it has more rays than this, in all its bounces.
     pub queue_capacity: u32,
 }
 
 impl Default for Batching {
-    /// Some 15 MB of rays and what belongs to them as a rule, and 110 MB at the most.
+    /// With these sizes the buffers of a batch take some 15 MB in most scenes, and at most 110 MB.
     fn default() -> Self {
         Self { n_pixels: 1 << 16, queue_capacity: 1 << 20 }
     }
 }
 
-/// A scene, and its picture in the making, sample by sample.
+/// A renderer of one world on the CPU, which accumulates a picture sample by sample.
 pub struct Renderer {
     world: World,
     camera: Camera,
@@ -45,31 +45,32 @@ pub struct Renderer {
     batching: Batching,
     links: TraversalLinks,
     frame: Frame,
-    /// Like `pixel_radiance`: `width * height` of the window, rows from the top.
+    /// The visibility buffer. Like all `pixel_*`, it has `width * height` pixels of the window, rows from the top.
     triangle_ids: Vec<u32>,
-    /// The sample, then the mean of all.
+    /// Radiances of the current sample; after the pass `accumulate`, the means of all samples.
     pixel_radiance: Vec<[f32; 4]>,
-    /// Sums of samples; empty before there is a second one.
+    /// Sums of the samples. Empty before there is a second one.
     pixel_accumulated: Vec<[f32; 4]>,
-    /// Empty where there is no noise filter.
+    /// Radiances after the noise filter. Empty without a filter.
     pixel_filtered: Vec<[f32; 4]>,
     pixel_display: Vec<[u8; 4]>,
-    /// Empty where the options do not ask for them.
+    /// Empty unless the options request features.
     pixel_features: Vec<Feature>,
     queue: Queue,
-    /// Rays of the batch beyond which it is halved.
+    /// Number of rays beyond which the current batch is halved.
     most_rays: u32,
-    /// One row a bounce of the batch.
+    /// Counts of the current batch, one row for each bounce.
     batch_stats: Vec<BounceStats>,
-    /// Samples a pixel that the picture holds.
+    /// Number of samples of each pixel in the picture.
     n_samples: u32,
     clock: Clock,
+    /// Counts of all batches of the sample, one row for each bounce.
     bounces: Vec<BounceStats>,
     n_batches: u32,
 }
 
 impl Renderer {
-    /// Makes room for a picture of a world.
+    /// Creates a renderer with buffers for a picture of a world.
     pub fn new(world: &World, options: &RenderOptions, batching: Batching) -> Self {
         let frame = world.frame_constants(options);
         let n_pixels = frame.width as usize * frame.height as usize;
@@ -96,14 +97,14 @@ impl Renderer {
         }
     }
 
-    /// Draws the frame by one sample more a pixel on the current rayon pool, the first at its centre; the picture is the
-    /// mean of all.
+    /// Draws one more sample of each pixel on the current rayon pool. The first sample is at the pixel's centre. The
+    /// picture is the mean of all samples.
     pub fn draw_sample(&mut self) -> Profile {
         self.draw_sample_with(|_| ())
     }
 
-    /// Draws as [`Renderer::draw_sample`] does, and tells the share of the sample's pixels that are drawn, 0 to 1, after each
-    /// batch.
+    /// Draws as [`Renderer::draw_sample`] does. After each batch it calls `progress` with the share of the sample's
+    /// pixels that are drawn, 0 to 1.
     pub fn draw_sample_with(&mut self, mut progress: impl FnMut(f32)) -> Profile {
         self.clock = Clock::start();
         self.bounces.clear();
@@ -126,7 +127,7 @@ impl Renderer {
         self.profile()
     }
 
-    /// Looks from elsewhere from the next sample on, which is the first of a new picture.
+    /// Moves the camera. The next sample is the first of a new picture.
     pub fn set_camera(&mut self, camera: &Camera) {
         self.camera = *camera;
         self.reset_samples();
@@ -136,12 +137,12 @@ impl Renderer {
         &self.options
     }
 
-    /// The next sample is the first of a new picture.
+    /// Starts a new picture, whose first sample is the next one.
     pub fn reset_samples(&mut self) {
         self.n_samples = 0;
     }
 
-    /// The mean of the samples so far, filtered.
+    /// Returns the mean of the samples so far, after the noise filter if there is one.
     pub fn picture(&self) -> Picture {
         let (window, crop) = (self.options.window(), self.options.crop_or_whole());
         Picture {
@@ -152,24 +153,25 @@ impl Renderer {
         }
     }
 
-    /// What the rays of each of the picture's pixels met and cost, of the sample drawn last.
+    /// Returns what the rays of each of the picture's pixels met and cost in the sample that was drawn last.
     ///
     /// # Panics
-    /// The options do not ask for features.
+    /// The options do not request features.
     pub fn features(&self) -> Vec<Feature> {
         assert!(self.options.features, "the options ask for features");
         self.options.window().part(&self.pixel_features, &self.options.crop_or_whole())
     }
 
-    /// Which passes the next sample has. Kernels that rasterize are the device's alone.
+    /// Returns which passes the next sample has. Only the device has kernels that rasterize, so the CPU replaces
+    /// `Primary::Compute` by `Primary::Raster`.
     fn frame_kind(&self) -> FrameKind {
         let kind = FrameKind::new(&self.options, self.frame.n_lights);
         let primary = if kind.primary == Primary::Trace { Primary::Trace } else { Primary::Raster };
         FrameKind { primary, adds_samples: self.n_samples > 0, ..kind }
     }
 
-    /// Draws a batch of pixels: all bounces and their light, or those of its halves where there are more rays than the
-    /// queue is meant to hold.
+    /// Draws a batch of pixels: all bounces, then their light. If there are more rays than the queue may hold, it
+    /// draws the two halves of the batch instead.
     fn batch(&mut self, plan: &Plan, first_pixel: u32, n_pixels: u32) {
         self.most_rays = if n_pixels == 1 { u32::MAX } else { self.batching.queue_capacity };
         self.batch_stats.clear();
@@ -194,7 +196,7 @@ impl Renderer {
         self.count();
     }
 
-    /// Runs a pass of a bounce of the batch, or one without a bounce.
+    /// Runs a pass. `depth` is its bounce, and is ignored by a pass that belongs to no bounce.
     fn run(&mut self, pass: Pass, depth: u32) {
         match pass {
             Pass::Visibility => self.visibility(),
@@ -221,7 +223,8 @@ impl Renderer {
         self.clock.time(Pass::Visibility, None, || super::visibility(&inputs, traversal, ids));
     }
 
-    /// The queue's first rays, which on the device every kernel makes for itself. Their time is the first pass's.
+    /// Writes the primary rays to the queue. Their time counts as part of the first pass, since on the device each
+    /// kernel generates them itself.
     fn primary_rays(&mut self, plan: &Plan, first_pixel: u32, n_pixels: u32) {
         let Queue { rays, bounces, .. } = &mut self.queue;
         *bounces = vec![Bounce::of(n_pixels, &self.frame)];
@@ -230,7 +233,7 @@ impl Renderer {
         self.clock.time(first_pass, Some(0), || primary_hit::primary_rays(&self.frame, first_pixel, rays));
     }
 
-    /// Fills the bounce's `hits`, and counts them.
+    /// Finds the closest hits of the bounce's rays, and counts them.
     fn closest_hits(&mut self, pass: Pass, depth: u32) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, .. } = &mut self.queue;
@@ -245,14 +248,14 @@ impl Renderer {
         self.batch_stats.push(BounceStats { n_rays: rays.len() as u64, n_hits: n_hits.into(), n_shadow_rays: 0 });
     }
 
-    /// What primary rays meet.
+    /// Records the features of the primary rays' hits.
     fn note_features(&mut self) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let (Queue { rays, hits, .. }, pixels) = (&self.queue, &mut self.pixel_features);
         self.clock.time(Pass::Features, Some(0), || features::features(&inputs, rays, hits, pixels));
     }
 
-    /// What the rays of all bounces cost.
+    /// Records what the rays of all bounces cost.
     fn note_costs(&mut self) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let (traversal, pixels) = (self.options.traversal, &mut self.pixel_features);
@@ -264,7 +267,7 @@ impl Renderer {
         costs::count_shadow(&inputs, traversal, rays, hits, pixels);
     }
 
-    /// Finds out which rays go on from the bounce's hits, and counts them.
+    /// Determines which rays continue from the bounce's hits, and counts them.
     fn compact_reduce(&mut self, depth: u32) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, child_kinds, scan_blocks, .. } = &mut self.queue;
@@ -276,7 +279,7 @@ impl Renderer {
         self.clock.time(Pass::CompactReduce, Some(depth), || compact::reduce(&inputs, parents, kinds, scan_blocks));
     }
 
-    /// Sizes the next bounce.
+    /// Computes the prefix sums of the counts, and from them the size of the next bounce.
     fn compact_spine(&mut self, depth: u32) {
         let constants = Frame { queue_capacity: self.most_rays, ..self.frame };
         let Queue { bounces, scan_blocks, .. } = &mut self.queue;
@@ -286,7 +289,7 @@ impl Renderer {
         bounces.push(next);
     }
 
-    /// Writes the next bounce's rays behind this one's, if there is room for them.
+    /// Writes the next bounce's rays behind those of this bounce, unless the queue has no room for them.
     fn compact_scatter(&mut self, depth: u32) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, child_kinds, first_children, scan_blocks, .. } = &mut self.queue;
@@ -305,7 +308,7 @@ impl Renderer {
         });
     }
 
-    /// Tests the shadow segments of all bounces, and counts them.
+    /// Traces the shadow rays of all bounces, and counts them.
     fn shadow(&mut self) {
         self.frame.queue_capacity = self.queue.rays.len() as u32;
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);

@@ -1,4 +1,4 @@
-//! Rays by columns, and their hits: as the packets' instructions load and store them.
+//! Rays of a packet and their hits as structures of arrays, the layout that SIMD instructions load and store.
 
 use glam::Vec3;
 

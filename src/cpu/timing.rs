@@ -7,11 +7,11 @@ use crate::frame::{
     counts::{count_rays, is_in_batch},
 };
 
-/// Times passes by name, bounce and batch.
+/// Measures the wall-clock times of passes by name, bounce and batch.
 pub struct Clock {
     begin: Instant,
     passes: Vec<PassTime>,
-    /// Of them, those of batches that have ended.
+    /// Number of `passes` whose rays are counted: those of batches that have ended.
     n_counted: usize,
     batch_ix: u32,
 }
@@ -21,7 +21,7 @@ impl Clock {
         Self { begin: Instant::now(), passes: Vec::new(), n_counted: 0, batch_ix: 0 }
     }
 
-    /// Two runs on end count as one.
+    /// Runs and times a pass. Two consecutive runs of the same pass, bounce and batch count as one.
     pub fn time<R>(&mut self, pass: Pass, bounce: Option<u32>, run: impl FnOnce() -> R) -> R {
         let start_ms = self.elapsed_ms();
         let result = run();
@@ -37,14 +37,14 @@ impl Clock {
         result
     }
 
-    /// A batch has ended or been given up, with these counts.
+    /// Ends a batch that is done or was given up. `bounces` holds its counts.
     pub fn end_batch(&mut self, bounces: &[BounceStats]) {
         self.passes[self.n_counted..].iter_mut().for_each(|pass| count_rays(pass, bounces));
         self.n_counted = self.passes.len();
         self.batch_ix += 1;
     }
 
-    /// In the order of execution.
+    /// Returns the passes in the order of execution.
     pub fn passes(&self) -> &[PassTime] {
         &self.passes
     }

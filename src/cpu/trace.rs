@@ -1,4 +1,4 @@
-//! The reference's passes that take rays through the tree, by the engine's tracer.
+//! The reference's passes that trace rays, run with the engine's [`FastTracer`].
 
 use std::ops::Range;
 

@@ -1,5 +1,5 @@
-//! The engine's tracer: with a stack, rays of one octant go through the tree as packets; by any other algorithm, or through a grid, one
-//! after the other.
+//! The engine's tracer. With [`Traversal::Stack`], rays of one octant go through a kd-tree as packets. With any other
+//! algorithm, or through a grid, rays are traced one after the other.
 
 use fearless_simd::Level;
 
@@ -19,7 +19,7 @@ use crate::{
     },
 };
 
-/// A thread's tracer.
+/// The tracer of one thread.
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
 pub enum FastTracer {
     /// [`Traversal::Stack`], through a kd-tree.
@@ -29,8 +29,8 @@ pub enum FastTracer {
 }
 
 impl FastTracer {
-    /// Uses the instructions of a level, which the machine must have. The hits are the same at every level, bit for
-    /// bit.
+    /// Creates a tracer that uses the instructions of `level`, which the machine must have. The hits are the same at
+    /// every level, bit for bit.
     pub fn at_level(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal, level: Level) -> Self {
         match traversal {
             Traversal::Stack if inputs.lattice.is_none() => Self::Packets(PacketTraverser::new(level)),

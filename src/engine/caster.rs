@@ -1,4 +1,4 @@
-//! Rays of the caller's own, cast by the device or by the CPU.
+//! Casts the caller's rays, on the device or on the CPU.
 
 use std::{sync::Arc, time::Instant};
 
@@ -9,7 +9,7 @@ use crate::{
     world::Geometry,
 };
 
-/// What casts rays, on the device or on the CPU.
+/// Casts rays, on the device or on the CPU.
 pub struct Caster<'a>(Processor<'a>);
 
 enum Processor<'a> {
@@ -18,7 +18,7 @@ enum Processor<'a> {
 }
 
 impl<'a> Caster<'a> {
-    /// Without a context, the CPU casts.
+    /// Creates a caster on the device, or without a context on the CPU.
     pub(super) fn new(
         context: Option<&Arc<Context>>,
         geometry: Geometry<'a>,
@@ -30,13 +30,13 @@ impl<'a> Caster<'a> {
         }))
     }
 
-    /// Makes rays pass through the triangles of these indices.
+    /// Makes rays pass through the triangles with these indices.
     ///
     /// # Errors
-    /// Beyond the device's limits, out of memory.
+    /// The buffers are beyond the device's limits or memory.
     ///
     /// # Panics
-    /// There is no triangle of an index.
+    /// There is no triangle with one of the indices.
     pub fn hiding(self, triangles: &[u32]) -> Result<Self, GpuError> {
         Ok(Self(match self.0 {
             Processor::Device(caster) => Processor::Device(Box::new(caster.hiding(triangles)?)),
@@ -44,11 +44,11 @@ impl<'a> Caster<'a> {
         }))
     }
 
-    /// Casts rays `n_times`, all of them with the same hits. The times of the result are those of the device's kernel,
-    /// or of the CPU's clock.
+    /// Casts rays `n_times`, with the same hits each time. The times of the result are those of the device's kernel,
+    /// or wall-clock times on the CPU.
     ///
     /// # Errors
-    /// Out of memory, a failed call.
+    /// Memory runs out, or a call fails.
     pub fn cast(&mut self, rays: &[Ray], query: Query, n_times: u32) -> Result<Cast, GpuError> {
         match &mut self.0 {
             Processor::Device(caster) => caster.cast(rays, query, n_times),

@@ -1,5 +1,5 @@
-//! What renders and casts: a Vulkan device, or the CPU. An engine opens it, makes every choice that the user leaves
-//! open, and draws.
+//! The engine renders and casts, on a Vulkan device or on the CPU. It opens the device, makes every choice that the
+//! user leaves open, and draws.
 //!
 //! ```text
 //! Scene ─> Engine::build ─> World ─> Engine::render ─> Picture
@@ -26,16 +26,17 @@ use crate::{
     world::{FlatScene, Geometry, Mismatch, World},
 };
 
-/// A device that renders and casts, and the choices that are made for it. A clone is a second handle to the same device.
+/// A device that renders and casts, and the choices that are made for it. A clone is a second handle to the same
+/// device.
 #[derive(Clone)]
 pub struct Engine {
-    /// None on the CPU.
+    /// The Vulkan device; none on the CPU.
     context: Option<Arc<Context>>,
     request: Request,
     cache: Cache,
 }
 
-/// A world, and which acceleration structure was chosen for it.
+/// A world, and the acceleration structure that was chosen for it.
 #[derive(Clone, Debug)]
 pub struct Built {
     /// The scene with its acceleration structure.
@@ -53,7 +54,7 @@ impl Engine {
         Context::new(options).map(Self::on_device)
     }
 
-    /// Uses a Vulkan device that is open.
+    /// Uses a Vulkan device that is already open.
     pub fn on_device(context: Arc<Context>) -> Self {
         Self { context: Some(context), ..Self::on_cpu() }
     }
@@ -63,23 +64,23 @@ impl Engine {
         Self { context: None, request: Request::default(), cache: Cache::open() }
     }
 
-    /// The same engine with some choices pinned; it makes the others itself.
+    /// Returns the same engine with some choices pinned. It makes the other choices itself.
     #[must_use]
     pub fn with_request(self, request: Request) -> Self {
         Self { request, ..self }
     }
 
-    /// The Vulkan device; none on the CPU.
+    /// Returns the Vulkan device, or none on the CPU.
     pub fn context(&self) -> Option<&Arc<Context>> {
         self.context.as_ref()
     }
 
-    /// What kind of processor the engine runs on.
+    /// Returns the kind of processor that the engine runs on.
     pub fn processor(&self) -> Processor {
         Processor::of(self.context.as_deref())
     }
 
-    /// The device's own name, or the CPU with its number of threads.
+    /// Returns the device's own name, or the CPU with its number of threads.
     pub fn device_name(&self) -> String {
         match &self.context {
             Some(context) => context.info().name.clone(),
@@ -87,8 +88,8 @@ impl Engine {
         }
     }
 
-    /// Chooses the acceleration structure for so many triangles. Of kd-trees it takes the one with which building and the
-    /// workload take the least time together.
+    /// Chooses the acceleration structure for `n_triangles` triangles. Among kd-trees it takes the one with which
+    /// building and the workload take the least time together.
     pub fn choose_accel(&self, n_triangles: usize, workload: &Workload) -> ChosenAccel {
         self.request.choose_accel(self.processor(), n_triangles, workload)
     }
@@ -99,12 +100,12 @@ impl Engine {
     /// The scene does not fit together: see [`Mismatch`].
     pub fn build(&self, scene: Scene, workload: &Workload) -> Result<Built, Mismatch> {
         let flat = FlatScene::new(&scene)?;
-        // The structure needs the memory.
+        // The build of the structure needs the memory.
         drop(scene);
         self.build_flat(flat, workload)
     }
 
-    /// Does what [`Engine::build`] does with a scene that is flattened already.
+    /// Does what [`Engine::build`] does, with a scene that is already flattened.
     ///
     /// # Errors
     /// The scene has a triangle without a material.
@@ -114,8 +115,8 @@ impl Engine {
         Ok(Built { world, accel })
     }
 
-    /// Chooses how to trace. A workload that is large enough pays for a short measurement, whose result is kept in the
-    /// user's cache folder.
+    /// Chooses the traversal and the primary visibility. If the workload is large enough to pay for it, they are
+    /// measured briefly, and the result is kept in the user's cache folder.
     ///
     /// # Errors
     /// The device is lost.
@@ -123,7 +124,7 @@ impl Engine {
         self.request.methods(self.context.as_ref(), world, workload, &self.cache)
     }
 
-    /// Makes what draws pictures of a world again and again.
+    /// Creates a renderer, which draws pictures of a world repeatedly.
     ///
     /// # Errors
     /// The scene or a row of the picture is beyond the device's limits or memory.
@@ -131,7 +132,7 @@ impl Engine {
         Renderer::new(self.context.as_ref(), world, options)
     }
 
-    /// Makes what casts rays through triangles again and again.
+    /// Creates a caster, which casts rays through triangles repeatedly.
     ///
     /// # Errors
     /// The triangles are beyond the device's limits or memory, or too many for [`Traversal::Brute`].
@@ -139,11 +140,11 @@ impl Engine {
         Caster::new(self.context.as_ref(), geometry, traversal)
     }
 
-    /// Draws one picture from the scene's own camera by one sample a pixel. The engine chooses traversal and primary
-    /// visibility in place of the options'.
+    /// Draws one picture from the scene's own camera with one sample per pixel. The engine's choices of traversal and
+    /// primary visibility replace those of the options.
     ///
     /// # Errors
-    /// Those of [`Engine::methods`] and [`Engine::renderer`]; a failed call.
+    /// Fails as [`Engine::methods`] and [`Engine::renderer`] do, or if a call fails.
     pub fn render(&self, world: &World, options: &RenderOptions) -> Result<Rendered, GpuError> {
         let scene = world.scene();
         let workload = Workload::of_pictures(options, scene.lights.len(), 1).seen_by([&scene.camera].into_iter());
@@ -153,10 +154,10 @@ impl Engine {
         Ok(Rendered { picture: renderer.picture()?.into_owned(), drawn })
     }
 
-    /// Casts rays; gives one hit a ray. The engine chooses the traversal.
+    /// Casts rays, and returns one hit for each. The engine chooses the traversal.
     ///
     /// # Errors
-    /// Those of [`Engine::methods`] and [`Engine::caster`]; a failed call.
+    /// Fails as [`Engine::methods`] and [`Engine::caster`] do, or if a call fails.
     pub fn cast(&self, world: &World, rays: &[Ray], query: Query) -> Result<Vec<Hit>, GpuError> {
         let traversal = self.methods(world, &Workload::of_rays(rays.len() as u64))?.traversal.value;
         Ok(self.caster(world.geometry(), traversal)?.cast(rays, query, 1)?.hits)

@@ -1,4 +1,4 @@
-//! A world's pictures, drawn by the device or by the CPU.
+//! Draws a world's pictures, on the device or on the CPU.
 
 use std::{borrow::Cow, sync::Arc};
 
@@ -13,7 +13,7 @@ use crate::{
     world::World,
 };
 
-/// A picture, and what comes of drawing it.
+/// A picture, and what else drawing it gives.
 #[derive(Clone, Debug)]
 pub struct Rendered {
     /// The picture.
@@ -22,7 +22,7 @@ pub struct Rendered {
     pub drawn: Drawn,
 }
 
-/// What draws pictures of a world, on the device or on the CPU.
+/// Draws pictures of a world, on the device or on the CPU.
 pub struct Renderer(Processor);
 
 enum Processor {
@@ -31,7 +31,7 @@ enum Processor {
 }
 
 impl Renderer {
-    /// Without a context, the CPU draws.
+    /// Creates a renderer on the device, or without a context on the CPU.
     pub(super) fn new(
         context: Option<&Arc<Context>>,
         world: &World,
@@ -43,7 +43,7 @@ impl Renderer {
         }))
     }
 
-    /// The number of parts of the picture that are drawn one after the other.
+    /// Returns the number of bands: parts of the picture that are drawn one after the other.
     pub fn n_bands(&self) -> u32 {
         match &self.0 {
             Processor::Device(renderer) => renderer.n_bands(),
@@ -51,11 +51,11 @@ impl Renderer {
         }
     }
 
-    /// Draws what a camera sees by so many samples a pixel, at least one. The watcher hears of each sample of each
-    /// band.
+    /// Draws what a camera sees with `n_samples` samples per pixel, at least one. The watcher is notified of each
+    /// sample of each band.
     ///
     /// # Errors
-    /// A failed call; one pixel alone makes more rays than a queue holds; out of memory.
+    /// A call fails, one pixel alone makes more rays than a queue holds, or memory runs out.
     pub fn draw(&mut self, camera: &Camera, n_samples: u32, mut watcher: impl Watcher) -> Result<Drawn, GpuError> {
         match &mut self.0 {
             Processor::Device(renderer) => {
@@ -69,12 +69,12 @@ impl Renderer {
         }
     }
 
-    /// Copies the displayed picture that was drawn last into the upper left corner of an image of the caller's own: sRGB, 8
-    /// bits a channel. The device begins after `after` and signals `then`; the host does not wait for it.
+    /// Copies the displayed picture that was drawn last into the upper left corner of the caller's image: sRGB, 8
+    /// bits a channel. The device begins after `after` and signals `then`. The host does not wait for it.
     ///
     /// # Errors
-    /// The CPU draws; the picture is so large that it does not stay on the device; the image is smaller than the picture;
-    /// a failed call. Then nothing is signalled.
+    /// The CPU draws, the picture is so large that it does not stay on the device, the image is smaller than the
+    /// picture, or a call fails. Then nothing is signalled.
     pub fn copy_picture_to(
         &self,
         image: &GivenImage,
@@ -89,10 +89,10 @@ impl Renderer {
         }
     }
 
-    /// The picture that was drawn last.
+    /// Returns the picture that was drawn last.
     ///
     /// # Errors
-    /// A failed copy.
+    /// The copy from the device fails.
     pub fn picture(&self) -> Result<Cow<'_, Picture>, GpuError> {
         match &self.0 {
             Processor::Device(renderer) => renderer.picture(),

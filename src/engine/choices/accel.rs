@@ -1,4 +1,4 @@
-//! Which acceleration structure to build.
+//! The choice of the acceleration structure.
 
 use super::{Chosen, Processor, TreeKind};
 use crate::accel::{AccelKind, AccelOptions, grid::GridOptions};
@@ -6,7 +6,7 @@ use crate::accel::{AccelKind, AccelOptions, grid::GridOptions};
 /// The acceleration structure that was chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChosenAccel {
-    /// A kd-tree of a kind.
+    /// A kd-tree of the chosen kind.
     KdTree(Chosen<TreeKind>),
     /// A uniform grid.
     Grid,
@@ -15,7 +15,7 @@ pub enum ChosenAccel {
 }
 
 impl ChosenAccel {
-    /// How the structure is built for a processor.
+    /// Returns the options for building the structure for a processor.
     pub fn options(self, processor: Processor) -> AccelOptions {
         match self {
             Self::KdTree(tree_kind) => AccelOptions::KdTree(tree_kind.value.options(processor)),
@@ -24,7 +24,7 @@ impl ChosenAccel {
         }
     }
 
-    /// The kind of the structure.
+    /// Returns the kind of the structure.
     pub fn kind(self) -> AccelKind {
         match self {
             Self::KdTree(_) => AccelKind::KdTree,
@@ -33,7 +33,7 @@ impl ChosenAccel {
         }
     }
 
-    /// Which kd-tree is built; none for grids.
+    /// Returns which kd-tree is built, or none for grids.
     pub fn tree_kind(self) -> Option<Chosen<TreeKind>> {
         match self {
             Self::KdTree(tree_kind) => Some(tree_kind),

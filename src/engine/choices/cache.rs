@@ -1,6 +1,7 @@
-//! What was measured in earlier runs, a small JSON file each, in the folder that the system has for such things.
+//! A cache of earlier runs' measurements: small JSON files in the folder that the system provides for caches.
 //!
-//! A file that cannot be read, or does not hold what it should, counts as none; one that cannot be written is left out.
+//! A file that cannot be read or has invalid contents counts as missing. A measurement that cannot be written is not
+//! kept.
 
 use std::{
     env,
@@ -22,29 +23,29 @@ use crate::{
     passes::spirv,
 };
 
-/// The environment variable that names another folder, or if it is empty, none.
+/// The environment variable that names another folder. If it is empty, nothing is kept.
 const FOLDER: &str = "KDRAY_CACHE";
-/// Bytes of the longest file that is read.
+/// Number of bytes of a file that are read at most.
 const MOST_BYTES: u64 = 1 << 16;
 
-/// What a measurement depends on.
+/// What a measurement depends on. It identifies an entry of the cache.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Key {
     device: String,
     /// The driver's name and version.
     driver: String,
-    /// What was tried.
+    /// What was measured: traversals, or primary visibility in pictures of a size.
     subject: String,
-    /// A hash of a kernel that was timed.
+    /// A hash of `cast.comp`, a kernel that was timed.
     kernel: String,
     /// A hash of the scene's triangles.
     triangles: String,
-    /// The tree's build options.
+    /// The build options of the acceleration structure.
     build: String,
 }
 
 impl Key {
-    /// The key of traversals.
+    /// Returns the key of a measurement of traversals.
     pub fn new(device: &DeviceInfo, triangles: &[Triangle], accel_options: &AccelOptions) -> Self {
         Self {
             device: device.name.clone(),
@@ -56,7 +57,7 @@ impl Key {
         }
     }
 
-    /// The key of primary visibility in pictures of a size, beside a traversal.
+    /// Returns the key of a measurement of primary visibility, in pictures of a size and with a traversal.
     pub fn of_primaries(&self, (width, height): (u32, u32), traversal: Traversal) -> Self {
         Self { subject: format!("primary rays, {width}x{height}, {traversal}"), ..self.clone() }
     }
@@ -66,14 +67,14 @@ impl Key {
     }
 }
 
-/// 16 hexadecimal digits.
+/// Returns a hash of 16 hexadecimal digits.
 fn hash(bytes: &[u8]) -> String {
     let mut hasher = FixedState::with_seed(0).build_hasher();
     hasher.write(bytes);
     format!("{:016x}", hasher.finish())
 }
 
-/// A file's contents. The key tells entries apart whose names are the same by chance.
+/// The contents of a file. The key tells apart entries whose file names are the same by chance.
 #[derive(Serialize, Deserialize)]
 struct Entry {
     #[serde(flatten)]
@@ -84,12 +85,13 @@ struct Entry {
 /// A folder of measurements.
 #[derive(Clone, Debug)]
 pub struct Cache {
-    /// None where the system has no such folder, or the user wants none.
+    /// None if the system has no such folder, or the user disables the cache.
     folder: Option<PathBuf>,
 }
 
 impl Cache {
-    /// The user's: `$KDRAY_CACHE`, or `kdray` in the system's cache folder (`$XDG_CACHE_HOME` or `~/.cache` on Linux).
+    /// Opens the user's cache: `$KDRAY_CACHE`, or `kdray` in the system's cache folder (`$XDG_CACHE_HOME` or
+    /// `~/.cache` on Linux).
     pub fn open() -> Self {
         let folder = match env::var_os(FOLDER) {
             Some(folder) => (!folder.is_empty()).then(|| folder.into()),
@@ -98,12 +100,13 @@ impl Cache {
         Self { folder }
     }
 
-    /// In a certain folder, which need not be there yet.
+    /// Uses a given folder, which need not exist yet.
     pub fn at(folder: &Path) -> Self {
         Self { folder: Some(folder.to_owned()) }
     }
 
-    /// What was measured, if it was. The words and times are whatever the file says.
+    /// Returns the times for a key, if they have been measured. Names and times are not checked: see
+    /// [`Timings::is_sound`].
     pub fn get(&self, key: &Key) -> Option<Timings> {
         let mut bytes = Vec::new();
         let file = File::open(self.folder.as_ref()?.join(key.file_name())).ok()?;
@@ -112,7 +115,7 @@ impl Cache {
         (entry.key == *key).then_some(entry.ns)
     }
 
-    /// Keeps what was measured, in place of what was there.
+    /// Stores times for a key, in place of earlier ones.
     pub fn put(&self, key: &Key, timings: &Timings) {
         let Some(folder) = &self.folder else { return };
         let entry = Entry { key: key.clone(), ns: timings.clone() };
@@ -122,7 +125,7 @@ impl Cache {
     }
 }
 
-/// Whole or not at all.
+/// Writes the whole file or nothing.
 fn write(folder: &Path, name: &str, entry: &Entry) -> io::Result<()> {
     fs::create_dir_all(folder)?;
     let mut file = NamedTempFile::new_in(folder)?;

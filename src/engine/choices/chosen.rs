@@ -1,4 +1,4 @@
-//! Choices with their reasons, as reports tell them.
+//! Choices with their reasons, as reports show them.
 
 use std::fmt::{self, Display};
 
@@ -10,16 +10,16 @@ use crate::{
     frame::{Primary, RenderOptions},
 };
 
-/// Why something was chosen.
+/// The reason for a choice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reason {
-    /// The user said so.
+    /// The user specified it.
     Pinned,
-    /// A rule says so, from the device and from sizes.
+    /// A rule gave it, from the device and from sizes.
     Rule,
-    /// It was the quickest just now.
+    /// It was the fastest in a measurement of this run.
     Measured,
-    /// It was the quickest when it was measured in an earlier run.
+    /// It was the fastest in a measurement of an earlier run.
     Cached,
 }
 
@@ -35,7 +35,7 @@ pub struct Chosen<T> {
 }
 
 impl<T> Chosen<T> {
-    /// What the user asked for, or else what the rule says.
+    /// Returns what the user specified, or else what the rule gives.
     pub(super) fn pinned_or(pinned: Option<T>, rule: impl FnOnce() -> T) -> Self {
         match pinned {
             Some(value) => Self { value, by: Reason::Pinned },
@@ -59,21 +59,22 @@ impl<T: Display> Serialize for Chosen<T> {
     }
 }
 
-/// How rays are traced.
+/// The methods by which rays are traced.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Methods {
-    /// The algorithm by which rays go through the kd-tree.
+    /// The algorithm that traverses the kd-tree.
     pub traversal: Chosen<Traversal>,
     /// How primary rays find their triangles.
     pub primary: Chosen<Primary>,
-    /// What the traversals took, nanoseconds a ray, if that decided.
+    /// Nanoseconds per ray of each traversal, if they decided.
     pub traversal_ns: Option<Timings>,
-    /// What frames of primary rays and their shadows took, nanoseconds a pixel, if that decided.
+    /// Nanoseconds per pixel of each kind of primary visibility, if they decided: whole frames of primary rays and
+    /// their shadow rays.
     pub primary_ns: Option<Timings>,
 }
 
 impl Methods {
-    /// The options with these methods.
+    /// Returns the options with these methods.
     pub fn apply(&self, options: &RenderOptions) -> RenderOptions {
         RenderOptions { traversal: self.traversal.value, primary: self.primary.value, ..options.clone() }
     }
@@ -88,27 +89,27 @@ pub struct Choices {
     /// Which kd-tree is built; none for grids.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub build: Option<Chosen<TreeKind>>,
-    /// The algorithm by which rays go through the kd-tree; none for grids.
+    /// The algorithm that traverses the kd-tree; none for grids.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub traversal: Option<Chosen<Traversal>>,
-    /// None for rays without a picture.
+    /// How primary rays find their triangles; none for rays without a picture.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub primary: Option<Chosen<Primary>>,
-    /// [`Methods::traversal_ns`].
+    /// See [`Methods::traversal_ns`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub traversal_ns: Option<Timings>,
-    /// [`Methods::primary_ns`].
+    /// See [`Methods::primary_ns`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub primary_ns: Option<Timings>,
 }
 
-/// Serializes a value as the word that it is displayed by.
+/// Serializes a value as the word that it displays as.
 fn as_word<S: Serializer>(value: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(value)
 }
 
 impl Choices {
-    /// The choices for pictures.
+    /// Returns the choices for pictures.
     pub fn of_pictures(accel: ChosenAccel, methods: Methods) -> Self {
         let Methods { traversal, primary, traversal_ns, primary_ns } = methods;
         let build = accel.tree_kind();
@@ -116,7 +117,7 @@ impl Choices {
         Self { accel: accel.kind(), build, traversal, primary: Some(primary), traversal_ns, primary_ns }
     }
 
-    /// Rays without a picture have no primary visibility.
+    /// Returns the choices for rays without a picture, which have no primary visibility.
     pub fn of_rays(accel: ChosenAccel, methods: Methods) -> Self {
         Self { primary: None, ..Self::of_pictures(accel, methods) }
     }

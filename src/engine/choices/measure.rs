@@ -1,7 +1,8 @@
-//! What each method takes on a device, in a scene.
+//! Measures what each method takes on a device, in a scene.
 //!
-//! Traversals are tried on rays of the scene's own camera, coherent, and one that bounces from each of their hits,
-//! scattered. They take turns, and the least time of each counts: a clock that rises meanwhile favours none.
+//! Traversals are timed on coherent rays from the scene's own camera and on scattered rays: one that bounces from
+//! each of their hits. They take turns, and the least time of each counts. So a clock that rises meanwhile favours
+//! none.
 
 use std::{rc::Rc, sync::Arc};
 
@@ -21,19 +22,20 @@ use crate::{
     world::{FlatScene, World},
 };
 
-/// As many camera rays as the device has lanes, within these: with fewer it would idle, and more only take longer.
+/// Bounds of the number of camera rays, which is otherwise that of the device's lanes. With fewer rays the device
+/// would idle, and more rays only take longer.
 const FEWEST_RAYS: u32 = 1 << 12;
 const MOST_RAYS: u32 = 1 << 18;
-/// Timed casts of all rays by each traversal.
+/// Number of timed casts of all rays by each traversal.
 const N_ROUNDS: u16 = 5;
-/// Timed frames of each kind of primary visibility, after as many that are not timed.
+/// Number of timed frames of each kind of primary visibility, after as many that are not timed.
 const N_FRAMES: usize = 5;
 
-/// Traces rays by each traversal; none where the device has no timestamps. The traversals must need no more than ropes
-/// beside the tree.
+/// Times each traversal, in nanoseconds per ray. Returns none where the device has no timestamps. The traversals may
+/// read nothing but ropes beside the tree.
 ///
 /// # Errors
-/// Beyond the device's limits, out of memory, a failed call.
+/// The buffers are beyond the device's limits or memory, or a call fails.
 pub fn measure_traversals(
     context: &Arc<Context>,
     world: &World,
@@ -66,7 +68,8 @@ pub fn measure_traversals(
     Ok((0..kernels.len()).map(ns_a_ray).collect())
 }
 
-/// Rays of the scene's camera, and one from each of their hits into the hemisphere above it. They depend on no device.
+/// Returns the rays of the scene's camera, and one from each of their hits into the hemisphere above it. The CPU
+/// finds the hits, so the rays of a frame are the same for every device.
 fn some_rays(world: &World, frame: &Frame) -> Vec<Ray> {
     let mut from_camera = vec![PathRay::zeroed(); (frame.width * frame.height) as usize];
     primary_rays(frame, 0, &mut from_camera);
@@ -76,7 +79,7 @@ fn some_rays(world: &World, frame: &Frame) -> Vec<Ray> {
     from_camera.iter().chain(&bounced).map(cast_ray).collect()
 }
 
-/// About so many pixels of the shape of the scene's own picture.
+/// Returns options for a picture of about `n_pixels` pixels, with the shape of the scene's own picture.
 fn picture_of(scene: &FlatScene, n_pixels: u32) -> RenderOptions {
     let (width, height) = (f64::from(scene.defaults.width), f64::from(scene.defaults.height));
     let scale = (f64::from(n_pixels) / (width * height)).sqrt();
@@ -84,11 +87,11 @@ fn picture_of(scene: &FlatScene, n_pixels: u32) -> RenderOptions {
     RenderOptions { width: side(width), height: side(height), ..RenderOptions::default() }
 }
 
-/// Draws whole pictures of one bounce by each kind of primary visibility; none where the device has no timestamps.
-/// `options`: the picture's size, and the traversal.
+/// Times whole pictures of one bounce by each kind of primary visibility, in nanoseconds per pixel. Returns none
+/// where the device has no timestamps. `options` gives the picture's size and the traversal.
 ///
 /// # Errors
-/// Beyond the device's limits, out of memory, a failed call.
+/// The buffers are beyond the device's limits or memory, or a call fails.
 pub fn measure_primaries(
     context: &Arc<Context>,
     world: &World,

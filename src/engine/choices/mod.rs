@@ -1,5 +1,5 @@
-//! What the user leaves open is chosen here, once for all commands: which tree is built, how rays find their way
-//! through it, and how primary rays find their triangles.
+//! Chooses what the user leaves open, in one place for all commands: which acceleration structure is built, which
+//! algorithm traverses it, and how primary rays find their triangles.
 //!
 //! ```text
 //! accel    which acceleration structure
@@ -12,15 +12,16 @@
 //! chosen   choices with their reasons, for reports
 //! ```
 //!
-//! Every traversal finds the same hits, bit for bit, so the quickest may be chosen by measurement. So may rasterization
-//! by kernels or tracing of primary rays, unless a camera may be so far away that they round otherwise. Whatever
-//! changes bits is chosen by rule: graphics or kernels for primary rays, and everything where the output holds what
-//! rays cost. All choices ask for the size of the whole picture, so that a part of it is rendered as the whole is.
+//! Every traversal finds the same hits, bit for bit, so the fastest one may be chosen by measurement. So may the
+//! faster of rasterizing primary rays by kernels and tracing them, unless a camera may be so far away that the two
+//! round differently. Choices that change bits are made by rule: the choice between graphics and kernels for primary
+//! rays, and every choice if the output contains what rays cost. All choices depend on the size of the whole picture,
+//! so that a part of it is rendered as the whole is.
 //!
 //! A measurement uploads the tree once more and makes ropes for it, which takes longer than a frame. Its result is
-//! kept, so any run may profit, but only runs pay for it that trace enough rays to win the time back: long casts, many
-//! samples, films, windows. It is never made where drivers run kernels on the CPU: to compile the kernels that it tries
-//! takes such a driver longer than another choice could spare.
+//! kept, so every later run may profit. Only runs with enough rays to win the time back make a measurement: long
+//! casts, many samples, films, windows. Drivers that run kernels on the CPU are never measured, because compiling the
+//! candidate kernels takes them longer than another choice could save.
 
 mod accel;
 mod cache;
@@ -52,32 +53,32 @@ use crate::{
     world::World,
 };
 
-/// What the user asks for; `None` and [`BuildPolicy::Auto`] leave it open.
+/// What the user specifies; `None` and [`BuildPolicy::Auto`] leave a choice open.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Request {
     /// The kind of the acceleration structure.
     pub accel: AccelKind,
     /// Which tree is built.
     pub build: BuildPolicy,
-    /// The algorithm by which rays go through the kd-tree.
+    /// The algorithm that traverses the kd-tree.
     pub traversal: Option<Traversal>,
     /// How primary rays find their triangles.
     pub primary: Option<Primary>,
 }
 
-/// What traces rays.
+/// The kind of processor that traces rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Processor {
     /// The CPU, without Vulkan.
     Cpu,
-    /// A Vulkan driver that runs kernels on the CPU, both sides of each branch.
+    /// A Vulkan driver that runs kernels on the CPU, and executes both sides of each branch.
     SoftwareDriver,
     /// A GPU.
     Gpu,
 }
 
 impl Processor {
-    /// The processor that an open device is; without one, the CPU.
+    /// Returns the processor that an open device is, or without a device the CPU.
     pub fn of(context: Option<&Context>) -> Self {
         match context {
             None => Self::Cpu,
@@ -86,7 +87,7 @@ impl Processor {
         }
     }
 
-    /// The processor that a device will be once it is open.
+    /// Returns the processor that a device will be once it is open.
     pub fn of_device(info: &DeviceInfo) -> Self {
         if info.is_software() { Self::SoftwareDriver } else { Self::Gpu }
     }
@@ -95,19 +96,20 @@ impl Processor {
 /// The work that a choice is made for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Workload {
-    /// Width and height of the whole picture, pixels, whatever part of it is rendered.
+    /// Width and height of the whole picture in pixels, whatever part of it is rendered.
     pub size: (u32, u32),
-    /// Rays that the work takes, as far as that can be told before. A measurement's repetitions do not count: it shows
-    /// what a single run does.
+    /// Number of rays that the work takes, as far as that is known in advance. The repetitions of a benchmark do not
+    /// count, since it shows what a single run does.
     pub n_rays: u64,
-    /// Whether the output holds what rays cost, which depends on tree and traversal.
+    /// Whether the output contains what rays cost, which depends on tree and traversal.
     pub shows_costs: bool,
     /// The greatest absolute coordinate of any camera's eye; infinity where a camera may go anywhere.
     pub farthest_eye: f32,
 }
 
 impl Workload {
-    /// The work of `n_pictures` pictures of one sample a pixel, if every pixel's ray hits and is reflected once.
+    /// Returns the work of `n_pictures` pictures with one sample per pixel, if every pixel's ray hits and is
+    /// reflected once.
     pub fn of_pictures(options: &RenderOptions, n_lights: usize, n_pictures: u64) -> Self {
         let size = (options.width, options.height);
         let rays_a_pixel = u64::from(options.max_depth.min(2)) * (1 + n_lights as u64);
@@ -116,32 +118,32 @@ impl Workload {
         Self { size, n_rays, shows_costs: options.features, farthest_eye: f32::INFINITY }
     }
 
-    /// The same work, with all its cameras known.
+    /// Returns the same work with all its cameras known.
     #[must_use]
     pub fn seen_by<'c>(self, cameras: impl Iterator<Item = &'c Camera>) -> Self {
         Self { farthest_eye: cameras.map(|camera| camera.eye.abs().max_element()).fold(0.0, f32::max), ..self }
     }
 
-    /// Whether primary rays find the same hits, bit for bit, traced and rasterized by kernels.
+    /// Tells whether primary rays find the same hits, bit for bit, if they are traced and if kernels rasterize them.
     fn primaries_agree(&self, world: &World) -> bool {
         let [least, greatest] = world.bounds();
         let largest_coordinate = least.abs().max(greatest.abs()).max_element();
         self.farthest_eye <= KD_MAX_ORIGIN_DISTANCE * largest_coordinate
     }
 
-    /// The work of a window, which goes on for as long as the user likes, from wherever the user likes.
+    /// Returns the work of a window, which runs for any time and shows any view, as the user likes.
     pub fn of_window(size: (u32, u32)) -> Self {
         Self { size, n_rays: u64::MAX, shows_costs: false, farthest_eye: f32::INFINITY }
     }
 
-    /// The work of casting rays without a picture.
+    /// Returns the work of casting rays without a picture.
     pub fn of_rays(n_rays: u64) -> Self {
         Self { n_rays, ..Self::of_window((0, 0)) }
     }
 }
 
 impl Request {
-    /// The acceleration structure to build for so many triangles.
+    /// Chooses the acceleration structure to build for `n_triangles` triangles.
     pub fn choose_accel(&self, processor: Processor, n_triangles: usize, workload: &Workload) -> ChosenAccel {
         let by_rule = || TreeKind::by_rule(processor, n_triangles, workload.n_rays);
         match self.accel {
@@ -151,7 +153,7 @@ impl Request {
         }
     }
 
-    /// How to trace, without any measurement.
+    /// Chooses how to trace, without any measurement.
     pub fn methods_by_rule(&self, context: Option<&Context>, n_triangles: usize, size: (u32, u32)) -> Methods {
         Methods {
             traversal: Chosen::pinned_or(self.traversal, || traversal_by_rule(Processor::of(context))),
@@ -161,11 +163,11 @@ impl Request {
         }
     }
 
-    /// How to trace: by the times of an earlier run or by a measurement, where that changes no bit and pays; else by
-    /// rule.
+    /// Chooses how to trace. If the choice changes no bit, the times of an earlier run decide, or those of a
+    /// measurement where that pays off. Else the rule decides.
     ///
     /// # Errors
-    /// The device is lost. What else goes wrong with a measurement leaves the choice to the rule.
+    /// The device is lost. If a measurement fails otherwise, the rule decides.
     pub fn methods(
         &self,
         context: Option<&Arc<Context>>,

@@ -1,5 +1,5 @@
-//! The methods that are tried, what each took, and which of them is taken. A method is a traversal or a kind of primary
-//! visibility.
+//! The candidate methods, their measured times, and the choice among them. A method is a traversal or a kind of
+//! primary visibility.
 
 use std::{
     collections::BTreeMap,
@@ -12,19 +12,22 @@ use serde::{Deserialize, Serialize};
 use super::{Cache, Chosen, Key, Reason};
 use crate::{accel::kdtree::Traversal, frame::Primary};
 
-/// Scenes of fewer triangles are small enough for any traversal: their frames take longer elsewhere.
+/// Scenes with fewer triangles are not measured. They are small enough for any traversal, since their frames spend
+/// more time elsewhere.
 const FEWEST_TRIANGLES: usize = 1000;
-/// Rays from which on a run wins back what a measurement takes, some 0.1 s and 0.3 us a triangle, by a tenth of the 1
-/// to 10 ns that a ray takes, in this run and a few that find its result in the cache.
+/// Number of rays from which a run wins back the time of a measurement: this many, and `RAYS_A_MEASURED_TRIANGLE`
+/// more for each triangle. A measurement takes some 0.1 s, and 0.3 us more for each triangle. It saves a tenth of the
+/// 1 to 10 ns that a ray takes, in this run and in a few that find its result in the cache.
 const RAYS_A_MEASUREMENT: u64 = 1 << 28;
+/// See `RAYS_A_MEASUREMENT`.
 const RAYS_A_MEASURED_TRIANGLE: u64 = 500;
-/// Rays a triangle from which on ropes pay: to make them takes the CPU some 200 ns a triangle in each run, and they spare
-/// a ray about 0.2 ns where they are quicker.
+/// Number of rays per triangle from which ropes pay off. Making them takes the CPU some 200 ns per triangle in each
+/// run. Where they are faster, they save about 0.2 ns per ray.
 const RAYS_A_ROPED_TRIANGLE: u64 = 1000;
-/// Share of its time that another traversal must spare to be taken in place of the rule's: less is noise.
+/// Share of the time of the rule's traversal that another one must save to replace it. Smaller savings are noise.
 const LEAST_GAIN: f64 = 0.03;
 
-/// What a few rays took on a device: nanoseconds a ray or pixel, by method.
+/// Measured times on a device, by method: nanoseconds per ray or per pixel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Timings {
@@ -38,18 +41,19 @@ impl<T: Display> FromIterator<(T, f64)> for Timings {
 }
 
 impl Timings {
-    /// What a method took.
+    /// Returns the time of a method.
     pub fn of(&self, method: impl Display) -> Option<f64> {
         self.ns.get(&method.to_string()).copied()
     }
 
-    /// Whether all is as a measurement of such methods leaves it: known words, times above zero.
+    /// Tells whether the contents are valid for methods of type `T`: names are known, and times are finite and above
+    /// zero.
     pub fn is_sound<T: FromStr>(&self) -> bool {
         let is_sound = |(word, ns): (&String, &f64)| T::from_str(word).is_ok() && ns.is_finite() && *ns > 0.0;
         !self.ns.is_empty() && self.ns.iter().all(is_sound)
     }
 
-    /// The quickest of some methods: another than the rule's only if it spares more than noise.
+    /// Returns the fastest of some methods. A method other than the rule's must save more than noise.
     fn quickest<T: Copy + Display>(&self, methods: &[T], rule: T) -> T {
         let times = methods.iter().filter_map(|&method| Some((method, self.of(method)?)));
         let best = times.min_by(|(_, a), (_, b)| a.total_cmp(b));
@@ -67,17 +71,18 @@ impl Display for Timings {
     }
 }
 
-/// The methods that come into question on a GPU, and whether it pays to try them.
+/// The candidate methods on a GPU, and whether measuring them pays off.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Candidates<T> {
-    /// The methods to try.
+    /// The methods to measure.
     pub methods: Vec<T>,
-    /// Whether a measurement pays in this run; if it does not, only an earlier one can help.
+    /// Whether a measurement pays off in this run. If not, only the result of an earlier one can be used.
     pub may_measure: bool,
 }
 
 impl Candidates<Traversal> {
-    /// Traversals for so many rays in a scene of so many triangles; none where any will do.
+    /// Returns the candidate traversals for `n_rays` rays in a scene of `n_triangles` triangles, or none where any
+    /// will do.
     pub fn of_traversals(n_triangles: usize, n_rays: u64) -> Option<Self> {
         let pay_for_ropes = n_rays >= RAYS_A_ROPED_TRIANGLE.saturating_mul(n_triangles as u64);
         let ropes = pay_for_ropes.then_some(Traversal::Ropes);
@@ -86,8 +91,8 @@ impl Candidates<Traversal> {
 }
 
 impl Candidates<Primary> {
-    /// Kinds of primary visibility that find the same hits, for so many rays in a scene of so many triangles; none
-    /// where any will do.
+    /// Returns the kinds of primary visibility that find the same hits, for `n_rays` rays in a scene of `n_triangles`
+    /// triangles, or none where any will do.
     pub fn of_primaries(n_triangles: usize, n_rays: u64) -> Option<Self> {
         Self::new(vec![Primary::Compute, Primary::Trace], n_triangles, n_rays)
     }
@@ -100,11 +105,12 @@ impl<T: Copy + Display + FromStr> Candidates<T> {
         (n_triangles >= FEWEST_TRIANGLES).then_some(Self { methods, may_measure })
     }
 
-    /// Chooses by what the cache holds, or by `measure` where that pays, and adds its result to the cache; else by
-    /// rule. `measure` gives the time of each method, or none where the device has no timestamps.
+    /// Chooses by the times in the cache. If those of a method are missing, it calls `measure` where that pays off,
+    /// and adds the result to the cache. Without any times the rule decides. `measure` returns the time of each
+    /// method, or none where the device has no timestamps.
     ///
     /// # Errors
-    /// Those of `measure`.
+    /// Fails as `measure` does.
     pub fn choose<E>(
         &self,
         cache: &Cache,

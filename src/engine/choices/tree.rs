@@ -1,12 +1,12 @@
-//! Which tree to build: how much work pays for the rays that will be traced.
+//! The choice of the kd-tree: how much build work pays off for the rays to be traced.
 
 use super::Processor;
 use crate::accel::kdtree::BuildOptions;
 
-/// How much work goes into the tree, as the user says it.
+/// How much work goes into the tree, as the user specifies it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BuildPolicy {
-    /// The quicker of the two, with building counted, by the number of rays.
+    /// The kind with which building and tracing take the least time together, by the number of rays.
     #[default]
     Auto,
     /// The tree that is built quickly.
@@ -18,7 +18,7 @@ pub enum BuildPolicy {
 named_enum!(BuildPolicy { Auto = "auto", Fast = "fast", Best = "best" });
 
 impl BuildPolicy {
-    /// The tree that the user wants, if that is a certain one.
+    /// Returns the kind of tree that the user specifies, or none for [`BuildPolicy::Auto`].
     pub fn pinned(self) -> Option<TreeKind> {
         match self {
             Self::Auto => None,
@@ -28,11 +28,11 @@ impl BuildPolicy {
     }
 }
 
-/// A tree to build.
+/// The kind of tree to build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TreeKind {
-    /// A small tree, built in half of the time. Rays take up to a tenth longer on the CPU, up to twice as long on a
-    /// GPU.
+    /// A small tree that is built in half the time. Rays take up to a tenth longer on the CPU, and up to twice as
+    /// long on a GPU.
     Fast,
     /// The tree that traces fastest.
     Best,
@@ -40,13 +40,15 @@ pub enum TreeKind {
 
 named_enum!(TreeKind { Fast = "fast", Best = "best" });
 
-/// Rays a triangle from which on the best tree pays: it takes about a microsecond a triangle longer to build, with
-/// slabs a third of one more, and spares a ray some 10 to 25 ns on the CPU's threads and half of one to one on a GPU.
+/// Number of rays per triangle from which the best tree pays off on the CPU. Its build takes about 1 us per triangle
+/// longer, and with slabs a third of that more. It saves some 10 to 25 ns per ray on the CPU's threads, and 0.5 to 1
+/// ns on a GPU.
 const RAYS_A_TRIANGLE_ON_CPU: u64 = 40;
+/// The same number for a GPU.
 const RAYS_A_TRIANGLE_ON_GPU: u64 = 1000;
 
 impl TreeKind {
-    /// The tree with which building and so many rays take the least time together.
+    /// Returns the kind with which building and `n_rays` rays take the least time together.
     pub fn by_rule(processor: Processor, n_triangles: usize, n_rays: u64) -> Self {
         let rays_a_triangle = match processor {
             Processor::Gpu => RAYS_A_TRIANGLE_ON_GPU,
@@ -55,7 +57,7 @@ impl TreeKind {
         if n_rays / rays_a_triangle < n_triangles as u64 { Self::Fast } else { Self::Best }
     }
 
-    /// How it is built for an processor: the kernels that software drivers run look at no slabs.
+    /// Returns the options for building the tree for a processor. The kernels that software drivers run use no slabs.
     pub fn options(self, processor: Processor) -> BuildOptions {
         match self {
             Self::Fast => BuildOptions::fast(),

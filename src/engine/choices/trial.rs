@@ -1,4 +1,4 @@
-//! Choices by measurement, or by what was measured before.
+//! Choices by a measurement of this run or of an earlier one.
 
 use std::sync::Arc;
 
@@ -19,6 +19,7 @@ pub struct Trial<'a> {
 }
 
 impl Trial<'_> {
+    /// Replaces the rule's traversal by the fastest one, if times are known or a measurement pays off.
     pub fn choose_traversal(&self, methods: &mut Methods) -> Result<(), GpuError> {
         let n_triangles = self.world.scene().triangles.len();
         let Some(candidates) = Candidates::of_traversals(n_triangles, self.workload.n_rays) else { return Ok(()) };
@@ -29,6 +30,7 @@ impl Trial<'_> {
         Ok(())
     }
 
+    /// Replaces the rule's primary visibility by the fastest one, if times are known or a measurement pays off.
     pub fn choose_primary(&self, methods: &mut Methods) -> Result<(), GpuError> {
         let n_triangles = self.world.scene().triangles.len();
         let Some(candidates) = Candidates::of_primaries(n_triangles, self.workload.n_rays) else { return Ok(()) };
@@ -47,7 +49,7 @@ impl Trial<'_> {
     }
 }
 
-/// What was measured, or nothing where that failed; a lost device stays an error.
+/// Returns the measured times, or none if the measurement failed. A lost device remains an error.
 fn unless_lost(measured: Result<Option<Timings>, GpuError>) -> Result<Option<Timings>, GpuError> {
     match measured {
         Err(error) if !error.is_device_lost() => {
