@@ -3,10 +3,10 @@
 
     python3 benches/grids.py target/release/kdray [--mesh dragon.obj] [--size 1920x1080] [--json all.json]
 
-Four scenes: a soup of equal triangles in even distribution, an interior of coarse walls and furniture with finer
-ornaments, a mesh in a closed room (the OBJ file that --mesh names, or a generated knot), and a small detailed body in the
-middle of a stadium. On each of them, `kdray bench traversal` casts the same rays through all structures. Prints Markdown
-tables of million rays a second.
+There are four scenes: a soup of triangles of one size in a uniform distribution, an interior of coarse walls and
+furniture with finer ornaments, a mesh in a closed room (the OBJ file that --mesh names, or a generated knot), and a
+small detailed body in the middle of a stadium. In each scene, `kdray bench traversal` casts the same rays through all
+structures. The script prints Markdown tables of million rays per second.
 """
 
 import argparse
@@ -38,7 +38,7 @@ ripples = [14, 4]
 ripple_depth = 0.07
 """
 
-# A bowl of 100 units' radius with the body of 1 unit on its ground: the "teapot in a stadium".
+# The "teapot in a stadium": a bowl with a radius of 100 units, and a body of 1 unit on its ground.
 STADIUM = """\
 [camera]
 eye = [1.4, 1.1, 2.2]
@@ -72,7 +72,8 @@ transform = { translate = [0.0, 0.6, 0.0] }
 """
 
 
-# Half a unit above 0: a floor at 0 has no rounding margin, and rays that start on it would hit it or not by chance.
+# The floor is half a unit above 0. At 0 it would have no rounding margin, and chance would decide whether rays that
+# start on it hit it.
 ROOM = """\
 [camera]
 eye = [0.0, 3.2, 9.0]
@@ -112,7 +113,7 @@ transform = { translate = [%.3f, %.3f, %.3f], rotate = [0, %.0f, 0] }
 
 
 def write_interior(path, n_tables):
-    """Writes a room with tables of 12 triangles, each with an ornament of 12,000 on it."""
+    """Writes a scene file: a room with tables of 12 triangles, each with an ornament of 12,000 triangles on it."""
     rng = random.Random(3)
     with open(path, "w") as file:
         file.write(ROOM)
@@ -126,7 +127,7 @@ def write_interior(path, n_tables):
 
 
 def write_soup(path, n_triangles):
-    """Writes triangles of one size, at even distribution in a cube of 2 units."""
+    """Writes an OBJ file of triangles of one size, uniformly distributed in a cube of 2 units."""
     rng = random.Random(7)
     size = 1.5 / n_triangles ** (1 / 3)
     with open(path, "w") as file:
@@ -140,7 +141,7 @@ def write_soup(path, n_triangles):
 
 
 def measure(binary, scene, options, size):
-    """Returns the report of `kdray bench traversal` as JSON."""
+    """Runs `kdray bench traversal` on a scene and returns its report as parsed JSON."""
     with tempfile.NamedTemporaryFile(suffix=".json") as report:
         words = [binary, "bench", "traversal", str(scene), "--size", size, "--variants", ",".join(VARIANTS)]
         subprocess.run(words + options + ["--json", report.name], check=True, stdout=subprocess.DEVNULL)
@@ -148,7 +149,7 @@ def measure(binary, scene, options, size):
 
 
 def table(name, report):
-    """Returns a scene's table: a row for each kind of rays, a column for each structure."""
+    """Returns a scene's Markdown table: one row per kind of ray, one column per variant."""
     lines = ["%s: %d triangles, on %s" % (name, report["n_triangles"], report["device"]), ""]
     lines.append("| rays | " + " | ".join("`%s`, Mrays/s" % variant for variant in VARIANTS) + " | `grid2` / `mask` |")
     lines.append("|---|" + "---:|" * (len(VARIANTS) + 1))

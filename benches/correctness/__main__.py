@@ -1,19 +1,21 @@
-"""Counts the rays that leak through closed meshes and the wrong answers of `kdray cast`, beside Embree's.
+"""Counts the rays that leak through closed meshes and the wrong answers of `kdray cast`, and those of Embree.
 
-Leaks: rays are aimed at edges and vertices of closed meshes. One that begins inside must hit the mesh, and what it hits
-first must be a face that it leaves through. One that begins outside and goes to a point deep inside must hit the mesh
-on the way. These rules need no tolerance, since they hold for every ray near the aimed one, too.
+Leaks: rays are aimed at edges and vertices of closed meshes. A ray that begins inside must hit the mesh, and the face
+that it hits first must be one through which it leaves. A ray that begins outside and goes to a point deep inside
+must hit the mesh on the way. These rules need no tolerance, since they are also true of every ray near the aimed one.
 
 Wrong answers: each answer is compared with all triangles that the ray comes near, in double precision. A ray crosses a
-triangle clearly if it passes inside all three edges by more than MARGIN * scale, and misses it clearly if it passes
-outside of one by as much; scale is the greatest coordinate of mesh and origin. An answer is wrong in one of three ways:
+triangle clearly if it passes inside all three edges by more than MARGIN * scale. It misses the triangle clearly if it
+passes outside of an edge by as much. Here, scale is the greatest coordinate of mesh and origin. An answer is wrong in
+one of three ways:
   lost     a triangle that the ray crosses clearly is in front of the reported hit, or nothing was reported
   false    the reported triangle is one that the ray misses clearly
   wrong t  the reported point is off the reported triangle's plane, or nearer or farther than all of its corners, by
            more than TOLERANCE * scale
-Every suspect is judged again in the widest floating-point type of the machine, and only then counted.
+Each answer that seems wrong is judged again in the widest floating-point type of the machine. It counts only if it is
+wrong there too.
 
-It needs two packages: pip install numpy embreex
+The script needs two packages: pip install numpy embreex
 """
 
 import argparse
@@ -61,6 +63,7 @@ def main():
 
 
 def report(rng, engines, arguments):
+    """Casts the rays of all meshes with each engine. Prints one row of counts per mesh and engine, and the totals."""
     levels = arguments.levels
     closed = [sphere(levels), torus(5 * 2**levels, 2 * 2**levels), bumpy(rng, levels)]
     print_row("mesh", "triangles", "engine", "rays at edges", "leaks", "rays judged", "lost", "false", "wrong t")

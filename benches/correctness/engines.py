@@ -1,4 +1,4 @@
-"""What is checked, kdray, and what it is checked beside, Embree."""
+"""The engines whose answers are judged: kdray, and Embree for comparison."""
 
 import subprocess
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ MISS = np.uint32(0xFFFFFFFF)
 
 @dataclass
 class Hits:
-    """Distances in units of the direction, and triangle numbers; infinity and MISS for a ray that hits nothing."""
+    """Distances in units of the direction's length, and triangle indices; infinity and MISS if a ray hits nothing."""
 
     t: np.ndarray
     triangle_ix: np.ndarray
@@ -24,13 +24,15 @@ class Hits:
 
 
 class Kdray:
+    """The program kdray, called with `flags`. `folder` is for its files."""
+
     def __init__(self, program, name, flags, folder):
         self.program, self.name, self.flags, self.folder = program, name, flags, Path(folder)
 
     def cast(self, mesh, rays):
         obj, npy, npz = (self.folder / f"x.{suffix}" for suffix in ("obj", "npy", "npz"))
         with open(obj, "w") as file:
-            # Nine digits name a float32 exactly.
+            # Nine digits represent a float32 exactly.
             file.writelines(f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in mesh.vertices.tolist())
             file.writelines(f"f {a} {b} {c}\n" for a, b, c in (mesh.triangles + 1).tolist())
         np.save(npy, np.hstack([rays.origins, rays.directions]))
@@ -40,6 +42,8 @@ class Kdray:
 
 
 class Embree:
+    """Embree, in its robust mode or its default mode."""
+
     def __init__(self, robust):
         self.robust, self.name = robust, "Embree, robust mode" if robust else "Embree, default mode"
 

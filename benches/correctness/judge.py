@@ -1,4 +1,4 @@
-"""Finds leaks and wrong answers. The rules are those at the top of __main__.py."""
+"""Functions that find leaks and wrong answers. The rules are at the top of __main__.py."""
 
 from dataclasses import dataclass
 
@@ -12,19 +12,20 @@ TOLERANCE = 1e-5
 
 
 def scale_of(mesh, rays):
+    """Returns the scale of each ray, the greatest coordinate of mesh and origin."""
     return np.maximum(np.abs(mesh.vertices).max(), np.abs(rays.origins).max(axis=1)).astype(float)
 
 
 @dataclass
 class Crossings:
-    """Where rays cross the planes of triangles, pair by pair. Lengths are fractions of the scale, t is in units of the
-    direction."""
+    """Crossings of rays with the planes of triangles, one per pair of a ray and a triangle. Lengths are fractions of
+    the scale; t is in units of the direction's length."""
 
-    inside: np.ndarray  # distance of the ray from the nearest edge; negative if it passes outside
+    inside: np.ndarray  # distance of the ray from the nearest edge; negative if the ray passes outside
     t: np.ndarray
-    slope: np.ndarray  # how far the ray gets from the plane as t grows by 1
-    unit: np.ndarray  # the direction's length
-    corner_ts: tuple  # the least and the greatest t of the corners
+    slope: np.ndarray  # distance by which the ray moves away from the plane as t grows by 1
+    unit: np.ndarray  # length of the direction
+    corner_ts: tuple  # least and greatest t of the corners, projected on the ray
 
     @staticmethod
     def of(mesh, rays, triangle_ix, dtype):
@@ -49,7 +50,7 @@ class Crossings:
 
 @dataclass
 class Pairs:
-    """Rays and triangles, by number, and where they cross."""
+    """Pairs of a ray and a triangle, as indices, and their crossings."""
 
     ray_ix: np.ndarray
     triangle_ix: np.ndarray
@@ -57,7 +58,7 @@ class Pairs:
 
 
 def pair_up(mesh, rays, dtype=np.float64):
-    """Pairs each ray with all triangles whose bounding sphere its line comes near."""
+    """Pairs each ray with all triangles whose bounding spheres are near the ray's line."""
     a, b, c = mesh.corners(slice(None))
     centres = (a + b + c) / 3
     radii = np.sqrt(np.max([((x - centres) ** 2).sum(axis=1) for x in (a, b, c)], axis=0))
@@ -65,7 +66,7 @@ def pair_up(mesh, rays, dtype=np.float64):
     for first in range(0, len(rays), 64):
         part = rays[first : first + 64]
         origins, directions = part.origins.astype(float), normalized(part.directions.astype(float))
-        # The point of the line nearest the mesh's middle stands for the origin, so that no digits are lost from afar.
+        # The origin is replaced by the line's point nearest to (0, 0, 0), so that distant origins lose no digits.
         origins = origins - (origins * directions).sum(axis=1, keepdims=True) * directions
         along = directions @ centres.T - (origins * directions).sum(axis=1)[:, None]
         squared = (origins**2).sum(axis=1)[:, None] - 2 * origins @ centres.T + (centres**2).sum(axis=1) - along**2
@@ -78,7 +79,7 @@ def pair_up(mesh, rays, dtype=np.float64):
 
 
 def judge(mesh, rays, hits, pairs, dtype=np.float64):
-    """Tells which answers are lost, false, or have a wrong t: three arrays of booleans."""
+    """Returns three arrays of booleans: the answers that are lost, that are false, and that have a wrong t."""
     t, crossings = hits.t.astype(dtype), pairs.crossings
     clear = (crossings.inside > MARGIN) & (crossings.t * crossings.unit > MARGIN)
     with np.errstate(invalid="ignore"):
@@ -95,7 +96,7 @@ def judge(mesh, rays, hits, pairs, dtype=np.float64):
 
 
 def count_wrong(mesh, rays, hits, pairs):
-    """Counts lost, false and wrong-t answers, after judging the suspects twice."""
+    """Counts the lost, the false and the wrong-t answers. Those that seem wrong are judged twice."""
     suspects = np.flatnonzero(np.any(judge(mesh, rays, hits, pairs), axis=0))
     if len(suspects) == 0:
         return np.zeros(3, int)
@@ -104,13 +105,13 @@ def count_wrong(mesh, rays, hits, pairs):
 
 
 def find_leaks(mesh, rays, hits, inside):
-    """Tells which rays leaked."""
+    """Returns an array of booleans: the rays that leaked. `inside` says whether the rays begin inside the mesh."""
     if not inside:
         return ~(hits.t < 1)  # the point at t = 1 is deep inside
     hit = np.flatnonzero(hits.triangle_ix != MISS)
     a, b, c = mesh.corners(hits.triangle_ix[hit])
     outward = normalized(np.cross(b - a, c - a))
-    # A hit at the edge that was aimed at (t = 1) may be either of its faces.
+    # A hit at the aimed edge (t = 1) may be of either of its faces.
     enters = ((outward * normalized(rays.directions[hit].astype(float))).sum(axis=1) < -1e-6) & (hits.t[hit] > 1.001)
     leaks = hits.triangle_ix == MISS
     leaks[hit[enters]] = True

@@ -1,4 +1,4 @@
-"""Closed meshes, and loose triangles."""
+"""Closed meshes, and a soup of loose triangles."""
 
 from dataclasses import dataclass
 
@@ -16,17 +16,19 @@ class Mesh:
     name: str
     vertices: np.ndarray
     triangles: np.ndarray
-    inner: object = None  # of a closed mesh: makes K points that are deep inside
+    inner: object = None  # only in closed meshes: called with (rng, K), it returns K points deep inside
 
     def corners(self, triangle_ix, dtype=np.float64):
         return [self.vertices[self.triangles[triangle_ix, i]].astype(dtype) for i in range(3)]
 
 
 def in_ball(rng, n, radius):
+    """Returns n random points in a ball around the origin."""
     return normalized(rng.normal(size=(n, 3))) * radius * rng.random((n, 1)) ** (1 / 3)
 
 
 def icosphere(levels):
+    """Returns the vertices and triangles of a unit sphere: an icosahedron subdivided `levels` times."""
     golden = (1 + 5**0.5) / 2
     vertices = [(a, b * golden, 0) for a in (-1, 1) for b in (-1, 1)]
     vertices = np.array(vertices + [(0, a, b) for a, b, _ in vertices] + [(b, 0, a) for a, b, _ in vertices], float)
@@ -52,7 +54,7 @@ def sphere(levels):
 
 
 def bumpy(rng, levels):
-    """A sphere with bumps, of whose vertices every twentieth is the tip of a needle, thin and up to ten radii long."""
+    """Returns a sphere with bumps. One in twenty vertices is the tip of a needle, thin and up to ten radii long."""
     vertices, triangles = icosphere(levels)
     radii = 1 + 0.1 * np.sin(7 * vertices).prod(axis=1) + 0.02 * rng.random(len(vertices))
     tips = rng.random(len(vertices)) < 0.05
@@ -62,6 +64,8 @@ def bumpy(rng, levels):
 
 
 def torus(n_around, n_across):
+    """Returns a torus of radii 1 and 0.4 with 2 * n_around * n_across triangles."""
+
     def inner(rng, n):
         angle = rng.random(n) * 2 * np.pi
         return np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) + in_ball(rng, n, 0.2)
@@ -81,7 +85,7 @@ def torus(n_around, n_across):
 
 
 def soup(rng, n):
-    """Loose triangles, half of them needles whose short edge is 1e-5 to 1e-2 of the long one."""
+    """Returns loose triangles. Half of them are needles, whose short edge is 1e-5 to 1e-2 of the long one."""
     a = rng.uniform(-1, 1, (n, 1, 3))
     corners = a + np.concatenate([np.zeros((n, 1, 3)), rng.normal(size=(n, 2, 3)) * 0.3], axis=1)
     thin = np.arange(n) % 2 == 0
@@ -94,6 +98,7 @@ def soup(rng, n):
 
 
 def assert_closed(mesh):
+    """Asserts that each edge has exactly one partner in the opposite direction, and that the faces point outwards."""
     edges = mesh.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).tolist()
     directed = set(map(tuple, edges))
     assert len(directed) == len(edges) and all((b, a) in directed for a, b in directed), f"{mesh.name} is not closed"

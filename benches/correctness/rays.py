@@ -1,4 +1,4 @@
-"""Rays at edges and vertices, and random and nasty ones."""
+"""Sets of rays: at edges and vertices, random ones, and nasty ones."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from meshes import normalized
 
 @dataclass
 class Rays:
-    """Float32 origins and directions, K x 3 each."""
+    """Origins and directions, float32 arrays of K x 3 each."""
 
     origins: np.ndarray
     directions: np.ndarray
@@ -30,7 +30,7 @@ class Rays:
 
 
 def on_edges(rng, mesh, n):
-    """Points on random edges; a quarter of them are vertices."""
+    """Returns n points on random edges. A quarter of them are vertices."""
     triangle, edge = rng.integers(len(mesh.triangles), size=n), rng.integers(3, size=n)
     ends = [mesh.vertices[mesh.triangles[triangle, i]].astype(float) for i in (edge, (edge + 1) % 3)]
     weight = rng.random((n, 1)) * (rng.random((n, 1)) < 0.75)
@@ -38,6 +38,8 @@ def on_edges(rng, mesh, n):
 
 
 def leak_rays(rng, mesh, n, inside):
+    """Returns n rays at edges and vertices of a closed mesh: from points deep inside, or from outside towards such
+    points."""
     targets, inner = on_edges(rng, mesh, n), mesh.inner(rng, n)
     if inside:
         return Rays(inner, targets - inner.astype(np.float32))
@@ -47,7 +49,7 @@ def leak_rays(rng, mesh, n, inside):
 
 
 def judged_rays(rng, mesh, n):
-    """Random rays, and all kinds of nasty ones, n of each."""
+    """Yields random rays, and four kinds of nasty rays, n of each."""
     box = mesh.vertices.min(axis=0).astype(float), mesh.vertices.max(axis=0).astype(float)
     size = np.linalg.norm(box[1] - box[0])
 
@@ -59,11 +61,11 @@ def judged_rays(rng, mesh, n):
 
     origins = around()
     yield Rays(origins, anywhere() - origins)
-    # Rays parallel to an axis, half of them in a plane through a vertex.
+    # Rays parallel to an axis. The lines of half of them pass through a vertex.
     axis = np.eye(3)[rng.integers(3, size=n)]
     through = np.where(rng.random((n, 1)) < 0.5, mesh.vertices[rng.integers(len(mesh.vertices), size=n)], anywhere())
     yield Rays(through - axis * size * rng.choice([-2, 0, 1], (n, 1)), axis * rng.choice([-1, 1], (n, 1)))
-    # Rays at edges, whose directions are of all lengths.
+    # Rays at edges. The lengths of their directions vary by six orders of magnitude.
     origins = around()
     scales = 10 ** rng.uniform(-3, 3, (n, 1))
     yield Rays(origins, (on_edges(rng, mesh, n) - origins.astype(np.float32)) * scales)

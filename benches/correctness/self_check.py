@@ -1,4 +1,4 @@
-"""Plants errors, to see that the judge counts them."""
+"""A check of the judge: it plants errors among right answers, all of which must be counted."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from rays import judged_rays, leak_rays
 
 
 def exact_hits(mesh, rays, pairs):
-    """The judge's own answers: the nearest triangle that the ray crosses."""
+    """Returns the judge's own answers: the nearest triangle that each ray crosses."""
     ray_ix, triangle_ix, crossings = pairs.ray_ix, pairs.triangle_ix, pairs.crossings
     crossed = np.flatnonzero((crossings.inside >= 0) & (crossings.t > 0))
     crossed = crossed[np.lexsort((crossings.t[crossed], ray_ix[crossed]))]
@@ -20,7 +20,7 @@ def exact_hits(mesh, rays, pairs):
 
 
 def self_check(rng, n):
-    """Plants wrong answers among right ones; all of them must be counted, and nothing else."""
+    """Plants wrong answers among right ones. Asserts that all of them are counted, and nothing else."""
     mesh, n_planted = sphere(3), 7
     rays = next(judged_rays(rng, mesh, n))
     pairs = pair_up(mesh, rays)

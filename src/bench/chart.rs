@@ -1,4 +1,4 @@
-//! Bars in groups, as SVG.
+//! Bar charts as SVG, with the bars in groups.
 
 use std::error::Error;
 
@@ -11,17 +11,19 @@ use plotters::{
     },
 };
 
-/// Pixels.
+/// Height of the picture, in pixels.
 const HEIGHT: u32 = 480;
-/// Pixels of a group, of the margin beside all groups, and at least of the picture.
+/// Width of a group, in pixels.
 const GROUP_WIDTH: u32 = 96;
+/// Width beside all groups, in pixels.
 const SIDE_WIDTH: u32 = 100;
+/// Smallest width of the picture, in pixels.
 const MIN_WIDTH: u32 = 640;
-/// Of a group's width, what its bars fill.
+/// Fraction of a group's width that its bars fill.
 const BARS_SHARE: f64 = 0.8;
-/// Of the value axis, what stays free above the bars for the legend.
+/// Fraction of the value axis that stays free above the bars for the legend.
 const LEGEND_SHARE: f64 = 0.25;
-/// Eight colours that the colour-blind can tell apart (Okabe and Ito 2008, its yellow darkened).
+/// Eight colours that colour-blind people can tell apart (Okabe and Ito 2008, with a darker yellow).
 const COLOURS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
@@ -33,14 +35,14 @@ const COLOURS: [RGBColor; 8] = [
     RGBColor(90, 90, 90),
 ];
 
-/// Values of several series, those of one group side by side.
+/// A bar chart of several series. The bars of one group are side by side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BarChart {
     pub title: String,
-    /// Along the value axis.
+    /// Unit of the values, written along the value axis.
     pub unit: String,
     pub scale: Scale,
-    /// Names, one a group; a line break starts a second line.
+    /// Names of the groups. A line break starts a second line.
     pub groups: Vec<String>,
     pub series: Vec<Series>,
 }
@@ -49,21 +51,21 @@ pub struct BarChart {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
     pub name: String,
-    /// One a group, above 0; none: no bar.
+    /// One value per group, above 0, or `None` for no bar.
     pub values: Vec<Option<f64>>,
 }
 
-/// How long a bar is.
+/// Scale of the value axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// From 0.
+    /// Linear, from 0.
     Linear,
-    /// From the power of ten below the least value.
+    /// Logarithmic, from the power of ten at or below the least value.
     Logarithmic,
 }
 
 impl Scale {
-    /// A value's place on the axis.
+    /// Returns a value's position on the axis.
     fn place(self, value: f64) -> f64 {
         match self {
             Self::Linear => value,
@@ -71,7 +73,7 @@ impl Scale {
         }
     }
 
-    /// Bottom and top of the axis; the legend has room above the longest bar.
+    /// Returns the positions of the bottom and the top of the axis, with space for the legend above the longest bar.
     fn axis(self, values: impl Iterator<Item = f64>) -> (f64, f64) {
         let values = values.filter(|value| *value > 0.0).map(|value| self.place(value));
         let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
@@ -83,7 +85,7 @@ impl Scale {
         (bottom, bottom + length / (1.0 - LEGEND_SHARE))
     }
 
-    /// Most labels of an axis.
+    /// Returns the largest number of labels on an axis.
     fn n_labels(self, length: f64) -> usize {
         match self {
             Self::Linear => 10,
@@ -91,7 +93,7 @@ impl Scale {
         }
     }
 
-    /// What stands beside a place on the axis.
+    /// Returns the label of a position on the axis, which may be empty.
     fn label(self, place: f64) -> String {
         let is_power = (place - place.round()).abs() < 1e-6;
         match self {
@@ -103,7 +105,7 @@ impl Scale {
 }
 
 impl BarChart {
-    /// The chart as an SVG file's text.
+    /// Returns the text of an SVG file.
     pub fn svg(&self) -> String {
         let mut svg = String::new();
         self.draw(&mut svg).expect("drawing to memory");
@@ -163,7 +165,7 @@ impl BarChart {
         Ok(())
     }
 
-    /// Left and right end of a bar; a group is 1 wide.
+    /// Returns the left and the right end of a bar, in widths of a group.
     fn bar(&self, group_ix: usize, series_ix: usize) -> (f64, f64) {
         let width = BARS_SHARE / self.series.len() as f64;
         let left = group_ix as f64 + (1.0 - BARS_SHARE) / 2.0 + series_ix as f64 * width;
@@ -186,7 +188,7 @@ mod tests {
         }
     }
 
-    /// Heights of the bars of each series, px: those rectangles that have its colour, less the legend's.
+    /// Returns the heights of a series' bars in pixels: all rectangles of its colour except the legend's.
     fn heights(svg: &str, series_ix: usize) -> Vec<f64> {
         let RGBColor(r, g, b) = COLOURS[series_ix];
         let colour = format!("#{r:02X}{g:02X}{b:02X}");

@@ -1,26 +1,31 @@
-//! Whether two ways of tracing found the same.
+//! Comparison of the hits of two tracers on the same rays.
 
 use serde::Serialize;
 
 use super::rays::RayKind;
 use crate::layout::{Hit, NO_TRIANGLE};
 
-/// Distances, relative to their own size, that the same hit may be computed at: of one triangle, whose plane the ray
-/// may meet at any angle, and of two, which then touch or share the edge that the ray meets.
+/// Relative difference of two distances to the same triangle that still counts as the same hit. It is large because
+/// the ray may meet the triangle's plane at any angle.
 const SAME_TRIANGLE: f32 = 1.0 / 1024.0;
+/// Relative difference of the distances to two triangles that still counts as the same point. The triangles then
+/// touch there or share the edge that the ray meets.
 const TWO_TRIANGLES: f32 = 1.0 / 65536.0;
 
-/// How many hits of a set of rays are not the expected ones.
+/// Numbers of hits in a set of rays that differ from those of the same arithmetic on the CPU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Difference {
-    /// Hits elsewhere, and misses in place of hits or hits in place of misses.
+    /// Hits at another distance, misses in place of hits, and hits in place of misses.
     pub n_differing: u64,
-    /// Another triangle at the same distance: rays that meet an edge.
+    /// Hits of another triangle at the same distance, which occur where rays meet an edge.
     pub n_grazing: u64,
 }
 
 impl Difference {
-    /// Of `found`, one hit a ray, from `expected`. Of hits that need not be the closest, only their being counts.
+    /// Compares `found` with `expected`, each with one hit per ray. For any-hit rays, only hit or miss counts.
+    ///
+    /// # Panics
+    /// The numbers of hits differ.
     pub fn of(kind: RayKind, expected: &[Hit], found: &[Hit]) -> Self {
         assert_eq!(expected.len(), found.len(), "one hit a ray");
         let mut difference = Self::default();
@@ -34,33 +39,37 @@ impl Difference {
         difference
     }
 
-    /// The greater numbers of both.
+    /// Returns the maximum of both in each number.
     pub fn max(self, other: Self) -> Self {
         Self { n_differing: self.n_differing.max(other.n_differing), n_grazing: self.n_grazing.max(other.n_grazing) }
     }
 
-    /// Whether rounding explains it: one in 100,000 rays may slip past an outline that another way of computing hits.
+    /// Returns whether rounding explains the difference: one in 100,000 rays may pass an outline that it hits with
+    /// other rounding.
     pub fn is_rounding(&self, n_rays: usize) -> bool {
         self.n_differing <= n_rays as u64 / 100_000
     }
 }
 
-/// Of the distance of a hit, what two arithmetics may differ by: 2^-13. Corners and products are rounded by 2^-24 each,
-/// and a plane that a ray meets at a grazing angle moves its hit by a multiple of that.
+/// Relative difference of a hit's distance that two arithmetics may have: 2^-13. Corners and products are rounded by
+/// 2^-24 each. If a ray meets a plane at a grazing angle, its hit moves by a multiple of that.
 pub const T_TOLERANCE: f32 = 1.0 / 8192.0;
 
-/// How many hits of a set of rays are not those of a tracer that computes them otherwise. Which triangle was hit says
-/// nothing: many share edges and corners.
+/// Numbers of hits in a set of rays that differ from those of a tracer with another arithmetic. The triangle that was
+/// hit is not compared, since many triangles share edges and corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Apart {
-    /// A hit here and a miss there, or what is neither: a distance that is no number.
+    /// Rays that hit with one tracer and miss with the other, or whose distance is NaN.
     pub n_hit_or_miss: u64,
-    /// Distances that differ by more than [`T_TOLERANCE`] of themselves.
+    /// Distances whose relative difference exceeds [`T_TOLERANCE`].
     pub n_distance: u64,
 }
 
 impl Apart {
-    /// Of `found`, one hit a ray, from `reference`. Of hits that need not be the closest, only their being counts.
+    /// Compares `found` with `reference`, each with one hit per ray. For any-hit rays, only hit or miss counts.
+    ///
+    /// # Panics
+    /// The numbers of hits differ.
     pub fn of(kind: RayKind, reference: &[Hit], found: &[Hit]) -> Self {
         assert_eq!(reference.len(), found.len(), "one hit a ray");
         let mut apart = Self::default();
@@ -76,19 +85,19 @@ impl Apart {
         apart
     }
 
-    /// Of both kinds.
+    /// Returns the number of differences of both kinds.
     pub fn n_differing(&self) -> u64 {
         self.n_hit_or_miss + self.n_distance
     }
 
-    /// Whether rounding explains it: one in 10,000 rays. A tracer that does not know where a ray starts may find that
-    /// triangle again.
+    /// Returns whether rounding explains the difference, which it does for one in 10,000 rays. A tracer that does not
+    /// know a ray's source triangle may hit that triangle again.
     pub fn is_rounding(&self, n_rays: usize) -> bool {
         self.n_differing() <= n_rays as u64 / 10_000
     }
 }
 
-/// Whether it is one, and no miss and no number.
+/// Returns whether it is a hit: neither a miss nor at a distance of NaN.
 pub fn is_hit(hit: &Hit) -> bool {
     hit.triangle_ix != NO_TRIANGLE && !hit.t.is_nan()
 }
@@ -121,7 +130,7 @@ mod tests {
         Hit { t, triangle_ix, u: 0.25, v: 0.5 }
     }
 
-    /// Of one wrong hit among right ones: differing, grazing.
+    /// Returns the numbers of differing and of grazing hits for one wrong hit among right ones.
     fn counts(kind: RayKind, expected: Hit, found: Hit) -> (u64, u64) {
         let right = [hit(1.0, 3), MISS];
         let difference = Difference::of(kind, &[right[0], expected, right[1]], &[right[0], found, right[1]]);
@@ -153,7 +162,7 @@ mod tests {
         assert_eq!(counts(RayKind::Shadow, hit(2.0, 7), hit(9.0, 1)), (0, 0));
     }
 
-    /// Of one wrong hit among right ones: hit or miss, distance.
+    /// Returns the numbers of hit-or-miss and of distance differences for one wrong hit among right ones.
     fn apart(kind: RayKind, reference: Hit, found: Hit) -> (u64, u64) {
         let right = [hit(1.0, 3), MISS];
         let apart = Apart::of(kind, &[right[0], reference, right[1]], &[right[0], found, right[1]]);

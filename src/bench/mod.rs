@@ -1,18 +1,19 @@
-//! Measurements: what is timed, how often, and what it is compared with. `kdray bench` prints what they find.
+//! Benchmarks. `kdray bench` runs them and prints their reports. Each benchmark with a report is called a suite.
 //!
 //! ```text
-//! paper      the four shipped scenes, frame by frame, beside the paper's own times
-//! traversal  every way through the kd-tree on four sets of rays
-//!   stage      scene -> room, camera, light, tree
+//! paper      suite: whole frames of the four shipped scenes, beside the paper's own times
+//! traversal  suite: all traversals of the kd-tree and the searches through grids, on four sets of rays
+//!   variant    an acceleration structure with a search through it
+//!   stage      scene -> room, camera, light, acceleration structures
 //!   rays       stage -> camera rays, and the rays that leave their hits
-//!   difference hits -> how many are not what the CPU finds
-//! driver     the traversal against the driver's own ray tracing
-//! size       one shape of ever more triangles
+//!   difference hits -> the number that differ from the CPU's
+//! driver     suite: the searches against the driver's own ray tracing
+//! size       suite: one shape of more and more triangles
 //! chart      numbers -> SVG
 //! ```
 //!
-//! Times are medians of many runs after a warm-up, and what is compared runs in turns, so that a clock that drifts
-//! favours nobody.
+//! Times are medians of many runs after a warm-up. Runs that are compared take turns, so that a drifting clock
+//! affects all of them alike.
 
 pub mod chart;
 pub mod difference;
@@ -28,11 +29,11 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-/// How long a device works before its times count. One that has been idle for some seconds runs at a low clock (an H200
-/// at 345 MHz instead of 1980) until it has been busy for a while, and short bursts don't do.
+/// Time that a device works before its times count. A device that has been idle for some seconds runs at a low clock
+/// (an H200 at 345 MHz instead of 1980 MHz) until it has been busy for a while; short bursts do not raise the clock.
 const WARM_UP: Duration = Duration::from_millis(200);
 
-/// Does the work again and again until the device is warm; at least once.
+/// Repeats the work for [`WARM_UP`], at least once.
 fn warm_up<E>(mut work: impl FnMut() -> Result<(), E>) -> Result<(), E> {
     let begin = Instant::now();
     while {
@@ -42,17 +43,20 @@ fn warm_up<E>(mut work: impl FnMut() -> Result<(), E>) -> Result<(), E> {
     Ok(())
 }
 
-/// Numbers from repeated runs, in whatever unit.
+/// Median, minimum and maximum of numbers from repeated runs, in any unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// Of an even number, the upper of the two in the middle.
+    /// Median. If there is an even number of numbers, the larger of the two in the middle.
     pub median: f64,
     pub min: f64,
     pub max: f64,
 }
 
 impl Spread {
-    /// None for no numbers. They must not be NaN.
+    /// Returns the spread of some numbers, or `None` if there are none.
+    ///
+    /// # Panics
+    /// A number is NaN.
     pub fn of(numbers: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut sorted: Vec<f64> = numbers.into_iter().collect();
         sorted.sort_by(|a, b| a.partial_cmp(b).expect("a measured number"));
@@ -60,7 +64,8 @@ impl Spread {
         Some(Self { median: sorted[sorted.len() / 2], min, max })
     }
 
-    /// Million rays a second, of times in milliseconds that each took `n_rays`; none where a time is 0.
+    /// Converts times in milliseconds, each for `n_rays` rays, to million rays per second. Returns `None` if a time
+    /// is 0.
     pub fn mrays_per_s(&self, n_rays: u64) -> Option<Self> {
         let rate = |ms: f64| n_rays as f64 / ms / 1e3;
         (self.min > 0.0).then(|| Self { median: rate(self.median), min: rate(self.max), max: rate(self.min) })

@@ -1,4 +1,4 @@
-//! The paper's own table: its four scenes at its three sizes, a frame on the GPU and on one thread of the CPU.
+//! The benchmark of the paper's table: four scenes at three sizes, rendered on the GPU and on one thread of the CPU.
 
 use std::sync::Arc;
 
@@ -22,15 +22,16 @@ use crate::{
 
 /// The shipped scenes' names, in the paper's order.
 pub const SCENES: [&str; 4] = ["cornell", "paper2", "paper3", "paper4"];
-/// The paper's sizes, pixels.
+/// The paper's picture sizes, in pixels.
 pub const SIZES: [(u32, u32); 3] = [(640, 480), (800, 600), (1024, 768)];
-/// Milliseconds of the paper's table (CPU, then a GTX 285): a row a size, a column a scene.
+/// Milliseconds of the paper's table, each pair for the CPU and for a GTX 285. One row per size, one column per
+/// scene.
 const REPORTED_MS: [[(u32, u32); 4]; 3] = [
     [(2316, 32), (5590, 82), (10_059, 411), (6459, 374)],
     [(3551, 49), (8523, 108), (15_054, 539), (10_103, 534)],
     [(5723, 77), (14_106, 188), (24_736, 730), (16_213, 848)],
 ];
-/// What the paper reports for a scene of the same triangle count; its geometry was not published.
+/// The paper's times for a scene of the same triangle count; its geometry was not published.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Reported {
     pub cpu_ms: f64,
@@ -39,7 +40,7 @@ pub struct Reported {
 }
 
 impl Reported {
-    /// None for a scene or a size that the paper does not have.
+    /// Returns `None` for a scene or a size that the paper does not have.
     pub fn of(scene: &str, size: (u32, u32)) -> Option<Self> {
         let row = SIZES.iter().position(|known| *known == size)?;
         let column = SCENES.iter().position(|known| *known == scene)?;
@@ -49,15 +50,16 @@ impl Reported {
     }
 }
 
-/// The scene's own options at another size.
+/// Returns the scene's own options at another size and with another traversal.
 pub fn options(scene: &FlatScene, (width, height): (u32, u32), traversal: Traversal) -> RenderOptions {
     RenderOptions { traversal, width, height, ..scene.defaults.options() }
 }
 
-/// Frames drawn on a device by the primary rays that suit it, after a warm-up, which also finds how many batches the frame needs.
+/// Draws frames on a device and returns their profiles. The method for primary rays is the one that suits the device.
+/// A warm-up comes first; it also finds the number of batches that a frame needs.
 ///
 /// # Errors
-/// As [`BandedRenderer::new`] and [`BandedRenderer::draw`].
+/// Fails as [`BandedRenderer::new`] and [`BandedRenderer::draw`] do.
 pub fn draw_on_gpu(
     context: &Arc<Context>,
     world: &World,
@@ -73,7 +75,8 @@ pub fn draw_on_gpu(
     (0..n_frames).map(|_| draw()).collect()
 }
 
-/// Frames drawn by one thread, as the paper's were, on the way through the tree that suits it.
+/// Draws frames on one CPU thread, as the paper does, and returns their profiles. The traversal is the one that suits
+/// the CPU.
 ///
 /// # Errors
 /// The thread cannot be started.
@@ -89,32 +92,32 @@ pub fn draw_on_cpu(
     Ok(thread.install(|| (0..n_frames).map(|_| draw().1).collect()))
 }
 
-/// One scene at one size.
+/// The result for one scene at one size.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
     pub scene: String,
-    /// Pixels.
+    /// Width of the picture, in pixels.
     pub width: u32,
-    /// Pixels.
+    /// Height of the picture, in pixels.
     pub height: u32,
     pub max_depth: u32,
     pub n_triangles: usize,
     pub n_primary_rays: u64,
     pub n_secondary_rays: u64,
     pub n_shadow_rays: u64,
-    /// None where the device has no timestamps.
+    /// Time of a frame on the GPU; none where the device has no timestamps.
     pub gpu_ms: Option<Spread>,
-    /// None where the CPU was left out.
+    /// Time of a frame on one CPU thread; none where the CPU was left out.
     pub cpu_ms: Option<Spread>,
-    /// Median CPU time in median GPU times.
+    /// Median CPU time divided by median GPU time.
     pub speedup: Option<f64>,
-    /// Million rays of all kinds in a second of whole frames on the GPU.
+    /// Million rays per second in whole frames on the GPU, where all kinds of rays count.
     pub mrays_per_s: Option<Spread>,
     pub paper: Option<Reported>,
 }
 
 impl Row {
-    /// From the profiles of frames drawn on a device, at least one, and on one thread.
+    /// Makes the row from the profiles of one or more frames on a device and of frames on one CPU thread.
     pub fn new(scene: &FlatScene, options: &RenderOptions, on_gpu: &[Profile], on_cpu: &[Profile]) -> Self {
         let size = (options.width, options.height);
         let times = |frames: &[Profile]| Spread::of(frames.iter().filter_map(|frame| frame.frame_ms));
@@ -141,32 +144,32 @@ impl Row {
         row
     }
 
-    /// Primary, secondary and shadow rays together.
+    /// Returns the number of primary, secondary and shadow rays together.
     pub fn n_rays(&self) -> u64 {
         self.n_primary_rays + self.n_secondary_rays + self.n_shadow_rays
     }
 }
 
-/// What the suite found.
+/// The suite's report.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// `paper`.
+    /// Name of the suite: `paper`.
     pub suite: &'static str,
     /// The device's own name.
     pub device: String,
     /// The driver's name and version.
     pub driver: String,
-    /// Way through the tree on the device.
+    /// Traversal of the kd-tree on the device.
     pub traversal: String,
-    /// Frames on the device, less the warm-up.
+    /// Number of frames on the device, without those of the warm-up.
     pub n_gpu_frames: u16,
-    /// 0 where the CPU was left out.
+    /// Number of frames on one CPU thread; 0 where the CPU was left out.
     pub n_cpu_frames: u16,
     pub rows: Vec<Row>,
 }
 
 impl Report {
-    /// Times of kdray beside the paper's, on a logarithmic scale.
+    /// Returns a chart of kdray's times beside the paper's, on a logarithmic scale.
     pub fn chart(&self) -> BarChart {
         let column = |name: &str, value: fn(&Row) -> Option<f64>| Series {
             name: name.to_owned(),

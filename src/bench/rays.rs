@@ -1,4 +1,4 @@
-//! Sets of rays from a scene's own hits: what a renderer asks of a tree, from coherent to scattered.
+//! Sets of rays such as a renderer casts in a scene, from coherent to scattered.
 
 use bytemuck::Zeroable;
 use glam::Vec3;
@@ -13,22 +13,22 @@ use crate::{
     reference::{light::sample_light, primary_hit::primary_rays, surface::Surface},
 };
 
-/// What the rays of a set are for.
+/// Purpose of the rays of a set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RayKind {
-    /// The camera's, through pixel centres.
+    /// Camera rays through the pixels' centres.
     Primary,
-    /// From each primary hit to the light, any hit.
+    /// Any-hit rays from each primary hit to the light.
     Shadow,
-    /// Reflected at each primary hit.
+    /// Rays reflected at each primary hit.
     Mirror,
-    /// From each primary hit into the hemisphere above it, by the cosine.
+    /// Rays from each primary hit into the hemisphere above it, with a cosine distribution.
     Diffuse,
 }
 
 impl RayKind {
-    /// In the order of falling coherence.
+    /// All kinds, in the order of decreasing coherence.
     pub const ALL: [Self; 4] = [Self::Primary, Self::Shadow, Self::Mirror, Self::Diffuse];
 
     pub fn name(self) -> &'static str {
@@ -40,22 +40,22 @@ impl RayKind {
         }
     }
 
-    /// Whether any hit answers such a ray, not the closest alone.
+    /// Returns whether such rays search for any hit instead of the closest one.
     pub fn is_any_hit(self) -> bool {
         self == Self::Shadow
     }
 }
 
-/// Rays of one kind, in the order of the renderer's queue: tile by tile, without gaps. None has a source triangle:
-/// those that leave a surface start clear of it.
+/// Rays of one kind, in the order of the renderer's queue: tile by tile, without gaps. They have no source triangle,
+/// since rays that leave a surface start at a distance from it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RaySet {
     pub kind: RayKind,
     pub rays: Vec<PathRay>,
 }
 
-/// The four sets, in the order of [`RayKind::ALL`]: `width * height` primary rays, and one ray of each other kind for
-/// each of their hits. The same stage gives the same rays.
+/// Returns the four sets, in the order of [`RayKind::ALL`]: `width * height` primary rays, and one ray of each other
+/// kind for each of their hits. The same stage gives the same rays.
 pub fn ray_sets(stage: &Stage) -> [RaySet; 4] {
     let bindings = stage.inputs();
     let mut primary = vec![PathRay::zeroed(); (stage.frame.width * stage.frame.height) as usize];
@@ -76,7 +76,7 @@ pub fn ray_sets(stage: &Stage) -> [RaySet; 4] {
     std::array::from_fn(|_| sets.next().map(|(kind, rays)| RaySet { kind, rays }).expect("as many sets as kinds"))
 }
 
-/// Reflected at the shading normal, or where that leads into the surface, at the geometric one.
+/// Reflects a direction at the shading normal, or at the geometric normal if the former leads into the surface.
 fn mirrored(direction: Vec3, surface: &Surface) -> Vec3 {
     let at = |normal: Vec3| (direction - 2.0 * direction.dot(normal) * normal).normalize();
     let smooth = at(surface.shading);

@@ -1,5 +1,5 @@
-//! Cost against size: one shape cut into ever more triangles, as many rays each time. Through a good tree the time of a
-//! ray grows like the logarithm of the number of triangles.
+//! The benchmark of cost against size: one shape cut into more and more triangles, with the same number of rays each
+//! time. In a good tree, the time of a ray grows like the logarithm of the number of triangles.
 
 use std::{sync::Arc, time::Instant};
 
@@ -25,20 +25,21 @@ use crate::{
     world::FlatScene,
 };
 
-/// Numbers of triangles that are measured unless others are asked for.
+/// Numbers of triangles that are measured by default.
 pub const SIZES: [u32; 3] = [10_000, 100_000, 1_000_000];
-/// Fewest triangles of which the knot can be made so that it still looks like one.
+/// Smallest number of triangles of the knot; with fewer it no longer looks like a knot.
 pub const MIN_TRIANGLES: u32 = 1000;
-/// The generators' own limit.
+/// Largest number of triangles of the knot, which is the generators' limit.
 pub const MOST_TRIANGLES: u32 = MAX_TRIANGLES as u32;
 
-/// A rippled torus knot of so many triangles, one fewer if they are odd, of about equal sides.
+/// Makes a rippled torus knot of `n_triangles` triangles, or one fewer if the number is odd. Its quads are about as
+/// long as wide.
 ///
 /// # Panics
-/// On a number beyond [`MIN_TRIANGLES`] and [`MOST_TRIANGLES`].
+/// The number is not within [`MIN_TRIANGLES`] to [`MOST_TRIANGLES`].
 pub fn knot(n_triangles: u32) -> Scene {
     assert!((MIN_TRIANGLES..=MOST_TRIANGLES).contains(&n_triangles), "no knot has {n_triangles} triangles");
-    // The knot is 13.5 times as long as the tube is around: n / 2 quads, as long as they are wide.
+    // The knot is 13.5 times as long as the tube's circumference, and has n / 2 quads that are as long as wide.
     let segments = (13.5 * f64::from(n_triangles) / 2.0).sqrt() as u32;
     let description = format!(
         "generator = \"torus_knot\"\np = 2\nq = 5\nradius = 1.35\nswing = 0.62\ntube = 0.36\nsegments = {segments}\n\
@@ -60,7 +61,7 @@ pub fn knot(n_triangles: u32) -> Scene {
     }
 }
 
-/// The knot in a closed room, and what it took to make it.
+/// The knot in a closed room, and the time of making it.
 pub struct Sized {
     pub stage: Stage,
     n_triangles: usize,
@@ -68,7 +69,7 @@ pub struct Sized {
 }
 
 impl Sized {
-    /// `size`: pixels, one primary ray each.
+    /// Makes the knot and the room. `size` is in pixels, with one primary ray each.
     pub fn new(n_triangles: u32, size: (u32, u32), build_options: &BuildOptions) -> Self {
         let begin = Instant::now();
         let scene = FlatScene::new(&knot(n_triangles)).expect("a knot of a few units");
@@ -76,10 +77,10 @@ impl Sized {
         Self { n_triangles: scene.triangles.len(), stage: Stage::in_room(scene, size, build_options), generate_ms }
     }
 
-    /// Casts the rays `n_times` on a device, or without one on the current rayon pool.
+    /// Casts the rays `n_times` on a device, or on the current rayon pool if there is none.
     ///
     /// # Errors
-    /// As [`Tracers::new`] and [`Tracers::measure`].
+    /// Fails as [`Tracers::new`] and [`Tracers::measure`] do.
     pub fn measure(
         &self,
         context: Option<&Arc<Context>>,
@@ -107,39 +108,40 @@ impl Sized {
     }
 }
 
-/// One size.
+/// The result for one size.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// Of the knot; the room has 12 more.
+    /// Number of the knot's triangles; the room has 12 more.
     pub n_triangles: usize,
-    /// The mesh, wall-clock.
+    /// Wall-clock time of generating the mesh.
     pub generate_ms: f64,
-    /// The structure: a kd-tree wall-clock; a grid on the GPU, or wall-clock where the host builds it.
+    /// Time of building the structure. For a kd-tree it is wall-clock; for a grid it is GPU time, or wall-clock where
+    /// the host builds the grid.
     pub build_ms: f64,
-    /// As `tree` or `grid`.
+    /// Statistics of the structure, serialized under the key `tree` or `grid`.
     #[serde(flatten)]
     pub accel: Statistics,
-    /// One a set.
+    /// One entry per set.
     pub rays: Vec<RayCost>,
 }
 
-/// What the rays of a set cost.
+/// The cost of the rays of a set.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RayCost {
     pub rays: RayKind,
     pub n_rays: usize,
-    /// Of the whole set; none where the device has no timestamps.
+    /// Time of the whole set; none where the device has no timestamps.
     pub ms: Option<Spread>,
-    /// Nanoseconds.
+    /// Time of the whole set divided by the number of rays, in nanoseconds.
     pub ns_a_ray: Option<Spread>,
     pub steps_a_ray: StepsARay,
-    /// From the CPU's hits.
+    /// Difference from the CPU's hits.
     #[serde(flatten)]
     pub difference: Difference,
 }
 
 impl RayCost {
-    /// Of the set's only variant.
+    /// Takes the cost from a set with a single variant.
     fn new(set: &SetResult) -> Self {
         let variant = &set.variants[0];
         let ns = |ms: f64| ms * 1e6 / set.n_rays as f64;
@@ -155,54 +157,54 @@ impl RayCost {
     }
 }
 
-/// What the suite found.
+/// The suite's report.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// `size`.
+    /// Name of the suite: `size`.
     pub suite: &'static str,
     /// The device's own name, or the number of CPU threads.
     pub device: String,
     /// The driver's name and version; none on the CPU.
     pub driver: Option<String>,
     pub traversal: String,
-    /// Pixels, one primary ray each.
+    /// Width of the picture in pixels, with one primary ray each.
     pub width: u32,
-    /// Pixels.
+    /// Height of the picture in pixels.
     pub height: u32,
-    /// For building.
+    /// Number of CPU threads that build the tree.
     pub n_threads: usize,
-    /// Timed casts of each set.
+    /// Number of timed casts of each set.
     pub n_times: u16,
-    /// By size.
+    /// One row per size.
     pub rows: Vec<Row>,
 }
 
-/// From the least to the largest mesh, how many times as great as before.
+/// Growth from the first size to the last, as ratios.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Growth {
-    /// The logarithm of the number of triangles.
+    /// Ratio of the logarithms of the numbers of triangles.
     pub logarithm: f64,
-    /// By kind of ray.
+    /// Growth of each kind of ray.
     pub rays: Vec<RayGrowth>,
 }
 
-/// Of [`Growth`]: the mean ray of a kind.
+/// Growth of the mean ray of a kind, as ratios.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayGrowth {
     pub kind: RayKind,
-    /// Its time; none without timestamps.
+    /// Ratio of its times; none without timestamps.
     pub time: Option<f64>,
-    /// The nodes that it visits, whatever the caches hold.
+    /// Ratio of the numbers of nodes that it visits, which does not depend on caches.
     pub nodes: f64,
 }
 
 impl Report {
-    /// What the structure is made of: `nodes` or `cells`.
+    /// Returns the name of the structure's parts: `nodes` or `cells`.
     pub fn parts(&self) -> &'static str {
         self.rows.first().map_or("nodes", |row| row.accel.parts())
     }
 
-    /// None of fewer than two sizes.
+    /// Returns the growth, or `None` if there are fewer than two sizes.
     pub fn growth(&self) -> Option<Growth> {
         let [first, .., last] = &self.rows[..] else { return None };
         let logarithm = (last.n_triangles as f64).ln() / (first.n_triangles as f64).ln();
@@ -214,7 +216,7 @@ impl Report {
         Some(Growth { logarithm, rays: first.rays.iter().zip(&last.rays).map(growth).collect() })
     }
 
-    /// Times of a ray, a group a size, a bar a kind of rays.
+    /// Returns a chart of the times of a ray, with one group per size and one bar per kind of ray.
     pub fn chart(&self) -> BarChart {
         let kinds = self.rows.first().map_or(&[][..], |row| &row.rays);
         let series = |(kind_ix, cost): (usize, &RayCost)| Series {
@@ -230,7 +232,7 @@ impl Report {
         }
     }
 
-    /// The first rays whose hits differ from the CPU's on more of them than rounding explains, and the size.
+    /// Returns the first size and kind of rays with more hits that differ from the CPU's than rounding explains.
     pub fn first_wrong(&self) -> Option<(&Row, &RayCost)> {
         let mut pairs = self.rows.iter().flat_map(|row| row.rays.iter().map(move |cost| (row, cost)));
         pairs.find(|(_, cost)| !cost.difference.is_rounding(cost.n_rays))

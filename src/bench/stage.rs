@@ -1,4 +1,5 @@
-//! Where rays are cast: a scene, a room around it, a camera and a light.
+//! A stage, in which benchmarks cast rays: a scene with its acceleration structures, a camera, a light, and
+//! optionally a closed room around them.
 
 use std::time::Instant;
 
@@ -18,27 +19,29 @@ use crate::{
     world::{FlatScene, Geometry, World},
 };
 
-/// From the middle of the picture towards the eye, in a room: from the front, the right and above.
+/// Direction from the middle of the scene towards the eye in a room: to the front, the right and above. Not of unit
+/// length.
 const TOWARDS_EYE: Vec3 = Vec3::new(0.45, 0.35, 1.0);
 const VERTICAL_FOV_DEGREES: f32 = 60.0;
 
-/// A scene and its tree, ready for rays.
+/// A scene and its acceleration structures, ready for rays.
 pub struct Stage {
     /// The scene and its tree.
     pub world: World,
-    /// What it took to build the tree, wall-clock.
+    /// Wall-clock time of building the tree, in milliseconds.
     pub tree_build_ms: f64,
-    /// What any traversal reads beside the tree.
+    /// Data that traversals read beside the tree's nodes, for every traversal.
     pub links: TraversalLinks,
+    /// The uniform grid and the grid of two levels.
     grids: [Accel; 2],
     /// The camera's constants. `queue_capacity` is 0: there is no queue.
     pub frame: Frame,
-    /// Where shadow rays go to.
+    /// Light to which shadow rays go.
     pub light: Light,
 }
 
 impl Stage {
-    /// The scene seen by its own camera, lit by its first light (from above, if it has none).
+    /// Makes a stage of a scene, seen by its own camera and lit by its first light, or from above if it has none.
     ///
     /// # Panics
     /// The scene has a triangle without a material.
@@ -55,8 +58,8 @@ impl Stage {
         Self { links: TraversalLinks::all(world.tree()), world, grids, tree_build_ms, frame, light }
     }
 
-    /// The scene on the floor of a closed room, seen from inside the room, with a point light under its ceiling.
-    /// No ray from inside misses.
+    /// Makes a stage of a scene on the floor of a closed room, seen from inside the room, with a point light under
+    /// the ceiling. No ray from inside the room misses.
     pub fn in_room(mut scene: FlatScene, size: (u32, u32), build_options: &BuildOptions) -> Self {
         let room = Room::around(scene.bounds());
         scene.triangles.extend(room.walls());
@@ -66,17 +69,17 @@ impl Stage {
         Self::open(scene, size, build_options)
     }
 
-    /// The scene.
+    /// Returns the scene.
     pub fn scene(&self) -> &FlatScene {
         self.world.scene()
     }
 
-    /// The scene's kd-tree.
+    /// Returns the scene's kd-tree.
     pub fn tree(&self) -> &KdTree {
         self.world.tree()
     }
 
-    /// The kd-tree in numbers.
+    /// Returns the kd-tree's statistics.
     pub fn tree_statistics(&self) -> kdtree::Statistics {
         match self.world.statistics() {
             Statistics::KdTree(tree) => tree,
@@ -84,7 +87,7 @@ impl Stage {
         }
     }
 
-    /// The triangles with the structure that a variant searches.
+    /// Returns the triangles with the structure that a variant searches.
     pub fn geometry(&self, variant: Variant) -> Geometry<'_> {
         let accel = match variant {
             Variant::KdTree(_) => return self.world.geometry(),
@@ -94,7 +97,7 @@ impl Stage {
         Geometry::new(&self.scene().triangles, accel).expect("a grid of these triangles")
     }
 
-    /// The structure that a variant searches in numbers. If no device has built a grid, the host
+    /// Returns the statistics of the structure that a variant searches. If no device has built the grid, the host
     /// builds it.
     pub fn statistics(&self, variant: Variant) -> Statistics {
         match self.geometry(variant).accel() {
@@ -103,12 +106,12 @@ impl Stage {
         }
     }
 
-    /// What a variant on the CPU reads.
+    /// Returns the inputs of a variant on the CPU.
     pub fn inputs_of(&self, variant: Variant) -> KernelInputs<'_> {
         KernelInputs::of_geometry(self.geometry(variant)).with_links(&self.links)
     }
 
-    /// What a traversal of the kd-tree on the CPU reads.
+    /// Returns the inputs of a traversal of the kd-tree on the CPU.
     pub fn inputs(&self) -> KernelInputs<'_> {
         KernelInputs::new(&self.world, &self.frame).with_links(&self.links)
     }
@@ -123,12 +126,19 @@ struct Room {
 }
 
 impl Room {
-    /// Lengths are in radii of the sphere around the mesh's bounding box: walls 2 from the middle, the ceiling 1.5
-    /// above it, the floor 0.05 below the mesh, the eye where it sees the whole sphere (2.1), the light 0.1 below
-    /// the ceiling.
+    /// Makes a room around a mesh with the given bounds. In radii of the sphere around the mesh's bounding box, its
+    /// dimensions are:
+    ///
+    /// | part | position |
+    /// |---|---|
+    /// | walls | 2 from the middle |
+    /// | ceiling | 1.5 above the middle |
+    /// | floor | 0.05 below the mesh |
+    /// | eye | 2.1 from the middle, from where it sees the whole sphere |
+    /// | light | 0.1 below the ceiling |
     fn around((min, max): (Vec3, Vec3)) -> Self {
         let centre = (min + max) / 2.0;
-        // All in one point: any radius will do, but it must change the coordinates.
+        // If all corners are at one point, any radius is right that is large enough to change the coordinates.
         let radius = ((max - min).length() / 2.0).max(centre.abs().max_element() * 1e-3).max(1e-6);
         let distance = 1.05 / (VERTICAL_FOV_DEGREES / 2.0).to_radians().sin();
         let floor = Vec3::new(centre.x - 2.0 * radius, min.y - 0.05 * radius, centre.z - 2.0 * radius);
@@ -151,9 +161,10 @@ impl Room {
         }
     }
 
-    /// Two triangles a side. Hits are two-sided: their winding says nothing.
+    /// Returns the room's walls, two triangles per side. Their winding does not matter, since triangles are hit from
+    /// both sides.
     fn walls(&self) -> Vec<Triangle> {
-        // Bits 0, 1, 2 of a corner's number: at the greatest x, y, z.
+        // Bits 0, 1 and 2 of a corner's number are set where its x, y and z are the greatest.
         let corner = |n: u32| Vec3::select(BVec3::new(n & 1 != 0, n & 2 != 0, n & 4 != 0), self.max, self.min);
         let triangle = |v0, v1, v2| Triangle { v0, n0: FLAT_NORMAL, v1, n1: FLAT_NORMAL, v2, n2: FLAT_NORMAL };
         let mut walls = Vec::with_capacity(12);

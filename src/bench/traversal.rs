@@ -1,4 +1,5 @@
-//! Every search through the kd-tree and through grids on the same rays: how fast, and whether all find the same.
+//! The benchmark of searches through the kd-tree and through grids on the same rays: their speeds, and whether all
+//! find the same hits.
 
 use std::{sync::Arc, time::Instant};
 
@@ -25,22 +26,22 @@ use crate::{
     reference::counting::steps::{Steps, count_steps},
 };
 
-/// Timed casts of one variant before it is the next one's turn.
+/// Number of timed casts of one variant before the next variant's turn.
 pub const CASTS_A_TURN: u16 = 5;
 
 /// The variants on one stage, ready for rays.
 pub struct Tracers<'a> {
     stage: &'a Stage,
     variants: &'a [Variant],
-    /// One a variant; none: all threads of the CPU.
+    /// One caster per variant; `None` if the CPU casts with all threads of the current rayon pool.
     casters: Option<Vec<Caster>>,
 }
 
 impl<'a> Tracers<'a> {
-    /// On a device, or without one on the current rayon pool.
+    /// Prepares the variants on a device, or on the current rayon pool if there is none.
     ///
     /// # Errors
-    /// As [`Caster::new`].
+    /// Fails as [`Caster::new`] does.
     pub fn new(context: Option<&Arc<Context>>, stage: &'a Stage, variants: &'a [Variant]) -> Result<Self, GpuError> {
         let caster = |context, variant: Variant| Caster::new(context, stage.geometry(variant), variant.traversal());
         let casters = context.map(|context| variants.iter().map(|&variant| caster(context, variant)).collect());
@@ -50,7 +51,7 @@ impl<'a> Tracers<'a> {
     /// Casts the rays `n_times` with each variant, in turns, and compares the hits with those that the CPU finds.
     ///
     /// # Errors
-    /// As [`Caster::cast`].
+    /// Fails as [`Caster::cast`] does.
     pub fn measure(&mut self, set: &RaySet, n_times: u16) -> Result<SetResult, GpuError> {
         let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
         let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
@@ -85,15 +86,16 @@ impl<'a> Tracers<'a> {
         })
     }
 
-    /// Casts that each turn begins with, untimed: the rays have just been uploaded, another variant's structure is in the
-    /// caches, and while the CPU compared hits the device's clock may have fallen. One at least.
+    /// Returns the number of untimed casts at the beginning of each turn, at least one. They are needed because the
+    /// rays have just been uploaded, the caches hold another variant's structure, and the device's clock may have
+    /// fallen while the CPU compared hits.
     fn n_warm_up(&mut self, rays: &[Ray], query: Query) -> Result<u16, GpuError> {
         let Some(caster) = self.casters.as_mut().and_then(|casters| casters.first_mut()) else { return Ok(1) };
         let once_ms = caster.cast(rays, query, 1)?.gpu_ms.map_or(f64::INFINITY, |ms| ms.iter().sum());
         Ok((WARM_UP.as_secs_f64() * 1e3 / once_ms.max(1e-2)).clamp(1.0, 1000.0) as u16)
     }
 
-    /// Hits, and the milliseconds of each time (none without timestamps).
+    /// Returns the hits, and the milliseconds of each cast (`None` without timestamps).
     fn cast(
         &mut self,
         variant_ix: usize,
@@ -122,46 +124,47 @@ impl<'a> Tracers<'a> {
     }
 }
 
-/// How many casts each turn has: all together `n_times`.
+/// Returns the number of casts of each turn; they sum to `n_times`.
 pub(super) fn turns(n_times: u16) -> impl Iterator<Item = u16> {
     (0..n_times).step_by(CASTS_A_TURN.into()).map(move |first| CASTS_A_TURN.min(n_times - first))
 }
 
-/// One set of rays.
+/// The results on one set of rays.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SetResult {
     pub rays: RayKind,
     pub n_rays: usize,
-    /// As the CPU finds them.
+    /// Number of hits that the CPU finds.
     pub n_hits: usize,
-    /// In the order in which they were asked for.
+    /// In the order of the variants given to [`Tracers::new`].
     pub variants: Vec<VariantResult>,
 }
 
-/// One variant on one set of rays.
+/// The result of one variant on one set of rays.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VariantResult {
     pub traversal: String,
-    /// Of a whole set; none where the device has no timestamps.
+    /// Time of the whole set; none where the device has no timestamps.
     pub ms: Option<Spread>,
+    /// Million rays per second.
     pub mrays_per_s: Option<Spread>,
-    /// From the CPU's hits, in the worst turn.
+    /// Difference from the CPU's hits, in the worst turn.
     #[serde(flatten)]
     pub difference: Difference,
-    /// As the CPU takes them.
+    /// Steps of the same search on the CPU.
     pub steps_a_ray: StepsARay,
-    /// What the driver tells of the kernel; empty where it tells nothing.
+    /// The driver's statistics of the kernel; empty if it has none.
     pub kernel: Vec<Statistic>,
 }
 
 impl VariantResult {
-    /// Registers of an invocation, if the driver tells.
+    /// Returns the number of registers of an invocation, if the driver reports it.
     pub fn registers(&self) -> Option<StatisticValue> {
         self.kernel.iter().find(|statistic| statistic.name.contains("egister")).map(|statistic| statistic.value)
     }
 }
 
-/// What is read of the structure, in the mean of a set's rays.
+/// Numbers of elements that a ray reads of the structure, as the mean of a set's rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct StepsARay {
     /// Nodes of a kd-tree, cells of a grid.
@@ -186,10 +189,10 @@ impl StepsARay {
     }
 }
 
-/// What the suite found.
+/// The suite's report.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// `traversal`.
+    /// Name of the suite: `traversal`.
     pub suite: &'static str,
     /// The device's own name, or the number of CPU threads.
     pub device: String,
@@ -198,19 +201,19 @@ pub struct Report {
     pub scene: String,
     /// Whether the scene was put into a closed room.
     pub room: bool,
-    /// Pixels, one primary ray each.
+    /// Width of the picture in pixels, with one primary ray each.
     pub width: u32,
-    /// Pixels.
+    /// Height of the picture in pixels.
     pub height: u32,
     pub n_triangles: usize,
     pub tree: Statistics,
-    /// Timed casts of each set by each variant.
+    /// Number of timed casts of each set by each variant.
     pub n_times: u16,
     pub sets: Vec<SetResult>,
 }
 
 impl Report {
-    /// Speeds, a group a set, a bar a variant.
+    /// Returns a chart of the speeds, with one group per set and one bar per variant.
     pub fn chart(&self) -> BarChart {
         let n_variants = self.sets.first().map_or(0, |set| set.variants.len());
         let series = |variant_ix: usize| Series {
@@ -228,7 +231,7 @@ impl Report {
         }
     }
 
-    /// The first variant whose hits differ from the CPU's on more rays than rounding explains, and the set.
+    /// Returns the first set and variant with more hits that differ from the CPU's than rounding explains.
     pub fn first_wrong(&self) -> Option<(&SetResult, &VariantResult)> {
         let pairs = self.sets.iter().flat_map(|set| set.variants.iter().map(move |variant| (set, variant)));
         pairs.into_iter().find(|(set, variant)| !variant.difference.is_rounding(set.n_rays))

@@ -1,4 +1,4 @@
-//! What is measured side by side: acceleration structures with the searches through them.
+//! Variants, which benchmarks compare: each is an acceleration structure with a search through it.
 
 use std::{fmt, str::FromStr};
 
@@ -19,18 +19,18 @@ pub enum Variant {
 }
 
 impl Variant {
-    /// All variants but brute force, which is for small meshes only.
+    /// Returns all variants except brute force, which is for small meshes only.
     pub fn all() -> Vec<Self> {
         let traversals = Traversal::ALL.iter().filter(|&&traversal| traversal != Traversal::Brute);
         traversals.map(|&traversal| Self::KdTree(traversal)).chain([Self::Grid, Self::Grid2]).collect()
     }
 
-    /// The words of all variants, with commas.
+    /// Returns the words of all variants, separated by commas.
     pub fn words() -> String {
         format!("{}, {}, {}", Traversal::words(), AccelKind::Grid, AccelKind::Grid2)
     }
 
-    /// The structure that is searched.
+    /// Returns the kind of structure that is searched.
     pub fn accel(self) -> AccelKind {
         match self {
             Self::KdTree(_) => AccelKind::KdTree,
@@ -39,7 +39,7 @@ impl Variant {
         }
     }
 
-    /// The algorithm for the kd-tree; with a grid nothing depends on it.
+    /// Returns the traversal of the kd-tree. For a grid it is a value without effect.
     pub fn traversal(self) -> Traversal {
         match self {
             Self::KdTree(traversal) => traversal,

@@ -1,4 +1,4 @@
-//! A scene file's text to a scene.
+//! Conversion of a scene file's text into a scene.
 
 use std::{collections::HashMap, ops::Range, path::Path};
 
@@ -20,21 +20,21 @@ use super::{
 };
 use crate::frame::Denoise;
 
-/// Loads a scene file, and the meshes that it names relative to its folder.
+/// Loads a scene file and the meshes that it names. Their names are relative to the scene file's folder.
 pub(super) fn load_toml(path: &Path) -> Result<Scene, SceneError> {
     let text = read_utf8(path)?;
     let file = File { path, text: &text };
     assemble(&file, file.parse()?)
 }
 
-/// The file that errors name.
+/// A file and its text. Errors name the file and the line.
 pub(super) struct File<'a> {
     pub path: &'a Path,
     pub text: &'a str,
 }
 
 impl File<'_> {
-    /// The text as TOML.
+    /// Parses the text as TOML.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, SceneError> {
         toml::from_str(self.text).map_err(|e| match e.span() {
             Some(span) => self.at(&span, e.message()),
@@ -47,7 +47,7 @@ impl File<'_> {
         SceneError::line(self.path, 1 + before.iter().filter(|byte| **byte == b'\n').count(), what)
     }
 
-    /// The value, checked; an error names the object and its line.
+    /// Returns the checked value. An error names the object and its line.
     pub fn check<T, U>(
         &self,
         object: &str,
@@ -93,8 +93,8 @@ fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> 
     Ok(scene)
 }
 
-/// Adds a mesh's triangles to the scene, of which generators have made `n_generated` so far. Returns how many more they
-/// have made.
+/// Adds a mesh to the scene and returns the number of triangles that a generator made for it. `n_generated` is the
+/// number that generators have made for the scene's earlier meshes.
 fn add_mesh(
     file: &File,
     scene: &mut Scene,
@@ -112,7 +112,7 @@ fn add_mesh(
     let (mesh, slots, n_made) = match source {
         Source::File { path, shading } => {
             let path = file.path.parent().unwrap_or(Path::new("")).join(path);
-            // The name may be misspelt in the scene file: the error says where that is.
+            // The scene file may misspell the name, so the error names the line in the scene file.
             let text = read_obj(&path).map_err(|error| failed(error.to_string()))?;
             let (mesh, library) = parse_obj(&path, &text, shading, n_loaded)?;
             let slots = if named.is_empty() { scene.push_library(library) } else { named };
@@ -136,7 +136,7 @@ fn add_mesh(
     Ok(n_made)
 }
 
-/// Indices of the materials that a mesh names.
+/// Returns the indices of the materials that a mesh names.
 fn named_materials(common: &CommonSpec, materials: &HashMap<String, u32>) -> Checked<Vec<u32>> {
     let index = |name: &String| {
         materials.get(name).copied().ok_or_else(|| format!("there is no material `{name}` in [materials]"))
@@ -150,7 +150,7 @@ impl Scene {
         (self.materials.len() - 1) as u32
     }
 
-    /// Index of the material of meshes that have none.
+    /// Returns the index of the material of meshes without one. Adds that material at the first call.
     fn default_material(&mut self) -> u32 {
         const NAME: &str = "(default)";
         if let Some(ix) = self.materials.iter().position(|material| material.name == NAME) {
@@ -159,7 +159,8 @@ impl Scene {
         self.push_material(MaterialSpec::default().material(NAME).expect("defaults are in range"))
     }
 
-    /// Adds a library's materials; returns the slots of the mesh that came with it, the last one for no material.
+    /// Adds a library's materials. Returns the material indices for the slots of the mesh that came with it; the last
+    /// one is the default material, for faces without one.
     pub(super) fn push_library(&mut self, library: Library) -> Vec<u32> {
         let mut slots: Vec<u32> = library.materials.into_iter().map(|material| self.push_material(material)).collect();
         slots.push(self.default_material());
@@ -198,7 +199,7 @@ pub(super) fn camera(spec: &CameraSpec) -> Checked<Camera> {
     Ok(camera)
 }
 
-/// A point in the world.
+/// Checks a point in world space, which must be finite and lie within [`MAX_COORDINATE`].
 fn point(name: &str, value: [f32; 3]) -> Checked<Vec3> {
     let point = finite(name, value)?.as_vec3();
     if point.abs().max_element() <= MAX_COORDINATE {

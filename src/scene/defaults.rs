@@ -1,15 +1,15 @@
-//! What a scene says of the options that it is rendered with.
+//! The render options that a scene file can set.
 
 use crate::frame::{Denoise, RenderOptions, Tonemap};
 
-/// What a scene asks to be rendered with, unless the user says otherwise.
+/// Render options of a scene, which the user may override.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderDefaults {
-    /// Pixels.
+    /// Width of the picture, pixels.
     pub width: u32,
-    /// Pixels.
+    /// Height of the picture, pixels.
     pub height: u32,
-    /// Levels of rays, the primary one counted.
+    /// Number of ray levels, including the primary rays: 1 stands for primary rays only.
     pub max_depth: u32,
     /// Factor on radiance before the tone curve.
     pub exposure: f32,
@@ -27,7 +27,7 @@ impl Default for RenderDefaults {
 }
 
 impl RenderDefaults {
-    /// The options that render the scene as it asks for.
+    /// Returns full render options with the scene's values.
     pub fn options(&self) -> RenderOptions {
         let &Self { width, height, max_depth, exposure, tonemap, denoise } = self;
         RenderOptions { width, height, max_depth, exposure, tonemap, denoise, ..RenderOptions::default() }

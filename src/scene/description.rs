@@ -1,4 +1,4 @@
-//! What a scene file may say, as serde reads it. Checks of values follow in `assemble`.
+//! The keys of a scene file, as serde reads them. `assemble` checks the values.
 
 use std::collections::BTreeMap;
 
@@ -17,43 +17,43 @@ use super::{
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Description {
-    /// Absent: one that frames the meshes.
+    /// Camera; where absent, `framing` makes one that shows all meshes.
     pub camera: Option<Spanned<CameraSpec>>,
     #[serde(default)]
     pub light: Vec<Spanned<LightSpec>>,
-    /// Irradiance from everywhere, weighted by Ka; black where absent.
+    /// Irradiance that every point receives, weighted by Ka; black where absent.
     pub ambient: Option<Spanned<[f32; 3]>>,
     /// Radiance of rays that leave the scene; black where absent.
     pub background: Option<Spanned<[f32; 3]>>,
     #[serde(default)]
     pub materials: BTreeMap<String, Spanned<MaterialSpec>>,
-    /// Read further by `MeshSpec::new`.
+    /// Meshes, as tables that `MeshSpec::new` reads.
     #[serde(default)]
     pub mesh: Vec<Spanned<Table>>,
     pub render: Option<Spanned<RenderSpec>>,
 }
 
-/// World space.
+/// A camera in world space.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CameraSpec {
     pub eye: [f32; 3],
     pub target: [f32; 3],
     pub up: Option<[f32; 3]>,
-    /// Degrees between the picture's lower and upper edge.
+    /// Angle between the picture's lower and upper edge, degrees; 45 where absent.
     pub vertical_fov: Option<f32>,
 }
 
 #[derive(Debug, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum LightSpec {
-    /// Irradiance falls with the square of distance.
+    /// A point light, whose irradiance falls with the square of the distance.
     Point { position: [f32; 3], intensity: [f32; 3] },
-    /// The way the light travels.
+    /// A light whose rays all travel along `direction`.
     Directional { direction: [f32; 3], irradiance: [f32; 3] },
 }
 
-/// What the command line may override.
+/// Options of rendering, which the command line may override.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RenderSpec {
@@ -61,7 +61,7 @@ pub(super) struct RenderSpec {
     pub height: Option<u32>,
     pub max_depth: Option<u32>,
     pub exposure: Option<f32>,
-    /// linear, agx or aces.
+    /// `linear`, `agx` or `aces`.
     pub tonemap: Option<String>,
     pub denoise: Option<DenoiseWord>,
     pub denoise_threshold: Option<f32>,
@@ -74,32 +74,33 @@ pub(super) enum DenoiseWord {
     Paper,
 }
 
-/// One `[[mesh]]`.
+/// One `[[mesh]]` table.
 #[derive(Debug)]
 pub(super) struct MeshSpec {
     pub source: Source,
     pub common: CommonSpec,
 }
 
-/// Where a mesh comes from.
+/// Source of a mesh's triangles.
 #[derive(Debug)]
 pub(super) enum Source {
-    /// Relative to the scene file's folder.
+    /// An OBJ file; `path` is relative to the scene file's folder.
     File { path: String, shading: Shading },
-    /// Made from parameters.
+    /// A generator that makes the mesh from a few parameters.
     Generator(Generator),
 }
 
-/// What files and generators have in common.
+/// Keys that meshes from files and from generators have in common.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub(super) struct CommonSpec {
     pub transform: TransformSpec,
-    /// One for the whole mesh; a file's own materials otherwise.
+    /// Name of the material of the whole mesh. Where it is absent, a mesh from a file keeps its own materials.
     pub material: Option<String>,
-    /// One a slot of a generator that has several (a room's walls, a checkered plane's fields), used in rotation.
+    /// Names of materials, one for each slot of the mesh (a room's walls, a checkered plane's fields). If there are
+    /// fewer names than slots, they repeat.
     pub materials: Vec<String>,
-    /// False: every face shows its own plane.
+    /// False: every face is shaded with its own plane's normal.
     pub smooth: Option<bool>,
 }
 
@@ -107,14 +108,16 @@ pub(super) struct CommonSpec {
 #[serde(deny_unknown_fields)]
 struct FileSpec {
     file: String,
-    /// Degrees beyond which an edge is sharp; only for files without normals.
+    /// Angle between two faces, in degrees, beyond which their common edge is sharp. Applies to faces without
+    /// normals.
     crease: Option<f32>,
 }
 
 const COMMON_KEYS: [&str; 4] = ["transform", "material", "materials", "smooth"];
 
 impl MeshSpec {
-    /// Splits a mesh's table into what all meshes have and what this kind has. No key is left over unread.
+    /// Splits a mesh's table into the keys that all meshes have and those of its own kind. An unknown key is an
+    /// error.
     pub fn new(mut table: Table) -> Checked<Self> {
         let common = COMMON_KEYS.iter().filter_map(|key| table.remove_entry(*key)).collect();
         let common: CommonSpec = read(common)?;

@@ -1,10 +1,11 @@
-//! Why a scene could not be loaded, in one line.
+//! The error of loading a scene, a message of one line.
 
 use std::path::Path;
 
 use crate::util::text::one_line;
 
-/// A scene file that cannot be read, understood or drawn. Displays as one line: `FILE:LINE: what` or `FILE: object: what`.
+/// A scene file that cannot be read, understood or drawn. It displays as one line: `FILE:LINE: what` or
+/// `FILE: object: what`.
 #[derive(Debug, thiserror::Error)]
 #[error("{place}: {what}")]
 pub struct SceneError {
@@ -13,21 +14,21 @@ pub struct SceneError {
 }
 
 impl SceneError {
-    /// About a file as a whole.
+    /// An error that concerns a file as a whole.
     pub(super) fn file(path: &Path, what: impl AsRef<str>) -> Self {
         Self { place: quoted(&path.display().to_string()), what: quoted(what.as_ref()) }
     }
 
-    /// About one line of a file, counted from 1.
+    /// An error that concerns one line of a file. Lines count from 1.
     pub(super) fn line(path: &Path, line: usize, what: impl AsRef<str>) -> Self {
         Self { place: format!("{}:{line}", quoted(&path.display().to_string())), what: quoted(what.as_ref()) }
     }
 }
 
-/// What comes of a check before it is known which file and line it is about.
+/// Result of a check that does not know the file and the line of what it checks. The error is a message for people.
 pub(super) type Checked<T> = Result<T, String>;
 
-/// Text on one line, of some 300 characters at most: it may quote a hostile file.
+/// Returns `text` on one line, cut after 300 characters and an ellipsis. The text may quote a hostile file.
 fn quoted(text: &str) -> String {
     let line = one_line(text);
     match line.char_indices().nth(300) {

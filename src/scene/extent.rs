@@ -1,4 +1,5 @@
-//! How small a scene may be, and how far from the origin, for single precision to tell its triangles apart.
+//! Limits on a scene's size and on its distance from the origin, within which single precision tells its triangles
+//! apart.
 
 use std::path::Path;
 
@@ -6,24 +7,28 @@ use glam::Vec3;
 
 use super::SceneError;
 
-/// Scenes whose longest side is less are refused: products of their coordinates would underflow.
+/// Smallest length of a scene's longest side. Smaller scenes are refused, because products of their coordinates would
+/// underflow.
 ///
-/// Let L be the longest side and s the size of a triangle. The hit test multiplies coordinates across the ray, of size
-/// s, to edge functions of size s^2, sums these to the determinant, and multiplies them by depths of size L to find t.
-/// Devices may flush what is less than 2^-126 to zero, and t is right to single precision only if what is flushed is
-/// less than 2^-24 of the sum: s^2 L >= 2^-102. For edges that the ray meets, products are exact only if 2^-48 of s^2,
-/// the error of the rounded product's error, is kept: s^2 >= 2^-78. With L = 1e-8 > 2^-27, the first holds for s >=
-/// 2^-37.5 and the second for s >= 2^-39: for triangles as small as 2^-10.5 of the scene, of which a surface has some
-/// two million. All other products of the traversal and of shading are of lower degree, or of vectors scaled to unit
-/// length before.
+/// Let L be the longest side and s the size of a triangle. The hit test multiplies coordinates across the ray, of
+/// size s, to edge functions of size s^2, sums these to the determinant, and multiplies them by depths of size L to
+/// find t. Devices may flush values below 2^-126 to zero. Two conditions follow:
+///
+/// - t is right to single precision only if a flushed value is less than 2^-24 of the sum: s^2 L >= 2^-102. With
+///   L = 1e-8 > 2^-27, this holds for s >= 2^-37.5.
+/// - At edges that the ray meets, a product is exact only if the error of its rounding error, 2^-48 of s^2, is not
+///   flushed: s^2 >= 2^-78. This holds for s >= 2^-39.
+///
+/// Triangles may thus be as small as 2^-10.5 of the scene; a surface has some two million triangles of that size. All
+/// other products of the traversal and of shading are of lower degree, or of vectors that were scaled to unit length.
 pub const MIN_EXTENT: f32 = 1e-8;
 
-/// Steps of single precision along a scene's longest side below which detail is lost that a picture could show: a
-/// sixteenth of a pixel in a picture 4096 pixels wide.
+/// Least number of single-precision steps along a scene's longest side. With fewer steps, a picture could show detail
+/// that the coordinates have lost: one step is a sixteenth of a pixel in a picture 4096 pixels wide.
 const MIN_STEPS: f64 = 65_536.0;
 
 /// Refuses a scene that is too small to be traced, and warns of one that lies so far from the origin that its
-/// coordinates are coarse. The bounds are those of all triangles.
+/// coordinates are coarse. `(min, max)` are the bounds of all triangles, world space.
 pub(super) fn check(path: &Path, (min, max): (Vec3, Vec3)) -> Result<(), SceneError> {
     let extent = (max.as_dvec3() - min.as_dvec3()).max_element();
     let largest = min.abs().max(max.abs()).max_element();

@@ -1,19 +1,20 @@
-//! A camera and a light for meshes that come without.
+//! A camera and a light for meshes without either.
 
 use glam::Vec3;
 
 use super::{Camera, Light};
 
-/// From the middle of the picture towards the eye: from the front, the right and above.
+/// Direction from the middle of the scene towards the eye: to the front, the right and above. Not of unit length.
 const TOWARDS_EYE: Vec3 = Vec3::new(0.45, 0.35, 1.0);
 const VERTICAL_FOV_DEGREES: f32 = 40.0;
-/// Room around the bounding sphere.
+/// Factor on the eye's distance, which leaves a margin around the bounding sphere.
 const MARGIN: f32 = 1.05;
 
-/// Sees the whole bounding sphere of the bounding box, in any picture that is not higher than wide.
+/// Returns a camera that sees the whole bounding sphere of a bounding box, in any picture that is not higher than
+/// wide.
 pub(super) fn camera((min, max): (Vec3, Vec3)) -> Camera {
     let centre = (min + max) / 2.0;
-    // A small scene far from the origin: the eye must be farther away than rounding of its coordinates is.
+    // For a small scene far from the origin, the eye's distance must exceed the rounding of its coordinates.
     let radius = ((max - min).length() / 2.0).max(centre.abs().max_element() * 1e-3);
     let distance = MARGIN * radius / (VERTICAL_FOV_DEGREES / 2.0).to_radians().sin();
     Camera {
@@ -24,7 +25,7 @@ pub(super) fn camera((min, max): (Vec3, Vec3)) -> Camera {
     }
 }
 
-/// From over the camera's left shoulder.
+/// Returns a directional light from above the camera's left shoulder.
 pub(super) fn light() -> Light {
     Light::Directional { towards: Vec3::new(-0.4, 0.8, 0.7).normalize(), irradiance: Vec3::splat(0.8) }
 }

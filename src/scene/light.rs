@@ -1,18 +1,18 @@
-//! Lights.
+//! Lights, which illuminate surfaces but are not visible themselves.
 
 use glam::Vec3;
 
 /// A source of light that no ray can hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
-    /// A point, whose irradiance falls with the square of the distance.
+    /// A point light, whose irradiance falls with the square of the distance.
     Point {
-        /// World space.
+        /// Position in world space.
         position: Vec3,
-        /// Power per steradian, linear RGB.
+        /// Radiant intensity (power per steradian), linear RGB.
         intensity: Vec3,
     },
-    /// A light from so far away that it comes from the same direction everywhere.
+    /// A light so far away that its direction is the same everywhere.
     Directional {
         /// Unit vector towards the light, world space.
         towards: Vec3,
@@ -22,7 +22,7 @@ pub enum Light {
 }
 
 impl Light {
-    /// Whether the light gives no light.
+    /// Returns whether the light's power is zero.
     pub fn is_black(&self) -> bool {
         match self {
             Self::Point { intensity: power, .. } | Self::Directional { irradiance: power, .. } => *power == Vec3::ZERO,

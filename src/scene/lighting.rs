@@ -1,4 +1,4 @@
-//! Whether anything lights a scene.
+//! The check that something lights a scene.
 
 use std::path::Path;
 
@@ -7,8 +7,8 @@ use glam::Vec3;
 use super::{Light, Scene};
 
 impl Scene {
-    /// Warns if neither a light nor the ambient term gives any surface light, and says how to add one. `path` is the
-    /// scene's file.
+    /// Warns if neither a light nor the ambient term illuminates the scene, and says how to add a light. `path` is
+    /// the scene's file.
     pub fn warn_if_unlit(&self, path: &Path) {
         let is_lit = self.ambient != Vec3::ZERO || !self.lights.iter().all(Light::is_black);
         if is_lit {

@@ -1,14 +1,14 @@
 //! Materials in MTL's own terms, from scene files and MTL files alike.
 //!
-//! Radiance leaving a hit is `Ke + Ka * ambient`, plus over all visible lights
-//! `(Kd * max(0, N.L) + Ks * (R.V)^Ns) * irradiance`, without 1/pi. `illum` says what else happens:
+//! The radiance that leaves a hit is `Ke + Ka * ambient` plus the sum over all visible lights of
+//! `(Kd * max(0, N.L) + Ks * (R.V)^Ns) * irradiance`, without a factor 1/pi. `illum` selects further terms:
 //!
-//! | illum | |
+//! | illum | terms |
 //! |---|---|
-//! | 0 | colour only: Kd, without a highlight |
+//! | 0 | colour only: Kd, without a highlight (treated as 1) |
 //! | 1 | diffuse |
-//! | 2, 10 | and a highlight (10's "cast shadows onto invisible surfaces" is left out) |
-//! | 3, 8 | and mirror reflection, weighted by Ks |
+//! | 2, 10 | diffuse and a highlight (10's "cast shadows onto invisible surfaces" is left out) |
+//! | 3, 8 | as 2, and mirror reflection, weighted by Ks |
 //! | 4, 6 | glass: reflection Ks, refraction Tf (1 - Ks), no Fresnel term |
 //! | 5 | mirror reflection by Fresnel's term (Ni) |
 //! | 7 | glass whose reflection and refraction are weighted by Fresnel's term |
@@ -19,7 +19,7 @@ use serde::Deserialize;
 
 use super::error::Checked;
 
-/// A material, with MTL's terms. Colours are linear RGB.
+/// A material in MTL's terms. Colours are linear RGB.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Material {
     /// The name in its file, by which meshes refer to it.
@@ -40,7 +40,7 @@ pub struct Material {
     pub ni: f32,
     /// Opacity, 0 to 1.
     pub d: f32,
-    /// What light does at the surface beside diffuse reflection.
+    /// Terms beside diffuse reflection.
     pub lobes: Lobes,
 }
 
@@ -51,20 +51,20 @@ impl Default for Material {
     }
 }
 
-/// What light does at a surface beside diffuse reflection.
+/// Reflection and refraction terms of a surface beside diffuse reflection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Lobes {
-    /// Lights make a highlight.
+    /// Lights make a highlight (Ks, Ns).
     pub highlight: bool,
     /// The surface is a mirror.
     pub reflection: bool,
-    /// Light goes through, bent.
+    /// Light passes through the surface and is refracted.
     pub refraction: bool,
     /// The shares of reflection and refraction follow Fresnel's equations.
     pub fresnel: bool,
 }
 
-/// A material as written. Everything may be left out.
+/// A material as a file describes it. Each term may be absent.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct MaterialSpec {
@@ -74,10 +74,10 @@ pub(super) struct MaterialSpec {
     /// Diffuse colour; 0.8 where absent, as in MTL.
     #[serde(rename = "Kd")]
     pub kd: Option<[f32; 3]>,
-    /// Specular colour, and the mirror's; black where absent.
+    /// Specular colour, of the highlight and of the mirror; black where absent.
     #[serde(rename = "Ks")]
     pub ks: Option<[f32; 3]>,
-    /// Radiance it gives off; black where absent.
+    /// Radiance that the surface gives off; black where absent.
     #[serde(rename = "Ke")]
     pub ke: Option<[f32; 3]>,
     /// Transmission colour; white where absent.
@@ -91,15 +91,15 @@ pub(super) struct MaterialSpec {
     pub ni: Option<f32>,
     /// Opacity, 0 to 1; 1 where absent.
     pub d: Option<f32>,
-    /// 1 - d.
+    /// Transparency, 1 - d; an error beside `d`.
     #[serde(rename = "Tr")]
     pub tr: Option<f32>,
-    /// 0 to 10; 2 where absent and Ks is not black, 1 otherwise.
+    /// Illumination model, 0 to 10; where absent, 2 if Ks is not black and 1 otherwise.
     pub illum: Option<u8>,
 }
 
 impl Lobes {
-    /// The lobes of MTL's illumination model of a number; none beyond 10.
+    /// Returns the lobes of MTL's illumination model `illum`, or `None` beyond 10.
     pub fn of_illum(illum: u32) -> Option<Self> {
         let diffuse = Self::default();
         let highlight = Self { highlight: true, ..diffuse };
@@ -118,7 +118,7 @@ impl Lobes {
 }
 
 impl MaterialSpec {
-    /// The material with its defaults filled in. The error says which term is out of range.
+    /// Returns the material with defaults in place of absent terms. The error says which term is out of range.
     pub fn material(&self, name: &str) -> Checked<Material> {
         let kd = colour("Kd", self.kd, Vec3::splat(0.8))?;
         let ks = colour("Ks", self.ks, Vec3::ZERO)?;
@@ -128,12 +128,13 @@ impl MaterialSpec {
             (None, Some(tr)) => 1.0 - within("Tr", tr, 0.0, 1.0)?,
             (d, None) => within("d", d.unwrap_or(1.0), 0.0, 1.0)?,
         };
-        // Some exporters write 0 for "does not bend".
+        // Some exporters write 0 for a surface that does not refract.
         let ni = self.ni.map(|ni| if ni == 0.0 { 1.0 } else { ni }).unwrap_or(1.5);
         Ok(Material {
             name: name.to_owned(),
             ka: colour("Ka", self.ka, kd)?,
-            // An exponent of 0 would be a highlight without a shape, and pow(0, 0) is undefined in GLSL.
+            // An exponent below 1 is raised to 1: 0 would be a constant highlight, and pow(0, 0) is undefined in
+            // GLSL.
             ns: within("Ns", self.ns.unwrap_or(32.0), 0.0, 1e6)?.max(1.0),
             kd,
             d: opacity,
@@ -146,7 +147,7 @@ impl MaterialSpec {
     }
 }
 
-/// A colour without negative or infinite parts.
+/// Checks a colour, whose parts must be finite and at least 0. Returns `default` where there is none.
 pub(super) fn colour(name: &str, value: Option<[f32; 3]>, default: Vec3) -> Checked<Vec3> {
     let Some(value) = value else { return Ok(default) };
     if value.iter().all(|part| part.is_finite() && *part >= 0.0) {
@@ -156,8 +157,8 @@ pub(super) fn colour(name: &str, value: Option<[f32; 3]>, default: Vec3) -> Chec
     }
 }
 
-/// A finite number of a closed range.
+/// Checks that a number is between `min` and `max`, both included.
 pub(super) fn within(name: &str, value: f32, min: f32, max: f32) -> Checked<f32> {
-    // NaN is in no range.
+    // A range contains no NaN.
     if (min..=max).contains(&value) { Ok(value) } else { Err(format!("{name} = {value} is outside {min} to {max}")) }
 }

@@ -5,25 +5,26 @@ use rayon::prelude::*;
 
 use super::{error::Checked, transform::Transform};
 
-/// World coordinates beyond this are refused: the squared length of a triangle's unnormalized normal, at most
-/// (2 sqrt(3) * 1e9)^4 = 1.5e38, must not overflow an f32 (3.4e38).
+/// Largest absolute value of a world coordinate; a mesh that reaches beyond it is refused. The squared length of a
+/// triangle's unnormalized normal, at most (2 sqrt(3) * 1e9)^4 = 1.5e38, must not overflow an f32 (3.4e38).
 pub const MAX_COORDINATE: f32 = 1e9;
 
-/// Triangles that share points.
+/// An indexed triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
-    /// Object space.
+    /// Points in object space.
     pub positions: Vec<Vec3>,
     /// Indices into `positions`, counter-clockwise seen from outside.
     pub faces: Vec<[u32; 3]>,
-    /// One entry a face: unit shading normals at its corners, zero for the face's own plane.
+    /// One entry per face: unit shading normals at its three corners. Three zero vectors stand for the normal of the
+    /// face's plane.
     pub normals: Vec<[Vec3; 3]>,
-    /// One entry a face: which of the instance's materials it has.
+    /// One entry per face: its slot, which selects one of the instance's materials.
     pub slots: Vec<u32>,
 }
 
 impl Mesh {
-    /// Adds a face of slot `slot` that is shaded as the plane it is.
+    /// Adds a face that is shaded with its plane's normal.
     pub fn push_flat(&mut self, face: [u32; 3], slot: u32) {
         self.faces.push(face);
         self.normals.push([Vec3::ZERO; 3]);
@@ -36,7 +37,7 @@ impl Mesh {
         (self.positions.len() - 1) as u32
     }
 
-    /// Adds another mesh, without joining any points.
+    /// Adds another mesh. Points at the same place are not merged.
     pub fn append(&mut self, other: Mesh) {
         let first = self.positions.len() as u32;
         self.positions.extend(other.positions);
@@ -45,10 +46,10 @@ impl Mesh {
         self.slots.extend(other.slots);
     }
 
-    /// The positions as they are placed in the world. All of them are finite and lie within [`MAX_COORDINATE`].
+    /// Returns the positions in world space.
     ///
     /// # Errors
-    /// A position that is not, in words.
+    /// A position is not finite or lies beyond [`MAX_COORDINATE`]. The error is a message for people.
     pub fn placed(&self, transform: &Transform) -> Checked<Vec<Vec3>> {
         let world: Vec<Vec3> = self.positions.par_iter().map(|p| transform.point(*p)).collect();
         let is_inside = |p: &Vec3| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE;

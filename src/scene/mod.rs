@@ -1,7 +1,7 @@
-//! Scenes as files and programs describe them: meshes, their instances in the world, materials, lights, a camera. Nothing
-//! here depends on how kernels lay data out; `world` flattens a scene for tracing.
+//! Scenes as files and programs describe them: meshes, their instances in the world, materials, lights, a camera.
+//! Nothing here depends on how kernels lay data out; `world` flattens a scene for tracing.
 //!
-//! A scene file is a TOML file (`description` lists what it may say) or a bare OBJ file.
+//! A scene file is a TOML file, whose keys `description` lists, or a bare OBJ file.
 
 mod assemble;
 mod defaults;
@@ -45,18 +45,18 @@ pub struct Scene {
     pub name: String,
     /// Meshes, each of which may have several instances.
     pub meshes: Vec<Mesh>,
-    /// Where the meshes are. A loaded scene has at least one triangle, all triangles lie within `mesh::MAX_COORDINATE`, and
+    /// Placed meshes. A loaded scene has at least one triangle, all triangles lie within `mesh::MAX_COORDINATE`, and
     /// their bounding box has a side of [`MIN_EXTENT`] or more.
     pub instances: Vec<Instance>,
-    /// What the instances refer to by index.
+    /// Materials, to which the instances refer by index.
     pub materials: Vec<Material>,
-    /// May be none.
+    /// Lights, possibly none.
     pub lights: Vec<Light>,
     /// The camera that renders the scene unless another one is set.
     pub camera: Camera,
-    /// Irradiance that every point receives, weighted by its Ka.
+    /// Irradiance that every point receives, linear RGB. The material's `ka` weights it.
     pub ambient: Vec3,
-    /// Radiance of rays that leave the scene.
+    /// Radiance of rays that leave the scene, linear RGB.
     pub background: Vec3,
     /// The options that the scene is rendered with unless others are set.
     pub defaults: RenderDefaults,
@@ -67,31 +67,33 @@ pub struct Scene {
 pub struct Instance {
     /// Index into the scene's meshes.
     pub mesh_ix: usize,
-    /// World from object.
+    /// Transform from object space to world space.
     pub transform: Transform,
-    /// Indices into the scene's materials, at least one. A face of slot i has material `i % materials.len()`.
+    /// Indices into the scene's materials, at least one. A face of slot i has the material at index
+    /// `i % materials.len()` of this list.
     pub materials: Vec<u32>,
 }
 
-/// A pinhole. `eye`, `target` and `up` span a plane.
+/// A pinhole camera. `eye`, `target` and `up` span a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// World space.
+    /// Position of the pinhole, world space.
     pub eye: Vec3,
-    /// What the middle of the picture shows.
+    /// Point that the middle of the picture shows, world space.
     pub target: Vec3,
-    /// Unit length, not parallel to the view.
+    /// Unit vector that points up in the picture, world space. It is not parallel to the view.
     pub up: Vec3,
-    /// Between the picture's lower and upper edge.
+    /// Angle between the picture's lower and upper edge, degrees.
     pub vertical_fov_degrees: f32,
 }
 
 impl Scene {
-    /// Loads a `.toml` or `.obj` file. What is left out of the picture is a `tracing` warning.
+    /// Loads a `.toml` or `.obj` file. Whatever the picture leaves out is reported as a `tracing` warning.
     ///
     /// # Errors
-    /// The file, or one that it names, cannot be read or understood; the scene is too small to be traced
-    /// ([`MIN_EXTENT`]), reaches too far from the origin (`mesh::MAX_COORDINATE`), or needs more memory than there is.
+    /// The file, or one that it names, cannot be read or understood; the scene has no triangles, is too small to be
+    /// traced ([`MIN_EXTENT`]), reaches too far from the origin (`mesh::MAX_COORDINATE`), or needs more memory than
+    /// there is.
     pub fn load(path: &Path) -> Result<Scene, SceneError> {
         let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
         match extension.as_ref().and_then(|extension| extension.to_str()) {
@@ -101,21 +103,21 @@ impl Scene {
         }
     }
 
-    /// The name of the scene in a file: the file's name without its folder and extension.
+    /// Returns the name of the scene in a file: the file's name without its folder and extension.
     pub fn name_of(path: &Path) -> String {
         path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
     }
 
-    /// The number of triangles of all instances.
+    /// Returns the number of triangles of all instances.
     pub fn n_triangles(&self) -> usize {
         let mesh_of = |instance: &Instance| self.meshes.get(instance.mesh_ix);
         self.instances.iter().filter_map(mesh_of).map(|mesh| mesh.faces.len()).sum()
     }
 
-    /// The smallest and the largest coordinates of all triangles, world space.
+    /// Returns the smallest and the largest coordinates of all triangles, world space.
     ///
     /// # Panics
-    /// An index names nothing.
+    /// An index of a mesh or of a position is out of range.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         let corners = self.instances.iter().flat_map(|Instance { mesh_ix, transform, .. }| {
             let mesh = &self.meshes[*mesh_ix];
@@ -124,10 +126,10 @@ impl Scene {
         corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
     }
 
-    /// Adds a mesh that is placed once. `materials`: [`Instance::materials`].
+    /// Adds a mesh and one instance of it. `materials` becomes [`Instance::materials`].
     ///
     /// # Errors
-    /// The mesh reaches beyond `mesh::MAX_COORDINATE`, in words.
+    /// The mesh reaches beyond `mesh::MAX_COORDINATE` in world space. The error is a message for people.
     pub(crate) fn push_mesh(&mut self, mesh: Mesh, transform: Transform, materials: Vec<u32>) -> Result<(), String> {
         mesh.placed(&transform)?;
         self.instances.push(Instance { mesh_ix: self.meshes.len(), transform, materials });
@@ -135,7 +137,7 @@ impl Scene {
         Ok(())
     }
 
-    /// Nothing yet, seen from nowhere.
+    /// A scene without meshes, materials and lights. Its camera is a placeholder.
     fn empty(path: &Path) -> Self {
         Self {
             name: Self::name_of(path),
@@ -151,7 +153,8 @@ impl Scene {
     }
 }
 
-/// The mesh with its own materials, framed, under one light.
+/// Loads an OBJ file as a scene: the mesh with its own materials, a camera that frames it, one light and ambient
+/// light.
 fn load_bare_obj(path: &Path) -> Result<Scene, SceneError> {
     let mut scene = Scene::empty(path);
     let shading = obj::Shading { smooth: true, crease: obj::DEFAULT_CREASE };

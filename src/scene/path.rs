@@ -1,4 +1,4 @@
-//! A camera that moves: a TOML file of keyframes, and the smooth way between them.
+//! A camera that moves: a TOML file of keyframes, and the smooth curve between them.
 
 use std::path::Path;
 
@@ -14,12 +14,12 @@ use super::{
     read::read_utf8,
 };
 
-/// Frames a second where the file says nothing.
+/// Frames per second if the file has no `fps`.
 const DEFAULT_FPS: f64 = 25.0;
-/// What any film has fewer of.
+/// Largest frame number of a keyframe.
 const MAX_FRAMES: f64 = 1e6;
 
-/// A path file.
+/// A path file, as serde reads it.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PathSpec {
@@ -28,13 +28,13 @@ struct PathSpec {
     keyframe: Vec<Spanned<KeyframeSpec>>,
 }
 
-/// A scene file's camera, and when it is there.
+/// A camera as in a scene file, and its frame or time.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct KeyframeSpec {
-    /// Frames, counted from 0.
+    /// Frame number, counted from 0.
     frame: Option<f64>,
-    /// Seconds, in place of a frame.
+    /// Time in seconds, in place of a frame.
     time: Option<f64>,
     eye: [f32; 3],
     target: [f32; 3],
@@ -42,10 +42,10 @@ struct KeyframeSpec {
     vertical_fov: Option<f32>,
 }
 
-/// Keyframes in the order of frames, at least one.
+/// The path of a moving camera: one or more keyframes in the order of their frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraPath {
-    /// Frames a second.
+    /// Frames per second.
     pub fps: f64,
     keyframes: Vec<Keyframe>,
 }
@@ -56,12 +56,15 @@ struct Keyframe {
     pose: Pose,
 }
 
-/// A camera as numbers that are interpolated one by one.
+/// A camera as ten numbers that are interpolated one by one: eye, target, up, vertical field of view in degrees.
 type Pose = [f64; 10];
 
 impl CameraPath {
+    /// Loads a path file.
+    ///
     /// # Errors
-    /// The file cannot be read or understood; keyframes out of order, or with a camera that sees nothing.
+    /// The file cannot be read or understood, has no keyframes or has them out of order, or a keyframe's camera sees
+    /// nothing.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         let text = read_utf8(path)?;
         let file = File { path, text: &text };
@@ -82,21 +85,23 @@ impl CameraPath {
         Ok(Self { fps, keyframes })
     }
 
-    /// Frame of the first keyframe.
+    /// Returns the frame of the first keyframe.
     pub fn begin(&self) -> f64 {
         self.keyframes[0].frame
     }
 
-    /// Frame of the last keyframe.
+    /// Returns the frame of the last keyframe.
     pub fn end(&self) -> f64 {
         self.keyframes[self.keyframes.len() - 1].frame
     }
 
-    /// The camera at a frame, or between two; before the first keyframe and after the last it stands still. None where the
-    /// way between keyframes leads through one that sees nothing: eye and target meet, or up points along the view.
+    /// Returns the camera at a frame, which may be a fraction. Before the first keyframe and after the last one the
+    /// camera rests. Returns `None` where the curve leads through a camera that sees nothing: eye and target meet, or
+    /// up points along the view.
     ///
-    /// Cubic Hermite splines, one a number, with Catmull-Rom's tangents (E. Catmull, R. Rom: A Class of Local Interpolating
-    /// Splines, 1974) over frames: through all keyframes, without jumps of speed; even motion stays even.
+    /// Each number of the camera is a cubic Hermite spline over frames with Catmull-Rom tangents (E. Catmull, R. Rom:
+    /// A Class of Local Interpolating Splines, 1974). The curve passes through all keyframes, its speed has no jumps,
+    /// and uniform motion stays uniform.
     pub fn camera_at(&self, frame: f64) -> Option<Camera> {
         let frame = frame.clamp(self.begin(), self.end());
         let after = self.keyframes.partition_point(|keyframe| keyframe.frame <= frame);
@@ -107,7 +112,7 @@ impl CameraPath {
         let (a, b) = (&self.keyframes[from], &self.keyframes[from + 1]);
         let span = b.frame - a.frame;
         let s = (frame - a.frame) / span;
-        // Weights of both ends and of their tangents.
+        // The weights of the Hermite basis: of the end `b` (that of `a` is 1 less it), and of both tangents.
         let b_weight = s * s * (3.0 - 2.0 * s);
         let (a_slope, b_slope) = (span * s * (1.0 - s) * (1.0 - s), span * s * s * (s - 1.0));
         let (a_tangent, b_tangent) = (self.tangent(from), self.tangent(from + 1));
@@ -117,7 +122,8 @@ impl CameraPath {
         }))
     }
 
-    /// Change a frame at a keyframe: from the one before to the one after, as far as there are any.
+    /// Returns the change per frame at a keyframe: the slope from the keyframe before it to the one after it. At an
+    /// end of the path, the keyframe itself takes the place of the missing one.
     fn tangent(&self, ix: usize) -> Pose {
         let before = &self.keyframes[ix.saturating_sub(1)];
         let after = &self.keyframes[(ix + 1).min(self.keyframes.len() - 1)];
@@ -154,7 +160,7 @@ fn keyframe(spec: &KeyframeSpec, fps: f64, before: Option<f64>) -> Checked<Keyfr
 
 fn to_camera(pose: &Pose) -> Option<Camera> {
     let vector = |i: usize| DVec3::from_slice(&pose[i..]).as_vec3().to_array();
-    // A curve may swing beyond its keyframes.
+    // A spline may overshoot its keyframes.
     let vertical_fov = (pose[9] as f32).clamp(0.1, 170.0);
     let spec = CameraSpec { eye: vector(0), target: vector(3), up: Some(vector(6)), vertical_fov: Some(vertical_fov) };
     camera(&spec).ok()

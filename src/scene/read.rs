@@ -1,10 +1,10 @@
-//! Reading scene files whole.
+//! Functions that read a whole scene file as text.
 
 use std::{fs, path::Path};
 
 use super::error::SceneError;
 
-/// Text that need not be UTF-8 throughout: comments in old encodings are no reason to refuse a mesh.
+/// Reads text that need not be UTF-8 throughout: comments in old encodings are no reason to refuse a mesh.
 pub(super) fn read_lossy(path: &Path) -> Result<String, SceneError> {
     let text = match String::from_utf8(read(path)?) {
         Ok(text) => text,
@@ -13,7 +13,7 @@ pub(super) fn read_lossy(path: &Path) -> Result<String, SceneError> {
     Ok(without_bom(text))
 }
 
-/// Text that must be UTF-8.
+/// Reads text that must be UTF-8.
 pub(super) fn read_utf8(path: &Path) -> Result<String, SceneError> {
     let text = String::from_utf8(read(path)?).map_err(|e| {
         let valid = &e.as_bytes()[..e.utf8_error().valid_up_to()];
@@ -25,7 +25,7 @@ pub(super) fn read_utf8(path: &Path) -> Result<String, SceneError> {
 
 fn read(path: &Path) -> Result<Vec<u8>, SceneError> {
     let failed = |e: std::io::Error| SceneError::file(path, format!("cannot be read: {e}"));
-    // A device or a pipe might never end.
+    // Reading a device or a pipe might never end.
     if !fs::metadata(path).map_err(failed)?.is_file() {
         return Err(SceneError::file(path, "is not a regular file"));
     }

@@ -1,32 +1,33 @@
-//! Shading normals for meshes that come without: angle-weighted averages over the faces around a point, as far as the
-//! surface does not bend by more than a crease angle.
+//! Shading normals for meshes without normals: angle-weighted averages over those faces around a point that differ in
+//! direction by no more than a crease angle.
 //!
-//! Weights after Thürmer and Wüthrich, "Computing Vertex Normals from Polygonal Facets" (JGT 1998).
+//! The weights follow Thürmer and Wüthrich, "Computing Vertex Normals from Polygonal Facets" (JGT 1998).
 
 use std::collections::HashMap;
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
-/// Where more faces than this meet (a fan's hub), comparing all pairs would take quadratic time, so all of them are
-/// averaged whatever their angles.
+/// Largest number of faces around a point that are compared in pairs. A point where more faces meet is called a hub,
+/// for example the middle of a fan. Comparing all its pairs would take quadratic time, so a hub's normal is the
+/// average of all its faces, whatever their angles.
 const MAX_PAIRED_FACES: usize = 256;
-/// Normals closer than this to the plane's own are the plane's own (1 - cosine; 0.08 degrees).
+/// Deviation (1 - cosine; 0.08 degrees) below which a normal counts as the normal of the face's plane.
 const FLAT_TOLERANCE: f32 = 1e-6;
 
-/// A face, as far as its neighbours need it.
+/// The properties of a face that its neighbours' normals depend on.
 #[derive(Clone, Copy, Default)]
 struct Facet {
-    /// Unit length, or zero where the face has no area.
+    /// Unit normal, or zero where the face has no area or is not smooth.
     normal: Vec3,
-    /// Radians at its corners.
+    /// Angles at its corners, radians.
     angles: [f32; 3],
 }
 
-/// One entry a face: unit normals at its corners, zero where the face's own plane will do.
+/// Returns unit normals at the three corners of each face, or zeros where the normal of the face's plane is as good.
 ///
-/// Points at the same place count as one, whatever their index. Faces that are not in `smooth` stay flat, and neither
-/// do their neighbours see them. `crease`: degrees.
+/// Points at the same place count as one, whatever their indices. A face whose `smooth` is false stays flat, and its
+/// neighbours' normals ignore it. `crease` is in degrees.
 pub(super) fn crease_normals(positions: &[Vec3], faces: &[[u32; 3]], smooth: &[bool], crease: f32) -> Vec<[Vec3; 3]> {
     let point_of = weld(positions);
     let facet = |(face, smooth): (&[u32; 3], &bool)| {
@@ -46,12 +47,12 @@ pub(super) fn crease_normals(positions: &[Vec3], faces: &[[u32; 3]], smooth: &[b
     faces.par_iter().zip(&facets).map(normals_of).collect()
 }
 
-/// What the normal of a face's corner is computed from.
+/// The data from which the normals at the corners of faces are computed.
 struct CornerNormals<'a> {
     around: &'a FacesAround,
     facets: &'a [Facet],
     min_cosine: f32,
-    /// The averages of points where more than `MAX_PAIRED_FACES` meet.
+    /// The normals of hubs, points where more than `MAX_PAIRED_FACES` faces meet.
     hubs: HashMap<u32, Vec3>,
 }
 
@@ -63,14 +64,16 @@ impl<'a> CornerNormals<'a> {
         normals
     }
 
-    /// The normal at a point of a face with normal `own`.
+    /// Returns the normal at a point of a face with normal `own`. It is `own` if the average differs by more than the
+    /// crease angle.
     fn at(&self, point: u32, own: Vec3) -> Vec3 {
         let near = |n: Vec3| n.dot(own) >= self.min_cosine;
         let normal = self.hubs.get(&point).copied().unwrap_or_else(|| self.average(point, near));
         if near(normal) { normal } else { own }
     }
 
-    /// Unit length, or zero where the faces that count cancel out.
+    /// Returns the average of those normals around a point for which `counts` is true: a unit vector, or zero where
+    /// they cancel out.
     fn average(&self, point: u32, counts: impl Fn(Vec3) -> bool) -> Vec3 {
         let corners = self.around.of(point).iter();
         let weighted = corners.map(|corner| {
@@ -81,7 +84,7 @@ impl<'a> CornerNormals<'a> {
     }
 }
 
-/// For each position the index of the first one at the same place.
+/// Returns for each position the index of the first position at the same place.
 fn weld(positions: &[Vec3]) -> Vec<u32> {
     let mut first_at = HashMap::with_capacity(positions.len());
     let place = |(ix, p): (usize, &Vec3)| {
@@ -91,17 +94,18 @@ fn weld(positions: &[Vec3]) -> Vec<u32> {
     positions.iter().enumerate().map(place).collect()
 }
 
-/// In f64: the cross product of edges of 1e-20 is not yet zero there.
+/// Returns the normal and the angles of a face. They are computed in f64, in which the cross product of edges of
+/// 1e-20 is not zero.
 fn facet(corners: [DVec3; 3]) -> Facet {
     let [a, b, c] = corners;
     let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3();
     let angle = |at: DVec3, p: DVec3, q: DVec3| (p - at).angle_between(q - at) as f32;
-    // Of a face without area the angles may be NaN.
+    // The angles of a face without area may be NaN.
     let angles = if normal == Vec3::ZERO { [0.0; 3] } else { [angle(a, b, c), angle(b, c, a), angle(c, a, b)] };
     Facet { normal, angles }
 }
 
-/// Which corners (3 * face + 0, 1 or 2) meet at each point.
+/// The corners that meet at each point. Corner k of face f has the number 3 f + k.
 struct FacesAround {
     /// The corners of point `ix` are `corners[first[ix]..first[ix + 1]]`.
     first: Vec<u32>,

@@ -6,8 +6,8 @@ use toml::{Table, Value};
 
 use super::read::{read_lossy, read_utf8};
 
-/// The scene file, the meshes that it names and the material libraries that those name, whether they exist or not. What
-/// cannot be read names nothing.
+/// Returns the scene file, the meshes that it names and the material libraries that those name, whether they exist or
+/// not, sorted. A file that cannot be read contributes no names.
 pub fn source_files(path: &Path) -> Vec<PathBuf> {
     let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
     let meshes = if is_obj { vec![path.to_owned()] } else { meshes(path) };

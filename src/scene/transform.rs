@@ -1,11 +1,11 @@
-//! How a mesh is placed in the world.
+//! Transforms that place a mesh in the world.
 
 use glam::{DMat3, DQuat, DVec3, Vec3};
 use serde::Deserialize;
 
 use super::error::Checked;
 
-/// How a mesh is placed: scaled, then rotated, then translated.
+/// A transform as a scene file describes it: the mesh is scaled, then rotated, then translated.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct TransformSpec {
@@ -17,7 +17,7 @@ pub(super) struct TransformSpec {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(untagged, expecting = "expected [x, y, z] in degrees or { axis = [x, y, z], angle = degrees }")]
 enum RotationSpec {
-    /// Degrees about x, then y, then z.
+    /// Rotations about x, then y, then z, degrees.
     Euler([f32; 3]),
     AxisAngle(AxisAngle),
 }
@@ -26,7 +26,7 @@ enum RotationSpec {
 #[serde(deny_unknown_fields)]
 struct AxisAngle {
     axis: [f32; 3],
-    /// Degrees.
+    /// Angle of the rotation in degrees.
     angle: f32,
 }
 
@@ -37,26 +37,29 @@ enum ScaleSpec {
     Axes([f32; 3]),
 }
 
-/// World from object. Computed in f64, so that the identity leaves every bit as it was.
+/// A transform from object space to world space: a scale, then a rotation, then a translation.
+///
+/// It is applied in f64, so that the identity leaves every bit of a point as it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transform {
     linear: DMat3,
     translation: DVec3,
-    /// The inverse transpose of `linear`, but for a positive factor.
+    /// The inverse transpose of `linear`, up to a positive factor.
     normals: DMat3,
-    /// A reflection: corners change their order so that outside stays outside.
+    /// Whether `linear` is a reflection.
     mirrors: bool,
 }
 
 impl Transform {
-    /// Leaves every bit of a point as it is.
+    /// The identity, which leaves every bit of a point as it is.
     pub const IDENTITY: Self =
         Self { linear: DMat3::IDENTITY, translation: DVec3::ZERO, normals: DMat3::IDENTITY, mirrors: false };
 
-    /// A mesh is scaled along its axes, then rotated, then moved. A negative factor of `scale` reflects the mesh.
+    /// Makes the transform that scales a mesh along its axes, then rotates it, then moves it. A negative factor of
+    /// `scale` reflects the mesh.
     ///
     /// # Errors
-    /// A factor of `scale` is 0, or a number is not finite, in words.
+    /// A factor of `scale` is 0, or a number is not finite. The error is a message for people.
     pub fn new(scale: DVec3, rotation: DQuat, translation: DVec3) -> Result<Self, String> {
         if !(scale.is_finite() && rotation.is_finite() && translation.is_finite()) {
             return Err("the transform has a number that is not finite".to_owned());
@@ -65,7 +68,7 @@ impl Transform {
             return Err(format!("scale = {:?} flattens the mesh: no factor may be 0", scale.to_array()));
         }
         let rotation = DMat3::from_quat(rotation);
-        // Relative to the smallest factor, so that tiny scales do not overflow.
+        // Multiplied by the smallest factor's size, so that tiny scales do not overflow.
         let inverse_scale = scale.abs().min_element() / scale;
         Ok(Self {
             linear: rotation * DMat3::from_diagonal(scale),
@@ -75,24 +78,25 @@ impl Transform {
         })
     }
 
-    /// A point in world space.
+    /// Returns a point of object space in world space.
     pub fn point(&self, p: Vec3) -> Vec3 {
         (self.linear * p.as_dvec3() + self.translation).as_vec3()
     }
 
-    /// A surface normal in world space: unit length, or zero if `n` is zero.
+    /// Returns a surface normal of object space in world space: unit length, or zero if `n` is zero.
     pub fn normal(&self, n: Vec3) -> Vec3 {
         (self.normals * n.as_dvec3()).normalize_or_zero().as_vec3()
     }
 
-    /// Whether the transform is a reflection, by which a triangle's corners change their order.
+    /// Returns whether the transform is a reflection. A reflection reverses the winding of triangles, so two of a
+    /// triangle's corners must be swapped for its outside to stay outside.
     pub fn mirrors(&self) -> bool {
         self.mirrors
     }
 }
 
 impl TransformSpec {
-    /// The transform, where it is finite and can be inverted.
+    /// Returns the transform, or an error if a number is not finite or the transform cannot be inverted.
     pub fn transform(&self) -> Checked<Transform> {
         let translation = finite("translate", self.translate.unwrap_or_default())?;
         let scale = match self.scale {
@@ -121,7 +125,7 @@ impl TransformSpec {
     }
 }
 
-/// Three finite numbers.
+/// Checks that three numbers are finite.
 pub(super) fn finite(name: &str, value: [f32; 3]) -> Checked<DVec3> {
     let vector = Vec3::from_array(value);
     if vector.is_finite() { Ok(vector.as_dvec3()) } else { Err(format!("{name} = {value:?} is not finite")) }

@@ -1,4 +1,4 @@
-//! What it takes to build the structures over the same triangles: the driver's and kdray's own.
+//! Times of building the structures over the same triangles: the driver's and kdray's own.
 
 use std::sync::Arc;
 
@@ -11,40 +11,40 @@ use crate::{
     passes::grid::GridBuilder,
 };
 
-/// Builds of each structure on the GPU, of which the median counts.
+/// Number of builds of each structure on the GPU.
 const N_BUILDS: usize = 9;
 
-/// What the structures over the same triangles cost.
+/// Times of building the structures over the same triangles.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Builds {
-    /// kdray's kd-tree on the CPU, wall-clock.
+    /// Wall-clock time of kdray's kd-tree on the CPU.
     pub tree_ms: f64,
-    /// For the kd-tree.
+    /// Number of CPU threads that build the kd-tree.
     pub n_threads: usize,
-    /// The driver's structure over the triangles, on the GPU; none where the device has no timestamps.
+    /// Time of the driver's structure on the GPU; none where the device has no timestamps.
     pub bvh_ms: Option<Spread>,
-    /// The number of builds of each structure on the GPU.
+    /// Number of builds of each structure on the GPU.
     pub n_bvh_builds: usize,
-    /// kdray's grids on the GPU.
+    /// Times of kdray's grids on the GPU.
     pub grids: Vec<GridBuilds>,
 }
 
-/// The builds of a kind of grid.
+/// Times of building one kind of grid.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GridBuilds {
     /// `grid` or `grid2`.
     pub accel: String,
-    /// From the first kernel's begin to the last one's end; none where the device has no timestamps.
+    /// Time from the begin of the first kernel to the end of the last one; none where the device has no timestamps.
     pub ms: Option<Spread>,
     /// The stages of the last build.
     pub stages: Vec<BuildStage>,
 }
 
 impl Builds {
-    /// Builds the driver's structure, which it gives back, and both grids.
+    /// Builds the driver's structure and both grids. Returns the times and the driver's structure.
     ///
     /// # Errors
-    /// A structure is beyond the device's limits or memory.
+    /// A structure exceeds the device's limits or memory.
     pub fn measure(context: &Arc<Context>, stage: &Stage) -> Result<(Self, Scenery), GpuError> {
         let triangles = &stage.scene().triangles;
         let mut scenery = Scenery::new(context, triangles)?;

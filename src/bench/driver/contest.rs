@@ -1,4 +1,4 @@
-//! Ways of tracing the same rays that take turns on a device.
+//! A contest of tracers (contenders) that take turns with the same rays on a device.
 
 use std::sync::Arc;
 
@@ -13,24 +13,24 @@ use crate::{
     layout::Hit,
 };
 
-/// What became of a contender.
+/// The result of one contender.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
     pub name: String,
-    /// Of all rays; none where the device has no timestamps.
+    /// Time of all rays; none where the device has no timestamps.
     pub ms: Option<Spread>,
-    /// One a ray.
+    /// One hit per ray.
     pub hits: Vec<Hit>,
 }
 
-/// No tracer leaves such a hit: where it is found, none was written.
+/// A hit that no tracer writes. It marks rays whose hit was not written.
 const UNWRITTEN: Hit = Hit { t: f32::NAN, triangle_ix: 0, u: 0.0, v: 0.0 };
 
-/// Lets each trace its rays `n_times`, one after the other again and again, and fetches their hits. `between` has its
-/// turn whenever they pause, with the number of rounds that were timed since the last pause.
+/// Runs `n_times` timed rounds, in each of which every contender traces its rays once. Then downloads the hits. After
+/// every few rounds, `between` is called with the number of rounds since its last call.
 ///
 /// # Errors
-/// Out of memory, a failed call.
+/// The device is out of memory, or a call of Vulkan fails.
 pub fn hold(
     context: &Arc<Context>,
     contenders: &[Box<dyn Contender>],
@@ -54,7 +54,7 @@ pub fn hold(
     contenders.iter().zip(all_ms).map(|(contender, ms)| trial(contender.as_ref(), ms)).collect()
 }
 
-/// What it finds, and nothing that another has found before.
+/// Returns the hits of one contender. The buffer is overwritten first, so that no hit of another contender remains.
 fn hits_of(context: &Arc<Context>, contender: &dyn Contender) -> Result<Vec<Hit>, GpuError> {
     let hits = &contender.resources().cast_hits;
     hits.upload(&vec![UNWRITTEN; hits.len()])?;

@@ -1,11 +1,12 @@
-//! kdray's searches against the driver's own ray tracing, on the same rays and triangles in one run.
+//! The benchmark of kdray's searches against the driver's own ray tracing, on the same rays and triangles in one run.
+//! Each of these tracers is called a contender.
 //!
 //! ```text
-//! builds    the structures of both over the same triangles
-//! contest   ways of tracing that take turns on a device -> times, hits
-//!   pipeline  VK_KHR_ray_tracing_pipeline is one, beside kdray's own kernel; nothing else uses that extension
-//! raster    primary rays without a tree, by the passes that rasterize
-//! report    what came of it, in numbers and as a chart
+//! builds    building the structures of both over the same triangles -> times
+//! contest   contenders that take turns on a device -> times, hits
+//!   pipeline  the contender that uses VK_KHR_ray_tracing_pipeline; nothing else in kdray uses that extension
+//! raster    rasterization in place of primary rays -> times
+//! report    the results, in numbers and as a chart
 //! ```
 
 pub mod builds;
@@ -35,8 +36,8 @@ use crate::{
     gpu::{BindingLayout, Context, GpuError, Scenery},
 };
 
-/// The searches of kdray that are measured. Of the kd-tree's, the first is the default one, the second keeps a stack in memory,
-/// and the third needs neither, but six words more a node.
+/// The searches of kdray that are measured. Three of them traverse the kd-tree: the first is the default one, the
+/// second keeps a stack in memory, and the third needs neither mask nor stack, but six words more per node.
 pub const VARIANTS: [Variant; 5] = [
     Variant::KdTree(Traversal::Mask),
     Variant::KdTree(Traversal::Stack),
@@ -45,14 +46,14 @@ pub const VARIANTS: [Variant; 5] = [
     Variant::Grid2,
 ];
 
-/// One of kdray's structures on the device, with all that the searches of [`VARIANTS`] read of it.
+/// One of kdray's structures on the device, with all data that the searches of [`VARIANTS`] read.
 struct Structure {
     kind: AccelKind,
     buffers: AccelBuffers,
     bindings: Arc<BindingLayout>,
 }
 
-/// The searches through a structure, and the rays that they trace.
+/// The searches through a structure, and the buffers of the rays that they trace.
 struct Contenders {
     resources: Rc<CastResources>,
     contenders: Vec<Box<dyn Contender>>,
@@ -66,7 +67,7 @@ impl Structure {
         Ok(Self { kind: variant.accel(), bindings: CastResources::bindings(context, &buffers)?, buffers })
     }
 
-    /// The searches through the structure, which are to trace these rays.
+    /// Uploads the rays and returns the searches through the structure that trace them.
     fn contenders(&self, context: &Arc<Context>, rays: &[Ray], query: Query) -> Result<Contenders, GpuError> {
         let resources = Rc::new(CastResources::new(context, &self.bindings, &self.buffers, rays.len())?);
         resources.cast_rays.upload(rays)?;
@@ -79,7 +80,7 @@ impl Structure {
     }
 }
 
-/// A stage on a device that has ray tracing, ready for rays.
+/// A stage on a device that supports ray tracing, ready for rays.
 pub struct Arena {
     context: Arc<Context>,
     structures: Vec<Structure>,
@@ -89,10 +90,13 @@ pub struct Arena {
 }
 
 impl Arena {
-    /// Uploads the stage and lets the driver build its structure. Panics on a context without ray tracing.
+    /// Uploads the stage and builds the driver's structure.
     ///
     /// # Errors
-    /// Tree, structure or picture are beyond the device's limits or memory.
+    /// A structure or the picture exceeds the device's limits or memory.
+    ///
+    /// # Panics
+    /// The context is without ray tracing.
     pub fn new(context: &Arc<Context>, stage: &Stage) -> Result<Self, GpuError> {
         let (builds, scenery) = Builds::measure(context, stage)?;
         let structures = [VARIANTS[0], Variant::Grid, Variant::Grid2];
@@ -106,15 +110,16 @@ impl Arena {
         })
     }
 
-    /// What it took to build the structures.
+    /// Returns the times of building the structures.
     pub fn builds(&self) -> &Builds {
         &self.builds
     }
 
-    /// Traces the rays `n_times` by the driver and by each of [`VARIANTS`], in turn. Primary rays are rasterized, too.
+    /// Traces the rays `n_times` by the driver and by each of [`VARIANTS`], in turns. For primary rays, also draws as
+    /// many frames by each method of rasterization.
     ///
     /// # Errors
-    /// Out of memory, a failed call.
+    /// The device is out of memory, or a call of Vulkan fails.
     pub fn measure(&mut self, set: &RaySet, n_times: u16) -> Result<(SetResult, Vec<RasterResult>), GpuError> {
         let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
         let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };

@@ -1,4 +1,4 @@
-//! VK_KHR_ray_tracing_pipeline as a contender.
+//! The contender that traces by `VK_KHR_ray_tracing_pipeline`.
 
 use std::{rc::Rc, sync::Arc};
 
@@ -14,7 +14,7 @@ use crate::{
     passes::spirv,
 };
 
-/// The driver's own ray tracing.
+/// The driver's own ray tracing as a contender.
 pub struct Pipeline {
     pipeline: RayTracingPipeline,
     set: BindingSet,
@@ -23,8 +23,13 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
+    /// Makes the pipeline, which traces the rays in `resources` through `scenery`.
+    ///
     /// # Errors
-    /// The driver refuses a shader. Panics on a context without ray tracing.
+    /// The driver refuses a shader.
+    ///
+    /// # Panics
+    /// The context is without ray tracing.
     pub fn new(
         context: &Arc<Context>,
         scenery: &Rc<Scenery>,

@@ -1,4 +1,4 @@
-//! Primary rays that are rasterized: the first passes of whole frames of one bounce.
+//! Rasterization in place of primary rays. It is timed by the tracing passes of whole frames of `max_depth` 1.
 
 use std::sync::Arc;
 
@@ -10,17 +10,19 @@ use crate::{
     render::Renderer,
 };
 
-/// Frames of a stage's view, and the times of their passes.
+/// A renderer of a stage's view, and the times of its passes.
 pub struct Raster {
     primary: Primary,
     renderer: Renderer,
-    /// A frame each: name and milliseconds of its passes, where the device has timestamps.
+    /// One entry per frame: names and milliseconds of its passes. Empty where the device has no timestamps.
     frames: Vec<Vec<(&'static str, f64)>>,
 }
 
 impl Raster {
+    /// Makes a renderer with one method of rasterization.
+    ///
     /// # Errors
-    /// As [`Renderer::new`].
+    /// Fails as [`Renderer::new`] does.
     pub fn new(context: &Arc<Context>, stage: &Stage, primary: Primary) -> Result<Self, GpuError> {
         let options = RenderOptions {
             width: stage.frame.width,
@@ -34,19 +36,19 @@ impl Raster {
         Ok(Self { primary, renderer, frames: Vec::new() })
     }
 
-    /// Both ways of rasterizing, where the device has them.
+    /// Makes a renderer for each method of rasterization that the device supports.
     ///
     /// # Errors
-    /// As [`Renderer::new`].
+    /// Fails as [`Renderer::new`] does.
     pub fn all(context: &Arc<Context>, stage: &Stage) -> Result<Vec<Self>, GpuError> {
         let by_kernels = context.has_wide_atomics().then_some(Primary::Compute);
         [Primary::Raster].into_iter().chain(by_kernels).map(|primary| Self::new(context, stage, primary)).collect()
     }
 
-    /// Draws so many frames, after one that is not counted.
+    /// Draws `n_frames` frames, after one that is not counted.
     ///
     /// # Errors
-    /// As [`Renderer::draw`].
+    /// Fails as [`Renderer::draw`] does.
     pub fn draw(&mut self, n_frames: u16) -> Result<(), GpuError> {
         self.renderer.draw()?;
         for _ in 0..n_frames {
@@ -57,7 +59,8 @@ impl Raster {
         Ok(())
     }
 
-    /// All frames so far, beside the driver's primary rays, which are as many.
+    /// Returns the result of all frames so far. `primary` is the set with the driver's primary rays, one per pixel
+    /// too.
     pub fn result(&self, primary: &SetResult) -> RasterResult {
         let sums = self.frames.iter().map(|frame| frame.iter().map(|(_, ms)| ms).sum());
         let names = self.frames.first().into_iter().flatten().map(|(name, _)| *name);

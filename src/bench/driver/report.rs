@@ -1,4 +1,4 @@
-//! What the contest found.
+//! The report of the `driver` suite.
 
 use serde::Serialize;
 
@@ -16,8 +16,9 @@ use crate::{
 /// Times of one tracer on one set of rays.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Timing {
-    /// Of a whole set; none where the device has no timestamps.
+    /// Time of the whole set; none where the device has no timestamps.
     pub ms: Option<Spread>,
+    /// Million rays per second.
     pub mrays_per_s: Option<Spread>,
 }
 
@@ -26,39 +27,39 @@ impl Timing {
         Self { ms, mrays_per_s: ms.and_then(|ms| ms.mrays_per_s(n_rays as u64)) }
     }
 
-    /// How many times as fast as another that traces as many rays, by medians.
+    /// Returns the ratio of this tracer's speed to that of another one with the same number of rays, by medians.
     fn ratio_to(&self, other: &Self) -> Option<f64> {
         let ratio = self.mrays_per_s.zip(other.mrays_per_s).map(|(own, other)| own.median / other.median);
-        ratio.filter(|ratio| ratio.is_finite()) // there may be no rays
+        ratio.filter(|ratio| ratio.is_finite()) // not finite if there are no rays
     }
 }
 
-/// One set of rays.
+/// The results on one set of rays.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SetResult {
     pub rays: RayKind,
     pub n_rays: usize,
-    /// As the driver finds them.
+    /// Number of hits that the driver finds.
     pub n_hits: usize,
     pub driver: Timing,
     pub kdray: Vec<Rival>,
 }
 
-/// One of kdray's ways through the tree on one set of rays.
+/// One of kdray's searches on one set of rays.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Rival {
     pub traversal: String,
     #[serde(flatten)]
     pub timing: Timing,
-    /// Its speed in speeds of the driver.
+    /// Its speed divided by the driver's.
     pub ratio: Option<f64>,
-    /// Its hits from the driver's.
+    /// Difference of its hits from the driver's.
     #[serde(flatten)]
     pub apart: Apart,
 }
 
 impl SetResult {
-    /// `trials`: the driver's first; all of the same rays.
+    /// Makes the result from trials of the same rays. The first trial is the driver's.
     pub fn new(rays: RayKind, trials: &[Trial]) -> Self {
         let (driver, rivals) = trials.split_first().expect("the driver's trial");
         let n_rays = driver.hits.len();
@@ -82,21 +83,21 @@ impl SetResult {
     }
 }
 
-/// Primary rays by rasterization, in the view of the set of primary rays.
+/// The result of rasterization in place of primary rays, in the view of the set of primary rays.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RasterResult {
-    /// `--primary`'s word.
+    /// Value of the option `--primary`.
     pub primary: String,
-    /// In the order of execution; none where the device has no timestamps.
+    /// Passes in the order of execution; empty where the device has no timestamps.
     pub passes: Vec<PassSpread>,
-    /// All of them.
+    /// Times of all passes together.
     #[serde(flatten)]
     pub timing: Timing,
-    /// Its speed in speeds of the driver's primary rays.
+    /// Its speed divided by that of the driver's primary rays.
     pub ratio: Option<f64>,
 }
 
-/// One pass of them.
+/// The time of one pass of a rasterization.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PassSpread {
     pub name: &'static str,
@@ -104,17 +105,17 @@ pub struct PassSpread {
 }
 
 impl RasterResult {
-    /// `ms`: of all passes together; `primary_rays`: what the driver makes of them.
+    /// Makes the result. `ms` is the time of all passes together; `primary_rays` holds the driver's result.
     pub fn new(primary: String, passes: Vec<PassSpread>, ms: Option<Spread>, primary_rays: &SetResult) -> Self {
         let timing = Timing::new(ms, primary_rays.n_rays);
         Self { primary, passes, timing, ratio: timing.ratio_to(&primary_rays.driver) }
     }
 }
 
-/// What the suite found.
+/// The suite's report.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// `driver`.
+    /// Name of the suite: `driver`.
     pub suite: &'static str,
     /// The device's own name.
     pub device: String,
@@ -123,24 +124,24 @@ pub struct Report {
     pub scene: String,
     /// Whether the scene was put into a closed room.
     pub room: bool,
-    /// Pixels, one primary ray each.
+    /// Width of the picture in pixels, with one primary ray each.
     pub width: u32,
-    /// Pixels.
+    /// Height of the picture in pixels.
     pub height: u32,
     pub n_triangles: usize,
     pub tree: Statistics,
-    /// Timed casts of each set by each tracer, and timed frames.
+    /// Number of timed casts of each set by each tracer, and of timed frames.
     pub n_times: u16,
-    /// Distances of the same hit may differ by so much of themselves.
+    /// Largest relative difference of the distances of the same hit.
     pub t_tolerance: f32,
     pub builds: Builds,
     pub sets: Vec<SetResult>,
-    /// A way of rasterizing each.
+    /// One entry per method of rasterization.
     pub raster: Vec<RasterResult>,
 }
 
 impl Report {
-    /// Speeds, a group a set, a bar a tracer.
+    /// Returns a chart of the speeds, with one group per set and one bar per tracer.
     pub fn chart(&self) -> BarChart {
         let rate = |timing: &Timing| timing.mrays_per_s.map(|rate| rate.median);
         let mut series =
@@ -164,7 +165,7 @@ impl Report {
         }
     }
 
-    /// The first tracer whose hits differ from the driver's on more rays than rounding explains, and the set.
+    /// Returns the first set and search with more hits that differ from the driver's than rounding explains.
     pub fn first_wrong(&self) -> Option<(&SetResult, &Rival)> {
         let mut pairs = self.sets.iter().flat_map(|set| set.kdray.iter().map(move |rival| (set, rival)));
         pairs.find(|(set, rival)| !rival.apart.is_rounding(set.n_rays))

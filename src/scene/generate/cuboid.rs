@@ -1,4 +1,4 @@
-//! Boxes from outside and from inside.
+//! Boxes that face outwards or inwards.
 
 use glam::Vec3;
 use serde::Deserialize;
@@ -6,51 +6,52 @@ use serde::Deserialize;
 use super::length;
 use crate::scene::{error::Checked, mesh::Mesh};
 
-/// A box centred at the origin: 2 triangles a side, facing outwards. Closed where no side is left out.
+/// A box centred at the origin: 2 triangles per side, facing outwards. It is closed if no side is left out.
 ///
-/// Slot i is `sides[i]`.
+/// Side `sides[i]` has slot i.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cuboid {
     /// Edge lengths along x, y, z.
     size: [f32; 3],
-    /// Which sides there are; all six where absent, in the order left, right, bottom, top, back, front.
+    /// Sides of the box; where absent, all six in the order left, right, bottom, top, back, front.
     sides: Option<Vec<Side>>,
 }
 
-/// The inside of a box centred at the origin: 2 triangles a side, facing inwards.
+/// The inside of a box centred at the origin: 2 triangles per side, facing inwards.
 ///
-/// Slot i is `sides[i]`.
+/// Side `sides[i]` has slot i.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Room {
     /// Edge lengths along x, y, z.
     size: [f32; 3],
-    /// As of a box.
+    /// Sides of the room; where absent, all six in the order left, right, bottom, top, back, front.
     sides: Option<Vec<Side>>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Side {
-    /// -x
+    /// The side at -x.
     Left,
-    /// +x
+    /// The side at +x.
     Right,
-    /// -y
+    /// The side at -y.
     Bottom,
-    /// +y
+    /// The side at +y.
     Top,
-    /// -z
+    /// The side at -z.
     Back,
-    /// +z
+    /// The side at +z.
     Front,
 }
 
 const ALL_SIDES: [Side; 6] = [Side::Left, Side::Right, Side::Bottom, Side::Top, Side::Back, Side::Front];
 
 impl Side {
-    /// Corner numbers counter-clockwise seen from outside; bit 0, 1, 2 of a number: at +x, +y, +z.
+    /// Returns the numbers of the side's corners, counter-clockwise seen from outside. Bits 0, 1 and 2 of a corner's
+    /// number are set at +x, +y and +z.
     fn corners(self) -> [u32; 4] {
         match self {
             Self::Left => [0, 4, 6, 2],
@@ -75,7 +76,8 @@ impl Room {
     }
 }
 
-/// Two triangles a side; `order` is given the side's corners counter-clockwise seen from outside.
+/// Makes two triangles per side. `order` receives a side's corners counter-clockwise seen from outside, and returns
+/// them in the order of the faces.
 fn faces(size: [f32; 3], sides: Option<&[Side]>, order: impl Fn([u32; 4]) -> [u32; 4]) -> Checked<Mesh> {
     let mut mesh = Mesh { positions: corners(size)?, ..Mesh::default() };
     for (slot, side) in sides.unwrap_or(&ALL_SIDES).iter().enumerate() {
@@ -86,7 +88,7 @@ fn faces(size: [f32; 3], sides: Option<&[Side]>, order: impl Fn([u32; 4]) -> [u3
     Ok(mesh)
 }
 
-/// The eight corners, by the bits of their numbers.
+/// Returns the eight corners at the index that is their number.
 fn corners(size: [f32; 3]) -> Checked<Vec<Vec3>> {
     for edge in size {
         length("size", edge)?;

@@ -9,18 +9,18 @@ use super::{
 };
 use crate::scene::{error::Checked, mesh::Mesh};
 
-/// A profile turned about the y axis: 2 * segments triangles a step, half of that where a step ends on the axis. Closed
-/// where the profile begins and ends on the axis.
+/// A surface of revolution: a profile turned about the y axis. Each step of the profile makes 2 * segments triangles,
+/// or half as many if it ends on the axis. The surface is closed if the profile begins and ends on the axis.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Lathe {
-    /// [distance from the axis, height], from top to bottom along the outside: outside is to the left of the way that
-    /// the profile runs (a vessel's runs up its inside first). A smooth curve goes through the points; a point given
-    /// twice is a sharp edge, and two points between sharp edges are a straight line.
+    /// Points `[distance from the axis, height]`, from top to bottom along the outside. The outside is to the left of
+    /// the profile's direction, so the profile of a vessel first runs up the inside. A smooth curve passes through
+    /// the points. A point given twice is a sharp edge, and two points between sharp edges make a straight line.
     profile: Vec<[f32; 2]>,
-    /// Points around.
+    /// Number of points around the axis.
     segments: u32,
-    /// Steps between two points of a curve; 8 where absent.
+    /// Number of steps between two points of a curve; 8 where absent.
     steps: Option<u32>,
 }
 
@@ -36,7 +36,7 @@ impl Lathe {
         let mut mesh = Mesh::default();
         for run in points.chunk_by(|a, b| a != b) {
             let curve = curve(run, steps)?;
-            // On the axis all points of a ring are one.
+            // On the axis, a ring is a single point.
             let n_points = curve.iter().map(|(at, _)| if at.x == 0.0 { 1 } else { segments }).collect();
             let point = |ring: usize, around: f64| -> SurfacePoint {
                 let (at, normal) = curve[ring];
@@ -57,7 +57,8 @@ fn profile_point(r: f32, y: f32) -> Checked<DVec2> {
     Ok(DVec2::new(f64::from(r), f64::from(y)))
 }
 
-/// A run of the profile between sharp edges, by Catmull and Rom's spline.
+/// Returns the points of a run of the profile between sharp edges: a Catmull-Rom spline through `run`, or the two
+/// ends of a straight line.
 fn curve(run: &[DVec2], steps: u32) -> Checked<Vec<ProfilePoint>> {
     let [first, .., last] = run else {
         return Err(
@@ -88,24 +89,26 @@ fn curve(run: &[DVec2], steps: u32) -> Checked<Vec<ProfilePoint>> {
     }
 }
 
-/// The point before an end: its mirror image where the curve ends on the axis, so that the tip is round.
+/// Returns the control point beyond an end of the curve. If the curve ends on the axis, it is the mirror image of the
+/// point next to the end, so that the tip is round.
 fn beyond(end: DVec2, next: DVec2) -> DVec2 {
     if end.x == 0.0 { DVec2::new(-next.x, next.y) } else { 2.0 * end - next }
 }
 
-/// Between the second and the third point; exactly the second one at 0.
+/// Returns the point of the spline between the second and the third control point, `t` from 0 to 1. At 0 it is
+/// exactly the second one.
 fn catmull_rom([a, b, c, d]: [DVec2; 4], t: f64) -> ProfilePoint {
     let (linear, square, cube) = ((c - a) / 2.0, a - 2.5 * b + 2.0 * c - 0.5 * d, (d - a) / 2.0 + 1.5 * (b - c));
     let at = b + t * (linear + t * (square + t * cube));
     (at, left_of(linear + t * (2.0 * square + t * 3.0 * cube)))
 }
 
-/// Unit normal of a profile that runs along `way`.
+/// Returns the unit normal of a profile that runs along `way`.
 fn left_of(way: DVec2) -> DVec2 {
     DVec2::new(-way.y, way.x).normalize_or_zero()
 }
 
-/// On the axis the normal is along it.
+/// Returns the normal at a point. On the axis it is parallel to the axis.
 fn pole_normal(at: DVec2, normal: DVec2) -> DVec2 {
     if at.x == 0.0 { DVec2::new(0.0, 1f64.copysign(normal.y)) } else { normal }
 }

@@ -1,7 +1,8 @@
-//! Meshes from a few numbers: what the shipped scenes are made of. One file a family.
+//! Generators, which make meshes from a few parameters. The shipped scenes are made of such meshes. Each family of
+//! shapes has its own file.
 //!
-//! Closed meshes share the points of their edges bit for bit, and all faces run counter-clockwise seen from outside.
-//! Curved surfaces take their normals from the surface, not from the facets.
+//! In closed meshes, faces that meet share their points bit for bit, and all faces are counter-clockwise seen from
+//! outside. Curved surfaces have the normals of the exact surface, not of the facets.
 
 mod cuboid;
 mod lathe;
@@ -15,18 +16,18 @@ use serde::Deserialize;
 
 use super::{error::Checked, mesh::Mesh, needs};
 
-/// Largest mesh of one generator: 0.8 GB of triangles.
+/// Largest number of triangles of one generator's mesh: 0.8 GiB at 52 bytes each.
 pub const MAX_TRIANGLES: u64 = 1 << 24;
-/// Triangles that all generators of a scene may make: 3.2 GB.
+/// Largest number of triangles that all generators of a scene may make together: 3.2 GiB at 52 bytes each.
 pub const MAX_TRIANGLES_OF_SCENE: u64 = 1 << 26;
 
-/// `generator = "name"` and its own parameters; no others are accepted.
+/// A generator, selected by `generator = "name"`, with its own parameters. Other parameters are an error.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "generator", rename_all = "snake_case")]
 pub enum Generator {
     /// A box.
     Box(cuboid::Cuboid),
-    /// A box whose faces look inwards, with a material for each wall.
+    /// A box whose faces point inwards, with a slot for each wall.
     Room(cuboid::Room),
     /// A rectangle, which may be checkered.
     Plane(plane::Plane),
@@ -34,19 +35,19 @@ pub enum Generator {
     Disc(plane::Disc),
     /// A sphere of rings and segments.
     Sphere(sphere::Sphere),
-    /// A sphere of about equal triangles.
+    /// A sphere of triangles of about equal size.
     Geodesic(sphere::Geodesic),
-    /// A shape between box, sphere and octahedron.
+    /// A shape between a box, a sphere and an octahedron.
     Superellipsoid(superellipsoid::Superellipsoid),
     /// A tube around a torus knot.
     TorusKnot(torus_knot::TorusKnot),
-    /// A profile that turns around an axis.
+    /// A surface of revolution.
     Lathe(lathe::Lathe),
 }
 
 impl Generator {
-    /// The mesh around the origin. The error says which parameter is out of range, or that the mesh is too large for
-    /// the `budget`.
+    /// Makes the mesh, around the origin. The error says which parameter is out of range, or that the mesh is too
+    /// large for the `budget`.
     pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
         match self {
             Self::Box(cuboid) => cuboid.build(),
@@ -62,28 +63,28 @@ impl Generator {
     }
 }
 
-/// A length above zero.
+/// Checks a length, which is 1e-6 to 1e6.
 fn length(name: &str, value: f32) -> Checked<f64> {
     super::material::within(name, value, 1e-6, 1e6).map(f64::from)
 }
 
-/// A number of parts.
+/// Checks a number of parts, which is `min` to 2^16.
 fn count(name: &str, value: u32, min: u32) -> Checked<u32> {
     const MAX: u32 = 1 << 16;
     if (min..=MAX).contains(&value) { Ok(value) } else { Err(format!("{name} = {value} is outside {min} to {MAX}")) }
 }
 
-/// What a scene holds already, which limits what its next generator may make.
+/// Numbers of triangles that a scene has already. They limit the mesh of its next generator.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Budget {
-    /// Triangles that generators have made.
+    /// Number of triangles that generators have made.
     pub n_generated: u64,
-    /// All triangles, those from files included.
+    /// Number of all triangles, including those from files.
     pub n_triangles: u64,
 }
 
 impl Budget {
-    /// Refuses a mesh of more triangles than a mesh or a scene may have, or than fit in memory.
+    /// Refuses a mesh whose number of triangles exceeds the limit of a mesh or of a scene, or the memory.
     fn require(&self, n_triangles: u64) -> Checked<()> {
         if n_triangles > MAX_TRIANGLES {
             return Err(format!("makes {n_triangles} triangles: more than {MAX_TRIANGLES}"));

@@ -1,4 +1,4 @@
-//! Flat things: rectangles of fields, and discs. Both lie on the ground and face up.
+//! Flat shapes: rectangles of fields, and discs. Both lie in the plane y = 0 and face up.
 
 use glam::Vec3;
 use serde::Deserialize;
@@ -6,18 +6,18 @@ use serde::Deserialize;
 use super::{Budget, count, length, rings::heading};
 use crate::scene::{error::Checked, mesh::Mesh};
 
-/// A rectangle of fields centred at the origin: 2 triangles a field. Field (i, k) has slot i + k: two materials make a
-/// checkerboard, and with one row of fields, stripes.
+/// A rectangle of fields centred at the origin: 2 triangles per field. Field (i, k) has slot i + k, so two materials
+/// make a checkerboard, or stripes if there is only one row of fields.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plane {
-    /// Along x and z.
+    /// Lengths along x and z.
     size: [f32; 2],
-    /// Fields along x and z; 1 and 1 where absent.
+    /// Numbers of fields along x and z; 1 and 1 where absent.
     fields: Option<[u32; 2]>,
 }
 
-/// A fan around the origin: one triangle a segment.
+/// A fan of triangles around the origin, one per segment.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Disc {

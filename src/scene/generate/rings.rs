@@ -1,40 +1,42 @@
-//! Surfaces swept from rings of points, any number on each.
+//! Surfaces swept from rings, each of any number of points.
 //!
 //! Two neighbouring rings of n and m points are stitched by n + m triangles:
 //!
 //! ```text
-//!   a0 ---- a1 ---- a2      ring i: the upper one; around grows to the right, seen from outside
+//!   a0 ---- a1 ---- a2      ring i, the upper one; `around` grows to the right, seen from outside
 //!   |  \   / \     / |
 //!   b0 -- b1 - b2 -- b3     ring i + 1
 //! ```
 //!
-//! A ring of one point is a pole: it adds no triangles of its own. So a surface between two poles, and one that is
-//! closed along the rings, has twice as many triangles as its rings have points, and any even number can be reached.
+//! A ring of one point is called a pole and adds no triangles of its own. A surface between two poles thus has twice
+//! as many triangles as the rings between them have points. The same is true of a surface whose last ring is stitched
+//! to the first. Any even number of triangles can be reached.
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::scene::{error::Checked, mesh::Mesh};
 
-/// A point of a surface, with the unit normal there.
+/// A point of a surface and the unit normal there.
 pub type SurfacePoint = (DVec3, DVec3);
 
-/// Points on each ring, from the first to the last.
+/// The rings of a surface.
 #[derive(Clone, Debug)]
 pub struct Rings {
+    /// Number of points on each ring, from the first to the last.
     pub n_points: Vec<u32>,
-    /// The last ring is stitched to the first.
+    /// Whether the last ring is stitched to the first.
     pub cyclic: bool,
 }
 
 impl Rings {
-    /// Triangles of the stitched surface.
+    /// Returns the number of triangles of the stitched surface.
     pub fn n_triangles(&self) -> u64 {
         self.pairs().map(|(a, b)| edges(self.n_points[a]) + edges(self.n_points[b])).sum()
     }
 
-    /// Rings between two poles that make exactly `n_triangles`, with points in proportion to `girth` (a ring's length;
-    /// its argument runs from 0 to 1 between the poles).
+    /// Returns `n_rings` rings between two poles that make exactly `n_triangles`. Their numbers of points are in
+    /// proportion to `girth`, the length of a ring as a function of its position from one pole (0) to the other (1).
     pub fn between_poles(n_triangles: u32, n_rings: u32, girth: impl Fn(f64) -> f64) -> Checked<Self> {
         let inner: Vec<f64> = (1..=n_rings).map(|ring| girth(f64::from(ring) / f64::from(n_rings + 1))).collect();
         let mut n_points = vec![1];
@@ -43,12 +45,13 @@ impl Rings {
         Ok(Self { n_points, cyclic: false })
     }
 
-    /// Rings of a surface closed both ways that make exactly `n_triangles`; their numbers differ by 1 at most.
+    /// Returns `n_rings` rings of a surface closed in both directions that make exactly `n_triangles`. Their numbers
+    /// of points differ by at most 1.
     pub fn cyclic(n_triangles: u32, n_rings: u32) -> Checked<Self> {
         Ok(Self { n_points: distribute(half(n_triangles)?, &vec![1.0; n_rings as usize])?, cyclic: true })
     }
 
-    /// The mesh; `point` is called with a ring and how far around it (0 to 1).
+    /// Makes the mesh. `point` is called with the index of a ring and the position around it, 0 to 1.
     pub fn sweep(&self, point: impl Fn(usize, f64) -> SurfacePoint + Sync) -> Mesh {
         let ring = |(ring, n): (usize, &u32)| {
             (0..*n).map(|ix| point(ring, f64::from(ix) / f64::from(*n))).collect::<Vec<SurfacePoint>>()
@@ -69,7 +72,7 @@ impl Rings {
         }
     }
 
-    /// Neighbouring rings.
+    /// Returns the indices of neighbouring rings.
     fn pairs(&self) -> impl Iterator<Item = (usize, usize)> {
         let n = self.n_points.len();
         let last = if self.cyclic { n } else { n.saturating_sub(1) };
@@ -77,7 +80,7 @@ impl Rings {
     }
 }
 
-/// Edges of a ring.
+/// Returns the number of a ring's edges.
 fn edges(n_points: u32) -> u64 {
     if n_points == 1 { 0 } else { u64::from(n_points) }
 }
@@ -90,13 +93,13 @@ fn half(n_triangles: u32) -> Checked<u32> {
     }
 }
 
-/// Splits `total` in whole numbers of 3 at least, otherwise in proportion to the weights.
+/// Splits `total` into whole numbers, one per weight: each is 3 plus a share of the rest in proportion to its weight.
 fn distribute(total: u32, weights: &[f64]) -> Checked<Vec<u32>> {
     let n_parts = weights.len() as u32;
     let Some(rest) = total.checked_sub(3 * n_parts) else {
         return Err(format!("{total} points are too few for {n_parts} rings of 3"));
     };
-    // Each part is the step of a rounded running sum, and the sums end at `rest` exactly.
+    // Each share is a difference of rounded prefix sums, and the last prefix sum is exactly `rest`.
     let whole: f64 = weights.iter().sum();
     let mut sum = 0.0;
     let mut given = 0;
@@ -110,14 +113,16 @@ fn distribute(total: u32, weights: &[f64]) -> Checked<Vec<u32>> {
     Ok(weights.iter().enumerate().map(part).collect())
 }
 
-/// The strip between an upper and a lower ring, each given by its first point and its number of points.
+/// Adds the strip of triangles between an upper and a lower ring, each given by the index of its first point and its
+/// number of points.
 fn stitch(faces: &mut Vec<[u32; 3]>, (first_a, n_a): (u32, u32), (first_b, n_b): (u32, u32)) {
     let (edges_a, edges_b) = (edges(n_a), edges(n_b));
     let (mut a, mut b) = (0, 0);
     while a < edges_a || b < edges_b {
         let at_a = first_a + (a % u64::from(n_a)) as u32;
         let at_b = first_b + (b % u64::from(n_b)) as u32;
-        // Step on the ring whose next edge has its middle further back: (a + 1/2) / n_a against (b + 1/2) / n_b.
+        // Advance on the ring whose next edge has its middle further back. The middles are at (a + 1/2) / n_a and
+        // (b + 1/2) / n_b.
         let upper = b == edges_b || a < edges_a && (2 * a + 1) * edges_b <= (2 * b + 1) * edges_a;
         if upper {
             a += 1;
@@ -129,9 +134,10 @@ fn stitch(faces: &mut Vec<[u32; 3]>, (first_a, n_a): (u32, u32), (first_b, n_b):
     }
 }
 
-/// Unit normal of a surface whose second parameter runs to the right and whose first runs down, seen from outside.
+/// Returns the unit normal of a surface whose second parameter grows to the right and whose first grows downwards,
+/// seen from outside.
 ///
-/// By central differences in f64: their error, some 1e-9, is far below the encoding's 1e-4.
+/// Central differences in f64 have an error of some 1e-9, far below the 1e-4 of the encoding of normals.
 pub fn normal_at(position: impl Fn(f64, f64) -> DVec3, down: f64, around: f64) -> DVec3 {
     const STEP: f64 = 1e-6;
     let along_down = position(down + STEP, around) - position(down - STEP, around);
@@ -139,7 +145,8 @@ pub fn normal_at(position: impl Fn(f64, f64) -> DVec3, down: f64, around: f64) -
     along_down.cross(along_around).normalize_or_zero()
 }
 
-/// The unit vector towards `around` (0 to 1) on the ground, counter-clockwise seen from above, from +z.
+/// Returns the unit vector in the plane y = 0 at the angle `around`, in turns (0 to 1) from +z, counter-clockwise
+/// seen from above.
 pub fn heading(around: f64) -> DVec3 {
     let (sin, cos) = (around * std::f64::consts::TAU).sin_cos();
     DVec3::new(sin, 0.0, cos)

@@ -1,4 +1,4 @@
-//! Spheres: by longitude and latitude, or from an icosahedron.
+//! Spheres, divided by longitude and latitude or from an icosahedron.
 
 use std::{collections::HashMap, f64::consts::PI};
 
@@ -11,7 +11,8 @@ use super::{
 };
 use crate::scene::{error::Checked, mesh::Mesh};
 
-/// A sphere around the origin with poles at +y and -y, closed: 2 * segments * rings triangles, or exactly `triangles`.
+/// A closed sphere around the origin with poles at +y and -y. It has 2 * segments * rings triangles, or exactly
+/// `triangles`.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sphere {
@@ -21,12 +22,12 @@ pub struct Sphere {
     triangles: Option<u32>,
 }
 
-/// A sphere around the origin, closed: 20 frequency^2 triangles of almost one size and shape.
+/// A closed sphere around the origin: 20 frequency^2 triangles of almost equal size and shape.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Geodesic {
     radius: f32,
-    /// Parts that each edge of the icosahedron is cut into.
+    /// Number of parts that each edge of the icosahedron is cut into.
     frequency: u32,
 }
 
@@ -42,8 +43,8 @@ impl Sphere {
     }
 }
 
-/// Rings between two poles, as asked for: even ones, or an exact number of triangles on rings of points in proportion
-/// to a sphere's circles.
+/// Returns the rings between two poles: `rings` rings of `segments` points each, or rings that make exactly
+/// `triangles` and whose numbers of points are in proportion to the circles of latitude.
 pub fn polar_rings(
     segments: Option<u32>,
     rings: Option<u32>,
@@ -61,7 +62,8 @@ pub fn polar_rings(
         }
         (None, None, Some(triangles)) => {
             budget.require(u64::from(triangles))?;
-            // Almost equilateral: rows sqrt(3)/2 edges high, and rings of 2/pi of the equator's points on average.
+            // For almost equilateral triangles, rows are sqrt(3)/2 edges high. Rings have on average 2/pi of the
+            // equator's points.
             let n_rows = (f64::from(triangles) * PI / (4.0 * 3f64.sqrt())).sqrt().round() as u32;
             Rings::between_poles(triangles, n_rows.max(2) - 1, |down| (PI * down).sin())
         }
@@ -69,7 +71,7 @@ pub fn polar_rings(
     }
 }
 
-/// Where a point of a ring lies, seen from the middle.
+/// Returns the unit vector from the middle to a point of a ring.
 pub fn polar_direction(rings: &Rings, ring: usize, around: f64) -> DVec3 {
     let last = rings.n_points.len() - 1;
     if ring == 0 || ring == last {
@@ -79,7 +81,7 @@ pub fn polar_direction(rings: &Rings, ring: usize, around: f64) -> DVec3 {
     sin * heading(around) + cos * DVec3::Y
 }
 
-/// The icosahedron's corners are (0, +-1, +-golden ratio) and their rotations; faces counter-clockwise from outside.
+/// Faces of the icosahedron, as indices into `icosahedron_corners`, counter-clockwise seen from outside.
 const ICOSAHEDRON: [[usize; 3]; 20] = [
     [0, 11, 5],
     [0, 5, 1],
@@ -103,6 +105,7 @@ const ICOSAHEDRON: [[usize; 3]; 20] = [
     [9, 8, 1],
 ];
 
+/// Returns the corners of the icosahedron: (0, +-1, +-golden ratio) and their cyclic permutations.
 fn icosahedron_corners() -> [DVec3; 12] {
     let g = (1.0 + 5f64.sqrt()) / 2.0;
     [
@@ -132,7 +135,7 @@ impl Geodesic {
         for face in ICOSAHEDRON {
             for row in 0..frequency {
                 for ix in 0..=row {
-                    // Corner weights of a point: row - ix parts of the second corner, ix of the third.
+                    // A point's weights of the face's three corners; they sum to `frequency`.
                     let mut at = |row: u32, ix: u32| points.at(face, [frequency - row, row - ix, ix]);
                     let (top, left, right) = (at(row, ix), at(row + 1, ix), at(row + 1, ix + 1));
                     let beside = (ix < row).then(|| at(row, ix + 1));
@@ -151,11 +154,12 @@ impl Geodesic {
     }
 }
 
-/// Points on the sphere, made once for all faces that share them.
+/// Points on the sphere. Faces that share a point share its index.
 struct Points {
     radius: f64,
     corners: [DVec3; 12],
-    /// By the corners of the icosahedron that a point lies between and its parts of each, in order.
+    /// Indices of points by their key: the corners of the icosahedron that a point lies between, each with its
+    /// weight, sorted. Entries of weight 0 are (0, 0).
     by_weights: HashMap<[(usize, u32); 3], u32>,
     mesh: Mesh,
 }

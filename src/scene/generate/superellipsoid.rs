@@ -1,4 +1,4 @@
-//! Superellipsoids: from boxes with rounded edges through ellipsoids to octahedra.
+//! Superellipsoids: shapes that range from boxes with rounded edges through ellipsoids to octahedra.
 
 use glam::{DVec3, Vec3};
 use serde::Deserialize;
@@ -10,14 +10,15 @@ use super::{
 };
 use crate::scene::{error::Checked, material::within, mesh::Mesh};
 
-/// (|x|^(2/h) + |z|^(2/h))^(h/v) + |y|^(2/v) = 1, scaled to its size, around the origin. Closed: triangles as of a
-/// sphere. Barr, "Superquadrics and Angle-Preserving Transformations" (1981).
+/// The surface `(|x|^(2/h) + |z|^(2/h))^(h/v) + |y|^(2/v) = 1`, scaled to its size, around the origin. It is closed
+/// and has as many triangles as a sphere with the same parameters. Source: Barr, "Superquadrics and Angle-Preserving
+/// Transformations" (1981).
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Superellipsoid {
     /// Extents along x, y, z.
     size: [f32; 3],
-    /// v and h, 0.1 (a box) to 1.9 (almost an octahedron); 1 and 1 make an ellipsoid.
+    /// The exponents v and h, each from 0.1 (almost a box) to 1.9 (almost an octahedron); 1 and 1 make an ellipsoid.
     exponents: [f32; 2],
     segments: Option<u32>,
     rings: Option<u32>,
@@ -45,24 +46,24 @@ impl Superellipsoid {
     }
 }
 
-/// The unscaled solid, with powers in place of exponents.
+/// The unscaled solid. Its fields are the powers 2/v and 2/h of the equation.
 struct Shape {
     v: f64,
     h: f64,
 }
 
 impl Shape {
-    /// What a vector must be divided by to lie on the surface.
+    /// Returns the number by which a vector must be divided to lie on the surface.
     fn gauge(&self, p: DVec3) -> f64 {
         (self.across(p).powf(self.v) + p.y.abs().powf(self.v)).powf(1.0 / self.v)
     }
 
-    /// Distance from the axis, in the measure of the horizontal section.
+    /// Returns the distance from the y axis in the norm of the horizontal section.
     fn across(&self, p: DVec3) -> f64 {
         (p.x.abs().powf(self.h) + p.z.abs().powf(self.h)).powf(1.0 / self.h)
     }
 
-    /// Normal to the surface, of any length.
+    /// Returns a normal of the surface, of any length.
     fn gradient(&self, p: DVec3) -> DVec3 {
         let across = self.across(p);
         let power = |x: f64, power: f64| x.abs().powf(power - 1.0).copysign(x);

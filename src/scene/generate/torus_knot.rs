@@ -1,4 +1,4 @@
-//! Tubes along torus knots, rippled if wanted.
+//! Tubes along torus knots, with optional ripples.
 
 use std::f64::consts::TAU;
 
@@ -11,29 +11,29 @@ use super::{
 };
 use crate::scene::{error::Checked, material::within, mesh::Mesh};
 
-/// A knot that runs `p` times around the y axis and `q` times around a circle's line, closed: 2 * segments * sides
-/// triangles, or exactly `triangles` (even) on `segments` rings.
+/// A closed tube along a knot that runs `p` times around the y axis and `q` times around a circle about that axis. It
+/// has 2 * segments * sides triangles, or exactly `triangles` (even) on `segments` rings.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TorusKnot {
     p: u32,
     q: u32,
-    /// Of the circle.
+    /// Radius of the circle.
     radius: f32,
-    /// Distance of the tube's middle from the circle's line.
+    /// Distance of the tube's centre line from the circle.
     swing: f32,
     /// Radius of the tube.
     tube: f32,
     segments: u32,
     sides: Option<u32>,
     triangles: Option<u32>,
-    /// Waves along the knot and around the tube; together they wind around it.
+    /// Numbers of waves along the knot and around the tube. If both are not 0, the ripples wind around the tube.
     ripples: Option<[i32; 2]>,
-    /// Height of the waves as a part of the tube's radius, 0 to 0.9.
+    /// Amplitude of the waves as a fraction of the tube's radius, 0 to 0.9; 0 where absent.
     ripple_depth: Option<f32>,
 }
 
-/// The numbers of a `TorusKnot`, checked.
+/// The checked parameters of a `TorusKnot`.
 struct Tube {
     p: f64,
     q: f64,
@@ -90,14 +90,14 @@ impl TorusKnot {
 }
 
 impl Tube {
-    /// `along` the knot and `around` the tube, each 0 to 1.
+    /// Returns the point at the positions `along` the knot and `around` the tube, each 0 to 1.
     fn position(&self, along: f64, around: f64) -> DVec3 {
         let (sin_q, cos_q) = (self.q * along * TAU).sin_cos();
         let outward = heading(self.p * along);
         let forward = DVec3::new(outward.z, 0.0, -outward.x);
         let from_axis = self.radius + self.swing * cos_q;
         let middle = from_axis * outward + self.swing * sin_q * DVec3::Y;
-        // The knot lies on a torus, so the torus's normal is perpendicular to it and comes back to itself.
+        // The knot lies on a torus, so the torus's normal is perpendicular to the knot and is the same at both ends.
         let normal = cos_q * outward + sin_q * DVec3::Y;
         let tangent = self.swing * self.q * (cos_q * DVec3::Y - sin_q * outward) + from_axis * self.p * forward;
         let beside = normal.cross(tangent.normalize());

@@ -1,19 +1,22 @@
-//! OBJ text as people and programs write it, checked statement by statement and rewritten for tobj.
+//! Checks of OBJ text as people and programs write it, statement by statement, and its rewriting for tobj.
 //!
-//! tobj 4.0.5 panics on an overflowing normal index, takes NaN for a coordinate, borrows a neighbour's normal where a
-//! corner has none, and knows no `s`. What leaves here is text on which none of that can happen: finite numbers,
-//! absolute indices in range, and a group (`g NORMALS`, ...) around faces that are shaded alike.
+//! tobj 4.0.5 panics on an overflowing normal index, accepts NaN as a coordinate, uses a neighbour's normal where a
+//! corner has none, and ignores `s`. The rewritten text avoids all of this: its numbers are finite, its indices are
+//! absolute and in range, and each run of faces that are shaded alike has its own group, named [`NORMALS`],
+//! [`SMOOTH`] or [`FLAT`].
 
 use std::{borrow::Cow, collections::BTreeMap, fmt::Write};
 
 use crate::scene::error::Checked;
 
-/// Names of the groups that faces are sorted into.
+/// Group of faces whose corners all have normals.
 pub const NORMALS: &str = "normals";
+/// Group of faces without normals that are shaded smoothly.
 pub const SMOOTH: &str = "smooth";
+/// Group of faces without normals after `s off`.
 pub const FLAT: &str = "flat";
 
-/// Statements of the format that say nothing about polygons or their materials.
+/// Keywords of the format that do not concern polygons or their materials.
 const IGNORED: [&str; 31] = [
     "o",
     "g",
@@ -51,19 +54,20 @@ const IGNORED: [&str; 31] = [
 /// A checked OBJ file.
 #[derive(Debug, Default)]
 pub struct CleanObj {
-    /// For tobj: all positions, all normals, then the faces. The first line asks for a material library.
+    /// Text for tobj: all positions, all normals, then the faces. The first line names a material library, so that
+    /// tobj calls its material loader.
     pub text: String,
-    /// What `mtllib` names, and where (lines from 1).
+    /// Names after `mtllib`, each with its line, counted from 1.
     pub libraries: Vec<(usize, String)>,
-    /// What `usemtl` names, and where first.
+    /// Names after `usemtl`, each with the first line that uses it.
     pub used_materials: BTreeMap<String, usize>,
-    /// Triangles that the faces make, polygons cut into fans.
+    /// Number of triangles after polygons are cut into fans.
     pub n_triangles: u64,
-    /// First statement that the format does not have, if any.
+    /// Line and keyword of the first statement that is not part of the format, if any.
     pub unknown: Option<(usize, String)>,
 }
 
-/// Checks and rewrites. The error: a line, counted from 1, and what is wrong with it.
+/// Checks and rewrites the text of an OBJ file. The error is a line, counted from 1, and what is wrong with it.
 pub fn clean_obj(text: &str) -> Result<CleanObj, (usize, String)> {
     let mut cleaner = Cleaner { totals: count(text), ..Cleaner::default() };
     for (line, statement) in statements(text) {
@@ -74,7 +78,8 @@ pub fn clean_obj(text: &str) -> Result<CleanObj, (usize, String)> {
     Ok(out)
 }
 
-/// Lines with their numbers, comments and blank ones left out, continued ones (`\` at the end) joined.
+/// Returns the statements of a file, each with the number of its first line. Comments and blank lines are left out;
+/// continued lines (`\` at the end) are joined.
 pub fn statements(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     let mut lines = text.lines().enumerate();
     let next = move || {
@@ -89,13 +94,13 @@ pub fn statements(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
     std::iter::from_fn(next).filter(|(_, statement)| !statement.is_empty() && !statement.starts_with('#'))
 }
 
-/// A statement's keyword and the rest, trimmed.
+/// Returns a statement's keyword and the rest, trimmed.
 pub fn split_keyword(statement: &str) -> (&str, &str) {
     let (keyword, rest) = statement.split_once(char::is_whitespace).unwrap_or((statement, ""));
     (keyword, rest.trim())
 }
 
-/// How many there are of what a face can refer to.
+/// Numbers of the elements that a face can refer to.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
     positions: usize,
@@ -123,9 +128,9 @@ fn count(text: &str) -> Counts {
 #[derive(Debug, Default)]
 struct Cleaner {
     totals: Counts,
-    /// Up to the current line: what negative indices count back from.
+    /// Counts up to the current line, from which negative indices count back.
     seen: Counts,
-    /// `s off` was the last word on smoothing; a file that says nothing is smooth where it does not crease.
+    /// Whether the last `s` statement was `s off`. A file without `s` is smooth except at creases.
     flat: bool,
     /// The group of the last face.
     group: &'static str,
@@ -141,7 +146,7 @@ impl Cleaner {
         let (keyword, rest) = split_keyword(statement);
         let words = || rest.split('#').next().unwrap_or_default().split_whitespace();
         match keyword {
-            // A weight (for curves only) or a colour may follow the point.
+            // A weight (used by curves only) or a colour may follow the point.
             "v" => vector(&mut self.positions, "v", words(), 3..=7)?,
             "vn" => vector(&mut self.normals, "vn", words(), 3..=3)?,
             "vt" => vector(&mut String::new(), "vt", words(), 1..=3)?,
@@ -164,7 +169,7 @@ impl Cleaner {
         Ok(())
     }
 
-    /// `f v`, `f v/vt`, `f v//vn` or `f v/vt/vn`, each three times or more.
+    /// Adds a face. It has three or more corners, each of the form `v`, `v/vt`, `v//vn` or `v/vt/vn`.
     fn face<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> Checked<()> {
         self.corners.clear();
         for word in words {
@@ -198,7 +203,7 @@ impl Cleaner {
         Ok(())
     }
 
-    /// Position and normal of one corner, counted from 1.
+    /// Returns the indices of one corner's position and normal, counted from 1.
     fn corner(&self, word: &str) -> Checked<(usize, Option<usize>)> {
         let mut parts = word.split('/');
         let position = parts.next().unwrap_or_default();
@@ -217,7 +222,7 @@ impl Cleaner {
     }
 }
 
-/// An absolute index in 1..=total; a negative one counts back from the last of those `seen`.
+/// Returns an absolute index in `1..=total`. A negative index counts back from the last of the `seen` elements.
 fn index(word: &str, what: &str, seen: usize, total: usize) -> Checked<usize> {
     let index: i64 = word.parse().map_err(|_| format!("`{word}` is not the index of a {what}"))?;
     let absolute = if index < 0 { (seen as i64).checked_add(index).map(|i| i + 1) } else { Some(index) };
@@ -227,7 +232,8 @@ fn index(word: &str, what: &str, seen: usize, total: usize) -> Checked<usize> {
     }
 }
 
-/// Checks that `counts` finite numbers follow, and writes the first three after the keyword.
+/// Writes the keyword and the first three of the numbers in `words`. Fails if a number is not finite, or if there are
+/// more or fewer numbers than `counts` allows.
 fn vector<'a>(
     out: &mut String,
     keyword: &str,
@@ -256,7 +262,7 @@ fn vector<'a>(
     }
 }
 
-/// Appends to a String, which cannot fail.
+/// Appends to a `String`, which cannot fail.
 fn push(out: &mut String, text: std::fmt::Arguments) {
     out.write_fmt(text).expect("a String takes what it is given");
 }

@@ -17,27 +17,27 @@ use super::{
     smooth::crease_normals,
 };
 
-/// Degrees between faces beyond which their common edge is sharp.
+/// Angle between two faces, in degrees, beyond which their common edge is sharp.
 pub(super) const DEFAULT_CREASE: f32 = 40.0;
 
-/// How a mesh without normals is shaded, and one with them.
+/// Options of a mesh's shading.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shading {
-    /// Otherwise every face is flat, whatever the file says.
+    /// If false, every face is flat, even where the file has normals.
     pub smooth: bool,
-    /// Degrees.
+    /// Angle between two faces without normals, in degrees, beyond which their common edge is sharp.
     pub crease: f32,
 }
 
-/// Reads the text of an OBJ file.
+/// Reads the text of an OBJ file, unless it is too large for the memory.
 pub(super) fn read_obj(path: &Path) -> Result<String, SceneError> {
     require_for_text(path).map_err(|what| SceneError::file(path, what))?;
     read_lossy(path)
 }
 
-/// Makes a mesh of an OBJ file's text, and reads its materials. A face's slot is an index into the library;
-/// `library.materials.len()` stands for none, or one that the library lacks. `n_loaded`: triangles that the scene has
-/// already.
+/// Makes a mesh from an OBJ file's text, and reads its materials. A face's slot is an index into the library. A face
+/// without a material, or with one that the library lacks, has slot `library.materials.len()`. `n_loaded` is the
+/// number of triangles that the scene has already.
 pub(super) fn parse_obj(
     path: &Path,
     text: &str,
@@ -57,7 +57,7 @@ pub(super) fn parse_obj(
     Ok((mesh, library))
 }
 
-/// Says what is left out, once each.
+/// Warns of the first unknown statement and of a material that the library lacks.
 fn warn(path: &Path, clean: &CleanObj, library: &Library) {
     let path = path.display();
     if let Some((line, statement)) = &clean.unknown {
@@ -75,12 +75,12 @@ fn parse(clean: &CleanObj, library: &Library) -> Result<Vec<tobj::Model>, tobj::
     let options =
         tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
     let by_name = library.materials.iter().map(|material| material.name.clone()).zip(0..).collect();
-    // tobj only looks names up; the materials themselves are in the library.
+    // tobj needs the materials only for their names; the materials themselves are in the library.
     let materials = |_: &Path| Ok((vec![tobj::Material::default()], std::clone::Clone::clone(&by_name)));
     tobj::load_obj_buf(&mut clean.text.as_bytes(), &options, materials).map(|(models, _)| models)
 }
 
-/// One mesh of all models; polygons have become fans.
+/// Joins all models into one mesh. tobj has cut polygons into fans.
 fn mesh(models: &[tobj::Model], no_material: u32, shading: Shading) -> Mesh {
     let mut mesh = Mesh::default();
     let mut to_smooth = Vec::new();

@@ -1,6 +1,6 @@
-//! MTL files: checked and rewritten line by line, read by tobj, turned into the kernels' materials.
+//! MTL files. They are checked and rewritten line by line, read by tobj and converted to materials.
 //!
-//! tobj 4.0.5 panics on a colour of one number, which the format allows (grey).
+//! A colour of one number is a grey in MTL, but tobj 4.0.5 panics on it; so it is rewritten as three numbers.
 
 use std::{
     fmt::Write,
@@ -14,20 +14,21 @@ use crate::scene::{
     read::read_lossy,
 };
 
-/// Materials; the last of a name counts.
+/// Materials of MTL files. If several have the same name, the last one counts.
 #[derive(Clone, Debug, Default)]
 pub struct Library {
     pub materials: Vec<Material>,
 }
 
 impl Library {
-    /// Whether there is a material of this name.
+    /// Returns whether there is a material of this name.
     pub fn has(&self, name: &str) -> bool {
         self.materials.iter().any(|material| material.name == name)
     }
 }
 
-/// Reads what the `mtllib` lines of an OBJ file name, relative to it. A file that is not there is a warning.
+/// Reads the files that the `mtllib` lines of an OBJ file name, relative to its folder. Warns of a file that does not
+/// exist.
 pub fn load_libraries(obj: &Path, libraries: &[(usize, String)]) -> Result<Library, SceneError> {
     let mut library = Library::default();
     let folder = obj.parent().unwrap_or(Path::new(""));
@@ -44,7 +45,8 @@ pub fn load_libraries(obj: &Path, libraries: &[(usize, String)]) -> Result<Libra
     Ok(library)
 }
 
-/// The rest of the line is one name, with spaces perhaps; where no such file is, several names.
+/// Returns the files that a `mtllib` line names. The rest of the line is one name, possibly with spaces, if such a
+/// file exists; otherwise it is a list of names.
 fn library_files(folder: &Path, rest: &str) -> Checked<Vec<PathBuf>> {
     let whole = inside(folder, rest)?;
     if whole.exists() {
@@ -53,7 +55,7 @@ fn library_files(folder: &Path, rest: &str) -> Checked<Vec<PathBuf>> {
     rest.split_whitespace().map(|name| inside(folder, name)).collect()
 }
 
-/// A path below the folder. Backslashes count as separators, as in files from Windows.
+/// Returns the path of a file below the folder. Backslashes count as separators, as in files from Windows.
 fn inside(folder: &Path, name: &str) -> Checked<PathBuf> {
     let climbs = name.split(['/', '\\']).any(|part| part == "..");
     let is_absolute = name.starts_with(['/', '\\']) || name.chars().nth(1) == Some(':');
@@ -76,7 +78,8 @@ fn load_library(path: &Path, library: &mut Library) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// The terms that are rendered, numbers checked and greys spelt out; textures and all else are left out.
+/// Returns the statements of the terms that are rendered. Numbers are checked and greys are written as three numbers.
+/// Textures and all other statements are left out.
 fn clean_mtl(text: &str) -> Result<String, (usize, String)> {
     let mut clean = String::new();
     for (line, statement) in statements(text) {
@@ -95,12 +98,12 @@ fn clean_mtl(text: &str) -> Result<String, (usize, String)> {
     Ok(clean)
 }
 
-/// Words before a comment.
+/// Returns the words before a comment.
 fn words(rest: &str) -> impl Iterator<Item = &str> {
     rest.split('#').next().unwrap_or_default().split_whitespace()
 }
 
-/// `r g b`, or one grey.
+/// Returns `r g b`. One number alone is a grey.
 fn rgb(keyword: &str, rest: &str) -> Checked<String> {
     let parts: Vec<&str> = words(rest).collect();
     for part in &parts {
@@ -115,7 +118,7 @@ fn rgb(keyword: &str, rest: &str) -> Checked<String> {
 
 fn number(keyword: &str, rest: &str) -> Checked<String> {
     let mut parts = words(rest);
-    // `d -halo x` fades towards the silhouette; x is its opacity face-on.
+    // `d -halo x` is an opacity that varies with the angle of view; x is its value where the surface faces the eye.
     let number = parts.find(|part| *part != "-halo").unwrap_or_default();
     finite(keyword, number)?;
     Ok(number.to_owned())
@@ -135,7 +138,7 @@ fn finite(keyword: &str, word: &str) -> Checked<()> {
     }
 }
 
-/// tobj keeps the terms that it does not know as text.
+/// Converts a material of tobj, which keeps the terms that it does not know (Tf, Tr) as text.
 fn spec(material: &tobj::Material) -> MaterialSpec {
     let unknown = |term: &str| -> Option<Vec<f32>> {
         material.unknown_param.get(term).map(|text| text.split_whitespace().flat_map(str::parse).collect())
@@ -149,7 +152,7 @@ fn spec(material: &tobj::Material) -> MaterialSpec {
         ns: material.shininess,
         ni: material.optical_density,
         d: material.dissolve,
-        // Files often give both; d is the one that the format documents.
+        // Files often have both; the format documents only d.
         tr: unknown("Tr").filter(|_| material.dissolve.is_none()).and_then(|tr| tr.first().copied()),
         illum: material.illumination_model,
     }
