@@ -1,4 +1,4 @@
-//! The words of the command line, and what they mean where they are left out.
+//! The arguments of the subcommands, and the defaults of those that are left out.
 
 use std::{path::PathBuf, str::FromStr};
 
@@ -32,41 +32,42 @@ pub struct Args {
 
 #[derive(Subcommand)]
 pub enum Command {
-    /// Render a scene to a picture, and report where the time went
+    /// Render a scene to a picture, and report the time of each pass
     Render(RenderArgs),
     #[cfg(feature = "view")]
-    /// Show a scene in a window, moved through with keys and mouse
+    /// Show a scene in a window; keys and mouse move the camera
     View(ViewArgs),
-    /// Find what given rays hit in a scene or mesh
+    /// Cast rays from a file into a scene or mesh, and write their hits
     Cast(CastArgs),
     /// List the Vulkan devices
     Devices,
     /// Describe a scene and its acceleration structure
     Inspect(InspectArgs),
     #[cfg(feature = "bench")]
-    /// Measure whole frames, traversals of the kd-tree, the driver's own ray tracing, or cost against size
+    /// Measure whole frames, search algorithms, the driver's own ray tracing, or the cost of larger meshes
     #[command(subcommand)]
     Bench(Suite),
 }
 
 #[derive(clap::Args)]
 pub struct RenderArgs {
-    /// Scene file
+    /// Scene file (TOML or OBJ)
     pub scene: PathBuf,
-    /// Picture to write, .png or .exr (linear radiance) [default: the scene's name, .png]; with --path, #### stands for
-    /// the frame's number
+    /// Picture to write: .png, or .exr for linear radiance; with --path, #### in the name stands for the frame's
+    /// number [default: the scene's name with .png, or with .####.png, in the working directory]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
-    /// Move the camera as keyframes in this TOML file say, and write a picture a frame
+    /// Move the camera along the keyframes of this TOML file, and write one picture per frame
     #[arg(long, value_name = "FILE", conflicts_with = "repeat")]
     pub path: Option<PathBuf>,
-    /// Frames of the path to render, as 0-99 or 7 [default: from the first keyframe to the last]
+    /// Frames of the path to render, both ends included, for example 0-99 or 7 [default: from the first keyframe to
+    /// the last]
     #[arg(long, value_name = "A-B", requires = "path")]
     pub frames: Option<Frames>,
-    /// Only the pixels x0 <= x < x1, y0 <= y < y1 of the picture, counted from its upper left corner
+    /// Render only the pixels x0 <= x < x1, y0 <= y < y1, counted from the picture's upper left corner
     #[arg(long, value_name = "x0,y0,x1,y1")]
     pub crop: Option<Crop>,
-    /// Samples a pixel, 1 to 65536: the first at its centre, more of them smooth edges
+    /// Samples per pixel, 1 to 65536: the first sample is at the pixel's centre, further ones smooth edges
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..=65_536))]
     pub spp: u32,
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
@@ -77,40 +78,42 @@ pub struct RenderArgs {
     /// Render on the CPU, without Vulkan
     #[arg(long, conflicts_with_all = ["device", "validate"])]
     pub cpu: bool,
-    /// Threads for loading, building and --cpu [default: all processors]
+    /// Number of CPU threads for loading, building and --cpu, 1 to 1024 [default: one per processor]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
-    /// Draw the frame so many times and report the one of median time
+    /// Number of times to draw the frame, 1 to 10000; the report shows the frame of median time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
-    /// Write the report as JSON, with the times and rays of each pass of each bounce
+    /// Write the report to this JSON file, with the time and the ray counts of each pass of each bounce
     #[arg(long, value_name = "FILE")]
     pub profile: Option<PathBuf>,
-    /// Write what CPU and device did when as Chrome trace events, for Perfetto or chrome://tracing
+    /// Write a timeline of the CPU's and the device's work to this file, as Chrome trace events for Perfetto or
+    /// chrome://tracing
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
-    /// Run under the Khronos validation layer and fail on any message
+    /// Run under the Khronos validation layer, and fail if it reports anything
     #[arg(long)]
     pub validate: bool,
-    /// Say nothing but errors
+    /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,
 }
 
 #[derive(clap::Args)]
 pub struct CastArgs {
-    /// OBJ file, or any scene file
+    /// OBJ file or scene file
     pub mesh: PathBuf,
-    /// Rays, a .npy file of float32: K x 8 (origin, direction, t_min, t_max) or K x 6 (t from 0 to infinity); a
-    /// direction may have any length from 1.2e-38 on, rays with a shorter one miss
+    /// Rays to cast, a .npy file of float32: K x 8 (origin, direction, t_min, t_max), or K x 6 for t from 0 to
+    /// infinity; directions need not be unit vectors, but a ray whose direction is shorter than 1.2e-38 misses
     pub rays: PathBuf,
-    /// Hits to write, .npz: t_hit, primitive_ids, primitive_uvs, primitive_normals
+    /// Hits to write, a .npz file of the arrays t_hit, primitive_ids, primitive_uvs and primitive_normals; with --any
+    /// of the array occluded
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
-    /// Find out only whether rays hit anything: occluded
+    /// Find only whether each ray hits anything (occlusion), not the closest hit
     #[arg(long)]
     pub any: bool,
     #[arg(long, value_name = "KIND", help = accel_help(), default_value_t)]
@@ -121,42 +124,42 @@ pub struct CastArgs {
     #[arg(long, value_name = "TREE", default_value_t = BuildPolicy::Auto)]
     #[arg(help = build_help())]
     pub build: BuildPolicy,
-    /// Cast the rays so many times and report the least, median and greatest time
+    /// Number of times to cast the rays, 1 to 10000; the report shows the minimum, median and maximum time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
     /// Cast on the CPU, without Vulkan
     #[arg(long, conflicts_with_all = ["device", "validate"])]
     pub cpu: bool,
-    /// Threads for loading, building and --cpu [default: all processors]
+    /// Number of CPU threads for loading, building and --cpu, 1 to 1024 [default: one per processor]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
-    /// Run under the Khronos validation layer and fail on any message
+    /// Run under the Khronos validation layer, and fail if it reports anything
     #[arg(long)]
     pub validate: bool,
-    /// Write the report as JSON, too
+    /// Write the report to this JSON file, too
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Say nothing but errors
+    /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,
 }
 
 #[derive(clap::Args)]
 pub struct InspectArgs {
-    /// Scene file
+    /// Scene file (TOML or OBJ)
     pub scene: PathBuf,
     #[arg(long, value_name = "KIND", help = accel_help(), default_value_t)]
     pub accel: AccelKind,
-    /// Describe it as JSON
+    /// Print the description as JSON
     #[arg(long)]
     pub json: bool,
 }
 
 impl RenderArgs {
-    /// Refuses words that contradict each other.
+    /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         self.picture.check()?;
         if self.trace.is_some() && (self.spp > 1 || self.path.is_some()) {
@@ -165,7 +168,8 @@ impl RenderArgs {
         Ok(())
     }
 
-    /// The options asked for; the scene's own fill what was left open. A crop beyond the picture is refused.
+    /// Returns the render options: the user's, and the scene's own where the user gave none. Refuses a crop beyond
+    /// the picture.
     pub fn options(&self, scene: &Scene) -> Result<RenderOptions, CliError> {
         let options = self.picture.options(scene);
         let RenderOptions { width, height, .. } = options;
@@ -174,14 +178,14 @@ impl RenderArgs {
                 "--crop {crop} reaches beyond the picture of {width}x{height} pixels"
             )));
         }
-        // Where anybody wants to know where the time went.
+        // Passes are timed only if some output shows the times.
         let profile = !self.quiet || self.profile.is_some() || self.trace.is_some();
         Ok(RenderOptions { crop: self.crop, features: !self.aov.is_empty(), profile, ..options })
     }
 }
 
 impl CastArgs {
-    /// Refuses words that contradict each other.
+    /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         check_accel(self.accel, self.traversal, self.build)?;
         if self.output.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("npz")) {
@@ -191,18 +195,18 @@ impl CastArgs {
         Ok(())
     }
 
-    /// The choices asked for.
+    /// Returns the user's choice of structure, build and traversal.
     pub fn request(&self) -> Request {
         Request { accel: self.accel, build: self.build, traversal: self.traversal.pinned(), primary: None }
     }
 
-    /// What is asked of the rays.
+    /// Returns the query: any hit or the closest hit.
     pub fn query(&self) -> Query {
         if self.any { Query::Any } else { Query::Closest }
     }
 }
 
-/// Pixels of a picture.
+/// Size of a picture in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
     pub width: u32,
@@ -210,7 +214,7 @@ pub struct Size {
 }
 
 impl Size {
-    /// What common GPUs take as an image's side.
+    /// Longest side of an image that common GPUs support, in pixels.
     const MAX_SIDE: u32 = 16384;
 }
 
@@ -225,7 +229,7 @@ impl FromStr for Size {
     }
 }
 
-/// Frames from the first to the last, both of them too.
+/// Range of frame numbers; both ends are included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frames {
     pub first: u32,
@@ -246,7 +250,7 @@ impl FromStr for Frames {
     }
 }
 
-/// An index where the word is a number, else a name.
+/// Parses a device selector: an index if the word is a number, else a part of a name.
 pub fn device(word: &str) -> Result<DeviceSelector, String> {
     match word.parse() {
         Ok(index) => Ok(DeviceSelector::Index(index)),

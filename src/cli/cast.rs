@@ -1,4 +1,4 @@
-//! `kdray cast`: rays of the user's own to hits, file to file.
+//! `kdray cast`: casts rays from a file into a scene and writes their hits to a file.
 
 use kdray::{
     cast::{Cast, Hit, HitWriter, NO_TRIANGLE, RAYS_PER_BATCH, RayReader},
@@ -23,8 +23,8 @@ use super::{
     render::{report_validation, set_threads},
 };
 
-/// Loads, builds, casts batch by batch, writes and reports. What can be refused is refused before the work that it
-/// would waste.
+/// Runs `kdray cast`: loads the scene, builds its structure, casts the rays batch by batch, writes and reports.
+/// Arguments and files are checked before the work that an error would waste.
 pub fn run(args: &CastArgs) -> Result<(), CliError> {
     args.check()?;
     check_roles(args)?;
@@ -81,7 +81,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
     context.map_or(Ok(()), |context| report_validation(&context))
 }
 
-/// Refuses an output that is read, or written twice.
+/// Refuses an output that the command also reads, or that it writes twice.
 fn check_roles(args: &CastArgs) -> Result<(), CliError> {
     let mut roles = FileRoles::default();
     roles.read_scene("MESH", &args.mesh);
@@ -95,7 +95,7 @@ struct Totals {
     n_rays: u64,
     n_hits: u64,
     n_invalid: u64,
-    /// One entry a repetition; none where the device has no timestamps.
+    /// Milliseconds of casting, one entry per repetition; none if the device has no timestamps.
     ms: Option<Vec<f64>>,
 }
 
@@ -109,7 +109,7 @@ impl Totals {
     }
 }
 
-/// Reads rays, casts them and writes their hits, a batch at a time.
+/// Reads rays, casts them and writes their hits, one batch at a time.
 fn cast_all(
     args: &CastArgs,
     mut rays: RayReader,

@@ -1,4 +1,4 @@
-//! What rays hit, and how long it took: lines for the reader, the same as JSON.
+//! The report of `kdray cast`: hits and times, as text and as JSON.
 
 use std::path::PathBuf;
 
@@ -10,52 +10,52 @@ use serde::Serialize;
 
 use super::{report::built_in, table::decimal};
 
-/// What was cast, on what, and how long it took.
+/// What was cast into which scene, on which device, and how long it took.
 #[derive(Serialize)]
 pub struct CastReport {
     pub scene: String,
     pub rays: PathBuf,
     pub hits: PathBuf,
     pub query: &'static str,
-    /// None for grids.
+    /// The traversal of the kd-tree; none for grids.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub traversal: Option<String>,
-    /// What the user left open, and why it is so.
+    /// The choices of structure, build and traversal, each with its reason.
     pub choices: Choices,
     pub device: String,
     pub triangles: usize,
-    /// As `tree` or `grid`.
+    /// Under the key `tree` or `grid`.
     #[serde(flatten)]
     pub accel: Statistics,
-    /// Times of the grid's build; none where no device has built one.
+    /// Times of the grid's build on the device; none if no device has built a grid.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub grid_build: Option<DeviceBuild>,
     pub n_rays: u64,
     pub n_hits: u64,
-    /// Rays that can only miss: with a NaN, an infinite origin or direction, or a direction of zero or so short that
-    /// all its components are denormal (less than 2^-126).
+    /// Number of rays that can only miss: those with a NaN, with an infinite origin or direction, or with a direction
+    /// whose components are all zero or denormal (less than 2^-126).
     pub n_invalid: u64,
-    /// None where the device has no timestamps.
+    /// None if the device has no timestamps.
     pub times: Option<Times>,
     pub load_ms: f64,
     pub build_ms: f64,
-    /// All of it: reading, copying, casting as often as it was repeated, writing.
+    /// Total time of reading, copying, casting (all repetitions) and writing.
     pub cast_ms: f64,
 }
 
-/// Casting alone, all rays each time: by the GPU's clock, on the CPU by its own.
+/// Times of casting all rays once, without reading, copying and writing. A GPU's times are by its own clock.
 #[derive(Serialize)]
 pub struct Times {
     n_times: usize,
     min_ms: f64,
     median_ms: f64,
     max_ms: f64,
-    /// Million rays a second in the median time; none without rays.
+    /// Million rays per second at the median time; none if that time is 0.
     mrays_per_s: Option<f64>,
 }
 
 impl Times {
-    /// `ms`: one entry a repetition; none for none.
+    /// Returns the times' minimum, median and maximum. `ms` has one entry per repetition; none if it is empty.
     pub fn of(mut ms: Vec<f64>, n_rays: u64) -> Option<Self> {
         ms.sort_by(f64::total_cmp);
         let (min_ms, median_ms, max_ms) = (*ms.first()?, ms[ms.len() / 2], *ms.last()?);

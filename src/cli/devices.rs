@@ -1,10 +1,10 @@
-//! `kdray devices`: what could render here.
+//! `kdray devices`: lists the Vulkan devices of this machine.
 
 use kdray::gpu;
 
 use super::{error::CliError, print, table::table};
 
-/// Lists the devices, and what keeps one from rendering.
+/// Lists the devices. For a device that cannot render, names the features that it lacks.
 pub fn run() -> Result<(), CliError> {
     let devices = gpu::devices()?;
     let rows: Vec<_> = (devices.iter())

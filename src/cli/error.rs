@@ -1,4 +1,4 @@
-//! What can go wrong, and the exit code that says so.
+//! The errors of a command, and their exit codes.
 
 use std::io;
 
@@ -35,7 +35,8 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// 2 usage; 3 scene or rays, also those that need more memory than there is; 4 device; 5 output.
+    /// Returns the exit code: 2 for usage; 3 for scene or rays, also if they need more memory than there is; 4 for
+    /// the device; 5 for output.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) | Self::Output(OutputError::UnknownEnding { .. }) => 2,
@@ -47,7 +48,7 @@ impl CliError {
 }
 
 impl CliError {
-    /// Names what takes less memory, where a picture's drawing failed for want of it.
+    /// Adds hints on how to use less memory to an error of drawing, if the device ran out of memory.
     pub fn of_drawing(self) -> Self {
         match self {
             Self::Device(error) if error.is_out_of_memory() => Self::DeviceMemory(error),
@@ -67,7 +68,7 @@ impl From<ViewError> for CliError {
 }
 
 impl From<clap::Error> for CliError {
-    /// Keeps clap's message and its hints, and leaves out the usage text below them.
+    /// Keeps clap's message and its hints. Leaves out the usage text below them.
     fn from(error: clap::Error) -> Self {
         let text = error.render().to_string();
         let paragraphs = text.trim_start_matches("error:").split("\n\n").map(str::trim);

@@ -1,4 +1,4 @@
-//! Which files a command reads and which it writes, so that no output overwrites another one or a file that is read.
+//! The roles of a command's files. They are noted so that no output overwrites another one or a file that is read.
 
 use std::{
     collections::HashMap,
@@ -9,13 +9,14 @@ use kdray::{output::regular_file, scene::source_files};
 
 use super::error::CliError;
 
-/// What a command does with a file, and what its user calls the file.
+/// What a command does with a file, and the argument that names the file.
 struct Role {
     name: String,
     is_read: bool,
 }
 
-/// The files of a command so far. Two paths are the same file if they lead to it by whatever spelling and links.
+/// The files that a command has named so far. Two paths name the same file if they lead to it, whatever their
+/// spelling and links.
 #[derive(Default)]
 pub struct FileRoles {
     roles: HashMap<PathBuf, Role>,
@@ -38,9 +39,10 @@ impl FileRoles {
     /// Notes an output.
     ///
     /// # Errors
-    /// The file is read, or another output is written to it.
+    /// The command reads the file, or writes another output to it.
     pub fn write(&mut self, name: &str, path: &Path) -> Result<(), CliError> {
-        // To find what a scene names takes reading it. An output that does not exist yet cannot be among that.
+        // The files that a scene names are found by reading the scene. A file that does not exist cannot be among
+        // them.
         if path.exists() {
             self.look_up_scenes();
         }
@@ -59,6 +61,7 @@ impl FileRoles {
         }
     }
 
+    /// Notes the files that the scenes name as read.
     fn look_up_scenes(&mut self) {
         for scene in std::mem::take(&mut self.scenes) {
             for source in source_files(&scene) {
@@ -69,7 +72,8 @@ impl FileRoles {
     }
 }
 
-/// The same for all paths to one regular file. A device or a pipe is compared by its spelling.
+/// Returns a key that is the same for all paths to one regular file. The key of a device or a pipe is its path as
+/// spelled.
 fn key_of(path: &Path) -> PathBuf {
     regular_file(path).unwrap_or_else(|| path.to_owned())
 }

@@ -1,4 +1,4 @@
-//! `kdray inspect`: what a scene holds, and its acceleration structure in numbers.
+//! `kdray inspect`: the contents of a scene, and the figures of its acceleration structure.
 
 use kdray::{
     accel::Statistics,
@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::{args::InspectArgs, build, error::CliError, print, print_raw, progress::Progress, table::table};
 
-/// Loads the scene, builds its structure, describes both.
+/// Loads the scene, builds its structure and describes both.
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let progress = Progress::new(false, 2);
     let (scene, load_ms) = progress.stage(&format!("loading {}", args.scene.display()), || Scene::load(&args.scene));
@@ -24,7 +24,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let options = accel.options(Processor::Gpu);
     let build = || {
         let world = World::with_accel(scene, &options)?;
-        let statistics = world.statistics(); // builds a grid
+        let statistics = world.statistics(); // builds the structure if it is a grid
         Ok::<_, Mismatch>((world, statistics))
     };
     let (built, build_ms) = progress.stage(&build::building(accel, n_triangles), build);
@@ -50,15 +50,16 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     }
 }
 
+/// The description, as it is printed.
 #[derive(Serialize)]
 struct Inspection {
     scene: String,
     triangles: usize,
-    /// Least and greatest corner, world units.
+    /// Minimum and maximum corner, world units.
     bounds: [[f32; 3]; 2],
     materials: Vec<MaterialUse>,
     lights: Vec<LightUse>,
-    /// As `tree` or `grid`.
+    /// Under the key `tree` or `grid`.
     #[serde(flatten)]
     accel: Statistics,
     load_ms: f64,
@@ -74,7 +75,7 @@ struct MaterialUse {
 #[derive(Serialize)]
 struct LightUse {
     kind: &'static str,
-    /// Where a point light is; where a directional one is seen, as a unit vector.
+    /// Position of a point light in world units; unit vector towards a directional light.
     position: [f32; 3],
     intensity: [f32; 3],
 }

@@ -1,4 +1,4 @@
-//! What the library remarks while it works, as `warning: …` lines beside the progress bar.
+//! Prints the library's log events as `warning: …` and `error: …` lines above the progress bar.
 
 use std::{
     fmt,
@@ -22,22 +22,22 @@ use tracing_subscriber::{
 
 use super::spans::Spans;
 
-/// Sends the library's remarks to standard error from now on: errors alone if `quiet`, else warnings, too. Its spans go
-/// to `spans`; without that they cost nothing.
+/// Sends the library's log events to standard error from now on: errors, and warnings unless `quiet`. The library's
+/// tracing spans go to `spans`; without it, spans are disabled and cost nothing.
 pub fn start(quiet: bool, bar: Option<&ProgressBar>, spans: Option<&Spans>) {
     let bar = bar.cloned();
     let lines = tracing_subscriber::fmt::layer()
-        // They would go to a standard error that has just failed.
+        // Internal errors would go to a standard error that has just failed.
         .log_internal_errors(false)
         .event_format(Line)
         .with_writer(move || Beside(bar.clone()))
         .with_filter(if quiet { LevelFilter::ERROR } else { LevelFilter::WARN });
     let started = tracing_subscriber::registry().with(lines).with(spans.map(Spans::layer)).try_init();
-    // A second command in one process keeps the first one's.
+    // A second command in the same process keeps the first one's subscriber.
     drop(started);
 }
 
-/// `level: message` on one line, without control characters.
+/// Format of an event: `level: message` on one line, with control characters escaped.
 struct Line;
 
 impl<S, N> FormatEvent<S, N> for Line
@@ -46,19 +46,19 @@ where
     N: for<'a> FormatFields<'a> + 'static,
 {
     fn format_event(&self, context: &FmtContext<S, N>, mut writer: Writer, event: &Event) -> fmt::Result {
-        // Other libraries' remarks are for their developers.
+        // Events of other libraries are for their developers.
         if !event.metadata().target().starts_with("kdray") {
             return Ok(());
         }
         let label = if *event.metadata().level() == Level::ERROR { "error" } else { "warning" };
-        // A remark may quote a name from a file.
+        // A message may quote a name from a file.
         let mut remark = String::new();
         context.field_format().format_fields(Writer::new(&mut remark), event)?;
         writeln!(writer, "{label}: {}", one_line(&remark))
     }
 }
 
-/// Standard error, with the bar out of the way.
+/// Standard error; the progress bar is hidden while a line is written.
 struct Beside(Option<ProgressBar>);
 
 impl Write for Beside {

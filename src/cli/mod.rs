@@ -1,6 +1,6 @@
-//! The command line: words to options, progress, reports, exit codes.
+//! The command line: arguments, progress, reports and exit codes.
 //!
-//! What a command was asked for goes to standard output; progress, notes and errors go to standard error.
+//! Reports go to standard output. Progress, notes and errors go to standard error.
 
 mod args;
 #[cfg(feature = "bench")]
@@ -44,7 +44,7 @@ use kdray::{
 };
 use progress::Progress;
 
-/// Runs the command that `arguments`, the program's name first, ask for.
+/// Runs the command that `arguments` describe. The first argument is the program's name.
 pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
     #[cfg(unix)]
     signals::handle();
@@ -75,7 +75,7 @@ fn run(args: Args) -> Result<(), CliError> {
     }
 }
 
-/// Opens the device that is meant, and says so where that is none but the CPU.
+/// Opens the selected device. If the user selected none and the best device is a software driver, a note says so.
 fn open_device(options: &ContextOptions, progress: &Progress) -> Result<Arc<Context>, GpuError> {
     let context = Context::new(options)?;
     if options.device.is_none() && context.is_software() {
@@ -84,12 +84,13 @@ fn open_device(options: &ContextOptions, progress: &Progress) -> Result<Arc<Cont
     Ok(context)
 }
 
-/// Writes a report to standard output, line by line, with control characters of the names that it quotes escaped.
+/// Writes a report to standard output. Control characters are escaped within each line, since a report quotes names
+/// from files.
 fn print(text: &str) -> Result<(), CliError> {
     print_raw(&text.split('\n').map(escape_controls).collect::<Vec<_>>().join("\n"))
 }
 
-/// Writes what was asked for to standard output, as it is. A reader that has seen enough is no error.
+/// Writes text to standard output without escaping. A closed pipe is not an error.
 fn print_raw(text: &str) -> Result<(), CliError> {
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
@@ -98,8 +99,8 @@ fn print_raw(text: &str) -> Result<(), CliError> {
     }
 }
 
-/// Writes `label: message` to standard error, as one line whatever the message quotes.
+/// Writes `label: message` to standard error. Line breaks in the message are escaped, so that it stays one line.
 fn complain(label: &str, message: &str) {
-    // There is nobody left to tell where this fails.
+    // If standard error fails, there is nowhere left to report it.
     let _ = writeln!(io::stderr(), "{label}: {}", one_line(message));
 }

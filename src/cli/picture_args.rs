@@ -1,4 +1,4 @@
-//! How a picture is made, in words: alike for files and windows.
+//! Arguments that say how a picture is made. `kdray render` and `kdray view` share them.
 
 use clap::{ValueEnum, value_parser};
 use kdray::{
@@ -12,19 +12,21 @@ use super::{args::Size, error::CliError, wanted::Wanted};
 
 #[derive(clap::Args)]
 pub struct PictureArgs {
-    /// Pixels, as 1024x768 [default: the scene's]
+    /// Size of the picture in pixels, for example 1024x768, each side 1 to 16384 [default: the scene's]
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
-    /// Levels of rays, 1 to 64: 1 stops at what the camera sees [default: the scene's]
+    /// Levels of rays per pixel, 1 to 64: 1 traces primary rays only, each level more adds one bounce of reflected
+    /// and refracted rays; shadow rays are not counted [default: the scene's]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=64))]
     pub max_depth: Option<u32>,
-    /// Noise filter [default: the scene's]
+    /// Noise filter for the finished picture [default: the scene's]
     #[arg(long, value_name = "paper|off")]
     pub denoise: Option<DenoiseWord>,
-    /// Sum of a pixel's differences to its neighbours above which it is smoothed, 0 to 4 [default: the scene's]
+    /// Threshold of the noise filter, 0 to 4: it smooths a pixel if the luminance differences to its four neighbours,
+    /// in units of display white, add up to more; implies --denoise paper [default: the scene's, else 2.5]
     #[arg(long, value_name = "X", value_parser = threshold)]
     pub denoise_threshold: Option<f32>,
-    /// Factor on radiance before it is encoded for display [default: the scene's]
+    /// Factor on radiance before the tone curve, above 0 [default: the scene's]
     #[arg(long, value_name = "X", value_parser = positive)]
     pub exposure: Option<f32>,
     #[arg(long, value_name = "CURVE")]
@@ -35,8 +37,10 @@ pub struct PictureArgs {
     #[arg(long, value_name = "ALGORITHM")]
     #[arg(help = traversal_help(), default_value = "auto", hide_default_value = true)]
     pub traversal: Wanted<Traversal>,
-    /// How primary rays find their triangles: rasterized by the device's graphics or by kernels, or traced; auto: what
-    /// suits the device and the sizes of scene and picture, or what a measurement has found to be quicker
+    /// How primary rays find their triangles. raster: the device's graphics pipeline rasterizes them; compute:
+    /// compute kernels rasterize them, which needs 64-bit atomics (with --cpu it equals raster); trace: rays search
+    /// the acceleration structure; auto: the method that suits the device, the scene and the picture's size, or that
+    /// a measurement has found to be quicker [default: auto]
     #[arg(long, value_name = "auto|raster|compute|trace", default_value = "auto", hide_default_value = true)]
     pub primary: Wanted<Primary>,
     #[arg(long, value_name = "TREE", default_value_t = BuildPolicy::Auto)]
@@ -44,12 +48,12 @@ pub struct PictureArgs {
     pub build: BuildPolicy,
 }
 
-/// The help of `--accel`.
+/// Returns the help text of `--accel`.
 pub fn accel_help() -> String {
     format!("The acceleration structure that leads rays to triangles: {}", AccelKind::words())
 }
 
-/// Refuses words about kd-trees where a grid is asked for.
+/// Refuses arguments for kd-trees if the structure is a grid.
 pub fn check_accel(accel: AccelKind, traversal: Wanted<Traversal>, build: BuildPolicy) -> Result<(), CliError> {
     check_traversal(accel, traversal.pinned())?;
     if accel != AccelKind::KdTree && build != BuildPolicy::Auto {
@@ -60,18 +64,18 @@ pub fn check_accel(accel: AccelKind, traversal: Wanted<Traversal>, build: BuildP
     Ok(())
 }
 
-/// Refuses a traversal of the kd-tree where a grid is asked for.
+/// Refuses a kd-tree traversal if the structure is a grid.
 pub fn check_traversal(accel: AccelKind, traversal: Option<Traversal>) -> Result<(), CliError> {
     if accel != AccelKind::KdTree && traversal.is_some() {
         return Err(CliError::Usage(format!(
-            "--traversal names an algorithm for the kd-tree: with --accel {accel}, rays go through a grid, for which there \
-             is one algorithm"
+            "--traversal names an algorithm for the kd-tree: with --accel {accel}, rays go through a grid, for which \
+             there is one algorithm"
         )));
     }
     Ok(())
 }
 
-/// The help of `--traversal`.
+/// Returns the help text of `--traversal`.
 pub fn traversal_help() -> String {
     let (words, of_devices, of_cpu) = (Traversal::words(), traversals_of_devices(), Traversal::OF_CPU);
     format!(
@@ -80,7 +84,7 @@ pub fn traversal_help() -> String {
     )
 }
 
-/// The help of `--build`.
+/// Returns the help text of `--build`.
 pub fn build_help() -> String {
     format!(
         "Which kd-tree to build: {}. best traces fastest; fast is built in half of the time, and rays take up to a \
@@ -89,13 +93,13 @@ pub fn build_help() -> String {
     )
 }
 
-/// The default traversals of devices.
+/// Returns the default traversals of GPUs and software drivers, as a phrase of a help text.
 pub fn traversals_of_devices() -> String {
     format!("{}, {} on software drivers", Traversal::OF_GPUS, Traversal::OF_SOFTWARE_DRIVERS)
 }
 
 impl PictureArgs {
-    /// Refuses words that contradict each other.
+    /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         check_accel(self.accel, self.traversal, self.build)?;
         if matches!(self.denoise, Some(DenoiseWord::Off)) && self.denoise_threshold.is_some() {
@@ -104,7 +108,7 @@ impl PictureArgs {
         Ok(())
     }
 
-    /// The choices asked for.
+    /// Returns the user's choice of structure, build, traversal and primary visibility.
     pub fn request(&self) -> Request {
         Request {
             accel: self.accel,
@@ -114,8 +118,8 @@ impl PictureArgs {
         }
     }
 
-    /// The options asked for; the scene's own fill what was left open, but for what depends on the device:
-    /// [`Self::request`].
+    /// Returns the render options: the user's, and the scene's own where the user gave none. Choices that depend on
+    /// the device are not among them: [`Self::request`] returns those.
     pub fn options(&self, scene: &Scene) -> RenderOptions {
         let scene = &scene.defaults;
         let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });
@@ -131,6 +135,7 @@ impl PictureArgs {
         }
     }
 
+    /// Returns the user's noise filter, or the scene's. `--denoise-threshold` alone turns the filter on.
     fn denoise(&self, scene: Denoise) -> Denoise {
         let threshold = match scene {
             Denoise::Paper { threshold } => threshold,
@@ -144,19 +149,21 @@ impl PictureArgs {
     }
 }
 
-/// The words for [`Denoise`].
+/// Value of `--denoise`; [`Denoise`] without the threshold.
 #[derive(Clone, Copy, ValueEnum)]
 pub enum DenoiseWord {
-    /// The paper's filter over four neighbours
+    /// Smooths pixels that differ from their four neighbours (the paper's filter)
     Paper,
-    /// None
+    /// No filter
     Off,
 }
 
+/// Parses `--denoise-threshold`, 0 to 4.
 fn threshold(word: &str) -> Result<f32, String> {
     word.parse().ok().filter(|x| (0.0..=4.0).contains(x)).ok_or_else(|| "expected a number from 0 to 4".into())
 }
 
+/// Parses a finite number above 0.
 pub fn positive(word: &str) -> Result<f32, String> {
     let number = word.parse().ok().filter(|x: &f32| x.is_finite() && *x > 0.0);
     number.ok_or_else(|| "expected a number above 0".into())

@@ -1,4 +1,4 @@
-//! What the command is doing: a bar on a terminal, a line a stage elsewhere.
+//! Progress of a command on standard error: a bar on a terminal, elsewhere one line per stage.
 
 use std::{
     io::{self, IsTerminal},
@@ -11,10 +11,10 @@ use kdray::util::text::one_line;
 
 use super::{complain, log, spans::Spans};
 
-/// Positions of the bar for each stage of a command.
+/// Number of the bar's positions per stage.
 const BAR_STEPS: u64 = 1000;
 
-/// Stages of a command, told on standard error.
+/// Shows the stages of a command on standard error.
 pub enum Progress {
     Silent,
     Lines,
@@ -22,12 +22,13 @@ pub enum Progress {
 }
 
 impl Progress {
-    /// For a command of `n_stages`. The library's own remarks appear beside it.
+    /// Shows a command of `n_stages` stages. The library's warnings and errors appear above the bar, or as lines of
+    /// their own.
     pub fn new(quiet: bool, n_stages: u64) -> Self {
         Self::with_spans(quiet, n_stages, None)
     }
 
-    /// As [`Progress::new`]; the library's spans go to `spans`.
+    /// Does what [`Progress::new`] does, and also collects the library's tracing spans in `spans`.
     pub fn with_spans(quiet: bool, n_stages: u64, spans: Option<&Spans>) -> Self {
         let progress = match (quiet, io::stderr().is_terminal()) {
             (true, _) => Self::Silent,
@@ -48,7 +49,7 @@ impl Progress {
         Self::Bar(bar)
     }
 
-    /// Does the work of a stage. Gives what it made and the milliseconds it took.
+    /// Runs the work of a stage. Returns its result and its duration in milliseconds.
     pub fn stage<T>(&self, message: &str, work: impl FnOnce() -> T) -> (T, f64) {
         match self {
             Self::Silent => {}
@@ -64,12 +65,12 @@ impl Progress {
         (made, start.elapsed().as_secs_f64() * 1e3)
     }
 
-    /// Where the bar is.
+    /// Returns the bar's position, or 0 without a bar.
     fn position(&self) -> u64 {
         if let Self::Bar(bar) = self { bar.position() } else { 0 }
     }
 
-    /// Tells what the user should know but need not act on.
+    /// Prints a note: something that the user should know but need not act on.
     pub fn note(&self, message: &str) {
         match self {
             Self::Silent => {}
@@ -85,18 +86,18 @@ pub struct Steps<'a> {
     message: String,
     n_done: u32,
     n_steps: u32,
-    /// Share of the step under way that is done, 0 to 1.
+    /// Finished share of the current step, 0 to 1.
     part: f32,
-    /// Whether the user sees a step go on, rather than only end.
+    /// Whether the user sees progress within a step.
     pub shows_parts: bool,
-    /// The bar's position at the stage's begin.
+    /// Position of the bar when the stage began.
     begin: u64,
     start: Instant,
     last_line: Instant,
 }
 
 impl Progress {
-    /// Tells how far the stage is that `message` names, and how much time is left.
+    /// Returns a counter of steps that shows the stage's progress and the time left. `message` names the stage.
     pub fn steps(&self, message: &str, n_steps: u32) -> Steps<'_> {
         let (message, start) = (message.to_owned(), Instant::now());
         let (begin, shows_parts) = (self.position(), matches!(self, Self::Bar(_)));
@@ -105,9 +106,9 @@ impl Progress {
 }
 
 impl Steps<'_> {
-    /// One more is done.
+    /// Notes that one more step is done.
     pub fn step(&mut self) {
-        /// Between lines where there is no terminal.
+        /// Least time between two lines if there is no terminal.
         const PAUSE: Duration = Duration::from_secs(5);
         self.n_done += 1;
         self.part = 0.0;
@@ -125,7 +126,7 @@ impl Steps<'_> {
         }
     }
 
-    /// So much of the step under way is done, 0 to 1.
+    /// Notes that a share of the current step is done, 0 to 1.
     pub fn part(&mut self, share: f32) {
         self.part = share.clamp(0.0, 1.0);
         if let Progress::Bar(bar) = self.progress {
@@ -138,7 +139,7 @@ impl Steps<'_> {
         bar.set_message(self.text());
     }
 
-    /// Share of the stage that is done, 0 to 1.
+    /// Returns the finished share of the stage, 0 to 1.
     fn share(&self) -> f64 {
         (f64::from(self.n_done) + f64::from(self.part)) / f64::from(self.n_steps)
     }
@@ -154,7 +155,8 @@ impl Steps<'_> {
     }
 }
 
-/// The time that the rest takes if it goes on as fast; none at the very begin, of which nothing can be said.
+/// Returns the time that the rest takes at the present speed. At the start the speed is unknown and the result
+/// is zero.
 fn time_left(elapsed: Duration, share_done: f64) -> Duration {
     if share_done > 0.0 { elapsed.mul_f64((1.0 - share_done) / share_done) } else { Duration::ZERO }
 }

@@ -1,4 +1,4 @@
-//! Where a frame's time went: tables for the reader, the same as JSON.
+//! The report of `kdray render`: the times and rays of a frame, as tables and as JSON.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,8 @@ use serde::Serialize;
 
 use super::table::{decimal, table};
 
-/// How long the acceleration structure took to build, in words. `on_host`: milliseconds, if the host has built it.
+/// Returns a phrase that says how long the acceleration structure took to build. `on_host` is the host's build time
+/// in milliseconds, which is shown unless the device has built the structure.
 pub fn built_in(on_host: f64, on_device: Option<&DeviceBuild>) -> String {
     match on_device {
         Some(build) => format!("built in {} ms on the device", decimal(build.ms, 3)),
@@ -23,27 +24,28 @@ pub fn built_in(on_host: f64, on_device: Option<&DeviceBuild>) -> String {
 #[derive(Serialize)]
 pub struct Report {
     pub scene: String,
-    /// At least one, in the order of frames.
+    /// Files of the pictures in the order of frames, at least one.
     pub pictures: Vec<PathBuf>,
-    /// Written beside them.
+    /// Files written beside the pictures: layers and heat maps.
     pub extra_files: Vec<PathBuf>,
     pub options: Options,
-    /// What the user left open, and why it is so.
+    /// The choices of structure, build, traversal and primary visibility, each with its reason.
     pub choices: Choices,
-    /// A pixel.
+    /// Samples per pixel.
     pub samples: u32,
     pub triangles: usize,
-    /// As `tree` or `grid`.
+    /// Under the key `tree` or `grid`.
     #[serde(flatten)]
     pub accel: Statistics,
-    /// Times of the grid's build; none where no device has built one.
+    /// Times of the grid's build on the device; none if no device has built a grid.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub grid_build: Option<DeviceBuild>,
     pub load_ms: f64,
     pub build_ms: f64,
-    /// From the finished tree to the picture in memory: uploading, compiling and copying back included.
+    /// Time from the finished acceleration structure to the pictures in memory, with uploading, compiling and copying
+    /// back.
     pub render_ms: f64,
-    /// Over all frames that were drawn; none for a single one.
+    /// Times of all frames that were drawn; none for a single frame.
     pub repeated: Option<Spread>,
     /// The frame of median time.
     #[serde(flatten)]
@@ -59,7 +61,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// None for a single frame, or without timestamps.
+    /// Returns the frames' minimum and maximum time; none for a single frame, or without timestamps.
     pub fn of(profiles: &[Profile]) -> Option<Self> {
         let times: Vec<_> = profiles.iter().filter_map(|profile| profile.frame_ms).collect();
         (times.len() > 1).then(|| Self {
@@ -70,12 +72,12 @@ impl Spread {
     }
 }
 
-/// [`RenderOptions`] in words.
+/// [`RenderOptions`] as they are written to JSON.
 #[derive(Serialize)]
 pub struct Options {
     width: u32,
     height: u32,
-    /// x0,y0,x1,y1; none for all of the picture.
+    /// The crop as `x0,y0,x1,y1` in pixels; none for the whole picture.
     crop: Option<String>,
     max_depth: u32,
     exposure: f32,
@@ -107,20 +109,20 @@ impl From<&RenderOptions> for Options {
     }
 }
 
-/// A [`Profile`] with its sums and rates.
+/// A [`Profile`] with sums and rates.
 #[derive(Serialize)]
 pub struct Frame {
     device: String,
-    /// First pass to last; none where the device has no timestamps.
+    /// Time from the start of the first pass to the end of the last; none if the device has no timestamps.
     frame_ms: Option<f64>,
     n_batches: u32,
-    /// Each pass over all bounces, in the order of execution.
+    /// Time of each pass summed over all bounces, in the order of execution.
     pass_totals: Vec<PassTotal>,
-    /// Each pass of each bounce.
+    /// Times of each pass of each bounce.
     passes: Vec<PassTime>,
-    /// One row a bounce, 0 = primary rays.
+    /// Counts and rates of each bounce; bounce 0 consists of the primary rays.
     bounces: Vec<Bounce>,
-    /// Of all bounces.
+    /// The shadow rays of all bounces.
     shadow: Shadow,
 }
 
@@ -128,7 +130,7 @@ pub struct Frame {
 struct PassTotal {
     name: &'static str,
     ms: Option<f64>,
-    /// Of the frame, 0 to 1.
+    /// Share of the frame's time, 0 to 1.
     share: Option<f64>,
 }
 
@@ -138,18 +140,18 @@ struct Bounce {
     n_rays: u64,
     n_hits: u64,
     n_shadow_rays: u64,
-    /// Milliseconds of the passes that find the closest hits of the bounce's rays.
+    /// Time in milliseconds of the passes that find the closest hits of the bounce's rays.
     tracing_ms: Option<f64>,
-    /// Million rays a second of tracing.
+    /// Million rays per second of `tracing_ms`.
     mrays_per_s: Option<f64>,
 }
 
-/// Shadow rays, which go to the lights when all hits are found.
+/// Counts and rates of the shadow rays, which are cast after the hits of all bounces are found.
 #[derive(Serialize)]
 struct Shadow {
     n_shadow_rays: u64,
     ms: Option<f64>,
-    /// Million shadow rays a second.
+    /// Million shadow rays per second.
     mrays_per_s: Option<f64>,
 }
 
@@ -200,7 +202,7 @@ fn shadow(profile: &Profile) -> Shadow {
     Shadow { n_shadow_rays, ms, mrays_per_s: rate(n_shadow_rays, ms) }
 }
 
-/// Million rays a second, where the time is known and more than nothing.
+/// Returns million rays per second, or none if the time is unknown or 0.
 fn rate(n_rays: u64, ms: Option<f64>) -> Option<f64> {
     ms.filter(|ms| *ms > 0.0).map(|ms| n_rays as f64 / ms / 1e3)
 }

@@ -1,7 +1,7 @@
-//! What signals do to the command.
+//! Handles signals.
 //!
-//! A signal that asks the process to end removes the temporary files of outputs first. A write beyond the limit on the
-//! size of files (`ulimit -f`) becomes an error of that write, in place of a signal that ends the process.
+//! On SIGHUP, SIGINT and SIGTERM, the process removes the temporary files of outputs before it ends. A write beyond
+//! the limit on the size of files (`ulimit -f`) returns an error; by default, SIGXFSZ would end the process.
 
 use std::{
     fs,
@@ -17,26 +17,26 @@ use signal_hook::{
     low_level::emulate_default_handler,
 };
 
-/// Handles signals from now on. What the system refuses keeps its default.
+/// Installs the signal handlers. A signal whose handler the system refuses keeps its default.
 pub fn handle() {
     let ending: Vec<_> = [SIGHUP, SIGINT, SIGTERM].into_iter().filter(|signal| !is_ignored(*signal)).collect();
     let (ready, is_ready) = mpsc::channel();
     let wait = move || {
         let signals = Signals::new(ending);
-        // The receiver waits for this.
+        // `handle` waits for this message, so that the handlers are installed when it returns.
         let _ = ready.send(());
         signals.map(end_at_the_first)
     };
     if thread::Builder::new().name("signals".to_owned()).spawn(wait).is_ok() {
-        // An error means that the thread is gone, and with it the handlers.
+        // An error means that the thread has ended, and the handlers with it.
         let _ = is_ready.recv();
     }
-    // Any handler will do: it lets `write` return the error. A flag that nobody reads is the simplest one.
+    // With any handler installed, `write` returns the error. A flag that nobody reads is the simplest handler.
     let _ = flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
 }
 
-/// Waits for a signal, removes temporary files and ends the process as the signal does by default. A shell reports this
-/// as exit code 128 + signal.
+/// Waits for a signal, removes temporary files and ends the process as the signal does by default. A shell reports
+/// exit code 128 + signal.
 fn end_at_the_first(mut signals: Signals) {
     if let Some(signal) = signals.forever().next() {
         output::remove_temporaries();
@@ -44,12 +44,13 @@ fn end_at_the_first(mut signals: Signals) {
     }
 }
 
-/// Whether whoever started the process had it ignore the signal, as `nohup` does with SIGHUP. It stays ignored.
+/// Returns whether the process was started with the signal ignored, as `nohup` does with SIGHUP. Such a signal stays
+/// ignored.
 fn is_ignored(signal: i32) -> bool {
     fs::read_to_string("/proc/self/status").is_ok_and(|status| ignored_signals(&status) >> (signal - 1) & 1 == 1)
 }
 
-/// The bit mask after `SigIgn:` in a process's status on Linux: bit n - 1 for signal n.
+/// Returns the bit mask after `SigIgn:` in a process's status on Linux. Bit n - 1 stands for signal n.
 fn ignored_signals(status: &str) -> u64 {
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)

@@ -1,4 +1,4 @@
-//! What the CPU did when: the library's tracing spans, kept for `--trace`.
+//! A timeline of the CPU's work: the library's tracing spans, kept for `--trace`.
 
 use std::{
     sync::{Arc, Mutex, PoisonError},
@@ -13,7 +13,7 @@ use tracing_subscriber::{
     registry::LookupSpan,
 };
 
-/// Work of one name.
+/// A named piece of work and its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
     pub name: &'static str,
@@ -26,7 +26,7 @@ pub struct Span {
 pub struct Spans(Arc<Mutex<Vec<Span>>>);
 
 impl Spans {
-    /// The collector for a subscriber: kdray's own spans, and no events.
+    /// Returns the layer that collects kdray's own spans. It ignores events and other libraries' spans.
     pub fn layer<S>(&self) -> impl Layer<S> + use<S>
     where
         S: Subscriber + for<'a> LookupSpan<'a>,
@@ -35,7 +35,7 @@ impl Spans {
         Collector(self.clone()).with_filter(FilterFn::new(is_own).with_max_level_hint(LevelFilter::INFO))
     }
 
-    /// All so far, by their beginnings; those that enclose others before them.
+    /// Returns all spans so far, sorted by start time. A span comes before those that it encloses.
     pub fn sorted(&self) -> Vec<Span> {
         let mut spans = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
         spans.sort_by(|a, b| a.begin.cmp(&b.begin).then(b.end.cmp(&a.end)));

@@ -1,9 +1,9 @@
-//! Text in columns.
+//! Tables of text.
 
 use kdray::util::text::escape_controls;
 
-/// Rows under a header: the first column to the left, the others to the right, no trailing blanks. Control characters
-/// of cells are escaped, so that a row stays a line.
+/// Returns rows under a header, without trailing blanks. The first column is aligned to the left, the others to the
+/// right. Control characters in cells are escaped, so that each row stays one line.
 pub fn table<const N: usize>(header: [&str; N], rows: &[[String; N]]) -> String {
     let header = header.map(str::to_owned);
     let rows: Vec<_> = rows.iter().map(|row| row.each_ref().map(|cell| escape_controls(cell).into_owned())).collect();
@@ -25,7 +25,7 @@ pub fn table<const N: usize>(header: [&str; N], rows: &[[String; N]]) -> String 
     text
 }
 
-/// A number with so many decimals, or a dash for none.
+/// Returns a number with a fixed number of decimals, or a dash for none.
 pub fn decimal(number: Option<f64>, decimals: usize) -> String {
     number.map_or_else(|| "-".to_owned(), |number| format!("{number:.decimals$}"))
 }

@@ -1,5 +1,5 @@
-//! A frame as Chrome trace events, which Perfetto and chrome://tracing show: the CPU's work on one track, the passes on
-//! another. <https://docs.google.com/document/d/1CvAClvFfyA5R-PhYUmn5OOQtYMH4h6I0nSsKchNAySU>
+//! Writes a frame as Chrome trace events, which Perfetto and chrome://tracing show. One track has the CPU's work,
+//! another the passes. <https://docs.google.com/document/d/1CvAClvFfyA5R-PhYUmn5OOQtYMH4h6I0nSsKchNAySU>
 
 use std::time::Instant;
 
@@ -9,11 +9,11 @@ use serde_json::{Map, Value, json};
 
 use super::spans::Span;
 
-/// Thread numbers, which are tracks.
+/// Thread numbers. A viewer shows each thread as a track.
 const CPU: u32 = 1;
 const PASSES: u32 = 2;
 
-/// The file's only object.
+/// The file's top-level object.
 #[derive(Serialize)]
 struct Trace {
     #[serde(rename = "traceEvents")]
@@ -30,9 +30,10 @@ struct Event {
     category: &'static str,
     #[serde(rename = "ph")]
     phase: &'static str,
-    /// Microseconds.
+    /// Microseconds since the command began.
     #[serde(rename = "ts")]
     start: f64,
+    /// Microseconds; none for a track's name.
     #[serde(rename = "dur", skip_serializing_if = "Option::is_none")]
     duration: Option<f64>,
     #[serde(rename = "pid")]
@@ -42,7 +43,8 @@ struct Event {
     args: Map<String, Value>,
 }
 
-/// From a moment to another, in whole nanoseconds: what encloses another still does so when it is rounded.
+/// Interval of time in whole nanoseconds. Both ends are rounded, so that an interval that encloses another still does
+/// so after rounding.
 #[derive(Clone, Copy)]
 struct Interval {
     begin: u64,
@@ -50,27 +52,30 @@ struct Interval {
 }
 
 impl Interval {
-    /// None where the pass has no timestamps.
+    /// Returns the interval of a pass, or none if the pass has no timestamps.
     fn of(pass: &PassTime) -> Option<Self> {
         let nanoseconds = |ms: f64| (ms * 1e6).round() as u64;
         let (start, ms) = pass.start_ms.zip(pass.ms)?;
         Some(Self { begin: nanoseconds(start), end: nanoseconds(start + ms) })
     }
 
-    /// From the first's begin to the last's end; none for none.
+    /// Returns the interval from the earliest start to the latest end, or none if no pass has timestamps.
     fn around(passes: &[&PassTime]) -> Option<Self> {
         let intervals = passes.iter().filter_map(|pass| Self::of(pass));
         intervals.reduce(|a, b| Self { begin: a.begin.min(b.begin), end: a.end.max(b.end) })
     }
 
+    /// Shifts the interval by `begin` nanoseconds.
     fn after(self, begin: u64) -> Self {
         Self { begin: self.begin + begin, end: self.end + begin }
     }
 }
 
-/// The trace as JSON that ends with a line break. `origin`: when the command began, which is time 0.
+/// Returns the trace as JSON that ends with a line break. `origin` is the moment when the command began, which is
+/// time 0.
 ///
-/// The device's clock is another than the CPU's: the frame is drawn from the moment when the device got it.
+/// The device's clock differs from the CPU's. The trace therefore shows the frame from the moment when the CPU
+/// submitted it to the device.
 pub fn trace_json(origin: Instant, spans: &[Span], frame: &Profile) -> Vec<u8> {
     let mut events = vec![
         named("process_name", CPU, "kdray"),
@@ -88,7 +93,8 @@ pub fn trace_json(origin: Instant, spans: &[Span], frame: &Profile) -> Vec<u8> {
     json
 }
 
-/// The frame, in it its batches if it has several, in these the bounces and their light, in these the passes.
+/// Returns nested slices: the frame, its batches if there are several, the bounces and the light of each batch, and
+/// the passes. `begun_at` is in nanoseconds since time 0.
 fn frame_slices(frame: &Profile, begun_at: u64) -> Vec<Event> {
     let mut slices = Vec::new();
     let mut add = |name: String, passes: &[&PassTime], args| {
@@ -147,7 +153,7 @@ fn slice(name: String, track: u32, interval: Interval, args: Map<String, Value>)
     }
 }
 
-/// `kind`: what is named, the process or the track.
+/// Returns the event that names the process or a track. `kind` is `process_name` or `thread_name`.
 fn named(kind: &str, track: u32, name: &str) -> Event {
     let args = object(json!({ "name": name }));
     Event {

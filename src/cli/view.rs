@@ -22,10 +22,11 @@ use super::{
     view_args::{Switch, ViewArgs},
 };
 
-/// Samples that a picture at rest gets, where the user does not say.
+/// Default number of samples per pixel while the camera rests.
 const SAMPLES_AT_REST: u32 = 256;
 
-/// Loads, builds and shows. What can be refused is refused before the work that it would waste.
+/// Runs `kdray view`: loads the scene, builds its structure and shows it. Arguments and files are checked before the
+/// work that an error would waste.
 pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     args.picture.check()?;
     check_outputs(args)?;
@@ -66,7 +67,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
             tour,
             screenshot: args.screenshot.clone(),
             record: args.record.clone(),
-            // The window goes on without its terminal.
+            // The window stays open even if the terminal is gone.
             print: |text| drop(print(text)),
         },
     )?;
@@ -82,7 +83,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     if report.validation.is_empty() { Ok(()) } else { Err(CliError::Validation(report.validation.len())) }
 }
 
-/// The way that the camera goes by itself, if that is asked for.
+/// Returns the camera tour of `--path` and `--frames`, or none if neither is given.
 fn tour(args: &ViewArgs, start: Camera) -> Result<Option<Tour>, CliError> {
     let Some(file) = &args.path else { return Ok(args.frames.map(|n_frames| Tour::around(start, n_frames))) };
     let path = CameraPath::load(file)?;
@@ -93,6 +94,7 @@ fn tour(args: &ViewArgs, start: Camera) -> Result<Option<Tour>, CliError> {
     tour.map(Some)
 }
 
+/// The file of `--profile`.
 #[derive(Serialize)]
 struct Profile<'a> {
     scene: &'a str,
@@ -108,7 +110,7 @@ fn json(profile: &Profile) -> Vec<u8> {
     json
 }
 
-/// Refuses targets that cannot be written, or that are read.
+/// Refuses outputs that cannot be written, or that the command also reads.
 fn check_outputs(args: &ViewArgs) -> Result<(), CliError> {
     check_roles(args)?;
     if let Some(path) = &args.screenshot {
@@ -124,7 +126,7 @@ fn check_outputs(args: &ViewArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Refuses an output that is read, or written twice.
+/// Refuses an output that the command also reads, or that it writes twice.
 fn check_roles(args: &ViewArgs) -> Result<(), CliError> {
     let mut roles = FileRoles::default();
     roles.read_scene("SCENE", &args.scene);
@@ -133,6 +135,7 @@ fn check_roles(args: &ViewArgs) -> Result<(), CliError> {
     args.profile.iter().try_for_each(|path| roles.write("--profile", path))
 }
 
+/// Refuses a directory in which frames cannot be written.
 fn check_directory(directory: &Path) -> Result<(), CliError> {
     let path = directory.join("frame.0000.png");
     if directory.is_dir() {

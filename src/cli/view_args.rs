@@ -1,4 +1,4 @@
-//! The words of `kdray view`.
+//! The arguments of `kdray view`.
 
 use std::path::PathBuf;
 
@@ -14,54 +14,57 @@ use super::{
 #[group(skip)]
 #[command(group = clap::ArgGroup::new("tour").args(["frames", "path"]).multiple(true))]
 pub struct ViewArgs {
-    /// Scene file; it is read again whenever it changes
+    /// Scene file (TOML or OBJ); the window follows changes of the file
     pub scene: PathBuf,
     #[command(flatten)]
     pub picture: PictureArgs,
-    /// Samples a pixel that a picture at rest gets, 1 to 65536 [default: 256, with --frames 1]
+    /// Samples per pixel while the camera rests, 1 to 65536 [default: 256; 1 with --frames or --path]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=65_536))]
     pub spp: Option<u32>,
-    /// Milliseconds a frame while the camera moves: the picture is drawn smaller to keep within them
+    /// Time budget per frame while the camera moves, in milliseconds; the picture is drawn at a lower resolution to
+    /// keep within it
     #[arg(long, value_name = "MS", default_value_t = 16.0, value_parser = milliseconds)]
     pub budget_ms: f64,
-    /// Whether frames wait for the screen's refresh
+    /// Vertical synchronization
     #[arg(long, value_name = "on|off", default_value = "on")]
     pub vsync: Switch,
-    /// Nothing over the picture at first; Tab shows it
+    /// Start without the panel over the picture; Tab shows it
     #[arg(long)]
     pub no_overlay: bool,
-    /// Move the camera as keyframes in this TOML file say, and end
+    /// Move the camera along the keyframes of this TOML file, then exit
     #[arg(long, value_name = "FILE")]
     pub path: Option<PathBuf>,
-    /// Go once around the scene, or along --path, in so many frames, and end
+    /// Move the camera once around its target, or along --path, in this number of frames, 1 to 1000000, then exit
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000))]
     pub frames: Option<u32>,
-    /// Picture to write of the last frame, .png or .exr
+    /// Write the last frame of --frames or --path to this .png or .exr file
     #[arg(long, value_name = "FILE", requires = "tour")]
     pub screenshot: Option<PathBuf>,
-    /// Directory to write every frame to, as frame.0000.png
+    /// Write each frame of --frames or --path to this existing directory, as frame.0000.png and so on
     #[arg(long, value_name = "DIR", requires = "tour")]
     pub record: Option<PathBuf>,
-    /// Write frame times and latency as JSON
+    /// Write frame times and input latency to this JSON file
     #[arg(long, value_name = "FILE")]
     pub profile: Option<PathBuf>,
-    /// Threads for loading and building [default: all processors]
+    /// Number of CPU threads for loading and building, 1 to 1024 [default: one per processor]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
-    /// Run under the Khronos validation layer and fail on any message
+    /// Run under the Khronos validation layer, and fail if it reports anything
     #[arg(long)]
     pub validate: bool,
-    /// Say nothing but errors
+    /// Print errors only
     #[arg(short, long)]
     pub quiet: bool,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Switch {
+    /// Frames wait for the screen's refresh
     On,
+    /// Frames are shown at once and may tear
     Off,
 }
 

@@ -1,10 +1,10 @@
-//! Options that the user may leave to kdray.
+//! Values of options that may be `auto`: kdray then chooses.
 
 use std::str::FromStr;
 
 use kdray::util::UnknownWord;
 
-/// What a user wants: a certain variant of an option, or whichever suits best.
+/// Value of an option: a certain variant, or `auto` for the one that suits best.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted<T> {
     Auto,
@@ -12,7 +12,7 @@ pub enum Wanted<T> {
 }
 
 impl<T> Wanted<T> {
-    /// The variant, if it is a certain one.
+    /// Returns the variant, or none for `auto`.
     pub fn pinned(self) -> Option<T> {
         match self {
             Self::Auto => None,

@@ -1,4 +1,4 @@
-//! What the user asks for once.
+//! One-time actions of the user: saving the picture, picking a pixel, placing the camera.
 
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,8 @@ pub enum SaveError {
 }
 
 impl Session {
-    /// Does what the user asks for, but for what is the window's to do. `window`: pixels.
+    /// Does an action. Actions on the window and its panels have no effect here. `window` is the window's size in
+    /// pixels.
     pub fn act(&mut self, action: Action, live: &Live, window: (u32, u32)) {
         match action {
             Action::Save => {
@@ -43,8 +44,8 @@ impl Session {
         }
     }
 
-    /// Saves what is seen, if the user has asked for it and it is as large as the window. Until then drawing goes on, and
-    /// nobody waits.
+    /// Saves the displayed picture if a save is due, and if the picture has the window's size and the current camera.
+    /// Until then drawing goes on, and the window stays responsive.
     pub fn save_if_due(&mut self, live: &Live, window: (u32, u32)) {
         let is_whole = |displayed: Displayed| displayed.size == window && displayed.camera == *self.controller.camera();
         if live.renderer.displayed().is_some_and(is_whole) {
@@ -52,7 +53,8 @@ impl Session {
         }
     }
 
-    /// Saves what is seen, if the user has asked for it: it is about to be replaced by something else.
+    /// Saves the displayed picture if a save is due. It is called before another view replaces the picture, and
+    /// before the viewer ends.
     pub fn save_what_is_left(&mut self, live: &Live) {
         if !std::mem::take(&mut self.is_save_due) {
             return;
@@ -67,7 +69,8 @@ impl Session {
         }
     }
 
-    /// Follows the rays of the pixel that is seen at a place of the window, in the picture that is displayed.
+    /// Follows the rays of the displayed picture's pixel at a point of the window. `window` and `(x, y)` are in
+    /// pixels.
     fn pick(&mut self, options: &RenderOptions, displayed: Displayed, window: (u32, u32), (x, y): (f64, f64)) {
         let (width, height) = displayed.size;
         let pixel = |at: f64, window: u32, picture: u32| {
@@ -79,7 +82,7 @@ impl Session {
     }
 }
 
-/// Writes the picture that is displayed as PNG; nothing before there is one.
+/// Writes the displayed picture as PNG. Writes nothing if no picture has been displayed yet.
 fn save_displayed(live: &Live, path: &Path) -> Result<(), SaveError> {
     match live.renderer.displayed_picture()? {
         Some(picture) => Ok(output::write_picture(path, &picture)?),
@@ -87,19 +90,20 @@ fn save_displayed(live: &Live, path: &Path) -> Result<(), SaveError> {
     }
 }
 
-/// Writes the renderer's picture as `kdray render` does.
+/// Writes the renderer's picture in the format of the path's extension, as `kdray render` does.
 pub fn save(live: &Live, path: &Path) -> Result<(), SaveError> {
     output::write_picture(path, &live.renderer.picture()?)?;
     Ok(())
 }
 
+/// Returns the first path `NAME-001.png`, `NAME-002.png` and so on that does not exist.
 fn next_free(scene_name: &str) -> PathBuf {
     let stem = output::stem_of(scene_name);
     let mut names = (1..).map(|n| PathBuf::from(format!("{stem}-{n:03}.png")));
     names.find(|path| !path.exists()).expect("numbers do not end")
 }
 
-/// The camera as a scene file has it.
+/// Returns the camera in the format of scene files.
 fn to_toml(camera: &Camera) -> String {
     let vector = |v: Vec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
     let Camera { eye, target, up, vertical_fov_degrees } = *camera;
@@ -133,7 +137,7 @@ mod tests {
         assert_eq!(crate::scene::Scene::load(&path).unwrap().camera, camera);
     }
 
-    /// While a picture is drawn from elsewhere, the one before is seen, and clicked at.
+    /// While a picture from another camera is being drawn, the previous picture is displayed, and clicks pick in it.
     #[test]
     fn a_click_picks_in_the_picture_that_is_seen() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.toml");

@@ -1,4 +1,4 @@
-//! The window: its events, and the order of things in a frame.
+//! The window: handles its events, and defines the order of work in a frame.
 
 use std::{
     sync::Arc,
@@ -30,25 +30,25 @@ use crate::{
     gpu::GpuError,
 };
 
-/// The viewer, as the event loop drives it.
+/// The viewer's state, driven by the event loop.
 pub(super) struct App {
     session: Session,
     options: ViewOptions,
     script: Option<Script>,
     reloader: Reloader,
     input: Input,
-    /// None before the window is there.
+    /// None until the window is open.
     shown: Option<Shown>,
-    /// What was chosen when the window was opened; none before.
+    /// Choices made when the window was opened; none before.
     choices: Option<Choices>,
     layers: Layers,
     is_occluded: bool,
-    /// Whether nothing was shown yet since the device was lost.
+    /// Whether the device was lost and opened again, and no frame has been shown since.
     is_reopened: bool,
     outcome: Result<(), ViewError>,
 }
 
-/// A window and what it shows.
+/// An open window with its device and overlay.
 struct Shown {
     live: Live,
     ui: Ui,
@@ -93,14 +93,14 @@ impl App {
         event_loop.exit();
     }
 
-    /// One frame: input and overlay, a sample, the screen.
+    /// Draws one frame: lays out the overlay, draws a sample and shows both.
     fn frame(&mut self, event_loop: &ActiveEventLoop) {
         let Some(mut shown) = self.shown.take() else { return };
         let result = self.draw(&mut shown);
         match result {
             Ok(true) => self.end(event_loop, Ok(())),
             Ok(false) => {}
-            // What is lost before it shows anything will not come back.
+            // A device that is lost again before it has shown a frame is not opened once more.
             Err(ViewError::Device(error)) if error.is_device_lost() && !self.is_reopened => {
                 self.recover(shown, event_loop, error);
                 return;
@@ -110,7 +110,7 @@ impl App {
         self.shown = Some(shown);
     }
 
-    /// True when the script has ended.
+    /// Draws and shows a frame. Returns true when the script has ended.
     fn draw(&mut self, shown: &mut Shown) -> Result<bool, ViewError> {
         let Shown { live, ui, window } = shown;
         let size = window.inner_size();
@@ -118,7 +118,7 @@ impl App {
         if size.0 == 0 || size.1 == 0 {
             return Ok(false);
         }
-        // A script's pictures do not depend on what the window manager makes of the window.
+        // A script's pictures have the size of the options, whatever size the window manager gives the window.
         let picture = match &mut self.script {
             Some(script) => {
                 script.direct(&mut self.session);
@@ -150,7 +150,7 @@ impl App {
         }
     }
 
-    /// Opens the device anew after it was lost; ends where that fails.
+    /// Opens the device again after it was lost. Ends the viewer if that fails.
     fn recover(&mut self, shown: Shown, event_loop: &ActiveEventLoop, error: GpuError) {
         let Shown { live, ui, window } = shown;
         drop((live, ui));
@@ -162,7 +162,7 @@ impl App {
         match Live::open(window.clone(), &self.options.device, loaded, options, request, *vsync) {
             Ok(live) => {
                 self.is_reopened = true;
-                // What took the place of shaders went with the device.
+                // Replaced shaders were lost with the device, so they are compiled again.
                 #[cfg(feature = "hot-reload")]
                 self.reloader.shaders.compile();
                 self.shown = Some(Shown { live, ui: Ui::new(&window), window });
@@ -186,7 +186,7 @@ impl App {
         }
     }
 
-    /// What the user does: the overlay's first, then the camera's.
+    /// Handles an event of the user. The overlay may take it first; otherwise it moves the camera or is an action.
     fn hear(&mut self, event_loop: &ActiveEventLoop, event: &WindowEvent) {
         let Some(Shown { ui, window, .. }) = &mut self.shown else { return };
         let is_overlays = self.layers.any() && !is_tab(event) && ui.take_event(window, event);
@@ -208,7 +208,7 @@ impl App {
         }
     }
 
-    /// What came of it, once the loop has ended.
+    /// Returns the report after the event loop has ended.
     pub fn report(self) -> Result<ViewReport, ViewError> {
         self.outcome?;
         let frames = &self.session.all_frames;
@@ -218,7 +218,7 @@ impl App {
             return Err(ViewError::Window("it was closed before it was open".to_owned()));
         };
         let context = live.context.clone();
-        // What the layer says of the end counts, too.
+        // The validation layer may also report errors of the release, so its messages are read after it.
         drop((live, ui, window));
         let (device, validation) = (context.info().name.clone(), context.validation_messages());
         Ok(ViewReport { device, choices, pace, validation })
@@ -268,7 +268,7 @@ impl ApplicationHandler<Wake> for App {
             WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => {
                 if let Some(Shown { live, .. }) = &mut self.shown {
                     live.presenter.mark_stale();
-                    // As long as the user pulls at the window, it is drawn fast.
+                    // While the user resizes the window, pictures are drawn small and fast.
                     self.session.pace.moved(Instant::now());
                 }
                 self.hear(event_loop, &event);
@@ -283,7 +283,7 @@ impl ApplicationHandler<Wake> for App {
         let is_busy = self.script.is_some() || self.session.is_busy(live, now, (size.width, size.height));
         let wait = if is_busy || !self.layers.any() { Duration::MAX } else { ui.repaint_after() };
         let has_area = size.width > 0 && size.height > 0;
-        // A script goes on whoever looks.
+        // A script goes on even if its window is hidden.
         let is_seen = self.script.is_some() || !(self.is_occluded || window.is_minimized() == Some(true));
         if !is_seen || !has_area {
             event_loop.set_control_flow(ControlFlow::Wait);

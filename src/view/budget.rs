@@ -1,12 +1,13 @@
-//! How large a picture may be to be drawn in time.
+//! Chooses how large a picture may be, so that it is drawn within a time budget.
 
-/// Sides of the picture as shares of the window's: k of so many parts.
+/// A picture's sides are k / `N_STEPS` of the window's, where the step k is at most `N_STEPS`.
 const N_STEPS: u32 = 16;
-/// The smallest share, in parts: 1/8 of a side is 1/64 of the pixels.
+/// The smallest step: 1/8 of a side, which is 1/64 of the pixels.
 const LEAST_STEP: u32 = 2;
-/// A larger picture is drawn where it is expected to take no more than this share of the budget.
+/// The picture grows by a step if it is then expected to take no more than this share of the budget.
 const ROOM: f64 = 0.85;
-/// Milliseconds that input waits for while a picture at rest is drawn, if all parts of it take as long.
+/// Milliseconds that a part of a picture at rest takes, if all its parts take equally long. Input waits for the end
+/// of a part.
 pub const PART_MS: f64 = 100.0;
 /// Weight of the newest frame in the mean cost.
 const NEWEST: f64 = 0.4;
@@ -14,52 +15,56 @@ const NEWEST: f64 = 0.4;
 /// Chooses the size of pictures that are drawn while the camera moves.
 #[derive(Clone, Debug)]
 pub struct Budget {
-    /// Milliseconds a frame.
+    /// Milliseconds per frame.
     budget_ms: f64,
-    /// Of [`N_STEPS`].
+    /// The current step, [`LEAST_STEP`] to [`N_STEPS`].
     step: u32,
-    /// Expected milliseconds of a frame of the window's full size.
+    /// Expected milliseconds of a frame of the window's full size; none if it is unknown.
     full_ms: Option<f64>,
-    /// Whether there was a frame: the first one takes long, since drivers finish their kernels then.
+    /// Whether a frame has been drawn. The first one is not counted: it takes long, because drivers finish compiling
+    /// their kernels then.
     is_warm: bool,
 }
 
 impl Budget {
+    /// Creates a budget of `budget_ms` milliseconds per frame, at the smallest step.
     pub fn new(budget_ms: f64) -> Self {
         Self { budget_ms, step: LEAST_STEP, full_ms: None, is_warm: false }
     }
 
-    /// Milliseconds a frame.
+    /// Sets the budget in milliseconds per frame.
     pub fn set_budget(&mut self, budget_ms: f64) {
         self.budget_ms = budget_ms;
     }
 
-    /// The picture's share of the window's sides, 0 to 1.
+    /// Returns the picture's share of the window's sides, 0 to 1.
     pub fn share(&self) -> f64 {
         f64::from(self.step) / f64::from(N_STEPS)
     }
 
-    /// The picture's size for a window's, pixels.
+    /// Returns the picture's size for a window's size, both in pixels.
     pub fn size(&self, window: (u32, u32)) -> (u32, u32) {
         let part = |side: u32| (f64::from(side) * self.share()).round().max(1.0) as u32;
         (part(window.0), part(window.1))
     }
 
-    /// Expected milliseconds of a frame of the window's full size; none before there were two frames.
+    /// Returns the expected milliseconds of a frame of the window's full size. It is unknown, none, before the second
+    /// frame and after the window's size has changed a lot.
     pub fn full_ms(&self) -> Option<f64> {
         self.full_ms
     }
 
-    /// Pixels of a picture of a window's size that are drawn in about [`PART_MS`]; none where all of them are.
+    /// Returns the number of pixels that are drawn in about [`PART_MS`], for a picture of a window's size. Returns
+    /// none if the whole picture is drawn in that time, or if the time is unknown.
     pub fn part_pixels(&self, (width, height): (u32, u32)) -> Option<u32> {
         let n_parts = (self.full_ms? / PART_MS).ceil();
-        // Powers of two, so that estimates that waver do not change them.
+        // The number of parts is a power of two, so that small changes of the estimate do not change it.
         let n_parts = (n_parts as u32).clamp(1, 1 << 12).next_power_of_two();
         (n_parts > 1).then(|| (width * height).div_ceil(n_parts))
     }
 
-    /// The window has `ratio` times as many pixels as before. What small windows cost says nothing of large ones: beyond
-    /// a factor of two it is learned anew.
+    /// Adapts to a window that has `ratio` times as many pixels as before. Beyond a factor of two the estimate is
+    /// dropped and learned again, because the cost of a small window says nothing about that of a large one.
     pub fn resize(&mut self, ratio: f64) {
         self.full_ms = self.full_ms.filter(|_| (0.5..=2.0).contains(&ratio)).map(|full_ms| full_ms * ratio);
         if self.full_ms.is_none() {
@@ -67,7 +72,7 @@ impl Budget {
         }
     }
 
-    /// Learns from a frame of a share of the sides that took so long, all of it counted.
+    /// Learns from a frame. `share` is its share of the window's sides, and `ms` is its whole time in milliseconds.
     pub fn learn(&mut self, share: f64, ms: f64) {
         if !std::mem::replace(&mut self.is_warm, true) {
             return;
@@ -76,8 +81,8 @@ impl Budget {
         let mean = self.full_ms.map_or(full_ms, |mean| mean + NEWEST * (full_ms - mean));
         self.full_ms = Some(mean);
         let expected = |step: u32| mean * (f64::from(step) / f64::from(N_STEPS)).powi(2);
-        // Down at once to what fits; up one step at a time, since what does not shrink with the picture is counted as
-        // if it did.
+        // The step goes down at once to what fits. It goes up by one at a time: costs that do not depend on the
+        // picture's size are scaled with its pixels, so that the estimate for a larger picture is too high.
         if expected(self.step) > self.budget_ms {
             self.step =
                 (LEAST_STEP..self.step).rev().find(|&step| expected(step) <= self.budget_ms).unwrap_or(LEAST_STEP);
@@ -87,7 +92,8 @@ impl Budget {
     }
 }
 
-/// Whether parts of so many pixels would take half or twice as long as before.
+/// Returns whether two numbers of pixels per part differ by a factor of two or more. None stands for the whole
+/// picture.
 pub fn is_other_pace(a: Option<u32>, b: Option<u32>) -> bool {
     match (a, b) {
         (Some(a), Some(b)) => a >= 2 * b || b >= 2 * a,
@@ -99,8 +105,8 @@ pub fn is_other_pace(a: Option<u32>, b: Option<u32>) -> bool {
 mod tests {
     use super::*;
 
-    /// The budget after frames that cost `fixed_ms` and `full_ms` times their share of the pixels, and the shares of the
-    /// last ones.
+    /// Returns the budget after 100 frames, and the shares of the last 50. A frame costs `fixed_ms`, and `full_ms`
+    /// times its share of the pixels.
     fn settled(budget_ms: f64, fixed_ms: f64, full_ms: f64) -> (Budget, Vec<f64>) {
         let mut budget = Budget::new(budget_ms);
         let shares: Vec<_> = (0..100)
@@ -120,7 +126,7 @@ mod tests {
             let share = budget.share();
             let ms = 0.5 + full_ms * share * share;
             assert!(ms <= 16.0, "{full_ms}: {ms}");
-            // The least step up, from 2 to 3 parts, is more than twice the pixels.
+            // The step from 2 to 3 more than doubles the pixels, so at step 2 a frame may take little of the budget.
             assert!(share == 1.0 || ms > 16.0 * 0.35, "{full_ms}: {ms} at {share}");
         }
     }

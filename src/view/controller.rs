@@ -1,4 +1,4 @@
-//! The camera in the user's hands: keys and the mouse to places, whatever the frame rate.
+//! Moves the camera by keys and the mouse, independently of the frame rate.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -7,13 +7,13 @@ use glam::{Quat, Vec3};
 use super::flight::{Axes, Flight};
 use crate::scene::Camera;
 
-/// Radians that the camera turns for a drag over the window's height.
+/// Angle in radians by which a drag over the window's height turns the camera.
 const TURN_A_HEIGHT: f32 = PI;
-/// The view keeps this far, radians, from looking straight up or down.
+/// Least angle in radians between the view and straight up or down.
 const POLE_MARGIN: f32 = 0.02;
 /// Factor on the distance to the target for one step of the wheel.
 const DISTANCE_A_STEP: f32 = 0.85;
-/// Room around the scene's bounding sphere when it is framed.
+/// Factor on the radius of the scene's bounding sphere when the scene is framed, which leaves a margin around it.
 const FRAME_MARGIN: f32 = 1.05;
 
 /// Moves a camera by keys and the mouse.
@@ -21,30 +21,34 @@ const FRAME_MARGIN: f32 = 1.05;
 pub struct Controller {
     camera: Camera,
     start: Camera,
+    /// The flight keys and the speed.
     pub flight: Flight,
+    /// Centre of the scene's bounds, world space.
     centre: Vec3,
-    /// Of a sphere around the scene, more than 0.
+    /// Radius of a sphere around the scene, world units, more than 0.
     radius: f32,
 }
 
 impl Controller {
-    /// Starts at `camera`; `bounds`: the scene's smallest and largest coordinates.
+    /// Creates a controller that starts at `camera`. `bounds` are the scene's minimum and maximum corner, world
+    /// space.
     pub fn new(camera: Camera, bounds: (Vec3, Vec3)) -> Self {
         let (min, max) = bounds;
         let radius = ((max - min).length() / 2.0).max(1e-6);
         Self { camera, start: camera, flight: Flight::new(radius), centre: (min + max) / 2.0, radius }
     }
 
+    /// Returns the camera.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// Of a sphere around the scene, world units.
+    /// Returns the radius of a sphere around the scene, world units.
     pub fn radius(&self) -> f32 {
         self.radius
     }
 
-    /// Flies for `seconds` with the keys that are held.
+    /// Moves the camera for `seconds` by the flight keys that are held.
     pub fn advance(&mut self, seconds: f32) {
         let step = self.flight.velocity(&self.axes()) * seconds;
         self.camera.eye += step;
@@ -56,31 +60,34 @@ impl Controller {
         Axes { forward, right: forward.cross(self.camera.up).normalize(), up: self.camera.up }
     }
 
-    /// Turns the head: a drag by `x` to the right and `y` down, in heights of the window.
+    /// Turns the camera about its eye by a drag of `x` to the right and `y` down, in heights of the window.
     pub fn look(&mut self, x: f32, y: f32) {
         let view = self.turned(self.camera.target - self.camera.eye, x, y);
         self.camera.target = self.camera.eye + view;
     }
 
-    /// Goes around the target: a drag by `x` to the right and `y` down, in heights of the window, takes the scene along.
+    /// Moves the camera around its target by a drag of `x` to the right and `y` down, in heights of the window. The
+    /// scene follows the drag.
     pub fn orbit(&mut self, x: f32, y: f32) {
         let view = self.turned(self.camera.target - self.camera.eye, x, y);
         self.camera.eye = self.camera.target - view;
     }
 
-    /// Moves sideways, up and down: what is seen at the target's distance goes with a drag by `x` to the right and `y` down,
-    /// in heights of the window.
+    /// Moves the camera sideways, up and down by a drag of `x` to the right and `y` down, in heights of the window.
+    /// Points at the target's distance follow the drag.
     pub fn pan(&mut self, x: f32, y: f32) {
         let step = self.across(-x, -y);
         self.camera.eye += step;
         self.camera.target += step;
     }
 
-    /// Goes nearer to the target by steps of the wheel, or farther away where they are negative. What is seen at the target's
-    /// distance, `x` to the right of the window's middle and `y` below it, in its heights, stays where it is seen.
+    /// Moves the camera nearer to the target by steps of the wheel; negative steps move it away. The point at the
+    /// target's distance that is `x` to the right of the window's middle and `y` below it, in heights of the window,
+    /// stays in place.
     pub fn zoom(&mut self, steps: f32, x: f32, y: f32) {
         let distance = (self.camera.target - self.camera.eye).length();
-        // A scene may look closer than the wheel leads to, or from farther away: from there it only leads back.
+        // A scene's own camera may be closer to its target than the wheel can go, or farther away. From there the
+        // wheel only leads back.
         let (least, most) = (distance.min(1e-4 * self.radius), distance.max(1e3 * self.radius));
         let share = (distance * DISTANCE_A_STEP.powf(steps)).clamp(least, most) / distance;
         let point = self.camera.target + self.across(x, y);
@@ -88,7 +95,8 @@ impl Controller {
         self.camera.target = point + (self.camera.target - point) * share;
     }
 
-    /// The way across the view at the target's distance, `x` to the right and `y` down, in heights of the window.
+    /// Returns the world-space vector at the target's distance that spans `x` to the right and `y` down, in heights
+    /// of the window.
     fn across(&self, x: f32, y: f32) -> Vec3 {
         let Axes { forward, right, .. } = self.axes();
         let distance = (self.camera.target - self.camera.eye).length();
@@ -96,20 +104,22 @@ impl Controller {
         (right * x - right.cross(forward) * y) * height
     }
 
-    /// The view, turned to the right and down about the camera's axes, kept off the poles.
+    /// Returns the vector from eye to target, turned by a drag of `x` to the right and `y` down, in heights of the
+    /// window. The result stays [`POLE_MARGIN`] off straight up and down.
     fn turned(&self, view: Vec3, x: f32, y: f32) -> Vec3 {
         let up = self.camera.up;
         let yawed = Quat::from_axis_angle(up, -x * TURN_A_HEIGHT) * view;
         let right = yawed.cross(up).normalize();
         let elevation = FRAC_PI_2 - yawed.angle_between(up);
         let most = FRAC_PI_2 - POLE_MARGIN;
-        // A scene may look closer to a pole than drags can go: from there they only lead away.
+        // A scene's own camera may look closer to a pole than drags can go. From there drags only lead away.
         let (least, most) = (elevation.min(-most), elevation.max(most));
         let pitch = (elevation - y * TURN_A_HEIGHT).clamp(least, most) - elevation;
         Quat::from_axis_angle(right, pitch) * yawed
     }
 
-    /// Backs off, or comes near, until the scene fills the picture; `aspect`: the picture's width by its height.
+    /// Moves the camera along its view until the scene fills the picture. `aspect` is the picture's width divided by
+    /// its height.
     pub fn frame_scene(&mut self, aspect: f32) {
         let Axes { forward, .. } = self.axes();
         let half_height = (self.camera.vertical_fov_degrees.to_radians() / 2.0).tan();
@@ -118,17 +128,17 @@ impl Controller {
         self.camera.eye = self.centre - forward * (FRAME_MARGIN * self.radius / narrower.sin());
     }
 
-    /// Back to where it started.
+    /// Moves the camera back to where it started.
     pub fn go_home(&mut self) {
         self.camera = self.start;
     }
 
-    /// Puts the camera somewhere.
+    /// Replaces the camera.
     pub fn place(&mut self, camera: Camera) {
         self.camera = camera;
     }
 
-    /// Another scene around the same camera.
+    /// Takes over another scene's start and bounds. The camera and the flight stay.
     pub fn set_scene(&mut self, start: Camera, bounds: (Vec3, Vec3)) {
         let Self { camera, flight, .. } = *self;
         *self = Self { camera, ..Self::new(start, bounds) };
@@ -149,12 +159,12 @@ mod tests {
         Controller::new(camera, (Vec3::splat(-2.0), Vec3::splat(2.0)))
     }
 
-    /// Farthest that eye or target of two cameras are apart.
+    /// Returns the larger of the distances between two cameras' eyes and between their targets.
     fn apart(a: &Camera, b: &Camera) -> f32 {
         (a.eye - b.eye).length().max((a.target - b.target).length())
     }
 
-    /// A second of flying and turning in steps of equal length.
+    /// Returns the camera after two seconds of flight with a turn in between, each second in `n_steps` equal steps.
     fn flown(n_steps: u32) -> Camera {
         let mut controller = controller();
         controller.flight.hold(Fly::Forward, true);
@@ -232,7 +242,7 @@ mod tests {
         }
     }
 
-    /// Where a point is seen, right of the window's middle and below it, in its heights.
+    /// Returns where a point is seen: to the right of the window's middle and below it, in heights of the window.
     fn seen_at(controller: &Controller, point: Vec3) -> (f32, f32) {
         let Axes { forward, right, .. } = controller.axes();
         let view = point - controller.camera.eye;

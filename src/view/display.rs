@@ -1,4 +1,4 @@
-//! Where windows can be opened, what is asked of them, and what comes of it.
+//! The viewer's entry point: a display, the options of a viewing, and its report.
 
 use std::path::PathBuf;
 
@@ -18,44 +18,47 @@ use super::{
 };
 use crate::{engine::choices::Choices, gpu::ContextOptions};
 
-/// What the viewer is asked for.
+/// Options of a viewing.
 pub struct ViewOptions {
-    /// The options' size is the window's at first.
+    /// Initial settings. The size in their render options is the window's initial size.
     pub settings: Settings,
+    /// The device to use.
     pub device: ContextOptions,
-    /// Whether there is an overlay; the user can hide it.
+    /// Whether the panel is shown at first. The user can show and hide it.
     pub overlay: bool,
-    /// After which it ends; none: the user's own way.
+    /// Camera tour, after which the viewer ends. Without one, the user moves the camera.
     pub tour: Option<Tour>,
-    /// Of the tour's last frame.
+    /// File for the picture of the tour's last frame.
     pub screenshot: Option<PathBuf>,
-    /// A directory for the tour's frames.
+    /// Directory for the pictures of all frames of the tour.
     pub record: Option<PathBuf>,
-    /// Writes to the terminal.
+    /// Prints text to the terminal.
     pub print: fn(&str),
 }
 
-/// What came of it.
+/// Report of a viewing.
 #[derive(Serialize)]
 pub struct ViewReport {
+    /// The device's name.
     pub device: String,
-    /// As they were when the window was opened.
+    /// Choices made when the window was opened.
     pub choices: Choices,
+    /// Frame times and latencies.
     #[serde(flatten)]
     pub pace: PaceReport,
-    /// What the validation layer has said.
+    /// Messages of the validation layer.
     #[serde(skip)]
     pub validation: Vec<String>,
 }
 
-/// Milliseconds.
+/// Frame times and latencies, milliseconds. Each is none if there were no such frames.
 #[derive(Serialize)]
 pub struct PaceReport {
-    /// From a frame to the next.
+    /// Time from one frame to the next.
     pub frame_ms: Option<Percentiles>,
-    /// From an input to the first frame that shows it.
+    /// Time from an input until the first frame that shows it was handed to the screen.
     pub input_to_present_ms: Option<Percentiles>,
-    /// While the camera moves.
+    /// Size and times of frames that were drawn while the camera moved.
     pub moving: Option<Moving>,
 }
 
@@ -65,13 +68,15 @@ pub struct Display {
 }
 
 impl Display {
+    /// Connects to the system's display.
+    ///
     /// # Errors
-    /// There is none.
+    /// There is no display.
     pub fn open() -> Result<Self, ViewError> {
         match EventLoop::with_user_event().build() {
             Ok(event_loop) => Ok(Self { event_loop }),
             Err(error) => {
-                // The message begins with a place in the library's source.
+                // The library's message begins with a position in its source, which is left out.
                 let message = error.to_string();
                 let what = message.rsplit_once(": ").map_or(&*message, |(_, what)| what);
                 Err(ViewError::NoDisplay(what.trim_end_matches('.').to_owned()))
@@ -82,7 +87,8 @@ impl Display {
     /// Shows the scene until the user, or the tour, ends it.
     ///
     /// # Errors
-    /// No window, no device that can present to it; a device that fails for good; a tour's picture that cannot be written.
+    /// The window cannot be opened, no device can present to it, the device fails and cannot be opened again, or a
+    /// tour's picture cannot be written.
     pub fn view(self, loaded: Loaded, options: ViewOptions) -> Result<ViewReport, ViewError> {
         let script =
             (options.tour.clone()).map(|tour| Script::new(tour, options.record.clone(), options.screenshot.clone()));

@@ -1,9 +1,9 @@
-//! Why the viewer ends, or does not begin, and what it outlives.
+//! Errors that end the viewer, and topics of those that it survives.
 
 use super::actions::SaveError;
 use crate::{gpu::GpuError, output::OutputError};
 
-/// Displays as one line.
+/// Why the viewer could not start, or ended. Displays as one line.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewError {
     #[error("no display to open a window on: {0}")]
@@ -25,7 +25,7 @@ impl From<SaveError> for ViewError {
     }
 }
 
-/// What can go wrong while the window lives on.
+/// Topic of an error that does not close the window. A later success on the same topic clears the message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Topic {
     Device,

@@ -1,13 +1,13 @@
-//! Flying by keys: where to, and how fast.
+//! Flight with keys: direction and speed.
 
 use glam::Vec3;
 
 /// Factor on the speed for one step of the wheel, or one press of a key.
 const SPEED_A_STEP: f32 = 1.25;
-/// Factor on the speed while a key for it is held.
+/// Factor on the speed while the key for faster flight is held; its reciprocal applies to slower flight.
 const HASTE: f32 = 4.0;
 
-/// A way to fly while its key is held.
+/// Direction of flight while its key is held, along the camera's axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fly {
     Forward,
@@ -18,7 +18,7 @@ pub enum Fly {
     Down,
 }
 
-/// Unit vectors, world space.
+/// The camera's axes: unit vectors, world space.
 #[derive(Clone, Copy, Debug)]
 pub struct Axes {
     pub forward: Vec3,
@@ -26,63 +26,64 @@ pub struct Axes {
     pub up: Vec3,
 }
 
-/// Keys that are held, and the speed.
+/// The flight keys that are held, and the speed.
 #[derive(Clone, Copy, Debug)]
 pub struct Flight {
-    /// By [`Fly`].
+    /// Whether the key of each [`Fly`] is held.
     held: [bool; 6],
     is_faster: bool,
     is_slower: bool,
-    /// World units a second.
+    /// World units per second, without the keys for faster and slower flight.
     speed: f32,
-    /// Of the scene, world units.
+    /// Radius of a sphere around the scene, world units.
     radius: f32,
 }
 
 impl Flight {
-    /// `radius`: of a sphere around the scene, world units; it is crossed in four seconds.
+    /// Creates a flight with no key held. `radius` is that of a sphere around the scene, world units. At the initial
+    /// speed, crossing the sphere takes four seconds.
     pub fn new(radius: f32) -> Self {
         Self { held: [false; 6], is_faster: false, is_slower: false, speed: radius / 2.0, radius }
     }
 
-    /// The same around a scene of another size.
+    /// Returns the same flight around a scene of another radius.
     pub fn around(self, radius: f32) -> Self {
         Self { radius, ..self }
     }
 
-    /// A key for a way to fly goes down or up.
+    /// Notes that the key of a direction goes down or up.
     pub fn hold(&mut self, way: Fly, is_down: bool) {
         self.held[way as usize] = is_down;
     }
 
-    /// The keys that make it faster and slower.
+    /// Notes whether the keys for faster and slower flight are held.
     pub fn hurry(&mut self, faster: bool, slower: bool) {
         (self.is_faster, self.is_slower) = (faster, slower);
     }
 
-    /// Lets go of all keys: the window has lost them.
+    /// Releases all keys. The speed stays.
     pub fn release(&mut self) {
         *self = Self { speed: self.speed, ..Self::new(self.radius) };
     }
 
-    /// Makes it faster for good by so many steps, or slower where they are negative.
+    /// Changes the speed by a number of steps, which may be fractional; negative steps slow down.
     pub fn change_speed(&mut self, steps: f32) {
         let speed = self.speed * SPEED_A_STEP.powf(steps);
         self.speed = speed.clamp(self.radius * 1e-4, self.radius * 1e3);
     }
 
-    /// World units a second, but for the keys that change it.
+    /// Returns the speed in world units per second, without the keys for faster and slower flight.
     pub fn speed(&self) -> f32 {
         self.speed
     }
 
-    /// Whether the held keys lead anywhere.
+    /// Returns whether the held keys move the camera: opposite keys cancel each other.
     pub fn is_under_way(&self) -> bool {
         let [forward, back, left, right, up, down] = self.held;
         forward != back || left != right || up != down
     }
 
-    /// World units a second.
+    /// Returns the velocity in world units per second.
     pub fn velocity(&self, axes: &Axes) -> Vec3 {
         let haste = match (self.is_faster, self.is_slower) {
             (true, false) => HASTE,

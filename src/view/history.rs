@@ -1,49 +1,53 @@
-//! The last frames: when, how long, what for.
+//! Records of the last frames: their times, latencies and passes.
 
 use std::collections::VecDeque;
 
 use serde::Serialize;
 
-/// One frame that was shown.
+/// Record of a frame that was shown.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrameRecord {
-    /// Seconds since the start, when it was handed to the screen.
+    /// Time when the frame was handed to the screen, seconds since the viewer started.
     pub shown_s: f64,
-    /// Since the frame before was shown, or its drawing began where the viewer had rested.
+    /// Time since the previous frame was shown or, after a pause, since the drawing of this frame began.
     pub frame_ms: f64,
-    /// From the oldest input that it is the first to show to its hand-over to the screen; none without input.
+    /// Time from the oldest input that this frame is the first to show until it was handed to the screen; none
+    /// without input.
     pub latency_ms: Option<f64>,
-    /// Width and height of the picture, pixels, if the camera moved.
+    /// Width and height of the picture in pixels; none if the camera did not move.
     pub moving: Option<(u32, u32)>,
-    /// GPU time of each pass, in the order of execution; empty where the device has no timestamps.
+    /// GPU time of each pass of the sample that the frame has completed, in the order of execution. Empty if it has
+    /// completed none, or if the device has no timestamps.
     pub pass_ms: Vec<(&'static str, f64)>,
 }
 
-/// Samples that are kept, however long they take, if it is not too long.
+/// Number of the newest samples that are kept even if they are older than the history's least length, but not older
+/// than [`TOO_LONG_S`].
 const N_SLOW_SAMPLES: usize = 3;
-/// Seconds.
+/// Longest history in seconds, unless its least length is longer.
 const TOO_LONG_S: f64 = 60.0;
 
-/// Frames of the last seconds, or of more of them where a sample takes seconds.
+/// Frames of the last seconds. If a sample takes seconds, the history reaches further back.
 pub struct History {
     frames: VecDeque<FrameRecord>,
-    /// Seconds.
+    /// Least length of the history, seconds.
     shortest_s: f64,
 }
 
 impl FrameRecord {
-    /// GPU time of all passes.
+    /// Returns the GPU time of all passes.
     pub fn busy_ms(&self) -> f64 {
         self.pass_ms.iter().map(|(_, ms)| ms).sum()
     }
 }
 
 impl History {
-    /// Keeps what was shown within so many seconds before the newest, and the last samples.
+    /// Creates an empty history that keeps the frames of the last `shortest_s` seconds and the newest samples.
     pub fn new(shortest_s: f64) -> Self {
         Self { frames: VecDeque::new(), shortest_s }
     }
 
+    /// Adds the newest frame and drops frames that are too old.
     pub fn push(&mut self, frame: FrameRecord) {
         let newest = frame.shown_s;
         self.frames.push_back(frame);
@@ -53,12 +57,12 @@ impl History {
         }
     }
 
-    /// Oldest first.
+    /// Returns the frames, the oldest first.
     pub fn frames(&self) -> impl DoubleEndedIterator<Item = &FrameRecord> {
         self.frames.iter()
     }
 
-    /// Seconds before the newest frame in which what is kept was drawn.
+    /// Returns the length of the history: the seconds before the newest frame was shown.
     pub fn length_s(&self) -> f64 {
         let Some(newest) = self.frames.back() else { return self.shortest_s };
         let samples = self.frames.iter().rev().filter(|frame| !frame.pass_ms.is_empty()).take(N_SLOW_SAMPLES);
@@ -66,12 +70,12 @@ impl History {
         samples.map(ago).fold(self.shortest_s, f64::max).min(TOO_LONG_S.max(self.shortest_s))
     }
 
-    /// Of frame times.
+    /// Returns the percentiles of the frame times.
     pub fn pace(&self) -> Option<Percentiles> {
         Percentiles::of(self.frames().map(|frame| frame.frame_ms).collect())
     }
 
-    /// Of those that were drawn while the camera moved.
+    /// Returns size and times of the frames that were drawn while the camera moved, or none without such frames.
     pub fn moving(&self) -> Option<Moving> {
         let moving = || self.frames().filter_map(|frame| Some((frame.moving?, frame.frame_ms)));
         let frame_ms = Percentiles::of(moving().map(|(_, ms)| ms).collect())?;
@@ -81,33 +85,39 @@ impl History {
         Some(Moving { width, height, frame_ms })
     }
 
-    /// Of the latency of those that answered input.
+    /// Returns the percentiles of the latency of frames that showed an input.
     pub fn latency(&self) -> Option<Percentiles> {
         Percentiles::of(self.frames().filter_map(|frame| frame.latency_ms).collect())
     }
 }
 
-/// What the budget made of frames while the camera moved.
+/// Size and times of the frames that were drawn while the camera moved.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Moving {
-    /// Of the picture of median size, pixels.
+    /// Width of the picture of median size, pixels.
     pub width: u32,
+    /// Height of the picture of median size, pixels.
     pub height: u32,
-    /// From a frame to the next, milliseconds.
+    /// Time from one frame to the next, milliseconds.
     pub frame_ms: Percentiles,
 }
 
-/// Of times, in milliseconds.
+/// Percentiles of times, in milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Percentiles {
+    /// Number of times.
     pub n: usize,
+    /// The median.
     pub p50: f64,
+    /// The time that 95 % of the times do not exceed.
     pub p95: f64,
+    /// The time that 99 % of the times do not exceed.
     pub p99: f64,
 }
 
 impl Percentiles {
-    /// The least times that so many percent do not exceed (nearest rank); none of none.
+    /// Returns the percentiles by nearest rank: p is the least time that p percent of the times do not exceed.
+    /// Returns none if there are no times.
     pub fn of(mut times: Vec<f64>) -> Option<Self> {
         times.sort_by(f64::total_cmp);
         let n = times.len();

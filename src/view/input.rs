@@ -1,4 +1,4 @@
-//! The window's keys and mouse to camera moves and actions.
+//! Turns the window's keyboard and mouse events into camera moves and actions.
 
 use winit::{
     event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent},
@@ -12,54 +12,64 @@ use super::{
 };
 use crate::frame::View;
 
-/// Pixels of the wheel's travel where it has no steps.
+/// Pixels that count as one step of a wheel or touchpad that reports pixels.
 const WHEEL_STEP_PX: f64 = 50.0;
 
-/// What the user wants done, once.
+/// Action that is done once for each key press or click.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Action {
+    /// Saves the picture once it is drawn in full.
     Save,
+    /// Prints the camera in the format of scene files.
     PrintCamera,
+    /// Moves the camera so that the scene fills the window.
     FrameScene,
+    /// Moves the camera back to where it started.
     GoHome,
     TogglePanel,
+    /// Shows or hides the list of keys.
     ToggleKeys,
+    /// Shows another view of the picture.
     Show(View),
-    /// What a place of the window shows, pixels from its upper left corner.
+    /// Follows the rays of the pixel at a point of the window, in pixels from the window's upper left corner.
     Pick {
         x: f64,
         y: f64,
     },
+    /// Closes the list of keys, or else the window.
     Quit,
 }
 
-/// What an event comes to.
+/// Result of an event.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Heard {
+    /// The action that the event asks for.
     pub action: Option<Action>,
-    /// Whether the camera moved, or begins to.
+    /// Whether the event has moved the camera, or a key that moves it went down or up.
     pub moves: bool,
 }
 
-/// What keys and the mouse mean.
+/// State of keys and mouse that decides what the next event means.
 #[derive(Debug, Default)]
 pub struct Input {
     mouse: Mouse,
     modifiers: ModifiersState,
-    /// Whether S flies back: from the first key that flies until the camera is put somewhere or goes round.
+    /// Whether S flies back. It does so from the first flight key or look drag until the camera is framed, sent home,
+    /// orbited or panned.
     is_flying: bool,
 }
 
 impl Input {
-    /// Whether S flies back, rather than saves.
+    /// Returns whether S flies back rather than saves.
     pub fn is_flying(&self) -> bool {
         self.is_flying
     }
 
-    /// Handles an event that is not the overlay's; `window`: its size in pixels.
+    /// Handles an event that the overlay has not taken. `window` is the window's size in pixels.
     pub fn hear(&mut self, event: &WindowEvent, window: (u32, u32), controller: &mut Controller) -> Heard {
         match event {
-            // Keys that are down when the window gets them: those pressed since are told of once more.
+            // A synthetic press reports a key that was already down when the window gained the focus. It is ignored:
+            // a key that is pressed from then on has an event of its own.
             WindowEvent::KeyboardInput { event, is_synthetic: true, .. } if event.state.is_pressed() => {
                 Heard::default()
             }
@@ -127,6 +137,7 @@ impl Input {
         Heard { action, moves: false }
     }
 
+    /// Returns the direction of flight of a key, or none for other keys.
     fn way(&self, code: KeyCode) -> Option<Fly> {
         match code {
             KeyCode::KeyW => Some(Fly::Forward),
@@ -139,7 +150,7 @@ impl Input {
         }
     }
 
-    /// Goes nearer or farther, or changes the speed of flight.
+    /// Zooms by steps of the wheel or, with Ctrl or Alt, changes the speed of flight.
     fn wheel(&mut self, steps: f32, window: (u32, u32), controller: &mut Controller) -> Heard {
         if self.modifiers.control_key() || self.modifiers.alt_key() {
             controller.flight.change_speed(steps);
@@ -170,7 +181,8 @@ impl Input {
     }
 }
 
-/// Handles keys that are known by what they write, wherever the keyboard has them; none for others.
+/// Handles keys that are known by the character that they write, whatever their place on the keyboard. Returns none
+/// for other keys.
 fn press_symbol(symbol: &str, is_repeat: bool, controller: &mut Controller) -> Option<Heard> {
     match symbol {
         "+" | "=" => controller.flight.change_speed(1.0),
@@ -239,7 +251,7 @@ mod tests {
         }
     }
 
-    /// Eye and target after a drag to the right.
+    /// Returns eye and target after a drag to the right.
     fn dragged(button: MouseButton, modifiers: ModifiersState) -> (Vec3, Vec3) {
         let (mut input, mut controller) = (Input { modifiers, ..Input::default() }, controller());
         input.motion((10.0, 20.0), WINDOW, &mut controller);

@@ -1,4 +1,4 @@
-//! What the viewer has on the device: the renderer, and the way from its picture into the window.
+//! The viewer's device objects: the renderer, and the passes that show its picture and the overlay in the window.
 
 use std::sync::Arc;
 
@@ -16,10 +16,10 @@ use crate::{
     render::Renderer,
 };
 
-/// A scene on a device that shows its pictures in a window.
+/// A device that renders a scene and shows its pictures in a window.
 pub struct Live {
     pub renderer: Renderer,
-    /// What was chosen for the scene that it was opened with.
+    /// Choices made for the scene with which the device was opened.
     pub choices: Choices,
     present: Present,
     overlay: Overlay,
@@ -28,10 +28,11 @@ pub struct Live {
 }
 
 impl Live {
-    /// Opens the device and uploads the scene. `request`: the methods that the user wants, in place of the options'.
+    /// Opens the device and uploads the scene. `request` decides the traversal and the primary visibility; those in
+    /// `options` are replaced.
     ///
     /// # Errors
-    /// No device can do it; the scene or the picture is beyond its limits or memory.
+    /// No device can render and present, or the scene or the picture exceeds the device's limits or memory.
     pub fn open(
         window: Arc<dyn Screen>,
         device: &ContextOptions,
@@ -41,7 +42,7 @@ impl Live {
         vsync: bool,
     ) -> Result<Self, GpuError> {
         let (context, surface) = Context::for_window(device, window)?;
-        // In motion, where it has to be quick, a picture is smaller than its window.
+        // Methods are chosen for pictures in motion, which must be quick and are smaller than the window.
         let moving = (options.width / 4, options.height / 4);
         let workload = Workload { size: moving, ..loaded.load_options.workload };
         let cache = Cache::open();
@@ -55,10 +56,10 @@ impl Live {
         Ok(Self { renderer, choices, present, overlay, presenter, context })
     }
 
-    /// Puts another scene in the place of the last one, which stays where that fails.
+    /// Replaces the scene. If that fails, the previous scene stays.
     ///
     /// # Errors
-    /// The scene is beyond the device's limits or memory.
+    /// The scene exceeds the device's limits or memory.
     pub fn set_scene(&mut self, loaded: &Loaded) -> Result<(), GpuError> {
         let camera = *self.renderer.camera();
         let mut renderer = Renderer::new(self.context.clone(), &loaded.world, self.renderer.options())?;
@@ -68,7 +69,7 @@ impl Live {
         Ok(())
     }
 
-    /// Goes on with other shaders; where the device refuses them, with those before.
+    /// Replaces the shaders. If the device refuses them, the previous ones stay.
     ///
     /// # Errors
     /// The driver refuses a shader.
@@ -84,19 +85,19 @@ impl Live {
         remade
     }
 
-    /// Takes over what egui has changed in its textures; no change may be left out.
+    /// Uploads egui's changes of its textures. Every change must be passed on, since each is relative to the last.
     ///
     /// # Errors
-    /// Out of memory; a failed copy.
+    /// Out of memory, or a copy fails.
     pub fn update_textures(&mut self, textures: TexturesDelta) -> Result<(), GpuError> {
         self.overlay.update_textures(textures)
     }
 
-    /// Shows what is displayed, and the overlay over it. False where the window cannot show anything now. `window`: its size
-    /// in pixels.
+    /// Shows the displayed picture, and the overlay over it. Returns false if the window cannot show anything now.
+    /// `window` is the window's size in pixels.
     ///
     /// # Errors
-    /// A failed call.
+    /// A Vulkan call fails.
     pub fn show(&mut self, window: (u32, u32), overlay: Option<&OverlayFrame>) -> Result<bool, GpuError> {
         let Self { renderer, present, overlay: drawer, presenter, .. } = self;
         presenter.present(window, |commands, image| {
@@ -113,7 +114,8 @@ impl Live {
 
 impl Drop for Live {
     fn drop(&mut self) {
-        // Frames in flight still read what goes; after a lost device there is nothing to wait for.
+        // Frames in flight still read the objects that are dropped. An error means that the device is lost; then
+        // there is nothing to wait for.
         let _ = self.context.wait();
     }
 }

@@ -1,4 +1,4 @@
-//! A scene with all that is made from it before there is a device.
+//! A loaded scene with its acceleration structure, before it is uploaded to a device.
 
 use std::{
     path::{Path, PathBuf},
@@ -14,26 +14,35 @@ use crate::{
     world::{FlatScene, World},
 };
 
-/// What the choice of a scene's tree depends on, each time that the scene is read.
+/// The inputs to the choice of an acceleration structure. They stay the same each time that the scene is read.
 #[derive(Clone, Copy, Debug)]
 pub struct LoadOptions {
+    /// The user's choices.
     pub request: Request,
+    /// The processor that traces rays.
     pub processor: Processor,
+    /// The work that the structure is chosen for.
     pub workload: Workload,
 }
 
-/// A scene and its tree.
+/// A scene and its acceleration structure.
 pub struct Loaded {
+    /// The scene's file.
     pub path: PathBuf,
+    /// The scene with its structure.
     pub world: World,
+    /// The structure that was chosen.
     pub accel: ChosenAccel,
+    /// The inputs to that choice.
     pub load_options: LoadOptions,
+    /// Figures of the structure.
     pub statistics: Statistics,
+    /// Time of building the structure, milliseconds.
     pub build_ms: f64,
 }
 
 impl Loaded {
-    /// Reads the scene and builds its tree.
+    /// Reads the scene and builds its acceleration structure.
     ///
     /// # Errors
     /// The scene cannot be loaded.
@@ -41,7 +50,7 @@ impl Loaded {
         Ok(Self::with_tree(path, Scene::load(path)?, load_options))
     }
 
-    /// Builds a scene's tree.
+    /// Builds a scene's acceleration structure.
     ///
     /// # Panics
     /// The scene has a triangle without a material, which no loaded scene has.
@@ -49,7 +58,7 @@ impl Loaded {
         let LoadOptions { request, processor, workload } = load_options;
         let accel = request.choose_accel(processor, scene.n_triangles(), &workload);
         let flat = FlatScene::new(&scene).expect("a loaded scene fits together");
-        // The structure needs the memory.
+        // Building the structure needs the memory of the unflattened scene.
         drop(scene);
         let start = Instant::now();
         let world = World::with_accel(flat, &accel.options(processor)).expect("a material for each triangle");
@@ -58,12 +67,12 @@ impl Loaded {
         Self { path: path.to_owned(), world, accel, load_options, statistics, build_ms }
     }
 
-    /// The scene.
+    /// Returns the scene.
     pub fn scene(&self) -> &FlatScene {
         self.world.scene()
     }
 
-    /// Smallest and largest coordinates.
+    /// Returns the minimum and the maximum corner of the scene, world space.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         self.scene().bounds()
     }

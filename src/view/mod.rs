@@ -1,4 +1,5 @@
-//! The renderer in a window: a camera in the user's hands, samples that add up while it rests, and where the time goes.
+//! The interactive viewer: the user moves the camera, samples accumulate while it rests, and a panel shows the times
+//! of the passes.
 
 mod actions;
 mod app;

@@ -1,20 +1,23 @@
-//! The mouse between events: where it is, and what a drag does.
+//! State of the mouse between events: its position and the current drag.
 
 use winit::event::{ElementState, MouseButton};
 
-/// A press that moves less, in pixels, is a click.
+/// Pixels within which the mouse stays while a button is down, for the press to be a click and not a drag.
 const CLICK_PX: f64 = 3.0;
 
-/// What a drag does.
+/// Effect of a drag.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drag {
+    /// Moves the camera around its target.
     Orbit,
+    /// Turns the camera about its eye.
     Look,
+    /// Moves the camera sideways, up and down.
     Pan,
 }
 
 impl Drag {
-    /// The drag that begins with a button; none for buttons that have none.
+    /// Returns the drag that a button begins, or none if it begins none.
     fn of(button: MouseButton, is_shifted: bool) -> Option<Self> {
         match button {
             MouseButton::Left if is_shifted => Some(Self::Pan),
@@ -30,13 +33,13 @@ impl Drag {
 #[derive(Clone, Copy, Debug)]
 struct Press {
     button: MouseButton,
-    /// Where it went down, pixels.
+    /// Position of the mouse when the button went down, pixels.
     start: (f64, f64),
     was_dragged: bool,
     drag: Option<Drag>,
 }
 
-/// Where the mouse is, and the first of its buttons that is down.
+/// Position of the mouse, and the first of its buttons that went down.
 #[derive(Debug, Default)]
 pub struct Mouse {
     /// Pixels from the window's upper left corner.
@@ -45,8 +48,8 @@ pub struct Mouse {
 }
 
 impl Mouse {
-    /// Handles a motion. Gives what it drags, and how far to the right and down, in heights of the window, whose size is
-    /// in pixels.
+    /// Handles a motion to a point in pixels. During a drag, returns the drag and the motion to the right and down,
+    /// in heights of the window. `window` is the window's size in pixels.
     pub fn moves(&mut self, to: (f64, f64), window: (u32, u32)) -> Option<(Drag, (f32, f32))> {
         let from = std::mem::replace(&mut self.cursor, to);
         let press = self.press.as_mut()?;
@@ -55,7 +58,7 @@ impl Mouse {
         Some((drag, in_heights((to.0 - from.0, to.1 - from.1), window)))
     }
 
-    /// Handles a button. Gives the place of a click by the left one, in pixels.
+    /// Handles a button that goes down or up. Returns the position of a click of the left button, in pixels.
     pub fn button(&mut self, state: ElementState, button: MouseButton, is_shifted: bool) -> Option<(f64, f64)> {
         match (state, self.press) {
             (ElementState::Pressed, None) => {
@@ -71,19 +74,19 @@ impl Mouse {
         }
     }
 
-    /// Forgets the button that is down: the window has lost the mouse.
+    /// Forgets the button that is down, because the window has lost the focus.
     pub fn release(&mut self) {
         self.press = None;
     }
 
-    /// How far the mouse is to the right of the window's middle and below it, in heights of the window.
+    /// Returns the mouse's offset to the right of the window's middle and below it, in heights of the window.
     pub fn offset_from_middle(&self, window: (u32, u32)) -> (f32, f32) {
         let middle = (f64::from(window.0) / 2.0, f64::from(window.1) / 2.0);
         in_heights((self.cursor.0 - middle.0, self.cursor.1 - middle.1), window)
     }
 }
 
-/// Pixels in heights of the window.
+/// Converts pixels to heights of the window.
 fn in_heights((x, y): (f64, f64), window: (u32, u32)) -> (f32, f32) {
     let height = f64::from(window.1.max(1));
     ((x / height) as f32, (y / height) as f32)

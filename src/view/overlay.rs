@@ -1,4 +1,4 @@
-//! Draws what egui has laid out over a window's image.
+//! Draws egui's output over a window's image.
 
 use std::sync::Arc;
 
@@ -7,23 +7,26 @@ use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer, Rendere
 
 use crate::gpu::{Commands, Context, FRAMES_IN_FLIGHT, GpuError, Presenter, WindowImage};
 
-/// egui's pipeline, textures and meshes.
+/// Device objects that draw egui's output: pipeline, textures and meshes.
 pub struct Overlay {
-    /// None only while it is dropped.
+    /// None only while the overlay is dropped.
     renderer: Option<Renderer<GpuAllocator>>,
-    /// Shown by the last frame for the last time.
+    /// Textures that the last frame has used for the last time.
     released: Vec<TextureId>,
     context: Arc<Context>,
 }
 
-/// What to draw.
+/// egui's output for one frame.
 pub struct OverlayFrame {
+    /// Meshes with their clip rectangles.
     pub primitives: Vec<ClippedPrimitive>,
-    /// Pixels of one of egui's points.
+    /// Pixels per egui point.
     pub pixels_per_point: f32,
 }
 
 impl Overlay {
+    /// Creates the pipeline for the presenter's image format.
+    ///
     /// # Errors
     /// Out of memory.
     pub fn new(context: &Arc<Context>, presenter: &Presenter) -> Result<Self, GpuError> {
@@ -39,7 +42,7 @@ impl Overlay {
         Ok(Self { renderer: Some(renderer), released: Vec::new(), context: context.clone() })
     }
 
-    /// Takes over new and changed textures; to be called before each `draw`.
+    /// Uploads new and changed textures. It must be called before each [`Self::draw`].
     ///
     /// # Errors
     /// Out of memory; a failed copy.
@@ -47,7 +50,7 @@ impl Overlay {
         if textures.is_empty() && self.released.is_empty() {
             return Ok(());
         }
-        // Frames in flight may still show what is replaced here.
+        // Frames in flight may still read the textures that are replaced here.
         self.context.wait()?;
         let renderer = self.renderer.as_mut().expect("a renderer");
         for id in self.released.drain(..) {
@@ -63,7 +66,7 @@ impl Overlay {
         Ok(())
     }
 
-    /// Draws over what the window's image holds.
+    /// Draws over the contents of the window's image.
     ///
     /// # Errors
     /// Out of memory.
@@ -81,7 +84,7 @@ impl Drop for Overlay {
     }
 }
 
-/// The overlay's error as one of the Vulkan layer.
+/// Converts an error of egui's renderer.
 fn error(error: RendererError) -> GpuError {
     match error {
         RendererError::Vulkan(result) => GpuError::call("drawing", "overlay")(result),

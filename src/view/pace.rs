@@ -1,63 +1,67 @@
-//! When the picture is drawn fast, and when well.
+//! Tells whether the camera moves or rests, and measures frame times and latencies.
 
 use std::time::{Duration, Instant};
 
-/// A camera that has not moved for so long rests.
+/// Time after its last motion at which the camera rests.
 const REST_AFTER: Duration = Duration::from_millis(150);
 
-/// Whether the camera moves, when frames were shown, and since when an input waits for its frame.
+/// Times of the last motion of the camera, the last frame, and the oldest input that no frame has shown yet.
 #[derive(Debug, Default)]
 pub struct Pace {
+    /// When the camera moved last; none if it rests for certain.
     moved_at: Option<Instant>,
-    /// When the last frame was shown, if drawing has gone on since.
+    /// When the last frame was shown; none after a pause.
     shown_at: Option<Instant>,
+    /// When the current frame, or the last one, was begun.
     begun_at: Option<Instant>,
+    /// When the oldest input that no frame has shown yet arrived.
     oldest_input: Option<Instant>,
 }
 
 /// Times of a frame that was shown, milliseconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameTimes {
-    /// Since the frame before, or the frame's beginning where nothing was drawn for a while.
+    /// Time since the previous frame was shown or, after a pause, since this frame was begun.
     pub frame_ms: f64,
-    /// Since the oldest input that it is the first to show.
+    /// Time since the oldest input that this frame is the first to show; none without input.
     pub latency_ms: Option<f64>,
 }
 
 impl Pace {
-    /// An input came that the next frame will show.
+    /// Notes an input that the next frame will show.
     pub fn hear(&mut self, now: Instant) {
         self.oldest_input.get_or_insert(now);
     }
 
-    /// The camera has moved.
+    /// Notes that the camera has moved.
     pub fn moved(&mut self, now: Instant) {
         self.moved_at = Some(now);
     }
 
-    /// The camera is where it shall be.
+    /// Notes that the camera rests, without waiting for [`REST_AFTER`].
     pub fn rest(&mut self) {
         self.moved_at = None;
     }
 
+    /// Returns whether the camera has moved within [`REST_AFTER`].
     pub fn is_moving(&self, now: Instant) -> bool {
         self.moved_at.is_some_and(|at| now.duration_since(at) < REST_AFTER)
     }
 
-    /// A frame begins; gives the seconds since the last one was begun, 0 after a pause.
+    /// Notes that a frame begins. Returns the seconds since the previous frame was begun, or 0 after a pause.
     pub fn begin(&mut self, now: Instant) -> f32 {
         let last = self.begun_at.replace(now).filter(|_| self.shown_at.is_some());
         last.map_or(0.0, |last| now.duration_since(last).as_secs_f32())
     }
 
-    /// The frame was shown.
+    /// Notes that the frame was shown, and returns its times.
     pub fn shown(&mut self, now: Instant) -> FrameTimes {
         let since = |then: Instant| now.duration_since(then).as_secs_f64() * 1e3;
         let before = self.shown_at.replace(now).or(self.begun_at);
         FrameTimes { frame_ms: before.map_or(0.0, since), latency_ms: self.oldest_input.take().map(since) }
     }
 
-    /// Nothing is drawn until something happens.
+    /// Notes that nothing is drawn until the next event.
     pub fn pause(&mut self) {
         self.shown_at = None;
     }

@@ -1,4 +1,4 @@
-//! What a pixel shows and why: its rays, one after the other, by the kernels' twins on the CPU.
+//! Follows the rays of a clicked pixel on the CPU, with the CPU twins of the kernels.
 
 use glam::{UVec2, Vec3};
 
@@ -17,45 +17,48 @@ use crate::{
     world::{FlatScene, World},
 };
 
-/// Rays of one level that are followed; a pixel of glass can make more than anyone reads.
+/// Most rays of one level that are followed. A pixel of glass can have more rays than anyone reads.
 const MAX_RAYS: usize = 8;
 
 /// A pixel's rays, level by level.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picked {
-    /// From the upper left corner.
+    /// The pixel, counted from the picture's upper left corner.
     pub pixel: UVec2,
-    /// The primary ray first.
+    /// The rays that were followed, the primary ray first.
     pub rays: Vec<PickedRay>,
-    /// Rays that were left out.
+    /// Number of rays that were left out.
     pub n_more: usize,
 }
 
 /// A ray, and what it hit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PickedRay {
-    /// 0 for the primary ray.
+    /// Level of the ray; 0 for the primary ray.
     pub depth: u32,
-    /// What share of its light reaches the pixel, by channel.
+    /// Share of the ray's light that reaches the pixel, by colour channel.
     pub throughput: Vec3,
-    /// Reads of the way through the tree.
+    /// Steps of the ray's search through the acceleration structure.
     pub steps: Steps,
-    /// None: it left the scene.
+    /// The hit; none if the ray left the scene.
     pub hit: Option<PickedHit>,
 }
 
 /// Where a ray ended.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PickedHit {
+    /// Index of the triangle in the scene.
     pub triangle_ix: u32,
     /// The material's name.
     pub material: String,
-    /// From the ray's origin, world units.
+    /// Distance from the ray's origin, world units.
     pub distance: f32,
+    /// The point that was hit, world space.
     pub point_world: Vec3,
 }
 
-/// Follows the rays of the pixel's middle, as seen from `camera`. `options.width` and `height` are the picture's that the pixel is counted in.
+/// Follows the rays through the middle of a pixel, as seen from `camera`. `options.width` and `options.height` are
+/// the size of the picture in which the pixel is counted.
 pub fn pick(world: &World, options: &RenderOptions, camera: &Camera, pixel: UVec2) -> Picked {
     let scene = world.scene();
     let links = TraversalLinks::of(world.accel(), options.traversal);
@@ -96,7 +99,7 @@ fn found(scene: &FlatScene, ray: &PathRay, hit: &Hit) -> Option<PickedHit> {
     })
 }
 
-/// The rays of the next level.
+/// Returns the rays of the next level: the reflected and refracted rays at the hits.
 fn next_rays(bindings: &KernelInputs, rays: &[PathRay], hits: &[Hit]) -> Vec<PathRay> {
     let of_ray = |(ray, hit)| children_of(bindings, ray, hit, child_kinds_of(bindings, ray, hit));
     rays.iter().zip(hits).flat_map(of_ray).collect()

@@ -1,4 +1,4 @@
-//! Another version of the scene, while the one before is shown.
+//! Reloads the scene when its files change, while the previous version stays on screen.
 
 use std::{collections::BTreeSet, path::PathBuf, thread, time::Instant};
 
@@ -13,21 +13,21 @@ use super::{
 };
 use crate::scene::{SceneError, source_files};
 
-/// What wakes the viewer.
+/// Event from another thread that wakes the viewer.
 pub enum Wake {
     /// A file of the scene has changed.
     Changed,
-    /// The scene was read again.
+    /// The scene was read again, or could not be read.
     Reloaded(Box<Result<Loaded, SceneError>>),
     /// A shader has changed.
     #[cfg(feature = "hot-reload")]
     ShadersChanged,
-    /// The shaders were compiled anew.
+    /// The shaders were compiled again, or could not be compiled.
     #[cfg(feature = "hot-reload")]
     Compiled(Result<crate::gpu::Replacements, String>),
 }
 
-/// Work that is not begun while it is under way; asked for meanwhile, it is due again.
+/// State of work that runs at most once at a time. A request while it runs makes it due once more.
 #[derive(Default)]
 pub struct OneAtATime {
     is_under_way: bool,
@@ -35,13 +35,13 @@ pub struct OneAtATime {
 }
 
 impl OneAtATime {
-    /// Whether to begin now.
+    /// Requests the work. Returns whether to start it now; otherwise it is due after the present run.
     pub fn begin(&mut self) -> bool {
         self.is_due = self.is_under_way;
         !std::mem::replace(&mut self.is_under_way, true)
     }
 
-    /// It has ended; whether it is due again.
+    /// Notes that the work has ended. Returns whether it is due again.
     pub fn end(&mut self) -> bool {
         self.is_under_way = false;
         std::mem::take(&mut self.is_due)
@@ -52,10 +52,10 @@ impl OneAtATime {
 pub struct Reloader {
     path: PathBuf,
     load_options: LoadOptions,
-    /// All that the scene has named so far.
+    /// All files that the scene has named so far.
     files: BTreeSet<PathBuf>,
     proxy: EventLoopProxy<Wake>,
-    /// None where the system refuses.
+    /// None if the system refuses to watch.
     _watch: Option<Watch>,
     loading: OneAtATime,
     #[cfg(feature = "hot-reload")]
@@ -78,7 +78,8 @@ impl Reloader {
         reloader
     }
 
-    /// Watches the files that the scene names now, and those that it named while it could be read.
+    /// Watches the files that the scene names now, and those that it has named before. The latter matter while the
+    /// scene cannot be read.
     fn watch(&mut self) {
         let n_known = self.files.len();
         self.files.extend(source_files(&self.path));
@@ -86,14 +87,14 @@ impl Reloader {
             return;
         }
         let proxy = self.proxy.clone();
-        // There may be no viewer left to wake.
+        // An error means that the viewer has ended; then nothing needs to be woken.
         let changed = move || drop(proxy.send_event(Wake::Changed));
         self._watch = Watch::new(&self.files, changed)
             .inspect_err(|error| tracing::warn!("the scene's files are not watched: {error}"))
             .ok();
     }
 
-    /// Begins to read the scene again, or does so once it is read that is being read.
+    /// Starts to read the scene again. If a reading is under way, another one starts when it has ended.
     pub fn load(&mut self) {
         if self.loading.begin() {
             let (path, load_options, proxy) = (self.path.clone(), self.load_options, self.proxy.clone());
@@ -102,7 +103,7 @@ impl Reloader {
         }
     }
 
-    /// The scene was read.
+    /// Notes that a reading has ended, and starts the one that is due.
     pub fn done(&mut self) {
         self.watch();
         if self.loading.end() {
@@ -112,7 +113,8 @@ impl Reloader {
 }
 
 impl Session {
-    /// Shows what was read, from where the camera is; what was not read leaves all as it is, with a message.
+    /// Replaces the scene; the camera stays. If the scene could not be read or uploaded, shows a message and keeps
+    /// the previous scene.
     pub fn replace_scene(&mut self, live: &mut Live, loaded: Result<Loaded, SceneError>) {
         let loaded = match loaded {
             Ok(loaded) => loaded,
@@ -123,7 +125,7 @@ impl Session {
                 self.controller.set_scene(loaded.scene().camera, loaded.bounds());
                 self.loaded = loaded;
                 self.picked = None;
-                // A small picture at once.
+                // The next picture is drawn small, so that it is shown at once.
                 self.pace.moved(Instant::now());
                 self.settle(Topic::Scene);
             }

@@ -1,4 +1,4 @@
-//! A viewer that is left to itself: a tour, its pictures, and the end.
+//! Runs the viewer without a user: follows a camera tour, writes its pictures and ends.
 
 use std::{path::PathBuf, time::Instant};
 
@@ -9,15 +9,15 @@ use super::{
     tour::Tour,
 };
 
-/// Frames along a tour. The last one is seen at rest: it gets all its samples.
+/// Progress along a tour. The camera rests at the last frame, which therefore gets all its samples.
 pub struct Script {
     tour: Tour,
     frame_ix: u32,
-    /// Whether the camera is where the frame is seen from.
+    /// Whether the camera has been moved to the current frame's place.
     is_placed: bool,
-    /// Where the frames' pictures go; each gets all its samples then.
+    /// Directory for the pictures of all frames. With it, each frame gets all its samples.
     record: Option<PathBuf>,
-    /// Where the last frame's picture goes.
+    /// File for the picture of the last frame.
     screenshot: Option<PathBuf>,
 }
 
@@ -26,7 +26,7 @@ impl Script {
         Self { tour, frame_ix: 0, is_placed: false, record, screenshot }
     }
 
-    /// Moves the camera to where the next frame is seen from. That counts as the user's input.
+    /// Moves the camera to the next frame's place, unless it is there. The move counts as an input of the user.
     pub fn direct(&mut self, session: &mut Session) {
         if std::mem::replace(&mut self.is_placed, true) {
             return;
@@ -45,14 +45,16 @@ impl Script {
         self.frame_ix + 1 == self.tour.n_frames()
     }
 
+    /// Returns whether the camera rests at the current frame, so that the frame gets all its samples.
     fn is_still(&self) -> bool {
         self.is_last() || self.record.is_some()
     }
 
-    /// Goes on after a frame was shown; true after the last one.
+    /// Goes on to the next frame after one was shown, and writes the frame's picture. Returns true after the last
+    /// frame.
     ///
     /// # Errors
-    /// A picture that cannot be written.
+    /// A picture cannot be written.
     pub fn shown(&mut self, session: &Session, live: &Live) -> Result<bool, SaveError> {
         if self.is_still() && !session.is_done(live) {
             return Ok(false);

@@ -1,4 +1,4 @@
-//! The viewer without its window: the scene, the camera, the settings, and what each frame does with them.
+//! The viewer's state without the window: scene, camera and settings. Decides what each frame draws.
 
 use std::time::Instant;
 
@@ -19,13 +19,14 @@ use crate::{
     gpu::GpuError,
 };
 
-/// Seconds that the overlay looks back.
+/// Least length in seconds of the history that the panel shows.
 const HISTORY_S: f64 = 5.0;
-/// Reads of the tree, for each of its levels, that are shown brightest: some rays of some ways down and up.
+/// Reads per level of the kd-tree that the cost view shows brightest. A pixel has several rays, each of which goes
+/// down and up the tree several times.
 const STEPS_A_LEVEL: u32 = 16;
 
-/// The number of reads that is shown brightest. A ray goes through as many cells of a grid as it has along all axes, at the most;
-/// a few such rays make a pixel.
+/// Returns the number of reads that the cost view shows brightest. In a grid, a ray goes through at most as many
+/// cells as the sum of the grid's resolutions along the axes, and a pixel has a few such rays.
 fn brightest_cost(statistics: &Statistics) -> u32 {
     match statistics {
         Statistics::KdTree(tree) => STEPS_A_LEVEL * tree.depth.max(1),
@@ -33,35 +34,35 @@ fn brightest_cost(statistics: &Statistics) -> u32 {
     }
 }
 
-/// What is viewed, from where, how.
+/// State of the viewer: the scene, the camera, the settings and the history of frames.
 pub struct Session {
     pub loaded: Loaded,
     pub settings: Settings,
     pub controller: Controller,
     pub pace: Pace,
-    /// Of the last seconds.
+    /// Frames of the last seconds, with the times of their passes.
     pub history: History,
-    /// Of all the time, without passes.
+    /// All frames, without the times of their passes.
     pub all_frames: History,
-    /// Of views that need all rays, and of those that need primary rays only.
+    /// Budget of views that need all rays, then of views that need primary rays only.
     budgets: [Budget; 2],
     profile: Profile,
-    /// Whether nobody waits for pictures of full size.
+    /// Whether a user moves the camera. A script, in contrast, needs pictures of full size.
     is_interactive: bool,
     /// Whether the last frame was drawn while the camera moved.
     is_moving: bool,
     /// Whether the last frame completed a sample.
     has_new_sample: bool,
-    /// The widest and the highest picture that there was.
+    /// Maximum width and maximum height of all pictures so far, pixels. The buffers are large enough for them.
     room: (u32, u32),
-    /// The window's size that the last frame was drawn for.
+    /// Size of the window for which the last frame was drawn, pixels.
     window: (u32, u32),
-    /// Milliseconds of the sample that is being drawn.
+    /// Time spent so far on the sample that is being drawn, milliseconds.
     sample_ms: f64,
     pub(super) picked: Option<Picked>,
-    /// Whether the picture is to be saved once it is drawn in full.
+    /// Whether the user has asked to save the picture, which happens once it is drawn in full.
     pub(super) is_save_due: bool,
-    /// Writes to the terminal.
+    /// Prints text to the terminal.
     pub(super) print: fn(&str),
     message: Option<(Topic, String)>,
     start: Instant,
@@ -92,7 +93,7 @@ impl Session {
         }
     }
 
-    /// Whether the next frame will differ from the last one. `window`: pixels.
+    /// Returns whether the next frame will differ from the last one. `window` is the window's size in pixels.
     pub fn is_busy(&self, live: &Live, now: Instant, window: (u32, u32)) -> bool {
         let options = live.renderer.options();
         let is_small = window != (options.width, options.height);
@@ -100,26 +101,26 @@ impl Session {
             || self.controller.flight.is_under_way()
             || self.pace.is_moving(now)
             || self.is_learning()
-            || self.has_new_sample // what the overlay says of it comes a frame later
+            || self.has_new_sample // the overlay shows its figures a frame later
             || !self.is_done(live)
     }
 
-    /// Whether it is not known yet how long a picture takes: small ones tell.
+    /// Returns whether the time of a picture is still unknown. Small pictures are drawn until it is known.
     fn is_learning(&self) -> bool {
         self.is_interactive && self.budget().full_ms().is_none()
     }
 
-    /// Whether the picture at rest has all its samples.
+    /// Returns whether the picture has all its samples.
     pub fn is_done(&self, live: &Live) -> bool {
         !live.renderer.is_pending() && live.renderer.n_samples() >= self.n_wanted()
     }
 
-    /// Samples a pixel at which the view is done: what primary rays meet is that of one sample.
+    /// Returns the samples per pixel at which the view is done. Views of primary hits need a single sample.
     fn n_wanted(&self) -> u32 {
         if self.settings.view.needs_primary_rays_only() { 1 } else { self.settings.max_samples }
     }
 
-    /// What such views cost.
+    /// Returns the budget of the current view.
     fn budget(&self) -> &Budget {
         &self.budgets[usize::from(self.settings.view.needs_primary_rays_only())]
     }
@@ -128,10 +129,11 @@ impl Session {
         &mut self.budgets[usize::from(self.settings.view.needs_primary_rays_only())]
     }
 
-    /// Draws what the frame needs: one sample more, of a smaller picture while the camera moves. `window`: pixels, not 0.
+    /// Draws one more sample or a part of it. While the camera moves, the picture is smaller than the window.
+    /// `window` is the window's size in pixels, not 0.
     ///
     /// # Errors
-    /// A failed call. Settings that the device refuses are taken back instead.
+    /// A Vulkan call fails. Settings that the device refuses are not an error: the previous settings return.
     pub fn draw(&mut self, live: &mut Live, window: (u32, u32)) -> Result<(), GpuError> {
         let now = Instant::now();
         let seconds = self.pace.begin(now);
@@ -139,7 +141,7 @@ impl Session {
             self.controller.advance(seconds);
             self.pace.moved(now);
         }
-        // Frames in flight read what changes here.
+        // Frames in flight read the objects that change here.
         live.context.wait()?;
         live.presenter.set_vsync(self.settings.vsync);
         self.budgets.iter_mut().for_each(|budget| budget.set_budget(self.settings.budget_ms));
@@ -154,7 +156,7 @@ impl Session {
             self.save_what_is_left(live);
         }
         if self.is_interactive && (is_elsewhere || is_other_view || makes_room) {
-            // A small picture at once.
+            // The new picture is drawn small first, so that it is shown at once.
             live.renderer.reset_samples();
             self.pace.moved(now);
         }
@@ -163,7 +165,8 @@ impl Session {
         let (width, height) = if is_moving { self.budget().size(window) } else { window };
         let asked = RenderOptions { width, height, ..whole.clone() };
         let is_new = asked != *live.renderer.options();
-        // Room for the whole picture before a small one is drawn: to make it later would lose that one.
+        // Buffers for the full-size picture are allocated before a small one is drawn. Allocating them later would
+        // discard the small picture.
         let steps = [(is_moving && makes_room).then_some(&whole), is_new.then_some(&asked)];
         for options in steps.into_iter().flatten() {
             if let Err(error) = live.renderer.set_options(options) {
@@ -187,7 +190,7 @@ impl Session {
         }
     }
 
-    /// What was learned of a window of another size is put right.
+    /// Adapts the budgets if the window's size has changed.
     fn fit_window(&mut self, live: &mut Live, window: (u32, u32)) -> Result<(), GpuError> {
         let before = std::mem::replace(&mut self.window, window);
         if before == window || before == (0, 0) {
@@ -196,11 +199,12 @@ impl Session {
         let n_pixels = |(width, height): (u32, u32)| f64::from(width) * f64::from(height);
         let ratio = n_pixels(window) / n_pixels(before);
         self.budgets.iter_mut().for_each(|budget| budget.resize(ratio));
-        // Parts as small as a small window's would be too many for a large one.
+        // A large window would consist of too many parts if they stayed as small as those of a small window.
         live.renderer.limit_batches(None)
     }
 
-    /// Whether the buffers are those that such a picture needs, and large enough; they will be.
+    /// Returns whether the present buffers suffice for such a picture. Notes its size, since the caller then makes
+    /// them large enough.
     fn has_room(&mut self, live: &Live, whole: &RenderOptions) -> bool {
         let now = live.renderer.options();
         let has_room = whole.width <= self.room.0 && whole.height <= self.room.1;
@@ -209,7 +213,8 @@ impl Session {
         has_room && whole.features == now.features && filters(whole) == filters(now)
     }
 
-    /// A whole sample while the camera moves. At rest so much of it that input is not kept waiting.
+    /// Draws the rest of the sample in parts, until the sample is complete or half of [`PART_MS`] is spent. At rest,
+    /// parts are so small that input does not wait long; while the camera moves, parts are as large as possible.
     fn draw_part(&mut self, live: &mut Live, window: (u32, u32), is_moving: bool) -> Result<(), GpuError> {
         let renderer = &mut live.renderer;
         if !renderer.is_pending() {
@@ -222,7 +227,7 @@ impl Session {
         let start = Instant::now();
         let spent_ms = || start.elapsed().as_secs_f64() * 1e3;
         let mut complete = renderer.draw_part()?;
-        // Small pictures let parts seem slower than they are.
+        // A part may take less than expected: estimates from small pictures are too high. Then further parts follow.
         while complete.is_none() && spent_ms() < PART_MS / 2.0 {
             complete = renderer.draw_part()?;
         }
@@ -237,7 +242,8 @@ impl Session {
         Ok(())
     }
 
-    /// Goes back to what the device did before, unless it is lost; a size that it refuses is not the user's to change.
+    /// Returns to the options that the device accepted last, and shows a message: the user cannot change a size that
+    /// the device refuses. Returns the error if the device is lost.
     fn take_back(&mut self, live: &Live, error: GpuError) -> Result<(), GpuError> {
         if error.is_device_lost() {
             return Err(error);
@@ -247,7 +253,7 @@ impl Session {
         Ok(())
     }
 
-    /// The frame, a picture of that size, is on its way to the screen.
+    /// Notes that the frame was handed to the screen. `picture` is the size of its picture in pixels.
     pub fn shown(&mut self, picture: (u32, u32)) {
         let now = Instant::now();
         let times = self.pace.shown(now);
@@ -264,7 +270,7 @@ impl Session {
         self.history.push(FrameRecord { pass_ms, ..record });
     }
 
-    /// What is displayed, and the value that is brightest.
+    /// Returns the current view, and the value that it shows brightest.
     fn view(&self) -> (View, f32) {
         let automatic = match self.settings.view {
             View::Picture | View::Normal | View::Id => 1.0,
@@ -275,7 +281,7 @@ impl Session {
         (self.settings.view, automatic / self.settings.gain)
     }
 
-    /// What the overlay shows.
+    /// Returns the facts that the overlay shows. `window` is the window's size in pixels.
     pub fn facts<'a>(&'a self, live: &'a Live, window: (u32, u32), is_flying: bool) -> Facts<'a> {
         let options = live.renderer.options();
         Facts {
@@ -297,13 +303,13 @@ impl Session {
         }
     }
 
-    /// Tells the user what went wrong last, in the overlay and on the terminal.
+    /// Shows an error in the overlay, in place of the last one, and on the terminal.
     pub fn complain(&mut self, topic: Topic, message: &str) {
         tracing::warn!("{message}");
         self.message = Some((topic, message.to_owned()));
     }
 
-    /// What went wrong there is right again.
+    /// Clears the overlay's message if it is about this topic, which works again.
     pub fn settle(&mut self, topic: Topic) {
         self.message.take_if(|(wrong, _)| *wrong == topic);
     }

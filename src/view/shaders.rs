@@ -1,4 +1,5 @@
-//! Shaders that change while they are used. The build script compiles them, as it does for cargo.
+//! Hot reload of shaders: when their files change, the build script compiles them as it does for cargo, and the
+//! renderer goes on with them.
 
 use std::{
     collections::BTreeSet,
@@ -21,27 +22,28 @@ use super::{
 };
 use crate::gpu::Replacements;
 
-/// The build script's program.
+/// Path of the build script's program, which compiles the shaders.
 const COMPILER: &str = env!("KDRAY_SHADER_COMPILER");
-/// What the program knows of layout.glsl.
+/// The Rust code that was generated from layout.glsl when this program was built.
 const LAYOUT: &str = include_str!(concat!(env!("OUT_DIR"), "/layout.rs"));
 
-/// Watches the shaders and compiles them anew on a thread of its own.
+/// Watches the shaders' files and compiles them again on a thread of its own.
 pub struct Shaders {
     checkout: PathBuf,
     proxy: EventLoopProxy<Wake>,
-    /// None where the system refuses.
+    /// None if the system refuses to watch.
     _watch: Option<Watch>,
     compiling: OneAtATime,
 }
 
 impl Shaders {
-    /// Of the working directory, if it is a checkout, or of the one that the program was built in.
+    /// Watches the shaders of the working directory if it is a checkout, else those of the checkout that the program
+    /// was built in.
     pub fn new(proxy: EventLoopProxy<Wake>) -> Self {
         let here = Path::new(".");
         let checkout = if here.join("glsl").is_dir() { here } else { Path::new(env!("CARGO_MANIFEST_DIR")) };
         let waker = proxy.clone();
-        // There may be no viewer left to wake.
+        // An error means that the viewer has ended; then nothing needs to be woken.
         let changed = move || drop(waker.send_event(Wake::ShadersChanged));
         let watch = Watch::new(&shader_files(checkout), changed)
             .inspect_err(|error| tracing::warn!("the shaders are not watched: {error}"))
@@ -49,7 +51,7 @@ impl Shaders {
         Self { checkout: checkout.to_owned(), proxy, _watch: watch, compiling: OneAtATime::default() }
     }
 
-    /// Begins to compile all shaders, or does so once those are compiled that are being compiled.
+    /// Starts to compile all shaders. If a compilation is under way, another one starts when it has ended.
     pub fn compile(&mut self) {
         if self.compiling.begin() {
             let (checkout, proxy) = (self.checkout.clone(), self.proxy.clone());
@@ -57,7 +59,7 @@ impl Shaders {
         }
     }
 
-    /// They were compiled.
+    /// Notes that a compilation has ended, and starts the one that is due.
     pub fn done(&mut self) {
         if self.compiling.end() {
             self.compile();
@@ -66,13 +68,14 @@ impl Shaders {
 }
 
 impl Session {
-    /// Goes on with other shaders; where they were not compiled, or the device refuses them, with those before.
+    /// Replaces the shaders. If they failed to compile or the device refuses them, shows a message and keeps the
+    /// previous shaders.
     pub fn replace_shaders(&mut self, live: &mut Live, shaders: Result<Replacements, String>) {
         let replaced =
             shaders.and_then(|shaders| live.replace_shaders(shaders).map_err(|error| format!("shaders: {error}")));
         match replaced {
             Ok(()) => {
-                // A small picture at once.
+                // The next picture is drawn small, so that it is shown at once.
                 self.pace.moved(Instant::now());
                 self.settle(Topic::Shaders);
             }
@@ -81,13 +84,18 @@ impl Session {
     }
 }
 
+/// Returns the files in the folders below the checkout's `glsl`.
 fn shader_files(checkout: &Path) -> BTreeSet<PathBuf> {
     let folders = fs::read_dir(checkout.join("glsl")).into_iter().flatten().flatten();
     let files = folders.flat_map(|folder| fs::read_dir(folder.path()).into_iter().flatten().flatten());
     files.map(|file| file.path()).collect()
 }
 
-/// All shaders of the checkout, or why there are none: the compiler's errors, with file and line.
+/// Compiles all shaders of the checkout.
+///
+/// # Errors
+/// The compiler's errors with file and line, or why it could not run. It is also an error if layout.glsl differs from
+/// the one that this program was built with.
 fn compile(checkout: &Path) -> Result<Replacements, String> {
     let out_dir = TempDir::new().map_err(|error| format!("shaders: {error}"))?;
     let output = Command::new(COMPILER)
@@ -117,11 +125,12 @@ fn compile(checkout: &Path) -> Result<Replacements, String> {
         .collect()
 }
 
-/// What the build script says to cargo of shaders, or, where it does not like layout.glsl, to nobody.
+/// Returns the build script's error messages: those that it prints for cargo or, if there are none, its panic
+/// message, which reports errors in layout.glsl.
 fn complaints(output: &Output) -> String {
     let (stdout, stderr) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     let errors = stdout.lines().filter_map(|line| line.strip_prefix("cargo::error="));
-    // Their number stands above them.
+    // The lines that introduce the errors or count them are left out.
     let errors: Vec<_> =
         errors.filter(|line| !line.ends_with("compilation error:") && !line.ends_with("errors:")).collect();
     if !errors.is_empty() {
@@ -131,7 +140,7 @@ fn complaints(output: &Output) -> String {
     stderr.lines().filter(is_why).collect::<Vec<_>>().join("\n")
 }
 
-/// The lines that are no documentation.
+/// Returns the lines that are not doc comments.
 fn code_of(rust: &str) -> Vec<&str> {
     rust.lines().filter(|line| !line.trim_start().starts_with("///")).collect()
 }
@@ -140,7 +149,7 @@ fn code_of(rust: &str) -> Vec<&str> {
 mod tests {
     use super::*;
 
-    /// A copy of this checkout's shaders, one file of them edited.
+    /// Copies this checkout's shaders to a new directory and edits one of the files.
     fn edited(file: &str, edit: impl Fn(&str) -> String) -> TempDir {
         let copy = TempDir::new().unwrap();
         for path in shader_files(Path::new(env!("CARGO_MANIFEST_DIR"))) {

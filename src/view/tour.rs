@@ -1,18 +1,21 @@
-//! Camera moves that need no user: for tests, measurements and films.
+//! Camera tours, which need no user: for tests, measurements and films.
 
 use glam::Quat;
 
 use crate::scene::{Camera, CameraPath};
 
-/// Frames along a fixed way.
+/// Cameras of a fixed sequence of frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tour {
-    /// One a frame, at least one.
+    /// One camera per frame, at least one.
     cameras: Vec<Camera>,
 }
 
 impl Tour {
-    /// Once around the target; the last frame is seen from the very start. At least one frame.
+    /// Returns a tour of `n_frames` frames once around the target. The last frame's camera is exactly `start`.
+    ///
+    /// # Panics
+    /// `n_frames` is 0.
     pub fn around(start: Camera, n_frames: u32) -> Self {
         assert!(n_frames > 0, "a tour has frames");
         let turned = |n_turned: u32| {
@@ -23,8 +26,11 @@ impl Tour {
         Self { cameras: (1..n_frames).map(turned).chain([start]).collect() }
     }
 
-    /// Along a path from its first keyframe to its last in so many frames, at least one; the last keyframe is the last
-    /// frame. None where the path leads through a camera that sees nothing.
+    /// Returns a tour of `n_frames` frames along a path, from its first keyframe to its last. A single frame is the
+    /// last keyframe. Returns none if eye, target and up vector of a frame span no picture.
+    ///
+    /// # Panics
+    /// `n_frames` is 0.
     pub fn along(path: &CameraPath, n_frames: u32) -> Option<Self> {
         assert!(n_frames > 0, "a tour has frames");
         let step = (path.end() - path.begin()) / f64::from(n_frames.max(2) - 1);
@@ -32,11 +38,12 @@ impl Tour {
         Some(Self { cameras: (0..n_frames).map(at).collect::<Option<_>>()? })
     }
 
+    /// Returns the number of frames.
     pub fn n_frames(&self) -> u32 {
         self.cameras.len() as u32
     }
 
-    /// Where frame `frame_ix` is seen from.
+    /// Returns the camera of frame `frame_ix`.
     pub fn camera(&self, frame_ix: u32) -> Camera {
         self.cameras[frame_ix as usize]
     }

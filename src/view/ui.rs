@@ -1,4 +1,4 @@
-//! egui between the window and the overlay.
+//! Connects egui to the window's events and to the overlay that draws it.
 
 use std::time::{Duration, Instant};
 
@@ -17,18 +17,20 @@ use super::{
     session::Session,
 };
 
-/// The overlay's state.
+/// State of egui.
 pub struct Ui {
     state: State,
-    /// Where the mouse is, points; egui itself knows it only at its next layout.
+    /// Position of the mouse in points. egui itself learns it only at its next layout.
     cursor: Pos2,
-    /// When it wants to be laid out again, counted from its last layout.
+    /// Delay after the last layout at which egui wants to be laid out again.
     repaint_after: Duration,
 }
 
-/// The overlay of one frame.
+/// egui's output for one frame.
 pub struct Layout {
+    /// What the overlay draws.
     pub frame: OverlayFrame,
+    /// Changes of textures, to be uploaded before the frame is drawn.
     pub textures: TexturesDelta,
 }
 
@@ -41,7 +43,7 @@ impl Ui {
         Self { state, cursor: Pos2::ZERO, repaint_after: Duration::ZERO }
     }
 
-    /// Tells the overlay of an event; true where it is the overlay's alone.
+    /// Passes an event to egui. Returns true if the event is egui's alone.
     pub fn take_event(&mut self, window: &Window, event: &WindowEvent) -> bool {
         let response = self.state.on_window_event(window, event);
         if response.repaint {
@@ -53,24 +55,25 @@ impl Ui {
             self.cursor = pos2(position.x as f32 / scale, position.y as f32 / scale);
         }
         match event {
-            // A drag that began on the picture ends wherever the mouse is.
+            // A drag that began on the picture also ends if the button goes up over the overlay.
             WindowEvent::MouseInput { state: ElementState::Released, .. } => false,
             WindowEvent::MouseInput { .. } | WindowEvent::MouseWheel { .. } => {
                 context.egui_is_using_pointer()
                     || context.layer_id_at(self.cursor).is_some_and(|layer| layer.order != Order::Background)
             }
             WindowEvent::CursorMoved { .. } => context.egui_is_using_pointer(),
-            // Escape closes a list of choices first.
+            // An open list of choices takes the keys: Escape closes it before anything else.
             WindowEvent::KeyboardInput { .. } => context.egui_wants_keyboard_input() || Popup::is_any_open(context),
             _ => false,
         }
     }
 
+    /// Returns the delay after the last layout at which egui wants to be laid out again.
     pub fn repaint_after(&self) -> Duration {
         self.repaint_after
     }
 
-    /// Lays the overlay out; changes the settings as the user does.
+    /// Lays out the overlay and applies the user's changes to `settings`.
     pub fn layout(&mut self, window: &Window, layers: Layers, settings: &mut Settings, facts: &Facts) -> Layout {
         let input = self.state.take_egui_input(window);
         let context = self.state.egui_ctx().clone();
@@ -84,7 +87,7 @@ impl Ui {
     }
 }
 
-/// Lays out what lies over the session's picture; takes over what the user sets there.
+/// Lays out the overlay of the session's picture and applies the user's changes to the session's settings.
 pub fn lay_out(
     session: &mut Session,
     live: &Live,
@@ -102,7 +105,7 @@ pub fn lay_out(
     layout
 }
 
-/// Whether the event is the Tab key, which shows and hides the panel whatever has the keys.
+/// Returns whether the event is a press of Tab, which shows and hides the panel even if egui has the keyboard focus.
 pub fn is_tab(event: &WindowEvent) -> bool {
     let tab = PhysicalKey::Code(KeyCode::Tab);
     matches!(event, WindowEvent::KeyboardInput {
@@ -110,7 +113,7 @@ pub fn is_tab(event: &WindowEvent) -> bool {
     } if *physical_key == tab)
 }
 
-/// Whether a key or a button of the mouse goes down.
+/// Returns whether a key or a mouse button goes down.
 pub fn is_press(event: &WindowEvent) -> bool {
     match event {
         WindowEvent::KeyboardInput { event, is_synthetic: false, .. } => event.state.is_pressed(),

@@ -1,4 +1,4 @@
-//! Tells when files change that a scene was made from.
+//! Watches files and reports when they change.
 
 use std::{
     collections::BTreeSet,
@@ -10,18 +10,18 @@ use std::{
 
 use notify::{Event, RecommendedWatcher, RecursiveMode, Watcher};
 
-/// A file is written in several steps: quiet for so long, it is done.
+/// Time without further changes after which a change is reported, because a file is written in several steps.
 const QUIET: Duration = Duration::from_millis(120);
 
 /// Watches files until it is dropped.
 pub struct Watch {
-    // Its end closes the channel, and that ends the thread.
+    // Dropping the watcher closes the channel, which ends the thread.
     _watcher: RecommendedWatcher,
 }
 
 impl Watch {
-    /// Calls `changed` on a thread of its own whenever any of the files was written, replaced or made, once for changes
-    /// that follow each other closely. Their folders are watched, since editors replace files.
+    /// Calls `changed` on a thread of its own whenever any of the files is written, replaced or created. Changes that
+    /// follow each other closely cause one call. The files' folders are watched, because editors replace files.
     ///
     /// # Errors
     /// The system refuses to watch.
@@ -32,7 +32,7 @@ impl Watch {
         let mut watcher = notify::recommended_watcher(move |event: notify::Result<Event>| {
             let event = event.unwrap_or_default();
             if is_change(&event) && event.paths.iter().any(|path| files.contains(&absolute(path))) {
-                // Nobody listens any more when the watch ends.
+                // An error means that the watch is ending; then nothing receives.
                 let _ = sender.send(());
             }
         })?;
@@ -44,7 +44,7 @@ impl Watch {
     }
 }
 
-/// Waits for changes, and for the end of each burst of them.
+/// Calls `changed` after each burst of changes.
 fn report(events: &Receiver<()>, changed: impl Fn()) {
     while events.recv().is_ok() {
         loop {
@@ -62,7 +62,7 @@ fn is_change(event: &Event) -> bool {
     event.kind.is_modify() || event.kind.is_create()
 }
 
-/// Comparable, whether the file exists or not.
+/// Returns a path that can be compared with others, whether the file exists or not.
 fn absolute(file: &Path) -> PathBuf {
     let (Some(folder), Some(name)) = (file.parent(), file.file_name()) else { return file.to_owned() };
     let folder = if folder == Path::new("") { Path::new(".") } else { folder };

@@ -1,4 +1,4 @@
-//! The words of `kdray bench`.
+//! The arguments of `kdray bench`.
 
 use std::path::{Path, PathBuf};
 
@@ -20,40 +20,46 @@ use crate::cli::{
     picture_args::{accel_help, traversal_help, traversals_of_devices},
 };
 
-/// What is measured.
+/// The suites: what is measured.
 #[derive(Subcommand)]
 pub enum Suite {
-    /// The paper's table: its four scenes, whole frames on the GPU and on one CPU thread, beside its own times
+    /// Measure the paper's table: whole frames of its four scenes, on the GPU and on one CPU thread, beside its own
+    /// times
     Paper(PaperArgs),
-    /// All traversals of the kd-tree, and grids, on primary, shadow, mirror and diffuse rays of a mesh
+    /// Compare all traversals of the kd-tree, and grids, on primary, shadow, mirror and diffuse rays of a mesh
     Traversal(TraversalArgs),
-    /// The traversal against the driver's own ray tracing, on the same rays; exits with 4 where the device lacks it
+    /// Compare kdray with the driver's own ray tracing on the same rays; exits with 4 if the device has none
     Driver(DriverArgs),
-    /// Cost of building and of a ray against the number of triangles, on a generated mesh
+    /// Measure how build time and time per ray grow with the number of triangles, on a generated mesh
     Size(SizeArgs),
 }
 
 #[derive(clap::Args)]
 pub struct PaperArgs {
-    /// Folder of cornell.toml, paper2.toml, paper3.toml and paper4.toml
+    /// Directory that holds cornell.toml, paper2.toml, paper3.toml and paper4.toml
     #[arg(long, value_name = "DIR", default_value = "scenes")]
     pub scenes: PathBuf,
-    /// Pixels, as 640x480,1024x768 [default: the paper's three sizes]
+    /// Sizes of the pictures in pixels, separated by commas, for example 640x480,1024x768 [default: 640x480, 800x600
+    /// and 1024x768, as in the paper]
     #[arg(long, value_name = "WxH", value_delimiter = ',')]
     pub size: Vec<Size>,
     #[arg(long, value_name = "ALGORITHM")]
-    #[arg(help = format!("Algorithm by which rays go through the kd-tree on the GPU: {} [default: {}]", Traversal::words(), traversals_of_devices()))]
+    #[arg(help = format!(
+        "Algorithm by which rays go through the kd-tree on the GPU: {} [default: {}]",
+        Traversal::words(),
+        traversals_of_devices()
+    ))]
     pub traversal: Option<Traversal>,
-    /// Frames on the GPU
+    /// Number of timed frames on the GPU, 1 to 10000
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
-    /// Frames on the CPU
+    /// Number of timed frames on the CPU, 1 to 10000
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
     pub cpu_repeat: u16,
-    /// Leave the CPU out
+    /// Do not measure the CPU
     #[arg(long, conflicts_with = "cpu_repeat")]
     pub no_cpu: bool,
-    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
     #[command(flatten)]
@@ -62,24 +68,27 @@ pub struct PaperArgs {
 
 #[derive(clap::Args)]
 pub struct TraversalArgs {
-    /// OBJ or scene file
+    /// OBJ file or scene file
     pub mesh: PathBuf,
-    /// Pixels, one primary ray each
+    /// Size of the picture in pixels; each pixel has one primary ray
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    #[arg(help = format!("Traversals of the kd-tree and grids, as mask,stack,grid: {} [default: all but brute]", Variant::words()))]
+    #[arg(help = format!(
+        "Traversals of the kd-tree and grids, as mask,stack,grid: {} [default: all but brute]",
+        Variant::words()
+    ))]
     pub variants: Vec<Variant>,
-    /// Timed casts of each set of rays
+    /// Number of timed casts of each set of rays, 1 to 10000
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
-    /// Leave the scene as it is: its own camera and first light, and no closed room around it
+    /// Use the scene's own camera and first light, without a closed room around the scene
     #[arg(long)]
     pub no_room: bool,
-    /// Cast on all threads of the CPU, without Vulkan
+    /// Cast on all CPU threads, without Vulkan
     #[arg(long, conflicts_with = "device")]
     pub cpu: bool,
-    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
     #[command(flatten)]
@@ -88,18 +97,18 @@ pub struct TraversalArgs {
 
 #[derive(clap::Args)]
 pub struct DriverArgs {
-    /// OBJ or scene file
+    /// OBJ file or scene file
     pub mesh: PathBuf,
-    /// Pixels, one primary ray each
+    /// Size of the picture in pixels; each pixel has one primary ray
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,
-    /// Timed casts of each set of rays
+    /// Number of timed casts of each set of rays, 1 to 10000
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
-    /// Leave the scene as it is: its own camera and first light, and no closed room around it
+    /// Use the scene's own camera and first light, without a closed room around the scene
     #[arg(long)]
     pub no_room: bool,
-    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
     #[command(flatten)]
@@ -108,11 +117,11 @@ pub struct DriverArgs {
 
 #[derive(clap::Args)]
 pub struct SizeArgs {
-    /// Numbers of triangles, as 10000,10000000
+    /// Numbers of triangles, separated by commas, for example 10000,10000000
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = SIZES)]
     #[arg(value_parser = value_parser!(u32).range(i64::from(MIN_TRIANGLES)..=i64::from(MOST_TRIANGLES)))]
     pub triangles: Vec<u32>,
-    /// Pixels, one primary ray each
+    /// Size of the picture in pixels; each pixel has one primary ray
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,
     #[arg(long, value_name = "KIND", help = accel_help(), default_value_t)]
@@ -120,33 +129,33 @@ pub struct SizeArgs {
     #[arg(long, value_name = "ALGORITHM")]
     #[arg(help = traversal_help())]
     pub traversal: Option<Traversal>,
-    /// Timed casts of each set of rays
+    /// Number of timed casts of each set of rays, 1 to 10000
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
     pub repeat: u16,
-    /// Cast on all threads of the CPU, without Vulkan
+    /// Cast on all CPU threads, without Vulkan
     #[arg(long, conflicts_with = "device")]
     pub cpu: bool,
-    /// Device by its index in `kdray devices` or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
     #[command(flatten)]
     pub files: FileArgs,
 }
 
-/// Where results go besides standard output.
+/// Files that the results are written to, besides standard output.
 #[derive(clap::Args)]
 pub struct FileArgs {
-    /// Write all that was measured as JSON
+    /// Write all measurements to this JSON file
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write a chart
+    /// Write a chart to this SVG file
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
 }
 
 impl FileArgs {
-    /// Refuses files that cannot be written, or that are a part of the `scenes` that are read, before anything is
-    /// measured.
+    /// Refuses files that cannot be written, or that belong to `scenes`, which the command reads. It is called before
+    /// anything is measured.
     pub fn check(&self, scenes: &[&Path]) -> Result<(), CliError> {
         let mut roles = FileRoles::default();
         scenes.iter().for_each(|scene| roles.read_scene("a scene", scene));
@@ -155,7 +164,7 @@ impl FileArgs {
         Ok([&self.json, &self.svg].into_iter().flatten().try_for_each(|path| output::check(path))?)
     }
 
-    /// Writes those files that were asked for.
+    /// Writes the files that the user has named.
     pub fn write(&self, report: &impl serde::Serialize, svg: impl FnOnce() -> String) -> Result<(), CliError> {
         if let Some(path) = &self.json {
             let mut json = serde_json::to_vec_pretty(report).expect("plain structs of numbers and words");

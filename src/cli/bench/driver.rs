@@ -1,4 +1,4 @@
-//! `kdray bench driver`: the traversal against the driver's own ray tracing.
+//! `kdray bench driver`: compares kdray's search algorithms with the driver's own ray tracing.
 
 use kdray::{
     accel::kdtree::BuildOptions,
@@ -26,7 +26,8 @@ use crate::cli::{
     table::{decimal, table},
 };
 
-/// Loads the mesh, makes the rays, lets both trace them set by set. A device without ray tracing is refused first.
+/// Loads the mesh, makes the rays, and lets kdray and the driver trace each set of rays. A device without ray tracing
+/// is refused first.
 pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     args.files.check(&[&args.mesh])?;
     let context = Context::with_ray_tracing(&ContextOptions::new(args.device.clone(), false))?;
@@ -129,8 +130,8 @@ fn builds_text(builds: &Builds) -> String {
     let Builds { tree_ms, n_threads, bvh_ms, n_bvh_builds, grids } = builds;
     let bvh_ms = decimal(bvh_ms.map(|ms| ms.median), 3);
     let mut text = format!(
-        "Built: the driver's tree in {bvh_ms} ms of the GPU (median of {n_bvh_builds}), the kd-tree in {tree_ms:.0} ms of \
-         {n_threads} CPU threads"
+        "Built: the driver's tree in {bvh_ms} ms of the GPU (median of {n_bvh_builds}), the kd-tree in {tree_ms:.0} ms \
+         of {n_threads} CPU threads"
     );
     for grid in grids {
         text += &format!(", `{}` in {} ms of the GPU", grid.accel, decimal(grid.ms.map(|ms| ms.median), 3));
@@ -138,7 +139,8 @@ fn builds_text(builds: &Builds) -> String {
     text + ".\n"
 }
 
-/// The speed of wrong answers is none.
+/// Fails if more hits of an algorithm differ from the driver's than rounding explains: the speed of wrong hits has no
+/// meaning.
 fn check_hits(report: &Report) -> Result<(), CliError> {
     let Some((set, rival)) = report.first_wrong() else { return Ok(()) };
     Err(CliError::WrongHits(format!(
@@ -163,8 +165,8 @@ mod tests {
 
     use super::*;
 
-    /// Four rays of each kind: the driver takes 4, 8, 12 ms, `mask` half of that, `stack` the same; `stack` has
-    /// `n_wrong` wrong hits among its primary rays.
+    /// Returns a report of four rays of each kind. The driver takes 4, 8 and 12 ms, `mask` half of that and `stack`
+    /// the same. `stack` has `n_wrong` wrong hits among its primary rays.
     fn report(n_wrong: usize) -> Report {
         let trial = |name: &str, ms: f64, n_wrong: usize| Trial {
             name: name.to_owned(),

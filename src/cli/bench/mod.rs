@@ -1,4 +1,4 @@
-//! `kdray bench`: measures, and prints a table; one file a suite.
+//! `kdray bench`: measures and prints a table. Each suite has a file.
 
 mod args;
 mod driver;

@@ -1,4 +1,4 @@
-//! `kdray bench paper`: the paper's table, measured here.
+//! `kdray bench paper`: the table of the paper, measured on this machine.
 
 use std::{path::Path, sync::Arc};
 
@@ -22,7 +22,7 @@ use crate::cli::{
     table::{decimal, table},
 };
 
-/// Each scene at each size, scene by scene.
+/// Draws each scene at each size on the GPU and the CPU, and reports the times.
 pub fn run(args: &PaperArgs) -> Result<(), CliError> {
     let scenes = SCENES.map(|name| args.scenes.join(name).with_extension("toml"));
     args.files.check(&scenes.each_ref().map(|scene| scene.as_path()))?;
@@ -42,7 +42,7 @@ pub fn run(args: &PaperArgs) -> Result<(), CliError> {
         n_cpu_frames: if args.no_cpu { 0 } else { args.cpu_repeat },
         rows: Vec::new(),
     };
-    // One tree for both: the CPU looks at slabs, whatever the device does.
+    // CPU and device use the same tree. If the CPU draws, the tree has slabs, even if the device does not read them.
     let processor = if args.no_cpu { Processor::of(Some(&context)) } else { Processor::Cpu };
     for (name, path) in SCENES.into_iter().zip(&scenes) {
         let (loaded, _) = progress.stage(&format!("loading {}", path.display()), || load(path, processor));

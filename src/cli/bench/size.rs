@@ -1,4 +1,4 @@
-//! `kdray bench size`: cost against size.
+//! `kdray bench size`: build time and time per ray against the number of triangles.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ use crate::cli::{
     table::{decimal, table},
 };
 
-/// Size by size, the least first.
+/// Measures each mesh, the smallest first, and reports.
 pub fn run(args: &SizeArgs) -> Result<(), CliError> {
     args.files.check(&[])?;
     check_traversal(args.accel, args.traversal)?;
@@ -47,7 +47,7 @@ pub fn run(args: &SizeArgs) -> Result<(), CliError> {
         n_times: args.repeat,
         rows: Vec::new(),
     };
-    // A size that is too large for the device leaves the smaller ones' results.
+    // If a mesh is too large for the device, the results of the smaller ones are still reported.
     let done = sizes.into_iter().try_for_each(|n_triangles| {
         report.rows.push(measure(args, context.as_ref(), variant, n_triangles, &progress)?);
         Ok(())
@@ -60,7 +60,8 @@ pub fn run(args: &SizeArgs) -> Result<(), CliError> {
     done.and_then(|()| check_hits(&report))
 }
 
-/// The structure that was asked for; of the kd-tree's traversals the one that was, or that suits the processor.
+/// Returns the user's acceleration structure. For a kd-tree, the traversal is the user's or the one that suits the
+/// processor.
 fn variant(args: &SizeArgs, processor: Processor) -> Variant {
     match args.accel {
         AccelKind::KdTree => Variant::KdTree(args.traversal.unwrap_or_else(|| traversal_by_rule(processor))),
@@ -94,7 +95,8 @@ fn text(report: &Report) -> String {
         ["triangles", report.parts(), "references", "build ms", "primary ns", "shadow ns", "mirror ns", "diffuse ns"];
     text += &table(header, &report.rows.iter().map(cells).collect::<Vec<_>>());
     text += &format!(
-        "\nA rippled knot in a closed room; ns: time of a ray. kd-trees are built on {} threads, grids on the device if there is one.\n",
+        "\nA rippled knot in a closed room; ns: time of a ray. kd-trees are built on {} threads, grids on the \
+         device if there is one.\n",
         report.n_threads
     );
     if let Some(growth) = report.growth() {
@@ -103,7 +105,8 @@ fn text(report: &Report) -> String {
             words.collect::<Vec<_>>().join(", ")
         };
         text += &format!(
-            "From the least to the largest mesh, log N grows {:.2} times, the nodes that a ray visits: {}; its time: {}.\n",
+            "From the least to the largest mesh, log N grows {:.2} times, the nodes that a ray visits: {}; its \
+             time: {}.\n",
             growth.logarithm,
             list(|ray| Some(ray.nodes)),
             list(|ray| ray.time)
@@ -129,7 +132,7 @@ fn cells(row: &Row) -> [String; 8] {
     ]
 }
 
-/// The speed of wrong answers is none.
+/// Fails if more hits differ from the CPU's than rounding explains: the speed of wrong hits has no meaning.
 fn check_hits(report: &Report) -> Result<(), CliError> {
     let Some((row, cost)) = report.first_wrong() else { return Ok(()) };
     Err(CliError::WrongHits(format!(
@@ -154,7 +157,7 @@ mod tests {
 
     use super::*;
 
-    /// Two sizes; a ray takes `ns` of each of them.
+    /// Returns a report of two sizes. `ns` is the time of a ray at each size, nanoseconds.
     fn report(ns: [f64; 2], n_differing: u64) -> Report {
         let row = |n_triangles: usize, ns: f64| Row {
             n_triangles,

@@ -1,4 +1,4 @@
-//! `kdray bench traversal`: every search through the kd-tree and through grids, side by side.
+//! `kdray bench traversal`: compares all search algorithms for kd-trees and grids.
 
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ use crate::cli::{
     table::{decimal, table},
 };
 
-/// Loads the mesh, makes the rays, casts set by set.
+/// Loads the mesh, makes the rays and casts each set of rays with each algorithm.
 pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
     args.files.check(&[&args.mesh])?;
     let progress = Progress::new(false, 7);
@@ -51,7 +51,7 @@ pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
     check_hits(&report)
 }
 
-/// Those asked for, each once; where none is, all but brute force.
+/// Returns the user's variants, each once. Without any, returns all but brute force.
 fn variants(asked: &[Variant]) -> Vec<Variant> {
     if asked.is_empty() {
         return Variant::all();
@@ -114,7 +114,8 @@ fn text(report: &Report) -> String {
         "grazing",
     ];
     text += &table(header, &rows);
-    text += "\nNodes and slabs, or cells; links to parents or neighbours, boxes, triangle tests: the mean of a ray, counted on the CPU.\nDiffering: from the CPU's hits.\n";
+    text += "\nNodes and slabs, or cells; links to parents or neighbours, boxes, triangle tests: the mean of a ray, \
+             counted on the CPU.\nDiffering: from the CPU's hits.\n";
     if report.sets.iter().flat_map(|set| &set.variants).any(|variant| variant.ms.is_none()) {
         text += "This device has no timestamps: speeds are unknown.\n";
     }
@@ -138,7 +139,7 @@ fn cells(set: &SetResult, variant: &VariantResult) -> [String; 12] {
     ]
 }
 
-/// The speed of wrong answers is none.
+/// Fails if more hits differ from the CPU's than rounding explains: the speed of wrong hits has no meaning.
 fn check_hits(report: &Report) -> Result<(), CliError> {
     let Some((set, variant)) = report.first_wrong() else { return Ok(()) };
     Err(CliError::WrongHits(format!(

@@ -1,4 +1,4 @@
-//! The files that a rendering leaves.
+//! The files that `kdray render` writes.
 
 use std::path::{Path, PathBuf};
 
@@ -11,13 +11,13 @@ use kdray::{
 
 use crate::cli::{args::RenderArgs, error::CliError, file_roles::FileRoles};
 
-/// A picture's file and those beside it.
+/// The files of one picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Files {
     pub picture: PathBuf,
-    /// The picture with layers; the picture itself where that is an .exr.
+    /// The .exr file of the layers. It is the picture's own file if that is an .exr.
     layers: Option<PathBuf>,
-    /// The costs in colours.
+    /// The .png file that shows each pixel's traversal cost as a colour.
     heat_map: Option<PathBuf>,
 }
 
@@ -32,18 +32,18 @@ impl Files {
         }
     }
 
-    /// All but the picture.
+    /// Returns the files beside the picture.
     pub fn beside(&self) -> impl Iterator<Item = &PathBuf> {
         self.layers.iter().chain(&self.heat_map).filter(|path| **path != self.picture)
     }
 
-    /// Notes the files as outputs, and refuses those that are read, or written twice.
+    /// Notes the files as outputs. Refuses files that the command also reads, or that it writes twice.
     pub fn note(&self, roles: &mut FileRoles) -> Result<(), CliError> {
         roles.write("--output", &self.picture)?;
         self.beside().try_for_each(|path| roles.write("--aov", path))
     }
 
-    /// Refuses what cannot be written.
+    /// Refuses files that cannot be written.
     pub fn check(&self) -> Result<(), CliError> {
         output::check(&self.picture)?;
         Ok(self.beside().try_for_each(|path| output::check(path))?)
@@ -64,8 +64,8 @@ impl Files {
     }
 }
 
-/// What the command reads and writes, but for the pictures of a path's frames, which are not known yet. Refuses outputs
-/// that are read, or written twice.
+/// Returns the roles of the command's files, without the pictures of a path's frames, which are not known yet.
+/// Refuses outputs that the command also reads, or that it writes twice.
 pub fn roles(args: &RenderArgs) -> Result<FileRoles, CliError> {
     let mut roles = FileRoles::default();
     roles.read_scene("SCENE", &args.scene);
@@ -78,7 +78,7 @@ pub fn roles(args: &RenderArgs) -> Result<FileRoles, CliError> {
     Ok(roles)
 }
 
-/// Refuses targets that cannot be written, as far as they are known before the scene is.
+/// Refuses outputs that cannot be written, as far as they are known before the scene is loaded.
 pub fn check_outputs(args: &RenderArgs) -> Result<(), CliError> {
     if let Some(path) = &args.output {
         Format::of(path)?;
@@ -90,18 +90,19 @@ pub fn check_outputs(args: &RenderArgs) -> Result<(), CliError> {
     Ok([&args.profile, &args.trace].into_iter().flatten().try_for_each(|path| output::check(path))?)
 }
 
-/// The picture's file, or the pattern for those of a path.
+/// Returns the picture's file or, with a path, the pattern of the pictures' files.
 pub fn output_of(args: &RenderArgs) -> PathBuf {
     args.output.clone().unwrap_or_else(|| default_output(&Scene::name_of(&args.scene), args.path.is_some()))
 }
 
-/// A PNG of the scene's name in the working directory.
+/// Returns a .png file in the working directory, named after the scene.
 fn default_output(scene_name: &str, is_numbered: bool) -> PathBuf {
     let stem = output::stem_of(scene_name).replace('#', "-");
     format!("{stem}{}.png", if is_numbered { ".####" } else { "" }).into()
 }
 
-/// The name of a frame's picture: its number in place of the only run of `#`, with as many digits or more.
+/// Returns the file of a frame's picture. The frame's number replaces the pattern's only run of `#` and has at least
+/// as many digits.
 pub fn numbered(pattern: &Path, frame: u32) -> Result<PathBuf, CliError> {
     let refused = |what| {
         let pattern = pattern.display();

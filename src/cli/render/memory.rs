@@ -1,17 +1,17 @@
-//! How much memory a picture takes, asked for before it is allocated.
+//! The memory that a picture takes, checked before it is allocated.
 
 use kdray::{frame::RenderOptions, layout::Feature, util::memory::require};
 
 use crate::cli::error::CliError;
 
-/// Bytes of a pixel's colour as floats.
+/// Bytes of a pixel's radiance as floats.
 const RADIANCE: u64 = size_of::<[f32; 4]>() as u64;
 /// Bytes of a pixel's colour for display.
 const DISPLAY: u64 = size_of::<[u8; 4]>() as u64;
-/// Bytes of a pixel on its way to a PNG: its colour alone, and encoded.
+/// Bytes of a pixel while a PNG is written: its RGB colour and its encoded form.
 const ENCODED: u64 = 6;
 
-/// Refuses a picture that does not fit in memory, with `--cpu` the buffers that it is rendered in included.
+/// Refuses a picture that does not fit in memory. With `--cpu`, the renderer's buffers are counted, too.
 pub fn check_memory(options: &RenderOptions, n_samples: u32, on_cpu: bool) -> Result<(), CliError> {
     let (window, crop) = (options.window(), options.crop_or_whole());
     let n_pixels = |width: u32, height: u32| u64::from(width) * u64::from(height);
@@ -22,8 +22,8 @@ pub fn check_memory(options: &RenderOptions, n_samples: u32, on_cpu: bool) -> Re
     Ok(())
 }
 
-/// Bytes a pixel of the CPU's buffers: the triangle that is seen there, the sample, the sum of samples, the filtered
-/// picture and the picture for display.
+/// Returns the bytes per pixel of the CPU renderer's buffers: the index of the visible triangle, the sample, the sum
+/// of samples, the filtered picture and the picture for display.
 fn rendered_bytes(options: &RenderOptions, n_samples: u32) -> u64 {
     let sums = if n_samples > 1 { RADIANCE } else { 0 };
     size_of::<u32>() as u64 + RADIANCE + sums + RADIANCE + DISPLAY + feature_bytes(options)

@@ -1,4 +1,4 @@
-//! `kdray render`: scene file to pictures.
+//! `kdray render`: renders a scene file to pictures.
 
 mod files;
 mod memory;
@@ -36,7 +36,8 @@ use super::{
     trace::trace_json,
 };
 
-/// Loads, builds, renders, writes and reports. What can be refused is refused before the work that it would waste.
+/// Runs `kdray render`: loads the scene, builds its structure, renders, writes and reports. Arguments, files and
+/// memory are checked before the work that an error would waste.
 pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     args.check()?;
     let roles = roles(args)?;
@@ -106,7 +107,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     context.map_or(Ok(()), |context| report_validation(&context))
 }
 
-/// The scene, and how many milliseconds it took to load it. Warns if nothing lights it.
+/// Loads the scene. Returns it and the loading time in milliseconds. Warns if the scene has no light.
 fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError> {
     let loading = format!("loading {}", args.scene.display());
     let (scene, load_ms) = progress.stage(&loading, || info_span!("load scene").in_scope(|| Scene::load(&args.scene)));
@@ -115,13 +116,14 @@ fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError
     Ok((scene, load_ms))
 }
 
-/// A camera, and where what it sees is written.
+/// A camera, and the files of its picture.
 struct View {
     camera: Camera,
     files: Files,
 }
 
-/// The scene's own view, or one a frame of the path. Refuses those whose files cannot be written, or have another role.
+/// Returns the scene's own view or, with a path, one view per frame. Refuses views whose files cannot be written or
+/// have another role.
 fn views(args: &RenderArgs, scene: &Scene, mut roles: FileRoles) -> Result<Vec<View>, CliError> {
     let output = output_of(args);
     let views = match &args.path {
@@ -136,7 +138,7 @@ fn views(args: &RenderArgs, scene: &Scene, mut roles: FileRoles) -> Result<Vec<V
     Ok(views)
 }
 
-/// One view a frame of the path.
+/// Returns one view per frame of the path.
 fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec<View>, CliError> {
     let path = CameraPath::load(path_file)?;
     let Frames { first, last } =
@@ -154,8 +156,8 @@ fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec
     (first..=last).map(view).collect()
 }
 
-/// Draws all views, as often as asked, and writes each. Gives the profiles, and how many milliseconds it took since
-/// `begin` to have the pictures in memory.
+/// Draws each view `--repeat` times and writes its picture. Returns the frames' profiles, and the time in
+/// milliseconds from `begin` until the pictures were in memory, without the time of writing files.
 fn draw_and_write(
     args: &RenderArgs,
     mut renderer: Renderer,
@@ -165,7 +167,7 @@ fn draw_and_write(
 ) -> Result<(Vec<Profile>, f64), CliError> {
     let n_steps = views.len() as u32 * args.spp * u32::from(args.repeat) * renderer.n_bands();
     let mut steps = progress.steps(message, n_steps);
-    // What is measured is drawn without pauses.
+    // A frame that is measured is drawn without pauses, which would show progress but take time.
     steps.shows_parts &= args.profile.is_none() && args.trace.is_none() && args.repeat == 1;
     let (mut profiles, mut drawing, mut last) = (Vec::new(), Duration::ZERO, begin);
     for view in views {
@@ -183,7 +185,7 @@ fn draw_and_write(
     Ok((profiles, drawing.as_secs_f64() * 1e3))
 }
 
-/// Moves the bar as far as a drawing is.
+/// Moves the progress bar while a frame is drawn.
 struct Bar<'a, 'b>(&'a mut Steps<'b>);
 
 impl Watcher for Bar<'_, '_> {
@@ -200,20 +202,20 @@ impl Watcher for Bar<'_, '_> {
     }
 }
 
-/// Sizes the pool for everything that follows.
+/// Sets the number of threads of rayon's global pool. Without a number, rayon chooses.
 pub(super) fn set_threads(n_threads: Option<u16>) -> Result<(), CliError> {
     let Some(n_threads) = n_threads else { return Ok(()) };
     (rayon::ThreadPoolBuilder::new().num_threads(n_threads.into()).build_global())
         .map_err(|error| CliError::Usage(format!("--threads {n_threads}: {error}")))
 }
 
-/// The frame of median time; the last one where the device has no timestamps.
+/// Returns the frame of median time. Without timestamps, returns the middle one in the order of drawing.
 fn median(mut profiles: Vec<Profile>) -> Profile {
     profiles.sort_by(|a, b| a.frame_ms.partial_cmp(&b.frame_ms).expect("times are numbers"));
     profiles.swap_remove(profiles.len() / 2)
 }
 
-/// Lists what the validation layer said; anything is a failure.
+/// Prints the validation layer's messages. Fails if there is any.
 pub(super) fn report_validation(context: &Context) -> Result<(), CliError> {
     let messages = context.validation_messages();
     for message in &messages {

@@ -1,4 +1,4 @@
-//! How the picture is made.
+//! The panel's controls for the settings of the picture.
 
 use std::fmt::Display;
 
@@ -10,7 +10,7 @@ use crate::{
     frame::{Denoise, Primary, Tonemap, View},
 };
 
-/// The controls; all take effect with the next frame. A grid has no choice of traversals.
+/// Shows the controls. Changes take effect with the next frame. A grid has no choice of traversals.
 pub fn show(ui: &mut Ui, settings: &mut Settings, accel: AccelKind) {
     Grid::new("controls").num_columns(2).spacing([10.0, 3.0]).show(ui, |ui| {
         let Settings { options, max_samples, budget_ms, vsync, view, gain } = settings;
@@ -38,7 +38,7 @@ fn row<R>(ui: &mut Ui, name: &str, control: impl FnOnce(&mut Ui) -> R) {
     ui.end_row();
 }
 
-/// One of several words.
+/// Shows a row in which one of several values is chosen.
 fn choice<T: Copy + PartialEq + Display>(ui: &mut Ui, name: &str, chosen: &mut T, all: &[T]) {
     row(ui, name, |ui| {
         ComboBox::from_id_salt(name).selected_text(chosen.to_string()).show_ui(ui, |ui| {

@@ -1,4 +1,4 @@
-//! GPU time of each pass over the last seconds, stacked, with numbers.
+//! A stacked graph of each pass's GPU time over the last seconds, with a legend of figures.
 
 use egui::{Color32, Pos2, Rect, Sense, Stroke, StrokeKind, Ui, vec2};
 
@@ -7,10 +7,10 @@ use crate::{
     view::history::{FrameRecord, History},
 };
 
-/// Points.
+/// Height of the graph, points.
 const HEIGHT: f32 = 80.0;
 
-/// The graph and its legend.
+/// Shows the graph and its legend.
 pub fn show(ui: &mut Ui, history: &History, newest: &Profile) {
     let passes = passes(newest);
     if passes.is_empty() {
@@ -26,7 +26,7 @@ pub fn show(ui: &mut Ui, history: &History, newest: &Profile) {
     let mut left = area.left();
     for frame in history.frames() {
         let right = x_at(frame.shown_s).max(left);
-        // What was long ago drawn shows as a gap, and is no wider than it took.
+        // A bar is as wide as its frame took. Time in which nothing was drawn stays a gap.
         let busy_ms = frame.busy_ms();
         let begin = x_at(frame.shown_s - busy_ms.max(frame.frame_ms) * 1e-3).max(left);
         let mut bottom = area.bottom();
@@ -55,7 +55,7 @@ fn pass_ms(frame: &FrameRecord, name: &str) -> f64 {
     frame.pass_ms.iter().filter(|(pass, _)| *pass == name).map(|(_, ms)| ms).sum()
 }
 
-/// Every pass of the sample and its colour, in the order of execution.
+/// Returns the name and colour of each timed pass of a sample, in the order of execution.
 fn passes(profile: &Profile) -> Vec<(&'static str, Color32)> {
     let mut names: Vec<&'static str> = Vec::new();
     for pass in profile.passes.iter().filter(|pass| pass.ms.is_some()) {
@@ -71,7 +71,8 @@ fn color(name: &str) -> Color32 {
     Color32::from_rgb(r, g, b)
 }
 
-/// A round number that hardly any frame exceeds, so that one slow frame does not flatten the others.
+/// Returns the milliseconds at the graph's top: the 95th percentile of the samples' GPU time, rounded up to 1, 2 or 5
+/// times a power of ten. One slow frame thus does not flatten the others.
 fn top_ms(history: &History) -> f64 {
     let mut sums: Vec<f64> = history.frames().map(FrameRecord::busy_ms).collect();
     sums.retain(|sum| *sum > 0.0);
@@ -81,7 +82,7 @@ fn top_ms(history: &History) -> f64 {
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|step| step * magnitude).find(|top| *top >= most).unwrap_or(most)
 }
 
-/// Names with the time of the newest sample, milliseconds.
+/// Shows the passes' names with their times in the newest sample, milliseconds.
 fn legend(ui: &mut Ui, newest: &Profile, passes: &[(&'static str, Color32)]) {
     egui::Grid::new("passes").num_columns(4).spacing([8.0, 1.0]).show(ui, |ui| {
         for pair in passes.chunks(2) {

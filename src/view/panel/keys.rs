@@ -1,8 +1,8 @@
-//! The keys and the mouse: a list over the picture, and the line that names the key for it.
+//! The list of keys and mouse actions, and the hint that names the key for the list.
 
 use egui::{Align2, Area, Color32, Frame, Grid, Id, Order, RichText, ScrollArea, Ui, Window, vec2};
 
-/// What the user can press, and what it does. README.md has the same rows.
+/// Keys and mouse actions, each with its effect. README.md has the same rows.
 pub const KEYS: [(&str, &str); 14] = [
     ("left drag, right drag", "go around the target, look around"),
     ("middle drag, Shift + left drag", "move sideways, up and down"),
@@ -20,16 +20,16 @@ pub const KEYS: [(&str, &str); 14] = [
     ("Tab, Esc", "hide the panel, quit"),
 ];
 
-/// Points between what lies over the picture and the window's edges.
+/// Margin between the overlay and the window's edges, points.
 const MARGIN: f32 = 8.0;
-/// Points that the longest line fits into.
+/// Width into which the longest line fits, points.
 const WIDTH: f32 = 640.0;
 
-/// Shows all keys in the middle of the picture; what does not fit can be scrolled to.
+/// Shows all keys in the middle of the picture. The list can be scrolled if it does not fit.
 pub fn show(ui: &Ui, frame: Frame) {
     let room = (ui.ctx().content_rect().size() - vec2(6.0, 6.0) * MARGIN).max(vec2(80.0, 40.0));
     Window::new("Keys")
-        .frame(frame.fill(Color32::from_black_alpha(245))) // it may lie over the panel's text
+        .frame(frame.fill(Color32::from_black_alpha(245))) // nearly opaque, since it may cover the panel's text
         .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
         .order(Order::Foreground)
         .title_bar(false)

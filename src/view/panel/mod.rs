@@ -1,4 +1,4 @@
-//! What lies over the picture: where the time goes, and how the picture is made.
+//! The overlay over the picture: times of the passes, figures, controls and the list of keys.
 
 mod controls;
 mod graph;
@@ -17,71 +17,79 @@ use crate::{
     gpu::MemoryUse,
 };
 
-/// Points.
+/// Width of the panel, points.
 const WIDTH: f32 = 300.0;
 
-/// What the user sets.
+/// Settings that the user can change.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Its size is not the user's: it is the window's.
+    /// Render options. Their size follows the window and is not the user's to set.
     pub options: RenderOptions,
-    /// Samples a pixel at which a picture at rest is done.
+    /// Samples per pixel at which a picture at rest is done.
     pub max_samples: u32,
-    /// Milliseconds a frame while the camera moves.
+    /// Time budget per frame while the camera moves, milliseconds.
     pub budget_ms: f64,
+    /// Whether frames wait for the screen's refresh.
     pub vsync: bool,
+    /// What the window shows of the picture.
     pub view: View,
-    /// Factor on the brightness of views of numbers.
+    /// Factor on the brightness of the views depth, cost and rays.
     pub gain: f32,
 }
 
-/// What lies over the picture.
+/// The parts of the overlay that are shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layers {
+    /// The panel of figures and controls.
     pub panel: bool,
     /// The list of keys.
     pub keys: bool,
-    /// The line that names the key for the list.
+    /// The hint that names the key for the list.
     pub hint: bool,
 }
 
 impl Layers {
-    /// Whether there is anything.
+    /// Returns whether any part is shown.
     pub fn any(self) -> bool {
         self.panel || self.keys || self.hint
     }
 }
 
-/// What the user reads.
+/// The facts that the overlay shows.
 pub struct Facts<'a> {
+    /// The device's name.
     pub device: &'a str,
+    /// The scene and its acceleration structure.
     pub loaded: &'a Loaded,
-    /// Pixels.
+    /// Width and height of the window, pixels.
     pub window: (u32, u32),
-    /// Pixels.
+    /// Width and height of the picture, pixels.
     pub picture: (u32, u32),
-    /// A pixel.
+    /// Samples per pixel so far.
     pub n_samples: u32,
-    /// Samples a pixel at which the view is done.
+    /// Samples per pixel at which the view is done.
     pub n_wanted: u32,
     /// Share of the next sample that is drawn, 0 to 1.
     pub progress: f32,
-    /// World units a second.
+    /// Speed of flight, world units per second.
     pub speed: f32,
-    /// Whether S flies back, rather than saves.
+    /// Whether S flies back rather than saves.
     pub is_flying: bool,
-    /// Whether the picture is to be saved once it is drawn in full.
+    /// Whether the user has asked to save the picture, which happens once it is drawn in full.
     pub is_save_due: bool,
-    /// Of the last frame that was drawn.
+    /// Profile of the last sample that was completed.
     pub profile: &'a Profile,
+    /// Frames of the last seconds.
     pub history: &'a History,
+    /// Device memory by use.
     pub memory: Vec<MemoryUse>,
+    /// The rays of the pixel that was clicked last.
     pub picked: Option<&'a Picked>,
-    /// What went wrong last.
+    /// The last error that has not been settled.
     pub message: Option<&'a str>,
 }
 
-/// Lays out what lies over the picture; changes `settings` as the user does.
+/// Lays out the overlay and applies the user's changes to `settings`.
 pub fn show(ui: &mut Ui, layers: Layers, settings: &mut Settings, facts: &Facts) {
     let style = ui.ctx().global_style();
     let frame = Frame::window(&style)

@@ -1,4 +1,4 @@
-//! Numbers in rows.
+//! Tables of the panel: rays, acceleration structure, memory and the picked pixel.
 
 use egui::{Grid, Ui};
 
@@ -11,7 +11,7 @@ use crate::{
     },
 };
 
-/// Rows of words under each other.
+/// Shows rows of aligned cells.
 pub fn grid<const N: usize>(ui: &mut Ui, name: &str, rows: impl IntoIterator<Item = [String; N]>) {
     Grid::new(name).num_columns(N).spacing([10.0, 1.0]).show(ui, |ui| {
         for row in rows {
@@ -23,7 +23,7 @@ pub fn grid<const N: usize>(ui: &mut Ui, name: &str, rows: impl IntoIterator<Ite
     });
 }
 
-/// Shows rays and their speed, a bounce a row, and all shadow rays in one.
+/// Shows the numbers of rays and their rates: one row per bounce, and one row for all shadow rays.
 pub fn rays(ui: &mut Ui, profile: &Profile) {
     grid(ui, "rays", ray_rows(profile));
 }
@@ -45,6 +45,7 @@ fn ray_rows(profile: &Profile) -> Vec<[String; 5]> {
     std::iter::once(head).chain(rows).chain([shadow]).collect()
 }
 
+/// Returns million rays per second, or a dash if the time is unknown or 0.
 fn rate(n_rays: u64, ms: Option<f64>) -> String {
     match ms {
         Some(ms) if ms > 0.0 => format!("{:.2}", n_rays as f64 / ms / 1e3),
@@ -52,7 +53,7 @@ fn rate(n_rays: u64, ms: Option<f64>) -> String {
     }
 }
 
-/// The acceleration structure's figures.
+/// Shows the figures of the acceleration structure.
 pub fn accel(ui: &mut Ui, loaded: &Loaded) {
     let statistics = &loaded.statistics;
     let size = ("size", bytes(statistics.bytes()));
@@ -61,7 +62,7 @@ pub fn accel(ui: &mut Ui, loaded: &Loaded) {
     grid(ui, "tree", rows.map(|(name, value)| [name.to_owned(), value]));
 }
 
-/// The device's memory by what it holds.
+/// Shows the device's memory by use.
 pub fn memory(ui: &mut Ui, memory: &[MemoryUse]) {
     let all = MemoryUse { name: "all".to_owned(), bytes: memory.iter().map(|used| used.bytes).sum() };
     grid(ui, "memory", memory.iter().chain([&all]).map(|used| [used.name.clone(), bytes(used.bytes)]));
@@ -75,7 +76,7 @@ fn bytes(n: u64) -> String {
     }
 }
 
-/// The rays of a pixel.
+/// Shows the rays of the picked pixel.
 pub fn picked(ui: &mut Ui, picked: &Picked) {
     ui.monospace(format!("pixel {}, {}", picked.pixel.x, picked.pixel.y));
     for ray in &picked.rays {
