@@ -1,4 +1,4 @@
-//! `kdray bench`: the rays that it casts, the checks that it makes, and the files that it writes.
+//! Tests the rays that `kdray bench` casts, the checks that it makes and the files that it writes.
 
 mod support;
 
@@ -29,7 +29,7 @@ use tempfile::TempDir;
 const SIZE: (u32, u32) = (33, 23);
 const N_PIXELS: usize = 33 * 23;
 
-/// A torus as an OBJ file.
+/// Writes a torus as an OBJ file.
 fn write_mesh(directory: &Path) -> PathBuf {
     let triangles = torus(24, 12);
     let corners = triangles.iter().flat_map(|t| [t.v0, t.v1, t.v2]);
@@ -98,10 +98,10 @@ fn primary_rays_go_tile_by_tile() {
     let pixels: Vec<_> = rays(&sets, RayKind::Primary).iter().map(|ray| ray.pixel_ix).collect();
     let mut first_tile = pixels[..64].to_vec();
     first_tile.sort_unstable();
-    // In the middle one of three bands.
+    // The first tile is in the middle one of three bands.
     let first = 8 * SIZE.0;
     assert!(first_tile.into_iter().eq((0..8).flat_map(|y| (0..8).map(move |x| first + y * SIZE.0 + x))));
-    // A Z-curve within the tile.
+    // Pixels within the tile follow a Z-order curve.
     let [right, down] = [1, SIZE.0];
     assert_eq!(pixels[..8], [0, 1, down, right + down, 2, 3, 2 + down, 3 + down].map(|pixel| first + pixel));
 }
@@ -160,7 +160,7 @@ fn a_wrong_tree_is_noticed() {
     let right = measured(&stage);
     assert!(right.n_hits == N_PIXELS && right.variants[0].difference == Difference::default());
     let seen = closest_hits(&stage, &sets[0].rays)[N_PIXELS / 2].triangle_ix;
-    // A tree leaves out triangles that are not finite.
+    // The build of a tree skips triangles that are not finite.
     let mut without = stage.scene().triangles.clone();
     without[seen as usize].v0 = Vec3::NAN;
     let options = BuildOptions::default();
@@ -177,7 +177,7 @@ fn kdray(directory: &Path, arguments: &[&str]) -> Output {
     command.current_dir(directory).arg("bench").args(arguments).stdin(Stdio::null()).output().unwrap()
 }
 
-/// Runs a suite; returns its table, JSON and SVG.
+/// Runs a suite. Returns its table, JSON and SVG.
 fn measure(directory: &Path, arguments: &[&str]) -> (String, Value, String) {
     let output = kdray(directory, &[arguments, &["--json", "x.json", "--svg", "x.svg"]].concat());
     assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
@@ -186,7 +186,7 @@ fn measure(directory: &Path, arguments: &[&str]) -> (String, Value, String) {
     (String::from_utf8(output.stdout).unwrap(), json, svg)
 }
 
-/// Fails unless every element that is opened is closed, in order, and no text has a bare `&` or `<`.
+/// Fails unless every element is closed in the right order, and no text has a bare `&` or `<`.
 fn check_xml(svg: &str) {
     let mut open = Vec::new();
     for tag in svg.split('<').skip(1) {
@@ -231,7 +231,8 @@ fn traversal_measures_every_variant_on_every_set() {
                 let fewest = if name.starts_with("grid") { 0.5 } else { 1.0 };
                 assert_eq!(steps["nodes"].as_f64() >= Some(fewest), name != "brute", "{name}: {steps}");
                 assert!(steps["triangles"].as_f64() > Some(0.0), "{name}: {steps}");
-                // The mask keeps the newest pending cells; a mesh so small has no more.
+                // `mask` stores only the newest pending cells. This mesh is so small that no ray has more of them, so
+                // that no links are read.
                 let has_links = ["mask-boxes", "backtrack", "ropes"].contains(&name);
                 assert_eq!(steps["links"].as_f64() > Some(0.0), has_links, "{name}: {steps}");
                 let has_boxes = ["mask-boxes", "backtrack"].contains(&name);

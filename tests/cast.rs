@@ -1,4 +1,4 @@
-//! Casts on the device, under the validation layer, and on the CPU, against every triangle of the mesh.
+//! Compares casts on the device, under the validation layer, and on the CPU with brute force over all triangles.
 
 mod support;
 
@@ -24,7 +24,7 @@ use support::{
 
 const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
 
-/// A device under validation, which must have had nothing to say when the test ends.
+/// A device under validation. When it is dropped, there must be no validation messages.
 struct Device(Arc<Context>);
 
 impl Device {
@@ -32,7 +32,7 @@ impl Device {
         Self(Context::new(&ContextOptions::new(None, true)).expect("a device with validation"))
     }
 
-    /// One that runs the kernels as a GPU of so many lanes, whatever it is.
+    /// Opens a device that runs kernels as a GPU of `n_lanes` lanes does, whatever it is.
     fn with_lanes(n_lanes: u32) -> Self {
         Self(with_lanes(n_lanes))
     }
@@ -41,13 +41,13 @@ impl Device {
         Caster::new(&self.0, world.geometry(), traversal).expect("a caster")
     }
 
-    /// Rays that may differ from the CPU's: none where the arithmetic is exactly the CPU's; elsewhere divisions are
-    /// 2.5 units in the last place off, and few rays at edges go another way.
+    /// Returns the number of rays that may differ from the CPU's. It is 0 where the arithmetic is exactly the CPU's.
+    /// Elsewhere divisions are 2.5 units in the last place off, and a few rays at edges hit other triangles.
     fn n_outliers(&self, n_rays: usize) -> usize {
         if self.0.is_software() { 0 } else { n_rays.div_ceil(500) }
     }
 
-    /// Ok where hits are as expected.
+    /// Succeeds if the hits are as expected.
     fn agree(&self, expected: &[Hit], found: &[Hit]) -> Result<(), String> {
         if self.0.is_software() {
             return compare::exact(expected, found);
@@ -64,12 +64,12 @@ impl Drop for Device {
     }
 }
 
-/// A ray of the traversal's tests, with a direction of another length.
+/// Returns a ray to cast whose direction is `scale` times as long as that of `ray`.
 fn scaled(ray: &PathRay, t_min: f32, scale: f32) -> Ray {
     Ray { origin: ray.origin, t_min, direction: ray.direction * scale, t_max: ray.t_max / scale }
 }
 
-/// Nasty rays with directions of all lengths, a fourth of them from behind their origins on or from before it.
+/// Returns nasty rays with directions of all lengths. A fourth of them begin behind their origins or before them.
 fn some_rays(world: &MeshWithTree, n: usize, scale_log2: RangeInclusive<f32>) -> Vec<Ray> {
     let some_ray = |i: usize| {
         let mut random = Random(i as u64);
@@ -81,7 +81,7 @@ fn some_rays(world: &MeshWithTree, n: usize, scale_log2: RangeInclusive<f32>) ->
     (0..n).map(some_ray).collect()
 }
 
-/// Without the tree, and with the direction as it is.
+/// Finds the hit without the tree, and with the direction as it is.
 fn by_brute_force(world: &MeshWithTree, cast: &Ray) -> Hit {
     let ray = PathRay { t_max: cast.t_max, ..ray(cast.origin, cast.direction) };
     let hit = world.by_brute_force(&ray, cast.t_min);
@@ -92,13 +92,13 @@ fn all_by_brute_force(world: &MeshWithTree, rays: &[Ray]) -> Vec<Hit> {
     rays.par_iter().map(|ray| by_brute_force(world, ray)).collect()
 }
 
-/// The same triangle's, within rounding, in whatever unit t is.
+/// Tells whether the hits are of the same triangle and equal within rounding, in whatever unit t is.
 fn is_close(a: &Hit, b: &Hit) -> bool {
     let unit = |hit: &Hit| Hit { t: hit.t / a.t, ..*hit };
     a == b || (a.triangle_ix == b.triangle_ix && compare::hits(0, &[unit(a)], &[unit(b)]).is_ok())
 }
 
-/// Whether rays hit anything, by the hits of an any-hit query.
+/// Returns whether each ray hits anything.
 fn occluded(hits: &[Hit]) -> Vec<bool> {
     hits.iter().map(|hit| hit.triangle_ix != NO_TRIANGLE).collect()
 }
@@ -106,7 +106,7 @@ fn occluded(hits: &[Hit]) -> Vec<bool> {
 fn check(device: &Device, world: &MeshWithTree, rays: &[Ray]) {
     let all_expected = all_by_brute_force(world, rays);
     for &traversal in Traversal::ALL {
-        // The default one is asked more than the others, which have their own tests.
+        // The default traversal is tested with more rays than the others, which have their own tests.
         let n = if traversal == Traversal::Mask { rays.len() } else { rays.len() / 20 };
         let (rays, expected) = (&rays[..n], &all_expected[..n]);
         let n_outliers = device.n_outliers(n);
@@ -123,7 +123,7 @@ fn check(device: &Device, world: &MeshWithTree, rays: &[Ray]) {
     }
 }
 
-/// Of all shapes, sizes and places.
+/// Returns meshes of all shapes, sizes and places.
 fn worlds() -> impl Iterator<Item = MeshWithTree> {
     let meshes = [
         meshes::torus(40, 20),
@@ -149,7 +149,7 @@ fn finds_what_brute_force_finds() {
 #[test]
 fn lanes_apart_find_the_same() {
     let device = Device::with_lanes(5000);
-    // Some of them: a software driver takes long to make the kernels.
+    // Only some meshes are tested, since a software driver takes long to compile the kernels.
     for world in worlds().step_by(3) {
         check(&device, &world, &some_rays(&world, 4000, -20.0..=20.0));
     }
@@ -160,14 +160,14 @@ fn a_mask_of_two_words_finds_the_same() {
     let world = chain(KD_MAX_DEPTH - 2);
     assert!(world.tree().depth() > KD_WORD_DEPTH);
     for device in [Device::new(), Device::with_lanes(5000)] {
-        // Towards the chain's root every level is pending.
+        // For rays towards the chain's root, every level is pending.
         check(&device, &world, &some_rays(&world, 4000, 0.0..=0.0));
     }
 }
 
 #[test]
 fn any_number_of_rays_in_batches_of_any_size() {
-    // Two and more lanes a ray, and one.
+    // First with two or more lanes for each ray, then with one.
     any_number_on(&Device::with_lanes(2000));
     any_number_on(&Device::new());
 }
@@ -188,7 +188,7 @@ fn any_number_on(device: &Device) {
     }
 }
 
-/// The same caster with more rays, fewer, other ones: nothing is left of the cast before.
+/// The same caster casts more rays, fewer, and other ones. Nothing of the previous cast remains.
 #[test]
 fn casts_follow_one_another() {
     let device = Device::new();
@@ -215,7 +215,7 @@ fn repetitions_are_timed_one_by_one() {
     assert_eq!(caster.cast(&[], Query::Closest, 3).expect("a cast").gpu_ms, Some(vec![0.0; 3]));
 }
 
-/// The interval holds its far end and not its near one, to the last bit where the origin is not moved.
+/// The interval contains its far end and not its near one, to the last bit if the origin is not moved.
 #[test]
 fn the_interval_s_ends_are_exact() {
     let device = Device::new();
@@ -247,7 +247,7 @@ fn the_interval_s_ends_are_exact() {
     assert!(empty.iter().all(|hit| *hit == MISS));
 }
 
-/// A direction of any length that a float holds without denormals.
+/// A direction may have any length that a float holds without denormals.
 #[test]
 fn the_direction_s_length_is_the_unit_of_t() {
     let device = Device::new();

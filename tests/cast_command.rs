@@ -1,4 +1,4 @@
-//! `kdray cast` as its users meet it: files in, files out, exit codes, one-line errors.
+//! Tests `kdray cast`: input files, output files, exit codes and one-line errors.
 
 mod support;
 
@@ -14,12 +14,12 @@ use support::command::{cornell, fail, kdray, names, stderr, stdout, succeed};
 use tempfile::TempDir;
 use zip::ZipArchive;
 
-/// A square at z = 0 of two triangles that face +z, and one above it that faces -z.
+/// A square at z = 0 of two triangles that face +z, and above it, at z = 2, a lid of one triangle that faces -z.
 const MESH: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 2\nv 0 1 2\nv 1 0 2\n\
                     o square\nf 1 2 3\nf 1 3 4\no lid\nf 5 6 7\n";
 const MISS: u32 = u32::MAX;
 
-/// Rows of an array of rays as NumPy saves them.
+/// Writes rows of an array of rays in NumPy's format.
 fn save<const N: usize>(path: &Path, rays: &[[f32; N]]) {
     save_as(path, &[rays.len() as u64, N as u64], npyz::Order::C, rays.as_flattened());
 }
@@ -32,7 +32,7 @@ fn save_as<T: npyz::AutoSerialize + npyz::Serialize>(path: &Path, shape: &[u64],
     array.finish().unwrap();
 }
 
-/// Shape and elements of an array of the archive.
+/// Returns the shape and the elements of an array in the archive.
 fn load<T: npyz::Deserialize>(path: &Path, name: &str) -> (Vec<u64>, Vec<T>) {
     let mut archive = ZipArchive::new(BufReader::new(File::open(path).unwrap())).unwrap();
     let array = NpyFile::new(archive.by_name(&format!("{name}.npy")).unwrap()).unwrap();
@@ -44,15 +44,15 @@ fn arrays(path: &Path) -> Vec<String> {
     archive.file_names().map(|name| name.unwrap().into_owned()).collect()
 }
 
-/// A directory with the mesh in it.
+/// Creates a directory that holds the mesh.
 fn with_mesh() -> TempDir {
     let directory = TempDir::new().unwrap();
     fs::write(directory.path().join("mesh.obj"), MESH).unwrap();
     directory
 }
 
-/// Down from above the lid, from below it, from beside; twice as long a direction; up to before and to behind the
-/// square; no ray.
+/// Rays that point down: from above the lid; from below the lid; from beside the square; with a direction of length
+/// 2; with a `t_max` above the square; with a `t_min` below the lid. The last ray is invalid: its direction is 0.
 const RAYS: [[f32; 8]; 7] = {
     let inf = f32::INFINITY;
     [
@@ -106,7 +106,7 @@ fn any_says_what_is_occluded() {
     }
 }
 
-/// Six columns are eight with t from 0 to infinity; a scene is a mesh, too; no rays are rays.
+/// Six columns mean t from 0 to infinity. The mesh may be a scene file. The file of rays may be empty.
 #[test]
 fn rays_of_six_columns_and_none() {
     let directory = TempDir::new().unwrap();
@@ -172,7 +172,7 @@ fn usage_mistakes_are_refused() {
     assert!(names(directory.path()).is_empty());
 }
 
-/// A header as `numpy` writes it, and what follows it.
+/// Returns a .npy file of a header, as `numpy` writes it, and data.
 fn with_header(header: &str, data: &[u8]) -> Vec<u8> {
     let size = (header.len() as u16).to_le_bytes();
     [b"\x93NUMPY\x01\x00", &size[..], header.as_bytes(), data].concat()
@@ -263,7 +263,7 @@ mod unix {
         assert_eq!(fs::read(directory.path().join("x.npz")).unwrap(), b"old");
     }
 
-    /// Rays may come from a pipe, hits may go to one.
+    /// Rays can be read from a pipe, and hits can be written to one.
     #[test]
     fn pipes() {
         let directory = with_mesh();
@@ -283,7 +283,7 @@ mod unix {
     }
 }
 
-/// The layer's advice on best practices, asked for by environment, stands in for a fault.
+/// The validation layer's best-practice messages, enabled by an environment variable, stand in for an error.
 #[test]
 fn a_validation_message_fails() {
     let directory = with_mesh();

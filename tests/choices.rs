@@ -1,4 +1,4 @@
-//! What is chosen and why: by times that a test makes up, by files that it spoils, and by a real measurement.
+//! Tests what is chosen and why: with invented times, with spoilt cache files, and with a real measurement.
 
 mod support;
 
@@ -26,7 +26,7 @@ use tempfile::TempDir;
 
 const RULE: Traversal = Traversal::OF_GPUS;
 
-/// A device that exists nowhere.
+/// Returns the description of a device that does not exist.
 fn device() -> DeviceInfo {
     DeviceInfo {
         index: 0,
@@ -43,7 +43,7 @@ fn key() -> Key {
     Key::new(&device(), &meshes::torus(40, 20), &AccelOptions::KdTree(BuildOptions::default()))
 }
 
-/// Enough rays for all of them, and for a measurement.
+/// Returns the candidates of a run with enough rays for all traversals and for a measurement.
 fn candidates() -> Candidates<Traversal> {
     Candidates::of_traversals(1600, u64::MAX).expect("enough triangles")
 }
@@ -52,13 +52,13 @@ fn timings(mask: f64, stack: f64, ropes: f64) -> Timings {
     [(Traversal::Mask, mask), (Traversal::Stack, stack), (Traversal::Ropes, ropes)].into_iter().collect()
 }
 
-/// What is chosen where the traversals take so long.
+/// Returns what is chosen if a measurement gives these times.
 fn choose(cache: &Cache, key: &Key, measured: Option<Timings>) -> Chosen<Traversal> {
     let measure = |_: &[Traversal]| Ok::<_, Infallible>(measured);
     candidates().choose(cache, key, RULE, measure).unwrap().0
 }
 
-/// What is chosen where nothing may be measured any more.
+/// Returns what is chosen where a measurement is an error.
 fn choose_again(cache: &Cache, key: &Key, candidates: &Candidates<Traversal>) -> Chosen<Traversal> {
     let measure = |_: &[Traversal]| -> Result<_, Infallible> { panic!("it was measured before, or must not be") };
     candidates.choose(cache, key, RULE, measure).unwrap().0
@@ -68,7 +68,7 @@ fn chosen(value: Traversal, by: Reason) -> Chosen<Traversal> {
     Chosen { value, by }
 }
 
-/// The only file in a cache.
+/// Returns the only file in a cache.
 fn only_file(folder: &TempDir) -> PathBuf {
     let mut files = fs::read_dir(folder).unwrap();
     let file = files.next().expect("a file").unwrap().path();
@@ -112,7 +112,7 @@ fn what_was_measured_once_decides_in_later_runs() {
         let found = choose_again(&Cache::at(&below), &key(), &candidates());
         assert_eq!(found, chosen(Traversal::Ropes, Reason::Cached));
     }
-    // One frame pays for no measurement and for no ropes, but an earlier run has paid.
+    // One frame pays neither for a measurement nor for ropes, but an earlier run has paid.
     let few = Candidates::of_traversals(1600, 1 << 20).expect("enough triangles");
     assert!(!few.may_measure && !few.methods.contains(&Traversal::Ropes));
     assert_eq!(choose_again(&cache, &key(), &few), chosen(Traversal::Stack, Reason::Cached));
@@ -184,14 +184,14 @@ fn small_scenes_and_short_runs_are_not_measured() {
     assert_eq!(Candidates::of_traversals(999, u64::MAX), None);
     let may_measure =
         |n_triangles, n_rays| Candidates::of_traversals(n_triangles, n_rays).expect("enough triangles").may_measure;
-    // A frame of 1024x768 with three lights, and 256 samples of it.
+    // The rays of a frame of 1024x768 with three lights. The long run has 256 samples of it.
     let frame = 1024 * 768 * 8;
     assert!(!may_measure(11_141, frame) && !may_measure(872_870, frame));
     assert!(may_measure(11_141, 256 * frame) && may_measure(872_870, 256 * frame));
     assert!(!may_measure(10_000_000, 256 * frame));
 }
 
-/// A knot of some thousand triangles.
+/// Returns a torus of some thousand triangles.
 fn scene() -> FlatScene {
     let mut scene = scenes::empty();
     scenes::add(&mut scene, meshes::torus(80, 40), scenes::diffuse(Vec3::ONE));
@@ -209,7 +209,7 @@ fn hits(context: &std::sync::Arc<kdray::gpu::Context>, world: &World, by: Traver
     bytemuck::cast_slice(&caster.cast(&rays, Query::Closest, 1).expect("a cast").hits).to_vec()
 }
 
-/// A software driver that is taken for a GPU measures as one; whatever it finds, the hits are the same.
+/// A software driver that is treated as a GPU measures as a GPU. Whatever it finds, the hits are the same.
 #[test]
 fn a_measurement_changes_no_bit_and_is_kept() {
     let (scene, folder, context) = (scene(), TempDir::new().unwrap(), with_lanes(5000));
@@ -238,13 +238,14 @@ fn a_measurement_changes_no_bit_and_is_kept() {
     assert_eq!(second.traversal_ns, first.traversal_ns);
     let pinned = Request { traversal: Some(Traversal::Restart), ..Request::default() };
     assert_eq!(methods(pinned, window).traversal, chosen(Traversal::Restart, Reason::Pinned));
-    // What rays cost depends on the traversal.
+    // What rays cost depends on the traversal, so the rule decides.
     let costs = Workload { shows_costs: true, ..window };
     assert_eq!(methods(Request::default(), costs).traversal, chosen(RULE, Reason::Rule));
     assert_eq!(context.validation_messages(), Vec::<String>::new());
 }
 
-/// Rasterized by kernels or traced, primary rays hit the same, unless the camera is far away: then a rule decides.
+/// Primary rays have the same hits whether kernels rasterize them or trace them, unless the camera is far away. Then
+/// a rule decides.
 #[test]
 fn primary_rays_are_measured_where_that_changes_no_bit() {
     let (scene, folder, context) = (scene(), TempDir::new().unwrap(), with_lanes(5000));
@@ -291,7 +292,7 @@ fn nothing_is_measured_where_the_cpu_runs_the_kernels() {
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
 }
 
-/// Triangles in another order make another scene: ids differ.
+/// Triangles in another order are another scene, because their ids differ.
 #[test]
 fn keys_see_the_order_of_triangles() {
     let triangles: Vec<Triangle> = meshes::torus(40, 20);

@@ -1,4 +1,4 @@
-//! The command as its users meet it: exit codes, one-line errors, files, closed pipes.
+//! Tests the `kdray` command: exit codes, one-line errors, files and closed pipes.
 
 mod support;
 
@@ -185,7 +185,7 @@ fn inspect_describes_grids() {
     }
 }
 
-/// Grids give the kd-tree's picture, and report no traversal.
+/// Grids give the same picture as the kd-tree. Their reports name no traversal.
 #[test]
 fn render_takes_grids() {
     let directory = TempDir::new().unwrap();
@@ -208,7 +208,7 @@ fn render_takes_grids() {
     }
 }
 
-/// Renders Cornell's box small, in a directory.
+/// Renders a small picture of the Cornell box in a directory.
 fn render_small(directory: &Path, more: &[&str]) -> Output {
     let scene = cornell();
     succeed(directory, &[&["render", &scene, "--size", "64x48"], more].concat())
@@ -263,7 +263,7 @@ fn the_validation_layer_has_nothing_to_say() {
     render_small(directory.path(), &["--validate", "-o", "x.png"]);
 }
 
-/// The layer's advice on best practices, asked for by environment, stands in for a fault.
+/// The validation layer's best-practice messages, enabled by an environment variable, stand in for an error.
 #[test]
 fn a_validation_message_is_listed_and_fails() {
     let directory = TempDir::new().unwrap();
@@ -284,7 +284,7 @@ mod unix {
 
     use super::*;
 
-    /// Runs the command from a shell, as "$@", with the shell's own ways of closing and filling things up.
+    /// Runs a shell script in which "$@" is the command. The script can close pipes and limit the size of files.
     fn shell(directory: &Path, script: &str, arguments: &[&str]) -> Output {
         let mut command = Command::new("bash");
         command.args(["-c", &format!("set -o pipefail; {script}"), "bash", env!("CARGO_BIN_EXE_kdray")]);
@@ -320,7 +320,7 @@ mod unix {
         fs::write(directory.path().join("x.exr"), "old").unwrap();
         symlink("/dev/full", directory.path().join("full.png")).unwrap();
         let scene = cornell();
-        // A limit on the size of files stands in for the full disk, without privileges.
+        // A limit on the size of files simulates a full disk without privileges.
         for (limit, path) in [("ulimit -f 8", "x.exr"), ("ulimit -f 8", "new.exr"), ("true", "full.png")] {
             let arguments = ["render", &scene, "--cpu", "-q", "--size", "256x256", "-o", path];
             let output = shell(directory.path(), &format!("{limit}; exec \"$@\""), &arguments);

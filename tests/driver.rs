@@ -1,5 +1,5 @@
-//! `kdray bench driver`: contenders take turns on the device under the validation layer, their differences are counted,
-//! and a device without ray tracing is told so. Where the device has it, the suite itself runs.
+//! Tests `kdray bench driver` under the validation layer: contenders take turns on the device, their differences are
+//! counted, and a device without ray tracing is refused. If the device has ray tracing, the suite itself runs.
 
 mod support;
 
@@ -44,13 +44,13 @@ fn stage() -> Stage {
     Stage::in_room(scenes::mixed(), SIZE, &BuildOptions::default())
 }
 
-/// A kernel, and the tree that it walks.
+/// A kernel, and the tree that it searches.
 struct Walker {
     kernel: Kernel,
     _tree: AccelBuffers,
 }
 
-/// A stage's kernel on the rays of a set.
+/// Returns a kernel that casts the rays of a set into a stage's scene.
 fn walker(context: &Arc<Context>, stage: &Stage, set: &RaySet, traversal: Traversal) -> Box<dyn Contender> {
     let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
     let tree = AccelBuffers::new(context, stage.world.geometry()).expect("a tree");
@@ -82,7 +82,7 @@ impl Contender for Walker {
     }
 }
 
-/// Records what another does, but for its work.
+/// A contender that does no work of its own and otherwise behaves as another one.
 struct Idle(Box<dyn Contender>);
 
 impl Contender for Idle {
@@ -98,7 +98,7 @@ impl Contender for Idle {
     }
 }
 
-/// Kernels on the same set stand in for the driver and its rivals.
+/// Runs two kernels on the same set of rays, in place of the driver and its rival.
 fn trials(stage: &Stage, rivals: &Stage, set: &RaySet) -> Vec<Trial> {
     let context = context();
     let contenders =
@@ -133,7 +133,8 @@ fn contenders_are_timed_and_agree() {
 #[test]
 fn a_wrong_tree_is_noticed() {
     let (stage, mut wrong) = (stage(), stage());
-    // The tree has triangles of the mesh where the walls are: rays that should hit them miss or hit elsewhere.
+    // The tree is built with triangles of the mesh in place of the walls, so that rays that should hit the walls miss
+    // or hit elsewhere.
     let first_wall = wrong.scene().triangles.len() - 12;
     let mut swapped = wrong.scene().triangles.clone();
     (0..12).for_each(|i| swapped.swap(i, first_wall + i));
@@ -153,7 +154,7 @@ fn a_contender_that_writes_nothing_is_noticed() {
     for set in &ray_sets(&stage) {
         let mut contenders = [walker(&context, &stage, set, Traversal::Mask)];
         let right = hold(&context, &contenders, 1, |_| Ok(())).expect("a contest").remove(0).hits;
-        // Right hits stand in the buffer.
+        // The buffer holds the right hits of the previous run.
         contenders = contenders.map(|walker| Box::new(Idle(walker)) as Box<dyn Contender>);
         let idle = hold(&context, &contenders, 0, |_| Ok(())).expect("a contest").remove(0).hits;
         let apart = Apart::of(set.kind, &right, &idle);
@@ -181,7 +182,7 @@ fn rasterized_primary_rays_are_timed() {
     assert_eq!(context.validation_messages(), Vec::<String>::new());
 }
 
-/// A box as a scene file.
+/// Writes a scene file of a box.
 fn write_scene(directory: &Path) {
     let scene = "[[mesh]]\ngenerator = \"box\"\nsize = [1.0, 1.0, 1.0]\n";
     fs::write(directory.join("box.toml"), scene).unwrap();

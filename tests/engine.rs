@@ -1,4 +1,4 @@
-//! The engine: what it draws and casts, by itself, on a device and on the CPU.
+//! Tests what the engine draws and casts with its own choices, on a device and on the CPU.
 
 mod support;
 
@@ -46,7 +46,7 @@ fn an_engine_renders_and_casts_alike_on_device_and_cpu() {
     assert_eq!(context.validation_messages(), Vec::<String>::new());
 }
 
-/// An engine's own choice of tree changes no hit.
+/// The engine's choice of tree changes no hit.
 #[test]
 fn trees_of_either_kind_give_the_same_hits() {
     let scene = scenes::mixed();

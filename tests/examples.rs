@@ -1,4 +1,4 @@
-//! The examples run, and show what they should.
+//! Runs the examples, and tests that they show what they should.
 
 mod support;
 
@@ -7,7 +7,7 @@ use std::{path::PathBuf, process::Command};
 use support::command::{shipped, succeed};
 use tempfile::TempDir;
 
-/// Runs an example, which `cargo test` builds unless it is told to run certain tests only. Gives what it prints.
+/// Runs an example and returns what it prints. `cargo test` builds the examples, unless it runs only certain tests.
 fn run(example: &str, arguments: &[&str]) -> String {
     let folder = PathBuf::from(env!("CARGO_BIN_EXE_kdray")).with_file_name("examples");
     let output = Command::new(folder.join(example)).args(arguments).output().expect("the example runs");
@@ -26,7 +26,7 @@ fn render_writes_the_picture_that_the_command_writes() {
     assert!(bytes("example.png") == bytes("command.png"));
 }
 
-/// The box is open in front: its five walls fill the picture but for its corners.
+/// The box is open in front. Its five walls fill the picture but for the corners.
 #[test]
 fn cast_draws_the_materials_that_the_camera_sees() {
     let printed = run("cast", &[&shipped("cornell.toml")]);
@@ -37,7 +37,7 @@ fn cast_draws_the_materials_that_the_camera_sees() {
     assert_eq!(rows[0][0], ' ', "{printed}");
 }
 
-/// Runs an example under the validation layer with synchronization validation, which must have nothing to say.
+/// Runs an example under the validation layer with synchronization validation. There must be no messages.
 fn run_validated(example: &str, arguments: &[&str]) -> String {
     let folder = PathBuf::from(env!("CARGO_BIN_EXE_kdray")).with_file_name("examples");
     let output = Command::new(folder.join(example))
@@ -62,7 +62,7 @@ fn a_program_with_a_device_of_its_own_gets_the_picture_that_the_command_writes()
     assert!(pixels("example.png") == pixels("command.png"));
 }
 
-/// The box is open in front.
+/// The box is open in front, so not all rays hit it.
 #[test]
 fn a_program_casts_in_its_own_command_buffer() {
     let printed = run_validated("record_cast", &[&shipped("cornell.toml")]);

@@ -1,4 +1,4 @@
-//! Outputs that are something else, too: another output, or a file that is read.
+//! Tests that an output is refused if another output or a file that is read has the same path.
 
 mod support;
 
@@ -9,7 +9,8 @@ use tempfile::TempDir;
 
 const MESH: &str = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n";
 
-/// A scene with a mesh and its library, in a folder `in`, to which `link` leads; and rays beside it.
+/// Creates a scene with a mesh and its material library in a folder `in`, a link `link` to that folder, and rays and
+/// a camera path beside it.
 fn with_scene() -> TempDir {
     let directory = TempDir::new().unwrap();
     let path = |name: &str| directory.path().join(name);
@@ -28,7 +29,8 @@ fn contents(directory: &Path) -> Vec<Vec<u8>> {
         .to_vec()
 }
 
-/// Each is refused with exit code 2 and a line that has the words, before anything is read or written.
+/// Asserts that each command is refused with exit code 2 and an error line that contains the words, before any file
+/// is read or written.
 fn assert_refused(directory: &Path, cases: &[(&[&str], &str)]) {
     let (names_before, before) = (names(directory), contents(directory));
     for (arguments, words) in cases {

@@ -1,4 +1,5 @@
-//! Tests that the search through a grid finds what a test of every triangle finds, for rays on which traversals fail.
+//! Tests that the search through a grid finds the hits of a test of every triangle, for rays on which traversals may
+//! fail.
 
 mod support;
 
@@ -38,8 +39,8 @@ fn traced<const ANY_HIT: bool>(inputs: &KernelInputs, rays: &[PathRay]) -> Vec<H
     rays.par_iter().map(hit).collect()
 }
 
-/// Returns a ray that starts in one to three planes between cells. Most of these rays also lie in the plane, or in the
-/// line where two planes meet, or almost do so.
+/// Returns a ray that starts in one to three planes between cells. Most of these rays also lie in the plane, or in
+/// the line where two planes meet, or almost do so.
 fn ray_in_planes(random: &mut Random, grid: &Grid) -> PathRay {
     let lattice = grid.lattice();
     let [least, greatest] = grid.bounds();
@@ -115,7 +116,7 @@ fn rays_from_inside_never_leak() {
 #[test]
 fn a_triangle_that_no_cell_has_is_noticed() {
     let world = MeshWithTree::new(meshes::torus(20, 10));
-    // A grid leaves out triangles that are not finite.
+    // Grids do not contain triangles that are not finite.
     let mut without = world.triangles.clone();
     without[11].v0 = Vec3::NAN;
     for (kind, options) in kinds() {
@@ -129,7 +130,7 @@ fn a_triangle_that_no_cell_has_is_noticed() {
 
 #[test]
 fn limits_of_memory_make_cells_larger() {
-    // Each of these long triangles is in very many cells.
+    // Each of these long triangles is in a large number of cells.
     let lengthened = |triangle: Triangle| Triangle { v1: triangle.v0 + 30.0 * (triangle.v1 - triangle.v0), ..triangle };
     let triangles: Vec<Triangle> = meshes::soup(3000, 5).into_iter().map(lengthened).collect();
     for (kind, options) in kinds() {

@@ -13,7 +13,7 @@ use kdray::{
 };
 use support::{meshes, random::Random};
 
-/// The options of both kinds of grids, each with its name.
+/// Returns the options of both kinds of grids, each with its name.
 fn kinds() -> [(&'static str, GridOptions); 2] {
     [("uniform", GridOptions::uniform()), ("two levels", GridOptions::two_level())]
 }
@@ -27,10 +27,10 @@ fn assert_silent(context: &Context) {
     assert!(messages.is_empty(), "{} messages: {}", messages.len(), messages.join("\n"));
 }
 
-/// What two grids are compared by.
+/// The content of a grid, by which two grids are compared.
 #[derive(Clone, Debug, PartialEq)]
 struct Content {
-    /// The lattice's corners and the cells' size.
+    /// Bits of the lattice's corners and of the cells' size.
     lattice: [u32; 7],
     n_cells: [u32; 3],
     n_coarser: u32,
@@ -76,7 +76,7 @@ impl Content {
         }
     }
 
-    /// Says what the first difference is.
+    /// Describes the first difference, if there is one.
     fn difference(&self, found: &Self) -> Option<String> {
         fn first<T: PartialEq + std::fmt::Debug>(name: &str, expected: &[T], found: &[T]) -> Option<String> {
             if expected.len() != found.len() {
@@ -95,7 +95,7 @@ impl Content {
     }
 }
 
-/// Builds on the device and compares. Returns the host's grid.
+/// Asserts that the device builds the host's grid, which it returns.
 fn check(context: &Arc<Context>, name: &str, triangles: &[Triangle], options: &GridOptions) -> Grid {
     let buffer = Buffer::with(context, "triangles", triangles, BufferUse::Storage).expect("triangles");
     let builder = GridBuilder::new(context, &buffer, options).expect("a builder");
@@ -112,7 +112,7 @@ fn check_both(context: &Arc<Context>, name: &str, triangles: &[Triangle]) {
     }
 }
 
-/// Each triangle is about as long as the whole soup.
+/// Returns a soup of triangles that are each about as long as the whole soup.
 fn long_soup(n: usize) -> Vec<Triangle> {
     let lengthened = |triangle: Triangle| Triangle { v1: triangle.v0 + 30.0 * (triangle.v1 - triangle.v0), ..triangle };
     meshes::soup(n, 5).into_iter().map(lengthened).collect()
@@ -174,7 +174,7 @@ fn coincident_triangles_have_the_hosts_grid() {
     assert_silent(&context);
 }
 
-/// Attempts with larger and larger cells, up to one cell.
+/// The limit of references is exceeded, so the build tries larger and larger cells, up to a single cell.
 #[test]
 fn triangles_above_the_limit_have_the_hosts_grid() {
     let context = device();
@@ -192,7 +192,7 @@ fn triangles_above_the_limit_have_the_hosts_grid() {
     assert_silent(&context);
 }
 
-/// Several rows of workgroups, and several tiles for each workgroup of the sort.
+/// The mesh is large enough for several rows of workgroups, and for several tiles per workgroup of the sort.
 #[test]
 fn many_triangles_have_the_hosts_grid() {
     let context = device();

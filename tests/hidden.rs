@@ -1,4 +1,5 @@
-//! Rays that pass through hidden triangles find what they would find in a mesh without these, on the device and on the CPU.
+//! Tests that rays pass through hidden triangles, on the device and on the CPU: they find what they would find in a
+//! mesh without these triangles.
 
 mod support;
 
@@ -19,7 +20,7 @@ use support::{MeshWithTree, compare, meshes, random::Random, rays::nasty_ray};
 
 const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
 
-/// A mesh, and the indices of those of its triangles that are hidden.
+/// A mesh, and the indices of its hidden triangles.
 struct Case {
     mesh: MeshWithTree,
     hidden: Vec<u32>,
@@ -39,7 +40,7 @@ impl Case {
         (0..3000).map(cast_ray).collect()
     }
 
-    /// The closest hits among the triangles that are not hidden, each of which is tested.
+    /// Returns the closest hits by a test of every triangle that is not hidden.
     fn by_brute_force(&self, rays: &[Ray]) -> Vec<Hit> {
         let all = &self.mesh.triangles;
         let visible: Vec<u32> = (0..all.len() as u32).filter(|ix| !self.hidden.contains(ix)).collect();
@@ -59,7 +60,7 @@ impl Case {
     }
 }
 
-/// Each triangle of the second mesh is there three times: with one of them hidden, another has the hit.
+/// Each triangle of the second mesh is there three times. If one copy is hidden, a ray hits another.
 fn cases() -> [Case; 3] {
     [meshes::soup(600, 3), meshes::threefold(meshes::torus(20, 10)), meshes::cube(6, 0.0)].map(Case::new)
 }
@@ -105,7 +106,7 @@ fn the_cpu_finds_what_is_not_hidden() {
     }
 }
 
-/// The tests above would prove nothing of rays that meet the same triangles with and without a filter.
+/// Without a filter the rays hit hidden triangles, so the tests above prove something.
 #[test]
 fn without_a_filter_hidden_triangles_are_hit() {
     for case in cases() {

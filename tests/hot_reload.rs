@@ -1,4 +1,4 @@
-//! Shaders that change while a window shows what they draw.
+//! Tests that the viewer goes on with shaders that change while its window is open.
 #![cfg(all(feature = "hot-reload", target_os = "linux"))]
 
 mod support;
@@ -24,20 +24,20 @@ fn copy_shaders(to: &Path) {
     assert!(Command::new("cp").arg("-r").arg(from).arg(to).status().unwrap().success());
 }
 
-/// Replaces one text of a file by another.
+/// Replaces a text that occurs once in a file.
 fn edit(file: &Path, from: &str, to: &str) {
     let text = fs::read_to_string(file).unwrap();
     assert_eq!(text.matches(from).count(), 1, "{from}");
     fs::write(file, text.replace(from, to)).unwrap();
 }
 
-/// Red and blue in each other's place.
+/// Returns a picture with red and blue exchanged.
 fn swapped(picture: &Screen) -> Screen {
     let pixels = picture.pixels.iter().map(|&[r, g, b]| [b, g, r]).collect();
     Screen { pixels, ..picture.clone() }
 }
 
-/// Dark where it is bright.
+/// Returns the inverse of a picture: bright becomes dark.
 fn inverted(picture: &Screen) -> Screen {
     let pixels = picture.pixels.iter().map(|pixel| pixel.map(|channel| 255 - channel)).collect();
     Screen { pixels, ..picture.clone() }
@@ -63,7 +63,7 @@ fn changed_shaders_draw_and_broken_ones_do_not() {
     let mut next = |prefix: &str| messages.find_map(|line| line.ok().filter(|line| line.starts_with(prefix))).unwrap();
     display.wait_until("the picture", |screen| picture.is_shown_on(screen));
 
-    // A kernel swaps red and blue; then the window's shader swaps them back.
+    // The tone-mapping kernel swaps red and blue. Then the shader that draws the window swaps them back.
     edit(&path(tonemap), "bytes.r | bytes.g << 8 | bytes.b << 16", "bytes.b | bytes.g << 8 | bytes.r << 16");
     display.wait_until("the changed kernel's picture", |screen| swapped(&picture).is_shown_on(screen));
     edit(&path(present), "weight.y);", "weight.y).bgra;");

@@ -1,4 +1,5 @@
-//! What the command says beside its reports: warnings, once each, and names from files without control characters.
+//! Tests the messages of the command: each warning appears once, and names from files are printed without control
+//! characters.
 
 mod support;
 
@@ -9,7 +10,7 @@ use tempfile::TempDir;
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 
-/// Renders a scene of the given text small, on the CPU.
+/// Renders a small picture of a scene with the given text on the CPU.
 fn render(directory: &Path, name: &str, text: &str) -> Output {
     fs::write(directory.join(name), text).unwrap();
     succeed(directory, &["render", name, "--cpu", "--size", "16x12", "-o", "x.png"])
@@ -43,7 +44,7 @@ fn a_scene_that_nothing_lights_is_named_once() {
     assert!(succeed(directory.path(), &quiet).stderr.is_empty());
 }
 
-/// A square of a metre in a city that is given in UTM coordinates: y is rounded to halves of a metre.
+/// Renders a square with sides of one metre in UTM coordinates, where y is rounded to half metres.
 #[test]
 fn coordinates_far_from_the_origin_are_named_once() {
     let directory = TempDir::new().unwrap();
@@ -56,7 +57,7 @@ fn coordinates_far_from_the_origin_are_named_once() {
     for part in ["utm.obj: ", "reach 5.200001e6", "5.00e-1 apart", "longest side is 1.00e0", "to the origin"] {
         assert!(line.contains(part), "{line}");
     }
-    // From 256 times the extent on there are fewer than 2^16 steps of single precision across the scene.
+    // From a distance of 256 times the extent, single precision has fewer than 2^16 steps across the scene.
     for (x, n_warnings) in [(0.0, 0), (200.0, 0), (-200.0, 0), (256.0, 1), (-300.0, 1)] {
         let told = warnings(&render(directory.path(), "a.obj", &square(x, 0.0, 1.0)));
         assert_eq!(told.len(), n_warnings, "{x}: {told:?}");
@@ -64,7 +65,8 @@ fn coordinates_far_from_the_origin_are_named_once() {
     assert!(warnings(&succeed(directory.path(), &["inspect", &cornell()])).is_empty());
 }
 
-/// Names of files and materials that would clear a terminal, set its title, forge a line or turn text around.
+/// Names of files and materials contain characters that would clear a terminal, set its title, forge a line or
+/// reverse text.
 #[test]
 fn control_characters_never_reach_the_terminal() {
     let directory = TempDir::new().unwrap();
@@ -77,7 +79,7 @@ fn control_characters_never_reach_the_terminal() {
         "materials.{material} = {{ Kd = [1, 1, 1] }}\n[[mesh]]\nfile = '{evil}.obj'\n[[mesh]]\n\
          generator = 'disc'\nradius = 1\nsegments = 8\nmaterial = {material}\n"
     );
-    // TOML takes control characters in strings only as escapes.
+    // TOML allows control characters in strings only as escapes.
     let escape = |c: char| if c.is_control() && c != '\n' { format!("\\u{:04x}", c as u32) } else { c.to_string() };
     let scene: String = scene.replace('\'', "\"").chars().map(escape).collect();
     fs::write(path(&format!("{evil}.toml")), scene).unwrap();

@@ -1,5 +1,5 @@
-//! Hits of needles and other narrow triangles: t, and the point that the weights name, against the bounds that the
-//! documentation of `reference::triangle` proves.
+//! Tests hits of needles and other narrow triangles. Their t, and the points that their weights give, are within the
+//! bounds that the documentation of `reference::triangle` proves.
 
 mod support;
 
@@ -25,23 +25,24 @@ const U: f64 = 1.0 / (1 << 24) as f64;
 
 const SHORT_EDGES: [f32; 6] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6];
 const N_NEEDLES: usize = 50_000;
-/// The least cosine between a ray and a normal, and the least distance, at which `PLAIN_BOUND` is asked for.
+/// The least cosine between a ray and a normal, and the least distance, for which `PLAIN_BOUND` applies.
 const LEAST_COSINE: f64 = 0.2;
 const LEAST_DISTANCE: f64 = 0.5;
-/// Of the hit's distance.
+/// Bound of the error along the ray, as a share of the hit's distance.
 const PLAIN_BOUND: f64 = 2e-6;
 
 fn corners(triangle: &Triangle) -> [DVec3; 3] {
     [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3())
 }
 
-/// A ray's exact hit of a triangle's plane, and how far from it a hit may be.
+/// A ray's exact hit of a triangle's plane, and what bounds the error of a computed hit.
 struct Exact {
     t: f64,
     length: f64,
     cosine: f64,
-    /// The proof's D and L.
+    /// The D of the proof.
     reach: f64,
+    /// The L of the proof.
     span: f64,
 }
 
@@ -60,7 +61,7 @@ impl Exact {
         }
     }
 
-    /// Along the ray, in units of the world.
+    /// Returns the error of a hit along the ray, in world units.
     fn error(&self, hit: &Hit) -> f64 {
         (f64::from(hit.t) - self.t).abs() * self.length
     }
@@ -73,7 +74,8 @@ impl Exact {
         self.t * self.length
     }
 
-    /// As far as the proof goes, and where the ray is steep a share of the distance.
+    /// Returns the bound of the proof. For a steep ray from far enough away, it is also at most a share of the
+    /// distance.
     fn bound(&self) -> f64 {
         let proven = U * ((7.0 * self.reach + 5.0 * self.span) / self.cosine + 13.0 * self.reach + 20.0 * self.span);
         let is_plain = self.is_steep() && self.distance() >= LEAST_DISTANCE;
@@ -81,7 +83,7 @@ impl Exact {
     }
 }
 
-/// The greatest coordinate by which the point at t differs from the one that the weights name.
+/// Returns the greatest coordinate of the difference between the point at t and the point that the weights give.
 fn gap(ray: &PathRay, triangle: &Triangle, hit: &Hit) -> f64 {
     let [v0, v1, v2] = corners(triangle);
     let [t, u, v] = [hit.t, hit.u, hit.v].map(f64::from);
@@ -89,11 +91,11 @@ fn gap(ray: &PathRay, triangle: &Triangle, hit: &Hit) -> f64 {
     (ray.origin.as_dvec3() + t * ray.direction.as_dvec3() - at_weights).abs().max_element()
 }
 
-/// Why a hit is wrong, if it is.
+/// Says why a hit is wrong, if it is.
 fn fault(ray: &PathRay, triangle: &Triangle, hit: &Hit) -> Option<String> {
     let exact = Exact::of(ray, triangle);
     let (error, gap) = (exact.error(hit), gap(ray, triangle, hit));
-    // 8 u L more than the proof's point Q, for the weights.
+    // The bound for the proof's point Q, and 8 u L more for the weights.
     let gap_bound = U * (11.5 * exact.reach + 22.0 * exact.span);
     let is_within = hit.u >= 0.0 && hit.v >= 0.0 && f64::from(hit.u) + f64::from(hit.v) <= 1.0 + 16.0 * U;
     // A triangle without area has no plane.
@@ -101,7 +103,8 @@ fn fault(ray: &PathRay, triangle: &Triangle, hit: &Hit) -> Option<String> {
     (!is_right).then(|| format!("{error:e} along {ray:?}, {gap:e} off {triangle:?}: {hit:?}, not {}", exact.t))
 }
 
-/// Of length 1, with corners 0 and `short_edge` apart, in any order, at one end.
+/// Returns a needle of length 1. The two corners at one of its ends are `short_edge` apart. The order of corners is
+/// random.
 fn needle(random: &mut Random, short_edge: f32) -> Triangle {
     let from = random.in_box(Vec3::NEG_ONE, Vec3::ONE);
     let mut corners = [from, from + short_edge * random.direction(), from + random.direction()];
@@ -109,7 +112,7 @@ fn needle(random: &mut Random, short_edge: f32) -> Triangle {
     triangle(corners[0], corners[1], corners[2])
 }
 
-/// Towards a point of the triangle, from a distance of 0.5 to 3.
+/// Returns a ray towards a point of the triangle, from a distance of 0.5 to 3.
 fn ray_at(random: &mut Random, triangle: &Triangle, direction: Vec3) -> PathRay {
     let (share, along) = (random.unit().sqrt(), random.unit());
     let [v0, v1, v2] = corners(triangle);
@@ -118,7 +121,7 @@ fn ray_at(random: &mut Random, triangle: &Triangle, direction: Vec3) -> PathRay 
     ray((target - distance * direction.as_dvec3()).as_vec3(), direction)
 }
 
-/// A ray that meets the triangle's plane at more than the least cosine.
+/// Returns a ray that meets the triangle's plane at more than the least cosine.
 fn steep_ray_at(random: &mut Random, triangle: &Triangle) -> PathRay {
     loop {
         let direction = random.direction();
@@ -133,8 +136,8 @@ fn alone(ray: &PathRay, triangle: &Triangle) -> Option<Hit> {
     Shear::of(ray.origin.to_array(), ray.direction.to_array()).intersect_triangle(triangle, 0)
 }
 
-/// The hit by rounded edge functions, as Woop, Benthin and Wald have it: t is a mean of the corners' depths. The signs
-/// of these edge functions are made exact, so the same triangles are hit.
+/// Returns the hit by rounded edge functions, as in Woop, Benthin and Wald: t is a mean of the corners' depths. The
+/// signs of these edge functions are made exact, so the same triangles are hit.
 fn by_rounded_edges(ray: &PathRay, triangle: &Triangle) -> Option<Hit> {
     let longest = ray.direction.abs().max_position();
     let last = |v: Vec3| Vec3::from_array([1, 2, 3].map(|i| v[(longest + i) % 3]));
@@ -179,7 +182,7 @@ fn t_of_needles_is_right() {
     }
 }
 
-/// Three corners all but on a line, in any order.
+/// Returns a triangle whose corners are almost on a line, in any order.
 fn collinear(random: &mut Random) -> Triangle {
     let from = random.in_box(Vec3::NEG_ONE, Vec3::ONE);
     let along = random.direction();
@@ -189,20 +192,20 @@ fn collinear(random: &mut Random) -> Triangle {
     triangle(corners[0], corners[1], corners[2])
 }
 
-/// Of any shape.
+/// Returns a triangle of any shape.
 fn any_triangle(random: &mut Random) -> Triangle {
     let [v0, v1, v2] = [0; 3].map(|_| random.in_box(Vec3::NEG_ONE, Vec3::ONE));
     triangle(v0, v1, v2)
 }
 
-/// All but in the triangle's plane.
+/// Returns a direction that is almost in the triangle's plane.
 fn flat_direction(random: &mut Random, triangle: &Triangle) -> Vec3 {
     let share = random.between(-1.0, 1.0);
     let along = (triangle.v1 - triangle.v0).lerp(triangle.v2 - triangle.v0, share).normalize();
     (along + 10f32.powf(random.between(-9.0, -2.0)) * random.direction()).normalize()
 }
 
-/// Where the plane says nothing, the point is on the triangle, and so between its corners.
+/// Where the plane does not determine the hit, the point is still on the triangle, and so between its corners.
 #[test]
 fn points_of_slivers_and_of_triangles_seen_edge_on_are_on_the_triangle() {
     let mut random = Random(5);
@@ -234,12 +237,12 @@ fn cast_ray(ray: &PathRay) -> Ray {
     Ray { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
 }
 
-/// All the ways through a tree find the same, and it is right: on a device, on the CPU, alone and in packets.
+/// All traversals find the same hits, and these are right: on a device, on the CPU, alone and in packets.
 #[test]
 fn needles_in_a_tree_are_hit_where_they_are() {
     const N_RAYS_A_NEEDLE: usize = 25;
     let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
-    // With branches, as GPUs run them.
+    // This device runs kernels with branches, as GPUs do.
     let with_lanes = with_lanes(5000);
     let ways = [(&context, Traversal::Mask), (&context, Traversal::Stack), (&with_lanes, Traversal::Ropes)];
     for short_edge in SHORT_EDGES {
@@ -258,7 +261,7 @@ fn needles_in_a_tree_are_hit_where_they_are() {
             let mut caster = Caster::new(context, world.geometry(), traversal).expect("a caster");
             let found = caster.cast(&casts, Query::Closest, 1).expect("a cast").hits;
             check(&world, &rays, &found);
-            // Elsewhere divisions are 2.5 units in the last place off.
+            // On other devices, divisions are 2.5 units in the last place off.
             if context.is_software() {
                 compare::exact(&expected, &found).unwrap();
             }

@@ -1,4 +1,4 @@
-//! Pictures are written bit for bit, whole or not at all.
+//! Tests that pictures are written bit for bit, and whole or not at all.
 
 use std::{
     env, fs,
@@ -13,7 +13,7 @@ use kdray::{
 };
 use tempfile::TempDir;
 
-/// Noise that compresses badly, with the floats that a careless conversion loses.
+/// Returns a picture of noise that compresses badly, with floats that a careless conversion would change.
 fn picture(width: u32, height: u32) -> Picture {
     let n_pixels = width * height;
     let mut state = 1_u32;
@@ -41,7 +41,7 @@ fn names(directory: &Path) -> Vec<String> {
     names
 }
 
-/// Bits of every RGB value, so that -0 differs from 0.
+/// Returns the bits of every RGB value, so that -0 differs from 0.
 fn bits(rgba: &[[f32; 4]]) -> Vec<[u32; 3]> {
     rgba.iter().map(|&[r, g, b, _]| [r, g, b].map(f32::to_bits)).collect()
 }
@@ -125,7 +125,7 @@ fn a_picture_that_contradicts_its_size_is_an_error() {
     assert!(names(directory.path()).is_empty());
 }
 
-/// Permission bits do not bind root, a file in place of a directory does.
+/// The directory is a file or is missing. Permission bits would not stop a test that runs as root.
 #[test]
 fn a_directory_that_cannot_take_a_file_is_an_error() {
     let directory = TempDir::new().unwrap();
@@ -171,7 +171,7 @@ mod unix {
         fs::metadata(path).unwrap().permissions().mode() & 0o777
     }
 
-    /// A limit on the size of files stands in for the full disk: `write` fails half-way, and it needs no privilege.
+    /// A limit on the size of files simulates a full disk: `write` fails half-way, and no privileges are needed.
     #[test]
     fn a_disk_that_fills_up_leaves_what_was_there() {
         if let Some(path) = env::var_os(CHILD) {
@@ -228,7 +228,7 @@ mod unix {
         assert_eq!(names(directory.path()), ["file", "x.png"]);
     }
 
-    /// A link to a link to a file in another directory that is not there yet.
+    /// The picture's path is a link to a link to a file in another directory. The file does not exist yet.
     #[test]
     fn a_link_that_leads_nowhere_gets_the_file_it_names() {
         let directory = TempDir::new().unwrap();

@@ -1,5 +1,5 @@
-//! Sixteen rays together, with each set of instructions that the machine has, against one ray after the other: the same,
-//! bit for bit.
+//! Compares sixteen rays together, with each instruction set that the machine has, with one ray after the other. The
+//! hits are the same, bit for bit.
 
 mod support;
 
@@ -33,7 +33,7 @@ fn the_machines_instructions_are_tested() {
     assert_eq!(has(|level| matches!(level, Level::Avx2(_))), is_x86_feature_detected!("avx2"));
 }
 
-/// With floats by their bits.
+/// Returns the hit's four words, with floats as their bits.
 fn bits(hit: &Hit) -> [u32; 4] {
     bytemuck::cast(*hit)
 }
@@ -61,7 +61,7 @@ fn alone(ray: &PathRay, triangle: &Triangle, triangle_ix: u32) -> Option<Hit> {
     Shear::of(ray.origin.to_array(), ray.direction.to_array()).intersect_triangle(triangle, triangle_ix)
 }
 
-/// Without area, with numbers that are none, large and small.
+/// Returns triangles without area, and triangles with NaN, infinite, large and small coordinates.
 fn odd_triangles() -> Vec<Triangle> {
     let (x, y, z) = (Vec3::X, Vec3::Y, Vec3::Z);
     let mut triangles: Vec<_> = [(x, x, y), (x, x, x), (x, -x, 0.5 * x), (0.1 * x, 0.2 * x, 0.3 * x + 1e-7 * y)]
@@ -74,7 +74,7 @@ fn odd_triangles() -> Vec<Triangle> {
     triangles
 }
 
-/// Nasty rays, and some with numbers that no ray should have.
+/// Returns nasty rays. In some packets, one ray has numbers that no ray should have.
 fn rays_of_a_packet(random: &mut Random, world: &MeshWithTree) -> [PathRay; LANES] {
     let first = random.below(1000);
     let mut rays = from_fn(|lane| nasty_ray(random, world, first + lane));
@@ -132,7 +132,7 @@ fn every_set_of_instructions_finds_the_same() {
     }
 }
 
-/// Rays of all octants in turn, some of whose components are zeros and all but zeros of either sign.
+/// Returns directions of all octants in turn. Some have components that are 0 or almost 0, with either sign.
 fn directions_in_turn() -> impl Iterator<Item = Vec3> {
     let sign = |i: u32, bit: u32| if i >> bit & 1 == 1 { -1.0 } else { 1.0 };
     (0..1000).map(move |i| {
@@ -165,7 +165,7 @@ fn sixteen_rays_of_an_octant_are_a_packet() {
     assert_eq!(seen, (0..1000).collect::<Vec<_>>());
 }
 
-/// The signs say in which order a ray comes to the children of a node, as `TraversalRay` has it.
+/// The signs of a direction tell in which order a ray comes to the children of a node, as [`TraversalRay`] does.
 #[test]
 fn rays_of_an_octant_take_children_in_one_order() {
     let world = MeshWithTree::new(meshes::cube(2, 0.0));

@@ -1,4 +1,5 @@
-//! The plan of a frame: every barrier that its passes need is there, and what the passes declare is what their kernels do.
+//! Tests the plan of a frame: it has every barrier that its passes need, and passes declare what their kernels
+//! access.
 
 use std::{collections::BTreeSet, fs};
 
@@ -12,7 +13,7 @@ use spirq::{
     var::Variable,
 };
 
-/// Frames with every combination of passes.
+/// Returns frames with every combination of passes.
 fn kinds() -> Vec<FrameKind> {
     let mut kinds = Vec::new();
     for (&primary, n_bounces) in Primary::ALL.iter().zip([3, 2, 1]).chain(Primary::ALL.iter().zip([1, 3, 2])) {
@@ -35,15 +36,16 @@ fn kinds() -> Vec<FrameKind> {
     kinds
 }
 
-/// All steps of a frame of two batches, one after the other.
+/// Returns all steps of a frame of two batches, one after the other.
 fn steps(plan: &Plan) -> Vec<Step> {
     let batch = [plan.bounces.concat(), plan.light.clone()].concat();
     [plan.visibility.clone(), batch.clone(), batch, plan.image.clone()].concat()
 }
 
-/// The resources that a pass touches. Two of them are left out: visibility and the host order them on their own.
+/// Returns the resources that a pass accesses. Two are left out, because visibility and the host order them on their
+/// own.
 fn touches(pass: Pass, denoises: bool) -> Vec<(Resource, Touch)> {
-    // Without a filter the two are one buffer.
+    // Without a noise filter, these two are one buffer.
     let same = |resource: &Resource| match resource {
         Resource::PixelFiltered if !denoises => Resource::PixelRadiance,
         other => *other,
@@ -55,11 +57,11 @@ fn touches(pass: Pass, denoises: bool) -> Vec<(Resource, Touch)> {
     reads.chain(writes).chain(indirect).filter(ordered).collect()
 }
 
-/// Whether a barrier orders a later touch of a resource behind an earlier one.
+/// Tells whether a barrier orders a later access of a resource after an earlier one.
 fn orders(barrier: &Step, resource: Resource, earlier: Touch, later: Touch) -> bool {
     let Step::Barrier { before, after, of } = *barrier else { return false };
     let is_kernel = |touch| touch != Touch::Indirect;
-    // A write behind a read waits for the kernel or the indirect read; no memory has to be made visible.
+    // A write after a read waits for the kernel or for the indirect read. No memory has to be made visible.
     if earlier != Touch::Write {
         return is_kernel(before) == is_kernel(earlier) && is_kernel(after);
     }
@@ -69,7 +71,7 @@ fn orders(barrier: &Step, resource: Resource, earlier: Touch, later: Touch) -> b
     is_written && is_visible && is_named
 }
 
-/// Pairs of passes of which the second may run too early.
+/// Describes the pairs of passes of which the second may run too early.
 fn hazards(steps: &[Step], denoises: bool) -> Vec<String> {
     let mut found = Vec::new();
     for (j, later) in steps.iter().enumerate() {
@@ -106,13 +108,13 @@ fn every_barrier_is_needed() {
     assert!(barriers.len() > 20);
     for &i in &barriers {
         let mut without = all.clone();
-        // A barrier of every batch and bounce that says the same.
+        // This removes the equal barriers of all batches and bounces.
         without.retain(|step| *step != all[i]);
         assert!(!hazards(&without, true).is_empty(), "{:?} is not needed", all[i]);
     }
 }
 
-/// A barrier names what earlier passes have touched as it says, and what some later pass or batch touches.
+/// A barrier names only resources that earlier passes have accessed in the way that it states.
 #[test]
 fn barriers_name_what_they_are_for() {
     for kind in kinds() {
@@ -127,7 +129,7 @@ fn barriers_name_what_they_are_for() {
     }
 }
 
-/// What the kernels of a pass read and write of the resources, by their SPIR-V.
+/// Returns the resources that the kernels of a pass read, and those that they write, from their SPIR-V.
 fn found_in_kernels(pass: Pass) -> (BTreeSet<Resource>, BTreeSet<Resource>) {
     let files = match pass {
         Pass::Visibility => vec!["visibility.vert.spv".to_owned(), "visibility.frag.spv".to_owned()],
@@ -161,7 +163,7 @@ fn passes_declare_what_their_kernels_read_and_write() {
     let mut wrong = Vec::new();
     for pass in Pass::all() {
         let (reads, writes) = found_in_kernels(pass);
-        // A graphics pass writes its target; it has no binding for it.
+        // A graphics pass writes its target without a binding.
         let target = (pass == Pass::Visibility).then_some(Resource::TriangleIds);
         let writes: BTreeSet<_> = writes.into_iter().chain(target).collect();
         let declared = (pass.reads().iter().copied().collect(), pass.writes().iter().copied().collect());

@@ -1,4 +1,4 @@
-//! What ends the command from outside: signals while it works, limits on the size of files and on memory.
+//! Tests what ends the command from outside: signals while it works, and limits on the size of files and on memory.
 #![cfg(target_os = "linux")]
 
 mod support;
@@ -17,11 +17,11 @@ use rustix::process::{Pid, Signal, kill_process};
 use support::command::{cornell, kdray, names, stderr};
 use tempfile::TempDir;
 
-/// Longer than anything here takes on a busy machine.
+/// Time limit of each wait. It is longer than anything here takes on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 const N_RAYS: u64 = 1_500_000;
 
-/// A triangle, and so many rays that writing their hits takes a while.
+/// Creates a directory with a triangle and so many rays that writing their hits takes a while.
 fn with_rays() -> TempDir {
     let directory = TempDir::new().unwrap();
     fs::write(directory.path().join("mesh.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
@@ -37,8 +37,8 @@ fn with_rays() -> TempDir {
 
 const CAST: [&str; 9] = ["cast", "mesh.obj", "rays.npy", "-o", "hits.npz", "--cpu", "-q", "--threads", "2"];
 
-/// The command, which a signal ends even if whoever runs the tests has it ignored, as a shell does for SIGINT in the
-/// background.
+/// Returns a command that signals can end, even if the tests run with these signals ignored. A shell ignores SIGINT
+/// for jobs in the background.
 fn interruptible(directory: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new("env");
     command.args(["--default-signal=INT,HUP,TERM", env!("CARGO_BIN_EXE_kdray")]).args(arguments);
@@ -46,7 +46,7 @@ fn interruptible(directory: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// A file that the command has begun to write under a temporary name.
+/// Returns whether the command has begun to write a file under a temporary name.
 fn has_begun_to_write(directory: &Path) -> bool {
     fs::read_dir(directory).unwrap().flatten().any(|entry| {
         let is_temporary = entry.file_name().to_string_lossy().starts_with(".kdray-");
@@ -54,7 +54,7 @@ fn has_begun_to_write(directory: &Path) -> bool {
     })
 }
 
-/// Waits until something is so, or the child has ended.
+/// Waits until a condition holds, or the child has ended.
 fn wait_until(child: &mut Child, is_so: impl Fn() -> bool) {
     let start = Instant::now();
     while !is_so() && child.try_wait().unwrap().is_none() {
@@ -64,7 +64,7 @@ fn wait_until(child: &mut Child, is_so: impl Fn() -> bool) {
 }
 
 fn send(child: &Child, signal: Signal) {
-    // A child that has just ended is no error.
+    // It is not an error if the child has just ended.
     let _ = kill_process(Pid::from_child(child), signal);
 }
 
@@ -80,7 +80,7 @@ fn end_of(child: &mut Child) -> ExitStatus {
     }
 }
 
-/// Casts the rays and sends the signals while the hits are written, `delay` after that has begun. Returns how it ended.
+/// Casts the rays and sends the signals `delay` after the command has begun to write hits. Returns its exit status.
 fn interrupt(directory: &Path, signals: &[Signal], delay: Duration) -> ExitStatus {
     let mut child = interruptible(directory, &CAST).stderr(Stdio::null()).spawn().unwrap();
     wait_until(&mut child, || has_begun_to_write(directory));
@@ -154,14 +154,14 @@ fn a_long_rendering_ends_at_once() {
     }
 }
 
-/// Runs the command in a shell that first limits it.
+/// Runs the command in a shell that first sets a limit.
 fn limited(directory: &Path, limit: &str, arguments: &[&str]) -> Output {
     let mut command = Command::new("bash");
     command.args(["-c", &format!("{limit}; exec \"$0\" \"$@\""), env!("CARGO_BIN_EXE_kdray")]).args(arguments);
     command.current_dir(directory).stdin(Stdio::null()).output().unwrap()
 }
 
-/// Asserts an exit code and one line of error that says each of some words.
+/// Asserts an exit code and a single error line that contains all words.
 fn assert_refused(output: &Output, code: i32, words: &[&str]) {
     let text = stderr(output);
     assert_eq!(output.status.code(), Some(code), "{}: {text}", output.status);
@@ -183,7 +183,7 @@ fn a_file_beyond_the_limit_on_files_is_an_error_of_its_output() {
     }
 }
 
-/// Address space for a small scene on two threads, in KiB, and not for more.
+/// Limit of the address space in KiB. It suffices for a small scene on two threads and for no more.
 const LIMIT: &str = "ulimit -v 900000";
 
 #[test]

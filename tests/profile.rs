@@ -1,5 +1,5 @@
-//! `kdray render --profile` and `--trace`: each pass of each bounce has its time and its rays, slices lie within one
-//! another, and nothing is measured where nobody asks.
+//! Tests `kdray render --profile` and `--trace`. Each pass of each bounce has its time and its rays, slices are
+//! nested, and nothing is measured unless the options request it.
 
 mod support;
 
@@ -40,13 +40,13 @@ fn n_rays_in(passes: &[PassTime], name: &str, bounce: Option<u32>) -> u64 {
     of_name.map(|pass| pass.n_rays_in.expect("a number of rays")).sum()
 }
 
-/// The ways to find primary hits that the device has.
+/// Returns the kinds of primary visibility that the device supports.
 fn primaries(context: &Context) -> &'static [Primary] {
     if context.has_wide_atomics() { Primary::ALL } else { &[Primary::Raster, Primary::Trace] }
 }
 
-/// Asserts that the table knows how often each pass runs, and that tracing takes all passes up to the primary rays' hits,
-/// whose last one comes before `next`. Gives the passes' names.
+/// Asserts that each pass has a bounce and a batch if its scope has them, and that the time of tracing is that of all
+/// passes before `next`, the first pass after the primary hits. Returns the passes' names.
 fn checked_names(profile: &Profile, next: &str) -> Vec<&'static str> {
     for pass in &profile.passes {
         let scope = pass.pass().scope();
@@ -130,7 +130,8 @@ fn passes_run_one_after_the_other() {
     assert!((profile.frame_ms.unwrap() - (start + ms)).abs() < 1e-9);
 }
 
-/// Neither timestamps nor counts, in whole frames and in such as have to be split; the picture is the same.
+/// There are neither timestamps nor counts, in whole frames and in frames that have to be split. The picture is the
+/// same.
 #[test]
 fn without_a_profile_nothing_is_measured() {
     let (scene, context) = (scenes::mixed(), context());
@@ -148,7 +149,7 @@ fn without_a_profile_nothing_is_measured() {
     assert_eq!(context.validation_messages(), Vec::<String>::new());
 }
 
-/// Renders Cornell's box small with a profile and a trace.
+/// Renders a small picture of Cornell's box, and returns its profile and its trace.
 fn measure(directory: &Path, more: &[&str]) -> (Value, Value) {
     let scene = cornell();
     let render = ["render", &scene, "--size", "64x48", "-q", "-o", "x.png"];
@@ -180,7 +181,8 @@ fn slices(trace: &Value) -> Vec<Slice<'_>> {
         .collect()
 }
 
-/// What is wrong with the slices of a track, which come in the order of their beginnings, outer ones first.
+/// Says what is wrong with the slices of a track, if anything is. They must be in the order of their beginnings,
+/// outer ones first.
 fn fault(slices: &[Slice], track: u64) -> Option<String> {
     let mut open: Vec<&Slice> = Vec::new();
     let mut last = 0;

@@ -1,4 +1,4 @@
-//! `kdray render`'s samples, crops, curves, layers and camera paths, as its users meet them.
+//! Tests the samples, crops, tone curves, layers and camera paths of `kdray render`.
 
 mod support;
 
@@ -8,7 +8,7 @@ use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
 use support::command::{cornell, fail, names, stderr, stdout, succeed};
 use tempfile::TempDir;
 
-/// Renders Cornell's box small, on the CPU, in a directory.
+/// Renders a small picture of the Cornell box on the CPU, in a directory.
 fn render(directory: &Path, more: &[&str]) -> Output {
     let scene = cornell();
     let size = if more.contains(&"--size") { &[][..] } else { &["--size", "64x48"] };
@@ -65,7 +65,7 @@ fn curves_change_what_is_shown_and_not_what_is() {
     assert!(read("agx.exr") == read("linear.exr") && read("aces.exr") == read("linear.exr"));
 }
 
-/// Channels of an EXR file by name, their samples as bits.
+/// Returns the channels of an EXR file with their names. Samples are given as bits.
 fn channels(path: &Path) -> Vec<(String, &'static str, Vec<u32>)> {
     let reader = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels();
     let image = reader.first_valid_layer().all_attributes().from_file(path).unwrap();
@@ -100,7 +100,7 @@ fn aovs_are_layers_beside_the_colour() {
         assert!(with.contains(colour), "{} is the same as without layers", colour.0);
     }
     let named = |name: &str| &with.iter().find(|channel| channel.0 == name).unwrap().2;
-    // 34 triangles, and around the box what is none.
+    // The scene has 34 triangles. Pixels around the box show no triangle.
     assert!(named("id.ID").iter().all(|id| *id < 34 || *id == u32::MAX));
     let is_far = |z: &u32| f32::from_bits(*z) == f32::INFINITY;
     assert!(named("id.ID").iter().zip(named("depth.Z")).all(|(id, z)| (*id == u32::MAX) == is_far(z)));
@@ -123,7 +123,8 @@ fn the_costs_are_a_heat_map_too() {
     refused(path, 5, &["--aov", "cost", "-o", "none/x.png"], "none");
 }
 
-/// A tree of other nodes costs otherwise: a part is rendered with the tree that the whole picture gets.
+/// A part of a picture is rendered with the same tree as the whole picture. Another tree has other nodes and thus
+/// other costs.
 #[test]
 fn a_part_costs_what_it_costs_in_the_whole() {
     let directory = TempDir::new().unwrap();
@@ -138,11 +139,11 @@ fn a_part_costs_what_it_costs_in_the_whole() {
     let (part_tree, part) = render("part.exr", &["--crop", "30,20,34,24"]);
     let expected: Vec<_> = (20..24).flat_map(|y| whole[y * 64 + 30..][..4].to_vec()).collect();
     assert_eq!((part_tree, part), (whole_tree, expected));
-    // Pixels of the other tree cost otherwise, or nothing was seen.
+    // The two kinds of trees must give different costs, or the test could not tell them apart.
     assert_ne!(render("fast.exr", &["--build", "fast"]).1, render("best.exr", &["--build", "best"]).1);
 }
 
-/// A measurement shows what a run without it does.
+/// Repetitions do not count as work for the choice of the tree, so that a measurement shows what a single run does.
 #[test]
 fn repetitions_do_not_change_the_tree() {
     let directory = TempDir::new().unwrap();
@@ -181,7 +182,7 @@ fn a_path_makes_a_picture_a_frame() {
     assert!(stdout(&output).ends_with("wrote 3 pictures, out.00.png to out.02.png\n"), "{}", stdout(&output));
     assert_eq!(names(path), ["out.00.png", "out.01.png", "out.02.png", "p.toml"]);
     render(path, &["-o", "still.png"]);
-    // The first keyframe is the scene's own camera; a part of the path is the same as in the whole.
+    // The first keyframe is the scene's own camera. A frame is the same alone and in the whole path.
     assert_eq!(pixels(path, "still.png"), pixels(path, "out.00.png"));
     render(path, &["--path", "p.toml", "-o", "again.####.png", "--frames", "1", "--aov", "cost"]);
     assert_eq!(pixels(path, "again.0001.png"), pixels(path, "out.01.png"));
@@ -196,7 +197,7 @@ fn bad_paths_are_refused_before_rendering() {
     refused(path, 3, &["--path", "none.toml"], "none.toml");
     fs::write(path.join("bad.toml"), "[[keyframe]]\nframe = 0\neye = [0, 0, 0]\n").unwrap();
     refused(path, 3, &["--path", "bad.toml"], "bad.toml:1");
-    // Half way, the eye goes through its target.
+    // Half way, eye and target coincide.
     let through = "[[keyframe]]\nframe = 0\neye = [0, 0, -1]\ntarget = [0, 0, 0]\n\
                    [[keyframe]]\nframe = 2\neye = [0, 0, 1]\ntarget = [0, 0, 0]\n";
     fs::write(path.join("through.toml"), through).unwrap();

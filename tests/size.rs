@@ -1,4 +1,4 @@
-//! `kdray bench size`: the mesh that it generates, what it measures, what it refuses.
+//! Tests `kdray bench size`: the mesh that it generates, its measurements, and the arguments that it refuses.
 
 mod support;
 

@@ -1,5 +1,5 @@
-//! Rays that take more turns of a kernel's loops than a dispatch allows end in a further one, with the hits of rays that
-//! are never interrupted.
+//! Tests rays that take more loop turns than a dispatch allows. They end in a further dispatch, with the hits of rays
+//! that are never interrupted.
 
 mod support;
 
@@ -17,12 +17,13 @@ use kdray::{
 };
 use support::{MeshWithTree, compare, meshes, pretended, random::Random, rays::nasty_ray, scenes, world_of};
 
-/// The device as it is.
+/// Opens the device as it is.
 fn plain_device() -> Arc<Context> {
     pretended(DeviceOverrides::default())
 }
 
-/// A device that ends shaders after so many turns. `n_lanes`: of a GPU, in place of a software driver.
+/// Opens a device that ends shaders after `loop_limit` turns. With `n_lanes` it is a GPU of that many lanes, in place
+/// of a software driver.
 fn limited_device(loop_limit: u32, n_lanes: Option<u32>, n_stall_slots: Option<usize>) -> Arc<Context> {
     pretended(DeviceOverrides { loop_limit: Some(loop_limit), n_lanes, n_stall_slots, ..DeviceOverrides::default() })
 }
@@ -36,7 +37,7 @@ fn cast(context: &Arc<Context>, world: &MeshWithTree, traversal: Traversal, quer
     caster.cast(rays, query, 1).expect("a cast").hits
 }
 
-/// A grid of each kind.
+/// Returns a grid of each kind.
 fn grids(triangles: &[Triangle]) -> [Accel; 2] {
     let options = [GridOptions::uniform(), GridOptions::two_level()].map(AccelOptions::Grid);
     options.map(|options| Accel::new(triangles, &options))
@@ -50,8 +51,8 @@ fn nasty_rays(world: &MeshWithTree, n: usize) -> Vec<Ray> {
     (0..n).map(some_ray).collect()
 }
 
-/// One leaf of many copies of a triangle and, as the last entry, a triangle that lies a little above them. Rays come from
-/// above; those with an even number hit.
+/// Returns a leaf of many copies of a triangle, whose last entry is a triangle slightly above them, and rays. The
+/// rays come from above; those with an even index hit.
 fn copies(n: usize) -> (MeshWithTree, Vec<Ray>) {
     let [below, above] = [0.0, 1e-6].map(|y| meshes::triangle(vec3(0.0, y, 0.0), vec3(1.0, y, 0.0), vec3(0.0, y, 1.0)));
     let mut triangles = vec![below; n];
@@ -64,7 +65,7 @@ fn copies(n: usize) -> (MeshWithTree, Vec<Ray>) {
     (MeshWithTree::new(triangles), (0..200).map(ray).collect())
 }
 
-/// How many of the rays on `n` copies are right: the closest hit is that of the last triangle.
+/// Counts the rays on `n` copies whose hits are right: the closest hit is that of the last triangle.
 fn n_right(n: usize, hits: &[Hit], query: Query) -> usize {
     let is_right = |(i, hit): (usize, &Hit)| match (i.is_multiple_of(2), query) {
         (false, _) => hit.triangle_ix == NO_TRIANGLE,
@@ -94,7 +95,7 @@ fn a_leaf_of_more_triangles_than_a_driver_takes_turns_is_searched_to_its_end() {
         }
     }
     assert_silent(&context);
-    // Where nobody counts turns, a driver with such a limit loses hits.
+    // If kernels do not count turns, a driver with such a limit loses hits.
     if context.loop_limit().expect("a probe").is_some() {
         let careless = limited_device(u32::MAX, None, None);
         let hits = cast(&careless, &world, Traversal::Mask, Query::Closest, &rays);
@@ -102,7 +103,7 @@ fn a_leaf_of_more_triangles_than_a_driver_takes_turns_is_searched_to_its_end() {
     }
 }
 
-/// Far from the origin the tree's margin is larger than the triangles: its leaves have most of them.
+/// Far from the origin, the tree's margin is larger than the triangles, so its leaves contain most of them.
 #[test]
 fn a_far_soup_of_small_triangles_is_as_on_the_cpu() {
     let world = MeshWithTree::new(meshes::placed(meshes::soup(20_000, 3), 1.0, Vec3::splat(1e7)));
@@ -120,7 +121,7 @@ fn a_far_soup_of_small_triangles_is_as_on_the_cpu() {
     assert_silent(&context);
 }
 
-/// Whatever the budget, the number of slots and the kind of search.
+/// The hits do not depend on the turn budget, the number of slots or the kind of search.
 #[test]
 fn interrupted_casts_find_the_same() {
     let world = MeshWithTree::new([meshes::soup(500, 1), meshes::torus(20, 10)].concat());
@@ -177,7 +178,7 @@ fn options(traversal: Traversal, primary: Primary) -> RenderOptions {
     }
 }
 
-/// A picture with what its rays cost.
+/// Draws a picture. Returns it with what its rays cost.
 fn draw(context: &Arc<Context>, options: &RenderOptions) -> (Picture, Vec<Feature>, Profile) {
     let scene = scenes::mixed();
     let world = world_of(&scene);

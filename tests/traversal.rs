@@ -1,4 +1,4 @@
-//! The CPU's kd-tree traversals against every triangle of the mesh, and against one another.
+//! Compares the CPU's kd-tree traversals with brute force over all triangles, and with one another.
 
 mod support;
 
@@ -30,7 +30,7 @@ use support::{
 
 const N_RAYS: usize = 100_000;
 
-/// All that use the tree.
+/// Returns all traversals that use the tree.
 fn tree_traversals() -> impl Iterator<Item = Traversal> {
     Traversal::ALL.iter().copied().filter(|&traversal| traversal != Traversal::Brute)
 }
@@ -39,8 +39,8 @@ fn rays_at(world: &MeshWithTree) -> Vec<PathRay> {
     (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), world, i)).collect()
 }
 
-/// The hits that the engine finds for rays that go together. They are the reference's, bit for bit, and where any hit
-/// answers, the same rays hit.
+/// Returns the hits that the engine finds for rays together. They must be the reference's, bit for bit, and any-hit
+/// queries must hit with the same rays.
 fn traced(world: &MeshWithTree, traversal: Traversal, rays: &[PathRay]) -> Vec<Hit> {
     traced_through(&world.inputs(), traversal, rays)
 }
@@ -56,7 +56,7 @@ fn traced_through(bindings: &KernelInputs, traversal: Traversal, rays: &[PathRay
         assert_eq!(is_hit, closest.iter().map(|hit| hit.triangle_ix != NO_TRIANGLE).collect::<Vec<_>>(), "{traversal}");
         closest
     };
-    // Not a multiple of what goes together.
+    // The number of rays is not a multiple of the packet size.
     rays.par_chunks(1001)
         .map_init(|| (FastTracer::new(bindings, traversal), Traverser::new(bindings, traversal)), of_task)
         .flatten()
@@ -179,8 +179,8 @@ fn a_hole_leaks() {
     assert!(traced(&world, Traversal::Mask, &rays).iter().any(|hit| hit.triangle_ix == NO_TRIANGLE));
 }
 
-/// Numbers that no ray should have, each in each component of origin and direction. Nothing is asked of directions
-/// that are merely far from unit length but that they end.
+/// Each component of origin and direction takes numbers that no ray should have. Rays whose directions are merely far
+/// from unit length only have to end.
 #[test]
 fn rays_that_are_none_end_and_miss() {
     let world = MeshWithTree::new(meshes::torus(40, 20));
@@ -217,7 +217,7 @@ fn with(mut v: Vec3, axis: usize, value: f32) -> Vec3 {
     v
 }
 
-/// Seen from its end, a needle's corners lie on one line with the ray as far as rounded products can tell.
+/// Seen from its end, a needle's corners are on one line with the ray, as far as rounded products can tell.
 #[test]
 fn a_needle_is_not_hit_beside() {
     let triangles = meshes::soup(1200, 7);
@@ -226,7 +226,8 @@ fn a_needle_is_not_hit_beside() {
     assert_eq!(brute::closest_hit(&triangles, &SearchRay::from(&needle)).triangle_ix, NO_TRIANGLE);
 }
 
-/// From so far away that rays start at the scene instead: the same triangles, by the test without that.
+/// These rays come from so far away that they are moved to the scene first. They hit the same triangles as in a test
+/// without that.
 #[test]
 fn rays_from_afar_hit_the_same() {
     let world = MeshWithTree::new(meshes::torus(40, 20));
@@ -245,7 +246,8 @@ fn rays_from_afar_hit_the_same() {
             let found = traced(&world, traversal, &rays);
             let differs = |(a, b): &(&Hit, &Hit)| a.triangle_ix != b.triangle_ix || (a.t - b.t).abs() > 1e-6 * a.t;
             let n = unmoved.iter().zip(&found).filter(differs).count();
-            // Rays at edges: an origin is rounded to 2^-24 of its distance, a triangle is some 2^-4 wide.
+            // Only rays at edges differ: an origin is rounded to 2^-24 of its distance, and a triangle is some 2^-4
+            // wide.
             assert!(n as f32 <= 5.0 + rays.len() as f32 * distance * 2e-6, "{traversal}, {distance}: {n} rays differ");
             assert!(found.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count() > rays.len() / 5);
         }

@@ -1,5 +1,5 @@
-//! The kernels' searches on the device, through kd-trees and grids: each finds, bit for bit, what the kernel without a
-//! structure finds, and that finds what brute force on the CPU finds. Under the validation layer.
+//! Compares the kernels that search kd-trees and grids on the device, under the validation layer. Each finds, bit for
+//! bit, what the kernel without a structure finds, and that kernel finds what brute force on the CPU finds.
 
 mod support;
 
@@ -37,7 +37,7 @@ fn context() -> Arc<Context> {
     Context::new(&ContextOptions::new(None, true)).expect("a Vulkan driver and the validation layer")
 }
 
-/// The triangles under a lamp and a sun.
+/// Returns a scene of the triangles under a lamp and a sun.
 fn scene(triangles: &[Triangle]) -> FlatScene {
     let lamp = Light { position: vec3(0.3, 1.5, 0.2), kind: LIGHT_POINT, intensity: Vec3::ONE, reserved: 0 };
     let sun = Light { position: vec3(0.48, 0.6, 0.64), kind: LIGHT_DIRECTIONAL, ..lamp };
@@ -55,10 +55,10 @@ fn scene(triangles: &[Triangle]) -> FlatScene {
     }
 }
 
-/// What the trace and the shadow kernel leave.
+/// The results of the trace and the shadow kernel.
 #[derive(PartialEq)]
 struct Traced {
-    /// t, triangle, u, v; floats by their bits.
+    /// The words t, triangle, u and v; floats as their bits.
     hits: Vec<[u32; 4]>,
     light_visibility: Vec<u32>,
     n_hits: u32,
@@ -89,7 +89,7 @@ fn traced(context: &Arc<Context>, world: &World, rays: &[PathRay], traversal: Tr
     }
 }
 
-/// The first ray that two variants do not agree on.
+/// Describes the first ray on which two variants disagree.
 fn difference(rays: &[PathRay], expected: &Traced, found: &Traced) -> Option<String> {
     let wrong = (0..rays.len()).find(|&i| expected.hits[i] != found.hits[i]);
     let describe = |i: usize| {
@@ -109,7 +109,8 @@ fn check(context: &Arc<Context>, name: &str, triangles: Vec<Triangle>) {
     let with_tree = world_of_tree(&world);
     let rays: Vec<PathRay> = (0..N_RAYS).map(|i| nasty_ray(&mut Random(i as u64), &world, i)).collect();
     let without_tree = traced(context, &with_tree, &rays, Traversal::Brute);
-    // These rays aim at vertices and edges. Where a GPU's division rounds otherwise, an H200 hits others with one in twelve.
+    // These rays aim at vertices and edges. A GPU's division rounds differently: on an H200, one ray in twelve hits
+    // another triangle.
     let n_outliers = if context.is_software() { N_RAYS / 200 } else { N_RAYS / 8 };
     check_against_cpu(name, &world, &rays, (&without_tree, n_outliers));
     let assert_same = |variant: &dyn Display, found: &Traced| {
@@ -125,7 +126,7 @@ fn check(context: &Arc<Context>, name: &str, triangles: Vec<Triangle>) {
     }
 }
 
-/// A device's division may differ in the last bits, and with it a hit at an edge.
+/// Compares hits with the CPU's. A device's division may differ in the last bits, and with it a hit at an edge.
 fn check_against_cpu(name: &str, world: &MeshWithTree, rays: &[PathRay], (found, n_outliers): (&Traced, usize)) {
     let hits: &[Hit] = bytemuck::cast_slice(&found.hits);
     let differs = |(ray, hit): (&PathRay, &Hit)| {
@@ -152,7 +153,7 @@ fn all_kernels_find_the_same() {
     assert_eq!(context.validation_messages(), Vec::<String>::new());
 }
 
-/// Rays from inside a closed mesh at its vertices and edges, through each structure.
+/// Traces rays from inside a closed mesh at its vertices and edges, through each structure.
 #[test]
 fn rays_from_inside_never_leak() {
     let context = context();

@@ -1,4 +1,4 @@
-//! The device's picture against the CPU's.
+//! Tests that the device's picture agrees with the CPU's.
 
 use std::path::Path;
 
@@ -11,11 +11,12 @@ use kdray::{
 use super::studio::{differing, on_both, options};
 use crate::support::scenes;
 
-/// Radiance of a pixel may differ by this much: some 2^-13 of a steep highlight's `pow`.
+/// Largest accepted difference of a pixel's radiance: some 2^-13 of a steep highlight's `pow`.
 const TOLERANCE: f32 = 2e-3;
 
-/// Few pixels may differ more: where the rasterizer's snapped edges, or the rounding of another `sqrt` or `pow`, send a
-/// ray past the other side of an edge. Glass multiplies such rays.
+/// Asserts that at most the fraction `share` of all pixels differs by more than `TOLERANCE`. They do where the
+/// rasterizer's snapped edges, or the rounding of another `sqrt` or `pow`, send a ray past the other side of an edge.
+/// Glass multiplies such rays.
 fn check(name: &str, scene: &FlatScene, options: &RenderOptions, share: f64) {
     let [device, cpu] = on_both(scene, options);
     let n_differing = differing(&device, &cpu, TOLERANCE).len();
@@ -33,7 +34,8 @@ fn device_and_cpu_agree_on_the_scenes_that_ship() {
         let scene = scenes::load(&path);
         let raster = options(96, 72, depth(&scene));
         check(name, &scene, &RenderOptions { primary: Primary::Trace, ..raster.clone() }, 0.002);
-        // Snapped to 1/16 px, the outlines of triangles of less than a pixel are many and far off.
+        // Corners are snapped to 1/16 px. Triangles of less than a pixel have many outlines, which snapping moves
+        // far.
         check(name, &scene, &raster, 0.05);
     }
 }

@@ -1,5 +1,5 @@
-//! Pictures that a device holds only in bands have the same bits as those that it holds at once. The devices here bind
-//! little, so that small pictures show it.
+//! Tests that a picture rendered in bands has the same bits as one rendered at once. The devices here pretend to bind
+//! only little memory, so that even small pictures need bands.
 
 use std::sync::Arc;
 
@@ -16,18 +16,19 @@ use kdray::{
 use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::{meshes, pretended, scenes};
 
-/// Bytes of a row of 64 pixels without features.
+/// Size of a row of 64 pixels without features, in bytes.
 const ROW: u64 = 64 * 16;
 const ELSEWHERE: Camera =
     Camera { eye: vec3(1.5, 0.5, 3.5), target: vec3(0.0, -0.2, 0.0), up: Vec3::Y, vertical_fov_degrees: 60.0 };
 const FILTER: Denoise = Denoise::Paper { threshold: 0.1 };
 
-/// Binds 24 rows of 64 pixels.
+/// Returns a device that binds at most 24 rows of 64 pixels.
 fn small_device() -> Arc<Context> {
     pretended(DeviceOverrides { storage_range: Some(24 * ROW), ..DeviceOverrides::default() })
 }
 
-/// Mirrors, and no glass: rays do not branch, so that a batch has enough pixels even on a device that binds little.
+/// Returns a scene with mirrors but without glass. Its rays do not branch, so that a batch has enough pixels even on
+/// a device that binds little.
 fn scene() -> FlatScene {
     let mut scene = scenes::empty();
     scenes::add(&mut scene, scenes::room(5.0), scenes::diffuse(vec3(0.7, 0.6, 0.5)));
@@ -39,7 +40,7 @@ fn scene() -> FlatScene {
     scene
 }
 
-/// A picture with all that belongs to it.
+/// A picture with its features and its counts of rays.
 #[derive(Clone)]
 struct Made {
     picture: Picture,
@@ -47,7 +48,7 @@ struct Made {
     bounces: Vec<BounceStats>,
 }
 
-/// The pictures that several cameras see, drawn at once.
+/// Renders the pictures of two cameras, each at once.
 fn at_once(context: &Arc<Context>, options: &RenderOptions, n_samples: u32) -> Vec<Made> {
     let scene = scene();
     let mut renderer = Renderer::new(context.clone(), &world_of(&scene), options).expect("a renderer");
@@ -61,7 +62,8 @@ fn at_once(context: &Arc<Context>, options: &RenderOptions, n_samples: u32) -> V
     made.to_vec()
 }
 
-/// The same in bands; how many there are, and how many samples of bands were told of.
+/// Renders the same pictures in bands. Returns them and the number of bands. Asserts that the callback is called for
+/// each sample of each band.
 fn in_bands(context: &Arc<Context>, options: &RenderOptions, n_samples: u32) -> (Vec<Made>, u32) {
     let scene = scene();
     let mut renderer = BandedRenderer::new(context.clone(), &world_of(&scene), options).expect("a renderer");
@@ -79,7 +81,7 @@ fn in_bands(context: &Arc<Context>, options: &RenderOptions, n_samples: u32) -> 
     (made.to_vec(), n_bands)
 }
 
-/// Whether the picture and the features agree in every bit.
+/// Returns whether the picture and the features agree in every bit.
 fn agree(a: &Made, b: &Made) -> bool {
     identical(&a.picture, &b.picture)
         && bytemuck::cast_slice::<_, u8>(&a.features) == bytemuck::cast_slice::<_, u8>(&b.features)
@@ -92,7 +94,7 @@ fn assert_same_bits(options: &RenderOptions, n_samples: u32, least_bands: u32) {
     assert!(n_bands >= least_bands, "{options:?}: {n_bands} bands");
     for (found, expected) in found.iter().zip(&expected) {
         assert!(agree(found, expected), "{options:?}");
-        // The filter's margins are drawn twice.
+        // With the filter, the margins of bands are drawn twice, so that the counts differ.
         assert!(options.denoise != Denoise::Off || found.bounces == expected.bounces, "{options:?}");
     }
     assert!(!agree(&found[0], &found[1]), "the cameras see different pictures");
@@ -114,7 +116,7 @@ fn every_way_of_primary_rays() {
 fn the_noise_filter_sees_beyond_a_band() {
     let filtered = RenderOptions { denoise: FILTER, ..options(64, 48, 2) };
     assert_same_bits(&filtered, 1, 3);
-    // Without it, the picture is another one.
+    // Without the filter, the picture differs.
     let scene = scene();
     let draw = |options: &RenderOptions| {
         let mut renderer = Renderer::new(device(), &world_of(&scene), options).expect("a renderer");
@@ -145,7 +147,7 @@ fn a_device_that_holds_all_pixels_draws_one_band() {
     assert!(made.iter().zip(&at_once(&device(), &options(64, 48, 2), 2)).all(|(a, b)| agree(a, b)));
 }
 
-/// Without this, the small device would prove nothing.
+/// The small device must refuse the picture at once; otherwise the tests with it would prove nothing.
 #[test]
 fn the_small_device_refuses_the_picture_at_once() {
     let scene = scene();

@@ -1,4 +1,4 @@
-//! The same bits run after run, in whatever batches, on whatever number of threads.
+//! Tests that pictures have the same bits in every run, in batches of any size, on any number of threads.
 
 use glam::Vec3;
 use kdray::{
@@ -11,7 +11,7 @@ use kdray::{
 use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::scenes;
 
-/// Glass in glass, nowhere dark: rays double at each of its surfaces.
+/// Returns a scene of glass in glass without dark places, in which the number of rays doubles at each surface.
 pub fn glass_in_glass() -> FlatScene {
     let mut scene = scenes::empty();
     scenes::add(&mut scene, scenes::smooth_sphere(6, 1.4, Vec3::ZERO), scenes::glass(1.5));

@@ -1,4 +1,4 @@
-//! Pictures that are known beforehand.
+//! Tests of pictures whose closed form is known.
 
 use glam::{Vec3, vec3};
 use kdray::{
@@ -10,15 +10,16 @@ use kdray::{
 use super::studio::{differing, on_both, options};
 use crate::support::{meshes, scenes};
 
-/// Largest difference of any channel of any pixel from `radiance`.
+/// Returns the largest difference of any channel of any pixel from `radiance`.
 fn worst(picture: &Picture, radiance: Vec3) -> f32 {
     let off = |pixel: &[f32; 4]| (Vec3::new(pixel[0], pixel[1], pixel[2]) - radiance).abs().max_element();
-    // NaN counts as infinitely wrong.
+    // NaN counts as an infinite difference.
     picture.radiance.iter().map(off).map(|off| if off.is_nan() { f32::INFINITY } else { off }).fold(0.0, f32::max)
 }
 
-/// A closed room that glows alike everywhere, and in it what neither adds nor takes light: all is one colour. (Traced:
-/// a rasterizer may show the back of a mirror's outline, and so a ray would start inside the mirror.)
+/// A furnace: a closed room whose walls all emit the same radiance, with objects that neither add nor absorb light.
+/// The picture has a single colour. Primary rays are traced, since a rasterizer may show the back of a mirror at its
+/// outline, so that a ray would start inside the mirror.
 #[test]
 fn a_furnace_is_uniform() {
     let glow = vec3(0.2, 0.5, 0.9);
@@ -36,14 +37,15 @@ fn a_furnace_is_uniform() {
     for picture in on_both(&scene, &traced(12)) {
         assert!(worst(&picture, glow) < 2e-3, "off by {}", worst(&picture, glow));
     }
-    // Glass splits rays; near total reflection the share that the last level cuts off falls slowly.
+    // Glass splits rays. Near total reflection, the share that the maximum depth cuts off falls slowly with the
+    // depth.
     scenes::add(&mut scene, scenes::smooth_sphere(8, 0.5, vec3(0.3, -1.1, 0.5)), scenes::glass(1.5));
     for picture in on_both(&scene, &traced(40)) {
         assert!(worst(&picture, glow) < 2e-3, "off by {}", worst(&picture, glow));
     }
 }
 
-/// Ambient light alone, or none but emitted: what a surface shows does not depend on where it is.
+/// With ambient light alone, the radiance of a surface does not depend on its position.
 #[test]
 fn ambient_light_is_ka_times_ambient() {
     let mut scene = scenes::empty();
@@ -54,7 +56,7 @@ fn ambient_light_is_ka_times_ambient() {
     }
 }
 
-/// A room of differently glowing walls.
+/// Returns a room whose walls emit different colours.
 fn colourful_room() -> FlatScene {
     let mut scene = scenes::empty();
     for (i, wall) in meshes::cube(4, 0.0).chunks(7).enumerate() {
@@ -64,7 +66,7 @@ fn colourful_room() -> FlatScene {
     scene
 }
 
-/// Not more than a few pixels, on edges of what is seen through the glass, may change.
+/// At most a few pixels may change, on edges that are seen through the glass.
 #[test]
 fn glass_of_index_one_is_invisible() {
     let scene = colourful_room();
@@ -77,7 +79,7 @@ fn glass_of_index_one_is_invisible() {
         let n_differing = differing(without, with, 1e-3).len();
         assert!(n_differing <= 5, "{n_differing} pixels differ");
     }
-    // Of index 1.5 it is visible.
+    // With index 1.5, the glass is visible.
     with_glass
         .materials
         .iter_mut()
@@ -88,7 +90,7 @@ fn glass_of_index_one_is_invisible() {
     }
 }
 
-/// A plane mirror shows what would be seen if the world behind it were the world before it, mirrored.
+/// A plane mirror shows the same picture as the mirrored world in its place.
 #[test]
 fn a_mirror_shows_the_mirrored_world() {
     let things = |scene: &mut FlatScene, side: f32| {
@@ -104,7 +106,7 @@ fn a_mirror_shows_the_mirrored_world() {
             scenes::add(scene, thing, scenes::emissive(vec3(0.3 + 0.3 * i as f32, 0.8 - 0.3 * i as f32, 0.5)));
         }
     };
-    // The camera stands between the mirror (z = 0) and the things, which it turns its back on.
+    // The camera is between the mirror (z = 0) and the objects, and looks away from the objects.
     let camera = Camera { eye: vec3(0.1, 0.0, 1.5), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 50.0 };
     let mut before = FlatScene { camera, background: vec3(0.1, 0.1, 0.2), ..scenes::empty() };
     things(&mut before, 1.0);
@@ -117,14 +119,15 @@ fn a_mirror_shows_the_mirrored_world() {
     {
         direct.radiance.iter_mut().for_each(|[_, g, b, _]| (*g, *b) = (*g * 0.5, *b * 0.25));
         let n_differing = differing(mirrored, &direct, 1e-3).len();
-        assert!(n_differing <= 60, "{n_differing} pixels differ"); // on the things' outlines
+        assert!(n_differing <= 60, "{n_differing} pixels differ"); // on the objects' outlines
         assert!(differing(mirrored, &direct, -1.0).len() == 4800, "the comparison looks at every pixel");
         let n_things = mirrored.radiance.iter().filter(|pixel| pixel[0] > 0.25).count();
         assert!(n_things > 200, "{n_things} pixels show things");
     }
 }
 
-/// A square of half width 0.5 in the plane y = 2, under a lamp at y = 4, darkens the square of half width 1 on y = 0.
+/// A square of half width 0.5 in the plane y = 2, under a lamp at y = 4, casts a shadow on y = 0 that is a square of
+/// half width 1.
 #[test]
 fn a_shadow_ends_where_it_must() {
     let square = |half: f32, y: f32| {
@@ -136,7 +139,7 @@ fn a_shadow_ends_where_it_must() {
     scenes::add(&mut scene, square(4.0, 0.0), scenes::diffuse(Vec3::ONE));
     scenes::add(&mut scene, square(0.5, 2.0), scenes::diffuse(Vec3::ONE));
     scene.lights = vec![scenes::point_light(vec3(0.0, 4.0, 0.0), Vec3::splat(16.0))];
-    // 90 degrees from a height of 1.5: the picture's edge lies 1.5 from its middle.
+    // With a field of view of 90 degrees from a height of 1.5, the picture's edge is 1.5 from its middle.
     scene.camera = Camera { eye: vec3(0.0, 1.5, 0.0), target: Vec3::ZERO, up: Vec3::NEG_Z, vertical_fov_degrees: 90.0 };
     let n = 90;
     for picture in on_both(&scene, &options(n, n, 1)) {
@@ -146,7 +149,8 @@ fn a_shadow_ends_where_it_must() {
             if (x.abs().max(z.abs()) - 1.0).abs() < 0.02 {
                 continue;
             }
-            // Lambert and the square of distance: 16 / 16 at the foot, times the cosine cubed.
+            // Lambert's law and the inverse square of the distance give 16 / 16 below the lamp, times the cubed
+            // cosine.
             let cos = 4.0 / vec3(x, 4.0, z).length();
             let expected = if x.abs().max(z.abs()) < 1.0 { 0.0 } else { cos * cos * cos };
             assert!((pixel[0] - expected).abs() < 1e-4, "at {x}, {z}: {}, not {expected}", pixel[0]);

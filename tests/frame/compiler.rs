@@ -1,5 +1,5 @@
-//! Pictures do not depend on the GLSL compiler that made the kernels: the system's library and the one that is built from
-//! source give the same.
+//! Tests that pictures do not depend on the GLSL compiler: the system's library and the one built from source give
+//! the same pictures.
 
 use std::path::Path;
 
@@ -12,13 +12,13 @@ use kdray::{
 use super::studio::{assert_silent, device, differing, on_cpu, options, world_of};
 use crate::support::scenes;
 
-/// Part of a driver's device name, and the checksums that it gives for `cornell` and `paper2`. They have to be the same
-/// with the feature `shaderc-from-source` and without it. A change of a kernel's arithmetic changes them. Lavapipe gives
-/// the same with registers of 128 bits and of 256.
+/// Part of a driver's device name, and its checksums of `cornell` and `paper2`. They must be the same with the
+/// feature `shaderc-from-source` and without it. A change of a kernel's arithmetic changes them. Lavapipe gives the
+/// same checksums with registers of 128 bits and of 256 bits.
 const CHECKSUMS: [(&str, [u32; 2]); 2] =
     [("llvmpipe", [496181928, 885076327]), ("SwiftShader", [2091055692, 1675913398])];
 
-/// CRC-32 of the displayed pixels.
+/// Returns the CRC-32 of the displayed pixels.
 fn checksum(picture: &Picture) -> u32 {
     crc32fast::hash(picture.display.as_flattened())
 }
@@ -46,7 +46,7 @@ fn pictures_are_the_same_whichever_compiler_made_the_kernels() {
             let found = pictures.each_ref().map(checksum);
             assert_eq!(found, expected, "{name}, kernels of {}", env!("KDRAY_SPIRV_COMPILER"));
         }
-        // Another device may round differently, so that only few pixels have to be those of the CPU.
+        // Another device may round differently, so a few pixels may differ from the CPU's.
         None => (0..2).for_each(|i| {
             let n_differing = differing(&pictures[i], &on_cpu(&scenes[i], &options[i]), 2e-3).len();
             assert!(n_differing <= 14, "{name}: {n_differing} of 6912 pixels differ from the CPU's");

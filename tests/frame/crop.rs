@@ -1,4 +1,4 @@
-//! A part of a picture is the same, bit for bit, as that part of the whole.
+//! Tests that a crop of a picture is the same, bit for bit, as that part of the whole picture.
 
 use kdray::{
     frame::{Crop, Denoise, Picture, Primary, RenderOptions},
@@ -42,7 +42,7 @@ fn a_crop_is_a_part_of_the_whole() {
     }
 }
 
-/// Without its border the filter would see other neighbours.
+/// The filter needs a border around the crop; without it, pixels at the edge would have other neighbours.
 #[test]
 fn the_filter_s_border_matters() {
     let scene = scenes::mixed_outdoors();

@@ -1,4 +1,4 @@
-//! What pixels show beside their colour.
+//! Tests of features, the AOVs of the first hits: position, normal, albedo, depth, ids and costs of each pixel.
 
 use glam::{Vec3, vec3};
 use kdray::{
@@ -42,7 +42,7 @@ fn noting(options: RenderOptions) -> RenderOptions {
     RenderOptions { features: true, ..options }
 }
 
-/// A room of half width 5 seen from its middle, straight on.
+/// The scene is a room of half width 5, seen from its middle along -z.
 #[test]
 fn a_wall_s_features_are_known() {
     let mut scene = scenes::empty();
@@ -57,7 +57,7 @@ fn a_wall_s_features_are_known() {
             assert!((feature.depth - 5.0).abs() < 1e-5 && (feature.position_world.z + 5.0).abs() < 1e-5);
             assert_eq!((feature.normal_world, feature.albedo), (Vec3::Z, vec3(0.25, 0.5, 0.75)));
             assert_eq!(feature.material_ix, 1);
-            // The second lamp stands behind the wall, which turns its back on it.
+            // The second lamp is behind the wall, so it gets no shadow ray.
             assert_eq!(feature.n_rays, 2);
             let x = ((i % 32) as f32 + 0.5) / 16.0 - 1.0;
             let half_width = 5.0 * (45.0_f32 / 2.0).to_radians().tan() * 32.0 / 24.0;
@@ -80,7 +80,7 @@ fn nothing_has_features_too() {
     for primary in [Primary::Raster, Primary::Trace] {
         let options = noting(RenderOptions { primary, ..options(9, 7, 2) });
         for mut features in [on_device, on_cpu].map(|render| render(&scene, &options)) {
-            features.iter_mut().for_each(|feature| feature.n_steps = 0); // the root may be read
+            features.iter_mut().for_each(|feature| feature.n_steps = 0); // a ray that misses may read the root
             assert!(features == [nothing; 63], "{primary}: {:?}", features[0]);
         }
     }
@@ -99,8 +99,8 @@ fn device_and_cpu_agree() {
     }
 }
 
-/// Traced alike, they read the same nodes, slabs and triangles; but for few rays that rounding sends another way. A device that
-/// is software looks at no slabs.
+/// Device and CPU read the same nodes, slabs and triangles, except for a few rays that rounding sends another way. A
+/// software device tests no slabs, so the CPU's tree has none then.
 #[test]
 fn device_and_cpu_count_the_same_steps() {
     let scene = scenes::mixed_outdoors();
@@ -118,7 +118,7 @@ fn device_and_cpu_count_the_same_steps() {
     }
 }
 
-/// A ray through a tree of one leaf reads that, and its triangles; one that misses the tree reads nothing.
+/// A ray through a tree of one leaf reads the leaf and its triangles. A ray that misses the tree reads nothing.
 #[test]
 fn steps_through_one_leaf_are_known() {
     let mut scene = scenes::empty();

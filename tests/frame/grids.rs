@@ -1,4 +1,5 @@
-//! Frames through grids are the kd-tree's frames, bit for bit: hits do not depend on the acceleration structure.
+//! Tests that frames traced through grids are the kd-tree's frames, bit for bit: hits do not depend on the
+//! acceleration structure.
 
 use kdray::{
     accel::kdtree::Traversal,
@@ -17,7 +18,7 @@ use super::{
 };
 use crate::support::{grid_worlds, scenes, world_of};
 
-/// A frame and its features, whose costs are set to 0.
+/// Renders a frame. Returns it and its features, whose costs are set to 0.
 fn on_device(world: &World, options: &RenderOptions) -> (Picture, Vec<Feature>) {
     let context = device();
     let options = RenderOptions { features: true, ..options.clone() };
@@ -43,7 +44,7 @@ fn frames_on_the_device_are_the_kd_trees() {
     }
 }
 
-/// Texels where the device has enough of them, storage that is bound, and by address.
+/// A grid is read as texels where the device has enough of them, as bound storage, or by address.
 #[test]
 fn all_ways_to_read_a_grid_give_the_same_bits() {
     let options = RenderOptions { primary: Primary::Trace, ..options(24, 16, 3) };

@@ -1,4 +1,4 @@
-//! How many lanes a ray has, and how they run, changes nothing.
+//! Tests that the number of lanes per ray, and how they run, does not change the picture.
 
 use kdray::{
     frame::{Primary, RenderOptions},
@@ -23,7 +23,7 @@ fn a_device_with_lanes_to_spare_gives_the_same_bits() {
     };
     let (expected, lanes_log2) = picture(&plain);
     assert!(lanes_log2.iter().all(|&log2| log2 == 0), "{lanes_log2:?}");
-    // Ever fewer rays have ever more lanes.
+    // Later bounces have fewer rays, and so more lanes per ray.
     let spare = with_lanes(3000);
     let (found, lanes_log2) = picture(&spare);
     assert!(lanes_log2[0] == 1 && lanes_log2.is_sorted() && lanes_log2[3] > 1, "{lanes_log2:?}");

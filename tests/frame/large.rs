@@ -1,5 +1,5 @@
-//! What grows with the scene is bound or read as texels, and read by address where the device has less of both: the same bits
-//! in all ways. Tried with devices that have little.
+//! Tests of the three kinds of access to arrays that grow with the scene: bound storage, texels, or by address where
+//! the device's limits exclude the other two. All give the same bits. The devices here pretend to have low limits.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ use kdray::{
 use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::{meshes, pretended, scenes};
 
-/// What the device binds, bytes: enough for the pictures here.
+/// Largest range that the small device binds, in bytes. It is enough for the pictures here.
 pub const RANGE: u64 = 48 << 10;
 
 pub fn device_with(bytes: u64, n_texels: u32) -> Arc<Context> {
@@ -32,25 +32,26 @@ fn small_device() -> Arc<Context> {
     device_with(RANGE, 1)
 }
 
-/// Ropes or the leaves' triangles have the most, one each and three each.
+/// Returns the number of texels of the largest array, which holds the ropes (one texel each) or the leaves' triangles
+/// (three texels each).
 fn most_texels(tree: &KdTree) -> u32 {
     (6 * tree.nodes().len()).max(3 * tree.leaf_triangles().len()) as u32
 }
 
-/// How a device reads what it can bind.
+/// Returns how a device reads arrays that it can bind.
 fn usual_reading(context: &Context, tree: &KdTree) -> SceneAccess {
     let has_texels = most_texels(tree) <= context.limits().n_texels;
     if context.predicates_branches() && has_texels { SceneAccess::Texels } else { SceneAccess::Bound }
 }
 
-/// With a ring of 16,000 triangles: none of its arrays can be bound then.
+/// Returns a world with a ring of 16,000 triangles, of which the small device can bind no array.
 pub fn large_world() -> World {
     let mut scene = scenes::mixed();
     scenes::add(&mut scene, meshes::torus(200, 40), scenes::mirror(Vec3::splat(0.8)));
     world_of(&scene)
 }
 
-/// Of each array that grows with the scene, with whatever the traversal asks for.
+/// Returns the size in bytes of each array that grows with the scene, including those that only this traversal needs.
 fn scene_bytes(tree: &SceneArrays, traversal: Traversal) -> Vec<u64> {
     let mut buffers = vec![
         tree.triangles.any(),
@@ -59,7 +60,7 @@ fn scene_bytes(tree: &SceneArrays, traversal: Traversal) -> Vec<u64> {
         tree.kd_parents.any(),
         tree.leaf_triangles.any(),
     ];
-    // None where the kernels would not look at them.
+    // An array that the kernels would not read is empty.
     buffers.extend((!tree.leaf_planes.is_empty()).then(|| tree.leaf_planes.any()));
     buffers.extend((!tree.kd_slabs.is_empty()).then(|| tree.kd_slabs.any()));
     let has_boxes = matches!(traversal, Traversal::MaskBoxes | Traversal::Backtrack);
@@ -92,8 +93,8 @@ fn a_scene_larger_than_what_the_device_binds_gives_the_same_bits() {
     assert_silent(&small);
 }
 
-/// Between them, these traversals read all arrays but slabs, of which software drivers have none. On a GPU, and where there are
-/// few texels, the two ways are one.
+/// Together, these traversals read all arrays except slabs, which software drivers do not use. On a GPU, and where
+/// there are few texels, both renderers use the same access.
 #[test]
 fn texels_and_what_is_bound_give_the_same_bits() {
     let (world, any, bound) = (large_world(), device(), device_with(u64::MAX, 1));
@@ -111,7 +112,7 @@ fn texels_and_what_is_bound_give_the_same_bits() {
     assert_silent(&bound);
 }
 
-/// What kernels that rasterize note of large triangles is bound; the triangles need not be.
+/// The rasterizing kernels bind their list of large triangles. The triangles themselves need not be bound.
 #[test]
 fn triangles_that_are_not_bound_are_rasterized() {
     let (world, any) = (large_world(), device());
@@ -169,7 +170,8 @@ fn rays_through_a_scene_larger_than_what_the_device_binds_find_the_same_hits() {
     assert_silent(&small);
 }
 
-/// One array beyond the range is enough, and what another traversal would read counts; a byte or texel less, and all are read so.
+/// If a single array is beyond the range, even one that only another traversal reads, all arrays are read by address.
+/// If the device has one texel too few, all are read as bound storage.
 #[test]
 fn a_scene_is_read_by_address_only_where_something_of_it_cannot_be_bound() {
     let scene = scenes::mixed();
@@ -194,7 +196,7 @@ fn a_scene_is_read_by_address_only_where_something_of_it_cannot_be_bound() {
     }
 }
 
-/// Without this, the small device would prove nothing.
+/// The small device must refuse buffers beyond its range; otherwise the tests with it would prove nothing.
 #[test]
 fn what_is_bound_is_held_against_the_range() {
     let (world, small) = (large_world(), small_device());
@@ -218,7 +220,7 @@ fn a_buffer_larger_than_the_devices_memory_is_refused_in_one_line() {
     assert_silent(&context);
 }
 
-/// Uploads come in parts, of whole elements.
+/// A large upload is made in parts, each of whole elements.
 #[test]
 fn a_large_upload_arrives_whole() {
     let context = device();

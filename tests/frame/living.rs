@@ -1,4 +1,4 @@
-//! A renderer that has been changed draws what a new one draws, bit for bit.
+//! Tests that a changed renderer draws the same picture as a new one, bit for bit.
 
 use glam::vec3;
 use kdray::{
@@ -16,7 +16,7 @@ use crate::support::scenes;
 const ELSEWHERE: Camera =
     Camera { eye: vec3(1.5, 0.5, 3.5), target: vec3(0.0, -0.2, 0.0), up: glam::Vec3::Y, vertical_fov_degrees: 60.0 };
 
-/// Means of so many samples.
+/// Draws `n_samples` samples from the start and returns their mean.
 fn sampled(renderer: &mut Renderer, n_samples: u32) -> Picture {
     renderer.reset_samples();
     for _ in 0..n_samples {

@@ -1,5 +1,5 @@
-//! Whole frames on the device, under the validation layer, and on the CPU: against one another, against closed forms,
-//! and against themselves in other batches and on other numbers of threads.
+//! Tests of whole frames on the device, under the validation layer, and on the CPU. They are compared with each
+//! other, with closed forms, and with the same frames in other batches and on other numbers of threads.
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,4 +1,4 @@
-//! What does not fit together is refused before a kernel, which checks no bounds, can read it.
+//! Tests that data that does not fit together is refused before a kernel reads it, since kernels check no bounds.
 
 use kdray::{
     accel::{
@@ -10,7 +10,8 @@ use kdray::{
 
 use crate::support::scenes;
 
-/// Why there is no world of the scene, whether it builds the tree or is given it. It must be the same.
+/// Returns the error of making a world of the scene. It must be the same whether the world builds the tree or is
+/// given it.
 fn refusal(scene: &FlatScene) -> Mismatch {
     let options = BuildOptions::default();
     let built = World::of_flat(scene.clone(), &options).expect_err("a refusal");

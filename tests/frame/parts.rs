@@ -1,4 +1,5 @@
-//! A sample in parts is the sample in one, bit for bit, and shows nothing of itself before it is complete.
+//! Tests that a sample drawn in parts is the same, bit for bit, as one drawn at once, and is not visible before it is
+//! complete.
 
 use kdray::{
     frame::{Picture, RenderOptions, View},
@@ -15,7 +16,7 @@ fn options_of_parts() -> RenderOptions {
     options(32, 24, 5)
 }
 
-/// Draws so many samples in parts; gives the picture and the number of parts.
+/// Draws `n_samples` samples in parts. Returns the picture and the number of parts.
 fn in_parts(renderer: &mut Renderer, n_samples: u32) -> (Picture, u32) {
     let mut n_parts = 0;
     while renderer.n_samples() < n_samples {
@@ -47,7 +48,7 @@ fn parts_make_the_same_picture() {
             renderer.reset_samples();
             let (picture, n) = in_parts(&mut renderer, n_samples);
             assert!(identical(&picture, whole), "{most_pixels:?}, {n_samples} samples");
-            // More where a queue overflowed.
+            // There are more parts if a queue overflowed.
             assert!(n >= n_samples * n_parts, "{most_pixels:?}: {n} parts");
         }
         assert!(identical(&at_once(&mut renderer, 3), &whole[1]));
@@ -66,7 +67,7 @@ fn what_is_dropped_half_way_leaves_no_trace() {
         renderer.reset_samples();
         in_parts(&mut renderer, n_before);
         assert!(renderer.draw_part().expect("a part").is_none() && renderer.is_pending());
-        // Begun anew, in other parts.
+        // The sample is begun again, in other parts.
         renderer.limit_batches(Some(300 + n_before)).expect("batches");
         assert!(!renderer.is_pending());
         assert!(identical(&in_parts(&mut renderer, 3).0, &whole), "after {n_before} samples");
@@ -138,7 +139,8 @@ fn steps_make_the_same_picture() {
         while renderer.draw_step().expect("a step").is_none() {
             shares.push(renderer.progress());
         }
-        // What begins and ends the frame, its bounces and their light; more where rays can stall.
+        // There are steps that begin and end the frame, and steps for its bounces and their light. There are more
+        // where rays can stall.
         assert!(shares.len() >= options_of_parts().max_depth as usize + 3);
         assert!(shares.is_sorted_by(|a, b| a < b) && shares.iter().all(|share| *share < 1.0), "{shares:?}");
     }
@@ -146,7 +148,8 @@ fn steps_make_the_same_picture() {
     assert_silent(&context);
 }
 
-/// Depth, normals and triangles: no ray but primary ones, the same features, and afterwards the same picture.
+/// The views of depth, normals and triangles trace only primary rays, have the same features, and leave the picture
+/// as it is.
 #[test]
 fn views_of_first_hits_trace_primary_rays_only() {
     let (scene, context) = (glass_in_glass(), device());
@@ -174,7 +177,7 @@ fn views_of_first_hits_trace_primary_rays_only() {
             assert_eq!((found.normal_world, found.material_ix), (expected.normal_world, expected.material_ix));
         }
         renderer.show().expect("the view again");
-        // The picture again, and features with all rays.
+        // Back in the picture's view, the picture and the features with all rays are the same.
         renderer.set_view(View::Picture, 1.0);
         assert_eq!(renderer.n_samples(), 0, "no sample of the picture is there yet");
         assert!(identical(&in_parts(&mut renderer, 2).0, &picture), "after {view}");

@@ -1,4 +1,4 @@
-//! Rasterized primaries against traced ones: the same picture but for pixels on edges.
+//! Tests that rasterized primary visibility gives the picture of traced primary rays, except for pixels on edges.
 
 use std::collections::HashSet;
 
@@ -20,8 +20,8 @@ use kdray::{
 use super::studio::{assert_silent, device, differing, identical, on_cpu, on_device, options, world_of};
 use crate::support::{scenes, with_lanes, without_wide_atomics};
 
-/// Whether rays within 1/8 px of the pixel's centre meet more than one triangle. (Corners are snapped to a grid of
-/// 1/16 px or finer.)
+/// Returns whether rays within 1/8 px of the pixel's centre meet more than one triangle. The rasterizer snaps corners
+/// to a grid of 1/16 px or finer.
 fn is_on_edge(world: &World, options: &RenderOptions, pixel_ix: usize) -> bool {
     let frame = world.frame_constants(options);
     let pixel = UVec2::new(pixel_ix as u32 % frame.width, pixel_ix as u32 / frame.width);
@@ -39,7 +39,7 @@ fn is_on_edge(world: &World, options: &RenderOptions, pixel_ix: usize) -> bool {
     ids.len() > 1
 }
 
-/// How many pixels differ in any bit, and those of them that are on no edge.
+/// Returns the number of pixels that differ, and those of them that are not on an edge.
 fn off_edges(scene: &FlatScene, options: &RenderOptions, a: &Picture, b: &Picture) -> (usize, Vec<usize>) {
     let world = world_of(scene);
     let differing = differing(a, b, 0.0);
@@ -61,7 +61,8 @@ fn raster_and_trace_differ_only_on_edges() {
     }
 }
 
-/// Triangles that kernels rasterize are those that rays hit, to the last bit; in batches, windows and samples, too.
+/// The picture of the rasterizing kernels is that of traced rays, to the last bit, also in batches, crops and
+/// samples.
 #[test]
 fn compute_and_trace_are_the_same() {
     let trace = RenderOptions { primary: Primary::Trace, ..options(120, 90, 4) };
@@ -89,7 +90,8 @@ fn compute_and_trace_are_the_same() {
     }
 }
 
-/// What takes less work, and what there is room for. A device that takes branches lane by lane is taken for a GPU.
+/// The default method depends on the work and on the device's memory. A device that does not predicate branches
+/// counts as a GPU.
 #[test]
 fn ways_suit_the_device() {
     let gpu = with_lanes(1000);
@@ -105,7 +107,7 @@ fn ways_suit_the_device() {
     assert_eq!(suited, [Traversal::Mask, way, Traversal::Stack]);
 }
 
-/// A living renderer makes room for what another way needs.
+/// A renderer allocates the buffers of another method when its options change.
 #[test]
 fn primaries_change_between_frames() {
     let context = device();
@@ -130,7 +132,7 @@ fn a_pixel_off_the_edges_is_noticed() {
     let (scene, options) = (scenes::mixed(), options(120, 90, 1));
     let picture = on_cpu(&scene, &options);
     let mut changed = picture.clone();
-    // Of ten pixels in a row some lie on no edge.
+    // At least one of ten pixels in a row is not on an edge.
     (500..510).for_each(|i| changed.radiance[i][0] += 0.1);
     assert!(!off_edges(&scene, &options, &picture, &changed).1.is_empty());
 }

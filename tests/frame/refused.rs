@@ -1,5 +1,5 @@
-//! A change that the device refuses, at whichever of its steps, changes nothing: the picture stays, and the next one has
-//! the bits that a renderer draws which nobody has tried to change.
+//! Tests that a change that the device refuses at any step changes nothing: the picture remains, and the next picture
+//! has the same bits as that of a renderer without the attempted change.
 
 use std::sync::Arc;
 
@@ -17,16 +17,16 @@ use kdray::{
 use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::{pretended, scenes, without_wide_atomics};
 
-/// From where all pictures here are seen; not the scene's own camera.
+/// Camera of all pictures here, which is not the scene's own.
 const CAMERA: Camera =
     Camera { eye: Vec3::new(0.4, 0.3, 3.9), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 50.0 };
 
-/// With few pixels, since each refused step draws two samples.
+/// Returns options of a picture with few pixels, since each refused step draws two samples.
 fn small() -> RenderOptions {
     options(15, 10, 2)
 }
 
-/// Pixels of a batch, so that a sample has several parts.
+/// Number of pixels of a batch, chosen so that a sample has several parts.
 const BATCH: u32 = 30;
 
 /// Draws one sample and a part of the second one.
@@ -42,7 +42,7 @@ fn finish(renderer: &mut Renderer) -> Picture {
     renderer.picture().expect("a picture")
 }
 
-/// What a user sees of a renderer.
+/// The state of a renderer that a user can see.
 #[derive(Debug, PartialEq)]
 struct State {
     options: RenderOptions,
@@ -64,12 +64,12 @@ fn state(renderer: &Renderer) -> State {
     }
 }
 
-/// A renderer that is changed again and again.
+/// A renderer that is changed repeatedly.
 struct Trial {
     context: Arc<Context>,
     world: World,
     renderer: Renderer,
-    /// What new renderers draw by two samples, for each of the options so far.
+    /// Pictures of two samples by new renderers, one for each of the options so far.
     untouched: Vec<(RenderOptions, Picture)>,
 }
 
@@ -88,7 +88,7 @@ impl Trial {
         renderer
     }
 
-    /// What a new renderer draws with the options of the changed one.
+    /// Returns the picture that a new renderer draws with the options of the changed one.
     fn untouched(&mut self) -> Picture {
         let options = self.renderer.options();
         if let Some((_, picture)) = self.untouched.iter().find(|(known, _)| known == options) {
@@ -101,7 +101,8 @@ impl Trial {
         picture
     }
 
-    /// Refuses the change at each of its creations in turn, until it succeeds. There are so many of them, at least.
+    /// Makes the change repeatedly. The device refuses first its first creation of an object, then its second, and so
+    /// on, until the change succeeds. It must have at least `least_creations` creations.
     fn refuse(&mut self, name: &str, least_creations: u32, change: &Change) {
         let untouched = self.untouched();
         let renderer = &mut self.renderer;
@@ -124,7 +125,7 @@ impl Trial {
         assert!(identical(&finish(&mut self.renderer), &self.untouched()), "{name}");
     }
 
-    /// Goes from options to options, each of which the device refuses first.
+    /// Changes to each of the options in turn. The device refuses each change first.
     fn walk(&mut self, steps: &[(RenderOptions, u32)]) {
         for (to, least_creations) in steps {
             let name = format!("{:?} to {to:?}", self.renderer.options());
@@ -143,7 +144,7 @@ fn another_traversal() {
     Trial::new(device(), &small()).walk(&ways);
 }
 
-/// Kernels that read by address find the boxes and ropes by a buffer of addresses, which changes with them.
+/// Kernels that read by address find boxes and ropes in a buffer of addresses, which changes with the traversal.
 #[test]
 fn another_traversal_of_arrays_that_are_read_by_address() {
     let overrides = DeviceOverrides { storage_range: Some(48 << 10), n_texels: Some(1), ..DeviceOverrides::default() };
@@ -196,7 +197,7 @@ fn other_batches() {
     assert_silent(&trial.context);
 }
 
-/// The second sample begins with the sums of samples, which need memory.
+/// The second sample begins with the allocation of the sums of samples.
 #[test]
 fn a_sample_that_cannot_begin_leaves_those_before() {
     let mut trial = Trial::new(device(), &small());

@@ -1,4 +1,4 @@
-//! Pictures of several samples a pixel.
+//! Tests of pictures with several samples per pixel.
 
 use glam::{Vec3, vec3};
 use kdray::{
@@ -16,7 +16,8 @@ use super::{
 };
 use crate::support::{meshes, scenes};
 
-/// White to the left of x = `edge` in the plane z = 0, black elsewhere; a pixel of a picture 30 high is 1/10 wide there.
+/// Returns a scene that is white to the left of x = `edge` in the plane z = 0 and black elsewhere. In a picture 30
+/// pixels high, a pixel is 1/10 wide in that plane.
 fn half_plane(edge: f32) -> FlatScene {
     let mut scene = scenes::empty();
     let corner = |x: f32, y: f32| vec3(x, y, 0.0);
@@ -27,13 +28,13 @@ fn half_plane(edge: f32) -> FlatScene {
     scene
 }
 
-/// The share of a tent filter over -1 to 1 that lies left of `x`.
+/// Returns the share of a tent filter over -1 to 1 that is left of `x`.
 fn left_of(x: f32) -> f32 {
     let x = x.clamp(-1.0, 1.0);
     0.5 + x - x * x.abs() / 2.0
 }
 
-/// Farthest that any pixel of a picture 40 wide is from what the filter makes of the edge.
+/// Returns the largest difference of any pixel of a picture 40 pixels wide from the filtered edge.
 fn worst(picture: &Picture, edge: f32) -> f32 {
     let of_column = |x: usize| left_of((edge * 10.0 + 20.0) - (x as f32 + 0.5));
     let off = |(i, pixel): (usize, &[f32; 4])| (pixel[0] - of_column(i % 40)).abs();
@@ -45,7 +46,8 @@ fn an_edge_converges_to_the_filter_s_coverage() {
     for (edge, primary) in [(0.03, Primary::Raster), (0.68, Primary::Trace), (-1.25, Primary::Raster)] {
         let (scene, options) = (half_plane(edge), RenderOptions { primary, ..options(40, 30, 1) });
         for (name, render) in [("device", on_device as fn(&_, &_, _) -> _), ("cpu", on_cpu)] {
-            // Three samples' weight for their number, and what snapping to 1/16 px moves an edge.
+            // The tolerance is the weight of three of 256 samples, and 1/32 px for edges moved by snapping to 1/16
+            // px.
             let found = worst(&render(&scene, &options, 256), edge);
             assert!(found < 3.0 / 256.0 + 1.0 / 32.0, "{name}, {edge}: {found}");
             let one = worst(&render(&scene, &options, 1), edge);
@@ -84,7 +86,7 @@ fn small_queues_give_the_same_bits() {
         (renderer.picture().expect("a picture"), profiles)
     };
     let (whole, profiles) = render(100_000);
-    // Enough for the first sample, but not for all.
+    // This capacity is enough for the first sample, but not for all samples.
     let enough: u32 = profiles[0].bounces.iter().map(|bounce| bounce.n_rays as u32).sum();
     for capacity in [600, 1000, enough] {
         let (picture, profiles) = render(capacity);

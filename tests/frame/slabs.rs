@@ -1,4 +1,4 @@
-//! Slabs spare rays steps, and change nothing else.
+//! Tests that slabs (pairs of planes that bound a node's triangles) spare rays steps, and change nothing else.
 
 use std::sync::Arc;
 
@@ -16,12 +16,12 @@ use kdray::{
 use super::studio::{assert_silent, identical, options};
 use crate::support::{meshes, scenes, with_lanes, world_by, world_of};
 
-/// One whose kernels look at slabs, whatever the driver.
+/// Returns a device whose kernels test slabs on every driver.
 fn device() -> Arc<Context> {
     with_lanes(0)
 }
 
-/// A mirror of many small triangles, which rays graze.
+/// Returns a scene with a mirror of many small triangles, which rays graze.
 fn scene() -> FlatScene {
     let mut scene = scenes::mixed();
     scenes::add(&mut scene, meshes::torus(120, 60), scenes::mirror(Vec3::splat(0.8)));
@@ -36,7 +36,7 @@ fn steps(features: &[Feature]) -> u64 {
     features.iter().map(|feature| u64::from(feature.n_steps)).sum()
 }
 
-/// The picture, and the steps of all its rays.
+/// Returns the picture and the number of steps of all its rays.
 fn render(context: &Arc<Context>, world: &World, traversal: Traversal) -> (Picture, u64) {
     let mut renderer = Renderer::new(context.clone(), world, &options_of(traversal)).expect("a renderer");
     let picture = renderer.render().expect("a frame").0;
@@ -55,7 +55,7 @@ fn slabs_spare_steps_and_change_no_bit() {
     let (scene, context) = (scene(), device());
     let [with, without] = [true, false].map(|slabs| world_by(&scene, &BuildOptions { slabs, ..Default::default() }));
     assert!(without.tree().slabs().is_empty());
-    // What is kept on the way down, a way back by boxes, and ropes: each goes on from a slab in its own way.
+    // After a missed slab, each of these traversals continues in its own way: by its mask, by boxes, or by ropes.
     for traversal in [Traversal::Mask, Traversal::Backtrack, Traversal::Ropes] {
         let ((expected, all), (found, some)) =
             (render(&context, &without, traversal), render(&context, &with, traversal));
@@ -67,7 +67,7 @@ fn slabs_spare_steps_and_change_no_bit() {
     assert_silent(&context);
 }
 
-/// What the test above rests on.
+/// Slabs that do not enclose their triangles lose them. This shows that the kernels do test slabs.
 #[test]
 fn slabs_beside_their_surface_lose_it() {
     let (scene, context) = (scene(), device());

@@ -1,4 +1,4 @@
-//! Rendering in tests.
+//! Functions that render pictures in tests, and compare them.
 
 use std::sync::Arc;
 
@@ -12,12 +12,12 @@ use kdray::{
 
 pub use crate::support::world_of;
 
-/// Without a noise filter.
+/// Returns options without a noise filter.
 pub fn options(width: u32, height: u32, max_depth: u32) -> RenderOptions {
     RenderOptions { width, height, max_depth, denoise: Denoise::Off, ..RenderOptions::default() }
 }
 
-/// A device whose validation messages `assert_silent` looks at.
+/// Returns a device that collects validation messages, for `assert_silent`.
 pub fn device() -> Arc<Context> {
     Context::new(&ContextOptions::new(None, true)).expect("a device with validation")
 }
@@ -39,7 +39,7 @@ pub fn on_cpu(scene: &FlatScene, options: &RenderOptions) -> Picture {
     cpu::render(&world_of(scene), options).0
 }
 
-/// The mean of so many samples a pixel.
+/// Renders the mean of `n_samples` samples per pixel on the device.
 pub fn samples_on_device(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
     let context = device();
     let mut renderer = Renderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
@@ -48,7 +48,7 @@ pub fn samples_on_device(scene: &FlatScene, options: &RenderOptions, n_samples: 
     renderer.picture().expect("a picture")
 }
 
-/// As [`samples_on_device`].
+/// Renders the mean of `n_samples` samples per pixel on the CPU.
 pub fn samples_on_cpu(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
     let world = world_of(scene);
     let mut renderer = cpu::Renderer::new(&world, options, Batching::default());
@@ -56,20 +56,20 @@ pub fn samples_on_cpu(scene: &FlatScene, options: &RenderOptions, n_samples: u32
     renderer.picture()
 }
 
-/// The device's picture and the CPU's: what holds for one has to hold for the other.
+/// Renders the picture on the device and on the CPU, for properties that both must have.
 pub fn on_both(scene: &FlatScene, options: &RenderOptions) -> [Picture; 2] {
     [on_device(scene, options), on_cpu(scene, options)]
 }
 
-/// Pixels in which a channel's radiance differs by more than `tolerance`, by index.
+/// Returns the indices of the pixels in which a channel's radiance differs by more than `tolerance`.
 pub fn differing(a: &Picture, b: &Picture, tolerance: f32) -> Vec<usize> {
     assert_eq!((a.width, a.height, a.radiance.len()), (b.width, b.height, b.radiance.len()));
-    // Not `>`: a NaN differs.
+    // The condition is not `>`, so that NaN differs.
     let differs = |a: &[f32; 4], b: &[f32; 4]| (0..4).any(|i| !((a[i] - b[i]).abs() <= tolerance));
     (0..a.radiance.len()).filter(|&i| differs(&a.radiance[i], &b.radiance[i])).collect()
 }
 
-/// Whether radiance and display agree in every bit.
+/// Returns whether radiance and displayed pixels agree in every bit.
 pub fn identical(a: &Picture, b: &Picture) -> bool {
     let bits = |picture: &Picture| -> Vec<_> { picture.radiance.iter().map(|p| p.map(f32::to_bits)).collect() };
     bits(a) == bits(b) && a.display == b.display && (a.width, a.height) == (b.width, b.height)

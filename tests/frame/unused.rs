@@ -1,4 +1,4 @@
-//! What the options do not ask for is not made: no memory, no time.
+//! Tests that buffers and passes that the options do not need are not made, so that they cost no memory and no time.
 
 use kdray::{
     buffers::Resources,
@@ -16,7 +16,7 @@ fn with(primary: Primary) -> RenderOptions {
     RenderOptions { primary, ..options(SIZE.0, SIZE.1, 2) }
 }
 
-/// Whether there is all that the graphics pipeline draws by and to, or, where nothing is drawn, none of it.
+/// Asserts that the graphics pipeline's indices and targets exist if it is used, and do not exist otherwise.
 fn assert_drawn_by(resources: &Resources, scene: &FlatScene, primary: Primary) {
     let pixels = &resources.pixels;
     let found = (

@@ -1,5 +1,6 @@
-//! The kd-tree: valid and bounded on any input, the same on any number of threads, as cheap as a plain exact builder's,
-//! and right against brute force. The validator: each check fails on a planted error.
+//! Tests of the kd-tree. It is valid and within its bounds on any input, the same on any number of threads, about as
+//! cheap as that of a plain exact builder, and finds the hits of brute force. Each check of the validator fails on a
+//! planted error.
 
 mod meshes;
 mod oracle;
@@ -12,14 +13,14 @@ use kdray::{
 };
 use meshes::{Random, boxed, boxes, needles, room, soup, sphere, terrain, triangle};
 
-/// Meshes of every kind, by name.
+/// Returns meshes of every kind, each with its name.
 fn all_meshes() -> Vec<(&'static str, Vec<Triangle>)> {
     vec![
         ("sphere", sphere(70)),
         ("terrain", terrain(70)),
         ("room", room(40)),
         ("box", boxed(Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0), 16)),
-        // Most walls lie inside the root's cell, in the planes of splits.
+        // Most walls are inside the root's cell and lie in the planes of splits.
         ("boxes", boxes(20)),
         ("small soup", soup(5000, 0.02, 1)),
         ("large soup", soup(500, 0.5, 2)),
@@ -27,7 +28,7 @@ fn all_meshes() -> Vec<(&'static str, Vec<Triangle>)> {
     ]
 }
 
-/// Builds, and checks what every tree has to keep.
+/// Builds a tree, and asserts that it is valid and within the limits of depth and of references.
 fn build(triangles: &[Triangle], options: &BuildOptions) -> KdTree {
     let tree = KdTree::build(triangles, options);
     assert_eq!(tree.validate(triangles), Ok(()));
@@ -48,13 +49,14 @@ fn is_as_cheap_as_a_plain_exact_build() {
             let cost = tree.statistics(triangles.len(), &options).sah_cost;
             let oracle = oracle::sah_cost(&triangles, &options);
             println!("{name}: {cost:.4}, plain {oracle:.4}");
-            // Planes of equal weight and their rounding make different trees.
+            // The trees may differ, because rounding decides between planes of equal weight.
             assert!(cost <= oracle * 1.005, "{name}: {cost} against {oracle}");
         }
     }
 }
 
-/// Planes between bins: another tree, little worse, and the same where cells are too small for bins.
+/// Planes between bins make another tree, which is little worse. Cells of few triangles use no bins, so a small mesh
+/// has the same tree.
 #[test]
 fn is_nearly_as_cheap_without_exact_planes() {
     let mut n_same = 0;
@@ -75,7 +77,7 @@ fn is_nearly_as_cheap_without_exact_planes() {
 
 #[test]
 fn is_the_same_on_any_number_of_threads() {
-    // Large enough for parallel counting, sorting and partition.
+    // The mesh is large enough for parallel counting, sorting and partition.
     let triangles = [sphere(180), terrain(120), soup(3000, 0.2, 4)].concat();
     for options in [BuildOptions::default(), BuildOptions::fast()] {
         let build_with = |n_threads| {
@@ -158,7 +160,7 @@ fn keeps_its_limits() {
     let n_references = build(&triangles, &unbounded).leaf_triangles().len();
     for max_references_per_triangle in [0, 1, 2, 4] {
         let options = BuildOptions { max_references_per_triangle, ..unbounded.clone() };
-        // Only as strict as it must be.
+        // The build keeps the limit, but is not much stricter than necessary.
         if max_references_per_triangle > 0 {
             let n = build(&triangles, &options).leaf_triangles().len();
             assert!(n < n_references && n > max_references_per_triangle as usize * 1000, "{n}");
@@ -172,13 +174,13 @@ fn keeps_its_limits() {
 
 #[test]
 fn statistics_of_a_split_by_hand() {
-    // Two small triangles at either end of a box of 4 x 1 x 1 would be cut apart at 1 and 3.
+    // Two small triangles are at either end of a box of 4 x 1 x 1. The candidate planes between them are 1 and 3.
     let at = |x: f32| triangle([Vec3::new(x, 0.0, 0.0), Vec3::new(x + 1.0, 1.0, 0.0), Vec3::new(x, 0.0, 1.0)]);
     let triangles = [at(0.0), at(3.0)];
     let options = BuildOptions { intersection_cost: 4.0, empty_bonus: 0.0, max_depth: Some(1), ..Default::default() };
     let tree = build(&triangles, &options);
     let statistics = tree.statistics(2, &options);
-    // One step; a child of 1 x 1 x 1 (surface 6 of 18) and one of 3 x 1 x 1 (14 of 18) with a test each.
+    // The cost is one step and one test in each child: of 1 x 1 x 1 (surface 6 of 18) and 3 x 1 x 1 (14 of 18).
     assert!((statistics.sah_cost - (1.0 + 4.0 * 20.0 / 18.0)).abs() < 1e-3, "{statistics:?}");
     assert_eq!((statistics.n_nodes, statistics.n_leaves, statistics.n_empty_leaves), (3, 2, 0));
     assert_eq!((statistics.n_references, statistics.references_per_triangle, statistics.depth), (2, 1.0, 1));
@@ -202,7 +204,7 @@ fn finds_what_brute_force_finds() {
     }
 }
 
-/// All triangles of leaves whose cells a ray meets.
+/// Returns all triangles of the leaves whose cells a ray meets.
 fn candidates(tree: &KdTree, origin: Vec3, direction: Vec3) -> Vec<u32> {
     let mut found = Vec::new();
     let mut stack = vec![(0, tree.cell_min(), tree.cell_max())];
@@ -226,7 +228,7 @@ fn candidates(tree: &KdTree, origin: Vec3, direction: Vec3) -> Vec<u32> {
     found
 }
 
-/// Distance and index of the closest hit (Moeller and Trumbore 1997).
+/// Returns the distance and the index of the closest hit (Moeller and Trumbore 1997).
 fn closest(triangles: &[Triangle], candidates: &[u32], origin: Vec3, direction: Vec3) -> Option<(f32, u32)> {
     let hit = |&ix: &u32| {
         let t = &triangles[ix as usize];

@@ -1,14 +1,14 @@
-//! Meshes made by formula, from fixed seeds.
+//! Meshes made by formulas and from fixed seeds.
 
 use glam::Vec3;
 use kdray::layout::Triangle;
 
-/// A corner list as a triangle.
+/// Returns the triangle with these corners.
 pub fn triangle(corners: [Vec3; 3]) -> Triangle {
     Triangle { v0: corners[0], v1: corners[1], v2: corners[2], ..Default::default() }
 }
 
-/// SplitMix64 (Steele, Lea and Flood 2014).
+/// The random generator SplitMix64 (Steele, Lea and Flood 2014).
 pub struct Random(pub u64);
 
 impl Random {
@@ -19,18 +19,18 @@ impl Random {
         z ^ z >> 31
     }
 
-    /// 0 to 1.
+    /// Returns a number from 0 to 1, without 1.
     pub fn unit(&mut self) -> f32 {
         (self.next() >> 40) as f32 / (1 << 24) as f32
     }
 
-    /// In the cube from -1 to 1.
+    /// Returns a point in the cube from -1 to 1.
     pub fn point(&mut self) -> Vec3 {
         Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
     }
 }
 
-/// Triangles with corners within `size` of random points of the cube.
+/// Returns triangles whose corners are within `size`, along each axis, of random points in the cube from -1 to 1.
 pub fn soup(n: usize, size: f32, seed: u64) -> Vec<Triangle> {
     let mut random = Random(seed);
     let mut corners = || {
@@ -40,7 +40,8 @@ pub fn soup(n: usize, size: f32, seed: u64) -> Vec<Triangle> {
     (0..n).map(|_| corners()).collect()
 }
 
-/// A patch of `n * n` squares, two triangles each, of corners `surface(u, v)`, u and v from 0 to 1.
+/// Returns a patch of `n * n` squares of two triangles each. Their corners are `surface(u, v)`, with u and v from 0
+/// to 1.
 pub fn patch(n: usize, surface: impl Fn(f32, f32) -> Vec3) -> Vec<Triangle> {
     let corner = |i: usize, j: usize| surface(i as f32 / n as f32, j as f32 / n as f32);
     let square = |i: usize, j: usize| {
@@ -50,7 +51,7 @@ pub fn patch(n: usize, surface: impl Fn(f32, f32) -> Vec3) -> Vec<Triangle> {
     (0..n * n).flat_map(|ix| square(ix % n, ix / n)).collect()
 }
 
-/// A unit sphere by latitude and longitude, with triangles without an area at the poles.
+/// Returns a unit sphere by latitude and longitude. At the poles it has triangles without area.
 pub fn sphere(n: usize) -> Vec<Triangle> {
     patch(n, |u, v| {
         let ((sin, cos), (height, radius)) = ((u * std::f32::consts::TAU).sin_cos(), {
@@ -61,7 +62,7 @@ pub fn sphere(n: usize) -> Vec<Triangle> {
     })
 }
 
-/// Hills over a square, small ones on large ones.
+/// Returns a square of small hills on large hills.
 pub fn terrain(n: usize) -> Vec<Triangle> {
     patch(n, |u, v| {
         let hills = |f: f32| (u * f).sin() * (v * f + 1.0).cos() / f;
@@ -69,7 +70,7 @@ pub fn terrain(n: usize) -> Vec<Triangle> {
     })
 }
 
-/// A room of six flat walls of two triangles, with spheres in it.
+/// Returns a room of six flat walls of two triangles each, with two spheres in it.
 pub fn room(n: usize) -> Vec<Triangle> {
     let mut triangles = boxed(Vec3::ZERO, Vec3::splat(10.0), 1);
     for (center, radius) in [(Vec3::new(3.0, 2.0, 4.0), 2.0), (Vec3::new(7.0, 1.0, 6.0), 1.0)] {
@@ -78,7 +79,7 @@ pub fn room(n: usize) -> Vec<Triangle> {
     triangles
 }
 
-/// The six faces of a box, each of `n * n` squares: all triangles lie in planes that are square to an axis.
+/// Returns the six faces of a box, each of `n * n` squares. All triangles lie in planes perpendicular to an axis.
 pub fn boxed(min: Vec3, max: Vec3, n: usize) -> Vec<Triangle> {
     let size = max - min;
     let mut triangles = Vec::new();
@@ -92,7 +93,7 @@ pub fn boxed(min: Vec3, max: Vec3, n: usize) -> Vec<Triangle> {
     triangles
 }
 
-/// Boxes without symmetry, which would make many planes equally cheap.
+/// Returns random boxes. They have no symmetry, which would make many planes equally cheap.
 pub fn boxes(n: usize) -> Vec<Triangle> {
     let mut random = Random(13);
     let mut next = || {
@@ -102,7 +103,7 @@ pub fn boxes(n: usize) -> Vec<Triangle> {
     (0..n).flat_map(|_| next()).collect()
 }
 
-/// Long thin triangles across the whole cube: worst for splits.
+/// Returns long thin triangles across the whole cube, the worst case for splits.
 pub fn needles(n: usize, seed: u64) -> Vec<Triangle> {
     let mut random = Random(seed);
     let mut needle = || {

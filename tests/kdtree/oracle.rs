@@ -1,16 +1,17 @@
-//! A plain exact builder: at every cell it sorts all ends on all axes and sweeps them (O(n log^2 n)), with clipped
-//! triangles and their margins, in f64. Only the tree's cost is kept.
+//! A plain exact builder of kd-trees, which returns only the tree's cost. In every cell it sorts the ends of all
+//! triangles on all axes and sweeps them (O(n log^2 n)). Triangles are clipped to cells and have the same margins as
+//! in kdray. It computes in f64.
 
 use kdray::{accel::kdtree::BuildOptions, layout::Triangle};
 
 type Point = [f64; 3];
-/// Min, max.
+/// Minimum and maximum of an axis-aligned box.
 type Box3 = [Point; 2];
 
 /// A triangle's corners, and the bounds of its part in the cell.
 type Part = ([Point; 3], Box3);
 
-/// SAH cost of the greedy tree.
+/// Returns the SAH cost of the greedy tree.
 pub fn sah_cost(triangles: &[Triangle], options: &BuildOptions) -> f64 {
     let corners = |t: &Triangle| [t.v0, t.v1, t.v2].map(|v| v.as_dvec3().to_array());
     let points: Vec<Point> = triangles.iter().flat_map(corners).collect();
@@ -61,11 +62,11 @@ fn cost(parts: &[Part], cell: &Box3, options: &BuildOptions, margin: f64, levels
     step + child(0) + child(1)
 }
 
-/// Weight, axis, position.
+/// Returns the weight, the axis and the position of the best split plane.
 fn best_plane(parts: &[Part], cell: &Box3, options: &BuildOptions) -> Option<(f64, usize, f64)> {
     let mut best: Option<(f64, usize, f64)> = None;
     for axis in 0..3 {
-        // An end counts before a begin at one position.
+        // At one position, ends come before begins.
         let mut events: Vec<(f64, bool)> =
             parts.iter().flat_map(|(_, [min, max])| [(min[axis], true), (max[axis], false)]).collect();
         events.sort_by(|a, b| a.partial_cmp(b).expect("finite"));
@@ -88,7 +89,7 @@ fn best_plane(parts: &[Part], cell: &Box3, options: &BuildOptions) -> Option<(f6
     best
 }
 
-/// The part of a triangle on one side (0 below, 1 above) of a plane, none where it has none there.
+/// Returns the part of a triangle on one side (0 below, 1 above) of a plane, or `None` if there is none.
 fn part_in(part: &Part, cells: &[Box3; 2], side: usize, (axis, position): (usize, f64), margin: f64) -> Option<Part> {
     let (corners, part_box @ [min, max]) = part;
     let sides = [min[axis] < position, max[axis] > position];
@@ -115,7 +116,7 @@ fn part_in(part: &Part, cells: &[Box3; 2], side: usize, (axis, position): (usize
     Some((*corners, [within(f64::max, 0), within(f64::min, 1)]))
 }
 
-/// What of a polygon has a height of 0 or more over a plane that is square to an axis.
+/// Returns the part of a polygon with a height of at least 0 over a plane perpendicular to an axis.
 fn clip(polygon: &[Point], axis: usize, height: impl Fn(f64) -> f64) -> Vec<Point> {
     let mut kept = Vec::new();
     for (ix, a) in polygon.iter().enumerate() {
@@ -127,7 +128,7 @@ fn clip(polygon: &[Point], axis: usize, height: impl Fn(f64) -> f64) -> Vec<Poin
         if (height_a > 0.0 && height_b < 0.0) || (height_a < 0.0 && height_b > 0.0) {
             let t = height_a / (height_a - height_b);
             let mut point = [0, 1, 2].map(|k| a[k] + t * (b[k] - a[k]));
-            // Exactly in the plane, as ends of other triangles are.
+            // The point is exactly in the plane, as the ends of other triangles are.
             point[axis] = a[axis] - height_a * (if height(1.0) > height(0.0) { 1.0 } else { -1.0 });
             kept.push(point);
         }

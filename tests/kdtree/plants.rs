@@ -1,4 +1,4 @@
-//! The validator finds each planted error, and says which.
+//! Tests that the validator finds each planted error and names it.
 
 use glam::Vec3;
 use kdray::{
@@ -8,6 +8,7 @@ use kdray::{
 
 use crate::meshes::{boxed, room, triangle};
 
+/// A valid tree into which a test plants an error.
 struct Plant {
     triangles: Vec<Triangle>,
     tree: Parts,
@@ -21,14 +22,14 @@ impl Plant {
         Self { triangles, tree: tree.into_parts() }
     }
 
-    /// What the validator says after a change.
+    /// Returns the validator's error after a change.
     fn after(mut self, change: impl FnOnce(&mut Parts)) -> Invalid {
         change(&mut self.tree);
         KdTree::from_parts(self.tree, &self.triangles).expect_err("the planted error")
     }
 }
 
-/// The last split, and its parts.
+/// Returns the last split: node, axis, position, child.
 fn last_split(tree: &Parts) -> (u32, usize, f32, u32) {
     let split = |node| match tree.node(node) {
         Node::Split { axis, position, child } => Some((node, axis, position, child)),
@@ -37,7 +38,7 @@ fn last_split(tree: &Parts) -> (u32, usize, f32, u32) {
     (0..tree.nodes.len() as u32).rev().find_map(split).expect("a split")
 }
 
-/// The last leaf with so many triangles at least: node, first, count.
+/// Returns the last leaf with at least `least` triangles: node, first, count.
 fn last_leaf(tree: &Parts, least: u32) -> (u32, u32, u32) {
     let leaf = |node| match tree.node(node) {
         Node::Leaf { first, count } if count >= least => Some((node, first, count)),
@@ -50,7 +51,7 @@ fn set(tree: &mut Parts, node: u32, to: Node) {
     tree.nodes[node as usize] = to.into();
 }
 
-/// Takes an entry out of a leaf, and moves those of the leaves behind.
+/// Removes an entry of a leaf, and adapts the ranges of the leaves after it.
 fn drop_entry(tree: &mut Parts, entry: u32) {
     tree.leaf_triangles.remove(entry as usize);
     tree.leaf_planes.remove(entry as usize);
@@ -74,7 +75,7 @@ fn any_dropped_reference() {
         drop_entry(&mut tree, entry);
         match KdTree::from_parts(tree, &plant.triangles) {
             Err(Invalid::Missing { triangle: missing, .. }) => n_missing += u32::from(missing == triangle),
-            // The conservative bounds of a triangle may reach into a leaf that it does not meet.
+            // A leaf may hold a triangle that does not meet it, because the triangle's bounds are conservative.
             other => assert_eq!(other.err(), None),
         }
     }
@@ -83,7 +84,7 @@ fn any_dropped_reference() {
 
 #[test]
 fn a_dropped_triangle_in_a_split_plane() {
-    // Nothing but triangles in planes; an inner wall lies exactly in a split.
+    // All triangles lie in planes perpendicular to an axis, and an inner wall lies exactly in a split plane.
     let walls = boxed(Vec3::ZERO, Vec3::ONE, 2);
     let inner = boxed(Vec3::splat(0.25), Vec3::splat(0.75), 2);
     let triangles = [walls, inner].concat();
@@ -181,7 +182,7 @@ fn a_circle_and_an_orphan() {
         let (node, axis, position, _) = last_split(tree);
         let Node::Split { child, .. } = tree.node(0) else { panic!("the root is a split") };
         set(tree, node, Node::Split { axis, position, child });
-        // Parents agree with one of the two only.
+        // The children now have two parents, of which `parents` names only one.
         tree.parents[child as usize / 2] = node;
     });
     assert!(matches!(found, Invalid::Parent { .. } | Invalid::Shared { .. }), "{found}");
@@ -201,7 +202,7 @@ fn wrong_leaf_entries() {
         })
     };
     assert!(matches!(leaf_with(u32::MAX), Invalid::LeafOrder { triangle: u32::MAX, .. }));
-    // Triangle 0 cannot come after another.
+    // The entries are in ascending order, so triangle 0 cannot come after another one.
     assert!(matches!(leaf_with(0), Invalid::LeafOrder { triangle: 0, .. }));
     let doubled = Plant::new().after(|tree| {
         let (_, first, _) = last_leaf(tree, 2);
@@ -235,7 +236,7 @@ fn a_wrong_plane() {
     assert_eq!(Plant::new().after(|tree| tree.leaf_planes.truncate(9)), Invalid::Planes);
 }
 
-/// A node with a slab, and that.
+/// Returns the last node with a slab, and its slab.
 fn last_slab(tree: &Parts) -> (u32, Slab) {
     let slab = |node: u32| {
         let is_marked = tree.nodes[node as usize].axis_and_child & KD_HAS_SLAB != 0;
@@ -288,7 +289,7 @@ fn a_wrong_cell() {
 #[test]
 fn a_wrong_depth() {
     assert!(matches!(Plant::new().after(|tree| tree.depth += 1), Invalid::Depth { .. }));
-    // A chain of splits, one level more than the traversal can hold.
+    // A chain of splits with one level more than the traversal supports.
     let n_levels = KD_MAX_DEPTH - 1;
     let triangles = [triangle([Vec3::ZERO, Vec3::X, Vec3::Y])];
     let mut tree = KdTree::build(&triangles, &BuildOptions { max_depth: Some(0), ..Default::default() }).into_parts();

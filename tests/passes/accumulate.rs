@@ -1,4 +1,5 @@
-//! Accumulate against its twin: sums exactly, means to the rounding of a division.
+//! Tests of the kernel accumulate against its twin on the CPU. Sums agree exactly, means up to the rounding of a
+//! division.
 
 use kdray::{
     layout::{Bounce, Frame},
@@ -26,7 +27,7 @@ fn some(n: usize, seed: u64) -> Pixels {
     (0..n).map(|_| [random.unit(), random.unit() * 100.0, random.unit(), 1.0]).collect()
 }
 
-/// What becomes of a sample and of the sums before it.
+/// Runs the kernel on a sample and on the sums before it. Returns the means and the new sums.
 fn accumulated(stage: &Stage, bounces: &[Bounce; 3], sample: &Pixels, sums: &Pixels) -> (Pixels, Pixels) {
     let pixels = &stage.resources.pixels;
     let accumulated = pixels.pixel_accumulated.as_ref().expect("pixel_accumulated");
@@ -53,7 +54,7 @@ fn agrees_with_its_twin() {
     }
 }
 
-/// The sum of 1, 2, ... n is n (n + 1) / 2, their mean (n + 1) / 2.
+/// The sum of 1, 2, ... n is n (n + 1) / 2, and their mean is (n + 1) / 2.
 #[test]
 fn the_mean_of_whole_numbers_is_known() {
     let (mut radiance, mut sums) = (vec![[1.0; 4]], vec![[1.0; 4]]);

@@ -1,5 +1,5 @@
-//! Synchronization validation: it sees each kind of hazard between kernels where a barrier is left out, and none where
-//! it stands. Without these, tests that hear no message would prove nothing.
+//! Tests of synchronization validation: it reports each kind of hazard between kernels if a barrier is missing, and
+//! none if it is there. Without these tests, the silence of the layer in other tests would prove nothing.
 
 use kdray::{
     frame::plan,
@@ -13,7 +13,7 @@ use crate::support::scenes;
 
 const BATCH: Batch = Batch { n_pixels: 64, ..FIRST };
 
-/// Valid contents, so that a kernel that runs too early reads nothing wild.
+/// Uploads valid contents, so that a kernel that runs too early does not read arbitrary data.
 fn fill(stage: &Stage) {
     let rays = some_rays(stage, 64);
     stage.set_n_rays(&[64]);
@@ -21,7 +21,8 @@ fn fill(stage: &Stage) {
     stage.set_hits(&hits_of(stage, &rays));
 }
 
-/// Runs `first`, the barrier if there is one, and `second`; a message is expected without it and none with it.
+/// Runs `first` and `second` with the barrier between them, and without it. Asserts that only the latter causes a
+/// message.
 fn check(barrier: (Access, Access), first: impl Fn(&Stage, &Commands), second: impl Fn(&Stage, &Commands)) {
     for has_barrier in [true, false] {
         let stage = Stage::new(scenes::mixed(), options(8, 8), 64);
@@ -58,7 +59,7 @@ fn accumulate(stage: &Stage, commands: &Commands) {
 }
 
 fn compact(stage: &Stage, commands: &Commands) {
-    // Without the barrier behind them.
+    // The section's last element, a barrier, is left out.
     let section = plan::next_rays();
     let (_, section) = section.split_last().expect("passes");
     let inputs = Inputs { batch: BATCH, ..Inputs::default() };

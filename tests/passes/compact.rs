@@ -1,4 +1,4 @@
-//! Compact against its twin and against closed forms.
+//! Tests of the kernels that compact rays against their twin on the CPU and against closed forms.
 
 use glam::{Vec3, vec3};
 use kdray::{
@@ -14,10 +14,10 @@ use kdray::{
 use super::stage::{FIRST, Stage, UNTOUCHED_RAY, UNTOUCHED_WORD, options};
 use crate::support::{compare, meshes, random::Random, scenes};
 
-/// Rays that one round of the spine has the counts of.
+/// Number of rays whose counts fit in one round of the spine, the prefix sum over workgroups.
 const ROUND: u32 = SCAN_GROUP_SIZE * SCAN_GROUP_SIZE * SPINE_ITEMS;
 
-/// One more and less than a workgroup, what one invocation of the spine adds up, and a round of it.
+/// Numbers of rays around the size of a workgroup, the number that one invocation of the spine sums, and a round.
 const COUNTS: [u32; 11] = [
     0,
     1,
@@ -32,7 +32,7 @@ const COUNTS: [u32; 11] = [
     ROUND + 1,
 ];
 
-/// Triangle i has i children: one of plaster, a mirror, one of glass.
+/// Makes a stage whose rays have i children at triangle i: triangle 0 is diffuse, 1 is a mirror, 2 is glass.
 fn stage(capacity: u32) -> Stage {
     let mut scene = scenes::empty();
     for material in [scenes::diffuse(Vec3::ONE), scenes::mirror(Vec3::splat(0.5)), scenes::glass(1.5)] {
@@ -42,7 +42,7 @@ fn stage(capacity: u32) -> Stage {
     Stage::new(scene, options(8, 8), capacity)
 }
 
-/// A ray that says which one it is, and its hit.
+/// Returns a ray whose pixel is its index, and its hit.
 fn parent(i: usize, n_children: u32) -> (PathRay, Hit) {
     let ray = PathRay {
         origin: vec3(0.3, 1.0, 0.3),
@@ -55,7 +55,7 @@ fn parent(i: usize, n_children: u32) -> (PathRay, Hit) {
     (ray, Hit { t: 1.0, triangle_ix: n_children, u: 0.3, v: 0.3 })
 }
 
-/// What compaction leaves.
+/// The output of compaction.
 struct Compacted {
     rays: Vec<PathRay>,
     child_kinds: Vec<u32>,
@@ -63,7 +63,7 @@ struct Compacted {
     bounces: Vec<Bounce>,
 }
 
-/// The second bounce's children behind `n_before` rays of the first one.
+/// Compacts the children of the second bounce, whose rays come after `n_before` rays of the first one.
 fn on_device(stage: &Stage, n_before: u32, child_counts: &[u32]) -> Compacted {
     let resources = &stage.resources;
     let before = vec![parent(0, 0); n_before as usize];
@@ -140,7 +140,7 @@ fn agrees_with_its_twin() {
     for (n_rays, n_before) in COUNTS.into_iter().zip([0, 70].into_iter().cycle()) {
         let mut random = Random(u64::from(n_rays));
         let mut child_counts: Vec<u32> = (0..n_rays).map(|_| random.below(3) as u32).collect();
-        // The last block, of one ray or more, moves something.
+        // The last block, which has one ray or more, has at least one child.
         child_counts.iter_mut().last().into_iter().for_each(|count| *count = 2);
         check(&stage, n_before, &child_counts);
     }
@@ -158,7 +158,8 @@ fn lanes_to_spare_are_shared_out_as_on_the_cpu() {
     }
 }
 
-/// Which rays go on is said by closed forms: plaster ends all, a mirror reflects, glass does both, and they stand in order.
+/// The closed form of the children: each ray at glass has a reflected child and a refracted one, in this order, and
+/// the children are in the order of their parents.
 #[test]
 fn all_children_keep_their_order() {
     let stage = stage(7500);
@@ -179,7 +180,7 @@ fn all_children_keep_their_order() {
     assert_eq!((next.n_rays, next.trace_groups_x, next.scan_groups_x, next.shade_groups_x), (0, 0, 0, 40));
 }
 
-/// One ray more than the queue holds: none is made, none lost without word.
+/// If there is one ray more than the queue holds, no ray is made, and the loss is reported.
 #[test]
 fn a_full_queue_is_used_and_an_overfull_one_reported() {
     let stage = stage(6100);

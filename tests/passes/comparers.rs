@@ -1,4 +1,4 @@
-//! The comparers that the other tests rely on.
+//! Tests of the comparers that the other tests rely on.
 
 use glam::Vec3;
 use kdray::layout::{Hit, PathRay};

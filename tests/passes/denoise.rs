@@ -1,4 +1,4 @@
-//! Denoise against its twin.
+//! Tests of the kernel denoise against its twin on the CPU.
 
 use kdray::{
     frame::{Denoise, RenderOptions},
@@ -8,7 +8,7 @@ use kdray::{
 use super::stage::{Stage, UNTOUCHED_PIXEL, options};
 use crate::support::{compare, random::Random, scenes};
 
-/// Smooth, with some pixels that stand out, some brighter than white.
+/// Returns dark pixels with some bright ones among them, of which some are brighter than white.
 fn noisy(n: usize) -> Vec<[f32; 4]> {
     let mut random = Random(5);
     let mut pixel = |_| {
@@ -39,14 +39,15 @@ fn agrees_with_its_twin() {
         let pixels = noisy((width * height) as usize);
         let mut expected = vec![UNTOUCHED_PIXEL; pixels.len()];
         reference::denoise::denoise(stage.resources.constants(), &pixels, &mut expected);
-        // A difference of almost the threshold may fall on either side of it.
+        // A sum of differences close to the threshold may be on either side of it.
         compare::pixels(1e-6, pixels.len() / 5000, &expected, &filtered(&stage, &pixels)).unwrap();
         let n_smoothed = pixels.iter().zip(&expected).filter(|(before, after)| before != after).count();
         assert!(pixels.len() < 50 || (pixels.len() / 10..pixels.len() * 9 / 10).contains(&n_smoothed));
     }
 }
 
-/// A lone white pixel on black differs by 4 in all; a corner of white on black by 2; an edge by 1.
+/// The differences of a white pixel to its four neighbours sum to 4 if it is alone on black, to 2 at a corner, and to
+/// 1 at an edge.
 #[test]
 fn a_lone_pixel_goes_and_an_edge_stays() {
     let threshold = Denoise::DEFAULT_THRESHOLD;

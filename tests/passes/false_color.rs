@@ -1,4 +1,4 @@
-//! False colour against its twin: within one level, since division is not exact.
+//! Tests of the kernel for false colours against its twin on the CPU: within one level, since division is not exact.
 
 use glam::{Vec3, vec3};
 use kdray::{
@@ -74,6 +74,6 @@ fn known_values_have_known_colours() {
     compare::bytes(1, &[black, [128, 128, 128, 255]], &show(VIEW_DEPTH)).unwrap();
     compare::bytes(1, &[black, [128, 255, 128, 255]], &show(VIEW_NORMAL)).unwrap();
     compare::bytes(1, &[black, [255, 255, 255, 255]], &show(VIEW_COST)).unwrap();
-    // 0.7 of the way: red is full, green at 1.1, blue at 0.1.
+    // At 0.7 of the scale, red is 1, green is 1.1 and blue is 0.1 before clamping.
     compare::bytes(1, &[black, [255, 255, 26, 255]], &show(VIEW_RAYS)).unwrap();
 }

@@ -1,4 +1,4 @@
-//! Features against their twin.
+//! Tests of the kernel features against its twin on the CPU.
 
 use std::collections::HashSet;
 
@@ -13,7 +13,7 @@ use kdray::{
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_RAY, hits_of, options};
 use crate::support::scenes;
 
-/// The camera's first rays.
+/// Returns the first `n` camera rays.
 fn primary_rays(stage: &Stage, n: u32) -> Vec<PathRay> {
     let mut rays = vec![UNTOUCHED_RAY; n as usize];
     reference::primary_hit::primary_rays(stage.resources.constants(), 0, &mut rays);
@@ -30,7 +30,8 @@ fn noted(stage: &Stage, rays: &[PathRay], before: &[Feature]) -> Vec<Feature> {
     stage.resources.pixels.pixel_features.download().expect("pixel_features")
 }
 
-/// Where two features differ: not at all in indices and counts, in the rest by few roundings.
+/// Returns the first index at which features differ, in indices, counts or albedo at all, or otherwise by more than
+/// rounding.
 fn difference(a: &[Feature], b: &[Feature]) -> Option<usize> {
     let exact = |f: &Feature| (f.triangle_ix, f.material_ix, f.n_rays, f.n_steps, f.albedo.to_array());
     let agree = |a: &Feature, b: &Feature| {
@@ -56,7 +57,7 @@ fn agrees_with_its_twin() {
     let stage = stage();
     for n in RAY_COUNTS {
         let rays = primary_rays(&stage, n);
-        // Cleared but for the counts, which stay.
+        // Features are cleared except for their counts, which the kernel keeps.
         let before: Vec<_> = (0..2000).map(|i| Feature { n_rays: i, n_steps: 7 * i, ..Feature::default() }).collect();
         let mut expected = before.clone();
         reference::features::features(&stage.inputs(), &rays, &hits_of(&stage, &rays), &mut expected);

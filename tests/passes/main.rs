@@ -1,5 +1,6 @@
-//! Each kernel on the device against its twin on the CPU, under the validation layer: exact for integers, within a
-//! stated tolerance for floats; with no ray, one, and one more or less than a workgroup and than each level of a scan.
+//! Tests of each kernel on the device against its twin, the same function on the CPU, under the validation layer.
+//! Integers agree exactly, floats within a stated tolerance. The numbers of rays are 0, 1, and one more and less than
+//! a workgroup and than each level of a scan.
 
 #[path = "../support/mod.rs"]
 mod support;

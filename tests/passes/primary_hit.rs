@@ -1,4 +1,4 @@
-//! Primary hit against its twin, from the same triangle IDs.
+//! Tests of the kernel primary_hit against its twin on the CPU, with the same triangle IDs.
 
 use kdray::{
     layout::{Batch, Hit},
@@ -8,7 +8,7 @@ use kdray::{
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_HIT, UNTOUCHED_RAY, options};
 use crate::support::{compare, scenes};
 
-/// Hits of a batch, and how many are hits.
+/// Returns the hits of a batch, and the number of those that are not misses.
 fn on_device(stage: &Stage, batch: &Batch) -> (Vec<Hit>, u32) {
     stage.set_n_rays(&[batch.n_pixels]);
     stage.set_hits(&[]);
@@ -19,7 +19,7 @@ fn on_device(stage: &Stage, batch: &Batch) -> (Vec<Hit>, u32) {
     (stage.resources.queue.hits.download().expect("hits"), stage.counters()[0].n_hits)
 }
 
-/// The same on the CPU, with the triangles of the device's hits.
+/// Returns the same by the twin on the CPU, with the triangle IDs of the device's hits.
 fn on_cpu(stage: &Stage, batch: &Batch, found: &[Hit]) -> (Vec<Hit>, u32) {
     let n = batch.n_pixels as usize;
     let (mut rays, mut hits) = (vec![UNTOUCHED_RAY; n], vec![UNTOUCHED_HIT; found.len()]);

@@ -1,4 +1,4 @@
-//! Rasterize against the kd-tree: what it finds is what camera rays hit, to the last bit.
+//! Tests of the rasterizing kernels against the kd-tree: they find the hits of the camera rays, to the last bit.
 
 use std::sync::Arc;
 
@@ -17,13 +17,13 @@ use kdray::{
 use super::stage::{FIRST, Stage, options};
 use crate::support::{compare, meshes, random::Random, scenes, without_wide_atomics, world_of};
 
-/// A stage whose kernels rasterize, and the pass that traces the same rays.
+/// A stage that rasterizes by kernels, and the pass that traces the same rays.
 struct View {
     stage: Stage,
     trace: Arc<Trace>,
 }
 
-/// None where the device has no atomics of 64 bits.
+/// Makes a view, or returns `None` if the device has no atomics of 64 bits.
 fn view(scene: FlatScene, options: RenderOptions) -> Option<View> {
     let context = Context::new(&ContextOptions::default()).expect("a device");
     let crop = options.crop_or_whole();
@@ -34,7 +34,7 @@ fn view(scene: FlatScene, options: RenderOptions) -> Option<View> {
     Some(View { stage, trace: passes.trace })
 }
 
-/// Hits of all pixels.
+/// Returns the hits of all pixels.
 fn hits_by(stage: &Stage, record: impl Fn(&Commands, &Batch)) -> Vec<Hit> {
     let batch = Batch { n_pixels: stage.resources.n_pixels() as u32, ..FIRST };
     stage.set_n_rays(&[batch.n_pixels]);
@@ -65,7 +65,7 @@ impl View {
         self.stage.resources.frame.upload(&[constants]).expect("constants");
     }
 
-    /// How many pixels show a triangle.
+    /// Asserts that both find the same hits. Returns the number of pixels that show a triangle.
     fn check(&self) -> usize {
         let found = self.rasterized();
         compare::exact(&self.traced(), &found).unwrap();
@@ -79,12 +79,12 @@ fn check(scene: FlatScene, options: RenderOptions) -> usize {
 
 fn random_camera(random: &mut Random, reach: f32) -> Camera {
     let [eye, target, up] = [reach, 3.0, 1.0].map(|r| random.in_box(Vec3::splat(-r), Vec3::splat(r)));
-    // From the flattest to beyond what is cut off beside the eye.
+    // The fields of view range from very narrow to so wide that parts beside the eye are cut off.
     let fovs = [5.0, 45.0, 90.0, 150.0, 176.0];
     Camera { eye, target, up, vertical_fov_degrees: fovs[random.below(fovs.len())] }
 }
 
-/// From within and without, with triangles behind, beside and around the eye.
+/// The eye is inside and outside of the scene, with triangles behind, beside and around it.
 #[test]
 fn shows_what_camera_rays_hit_from_anywhere() {
     let mut random = Random(17);
@@ -97,7 +97,7 @@ fn shows_what_camera_rays_hit_from_anywhere() {
     }
 }
 
-/// Triangles as large as the room, all around the eye, some through it.
+/// Triangles as large as a room are all around the eye, and some pass through it.
 #[test]
 fn shows_what_camera_rays_hit_amid_triangles() {
     let mut random = Random(23);
@@ -116,7 +116,8 @@ fn shows_what_camera_rays_hit_amid_triangles() {
     }
 }
 
-/// Far more triangles than pixels, triangles that no pixel's sample lies in, and more than one row of workgroups.
+/// There are far more triangles than pixels, triangles that contain no pixel's sample, and more than one row of
+/// workgroups.
 #[test]
 fn shows_what_camera_rays_hit_of_small_triangles() {
     for triangles in [meshes::soup(20_000, 3), meshes::torus(300, 120), meshes::threefold(meshes::cube(9, 0.0))] {
@@ -126,7 +127,8 @@ fn shows_what_camera_rays_hit_of_small_triangles() {
     }
 }
 
-/// Slivers so thin that rounding decides from which side they are seen, through the very samples that the rays go through.
+/// The slivers are so thin that rounding decides from which side they are seen. They contain the samples through
+/// which the rays pass.
 #[test]
 fn shows_what_camera_rays_hit_of_slivers() {
     let (options, mut random) = (options(64, 48), Random(41));
@@ -137,7 +139,7 @@ fn shows_what_camera_rays_hit_of_slivers() {
         let pixel = uvec2(random.below(64) as u32, random.below(48) as u32);
         let ray = camera_ray(&frame, pixel);
         let across = ray.direction.cross(random.direction()).normalize();
-        // Some 6 pixels long.
+        // Slivers are some 6 pixels long.
         let at = |random: &mut Random, share: f32| {
             let along = ray.direction + share * across * random.between(0.0, 0.04);
             frame.eye + along * random.between(2.0, 6.0)
@@ -150,7 +152,7 @@ fn shows_what_camera_rays_hit_of_slivers() {
     assert!(check(scene, options) > 1000);
 }
 
-/// Triangles of some 25 pixels, so that a workgroup has more tests than fit at once.
+/// Triangles have some 25 pixels, so that a workgroup has more tests than fit at once.
 #[test]
 fn shows_all_pixels_of_a_workgroups_triangles() {
     let mut scene = scenes::empty();
@@ -166,7 +168,8 @@ fn shows_all_pixels_of_a_workgroups_triangles() {
     assert!(check(scene, options(200, 200)) > 30_000);
 }
 
-/// Slivers across the picture have blocks of which most are empty, and together more than there are workgroups.
+/// Slivers across the picture have many blocks of pixels, most of which are empty. Together there are more blocks
+/// than workgroups.
 #[test]
 fn shows_all_blocks_of_large_triangles() {
     let (width, height) = (160, 120);

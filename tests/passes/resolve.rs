@@ -1,4 +1,5 @@
-//! Resolve against its twin and against the sum of a pixel's rays in the queue's order: the same to the last bit.
+//! Tests of the kernel resolve against its twin on the CPU, and against the sum of a pixel's rays in the queue's
+//! order: the same to the last bit.
 
 use kdray::{
     layout::{Batch, PathRay},
@@ -8,17 +9,17 @@ use kdray::{
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_PIXEL, UNTOUCHED_RAY, options};
 use crate::support::{compare, random::Random, scenes};
 
-/// Where the batch's pixels begin.
+/// First pixel of the batch.
 const FIRST_PIXEL: u32 = 200;
 
-/// A batch's rays, bounce after bounce.
+/// The rays of a batch, bounce after bounce.
 struct Family {
     rays: Vec<PathRay>,
     first_children: Vec<u32>,
     n_rays: Vec<u32>,
 }
 
-/// One ray a pixel, and up to `most_children` of each ray of `n_bounces`.
+/// Makes one ray per pixel, and `n_bounces` bounces in which each ray has up to `most_children` children.
 fn family(stage: &Stage, n_primary: u32, n_bounces: usize, most_children: usize) -> Family {
     let mut random = Random(9);
     let mut rays = vec![UNTOUCHED_RAY; n_primary as usize];

@@ -1,4 +1,4 @@
-//! Shade against its twin, from the same hits and lights.
+//! Tests of the kernel shade against its twin on the CPU, with the same hits and light visibilities.
 
 use kdray::{
     layout::{Batch, LIGHT_UNTESTED},
@@ -8,7 +8,8 @@ use kdray::{
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_PIXEL, hits_of, options, rays_of};
 use crate::support::{compare, random::Random, scenes};
 
-/// Radiance within 1e-4: `pow` and `inversesqrt` are good for some 2^-13 of a steep highlight. The rays are those of two bounces.
+/// Asserts that radiance agrees within 1e-4: `pow` and `inversesqrt` have an error of some 2^-13 of a steep
+/// highlight. The rays are those of two bounces.
 fn check(stage: &Stage, batch: &Batch, n_rays: u32) {
     let queue = &stage.resources.queue;
     let (rays, stored) = rays_of(stage, batch, n_rays);

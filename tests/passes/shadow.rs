@@ -1,4 +1,4 @@
-//! Shadow against its twin, from the same hits.
+//! Tests of the kernel shadow against its twin on the CPU, with the same hits.
 
 use std::collections::HashSet;
 
@@ -14,7 +14,7 @@ use kdray::{
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_WORD, hits_of, options, rays_of, some_rays};
 use crate::support::{compare, scenes};
 
-/// The rays are those of two bounces. Returns what is said of their lights.
+/// Asserts that both agree on the rays of two bounces. Returns the light visibilities.
 fn check(stage: &Stage, batch: &Batch, n_rays: u32) -> Vec<u32> {
     let queue = &stage.resources.queue;
     let (rays, stored) = rays_of(stage, batch, n_rays);
@@ -56,7 +56,8 @@ fn agrees_where_the_first_rays_are_the_cameras() {
     }
 }
 
-/// Flat surfaces, which show no light that they turn their backs on: plaster, a narrow highlight, black.
+/// Returns a scene of flat surfaces, on which a light behind the surface cannot show: diffuse ones, ones with a
+/// narrow highlight, and black ones.
 fn flat() -> FlatScene {
     let mut scene = scenes::mixed_outdoors();
     scene.triangles.iter_mut().for_each(|t| [t.n0, t.n1, t.n2] = [FLAT_NORMAL; 3]);
@@ -65,7 +66,7 @@ fn flat() -> FlatScene {
     scene
 }
 
-/// Lights that are not asked for change nothing that shows, lit or not; those that are, do.
+/// Lights that are not tested would not change the radiance if they were lit. Lights that are tested would.
 #[test]
 fn lights_that_are_not_asked_for_could_not_be_seen() {
     let stage = Stage::new(flat(), options(8, 8), 2000);
@@ -87,10 +88,10 @@ fn lights_that_are_not_asked_for_could_not_be_seen() {
         let both = asked_for.as_flattened().iter().zip(instead.as_flattened());
         both.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
     };
-    // 2^-64 of some 20 lit up by three lights.
+    // The bound is 2^-64 of a radiance of some 20 by three lights.
     assert!(greatest_difference(&instead(LIGHT_UNTESTED)) < 3e-18);
     assert!(greatest_difference(&instead(LIGHT_SHADOWED)) > 0.1);
-    // More are spared than those of black surfaces and behind a surface's back, but not all of the glossy.
+    // On glossy surfaces, most lights are not tested, but some are.
     let is_glossy = |hit: &Hit| {
         hit.triangle_ix != NO_TRIANGLE && stage.inputs().triangle_materials[hit.triangle_ix as usize] % 3 == 1
     };

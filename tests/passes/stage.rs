@@ -1,4 +1,4 @@
-//! A scene on a device with all passes, to run one of them at a time.
+//! A scene on a device with all passes, of which tests run one at a time.
 
 use std::{cell::Cell, sync::Arc, thread};
 
@@ -17,7 +17,7 @@ use kdray::{
 pub const RAY_COUNTS: [u32; 7] =
     [0, 1, RAY_GROUP_SIZE - 1, RAY_GROUP_SIZE, RAY_GROUP_SIZE + 1, 5 * RAY_GROUP_SIZE + 7, 2000];
 
-/// What stands in buffers before a kernel runs: where it still stands, nothing was written.
+/// Contents of buffers before a kernel runs. They remain where nothing is written.
 pub const UNTOUCHED_RAY: PathRay = PathRay {
     origin: glam::Vec3::splat(-7.0),
     pixel_ix: 0xdead,
@@ -37,17 +37,17 @@ pub struct Stage {
     pub resources: Resources,
     pub passes: Passes,
     pub context: Arc<Context>,
-    /// Set by a test that provokes the validation layer.
+    /// True in a test that provokes messages of the validation layer.
     pub expects_messages: Cell<bool>,
 }
 
-/// Small, and with a noise filter.
+/// Returns options with the noise filter.
 pub fn options(width: u32, height: u32) -> RenderOptions {
     RenderOptions { width, height, denoise: Denoise::Paper { threshold: 0.5 }, ..RenderOptions::default() }
 }
 
 impl Stage {
-    /// A queue for `capacity` rays.
+    /// Makes a stage with a queue for `capacity` rays.
     pub fn new(scene: FlatScene, options: RenderOptions, capacity: u32) -> Self {
         let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
         let world = World::of_flat(scene, &BuildOptions::default()).expect("a world");
@@ -59,12 +59,12 @@ impl Stage {
         Self { world, links, options, resources, passes, context, expects_messages: Cell::new(false) }
     }
 
-    /// The twin's view of the same scene.
+    /// Returns the twin's inputs for the same scene.
     pub fn inputs(&self) -> KernelInputs<'_> {
         KernelInputs::new(&self.world, self.resources.constants()).with_links(&self.links)
     }
 
-    /// Binds the descriptor set, records and runs.
+    /// Binds the descriptor set, records the commands and runs them.
     pub fn run(&self, record: impl FnOnce(&Commands)) {
         let body = |commands: &Commands| {
             self.resources.bind(commands);
@@ -73,8 +73,8 @@ impl Stage {
         self.context.run("test", body).expect("the commands run");
     }
 
-    /// As [`Stage::run`], for kernels whose rays can stall: repeats the dispatch until all of them have ended. `record` is
-    /// given the batch for a round.
+    /// Does what [`Stage::run`] does for kernels whose rays can stall: repeats the dispatch until all rays have
+    /// ended. `record` receives the batch of a round.
     pub fn trace(&self, batch: &Batch, record: impl Fn(&Commands, &Batch)) {
         let stalls = &self.resources.accel.stalls;
         self.run(|commands| {
@@ -88,12 +88,13 @@ impl Stage {
         resumed.expect("all rays end");
     }
 
-    /// Records visibility, which the stage's options ask for.
+    /// Records the pass visibility, which the stage's options must need.
     pub fn draw_triangles(&self, commands: &Commands) {
         self.passes.visibility.as_ref().expect("the options ask for it").record(commands, &self.resources);
     }
 
-    /// A batch of bounces of so many rays, one after the other, and none after these; all counters 0. Returns their rows.
+    /// Uploads the rows of a batch's bounces, which have `n_rays` rays one after the other; later bounces have none.
+    /// Sets all counters to 0. Returns the rows.
     pub fn set_n_rays(&self, n_rays: &[u32]) -> Vec<Bounce> {
         let constants = self.resources.constants();
         let mut first_ray = 0;
@@ -109,34 +110,34 @@ impl Stage {
         rows
     }
 
-    /// The first `rays.len()` of the queue; untouched ones behind.
+    /// Uploads the first rays of the queue. The rays after them become [`UNTOUCHED_RAY`].
     pub fn set_rays(&self, rays: &[PathRay]) {
         let mut queue = vec![UNTOUCHED_RAY; self.resources.queue.rays.len()];
         queue[..rays.len()].copy_from_slice(rays);
         self.resources.queue.rays.upload(&queue).expect("rays");
     }
 
-    /// As `set_rays`.
+    /// Uploads the first hits of the queue. The hits after them become [`UNTOUCHED_HIT`].
     pub fn set_hits(&self, hits: &[Hit]) {
         let mut all = vec![UNTOUCHED_HIT; self.resources.queue.hits.len()];
         all[..hits.len()].copy_from_slice(hits);
         self.resources.queue.hits.upload(&all).expect("hits");
     }
 
-    /// How many of `n` rays may differ from the twin's: none on software drivers, whose arithmetic is exactly the
-    /// CPU's. Elsewhere divisions are 2.5 units in the last place off (Vulkan's precision of OpFDiv), and few rays at
-    /// corners go another way.
+    /// Returns the number of `n` rays that may differ from the twin's. It is 0 on software drivers, whose arithmetic
+    /// is exactly the CPU's. Elsewhere divisions are 2.5 units in the last place off (Vulkan's precision of OpFDiv),
+    /// so a few rays at corners take another path.
     pub fn n_outliers(&self, n: u32) -> usize {
         if self.context.is_software() { 0 } else { n as usize / 500 }
     }
 
-    /// What the kernels counted, a row a bounce.
+    /// Returns the kernels' counters, one row per bounce.
     pub fn counters(&self) -> Vec<Counters> {
         self.resources.counters().expect("counters")
     }
 }
 
-/// A test passes only if the validation layer had nothing to say.
+/// Fails the test if the validation layer reported messages that were not expected, or none where they were expected.
 impl Drop for Stage {
     fn drop(&mut self) {
         let messages = self.context.validation_messages();
@@ -145,10 +146,10 @@ impl Drop for Stage {
     }
 }
 
-/// The first batch, and its bounce of depth 0.
+/// The first batch at its bounce of depth 0.
 pub const FIRST: Batch = Batch { first_pixel: 0, n_pixels: 0, bounce_ix: 0, depth: 0, round: 0 };
 
-/// `n` rays of every nasty kind at the stage's scene, with pixels and throughputs of their own.
+/// Returns `n` rays of every nasty kind at the stage's scene, each with its own pixel and throughput.
 pub fn some_rays(stage: &Stage, n: u32) -> Vec<PathRay> {
     use crate::support::{MeshWithTree, random::Random, rays::nasty_ray};
     let world = MeshWithTree::new(stage.world.scene().triangles.clone());
@@ -163,7 +164,8 @@ pub fn some_rays(stage: &Stage, n: u32) -> Vec<PathRay> {
         .collect()
 }
 
-/// As `some_rays`, but that the first are the batch's camera rays; and what of them is in memory, where those are not.
+/// Returns rays twice. In the first list, the batch's camera rays replace the first rays of `some_rays`. The second
+/// list is the content of the queue, in which camera rays are not stored.
 pub fn rays_of(stage: &Stage, batch: &Batch, n: u32) -> (Vec<PathRay>, Vec<PathRay>) {
     let mut rays = some_rays(stage, n);
     let mut stored = rays.clone();
@@ -173,7 +175,7 @@ pub fn rays_of(stage: &Stage, batch: &Batch, n: u32) -> (Vec<PathRay>, Vec<PathR
     (rays, stored)
 }
 
-/// The twin's hits of `rays`.
+/// Returns the twin's hits of `rays`.
 pub fn hits_of(stage: &Stage, rays: &[PathRay]) -> Vec<Hit> {
     let mut hits = vec![Hit { triangle_ix: NO_TRIANGLE, ..UNTOUCHED_HIT }; rays.len()];
     kdray::reference::trace::trace(&stage.inputs(), stage.options.traversal, rays, &mut hits);

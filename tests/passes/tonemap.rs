@@ -1,4 +1,4 @@
-//! Tonemap against its twin: within one level, since `pow` is not exact.
+//! Tests of the kernel tonemap against its twin on the CPU: within one level, since `pow` is not exact.
 
 use kdray::{
     frame::{RenderOptions, Tonemap},
@@ -50,7 +50,7 @@ fn another_curve_is_noticed() {
     }
 }
 
-/// Values of IEC 61966-2-1, worked out by hand.
+/// The levels are values of IEC 61966-2-1, computed by hand.
 #[test]
 fn known_values_are_encoded_as_the_standard_says() {
     let stage = empty_stage(options(3, 3));

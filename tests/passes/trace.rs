@@ -1,4 +1,5 @@
-//! Trace against its twin, with ordinary rays and with those on which traversals fail.
+//! Tests of the kernel trace against its twin on the CPU, with ordinary rays and with rays on which traversals may
+//! fail.
 
 use kdray::{
     accel::kdtree::Traversal,

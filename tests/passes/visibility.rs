@@ -1,5 +1,5 @@
-//! Visibility against the kd-tree: a rasterizer snaps corners to its sub-pixel grid, so where the two differ, the
-//! rasterizer's triangle is what a ray close by meets.
+//! Tests of the pass visibility against the kd-tree. The rasterizer snaps corners to its sub-pixel grid. Where the
+//! two differ, a nearby ray must meet the rasterizer's triangle.
 
 use glam::{DVec2, dvec2, swizzles::Vec4Swizzles, uvec2, vec3};
 use kdray::{
@@ -15,10 +15,11 @@ use kdray::{
 use super::stage::{FIRST, Stage, options};
 use crate::support::{compare, meshes, scenes};
 
-/// Snapping to 1/16 px (Vulkan's least `subPixelPrecisionBits`) moves an edge by at most 1/32 px on each axis.
+/// Distance from a pixel's centre, in pixels, within which a ray counts as nearby. Snapping to 1/16 px (Vulkan's
+/// least `subPixelPrecisionBits`) moves an edge by at most 1/32 px on each axis.
 const SNAP_PX: f32 = 1.0 / 16.0;
 
-/// Which triangle each pixel shows, by way of primary hits; rows from the top.
+/// Returns the triangle that each pixel shows according to its primary hit, in rows from the top.
 fn rasterized(stage: &Stage) -> Vec<u32> {
     let n_pixels = stage.options.width * stage.options.height;
     let batch = Batch { n_pixels, ..FIRST };
@@ -36,14 +37,14 @@ fn rasterized(stage: &Stage) -> Vec<u32> {
     ids
 }
 
-/// The same from the kd-tree.
+/// Returns the same from the kd-tree.
 fn on_cpu(stage: &Stage) -> Vec<u32> {
     let mut ids = vec![0xdead; (stage.options.width * stage.options.height) as usize];
     reference::visibility::visibility(&stage.inputs(), stage.options.traversal, &mut ids);
     ids
 }
 
-/// Whether some ray within `SNAP_PX` of the pixel's centre meets triangle `id` first.
+/// Returns whether some ray within `SNAP_PX` of the pixel's centre meets triangle `id` first.
 fn is_met_nearby(stage: &Stage, pixel_ix: u32, id: u32) -> bool {
     let mut traverser = Traverser::new(&stage.inputs(), stage.options.traversal);
     let frame = stage.resources.constants();
@@ -60,8 +61,8 @@ fn is_met_nearby(stage: &Stage, pixel_ix: u32, id: u32) -> bool {
     })
 }
 
-/// Whether triangle `id`, seen edge-on, comes within `SNAP_PX` of the pixel's centre with all of its corners in front of
-/// the eye: so thin a triangle may hide from every ray close by.
+/// Returns whether triangle `id`, seen edge-on, comes within `SNAP_PX` of the pixel's centre with all of its corners
+/// in front of the eye. So thin a triangle may be missed by every nearby ray.
 fn is_touched(stage: &Stage, pixel_ix: u32, id: u32) -> bool {
     let (width, height) = (stage.options.width, stage.options.height);
     let centre = uvec2(pixel_ix % width, pixel_ix / width).as_dvec2() + 0.5;
@@ -79,7 +80,7 @@ fn is_touched(stage: &Stage, pixel_ix: u32, id: u32) -> bool {
     (0..3).any(|i| distance(corners[i], corners[(i + 1) % 3]) <= f64::from(SNAP_PX))
 }
 
-/// Pixels whose IDs differ, and those among them whose ID no ray close by explains.
+/// Returns the number of pixels whose IDs differ, and the pixels among them whose ID no nearby ray explains.
 fn differences(stage: &Stage, expected: &[u32], found: &[u32]) -> (usize, Vec<u32>) {
     let differing: Vec<u32> =
         (0..expected.len() as u32).filter(|&i| expected[i as usize] != found[i as usize]).collect();
@@ -113,7 +114,7 @@ fn nothing_is_shown_of_an_empty_scene() {
     compare::exact(&[NO_TRIANGLE; 63], &rasterized(&stage)).unwrap();
 }
 
-/// Triangle 0 is a triangle like any other.
+/// The id 0 is a valid triangle, not the background.
 #[test]
 fn a_lone_triangle_is_shown() {
     let mut scene = scenes::empty();

@@ -1,4 +1,4 @@
-//! What is refused, and how it is said: one line that names the file, and the line or object.
+//! Tests of refused scene files. The error is one line that names the file, and the line or the object.
 
 use std::{fs, path::Path};
 
@@ -9,7 +9,7 @@ use super::{flattened, load};
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 const DISC: &str = "[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 3\n";
 
-/// The error of a scene whose first file is `name`.
+/// Returns the error of loading a file. An MTL file is loaded through an OBJ file that uses it.
 fn error(name: &str, content: &[u8]) -> String {
     let mtl = content.split(|byte| *byte == b'\n').next() == Some(b"newmtl m");
     let obj = format!("mtllib {name}\n{TRIANGLE}usemtl m\nf 1 2 3\n");
@@ -21,7 +21,7 @@ fn error(name: &str, content: &[u8]) -> String {
     line
 }
 
-/// Each error names `place` right after the folder, and says `what`.
+/// Asserts that each error names `place` right after the folder, and contains `what`.
 fn assert_errors(cases: &[(&str, String, &str, &str)]) {
     for (name, content, place, what) in cases {
         let line = error(name, content.as_bytes());
@@ -193,17 +193,19 @@ fn files_that_are_no_scenes_are_refused() {
     assert!(missing.starts_with("no such\\u{7}.toml: cannot be read"), "{missing}");
 }
 
-/// Good files to start from, the first of each row to be mutated.
+/// Valid scenes. The first file of each row is the one that is mutated.
 const SEEDS: [&[(&str, &str)]; 4] = [
     &[(
         "m.obj",
-        "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0.5\nvt 0 0\nvn 0 0 1\nusemtl m\ns 1\nf 1/1/1 2//1 3//1\nf 2 4 3\ns off\nf -1 -2 -3 -4\n",
+        "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0.5\nvt 0 0\nvn 0 0 1\nusemtl m\ns 1\n\
+         f 1/1/1 2//1 3//1\nf 2 4 3\ns off\nf -1 -2 -3 -4\n",
     )],
     &[("m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")],
     &[
         (
             "m.mtl",
-            "newmtl m\nKa 0.1 0.1 0.1\nKd 0.5\nKs 1 1 1\nNs 10\nNi 1.5\nd 0.5\nTr 0.5\nTf 1 1 1\nillum 7\nmap_Kd a.png\nbump b.png\n",
+            "newmtl m\nKa 0.1 0.1 0.1\nKd 0.5\nKs 1 1 1\nNs 10\nNi 1.5\nd 0.5\nTr 0.5\nTf 1 1 1\nillum 7\n\
+             map_Kd a.png\nbump b.png\n",
         ),
         ("user.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n"),
     ],
@@ -217,13 +219,13 @@ const SEEDS: [&[(&str, &str)]; 4] = [
     )],
 ];
 
-/// Knuth's MMIX generator.
+/// Returns the next number of Knuth's MMIX generator, 31 bits.
 fn random(state: &mut u64) -> usize {
     *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
     (*state >> 33) as usize
 }
 
-/// Up to three edits: bytes changed, cut out or repeated, numbers swapped for nasty ones.
+/// Makes up to three edits: it changes, removes or repeats bytes, or replaces bytes or a digit by nasty text.
 fn mutate(bytes: &mut Vec<u8>, state: &mut u64) {
     const NASTY: [&str; 12] =
         ["nan", "-inf", "1e39", "-1", "0", "9223372036854775807", "1e-45", "", "\u{feff}", "\\\n", "/", "-0.0"];
@@ -275,6 +277,6 @@ fn mutated_files_never_panic() {
             }
         }
     }
-    // The mutations neither all miss nor all hit.
+    // Many mutations leave the file valid, and many do not.
     assert!(n_good > 500 && n_bad > 500, "{n_good} good, {n_bad} bad");
 }

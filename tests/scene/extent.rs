@@ -1,4 +1,5 @@
-//! How small a scene may be: just above the limit it is hit as the same scene at unit size is, below it is refused.
+//! Tests of the smallest size of a scene: just above the limit its hits are those of the same scene at unit size;
+//! below the limit it is refused.
 
 use std::fmt::Write;
 
@@ -24,7 +25,8 @@ use super::{
     },
 };
 
-/// A torus 2.8 units wide, and on its axis one that is 64 times smaller, of triangles down to 2^-13 of the scene.
+/// Returns a torus 2.8 units wide, and on its axis one that is 64 times smaller, whose triangles are down to 2^-13 of
+/// the scene.
 fn two_tori() -> Vec<Triangle> {
     [torus(64, 32), placed(torus(64, 32), 1.0 / 64.0, vec3(0.0, 0.25, 0.0))].concat()
 }
@@ -33,7 +35,7 @@ fn scaled(triangles: &[Triangle], scale: f32) -> Vec<Triangle> {
     placed(triangles.to_vec(), scale, Vec3::ZERO)
 }
 
-/// Loads triangles from an OBJ file with all digits of their coordinates.
+/// Writes triangles to an OBJ file with all digits of their coordinates, and loads it.
 fn load_triangles(triangles: &[Triangle]) -> Result<FlatScene, SceneError> {
     let mut obj = String::new();
     for (ix, t) in triangles.iter().enumerate() {
@@ -45,7 +47,8 @@ fn load_triangles(triangles: &[Triangle]) -> Result<FlatScene, SceneError> {
     load(&[("tori.obj", obj.as_bytes())])
 }
 
-/// Rays from around the scene at points of its triangles and of their edges, and some past it.
+/// Returns rays from around the scene towards points of its triangles and of their edges, and some in random
+/// directions.
 fn rays(triangles: &[Triangle], n: usize) -> Vec<Ray> {
     let mut random = Random(7);
     let ray = |_| {
@@ -74,12 +77,12 @@ fn cast_on_device(context: &std::sync::Arc<Context>, triangles: &[Triangle], ray
     Caster::new(context, geometry, Traversal::Stack).unwrap().cast(rays, Query::Closest, 1).unwrap().hits
 }
 
-/// Rays that hit another triangle, or the same one elsewhere.
+/// Returns the number of rays whose hits differ in the triangle or in the distance.
 fn n_differing(expected: &[Hit], found: &[Hit]) -> usize {
     expected.iter().zip(found).filter(|(a, b)| a.triangle_ix != b.triangle_ix || a.t != b.t).count()
 }
 
-/// The same rays in the scaled scene. Directions are scaled, too, so that t stays as it is.
+/// Returns the same rays in the scaled scene. Directions are scaled too, so that t stays the same.
 fn scaled_rays(rays: &[Ray], scale: f32) -> Vec<Ray> {
     rays.iter().map(|ray| Ray { origin: scale * ray.origin, direction: scale * ray.direction, ..*ray }).collect()
 }
@@ -110,7 +113,7 @@ fn just_above_the_limit_every_ray_hits_what_it_hits_at_unit_size() {
     assert!(context.validation_messages().is_empty());
 }
 
-/// What the limit is for: far below it, the same comparison notices lost hits.
+/// Shows that the limit is necessary: far below it, the same comparison notices lost hits.
 #[test]
 fn far_below_the_limit_hits_are_lost() {
     let (unit, scale) = (two_tori(), 2f32.powi(-70));
@@ -133,7 +136,7 @@ fn just_below_the_limit_a_scene_is_refused() {
     assert!(of_scale("5.1e-9").is_ok());
     let error = of_scale("4.9e-9").unwrap_err().to_string();
     assert!(error.contains("a.toml: is too small to be traced") && error.contains("9.80e-9"), "{error}");
-    // Far from the origin all corners of a triangle may be rounded to one point.
+    // Far from the origin, all corners of a triangle may be rounded to one point.
     let point = "v 500000 5200000.1 0\nv 500000.01 5200000.1 0\nv 500000 5200000.2 0\nf 1 2 3\n";
     let error = load(&[("utm.obj", point.as_bytes())]).unwrap_err().to_string();
     assert!(error.contains("5.00e-1 apart") && error.contains("move it to the origin"), "{error}");

@@ -1,4 +1,4 @@
-//! Generated meshes: closed where they should be, facing outwards, with the surface's own normals.
+//! Tests of generated meshes: closed bodies are closed and face outwards, and normals are those of the exact surface.
 
 use std::collections::HashMap;
 
@@ -27,9 +27,10 @@ const CLOSED: [(&str, usize); 15] = [
          triangles = 7654\nripples = [9, 2]\nripple_depth = 0.1",
         7654,
     ),
-    // A goblet: up its inside, over the rim, down to a sharp edge at the foot.
+    // A goblet: the profile runs up its inside, over the rim and down to a sharp edge at the foot.
     (
-        "generator = 'lathe'\nsegments = 24\nsteps = 5\nprofile = [[0, 0.2], [0.4, 0.5], [0.5, 1], [0.6, 1], [0.5, 0.4],\n\
+        "generator = 'lathe'\nsegments = 24\nsteps = 5\n\
+         profile = [[0, 0.2], [0.4, 0.5], [0.5, 1], [0.6, 1], [0.5, 0.4],\n\
          [0.3, 0], [0.3, 0], [0, 0]]",
         24 * (2 * 25),
     ),
@@ -51,7 +52,8 @@ fn corners(mesh: &Mesh, face: [u32; 3]) -> [Vec3; 3] {
     face.map(|ix| mesh.positions[ix as usize])
 }
 
-/// How many directed edges, told apart by the bits of their ends, have not exactly one partner that runs back.
+/// Returns the number of directed edges without exactly one partner in the opposite direction. Ends of edges are
+/// compared bit for bit.
 fn n_open_edges(mesh: &Mesh) -> usize {
     let mut edges: HashMap<[[u32; 3]; 2], i32> = HashMap::new();
     let bits = |p: Vec3| (p + Vec3::ZERO).to_array().map(f32::to_bits);
@@ -65,7 +67,7 @@ fn n_open_edges(mesh: &Mesh) -> usize {
     edges.keys().filter(|edge| !paired(**edge)).count()
 }
 
-/// Positive where the faces of a closed mesh run counter-clockwise seen from outside.
+/// Returns the volume of a closed mesh. It is positive if the faces are counter-clockwise seen from outside.
 fn volume(mesh: &Mesh) -> f32 {
     mesh.faces.iter().map(|face| corners(mesh, *face)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
 }
@@ -110,7 +112,7 @@ fn shading_normals_are_the_surfaces_own() {
             let facet = facet_normal(&mesh, *face).normalize();
             for normal in normals {
                 assert!((normal.length() - 1.0).abs() < 1e-5, "{toml}");
-                // Coarse bodies bend by up to a right angle within a triangle.
+                // In coarse bodies, the surface under one triangle may bend by up to a right angle.
                 assert!(n_triangles < 100 || normal.dot(facet) > 0.2, "{toml}: {normal} at a face towards {facet}");
             }
         }
@@ -119,7 +121,7 @@ fn shading_normals_are_the_surfaces_own() {
 
 #[test]
 fn a_spheres_normals_are_radial() {
-    // The lathe's circle is a spline through points, so it is only close to one.
+    // The lathe's profile is a spline through points of a circle, so it is only close to a circle.
     let circle: Vec<String> = (0..=24)
         .map(|ix| match (ix as f64 * std::f64::consts::PI / 24.0).sin_cos() {
             _ if ix == 0 => "[0.0, 2.0]".to_owned(),
@@ -144,7 +146,7 @@ fn a_spheres_normals_are_radial() {
 #[test]
 fn a_knots_normals_point_from_the_middle_of_the_tube() {
     let mesh = build(CLOSED[11].0);
-    // Twelve points a ring, whose mean is the ring's middle.
+    // The mean of a ring's twelve points is the ring's middle.
     let middles: Vec<Vec3> = mesh.positions.chunks(12).map(|ring| ring.iter().sum::<Vec3>() / 12.0).collect();
     for (face, normals) in mesh.faces.iter().zip(&mesh.normals) {
         for (ix, normal) in face.iter().zip(normals) {
@@ -160,7 +162,7 @@ fn rooms_face_inwards_and_planes_up() {
     assert_eq!((room.faces.len(), n_open_edges(&room)), (12, 0));
     assert!((volume(&room) + 6.0).abs() < 1e-5);
     assert_eq!(room.slots, [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5]);
-    // The left wall looks right.
+    // The left wall faces right.
     assert!(facet_normal(&room, room.faces[0]).x > 0.0);
     let flat = ["generator = 'plane'\nsize = [2, 3]\nfields = [3, 2]", "generator = 'disc'\nradius = 1\nsegments = 97"];
     for (toml, n_triangles) in flat.into_iter().zip([12, 97]) {

@@ -1,4 +1,5 @@
-//! Scenes that a program describes: meshes with several instances, and what does not fit together.
+//! Tests of scenes that a program describes: meshes with several instances, and scenes whose parts do not fit
+//! together.
 
 use glam::{DQuat, DVec3, Vec3, vec3};
 use kdray::{
@@ -10,7 +11,7 @@ use kdray::{
 
 use super::load_toml;
 
-/// Two faces of a unit square in the plane z = 0, of which the second one is smooth.
+/// Returns a unit square in the plane z = 0 of two faces, of which the second one has shading normals.
 fn square() -> Mesh {
     Mesh {
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::ONE.with_z(0.0), Vec3::Y],
@@ -52,13 +53,13 @@ fn each_instance_has_its_place_and_its_materials() {
     let scene = scene(vec![instance(moved(5.0), vec![2, 0]), instance(mirrored, vec![1])]);
     let flat = FlatScene::new(&scene).expect("a scene that fits together");
     assert_eq!((flat.triangles.len(), scene.n_triangles()), (4, 4));
-    // A slot beyond the last material starts over.
+    // Slots beyond the last material begin again at the first one.
     assert_eq!(flat.triangle_materials, [2, 0, 1, 1]);
     assert_eq!(flat.material_names, ["red", "green", "blue"]);
     let [first, second, third, _] = flat.triangles[..] else { panic!("four triangles") };
     assert_eq!([first.v0, first.v1, first.v2], [vec3(5.0, 0.0, 0.0), vec3(6.0, 0.0, 0.0), vec3(6.0, 1.0, 0.0)]);
     assert_eq!([first.n0, second.n0], [FLAT_NORMAL, encode_octahedral(Vec3::Z)]);
-    // A reflection changes the order of the corners, so that the front stays in front.
+    // A reflection swaps two corners, so that the front remains the front.
     assert_eq!([third.v0, third.v1, third.v2], [Vec3::ZERO, vec3(-1.0, 1.0, 0.0), vec3(-1.0, 0.0, 0.0)]);
     assert_eq!(scene.bounds(), (vec3(-1.0, 0.0, 0.0), vec3(6.0, 1.0, 0.0)));
     assert_eq!(flat.bounds(), scene.bounds());

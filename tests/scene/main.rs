@@ -1,4 +1,4 @@
-//! Scenes: what ships, what generators make, what OBJ files may say, and what is refused.
+//! Tests of scenes: the shipped scenes, generators, OBJ files, and errors.
 
 mod errors;
 mod extent;
@@ -23,7 +23,7 @@ use kdray::{
     world::FlatScene,
 };
 
-/// Loads the first of some files that are written to one folder, and flattens it.
+/// Writes files to one folder, loads the first one as a scene and flattens it.
 fn load(files: &[(&str, &[u8])]) -> Result<FlatScene, SceneError> {
     let folder = tempfile::tempdir().unwrap();
     for (name, content) in files {
@@ -41,7 +41,7 @@ fn load_toml(text: &str) -> FlatScene {
     load(&[("scene.toml", text.as_bytes())]).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Not normalized: twice the area.
+/// Returns the facet's normal. Its length is twice the area.
 fn facet_normal(t: &Triangle) -> Vec3 {
     (t.v1 - t.v0).cross(t.v2 - t.v0)
 }
@@ -56,7 +56,7 @@ fn shipped_scenes_have_the_papers_counts() {
         assert_eq!(scene.material_names.len(), scene.materials.len());
         assert!(scene.triangle_materials.iter().all(|ix| (*ix as usize) < scene.materials.len()));
         assert!(scene.triangles.iter().all(|t| facet_normal(t).length() > 0.0), "{name}: a triangle without area");
-        // Every material that is described is used, the unnamed default never.
+        // Every material of the file is used, and the unnamed default is not.
         for ix in 0..scene.materials.len() as u32 {
             assert!(scene.triangle_materials.contains(&ix), "{name}: `{}` unused", scene.material_names[ix as usize]);
         }
@@ -66,7 +66,7 @@ fn shipped_scenes_have_the_papers_counts() {
 
 #[test]
 fn octahedral_normals_survive() {
-    // Fibonacci's spiral covers the sphere evenly.
+    // A Fibonacci spiral covers the sphere evenly.
     let n = 200_000;
     let spiral = (0..n).map(|ix| {
         let y = 1.0 - 2.0 * (ix as f32 + 0.5) / n as f32;
@@ -81,7 +81,7 @@ fn octahedral_normals_survive() {
         assert!((decoded.length() - 1.0).abs() < 1e-6);
         assert!(encoded & 0xffff != 0x8000 && encoded >> 16 != 0x8000, "{normal} encodes to {encoded:x}");
     }
-    // As GLSL's packSnorm2x16 lays them out.
+    // The layout is that of GLSL's packSnorm2x16.
     let known = [(Vec3::X, 0x0000_7fff), (Vec3::Y, 0x7fff_0000), (Vec3::Z, 0), (Vec3::NEG_X, 0x0000_8001)];
     for (normal, encoded) in known {
         assert_eq!(encode_octahedral(normal), encoded);
@@ -97,7 +97,8 @@ fn illum_maps_to_flags() {
     let expected = [0, 0, s, s | l, s | l | r, s | l | f, s | l | r, s | l | r | f, s | l, s | r, s];
     for (illum, flags) in expected.into_iter().enumerate() {
         let scene = load_toml(&format!(
-            "materials.m = {{ illum = {illum} }}\n[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 3\nmaterial = 'm'"
+            "materials.m = {{ illum = {illum} }}\n[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 3\n\
+             material = 'm'"
         ));
         assert_eq!(scene.materials[0].flags, flags, "illum {illum}");
     }
@@ -137,11 +138,11 @@ fn a_scene_file_says_everything() {
     assert_eq!((scene.defaults.exposure, scene.defaults.denoise), (2.0, Denoise::Paper { threshold: 1.5 }));
     assert_eq!((scene.camera.up, scene.camera.vertical_fov_degrees), (Vec3::Y, 30.0));
     assert_eq!((scene.lights[0].kind, scene.lights[0].position), (LIGHT_POINT, Vec3::new(1.0, 2.0, 3.0)));
-    // Towards the light, against the way that it travels.
+    // The direction towards the light is opposite to the direction in which the light travels.
     assert_eq!((scene.lights[1].kind, scene.lights[1].position), (LIGHT_DIRECTIONAL, Vec3::Y));
 }
 
-/// One triangle in the plane z = 0, facing +z, transformed.
+/// Returns a triangle in the plane z = 0 that faces +z, after a transform.
 fn transformed(transform: &str) -> Triangle {
     let toml = format!("[[mesh]]\nfile = 't.obj'\ntransform = {{ {transform} }}");
     let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1";
@@ -156,13 +157,13 @@ fn transforms_scale_then_rotate_then_translate() {
     let t = transformed("rotate = { axis = [0, 3, 0], angle = 90 }");
     close(t.v1, Vec3::NEG_Z);
     close(decode_octahedral(t.n0), Vec3::X);
-    // x before y: +y turns to +z about x, then to +x about y.
+    // The rotation about x comes first: it turns +y to +z, and the rotation about y turns +z to +x.
     close(transformed("rotate = [90, 90, 0]").v2, Vec3::X);
-    // A reflection keeps outside outside.
+    // After a reflection, the outside is still the outside.
     let t = transformed("scale = [-1, 1, 1]");
     close(facet_normal(&t), Vec3::Z);
     close(decode_octahedral(t.n0), Vec3::Z);
-    // Normals keep perpendicular to a surface that is squeezed.
+    // Normals remain perpendicular to a surface that is squeezed.
     let t = transformed("rotate = [0, 45, 0], scale = [1e-6, 1e-3, 1e-6]");
     close(decode_octahedral(t.n1), facet_normal(&t).normalize());
 }

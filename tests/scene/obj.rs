@@ -1,4 +1,4 @@
-//! OBJ and MTL files, as exporters and people write them.
+//! Tests of OBJ and MTL files as exporters and people write them.
 
 use std::fmt::Write;
 
@@ -30,12 +30,12 @@ fn load_mtl(mtl: &str) -> FlatScene {
     load(&[("mesh.obj", obj.as_bytes()), ("a b.mtl", mtl.as_bytes())]).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Encoded normals of all corners.
+/// Returns the encoded normals of all corners.
 fn normals(scene: &FlatScene) -> Vec<u32> {
     scene.triangles.iter().flat_map(|t| [t.n0, t.n1, t.n2]).collect()
 }
 
-/// A sphere of radius 1 without normals, each triangle with corners of its own.
+/// Returns the OBJ text of a sphere of radius 1 without normals, in which each triangle has its own points.
 fn triangle_soup_sphere() -> String {
     let scene = load(&[("s.toml", b"mesh = [{ generator = 'geodesic', radius = 1, frequency = 8 }]")]).unwrap();
     let mut obj = String::new();
@@ -61,7 +61,7 @@ fn files_without_normals_are_smooth_up_to_the_crease() {
     }
     let round = load_with("mesh = [{ file = 'mesh.obj', crease = 100 }]", CUBE);
     let expected = Vec3::new(-1.0, -1.0, -1.0).normalize();
-    // Weighted by angle, a corner's diagonals do not pull the normal to one side.
+    // Since normals are weighted by angle, the diagonals of the quads do not pull a corner's normal to one side.
     assert!(decode_octahedral(round.triangles[0].n0).distance(expected) < 1e-3);
 }
 
@@ -95,7 +95,8 @@ fn a_fans_hub_takes_no_quadratic_time() {
 
 #[test]
 fn a_files_own_normals_count() {
-    // The second face has none for one corner, so none of its own; a zero normal is none.
+    // The second face lacks a normal at one corner, so it counts as a face without normals. A zero normal is none
+    // either.
     let obj = format!("{TRIANGLE}v 1 1 0\nvn 0 3 4\nvn 0 0 0\nf 1//1 2//1 3//2\nf 2//1 4 3//1\n");
     let scene = load_obj(&obj);
     let [first, second] = scene.triangles[..] else { panic!("two triangles") };
@@ -135,7 +136,7 @@ fn mtl_terms_become_the_kernels() {
     let m = scene.materials[scene.triangle_materials[0] as usize];
     assert_eq!((m.ka, m.kd, m.ke), (Vec3::splat(0.5), Vec3::new(0.1, 0.2, 0.3), Vec3::new(2.0, 0.0, 0.0)));
     assert_eq!((m.ns, m.ni, m.d, m.tf, m.flags), (10.0, 1.3, 0.6, Vec3::new(0.7, 0.8, 0.9), all));
-    // d counts where a file gives both.
+    // If a file has both d and Tr, d counts.
     assert_eq!(load_mtl("newmtl my own\nTr 1\nd -halo 0.5\n").materials[0].d, 0.5);
 }
 
@@ -145,7 +146,7 @@ fn what_no_library_defines_is_the_default() {
         let scene = load_obj(&format!("{obj}{TRIANGLE}f 1 2 3\n"));
         assert_eq!((scene.material_names, scene.triangle_materials), (vec!["(default)".to_owned()], vec![0]));
     }
-    // Two libraries on one line, and faces of several materials.
+    // One line names two libraries, and the faces have several materials.
     let obj = format!(
         "mtllib a.mtl b.mtl\n{TRIANGLE}usemtl b\nf 1 2 3\nusemtl a\nf 1 2 3\nusemtl c\nf 3 2 1\nusemtl b\nf 1 2 3"
     );
@@ -178,7 +179,7 @@ fn a_bare_obj_is_framed_and_lit() {
             assert!(edge > 0.0, "behind the camera");
             assert!(to.dot(right).abs() < edge && to.dot(right.cross(forward)).abs() < edge, "outside the picture");
         }
-        // The box is not lost in the picture either.
+        // The box is not too small in the picture.
         assert!((camera.target - camera.eye).length() < 3.5 * (max - min).length());
     }
 }

@@ -1,4 +1,4 @@
-//! Camera paths: closed forms of the way between keyframes, and what is refused.
+//! Tests of camera paths: closed forms of the curve between keyframes, and refused files.
 
 use std::fs;
 
@@ -13,7 +13,7 @@ fn load(text: &str) -> Result<CameraPath, String> {
     CameraPath::load(&path).map_err(|error| error.to_string())
 }
 
-/// A keyframe that looks along -z.
+/// Returns the text of a keyframe whose camera looks along -z.
 fn key(when: &str, eye: Vec3, fov: f32) -> String {
     let Vec3 { x, y, z } = eye;
     format!("[[keyframe]]\n{when}\neye = [{x}, {y}, {z}]\ntarget = [{x}, {y}, {}]\nvertical_fov = {fov}\n", z - 1.0)
@@ -38,7 +38,7 @@ fn keyframes_are_met_and_ends_stand_still() {
     assert_eq!((at(&path, 0.0), at(&path, 99.0)), (at(&path, 3.0), at(&path, 40.0)));
 }
 
-/// Even motion stays even, however unevenly the keyframes lie.
+/// Uniform motion stays uniform, even if the keyframes are at irregular frames.
 #[test]
 fn even_motion_stays_even() {
     let speed = vec3(0.5, -1.0, 0.25);
@@ -54,7 +54,7 @@ fn even_motion_stays_even() {
     }
 }
 
-/// Speed has no jumps, nor has the place.
+/// Speed has no jumps, and so the position has none either.
 #[test]
 fn uneven_motion_is_smooth() {
     let eyes = [vec3(0.0, 0.0, 0.0), vec3(4.0, 1.0, 2.0), vec3(4.0, -3.0, 2.0), vec3(-5.0, 7.0, 0.0)];
@@ -66,7 +66,7 @@ fn uneven_motion_is_smooth() {
         let frame = f64::from(i) / 100.0;
         assert!((speed(frame + step) - speed(frame)).length() < 0.01, "a jump at {frame}");
     }
-    // At the second keyframe, as Catmull and Rom have it: from the first to the third.
+    // Catmull and Rom's slope at the second keyframe is the one from the first to the third keyframe.
     assert!((speed(7.0) - eyes[2] / 28.0).length() < 2e-3);
 }
 

@@ -1,4 +1,4 @@
-//! A tree as deep as one wishes: a chain of splits across x, each with a leaf below.
+//! A kd-tree of any depth: a chain of splits along x, each with a leaf as its lower child.
 
 use glam::{Vec3, vec3};
 use kdray::{
@@ -8,7 +8,8 @@ use kdray::{
 
 use super::{MeshWithTree, meshes::triangle};
 
-/// One triangle across x a leaf, that of the lower or of the upper half in turn.
+/// Returns one triangle for each leaf, in a plane across x. They are the lower and the upper half of a square in
+/// turn.
 fn slabs(n: u32) -> Vec<Triangle> {
     let slab = |ix: u32| {
         let x = ix as f32 + 0.5;
@@ -22,7 +23,8 @@ fn slabs(n: u32) -> Vec<Triangle> {
     (0..n).map(slab).collect()
 }
 
-/// Rays that come from above leave the lower leaf of every level pending.
+/// Returns the chain with `n_levels` splits. Rays that come from above, towards smaller x, leave the lower leaf of
+/// every level pending.
 pub fn chain(n_levels: u32) -> MeshWithTree {
     let triangles = slabs(n_levels + 1);
     let flat = KdTree::build(&triangles, &BuildOptions { max_depth: Some(0), ..BuildOptions::default() });

@@ -1,4 +1,4 @@
-//! The command, run as its users run it.
+//! Runs the command `kdray` as its users do.
 
 use std::{
     fs,
@@ -6,10 +6,10 @@ use std::{
     process::{Command, Output, Stdio},
 };
 
-/// The command in a directory.
+/// Returns the command with arguments, to be run in a directory.
 pub fn kdray(directory: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_kdray"));
-    // What a user has measured has no part in tests.
+    // Tests do not depend on what a user has measured.
     command.current_dir(directory).args(arguments).env("KDRAY_CACHE", "").stdin(Stdio::null());
     command
 }
@@ -18,7 +18,7 @@ pub fn cornell() -> String {
     shipped("cornell.toml")
 }
 
-/// The path of a scene that comes with the program.
+/// Returns the path of a scene that comes with the program.
 pub fn shipped(scene: &str) -> String {
     let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "scenes", scene].iter().collect();
     path.into_os_string().into_string().unwrap()
@@ -34,14 +34,14 @@ pub fn stderr(output: &Output) -> String {
     text
 }
 
-/// Runs a command that succeeds.
+/// Runs the command, which has to succeed.
 pub fn succeed(directory: &Path, arguments: &[&str]) -> Output {
     let output = kdray(directory, arguments).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
     output
 }
 
-/// Runs a command that fails with an exit code and one line that names what went wrong.
+/// Runs the command, which has to fail with an exit code and one line that names what went wrong.
 pub fn fail(directory: &Path, arguments: &[&str], code: i32, named: &str) {
     let output = kdray(directory, arguments).output().unwrap();
     let text = stderr(&output);
@@ -53,6 +53,7 @@ pub fn fail(directory: &Path, arguments: &[&str], code: i32, named: &str) {
     assert!(output.stdout.is_empty(), "{arguments:?}: {}", stdout(&output));
 }
 
+/// Returns the sorted names of the files in a directory.
 pub fn names(directory: &Path) -> Vec<String> {
     let mut names: Vec<_> =
         fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();

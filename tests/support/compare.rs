@@ -1,11 +1,11 @@
-//! Comparers: each says where two results first differ, and how often.
+//! Comparers. Each says where two results first differ, and how often.
 
 use std::fmt::Debug;
 
 use glam::Vec3;
 use kdray::layout::{Hit, PathRay};
 
-/// Ok where all pairs agree; at most `n_outliers` may not.
+/// Succeeds if all pairs agree, but for at most `n_outliers`.
 fn all_agree<T: Debug>(
     expected: &[T],
     found: &[T],
@@ -32,12 +32,13 @@ pub fn exact<T: PartialEq + Debug>(expected: &[T], found: &[T]) -> Result<(), St
     all_agree(expected, found, 0, |a, b| a == b)
 }
 
-/// As `exact`, but for `n_outliers` elements.
+/// Succeeds if all elements are equal, but for at most `n_outliers`.
 pub fn exact_but_for<T: PartialEq + Debug>(n_outliers: usize, expected: &[T], found: &[T]) -> Result<(), String> {
     all_agree(expected, found, n_outliers, |a, b| a == b)
 }
 
-/// Equal bits, or finite and within `relative` of the larger magnitude and at least of 1.
+/// Tells whether numbers have equal bits, or are finite and differ by at most `relative` of the larger magnitude. A
+/// magnitude below 1 counts as 1.
 pub fn near(a: f32, b: f32, relative: f32) -> bool {
     let magnitude = a.abs().max(b.abs()).max(1.0);
     a.to_bits() == b.to_bits() || (magnitude.is_finite() && (a - b).abs() <= relative * magnitude)
@@ -47,14 +48,14 @@ fn near_vec(a: Vec3, b: Vec3, relative: f32) -> bool {
     near(a.x, b.x, relative) && near(a.y, b.y, relative) && near(a.z, b.z, relative)
 }
 
-/// All four components near.
+/// Succeeds if all four components of each pixel are near.
 pub fn pixels(relative: f32, n_outliers: usize, expected: &[[f32; 4]], found: &[[f32; 4]]) -> Result<(), String> {
     all_agree(expected, found, n_outliers, |a, b| (0..4).all(|i| near(a[i], b[i], relative)))
 }
 
-/// The same triangle at the same place; or, where edges meet or surfaces lie on one another, another one at the same t.
-/// Divisions may be 2.5 units in the last place off (Vulkan's precision of OpFDiv), so t and the weights may be too,
-/// where a needle is seen edge-on far more: hence the outliers.
+/// Succeeds if both hits are of the same triangle at the same place, or of different triangles at the same t, where
+/// edges meet or surfaces coincide. Divisions may be 2.5 units in the last place off (Vulkan's precision of OpFDiv),
+/// so t and the weights may be off too, and far more where a needle is seen edge-on: hence the outliers.
 pub fn hits(n_outliers: usize, expected: &[Hit], found: &[Hit]) -> Result<(), String> {
     all_agree(expected, found, n_outliers, |a, b| {
         let same = a.triangle_ix == b.triangle_ix && near(a.u, b.u, 1e-3) && near(a.v, b.v, 1e-3);
@@ -63,7 +64,8 @@ pub fn hits(n_outliers: usize, expected: &[Hit], found: &[Hit]) -> Result<(), St
     })
 }
 
-/// Says which ray is the first whose two hits differ in any bit, and how many rays do; None where all hits are equal.
+/// Describes the first ray whose two hits differ in any bit, and says how many rays differ. Returns none if all hits
+/// are equal.
 pub fn first_difference(rays: &[PathRay], expected: &[Hit], found: &[Hit]) -> Option<String> {
     assert_eq!([expected.len(), found.len()], [rays.len(); 2]);
     let bits = |hit: &Hit| (hit.t.to_bits(), hit.triangle_ix, hit.u.to_bits(), hit.v.to_bits());
@@ -73,7 +75,7 @@ pub fn first_difference(rays: &[PathRay], expected: &[Hit], found: &[Hit]) -> Op
     Some(format!("{n} rays; ray {i}: {:?}: {:?}, not {:?}", rays[i], found[i], expected[i]))
 }
 
-/// Integers equal, the rest near.
+/// Succeeds if the integers of each ray are equal and the floats near.
 pub fn rays(relative: f32, n_outliers: usize, expected: &[PathRay], found: &[PathRay]) -> Result<(), String> {
     all_agree(expected, found, n_outliers, |a, b| {
         a.pixel_ix == b.pixel_ix
@@ -85,7 +87,7 @@ pub fn rays(relative: f32, n_outliers: usize, expected: &[PathRay], found: &[Pat
     })
 }
 
-/// Every channel within `levels`.
+/// Succeeds if every channel is within `levels`.
 pub fn bytes(levels: u8, expected: &[[u8; 4]], found: &[[u8; 4]]) -> Result<(), String> {
     all_agree(expected, found, 0, |a, b| (0..4).all(|i| a[i].abs_diff(b[i]) <= levels))
 }

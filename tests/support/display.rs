@@ -1,4 +1,4 @@
-//! A display of one's own: an X server without a screen, what it shows, and a hand at its keys.
+//! A display for a test: an X server without a screen, what it shows, and simulated keys and mouse.
 
 use std::{
     fs,
@@ -11,19 +11,19 @@ use std::{
 
 use tempfile::TempDir;
 
-/// Longer than any picture takes to come on a busy machine.
+/// Longer than any picture takes to appear on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A running Xvfb.
 pub struct Display {
     server: Child,
-    /// As DISPLAY has it.
+    /// The value of the environment variable DISPLAY.
     pub name: String,
     /// Holds the screen's memory, as an XWD file.
     memory: TempDir,
 }
 
-/// Rows from the top, RGB.
+/// The contents of a screen or of a picture file: rows from the top, RGB.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Screen {
     pub width: usize,
@@ -47,7 +47,7 @@ impl Display {
         Self { server, name: format!(":{}", number.trim()), memory }
     }
 
-    /// What the screen shows now.
+    /// Returns what the screen shows at present.
     pub fn screen(&self) -> Screen {
         let xwd = fs::read(self.memory.path().join("Xvfb_screen0")).unwrap();
         let field = |ix: usize| u32::from_be_bytes(xwd[4 * ix..4 * ix + 4].try_into().unwrap()) as usize;
@@ -59,7 +59,7 @@ impl Display {
         Screen { width, height, pixels }
     }
 
-    /// Waits until the screen is as wanted.
+    /// Waits until `is_so` is true of the screen.
     pub fn wait_until(&self, what: &str, is_so: impl Fn(&Screen) -> bool) {
         let start = Instant::now();
         while !is_so(&self.screen()) {
@@ -76,7 +76,8 @@ impl Display {
         String::from_utf8(output.stdout).unwrap()
     }
 
-    /// Waits for the window of a name and gives it the keys, which without a window manager nobody does.
+    /// Waits for the window of a name and gives it the keyboard focus, since there is no window manager that would.
+    /// Returns the window's id.
     pub fn focus(&self, name: &str) -> String {
         let window = self.act(&["search", "--sync", "--name", name]).lines().last().unwrap().to_owned();
         self.act(&["windowfocus", "--sync", &window]);
@@ -92,14 +93,14 @@ impl Drop for Display {
 }
 
 impl Screen {
-    /// A picture file.
+    /// Loads a picture file.
     pub fn load(path: &PathBuf) -> Self {
         let image = image::open(path).unwrap().to_rgb8();
         let pixels = image.pixels().map(|pixel| pixel.0).collect();
         Self { width: image.width() as usize, height: image.height() as usize, pixels }
     }
 
-    /// Whether it is the upper left part of another.
+    /// Tells whether this is the upper left part of `screen`.
     pub fn is_shown_on(&self, screen: &Screen) -> bool {
         let row = |of: &Screen, y: usize| of.pixels[y * of.width..][..self.width].to_vec();
         self.width <= screen.width

@@ -1,4 +1,4 @@
-//! Small meshes in world space; the closed ones share the points of their edges bit for bit.
+//! Small meshes in world space. The triangles of closed ones share the points of their edges, bit for bit.
 
 use std::f32::consts::TAU;
 
@@ -11,7 +11,7 @@ pub fn triangle(v0: Vec3, v1: Vec3, v2: Vec3) -> Triangle {
     Triangle { v0, n0: FLAT_NORMAL, v1, n1: FLAT_NORMAL, v2, n2: FLAT_NORMAL }
 }
 
-/// The quads of a grid of points as two triangles each.
+/// Returns the quads of a grid of points as two triangles each.
 fn grid(n_u: usize, n_v: usize, point: impl Fn(usize, usize) -> Vec3) -> Vec<Triangle> {
     let mut triangles = Vec::new();
     for (u, v) in (0..n_v).flat_map(|v| (0..n_u).map(move |u| (u, v))) {
@@ -31,8 +31,8 @@ pub fn torus(n_around: usize, n_across: usize) -> Vec<Triangle> {
     })
 }
 
-/// A closed cube from -1 to 1 whose faces are cut into n x n squares, along whose lines the tree's planes lie.
-/// `bulge` moves each point towards the unit sphere.
+/// A closed cube from -1 to 1 whose faces are cut into n x n squares. The tree's split planes are along the edges of
+/// these. `bulge` moves each point towards the unit sphere.
 pub fn cube(n: usize, bulge: f32) -> Vec<Triangle> {
     let mut triangles = Vec::new();
     for (axis, side) in (0..3).flat_map(|axis| [(axis, 1.0), (axis, -1.0)]) {
@@ -47,7 +47,8 @@ pub fn cube(n: usize, bulge: f32) -> Vec<Triangle> {
     triangles
 }
 
-/// Triangles of all sizes and shapes, through one another: needles, specks, one with all of its corners on a line.
+/// Triangles of all sizes and shapes that intersect one another: needles, specks, and one whose corners are all on a
+/// line.
 pub fn soup(n: usize, seed: u64) -> Vec<Triangle> {
     let mut random = Random(seed);
     let mut triangles = vec![triangle(Vec3::ZERO, Vec3::ONE, Vec3::splat(0.5))];
@@ -65,13 +66,13 @@ pub fn soup(n: usize, seed: u64) -> Vec<Triangle> {
     triangles
 }
 
-/// Every triangle three times, so that only the lowest index may win.
+/// Repeats the triangles three times, so that only the lowest index may win.
 pub fn threefold(triangles: Vec<Triangle>) -> Vec<Triangle> {
     let n = triangles.len();
     triangles.into_iter().cycle().take(3 * n).collect()
 }
 
-/// The mesh scaled and then moved.
+/// Returns the mesh scaled and then moved.
 pub fn placed(mut triangles: Vec<Triangle>, scale: f32, offset: Vec3) -> Vec<Triangle> {
     for corner in triangles.iter_mut().flat_map(|t| [&mut t.v0, &mut t.v1, &mut t.v2]) {
         *corner = *corner * scale + offset;

@@ -1,6 +1,6 @@
-//! What several tests share: random numbers from a seed, small meshes, and their trees without a scene.
+//! Shared code of the tests: random numbers from a seed, small meshes, and their trees without a scene.
 
-#![allow(dead_code)] // each test target uses its own part
+#![allow(dead_code)] // each test target uses a part of it
 
 pub mod chain;
 pub mod command;
@@ -27,40 +27,40 @@ use kdray::{
     world::{FlatScene, Geometry, World},
 };
 
-/// A device under validation, which is taken for what the overrides make of it.
+/// Opens a device under validation, which kdray takes for what the overrides make of it.
 pub fn pretended(pretend: DeviceOverrides) -> Arc<Context> {
     let options = ContextOptions { pretend, ..ContextOptions::new(None, true) };
     Context::new(&options).expect("a device with validation")
 }
 
-/// A device under validation that runs kernels as a GPU of so many lanes does.
+/// Opens a device under validation that runs kernels as a GPU of `n_lanes` lanes does.
 pub fn with_lanes(n_lanes: u32) -> Arc<Context> {
     pretended(DeviceOverrides { n_lanes: Some(n_lanes), ..DeviceOverrides::default() })
 }
 
-/// A device under validation whose kernels have no atomics of 64 bits.
+/// Opens a device under validation whose kernels have no 64-bit atomics.
 pub fn without_wide_atomics() -> Arc<Context> {
     pretended(DeviceOverrides { no_wide_atomics: true, ..DeviceOverrides::default() })
 }
 
-/// The scene with its best tree.
+/// Returns the scene with its best tree.
 pub fn world_of(scene: &FlatScene) -> World {
     world_by(scene, &BuildOptions::default())
 }
 
-/// The scene with a tree that is built so.
+/// Returns the scene with a tree that is built with these options.
 pub fn world_by(scene: &FlatScene, build_options: &BuildOptions) -> World {
     World::of_flat(scene.clone(), build_options).expect("a material for each triangle")
 }
 
-/// The scene with a grid of each kind.
+/// Returns the scene with a grid of each kind.
 pub fn grid_worlds(scene: &FlatScene) -> [World; 2] {
     [GridOptions::uniform(), GridOptions::two_level()].map(|options| {
         World::with_accel(scene.clone(), &AccelOptions::Grid(options)).expect("a material for each triangle")
     })
 }
 
-/// Triangles and their tree.
+/// A mesh, its kd-tree, and the links that traversals read beside the tree.
 pub struct MeshWithTree {
     pub triangles: Vec<Triangle>,
     pub accel: Accel,
@@ -85,24 +85,25 @@ impl MeshWithTree {
         KernelInputs::of_tree(&self.triangles, self.tree()).with_links(&self.links)
     }
 
-    /// What a cast goes through.
+    /// Returns the triangles and the tree as a cast takes them.
     pub fn geometry(&self) -> Geometry<'_> {
         Geometry::new(&self.triangles, &self.accel).expect("a tree of these triangles")
     }
 
-    /// The closest hit beyond `t_min` over every triangle, of the ray as the traversal sees it.
+    /// Returns the closest hit beyond `t_min` among all triangles. The ray's origin is first moved near the scene, as
+    /// a traversal moves it.
     pub fn by_brute_force(&self, ray: &PathRay, t_min: f32) -> Hit {
         let (near, t_start) = near_scene(&self.inputs(), &SearchRay { t_min, ..SearchRay::from(ray) });
         let hit = brute::closest_hit(&self.triangles, &near);
         Hit { t: if hit.triangle_ix == NO_TRIANGLE { ray.t_max } else { hit.t + t_start }, ..hit }
     }
 
-    /// The middle of the root's cell.
+    /// Returns the centre of the root's cell.
     pub fn centre(&self) -> Vec3 {
         (self.tree().cell_min() + self.tree().cell_max()) / 2.0
     }
 
-    /// Half of the root cell's diagonal.
+    /// Returns half of the root cell's diagonal.
     pub fn radius(&self) -> f32 {
         (self.tree().cell_max() - self.tree().cell_min()).length() / 2.0
     }

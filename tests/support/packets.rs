@@ -1,4 +1,4 @@
-//! Rays that go through the tree as packets.
+//! Traces rays as packets.
 
 use fearless_simd::{Level, Simd};
 use kdray::{
@@ -10,7 +10,7 @@ use kdray::{
 
 use super::MeshWithTree;
 
-/// The sets of instructions that the machine has, the baseline first.
+/// Returns the instruction sets that the machine has, the baseline first.
 pub fn levels() -> Vec<Level> {
     let mut levels = vec![Level::baseline()];
     #[cfg(target_arch = "x86_64")]
@@ -23,7 +23,7 @@ pub fn levels() -> Vec<Level> {
     levels
 }
 
-/// The hits of rays that go as packets, with the instructions of a level.
+/// Returns the hits of rays that are traced as packets, with the instructions of a level.
 pub fn traced<const ANY_HIT: bool>(world: &MeshWithTree, level: Level, rays: &[PathRay]) -> Vec<Hit> {
     let mut hits = vec![None; rays.len()];
     let probes = hits.iter_mut().zip(rays.iter().map(SearchRay::from));

@@ -1,4 +1,4 @@
-//! Random numbers: the same from the same seed, everywhere.
+//! Random numbers, which are the same for the same seed everywhere.
 
 use glam::Vec3;
 
@@ -13,7 +13,7 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// 0 to 1, without 1.
+    /// Returns a number from 0 to 1, 1 excluded.
     pub fn unit(&mut self) -> f32 {
         (self.bits() >> 40) as f32 / (1 << 24) as f32
     }
@@ -22,11 +22,12 @@ impl Random {
         low + (high - low) * self.unit()
     }
 
-    /// 0 to n - 1.
+    /// Returns an integer from 0 to n - 1.
     pub fn below(&mut self, n: usize) -> usize {
         (self.bits() % n as u64) as usize
     }
 
+    /// Returns one of the items.
     pub fn of<'a, T>(&mut self, items: &'a [T]) -> &'a T {
         &items[self.below(items.len())]
     }
@@ -35,7 +36,7 @@ impl Random {
         Vec3::new(self.between(min.x, max.x), self.between(min.y, max.y), self.between(min.z, max.z))
     }
 
-    /// Unit length, every direction alike.
+    /// Returns a unit vector. All directions are equally likely.
     pub fn direction(&mut self) -> Vec3 {
         loop {
             let v = self.in_box(Vec3::NEG_ONE, Vec3::ONE);

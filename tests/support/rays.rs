@@ -1,4 +1,4 @@
-//! Rays at a mesh: ordinary ones, and those on which traversals fail.
+//! Rays at a mesh: ordinary ones, and those on which traversals are likely to fail. The latter are *nasty*.
 
 use glam::Vec3;
 use kdray::{
@@ -8,7 +8,7 @@ use kdray::{
 
 use super::{MeshWithTree, random::Random};
 
-/// A ray of the length `t_max`, from no triangle.
+/// Returns a ray without an end, from no triangle.
 pub fn ray(origin: Vec3, direction: Vec3) -> PathRay {
     PathRay {
         origin,
@@ -25,7 +25,7 @@ fn corner(random: &mut Random, triangles: &[Triangle]) -> Vec3 {
     *random.of(&[t.v0, t.v1, t.v2])
 }
 
-/// The middle of an edge, or a point elsewhere on it.
+/// Returns the middle of an edge, or a point elsewhere on it.
 fn edge_point(random: &mut Random, triangles: &[Triangle]) -> Vec3 {
     let t = random.of(triangles);
     let (a, b) = *random.of(&[(t.v0, t.v1), (t.v1, t.v2), (t.v2, t.v0)]);
@@ -38,7 +38,7 @@ fn axis_direction(random: &mut Random) -> Vec3 {
     if random.below(2) == 0 { axis } else { -axis }
 }
 
-/// A point of a split plane of the tree, and the plane's axis.
+/// Moves `point` into a split plane of the tree, along the plane's axis. Returns it with the axis.
 fn split_plane_point(random: &mut Random, world: &MeshWithTree, point: Vec3) -> (Vec3, usize) {
     let mut point = point;
     for _ in 0..100 {
@@ -50,7 +50,8 @@ fn split_plane_point(random: &mut Random, world: &MeshWithTree, point: Vec3) -> 
     (point, 0)
 }
 
-/// One of the kinds of rays below, in turn.
+/// Returns a ray of one of the kinds below, selected by `kind` modulo `N_KINDS`. Some rays end early, and some come
+/// from a triangle.
 pub fn nasty_ray(random: &mut Random, world: &MeshWithTree, kind: usize) -> PathRay {
     let far = world.centre() + 3.0 * world.radius() * random.direction();
     let within = random.in_box(world.tree().cell_min(), world.tree().cell_max());
@@ -87,7 +88,7 @@ pub fn nasty_ray(random: &mut Random, world: &MeshWithTree, kind: usize) -> Path
     ray
 }
 
-/// Kinds of rays that `nasty_ray` makes.
+/// Number of kinds of rays that `nasty_ray` makes.
 pub const N_KINDS: usize = 14;
 
 /// Returns a ray from inside a convex mesh around 0 to a corner or a point of an edge.

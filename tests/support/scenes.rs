@@ -1,4 +1,4 @@
-//! Small scenes in code.
+//! Small scenes that are made in code.
 
 use std::path::Path;
 
@@ -14,12 +14,12 @@ use kdray::{
 
 use super::meshes;
 
-/// A scene file, flattened.
+/// Loads a scene file and flattens it.
 pub fn load(path: &Path) -> FlatScene {
     FlatScene::new(&Scene::load(path).expect("a scene")).expect("a loaded scene fits together")
 }
 
-/// A scene without triangles and lights, seen from z = 4.
+/// Returns a scene without triangles and lights, seen from z = 4.
 pub fn empty() -> FlatScene {
     FlatScene {
         name: "test".to_owned(),
@@ -43,7 +43,7 @@ pub fn add(scene: &mut FlatScene, triangles: Vec<Triangle>, material: Material) 
     scene.materials.push(material);
 }
 
-/// Without light of any kind.
+/// A material that neither emits nor reflects light.
 pub const BLACK: Material = Material {
     ka: Vec3::ZERO,
     ns: 1.0,
@@ -73,24 +73,24 @@ pub fn mirror(ks: Vec3) -> Material {
     Material { ks, flags: MATERIAL_REFLECT, ..BLACK }
 }
 
-/// Reflection and refraction by Fresnel's term.
+/// A material that reflects and refracts by Fresnel's term.
 pub fn glass(ni: f32) -> Material {
     let flags = MATERIAL_SPECULAR | MATERIAL_REFLECT | MATERIAL_REFRACT | MATERIAL_FRESNEL;
     Material { ks: Vec3::ONE, ns: 50.0, ni, flags, ..BLACK }
 }
 
-/// A mirror whose share grows towards grazing views.
+/// A diffuse material under a mirror whose share grows towards grazing views.
 pub fn varnish(ks: Vec3, ni: f32) -> Material {
     Material { ks, ni, flags: MATERIAL_REFLECT | MATERIAL_FRESNEL, ..diffuse(vec3(0.3, 0.1, 0.1)) }
 }
 
-/// Reflects Ks and refracts the rest, or, without reflection, refracts all.
+/// A material that reflects Ks and refracts the rest. Without reflection it refracts all.
 pub fn plain_glass(ks: Vec3, tf: Vec3, reflects: bool) -> Material {
     let flags = MATERIAL_REFRACT | if reflects { MATERIAL_REFLECT } else { 0 };
     Material { ks, tf, ni: 1.4, flags, ..BLACK }
 }
 
-/// Lets a part of the light straight through.
+/// A material that lets a part of the light straight through.
 pub fn veil(kd: Vec3, d: f32) -> Material {
     Material { d, ..diffuse(kd) }
 }
@@ -112,14 +112,14 @@ pub fn smooth_sphere(n: usize, radius: f32, centre: Vec3) -> Vec<Triangle> {
     meshes::placed(triangles, radius, centre)
 }
 
-/// A box of side 2 * `half` whose faces look inwards.
+/// A box of side 2 * `half` whose front faces are inside.
 pub fn room(half: f32) -> Vec<Triangle> {
     let mut triangles = meshes::placed(meshes::cube(2, 0.0), half, Vec3::ZERO);
     triangles.iter_mut().for_each(|t| (t.v1, t.v2) = (t.v2, t.v1));
     triangles
 }
 
-/// Every material in a room, under a lamp and a far light.
+/// Returns a scene with every material in a room, under two lamps and a directional light.
 pub fn mixed() -> FlatScene {
     let mut scene = empty();
     add(&mut scene, room(5.0), diffuse(vec3(0.7, 0.6, 0.5)));
@@ -147,7 +147,7 @@ pub fn mixed() -> FlatScene {
     scene
 }
 
-/// The room of `mixed` with the front taken off, so that some rays leave.
+/// Returns `mixed` without the walls of its room at the upper ends of x and z, so that some rays leave.
 pub fn mixed_outdoors() -> FlatScene {
     let scene = mixed();
     let keep: Vec<bool> = scene

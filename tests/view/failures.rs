@@ -1,4 +1,4 @@
-//! What goes wrong while a window is open, and does not end it.
+//! Errors that occur while the viewer's window is open, and do not close it.
 
 use std::{
     fs,
@@ -36,7 +36,7 @@ fn a_picture_that_cannot_be_written_is_no_end() {
     assert!(text.contains("\nwarning: cannot write `cornell-001.png`: "), "{text}");
 }
 
-/// Makes the layer that loses devices; gives the folder of its manifest.
+/// Builds the Vulkan layer that simulates a lost device. Returns the directory of its manifest.
 fn losing_layer(directory: &Path) -> PathBuf {
     let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/support/lose_device.c");
     let library = directory.join("lose_device.so");
@@ -55,7 +55,7 @@ fn a_lost_device_is_opened_anew() {
     let scene = cornell();
     let mut command = kdray(directory.path(), &["view", &scene, "--size", SIZE, "--spp", "64", "--no-overlay"]);
     command.env("VK_LAYER_PATH", losing_layer(directory.path())).env("VK_INSTANCE_LAYERS", "VK_LAYER_lose_device");
-    // In the midst of the samples: five submits and more for each.
+    // The device is lost while samples are drawn: each sample takes at least five submits.
     command.env("LOSE_DEVICE_AT", "100").env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY");
     let viewer = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mean = rendered(directory.path(), &scene, &["--spp", "64"]);

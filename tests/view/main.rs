@@ -1,4 +1,4 @@
-//! The viewer as its users meet it, in a window on a display of its own, under the validation layer.
+//! Tests `kdray view` in a window on a display of its own, under the validation layer.
 #![cfg(target_os = "linux")]
 
 #[path = "../support/mod.rs"]
@@ -22,26 +22,26 @@ use tempfile::TempDir;
 
 const SIZE: &str = "160x120";
 
-/// A viewer of a scene on the display, in a small window.
+/// Starts a viewer of a scene on the display, in a small window.
 fn viewer(directory: &Path, display: &Display, scene: &str, more: &[&str]) -> Child {
     viewer_of_size(directory, display, scene, &[&["--size", SIZE], more].concat())
 }
 
-/// A viewer of a scene on the display, in a window of the size that is among the arguments.
+/// Starts a viewer of a scene on the display, in a window whose size is among the arguments.
 fn viewer_of_size(directory: &Path, display: &Display, scene: &str, more: &[&str]) -> Child {
     let mut command = kdray(directory, &[&["view", scene, "--validate"], more].concat());
     command.env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY").stdout(Stdio::piped()).stderr(Stdio::piped());
     command.spawn().unwrap()
 }
 
-/// Waits for the viewer's end, which is a good one.
+/// Waits until the viewer ends, and asserts that it succeeds.
 fn ended(viewer: Child) -> Output {
     let output = viewer.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     output
 }
 
-/// What `kdray render` makes of a scene.
+/// Returns the picture that `kdray render` makes of a scene.
 fn rendered(directory: &Path, scene: &str, more: &[&str]) -> Screen {
     let path = directory.join("rendered.png");
     let arguments = [&["render", scene, "--size", SIZE, "-q", "-o", path.to_str().unwrap()], more].concat();
@@ -72,7 +72,7 @@ fn a_tour_ends_with_the_picture_that_render_makes() {
         assert!(json[times]["n"].as_u64() >= Some(4) && json["vsync"] == false, "{json}");
         assert!(0.0 < at("p50") && at("p50") <= at("p95") && at("p95") <= at("p99"), "{json}");
     }
-    // The last frame is at rest; the first ones are drawn small.
+    // The camera rests at the last frame; the frames before it are drawn small.
     let moving = &json["moving"];
     let pixels = ["width", "height"].map(|side| moving[side].as_u64().unwrap());
     assert!(moving["frame_ms"]["n"] == 3 && (20..160).contains(&pixels[0]) && pixels[1] < 120, "{json}");
@@ -176,7 +176,7 @@ fn keys_and_mouse_move_the_camera_and_home_brings_it_back() {
 
 #[test]
 fn keys_are_listed_over_the_picture_and_a_line_says_how() {
-    // The mouse pointer, in the screen's middle, is beside the window.
+    // The mouse pointer is in the screen's middle, which is outside the window.
     let (directory, display) = (TempDir::new().unwrap(), Display::start(1000, 400));
     let size = ["--size", "480x360"];
     succeed(directory.path(), &[&["render", &cornell(), "-q", "-o", "rendered.png"], &size[..]].concat());
@@ -196,7 +196,7 @@ fn keys_are_listed_over_the_picture_and_a_line_says_how() {
     for key in ["h", "F1", "question"] {
         display.act(&["key", key]);
         display.wait_until("the keys", |screen| !picture.is_shown_on(screen));
-        // Escape closes the list before it closes the window.
+        // If the list is open, Escape closes the list and not the window.
         display.act(&["key", if key == "F1" { "Escape" } else { key }]);
         display.wait_until("the picture again", |screen| picture.is_shown_on(screen));
     }
@@ -272,7 +272,7 @@ fn usage_mistakes_are_refused_before_there_is_a_window() {
     }
 }
 
-/// The layer's advice on best practices, asked for by environment, stands in for a fault.
+/// The validation layer's best-practice messages, enabled by an environment variable, stand in for an error.
 #[test]
 fn a_validation_message_fails() {
     let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));

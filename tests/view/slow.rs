@@ -1,4 +1,4 @@
-//! Pictures that take seconds: the window answers meanwhile.
+//! Tests that the window responds while a picture takes seconds.
 
 use std::{
     path::Path,
@@ -18,28 +18,29 @@ use super::{
     viewer_of_size,
 };
 
-/// The same way to the same picture, whatever suits a window or a picture.
+/// Arguments with which `view` and `render` draw the same picture; by default each would choose its own method.
 const SAME: [&str; 4] = ["--size", "320x240", "--primary", "trace"];
 
-/// A viewer of glass, a sample of which takes seconds on a software driver.
+/// Starts a viewer of a glass scene, a sample of which takes seconds on a software driver.
 fn slow_viewer(directory: &Path, display: &Display, n_samples: &str) -> Child {
     let arguments = [&["--spp", n_samples, "--no-overlay", "-q"], &SAME[..]].concat();
     viewer_of_size(directory, display, &shipped("paper3.toml"), &arguments)
 }
 
-/// A display whose middle, where the mouse pointer is, lies beside the window.
+/// Starts a display so wide that its middle, where the mouse pointer is, is outside the window.
 fn wide_display() -> Display {
     Display::start(700, 300)
 }
 
-/// The viewer's picture of one sample.
+/// Returns the viewer's picture of one sample, as `kdray render` draws it.
 fn picture(directory: &Path) -> Screen {
     let scene = shipped("paper3.toml");
     succeed(directory, &[&["render", &scene, "-q", "-o", "rendered.png"], &SAME[..]].concat());
     Screen::load(&directory.join("rendered.png"))
 }
 
-/// Whether the screen, which was `framed`, shows something else for some time before it shows the picture.
+/// Waits for the picture. Returns whether the screen showed a preview before it: a still image other than `framed`,
+/// the screen at the start.
 fn previews(display: &Display, framed: &Screen, picture: &Screen) -> bool {
     let (start, mut before, mut is_previewed) = (Instant::now(), display.screen(), false);
     loop {
@@ -48,7 +49,7 @@ fn previews(display: &Display, framed: &Screen, picture: &Screen) -> bool {
         if picture.is_shown_on(&screen) {
             return is_previewed;
         }
-        // A screen that is being drawn is not the same twice.
+        // Two equal screens in a row show a complete frame and not one that is just being drawn.
         is_previewed |= screen == before && screen != *framed;
         before = screen;
         assert!(start.elapsed() < Duration::from_secs(120), "the picture never came");
@@ -79,7 +80,7 @@ fn what_is_seen_is_saved_at_once() {
     let viewer = slow_viewer(directory.path(), &display, "256");
     display.focus("kdray");
     display.wait_until("the first sample", |screen| picture.is_shown_on(screen));
-    // While the second sample is drawn.
+    // The keys are pressed while the second sample is drawn.
     display.act(&["key", "s", "key", "p", "key", "Escape"]);
     let output = ended(viewer);
     assert!(stdout(&output).starts_with("wrote paper3-001.png\n[camera]\n"), "{}", stdout(&output));
