@@ -47,8 +47,8 @@ impl Case {
         let triangles: Vec<Triangle> = visible.iter().map(|&ix| all[ix as usize]).collect();
         let hit_of = |ray: &Ray| {
             let &Ray { origin, t_min, direction, t_max } = ray;
-            let probe = SearchRay { origin, t_min, direction, t_max, source_triangle: NO_TRIANGLE };
-            let hit = hit_from_near(&self.mesh.inputs(), &probe, |near, best| {
+            let search_ray = SearchRay { origin, t_min, direction, t_max, source_triangle: NO_TRIANGLE };
+            let hit = hit_from_near(&self.mesh.inputs(), &search_ray, |near, best| {
                 *best = brute::closest_hit(&triangles, near);
             });
             if hit.triangle_ix == NO_TRIANGLE {

@@ -147,14 +147,14 @@ fn sixteen_rays_of_an_octant_are_a_packet() {
     let mut seen = vec![];
     let mut n_packets = 0;
     for (ray_ix, direction) in directions_in_turn().enumerate() {
-        let probe = SearchRay::from(&support::rays::ray(Vec3::X * ray_ix as f32, direction));
-        let Some(bin) = bins.push(ray_ix, &probe) else { continue };
+        let search_ray = SearchRay::from(&support::rays::ray(Vec3::X * ray_ix as f32, direction));
+        let Some(bin) = bins.push(ray_ix, &search_ray) else { continue };
         n_packets += 1;
         assert_eq!(bin.keys.len(), LANES);
         for (lane, ray_ix) in bin.keys.drain(..).enumerate() {
-            let probe = bin.rays.get(lane);
-            assert_eq!(probe.origin.x, ray_ix as f32, "the ray's own");
-            assert_eq!(signs_of(probe.direction), signs_of(bin.rays.get(0).direction));
+            let search_ray = bin.rays.get(lane);
+            assert_eq!(search_ray.origin.x, ray_ix as f32, "the ray's own");
+            assert_eq!(signs_of(search_ray.direction), signs_of(bin.rays.get(0).direction));
             seen.push(ray_ix);
         }
     }

@@ -48,9 +48,9 @@ fn traced(world: &MeshWithTree, traversal: Traversal, rays: &[PathRay]) -> Vec<H
 fn traced_through(bindings: &KernelInputs, traversal: Traversal, rays: &[PathRay]) -> Vec<Hit> {
     let of_task = |(engine, reference): &mut (FastTracer, Traverser), rays: &[PathRay]| {
         let (mut closest, mut is_hit) = (vec![Hit::default(); rays.len()], vec![false; rays.len()]);
-        let probes = || rays.iter().map(SearchRay::from).enumerate();
-        engine.trace_all::<false, _>(bindings, probes(), |i, hit| closest[i] = hit);
-        engine.trace_all::<true, _>(bindings, probes(), |i, hit| is_hit[i] = hit.triangle_ix != NO_TRIANGLE);
+        let search_rays = || rays.iter().map(SearchRay::from).enumerate();
+        engine.trace_all::<false, _>(bindings, search_rays(), |i, hit| closest[i] = hit);
+        engine.trace_all::<true, _>(bindings, search_rays(), |i, hit| is_hit[i] = hit.triangle_ix != NO_TRIANGLE);
         let alone = rays.iter().map(|ray| reference.traverse::<false>(bindings, &ray.into())).collect::<Vec<_>>();
         assert_eq!(first_difference(rays, &alone, &closest), None, "{traversal}: engine and reference");
         assert_eq!(is_hit, closest.iter().map(|hit| hit.triangle_ix != NO_TRIANGLE).collect::<Vec<_>>(), "{traversal}");

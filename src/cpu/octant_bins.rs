@@ -32,9 +32,9 @@ impl<Key> Default for OctantBins<Key> {
 impl<Key> OctantBins<Key> {
     /// Adds a ray to the bin of its octant. Returns the bin if it is now full; the caller has to empty it.
     #[inline(always)]
-    pub fn push(&mut self, key: Key, probe: &SearchRay) -> Option<&mut Bin<Key>> {
-        let octant = &mut self.octants[signs_of(probe.direction) as usize & 7];
-        octant.rays.set(octant.keys.len(), probe);
+    pub fn push(&mut self, key: Key, search_ray: &SearchRay) -> Option<&mut Bin<Key>> {
+        let octant = &mut self.octants[signs_of(search_ray.direction) as usize & 7];
+        octant.rays.set(octant.keys.len(), search_ray);
         octant.keys.push(key);
         octant.keys.is_full().then_some(octant)
     }

@@ -119,16 +119,16 @@ impl<S: Simd> Packet<S> {
     pub fn new(
         simd: S,
         inputs: &KernelInputs<impl ReadCounter>,
-        probes: &RaysSoa,
+        search_rays: &RaysSoa,
         n_rays: usize,
     ) -> (Self, Interval<S>) {
-        let (origin, direction) = (columns(simd, &probes.origin), columns(simd, &probes.direction));
+        let (origin, direction) = (columns(simd, &search_rays.origin), columns(simd, &search_rays.direction));
         let inv_direction = [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])];
         let bias = [-origin[0] * inv_direction[0], -origin[1] * inv_direction[1], -origin[2] * inv_direction[2]];
         let [x0, y0, z0] = times_plus(inputs.cell_min.to_array(), &inv_direction, &bias);
         let [x1, y1, z1] = times_plus(inputs.cell_max.to_array(), &inv_direction, &bias);
-        let t_min = f32x16::load_array_ref(simd, &probes.t_min);
-        let t_max = f32x16::load_array_ref(simd, &probes.t_max);
+        let t_min = f32x16::load_array_ref(simd, &search_rays.t_min);
+        let t_max = f32x16::load_array_ref(simd, &search_rays.t_max);
         let whole = Interval {
             enter: x0.min(x1).max(y0.min(y1)).max(z0.min(z1).max(t_min)),
             exit: x0.max(x1).min(y0.max(y1)).min(z0.max(z1).min(t_max)),
@@ -137,12 +137,12 @@ impl<S: Simd> Packet<S> {
             origin,
             direction,
             inv_direction,
-            first_is_above: [0, 1, 2].map(|axis| signs_of(probes.direction(0)) >> axis & 1),
+            first_is_above: [0, 1, 2].map(|axis| signs_of(search_rays.direction(0)) >> axis & 1),
             bias,
             plane_epsilon: KD_PLANE_EPSILON * largest_coordinate(inputs),
             shears: Shears::of(&origin, &direction),
             t_min,
-            source_triangle: u32x16::load_array_ref(simd, &probes.source_triangle),
+            source_triangle: u32x16::load_array_ref(simd, &search_rays.source_triangle),
             best: Found::nothing(t_max),
             t_best: t_max,
         };

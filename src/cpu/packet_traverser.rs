@@ -147,12 +147,12 @@ impl PacketTraverser {
         &mut self,
         simd: S,
         inputs: &KernelInputs<impl ReadCounter>,
-        probes: &RaysSoa,
+        search_rays: &RaysSoa,
         n_rays: usize,
     ) -> HitsSoa {
-        let (mut packet, whole) = Packet::new(simd, inputs, probes, n_rays);
+        let (mut packet, whole) = Packet::new(simd, inputs, search_rays, n_rays);
         if !packet.is_within_reach(inputs) {
-            return self.traverse_one_by_one::<ANY_HIT>(inputs, probes, n_rays);
+            return self.traverse_one_by_one::<ANY_HIT>(inputs, search_rays, n_rays);
         }
         if whole.lanes() != 0 {
             self.search::<_, ANY_HIT>(inputs, &mut packet, whole);
@@ -165,12 +165,12 @@ impl PacketTraverser {
     fn traverse_one_by_one<const ANY_HIT: bool>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
-        probes: &RaysSoa,
+        search_rays: &RaysSoa,
         n_rays: usize,
     ) -> HitsSoa {
         let mut hits = HitsSoa::default();
         for lane in 0..n_rays {
-            let hit = hit_from_near(inputs, &probes.get(lane), |near, best| {
+            let hit = hit_from_near(inputs, &search_rays.get(lane), |near, best| {
                 self.traverse_alone::<ANY_HIT>(inputs, &TraversalRay::new(inputs, near), best);
             });
             hits.set(lane, &hit);
@@ -183,10 +183,10 @@ impl PacketTraverser {
     pub fn traverse<const ANY_HIT: bool>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
-        probes: &RaysSoa,
+        search_rays: &RaysSoa,
         n_rays: usize,
     ) -> HitsSoa {
-        dispatch!(self.level, simd => self.traverse_at::<_, ANY_HIT>(simd, inputs, probes, n_rays))
+        dispatch!(self.level, simd => self.traverse_at::<_, ANY_HIT>(simd, inputs, search_rays, n_rays))
     }
 
     /// Traces one ray.

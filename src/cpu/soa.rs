@@ -28,14 +28,14 @@ pub struct HitsSoa {
 
 impl RaysSoa {
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, probe: &SearchRay) {
+    pub fn set(&mut self, lane: usize, search_ray: &SearchRay) {
         for axis in 0..3 {
-            self.origin[axis][lane] = probe.origin[axis];
-            self.direction[axis][lane] = probe.direction[axis];
+            self.origin[axis][lane] = search_ray.origin[axis];
+            self.direction[axis][lane] = search_ray.direction[axis];
         }
-        self.t_min[lane] = probe.t_min;
-        self.t_max[lane] = probe.t_max;
-        self.source_triangle[lane] = probe.source_triangle;
+        self.t_min[lane] = search_ray.t_min;
+        self.t_max[lane] = search_ray.t_max;
+        self.source_triangle[lane] = search_ray.source_triangle;
     }
 
     #[inline(always)]

@@ -40,12 +40,16 @@ impl FastTracer {
 
     /// Finds one ray's hit, as [`Traverser::traverse`] does.
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(&mut self, inputs: &KernelInputs<impl ReadCounter>, probe: &SearchRay) -> Hit {
+    pub fn traverse<const ANY_HIT: bool>(
+        &mut self,
+        inputs: &KernelInputs<impl ReadCounter>,
+        search_ray: &SearchRay,
+    ) -> Hit {
         match self {
-            Self::Packets(packets) => hit_from_near(inputs, probe, |near, best| {
+            Self::Packets(packets) => hit_from_near(inputs, search_ray, |near, best| {
                 packets.traverse_alone::<ANY_HIT>(inputs, &TraversalRay::new(inputs, near), best);
             }),
-            Self::Single(traverser) => traverser.traverse::<ANY_HIT>(inputs, probe),
+            Self::Single(traverser) => traverser.traverse::<ANY_HIT>(inputs, search_ray),
         }
     }
 }
@@ -59,20 +63,20 @@ impl Tracer for FastTracer {
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
-        probes: impl Iterator<Item = (Key, SearchRay)>,
+        search_rays: impl Iterator<Item = (Key, SearchRay)>,
         mut found: impl FnMut(Key, Hit),
     ) {
         let packets = match self {
             Self::Packets(packets) => packets,
-            Self::Single(traverser) => return traverser.trace_all::<ANY_HIT, Key>(inputs, probes, found),
+            Self::Single(traverser) => return traverser.trace_all::<ANY_HIT, Key>(inputs, search_rays, found),
         };
         let mut bins = OctantBins::default();
         let mut traverse = |Bin { rays, keys }: &mut Bin<Key>| {
             let hits = packets.traverse::<ANY_HIT>(inputs, rays, keys.len());
             keys.drain(..).enumerate().for_each(|(lane, key)| found(key, hits.get(lane)));
         };
-        for (key, probe) in probes {
-            if let Some(packet) = bins.push(key, &probe) {
+        for (key, search_ray) in search_rays {
+            if let Some(packet) = bins.push(key, &search_ray) {
                 traverse(packet);
             }
         }

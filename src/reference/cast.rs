@@ -63,8 +63,8 @@ fn scaled(ray: &Ray) -> SearchRay {
 
 /// Writes the hits of one task's rays.
 fn cast_all<const ANY_HIT: bool>(inputs: &KernelInputs, traverser: &mut impl Tracer, rays: &[Ray], hits: &mut [Hit]) {
-    let probes = rays.iter().zip(hits).map(|(ray, hit)| ((ray, hit), scaled(ray)));
-    traverser.trace_all::<ANY_HIT, _>(inputs, probes, |(ray, hit), found| {
+    let search_rays = rays.iter().zip(hits).map(|(ray, hit)| ((ray, hit), scaled(ray)));
+    traverser.trace_all::<ANY_HIT, _>(inputs, search_rays, |(ray, hit), found| {
         let [scale, _] = scales_of(ray.direction);
         *hit = if found.triangle_ix == NO_TRIANGLE { MISS } else { Hit { t: found.t * scale, ..found } };
     });

@@ -26,8 +26,8 @@ pub fn trace_by<T: Tracer>(inputs: &KernelInputs, traversal: Traversal, rays: &[
             || T::new(inputs, traversal),
             |traverser, (rays, hits)| {
                 let mut n_hits = 0;
-                let probes = rays.iter().map(SearchRay::from);
-                traverser.trace_all::<false, _>(inputs, hits.iter_mut().zip(probes), |hit, found| {
+                let search_rays = rays.iter().map(SearchRay::from);
+                traverser.trace_all::<false, _>(inputs, hits.iter_mut().zip(search_rays), |hit, found| {
                     *hit = found;
                     n_hits += u32::from(found.triangle_ix != NO_TRIANGLE);
                 });

@@ -109,13 +109,13 @@ pub fn near_scene(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> (
 #[inline(always)]
 pub fn hit_from_near(
     inputs: &KernelInputs<impl ReadCounter>,
-    probe: &SearchRay,
+    search_ray: &SearchRay,
     search: impl FnOnce(&SearchRay, &mut Hit),
 ) -> Hit {
-    let (near, t_start) = near_scene(inputs, probe);
+    let (near, t_start) = near_scene(inputs, search_ray);
     let mut best = near.miss();
     search(&near, &mut best);
-    best.t = if best.triangle_ix == NO_TRIANGLE { probe.t_max } else { best.t + t_start };
+    best.t = if best.triangle_ix == NO_TRIANGLE { search_ray.t_max } else { best.t + t_start };
     best
 }
 

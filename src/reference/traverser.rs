@@ -31,7 +31,7 @@ pub trait Tracer {
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
-        probes: impl Iterator<Item = (Key, SearchRay)>,
+        search_rays: impl Iterator<Item = (Key, SearchRay)>,
         found: impl FnMut(Key, Hit),
     );
 }
@@ -53,8 +53,12 @@ impl Traverser {
     /// Finds a ray's closest hit in (t_min, t_max], or with `ANY_HIT` one that need not be the closest. A miss has
     /// t = t_max.
     #[inline]
-    pub fn traverse<const ANY_HIT: bool>(&mut self, inputs: &KernelInputs<impl ReadCounter>, probe: &SearchRay) -> Hit {
-        hit_from_near(inputs, probe, |near, best| {
+    pub fn traverse<const ANY_HIT: bool>(
+        &mut self,
+        inputs: &KernelInputs<impl ReadCounter>,
+        search_ray: &SearchRay,
+    ) -> Hit {
+        hit_from_near(inputs, search_ray, |near, best| {
             let ray = &TraversalRay::new(inputs, near);
             match self {
                 Self::Mask(pending) => search::<_, ANY_HIT>(inputs, ray, pending, best),
@@ -92,9 +96,9 @@ impl Tracer for Traverser {
     fn trace_all<const ANY_HIT: bool, Key>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
-        probes: impl Iterator<Item = (Key, SearchRay)>,
+        search_rays: impl Iterator<Item = (Key, SearchRay)>,
         mut found: impl FnMut(Key, Hit),
     ) {
-        probes.for_each(|(key, probe)| found(key, self.traverse::<ANY_HIT>(inputs, &probe)));
+        search_rays.for_each(|(key, search_ray)| found(key, self.traverse::<ANY_HIT>(inputs, &search_ray)));
     }
 }

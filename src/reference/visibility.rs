@@ -23,11 +23,11 @@ pub fn visibility_by<T: Tracer>(inputs: &KernelInputs, traversal: Traversal, tri
     triangle_ids.par_chunks_mut(RAYS_PER_TASK).enumerate().for_each_init(
         || T::new(inputs, traversal),
         |traverser, (task, ids)| {
-            let probes = (task * RAYS_PER_TASK..).map(|pixel_ix| {
+            let search_rays = (task * RAYS_PER_TASK..).map(|pixel_ix| {
                 let pixel = glam::uvec2(pixel_ix as u32 % width, pixel_ix as u32 / width);
                 SearchRay::from(&camera_ray(inputs.frame(), pixel))
             });
-            traverser.trace_all::<false, _>(inputs, ids.iter_mut().zip(probes), |id, hit| *id = hit.triangle_ix);
+            traverser.trace_all::<false, _>(inputs, ids.iter_mut().zip(search_rays), |id, hit| *id = hit.triangle_ix);
         },
     );
 }

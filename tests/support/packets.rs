@@ -26,9 +26,9 @@ pub fn levels() -> Vec<Level> {
 /// Returns the hits of rays that are traced as packets, with the instructions of a level.
 pub fn traced<const ANY_HIT: bool>(world: &MeshWithTree, level: Level, rays: &[PathRay]) -> Vec<Hit> {
     let mut hits = vec![None; rays.len()];
-    let probes = hits.iter_mut().zip(rays.iter().map(SearchRay::from));
+    let search_rays = hits.iter_mut().zip(rays.iter().map(SearchRay::from));
     let mut tracer = FastTracer::at_level(&world.inputs(), Traversal::Stack, level);
-    tracer.trace_all::<ANY_HIT, _>(&world.inputs(), probes, |place, hit| {
+    tracer.trace_all::<ANY_HIT, _>(&world.inputs(), search_rays, |place, hit| {
         assert_eq!(place.replace(hit), None, "a ray has one hit");
     });
     hits.into_iter().map(|hit| hit.expect("a ray has a hit")).collect()
