@@ -15,7 +15,7 @@ use super::{
 use crate::{
     layout::{Hit, KD_LEAST_COMPONENT, KD_PLANE_EPSILON, KdNode, Slab},
     reference::{
-        candidate::Target,
+        candidate::HitFilter,
         counting::table::ReadCounter,
         inputs::KernelInputs,
         leaf::entries_of,
@@ -245,7 +245,7 @@ impl<S: Simd> Packet<S> {
     #[inline(always)]
     pub fn ray(&self, lane: usize) -> TraversalRay {
         TraversalRay {
-            target: Target {
+            hit_filter: HitFilter {
                 shear: self.shears.of_lane(lane),
                 t_min: self.t_min.as_array()[lane],
                 source_triangle: self.source_triangle.as_array()[lane],

@@ -6,14 +6,14 @@ use crate::layout::Hit;
 
 /// The data by which a triangle is tested and its hit accepted: t in (`t_min`, best t], not on `source_triangle`.
 #[derive(Clone, Copy, Debug)]
-pub struct Target {
+pub struct HitFilter {
     pub shear: Shear,
     pub t_min: f32,
     pub source_triangle: u32,
 }
 
-impl Target {
-    /// The target of a ray.
+impl HitFilter {
+    /// The hit_filter of a ray.
     #[inline(always)]
     pub fn of(ray: &SearchRay) -> Self {
         let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
@@ -24,11 +24,11 @@ impl Target {
 /// Tests a triangle against the ray, and keeps its hit in `best` if it is nearer. Of two hits at the same t, the one
 /// with the lower triangle index wins, so the order of tests does not matter.
 #[inline(always)]
-pub fn intersect(inputs: &KernelInputs<impl ReadCounter>, target: &Target, triangle_ix: u32, best: &mut Hit) {
+pub fn intersect(inputs: &KernelInputs<impl ReadCounter>, hit_filter: &HitFilter, triangle_ix: u32, best: &mut Hit) {
     let triangle = &inputs.triangles[triangle_ix as usize];
-    let Some(hit) = target.shear.intersect_triangle(triangle, triangle_ix) else { return };
+    let Some(hit) = hit_filter.shear.intersect_triangle(triangle, triangle_ix) else { return };
     let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
-    let is_of_ray = hit.t > target.t_min && triangle_ix != target.source_triangle;
+    let is_of_ray = hit.t > hit_filter.t_min && triangle_ix != hit_filter.source_triangle;
     if is_of_ray && nearer && inputs.is_accepted(triangle_ix) {
         *best = hit;
     }

@@ -66,14 +66,14 @@ pub fn intersect_entries(
 ) {
     let triangles = &inputs.leaf_triangles[entries.clone()];
     if inputs.leaf_planes.is_empty() {
-        return triangles.iter().for_each(|&ix| intersect(inputs, &ray.target, ix, best));
+        return triangles.iter().for_each(|&ix| intersect(inputs, &ray.hit_filter, ix, best));
     }
     let way = Segment::new(t_enter, t_exit);
     for (four, first) in triangles.chunks(4).zip(entries.step_by(4)) {
         let planes = four_planes(inputs.leaf_planes, first);
         let mut near = near_planes(ray, way, &planes) & ((1 << four.len()) - 1);
         while near != 0 {
-            intersect(inputs, &ray.target, four[near.trailing_zeros() as usize], best);
+            intersect(inputs, &ray.hit_filter, four[near.trailing_zeros() as usize], best);
             near &= near - 1;
         }
     }

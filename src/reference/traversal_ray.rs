@@ -3,14 +3,14 @@
 
 use glam::{Vec3, Vec3A};
 
-use super::{candidate::Target, counting::table::ReadCounter, inputs::KernelInputs, search_ray::SearchRay};
+use super::{candidate::HitFilter, counting::table::ReadCounter, inputs::KernelInputs, search_ray::SearchRay};
 use crate::layout::{Hit, KD_LEAST_COMPONENT, KD_MAX_ORIGIN_DISTANCE, KD_PLANE_EPSILON, NO_TRIANGLE};
 
 /// A ray in the form that the traversal uses. Arrays by axis have a fourth entry, so that two bits index them without
 /// a check.
 #[derive(Clone, Copy, Debug)]
 pub struct TraversalRay {
-    pub target: Target,
+    pub hit_filter: HitFilter,
     pub origin: Vec3A,
     pub direction: Vec3A,
     /// Distance from a plane beyond which a segment of the ray is clear of it (world units).
@@ -61,7 +61,7 @@ impl TraversalRay {
         let near = [0, 1, 2].map(|i| min(t0[i], t1[i]));
         let far = [0, 1, 2].map(|i| max(t0[i], t1[i]));
         Self {
-            target: Target::of(ray),
+            hit_filter: HitFilter::of(ray),
             origin: ray.origin.into(),
             direction: ray.direction.into(),
             plane_epsilon: KD_PLANE_EPSILON * largest_coordinate(inputs),
