@@ -1,6 +1,6 @@
 //! Writes pixels to a file, whole or not at all.
 //!
-//! A file is encoded in memory, if it fits there, written beside its target under a temporary name, synchronized and
+//! A file is encoded in memory, if it fits there, written beside its destination under a temporary name, synchronized and
 //! renamed. So if the disk is full, the earlier file stays as it was, and no truncated or temporary file is left. A
 //! signal that ends the process leaves none either, if its handler calls [`remove_temporaries`].
 
@@ -18,13 +18,13 @@ use image::{
 use tempfile::SpooledTempFile;
 use tracing::info_span;
 
-pub use self::{heat_map::HeatMap, layers::write_layers, target::regular_file, temporary::remove_temporaries};
-use self::{target::Target, temporary::Temporary};
+use self::{destination::Destination, temporary::Temporary};
+pub use self::{destination::regular_file, heat_map::HeatMap, layers::write_layers, temporary::remove_temporaries};
 use crate::frame::Picture;
 
+mod destination;
 mod heat_map;
 mod layers;
-mod target;
 mod temporary;
 
 /// Size beyond which a spool goes to disk, bytes.
@@ -116,9 +116,9 @@ pub fn stem_of(scene_name: &str) -> String {
 /// # Errors
 /// No file can be created or replaced there.
 pub fn check(path: &Path) -> Result<(), OutputError> {
-    match Target::at(path)? {
-        Target::Stream => Ok(()),
-        Target::File { directory, .. } => Temporary::create_in(&directory)
+    match Destination::at(path)? {
+        Destination::Stream => Ok(()),
+        Destination::File { directory, .. } => Temporary::create_in(&directory)
             .map(drop)
             .map_err(|source| OutputError::Write { path: path.to_owned(), source }),
     }
@@ -139,9 +139,9 @@ pub fn write_picture(path: &Path, picture: &Picture) -> Result<(), OutputError> 
 /// A symbolic link is followed. If it leads nowhere, the file that it names is created. An existing file must be
 /// writable and keeps its permissions. A new file gets the permissions that the umask leaves.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    match Target::at(path)? {
-        Target::Stream => open_stream(path).and_then(|mut stream| stream.write_all(bytes)),
-        Target::File { directory, file } => replace(&directory, &file, |temporary| temporary.write_all(bytes)),
+    match Destination::at(path)? {
+        Destination::Stream => open_stream(path).and_then(|mut stream| stream.write_all(bytes)),
+        Destination::File { directory, file } => replace(&directory, &file, |temporary| temporary.write_all(bytes)),
     }
     .map_err(|source| OutputError::Write { path: path.to_owned(), source })
 }
@@ -149,9 +149,9 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
 /// Writes a file as [`write()`] does, for contents that are too large to encode in memory. `body` writes the file and
 /// may seek in it.
 pub fn write_with(path: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), OutputError> {
-    match Target::at(path)? {
-        Target::Stream => write_stream(path, body),
-        Target::File { directory, file } => replace(&directory, &file, body),
+    match Destination::at(path)? {
+        Destination::Stream => write_stream(path, body),
+        Destination::File { directory, file } => replace(&directory, &file, body),
     }
     .map_err(|source| OutputError::Write { path: path.to_owned(), source })
 }
@@ -159,9 +159,9 @@ pub fn write_with(path: &Path, body: impl FnOnce(&mut File) -> io::Result<()>) -
 /// Makes a spool: a temporary file for data that will be written to the file at `path`. It is in memory while it is
 /// small, then on the same disk as the file. For a device or a pipe, it is then in the system's temporary directory.
 pub fn spool(path: &Path) -> Result<SpooledTempFile, OutputError> {
-    let directory = match Target::at(path)? {
-        Target::Stream => std::env::temp_dir(),
-        Target::File { directory, .. } => directory,
+    let directory = match Destination::at(path)? {
+        Destination::Stream => std::env::temp_dir(),
+        Destination::File { directory, .. } => directory,
     };
     Ok(tempfile::spooled_tempfile_in(SPOOL_IN_MEMORY, directory))
 }

@@ -10,15 +10,15 @@ use super::OutputError;
 /// Number of symbolic links, one after another, that Linux follows before it gives up.
 const MAX_LINKS: usize = 40;
 
-/// The target of a path.
-pub enum Target {
+/// The destination of a path.
+pub enum Destination {
     /// A device or a pipe, which cannot be replaced.
     Stream,
     /// A regular file, which may not exist yet, in an existing directory.
     File { directory: PathBuf, file: PathBuf },
 }
 
-impl Target {
+impl Destination {
     /// Follows the path's links and checks that a file can be written at their end.
     pub fn at(path: &Path) -> Result<Self, OutputError> {
         let failed = |source| OutputError::Write { path: path.to_owned(), source };
