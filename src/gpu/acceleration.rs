@@ -10,7 +10,7 @@ use super::{
 };
 
 /// The driver's acceleration structure: a bottom level over all triangles and a top level of one instance.
-pub struct Scenery {
+pub struct DriverAccel {
     top: Level,
     _bottom: Level,
     build_ms: Option<f64>,
@@ -31,14 +31,14 @@ struct Contents<'a> {
     n_primitives: u32,
 }
 
-impl Scenery {
+impl DriverAccel {
     /// Builds both levels for fast tracing. An element of `triangles` has 48 bytes: three 16-byte rows, each of which
     /// begins with a corner.
     ///
     /// # Errors
     /// Memory is exhausted. Panics on a context without ray tracing.
     pub fn new<T: Pod>(context: &Arc<Context>, triangles: &[T]) -> Result<Self, GpuError> {
-        let corners = Buffer::with(context, "scenery corners", triangles, BufferUse::Structure)?;
+        let corners = Buffer::with(context, "driver_accel corners", triangles, BufferUse::Structure)?;
         let data = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
             .vertex_format(vk::Format::R32G32B32_SFLOAT)
             .vertex_data(vk::DeviceOrHostAddressConstKHR { device_address: corners.any().address() })
@@ -56,7 +56,7 @@ impl Scenery {
         };
         let (bottom, build_ms) = Level::build(context, &bottom)?;
         let instances =
-            Buffer::with(context, "scenery instance", &[instance_of(bottom.address())], BufferUse::Structure)?;
+            Buffer::with(context, "driver_accel instance", &[instance_of(bottom.address())], BufferUse::Structure)?;
         let data = vk::AccelerationStructureGeometryInstancesDataKHR::default()
             .data(vk::DeviceOrHostAddressConstKHR { device_address: instances.any().address() });
         let top = Contents {

@@ -39,7 +39,7 @@ mod timer;
 #[cfg(feature = "view")]
 mod window;
 
-pub use acceleration::Scenery;
+pub use acceleration::DriverAccel;
 pub use barrier::Access;
 pub use bindings::{Binding, BindingKind, BindingLayout, BindingSet};
 pub use buffer::{AnyBuffer, Buffer, BufferUse, texel_bytes};

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::{
     accel::grid::{BuildStage, GridOptions},
     bench::{Spread, stage::Stage, variant::Variant, warm_up},
-    gpu::{Buffer, BufferUse, Context, GpuError, Scenery, Timer},
+    gpu::{Buffer, BufferUse, Context, DriverAccel, GpuError, Timer},
     passes::grid::GridBuilder,
 };
 
@@ -45,13 +45,13 @@ impl Builds {
     ///
     /// # Errors
     /// A structure exceeds the device's limits or memory.
-    pub fn measure(context: &Arc<Context>, stage: &Stage) -> Result<(Self, Scenery), GpuError> {
+    pub fn measure(context: &Arc<Context>, stage: &Stage) -> Result<(Self, DriverAccel), GpuError> {
         let triangles = &stage.scene().triangles;
-        let mut scenery = Scenery::new(context, triangles)?;
+        let mut driver_accel = DriverAccel::new(context, triangles)?;
         let mut bvh_ms = Vec::new();
         for _ in 0..N_BUILDS {
-            scenery = Scenery::new(context, triangles)?;
-            bvh_ms.push(scenery.build_ms());
+            driver_accel = DriverAccel::new(context, triangles)?;
+            bvh_ms.push(driver_accel.build_ms());
         }
         let grids = [(Variant::Grid, GridOptions::uniform()), (Variant::Grid2, GridOptions::two_level())];
         let builds = Self {
@@ -63,7 +63,7 @@ impl Builds {
                 .map(|(variant, options)| GridBuilds::measure(context, stage, *variant, options))
                 .collect::<Result<_, _>>()?,
         };
-        Ok((builds, scenery))
+        Ok((builds, driver_accel))
     }
 }
 

@@ -33,7 +33,7 @@ use crate::{
     accel::{AccelKind, Query, kdtree::Traversal},
     buffers::{AccelBuffers, CastResources},
     cast::{Contender, Kernel, Ray, cast_ray},
-    gpu::{BindingLayout, Context, GpuError, Scenery},
+    gpu::{BindingLayout, Context, DriverAccel, GpuError},
 };
 
 /// The searches of kdray that are measured. Three of them traverse the kd-tree: the first is the default one, the
@@ -84,7 +84,7 @@ impl Structure {
 pub struct Arena {
     context: Arc<Context>,
     structures: Vec<Structure>,
-    scenery: Rc<Scenery>,
+    driver_accel: Rc<DriverAccel>,
     rasters: Vec<Raster>,
     builds: Builds,
 }
@@ -98,12 +98,12 @@ impl Arena {
     /// # Panics
     /// The context is without ray tracing.
     pub fn new(context: &Arc<Context>, stage: &Stage) -> Result<Self, GpuError> {
-        let (builds, scenery) = Builds::measure(context, stage)?;
+        let (builds, driver_accel) = Builds::measure(context, stage)?;
         let structures = [VARIANTS[0], Variant::Grid, Variant::Grid2];
         let structures = structures.map(|variant| Structure::new(context, stage, variant));
         Ok(Self {
             structures: structures.into_iter().collect::<Result<_, _>>()?,
-            scenery: Rc::new(scenery),
+            driver_accel: Rc::new(driver_accel),
             rasters: Raster::all(context, stage)?,
             builds,
             context: Arc::clone(context),
@@ -127,7 +127,7 @@ impl Arena {
         for structure in &self.structures {
             let Contenders { resources, contenders: kernels } = structure.contenders(&self.context, &rays, query)?;
             if contenders.is_empty() {
-                contenders.push(Box::new(Pipeline::new(&self.context, &self.scenery, &resources, query)?));
+                contenders.push(Box::new(Pipeline::new(&self.context, &self.driver_accel, &resources, query)?));
             }
             contenders.extend(kernels);
         }

@@ -7,8 +7,8 @@ use crate::{
     buffers::CastResources,
     cast::Contender,
     gpu::{
-        Access, Binding, BindingKind, BindingLayout, BindingSet, Commands, Constants, Context, GpuError,
-        RayTracingDesc, RayTracingPipeline, Scenery,
+        Access, Binding, BindingKind, BindingLayout, BindingSet, Commands, Constants, Context, DriverAccel, GpuError,
+        RayTracingDesc, RayTracingPipeline,
     },
     layout::{BIND_CAST_HITS, BIND_CAST_RAYS, DriverCast, constants},
     passes::spirv,
@@ -18,12 +18,12 @@ use crate::{
 pub struct Pipeline {
     pipeline: RayTracingPipeline,
     set: BindingSet,
-    scenery: Rc<Scenery>,
+    driver_accel: Rc<DriverAccel>,
     resources: Rc<CastResources>,
 }
 
 impl Pipeline {
-    /// Makes the pipeline, which traces the rays in `resources` through `scenery`.
+    /// Makes the pipeline, which traces the rays in `resources` through `driver_accel`.
     ///
     /// # Errors
     /// The driver refuses a shader.
@@ -32,7 +32,7 @@ impl Pipeline {
     /// The context is without ray tracing.
     pub fn new(
         context: &Arc<Context>,
-        scenery: &Rc<Scenery>,
+        driver_accel: &Rc<DriverAccel>,
         resources: &Rc<CastResources>,
         query: Query,
     ) -> Result<Self, GpuError> {
@@ -52,7 +52,7 @@ impl Pipeline {
         Ok(Self {
             pipeline: RayTracingPipeline::new(context, &bindings, &desc)?,
             set: BindingSet::new(&bindings, "driver", &buffers)?,
-            scenery: Rc::clone(scenery),
+            driver_accel: Rc::clone(driver_accel),
             resources: Rc::clone(resources),
         })
     }
@@ -68,7 +68,7 @@ impl Contender for Pipeline {
     }
 
     fn record(&self, commands: &Commands) {
-        let address = self.scenery.address();
+        let address = self.driver_accel.address();
         let push = DriverCast { scenery_low: address as u32, scenery_high: (address >> 32) as u32 };
         commands.bind(&self.set);
         commands.trace_rays(&self.pipeline, &push, self.resources.cast_rays.len() as u32);
