@@ -14,11 +14,11 @@ use super::{
     commands::CommandBuffer,
     device::{DeviceExtras, Purpose},
     devices::{list, queue_family, select},
+    failure_injection::FailureInjection,
     instance::Instance,
     memory::create_allocator,
     probe,
     ray_tracing::RayTracingCalls,
-    refusal::Refusal,
     statistics::StatisticsCalls,
 };
 
@@ -79,7 +79,7 @@ pub struct Context {
     /// See [`Context::loop_limit`].
     loop_limit: OnceLock<Option<u32>>,
     pretend: DeviceOverrides,
-    pub(super) refusal: Refusal,
+    pub(super) refusal: FailureInjection,
     #[cfg(feature = "hot-reload")]
     pub(super) replacements: Mutex<super::Replacements>,
     /// Submitted command buffers that have no owner. They are freed when the queue is idle.
@@ -227,7 +227,7 @@ impl Context {
             n_lanes: pretend.n_lanes.map_or_else(OnceLock::new, OnceLock::from),
             pretend: *pretend,
             loop_limit: pretend.loop_limit.map_or_else(OnceLock::new, |limit| OnceLock::from(Some(limit))),
-            refusal: Refusal::never(),
+            refusal: FailureInjection::never(),
             #[cfg(feature = "hot-reload")]
             replacements: Mutex::default(),
             limits: Limits::of(&instance, physical).reduced_to(pretend),

@@ -14,6 +14,7 @@ mod context;
 mod device;
 mod devices;
 mod error;
+mod failure_injection;
 mod given;
 mod image;
 mod instance;
@@ -26,7 +27,6 @@ mod probe;
 #[cfg(feature = "view")]
 mod raw;
 mod ray_tracing;
-mod refusal;
 mod robustness;
 mod shader;
 mod specialization;

@@ -109,9 +109,9 @@ impl Trial {
         for n_creations in 0.. {
             begin(renderer);
             let (before, picture) = (state(renderer), renderer.picture().expect("a picture"));
-            self.context.refuse_creations_after(Some(n_creations));
+            self.context.fail_creations_after(Some(n_creations));
             let changed = change(renderer);
-            self.context.refuse_creations_after(None);
+            self.context.fail_creations_after(None);
             let Err(error) = changed else {
                 assert!(n_creations >= least_creations, "{name}: {n_creations} creations");
                 break;
@@ -206,9 +206,9 @@ fn a_sample_that_cannot_begin_leaves_those_before() {
     renderer.draw().expect("a sample");
     let first = renderer.picture().expect("a picture");
     let begins = (0..).take_while(|&n_creations| {
-        context.refuse_creations_after(Some(n_creations));
+        context.fail_creations_after(Some(n_creations));
         let begun = renderer.draw_part();
-        context.refuse_creations_after(None);
+        context.fail_creations_after(None);
         let is_refused = begun.is_err() && renderer.n_samples() == 1;
         assert!(!is_refused || identical(&renderer.picture().expect("a picture"), &first), "{n_creations}");
         is_refused

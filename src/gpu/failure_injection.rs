@@ -8,12 +8,12 @@ use ash::vk;
 use super::{Context, GpuError};
 
 /// A countdown of the creations that succeed before one fails.
-pub(super) struct Refusal {
-    /// Number of creations that still succeed. [`Refusal::NEVER`] if none fails.
+pub(super) struct FailureInjection {
+    /// Number of creations that still succeed. [`FailureInjection::NEVER`] if none fails.
     n_left: AtomicU32,
 }
 
-impl Refusal {
+impl FailureInjection {
     const NEVER: u32 = u32::MAX;
 
     pub(super) fn never() -> Self {
@@ -25,17 +25,17 @@ impl Context {
     /// Lets the next `n_creations` creations of buffers, images, pipelines, descriptor sets, query pools and command
     /// buffers succeed, and every later one fail as if memory were exhausted. `None` lets all succeed.
     #[doc(hidden)]
-    pub fn refuse_creations_after(&self, n_creations: Option<u32>) {
-        self.refusal.n_left.store(n_creations.unwrap_or(Refusal::NEVER), Ordering::Relaxed);
+    pub fn fail_creations_after(&self, n_creations: Option<u32>) {
+        self.refusal.n_left.store(n_creations.unwrap_or(FailureInjection::NEVER), Ordering::Relaxed);
     }
 
     /// Counts a creation that is about to be made by `call`.
     ///
     /// # Errors
-    /// The creation is one of those that [`Context::refuse_creations_after`] lets fail.
+    /// The creation is one of those that [`Context::fail_creations_after`] lets fail.
     pub(super) fn count_creation(&self, call: &'static str, object: &str) -> Result<(), GpuError> {
         let count_down = |n_left| match n_left {
-            Refusal::NEVER => Some(n_left),
+            FailureInjection::NEVER => Some(n_left),
             _ => u32::checked_sub(n_left, 1),
         };
         match self.refusal.n_left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, count_down) {
