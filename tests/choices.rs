@@ -249,7 +249,7 @@ fn a_measurement_changes_no_bit_and_is_kept() {
 #[test]
 fn primary_rays_are_measured_where_that_changes_no_bit() {
     let (scene, folder, context) = (scene(), TempDir::new().unwrap(), with_lanes(5000));
-    assert!(context.has_wide_atomics(), "the device rasterizes by kernels");
+    assert!(context.has_int64_atomics(), "the device rasterizes by kernels");
     let world = world_of(&scene);
     let cache = Cache::at(folder.path());
     let options = RenderOptions { width: 60, height: 45, max_depth: 2, ..RenderOptions::default() };

@@ -168,7 +168,7 @@ fn rasterized_primary_rays_are_timed() {
     let set = &ray_sets(&stage)[0];
     let primary = SetResult::new(set.kind, &trials(&stage, &stage, set));
     let mut rasters = Raster::all(&context, &stage).expect("renderers");
-    assert_eq!(rasters.len(), if context.has_wide_atomics() { 2 } else { 1 });
+    assert_eq!(rasters.len(), if context.has_int64_atomics() { 2 } else { 1 });
     for raster in &mut rasters {
         raster.draw(3).expect("frames");
         raster.draw(2).expect("frames");

@@ -42,7 +42,7 @@ fn n_rays_in(passes: &[PassTime], name: &str, bounce: Option<u32>) -> u64 {
 
 /// Returns the kinds of primary visibility that the device supports.
 fn primaries(context: &Context) -> &'static [Primary] {
-    if context.has_wide_atomics() { Primary::ALL } else { &[Primary::Raster, Primary::Trace] }
+    if context.has_int64_atomics() { Primary::ALL } else { &[Primary::Raster, Primary::Trace] }
 }
 
 /// Asserts that each pass has a bounce and a batch if its scope has them, and that the time of tracing is that of all
@@ -77,7 +77,7 @@ fn the_table_has_every_pass_and_tracing_takes_all_that_find_primary_hits() {
         let mut on_cpu = cpu::Renderer::new(&world, &options, Batching::default());
         (0..2).for_each(|_sample| names.extend(checked_names(&on_cpu.draw_sample(), "features")));
     }
-    let by_kernels = |name: &str| name.starts_with("rasterize_") && !context.has_wide_atomics();
+    let by_kernels = |name: &str| name.starts_with("rasterize_") && !context.has_int64_atomics();
     let known = Pass::all().map(Pass::name).filter(|name| !by_kernels(name));
     assert_eq!(names, known.collect::<BTreeSet<_>>());
     assert_eq!(context.validation_messages(), Vec::<String>::new());

@@ -62,7 +62,7 @@ impl Program {
             device: self.device.clone(),
             queue_family: self.queue_family,
             queue: self.queue,
-            wide_atomics: false,
+            int64_atomics: false,
         }
     }
 

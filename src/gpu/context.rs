@@ -63,7 +63,7 @@ pub struct Context {
     /// Whether pipelines can be made without bounds checks.
     pub(super) unchecked: bool,
     /// Whether kernels have 64-bit atomics on buffers.
-    wide_atomics: bool,
+    int64_atomics: bool,
     /// Functions of the swapchain extension. `None` if the device was opened without a window.
     pub(super) presentation: Option<khr::swapchain::Device>,
     #[cfg(feature = "view")]
@@ -179,7 +179,7 @@ impl Context {
             queue: given.queue,
             family: given.queue_family as usize,
             info,
-            extras: DeviceExtras::of_given(given.wide_atomics),
+            extras: DeviceExtras::of_given(given.int64_atomics),
             is_given: true,
         };
         Self::with_device(instance, opened, Purpose::Compute, pretend)
@@ -209,7 +209,7 @@ impl Context {
             ray_tracing: ray_tracing.then(|| RayTracingCalls::new(&instance, physical, &device)),
             has_labels: !instance.validates(),
             unchecked: extras.unchecked,
-            wide_atomics: extras.wide_atomics && !pretend.no_wide_atomics,
+            int64_atomics: extras.int64_atomics && !pretend.no_int64_atomics,
             statistics: extras.statistics.then(|| StatisticsCalls::new(&instance, &device)),
             debug_utils: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device)),
             presentation: (purpose == Purpose::Window).then(|| khr::swapchain::Device::new(&instance.raw, &device)),
@@ -264,17 +264,17 @@ impl Context {
     }
 
     /// Whether kernels have 64-bit atomics on buffers.
-    pub fn has_wide_atomics(&self) -> bool {
-        self.wide_atomics
+    pub fn has_int64_atomics(&self) -> bool {
+        self.int64_atomics
     }
 
     /// Checks that kernels have 64-bit atomics on buffers.
     ///
     /// # Errors
     /// Kernels have no such atomics.
-    pub fn require_wide_atomics(&self) -> Result<(), GpuError> {
+    pub fn require_int64_atomics(&self) -> Result<(), GpuError> {
         let missing = "shaderBufferInt64Atomics".to_owned();
-        if self.wide_atomics { Ok(()) } else { Err(GpuError::Lacks { device: self.info.name.clone(), missing }) }
+        if self.int64_atomics { Ok(()) } else { Err(GpuError::Lacks { device: self.info.name.clone(), missing }) }
     }
 
     /// Whether `fma` rounds once in this device's kernels. The first call runs a kernel to find out.

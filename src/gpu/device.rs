@@ -29,7 +29,7 @@ pub(super) struct DeviceExtras {
     /// Whether pipelines can be made without bounds checks.
     pub unchecked: bool,
     /// Whether kernels have 64-bit atomics on buffers.
-    pub wide_atomics: bool,
+    pub int64_atomics: bool,
     purpose: Purpose,
 }
 
@@ -44,14 +44,14 @@ impl DeviceExtras {
             portability: has(khr::portability_subset::NAME),
             statistics: has(StatisticsCalls::EXTENSION) && StatisticsCalls::has_feature(instance, physical),
             unchecked: has(robustness::EXTENSION) && robustness::has_feature(instance, physical),
-            wide_atomics: has_wide_atomics(instance, physical),
+            int64_atomics: has_int64_atomics(instance, physical),
             purpose,
         })
     }
 
     /// Returns the extras of a device that the library's caller has created: at most 64-bit atomics.
-    pub fn of_given(wide_atomics: bool) -> Self {
-        Self { portability: false, statistics: false, unchecked: false, wide_atomics, purpose: Purpose::Compute }
+    pub fn of_given(int64_atomics: bool) -> Self {
+        Self { portability: false, statistics: false, unchecked: false, int64_atomics, purpose: Purpose::Compute }
     }
 
     fn extensions(self) -> Vec<*const c_char> {
@@ -77,7 +77,7 @@ impl DeviceExtras {
         let extensions = self.extensions();
         let priorities = [1.0];
         let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&priorities)];
-        let RequiredFeatures { of_1_0, mut of_1_2, mut of_1_3 } = RequiredFeatures::new(self.wide_atomics);
+        let RequiredFeatures { of_1_0, mut of_1_2, mut of_1_3 } = RequiredFeatures::new(self.int64_atomics);
         let mut executables =
             vk::PhysicalDevicePipelineExecutablePropertiesFeaturesKHR::default().pipeline_executable_info(true);
         let mut unchecked = vk::PhysicalDevicePipelineRobustnessFeaturesEXT::default().pipeline_robustness(true);
@@ -103,7 +103,7 @@ impl DeviceExtras {
     }
 }
 
-fn has_wide_atomics(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
+fn has_int64_atomics(instance: &Instance, physical: vk::PhysicalDevice) -> bool {
     let mut of_1_2 = vk::PhysicalDeviceVulkan12Features::default();
     let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut of_1_2);
     // SAFETY: the device supports Vulkan 1.3, which defines the struct.

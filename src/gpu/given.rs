@@ -26,7 +26,7 @@ pub struct GivenDevice {
     /// A queue of the family.
     pub queue: vk::Queue,
     /// Whether the device has `shaderInt64` and `shaderBufferInt64Atomics` enabled, with which kernels can rasterize.
-    pub wide_atomics: bool,
+    pub int64_atomics: bool,
 }
 
 /// The features that a device needs for kdray. A program may add its own before it creates a device with them.
@@ -41,14 +41,14 @@ pub struct RequiredFeatures {
 }
 
 impl RequiredFeatures {
-    /// Returns the required features. `wide_atomics` adds 64-bit atomics on buffers, which not all devices have and
+    /// Returns the required features. `int64_atomics` adds 64-bit atomics on buffers, which not all devices have and
     /// with which kernels can rasterize.
-    pub fn new(wide_atomics: bool) -> Self {
+    pub fn new(int64_atomics: bool) -> Self {
         Self {
-            of_1_0: vk::PhysicalDeviceFeatures::default().shader_int64(wide_atomics),
+            of_1_0: vk::PhysicalDeviceFeatures::default().shader_int64(int64_atomics),
             of_1_2: vk::PhysicalDeviceVulkan12Features::default()
                 .buffer_device_address(true)
-                .shader_buffer_int64_atomics(wide_atomics),
+                .shader_buffer_int64_atomics(int64_atomics),
             of_1_3: vk::PhysicalDeviceVulkan13Features::default()
                 .dynamic_rendering(true)
                 .synchronization2(true)
@@ -70,7 +70,7 @@ impl Context {
     ///
     /// # Safety
     /// The handles belong together and live longer than the context. The device was created with
-    /// [`RequiredFeatures`], and with 64-bit atomics if `wide_atomics` says so. No other thread uses the queue while
+    /// [`RequiredFeatures`], and with 64-bit atomics if `int64_atomics` says so. No other thread uses the queue while
     /// a function of kdray runs.
     pub unsafe fn on_given(given: GivenDevice) -> Result<Arc<Self>, GpuError> {
         Self::open_given(given, &ContextOptions::default().pretend)

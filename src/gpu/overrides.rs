@@ -12,7 +12,7 @@ pub struct DeviceOverrides {
     /// run.
     pub n_lanes: Option<u32>,
     /// Whether kernels lack 64-bit atomics.
-    pub no_wide_atomics: bool,
+    pub no_int64_atomics: bool,
     /// Number of turns (iterations) of a kernel's loops after which the driver ends the kernel.
     pub loop_limit: Option<u32>,
     /// Number of rays whose state can be stored at a time, if kernels have to stop before the loop limit.

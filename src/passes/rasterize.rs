@@ -27,7 +27,7 @@ impl Rasterize {
     /// # Errors
     /// The device lacks 64-bit atomics, or the driver refuses a shader.
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
-        context.require_wide_atomics()?;
+        context.require_int64_atomics()?;
         let constants = Constants::new().set(constants::FUSED_FMA, context.fuses_fma()?);
         let kernel = |name, shader| kernel(context, bindings, name, shader, &constants);
         Ok(Self {

@@ -116,7 +116,7 @@ fn texels_and_what_is_bound_give_the_same_bits() {
 #[test]
 fn triangles_that_are_not_bound_are_rasterized() {
     let (world, any) = (large_world(), device());
-    if !any.has_wide_atomics() {
+    if !any.has_int64_atomics() {
         return;
     }
     let options = RenderOptions { primary: Primary::Compute, ..options(24, 16, 2) };

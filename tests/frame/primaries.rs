@@ -79,7 +79,7 @@ fn compute_and_trace_are_the_same() {
             renderer.picture().expect("a picture")
         })
     };
-    if !device().has_wide_atomics() {
+    if !device().has_int64_atomics() {
         return;
     }
     for (options, n_samples, capacity) in
@@ -96,7 +96,7 @@ fn compute_and_trace_are_the_same() {
 fn ways_suit_the_device() {
     let gpu = with_lanes(1000);
     let suited = |n_triangles| primary_by_rule(Some(&gpu), n_triangles, (100, 80));
-    let by_kernels = if gpu.has_wide_atomics() { Primary::Compute } else { Primary::Trace };
+    let by_kernels = if gpu.has_int64_atomics() { Primary::Compute } else { Primary::Trace };
     assert_eq!([suited(8001), suited(usize::MAX)], [by_kernels, Primary::Trace]);
     let without = without_wide_atomics();
     let n_raster = if without.predicates_branches() { 4 * 8000 } else { 8000 };
@@ -115,7 +115,7 @@ fn primaries_change_between_frames() {
     let world = world_of(&scene);
     let mut renderer = Renderer::new(context.clone(), &world, &raster).expect("a renderer");
     let mut pictures = Vec::new();
-    let all = if context.has_wide_atomics() { Primary::ALL } else { &[Primary::Raster, Primary::Trace] };
+    let all = if context.has_int64_atomics() { Primary::ALL } else { &[Primary::Raster, Primary::Trace] };
     for &primary in all.iter().chain(all) {
         let options = RenderOptions { primary, ..raster.clone() };
         renderer.set_options(&options).expect("other options");

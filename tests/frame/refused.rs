@@ -158,7 +158,7 @@ fn another_traversal_of_arrays_that_are_read_by_address() {
 fn other_primary_rays() {
     let primary = |primary| (RenderOptions { primary, ..small() }, 10);
     let mut ways = vec![Primary::Trace, Primary::Raster];
-    if device().has_wide_atomics() {
+    if device().has_int64_atomics() {
         ways.extend([Primary::Compute, Primary::Trace]);
     }
     Trial::new(device(), &small()).walk(&ways.into_iter().map(primary).collect::<Vec<_>>());

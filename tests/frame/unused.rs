@@ -43,7 +43,7 @@ fn only_what_draws_has_indices_and_targets() {
     let mut drawing = new(Primary::Raster);
     let drawn = drawing.render().expect("a frame").0;
     let ways = [Primary::Trace, Primary::Compute];
-    for from in ways.into_iter().filter(|&way| way == Primary::Trace || context.has_wide_atomics()) {
+    for from in ways.into_iter().filter(|&way| way == Primary::Trace || context.has_int64_atomics()) {
         let mut renderer = new(from);
         assert_drawn_by(renderer.resources(), &scene, from);
         let before = renderer.render().expect("a frame").0;

@@ -28,7 +28,7 @@ fn view(scene: FlatScene, options: RenderOptions) -> Option<View> {
     let context = Context::new(&ContextOptions::default()).expect("a device");
     let crop = options.crop_or_whole();
     let options = RenderOptions { primary: Primary::Compute, ..options };
-    let stage = context.has_wide_atomics().then(|| Stage::new(scene, options, crop.width() * crop.height()))?;
+    let stage = context.has_int64_atomics().then(|| Stage::new(scene, options, crop.width() * crop.height()))?;
     let options = RenderOptions { primary: Primary::Trace, ..stage.options.clone() };
     let passes = Passes::new(&stage.context, &stage.resources.bindings, &options).expect("passes");
     Some(View { stage, trace: passes.trace })

@@ -40,7 +40,7 @@ pub fn with_lanes(n_lanes: u32) -> Arc<Context> {
 
 /// Opens a device under validation whose kernels have no 64-bit atomics.
 pub fn without_wide_atomics() -> Arc<Context> {
-    pretended(DeviceOverrides { no_wide_atomics: true, ..DeviceOverrides::default() })
+    pretended(DeviceOverrides { no_int64_atomics: true, ..DeviceOverrides::default() })
 }
 
 /// Returns the scene with its best tree.

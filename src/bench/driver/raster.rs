@@ -41,7 +41,7 @@ impl Raster {
     /// # Errors
     /// Fails as [`Renderer::new`] does.
     pub fn all(context: &Arc<Context>, stage: &Stage) -> Result<Vec<Self>, GpuError> {
-        let by_kernels = context.has_wide_atomics().then_some(Primary::Compute);
+        let by_kernels = context.has_int64_atomics().then_some(Primary::Compute);
         [Primary::Raster].into_iter().chain(by_kernels).map(|primary| Self::new(context, stage, primary)).collect()
     }
 
