@@ -60,7 +60,7 @@ impl Stalls {
         let turn_budget = context.loop_limit()?.map_or(0, |limit| turn_budget(limit, context.info().subgroup_size));
         let most_rows = context.limits().storage_range as usize / size_of::<Counts>();
         let most_slots = (most_rows - 1) / STALLED_RAY_ROWS as usize;
-        let n_slots = context.pretend().n_stall_slots.unwrap_or(N_SLOTS).min(most_slots);
+        let n_slots = context.overrides().n_stall_slots.unwrap_or(N_SLOTS).min(most_slots);
         let n_slots = if turn_budget == 0 { 0 } else { n_slots };
         let n_rows = 1 + STALLED_RAY_ROWS as usize * n_slots;
         Ok(Self { rows: Buffer::new(context, "stalls", n_rows, BufferUse::Storage)?, turn_budget })

@@ -32,14 +32,14 @@ pub struct ContextOptions {
     pub validate: bool,
     /// Properties that tests substitute for the device's own.
     #[doc(hidden)]
-    pub pretend: DeviceOverrides,
+    pub overrides: DeviceOverrides,
 }
 
 impl ContextOptions {
     /// Returns options for the selected device, or for the best one if `device` is `None`. `validate` turns the
     /// validation layer on.
     pub fn new(device: Option<DeviceSelector>, validate: bool) -> Self {
-        Self { device, validate, pretend: DeviceOverrides::default() }
+        Self { device, validate, overrides: DeviceOverrides::default() }
     }
 }
 
@@ -78,7 +78,7 @@ pub struct Context {
     n_lanes: OnceLock<u32>,
     /// See [`Context::loop_limit`].
     loop_limit: OnceLock<Option<u32>>,
-    pretend: DeviceOverrides,
+    overrides: DeviceOverrides,
     pub(super) refusal: FailureInjection,
     #[cfg(feature = "hot-reload")]
     pub(super) replacements: Mutex<super::Replacements>,
@@ -110,7 +110,7 @@ impl Context {
     pub fn new(options: &ContextOptions) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::new(options.validate)?;
         let (physical, info) = select(&instance, options.device.as_ref(), |_| true)?;
-        Self::open(instance, physical, info, Purpose::Compute, &options.pretend)
+        Self::open(instance, physical, info, Purpose::Compute, &options.overrides)
     }
 
     /// Opens a device and makes the surface of a window, in which the context can show pictures.
@@ -126,7 +126,7 @@ impl Context {
         let surface = super::Surface::new(&instance, window)?;
         let (physical, info) =
             select(&instance, options.device.as_ref(), |device| surface.is_served_by(&instance, device))?;
-        Ok((Self::open(instance, physical, info, Purpose::Window, &options.pretend)?, surface))
+        Ok((Self::open(instance, physical, info, Purpose::Window, &options.overrides)?, surface))
     }
 
     /// Opens a device with the driver's own ray tracing, with which kdray is compared.
@@ -139,7 +139,7 @@ impl Context {
         if let Some(missing) = RayTracingCalls::missing(&instance, physical) {
             return Err(GpuError::Lacks { device: info.name, missing });
         }
-        Self::open(instance, physical, info, Purpose::RayTracing, &options.pretend)
+        Self::open(instance, physical, info, Purpose::RayTracing, &options.overrides)
     }
 
     fn open(
@@ -147,7 +147,7 @@ impl Context {
         physical: vk::PhysicalDevice,
         info: DeviceInfo,
         purpose: Purpose,
-        pretend: &DeviceOverrides,
+        overrides: &DeviceOverrides,
     ) -> Result<Arc<Self>, GpuError> {
         // SAFETY: the physical device belongs to the instance.
         let families = unsafe { instance.raw.get_physical_device_queue_family_properties(physical) };
@@ -160,11 +160,11 @@ impl Context {
         // SAFETY: the device was created with one queue of this family.
         let queue = unsafe { device.get_device_queue(family as u32, 0) };
         let opened = Opened { physical, device, queue, family, info, extras, is_given: false };
-        Self::with_device(instance, opened, purpose, pretend)
+        Self::with_device(instance, opened, purpose, overrides)
     }
 
     /// Opens a context on the caller's device. [`Context::on_given`](Self::on_given) states the conditions.
-    pub(super) fn open_given(given: GivenDevice, pretend: &DeviceOverrides) -> Result<Arc<Self>, GpuError> {
+    pub(super) fn open_given(given: GivenDevice, overrides: &DeviceOverrides) -> Result<Arc<Self>, GpuError> {
         let instance = Instance::given(given.entry, given.instance);
         let (physical, info) = list(&instance)?
             .into_iter()
@@ -182,14 +182,14 @@ impl Context {
             extras: DeviceExtras::of_given(given.int64_atomics),
             is_given: true,
         };
-        Self::with_device(instance, opened, Purpose::Compute, pretend)
+        Self::with_device(instance, opened, Purpose::Compute, overrides)
     }
 
     fn with_device(
         instance: Arc<Instance>,
         opened: Opened,
         purpose: Purpose,
-        pretend: &DeviceOverrides,
+        overrides: &DeviceOverrides,
     ) -> Result<Arc<Self>, GpuError> {
         let Opened { physical, device, queue, family, info, extras, is_given } = opened;
         let ray_tracing = purpose == Purpose::RayTracing;
@@ -209,7 +209,7 @@ impl Context {
             ray_tracing: ray_tracing.then(|| RayTracingCalls::new(&instance, physical, &device)),
             has_labels: !instance.validates(),
             unchecked: extras.unchecked,
-            int64_atomics: extras.int64_atomics && !pretend.no_int64_atomics,
+            int64_atomics: extras.int64_atomics && !overrides.no_int64_atomics,
             statistics: extras.statistics.then(|| StatisticsCalls::new(&instance, &device)),
             debug_utils: instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &device)),
             presentation: (purpose == Purpose::Window).then(|| khr::swapchain::Device::new(&instance.raw, &device)),
@@ -221,16 +221,16 @@ impl Context {
             timestamp_valid_bits: families[family].timestamp_valid_bits,
             queue,
             allocator: ManuallyDrop::new(Arc::new(Mutex::new(allocator))),
-            predicates_branches: info.kind == SOFTWARE && pretend.n_lanes.is_none(),
+            predicates_branches: info.kind == SOFTWARE && overrides.n_lanes.is_none(),
             info,
             fuses_fma: OnceLock::new(),
-            n_lanes: pretend.n_lanes.map_or_else(OnceLock::new, OnceLock::from),
-            pretend: *pretend,
-            loop_limit: pretend.loop_limit.map_or_else(OnceLock::new, |limit| OnceLock::from(Some(limit))),
+            n_lanes: overrides.n_lanes.map_or_else(OnceLock::new, OnceLock::from),
+            overrides: *overrides,
+            loop_limit: overrides.loop_limit.map_or_else(OnceLock::new, |limit| OnceLock::from(Some(limit))),
             refusal: FailureInjection::never(),
             #[cfg(feature = "hot-reload")]
             replacements: Mutex::default(),
-            limits: Limits::of(&instance, physical).reduced_to(pretend),
+            limits: Limits::of(&instance, physical).reduced_to(overrides),
             left_commands: Mutex::default(),
             is_given,
             instance,
@@ -317,8 +317,8 @@ impl Context {
     }
 
     /// Returns the properties that tests substitute for the device's own.
-    pub(crate) fn pretend(&self) -> &DeviceOverrides {
-        &self.pretend
+    pub(crate) fn overrides(&self) -> &DeviceOverrides {
+        &self.overrides
     }
 
     /// Returns the validation layer's messages so far. There are none without validation.

@@ -73,7 +73,7 @@ impl Context {
     /// [`RequiredFeatures`], and with 64-bit atomics if `int64_atomics` says so. No other thread uses the queue while
     /// a function of kdray runs.
     pub unsafe fn on_given(given: GivenDevice) -> Result<Arc<Self>, GpuError> {
-        Self::open_given(given, &ContextOptions::default().pretend)
+        Self::open_given(given, &ContextOptions::default().overrides)
     }
 }
 

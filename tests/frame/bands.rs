@@ -1,4 +1,4 @@
-//! Tests that a picture rendered in bands has the same bits as one rendered at once. The devices here pretend to bind
+//! Tests that a picture rendered in bands has the same bits as one rendered at once. The devices here overrides to bind
 //! only little memory, so that even small pictures need bands.
 
 use std::sync::Arc;

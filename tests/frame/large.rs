@@ -1,5 +1,5 @@
 //! Tests of the three kinds of access to arrays that grow with the scene: bound storage, texels, or by address where
-//! the device's limits exclude the other two. All give the same bits. The devices here pretend to have low limits.
+//! the device's limits exclude the other two. All give the same bits. The devices here overrides to have low limits.
 
 use std::sync::Arc;
 

@@ -28,8 +28,8 @@ use kdray::{
 };
 
 /// Opens a device under validation, which kdray takes for what the overrides make of it.
-pub fn pretended(pretend: DeviceOverrides) -> Arc<Context> {
-    let options = ContextOptions { pretend, ..ContextOptions::new(None, true) };
+pub fn pretended(overrides: DeviceOverrides) -> Arc<Context> {
+    let options = ContextOptions { overrides, ..ContextOptions::new(None, true) };
     Context::new(&options).expect("a device with validation")
 }
 
