@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{Vec3, uvec2};
 
-use super::{error::Topic, input::Action, live::Live, pick::pick, session::Session};
+use super::{error::Topic, gpu_session::GpuSession, input::Action, pick::pick, session::Session};
 use crate::{
     frame::RenderOptions,
     gpu::GpuError,
@@ -25,7 +25,7 @@ pub enum SaveError {
 impl Session {
     /// Does an action. Actions on the window and its panels have no effect here. `window` is the window's size in
     /// pixels.
-    pub fn act(&mut self, action: Action, live: &Live, window: (u32, u32)) {
+    pub fn act(&mut self, action: Action, live: &GpuSession, window: (u32, u32)) {
         match action {
             Action::Save => {
                 self.is_save_due = true;
@@ -46,7 +46,7 @@ impl Session {
 
     /// Saves the displayed picture if a save is due, and if the picture has the window's size and the current camera.
     /// Until then drawing goes on, and the window stays responsive.
-    pub fn save_if_due(&mut self, live: &Live, window: (u32, u32)) {
+    pub fn save_if_due(&mut self, live: &GpuSession, window: (u32, u32)) {
         let is_whole = |displayed: Displayed| displayed.size == window && displayed.camera == *self.controller.camera();
         if live.renderer.displayed().is_some_and(is_whole) {
             self.save_what_is_left(live);
@@ -55,7 +55,7 @@ impl Session {
 
     /// Saves the displayed picture if a save is due. It is called before another view replaces the picture, and
     /// before the viewer ends.
-    pub fn save_what_is_left(&mut self, live: &Live) {
+    pub fn save_what_is_left(&mut self, live: &GpuSession) {
         if !std::mem::take(&mut self.is_save_due) {
             return;
         }
@@ -83,7 +83,7 @@ impl Session {
 }
 
 /// Writes the displayed picture as PNG. Writes nothing if no picture has been displayed yet.
-fn save_displayed(live: &Live, path: &Path) -> Result<(), SaveError> {
+fn save_displayed(live: &GpuSession, path: &Path) -> Result<(), SaveError> {
     match live.renderer.displayed_picture()? {
         Some(picture) => Ok(output::write_picture(path, &picture)?),
         None => Ok(()),
@@ -91,7 +91,7 @@ fn save_displayed(live: &Live, path: &Path) -> Result<(), SaveError> {
 }
 
 /// Writes the renderer's picture in the format of the path's extension, as `kdray render` does.
-pub fn save(live: &Live, path: &Path) -> Result<(), SaveError> {
+pub fn save(live: &GpuSession, path: &Path) -> Result<(), SaveError> {
     output::write_picture(path, &live.renderer.picture()?)?;
     Ok(())
 }
@@ -119,7 +119,7 @@ mod tests {
     use crate::{
         engine::choices::{Processor, Request, Workload},
         frame::View,
-        view::{LoadOptions, Loaded, Settings},
+        view::{LoadOptions, LoadedScene, Settings},
     };
 
     #[test]
@@ -154,7 +154,7 @@ mod tests {
             processor: Processor::SoftwareDriver,
             workload: Workload::of_window((640, 480)),
         };
-        let mut session = Session::new(Loaded::load(&path, load_options).unwrap(), settings.clone(), true, |_| ());
+        let mut session = Session::new(LoadedScene::load(&path, load_options).unwrap(), settings.clone(), true, |_| ());
         let seen = session.loaded.scene().camera;
         let displayed = Displayed { size: (80, 60), camera: seen };
         session.controller.look(0.5, 0.0);

@@ -16,8 +16,8 @@ use winit::{
 use super::{
     display::{PaceReport, ViewOptions, ViewReport},
     error::{Topic, ViewError},
+    gpu_session::GpuSession,
     input::{Action, Input},
-    live::Live,
     panel::{Layers, Settings},
     reload::{Reloader, Wake},
     script::Script,
@@ -50,7 +50,7 @@ pub(super) struct App {
 
 /// An open window with its device and overlay.
 struct Shown {
-    live: Live,
+    live: GpuSession,
     ui: Ui,
     window: Arc<Window>,
 }
@@ -80,7 +80,7 @@ impl App {
         let window = event_loop.create_window(attributes).map_err(|error| ViewError::Window(error.to_string()))?;
         let window = Arc::new(window);
         let (device, loaded) = (&self.options.device, &self.session.loaded);
-        let live = Live::open(window.clone(), device, loaded, options, loaded.load_options.request, *vsync)?;
+        let live = GpuSession::open(window.clone(), device, loaded, options, loaded.load_options.request, *vsync)?;
         self.choices = Some(live.choices.clone());
         self.session.settings.options = live.renderer.options().clone();
         Ok(Shown { live, ui: Ui::new(&window), window })
@@ -159,7 +159,7 @@ impl App {
         let loaded = &self.session.loaded;
         let (traversal, primary) = (Some(options.traversal), Some(options.primary));
         let request = Request { traversal, primary, ..loaded.load_options.request };
-        match Live::open(window.clone(), &self.options.device, loaded, options, request, *vsync) {
+        match GpuSession::open(window.clone(), &self.options.device, loaded, options, request, *vsync) {
             Ok(live) => {
                 self.is_reopened = true;
                 // Replaced shaders were lost with the device, so they are compiled again.

@@ -9,7 +9,7 @@ use super::{
     app::App,
     error::ViewError,
     history::{Moving, Percentiles},
-    loaded::Loaded,
+    loaded_scene::LoadedScene,
     panel::Settings,
     reload::{Reloader, Wake},
     script::Script,
@@ -89,7 +89,7 @@ impl Display {
     /// # Errors
     /// The window cannot be opened, no device can present to it, the device fails and cannot be opened again, or a
     /// tour's picture cannot be written.
-    pub fn view(self, loaded: Loaded, options: ViewOptions) -> Result<ViewReport, ViewError> {
+    pub fn view(self, loaded: LoadedScene, options: ViewOptions) -> Result<ViewReport, ViewError> {
         let script =
             (options.tour.clone()).map(|tour| Script::new(tour, options.record.clone(), options.screenshot.clone()));
         let reloader = Reloader::new(loaded.path.clone(), loaded.load_options, self.event_loop.create_proxy());

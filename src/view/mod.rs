@@ -8,10 +8,10 @@ pub mod controller;
 mod display;
 mod error;
 pub mod flight;
+mod gpu_session;
 pub mod history;
 mod input;
-mod live;
-pub mod loaded;
+pub mod loaded_scene;
 mod mouse;
 mod overlay;
 mod pace;
@@ -29,7 +29,7 @@ pub mod watch;
 pub use self::{
     display::{Display, PaceReport, ViewOptions, ViewReport},
     error::ViewError,
-    loaded::{LoadOptions, Loaded},
+    loaded::{LoadOptions, LoadedScene},
     panel::Settings,
     tour::Tour,
 };

@@ -6,8 +6,8 @@ use winit::event_loop::EventLoopProxy;
 
 use super::{
     error::Topic,
-    live::Live,
-    loaded::{LoadOptions, Loaded},
+    gpu_session::GpuSession,
+    loaded::{LoadOptions, LoadedScene},
     session::Session,
     watch::Watch,
 };
@@ -18,7 +18,7 @@ pub enum Wake {
     /// A file of the scene has changed.
     Changed,
     /// The scene was read again, or could not be read.
-    Reloaded(Box<Result<Loaded, SceneError>>),
+    Reloaded(Box<Result<LoadedScene, SceneError>>),
     /// A shader has changed.
     #[cfg(feature = "hot-reload")]
     ShadersChanged,
@@ -98,7 +98,7 @@ impl Reloader {
     pub fn load(&mut self) {
         if self.loading.begin() {
             let (path, load_options, proxy) = (self.path.clone(), self.load_options, self.proxy.clone());
-            let load = move || Box::new(Loaded::load(&path, load_options));
+            let load = move || Box::new(LoadedScene::load(&path, load_options));
             thread::spawn(move || drop(proxy.send_event(Wake::Reloaded(load()))));
         }
     }
@@ -115,7 +115,7 @@ impl Reloader {
 impl Session {
     /// Replaces the scene; the camera stays. If the scene could not be read or uploaded, shows a message and keeps
     /// the previous scene.
-    pub fn replace_scene(&mut self, live: &mut Live, loaded: Result<Loaded, SceneError>) {
+    pub fn replace_scene(&mut self, live: &mut GpuSession, loaded: Result<LoadedScene, SceneError>) {
         let loaded = match loaded {
             Ok(loaded) => loaded,
             Err(error) => return self.complain(Topic::Scene, &error.to_string()),

@@ -4,7 +4,7 @@ use std::{path::PathBuf, time::Instant};
 
 use super::{
     actions::{SaveError, save},
-    live::Live,
+    gpu_session::GpuSession,
     session::Session,
     tour::Tour,
 };
@@ -55,7 +55,7 @@ impl Script {
     ///
     /// # Errors
     /// A picture cannot be written.
-    pub fn shown(&mut self, session: &Session, live: &Live) -> Result<bool, SaveError> {
+    pub fn shown(&mut self, session: &Session, live: &GpuSession) -> Result<bool, SaveError> {
         if self.is_still() && !session.is_done(live) {
             return Ok(false);
         }

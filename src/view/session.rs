@@ -6,9 +6,9 @@ use super::{
     budget::{Budget, PART_MS, is_other_pace},
     controller::Controller,
     error::Topic,
+    gpu_session::GpuSession,
     history::{FrameRecord, History},
-    live::Live,
-    loaded::Loaded,
+    loaded_scene::LoadedScene,
     pace::Pace,
     panel::{Facts, Settings},
     pick::Picked,
@@ -36,7 +36,7 @@ fn brightest_cost(statistics: &Statistics) -> u32 {
 
 /// State of the viewer: the scene, the camera, the settings and the history of frames.
 pub struct Session {
-    pub loaded: Loaded,
+    pub loaded: LoadedScene,
     pub settings: Settings,
     pub controller: Controller,
     pub pace: Pace,
@@ -69,7 +69,7 @@ pub struct Session {
 }
 
 impl Session {
-    pub fn new(loaded: Loaded, settings: Settings, is_interactive: bool, print: fn(&str)) -> Self {
+    pub fn new(loaded: LoadedScene, settings: Settings, is_interactive: bool, print: fn(&str)) -> Self {
         Self {
             controller: Controller::new(loaded.scene().camera, loaded.bounds()),
             budgets: [(); 2].map(|()| Budget::new(settings.budget_ms)),
@@ -94,7 +94,7 @@ impl Session {
     }
 
     /// Returns whether the next frame will differ from the last one. `window` is the window's size in pixels.
-    pub fn is_busy(&self, live: &Live, now: Instant, window: (u32, u32)) -> bool {
+    pub fn is_busy(&self, live: &GpuSession, now: Instant, window: (u32, u32)) -> bool {
         let options = live.renderer.options();
         let is_small = window != (options.width, options.height);
         is_small
@@ -111,7 +111,7 @@ impl Session {
     }
 
     /// Returns whether the picture has all its samples.
-    pub fn is_done(&self, live: &Live) -> bool {
+    pub fn is_done(&self, live: &GpuSession) -> bool {
         !live.renderer.is_pending() && live.renderer.n_samples() >= self.n_wanted()
     }
 
@@ -134,7 +134,7 @@ impl Session {
     ///
     /// # Errors
     /// A Vulkan call fails. Settings that the device refuses are not an error: the previous settings return.
-    pub fn draw(&mut self, live: &mut Live, window: (u32, u32)) -> Result<(), GpuError> {
+    pub fn draw(&mut self, live: &mut GpuSession, window: (u32, u32)) -> Result<(), GpuError> {
         let now = Instant::now();
         let seconds = self.pace.begin(now);
         if self.controller.flight.is_under_way() {
@@ -191,7 +191,7 @@ impl Session {
     }
 
     /// Adapts the budgets if the window's size has changed.
-    fn fit_window(&mut self, live: &mut Live, window: (u32, u32)) -> Result<(), GpuError> {
+    fn fit_window(&mut self, live: &mut GpuSession, window: (u32, u32)) -> Result<(), GpuError> {
         let before = std::mem::replace(&mut self.window, window);
         if before == window || before == (0, 0) {
             return Ok(());
@@ -205,7 +205,7 @@ impl Session {
 
     /// Returns whether the present buffers suffice for such a picture. Notes its size, since the caller then makes
     /// them large enough.
-    fn has_room(&mut self, live: &Live, whole: &RenderOptions) -> bool {
+    fn has_room(&mut self, live: &GpuSession, whole: &RenderOptions) -> bool {
         let now = live.renderer.options();
         let has_room = whole.width <= self.room.0 && whole.height <= self.room.1;
         self.room = (self.room.0.max(whole.width), self.room.1.max(whole.height));
@@ -215,7 +215,7 @@ impl Session {
 
     /// Draws the rest of the sample in parts, until the sample is complete or half of [`PART_MS`] is spent. At rest,
     /// parts are so small that input does not wait long; while the camera moves, parts are as large as possible.
-    fn draw_part(&mut self, live: &mut Live, window: (u32, u32), is_moving: bool) -> Result<(), GpuError> {
+    fn draw_part(&mut self, live: &mut GpuSession, window: (u32, u32), is_moving: bool) -> Result<(), GpuError> {
         let renderer = &mut live.renderer;
         if !renderer.is_pending() {
             self.sample_ms = 0.0;
@@ -244,7 +244,7 @@ impl Session {
 
     /// Returns to the options that the device accepted last, and shows a message: the user cannot change a size that
     /// the device refuses. Returns the error if the device is lost.
-    fn take_back(&mut self, live: &Live, error: GpuError) -> Result<(), GpuError> {
+    fn take_back(&mut self, live: &GpuSession, error: GpuError) -> Result<(), GpuError> {
         if error.is_device_lost() {
             return Err(error);
         }
@@ -282,7 +282,7 @@ impl Session {
     }
 
     /// Returns the facts that the overlay shows. `window` is the window's size in pixels.
-    pub fn facts<'a>(&'a self, live: &'a Live, window: (u32, u32), is_flying: bool) -> Facts<'a> {
+    pub fn facts<'a>(&'a self, live: &'a GpuSession, window: (u32, u32), is_flying: bool) -> Facts<'a> {
         let options = live.renderer.options();
         Facts {
             device: &live.context.info().name,

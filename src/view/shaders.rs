@@ -15,7 +15,7 @@ use winit::event_loop::EventLoopProxy;
 
 use super::{
     error::Topic,
-    live::Live,
+    gpu_session::GpuSession,
     reload::{OneAtATime, Wake},
     session::Session,
     watch::Watch,
@@ -70,7 +70,7 @@ impl Shaders {
 impl Session {
     /// Replaces the shaders. If they failed to compile or the device refuses them, shows a message and keeps the
     /// previous shaders.
-    pub fn replace_shaders(&mut self, live: &mut Live, shaders: Result<Replacements, String>) {
+    pub fn replace_shaders(&mut self, live: &mut GpuSession, shaders: Result<Replacements, String>) {
         let replaced =
             shaders.and_then(|shaders| live.replace_shaders(shaders).map_err(|error| format!("shaders: {error}")));
         match replaced {

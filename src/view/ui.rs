@@ -12,7 +12,7 @@ use winit::{
 
 use super::overlay::OverlayFrame;
 use super::{
-    live::Live,
+    gpu_session::GpuSession,
     panel::{self, Facts, Layers, Settings},
     session::Session,
 };
@@ -90,7 +90,7 @@ impl Ui {
 /// Lays out the overlay of the session's picture and applies the user's changes to the session's settings.
 pub fn lay_out(
     session: &mut Session,
-    live: &Live,
+    live: &GpuSession,
     (ui, window, layers): (&mut Ui, &Window, Layers),
     is_flying: bool,
 ) -> Layout {

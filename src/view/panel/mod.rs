@@ -9,7 +9,7 @@ use egui::{Color32, CornerRadius, Frame, Margin, RichText, ScrollArea, Ui, Windo
 
 use super::{
     history::{History, Percentiles},
-    loaded::Loaded,
+    loaded_scene::LoadedScene,
     pick::Picked,
 };
 use crate::{
@@ -60,7 +60,7 @@ pub struct Facts<'a> {
     /// The device's name.
     pub device: &'a str,
     /// The scene and its acceleration structure.
-    pub loaded: &'a Loaded,
+    pub loaded: &'a LoadedScene,
     /// Width and height of the window, pixels.
     pub window: (u32, u32),
     /// Width and height of the picture, pixels.

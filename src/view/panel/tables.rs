@@ -6,7 +6,7 @@ use crate::{
     frame::Profile,
     gpu::MemoryUse,
     view::{
-        loaded::Loaded,
+        loaded_scene::LoadedScene,
         pick::{Picked, PickedRay},
     },
 };
@@ -54,7 +54,7 @@ fn rate(n_rays: u64, ms: Option<f64>) -> String {
 }
 
 /// Shows the figures of the acceleration structure.
-pub fn accel(ui: &mut Ui, loaded: &Loaded) {
+pub fn accel(ui: &mut Ui, loaded: &LoadedScene) {
     let statistics = &loaded.statistics;
     let size = ("size", bytes(statistics.bytes()));
     let built_in = ("built in", format!("{:.0} ms", loaded.build_ms));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::TexturesDelta;
 
 use super::{
-    loaded::Loaded,
+    loaded_scene::LoadedScene,
     overlay::{Overlay, OverlayFrame},
 };
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// A device that renders a scene and shows its pictures in a window.
-pub struct Live {
+pub struct GpuSession {
     pub renderer: Renderer,
     /// Choices made for the scene with which the device was opened.
     pub choices: Choices,
@@ -27,7 +27,7 @@ pub struct Live {
     pub context: Arc<Context>,
 }
 
-impl Live {
+impl GpuSession {
     /// Opens the device and uploads the scene. `request` decides the traversal and the primary visibility; those in
     /// `options` are replaced.
     ///
@@ -36,7 +36,7 @@ impl Live {
     pub fn open(
         window: Arc<dyn Screen>,
         device: &ContextOptions,
-        loaded: &Loaded,
+        loaded: &LoadedScene,
         options: &RenderOptions,
         request: Request,
         vsync: bool,
@@ -60,7 +60,7 @@ impl Live {
     ///
     /// # Errors
     /// The scene exceeds the device's limits or memory.
-    pub fn set_scene(&mut self, loaded: &Loaded) -> Result<(), GpuError> {
+    pub fn set_scene(&mut self, loaded: &LoadedScene) -> Result<(), GpuError> {
         let camera = *self.renderer.camera();
         let mut renderer = Renderer::new(self.context.clone(), &loaded.world, self.renderer.options())?;
         renderer.set_camera(&camera);
@@ -112,7 +112,7 @@ impl Live {
     }
 }
 
-impl Drop for Live {
+impl Drop for GpuSession {
     fn drop(&mut self) {
         // Frames in flight still read the objects that are dropped. An error means that the device is lost; then
         // there is nothing to wait for.

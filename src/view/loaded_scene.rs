@@ -26,7 +26,7 @@ pub struct LoadOptions {
 }
 
 /// A scene and its acceleration structure.
-pub struct Loaded {
+pub struct LoadedScene {
     /// The scene's file.
     pub path: PathBuf,
     /// The scene with its structure.
@@ -41,7 +41,7 @@ pub struct Loaded {
     pub build_ms: f64,
 }
 
-impl Loaded {
+impl LoadedScene {
     /// Reads the scene and builds its acceleration structure.
     ///
     /// # Errors
