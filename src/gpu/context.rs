@@ -79,7 +79,7 @@ pub struct Context {
     /// See [`Context::loop_limit`].
     loop_limit: OnceLock<Option<u32>>,
     overrides: DeviceOverrides,
-    pub(super) refusal: FailureInjection,
+    pub(super) failure_injection: FailureInjection,
     #[cfg(feature = "hot-reload")]
     pub(super) replacements: Mutex<super::Replacements>,
     /// Submitted command buffers that have no owner. They are freed when the queue is idle.
@@ -227,7 +227,7 @@ impl Context {
             n_lanes: overrides.n_lanes.map_or_else(OnceLock::new, OnceLock::from),
             overrides: *overrides,
             loop_limit: overrides.loop_limit.map_or_else(OnceLock::new, |limit| OnceLock::from(Some(limit))),
-            refusal: FailureInjection::never(),
+            failure_injection: FailureInjection::never(),
             #[cfg(feature = "hot-reload")]
             replacements: Mutex::default(),
             limits: Limits::of(&instance, physical).reduced_to(overrides),

@@ -26,7 +26,7 @@ impl Context {
     /// buffers succeed, and every later one fail as if memory were exhausted. `None` lets all succeed.
     #[doc(hidden)]
     pub fn fail_creations_after(&self, n_creations: Option<u32>) {
-        self.refusal.n_left.store(n_creations.unwrap_or(FailureInjection::NEVER), Ordering::Relaxed);
+        self.failure_injection.n_left.store(n_creations.unwrap_or(FailureInjection::NEVER), Ordering::Relaxed);
     }
 
     /// Counts a creation that is about to be made by `call`.
@@ -38,7 +38,7 @@ impl Context {
             FailureInjection::NEVER => Some(n_left),
             _ => u32::checked_sub(n_left, 1),
         };
-        match self.refusal.n_left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, count_down) {
+        match self.failure_injection.n_left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, count_down) {
             Ok(_) => Ok(()),
             Err(_) => Err(GpuError::call(call, object)(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY)),
         }
