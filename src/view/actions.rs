@@ -25,19 +25,19 @@ pub enum SaveError {
 impl Session {
     /// Does an action. Actions on the window and its panels have no effect here. `window` is the window's size in
     /// pixels.
-    pub fn act(&mut self, action: Action, live: &GpuSession, window: (u32, u32)) {
+    pub fn act(&mut self, action: Action, gpu: &GpuSession, window: (u32, u32)) {
         match action {
             Action::Save => {
                 self.is_save_due = true;
-                self.save_if_due(live, window);
+                self.save_if_due(gpu, window);
             }
             Action::PrintCamera => (self.print)(&to_toml(self.controller.camera())),
             Action::FrameScene => self.controller.frame_scene(window.0 as f32 / window.1 as f32),
             Action::GoHome => self.controller.go_home(),
             Action::Show(view) => self.settings.view = view,
             Action::Pick { x, y } => {
-                if let Some(displayed) = live.renderer.displayed() {
-                    self.pick(live.renderer.options(), displayed, window, (x, y));
+                if let Some(displayed) = gpu.renderer.displayed() {
+                    self.pick(gpu.renderer.options(), displayed, window, (x, y));
                 }
             }
             Action::TogglePanel | Action::ToggleKeys | Action::Quit => {}
@@ -46,21 +46,21 @@ impl Session {
 
     /// Saves the displayed picture if a save is due, and if the picture has the window's size and the current camera.
     /// Until then drawing goes on, and the window stays responsive.
-    pub fn save_if_due(&mut self, live: &GpuSession, window: (u32, u32)) {
+    pub fn save_if_due(&mut self, gpu: &GpuSession, window: (u32, u32)) {
         let is_whole = |displayed: Displayed| displayed.size == window && displayed.camera == *self.controller.camera();
-        if live.renderer.displayed().is_some_and(is_whole) {
-            self.save_what_is_left(live);
+        if gpu.renderer.displayed().is_some_and(is_whole) {
+            self.save_what_is_left(gpu);
         }
     }
 
     /// Saves the displayed picture if a save is due. It is called before another view replaces the picture, and
     /// before the viewer ends.
-    pub fn save_what_is_left(&mut self, live: &GpuSession) {
+    pub fn save_what_is_left(&mut self, gpu: &GpuSession) {
         if !std::mem::take(&mut self.is_save_due) {
             return;
         }
         let path = next_free(&self.loaded.scene().name);
-        match save_displayed(live, &path) {
+        match save_displayed(gpu, &path) {
             Ok(()) => {
                 (self.print)(&format!("wrote {}\n", path.display()));
                 self.settle(Topic::File);
@@ -83,16 +83,16 @@ impl Session {
 }
 
 /// Writes the displayed picture as PNG. Writes nothing if no picture has been displayed yet.
-fn save_displayed(live: &GpuSession, path: &Path) -> Result<(), SaveError> {
-    match live.renderer.displayed_picture()? {
+fn save_displayed(gpu: &GpuSession, path: &Path) -> Result<(), SaveError> {
+    match gpu.renderer.displayed_picture()? {
         Some(picture) => Ok(output::write_picture(path, &picture)?),
         None => Ok(()),
     }
 }
 
 /// Writes the renderer's picture in the format of the path's extension, as `kdray render` does.
-pub fn save(live: &GpuSession, path: &Path) -> Result<(), SaveError> {
-    output::write_picture(path, &live.renderer.picture()?)?;
+pub fn save(gpu: &GpuSession, path: &Path) -> Result<(), SaveError> {
+    output::write_picture(path, &gpu.renderer.picture()?)?;
     Ok(())
 }
 

@@ -50,7 +50,7 @@ pub(super) struct App {
 
 /// An open window with its device and overlay.
 struct Shown {
-    live: GpuSession,
+    gpu: GpuSession,
     ui: Ui,
     window: Arc<Window>,
 }
@@ -80,10 +80,10 @@ impl App {
         let window = event_loop.create_window(attributes).map_err(|error| ViewError::Window(error.to_string()))?;
         let window = Arc::new(window);
         let (device, loaded) = (&self.options.device, &self.session.loaded);
-        let live = GpuSession::open(window.clone(), device, loaded, options, loaded.load_options.request, *vsync)?;
-        self.choices = Some(live.choices.clone());
-        self.session.settings.options = live.renderer.options().clone();
-        Ok(Shown { live, ui: Ui::new(&window), window })
+        let gpu = GpuSession::open(window.clone(), device, loaded, options, loaded.load_options.request, *vsync)?;
+        self.choices = Some(gpu.choices.clone());
+        self.session.settings.options = gpu.renderer.options().clone();
+        Ok(Shown { gpu, ui: Ui::new(&window), window })
     }
 
     fn end(&mut self, event_loop: &ActiveEventLoop, outcome: Result<(), ViewError>) {
@@ -112,7 +112,7 @@ impl App {
 
     /// Draws and shows a frame. Returns true when the script has ended.
     fn draw(&mut self, shown: &mut Shown) -> Result<bool, ViewError> {
-        let Shown { live, ui, window } = shown;
+        let Shown { gpu, ui, window } = shown;
         let size = window.inner_size();
         let size = (size.width, size.height);
         if size.0 == 0 || size.1 == 0 {
@@ -128,61 +128,61 @@ impl App {
         };
         let session = &mut self.session;
         let layout =
-            self.layers.any().then(|| lay_out(session, live, (ui, window, self.layers), self.input.is_flying()));
-        session.draw(live, picture)?;
-        session.save_if_due(live, picture);
+            self.layers.any().then(|| lay_out(session, gpu, (ui, window, self.layers), self.input.is_flying()));
+        session.draw(gpu, picture)?;
+        session.save_if_due(gpu, picture);
         let frame = match layout {
             Some(Layout { frame, textures }) => {
-                live.update_textures(textures)?;
+                gpu.update_textures(textures)?;
                 Some(frame)
             }
             None => None,
         };
-        if !live.show(size, frame.as_ref())? {
+        if !gpu.show(size, frame.as_ref())? {
             return Ok(false);
         }
-        let RenderOptions { width, height, .. } = *live.renderer.options();
+        let RenderOptions { width, height, .. } = *gpu.renderer.options();
         session.shown((width, height));
         self.is_reopened = false;
         match &mut self.script {
-            Some(script) => Ok(script.shown(session, live)?),
+            Some(script) => Ok(script.shown(session, gpu)?),
             None => Ok(false),
         }
     }
 
     /// Opens the device again after it was lost. Ends the viewer if that fails.
     fn recover(&mut self, shown: Shown, event_loop: &ActiveEventLoop, error: GpuError) {
-        let Shown { live, ui, window } = shown;
-        drop((live, ui));
+        let Shown { gpu, ui, window } = shown;
+        drop((gpu, ui));
         self.session.complain(Topic::Device, &format!("{error}; the device was opened anew"));
         let Settings { options, vsync, .. } = &self.session.settings;
         let loaded = &self.session.loaded;
         let (traversal, primary) = (Some(options.traversal), Some(options.primary));
         let request = Request { traversal, primary, ..loaded.load_options.request };
         match GpuSession::open(window.clone(), &self.options.device, loaded, options, request, *vsync) {
-            Ok(live) => {
+            Ok(gpu) => {
                 self.is_reopened = true;
                 // Replaced shaders were lost with the device, so they are compiled again.
                 #[cfg(feature = "hot-reload")]
                 self.reloader.shaders.compile();
-                self.shown = Some(Shown { live, ui: Ui::new(&window), window });
+                self.shown = Some(Shown { gpu, ui: Ui::new(&window), window });
             }
             Err(error) => self.end(event_loop, Err(error.into())),
         }
     }
 
     fn act(&mut self, event_loop: &ActiveEventLoop, action: Action) {
-        let Some(Shown { live, window, .. }) = &mut self.shown else { return };
+        let Some(Shown { gpu, window, .. }) = &mut self.shown else { return };
         let size = window.inner_size();
         match action {
             Action::Quit if self.layers.keys => self.layers.keys = false,
             Action::Quit => {
-                self.session.save_what_is_left(live);
+                self.session.save_what_is_left(gpu);
                 self.end(event_loop, Ok(()));
             }
             Action::TogglePanel => self.layers.panel = !self.layers.panel,
             Action::ToggleKeys => self.layers.keys = !self.layers.keys,
-            action => self.session.act(action, live, (size.width.max(1), size.height.max(1))),
+            action => self.session.act(action, gpu, (size.width.max(1), size.height.max(1))),
         }
     }
 
@@ -214,12 +214,12 @@ impl App {
         let frames = &self.session.all_frames;
         let pace =
             PaceReport { frame_ms: frames.pace(), input_to_present_ms: frames.latency(), moving: frames.moving() };
-        let (Some(Shown { live, ui, window }), Some(choices)) = (self.shown, self.choices) else {
+        let (Some(Shown { gpu, ui, window }), Some(choices)) = (self.shown, self.choices) else {
             return Err(ViewError::Window("it was closed before it was open".to_owned()));
         };
-        let context = live.context.clone();
+        let context = gpu.context.clone();
         // The validation layer may also report errors of the release, so its messages are read after it.
-        drop((live, ui, window));
+        drop((gpu, ui, window));
         let (device, validation) = (context.info().name.clone(), context.validation_messages());
         Ok(ViewReport { device, choices, pace, validation })
     }
@@ -241,8 +241,8 @@ impl ApplicationHandler<Wake> for App {
         match wake {
             Wake::Changed => self.reloader.load(),
             Wake::Reloaded(loaded) => {
-                if let Some(Shown { live, window, .. }) = &mut self.shown {
-                    self.session.replace_scene(live, *loaded);
+                if let Some(Shown { gpu, window, .. }) = &mut self.shown {
+                    self.session.replace_scene(gpu, *loaded);
                     window.request_redraw();
                 }
                 self.reloader.done();
@@ -251,8 +251,8 @@ impl ApplicationHandler<Wake> for App {
             Wake::ShadersChanged => self.reloader.shaders.compile(),
             #[cfg(feature = "hot-reload")]
             Wake::Compiled(shaders) => {
-                if let Some(Shown { live, window, .. }) = &mut self.shown {
-                    self.session.replace_shaders(live, shaders);
+                if let Some(Shown { gpu, window, .. }) = &mut self.shown {
+                    self.session.replace_shaders(gpu, shaders);
                     window.request_redraw();
                 }
                 self.reloader.shaders.done();
@@ -266,8 +266,8 @@ impl ApplicationHandler<Wake> for App {
             WindowEvent::RedrawRequested => self.frame(event_loop),
             WindowEvent::Occluded(is_occluded) => self.is_occluded = is_occluded,
             WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => {
-                if let Some(Shown { live, .. }) = &mut self.shown {
-                    live.presenter.mark_stale();
+                if let Some(Shown { gpu, .. }) = &mut self.shown {
+                    gpu.presenter.mark_stale();
                     // While the user resizes the window, pictures are drawn small and fast.
                     self.session.pace.moved(Instant::now());
                 }
@@ -278,9 +278,9 @@ impl ApplicationHandler<Wake> for App {
     }
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
-        let Some(Shown { live, ui, window }) = &self.shown else { return };
+        let Some(Shown { gpu, ui, window }) = &self.shown else { return };
         let (now, size) = (Instant::now(), window.inner_size());
-        let is_busy = self.script.is_some() || self.session.is_busy(live, now, (size.width, size.height));
+        let is_busy = self.script.is_some() || self.session.is_busy(gpu, now, (size.width, size.height));
         let wait = if is_busy || !self.layers.any() { Duration::MAX } else { ui.repaint_after() };
         let has_area = size.width > 0 && size.height > 0;
         // A script goes on even if its window is hidden.

@@ -115,12 +115,12 @@ impl Reloader {
 impl Session {
     /// Replaces the scene; the camera stays. If the scene could not be read or uploaded, shows a message and keeps
     /// the previous scene.
-    pub fn replace_scene(&mut self, live: &mut GpuSession, loaded: Result<LoadedScene, SceneError>) {
+    pub fn replace_scene(&mut self, gpu: &mut GpuSession, loaded: Result<LoadedScene, SceneError>) {
         let loaded = match loaded {
             Ok(loaded) => loaded,
             Err(error) => return self.complain(Topic::Scene, &error.to_string()),
         };
-        match live.set_scene(&loaded) {
+        match gpu.set_scene(&loaded) {
             Ok(()) => {
                 self.controller.set_scene(loaded.scene().camera, loaded.bounds());
                 self.loaded = loaded;

@@ -55,16 +55,16 @@ impl Script {
     ///
     /// # Errors
     /// A picture cannot be written.
-    pub fn shown(&mut self, session: &Session, live: &GpuSession) -> Result<bool, SaveError> {
-        if self.is_still() && !session.is_done(live) {
+    pub fn shown(&mut self, session: &Session, gpu: &GpuSession) -> Result<bool, SaveError> {
+        if self.is_still() && !session.is_done(gpu) {
             return Ok(false);
         }
         if let Some(directory) = &self.record {
-            save(live, &directory.join(format!("frame.{:04}.png", self.frame_ix)))?;
+            save(gpu, &directory.join(format!("frame.{:04}.png", self.frame_ix)))?;
         }
         if self.is_last() {
             if let Some(path) = &self.screenshot {
-                save(live, path)?;
+                save(gpu, path)?;
             }
             return Ok(true);
         }

@@ -94,15 +94,15 @@ impl Session {
     }
 
     /// Returns whether the next frame will differ from the last one. `window` is the window's size in pixels.
-    pub fn is_busy(&self, live: &GpuSession, now: Instant, window: (u32, u32)) -> bool {
-        let options = live.renderer.options();
+    pub fn is_busy(&self, gpu: &GpuSession, now: Instant, window: (u32, u32)) -> bool {
+        let options = gpu.renderer.options();
         let is_small = window != (options.width, options.height);
         is_small
             || self.controller.flight.is_under_way()
             || self.pace.is_moving(now)
             || self.is_learning()
             || self.has_new_sample // the overlay shows its figures a frame later
-            || !self.is_done(live)
+            || !self.is_done(gpu)
     }
 
     /// Returns whether the time of a picture is still unknown. Small pictures are drawn until it is known.
@@ -111,8 +111,8 @@ impl Session {
     }
 
     /// Returns whether the picture has all its samples.
-    pub fn is_done(&self, live: &GpuSession) -> bool {
-        !live.renderer.is_pending() && live.renderer.n_samples() >= self.n_wanted()
+    pub fn is_done(&self, gpu: &GpuSession) -> bool {
+        !gpu.renderer.is_pending() && gpu.renderer.n_samples() >= self.n_wanted()
     }
 
     /// Returns the samples per pixel at which the view is done. Views of primary hits need a single sample.
@@ -134,7 +134,7 @@ impl Session {
     ///
     /// # Errors
     /// A Vulkan call fails. Settings that the device refuses are not an error: the previous settings return.
-    pub fn draw(&mut self, live: &mut GpuSession, window: (u32, u32)) -> Result<(), GpuError> {
+    pub fn draw(&mut self, gpu: &mut GpuSession, window: (u32, u32)) -> Result<(), GpuError> {
         let now = Instant::now();
         let seconds = self.pace.begin(now);
         if self.controller.flight.is_under_way() {
@@ -142,56 +142,56 @@ impl Session {
             self.pace.moved(now);
         }
         // Frames in flight read the objects that change here.
-        live.context.wait()?;
-        live.presenter.set_vsync(self.settings.vsync);
+        gpu.context.wait()?;
+        gpu.presenter.set_vsync(self.settings.vsync);
         self.budgets.iter_mut().for_each(|budget| budget.set_budget(self.settings.budget_ms));
-        self.fit_window(live, window)?;
+        self.fit_window(gpu, window)?;
         let features = self.settings.view != View::Picture;
         let whole = RenderOptions { width: window.0, height: window.1, features, ..self.settings.options.clone() };
         let (view, brightest) = self.view();
-        let is_other_view = live.renderer.set_view(view, brightest);
-        let makes_room = !self.has_room(live, &whole);
-        let is_elsewhere = self.controller.camera() != live.renderer.camera();
+        let is_other_view = gpu.renderer.set_view(view, brightest);
+        let makes_room = !self.has_room(gpu, &whole);
+        let is_elsewhere = self.controller.camera() != gpu.renderer.camera();
         if is_elsewhere || is_other_view {
-            self.save_what_is_left(live);
+            self.save_what_is_left(gpu);
         }
         if self.is_interactive && (is_elsewhere || is_other_view || makes_room) {
             // The new picture is drawn small first, so that it is shown at once.
-            live.renderer.reset_samples();
+            gpu.renderer.reset_samples();
             self.pace.moved(now);
         }
         let is_moving = self.pace.is_moving(now) || self.is_learning();
         self.is_moving = self.pace.is_moving(now);
         let (width, height) = if is_moving { self.budget().size(window) } else { window };
         let asked = RenderOptions { width, height, ..whole.clone() };
-        let is_new = asked != *live.renderer.options();
+        let is_new = asked != *gpu.renderer.options();
         // Buffers for the full-size picture are allocated before a small one is drawn. Allocating them later would
         // discard the small picture.
         let steps = [(is_moving && makes_room).then_some(&whole), is_new.then_some(&asked)];
         for options in steps.into_iter().flatten() {
-            if let Err(error) = live.renderer.set_options(options) {
-                self.take_back(live, error)?;
+            if let Err(error) = gpu.renderer.set_options(options) {
+                self.take_back(gpu, error)?;
                 break;
             }
         }
         if is_elsewhere {
-            live.renderer.set_camera(self.controller.camera());
+            gpu.renderer.set_camera(self.controller.camera());
         }
         if self.is_learning() {
-            live.renderer.reset_samples();
+            gpu.renderer.reset_samples();
         }
         self.has_new_sample = false;
-        if !self.is_done(live) {
-            self.draw_part(live, window, is_moving)
+        if !self.is_done(gpu) {
+            self.draw_part(gpu, window, is_moving)
         } else if is_new {
-            live.renderer.show()
+            gpu.renderer.show()
         } else {
             Ok(())
         }
     }
 
     /// Adapts the budgets if the window's size has changed.
-    fn fit_window(&mut self, live: &mut GpuSession, window: (u32, u32)) -> Result<(), GpuError> {
+    fn fit_window(&mut self, gpu: &mut GpuSession, window: (u32, u32)) -> Result<(), GpuError> {
         let before = std::mem::replace(&mut self.window, window);
         if before == window || before == (0, 0) {
             return Ok(());
@@ -200,13 +200,13 @@ impl Session {
         let ratio = n_pixels(window) / n_pixels(before);
         self.budgets.iter_mut().for_each(|budget| budget.resize(ratio));
         // A large window would consist of too many parts if they stayed as small as those of a small window.
-        live.renderer.limit_batches(None)
+        gpu.renderer.limit_batches(None)
     }
 
     /// Returns whether the present buffers suffice for such a picture. Notes its size, since the caller then makes
     /// them large enough.
-    fn has_room(&mut self, live: &GpuSession, whole: &RenderOptions) -> bool {
-        let now = live.renderer.options();
+    fn has_room(&mut self, gpu: &GpuSession, whole: &RenderOptions) -> bool {
+        let now = gpu.renderer.options();
         let has_room = whole.width <= self.room.0 && whole.height <= self.room.1;
         self.room = (self.room.0.max(whole.width), self.room.1.max(whole.height));
         let filters = |options: &RenderOptions| options.denoise != Denoise::Off;
@@ -215,8 +215,8 @@ impl Session {
 
     /// Draws the rest of the sample in parts, until the sample is complete or half of [`PART_MS`] is spent. At rest,
     /// parts are so small that input does not wait long; while the camera moves, parts are as large as possible.
-    fn draw_part(&mut self, live: &mut GpuSession, window: (u32, u32), is_moving: bool) -> Result<(), GpuError> {
-        let renderer = &mut live.renderer;
+    fn draw_part(&mut self, gpu: &mut GpuSession, window: (u32, u32), is_moving: bool) -> Result<(), GpuError> {
+        let renderer = &mut gpu.renderer;
         if !renderer.is_pending() {
             self.sample_ms = 0.0;
             let most_pixels = self.budget().part_pixels(window).filter(|_| !is_moving);
@@ -244,11 +244,11 @@ impl Session {
 
     /// Returns to the options that the device accepted last, and shows a message: the user cannot change a size that
     /// the device refuses. Returns the error if the device is lost.
-    fn take_back(&mut self, live: &GpuSession, error: GpuError) -> Result<(), GpuError> {
+    fn take_back(&mut self, gpu: &GpuSession, error: GpuError) -> Result<(), GpuError> {
         if error.is_device_lost() {
             return Err(error);
         }
-        self.settings.options = live.renderer.options().clone();
+        self.settings.options = gpu.renderer.options().clone();
         self.complain(Topic::Settings, &error.to_string());
         Ok(())
     }
@@ -282,22 +282,22 @@ impl Session {
     }
 
     /// Returns the facts that the overlay shows. `window` is the window's size in pixels.
-    pub fn facts<'a>(&'a self, live: &'a GpuSession, window: (u32, u32), is_flying: bool) -> Facts<'a> {
-        let options = live.renderer.options();
+    pub fn facts<'a>(&'a self, gpu: &'a GpuSession, window: (u32, u32), is_flying: bool) -> Facts<'a> {
+        let options = gpu.renderer.options();
         Facts {
-            device: &live.context.info().name,
+            device: &gpu.context.info().name,
             loaded: &self.loaded,
             window,
             picture: (options.width, options.height),
-            n_samples: live.renderer.n_samples(),
+            n_samples: gpu.renderer.n_samples(),
             n_wanted: self.n_wanted(),
-            progress: live.renderer.progress(),
+            progress: gpu.renderer.progress(),
             speed: self.controller.flight.speed(),
             is_flying,
             is_save_due: self.is_save_due,
             profile: &self.profile,
             history: &self.history,
-            memory: live.context.memory(),
+            memory: gpu.context.memory(),
             picked: self.picked.as_ref(),
             message: self.message.as_ref().map(|(_, message)| &**message),
         }

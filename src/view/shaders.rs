@@ -70,9 +70,9 @@ impl Shaders {
 impl Session {
     /// Replaces the shaders. If they failed to compile or the device refuses them, shows a message and keeps the
     /// previous shaders.
-    pub fn replace_shaders(&mut self, live: &mut GpuSession, shaders: Result<Replacements, String>) {
+    pub fn replace_shaders(&mut self, gpu: &mut GpuSession, shaders: Result<Replacements, String>) {
         let replaced =
-            shaders.and_then(|shaders| live.replace_shaders(shaders).map_err(|error| format!("shaders: {error}")));
+            shaders.and_then(|shaders| gpu.replace_shaders(shaders).map_err(|error| format!("shaders: {error}")));
         match replaced {
             Ok(()) => {
                 // The next picture is drawn small, so that it is shown at once.

@@ -90,13 +90,13 @@ impl Ui {
 /// Lays out the overlay of the session's picture and applies the user's changes to the session's settings.
 pub fn lay_out(
     session: &mut Session,
-    live: &GpuSession,
+    gpu: &GpuSession,
     (ui, window, layers): (&mut Ui, &Window, Layers),
     is_flying: bool,
 ) -> Layout {
     let size = window.inner_size();
     let mut settings = session.settings.clone();
-    let facts = session.facts(live, (size.width, size.height), is_flying);
+    let facts = session.facts(gpu, (size.width, size.height), is_flying);
     let layout = ui.layout(window, layers, &mut settings, &facts);
     if settings != session.settings {
         session.pace.hear(Instant::now());
