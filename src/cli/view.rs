@@ -8,7 +8,7 @@ use kdray::{
     gpu::{ContextOptions, chosen_device},
     output::{self, Format, OutputError},
     scene::{Camera, CameraPath, Scene},
-    view::{Display, LoadOptions, Loaded, Settings, Tour, ViewOptions, ViewReport},
+    view::{Display, LoadOptions, LoadedScene, Settings, Tour, ViewOptions, ViewReport},
 };
 use serde::Serialize;
 
@@ -52,7 +52,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     let accel = load_options.request.choose_accel(processor, scene.n_triangles(), &workload);
     build::check_memory(accel, scene.n_triangles())?;
     let building = build::building(accel, scene.n_triangles());
-    let (loaded, _) = progress.stage(&building, || Loaded::with_tree(&args.scene, scene, load_options));
+    let (loaded, _) = progress.stage(&building, || LoadedScene::with_tree(&args.scene, scene, load_options));
     drop(progress);
 
     let vsync = args.vsync == Switch::On;

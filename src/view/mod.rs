@@ -29,7 +29,7 @@ pub mod watch;
 pub use self::{
     display::{Display, PaceReport, ViewOptions, ViewReport},
     error::ViewError,
-    loaded::{LoadOptions, LoadedScene},
+    loaded_scene::{LoadOptions, LoadedScene},
     panel::Settings,
     tour::Tour,
 };

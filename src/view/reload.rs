@@ -7,7 +7,7 @@ use winit::event_loop::EventLoopProxy;
 use super::{
     error::Topic,
     gpu_session::GpuSession,
-    loaded::{LoadOptions, LoadedScene},
+    loaded_scene::{LoadOptions, LoadedScene},
     session::Session,
     watch::Watch,
 };
