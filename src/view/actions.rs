@@ -63,9 +63,9 @@ impl Session {
         match save_displayed(gpu, &path) {
             Ok(()) => {
                 (self.print)(&format!("wrote {}\n", path.display()));
-                self.settle(Topic::File);
+                self.clear_message(Topic::File);
             }
-            Err(error) => self.complain(Topic::File, &error.to_string()),
+            Err(error) => self.show_error(Topic::File, &error.to_string()),
         }
     }
 

@@ -154,7 +154,7 @@ impl App {
     fn recover(&mut self, shown: Shown, event_loop: &ActiveEventLoop, error: GpuError) {
         let Shown { gpu, ui, window } = shown;
         drop((gpu, ui));
-        self.session.complain(Topic::Device, &format!("{error}; the device was opened anew"));
+        self.session.show_error(Topic::Device, &format!("{error}; the device was opened anew"));
         let Settings { options, vsync, .. } = &self.session.settings;
         let loaded = &self.session.loaded;
         let (traversal, primary) = (Some(options.traversal), Some(options.primary));

@@ -118,7 +118,7 @@ impl Session {
     pub fn replace_scene(&mut self, gpu: &mut GpuSession, loaded: Result<LoadedScene, SceneError>) {
         let loaded = match loaded {
             Ok(loaded) => loaded,
-            Err(error) => return self.complain(Topic::Scene, &error.to_string()),
+            Err(error) => return self.show_error(Topic::Scene, &error.to_string()),
         };
         match gpu.set_scene(&loaded) {
             Ok(()) => {
@@ -127,9 +127,9 @@ impl Session {
                 self.picked = None;
                 // The next picture is drawn small, so that it is shown at once.
                 self.pace.moved(Instant::now());
-                self.settle(Topic::Scene);
+                self.clear_message(Topic::Scene);
             }
-            Err(error) => self.complain(Topic::Scene, &error.to_string()),
+            Err(error) => self.show_error(Topic::Scene, &error.to_string()),
         }
     }
 }

@@ -249,7 +249,7 @@ impl Session {
             return Err(error);
         }
         self.settings.options = gpu.renderer.options().clone();
-        self.complain(Topic::Settings, &error.to_string());
+        self.show_error(Topic::Settings, &error.to_string());
         Ok(())
     }
 
@@ -304,13 +304,13 @@ impl Session {
     }
 
     /// Shows an error in the overlay, in place of the last one, and on the terminal.
-    pub fn complain(&mut self, topic: Topic, message: &str) {
+    pub fn show_error(&mut self, topic: Topic, message: &str) {
         tracing::warn!("{message}");
         self.message = Some((topic, message.to_owned()));
     }
 
     /// Clears the overlay's message if it is about this topic, which works again.
-    pub fn settle(&mut self, topic: Topic) {
+    pub fn clear_message(&mut self, topic: Topic) {
         self.message.take_if(|(wrong, _)| *wrong == topic);
     }
 }

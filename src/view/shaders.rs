@@ -77,9 +77,9 @@ impl Session {
             Ok(()) => {
                 // The next picture is drawn small, so that it is shown at once.
                 self.pace.moved(Instant::now());
-                self.settle(Topic::Shaders);
+                self.clear_message(Topic::Shaders);
             }
-            Err(error) => self.complain(Topic::Shaders, &error),
+            Err(error) => self.show_error(Topic::Shaders, &error),
         }
     }
 }
