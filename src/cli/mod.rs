@@ -56,7 +56,7 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            complain("error", &error.to_string());
+            print_line("error", &error.to_string());
             ExitCode::from(error.exit_code())
         }
     }
@@ -100,7 +100,7 @@ fn print_raw(text: &str) -> Result<(), CliError> {
 }
 
 /// Writes `label: message` to standard error. Line breaks in the message are escaped, so that it stays one line.
-fn complain(label: &str, message: &str) {
+fn print_line(label: &str, message: &str) {
     // If standard error fails, there is nowhere left to report it.
     let _ = writeln!(io::stderr(), "{label}: {}", one_line(message));
 }

@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use kdray::util::text::one_line;
 
-use super::{complain, log, spans::Spans};
+use super::{log, print_line, spans::Spans};
 
 /// Number of the bar's positions per stage.
 const BAR_STEPS: u64 = 1000;
@@ -53,7 +53,7 @@ impl Progress {
     pub fn stage<T>(&self, message: &str, work: impl FnOnce() -> T) -> (T, f64) {
         match self {
             Self::Silent => {}
-            Self::Lines => complain("kdray", message),
+            Self::Lines => print_line("kdray", message),
             Self::Bar(bar) => bar.set_message(one_line(message)),
         }
         let start = Instant::now();
@@ -74,8 +74,8 @@ impl Progress {
     pub fn note(&self, message: &str) {
         match self {
             Self::Silent => {}
-            Self::Lines => complain("note", message),
-            Self::Bar(bar) => bar.suspend(|| complain("note", message)),
+            Self::Lines => print_line("note", message),
+            Self::Bar(bar) => bar.suspend(|| print_line("note", message)),
         }
     }
 }
@@ -119,7 +119,7 @@ impl Steps<'_> {
             Progress::Silent => {}
             Progress::Lines if self.last_line.elapsed() >= PAUSE => {
                 self.last_line = Instant::now();
-                complain("kdray", &self.text());
+                print_line("kdray", &self.text());
             }
             Progress::Lines => {}
             Progress::Bar(bar) => self.move_bar(bar),

@@ -13,10 +13,10 @@ use kdray::{
 use serde::Serialize;
 
 use super::{
-    build, complain,
+    build,
     error::CliError,
     file_roles::FileRoles,
-    print,
+    print, print_line,
     progress::Progress,
     render::set_threads,
     view_args::{Switch, ViewArgs},
@@ -78,7 +78,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         print(&format!("{}\n", report.choices))?;
     }
     for message in &report.validation {
-        complain("validation", message);
+        print_line("validation", message);
     }
     if report.validation.is_empty() { Ok(()) } else { Err(CliError::Validation(report.validation.len())) }
 }

@@ -26,10 +26,10 @@ use self::{
 };
 use super::{
     args::{Frames, RenderArgs},
-    build, complain,
+    build,
     error::CliError,
     file_roles::FileRoles,
-    open_device, print,
+    open_device, print, print_line,
     progress::{Progress, Steps},
     report::{Report, Spread},
     spans::Spans,
@@ -219,7 +219,7 @@ fn median(mut profiles: Vec<Profile>) -> Profile {
 pub(super) fn report_validation(context: &Context) -> Result<(), CliError> {
     let messages = context.validation_messages();
     for message in &messages {
-        complain("validation", message);
+        print_line("validation", message);
     }
     if messages.is_empty() { Ok(()) } else { Err(CliError::Validation(messages.len())) }
 }
