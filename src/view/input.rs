@@ -42,7 +42,7 @@ pub enum Action {
 
 /// Result of an event.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Heard {
+pub struct InputEffect {
     /// The action that the event asks for.
     pub action: Option<Action>,
     /// Whether the event has moved the camera, or a key that moves it went down or up.
@@ -66,18 +66,18 @@ impl Input {
     }
 
     /// Handles an event that the overlay has not taken. `window` is the window's size in pixels.
-    pub fn hear(&mut self, event: &WindowEvent, window: (u32, u32), controller: &mut Controller) -> Heard {
+    pub fn handle(&mut self, event: &WindowEvent, window: (u32, u32), controller: &mut Controller) -> InputEffect {
         match event {
             // A synthetic press reports a key that was already down when the window gained the focus. It is ignored:
             // a key that is pressed from then on has an event of its own.
             WindowEvent::KeyboardInput { event, is_synthetic: true, .. } if event.state.is_pressed() => {
-                Heard::default()
+                InputEffect::default()
             }
             WindowEvent::KeyboardInput { event, .. } => self.key(event, controller),
             WindowEvent::ModifiersChanged(modifiers) => {
                 self.modifiers = modifiers.state();
                 controller.flight.hurry(self.modifiers.shift_key(), self.modifiers.control_key());
-                Heard::default()
+                InputEffect::default()
             }
             WindowEvent::CursorMoved { position, .. } => self.motion((position.x, position.y), window, controller),
             WindowEvent::MouseInput { state, button, .. } => self.button(*state, *button),
@@ -91,27 +91,27 @@ impl Input {
             WindowEvent::Focused(false) => {
                 controller.flight.release();
                 self.mouse.release();
-                Heard::default()
+                InputEffect::default()
             }
-            _ => Heard::default(),
+            _ => InputEffect::default(),
         }
     }
 
-    fn key(&mut self, event: &KeyEvent, controller: &mut Controller) -> Heard {
+    fn key(&mut self, event: &KeyEvent, controller: &mut Controller) -> InputEffect {
         if let (ElementState::Pressed, Key::Character(symbol)) = (event.state, &event.logical_key)
-            && let Some(heard) = press_symbol(symbol, event.repeat, controller)
+            && let Some(effect) = press_symbol(symbol, event.repeat, controller)
         {
-            return heard;
+            return effect;
         }
-        let PhysicalKey::Code(code) = event.physical_key else { return Heard::default() };
+        let PhysicalKey::Code(code) = event.physical_key else { return InputEffect::default() };
         self.press_key(code, event.state.is_pressed(), event.repeat, controller)
     }
 
-    fn press_key(&mut self, code: KeyCode, is_down: bool, is_repeat: bool, controller: &mut Controller) -> Heard {
+    fn press_key(&mut self, code: KeyCode, is_down: bool, is_repeat: bool, controller: &mut Controller) -> InputEffect {
         if let Some(way) = self.way(code).filter(|_| !is_repeat) {
             controller.flight.hold(way, is_down);
             self.is_flying |= is_down;
-            return Heard { moves: true, action: None };
+            return InputEffect { moves: true, action: None };
         }
         let action = match code {
             _ if !is_down || is_repeat => None,
@@ -134,7 +134,7 @@ impl Input {
             self.is_flying = false;
             controller.flight.release();
         }
-        Heard { action, moves: false }
+        InputEffect { action, moves: false }
     }
 
     /// Returns the direction of flight of a key, or none for other keys.
@@ -151,18 +151,18 @@ impl Input {
     }
 
     /// Zooms by steps of the wheel or, with Ctrl or Alt, changes the speed of flight.
-    fn wheel(&mut self, steps: f32, window: (u32, u32), controller: &mut Controller) -> Heard {
+    fn wheel(&mut self, steps: f32, window: (u32, u32), controller: &mut Controller) -> InputEffect {
         if self.modifiers.control_key() || self.modifiers.alt_key() {
             controller.flight.change_speed(steps);
-            return Heard::default();
+            return InputEffect::default();
         }
         let (x, y) = self.mouse.offset_from_middle(window);
         controller.zoom(steps, x, y);
-        Heard { moves: steps != 0.0, action: None }
+        InputEffect { moves: steps != 0.0, action: None }
     }
 
-    fn motion(&mut self, to: (f64, f64), window: (u32, u32), controller: &mut Controller) -> Heard {
-        let Some((drag, (x, y))) = self.mouse.moves(to, window) else { return Heard::default() };
+    fn motion(&mut self, to: (f64, f64), window: (u32, u32), controller: &mut Controller) -> InputEffect {
+        let Some((drag, (x, y))) = self.mouse.moves(to, window) else { return InputEffect::default() };
         self.is_flying = drag == Drag::Look;
         if !self.is_flying {
             controller.flight.release();
@@ -172,26 +172,26 @@ impl Input {
             Drag::Look => controller.look(x, y),
             Drag::Pan => controller.pan(x, y),
         }
-        Heard { moves: true, action: None }
+        InputEffect { moves: true, action: None }
     }
 
-    fn button(&mut self, state: ElementState, button: MouseButton) -> Heard {
+    fn button(&mut self, state: ElementState, button: MouseButton) -> InputEffect {
         let click = self.mouse.button(state, button, self.modifiers.shift_key());
-        Heard { action: click.map(|(x, y)| Action::Pick { x, y }), moves: false }
+        InputEffect { action: click.map(|(x, y)| Action::Pick { x, y }), moves: false }
     }
 }
 
 /// Handles keys that are known by the character that they write, whatever their place on the keyboard. Returns none
 /// for other keys.
-fn press_symbol(symbol: &str, is_repeat: bool, controller: &mut Controller) -> Option<Heard> {
+fn press_symbol(symbol: &str, is_repeat: bool, controller: &mut Controller) -> Option<InputEffect> {
     match symbol {
         "+" | "=" => controller.flight.change_speed(1.0),
         "-" => controller.flight.change_speed(-1.0),
         "?" if is_repeat => {}
-        "?" => return Some(Heard { action: Some(Action::ToggleKeys), moves: false }),
+        "?" => return Some(InputEffect { action: Some(Action::ToggleKeys), moves: false }),
         _ => return None,
     }
-    Some(Heard::default())
+    Some(InputEffect::default())
 }
 
 #[cfg(test)]
@@ -300,9 +300,9 @@ mod tests {
         assert!(controller.flight.speed() > speed);
         press_symbol("-", true, &mut controller);
         assert!((controller.flight.speed() - speed).abs() < 1e-6);
-        let shows = Some(Heard { action: Some(Action::ToggleKeys), moves: false });
+        let shows = Some(InputEffect { action: Some(Action::ToggleKeys), moves: false });
         assert_eq!(press_symbol("?", false, &mut controller), shows);
-        assert_eq!(press_symbol("?", true, &mut controller), Some(Heard::default()));
+        assert_eq!(press_symbol("?", true, &mut controller), Some(InputEffect::default()));
         assert_eq!(press_symbol("a", false, &mut controller), None);
         for code in [KeyCode::KeyH, KeyCode::F1] {
             assert_eq!(tap(&mut Input::default(), &mut controller, code), Some(Action::ToggleKeys));
