@@ -187,7 +187,7 @@ impl App {
     }
 
     /// Handles an event of the user. The overlay may take it first; otherwise it moves the camera or is an action.
-    fn hear(&mut self, event_loop: &ActiveEventLoop, event: &WindowEvent) {
+    fn handle_input(&mut self, event_loop: &ActiveEventLoop, event: &WindowEvent) {
         let Some(Shown { ui, window, .. }) = &mut self.shown else { return };
         let is_overlays = self.layers.any() && !is_tab(event) && ui.take_event(window, event);
         self.layers.hint &= !is_press(event);
@@ -196,14 +196,14 @@ impl App {
             return;
         }
         let (now, size) = (Instant::now(), window.inner_size());
-        let heard = self.input.hear(event, (size.width, size.height), &mut self.session.controller);
-        if heard.moves {
+        let effect = self.input.handle(event, (size.width, size.height), &mut self.session.controller);
+        if effect.moves {
             self.session.pace.moved(now);
         }
-        if heard.moves || heard.action.is_some() {
-            self.session.pace.hear(now);
+        if effect.moves || effect.action.is_some() {
+            self.session.pace.note_input(now);
         }
-        if let Some(action) = heard.action {
+        if let Some(action) = effect.action {
             self.act(event_loop, action);
         }
     }
@@ -271,9 +271,9 @@ impl ApplicationHandler<Wake> for App {
                     // While the user resizes the window, pictures are drawn small and fast.
                     self.session.pace.moved(Instant::now());
                 }
-                self.hear(event_loop, &event);
+                self.handle_input(event_loop, &event);
             }
-            event => self.hear(event_loop, &event),
+            event => self.handle_input(event_loop, &event),
         }
     }
 
