@@ -29,7 +29,7 @@ pub struct FrameTimes {
 
 impl Pace {
     /// Notes an input that the next frame will show.
-    pub fn hear(&mut self, now: Instant) {
+    pub fn note_input(&mut self, now: Instant) {
         self.oldest_input.get_or_insert(now);
     }
 
@@ -78,8 +78,8 @@ mod tests {
         let mut pace = Pace::default();
         assert_eq!(pace.begin(at(0)), 0.0);
         assert_eq!(pace.shown(at(10)), FrameTimes { frame_ms: 10.0, latency_ms: None });
-        pace.hear(at(12));
-        pace.hear(at(15));
+        pace.note_input(at(12));
+        pace.note_input(at(15));
         assert_eq!(pace.begin(at(20)), 0.02);
         assert_eq!(pace.shown(at(30)), FrameTimes { frame_ms: 20.0, latency_ms: Some(18.0) });
         pace.pause();
