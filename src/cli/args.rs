@@ -18,7 +18,7 @@ pub use super::view_args::ViewArgs;
 use super::{
     error::CliError,
     picture_args::{PictureArgs, accel_help, build_help, check_accel, traversal_help},
-    wanted::Wanted,
+    wanted::OrAuto,
 };
 
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
@@ -120,7 +120,7 @@ pub struct CastArgs {
     pub accel: AccelKind,
     #[arg(long, value_name = "ALGORITHM")]
     #[arg(help = traversal_help(), default_value = "auto", hide_default_value = true)]
-    pub traversal: Wanted<Traversal>,
+    pub traversal: OrAuto<Traversal>,
     #[arg(long, value_name = "TREE", default_value_t = BuildPolicy::Auto)]
     #[arg(help = build_help())]
     pub build: BuildPolicy,

@@ -13,6 +13,7 @@ mod error;
 mod file_roles;
 mod inspect;
 mod log;
+mod or_auto;
 mod picture_args;
 mod progress;
 mod render;
@@ -26,7 +27,6 @@ mod trace;
 mod view;
 #[cfg(feature = "view")]
 mod view_args;
-mod wanted;
 
 use std::{
     ffi::OsString,

@@ -8,7 +8,7 @@ use kdray::{
     scene::Scene,
 };
 
-use super::{args::Size, error::CliError, wanted::Wanted};
+use super::{args::Size, error::CliError, wanted::OrAuto};
 
 #[derive(clap::Args)]
 pub struct PictureArgs {
@@ -36,13 +36,13 @@ pub struct PictureArgs {
     pub accel: AccelKind,
     #[arg(long, value_name = "ALGORITHM")]
     #[arg(help = traversal_help(), default_value = "auto", hide_default_value = true)]
-    pub traversal: Wanted<Traversal>,
+    pub traversal: OrAuto<Traversal>,
     /// How primary rays find their triangles. raster: the device's graphics pipeline rasterizes them; compute:
     /// compute kernels rasterize them, which needs 64-bit atomics (with --cpu it equals raster); trace: rays search
     /// the acceleration structure; auto: the method that suits the device, the scene and the picture's size, or that
     /// a measurement has found to be quicker [default: auto]
     #[arg(long, value_name = "auto|raster|compute|trace", default_value = "auto", hide_default_value = true)]
-    pub primary: Wanted<Primary>,
+    pub primary: OrAuto<Primary>,
     #[arg(long, value_name = "TREE", default_value_t = BuildPolicy::Auto)]
     #[arg(help = build_help())]
     pub build: BuildPolicy,
@@ -54,7 +54,7 @@ pub fn accel_help() -> String {
 }
 
 /// Refuses arguments for kd-trees if the structure is a grid.
-pub fn check_accel(accel: AccelKind, traversal: Wanted<Traversal>, build: BuildPolicy) -> Result<(), CliError> {
+pub fn check_accel(accel: AccelKind, traversal: OrAuto<Traversal>, build: BuildPolicy) -> Result<(), CliError> {
     check_traversal(accel, traversal.pinned())?;
     if accel != AccelKind::KdTree && build != BuildPolicy::Auto {
         return Err(CliError::Usage(format!(

@@ -220,7 +220,7 @@ impl Report {
             self.frame.device, self.render_ms, self.choices
         );
         if self.frame.frame_ms.is_none() {
-            text += "This device has no timestamps: where the time went is unknown.\n\n";
+            text += "Pinned device has no timestamps: where the time went is unknown.\n\n";
         }
         if let Some(Spread { n_frames, min_ms, max_ms }) = &self.repeated {
             text += &format!("the median of {n_frames} frames, which took {min_ms:.3} to {max_ms:.3} ms:\n\n");

@@ -6,28 +6,28 @@ use kdray::util::UnknownWord;
 
 /// Value of an option: a certain variant, or `auto` for the one that suits best.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Wanted<T> {
+pub enum OrAuto<T> {
     Auto,
-    This(T),
+    Pinned(T),
 }
 
-impl<T> Wanted<T> {
+impl<T> OrAuto<T> {
     /// Returns the variant, or none for `auto`.
     pub fn pinned(self) -> Option<T> {
         match self {
             Self::Auto => None,
-            Self::This(variant) => Some(variant),
+            Self::Pinned(variant) => Some(variant),
         }
     }
 }
 
-impl<T: FromStr<Err = UnknownWord>> FromStr for Wanted<T> {
+impl<T: FromStr<Err = UnknownWord>> FromStr for OrAuto<T> {
     type Err = String;
 
     fn from_str(word: &str) -> Result<Self, String> {
         match word {
             "auto" => Ok(Self::Auto),
-            _ => word.parse().map(Self::This).map_err(|error| format!("{error}, auto")),
+            _ => word.parse().map(Self::Pinned).map_err(|error| format!("{error}, auto")),
         }
     }
 }
@@ -40,9 +40,9 @@ mod tests {
 
     #[test]
     fn auto_is_a_word_beside_the_variants() {
-        assert_eq!("auto".parse(), Ok(Wanted::<Primary>::Auto));
-        assert_eq!("trace".parse::<Wanted<Primary>>().unwrap().pinned(), Some(Primary::Trace));
-        let error = "Auto".parse::<Wanted<Primary>>().unwrap_err();
+        assert_eq!("auto".parse(), Ok(OrAuto::<Primary>::Auto));
+        assert_eq!("trace".parse::<OrAuto<Primary>>().unwrap().pinned(), Some(Primary::Trace));
+        let error = "Auto".parse::<OrAuto<Primary>>().unwrap_err();
         assert_eq!(error, "`Auto` is not one of raster, compute, trace, auto");
     }
 }
