@@ -46,7 +46,7 @@ pub struct Report {
     /// back.
     pub render_ms: f64,
     /// Times of all frames that were drawn; none for a single frame.
-    pub repeated: Option<Spread>,
+    pub repeated: Option<FrameTimeRange>,
     /// The frame of median time.
     #[serde(flatten)]
     pub frame: Frame,
@@ -54,13 +54,13 @@ pub struct Report {
 
 /// Times of a frame that was drawn more than once.
 #[derive(Serialize)]
-pub struct Spread {
+pub struct FrameTimeRange {
     n_frames: usize,
     min_ms: f64,
     max_ms: f64,
 }
 
-impl Spread {
+impl FrameTimeRange {
     /// Returns the frames' minimum and maximum time; none for a single frame, or without timestamps.
     pub fn of(profiles: &[Profile]) -> Option<Self> {
         let times: Vec<_> = profiles.iter().filter_map(|profile| profile.frame_ms).collect();
@@ -222,7 +222,7 @@ impl Report {
         if self.frame.frame_ms.is_none() {
             text += "Pinned device has no timestamps: where the time went is unknown.\n\n";
         }
-        if let Some(Spread { n_frames, min_ms, max_ms }) = &self.repeated {
+        if let Some(FrameTimeRange { n_frames, min_ms, max_ms }) = &self.repeated {
             text += &format!("the median of {n_frames} frames, which took {min_ms:.3} to {max_ms:.3} ms:\n\n");
         }
         text += &self.frame.passes_text();
