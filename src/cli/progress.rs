@@ -81,7 +81,7 @@ impl Progress {
 }
 
 /// A stage of many equal steps.
-pub struct Steps<'a> {
+pub struct StepProgress<'a> {
     progress: &'a Progress,
     message: String,
     n_done: u32,
@@ -98,14 +98,24 @@ pub struct Steps<'a> {
 
 impl Progress {
     /// Returns a counter of steps that shows the stage's progress and the time left. `message` names the stage.
-    pub fn steps(&self, message: &str, n_steps: u32) -> Steps<'_> {
+    pub fn steps(&self, message: &str, n_steps: u32) -> StepProgress<'_> {
         let (message, start) = (message.to_owned(), Instant::now());
         let (begin, shows_parts) = (self.position(), matches!(self, Self::Bar(_)));
-        Steps { progress: self, message, n_done: 0, n_steps, part: 0.0, shows_parts, begin, start, last_line: start }
+        StepProgress {
+            progress: self,
+            message,
+            n_done: 0,
+            n_steps,
+            part: 0.0,
+            shows_parts,
+            begin,
+            start,
+            last_line: start,
+        }
     }
 }
 
-impl Steps<'_> {
+impl StepProgress<'_> {
     /// Notes that one more step is done.
     pub fn step(&mut self) {
         /// Least time between two lines if there is no terminal.

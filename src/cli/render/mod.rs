@@ -30,7 +30,7 @@ use super::{
     error::CliError,
     file_roles::FileRoles,
     open_device, print, print_line,
-    progress::{Progress, Steps},
+    progress::{Progress, StepProgress},
     report::{Report, Spread},
     spans::Spans,
     trace::trace_json,
@@ -186,7 +186,7 @@ fn draw_and_write(
 }
 
 /// Moves the progress bar while a frame is drawn.
-struct Bar<'a, 'b>(&'a mut Steps<'b>);
+struct Bar<'a, 'b>(&'a mut StepProgress<'b>);
 
 impl Watcher for Bar<'_, '_> {
     fn sees_parts(&self) -> bool {
