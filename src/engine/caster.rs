@@ -10,9 +10,9 @@ use crate::{
 };
 
 /// Casts rays, on the device or on the CPU.
-pub struct Caster<'a>(Processor<'a>);
+pub struct Caster<'a>(Backend<'a>);
 
-enum Processor<'a> {
+enum Backend<'a> {
     Device(Box<cast::Caster>),
     Cpu(Box<CpuCaster<'a>>),
 }
@@ -25,8 +25,8 @@ impl<'a> Caster<'a> {
         traversal: Traversal,
     ) -> Result<Self, GpuError> {
         Ok(Self(match context {
-            Some(context) => Processor::Device(Box::new(cast::Caster::new(context, geometry, traversal)?)),
-            None => Processor::Cpu(Box::new(CpuCaster::new(geometry, traversal))),
+            Some(context) => Backend::Device(Box::new(cast::Caster::new(context, geometry, traversal)?)),
+            None => Backend::Cpu(Box::new(CpuCaster::new(geometry, traversal))),
         }))
     }
 
@@ -39,8 +39,8 @@ impl<'a> Caster<'a> {
     /// There is no triangle with one of the indices.
     pub fn hiding(self, triangles: &[u32]) -> Result<Self, GpuError> {
         Ok(Self(match self.0 {
-            Processor::Device(caster) => Processor::Device(Box::new(caster.hiding(triangles)?)),
-            Processor::Cpu(caster) => Processor::Cpu(Box::new(caster.hiding(triangles))),
+            Backend::Device(caster) => Backend::Device(Box::new(caster.hiding(triangles)?)),
+            Backend::Cpu(caster) => Backend::Cpu(Box::new(caster.hiding(triangles))),
         }))
     }
 
@@ -51,8 +51,8 @@ impl<'a> Caster<'a> {
     /// Memory runs out, or a call fails.
     pub fn cast(&mut self, rays: &[Ray], query: Query, n_times: u32) -> Result<Cast, GpuError> {
         match &mut self.0 {
-            Processor::Device(caster) => caster.cast(rays, query, n_times),
-            Processor::Cpu(caster) => Ok(cast_on_cpu(caster, rays, query, n_times)),
+            Backend::Device(caster) => caster.cast(rays, query, n_times),
+            Backend::Cpu(caster) => Ok(cast_on_cpu(caster, rays, query, n_times)),
         }
     }
 }

@@ -23,9 +23,9 @@ pub struct Rendered {
 }
 
 /// Draws pictures of a world, on the device or on the CPU.
-pub struct Renderer(Processor);
+pub struct Renderer(Backend);
 
-enum Processor {
+enum Backend {
     Device(Box<BandedRenderer>),
     Cpu(Box<cpu::Renderer>),
 }
@@ -38,16 +38,16 @@ impl Renderer {
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
         Ok(Self(match context {
-            Some(context) => Processor::Device(Box::new(BandedRenderer::new(Arc::clone(context), world, options)?)),
-            None => Processor::Cpu(Box::new(cpu::Renderer::new(world, options, Batching::default()))),
+            Some(context) => Backend::Device(Box::new(BandedRenderer::new(Arc::clone(context), world, options)?)),
+            None => Backend::Cpu(Box::new(cpu::Renderer::new(world, options, Batching::default()))),
         }))
     }
 
     /// Returns the number of bands: parts of the picture that are drawn one after the other.
     pub fn n_bands(&self) -> u32 {
         match &self.0 {
-            Processor::Device(renderer) => renderer.n_bands(),
-            Processor::Cpu(_) => 1,
+            Backend::Device(renderer) => renderer.n_bands(),
+            Backend::Cpu(_) => 1,
         }
     }
 
@@ -58,11 +58,11 @@ impl Renderer {
     /// A call fails, one pixel alone makes more rays than a queue holds, or memory runs out.
     pub fn draw(&mut self, camera: &Camera, n_samples: u32, mut watcher: impl Watcher) -> Result<Drawn, GpuError> {
         match &mut self.0 {
-            Processor::Device(renderer) => {
+            Backend::Device(renderer) => {
                 renderer.set_camera(camera);
                 renderer.draw(n_samples, watcher)
             }
-            Processor::Cpu(renderer) => {
+            Backend::Cpu(renderer) => {
                 renderer.set_camera(camera);
                 Ok(draw_on_cpu(renderer, n_samples, &mut watcher))
             }
@@ -82,8 +82,8 @@ impl Renderer {
         then: Option<TimelinePoint>,
     ) -> Result<(), GpuError> {
         match &self.0 {
-            Processor::Device(renderer) => renderer.copy_picture_to(image, after, then),
-            Processor::Cpu(_) => {
+            Backend::Device(renderer) => renderer.copy_picture_to(image, after, then),
+            Backend::Cpu(_) => {
                 Err(GpuError::Lacks { device: "CPU".to_owned(), missing: "images to copy a picture into".to_owned() })
             }
         }
@@ -95,8 +95,8 @@ impl Renderer {
     /// The copy from the device fails.
     pub fn picture(&self) -> Result<Cow<'_, Picture>, GpuError> {
         match &self.0 {
-            Processor::Device(renderer) => renderer.picture(),
-            Processor::Cpu(renderer) => Ok(Cow::Owned(renderer.picture())),
+            Backend::Device(renderer) => renderer.picture(),
+            Backend::Cpu(renderer) => Ok(Cow::Owned(renderer.picture())),
         }
     }
 }
