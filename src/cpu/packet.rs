@@ -9,7 +9,7 @@ use glam::{Vec3, Vec3A, Vec4};
 
 use super::{
     lanes::{LANES, LaneMask},
-    packet_triangle::{Found, Shears},
+    packet_triangle::{HitColumns, Shears},
     soa::{HitsSoa, RaysSoa},
 };
 use crate::{
@@ -54,7 +54,7 @@ pub struct Packet<S: Simd> {
     shears: Shears<S>,
     t_min: f32x16<S>,
     source_triangle: u32x16<S>,
-    best: Found<S>,
+    best: HitColumns<S>,
     /// The t of the rays' `best` hits. It is minus infinity for a ray that is done, so no cell is left for it.
     pub t_best: f32x16<S>,
 }
@@ -143,7 +143,7 @@ impl<S: Simd> Packet<S> {
             shears: Shears::of(&origin, &direction),
             t_min,
             source_triangle: u32x16::load_array_ref(simd, &search_rays.source_triangle),
-            best: Found::nothing(t_max),
+            best: HitColumns::nothing(t_max),
             t_best: t_max,
         };
         (packet, whole.of((1 << n_rays) - 1))

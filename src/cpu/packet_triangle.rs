@@ -22,14 +22,14 @@ pub struct Shears<S: Simd> {
 
 /// Sixteen hits as columns.
 #[derive(Clone, Copy)]
-pub struct Found<S: Simd> {
+pub struct HitColumns<S: Simd> {
     pub t: f32x16<S>,
     pub triangle_ix: u32x16<S>,
     pub u: f32x16<S>,
     pub v: f32x16<S>,
 }
 
-impl<S: Simd> Found<S> {
+impl<S: Simd> HitColumns<S> {
     /// Returns misses, with t = `t_max`.
     #[inline(always)]
     pub fn nothing(t_max: f32x16<S>) -> Self {
@@ -115,7 +115,7 @@ impl<S: Simd> Shears<S> {
         triangle_ix: u32,
         axis: usize,
         lanes: LaneMask,
-    ) -> Option<(Found<S>, mask32x16<S>)> {
+    ) -> Option<(HitColumns<S>, mask32x16<S>)> {
         let simd = self.x.simd;
         let [x0, y0, z0] = self.corner(axis_last(triangle.v0.to_array(), axis));
         let [x1, y1, z1] = self.corner(axis_last(triangle.v1.to_array(), axis));
@@ -131,7 +131,7 @@ impl<S: Simd> Shears<S> {
         let inv_det = 1.0 / sum_of(edges);
         let (u, v) = (edges[1] * inv_det, edges[2] * inv_det);
         let t = (z0 + (u * (z1 - z0) + v * (z2 - z0))) * self.z;
-        Some((Found { t, triangle_ix: u32x16::splat(simd, triangle_ix), u, v }, hit))
+        Some((HitColumns { t, triangle_ix: u32x16::splat(simd, triangle_ix), u, v }, hit))
     }
 }
 
