@@ -40,7 +40,7 @@ impl<Key> OctantBins<Key> {
     }
 
     /// Returns the bins that hold rays.
-    pub fn rest(&mut self) -> impl Iterator<Item = &mut Bin<Key>> {
+    pub fn non_empty(&mut self) -> impl Iterator<Item = &mut Bin<Key>> {
         self.octants.iter_mut().filter(|octant| !octant.keys.is_empty())
     }
 }

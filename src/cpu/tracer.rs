@@ -80,6 +80,6 @@ impl Tracer for FastTracer {
                 traverse(packet);
             }
         }
-        bins.rest().for_each(traverse);
+        bins.non_empty().for_each(traverse);
     }
 }
