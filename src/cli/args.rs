@@ -17,8 +17,8 @@ use super::bench::Suite;
 pub use super::view_args::ViewArgs;
 use super::{
     error::CliError,
+    or_auto::OrAuto,
     picture_args::{PictureArgs, accel_help, build_help, check_accel, traversal_help},
-    wanted::OrAuto,
 };
 
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.

@@ -8,7 +8,7 @@ use kdray::{
     scene::Scene,
 };
 
-use super::{args::Size, error::CliError, wanted::OrAuto};
+use super::{args::Size, error::CliError, or_auto::OrAuto};
 
 #[derive(clap::Args)]
 pub struct PictureArgs {

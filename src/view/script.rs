@@ -33,7 +33,7 @@ impl Script {
         }
         let now = Instant::now();
         session.controller.place(self.tour.camera(self.frame_ix));
-        session.pace.hear(now);
+        session.pace.note_input(now);
         if self.is_still() {
             session.pace.rest();
         } else {

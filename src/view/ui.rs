@@ -99,7 +99,7 @@ pub fn lay_out(
     let facts = session.facts(gpu, (size.width, size.height), is_flying);
     let layout = ui.layout(window, layers, &mut settings, &facts);
     if settings != session.settings {
-        session.pace.hear(Instant::now());
+        session.pace.note_input(Instant::now());
         session.settings = settings;
     }
     layout

@@ -31,7 +31,7 @@ use super::{
     file_roles::FileRoles,
     open_device, print, print_line,
     progress::{Progress, StepProgress},
-    report::{Report, Spread},
+    report::{FrameTimeRange, Report},
     spans::Spans,
     trace::trace_json,
 };
@@ -77,7 +77,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let (profiles, render_ms) = drawn.map_err(CliError::of_drawing)?;
     drop(progress);
 
-    let repeated = Spread::of(&profiles);
+    let repeated = FrameTimeRange::of(&profiles);
     let profile = median(profiles);
     if let Some(path) = &args.trace {
         output::write(path, &trace_json(begun_at, &spans.sorted(), &profile))?;
