@@ -23,24 +23,24 @@ shared uint first_pixels[RAY_GROUP_SIZE];
 
 // The pixels of one invocation's triangle that are still to be tested, and the index of the first among all tests.
 // covered: one bit per pixel of the rectangle (covered.glsl).
-struct Pending {
+struct PixelTests {
     Rectangle rectangle;
     uvec2 covered;
     uint place;
 };
 
-Pending nothing_pending() {
-    return Pending(Rectangle(uvec2(0u), uvec2(0u)), uvec2(0u), 0u);
+PixelTests nothing_pending() {
+    return PixelTests(Rectangle(uvec2(0u), uvec2(0u)), uvec2(0u), 0u);
 }
 
 // Reserves the tests of the covered pixels.
-Pending pending_of(Rectangle rectangle, uvec2 covered) {
+PixelTests pixel_tests_of(Rectangle rectangle, uvec2 covered) {
     first_pixels[gl_LocalInvocationIndex] = rectangle.first.x | rectangle.first.y << 16;
-    return Pending(rectangle, covered, atomicAdd(n_tests, bitCount(covered.x) + bitCount(covered.y)));
+    return PixelTests(rectangle, covered, atomicAdd(n_tests, bitCount(covered.x) + bitCount(covered.y)));
 }
 
 // Removes the next pixel and returns its bit's index.
-uint take_pixel(inout Pending pending) {
+uint take_pixel(inout PixelTests pending) {
     uint word = pending.covered.x != 0u ? 0u : 1u;
     uint left = pending.covered[word];
     pending.covered[word] = left & (left - 1u);
@@ -49,7 +49,7 @@ uint take_pixel(inout Pending pending) {
 }
 
 // Writes those of the invocation's tests whose index is below `end`.
-void put_tests(inout Pending pending, uint end) {
+void put_tests(inout PixelTests pending, uint end) {
     float rows_a_pixel = 1.0 / float(pending.rectangle.size.x);
     while (pending.covered != uvec2(0u) && pending.place < end) {
         uint place = pending.place % N_TESTS, bit = take_pixel(pending);
@@ -86,7 +86,7 @@ void rasterize_beside_eye(uint triangle_ix, vec3 a, vec3 b, vec3 c, vec3 ahead) 
 }
 
 // Returns the pixels of a small triangle. Appends a large one to large_triangles, and then nothing is pending.
-Pending rasterize(Triangle triangle, uint triangle_ix) {
+PixelTests rasterize(Triangle triangle, uint triangle_ix) {
     vec3 a = triangle.v0 - frame.eye, b = triangle.v1 - frame.eye, c = triangle.v2 - frame.eye;
     vec3 ahead = vec3(dot(a, frame.forward), dot(b, frame.forward), dot(c, frame.forward));
     if (all(lessThanEqual(ahead, vec3(0.0)))) return nothing_pending();
@@ -103,7 +103,7 @@ Pending rasterize(Triangle triangle, uint triangle_ix) {
         return nothing_pending();
     }
     vec2 first = vec2(rectangle.first);
-    return pending_of(
+    return pixel_tests_of(
         rectangle, covered_of(rectangle.size, edge_lines(a_px - first, b_px - first, c_px - first, bounds.slack))
     );
 }
@@ -113,7 +113,7 @@ void main() {
     uint first_triangle = group * RAY_GROUP_SIZE;
     if (gl_LocalInvocationIndex == 0u) n_tests = 0u;
     barrier();
-    Pending pending = nothing_pending();
+    PixelTests pending = nothing_pending();
     uint triangle_ix = first_triangle + gl_LocalInvocationIndex;
     if (triangle_ix < frame.n_triangles) pending = rasterize(triangle_at(triangle_ix), triangle_ix);
     barrier();
