@@ -55,7 +55,7 @@ pub(super) enum Until {
 }
 
 /// A sample of which some parts have run. The device is not working on any of them.
-pub(super) struct Pending {
+pub(super) struct PartialSample {
     parts: Vec<Part>,
     /// Number of parts that have run.
     n_done: usize,
@@ -64,7 +64,7 @@ pub(super) struct Pending {
     begun_at: Option<Instant>,
 }
 
-impl Pending {
+impl PartialSample {
     /// Returns the number of parts that have run when the sample is drawn up to `until`.
     fn end(&self, until: Until) -> usize {
         if until == Until::Step {
@@ -164,7 +164,7 @@ impl Renderer {
         gone_on
     }
 
-    fn try_to_go_on(&mut self, mut pending: Pending, until: Until) -> Result<Option<Profile>, GpuError> {
+    fn try_to_go_on(&mut self, mut pending: PartialSample, until: Until) -> Result<Option<Profile>, GpuError> {
         let running = info_span!("submit and wait").entered();
         let begun_at = *pending.begun_at.get_or_insert_with(Instant::now);
         let end = pending.end(until);
@@ -204,7 +204,7 @@ impl Renderer {
         Ok(())
     }
 
-    fn begin_sample(&mut self) -> Result<Pending, GpuError> {
+    fn begin_sample(&mut self) -> Result<PartialSample, GpuError> {
         let sample_ix = self.n_samples;
         // If the second sample was dropped and is drawn again, the sums are there already.
         if sample_ix == 1 && !self.has_sums {
@@ -217,9 +217,9 @@ impl Renderer {
         self.recorded(sample_ix)
     }
 
-    fn recorded(&self, sample_ix: u32) -> Result<Pending, GpuError> {
+    fn recorded(&self, sample_ix: u32) -> Result<PartialSample, GpuError> {
         let parts = info_span!("record").in_scope(|| self.record())?;
-        Ok(Pending { parts, n_done: 0, sample_ix, begun_at: None })
+        Ok(PartialSample { parts, n_done: 0, sample_ix, begun_at: None })
     }
 
     /// Sets the view that is displayed from the next sample on: the picture, or a feature in its place. A feature

@@ -26,7 +26,7 @@ use tracing::info_span;
 
 pub use self::{bands::BandedRenderer, incremental::Displayed};
 use self::{
-    incremental::{Part, Pending, Traced, Until},
+    incremental::{Part, PartialSample, Traced, Until},
     schedule::{QueueBudget, Schedule},
 };
 use crate::{
@@ -58,7 +58,7 @@ pub struct Renderer {
     /// Whether `pixel_accumulated`, to which samples are added, contains the first sample.
     has_sums: bool,
     /// The sample of which only some command buffers have run, if there is one.
-    pending: Option<Pending>,
+    pending: Option<PartialSample>,
     /// The most pixels of a batch, if the caller has set a limit.
     most_pixels: Option<u32>,
     /// The picture in `pixel_display`; None before there is one.
