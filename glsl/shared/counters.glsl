@@ -1,5 +1,5 @@
 // Counters of the kernels for the profile: hits and shadow rays of each bounce. Needs
-// GL_KHR_shader_subgroup_arithmetic. Invocations of a subgroup add once together. Each bounce has COUNTER_PLACES
+// GL_KHR_shader_subgroup_arithmetic. Invocations of a subgroup add once together. Each bounce has COUNTER_COPIES
 // counters, whose sum is the count, so that as many workgroups can add at the same time.
 #ifndef KDRAY_COUNTERS
 #define KDRAY_COUNTERS
@@ -10,7 +10,7 @@ layout(std430, set = 0, binding = BIND_COUNTERS) buffer CountersBlock { Counters
 
 // The index in `counters` of one of a bounce's counters.
 uint counters_of(uint bounce_ix, uint place) {
-    return (bounce_ix * COUNTER_PLACES + place % COUNTER_PLACES) * COUNTER_STRIDE;
+    return (bounce_ix * COUNTER_COPIES + place % COUNTER_COPIES) * COUNTER_STRIDE;
 }
 
 // Counts a hit of this invocation. place: any number; the same in a workgroup, and different in neighbouring

@@ -392,11 +392,11 @@ struct Bounce {
 };
 
 // Copies of a bounce's `Counters`, whose sum is the count. This many workgroups can add to them at the same time.
-#define COUNTER_PLACES 16u
+#define COUNTER_COPIES 16u
 // Distance of these copies in `counters`, in elements. It keeps them from sharing a cache line.
 #define COUNTER_STRIDE 16u
 
-// Counts for the profile, 8 bytes. Each batch and bounce has `COUNTER_PLACES` of them. Integer sums are the same in
+// Counts for the profile, 8 bytes. Each batch and bounce has `COUNTER_COPIES` of them. Integer sums are the same in
 // every order of arrival.
 //
 // - `n_hits`: rays that hit a triangle.
@@ -742,7 +742,7 @@ struct GridSort {
 #define BIND_PIXEL_DISPLAY 18u
 // The visibility buffer, an R32_UINT image: the index of the triangle that each pixel of the picture shows.
 #define BIND_TRIANGLE_IDS 19u
-// `COUNTER_PLACES` of `Counters` for each batch and bounce, `COUNTER_STRIDE` elements apart.
+// `COUNTER_COPIES` of `Counters` for each batch and bounce, `COUNTER_STRIDE` elements apart.
 #define BIND_COUNTERS 20u
 // A vec4 for each pixel: the sum of its samples' radiance.
 #define BIND_PIXEL_ACCUMULATED 24u

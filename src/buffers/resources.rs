@@ -11,7 +11,7 @@ use crate::{
     accel::Accel,
     frame::RenderOptions,
     gpu::{Access, Binding, BindingLayout, BindingSet, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
-    layout::{self, Batch, Bounce, COUNTER_PLACES, COUNTER_STRIDE, Counters, Frame, Light, Material},
+    layout::{self, Batch, Bounce, COUNTER_COPIES, COUNTER_STRIDE, Counters, Frame, Light, Material},
     world::World,
 };
 
@@ -47,7 +47,7 @@ const OWN_BINDINGS: [u32; 21] = [
 ];
 
 /// The number of counters of a bounce of a batch, including the unused ones between the places.
-const COUNTERS_A_ROW: usize = (COUNTER_PLACES * COUNTER_STRIDE) as usize;
+const COUNTERS_PER_BOUNCE: usize = (COUNTER_COPIES * COUNTER_STRIDE) as usize;
 
 /// Resources that the frame's kernels read and write. Each has the same name here, in the kernels, as debug label and
 /// as allocation.
@@ -254,7 +254,7 @@ impl Resources {
                 n_shadow_rays: sum.n_shadow_rays + place.n_shadow_rays,
             })
         };
-        Ok(self.counters.download()?.chunks_exact(COUNTERS_A_ROW).map(sum).collect())
+        Ok(self.counters.download()?.chunks_exact(COUNTERS_PER_BOUNCE).map(sum).collect())
     }
 
     /// The number of the window's pixels.
@@ -322,5 +322,5 @@ fn new_bounces(context: &Arc<Context>, n_bounces: usize) -> Result<Buffer<Bounce
 }
 
 fn new_counters(context: &Arc<Context>, n_bounces: usize) -> Result<Buffer<Counters>, GpuError> {
-    Buffer::new(context, "counters", n_bounces * COUNTERS_A_ROW, BufferUse::Storage)
+    Buffer::new(context, "counters", n_bounces * COUNTERS_PER_BOUNCE, BufferUse::Storage)
 }
