@@ -14,11 +14,11 @@ const uint LENGTHS_SLOT = KD_MAX_DEPTH + 1u;
 // The pairs of spill_pair on devices that keep them in registers.
 vec2 unspilled_pairs[2];
 
-void spill_pair(uint place, float x, float y) {
-    if (PREDICATES_BRANCHES) unspilled_pairs[place - KD_MAX_DEPTH] = vec2(x, y);
-    else local_memory[place] = floatBitsToUint(vec2(x, y));
+void spill_pair(uint slot, float x, float y) {
+    if (PREDICATES_BRANCHES) unspilled_pairs[slot - KD_MAX_DEPTH] = vec2(x, y);
+    else local_memory[slot] = floatBitsToUint(vec2(x, y));
 }
 
-vec2 spilled_pair(uint place) {
-    return PREDICATES_BRANCHES ? unspilled_pairs[place - KD_MAX_DEPTH] : uintBitsToFloat(local_memory[place]);
+vec2 spilled_pair(uint slot) {
+    return PREDICATES_BRANCHES ? unspilled_pairs[slot - KD_MAX_DEPTH] : uintBitsToFloat(local_memory[slot]);
 }

@@ -60,7 +60,7 @@ uint mask_up() {
 }
 
 // Slot of the last pending cell in local memory.
-uint last_place() {
+uint last_slot() {
     return n_pending() - 1u;
 }
 
@@ -68,10 +68,10 @@ uint last_place() {
 // registers instead of 40.
 void mask_push(Cell cell) {
     mark();
-    keep_cell(last_place(), cell);
+    keep_cell(last_slot(), cell);
 }
 
 void mask_pop(inout Cell cell) {
-    take_cell(last_place(), cell);
+    take_cell(last_slot(), cell);
     mask_up();
 }
