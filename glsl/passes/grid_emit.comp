@@ -19,7 +19,7 @@ void emit(uint column_ix, uint pair_ix) {
     for (uint i = cubes.x; i < cubes.y; ++i) {
         uvec3 cube = uvec3(column, i);
         if (is_near(columns, cube)) {
-            uint cell_ix = item.first_cell + place_of(item.lattice, axis_back(cube, columns.axis));
+            uint cell_ix = item.first_cell + cell_ix_of(item.lattice, axis_back(cube, columns.axis));
             pairs_to[pair_ix] = uvec2(cell_ix, item.triangle_ix);
             pair_ix += 1u;
         }

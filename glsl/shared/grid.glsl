@@ -141,7 +141,7 @@ void leave_block(TraversalRay ray, inout GridWalk walk) {
 // Loads the cell that the ray is in.
 GridCell cell_of(GridWalk walk) {
     count_steps(1u);
-    uvec2 words = load_grid_cells(walk.first_cell + place_of(walk.lattice, walk.cube));
+    uvec2 words = load_grid_cells(walk.first_cell + cell_ix_of(walk.lattice, walk.cube));
     return GridCell(words.x, words.y);
 }
 
@@ -221,7 +221,7 @@ void resume_in_grid(TraversalRay ray, out GridWalk walk, out Visit visit, out Ne
     if (state.siblings_done.x != IN_UPPER_LEVEL) {
         walk.upper_cube = state.siblings_done.x;
         uvec3 upper = unpack_cube(walk.upper_cube);
-        uvec2 block = load_grid_cells(place_of(walk.lattice, upper));
+        uvec2 block = load_grid_cells(cell_ix_of(walk.lattice, upper));
         walk.t_exit = min(least_of(exits_of(walk.lattice, ray, upper)), walk.t_exit);
         walk.lattice = lattice_within(walk.lattice, upper, block.y);
         walk.first_cell = block.x;

@@ -26,7 +26,7 @@ struct Item {
     Lattice lattice;
 };
 
-// The indices of the cube at a place (`place_of`).
+// The indices of the cube at a place (`cell_ix_of`).
 uvec3 cube_at(Lattice lattice, uint place) {
     uvec2 n = lattice.n_cells.xy;
     return uvec3(place % n.x, place / n.x % n.y, place / n.x / n.y);

@@ -30,7 +30,7 @@ uvec3 cube_near(Lattice lattice, vec3 point) {
 }
 
 // A cube's place, its index among all cubes of the lattice: x fastest, then y.
-uint place_of(Lattice lattice, uvec3 cube) {
+uint cell_ix_of(Lattice lattice, uvec3 cube) {
     return cube.x + lattice.n_cells.x * (cube.y + lattice.n_cells.y * cube.z);
 }
 

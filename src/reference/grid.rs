@@ -109,7 +109,7 @@ impl<'a> Walk<'a> {
 }
 
 /// Calls `visit` for the cubes that the ray meets from `t_enter` to `t_exit`, with the place of each
-/// ([`Lattice::place_of`]) and the ray's interval of t in it, until `visit` returns true. Returns whether it did.
+/// ([`Lattice::cell_ix_of`]) and the ray's interval of t in it, until `visit` returns true. Returns whether it did.
 #[inline(always)]
 fn walk(
     lattice: &Lattice,
@@ -123,7 +123,7 @@ fn walk(
         let t = walk.t_next[axis];
         let goes_on = t < t_exit;
         let t_leave = if goes_on { t } else { t_exit };
-        if visit(lattice.place_of(walk.cube), [t_enter, t_leave]) {
+        if visit(lattice.cell_ix_of(walk.cube), [t_enter, t_leave]) {
             return true;
         }
         if !goes_on {

@@ -155,7 +155,7 @@ fn pairs_of(input: &Input, n_items: usize, item: impl Fn(usize) -> Option<Item> 
     let pairs_of_item = |item: Item| {
         let (columns, mut pairs) = (columns(&item), Vec::new());
         for column_ix in 0..columns.n_columns() {
-            let found = |cube| pairs.push((item.first_cell + item.lattice.place_of(cube), item.triangle_ix));
+            let found = |cube| pairs.push((item.first_cell + item.lattice.cell_ix_of(cube), item.triangle_ix));
             columns.cubes_of(column_ix, found);
         }
         pairs

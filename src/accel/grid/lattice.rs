@@ -121,7 +121,7 @@ impl Lattice {
 
     /// Returns the index of a cube in the order of all cubes: x fastest, then y.
     #[inline(always)]
-    pub fn place_of(&self, [x, y, z]: [u32; 3]) -> u32 {
+    pub fn cell_ix_of(&self, [x, y, z]: [u32; 3]) -> u32 {
         x + self.n_cells[0] * (y + self.n_cells[1] * z)
     }
 
