@@ -9,22 +9,22 @@
 // memory than the first cache holds, and would take up to a quarter longer (benches/EXPERIMENTS.md).
 //
 // Needs kd_nodes.glsl and local_cells.glsl. Provides `mask_down`, `mask_push` and `mask_pop`. Other ways also use the
-// mask itself: `below`, `above`, `is_pending`, `mark` and `mask_up`.
+// mask itself: `mask_shifted_down`, `mask_shifted_up`, `is_pending`, `mask_mark` and `mask_up`.
 
 // 1 if no leaf is deeper than KD_WORD_DEPTH, as in most trees; else 2. A mask of one word is shifted and searched
 // faster. The value is the same for all kernels over one tree.
 layout(constant_id = CONSTANT_MASK_WORDS) const uint MASK_WORDS = 2u;
 
-// Bit i, counted over both words: whether the sibling i levels above the cell's node is pending.
+// Bit i, counted over both words: whether the sibling i levels mask_shifted_up the cell's node is pending.
 uvec2 pending_mask;
 
 // The mask as seen from one level farther down.
-uvec2 below(uvec2 mask) {
+uvec2 mask_shifted_down(uvec2 mask) {
     return uvec2(mask.x << 1, MASK_WORDS == 1u ? 0u : (mask.y << 1) | (mask.x >> (KD_WORD_DEPTH - 1u)));
 }
 
 // The mask as seen from n levels farther up, n < KD_WORD_DEPTH.
-uvec2 above(uvec2 mask, uint n) {
+uvec2 mask_shifted_up(uvec2 mask, uint n) {
     if (MASK_WORDS == 1u) return uvec2(mask.x >> n, 0u);
     return uvec2((mask.x >> n) | ((mask.y << 1) << (KD_WORD_DEPTH - 1u - n)), mask.y >> n);
 }
@@ -41,11 +41,11 @@ uint n_pending() {
 }
 
 void mask_down() {
-    pending_mask = below(pending_mask);
+    pending_mask = mask_shifted_down(pending_mask);
 }
 
 // Marks the sibling of the cell's node as pending.
-void mark() {
+void mask_mark() {
     pending_mask.x |= 1u;
 }
 
@@ -54,7 +54,7 @@ uint mask_up() {
     bool is_high = MASK_WORDS == 2u && pending_mask.x == 0u;
     if (is_high) pending_mask = uvec2(pending_mask.y, 0u);
     uint n = uint(findLSB(pending_mask.x));
-    pending_mask = above(pending_mask, n);
+    pending_mask = mask_shifted_up(pending_mask, n);
     pending_mask.x ^= 1u;
     return is_high ? KD_WORD_DEPTH + n : n;
 }
@@ -67,7 +67,7 @@ uint last_slot() {
 // Both functions compute a cell's slot while the cell's bit is set in the mask. Otherwise NVIDIA's compiler uses 48
 // registers instead of 40.
 void mask_push(Cell cell) {
-    mark();
+    mask_mark();
     keep_cell(last_slot(), cell);
 }
 
