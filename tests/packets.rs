@@ -159,8 +159,8 @@ fn sixteen_rays_of_an_octant_are_a_packet() {
         }
     }
     assert!(n_packets > 1000 / LANES - 8);
-    bins.rest().for_each(|bin| seen.extend(bin.keys.drain(..)));
-    assert_eq!(bins.rest().count(), 0);
+    bins.non_empty().for_each(|bin| seen.extend(bin.keys.drain(..)));
+    assert_eq!(bins.non_empty().count(), 0);
     seen.sort_unstable();
     assert_eq!(seen, (0..1000).collect::<Vec<_>>());
 }

@@ -26,10 +26,10 @@ struct Item {
     Lattice lattice;
 };
 
-// The indices of the cube at a place (`cell_ix_of`).
-uvec3 cube_at(Lattice lattice, uint place) {
+// The indices of the cube of a cell (the inverse of `cell_ix_of`).
+uvec3 cube_at(Lattice lattice, uint cell_ix) {
     uvec2 n = lattice.n_cells.xy;
-    return uvec3(place % n.x, place / n.x % n.y, place / n.x / n.y);
+    return uvec3(cell_ix % n.x, cell_ix / n.x % n.y, cell_ix / n.x / n.y);
 }
 
 Item upper_item(uint triangle_ix) {

@@ -25,7 +25,7 @@ void clear_pending() {
 
 // Notes that the ray goes one level down. Only ways that keep a bit for each level do anything.
 void go_down() {
-    if (TRAVERSAL == TRAVERSAL_MASK_BOXES) siblings_done = below(siblings_done);
+    if (TRAVERSAL == TRAVERSAL_MASK_BOXES) siblings_done = mask_shifted_down(siblings_done);
     if (TRAVERSAL == TRAVERSAL_MASK) mask_down();
     if (TRAVERSAL == TRAVERSAL_RESTART) marked_down();
     if (TRAVERSAL == TRAVERSAL_SHORT_STACK) marked_down();

@@ -15,7 +15,7 @@
 // faster. The value is the same for all kernels over one tree.
 layout(constant_id = CONSTANT_MASK_WORDS) const uint MASK_WORDS = 2u;
 
-// Bit i, counted over both words: whether the sibling i levels mask_shifted_up the cell's node is pending.
+// Bit i, counted over both words: whether the sibling i levels above the cell's node is pending.
 uvec2 pending_mask;
 
 // The mask as seen from one level farther down.

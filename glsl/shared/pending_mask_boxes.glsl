@@ -25,7 +25,7 @@ bool climb_by_boxes(TraversalRay ray, float t_best, inout Cell cell) {
                 return true;
             }
         }
-        siblings_done = above(siblings_done, 1u);
+        siblings_done = mask_shifted_up(siblings_done, 1u);
         cell.node_offset = offset_of(kd_parent_of(node_ix_of(cell.node_offset)));
     }
     return false;

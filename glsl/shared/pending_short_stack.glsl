@@ -32,7 +32,7 @@ void marked_down() {
 }
 
 void marked_push(Cell cell) {
-    mark();
+    mask_mark();
     if (TRAVERSAL != TRAVERSAL_RESTART) short_stack_push(cell);
 }
 

@@ -149,9 +149,9 @@ impl Lattice {
     }
 
     /// Returns a cube's indices on the axes from its index in the order of all cubes.
-    pub fn cube_at(&self, place: u32) -> [u32; 3] {
+    pub fn cube_at(&self, cell_ix: u32) -> [u32; 3] {
         let [n_x, n_y, _] = self.n_cells;
-        [place % n_x, place / n_x % n_y, place / n_x / n_y]
+        [cell_ix % n_x, cell_ix / n_x % n_y, cell_ix / n_x / n_y]
     }
 
     /// Returns the uniform constants that kernels need of a grid with these cells on its upper level.
