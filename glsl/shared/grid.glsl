@@ -28,7 +28,7 @@ const float LARGEST_T = 3.4028235e38;
 const uint CELLS_A_TURN = 4u;
 const uint TRIANGLES_A_TURN = 4u;
 
-// A ray's position on its way through the cells of one lattice. first_cell: the index of the lattice's first cell in
+// A ray's position on its interval through the cells of one lattice. first_cell: the index of the lattice's first cell in
 // grid_cells. upper_cube: the packed cube of the upper level that this lattice is the block of, or IN_UPPER_LEVEL.
 // cube: the cube that the ray is in. t_next: the t at which the ray leaves this cube on each axis. t_enter: the t at
 // which it enters the cube. t_exit: the t at which it leaves the lattice.
@@ -60,7 +60,7 @@ uvec3 unpack_cube(uint packed) {
 // The t at which the ray leaves cubes of these indices on each axis. The planes are those of `planes_of`, except at
 // the border. In a uniform grid, the border is where the last cubes end, not where the box does, so the ray leaves
 // the box first. In a grid of two levels, the ray never leaves a lattice by its border, whose t is infinity: a
-// block's border may be off by rounding. There t_exit ends the way.
+// block's border may be off by rounding. There t_exit ends the interval.
 vec3 exits_of(Lattice lattice, TraversalRay ray, uvec3 cube) {
     uvec3 faces = cube + uvec3(greaterThanEqual(ray.inv_direction, vec3(0.0)));
     precise vec3 offsets = vec3(faces) * lattice.cell_size;
@@ -76,7 +76,7 @@ ivec3 steps_of(TraversalRay ray) {
     return 2 * ivec3(greaterThanEqual(ray.inv_direction, vec3(0.0))) - 1;
 }
 
-// Enters the lattice at t_enter: finds the first cube on the ray's way that the ray leaves at t_enter or later. The
+// Enters the lattice at t_enter: finds the first cube on the ray's interval that the ray leaves at t_enter or later. The
 // loop corrects the cube that is computed from the point at t_enter, whose indices are off by about 1.
 void enter_lattice(TraversalRay ray, inout GridWalk walk) {
     ivec3 steps = steps_of(ray);
@@ -153,7 +153,7 @@ Visit visit_cell(TraversalRay ray, float t_best, inout GridWalk walk) {
         cell = cell_of(walk);
     }
     count_steps(cell.count);
-    return Visit(cell.first, cell.first + cell.count, segment_of(walk.t_enter, min(t_leave_of(walk), t_best)));
+    return Visit(cell.first, cell.first + cell.count, interval_of(walk.t_enter, min(t_leave_of(walk), t_best)));
 }
 
 // Goes to the ray's next cube, in the block or after it. Returns false if nothing nearer than t_best can follow.
@@ -231,7 +231,7 @@ void resume_in_grid(TraversalRay ray, out GridWalk walk, out Visit visit, out Ne
     walk.t_enter = state.t_enter;
     best = Nearest(state.t_best, state.triangle_ix);
     spill_pair(WEIGHTS_SLOT, state.u, state.v);
-    visit = Visit(state.entry_ix, state.end_ix, segment_of(walk.t_enter, min(t_leave_of(walk), best.t)));
+    visit = Visit(state.entry_ix, state.end_ix, interval_of(walk.t_enter, min(t_leave_of(walk), best.t)));
     count_steps(state.n_steps);
 }
 

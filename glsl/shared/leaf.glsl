@@ -8,14 +8,14 @@
 struct Visit {
     uint entry_ix;
     uint end_ix;
-    Segment way;
+    Interval interval;
 };
 
 // The visit to a leaf of the kd-tree, from t_enter to t_exit (the traversal's t).
 Visit visit_leaf(KdNode leaf, float t_enter, float t_exit) {
     uint n_entries = leaf.axis_and_child >> KD_PAIR_SHIFT;
     count_steps(n_entries);
-    return Visit(leaf.split_or_first, leaf.split_or_first + n_entries, segment_of(t_enter, t_exit));
+    return Visit(leaf.split_or_first, leaf.split_or_first + n_entries, interval_of(t_enter, t_exit));
 }
 
 // Goes on to the leaf's next triangle whose plane the ray meets within the leaf. The ray may meet the other planes
@@ -28,7 +28,7 @@ bool find_candidate(TraversalRay ray, inout Visit visit, out uint entry_ix) {
         count_turn();
         entry_ix = visit.entry_ix;
         visit.entry_ix += 1u;
-        if (!is_clear(ray, visit.way, load_leaf_planes(entry_ix), accel.plane_epsilon)) return true;
+        if (!is_clear(ray, visit.interval, load_leaf_planes(entry_ix), accel.plane_epsilon)) return true;
     }
     return false;
 }

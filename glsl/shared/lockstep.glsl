@@ -16,7 +16,7 @@ bool find_candidate_in_step(TraversalRay ray, float reach, inout Visit visit) {
     bool looks = visit.entry_ix < visit.end_ix && has_turns();
     while (looks) {
         count_turn();
-        found = !is_clear(ray, visit.way, load_leaf_planes(visit.entry_ix), reach);
+        found = !is_clear(ray, visit.interval, load_leaf_planes(visit.entry_ix), reach);
         visit.entry_ix += 1u;
         looks = !found && visit.entry_ix < visit.end_ix && has_turns();
         if (!looks) break;
@@ -60,7 +60,7 @@ bool go_on_in_step(TraversalRay ray, float t_best, inout bool begins, inout Cell
 uint search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
     Cell cell = whole(ray);
     // The ray starts at the root, with a visit that has nothing left to test.
-    Visit visit = Visit(0u, 0u, segment_of(0.0, 0.0));
+    Visit visit = Visit(0u, 0u, interval_of(0.0, 0.0));
     float reach = accel.plane_epsilon;
     bool begins = true;
     bool goes_on = is_in(ray);

@@ -1,26 +1,26 @@
 // Two ways to save tests. If a ray keeps clear of the slab around a node's surface, everything below the node is
 // skipped. If it keeps clear of a triangle's plane, the triangle is skipped. A part of kdtree.glsl.
 //
-// Needs scene.glsl, steps.glsl, traversal_ray.glsl, kd_nodes.glsl and PREDICATES_BRANCHES. Provides `Segment`,
+// Needs scene.glsl, steps.glsl, traversal_ray.glsl, kd_nodes.glsl and PREDICATES_BRANCHES. Provides `Interval`,
 // `is_clear`, `is_open_split`, `has_slab` and `enter_slab`.
 
 // A segment of the ray, from t_middle - t_half to t_middle + t_half in the ray's own t.
-struct Segment {
+struct Interval {
     float t_middle;
     float t_half;
 };
 
 // The segment between two t of the traversal, which are half of the ray's own.
-Segment segment_of(float t_enter, float t_exit) {
-    return Segment(t_enter + t_exit, t_exit - t_enter);
+Interval interval_of(float t_enter, float t_exit) {
+    return Interval(t_enter + t_exit, t_exit - t_enter);
 }
 
-// Whether the segment `way` of the ray stays on one side of a plane (normal, distance from the world's origin),
+// Whether the segment `interval` of the ray stays on one side of a plane (normal, distance from the world's origin),
 // farther from it than `reach`, which is in the units of that distance.
-bool is_clear(TraversalRay ray, Segment way, vec4 plane, float reach) {
+bool is_clear(TraversalRay ray, Interval interval, vec4 plane, float reach) {
     float height = dot(plane.xyz, ray.shear.origin) - plane.w;
     float slope = dot(plane.xyz, ray.direction);
-    return abs(fma(way.t_middle, slope, height)) > fma(way.t_half, abs(slope), reach);
+    return abs(fma(interval.t_middle, slope, height)) > fma(interval.t_half, abs(slope), reach);
 }
 
 // Whether the node is a split whose children can be visited: it has no slab, or the ray has already passed the slab's
@@ -34,11 +34,11 @@ bool has_slab(KdNode node) {
     return (node.axis_and_child & KD_HAS_SLAB) != 0u;
 }
 
-// Tests the node's slab. Returns the node without the mark of a slab if the ray comes into the slab on its way
+// Tests the node's slab. Returns the node without the mark of a slab if the ray comes into the slab on its interval
 // through the cell, and otherwise an empty leaf.
 KdNode enter_slab(TraversalRay ray, float t_best, Cell cell, KdNode node) {
     count_steps(1u);
-    Segment way = segment_of(cell.t_enter, min(cell.t_exit, t_best));
-    if (is_clear(ray, way, load_kd_slabs(node_ix_of(cell.node_offset)), 1.0)) return KdNode(0u, KD_LEAF);
+    Interval interval = interval_of(cell.t_enter, min(cell.t_exit, t_best));
+    if (is_clear(ray, interval, load_kd_slabs(node_ix_of(cell.node_offset)), 1.0)) return KdNode(0u, KD_LEAF);
     return KdNode(node.split_or_first, node.axis_and_child & ~KD_HAS_SLAB);
 }

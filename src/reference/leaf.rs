@@ -6,7 +6,7 @@ use std::ops::Range;
 use glam::{Mat4, Vec3A, Vec4};
 
 use super::{
-    candidate::intersect, counting::table::ReadCounter, inputs::KernelInputs, slab::Segment,
+    candidate::intersect, counting::table::ReadCounter, inputs::KernelInputs, slab::Interval,
     traversal_ray::TraversalRay,
 };
 use crate::layout::{Hit, KD_PAIR_SHIFT, KdNode, Plane};
@@ -32,26 +32,27 @@ fn four_planes(planes: &[Plane], first: usize) -> Mat4 {
     }
 }
 
-/// Returns a mask of the planes that the ray may meet in the segment `way`. Bit i is cleared if the ray stays on one
+/// Returns a mask of the planes that the ray may meet in the segment `interval`. Bit i is cleared if the ray stays on one
 /// side of plane i, so far from it that no rounding of the hit test reaches across.
 #[inline(always)]
-fn near_planes(ray: &TraversalRay, way: Segment, planes: &Mat4) -> u32 {
+fn near_planes(ray: &TraversalRay, interval: Interval, planes: &Mat4) -> u32 {
     let dot = |v: Vec3A| planes.x_axis * v.x + planes.y_axis * v.y + planes.z_axis * v.z;
     let (height, slope) = (dot(ray.origin) - planes.w_axis, dot(ray.direction));
-    let is_clear = (way.middle * slope + height).abs().cmpgt(way.half * slope.abs() + Vec4::splat(ray.plane_epsilon));
+    let is_clear =
+        (interval.middle * slope + height).abs().cmpgt(interval.half * slope.abs() + Vec4::splat(ray.plane_epsilon));
     !is_clear.bitmask()
 }
 
-/// Tests the leaf's triangles against the ray, as [`intersect_entries`] does. `way`: `t_enter` and `t_exit`.
+/// Tests the leaf's triangles against the ray, as [`intersect_entries`] does. `interval`: `t_enter` and `t_exit`.
 #[inline(always)]
 pub fn intersect_leaf(
     inputs: &KernelInputs<impl ReadCounter>,
     ray: &TraversalRay,
     leaf: KdNode,
-    way: [f32; 2],
+    interval: [f32; 2],
     best: &mut Hit,
 ) {
-    intersect_entries(inputs, ray, entries_of(leaf), way, best);
+    intersect_entries(inputs, ray, entries_of(leaf), interval, best);
 }
 
 /// Tests the triangles of some entries against the ray, except those whose planes it does not meet from `t_enter` to
@@ -68,10 +69,10 @@ pub fn intersect_entries(
     if inputs.leaf_planes.is_empty() {
         return triangles.iter().for_each(|&ix| intersect(inputs, &ray.hit_filter, ix, best));
     }
-    let way = Segment::new(t_enter, t_exit);
+    let interval = Interval::new(t_enter, t_exit);
     for (four, first) in triangles.chunks(4).zip(entries.step_by(4)) {
         let planes = four_planes(inputs.leaf_planes, first);
-        let mut near = near_planes(ray, way, &planes) & ((1 << four.len()) - 1);
+        let mut near = near_planes(ray, interval, &planes) & ((1 << four.len()) - 1);
         while near != 0 {
             intersect(inputs, &ray.hit_filter, four[near.trailing_zeros() as usize], best);
             near &= near - 1;

@@ -12,12 +12,12 @@ pub fn slab_of<'a>(inputs: &KernelInputs<'a, impl ReadCounter>, node: KdNode, no
 
 /// A segment of a ray, such as the one within a cell: the middle and half the length, in t.
 #[derive(Clone, Copy)]
-pub struct Segment {
+pub struct Interval {
     pub middle: f32,
     pub half: f32,
 }
 
-impl Segment {
+impl Interval {
     /// The segment from `t_enter` to `t_exit`.
     #[inline(always)]
     pub fn new(t_enter: f32, t_exit: f32) -> Self {
@@ -29,9 +29,9 @@ impl TraversalRay {
     /// Returns whether the ray stays on one side of the slab, outside of it, from `t_enter` to `t_exit`.
     #[inline(always)]
     pub fn is_clear_of(&self, slab: &Slab, [t_enter, t_exit]: [f32; 2]) -> bool {
-        let way = Segment::new(t_enter, t_exit);
+        let interval = Interval::new(t_enter, t_exit);
         let height = slab.normal.dot(self.origin.into()) - slab.offset;
         let slope = slab.normal.dot(self.direction.into());
-        (way.middle * slope + height).abs() > way.half * slope.abs() + 1.0
+        (interval.middle * slope + height).abs() > interval.half * slope.abs() + 1.0
     }
 }
