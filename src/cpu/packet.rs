@@ -34,7 +34,7 @@ pub struct Interval<S: Simd> {
 }
 
 /// The rays' t intervals in a cell, as middles and half lengths.
-struct Segments<S: Simd> {
+struct CenteredIntervals<S: Simd> {
     middle: f32x16<S>,
     half: f32x16<S>,
 }
@@ -160,24 +160,31 @@ impl<S: Simd> Packet<S> {
 
     /// Returns the rays' t intervals in the cell, cut off at their best hits.
     #[inline(always)]
-    fn ways(&self, cell: &Interval<S>) -> Segments<S> {
+    fn centered_intervals(&self, cell: &Interval<S>) -> CenteredIntervals<S> {
         let exit = cell.exit.min(self.t_best);
-        Segments { middle: (cell.enter + exit) * 0.5, half: (exit - cell.enter) * 0.5 }
+        CenteredIntervals { middle: (cell.enter + exit) * 0.5, half: (exit - cell.enter) * 0.5 }
     }
 
     /// Returns the rays that cross a plane or come within `reach` of it in their t intervals. A NaN counts as near.
     #[inline(always)]
-    fn lanes_near(&self, ways: &Segments<S>, normal: Vec3, distance: f32, reach: f32) -> LaneMask {
+    fn lanes_near(
+        &self,
+        centered_intervals: &CenteredIntervals<S>,
+        normal: Vec3,
+        distance: f32,
+        reach: f32,
+    ) -> LaneMask {
         let height = dot(normal, &self.origin) - distance;
         let slope = dot(normal, &self.direction);
-        let is_clear = (ways.middle * slope + height).abs().simd_gt(ways.half * slope.abs() + reach);
+        let is_clear =
+            (centered_intervals.middle * slope + height).abs().simd_gt(centered_intervals.half * slope.abs() + reach);
         !is_clear.to_bitmask() as LaneMask
     }
 
     /// Returns the rays that enter a slab within the cell.
     #[inline(always)]
     pub fn lanes_in_slab(&self, slab: &Slab, cell: &Interval<S>) -> LaneMask {
-        self.lanes_near(&self.ways(cell), slab.normal, slab.offset, 1.0)
+        self.lanes_near(&self.centered_intervals(cell), slab.normal, slab.offset, 1.0)
     }
 
     /// Tests the leaf's triangles against the rays that are in it.
@@ -193,13 +200,13 @@ impl<S: Simd> Packet<S> {
             return;
         }
         let in_cell = cell.lanes();
-        let ways = self.ways(cell);
+        let centered_intervals = self.centered_intervals(cell);
         // A block's planes are tested before its triangles, so that the loads of several triangles overlap.
         for (triangles, first) in inputs.leaf_triangles[entries.clone()].chunks(BLOCK).zip(entries.step_by(BLOCK)) {
             let mut near = [in_cell; BLOCK];
             for (lanes, entry) in near.iter_mut().zip(first..first + triangles.len()) {
                 let Some(plane) = inputs.leaf_planes.get(entry) else { break };
-                *lanes &= self.lanes_near(&ways, plane.normal, plane.distance, self.plane_epsilon);
+                *lanes &= self.lanes_near(&centered_intervals, plane.normal, plane.distance, self.plane_epsilon);
             }
             for (&triangle_ix, lanes) in triangles.iter().zip(near) {
                 if lanes != 0 {
