@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::{
     BuildOptions,
-    sah::{Shares, Split},
+    sah::{ChildAreas, Split},
 };
 use crate::accel::bounds::{Bounds, Reference};
 
@@ -51,21 +51,21 @@ impl Default for BinnedSearch {
 /// The bins of one axis.
 #[derive(Clone, Copy)]
 struct Bins {
-    shares: Shares,
+    child_areas: ChildAreas,
     /// Factor from positions to bins: the bin is `(position - min) * scale`, rounded to the nearest integer.
     scale: f32,
 }
 
 impl Bins {
-    fn new(shares: Shares, n_bins: usize) -> Self {
-        Self { shares, scale: (n_bins - 1) as f32 * shares.per_extent }
+    fn new(child_areas: ChildAreas, n_bins: usize) -> Self {
+        Self { child_areas, scale: (n_bins - 1) as f32 * child_areas.per_extent }
     }
 
     /// Returns the bin of a position, which never decreases as the position grows. Adding 2^23 rounds the number to
     /// an integer, which is then in the lowest bits.
     #[inline]
     fn bin(&self, position: f32) -> usize {
-        ((position - self.shares.min) * self.scale + 8_388_608.0).to_bits() as usize & (MAX_BINS - 1)
+        ((position - self.child_areas.min) * self.scale + 8_388_608.0).to_bits() as usize & (MAX_BINS - 1)
     }
 }
 
@@ -73,7 +73,8 @@ impl BinnedSearch {
     /// Returns the cheapest split of a cell. Its weight is infinite if there is none.
     pub fn best_split(&mut self, references: &[Reference], cell: &Bounds, options: &BuildOptions) -> Split {
         let n_bins = (references.len() / 4).next_power_of_two().clamp(32, MAX_BINS);
-        let bins = [0, 1, 2].map(|axis| Shares::new(cell, axis, options).map(|shares| Bins::new(shares, n_bins)));
+        let bins = [0, 1, 2]
+            .map(|axis| ChildAreas::new(cell, axis, options).map(|child_areas| Bins::new(child_areas, n_bins)));
         self.count(references, &bins, n_bins);
         let edge = self.best_edge(references.len() as u32, &bins, n_bins);
         if !options.exact_planes
@@ -124,7 +125,7 @@ impl BinnedSearch {
     fn best_edge(&mut self, n: u32, bins: &[Option<Bins>; 3], n_bins: usize) -> Edge {
         let mut best = Edge { axis: 0, bin: 0, weight: f32::INFINITY };
         for (axis, bins) in bins.iter().enumerate() {
-            let Some(Bins { shares, .. }) = bins else { continue };
+            let Some(Bins { child_areas, .. }) = bins else { continue };
             let (below, above) = (&mut self.n_below[axis], &mut self.n_above[axis]);
             let (mut n_below, mut n_above) = (0, n);
             let per_bin = 1.0 / (n_bins - 1) as f32;
@@ -132,7 +133,7 @@ impl BinnedSearch {
                 let (begins, ends) = (below[bin], above[bin]);
                 (below[bin], above[bin]) = (n_below, n_above);
                 (n_below, n_above) = (n_below + begins, n_above - ends);
-                let weight = shares.weight((bin as f32 + 0.5) * per_bin, n_below as f32, n_above as f32);
+                let weight = child_areas.weight((bin as f32 + 0.5) * per_bin, n_below as f32, n_above as f32);
                 if bin + 1 < n_bins && weight < best.weight {
                     best = Edge { axis, bin, weight };
                 }
@@ -147,7 +148,7 @@ impl BinnedSearch {
         let mut n_flagged = 0;
         for (axis, bins) in bins.iter().enumerate() {
             self.flags[axis][..n_bins].fill(false);
-            let Some(Bins { shares, .. }) = bins else { continue };
+            let Some(Bins { child_areas, .. }) = bins else { continue };
             let (below, above) = (&self.n_below[axis], &self.n_above[axis]);
             let per_bin = 1.0 / (n_bins - 1) as f32;
             for bin in 0..n_bins {
@@ -155,7 +156,7 @@ impl BinnedSearch {
                 let from = (bin as f32 - 0.5).max(0.0) * per_bin;
                 let to = ((bin as f32 + 0.5) * per_bin).min(1.0);
                 let has_ends = below[bin + 1] > below[bin] || above[bin + 1] < above[bin];
-                let flag = has_ends && shares.lower_bound(from, to, n_below, n_above) * ROUNDING <= limit;
+                let flag = has_ends && child_areas.lower_bound(from, to, n_below, n_above) * ROUNDING <= limit;
                 self.flags[axis][bin] = flag;
                 n_flagged += usize::from(flag);
             }
@@ -196,8 +197,8 @@ impl BinnedSearch {
                 }
                 let n_begins = in_plane.iter().filter(|event| event.is_begin()).count() as u32;
                 n_above -= in_plane.len() as u32 - n_begins;
-                if position > bins.shares.min && position < bins.shares.max {
-                    let split = bins.shares.split(position, [n_below, n_above]);
+                if position > bins.child_areas.min && position < bins.child_areas.max {
+                    let split = bins.child_areas.split(position, [n_below, n_above]);
                     best = if split.weight < best.weight { split } else { best };
                 }
                 n_below += n_begins;
@@ -217,12 +218,12 @@ struct Edge {
 impl Edge {
     /// Returns the split at the edge, or none if its plane is not inside the cell.
     fn split(&self, references: &[Reference], bins: &[Option<Bins>; 3], n_bins: usize) -> Option<Split> {
-        let shares = bins[self.axis]?.shares;
+        let child_areas = bins[self.axis]?.child_areas;
         let fraction = (self.bin as f32 + 0.5) / (n_bins - 1) as f32;
-        let position = shares.min + fraction / shares.per_extent;
-        let is_inside = self.weight < f32::INFINITY && position > shares.min && position < shares.max;
+        let position = child_areas.min + fraction / child_areas.per_extent;
+        let is_inside = self.weight < f32::INFINITY && position > child_areas.min && position < child_areas.max;
         // Binning rounds a position, so the references are counted again, against the plane itself.
-        is_inside.then(|| shares.split(position, count_sides(references, self.axis, position)))
+        is_inside.then(|| child_areas.split(position, count_sides(references, self.axis, position)))
     }
 }
 

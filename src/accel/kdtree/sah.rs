@@ -29,10 +29,10 @@ impl Split {
     pub const NONE: Self = Self { axis: 0, position: 0.0, weight: f32::INFINITY, n_references: [0; 2] };
 }
 
-/// Surface areas of the two parts of a cell on either side of a plane, as shares of the cell's surface area. They are
+/// Surface areas of the two parts of a cell on either side of a plane, as child_areas of the cell's surface area. They are
 /// linear in the plane's position.
 #[derive(Clone, Copy, Debug)]
-pub struct Shares {
+pub struct ChildAreas {
     pub axis: usize,
     pub min: f32,
     pub max: f32,
@@ -46,7 +46,7 @@ pub struct Shares {
     empty_factor: f32,
 }
 
-impl Shares {
+impl ChildAreas {
     /// Returns none where no plane can split the cell: its extent on this axis is too small or too large, or it has
     /// no surface.
     pub fn new(cell: &Bounds, axis: usize, options: &BuildOptions) -> Option<Self> {
@@ -70,9 +70,9 @@ impl Shares {
         (position - self.min) * self.per_extent
     }
 
-    /// Returns the shares below and above a plane at a fraction of the extent.
+    /// Returns the child_areas below and above a plane at a fraction of the extent.
     #[inline]
-    fn shares(&self, fraction: f32) -> [f32; 2] {
+    fn child_areas(&self, fraction: f32) -> [f32; 2] {
         [self.base + self.slope * fraction, self.base + self.slope * (1.0 - fraction)]
     }
 
@@ -87,7 +87,7 @@ impl Shares {
     /// `n_below` and `n_above` triangles on its sides.
     #[inline]
     pub fn lower_bound(&self, from: f32, to: f32, n_below: f32, n_above: f32) -> f32 {
-        let (below, above) = (self.shares(from)[0], self.shares(to)[1]);
+        let (below, above) = (self.child_areas(from)[0], self.child_areas(to)[1]);
         let factor = if n_below == 0.0 || n_above == 0.0 { self.empty_factor } else { 1.0 };
         factor * (below * n_below + above * n_above)
     }
