@@ -18,9 +18,9 @@ use crate::{
 /// The most entries below nodes that get slabs. For each of these numbers, the first node on each path down that has
 /// no more entries gets a slab, if the surface there is flat enough. Larger pieces of the surface hardly ever are
 /// (benches/EXPERIMENTS.md).
-const MOST_ENTRIES: [u32; 5] = [8, 32, 128, 512, LARGEST_PATCH];
-/// The largest of `MOST_ENTRIES`.
-const LARGEST_PATCH: u32 = 2048;
+const SLAB_ENTRY_LIMITS: [u32; 5] = [8, 32, 128, 512, MAX_SLAB_ENTRIES];
+/// The largest of `SLAB_ENTRY_LIMITS`.
+const MAX_SLAB_ENTRIES: u32 = 2048;
 /// The fewest entries of a leaf that gets a slab. For a single entry, the plane of its triangle does as well.
 const LEAF_ENTRIES: u32 = 2;
 /// The greatest thickness of a split's slab, as a share of the longest side of the cell.
@@ -77,7 +77,7 @@ impl KdTree {
 }
 
 /// A node and its cell.
-struct Patch {
+struct NodeCell {
     node: u32,
     cell: Bounds,
 }
@@ -102,15 +102,15 @@ struct Surface {
 }
 
 impl Fitting<'_> {
-    /// Returns the topmost nodes with no more than `LARGEST_PATCH` entries below them, and all leaves above those.
-    fn patches(&self, root: Bounds) -> Vec<Patch> {
+    /// Returns the topmost nodes with no more than `MAX_SLAB_ENTRIES` entries below them, and all leaves above those.
+    fn patches(&self, root: Bounds) -> Vec<NodeCell> {
         let mut patches = Vec::new();
-        let mut stack = vec![Patch { node: 0, cell: root }];
+        let mut stack = vec![NodeCell { node: 0, cell: root }];
         while let Some(patch) = stack.pop() {
             match self.tree.node(patch.node) {
-                Node::Split { axis, position, child } if self.n_entries[patch.node as usize] > LARGEST_PATCH => {
+                Node::Split { axis, position, child } if self.n_entries[patch.node as usize] > MAX_SLAB_ENTRIES => {
                     let [below, above] = patch.cell.split(axis, position);
-                    stack.extend([Patch { node: child, cell: below }, Patch { node: child + 1, cell: above }]);
+                    stack.extend([NodeCell { node: child, cell: below }, NodeCell { node: child + 1, cell: above }]);
                 }
                 _ => patches.push(patch),
             }
@@ -119,7 +119,7 @@ impl Fitting<'_> {
     }
 
     /// Returns the slabs of a node and of all nodes below it.
-    fn slabs_of(&self, patch: &Patch) -> Slabs {
+    fn slabs_of(&self, patch: &NodeCell) -> Slabs {
         let mut surface = Surface::default();
         self.fit(patch, u32::MAX, &mut surface);
         surface.slabs
@@ -127,7 +127,7 @@ impl Fitting<'_> {
 
     /// Adds the polygons below a node to the surface, and the slabs there. `n_above`: the number of entries below the
     /// parent. Returns the sum of the polygons' area vectors, each turned to the side of the others.
-    fn fit(&self, patch: &Patch, n_above: u32, surface: &mut Surface) -> DVec3 {
+    fn fit(&self, patch: &NodeCell, n_above: u32, surface: &mut Surface) -> DVec3 {
         let (n_entries, first_corner) = (self.n_entries[patch.node as usize], surface.corners.len());
         let (area, thickest) = match self.tree.node(patch.node) {
             Node::Leaf { first, count } => {
@@ -140,9 +140,9 @@ impl Fitting<'_> {
             }
             Node::Split { axis, position, child } => {
                 let [below, above] = patch.cell.split(axis, position);
-                let below = self.fit(&Patch { node: child, cell: below }, n_entries, surface);
-                let above = self.fit(&Patch { node: child + 1, cell: above }, n_entries, surface);
-                let is_first = MOST_ENTRIES.iter().any(|&most| n_entries <= most && most < n_above);
+                let below = self.fit(&NodeCell { node: child, cell: below }, n_entries, surface);
+                let above = self.fit(&NodeCell { node: child + 1, cell: above }, n_entries, surface);
+                let is_first = SLAB_ENTRY_LIMITS.iter().any(|&most| n_entries <= most && most < n_above);
                 (towards(below, above), if is_first { THICKEST_SPLIT } else { 0.0 })
             }
         };
