@@ -122,8 +122,8 @@ impl BinnedSearch {
     }
 
     /// Turns the counts into sums, and returns the edge of the least weight.
-    fn best_edge(&mut self, n: u32, bins: &[Option<Bins>; 3], n_bins: usize) -> Edge {
-        let mut best = Edge { axis: 0, bin: 0, weight: f32::INFINITY };
+    fn best_edge(&mut self, n: u32, bins: &[Option<Bins>; 3], n_bins: usize) -> BinBoundary {
+        let mut best = BinBoundary { axis: 0, bin: 0, weight: f32::INFINITY };
         for (axis, bins) in bins.iter().enumerate() {
             let Some(Bins { child_areas, .. }) = bins else { continue };
             let (below, above) = (&mut self.n_below[axis], &mut self.n_above[axis]);
@@ -135,7 +135,7 @@ impl BinnedSearch {
                 (n_below, n_above) = (n_below + begins, n_above - ends);
                 let weight = child_areas.weight((bin as f32 + 0.5) * per_bin, n_below as f32, n_above as f32);
                 if bin + 1 < n_bins && weight < best.weight {
-                    best = Edge { axis, bin, weight };
+                    best = BinBoundary { axis, bin, weight };
                 }
             }
             (below[n_bins], above[n_bins]) = (n_below, n_above);
@@ -209,13 +209,13 @@ impl BinnedSearch {
 }
 
 /// The edge between `bin` and the next bin, and the weight of a split there.
-struct Edge {
+struct BinBoundary {
     axis: usize,
     bin: usize,
     weight: f32,
 }
 
-impl Edge {
+impl BinBoundary {
     /// Returns the split at the edge, or none if its plane is not inside the cell.
     fn split(&self, references: &[Reference], bins: &[Option<Bins>; 3], n_bins: usize) -> Option<Split> {
         let child_areas = bins[self.axis]?.child_areas;
