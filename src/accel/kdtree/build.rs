@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{
     BuildOptions, KdTree,
-    flatten::{Top, flatten},
+    flatten::{UpperTree, flatten},
     planes::planes_of,
     sah::Split,
     search::Search,
@@ -56,17 +56,17 @@ impl KdTree {
 }
 
 /// Builds the node of a cell and all nodes below it.
-fn grow(input: Input, references: Vec<Reference>, cell: Cell) -> Top {
+fn grow(input: Input, references: Vec<Reference>, cell: Cell) -> UpperTree {
     if references.len() <= TASK_REFERENCES {
-        return Top::Subtree(subtree::build(input, references, cell));
+        return UpperTree::Subtree(subtree::build(input, references, cell));
     }
     let Some((split, cells)) = cell.split(&references, input.options, &mut Search::default()) else {
         // The cell becomes a leaf. This is rare: nearly all of its triangles coincide, or a split exceeds the budget.
-        return Top::Subtree(subtree::build(input, references, cell));
+        return UpperTree::Subtree(subtree::build(input, references, cell));
     };
     let [below, above] = partition(input, references, &cell.bounds, &split);
     let (below, above) = rayon::join(|| grow(input, below, cells[0]), || grow(input, above, cells[1]));
-    Top::Split { axis: split.axis, position: split.position, children: Box::new([below, above]) }
+    UpperTree::Split { axis: split.axis, position: split.position, children: Box::new([below, above]) }
 }
 
 /// Returns the references of both children, in the order of their parent's references.

@@ -6,13 +6,13 @@ use super::{EMPTY_LEAF, Node, Parts, subtree::Subtree};
 use crate::accel::bounds::Bounds;
 
 /// Upper part of a tree, with the subtrees below it.
-pub enum Top {
-    Split { axis: usize, position: f32, children: Box<[Top; 2]> },
+pub enum UpperTree {
+    Split { axis: usize, position: f32, children: Box<[UpperTree; 2]> },
     Subtree(Subtree),
 }
 
 /// Makes the tree's arrays as kernels read them, without planes and slabs. `cell`: the root's cell.
-pub fn flatten(top: Top, cell: Bounds) -> Parts {
+pub fn flatten(top: UpperTree, cell: Bounds) -> Parts {
     let mut tree = Parts {
         nodes: vec![EMPTY_LEAF; 2],
         parents: vec![0],
@@ -28,10 +28,10 @@ pub fn flatten(top: Top, cell: Bounds) -> Parts {
 }
 
 /// Writes a node into a slot, and appends all nodes below it.
-fn append(tree: &mut Parts, slot: usize, top: Top) {
+fn append(tree: &mut Parts, slot: usize, top: UpperTree) {
     match top {
-        Top::Subtree(subtree) => append_subtree(tree, slot, &subtree),
-        Top::Split { axis, position, children } => {
+        UpperTree::Subtree(subtree) => append_subtree(tree, slot, &subtree),
+        UpperTree::Split { axis, position, children } => {
             let child = tree.nodes.len();
             tree.nodes[slot] = Node::Split { axis, position, child: child as u32 }.into();
             tree.nodes.extend([EMPTY_LEAF; 2]);
