@@ -67,7 +67,7 @@ impl Cell {
 
 /// Returns the reference's parts below and above a split of its cell.
 #[inline]
-pub fn sort_out(input: Input, reference: &Reference, cell: &Bounds, split: &Split) -> [Option<Reference>; 2] {
+pub fn split_reference(input: Input, reference: &Reference, cell: &Bounds, split: &Split) -> [Option<Reference>; 2] {
     if reference.bounds.max[split.axis] <= split.position {
         return [Some(*reference), None];
     }
@@ -147,7 +147,7 @@ impl Builder<'_> {
         let first = self.references.len();
         self.above.clear();
         for ix in range {
-            let [below, above] = sort_out(self.input, &self.references[ix], cell, split);
+            let [below, above] = split_reference(self.input, &self.references[ix], cell, split);
             self.references.extend(below);
             self.above.extend(above);
         }
