@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_ballot : require
 // Grid, sort, 1 of 3 (a least-significant-digit radix sort: Satish, Harris, Garland, "Designing efficient sorting
-// algorithms for manycore GPUs", 2009): each workgroup counts the pairs of its build.tiles_a_group tiles of
+// algorithms for manycore GPUs", 2009): each workgroup counts the pairs of its build.tiles_per_group tiles of
 // GRID_BLOCK_SIZE pairs by one digit of their cells' indices. grid_spine.comp is the second kernel of the sort.
 // Reads build, pairs_from; writes scan_blocks[digit * workgroups + workgroup].
 #include "grid_build.glsl"
@@ -17,8 +17,8 @@ shared uint n_by_digit[GRID_DIGITS];
 void main() {
     if (gl_LocalInvocationIndex < GRID_DIGITS) n_by_digit[gl_LocalInvocationIndex] = 0u;
     barrier();
-    uint begin = gl_WorkGroupID.x * build.tiles_a_group * GRID_BLOCK_SIZE;
-    uint end = min(begin + build.tiles_a_group * GRID_BLOCK_SIZE, build.n_pairs);
+    uint begin = gl_WorkGroupID.x * build.tiles_per_group * GRID_BLOCK_SIZE;
+    uint end = min(begin + build.tiles_per_group * GRID_BLOCK_SIZE, build.n_pairs);
     for (uint first = begin; first < end; first += SCAN_GROUP_SIZE) {
         uint pair_ix = first + gl_LocalInvocationIndex;
         bool has_pair = pair_ix < end;

@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_KHR_shader_subgroup_ballot : require
-// Grid, sort, 3 of 3: each workgroup writes the pairs of its build.tiles_a_group tiles of GRID_BLOCK_SIZE pairs in
+// Grid, sort, 3 of 3: each workgroup writes the pairs of its build.tiles_per_group tiles of GRID_BLOCK_SIZE pairs in
 // the order of one digit. Pairs of the same digit keep their order. A tile is sorted in shared memory first, so that
 // neighbouring invocations write to neighbouring addresses.
 // Reads build, pairs_from, scan_blocks; writes pairs_to.
@@ -92,8 +92,8 @@ uint first_of(uint digit, uint n_pairs) {
 void main() {
     uint rank = gl_LocalInvocationIndex;
     if (rank < GRID_DIGITS) next_places[rank] = scan_blocks[rank * gl_NumWorkGroups.x + gl_WorkGroupID.x];
-    uint begin = gl_WorkGroupID.x * build.tiles_a_group * GRID_BLOCK_SIZE;
-    uint end = min(begin + build.tiles_a_group * GRID_BLOCK_SIZE, build.n_pairs);
+    uint begin = gl_WorkGroupID.x * build.tiles_per_group * GRID_BLOCK_SIZE;
+    uint end = min(begin + build.tiles_per_group * GRID_BLOCK_SIZE, build.n_pairs);
     for (uint first = begin; first < end; first += GRID_BLOCK_SIZE) {
         uint n_pairs = min(end - first, GRID_BLOCK_SIZE);
         sort_tile(first, n_pairs);

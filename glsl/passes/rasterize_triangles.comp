@@ -50,10 +50,10 @@ uint take_pixel(inout PixelTests pending) {
 
 // Writes those of the invocation's tests whose index is below `end`.
 void put_tests(inout PixelTests pending, uint end) {
-    float rows_a_pixel = 1.0 / float(pending.rectangle.size.x);
+    float rows_per_pixel = 1.0 / float(pending.rectangle.size.x);
     while (pending.covered != uvec2(0u) && pending.place < end) {
         uint place = pending.place % N_TESTS, bit = take_pixel(pending);
-        uint y = uint((float(bit) + 0.5) * rows_a_pixel), x = bit - y * pending.rectangle.size.x;
+        uint y = uint((float(bit) + 0.5) * rows_per_pixel), x = bit - y * pending.rectangle.size.x;
         tests[place] = gl_LocalInvocationIndex | x << PLACE_BITS | y << (PLACE_BITS + OFFSET_BITS);
     }
 }

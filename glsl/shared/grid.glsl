@@ -25,8 +25,8 @@ const float LARGEST_T = 3.4028235e38;
 // an H200 with rays of a dragon in a room: the limit of 4 cells makes the search 1.2 to 2 times as fast as no limit.
 // The limit of 4 triangles makes it 1.1 to 1.6 times as fast in uniform grids, whose cells have many triangles. In
 // grids of two levels it would cost 5 %, so there it does not apply.
-const uint CELLS_A_TURN = 4u;
-const uint TRIANGLES_A_TURN = 4u;
+const uint CELLS_PER_TURN = 4u;
+const uint TRIANGLES_PER_TURN = 4u;
 
 // A ray's position on its interval through the cells of one lattice. first_cell: the index of the lattice's first cell in
 // grid_cells. upper_cube: the packed cube of the upper level that this lattice is the block of, or IN_UPPER_LEVEL.
@@ -173,12 +173,12 @@ bool step_on(TraversalRay ray, float t_best, inout GridWalk walk) {
     return true;
 }
 
-// Goes to the next cell that has triangles, but no farther than CELLS_A_TURN cells. Returns false if nothing nearer
+// Goes to the next cell that has triangles, but no farther than CELLS_PER_TURN cells. Returns false if nothing nearer
 // than t_best can follow.
 bool find_cell(TraversalRay ray, float t_best, inout GridWalk walk, inout Visit visit) {
     bool goes_on = true;
     bool seeks = true;
-    uint n_left = CELLS_A_TURN;
+    uint n_left = CELLS_PER_TURN;
     while (seeks) {
         count_turn();
         goes_on = step_on(ray, t_best, walk);
@@ -191,11 +191,11 @@ bool find_cell(TraversalRay ray, float t_best, inout GridWalk walk, inout Visit 
 }
 
 // Finds the cell's next triangle whose plane the ray meets within the cell. In uniform grids it tests at most
-// TRIANGLES_A_TURN planes.
+// TRIANGLES_PER_TURN planes.
 bool find_candidate_soon(TraversalRay ray, inout Visit visit, out uint entry_ix) {
     if (GRID_LEVELS == 2u) return find_candidate(ray, visit, entry_ix);
     uint end_ix = visit.end_ix;
-    visit.end_ix = min(end_ix, visit.entry_ix + TRIANGLES_A_TURN);
+    visit.end_ix = min(end_ix, visit.entry_ix + TRIANGLES_PER_TURN);
     bool found = find_candidate(ray, visit, entry_ix);
     visit.end_ix = end_ix;
     return found;

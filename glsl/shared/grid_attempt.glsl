@@ -35,8 +35,8 @@ void size_dispatches() {
     build.counted_cell_groups_x = counted_cells.x;
     build.counted_cell_groups_y = counted_cells.y;
     uint n_tiles = is_counted ? blocks_of(build.n_pairs) : 0u;
-    build.tiles_a_group = max((n_tiles + GRID_MAX_SORT_GROUPS - 1u) / GRID_MAX_SORT_GROUPS, 1u);
-    build.sort_groups_x = (n_tiles + build.tiles_a_group - 1u) / build.tiles_a_group;
+    build.tiles_per_group = max((n_tiles + GRID_MAX_SORT_GROUPS - 1u) / GRID_MAX_SORT_GROUPS, 1u);
+    build.sort_groups_x = (n_tiles + build.tiles_per_group - 1u) / build.tiles_per_group;
     build.sort_groups_y = 1u;
 }
 

@@ -677,7 +677,7 @@ struct GridBuild {
     uint pairs_begin;
     uint cells_begin;
     // Blocks that a workgroup of the sort goes through.
-    uint tiles_a_group;
+    uint tiles_per_group;
     // Workgroups of indirect dispatches, over upper cells, items and columns, in the order in which an attempt
     // counts. Only those whose turn it is are not 0.
     uint cell_groups_x;

@@ -27,7 +27,7 @@ use crate::{
 };
 
 /// Number of timed casts of one variant before the next variant's turn.
-pub const CASTS_A_TURN: u16 = 5;
+pub const CASTS_PER_TURN: u16 = 5;
 
 /// The variants on one stage, ready for rays.
 pub struct Tracers<'a> {
@@ -126,7 +126,7 @@ impl<'a> Tracers<'a> {
 
 /// Returns the number of casts of each turn; they sum to `n_times`.
 pub(super) fn turns(n_times: u16) -> impl Iterator<Item = u16> {
-    (0..n_times).step_by(CASTS_A_TURN.into()).map(move |first| CASTS_A_TURN.min(n_times - first))
+    (0..n_times).step_by(CASTS_PER_TURN.into()).map(move |first| CASTS_PER_TURN.min(n_times - first))
 }
 
 /// The results on one set of rays.
@@ -246,7 +246,7 @@ mod tests {
     fn turns_add_up() {
         for n_times in [1, 4, 5, 6, 25, 10_000] {
             assert_eq!(turns(n_times).sum::<u16>(), n_times);
-            assert!(turns(n_times).all(|n| (1..=CASTS_A_TURN).contains(&n)));
+            assert!(turns(n_times).all(|n| (1..=CASTS_PER_TURN).contains(&n)));
         }
     }
 }

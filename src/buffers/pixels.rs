@@ -64,7 +64,7 @@ impl Pixels {
     }
 
     /// Returns the bytes of a pixel in the widest buffer that the options need.
-    pub fn bytes_a_pixel(options: &RenderOptions) -> u64 {
+    pub fn bytes_per_pixel(options: &RenderOptions) -> u64 {
         let widest = if options.features { size_of::<Feature>() } else { 0 };
         widest.max(size_of::<[f32; 4]>()).max(size_of::<u64>()) as u64
     }

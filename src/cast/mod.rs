@@ -200,9 +200,9 @@ impl Caster {
 
 /// Returns the largest number of rays in a batch on a device.
 fn most_rays(limits: &Limits) -> usize {
-    let bytes_a_ray = mem::size_of::<Ray>().max(mem::size_of::<Hit>()) as u64;
+    let bytes_per_ray = mem::size_of::<Ray>().max(mem::size_of::<Hit>()) as u64;
     let in_groups = u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE);
-    (limits.storage_range / bytes_a_ray).min(in_groups) as usize
+    (limits.storage_range / bytes_per_ray).min(in_groups) as usize
 }
 
 /// Counts the rays that can only miss. They have a NaN, an infinite origin or direction, or a direction that is zero

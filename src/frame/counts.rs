@@ -45,10 +45,10 @@ pub(crate) fn device_counts(bounces: &[Bounce], counters: &[Counters]) -> Vec<Bo
 pub(crate) fn count_batches(passes: &mut [PassTime], counts: &[BounceStats], max_depth: u32) {
     let batches = || (0..).zip(counts.chunks_exact(max_depth as usize));
     // All batches have the same passes, no matter how many rays they have.
-    let passes_a_batch = passes.iter().filter(|pass| is_in_batch(pass)).count() / batches().count().max(1);
+    let passes_per_batch = passes.iter().filter(|pass| is_in_batch(pass)).count() / batches().count().max(1);
     let mut in_batches = passes.iter_mut().filter(|pass| is_in_batch(pass));
     for (batch_ix, bounces) in batches() {
-        for pass in in_batches.by_ref().take(passes_a_batch) {
+        for pass in in_batches.by_ref().take(passes_per_batch) {
             pass.batch = Some(batch_ix);
             count_rays(pass, bounces);
         }

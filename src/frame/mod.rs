@@ -135,11 +135,11 @@ pub enum Primary {
 
 impl Primary {
     /// Returns the method with less work, `Raster` or `Trace`: the rasterizer processes all triangles, tracing
-    /// processes all pixels of the whole picture. `triangles_a_ray`: the number of triangles that are rasterized in
+    /// processes all pixels of the whole picture. `triangles_per_ray`: the number of triangles that are rasterized in
     /// the time in which one ray is traced.
-    pub fn suited_to(n_triangles: usize, (width, height): (u32, u32), triangles_a_ray: u64) -> Self {
+    pub fn suited_to(n_triangles: usize, (width, height): (u32, u32), triangles_per_ray: u64) -> Self {
         let n_rays = u64::from(width) * u64::from(height);
-        if n_triangles as u64 <= triangles_a_ray * n_rays { Self::Raster } else { Self::Trace }
+        if n_triangles as u64 <= triangles_per_ray * n_rays { Self::Raster } else { Self::Trace }
     }
 }
 

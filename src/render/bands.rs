@@ -176,7 +176,7 @@ fn reserve<T>(object: &'static str, elements: &mut Vec<T>, len: usize) -> Result
 /// beside it that the noise filter reads. A band has at least one row, even if the row is too long for the device.
 fn bands(limits: &Limits, options: &RenderOptions) -> Vec<Crop> {
     let (asked, window) = (options.crop_or_whole(), options.window());
-    let row_bytes = u64::from(window.width()) * Pixels::bytes_a_pixel(options);
+    let row_bytes = u64::from(window.width()) * Pixels::bytes_per_pixel(options);
     let most_rows = u32::try_from(limits.storage_range / row_bytes).unwrap_or(u32::MAX);
     if window.height() <= most_rows {
         return vec![asked];
@@ -218,7 +218,7 @@ mod tests {
                     y = band.y1;
                     let window = RenderOptions { crop: Some(*band), ..options.clone() }.window();
                     let n_pixels = u64::from(window.width()) * u64::from(window.height());
-                    assert!(n_pixels * Pixels::bytes_a_pixel(&options) <= range, "{range}: {band}");
+                    assert!(n_pixels * Pixels::bytes_per_pixel(&options) <= range, "{range}: {band}");
                 }
                 assert_eq!(y, asked.y1);
                 assert_eq!(bands.len() == 1, largest(&bands, &options).is_none());

@@ -106,9 +106,9 @@ impl QueueBudget {
         }
         let n_pixels = u64::from(constants.width) * u64::from(constants.height);
         // `rays` and `light_visibility` have the most bytes a ray of all buffers of the queue.
-        let bytes_a_ray = mem::size_of::<PathRay>().max(4 * constants.n_lights as usize) as u64;
-        let most = (limits.storage_range / bytes_a_ray).min(u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE));
-        let wanted = n_pixels * u64::from(self.rays_a_pixel(constants.max_depth));
+        let bytes_per_ray = mem::size_of::<PathRay>().max(4 * constants.n_lights as usize) as u64;
+        let most = (limits.storage_range / bytes_per_ray).min(u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE));
+        let wanted = n_pixels * u64::from(self.rays_per_pixel(constants.max_depth));
         wanted.min(MOST_RAYS).min(most).max(1) as u32
     }
 
@@ -117,14 +117,14 @@ impl QueueBudget {
     /// `most_pixels` pixels, if that is given.
     pub fn spans(&self, constants: &Frame, most_pixels: Option<u32>) -> Vec<(u32, u32)> {
         let n_pixels = constants.width * constants.height;
-        let with_room = (constants.queue_capacity / self.rays_a_pixel(constants.max_depth)).max(1);
+        let with_room = (constants.queue_capacity / self.rays_per_pixel(constants.max_depth)).max(1);
         let n_batches = n_pixels.div_ceil(most_pixels.map_or(with_room, |most| most.clamp(1, with_room))).max(1);
         let size = n_pixels.div_ceil(n_batches);
         (0..n_batches).map(|i| (i * size, size.min(n_pixels - i * size))).collect()
     }
 
     /// Returns the rays that a pixel is expected to make, primary and secondary: as many as most scenes make.
-    fn rays_a_pixel(&self, max_depth: u32) -> u32 {
+    fn rays_per_pixel(&self, max_depth: u32) -> u32 {
         match self {
             Self { fixed_capacity: Some(_), .. } => 1,
             Self { branches: true, .. } => 8.min((1 << max_depth.min(4)) - 1),
@@ -160,7 +160,7 @@ mod tests {
                         Some(*end)
                     });
                     assert_eq!(ends.last(), Some(width * height));
-                    let most = constants.queue_capacity / budget.rays_a_pixel(max_depth);
+                    let most = constants.queue_capacity / budget.rays_per_pixel(max_depth);
                     let fits =
                         |n: u32| n > 0 && n <= most.max(1) && most_pixels.is_none_or(|pixels| n <= pixels.max(1));
                     assert!(spans.iter().all(|&(_, n)| fits(n)), "{width}x{height}: {spans:?}");

@@ -8,11 +8,11 @@ use super::flight::{Axes, Flight};
 use crate::scene::Camera;
 
 /// Angle in radians by which a drag over the window's height turns the camera.
-const TURN_A_HEIGHT: f32 = PI;
+const TURN_PER_HEIGHT: f32 = PI;
 /// Least angle in radians between the view and straight up or down.
 const POLE_MARGIN: f32 = 0.02;
 /// Factor on the distance to the target for one step of the wheel.
-const DISTANCE_A_STEP: f32 = 0.85;
+const DISTANCE_PER_STEP: f32 = 0.85;
 /// Factor on the radius of the scene's bounding sphere when the scene is framed, which leaves a margin around it.
 const FRAME_MARGIN: f32 = 1.05;
 
@@ -89,7 +89,7 @@ impl Controller {
         // A scene's own camera may be closer to its target than the wheel can go, or farther away. From there the
         // wheel only leads back.
         let (least, most) = (distance.min(1e-4 * self.radius), distance.max(1e3 * self.radius));
-        let share = (distance * DISTANCE_A_STEP.powf(steps)).clamp(least, most) / distance;
+        let share = (distance * DISTANCE_PER_STEP.powf(steps)).clamp(least, most) / distance;
         let point = self.camera.target + self.across(x, y);
         self.camera.eye = point + (self.camera.eye - point) * share;
         self.camera.target = point + (self.camera.target - point) * share;
@@ -108,13 +108,13 @@ impl Controller {
     /// window. The result stays [`POLE_MARGIN`] off straight up and down.
     fn turned(&self, view: Vec3, x: f32, y: f32) -> Vec3 {
         let up = self.camera.up;
-        let yawed = Quat::from_axis_angle(up, -x * TURN_A_HEIGHT) * view;
+        let yawed = Quat::from_axis_angle(up, -x * TURN_PER_HEIGHT) * view;
         let right = yawed.cross(up).normalize();
         let elevation = FRAC_PI_2 - yawed.angle_between(up);
         let most = FRAC_PI_2 - POLE_MARGIN;
         // A scene's own camera may look closer to a pole than drags can go. From there drags only lead away.
         let (least, most) = (elevation.min(-most), elevation.max(most));
-        let pitch = (elevation - y * TURN_A_HEIGHT).clamp(least, most) - elevation;
+        let pitch = (elevation - y * TURN_PER_HEIGHT).clamp(least, most) - elevation;
         Quat::from_axis_angle(right, pitch) * yawed
     }
 
@@ -265,7 +265,7 @@ mod tests {
             assert!(is_near(seen_at(&controller, point), (x, y)), "{steps} steps");
             let Camera { eye, target, .. } = *controller.camera();
             let share = (target - eye).length() / (before.target - before.eye).length();
-            assert!((share - DISTANCE_A_STEP.powf(steps)).abs() < 1e-4);
+            assert!((share - DISTANCE_PER_STEP.powf(steps)).abs() < 1e-4);
             assert!((target - eye).angle_between(before.target - before.eye) < 1e-3, "it looks where it looked");
             assert!((target == before.target) == (x == 0.0));
             controller.zoom(-steps, x, y);

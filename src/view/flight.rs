@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 /// Factor on the speed for one step of the wheel, or one press of a key.
-const SPEED_A_STEP: f32 = 1.25;
+const SPEED_PER_STEP: f32 = 1.25;
 /// Factor on the speed while the key for faster flight is held; its reciprocal applies to slower flight.
 const HASTE: f32 = 4.0;
 
@@ -68,7 +68,7 @@ impl Flight {
 
     /// Changes the speed by a number of steps, which may be fractional; negative steps slow down.
     pub fn change_speed(&mut self, steps: f32) {
-        let speed = self.speed * SPEED_A_STEP.powf(steps);
+        let speed = self.speed * SPEED_PER_STEP.powf(steps);
         self.speed = speed.clamp(self.radius * 1e-4, self.radius * 1e3);
     }
 
@@ -145,7 +145,7 @@ mod tests {
         flight.change_speed(-2.0);
         assert!((flight.speed() - 1.0).abs() < 1e-6);
         flight.change_speed(1.0);
-        assert_eq!(flight.speed(), SPEED_A_STEP);
+        assert_eq!(flight.speed(), SPEED_PER_STEP);
         flight.change_speed(-1e9);
         assert!(flight.speed() > 0.0);
         flight.change_speed(1e9);

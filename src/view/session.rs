@@ -23,13 +23,13 @@ use crate::{
 const HISTORY_S: f64 = 5.0;
 /// Reads per level of the kd-tree that the cost view shows brightest. A pixel has several rays, each of which goes
 /// down and up the tree several times.
-const STEPS_A_LEVEL: u32 = 16;
+const STEPS_PER_LEVEL: u32 = 16;
 
 /// Returns the number of reads that the cost view shows brightest. In a grid, a ray goes through at most as many
 /// cells as the sum of the grid's resolutions along the axes, and a pixel has a few such rays.
 fn brightest_cost(statistics: &Statistics) -> u32 {
     match statistics {
-        Statistics::KdTree(tree) => STEPS_A_LEVEL * tree.depth.max(1),
+        Statistics::KdTree(tree) => STEPS_PER_LEVEL * tree.depth.max(1),
         Statistics::Grid(grid) => 2 * grid.resolution.iter().sum::<u32>().max(8),
     }
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     bench::{
         Spread,
-        traversal::{CASTS_A_TURN, turns},
+        traversal::{CASTS_PER_TURN, turns},
         warm_up,
     },
     cast::{Contender, rounds},
@@ -38,7 +38,7 @@ pub fn hold(
     mut between: impl FnMut(u16) -> Result<(), GpuError>,
 ) -> Result<Vec<Trial>, GpuError> {
     if n_times > 0 {
-        warm_up(|| rounds(context, contenders, CASTS_A_TURN).map(drop))?;
+        warm_up(|| rounds(context, contenders, CASTS_PER_TURN).map(drop))?;
     }
     let mut all_ms = vec![Vec::new(); contenders.len()];
     for n_rounds in turns(n_times) {

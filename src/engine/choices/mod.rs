@@ -112,8 +112,8 @@ impl Workload {
     /// reflected once.
     pub fn of_pictures(options: &RenderOptions, n_lights: usize, n_pictures: u64) -> Self {
         let size = (options.width, options.height);
-        let rays_a_pixel = u64::from(options.max_depth.min(2)) * (1 + n_lights as u64);
-        let factors = [u64::from(size.0), u64::from(size.1), rays_a_pixel, n_pictures];
+        let rays_per_pixel = u64::from(options.max_depth.min(2)) * (1 + n_lights as u64);
+        let factors = [u64::from(size.0), u64::from(size.1), rays_per_pixel, n_pictures];
         let n_rays = factors.into_iter().fold(1, u64::saturating_mul);
         Self { size, n_rays, shows_costs: options.features, farthest_eye: f32::INFINITY }
     }

@@ -15,15 +15,15 @@ use crate::{accel::kdtree::Traversal, frame::Primary};
 /// Scenes with fewer triangles are not measured. They are small enough for any traversal, since their frames spend
 /// more time elsewhere.
 const FEWEST_TRIANGLES: usize = 1000;
-/// Number of rays from which a run wins back the time of a measurement: this many, and `RAYS_A_MEASURED_TRIANGLE`
+/// Number of rays from which a run wins back the time of a measurement: this many, and `RAYS_PER_MEASURED_TRIANGLE`
 /// more for each triangle. A measurement takes some 0.1 s, and 0.3 us more for each triangle. It saves a tenth of the
 /// 1 to 10 ns that a ray takes, in this run and in a few that find its result in the cache.
-const RAYS_A_MEASUREMENT: u64 = 1 << 28;
-/// See `RAYS_A_MEASUREMENT`.
-const RAYS_A_MEASURED_TRIANGLE: u64 = 500;
+const RAYS_PER_MEASUREMENT: u64 = 1 << 28;
+/// See `RAYS_PER_MEASUREMENT`.
+const RAYS_PER_MEASURED_TRIANGLE: u64 = 500;
 /// Number of rays per triangle from which ropes pay off. Making them takes the CPU some 200 ns per triangle in each
 /// run. Where they are faster, they save about 0.2 ns per ray.
-const RAYS_A_ROPED_TRIANGLE: u64 = 1000;
+const RAYS_PER_ROPED_TRIANGLE: u64 = 1000;
 /// Share of the time of the rule's traversal that another one must save to replace it. Smaller savings are noise.
 const LEAST_GAIN: f64 = 0.03;
 
@@ -84,7 +84,7 @@ impl Candidates<Traversal> {
     /// Returns the candidate traversals for `n_rays` rays in a scene of `n_triangles` triangles, or none where any
     /// will do.
     pub fn of_traversals(n_triangles: usize, n_rays: u64) -> Option<Self> {
-        let pay_for_ropes = n_rays >= RAYS_A_ROPED_TRIANGLE.saturating_mul(n_triangles as u64);
+        let pay_for_ropes = n_rays >= RAYS_PER_ROPED_TRIANGLE.saturating_mul(n_triangles as u64);
         let ropes = pay_for_ropes.then_some(Traversal::Ropes);
         Self::new([Traversal::Mask, Traversal::Stack].into_iter().chain(ropes).collect(), n_triangles, n_rays)
     }
@@ -100,8 +100,8 @@ impl Candidates<Primary> {
 
 impl<T: Copy + Display + FromStr> Candidates<T> {
     fn new(methods: Vec<T>, n_triangles: usize, n_rays: u64) -> Option<Self> {
-        let for_triangles = RAYS_A_MEASURED_TRIANGLE.saturating_mul(n_triangles as u64);
-        let may_measure = n_rays >= RAYS_A_MEASUREMENT.saturating_add(for_triangles);
+        let for_triangles = RAYS_PER_MEASURED_TRIANGLE.saturating_mul(n_triangles as u64);
+        let may_measure = n_rays >= RAYS_PER_MEASUREMENT.saturating_add(for_triangles);
         (n_triangles >= FEWEST_TRIANGLES).then_some(Self { methods, may_measure })
     }
 

@@ -43,18 +43,18 @@ named_enum!(TreeKind { Fast = "fast", Best = "best" });
 /// Number of rays per triangle from which the best tree pays off on the CPU. Its build takes about 1 us per triangle
 /// longer, and with slabs a third of that more. It saves some 10 to 25 ns per ray on the CPU's threads, and 0.5 to 1
 /// ns on a GPU.
-const RAYS_A_TRIANGLE_ON_CPU: u64 = 40;
+const RAYS_PER_TRIANGLE_ON_CPU: u64 = 40;
 /// The same number for a GPU.
-const RAYS_A_TRIANGLE_ON_GPU: u64 = 1000;
+const RAYS_PER_TRIANGLE_ON_GPU: u64 = 1000;
 
 impl TreeKind {
     /// Returns the kind with which building and `n_rays` rays take the least time together.
     pub fn by_rule(processor: Processor, n_triangles: usize, n_rays: u64) -> Self {
-        let rays_a_triangle = match processor {
-            Processor::Gpu => RAYS_A_TRIANGLE_ON_GPU,
-            Processor::Cpu | Processor::SoftwareDriver => RAYS_A_TRIANGLE_ON_CPU,
+        let rays_per_triangle = match processor {
+            Processor::Gpu => RAYS_PER_TRIANGLE_ON_GPU,
+            Processor::Cpu | Processor::SoftwareDriver => RAYS_PER_TRIANGLE_ON_CPU,
         };
-        if n_rays / rays_a_triangle < n_triangles as u64 { Self::Fast } else { Self::Best }
+        if n_rays / rays_per_triangle < n_triangles as u64 { Self::Fast } else { Self::Best }
     }
 
     /// Returns the options for building the tree for a processor. The kernels that software drivers run use no slabs.
