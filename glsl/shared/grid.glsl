@@ -28,7 +28,7 @@ const float LARGEST_T = 3.4028235e38;
 const uint CELLS_PER_TURN = 4u;
 const uint TRIANGLES_PER_TURN = 4u;
 
-// A ray's position on its interval through the cells of one lattice. first_cell: the index of the lattice's first cell in
+// A ray's position on its way through the cells of one lattice. first_cell: the index of the lattice's first cell in
 // grid_cells. upper_cube: the packed cube of the upper level that this lattice is the block of, or IN_UPPER_LEVEL.
 // cube: the cube that the ray is in. t_next: the t at which the ray leaves this cube on each axis. t_enter: the t at
 // which it enters the cube. t_exit: the t at which it leaves the lattice.
@@ -76,7 +76,7 @@ ivec3 steps_of(TraversalRay ray) {
     return 2 * ivec3(greaterThanEqual(ray.inv_direction, vec3(0.0))) - 1;
 }
 
-// Enters the lattice at t_enter: finds the first cube on the ray's interval that the ray leaves at t_enter or later. The
+// Enters the lattice at t_enter: finds the first cube on the ray's way that it leaves at t_enter or later. The
 // loop corrects the cube that is computed from the point at t_enter, whose indices are off by about 1.
 void enter_lattice(TraversalRay ray, inout GridWalk walk) {
     ivec3 steps = steps_of(ray);

@@ -33,7 +33,7 @@ KdNode step_down(TraversalRay ray, KdNode node, inout Cell cell) {
     return node;
 }
 
-// Descends to the leaf in which the ray enters the cell. If the ray keeps clear of a node's slab on the interval, returns
+// Descends to the leaf in which the ray enters the cell. If the ray keeps clear of a node's slab on the way, returns
 // an empty leaf in place of that node.
 KdNode descend(TraversalRay ray, float t_best, inout Cell cell) {
     KdNode node = kd_node(cell.node_offset);

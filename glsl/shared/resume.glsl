@@ -55,7 +55,7 @@ void resume(TraversalRay ray, out Cell cell, out Visit visit, out Nearest best) 
     visit = Visit(state.entry_ix, state.end_ix, interval_of(cell.t_enter, min(cell.t_exit, best.t)));
     count_steps(state.n_steps);
     siblings_done = state.siblings_done;
-    // These ways find pending subtrees on the interval back up, or by a rope.
+    // These ways find pending subtrees on the way back up, or by a rope.
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;
     if (TRAVERSAL == TRAVERSAL_ROPES) return;

@@ -32,7 +32,7 @@ fn four_planes(planes: &[Plane], first: usize) -> Mat4 {
     }
 }
 
-/// Returns a mask of the planes that the ray may meet in the segment `interval`. Bit i is cleared if the ray stays on one
+/// Returns a mask of the planes that the ray may meet in `interval`. Bit i is cleared if the ray stays on one
 /// side of plane i, so far from it that no rounding of the hit test reaches across.
 #[inline(always)]
 fn near_planes(ray: &TraversalRay, interval: Interval, planes: &Mat4) -> u32 {

@@ -10,7 +10,7 @@ use super::{
     planes::planes_of,
     sah::Split,
     search::Search,
-    subtree::{self, Cell, Input, sort_out},
+    subtree::{self, Cell, Input, split_reference},
 };
 use crate::{
     accel::bounds::{Bounds, Reference, is_finite},
@@ -79,7 +79,7 @@ fn partition(input: Input, references: Vec<Reference>, cell: &Bounds, split: &Sp
     let sorted_out = |chunk: &[Reference]| {
         let (mut below, mut above) = (Vec::with_capacity(chunk.len()), Vec::with_capacity(chunk.len()));
         for reference in chunk {
-            let parts = sort_out(input, reference, cell, split);
+            let parts = split_reference(input, reference, cell, split);
             below.extend(parts[0]);
             above.extend(parts[1]);
         }

@@ -5,7 +5,7 @@
 
 use super::{
     BuildOptions,
-    sah::{Shares, Split},
+    sah::{ChildAreas, Split},
 };
 use crate::accel::bounds::{Bounds, Reference};
 
@@ -18,8 +18,8 @@ const LANES: usize = 8;
 pub fn best_split(references: &[Reference], cell: &Bounds, options: &BuildOptions) -> Split {
     let mut best = Split::NONE;
     for axis in 0..3 {
-        let Some(shares) = Shares::new(cell, axis, options) else { continue };
-        let split = Planes::new(references, &shares).best(&shares);
+        let Some(child_areas) = ChildAreas::new(cell, axis, options) else { continue };
+        let split = Planes::new(references, &child_areas).best(&child_areas);
         if split.weight < best.weight {
             best = split;
         }
@@ -39,7 +39,7 @@ struct Planes {
 }
 
 impl Planes {
-    fn new(references: &[Reference], shares: &Shares) -> Self {
+    fn new(references: &[Reference], child_areas: &ChildAreas) -> Self {
         let mut planes = Self {
             min: [0.0; MAX_REFERENCES],
             max: [0.0; MAX_REFERENCES],
@@ -49,14 +49,14 @@ impl Planes {
         };
         let mut n_positions = 0;
         for (ix, reference) in references.iter().enumerate() {
-            let (min, max) = (reference.bounds.min[shares.axis], reference.bounds.max[shares.axis]);
+            let (min, max) = (reference.bounds.min[child_areas.axis], reference.bounds.max[child_areas.axis]);
             planes.min[ix] = min;
             planes.max[ix] = max;
             // Each side is written in any case and kept only if it is inside the cell, so there is no branch.
             planes.positions[n_positions] = min;
-            n_positions += usize::from(min > shares.min && min < shares.max);
+            n_positions += usize::from(min > child_areas.min && min < child_areas.max);
             planes.positions[n_positions] = max;
-            n_positions += usize::from(max > shares.min && max < shares.max);
+            n_positions += usize::from(max > child_areas.min && max < child_areas.max);
         }
         planes.positions[n_positions..][..LANES].fill(f32::NAN);
         planes.n_positions = n_positions;
@@ -64,7 +64,7 @@ impl Planes {
     }
 
     /// Returns the split at the cheapest plane.
-    fn best(&self, shares: &Shares) -> Split {
+    fn best(&self, child_areas: &ChildAreas) -> Split {
         let mut best = Split::NONE;
         for first in (0..self.n_positions).step_by(LANES) {
             let positions: &[f32; LANES] = self.positions[first..][..LANES].try_into().expect("padded");
@@ -77,12 +77,12 @@ impl Planes {
             }
             let mut weights = [0.0; LANES];
             for lane in 0..LANES {
-                let fraction = shares.fraction(positions[lane]);
-                weights[lane] = shares.weight(fraction, below[lane] as f32, above[lane] as f32);
+                let fraction = child_areas.fraction(positions[lane]);
+                weights[lane] = child_areas.weight(fraction, below[lane] as f32, above[lane] as f32);
             }
             for lane in 0..LANES {
                 if weights[lane] < best.weight {
-                    best = shares.split(positions[lane], [below[lane], above[lane]]);
+                    best = child_areas.split(positions[lane], [below[lane], above[lane]]);
                 }
             }
         }

@@ -29,7 +29,7 @@ impl Split {
     pub const NONE: Self = Self { axis: 0, position: 0.0, weight: f32::INFINITY, n_references: [0; 2] };
 }
 
-/// Surface areas of the two parts of a cell on either side of a plane, as child_areas of the cell's surface area. They are
+/// Surface areas of the two parts of a cell on either side of a plane, as shares of the cell's surface area. They are
 /// linear in the plane's position.
 #[derive(Clone, Copy, Debug)]
 pub struct ChildAreas {
@@ -70,7 +70,7 @@ impl ChildAreas {
         (position - self.min) * self.per_extent
     }
 
-    /// Returns the child_areas below and above a plane at a fraction of the extent.
+    /// Returns the shares below and above a plane at a fraction of the extent.
     #[inline]
     fn child_areas(&self, fraction: f32) -> [f32; 2] {
         [self.base + self.slope * fraction, self.base + self.slope * (1.0 - fraction)]
