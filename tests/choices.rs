@@ -261,14 +261,14 @@ fn primary_rays_are_measured_where_that_changes_no_bit() {
     let many = Workload { n_rays: u64::MAX, ..Workload::of_pictures(&options, 0, 1) };
     let far = Camera { eye: Vec3::Z * 1e3, ..scene.camera };
     for unknown in [many, many.seen_by([scene.camera, far].iter())] {
-        assert_eq!(primary_of(unknown), Chosen { value: Primary::Compute, by: Reason::Rule });
+        assert_eq!(primary_of(unknown), Chosen { value: Primary::SoftwareRaster, by: Reason::Rule });
     }
     let near = many.seen_by([scene.camera].iter());
     let (first, second) = (primary_of(near), primary_of(near));
     assert_eq!((first.by, second), (Reason::Measured, Chosen { by: Reason::Cached, ..first }));
     let other_size = Workload { size: (61, 45), n_rays: 1, ..near };
     assert_eq!(primary_of(other_size).by, Reason::Rule);
-    let pictures = [Primary::Compute, Primary::Trace].map(|primary| {
+    let pictures = [Primary::SoftwareRaster, Primary::Trace].map(|primary| {
         let options = RenderOptions { primary, ..options.clone() };
         let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
         renderer.render().expect("a frame").0

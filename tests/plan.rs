@@ -102,7 +102,8 @@ fn no_pass_runs_before_what_it_needs_is_there() {
 /// Without any one of the barriers, some pass could run too early.
 #[test]
 fn every_barrier_is_needed() {
-    let options = RenderOptions { features: true, max_depth: 3, primary: Primary::Compute, ..RenderOptions::default() };
+    let options =
+        RenderOptions { features: true, max_depth: 3, primary: Primary::SoftwareRaster, ..RenderOptions::default() };
     let all = steps(&Plan::new(&FrameKind::new(&options, 1)));
     let barriers: Vec<_> = (0..all.len()).filter(|&i| matches!(all[i], Step::Barrier { .. })).collect();
     assert!(barriers.len() > 20);

@@ -23,10 +23,10 @@ layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;
 // Whether the ray's cost is written to pixel_features.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
 // Whether the triangles were found by kernels, in pixel_nearest, not by the graphics pipeline, in triangle_ids.
-layout(constant_id = CONSTANT_BY_KERNELS) const bool BY_KERNELS = false;
+layout(constant_id = CONSTANT_SOFTWARE_RASTER) const bool SOFTWARE_RASTER = false;
 
 uint triangle_of(uvec2 pixel) {
-    if (BY_KERNELS) return pixel_nearest[pixel_ix_of(pixel)].x;
+    if (SOFTWARE_RASTER) return pixel_nearest[pixel_ix_of(pixel)].x;
     return imageLoad(triangle_ids, ivec2(in_picture(pixel))).x;
 }
 
@@ -36,7 +36,7 @@ Hit hit_of(PathRay ray, uint triangle_ix) {
     Shear shear = shear_of(ray.origin, ray.direction);
     Triangle triangle = triangle_at(triangle_ix);
     Hit hit;
-    if (BY_KERNELS && intersect_triangle(shear, triangle, triangle_ix, hit)) return hit;
+    if (SOFTWARE_RASTER && intersect_triangle(shear, triangle, triangle_ix, hit)) return hit;
     return clamp_to_triangle(shear, triangle, triangle_ix);
 }
 

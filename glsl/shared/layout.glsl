@@ -474,7 +474,7 @@ struct AccelConstants {
 // The curve that maps radiance to the display's range: `TONEMAP_LINEAR` and its like.
 #define CONSTANT_CURVE 8u
 // Whether compute kernels found the triangles that pixels show, rather than the graphics pipeline.
-#define CONSTANT_BY_KERNELS 9u
+#define CONSTANT_SOFTWARE_RASTER 9u
 
 // Whether a kernel builds the lower level of a grid.
 #define CONSTANT_LOWER 10u

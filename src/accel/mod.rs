@@ -46,7 +46,11 @@ pub enum AccelKind {
     Grid2,
 }
 
-named_enum!(AccelKind { KdTree = "kdtree", Grid = "grid", Grid2 = "grid2" });
+named_enum!(AccelKind {
+    KdTree = "kdtree": "a kd-tree by the surface area heuristic: rays are fastest, the build takes longest",
+    Grid = "grid": "a uniform grid: the device builds it in a millisecond; for triangles of even size and distribution",
+    Grid2 = "grid2": "a grid of two levels: cells with many triangles are cut again; built in two milliseconds",
+});
 
 impl AccelKind {
     /// The structure's name, as it is written in a sentence.

@@ -30,6 +30,13 @@ impl Variant {
         format!("{}, {}, {}", Traversal::words(), AccelKind::Grid, AccelKind::Grid2)
     }
 
+    /// Returns a list of all words, one in a line, each with what its variant does.
+    pub fn descriptions() -> String {
+        let accels = AccelKind::descriptions();
+        let grids = accels.lines().filter(|line| !line.starts_with(&format!("- {}:", AccelKind::KdTree)));
+        [Traversal::descriptions().as_str()].into_iter().chain(grids).collect::<Vec<_>>().join("\n")
+    }
+
     /// Returns the kind of structure that is searched.
     pub fn accel(self) -> AccelKind {
         match self {
@@ -67,7 +74,7 @@ impl FromStr for Variant {
         match word.parse() {
             Ok(AccelKind::Grid) => Ok(Self::Grid),
             Ok(AccelKind::Grid2) => Ok(Self::Grid2),
-            _ => Err(UnknownWord { word: word.to_owned(), expected: Self::words() }),
+            _ => Err(UnknownWord::Unknown { word: word.to_owned(), expected: Self::words() }),
         }
     }
 }

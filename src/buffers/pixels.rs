@@ -43,7 +43,7 @@ impl Pixels {
         let n_pixels = n_pixels(frame);
         let size = (frame.picture_width, frame.picture_height);
         let storage = BufferUse::Storage;
-        let (features, by_kernels) = (options.features, options.primary == Primary::Compute);
+        let (features, software_raster) = (options.features, options.primary == Primary::SoftwareRaster);
         let filters = frame.denoise_threshold.is_finite();
         let (triangle_ids, depth) = if draws(options) {
             let target = |name, kind| Target::new(context, name, kind, size).map(Arc::new);
@@ -56,7 +56,7 @@ impl Pixels {
             pixel_accumulated: None,
             pixel_filtered: filters.then(|| Buffer::new(context, "pixel_filtered", n_pixels, storage)).transpose()?,
             pixel_display: Buffer::new(context, "pixel_display", n_pixels, storage)?,
-            pixel_nearest: Buffer::new(context, "pixel_nearest", if by_kernels { n_pixels } else { 0 }, storage)?,
+            pixel_nearest: Buffer::new(context, "pixel_nearest", if software_raster { n_pixels } else { 0 }, storage)?,
             pixel_features: Buffer::new(context, "pixel_features", if features { n_pixels } else { 0 }, storage)?,
             triangle_ids,
             depth,
@@ -77,7 +77,7 @@ impl Pixels {
             && (has_targets || !draws(options))
             && self.depth.is_some() == draws(options)
             && self.pixel_features.is_empty() != options.features
-            && self.pixel_nearest.is_empty() == (options.primary != Primary::Compute)
+            && self.pixel_nearest.is_empty() == (options.primary != Primary::SoftwareRaster)
             && self.pixel_filtered.is_some() == frame.denoise_threshold.is_finite()
     }
 

@@ -34,7 +34,7 @@ impl RasterQueue {
     /// # Errors
     /// A buffer is beyond the device's limits, or memory runs out.
     pub fn new(context: &Arc<Context>, n_triangles: u32, options: &RenderOptions) -> Result<Self, GpuError> {
-        let n_large = if options.primary == Primary::Compute { n_triangles as usize } else { 0 };
+        let n_large = if options.primary == Primary::SoftwareRaster { n_triangles as usize } else { 0 };
         Ok(Self {
             groups: Buffer::new(context, "raster_groups", 1, BufferUse::Indirect)?,
             large_triangles: Buffer::new(context, "large_triangles", n_large, BufferUse::Storage)?,
@@ -49,6 +49,6 @@ impl RasterQueue {
     /// Whether there is room if the options need it, and none if they do not.
     pub fn fits(&self, n_triangles: u32, options: &RenderOptions) -> bool {
         let has_room = self.large_triangles.len() == n_triangles as usize;
-        if options.primary == Primary::Compute { has_room } else { self.large_triangles.is_empty() }
+        if options.primary == Primary::SoftwareRaster { has_room } else { self.large_triangles.is_empty() }
     }
 }

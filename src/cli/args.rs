@@ -18,7 +18,10 @@ pub use super::view_args::ViewArgs;
 use super::{
     error::CliError,
     or_auto::OrAuto,
-    picture_args::{PictureArgs, accel_help, build_help, check_accel, traversal_help},
+    picture_args::{
+        PictureArgs, accel_help, accel_long_help, build_help, build_long_help, check_accel, listed, traversal_help,
+        traversal_long_help, with_words,
+    },
 };
 
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
@@ -71,7 +74,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..=65_536))]
     pub spp: u32,
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    #[arg(help = format!("What else to write of each pixel, as layers of an .exr, with commas: {}", Aov::words()))]
+    #[arg(help = with_words("Layers of each pixel to write into an .exr, separated by commas", None, &Aov::words()))]
+    #[arg(long_help = listed("Layers of each pixel to write into an .exr, separated by commas", "none", &Aov::descriptions()))]
     pub aov: Vec<Aov>,
     #[command(flatten)]
     pub picture: PictureArgs,
@@ -116,13 +120,15 @@ pub struct CastArgs {
     /// Find only whether each ray hits anything (occlusion), not the closest hit
     #[arg(long)]
     pub any: bool,
-    #[arg(long, value_name = "KIND", help = accel_help(), default_value_t)]
+    #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
+    #[arg(hide_default_value = true)]
     pub accel: AccelKind,
     #[arg(long, value_name = "ALGORITHM")]
-    #[arg(help = traversal_help(), default_value = "auto", hide_default_value = true)]
+    #[arg(help = traversal_help(), long_help = traversal_long_help())]
+    #[arg(default_value = "auto", hide_default_value = true)]
     pub traversal: OrAuto<Traversal>,
     #[arg(long, value_name = "TREE", default_value_t = BuildPolicy::Auto)]
-    #[arg(help = build_help())]
+    #[arg(help = build_help(), long_help = build_long_help(), hide_default_value = true)]
     pub build: BuildPolicy,
     /// Number of times to cast the rays, 1 to 10000; the report shows the minimum, median and maximum time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u16).range(1..=10_000))]
@@ -151,7 +157,8 @@ pub struct CastArgs {
 pub struct InspectArgs {
     /// Scene file (TOML or OBJ)
     pub scene: PathBuf,
-    #[arg(long, value_name = "KIND", help = accel_help(), default_value_t)]
+    #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
+    #[arg(hide_default_value = true)]
     pub accel: AccelKind,
     /// Print the description as JSON
     #[arg(long)]

@@ -27,7 +27,10 @@ impl<T: FromStr<Err = UnknownWord>> FromStr for OrAuto<T> {
     fn from_str(word: &str) -> Result<Self, String> {
         match word {
             "auto" => Ok(Self::Auto),
-            _ => word.parse().map(Self::Pinned).map_err(|error| format!("{error}, auto")),
+            _ => word.parse().map(Self::Pinned).map_err(|error| match error {
+                UnknownWord::Unknown { .. } => format!("{error}, auto"),
+                UnknownWord::Renamed { .. } => error.to_string(),
+            }),
         }
     }
 }
@@ -43,6 +46,12 @@ mod tests {
         assert_eq!("auto".parse(), Ok(OrAuto::<Primary>::Auto));
         assert_eq!("trace".parse::<OrAuto<Primary>>().unwrap().pinned(), Some(Primary::Trace));
         let error = "Auto".parse::<OrAuto<Primary>>().unwrap_err();
-        assert_eq!(error, "`Auto` is not one of raster, compute, trace, auto");
+        assert_eq!(error, "`Auto` is not one of raster, software-raster, trace, auto");
+    }
+
+    #[test]
+    fn an_old_word_is_refused_by_the_new_one() {
+        let error = "compute".parse::<OrAuto<Primary>>().unwrap_err();
+        assert_eq!(error, "`compute` is now called `software-raster`");
     }
 }

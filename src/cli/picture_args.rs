@@ -30,36 +30,67 @@ pub struct PictureArgs {
     #[arg(long, value_name = "X", value_parser = positive)]
     pub exposure: Option<f32>,
     #[arg(long, value_name = "CURVE")]
-    #[arg(help = format!("From radiance to what a display shows: {} [default: the scene's]", Tonemap::words()))]
+    #[arg(help = with_words("Tone curve from radiance to what a display shows", Some("the scene's"), &Tonemap::words()))]
+    #[arg(long_help = listed("Tone curve from radiance to what a display shows", "the scene's", &Tonemap::descriptions()))]
     pub tonemap: Option<Tonemap>,
-    #[arg(long, value_name = "KIND", help = accel_help(), default_value_t)]
+    #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
+    #[arg(hide_default_value = true)]
     pub accel: AccelKind,
     #[arg(long, value_name = "ALGORITHM")]
-    #[arg(help = traversal_help(), default_value = "auto", hide_default_value = true)]
+    #[arg(help = traversal_help(), long_help = traversal_long_help())]
+    #[arg(default_value = "auto", hide_default_value = true)]
     pub traversal: OrAuto<Traversal>,
-    /// How primary rays find their triangles. raster: the device's graphics pipeline rasterizes them; compute:
-    /// compute kernels rasterize them, which needs 64-bit atomics (with --cpu it equals raster); trace: rays search
-    /// the acceleration structure; auto: the method that suits the device, the scene and the picture's size, or that
-    /// a measurement has found to be quicker [default: auto]
-    #[arg(long, value_name = "auto|raster|compute|trace", default_value = "auto", hide_default_value = true)]
+    #[arg(long, value_name = "METHOD", help = primary_help(), long_help = primary_long_help())]
+    #[arg(default_value = "auto", hide_default_value = true)]
     pub primary: OrAuto<Primary>,
-    #[arg(long, value_name = "TREE", default_value_t = BuildPolicy::Auto)]
-    #[arg(help = build_help())]
+    #[arg(long, value_name = "TREE", default_value_t = BuildPolicy::Auto, hide_default_value = true)]
+    #[arg(help = build_help(), long_help = build_long_help())]
     pub build: BuildPolicy,
 }
 
+/// Returns a short help text: what the option says, its words, its default.
+pub fn with_words(what: &str, default: Option<&str>, words: &str) -> String {
+    let default = default.map_or_else(String::new, |default| format!(" [default: {default}]"));
+    format!("{what}: {words}{default}")
+}
+
+/// Returns a long help text: what the option says, its default, and what each of its words means.
+pub fn listed(what: &str, default: &str, descriptions: &str) -> String {
+    format!("{what} [default: {default}]\n\n{descriptions}")
+}
+
+const ACCEL: &str = "Acceleration structure that leads rays to triangles";
+const TRAVERSAL: &str = "Algorithm by which rays go through the kd-tree";
+const PRIMARY: &str = "How primary rays find their triangles";
+const BUILD: &str = "Which kd-tree is built";
+
 /// Returns the help text of `--accel`.
 pub fn accel_help() -> String {
-    format!("The acceleration structure that leads rays to triangles: {}", AccelKind::words())
+    with_words(ACCEL, Some("kdtree"), &AccelKind::words())
+}
+
+/// Returns the help text of `--accel` with all words explained.
+pub fn accel_long_help() -> String {
+    listed(ACCEL, "kdtree", &AccelKind::descriptions())
+}
+
+/// Returns the help text of `--primary`.
+fn primary_help() -> String {
+    with_words(PRIMARY, Some("auto"), &format!("{}, auto", Primary::words()))
+}
+
+/// Returns the help text of `--primary` with all words explained.
+fn primary_long_help() -> String {
+    let auto = "- auto: what suits the device, the scene and the picture's size, or what a measurement has found to be \
+                quicker";
+    listed(PRIMARY, "auto", &format!("{}\n{auto}", Primary::descriptions()))
 }
 
 /// Refuses arguments for kd-trees if the structure is a grid.
 pub fn check_accel(accel: AccelKind, traversal: OrAuto<Traversal>, build: BuildPolicy) -> Result<(), CliError> {
     check_traversal(accel, traversal.pinned())?;
     if accel != AccelKind::KdTree && build != BuildPolicy::Auto {
-        return Err(CliError::Usage(format!(
-            "--build says how much work goes into the kd-tree: with --accel {accel}, a grid is built"
-        )));
+        return Err(CliError::Usage(format!("--build chooses a kd-tree: with --accel {accel}, a grid is built")));
     }
     Ok(())
 }
@@ -77,20 +108,27 @@ pub fn check_traversal(accel: AccelKind, traversal: Option<Traversal>) -> Result
 
 /// Returns the help text of `--traversal`.
 pub fn traversal_help() -> String {
-    let (words, of_devices, of_cpu) = (Traversal::words(), traversals_of_devices(), Traversal::OF_CPU);
-    format!(
-        "The algorithm by which rays go through the kd-tree: {words}, or auto: {of_devices}, with --cpu {of_cpu}, or \
-         what a measurement on this GPU and scene has found to be quicker [default: auto]"
-    )
+    with_words(TRAVERSAL, Some("auto"), &format!("{}, auto", Traversal::words()))
+}
+
+/// Returns the help text of `--traversal` with all words explained.
+pub fn traversal_long_help() -> String {
+    let auto = format!(
+        "- auto: {}, with --cpu {}, or what a measurement on this GPU and scene has found to be quicker",
+        traversals_of_devices(),
+        Traversal::OF_CPU
+    );
+    listed(TRAVERSAL, "auto", &format!("{}\n{auto}", Traversal::descriptions()))
 }
 
 /// Returns the help text of `--build`.
 pub fn build_help() -> String {
-    format!(
-        "Which kd-tree to build: {}. best traces fastest; fast is built in half of the time, and rays take up to a \
-         tenth longer on the CPU, up to twice as long on a GPU; auto takes what is quicker for the number of rays",
-        BuildPolicy::words()
-    )
+    with_words(BUILD, Some("auto"), &BuildPolicy::words())
+}
+
+/// Returns the help text of `--build` with all words explained.
+pub fn build_long_help() -> String {
+    listed(BUILD, "auto", &BuildPolicy::descriptions())
 }
 
 /// Returns the default traversals of GPUs and software drivers, as a phrase of a help text.

@@ -163,7 +163,7 @@ impl Renderer {
     }
 
     /// Returns which passes the next sample has. Only the device has kernels that rasterize, so the CPU replaces
-    /// `Primary::Compute` by `Primary::Raster`.
+    /// `Primary::SoftwareRaster` by `Primary::Raster`.
     fn frame_kind(&self) -> FrameKind {
         let kind = FrameKind::new(&self.options, self.frame.n_lights);
         let primary = if kind.primary == Primary::Trace { Primary::Trace } else { Primary::Raster };

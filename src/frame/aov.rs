@@ -24,14 +24,14 @@ pub enum Aov {
 }
 
 named_enum!(Aov {
-    Depth = "depth",
-    Normal = "normal",
-    Position = "position",
-    Albedo = "albedo",
-    Id = "id",
-    Material = "material",
-    Rays = "rays",
-    Cost = "cost"
+    Depth = "depth": "distance along the camera's view; infinity where nothing is hit",
+    Normal = "normal": "shading normal, world space",
+    Position = "position": "point that is hit, world space",
+    Albedo = "albedo": "diffuse reflectance (Kd), linear",
+    Id = "id": "index of the triangle; 4294967295 where nothing is hit",
+    Material = "material": "index of the material; 4294967295 where nothing is hit",
+    Rays = "rays": "number of the pixel's primary, secondary and shadow rays",
+    Cost = "cost": "nodes and triangles that these rays read; also drawn as NAME.cost.png",
 });
 
 /// A named channel, with a number for each pixel.

@@ -128,7 +128,7 @@ pub enum Primary {
     /// Compute kernels rasterize triangles with the ray-triangle test of the traversal. So hits are those of `Trace`,
     /// bit for bit, unless the camera is farther from the scene than `KD_MAX_ORIGIN_DISTANCE` allows. Needs 64-bit
     /// atomics. The CPU has no such kernels and takes `Raster` instead.
-    Compute,
+    SoftwareRaster,
     /// Rays are traced through the acceleration structure.
     Trace,
 }
@@ -156,5 +156,13 @@ pub struct Picture {
     pub display: Vec<[u8; 4]>,
 }
 
-named_enum!(Tonemap { Linear = "linear", Agx = "agx", Aces = "aces" });
-named_enum!(Primary { Raster = "raster", Compute = "compute", Trace = "trace" });
+named_enum!(Tonemap {
+    Linear = "linear": "radiance as it is; what is above white is clipped",
+    Agx = "agx": "AgX: bright colours fade to white, dark ones keep their hue",
+    Aces = "aces": "the ACES curve of films: more contrast",
+});
+named_enum!(Primary {
+    Raster = "raster": "the device's graphics pipeline rasterizes the triangles",
+    SoftwareRaster = "software-raster": "compute kernels rasterize them, with 64-bit atomics; with --cpu as raster",
+    Trace = "trace": "rays are traced through the acceleration structure",
+} renamed { "compute" => "software-raster" });

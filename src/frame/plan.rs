@@ -133,7 +133,7 @@ pub fn visibility(primary: Primary) -> Section {
     match primary {
         Primary::Trace => Section::new(),
         Primary::Raster => vec![Step::Run(Pass::Visibility)], // it leaves triangle_ids visible to kernels
-        Primary::Compute => vec![
+        Primary::SoftwareRaster => vec![
             Step::Run(Pass::RasterizeTriangles),
             barrier(Touch::Write, Touch::Update, &[PixelNearest, LargeTriangles, RasterGroups]),
             barrier(Touch::Write, Touch::Indirect, &[RasterGroups]),

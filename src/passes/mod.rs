@@ -139,7 +139,9 @@ impl Passes {
         bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Option<Arc<Rasterize>>, GpuError> {
-        (options.primary == Primary::Compute).then(|| Rasterize::new(context, bindings).map(Arc::new)).transpose()
+        (options.primary == Primary::SoftwareRaster)
+            .then(|| Rasterize::new(context, bindings).map(Arc::new))
+            .transpose()
     }
 
     /// Creates the passes for the options `to`. They share with these passes, which were created for the options

@@ -25,7 +25,7 @@ impl PrimaryHit {
             .set(constants::FUSED_FMA, context.fuses_fma()?)
             .set(constants::COUNTS, options.profile)
             .set(constants::COUNT_COSTS, options.features)
-            .set(constants::BY_KERNELS, options.primary == Primary::Compute);
+            .set(constants::SOFTWARE_RASTER, options.primary == Primary::SoftwareRaster);
         Ok(Self { kernel: kernel(context, bindings, "primary_hit", spirv!("primary_hit.comp"), &constants)? })
     }
 

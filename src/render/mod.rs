@@ -315,7 +315,7 @@ impl Renderer {
         if self.options.features {
             commands.clear_buffer(self.resources.pixels.pixel_features.any());
         }
-        if self.options.primary == Primary::Compute {
+        if self.options.primary == Primary::SoftwareRaster {
             Rasterize::reset(commands, &self.resources);
         }
         // bounces, counters, pixel_features, raster_groups

@@ -2,15 +2,32 @@
 
 /// A word that names no variant of an option.
 #[derive(Debug, thiserror::Error)]
-#[error("`{word}` is not one of {expected}")]
-pub struct UnknownWord {
-    pub(crate) word: String,
-    pub(crate) expected: String,
+pub enum UnknownWord {
+    /// The word never named a variant.
+    #[error("`{word}` is not one of {expected}")]
+    Unknown {
+        /// The word.
+        word: String,
+        /// The words of all variants, separated by commas.
+        expected: String,
+    },
+    /// The word named a variant once.
+    #[error("`{word}` is now called `{now}`")]
+    Renamed {
+        /// The word.
+        word: String,
+        /// The variant's word.
+        now: &'static str,
+    },
 }
 
 /// Implements `ALL`, `words`, `FromStr` and `Display` for an enum without fields.
+///
+/// A description may follow a word, `Mask = "mask": "what the variant does"`. If all words have one, `descriptions`
+/// lists them for a help text. Words that a variant had once follow the variants, `renamed { "old" => "new" }`; they are
+/// refused by an error that names the new word.
 macro_rules! named_enum {
-    ($ty:ident { $($variant:ident = $word:literal),+ }) => {
+    (@common $ty:ident { $($variant:ident = $word:literal),+ } renamed { $($old:literal => $now:literal),* }) => {
         impl $ty {
             /// Every variant.
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
@@ -25,13 +42,29 @@ macro_rules! named_enum {
             fn from_str(word: &str) -> Result<Self, $crate::util::UnknownWord> {
                 match word {
                     $($word => Ok(Self::$variant),)+
-                    _ => Err($crate::util::UnknownWord { word: word.to_owned(), expected: Self::words() }),
+                    $($old => Err($crate::util::UnknownWord::Renamed { word: word.to_owned(), now: $now }),)*
+                    _ => Err($crate::util::UnknownWord::Unknown { word: word.to_owned(), expected: Self::words() }),
                 }
             }
         }
         impl std::fmt::Display for $ty {
             fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
                 f.write_str(match self { $(Self::$variant => $word),+ })
+            }
+        }
+    };
+    ($ty:ident { $($variant:ident = $word:literal),+ $(,)? }) => {
+        named_enum!(@common $ty { $($variant = $word),+ } renamed {});
+    };
+    (
+        $ty:ident { $($variant:ident = $word:literal : $description:literal),+ $(,)? }
+        $(renamed { $($old:literal => $now:literal),* })?
+    ) => {
+        named_enum!(@common $ty { $($variant = $word),+ } renamed { $($($old => $now),*)? });
+        impl $ty {
+            /// Returns a list of all words, one in a line, each with what its variant does.
+            pub fn descriptions() -> String {
+                [$(concat!("- ", $word, ": ", $description)),+].join("\n")
             }
         }
     };

@@ -104,8 +104,8 @@ fn assert_same_bits(options: &RenderOptions, n_samples: u32, least_bands: u32) {
 
 #[test]
 fn every_way_of_primary_rays() {
-    for primary in [Primary::Raster, Primary::Trace, Primary::Compute] {
-        if primary == Primary::Compute && !device().has_int64_atomics() {
+    for primary in [Primary::Raster, Primary::Trace, Primary::SoftwareRaster] {
+        if primary == Primary::SoftwareRaster && !device().has_int64_atomics() {
             continue;
         }
         assert_same_bits(&RenderOptions { primary, ..options(64, 48, 2) }, 1, 2);

@@ -119,7 +119,7 @@ fn triangles_that_are_not_bound_are_rasterized() {
     if !any.has_int64_atomics() {
         return;
     }
-    let options = RenderOptions { primary: Primary::Compute, ..options(24, 16, 2) };
+    let options = RenderOptions { primary: Primary::SoftwareRaster, ..options(24, 16, 2) };
     let n_bytes = (world.scene().triangles.len() * size_of::<LargeTriangle>()) as u64;
     let with_range = |bytes| Renderer::new(device_with(bytes, 1), &world, &options);
     let mut by_address = with_range(n_bytes).expect("a renderer");

@@ -69,7 +69,7 @@ fn compute_and_trace_are_the_same() {
     let crop = Some(Crop { x0: 33, y0: 0, x1: 120, y1: 41 });
     let compute_and_trace = |options: &RenderOptions, n_samples: u32, capacity: u32| {
         let context = device();
-        [Primary::Compute, Primary::Trace].map(|primary| {
+        [Primary::SoftwareRaster, Primary::Trace].map(|primary| {
             let (scene, options) = (scenes::mixed_outdoors(), RenderOptions { primary, ..options.clone() });
             let world = world_of(&scene);
             let mut renderer =
@@ -96,8 +96,8 @@ fn compute_and_trace_are_the_same() {
 fn ways_suit_the_device() {
     let gpu = with_lanes(1000);
     let suited = |n_triangles| primary_by_rule(Some(&gpu), n_triangles, (100, 80));
-    let by_kernels = if gpu.has_int64_atomics() { Primary::Compute } else { Primary::Trace };
-    assert_eq!([suited(8001), suited(usize::MAX)], [by_kernels, Primary::Trace]);
+    let software_raster = if gpu.has_int64_atomics() { Primary::SoftwareRaster } else { Primary::Trace };
+    assert_eq!([suited(8001), suited(usize::MAX)], [software_raster, Primary::Trace]);
     let without = without_wide_atomics();
     let n_raster = if without.predicates_branches() { 4 * 8000 } else { 8000 };
     let suited = [n_raster, n_raster + 1].map(|n| primary_by_rule(Some(&without), n, (100, 80)));

@@ -159,7 +159,7 @@ fn other_primary_rays() {
     let primary = |primary| (RenderOptions { primary, ..small() }, 10);
     let mut ways = vec![Primary::Trace, Primary::Raster];
     if device().has_int64_atomics() {
-        ways.extend([Primary::Compute, Primary::Trace]);
+        ways.extend([Primary::SoftwareRaster, Primary::Trace]);
     }
     Trial::new(device(), &small()).walk(&ways.into_iter().map(primary).collect::<Vec<_>>());
 }
@@ -227,7 +227,7 @@ fn what_the_device_lacks() {
         let untouched = trial.untouched();
         begin(&mut trial.renderer);
         let before = state(&trial.renderer);
-        let refused = trial.renderer.set_options(&RenderOptions { primary: Primary::Compute, ..small() });
+        let refused = trial.renderer.set_options(&RenderOptions { primary: Primary::SoftwareRaster, ..small() });
         assert!(matches!(refused, Err(GpuError::Lacks { .. })), "{:?}", refused.err());
         assert_eq!(state(&trial.renderer), before);
         assert!(identical(&finish(&mut trial.renderer), &untouched), "{primary}");

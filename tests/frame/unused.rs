@@ -26,7 +26,7 @@ fn assert_drawn_by(resources: &Resources, scene: &FlatScene, primary: Primary) {
     );
     let expected = match primary {
         Primary::Raster => (Some(3 * scene.triangles.len()), Some(SIZE), SIZE),
-        Primary::Compute | Primary::Trace => (None, None, (1, 1)),
+        Primary::SoftwareRaster | Primary::Trace => (None, None, (1, 1)),
     };
     assert_eq!(found, expected, "{primary}");
 }
@@ -42,7 +42,7 @@ fn only_what_draws_has_indices_and_targets() {
     let new = |primary| Renderer::new(context.clone(), &world, &with(primary)).expect("a renderer");
     let mut drawing = new(Primary::Raster);
     let drawn = drawing.render().expect("a frame").0;
-    let ways = [Primary::Trace, Primary::Compute];
+    let ways = [Primary::Trace, Primary::SoftwareRaster];
     for from in ways.into_iter().filter(|&way| way == Primary::Trace || context.has_int64_atomics()) {
         let mut renderer = new(from);
         assert_drawn_by(renderer.resources(), &scene, from);

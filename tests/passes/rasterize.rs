@@ -27,7 +27,7 @@ struct View {
 fn view(scene: FlatScene, options: RenderOptions) -> Option<View> {
     let context = Context::new(&ContextOptions::default()).expect("a device");
     let crop = options.crop_or_whole();
-    let options = RenderOptions { primary: Primary::Compute, ..options };
+    let options = RenderOptions { primary: Primary::SoftwareRaster, ..options };
     let stage = context.has_int64_atomics().then(|| Stage::new(scene, options, crop.width() * crop.height()))?;
     let options = RenderOptions { primary: Primary::Trace, ..stage.options.clone() };
     let passes = Passes::new(&stage.context, &stage.resources.bindings, &options).expect("passes");
@@ -49,7 +49,7 @@ impl View {
         hits_by(&self.stage, |commands, batch| {
             Rasterize::reset(commands, resources);
             commands.barrier(Access::TransferWrite, Access::AllReads); // raster_groups
-            passes.record_section(commands, resources, &plan::visibility(Primary::Compute), &Inputs::default());
+            passes.record_section(commands, resources, &plan::visibility(Primary::SoftwareRaster), &Inputs::default());
             passes.primary_hit.record(commands, batch);
         })
     }
@@ -205,7 +205,7 @@ fn nothing_is_shown_of_an_empty_scene() {
 fn a_device_without_wide_atomics_is_told_so() {
     let context = without_wide_atomics();
     let scene = scenes::mixed();
-    let options = RenderOptions { primary: Primary::Compute, ..options(9, 7) };
+    let options = RenderOptions { primary: Primary::SoftwareRaster, ..options(9, 7) };
     match Renderer::new(context, &world_of(&scene), &options).err() {
         Some(GpuError::Lacks { missing, .. }) => assert_eq!(missing, "shaderBufferInt64Atomics"),
         other => panic!("{other:?}"),

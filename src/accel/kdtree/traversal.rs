@@ -62,12 +62,12 @@ impl Traversal {
 }
 
 named_enum!(Traversal {
-    Mask = "mask",
-    MaskBoxes = "mask-boxes",
-    Restart = "restart",
-    Backtrack = "backtrack",
-    ShortStack = "short-stack",
-    Ropes = "ropes",
-    Stack = "stack",
-    Brute = "brute"
+    Mask = "mask": "one bit a level for pending siblings, whose intervals are kept in local memory",
+    MaskBoxes = "mask-boxes": "the paper's own: one bit a level for finished siblings; nodes' boxes say which to visit",
+    Restart = "restart": "each pending subtree is found again from the root",
+    Backtrack = "backtrack": "back to the deepest ancestor that the ray has not left, found by the nodes' boxes",
+    ShortStack = "short-stack": "the eight newest far children are kept, older ones are found by a restart",
+    Ropes = "ropes": "from leaf to leaf, along links to neighbours",
+    Stack = "stack": "a stack of all far children; with --cpu packets of sixteen rays",
+    Brute = "brute": "every triangle is tested, without a tree; for small meshes",
 });

@@ -41,8 +41,8 @@ impl Raster {
     /// # Errors
     /// Fails as [`Renderer::new`] does.
     pub fn all(context: &Arc<Context>, stage: &Stage) -> Result<Vec<Self>, GpuError> {
-        let by_kernels = context.has_int64_atomics().then_some(Primary::Compute);
-        [Primary::Raster].into_iter().chain(by_kernels).map(|primary| Self::new(context, stage, primary)).collect()
+        let software_raster = context.has_int64_atomics().then_some(Primary::SoftwareRaster);
+        [Primary::Raster].into_iter().chain(software_raster).map(|primary| Self::new(context, stage, primary)).collect()
     }
 
     /// Draws `n_frames` frames, after one that is not counted.

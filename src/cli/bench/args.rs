@@ -17,7 +17,7 @@ use crate::cli::{
     args::{Size, device},
     error::CliError,
     file_roles::FileRoles,
-    picture_args::{accel_help, traversal_help, traversals_of_devices},
+    picture_args::{accel_help, accel_long_help, listed, traversal_help, traversal_long_help, traversals_of_devices},
 };
 
 /// The suites: what is measured.
@@ -78,6 +78,11 @@ pub struct TraversalArgs {
         "Traversals of the kd-tree and grids, as mask,stack,grid: {} [default: all but brute]",
         Variant::words()
     ))]
+    #[arg(long_help = listed(
+        "Traversals of the kd-tree and kinds of grids, separated by commas, for example mask,stack,grid",
+        "all but brute",
+        &Variant::descriptions()
+    ))]
     pub variants: Vec<Variant>,
     /// Number of timed casts of each set of rays, 1 to 10000
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
@@ -124,10 +129,11 @@ pub struct SizeArgs {
     /// Size of the picture in pixels; each pixel has one primary ray
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,
-    #[arg(long, value_name = "KIND", help = accel_help(), default_value_t)]
+    #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
+    #[arg(hide_default_value = true)]
     pub accel: AccelKind,
     #[arg(long, value_name = "ALGORITHM")]
-    #[arg(help = traversal_help())]
+    #[arg(help = traversal_help(), long_help = traversal_long_help())]
     pub traversal: Option<Traversal>,
     /// Number of timed casts of each set of rays, 1 to 10000
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]

@@ -184,7 +184,7 @@ impl Request {
         if methods.traversal.by == Reason::Rule && world.accel().kind() == AccelKind::KdTree {
             trial.choose_traversal(&mut methods)?;
         }
-        let may_trace = methods.primary == Chosen { value: Primary::Compute, by: Reason::Rule };
+        let may_trace = methods.primary == Chosen { value: Primary::SoftwareRaster, by: Reason::Rule };
         if may_trace && workload.primaries_agree(world) {
             trial.choose_primary(&mut methods)?;
         }

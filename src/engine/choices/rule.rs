@@ -19,7 +19,9 @@ pub fn primary_by_rule(context: Option<&Context>, n_triangles: usize, size: (u32
         // Mesa's lavapipe rasterizes 870,000 triangles in 72 ms, and traces 790,000 rays in 242 ms
         // (benches/EXPERIMENTS.md).
         Some(context) if context.predicates_branches() => Primary::suited_to(n_triangles, size, 4),
-        Some(context) if context.has_int64_atomics() && RasterQueue::has_room(context, n_triangles) => Primary::Compute,
+        Some(context) if context.has_int64_atomics() && RasterQueue::has_room(context, n_triangles) => {
+            Primary::SoftwareRaster
+        }
         _ => Primary::suited_to(n_triangles, size, 1),
     }
 }

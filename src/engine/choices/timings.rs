@@ -94,7 +94,7 @@ impl Candidates<Primary> {
     /// Returns the kinds of primary visibility that find the same hits, for `n_rays` rays in a scene of `n_triangles`
     /// triangles, or none where any will do.
     pub fn of_primaries(n_triangles: usize, n_rays: u64) -> Option<Self> {
-        Self::new(vec![Primary::Compute, Primary::Trace], n_triangles, n_rays)
+        Self::new(vec![Primary::SoftwareRaster, Primary::Trace], n_triangles, n_rays)
     }
 }
 

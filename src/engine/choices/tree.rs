@@ -15,7 +15,11 @@ pub enum BuildPolicy {
     Best,
 }
 
-named_enum!(BuildPolicy { Auto = "auto", Fast = "fast", Best = "best" });
+named_enum!(BuildPolicy {
+    Auto = "auto": "the tree with which building and tracing take the least time together",
+    Fast = "fast": "built in half of the time; rays take up to a tenth longer on the CPU, up to twice as long on a GPU",
+    Best = "best": "the tree through which rays are fastest",
+});
 
 impl BuildPolicy {
     /// Returns the kind of tree that the user specifies, or none for [`BuildPolicy::Auto`].
