@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures grids against the kd-tree where grids do well and where they do badly.
 
-    python3 benches/grids.py target/release/kdray [--mesh dragon.obj] [--size 1920x1080] [--json all.json]
+    python3 benches/grids.py target/release/kdray [--mesh dragon.obj] [--size 1920x1080] [--repeat 5] [--cpu]
 
 There are four scenes: a soup of triangles of one size in a uniform distribution, an interior of coarse walls and
 furniture with finer ornaments, a mesh in a closed room (the OBJ file that --mesh names, or a generated knot), and a
@@ -140,10 +140,10 @@ def write_soup(path, n_triangles):
             file.write("f %d %d %d\n" % (3 * i + 1, 3 * i + 2, 3 * i + 3))
 
 
-def measure(binary, scene, options, size):
+def measure(binary, scene, options):
     """Runs `kdray bench traversal` on a scene and returns its report as parsed JSON."""
     with tempfile.NamedTemporaryFile(suffix=".json") as report:
-        words = [binary, "bench", "traversal", str(scene), "--size", size, "--variants", ",".join(VARIANTS)]
+        words = [binary, "bench", "traversal", str(scene), "--variants", ",".join(VARIANTS)]
         subprocess.run(words + options + ["--json", report.name], check=True, stdout=subprocess.DEVNULL)
         return json.load(open(report.name))
 
@@ -165,8 +165,11 @@ def main():
     parser.add_argument("binary", help="the program `kdray`")
     parser.add_argument("--mesh", help="an OBJ file for the mesh in a room, such as the Stanford dragon")
     parser.add_argument("--size", default="1920x1080", help="pixels, one primary ray each")
+    parser.add_argument("--repeat", default="5", help="timed casts of each set of rays")
+    parser.add_argument("--cpu", action="store_true", help="cast on the CPU, without Vulkan")
     parser.add_argument("--json", help="write all reports to this file")
     args = parser.parse_args()
+    common = ["--size", args.size, "--repeat", args.repeat] + ["--cpu"] * args.cpu
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         write_soup(folder / "soup.obj", 200_000)
@@ -182,7 +185,7 @@ def main():
         reports = {}
         for name, scene, options in scenes:
             print("measuring: %s" % name, file=sys.stderr)
-            reports[name] = measure(args.binary, scene, options, args.size)
+            reports[name] = measure(args.binary, scene, options + common)
             print(table(name, reports[name]), flush=True)
     if args.json:
         pathlib.Path(args.json).write_text(json.dumps(reports, indent=2))

@@ -18,6 +18,7 @@ use kdray::{
         traversal::Tracers,
         variant::Variant,
     },
+    gpu::{Context, ContextOptions},
     layout::{Hit, NO_TRIANGLE, PathRay},
     reference::traverser::{Tracer, Traverser},
     world::{FlatScene, World},
@@ -90,6 +91,20 @@ fn without_a_room_only_primary_hits_have_further_rays() {
     for kind in [RayKind::Shadow, RayKind::Mirror, RayKind::Diffuse] {
         assert!(rays(&sets, kind).iter().map(|ray| ray.pixel_ix).eq(pixels.iter().copied()), "{}", kind.name());
     }
+}
+
+/// Brute force tests 20,000 triangles for a ray where the kd-tree leads to a few.
+#[test]
+fn a_slow_variant_warms_up_with_fewer_casts_than_a_fast_one() {
+    let triangles = torus(100, 100);
+    let scene = FlatScene { triangle_materials: vec![0; triangles.len()], triangles, ..mesh() };
+    let stage = Stage::in_room(scene, SIZE, &BuildOptions::default());
+    let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
+    let variants = [Traversal::Mask, Traversal::Brute].map(Variant::KdTree);
+    let mut tracers = Tracers::new(Some(&context), &stage, &variants).unwrap();
+    let [primary, ..] = ray_sets(&stage);
+    let n_casts = tracers.n_warm_up(&primary).unwrap();
+    assert!(n_casts[0] > 4 * n_casts[1], "{n_casts:?} untimed casts");
 }
 
 #[test]

@@ -54,14 +54,15 @@ impl<'a> Tracers<'a> {
     /// Fails as [`Caster::cast`] does.
     pub fn measure(&mut self, set: &RaySet, n_times: u16) -> Result<SetResult, GpuError> {
         let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
-        let query = if set.kind.is_any_hit() { Query::Any } else { Query::Closest };
+        let query = query_of(set);
         let expected = self.cast_on_cpu(Variant::KdTree(Traversal::Mask), &rays, query);
         let mut results = vec![(Some(Vec::new()), Difference::default()); self.variants.len()];
-        let n_warm_up = self.n_warm_up(&rays, query)?;
+        let n_warm_up = self.n_warm_up(set)?;
         for n_casts in turns(n_times) {
             for (variant_ix, (all_ms, difference)) in results.iter_mut().enumerate() {
-                let (hits, ms) = self.cast(variant_ix, &rays, query, n_warm_up + n_casts)?;
-                *all_ms = all_ms.take().zip(ms).map(|(all, ms)| [all, ms[usize::from(n_warm_up)..].to_vec()].concat());
+                let n_untimed = n_warm_up[variant_ix];
+                let (hits, ms) = self.cast(variant_ix, &rays, query, n_untimed + n_casts)?;
+                *all_ms = all_ms.take().zip(ms).map(|(all, ms)| [all, ms[usize::from(n_untimed)..].to_vec()].concat());
                 *difference = difference.max(Difference::of(set.kind, &expected, &hits));
             }
         }
@@ -86,13 +87,23 @@ impl<'a> Tracers<'a> {
         })
     }
 
-    /// Returns the number of untimed casts at the beginning of each turn, at least one. They are needed because the
-    /// rays have just been uploaded, the caches hold another variant's structure, and the device's clock may have
-    /// fallen while the CPU compared hits.
-    fn n_warm_up(&mut self, rays: &[Ray], query: Query) -> Result<u16, GpuError> {
-        let Some(caster) = self.casters.as_mut().and_then(|casters| casters.first_mut()) else { return Ok(1) };
-        let once_ms = caster.cast(rays, query, 1)?.gpu_ms.map_or(f64::INFINITY, |ms| ms.iter().sum());
-        Ok((WARM_UP.as_secs_f64() * 1e3 / once_ms.max(1e-2)).clamp(1.0, 1000.0) as u16)
+    /// Returns, for each variant, the number of untimed casts at the beginning of each of its turns: as many as take
+    /// [`WARM_UP`], at least one. They are needed because the rays have just been uploaded, the caches hold another
+    /// variant's structure, and the device's clock may have fallen while the CPU compared hits. Variants can differ in
+    /// speed by a factor of a thousand, so each has a number of its own.
+    ///
+    /// # Errors
+    /// Fails as [`Caster::cast`] does.
+    #[doc(hidden)]
+    pub fn n_warm_up(&mut self, set: &RaySet) -> Result<Vec<u16>, GpuError> {
+        let Some(casters) = &mut self.casters else { return Ok(vec![1; self.variants.len()]) };
+        let rays: Vec<_> = set.rays.iter().map(cast_ray).collect();
+        let query = query_of(set);
+        let n_casts = |caster: &mut Caster| {
+            let once_ms = caster.cast(&rays, query, 1)?.gpu_ms.map_or(f64::INFINITY, |ms| ms.iter().sum());
+            Ok((WARM_UP.as_secs_f64() * 1e3 / once_ms.max(1e-2)).clamp(1.0, 1000.0) as u16)
+        };
+        casters.iter_mut().map(n_casts).collect()
     }
 
     /// Returns the hits, and the milliseconds of each cast (`None` without timestamps).
@@ -122,6 +133,11 @@ impl<'a> Tracers<'a> {
         cpu::cast(&self.stage.inputs_of(variant), variant.traversal(), query, rays, &mut hits);
         hits
     }
+}
+
+/// Returns the query that the rays of a set are for.
+fn query_of(set: &RaySet) -> Query {
+    if set.kind.is_any_hit() { Query::Any } else { Query::Closest }
 }
 
 /// Returns the number of casts of each turn; they sum to `n_times`.
