@@ -1,6 +1,6 @@
 // Values in an invocation's local memory: pending subtrees, and values that are not needed before the end of the
 // search. The latter would lower the occupancy if they were in registers: an H200 would run fewer rays at a time, and
-// diffuse rays would be a twentieth slower (benches/EXPERIMENTS.md). Software drivers have enough registers and pay
+// diffuse rays would be a twentieth slower (docs/experiments.md). Software drivers have enough registers and pay
 // for each store, so there these values stay in registers. A part of accel.glsl.
 //
 // Needs layout.glsl and PREDICATES_BRANCHES. Provides `local_memory`, `spill_pair`, `spilled_pair` and their slots.

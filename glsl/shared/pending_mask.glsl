@@ -6,7 +6,7 @@
 // shifted as the ray goes down. So the lowest bit is the level of the cell's node, no depth has to be kept, and the
 // lowest set bit tells directly how many levels to go up. The pending cells are in local memory in the order of the
 // bits, without gaps (local_cells.glsl). With a slot for each level, divergent rays would soon spread over more
-// memory than the first cache holds, and would take up to a quarter longer (benches/EXPERIMENTS.md).
+// memory than the first cache holds, and would take up to a quarter longer (docs/experiments.md).
 //
 // Needs kd_nodes.glsl and local_cells.glsl. Provides `mask_down`, `mask_push` and `mask_pop`. Other ways also use the
 // mask itself: `mask_shifted_down`, `mask_shifted_up`, `is_pending`, `mask_mark` and `mask_up`.

@@ -1,5 +1,5 @@
 // Stores of rays and hits, by whole vectors. Some drivers store a struct member by member, and a ray that is written
-// in nine pieces takes three times as long (benches/EXPERIMENTS.md).
+// in nine pieces takes three times as long (docs/experiments.md).
 #ifndef KDRAY_STORE
 #define KDRAY_STORE
 

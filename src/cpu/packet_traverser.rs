@@ -42,7 +42,7 @@ struct Entry {
 }
 
 /// Tells whether a ray that is the only one in a cell is traced faster outside its packet. This is so if one
-/// operation on a packet takes several instructions (benches/EXPERIMENTS.md).
+/// operation on a packet takes several instructions (docs/experiments.md).
 const fn goes_on_alone<S: Simd>() -> bool {
     size_of::<S::f32s>() < size_of::<f32x16<S>>()
 }

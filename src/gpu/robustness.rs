@@ -1,6 +1,6 @@
 //! Kernels without bounds checks. Their indices come from queues that kdray's own kernels write, and from trees and
 //! materials that are checked before they are uploaded (world/mismatch.rs, accel/kdtree/validate.rs). A check of each
-//! load costs rays 3 to 4 % of their speed on an H200 (benches/EXPERIMENTS.md).
+//! load costs rays 3 to 4 % of their speed on an H200 (docs/experiments.md).
 
 use std::ffi::CStr;
 

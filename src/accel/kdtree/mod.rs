@@ -81,7 +81,7 @@ pub struct BuildOptions {
     pub slabs: bool,
 }
 
-/// Options of the tree that traces fastest on a GPU (benches/EXPERIMENTS.md). An intersection cost of 0.7 makes a
+/// Options of the tree that traces fastest on a GPU (docs/experiments.md). An intersection cost of 0.7 makes a
 /// tree that is half as large again and no faster.
 impl Default for BuildOptions {
     fn default() -> Self {

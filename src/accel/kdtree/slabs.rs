@@ -17,7 +17,7 @@ use crate::{
 
 /// The most entries below nodes that get slabs. For each of these numbers, the first node on each path down that has
 /// no more entries gets a slab, if the surface there is flat enough. Larger pieces of the surface hardly ever are
-/// (benches/EXPERIMENTS.md).
+/// (docs/experiments.md).
 const SLAB_ENTRY_LIMITS: [u32; 5] = [8, 32, 128, 512, MAX_SLAB_ENTRIES];
 /// The largest of `SLAB_ENTRY_LIMITS`.
 const MAX_SLAB_ENTRIES: u32 = 2048;

@@ -30,7 +30,7 @@ pub struct Cell {
 
 /// Number of references that does not justify the second word of the traversal's bit mask, which slows all rays down.
 /// A cell at or below the level where the first word ends is split only if it has more. Meshes of a million triangles
-/// have hardly a leaf of as many there (benches/EXPERIMENTS.md).
+/// have hardly a leaf of as many there (docs/experiments.md).
 const FEW_REFERENCES: usize = 64;
 
 impl Cell {

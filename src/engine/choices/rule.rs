@@ -17,7 +17,7 @@ pub fn traversal_by_rule(processor: Processor) -> Traversal {
 pub fn primary_by_rule(context: Option<&Context>, n_triangles: usize, size: (u32, u32)) -> Primary {
     match context {
         // Mesa's lavapipe rasterizes 870,000 triangles in 72 ms, and traces 790,000 rays in 242 ms
-        // (benches/EXPERIMENTS.md).
+        // (docs/experiments.md).
         Some(context) if context.predicates_branches() => Primary::suited_to(n_triangles, size, 4),
         Some(context) if context.has_int64_atomics() && RasterQueue::has_room(context, n_triangles) => {
             Primary::SoftwareRaster
