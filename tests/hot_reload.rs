@@ -72,11 +72,11 @@ fn changed_shaders_draw_and_broken_ones_do_not() {
     edit(&path(tonemap), "uvec3 bytes = ", "uvec3 bytes = no_such_word + ");
     let warning = next("warning: glsl/passes/tonemap.comp:");
     assert!(warning.contains("no_such_word"), "{warning}");
-    assert!(picture.is_shown_on(&display.screen()), "the shaders before go on");
+    assert!(picture.is_shown_on(&display.screen()), "the previous shaders stay in use");
     edit(&path(layout), "#define TILE_SIZE 8u", "#define TILE_SIZE 4u");
     edit(&path(tonemap), "no_such_word + ", "255u - ");
     next("warning: glsl/shared/layout.glsl: ");
-    assert!(picture.is_shown_on(&display.screen()), "the shaders before go on");
+    assert!(picture.is_shown_on(&display.screen()), "the previous shaders stay in use");
     edit(&path(layout), "#define TILE_SIZE 4u", "#define TILE_SIZE 8u");
     display.wait_until("the mended kernel's picture", |screen| inverted(&picture).is_shown_on(screen));
 

@@ -25,6 +25,8 @@ use super::{
 };
 
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
+const AOV: &str = "Layers of each pixel to write into an .exr, separated by commas";
+
 #[derive(Parser)]
 #[command(name = "kdray", version, arg_required_else_help = false)]
 #[command(after_help = "Exit codes: 2 usage, 3 scene or rays, 4 device, 5 output.")]
@@ -74,8 +76,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..=65_536))]
     pub spp: u32,
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    #[arg(help = with_words("Layers of each pixel to write into an .exr, separated by commas", None, &Aov::words()))]
-    #[arg(long_help = listed("Layers of each pixel to write into an .exr, separated by commas", "none", &Aov::descriptions()))]
+    #[arg(help = with_words(AOV, None, &Aov::words()), long_help = listed(AOV, "none", &Aov::descriptions()))]
     pub aov: Vec<Aov>,
     #[command(flatten)]
     pub picture: PictureArgs,
@@ -170,7 +171,9 @@ impl RenderArgs {
     pub fn check(&self) -> Result<(), CliError> {
         self.picture.check()?;
         if self.trace.is_some() && (self.spp > 1 || self.path.is_some()) {
-            return Err(CliError::Usage("--trace shows a single sample: it goes with neither --spp nor --path".into()));
+            return Err(CliError::Usage(
+                "--trace cannot be combined with --spp or --path: it shows a single sample".into(),
+            ));
         }
         Ok(())
     }

@@ -24,7 +24,7 @@ pub enum CliError {
     DeviceMemory(GpuError),
     #[error("{0}")]
     Window(String),
-    #[error("the validation layer had {0} complaint(s)")]
+    #[error("the validation layer reported {0} message(s)")]
     Validation(usize),
     #[error("{0}")]
     WrongHits(String),

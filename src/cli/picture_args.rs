@@ -30,8 +30,8 @@ pub struct PictureArgs {
     #[arg(long, value_name = "X", value_parser = positive)]
     pub exposure: Option<f32>,
     #[arg(long, value_name = "CURVE")]
-    #[arg(help = with_words("Tone curve from radiance to what a display shows", Some("the scene's"), &Tonemap::words()))]
-    #[arg(long_help = listed("Tone curve from radiance to what a display shows", "the scene's", &Tonemap::descriptions()))]
+    #[arg(help = with_words(TONEMAP, Some("the scene's"), &Tonemap::words()))]
+    #[arg(long_help = listed(TONEMAP, "the scene's", &Tonemap::descriptions()))]
     pub tonemap: Option<Tonemap>,
     #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
     #[arg(hide_default_value = true)]
@@ -59,6 +59,7 @@ pub fn listed(what: &str, default: &str, descriptions: &str) -> String {
     format!("{what} [default: {default}]\n\n{descriptions}")
 }
 
+const TONEMAP: &str = "Tone curve from radiance to what a display shows";
 const ACCEL: &str = "Acceleration structure that leads rays to triangles";
 const TRAVERSAL: &str = "Algorithm by which rays go through the kd-tree";
 const PRIMARY: &str = "How primary rays find their triangles";

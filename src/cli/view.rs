@@ -89,7 +89,8 @@ fn tour(args: &ViewArgs, start: Camera) -> Result<Option<Tour>, CliError> {
     let path = CameraPath::load(file)?;
     let n_frames = args.frames.unwrap_or((path.end() - path.begin()).ceil() as u32 + 1);
     let tour = Tour::along(&path, n_frames).ok_or_else(|| {
-        CliError::Usage(format!("{}: between keyframes, eye, target and up span no picture", file.display()))
+        let file = file.display();
+        CliError::Usage(format!("{file}: between keyframes, eye and target coincide, or up points along the view"))
     });
     tour.map(Some)
 }

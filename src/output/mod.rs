@@ -1,7 +1,7 @@
 //! Writes pixels to a file, whole or not at all.
 //!
-//! A file is encoded in memory, if it fits there, written beside its destination under a temporary name, synchronized and
-//! renamed. So if the disk is full, the earlier file stays as it was, and no truncated or temporary file is left. A
+//! A file is encoded in memory, if it fits there, written beside its destination under a temporary name, synchronized
+//! and renamed. So if the disk is full, the earlier file stays as it was, and no truncated or temporary file is left. A
 //! signal that ends the process leaves none either, if its handler calls [`remove_temporaries`].
 
 use std::{

@@ -4,20 +4,21 @@ use glam::{UVec2, Vec3, uvec2, vec2};
 
 use crate::layout::{Frame, TILE_SIZE};
 
-/// Bits 0, 2 and 4 of a number below 64, packed.
+/// Moves bits 0, 2 and 4 of a number below 64 to bits 0, 1 and 2.
 fn every_second_bit(n: u32) -> u32 {
     n & 1 | n >> 1 & 2 | n >> 2 & 4
 }
 
-/// The `k`-th of `n` bands from the middle outward, alternately above and below; the last is the bottom one.
+/// The index from the top of the `k`-th of `n` bands, which are rows of tiles. `k` counts from 0, from the middle
+/// outward, alternately above and below. The last band is the bottom one, which the picture's border may cut.
 fn band_outward(k: u32, n: u32) -> u32 {
     let n_left = n - 1 - k;
     if n_left.is_multiple_of(2) { n - 1 - n_left / 2 } else { n_left / 2 }
 }
 
-/// The pixel at index `order` of the queue, whose indices have no gaps. Pixels are ordered tile by tile, and in each
-/// tile along a Z-curve, so that neighbours in the queue are blocks of the image. Tiles that the border cuts are
-/// ordered row by row. The bands of tiles come from the middle outward.
+/// The pixel at index `order` of the queue, from 0 to `width * height - 1`. Pixels are ordered tile by tile, and in
+/// each tile along a Z-curve, so that neighbours in the queue are blocks of the image. In tiles that the border cuts,
+/// pixels are ordered row by row. The bands of tiles come from the middle outward.
 pub fn pixel_of(order: u32, width: u32, height: u32) -> UVec2 {
     let nth_band = order / (TILE_SIZE * width);
     let in_band = order - nth_band * TILE_SIZE * width;
@@ -35,12 +36,12 @@ pub fn pixel_of(order: u32, width: u32, height: u32) -> UVec2 {
     TILE_SIZE * uvec2(tile, band) + at
 }
 
-/// The pixel of the whole picture that a pixel of the window is.
+/// Converts a pixel of the window to the same pixel's coordinates in the whole picture.
 pub fn in_picture(frame: &Frame, pixel: UVec2) -> UVec2 {
     pixel + uvec2(frame.window_x, frame.window_y)
 }
 
-/// The unit direction through the sample of the window's pixel, the one that the rasterizer tests.
+/// The unit direction through the sample of a pixel of the window. The rasterizer tests the same sample.
 pub fn camera_direction(frame: &Frame, pixel: UVec2) -> Vec3 {
     let at_px = in_picture(frame, pixel).as_vec2() + vec2(frame.sample_x, frame.sample_y);
     let at = at_px / uvec2(frame.picture_width, frame.picture_height).as_vec2() * 2.0 - 1.0;

@@ -37,7 +37,7 @@ pub fn is_ray(ray: &Ray) -> bool {
 }
 
 /// The factor that scales a direction to about unit length, which the traversal needs, and the factor's inverse. Both
-/// are powers of two, so that direction and t keep their bits.
+/// are powers of two, so scaling rounds neither the direction nor t.
 #[inline(always)]
 fn scales_of(direction: Vec3) -> [f32; 2] {
     let exponent = exponent_of(direction).min(253);

@@ -8,7 +8,7 @@ use super::display::luminance;
 use crate::layout::Frame;
 
 /// Writes `pixel_filtered`. If the luminance differences of a pixel to its four neighbours add up to more than the
-/// threshold, it is the mean of the five; else it is the pixel itself.
+/// threshold, the result is the mean of the five; else it is the pixel itself.
 pub fn denoise(frame: &Frame, pixel_radiance: &[[f32; 4]], pixel_filtered: &mut [[f32; 4]]) {
     let (width, height) = (frame.width as usize, frame.height as usize);
     pixel_filtered.par_chunks_mut(width).enumerate().for_each(|(y, row)| {

@@ -3,10 +3,10 @@
 //!
 //! The t at which the ray meets a plane between cells is computed from the plane itself, by the operations of the
 //! kd-tree's traversal, not summed up from cell to cell. So the ray visits the cells that it would visit in a kd-tree
-//! that is split at all of these planes. The cell in which the search finds the ray at a t is off by no more than in
-//! that kd-tree, and the same margin covers the error (accel/bounds.rs).
+//! that is split at all of these planes. Rounding misplaces the ray by no more than in that kd-tree, whose margin
+//! covers the error (accel/bounds.rs).
 //!
-//! A cube is a cell by its indices in a lattice.
+//! "Cube" means a cell as one of a lattice's cubes; `cube` is its three indices there.
 
 use super::{
     counting::table::ReadCounter,
@@ -63,8 +63,8 @@ impl<'a> Walk<'a> {
     fn index_at(&self, ray: &TraversalRay, axis: usize, t: f32) -> u32 {
         let last_ix = self.lattice.n_cells[axis] - 1;
         let mut i = self.lattice.index_near(axis, ray.origin[axis] + t * ray.direction[axis]);
-        // The index is off by about 1: only rounding makes it wrong, and the margin and the cubes are wider than
-        // that.
+        // This first index is off by at most about 1: only rounding makes it wrong, and rounding errors are smaller
+        // than the margin, which is no wider than a cube.
         if Self::goes_up(ray, axis) {
             while i > 0 && self.exit_at(ray, axis, i - 1) >= t {
                 i -= 1;
@@ -83,7 +83,7 @@ impl<'a> Walk<'a> {
         i
     }
 
-    /// The axis by which the ray leaves the cube.
+    /// The axis on which the ray leaves the cube first.
     #[inline(always)]
     fn exit_axis(&self) -> usize {
         let [x, y, z] = self.t_next;
@@ -152,8 +152,8 @@ pub fn search_grid<const ANY_HIT: bool>(inputs: &KernelInputs<impl ReadCounter>,
         }
         is_done::<ANY_HIT>(best) || best.t < t_leave
     };
-    // The exit of a box whose corners are near the largest number may be at infinity. It must be before the exits at
-    // the border, which are infinite, too.
+    // If the box's corners are near the largest number, the t at which the ray leaves the box may be infinite. The
+    // exits at the border are infinite, too, and must come after it, so it is clamped to the largest finite number.
     let way = [ray.t_enter, min(ray.t_exit, f32::MAX)];
     walk(lattice, ray, way, |place, way| {
         let cell = inputs.grid_cells[place as usize];

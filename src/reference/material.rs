@@ -7,8 +7,8 @@ use crate::layout::{
     LEAST_COSINE, LEAST_REFLECTANCE, MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR, Material,
 };
 
-/// The directions in which a ray continues from a surface, and the factors of its throughput. A weight of zero means
-/// that there is no such ray.
+/// The directions in which a ray continues from a surface, and the weights by which its throughput is multiplied. A
+/// weight of zero means that there is no such ray.
 #[derive(Clone, Copy, Debug)]
 pub struct Scattering {
     pub reflected: Vec3,
@@ -17,8 +17,8 @@ pub struct Scattering {
     pub transmitted_weight: Vec3,
 }
 
-/// The weight of the light that the surface itself reflects and emits: a see-through material (d < 1) covers only a
-/// share d of what is behind it.
+/// The weight of the light that the surface itself reflects and emits. A see-through material (d < 1) covers only a
+/// share d of what is behind it. A material that refracts shows its own light in full.
 pub fn local_weight(material: &Material) -> f32 {
     if material.flags & MATERIAL_REFRACT != 0 { 1.0 } else { material.d }
 }
@@ -33,8 +33,8 @@ pub fn scatters_light(material: &Material) -> bool {
     material.flags & (MATERIAL_REFLECT | MATERIAL_REFRACT) != 0 || material.d < 1.0
 }
 
-/// The sum of the diffuse reflectance, times the cosine of the light's direction, and the specular reflectance towards
-/// the viewer. All vectors are unit vectors that point away from the surface.
+/// The reflectance towards the viewer: the diffuse part, which is multiplied by the cosine of the light's direction,
+/// plus the specular part, which is not. All vectors are unit vectors that point away from the surface.
 pub fn phong(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3) -> Vec3 {
     let cos_light = normal.dot(to_light);
     // Not `<=`: a NaN is dark.
@@ -49,11 +49,11 @@ pub fn phong(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3)
     reflectance
 }
 
-/// Whether a light in the direction `to_light` is visible in the surface: whether it reflects more than
-/// [`LEAST_REFLECTANCE`].
+/// Whether the surface reflects more than [`LEAST_REFLECTANCE`] of a light in the direction `to_light` towards the
+/// viewer.
 pub fn can_show(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3) -> bool {
     let least = Vec3::splat(LEAST_REFLECTANCE);
-    // The diffuse part decides most cases without the specular part's power.
+    // The diffuse part alone decides most cases, without the exponentiation of the specular part.
     let diffuse = material.kd * normal.dot(to_light) * local_weight(material);
     diffuse.cmpgt(least).any()
         || (phong(material, normal, to_viewer, to_light) * local_weight(material)).cmpgt(least).any()
@@ -75,7 +75,8 @@ fn refraction_cosine(cos_in: f32, eta: f32) -> f32 {
     (1.0 - eta * eta * (1.0 - cos_in * cos_in)).max(0.0).sqrt()
 }
 
-/// The direction, mirrored back to the surface's `side` if an interpolated normal has put it on the other one.
+/// The direction, mirrored at the surface if it points to the wrong side, which an interpolated normal can cause.
+/// `side`: the normal on the right side.
 fn keep_side(direction: Vec3, side: Vec3) -> Vec3 {
     direction - 2.0 * direction.dot(side).min(0.0) * side
 }

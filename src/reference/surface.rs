@@ -14,7 +14,7 @@ pub struct Surface {
     pub shading: Vec3,
     /// Distance along `geometric` at which a new ray starts so that it does not hit this surface, world units.
     pub clearance: f32,
-    /// Whether the ray meets the triangle's back: then it is inside a solid.
+    /// Whether the ray meets the triangle's back. The ray then counts as inside a solid.
     pub from_inside: bool,
 }
 
@@ -77,8 +77,8 @@ pub fn surface_at(ray: &PathRay, hit: &Hit, t: &Triangle) -> Surface {
 }
 
 impl Surface {
-    /// A ray from the surface, which starts on the side that it leaves to. `triangle_ix`: the surface's triangle,
-    /// which the ray does not hit.
+    /// Returns a child ray from the surface, with the parent's `t_max`. It starts on the side of the surface to which
+    /// its direction points. `triangle_ix`: the surface's triangle, which the ray does not hit.
     pub fn ray_from(&self, direction: Vec3, triangle_ix: u32, parent: &PathRay, throughput: Vec3) -> PathRay {
         let side = if direction.dot(self.geometric) < 0.0 { -self.clearance } else { self.clearance };
         PathRay {

@@ -24,8 +24,8 @@ pub enum UnknownWord {
 /// Implements `ALL`, `words`, `FromStr` and `Display` for an enum without fields.
 ///
 /// A description may follow a word, `Mask = "mask": "what the variant does"`. If all words have one, `descriptions`
-/// lists them for a help text. Words that a variant had once follow the variants, `renamed { "old" => "new" }`; they are
-/// refused by an error that names the new word.
+/// lists them for a help text. Words that a variant had once follow the variants, `renamed { "old" => "new" }`; they
+/// are refused by an error that names the new word.
 macro_rules! named_enum {
     (@common $ty:ident { $($variant:ident = $word:literal),+ } renamed { $($old:literal => $now:literal),* }) => {
         impl $ty {

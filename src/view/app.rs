@@ -154,7 +154,7 @@ impl App {
     fn recover(&mut self, shown: Shown, event_loop: &ActiveEventLoop, error: GpuError) {
         let Shown { gpu, ui, window } = shown;
         drop((gpu, ui));
-        self.session.show_error(Topic::Device, &format!("{error}; the device was opened anew"));
+        self.session.show_error(Topic::Device, &format!("{error}; the device was opened again"));
         let Settings { options, vsync, .. } = &self.session.settings;
         let loaded = &self.session.loaded;
         let (traversal, primary) = (Some(options.traversal), Some(options.primary));
@@ -176,14 +176,19 @@ impl App {
         let size = window.inner_size();
         match action {
             Action::Quit if self.layers.keys => self.layers.keys = false,
-            Action::Quit => {
-                self.session.save_what_is_left(gpu);
-                self.end(event_loop, Ok(()));
-            }
+            Action::Quit => self.quit(event_loop),
             Action::TogglePanel => self.layers.panel = !self.layers.panel,
             Action::ToggleKeys => self.layers.keys = !self.layers.keys,
             action => self.session.act(action, gpu, (size.width.max(1), size.height.max(1))),
         }
+    }
+
+    /// Ends the viewer at the user's wish. A save that is due is made first.
+    fn quit(&mut self, event_loop: &ActiveEventLoop) {
+        if let Some(Shown { gpu, .. }) = &self.shown {
+            self.session.save_what_is_left(gpu);
+        }
+        self.end(event_loop, Ok(()));
     }
 
     /// Handles an event of the user. The overlay may take it first; otherwise it moves the camera or is an action.
@@ -215,7 +220,7 @@ impl App {
         let pace =
             PaceReport { frame_ms: frames.pace(), input_to_present_ms: frames.latency(), moving: frames.moving() };
         let (Some(Shown { gpu, ui, window }), Some(choices)) = (self.shown, self.choices) else {
-            return Err(ViewError::Window("it was closed before it was open".to_owned()));
+            return Err(ViewError::Window("it closed before it opened".to_owned()));
         };
         let context = gpu.context.clone();
         // The validation layer may also report errors of the release, so its messages are read after it.
@@ -262,7 +267,7 @@ impl ApplicationHandler<Wake> for App {
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         match event {
-            WindowEvent::CloseRequested => self.end(event_loop, Ok(())),
+            WindowEvent::CloseRequested => self.quit(event_loop),
             WindowEvent::RedrawRequested => self.frame(event_loop),
             WindowEvent::Occluded(is_occluded) => self.is_occluded = is_occluded,
             WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => {

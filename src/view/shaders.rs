@@ -111,8 +111,8 @@ fn compile(checkout: &Path) -> Result<Replacements, String> {
     let read = |path: &Path| fs::read(path).map_err(|error| format!("{}: {error}", path.display()));
     let layout = read(&out_dir.path().join("layout.rs"))?;
     if code_of(&String::from_utf8_lossy(&layout)) != code_of(LAYOUT) {
-        return Err("glsl/shared/layout.glsl: the program shares its structs and constants and has to be built anew \
-                    to use others; the shaders before go on"
+        return Err("glsl/shared/layout.glsl: the program shares its structs and constants and must be built again \
+                    to use others; the previous shaders stay in use"
             .to_owned());
     }
     let files = fs::read_dir(out_dir.path()).into_iter().flatten().flatten().map(|entry| entry.path());

@@ -10,6 +10,10 @@ use std::{
 };
 
 use tempfile::TempDir;
+use x11rb::{
+    connection::Connection,
+    protocol::xproto::{ClientMessageEvent, ConnectionExt, EventMask},
+};
 
 /// Longer than any picture takes to appear on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -74,6 +78,17 @@ impl Display {
         let output = output.expect("xdotool, which ./setup installs");
         assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
         String::from_utf8(output.stdout).unwrap()
+    }
+
+    /// Closes a window as a window manager does when its user clicks the close button.
+    pub fn close(&self, window: &str) {
+        let (connection, _) = x11rb::connect(Some(&self.name)).expect("a connection to Xvfb");
+        let atom = |name: &str| connection.intern_atom(false, name.as_bytes()).unwrap().reply().unwrap().atom;
+        let window = window.parse().expect("a window's id");
+        let data = [atom("WM_DELETE_WINDOW"), x11rb::CURRENT_TIME, 0, 0, 0];
+        let message = ClientMessageEvent::new(32, window, atom("WM_PROTOCOLS"), data);
+        connection.send_event(false, window, EventMask::NO_EVENT, message).unwrap();
+        connection.flush().unwrap();
     }
 
     /// Waits for the window of a name and gives it the keyboard focus, since there is no window manager that would.

@@ -43,7 +43,8 @@ fn losing_layer(directory: &Path) -> PathBuf {
     let compiled = Command::new("cc").args(["-shared", "-fPIC", "-o"]).arg(&library).arg(source).status();
     assert!(compiled.expect("cc, which Rust links with").success());
     let manifest = r#"{"file_format_version": "1.1.0", "layer": {"name": "VK_LAYER_lose_device", "type": "GLOBAL",
-        "library_path": "./lose_device.so", "api_version": "1.3.0", "implementation_version": "1", "description": ""}}"#;
+        "library_path": "./lose_device.so", "api_version": "1.3.0",
+        "implementation_version": "1", "description": ""}}"#;
     fs::write(directory.join("lose_device.json"), manifest).unwrap();
     directory.to_owned()
 }
@@ -65,7 +66,7 @@ fn a_lost_device_is_opened_anew() {
     display.act(&["key", "Escape"]);
     let output = ended(viewer);
     let text = stderr(&output);
-    let lost = text.lines().filter(|line| line.contains("the device was opened anew")).count();
+    let lost = text.lines().filter(|line| line.contains("the device was opened again")).count();
     assert_eq!(lost, 1, "{text}");
 }
 

@@ -87,6 +87,19 @@ fn what_is_seen_is_saved_at_once() {
     assert!(Screen::load(&directory.path().join("paper3-001.png")) == picture);
 }
 
+/// Ends the viewer while a save waits for the whole picture. The picture that is seen is saved then.
+#[test]
+fn a_closed_window_saves_what_waits_to_be_saved() {
+    let (directory, display) = (TempDir::new().unwrap(), wide_display());
+    let viewer = slow_viewer(directory.path(), &display, "1");
+    let window = display.focus("kdray");
+    display.wait_until("a small picture", |screen| screen.pixels.iter().any(|pixel| *pixel != [0; 3]));
+    display.act(&["key", "s"]);
+    display.close(&window);
+    let text = stdout(&ended(viewer));
+    assert!(text.starts_with("wrote paper3-001.png\n"), "{text}");
+}
+
 #[test]
 fn a_picture_that_is_not_there_yet_is_saved_when_it_is_and_nobody_waits() {
     let (directory, display) = (TempDir::new().unwrap(), wide_display());

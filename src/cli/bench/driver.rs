@@ -144,7 +144,7 @@ fn builds_text(builds: &Builds) -> String {
 fn check_hits(report: &Report) -> Result<(), CliError> {
     let Some((set, rival)) = report.first_wrong() else { return Ok(()) };
     Err(CliError::WrongHits(format!(
-        "{} of {} {} rays hit otherwise with `{}` than with the driver",
+        "{} of {} {} rays have other hits with `{}` than with the driver",
         rival.apart.n_differing(),
         set.n_rays,
         set.rays.name(),
@@ -254,7 +254,7 @@ mod tests {
     fn wrong_hits_fail() {
         assert!(check_hits(&report(0)).is_ok());
         let error = check_hits(&report(1)).unwrap_err();
-        assert_eq!(error.to_string(), "1 of 4 primary rays hit otherwise with `stack` than with the driver");
+        assert_eq!(error.to_string(), "1 of 4 primary rays have other hits with `stack` than with the driver");
         assert_eq!(error.exit_code(), 4);
     }
 }

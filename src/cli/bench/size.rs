@@ -136,7 +136,7 @@ fn cells(row: &Row) -> [String; 8] {
 fn check_hits(report: &Report) -> Result<(), CliError> {
     let Some((row, cost)) = report.first_wrong() else { return Ok(()) };
     Err(CliError::WrongHits(format!(
-        "{} of {} {} rays at {} triangles hit otherwise with `{}` than on the CPU",
+        "{} of {} {} rays at {} triangles have other hits with `{}` than on the CPU",
         cost.difference.n_differing,
         cost.n_rays,
         cost.rays.name(),
@@ -206,7 +206,7 @@ mod tests {
         let error = check_hits(&report([8.0, 20.0], 1)).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "1 of 1000 primary rays at 1000 triangles hit otherwise with `mask` than on the CPU"
+            "1 of 1000 primary rays at 1000 triangles have other hits with `mask` than on the CPU"
         );
         assert_eq!(error.exit_code(), 4);
     }

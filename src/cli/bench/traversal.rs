@@ -143,7 +143,7 @@ fn cells(set: &SetResult, variant: &VariantResult) -> [String; 12] {
 fn check_hits(report: &Report) -> Result<(), CliError> {
     let Some((set, variant)) = report.first_wrong() else { return Ok(()) };
     Err(CliError::WrongHits(format!(
-        "{} of {} {} rays hit otherwise with `{}` than on the CPU",
+        "{} of {} {} rays have other hits with `{}` than on the CPU",
         variant.difference.n_differing,
         set.n_rays,
         set.rays.name(),

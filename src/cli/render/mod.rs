@@ -144,12 +144,15 @@ fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec
     let Frames { first, last } =
         args.frames.unwrap_or(Frames { first: path.begin().ceil() as u32, last: path.end().floor() as u32 });
     if first > last {
-        return Err(CliError::Usage(format!("{}: no whole frame lies between its keyframes", path_file.display())));
+        return Err(CliError::Usage(format!(
+            "{}: no whole frame number lies between its first and last keyframe",
+            path_file.display()
+        )));
     }
     let view = |frame| {
         let camera = path.camera_at(f64::from(frame)).ok_or_else(|| {
             let file = path_file.display();
-            CliError::Usage(format!("{file}: at frame {frame}, eye, target and up span no picture"))
+            CliError::Usage(format!("{file}: at frame {frame}, eye and target coincide, or up points along the view"))
         })?;
         Ok(View { camera, files: Files::of(numbered(output, frame)?, &args.aov) })
     };
