@@ -18,8 +18,8 @@ fn main() {
     let out_dir = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
     let out_dir = Path::new(&out_dir);
     println!("cargo::rerun-if-changed=glsl");
-    // With hot reload, kdray runs this build program again, so that shaders are compiled only here and with one set
-    // of options.
+    // With the feature `hot-reload`, a running kdray starts this program to compile changed shaders. So this file has
+    // the only compiler call, with the only set of options.
     if env::var_os("CARGO_FEATURE_HOT_RELOAD").is_some() {
         let compiler = env::current_exe().expect("this program's path");
         println!("cargo::rustc-env=KDRAY_SHADER_COMPILER={}", compiler.display());
@@ -39,7 +39,8 @@ fn main() {
                 name_compiler(&spirv);
                 fs::write(out_dir.join(format!("{name}.spv")), spirv).expect("write SPIR-V");
             }
-            // Each error is one line, as the compiler prints it, so that an editor can jump to it.
+            // Each line of the compiler's output becomes an error of its own, so that an editor can jump to its
+            // place.
             Err(error) => {
                 error.lines().for_each(|line| println!("cargo::error={line}"));
                 std::process::exit(1);
@@ -57,7 +58,8 @@ fn layout_in_rust() -> Result<String, String> {
     Ok(rust_layout(&layout, &arrays) + &scene_arrays::rust(&arrays) + &constants_of_shaders(&layout)?)
 }
 
-/// Generates Rust for the specialization constants of all shaders. Includes count as parts of the shaders.
+/// Generates Rust for the specialization constants of all shaders. A shader's constants are those of its file and of
+/// all files that it includes.
 fn constants_of_shaders(layout: &str) -> Result<String, String> {
     let numbers = specialization::numbers(layout)?;
     let mut shaders = Vec::new();
@@ -93,7 +95,7 @@ fn name_compiler(spirv: &[u8]) {
     println!("cargo::rustc-env=KDRAY_SPIRV_COMPILER=SPIR-V {:#x}, generator {:#010x}", word(1), word(2));
 }
 
-/// Returns the shaders of all folders, in a fixed order.
+/// Returns the paths of all shaders, in a fixed order.
 fn shaders_in_order() -> Vec<PathBuf> {
     let mut shaders: Vec<_> = ["glsl/passes", "glsl/probes", "glsl/driver"]
         .into_iter()
@@ -134,11 +136,11 @@ fn compile(compiler: &shaderc::Compiler, path: &Path, name: &str) -> Result<Vec<
 /// Generates Rust constants and structs from layout.glsl.
 ///
 /// # Panics
-/// std430 would pad a struct.
+/// A struct has a member of an unknown type, or std430 would pad a struct.
 fn rust_layout(glsl: &str, arrays: &[scene_arrays::Row]) -> String {
     let mut rust = String::new();
     let mut doc = String::new();
-    let mut structs = String::new(); // the structs as data, for the test against SPIR-V
+    let mut structs = String::new(); // elements of `STRUCTS`, which a test compares with the SPIR-V
     let mut layout: Option<(String, usize, usize)> = None; // struct name, bytes so far, widest alignment
     for line in glsl.lines().map(str::trim) {
         if let Some(comment) = line.strip_prefix("//") {
@@ -153,13 +155,13 @@ fn rust_layout(glsl: &str, arrays: &[scene_arrays::Row]) -> String {
                     write!(structs, "(\"[u32; 2]\", std::mem::offset_of!({name}, {array})),").unwrap();
                     *offset += 8;
                 }
-                // The struct ends where GLSL's does, whatever the number of arrays.
+                // GLSL rounds the struct's size up to its alignment. In Rust, a reserved member does so.
                 if *offset % *widest != 0 {
                     writeln!(rust, "    pub reserved: [u32; 2],").unwrap();
                     *offset += 8;
                 }
             } else if line.starts_with('#') {
-                // ARRAY is defined for GLSL only.
+                // The macro ARRAY, which is defined and undefined within the struct, is for GLSL only.
             } else if line == "};" {
                 assert_eq!(*offset % *widest, 0, "layout.glsl: std430 pads the end of {name} ({offset} bytes)");
                 writeln!(rust, "}}\nconst _: () = assert!(size_of::<{name}>() == {offset});").unwrap();

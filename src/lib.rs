@@ -39,24 +39,24 @@
 //!
 //! ```text
 //! scene    files -> triangles, materials, lights, camera
-//! accel    triangles -> acceleration structure, which leads rays to triangles
+//! accel    triangles -> acceleration structure, through which rays find the triangles that they hit
 //!   kdtree   the flat SAH kd-tree and its traversals
 //! world    a scene with its acceleration structure
-//! frame    options, picture and profile; scene + size + sample -> the frame's constants
+//! frame    options, picture and profile; scene, size, index of a sample -> the frame's constants
 //! render   the frame: passes, barriers, batches -> picture
 //!   passes   one kernel and one file each
 //!   buffers  what kernels read and write
-//!   gpu      the Vulkan layer, on which the three above are built
+//!   gpu      the Vulkan layer, on which render, passes and buffers are built
 //! cast     rays -> hits, without a frame
 //! reference  every kernel in simple CPU code: the oracle of the tests
 //! cpu      frames and casts without Vulkan, fast
-//! engine   a device or the CPU: chooses what is left open, renders, casts
+//! engine   a device or the CPU: chooses the methods that the user leaves open, renders, casts
 //! output   picture -> file
 //! bench    all of it, timed
 //! view     all of it, in a window
 //!
 //! layout   the structs that kernels and Rust share
-//! util     names of variants, text that is safe to print, the host's memory
+//! util     names of enum variants, text that is safe to print, the host's memory
 //! ```
 
 #![deny(unsafe_code)]

@@ -275,6 +275,12 @@ mod unix {
              \"$0\" cast mesh.obj rays.npy --cpu -q -o whole.npz && cmp piped.npz whole.npz",
         );
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        let output = shell(
+            directory.path(),
+            "(head -c 3 rays.npy; sleep 0.5; tail -c +4 rays.npy) | \"$0\" cast mesh.obj /dev/stdin --cpu -q -o slow.npz \
+             && cmp slow.npz whole.npz",
+        );
+        assert_eq!(output.status.code(), Some(0), "in two parts: {}", stderr(&output));
         let output =
             shell(directory.path(), "head -c 300 rays.npy | \"$0\" cast mesh.obj /dev/stdin --cpu -q -o x.npz");
         assert_eq!(output.status.code(), Some(3));

@@ -20,8 +20,8 @@ use kdray::{
 use program::Program;
 use target::Target;
 
-/// The values of the timeline semaphore, in order: the image is cleared, kdray has written it, the program has read
-/// it.
+/// Values of the timeline semaphore, in order: after the program has cleared the image, after kdray has written it,
+/// and after the program has read it.
 const CLEARED: u64 = 1;
 const WRITTEN: u64 = 2;
 const READ: u64 = 3;

@@ -18,6 +18,7 @@ pub struct Program {
 }
 
 impl Program {
+    /// Creates an instance, and a device with the features that kdray requires.
     pub unsafe fn new() -> Result<Self, Box<dyn Error>> {
         // SAFETY: the structs that the calls read live until they return.
         unsafe {
@@ -27,7 +28,7 @@ impl Program {
             let instance = entry.create_instance(&info, None)?;
             let (physical, queue_family) = choose_device(&instance).ok_or("no device with graphics and compute")?;
             let RequiredFeatures { of_1_0, of_1_2, mut of_1_3 } = RequiredFeatures::new(false);
-            // A feature that this program needs beside those of kdray.
+            // This program needs this feature in addition to those that kdray requires.
             let mut of_1_2 = of_1_2.timeline_semaphore(true);
             let queues =
                 [vk::DeviceQueueCreateInfo::default().queue_family_index(queue_family).queue_priorities(&[1.0])];

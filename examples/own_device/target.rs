@@ -66,7 +66,7 @@ impl Target {
     }
 }
 
-/// Returns the range of a colour image that has one layer and one level.
+/// Returns the subresource range of a whole colour image with one layer and one mip level.
 fn whole() -> vk::ImageSubresourceRange {
     vk::ImageSubresourceRange::default().aspect_mask(vk::ImageAspectFlags::COLOR).level_count(1).layer_count(1)
 }

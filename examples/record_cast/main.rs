@@ -53,7 +53,7 @@ fn rays(origin: Vec3) -> Vec<Ray> {
     (0..N_RAYS).map(ray).collect()
 }
 
-/// The value of the timeline semaphore when the hits are written. It begins at 0.
+/// The value to which the timeline semaphore, initially 0, is set when the hits are written.
 const WRITTEN: u64 = 1;
 
 /// Casts the rays in a command buffer of the program.
@@ -80,7 +80,7 @@ unsafe fn cast(program: &Program, buffers: &Buffers, scene: Scene) -> Result<(),
         program.submit(&commands, None, Some(WRITTEN))?;
         program.wait_for(WRITTEN)?;
     }
-    // A few drivers end rays that take long. Such rays are finished here.
+    // A few drivers end loops after a number of iterations. Rays that stopped at that limit are finished here.
     cast.finish()?;
     Ok(())
 }

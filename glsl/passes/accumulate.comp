@@ -1,8 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Accumulate: one invocation per pixel of the window, in tiles, adds the frame's sample to the earlier samples and
-// replaces it by the mean of all. If the ray queue overflowed, the frame is drawn again and this dispatch adds
-// nothing.
+// Accumulate: one invocation per pixel of the window, in tiles, adds the frame's sample to the sum of the earlier
+// samples and replaces the sample by the mean of all samples. If the ray queue overflowed, the frame is drawn again
+// and this dispatch adds nothing.
 // Reads bounces; updates pixel_accumulated (sums of radiance) and pixel_radiance (the sample, then the mean).
 #include "layout.glsl"
 

@@ -33,7 +33,7 @@ bool is_ray(Ray ray) {
         && magnitude_bits(ray.t_min) <= INFINITY_BITS && magnitude_bits(ray.t_max) <= INFINITY_BITS;
 }
 
-// Finds the hit of a valid ray. t_max is at most the greatest finite number, so a hit beyond it is a miss.
+// Finds the hit of a valid ray. Clamps t_max to the greatest finite number, so a hit with an infinite t is a miss.
 Hit cast_ray(Ray ray) {
     PathRay bounded = PathRay(ray.origin, 0u, ray.direction, NO_TRIANGLE, vec3(0.0), min(ray.t_max, GREATEST));
     Hit hit = traverse_any_length(bounded, ray.t_min, ANY_HIT);

@@ -49,7 +49,7 @@ void main() {
     uint carry = 0u;
     for (uint first = 0u; first < n_blocks; first += SCAN_GROUP_SIZE * SPINE_ITEMS) {
         uint begin = first + scan_rank() * SPINE_ITEMS;
-        // All are loaded before the first is used, so that no load waits for another.
+        // All counts are loaded before the first is used, so that no load waits for another.
         uint n_children[SPINE_ITEMS];
         for (uint i = 0u; i < SPINE_ITEMS; ++i) n_children[i] = begin + i < n_blocks ? scan_blocks[begin + i] : 0u;
         uint sum = 0u;

@@ -2,13 +2,14 @@
 #extension GL_GOOGLE_include_directive : require
 // Grid, lattice: the only invocation finds the size of the cells of a uniform grid or of the upper level, and
 // prepares the first attempt.
-// Reads the bounds in build; writes build's lattice, margin, largest_coordinate and sizes of dispatches.
+// Reads the bounds, n_finite, n_triangles and upper_density of build; writes build's lattice, margin,
+// largest_coordinate, n_items, counts and sizes of dispatches.
 #include "grid_attempt.glsl"
 
 layout(local_size_x = 1) in;
 
-// The margin as a multiple of the largest coordinate, and the least margin: it is never 0. Twin of
-// src/accel/bounds.rs.
+// The margin as a multiple of the largest coordinate. The margin is at least LEAST_MARGIN, the smallest number that
+// is not denormal, so it is never 0. Twin of src/accel/bounds.rs.
 const float MARGIN = 1.0 / 131072.0;
 const float LEAST_MARGIN = 1.17549435e-38;
 

@@ -15,8 +15,10 @@ layout(std430, set = 0, binding = BIND_GRID_LEAF_TRIANGLES) writeonly buffer Lea
 };
 layout(std430, set = 0, binding = BIND_GRID_LEAF_PLANES) writeonly buffer LeafPlanesBlock { vec4 leaf_planes[]; };
 
-// The bound of a plane's error; src/accel/grid/planes.rs derives it.
+// The largest error that a plane may have, in units of 2^-24 times the largest coordinate. Derived in
+// src/accel/grid/planes.rs.
 const float MAX_ERROR = 16.0;
+// The smallest positive number that is not denormal.
 const float LEAST_NORMAL = 1.17549435e-38;
 
 float magnitude(vec3 v) {
@@ -35,7 +37,7 @@ vec4 plane_of(Triangle triangle) {
     precise float error = 4.0 * edges * reach;
     precise float limit = MAX_ERROR * (build.largest_coordinate * longest);
     uint exponent = floatBitsToUint(longest) >> 23;
-    // If the limit is denormal, a device may flush both to 0.
+    // If the limit is denormal, a device may flush the limit and the error to 0.
     bool is_certain = limit >= LEAST_NORMAL && error <= limit;
     if (!is_certain || exponent < 3u || exponent >= 250u) return vec4(0.0);
     precise vec3 scaled = normal * uintBitsToFloat((252u - exponent) << 23);

@@ -30,6 +30,8 @@ uvec2 sums() {
 }
 
 // Stores the total, and continues the attempt. If the total is above its limit, the next attempt has larger cells.
+// The first three GRID_SCANS_* have the numbers of GRID_COUNTS_*, which are in counting order. So adding 1 to
+// build.counts goes on to the next count.
 void finish(uint total) {
     if (SCANS == GRID_SCANS_DIGITS || build.counts != SCANS) return;
     if (SCANS == GRID_SCANS_CELLS) build.n_lower = total;

@@ -3,8 +3,8 @@
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Primary hit (the paper's section 2.2): one invocation per pixel of the batch intersects the camera ray of its
 // sample with the triangle that the rasterizer found there.
-// Reads triangle_ids or pixel_nearest, triangles; writes hits, pixel_features (n_rays, n_steps); updates counters
-// (n_hits).
+// Reads triangle_ids or pixel_nearest, triangles; writes hits and, with COUNT_COSTS, n_rays and n_steps of
+// pixel_features; updates counters (n_hits).
 #include "layout.glsl"
 #include "scene.glsl"
 #include "rays.glsl"
@@ -22,7 +22,8 @@ layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock
 layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;
 // Whether the ray's cost is written to pixel_features.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
-// Whether the triangles were found by kernels, in pixel_nearest, not by the graphics pipeline, in triangle_ids.
+// Which rasterizer found the triangles. True: the kernels rasterize_*.comp, which wrote pixel_nearest. False: the
+// graphics pipeline, which wrote triangle_ids.
 layout(constant_id = CONSTANT_SOFTWARE_RASTER) const bool SOFTWARE_RASTER = false;
 
 uint triangle_of(uvec2 pixel) {
@@ -30,8 +31,8 @@ uint triangle_of(uvec2 pixel) {
     return imageLoad(triangle_ids, ivec2(in_picture(pixel))).x;
 }
 
-// The camera ray's hit. Kernels find only triangles that the ray hits; the graphics pipeline may find one that it
-// just misses, whose hit is moved to the triangle's edge.
+// The camera ray's hit. Kernels find only triangles that the ray hits. The graphics pipeline may find a triangle that
+// the ray just misses. The hit is then moved to the triangle's edge.
 Hit hit_of(PathRay ray, uint triangle_ix) {
     Shear shear = shear_of(ray.origin, ray.direction);
     Triangle triangle = triangle_at(triangle_ix);

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Rasterize, 1 of 2: one invocation per triangle finds the pixels that it may cover. The workgroup tests the pixels
-// of its small triangles together; large triangles are left to rasterize_blocks.comp.
+// Rasterize, 1 of 2: one invocation per triangle finds the pixels that the triangle may cover. The invocations of a
+// workgroup share the tests of all pixels of its small triangles; large triangles are left to rasterize_blocks.comp.
 // Reads triangles; writes large_triangles; updates pixel_nearest, raster_groups, raster_count.
 #include "layout.glsl"
 #include "rasterize.glsl"
@@ -13,16 +13,16 @@ layout(local_size_x = RAY_GROUP_SIZE) in;
 // Tests of small triangles against pixels. Bits from the lowest on: the triangle's index in the workgroup
 // (PLACE_BITS), then the pixel's x (OFFSET_BITS) and y in the triangle's rectangle.
 const uint N_TESTS = 512u;
-const uint PLACE_BITS = 6u; // RAY_GROUP_SIZE
-const uint OFFSET_BITS = 6u; // RASTER_SMALL
+const uint PLACE_BITS = 6u; // holds an index below RAY_GROUP_SIZE
+const uint OFFSET_BITS = 6u; // holds an offset below RASTER_SMALL
 shared uint tests[N_TESTS];
 // The number of tests of all triangles of the workgroup. They run in rounds of N_TESTS.
 shared uint n_tests;
 // The first pixel of each triangle's rectangle, px of the window: x in the lower half, y in the upper.
 shared uint first_pixels[RAY_GROUP_SIZE];
 
-// The pixels of one invocation's triangle that are still to be tested, and the index of the first among all tests.
-// covered: one bit per pixel of the rectangle (covered.glsl).
+// The pixels of one invocation's triangle that are still to be tested. covered: one bit per pixel of the rectangle
+// (covered.glsl). place: the index of the first of these pixels' tests among all tests of the workgroup.
 struct PixelTests {
     Rectangle rectangle;
     uvec2 covered;
@@ -78,14 +78,15 @@ void add_large(uint triangle_ix, Rectangle rectangle) {
     atomicMax(raster_groups.y, min((n_groups - 1u) / RASTER_GROUPS_X + 1u, RASTER_GROUPS_Y));
 }
 
-// Appends a triangle that is too steep to be projected (STEEPEST), unless its rectangle is certainly missed.
+// Handles a triangle with a corner that is too steep to be projected (STEEPEST): appends it to large_triangles,
+// unless it certainly covers no pixel of the window.
 void rasterize_beside_eye(uint triangle_ix, vec3 a, vec3 b, vec3 c, vec3 ahead) {
     Rectangle rectangle = rectangle_beside_eye(a, b, c, ahead);
     if (area_of(rectangle) == 0u || misses(edge_heights(a, b, c, rectangle), rectangle)) return;
     add_large(triangle_ix, rectangle);
 }
 
-// Returns the pixels of a small triangle. Appends a large one to large_triangles, and then nothing is pending.
+// Returns the pixels of a small triangle. Appends a large triangle to large_triangles, and returns no pixels.
 PixelTests rasterize(Triangle triangle, uint triangle_ix) {
     vec3 a = triangle.v0 - frame.eye, b = triangle.v1 - frame.eye, c = triangle.v2 - frame.eye;
     vec3 ahead = vec3(dot(a, frame.forward), dot(b, frame.forward), dot(c, frame.forward));

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 // Shadow (the paper's section 2.1): tests the shadow rays, or segments, from the hit of each ray of the batch, of all
-// bounces, to each light that could be visible in the surface. A light is in shadow if anything is hit before it.
+// bounces, to each light that could be visible in the surface. A light is hidden if its segment hits anything.
 // There are 2^shadow_lanes_log2 invocations per ray and light, the first of which works (lanes.glsl).
 // Reads rays, hits, bounces and the scene; updates light_visibility[light * queue_capacity + ray], in which a stalled
 // segment leaves its mark (stalls.glsl), and pixel_features (n_rays, n_steps).

@@ -68,7 +68,8 @@ uint exponent_of(vec3 direction) {
 // Does what `traverse` does, for a ray whose direction has any length, such as a ray that was transformed to the
 // space of an instance. t is in units of the direction. `exponent_of` the direction must be 1..254.
 //
-// The direction and t are scaled by a power of two, which loses none of their bits.
+// The direction and t are scaled by a power of two, which loses none of their bits. For exponent 254, the power would
+// be denormal, so the power for 253 is used.
 Hit traverse_any_length(PathRay ray, float t_min, bool any_hit) {
     uint exponent = min(exponent_of(ray.direction), 253u);
     float scale = uintBitsToFloat((254u - exponent) << 23); // 2^(127 - exponent)

@@ -6,22 +6,24 @@
 #include "layout.glsl"
 #include "frame.glsl"
 
-// Bits 0, 2 and 4 of a number below 64, packed.
+// Moves bits 0, 2 and 4 of a number below 64 to bits 0, 1 and 2.
 uint every_second_bit(uint n) {
     return (n & 1u) | ((n >> 1) & 2u) | ((n >> 2) & 4u);
 }
 
-// The k-th of n bands from the middle outward, alternately above and below; the last is the bottom one.
+// The index from the top of the k-th of n bands, which are rows of tiles. k counts from 0, from the middle outward,
+// alternately above and below. The last band is the bottom one, since the picture's border may cut it: all bands
+// before it have the same number of pixels.
 uint band_outward(uint k, uint n) {
     uint n_left = n - 1u - k;
     return (n_left & 1u) == 0u ? n - 1u - (n_left >> 1) : n_left >> 1;
 }
 
-// The pixel at index `order` of the queue, whose indices have no gaps. Pixels are ordered tile by tile (TILE_SIZE x
-// TILE_SIZE pixels), and in each tile along a Z-curve, so that subgroups of any size are blocks of the image. Tiles
-// that the right or lower border cuts are ordered row by row. The bands of tiles come from the middle outward: most
-// pictures show their subject in the middle, so its long rays start early and a dispatch does not wait for them at
-// its end.
+// The pixel at index `order` of the queue, from 0 to width * height - 1. Pixels are ordered tile by tile (TILE_SIZE x
+// TILE_SIZE pixels), and in each tile along a Z-curve, so that subgroups of any size are blocks of the image. In
+// tiles that the right or lower border cuts, pixels are ordered row by row. The bands of tiles come from the middle
+// outward: most pictures show their subject in the middle, where rays take longest. These rays start early, so that a
+// dispatch does not wait for them at its end.
 uvec2 pixel_of(uint order, uint width, uint height) {
     uint nth_band = order / (TILE_SIZE * width);
     uint in_band = order - nth_band * TILE_SIZE * width;
@@ -36,13 +38,13 @@ uvec2 pixel_of(uint order, uint width, uint height) {
     return TILE_SIZE * uvec2(tile, band) + at;
 }
 
-// The pixel of the whole picture that a pixel of the window is.
+// Converts a pixel of the window to the same pixel's coordinates in the whole picture.
 uvec2 in_picture(uvec2 pixel) {
     return pixel + uvec2(frame.window_x, frame.window_y);
 }
 
-// The pixel's sample, the one that the rasterizer tests: its point in the image plane, at distance 1 from the eye.
-// Relative to the eye, world axes.
+// The point of the pixel's sample in the image plane, which is at distance 1 from the eye. The rasterizer tests the
+// same sample. The point is relative to the eye, with world axes.
 vec3 sample_in_image(uvec2 pixel) {
     vec2 at_px = vec2(in_picture(pixel)) + vec2(frame.sample_x, frame.sample_y);
     vec2 at = at_px / vec2(frame.picture_width, frame.picture_height) * 2.0 - 1.0;

@@ -7,7 +7,7 @@
 #include "surface.glsl"
 #include "material.glsl"
 
-// Whether a child whose weight this is has any throughput.
+// Whether a child ray of this weight has a throughput above 0 in any colour.
 bool carries_light(PathRay ray, vec3 weight) {
     return any(greaterThan(ray.throughput * weight, vec3(0.0)));
 }

@@ -1,6 +1,6 @@
 // Counters of the kernels for the profile: hits and shadow rays of each bounce. Needs
-// GL_KHR_shader_subgroup_arithmetic. Invocations of a subgroup add once together. Each bounce has COUNTER_COPIES
-// counters, whose sum is the count, so that as many workgroups can add at the same time.
+// GL_KHR_shader_subgroup_arithmetic. Each subgroup sums its counts and adds the sum with one atomic. Each bounce has
+// COUNTER_COPIES counters, whose sum is the count, so that this many workgroups can add at the same time.
 #ifndef KDRAY_COUNTERS
 #define KDRAY_COUNTERS
 
@@ -13,8 +13,8 @@ uint counters_of(uint bounce_ix, uint place) {
     return (bounce_ix * COUNTER_COPIES + place % COUNTER_COPIES) * COUNTER_STRIDE;
 }
 
-// Counts a hit of this invocation. place: any number; the same in a workgroup, and different in neighbouring
-// workgroups if these add at the same time.
+// Counts the hit of this invocation if is_hit. place: selects one of the bounce's counters. It is the same for all
+// invocations of a workgroup, and should differ between neighbouring workgroups if these add at the same time.
 void count_hits(uint bounce_ix, uint place, bool is_hit) {
     uint n_hits = subgroupAdd(is_hit ? 1u : 0u);
     if (subgroupElect() && n_hits > 0u) atomicAdd(counters[counters_of(bounce_ix, place)].n_hits, n_hits);

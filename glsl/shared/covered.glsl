@@ -8,8 +8,8 @@
 #include "layout.glsl"
 
 // The lines of a triangle's edges, x = at_first + y * step in row y, one edge per component. They bound the pixels of
-// a row that the triangle may cover. Each edge is either a lower or an upper bound of x; its other line is at -FAR or
-// FAR.
+// a row that the triangle may cover. Each edge has a low and a high line, and bounds x by one of them: either from
+// below or from above. The line that is not a bound is at -FAR (low) or FAR (high).
 struct EdgeLines {
     vec3 low_at_first;
     vec3 low_step;
@@ -19,7 +19,8 @@ struct EdgeLines {
 
 const float FAR = 1e9;
 
-// The lines of the edges of a triangle a, b, c. slack: how far outside an edge a pixel still counts as covered.
+// The lines of the edges of a triangle a, b, c. slack: the error of a point on each axis, px. A pixel that is outside
+// an edge by no more than that still counts as covered.
 EdgeLines edge_lines(vec2 a, vec2 b, vec2 c, float slack) {
     vec3 along_x = vec3(b.x - a.x, c.x - b.x, a.x - c.x);
     vec3 along_y = vec3(b.y - a.y, c.y - b.y, a.y - c.y);
@@ -29,12 +30,12 @@ EdgeLines edge_lines(vec2 a, vec2 b, vec2 c, float slack) {
     // Rounding may have turned a sliver's winding around, so its edges bound nothing.
     bool is_sliver = abs(area) <= 4.0 * (spans.x + spans.y + spans.z);
     float side = area < 0.0 ? -1.0 : 1.0;
-    // Twice the signed area that an edge spans with a pixel, and the slack, is at_first + x * step_x + y * step_y. It
-    // is not below 0 for a covered pixel.
+    // at_first + x * step_x + y * step_y is twice the signed area that an edge spans with a pixel, plus the slack.
+    // The sum is not below 0 for a covered pixel.
     vec3 step_x = -side * along_y, step_y = side * along_x;
     vec3 at_first = side * (along_y * from_x - along_x * from_y) + spans;
-    // An edge along the rows gets a tiny slope: it crosses a row beyond all pixels if the row is on one side of it,
-    // and before all pixels if on the other.
+    // An edge that is parallel to the rows gets a tiny slope. In rows on its inner side, it then crosses left of all
+    // pixels and excludes none. In rows on its outer side, it crosses right of all pixels and excludes all.
     step_x = mix(step_x, vec3(1e-6), lessThan(abs(step_x), vec3(1e-6)));
     vec3 crossing = -at_first / step_x, step = -step_y / step_x;
     bvec3 is_low = greaterThan(step_x, vec3(0.0)), is_high = not(is_low);

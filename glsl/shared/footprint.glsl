@@ -19,8 +19,8 @@ uint area_of(Rectangle rectangle) {
 
 // Heights of the directions through a rectangle's pixels above three planes, positive towards the triangle. Each
 // plane contains the eye and one edge of the triangle. Heights are linear in the pixel: at_first is that of the
-// rectangle's first pixel, step_x and step_y are the changes per pixel. The slack in at_first keeps a height from
-// being below 0 if the ray meets the triangle, whatever has been rounded.
+// rectangle's first pixel, step_x and step_y are the changes per pixel. at_first includes a slack above all rounding
+// errors, so no height of a ray that meets the triangle is below 0.
 struct EdgeHeights {
     vec3 at_first;
     vec3 step_x;
@@ -32,8 +32,8 @@ float longest_in_image() {
     return length(abs(frame.forward) + abs(frame.right) + abs(frame.up));
 }
 
-// The heights for a triangle a, b, c. If the triangle is seen edge-on, rounding may turn the planes around. Then all
-// heights are at the slack, and no pixel is excluded.
+// The heights for a triangle a, b, c. If the triangle is seen edge-on, rounding may flip the planes' normals. Then
+// all heights are set to the slack, and no pixel is excluded.
 EdgeHeights edge_heights(vec3 a, vec3 b, vec3 c, Rectangle rectangle) {
     vec3 across_a = cross(b, c), across_b = cross(c, a), across_c = cross(a, b);
     float volume = dot(a, across_a);
@@ -63,7 +63,8 @@ bool misses_pixel(EdgeHeights heights, uvec2 offset) {
 // side.
 const float SLACK = exp2(-15.0);
 // The steepness of a point is its distance from the eye divided by its depth. Up to this steepness, SLACK bounds the
-// error of the projection. Points of twice this steepness are outside every window.
+// error of the projection. If longest_in_image() is at most STEEPEST, points of twice this steepness are outside the
+// window.
 const float STEEPEST = 20.0;
 
 // Projects a point to pixels of the window; (0, 0) is the first pixel's sample. ahead: the point's depth.
@@ -79,7 +80,8 @@ bool is_steep(vec3 corner, float ahead) {
     return !(ahead > 0.0) || ahead * ahead * STEEPEST * STEEPEST < dot(corner, corner);
 }
 
-// A box of projected points, pixels of the window. slack: how far outside it they may be because of rounding.
+// A box of projected points, in pixels of the window. slack: how far outside the box the exact points may be because
+// of rounding.
 struct Bounds {
     vec2 low;
     vec2 high;
@@ -99,8 +101,8 @@ Rectangle rectangle_of(Bounds bounds) {
     return Rectangle(uvec2(first), uvec2(end - first));
 }
 
-// Extends the bounds by a point of depth `ahead`. reach: the largest distance from the eye of the points that it was
-// computed from.
+// Extends the bounds by a point of depth `ahead`. reach: the largest distance from the eye of the corners from which
+// the point was computed.
 void include(inout Bounds bounds, vec3 point, float ahead, float reach) {
     vec2 at = projected(point, ahead);
     bounds.low = min(bounds.low, at);
@@ -108,8 +110,8 @@ void include(inout Bounds bounds, vec3 point, float ahead, float reach) {
     bounds.slack = max(bounds.slack, least_slack() / STEEPEST * reach / ahead);
 }
 
-// Extends the bounds by the part of an edge whose depth is at least `nearest`, except its end q, which the next edge
-// adds. ahead: the depths of p and q.
+// Extends the bounds by the part of the edge from p to q whose depth is at least `nearest`. The corner q itself is
+// left to the next edge, which begins there. ahead: the depths of p and q.
 void include_edge(inout Bounds bounds, vec3 p, vec3 q, vec2 ahead, float nearest) {
     if (ahead.x >= nearest) include(bounds, p, ahead.x, length(p));
     if (ahead.x >= nearest == ahead.y >= nearest) return;
@@ -117,9 +119,10 @@ void include_edge(inout Bounds bounds, vec3 p, vec3 q, vec2 ahead, float nearest
     include(bounds, between, nearest, max(length(p), length(q)));
 }
 
-// The rectangle of a triangle that is partly beside or behind the eye. The triangle is cut off where it is too steep
-// for any window: none of its points is nearer to the eye than its plane is, so points whose depth is less than a
-// fraction of the plane's distance are steep. ahead: the depths of a, b and c.
+// The rectangle of a triangle that is partly beside or behind the eye. Only the part of the triangle whose depth is
+// at least 1 / (2 * STEEPEST) of its plane's distance from the eye is projected. No point of the triangle is nearer
+// to the eye than its plane, so the points of smaller depth are at least twice as steep as STEEPEST and outside the
+// window. ahead: the depths of a, b and c.
 Rectangle rectangle_beside_eye(vec3 a, vec3 b, vec3 c, vec3 ahead) {
     Rectangle window = Rectangle(uvec2(0u), uvec2(frame.width, frame.height));
     vec3 normal = cross(b - a, c - a);

@@ -4,7 +4,8 @@
 // that has triangles is cut into a block of lower cells, which the ray traverses. A part of accel.glsl, which calls
 // `search_grid`.
 //
-// A cube is a cell by its indices in a lattice (lattice.glsl). All t are half of the ray's own (traversal_ray.glsl).
+// `cube` means the three indices of a cell in its lattice (lattice.glsl). All t are half of the ray's own
+// (traversal_ray.glsl).
 //
 // The t at which the ray meets a plane between cells is computed from the plane itself, not summed up from cell to
 // cell. So the kd-tree's proof holds: rounding moves the ray by no more than the margin, and a cell has all triangles
@@ -58,9 +59,9 @@ uvec3 unpack_cube(uint packed) {
 }
 
 // The t at which the ray leaves cubes of these indices on each axis. The planes are those of `planes_of`, except at
-// the border. In a uniform grid, the border is where the last cubes end, not where the box does, so the ray leaves
-// the box first. In a grid of two levels, the ray never leaves a lattice by its border, whose t is infinity: a
-// block's border may be off by rounding. There t_exit ends the interval.
+// the lattice's border. There, t_exit ends the search of the lattice, since it is no later than the border's t. In a
+// uniform grid, the border's plane is where the last cubes end. The box may cut these cubes, so the ray leaves the
+// box first. In a grid of two levels, a block's border may be off by rounding, so the t of every border is infinity.
 vec3 exits_of(Lattice lattice, TraversalRay ray, uvec3 cube) {
     uvec3 faces = cube + uvec3(greaterThanEqual(ray.inv_direction, vec3(0.0)));
     precise vec3 offsets = vec3(faces) * lattice.cell_size;
@@ -76,8 +77,8 @@ ivec3 steps_of(TraversalRay ray) {
     return 2 * ivec3(greaterThanEqual(ray.inv_direction, vec3(0.0))) - 1;
 }
 
-// Enters the lattice at t_enter: finds the first cube on the ray's way that it leaves at t_enter or later. The
-// loop corrects the cube that is computed from the point at t_enter, whose indices are off by about 1.
+// Enters the lattice at t_enter: finds the first cube on the ray's way that the ray leaves at t_enter or later. A
+// first estimate is computed from the point at t_enter. Its indices are off by about 1, which the loop corrects.
 void enter_lattice(TraversalRay ray, inout GridWalk walk) {
     ivec3 steps = steps_of(ray);
     ivec3 cube = ivec3(cube_near(walk.lattice, ray.shear.origin + 2.0 * walk.t_enter * ray.direction));
@@ -145,7 +146,8 @@ GridCell cell_of(GridWalk walk) {
     return GridCell(words.x, words.y);
 }
 
-// The triangles of the lowest cell that the ray is in. Enters the block of an upper cell that has one.
+// Returns the entries of the cell that the ray is in. If this is an upper cell with a block, enters the block and
+// returns the entries of a lower cell.
 Visit visit_cell(TraversalRay ray, float t_best, inout GridWalk walk) {
     GridCell cell = cell_of(walk);
     if (GRID_LEVELS == 2u && walk.upper_cube == IN_UPPER_LEVEL && cell.count > 0u) {

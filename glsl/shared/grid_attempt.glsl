@@ -1,4 +1,4 @@
-// Attempts to build a level. Each one counts the columns of its triangles and then the pairs of a cell and a
+// Attempts to build a level. Each attempt counts the columns of the level's items and then the pairs of a cell and a
 // triangle; at the lower level it counts the cells first. If a count is above its limit, the next attempt has larger
 // cells. Once everything is counted, the kernels of further attempts get no workgroups. Twin of
 // src/accel/grid/build.rs. Needs nothing before it; includes grid_build.glsl and grid_size.glsl.
@@ -13,7 +13,8 @@ uvec2 groups_for(uint n_groups) {
     return uvec2(min(n_groups, GRID_GROUPS_X), (n_groups + GRID_GROUPS_X - 1u) / GRID_GROUPS_X);
 }
 
-// Sizes the dispatches that follow. Those that need something that is not counted yet get no workgroups.
+// Sizes the dispatches that follow. Of the kernels that count, only those that count what is next (build.counts) get
+// workgroups. The kernels after the attempts get workgroups only once everything is counted.
 void size_dispatches() {
     uvec2 cells = groups_for(build.counts == GRID_COUNTS_CELLS ? blocks_of(build.n_upper) : 0u);
     uvec2 items = groups_for(build.counts == GRID_COUNTS_COLUMNS ? blocks_of(build.n_items) : 0u);
@@ -40,9 +41,9 @@ void size_dispatches() {
     build.sort_groups_y = 1u;
 }
 
-// How many times the cells' edges are doubled after an attempt whose count is above its limit. At each doubling, the
-// number of cells that a surface meets falls to about a quarter. Each further failed attempt adds one more doubling,
-// and the last attempt has the largest cells possible.
+// The number of times that the cells' edges are doubled after an attempt whose count is above its limit. Each
+// doubling reduces the number of cells that a surface meets to about a quarter. Each attempt that has already failed
+// adds one more doubling. The last attempt has the largest cells possible.
 uint n_steps(uint count, uint limit) {
     if (build.n_attempts + 1u >= GRID_MAX_ATTEMPTS) return 32u;
     uint expected = 1u;

@@ -3,7 +3,8 @@
 //
 //   pair     the index of a cell, and the index of a triangle that comes near to it
 //   item     a triangle, and the lattice into whose cells it is sorted (grid_items.glsl)
-//   column   the cells of an item's box that are in line along one axis (grid_overlap.glsl)
+//   column   the cells in a line along one axis, in an item's box: the cells that its triangle's bounds meet
+//            (grid_overlap.glsl)
 //   block    GRID_BLOCK_SIZE consecutive items, columns, pairs or upper cells, whose sum is one of scan_blocks. A block
 //            of lower cells (`blocks`) is something else: the cells that an upper cell is cut into.
 //

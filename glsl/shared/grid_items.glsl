@@ -11,10 +11,10 @@
 layout(std430, set = 0, binding = BIND_GRID_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
 // The pairs of the upper level: a cell's index and a triangle's.
 layout(std430, set = 0, binding = BIND_GRID_UPPER_PAIRS) readonly buffer UpperPairsBlock { uvec2 upper_pairs[]; };
-// For each upper cell: the index of its first lower cell among those of its block of GRID_BLOCK_SIZE upper cells; the
-// number of its lower cells along each axis.
+// For each upper cell: the index of its first lower cell, counted from the first lower cell of its GRID_BLOCK_SIZE
+// consecutive upper cells, and the number of its lower cells along each axis.
 layout(std430, set = 0, binding = BIND_GRID_BLOCKS) readonly buffer BlocksBlock { uvec2 blocks[]; };
-// For each item: the index of its first column among those of its block of GRID_BLOCK_SIZE items.
+// For each item: the index of its first column, counted from the first column of its block of GRID_BLOCK_SIZE items.
 layout(std430, set = 0, binding = BIND_GRID_FIRST_COLUMNS) buffer FirstColumnsBlock { uint first_columns[]; };
 // The sums of blocks; after the scan, for each block the sum of all blocks before it.
 layout(std430, set = 0, binding = BIND_GRID_SCAN_BLOCKS) buffer ScanBlocksBlock { uint scan_blocks[]; };
@@ -57,8 +57,8 @@ uint first_column_of(uint item_ix) {
     return scan_blocks[build.columns_begin + item_ix / GRID_BLOCK_SIZE] + first_columns[item_ix];
 }
 
-// The item of a column, searched in [low, high): the last item whose first column is this one or an earlier one.
-// Items without columns begin where the next item does.
+// The item of a column, searched in [low, high): the last item whose first column is this one or an earlier one. An
+// item without columns has the same first column as the item after it, so it is not the last.
 uint item_of_column(uint column_ix, uint low, uint high) {
     while (high - low > 1u) {
         uint middle = (low + high) / 2u;

@@ -1,6 +1,7 @@
-// Tests which cubes of a lattice a triangle comes near to. Twin of src/accel/grid/overlap.rs, which explains the
-// method and derives the bounds of the errors. All arithmetic is `precise`, so that it gives the same bits as the
-// twin; divisions may round differently, which does not change the result.
+// Tests which cubes of a lattice a triangle comes near to, which means within the margin (src/accel/bounds.rs). Twin
+// of src/accel/grid/overlap.rs, which explains the method and derives the bounds of the errors. All arithmetic is
+// `precise`, so that it gives the same bits as the twin; divisions may round differently, which does not change the
+// result.
 //
 // No intermediate result is denormal in scenes whose largest coordinate is 2^-20 or more and whose edges are 0 or at
 // least 2^-20 times that. In smaller scenes, a device that flushes denormals may build a grid with a few
@@ -10,13 +11,15 @@
 
 #include "lattice.glsl"
 
+// A factor on the margin, which covers the rounding of the cubes' middles and half edges.
 const float MARGIN_FACTOR = 1.0625;
+// A bound of the error of a product of two vectors, as a multiple of the product of their `magnitude`s.
 const float PRODUCT_ERROR = 1.0 / 1048576.0;
 
 // A triangle and the columns of its box. The axes are permuted so that columns extend along z, which is the axis of
 // the normal's longest component. normal: not of unit length. normal_error: a bound of its components' error.
-// half_size: half of a cube's edge plus the margin. first, last: the first and the last index of the box's cubes on
-// each axis, inclusive. axis: the lattice's own axis that is z here.
+// half_size: half of a cube's edge plus MARGIN_FACTOR times the margin, world units. first, last: the first and the
+// last index of the box's cubes on each axis, inclusive. axis: the lattice's own axis that is z here.
 struct Columns {
     Lattice lattice;
     vec3 v0;
@@ -50,7 +53,7 @@ float magnitude(vec3 v) {
     return sum;
 }
 
-// The first index, on each axis, of the closed cubes that meet an interval from `least` on.
+// The index, on each axis, of the first closed cube whose upper face is at or above `least`.
 uvec3 first_cubes(Lattice lattice, vec3 least) {
     uvec3 first = cube_near(lattice, least);
     bool moves = true;
@@ -66,7 +69,7 @@ uvec3 first_cubes(Lattice lattice, vec3 least) {
     return first;
 }
 
-// The last index, on each axis, of the closed cubes that meet an interval up to `greatest`.
+// The index, on each axis, of the last closed cube whose lower face is at or below `greatest`.
 uvec3 last_cubes(Lattice lattice, vec3 greatest) {
     uvec3 last = cube_near(lattice, greatest);
     bool moves = true;
@@ -82,7 +85,7 @@ uvec3 last_cubes(Lattice lattice, vec3 greatest) {
     return last;
 }
 
-// The columns of a triangle. margin: that of the box of all triangles.
+// The columns of a triangle. margin: the margin of the box of all triangles, world units.
 Columns columns_of(Lattice lattice, Triangle triangle, float margin) {
     precise float grown = MARGIN_FACTOR * margin;
     precise vec3 a = triangle.v1 - triangle.v0;
@@ -116,8 +119,8 @@ uint n_columns_of(Columns columns) {
     return n.x * n.y;
 }
 
-// Whether a square is certainly on the right of an edge, and whether it is certainly on its left. middle:
-// that of the square.
+// x: whether a square is certainly on the right of an edge. y: whether it is certainly on the edge's left. middle,
+// half_size: the square's middle and half of its edge.
 bvec2 sides_of(vec2 from, vec2 to, vec2 middle, float half_size) {
     precise vec2 along = to - from;
     precise vec2 way = middle - from;
@@ -136,7 +139,7 @@ bool is_beside(vec2 a, vec2 b, vec2 c, vec2 middle, float half_size) {
     return (ab.x || bc.x || ca.x) && (ab.y || bc.y || ca.y);
 }
 
-// Whether the triangle's plane may come near to the cube of this middle.
+// Whether the triangle's plane may come near to the cube with this middle.
 bool meets_plane(Columns columns, vec3 middle) {
     precise vec3 way = middle - columns.v0;
     vec3 n = columns.normal;
@@ -146,14 +149,14 @@ bool meets_plane(Columns columns, vec3 middle) {
     return !(abs(height) > reach);
 }
 
-// About the index of the cube of a column that contains a coordinate; the cube at the border if none does.
+// The approximate index along z of the cube that contains a coordinate; the index at the border if none contains it.
 uint index_near(Lattice lattice, float at) {
     precise float index = (at - lattice.least.z) / lattice.cell_size;
     return uint(clamp(index, 0.0, float(lattice.n_cells.z - 1u)));
 }
 
-// The first and the last index of the cubes of a column that may meet the triangle's plane. The interval is up to a
-// cube wider on each side than `meets_plane` needs, so its last bits make no difference.
+// The first and the last index along z of the cubes of a column that may meet the triangle's plane. The range is up
+// to a cube wider on each side than `meets_plane` needs, so the rounding of its ends makes no difference.
 uvec2 near_plane(Columns columns, uvec2 column) {
     Lattice lattice = columns.lattice;
     uint first = columns.first.z, last = columns.last.z;
@@ -193,7 +196,8 @@ uvec2 cubes_of(Columns columns, uvec2 column) {
     return near_plane(columns, column) + uvec2(0u, 1u);
 }
 
-// Whether the triangle comes near to a cube that is in the range of `cubes_of`.
+// Whether the triangle comes near to a cube that is in the range of `cubes_of`, which has tested the column, as seen
+// along z.
 bool is_near(Columns columns, uvec3 cube) {
     vec3 middle = middle_of(columns.lattice, cube);
     float half_size = columns.half_size;

@@ -37,11 +37,11 @@ Lattice with_doubled_edges(Lattice lattice) {
     return lattice_of_size(lattice.least, lattice.greatest, min(cell_size, LARGEST));
 }
 
-// The lattice of the smallest cubes of which no more than max_cells fill a box, and which are not smaller than the
-// margin.
+// The lattice of the smallest cubes with which a box has no more than max_cells cubes and no more than
+// GRID_MAX_RESOLUTION along an axis. The cubes' edges are no shorter than the margin.
 Lattice lattice_of_density(vec3 least, vec3 greatest, float margin, uint max_cells) {
-    // The bits of positive numbers have the same order as the numbers. The search finds the highest bits first, and
-    // cubes of the size that `bits` encode are always too small.
+    // The bits of positive numbers have the same order as the numbers. The search finds the bits of the largest size
+    // that is too small, the highest bit first. The next larger number is the result.
     uint bits = 0u;
     for (uint bit = 1u << 30; bit > 0u; bit >>= 1u) {
         float next = uintBitsToFloat(bits | bit);

@@ -49,10 +49,10 @@ float along_split(vec3 v, KdNode node) {
     return (node.axis_and_child & 2u) != 0u ? v.z : ((node.axis_and_child & 1u) != 0u ? v.y : v.x);
 }
 
-// Position of a split's plane on its axis. In a leaf this word is an index, which is a denormal float. On lavapipe
-// idle lanes that hold a leaf still compute with it, and products of denormals took a sixth of the kernel's time. So
-// it is masked to zero there. The mask is computed from the node's bits, since a compiler removes a test for a leaf
-// where a branch has already made that test.
+// Position of a split's plane on its axis. In a leaf, this word is an index, which is a denormal float. On lavapipe,
+// idle lanes that hold a leaf still compute with the word, and products of denormals took a sixth of the kernel's
+// time. So on devices that predicate branches, the word of a leaf is masked to zero. The mask is computed from the
+// node's bits, not by a comparison: where a branch has already tested for a leaf, the compiler removes comparisons.
 float plane_of(KdNode node) {
     const int LEAF_BIT = findMSB(KD_LEAF);
     uint bits = node.split_or_first;
@@ -67,7 +67,7 @@ float crossing(TraversalRay ray, KdNode node) {
     return t;
 }
 
-// Offset of the first child, on the side that the ray comes from, or of the second one.
+// Offset of the second child if `second` is true, otherwise of the first child, on the side that the ray comes from.
 uint child_of(TraversalRay ray, KdNode node, bool second) {
     bool is_above = (along_split(ray.inv_direction, node) < 0.0) != second;
     uint pair_at = node.axis_and_child & ~((1u << KD_PAIR_SHIFT) - 1u);

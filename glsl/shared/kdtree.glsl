@@ -54,6 +54,7 @@ KdNode descend_in_step(TraversalRay ray, inout Cell cell) {
     return node;
 }
 
+// Descends from the cell to a leaf, as the traversal and the device require, and begins the visit to it.
 Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
     KdNode leaf;
     if (TRAVERSAL == TRAVERSAL_ROPES) leaf = descend_to_rope(ray, t_best, cell);
@@ -63,8 +64,9 @@ Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
 }
 
 // Searches in one loop, each of whose turns either tests a triangle or goes on to a leaf. So lanes that test stay
-// together, and so do lanes that go on. If the loops were nested, the outer loop would wait for all lanes' leaves or
-// for each lane's tests. Returns 0, or the mark of a ray that has stalled.
+// together, and so do lanes that go on. With a nested loop, lanes that are finished with it would wait for all other
+// lanes: until each of them has found a leaf, or has tested the triangles of its leaf. Returns 0, or the mark of a
+// ray that has stalled.
 uint search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (!is_in(ray)) return 0u;
     Cell cell = whole(ray);

@@ -23,7 +23,8 @@ vec3 planes_of(Lattice lattice, uvec3 cube) {
     return min(planes, lattice.greatest);
 }
 
-// About the cube that contains a point, or the one at the border if the point is outside the box.
+// The approximate indices of the cube that contains a point, or of the nearest cube at the border if the point is
+// outside the box.
 uvec3 cube_near(Lattice lattice, vec3 point) {
     precise vec3 indices = (point - lattice.least) / lattice.cell_size;
     return uvec3(clamp(indices, vec3(0.0), vec3(lattice.n_cells - 1u)));

@@ -9,10 +9,12 @@
 
 // Invocations of a workgroup in ray kernels. Each invocation handles one ray.
 #define RAY_GROUP_SIZE 64u
-// Sides of a workgroup in pixel kernels, 8 x 8 pixels, and of the tiles in whose order pixels are rendered.
+// Side of a workgroup in pixel kernels, which handles 8 x 8 pixels. It is also the side of the tiles in whose order
+// pixels are rendered.
 #define TILE_SIZE 8u
-// Logarithm of the most lanes that one ray gets. If a dispatch has fewer rays than the device has lanes, each ray
-// gets 2^n lanes, of which only the first works, so that divergent rays do not share a subgroup.
+// Base-2 logarithm of the most lanes that one ray gets. If a dispatch has fewer rays than the device has lanes, each
+// ray gets several lanes, a power of two. Only the first of them works, so that fewer divergent rays share a
+// subgroup.
 #define MOST_LANES_LOG2 5u
 // Invocations of a workgroup in prefix sums. Vulkan guarantees 128 invocations on every device.
 #define SCAN_GROUP_SIZE 128u
@@ -30,7 +32,8 @@
 #define NO_TRIANGLE 0xffffffffu
 // Marks a triangle that rays pass through. It replaces the index of the triangle's material.
 #define TRIANGLE_HIDDEN 0x80000000u
-// Replaces an encoded shading normal: use the normal of the triangle's own plane. No snorm pair encodes to it.
+// Replaces the encoded shading normal of a corner that has none. Kernels then shade with the normal of the triangle's
+// plane. No encoded normal equals this value.
 #define FLAT_NORMAL 0x80008000u
 
 // `KdNode.axis_and_child`, bits 0..1: the axis of a split, 0, 1 or 2. The bits are 0 in a leaf.
@@ -39,8 +42,9 @@
 #define KD_LEAF 4u
 // `KdNode.axis_and_child`, bit 3: the node has a slab, which is tested before anything below the node.
 #define KD_HAS_SLAB 8u
-// `KdNode.axis_and_child`, bits 4..31. In a split, p, whose children are nodes 2 p and 2 p + 1. In a leaf, the number
-// of its triangles. With the lower bits cleared, a split's word is the offset of its children in bytes.
+// `KdNode.axis_and_child`, bits 4..31. In a split, they are a number p: the split's children are nodes 2 p and
+// 2 p + 1. In a leaf, they are the number of its triangles. With the lower bits cleared, a split's word is the offset
+// of its children in bytes.
 #define KD_PAIR_SHIFT 4u
 // Size of a `KdNode`.
 #define KD_NODE_BYTES 8u
@@ -57,7 +61,8 @@
 // does to hits, to planes and to a ray's distance from a plane.
 #define KD_PLANE_EPSILON 0.000015258789
 // A component of a direction is replaced by this if its magnitude is less. So inverse directions are finite, and rays
-// in a split plane follow one rule. For unit directions it is far below one rounding of a direction, 2^-24.
+// that are parallel to a split plane need no case of their own. For unit directions, the change is far below the
+// rounding of a component, 2^-24.
 #define KD_LEAST_COMPONENT 1.0e-12
 // Far children that the traversal `short-stack` keeps.
 #define SHORT_STACK_SIZE 8u
@@ -67,20 +72,21 @@
 // The most cells along each axis into which a grid of two levels cuts a cell of the upper level.
 #define GRID_MAX_BLOCK_RESOLUTION 32u
 
-// Lower bound of the barycentric weights of shaded points, 2^-16. Rounding could put a point that is exactly on the
-// edge where two walls meet behind the other wall, and thus into that wall's shadow.
+// Lower bound of the barycentric weights of shaded points, 2^-16. It keeps points off edges. At an edge between two
+// walls, rounding could otherwise put a point of one wall behind the other wall, into that wall's shadow.
 #define LEAST_WEIGHT 0.000015258789
-// Distance from a surface at which rays that leave it start, as a multiple of the weighted magnitudes of the
-// triangle's corners. 2^-18, which is 64 roundings, covers the few roundings by which an interpolated point is off
-// the plane, and those of the next ray's tests in the same plane.
+// Distance from a surface at which rays that leave it start, as a multiple of `dot(m, abs(normal))`. m is the mean of
+// the corners' absolute coordinates, weighted by the hit's barycentric weights. The factor is 2^-18, which is 64
+// roundings. It covers the few roundings by which an interpolated point is off the plane, and those of the next ray's
+// tests in the same plane.
 #define SURFACE_CLEARANCE 0.0000038146973
 // Squared length below which an interpolated shading normal has no direction: the corners' normals cancel out.
 #define LEAST_NORMAL_SQUARED 1.0e-12
-// Reflectance, 2^-64, below which light is never visible. A narrow highlight is darker than this almost all around,
-// and no shadow rays are traced there.
+// Reflectance, 2^-64, below which light is never visible. Outside its small bright spot, a narrow highlight reflects
+// less than this. Hits that reflect no more of a light trace no shadow ray to it.
 #define LEAST_REFLECTANCE 5.421011e-20
-// Lower bound of the cosine between an interpolated normal and the direction back along the ray. Such a normal can
-// turn away from the viewer.
+// Lower bound of the cosine between an interpolated normal and the direction to the ray's origin. The bound is needed
+// because an interpolated normal can point away from the viewer.
 #define LEAST_COSINE 1.0e-4
 
 // Values of the specialization constant `TRAVERSAL`: the algorithm that takes rays through the kd-tree.
@@ -182,8 +188,8 @@ struct KdNode {
 // The plane of a leaf's triangle, 16 bytes. The planes of a leaf are side by side in memory, apart from its
 // triangles. A point p is `dot(normal, p) - distance` above the plane (world units).
 //
-// - `normal`: unit length, or 0 if the triangle has no area or its plane is not certain. No ray is clear of a plane
-//   of 0.
+// - `normal`: unit length, or 0 if the triangle has no area or its plane is not certain. Rays always test a triangle
+//   whose normal here is 0.
 // - `distance`: of the plane from the world's origin, along the normal (world units).
 struct Plane {
     vec3 normal;
@@ -221,8 +227,8 @@ struct KdRope {
 };
 
 // A cell of a grid, 8 bytes. At the lowest level, its triangles are the `count` entries of `leaf_triangles` from
-// `first` on. At the upper level of two, it is cut into count x count x count cells, of which `grid_cells[first]` is
-// the first, x fastest. A count of 0 means that the cell has no triangles.
+// `first` on. At the upper level of a grid of two levels, the cell is cut into count x count x count cells. The first
+// of them is `grid_cells[first]`, and x varies fastest. A count of 0 means that the cell has no triangles.
 struct GridCell {
     uint first;
     uint count;
@@ -282,8 +288,8 @@ struct PathRay {
 
 // A ray that is cast by itself, not for a picture, 32 bytes. The length of `direction` is arbitrary; it is the unit
 // of t. Hits have t in `(t_min, t_max]`. All bounds are valid, but those below 2^-126 may count as 0. Bounds are
-// exact to the last bit if the origin is within `KD_MAX_ORIGIN_DISTANCE`, and otherwise to 2^-24 of the way to the
-// scene.
+// exact to the last bit if the origin is within `KD_MAX_ORIGIN_DISTANCE`. Otherwise they are exact to 2^-24 of the
+// distance from the ray's origin to the scene.
 struct Ray {
     vec3 origin;
     float t_min;
@@ -311,15 +317,16 @@ struct Hit {
 //         + (1 - 2 (window_y + y + sample_y) / picture_height) * up
 // ```
 //
-// - `clip_from_world`: of the whole picture, moved so that the sample is in the middle of its pixel.
+// - `clip_from_world`: world space to the clip space of the whole picture. It is shifted within a pixel so that the
+//   frame's sample is at the centre of its pixel, where the rasterizer samples.
 // - `eye`: world space. `forward`: unit length. `right`, `up`: from the middle of the image plane, which is at
 //   distance 1, to its right and its upper edge.
 // - `width`, `height`: of the window (pixels).
 // - `n_triangles`, `n_lights`: of the scene.
 // - `ambient`: radiance, weighted by `Material.ka`. `background`: radiance of rays that hit nothing.
 // - `exposure`: factor of radiance before the tone curve.
-// - `denoise_threshold`: a pixel is smoothed if its luminance differs from that of its four neighbours by more in
-//   sum.
+// - `denoise_threshold`: a pixel is smoothed if the differences between its luminance and those of its four
+//   neighbours add up to more than this.
 // - `max_depth`: levels of rays, of which the camera's are the first.
 // - `queue_capacity`: rays that the ray queue has room for.
 // - `picture_width`, `picture_height`: of the whole picture (pixels).
@@ -355,16 +362,17 @@ struct Frame {
     uint reserved1;
 };
 
-// The rays of one bounce of one batch, 80 bytes. The bounce before fills it in, and the host the first one. The rays
-// of a batch are in one queue, bounce after bounce. Each `groups` is a `VkDispatchIndirectCommand`.
+// The rays of one bounce of one batch, 80 bytes. The host writes the row of a batch's first bounce. Compaction of
+// each bounce's rays (`compact_spine.comp`) writes the row of the next bounce. The rays of a batch are in one queue,
+// bounce after bounce. Each `groups` is a `VkDispatchIndirectCommand`.
 //
 // - `first_ray`, `n_rays`: the bounce's rays in the queue.
-// - `n_wanted`: rays that the bounce before made.
-// - `overflow`: 1 if the queue has no room for them. Then `n_rays` is 0, and the batch has to be split.
-// - `trace_groups`: over the bounce's rays, each of which has `2^trace_lanes_log2` lanes. Only the first of them
-//   works (src/frame/bounce.rs).
-// - `shadow_groups`: over a segment for each light and each ray of the batch up to the last one of this bounce, each
-//   with `2^shadow_lanes_log2` lanes.
+// - `n_wanted`: child rays of the bounce before, including those for which the queue has no room.
+// - `overflow`: 1 if the queue has no room for all of these rays. Then `n_rays` is 0, and the batch has to be split.
+// - `trace_groups`: over the bounce's rays, each of which has `2^trace_lanes_log2` lanes. Only the first lane of a
+//   ray works (src/frame/bounce.rs).
+// - `shadow_groups`: over the segments from hits to lights. y counts lights, x all rays of the batch up to the last
+//   one of this bounce. A segment has `2^shadow_lanes_log2` lanes.
 // - `scan_groups`: over the bounce's rays.
 // - `any_overflow`: in the first row only, 1 if any row of the frame has an overflow.
 // - `shade_groups`: over all rays of the batch up to the last one of this bounce.
@@ -415,7 +423,7 @@ struct Counters {
 // - `albedo`: the material's `kd`.
 // - `depth`: distance from the eye along `Frame.forward` (world units).
 // - `n_rays`: primary, secondary and shadow rays.
-// - `n_steps`: nodes and triangles of leaves that all of these rays read.
+// - `n_steps`: nodes, slabs, cells of a grid and triangles of leaves that all of these rays read.
 struct Feature {
     vec3 position_world;
     uint triangle_ix;
@@ -473,13 +481,13 @@ struct AccelConstants {
 #define CONSTANT_ANY_HIT 7u
 // The curve that maps radiance to the display's range: `TONEMAP_LINEAR` and its like.
 #define CONSTANT_CURVE 8u
-// Whether compute kernels found the triangles that pixels show, rather than the graphics pipeline.
+// Whether compute kernels, and not the graphics pipeline, found the triangle that each pixel shows.
 #define CONSTANT_SOFTWARE_RASTER 9u
 
 // Whether a kernel builds the lower level of a grid.
 #define CONSTANT_LOWER 10u
-// What a scan of a grid's build adds up: `GRID_SCANS_CELLS` and its like. The first three have the numbers of
-// `GRID_COUNTS_CELLS` and its like.
+// Which counts a prefix sum in a grid's build adds up: `GRID_SCANS_CELLS` and its like. The first three values equal
+// those of `GRID_COUNTS_CELLS` and its like.
 #define CONSTANT_SCANS 11u
 #define GRID_SCANS_CELLS 0u
 #define GRID_SCANS_COLUMNS 1u
@@ -508,8 +516,8 @@ struct AccelConstants {
 // Push constants of the kernels of a frame.
 //
 // - `first_pixel`, `n_pixels`: the batch's pixels, `[first_pixel, first_pixel + n_pixels)` in tile order.
-// - `bounce_ix`: the row of `bounces` for the batch's bounce of this depth. Kernels that light all rays of the batch
-//   get its first row.
+// - `bounce_ix`: index of the batch's row in `bounces` for the bounce of this depth. Kernels that light the rays of
+//   all bounces get the batch's first row.
 // - `depth`: of the bounce, 0 for the camera's rays and for kernels that light all rays.
 // - `round`: `ROUND_BEGIN` and its like.
 struct Batch {
@@ -591,20 +599,21 @@ struct DriverCast {
     uint scenery_high;
 };
 
-// The build of a grid (src/passes/grid).
+// The build of a grid (src/passes/grid). grid_build.glsl defines its terms: pair, item, column and block.
 
 // The most attempts to build a level of cells within the limit of references. The last one has the largest cells.
 #define GRID_MAX_ATTEMPTS 4u
 // The most columns, as a multiple of the most references. In many columns of a long triangle's box, no cell contains
 // the triangle.
 #define GRID_COLUMNS_PER_REFERENCE 4u
-// Halvings after which the finest block, of `GRID_MAX_BLOCK_RESOLUTION` cells along each axis, is one cell.
+// How many halvings of its resolution turn the finest block, which has `GRID_MAX_BLOCK_RESOLUTION` cells along each
+// axis, into one cell.
 #define GRID_MAX_HALVINGS 5u
 // Counts above this are all replaced by 2^32 - 1.
 #define GRID_MAX_COUNT 0x7fffffffu
-// Rows of `SCAN_GROUP_SIZE` entries, one for each invocation, that a workgroup goes through.
+// How many rows of entries a workgroup goes through. A row has `SCAN_GROUP_SIZE` entries, one for each invocation.
 #define GRID_ROWS 8u
-// The entries of these rows.
+// The number of entries in these rows, `GRID_ROWS * SCAN_GROUP_SIZE`.
 #define GRID_BLOCK_SIZE 1024u
 // Workgroups of a dispatch side by side. More are in further rows, since a device need not accept more than 65,535.
 #define GRID_GROUPS_X 1024u
@@ -615,11 +624,11 @@ struct DriverCast {
 // The most workgroups of a pass of the sort. Each sorts several blocks one after the other if there are more blocks.
 #define GRID_MAX_SORT_GROUPS 1024u
 
-// Value of `GridBuild.counts`: the build of the level next counts the cells of the lower level.
+// Value of `GridBuild.counts`: the attempt counts the cells of the lower level next.
 #define GRID_COUNTS_CELLS 0u
-// Value of `GridBuild.counts`: next come the columns of cells that the boxes of triangles take.
+// Value of `GridBuild.counts`: the attempt counts the columns of cells in the items' boxes next.
 #define GRID_COUNTS_COLUMNS 1u
-// Value of `GridBuild.counts`: next come the pairs of a cell and a triangle.
+// Value of `GridBuild.counts`: the attempt counts the pairs of a cell and a triangle next.
 #define GRID_COUNTS_PAIRS 2u
 // Value of `GridBuild.counts`: everything is counted.
 #define GRID_IS_COUNTED 3u
@@ -638,8 +647,8 @@ struct GridBuild {
     uint n_cells_y;
     uint n_cells_z;
     float largest_coordinate;
-    // The bounds of the finite triangles, as integers of the same order (grid_bounds.comp), the number of these
-    // triangles, and the number of all triangles.
+    // The bounds of the finite triangles, the number of these triangles, and the number of all triangles. A bound is
+    // stored as an integer, such that integers compare as the floats do (grid_bounds.comp).
     uint least_x;
     uint least_y;
     uint least_z;
@@ -648,8 +657,8 @@ struct GridBuild {
     uint greatest_y;
     uint greatest_z;
     uint n_triangles;
-    // What is required. *_density: cells for each triangle. max_references: the most pairs, which is also the most
-    // lower cells. max_columns: the most columns.
+    // What the host requires. *_density: cells for each triangle. max_references: the most pairs of a level, and also
+    // the most cells of the lower level. max_columns: the most columns.
     float upper_density;
     float lower_density;
     uint max_references;
@@ -678,8 +687,8 @@ struct GridBuild {
     uint cells_begin;
     // Blocks that a workgroup of the sort goes through.
     uint tiles_per_group;
-    // Workgroups of indirect dispatches, over upper cells, items and columns, in the order in which an attempt
-    // counts. Only those whose turn it is are not 0.
+    // Workgroups of an attempt's indirect dispatches, in their order: over upper cells, over items, over columns.
+    // They are 0, except for the dispatch that counts what `counts` says.
     uint cell_groups_x;
     uint cell_groups_y;
     uint cell_groups_z;
@@ -722,9 +731,11 @@ struct GridSort {
 #define BIND_RAYS 8u
 // A word for each ray: bits of `CHILD_REFLECTED` and its like.
 #define BIND_CHILD_KINDS 9u
-// A word for each ray: the index of its first child in the queue, or where that would be.
+// A word for each ray: the index of its first child in the queue. A ray without children has the index that a child
+// of it would have.
 #define BIND_FIRST_CHILDREN 10u
-// A word for each `SCAN_GROUP_SIZE` rays: the number of their children, after the scan that of all blocks before.
+// A word for each block of `SCAN_GROUP_SIZE` rays: the number of the block's children. After the scan, it is the
+// number of the children of all blocks before.
 #define BIND_SCAN_BLOCKS 11u
 // One `Bounce` for each batch and bounce.
 #define BIND_BOUNCES 12u

@@ -3,8 +3,8 @@
 //
 // Needs scene.glsl, stalls.glsl, steps.glsl and slab.glsl. Provides `Visit`, `visit_leaf` and `find_candidate`.
 
-// A ray's visit to a leaf: the entries of leaf_triangles that are still to be tested, from entry_ix to before end_ix,
-// and the ray's segment within the leaf.
+// A ray's visit to a leaf: the entries of leaf_triangles that are still to be tested, from entry_ix up to, but not
+// including, end_ix, and the ray's segment within the leaf.
 struct Visit {
     uint entry_ix;
     uint end_ix;
@@ -18,11 +18,11 @@ Visit visit_leaf(KdNode leaf, float t_enter, float t_exit) {
     return Visit(leaf.split_or_first, leaf.split_or_first + n_entries, interval_of(t_enter, t_exit));
 }
 
-// Goes on to the leaf's next triangle whose plane the ray meets within the leaf. The ray may meet the other planes
-// elsewhere, in leaves that also have those triangles. Most triangles are in several leaves, so this saves most
-// tests.
+// Finds the leaf's next triangle whose plane the ray meets within the leaf. Returns false if there is none, or if the
+// invocation's loop turns are spent. A triangle that is skipped can be hit only in another leaf, which has it, too.
+// Most triangles are in several leaves, so this saves most tests.
 bool find_candidate(TraversalRay ray, inout Visit visit, out uint entry_ix) {
-    // If it were left undefined, it would be kept from turn to turn, in a register.
+    // If entry_ix were not set here, the compiler would keep its old value in a register from turn to turn.
     entry_ix = 0u;
     while (visit.entry_ix < visit.end_ix && has_turns()) {
         count_turn();

@@ -13,6 +13,7 @@ struct LightSample {
     vec3 irradiance;
 };
 
+// Returns what arrives from a light at a point.
 LightSample sample_light(Light light, vec3 point_world) {
     if (light.kind == LIGHT_DIRECTIONAL) {
         return LightSample(light.position, uintBitsToFloat(0x7f800000u), light.intensity);

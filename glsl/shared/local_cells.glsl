@@ -3,7 +3,7 @@
 // An entry holds the offset of the node whose sibling is pending, and the bits of the t at which the ray leaves that
 // sibling. The t at which it enters is not stored: it is the t at which the ray has just left the cell before.
 //
-// Needs kd_nodes.glsl and local_memory.glsl. Provides `keep_cell` and `take_cell`. slot: a slot below KD_MAX_DEPTH.
+// Needs kd_nodes.glsl and local_memory.glsl. Provides `keep_cell` and `take_cell`. slot: index below KD_MAX_DEPTH.
 
 void keep_cell(uint slot, Cell cell) {
     local_memory[slot] = uvec2(cell.node_offset, floatBitsToUint(cell.t_exit));

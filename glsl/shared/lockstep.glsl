@@ -4,8 +4,8 @@
 // the same order, as by `search_by_turns`. A part of kdtree.glsl.
 //
 // So loops test at their end whether to continue, which saves a turn in which no lane takes part. They test at their
-// beginning, too. Otherwise lavapipe (Mesa 22.3) would take the values that a loop leaves behind from the loop's last
-// turn, also for lanes that left it earlier.
+// beginning, too. Without that second test, lavapipe (Mesa 22.3) computes wrong results for lanes that leave the loop
+// early: their variables get the values of the loop's last turn.
 //
 // Needs everything that kdtree.glsl includes, and its `next_leaf`. Provides `search_in_step`.
 
@@ -54,9 +54,10 @@ bool go_on_in_step(TraversalRay ray, float t_best, inout bool begins, inout Cell
     return goes_on;
 }
 
-// Searches in turns. Each turn goes on to a leaf, to one more if that leaf has nothing to test, and then makes at
-// most one test. If a turn went on until all lanes have something to test, most lanes would wait. If it tested after
-// every leaf, often no lane would have anything to test. Returns 0, or the mark of a ray that has stalled.
+// Searches in turns. Each turn seeks a triangle to test in at most two leaves: the second one only if the first one
+// has none. Then it makes at most one test. If a turn went on until all lanes have something to test, most lanes
+// would wait. If it tested after every leaf, often no lane would have anything to test. Returns 0, or the mark of a
+// ray that has stalled.
 uint search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
     Cell cell = whole(ray);
     // The ray starts at the root, with a visit that has nothing left to test.

@@ -13,8 +13,8 @@ Material material_at(Hit hit) {
     return materials[load_triangle_materials(hit.triangle_ix)];
 }
 
-// The directions in which a ray continues from a surface, and the factors of its throughput. A weight of zero means
-// that there is no such ray.
+// The directions in which a ray continues from a surface, and the weights by which its throughput is multiplied. A
+// weight of zero means that there is no such ray.
 struct Scattering {
     vec3 reflected;
     vec3 reflected_weight;
@@ -22,8 +22,8 @@ struct Scattering {
     vec3 transmitted_weight;
 };
 
-// The weight of the light that the surface itself reflects and emits: a see-through material (d < 1) covers only a
-// share d of what is behind it.
+// The weight of the light that the surface itself reflects and emits. A see-through material (d < 1) covers only a
+// share d of what is behind it. A material that refracts shows its own light in full.
 float local_weight(Material material) {
     return (material.flags & MATERIAL_REFRACT) != 0u ? 1.0 : material.d;
 }
@@ -33,8 +33,8 @@ bool scatters_light(Material material) {
     return (material.flags & (MATERIAL_REFLECT | MATERIAL_REFRACT)) != 0u || material.d < 1.0;
 }
 
-// The sum of the diffuse reflectance, times the cosine of the light's direction, and the specular reflectance towards
-// the viewer. All vectors are unit vectors that point away from the surface.
+// The reflectance towards the viewer: the diffuse part, which is multiplied by the cosine of the light's direction,
+// plus the specular part, which is not. All vectors are unit vectors that point away from the surface.
 vec3 phong(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
     float cos_light = dot(normal, to_light);
     if (!(cos_light > 0.0)) return vec3(0.0);
@@ -46,10 +46,9 @@ vec3 phong(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
     return reflectance;
 }
 
-// Whether a light in the direction to_light is visible in the surface: whether it reflects more than
-// LEAST_REFLECTANCE.
+// Whether the surface reflects more than LEAST_REFLECTANCE of a light in the direction to_light towards the viewer.
 bool can_show(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
-    // The diffuse part decides most cases without the specular part's power.
+    // The diffuse part alone decides most cases, without the exponentiation of the specular part.
     vec3 diffuse = material.kd * dot(normal, to_light) * local_weight(material);
     if (any(greaterThan(diffuse, vec3(LEAST_REFLECTANCE)))) return true;
     vec3 reflectance = phong(material, normal, to_viewer, to_light) * local_weight(material);
@@ -70,7 +69,8 @@ float refraction_cosine(float cos_in, float eta) {
     return sqrt(max(0.0, 1.0 - eta * eta * (1.0 - cos_in * cos_in)));
 }
 
-// The direction, mirrored back to the surface's `side` if an interpolated normal has put it on the other one.
+// The direction, mirrored at the surface if it points to the wrong side, which an interpolated normal can cause.
+// side: the normal on the correct side.
 vec3 keep_side(vec3 direction, vec3 side) {
     return direction - 2.0 * min(dot(direction, side), 0.0) * side;
 }

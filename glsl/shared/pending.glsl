@@ -1,5 +1,5 @@
-// Pending subtrees, which the ray visits later. The constant TRAVERSAL selects how they are kept; each way has its
-// own file. A part of kdtree.glsl.
+// Pending subtrees, which the ray visits later. The constant TRAVERSAL selects the method by which they are kept.
+// Each method has its own file. A part of kdtree.glsl.
 //
 // Needs TRAVERSAL, kd_nodes.glsl, local_cells.glsl and slab.glsl. Provides `clear_pending`, `go_down`,
 // `push_pending`, `find_pending` and `take_pending`, and `descend_to_rope` of ropes.glsl.
@@ -23,7 +23,7 @@ void clear_pending() {
     siblings_done = uvec2(0u);
 }
 
-// Notes that the ray goes one level down. Only ways that keep a bit for each level do anything.
+// Notes that the ray goes one level down. Only methods that keep a bit for each level do anything.
 void go_down() {
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) siblings_done = mask_shifted_down(siblings_done);
     if (TRAVERSAL == TRAVERSAL_MASK) mask_down();
@@ -33,7 +33,7 @@ void go_down() {
 
 // Makes the sibling of the cell's node pending. The ray leaves it at the cell's t_exit.
 void push_pending(Cell cell) {
-    // These ways find pending subtrees on the way back up.
+    // These methods store nothing here: they find pending subtrees on the way back up.
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;
     if (TRAVERSAL == TRAVERSAL_MASK) mask_push(cell);
@@ -41,8 +41,8 @@ void push_pending(Cell cell) {
     else marked_push(cell);
 }
 
-// Returns whether there is a pending cell that may hold a hit nearer than t_best. Ways that have to search for that
-// cell (TRAVERSAL_MASK_BOXES and TRAVERSAL_BACKTRACK) write it to `cell`.
+// Returns whether there is a pending cell that may hold a hit nearer than t_best. Methods that have to search for
+// that cell (TRAVERSAL_MASK_BOXES and TRAVERSAL_BACKTRACK) write it to `cell`.
 bool find_pending(TraversalRay ray, float t_best, inout Cell cell) {
     // Every cell that has not been visited begins where the leaf ends, or later.
     bool has_time = !(t_best < cell.t_exit);

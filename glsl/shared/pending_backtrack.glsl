@@ -3,8 +3,8 @@
 // "kd-backtrack"). A part of pending.glsl.
 //
 // The paper compares the ancestor's exit with the leaf's. If cells end at the same t, that could lead back into the
-// leaf. This version uses that the ray comes back to an ancestor from its first child or from its second, and that
-// the ray's direction alone tells which child that is. From the second child, the ancestor is done. From the first
+// leaf. This version asks instead from which child the ray comes back to an ancestor. The ray's direction alone tells
+// whether that is the ancestor's first or second child. After the second child, the ancestor is done. After the first
 // child, the second one is pending if the ray crosses the split plane before it leaves the ancestor.
 //
 // Needs kd_nodes.glsl and kd_boxes.glsl. Provides `backtrack`.

@@ -8,11 +8,11 @@
 // bits, without gaps (local_cells.glsl). With a slot for each level, divergent rays would soon spread over more
 // memory than the first cache holds, and would take up to a quarter longer (docs/experiments.md).
 //
-// Needs kd_nodes.glsl and local_cells.glsl. Provides `mask_down`, `mask_push` and `mask_pop`. Other ways also use the
-// mask itself: `mask_shifted_down`, `mask_shifted_up`, `is_pending`, `mask_mark` and `mask_up`.
+// Needs kd_nodes.glsl and local_cells.glsl. Provides `mask_down`, `mask_push` and `mask_pop`. Other methods also use
+// the mask itself: `mask_shifted_down`, `mask_shifted_up`, `is_pending`, `mask_mark` and `mask_up`.
 
-// 1 if no leaf is deeper than KD_WORD_DEPTH, as in most trees; else 2. A mask of one word is shifted and searched
-// faster. The value is the same for all kernels over one tree.
+// Words of the mask: 1 if no leaf is deeper than KD_WORD_DEPTH, which is so in most trees, otherwise 2. One word
+// takes less time to shift and to search than two. The value is the same for all kernels over one tree.
 layout(constant_id = CONSTANT_MASK_WORDS) const uint MASK_WORDS = 2u;
 
 // Bit i, counted over both words: whether the sibling i levels above the cell's node is pending.

@@ -2,11 +2,12 @@
 // GPU Raytracer, Graphics Hardware 2005). There are no parent links, and only one bit for each level is kept. A part
 // of pending.glsl.
 //
-// The paper does not keep these bits: it enters the root again at the t where the ray left the leaf. But cells that
-// meet at one t have to be told apart, or the old leaf would be entered for ever. The bits are the trail of the path
-// down (Laine: Restart Trail for Stackless BVH Traversal, HPG 2010), in the form that pending_mask.glsl writes. At a
-// set bit, the path went to the first child. At a cleared bit, it went to the second child if the ray enters that
-// child at all. Each restart clears the lowest set bit and sets only lower ones, so the traversal ends.
+// The paper does not keep these bits: it enters the root again at the t where the ray left the leaf. This t alone
+// does not suffice, since the leaf that the ray has left also contains it, and could be entered again without end.
+// The bits are the trail of the path down (Laine: Restart Trail for Stackless BVH Traversal, HPG 2010). They are kept
+// in `pending_mask`. At a set bit, the path went to the first child. At a cleared bit, it went to the second child if
+// the ray enters that child at all. Each restart clears the lowest set bit and sets only lower ones, so the traversal
+// ends.
 //
 // Needs kd_nodes.glsl and pending_mask.glsl. Provides `trail_length` and `retrace`.
 

@@ -8,8 +8,9 @@
 
 // Each entry: offset of the node whose sibling is pending, and the bits of the t at which the ray leaves the sibling.
 uvec2 short_stack[SHORT_STACK_SIZE];
-// Number of the next entry, whose slot is its remainder by the ring's size; number of entries that the ring holds.
+// Number of the next entry. An entry's slot is its number modulo SHORT_STACK_SIZE.
 uint short_stack_top;
+// Number of entries that the ring holds.
 uint short_stack_size;
 
 void short_stack_push(Cell cell) {

@@ -15,8 +15,8 @@
 layout(std430, set = 0, binding = BIND_PIXEL_NEAREST) buffer PixelNearestBlock { uint64_t pixel_nearest[]; };
 
 layout(push_constant) uniform RasterPushBlock { RasterPush raster; };
-// raster_count: the number of large triangles in the upper half, of their blocks in the lower. It shares a buffer
-// with raster_groups, since some devices bind no more than 30 buffers in a stage.
+// raster_count: the number of large triangles in the upper 32 bits, the number of their blocks in the lower 32 bits.
+// It shares a buffer with raster_groups, since some devices bind no more than 30 buffers in a stage.
 layout(std430, set = 0, binding = BIND_RASTER_GROUPS) buffer RasterGroupsBlock {
     RasterGroups raster_groups;
     uint64_t raster_count;
@@ -28,8 +28,8 @@ uvec2 blocks_of(uvec2 size) {
     return (size + (1u << raster.block_log2) - 1u) >> raster.block_log2;
 }
 
-// Keeps the nearest of a pixel's hits, and of two at one t that of the lower triangle index. t must be positive, so
-// that its bits have the same order as t.
+// Keeps the nearest of a pixel's hits. Of two hits at the same t, keeps the one with the lower triangle index. t must
+// be positive: the bits of positive numbers have the same order as the numbers.
 void keep_nearest(uvec2 pixel, float t, uint triangle_ix) {
     atomicMin(pixel_nearest[pixel_ix_of(pixel)], packUint2x32(uvec2(triangle_ix, floatBitsToUint(t))));
 }

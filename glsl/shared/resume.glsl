@@ -16,8 +16,8 @@ uint stall_at(Cell cell, Visit visit, Nearest best) {
 // path is found by the links to parents. Every crossing is computed by the same operations as the first time, so it
 // has the same bits.
 void walk_to(TraversalRay ray, uint node_offset) {
-    // Bit i, counted over both words: whether the node i levels above the last one is the child above its parent's
-    // plane.
+    // Bit i, counted over both words, belongs to the node on the path that is i levels above node_offset. It tells
+    // whether this node is its parent's upper child, on the positive side of the split plane.
     uvec2 path = uvec2(0u);
     uint n_levels = 0u;
     for (uint at = node_offset; at != 0u; at = offset_of(kd_parent_of(node_ix_of(at)))) {
@@ -55,7 +55,7 @@ void resume(TraversalRay ray, out Cell cell, out Visit visit, out Nearest best) 
     visit = Visit(state.entry_ix, state.end_ix, interval_of(cell.t_enter, min(cell.t_exit, best.t)));
     count_steps(state.n_steps);
     siblings_done = state.siblings_done;
-    // These ways find pending subtrees on the way back up, or by a rope.
+    // These methods find pending subtrees on the way back up, or by a rope, so nothing has to be rebuilt.
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;
     if (TRAVERSAL == TRAVERSAL_ROPES) return;

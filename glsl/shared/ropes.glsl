@@ -32,8 +32,8 @@ Exit exit_of(TraversalRay ray, uint leaf_ix) {
 
 // Descends to the leaf that contains the ray at t_enter. Of all slabs, only the leaf's own is tested: the others
 // would require the t at which the ray leaves their cells, which costs more than these slabs save
-// (docs/experiments.md). Afterwards, the cell's node_offset is that of the node to which the rope leads from the
-// face by which the ray leaves the leaf.
+// (docs/experiments.md). Afterwards, the cell's t_exit is the leaf's, but its node_offset is already that of the
+// next node: the one to which the rope of the leaf's exit face leads.
 KdNode descend_to_rope(TraversalRay ray, float t_best, inout Cell cell) {
     KdNode node = kd_node(cell.node_offset);
     while (!is_leaf(node)) {

@@ -3,7 +3,8 @@
 //
 // - GPUs read them as bound storage buffers.
 // - Software drivers read them as texels of the same buffers. lavapipe fetches the texels of eight lanes side by
-//   side, but loads from storage buffers lane by lane, with which rays take 1.2 to 1.4 times as long.
+//   side, but loads from storage buffers lane by lane. With loads from storage buffers, rays take 1.2 to 1.4 times as
+//   long.
 // - If an array is larger than what the device binds, it is read by its device address. This costs the traversal up
 //   to 7 % of its speed on a large GPU.
 //
@@ -87,7 +88,7 @@ KdBox kd_box_of(uint node_ix) {
     return KdBox(a.x, a.y, b.x, b.y, c.x, c.y);
 }
 
-// side: 0..5, below and above on x, y, z.
+// side: 0..5, the face of the node's cell: -x, +x, -y, +y, -z, +z.
 KdRope kd_rope_of(uint node_ix, uint side) {
     uvec2 words = load_kd_ropes(6u * node_ix + side);
     return KdRope(uintBitsToFloat(words.x), words.y);

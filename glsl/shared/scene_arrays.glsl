@@ -9,7 +9,8 @@
 // file itself and writes the types in Rust. A new array takes two edits: a line here, and its contents in
 // src/buffers/accel.rs.
 
-// The triangles, in the order of the scene. Each has three rows: a corner, and its shading normal in the fourth word.
+// The triangles, in the order of the scene. A triangle has three rows, one for each corner. The fourth word of a row
+// is the corner's shading normal.
 ARRAY(triangles, Triangle, vec4, 1u)
 // One word for each triangle: the index of its material. For casts with a filter, it is TRIANGLE_HIDDEN or 0.
 ARRAY(triangle_materials, uint, uint, 2u)
@@ -22,14 +23,16 @@ ARRAY(kd_parents, uint, uint, 6u)
 // order of the upper cells.
 ARRAY(grid_cells, GridCell, uvec2, 30u)
 
-// One entry for each triangle of each leaf, in the order of the leaves. Each has three rows: a corner, and in the
-// first row's fourth word the triangle's index.
+// One entry for each triangle of each leaf, in the order of the leaves. An entry has three rows, one
+// for each corner. The fourth word of its first row is the triangle's index.
 ARRAY(leaf_triangles, LeafTriangle, vec4, 7u)
 // One plane for each entry of `leaf_triangles`: the plane of its triangle.
 ARRAY(leaf_planes, Plane, vec4, 23u)
-// One slab for each node, or none at all: it holds the parts of the node's triangles that are within its cell.
+// One slab for each node, or no slabs at all. A slab holds the parts of the node's triangles that are within the
+// node's cell.
 ARRAY(kd_slabs, Slab, vec4, 27u)
 // One box for each node, or none at all: the node's cell, three rows each. Only some traversals read them.
 ARRAY(kd_boxes, KdBox, uvec2, 21u)
-// Six ropes for each node, or none at all: below and above on x, y, z. Only the traversal by ropes reads them.
+// Six ropes for each node, one for each face of its cell, or none at all. The faces are in the order -x, +x, -y, +y,
+// -z, +z. Only the traversal by ropes reads them.
 ARRAY(kd_ropes, KdRope, uvec2, 22u)

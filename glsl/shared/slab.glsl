@@ -15,8 +15,8 @@ Interval interval_of(float t_enter, float t_exit) {
     return Interval(t_enter + t_exit, t_exit - t_enter);
 }
 
-// Whether `interval` of the ray stays on one side of a plane (normal, distance from the world's origin),
-// farther from it than `reach`, which is in the units of that distance.
+// Whether the ray, within `interval`, stays on one side of a plane and farther from it than `reach`. plane: normal,
+// and distance from the world's origin. reach: in units of `plane.w`, as a point's `dot(normal, p)` is.
 bool is_clear(TraversalRay ray, Interval interval, vec4 plane, float reach) {
     float height = dot(plane.xyz, ray.shear.origin) - plane.w;
     float slope = dot(plane.xyz, ray.direction);
@@ -34,8 +34,8 @@ bool has_slab(KdNode node) {
     return (node.axis_and_child & KD_HAS_SLAB) != 0u;
 }
 
-// Tests the node's slab. Returns the node without the mark of a slab if the ray comes into the slab within its interval
-// through the cell, and otherwise an empty leaf.
+// Tests the node's slab. Returns the node without the mark of a slab if the ray comes into the slab within its
+// interval through the cell, and otherwise an empty leaf.
 KdNode enter_slab(TraversalRay ray, float t_best, Cell cell, KdNode node) {
     count_steps(1u);
     Interval interval = interval_of(cell.t_enter, min(cell.t_exit, t_best));

@@ -21,8 +21,8 @@ const bool CAN_STALL = TURN_BUDGET != 0u;
 // node_offset, t_enter, t_exit: the cell that the ray is in (kd_nodes.glsl). entry_ix, end_ix: the entries of the
 // leaf that are still to be tested. t_best, triangle_ix, u, v: the nearest hit so far. n_steps: reads so far
 // (steps.glsl). siblings_done: the mask of TRAVERSAL_MASK_BOXES; the other traversals of the kd-tree rebuild their
-// pending subtrees. grid.glsl stores the ray's cube in node_offset, and the cube of the upper level in
-// siblings_done.x.
+// pending subtrees. grid.glsl stores the indices of the ray's cell (its cube) in node_offset, and those of the
+// cell of the upper level in siblings_done.x.
 struct StalledRay {
     uint node_offset;
     float t_enter;
@@ -46,7 +46,7 @@ struct StallCounts {
     uint reserved;
 };
 
-// One buffer holds both, since some devices bind no more than 30 buffers in a stage.
+// One buffer holds the counts and the rays, since some devices bind no more than 30 buffers in a stage.
 layout(std430, set = 0, binding = BIND_STALLS) buffer StallsBlock {
     StallCounts stall_counts;
     StalledRay stalled_rays[];
@@ -65,7 +65,7 @@ bool has_turns() {
     return TURN_BUDGET == 0u || n_turns < TURN_BUDGET;
 }
 
-// Slot of the ray's stored state, or NO_SLOT if the ray begins.
+// Slot of the ray's stored state, or NO_SLOT if the ray starts from its beginning.
 uint resumed_slot = NO_SLOT;
 
 bool is_resumed() {

@@ -1,7 +1,7 @@
 // Counts of what an invocation's rays read of the acceleration structure.
 //
-// Needs a constant `bool COUNT_COSTS`, which the includer declares before. If it is false, the counting is compiled
-// out. Provides `count_steps`, `steps_so_far` and `n_steps`.
+// Needs a constant `bool COUNT_COSTS`, which the kernel declares before it includes this file. If it is false, the
+// counting is compiled out. Provides `count_steps`, `steps_so_far` and `n_steps`.
 #ifndef KDRAY_STEPS
 #define KDRAY_STEPS
 

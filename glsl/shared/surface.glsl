@@ -7,12 +7,13 @@
 // The surface of a triangle at a hit, as the ray meets it.
 struct Surface {
     vec3 point_world;
-    // Unit normals on the side that the ray comes from: the triangle's plane's, and the interpolated one.
+    // Unit normals, both on the side that the ray comes from. geometric: the normal of the triangle's plane. shading:
+    // the normal interpolated from the corners.
     vec3 geometric;
     vec3 shading;
     // Distance along `geometric` at which a new ray starts so that it does not hit this surface, world units.
     float clearance;
-    // Whether the ray meets the triangle's back: then it is inside a solid.
+    // Whether the ray meets the triangle's back. The ray then counts as inside a solid.
     bool from_inside;
 };
 
@@ -65,8 +66,8 @@ Surface surface_at(PathRay ray, Hit hit, Triangle t) {
     return s;
 }
 
-// A ray from the surface, which starts on the side that it leaves to. triangle_ix: the surface's triangle, which the
-// ray does not hit.
+// A child ray from the surface, with the parent's t_max. It starts on the side of the surface to which its direction
+// points. triangle_ix: the surface's triangle, which the ray does not hit.
 PathRay ray_from(Surface s, vec3 direction, uint triangle_ix, PathRay parent, vec3 throughput) {
     float side = dot(direction, s.geometric) < 0.0 ? -s.clearance : s.clearance;
     return PathRay(

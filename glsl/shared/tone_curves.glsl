@@ -1,5 +1,5 @@
-// Tone curves: from exposed radiance, which has no upper bound, to a display's 0..1. Both are linear in Rec. 709
-// primaries.
+// Tone curves: from exposed radiance, which has no upper bound, to display values, 0..1. Both radiance and display
+// values are linear, with Rec. 709 primaries.
 #ifndef KDRAY_TONE_CURVES
 #define KDRAY_TONE_CURVES
 

@@ -13,8 +13,8 @@
 // also covers the rounding of the hit test. So the traversal finds what brute force finds, also for rays along planes
 // and through corners of cells.
 //
-// t_enter, t_exit: the part of the ray's interval that is in the structure's box. source_triangle: the triangle that
-// the ray never hits.
+// shear: with z halved, so that hits have the traversal's t. t_min: hits have a greater t. t_enter, t_exit: the part
+// of the ray's interval that is in the structure's box. source_triangle: the triangle that the ray never hits.
 struct TraversalRay {
     Shear shear;
     vec3 direction;
@@ -33,8 +33,8 @@ TraversalRay traversal_ray(PathRay ray, float t_min) {
     r.source_triangle = ray.source_triangle;
     r.t_min = 0.5 * t_min;
     r.shear.z *= 0.5;
-    // A direction in a split plane is replaced by one that is almost in it. So all values are finite, and all ties
-    // follow one rule.
+    // A direction that is parallel to a split plane is replaced by one that is almost parallel to it. So all values
+    // are finite, and such rays need no case of their own.
     vec3 tiny = vec3(KD_LEAST_COMPONENT);
     r.inv_direction = 0.5 / mix(ray.direction, tiny, lessThan(abs(ray.direction), tiny));
     r.bias = -ray.origin * r.inv_direction;

@@ -7,8 +7,9 @@
 
 #include "layout.glsl"
 
-// A ray's shear, which maps the ray onto the z axis of a space in which `axis`, the axis of the direction's longest
-// component, is z. x, y: the direction's other components by the longest one. z: the inverse of the longest one.
+// A ray's shear. Space is permuted so that the axis of the direction's longest component, `axis`, becomes z. The
+// shear then maps the ray onto the z axis. x, y: the direction's two other components, divided by the longest one. z:
+// the inverse of the longest component.
 struct Shear {
     vec3 origin;
     float x;
@@ -33,7 +34,8 @@ Shear shear_of(vec3 origin, vec3 direction) {
     return Shear(origin, d.x / d.z, d.y / d.z, 1.0 / d.z, axis);
 }
 
-// A corner as seen from the ray: xy across the ray, z along it in units of the direction's longest component.
+// A corner as seen from the ray, in world units. xy: sheared, so that the ray is at (0, 0). z: offset from the ray's
+// origin along `axis`. Times `shear.z`, it is a t.
 // `precise` forbids contraction to fma, so that a corner is mapped to the same point for every triangle that shares
 // it.
 vec3 sheared(Shear shear, vec3 corner) {
@@ -43,8 +45,9 @@ vec3 sheared(Shear shear, vec3 corner) {
     return vec3(x, y, p.z);
 }
 
-// The edge functions: twice the signed areas that the ray's axis spans with the edges opposite to v0, v1, v2.
-// Rounding never reverses the order of two products, so each sign is right or the value is zero.
+// The edge functions: in the xy plane, twice the signed areas of the triangles between the ray, which is at (0, 0),
+// and the edges opposite to v0, v1, v2. Rounding never reverses the order of two products, so each sign is right or
+// the value is zero.
 vec3 edge_functions(vec3 a, vec3 b, vec3 c) {
     precise float u = c.x * b.y - c.y * b.x;
     precise float v = a.x * c.y - a.y * c.x;
@@ -80,13 +83,14 @@ vec3 edge_errors(vec3 a, vec3 b, vec3 c) {
     return vec3(edge_error(c, b), edge_error(a, c), edge_error(b, a));
 }
 
-// The edge functions with right signs. If the two products round to one value, their errors are the edge function.
-// Zero then means that the ray meets the edge. Without this, a needle that is seen from its end would be hit at an
-// arbitrary corner.
+// The edge functions with right signs. If the two products round to the same value, the edge function is the
+// difference of their errors. Zero then means that the ray meets the edge. Without this, a needle that is seen from
+// its end would be hit at an arbitrary corner.
 vec3 with_exact_signs(vec3 edges, vec3 errors) {
     return mix(edges, errors, equal(edges, vec3(0.0)));
 }
 
+// Whether edge functions of both signs occur: the ray passes outside of the triangle.
 bool is_outside(vec3 edges) {
     return any(lessThan(edges, vec3(0.0))) && any(greaterThan(edges, vec3(0.0)));
 }
@@ -106,8 +110,8 @@ bool is_inside(vec3 edges) {
 const float LEAST_EXACT_SUM = 8.077935669e-28; // 2^-90
 
 // Returns the edge functions, each right to 2^-23 of itself (Muller: On the error of computing ab + cd using Cornea,
-// Harrison and Tang's method, ACM TOMS 41, 2015). If the triangle is narrow, its rounded products differ by little
-// more than their errors: weights made of them would lie anywhere along a needle.
+// Harrison and Tang's method, ACM TOMS 41, 2015). In a narrow triangle, the two products differ by little more
+// than their rounding errors. Weights without this correction would give an arbitrary point along a needle.
 vec3 exact_edges(vec3 edges, vec3 errors) {
     precise vec3 exact = edges + errors;
     return abs(sum_of(exact)) < LEAST_EXACT_SUM ? with_exact_signs(edges, errors) : exact;
@@ -151,8 +155,8 @@ Hit clamp_to_triangle(Shear shear, Triangle triangle, uint triangle_ix) {
     vec3 edges = seen_edges(shear, triangle, a, b, c);
     edges = exact_edges(edges, edge_errors(a, b, c));
     vec3 inside = max(sum_of(edges) < 0.0 ? -edges : edges, vec3(0.0));
-    // If the triangle is seen exactly edge-on, the areas carry no information: its middle is the nearest certain
-    // point.
+    // If the triangle is seen exactly edge-on, all areas are 0 and tell nothing about the point. The triangle's
+    // middle is used.
     if (!(sum_of(inside) > 0.0)) inside = vec3(1.0);
     return weighted_hit(shear, inside, vec3(a.z, b.z, c.z), triangle_ix);
 }

@@ -1,4 +1,4 @@
-//! Axis-aligned boxes, and references: entries of triangles in the cells that they come near to.
+//! Axis-aligned boxes, and references, which are the entries in a cell's list of triangles.
 
 use rayon::prelude::*;
 
@@ -7,8 +7,8 @@ use crate::layout::Triangle;
 /// Rounding margin of a cell, as a multiple of the largest coordinate: 128 units of 2^-24. A leaf has every triangle
 /// that comes nearer to its cell than this.
 ///
-/// Thanks to the margin, the traversal may treat its own arithmetic as exact: the leaf that it is in at a hit's t has
-/// the triangle that is hit. Proof: let m be the largest coordinate, u = 2^-24, and o the ray's origin. |o| is at
+/// Thanks to the margin, the traversal may treat its own arithmetic as exact: the leaf that the traversal visits at a
+/// hit's t has the hit triangle. Proof: let m be the largest coordinate, u = 2^-24, and o the ray's origin. |o| is at
 /// most 4 m (`KD_MAX_ORIGIN_DISTANCE`). Divisions are right to 2.5 units in the last place, as Vulkan guarantees.
 /// Then the crossing of a plane at p is off by u (|o| + |p| + 6 |p - o|) <= 35 u m in space. The point at a hit's t
 /// is off the triangle by u (11.5 D + 14 L) on each axis, as `reference::triangle` proves. D, the greatest coordinate
@@ -41,8 +41,9 @@ impl Bounds {
         Self { min: self.min.map(|x| (x - margin).max(f32::MIN)), max: self.max.map(|x| (x + margin).min(f32::MAX)) }
     }
 
-    /// Returns the distance from a cell within which a triangle counts as inside the cell, world units (see
-    /// [`MARGIN`]). This box must hold all triangles. The margin is never zero, so no grown box is flat.
+    /// Returns the rounding margin of all cells of a scene with these bounds, world units (see [`MARGIN`]). A
+    /// triangle that comes nearer to a cell than the margin counts as inside the cell. The margin is never zero, so
+    /// no grown box is flat.
     pub fn margin(&self) -> f32 {
         let largest = self.min.iter().chain(&self.max).fold(0.0, |largest: f32, x| largest.max(x.abs()));
         (MARGIN * largest).max(f32::MIN_POSITIVE)
@@ -90,7 +91,7 @@ pub fn is_finite(triangle: &Triangle) -> bool {
     triangle.v0.is_finite() && triangle.v1.is_finite() && triangle.v2.is_finite()
 }
 
-/// Reference: the entry of a triangle in a cell that it comes near to. 28 bytes.
+/// Reference: an entry in a cell's list of the triangles that come near to the cell. 28 bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct Reference {
     /// Bounds of the part of the triangle that comes within the margin of the cell, grown by the margin.

@@ -21,7 +21,7 @@ pub use crate::layout::{Hit, NO_TRIANGLE, Ray};
 pub enum Accel {
     /// A kd-tree, which the host builds.
     KdTree(KdTree),
-    /// A grid. Each device builds the grid for itself; the host builds one only when it needs it.
+    /// A grid. Each device builds its own grid. The host builds a grid only at the first [`LazyGrid::get`].
     Grid(LazyGrid),
 }
 
@@ -64,8 +64,8 @@ impl AccelKind {
 }
 
 impl Accel {
-    /// Builds a structure over triangles on the current rayon pool. A grid is not built here, but when it is first
-    /// needed.
+    /// Builds a structure over triangles on the current rayon pool. For a grid, this only keeps the options: the grid
+    /// is built at its first use ([`LazyGrid`]).
     pub fn new(triangles: &[Triangle], options: &AccelOptions) -> Self {
         match options {
             AccelOptions::KdTree(options) => Self::KdTree(KdTree::build(triangles, options)),

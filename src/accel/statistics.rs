@@ -51,7 +51,7 @@ impl Statistics {
         }
     }
 
-    /// The size of the structure in memory, bytes.
+    /// The size of the structure's arrays as the host stores them, bytes.
     pub fn bytes(&self) -> u64 {
         match self {
             Self::KdTree(tree) => tree.bytes,

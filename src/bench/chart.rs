@@ -15,7 +15,7 @@ use plotters::{
 const HEIGHT: u32 = 480;
 /// Width of a group, in pixels.
 const GROUP_WIDTH: u32 = 96;
-/// Width beside all groups, in pixels.
+/// Width of the space to the left and right of the groups, in pixels.
 const SIDE_WIDTH: u32 = 100;
 /// Smallest width of the picture, in pixels.
 const MIN_WIDTH: u32 = 640;

@@ -12,7 +12,7 @@ const SAME_TRIANGLE: f32 = 1.0 / 1024.0;
 /// touch there or share the edge that the ray meets.
 const TWO_TRIANGLES: f32 = 1.0 / 65536.0;
 
-/// Numbers of hits in a set of rays that differ from those of the same arithmetic on the CPU.
+/// Numbers of hits in a set of rays that differ from the hits that the CPU finds with the same arithmetic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Difference {
     /// Hits at another distance, misses in place of hits, and hits in place of misses.
@@ -44,15 +44,16 @@ impl Difference {
         Self { n_differing: self.n_differing.max(other.n_differing), n_grazing: self.n_grazing.max(other.n_grazing) }
     }
 
-    /// Returns whether rounding explains the difference: one in 100,000 rays may pass an outline that it hits with
-    /// other rounding.
+    /// Returns whether rounding explains the difference. Near an outline, rounding decides whether a ray hits or
+    /// misses; up to one in 100,000 rays may differ for that reason.
     pub fn is_rounding(&self, n_rays: usize) -> bool {
         self.n_differing <= n_rays as u64 / 100_000
     }
 }
 
-/// Relative difference of a hit's distance that two arithmetics may have: 2^-13. Corners and products are rounded by
-/// 2^-24 each. If a ray meets a plane at a grazing angle, its hit moves by a multiple of that.
+/// Largest relative difference, 2^-13, between the distances that two tracers of different arithmetic may find for
+/// the same hit. Corners and products are rounded by 2^-24 each. If a ray meets a plane at a grazing angle, its hit
+/// moves by a multiple of that.
 pub const T_TOLERANCE: f32 = 1.0 / 8192.0;
 
 /// Numbers of hits in a set of rays that differ from those of a tracer with another arithmetic. The triangle that was
@@ -90,14 +91,14 @@ impl Apart {
         self.n_hit_or_miss + self.n_distance
     }
 
-    /// Returns whether rounding explains the difference, which it does for one in 10,000 rays. A tracer that does not
-    /// know a ray's source triangle may hit that triangle again.
+    /// Returns whether rounding explains the difference, which it does for up to one in 10,000 rays. This bound also
+    /// covers tracers that do not know a ray's source triangle and may hit it again.
     pub fn is_rounding(&self, n_rays: usize) -> bool {
         self.n_differing() <= n_rays as u64 / 10_000
     }
 }
 
-/// Returns whether it is a hit: neither a miss nor at a distance of NaN.
+/// Returns whether `hit` is neither a miss nor at a distance of NaN.
 pub fn is_hit(hit: &Hit) -> bool {
     hit.triangle_ix != NO_TRIANGLE && !hit.t.is_nan()
 }

@@ -24,13 +24,14 @@ use crate::{
 pub const SCENES: [&str; 4] = ["cornell", "paper2", "paper3", "paper4"];
 /// The paper's picture sizes, in pixels.
 pub const SIZES: [(u32, u32); 3] = [(640, 480), (800, 600), (1024, 768)];
-/// Milliseconds of the paper's table, each pair for the CPU and for a GTX 285. One row per size, one column per
-/// scene.
+/// Times of the paper's table in milliseconds: one row per size, one column per scene. The first of each pair is the
+/// CPU's time, the second that of a GTX 285.
 const REPORTED_MS: [[(u32, u32); 4]; 3] = [
     [(2316, 32), (5590, 82), (10_059, 411), (6459, 374)],
     [(3551, 49), (8523, 108), (15_054, 539), (10_103, 534)],
     [(5723, 77), (14_106, 188), (24_736, 730), (16_213, 848)],
 ];
+
 /// The paper's times for a scene of the same triangle count; its geometry was not published.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Reported {

@@ -69,7 +69,7 @@ pub struct Sized {
 }
 
 impl Sized {
-    /// Makes the knot and the room. `size` is in pixels, with one primary ray each.
+    /// Makes the knot and the room. `size` is in pixels; each pixel has one primary ray.
     pub fn new(n_triangles: u32, size: (u32, u32), build_options: &BuildOptions) -> Self {
         let begin = Instant::now();
         let scene = FlatScene::new(&knot(n_triangles)).expect("a knot of a few units");
@@ -90,8 +90,8 @@ impl Sized {
     ) -> Result<Row, GpuError> {
         let variants = [variant];
         let begin = Instant::now();
-        let mut tracers = Tracers::new(context, &self.stage, &variants)?; // on a device it builds a grid
-        let accel = self.stage.statistics(variant); // on the host this does
+        let mut tracers = Tracers::new(context, &self.stage, &variants)?; // builds a grid if there is a device
+        let accel = self.stage.statistics(variant); // builds a grid if there is none
         let grid_ms = begin.elapsed().as_secs_f64() * 1e3;
         let build_ms = match self.stage.geometry(variant).accel() {
             Accel::KdTree(_) => self.stage.tree_build_ms,
@@ -232,7 +232,7 @@ impl Report {
         }
     }
 
-    /// Returns the first size and kind of rays with more hits that differ from the CPU's than rounding explains.
+    /// Returns the first size and kind of rays for which more hits differ from the CPU's than rounding explains.
     pub fn first_wrong(&self) -> Option<(&Row, &RayCost)> {
         let mut pairs = self.rows.iter().flat_map(|row| row.rays.iter().map(move |cost| (row, cost)));
         pairs.find(|(_, cost)| !cost.difference.is_rounding(cost.n_rays))

@@ -138,7 +138,7 @@ impl Room {
     /// | light | 0.1 below the ceiling |
     fn around((min, max): (Vec3, Vec3)) -> Self {
         let centre = (min + max) / 2.0;
-        // If all corners are at one point, any radius is right that is large enough to change the coordinates.
+        // If all corners are at one point, the radius only has to be large enough to change the coordinates.
         let radius = ((max - min).length() / 2.0).max(centre.abs().max_element() * 1e-3).max(1e-6);
         let distance = 1.05 / (VERTICAL_FOV_DEGREES / 2.0).to_radians().sin();
         let floor = Vec3::new(centre.x - 2.0 * radius, min.y - 0.05 * radius, centre.z - 2.0 * radius);

@@ -88,9 +88,9 @@ impl<'a> Tracers<'a> {
     }
 
     /// Returns, for each variant, the number of untimed casts at the beginning of each of its turns: as many as take
-    /// [`WARM_UP`], at least one. They are needed because the rays have just been uploaded, the caches hold another
-    /// variant's structure, and the device's clock may have fallen while the CPU compared hits. Variants can differ in
-    /// speed by a factor of a thousand, so each has a number of its own.
+    /// [`WARM_UP`], but 1 to 1000; on the CPU 1. They are needed because the rays have just been uploaded, the caches
+    /// hold another variant's structure, and the device's clock may have fallen while the CPU compared hits. Variants
+    /// can differ in speed by a factor of a thousand, so each has a number of its own.
     ///
     /// # Errors
     /// Fails as [`Caster::cast`] does.
@@ -159,6 +159,7 @@ pub struct SetResult {
 /// The result of one variant on one set of rays.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VariantResult {
+    /// The variant's word: a traversal of the kd-tree, or a grid.
     pub traversal: String,
     /// Time of the whole set; none where the device has no timestamps.
     pub ms: Option<Spread>,
@@ -180,16 +181,16 @@ impl VariantResult {
     }
 }
 
-/// Numbers of elements that a ray reads of the structure, as the mean of a set's rays.
+/// Mean numbers of the acceleration structure's elements that a ray of a set reads.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct StepsARay {
-    /// Nodes of a kd-tree, cells of a grid.
+    /// Nodes and slabs of a kd-tree, or cells of a grid.
     pub nodes: f64,
     /// Links to parents, and ropes.
     pub links: f64,
     /// Boxes of nodes.
     pub boxes: f64,
-    /// Triangle tests.
+    /// Triangles in the visited leaves or cells. A triangle counts once for each leaf or cell.
     pub triangles: f64,
 }
 
@@ -247,7 +248,7 @@ impl Report {
         }
     }
 
-    /// Returns the first set and variant with more hits that differ from the CPU's than rounding explains.
+    /// Returns the first set and variant for which more hits differ from the CPU's than rounding explains.
     pub fn first_wrong(&self) -> Option<(&SetResult, &VariantResult)> {
         let pairs = self.sets.iter().flat_map(|set| set.variants.iter().map(move |variant| (set, variant)));
         pairs.into_iter().find(|(set, variant)| !variant.difference.is_rounding(set.n_rays))

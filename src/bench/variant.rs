@@ -30,7 +30,7 @@ impl Variant {
         format!("{}, {}, {}", Traversal::words(), AccelKind::Grid, AccelKind::Grid2)
     }
 
-    /// Returns a list of all words, one in a line, each with what its variant does.
+    /// Returns a list of all words, one per line, each with a description of its variant.
     pub fn descriptions() -> String {
         let accels = AccelKind::descriptions();
         let grids = accels.lines().filter(|line| !line.starts_with(&format!("- {}:", AccelKind::KdTree)));

@@ -108,7 +108,8 @@ impl AccelBuffers {
         Self::with(context, contents, &constants, structure)
     }
 
-    /// Uploads triangles and the grid that the host has built. This is for more triangles than the device can bind.
+    /// Uploads triangles and the grid that the host has built. This is for scenes with more triangles than a device
+    /// can bind: it cannot build a grid over them.
     fn of_grid(context: &Arc<Context>, triangles: &[Triangle], grid: &Grid) -> Result<Self, GpuError> {
         let entries = grid.leaf_triangles();
         let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);
@@ -249,7 +250,8 @@ pub(crate) fn hidden_words(n_triangles: usize, hidden: &[u32]) -> Vec<u32> {
     words
 }
 
-/// Returns the tree's slabs, or none if the device runs both sides of every branch: its kernels do not read slabs.
+/// Returns the tree's slabs. Returns none for a device that runs both sides of every branch, since its kernels do not
+/// read slabs.
 fn slabs_for<'a>(context: &Context, tree: &'a KdTree) -> &'a [Slab] {
     if context.predicates_branches() { &[] } else { tree.slabs() }
 }

@@ -14,7 +14,7 @@ use crate::{
     },
 };
 
-/// The bindings of the set.
+/// The bindings of the descriptor sets of a build.
 const BINDINGS: [u32; 12] = [
     BIND_GRID_BUILD,
     BIND_GRID_TRIANGLES,

@@ -1,5 +1,5 @@
-//! Buffers and images that kernels read and write, and the descriptor sets over them. Each file has a group of them
-//! that is made and grows together.
+//! Buffers and images that kernels read and write, and the descriptor sets over them. Each file has a group of
+//! buffers that are made and grow together.
 //!
 //! ```text
 //! accel           triangles and their acceleration structure, with the arrays of scene_arrays

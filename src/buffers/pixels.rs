@@ -8,12 +8,12 @@ use crate::{
     layout::{Feature, Frame},
 };
 
-/// Buffers and images of the window's pixels, rows from the top. Buffers may be longer than the window needs. A clone
-/// is a second handle to the same memory.
+/// Buffers and images of the window's pixels, rows from the top. The window is the part of the picture that is
+/// rendered ([`Frame`]). Buffers may be longer than the window needs. A clone is a second handle to the same memory.
 #[derive(Clone)]
 pub struct Pixels {
-    /// The radiance of the frame's sample, then the mean of all samples. `width * height` elements, as in all buffers
-    /// here.
+    /// The radiance of the frame's sample, which the kernel `accumulate` replaces by the mean of all samples. There
+    /// are `width * height` elements, as in all buffers here.
     pub pixel_radiance: Buffer<[f32; 4]>,
     /// The sums of all samples; none before there is a second sample.
     pub pixel_accumulated: Option<Buffer<[f32; 4]>>,
@@ -23,7 +23,7 @@ pub struct Pixels {
     /// The displayed colour, 8 bits each: red in the lowest byte, green, blue, 255.
     pub pixel_display: Buffer<u32>,
     /// The nearest hit: the triangle's index in the lower half, the bits of the distance in the upper half. Empty
-    /// unless the options have kernels rasterize.
+    /// unless compute kernels rasterize the primary rays ([`Primary::SoftwareRaster`]).
     pub pixel_nearest: Buffer<u64>,
     /// The first-hit features. Empty unless the options request them.
     pub pixel_features: Buffer<Feature>,
@@ -69,7 +69,7 @@ impl Pixels {
         widest.max(size_of::<[f32; 4]>()).max(size_of::<u64>()) as u64
     }
 
-    /// Whether the buffers and images are large enough for the frame, and none is there that the frame does not use.
+    /// Whether the buffers and images are large enough for the frame, and exist only if the frame uses them.
     pub fn fit(&self, frame: &Frame, options: &RenderOptions) -> bool {
         let (width, height) = self.triangle_ids.size();
         let has_targets = width >= frame.picture_width && height >= frame.picture_height;
@@ -86,7 +86,7 @@ impl Pixels {
         self.pixel_filtered.as_ref().unwrap_or(&self.pixel_radiance)
     }
 
-    /// The sums of samples. Before there are any, this is a buffer that takes their place in the descriptor set.
+    /// The sums of samples. If there are none yet, `pixel_radiance` takes their place in the descriptor set.
     pub(super) fn accumulated(&self) -> &Buffer<[f32; 4]> {
         self.pixel_accumulated.as_ref().unwrap_or(&self.pixel_radiance)
     }

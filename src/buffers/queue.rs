@@ -7,8 +7,8 @@ use crate::{
     layout::{Hit, PathRay, SCAN_GROUP_SIZE},
 };
 
-/// Queue of the rays of all bounces of a batch, at most `queue_capacity`, and what belongs to each ray. A clone is a
-/// second handle to the same buffers.
+/// Queue of the rays of all bounces of a batch, at most `queue_capacity`, with the hit, the children, the radiance
+/// and the shadows of each ray. A clone is a second handle to the same buffers.
 #[derive(Clone)]
 pub struct Queue {
     /// The rays, bounce after bounce. There are `queue_capacity` elements, as in all buffers here but the last two.
@@ -16,13 +16,14 @@ pub struct Queue {
     /// (glsl/shared/rays.glsl).
     pub rays: Buffer<PathRay>,
     pub hits: Buffer<Hit>,
+    /// Bits that say which rays continue from each hit: a reflected one, a transmitted one (layout.glsl).
     pub child_kinds: Buffer<u32>,
     /// The index in `rays` at which a ray's children begin, or would begin if it had any.
     pub first_children: Buffer<u32>,
     pub ray_radiance: Buffer<[f32; 4]>,
     /// `n_lights * queue_capacity` elements, lights outermost.
     pub light_visibility: Buffer<u32>,
-    /// `queue_capacity / SCAN_GROUP_SIZE` elements, rounded up.
+    /// The sums of the prefix sum's blocks: `queue_capacity / SCAN_GROUP_SIZE` elements, rounded up.
     pub scan_blocks: Buffer<u32>,
 }
 

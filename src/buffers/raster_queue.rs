@@ -18,8 +18,8 @@ pub struct RasterState {
     pub count: u64,
 }
 
-/// Triangles with large bounding rectangles, and their blocks. There is no room for any unless the options have
-/// kernels rasterize. A clone is a second handle to the same buffers.
+/// Triangles with large bounding rectangles, and their blocks. The array of triangles is empty unless compute kernels
+/// rasterize the primary rays ([`Primary::SoftwareRaster`]). A clone is a second handle to the same buffers.
 #[derive(Clone)]
 pub struct RasterQueue {
     /// The state: one element.
@@ -46,7 +46,8 @@ impl RasterQueue {
         (n_triangles as u64).saturating_mul(size_of::<LargeTriangle>() as u64) <= context.limits().storage_range
     }
 
-    /// Whether there is room if the options need it, and none if they do not.
+    /// Whether the array of triangles has the length that the options need: `n_triangles`, or 0 if no compute kernel
+    /// rasterizes.
     pub fn fits(&self, n_triangles: u32, options: &RenderOptions) -> bool {
         let has_room = self.large_triangles.len() == n_triangles as usize;
         if options.primary == Primary::SoftwareRaster { has_room } else { self.large_triangles.is_empty() }

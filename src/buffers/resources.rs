@@ -46,7 +46,8 @@ const OWN_BINDINGS: [u32; 21] = [
     layout::BIND_TRIANGLE_IDS,
 ];
 
-/// The number of counters of a bounce of a batch, including the unused ones between the places.
+/// The number of elements of `counters` for each bounce of each batch, including the unused elements between the
+/// copies of a counter.
 const COUNTERS_PER_BOUNCE: usize = (COUNTER_COPIES * COUNTER_STRIDE) as usize;
 
 /// Resources that the frame's kernels read and write. Each has the same name here, in the kernels, as debug label and
@@ -59,8 +60,8 @@ pub struct Resources {
     /// The constants: one element.
     pub frame: Buffer<Frame>,
     pub accel: AccelBuffers,
-    /// Three for each triangle, or empty if triangles are drawn without indices. None if the options draw no
-    /// triangles.
+    /// Three indices for each triangle, or empty if triangles are drawn without indices. None if the graphics
+    /// pipeline draws no triangles.
     pub vertex_indices: Option<Buffer<u32>>,
     pub materials: Buffer<Material>,
     /// `n_lights` elements.
@@ -213,7 +214,7 @@ impl Resources {
         self.constants = *constants;
     }
 
-    /// Copies the first sample into the sum of samples. Its buffer is made if there is none.
+    /// Copies the first sample into the sums of samples. The buffer of the sums is made if there is none.
     ///
     /// # Errors
     /// Memory runs out, or a copy fails. Nothing has changed then.
@@ -267,7 +268,7 @@ impl Resources {
         &self.constants
     }
 
-    /// A dispatch of the lanes of all rays of the bounce.
+    /// A dispatch over the rays of the bounce, with `2^trace_lanes_log2` lanes for each ray ([`Bounce`]).
     pub fn trace_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
         self.indirect(batch.bounce_ix, offset_of!(Bounce, trace_groups_x))
     }
@@ -277,7 +278,8 @@ impl Resources {
         self.indirect(batch.bounce_ix, offset_of!(Bounce, scan_groups_x))
     }
 
-    /// A dispatch of the lanes of all rays of the batch, of all bounces, for each light.
+    /// A dispatch over the rays of all bounces of the batch and the lights, with `2^shadow_lanes_log2` lanes for each
+    /// pair ([`Bounce`]).
     pub fn shadow_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
         self.indirect(self.last_bounce(batch), offset_of!(Bounce, shadow_groups_x))
     }

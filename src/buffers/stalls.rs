@@ -15,8 +15,12 @@ use crate::{
 /// The most rays whose state is stored at a time: 3 MiB. Further rays begin again when there is room.
 const N_SLOTS: usize = 1 << 16;
 
-/// First row of `stalls`. Its words are the number of slots that have been requested, the number of rays of the last
-/// dispatch that have stalled and have a slot, the number of rays that have no slot, and an unused word.
+/// First row of `stalls`, with four words:
+///
+/// 0. the number of slots that rays have requested, which can be more than there are,
+/// 1. the number of rays of the last dispatch that have stalled and have a slot,
+/// 2. the number of stalled rays that have no slot,
+/// 3. unused.
 type Counts = [u32; 4];
 
 /// Round of a dispatch: the rays that it traces.
@@ -81,7 +85,7 @@ impl Stalls {
         (BIND_STALLS, Binding::Buffer(self.rows.any()))
     }
 
-    /// Empties all slots. It is recorded before a dispatch of [`Round::Begin`]. Needs nothing.
+    /// Records that all slots become empty. A dispatch of [`Round::Begin`] follows. The caller needs no barrier.
     pub fn reset(&self, commands: &Commands) {
         if self.can_occur() {
             self.set_counts(commands, &Counts::default());
@@ -106,7 +110,7 @@ impl Stalls {
         let mut n_rounds = 0;
         loop {
             let [n_slots, n_stalled, n_waiting, _] = self.rows.download_first(1)?[0];
-            // Rays that wait for a slot do not run in the rounds of the others, so their count is kept.
+            // Rays without a slot do not run in a round of `Resume`, so their count is kept for a round of `Restart`.
             let (round, counts) = match (n_stalled, n_waiting) {
                 (1.., _) => (Round::Resume, [n_slots, 0, n_waiting, 0]),
                 (0, 1..) => (Round::Restart, Counts::default()),
@@ -125,13 +129,13 @@ impl Stalls {
 
 /// Returns the loop turns that one invocation may take so that its subgroup stays below the device's limit.
 ///
-/// The driver counts the turns of a subgroup. A loop goes on while any lane is in it, and takes one turn even if no
-/// lane is in it. So a turn of the outer loop costs up to `TURNS_OF_ALL` turns whatever its lanes do: its own, two of
-/// the loop that goes from leaf to leaf, and in each of those two, one of every loop inside. All further turns are
-/// taken by some lane. So if no lane takes more than `b` turns, outer and inner ones together, the subgroup takes no
-/// more than `(TURNS_OF_ALL + subgroup_size) b`. When its turns are spent, a lane still finishes its step, and before
-/// that it may have walked back to where it stopped. These are up to `TURNS_ASIDE` turns a lane, four times a tree's
-/// greatest depth.
+/// The driver counts the turns of a subgroup. A subgroup stays in a loop while any of its lanes does. It takes one
+/// turn of a loop even if no lane enters the loop. So a turn of the outer loop costs up to `TURNS_OF_ALL` turns
+/// whatever its lanes do: its own, two of the loop that goes from leaf to leaf, and in each of those two, one of
+/// every loop inside. All further turns are taken by some lane. So if no lane takes more than `b` turns, outer and
+/// inner ones together, the subgroup takes no more than `(TURNS_OF_ALL + subgroup_size) b`. Two kinds of turns come
+/// on top. A lane whose turns are spent still finishes its step. A lane that resumes a ray first walks back to where
+/// the ray stopped. These are up to `TURNS_ASIDE` turns per lane, four times a tree's greatest depth.
 fn turn_budget(limit: u32, subgroup_size: u32) -> u32 {
     const TURNS_OF_ALL: u32 = 12;
     const TURNS_ASIDE: u32 = 4 * KD_MAX_DEPTH;

@@ -1,18 +1,19 @@
-//! Vertex indices of the visibility pass. A pixel gets its triangle's index from the first vertex of the triangle, so
-//! each triangle needs a first vertex of its own. The other two may be any vertices at the same points. With vertices
-//! shared like this, a device transforms about one vertex a triangle instead of three.
+//! Vertex indices of the visibility pass. A pixel gets its triangle's index from the triangle's first vertex, the
+//! provoking vertex. So each triangle needs a first vertex of its own. The other two may be vertices of other
+//! triangles at the same points. With vertices shared like this, a device transforms about one vertex per triangle
+//! instead of three.
 
 use glam::Vec3;
 use hashbrown::HashMap;
 
 use crate::layout::Triangle;
 
-/// The greatest index that every device can draw by.
+/// The greatest vertex index that every device supports (the least `maxDrawIndexedIndexValue` that Vulkan allows).
 const MAX_INDEX: usize = (1 << 24) - 1;
 
-/// Returns three indices for each triangle. Each is `3 * triangle + corner` of a corner at the same point. The first
-/// one is of the triangle itself, and the corners keep their order round the triangle. The result is empty for more
-/// triangles than every device can draw by indices.
+/// Returns three vertex indices for each triangle. A vertex has the index `3 * triangle + corner`. The first of the
+/// three is a vertex of the triangle itself. The other two are vertices of any triangles at the points of its next
+/// corners, so the triangle keeps its winding. The result is empty if a device may not support the greatest index.
 pub fn vertex_indices(triangles: &[Triangle]) -> Vec<u32> {
     if !has_indices(triangles.len()) {
         return Vec::new();
@@ -51,8 +52,8 @@ fn vertex(triangle_ix: u32, corner: usize) -> u32 {
     3 * triangle_ix + corner as u32
 }
 
-/// Returns the numbers of the corners' points, and how many points there are. Points with the same number have the
-/// same bits.
+/// Numbers the distinct points of all corners. Returns the number of each corner's point, and the number of distinct
+/// points. Points are the same if they have the same bits.
 fn points_of(triangles: &[Triangle]) -> (Vec<[u32; 3]>, usize) {
     let mut numbers = HashMap::with_capacity(triangles.len());
     let mut number_of = |p: Vec3| {

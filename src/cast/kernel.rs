@@ -1,4 +1,4 @@
-//! kdray's cast kernels as a [`Contender`], to be timed against others.
+//! Implementation of [`Contender`] for kdray's own cast kernels, so that they can be timed against other kernels.
 
 use std::{rc::Rc, sync::Arc};
 
@@ -18,8 +18,8 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// Creates the kernel. `resources` are made for `bindings`, hold the rays, and must hold what the traversal reads
-    /// beside the tree.
+    /// Creates the kernel. `resources` must be created for `bindings`, and must hold the rays and the links (such as
+    /// ropes) that the traversal reads in addition to the tree.
     ///
     /// # Errors
     /// The driver refuses the shader.
@@ -33,7 +33,7 @@ impl Kernel {
         Ok(Self { name: traversal.to_string(), cast, resources: Rc::clone(resources) })
     }
 
-    /// Returns the kernel under another name than that of the traversal.
+    /// Returns the kernel with the name `name` in place of the traversal's name.
     #[must_use]
     pub fn named(self, name: String) -> Self {
         Self { name, ..self }

@@ -1,4 +1,4 @@
-//! Rays that leave the hits of other rays.
+//! Secondary rays, which start at the hits of other rays.
 
 use std::f32::consts::TAU;
 

@@ -1,8 +1,8 @@
 //! Casts the caller's rays on a device or on the CPU, and returns their hits. No frame is involved.
 //!
 //! ```text
-//! RayReader ─> batches ─> Caster (the kernel, as often as it is to be timed) ─> HitWriter
-//!   .npy                                                                          .npz
+//! RayReader ─> batches ─> Caster (runs the kernel once for each repetition) ─> HitWriter
+//!   .npy                                                                         .npz
 //! ```
 
 mod kernel;
@@ -45,8 +45,8 @@ pub struct Cast {
     /// One hit for each ray, with t in units of the ray's direction. A miss has an infinite t and the index
     /// `NO_TRIANGLE`.
     pub hits: Vec<Hit>,
-    /// Milliseconds of the kernel, one entry for each repetition, summed over batches. None where the device has no
-    /// timestamps.
+    /// Milliseconds of the kernel, or on the CPU of wall-clock time: one entry for each repetition, summed over
+    /// batches. None where the device has no timestamps.
     pub gpu_ms: Option<Vec<f64>>,
     /// Number of rays that can only miss: see [`count_invalid`].
     pub n_invalid: u64,
@@ -90,7 +90,7 @@ impl Caster {
         })
     }
 
-    /// Makes rays pass through the triangles with these indices.
+    /// Makes rays pass through the triangles with these indices. A second call replaces the indices of the first.
     ///
     /// # Errors
     /// The buffers are beyond the device's limits or memory.
@@ -190,8 +190,8 @@ impl Caster {
         let n_rounds = self.tree.stalls.finish(&self.context, |commands, round| {
             kernel.record(commands, &self.resources.set, n_rays, round);
         })?;
-        // Rays stall alike in every repetition, but only those of the last one are resumed. Their time counts for
-        // each.
+        // The same rays stall in every repetition, but they are resumed only once, after the last repetition. The
+        // time of that is added to each repetition.
         let stalled_ms = if n_rounds > 0 { began_ms.elapsed().as_secs_f64() * 1e3 } else { 0.0 };
         let rows = timer.rows()?;
         Ok(rows.iter().map(|row| row.span_ms.map(|(begin, end)| end - begin + stalled_ms)).collect())
@@ -221,13 +221,13 @@ pub struct CpuCaster<'a> {
 }
 
 impl<'a> CpuCaster<'a> {
-    /// Creates a caster, and computes what the traversal reads beside the tree.
+    /// Creates a caster, and computes the links (such as ropes) that the traversal reads in addition to the tree.
     pub fn new(geometry: Geometry<'a>, traversal: Traversal) -> Self {
         let links = TraversalLinks::of(geometry.accel(), traversal);
         Self { geometry, traversal, links, hidden: None }
     }
 
-    /// Makes rays pass through the triangles with these indices.
+    /// Makes rays pass through the triangles with these indices. A second call replaces the indices of the first.
     ///
     /// # Panics
     /// There is no triangle with one of the indices.
@@ -249,12 +249,12 @@ impl<'a> CpuCaster<'a> {
     }
 }
 
-/// Casts rays by a [`CpuCaster`], and returns the hits that a [`Caster`] finds.
+/// Casts rays by a [`CpuCaster`], and returns one hit for each. The hits are those that a [`Caster`] finds.
 pub fn cast_on_cpu(geometry: Geometry, traversal: Traversal, rays: &[Ray], query: Query) -> Vec<Hit> {
     CpuCaster::new(geometry, traversal).cast(rays, query)
 }
 
-/// Returns a ray of the renderer as a ray to cast, from t = 0.
+/// Converts a ray of the renderer to a ray to cast, with `t_min` = 0.
 pub(crate) fn cast_ray(ray: &PathRay) -> Ray {
     Ray { origin: ray.origin, t_min: 0.0, direction: ray.direction, t_max: ray.t_max }
 }

@@ -2,7 +2,7 @@
 
 use std::{
     fs::File,
-    io::{self, BufRead, BufReader, Seek},
+    io::{self, BufReader, Read, Seek},
     path::{Path, PathBuf},
 };
 
@@ -19,8 +19,8 @@ pub struct RayFileError {
     what: String,
 }
 
-/// Size in bytes of the largest header that is accepted: that of a plain array is smaller. The reader allocates as
-/// many bytes as the file claims, so the size is checked first.
+/// Greatest accepted size of a header in bytes. Headers of plain arrays are smaller. The reader allocates as many
+/// bytes as the file claims, so the size is checked first.
 const MAX_HEADER: u32 = 1024;
 
 /// Reads a `.npy` file of float32, K x 8 (origin, direction, t_min, t_max) or K x 6 (origin, direction; t from 0 to
@@ -34,8 +34,8 @@ pub struct RayReader {
 }
 
 impl RayReader {
-    /// Opens a file and reads its header. If the file has a known size, it must hold the rays that the header
-    /// promises.
+    /// Opens a file and reads its header. A regular file must be large enough for the number of rays in its header.
+    /// The size of a pipe is unknown, so it is not checked.
     ///
     /// # Errors
     /// The file cannot be read, or is no `.npy` file of such an array.
@@ -48,8 +48,10 @@ impl RayReader {
             return Err(failed("is a directory".to_owned()));
         }
         let mut file = BufReader::with_capacity(1 << 16, file);
-        check_header_size(&mut file).map_err(failed)?;
-        let header = NpyHeader::from_reader(&mut file).map_err(|e| failed(format!("is no .npy file: {e}")))?;
+        let start = read_start(&mut file).map_err(failed)?;
+        check_header_size(&start).map_err(failed)?;
+        let header = NpyHeader::from_reader(start.as_slice().chain(&mut file));
+        let header = header.map_err(|e| failed(format!("is no .npy file: {e}")))?;
         let (n_rays, n_columns) = check_header(&header).map_err(failed)?;
         if metadata.is_file() {
             let n_bytes = metadata.len().saturating_sub(file.stream_position().map_err(unreadable)?);
@@ -100,9 +102,19 @@ impl RayReader {
     }
 }
 
-/// Refuses a header that is too large for a plain array, before it is read: see `MAX_HEADER`.
-fn check_header_size(file: &mut BufReader<File>) -> Result<(), String> {
-    let start = file.fill_buf().map_err(|e| format!("cannot be read: {e}"))?;
+/// Reads the first bytes, fewer than every header has. A pipe may deliver them one by one.
+fn read_start(file: &mut impl Read) -> Result<[u8; 12], String> {
+    let mut start = [0; 12];
+    file.read_exact(&mut start).map_err(|e| match e.kind() {
+        io::ErrorKind::UnexpectedEof => "is no .npy file".to_owned(),
+        _ => format!("cannot be read: {e}"),
+    })?;
+    Ok(start)
+}
+
+/// Refuses a header that is too large for a plain array, before it is read: see `MAX_HEADER`. `start`: the file's first
+/// bytes.
+fn check_header_size(start: &[u8; 12]) -> Result<(), String> {
     let size = match start {
         [0x93, b'N', b'U', b'M', b'P', b'Y', 1, _, a, b, ..] => u32::from_le_bytes([*a, *b, 0, 0]),
         [0x93, b'N', b'U', b'M', b'P', b'Y', _, _, a, b, c, d, ..] => u32::from_le_bytes([*a, *b, *c, *d]),

@@ -10,7 +10,7 @@ use crate::{
     passes,
 };
 
-/// A cast that is ready to be recorded, as often as the caller likes.
+/// A cast that is ready to be recorded into command buffers, any number of times.
 pub struct RecordedCast {
     context: Arc<Context>,
     kernel: Rc<passes::Cast>,
@@ -20,8 +20,8 @@ pub struct RecordedCast {
 }
 
 impl Caster {
-    /// Prepares a cast of rays that a program has on the device. `rays` holds elements of [`Ray`]. `hits` has room
-    /// for as many elements of [`Hit`], which the cast writes.
+    /// Prepares a cast of rays in a device buffer of the caller. `rays` is filled with elements of [`Ray`]. The cast
+    /// writes one [`Hit`] for each ray to `hits`.
     ///
     /// # Errors
     /// `hits` has too little room, there are more rays than a dispatch or a storage buffer can have, memory runs out,
@@ -43,9 +43,9 @@ impl Caster {
 }
 
 impl RecordedCast {
-    /// Records the cast. The rays must be visible to compute shaders as storage, and a compute shader writes the
-    /// hits: the caller records the barriers before and after the cast. The cast binds its own pipeline, descriptor
-    /// set and push constants for compute, and its descriptor set for graphics.
+    /// Records the cast. The caller records a barrier before it, which makes the rays visible to storage reads of
+    /// compute shaders, and one after it, since a compute shader writes the hits to storage. The cast replaces the
+    /// pipeline, descriptor set and push constants that are bound for compute, and the descriptor set for graphics.
     ///
     /// Only one cast of a [`Caster`] may run at a time. The cast must live until the device has run the commands.
     pub fn record(&self, commands: &GivenCommands) {
@@ -54,9 +54,9 @@ impl RecordedCast {
         self.kernel.record(&commands, &self.set, self.n_rays, Round::Begin);
     }
 
-    /// Finishes rays that the driver would not let run long enough. It must be called after the device has run the
-    /// commands, and before the hits are read. With most drivers there is nothing to do. Returns the number of
-    /// further dispatches, after waiting for their end.
+    /// Finishes the rays that stopped at the driver's limit of loop iterations. Most drivers have no such limit. The
+    /// function must be called after the device has run the commands, and before the hits are read. It waits for the
+    /// end of its dispatches and returns their number.
     ///
     /// # Errors
     /// A call fails.

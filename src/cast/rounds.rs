@@ -15,16 +15,16 @@ pub trait Contender {
     /// Returns how the kernel accesses rays and hits.
     fn access(&self) -> Access;
 
-    /// Records one pass. It needs cast_rays, and leaves cast_hits, one for each ray.
+    /// Records one cast of all rays as one pass. It reads `cast_rays` and writes `cast_hits`, one hit for each ray.
     fn record(&self, commands: &Commands);
 
     /// Returns the buffers of rays and hits. Contenders may share them.
     fn resources(&self) -> &Rc<CastResources>;
 }
 
-/// Returns the milliseconds of each contender in each of `n_rounds` rounds, one round after the other. An entry is
-/// None where the device has no timestamps. A first round is not counted, because caches and clocks are then in the
-/// state in which earlier work has left them.
+/// Runs every contender once in each round, and returns the milliseconds of `n_rounds` rounds: one entry for each
+/// contender, round by round. An entry is None where the device has no timestamps. An additional first round is not
+/// counted, because its times depend on the caches and clocks that earlier work has left.
 pub(crate) fn rounds(
     context: &Arc<Context>,
     contenders: &[Box<dyn Contender>],

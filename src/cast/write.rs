@@ -1,7 +1,7 @@
 //! Writes hits to a NumPy archive, with the names that Open3D's `cast_rays` uses.
 //!
-//! An archive holds one array after the other, while each hit has a part of every array. So the hits wait in a spool,
-//! which is read again for each array. Memory use is bounded, whatever the number of rays.
+//! An archive holds one array after the other, while each hit has a part of every array. So hits are first stored in
+//! a spool (a temporary file), which is read again for each array. Memory use is bounded for any number of rays.
 
 use std::{
     fs::File,
@@ -103,7 +103,7 @@ impl Hits {
         let n_bytes = self.n * (N * size_of::<T>()) as u64;
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Stored)
-            .large_file(n_bytes >= u64::from(u32::MAX) - 1024); // the array's header
+            .large_file(n_bytes >= u64::from(u32::MAX) - 1024); // 1024 bytes for the array's header
         archive.start_file(npyz::npz::file_name_from_array_name(name), options)?;
         let mut file = BufWriter::with_capacity(1 << 16, archive);
         let shape = [self.n, N as u64];
@@ -128,8 +128,8 @@ impl Hits {
     }
 }
 
-/// A file that reports one error only. If the archive's writer is dropped after an error, it writes again and would
-/// itself print the error of that. Such writes are discarded.
+/// A file that reports only its first error and discards all later writes. An archive's writer that is dropped after
+/// an error writes again, and would print the error of that second write.
 struct FailsOnce<'a> {
     file: &'a mut File,
     failed: bool,

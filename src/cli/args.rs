@@ -24,9 +24,9 @@ use super::{
     },
 };
 
-/// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
 const AOV: &str = "Layers of each pixel to write into an .exr, separated by commas";
 
+/// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
 #[derive(Parser)]
 #[command(name = "kdray", version, arg_required_else_help = false)]
 #[command(after_help = "Exit codes: 2 usage, 3 scene or rays, 4 device, 5 output.")]
@@ -114,8 +114,8 @@ pub struct CastArgs {
     /// Rays to cast, a .npy file of float32: K x 8 (origin, direction, t_min, t_max), or K x 6 for t from 0 to
     /// infinity; directions need not be unit vectors, but a ray whose direction is shorter than 1.2e-38 misses
     pub rays: PathBuf,
-    /// Hits to write, a .npz file of the arrays t_hit, primitive_ids, primitive_uvs and primitive_normals; with --any
-    /// of the array occluded
+    /// Hits to write, a .npz file of the arrays t_hit, primitive_ids, primitive_uvs and primitive_normals, or with
+    /// --any of a single array, occluded
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
     /// Find only whether each ray hits anything (occlusion), not the closest hit

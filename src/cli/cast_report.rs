@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::{report::built_in, table::decimal};
 
-/// What was cast into which scene, on which device, and how long it took.
+/// The report: the scene, the files of rays and hits, the device, the numbers of rays and hits, and the times.
 #[derive(Serialize)]
 pub struct CastReport {
     pub scene: String,
@@ -24,7 +24,7 @@ pub struct CastReport {
     pub choices: Choices,
     pub device: String,
     pub triangles: usize,
-    /// Under the key `tree` or `grid`.
+    /// Statistics of the acceleration structure, serialized under the key `tree` or `grid`.
     #[serde(flatten)]
     pub accel: Statistics,
     /// Times of the grid's build on the device; none if no device has built a grid.
@@ -43,7 +43,8 @@ pub struct CastReport {
     pub cast_ms: f64,
 }
 
-/// Times of casting all rays once, without reading, copying and writing. A GPU's times are by its own clock.
+/// Times of casting all rays once, without reading, copying and writing. A GPU measures its times with its own
+/// timestamps.
 #[derive(Serialize)]
 pub struct Times {
     n_times: usize,

@@ -7,7 +7,7 @@ use kdray::{
     view::ViewError,
 };
 
-/// Why a command failed. Displays as one line.
+/// The reason why a command failed. It displays as one line.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
     #[error("{0}")]

@@ -9,14 +9,14 @@ use kdray::{output::regular_file, scene::source_files};
 
 use super::error::CliError;
 
-/// What a command does with a file, and the argument that names the file.
+/// The use of a file by a command, and the argument that names the file.
 struct Role {
     name: String,
     is_read: bool,
 }
 
-/// The files that a command has named so far. Two paths name the same file if they lead to it, whatever their
-/// spelling and links.
+/// The files that a command uses, as far as they have been noted. Two paths that lead to one file count as the same
+/// file, even if they are spelled differently or pass through links.
 #[derive(Default)]
 pub struct FileRoles {
     roles: HashMap<PathBuf, Role>,

@@ -59,7 +59,7 @@ struct Inspection {
     bounds: [[f32; 3]; 2],
     materials: Vec<MaterialUse>,
     lights: Vec<LightUse>,
-    /// Under the key `tree` or `grid`.
+    /// Statistics of the acceleration structure, serialized under the key `tree` or `grid`.
     #[serde(flatten)]
     accel: Statistics,
     load_ms: f64,

@@ -15,15 +15,16 @@ pub struct PictureArgs {
     /// Size of the picture in pixels, for example 1024x768, each side 1 to 16384 [default: the scene's]
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
-    /// Levels of rays per pixel, 1 to 64: 1 traces primary rays only, each level more adds one bounce of reflected
-    /// and refracted rays; shadow rays are not counted [default: the scene's]
+    /// Levels of rays per pixel, 1 to 64: 1 traces primary rays only, and each further level adds one bounce of
+    /// reflected and refracted rays; shadow rays are not counted [default: the scene's]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=64))]
     pub max_depth: Option<u32>,
     /// Noise filter for the finished picture [default: the scene's]
     #[arg(long, value_name = "paper|off")]
     pub denoise: Option<DenoiseWord>,
-    /// Threshold of the noise filter, 0 to 4: it smooths a pixel if the luminance differences to its four neighbours,
-    /// in units of display white, add up to more; implies --denoise paper [default: the scene's, else 2.5]
+    /// Threshold of the noise filter, 0 to 4: the filter smooths a pixel if its luminance differences to its four
+    /// neighbours, in units of display white, add up to more than the threshold; implies --denoise paper [default:
+    /// the scene's, else 2.5]
     #[arg(long, value_name = "X", value_parser = threshold)]
     pub denoise_threshold: Option<f32>,
     /// Factor on radiance before the tone curve, above 0 [default: the scene's]
@@ -48,13 +49,14 @@ pub struct PictureArgs {
     pub build: BuildPolicy,
 }
 
-/// Returns a short help text: what the option says, its words, its default.
+/// Returns a short help text: the option's description `what`, the words that it accepts, and its default.
 pub fn with_words(what: &str, default: Option<&str>, words: &str) -> String {
     let default = default.map_or_else(String::new, |default| format!(" [default: {default}]"));
     format!("{what}: {words}{default}")
 }
 
-/// Returns a long help text: what the option says, its default, and what each of its words means.
+/// Returns a long help text: the option's description `what`, its default, and the meaning of each word that it
+/// accepts.
 pub fn listed(what: &str, default: &str, descriptions: &str) -> String {
     format!("{what} [default: {default}]\n\n{descriptions}")
 }
@@ -157,8 +159,8 @@ impl PictureArgs {
         }
     }
 
-    /// Returns the render options: the user's, and the scene's own where the user gave none. Choices that depend on
-    /// the device are not among them: [`Self::request`] returns those.
+    /// Returns the render options: the user's, and the scene's own where the user gave none. Traversal and primary
+    /// visibility depend on the device and keep their defaults; [`Self::request`] returns the user's choice of them.
     pub fn options(&self, scene: &Scene) -> RenderOptions {
         let scene = &scene.defaults;
         let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });

@@ -22,8 +22,8 @@ pub enum Progress {
 }
 
 impl Progress {
-    /// Shows a command of `n_stages` stages. The library's warnings and errors appear above the bar, or as lines of
-    /// their own.
+    /// Shows the progress of a command that has `n_stages` stages. The library's warnings and errors appear above the
+    /// bar, or as lines of their own.
     pub fn new(quiet: bool, n_stages: u64) -> Self {
         Self::with_spans(quiet, n_stages, None)
     }

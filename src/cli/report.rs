@@ -20,7 +20,7 @@ pub fn built_in(on_host: f64, on_device: Option<&DeviceBuild>) -> String {
     }
 }
 
-/// What was rendered, how, and how long it took.
+/// The report: the scene, the files, the options and choices, and the times and rays of the frame.
 #[derive(Serialize)]
 pub struct Report {
     pub scene: String,
@@ -34,7 +34,7 @@ pub struct Report {
     /// Samples per pixel.
     pub samples: u32,
     pub triangles: usize,
-    /// Under the key `tree` or `grid`.
+    /// Statistics of the acceleration structure, serialized under the key `tree` or `grid`.
     #[serde(flatten)]
     pub accel: Statistics,
     /// Times of the grid's build on the device; none if no device has built a grid.
@@ -220,7 +220,7 @@ impl Report {
             self.frame.device, self.render_ms, self.choices
         );
         if self.frame.frame_ms.is_none() {
-            text += "Pinned device has no timestamps: where the time went is unknown.\n\n";
+            text += "This device has no timestamps: where the time went is unknown.\n\n";
         }
         if let Some(FrameTimeRange { n_frames, min_ms, max_ms }) = &self.repeated {
             text += &format!("the median of {n_frames} frames, which took {min_ms:.3} to {max_ms:.3} ms:\n\n");

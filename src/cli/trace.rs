@@ -65,7 +65,7 @@ impl Interval {
         intervals.reduce(|a, b| Self { begin: a.begin.min(b.begin), end: a.end.max(b.end) })
     }
 
-    /// Shifts the interval by `begin` nanoseconds.
+    /// Returns the interval `begin` nanoseconds later.
     fn after(self, begin: u64) -> Self {
         Self { begin: self.begin + begin, end: self.end + begin }
     }
@@ -74,8 +74,8 @@ impl Interval {
 /// Returns the trace as JSON that ends with a line break. `origin` is the moment when the command began, which is
 /// time 0.
 ///
-/// The device's clock differs from the CPU's. The trace therefore shows the frame from the moment when the CPU
-/// submitted it to the device.
+/// The device's clock differs from the CPU's, so the two cannot be compared. In the trace, the device's first pass
+/// begins at the moment when the CPU submitted the frame.
 pub fn trace_json(origin: Instant, spans: &[Span], frame: &Profile) -> Vec<u8> {
     let mut events = vec![
         named("process_name", CPU, "kdray"),
@@ -93,8 +93,9 @@ pub fn trace_json(origin: Instant, spans: &[Span], frame: &Profile) -> Vec<u8> {
     json
 }
 
-/// Returns nested slices: the frame, its batches if there are several, the bounces and the light of each batch, and
-/// the passes. `begun_at` is in nanoseconds since time 0.
+/// Returns nested slices: the frame, its batches if there are several, the bounces of each batch, its shadow and
+/// shading passes (one slice `light`, for all bounces), and the single passes. `begun_at` is in nanoseconds since
+/// time 0.
 fn frame_slices(frame: &Profile, begun_at: u64) -> Vec<Event> {
     let mut slices = Vec::new();
     let mut add = |name: String, passes: &[&PassTime], args| {

@@ -1,11 +1,11 @@
-//! The fast CPU engine: renders frames and casts rays without Vulkan. Only its traversal is its own; all other
-//! kernels are those of the [reference](crate::reference).
+//! The fast CPU engine: renders frames and casts rays without Vulkan. Only the traversal is implemented here.
+//! All other kernels are those of the [reference](crate::reference).
 //!
 //! ```text
 //! render   the frame, batch by batch, in the order of its plan
 //!   queue    the rays of a batch
 //!   timing   wall-clock times of passes
-//! trace    the reference's passes that trace rays, run with
+//! trace    the reference's passes that trace rays, with the tracer of this folder
 //!   tracer   traces rays one after the other, or as packets:
 //!     octant_bins        collect rays of one octant until they fill a packet
 //!     soa                rays and hits as structures of arrays

@@ -6,7 +6,7 @@ use arrayvec::ArrayVec;
 use super::{lanes::LANES, soa::RaysSoa};
 use crate::reference::{search_ray::SearchRay, traversal_ray::signs_of};
 
-/// Rays of one octant, at most one packet, each with the key under which its hit is reported.
+/// Rays of one octant, at most one packet. Each ray has a key, by which the caller identifies its hit.
 pub struct Bin<Key> {
     pub rays: RaysSoa,
     pub keys: ArrayVec<Key, LANES>,

@@ -1,5 +1,6 @@
 //! A packet: sixteen rays as a structure of arrays, their t intervals in a cell, and the test of a leaf's triangles
-//! against the rays that are in it. A *column* is one component of all sixteen rays.
+//! against those rays whose t interval in the leaf's cell is not empty. A *column* is one component of all sixteen
+//! rays.
 //!
 //! `dispatch!` compiles a function for an instruction set. Code that computes with columns has to be inlined into
 //! that function, and must not be in a closure: otherwise each operation would be a call.
@@ -23,7 +24,7 @@ use crate::{
     },
 };
 
-/// Number of a leaf's triangles whose planes are tested before the first of these triangles is.
+/// Number of triangles in a block of a leaf. All planes of a block are tested before its first triangle is tested.
 const BLOCK: usize = 8;
 
 /// The rays' t intervals in a cell. A ray that is not in the cell has `enter` above `exit`.
@@ -43,19 +44,20 @@ struct CenteredIntervals<S: Simd> {
 pub struct Packet<S: Simd> {
     origin: [f32x16<S>; 3],
     direction: [f32x16<S>; 3],
-    /// Inverse of `direction`, whose components are first brought away from 0: see `inverse`.
+    /// Inverse of `direction`, with a least magnitude for each component of `direction`: see `inverse`.
     pub inv_direction: [f32x16<S>; 3],
-    /// For each axis, 1 if the rays come to the upper child first, else 0.
+    /// For each axis, 1 if the rays visit the child above the split plane first, else 0.
     pub first_is_above: [u32; 3],
     /// For each axis, the t at which the rays meet the plane at coordinate 0.
     pub bias: [f32x16<S>; 3],
-    /// A ray counts as near a triangle's plane up to this distance (world units).
+    /// Distance from a triangle's plane up to which a ray counts as meeting the plane (world units).
     plane_epsilon: f32,
     shears: Shears<S>,
     t_min: f32x16<S>,
     source_triangle: u32x16<S>,
     best: HitColumns<S>,
-    /// The t of the rays' `best` hits. It is minus infinity for a ray that is done, so no cell is left for it.
+    /// The t of the rays' `best` hits. It is minus infinity for a ray that is done, so that all its t intervals are
+    /// empty.
     pub t_best: f32x16<S>,
 }
 
@@ -66,7 +68,7 @@ impl<S: Simd> Interval<S> {
         self.enter.simd_le(self.exit).to_bitmask() as LaneMask
     }
 
-    /// Returns the intervals of `lanes`. All other rays are not in the returned cell.
+    /// Returns the intervals of the rays in `lanes`, and empty intervals for all other rays.
     #[inline(always)]
     pub fn of(self, lanes: LaneMask) -> Self {
         let simd = self.enter.simd;
@@ -78,7 +80,7 @@ impl<S: Simd> Interval<S> {
     }
 }
 
-/// Loads vectors, one for each ray, as columns.
+/// Loads one vector for each ray, as a column for each axis.
 #[inline(always)]
 pub fn columns<S: Simd>(simd: S, [x, y, z]: &[[f32; LANES]; 3]) -> [f32x16<S>; 3] {
     [f32x16::load_array_ref(simd, x), f32x16::load_array_ref(simd, y), f32x16::load_array_ref(simd, z)]
@@ -90,7 +92,8 @@ fn row<S: Simd>(columns: &[f32x16<S>; 3], lane: usize) -> [f32; 4] {
     [columns[0].as_array()[lane], columns[1].as_array()[lane], columns[2].as_array()[lane], 0.0]
 }
 
-/// Returns 1 / direction. A component whose magnitude is below `KD_LEAST_COMPONENT` is replaced by that.
+/// Returns 1 / direction. A component whose magnitude is below `KD_LEAST_COMPONENT` is replaced by the positive
+/// `KD_LEAST_COMPONENT`, whatever its sign.
 #[inline(always)]
 fn inverse<S: Simd>(direction: f32x16<S>) -> f32x16<S> {
     let tiny = f32x16::splat(direction.simd, KD_LEAST_COMPONENT);
@@ -149,8 +152,8 @@ impl<S: Simd> Packet<S> {
         (packet, whole.of((1 << n_rays) - 1))
     }
 
-    /// Tells whether all rays start within `origin_reach`. It also tests unused lanes, which still hold rays of an
-    /// earlier packet. A far ray among these only costs the slow path.
+    /// Tells whether all coordinates of all origins have a magnitude of at most `origin_reach`. It also tests unused
+    /// lanes, which still hold rays of an earlier packet. A far ray in an unused lane costs time but changes no hit.
     #[inline(always)]
     pub fn is_within_reach(&self, inputs: &KernelInputs<impl ReadCounter>) -> bool {
         let reach = origin_reach(inputs);
@@ -165,7 +168,8 @@ impl<S: Simd> Packet<S> {
         CenteredIntervals { middle: (cell.enter + exit) * 0.5, half: (exit - cell.enter) * 0.5 }
     }
 
-    /// Returns the rays that cross a plane or come within `reach` of it in their t intervals. A NaN counts as near.
+    /// Returns the rays that cross a plane or come within `reach` of it in their t intervals. `reach` has the unit of
+    /// `dot(normal, point)`: world units if the normal has unit length. A NaN counts as near.
     #[inline(always)]
     fn lanes_near(
         &self,
@@ -181,13 +185,14 @@ impl<S: Simd> Packet<S> {
         !is_clear.to_bitmask() as LaneMask
     }
 
-    /// Returns the rays that enter a slab within the cell.
+    /// Returns the rays that enter a slab within the cell. The slab's normal is scaled such that its half thickness
+    /// is 1.
     #[inline(always)]
     pub fn lanes_in_slab(&self, slab: &Slab, cell: &Interval<S>) -> LaneMask {
         self.lanes_near(&self.centered_intervals(cell), slab.normal, slab.offset, 1.0)
     }
 
-    /// Tests the leaf's triangles against the rays that are in it.
+    /// Tests the leaf's triangles against the rays that are in its cell.
     #[inline(always)]
     pub fn intersect_leaf<const ANY_HIT: bool>(
         &mut self,
@@ -248,7 +253,7 @@ impl<S: Simd> Packet<S> {
         }
     }
 
-    /// Returns one ray for traversal outside the packet. Its t interval is not set.
+    /// Returns one ray in the form in which it is traced alone. Its t interval is not set.
     #[inline(always)]
     pub fn ray(&self, lane: usize) -> TraversalRay {
         TraversalRay {

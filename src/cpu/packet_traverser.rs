@@ -1,6 +1,6 @@
 //! Packet traversal: sixteen rays go through the kd-tree together (Wald et al., "Interactive rendering with coherent
-//! ray tracing", 2001). A node is read and a plane is tested once for all rays in the cell. Each ray is tested where
-//! it would be tested alone, and finds the same hit, bit for bit.
+//! ray tracing", 2001). A node is read and a plane is loaded once for all rays in the cell. Each ray is tested in the
+//! same leaves as a ray that is traced alone, so it finds the same hit, bit for bit.
 
 use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
@@ -27,7 +27,7 @@ pub struct PacketTraverser {
     level: Level,
     /// The stack for rays that are traced outside a packet.
     single: PendingStack,
-    /// The stack of pending subtrees, of which the first `size` are in use.
+    /// The stack of pending subtrees. Its first `size` entries are in use.
     entries: [Entry; KD_MAX_DEPTH as usize],
     size: usize,
 }
@@ -41,8 +41,9 @@ struct Entry {
     node_ix: u32,
 }
 
-/// Tells whether a ray that is the only one in a cell is traced faster outside its packet. This is so if one
-/// operation on a packet takes several instructions (docs/experiments.md).
+/// Tells whether a ray that is the only one in a cell is traced faster alone than in its packet. This is true if the
+/// machine's vectors have fewer than 16 lanes, so that an operation on a packet takes several instructions
+/// (docs/experiments.md).
 const fn goes_on_alone<S: Simd>() -> bool {
     size_of::<S::f32s>() < size_of::<f32x16<S>>()
 }
@@ -53,9 +54,9 @@ impl PacketTraverser {
         Self { level, single: Pending::new(), entries: [Entry::default(); KD_MAX_DEPTH as usize], size: 0 }
     }
 
-    /// Descends to the first leaf that rays of `cell` enter, and narrows `cell` to it. Rays that keep clear of a
-    /// node's slab leave the cell. If none is left, the node counts as an empty leaf. A ray that is not in the cell
-    /// decides nothing.
+    /// Descends to the first leaf that rays of `cell` enter, and sets `cell` to the rays' t intervals in that leaf.
+    /// The interval of a ray that stays outside a node's slab becomes empty. If all are empty, returns an empty leaf.
+    /// Rays with empty intervals do not influence the descent.
     #[inline(always)]
     fn descend<S: Simd>(
         &mut self,
@@ -78,7 +79,7 @@ impl PacketTraverser {
             let axis = axis_of(node) as usize;
             let t_cross = f32::from_bits(node.split_or_first) * packet.inv_direction[axis] + packet.bias[axis];
             let first_ix = 2 * (node.axis_and_child >> KD_PAIR_SHIFT) + packet.first_is_above[axis];
-            // A ray that is in neither child has met a NaN, or is not in the cell.
+            // A ray that is in neither child has a NaN as `t_cross`, or is not in the cell.
             let first = Interval { enter: cell.enter, exit: t_cross.min(cell.exit) };
             let second = Interval { enter: t_cross.max(cell.enter), exit: cell.exit };
             (*node_ix, *cell) = match (first.lanes() != 0, second.lanes() != 0) {
@@ -111,7 +112,7 @@ impl PacketTraverser {
         None
     }
 
-    /// Traverses all leaves that the rays meet in the root's cell, `whole`, unless they are beyond the best hits.
+    /// Visits all leaves that the rays enter, except leaves beyond the best hits. `whole` is the root's cell.
     #[inline(always)]
     fn search<S: Simd, const ANY_HIT: bool>(
         &mut self,
@@ -141,7 +142,8 @@ impl PacketTraverser {
         }
     }
 
-    /// Traces the first `n_rays` rays. If a ray starts far from the scene, which is rare, each is traced alone.
+    /// Traces the first `n_rays` rays. If any of them starts far from the scene, which is rare, every ray is traced
+    /// alone.
     #[inline(always)]
     fn traverse_at<S: Simd, const ANY_HIT: bool>(
         &mut self,
@@ -160,7 +162,7 @@ impl PacketTraverser {
         packet.hits()
     }
 
-    /// Traces each ray alone, from an origin near the scene.
+    /// Traces each ray alone, with its origin moved along the ray to near the scene.
     #[cold]
     fn traverse_one_by_one<const ANY_HIT: bool>(
         &mut self,
@@ -178,8 +180,8 @@ impl PacketTraverser {
         hits
     }
 
-    /// Returns the hits of the first `n_rays` rays, which must be of one octant. Further lanes of the result are
-    /// void.
+    /// Returns the hits of the first `n_rays` rays, which must be of one octant. All further lanes of the result are
+    /// meaningless.
     pub fn traverse<const ANY_HIT: bool>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
@@ -189,7 +191,7 @@ impl PacketTraverser {
         dispatch!(self.level, simd => self.traverse_at::<_, ANY_HIT>(simd, inputs, search_rays, n_rays))
     }
 
-    /// Traces one ray.
+    /// Traces one ray, without a packet. `best` becomes its hit.
     pub fn traverse_alone<const ANY_HIT: bool>(
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,

@@ -30,7 +30,7 @@ pub struct HitColumns<S: Simd> {
 }
 
 impl<S: Simd> HitColumns<S> {
-    /// Returns misses, with t = `t_max`.
+    /// Returns a miss for each ray, with its t set to `t_max`.
     #[inline(always)]
     pub fn nothing(t_max: f32x16<S>) -> Self {
         let zero = f32x16::splat(t_max.simd, 0.0);
@@ -99,7 +99,8 @@ impl<S: Simd> Shears<S> {
         Shear { origin, x, y, z, axis }
     }
 
-    /// Returns a corner in the sheared space of each ray. `[x, y, z]` has the rays' longest axis last.
+    /// Maps a triangle's corner to the sheared space of each ray. The corner's components `[x, y, z]` are permuted so
+    /// that the rays' longest axis is last.
     #[inline(always)]
     fn corner(&self, [x, y, z]: [f32; 3]) -> [f32x16<S>; 3] {
         let z = z - self.origin[2];
@@ -107,7 +108,8 @@ impl<S: Simd> Shears<S> {
     }
 
     /// Finds what [`Shear::intersect_triangle`] finds for each ray of `lanes`, whose longest axis is `axis`. Returns
-    /// the hits and the lanes in which they are valid, or nothing if no ray comes near the triangle.
+    /// the hits and the lanes in which they are valid, or none if the rounded edge functions already exclude all
+    /// rays.
     #[inline(always)]
     pub fn intersect_triangle(
         &self,
@@ -135,8 +137,8 @@ impl<S: Simd> Shears<S> {
     }
 }
 
-/// Returns the rounding error of the products in the edge function `a.x * b.y - a.y * b.x`: its exact value less that
-/// of the rounded products.
+/// Returns the error of the edge function `a.x * b.y - a.y * b.x` that the rounding of its products causes: the value
+/// with exact products less the value with rounded products.
 #[inline(always)]
 fn edge_error<S: Simd>(a: [f32x16<S>; 2], b: [f32x16<S>; 2]) -> f32x16<S> {
     product_error(a[0], b[1]) - product_error(a[1], b[0])
@@ -148,7 +150,8 @@ fn product_error<S: Simd>(a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
     a.mul_sub_precise(b, a * b)
 }
 
-/// Returns the edge functions, each with a relative error of at most 2^-23, as `triangle.rs` does.
+/// Returns the edge functions, each with a relative error of at most 2^-23: see the proof in
+/// `reference/triangle.rs`.
 #[inline(always)]
 fn exact_edges<S: Simd>(edges: [f32x16<S>; 3], errors: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
     let exact = [edges[0] + errors[0], edges[1] + errors[1], edges[2] + errors[2]];
@@ -194,7 +197,8 @@ fn is_outside<S: Simd>(edges: [f32x16<S>; 3]) -> mask32x16<S> {
     below & above
 }
 
-/// Returns vectors with their components rotated until x, y or z is last: x where `is_x`, y where `is_y`, else z.
+/// Returns vectors with their components permuted cyclically. The last component is x where `is_x` is set, y where
+/// `is_y` is set, and z elsewhere.
 #[inline(always)]
 fn axes_last<S: Simd>([x, y, z]: &[f32x16<S>; 3], is_x: mask32x16<S>, is_y: mask32x16<S>) -> [f32x16<S>; 3] {
     [is_x.select(*y, is_y.select(*z, *x)), is_x.select(*z, is_y.select(*x, *y)), is_x.select(*x, is_y.select(*y, *z))]

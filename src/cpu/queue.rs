@@ -1,21 +1,25 @@
-//! The buffers of a batch. They are as long as its rays require, and their memory is reused by the next batch.
+//! The buffers of a batch. They grow with its number of rays, and their memory is reused by the next batch.
 
 use crate::layout::{Bounce, Hit, PathRay};
 
-/// The ray queue of a batch, and what belongs to its rays.
+/// The rays of a batch, with their hits and all other results of passes.
 #[derive(Default)]
 pub struct Queue {
     /// The rays of all bounces, one bounce after the other.
     pub rays: Vec<PathRay>,
-    /// One for each bounce.
+    /// For each bounce, its range in `rays` and its counts.
     pub bounces: Vec<Bounce>,
-    /// One for each ray, like `child_kinds`, `first_children` and `ray_radiance`.
+    /// The closest hit of each ray.
     pub hits: Vec<Hit>,
+    /// For each ray, bits of `CHILD_REFLECTED` and its like.
     pub child_kinds: Vec<u32>,
+    /// For each ray, the index in `rays` of its first child, or the index that the child would have.
     pub first_children: Vec<u32>,
+    /// For each ray, its radiance, weighted by its throughput.
     pub ray_radiance: Vec<[f32; 4]>,
-    /// `LIGHT_*` of each light and ray, at `[light * rays.len() + ray]`.
+    /// For each light and ray, one of `LIGHT_*`, at `[light * rays.len() + ray]`.
     pub light_visibility: Vec<u32>,
-    /// One for each block of `SCAN_GROUP_SIZE` rays of a bounce.
+    /// For each block of `SCAN_GROUP_SIZE` rays of a bounce, the number of their children, and after the prefix sum
+    /// the number in all blocks before.
     pub scan_blocks: Vec<u32>,
 }

@@ -24,9 +24,10 @@ use crate::{
 /// How a frame is cut into batches. The picture does not depend on it.
 #[derive(Clone, Copy, Debug)]
 pub struct Batching {
-    /// Number of pixels in a batch, whose rays are traced together.
+    /// Number of pixels in a batch. The rays of a batch are traced together.
     pub n_pixels: u32,
-    /// A batch of more than one pixel is halved if it has more rays than this, in all its bounces.
+    /// Greatest number of rays of a batch, summed over its bounces. A batch with more rays is halved, unless it is
+    /// one pixel.
     pub queue_capacity: u32,
 }
 
@@ -45,19 +46,20 @@ pub struct Renderer {
     batching: Batching,
     links: TraversalLinks,
     frame: Frame,
-    /// The visibility buffer. Like all `pixel_*`, it has `width * height` pixels of the window, rows from the top.
+    /// The visibility buffer, `width * height` pixels of the window, rows from the top. The buffers `pixel_*` have
+    /// the same layout.
     triangle_ids: Vec<u32>,
     /// Radiances of the current sample; after the pass `accumulate`, the means of all samples.
     pixel_radiance: Vec<[f32; 4]>,
-    /// Sums of the samples. Empty before there is a second one.
+    /// Sums of the samples. Not in use before the second sample of a picture.
     pixel_accumulated: Vec<[f32; 4]>,
-    /// Radiances after the noise filter. Empty without a filter.
+    /// Radiances after the noise filter. Empty if there is no filter.
     pixel_filtered: Vec<[f32; 4]>,
     pixel_display: Vec<[u8; 4]>,
     /// Empty unless the options request features.
     pixel_features: Vec<Feature>,
     queue: Queue,
-    /// Number of rays beyond which the current batch is halved.
+    /// Number of rays beyond which the current batch is halved: `queue_capacity`, or no limit for one pixel.
     most_rays: u32,
     /// Counts of the current batch, one row for each bounce.
     batch_stats: Vec<BounceStats>,
@@ -153,7 +155,8 @@ impl Renderer {
         }
     }
 
-    /// Returns what the rays of each of the picture's pixels met and cost in the sample that was drawn last.
+    /// Returns the features of each pixel of the picture: the first hit, and the costs of the pixel's rays, in the
+    /// sample that was drawn last.
     ///
     /// # Panics
     /// The options do not request features.
@@ -162,7 +165,7 @@ impl Renderer {
         self.options.window().part(&self.pixel_features, &self.options.crop_or_whole())
     }
 
-    /// Returns which passes the next sample has. Only the device has kernels that rasterize, so the CPU replaces
+    /// Returns the properties that decide the passes of the next sample. Only devices rasterize, so the CPU replaces
     /// `Primary::SoftwareRaster` by `Primary::Raster`.
     fn frame_kind(&self) -> FrameKind {
         let kind = FrameKind::new(&self.options, self.frame.n_lights);
@@ -170,8 +173,8 @@ impl Renderer {
         FrameKind { primary, adds_samples: self.n_samples > 0, ..kind }
     }
 
-    /// Draws a batch of pixels: all bounces, then their light. If there are more rays than the queue may hold, it
-    /// draws the two halves of the batch instead.
+    /// Draws a batch of pixels: first all bounces are traced, then their hits are lit. If there are more rays than
+    /// the queue may hold, the two halves of the batch are drawn instead.
     fn batch(&mut self, plan: &Plan, first_pixel: u32, n_pixels: u32) {
         self.most_rays = if n_pixels == 1 { u32::MAX } else { self.batching.queue_capacity };
         self.batch_stats.clear();
@@ -223,8 +226,8 @@ impl Renderer {
         self.clock.time(Pass::Visibility, None, || super::visibility(&inputs, traversal, ids));
     }
 
-    /// Writes the primary rays to the queue. Their time counts as part of the first pass, since on the device each
-    /// kernel generates them itself.
+    /// Writes the primary rays to the queue. Their time counts as part of the first pass, because on a device that
+    /// pass computes the camera rays itself.
     fn primary_rays(&mut self, plan: &Plan, first_pixel: u32, n_pixels: u32) {
         let Queue { rays, bounces, .. } = &mut self.queue;
         *bounces = vec![Bounce::of(n_pixels, &self.frame)];
@@ -255,7 +258,7 @@ impl Renderer {
         self.clock.time(Pass::Features, Some(0), || features::features(&inputs, rays, hits, pixels));
     }
 
-    /// Records what the rays of all bounces cost.
+    /// Adds the traversal costs of the rays of all bounces to the features.
     fn note_costs(&mut self) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let (traversal, pixels) = (self.options.traversal, &mut self.pixel_features);

@@ -11,7 +11,7 @@ use crate::frame::{
 pub struct Clock {
     begin: Instant,
     passes: Vec<PassTime>,
-    /// Number of `passes` whose rays are counted: those of batches that have ended.
+    /// Number of entries of `passes` that have their ray counts. These are the passes of ended batches.
     n_counted: usize,
     batch_ix: u32,
 }
@@ -37,7 +37,7 @@ impl Clock {
         result
     }
 
-    /// Ends a batch that is done or was given up. `bounces` holds its counts.
+    /// Ends a batch that is complete, or that was abandoned to be halved. `bounces` holds the batch's ray counts.
     pub fn end_batch(&mut self, bounces: &[BounceStats]) {
         self.passes[self.n_counted..].iter_mut().for_each(|pass| count_rays(pass, bounces));
         self.n_counted = self.passes.len();

@@ -1,4 +1,4 @@
-//! The reference's passes that trace rays, run with the engine's [`FastTracer`].
+//! The reference's passes that trace rays, with [`FastTracer`] in place of the reference's tracer.
 
 use std::ops::Range;
 

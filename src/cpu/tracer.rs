@@ -1,5 +1,5 @@
-//! The engine's tracer. With [`Traversal::Stack`], rays of one octant go through a kd-tree as packets. With any other
-//! algorithm, or through a grid, rays are traced one after the other.
+//! The tracer of the CPU engine. With [`Traversal::Stack`], rays of one octant go through a kd-tree as packets. With
+//! any other algorithm, or through a grid, rays are traced one after the other.
 
 use fearless_simd::Level;
 
@@ -22,9 +22,9 @@ use crate::{
 /// The tracer of one thread.
 #[expect(clippy::large_enum_variant, reason = "one a thread, on its stack")]
 pub enum FastTracer {
-    /// [`Traversal::Stack`], through a kd-tree.
+    /// Traces packets through a kd-tree by [`Traversal::Stack`].
     Packets(PacketTraverser),
-    /// All other algorithms, and grids.
+    /// Traces ray by ray, by any other algorithm or through a grid.
     Single(Traverser),
 }
 

@@ -18,7 +18,7 @@ enum Backend<'a> {
 }
 
 impl<'a> Caster<'a> {
-    /// Creates a caster on the device, or without a context on the CPU.
+    /// Creates a caster on the device. If `context` is none, the caster runs on the CPU.
     pub(super) fn new(
         context: Option<&Arc<Context>>,
         geometry: Geometry<'a>,
@@ -30,7 +30,7 @@ impl<'a> Caster<'a> {
         }))
     }
 
-    /// Makes rays pass through the triangles with these indices.
+    /// Makes rays pass through the triangles with these indices. A second call replaces the indices of the first.
     ///
     /// # Errors
     /// The buffers are beyond the device's limits or memory.
@@ -44,8 +44,8 @@ impl<'a> Caster<'a> {
         }))
     }
 
-    /// Casts rays `n_times`, with the same hits each time. The times of the result are those of the device's kernel,
-    /// or wall-clock times on the CPU.
+    /// Casts all rays `n_times` (at least once) for timing. Every repetition finds the same hits. The times of the
+    /// result are those of the device's kernel, or wall-clock times on the CPU.
     ///
     /// # Errors
     /// Memory runs out, or a call fails.

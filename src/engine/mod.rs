@@ -1,5 +1,5 @@
-//! The engine renders and casts, on a Vulkan device or on the CPU. It opens the device, makes every choice that the
-//! user leaves open, and draws.
+//! The engine renders pictures and casts rays, on a Vulkan device or on the CPU. It opens the device, and chooses the
+//! acceleration structure, the traversal and the primary visibility where the user leaves them open.
 //!
 //! ```text
 //! Scene ─> Engine::build ─> World ─> Engine::render ─> Picture
@@ -26,8 +26,8 @@ use crate::{
     world::{FlatScene, Geometry, Mismatch, World},
 };
 
-/// A device that renders and casts, and the choices that are made for it. A clone is a second handle to the same
-/// device.
+/// A Vulkan device or the CPU, with the choices that the user has pinned and a cache of measurements. A clone is a
+/// second handle to the same device.
 #[derive(Clone)]
 pub struct Engine {
     /// The Vulkan device; none on the CPU.
@@ -64,7 +64,7 @@ impl Engine {
         Self { context: None, request: Request::default(), cache: Cache::open() }
     }
 
-    /// Returns the same engine with some choices pinned. It makes the other choices itself.
+    /// Returns the same engine with the choices that `request` specifies. The engine makes all other choices.
     #[must_use]
     pub fn with_request(self, request: Request) -> Self {
         Self { request, ..self }
@@ -100,7 +100,7 @@ impl Engine {
     /// The scene does not fit together: see [`Mismatch`].
     pub fn build(&self, scene: Scene, workload: &Workload) -> Result<Built, Mismatch> {
         let flat = FlatScene::new(&scene)?;
-        // The build of the structure needs the memory.
+        // The memory of the scene is freed for the build of the structure.
         drop(scene);
         self.build_flat(flat, workload)
     }
@@ -124,7 +124,7 @@ impl Engine {
         self.request.methods(self.context.as_ref(), world, workload, &self.cache)
     }
 
-    /// Creates a renderer, which draws pictures of a world repeatedly.
+    /// Creates a renderer, which can draw many pictures of one world.
     ///
     /// # Errors
     /// The scene or a row of the picture is beyond the device's limits or memory.
@@ -132,7 +132,7 @@ impl Engine {
         Renderer::new(self.context.as_ref(), world, options)
     }
 
-    /// Creates a caster, which casts rays through triangles repeatedly.
+    /// Creates a caster, which can cast many sets of rays through the same triangles.
     ///
     /// # Errors
     /// The triangles are beyond the device's limits or memory, or too many for [`Traversal::Brute`].

@@ -13,7 +13,7 @@ use crate::{
     world::World,
 };
 
-/// A picture, and what else drawing it gives.
+/// A picture, with the measurements and features of its drawing.
 #[derive(Clone, Debug)]
 pub struct Rendered {
     /// The picture.
@@ -31,7 +31,7 @@ enum Backend {
 }
 
 impl Renderer {
-    /// Creates a renderer on the device, or without a context on the CPU.
+    /// Creates a renderer on the device. If `context` is none, the renderer runs on the CPU.
     pub(super) fn new(
         context: Option<&Arc<Context>>,
         world: &World,
@@ -52,7 +52,7 @@ impl Renderer {
     }
 
     /// Draws what a camera sees with `n_samples` samples per pixel, at least one. The watcher is notified of each
-    /// sample of each band.
+    /// sample of each band. If it uses [`Watcher::part`], it is also notified of the progress within a sample.
     ///
     /// # Errors
     /// A call fails, one pixel alone makes more rays than a queue holds, or memory runs out.
@@ -70,11 +70,12 @@ impl Renderer {
     }
 
     /// Copies the displayed picture that was drawn last into the upper left corner of the caller's image: sRGB, 8
-    /// bits a channel. The device begins after `after` and signals `then`. The host does not wait for it.
+    /// bits a channel. The copy waits for the point `after` and signals the point `then`. The host does
+    /// not wait for the copy.
     ///
     /// # Errors
-    /// The CPU draws, the picture is so large that it does not stay on the device, the image is smaller than the
-    /// picture, or a call fails. Then nothing is signalled.
+    /// The renderer runs on the CPU. The picture was drawn in several bands, so it is not on the device. The image is
+    /// smaller than the picture. A call fails. In all these cases nothing is signalled.
     pub fn copy_picture_to(
         &self,
         image: &GivenImage,

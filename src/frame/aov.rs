@@ -1,4 +1,5 @@
-//! AOVs (arbitrary output variables): what a pixel shows and costs beside its colour, by the names that users see.
+//! AOVs (arbitrary output variables): what a pixel shows and costs, beside its colour. Users see the names of this
+//! file.
 
 use crate::layout::Feature;
 
@@ -37,7 +38,7 @@ named_enum!(Aov {
 /// A named channel, with a number for each pixel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Channel {
-    /// The name of the layer, a dot, the component, as in `normal.X`.
+    /// The name of the layer, a dot and the name of the component, as in `normal.X`.
     pub name: String,
     /// The samples of all pixels, rows from the top.
     pub samples: Samples,

@@ -1,12 +1,14 @@
-//! Rows of `bounces`, one for each bounce of each batch: the number of rays, and the sizes of dispatches that follow
-//! from it. Twin of `compact_spine.comp`, which computes them on the device.
+//! Rows of the buffer `bounces`, one for each bounce of each batch. A row has the bounce's range of rays and the
+//! sizes of the dispatches over them. Twin of `compact_spine.comp`, which computes the rows of secondary rays on the
+//! device.
 
 use std::ops::Range;
 
 use crate::layout::{Bounce, Frame, MOST_LANES_LOG2, RAY_GROUP_SIZE, SCAN_GROUP_SIZE};
 
 impl Bounce {
-    /// Returns the row of a batch's first bounce, of `n_rays` rays, for all of which the queue has room.
+    /// Returns the row of a bounce whose `n_rays` rays are the first in the queue. The queue must have room for them.
+    /// With no rays, it is the initial row of a later bounce, which compaction fills in.
     pub fn of(n_rays: u32, constants: &Frame) -> Self {
         let mut row = Self {
             n_wanted: n_rays,
@@ -24,7 +26,7 @@ impl Bounce {
         row
     }
 
-    /// Sets the bounce's range of rays in the queue, and the sizes of its dispatches along x.
+    /// Sets the bounce's range of rays in the queue, the lanes of each ray, and the sizes of the dispatches along x.
     pub fn set_rays(&mut self, first_ray: u32, n_rays: u32, constants: &Frame) {
         let n_so_far = first_ray + n_rays;
         let for_rays = lanes_log2(n_rays, constants.n_lanes);
@@ -39,14 +41,14 @@ impl Bounce {
         self.shade_groups_x = n_so_far.div_ceil(RAY_GROUP_SIZE);
     }
 
-    /// Returns the indices of its rays in the queue.
+    /// Returns the indices of the bounce's rays in the queue.
     pub fn rays(&self) -> Range<usize> {
         self.first_ray as usize..(self.first_ray + self.n_rays) as usize
     }
 }
 
-/// Returns n, where each ray gets 2^n lanes, of which only the first works. `n_lanes`: the lanes of the device, or 0,
-/// with which each ray gets one.
+/// Returns the base-2 logarithm n of the number of lanes of each ray, of which only the first works. `n_lanes`: the
+/// number of lanes of the device; if it is 0, each ray gets one lane.
 ///
 /// Divergent rays of a subgroup wait for one another. So if a dispatch has fewer rays than the device has lanes, the
 /// rays are spread over all lanes, and fewer of them share a subgroup. n is the largest for which the device has

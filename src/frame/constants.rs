@@ -1,5 +1,5 @@
-//! The frame's constants, the same on GPU and CPU. The rasterizer's matrix and the camera rays come from one camera
-//! here.
+//! The frame's constants, the same on GPU and CPU. The rasterizer's matrix and the vectors of camera rays are
+//! computed together from one camera, so that they agree.
 
 use glam::{DMat4, DVec2, DVec3, DVec4, Vec3, dvec2};
 
@@ -9,12 +9,13 @@ use crate::{
     scene::Camera,
 };
 
-/// Distance of the near plane from the eye, as a share of the scene's farthest distance from it. Nothing that can be
-/// seen is nearer, and reverse-Z in floating point loses no precision by so near a plane.
+/// Distance of the near plane from the eye, divided by the distance of the scene's farthest point. Nothing that can
+/// be seen is nearer than this plane. Reverse-Z in floating point loses no precision if the plane is so near.
 const NEAR_SHARE: f64 = 1.0 / (1 << 20) as f64;
 
 impl Frame {
-    /// Sets what follows from the options alone. [`Frame::set_view`] must be called after it.
+    /// Sets the constants that depend on the options alone. [`Frame::set_view`] must be called afterwards, since it
+    /// reads the picture's size.
     ///
     /// # Panics
     /// The crop exceeds the picture.
@@ -55,8 +56,8 @@ impl Frame {
     }
 }
 
-/// Returns the matrix that moves the image by `step`, in units of half the picture's sides. A
-/// viewport could not move it by fractions of a pixel, since a device need not place viewports between pixels.
+/// Returns the matrix that moves the image by `step`, in units of half the picture's width and height. The viewport
+/// cannot be moved instead: a device need not support viewports at fractions of a pixel.
 fn moved_by(step: DVec2) -> DMat4 {
     DMat4::from_cols(DVec4::X, DVec4::Y, DVec4::Z, step.extend(0.0).extend(1.0))
 }
@@ -93,7 +94,7 @@ mod tests {
     use super::*;
     use crate::reference::camera::{camera_direction, in_picture};
 
-    /// Returns the constants of a view of what is around the camera's target.
+    /// Returns the constants of a view of a scene around the camera's target.
     fn frame(camera: Camera, width: u32, height: u32) -> Frame {
         part(camera, RenderOptions { width, height, ..RenderOptions::default() }, 0)
     }
@@ -128,8 +129,9 @@ mod tests {
         ((ndc.x + 1.0) / 2.0 * width, (ndc.y + 1.0) / 2.0 * height, ndc.z)
     }
 
-    /// Returns the largest distance, px, between the projection of a point on a camera ray and the ray's pixel
-    /// centre. Rays of every sample are projected to the centre.
+    /// Returns the largest distance, px, between the projection of a point on a camera ray and the centre of the
+    /// ray's pixel. The matrix moves the image by the sample's offset, so points are projected to the centre in each
+    /// sample.
     fn worst_distance(frame: &Frame) -> f64 {
         let pixels = (0..50).map(|i| uvec2(i * 7919 % frame.width, i * 104_729 % frame.height));
         let corners = [UVec2::ZERO, uvec2(frame.width - 1, frame.height - 1)];

@@ -5,12 +5,12 @@ use crate::{
     layout::{Bounce, Counters},
 };
 
-/// Whether the pass runs once a batch, or once a bounce of a batch.
+/// Whether the pass belongs to a batch: it runs for the batch or for one of its bounces, not once a frame.
 pub(crate) fn is_in_batch(pass: &PassTime) -> bool {
     pass.pass().scope() != Scope::Frame
 }
 
-/// Fills in a pass's counts of rays. `bounces`: the counts of the pass's batch, one row a bounce.
+/// Fills in a pass's counts of rays. `bounces`: the counts of the pass's batch, one row per bounce.
 pub(crate) fn count_rays(pass: &mut PassTime, bounces: &[BounceStats]) {
     let role = pass.pass().role();
     if pass.pass().scope() == Scope::Batch {
@@ -30,7 +30,7 @@ pub(crate) fn count_rays(pass: &mut PassTime, bounces: &[BounceStats]) {
     };
 }
 
-/// Returns the counts that a device has left, one row for each bounce of each batch.
+/// Returns the counts in a device's buffers `bounces` and `counters`, one row for each bounce of each batch.
 pub(crate) fn device_counts(bounces: &[Bounce], counters: &[Counters]) -> Vec<BounceStats> {
     let row = |(bounce, counters): (&Bounce, &Counters)| BounceStats {
         n_rays: bounce.n_rays.into(),
@@ -40,8 +40,8 @@ pub(crate) fn device_counts(bounces: &[Bounce], counters: &[Counters]) -> Vec<Bo
     bounces.iter().zip(counters).map(row).collect()
 }
 
-/// Fills in the batch and the counts of rays of each pass of a device's frame. `counts`: the rows of
-/// [`device_counts`], `max_depth` for each batch.
+/// Fills in the batch and the counts of rays of each pass of a device's frame. `counts`: the rows that
+/// [`device_counts`] returns, `max_depth` rows for each batch.
 pub(crate) fn count_batches(passes: &mut [PassTime], counts: &[BounceStats], max_depth: u32) {
     let batches = || (0..).zip(counts.chunks_exact(max_depth as usize));
     // All batches have the same passes, no matter how many rays they have.
@@ -55,7 +55,7 @@ pub(crate) fn count_batches(passes: &mut [PassTime], counts: &[BounceStats], max
     }
 }
 
-/// Returns the sums of all batches, one row a bounce.
+/// Returns the sums of the counts over all batches, one row per bounce.
 pub(crate) fn sum_of_batches(counts: &[BounceStats], max_depth: u32) -> Vec<BounceStats> {
     let mut sums = vec![BounceStats::default(); max_depth as usize];
     for batch in counts.chunks_exact(max_depth as usize) {

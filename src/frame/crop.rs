@@ -4,8 +4,8 @@ use std::{fmt, str::FromStr};
 
 use super::{Denoise, RenderOptions};
 
-/// The pixels (x, y) of a picture with `x0 <= x < x1` and `y0 <= y < y1`, counted from the upper left corner. There
-/// is at least one.
+/// A rectangle of at least one pixel: the pixels (x, y) of a picture with `x0 <= x < x1` and `y0 <= y < y1`, counted
+/// from the upper left corner. Crops, windows and bands are such rectangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Crop {
     /// The first column.
@@ -34,7 +34,7 @@ impl Crop {
         self.y1 - self.y0
     }
 
-    /// Returns the crop with `border` more pixels on each side, as far as the picture extends.
+    /// Returns the crop with `border` more pixels on each side, clipped to a picture of `width` x `height` pixels.
     fn grown(&self, border: u32, width: u32, height: u32) -> Self {
         Self {
             x0: self.x0.saturating_sub(border),
@@ -44,8 +44,8 @@ impl Crop {
         }
     }
 
-    /// Copies the pixels of `crop`, which must be inside this window. `pixels`: those of this window, rows from the
-    /// top.
+    /// Copies the pixels of `crop` out of those of this rectangle, which must contain it. `pixels`: the pixels of
+    /// this rectangle, rows from the top.
     pub(crate) fn part<T: Copy>(&self, pixels: &[T], crop: &Crop) -> Vec<T> {
         let (left, width) = ((crop.x0 - self.x0) as usize, crop.width() as usize);
         let rows = pixels.chunks_exact(self.width() as usize).skip((crop.y0 - self.y0) as usize);
@@ -54,7 +54,7 @@ impl Crop {
 }
 
 impl RenderOptions {
-    /// Returns the part of the picture that the options ask for.
+    /// Returns the crop or, without one, the whole picture.
     pub fn crop_or_whole(&self) -> Crop {
         self.crop.unwrap_or(Crop::whole(self.width, self.height))
     }

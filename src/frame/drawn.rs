@@ -14,16 +14,16 @@ pub struct Drawn {
 
 /// Follows the progress of a drawing.
 pub trait Watcher {
-    /// Whether the watcher makes use of [`Watcher::part`]. If not, the drawing need not wait for the device within a
-    /// sample, which takes time.
+    /// Whether the watcher makes use of [`Watcher::part`]. If it does not, the renderer saves the time to wait for
+    /// the device several times in a sample.
     fn sees_parts(&self) -> bool {
         false
     }
 
-    /// Notes that this share of the sample is drawn, 0 to 1.
+    /// Is called when the share `_share` of the sample, 0 to 1, has been drawn.
     fn part(&mut self, _share: f32) {}
 
-    /// Notes that a sample of a band is done.
+    /// Is called when a sample of a band has been drawn.
     fn sample(&mut self);
 }
 

@@ -1,9 +1,10 @@
-//! A frame's options, its plan of passes, and its results, the picture and the profile: the same on GPU and CPU.
+//! A frame's options, its plan of passes, and its results: the picture, the profile and the features of pixels. GPU
+//! and CPU share these types.
 //!
 //! ```text
 //! options    RenderOptions, crop: what to render, and by which methods
 //! constants  the uniform buffer of the kernels; sampling: the positions of samples in their pixels
-//! plan       the order of passes and the barriers between them, of
+//! plan       the order of passes and the barriers between them
 //!   pass       what each pass does, reads and writes
 //!   resource   the buffers and images that passes write
 //! bounce     sizes of a bounce's dispatches
@@ -35,7 +36,8 @@ pub use self::{
 };
 use crate::{accel::kdtree::Traversal, layout};
 
-/// How a frame is rendered. The scene's own defaults fill in what the user does not set.
+/// How a frame is rendered. The command takes what its user does not set from the scene's
+/// [`RenderDefaults`](crate::scene::RenderDefaults).
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {
     /// Width of the whole picture, pixels.
@@ -58,7 +60,7 @@ pub struct RenderOptions {
     pub primary: Primary,
     /// Whether the device measures times and counts rays. If not, its frames have empty profiles.
     pub profile: bool,
-    /// Whether features are noted: what the rays of each pixel hit and cost.
+    /// Whether the features of each pixel are written: what its rays hit and cost.
     pub features: bool,
 }
 
@@ -87,14 +89,14 @@ pub enum Denoise {
     Off,
     /// Smooths a pixel if its luminance differences to its four neighbours add up to more than the threshold.
     Paper {
-        /// Sum of the differences, in units of display white, 0 to 4.
+        /// Sum of the four differences above which a pixel is smoothed, in units of display white, 0 to 4.
         threshold: f32,
     },
 }
 
 impl Denoise {
     /// The default threshold. A pixel's differences add up to 1 on a straight edge between black and white, to 2 at a
-    /// corner or on a thin line, and to 4 if it stands alone.
+    /// corner or on a thin line, and to 4 if the pixel is a white dot on black.
     pub const DEFAULT_THRESHOLD: f32 = 2.5;
 }
 
@@ -126,31 +128,31 @@ pub enum Primary {
     /// The graphics pipeline rasterizes triangle IDs; then each ray is intersected with its triangle's plane.
     Raster,
     /// Compute kernels rasterize triangles with the ray-triangle test of the traversal. So hits are those of `Trace`,
-    /// bit for bit, unless the camera is farther from the scene than `KD_MAX_ORIGIN_DISTANCE` allows. Needs 64-bit
-    /// atomics. The CPU has no such kernels and takes `Raster` instead.
+    /// bit for bit, unless the camera is farther from the scene than `KD_MAX_ORIGIN_DISTANCE` allows. The device must
+    /// have 64-bit atomics. The CPU engine has no such kernels and takes `Raster` instead.
     SoftwareRaster,
     /// Rays are traced through the acceleration structure.
     Trace,
 }
 
 impl Primary {
-    /// Returns the method with less work, `Raster` or `Trace`: the rasterizer processes all triangles, tracing
-    /// processes all pixels of the whole picture. `triangles_per_ray`: the number of triangles that are rasterized in
-    /// the time in which one ray is traced.
+    /// Returns `Raster` or `Trace`, whichever is expected to take less time. The rasterizer processes all triangles;
+    /// tracing processes one ray per pixel of the picture, of the given width and height. `triangles_per_ray`: the
+    /// number of triangles that are rasterized in the time in which one ray is traced.
     pub fn suited_to(n_triangles: usize, (width, height): (u32, u32), triangles_per_ray: u64) -> Self {
         let n_rays = u64::from(width) * u64::from(height);
         if n_triangles as u64 <= triangles_per_ray * n_rays { Self::Raster } else { Self::Trace }
     }
 }
 
-/// A rendered frame or its crop. Pixels are in rows from the top, left to right.
+/// The picture of a rendered frame, or of its crop. Pixels are in rows from the top, left to right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Width, pixels.
     pub width: u32,
     /// Height, pixels.
     pub height: u32,
-    /// `width * height` linear RGB radiances before exposure; the fourth component is 1.
+    /// `width * height` linear RGB radiances, after the noise filter and before exposure; the fourth component is 1.
     pub radiance: Vec<[f32; 4]>,
     /// `width * height` sRGB-encoded RGBA pixels.
     pub display: Vec<[u8; 4]>,

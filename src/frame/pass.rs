@@ -33,7 +33,8 @@ pub enum Scope {
     Frame,
     /// Once for each batch, for the rays of all its bounces together.
     Batch,
-    /// Once for each bounce of each batch.
+    /// Once for a bounce of a batch, in each bounce that has the pass. Not all bounces have it: `primary_hit` and
+    /// `features` run for bounce 0 only, and the last bounce has no compaction.
     Bounce,
 }
 
@@ -46,7 +47,8 @@ pub enum Pass {
     RasterizeTriangles,
     /// Rasterizes the large triangles, block by block.
     RasterizeBlocks,
-    /// Intersects each camera ray with the triangle that was rasterized in its pixel.
+    /// Intersects each camera ray with the triangle that was rasterized in its pixel. If the ray just misses that
+    /// triangle, the hit is moved to its edge.
     PrimaryHit,
     /// Finds each ray's closest hit through the acceleration structure.
     Trace,
@@ -60,7 +62,7 @@ pub enum Pass {
     CompactScatter,
     /// Tests the segments from hits to lights.
     Shadow,
-    /// Computes the radiance that each hit sends back along its ray.
+    /// Computes the radiance that each ray contributes to its pixel: that of its hit, weighted by its throughput.
     Shade,
     /// Adds up the radiance of each pixel's rays.
     Resolve,
@@ -83,7 +85,7 @@ struct Info {
     color: [u8; 3],
     reads: &'static [Resource],
     writes: &'static [Resource],
-    /// The buffer that holds the size of its indirect dispatch; None if the host sets the size.
+    /// The buffer that holds the size of the pass's indirect dispatch; None if the host sets the size.
     indirect: Option<Resource>,
 }
 
@@ -305,7 +307,7 @@ impl Pass {
         info.unwrap_or_else(|| panic!("`{name}` is missing in the table of a frame's passes")).pass
     }
 
-    /// Whether it is one of the passes that find the closest hits of rays, primary visibility included.
+    /// Whether the pass takes part in finding the closest hits of rays, by tracing or by rasterization.
     pub fn is_tracing(self) -> bool {
         matches!(self.role(), Role::PrimaryVisibility | Role::ClosestHit)
     }

@@ -14,7 +14,7 @@ use super::{
     {Denoise, Primary, RenderOptions},
 };
 
-/// How passes access the resources of a barrier.
+/// How the passes before or after a barrier access its resources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Touch {
     /// Kernels read them.
@@ -38,7 +38,8 @@ pub enum Step {
         before: Touch,
         /// The accesses of later passes.
         after: Touch,
-        /// The resources that the barrier is for. The Vulkan barrier orders such accesses to all memory.
+        /// The resources for which the plan needs the barrier. The Vulkan barrier itself is not limited to them: it
+        /// orders accesses of these kinds to all memory.
         of: &'static [Resource],
     },
 }
@@ -46,14 +47,14 @@ pub enum Step {
 /// Passes and barriers in the order of execution.
 pub type Section = Vec<Step>;
 
-/// What decides which passes a frame has.
+/// The properties of a frame that decide which passes it has.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameKind {
     /// How primary rays find their triangles.
     pub primary: Primary,
     /// Number of bounces, the primary rays included.
     pub n_bounces: u32,
-    /// Whether features are noted: what each pixel shows.
+    /// Whether the features of each pixel are written: what it shows.
     pub features: bool,
     /// Whether hits are lit. They are not if a frame finds only the hits of primary rays.
     pub is_lit: bool,
@@ -68,8 +69,8 @@ pub struct FrameKind {
 }
 
 impl FrameKind {
-    /// Returns the kind of a lit frame of several samples, which has all the passes that frames of these options can
-    /// have, except that it displays the picture and no feature.
+    /// Returns the kind of a frame with all the passes that frames of these options can have: the frame is lit, and
+    /// its sample is added to earlier ones. It displays the picture, by as many passes as would display a feature.
     pub fn new(options: &RenderOptions, n_lights: u32) -> Self {
         Self {
             primary: options.primary,
@@ -128,11 +129,11 @@ pub fn passes(section: &[Step]) -> impl Iterator<Item = Pass> {
     })
 }
 
-/// Finds the triangles that the pixels show by rasterization. The section is empty if primary rays are traced.
+/// Finds by rasterization which triangle each pixel shows. The section is empty if primary rays are traced.
 pub fn visibility(primary: Primary) -> Section {
     match primary {
         Primary::Trace => Section::new(),
-        Primary::Raster => vec![Step::Run(Pass::Visibility)], // it leaves triangle_ids visible to kernels
+        Primary::Raster => vec![Step::Run(Pass::Visibility)], // the pass itself makes triangle_ids visible to kernels
         Primary::SoftwareRaster => vec![
             Step::Run(Pass::RasterizeTriangles),
             barrier(Touch::Write, Touch::Update, &[PixelNearest, LargeTriangles, RasterGroups]),
@@ -155,8 +156,8 @@ fn bounce(kind: &FrameKind, depth: u32) -> Section {
     bounce
 }
 
-/// Finds the closest hits of one bounce: those of primary rays from the rasterized triangles, if there are any, and
-/// all others through the acceleration structure.
+/// Finds the closest hits of one bounce's rays. Primary rays are intersected with the rasterized triangles if the
+/// frame rasterizes them; all other rays are traced through the acceleration structure.
 fn closest_hits(kind: &FrameKind, depth: u32) -> Section {
     let is_rasterized = depth == 0 && kind.primary != Primary::Trace;
     vec![
@@ -165,7 +166,8 @@ fn closest_hits(kind: &FrameKind, depth: u32) -> Section {
     ]
 }
 
-/// Compaction (the paper's section 2.1): makes the rays that go on from the hits, without gaps, by a prefix sum.
+/// Compaction (the paper's section 2.1): writes the rays that go on from the hits to the ray queue, without gaps, by
+/// a prefix sum.
 pub fn next_rays() -> Section {
     vec![
         Step::Run(Pass::CompactReduce),

@@ -15,16 +15,17 @@ pub struct Profile {
     pub passes: Vec<PassTime>,
     /// Counts of rays, the sums of all batches. One row a bounce; row 0: primary rays.
     pub bounces: Vec<BounceStats>,
-    /// Number of batches that the frame was split into; the largest one if several frames are added up.
+    /// Number of batches that the frame was split into. In a sum of frames, the largest of their numbers.
     pub n_batches: u32,
-    /// Milliseconds from the first pass's start to the last one's end; None if the device has no timestamps.
+    /// Milliseconds from the first pass's start to the last one's end, summed over frames and bands if there are
+    /// several; None if the device has no timestamps.
     pub frame_ms: Option<f64>,
     /// When the first commands were submitted to the device, or the CPU began.
     #[serde(skip)]
     pub begun_at: Option<Instant>,
 }
 
-/// One run of a pass: of one bounce of one batch, of a batch, or of the frame.
+/// Times and counts of one run of a pass: for one bounce of a batch, for a whole batch, or for the frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PassTime {
     /// The name of a [`Pass`], of its debug label and of its kernel's file.
@@ -32,7 +33,7 @@ pub struct PassTime {
     /// The bounce. None for passes that run once a frame, and for those that run for all bounces of a batch at once:
     /// shadow, shade, resolve.
     pub bounce: Option<u32>,
-    /// Index of the batch, in the order of execution. None for passes that run once a frame.
+    /// Index of the batch, counted in the order of execution. None for passes that run once a frame.
     pub batch: Option<u32>,
     /// Milliseconds from the start of the frame's first pass to that of this one; None if the device has no
     /// timestamps.
@@ -52,7 +53,7 @@ impl PassTime {
         Pass::named(self.name)
     }
 
-    /// Adds time and counts of the same pass of another frame.
+    /// Adds the time and the counts that the same pass has in another frame.
     fn add(&mut self, other: &Self) {
         let sum = |a: Option<u64>, b: Option<u64>| a.zip(b).map(|(a, b)| a + b);
         self.ms = self.ms.zip(other.ms).map(|(a, b)| a + b);
@@ -64,7 +65,7 @@ impl PassTime {
 /// Counts of one bounce's rays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct BounceStats {
-    /// Rays whose closest hit was found.
+    /// Rays whose closest hit was searched, those that hit nothing included.
     pub n_rays: u64,
     /// Rays that hit something.
     pub n_hits: u64,
@@ -82,8 +83,8 @@ impl BounceStats {
 }
 
 impl Profile {
-    /// Adds the times and counts of another frame of the same options. `start_ms` of a pass stays that of the first
-    /// frame which has the pass.
+    /// Adds the times and counts of another frame with the same options. The `start_ms` of a pass remains the one
+    /// from the first frame that has the pass.
     pub fn add(&mut self, frame: &Profile) {
         let mut next = 0;
         let place = |pass: &PassTime| (pass.name, pass.bounce, pass.batch);
@@ -105,7 +106,8 @@ impl Profile {
         self.n_batches = self.n_batches.max(frame.n_batches);
     }
 
-    /// Appends the profile of another part of the picture. The numbers of its batches follow those of this profile.
+    /// Appends the profile of another band of the picture. Its batches are numbered on from those of this profile,
+    /// and its passes start later by the time between the beginnings of both bands.
     pub fn append(&mut self, part: Profile) {
         let delay = self.begun_at.zip(part.begun_at).map(|(first, later)| later.saturating_duration_since(first));
         let delay_ms = delay.unwrap_or_default().as_secs_f64() * 1e3;
@@ -131,7 +133,7 @@ impl Profile {
     }
 
     /// Returns the milliseconds of the passes that find the closest hits of a bounce's rays, or None if one of the
-    /// passes lacks a timestamp. Those that find primary visibility once a frame belong to bounce 0.
+    /// passes lacks a timestamp. Passes of primary visibility, which run once a frame, count for bounce 0.
     pub fn tracing_ms(&self, bounce: u32) -> Option<f64> {
         let passes = self.passes.iter().filter(|pass| pass.pass().is_tracing());
         passes.filter(|pass| pass.bounce.unwrap_or(0) == bounce).map(|pass| pass.ms).sum()

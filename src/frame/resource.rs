@@ -2,14 +2,14 @@
 
 use crate::layout;
 
-/// A buffer or image that some pass writes. Its name is that in the kernels.
+/// A buffer or image that some pass writes. Kernels have it under the same name in snake case, as `first_children`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Resource {
     /// Rays of all bounces of a batch: the ray queue.
     Rays,
     /// The closest hit of each ray.
     Hits,
-    /// The kinds of rays that go on from each hit, its ray's children: reflected, refracted, both or none.
+    /// The kinds of each ray's children, the rays that go on from its hit: reflected, refracted, both or none.
     ChildKinds,
     /// Index in `Rays` at which each ray's children begin, or would begin if it had any.
     FirstChildren,
@@ -17,13 +17,13 @@ pub enum Resource {
     ScanBlocks,
     /// The number of rays of each bounce, and the sizes of its dispatches.
     Bounces,
-    /// For each light and each hit: whether the light is visible.
+    /// For each light and each hit: whether the light is visible, in shadow or untested.
     LightVisibility,
-    /// The radiance that each ray contributes to its pixel.
+    /// The radiance that each ray contributes to its pixel, weighted by the ray's throughput.
     RayRadiance,
     /// The sample's radiance in each pixel, then the mean of all samples.
     PixelRadiance,
-    /// The sum of all samples in each pixel.
+    /// The sum of the radiances of all samples of each pixel.
     PixelAccumulated,
     /// The radiance of each pixel after the noise filter; the same buffer as `PixelRadiance` if there is no filter.
     PixelFiltered,
@@ -39,9 +39,9 @@ pub enum Resource {
     RasterGroups,
     /// Triangles with large bounding rectangles, which `RasterizeBlocks` rasterizes.
     LargeTriangles,
-    /// Numbers of hits and of shadow segments of each bounce.
+    /// Numbers of hits and of shadow segments of each bounce of each batch.
     Counters,
-    /// States of rays that have spent the loop turns of a dispatch, and go on in the next one.
+    /// States of stalled rays: rays that have spent the loop turns of a dispatch and go on in a further dispatch.
     Stalls,
 }
 

@@ -10,8 +10,8 @@ use glam::{DVec2, dvec2};
 /// Effectiveness of Quasirandom Sequences, 2018) in units of 2^-32.
 const R2_STEP: [u32; 2] = [3_242_174_889, 2_447_445_414];
 
-/// Returns the sample's offset from the centre of its pixel, px, -1 to 1 on each axis. Offsets are distributed as a
-/// tent filter of radius 1 px weighs them. Sample 0 is the centre.
+/// Returns the sample's offset from the centre of its pixel, px, -1 to 1 on each axis. The density of offsets is a
+/// tent filter of radius 1 px. Sample 0 is at the centre.
 pub fn sample_offset(sample_ix: u32) -> DVec2 {
     let [x, y] = R2_STEP.map(|step| tent(quasirandom(sample_ix, step)));
     dvec2(x, y)
@@ -24,7 +24,8 @@ fn quasirandom(ix: u32, step: u32) -> f64 {
     f64::from(bits.max(1)) / (1_u64 << 32) as f64
 }
 
-/// Returns the position, -1 to 1, to whose left a tent over -1 to 1 has the share `u` of its area.
+/// Returns the inverse cumulative distribution of a tent over -1 to 1: the position that has the share `u` of the
+/// tent's area to its left.
 fn tent(u: f64) -> f64 {
     if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 * (1.0 - u)).sqrt() }
 }
@@ -65,8 +66,8 @@ mod tests {
         assert!(mean(&|p| p.x * p.y).abs() < 1e-3);
     }
 
-    /// The first n samples are spread evenly, for any n: no half plane along an axis has much more than its share of
-    /// them, as it would have of random samples.
+    /// The first n samples are spread evenly, for any n: the share of samples below a coordinate differs from the
+    /// tent's share by less than 3 / n, which random samples would exceed.
     #[test]
     fn few_samples_are_spread_evenly() {
         for n in [16, 64, 256, 1024] {

@@ -15,7 +15,7 @@ pub enum View {
     Id,
     /// Number of reads of the acceleration structure by all rays of the pixel.
     Cost,
-    /// Number of all rays of the pixel.
+    /// Number of the pixel's rays: primary, secondary and shadow rays.
     Rays,
 }
 
@@ -34,7 +34,7 @@ impl View {
         matches!(self, Self::Depth | Self::Normal | Self::Id)
     }
 
-    /// Returns the value that the kernel has for it, `VIEW_*`; None for the picture.
+    /// Returns the kernels' constant of the view, `VIEW_*`; None for the picture, which needs no such kernel.
     pub(crate) fn constant(self) -> Option<u32> {
         match self {
             Self::Picture => None,

@@ -23,7 +23,7 @@ struct Level {
     context: Arc<Context>,
 }
 
-/// Geometry of a level and its number of primitives.
+/// Inputs of a level's build: the level's name and type, its geometry and the number of primitives in the geometry.
 struct Contents<'a> {
     name: &'static str,
     ty: vk::AccelerationStructureTypeKHR,
@@ -32,11 +32,14 @@ struct Contents<'a> {
 }
 
 impl DriverAccel {
-    /// Builds both levels for fast tracing. An element of `triangles` has 48 bytes: three 16-byte rows, each of which
-    /// begins with a corner.
+    /// Builds both levels for fast tracing. An element of `triangles` must have 48 bytes: three 16-byte rows, each of
+    /// which begins with a vertex position.
     ///
     /// # Errors
-    /// Memory is exhausted. Panics on a context without ray tracing.
+    /// Memory is exhausted.
+    ///
+    /// # Panics
+    /// The context was opened without ray tracing.
     pub fn new<T: Pod>(context: &Arc<Context>, triangles: &[T]) -> Result<Self, GpuError> {
         let corners = Buffer::with(context, "driver_accel corners", triangles, BufferUse::Structure)?;
         let data = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
@@ -172,6 +175,7 @@ fn build(
 
 impl Drop for Level {
     fn drop(&mut self) {
+        // The field only keeps the memory alive. This use of it silences the lint for fields that are never read.
         let _ = &self.bytes;
         // SAFETY: the device has ended all work with the structure.
         unsafe { RayTracingCalls::of(&self.context).structures.destroy_acceleration_structure(self.raw, None) };

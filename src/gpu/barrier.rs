@@ -5,31 +5,35 @@ use ash::vk::{AccessFlags2 as A, PipelineStageFlags2 as S};
 /// An access to memory: its pipeline stages, and whether it reads or writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// Reads of a kernel, from storage and uniform buffers.
+    /// Reads by a kernel, from storage and uniform buffers.
     ComputeRead,
-    /// Writes of a kernel.
+    /// Writes by a kernel.
     ComputeWrite,
-    /// Reads and writes of a kernel that updates in place.
+    /// Reads and writes by a kernel that updates a buffer in place.
     ComputeUpdate,
-    /// Reads and writes of a kernel, and reads of its indirect dispatch's workgroup counts.
+    /// Reads and writes by a kernel, and the device's reads of the workgroup counts of the kernel's indirect
+    /// dispatch.
     KernelUpdate,
-    /// A fragment shader's reads of storage.
+    /// Reads by a fragment shader, from storage buffers.
     FragmentRead,
-    /// Reads of an indirect dispatch's workgroup counts.
+    /// The device's reads of the workgroup counts of an indirect dispatch.
     IndirectRead,
-    /// Reads of a copy.
+    /// Reads by a copy command.
     TransferRead,
-    /// Writes of a copy, or of an update or a fill of a buffer.
+    /// Writes by a command that copies, updates or fills a buffer.
     TransferWrite,
-    /// Reads of the host.
+    /// Reads by the host.
     HostRead,
-    /// Reads and writes of a ray generation shader, and its reads of the driver's acceleration structure. Like
-    /// `StructureBuild`, it is valid only on a context with ray tracing.
+    /// Reads and writes by a ray generation shader, including reads of the driver's acceleration structure. The
+    /// access is valid only on a context with ray tracing.
     RayTracingUpdate,
-    /// Reads and writes of a build of the driver's acceleration structure.
+    /// Reads and writes by a build of the driver's acceleration structure. The access is valid only on a context with
+    /// ray tracing.
     StructureBuild,
-    /// Index, vertex, compute, uniform and indirect reads, compute writes and transfers. It is for barriers between
-    /// an upload and whatever uses it, and between a frame and the next one's uploads.
+    /// Uses of buffers in a frame: reads of indices and workgroup counts, reads by vertex shaders, reads and writes
+    /// by kernels, and reads and writes by transfers. Fragment shaders are not included. The access serves barriers
+    /// between an upload and the commands that use the uploaded data, and between a frame and the uploads of the next
+    /// frame.
     AllReads,
 }
 

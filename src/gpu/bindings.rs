@@ -57,7 +57,7 @@ pub struct BindingLayout {
 
 impl BindingLayout {
     /// Creates a layout. `kinds` lists the binding numbers and their kinds. `push_bytes` is the size of the push
-    /// constants, which all stages see, in bytes.
+    /// constants, bytes. All stages see the push constants.
     pub fn new(context: &Arc<Context>, kinds: &[(u32, BindingKind)], push_bytes: u32) -> Result<Arc<Self>, GpuError> {
         Self::with_constants(context, kinds, push_bytes, Constants::new())
     }
@@ -125,11 +125,12 @@ pub struct BindingSet {
 }
 
 impl BindingSet {
-    /// Creates a set. `objects` has one object for each binding of the layout, with its number. If a buffer exceeds
-    /// what the device can bind, only its first part is bound: kernels read it as texels or by address instead.
+    /// Creates a set. `objects` has each binding number of the layout once, with an object of the binding's kind. If
+    /// a buffer exceeds what the device can bind, only its first part is bound. Kernels then have to read the buffer
+    /// as texels or by address.
     ///
     /// # Panics
-    /// An object is missing or has no binding in the layout.
+    /// The number of objects is not that of the layout's bindings, or an object has no binding in the layout.
     pub fn new(bindings: &Arc<BindingLayout>, name: &str, objects: &[(u32, Binding)]) -> Result<Self, GpuError> {
         assert_eq!(objects.len(), bindings.kinds.len(), "one object a binding");
         let context = &bindings.context;

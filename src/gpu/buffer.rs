@@ -10,7 +10,7 @@ use super::{Access, Context, GpuError};
 
 /// Greatest size of one part of an upload, bytes. It bounds the memory that an upload takes beside the buffer's own.
 const MOST_STAGING_BYTES: usize = 64 << 20;
-/// Size of a vector of four words, bytes. Kernels read as much at once by address.
+/// Size of a vector of four words, bytes. Kernels that read by address load one such vector at a time.
 const ROW_BYTES: u64 = 16;
 
 /// How kernels use a buffer. Every buffer can also be copied from and to.
@@ -22,7 +22,7 @@ pub enum BufferUse {
     Uniform,
     /// A bound storage buffer that also holds workgroup counts of indirect dispatches.
     Indirect,
-    /// Vertex indices, only for draws.
+    /// Vertex indices of draws. Kernels cannot read the buffer.
     Index,
     /// Storage that kernels may fetch as texels. The size of the elements decides whether a texel has four words, two
     /// or one. The buffer may be larger than what can be bound.
@@ -113,8 +113,9 @@ impl<T: Pod> Buffer<T> {
         Ok(buffer)
     }
 
-    /// Creates a buffer of `len` elements, which `write(first, part)` makes part by part: `part` begins with element
-    /// `first`. At most 64 MiB of the elements are in the host's memory at a time.
+    /// Creates a buffer of `len` elements and fills it part by part. Each call of `write(first, part)` has to set
+    /// `part` to the elements from index `first` on. At most 64 MiB of the elements are in the host's memory at a
+    /// time.
     ///
     /// # Errors
     /// Fails as [`Buffer::new`] does, or if a copy fails.
@@ -149,7 +150,8 @@ impl<T: Pod> Buffer<T> {
         self.upload_by(data.len(), |first, part| part.copy_from_slice(&data[first..][..part.len()]))
     }
 
-    /// Overwrites the first `len` elements with what `write` makes, part by part, and waits for the device.
+    /// Overwrites the first `len` elements, part by part, and waits for the device. `write` is that of
+    /// [`Buffer::written_by`].
     fn upload_by(&self, len: usize, mut write: impl FnMut(usize, &mut [T])) -> Result<(), GpuError> {
         if len == 0 {
             return Ok(());
@@ -250,7 +252,8 @@ impl AnyBuffer {
         }
     }
 
-    /// Adds a view of the buffer's texels, as many as the device allows in one view.
+    /// Adds a texel view of the buffer. If the buffer has more texels than the device allows in one view, the view
+    /// covers only the first texels.
     fn add_texels(&mut self, texel_bytes: u64) -> Result<(), GpuError> {
         self.context.count_creation("vkCreateBufferView", &self.name)?;
         let format = match texel_bytes {
@@ -306,8 +309,8 @@ impl AnyBuffer {
 
 impl Drop for AnyBuffer {
     fn drop(&mut self) {
-        // SAFETY: the device has ended all work on the buffer: `Context::run` waits for it, and so does a frame's
-        // owner.
+        // SAFETY: the device has ended all work on the buffer. `Context::run` waits for that work, and so does
+        // whoever submits a frame.
         unsafe {
             self.context.device.destroy_buffer_view(self.texels, None);
             self.context.device.destroy_buffer(self.raw, None);

@@ -17,19 +17,20 @@ pub struct CommandBuffer {
     context: Arc<Context>,
 }
 
-/// A command buffer that is being recorded. [`CommandBuffer::record`] hands it to its body.
+/// A command buffer that is being recorded. [`CommandBuffer::record`] passes it to the closure that records commands.
 pub struct Commands<'a> {
     pub(super) raw: vk::CommandBuffer,
     pub(super) context: &'a Context,
     timer: Option<&'a Timer>,
+    /// Whether a pass has been recorded. The timer needs to know the first pass of a command buffer.
     has_passes: Cell<bool>,
 }
 
 /// The grid of a dispatch.
 #[derive(Clone, Copy)]
 pub enum Dispatch<'a> {
-    /// Numbers of invocations along x, y and z, rounded up to whole workgroups, and the workgroup's size along x, y
-    /// and z.
+    /// Numbers of invocations along x, y and z, and the workgroup's size along x, y and z. The dispatch rounds the
+    /// numbers up to whole workgroups.
     Threads([u32; 3], [u32; 3]),
     /// A buffer and the byte offset at which it holds the numbers of workgroups along x, y and z.
     Indirect(&'a AnyBuffer, u64),
@@ -52,16 +53,16 @@ pub struct Area {
 pub struct DrawDesc<'a> {
     /// Takes the index of each pixel's triangle.
     pub ids: &'a Target,
-    /// Takes the depth of each pixel.
+    /// Takes the depth of each pixel during the draw. The depths are undefined afterwards.
     pub depth: &'a Target,
-    /// Width and height of the picture that clip space spans, pixels. The targets are no smaller.
+    /// Width and height of the picture that clip space spans, pixels. The targets must be at least as large.
     pub picture: (u32, u32),
     /// The part of the picture to draw. Its pixels are the same, bit for bit, as if the whole picture were drawn. The
     /// rest of the targets is left unchanged.
     pub area: Area,
-    /// Number of triangles. It is used only without `indices`.
+    /// Number of triangles. It is used only if `indices` is empty.
     pub n_triangles: u32,
-    /// Vertex indices, three for each triangle. If the buffer is empty, they are 0, 1, 2 and so on.
+    /// Vertex indices, three for each triangle. If the buffer is empty, the indices are 0, 1, 2 and so on.
     pub indices: &'a Buffer<u32>,
 }
 
@@ -111,8 +112,8 @@ impl CommandBuffer {
 
 impl Drop for CommandBuffer {
     fn drop(&mut self) {
-        // SAFETY: its owner has waited for the device, or has left the buffer to the context. In the second case the
-        // handle is null, which Vulkan ignores.
+        // SAFETY: the buffer's owner has waited for the device, or has left the buffer to the context. In the second
+        // case the handle is null, which Vulkan ignores.
         unsafe { self.context.device.free_command_buffers(self.context.command_pool, &[self.raw]) };
     }
 }
@@ -125,7 +126,8 @@ impl<'a> Commands<'a> {
 }
 
 impl Commands<'_> {
-    /// Records one pass. Its name is its debug label and its row of the timer, which shows `number` beside it.
+    /// Records one pass. `name` is the debug label of the pass. If there is a timer, the pass gets a row with `name`
+    /// and `number`.
     pub(super) fn pass(&self, name: &'static str, number: Option<u32>, body: impl FnOnce()) {
         if let Some(timer) = self.timer {
             timer.begin(self.raw, name, number, !self.has_passes.replace(true));
@@ -153,7 +155,7 @@ impl Commands<'_> {
         }
     }
 
-    /// Begins the timer's frame, if there is a timer.
+    /// Resets the timer, if there is one: its rows are then those of the passes that follow.
     pub fn reset_timer(&self) {
         if let Some(timer) = self.timer {
             timer.reset(self.raw);
@@ -385,9 +387,9 @@ pub struct PixelRows {
 }
 
 impl Commands<'_> {
-    /// Copies pixels to the upper left corner of an image that the caller owns. Needs a barrier to
-    /// `Access::TransferRead` of the buffer. Leaves the image in the second of its layouts. Whoever waits for the end
-    /// of the commands sees the pixels.
+    /// Copies pixels to the upper left corner of an image that the caller owns. Before, a barrier to
+    /// [`Access::TransferRead`] has to make the buffer's contents visible. Afterwards, the image is in the second
+    /// layout of [`GivenImage::new`]. Whoever waits for the end of the commands sees the pixels.
     ///
     /// # Panics
     /// The image is smaller than the rectangle.

@@ -289,8 +289,9 @@ impl Context {
         Ok(*self.fuses_fma.get_or_init(|| fuses))
     }
 
-    /// Returns the number of lanes that the device runs at once. The first call runs a kernel to find out. The result
-    /// is 0 if the driver predicates branches: lanes are then SIMD lanes of the CPU, and an idle lane saves no time.
+    /// Returns the number of lanes (invocations) that are resident on the device at once, in all subgroups together.
+    /// The first call runs a kernel to find out. The result is 0 if the driver predicates branches: lanes are then
+    /// SIMD lanes of the CPU, and to leave some of them idle saves no time.
     ///
     /// # Errors
     /// The kernel does not run.
@@ -302,9 +303,10 @@ impl Context {
         Ok(*self.n_lanes.get_or_init(|| n_lanes))
     }
 
-    /// Returns the number of turns (iterations) that the loops of a kernel may take together before the driver ends
-    /// it without an error, or `None` if there is no limit. The first call runs a kernel to find out. Only software
-    /// drivers are tested: a GPU executes a loop as branches of the kernel's own code, which nothing counts.
+    /// Returns the number of turns (iterations) that all loops of a kernel may take together. Beyond it, the driver
+    /// ends the kernel without an error. `None` if there is no limit. The first call runs a kernel to find out. Only
+    /// software drivers are tested: a GPU executes a loop as branches of the kernel's own code, and nothing counts
+    /// the branches.
     ///
     /// # Errors
     /// The kernel does not run.
@@ -326,16 +328,16 @@ impl Context {
         self.instance.messages()
     }
 
-    /// Records commands, submits them and waits for their end. Serves uploads, downloads, probes and tests.
+    /// Records commands, submits them and waits for their end. Uploads, downloads, probes and tests use it.
     pub fn run(self: &Arc<Self>, name: &str, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
         let buffer = CommandBuffer::record(self, name, None, record)?;
         self.submit(&[&buffer])?;
         self.wait()
     }
 
-    /// Submits command buffers in order, each in its own submit, since a driver's watchdog times each submit. One
-    /// call takes them all, because a call for each costs an H200 6 us a command buffer. If the call fails, no
-    /// command buffer has begun.
+    /// Submits command buffers in order. Each is in a `VkSubmitInfo2` of its own, because a driver's watchdog times
+    /// each of these separately. One `vkQueueSubmit2` takes all of them, because a call for each would cost 6 us per
+    /// command buffer on an H200. If the call fails, no command buffer has begun.
     pub fn submit(&self, buffers: &[&CommandBuffer]) -> Result<(), GpuError> {
         let infos: Vec<_> = (buffers.iter())
             .map(|buffer| [vk::CommandBufferSubmitInfo::default().command_buffer(buffer.raw())])

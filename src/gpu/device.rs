@@ -34,8 +34,8 @@ pub(super) struct DeviceExtras {
 }
 
 impl DeviceExtras {
-    /// Returns all extras that the device has and kdray can use. Those that `purpose` requires are included
-    /// unchecked: the caller has chosen a device that has them.
+    /// Returns all extras that the device has and kdray can use. The extensions and features that `purpose` requires
+    /// are included without a test: the caller has chosen a device that has them.
     pub fn of(instance: &Instance, physical: vk::PhysicalDevice, purpose: Purpose) -> VkResult<Self> {
         // SAFETY: the physical device belongs to the instance.
         let available = unsafe { instance.raw.enumerate_device_extension_properties(physical) }?;

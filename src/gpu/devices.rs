@@ -58,7 +58,7 @@ pub struct Limits {
     pub storage_range: u64,
     /// Greatest number of texels in a texel view of a buffer.
     pub n_texels: u32,
-    /// Greatest size of a buffer that kernels read by its address, or that is not bound as a whole, bytes.
+    /// Greatest size of a buffer that need not be bound as a whole, such as one that kernels read by address, bytes.
     pub buffer_bytes: u64,
     /// Greatest width and height of a render target, pixels.
     pub target_size: u32,
@@ -141,7 +141,7 @@ pub(super) fn select(
         Some(DeviceSelector::Name(name)) => {
             list.iter().find(|(_, info)| info.name.to_lowercase().contains(&name.to_lowercase()))
         }
-        // Among equal kinds the first device is chosen, since the loader's order is the user's.
+        // Among devices of equal kinds the first is chosen, since users can set the loader's order.
         None => list.iter().min_by_key(|(_, info)| (!info.missing.is_empty(), rank(&info.kind), info.index)),
     };
     let Some((device, info)) = chosen else {
@@ -236,7 +236,8 @@ fn missing(
         (features_1_3.compute_full_subgroups == vk::TRUE, "computeFullSubgroups"),
         (subgroup.supported_operations.contains(operations), "subgroup arithmetic"),
         (subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE), "subgroup operations in compute"),
-        // scan.glsl keeps one total for every four invocations.
+        // The bounds are those of scan.glsl: workgroups have 128 invocations, and an array with one total per
+        // subgroup has room for 32 subgroups.
         ((4..=128).contains(&subgroup.subgroup_size), "a subgroup size from 4 to 128"),
         (targets.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT), "D32_SFLOAT depth targets"),
         (queue_family(&families).is_some(), "a queue for graphics and compute"),

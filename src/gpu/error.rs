@@ -33,7 +33,7 @@ pub enum GpuError {
     /// The machine has no validation layer.
     #[error("no validation layer VK_LAYER_KHRONOS_validation; ./setup installs it")]
     NoValidationLayer,
-    /// No device can present to a window.
+    /// No picture can be shown in the window. The text says why.
     #[error("cannot show pictures in this window: {0}")]
     NoSurface(String),
     /// A library that kdray uses has failed.

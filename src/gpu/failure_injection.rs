@@ -1,5 +1,5 @@
-//! Creations of Vulkan objects that fail on purpose, with which tests find out what remains of a change that a driver
-//! refuses halfway.
+//! Deliberate failures to create Vulkan objects. Tests use them to find out what state remains if the driver refuses
+//! an object in the middle of a change.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -22,14 +22,15 @@ impl FailureInjection {
 }
 
 impl Context {
-    /// Lets the next `n_creations` creations of buffers, images, pipelines, descriptor sets, query pools and command
-    /// buffers succeed, and every later one fail as if memory were exhausted. `None` lets all succeed.
+    /// Lets the next `n_creations` creations succeed, and every later one fail as if memory were exhausted. `None`
+    /// lets all succeed. Creations are those of buffers, images, their views, compute and raster pipelines,
+    /// descriptor pools, descriptor sets, query pools and command buffers.
     #[doc(hidden)]
     pub fn fail_creations_after(&self, n_creations: Option<u32>) {
         self.failure_injection.n_left.store(n_creations.unwrap_or(FailureInjection::NEVER), Ordering::Relaxed);
     }
 
-    /// Counts a creation that is about to be made by `call`.
+    /// Counts a creation that `call` is about to make, and fails if the creation is to fail.
     ///
     /// # Errors
     /// The creation is one of those that [`Context::fail_creations_after`] lets fail.

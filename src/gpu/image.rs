@@ -10,9 +10,10 @@ use super::{Context, GpuError};
 /// Kind of a target's pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TargetKind {
-    /// One `u32` a pixel, readable by kernels as a storage image.
+    /// One `u32` per pixel: the ID of a triangle. Such a target is called an ID target. Kernels can read it as a
+    /// storage image.
     Uint,
-    /// One `f32` a pixel.
+    /// One `f32` per pixel: the depth.
     Depth,
 }
 

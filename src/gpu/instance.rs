@@ -32,7 +32,7 @@ impl Instance {
         Self::with_extensions(validate, &[])
     }
 
-    /// Creates an instance as [`Instance::new`] does, with the extensions that a window needs.
+    /// Creates an instance as [`Instance::new`] does. `window` lists the further extensions that a window needs.
     pub fn with_extensions(validate: bool, window: &[&CStr]) -> Result<Arc<Self>, GpuError> {
         // SAFETY: the call loads the system's Vulkan loader, whose initialization code is trusted as any driver's is.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| GpuError::NoLoader(e.to_string()))?;

@@ -20,6 +20,7 @@ pub struct MemoryUse {
 }
 
 impl Context {
+    /// Allocates memory for the object `name`. `linear` is true for buffers and false for images with optimal tiling.
     pub(super) fn allocate(
         &self,
         name: &str,

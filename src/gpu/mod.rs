@@ -1,8 +1,9 @@
 //! The Vulkan layer: devices, memory, pipelines and commands. It knows nothing about rays.
 //!
 //! All of the crate's `unsafe` is here. Every handle is released by its owner's `Drop`, and every owner holds the
-//! [`Context`] that it was made from. Only one thread uses a context at a time. Names that begin with `Given` are
-//! Vulkan objects that the library's caller owns.
+//! [`Context`] that it was made from. A context must be used by one thread at a time. Before an object is dropped,
+//! the device must have ended all work with it ([`Context::wait`]). Names that begin with `Given` are Vulkan objects
+//! that the library's caller owns.
 #![allow(unsafe_code)]
 
 mod acceleration;

@@ -3,13 +3,13 @@
 /// Properties that a context reports and acts on in place of the device's own. All default to the device's own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DeviceOverrides {
-    /// Greatest size of a bound storage buffer, bytes, if the device allows more. Small scenes then take the paths
-    /// that otherwise only large scenes take.
+    /// Greatest size of a bound storage buffer, bytes. It has no effect if the device allows less. Small scenes then
+    /// take the paths that otherwise only large scenes take.
     pub storage_range: Option<u64>,
-    /// Greatest number of texels in a view of a buffer, if the device allows more.
+    /// Greatest number of texels in a view of a buffer. It has no effect if the device allows less.
     pub n_texels: Option<u32>,
-    /// Number of lanes, of a device that takes branches lane by lane. A software driver then runs the code that GPUs
-    /// run.
+    /// Result of [`Context::n_lanes`](super::Context::n_lanes). With it, a software driver is taken for one that does
+    /// not predicate branches, so it runs the code that GPUs run.
     pub n_lanes: Option<u32>,
     /// Whether kernels lack 64-bit atomics.
     pub no_int64_atomics: bool,

@@ -74,10 +74,10 @@ impl Presenter {
         self.vsync = vsync;
     }
 
-    /// Draws a frame and shows it. `body` draws it while rendering to the window's image is open. Its shaders see
-    /// what earlier kernels wrote, and later kernels may overwrite that. `size` is the window's size, pixels, used if
-    /// the window system does not report one. Returns false, without drawing, if the window has no area or has just
-    /// changed.
+    /// Draws a frame and shows it. `body` records the draws, between the begin and the end of rendering to the
+    /// window's image. The shaders of the draws see what earlier kernels wrote, and later kernels may overwrite that.
+    /// `size` is the window's size, pixels. It is used if the window system does not report one. Returns false,
+    /// without drawing, if the window has no area or has just changed.
     ///
     /// # Errors
     /// A call or `body` fails.
@@ -171,7 +171,7 @@ impl Slot {
         Ok(())
     }
 
-    /// Submits the frame's commands. The slot's last frame must have been waited for.
+    /// Submits the frame's commands. [`Slot::wait`] must have returned since the slot's last frame.
     fn submit(&mut self, context: &Context, commands: CommandBuffer, image: &SwapchainImage) -> Result<(), GpuError> {
         let stage = vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT;
         let wait = [vk::SemaphoreSubmitInfo::default().semaphore(self.acquired).stage_mask(stage)];

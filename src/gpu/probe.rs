@@ -1,4 +1,4 @@
-//! Probes: kernels that find out what no property of a device tells.
+//! Probes: kernels that measure what Vulkan has no device property for.
 
 use std::sync::Arc;
 
@@ -17,8 +17,8 @@ const GROUP_SIZE: u32 = 64;
 const LOOP_TURNS: Shader =
     Shader { file: "loop_turns.comp", spirv: include_bytes!(concat!(env!("OUT_DIR"), "/loop_turns.comp.spv")) };
 
-/// Returns the number of turns (iterations) of its loops after which the driver ends a kernel, or `None` if the probe
-/// meets no limit. The lavapipe of Mesa 22.3 ends every shader after 65,535 turns, that of Mesa 25.0 does not.
+/// Returns the number of loop turns (iterations) after which the driver ends a kernel, or `None` if the probe meets
+/// no limit. The lavapipe of Mesa 22.3 ends every shader after 65,535 turns, that of Mesa 25.0 does not.
 pub(super) fn loop_limit(context: &Arc<Context>) -> Result<Option<u32>, GpuError> {
     // The number of turns that the probe tries is twice the known limit.
     const N_TURNS: u32 = 1 << 17;
@@ -54,11 +54,11 @@ pub(super) fn fuses_fma(context: &Arc<Context>) -> Result<bool, GpuError> {
     Ok(numbers.download()?[1] != 0.0)
 }
 
-/// Returns the number of lanes that the device runs at once in workgroups of a light kernel. It is the greatest
-/// number that the kernel has seen side by side.
+/// Returns the number of lanes (invocations) that are resident on the device at once. The probe's kernel needs few
+/// registers. It counts the workgroups that are running; the result is the greatest count, in invocations.
 pub(super) fn n_lanes(context: &Arc<Context>) -> Result<u32, GpuError> {
-    // These are more workgroups than any device has room for. Each runs for some 20,000 cycles, longer than it takes
-    // to begin them all.
+    // The probe dispatches more workgroups than any device has room for. Each workgroup runs for some 20,000 cycles,
+    // longer than the device takes to begin all of them.
     const N_GROUPS: u32 = 16_384;
     const N_TURNS: u32 = 2500;
     let counts = Buffer::with(context, "counts", &[0u32; 3], BufferUse::Storage)?;

@@ -82,7 +82,10 @@ impl RayTracingPipeline {
     /// Creates the pipeline and its table.
     ///
     /// # Errors
-    /// The driver refuses a shader or is out of memory. Panics on a context without ray tracing.
+    /// The driver refuses a shader or is out of memory.
+    ///
+    /// # Panics
+    /// The context was opened without ray tracing.
     pub fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>, desc: &RayTracingDesc) -> Result<Self, GpuError> {
         let calls = RayTracingCalls::of(context);
         let stages = [

@@ -15,7 +15,7 @@ pub struct Shader {
     pub spirv: &'static [u8],
 }
 
-/// SPIR-V modules that replace those that are compiled into the program, by their files' names.
+/// SPIR-V modules that replace those compiled into the program. The key is [`Shader::file`].
 #[cfg(feature = "hot-reload")]
 pub type Replacements = std::collections::HashMap<String, Vec<u8>>;
 

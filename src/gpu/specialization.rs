@@ -6,7 +6,7 @@ use ash::vk;
 
 use super::BindingLayout;
 
-/// A specialization constant of shaders whose value is a `T`: a `u32` or a `bool`.
+/// A specialization constant. Its value is a `T`: a `u32` or a `bool`.
 #[derive(Debug)]
 pub struct Constant<T> {
     name: &'static str,
@@ -48,7 +48,7 @@ pub struct Constants {
 }
 
 impl Constants {
-    /// Returns no constants: each shader keeps its own values.
+    /// Returns an empty list. Constants without a value here keep the default that the shader declares.
     pub fn new() -> Self {
         Self::default()
     }

@@ -7,7 +7,7 @@ use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 
 use super::{GpuError, devices::queue_family, instance::Instance};
 
-/// A window, with the handles of its display and of itself.
+/// A window that gives access to its raw window handle and to the raw handle of its display.
 pub trait Screen: HasDisplayHandle + HasWindowHandle {}
 
 impl<T: HasDisplayHandle + HasWindowHandle> Screen for T {}
@@ -42,7 +42,7 @@ impl Surface {
         Ok(Self { raw, calls, _instance: instance.clone(), _window: window })
     }
 
-    /// Whether a device's queue for rendering can also present to the surface.
+    /// Whether a device has the swapchain extension and its queue for rendering can also present to the surface.
     pub(super) fn is_served_by(&self, instance: &Instance, device: vk::PhysicalDevice) -> bool {
         // SAFETY: the physical device belongs to the instance.
         let (families, extensions) = unsafe {

@@ -6,7 +6,7 @@ use ash::{khr, vk};
 
 use super::{Context, GpuError, Surface};
 
-/// Number of images: one is shown, one waits to be shown and one is drawn.
+/// Number of images to request, within the surface's bounds: one is shown, one waits to be shown and one is drawn.
 const N_IMAGES: u32 = 3;
 
 /// Images of one size that are drawn and shown in turn.
@@ -21,8 +21,8 @@ pub(super) struct Swapchain {
 pub(super) struct SwapchainImage {
     pub raw: vk::Image,
     pub view: vk::ImageView,
-    /// Signalled when the image is drawn. Each image has its own semaphore: only when the image can be acquired again
-    /// is it certain that a presentation has waited for it.
+    /// Signalled when the image is drawn. The image's presentation waits for the semaphore. That this wait has ended
+    /// is certain only once the image is acquired again, so each image has a semaphore of its own.
     pub drawn: vk::Semaphore,
 }
 
@@ -111,7 +111,7 @@ impl Swapchain {
         Ok(())
     }
 
-    /// Acquires the next image to draw. `acquired` is signalled when the screen has released it.
+    /// Acquires the next image to draw. `acquired` is signalled when the presentation engine has released the image.
     pub fn acquire(&self, acquired: vk::Semaphore) -> Result<Outcome<usize>, GpuError> {
         // SAFETY: the semaphore is unsignalled and nothing waits for it.
         let result =
@@ -144,7 +144,8 @@ impl Swapchain {
 
 impl Drop for Swapchain {
     fn drop(&mut self) {
-        // SAFETY: the device is idle, including its work for the screen, and Vulkan ignores null handles.
+        // SAFETY: the first call waits until the device is idle, including its work for the window. Vulkan ignores
+        // null handles.
         unsafe {
             let _ = self.context.device.device_wait_idle();
             for image in &self.images {
@@ -186,8 +187,8 @@ fn present_mode(context: &Context, surface: &Surface, vsync: bool) -> Result<vk:
     Ok(found.unwrap_or(vk::PresentModeKHR::FIFO))
 }
 
-/// Returns the window's size. If the window takes the size of its images instead, returns `size`, clamped to the
-/// surface's bounds.
+/// Returns the size that the surface reports, pixels. If the surface takes its size from the swapchain instead,
+/// returns `size`, clamped to the surface's bounds.
 fn extent(able: &vk::SurfaceCapabilitiesKHR, size: (u32, u32)) -> vk::Extent2D {
     if able.current_extent.width != u32::MAX {
         return able.current_extent;

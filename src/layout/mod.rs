@@ -24,7 +24,8 @@ mod tests {
 
     use super::*;
 
-    /// Returns the name of the struct that a binding holds, one or an array of it; none for words and vectors.
+    /// Returns the name of the struct at a binding, which holds one such struct or an array of them. Returns none for
+    /// bindings of words or vectors.
     fn struct_at(binding: u32) -> Option<&'static str> {
         if let Some((_, element)) = SCENE_ARRAYS.iter().find(|(number, _)| *number == binding) {
             return (*element != "uint").then_some(element);
@@ -83,7 +84,7 @@ mod tests {
     type Members = Vec<(&'static str, usize)>;
 
     /// Returns the members of a block's only member, which is a struct or an array of structs, and the array's stride
-    /// in bytes. There are no members for an array of vectors, of which the kernel makes structs itself.
+    /// in bytes. Returns no members for an array of vectors: the kernel assembles its structs from these vectors.
     fn members_of(block: &Type) -> (Option<Members>, Option<usize>) {
         let Type::Struct(block) = block else { panic!("{block:?} is no block") };
         let (element, stride) = match &block.members[0].ty {

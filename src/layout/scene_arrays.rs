@@ -94,8 +94,8 @@ pub fn check_bindings(rows: &[Row], layout: &str) -> Result<(), String> {
 }
 
 /// Generates Rust from the list: a macro, `for_scene_arrays!(with)`. It calls the macro `with` with a row
-/// `/// doc name: element = binding,` for each array. The Rust does not compile if a row of the list has another size
-/// than the widest texel of which an element can be made.
+/// `/// doc name: element = binding,` for each array. The generated Rust does not compile unless `row` is as large as
+/// the widest texel that divides an element.
 pub fn rust(rows: &[Row]) -> String {
     let (mut list, mut checks, mut elements) = (String::new(), String::new(), String::new());
     for row in rows {

@@ -1,4 +1,4 @@
-//! Targets of outputs: what their paths lead to.
+//! Destinations of outputs: the regular file, device or pipe that a path leads to.
 
 use std::{
     fs::{self, OpenOptions},
@@ -10,7 +10,7 @@ use super::OutputError;
 /// Number of symbolic links, one after another, that Linux follows before it gives up.
 const MAX_LINKS: usize = 40;
 
-/// The destination of a path.
+/// What a path leads to, once its symbolic links are followed.
 pub enum Destination {
     /// A device or a pipe, which cannot be replaced.
     Stream,
@@ -55,8 +55,8 @@ pub fn regular_file(path: &Path) -> Option<PathBuf> {
     }
 }
 
-/// Returns the path that the last link of a chain of symbolic links names, whether it exists or not. It is the path
-/// itself if that is no link. `None` for a circle of links, or for a chain of [`MAX_LINKS`] links or more.
+/// Returns the path that the last link of a chain of symbolic links names. Nothing need exist at that path. If `path`
+/// is no link, it is returned itself. `None` for a circle of links, or for a chain of [`MAX_LINKS`] links or more.
 fn end_of_links(path: &Path) -> Option<PathBuf> {
     let mut file = path.to_owned();
     for _ in 0..MAX_LINKS {

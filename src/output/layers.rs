@@ -14,8 +14,9 @@ use crate::{
     layout::Feature,
 };
 
-/// Writes the radiance as R, G and B, and the channels of each AOV beside it, whole or not at all. The values are
-/// 32-bit floats, but counts and indices are 32-bit integers.
+/// Writes an OpenEXR file with the radiance as R, G and B and with the channels of each AOV. The file is written
+/// whole or not at all. Counts and indices are 32-bit integers, all other values are 32-bit floats. `features` has an
+/// entry for each pixel; without AOVs it may be empty.
 ///
 /// # Errors
 /// Fails as [`write()`] does, or if the pixels cannot be encoded.

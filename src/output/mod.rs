@@ -1,8 +1,9 @@
 //! Writes pixels to a file, whole or not at all.
 //!
-//! A file is encoded in memory, if it fits there, written beside its destination under a temporary name, synchronized
-//! and renamed. So if the disk is full, the earlier file stays as it was, and no truncated or temporary file is left. A
-//! signal that ends the process leaves none either, if its handler calls [`remove_temporaries`].
+//! A file is written beside its destination under a temporary name, then synchronized and renamed. Its contents are
+//! encoded in memory first, unless they are too large ([`write_with`]). So if the disk is full, the earlier file
+//! stays as it was, and no truncated or temporary file is left. A signal that ends the process leaves none either, if
+//! its handler calls [`remove_temporaries`].
 
 use std::{
     error::Error,
@@ -104,8 +105,8 @@ impl Format {
     }
 }
 
-/// Returns a file name without ending for pictures of a scene. The name leads to the working directory, since `-`
-/// replaces path separators and control characters.
+/// Returns a file name without ending for pictures of a scene. `-` replaces control characters and path separators,
+/// so the name is that of a file in the working directory.
 pub fn stem_of(scene_name: &str) -> String {
     let name = scene_name.replace(|c: char| std::path::is_separator(c) || c.is_control(), "-");
     if name.is_empty() { "picture".to_owned() } else { name }

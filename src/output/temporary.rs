@@ -1,8 +1,9 @@
-//! Temporary files beside their targets. None of them outlives the process, even if a signal ends it.
+//! Temporary files beside their targets. None of them outlives the process, unless SIGKILL ends it, which no handler
+//! sees.
 //!
 //! Every temporary file with a name is registered while it has that name. A signal handler's thread calls
-//! [`remove_temporaries`] before it ends the process. One lock covers the registry and the files themselves: no file
-//! gets or loses its temporary name without it. Only SIGKILL, which no handler sees, leaves a temporary file behind.
+//! [`remove_temporaries`] before it ends the process. One lock covers the registry and the files themselves: only the
+//! thread that holds the lock gives a file its temporary name or takes it away.
 
 #[cfg(unix)]
 use std::os::unix::fs::PermissionsExt;

@@ -35,7 +35,7 @@ impl Cast {
         Ok(Self { kernel: kernel(context, bindings, "cast", spirv!("cast.comp"), &constants)?, n_lanes })
     }
 
-    /// Returns the statistics that the driver reports of the kernel.
+    /// Returns the driver's statistics of the compiled kernel.
     ///
     /// # Errors
     /// Fails as [`ComputePipeline::statistics`] does.
@@ -43,8 +43,9 @@ impl Cast {
         self.kernel.statistics()
     }
 
-    /// Needs the first `n_rays` of `cast_rays`. Leaves as many of `cast_hits`; a ray that has stalled leaves a mark
-    /// in place of its hit. `round`: the rays that run, all or those that have stalled.
+    /// Needs the first `n_rays` elements of `cast_rays`. Leaves the first `n_rays` elements of `cast_hits`; a ray
+    /// that has stalled leaves a mark in place of its hit. `round`: which rays are traced, all or those that have
+    /// stalled.
     pub fn record(&self, commands: &Commands, set: &BindingSet, n_rays: u32, round: Round) {
         commands.bind(set);
         let lanes_log2 = lanes_log2(n_rays, self.n_lanes);

@@ -1,8 +1,8 @@
 //! Compact (the paper's section 2.1): writes the rays of the next bounce to the queue by a prefix sum, without gaps,
 //! after those of this bounce.
 //!
-//! Each ray counts its child rays, those that go on from its hit. A block is the `SCAN_GROUP_SIZE` rays of one
-//! workgroup.
+//! The children of a ray are the reflected and the refracted ray that go on from its hit. They are counted for each
+//! ray. A block is the `SCAN_GROUP_SIZE` rays of one workgroup.
 
 use std::sync::Arc;
 
@@ -33,8 +33,8 @@ impl Compact {
         })
     }
 
-    /// Needs `rays` and `hits` of the bounce. Leaves the children of each ray in `child_kinds`, and the number of
-    /// each block's children in `scan_blocks`.
+    /// Needs `rays` and `hits` of the bounce. Leaves the kinds of each ray's children in `child_kinds`, and the
+    /// number of each block's children in `scan_blocks`.
     pub fn reduce(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.reduce, Some(batch.depth), batch, resources.scan_dispatch(batch));
     }

@@ -18,8 +18,8 @@ impl Features {
         Ok(Self { kernel: kernel(context, bindings, "features", spirv!("features.comp"), &Constants::new())? })
     }
 
-    /// Needs `hits` of the camera rays, and `pixel_features` that have been cleared. Leaves all of `pixel_features`
-    /// but the counts of rays and steps.
+    /// Needs `hits` of the camera rays, and `pixel_features` whose position, normal and albedo have been cleared: a
+    /// pixel without a hit keeps these. Leaves all of `pixel_features` except the counts of rays and steps.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, Some(batch.depth), batch, dispatch);

@@ -66,9 +66,9 @@ pub(crate) use spirv;
 /// All passes of a frame. A clone shares its pipelines with the original.
 #[derive(Clone)]
 pub struct Passes {
-    /// None unless the graphics pipeline rasterizes the triangles that pixels show.
+    /// None unless the options have [`Primary::Raster`].
     pub visibility: Option<Arc<Visibility>>,
-    /// None unless compute kernels rasterize them.
+    /// None unless the options have [`Primary::SoftwareRaster`].
     pub rasterize: Option<Arc<Rasterize>>,
     pub primary_hit: Arc<PrimaryHit>,
     pub trace: Arc<Trace>,
@@ -87,7 +87,7 @@ impl Passes {
     /// Creates the pipelines.
     ///
     /// # Errors
-    /// The driver refuses a shader.
+    /// The device lacks 64-bit atomics for [`Primary::SoftwareRaster`], or the driver refuses a shader.
     pub fn new(
         context: &Arc<Context>,
         bindings: &Arc<BindingLayout>,
@@ -113,7 +113,7 @@ impl Passes {
     /// Returns the pass that rasterizes by the graphics pipeline.
     ///
     /// # Panics
-    /// The options have another [`Primary`].
+    /// The options do not have [`Primary::Raster`].
     pub fn visibility(&self) -> &Visibility {
         self.visibility.as_ref().expect("the options ask for graphics")
     }
@@ -121,7 +121,7 @@ impl Passes {
     /// Returns the kernels that rasterize.
     ///
     /// # Panics
-    /// The options have another [`Primary`].
+    /// The options do not have [`Primary::SoftwareRaster`].
     pub fn rasterize(&self) -> &Rasterize {
         self.rasterize.as_ref().expect("the options ask for kernels that rasterize")
     }
@@ -144,11 +144,11 @@ impl Passes {
             .transpose()
     }
 
-    /// Creates the passes for the options `to`. They share with these passes, which were created for the options
-    /// `from`, all pipelines for which the options do not differ.
+    /// Creates the passes for the options `to`. `self` was created for the options `from`. The new passes share with
+    /// it all pipelines that do not depend on a changed option.
     ///
     /// # Errors
-    /// The driver refuses a shader.
+    /// Fails as [`Passes::new`] does.
     pub fn with_options(
         &self,
         context: &Arc<Context>,

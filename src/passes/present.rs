@@ -15,7 +15,7 @@ pub struct Present {
 }
 
 impl Present {
-    /// Creates the pipeline, for pictures of resources with the same bindings.
+    /// Creates the pipeline. It can draw the pictures of all resources that have the binding layout of `resources`.
     ///
     /// # Errors
     /// The driver refuses a shader.

@@ -1,5 +1,5 @@
-//! Primary hit (the paper's section 2.2): intersects each camera ray with the plane of the triangle that was
-//! rasterized in its pixel.
+//! Primary hit (the paper's section 2.2): intersects each camera ray with the triangle that was rasterized in its
+//! pixel. If the ray just misses that triangle, the hit is moved to its edge.
 
 use std::sync::Arc;
 

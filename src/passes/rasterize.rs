@@ -1,6 +1,5 @@
 //! Rasterize: finds the triangle of each pixel as visibility does (the paper's section 2.2), but by compute kernels,
-//! for devices with few units for graphics. The triangle of each pixel is the one that its camera ray hits, to the
-//! last bit.
+//! for devices with few units for graphics. The triangle of each pixel is exactly the one that its camera ray hits.
 //!
 //! One kernel rasterizes the triangles with small bounding rectangles. The rectangles of the large triangles are cut
 //! into blocks, squares of pixels, which the other kernel rasterizes.
@@ -24,6 +23,8 @@ pub struct Rasterize {
 }
 
 impl Rasterize {
+    /// Creates the pipelines.
+    ///
     /// # Errors
     /// The device lacks 64-bit atomics, or the driver refuses a shader.
     pub(super) fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
@@ -36,14 +37,15 @@ impl Rasterize {
         })
     }
 
-    /// Leaves `raster_groups` without blocks, by a transfer, as [`Rasterize::triangles`] needs it.
+    /// Records the transfer by which `raster_groups` has no large triangles and no blocks, as
+    /// [`Rasterize::triangles`] needs it.
     pub fn reset(commands: &Commands, resources: &Resources) {
         let groups = RasterGroups { x: RASTER_GROUPS_X, y: 0, z: 1, reserved: 0 };
         commands.update_buffer(resources.raster.groups.any(), &RasterState { groups, count: 0 });
     }
 
-    /// Needs what [`Rasterize::reset`] leaves. Leaves the hits of small triangles in `pixel_nearest`, the others in
-    /// `large_triangles`, and the size of the next dispatch in `raster_groups`.
+    /// Needs what [`Rasterize::reset`] leaves. Clears `pixel_nearest`, and leaves the nearest hits of small triangles
+    /// there, the large triangles in `large_triangles`, and the size of the next dispatch in `raster_groups`.
     pub fn triangles(&self, commands: &Commands, resources: &Resources) {
         let (pixels, constants) = (&resources.pixels, resources.constants());
         let push = RasterPush { block_log2: block_log2(constants) };
@@ -61,8 +63,8 @@ impl Rasterize {
     }
 }
 
-/// Returns log2 of a block's side in pixels. Blocks are as small as possible. Yet a u32 must number the blocks of all
-/// triangles, even if each triangle fills the window.
+/// Returns log2 of a block's side in pixels. Blocks are as small as possible, but so large that a u32 can number the
+/// blocks of all triangles even if each triangle fills the window.
 fn block_log2(constants: &Frame) -> u32 {
     let n_blocks = |log2: u32| {
         let along = |pixels: u32| u64::from(pixels.div_ceil(1 << log2));
@@ -71,8 +73,8 @@ fn block_log2(constants: &Frame) -> u32 {
     (SMALLEST_BLOCK_LOG2..16).find(|&log2| u32::try_from(n_blocks(log2)).is_ok()).unwrap_or(16)
 }
 
-/// Returns the workgroups for one invocation per triangle. They are in several rows, since a device need not accept
-/// more than 65,535 workgroups in a row.
+/// Returns a dispatch of at least one invocation per triangle. Its workgroups are in rows of 1024, since a device
+/// need not accept more than 65,535 workgroups along an axis.
 fn groups_for(n_triangles: u32) -> Dispatch<'static> {
     const GROUPS_OF_ROW: u32 = 1 << 10;
     let n_groups = n_triangles.div_ceil(RAY_GROUP_SIZE);

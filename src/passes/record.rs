@@ -1,4 +1,5 @@
-//! Records a section of the frame's plan: each pass by the functions in its file, each barrier by its accesses.
+//! Records a section of the frame's plan. The functions in a pass's file record the pass. A barrier is recorded by
+//! its accesses alone, without its resources.
 
 use super::Passes;
 use crate::{
@@ -31,7 +32,7 @@ impl Passes {
     /// Records one pass. The resources must be bound.
     ///
     /// # Panics
-    /// The passes were created for options without this one, or `inputs` lacks the feature that it displays.
+    /// The passes were created for options that do not have `pass`, or `inputs` lacks the feature that it displays.
     pub fn record(&self, commands: &Commands, resources: &Resources, pass: Pass, inputs: &Inputs) {
         let batch = &inputs.batch;
         match pass {
@@ -58,7 +59,7 @@ impl Passes {
     }
 }
 
-/// Returns the access of a barrier for the use of memory by passes.
+/// Returns the Vulkan access of a barrier that stands for a plan's `touch`.
 fn access(touch: Touch) -> Access {
     match touch {
         Touch::Read => Access::ComputeRead,

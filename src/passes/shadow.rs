@@ -28,8 +28,8 @@ impl Shadow {
     }
 
     /// Needs `rays` and `hits` of all bounces of the batch. Leaves `light_visibility`; a segment that has stalled
-    /// leaves a mark in its place. Updates `pixel_features` if the options ask for features. `batch.round`: the
-    /// segments that run, all or those that have stalled.
+    /// leaves a mark in place of its visibility. Updates `pixel_features` if the options ask for features.
+    /// `batch.round`: which segments are traced, all or those that have stalled.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, None, batch, resources.shadow_dispatch(batch));
     }

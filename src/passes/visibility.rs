@@ -25,10 +25,10 @@ impl Visibility {
         Ok(Self { pipeline: RasterPipeline::new(context, bindings, &desc)? })
     }
 
-    /// Needs no buffer of another pass. Leaves `triangle_ids`, which are already visible to kernels.
+    /// Needs no buffer of another pass. Leaves `triangle_ids`, and makes them visible to kernels by a barrier.
     ///
     /// # Panics
-    /// The resources were created for options by which the graphics pipeline draws nothing.
+    /// The resources were created for options without [`Primary::Raster`](crate::frame::Primary::Raster).
     pub fn record(&self, commands: &Commands, resources: &Resources) {
         let (ids, depth) = (&resources.pixels.triangle_ids, resources.pixels.depth.as_ref());
         let depth = depth.expect("there is a depth target where triangles are drawn");

@@ -4,7 +4,8 @@
 use super::{counting::table::ReadCounter, inputs::KernelInputs, search_ray::SearchRay, triangle::Shear};
 use crate::layout::Hit;
 
-/// The data by which a triangle is tested and its hit accepted: t in (`t_min`, best t], not on `source_triangle`.
+/// The part of a ray that the test of a triangle needs. A hit counts if its t is in (`t_min`, t of the nearest hit so
+/// far] and it is not on `source_triangle`.
 #[derive(Clone, Copy, Debug)]
 pub struct HitFilter {
     pub shear: Shear,
@@ -13,7 +14,7 @@ pub struct HitFilter {
 }
 
 impl HitFilter {
-    /// The hit_filter of a ray.
+    /// Prepares a ray for the tests of triangles.
     #[inline(always)]
     pub fn of(ray: &SearchRay) -> Self {
         let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());

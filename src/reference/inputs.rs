@@ -32,7 +32,8 @@ pub struct KernelInputs<'a, R = NoCounter> {
     pub kd_nodes: CountedSlice<'a, KdNode, R>,
     /// The parents: one for each pair of siblings.
     pub kd_parents: CountedSlice<'a, u32, R>,
-    /// The entries of leaves or of a grid's cells: indices into `triangles`.
+    /// The entries of leaves or of a grid's cells. Each is an index into `triangles`. (The kernels' array
+    /// of this name holds a `LeafTriangle` for each entry.)
     pub leaf_triangles: CountedSlice<'a, u32, R>,
     /// One for each entry of `leaf_triangles`, or none at all.
     pub leaf_planes: &'a [Plane],
@@ -114,7 +115,7 @@ impl<'a> KernelInputs<'a> {
         }
     }
 
-    /// Inputs of triangles and the box that holds them alone.
+    /// Inputs with the triangles and the box that holds them. All other arrays are empty.
     fn without_accel(triangles: &'a [Triangle], [cell_min, cell_max]: [Vec3; 2]) -> Self {
         Self {
             frame: None,

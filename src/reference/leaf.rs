@@ -32,8 +32,8 @@ fn four_planes(planes: &[Plane], first: usize) -> Mat4 {
     }
 }
 
-/// Returns a mask of the planes that the ray may meet in `interval`. Bit i is cleared if the ray stays on one
-/// side of plane i, so far from it that no rounding of the hit test reaches across.
+/// Returns a mask of the planes that the ray may meet in `interval`. Bit i is cleared if the ray stays on one side of
+/// plane i, at a distance that the rounding of the hit test cannot bridge.
 #[inline(always)]
 fn near_planes(ray: &TraversalRay, interval: Interval, planes: &Mat4) -> u32 {
     let dot = |v: Vec3A| planes.x_axis * v.x + planes.y_axis * v.y + planes.z_axis * v.z;
@@ -55,8 +55,8 @@ pub fn intersect_leaf(
     intersect_entries(inputs, ray, entries_of(leaf), interval, best);
 }
 
-/// Tests the triangles of some entries against the ray, except those whose planes it does not meet from `t_enter` to
-/// `t_exit`. Tests all of them if there are no planes. Keeps the nearest hit in `best`.
+/// Tests the triangles of some entries against the ray. Skips each triangle whose plane the ray does not meet from
+/// `t_enter` to `t_exit`; without planes, skips none. Keeps the nearest hit in `best`.
 #[inline(always)]
 pub fn intersect_entries(
     inputs: &KernelInputs<impl ReadCounter>,

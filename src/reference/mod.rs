@@ -9,7 +9,7 @@
 //! passes      primary_hit, trace, features, compact, shadow, shade, resolve, accumulate, denoise, false_color,
 //!             tonemap, cast; visibility, for which the device rasterizes
 //! traversal   traverser: one ray by any algorithm
-//!               kdtree, leaf, slab, ropes, brute and the pending_* of each algorithm; grid; candidate
+//!               kdtree, leaf, slab, kd_boxes, ropes, brute and the pending_* of each algorithm; grid; candidate
 //! geometry    triangle, surface, camera; search_ray and traversal_ray: a ray in the form that searches use
 //! light       light, material, children, display, tone_curves
 //! inputs      the data that kernels only read

@@ -15,13 +15,14 @@ pub struct TraversalRay {
     pub direction: Vec3A,
     /// Distance from a plane beyond which a segment of the ray is clear of it (world units).
     pub plane_epsilon: f32,
-    /// Finite: components below `KD_LEAST_COMPONENT` are replaced by it.
+    /// The inverses of the direction's components. They are finite, since a component whose magnitude is less than
+    /// `KD_LEAST_COMPONENT` is first replaced by that constant.
     pub inv_direction: [f32; 4],
     /// The t at which the ray meets the plane at 0 on each axis.
     pub bias: [f32; 4],
-    /// The t at which the ray enters the structure's box, or `t_min`.
+    /// The t at which the ray enters the structure's box, but at least the ray's `t_min`.
     pub t_enter: f32,
-    /// The t at which the ray leaves the structure's box, or `t_max`.
+    /// The t at which the ray leaves the structure's box, but at most the ray's `t_max`.
     pub t_exit: f32,
 }
 
@@ -37,7 +38,8 @@ pub fn max(x: f32, y: f32) -> f32 {
     if x < y { y } else { x }
 }
 
-/// Returns a word whose bit i tells that on axis i the ray comes to the upper child first.
+/// Returns the signs of a direction. Bit i is set if the ray goes downwards on axis i, and so meets the upper child
+/// of a split on that axis first.
 #[inline(always)]
 pub fn signs_of(direction: Vec3) -> u32 {
     let is_below = |d: f32| u32::from(d <= -KD_LEAST_COMPONENT);
@@ -79,8 +81,8 @@ pub fn largest_coordinate(inputs: &KernelInputs<impl ReadCounter>) -> f32 {
     inputs.cell_min.abs().max(inputs.cell_max.abs()).max_element()
 }
 
-/// Returns the greatest magnitude that a coordinate of a ray's origin may have for the margins of leaves to cover the
-/// ray's rounding (world units).
+/// Returns the limit of the coordinates of a ray's origin (world units). For origins whose coordinates all have at
+/// most this magnitude, the margins of leaves cover the ray's rounding.
 #[inline(always)]
 pub fn origin_reach(inputs: &KernelInputs<impl ReadCounter>) -> f32 {
     KD_MAX_ORIGIN_DISTANCE * largest_coordinate(inputs)

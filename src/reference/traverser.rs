@@ -23,7 +23,8 @@ use crate::{
 
 /// Finds the hits of many rays. Each thread has its own tracer.
 pub trait Tracer {
-    /// A tracer through the structure of the inputs. `traversal` is the algorithm if this is a kd-tree.
+    /// Makes a tracer for the acceleration structure of the inputs. `traversal` is the algorithm for a kd-tree. A
+    /// grid ignores it.
     fn new(inputs: &KernelInputs<impl ReadCounter>, traversal: Traversal) -> Self;
 
     /// Calls `found` with each ray's key and its closest hit in (t_min, t_max], or with `ANY_HIT` one that need not

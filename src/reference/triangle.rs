@@ -2,10 +2,10 @@
 //!
 //! # Bounds of a hit's error
 //!
-//! u is 2^-24, o the ray's origin and d its direction. D is the greatest coordinate of any v_i - o, and L that of any
-//! v_i - v_j, where v_i are the triangle's corners. Products, sums and differences are rounded to nearest. Divisions
-//! are right to 2.5 units in the last place, which is what Vulkan guarantees; the CPU's are better. Terms of u² are
-//! left out.
+//! u is 2^-24, o the ray's origin and d its direction. D is the greatest magnitude of a coordinate of any v_i - o,
+//! and L that of any v_i - v_j, where v_i are the triangle's corners. Products, sums and differences are rounded to
+//! nearest. Divisions are right to 2.5 units in the last place, which is what Vulkan guarantees; the CPU's are better.
+//! Terms of u² are left out.
 //!
 //! **Result.** The triangle has a point Q whose every coordinate is within u (11.5 D + 14 L) of o + t d. The weights
 //! that are returned with t are those of Q, except for factors within 8 u of 1. Let c be the cosine between d and the
@@ -32,10 +32,11 @@
 //!    differences of z, which are at most L, round three times more, so they are off by 11 u L. The sum with the
 //!    first z is off by u D, 1 / d.z by 5 u D and the last product by u D. So t d.z differs from Z by
 //!    e <= u (7 D + 11 L).
-//! 4. *Sum.* Along z, o + t d is off Q by e and step 1's u D. Along x it is off by S e, by step 1's 4.5 u D, and by
-//!    3 u L of step 2: by u (11.5 D + 14 L) in all. Without e, the rest is a vector of at most u (7 D + 5 L). It leads
-//!    from Q, in the plane, to a point of the ray whose distance from the plane is c times its distance along the ray
-//!    from t_plane. The part of e is at most e |d| / |d.z|, and |d| / |d.z| is at most the root of 3.
+//! 4. *Sum.* Along z, o + t d differs from Q by e and by the u D of step 1. Along x, it differs by S e, by the
+//!    4.5 u D of step 1 and by the 3 u L of step 2: by u (11.5 D + 14 L) in all. The terms without e are a vector of
+//!    at most u (7 D + 5 L). It leads from Q, in the plane, to a point of the ray whose distance from the plane is c
+//!    times its distance along the ray from t_plane. The terms with e move that point along the ray, by at most
+//!    e |d| / |d.z|, and |d| / |d.z| is at most the root of 3.
 //!
 //! **Underflow.** Edge functions whose sum is below 2^-90 are used as rounded. They belong to triangles that seem
 //! less than 3e-14 wide. Then t is between the corners' depths, but anywhere along a needle. In larger sums,
@@ -66,7 +67,7 @@ pub struct Shear {
 struct Corners {
     x: Vec4,
     y: Vec4,
-    /// Distance along the ray, in units of the direction's longest component.
+    /// Offsets from the ray's origin along `Shear::axis` (world units). Times `Shear::z`, they are t.
     z: Vec4,
 }
 
@@ -148,8 +149,8 @@ impl Shear {
 }
 
 impl Corners {
-    /// Returns the edge functions: twice the signed areas that the ray's axis spans with the edges opposite to v0,
-    /// v1, v2.
+    /// Returns the edge functions: in the xy plane, twice the signed areas of the triangles between the ray, which is
+    /// at (0, 0), and the edges opposite to v0, v1, v2.
     #[inline(always)]
     fn edge_functions(&self) -> Vec4 {
         self.x.zxyw() * self.y.yzxw() - self.y.zxyw() * self.x.yzxw()
@@ -179,8 +180,8 @@ fn exact_edges(edges: Vec4, errors: Vec4) -> Vec4 {
     if sum_of(exact).abs() < LEAST_EXACT_SUM { with_exact_signs(edges, errors) } else { exact }
 }
 
-/// Returns the edge functions with right signs. If the two products round to one value, their errors are the edge
-/// function.
+/// Returns the edge functions with right signs. If the two products round to the same value, the edge function is
+/// the difference of their errors.
 #[inline(always)]
 fn with_exact_signs(edges: Vec4, errors: Vec4) -> Vec4 {
     Vec4::select(edges.cmpeq(Vec4::ZERO), errors, edges)

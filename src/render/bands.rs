@@ -17,23 +17,23 @@ use crate::{
     world::World,
 };
 
-/// Draws whole pictures of any size. If all pixels together exceed the device's limit of a storage buffer, it draws
-/// bands of full rows. The joined picture has the same bits as one that is drawn at once.
+/// Renderer of whole pictures of any size. If the pixels of the picture exceed the range of a storage buffer that the
+/// device can bind, bands of full rows are drawn. The joined picture has the same bits as one that is drawn at once.
 pub struct BandedRenderer {
     renderer: Renderer,
     /// The bands from top to bottom. Together they are the picture, or its crop.
     bands: Vec<Crop>,
-    /// The picture that was drawn last. None if there is a single band, which stays on the device until it is
-    /// downloaded.
+    /// The picture that was drawn last, joined from its bands. None before there is one, and always if there is a
+    /// single band, whose picture stays on the device until it is downloaded.
     joined: Option<Picture>,
     /// Whether the next sample is expected to be slow, as the last one was. The first one is expected to be slow if
     /// the driver runs kernels on the CPU.
     is_slow: bool,
 }
 
-/// A sample that takes longer is slow. It is drawn in steps if the watcher shows them. The wait for the device after
-/// a step takes about 0.1 ms: less than a hundredth of a slow sample, but as much as a whole step takes on a fast
-/// GPU.
+/// Duration above which a sample is slow. The sample after a slow one is drawn in steps, if the watcher shows them.
+/// The wait for the device after each step takes about 0.1 ms. All these waits take less than a hundredth of a slow
+/// sample, but on a fast GPU a wait takes as long as a whole step.
 const SLOW_SAMPLE: Duration = Duration::from_millis(500);
 
 impl BandedRenderer {
@@ -66,7 +66,7 @@ impl BandedRenderer {
     /// Draws a new picture of `n_samples` samples a pixel, at least one, and reports its progress to the watcher.
     ///
     /// # Errors
-    /// A call fails; one pixel alone makes more rays than the queue holds; out of memory.
+    /// A Vulkan call fails; one pixel alone makes more rays than the queue holds; out of memory.
     pub fn draw(&mut self, n_samples: u32, mut watcher: impl Watcher) -> Result<Drawn, GpuError> {
         if let [_] = self.bands[..] {
             return self.draw_band(n_samples, &mut watcher);
@@ -151,8 +151,8 @@ impl BandedRenderer {
         }
     }
 
-    /// Reserves memory for the pictures and the features of all bands, so that a lack of memory is found before the
-    /// work is done. Returns the empty picture.
+    /// Reserves memory for the joined picture and for `features` of all bands, so that a lack of memory is found
+    /// before the first band is drawn. Returns the joined picture, which has no pixels yet.
     fn room_for_all(&mut self, features: &mut Vec<Feature>) -> Result<Picture, GpuError> {
         self.joined = None;
         let n_pixels = self.bands.iter().map(|band| band.width() as usize * band.height() as usize).sum();
@@ -172,8 +172,9 @@ fn reserve<T>(object: &'static str, elements: &mut Vec<T>, len: usize) -> Result
     elements.try_reserve_exact(len).map_err(|_| GpuError::HostMemory { object, bytes })
 }
 
-/// Returns bands of nearly equal height, as few as possible. The device can hold each of them together with the rows
-/// beside it that the noise filter reads. A band has at least one row, even if the row is too long for the device.
+/// Returns as few bands as possible, of equal height except for the last. The device can bind the pixels of each band
+/// together with the neighbouring rows that the noise filter reads. A band has at least one row, even if that row is
+/// too long for the device.
 fn bands(limits: &Limits, options: &RenderOptions) -> Vec<Crop> {
     let (asked, window) = (options.crop_or_whole(), options.window());
     let row_bytes = u64::from(window.width()) * Pixels::bytes_per_pixel(options);

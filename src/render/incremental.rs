@@ -1,6 +1,7 @@
 //! Draws a sample in parts, so that the caller can do something else in between.
 //!
 //! A part is a command buffer of the frame. A sample is pending while some of its parts have run and others have not.
+//! A step draws one part. (`draw_part` draws a batch, which is several parts.)
 
 use std::time::Instant;
 
@@ -17,7 +18,7 @@ use crate::{
 /// A command buffer of a frame.
 pub(super) struct Part {
     commands: CommandBuffer,
-    /// Its rays that can stall, if it has such: they must end before the next part begins.
+    /// The part's rays that can stall, if there are any. All of them must end before the next part begins.
     traced: Option<Traced>,
     /// Whether it is the last part of its batch.
     pub ends_batch: bool,
@@ -54,7 +55,7 @@ pub(super) enum Until {
     End,
 }
 
-/// A sample of which some parts have run. The device is not working on any of them.
+/// A sample of which some parts have run and others have not. The device has finished the parts that were submitted.
 pub(super) struct PartialSample {
     parts: Vec<Part>,
     /// Number of parts that have run.
@@ -65,7 +66,7 @@ pub(super) struct PartialSample {
 }
 
 impl PartialSample {
-    /// Returns the number of parts that have run when the sample is drawn up to `until`.
+    /// Returns the number of parts that will have run once the sample is drawn up to `until`.
     fn end(&self, until: Until) -> usize {
         if until == Until::Step {
             return self.n_done + 1;
@@ -89,9 +90,9 @@ pub struct Displayed {
 }
 
 impl Renderer {
-    /// Draws one batch of the pending sample, or of the next one if none is pending. Returns the whole sample's
-    /// profile with its last batch, and None before. The displayed picture changes with the last batch only. Whatever
-    /// begins a new picture drops the pending sample.
+    /// Draws one batch of the pending sample, or of the next sample if none is pending. Returns the whole sample's
+    /// profile after its last batch, and None before that. Only the last batch changes the displayed picture. The
+    /// pending sample is dropped when a new picture begins.
     ///
     /// # Errors
     /// Fails as [`Renderer::draw_sample`] does.
@@ -99,9 +100,9 @@ impl Renderer {
         self.go_on(Until::Batch)
     }
 
-    /// Draws one part of the pending sample, or of the next one if none is pending: a bounce of a batch, or its
-    /// light. Returns the whole sample's profile with its last part, and None before. The displayed picture changes
-    /// with the last part only.
+    /// Draws one part of the pending sample, or of the next sample if none is pending: mostly a bounce or the light
+    /// of a batch. Returns the whole sample's profile after its last part, and None before that. Only the last part
+    /// changes the displayed picture.
     ///
     /// # Errors
     /// Fails as [`Renderer::draw_sample`] does.
@@ -109,7 +110,7 @@ impl Renderer {
         self.go_on(Until::Step)
     }
 
-    /// Whether samples find the hits of primary rays only, and no light.
+    /// Whether a sample consists of the hits of primary rays only, without light.
     pub(super) fn draws_primary_rays_only(&self) -> bool {
         self.options.features && self.needs_primary_rays_only
     }
@@ -152,10 +153,11 @@ impl Renderer {
         Ok(())
     }
 
-    /// Runs the next parts of the pending or the next sample. Returns the sample's profile when all parts have run
-    /// without an overflow, and None while parts are left.
+    /// Runs the next parts of the pending sample, or of the next sample if none is pending. Returns the sample's
+    /// profile when all parts have run, and None while parts are left. If the ray queue has overflowed, the whole
+    /// sample is drawn again, in smaller batches, before the call returns.
     pub(super) fn go_on(&mut self, until: Until) -> Result<Option<Profile>, GpuError> {
-        // An error here keeps the samples that are complete; a later one drops them.
+        // If the sample cannot begin, the complete samples are kept. An error after that drops them.
         let pending = self.pending.take().map_or_else(|| self.begin_sample(), Ok)?;
         let gone_on = self.try_to_go_on(pending, until);
         if gone_on.is_err() {
@@ -191,8 +193,8 @@ impl Renderer {
         self.profile(&bounces, begun_at).map(Some)
     }
 
-    /// Runs parts and waits for their end. They are submitted together, except that rays which can stall must end
-    /// before the next part begins.
+    /// Runs parts and waits for their end. They are submitted together, except that a part whose rays can stall ends
+    /// a submission, since its rays must end before the next part begins.
     fn run_parts(&self, parts: &[Part]) -> Result<(), GpuError> {
         for together in parts.split_inclusive(|part| part.traced.is_some()) {
             self.context.submit(&together.iter().map(|part| &part.commands).collect::<Vec<_>>())?;
@@ -206,7 +208,7 @@ impl Renderer {
 
     fn begin_sample(&mut self) -> Result<PartialSample, GpuError> {
         let sample_ix = self.n_samples;
-        // If the second sample was dropped and is drawn again, the sums are there already.
+        // If the second sample was dropped and is drawn again, the sums contain the first sample already.
         if sample_ix == 1 && !self.has_sums {
             self.resources.begin_sums(&self.context)?;
             self.has_sums = true;
@@ -222,13 +224,13 @@ impl Renderer {
         Ok(PartialSample { parts, n_done: 0, sample_ix, begun_at: None })
     }
 
-    /// Sets the view that is displayed from the next sample on: the picture, or a feature in its place. A feature
-    /// needs options that ask for features. `brightest`: the cost or number of rays that is displayed brightest, or
-    /// the depth that is displayed half as bright as depth 0.
+    /// Sets the view that is displayed from the next sample on: the picture, or a feature in its place. A feature is
+    /// displayed only if the options ask for features. `brightest`: in views of costs and of numbers of rays, the
+    /// value that is displayed brightest; in the view of depth, the depth that is half as bright as depth 0.
     ///
-    /// Returns whether this is a change, which drops a pending sample. Samples of a view that needs primary rays only
-    /// have no radiance. So the next sample is the first of a new picture if one of the old and the new view needs
-    /// primary rays only and the other needs all rays.
+    /// Returns whether the view or `brightest` has changed. A change drops a pending sample. Samples of a view that
+    /// needs primary rays only have no radiance. So the next sample is the first of a new picture if one of the old
+    /// and the new view needs primary rays only and the other needs all rays.
     pub fn set_view(&mut self, view: View, brightest: f32) -> bool {
         let false_color = view.constant().map(|view| FalseColor { view, brightest });
         let is_new = false_color != self.false_color;
@@ -243,13 +245,14 @@ impl Renderer {
         is_new
     }
 
-    /// Returns size and camera of the displayed picture, also while another one is drawn; None before there is one.
+    /// Returns the size and the camera of the displayed picture, or None before there is one. While a sample is
+    /// pending, the displayed picture is the one before it.
     pub fn displayed(&self) -> Option<Displayed> {
         self.displayed
     }
 
-    /// Downloads the displayed picture in its own size, also while another one is drawn; None before there is one.
-    /// Its radiance is empty, since a pending sample may have overwritten it. Only for pictures without a crop.
+    /// Downloads the picture that [`Renderer::displayed`] describes, or returns None before there is one. Its
+    /// radiance is empty, since a pending sample may have overwritten it. The picture must have no crop.
     ///
     /// # Errors
     /// A copy fails.

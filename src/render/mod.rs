@@ -10,8 +10,9 @@
 //! end frame      mean of all samples, noise filter, encoding for display
 //! ```
 //!
-//! Each line but `each batch` is one command buffer. A bounce or `light` is two where rays can stall: where a driver
-//! limits the loop turns of a kernel, a ray that has spent its turns goes on in a further dispatch.
+//! Each line except `each batch` is one command buffer, and each bounce has one of its own. Where rays can stall, a
+//! bounce or `light` has two command buffers. A ray stalls if the driver limits the loop turns of a kernel and the
+//! ray has spent its turns; it goes on in a further dispatch.
 
 mod bands;
 mod given;
@@ -49,7 +50,7 @@ pub struct Renderer {
     resources: Resources,
     passes: Passes,
     schedule: Schedule,
-    /// Number of samples a pixel in the picture.
+    /// Number of samples per pixel of which the picture is the mean.
     n_samples: u32,
     /// The feature that is displayed in place of the picture. Used only if the options ask for features.
     false_color: Option<FalseColor>,
@@ -69,7 +70,8 @@ impl Renderer {
     /// Uploads the scene and creates the pipelines.
     ///
     /// # Errors
-    /// The scene or the picture exceeds the device's limits or memory, or the driver refuses a shader.
+    /// The scene or the picture exceeds the device's limits or memory, the device lacks 64-bit atomics for
+    /// [`Primary::SoftwareRaster`], or the driver refuses a shader.
     pub fn new(context: Arc<Context>, world: &World, options: &RenderOptions) -> Result<Self, GpuError> {
         Self::with_capacity(context, world, options, None)
     }
@@ -131,7 +133,7 @@ impl Renderer {
     /// Draws a new picture with one sample a pixel and downloads it.
     ///
     /// # Errors
-    /// A call fails, or one pixel alone makes more rays than the queue holds.
+    /// A Vulkan call fails, or one pixel alone makes more rays than the queue holds.
     pub fn render(&mut self) -> Result<(Picture, Profile), GpuError> {
         let profile = self.draw()?;
         Ok((self.picture()?, profile))
@@ -151,8 +153,8 @@ impl Renderer {
     /// again. Later samples keep the smaller batches.
     ///
     /// # Errors
-    /// Fails as [`Renderer::render`] does. The next sample is then the first of a new picture, unless the sample
-    /// could not even begin.
+    /// Fails as [`Renderer::render`] does. The next sample is then the first of a new picture. Only if the error
+    /// occurs before the sample is recorded are the earlier samples kept.
     pub fn draw_sample(&mut self) -> Result<Profile, GpuError> {
         loop {
             if let Some(profile) = self.go_on(Until::End)? {
@@ -161,10 +163,10 @@ impl Renderer {
         }
     }
 
-    /// Filters and encodes the samples of the picture again, with the options as they are. Draws no sample.
+    /// Filters and encodes the samples of the picture again, by the current options. Draws no sample.
     ///
     /// # Errors
-    /// A call fails.
+    /// A Vulkan call fails.
     pub fn show(&mut self) -> Result<(), GpuError> {
         self.context.run("show", |commands| {
             self.resources.bind(commands);
@@ -236,7 +238,7 @@ impl Renderer {
         Ok(frame)
     }
 
-    /// Returns which passes the next sample has.
+    /// Returns the properties of the next sample's frame that decide which passes it has.
     fn frame_kind(&self) -> FrameKind {
         let only_primary_rays = self.draws_primary_rays_only();
         let constants = self.resources.constants();
@@ -277,7 +279,7 @@ impl Renderer {
         ])
     }
 
-    /// Returns the rays that a section's first pass traces through the acceleration structure, if it is such a pass.
+    /// Returns the rays of a section's first pass if that pass traces rays through the acceleration structure.
     fn traced(&self, section: &[Step], batch: &Batch) -> Option<Traced> {
         match section.first()? {
             Step::Run(Pass::Trace) => Some(Traced::Rays(*batch)),
@@ -286,7 +288,7 @@ impl Renderer {
         }
     }
 
-    /// Repeats the tracing pass of a part that has run until none of its rays is stalled.
+    /// Repeats the tracing pass of a part, whose commands have run once, until none of its rays is stalled.
     fn finish_rays(&self, traced: &Traced) -> Result<(), GpuError> {
         self.resources.accel.stalls.finish(&self.context, |commands, round| {
             self.resources.bind(commands);
@@ -304,8 +306,8 @@ impl Renderer {
         CommandBuffer::record(&self.context, name, self.schedule.timer.as_ref(), body)
     }
 
-    /// Records the constants, the rows of `bounces` and the cleared counters that all passes need, then primary
-    /// visibility.
+    /// Records the transfers that set the constants and the initial rows of `bounces` and clear the counters, then
+    /// the passes of primary visibility.
     fn begin_frame(&self, commands: &Commands, visibility: &[Step]) {
         commands.reset_timer();
         self.resources.bind(commands);
@@ -324,7 +326,7 @@ impl Renderer {
     }
 
     fn update_constants(&self, commands: &Commands) {
-        commands.barrier(Access::AllReads, Access::TransferWrite); // frame, bounces and all that the last frame reads
+        commands.barrier(Access::AllReads, Access::TransferWrite); // all that the last frame reads: frame, bounces ...
         commands.update_buffer(self.resources.frame.any(), self.resources.constants());
         commands.barrier(Access::TransferWrite, Access::AllReads); // frame
     }
@@ -335,8 +337,8 @@ impl Renderer {
     }
 }
 
-/// Returns the number of lanes to share among rays, or 0, with which each ray gets one lane. It is 0 if the options
-/// ask for what rays cost.
+/// Returns the number of lanes to share among the rays of a dispatch. 0 means that each ray gets one lane, and is
+/// returned if the options ask for features, which contain the costs of rays.
 fn lanes_to_share(context: &Arc<Context>, options: &RenderOptions) -> Result<u32, GpuError> {
     if options.features { Ok(0) } else { context.n_lanes() }
 }

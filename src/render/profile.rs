@@ -13,8 +13,8 @@ use crate::{
 };
 
 impl Renderer {
-    /// Returns times and counts of the frame that was begun at `begun_at`. They are empty if the options do not ask
-    /// for a profile.
+    /// Returns the profile of the last frame, which began at `begun_at`. The profile is empty if the options do not
+    /// ask for one. `bounces`: the rows that the frame has left in the buffer.
     ///
     /// # Errors
     /// A copy fails.

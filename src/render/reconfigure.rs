@@ -1,5 +1,5 @@
-//! Changes between frames: of the camera, the size, the crop and the options. The scene and its tree stay on the
-//! device.
+//! Changes between frames: of the camera, the size, the crop and the options. The scene and its acceleration
+//! structure stay on the device; a change of the traversal adds the links that it reads.
 
 use super::{Renderer, lanes_to_share, schedule::Schedule};
 use crate::{
@@ -28,7 +28,7 @@ impl Renderer {
         self.pending = None;
     }
 
-    /// Number of samples a pixel, of which the picture is the mean.
+    /// Number of samples per pixel of which the picture is the mean.
     pub fn n_samples(&self) -> u32 {
         self.n_samples
     }
@@ -51,6 +51,9 @@ impl Renderer {
     /// Sets the part of the picture to render. The next sample is the first of a new picture. Buffers are kept as
     /// [`Renderer::resize`] keeps them.
     ///
+    /// # Panics
+    /// The crop exceeds the picture.
+    ///
     /// # Errors
     /// The part exceeds the device's limits or memory. Then nothing has changed.
     pub fn set_crop(&mut self, crop: Crop) -> Result<(), GpuError> {
@@ -60,6 +63,9 @@ impl Renderer {
     /// Sets the options of the next samples. Only kernels that depend on a changed option are created again. Samples
     /// are kept if only their display changes: the exposure, the tone curve or the filter's threshold.
     /// [`Renderer::show`] then displays them by the new options. A pending sample is dropped.
+    ///
+    /// # Panics
+    /// The crop exceeds the picture.
     ///
     /// # Errors
     /// The options exceed the device's limits or memory, or the driver refuses a kernel. Then nothing has changed,
@@ -80,7 +86,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// Creates all that the options need, and then installs it by steps that cannot fail.
+    /// Creates the buffers and kernels that the changed options need, and then installs them by steps that cannot
+    /// fail.
     fn remake(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
         let (context, before) = (&self.context, &self.options);
         let mut constants = *self.resources.constants();
@@ -104,7 +111,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// Creates the buffers and the batches for another size, number of bounces or set of outputs.
+    /// Creates the buffers and the batches for options that need other ones, such as another size or number of
+    /// bounces. Buffers that are large enough are shared with the current resources.
     fn with_room(&self, constants: Frame, options: &RenderOptions) -> Result<(Resources, Schedule), GpuError> {
         let queue_capacity = self.budget.queue_capacity(self.context.limits(), &constants);
         let n_lanes = lanes_to_share(&self.context, options)?;
@@ -117,7 +125,8 @@ impl Renderer {
     }
 }
 
-/// Whether the options differ at most in what is done with the samples, and need the same buffers for it.
+/// Whether the samples and buffers of options `a` serve options `b`, too: they differ at most in the exposure, the
+/// tone curve and the filter's threshold.
 fn same_samples(a: &RenderOptions, b: &RenderOptions) -> bool {
     let (denoise, tonemap) = (a.denoise, a.tonemap);
     let of_samples = |options: &RenderOptions| RenderOptions { exposure: 1.0, denoise, tonemap, ..options.clone() };

@@ -1,5 +1,5 @@
 //! Batches of a frame: parts of the picture's pixels whose rays fit in the ray queue. No ray is dropped: a batch for
-//! which the queue was too small is halved and drawn again.
+//! which the queue was too small is halved, and the sample is drawn again.
 
 use std::{mem, sync::Arc};
 
@@ -9,15 +9,16 @@ use crate::{
     layout::{Batch, Bounce, Frame, PathRay, RAY_GROUP_SIZE, ROUND_BEGIN},
 };
 
-/// The most rays that the queue is made for, unless the caller sets its capacity. They keep any device busy, and fit
-/// well into memory: they take some 100 bytes each, 1.7 GB together.
+/// Upper limit of the queue's capacity, in rays, unless the caller sets the capacity. This number of rays keeps any
+/// device busy. They take some 100 bytes each, 1.7 GB together, which fits well into memory.
 const MOST_RAYS: u64 = 1 << 24;
 
 /// The batches of a frame, and the objects whose size depends on their number.
 pub struct Schedule {
     /// Each batch at depth 0; `bounce_ix` is its first row of `bounces`.
     pub batches: Vec<Batch>,
-    /// The contents of `bounces` when a frame begins: a ray for each pixel at depth 0, and none at further depths.
+    /// The initial contents of `bounces`, for each bounce of each batch: a ray for each pixel at depth 0, and none at
+    /// further depths.
     pub first_bounces: Buffer<Bounce>,
     /// None if the options do not ask for a profile.
     pub timer: Option<Timer>,
@@ -88,24 +89,25 @@ impl Schedule {
     }
 }
 
-/// The number of rays that the queue has room for, and the number that a pixel is expected to make.
+/// What decides how many rays the queue has room for, and how many rays a pixel is expected to make.
 #[derive(Clone, Copy)]
 pub struct QueueBudget {
-    /// Rays in the queue, if the caller has set them. A batch then has as many pixels.
+    /// Capacity of the queue in rays, if the caller has set it. A batch then has up to as many pixels,
+    /// since one ray per pixel is expected.
     pub fixed_capacity: Option<u32>,
     /// Whether a hit can have two child rays, a reflected and a refracted one.
     pub branches: bool,
 }
 
 impl QueueBudget {
-    /// Returns the number of rays that the queue should hold: those that the whole picture is expected to make, but
-    /// no more than [`MOST_RAYS`] and than the device's limits allow.
+    /// Returns the capacity that the queue should have: the caller's, if it is set. Otherwise the rays that the whole
+    /// picture is expected to make, but no more than [`MOST_RAYS`] and no more than the device's limits allow.
     pub fn queue_capacity(&self, limits: &Limits, constants: &Frame) -> u32 {
         if let Some(capacity) = self.fixed_capacity {
             return capacity;
         }
         let n_pixels = u64::from(constants.width) * u64::from(constants.height);
-        // `rays` and `light_visibility` have the most bytes a ray of all buffers of the queue.
+        // Of the queue's buffers, `rays` or `light_visibility` is the largest.
         let bytes_per_ray = mem::size_of::<PathRay>().max(4 * constants.n_lights as usize) as u64;
         let most = (limits.storage_range / bytes_per_ray).min(u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE));
         let wanted = n_pixels * u64::from(self.rays_per_pixel(constants.max_depth));

@@ -150,7 +150,7 @@ impl Scene {
         (self.materials.len() - 1) as u32
     }
 
-    /// Returns the index of the material of meshes without one. Adds that material at the first call.
+    /// Returns the index of the default material, for meshes and faces that name none. Adds it at the first call.
     fn default_material(&mut self) -> u32 {
         const NAME: &str = "(default)";
         if let Some(ix) = self.materials.iter().position(|material| material.name == NAME) {

@@ -100,7 +100,7 @@ pub(super) struct CommonSpec {
     /// Names of materials, one for each slot of the mesh (a room's walls, a checkered plane's fields). If there are
     /// fewer names than slots, they repeat.
     pub materials: Vec<String>,
-    /// False: every face is shaded with its own plane's normal.
+    /// If false, every face is shaded with its own plane's normal; true where absent.
     pub smooth: Option<bool>,
 }
 

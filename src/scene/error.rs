@@ -28,7 +28,8 @@ impl SceneError {
 /// Result of a check that does not know the file and the line of what it checks. The error is a message for people.
 pub(super) type Checked<T> = Result<T, String>;
 
-/// Returns `text` on one line, cut after 300 characters and an ellipsis. The text may quote a hostile file.
+/// Returns `text` on one line. After 300 characters an ellipsis replaces the rest, since the text may quote a hostile
+/// file.
 fn quoted(text: &str) -> String {
     let line = one_line(text);
     match line.char_indices().nth(300) {

@@ -10,14 +10,16 @@ use super::SceneError;
 /// Smallest length of a scene's longest side. Smaller scenes are refused, because products of their coordinates would
 /// underflow.
 ///
-/// Let L be the longest side and s the size of a triangle. The hit test multiplies coordinates across the ray, of
-/// size s, to edge functions of size s^2, sums these to the determinant, and multiplies them by depths of size L to
-/// find t. Devices may flush values below 2^-126 to zero. Two conditions follow:
+/// Let L be the longest side and s the size of a triangle. The hit test multiplies pairs of coordinates perpendicular
+/// to the ray, each of size s, which gives edge functions of size s^2. It adds these up to the determinant, and
+/// multiplies them by depths of size L to find t. Devices may flush values below 2^-126 to zero. Two conditions
+/// follow:
 ///
 /// - t is right to single precision only if a flushed value is less than 2^-24 of the sum: s^2 L >= 2^-102. With
 ///   L = 1e-8 > 2^-27, this holds for s >= 2^-37.5.
-/// - At edges that the ray meets, a product is exact only if the error of its rounding error, 2^-48 of s^2, is not
-///   flushed: s^2 >= 2^-78. This holds for s >= 2^-39.
+/// - At edges that the ray meets, the test adds each product's rounding error to the product. The sum is exact only
+///   if no rounding error is flushed. The smallest that is not 0 is 2^-48 of s^2, so s^2 >= 2^-78. This holds for
+///   s >= 2^-39.
 ///
 /// Triangles may thus be as small as 2^-10.5 of the scene; a surface has some two million triangles of that size. All
 /// other products of the traversal and of shading are of lower degree, or of vectors that were scaled to unit length.

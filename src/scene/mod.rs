@@ -88,7 +88,8 @@ pub struct Camera {
 }
 
 impl Scene {
-    /// Loads a `.toml` or `.obj` file. Whatever the picture leaves out is reported as a `tracing` warning.
+    /// Loads a `.toml` or `.obj` file. Statements and files that are ignored or missing are reported as `tracing`
+    /// warnings.
     ///
     /// # Errors
     /// The file, or one that it names, cannot be read or understood; the scene has no triangles, is too small to be

@@ -4,7 +4,8 @@ use std::{fs, path::Path};
 
 use super::error::SceneError;
 
-/// Reads text that need not be UTF-8 throughout: comments in old encodings are no reason to refuse a mesh.
+/// Reads text that need not be UTF-8. Invalid bytes become U+FFFD, so that a mesh with comments in an old encoding is
+/// not refused.
 pub(super) fn read_lossy(path: &Path) -> Result<String, SceneError> {
     let text = match String::from_utf8(read(path)?) {
         Ok(text) => text,

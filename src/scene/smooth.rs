@@ -1,5 +1,5 @@
-//! Shading normals for meshes without normals: angle-weighted averages over those faces around a point that differ in
-//! direction by no more than a crease angle.
+//! Shading normals for meshes without normals. The normal at a face's corner is the angle-weighted average of the
+//! normals of the faces around that point that differ from the face's own normal by no more than a crease angle.
 //!
 //! The weights follow Thürmer and Wüthrich, "Computing Vertex Normals from Polygonal Facets" (JGT 1998).
 
@@ -15,7 +15,7 @@ const MAX_PAIRED_FACES: usize = 256;
 /// Deviation (1 - cosine; 0.08 degrees) below which a normal counts as the normal of the face's plane.
 const FLAT_TOLERANCE: f32 = 1e-6;
 
-/// The properties of a face that its neighbours' normals depend on.
+/// A face's share in the averages at its corners: its normal, and its angles as weights.
 #[derive(Clone, Copy, Default)]
 struct Facet {
     /// Unit normal, or zero where the face has no area or is not smooth.
@@ -72,8 +72,8 @@ impl<'a> CornerNormals<'a> {
         if near(normal) { normal } else { own }
     }
 
-    /// Returns the average of those normals around a point for which `counts` is true: a unit vector, or zero where
-    /// they cancel out.
+    /// Returns the average of the normals around a point that the predicate `counts` accepts: a unit vector, or zero
+    /// if they cancel out.
     fn average(&self, point: u32, counts: impl Fn(Vec3) -> bool) -> Vec3 {
         let corners = self.around.of(point).iter();
         let weighted = corners.map(|corner| {

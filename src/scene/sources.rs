@@ -4,10 +4,13 @@ use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
-use super::read::{read_lossy, read_utf8};
+use super::{
+    obj::named_libraries,
+    read::{read_lossy, read_utf8},
+};
 
-/// Returns the scene file, the meshes that it names and the material libraries that those name, whether they exist or
-/// not, sorted. A file that cannot be read contributes no names.
+/// Returns the sorted paths of the scene file, the mesh files that it names, and the material libraries that the mesh
+/// files name. The files need not exist. A file that cannot be read contributes no names.
 pub fn source_files(path: &Path) -> Vec<PathBuf> {
     let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
     let meshes = if is_obj { vec![path.to_owned()] } else { meshes(path) };
@@ -22,17 +25,12 @@ fn meshes(scene: &Path) -> Vec<PathBuf> {
     let table: Table = read_utf8(scene).ok().and_then(|text| text.parse().ok()).unwrap_or_default();
     let meshes = table.get("mesh").and_then(Value::as_array).into_iter().flatten();
     let names = meshes.filter_map(|mesh| mesh.get("file").and_then(Value::as_str));
-    names.map(|name| beside(scene, name)).collect()
+    let folder = scene.parent().unwrap_or(Path::new(""));
+    names.map(|name| folder.join(name)).collect()
 }
 
 fn libraries(mesh: &Path) -> Vec<PathBuf> {
-    let text = read_lossy(mesh).unwrap_or_default();
-    let named = text.lines().filter_map(|line| line.trim_start().strip_prefix("mtllib "));
-    named.map(|name| beside(mesh, name.trim())).collect()
-}
-
-fn beside(file: &Path, name: &str) -> PathBuf {
-    file.parent().unwrap_or(Path::new("")).join(name)
+    named_libraries(mesh, &read_lossy(mesh).unwrap_or_default())
 }
 
 #[cfg(test)]
@@ -55,6 +53,12 @@ mod tests {
         let expected = [path("none.obj"), path("parts/a.mtl"), path("parts/a.obj"), path("x.toml")];
         assert_eq!(source_files(&path("x.toml")), expected);
         assert_eq!(source_files(&path("parts/a.obj")), [path("parts/a.mtl"), path("parts/a.obj")]);
+        // Statements as the loader reads them: tabs, several names, names with spaces, continued lines, backslashes.
+        fs::write(path("parts/with space.mtl"), "").unwrap();
+        let obj = "mtllib\tone.mtl two.mtl\nmtllib with space.mtl\nmtllib \\\n deep\\three.mtl\nmtllib ../out.mtl\n";
+        fs::write(path("parts/a.obj"), obj).unwrap();
+        let names = ["parts/a.obj", "parts/deep/three.mtl", "parts/one.mtl", "parts/two.mtl", "parts/with space.mtl"];
+        assert_eq!(source_files(&path("parts/a.obj")), names.map(path));
         fs::write(path("x.toml"), "[[mesh\n").unwrap();
         assert_eq!(source_files(&path("x.toml")), [path("x.toml")]);
     }

@@ -68,7 +68,7 @@ impl Transform {
             return Err(format!("scale = {:?} flattens the mesh: no factor may be 0", scale.to_array()));
         }
         let rotation = DMat3::from_quat(rotation);
-        // Multiplied by the smallest factor's size, so that tiny scales do not overflow.
+        // The inverse is multiplied by the smallest factor's size, so that it does not overflow for tiny scales.
         let inverse_scale = scale.abs().min_element() / scale;
         Ok(Self {
             linear: rotation * DMat3::from_diagonal(scale),

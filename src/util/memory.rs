@@ -31,14 +31,15 @@ pub fn require(what: &str, needed: u64) -> Result<(), OutOfMemory> {
     }
 }
 
-/// Returns the number of bytes that the process can still allocate. It is the least of what the machine has left with
-/// its swap space, what the container's limit leaves and what the limit on the process's address space (`ulimit -v`)
-/// leaves. `None` if the system does not tell.
+/// Returns the number of bytes that the process can still allocate. It is the least of three numbers: the machine's
+/// available memory and free swap space, the rest up to the container's limit, and the rest up to the limit on the
+/// process's address space (`ulimit -v`). `None` if the system reports none of them.
 pub fn available() -> Option<u64> {
     let memory = RefreshKind::nothing().with_memory(MemoryRefreshKind::everything());
     let system = System::new_with_specifics(memory).ok().filter(|system| system.total_memory() > 0);
     let of_machine = system.as_ref().map(|system| system.available_memory().saturating_add(system.free_swap()));
-    // `free_memory` counts the container's page cache as used, although the kernel would give it up.
+    // `CGroupLimits::free_memory` counts the container's page cache as used, although the kernel would give it up. So
+    // `rss` is subtracted from the limit instead.
     let of_container = system.as_ref().and_then(System::cgroup_limits);
     let of_container = of_container.map(|it| it.total_memory.saturating_sub(it.rss).saturating_add(it.free_swap));
     [of_machine, of_container, address_space_left()].into_iter().flatten().min()

@@ -23,9 +23,9 @@ pub enum UnknownWord {
 
 /// Implements `ALL`, `words`, `FromStr` and `Display` for an enum without fields.
 ///
-/// A description may follow a word, `Mask = "mask": "what the variant does"`. If all words have one, `descriptions`
-/// lists them for a help text. Words that a variant had once follow the variants, `renamed { "old" => "new" }`; they
-/// are refused by an error that names the new word.
+/// Either all words or none are followed by a description, `Mask = "mask": "what the variant does"`. With
+/// descriptions, the macro also implements `descriptions`, which lists them for a help text. After such variants,
+/// `renamed { "old" => "new" }` may list former words. An error that names the new word refuses each of them.
 macro_rules! named_enum {
     (@common $ty:ident { $($variant:ident = $word:literal),+ } renamed { $($old:literal => $now:literal),* }) => {
         impl $ty {

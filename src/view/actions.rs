@@ -13,7 +13,7 @@ use crate::{
     scene::Camera,
 };
 
-/// Why a picture was not saved.
+/// The reason why a picture was not saved.
 #[derive(Debug, thiserror::Error)]
 pub enum SaveError {
     #[error(transparent)]
@@ -53,8 +53,8 @@ impl Session {
         }
     }
 
-    /// Saves the displayed picture if a save is due. It is called before another view replaces the picture, and
-    /// before the viewer ends.
+    /// Saves the displayed picture if a save is due, even if the picture is small or unfinished. It is called before
+    /// another camera or view replaces the picture, and before the viewer ends.
     pub fn save_what_is_left(&mut self, gpu: &GpuSession) {
         if !std::mem::take(&mut self.is_save_due) {
             return;

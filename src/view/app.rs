@@ -183,7 +183,7 @@ impl App {
         }
     }
 
-    /// Ends the viewer at the user's wish. A save that is due is made first.
+    /// Ends the viewer because the user closes it. A save that is due is made first.
     fn quit(&mut self, event_loop: &ActiveEventLoop) {
         if let Some(Shown { gpu, .. }) = &self.shown {
             self.session.save_what_is_left(gpu);
@@ -191,7 +191,8 @@ impl App {
         self.end(event_loop, Ok(()));
     }
 
-    /// Handles an event of the user. The overlay may take it first; otherwise it moves the camera or is an action.
+    /// Handles an event of the user. The overlay may take the event. Otherwise the event moves the camera or triggers
+    /// an action.
     fn handle_input(&mut self, event_loop: &ActiveEventLoop, event: &WindowEvent) {
         let Some(Shown { ui, window, .. }) = &mut self.shown else { return };
         let is_overlays = self.layers.any() && !is_tab(event) && ui.take_event(window, event);

@@ -6,8 +6,8 @@ const N_STEPS: u32 = 16;
 const LEAST_STEP: u32 = 2;
 /// The picture grows by a step if it is then expected to take no more than this share of the budget.
 const ROOM: f64 = 0.85;
-/// Milliseconds that a part of a picture at rest takes, if all its parts take equally long. Input waits for the end
-/// of a part.
+/// Intended time, in milliseconds, of each of the parts in which a picture is drawn while the camera rests. Input
+/// waits for the end of a part.
 pub const PART_MS: f64 = 100.0;
 /// Weight of the newest frame in the mean cost.
 const NEWEST: f64 = 0.4;
@@ -48,8 +48,9 @@ impl Budget {
         (part(window.0), part(window.1))
     }
 
-    /// Returns the expected milliseconds of a frame of the window's full size. It is unknown, none, before the second
-    /// frame and after the window's size has changed a lot.
+    /// Returns the expected milliseconds of a frame of the window's full size. Returns none while the time is
+    /// unknown: before the second frame, and after the window's number of pixels has changed by more than a factor of
+    /// two.
     pub fn full_ms(&self) -> Option<f64> {
         self.full_ms
     }

@@ -105,7 +105,8 @@ impl Controller {
     }
 
     /// Returns the vector from eye to target, turned by a drag of `x` to the right and `y` down, in heights of the
-    /// window. The result stays [`POLE_MARGIN`] off straight up and down.
+    /// window. The result is at least [`POLE_MARGIN`] away from straight up and down, unless `view` is closer
+    /// already.
     fn turned(&self, view: Vec3, x: f32, y: f32) -> Vec3 {
         let up = self.camera.up;
         let yawed = Quat::from_axis_angle(up, -x * TURN_PER_HEIGHT) * view;

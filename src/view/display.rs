@@ -1,4 +1,4 @@
-//! The viewer's entry point: a display, the options of a viewing, and its report.
+//! The viewer's entry point: a display, the viewer's options, and its report.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{engine::choices::Choices, gpu::ContextOptions};
 
-/// Options of a viewing.
+/// Options of the viewer.
 pub struct ViewOptions {
     /// Initial settings. The size in their render options is the window's initial size.
     pub settings: Settings,
@@ -36,7 +36,7 @@ pub struct ViewOptions {
     pub print: fn(&str),
 }
 
-/// Report of a viewing.
+/// Report of the viewer after it has ended.
 #[derive(Serialize)]
 pub struct ViewReport {
     /// The device's name.

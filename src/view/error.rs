@@ -3,7 +3,7 @@
 use super::actions::SaveError;
 use crate::{gpu::GpuError, output::OutputError};
 
-/// Why the viewer could not start, or ended. Displays as one line.
+/// The reason why the viewer could not start, or ended with an error. It displays as one line.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewError {
     #[error("no display to open a window on: {0}")]

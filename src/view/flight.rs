@@ -46,7 +46,7 @@ impl Flight {
         Self { held: [false; 6], is_faster: false, is_slower: false, speed: radius / 2.0, radius }
     }
 
-    /// Returns the same flight around a scene of another radius.
+    /// Returns the same flight in a scene of another radius. The speed stays; only its limits change.
     pub fn around(self, radius: f32) -> Self {
         Self { radius, ..self }
     }

@@ -11,18 +11,18 @@ pub struct FrameRecord {
     pub shown_s: f64,
     /// Time since the previous frame was shown or, after a pause, since the drawing of this frame began.
     pub frame_ms: f64,
-    /// Time from the oldest input that this frame is the first to show until it was handed to the screen; none
-    /// without input.
+    /// Input latency: the time from an input's arrival until this frame was handed to the screen, if this frame is
+    /// the first that shows the input. Of several inputs, the oldest counts. None without input.
     pub latency_ms: Option<f64>,
-    /// Width and height of the picture in pixels; none if the camera did not move.
+    /// Width and height of the picture in pixels, if the frame was drawn while the camera moved; none otherwise.
     pub moving: Option<(u32, u32)>,
     /// GPU time of each pass of the sample that the frame has completed, in the order of execution. Empty if it has
     /// completed none, or if the device has no timestamps.
     pub pass_ms: Vec<(&'static str, f64)>,
 }
 
-/// Number of the newest samples that are kept even if they are older than the history's least length, but not older
-/// than [`TOO_LONG_S`].
+/// Number of the newest samples that are kept beyond the history's least length. Samples older than [`TOO_LONG_S`]
+/// are dropped all the same.
 const N_SLOW_SAMPLES: usize = 3;
 /// Longest history in seconds, unless its least length is longer.
 const TOO_LONG_S: f64 = 60.0;
@@ -62,7 +62,7 @@ impl History {
         self.frames.iter()
     }
 
-    /// Returns the length of the history: the seconds before the newest frame was shown.
+    /// Returns the length of the history in seconds, which ends when the newest frame was shown.
     pub fn length_s(&self) -> f64 {
         let Some(newest) = self.frames.back() else { return self.shortest_s };
         let samples = self.frames.iter().rev().filter(|frame| !frame.pass_ms.is_empty()).take(N_SLOW_SAMPLES);

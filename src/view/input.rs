@@ -43,7 +43,7 @@ pub enum Action {
 /// Result of an event.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct InputEffect {
-    /// The action that the event asks for.
+    /// The action that the event triggers.
     pub action: Option<Action>,
     /// Whether the event has moved the camera, or a key that moves it went down or up.
     pub moves: bool,
@@ -54,13 +54,13 @@ pub struct InputEffect {
 pub struct Input {
     mouse: Mouse,
     modifiers: ModifiersState,
-    /// Whether S flies back. It does so from the first flight key or look drag until the camera is framed, sent home,
-    /// orbited or panned.
+    /// Whether the key S flies back rather than saves. It flies back from the first flight key or look drag until the
+    /// camera is framed, sent home, orbited or panned.
     is_flying: bool,
 }
 
 impl Input {
-    /// Returns whether S flies back rather than saves.
+    /// Returns whether the key S flies back rather than saves the picture.
     pub fn is_flying(&self) -> bool {
         self.is_flying
     }

@@ -50,7 +50,7 @@ impl LoadedScene {
         Ok(Self::with_tree(path, Scene::load(path)?, load_options))
     }
 
-    /// Builds a scene's acceleration structure.
+    /// Builds a scene's acceleration structure, a kd-tree or a grid.
     ///
     /// # Panics
     /// The scene has a triangle without a material, which no loaded scene has.

@@ -2,7 +2,8 @@
 
 use winit::event::{ElementState, MouseButton};
 
-/// Pixels within which the mouse stays while a button is down, for the press to be a click and not a drag.
+/// Largest distance, in pixels, that the mouse may move while a button is down for the press to count as a click. A
+/// longer way is a drag.
 const CLICK_PX: f64 = 3.0;
 
 /// Effect of a drag.

@@ -11,7 +11,7 @@ use crate::gpu::{Commands, Context, FRAMES_IN_FLIGHT, GpuError, Presenter, Windo
 pub struct Overlay {
     /// None only while the overlay is dropped.
     renderer: Option<Renderer<GpuAllocator>>,
-    /// Textures that the last frame has used for the last time.
+    /// Textures that no further frame uses. They are freed once the frames in flight have ended.
     released: Vec<TextureId>,
     context: Arc<Context>,
 }

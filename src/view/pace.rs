@@ -2,13 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-/// Time after its last motion at which the camera rests.
+/// The camera counts as resting this long after its last motion.
 const REST_AFTER: Duration = Duration::from_millis(150);
 
 /// Times of the last motion of the camera, the last frame, and the oldest input that no frame has shown yet.
 #[derive(Debug, Default)]
 pub struct Pace {
-    /// When the camera moved last; none if it rests for certain.
+    /// When the camera moved last; none if it has not moved yet, or if [`Pace::rest`] was called since.
     moved_at: Option<Instant>,
     /// When the last frame was shown; none after a pause.
     shown_at: Option<Instant>,

@@ -26,7 +26,8 @@ impl Script {
         Self { tour, frame_ix: 0, is_placed: false, record, screenshot }
     }
 
-    /// Moves the camera to the next frame's place, unless it is there. The move counts as an input of the user.
+    /// Moves the camera to the place of the current frame, unless it was moved there before. The move counts as an
+    /// input of the user.
     pub fn direct(&mut self, session: &mut Session) {
         if std::mem::replace(&mut self.is_placed, true) {
             return;
@@ -50,8 +51,8 @@ impl Script {
         self.is_last() || self.record.is_some()
     }
 
-    /// Goes on to the next frame after one was shown, and writes the frame's picture. Returns true after the last
-    /// frame.
+    /// Is called after a frame was shown. If the frame has all samples that it gets, writes its picture and goes on
+    /// to the next frame. Returns true after the last frame.
     ///
     /// # Errors
     /// A picture cannot be written.

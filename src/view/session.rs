@@ -21,12 +21,12 @@ use crate::{
 
 /// Least length in seconds of the history that the panel shows.
 const HISTORY_S: f64 = 5.0;
-/// Reads per level of the kd-tree that the cost view shows brightest. A pixel has several rays, each of which goes
-/// down and up the tree several times.
+/// A pixel has the cost view's full brightness if its rays read this many nodes per level of the kd-tree. A pixel has
+/// several rays, each of which goes down and up the tree several times.
 const STEPS_PER_LEVEL: u32 = 16;
 
-/// Returns the number of reads that the cost view shows brightest. In a grid, a ray goes through at most as many
-/// cells as the sum of the grid's resolutions along the axes, and a pixel has a few such rays.
+/// Returns the number of reads per pixel that the cost view shows at full brightness. In a grid, a ray goes through
+/// at most as many cells as the sum of the grid's resolutions along the axes, and a pixel has a few such rays.
 fn brightest_cost(statistics: &Statistics) -> u32 {
     match statistics {
         Statistics::KdTree(tree) => STEPS_PER_LEVEL * tree.depth.max(1),
@@ -115,7 +115,8 @@ impl Session {
         !gpu.renderer.is_pending() && gpu.renderer.n_samples() >= self.n_wanted()
     }
 
-    /// Returns the samples per pixel at which the view is done. Views of primary hits need a single sample.
+    /// Returns the number of samples per pixel with which the view is complete. Views of primary hits need a single
+    /// sample.
     fn n_wanted(&self) -> u32 {
         if self.settings.view.needs_primary_rays_only() { 1 } else { self.settings.max_samples }
     }
@@ -203,8 +204,8 @@ impl Session {
         gpu.renderer.limit_batches(None)
     }
 
-    /// Returns whether the present buffers suffice for such a picture. Notes its size, since the caller then makes
-    /// them large enough.
+    /// Returns whether the renderer's buffers are large enough for a picture with the options `whole`. Also adds the
+    /// picture's size to `room`, since the caller enlarges the buffers if they are too small.
     fn has_room(&mut self, gpu: &GpuSession, whole: &RenderOptions) -> bool {
         let now = gpu.renderer.options();
         let has_room = whole.width <= self.room.0 && whole.height <= self.room.1;
@@ -242,8 +243,8 @@ impl Session {
         Ok(())
     }
 
-    /// Returns to the options that the device accepted last, and shows a message: the user cannot change a size that
-    /// the device refuses. Returns the error if the device is lost.
+    /// Returns to the options that the device accepted last, and shows a message. The viewer goes on, because the
+    /// user may be unable to undo the change, such as the window's size. Returns the error if the device is lost.
     fn take_back(&mut self, gpu: &GpuSession, error: GpuError) -> Result<(), GpuError> {
         if error.is_device_lost() {
             return Err(error);

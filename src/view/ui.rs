@@ -43,7 +43,7 @@ impl Ui {
         Self { state, cursor: Pos2::ZERO, repaint_after: Duration::ZERO }
     }
 
-    /// Passes an event to egui. Returns true if the event is egui's alone.
+    /// Passes an event to egui. Returns true if egui has taken the event, so that the camera must not react to it.
     pub fn take_event(&mut self, window: &Window, event: &WindowEvent) -> bool {
         let response = self.state.on_window_event(window, event);
         if response.repaint {

@@ -51,6 +51,7 @@ impl FlatScene {
             check(mesh, instance).map_err(|what| Mismatch::Instance { instance: instance_ix, what })?;
             push_triangles(mesh, instance, &mut triangles)
                 .map_err(|what| Mismatch::Instance { instance: instance_ix, what })?;
+            // An instance with fewer materials than the mesh has slots repeats its materials.
             let material_of = |slot: &u32| instance.materials[*slot as usize % instance.materials.len()];
             triangle_materials.extend(mesh.slots.iter().map(material_of));
         }
@@ -100,6 +101,7 @@ fn push_triangles(mesh: &Mesh, instance: &Instance, triangles: &mut Vec<Triangle
         normal => encode_octahedral(normal),
     };
     let triangle = |(face, normals): (&[u32; 3], &[Vec3; 3])| {
+        // A mirroring transform reverses the winding, so two corners are swapped.
         let [a, b, c] = if transform.mirrors() { [0, 2, 1] } else { [0, 1, 2] };
         Triangle {
             v0: world[face[a] as usize],

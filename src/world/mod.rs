@@ -62,7 +62,8 @@ impl World {
         Ok(Self(Arc::new(Parts { scene, accel, accel_options: options.clone() })))
     }
 
-    /// Joins a scene and a kd-tree that was built elsewhere, with `build_options`.
+    /// Joins a scene and a kd-tree that was built elsewhere. `build_options`: the options that the tree was built
+    /// with.
     ///
     /// # Errors
     /// The scene has a triangle without a material, or the tree was built from more or fewer triangles.
@@ -101,8 +102,8 @@ impl World {
         &self.0.accel_options
     }
 
-    /// Computes the statistics of the acceleration structure. If no device has built a grid, the host builds it for
-    /// this.
+    /// Computes the statistics of the acceleration structure. If the structure is a grid that no device has built,
+    /// the host builds the grid first.
     pub fn statistics(&self) -> Statistics {
         let Parts { scene, accel, accel_options } = &*self.0;
         match (accel, accel_options) {

@@ -29,11 +29,12 @@ struct TooMany {
 struct Item {
     triangle_ix: u32,
     lattice: Lattice,
-    /// The index of the lattice's first cell.
+    /// The index of the lattice's first cell in [`Grid::cells`].
     first_cell: u32,
 }
 
-/// The cells of all levels so far and, in the order of the lowest level's cells, their pairs.
+/// State of a build after a level: the cells of all levels so far, and the pairs of the lowest of these levels in the
+/// order of its cells.
 struct Level {
     cells: Vec<GridCell>,
     pairs: Vec<Pair>,
@@ -124,8 +125,9 @@ fn lower_level(input: &Input, lattice: &Lattice, upper: Level, density: f32) -> 
     unreachable!("blocks of one cell keep to the limits")
 }
 
-/// Returns the upper cells as blocks, and the number of all blocks' cells. `resolution`: the number of a block's
-/// cells along each axis.
+/// Returns the upper cells of a grid of two levels, and the number of all lower cells. In an upper cell, `first` is
+/// the index of the first cell of its block, and `count` is the block's resolution. `resolution`: the number of a
+/// block's cells along each axis.
 fn blocks_of(n_upper: u32, resolution: impl Fn(usize) -> u32) -> (Vec<GridCell>, u64) {
     let mut n_lower = 0;
     let block = |ix: usize| {
@@ -143,7 +145,7 @@ fn finest_resolution(input: &Input, upper: &Lattice, max_cells: f32) -> u32 {
     (2..=GRID_MAX_BLOCK_RESOLUTION).take_while(|&r| fits(r)).last().unwrap_or(1)
 }
 
-/// Returns the pairs of all items, in the order of the items, of each item's columns and of each column's cells.
+/// Returns the pairs of all items, ordered by item, then by column, then by the cell's place in the column.
 ///
 /// # Errors
 /// There are too many columns or pairs.

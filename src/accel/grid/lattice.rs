@@ -27,7 +27,7 @@ impl Lattice {
     pub fn of_density(bounds: &Bounds, max_cells: u32) -> Self {
         let margin = bounds.margin();
         // The bits of positive floats, as integers, have the same order as the floats. The search fixes the highest
-        // bits first. Cubes of the size with these bits are always too small.
+        // bits first. Cubes of the size whose bits are `bits` are too small at every step.
         let mut bits = 0;
         for bit in (0..31).rev() {
             let next = f32::from_bits(bits | (1 << bit));
@@ -38,8 +38,8 @@ impl Lattice {
         Self::of_size(bounds, f32::from_bits(bits + 1).min(f32::MAX))
     }
 
-    /// Returns the lattice of cubes of a size that [`Lattice::of_density`] has found, or of a larger one. A cube of
-    /// the largest size counts as filling any box.
+    /// Returns the lattice of cubes of a size that [`Lattice::of_density`] has found, or of a larger one. One cube
+    /// of the size `f32::MAX` counts as filling any box.
     fn of_size(bounds: &Bounds, cell_size: f32) -> Self {
         let mut lattice = Self { min: bounds.min, max: bounds.max, cell_size, n_cells: [1; 3] };
         if cell_size < f32::MAX {
@@ -48,8 +48,8 @@ impl Lattice {
         lattice
     }
 
-    /// Returns the lattice after doubling the edges of the cubes n times, and n. This is `n_doublings`, or fewer if
-    /// one cube fills the box before.
+    /// Returns the lattice after doubling the edges of the cubes n times, and n. The doubling ends early if one cube
+    /// fills the box. Otherwise n is `n_doublings`.
     pub fn coarser(&self, n_doublings: u32) -> (Self, u32) {
         let bounds = Bounds { min: self.min, max: self.max };
         let mut lattice = *self;

@@ -1,5 +1,6 @@
 //! Grids that are built when they are needed. The host keeps the options; each device builds the grid for itself, and
-//! the host builds one when it needs it. Both grids have the same bits.
+//! the host builds one at the first [`LazyGrid::get`]. Both grids have the same bits, unless the device had to lower
+//! the limit of references ([`GridOptions::max_references`]).
 
 use std::sync::OnceLock;
 
@@ -9,7 +10,8 @@ use serde::Serialize;
 use super::{Grid, GridOptions, Statistics};
 use crate::{accel::bounds::Bounds, layout::Triangle};
 
-/// Options of a grid over some triangles, with what is known of the grid so far.
+/// A grid over some triangles that is built on demand: its options, the host's grid if that is built, and the report
+/// of the first device that has built one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LazyGrid {
     options: GridOptions,
@@ -66,7 +68,8 @@ impl LazyGrid {
 
     /// Keeps a device's report, if it is the first one.
     pub(crate) fn note(&self, build: DeviceBuild) {
-        // Later builds have the same triangles and options, so their statistics are the same.
+        // Later builds have the same triangles and options. Their statistics are the same, unless another device has
+        // a lower limit of references.
         let _ = self.on_device.set(build);
     }
 

@@ -49,11 +49,11 @@ pub struct Grid {
 pub struct GridOptions {
     /// The levels of cells, and the densities of their cells.
     pub levels: GridLevels,
-    /// Limit of the number of references, as a multiple of the number of triangles; 1024 more are always allowed. A
-    /// grid that would have more references gets larger cells.
+    /// Limit of the number of references, as a multiple of the number of triangles, plus 1024. A grid that would have
+    /// more references gets larger cells.
     pub max_references_per_triangle: u32,
-    /// Limit of the number of references. One for each triangle is always allowed. A device sets the limit to what
-    /// its memory holds.
+    /// Second limit of the number of references; the smaller limit counts. One reference for each triangle is always
+    /// allowed. A device lowers this limit to the number of references that the device can bind.
     pub max_references: u32,
 }
 
@@ -111,15 +111,15 @@ impl GridOptions {
         most.min(u64::from(self.max_references)).max(n_triangles).min(u64::from(GRID_MAX_COUNT)) as u32
     }
 
-    /// Returns the most columns of cells that the boxes of all triangles may take together, in a grid of at most
-    /// `max_references` references.
+    /// Returns the most columns of cells that all triangles may have together in a grid of at most `max_references`
+    /// references. A triangle's columns are those of its bounds (overlap.rs).
     pub(crate) fn max_columns_of(max_references: u32) -> u32 {
         max_references.saturating_mul(GRID_COLUMNS_PER_REFERENCE).min(GRID_MAX_COUNT)
     }
 }
 
 impl Grid {
-    /// Returns the uniform constants that kernels need beside the grid's arrays.
+    /// Returns the uniform constants that kernels need in addition to the grid's arrays.
     pub fn constants(&self) -> AccelConstants {
         self.lattice.constants()
     }

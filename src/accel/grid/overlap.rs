@@ -8,13 +8,14 @@
 use super::Lattice;
 use crate::{accel::bounds::Bounds, layout::Triangle};
 
-/// Factor on the margin of the triangles' box. A triangle that comes nearer to a cube than this counts as inside it.
-/// The traversal needs the margin itself (bounds.rs). The additional sixteenth is 8 units of 2^-24 times the largest
-/// coordinate. The rounding of the cubes' middles and half edges takes 4 of these.
+/// Factor on the margin of the triangles' box. A triangle that comes nearer to a cube than the product counts as
+/// inside the cube. The traversal needs the margin itself (bounds.rs). The additional sixteenth is 8 units of 2^-24
+/// times the largest coordinate. The rounding of the cubes' middles and half edges takes 4 of these.
 const MARGIN_FACTOR: f32 = 1.0625;
 /// Error of a rounded product of two vectors, as a multiple of the product of their sums of magnitudes: 16 units of
-/// 2^-24. For a normal the error is 4 units: the rounding of an edge takes 1 unit, that of a product of two
-/// components 1, that of their difference 1. The product of a normal with a third vector adds 4.
+/// 2^-24. For a normal the error is 4 units: the rounding of each of the two edges takes 1 unit, that of a product of
+/// two components 1, and that of the difference of two products 1. The product of a normal with a third vector adds
+/// 4.
 const PRODUCT_ERROR: f32 = 1.0 / (1 << 20) as f32;
 
 /// A triangle and the columns of its box. The axes are permuted so that columns extend along the last one.

@@ -25,12 +25,12 @@ pub struct Statistics {
     pub references_per_triangle: f64,
     /// The number of times that the edges of all cells were doubled to keep to the limits of memory.
     pub n_coarser: u32,
-    /// Size in memory of cells, entries and their planes, bytes.
+    /// Size of cells, entries and their planes as the host stores them, bytes.
     pub bytes: u64,
 }
 
 impl Statistics {
-    /// Returns the size in memory of a grid's cells, and of its references with their planes, bytes.
+    /// Returns the size of a grid's cells, and of its references with their planes, as the host stores them, bytes.
     pub(crate) fn bytes_of(n_cells: usize, n_references: usize) -> u64 {
         (n_cells * size_of::<GridCell>() + n_references * (size_of::<u32>() + size_of::<Plane>())) as u64
     }

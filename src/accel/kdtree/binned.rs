@@ -1,10 +1,11 @@
-//! Search for the cheapest split of a large cell. It finds the same plane as a sweep over all sorted events would,
-//! without sorting them all. An event is where a triangle's bounds begin or end on an axis.
+//! Search for the cheapest split of a large cell. An event is a coordinate at which a triangle's bounds begin or end
+//! on an axis. With `exact_planes`, the search finds the same plane as a sweep over all sorted events would, without
+//! sorting them all. Otherwise the search ends at the cheapest edge between two bins.
 //!
-//! Counting events by bins gives the weight at every edge between two bins, and so an upper bound of the best weight.
-//! It also gives a lower bound of every weight within a bin. Only bins whose lower bound does not exceed the upper
-//! bound can hold the best plane, so only their events are sorted and swept (the sweep of Wald and Havran 2006). This
-//! takes O(n) time in practice.
+//! Counting events by bins gives the weight (sah.rs) of a split at every edge between two bins, and so an upper bound
+//! of the best weight. It also gives a lower bound of every weight within a bin. Only bins whose lower bound does not
+//! exceed the upper bound can hold the best plane, so only their events are sorted and swept (the sweep of Wald and
+//! Havran 2006). This takes O(n) time in practice.
 
 use rayon::prelude::*;
 
@@ -61,8 +62,8 @@ impl Bins {
         Self { child_areas, scale: (n_bins - 1) as f32 * child_areas.per_extent }
     }
 
-    /// Returns the bin of a position, which never decreases as the position grows. Adding 2^23 rounds the number to
-    /// an integer, which is then in the lowest bits.
+    /// Returns the bin of a position. A greater position never has a lower bin. Adding 2^23 rounds the scaled
+    /// position to an integer and leaves that integer in the lowest bits of the sum.
     #[inline]
     fn bin(&self, position: f32) -> usize {
         ((position - self.child_areas.min) * self.scale + 8_388_608.0).to_bits() as usize & (MAX_BINS - 1)
@@ -90,8 +91,9 @@ impl BinnedSearch {
             }
             self.collect(references, &bins);
             let best = self.sweep(&bins);
-            // An edge next to the cell's face can have a lower weight than all events. Then the search is repeated
-            // with the lowest weight that was found.
+            // An edge next to the cell's face can have a lower weight than all events. Then a bin that was not
+            // flagged may hold the best event, so the search is repeated with the lowest weight that the sweep has
+            // found.
             if best.weight <= limit || limit == f32::INFINITY {
                 return best;
             }

@@ -17,14 +17,14 @@ use crate::{
     layout::Triangle,
 };
 
-/// The most references of a cell that is built by one thread: some 5 ms.
+/// The most references of a cell that one thread builds, with all cells below it. This takes some 5 ms.
 const TASK_REFERENCES: usize = 4096;
 /// The number of references that one thread separates at a time.
 const CHUNK: usize = 1 << 15;
-/// The number of references that the budget allows beside a multiple of the number of triangles.
+/// The number of references by which a tree may exceed `max_references_per_triangle` times the number of triangles.
 const MIN_BUDGET: u64 = 1024;
-/// The most references of a tree, unless it has more triangles. Cutting off empty space makes up to 14 nodes a
-/// reference, so this many references stay below the 2^29 nodes that a link can reach.
+/// The most references of a tree, unless it has more triangles. Cutting off empty space makes up to 14 nodes per
+/// reference, so a tree of this many references stays below the 2^29 nodes that a split's child index can address.
 const MAX_BUDGET: u64 = 1 << 25;
 
 impl KdTree {

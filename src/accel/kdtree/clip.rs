@@ -1,5 +1,5 @@
-//! Clipping of triangles to cells, and "perfect splits" (Havran 2000): the bounds of what a plane leaves of a clipped
-//! triangle on either side.
+//! Clipping of triangles to cells, and "perfect splits" (Havran 2000). A perfect split cuts the clipped triangle at
+//! the plane and takes the bounds of each of the two parts.
 //!
 //! The clipping is Sutherland-Hodgman's, in f64. Coordinates are f32, so a computed point is off by some 2^-52 of
 //! them, which is far less than the margin.
@@ -15,9 +15,9 @@ pub struct Polygon {
     len: usize,
 }
 
-/// Returns the bounds of the parts of `triangle` below and above a plane through the cell, grown by the margin. Each
-/// part is what comes within the margin of the cell and is on its side of the plane, or within the margin of the
-/// plane on the other side. None: there is no such part. `plane`: its axis and its coordinate there, world units.
+/// Returns the bounds of the parts of `triangle` below and above a plane through the cell, grown by the margin. The
+/// triangle is first clipped to the cell, grown by the margin. Each part reaches beyond the plane by the margin. The
+/// bounds are none if the part is empty. `plane`: the axis and the coordinate of the plane, world units.
 pub fn split_bounds(triangle: &Triangle, cell: &Bounds, plane: (usize, f32), margin: f32) -> [Option<Bounds>; 2] {
     let polygon = Polygon::near(triangle, cell, margin);
     let (axis, position, margin) = (plane.0, f64::from(plane.1), f64::from(margin));
@@ -56,7 +56,7 @@ impl Polygon {
             if !outside(a) {
                 kept.push(*a);
             }
-            // The end of an edge that ends on the plane is a corner already.
+            // An edge with an end on the plane needs no further corner: that end is kept as a corner already.
             if outside(a) != outside(b) && a[axis] != position && b[axis] != position {
                 kept.push(crossing(a, b, axis, position));
             }

@@ -1,7 +1,7 @@
 //! Search for the cheapest split of a small cell. It counts the triangles on either side of every plane.
 //!
-//! n references give up to 2 n planes on each axis, so there are 4 n^2 comparisons. No branch depends on their
-//! results, and eight planes are compared at a time, which is faster than sorting so few references.
+//! n references give up to 2 n planes on each axis, so there are 4 n^2 comparisons per axis. No branch depends on
+//! their results, and eight planes are compared at a time, which is faster than sorting so few references.
 
 use super::{
     BuildOptions,

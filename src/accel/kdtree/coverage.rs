@@ -1,5 +1,5 @@
-//! Check that each triangle is in all leaves whose cells it comes near to, and within the slabs on the way there.
-//! Each triangle is cut up in f64, independently of the builder's own clipping.
+//! Check that each triangle is in all leaves whose cells the triangle comes near to, and within the slabs of the
+//! nodes above these leaves. Each triangle is cut up in f64, independently of the builder's own clipping.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -7,8 +7,9 @@ use rayon::prelude::*;
 use super::{Invalid, KdTree, Node};
 use crate::{accel::bounds::is_finite, layout::Triangle};
 
-/// Share of the margin, and of the reach of slabs, that is checked. The rest is room for rounding: of bounds to f32,
-/// and of points that are cut by seven planes, each off by four times 2^-53 of the coordinates.
+/// Share of the margin, and of the reach of slabs, that is checked. The rest is room for two kinds of rounding:
+/// bounds are rounded to f32, and a point may be cut by seven planes, where each cut is off by four times 2^-53 of
+/// the coordinates.
 const CHECKED: f64 = 0.96;
 
 /// A triangle on its way down a tree.
@@ -21,7 +22,7 @@ struct Descent<'a> {
     reach: f64,
 }
 
-/// What a node lacks of a triangle.
+/// Defect of a node that the check has found for a triangle.
 enum Lack {
     /// The leaf of this index has no entry of the triangle.
     Entry(u32),
@@ -56,6 +57,7 @@ impl Descent<'_> {
         }
         if let Some(slab) = self.tree.slab_of(node) {
             let (normal, offset) = (slab.normal.as_dvec3(), f64::from(slab.offset));
+            // In the slab's unit, half of its thickness is 1, and a world unit is the normal's length (`Slab`).
             let room = 1.0 - self.reach * normal.length();
             if polygon.iter().any(|&corner| (normal.dot(corner) - offset).abs() > room) {
                 return Some(Lack::Slab(node));

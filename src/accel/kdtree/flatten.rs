@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::{EMPTY_LEAF, Node, Parts, subtree::Subtree};
 use crate::accel::bounds::Bounds;
 
-/// Upper part of a tree, with the subtrees below it.
+/// Node of the upper part of a tree with all nodes below it. Its lowest nodes are whole subtrees.
 pub enum UpperTree {
     Split { axis: usize, position: f32, children: Box<[UpperTree; 2]> },
     Subtree(Subtree),
@@ -27,7 +27,7 @@ pub fn flatten(top: UpperTree, cell: Bounds) -> Parts {
     tree
 }
 
-/// Writes a node into a slot, and appends all nodes below it.
+/// Writes a node at the index `slot`, and appends all nodes below it.
 fn append(tree: &mut Parts, slot: usize, top: UpperTree) {
     match top {
         UpperTree::Subtree(subtree) => append_subtree(tree, slot, &subtree),
@@ -43,7 +43,7 @@ fn append(tree: &mut Parts, slot: usize, top: UpperTree) {
     }
 }
 
-/// Writes a subtree's root into a slot, and appends the subtree's other nodes and its entries.
+/// Writes a subtree's root at the index `slot`, and appends the subtree's other nodes and its entries.
 fn append_subtree(tree: &mut Parts, slot: usize, subtree: &Subtree) {
     let (first_node, first_triangle) = (tree.nodes.len() as u32, tree.leaf_triangles.len() as u32);
     let relocated = |node| match Node::from(node) {

@@ -17,7 +17,7 @@ pub struct TraversalLinks {
 }
 
 impl TraversalLinks {
-    /// Returns what the traversal reads beside the scene's structure. For a grid, all arrays are empty.
+    /// Returns the arrays that the traversal reads in addition to the scene's structure. For a grid, all are empty.
     pub fn of(accel: &Accel, traversal: Traversal) -> Self {
         match accel {
             Accel::KdTree(tree) => Self::new(tree, traversal),
@@ -25,7 +25,7 @@ impl TraversalLinks {
         }
     }
 
-    /// Returns what the traversal reads beside the tree.
+    /// Returns the arrays that the traversal reads in addition to the tree.
     pub fn new(tree: &KdTree, traversal: Traversal) -> Self {
         let boxes = if traversal.needs_boxes() { tree.boxes() } else { Vec::new() };
         let ropes = if traversal.needs_ropes() { tree.ropes(&tree.boxes()) } else { Vec::new() };

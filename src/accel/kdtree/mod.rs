@@ -45,12 +45,12 @@ pub use validate::Invalid;
 #[derive(Clone, Debug, PartialEq)]
 pub struct KdTree {
     parts: Parts,
-    /// The number of triangles that the tree was built from: every index in its leaves is below it.
+    /// The number of triangles that the tree was built from. Every triangle index in a leaf is less than this number.
     n_triangles: usize,
 }
 
 impl KdTree {
-    /// Returns the uniform constants that kernels need beside the tree's arrays. All other members are 0.
+    /// Returns the uniform constants that kernels need in addition to the tree's arrays. All other members are 0.
     pub fn constants(&self) -> AccelConstants {
         let Parts { cell_min, cell_max, .. } = self.parts;
         let largest_coordinate = cell_min.abs().max(cell_max.abs()).max_element();
@@ -68,13 +68,14 @@ pub struct BuildOptions {
     pub intersection_cost: f32,
     /// Bonus for a split that cuts off empty space: the share by which its intersection cost is reduced, 0 to 1.
     pub empty_bonus: f32,
-    /// The most levels below the root. It is never more than `KD_MAX_DEPTH - 2`, which is also what `None` means.
+    /// The most levels below the root. `None` and all values above `KD_MAX_DEPTH - 2` mean `KD_MAX_DEPTH - 2`.
     pub max_depth: Option<u32>,
-    /// Limit of the number of references, as a multiple of the number of triangles; 1024 more are always allowed. So
-    /// is a single leaf of all triangles.
+    /// Limit of the number of references, as a multiple of the number of triangles, plus 1024. The limit is never
+    /// more than 2^25 or the number of triangles, whichever is larger. A single leaf of all triangles is always
+    /// allowed.
     pub max_references_per_triangle: u32,
     /// Whether a cell of more than 32 references is split at the best of all planes through the sides of its
-    /// triangles' bounds. If not, it is split at the best of up to 1023 planes on each axis, which are found sooner.
+    /// triangles' bounds. If not, it is split at the best of up to 1023 planes on each axis, which takes less time.
     pub exact_planes: bool,
     /// Whether nodes get slabs, which takes some 200 ns a reference. The CPU and GPUs use slabs, software drivers do
     /// not.
@@ -82,7 +83,7 @@ pub struct BuildOptions {
 }
 
 /// Options of the tree that traces fastest on a GPU (docs/experiments.md). An intersection cost of 0.7 makes a
-/// tree that is half as large again and no faster.
+/// tree that is 1.5 times as large and no faster.
 impl Default for BuildOptions {
     fn default() -> Self {
         Self {

@@ -1,18 +1,19 @@
 //! Planes of the leaves' triangles. Where a ray keeps clear of a triangle's plane, the triangle need not be tested.
 //!
-//! A ray is clear of a plane if its distance from the plane is more than `KD_PLANE_EPSILON` all along its t interval
-//! in the leaf. This epsilon is twice the tree's margin: 256 units of 2^-24 times the largest coordinate. The table
-//! lists the errors in these units, with origins as far away as `KD_MAX_ORIGIN_DISTANCE` allows.
+//! A ray is clear of a plane if its distance from the plane is more than `plane_epsilon` all along its t interval in
+//! the leaf. This epsilon is `KD_PLANE_EPSILON` times the largest coordinate, which is twice the tree's margin: 256
+//! units of 2^-24 times the largest coordinate. The table lists the errors in these units, with origins as far away
+//! as `KD_MAX_ORIGIN_DISTANCE` allows.
 //!
 //! ```text
 //! error of                                                   units
-//! the point at a hit's t, off the triangle across its plane    149   (86 on each axis: bounds.rs)
+//! the height of the point at a hit's t above the plane         149   (86 on each axis, times sqrt(3): bounds.rs)
 //! the plane                                                      4
 //! the origin's height above the plane                           30
 //! the slope over the ray's length                               26
 //! the middle of the t interval                                   9
 //! half of the t interval                                         9
-//! the heights that belong to these two                       4 + 4
+//! the heights at that middle and for that half               4 + 4
 //! sum                                                          235   of 256
 //! ```
 

@@ -8,9 +8,9 @@
 use super::BuildOptions;
 use crate::accel::bounds::Bounds;
 
-/// Least extent on an axis of a cell that is split there, world units: 2^-115. With at least this extent, 1024 bins
-/// divided by the extent are a finite f32. With an extent of at most `f32::MAX`, so is a plane's distance from the
-/// cell's face. Other cells are not split on the axis.
+/// The least extent on an axis at which a cell is split on that axis, world units: 2^-115. The greatest extent is
+/// `f32::MAX`. The lower limit keeps the quotient of 1024 bins and the extent finite in f32. The upper limit keeps a
+/// plane's distance from the cell's face finite.
 const MIN_EXTENT: f64 = f32::MIN_POSITIVE as f64 * 2048.0;
 
 /// A plane that splits a cell, and the weight of the split.
@@ -38,9 +38,9 @@ pub struct ChildAreas {
     pub max: f32,
     /// 1 / extent on the axis.
     pub per_extent: f32,
-    /// Share of a part of no thickness.
+    /// The share of a part of thickness 0, which comes from its two faces parallel to the plane.
     base: f32,
-    /// What the whole thickness of the cell adds to the share.
+    /// The increase of the share from a part of thickness 0 to the whole cell.
     slope: f32,
     /// Factor on the weight of a split with an empty side.
     empty_factor: f32,

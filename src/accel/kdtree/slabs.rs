@@ -2,9 +2,9 @@
 //! Scenes, SIGGRAPH 1986). A ray that passes by a surface goes through many cells that have a part of it. Where the
 //! ray keeps clear of a cell's slab, it need not go down to the leaves.
 //!
-//! A slab holds the parts of triangles within the tree's margin (bounds.rs) of the cell, and reaches
-//! `KD_PLANE_EPSILON` beyond them. That is as far as a ray has to keep from a triangle's plane, and the reasons are
-//! the same (planes.rs), except that rounding moves a slab by 5 of the units there, and a plane by 4.
+//! A slab holds the parts of triangles within the tree's margin (bounds.rs) of the cell. It reaches beyond them by
+//! `plane_epsilon`, which is also the distance that a ray has to keep from a triangle's plane. The proof is that of
+//! planes.rs, except that rounding moves a slab by 5 of the units there, and a plane by 4.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -15,8 +15,9 @@ use crate::{
     layout::{KD_HAS_SLAB, Slab, Triangle},
 };
 
-/// The most entries below nodes that get slabs. For each of these numbers, the first node on each path down that has
-/// no more entries gets a slab, if the surface there is flat enough. Larger pieces of the surface hardly ever are
+/// Limits of the number of entries below a node, which choose the splits that may get a slab. For each limit, that is
+/// the first split on each path from the root with no more entries than the limit. It gets a slab if the surface in
+/// its cell is flat enough. A piece of the surface with more entries than the last limit is hardly ever flat enough
 /// (docs/experiments.md).
 const SLAB_ENTRY_LIMITS: [u32; 5] = [8, 32, 128, 512, MAX_SLAB_ENTRIES];
 /// The largest of `SLAB_ENTRY_LIMITS`.
@@ -102,7 +103,8 @@ struct Surface {
 }
 
 impl Fitting<'_> {
-    /// Returns the topmost nodes with no more than `MAX_SLAB_ENTRIES` entries below them, and all leaves above those.
+    /// Returns the topmost nodes with no more than `MAX_SLAB_ENTRIES` entries below them, and the leaves that have
+    /// more entries.
     fn patches(&self, root: Bounds) -> Vec<NodeCell> {
         let mut patches = Vec::new();
         let mut stack = vec![NodeCell { node: 0, cell: root }];
@@ -126,7 +128,8 @@ impl Fitting<'_> {
     }
 
     /// Adds the polygons below a node to the surface, and the slabs there. `n_above`: the number of entries below the
-    /// parent. Returns the sum of the polygons' area vectors, each turned to the side of the others.
+    /// parent. Returns the sum of the polygons' area vectors. A vector that points away from the sum so far is
+    /// negated, so the triangles' winding does not matter.
     fn fit(&self, patch: &NodeCell, n_above: u32, surface: &mut Surface) -> DVec3 {
         let (n_entries, first_corner) = (self.n_entries[patch.node as usize], surface.corners.len());
         let (area, thickest) = match self.tree.node(patch.node) {
@@ -178,7 +181,7 @@ impl Surface {
     }
 }
 
-/// Returns the sum of two area vectors, the second one turned to the side of the first.
+/// Returns the sum of two area vectors. The second one is negated if it points away from the first.
 fn towards(area: DVec3, other: DVec3) -> DVec3 {
     if area.dot(other) < 0.0 { area - other } else { area + other }
 }

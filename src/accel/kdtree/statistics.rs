@@ -24,7 +24,7 @@ pub struct Statistics {
     /// Expected cost of a ray that crosses the root's cell, in the unit of the build's costs (MacDonald and Booth
     /// 1990). It is the sum over all nodes of the node's own cost times its cell's share of the root's surface.
     pub sah_cost: f64,
-    /// Size in memory of nodes, parents, leaves with their planes, and slabs, bytes.
+    /// Size on the host of nodes, parents, leaves with their planes, and slabs, bytes.
     pub bytes: u64,
 }
 

@@ -1,5 +1,5 @@
-//! Build of a subtree by one thread. It is recursive; the references of the cells on the path are in one array that
-//! grows and shrinks like a stack.
+//! Build of a subtree by one thread, recursively. The references of the current cell and of all cells above it are in
+//! one array, which grows and shrinks like a stack.
 
 use std::ops::Range;
 
@@ -28,9 +28,10 @@ pub struct Cell {
     pub budget: u64,
 }
 
-/// Number of references that does not justify the second word of the traversal's bit mask, which slows all rays down.
-/// A cell at or below the level where the first word ends is split only if it has more. Meshes of a million triangles
-/// have hardly a leaf of as many there (docs/experiments.md).
+/// The most references of a cell that is never split at a level of `KD_WORD_DEPTH` or more. A tree that is deeper
+/// than `KD_WORD_DEPTH` needs a second word of the traversal's bit mask, which slows all rays down. So few references
+/// do not justify that. In meshes of a million triangles, hardly any leaf at these levels has this many references
+/// (docs/experiments.md).
 const FEW_REFERENCES: usize = 64;
 
 impl Cell {
@@ -76,7 +77,8 @@ pub fn split_reference(input: Input, reference: &Reference, cell: &Bounds, split
     }
     let triangle = &input.triangles[reference.triangle_ix as usize];
     let parts = split_bounds(triangle, cell, (split.axis, split.position), input.margin);
-    // Each part is rounded outwards by itself, so it is cut with the reference's own bounds: bounds only shrink.
+    // The bounds of each part are rounded outwards. The intersection keeps them within the reference's own bounds, so
+    // bounds never grow from a cell to its children.
     let limits = reference.bounds.split(split.axis, split.position);
     [0, 1].map(|side| parts[side].map(|part| Reference { bounds: part.intersection(&limits[side]), ..*reference }))
 }
@@ -101,7 +103,8 @@ pub fn build(input: Input, references: Vec<Reference>, cell: Cell) -> Subtree {
 /// State of a build.
 struct Builder<'a> {
     input: Input<'a>,
-    /// The references of the cells on the path, and of their siblings that are still to be built; the newest last.
+    /// The references of the current cell, of all cells above it, and of siblings that are not built yet; the newest
+    /// references are last.
     references: Vec<Reference>,
     /// The references of the upper child while those of both children are separated.
     above: Vec<Reference>,
@@ -110,7 +113,7 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    /// Builds the node of a cell into a slot, and appends all nodes below it.
+    /// Builds the node of a cell at the index `slot`, and appends all nodes below it.
     fn node(&mut self, slot: usize, range: Range<usize>, cell: Cell) {
         let references = &self.references[range.clone()];
         let Some((split, cells)) = cell.split(references, self.input.options, &mut self.search) else {
@@ -127,6 +130,7 @@ impl Builder<'_> {
         self.references.truncate(n_references);
     }
 
+    /// Writes a leaf with the references of a range at the index `slot`.
     fn leaf(&mut self, slot: usize, range: Range<usize>, level: u32) {
         let leaf_triangles = &mut self.subtree.leaf_triangles;
         let (first, count) = (leaf_triangles.len() as u32, range.len() as u32);

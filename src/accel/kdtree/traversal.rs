@@ -1,16 +1,16 @@
-//! Algorithms that take rays through a kd-tree. They differ in how they find the pending subtrees: far children that
-//! the ray has passed and still has to visit. The paper is the one that README.md names.
+//! Traversal algorithms of the kd-tree. They differ in how they find the pending subtrees: far children that the ray
+//! has passed and still has to visit. README.md names the paper that comments here refer to.
 
 use crate::layout;
 
-/// Algorithm that takes a ray through the kd-tree.
+/// Traversal algorithm of the kd-tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Traversal {
-    /// A bit mask: one bit a level says whether the sibling there is still to be visited. Pending subtrees are kept
+    /// A bit mask: one bit per level says whether the sibling there is still to be visited. Pending subtrees are kept
     /// in local memory, in the order of the bits.
     Mask,
-    /// The paper's own bit mask: one bit a level says whether the sibling there is done. The siblings' boxes tell
-    /// whether the ray visits them.
+    /// The paper's own bit mask: one bit per level says whether the sibling there is done. The ray is tested against
+    /// the box of a sibling that is not done, and visits the sibling if the ray meets the box.
     MaskBoxes,
     /// Restarts: each pending subtree is found again from the root.
     Restart,
@@ -28,8 +28,8 @@ pub enum Traversal {
 }
 
 impl Traversal {
-    /// The algorithm for GPUs: the paper's idea. A stack and ropes are up to a tenth faster on some scenes
-    /// (README.md's figures).
+    /// The algorithm for GPUs, which follows the paper's idea. A stack and ropes are up to a tenth faster on some
+    /// scenes (figures in README.md).
     pub const OF_GPUS: Self = Self::Mask;
     /// The fastest algorithm on software drivers, which run kernels on the CPU.
     pub const OF_SOFTWARE_DRIVERS: Self = Self::Ropes;

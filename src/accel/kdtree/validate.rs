@@ -1,4 +1,5 @@
-//! Check of all invariants of a tree: of its structure here, of what its leaves hold in `coverage`.
+//! Check of all invariants of a tree. This file checks the structure. `coverage` checks that no leaf lacks a
+//! triangle.
 
 use super::{EMPTY_LEAF, KdTree, Node, coverage, planes::planes_of};
 use crate::{
@@ -90,9 +91,11 @@ struct Walk<'a> {
     triangles: &'a [Triangle],
     /// Distance from a cell within which a triangle counts as inside the cell, world units.
     margin: f32,
+    /// Whether each node has been entered.
     seen: Vec<bool>,
     /// The number of entries of the leaves so far.
     n_entries: usize,
+    /// The deepest level so far.
     depth: u32,
 }
 
@@ -136,6 +139,7 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
+    /// Checks a split's axis, child index, parent link and position.
     fn split(&self, node: u32, (axis, position): (usize, f32), child: u32, cell: &Bounds) -> Result<(), Invalid> {
         if axis > 2 {
             return Err(Invalid::Axis { node });
@@ -152,6 +156,7 @@ impl<'a> Walk<'a> {
         if is_inside { Ok(()) } else { Err(Invalid::Position { node, axis, position }) }
     }
 
+    /// Checks a leaf's range of entries, their order, and that each triangle comes near to the cell.
     fn leaf(&mut self, node: u32, first: usize, count: usize, cell: &Bounds) -> Result<(), Invalid> {
         if first != self.n_entries || count > self.tree.leaf_triangles().len() - first {
             return Err(Invalid::LeafRange { node });

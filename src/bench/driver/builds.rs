@@ -23,7 +23,7 @@ pub struct Builds {
     pub n_threads: usize,
     /// Time of the driver's structure on the GPU; none where the device has no timestamps.
     pub bvh_ms: Option<Spread>,
-    /// Number of builds of each structure on the GPU.
+    /// Number of timed builds of each structure on the GPU, the driver's and the grids.
     pub n_bvh_builds: usize,
     /// Times of kdray's grids on the GPU.
     pub grids: Vec<GridBuilds>,
@@ -34,7 +34,8 @@ pub struct Builds {
 pub struct GridBuilds {
     /// `grid` or `grid2`.
     pub accel: String,
-    /// Time from the begin of the first kernel to the end of the last one; none where the device has no timestamps.
+    /// Time from the beginning of the first kernel to the end of the last one; none where the device has no
+    /// timestamps.
     pub ms: Option<Spread>,
     /// The stages of the last build.
     pub stages: Vec<BuildStage>,

@@ -1,8 +1,8 @@
 //! The benchmark of kdray's searches against the driver's own ray tracing, on the same rays and triangles in one run.
-//! Each of these tracers is called a contender.
+//! Each of kdray's searches, and the driver's ray tracing, is called a contender.
 //!
 //! ```text
-//! builds    building the structures of both over the same triangles -> times
+//! builds    building kdray's and the driver's structures over the same triangles -> times
 //! contest   contenders that take turns on a device -> times, hits
 //!   pipeline  the contender that uses VK_KHR_ray_tracing_pipeline; nothing else in kdray uses that extension
 //! raster    rasterization in place of primary rays -> times
@@ -80,7 +80,8 @@ impl Structure {
     }
 }
 
-/// A stage on a device that supports ray tracing, ready for rays.
+/// A scene on a device that supports ray tracing: kdray's structures, the driver's structure and the rasterizers,
+/// ready to be measured.
 pub struct Arena {
     context: Arc<Context>,
     structures: Vec<Structure>,

@@ -1,4 +1,5 @@
-//! Rasterization in place of primary rays. It is timed by the tracing passes of whole frames of `max_depth` 1.
+//! Rasterization in place of primary rays. Frames of `max_depth` 1 are drawn, and the times of their tracing passes
+//! count.
 
 use std::sync::Arc;
 
@@ -59,8 +60,8 @@ impl Raster {
         Ok(())
     }
 
-    /// Returns the result of all frames so far. `primary` is the set with the driver's primary rays, one per pixel
-    /// too.
+    /// Returns the result of all frames so far. `primary` is the result on the set of primary rays, which also has
+    /// one ray per pixel.
     pub fn result(&self, primary: &SetResult) -> RasterResult {
         let sums = self.frames.iter().map(|frame| frame.iter().map(|(_, ms)| ms).sum());
         let names = self.frames.first().into_iter().flatten().map(|(name, _)| *name);

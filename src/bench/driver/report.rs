@@ -45,7 +45,7 @@ pub struct SetResult {
     pub kdray: Vec<Rival>,
 }
 
-/// One of kdray's searches on one set of rays.
+/// The result of one of kdray's searches on one set of rays, beside the driver's.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Rival {
     pub traversal: String,
@@ -165,7 +165,7 @@ impl Report {
         }
     }
 
-    /// Returns the first set and search with more hits that differ from the driver's than rounding explains.
+    /// Returns the first set and search for which more hits differ from the driver's than rounding explains.
     pub fn first_wrong(&self) -> Option<(&SetResult, &Rival)> {
         let mut pairs = self.sets.iter().flat_map(|set| set.kdray.iter().map(move |rival| (set, rival)));
         pairs.find(|(set, rival)| !rival.apart.is_rounding(set.n_rays))

@@ -20,15 +20,16 @@ use crate::cli::{
     picture_args::{accel_help, accel_long_help, listed, traversal_help, traversal_long_help, traversals_of_devices},
 };
 
-/// The suites: what is measured.
+/// The benchmark suites.
 #[derive(Subcommand)]
 pub enum Suite {
-    /// Measure the paper's table: whole frames of its four scenes, on the GPU and on one CPU thread, beside its own
-    /// times
+    /// Measure the paper's table: whole frames of the paper's four scenes, on the GPU and on one CPU thread, beside
+    /// the times that the paper reports
     Paper(PaperArgs),
     /// Compare all traversals of the kd-tree, and grids, on primary, shadow, mirror and diffuse rays of a mesh
     Traversal(TraversalArgs),
-    /// Compare kdray with the driver's own ray tracing on the same rays; exits with 4 if the device has none
+    /// Compare kdray with the driver's own ray tracing on the same rays; exits with 4 if the device has no
+    /// ray tracing
     Driver(DriverArgs),
     /// Measure how build time and time per ray grow with the number of triangles, on a generated mesh
     Size(SizeArgs),

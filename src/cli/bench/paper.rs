@@ -83,7 +83,7 @@ fn text(report: &Report) -> String {
     );
     text += "The paper's times: a GTX 285 and one CPU thread, scenes of the same triangle counts.\n";
     if report.rows.iter().any(|row| row.gpu_ms.is_none()) {
-        text += "Pinned device has no timestamps: its times are unknown.\n";
+        text += "This device has no timestamps: its times are unknown.\n";
     }
     text
 }

@@ -117,7 +117,7 @@ fn text(report: &Report) -> String {
     text += "\nNodes and slabs, or cells; links to parents or neighbours, boxes, triangle tests: the mean of a ray, \
              counted on the CPU.\nDiffering: from the CPU's hits.\n";
     if report.sets.iter().flat_map(|set| &set.variants).any(|variant| variant.ms.is_none()) {
-        text += "Pinned device has no timestamps: speeds are unknown.\n";
+        text += "This device has no timestamps: speeds are unknown.\n";
     }
     text
 }

@@ -37,7 +37,7 @@ impl Files {
         self.layers.iter().chain(&self.heat_map).filter(|path| **path != self.picture)
     }
 
-    /// Notes the files as outputs. Refuses files that the command also reads, or that it writes twice.
+    /// Enters the files into `roles` as outputs. Refuses files that the command also reads, or that it writes twice.
     pub fn note(&self, roles: &mut FileRoles) -> Result<(), CliError> {
         roles.write("--output", &self.picture)?;
         self.beside().try_for_each(|path| roles.write("--aov", path))

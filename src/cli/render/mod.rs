@@ -170,7 +170,8 @@ fn draw_and_write(
 ) -> Result<(Vec<Profile>, f64), CliError> {
     let n_steps = views.len() as u32 * args.spp * u32::from(args.repeat) * renderer.n_bands();
     let mut steps = progress.steps(message, n_steps);
-    // A frame that is measured is drawn without pauses, which would show progress but take time.
+    // Progress within a sample takes time, because the CPU waits for the device. Measured frames are drawn without
+    // it.
     steps.shows_parts &= args.profile.is_none() && args.trace.is_none() && args.repeat == 1;
     let (mut profiles, mut drawing, mut last) = (Vec::new(), Duration::ZERO, begin);
     for view in views {

@@ -23,20 +23,22 @@ use crate::{
     passes::spirv,
 };
 
-/// The environment variable that names another folder. If it is empty, nothing is kept.
+/// Environment variable with the path of the cache folder. If its value is empty, nothing is kept.
 const FOLDER: &str = "KDRAY_CACHE";
 /// Number of bytes of a file that are read at most.
 const MOST_BYTES: u64 = 1 << 16;
 
-/// What a measurement depends on. It identifies an entry of the cache.
+/// Identifies an entry of the cache by what the measured times depend on. The scene's camera and lights are not part
+/// of the key.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Key {
     device: String,
     /// The driver's name and version.
     driver: String,
-    /// What was measured: traversals, or primary visibility in pictures of a size.
+    /// What was measured: traversals, or primary visibility, with the picture's size and the traversal.
     subject: String,
-    /// A hash of `cast.comp`, a kernel that was timed.
+    /// A hash of `cast.comp`, the kernel by which traversals are timed. Measurements
+    /// of primary visibility have the same hash, since their kernels share the traversal code.
     kernel: String,
     /// A hash of the scene's triangles.
     triangles: String,
@@ -74,7 +76,7 @@ fn hash(bytes: &[u8]) -> String {
     format!("{:016x}", hasher.finish())
 }
 
-/// The contents of a file. The key tells apart entries whose file names are the same by chance.
+/// The contents of a file. The file's name is a hash of the key, so the whole key is stored to detect collisions.
 #[derive(Serialize, Deserialize)]
 struct Entry {
     #[serde(flatten)]
@@ -105,8 +107,8 @@ impl Cache {
         Self { folder: Some(folder.to_owned()) }
     }
 
-    /// Returns the times for a key, if they have been measured. Names and times are not checked: see
-    /// [`Timings::is_sound`].
+    /// Returns the times for a key, if they have been measured. The names of methods and the times are not checked:
+    /// see [`Timings::is_sound`].
     pub fn get(&self, key: &Key) -> Option<Timings> {
         let mut bytes = Vec::new();
         let file = File::open(self.folder.as_ref()?.join(key.file_name())).ok()?;

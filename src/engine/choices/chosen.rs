@@ -17,9 +17,9 @@ pub enum Reason {
     Pinned,
     /// A rule gave it, from the device and from sizes.
     Rule,
-    /// It was the fastest in a measurement of this run.
+    /// A measurement of this run decided.
     Measured,
-    /// It was the fastest in a measurement of an earlier run.
+    /// A measurement of an earlier run decided.
     Cached,
 }
 
@@ -66,10 +66,10 @@ pub struct Methods {
     pub traversal: Chosen<Traversal>,
     /// How primary rays find their triangles.
     pub primary: Chosen<Primary>,
-    /// Nanoseconds per ray of each traversal, if they decided.
+    /// Nanoseconds per ray of each traversal, if these times decided.
     pub traversal_ns: Option<Timings>,
-    /// Nanoseconds per pixel of each kind of primary visibility, if they decided: whole frames of primary rays and
-    /// their shadow rays.
+    /// Nanoseconds per pixel of each kind of primary visibility, if these times decided. They are the times of whole
+    /// frames of primary rays and their shadow rays.
     pub primary_ns: Option<Timings>,
 }
 

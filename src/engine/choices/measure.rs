@@ -1,8 +1,8 @@
-//! Measures what each method takes on a device, in a scene.
+//! Measures the time that each method takes on a device, in a scene.
 //!
-//! Traversals are timed on coherent rays from the scene's own camera and on scattered rays: one that bounces from
-//! each of their hits. They take turns, and the least time of each counts. So a clock that rises meanwhile favours
-//! none.
+//! Traversals are timed on coherent rays from the scene's own camera and on scattered rays: one diffuse ray from each
+//! hit of a camera ray. The traversals run in turn, and the shortest time of each counts, so that a clock frequency
+//! that rises during the measurement favours none.
 
 use std::{rc::Rc, sync::Arc};
 
@@ -22,17 +22,17 @@ use crate::{
     world::{FlatScene, World},
 };
 
-/// Bounds of the number of camera rays, which is otherwise that of the device's lanes. With fewer rays the device
-/// would idle, and more rays only take longer.
+/// Bounds of the number of camera rays. Between them, it is the number of lanes that the device runs at once: with
+/// fewer rays the device would idle, and more rays only take longer.
 const FEWEST_RAYS: u32 = 1 << 12;
 const MOST_RAYS: u32 = 1 << 18;
 /// Number of timed casts of all rays by each traversal.
 const N_ROUNDS: u16 = 5;
-/// Number of timed frames of each kind of primary visibility, after as many that are not timed.
+/// Number of timed frames of each kind of primary visibility. The same number of frames runs before, untimed.
 const N_FRAMES: usize = 5;
 
-/// Times each traversal, in nanoseconds per ray. Returns none where the device has no timestamps. The traversals may
-/// read nothing but ropes beside the tree.
+/// Times each traversal, in nanoseconds per ray. Returns none where the device has no timestamps. Each traversal
+/// must read only the tree, or the tree and ropes.
 ///
 /// # Errors
 /// The buffers are beyond the device's limits or memory, or a call fails.
@@ -68,8 +68,8 @@ pub fn measure_traversals(
     Ok((0..kernels.len()).map(ns_a_ray).collect())
 }
 
-/// Returns the rays of the scene's camera, and one from each of their hits into the hemisphere above it. The CPU
-/// finds the hits, so the rays of a frame are the same for every device.
+/// Returns the rays of the scene's camera, then one diffuse ray from each of their hits. The CPU finds the hits, so
+/// the rays of a frame are the same for every device.
 fn some_rays(world: &World, frame: &Frame) -> Vec<Ray> {
     let mut from_camera = vec![PathRay::zeroed(); (frame.width * frame.height) as usize];
     primary_rays(frame, 0, &mut from_camera);

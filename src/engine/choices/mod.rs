@@ -12,11 +12,11 @@
 //! chosen   choices with their reasons, for reports
 //! ```
 //!
-//! Every traversal finds the same hits, bit for bit, so the fastest one may be chosen by measurement. So may the
-//! faster of rasterizing primary rays by kernels and tracing them, unless a camera may be so far away that the two
-//! round differently. Choices that change bits are made by rule: the choice between graphics and kernels for primary
-//! rays, and every choice if the output contains what rays cost. All choices depend on the size of the whole picture,
-//! so that a part of it is rendered as the whole is.
+//! Every traversal finds the same hits, bit for bit, so the fastest one may be chosen by measurement. Primary
+//! visibility by compute kernels and by tracing may also be chosen by measurement, unless a camera may be so far away
+//! that the two round differently. Choices that change bits are made by rule: the choice between graphics and kernels
+//! for primary rays, and every choice if the output contains the traversal costs of rays. All choices depend on the
+//! size of the whole picture, so that a part of it is rendered as the whole is.
 //!
 //! A measurement uploads the tree once more and makes ropes for it, which takes longer than a frame. Its result is
 //! kept, so every later run may profit. Only runs with enough rays to win the time back make a measurement: long
@@ -93,15 +93,15 @@ impl Processor {
     }
 }
 
-/// The work that a choice is made for.
+/// An estimate of the work of a run. Choices depend on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Workload {
     /// Width and height of the whole picture in pixels, whatever part of it is rendered.
     pub size: (u32, u32),
-    /// Number of rays that the work takes, as far as that is known in advance. The repetitions of a benchmark do not
-    /// count, since it shows what a single run does.
+    /// Number of rays that the work takes, as far as that is known in advance. A benchmark counts only one of its
+    /// repetitions, because it shows what a single run does.
     pub n_rays: u64,
-    /// Whether the output contains what rays cost, which depends on tree and traversal.
+    /// Whether the output contains the traversal costs of rays (features), which depend on tree and traversal.
     pub shows_costs: bool,
     /// The greatest absolute coordinate of any camera's eye; infinity where a camera may go anywhere.
     pub farthest_eye: f32,
@@ -118,20 +118,20 @@ impl Workload {
         Self { size, n_rays, shows_costs: options.features, farthest_eye: f32::INFINITY }
     }
 
-    /// Returns the same work with all its cameras known.
+    /// Returns the same work with `farthest_eye` set from `cameras`, which are all the cameras of the work.
     #[must_use]
     pub fn seen_by<'c>(self, cameras: impl Iterator<Item = &'c Camera>) -> Self {
         Self { farthest_eye: cameras.map(|camera| camera.eye.abs().max_element()).fold(0.0, f32::max), ..self }
     }
 
-    /// Tells whether primary rays find the same hits, bit for bit, if they are traced and if kernels rasterize them.
+    /// Tells whether tracing and compute kernels that rasterize find the same primary hits, bit for bit.
     fn primaries_agree(&self, world: &World) -> bool {
         let [least, greatest] = world.bounds();
         let largest_coordinate = least.abs().max(greatest.abs()).max_element();
         self.farthest_eye <= KD_MAX_ORIGIN_DISTANCE * largest_coordinate
     }
 
-    /// Returns the work of a window, which runs for any time and shows any view, as the user likes.
+    /// Returns the work of an interactive window, whose number of rays and cameras have no bound.
     pub fn of_window(size: (u32, u32)) -> Self {
         Self { size, n_rays: u64::MAX, shows_costs: false, farthest_eye: f32::INFINITY }
     }
@@ -153,7 +153,7 @@ impl Request {
         }
     }
 
-    /// Chooses how to trace, without any measurement.
+    /// Chooses traversal and primary visibility, without any measurement.
     pub fn methods_by_rule(&self, context: Option<&Context>, n_triangles: usize, size: (u32, u32)) -> Methods {
         Methods {
             traversal: Chosen::pinned_or(self.traversal, || traversal_by_rule(Processor::of(context))),
@@ -163,8 +163,8 @@ impl Request {
         }
     }
 
-    /// Chooses how to trace. If the choice changes no bit, the times of an earlier run decide, or those of a
-    /// measurement where that pays off. Else the rule decides.
+    /// Chooses traversal and primary visibility. If the choice changes no bit of the output, the times of an earlier
+    /// run decide, or those of a measurement where that pays off. Else the rule decides.
     ///
     /// # Errors
     /// The device is lost. If a measurement fails otherwise, the rule decides.

@@ -12,19 +12,19 @@ use serde::{Deserialize, Serialize};
 use super::{Cache, Chosen, Key, Reason};
 use crate::{accel::kdtree::Traversal, frame::Primary};
 
-/// Scenes with fewer triangles are not measured. They are small enough for any traversal, since their frames spend
-/// more time elsewhere.
+/// Least number of triangles of a scene in which methods are measured. In smaller scenes every traversal is fast
+/// enough, because a frame spends more time elsewhere.
 const FEWEST_TRIANGLES: usize = 1000;
-/// Number of rays from which a run wins back the time of a measurement: this many, and `RAYS_PER_MEASURED_TRIANGLE`
-/// more for each triangle. A measurement takes some 0.1 s, and 0.3 us more for each triangle. It saves a tenth of the
-/// 1 to 10 ns that a ray takes, in this run and in a few that find its result in the cache.
+/// Least number of rays of a run in which a measurement pays off, in a scene of no triangles. Each triangle adds
+/// `RAYS_PER_MEASURED_TRIANGLE`. A measurement takes some 0.1 s, and 0.3 us more for each triangle. It saves a tenth
+/// of the 1 to 10 ns that a ray takes, in this run and in a few later runs that find the result in the cache.
 const RAYS_PER_MEASUREMENT: u64 = 1 << 28;
 /// See `RAYS_PER_MEASUREMENT`.
 const RAYS_PER_MEASURED_TRIANGLE: u64 = 500;
 /// Number of rays per triangle from which ropes pay off. Making them takes the CPU some 200 ns per triangle in each
 /// run. Where they are faster, they save about 0.2 ns per ray.
 const RAYS_PER_ROPED_TRIANGLE: u64 = 1000;
-/// Share of the time of the rule's traversal that another one must save to replace it. Smaller savings are noise.
+/// Share of the time of the rule's method that another method must save to replace it. Smaller savings are noise.
 const LEAST_GAIN: f64 = 0.03;
 
 /// Measured times on a device, by method: nanoseconds per ray or per pixel.
@@ -53,7 +53,7 @@ impl Timings {
         !self.ns.is_empty() && self.ns.iter().all(is_sound)
     }
 
-    /// Returns the fastest of some methods. A method other than the rule's must save more than noise.
+    /// Returns the fastest of `methods`, or `rule` if no other method saves more than `LEAST_GAIN` of its time.
     fn quickest<T: Copy + Display>(&self, methods: &[T], rule: T) -> T {
         let times = methods.iter().filter_map(|&method| Some((method, self.of(method)?)));
         let best = times.min_by(|(_, a), (_, b)| a.total_cmp(b));
@@ -81,8 +81,8 @@ pub struct Candidates<T> {
 }
 
 impl Candidates<Traversal> {
-    /// Returns the candidate traversals for `n_rays` rays in a scene of `n_triangles` triangles, or none where any
-    /// will do.
+    /// Returns the candidate traversals for `n_rays` rays in a scene of `n_triangles` triangles, or none if the scene
+    /// is too small for a measurement.
     pub fn of_traversals(n_triangles: usize, n_rays: u64) -> Option<Self> {
         let pay_for_ropes = n_rays >= RAYS_PER_ROPED_TRIANGLE.saturating_mul(n_triangles as u64);
         let ropes = pay_for_ropes.then_some(Traversal::Ropes);
@@ -91,8 +91,8 @@ impl Candidates<Traversal> {
 }
 
 impl Candidates<Primary> {
-    /// Returns the kinds of primary visibility that find the same hits, for `n_rays` rays in a scene of `n_triangles`
-    /// triangles, or none where any will do.
+    /// Returns the kinds of primary visibility whose hits are the same, or none if the scene is too small for a
+    /// measurement. `n_rays` and `n_triangles` decide whether a measurement pays off.
     pub fn of_primaries(n_triangles: usize, n_rays: u64) -> Option<Self> {
         Self::new(vec![Primary::SoftwareRaster, Primary::Trace], n_triangles, n_rays)
     }
@@ -105,9 +105,10 @@ impl<T: Copy + Display + FromStr> Candidates<T> {
         (n_triangles >= FEWEST_TRIANGLES).then_some(Self { methods, may_measure })
     }
 
-    /// Chooses by the times in the cache. If those of a method are missing, it calls `measure` where that pays off,
-    /// and adds the result to the cache. Without any times the rule decides. `measure` returns the time of each
-    /// method, or none where the device has no timestamps.
+    /// Chooses by the times in the cache. If the cache lacks the time of a method and a measurement pays off,
+    /// `measure` is called instead and its result is added to the cache. If there are no valid times then, the choice
+    /// is `rule`. `measure` returns the time of each method, or none where there is no measurement, as on a device
+    /// without timestamps.
     ///
     /// # Errors
     /// Fails as `measure` does.

@@ -6,7 +6,8 @@ use crate::accel::kdtree::BuildOptions;
 /// How much work goes into the tree, as the user specifies it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BuildPolicy {
-    /// The kind with which building and tracing take the least time together, by the number of rays.
+    /// The kind with which building and tracing are estimated to take the least time together, for the number of
+    /// rays.
     #[default]
     Auto,
     /// The tree that is built quickly.
@@ -45,8 +46,8 @@ pub enum TreeKind {
 named_enum!(TreeKind { Fast = "fast", Best = "best" });
 
 /// Number of rays per triangle from which the best tree pays off on the CPU. Its build takes about 1 us per triangle
-/// longer, and with slabs a third of that more. It saves some 10 to 25 ns per ray on the CPU's threads, and 0.5 to 1
-/// ns on a GPU.
+/// longer than that of the fast tree, and a further third of that with slabs. It saves some 10 to 25 ns per ray on
+/// the CPU's threads, and 0.5 to 1 ns on a GPU.
 const RAYS_PER_TRIANGLE_ON_CPU: u64 = 40;
 /// The same number for a GPU.
 const RAYS_PER_TRIANGLE_ON_GPU: u64 = 1000;

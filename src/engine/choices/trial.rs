@@ -10,7 +10,7 @@ use crate::{
     world::World,
 };
 
-/// What a choice by measurement depends on.
+/// The inputs of a choice by measurement.
 pub struct Trial<'a> {
     pub context: &'a Arc<Context>,
     pub world: &'a World,
@@ -19,7 +19,7 @@ pub struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// Replaces the rule's traversal by the fastest one, if times are known or a measurement pays off.
+    /// Replaces the rule's traversal by one that is measurably faster, if times are known or a measurement pays off.
     pub fn choose_traversal(&self, methods: &mut Methods) -> Result<(), GpuError> {
         let n_triangles = self.world.scene().triangles.len();
         let Some(candidates) = Candidates::of_traversals(n_triangles, self.workload.n_rays) else { return Ok(()) };
@@ -30,7 +30,8 @@ impl Trial<'_> {
         Ok(())
     }
 
-    /// Replaces the rule's primary visibility by the fastest one, if times are known or a measurement pays off.
+    /// Replaces the rule's primary visibility by one that is measurably faster, if times are known or a measurement
+    /// pays off.
     pub fn choose_primary(&self, methods: &mut Methods) -> Result<(), GpuError> {
         let n_triangles = self.world.scene().triangles.len();
         let Some(candidates) = Candidates::of_primaries(n_triangles, self.workload.n_rays) else { return Ok(()) };

@@ -1,5 +1,5 @@
-//! Builds a grid on a device: runs the kernels over its triangles and copies the grid to arrays of the sizes that it
-//! has.
+//! Builds a grid on a device: runs the kernels over the triangles, and copies the grid from arrays of the largest
+//! possible size to arrays that it just fills.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use crate::{
     layout::{GRID_IS_COUNTED, GridBuild, GridCell, LeafTriangle, Plane, Triangle},
 };
 
-/// Kernels and memory to build the grid of some triangles, any number of times.
+/// Kernels and memory that build the grid of an array of triangles. A build can be repeated any number of times.
 pub struct GridBuilder {
     context: Arc<Context>,
     options: GridOptions,
@@ -25,7 +25,8 @@ pub struct DeviceGrid {
     pub lattice: Lattice,
     /// The number of levels, 1 or 2.
     pub n_levels: u32,
-    /// The number of times that the edges of all cells of a level were doubled to keep to the limit of references.
+    /// The number of times that cells were made larger because a count exceeded its limit: doublings of the upper
+    /// cells' edges and halvings of the blocks' resolutions.
     pub n_coarser: u32,
     /// The cells of the upper level, then those of the lower one.
     pub cells: Buffer<GridCell>,
@@ -59,13 +60,14 @@ impl GridBuilder {
         })
     }
 
-    /// Whether the device can bind an array of `n_triangles` triangles.
+    /// Whether the device can bind an array of `n_triangles` triangles as a storage buffer. Free memory is
+    /// not considered.
     pub fn has_room(context: &Context, n_triangles: usize) -> bool {
         (n_triangles as u64).saturating_mul(size_of::<Triangle>() as u64) <= context.limits().storage_range
     }
 
-    /// Returns the options, with the limit of references lowered to what the device can bind. The host's build with
-    /// these makes the same grid.
+    /// Returns the options with the limit of references lowered to what the device can bind. With the returned
+    /// options, the host builds the same grid as the device.
     pub fn options_for(context: &Context, options: &GridOptions) -> GridOptions {
         let most = context.limits().storage_range / size_of::<LeafTriangle>() as u64;
         let max_references = options.max_references.min(u32::try_from(most).unwrap_or(u32::MAX));
@@ -77,15 +79,16 @@ impl GridBuilder {
         &self.options
     }
 
-    /// Returns the number of rows that a build takes in a timer.
+    /// Returns the number of a timer's rows that a build needs, one per dispatch.
     pub fn n_stages(&self) -> u32 {
         self.passes.n_stages(&self.buffers)
     }
 
-    /// Builds the grid and waits for the device. The grid's buffers get the `usage`.
+    /// Builds the grid and waits for the device. The grid's buffers are created for `usage`. `timer`: takes the times
+    /// of the dispatches; it must have room for [`GridBuilder::n_stages`] rows.
     ///
     /// # Errors
-    /// Out of memory; a call fails.
+    /// Out of memory; a Vulkan call fails.
     pub fn build(&self, timer: Option<&Timer>, usage: BufferUse) -> Result<DeviceGrid, GpuError> {
         let commands = CommandBuffer::record(&self.context, "grid_build", timer, |commands| {
             commands.reset_timer();

@@ -30,7 +30,7 @@ struct Sort {
     scatter: ComputePipeline,
 }
 
-/// The kernels' names: debug labels and the timer's rows.
+/// The kernels' names, which are their debug labels and the names of their rows in the timer.
 struct Names {
     columns: &'static str,
     spine_columns: &'static str,
@@ -108,9 +108,9 @@ impl Level {
         4 * GRID_MAX_ATTEMPTS + 1 + 3 * sets.n_passes + 1
     }
 
-    /// Records the build of the level. Needs `build`, and for the lower level what the upper one leaves. Leaves the
-    /// level's `cells` and its sorted pairs, which kernels can read as `pairs_from` of the set that stays bound.
-    /// `cut`: the kernels that make the lattices of the lower level before each attempt.
+    /// Records the build of the level. Needs `build`, and for the lower level what the upper level leaves. Leaves the
+    /// level's `cells` and its sorted pairs. The descriptor set that remains bound has the pairs as `pairs_from`.
+    /// `cut`: for the lower level, the kernels that choose its lattices before each attempt.
     pub fn record(&self, commands: &Commands, buffers: &GridBuffers, sets: &PairSets, cut: Option<&Cut>) {
         commands.bind(sets.writing_unsorted());
         for attempt in 0..GRID_MAX_ATTEMPTS {
@@ -130,9 +130,9 @@ impl Level {
         dispatch(commands, &self.cells, sized_by(buffers, offset_of!(GridBuild, counted_pair_groups_x)));
     }
 
-    /// Records one attempt. Needs `build`, and at the lower level `blocks`. Leaves the beginnings of each item's
-    /// columns and of each column's pairs in `first_columns`, `first_pairs` and `scan_blocks`, and in `build` how it
-    /// goes on.
+    /// Records one attempt to count columns and pairs. Needs `build`, and at the lower level `blocks`. Leaves in
+    /// `first_columns` and `first_pairs`, relative to the block's position in `scan_blocks`, where each item's
+    /// columns and each column's pairs begin. Leaves in `build` the sizes of the next dispatches.
     fn count(&self, commands: &Commands, buffers: &GridBuffers, attempt: u32) {
         let none = GridSort::default();
         let items = sized_by(buffers, offset_of!(GridBuild, item_groups_x));

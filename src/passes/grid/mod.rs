@@ -5,26 +5,28 @@
 //! bounds             finds the box of the triangles
 //! lattice            chooses the size of the cells
 //! each level
-//!   descend          (lower level) makes the pairs of the upper level the items of this one
-//!   4 attempts       each with larger cells, until all counts keep to their limits
+//!   descend          (lower level) turns the pairs of the upper level into the items of the lower level
+//!   4 attempts       each with larger cells than the one before, until no count exceeds its limit
 //!     resolutions    (lower level) chooses into how many cells each upper cell is cut
 //!     columns        counts the columns of cells in each item's box
 //!     count          counts the pairs of a cell and a triangle in each column
 //!   emit             writes the pairs
 //!   sort             puts the pairs in the order of their cells, digit by digit
 //!   cells            finds each cell's pairs
-//!   blocks           (lower level) writes into which cells each upper cell is cut
+//!   blocks           (lower level) writes into each upper cell where its lower cells are
 //! leaves             writes triangles and planes in the order of the pairs
 //! ```
 //!
-//! An item is a triangle and the lattice whose cells get it: at the upper level the whole grid's, at the lower level
-//! that of the block into which an upper cell is cut. A pair is a cell and a triangle in it. A column is the cells of
-//! an item's box in a line along one axis.
+//! An item is a triangle with a lattice, into whose cells the triangle is put. At the upper level, this is the
+//! lattice of the whole grid. At the lower level, it is the lattice into which an upper cell is cut, the block of
+//! that cell. A pair is a cell and a triangle in it. A column is a line of cells along one axis within the box of an
+//! item.
 //!
 //! Scans find where each item's columns and each column's pairs begin, so that the order of all pairs is fixed. Each
 //! scan has three steps, as in compaction: the sums of blocks of entries, the spine over these sums, and the
-//! positions within each block. The spine also decides how the attempt goes on and sizes the dispatches that follow.
-//! When all is counted, the kernels of further attempts have no workgroups.
+//! positions within each block. (These blocks have nothing to do with the blocks of upper cells.) The spine also
+//! compares the total with its limit and sizes the dispatches that follow: either the next count of the attempt, or
+//! another attempt with larger cells. When everything is counted, the kernels of further attempts have no workgroups.
 //!
 //! Kalojanov and Slusallek, "A parallel algorithm for construction of uniform grids", 2009; Kalojanov, Billeter and
 //! Slusallek, "Two-level grids for ray tracing on GPUs", 2011.
@@ -104,7 +106,7 @@ impl GridPasses {
             then(commands);
             dispatch(commands, &lower.blocks, sized_by(buffers, offset_of!(GridBuild, counted_cell_groups_x)));
         }
-        // No barrier: `leaves` reads what `cells` and `blocks` read, and nothing that they write.
+        // No barrier: the kernel `leaves` reads nothing that the kernels `cells` and `blocks` write.
         dispatch(commands, &self.leaves, sized_by(buffers, offset_of!(GridBuild, counted_pair_groups_x)));
     }
 
@@ -115,7 +117,7 @@ impl GridPasses {
         own + buffers.levels.iter().map(of_level).sum::<u32>()
     }
 
-    /// Needs `triangles`. Leaves their bounding box in `build`, and `cells` without entries.
+    /// Needs `triangles`. Leaves their bounding box in `build`, and `cells` cleared to zero.
     fn bounds(&self, commands: &Commands, buffers: &GridBuffers) {
         let reset = || {
             commands.update_buffer(buffers.build.any(), buffers.initial());
@@ -146,8 +148,8 @@ impl Lower {
 }
 
 impl Cut {
-    /// Needs `build` and `cells`. Leaves `blocks`, and in `build` the number of lower cells and how the attempt goes
-    /// on.
+    /// Needs `build` and `cells`. Leaves `blocks`, and in `build` the number of lower cells and the sizes of the
+    /// attempt's next dispatches.
     fn record(&self, commands: &Commands, buffers: &GridBuffers, attempt: u32) {
         let cells = sized_by(buffers, offset_of!(GridBuild, cell_groups_x));
         commands.dispatch(&self.resolutions, Some(attempt), &GridSort::default(), cells);
@@ -157,14 +159,17 @@ impl Cut {
     }
 }
 
-/// Creates the kernels of a build, for one device and one layout of bindings.
+/// Factory of a build's kernels, for one device and one layout of bindings.
 struct Kernels<'a> {
     context: &'a Arc<Context>,
     bindings: &'a Arc<BindingLayout>,
 }
 
 impl Kernels<'_> {
-    /// Creates a kernel whose workgroups go through blocks of entries.
+    /// Creates a kernel whose workgroups go through blocks of entries. It requires full subgroups.
+    ///
+    /// # Panics
+    /// The shader does not declare one of the `constants`.
     fn of_blocks(
         &self,
         name: &'static str,
@@ -193,7 +198,8 @@ fn dispatch(commands: &Commands, kernel: &ComputePipeline, dispatch: Dispatch) {
     commands.dispatch(kernel, None, &GridSort::default(), dispatch);
 }
 
-/// Makes the next kernel wait for the one before it, and for the sizes of dispatches that this has written.
+/// Makes the next kernel wait for the previous one, and for the sizes of dispatches that the previous one has
+/// written.
 fn then(commands: &Commands) {
     commands.barrier(Access::KernelUpdate, Access::KernelUpdate); // the build's arrays
 }
@@ -205,11 +211,12 @@ mod tests {
     /// The opcode of a decoration in SPIR-V, and the decoration that forbids contraction.
     const OP_DECORATE: u32 = 71;
     const NO_CONTRACTION: u32 = 42;
-    /// Opcodes of sums, differences and products: of floats, of vectors and scalars, with matrices, and of two
-    /// vectors.
+    /// Opcodes of sums, differences and products of floats, of products of vectors and scalars and with matrices, and
+    /// of the dot product.
     const ARITHMETIC: [u32; 8] = [129, 131, 133, 142, 143, 144, 145, 148];
 
-    /// Returns how many arithmetic instructions of a module a device may contract to others that round differently.
+    /// Counts the arithmetic instructions of a module that lack `NoContraction`. A device may contract these to
+    /// others, which round differently.
     fn n_contractible(spirv: &[u8]) -> usize {
         let words: Vec<u32> = spirv.chunks_exact(4).map(|b| u32::from_le_bytes(b.try_into().unwrap())).collect();
         let (mut results, mut exact) = (Vec::new(), Vec::new());

@@ -17,7 +17,8 @@ impl DeviceGrid {
     pub fn statistics(&self, n_triangles: usize) -> Statistics {
         let n_upper = self.lattice.n_cubes() as u64;
         let [n_filled_upper, n_filled_lower] = self.n_filled.map(u64::from);
-        // Upper cells with triangles are cut, and only their lower cells count. The others are cells of their own.
+        // An upper cell with triangles is cut, and its lower cells count in its place. An empty one counts as one
+        // cell.
         let (n_cells, n_filled) = match self.n_levels {
             1 => (n_upper, n_filled_upper),
             _ => (self.cells.len() as u64 - n_filled_upper, n_filled_lower),
@@ -49,7 +50,7 @@ impl DeviceGrid {
     }
 }
 
-/// Returns the summed times of the rows of each name.
+/// Returns the sum of the times of all rows of a name, for each name in the order in which it first occurs.
 fn stages_of(rows: &[TimerRow]) -> Vec<BuildStage> {
     let mut stages: Vec<BuildStage> = Vec::new();
     for row in rows {

@@ -88,7 +88,7 @@ fn faces(size: [f32; 3], sides: Option<&[Side]>, order: impl Fn([u32; 4]) -> [u3
     Ok(mesh)
 }
 
-/// Returns the eight corners at the index that is their number.
+/// Returns the positions of the eight corners. The index of a corner is its number, as `Side::corners` defines it.
 fn corners(size: [f32; 3]) -> Checked<Vec<Vec3>> {
     for edge in size {
         length("size", edge)?;

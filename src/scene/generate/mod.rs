@@ -74,7 +74,8 @@ fn count(name: &str, value: u32, min: u32) -> Checked<u32> {
     if (min..=MAX).contains(&value) { Ok(value) } else { Err(format!("{name} = {value} is outside {min} to {MAX}")) }
 }
 
-/// Numbers of triangles that a scene has already. They limit the mesh of its next generator.
+/// Numbers of triangles that a scene has already. What they leave of the scene's limits is the budget of its next
+/// generator.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Budget {
     /// Number of triangles that generators have made.

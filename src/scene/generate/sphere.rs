@@ -158,8 +158,8 @@ impl Geodesic {
 struct Points {
     radius: f64,
     corners: [DVec3; 12],
-    /// Indices of points by their key: the corners of the icosahedron that a point lies between, each with its
-    /// weight, sorted. Entries of weight 0 are (0, 0).
+    /// Index of each point by its key, which is the same for all faces that share the point: three pairs of a corner
+    /// of the icosahedron and its weight, sorted. A pair of weight 0 is (0, 0).
     by_weights: HashMap<[(usize, u32); 3], u32>,
     mesh: Mesh,
 }

@@ -46,9 +46,11 @@ impl Superellipsoid {
     }
 }
 
-/// The unscaled solid. Its fields are the powers 2/v and 2/h of the equation.
+/// The unscaled solid.
 struct Shape {
+    /// The power 2/v of the equation, not v itself.
     v: f64,
+    /// The power 2/h of the equation, not h itself.
     h: f64,
 }
 

@@ -1,4 +1,4 @@
-//! Checks of OBJ text as people and programs write it, statement by statement, and its rewriting for tobj.
+//! Checks the text of an OBJ file, statement by statement, and rewrites it into a form that tobj reads correctly.
 //!
 //! tobj 4.0.5 panics on an overflowing normal index, accepts NaN as a coordinate, uses a neighbour's normal where a
 //! corner has none, and ignores `s`. The rewritten text avoids all of this: its numbers are finite, its indices are

@@ -8,7 +8,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use self::clean::{CleanObj, NORMALS, SMOOTH, clean_obj};
-pub(super) use self::mtl::Library;
+pub(super) use self::mtl::{Library, named_libraries};
 use super::{
     error::SceneError,
     mesh::Mesh,
@@ -57,7 +57,8 @@ pub(super) fn parse_obj(
     Ok((mesh, library))
 }
 
-/// Warns of the first unknown statement and of a material that the library lacks.
+/// Warns of the first unknown statement, and of the first material, by name, that is used but not defined. Further
+/// ones are not reported.
 fn warn(path: &Path, clean: &CleanObj, library: &Library) {
     let path = path.display();
     if let Some((line, statement)) = &clean.unknown {

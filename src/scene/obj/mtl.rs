@@ -3,6 +3,7 @@
 //! A colour of one number is a grey in MTL, but tobj 4.0.5 panics on it; so it is rewritten as three numbers.
 
 use std::{
+    borrow::Cow,
     fmt::Write,
     path::{Path, PathBuf},
 };
@@ -43,6 +44,16 @@ pub fn load_libraries(obj: &Path, libraries: &[(usize, String)]) -> Result<Libra
         }
     }
     Ok(library)
+}
+
+/// Returns the files that the `mtllib` statements of an OBJ file's text name. Names that are refused are left out.
+pub fn named_libraries(obj: &Path, text: &str) -> Vec<PathBuf> {
+    let folder = obj.parent().unwrap_or(Path::new(""));
+    let files = |(_, statement): (usize, Cow<str>)| match split_keyword(&statement) {
+        ("mtllib", rest) => library_files(folder, rest).unwrap_or_default(),
+        _ => Vec::new(),
+    };
+    statements(text).flat_map(files).collect()
 }
 
 /// Returns the files that a `mtllib` line names. The rest of the line is one name, possibly with spaces, if such a

@@ -10,7 +10,8 @@ use crate::{
     frame::{Denoise, Primary, Tonemap, View},
 };
 
-/// Shows the controls. Changes take effect with the next frame. A grid has no choice of traversals.
+/// Shows the controls. Changes take effect with the next frame. `accel` is the structure in use: only a kd-tree has a
+/// choice of traversals.
 pub fn show(ui: &mut Ui, settings: &mut Settings, accel: AccelKind) {
     Grid::new("controls").num_columns(2).spacing([10.0, 3.0]).show(ui, |ui| {
         let Settings { options, max_samples, budget_ms, vsync, view, gain } = settings;
@@ -18,7 +19,7 @@ pub fn show(ui: &mut Ui, settings: &mut Settings, accel: AccelKind) {
         if matches!(view, View::Depth | View::Cost | View::Rays) {
             row(ui, "brightness", |ui| ui.add(Slider::new(gain, 0.01..=100.0).logarithmic(true)));
         }
-        row(ui, "bounces", |ui| ui.add(Slider::new(&mut options.max_depth, 1..=16)));
+        row(ui, "max depth", |ui| ui.add(Slider::new(&mut options.max_depth, 1..=16)));
         row(ui, "samples", |ui| ui.add(Slider::new(max_samples, 1..=4096).logarithmic(true)));
         row(ui, "exposure", |ui| ui.add(Slider::new(&mut options.exposure, 0.01..=100.0).logarithmic(true)));
         choice(ui, "tone curve", &mut options.tonemap, Tonemap::ALL);

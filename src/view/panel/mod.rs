@@ -23,7 +23,7 @@ const WIDTH: f32 = 300.0;
 /// Settings that the user can change.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Render options. Their size follows the window and is not the user's to set.
+    /// Render options. The size in them follows the window; the user cannot set it.
     pub options: RenderOptions,
     /// Samples per pixel at which a picture at rest is done.
     pub max_samples: u32,
@@ -67,13 +67,13 @@ pub struct Facts<'a> {
     pub picture: (u32, u32),
     /// Samples per pixel so far.
     pub n_samples: u32,
-    /// Samples per pixel at which the view is done.
+    /// Number of samples per pixel with which the view is complete.
     pub n_wanted: u32,
-    /// Share of the next sample that is drawn, 0 to 1.
+    /// Share of the next sample that has been drawn so far, 0 to 1.
     pub progress: f32,
     /// Speed of flight, world units per second.
     pub speed: f32,
-    /// Whether S flies back rather than saves.
+    /// Whether the key S flies back rather than saves the picture.
     pub is_flying: bool,
     /// Whether the user has asked to save the picture, which happens once it is drawn in full.
     pub is_save_due: bool,
@@ -85,7 +85,7 @@ pub struct Facts<'a> {
     pub memory: Vec<MemoryUse>,
     /// The rays of the pixel that was clicked last.
     pub picked: Option<&'a Picked>,
-    /// The last error that has not been settled.
+    /// The last error, unless a later success on the same topic has cleared it.
     pub message: Option<&'a str>,
 }
 
