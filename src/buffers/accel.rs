@@ -109,7 +109,7 @@ impl AccelBuffers {
     }
 
     /// Uploads triangles and the grid that the host has built. This is for scenes with more triangles than a device
-    /// can bind: it cannot build a grid over them.
+    /// can bind, and so cannot build a grid over.
     fn of_grid(context: &Arc<Context>, triangles: &[Triangle], grid: &Grid) -> Result<Self, GpuError> {
         let entries = grid.leaf_triangles();
         let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);

@@ -23,7 +23,8 @@ pub struct Queue {
     pub ray_radiance: Buffer<[f32; 4]>,
     /// `n_lights * queue_capacity` elements, lights outermost.
     pub light_visibility: Buffer<u32>,
-    /// The sums of the prefix sum's blocks: `queue_capacity / SCAN_GROUP_SIZE` elements, rounded up.
+    /// The number of children of each block of `SCAN_GROUP_SIZE` rays. After the prefix sum, it is the number of
+    /// children of all blocks before. There are `queue_capacity / SCAN_GROUP_SIZE` elements, rounded up.
     pub scan_blocks: Buffer<u32>,
 }
 

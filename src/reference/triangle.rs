@@ -4,8 +4,8 @@
 //!
 //! u is 2^-24, o the ray's origin and d its direction. D is the greatest magnitude of a coordinate of any v_i - o,
 //! and L that of any v_i - v_j, where v_i are the triangle's corners. Products, sums and differences are rounded to
-//! nearest. Divisions are right to 2.5 units in the last place, which is what Vulkan guarantees; the CPU's are better.
-//! Terms of u² are left out.
+//! nearest. Divisions are right to 2.5 units in the last place, which is what Vulkan guarantees; the CPU's are
+//! better. Terms of u² are left out.
 //!
 //! **Result.** The triangle has a point Q whose every coordinate is within u (11.5 D + 14 L) of o + t d. The weights
 //! that are returned with t are those of Q, except for factors within 8 u of 1. Let c be the cosine between d and the
