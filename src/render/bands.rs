@@ -144,7 +144,7 @@ impl BandedRenderer {
 
     fn draw_steps(&mut self, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
         loop {
-            match self.renderer.draw_step()? {
+            match self.renderer.draw_part()? {
                 Some(profile) => return Ok(profile),
                 None => watcher.part(self.renderer.progress()),
             }

@@ -1,7 +1,7 @@
 //! Draws a sample in parts, so that the caller can do something else in between.
 //!
 //! A part is a command buffer of the frame. A sample is pending while some of its parts have run and others have not.
-//! A step draws one part. (`draw_part` draws a batch, which is several parts.)
+//! A step draws one part. (`draw_batch` draws a batch, which is several parts.)
 
 use std::time::Instant;
 
@@ -68,7 +68,7 @@ pub(super) struct PartialSample {
 impl PartialSample {
     /// Returns the number of parts that will have run once the sample is drawn up to `until`.
     fn end(&self, until: Until) -> usize {
-        if until == Until::Step {
+        if until == Until::Part {
             return self.n_done + 1;
         }
         let ends_batch = |part: &Part| part.ends_batch;
@@ -96,7 +96,7 @@ impl Renderer {
     ///
     /// # Errors
     /// Fails as [`Renderer::draw_sample`] does.
-    pub fn draw_part(&mut self) -> Result<Option<Profile>, GpuError> {
+    pub fn draw_batch(&mut self) -> Result<Option<Profile>, GpuError> {
         self.go_on(Until::Batch)
     }
 
@@ -106,8 +106,8 @@ impl Renderer {
     ///
     /// # Errors
     /// Fails as [`Renderer::draw_sample`] does.
-    pub fn draw_step(&mut self) -> Result<Option<Profile>, GpuError> {
-        self.go_on(Until::Step)
+    pub fn draw_part(&mut self) -> Result<Option<Profile>, GpuError> {
+        self.go_on(Until::Part)
     }
 
     /// Whether a sample consists of the hits of primary rays only, without light.

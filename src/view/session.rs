@@ -183,7 +183,7 @@ impl Session {
         }
         self.has_new_sample = false;
         if !self.is_done(gpu) {
-            self.draw_part(gpu, window, is_moving)
+            self.draw_batch(gpu, window, is_moving)
         } else if is_new {
             gpu.renderer.show()
         } else {
@@ -216,7 +216,7 @@ impl Session {
 
     /// Draws the rest of the sample in parts, until the sample is complete or half of [`PART_MS`] is spent. At rest,
     /// parts are so small that input does not wait long; while the camera moves, parts are as large as possible.
-    fn draw_part(&mut self, gpu: &mut GpuSession, window: (u32, u32), is_moving: bool) -> Result<(), GpuError> {
+    fn draw_batch(&mut self, gpu: &mut GpuSession, window: (u32, u32), is_moving: bool) -> Result<(), GpuError> {
         let renderer = &mut gpu.renderer;
         if !renderer.is_pending() {
             self.sample_ms = 0.0;
@@ -227,10 +227,10 @@ impl Session {
         }
         let start = Instant::now();
         let spent_ms = || start.elapsed().as_secs_f64() * 1e3;
-        let mut complete = renderer.draw_part()?;
+        let mut complete = renderer.draw_batch()?;
         // A part may take less than expected: estimates from small pictures are too high. Then further parts follow.
         while complete.is_none() && spent_ms() < PART_MS / 2.0 {
-            complete = renderer.draw_part()?;
+            complete = renderer.draw_batch()?;
         }
         self.sample_ms += spent_ms();
         if let Some(profile) = complete {

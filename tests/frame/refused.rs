@@ -32,7 +32,7 @@ const BATCH: u32 = 30;
 /// Draws one sample and a part of the second one.
 fn begin(renderer: &mut Renderer) {
     renderer.draw().expect("a sample");
-    assert_eq!(renderer.draw_part().expect("a part"), None, "the sample has more parts");
+    assert_eq!(renderer.draw_batch().expect("a part"), None, "the sample has more parts");
 }
 
 /// Draws the rest of the second sample.
@@ -207,7 +207,7 @@ fn a_sample_that_cannot_begin_leaves_those_before() {
     let first = renderer.picture().expect("a picture");
     let begins = (0..).take_while(|&n_creations| {
         context.fail_creations_after(Some(n_creations));
-        let begun = renderer.draw_part();
+        let begun = renderer.draw_batch();
         context.fail_creations_after(None);
         let is_refused = begun.is_err() && renderer.n_samples() == 1;
         assert!(!is_refused || identical(&renderer.picture().expect("a picture"), &first), "{n_creations}");
