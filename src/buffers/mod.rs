@@ -6,7 +6,7 @@
 //! queue           rays of a batch and what belongs to each
 //! pixels          samples, sums, filtered and displayed pixels
 //! raster_queue    large triangles, between the two kernels that rasterize
-//! vertex_indices  the vertices that the graphics pipeline draws
+//! vertex_indices  the vertices that the graphics pipeline uses_graphics_pipeline
 //! stalls          rays that have spent a dispatch's loop turns
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid
@@ -35,7 +35,7 @@ pub use self::{
     scene_arrays::{SceneAccess, SceneArrays},
     stalls::{Round, Stalls},
 };
-pub(crate) use self::{accel::hidden_words, pixels::draws};
+pub(crate) use self::{accel::hidden_words, pixels::uses_graphics_pipeline};
 use crate::{
     gpu::BindingKind,
     layout::{BIND_ACCEL, BIND_FRAME, BIND_TEXELS, BIND_TRIANGLE_IDS},

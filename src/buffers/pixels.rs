@@ -45,7 +45,7 @@ impl Pixels {
         let storage = BufferUse::Storage;
         let (features, software_raster) = (options.features, options.primary == Primary::SoftwareRaster);
         let filters = frame.denoise_threshold.is_finite();
-        let (triangle_ids, depth) = if draws(options) {
+        let (triangle_ids, depth) = if uses_graphics_pipeline(options) {
             let target = |name, kind| Target::new(context, name, kind, size).map(Arc::new);
             (target("triangle_ids", TargetKind::Uint)?, Some(target("depth", TargetKind::Depth)?))
         } else {
@@ -74,8 +74,8 @@ impl Pixels {
         let (width, height) = self.triangle_ids.size();
         let has_targets = width >= frame.picture_width && height >= frame.picture_height;
         self.pixel_radiance.len() >= n_pixels(frame)
-            && (has_targets || !draws(options))
-            && self.depth.is_some() == draws(options)
+            && (has_targets || !uses_graphics_pipeline(options))
+            && self.depth.is_some() == uses_graphics_pipeline(options)
             && self.pixel_features.is_empty() != options.features
             && self.pixel_nearest.is_empty() == (options.primary != Primary::SoftwareRaster)
             && self.pixel_filtered.is_some() == frame.denoise_threshold.is_finite()
@@ -92,8 +92,8 @@ impl Pixels {
     }
 }
 
-/// Whether the graphics pipeline draws triangles.
-pub(crate) fn draws(options: &RenderOptions) -> bool {
+/// Whether the graphics pipeline uses_graphics_pipeline triangles.
+pub(crate) fn uses_graphics_pipeline(options: &RenderOptions) -> bool {
     options.primary == Primary::Raster
 }
 

@@ -4,7 +4,7 @@ use std::{mem::offset_of, sync::Arc};
 
 use super::{
     AccelBuffers, Pixels, Queue, RasterQueue, accel, binding,
-    pixels::{draws, n_pixels},
+    pixels::{n_pixels, uses_graphics_pipeline},
     vertex_indices::{has_indices, vertex_indices},
 };
 use crate::{
@@ -61,7 +61,7 @@ pub struct Resources {
     pub frame: Buffer<Frame>,
     pub accel: AccelBuffers,
     /// Three indices for each triangle, or empty if triangles are drawn without indices. None if the graphics
-    /// pipeline draws no triangles.
+    /// pipeline uses_graphics_pipeline no triangles.
     pub vertex_indices: Option<Buffer<u32>>,
     pub materials: Buffer<Material>,
     /// `n_lights` elements.
@@ -104,7 +104,7 @@ impl Resources {
         let upload_indices = || new_vertex_indices(context, &vertex_indices(&scene.triangles));
         let mut resources = Self {
             frame: Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?,
-            vertex_indices: draws(options).then(upload_indices).transpose()?,
+            vertex_indices: uses_graphics_pipeline(options).then(upload_indices).transpose()?,
             materials: Buffer::with(context, "materials", &scene.materials, storage)?,
             lights: Buffer::with(context, "lights", &scene.lights, storage)?,
             queue: Queue::new(context, constants.queue_capacity, constants.n_lights)?,
@@ -161,8 +161,9 @@ impl Resources {
             if let Some(accel) = accel {
                 next.accel.add_links(context, accel, options.traversal)?;
             }
-            if draws(options) != next.vertex_indices.is_some() {
-                next.vertex_indices = draws(options).then(|| next.make_vertex_indices(context)).transpose()?;
+            if uses_graphics_pipeline(options) != next.vertex_indices.is_some() {
+                next.vertex_indices =
+                    uses_graphics_pipeline(options).then(|| next.make_vertex_indices(context)).transpose()?;
             }
             if next.queue.capacity() < constants.queue_capacity {
                 next.queue = Queue::new(context, constants.queue_capacity, constants.n_lights)?;

@@ -21,7 +21,7 @@ use std::sync::Arc;
 
 use crate::{
     accel::kdtree::Traversal,
-    buffers::draws,
+    buffers::uses_graphics_pipeline,
     frame::{Primary, RenderOptions},
     gpu::{BindingLayout, ComputeDesc, ComputePipeline, Constants, Context, GpuError, Shader},
     layout::{CONSTANTS_OF_SHADERS, constants},
@@ -131,7 +131,7 @@ impl Passes {
         bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Option<Arc<Visibility>>, GpuError> {
-        draws(options).then(|| Visibility::new(context, bindings).map(Arc::new)).transpose()
+        uses_graphics_pipeline(options).then(|| Visibility::new(context, bindings).map(Arc::new)).transpose()
     }
 
     fn new_rasterize(

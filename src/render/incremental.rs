@@ -48,7 +48,7 @@ impl Part {
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Until {
     /// The end of the next part.
-    Step,
+    Part,
     /// The end of the next batch, or the frame's end if that is the last batch.
     Batch,
     /// The frame's end.
