@@ -12,9 +12,9 @@ use kdray::{
     },
     bench::{
         Spread,
-        difference::Apart,
+        difference::DriverDifference,
         driver::{
-            contest::{Trial, hold},
+            contest::{ContenderResult, run_contest},
             raster::Raster,
             report::{RasterResult, SetResult},
         },
@@ -99,12 +99,12 @@ impl Contender for Idle {
 }
 
 /// Runs two kernels on the same set of rays, in place of the driver and its rival.
-fn trials(stage: &Stage, rivals: &Stage, set: &RaySet) -> Vec<Trial> {
+fn trials(stage: &Stage, rivals: &Stage, set: &RaySet) -> Vec<ContenderResult> {
     let context = context();
     let contenders =
         vec![walker(&context, stage, set, Traversal::Stack), walker(&context, rivals, set, Traversal::Mask)];
     let mut pauses = Vec::new();
-    let trials = hold(&context, &contenders, 7, |n_rounds| {
+    let trials = run_contest(&context, &contenders, 7, |n_rounds| {
         pauses.push(n_rounds);
         Ok(())
     });
@@ -123,7 +123,7 @@ fn contenders_are_timed_and_agree() {
         assert_eq!(result.n_hits, trials[0].hits.iter().filter(|hit| hit.triangle_ix != NO_TRIANGLE).count());
         assert!(result.n_hits > 0, "{}", set.kind.name());
         let rival = &result.kdray[0];
-        assert_eq!((rival.traversal.as_str(), rival.apart), ("mask", Apart::default()));
+        assert_eq!((rival.traversal.as_str(), rival.apart), ("mask", DriverDifference::default()));
         let (own, other) = (rival.timing.mrays_per_s.unwrap(), result.driver.mrays_per_s.unwrap());
         assert!(own.min > 0.0 && own.min <= own.median && own.median <= own.max);
         assert_eq!(rival.ratio, Some(own.median / other.median));
@@ -153,12 +153,12 @@ fn a_contender_that_writes_nothing_is_noticed() {
     let (stage, context) = (stage(), context());
     for set in &ray_sets(&stage) {
         let mut contenders = [walker(&context, &stage, set, Traversal::Mask)];
-        let right = hold(&context, &contenders, 1, |_| Ok(())).expect("a contest").remove(0).hits;
+        let right = run_contest(&context, &contenders, 1, |_| Ok(())).expect("a contest").remove(0).hits;
         // The buffer holds the right hits of the previous run.
         contenders = contenders.map(|walker| Box::new(Idle(walker)) as Box<dyn Contender>);
-        let idle = hold(&context, &contenders, 0, |_| Ok(())).expect("a contest").remove(0).hits;
-        let apart = Apart::of(set.kind, &right, &idle);
-        assert_eq!(apart, Apart { n_hit_or_miss: right.len() as u64, n_distance: 0 }, "{}", set.kind.name());
+        let idle = run_contest(&context, &contenders, 0, |_| Ok(())).expect("a contest").remove(0).hits;
+        let apart = DriverDifference::of(set.kind, &right, &idle);
+        assert_eq!(apart, DriverDifference { n_hit_or_miss: right.len() as u64, n_distance: 0 }, "{}", set.kind.name());
     }
 }
 

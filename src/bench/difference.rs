@@ -59,14 +59,14 @@ pub const T_TOLERANCE: f32 = 1.0 / 8192.0;
 /// Numbers of hits in a set of rays that differ from those of a tracer with another arithmetic. The triangle that was
 /// hit is not compared, since many triangles share edges and corners.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Apart {
+pub struct DriverDifference {
     /// Rays that hit with one tracer and miss with the other, or whose distance is NaN.
     pub n_hit_or_miss: u64,
     /// Distances whose relative difference exceeds [`T_TOLERANCE`].
     pub n_distance: u64,
 }
 
-impl Apart {
+impl DriverDifference {
     /// Compares `found` with `reference`, each with one hit per ray. For any-hit rays, only hit or miss counts.
     ///
     /// # Panics
@@ -166,7 +166,7 @@ mod tests {
     /// Returns the numbers of hit-or-miss and of distance differences for one wrong hit among right ones.
     fn apart(kind: RayKind, reference: Hit, found: Hit) -> (u64, u64) {
         let right = [hit(1.0, 3), MISS];
-        let apart = Apart::of(kind, &[right[0], reference, right[1]], &[right[0], found, right[1]]);
+        let apart = DriverDifference::of(kind, &[right[0], reference, right[1]], &[right[0], found, right[1]]);
         assert_eq!(apart.n_differing(), apart.n_hit_or_miss + apart.n_distance);
         (apart.n_hit_or_miss, apart.n_distance)
     }
@@ -183,8 +183,8 @@ mod tests {
             assert_eq!(apart(kind, hit(2.0, 7), hit(f32::NAN, 7)), (1, 0));
             assert_eq!(apart(kind, hit(f32::NAN, 7), hit(f32::NAN, 7)), (1, 0));
         }
-        assert!(Apart { n_hit_or_miss: 1, n_distance: 1 }.is_rounding(20_000));
-        assert!(!Apart { n_hit_or_miss: 1, n_distance: 1 }.is_rounding(19_999));
+        assert!(DriverDifference { n_hit_or_miss: 1, n_distance: 1 }.is_rounding(20_000));
+        assert!(!DriverDifference { n_hit_or_miss: 1, n_distance: 1 }.is_rounding(19_999));
     }
 
     #[test]

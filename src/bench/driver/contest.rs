@@ -15,7 +15,7 @@ use crate::{
 
 /// The result of one contender.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trial {
+pub struct ContenderResult {
     pub name: String,
     /// Time of all rays; none where the device has no timestamps.
     pub ms: Option<Spread>,
@@ -31,12 +31,12 @@ const UNWRITTEN: Hit = Hit { t: f32::NAN, triangle_ix: 0, u: 0.0, v: 0.0 };
 ///
 /// # Errors
 /// The device is out of memory, or a call of Vulkan fails.
-pub fn hold(
+pub fn run_contest(
     context: &Arc<Context>,
     contenders: &[Box<dyn Contender>],
     n_times: u16,
     mut between: impl FnMut(u16) -> Result<(), GpuError>,
-) -> Result<Vec<Trial>, GpuError> {
+) -> Result<Vec<ContenderResult>, GpuError> {
     if n_times > 0 {
         warm_up(|| rounds(context, contenders, CASTS_PER_TURN).map(drop))?;
     }
@@ -49,7 +49,7 @@ pub fn hold(
         between(n_rounds)?;
     }
     let trial = |contender: &dyn Contender, ms| {
-        Ok(Trial { name: contender.name(), ms: Spread::of(ms), hits: hits_of(context, contender)? })
+        Ok(ContenderResult { name: contender.name(), ms: Spread::of(ms), hits: hits_of(context, contender)? })
     };
     contenders.iter().zip(all_ms).map(|(contender, ms)| trial(contender.as_ref(), ms)).collect()
 }

@@ -19,7 +19,7 @@ use std::{rc::Rc, sync::Arc};
 
 use self::{
     builds::Builds,
-    contest::hold,
+    contest::run_contest,
     pipeline::Pipeline,
     raster::Raster,
     report::{RasterResult, SetResult},
@@ -82,7 +82,7 @@ impl Structure {
 
 /// A scene on a device that supports ray tracing: kdray's structures, the driver's structure and the rasterizers,
 /// ready to be measured.
-pub struct Arena {
+pub struct DeviceStage {
     context: Arc<Context>,
     structures: Vec<Structure>,
     driver_accel: Rc<DriverAccel>,
@@ -90,7 +90,7 @@ pub struct Arena {
     builds: Builds,
 }
 
-impl Arena {
+impl DeviceStage {
     /// Uploads the stage and builds the driver's structure.
     ///
     /// # Errors
@@ -133,7 +133,7 @@ impl Arena {
             contenders.extend(kernels);
         }
         let rasterizes = set.kind == RayKind::Primary;
-        let trials = hold(&self.context, &contenders, n_times, |n_rounds| {
+        let trials = run_contest(&self.context, &contenders, n_times, |n_rounds| {
             let rasters = if rasterizes { &mut self.rasters[..] } else { &mut [] };
             rasters.iter_mut().try_for_each(|raster| raster.draw(n_rounds))
         })?;

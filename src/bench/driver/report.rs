@@ -2,13 +2,13 @@
 
 use serde::Serialize;
 
-use super::{builds::Builds, contest::Trial};
+use super::{builds::Builds, contest::ContenderResult};
 use crate::{
     accel::kdtree::Statistics,
     bench::{
         Spread,
         chart::{BarChart, Scale, Series},
-        difference::{Apart, is_hit},
+        difference::{DriverDifference, is_hit},
         rays::RayKind,
     },
 };
@@ -42,12 +42,12 @@ pub struct SetResult {
     /// Number of hits that the driver finds.
     pub n_hits: usize,
     pub driver: Timing,
-    pub kdray: Vec<Rival>,
+    pub kdray: Vec<SearchResult>,
 }
 
 /// The result of one of kdray's searches on one set of rays, beside the driver's.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Rival {
+pub struct SearchResult {
     pub traversal: String,
     #[serde(flatten)]
     pub timing: Timing,
@@ -55,22 +55,22 @@ pub struct Rival {
     pub ratio: Option<f64>,
     /// Difference of its hits from the driver's.
     #[serde(flatten)]
-    pub apart: Apart,
+    pub apart: DriverDifference,
 }
 
 impl SetResult {
     /// Makes the result from trials of the same rays. The first trial is the driver's.
-    pub fn new(rays: RayKind, trials: &[Trial]) -> Self {
+    pub fn new(rays: RayKind, trials: &[ContenderResult]) -> Self {
         let (driver, rivals) = trials.split_first().expect("the driver's trial");
         let n_rays = driver.hits.len();
         let driver_timing = Timing::new(driver.ms, n_rays);
-        let rival = |trial: &Trial| {
+        let rival = |trial: &ContenderResult| {
             let timing = Timing::new(trial.ms, n_rays);
-            Rival {
+            SearchResult {
                 traversal: trial.name.clone(),
                 timing,
                 ratio: timing.ratio_to(&driver_timing),
-                apart: Apart::of(rays, &driver.hits, &trial.hits),
+                apart: DriverDifference::of(rays, &driver.hits, &trial.hits),
             }
         };
         Self {
@@ -166,7 +166,7 @@ impl Report {
     }
 
     /// Returns the first set and search for which more hits differ from the driver's than rounding explains.
-    pub fn first_wrong(&self) -> Option<(&SetResult, &Rival)> {
+    pub fn first_wrong(&self) -> Option<(&SetResult, &SearchResult)> {
         let mut pairs = self.sets.iter().flat_map(|set| set.kdray.iter().map(move |rival| (set, rival)));
         pairs.find(|(set, rival)| !rival.apart.is_rounding(set.n_rays))
     }
@@ -183,8 +183,8 @@ mod tests {
         Hit { t, triangle_ix: 3, u: 0.0, v: 0.0 }
     }
 
-    fn trial(name: &str, ms: f64, hits: [Hit; 4]) -> Trial {
-        Trial { name: name.to_owned(), ms: Spread::of([ms, 2.0 * ms, 3.0 * ms]), hits: hits.to_vec() }
+    fn trial(name: &str, ms: f64, hits: [Hit; 4]) -> ContenderResult {
+        ContenderResult { name: name.to_owned(), ms: Spread::of([ms, 2.0 * ms, 3.0 * ms]), hits: hits.to_vec() }
     }
 
     fn set(rays: RayKind) -> SetResult {
@@ -199,9 +199,9 @@ mod tests {
         assert_eq!((result.n_rays, result.n_hits, result.driver.ms.unwrap().median), (4, 3, 6.0));
         let [mask, stack] = &result.kdray[..] else { panic!("two rivals") };
         assert!((mask.ratio.unwrap() - 1.5).abs() < 1e-12 && (stack.ratio.unwrap() - 0.5).abs() < 1e-12);
-        assert_eq!(mask.apart, Apart::default());
-        assert_eq!(stack.apart, Apart { n_hit_or_miss: 2, n_distance: 1 });
-        assert_eq!(set(RayKind::Shadow).kdray[1].apart, Apart { n_hit_or_miss: 2, n_distance: 0 });
+        assert_eq!(mask.apart, DriverDifference::default());
+        assert_eq!(stack.apart, DriverDifference { n_hit_or_miss: 2, n_distance: 1 });
+        assert_eq!(set(RayKind::Shadow).kdray[1].apart, DriverDifference { n_hit_or_miss: 2, n_distance: 0 });
     }
 
     #[test]
@@ -214,15 +214,18 @@ mod tests {
 
     #[test]
     fn no_rays_have_no_speed() {
-        let nobody = |name: &str| Trial { hits: Vec::new(), ..trial(name, 1.0, [hit(1.0); 4]) };
+        let nobody = |name: &str| ContenderResult { hits: Vec::new(), ..trial(name, 1.0, [hit(1.0); 4]) };
         let result = SetResult::new(RayKind::Shadow, &[nobody("driver"), nobody("mask")]);
-        assert_eq!((result.n_rays, result.kdray[0].ratio, result.kdray[0].apart), (0, None, Apart::default()));
+        assert_eq!(
+            (result.n_rays, result.kdray[0].ratio, result.kdray[0].apart),
+            (0, None, DriverDifference::default())
+        );
     }
 
     #[test]
     fn without_timestamps_only_hits_are_compared() {
-        let untimed = |name| Trial { ms: None, ..trial(name, 1.0, [hit(1.0); 4]) };
+        let untimed = |name| ContenderResult { ms: None, ..trial(name, 1.0, [hit(1.0); 4]) };
         let result = SetResult::new(RayKind::Primary, &[untimed("driver"), untimed("mask")]);
-        assert_eq!((result.kdray[0].ratio, result.kdray[0].apart), (None, Apart::default()));
+        assert_eq!((result.kdray[0].ratio, result.kdray[0].apart), (None, DriverDifference::default()));
     }
 }

@@ -5,7 +5,7 @@ use kdray::{
     bench::{
         difference::T_TOLERANCE,
         driver::{
-            Arena,
+            DeviceStage,
             builds::Builds,
             report::{RasterResult, Report, SetResult, Timing},
         },
@@ -37,7 +37,7 @@ pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     let build_options = TreeKind::Best.options(Processor::of(Some(&context)));
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());
     let (stage, _) = progress.stage(&building, || stage(args, scene, &build_options));
-    let (arena, _) = progress.stage("letting the driver build its tree", || Arena::new(&context, &stage));
+    let (arena, _) = progress.stage("letting the driver build its tree", || DeviceStage::new(&context, &stage));
     let mut arena = arena?;
     let (sets, _) = progress.stage("making rays", || ray_sets(&stage));
 
@@ -158,7 +158,7 @@ mod tests {
         accel::kdtree::KdTree,
         bench::{
             Spread,
-            driver::{builds::GridBuilds, contest::Trial, report::PassSpread},
+            driver::{builds::GridBuilds, contest::ContenderResult, report::PassSpread},
         },
         cast::Hit,
     };
@@ -168,7 +168,7 @@ mod tests {
     /// Returns a report of four rays of each kind. The driver takes 4, 8 and 12 ms, `mask` half of that and `stack`
     /// the same. `stack` has `n_wrong` wrong hits among its primary rays.
     fn report(n_wrong: usize) -> Report {
-        let trial = |name: &str, ms: f64, n_wrong: usize| Trial {
+        let trial = |name: &str, ms: f64, n_wrong: usize| ContenderResult {
             name: name.to_owned(),
             ms: Spread::of([ms, 2.0 * ms, 3.0 * ms]),
             hits: (0..4)
