@@ -62,13 +62,13 @@ pub fn knot(n_triangles: u32) -> Scene {
 }
 
 /// The knot in a closed room, and the time of making it.
-pub struct Sized {
+pub struct KnotStage {
     pub stage: Stage,
     n_triangles: usize,
     generate_ms: f64,
 }
 
-impl Sized {
+impl KnotStage {
     /// Makes the knot and the room. `size` is in pixels; each pixel has one primary ray.
     pub fn new(n_triangles: u32, size: (u32, u32), build_options: &BuildOptions) -> Self {
         let begin = Instant::now();
