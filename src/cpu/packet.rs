@@ -29,7 +29,7 @@ const BLOCK: usize = 8;
 
 /// The rays' t intervals in a cell. A ray that is not in the cell has `enter` above `exit`.
 #[derive(Clone, Copy)]
-pub struct Interval<S: Simd> {
+pub struct PacketIntervals<S: Simd> {
     pub enter: f32x16<S>,
     pub exit: f32x16<S>,
 }
@@ -61,7 +61,7 @@ pub struct Packet<S: Simd> {
     pub t_best: f32x16<S>,
 }
 
-impl<S: Simd> Interval<S> {
+impl<S: Simd> PacketIntervals<S> {
     /// Returns the rays that are in the cell.
     #[inline(always)]
     pub fn lanes(&self) -> LaneMask {
@@ -124,7 +124,7 @@ impl<S: Simd> Packet<S> {
         inputs: &KernelInputs<impl ReadCounter>,
         search_rays: &RaysSoa,
         n_rays: usize,
-    ) -> (Self, Interval<S>) {
+    ) -> (Self, PacketIntervals<S>) {
         let (origin, direction) = (columns(simd, &search_rays.origin), columns(simd, &search_rays.direction));
         let inv_direction = [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])];
         let bias = [-origin[0] * inv_direction[0], -origin[1] * inv_direction[1], -origin[2] * inv_direction[2]];
@@ -132,7 +132,7 @@ impl<S: Simd> Packet<S> {
         let [x1, y1, z1] = times_plus(inputs.cell_max.to_array(), &inv_direction, &bias);
         let t_min = f32x16::load_array_ref(simd, &search_rays.t_min);
         let t_max = f32x16::load_array_ref(simd, &search_rays.t_max);
-        let whole = Interval {
+        let whole = PacketIntervals {
             enter: x0.min(x1).max(y0.min(y1)).max(z0.min(z1).max(t_min)),
             exit: x0.max(x1).min(y0.max(y1)).min(z0.max(z1).min(t_max)),
         };
@@ -163,7 +163,7 @@ impl<S: Simd> Packet<S> {
 
     /// Returns the rays' t intervals in the cell, cut off at their best hits.
     #[inline(always)]
-    fn centered_intervals(&self, cell: &Interval<S>) -> CenteredIntervals<S> {
+    fn centered_intervals(&self, cell: &PacketIntervals<S>) -> CenteredIntervals<S> {
         let exit = cell.exit.min(self.t_best);
         CenteredIntervals { middle: (cell.enter + exit) * 0.5, half: (exit - cell.enter) * 0.5 }
     }
@@ -188,7 +188,7 @@ impl<S: Simd> Packet<S> {
     /// Returns the rays that enter a slab within the cell. The slab's normal is scaled such that its half thickness
     /// is 1.
     #[inline(always)]
-    pub fn lanes_in_slab(&self, slab: &Slab, cell: &Interval<S>) -> LaneMask {
+    pub fn lanes_in_slab(&self, slab: &Slab, cell: &PacketIntervals<S>) -> LaneMask {
         self.lanes_near(&self.centered_intervals(cell), slab.normal, slab.offset, 1.0)
     }
 
@@ -198,7 +198,7 @@ impl<S: Simd> Packet<S> {
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
         leaf: KdNode,
-        cell: &Interval<S>,
+        cell: &PacketIntervals<S>,
     ) {
         let entries = entries_of(leaf);
         if entries.is_empty() {

@@ -6,7 +6,7 @@ use fearless_simd::{Level, Simd, dispatch, f32x16, prelude::*};
 
 use super::{
     lanes::LANES,
-    packet::{Interval, Packet},
+    packet::{Packet, PacketIntervals},
     soa::{HitsSoa, RaysSoa},
 };
 use crate::{
@@ -63,7 +63,7 @@ impl PacketTraverser {
         inputs: &KernelInputs<impl ReadCounter>,
         packet: &Packet<S>,
         node_ix: &mut u32,
-        cell: &mut Interval<S>,
+        cell: &mut PacketIntervals<S>,
     ) -> KdNode {
         let mut node = inputs.kd_nodes[*node_ix as usize];
         loop {
@@ -80,8 +80,8 @@ impl PacketTraverser {
             let t_cross = f32::from_bits(node.split_or_first) * packet.inv_direction[axis] + packet.bias[axis];
             let first_ix = 2 * (node.axis_and_child >> KD_PAIR_SHIFT) + packet.first_is_above[axis];
             // A ray that is in neither child has a NaN as `t_cross`, or is not in the cell.
-            let first = Interval { enter: cell.enter, exit: t_cross.min(cell.exit) };
-            let second = Interval { enter: t_cross.max(cell.enter), exit: cell.exit };
+            let first = PacketIntervals { enter: cell.enter, exit: t_cross.min(cell.exit) };
+            let second = PacketIntervals { enter: t_cross.max(cell.enter), exit: cell.exit };
             (*node_ix, *cell) = match (first.lanes() != 0, second.lanes() != 0) {
                 (_, false) => (first_ix, first),
                 (false, true) => (first_ix ^ 1, second),
@@ -98,13 +98,13 @@ impl PacketTraverser {
 
     /// Returns the next pending cell in which a ray may have a hit nearer than its best one, or none.
     #[inline(always)]
-    fn pop<S: Simd>(&mut self, t_best: f32x16<S>) -> Option<(u32, Interval<S>)> {
+    fn pop<S: Simd>(&mut self, t_best: f32x16<S>) -> Option<(u32, PacketIntervals<S>)> {
         while self.size > 0 {
             self.size -= 1;
             let entry = &self.entries[self.size];
             let enter = f32x16::load_array_ref(t_best.simd, &entry.enter);
             let exit = f32x16::load_array_ref(t_best.simd, &entry.exit);
-            let cell = Interval { enter, exit: exit.min(t_best) };
+            let cell = PacketIntervals { enter, exit: exit.min(t_best) };
             if cell.lanes() != 0 {
                 return Some((entry.node_ix, cell));
             }
@@ -118,7 +118,7 @@ impl PacketTraverser {
         &mut self,
         inputs: &KernelInputs<impl ReadCounter>,
         packet: &mut Packet<S>,
-        whole: Interval<S>,
+        whole: PacketIntervals<S>,
     ) {
         let (mut node_ix, mut cell) = (0, whole);
         self.size = 0;
