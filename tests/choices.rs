@@ -260,10 +260,10 @@ fn primary_rays_are_measured_where_that_changes_no_bit() {
     };
     let many = Workload { n_rays: u64::MAX, ..Workload::of_pictures(&options, 0, 1) };
     let far = Camera { eye: Vec3::Z * 1e3, ..scene.camera };
-    for unknown in [many, many.seen_by([scene.camera, far].iter())] {
+    for unknown in [many, many.with_cameras([scene.camera, far].iter())] {
         assert_eq!(primary_of(unknown), Chosen { value: Primary::SoftwareRaster, by: Reason::Rule });
     }
-    let near = many.seen_by([scene.camera].iter());
+    let near = many.with_cameras([scene.camera].iter());
     let (first, second) = (primary_of(near), primary_of(near));
     assert_eq!((first.by, second), (Reason::Measured, Chosen { by: Reason::Cached, ..first }));
     let other_size = Workload { size: (61, 45), n_rays: 1, ..near };

@@ -147,7 +147,7 @@ impl Engine {
     /// Fails as [`Engine::methods`] and [`Engine::renderer`] do, or if a call fails.
     pub fn render(&self, world: &World, options: &RenderOptions) -> Result<Rendered, GpuError> {
         let scene = world.scene();
-        let workload = Workload::of_pictures(options, scene.lights.len(), 1).seen_by([&scene.camera].into_iter());
+        let workload = Workload::of_pictures(options, scene.lights.len(), 1).with_cameras([&scene.camera].into_iter());
         let options = self.methods(world, &workload)?.apply(options);
         let mut renderer = self.renderer(world, &options)?;
         let drawn = renderer.draw(&scene.camera, 1, || ())?;

@@ -58,7 +58,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let n_triangles = scene.n_triangles();
     let n_pictures = u64::from(args.spp) * views.len() as u64;
     let cameras = views.iter().map(|view| &view.camera);
-    let workload = Workload::of_pictures(&options, scene.lights.len(), n_pictures).seen_by(cameras);
+    let workload = Workload::of_pictures(&options, scene.lights.len(), n_pictures).with_cameras(cameras);
     let accel = engine.choose_accel(n_triangles, &workload);
     build::check_memory(accel, n_triangles)?;
     let building = build::building(accel, n_triangles);

@@ -120,7 +120,7 @@ impl Workload {
 
     /// Returns the same work with `farthest_eye` set from `cameras`, which are all the cameras of the work.
     #[must_use]
-    pub fn seen_by<'c>(self, cameras: impl Iterator<Item = &'c Camera>) -> Self {
+    pub fn with_cameras<'c>(self, cameras: impl Iterator<Item = &'c Camera>) -> Self {
         Self { farthest_eye: cameras.map(|camera| camera.eye.abs().max_element()).fold(0.0, f32::max), ..self }
     }
 
