@@ -234,7 +234,7 @@ impl Resources {
             commands.barrier(Access::ComputeWrite, Access::TransferRead); // pixel_radiance
             commands.barrier(Access::ComputeUpdate, Access::TransferWrite); // pixel_accumulated
             commands.copy_buffer(sample, sums, sample.bytes());
-            commands.barrier(Access::TransferWrite, Access::AllReads); // pixel_accumulated
+            commands.barrier(Access::TransferWrite, Access::AnyUse); // pixel_accumulated
         })?;
         *self = next;
         Ok(())

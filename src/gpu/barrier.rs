@@ -34,7 +34,7 @@ pub enum Access {
     /// by kernels, and reads and writes by transfers. Fragment shaders are not included. The access serves barriers
     /// between an upload and the commands that use the uploaded data, and between a frame and the uploads of the next
     /// frame.
-    AllReads,
+    AnyUse,
 }
 
 impl Access {
@@ -50,7 +50,7 @@ impl Access {
             Self::HostRead => S::HOST,
             Self::RayTracingUpdate => S::RAY_TRACING_SHADER_KHR,
             Self::StructureBuild => S::ACCELERATION_STRUCTURE_BUILD_KHR,
-            Self::AllReads => {
+            Self::AnyUse => {
                 S::INDEX_INPUT | S::VERTEX_SHADER | S::COMPUTE_SHADER | S::DRAW_INDIRECT | S::COPY | S::CLEAR
             }
         }
@@ -74,7 +74,7 @@ impl Access {
             Self::StructureBuild => {
                 A::SHADER_READ | A::ACCELERATION_STRUCTURE_READ_KHR | A::ACCELERATION_STRUCTURE_WRITE_KHR
             }
-            Self::AllReads => {
+            Self::AnyUse => {
                 A::SHADER_STORAGE_READ
                     | A::SHADER_STORAGE_WRITE
                     | A::UNIFORM_READ

@@ -166,7 +166,7 @@ impl<T: Pod> Buffer<T> {
             let begin = (first * size_of::<T>()) as u64;
             context.run("upload", |commands| {
                 commands.copy_buffer_to((&self.any, begin), &staging, bytes as u64);
-                commands.barrier(Access::TransferWrite, Access::AllReads); // the buffer
+                commands.barrier(Access::TransferWrite, Access::AnyUse); // the buffer
             })?;
         }
         Ok(())

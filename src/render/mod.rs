@@ -321,14 +321,14 @@ impl Renderer {
             Rasterize::reset(commands, &self.resources);
         }
         // bounces, counters, pixel_features, raster_groups
-        commands.barrier(Access::TransferWrite, Access::AllReads);
+        commands.barrier(Access::TransferWrite, Access::AnyUse);
         self.record_section(commands, visibility, &Batch::default());
     }
 
     fn update_constants(&self, commands: &Commands) {
-        commands.barrier(Access::AllReads, Access::TransferWrite); // all that the last frame reads: frame, bounces ...
+        commands.barrier(Access::AnyUse, Access::TransferWrite); // all that the last frame reads: frame, bounces ...
         commands.update_buffer(self.resources.frame.any(), self.resources.constants());
-        commands.barrier(Access::TransferWrite, Access::AllReads); // frame
+        commands.barrier(Access::TransferWrite, Access::AnyUse); // frame
     }
 
     fn record_section(&self, commands: &Commands, section: &[Step], batch: &Batch) {

@@ -48,7 +48,7 @@ impl View {
         let Stage { passes, resources, .. } = &self.stage;
         hits_by(&self.stage, |commands, batch| {
             Rasterize::reset(commands, resources);
-            commands.barrier(Access::TransferWrite, Access::AllReads); // raster_groups
+            commands.barrier(Access::TransferWrite, Access::AnyUse); // raster_groups
             passes.record_section(commands, resources, &plan::visibility(Primary::SoftwareRaster), &Inputs::default());
             passes.primary_hit.record(commands, batch);
         })

@@ -141,7 +141,7 @@ impl GridBuilder {
             for (from, to, bytes) in copies.into_iter().filter(|(.., bytes)| *bytes > 0) {
                 commands.copy_buffer(from, to, bytes as u64);
             }
-            commands.barrier(Access::TransferWrite, Access::AllReads); // the grid
+            commands.barrier(Access::TransferWrite, Access::AnyUse); // the grid
         })
     }
 }
