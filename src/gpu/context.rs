@@ -120,7 +120,7 @@ impl Context {
     #[cfg(feature = "view")]
     pub fn for_window(
         options: &ContextOptions,
-        window: Arc<dyn super::Screen>,
+        window: Arc<dyn super::WindowHandles>,
     ) -> Result<(Arc<Self>, super::Surface), GpuError> {
         let instance = Instance::with_extensions(options.validate, &super::Surface::extensions(&*window)?)?;
         let surface = super::Surface::new(&instance, window)?;

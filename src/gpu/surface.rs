@@ -8,21 +8,21 @@ use raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use super::{GpuError, devices::queue_family, instance::Instance};
 
 /// A window that gives access to its raw window handle and to the raw handle of its display.
-pub trait Screen: HasDisplayHandle + HasWindowHandle {}
+pub trait WindowHandles: HasDisplayHandle + HasWindowHandle {}
 
-impl<T: HasDisplayHandle + HasWindowHandle> Screen for T {}
+impl<T: HasDisplayHandle + HasWindowHandle> WindowHandles for T {}
 
 /// A window's surface. It keeps the window alive.
 pub struct Surface {
     pub(super) raw: vk::SurfaceKHR,
     pub(super) calls: khr::surface::Instance,
     _instance: Arc<Instance>,
-    _window: Arc<dyn Screen>,
+    _window: Arc<dyn WindowHandles>,
 }
 
 impl Surface {
     /// Lists the instance extensions that a surface of this window needs.
-    pub(super) fn extensions(window: &dyn Screen) -> Result<Vec<&'static CStr>, GpuError> {
+    pub(super) fn extensions(window: &dyn WindowHandles) -> Result<Vec<&'static CStr>, GpuError> {
         let display = window.display_handle().map_err(|error| GpuError::NoSurface(error.to_string()))?;
         let names = ash_window::enumerate_required_extensions(display.as_raw())
             .map_err(GpuError::call("enumerate_required_extensions", "window"))?;
@@ -31,7 +31,7 @@ impl Surface {
     }
 
     /// Creates the surface of a window. The instance must have the extensions that the window needs.
-    pub(super) fn new(instance: &Arc<Instance>, window: Arc<dyn Screen>) -> Result<Self, GpuError> {
+    pub(super) fn new(instance: &Arc<Instance>, window: Arc<dyn WindowHandles>) -> Result<Self, GpuError> {
         let no_surface = |error: raw_window_handle::HandleError| GpuError::NoSurface(error.to_string());
         let display = window.display_handle().map_err(no_surface)?.as_raw();
         let handle = window.window_handle().map_err(no_surface)?.as_raw();

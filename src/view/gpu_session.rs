@@ -11,7 +11,7 @@ use super::{
 use crate::{
     engine::choices::{Cache, Choices, Request, Workload},
     frame::RenderOptions,
-    gpu::{Context, ContextOptions, GpuError, Presenter, Screen},
+    gpu::{Context, ContextOptions, GpuError, Presenter, WindowHandles},
     passes::Present,
     render::Renderer,
 };
@@ -34,7 +34,7 @@ impl GpuSession {
     /// # Errors
     /// No device can render and present, or the scene or the picture exceeds the device's limits or memory.
     pub fn open(
-        window: Arc<dyn Screen>,
+        window: Arc<dyn WindowHandles>,
         device: &ContextOptions,
         loaded: &LoadedScene,
         options: &RenderOptions,
