@@ -308,7 +308,7 @@ impl Pass {
     }
 
     /// Whether the pass takes part in finding the closest hits of rays, by tracing or by rasterization.
-    pub fn is_tracing(self) -> bool {
+    pub fn finds_hits(self) -> bool {
         matches!(self.role(), Role::PrimaryVisibility | Role::ClosestHit)
     }
 }

@@ -135,7 +135,7 @@ impl Profile {
     /// Returns the milliseconds of the passes that find the closest hits of a bounce's rays, or None if one of the
     /// passes lacks a timestamp. Passes of primary visibility, which run once a frame, count for bounce 0.
     pub fn tracing_ms(&self, bounce: u32) -> Option<f64> {
-        let passes = self.passes.iter().filter(|pass| pass.pass().is_tracing());
+        let passes = self.passes.iter().filter(|pass| pass.pass().finds_hits());
         passes.filter(|pass| pass.bounce.unwrap_or(0) == bounce).map(|pass| pass.ms).sum()
     }
 

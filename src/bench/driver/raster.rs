@@ -54,7 +54,7 @@ impl Raster {
         self.renderer.draw()?;
         for _ in 0..n_frames {
             let passes = self.renderer.draw()?.passes;
-            let tracing = passes.iter().filter(|pass| pass.pass().is_tracing());
+            let tracing = passes.iter().filter(|pass| pass.pass().finds_hits());
             self.frames.extend(tracing.map(|pass| pass.ms.map(|ms| (pass.name, ms))).collect::<Option<Vec<_>>>());
         }
         Ok(())
