@@ -49,13 +49,13 @@ impl Session {
     pub fn save_if_due(&mut self, gpu: &GpuSession, window: (u32, u32)) {
         let is_whole = |displayed: Displayed| displayed.size == window && displayed.camera == *self.controller.camera();
         if gpu.renderer.displayed().is_some_and(is_whole) {
-            self.save_what_is_left(gpu);
+            self.save_as_it_is(gpu);
         }
     }
 
     /// Saves the displayed picture if a save is due, even if the picture is small or unfinished. It is called before
     /// another camera or view replaces the picture, and before the viewer ends.
-    pub fn save_what_is_left(&mut self, gpu: &GpuSession) {
+    pub fn save_as_it_is(&mut self, gpu: &GpuSession) {
         if !std::mem::take(&mut self.is_save_due) {
             return;
         }

@@ -186,7 +186,7 @@ impl App {
     /// Ends the viewer because the user closes it. A save that is due is made first.
     fn quit(&mut self, event_loop: &ActiveEventLoop) {
         if let Some(Shown { gpu, .. }) = &self.shown {
-            self.session.save_what_is_left(gpu);
+            self.session.save_as_it_is(gpu);
         }
         self.end(event_loop, Ok(()));
     }

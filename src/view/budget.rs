@@ -95,7 +95,7 @@ impl Budget {
 
 /// Returns whether two numbers of pixels per part differ by a factor of two or more. None stands for the whole
 /// picture.
-pub fn is_other_pace(a: Option<u32>, b: Option<u32>) -> bool {
+pub fn differs_by_two(a: Option<u32>, b: Option<u32>) -> bool {
     match (a, b) {
         (Some(a), Some(b)) => a >= 2 * b || b >= 2 * a,
         (a, b) => a != b,

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use super::{
-    budget::{Budget, PART_MS, is_other_pace},
+    budget::{Budget, PART_MS, differs_by_two},
     controller::Controller,
     error::Topic,
     gpu_session::GpuSession,
@@ -154,7 +154,7 @@ impl Session {
         let makes_room = !self.has_room(gpu, &whole);
         let is_elsewhere = self.controller.camera() != gpu.renderer.camera();
         if is_elsewhere || is_other_view {
-            self.save_what_is_left(gpu);
+            self.save_as_it_is(gpu);
         }
         if self.is_interactive && (is_elsewhere || is_other_view || makes_room) {
             // The new picture is drawn small first, so that it is shown at once.
@@ -221,7 +221,7 @@ impl Session {
         if !renderer.is_pending() {
             self.sample_ms = 0.0;
             let most_pixels = self.budget().part_pixels(window).filter(|_| !is_moving);
-            if renderer.n_samples() == 0 || is_other_pace(most_pixels, renderer.most_pixels()) {
+            if renderer.n_samples() == 0 || differs_by_two(most_pixels, renderer.most_pixels()) {
                 renderer.limit_batches(most_pixels)?;
             }
         }
