@@ -69,7 +69,7 @@ impl Contender for Pipeline {
 
     fn record(&self, commands: &Commands) {
         let address = self.driver_accel.address();
-        let push = DriverCast { scenery_low: address as u32, scenery_high: (address >> 32) as u32 };
+        let push = DriverCast { accel_address_low: address as u32, accel_address_high: (address >> 32) as u32 };
         commands.bind(&self.set);
         commands.trace_rays(&self.pipeline, &push, self.resources.cast_rays.len() as u32);
     }
