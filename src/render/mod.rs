@@ -28,7 +28,7 @@ use tracing::info_span;
 pub use self::{bands::BandedRenderer, incremental::Displayed};
 use self::{
     incremental::{Part, PartialSample, Traced, Until},
-    schedule::{QueueBudget, Schedule},
+    schedule::{QueueSizing, Schedule},
 };
 use crate::{
     buffers::{Needs, Resources},
@@ -46,7 +46,7 @@ pub struct Renderer {
     world: World,
     camera: Camera,
     options: RenderOptions,
-    budget: QueueBudget,
+    budget: QueueSizing,
     resources: Resources,
     passes: Passes,
     schedule: Schedule,
@@ -101,7 +101,7 @@ impl Renderer {
         let branches = scene.materials.iter().any(|material| material.flags & both == both);
         let mut constants = world.frame_constants(options);
         constants.n_lanes = lanes_to_share(&context, options)?;
-        let budget = QueueBudget { fixed_capacity, branches };
+        let budget = QueueSizing { fixed_capacity, branches };
         constants.queue_capacity = budget.queue_capacity(context.limits(), &constants);
         let spans = budget.spans(&constants, None);
         let schedule = Schedule::new(&context, &constants, spans, options)?;

@@ -91,7 +91,7 @@ impl Schedule {
 
 /// What decides how many rays the queue has room for, and how many rays a pixel is expected to make.
 #[derive(Clone, Copy)]
-pub struct QueueBudget {
+pub struct QueueSizing {
     /// Capacity of the queue in rays, if the caller has set it. A batch then has up to as many pixels,
     /// since one ray per pixel is expected.
     pub fixed_capacity: Option<u32>,
@@ -99,7 +99,7 @@ pub struct QueueBudget {
     pub branches: bool,
 }
 
-impl QueueBudget {
+impl QueueSizing {
     /// Returns the capacity that the queue should have: the caller's, if it is set. Otherwise the rays that the whole
     /// picture is expected to make, but no more than [`MOST_RAYS`] and no more than the device's limits allow.
     pub fn queue_capacity(&self, limits: &Limits, constants: &Frame) -> u32 {
@@ -150,7 +150,7 @@ mod tests {
         };
         for (width, height, max_depth) in [(1, 1, 1), (1024, 768, 5), (3840, 2160, 8), (7, 9, 64)] {
             for (branches, fixed_capacity) in [(false, None), (true, None), (true, Some(50))] {
-                let budget = QueueBudget { fixed_capacity, branches };
+                let budget = QueueSizing { fixed_capacity, branches };
                 let mut constants = Frame { width, height, max_depth, n_lights: 3, ..Frame::default() };
                 constants.queue_capacity = budget.queue_capacity(&limits, &constants);
                 assert!(u64::from(constants.queue_capacity) * 48 <= limits.storage_range);
