@@ -595,8 +595,8 @@ struct CastBatch {
 
 // Push constants of a cast by the driver's own ray tracing: the device address of its acceleration structure.
 struct DriverCast {
-    uint scenery_low;
-    uint scenery_high;
+    uint accel_address_low;
+    uint accel_address_high;
 };
 
 // The build of a grid (src/passes/grid). grid_build.glsl defines its terms: pair, item, column and block.

@@ -17,7 +17,7 @@ use std::{mem, rc::Rc, sync::Arc, time::Instant};
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 
-pub(crate) use self::rounds::rounds;
+pub(crate) use self::rounds::time_in_turn;
 pub use self::{
     kernel::Kernel,
     read::{RayFileError, RayReader},

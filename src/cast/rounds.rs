@@ -22,7 +22,7 @@ pub trait Contender {
     fn resources(&self) -> &Rc<CastResources>;
 }
 
-/// Runs every contender once in each round, and returns the milliseconds of `n_rounds` time_in_turn: one entry for each
+/// Runs every contender once in each round, and returns the milliseconds of `n_rounds` rounds: one entry for each
 /// contender, round by round. An entry is None where the device has no timestamps. An additional first round is not
 /// counted, because its times depend on the caches and clocks that earlier work has left.
 pub(crate) fn time_in_turn(

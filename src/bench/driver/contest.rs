@@ -8,7 +8,7 @@ use crate::{
         traversal::{CASTS_PER_TURN, turns},
         warm_up,
     },
-    cast::{Contender, rounds},
+    cast::{Contender, time_in_turn},
     gpu::{Access, Context, GpuError},
     layout::Hit,
 };
@@ -38,11 +38,11 @@ pub fn run_contest(
     mut between: impl FnMut(u16) -> Result<(), GpuError>,
 ) -> Result<Vec<ContenderResult>, GpuError> {
     if n_times > 0 {
-        warm_up(|| rounds(context, contenders, CASTS_PER_TURN).map(drop))?;
+        warm_up(|| time_in_turn(context, contenders, CASTS_PER_TURN).map(drop))?;
     }
     let mut all_ms = vec![Vec::new(); contenders.len()];
     for n_rounds in turns(n_times) {
-        let rows = rounds(context, contenders, n_rounds)?;
+        let rows = time_in_turn(context, contenders, n_rounds)?;
         for (row_ix, ms) in rows.into_iter().enumerate() {
             all_ms[row_ix % contenders.len()].extend(ms);
         }

@@ -6,7 +6,7 @@ use kdray::{
     accel::AccelKind,
     bench::{
         rays::ray_sets,
-        size::{RayGrowth, Report, Row, Sized},
+        size::{KnotStage, RayGrowth, Report, Row},
         variant::Variant,
     },
     engine::choices::{Processor, TreeKind, traversal_by_rule},
@@ -80,7 +80,7 @@ fn measure(
     let building = format!("building the kd-tree of {n_triangles} triangles");
     let build_options = TreeKind::Best.options(Processor::of(context.map(|context| &**context)));
     let pixels = (args.size.width, args.size.height);
-    let (sized, _) = progress.stage(&building, || Sized::new(n_triangles, pixels, &build_options));
+    let (sized, _) = progress.stage(&building, || KnotStage::new(n_triangles, pixels, &build_options));
     let (sets, _) = progress.stage("making rays", || ray_sets(&sized.stage));
     let casting = format!("casting rays at {n_triangles} triangles");
     progress.stage(&casting, || sized.measure(context, variant, &sets, args.repeat)).0

@@ -12,7 +12,7 @@ use super::Timings;
 use crate::{
     accel::{Query, kdtree::Traversal},
     buffers::{AccelBuffers, CastResources},
-    cast::{Contender, Kernel, cast_ray, leaving::diffuse_rays, rounds},
+    cast::{Contender, Kernel, cast_ray, leaving::diffuse_rays, time_in_turn},
     cpu::trace,
     frame::{Denoise, Primary, RenderOptions},
     gpu::{Context, GpuError},
@@ -59,7 +59,7 @@ pub fn measure_traversals(
         Ok(Box::new(Kernel::new(context, &bindings, &resources, (traversal, Query::Closest))?))
     };
     let kernels = traversals.iter().map(kernel).collect::<Result<Vec<_>, _>>()?;
-    let ms = rounds(context, &kernels, N_ROUNDS)?;
+    let ms = time_in_turn(context, &kernels, N_ROUNDS)?;
     let ns_a_ray = |kernel_ix: usize| {
         let own = ms.iter().skip(kernel_ix).step_by(kernels.len()).copied().collect::<Option<Vec<f64>>>()?;
         let least = own.into_iter().min_by(f64::total_cmp)?;
