@@ -44,7 +44,7 @@ void size_dispatches() {
 // The number of times that the cells' edges are doubled after an attempt whose count is above its limit. Each
 // doubling reduces the number of cells that a surface meets to about a quarter. Each attempt that has already failed
 // adds one more doubling. The last attempt has the largest cells possible.
-uint n_steps(uint count, uint limit) {
+uint n_doublings(uint count, uint limit) {
     if (build.n_attempts + 1u >= GRID_MAX_ATTEMPTS) return 32u;
     uint expected = 1u;
     while (expected < 15u && count >> (2u * expected) > limit) ++expected;
@@ -54,7 +54,7 @@ uint n_steps(uint count, uint limit) {
 // Ends an attempt whose count is above its limit, and makes the cells of the next one larger.
 void coarsen(uint count, uint limit) {
     build.n_attempts += 1u;
-    uint steps = n_steps(count, limit);
+    uint steps = n_doublings(count, limit);
     if (LOWER) {
         build.n_halvings = min(build.n_halvings + steps, GRID_MAX_HALVINGS);
         build.counts = GRID_COUNTS_CELLS;

@@ -88,7 +88,7 @@ fn upper_level(input: &Input, bounds: &Bounds, density: f32) -> (Lattice, Level)
             }
             Err(too_many) => {
                 let n_doublings;
-                (lattice, n_doublings) = lattice.coarser(too_many.n_steps(n_attempts));
+                (lattice, n_doublings) = lattice.coarser(too_many.n_doublings(n_attempts));
                 n_coarser += n_doublings;
             }
         }
@@ -118,7 +118,7 @@ fn lower_level(input: &Input, lattice: &Lattice, upper: Level, density: f32) -> 
                 return Level { cells: [blocks, lower_cells].concat(), pairs, n_coarser: upper.n_coarser + n_halvings };
             }
             Err(too_many) => {
-                n_halvings = (n_halvings + too_many.n_steps(n_attempts)).min(GRID_MAX_HALVINGS);
+                n_halvings = (n_halvings + too_many.n_doublings(n_attempts)).min(GRID_MAX_HALVINGS);
             }
         }
     }
@@ -178,7 +178,7 @@ impl TooMany {
     /// are. The last attempt has the largest possible cells.
     ///
     /// `n_attempts`: the number of failed attempts.
-    fn n_steps(&self, n_attempts: u32) -> u32 {
+    fn n_doublings(&self, n_attempts: u32) -> u32 {
         if n_attempts + 1 >= GRID_MAX_ATTEMPTS {
             return 32;
         }
