@@ -55,11 +55,11 @@ impl KdTree {
 
     /// Returns the slab of a node, if it has one.
     pub fn slab_of(&self, node_ix: u32) -> Option<&Slab> {
-        self.is_in_slab(node_ix).then(|| &self.slabs()[node_ix as usize])
+        self.has_slab(node_ix).then(|| &self.slabs()[node_ix as usize])
     }
 
     /// Whether a node has a slab.
-    pub(super) fn is_in_slab(&self, node_ix: u32) -> bool {
+    pub(super) fn has_slab(&self, node_ix: u32) -> bool {
         self.nodes()[node_ix as usize].axis_and_child & KD_HAS_SLAB != 0
     }
 

@@ -49,7 +49,7 @@ impl KdTree {
             // If the root's cell has no surface (a point, a line), all cells count like the root.
             let share = if root_area > 0.0 { half_area(&min, &max) / root_area } else { 1.0 };
             statistics.n_nodes += 1;
-            statistics.n_slabs += u64::from(self.is_in_slab(node_ix));
+            statistics.n_slabs += u64::from(self.has_slab(node_ix));
             match self.node(node_ix) {
                 Node::Leaf { count, .. } => {
                     statistics.n_leaves += 1;

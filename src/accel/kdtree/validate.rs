@@ -110,7 +110,7 @@ impl<'a> Walk<'a> {
         self.seen[1] = true;
         while let Some((node, level, cell)) = stack.pop() {
             let slabs = self.tree.slabs().len();
-            if self.tree.is_in_slab(node) && node as usize >= slabs {
+            if self.tree.has_slab(node) && node as usize >= slabs {
                 return Err(Invalid::NoSlab { node, slabs });
             }
             if std::mem::replace(&mut self.seen[node as usize], true) {
