@@ -21,7 +21,7 @@ const float MAX_ERROR = 16.0;
 // The smallest positive number that is not denormal.
 const float LEAST_NORMAL = 1.17549435e-38;
 
-float magnitude(vec3 v) {
+float sum_of_magnitudes(vec3 v) {
     precise float sum = abs(v.x) + abs(v.y) + abs(v.z);
     return sum;
 }
@@ -32,8 +32,8 @@ vec4 plane_of(Triangle triangle) {
     precise vec3 b = triangle.v2 - triangle.v0;
     precise vec3 normal = a.yzx * b.zxy - a.zxy * b.yzx;
     float longest = max(abs(normal.x), max(abs(normal.y), abs(normal.z)));
-    precise float edges = magnitude(a) * magnitude(b);
-    float reach = max(magnitude(a), magnitude(b));
+    precise float edges = sum_of_magnitudes(a) * sum_of_magnitudes(b);
+    float reach = max(sum_of_magnitudes(a), sum_of_magnitudes(b));
     precise float error = 4.0 * edges * reach;
     precise float limit = MAX_ERROR * (build.largest_coordinate * longest);
     uint exponent = floatBitsToUint(longest) >> 23;

@@ -13,7 +13,7 @@
 
 // A factor on the margin, which covers the rounding of the cubes' middles and half edges.
 const float MARGIN_FACTOR = 1.0625;
-// A bound of the error of a product of two vectors, as a multiple of the product of their `magnitude`s.
+// A bound of the error of a product of two vectors, as a multiple of the product of their `sum_of_magnitudes`s.
 const float PRODUCT_ERROR = 1.0 / 1048576.0;
 
 // A triangle and the columns of its box. The axes are permuted so that columns extend along z, which is the axis of
@@ -48,7 +48,7 @@ uvec3 axis_back(uvec3 v, uint axis) {
 }
 
 // The sum of the components' magnitudes, which is no less than the length.
-float magnitude(vec3 v) {
+float sum_of_magnitudes(vec3 v) {
     precise float sum = abs(v.x) + abs(v.y) + abs(v.z);
     return sum;
 }
@@ -91,7 +91,7 @@ Columns columns_of(Lattice lattice, Triangle triangle, float margin) {
     precise vec3 a = triangle.v1 - triangle.v0;
     precise vec3 b = triangle.v2 - triangle.v0;
     precise vec3 normal = a.yzx * b.zxy - a.zxy * b.yzx;
-    precise float normal_error = PRODUCT_ERROR * (magnitude(a) * magnitude(b));
+    precise float normal_error = PRODUCT_ERROR * (sum_of_magnitudes(a) * sum_of_magnitudes(b));
     vec3 n = abs(normal);
     uint axis = n.z >= n.x && n.z >= n.y ? 2u : (n.y >= n.x ? 1u : 0u);
     Columns columns;
@@ -144,8 +144,8 @@ bool meets_plane(Columns columns, vec3 middle) {
     precise vec3 way = middle - columns.v0;
     vec3 n = columns.normal;
     precise float height = n.x * way.x + n.y * way.y + n.z * way.z;
-    precise float error = columns.normal_error * (magnitude(way) + 3.0 * columns.half_size);
-    precise float reach = magnitude(n) * columns.half_size + error;
+    precise float error = columns.normal_error * (sum_of_magnitudes(way) + 3.0 * columns.half_size);
+    precise float reach = sum_of_magnitudes(n) * columns.half_size + error;
     return !(abs(height) > reach);
 }
 

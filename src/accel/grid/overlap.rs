@@ -54,7 +54,7 @@ impl Columns {
             },
             corners: corners.map(|corner| axis_last(corner, axis)),
             normal: axis_last(normal, axis),
-            normal_error: PRODUCT_ERROR * (magnitude(a) * magnitude(b)),
+            normal_error: PRODUCT_ERROR * (sum_of_magnitudes(a) * sum_of_magnitudes(b)),
             half: 0.5 * lattice.cell_size + margin,
             range: axis_last(range, axis),
             axis,
@@ -136,8 +136,8 @@ impl Columns {
         let way = difference(middle, self.corners[0]);
         let [x, y, z] = self.normal;
         let height = x * way[0] + y * way[1] + z * way[2];
-        let error = self.normal_error * (magnitude(way) + 3.0 * self.half);
-        let reach = magnitude(self.normal) * self.half + error;
+        let error = self.normal_error * (sum_of_magnitudes(way) + 3.0 * self.half);
+        let reach = sum_of_magnitudes(self.normal) * self.half + error;
         !(height.abs() > reach)
     }
 }
@@ -158,7 +158,7 @@ fn difference(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
 }
 
 /// Returns the sum of the magnitudes of a vector's components, which is no less than the vector's length.
-fn magnitude([x, y, z]: [f32; 3]) -> f32 {
+fn sum_of_magnitudes([x, y, z]: [f32; 3]) -> f32 {
     x.abs() + y.abs() + z.abs()
 }
 
