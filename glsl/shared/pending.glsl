@@ -27,8 +27,8 @@ void clear_pending() {
 void go_down() {
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) siblings_done = mask_shifted_down(siblings_done);
     if (TRAVERSAL == TRAVERSAL_MASK) mask_down();
-    if (TRAVERSAL == TRAVERSAL_RESTART) marked_down();
-    if (TRAVERSAL == TRAVERSAL_SHORT_STACK) marked_down();
+    if (TRAVERSAL == TRAVERSAL_RESTART) trail_down();
+    if (TRAVERSAL == TRAVERSAL_SHORT_STACK) trail_down();
 }
 
 // Makes the sibling of the cell's node pending. The ray leaves it at the cell's t_exit.
@@ -38,7 +38,7 @@ void push_pending(Cell cell) {
     if (TRAVERSAL == TRAVERSAL_BACKTRACK) return;
     if (TRAVERSAL == TRAVERSAL_MASK) mask_push(cell);
     else if (TRAVERSAL == TRAVERSAL_STACK) stack_push(cell);
-    else marked_push(cell);
+    else trail_push(cell);
 }
 
 // Returns whether there is a pending cell that may hold a hit nearer than t_best. Methods that have to search for
@@ -62,5 +62,5 @@ void take_pending(TraversalRay ray, inout Cell cell) {
     if (TRAVERSAL == TRAVERSAL_ROPES) return;
     if (TRAVERSAL == TRAVERSAL_MASK) mask_pop(cell);
     else if (TRAVERSAL == TRAVERSAL_STACK) stack_pop(cell);
-    else marked_pop(ray, cell);
+    else trail_pop(ray, cell);
 }

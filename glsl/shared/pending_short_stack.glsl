@@ -3,8 +3,8 @@
 // mask (pending_restart.glsl). In the paper, the ray restarts at the t where it left the leaf. Most rays lose no
 // entry. A part of pending.glsl.
 //
-// Needs kd_nodes.glsl, pending_mask.glsl and pending_restart.glsl. Provides `marked_down`, `marked_push` and
-// `marked_pop`, which serve both TRAVERSAL_SHORT_STACK and TRAVERSAL_RESTART: the latter never pushes to the ring.
+// Needs kd_nodes.glsl, pending_mask.glsl and pending_restart.glsl. Provides `trail_down`, `trail_push` and
+// `trail_pop`, which serve both TRAVERSAL_SHORT_STACK and TRAVERSAL_RESTART: the latter never pushes to the ring.
 
 // Each entry: offset of the node whose sibling is pending, and the bits of the t at which the ray leaves the sibling.
 uvec2 short_stack[SHORT_STACK_SIZE];
@@ -27,17 +27,17 @@ void short_stack_pop(inout Cell cell) {
     trail_length -= mask_up();
 }
 
-void marked_down() {
+void trail_down() {
     mask_down();
     trail_length += 1u;
 }
 
-void marked_push(Cell cell) {
+void trail_push(Cell cell) {
     mask_mark();
     if (TRAVERSAL != TRAVERSAL_RESTART) short_stack_push(cell);
 }
 
-void marked_pop(TraversalRay ray, inout Cell cell) {
+void trail_pop(TraversalRay ray, inout Cell cell) {
     if (short_stack_size > 0u) short_stack_pop(cell);
     else retrace(ray, cell);
 }

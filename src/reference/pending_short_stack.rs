@@ -11,7 +11,7 @@ use super::{
 
 /// Pending subtrees: the `N` newest ones, and the trail of all. `N` is a power of two, or 0 for the traversal by
 /// restarts.
-pub struct PendingMarked<const N: usize> {
+pub struct PendingTrail<const N: usize> {
     trail: Trail,
     /// Each entry: the pending node, and the t at which the ray leaves it.
     entries: [(u32, f32); N],
@@ -21,7 +21,7 @@ pub struct PendingMarked<const N: usize> {
     size: usize,
 }
 
-impl<const N: usize> Pending for PendingMarked<N> {
+impl<const N: usize> Pending for PendingTrail<N> {
     fn new() -> Self {
         Self { trail: Trail::default(), entries: [(0, 0.0); N], top: 0, size: 0 }
     }
