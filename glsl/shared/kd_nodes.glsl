@@ -12,8 +12,8 @@ struct Cell {
     float t_exit;
 };
 
-// The root, and the ray's whole interval.
-Cell whole(TraversalRay ray) {
+// The root, and the ray's root_cell interval.
+Cell root_cell(TraversalRay ray) {
     return Cell(0u, ray.t_enter, ray.t_exit);
 }
 

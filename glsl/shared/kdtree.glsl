@@ -69,7 +69,7 @@ Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
 // ray that has stalled.
 uint search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (!is_in(ray)) return 0u;
-    Cell cell = whole(ray);
+    Cell cell = root_cell(ray);
     Visit visit;
     if (is_resumed()) resume(ray, cell, visit, best);
     else visit = next_leaf(ray, best.t, cell);

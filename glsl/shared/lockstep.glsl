@@ -59,7 +59,7 @@ bool go_on_in_step(TraversalRay ray, float t_best, inout bool begins, inout Cell
 // would wait. If it tested after every leaf, often no lane would have anything to test. Returns 0, or the mark of a
 // ray that has stalled.
 uint search_in_step(TraversalRay ray, bool any_hit, inout Nearest best) {
-    Cell cell = whole(ray);
+    Cell cell = root_cell(ray);
     // The ray starts at the root, with a visit that has nothing left to test.
     Visit visit = Visit(0u, 0u, interval_of(0.0, 0.0));
     float reach = accel.plane_epsilon;

@@ -26,7 +26,7 @@ void walk_to(TraversalRay ray, uint node_offset) {
         else path.y |= bit;
         n_levels += 1u;
     }
-    Cell cell = whole(ray);
+    Cell cell = root_cell(ray);
     while (n_levels > 0u) {
         n_levels -= 1u;
         uint is_above = ((n_levels < 32u ? path.x : path.y) >> (n_levels % 32u)) & 1u;
