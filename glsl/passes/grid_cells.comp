@@ -36,11 +36,11 @@ void main() {
         uint cell_ix = pairs_from[entry_ix].x;
         if (entry_ix > 0u && pairs_from[entry_ix - 1u].x == cell_ix) continue;
         uint count = end_of_cell(cell_ix, entry_ix) - entry_ix;
-        cells[cell_ix + (LOWER ? build.n_upper : 0u)] = GridCell(entry_ix, count);
+        cells[cell_ix + (LOWER_LEVEL ? build.n_upper : 0u)] = GridCell(entry_ix, count);
         n_filled += 1u;
     }
     n_filled = subgroupAdd(n_filled);
     if (!subgroupElect() || n_filled == 0u) return;
-    if (LOWER) atomicAdd(build.n_filled_lower, n_filled);
+    if (LOWER_LEVEL) atomicAdd(build.n_filled_lower, n_filled);
     else atomicAdd(build.n_filled_upper, n_filled);
 }

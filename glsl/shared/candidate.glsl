@@ -5,7 +5,7 @@
 // `is_better`, `is_accepted` and `is_done`.
 
 // Whether rays pass through some of the triangles.
-layout(constant_id = CONSTANT_FILTERS) const bool FILTERS = false;
+layout(constant_id = CONSTANT_SKIPS_HIDDEN) const bool SKIPS_HIDDEN = false;
 
 // The nearest hit so far, with the traversal's t. Its barycentric weights are in local memory (WEIGHTS_SLOT).
 struct Nearest {
@@ -20,9 +20,9 @@ bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
     return t > ray.t_min && nearer && triangle_ix != ray.source_triangle;
 }
 
-// Whether a hit counts. Without FILTERS every hit does, and nothing is read. u, v: barycentric weights of the hit.
+// Whether a hit counts. Without SKIPS_HIDDEN every hit does, and nothing is read. u, v: barycentric weights of the hit.
 bool is_accepted(uint triangle_ix, float u, float v) {
-    if (FILTERS) return (load_triangle_materials(triangle_ix) & TRIANGLE_HIDDEN) == 0u;
+    if (SKIPS_HIDDEN) return (load_triangle_materials(triangle_ix) & TRIANGLE_HIDDEN) == 0u;
     return true;
 }
 

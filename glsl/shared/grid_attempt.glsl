@@ -55,7 +55,7 @@ uint n_doublings(uint count, uint limit) {
 void coarsen(uint count, uint limit) {
     build.n_attempts += 1u;
     uint steps = n_doublings(count, limit);
-    if (LOWER) {
+    if (LOWER_LEVEL) {
         build.n_halvings = min(build.n_halvings + steps, GRID_MAX_HALVINGS);
         build.counts = GRID_COUNTS_CELLS;
         return;

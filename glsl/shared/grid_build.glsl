@@ -17,7 +17,7 @@
 #include "lattice.glsl"
 
 // Whether the kernel builds the lower level of a grid of two levels.
-layout(constant_id = CONSTANT_LOWER) const bool LOWER = false;
+layout(constant_id = CONSTANT_LOWER_LEVEL) const bool LOWER_LEVEL = false;
 
 layout(std430, set = 0, binding = BIND_GRID_BUILD) buffer BuildBlock { GridBuild build; };
 

@@ -44,7 +44,7 @@ Item lower_item(uvec2 pair) {
 }
 
 Item item_at(uint item_ix) {
-    if (LOWER) return lower_item(upper_pairs[item_ix]);
+    if (LOWER_LEVEL) return lower_item(upper_pairs[item_ix]);
     return upper_item(item_ix);
 }
 

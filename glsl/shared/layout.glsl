@@ -485,7 +485,7 @@ struct AccelConstants {
 #define CONSTANT_SOFTWARE_RASTER 9u
 
 // Whether a kernel builds the lower level of a grid.
-#define CONSTANT_LOWER 10u
+#define CONSTANT_LOWER_LEVEL 10u
 // Which counts a prefix sum in a grid's build adds up: `GRID_SCANS_CELLS` and its like. The first three values equal
 // those of `GRID_COUNTS_CELLS` and its like.
 #define CONSTANT_SCANS 11u
@@ -497,7 +497,7 @@ struct AccelConstants {
 // Constants that have the same value in all kernels over one scene.
 
 // Whether rays pass through triangles with `TRIANGLE_HIDDEN` in `triangle_materials`.
-#define CONSTANT_FILTERS 28u
+#define CONSTANT_SKIPS_HIDDEN 28u
 // Levels of cells of the scene's grid, 1 or 2. 0: the scene has a kd-tree.
 #define CONSTANT_GRID_LEVELS 27u
 // Loop turns that an invocation takes before its ray stalls. 0: any number.

@@ -32,7 +32,7 @@ void intersect_in_step(TraversalRay ray, LeafTriangle entry, bool tests, inout N
     Hit hit = weighted_hit(ray.shear, exact_edges(edges, errors), vec3(a.z, b.z, c.z), entry.triangle_ix);
     bool is_hit = tests && is_inside(with_exact_signs(edges, errors));
     bool is_new = is_hit && is_better(ray, hit.t, entry.triangle_ix, best);
-    if (FILTERS) is_new = is_new && is_accepted(entry.triangle_ix, hit.u, hit.v);
+    if (SKIPS_HIDDEN) is_new = is_new && is_accepted(entry.triangle_ix, hit.u, hit.v);
     vec2 weights = spilled_pair(WEIGHTS_SLOT);
     best.t = is_new ? hit.t : best.t;
     best.triangle_ix = is_new ? entry.triangle_ix : best.triangle_ix;

@@ -211,7 +211,7 @@ impl AccelBuffers {
         };
         Constants::new()
             .set(constants::READING, self.access.constant())
-            .set(constants::FILTERS, self.filters)
+            .set(constants::SKIPS_HIDDEN, self.filters)
             .set(constants::MASK_WORDS, mask_words)
             .set(constants::GRID_LEVELS, n_levels)
             .set(constants::TURN_BUDGET, self.stalls.turn_budget())

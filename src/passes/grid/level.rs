@@ -55,7 +55,7 @@ const UPPER: Names = Names {
     cells: "grid_cells",
 };
 
-const LOWER: Names = Names {
+const LOWER_LEVEL: Names = Names {
     columns: "grid_lower_columns",
     spine_columns: "grid_lower_spine_columns",
     count: "grid_lower_count",
@@ -73,7 +73,7 @@ impl Level {
     /// # Errors
     /// The driver refuses a shader.
     pub fn upper(kernels: &Kernels) -> Result<Self, GpuError> {
-        Self::new(kernels, &UPPER, &Constants::new().set(constants::LOWER, false))
+        Self::new(kernels, &UPPER, &Constants::new().set(constants::LOWER_LEVEL, false))
     }
 
     /// Creates the kernels of the lower level.
@@ -81,7 +81,7 @@ impl Level {
     /// # Errors
     /// The driver refuses a shader.
     pub fn lower(kernels: &Kernels) -> Result<Self, GpuError> {
-        Self::new(kernels, &LOWER, &Constants::new().set(constants::LOWER, true))
+        Self::new(kernels, &LOWER_LEVEL, &Constants::new().set(constants::LOWER_LEVEL, true))
     }
 
     fn new(kernels: &Kernels, names: &Names, level: &Constants) -> Result<Self, GpuError> {

@@ -133,7 +133,7 @@ impl GridPasses {
 
 impl Lower {
     fn new(kernels: &Kernels) -> Result<Self, GpuError> {
-        let lower = Constants::new().set(constants::LOWER, true);
+        let lower = Constants::new().set(constants::LOWER_LEVEL, true);
         let scans_cells = lower.clone().set(constants::SCANS, GRID_SCANS_CELLS);
         Ok(Self {
             descend: kernels.of_one("grid_descend", spirv!("grid_descend.comp"), &lower)?,
