@@ -234,7 +234,7 @@ fn rays_from_afar_hit_the_same() {
     for distance in [10.0, 300.0, 3000.0] {
         let afar = |i: usize| {
             let mut random = Random(i as u64);
-            let within = random.in_box(world.tree().cell_min(), world.tree().cell_max());
+            let within = random.in_box(world.tree().box_min(), world.tree().box_max());
             let origin = world.centre() + distance * world.radius() * random.direction();
             ray(origin, (within - origin).normalize())
         };

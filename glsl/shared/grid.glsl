@@ -46,7 +46,7 @@ struct GridWalk {
 // The lattice of the uniform grid, or of the upper level.
 Lattice upper_lattice() {
     uvec3 n_cells = uvec3(accel.n_cells_x, accel.n_cells_y, accel.n_cells_z);
-    return Lattice(accel.cell_min, accel.cell_size, accel.cell_max, n_cells);
+    return Lattice(accel.box_min, accel.cell_size, accel.box_max, n_cells);
 }
 
 // Packs a cube's indices, which are below GRID_MAX_RESOLUTION, into 10 bits each.

@@ -24,7 +24,7 @@ layout(std430, set = 0, binding = BIND_GRID_BUILD) buffer BuildBlock { GridBuild
 // The uniform grid's lattice, or that of the upper level.
 Lattice upper_lattice() {
     uvec3 n_cells = uvec3(build.n_cells_x, build.n_cells_y, build.n_cells_z);
-    return Lattice(build.cell_min, build.cell_size, build.cell_max, n_cells);
+    return Lattice(build.box_min, build.cell_size, build.box_max, n_cells);
 }
 
 // The number of blocks of n_entries entries.

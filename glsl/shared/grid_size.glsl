@@ -56,9 +56,9 @@ Lattice lattice_of_density(vec3 least, vec3 greatest, float margin, uint max_cel
 
 // Stores the lattice of the uniform grid or of the upper level in build.
 void set_upper_lattice(Lattice lattice) {
-    build.cell_min = lattice.least;
+    build.box_min = lattice.least;
     build.cell_size = lattice.cell_size;
-    build.cell_max = lattice.greatest;
+    build.box_max = lattice.greatest;
     build.n_cells_x = lattice.n_cells.x;
     build.n_cells_y = lattice.n_cells.y;
     build.n_cells_z = lattice.n_cells.z;

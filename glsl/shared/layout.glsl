@@ -439,8 +439,8 @@ struct Feature {
 
 // What kernels need of the scene's triangles and acceleration structure besides the arrays (a uniform buffer).
 //
-// - `cell_min`, `cell_max`: the box that holds all triangles, with the structure's rounding margin (world units). In
-//   a grid, `cell_min` is the least corner of the first cell.
+// - `box_min`, `box_max`: the box that holds all triangles, with the structure's rounding margin (world units). In
+//   a grid, `box_min` is the least corner of the first cell.
 // - `plane_epsilon`: `KD_PLANE_EPSILON` times the scene's largest coordinate (world units).
 // - `n_triangles`: of the scene.
 // - `n_cells_x`, `n_cells_y`, `n_cells_z`: cells of a grid's upper level along each axis.
@@ -448,9 +448,9 @@ struct Feature {
 // - The rest: the device address of each of the scene's arrays, low word first. 0 if kernels read the array by its
 //   binding.
 struct AccelConstants {
-    vec3 cell_min;
+    vec3 box_min;
     float plane_epsilon;
-    vec3 cell_max;
+    vec3 box_max;
     uint n_triangles;
     uint n_cells_x;
     uint n_cells_y;
@@ -637,9 +637,9 @@ struct DriverCast {
 struct GridBuild {
     // The lattice of the uniform grid or of the upper level: its box and the edge of a cell (world units).
     // margin: a triangle counts as inside a cell up to this distance outside (world units).
-    vec3 cell_min;
+    vec3 box_min;
     float cell_size;
-    vec3 cell_max;
+    vec3 box_max;
     float margin;
     // n_cells_*: cells of this lattice along each axis.
     // largest_coordinate: the greatest magnitude of a coordinate of the finite triangles' bounds (world units).

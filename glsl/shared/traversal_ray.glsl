@@ -38,8 +38,8 @@ TraversalRay traversal_ray(PathRay ray, float t_min) {
     vec3 tiny = vec3(KD_LEAST_COMPONENT);
     r.inv_direction = 0.5 / mix(ray.direction, tiny, lessThan(abs(ray.direction), tiny));
     r.bias = -ray.origin * r.inv_direction;
-    precise vec3 t0 = fma(accel.cell_min, r.inv_direction, r.bias);
-    precise vec3 t1 = fma(accel.cell_max, r.inv_direction, r.bias);
+    precise vec3 t0 = fma(accel.box_min, r.inv_direction, r.bias);
+    precise vec3 t1 = fma(accel.box_max, r.inv_direction, r.bias);
     vec3 near = min(t0, t1);
     vec3 far = max(t0, t1);
     r.t_enter = max(max(near.x, near.y), max(near.z, 0.5 * t_min));
@@ -53,7 +53,7 @@ bool is_in(TraversalRay ray) {
 }
 
 float largest_coordinate() {
-    vec3 largest = max(abs(accel.cell_min), abs(accel.cell_max));
+    vec3 largest = max(abs(accel.box_min), abs(accel.box_max));
     return max(largest.x, max(largest.y, largest.z));
 }
 

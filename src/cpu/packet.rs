@@ -128,8 +128,8 @@ impl<S: Simd> Packet<S> {
         let (origin, direction) = (columns(simd, &search_rays.origin), columns(simd, &search_rays.direction));
         let inv_direction = [inverse(direction[0]), inverse(direction[1]), inverse(direction[2])];
         let bias = [-origin[0] * inv_direction[0], -origin[1] * inv_direction[1], -origin[2] * inv_direction[2]];
-        let [x0, y0, z0] = times_plus(inputs.cell_min.to_array(), &inv_direction, &bias);
-        let [x1, y1, z1] = times_plus(inputs.cell_max.to_array(), &inv_direction, &bias);
+        let [x0, y0, z0] = times_plus(inputs.box_min.to_array(), &inv_direction, &bias);
+        let [x1, y1, z1] = times_plus(inputs.box_max.to_array(), &inv_direction, &bias);
         let t_min = f32x16::load_array_ref(simd, &search_rays.t_min);
         let t_max = f32x16::load_array_ref(simd, &search_rays.t_max);
         let whole = PacketIntervals {

@@ -19,9 +19,9 @@ pub struct KernelInputs<'a, R = NoCounter> {
     /// The frame's constants; `None` for rays that do not belong to a frame.
     pub frame: Option<&'a Frame>,
     /// Least corner of the box that holds all triangles, with the structure's rounding margin (world units).
-    pub cell_min: Vec3,
+    pub box_min: Vec3,
     /// Greatest corner of this box.
-    pub cell_max: Vec3,
+    pub box_max: Vec3,
     pub triangles: &'a [Triangle],
     /// One word for each triangle: an index into `materials`, or with `filters`, `TRIANGLE_HIDDEN` or 0.
     pub triangle_materials: &'a [u32],
@@ -99,7 +99,7 @@ impl<'a> KernelInputs<'a> {
             leaf_triangles: CountedSlice::from(tree.leaf_triangles()),
             leaf_planes: tree.leaf_planes(),
             kd_slabs: CountedSlice::from(tree.slabs()),
-            ..Self::without_accel(triangles, [tree.cell_min(), tree.cell_max()])
+            ..Self::without_accel(triangles, [tree.box_min(), tree.box_max()])
         }
     }
 
@@ -116,11 +116,11 @@ impl<'a> KernelInputs<'a> {
     }
 
     /// Inputs with the triangles and the box that holds them. All other arrays are empty.
-    fn without_accel(triangles: &'a [Triangle], [cell_min, cell_max]: [Vec3; 2]) -> Self {
+    fn without_accel(triangles: &'a [Triangle], [box_min, box_max]: [Vec3; 2]) -> Self {
         Self {
             frame: None,
-            cell_min,
-            cell_max,
+            box_min,
+            box_max,
             triangles,
             triangle_materials: &[],
             filters: false,
@@ -143,8 +143,8 @@ impl<'a> KernelInputs<'a> {
     pub fn counted<'c>(self, counts: &'c ReadCounts) -> KernelInputs<'a, Counted<'c>> {
         KernelInputs {
             frame: self.frame,
-            cell_min: self.cell_min,
-            cell_max: self.cell_max,
+            box_min: self.box_min,
+            box_max: self.box_max,
             triangles: self.triangles,
             triangle_materials: self.triangle_materials,
             filters: self.filters,

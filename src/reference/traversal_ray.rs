@@ -52,14 +52,14 @@ impl TraversalRay {
     #[inline]
     pub fn new(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> Self {
         let origin = ray.origin.to_array();
-        let cell_min = inputs.cell_min.to_array();
-        let cell_max = inputs.cell_max.to_array();
+        let box_min = inputs.box_min.to_array();
+        let box_max = inputs.box_max.to_array();
         let direction =
             ray.direction.to_array().map(|d| if d.abs() < KD_LEAST_COMPONENT { KD_LEAST_COMPONENT } else { d });
         let inv_direction = direction.map(|d| 1.0 / d);
         let bias = [0, 1, 2].map(|i| -origin[i] * inv_direction[i]);
-        let t0 = [0, 1, 2].map(|i| cell_min[i] * inv_direction[i] + bias[i]);
-        let t1 = [0, 1, 2].map(|i| cell_max[i] * inv_direction[i] + bias[i]);
+        let t0 = [0, 1, 2].map(|i| box_min[i] * inv_direction[i] + bias[i]);
+        let t1 = [0, 1, 2].map(|i| box_max[i] * inv_direction[i] + bias[i]);
         let near = [0, 1, 2].map(|i| min(t0[i], t1[i]));
         let far = [0, 1, 2].map(|i| max(t0[i], t1[i]));
         Self {
@@ -78,7 +78,7 @@ impl TraversalRay {
 /// Returns the greatest magnitude of a coordinate of the structure's box (world units).
 #[inline(always)]
 pub fn largest_coordinate(inputs: &KernelInputs<impl ReadCounter>) -> f32 {
-    inputs.cell_min.abs().max(inputs.cell_max.abs()).max_element()
+    inputs.box_min.abs().max(inputs.box_max.abs()).max_element()
 }
 
 /// Returns the limit of the coordinates of a ray's origin (world units). For origins whose coordinates all have at

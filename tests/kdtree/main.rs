@@ -95,11 +95,11 @@ fn is_the_same_on_any_number_of_threads() {
 fn of_nothing_or_one_triangle_is_a_leaf() {
     let none = build(&[], &BuildOptions::default());
     assert_eq!((none.nodes().len(), none.node(0)), (2, Node::Leaf { first: 0, count: 0 }));
-    assert_eq!((none.cell_min(), none.cell_max()), (Vec3::splat(-f32::MIN_POSITIVE), Vec3::splat(f32::MIN_POSITIVE)));
+    assert_eq!((none.box_min(), none.box_max()), (Vec3::splat(-f32::MIN_POSITIVE), Vec3::splat(f32::MIN_POSITIVE)));
     let one = build(&[triangle([Vec3::X, Vec3::Y, Vec3::Z])], &BuildOptions::default());
     assert_eq!((one.node(0), one.leaf_triangles()), (Node::Leaf { first: 0, count: 1 }, &[0][..]));
     let margin = 2f32.powi(-17);
-    assert_eq!((one.cell_min(), one.cell_max()), (Vec3::splat(-margin), Vec3::splat(1.0 + margin)));
+    assert_eq!((one.box_min(), one.box_max()), (Vec3::splat(-margin), Vec3::splat(1.0 + margin)));
 }
 
 #[test]
@@ -192,7 +192,7 @@ fn finds_what_brute_force_finds() {
     let mut random = Random(12);
     for (name, triangles) in all_meshes() {
         let tree = build(&triangles, &BuildOptions::default());
-        let (center, size) = ((tree.cell_min() + tree.cell_max()) * 0.5, (tree.cell_max() - tree.cell_min()).length());
+        let (center, size) = ((tree.box_min() + tree.box_max()) * 0.5, (tree.box_max() - tree.box_min()).length());
         for _ in 0..200 {
             let origin = center + random.point() * size;
             let direction = center + random.point() * size * 0.4 - origin;
@@ -207,7 +207,7 @@ fn finds_what_brute_force_finds() {
 /// Returns all triangles of the leaves whose cells a ray meets.
 fn candidates(tree: &KdTree, origin: Vec3, direction: Vec3) -> Vec<u32> {
     let mut found = Vec::new();
-    let mut stack = vec![(0, tree.cell_min(), tree.cell_max())];
+    let mut stack = vec![(0, tree.box_min(), tree.box_max())];
     while let Some((node, min, max)) = stack.pop() {
         let slack = Vec3::splat((max - min).max_element() * 1e-5);
         let (to_min, to_max) = ((min - slack - origin) / direction, (max + slack - origin) / direction);

@@ -106,7 +106,7 @@ fn a_moved_split() {
     let after = |share: f32| {
         Plant::new().after(|tree| {
             let Node::Split { axis, position, child } = tree.node(0) else { panic!("the root is a split") };
-            let position = position + share * (tree.cell_max[axis] - position);
+            let position = position + share * (tree.box_max[axis] - position);
             set(tree, 0, Node::Split { axis, position, child });
         })
     };
@@ -282,8 +282,8 @@ fn a_stray_triangle() {
 
 #[test]
 fn a_wrong_cell() {
-    assert_eq!(Plant::new().after(|tree| tree.cell_max.y = tree.cell_max.y.next_down()), Invalid::RootCell);
-    assert_eq!(Plant::new().after(|tree| tree.cell_min.z = -1.0), Invalid::RootCell);
+    assert_eq!(Plant::new().after(|tree| tree.box_max.y = tree.box_max.y.next_down()), Invalid::RootCell);
+    assert_eq!(Plant::new().after(|tree| tree.box_min.z = -1.0), Invalid::RootCell);
 }
 
 #[test]
@@ -293,7 +293,7 @@ fn a_wrong_depth() {
     let n_levels = KD_MAX_DEPTH - 1;
     let triangles = [triangle([Vec3::ZERO, Vec3::X, Vec3::Y])];
     let mut tree = KdTree::build(&triangles, &BuildOptions { max_depth: Some(0), ..Default::default() }).into_parts();
-    let end = tree.cell_max.x;
+    let end = tree.box_max.x;
     for level in 0..n_levels {
         let child = 2 * level + 2;
         let node = if level == 0 { 0 } else { child - 2 };

@@ -100,11 +100,11 @@ impl MeshWithTree {
 
     /// Returns the centre of the root's cell.
     pub fn centre(&self) -> Vec3 {
-        (self.tree().cell_min() + self.tree().cell_max()) / 2.0
+        (self.tree().box_min() + self.tree().box_max()) / 2.0
     }
 
     /// Returns half of the root cell's diagonal.
     pub fn radius(&self) -> f32 {
-        (self.tree().cell_max() - self.tree().cell_min()).length() / 2.0
+        (self.tree().box_max() - self.tree().box_min()).length() / 2.0
     }
 }

@@ -54,7 +54,7 @@ fn split_plane_point(random: &mut Random, world: &MeshWithTree, point: Vec3) -> 
 /// from a triangle.
 pub fn nasty_ray(random: &mut Random, world: &MeshWithTree, kind: usize) -> PathRay {
     let far = world.centre() + 3.0 * world.radius() * random.direction();
-    let within = random.in_box(world.tree().cell_min(), world.tree().cell_max());
+    let within = random.in_box(world.tree().box_min(), world.tree().box_max());
     let vertex = corner(random, &world.triangles);
     let edge = edge_point(random, &world.triangles);
     let (on_plane, axis) = split_plane_point(random, world, within);

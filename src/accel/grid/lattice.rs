@@ -156,12 +156,12 @@ impl Lattice {
 
     /// Returns the uniform constants that kernels need of a grid with these cells on its upper level.
     pub fn constants(&self) -> AccelConstants {
-        let [cell_min, cell_max] = self.bounds();
+        let [box_min, box_max] = self.bounds();
         let [n_cells_x, n_cells_y, n_cells_z] = self.n_cells;
         AccelConstants {
-            cell_min,
-            plane_epsilon: KD_PLANE_EPSILON * cell_min.abs().max(cell_max.abs()).max_element(),
-            cell_max,
+            box_min,
+            plane_epsilon: KD_PLANE_EPSILON * box_min.abs().max(box_max.abs()).max_element(),
+            box_max,
             n_cells_x,
             n_cells_y,
             n_cells_z,

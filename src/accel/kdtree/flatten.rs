@@ -19,8 +19,8 @@ pub fn flatten(top: UpperTree, cell: Bounds) -> Parts {
         leaf_triangles: Vec::new(),
         leaf_planes: Vec::new(),
         slabs: Vec::new(),
-        cell_min: Vec3::from_array(cell.min),
-        cell_max: Vec3::from_array(cell.max),
+        box_min: Vec3::from_array(cell.min),
+        box_max: Vec3::from_array(cell.max),
         depth: 0,
     };
     append(&mut tree, 0, top);

@@ -52,10 +52,10 @@ pub struct KdTree {
 impl KdTree {
     /// Returns the uniform constants that kernels need in addition to the tree's arrays. All other members are 0.
     pub fn constants(&self) -> AccelConstants {
-        let Parts { cell_min, cell_max, .. } = self.parts;
-        let largest_coordinate = cell_min.abs().max(cell_max.abs()).max_element();
+        let Parts { box_min, box_max, .. } = self.parts;
+        let largest_coordinate = box_min.abs().max(box_max.abs()).max_element();
         let plane_epsilon = KD_PLANE_EPSILON * largest_coordinate;
-        AccelConstants { cell_min, cell_max, plane_epsilon, ..AccelConstants::default() }
+        AccelConstants { box_min, box_max, plane_epsilon, ..AccelConstants::default() }
     }
 }
 

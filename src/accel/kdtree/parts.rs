@@ -24,9 +24,9 @@ pub struct Parts {
     pub slabs: Vec<Slab>,
     /// The least corner of the root's cell, world units. The root's cell is the exact bounds of all triangles (a box
     /// of zeros for none), grown by the rounding margin.
-    pub cell_min: Vec3,
+    pub box_min: Vec3,
     /// The greatest corner of the root's cell, world units.
-    pub cell_max: Vec3,
+    pub box_max: Vec3,
     /// The number of levels below the root, at most `KD_MAX_DEPTH - 2`.
     pub depth: u32,
 }
@@ -80,18 +80,18 @@ impl KdTree {
     }
 
     /// The least corner of the root's cell, world units.
-    pub fn cell_min(&self) -> Vec3 {
-        self.parts.cell_min
+    pub fn box_min(&self) -> Vec3 {
+        self.parts.box_min
     }
 
     /// The greatest corner of the root's cell, world units.
-    pub fn cell_max(&self) -> Vec3 {
-        self.parts.cell_max
+    pub fn box_max(&self) -> Vec3 {
+        self.parts.box_max
     }
 
     /// The least and the greatest corner of the root's cell, which holds all triangles, world units.
     pub fn bounds(&self) -> [Vec3; 2] {
-        [self.cell_min(), self.cell_max()]
+        [self.box_min(), self.box_max()]
     }
 
     /// [`Parts::depth`].

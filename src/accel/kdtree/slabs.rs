@@ -38,7 +38,7 @@ impl KdTree {
     /// The same triangles and tree give the same slabs on any number of threads. This takes some 200 ns for each
     /// entry of the leaves.
     pub(super) fn add_slabs(&mut self, triangles: &[Triangle]) {
-        let bounds = Bounds { min: self.cell_min().to_array(), max: self.cell_max().to_array() };
+        let bounds = Bounds { min: self.box_min().to_array(), max: self.box_max().to_array() };
         // The root's cell has the margin around it already, so this margin is larger than the tree's by 2^-17 of
         // itself.
         let margin = bounds.margin();

@@ -42,7 +42,7 @@ impl KdTree {
                 + size_of_val(self.slabs())) as u64,
             ..Default::default()
         };
-        let root = (self.cell_min().as_dvec3().to_array(), self.cell_max().as_dvec3().to_array());
+        let root = (self.box_min().as_dvec3().to_array(), self.box_max().as_dvec3().to_array());
         let root_area = half_area(&root.0, &root.1);
         let mut stack = vec![(0, root)];
         while let Some((node_ix, (min, max))) = stack.pop() {

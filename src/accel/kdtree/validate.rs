@@ -69,7 +69,7 @@ impl KdTree {
         if nodes < 2 || nodes != 2 * parents {
             return Err(Invalid::Length { nodes, parents });
         }
-        let root = Bounds { min: self.cell_min().to_array(), max: self.cell_max().to_array() };
+        let root = Bounds { min: self.box_min().to_array(), max: self.box_max().to_array() };
         let exact_bounds = Bounds::of_all(triangles);
         let margin = exact_bounds.margin();
         if root != exact_bounds.grown(margin) {

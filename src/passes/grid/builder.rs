@@ -107,8 +107,8 @@ impl GridBuilder {
     /// Creates the grid of a finished build, with arrays whose contents are undefined.
     fn with_room(&self, build: &GridBuild, usage: BufferUse) -> Result<DeviceGrid, GpuError> {
         let lattice = Lattice {
-            min: build.cell_min.to_array(),
-            max: build.cell_max.to_array(),
+            min: build.box_min.to_array(),
+            max: build.box_max.to_array(),
             cell_size: build.cell_size,
             n_cells: [build.n_cells_x, build.n_cells_y, build.n_cells_z],
         };
