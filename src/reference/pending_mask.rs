@@ -22,7 +22,7 @@ impl Mask {
 
     /// Returns the slot of the last pending cell.
     #[inline(always)]
-    fn last_place(self) -> usize {
+    fn last_slot(self) -> usize {
         self.0.count_ones() as usize - 1
     }
 
@@ -79,7 +79,7 @@ impl Pending for PendingMask {
     #[inline(always)]
     fn push(&mut self, second_ix: u32, cell: &Cell) {
         self.mask.mark();
-        self.cells[self.mask.last_place()] = (second_ix, cell.t_exit);
+        self.cells[self.mask.last_slot()] = (second_ix, cell.t_exit);
     }
 
     #[inline(always)]
@@ -88,7 +88,7 @@ impl Pending for PendingMask {
         if self.mask.is_empty() || t_best < cell.t_enter {
             return false;
         }
-        (cell.node_ix, cell.t_exit) = self.cells[self.mask.last_place()];
+        (cell.node_ix, cell.t_exit) = self.cells[self.mask.last_slot()];
         self.mask.go_up();
         true
     }
