@@ -22,9 +22,9 @@ impl CastResources {
     ///
     /// # Errors
     /// Memory runs out.
-    pub fn bindings(context: &Arc<Context>, tree: &AccelBuffers) -> Result<Arc<BindingLayout>, GpuError> {
+    pub fn bindings(context: &Arc<Context>, accel: &AccelBuffers) -> Result<Arc<BindingLayout>, GpuError> {
         let kinds: Vec<_> = accel::bindings().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
-        BindingLayout::with_constants(context, &kinds, size_of::<CastBatch>() as u32, tree.constants())
+        BindingLayout::with_constants(context, &kinds, size_of::<CastBatch>() as u32, accel.constants())
     }
 
     /// Makes the set over buffers of rays and hits that the caller gives.
@@ -33,12 +33,12 @@ impl CastResources {
     /// Memory runs out.
     pub fn given(
         bindings: &Arc<BindingLayout>,
-        tree: &AccelBuffers,
+        accel: &AccelBuffers,
         rays: GivenBuffer,
         hits: GivenBuffer,
     ) -> Result<BindingSet, GpuError> {
         let own = [(BIND_CAST_RAYS, Binding::Given(rays)), (BIND_CAST_HITS, Binding::Given(hits))];
-        BindingSet::new(bindings, "recorded cast", &[&tree.objects(), &own[..]].concat())
+        BindingSet::new(bindings, "recorded cast", &[&accel.objects(), &own[..]].concat())
     }
 
     /// Makes buffers for `len` rays, and the set over them.
@@ -48,14 +48,14 @@ impl CastResources {
     pub fn new(
         context: &Arc<Context>,
         bindings: &Arc<BindingLayout>,
-        tree: &AccelBuffers,
+        accel: &AccelBuffers,
         len: usize,
     ) -> Result<Self, GpuError> {
         let cast_rays = Buffer::new(context, "cast_rays", len, BufferUse::Storage)?;
         let cast_hits = Buffer::new(context, "cast_hits", len, BufferUse::Storage)?;
         let own =
             [(BIND_CAST_RAYS, Binding::Buffer(cast_rays.any())), (BIND_CAST_HITS, Binding::Buffer(cast_hits.any()))];
-        let set = BindingSet::new(bindings, "cast", &[&tree.objects(), &own[..]].concat())?;
+        let set = BindingSet::new(bindings, "cast", &[&accel.objects(), &own[..]].concat())?;
         Ok(Self { cast_rays, cast_hits, set })
     }
 }
