@@ -277,8 +277,8 @@ mod unix {
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         let output = shell(
             directory.path(),
-            "(head -c 3 rays.npy; sleep 0.5; tail -c +4 rays.npy) | \"$0\" cast mesh.obj /dev/stdin --cpu -q -o slow.npz \
-             && cmp slow.npz whole.npz",
+            "(head -c 3 rays.npy; sleep 0.5; tail -c +4 rays.npy) | \
+             \"$0\" cast mesh.obj /dev/stdin --cpu -q -o slow.npz && cmp slow.npz whole.npz",
         );
         assert_eq!(output.status.code(), Some(0), "in two parts: {}", stderr(&output));
         let output =

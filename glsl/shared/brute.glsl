@@ -6,7 +6,7 @@
 
 // Tests all triangles. Returns 0, or the mark of a ray that has stalled.
 uint intersect_all(TraversalRay ray, bool any_hit, inout Nearest best) {
-    Cell cell = whole(ray);
+    Cell cell = root_cell(ray);
     Visit all = Visit(0u, accel.n_triangles, interval_of(0.0, 0.0));
     if (is_resumed()) resume(ray, cell, all, best);
     while (all.entry_ix < all.end_ix && !is_done(any_hit, best) && has_turns()) {

@@ -12,7 +12,7 @@ struct Cell {
     float t_exit;
 };
 
-// The root, and the ray's root_cell interval.
+// The root, and the ray's whole interval.
 Cell root_cell(TraversalRay ray) {
     return Cell(0u, ray.t_enter, ray.t_exit);
 }
