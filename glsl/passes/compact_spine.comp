@@ -14,7 +14,8 @@ layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; 
 layout(std430, set = 0, binding = BIND_SCAN_BLOCKS) buffer ScanBlocksBlock { uint scan_blocks[]; };
 layout(std430, set = 0, binding = BIND_BOUNCES) buffer BouncesBlock { Bounce bounces[]; };
 
-// The logarithm of the number of lanes that each of n_rays rays gets. Twin of `lanes_log2` in src/frame/bounce.rs.
+// The base-2 logarithm of the number of lanes that each of n_rays rays gets. Twin of `lanes_log2` in
+// src/frame/bounce.rs.
 uint lanes_log2(uint n_rays) {
     uint n_lanes = frame.n_lanes / max(n_rays, 1u);
     return n_lanes == 0u ? 0u : min(uint(findMSB(n_lanes)), MOST_LANES_LOG2);

@@ -2,7 +2,8 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Grid, cells: one workgroup per block of GRID_BLOCK_SIZE pairs, which are sorted by their cells. The invocation at a
-// cell's first pair writes where the cell's entries begin and how many there are. All other cells have been cleared.
+// cell's first pair writes where the cell's entries begin and how many there are. Entries have the indices of their
+// pairs (grid_leaves.comp). All other cells have been cleared.
 // Atomics count the cells that have entries; the sum is the same in every order.
 // Reads build, pairs_from; writes cells and n_filled_* of build.
 #include "grid_build.glsl"

@@ -39,7 +39,8 @@ void main() {
     precise vec3 above = greatest + margin;
     least = max(below, vec3(-LARGEST));
     greatest = min(above, vec3(LARGEST));
-    // No grid has more than 2^30 cells.
+    // No grid has more than 2^30 cells. The lower limit of their size is the margin of the grown box, which is
+    // slightly larger than build.margin.
     precise float max_cells = build.upper_density * float(build.n_finite);
     uint n_cells = uint(min(max_cells, 1073741824.0));
     set_upper_lattice(lattice_of_density(least, greatest, margin_of(least, greatest), n_cells));

@@ -15,8 +15,8 @@ layout(std430, set = 0, binding = BIND_GRID_LEAF_TRIANGLES) writeonly buffer Lea
 };
 layout(std430, set = 0, binding = BIND_GRID_LEAF_PLANES) writeonly buffer LeafPlanesBlock { vec4 leaf_planes[]; };
 
-// The largest error that a plane may have, in units of 2^-24 times the largest coordinate. Derived in
-// src/accel/grid/planes.rs.
+// The largest error of a point's height above a plane that the rounding of the normal may cause, in units of 2^-24
+// times the largest coordinate. Derived in src/accel/grid/planes.rs.
 const float MAX_ERROR = 16.0;
 // The smallest positive number that is not denormal.
 const float LEAST_NORMAL = 1.17549435e-38;
@@ -26,7 +26,9 @@ float sum_of_magnitudes(vec3 v) {
     return sum;
 }
 
-// Returns a plane's normal and distance, or zeros if rounding may put the plane too far off.
+// Returns the plane of a triangle: a normal, and in w the normal's dot product with the plane's points. The normal is
+// scaled by a power of two, so that its longest component is in [1/4, 1/2). Returns zeros if rounding may put the
+// plane too far off.
 vec4 plane_of(Triangle triangle) {
     precise vec3 a = triangle.v1 - triangle.v0;
     precise vec3 b = triangle.v2 - triangle.v0;

@@ -15,8 +15,9 @@ layout(std430, set = 0, binding = BIND_GRID_PAIRS_FROM) readonly buffer PairsFro
 layout(std430, set = 0, binding = BIND_GRID_PAIRS_TO) writeonly buffer PairsToBlock { uvec2 pairs_to[]; };
 layout(std430, set = 0, binding = BIND_GRID_SCAN_BLOCKS) readonly buffer ScanBlocksBlock { uint scan_blocks[]; };
 
-// For each digit and each subgroup, ordered by digit and then subgroup: first the number of the subgroup's pairs with
-// this digit, then where they begin in the tile. There are at most 32 subgroups.
+// One word for each digit and each subgroup, ordered by digit and then subgroup. At first it is the number of the
+// subgroup's pairs with this digit. `scan_places` replaces it by the place where these pairs begin in the tile. There
+// are at most 32 subgroups.
 shared uint places[GRID_DIGITS * SCAN_GROUP_SIZE / 4u];
 shared uvec2 tile[GRID_BLOCK_SIZE];
 // For each digit: where the workgroup's next pair with this digit is written in pairs_to.

@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Grid, spine: the only workgroup turns the sums of blocks into exclusive prefix sums. Each invocation scans a
-// contiguous part of the sums. The total decides how the attempt continues.
+// contiguous part of the sums. Except in the sort, the total decides how the attempt continues.
 // Reads and writes scan_blocks and build.
 #include "grid_attempt.glsl"
 #include "scan.glsl"
@@ -63,7 +63,8 @@ void main() {
     }
     uint total, n_65536;
     uint before = workgroup_exclusive_add(sum, total);
-    // The total may wrap around. The sum of the upper halves cannot, so it tells whether the total has.
+    // The total may wrap around. n_65536, the sum of the upper 16 bits of each `sum`, cannot. So n_65536 tells
+    // whether the total has.
     workgroup_exclusive_add(sum >> 16, n_65536);
     for (uint first = mine; first < end; first += N_AT_ONCE) {
         uint part[N_AT_ONCE];

@@ -26,8 +26,8 @@ uvec2 halves(uint packed) {
     return uvec2(packed & 0xffffu, packed >> 16);
 }
 
-// Tests the pixels of a block that the triangle may cover. Each invocation takes one pixel of each tile of TILE_SIZE x
-// TILE_SIZE pixels.
+// Tests the pixels of a block that the triangle may cover. Each invocation takes one pixel of each tile of
+// TILE_SIZE x TILE_SIZE pixels.
 void rasterize(Triangle triangle, uint triangle_ix, Rectangle block) {
     vec3 a = triangle.v0 - frame.eye, b = triangle.v1 - frame.eye, c = triangle.v2 - frame.eye;
     EdgeHeights heights = edge_heights(a, b, c, block);

@@ -10,8 +10,8 @@
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 
-// Tests of small triangles against pixels. Bits from the lowest on: the triangle's index in the workgroup
-// (PLACE_BITS), then the pixel's x (OFFSET_BITS) and y in the triangle's rectangle.
+// Tests of small triangles against pixels, one word each. A word has, from the lowest bit on, the triangle's index in
+// the workgroup (PLACE_BITS), then the pixel's x (OFFSET_BITS) and y in the triangle's rectangle.
 const uint N_TESTS = 512u;
 const uint PLACE_BITS = 6u; // holds an index below RAY_GROUP_SIZE
 const uint OFFSET_BITS = 6u; // holds an offset below RASTER_SMALL

@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 // Shade (the paper's section 2.1): one invocation per ray of the batch, of all bounces, sums the ambient, diffuse,
-// specular and emitted light at the ray's hit.
+// specular and emitted light at the ray's hit. A ray that hits nothing gets the background's light.
 // Reads rays, hits, light_visibility, bounces and the scene; writes ray_radiance (weighted by throughput); updates
 // counters (n_shadow_rays).
 #include "layout.glsl"

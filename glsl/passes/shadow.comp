@@ -1,10 +1,11 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Shadow (the paper's section 2.1): tests the shadow rays, or segments, from the hit of each ray of the batch, of all
-// bounces, to each light that could be visible in the surface. A light is hidden if its segment hits anything.
+// Shadow (the paper's section 2.1): tests the shadow rays, here called segments. They go from the hits of all rays of
+// the batch, in all bounces, to each light that the surface could show. A light is hidden if its segment hits
+// anything.
 // There are 2^shadow_lanes_log2 invocations per ray and light, the first of which works (lanes.glsl).
 // Reads rays, hits, bounces and the scene; updates light_visibility[light * queue_capacity + ray], in which a stalled
-// segment leaves its mark (stalls.glsl), and pixel_features (n_rays, n_steps).
+// segment leaves its mark (stalls.glsl), and, with COUNT_COSTS, n_rays and n_steps of pixel_features.
 #include "layout.glsl"
 
 // Whether the segments' cost is added to pixel_features.
@@ -34,7 +35,7 @@ bool shadow_segment(PathRay ray, Hit hit, Light light, out PathRay segment) {
     return true;
 }
 
-// One of LIGHT_*, or the mark of a stalled segment.
+// Returns the light's visibility from the ray's hit, one of LIGHT_*, or the mark of a stalled segment.
 uint visibility_of(Light light, uint ray_ix) {
     Hit hit = hits[ray_ix];
     PathRay segment;

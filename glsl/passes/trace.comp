@@ -4,7 +4,7 @@
 // Trace (the paper's section 2.3): finds the closest hit of each ray of the bounce. There are 2^trace_lanes_log2
 // invocations per ray, the first of which works (lanes.glsl).
 // Reads rays, bounces and the acceleration structure; updates hits, in which a stalled ray leaves its mark
-// (stalls.glsl), counters (n_hits) and pixel_features (n_rays, n_steps).
+// (stalls.glsl), counters (n_hits) and, with COUNT_COSTS, n_rays and n_steps of pixel_features.
 #include "layout.glsl"
 
 // Whether the rays' cost is added to pixel_features.

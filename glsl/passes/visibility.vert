@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// Visibility (the paper's section 2.2): one invocation per vertex projects the corner of index 3 * triangle + corner.
+// Visibility (the paper's section 2.2): one invocation per vertex projects a corner of a triangle. The vertex's index
+// is 3 times the triangle's index plus the corner's number, 0 to 2.
 // Reads triangles; passes the triangle's index on to visibility.frag, flat: a fragment gets that of the drawn
 // triangle's first vertex. The other two vertices may be shared with other triangles (src/buffers/vertex_indices.rs).
 #include "layout.glsl"

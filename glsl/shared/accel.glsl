@@ -34,7 +34,8 @@ uint search(TraversalRay ray, bool any_hit, inout Nearest best) {
 }
 
 // Returns the closest hit in (t_min, t_max], or with any_hit one that need not be the closest. The direction has
-// about unit length. A miss has t = t_max. If the ray has stalled, the hit's triangle_ix is its mark.
+// about unit length. A miss has t = t_max. If the ray has stalled, the hit's triangle_ix is its mark. During the
+// search, all t are half of the ray's own (traversal_ray.glsl).
 Hit traverse(PathRay ray_in, float t_min, bool any_hit) {
     float t_start;
     PathRay ray_near = near_scene(ray_in, t_start);

@@ -1,5 +1,5 @@
 // Brute force: tests every triangle without a tree, as the first ray tracing on GPUs did (Carr, Hall, Hart: The Ray
-// Engine, Graphics Hardware 2002). For at most BRUTE_MAX_TRIANGLES. A part of kdtree.glsl.
+// Engine, Graphics Hardware 2002). A scene may have at most BRUTE_MAX_TRIANGLES. A part of kdtree.glsl.
 //
 // Needs scene.glsl, stalls.glsl, steps.glsl, candidate.glsl, kd_nodes.glsl, leaf.glsl and resume.glsl. Provides
 // `intersect_all`.

@@ -12,8 +12,8 @@ uint every_second_bit(uint n) {
 }
 
 // The index from the top of the k-th of n bands, which are rows of tiles. k counts from 0, from the middle outward,
-// alternately above and below. The last band is the bottom one, since the picture's border may cut it: all bands
-// before it have the same number of pixels.
+// alternately above and below. The bottom band, which the window's border may cut, comes last. So all bands before it
+// have the same number of pixels, and `pixel_of` finds a pixel's band by a division.
 uint band_outward(uint k, uint n) {
     uint n_left = n - 1u - k;
     return (n_left & 1u) == 0u ? n - 1u - (n_left >> 1) : n_left >> 1;

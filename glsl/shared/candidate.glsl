@@ -4,7 +4,7 @@
 // Needs scene.glsl, triangle.glsl, traversal_ray.glsl and local_memory.glsl. Provides `Nearest`, `intersect`,
 // `is_better`, `is_accepted` and `is_done`.
 
-// Whether rays pass through some of the triangles.
+// Whether rays pass through triangles that are marked TRIANGLE_HIDDEN in `triangle_materials`.
 layout(constant_id = CONSTANT_SKIPS_HIDDEN) const bool SKIPS_HIDDEN = false;
 
 // The nearest hit so far, with the traversal's t. Its barycentric weights are in local memory (WEIGHTS_SLOT).
@@ -20,7 +20,8 @@ bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
     return t > ray.t_min && nearer && triangle_ix != ray.source_triangle;
 }
 
-// Whether a hit counts. Without SKIPS_HIDDEN every hit does, and nothing is read. u, v: barycentric weights of the hit.
+// Whether a hit counts. Without SKIPS_HIDDEN every hit does, and nothing is read. u, v: barycentric weights of the
+// hit, which are not used: the triangle's mark decides alone.
 bool is_accepted(uint triangle_ix, float u, float v) {
     if (SKIPS_HIDDEN) return (load_triangle_materials(triangle_ix) & TRIANGLE_HIDDEN) == 0u;
     return true;

@@ -27,7 +27,7 @@ EdgeLines edge_lines(vec2 a, vec2 b, vec2 c, float slack) {
     vec3 from_x = vec3(a.x, b.x, c.x), from_y = vec3(a.y, b.y, c.y);
     float area = along_x.x * along_y.y - along_y.x * along_x.y;
     vec3 spans = slack * (abs(along_x) + abs(along_y));
-    // Rounding may have turned a sliver's winding around, so its edges bound nothing.
+    // Rounding may have reversed a sliver's winding, so its edges exclude no pixel.
     bool is_sliver = abs(area) <= 4.0 * (spans.x + spans.y + spans.z);
     float side = area < 0.0 ? -1.0 : 1.0;
     // at_first + x * step_x + y * step_y is twice the signed area that an edge spans with a pixel, plus the slack.

@@ -126,6 +126,7 @@ void include_edge(inout Bounds bounds, vec3 p, vec3 q, vec2 ahead, float nearest
 Rectangle rectangle_beside_eye(vec3 a, vec3 b, vec3 c, vec3 ahead) {
     Rectangle window = Rectangle(uvec2(0u), uvec2(frame.width, frame.height));
     vec3 normal = cross(b - a, c - a);
+    // A lower bound of the plane's distance from the eye: what rounding may have added is subtracted.
     float distance = abs(dot(a, normal)) / length(normal) - exp2(-18.0) * max(length(a), max(length(b), length(c)));
     if (!(distance > 0.0) || longest_in_image() > STEEPEST) return window;
     float nearest = distance / (2.0 * STEEPEST);

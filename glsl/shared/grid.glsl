@@ -78,7 +78,9 @@ ivec3 steps_of(TraversalRay ray) {
 }
 
 // Enters the lattice at t_enter: finds the first cube on the ray's way that the ray leaves at t_enter or later. A
-// first estimate is computed from the point at t_enter. Its indices are off by about 1, which the loop corrects.
+// first estimate is computed from the point at t_enter. Its indices are off by about 1, which the loop corrects. On
+// axes on which the ray leaves the cube earlier than t_enter (are_late), it goes forward. On axes on which the ray
+// leaves the previous cube at t_enter or later (are_early), it goes back.
 void enter_lattice(TraversalRay ray, inout GridWalk walk) {
     ivec3 steps = steps_of(ray);
     ivec3 cube = ivec3(cube_near(walk.lattice, ray.shear.origin + 2.0 * walk.t_enter * ray.direction));
@@ -146,8 +148,8 @@ GridCell cell_of(GridWalk walk) {
     return GridCell(words.x, words.y);
 }
 
-// Returns the entries of the cell that the ray is in. If this is an upper cell with a block, enters the block and
-// returns the entries of a lower cell.
+// Returns the entries of the cell that the ray is in, and the ray's segment there. If this is an upper cell with a
+// block, enters the block and returns those of the lower cell that the ray enters first.
 Visit visit_cell(TraversalRay ray, float t_best, inout GridWalk walk) {
     GridCell cell = cell_of(walk);
     if (GRID_LEVELS == 2u && walk.upper_cube == IN_UPPER_LEVEL && cell.count > 0u) {
@@ -158,7 +160,8 @@ Visit visit_cell(TraversalRay ray, float t_best, inout GridWalk walk) {
     return Visit(cell.first, cell.first + cell.count, interval_of(walk.t_enter, min(t_leave_of(walk), t_best)));
 }
 
-// Goes to the ray's next cube, in the block or after it. Returns false if nothing nearer than t_best can follow.
+// Goes to the ray's next cube. At the end of a block, this is the upper level's next cube. Returns false if nothing
+// nearer than t_best can follow.
 bool step_on(TraversalRay ray, float t_best, inout GridWalk walk) {
     float t = least_of(walk.t_next);
     if (GRID_LEVELS == 2u && walk.upper_cube != IN_UPPER_LEVEL && !(t < walk.t_exit)) {
@@ -212,8 +215,8 @@ uint stall_in_grid(GridWalk walk, Visit visit, Nearest best) {
     ));
 }
 
-// Loads the ray's stored state. All t are computed by the same operations as in the first search, so they have the
-// same bits.
+// Loads the ray's stored state. The t of planes are computed by the same operations as in the first search, so they
+// have the same bits. The visit ends at the nearest hit so far, which can be nearer than when the visit began.
 void resume_in_grid(TraversalRay ray, out GridWalk walk, out Visit visit, out Nearest best) {
     StalledRay state = stalled_rays[resumed_slot];
     walk.lattice = upper_lattice();
@@ -238,7 +241,8 @@ void resume_in_grid(TraversalRay ray, out GridWalk walk, out Visit visit, out Ne
 }
 
 // Searches all cells that the ray meets in [t_enter, t_exit], until nothing nearer can follow. Each turn of the loop
-// tests one triangle or goes to the next cell that has triangles. Returns 0, or the mark of a stalled ray.
+// tests at most one triangle. If the cell has no triangles left, the turn goes on towards the next cell that has
+// triangles, by at most CELLS_PER_TURN cells. Returns 0, or the mark of a stalled ray.
 uint search_grid(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (!is_in(ray)) return 0u;
     GridWalk walk;

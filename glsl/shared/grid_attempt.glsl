@@ -42,8 +42,9 @@ void size_dispatches() {
 }
 
 // The number of times that the cells' edges are doubled after an attempt whose count is above its limit. Each
-// doubling reduces the number of cells that a surface meets to about a quarter. Each attempt that has already failed
-// adds one more doubling. The last attempt has the largest cells possible.
+// doubling reduces the number of cells that a surface meets to about a quarter. Each attempt that failed before this
+// one adds one more doubling; build.n_attempts already includes this one. The last attempt has the largest cells
+// possible.
 uint n_doublings(uint count, uint limit) {
     if (build.n_attempts + 1u >= GRID_MAX_ATTEMPTS) return 32u;
     uint expected = 1u;

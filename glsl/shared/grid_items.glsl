@@ -11,12 +11,12 @@
 layout(std430, set = 0, binding = BIND_GRID_TRIANGLES) readonly buffer TrianglesBlock { Triangle triangles[]; };
 // The pairs of the upper level: a cell's index and a triangle's.
 layout(std430, set = 0, binding = BIND_GRID_UPPER_PAIRS) readonly buffer UpperPairsBlock { uvec2 upper_pairs[]; };
-// For each upper cell: the index of its first lower cell, counted from the first lower cell of its GRID_BLOCK_SIZE
-// consecutive upper cells, and the number of its lower cells along each axis.
+// For each upper cell, x is the index of its first lower cell, counted from the first lower cell of all those upper
+// cells that share its sum in scan_blocks. y is the number of its lower cells along each axis.
 layout(std430, set = 0, binding = BIND_GRID_BLOCKS) readonly buffer BlocksBlock { uvec2 blocks[]; };
 // For each item: the index of its first column, counted from the first column of its block of GRID_BLOCK_SIZE items.
 layout(std430, set = 0, binding = BIND_GRID_FIRST_COLUMNS) buffer FirstColumnsBlock { uint first_columns[]; };
-// The sums of blocks; after the scan, for each block the sum of all blocks before it.
+// The sums of blocks. The scan replaces each by the sum of all blocks before it.
 layout(std430, set = 0, binding = BIND_GRID_SCAN_BLOCKS) buffer ScanBlocksBlock { uint scan_blocks[]; };
 
 // first_cell: the index of the lattice's first cell at its level.

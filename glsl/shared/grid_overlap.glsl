@@ -53,7 +53,8 @@ float sum_of_magnitudes(vec3 v) {
     return sum;
 }
 
-// The index, on each axis, of the first closed cube whose upper face is at or above `least`.
+// The index, on each axis, of the first cube whose upper face is at or above `least`, or of the lattice's last cube
+// if there is none. A cube that only touches `least` counts, too.
 uvec3 first_cubes(Lattice lattice, vec3 least) {
     uvec3 first = cube_near(lattice, least);
     bool moves = true;
@@ -69,7 +70,8 @@ uvec3 first_cubes(Lattice lattice, vec3 least) {
     return first;
 }
 
-// The index, on each axis, of the last closed cube whose lower face is at or below `greatest`.
+// The index, on each axis, of the last cube whose lower face is at or below `greatest`, or of the lattice's first
+// cube if there is none. A cube that only touches `greatest` counts, too.
 uvec3 last_cubes(Lattice lattice, vec3 greatest) {
     uvec3 last = cube_near(lattice, greatest);
     bool moves = true;
@@ -196,8 +198,8 @@ uvec2 cubes_of(Columns columns, uvec2 column) {
     return near_plane(columns, column) + uvec2(0u, 1u);
 }
 
-// Whether the triangle comes near to a cube that is in the range of `cubes_of`, which has tested the column, as seen
-// along z.
+// Whether the triangle comes near to a cube that is in the range of `cubes_of`. Tests the triangle's plane and the
+// projections along x and y; `cubes_of` has tested the projection along z.
 bool is_near(Columns columns, uvec3 cube) {
     vec3 middle = middle_of(columns.lattice, cube);
     float half_size = columns.half_size;

@@ -16,8 +16,8 @@ BoxPlanes box_planes_of(TraversalRay ray, uint node_ix) {
     return BoxPlanes(min(t0, t1), max(t0, t1));
 }
 
-// The ray's interval in a node's cell, as (t_enter, t_exit). The planes of the box are the split planes that
-// `descend` crosses on the way to the node.
+// The ray's interval in a node's cell, as (t_enter, t_exit). The planes of the cell are those of the root's box and
+// of the splits above the node. Their t are computed as on the way down to the node, so they have the same bits.
 vec2 interval_in(TraversalRay ray, uint node_ix) {
     BoxPlanes slabs = box_planes_of(ray, node_ix);
     return vec2(max(max(slabs.near.x, slabs.near.y), max(slabs.near.z, ray.t_enter)),

@@ -4,7 +4,6 @@
 // the offsets of children, siblings and indices, and `crossing`.
 
 // A node and the interval that the ray spends in it, in the traversal's t.
-
 struct Cell {
     // Offset of the node in kd_nodes, in bytes. A split stores the same kind of offset for its children.
     uint node_offset;
@@ -67,7 +66,8 @@ float crossing(TraversalRay ray, KdNode node) {
     return t;
 }
 
-// Offset of the second child if `second` is true, otherwise of the first child, on the side that the ray comes from.
+// Offset of a split's child: of the second child if `second` is true, otherwise of the first one. The first child is
+// on the side that the ray comes from.
 uint child_of(TraversalRay ray, KdNode node, bool second) {
     bool is_above = (along_split(ray.inv_direction, node) < 0.0) != second;
     uint pair_at = node.axis_and_child & ~((1u << KD_PAIR_SHIFT) - 1u);

@@ -9,8 +9,8 @@
 
 // Invocations of a workgroup in ray kernels. Each invocation handles one ray.
 #define RAY_GROUP_SIZE 64u
-// Side of a workgroup in pixel kernels, which handles 8 x 8 pixels. It is also the side of the tiles in whose order
-// pixels are rendered.
+// Side of the square of pixels that a workgroup of a pixel kernel handles. It is also the side of the tiles in whose
+// order pixels are rendered.
 #define TILE_SIZE 8u
 // Base-2 logarithm of the most lanes that one ray gets. If a dispatch has fewer rays than the device has lanes, each
 // ray gets several lanes, a power of two. Only the first of them works, so that fewer divergent rays share a
@@ -18,14 +18,15 @@
 #define MOST_LANES_LOG2 5u
 // Invocations of a workgroup in prefix sums. Vulkan guarantees 128 invocations on every device.
 #define SCAN_GROUP_SIZE 128u
-// The most pixels in the bounding rectangle of a triangle that one invocation of `rasterize_triangles.comp` handles
-// alone. The rectangles of larger triangles are cut into blocks.
+// The most pixels in the bounding rectangle of a small triangle. A workgroup of `rasterize_triangles.comp` shares the
+// pixels of its small triangles among its invocations. The rectangles of larger triangles are cut into blocks.
 #define RASTER_SMALL 64u
 // Workgroups side by side in the dispatch over the blocks of large triangles (`rasterize_blocks.comp`).
 #define RASTER_GROUPS_X 256u
 // The most rows of workgroups in that dispatch.
 #define RASTER_GROUPS_Y 1024u
-// Blocks of `SCAN_GROUP_SIZE` rays whose counts one invocation of `compact_spine.comp` adds up at a time.
+// Counts that one invocation of `compact_spine.comp` loads and adds up in each turn of its loop. Each is the count of
+// a block of `SCAN_GROUP_SIZE` rays.
 #define SPINE_ITEMS 8u
 
 // Triangle index of a ray that hits nothing, and of a pixel that no triangle covers.
@@ -40,7 +41,8 @@
 #define KD_AXIS_MASK 3u
 // `KdNode.axis_and_child`, bit 2: the node is a leaf.
 #define KD_LEAF 4u
-// `KdNode.axis_and_child`, bit 3: the node has a slab, which is tested before anything below the node.
+// `KdNode.axis_and_child`, bit 3: the node, a split or a leaf, has a slab. The slab is tested before the split's
+// children or the leaf's triangles.
 #define KD_HAS_SLAB 8u
 // `KdNode.axis_and_child`, bits 4..31. In a split, they are a number p: the split's children are nodes 2 p and
 // 2 p + 1. In a leaf, they are the number of its triangles. With the lower bits cleared, a split's word is the offset
@@ -53,12 +55,13 @@
 // The most levels below the root that two words of the traversal's bit mask can hold.
 #define KD_MAX_DEPTH 64u
 
-// The farthest that a ray may start from the scene, as a multiple of the scene's largest coordinate. Origins of rays
-// that start farther away are first moved up to the scene. The tree's rounding margin is derived for this distance.
+// The greatest magnitude of a coordinate of a ray's origin, as a multiple of the scene's largest coordinate. A ray
+// that starts farther away is first moved along itself up to the scene. The tree's rounding margin is derived for
+// this limit.
 #define KD_MAX_ORIGIN_DISTANCE 4.0
-// A ray has no hit on a triangle if it keeps this far from the triangle's plane within a leaf. The distance is a
-// multiple of the scene's largest coordinate. It is twice the tree's margin: kdtree/planes.rs adds up what rounding
-// does to hits, to planes and to a ray's distance from a plane.
+// If a ray keeps this far from a triangle's plane all along its way through a leaf, it has no hit on the triangle in
+// this leaf. The distance is a multiple of the scene's largest coordinate, and twice the tree's margin.
+// src/accel/kdtree/planes.rs adds up what rounding does to hits, to planes and to a ray's distance from a plane.
 #define KD_PLANE_EPSILON 0.000015258789
 // A component of a direction is replaced by this if its magnitude is less. So inverse directions are finite, and rays
 // that are parallel to a split plane need no case of their own. For unit directions, the change is far below the
@@ -77,8 +80,8 @@
 #define LEAST_WEIGHT 0.000015258789
 // Distance from a surface at which rays that leave it start, as a multiple of `dot(m, abs(normal))`. m is the mean of
 // the corners' absolute coordinates, weighted by the hit's barycentric weights. The factor is 2^-18, which is 64
-// roundings. It covers the few roundings by which an interpolated point is off the plane, and those of the next ray's
-// tests in the same plane.
+// roundings. It covers the few roundings by which an interpolated point is off the plane, and the rounding in the
+// tests of the next ray against triangles in the same plane.
 #define SURFACE_CLEARANCE 0.0000038146973
 // Squared length below which an interpolated shading normal has no direction: the corners' normals cancel out.
 #define LEAST_NORMAL_SQUARED 1.0e-12
@@ -159,8 +162,8 @@ struct Triangle {
     uint n2;
 };
 
-// A triangle as a leaf stores it, 48 bytes. With it, a ray's test waits for one load instead of an index and then a
-// triangle.
+// A triangle as a leaf stores it, 48 bytes. A ray's test waits for this one load. With an index in its place, the
+// test would wait for two, the index and then the triangle.
 //
 // - `v0`, `v1`, `v2`: the corners, as in `Triangle`.
 // - `triangle_ix`: the triangle's index in `triangles`.
@@ -287,9 +290,9 @@ struct PathRay {
 };
 
 // A ray that is cast by itself, not for a picture, 32 bytes. The length of `direction` is arbitrary; it is the unit
-// of t. Hits have t in `(t_min, t_max]`. All bounds are valid, but those below 2^-126 may count as 0. Bounds are
-// exact to the last bit if the origin is within `KD_MAX_ORIGIN_DISTANCE`. Otherwise they are exact to 2^-24 of the
-// distance from the ray's origin to the scene.
+// of t. Hits have t in `(t_min, t_max]`. All numbers are valid as `t_min` and `t_max`, but those below 2^-126 may
+// count as 0. Both are exact to the last bit if the origin is within the limit of `KD_MAX_ORIGIN_DISTANCE`. Otherwise
+// they are exact to 2^-24 of the distance from the ray's origin to the scene.
 struct Ray {
     vec3 origin;
     float t_min;
@@ -299,7 +302,7 @@ struct Ray {
 
 // The hit of a ray, 16 bytes.
 //
-// - `t`: in units of the ray's direction. Infinity for a miss.
+// - `t`: in units of the ray's direction. For a miss, infinity in a cast, and the ray's `t_max` in a frame.
 // - `triangle_ix`: index of the triangle. `NO_TRIANGLE` for a miss.
 // - `u`, `v`: barycentric weights of `v1` and `v2`.
 struct Hit {
@@ -463,7 +466,8 @@ struct AccelConstants {
 
 // Specialization constants. Each has one number, one type and one meaning in all kernels. A kernel that uses one
 // declares it as `layout(constant_id = CONSTANT_X) const TYPE X = DEFAULT;`, and Rust sets it as `constants::X`.
-// build.rs refuses a number that is another constant's, or that is missing here.
+// build.rs refuses two constants with the same number. In a kernel, it refuses a constant that has the number of
+// another constant, or none here.
 
 // The algorithm that takes rays through the kd-tree: `TRAVERSAL_MASK` and its like.
 #define CONSTANT_TRAVERSAL 0u
@@ -477,7 +481,7 @@ struct AccelConstants {
 #define CONSTANT_PREDICATES_BRANCHES 4u
 // Whether the rays are the camera's, which are not stored.
 #define CONSTANT_FROM_CAMERA 5u
-// Whether any hit ends a ray, not only the closest.
+// Whether a search may end at any hit, instead of finding the closest one.
 #define CONSTANT_ANY_HIT 7u
 // The curve that maps radiance to the display's range: `TONEMAP_LINEAR` and its like.
 #define CONSTANT_CURVE 8u
@@ -781,8 +785,8 @@ struct GridSort {
 // One `Hit` for each ray of the cast.
 #define BIND_CAST_HITS 63u
 
-// The descriptor set of a grid's build. "Level" is the level that is built; "block" is one of `GRID_BLOCK_SIZE`
-// entries.
+// The descriptor set of a grid's build. "Level" is the level that is built. A "scan block" is `GRID_BLOCK_SIZE`
+// consecutive entries. A "block of cells" is the lower cells that an upper cell is cut into.
 
 // One `GridBuild`.
 #define BIND_GRID_BUILD 40u
@@ -790,9 +794,9 @@ struct GridSort {
 #define BIND_GRID_TRIANGLES 41u
 // The upper level's pairs of a cell's and a triangle's index, two words each.
 #define BIND_GRID_UPPER_PAIRS 42u
-// A word for each item of the level: its first column, counted from the first one of its block.
+// A word for each item of the level: its first column, counted from the first one of its scan block.
 #define BIND_GRID_FIRST_COLUMNS 43u
-// Sums of blocks; after the scan, the sums of all blocks before.
+// The sum of each scan block; after the scan, the sum of all scan blocks before it.
 #define BIND_GRID_SCAN_BLOCKS 44u
 // The pairs that a kernel reads, two words each.
 #define BIND_GRID_PAIRS_FROM 45u
@@ -800,14 +804,14 @@ struct GridSort {
 #define BIND_GRID_PAIRS_TO 46u
 // One `GridCell` for each cell.
 #define BIND_GRID_CELLS 47u
-// Two words for each upper cell: its first lower cell, counted from the first one of its block, and the number of
-// lower cells along each axis.
+// Two words for each upper cell, which describe its block of cells: the first lower cell, counted from the first one
+// of the upper cell's scan block, and the number of lower cells along each axis.
 #define BIND_GRID_BLOCKS 48u
 // One `LeafTriangle` for each pair.
 #define BIND_GRID_LEAF_TRIANGLES 49u
 // One `Plane` for each pair.
 #define BIND_GRID_LEAF_PLANES 50u
-// A word for each column: its first pair, counted from the first one of its block.
+// A word for each column: its first pair, counted from the first one of its scan block.
 #define BIND_GRID_FIRST_PAIRS 51u
 
 #endif

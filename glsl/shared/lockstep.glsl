@@ -1,11 +1,11 @@
 // The search for devices that run both sides of a branch for all lanes, as software drivers do (predication,
-// PREDICATES_BRANCHES). There an `if` saves nothing: its body costs the same whether all lanes, some lanes or no lane
-// take it. A loop ends as soon as no lane continues, but runs its body at least once. A ray finds the same hits, in
-// the same order, as by `search_by_turns`. A part of kdtree.glsl.
+// PREDICATES_BRANCHES). A ray finds the same hits, in the same order, as by `search_by_turns`. A part of kdtree.glsl.
 //
-// So loops test at their end whether to continue, which saves a turn in which no lane takes part. They test at their
-// beginning, too. Without that second test, lavapipe (Mesa 22.3) computes wrong results for lanes that leave the loop
-// early: their variables get the values of the loop's last turn.
+// On such devices, an `if` saves nothing: its body costs the same whether all lanes, some lanes or no lane take it. A
+// loop ends as soon as no lane continues, but runs its body at least once. So loops test at their end whether to
+// continue, which saves a turn in which no lane takes part. They test at their beginning, too. Without that second
+// test, lavapipe (Mesa 22.3) computes wrong results for lanes that leave the loop early: their variables get the
+// values of the loop's last turn.
 //
 // Needs everything that kdtree.glsl includes, and its `next_leaf`. Provides `search_in_step`.
 
@@ -39,8 +39,8 @@ void intersect_in_step(TraversalRay ray, LeafTriangle entry, bool tests, inout N
     spill_pair(WEIGHTS_SLOT, is_new ? hit.u : weights.x, is_new ? hit.v : weights.y);
 }
 
-// If the visit to this leaf is finished, goes on to the next leaf, or at the beginning to the first one. Returns
-// false if no leaf follows.
+// If the visit to this leaf is finished, goes on to the next leaf. Returns false if no leaf follows. begins: whether
+// the ray has not yet come to its first leaf, which is then the next one.
 bool go_on_in_step(TraversalRay ray, float t_best, inout bool begins, inout Cell cell, inout Visit visit) {
     bool goes_on = true;
     if (visit.entry_ix >= visit.end_ix) {

@@ -46,7 +46,8 @@ vec3 phong(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
     return reflectance;
 }
 
-// Whether the surface reflects more than LEAST_REFLECTANCE of a light in the direction to_light towards the viewer.
+// Whether the surface can show a light: whether it reflects towards the viewer more than LEAST_REFLECTANCE, in any
+// colour, of the light that comes from the direction to_light.
 bool can_show(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
     // The diffuse part alone decides most cases, without the exponentiation of the specular part.
     vec3 diffuse = material.kd * dot(normal, to_light) * local_weight(material);

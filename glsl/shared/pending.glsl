@@ -31,7 +31,7 @@ void go_down() {
     if (TRAVERSAL == TRAVERSAL_SHORT_STACK) trail_down();
 }
 
-// Makes the sibling of the cell's node pending. The ray leaves it at the cell's t_exit.
+// Makes the sibling of the cell's node pending. The ray leaves that sibling at the cell's t_exit.
 void push_pending(Cell cell) {
     // These methods store nothing here: they find pending subtrees on the way back up.
     if (TRAVERSAL == TRAVERSAL_MASK_BOXES) return;

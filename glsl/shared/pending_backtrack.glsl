@@ -11,7 +11,6 @@
 
 // Finds the next pending cell upwards from the cell's node. Returns false if there is none that may hold a hit nearer
 // than t_best.
-
 bool backtrack(TraversalRay ray, float t_best, inout Cell cell) {
     while (cell.node_offset != 0u) {
         uint parent_ix = kd_parent_of(node_ix_of(cell.node_offset));

@@ -15,7 +15,8 @@
 // takes less time to shift and to search than two. The value is the same for all kernels over one tree.
 layout(constant_id = CONSTANT_MASK_WORDS) const uint MASK_WORDS = 2u;
 
-// Bit i, counted over both words: whether the sibling i levels above the cell's node is pending.
+// Bit i, counted over both words: whether the sibling of the node i levels above the cell's node is pending. Bit 0 is
+// the sibling of the cell's node itself.
 uvec2 pending_mask;
 
 // The mask as seen from one level farther down.
@@ -29,6 +30,7 @@ uvec2 mask_shifted_up(uvec2 mask, uint n) {
     return uvec2((mask.x >> n) | ((mask.y << 1) << (KD_WORD_DEPTH - 1u - n)), mask.y >> n);
 }
 
+// Whether the sibling of the node n_levels_up above the cell's node is pending.
 bool is_pending(uint n_levels_up) {
     bool is_high = MASK_WORDS == 2u && n_levels_up >= KD_WORD_DEPTH;
     uint word = is_high ? pending_mask.y : pending_mask.x;
@@ -59,13 +61,13 @@ uint mask_up() {
     return is_high ? KD_WORD_DEPTH + n : n;
 }
 
-// Slot of the last pending cell in local memory.
+// Slot in local memory of the deepest pending cell, which is the next to be visited.
 uint last_slot() {
     return n_pending() - 1u;
 }
 
-// Both functions compute a cell's slot while the cell's bit is set in the mask. Otherwise NVIDIA's compiler uses 48
-// registers instead of 40.
+// `mask_push` and `mask_pop` both compute a cell's slot while the cell's bit is set in the mask. Otherwise NVIDIA's
+// compiler uses 48 registers instead of 40.
 void mask_push(Cell cell) {
     mask_mark();
     keep_cell(last_slot(), cell);

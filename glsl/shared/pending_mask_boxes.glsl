@@ -8,8 +8,8 @@
 //
 // Needs kd_nodes.glsl, kd_boxes.glsl and pending_mask.glsl. Provides `climb_by_boxes` and `siblings_done`.
 
-// Bit i, counted over both words: whether the sibling i levels above the cell's node has been visited. Shifted as
-// `pending_mask` is.
+// Bit i, counted over both words: whether the sibling of the node i levels above the cell's node has been visited.
+// The word is shifted as `pending_mask` is.
 uvec2 siblings_done;
 
 // Finds the next pending cell upwards from the cell's node. Returns false if there is none that may hold a hit nearer

@@ -1,7 +1,7 @@
 // Pending subtrees on a short stack, which is a ring and keeps the newest ones (Horn, Sugerman, Houston, Hanrahan:
 // Interactive k-D Tree GPU Raytracing, I3D 2007). Older ones, which the ring has lost, are found from the root by the
-// mask (pending_restart.glsl). In the paper, the ray restarts at the t where it left the leaf. Most rays lose no
-// entry. A part of pending.glsl.
+// mask (pending_restart.glsl). The paper finds them by a restart at the t where the ray left the leaf. Most rays lose
+// no entry, so they never restart. A part of pending.glsl.
 //
 // Needs kd_nodes.glsl, pending_mask.glsl and pending_restart.glsl. Provides `trail_down`, `trail_push` and
 // `trail_pop`, which serve both TRAVERSAL_SHORT_STACK and TRAVERSAL_RESTART: the latter never pushes to the ring.

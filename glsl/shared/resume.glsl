@@ -1,4 +1,4 @@
-// Storing of a stalled ray's traversal, and resuming it where it stopped. A part of kdtree.glsl.
+// Stores the state of a stalled ray's traversal, and resumes the traversal where it stopped. A part of kdtree.glsl.
 //
 // Needs stalls.glsl, steps.glsl, local_memory.glsl, candidate.glsl, kd_nodes.glsl, pending.glsl and leaf.glsl.
 // Provides `stall_at` and `resume`.

@@ -1,12 +1,12 @@
-// Access to the scene's triangles and their acceleration structure. All kernels over a scene read them in the same
-// one of three ways:
+// Access to the scene's triangles and their acceleration structure. There are three ways of reading. All kernels over
+// a scene read all of its arrays in the same way:
 //
 // - GPUs read them as bound storage buffers.
 // - Software drivers read them as texels of the same buffers. lavapipe fetches the texels of eight lanes side by
 //   side, but loads from storage buffers lane by lane. With loads from storage buffers, rays take 1.2 to 1.4 times as
 //   long.
-// - If an array is larger than what the device binds, it is read by its device address. This costs the traversal up
-//   to 7 % of its speed on a large GPU.
+// - If any array is larger than what the device binds, all arrays are read by their device addresses. This costs the
+//   traversal up to 7 % of its speed on a large GPU.
 //
 // Needs nothing: it includes layout.glsl, and declares all bindings of the scene's arrays. Provides `accel`, the
 // function `load_NAME` for each array, and functions that assemble an element: `triangle_at`, `kd_node_at`,

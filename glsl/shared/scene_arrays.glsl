@@ -23,13 +23,14 @@ ARRAY(kd_parents, uint, uint, 6u)
 // order of the upper cells.
 ARRAY(grid_cells, GridCell, uvec2, 30u)
 
-// One entry for each triangle of each leaf, in the order of the leaves. An entry has three rows, one
-// for each corner. The fourth word of its first row is the triangle's index.
+// One entry for each triangle of each leaf, in the order of the leaves. In a grid, the cells of the lowest level take
+// the place of leaves. An entry has three rows, one for each corner. The fourth word of its first row is the
+// triangle's index.
 ARRAY(leaf_triangles, LeafTriangle, vec4, 7u)
 // One plane for each entry of `leaf_triangles`: the plane of its triangle.
 ARRAY(leaf_planes, Plane, vec4, 23u)
-// One slab for each node, or no slabs at all. A slab holds the parts of the node's triangles that are within the
-// node's cell.
+// One slab for each node, or no slabs at all. A slab holds the parts of the node's triangles that come near the
+// node's cell. The entries of nodes without KD_HAS_SLAB are unused.
 ARRAY(kd_slabs, Slab, vec4, 27u)
 // One box for each node, or none at all: the node's cell, three rows each. Only some traversals read them.
 ARRAY(kd_boxes, KdBox, uvec2, 21u)

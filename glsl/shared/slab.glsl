@@ -23,8 +23,8 @@ bool is_clear(TraversalRay ray, Interval interval, vec4 plane, float reach) {
     return abs(fma(interval.t_middle, slope, height)) > fma(interval.t_half, abs(slope), reach);
 }
 
-// Whether the node is a split whose children can be visited: it has no slab, or the ray has already passed the slab's
-// test.
+// Whether the node is a split whose children can be visited. Either it has no slab, or `enter_slab` has removed the
+// mark, since the ray comes into the slab.
 bool is_open_split(KdNode node) {
     return (node.axis_and_child & (KD_LEAF | KD_HAS_SLAB)) == 0u;
 }

@@ -21,8 +21,8 @@ const bool CAN_STALL = TURN_BUDGET != 0u;
 // node_offset, t_enter, t_exit: the cell that the ray is in (kd_nodes.glsl). entry_ix, end_ix: the entries of the
 // leaf that are still to be tested. t_best, triangle_ix, u, v: the nearest hit so far. n_steps: reads so far
 // (steps.glsl). siblings_done: the mask of TRAVERSAL_MASK_BOXES; the other traversals of the kd-tree rebuild their
-// pending subtrees. grid.glsl stores the indices of the ray's cell (its cube) in node_offset, and those of the
-// cell of the upper level in siblings_done.x.
+// pending subtrees. grid.glsl stores the packed indices of the ray's cell in node_offset, and those of the cell of
+// the upper level in siblings_done.x.
 struct StalledRay {
     uint node_offset;
     float t_enter;
@@ -37,8 +37,9 @@ struct StalledRay {
     uvec2 siblings_done;
 };
 
-// One row. n_slots: slots that rays have requested, which can be more than there are. n_stalled: rays of the last
-// dispatch that have stalled and have a slot. n_waiting: stalled rays that have no slot.
+// The counts of stalled rays, one row. n_slots: slots that rays have requested, which can be more than there are.
+// n_stalled: rays of the last dispatch that have stalled and have a slot. n_waiting: stalled rays that have no slot,
+// which the host keeps counted through rounds of ROUND_RESUME.
 struct StallCounts {
     uint n_slots;
     uint n_stalled;
@@ -55,7 +56,9 @@ layout(std430, set = 0, binding = BIND_STALLS) buffer StallsBlock {
 // Turns that this invocation has taken.
 uint n_turns = 0u;
 
-// Counts a turn. Every loop of a search calls this in every turn.
+// Counts a turn. The loops of a search call this in every turn, directly or by `kd_node`. Loops of a few turns inside
+// a counted turn, and the loops of `walk_to` (resume.glsl), are not counted: the budget leaves room for them
+// (src/buffers/stalls.rs).
 void count_turn() {
     if (CAN_STALL) n_turns += 1u;
 }

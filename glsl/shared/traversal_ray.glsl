@@ -57,8 +57,8 @@ float largest_coordinate() {
     return max(largest.x, max(largest.y, largest.z));
 }
 
-// Returns the ray with its origin moved along it to within KD_MAX_ORIGIN_DISTANCE. t_start: the distance of the move,
-// in the ray's own t. It is 0 unless the ray starts far away from the scene.
+// Returns the ray. If its origin is beyond the limit of KD_MAX_ORIGIN_DISTANCE, it is moved along the ray to the
+// structure's box. t_start: the distance of the move, in the ray's own t, or 0 if the origin is not moved.
 PathRay near_scene(PathRay ray, out float t_start) {
     vec3 away = abs(ray.origin);
     t_start = 0.0;

@@ -8,8 +8,8 @@
 #include "layout.glsl"
 
 // A ray's shear. Space is permuted so that the axis of the direction's longest component, `axis`, becomes z. The
-// shear then maps the ray onto the z axis. x, y: the direction's two other components, divided by the longest one. z:
-// the inverse of the longest component.
+// shear then maps the ray onto the z axis. origin: the ray's origin, not permuted. x, y: the direction's two other
+// components, divided by the longest one. z: the inverse of the longest component.
 struct Shear {
     vec3 origin;
     float x;

@@ -10,10 +10,10 @@ use crate::layout::Triangle;
 /// Thanks to the margin, the traversal may treat its own arithmetic as exact: the leaf that the traversal visits at a
 /// hit's t has the hit triangle. Proof: let m be the largest coordinate, u = 2^-24, and o the ray's origin. |o| is at
 /// most 4 m (`KD_MAX_ORIGIN_DISTANCE`). Divisions are right to 2.5 units in the last place, as Vulkan guarantees.
-/// Then the crossing of a plane at p is off by u (|o| + |p| + 6 |p - o|) <= 35 u m in space. The point at a hit's t
-/// is off the triangle by u (11.5 D + 14 L) on each axis, as `reference::triangle` proves. D, the greatest coordinate
-/// difference between o and a corner, is at most 5 m. L, that between two corners, is at most 2 m. So the point is
-/// off by at most 85.5 u m. The sum is 120.5 u m, of the margin's 128 u m.
+/// Then the point where a ray crosses the split plane of coordinate p is off by u (|o| + |p| + 6 |p - o|) <= 35 u m.
+/// The point at a hit's t is off the triangle by u (11.5 D + 14 L) on each axis, as `reference::triangle` proves. D,
+/// the greatest coordinate difference between o and a corner, is at most 5 m. L, that between two corners, is at most
+/// 2 m. So the point is off by at most 85.5 u m. The sum is 120.5 u m, of the margin's 128 u m.
 pub const MARGIN: f32 = 1.0 / (1 << 17) as f32;
 
 /// Closed axis-aligned box, world units.
@@ -58,7 +58,7 @@ impl Bounds {
         self
     }
 
-    /// Returns the part that both boxes contain.
+    /// Returns the part that both boxes contain. If there is none, `min` exceeds `max` on some axis.
     pub fn intersection(mut self, other: &Self) -> Self {
         for axis in 0..3 {
             self.min[axis] = self.min[axis].max(other.min[axis]);
@@ -91,10 +91,12 @@ pub fn is_finite(triangle: &Triangle) -> bool {
     triangle.v0.is_finite() && triangle.v1.is_finite() && triangle.v2.is_finite()
 }
 
-/// Reference: an entry in a cell's list of the triangles that come near to the cell. 28 bytes.
+/// Reference: an entry in a cell's list of the triangles that come near to the cell, while a kd-tree is built. 28
+/// bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct Reference {
-    /// Bounds of the part of the triangle that comes within the margin of the cell, grown by the margin.
+    /// Bounds of the part of the triangle that comes within the margin of the cell, grown by the margin, and then cut
+    /// off at the cell's faces. So they never reach beyond the cell.
     pub bounds: Bounds,
     pub triangle_ix: u32,
 }

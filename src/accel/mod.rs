@@ -47,9 +47,9 @@ pub enum AccelKind {
 }
 
 named_enum!(AccelKind {
-    KdTree = "kdtree": "a kd-tree by the surface area heuristic: rays are fastest, the build takes longest",
-    Grid = "grid": "a uniform grid: the device builds it in a millisecond; for triangles of even size and distribution",
-    Grid2 = "grid2": "a grid of two levels: cells with many triangles are cut again; built in two milliseconds",
+    KdTree = "kdtree": "a kd-tree by the surface area heuristic: rays are fastest; the CPU builds it",
+    Grid = "grid": "a uniform grid: the device builds it in about a millisecond; rays are 2 to 10 times slower",
+    Grid2 = "grid2": "a grid of two levels: built in about two milliseconds; rays are 2 to 5 times slower",
 });
 
 impl AccelKind {

@@ -12,8 +12,8 @@
 //! chart      numbers -> SVG
 //! ```
 //!
-//! Times are medians of many runs after a warm-up. Runs that are compared take turns, so that a drifting clock
-//! affects all of them alike.
+//! Times are medians of repeated runs after a warm-up; only the CPU's frames in `paper` have no warm-up. Searches
+//! that are compared take turns, so that a drifting clock affects all of them alike.
 
 pub mod chart;
 pub mod difference;

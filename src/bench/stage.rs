@@ -41,7 +41,8 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Makes a stage of a scene, seen by its own camera and lit by its first light, or from above if it has none.
+    /// Makes a stage of a scene without a room, seen by its own camera and lit by its first light, or from above if
+    /// it has none.
     ///
     /// # Panics
     /// The scene has a triangle without a material.
@@ -58,8 +59,8 @@ impl Stage {
         Self { links: TraversalLinks::all(world.tree()), world, grids, tree_build_ms, frame, light }
     }
 
-    /// Makes a stage of a scene on the floor of a closed room, seen from inside the room, with a point light under
-    /// the ceiling. No ray from inside the room misses.
+    /// Makes a stage of a scene just above the floor of a closed room, seen from inside the room, with a point light
+    /// under the ceiling. No ray from inside the room misses.
     pub fn in_room(mut scene: FlatScene, size: (u32, u32), build_options: &BuildOptions) -> Self {
         let room = Room::around(scene.bounds());
         scene.triangles.extend(room.walls());

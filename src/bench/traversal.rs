@@ -87,10 +87,11 @@ impl<'a> Tracers<'a> {
         })
     }
 
-    /// Returns, for each variant, the number of untimed casts at the beginning of each of its turns: as many as take
-    /// [`WARM_UP`], but 1 to 1000; on the CPU 1. They are needed because the rays have just been uploaded, the caches
-    /// hold another variant's structure, and the device's clock may have fallen while the CPU compared hits. Variants
-    /// can differ in speed by a factor of a thousand, so each has a number of its own.
+    /// Returns, for each variant, the number of untimed casts at the beginning of each of its turns. On a device,
+    /// they take about [`WARM_UP`] together, and their number is 1 to 1000. On the CPU, or without timestamps, it is
+    /// 1. They are needed because the rays have just been uploaded, the caches hold another variant's structure, and
+    /// the device's clock may have fallen while the CPU compared hits. Variants can differ in speed by a factor of a
+    /// thousand, so each has a number of its own.
     ///
     /// # Errors
     /// Fails as [`Caster::cast`] does.
@@ -165,7 +166,7 @@ pub struct VariantResult {
     pub ms: Option<Spread>,
     /// Million rays per second.
     pub mrays_per_s: Option<Spread>,
-    /// Difference from the CPU's hits, in the worst turn.
+    /// Difference from the CPU's hits: the maximum of each number over all turns.
     #[serde(flatten)]
     pub difference: Difference,
     /// Steps of the same search on the CPU.

@@ -44,7 +44,7 @@ pub struct AccelBuffers {
     /// The constants: one element.
     constants: Buffer<AccelConstants>,
     pub arrays: SceneArrays,
-    /// Rays that have stalled on their way through the tree.
+    /// Rays that have stalled on their way through the structure.
     pub stalls: Stalls,
     access: SceneAccess,
     structure: Structure,
@@ -108,8 +108,8 @@ impl AccelBuffers {
         Self::with(context, contents, &constants, structure)
     }
 
-    /// Uploads triangles and the grid that the host has built. This is for scenes with more triangles than a device
-    /// can bind, and so cannot build a grid over.
+    /// Uploads triangles and the grid that the host has built. This is for scenes with more triangles than the device
+    /// can bind as one storage buffer, since the kernels that build grids need that.
     fn of_grid(context: &Arc<Context>, triangles: &[Triangle], grid: &Grid) -> Result<Self, GpuError> {
         let entries = grid.leaf_triangles();
         let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);
@@ -145,8 +145,8 @@ impl AccelBuffers {
         Ok(made)
     }
 
-    /// Uploads the triangles' materials, which a cast does not need. Descriptor sets over these buffers have to be
-    /// made again.
+    /// Uploads the index of each triangle's material, which a cast does not need. Descriptor sets over these buffers
+    /// have to be made again.
     ///
     /// # Errors
     /// A buffer is beyond the device's limits, or memory runs out.
@@ -250,8 +250,8 @@ pub(crate) fn hidden_words(n_triangles: usize, hidden: &[u32]) -> Vec<u32> {
     words
 }
 
-/// Returns the tree's slabs. Returns none for a device that runs both sides of every branch, since its kernels do not
-/// read slabs.
+/// Returns the tree's slabs, or an empty slice for a device that predicates branches, since its kernels do not read
+/// slabs.
 fn slabs_for<'a>(context: &Context, tree: &'a KdTree) -> &'a [Slab] {
     if context.predicates_branches() { &[] } else { tree.slabs() }
 }

@@ -200,18 +200,22 @@ impl GridBuffers {
     }
 }
 
-/// Arrays that only kernels access.
+/// Arrays that only kernels access. grid_build.glsl defines the terms: item, column, pair and block.
 struct Arrays {
     triangles: Buffer<Triangle>,
+    /// The index of each item's first column, counted from the first column of the item's scan block.
     first_columns: Buffer<u32>,
+    /// The index of each column's first pair, counted from the first pair of the column's scan block.
     first_pairs: Buffer<u32>,
+    /// Sums of blocks of `GRID_BLOCK_SIZE` entries ([`ScanRegions`]).
     scan_blocks: Buffer<u32>,
+    /// For each upper cell, its block of lower cells (`BIND_GRID_BLOCKS`). Empty for a uniform grid.
     blocks: Buffer<[u32; 2]>,
     /// Arrays of pairs. The sort of the upper level ends in the first one, that of the lower level in the second one.
     pairs: [Buffer<[u32; 2]>; 3],
 }
 
-/// Regions of scan_blocks: the index at which the sums of each scan begin. Those of the sort begin at 0.
+/// Regions of `scan_blocks`: the index at which the sums of each prefix sum begin. Those of the sort begin at 0.
 struct ScanRegions {
     columns_begin: u32,
     pairs_begin: u32,

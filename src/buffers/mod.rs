@@ -6,7 +6,7 @@
 //! queue           rays of a batch and what belongs to each
 //! pixels          samples, sums, filtered and displayed pixels
 //! raster_queue    large triangles, between the two kernels that rasterize
-//! vertex_indices  the vertices that the graphics pipeline uses_graphics_pipeline
+//! vertex_indices  the index buffer of the triangles that the graphics pipeline rasterizes
 //! stalls          rays that have spent a dispatch's loop turns
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid

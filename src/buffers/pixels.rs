@@ -30,7 +30,7 @@ pub struct Pixels {
     /// The index of the nearest triangle at each pixel of the whole picture, of which only the window's part is
     /// drawn. If the options do not use the graphics pipeline, this is one pixel that no kernel reads.
     pub triangle_ids: Arc<Target>,
-    /// The depth image for `triangle_ids`; none where nothing is drawn.
+    /// The depth image for `triangle_ids`. None if the options do not use the graphics pipeline.
     pub depth: Option<Arc<Target>>,
 }
 
@@ -92,7 +92,7 @@ impl Pixels {
     }
 }
 
-/// Whether the graphics pipeline uses_graphics_pipeline triangles.
+/// Whether the graphics pipeline rasterizes the primary rays.
 pub(crate) fn uses_graphics_pipeline(options: &RenderOptions) -> bool {
     options.primary == Primary::Raster
 }

@@ -60,8 +60,8 @@ pub struct Resources {
     /// The constants: one element.
     pub frame: Buffer<Frame>,
     pub accel: AccelBuffers,
-    /// Three indices for each triangle, or empty if triangles are drawn without indices. None if the graphics
-    /// pipeline uses_graphics_pipeline no triangles.
+    /// Three indices for each triangle, or empty if triangles are drawn without indices. None if the options do not
+    /// use the graphics pipeline.
     pub vertex_indices: Option<Buffer<u32>>,
     pub materials: Buffer<Material>,
     /// `n_lights` elements.
@@ -149,9 +149,9 @@ impl Resources {
         BindingSet::new(&self.bindings, "frame", &[&self.accel.objects(), &own[..]].concat())
     }
 
-    /// Makes the resources for another frame of the same scene. Their contents are undefined, but for the scene, and
-    /// for pixels whose buffers fit the frame and are therefore shared. `accel`: the scene's structure if the
-    /// traversal changes, else none.
+    /// Makes the resources for another frame of the same scene. The scene keeps its contents, and so do the pixels if
+    /// their buffers fit the frame. All other contents are undefined. `accel`: the scene's structure if the traversal
+    /// changes, else none.
     ///
     /// # Errors
     /// There are too many triangles for brute force, a buffer is beyond the device's limits, or memory runs out.

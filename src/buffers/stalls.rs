@@ -1,4 +1,4 @@
-//! Stalled rays: rays that stop on their way through the tree, and go on in further dispatches
+//! Stalled rays: rays that stop on their way through the acceleration structure, and go on in further dispatches
 //! (glsl/shared/stalls.glsl).
 //!
 //! Some drivers silently end a shader after a number of loop turns. On such a device, a ray that has spent its turns

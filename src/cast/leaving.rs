@@ -10,8 +10,8 @@ use crate::{
     reference::surface::{Surface, surface_at},
 };
 
-/// Returns a ray for each hit, in the order of the hits. It goes into the hemisphere above the hit, with a density
-/// proportional to the cosine. Misses give no ray.
+/// Returns one ray for each hit, in the order of the hits, with a pseudorandom direction in the hemisphere above the
+/// hit. The density of directions is proportional to the cosine. Misses give no ray.
 pub fn diffuse_rays(triangles: &[Triangle], rays: &[PathRay], hits: &[Hit]) -> Vec<PathRay> {
     rays_from_hits(triangles, rays, hits, |ray, surface| {
         leaving(surface, ray, cosine_distributed(surface.geometric, uniform_pair(ray.pixel_ix)))

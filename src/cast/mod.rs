@@ -42,11 +42,11 @@ use crate::{
 /// The result of a cast.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cast {
-    /// One hit for each ray, with t in units of the ray's direction. A miss has an infinite t and the index
-    /// `NO_TRIANGLE`.
+    /// One hit for each ray, at origin + t * direction: t is a distance in world units only if the direction has unit
+    /// length. A miss has an infinite t and the index `NO_TRIANGLE`.
     pub hits: Vec<Hit>,
-    /// Milliseconds of the kernel, or on the CPU of wall-clock time: one entry for each repetition, summed over
-    /// batches. None where the device has no timestamps.
+    /// Milliseconds of each repetition, summed over batches. They are the kernel's GPU time, or wall-clock time if
+    /// the CPU casts. None where the device has no timestamps.
     pub gpu_ms: Option<Vec<f64>>,
     /// Number of rays that can only miss: see [`count_invalid`].
     pub n_invalid: u64,
@@ -58,6 +58,7 @@ pub const RAYS_PER_BATCH: usize = 1 << 21;
 /// Casts rays on a device, which holds the triangles and their acceleration structure.
 pub struct Caster {
     context: Arc<Context>,
+    /// The triangles and their acceleration structure, which may also be a grid.
     tree: AccelBuffers,
     bindings: Arc<BindingLayout>,
     traversal: Traversal,
@@ -191,7 +192,7 @@ impl Caster {
             kernel.record(commands, &self.resources.set, n_rays, round);
         })?;
         // The same rays stall in every repetition, but they are resumed only once, after the last repetition. The
-        // time of that is added to each repetition.
+        // wall-clock time of resuming them is added to each repetition.
         let stalled_ms = if n_rounds > 0 { began_ms.elapsed().as_secs_f64() * 1e3 } else { 0.0 };
         let rows = timer.rows()?;
         Ok(rows.iter().map(|row| row.span_ms.map(|(begin, end)| end - begin + stalled_ms)).collect())

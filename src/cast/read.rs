@@ -102,7 +102,7 @@ impl RayReader {
     }
 }
 
-/// Reads the first bytes, fewer than every header has. A pipe may deliver them one by one.
+/// Reads the first 12 bytes of a file. Every `.npy` file is longer. A pipe may deliver the bytes one by one.
 fn read_start(file: &mut impl Read) -> Result<[u8; 12], String> {
     let mut start = [0; 12];
     file.read_exact(&mut start).map_err(|e| match e.kind() {
@@ -112,8 +112,8 @@ fn read_start(file: &mut impl Read) -> Result<[u8; 12], String> {
     Ok(start)
 }
 
-/// Refuses a header that is too large for a plain array, before it is read: see `MAX_HEADER`. `start`: the file's first
-/// bytes.
+/// Refuses a header that is too large for a plain array, before it is read: see `MAX_HEADER`. `start` holds the
+/// file's first bytes.
 fn check_header_size(start: &[u8; 12]) -> Result<(), String> {
     let size = match start {
         [0x93, b'N', b'U', b'M', b'P', b'Y', 1, _, a, b, ..] => u32::from_le_bytes([*a, *b, 0, 0]),

@@ -28,8 +28,8 @@ const HITS_AT_A_TIME: usize = 1 << 16;
 ///
 /// The arrays for [`Query::Closest`] are `t_hit` (float32 K, infinity on a miss), `primitive_ids` (uint32 K,
 /// 4294967295 on a miss), `primitive_uvs` (float32 K x 2, the weights of the triangle's second and third corner) and
-/// `primitive_normals` (float32 K x 3, unit length, zero on a miss). The normal is on the side from which the corners
-/// go round counter-clockwise. The array for [`Query::Any`] is `occluded` (bool K).
+/// `primitive_normals` (float32 K x 3, unit length, zero on a miss). The normal points to the side from which the
+/// corners are seen in counter-clockwise order. The array for [`Query::Any`] is `occluded` (bool K).
 pub struct HitWriter {
     path: PathBuf,
     spool: SpooledTempFile,

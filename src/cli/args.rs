@@ -29,7 +29,9 @@ const AOV: &str = "Layers of each pixel to write into an .exr, separated by comm
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
 #[derive(Parser)]
 #[command(name = "kdray", version, arg_required_else_help = false)]
-#[command(after_help = "Exit codes: 2 usage, 3 scene or rays, 4 device, 5 output.")]
+#[command(
+    after_help = "Exit codes: 0 success, 2 usage, 3 scene or rays, 4 device, 5 output, 128 + n ended by signal n."
+)]
 pub struct Args {
     #[command(subcommand)]
     pub command: Command,
@@ -86,7 +88,8 @@ pub struct RenderArgs {
     /// Number of CPU threads for loading, building and --cpu, 1 to 1024 [default: one per processor]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: a
+    /// discrete GPU, else an integrated one, else a software driver]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
     /// Number of times to draw the frame, 1 to 10000; the report shows the frame of median time
@@ -140,7 +143,8 @@ pub struct CastArgs {
     /// Number of CPU threads for loading, building and --cpu, 1 to 1024 [default: one per processor]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: a
+    /// discrete GPU, else an integrated one, else a software driver]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
     /// Run under the Khronos validation layer, and fail if it reports anything

@@ -1,4 +1,5 @@
-//! The roles of a command's files. They are noted so that no output overwrites another one or a file that is read.
+//! The roles of a command's files. They are recorded so that no output overwrites another output or a file that is
+//! read.
 
 use std::{
     collections::HashMap,
@@ -15,8 +16,8 @@ struct Role {
     is_read: bool,
 }
 
-/// The files that a command uses, as far as they have been noted. Two paths that lead to one file count as the same
-/// file, even if they are spelled differently or pass through links.
+/// The files recorded so far as used by a command. Two paths that lead to one file count as the same file, even if
+/// they are spelled differently or pass through links.
 #[derive(Default)]
 pub struct FileRoles {
     roles: HashMap<PathBuf, Role>,

@@ -77,6 +77,7 @@ struct LightUse {
     kind: &'static str,
     /// Position of a point light in world units; unit vector towards a directional light.
     position: [f32; 3],
+    /// Radiant intensity of a point light, irradiance of a directional light; linear RGB.
     intensity: [f32; 3],
 }
 

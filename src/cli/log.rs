@@ -27,7 +27,7 @@ use super::spans::Spans;
 pub fn start(quiet: bool, bar: Option<&ProgressBar>, spans: Option<&Spans>) {
     let bar = bar.cloned();
     let lines = tracing_subscriber::fmt::layer()
-        // Internal errors would go to a standard error that has just failed.
+        // The layer would report a failed write to standard error, which is the stream that has failed.
         .log_internal_errors(false)
         .event_format(Line)
         .with_writer(move || Beside(bar.clone()))

@@ -50,6 +50,7 @@ pub fn main(arguments: impl Iterator<Item = OsString>) -> ExitCode {
     signals::handle();
     let result = match Args::try_parse_from(arguments) {
         Ok(args) => run(args),
+        // clap returns the texts of --help and --version as errors that belong on standard output.
         Err(request) if !request.use_stderr() => print(&request.render().to_string()),
         Err(mistake) => Err(CliError::from(mistake)),
     };

@@ -117,11 +117,25 @@ pub fn traversal_help() -> String {
 /// Returns the help text of `--traversal` with all words explained.
 pub fn traversal_long_help() -> String {
     let auto = format!(
-        "- auto: {}, with --cpu {}, or what a measurement on this GPU and scene has found to be quicker",
-        traversals_of_devices(),
+        "- auto: {} on GPUs, {} on software drivers, {} with --cpu, or what a measurement on this GPU and scene has \
+         found to be quicker",
+        Traversal::OF_GPUS,
+        Traversal::OF_SOFTWARE_DRIVERS,
         Traversal::OF_CPU
     );
     listed(TRAVERSAL, "auto", &format!("{}\n{auto}", Traversal::descriptions()))
+}
+
+/// Returns the help text of `--traversal` of a benchmark, which measures the default of the device.
+pub fn fixed_traversal_help() -> String {
+    let default = format!("{}, with --cpu {}", traversals_of_devices(), Traversal::OF_CPU);
+    with_words(TRAVERSAL, Some(&default), &Traversal::words())
+}
+
+/// Returns the help text of `--traversal` of a benchmark with all words explained.
+pub fn fixed_traversal_long_help() -> String {
+    let default = format!("{}, with --cpu {}", traversals_of_devices(), Traversal::OF_CPU);
+    listed(TRAVERSAL, &default, &Traversal::descriptions())
 }
 
 /// Returns the help text of `--build`.

@@ -42,8 +42,8 @@ pub struct Report {
     pub grid_build: Option<DeviceBuild>,
     pub load_ms: f64,
     pub build_ms: f64,
-    /// Time from the finished acceleration structure to the pictures in memory, with uploading, compiling and copying
-    /// back.
+    /// Time from the choice of traversal and primary visibility to the pictures in memory, with uploading, compiling
+    /// and copying back. The choice itself, which may include a measurement, and the writing of files do not count.
     pub render_ms: f64,
     /// Times of all frames that were drawn; none for a single frame.
     pub repeated: Option<FrameTimeRange>,

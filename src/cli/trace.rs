@@ -93,9 +93,9 @@ pub fn trace_json(origin: Instant, spans: &[Span], frame: &Profile) -> Vec<u8> {
     json
 }
 
-/// Returns nested slices: the frame, its batches if there are several, the bounces of each batch, its shadow and
-/// shading passes (one slice `light`, for all bounces), and the single passes. `begun_at` is in nanoseconds since
-/// time 0.
+/// Returns nested slices: the frame, its batches if there are several, and in each batch its bounces and a slice
+/// `light`, which holds the shadow and shading passes of all bounces. The innermost slices are the single passes.
+/// `begun_at` is in nanoseconds since time 0.
 fn frame_slices(frame: &Profile, begun_at: u64) -> Vec<Event> {
     let mut slices = Vec::new();
     let mut add = |name: String, passes: &[&PassTime], args| {

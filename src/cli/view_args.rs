@@ -49,7 +49,8 @@ pub struct ViewArgs {
     /// Number of CPU threads for loading and building, 1 to 1024 [default: one per processor]
     #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
-    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: a
+    /// discrete GPU, else an integrated one, else a software driver]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
     /// Run under the Khronos validation layer, and fail if it reports anything

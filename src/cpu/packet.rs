@@ -100,7 +100,7 @@ fn inverse<S: Simd>(direction: f32x16<S>) -> f32x16<S> {
     1.0 / direction.abs().simd_lt(tiny).select(tiny, direction)
 }
 
-/// Returns `a * b + c` for each axis. Product and sum are rounded separately, as without fused multiply-add.
+/// Returns `a * b + c` for each axis. Product and sum are rounded separately: there is no fused multiply-add.
 #[inline(always)]
 fn times_plus<S: Simd, A: std::ops::Mul<f32x16<S>, Output = f32x16<S>>>(
     [ax, ay, az]: [A; 3],

@@ -22,7 +22,7 @@ use crate::{
     },
 };
 
-/// Traverses packets on one thread, whose working memory it owns.
+/// Traverses packets on one thread, and owns the working memory for that.
 pub struct PacketTraverser {
     level: Level,
     /// The stack for rays that are traced outside a packet.
@@ -96,7 +96,8 @@ impl PacketTraverser {
         }
     }
 
-    /// Returns the next pending cell in which a ray may have a hit nearer than its best one, or none.
+    /// Returns the next pending subtree whose cell a ray enters no farther than its best hit, with the t intervals
+    /// cut off at the best hits. Returns none if there is no such subtree.
     #[inline(always)]
     fn pop<S: Simd>(&mut self, t_best: f32x16<S>) -> Option<(u32, PacketIntervals<S>)> {
         while self.size > 0 {

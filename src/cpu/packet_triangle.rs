@@ -151,7 +151,8 @@ fn product_error<S: Simd>(a: f32x16<S>, b: f32x16<S>) -> f32x16<S> {
 }
 
 /// Returns the edge functions, each with a relative error of at most 2^-23: see the proof in
-/// `reference/triangle.rs`.
+/// `reference/triangle.rs`. If their sum is so small that the errors of the products may have underflowed, takes the
+/// edge functions of `with_exact_signs` instead.
 #[inline(always)]
 fn exact_edges<S: Simd>(edges: [f32x16<S>; 3], errors: [f32x16<S>; 3]) -> [f32x16<S>; 3] {
     let exact = [edges[0] + errors[0], edges[1] + errors[1], edges[2] + errors[2]];

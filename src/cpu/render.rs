@@ -46,8 +46,8 @@ pub struct Renderer {
     batching: Batching,
     links: TraversalLinks,
     frame: Frame,
-    /// The visibility buffer, `width * height` pixels of the window, rows from the top. The buffers `pixel_*` have
-    /// the same layout.
+    /// The visibility buffer: `width * height` pixels, rows from the top, of the window, which is the crop with the
+    /// border that the noise filter reads. The buffers `pixel_*` have the same layout.
     triangle_ids: Vec<u32>,
     /// Radiances of the current sample; after the pass `accumulate`, the means of all samples.
     pixel_radiance: Vec<[f32; 4]>,
@@ -313,6 +313,7 @@ impl Renderer {
 
     /// Traces the shadow rays of all bounces, and counts them.
     fn shadow(&mut self) {
+        // The reference takes `queue_capacity` as the stride between two lights in `light_visibility`.
         self.frame.queue_capacity = self.queue.rays.len() as u32;
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let Queue { rays, bounces, hits, light_visibility, .. } = &mut self.queue;

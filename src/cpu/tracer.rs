@@ -1,5 +1,5 @@
-//! The tracer of the CPU engine. With [`Traversal::Stack`], rays of one octant go through a kd-tree as packets. With
-//! any other algorithm, or through a grid, rays are traced one after the other.
+//! The tracer of the CPU engine. With [`Traversal::Stack`], rays of one octant (directions of the same signs) go
+//! through a kd-tree as packets. With any other algorithm, or through a grid, rays are traced one after the other.
 
 use fearless_simd::Level;
 

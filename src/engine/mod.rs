@@ -1,5 +1,5 @@
 //! The engine renders pictures and casts rays, on a Vulkan device or on the CPU. It opens the device, and chooses the
-//! acceleration structure, the traversal and the primary visibility where the user leaves them open.
+//! kd-tree, the traversal and the primary visibility where the user leaves them open.
 //!
 //! ```text
 //! Scene ─> Engine::build ─> World ─> Engine::render ─> Picture
@@ -88,13 +88,14 @@ impl Engine {
         }
     }
 
-    /// Chooses the acceleration structure for `n_triangles` triangles. Among kd-trees it takes the one with which
-    /// building and the workload take the least time together.
+    /// Returns the requested kind of acceleration structure for `n_triangles` triangles. For a kd-tree whose
+    /// [`BuildPolicy`](choices::BuildPolicy) is `Auto`, chooses the tree with which building and the workload are
+    /// estimated to take the least time together.
     pub fn choose_accel(&self, n_triangles: usize, workload: &Workload) -> ChosenAccel {
         self.request.choose_accel(self.processor(), n_triangles, workload)
     }
 
-    /// Chooses an acceleration structure for the workload and builds it on the current rayon pool.
+    /// Builds the acceleration structure that [`Engine::choose_accel`] returns, on the current rayon pool.
     ///
     /// # Errors
     /// The scene does not fit together: see [`Mismatch`].
@@ -115,8 +116,8 @@ impl Engine {
         Ok(Built { world, accel })
     }
 
-    /// Chooses the traversal and the primary visibility. If the workload is large enough to pay for it, they are
-    /// measured briefly, and the result is kept in the user's cache folder.
+    /// Chooses the traversal and the primary visibility. On a GPU, if the workload is large enough to pay for a short
+    /// measurement, the candidates are timed, and the times are kept in the user's cache folder.
     ///
     /// # Errors
     /// The device is lost.

@@ -20,7 +20,8 @@ pub enum Aov {
     Material,
     /// Number of the pixel's rays: primary, secondary and shadow rays.
     Rays,
-    /// Number of reads of the acceleration structure by the pixel's rays, such as nodes and triangles of leaves.
+    /// Number of entries of the acceleration structure that the pixel's rays read, such as nodes and triangles in
+    /// leaves.
     Cost,
 }
 
@@ -32,7 +33,7 @@ named_enum!(Aov {
     Id = "id": "index of the triangle; 4294967295 where nothing is hit",
     Material = "material": "index of the material; 4294967295 where nothing is hit",
     Rays = "rays": "number of the pixel's primary, secondary and shadow rays",
-    Cost = "cost": "nodes and triangles that these rays read; also drawn as NAME.cost.png",
+    Cost = "cost": "nodes or cells, and triangles that these rays read; also drawn as NAME.cost.png",
 });
 
 /// A named channel, with a number for each pixel.

@@ -47,8 +47,8 @@ impl Bounce {
     }
 }
 
-/// Returns the base-2 logarithm n of the number of lanes of each ray, of which only the first works. `n_lanes`: the
-/// number of lanes of the device; if it is 0, each ray gets one lane.
+/// Returns the base-2 logarithm n of the number of lanes that each ray gets. Only the first of them works, and the
+/// others are idle. `n_lanes`: the number of lanes of the device; if it is 0, each ray gets one lane.
 ///
 /// Divergent rays of a subgroup wait for one another. So if a dispatch has fewer rays than the device has lanes, the
 /// rays are spread over all lanes, and fewer of them share a subgroup. n is the largest for which the device has

@@ -9,8 +9,9 @@ use crate::{
     scene::Camera,
 };
 
-/// Distance of the near plane from the eye, divided by the distance of the scene's farthest point. Nothing that can
-/// be seen is nearer than this plane. Reverse-Z in floating point loses no precision if the plane is so near.
+/// Distance of the near plane from the eye, divided by the distance of the farthest corner of the scene's box. The
+/// camera is assumed to see nothing nearer than this plane, since the graphics pipeline clips it. Reverse-Z in
+/// floating point loses no precision if the plane is so near.
 const NEAR_SHARE: f64 = 1.0 / (1 << 20) as f64;
 
 impl Frame {

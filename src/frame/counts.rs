@@ -30,7 +30,8 @@ pub(crate) fn count_rays(pass: &mut PassTime, bounces: &[BounceStats]) {
     };
 }
 
-/// Returns the counts in a device's buffers `bounces` and `counters`, one row for each bounce of each batch.
+/// Returns the counts of a device's frame, one row for each bounce of each batch. `bounces`: the contents of the
+/// buffer. `counters`: the sums that [`Resources::counters`](crate::buffers::Resources::counters) returns.
 pub(crate) fn device_counts(bounces: &[Bounce], counters: &[Counters]) -> Vec<BounceStats> {
     let row = |(bounce, counters): (&Bounce, &Counters)| BounceStats {
         n_rays: bounce.n_rays.into(),

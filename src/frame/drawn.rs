@@ -6,7 +6,8 @@ use crate::layout::Feature;
 /// Results of drawing, beside the picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drawn {
-    /// What the rays of each pixel hit and cost in the first sample; empty unless the options ask for features.
+    /// What the primary ray of each pixel hits in the first sample, and what all rays of that sample cost. Empty
+    /// unless the options ask for features.
     pub features: Vec<Feature>,
     /// Times and counts of all samples of all bands.
     pub profile: Profile,

@@ -60,7 +60,7 @@ pub struct RenderOptions {
     pub primary: Primary,
     /// Whether the device measures times and counts rays. If not, its frames have empty profiles.
     pub profile: bool,
-    /// Whether the features of each pixel are written: what its rays hit and cost.
+    /// Whether the features of each pixel are written: what its primary ray hits, and what all its rays cost.
     pub features: bool,
 }
 
@@ -164,7 +164,7 @@ named_enum!(Tonemap {
     Aces = "aces": "the ACES curve of films: more contrast",
 });
 named_enum!(Primary {
-    Raster = "raster": "the device's graphics pipeline rasterizes the triangles",
+    Raster = "raster": "the device's graphics pipeline rasterizes the triangles; best if they are fewer than pixels",
     SoftwareRaster = "software-raster": "compute kernels rasterize them, with 64-bit atomics; with --cpu as raster",
     Trace = "trace": "rays are traced through the acceleration structure",
 } renamed { "compute" => "software-raster" });

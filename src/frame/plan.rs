@@ -1,6 +1,7 @@
 //! The plan of a frame: the order of its passes and every barrier between them. GPU and CPU follow it.
 //!
-//! A section is a sequence of passes and barriers; the GPU records each section in one or two command buffers.
+//! A section is a sequence of passes and barriers. The renderer records a section once for each time that it runs, in
+//! one or two command buffers.
 
 use super::{
     pass::Pass,
@@ -56,7 +57,8 @@ pub struct FrameKind {
     pub n_bounces: u32,
     /// Whether the features of each pixel are written: what it shows.
     pub features: bool,
-    /// Whether hits are lit. They are not if a frame finds only the hits of primary rays.
+    /// Whether hits are lit. They are not if the frame displays a feature, such as depth, that depends on the hits of
+    /// primary rays only.
     pub is_lit: bool,
     /// Whether the scene has lights that cast shadows.
     pub has_lights: bool,
@@ -69,8 +71,8 @@ pub struct FrameKind {
 }
 
 impl FrameKind {
-    /// Returns the kind of a frame with all the passes that frames of these options can have: the frame is lit, and
-    /// its sample is added to earlier ones. It displays the picture, by as many passes as would display a feature.
+    /// Returns the kind of a frame with the most passes that frames of these options can have: the frame is lit, and
+    /// its sample is added to earlier ones. It displays the picture. To display a feature takes no more passes.
     pub fn new(options: &RenderOptions, n_lights: u32) -> Self {
         Self {
             primary: options.primary,
@@ -129,7 +131,7 @@ pub fn passes(section: &[Step]) -> impl Iterator<Item = Pass> {
     })
 }
 
-/// Finds by rasterization which triangle each pixel shows. The section is empty if primary rays are traced.
+/// Returns the section that rasterizes the triangle of each pixel. It is empty if primary rays are traced.
 pub fn visibility(primary: Primary) -> Section {
     match primary {
         Primary::Trace => Section::new(),
@@ -144,7 +146,8 @@ pub fn visibility(primary: Primary) -> Section {
     }
 }
 
-/// Finds the closest hits of one bounce's rays and, from these, makes the next bounce's rays.
+/// Returns the section that finds the closest hits of one bounce's rays and, from these, makes the next bounce's
+/// rays.
 fn bounce(kind: &FrameKind, depth: u32) -> Section {
     let mut bounce = closest_hits(kind, depth);
     if depth == 0 && kind.features {
@@ -156,8 +159,8 @@ fn bounce(kind: &FrameKind, depth: u32) -> Section {
     bounce
 }
 
-/// Finds the closest hits of one bounce's rays. Primary rays are intersected with the rasterized triangles if the
-/// frame rasterizes them; all other rays are traced through the acceleration structure.
+/// Returns the steps that find the closest hits of one bounce's rays. If the frame rasterizes triangles, primary rays
+/// are intersected with these. All other rays are traced through the acceleration structure.
 fn closest_hits(kind: &FrameKind, depth: u32) -> Section {
     let is_rasterized = depth == 0 && kind.primary != Primary::Trace;
     vec![
@@ -166,8 +169,8 @@ fn closest_hits(kind: &FrameKind, depth: u32) -> Section {
     ]
 }
 
-/// Compaction (the paper's section 2.1): writes the rays that go on from the hits to the ray queue, without gaps, by
-/// a prefix sum.
+/// Returns the steps of compaction (the paper's section 2.1), which writes the rays that go on from the hits to the
+/// ray queue, without gaps, by a prefix sum.
 pub fn next_rays() -> Section {
     vec![
         Step::Run(Pass::CompactReduce),
@@ -181,8 +184,9 @@ pub fn next_rays() -> Section {
     ]
 }
 
-/// Lights the hits of all bounces, and adds up the light in the pixels. A dispatch lasts as long as its longest ray:
-/// one dispatch for the shadow rays of all bounces waits for such a ray once, not once a bounce.
+/// Returns the section that lights the hits of all bounces, and adds up the light in the pixels. A dispatch lasts as
+/// long as its longest ray: one dispatch for the shadow rays of all bounces waits for such a ray once, not once a
+/// bounce.
 fn light(has_lights: bool) -> Section {
     let mut light = Section::new();
     if has_lights {
@@ -193,13 +197,15 @@ fn light(has_lights: bool) -> Section {
         Step::Run(Pass::Shade),
         barrier(Touch::Write, Touch::Update, &[RayRadiance, Counters]),
         Step::Run(Pass::Resolve),
-        // This barrier also protects the ray queue, which the next batch overwrites.
+        // The next batch overwrites the ray queue. This barrier makes it wait until the passes of this batch have
+        // read the queue.
         barrier(Touch::Write, Touch::Update, &[PixelRadiance]),
     ]);
     light
 }
 
-/// Turns the frame's sample into the mean of all samples.
+/// Returns the steps that turn the frame's sample into the mean of all samples. There are none for a picture's first
+/// sample and for a frame that is not lit.
 fn samples(kind: &FrameKind) -> Section {
     if !kind.is_lit || !kind.adds_samples {
         return Section::new();
@@ -207,7 +213,7 @@ fn samples(kind: &FrameKind) -> Section {
     vec![Step::Run(Pass::Accumulate), barrier(Touch::Write, Touch::Read, &[PixelAccumulated, PixelRadiance])]
 }
 
-/// Turns the mean of all samples into the displayed picture, or displays a feature in its place.
+/// Returns the steps that turn the mean of all samples into the displayed picture, or display a feature in its place.
 pub fn display(kind: &FrameKind) -> Section {
     let mut display = Section::new();
     if kind.is_lit && kind.denoises {

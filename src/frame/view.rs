@@ -13,7 +13,7 @@ pub enum View {
     Normal,
     /// The triangle of the first hit: a colour for each index.
     Id,
-    /// Number of reads of the acceleration structure by all rays of the pixel.
+    /// Number of entries of the acceleration structure that all rays of the pixel read.
     Cost,
     /// Number of the pixel's rays: primary, secondary and shadow rays.
     Rays,

@@ -27,7 +27,7 @@ pub enum BufferUse {
     /// Storage that kernels may fetch as texels. The size of the elements decides whether a texel has four words, two
     /// or one. The buffer may be larger than what can be bound.
     Texels,
-    /// As `Texels`, and kernels may read the buffer by its address.
+    /// Storage as for `Texels`, which kernels may also read by its address.
     Address,
     /// Data that the driver's own ray tracing reads and writes by address.
     Structure,

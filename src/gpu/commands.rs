@@ -30,7 +30,8 @@ pub struct Commands<'a> {
 #[derive(Clone, Copy)]
 pub enum Dispatch<'a> {
     /// Numbers of invocations along x, y and z, and the workgroup's size along x, y and z. The dispatch rounds the
-    /// numbers up to whole workgroups.
+    /// numbers up to whole workgroups. With the size `[1, 1, 1]`, the numbers are those of workgroups, whatever size
+    /// the kernel declares.
     Threads([u32; 3], [u32; 3]),
     /// A buffer and the byte offset at which it holds the numbers of workgroups along x, y and z.
     Indirect(&'a AnyBuffer, u64),
@@ -264,7 +265,8 @@ impl Commands<'_> {
         }
     }
 
-    /// Makes everything that `source` did before visible to `destination` after.
+    /// Makes later accesses of the kind `destination` wait for earlier ones of the kind `source`, and see what these
+    /// wrote. The barrier is not limited to a buffer.
     pub fn barrier(&self, source: Access, destination: Access) {
         let barrier = [vk::MemoryBarrier2::default()
             .src_stage_mask(source.stages())

@@ -329,6 +329,9 @@ impl Context {
     }
 
     /// Records commands, submits them and waits for their end. Uploads, downloads, probes and tests use it.
+    ///
+    /// # Errors
+    /// Out of memory; a call fails.
     pub fn run(self: &Arc<Self>, name: &str, record: impl FnOnce(&Commands)) -> Result<(), GpuError> {
         let buffer = CommandBuffer::record(self, name, None, record)?;
         self.submit(&[&buffer])?;

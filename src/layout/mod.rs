@@ -1,4 +1,5 @@
-//! The structs, constants and bindings that the kernels share with the host, generated from `glsl/shared/layout.glsl`.
+//! The structs, constants and bindings that the kernels share with the host. build.rs generates them from
+//! `glsl/shared/layout.glsl`, `glsl/shared/scene_arrays.glsl` and the shaders' specialization constants.
 
 pub mod normal;
 #[cfg(test)]

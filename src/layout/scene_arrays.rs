@@ -8,7 +8,8 @@ use std::fmt::Write;
 pub struct Row {
     /// The comment above the row, without `//`, line by line.
     pub doc: Vec<String>,
-    /// The array's name in GLSL, in Rust, as debug label and as allocation.
+    /// The array's name in GLSL and in Rust. It is also the debug label of the array's buffer and the name of the
+    /// buffer's allocation.
     pub name: String,
     /// The type of an element: `uint`, or a struct of layout.glsl.
     pub element: String,

@@ -1,5 +1,5 @@
-//! Cast: finds the closest hit, or any hit, of each ray of an array, through the acceleration structure. It is no
-//! pass of a frame.
+//! Cast: finds the closest hit, or any hit, of each ray of an array, through the acceleration structure. It is not
+//! a pass of a frame.
 
 use std::sync::Arc;
 
@@ -15,7 +15,8 @@ use crate::{
 /// The pipeline of the pass.
 pub struct Cast {
     kernel: ComputePipeline,
-    /// Lanes of the device, which are shared among the rays; 0: each ray gets one lane.
+    /// Number of lanes of the device, over which the rays are spread ([`lanes_log2`]). If it is 0, each ray gets one
+    /// lane.
     n_lanes: u32,
 }
 

@@ -10,7 +10,7 @@
 //!   barrier has made them visible.
 //! - "Leaves `c`." The dispatch writes this buffer. It is complete when the dispatch has ended, and a barrier must
 //!   make it visible before the next dispatch reads it.
-//! - "Updates `d`." The dispatch does both in place.
+//! - "Updates `d`." The dispatch reads this buffer and writes it in place. It both needs and leaves the buffer.
 //!
 //! The names are those of the buffers in the kernels, which are fields of [`Resources`](crate::buffers::Resources)
 //! and its parts. Not mentioned are the scene's arrays, which no pass writes, and `bounces` where it only gives a

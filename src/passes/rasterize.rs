@@ -13,7 +13,8 @@ use crate::{
     layout::{Frame, RASTER_GROUPS_X, RAY_GROUP_SIZE, RasterGroups, RasterPush, constants},
 };
 
-/// The smallest blocks have 32 x 32 pixels. A workgroup of 64 invocations tests such a block in 16 steps.
+/// Log2 of the side of the smallest blocks, which have 32 x 32 pixels. A workgroup of 64 invocations tests such a
+/// block in 16 steps.
 const SMALLEST_BLOCK_LOG2: u32 = 5;
 
 /// The two pipelines of the pass.
@@ -37,8 +38,8 @@ impl Rasterize {
         })
     }
 
-    /// Records the transfer by which `raster_groups` has no large triangles and no blocks, as
-    /// [`Rasterize::triangles`] needs it.
+    /// Records the transfer that sets the numbers of large triangles and of their blocks in `raster_groups` to 0, as
+    /// [`Rasterize::triangles`] needs them.
     pub fn reset(commands: &Commands, resources: &Resources) {
         let groups = RasterGroups { x: RASTER_GROUPS_X, y: 0, z: 1, reserved: 0 };
         commands.update_buffer(resources.raster.groups.any(), &RasterState { groups, count: 0 });

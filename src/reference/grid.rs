@@ -152,8 +152,8 @@ pub fn search_grid<const ANY_HIT: bool>(inputs: &KernelInputs<impl ReadCounter>,
         }
         is_done::<ANY_HIT>(best) || best.t < t_leave
     };
-    // If the box's corners are near the largest number, the t at which the ray leaves the box may be infinite. The
-    // exits at the border are infinite, too, and must come after it, so it is clamped to the largest finite number.
+    // If the box's corners are near the largest number, the t at which the ray leaves the box may be infinite. It is
+    // clamped to the largest finite number, so that the exits at the border, which are infinite, come later.
     let way = [ray.t_enter, min(ray.t_exit, f32::MAX)];
     walk(lattice, ray, way, |place, way| {
         let cell = inputs.grid_cells[place as usize];

@@ -30,7 +30,7 @@ pub struct KernelInputs<'a, R = NoCounter> {
     pub materials: &'a [Material],
     pub lights: &'a [Light],
     pub kd_nodes: CountedSlice<'a, KdNode, R>,
-    /// The parents: one for each pair of siblings.
+    /// For each pair of siblings, the index of their parent.
     pub kd_parents: CountedSlice<'a, u32, R>,
     /// The entries of leaves or of a grid's cells. Each is an index into `triangles`. (The kernels' array
     /// of this name holds a `LeafTriangle` for each entry.)

@@ -57,8 +57,8 @@ pub trait Pending {
     fn clear(&mut self);
     /// Notes that the ray goes one level down. Only implementations that keep a bit for each level do anything.
     fn go_down(&mut self) {}
-    /// Makes the node `second_ix` pending. The ray leaves it at the cell's `t_exit`. It is the sibling of the cell's
-    /// node.
+    /// Makes the node `second_ix` pending, which is the sibling of the cell's node. The ray leaves that sibling at
+    /// the cell's `t_exit`.
     fn push(&mut self, second_ix: u32, cell: &Cell);
     /// Sets `cell` to the next pending cell that may hold a hit nearer than `t_best`, or returns false if there is
     /// none.

@@ -49,8 +49,8 @@ pub fn phong(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3)
     reflectance
 }
 
-/// Whether the surface reflects more than [`LEAST_REFLECTANCE`] of a light in the direction `to_light` towards the
-/// viewer.
+/// Whether the surface can show a light: whether it reflects towards the viewer more than [`LEAST_REFLECTANCE`], in
+/// any colour, of the light that comes from the direction `to_light`.
 pub fn can_show(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3) -> bool {
     let least = Vec3::splat(LEAST_REFLECTANCE);
     // The diffuse part alone decides most cases, without the exponentiation of the specular part.

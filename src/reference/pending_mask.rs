@@ -8,8 +8,8 @@ use super::{
 };
 use crate::layout::KD_MAX_DEPTH;
 
-/// The siblings that are still to be visited on the way to the root. Bit i is set if the sibling i levels above the
-/// cell's node is pending. This one word replaces the kernel's two.
+/// The siblings that are still to be visited on the way to the root. Bit i is set if the sibling of the node i levels
+/// above the cell's node is pending. This one word replaces the kernel's two.
 #[derive(Clone, Copy, Default)]
 pub struct Mask(u64);
 
@@ -20,13 +20,13 @@ impl Mask {
         self.0 == 0
     }
 
-    /// Returns the slot of the last pending cell.
+    /// Returns the slot of the deepest pending cell, which is the next to be visited.
     #[inline(always)]
     fn last_slot(self) -> usize {
         self.0.count_ones() as usize - 1
     }
 
-    /// Returns whether the sibling `n_levels_up` above the cell's node is pending.
+    /// Returns whether the sibling of the node `n_levels_up` above the cell's node is pending.
     #[inline(always)]
     pub fn has(self, n_levels_up: u32) -> bool {
         self.0 >> n_levels_up & 1 != 0

@@ -15,7 +15,7 @@ pub struct PendingTrail<const N: usize> {
     trail: Trail,
     /// Each entry: the pending node, and the t at which the ray leaves it.
     entries: [(u32, f32); N],
-    /// Number of the next entry, whose slot is its remainder by `N`.
+    /// Number of the next entry. An entry's slot is its number modulo `N`.
     top: usize,
     /// Number of entries that the ring holds.
     size: usize,

@@ -34,8 +34,9 @@ pub(crate) fn shadow_segment(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, li
     Some(PathRay { t_max: to_light.distance, ..segment })
 }
 
-/// Writes `light_visibility[light * queue_capacity + ray]`, one of `LIGHT_*`, for a bounce's rays. `places`: the
-/// rays' indices in the queue. Returns the number of segments that were tested.
+/// Writes `light_visibility[light * queue_capacity + ray]`, one of `LIGHT_*`, for some of the queue's rays, those at
+/// the indices `places`. `rays` and `hits` are those of the whole queue. Returns the number of shadow rays
+/// ("segments") that were tested.
 pub fn shadow(
     inputs: &KernelInputs,
     traversal: Traversal,

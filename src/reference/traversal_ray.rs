@@ -94,8 +94,8 @@ fn is_within_reach(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> 
     ray.origin.abs().max_element() <= origin_reach(inputs)
 }
 
-/// Returns the ray with its origin moved along it to within `KD_MAX_ORIGIN_DISTANCE`, and the t of the move, which is
-/// 0 unless the ray starts far away from the scene.
+/// Returns the ray, and the t by which its origin was moved. If the origin is beyond [`origin_reach`], it is moved
+/// along the ray to the structure's box. Otherwise t is 0.
 #[inline(always)]
 pub fn near_scene(inputs: &KernelInputs<impl ReadCounter>, ray: &SearchRay) -> (SearchRay, f32) {
     if is_within_reach(inputs, ray) {

@@ -1,5 +1,5 @@
-//! Draws pictures that are larger than a device can hold at once: in bands of full rows, one after the other, which
-//! the host joins.
+//! Draws pictures whose pixels take more bytes than a device can bind as one buffer: in bands of full rows, one after
+//! the other, which the host joins.
 
 use std::{
     borrow::Cow,
@@ -17,23 +17,23 @@ use crate::{
     world::World,
 };
 
-/// Renderer of whole pictures of any size. If the pixels of the picture exceed the range of a storage buffer that the
-/// device can bind, bands of full rows are drawn. The joined picture has the same bits as one that is drawn at once.
+/// Renderer of whole pictures of any size. If the widest buffer of pixels exceeds what the device can bind as one
+/// storage buffer, bands of full rows are drawn. The joined picture has the same bits as one that is drawn at once.
 pub struct BandedRenderer {
     renderer: Renderer,
     /// The bands from top to bottom. Together they are the picture, or its crop.
     bands: Vec<Crop>,
-    /// The picture that was drawn last, joined from its bands. None before there is one, and always if there is a
-    /// single band, whose picture stays on the device until it is downloaded.
+    /// The picture that was drawn last, joined from its bands. None before the first picture is complete. Always None
+    /// if there is a single band: its picture stays on the device.
     joined: Option<Picture>,
     /// Whether the next sample is expected to be slow, as the last one was. The first one is expected to be slow if
     /// the driver runs kernels on the CPU.
     is_slow: bool,
 }
 
-/// Duration above which a sample is slow. The sample after a slow one is drawn in steps, if the watcher shows them.
-/// The wait for the device after each step takes about 0.1 ms. All these waits take less than a hundredth of a slow
-/// sample, but on a fast GPU a wait takes as long as a whole step.
+/// Duration above which a sample is slow. The sample after a slow one is drawn part by part (`incremental.rs`), if
+/// the watcher sees parts. The wait for the device after each part takes about 0.1 ms. All these waits take less than
+/// a hundredth of a slow sample, but on a fast GPU a wait takes as long as a whole part.
 const SLOW_SAMPLE: Duration = Duration::from_millis(500);
 
 impl BandedRenderer {
@@ -129,7 +129,7 @@ impl BandedRenderer {
         Ok(Drawn { features, profile })
     }
 
-    /// Draws a sample, in steps if it is expected to be slow and the watcher shows them.
+    /// Draws a sample, part by part if it is expected to be slow and the watcher sees parts.
     fn draw_sample(&mut self, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
         let begin = Instant::now();
         let profile = if self.is_slow && watcher.sees_parts() {
@@ -142,6 +142,7 @@ impl BandedRenderer {
         Ok(profile)
     }
 
+    /// Draws a sample part by part, and tells the watcher after each part which share of the sample is drawn.
     fn draw_steps(&mut self, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
         loop {
             match self.renderer.draw_part()? {
@@ -172,9 +173,9 @@ fn reserve<T>(object: &'static str, elements: &mut Vec<T>, len: usize) -> Result
     elements.try_reserve_exact(len).map_err(|_| GpuError::HostMemory { object, bytes })
 }
 
-/// Returns as few bands as possible, of equal height except for the last. The device can bind the pixels of each band
-/// together with the neighbouring rows that the noise filter reads. A band has at least one row, even if that row is
-/// too long for the device.
+/// Returns as few bands as possible, of equal height except for the last. Each buffer of a band's pixels, with the
+/// neighbouring rows that the noise filter reads, is small enough for the device to bind. A band has at least one
+/// row, even if that row is too long for the device.
 fn bands(limits: &Limits, options: &RenderOptions) -> Vec<Crop> {
     let (asked, window) = (options.crop_or_whole(), options.window());
     let row_bytes = u64::from(window.width()) * Pixels::bytes_per_pixel(options);

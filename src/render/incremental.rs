@@ -1,7 +1,7 @@
 //! Draws a sample in parts, so that the caller can do something else in between.
 //!
-//! A part is a command buffer of the frame. A sample is pending while some of its parts have run and others have not.
-//! A step draws one part. (`draw_batch` draws a batch, which is several parts.)
+//! A part is a command buffer of the frame. A batch has several parts: one or two for each bounce, and for the light.
+//! A sample is pending while some of its parts have run and others have not.
 
 use std::time::Instant;
 
@@ -126,7 +126,7 @@ impl Renderer {
     }
 
     /// Limits batches to `most_pixels` pixels or, with None, only to what the queue holds. The picture does not
-    /// depend on this. A pending sample is dropped, and drawn again from its beginning.
+    /// depend on this. A pending sample is dropped. The next call that draws starts it again.
     ///
     /// # Errors
     /// Out of memory. Then nothing has changed, and a pending sample stays pending.
@@ -145,6 +145,7 @@ impl Renderer {
         self.most_pixels
     }
 
+    /// Replaces the batches by those of `spans`, and drops a pending sample.
     fn reschedule(&mut self, spans: Vec<(u32, u32)>) -> Result<(), GpuError> {
         let schedule = Schedule::new(&self.context, self.resources.constants(), spans, &self.options)?;
         let resources = self.resources.with_bounces(&self.context, schedule.n_rows())?;
@@ -229,8 +230,8 @@ impl Renderer {
     /// value that is displayed brightest; in the view of depth, the depth that is half as bright as depth 0.
     ///
     /// Returns whether the view or `brightest` has changed. A change drops a pending sample. Samples of a view that
-    /// needs primary rays only have no radiance. So the next sample is the first of a new picture if one of the old
-    /// and the new view needs primary rays only and the other needs all rays.
+    /// needs primary rays only have no radiance. So a change from such a view to one that needs all rays, or back,
+    /// also drops the complete samples: the next sample is the first of a new picture.
     pub fn set_view(&mut self, view: View, brightest: f32) -> bool {
         let false_color = view.constant().map(|view| FalseColor { view, brightest });
         let is_new = false_color != self.false_color;

@@ -153,8 +153,8 @@ impl Renderer {
     /// again. Later samples keep the smaller batches.
     ///
     /// # Errors
-    /// Fails as [`Renderer::render`] does. The next sample is then the first of a new picture. Only if the error
-    /// occurs before the sample is recorded are the earlier samples kept.
+    /// Fails as [`Renderer::render`] does. If the error occurs before the commands of the sample are completely
+    /// recorded, the earlier samples are kept. Otherwise the next sample is the first of a new picture.
     pub fn draw_sample(&mut self) -> Result<Profile, GpuError> {
         loop {
             if let Some(profile) = self.go_on(Until::End)? {
@@ -163,7 +163,8 @@ impl Renderer {
         }
     }
 
-    /// Filters and encodes the samples of the picture again, by the current options. Draws no sample.
+    /// Displays the mean of the samples again, filtered and encoded by the current options, or the feature of the
+    /// view. Draws no sample. The last sample must be complete, as for [`Renderer::picture`].
     ///
     /// # Errors
     /// A Vulkan call fails.
@@ -177,8 +178,8 @@ impl Renderer {
         Ok(())
     }
 
-    /// Downloads the picture as it was last drawn or shown. The last sample must be complete: one that is drawn in
-    /// part has overwritten some of the radiance.
+    /// Downloads the picture as it was last drawn or shown. The last sample must be complete: one that was drawn in
+    /// part, even if it has been dropped, has overwritten some of the radiance.
     ///
     /// # Errors
     /// A copy fails.
@@ -195,7 +196,7 @@ impl Renderer {
         })
     }
 
-    /// Downloads what the rays of each of the picture's pixels hit and cost in the last sample.
+    /// Downloads what the primary ray of each pixel hits in the last sample, and what all rays of that sample cost.
     ///
     /// # Panics
     /// The options do not ask for features.

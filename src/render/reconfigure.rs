@@ -62,7 +62,8 @@ impl Renderer {
 
     /// Sets the options of the next samples. Only kernels that depend on a changed option are created again. Samples
     /// are kept if only their display changes: the exposure, the tone curve or the filter's threshold.
-    /// [`Renderer::show`] then displays them by the new options. A pending sample is dropped.
+    /// [`Renderer::show`] then displays them by the new options, unless a pending sample has overwritten some of
+    /// their radiance. A pending sample is dropped.
     ///
     /// # Panics
     /// The crop exceeds the picture.
@@ -125,8 +126,8 @@ impl Renderer {
     }
 }
 
-/// Whether the samples and buffers of options `a` serve options `b`, too: they differ at most in the exposure, the
-/// tone curve and the filter's threshold.
+/// Whether the samples and buffers of options `a` serve options `b`, too. They do if the options differ at most in
+/// the exposure, the tone curve and the filter's threshold.
 fn same_samples(a: &RenderOptions, b: &RenderOptions) -> bool {
     let (denoise, tonemap) = (a.denoise, a.tonemap);
     let of_samples = |options: &RenderOptions| RenderOptions { exposure: 1.0, denoise, tonemap, ..options.clone() };

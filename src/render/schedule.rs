@@ -89,11 +89,11 @@ impl Schedule {
     }
 }
 
-/// What decides how many rays the queue has room for, and how many rays a pixel is expected to make.
+/// Settings from which the capacity of the ray queue and the sizes of the batches are computed.
 #[derive(Clone, Copy)]
 pub struct QueueSizing {
-    /// Capacity of the queue in rays, if the caller has set it. A batch then has up to as many pixels,
-    /// since one ray per pixel is expected.
+    /// Capacity of the queue in rays, if the caller has set it. A batch then has at most that number of pixels, since
+    /// one ray per pixel is expected.
     pub fixed_capacity: Option<u32>,
     /// Whether a hit can have two child rays, a reflected and a refracted one.
     pub branches: bool,
@@ -107,7 +107,7 @@ impl QueueSizing {
             return capacity;
         }
         let n_pixels = u64::from(constants.width) * u64::from(constants.height);
-        // Of the queue's buffers, `rays` or `light_visibility` is the largest.
+        // The largest buffer of the queue is `rays` or `light_visibility`.
         let bytes_per_ray = mem::size_of::<PathRay>().max(4 * constants.n_lights as usize) as u64;
         let most = (limits.storage_range / bytes_per_ray).min(u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE));
         let wanted = n_pixels * u64::from(self.rays_per_pixel(constants.max_depth));

@@ -10,8 +10,8 @@ const VERTICAL_FOV_DEGREES: f32 = 40.0;
 /// Factor on the eye's distance, which leaves a margin around the bounding sphere.
 const MARGIN: f32 = 1.05;
 
-/// Returns a camera that sees the whole bounding sphere of a bounding box, in any picture that is not higher than
-/// wide.
+/// Returns a camera that sees the whole bounding sphere of a bounding box, in any picture whose height is at most its
+/// width.
 pub(super) fn camera((min, max): (Vec3, Vec3)) -> Camera {
     let centre = (min + max) / 2.0;
     // For a small scene far from the origin, the eye's distance must exceed the rounding of its coordinates.

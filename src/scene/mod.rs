@@ -88,8 +88,8 @@ pub struct Camera {
 }
 
 impl Scene {
-    /// Loads a `.toml` or `.obj` file. Statements and files that are ignored or missing are reported as `tracing`
-    /// warnings.
+    /// Loads a `.toml` or `.obj` file. It emits `tracing` warnings for unknown OBJ statements, missing material
+    /// libraries, undefined materials, and coordinates too large for the scene's detail.
     ///
     /// # Errors
     /// The file, or one that it names, cannot be read or understood; the scene has no triangles, is too small to be

@@ -112,8 +112,8 @@ impl CameraPath {
         let (a, b) = (&self.keyframes[from], &self.keyframes[from + 1]);
         let span = b.frame - a.frame;
         let s = (frame - a.frame) / span;
-        // The weights of the Hermite basis: of the end `b`, and of both tangents. The weight of `a` is 1 -
-        // `b_weight`.
+        // The Hermite basis has a weight for each keyframe and one for each tangent. The weight of `a` is
+        // `1 - b_weight`.
         let b_weight = s * s * (3.0 - 2.0 * s);
         let (a_slope, b_slope) = (span * s * (1.0 - s) * (1.0 - s), span * s * s * (s - 1.0));
         let (a_tangent, b_tangent) = (self.tangent(from), self.tangent(from + 1));

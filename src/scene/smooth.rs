@@ -1,5 +1,6 @@
 //! Shading normals for meshes without normals. The normal at a face's corner is the angle-weighted average of the
-//! normals of the faces around that point that differ from the face's own normal by no more than a crease angle.
+//! normals of the faces that meet there. Only faces count whose normals differ from the face's own normal by at most
+//! the crease angle.
 //!
 //! The weights follow Thürmer and Wüthrich, "Computing Vertex Normals from Polygonal Facets" (JGT 1998).
 

@@ -45,7 +45,7 @@ impl Session {
     }
 
     /// Saves the displayed picture if a save is due, and if the picture has the window's size and the current camera.
-    /// Until then drawing goes on, and the window stays responsive.
+    /// Otherwise the save stays due, while drawing goes on and the window stays responsive.
     pub fn save_if_due(&mut self, gpu: &GpuSession, window: (u32, u32)) {
         let is_whole = |displayed: Displayed| displayed.size == window && displayed.camera == *self.controller.camera();
         if gpu.renderer.displayed().is_some_and(is_whole) {

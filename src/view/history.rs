@@ -21,8 +21,8 @@ pub struct FrameRecord {
     pub pass_ms: Vec<(&'static str, f64)>,
 }
 
-/// Number of the newest samples that are kept beyond the history's least length. Samples older than [`TOO_LONG_S`]
-/// are dropped all the same.
+/// The history reaches back to the beginning of this number of the newest samples, even if that is longer ago than
+/// its least length. It is never longer than [`TOO_LONG_S`]. A sample is a frame with times of passes.
 const N_SLOW_SAMPLES: usize = 3;
 /// Longest history in seconds, unless its least length is longer.
 const TOO_LONG_S: f64 = 60.0;
@@ -42,7 +42,8 @@ impl FrameRecord {
 }
 
 impl History {
-    /// Creates an empty history that keeps the frames of the last `shortest_s` seconds and the newest samples.
+    /// Creates an empty history that keeps the frames of the last `shortest_s` seconds, and more if the newest
+    /// samples take longer.
     pub fn new(shortest_s: f64) -> Self {
         Self { frames: VecDeque::new(), shortest_s }
     }
@@ -62,7 +63,7 @@ impl History {
         self.frames.iter()
     }
 
-    /// Returns the length of the history in seconds, which ends when the newest frame was shown.
+    /// Returns the length in seconds of the time span whose frames are kept. It ends when the newest frame was shown.
     pub fn length_s(&self) -> f64 {
         let Some(newest) = self.frames.back() else { return self.shortest_s };
         let samples = self.frames.iter().rev().filter(|frame| !frame.pass_ms.is_empty()).take(N_SLOW_SAMPLES);

@@ -18,7 +18,7 @@ const WHEEL_STEP_PX: f64 = 50.0;
 /// Action that is done once for each key press or click.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Action {
-    /// Saves the picture once it is drawn in full.
+    /// Saves the picture once it is displayed at the window's size.
     Save,
     /// Prints the camera in the format of scene files.
     PrintCamera,

@@ -27,7 +27,7 @@ pub struct Picked {
     pub pixel: UVec2,
     /// The rays that were followed, the primary ray first.
     pub rays: Vec<PickedRay>,
-    /// Number of rays that were left out.
+    /// Number of rays that were left out. Their own child rays are not counted.
     pub n_more: usize,
 }
 

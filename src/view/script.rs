@@ -51,8 +51,8 @@ impl Script {
         self.is_last() || self.record.is_some()
     }
 
-    /// Is called after a frame was shown. If the frame has all samples that it gets, writes its picture and goes on
-    /// to the next frame. Returns true after the last frame.
+    /// Handles that a picture of the current frame was shown. Once the frame has all samples that it gets, writes its
+    /// picture and goes on to the next frame. Returns true after the last frame.
     ///
     /// # Errors
     /// A picture cannot be written.

@@ -47,7 +47,8 @@ pub struct Session {
     /// Budget of views that need all rays, then of views that need primary rays only.
     budgets: [Budget; 2],
     profile: Profile,
-    /// Whether a user moves the camera. A script, in contrast, needs pictures of full size.
+    /// Whether a user moves the camera. Then a new picture is first drawn small, so that it is shown at once. With a
+    /// script, only frames in which the camera moves are drawn small: see `Script::direct`.
     is_interactive: bool,
     /// Whether the last frame was drawn while the camera moved.
     is_moving: bool,
@@ -60,7 +61,8 @@ pub struct Session {
     /// Time spent so far on the sample that is being drawn, milliseconds.
     sample_ms: f64,
     pub(super) picked: Option<Picked>,
-    /// Whether the user has asked to save the picture, which happens once it is drawn in full.
+    /// Whether the user has asked to save the picture. It is saved once a picture of the window's size is displayed,
+    /// even if further samples are to come.
     pub(super) is_save_due: bool,
     /// Prints text to the terminal.
     pub(super) print: fn(&str),
@@ -254,7 +256,7 @@ impl Session {
         Ok(())
     }
 
-    /// Notes that the frame was handed to the screen. `picture` is the size of its picture in pixels.
+    /// Records the times of a frame that was handed to the screen. `picture` is the size of its picture in pixels.
     pub fn shown(&mut self, picture: (u32, u32)) {
         let now = Instant::now();
         let times = self.pace.shown(now);

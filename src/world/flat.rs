@@ -42,7 +42,8 @@ impl FlatScene {
     /// Places all meshes of a scene in the world, on the current rayon pool.
     ///
     /// # Errors
-    /// An index names nothing, arrays have different lengths, or a vertex is too far from the origin.
+    /// An index names nothing, arrays have different lengths, an instance with faces has no material, or a vertex is
+    /// too far from the origin.
     pub fn new(scene: &Scene) -> Result<Self, Mismatch> {
         let mut triangles = Vec::with_capacity(scene.n_triangles());
         let mut triangle_materials = Vec::with_capacity(triangles.capacity());

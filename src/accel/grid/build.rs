@@ -71,7 +71,7 @@ impl Grid {
     }
 }
 
-/// Returns the lattice, the cells and the pairs of a uniform grid, or of the upper level of two.
+/// Returns the lattice, the cells and the pairs of a uniform grid, or of the upper level of a two-level grid.
 fn upper_level(input: &Input, bounds: &Bounds, density: f32) -> (Lattice, Level) {
     let n_finite = input.triangles.par_iter().filter(|triangle| is_finite(triangle)).count();
     let mut lattice = Lattice::of_density(bounds, (density * n_finite as f32) as u32);
@@ -138,8 +138,8 @@ fn blocks_of(n_upper: u32, resolution: impl Fn(usize) -> u32) -> (Vec<GridCell>,
     ((0..n_upper as usize).map(block).collect(), n_lower)
 }
 
-/// Returns the largest number of cells along each axis with which a block has no more than `max_cells` cells, and
-/// none smaller than the margin.
+/// Returns the largest number of cells along each axis, 1 to `GRID_MAX_BLOCK_RESOLUTION`, with which a block has no
+/// more than `max_cells` cells, and none smaller than the margin. Returns 1 if every larger number is too large.
 fn finest_resolution(input: &Input, upper: &Lattice, max_cells: f32) -> u32 {
     let fits = |r: u32| (r * r * r) as f32 <= max_cells && upper.cell_size_within(r) >= input.margin;
     (2..=GRID_MAX_BLOCK_RESOLUTION).take_while(|&r| fits(r)).last().unwrap_or(1)

@@ -26,8 +26,8 @@ impl Lattice {
     /// smaller than the margin of the box.
     pub fn of_density(bounds: &Bounds, max_cells: u32) -> Self {
         let margin = bounds.margin();
-        // The bits of positive floats, as integers, have the same order as the floats. The search fixes the highest
-        // bits first. Cubes of the size whose bits are `bits` are too small at every step.
+        // The bits of positive floats, as integers, have the same order as the floats. The search finds the bits of
+        // the largest size that is too small, the highest bit first. At every step, `bits` are those of such a size.
         let mut bits = 0;
         for bit in (0..31).rev() {
             let next = f32::from_bits(bits | (1 << bit));
@@ -90,8 +90,8 @@ impl Lattice {
         if self.max[axis] < at { self.max[axis] } else { at }
     }
 
-    /// Returns an estimate of the index on an axis of the cubes that contain a coordinate. It may be off, since
-    /// quotients on a device are not exact.
+    /// Estimates the index on an axis of the cubes in which a coordinate is. The estimate may be off, since devices
+    /// round quotients differently. A coordinate outside the box gets the first or the last index.
     #[inline(always)]
     pub fn index_near(&self, axis: usize, at: f32) -> u32 {
         // A negative number and a NaN are cast to 0.
@@ -140,7 +140,7 @@ impl Lattice {
         }
     }
 
-    /// Returns the edge's length of the cubes into which a cube is cut, world units.
+    /// Returns the edge length of the smaller cubes into which `within` cuts a cube, world units.
     ///
     /// 1 / resolution is rounded up to a multiple of 2^-16 by integer arithmetic, since the last bit of a quotient of
     /// floats is not the same on every device. So the last cube along each axis is up to 2 % smaller than the others.

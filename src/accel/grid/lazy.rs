@@ -43,7 +43,7 @@ pub struct BuildStage {
 }
 
 impl LazyGrid {
-    /// Makes a grid that is not built yet over these triangles.
+    /// Keeps the options of a grid over these triangles. The grid itself is not built.
     pub fn new(triangles: &[Triangle], options: GridOptions) -> Self {
         let bounds = Bounds::of_all(triangles);
         let Bounds { min, max } = bounds.grown(bounds.margin());

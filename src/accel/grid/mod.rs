@@ -140,7 +140,7 @@ impl Grid {
         &self.cells
     }
 
-    /// The indices of the triangles, cell after cell, ascending in each cell.
+    /// The indices of the triangles in the cells of the lowest level, cell after cell, ascending in each cell.
     pub fn leaf_triangles(&self) -> &[u32] {
         &self.leaf_triangles
     }

@@ -12,10 +12,10 @@ use crate::{accel::bounds::Bounds, layout::Triangle};
 /// inside the cube. The traversal needs the margin itself (bounds.rs). The additional sixteenth is 8 units of 2^-24
 /// times the largest coordinate. The rounding of the cubes' middles and half edges takes 4 of these.
 const MARGIN_FACTOR: f32 = 1.0625;
-/// Error of a rounded product of two vectors, as a multiple of the product of their sums of magnitudes: 16 units of
-/// 2^-24. For a normal the error is 4 units: the rounding of each of the two edges takes 1 unit, that of a product of
-/// two components 1, and that of the difference of two products 1. The product of a normal with a third vector adds
-/// 4.
+/// Bound of the rounding error of a cross product, and of the dot product of a cross product and a third vector. It
+/// is a multiple of the product of all factors' sums of magnitudes: 16 units of 2^-24. The cross product of two edges
+/// is off by 4 units: the rounding of each edge takes 1 unit, that of a product of two components 1, and that of the
+/// difference of two products 1. The dot product adds 4.
 const PRODUCT_ERROR: f32 = 1.0 / (1 << 20) as f32;
 
 /// A triangle and the columns of its box. The axes are permuted so that columns extend along the last one.
@@ -121,6 +121,7 @@ impl Columns {
         let way = [middle[0] - self.corners[0][0], middle[1] - self.corners[0][1]];
         let extent = self.lattice.plane(2, last + 1) - self.lattice.plane(2, first);
         let error = self.normal_error * (way[0].abs() + way[1].abs() + extent + self.half) * slope;
+        // If the error is too large or NaN, the whole column is returned.
         if !(error < 0.25 * self.lattice.cell_size) {
             return [first, last];
         }

@@ -1,21 +1,22 @@
 //! Planes of the cells' triangles. Where a ray keeps clear of a triangle's plane, the triangle need not be tested
-//! (kdtree/planes.rs). Only arithmetic that is exact on every device is used.
+//! (kdtree/planes.rs). Only arithmetic that rounds in the same way on every device is used.
 
 use crate::layout::{Plane, Triangle};
 
-/// The largest error of the heights of a triangle's points above its plane that comes from the rounding of the
-/// normal, in units of 2^-24 times the largest coordinate. It includes a factor of two to spare, so the error itself
-/// is at most 8 units. The plane's distance is off by 4 units more, so a height is off by 8 + 4 = 12 units. The
-/// planes of a kd-tree are off by 4 units, and their proof (kdtree/planes.rs) leaves 21 of the 256 units of
-/// `KD_PLANE_EPSILON` unused. So the additional 8 units of a grid's planes are covered.
+/// Limit of the error that the rounding of the normal causes in heights above the triangle's plane. The limit is in
+/// units of 2^-24 times the largest coordinate times the normal's longest component. Scaling makes that component
+/// less than 1/2, so heights are off by at most 8 units of 2^-24 times the largest coordinate. The rounding of the
+/// plane's distance adds 4 units, which makes 12. The planes of a kd-tree are off by 4 units, and their proof
+/// (kdtree/planes.rs) leaves 21 of the 256 units of `KD_PLANE_EPSILON` unused. So the additional 8 units of a grid's
+/// planes are covered.
 const MAX_ERROR: f32 = 16.0;
 
-/// Returns the plane of a triangle, or a plane with a normal of 0 if rounding may put the plane too far off. No ray is
-/// clear of a plane with such a normal.
+/// Returns the plane of a triangle, or a plane with a normal of 0 if rounding may put the plane too far off. No ray
+/// is clear of a plane with such a normal.
 ///
-/// The normal is scaled by a power of two and not by its length, since a square root is not exact on a device. Its
-/// longest component is in [1/4, 1/2). So its length is below 1, and a height above the plane is less than the true
-/// one.
+/// The normal is scaled by a power of two and not by its length, since devices round square roots differently. The
+/// longest component of the scaled normal is in `[1/4, 1/2)`. So its length is below 1, and a height above the plane
+/// is less than the true one.
 pub fn plane_of(triangle: &Triangle, largest_coordinate: f32) -> Plane {
     let a = triangle.v1 - triangle.v0;
     let b = triangle.v2 - triangle.v0;

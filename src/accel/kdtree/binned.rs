@@ -157,6 +157,7 @@ impl BinnedSearch {
                 let (n_below, n_above) = (below[bin] as f32, above[bin + 1] as f32);
                 let from = (bin as f32 - 0.5).max(0.0) * per_bin;
                 let to = ((bin as f32 + 0.5) * per_bin).min(1.0);
+                // A bin with a begin or an end changes a sum.
                 let has_ends = below[bin + 1] > below[bin] || above[bin + 1] < above[bin];
                 let flag = has_ends && child_areas.lower_bound(from, to, n_below, n_above) * ROUNDING <= limit;
                 self.flags[axis][bin] = flag;

@@ -15,9 +15,9 @@ pub struct Polygon {
     len: usize,
 }
 
-/// Returns the bounds of the parts of `triangle` below and above a plane through the cell, grown by the margin. The
-/// triangle is first clipped to the cell, grown by the margin. Each part reaches beyond the plane by the margin. The
-/// bounds are none if the part is empty. `plane`: the axis and the coordinate of the plane, world units.
+/// Clips `triangle` to a cell and cuts it at a plane through the cell. Returns the bounds of the parts below and
+/// above the plane, or none for an empty part. A part reaches up to the margin outside the cell and beyond the plane.
+/// Its bounds are then grown by the margin once more. `plane`: the axis and the coordinate of the plane, world units.
 pub fn split_bounds(triangle: &Triangle, cell: &Bounds, plane: (usize, f32), margin: f32) -> [Option<Bounds>; 2] {
     let polygon = Polygon::near(triangle, cell, margin);
     let (axis, position, margin) = (plane.0, f64::from(plane.1), f64::from(margin));

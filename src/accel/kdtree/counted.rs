@@ -14,7 +14,8 @@ pub const MAX_REFERENCES: usize = 32;
 /// The number of planes that are counted together: two SSE registers.
 const LANES: usize = 8;
 
-/// Returns the cheapest split of a cell with at most [`MAX_REFERENCES`]. Its weight is infinite if there is none.
+/// Returns the cheapest split of a cell with at most [`MAX_REFERENCES`] references. Its weight is infinite if there
+/// is none.
 pub fn best_split(references: &[Reference], cell: &Bounds, options: &BuildOptions) -> Split {
     let mut best = Split::NONE;
     for axis in 0..3 {

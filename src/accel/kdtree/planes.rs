@@ -9,11 +9,11 @@
 //! error of                                                   units
 //! the height of the point at a hit's t above the plane         149   (86 on each axis, times sqrt(3): bounds.rs)
 //! the plane                                                      4
-//! the origin's height above the plane                           30
-//! the slope over the ray's length                               26
+//! the height of the origin above the plane                      30
+//! the slope (the change of height per t), times t               26
 //! the middle of the t interval                                   9
 //! half of the t interval                                         9
-//! the heights at that middle and for that half               4 + 4
+//! middle * slope + height, and half * |slope|                4 + 4   (`is_clear` in glsl/shared/slab.glsl)
 //! sum                                                          235   of 256
 //! ```
 
@@ -27,7 +27,7 @@ pub fn planes_of(triangles: &[Triangle], entries: &[u32]) -> Vec<Plane> {
 }
 
 /// Returns a triangle's plane: the rounded normal, and the distance at which a plane with that normal passes through
-/// the triangle's middle. The normal is 0 if the triangle has no area.
+/// the triangle's centroid. The normal is 0 if the triangle has no area.
 pub fn plane_of(triangle: &Triangle) -> Plane {
     let [v0, v1, v2] = [triangle.v0, triangle.v1, triangle.v2].map(|v| v.as_dvec3());
     let normal = (v1 - v0).cross(v2 - v0).normalize_or_zero().as_vec3();

@@ -29,14 +29,16 @@ impl Split {
     pub const NONE: Self = Self { axis: 0, position: 0.0, weight: f32::INFINITY, n_references: [0; 2] };
 }
 
-/// Surface areas of the two parts of a cell on either side of a plane, as shares of the cell's surface area. They are
-/// linear in the plane's position.
+/// Surface areas of the two parts into which a plane perpendicular to `axis` splits a cell, as linear functions of
+/// the plane's position. The areas are shares of the cell's surface area.
 #[derive(Clone, Copy, Debug)]
 pub struct ChildAreas {
     pub axis: usize,
+    /// The cell's least coordinate on the axis, world units.
     pub min: f32,
+    /// The cell's greatest coordinate on the axis, world units.
     pub max: f32,
-    /// 1 / extent on the axis.
+    /// 1 / extent of the cell on the axis.
     pub per_extent: f32,
     /// The share of a part of thickness 0, which comes from its two faces parallel to the plane.
     base: f32,

@@ -15,9 +15,9 @@ use crate::{
     layout::{KD_HAS_SLAB, Slab, Triangle},
 };
 
-/// Limits of the number of entries below a node, which choose the splits that may get a slab. For each limit, that is
-/// the first split on each path from the root with no more entries than the limit. It gets a slab if the surface in
-/// its cell is flat enough. A piece of the surface with more entries than the last limit is hardly ever flat enough
+/// Limits of the number of entries below a split, by which the splits that may get a slab are chosen. On each path
+/// from the root, the first split within each limit is chosen. It gets a slab if the surface in its cell is flat
+/// enough. A piece of the surface with more entries than the last limit is hardly ever flat enough
 /// (docs/experiments.md).
 const SLAB_ENTRY_LIMITS: [u32; 5] = [8, 32, 128, 512, MAX_SLAB_ENTRIES];
 /// The largest of `SLAB_ENTRY_LIMITS`.

@@ -28,9 +28,9 @@ pub struct Cell {
     pub budget: u64,
 }
 
-/// The most references of a cell that is never split at a level of `KD_WORD_DEPTH` or more. A tree that is deeper
-/// than `KD_WORD_DEPTH` needs a second word of the traversal's bit mask, which slows all rays down. So few references
-/// do not justify that. In meshes of a million triangles, hardly any leaf at these levels has this many references
+/// At level `KD_WORD_DEPTH` and deeper, a cell with this number of references or fewer always becomes a leaf. A split
+/// there would need a second word of the traversal's bit mask, which slows all rays down. So few references do not
+/// justify that. In meshes of a million triangles, hardly any leaf at these levels has this many references
 /// (docs/experiments.md).
 const FEW_REFERENCES: usize = 64;
 

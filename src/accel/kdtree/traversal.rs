@@ -29,7 +29,7 @@ pub enum Traversal {
 
 impl Traversal {
     /// The algorithm for GPUs, which follows the paper's idea. A stack and ropes are up to a tenth faster on some
-    /// scenes (figures in README.md).
+    /// scenes (figures in docs/performance.md).
     pub const OF_GPUS: Self = Self::Mask;
     /// The fastest algorithm on software drivers, which run kernels on the CPU.
     pub const OF_SOFTWARE_DRIVERS: Self = Self::Ropes;
@@ -62,9 +62,9 @@ impl Traversal {
 }
 
 named_enum!(Traversal {
-    Mask = "mask": "one bit a level for pending siblings, whose intervals are kept in local memory",
+    Mask = "mask": "one bit a level for siblings that are still to be visited; their intervals are in local memory",
     MaskBoxes = "mask-boxes": "the paper's own: one bit a level for finished siblings; nodes' boxes say which to visit",
-    Restart = "restart": "each pending subtree is found again from the root",
+    Restart = "restart": "each subtree that is still to be visited is found again from the root",
     Backtrack = "backtrack": "back to the deepest ancestor that the ray has not left, found by the nodes' boxes",
     ShortStack = "short-stack": "the eight newest far children are kept, older ones are found by a restart",
     Ropes = "ropes": "from leaf to leaf, along links to neighbours",

@@ -11,7 +11,7 @@ use crate::{
     passes::grid::GridBuilder,
 };
 
-/// Number of builds of each structure on the GPU.
+/// Number of timed builds of each structure on the GPU.
 const N_BUILDS: usize = 9;
 
 /// Times of building the structures over the same triangles.
@@ -48,6 +48,7 @@ impl Builds {
     /// A structure exceeds the device's limits or memory.
     pub fn measure(context: &Arc<Context>, stage: &Stage) -> Result<(Self, DriverAccel), GpuError> {
         let triangles = &stage.scene().triangles;
+        // The first build is a warm-up, whose time does not count.
         let mut driver_accel = DriverAccel::new(context, triangles)?;
         let mut bvh_ms = Vec::new();
         for _ in 0..N_BUILDS {

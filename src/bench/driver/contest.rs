@@ -26,8 +26,9 @@ pub struct ContenderResult {
 /// A hit that no tracer writes. It marks rays whose hit was not written.
 const UNWRITTEN: Hit = Hit { t: f32::NAN, triangle_ix: 0, u: 0.0, v: 0.0 };
 
-/// Runs `n_times` timed rounds, in each of which every contender traces its rays once. Then downloads the hits. After
-/// every few rounds, `between` is called with the number of rounds since its last call.
+/// Runs `n_times` timed rounds, in each of which every contender traces its rays once. After every few rounds,
+/// `between` is called with the number of rounds since its last call. At the end, each contender traces its rays once
+/// more, untimed, and its hits are downloaded.
 ///
 /// # Errors
 /// The device is out of memory, or a call of Vulkan fails.

@@ -59,7 +59,7 @@ pub struct SearchResult {
 }
 
 impl SetResult {
-    /// Makes the result from trials of the same rays. The first trial is the driver's.
+    /// Makes the result from all contenders' results on the same rays. The first one is the driver's.
     pub fn new(rays: RayKind, trials: &[ContenderResult]) -> Self {
         let (driver, rivals) = trials.split_first().expect("the driver's trial");
         let n_rays = driver.hits.len();

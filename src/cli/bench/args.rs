@@ -17,7 +17,9 @@ use crate::cli::{
     args::{Size, device},
     error::CliError,
     file_roles::FileRoles,
-    picture_args::{accel_help, accel_long_help, listed, traversal_help, traversal_long_help, traversals_of_devices},
+    picture_args::{
+        accel_help, accel_long_help, fixed_traversal_help, fixed_traversal_long_help, listed, traversals_of_devices,
+    },
 };
 
 /// The benchmark suites.
@@ -60,7 +62,8 @@ pub struct PaperArgs {
     /// Do not measure the CPU
     #[arg(long, conflicts_with = "cpu_repeat")]
     pub no_cpu: bool,
-    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: a
+    /// discrete GPU, else an integrated one, else a software driver]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
     #[command(flatten)]
@@ -94,7 +97,8 @@ pub struct TraversalArgs {
     /// Cast on all CPU threads, without Vulkan
     #[arg(long, conflicts_with = "device")]
     pub cpu: bool,
-    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: a
+    /// discrete GPU, else an integrated one, else a software driver]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
     #[command(flatten)]
@@ -114,7 +118,8 @@ pub struct DriverArgs {
     /// Use the scene's own camera and first light, without a closed room around the scene
     #[arg(long)]
     pub no_room: bool,
-    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: a
+    /// discrete GPU, else an integrated one, else a software driver]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
     #[command(flatten)]
@@ -127,14 +132,14 @@ pub struct SizeArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = SIZES)]
     #[arg(value_parser = value_parser!(u32).range(i64::from(MIN_TRIANGLES)..=i64::from(MOST_TRIANGLES)))]
     pub triangles: Vec<u32>,
-    /// Size of the picture in pixels; each pixel has one primary ray
+    /// Number of primary rays, as the size of a picture in pixels
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,
     #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
     #[arg(hide_default_value = true)]
     pub accel: AccelKind,
     #[arg(long, value_name = "ALGORITHM")]
-    #[arg(help = traversal_help(), long_help = traversal_long_help())]
+    #[arg(help = fixed_traversal_help(), long_help = fixed_traversal_long_help())]
     pub traversal: Option<Traversal>,
     /// Number of timed casts of each set of rays, 1 to 10000
     #[arg(long, value_name = "N", default_value_t = 25, value_parser = value_parser!(u16).range(1..=10_000))]
@@ -142,7 +147,8 @@ pub struct SizeArgs {
     /// Cast on all CPU threads, without Vulkan
     #[arg(long, conflicts_with = "device")]
     pub cpu: bool,
-    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: the best one]
+    /// Vulkan device to use: its index in `kdray devices`, or a part of its name [default: a
+    /// discrete GPU, else an integrated one, else a software driver]
     #[arg(long, value_name = "INDEX|NAME", value_parser = device)]
     pub device: Option<DeviceSelector>,
     #[command(flatten)]

@@ -26,8 +26,8 @@ use crate::cli::{
     table::{decimal, table},
 };
 
-/// Loads the mesh, makes the rays, and lets kdray and the driver trace each set of rays. A device without ray tracing
-/// is refused first.
+/// Opens the device, which must have ray tracing. Then loads the mesh, makes the rays, and lets kdray and the driver
+/// trace each set of rays.
 pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     args.files.check(&[&args.mesh])?;
     let context = Context::with_ray_tracing(&ContextOptions::new(args.device.clone(), false))?;

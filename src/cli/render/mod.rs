@@ -168,7 +168,8 @@ fn draw_and_write(
     (progress, message): (&Progress, &str),
     begin: Instant,
 ) -> Result<(Vec<Profile>, f64), CliError> {
-    let n_steps = views.len() as u32 * args.spp * u32::from(args.repeat) * renderer.n_bands();
+    let factors = [views.len() as u32, args.spp, args.repeat.into(), renderer.n_bands()];
+    let n_steps = factors.into_iter().fold(1, u32::saturating_mul);
     let mut steps = progress.steps(message, n_steps);
     // Progress within a sample takes time, because the CPU waits for the device. Measured frames are drawn without
     // it.

@@ -37,8 +37,8 @@ pub struct Key {
     driver: String,
     /// What was measured: traversals, or primary visibility, with the picture's size and the traversal.
     subject: String,
-    /// A hash of `cast.comp`, the kernel by which traversals are timed. Measurements
-    /// of primary visibility have the same hash, since their kernels share the traversal code.
+    /// A hash of `cast.comp`, the kernel by which traversals are timed. It is also used for measurements of primary
+    /// visibility, since their kernels share the traversal code.
     kernel: String,
     /// A hash of the scene's triangles.
     triangles: String,
@@ -107,8 +107,8 @@ impl Cache {
         Self { folder: Some(folder.to_owned()) }
     }
 
-    /// Returns the times for a key, if they have been measured. The names of methods and the times are not checked:
-    /// see [`Timings::is_sound`].
+    /// Returns the times for a key, if they have been measured. The caller has to check the file's method names and
+    /// times by [`Timings::is_sound`].
     pub fn get(&self, key: &Key) -> Option<Timings> {
         let mut bytes = Vec::new();
         let file = File::open(self.folder.as_ref()?.join(key.file_name())).ok()?;

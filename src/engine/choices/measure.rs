@@ -22,8 +22,8 @@ use crate::{
     world::{FlatScene, World},
 };
 
-/// Bounds of the number of camera rays. Between them, it is the number of lanes that the device runs at once: with
-/// fewer rays the device would idle, and more rays only take longer.
+/// Bounds of the number of camera rays, which is the number of lanes that the device runs at once, clamped to them.
+/// With fewer rays the device would idle, and more rays only take longer.
 const FEWEST_RAYS: u32 = 1 << 12;
 const MOST_RAYS: u32 = 1 << 18;
 /// Number of timed casts of all rays by each traversal.
@@ -31,8 +31,8 @@ const N_ROUNDS: u16 = 5;
 /// Number of timed frames of each kind of primary visibility. The same number of frames runs before, untimed.
 const N_FRAMES: usize = 5;
 
-/// Times each traversal, in nanoseconds per ray. Returns none where the device has no timestamps. Each traversal
-/// must read only the tree, or the tree and ropes.
+/// Times each traversal, in nanoseconds per ray. Returns none where the device has no timestamps. The traversals must
+/// not read any links except ropes, because only ropes are uploaded beside the tree.
 ///
 /// # Errors
 /// The buffers are beyond the device's limits or memory, or a call fails.
@@ -87,8 +87,8 @@ fn picture_of(scene: &FlatScene, n_pixels: u32) -> RenderOptions {
     RenderOptions { width: side(width), height: side(height), ..RenderOptions::default() }
 }
 
-/// Times whole pictures of one bounce by each kind of primary visibility, in nanoseconds per pixel. Returns none
-/// where the device has no timestamps. `options` gives the picture's size and the traversal.
+/// Times whole pictures of primary rays and their shadow rays by each kind of primary visibility, in nanoseconds per
+/// pixel. Returns none where the device has no timestamps. `options` gives the picture's size and the traversal.
 ///
 /// # Errors
 /// The buffers are beyond the device's limits or memory, or a call fails.

@@ -1,8 +1,9 @@
-//! Chooses what the user leaves open, in one place for all commands: which acceleration structure is built, which
-//! algorithm traverses it, and how primary rays find their triangles.
+//! Chooses what the user leaves open, in one place for all commands: which kd-tree is built, which algorithm
+//! traverses it, and how primary rays find their triangles. The kind of the acceleration structure is not chosen
+//! here: it is a kd-tree unless the user asks for a grid.
 //!
 //! ```text
-//! accel    which acceleration structure
+//! accel    the acceleration structure: a chosen kd-tree, or the user's grid
 //! tree     which kd-tree: by rule, from the numbers of rays and of triangles
 //! rule     traversal and primary visibility, by rule, from the device and the sizes of scene and picture
 //! trial    traversal and primary visibility, from the times of each candidate on the device
@@ -18,10 +19,10 @@
 //! for primary rays, and every choice if the output contains the traversal costs of rays. All choices depend on the
 //! size of the whole picture, so that a part of it is rendered as the whole is.
 //!
-//! A measurement uploads the tree once more and makes ropes for it, which takes longer than a frame. Its result is
-//! kept, so every later run may profit. Only runs with enough rays to win the time back make a measurement: long
-//! casts, many samples, films, windows. Drivers that run kernels on the CPU are never measured, because compiling the
-//! candidate kernels takes them longer than another choice could save.
+//! A measurement uploads the tree once more, and makes ropes for it if they are a candidate. That takes longer than a
+//! frame, but the result is kept, so every later run may profit. Only runs with enough rays to win the time back make
+//! a measurement: long casts, many samples, films, windows. Drivers that run kernels on the CPU are never measured,
+//! because compiling the candidate kernels takes them longer than another choice could save.
 
 mod accel;
 mod cache;
@@ -56,7 +57,7 @@ use crate::{
 /// What the user specifies; `None` and [`BuildPolicy::Auto`] leave a choice open.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Request {
-    /// The kind of the acceleration structure.
+    /// The kind of the acceleration structure, which is never left open.
     pub accel: AccelKind,
     /// Which tree is built.
     pub build: BuildPolicy,
@@ -98,8 +99,8 @@ impl Processor {
 pub struct Workload {
     /// Width and height of the whole picture in pixels, whatever part of it is rendered.
     pub size: (u32, u32),
-    /// Number of rays that the work takes, as far as that is known in advance. A benchmark counts only one of its
-    /// repetitions, because it shows what a single run does.
+    /// Number of rays that the work takes, as far as that is known in advance. If the same work is repeated for
+    /// timing, only one repetition counts, so that the choices are those of a single run.
     pub n_rays: u64,
     /// Whether the output contains the traversal costs of rays (features), which depend on tree and traversal.
     pub shows_costs: bool,
@@ -143,7 +144,8 @@ impl Workload {
 }
 
 impl Request {
-    /// Chooses the acceleration structure to build for `n_triangles` triangles.
+    /// Returns the requested kind of acceleration structure for `n_triangles` triangles. For a kd-tree, it is the
+    /// user's tree, or else the rule's.
     pub fn choose_accel(&self, processor: Processor, n_triangles: usize, workload: &Workload) -> ChosenAccel {
         let by_rule = || TreeKind::by_rule(processor, n_triangles, workload.n_rays);
         match self.accel {

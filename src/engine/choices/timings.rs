@@ -24,7 +24,8 @@ const RAYS_PER_MEASURED_TRIANGLE: u64 = 500;
 /// Number of rays per triangle from which ropes pay off. Making them takes the CPU some 200 ns per triangle in each
 /// run. Where they are faster, they save about 0.2 ns per ray.
 const RAYS_PER_ROPED_TRIANGLE: u64 = 1000;
-/// Share of the time of the rule's method that another method must save to replace it. Smaller savings are noise.
+/// A method replaces the rule's method only if it saves more than this share of that method's time. Smaller savings
+/// are noise.
 const LEAST_GAIN: f64 = 0.03;
 
 /// Measured times on a device, by method: nanoseconds per ray or per pixel.
@@ -53,7 +54,7 @@ impl Timings {
         !self.ns.is_empty() && self.ns.iter().all(is_sound)
     }
 
-    /// Returns the fastest of `methods`, or `rule` if no other method saves more than `LEAST_GAIN` of its time.
+    /// Returns the fastest of `methods` if it saves more than `LEAST_GAIN` of the time of `rule`, or else `rule`.
     fn quickest<T: Copy + Display>(&self, methods: &[T], rule: T) -> T {
         let times = methods.iter().filter_map(|&method| Some((method, self.of(method)?)));
         let best = times.min_by(|(_, a), (_, b)| a.total_cmp(b));
@@ -105,10 +106,10 @@ impl<T: Copy + Display + FromStr> Candidates<T> {
         (n_triangles >= FEWEST_TRIANGLES).then_some(Self { methods, may_measure })
     }
 
-    /// Chooses by the times in the cache. If the cache lacks the time of a method and a measurement pays off,
-    /// `measure` is called instead and its result is added to the cache. If there are no valid times then, the choice
-    /// is `rule`. `measure` returns the time of each method, or none where there is no measurement, as on a device
-    /// without timestamps.
+    /// Chooses the fastest method by the times in the cache. If the cache lacks the time of a method and a
+    /// measurement pays off, `measure` is called, the choice is made by its times alone, and they are stored in the
+    /// cache. If neither gives valid times, the choice is `rule`. `measure` returns the time of each method, or none
+    /// where there is no measurement, as on a device without timestamps.
     ///
     /// # Errors
     /// Fails as `measure` does.

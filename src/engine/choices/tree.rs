@@ -36,8 +36,8 @@ impl BuildPolicy {
 /// The kind of tree to build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TreeKind {
-    /// A small tree that is built in half the time. Rays take up to a tenth longer on the CPU, and up to twice as
-    /// long on a GPU.
+    /// A small tree that is built in half the time of the best one. Rays take up to a tenth longer on the CPU, and up
+    /// to twice as long on a GPU.
     Fast,
     /// The tree that traces fastest.
     Best,
@@ -45,9 +45,9 @@ pub enum TreeKind {
 
 named_enum!(TreeKind { Fast = "fast", Best = "best" });
 
-/// Number of rays per triangle from which the best tree pays off on the CPU. Its build takes about 1 us per triangle
-/// longer than that of the fast tree, and a further third of that with slabs. It saves some 10 to 25 ns per ray on
-/// the CPU's threads, and 0.5 to 1 ns on a GPU.
+/// Number of rays per triangle from which the best tree pays off on the CPU. Its build takes longer than that of the
+/// fast tree: by about 1 us per triangle, and with slabs by a third of 1 us more. It saves some 10 to 25 ns per ray
+/// on the CPU's threads, and 0.5 to 1 ns on a GPU.
 const RAYS_PER_TRIANGLE_ON_CPU: u64 = 40;
 /// The same number for a GPU.
 const RAYS_PER_TRIANGLE_ON_GPU: u64 = 1000;

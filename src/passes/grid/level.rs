@@ -130,9 +130,10 @@ impl Level {
         dispatch(commands, &self.cells, sized_by(buffers, offset_of!(GridBuild, counted_pair_groups_x)));
     }
 
-    /// Records one attempt to count columns and pairs. Needs `build`, and at the lower level `blocks`. Leaves in
-    /// `first_columns` and `first_pairs`, relative to the block's position in `scan_blocks`, where each item's
-    /// columns and each column's pairs begin. Leaves in `build` the sizes of the next dispatches.
+    /// Records one attempt to count columns and pairs. Needs `build`, and at the lower level `blocks`. Leaves the
+    /// index of each item's first column in `first_columns`, and of each column's first pair in `first_pairs`. Both
+    /// count from the first entry of their block of the scan, whose own position is left in `scan_blocks`. Leaves the
+    /// sizes of the next dispatches in `build`.
     fn count(&self, commands: &Commands, buffers: &GridBuffers, attempt: u32) {
         let none = GridSort::default();
         let items = sized_by(buffers, offset_of!(GridBuild, item_groups_x));

@@ -10,7 +10,7 @@
 //!
 //! A ring of one point is called a pole and adds no triangles of its own. A surface between two poles thus has twice
 //! as many triangles as the rings between them have points. The same is true of a surface whose last ring is stitched
-//! to the first. Any even number of triangles from 6 per ring can be reached, where poles do not count.
+//! to the first. With r rings (poles do not count), every even number of triangles from 6 r is possible.
 
 use glam::DVec3;
 use rayon::prelude::*;

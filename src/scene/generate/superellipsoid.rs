@@ -55,7 +55,7 @@ struct Shape {
 }
 
 impl Shape {
-    /// Returns the number by which a vector must be divided to lie on the surface.
+    /// Returns the number by which a vector from the middle must be divided for its end to be on the surface.
     fn gauge(&self, p: DVec3) -> f64 {
         (self.across(p).powf(self.v) + p.y.abs().powf(self.v)).powf(1.0 / self.v)
     }

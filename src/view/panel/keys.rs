@@ -2,7 +2,7 @@
 
 use egui::{Align2, Area, Color32, Frame, Grid, Id, Order, RichText, ScrollArea, Ui, Window, vec2};
 
-/// Keys and mouse actions, each with its effect. README.md has the same rows.
+/// Keys and mouse actions, each with its effect. docs/guide.md has the same rows.
 pub const KEYS: [(&str, &str); 14] = [
     ("left drag, right drag", "go around the target, look around"),
     ("middle drag, Shift + left drag", "move sideways, up and down"),
@@ -61,8 +61,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_readme_has_the_same_keys() {
+    fn the_guide_has_the_same_keys() {
         let rows: String = KEYS.iter().map(|(keys, does)| format!("| {keys} | {does} |\n")).collect();
-        assert!(include_str!("../../../README.md").contains(&rows), "README.md lacks these rows:\n{rows}");
+        assert!(include_str!("../../../docs/guide.md").contains(&rows), "docs/guide.md lacks these rows:\n{rows}");
     }
 }

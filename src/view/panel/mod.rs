@@ -75,7 +75,7 @@ pub struct Facts<'a> {
     pub speed: f32,
     /// Whether the key S flies back rather than saves the picture.
     pub is_flying: bool,
-    /// Whether the user has asked to save the picture, which happens once it is drawn in full.
+    /// Whether the user has asked to save the picture. It is saved once a picture of the window's size is displayed.
     pub is_save_due: bool,
     /// Profile of the last sample that was completed.
     pub profile: &'a Profile,
