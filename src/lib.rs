@@ -23,6 +23,14 @@
 //!
 //! `examples/render.rs` and `examples/cast.rs` are complete programs.
 //!
+//! # Documents
+//!
+//! - [`documents::guide`]: scene files, rendering, layers, films, the viewer, casting rays, measuring.
+//! - [`documents::architecture`]: the way of the data; adding a pass, an array, a traversal, an acceleration structure.
+//! - [`documents::performance`]: all figures, each with its machine and command.
+//! - [`documents::experiments`]: what was tried, what it gave, what limits the traversal today.
+//! - [`documents::conventions`]: how the code and its comments are written.
+//!
 //! # Features
 //!
 //! - `cli`: the command `kdray`.
@@ -104,3 +112,23 @@ pub mod bench;
 #[cfg(feature = "view")]
 #[doc(hidden)]
 pub mod view;
+
+/// The documents of the folder `docs`. They have no code.
+#[cfg(doc)]
+pub mod documents {
+    #[doc = include_str!("../docs/guide.md")]
+    pub mod guide {}
+    #[doc = include_str!("../docs/architecture.md")]
+    pub mod architecture {}
+    #[doc = include_str!("../docs/performance.md")]
+    pub mod performance {}
+    #[doc = include_str!("../docs/experiments.md")]
+    pub mod experiments {}
+    #[doc = include_str!("../docs/conventions.md")]
+    pub mod conventions {}
+}
+
+/// Compiles the example of README.md with the tests.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
