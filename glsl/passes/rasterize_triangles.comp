@@ -96,7 +96,7 @@ PixelTests rasterize(Triangle triangle, uint triangle_ix) {
         return nothing_pending();
     }
     vec2 a_px = projected(a, ahead.x), b_px = projected(b, ahead.y), c_px = projected(c, ahead.z);
-    Bounds bounds = Bounds(min(a_px, min(b_px, c_px)), max(a_px, max(b_px, c_px)), least_slack());
+    Footprint bounds = Footprint(min(a_px, min(b_px, c_px)), max(a_px, max(b_px, c_px)), least_slack());
     Rectangle rectangle = rectangle_of(bounds);
     if (area_of(rectangle) == 0u) return nothing_pending();
     if (area_of(rectangle) > RASTER_SMALL || rectangle.size.x > 32u) {

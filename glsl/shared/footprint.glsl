@@ -82,7 +82,7 @@ bool is_steep(vec3 corner, float ahead) {
 
 // A box of projected points, in pixels of the window. slack: how far outside the box the exact points may be because
 // of rounding.
-struct Bounds {
+struct Footprint {
     vec2 low;
     vec2 high;
     float slack;
@@ -94,7 +94,7 @@ float least_slack() {
 }
 
 // The window's pixels whose samples are within the bounds. It is empty if the bounds fall between samples.
-Rectangle rectangle_of(Bounds bounds) {
+Rectangle rectangle_of(Footprint bounds) {
     vec2 window = vec2(frame.width, frame.height);
     vec2 first = clamp(ceil(bounds.low - bounds.slack), vec2(0.0), window);
     vec2 end = clamp(floor(bounds.high + bounds.slack) + 1.0, first, window);
@@ -103,7 +103,7 @@ Rectangle rectangle_of(Bounds bounds) {
 
 // Extends the bounds by a point of depth `ahead`. reach: the largest distance from the eye of the corners from which
 // the point was computed.
-void include(inout Bounds bounds, vec3 point, float ahead, float reach) {
+void include(inout Footprint bounds, vec3 point, float ahead, float reach) {
     vec2 at = projected(point, ahead);
     bounds.low = min(bounds.low, at);
     bounds.high = max(bounds.high, at);
@@ -112,7 +112,7 @@ void include(inout Bounds bounds, vec3 point, float ahead, float reach) {
 
 // Extends the bounds by the part of the edge from p to q whose depth is at least `nearest`. The corner q itself is
 // left to the next edge, which begins there. ahead: the depths of p and q.
-void include_edge(inout Bounds bounds, vec3 p, vec3 q, vec2 ahead, float nearest) {
+void include_edge(inout Footprint bounds, vec3 p, vec3 q, vec2 ahead, float nearest) {
     if (ahead.x >= nearest) include(bounds, p, ahead.x, length(p));
     if (ahead.x >= nearest == ahead.y >= nearest) return;
     vec3 between = mix(p, q, (nearest - ahead.x) / (ahead.y - ahead.x));
@@ -130,7 +130,7 @@ Rectangle rectangle_beside_eye(vec3 a, vec3 b, vec3 c, vec3 ahead) {
     float distance = abs(dot(a, normal)) / length(normal) - exp2(-18.0) * max(length(a), max(length(b), length(c)));
     if (!(distance > 0.0) || longest_in_image() > STEEPEST) return window;
     float nearest = distance / (2.0 * STEEPEST);
-    Bounds bounds = Bounds(vec2(frame.width, frame.height), vec2(-1.0), least_slack());
+    Footprint bounds = Footprint(vec2(frame.width, frame.height), vec2(-1.0), least_slack());
     include_edge(bounds, a, b, ahead.xy, nearest);
     include_edge(bounds, b, c, ahead.yz, nearest);
     include_edge(bounds, c, a, ahead.zx, nearest);
