@@ -63,5 +63,5 @@ pub use shader::Shader;
 pub use specialization::{Constant, ConstantValue, Constants};
 pub use statistics::{Statistic, StatisticValue};
 #[cfg(feature = "view")]
-pub use surface::{Surface, WindowHandles};
+pub use surface::{WindowHandles, WindowSurface};
 pub use timer::{Timer, TimerRow};

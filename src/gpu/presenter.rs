@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::{
-    Access, CommandBuffer, Commands, Context, GpuError, Surface,
+    Access, CommandBuffer, Commands, Context, GpuError, WindowSurface,
     swapchain::{Outcome, Swapchain, SwapchainImage, format},
 };
 
@@ -22,7 +22,7 @@ pub struct Presenter {
     /// Whether the next frame makes a new swapchain.
     stale: bool,
     vsync: bool,
-    surface: Surface,
+    surface: WindowSurface,
     format: vk::Format,
     context: Arc<Context>,
 }
@@ -44,7 +44,7 @@ impl Presenter {
     ///
     /// # Errors
     /// The window offers no image format that kdray can draw, or memory is exhausted.
-    pub fn new(context: &Arc<Context>, surface: Surface, vsync: bool) -> Result<Self, GpuError> {
+    pub fn new(context: &Arc<Context>, surface: WindowSurface, vsync: bool) -> Result<Self, GpuError> {
         let format = format(context, &surface)?.format;
         Ok(Self {
             slots: [Slot::new(context)?, Slot::new(context)?],

@@ -13,14 +13,14 @@ pub trait WindowHandles: HasDisplayHandle + HasWindowHandle {}
 impl<T: HasDisplayHandle + HasWindowHandle> WindowHandles for T {}
 
 /// A window's surface. It keeps the window alive.
-pub struct Surface {
+pub struct WindowSurface {
     pub(super) raw: vk::SurfaceKHR,
     pub(super) calls: khr::surface::Instance,
     _instance: Arc<Instance>,
     _window: Arc<dyn WindowHandles>,
 }
 
-impl Surface {
+impl WindowSurface {
     /// Lists the instance extensions that a surface of this window needs.
     pub(super) fn extensions(window: &dyn WindowHandles) -> Result<Vec<&'static CStr>, GpuError> {
         let display = window.display_handle().map_err(|error| GpuError::NoSurface(error.to_string()))?;
@@ -61,7 +61,7 @@ impl Surface {
     }
 }
 
-impl Drop for Surface {
+impl Drop for WindowSurface {
     fn drop(&mut self) {
         // SAFETY: the swapchain of the surface is destroyed before it.
         unsafe { self.calls.destroy_surface(self.raw, None) };

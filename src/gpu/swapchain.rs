@@ -4,7 +4,7 @@ use std::{slice, sync::Arc};
 
 use ash::{khr, vk};
 
-use super::{Context, GpuError, Surface};
+use super::{Context, GpuError, WindowSurface};
 
 /// Number of images to request, within the surface's bounds: one is shown, one waits to be shown and one is drawn.
 const N_IMAGES: u32 = 3;
@@ -41,7 +41,7 @@ impl Swapchain {
     /// system leaves the size to the program. `old` is retired.
     pub fn new(
         context: &Arc<Context>,
-        surface: &Surface,
+        surface: &WindowSurface,
         old: Option<&Swapchain>,
         vsync: bool,
         size: (u32, u32),
@@ -163,7 +163,7 @@ fn calls(context: &Context) -> &khr::swapchain::Device {
 
 /// Chooses a format of 8 bits a channel whose values are stored unchanged, since the tone mapper has already encoded
 /// them for display.
-pub(super) fn format(context: &Context, surface: &Surface) -> Result<vk::SurfaceFormatKHR, GpuError> {
+pub(super) fn format(context: &Context, surface: &WindowSurface) -> Result<vk::SurfaceFormatKHR, GpuError> {
     // SAFETY: the surface belongs to the device's instance.
     let offered = unsafe { surface.calls.get_physical_device_surface_formats(context.physical, surface.raw) }
         .map_err(GpuError::call("vkGetPhysicalDeviceSurfaceFormatsKHR", "window"))?;
@@ -177,7 +177,7 @@ pub(super) fn format(context: &Context, surface: &Surface) -> Result<vk::Surface
 }
 
 /// Chooses how images are shown: at the screen's refresh with `vsync`, else as soon as possible.
-fn present_mode(context: &Context, surface: &Surface, vsync: bool) -> Result<vk::PresentModeKHR, GpuError> {
+fn present_mode(context: &Context, surface: &WindowSurface, vsync: bool) -> Result<vk::PresentModeKHR, GpuError> {
     // SAFETY: the surface belongs to the device's instance.
     let offered = unsafe { surface.calls.get_physical_device_surface_present_modes(context.physical, surface.raw) }
         .map_err(GpuError::call("vkGetPhysicalDeviceSurfacePresentModesKHR", "window"))?;
