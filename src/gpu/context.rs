@@ -121,9 +121,9 @@ impl Context {
     pub fn for_window(
         options: &ContextOptions,
         window: Arc<dyn super::WindowHandles>,
-    ) -> Result<(Arc<Self>, super::Surface), GpuError> {
-        let instance = Instance::with_extensions(options.validate, &super::Surface::extensions(&*window)?)?;
-        let surface = super::Surface::new(&instance, window)?;
+    ) -> Result<(Arc<Self>, super::WindowSurface), GpuError> {
+        let instance = Instance::with_extensions(options.validate, &super::WindowSurface::extensions(&*window)?)?;
+        let surface = super::WindowSurface::new(&instance, window)?;
         let (physical, info) =
             select(&instance, options.device.as_ref(), |device| surface.is_served_by(&instance, device))?;
         Ok((Self::open(instance, physical, info, Purpose::Window, &options.overrides)?, surface))

@@ -96,7 +96,7 @@ struct Fitting<'a> {
 
 /// The part of the surface that is in the leaves below a node, and the slabs that were found there.
 #[derive(Default)]
-struct Surface {
+struct FlatPiece {
     /// The corners of all polygons, leaf after leaf.
     corners: Vec<DVec3>,
     slabs: Slabs,
@@ -122,7 +122,7 @@ impl Fitting<'_> {
 
     /// Returns the slabs of a node and of all nodes below it.
     fn slabs_of(&self, patch: &NodeCell) -> Slabs {
-        let mut surface = Surface::default();
+        let mut surface = FlatPiece::default();
         self.fit(patch, u32::MAX, &mut surface);
         surface.slabs
     }
@@ -130,7 +130,7 @@ impl Fitting<'_> {
     /// Adds the polygons below a node to the surface, and the slabs there. `n_above`: the number of entries below the
     /// parent. Returns the sum of the polygons' area vectors. A vector that points away from the sum so far is
     /// negated, so the triangles' winding does not matter.
-    fn fit(&self, patch: &NodeCell, n_above: u32, surface: &mut Surface) -> DVec3 {
+    fn fit(&self, patch: &NodeCell, n_above: u32, surface: &mut FlatPiece) -> DVec3 {
         let (n_entries, first_corner) = (self.n_entries[patch.node as usize], surface.corners.len());
         let (area, thickest) = match self.tree.node(patch.node) {
             Node::Leaf { first, count } => {
@@ -171,7 +171,7 @@ impl Fitting<'_> {
     }
 }
 
-impl Surface {
+impl FlatPiece {
     /// Adds a polygon's corners. Returns its area vector, whose length is twice the area.
     fn add(&mut self, polygon: &Polygon) -> DVec3 {
         let first_corner = self.corners.len();
