@@ -10,7 +10,7 @@ use super::{
     planes::planes_of,
     sah::Split,
     search::Search,
-    subtree::{self, Cell, Input, split_reference},
+    subtree::{self, BuildCell, Input, split_reference},
 };
 use crate::{
     accel::bounds::{Bounds, Reference, is_finite},
@@ -44,7 +44,7 @@ impl KdTree {
         let bounds = exact_bounds.grown(margin);
         let n = references.len() as u64;
         let budget = (n * u64::from(options.max_references_per_triangle) + MIN_BUDGET).min(MAX_BUDGET.max(n));
-        let cell = Cell { bounds, level: 0, budget };
+        let cell = BuildCell { bounds, level: 0, budget };
         let mut parts = flatten(grow(Input { triangles, options, margin }, references, cell), bounds);
         parts.leaf_planes = planes_of(triangles, &parts.leaf_triangles);
         let mut tree = KdTree { parts, n_triangles: triangles.len() };
@@ -56,7 +56,7 @@ impl KdTree {
 }
 
 /// Builds the node of a cell and all nodes below it.
-fn grow(input: Input, references: Vec<Reference>, cell: Cell) -> UpperTree {
+fn grow(input: Input, references: Vec<Reference>, cell: BuildCell) -> UpperTree {
     if references.len() <= TASK_REFERENCES {
         return UpperTree::Subtree(subtree::build(input, references, cell));
     }

@@ -20,7 +20,7 @@ pub struct Input<'a> {
 
 /// A cell that is to be built, without its references.
 #[derive(Clone, Copy)]
-pub struct Cell {
+pub struct BuildCell {
     pub bounds: Bounds,
     /// The number of levels below the root.
     pub level: u32,
@@ -34,14 +34,14 @@ pub struct Cell {
 /// (docs/experiments.md).
 const FEW_REFERENCES: usize = 64;
 
-impl Cell {
+impl BuildCell {
     /// Returns the best split and its children's cells, or none where a leaf is cheaper or a limit is reached.
     pub fn split(
         self,
         references: &[Reference],
         options: &BuildOptions,
         search: &mut Search,
-    ) -> Option<(Split, [Cell; 2])> {
+    ) -> Option<(Split, [BuildCell; 2])> {
         let leaf_cost = options.intersection_cost * references.len() as f32;
         // A split costs at least one step.
         if leaf_cost <= options.traversal_cost || self.level >= options.depth_limit() {
@@ -61,7 +61,7 @@ impl Cell {
         // The budget is divided in proportion to the references, so a cell's share does not depend on what is built
         // before it.
         let budget = n.map(|n| self.budget * n / n_both);
-        let child = |side: usize| Cell { bounds: bounds[side], level: self.level + 1, budget: budget[side] };
+        let child = |side: usize| BuildCell { bounds: bounds[side], level: self.level + 1, budget: budget[side] };
         Some((split, [child(0), child(1)]))
     }
 }
@@ -92,7 +92,7 @@ pub struct Subtree {
 }
 
 /// Builds the subtree of a cell.
-pub fn build(input: Input, references: Vec<Reference>, cell: Cell) -> Subtree {
+pub fn build(input: Input, references: Vec<Reference>, cell: BuildCell) -> Subtree {
     let n = references.len();
     let subtree = Subtree { nodes: vec![EMPTY_LEAF; 2], leaf_triangles: Vec::new(), depth: cell.level };
     let mut builder = Builder { input, references, above: Vec::new(), search: Search::default(), subtree };
@@ -114,7 +114,7 @@ struct Builder<'a> {
 
 impl Builder<'_> {
     /// Builds the node of a cell at the index `slot`, and appends all nodes below it.
-    fn node(&mut self, slot: usize, range: Range<usize>, cell: Cell) {
+    fn node(&mut self, slot: usize, range: Range<usize>, cell: BuildCell) {
         let references = &self.references[range.clone()];
         let Some((split, cells)) = cell.split(references, self.input.options, &mut self.search) else {
             return self.leaf(slot, range, cell.level);
