@@ -41,7 +41,7 @@ use crate::{
 
 /// The result of a cast.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Cast {
+pub struct CastResult {
     /// One hit for each ray, at origin + t * direction: t is a distance in world units only if the direction has unit
     /// length. A miss has an infinite t and the index `NO_TRIANGLE`.
     pub hits: Vec<Hit>,
@@ -127,7 +127,7 @@ impl Caster {
             gpu_ms = gpu_ms.zip(batch_ms).map(|(sums, batch)| sums.iter().zip(batch).map(|(a, b)| a + b).collect());
             hits.extend(self.resources.cast_hits.download_first(batch.len())?);
         }
-        Ok(Cast { hits, gpu_ms, n_invalid: count_invalid(rays) })
+        Ok(CastResult { hits, gpu_ms, n_invalid: count_invalid(rays) })
     }
 
     /// Returns the driver's statistics of the query's kernel. They are empty before the first cast.

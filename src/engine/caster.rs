@@ -57,12 +57,12 @@ impl<'a> Caster<'a> {
     }
 }
 
-fn cast_on_cpu(caster: &CpuCaster, rays: &[Ray], query: Query, n_times: u32) -> Cast {
+fn cast_on_cpu(caster: &CpuCaster, rays: &[Ray], query: Query, n_times: u32) -> CastResult {
     let (mut hits, mut ms) = (Vec::new(), Vec::new());
     for _ in 0..n_times.max(1) {
         let start = Instant::now();
         hits = caster.cast(rays, query);
         ms.push(start.elapsed().as_secs_f64() * 1e3);
     }
-    Cast { hits, gpu_ms: Some(ms), n_invalid: cast::count_invalid(rays) }
+    CastResult { hits, gpu_ms: Some(ms), n_invalid: cast::count_invalid(rays) }
 }
