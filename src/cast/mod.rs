@@ -117,7 +117,7 @@ impl Caster {
     ///
     /// # Errors
     /// Memory runs out, or a call fails.
-    pub fn cast(&mut self, rays: &[Ray], query: Query, n_times: u32) -> Result<Cast, GpuError> {
+    pub fn cast(&mut self, rays: &[Ray], query: Query, n_times: u32) -> Result<CastResult, GpuError> {
         self.prepare(query, rays.len())?;
         let mut hits = Vec::with_capacity(rays.len());
         let mut gpu_ms = Some(vec![0.0; n_times.max(1) as usize]);

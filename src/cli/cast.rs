@@ -1,7 +1,7 @@
 //! `kdray cast`: casts rays from a file into a scene and writes their hits to a file.
 
 use kdray::{
-    cast::{Cast, Hit, HitWriter, NO_TRIANGLE, RAYS_PER_BATCH, RayReader},
+    cast::{CastResult, Hit, HitWriter, NO_TRIANGLE, RAYS_PER_BATCH, RayReader},
     engine::{
         Built, Caster, Engine,
         choices::{Choices, Workload},
@@ -100,7 +100,7 @@ struct Totals {
 }
 
 impl Totals {
-    fn add(&mut self, cast: &Cast) {
+    fn add(&mut self, cast: &CastResult) {
         self.n_rays += cast.hits.len() as u64;
         self.n_hits += cast.hits.iter().filter(|hit: &&Hit| hit.triangle_ix != NO_TRIANGLE).count() as u64;
         self.n_invalid += cast.n_invalid;

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Instant};
 
 use crate::{
     accel::{Query, kdtree::Traversal},
-    cast::{self, Cast, CpuCaster, Ray},
+    cast::{self, CastResult, CpuCaster, Ray},
     gpu::{Context, GpuError},
     world::Geometry,
 };
@@ -49,7 +49,7 @@ impl<'a> Caster<'a> {
     ///
     /// # Errors
     /// Memory runs out, or a call fails.
-    pub fn cast(&mut self, rays: &[Ray], query: Query, n_times: u32) -> Result<Cast, GpuError> {
+    pub fn cast(&mut self, rays: &[Ray], query: Query, n_times: u32) -> Result<CastResult, GpuError> {
         match &mut self.0 {
             Backend::Device(caster) => caster.cast(rays, query, n_times),
             Backend::Cpu(caster) => Ok(cast_on_cpu(caster, rays, query, n_times)),

@@ -117,17 +117,17 @@ fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError
 }
 
 /// A camera, and the files of its picture.
-struct View {
+struct FrameJob {
     camera: Camera,
     files: Files,
 }
 
 /// Returns the scene's own view or, with a path, one view per frame. Refuses views whose files cannot be written or
 /// have another role.
-fn views(args: &RenderArgs, scene: &Scene, mut roles: FileRoles) -> Result<Vec<View>, CliError> {
+fn views(args: &RenderArgs, scene: &Scene, mut roles: FileRoles) -> Result<Vec<FrameJob>, CliError> {
     let output = output_of(args);
     let views = match &args.path {
-        None => vec![View { camera: scene.camera, files: Files::of(output, &args.aov) }],
+        None => vec![FrameJob { camera: scene.camera, files: Files::of(output, &args.aov) }],
         Some(path) => {
             let views = views_along(path, args, &output)?;
             views.iter().try_for_each(|view| view.files.note(&mut roles))?;
@@ -139,7 +139,7 @@ fn views(args: &RenderArgs, scene: &Scene, mut roles: FileRoles) -> Result<Vec<V
 }
 
 /// Returns one view per frame of the path.
-fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec<View>, CliError> {
+fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec<FrameJob>, CliError> {
     let path = CameraPath::load(path_file)?;
     let Frames { first, last } =
         args.frames.unwrap_or(Frames { first: path.begin().ceil() as u32, last: path.end().floor() as u32 });
@@ -154,7 +154,7 @@ fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec
             let file = path_file.display();
             CliError::Usage(format!("{file}: at frame {frame}, eye and target coincide, or up points along the view"))
         })?;
-        Ok(View { camera, files: Files::of(numbered(output, frame)?, &args.aov) })
+        Ok(FrameJob { camera, files: Files::of(numbered(output, frame)?, &args.aov) })
     };
     (first..=last).map(view).collect()
 }
@@ -164,7 +164,7 @@ fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec
 fn draw_and_write(
     args: &RenderArgs,
     mut renderer: Renderer,
-    views: &[View],
+    views: &[FrameJob],
     (progress, message): (&Progress, &str),
     begin: Instant,
 ) -> Result<(Vec<Profile>, f64), CliError> {
