@@ -43,15 +43,15 @@ struct Event {
     args: Map<String, Value>,
 }
 
-/// Interval of time in whole nanoseconds. Both ends are rounded, so that an interval that encloses another still does
+/// TraceInterval of time in whole nanoseconds. Both ends are rounded, so that an interval that encloses another still does
 /// so after rounding.
 #[derive(Clone, Copy)]
-struct Interval {
+struct TraceInterval {
     begin: u64,
     end: u64,
 }
 
-impl Interval {
+impl TraceInterval {
     /// Returns the interval of a pass, or none if the pass has no timestamps.
     fn of(pass: &PassTime) -> Option<Self> {
         let nanoseconds = |ms: f64| (ms * 1e6).round() as u64;
@@ -84,7 +84,7 @@ pub fn trace_json(origin: Instant, spans: &[Span], frame: &Profile) -> Vec<u8> {
     ];
     let since = |moment: Instant| moment.saturating_duration_since(origin).as_nanos() as u64;
     events.extend(spans.iter().map(|span| {
-        let interval = Interval { begin: since(span.begin), end: since(span.end) };
+        let interval = TraceInterval { begin: since(span.begin), end: since(span.end) };
         slice(span.name.to_owned(), CPU, interval, Map::new())
     }));
     events.extend(frame_slices(frame, frame.begun_at.map_or(0, since)));
@@ -99,7 +99,7 @@ pub fn trace_json(origin: Instant, spans: &[Span], frame: &Profile) -> Vec<u8> {
 fn frame_slices(frame: &Profile, begun_at: u64) -> Vec<Event> {
     let mut slices = Vec::new();
     let mut add = |name: String, passes: &[&PassTime], args| {
-        if let Some(interval) = Interval::around(passes) {
+        if let Some(interval) = TraceInterval::around(passes) {
             slices.push(slice(name, PASSES, interval.after(begun_at), args));
         }
     };
@@ -140,7 +140,7 @@ fn object(value: Value) -> Map<String, Value> {
     }
 }
 
-fn slice(name: String, track: u32, interval: Interval, args: Map<String, Value>) -> Event {
+fn slice(name: String, track: u32, interval: TraceInterval, args: Map<String, Value>) -> Event {
     let microseconds = |nanoseconds: u64| nanoseconds as f64 / 1e3;
     Event {
         name,
