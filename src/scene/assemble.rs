@@ -11,7 +11,7 @@ use super::{
     description::{CameraSpec, CommonSpec, DenoiseWord, Description, LightSpec, MeshSpec, RenderSpec, Source},
     error::{Checked, SceneError},
     extent, framing,
-    generate::Budget,
+    generate::TriangleBudget,
     material::{MaterialSpec, colour, within},
     mesh::MAX_COORDINATE,
     obj::{Library, parse_obj, read_obj},
@@ -119,7 +119,7 @@ fn add_mesh(
             (mesh, slots, 0)
         }
         Source::Generator(generator) => {
-            let budget = Budget { n_generated, n_triangles: n_loaded as u64 };
+            let budget = TriangleBudget { n_generated, n_triangles: n_loaded as u64 };
             let mut mesh = generator.build(&budget).map_err(failed)?;
             if mesh.faces.is_empty() {
                 return Err(failed("makes no triangles".to_owned()));

@@ -48,7 +48,7 @@ pub enum Generator {
 impl Generator {
     /// Makes the mesh, around the origin. The error says which parameter is out of range, or that the mesh is too
     /// large for the `budget`.
-    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
+    pub fn build(&self, budget: &TriangleBudget) -> Checked<Mesh> {
         match self {
             Self::Box(cuboid) => cuboid.build(),
             Self::Room(room) => room.build(),
@@ -77,14 +77,14 @@ fn count(name: &str, value: u32, min: u32) -> Checked<u32> {
 /// Numbers of triangles that a scene has already. What they leave of the scene's limits is the budget of its next
 /// generator.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Budget {
+pub struct TriangleBudget {
     /// Number of triangles that generators have made.
     pub n_generated: u64,
     /// Number of all triangles, including those from files.
     pub n_triangles: u64,
 }
 
-impl Budget {
+impl TriangleBudget {
     /// Refuses a mesh whose number of triangles exceeds the limit of a mesh or of a scene, or the memory.
     fn require(&self, n_triangles: u64) -> Checked<()> {
         if n_triangles > MAX_TRIANGLES {
@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn the_generators_of_a_scene_are_limited_together() {
-        let after = |n_generated: u64| Budget { n_generated, n_triangles: 0 };
+        let after = |n_generated: u64| TriangleBudget { n_generated, n_triangles: 0 };
         after(0).require(12).unwrap();
         assert!(after(0).require(MAX_TRIANGLES + 1).unwrap_err().contains("more than 16777216"));
         after(MAX_TRIANGLES_OF_SCENE - 12).require(12).unwrap();
