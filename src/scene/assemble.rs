@@ -8,7 +8,7 @@ use toml::Spanned;
 
 use super::{
     Camera, Light, Material, RenderDefaults, Scene,
-    description::{CameraSpec, CommonSpec, DenoiseWord, Description, LightSpec, MeshSpec, RenderSpec, Source},
+    description::{CameraSpec, CommonSpec, Description, LightSpec, MeshSpec, RenderSpec, SceneDenoise, Source},
     error::{Checked, SceneError},
     extent, framing,
     generate::TriangleBudget,
@@ -226,9 +226,9 @@ fn render_defaults(spec: &RenderSpec) -> Checked<RenderDefaults> {
             None => defaults.tonemap,
         },
         exposure: within("exposure", spec.exposure.unwrap_or(defaults.exposure), 1e-6, 1e6)?,
-        denoise: match spec.denoise.unwrap_or(DenoiseWord::Paper) {
-            DenoiseWord::Off => Denoise::Off,
-            DenoiseWord::Paper => Denoise::Paper { threshold },
+        denoise: match spec.denoise.unwrap_or(SceneDenoise::Paper) {
+            SceneDenoise::Off => Denoise::Off,
+            SceneDenoise::Paper => Denoise::Paper { threshold },
         },
     })
 }

@@ -63,13 +63,13 @@ pub(super) struct RenderSpec {
     pub exposure: Option<f32>,
     /// `linear`, `agx` or `aces`.
     pub tonemap: Option<String>,
-    pub denoise: Option<DenoiseWord>,
+    pub denoise: Option<SceneDenoise>,
     pub denoise_threshold: Option<f32>,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum DenoiseWord {
+pub(super) enum SceneDenoise {
     Off,
     Paper,
 }
