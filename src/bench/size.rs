@@ -20,7 +20,7 @@ use crate::{
     gpu::{Context, GpuError},
     scene::{
         Camera, Instance, Material, RenderDefaults, Scene, Transform,
-        generate::{Budget, Generator, MAX_TRIANGLES},
+        generate::{Generator, MAX_TRIANGLES, TriangleBudget},
     },
     world::FlatScene,
 };
@@ -47,7 +47,7 @@ pub fn knot(n_triangles: u32) -> Scene {
         n_triangles & !1
     );
     let generator: Generator = toml::from_str(&description).expect("the generator knows its words");
-    let mesh = generator.build(&Budget::default()).expect("numbers within its limits and memory");
+    let mesh = generator.build(&TriangleBudget::default()).expect("numbers within its limits and memory");
     Scene {
         name: "knot".to_owned(),
         meshes: vec![mesh],

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::Vec3;
 use kdray::scene::{
-    generate::{Budget, Generator},
+    generate::{Generator, TriangleBudget},
     mesh::Mesh,
 };
 
@@ -44,7 +44,7 @@ const CLOSED: [(&str, usize); 15] = [
 fn build(toml: &str) -> Mesh {
     toml::from_str::<Generator>(toml)
         .unwrap_or_else(|e| panic!("{e}\n{toml}"))
-        .build(&Budget::default())
+        .build(&TriangleBudget::default())
         .unwrap_or_else(|e| panic!("{e}\n{toml}"))
 }
 

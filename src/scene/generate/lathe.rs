@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 use serde::Deserialize;
 
 use super::{
-    Budget, count, length,
+    TriangleBudget, count, length,
     rings::{Rings, SurfacePoint, heading},
 };
 use crate::scene::{error::Checked, mesh::Mesh};
@@ -28,7 +28,7 @@ pub struct Lathe {
 type ProfilePoint = (DVec2, DVec2);
 
 impl Lathe {
-    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
+    pub fn build(&self, budget: &TriangleBudget) -> Checked<Mesh> {
         let segments = count("segments", self.segments, 3)?;
         let steps = count("steps", self.steps.unwrap_or(8), 1)?;
         budget.require(2 * u64::from(segments) * u64::from(steps) * self.profile.len() as u64)?;

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde::Deserialize;
 
-use super::{Budget, count, length, rings::heading};
+use super::{TriangleBudget, count, length, rings::heading};
 use crate::scene::{error::Checked, mesh::Mesh};
 
 /// A rectangle of fields centred at the origin: 2 triangles per field. Field (i, k) has slot i + k, so two materials
@@ -26,7 +26,7 @@ pub struct Disc {
 }
 
 impl Plane {
-    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
+    pub fn build(&self, budget: &TriangleBudget) -> Checked<Mesh> {
         let [width, depth] = [length("size", self.size[0])?, length("size", self.size[1])?];
         let [n_x, n_z] = self.fields.unwrap_or([1, 1]);
         let (n_x, n_z) = (count("fields", n_x, 1)?, count("fields", n_z, 1)?);
@@ -52,7 +52,7 @@ impl Plane {
 }
 
 impl Disc {
-    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
+    pub fn build(&self, budget: &TriangleBudget) -> Checked<Mesh> {
         let radius = length("radius", self.radius)?;
         let n = count("segments", self.segments, 3)?;
         budget.require(u64::from(n))?;

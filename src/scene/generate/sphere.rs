@@ -6,7 +6,7 @@ use glam::DVec3;
 use serde::Deserialize;
 
 use super::{
-    Budget, count, length,
+    TriangleBudget, count, length,
     rings::{Rings, SurfacePoint, heading},
 };
 use crate::scene::{error::Checked, mesh::Mesh};
@@ -32,7 +32,7 @@ pub struct Geodesic {
 }
 
 impl Sphere {
-    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
+    pub fn build(&self, budget: &TriangleBudget) -> Checked<Mesh> {
         let radius = length("radius", self.radius)?;
         let rings = polar_rings(self.segments, self.rings, self.triangles, budget)?;
         let point = |ring: usize, around: f64| -> SurfacePoint {
@@ -49,7 +49,7 @@ pub fn polar_rings(
     segments: Option<u32>,
     rings: Option<u32>,
     triangles: Option<u32>,
-    budget: &Budget,
+    budget: &TriangleBudget,
 ) -> Checked<Rings> {
     match (segments, rings, triangles) {
         (Some(segments), Some(rings), None) => {
@@ -126,7 +126,7 @@ fn icosahedron_corners() -> [DVec3; 12] {
 }
 
 impl Geodesic {
-    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
+    pub fn build(&self, budget: &TriangleBudget) -> Checked<Mesh> {
         let radius = length("radius", self.radius)?;
         let frequency = count("frequency", self.frequency, 1)?;
         budget.require(20 * u64::from(frequency).pow(2))?;

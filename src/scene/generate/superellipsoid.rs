@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use serde::Deserialize;
 
 use super::{
-    Budget, length,
+    TriangleBudget, length,
     rings::SurfacePoint,
     sphere::{polar_direction, polar_rings},
 };
@@ -26,7 +26,7 @@ pub struct Superellipsoid {
 }
 
 impl Superellipsoid {
-    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
+    pub fn build(&self, budget: &TriangleBudget) -> Checked<Mesh> {
         for extent in self.size {
             length("size", extent)?;
         }

@@ -6,7 +6,7 @@ use glam::DVec3;
 use serde::Deserialize;
 
 use super::{
-    Budget, count, length,
+    TriangleBudget, count, length,
     rings::{Rings, heading, normal_at},
 };
 use crate::scene::{error::Checked, material::within, mesh::Mesh};
@@ -45,7 +45,7 @@ struct Tube {
 }
 
 impl TorusKnot {
-    pub fn build(&self, budget: &Budget) -> Checked<Mesh> {
+    pub fn build(&self, budget: &TriangleBudget) -> Checked<Mesh> {
         let tube = self.tube()?;
         let rings = self.rings(budget)?;
         let n_rings = rings.n_points.len() as f64;
@@ -56,7 +56,7 @@ impl TorusKnot {
         }))
     }
 
-    fn rings(&self, budget: &Budget) -> Checked<Rings> {
+    fn rings(&self, budget: &TriangleBudget) -> Checked<Rings> {
         let segments = count("segments", self.segments, 3)?;
         match (self.sides, self.triangles) {
             (Some(sides), None) => {
