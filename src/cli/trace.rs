@@ -43,7 +43,7 @@ struct Event {
     args: Map<String, Value>,
 }
 
-/// TraceInterval of time in whole nanoseconds. Both ends are rounded, so that an interval that encloses another still does
+/// Interval of time in whole nanoseconds. Both ends are rounded, so that an interval that encloses another still does
 /// so after rounding.
 #[derive(Clone, Copy)]
 struct TraceInterval {
