@@ -58,7 +58,7 @@ pub enum Command {
 
 #[derive(clap::Args)]
 pub struct RenderArgs {
-    /// Scene file (TOML or OBJ)
+    /// Scene file (TOML), or mesh file (OBJ, PLY, STL)
     pub scene: PathBuf,
     /// Picture to write: .png, or .exr for linear radiance; with --path, #### in the name stands for the frame's
     /// number [default: the scene's name with .png, or with .####.png, in the working directory]
@@ -112,7 +112,7 @@ pub struct RenderArgs {
 
 #[derive(clap::Args)]
 pub struct CastArgs {
-    /// OBJ file or scene file
+    /// Mesh file (OBJ, PLY, STL) or scene file
     pub mesh: PathBuf,
     /// Rays to cast, a .npy file of float32: K x 8 (origin, direction, t_min, t_max), or K x 6 for t from 0 to
     /// infinity; directions need not be unit vectors, but a ray whose direction is shorter than 1.2e-38 misses
@@ -160,7 +160,7 @@ pub struct CastArgs {
 
 #[derive(clap::Args)]
 pub struct InspectArgs {
-    /// Scene file (TOML or OBJ)
+    /// Scene file (TOML), or mesh file (OBJ, PLY, STL)
     pub scene: PathBuf,
     #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
     #[arg(hide_default_value = true)]

@@ -14,7 +14,7 @@ use super::{
 #[group(skip)]
 #[command(group = clap::ArgGroup::new("tour").args(["frames", "path"]).multiple(true))]
 pub struct ViewArgs {
-    /// Scene file (TOML or OBJ); the window follows changes of the file
+    /// Scene file (TOML), or mesh file (OBJ, PLY, STL); the window follows changes of the file
     pub scene: PathBuf,
     #[command(flatten)]
     pub picture: PictureArgs,

@@ -14,7 +14,8 @@ use super::{
     generate::TriangleBudget,
     material::{MaterialSpec, colour, within},
     mesh::MAX_COORDINATE,
-    obj::{Library, parse_obj, read_obj},
+    mesh_file::{parse_mesh, read_mesh},
+    obj::Library,
     read::read_utf8,
     transform::finite,
 };
@@ -113,8 +114,8 @@ fn add_mesh(
         Source::File { path, shading } => {
             let path = file.path.parent().unwrap_or(Path::new("")).join(path);
             // The scene file may misspell the name, so the error names the line in the scene file.
-            let text = read_obj(&path).map_err(|error| failed(error.to_string()))?;
-            let (mesh, library) = parse_obj(&path, &text, shading, n_loaded)?;
+            let bytes = read_mesh(&path).map_err(|error| failed(error.to_string()))?;
+            let (mesh, library) = parse_mesh(&path, bytes, shading, n_loaded)?;
             let slots = if named.is_empty() { scene.push_library(library) } else { named };
             (mesh, slots, 0)
         }

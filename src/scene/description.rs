@@ -9,7 +9,7 @@ use super::{
     error::Checked,
     generate::Generator,
     material::MaterialSpec,
-    obj::{DEFAULT_CREASE, Shading},
+    smooth::{DEFAULT_CREASE, Shading},
     transform::TransformSpec,
 };
 
@@ -84,7 +84,7 @@ pub(super) struct MeshSpec {
 /// Source of a mesh's triangles.
 #[derive(Debug)]
 pub(super) enum Source {
-    /// An OBJ file; `path` is relative to the scene file's folder.
+    /// A mesh file; `path` is relative to the scene file's folder.
     File { path: String, shading: Shading },
     /// A generator that makes the mesh from a few parameters.
     Generator(Generator),

@@ -1,7 +1,7 @@
 //! Scenes as files and programs describe them: meshes, their instances in the world, materials, lights, a camera.
 //! Nothing here depends on how kernels lay data out; `world` flattens a scene for tracing.
 //!
-//! A scene file is a TOML file, whose keys `description` lists, or a bare OBJ file.
+//! A scene file is a TOML file, whose keys `description` lists, or a mesh file: OBJ, PLY or STL.
 
 mod assemble;
 mod defaults;
@@ -14,12 +14,15 @@ mod light;
 mod lighting;
 mod material;
 pub mod mesh;
+mod mesh_file;
 mod needs;
 mod obj;
 mod path;
+mod ply;
 mod read;
 mod smooth;
 mod sources;
+mod stl;
 mod transform;
 
 use std::path::Path;
@@ -37,6 +40,7 @@ pub use self::{
     sources::source_files,
     transform::Transform,
 };
+use self::{mesh_file::MeshFormat, smooth::Shading};
 
 /// Everything that a frame shows. World space is right-handed, +y up by default.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,19 +92,21 @@ pub struct Camera {
 }
 
 impl Scene {
-    /// Loads a `.toml` or `.obj` file. It emits `tracing` warnings for unknown OBJ statements, missing material
-    /// libraries, undefined materials, and coordinates too large for the scene's detail.
+    /// Loads a scene file, `.toml`, or a mesh file, `.obj`, `.ply` or `.stl`. The content of a mesh file says which of
+    /// the three it is. Emits `tracing` warnings for unknown OBJ statements, missing material libraries, undefined
+    /// materials, properties that are not shown, and coordinates too large for the scene's detail.
     ///
     /// # Errors
     /// The file, or one that it names, cannot be read or understood; the scene has no triangles, is too small to be
     /// traced ([`MIN_EXTENT`]), reaches too far from the origin (`mesh::MAX_COORDINATE`), or needs more memory than
     /// there is.
     pub fn load(path: &Path) -> Result<Scene, SceneError> {
-        let extension = path.extension().map(|extension| extension.to_ascii_lowercase());
-        match extension.as_ref().and_then(|extension| extension.to_str()) {
-            Some("toml") => assemble::load_toml(path),
-            Some("obj") => load_bare_obj(path),
-            _ => Err(SceneError::file(path, "is no scene: its name ends neither in .toml nor in .obj")),
+        if is_scene_file(path) {
+            assemble::load_toml(path)
+        } else if MeshFormat::of_name(path).is_some() {
+            load_mesh_file(path)
+        } else {
+            Err(SceneError::file(path, "is no scene: its name ends in none of .toml, .obj, .ply and .stl"))
         }
     }
 
@@ -154,12 +160,15 @@ impl Scene {
     }
 }
 
-/// Loads an OBJ file as a scene: the mesh with its own materials, a camera that frames it, one light and ambient
-/// light.
-fn load_bare_obj(path: &Path) -> Result<Scene, SceneError> {
+/// Returns whether a file's name is that of a scene file in TOML.
+fn is_scene_file(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
+}
+
+/// Loads a mesh file as a scene: the mesh with its own materials, a camera that frames it, one light and ambient light.
+fn load_mesh_file(path: &Path) -> Result<Scene, SceneError> {
     let mut scene = Scene::empty(path);
-    let shading = obj::Shading { smooth: true, crease: obj::DEFAULT_CREASE };
-    let (mesh, library) = obj::parse_obj(path, &obj::read_obj(path)?, shading, 0)?;
+    let (mesh, library) = mesh_file::parse_mesh(path, mesh_file::read_mesh(path)?, Shading::default(), 0)?;
     let slots = scene.push_library(library);
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
     let bounds = scene.bounds();

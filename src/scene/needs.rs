@@ -23,6 +23,15 @@ pub(super) fn require_for_triangles(n_loaded: u64, n_more: u64) -> Checked<()> {
 
 /// Refuses a text file that is too large for the memory. Accepts a file that cannot be read; reading it then fails.
 pub(super) fn require_for_text(path: &Path) -> Checked<()> {
+    require_for_copies(path, TEXT_COPIES)
+}
+
+/// Refuses a file of rows or facets that is too large for the memory, as [`require_for_text`] does for text.
+pub(super) fn require_for_bytes(path: &Path) -> Checked<()> {
+    require_for_copies(path, 1)
+}
+
+fn require_for_copies(path: &Path, n_copies: u64) -> Checked<()> {
     let n_bytes = fs::metadata(path).map_or(0, |metadata| metadata.len());
-    require("reading it", n_bytes.saturating_mul(TEXT_COPIES)).map_err(|error| error.to_string())
+    require("reading it", n_bytes.saturating_mul(n_copies)).map_err(|error| error.to_string())
 }

@@ -16,6 +16,24 @@ const MAX_PAIRED_FACES: usize = 256;
 /// Deviation (1 - cosine; 0.08 degrees) below which a normal counts as the normal of the face's plane.
 const FLAT_TOLERANCE: f32 = 1e-6;
 
+/// Angle between two faces, in degrees, beyond which their common edge is sharp.
+pub(super) const DEFAULT_CREASE: f32 = 40.0;
+
+/// Options of a mesh's shading.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shading {
+    /// If false, every face is flat, even where the file has normals.
+    pub smooth: bool,
+    /// Angle between two faces without normals, in degrees, beyond which their common edge is sharp.
+    pub crease: f32,
+}
+
+impl Default for Shading {
+    fn default() -> Self {
+        Self { smooth: true, crease: DEFAULT_CREASE }
+    }
+}
+
 /// A face's share in the averages at its corners: its normal, and its angles as weights.
 #[derive(Clone, Copy, Default)]
 struct Facet {
@@ -46,6 +64,14 @@ pub(super) fn crease_normals(positions: &[Vec3], faces: &[[u32; 3]], smooth: &[b
         if is_flat { [Vec3::ZERO; 3] } else { normals }
     };
     faces.par_iter().zip(&facets).map(normals_of).collect()
+}
+
+/// Returns the shading normals of a mesh whose file has none: those of [`crease_normals`], or zeros for flat shading.
+pub(super) fn smooth_normals(positions: &[Vec3], faces: &[[u32; 3]], shading: Shading) -> Vec<[Vec3; 3]> {
+    match shading.smooth {
+        true => crease_normals(positions, faces, &vec![true; faces.len()], shading.crease),
+        false => vec![[Vec3::ZERO; 3]; faces.len()],
+    }
 }
 
 /// The data from which the normals at the corners of faces are computed.

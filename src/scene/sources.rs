@@ -5,15 +5,16 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 use super::{
+    is_scene_file,
+    mesh_file::MeshFormat,
     obj::named_libraries,
-    read::{read_lossy, read_utf8},
+    read::{lossy_text, read_bytes, read_utf8},
 };
 
 /// Returns the sorted paths of the scene file, the mesh files that it names, and the material libraries that the mesh
 /// files name. The files need not exist. A file that cannot be read contributes no names.
 pub fn source_files(path: &Path) -> Vec<PathBuf> {
-    let is_obj = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("obj"));
-    let meshes = if is_obj { vec![path.to_owned()] } else { meshes(path) };
+    let meshes = if is_scene_file(path) { meshes(path) } else { vec![path.to_owned()] };
     let libraries: Vec<_> = meshes.iter().flat_map(|mesh| libraries(mesh)).collect();
     let mut files = [vec![path.to_owned()], meshes, libraries].concat();
     files.sort();
@@ -30,7 +31,11 @@ fn meshes(scene: &Path) -> Vec<PathBuf> {
 }
 
 fn libraries(mesh: &Path) -> Vec<PathBuf> {
-    named_libraries(mesh, &read_lossy(mesh).unwrap_or_default())
+    let bytes = read_bytes(mesh).unwrap_or_default();
+    match MeshFormat::of(mesh, &bytes) {
+        MeshFormat::Obj => named_libraries(mesh, &lossy_text(bytes)),
+        MeshFormat::Ply | MeshFormat::Stl => Vec::new(),
+    }
 }
 
 #[cfg(test)]

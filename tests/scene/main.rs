@@ -4,6 +4,7 @@ mod errors;
 mod extent;
 mod generators;
 mod instances;
+mod mesh_files;
 mod obj;
 mod path;
 #[path = "../support/mod.rs"]

@@ -72,7 +72,7 @@ pub struct PaperArgs {
 
 #[derive(clap::Args)]
 pub struct TraversalArgs {
-    /// OBJ file or scene file
+    /// Mesh file (OBJ, PLY, STL) or scene file
     pub mesh: PathBuf,
     /// Size of the picture in pixels; each pixel has one primary ray
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
@@ -107,7 +107,7 @@ pub struct TraversalArgs {
 
 #[derive(clap::Args)]
 pub struct DriverArgs {
-    /// OBJ file or scene file
+    /// Mesh file (OBJ, PLY, STL) or scene file
     pub mesh: PathBuf,
     /// Size of the picture in pixels; each pixel has one primary ray
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]

@@ -12,28 +12,9 @@ pub(super) use self::mtl::{Library, named_libraries};
 use super::{
     error::SceneError,
     mesh::Mesh,
-    needs::{require_for_text, require_for_triangles},
-    read::read_lossy,
-    smooth::crease_normals,
+    needs::require_for_triangles,
+    smooth::{Shading, crease_normals},
 };
-
-/// Angle between two faces, in degrees, beyond which their common edge is sharp.
-pub(super) const DEFAULT_CREASE: f32 = 40.0;
-
-/// Options of a mesh's shading.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Shading {
-    /// If false, every face is flat, even where the file has normals.
-    pub smooth: bool,
-    /// Angle between two faces without normals, in degrees, beyond which their common edge is sharp.
-    pub crease: f32,
-}
-
-/// Reads the text of an OBJ file, unless it is too large for the memory.
-pub(super) fn read_obj(path: &Path) -> Result<String, SceneError> {
-    require_for_text(path).map_err(|what| SceneError::file(path, what))?;
-    read_lossy(path)
-}
 
 /// Makes a mesh from an OBJ file's text, and reads its materials. A face's slot is an index into the library. A face
 /// without a material, or with one that the library lacks, has slot `library.materials.len()`. `n_loaded` is the
@@ -50,11 +31,7 @@ pub(super) fn parse_obj(
     let library = mtl::load_libraries(path, &clean.libraries)?;
     warn(path, &clean, &library);
     let models = parse(&clean, &library).map_err(|e| SceneError::file(path, e.to_string()))?;
-    let mesh = mesh(&models, library.materials.len() as u32, shading);
-    if mesh.faces.is_empty() {
-        return Err(SceneError::file(path, "has no triangles"));
-    }
-    Ok((mesh, library))
+    Ok((mesh(&models, library.materials.len() as u32, shading), library))
 }
 
 /// Warns of the first unknown statement, and of the first material, by name, that is used but not defined. Further

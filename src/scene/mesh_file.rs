@@ -1,0 +1,77 @@
+//! Mesh files: OBJ, PLY and STL. A file's content says which of them it is; its name counts only if the content does
+//! not tell.
+
+use std::path::Path;
+
+use super::{
+    error::SceneError,
+    mesh::Mesh,
+    needs::{require_for_bytes, require_for_text},
+    obj::{Library, parse_obj},
+    ply::parse_ply,
+    read::{lossy_text, read_bytes},
+    smooth::Shading,
+    stl::{is_binary_stl, parse_stl},
+};
+
+/// Format of a mesh file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum MeshFormat {
+    Obj,
+    Ply,
+    Stl,
+}
+
+impl MeshFormat {
+    /// Returns the format that the name's ending stands for, if it is a mesh file's.
+    pub fn of_name(path: &Path) -> Option<Self> {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "obj" => Some(Self::Obj),
+            "ply" => Some(Self::Ply),
+            "stl" => Some(Self::Stl),
+            _ => None,
+        }
+    }
+
+    /// Returns the format of a file. OBJ is text without a mark, so it is what the file has if nothing else fits.
+    pub fn of(path: &Path, bytes: &[u8]) -> Self {
+        if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
+            Self::Ply
+        } else if is_binary_stl(bytes) || bytes.trim_ascii_start().starts_with(b"solid") {
+            Self::Stl
+        } else {
+            Self::of_name(path).unwrap_or(Self::Obj)
+        }
+    }
+}
+
+/// Reads a mesh file, unless it is too large for the memory.
+pub(super) fn read_mesh(path: &Path) -> Result<Vec<u8>, SceneError> {
+    let required = match MeshFormat::of_name(path) {
+        Some(MeshFormat::Ply | MeshFormat::Stl) => require_for_bytes(path),
+        _ => require_for_text(path),
+    };
+    required.map_err(|what| SceneError::file(path, what))?;
+    read_bytes(path)
+}
+
+/// Makes a mesh from a file's content, and reads the materials that it names. A face's slot is an index into the
+/// library. A face without a material, or with one that the library lacks, has slot `library.materials.len()`.
+/// `n_loaded` is the number of triangles that the scene has already.
+pub(super) fn parse_mesh(
+    path: &Path,
+    bytes: Vec<u8>,
+    shading: Shading,
+    n_loaded: usize,
+) -> Result<(Mesh, Library), SceneError> {
+    let failed = |what: String| SceneError::file(path, what);
+    let (mesh, library) = match MeshFormat::of(path, &bytes) {
+        MeshFormat::Obj => parse_obj(path, &lossy_text(bytes), shading, n_loaded)?,
+        MeshFormat::Ply => (parse_ply(path, &bytes, shading, n_loaded).map_err(failed)?, Library::default()),
+        MeshFormat::Stl => (parse_stl(bytes, shading, n_loaded).map_err(failed)?, Library::default()),
+    };
+    if mesh.faces.is_empty() {
+        return Err(SceneError::file(path, "has no triangles"));
+    }
+    Ok((mesh, library))
+}

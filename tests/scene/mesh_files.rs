@@ -1,0 +1,243 @@
+//! PLY and STL files, held against OBJ files of the same meshes.
+
+use std::fmt::Write;
+
+use glam::Vec3;
+use kdray::{layout::normal::decode_octahedral, world::FlatScene};
+
+use super::{load, support::random::Random};
+
+/// The corners of a cube, and its sides as polygons that are counter-clockwise from outside.
+const CORNERS: [[f32; 3]; 8] = [
+    [-1.0, -1.0, -1.0],
+    [1.0, -1.0, -1.0],
+    [1.0, 1.0, -1.0],
+    [-1.0, 1.0, -1.0],
+    [-1.0, -1.0, 1.0],
+    [1.0, -1.0, 1.0],
+    [1.0, 1.0, 1.0],
+    [-1.0, 1.0, 1.0],
+];
+const SIDES: [[u32; 4]; 6] = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+
+fn obj() -> Vec<u8> {
+    let mut text: String = CORNERS.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+    text.extend(SIDES.map(|side| format!("f {} {} {} {}\n", side[0] + 1, side[1] + 1, side[2] + 1, side[3] + 1)));
+    text.into_bytes()
+}
+
+fn ply_header(format: &str) -> String {
+    format!(
+        "ply\nformat {format} 1.0\ncomment a cube\n\
+         element vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
+         element face 6\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+}
+
+fn ply_text() -> Vec<u8> {
+    let mut text = ply_header("ascii");
+    text.extend(CORNERS.map(|[x, y, z]| format!("{x} {y} {z}\n")));
+    text.extend(SIDES.map(|[a, b, c, d]| format!("4 {a} {b} {c} {d}\n")));
+    text.into_bytes()
+}
+
+fn ply_binary(is_big: bool) -> Vec<u8> {
+    let word = |bits: u32| if is_big { bits.to_be_bytes() } else { bits.to_le_bytes() };
+    let mut bytes = ply_header(if is_big { "binary_big_endian" } else { "binary_little_endian" }).into_bytes();
+    bytes.extend(CORNERS.as_flattened().iter().flat_map(|x| word(x.to_bits())));
+    SIDES.iter().for_each(|side| {
+        bytes.push(4);
+        bytes.extend(side.iter().flat_map(|ix| word(*ix)));
+    });
+    bytes
+}
+
+/// The cube's triangles: fans of its sides.
+fn triangles() -> impl Iterator<Item = [[f32; 3]; 3]> {
+    let corner = |ix: u32| CORNERS[ix as usize];
+    SIDES.into_iter().flat_map(move |[a, b, c, d]| [[a, b, c], [a, c, d]].map(|face| face.map(corner)))
+}
+
+fn stl_text(name: &str, triangles: impl Iterator<Item = [[f32; 3]; 3]>) -> String {
+    let mut text = format!("solid{name}\n");
+    for triangle in triangles {
+        text += "  facet normal nan 0 0\n    outer loop\n";
+        triangle.iter().for_each(|[x, y, z]| writeln!(text, "      vertex {x:e} {y} {z}").unwrap());
+        text += "    endloop\n  endfacet\n";
+    }
+    text + &format!("endsolid{name}\n")
+}
+
+fn stl_binary(comment: &[u8]) -> Vec<u8> {
+    let mut bytes = [comment, &[b' '; 80]].concat()[..80].to_vec();
+    bytes.extend(12_u32.to_le_bytes());
+    for triangle in triangles() {
+        let numbers = [0.0; 3].into_iter().chain(triangle.into_iter().flatten());
+        bytes.extend(numbers.flat_map(f32::to_le_bytes));
+        bytes.extend([0, 0]);
+    }
+    bytes
+}
+
+/// Every way to write the cube, with the ending of its file's name.
+fn cubes() -> Vec<(&'static str, Vec<u8>)> {
+    let halves = [stl_text(" a", triangles().take(6)), stl_text("", triangles().skip(6))].concat();
+    vec![
+        ("ply", ply_text()),
+        ("ply", ply_binary(false)),
+        ("ply", ply_binary(true)),
+        ("ply", String::from_utf8(ply_text()).unwrap().replace('\n', "\r\n").into_bytes()),
+        ("stl", stl_text(" cube", triangles()).into_bytes()),
+        ("stl", [b"solid caf\xe9\n", stl_text("", triangles()).split_at(6).1.as_bytes()].concat()),
+        ("stl", halves.into_bytes()),
+        ("stl", stl_binary(b"a cube")),
+        ("stl", stl_binary(b"solid cube")),
+    ]
+}
+
+fn load_as(name: &str, content: &[u8]) -> FlatScene {
+    load(&[(name, content)]).unwrap_or_else(|e| panic!("{e}\n{}", String::from_utf8_lossy(content)))
+}
+
+fn error(name: &str, content: &[u8]) -> String {
+    load(&[(name, content)])
+        .map(|scene| scene.triangles.len())
+        .expect_err(&String::from_utf8_lossy(content))
+        .to_string()
+}
+
+#[test]
+fn a_cube_is_the_same_in_every_format() {
+    let expected = load_as("cube.obj", &obj());
+    assert_eq!(expected.triangles.len(), 12);
+    for (ix, (ending, content)) in cubes().into_iter().enumerate() {
+        let found = load_as(&format!("cube.{ending}"), &content);
+        assert_eq!(found.triangles, expected.triangles, "cube {ix}");
+        assert_eq!((found.camera, found.materials), (expected.camera, expected.materials.clone()), "cube {ix}");
+        assert_eq!(found.triangle_materials, expected.triangle_materials, "cube {ix}");
+    }
+    let moved =
+        load_as("cube.ply", &String::from_utf8(ply_text()).unwrap().replacen("-1 -1 -1", "-1 -1 -1.5", 1).into_bytes());
+    assert_ne!(moved.triangles, expected.triangles, "a moved corner");
+}
+
+#[test]
+fn the_content_counts_and_not_the_name() {
+    let expected = load_as("cube.obj", &obj());
+    for (_, content) in cubes() {
+        for name in ["cube.obj", "CUBE.PLY", "cube.Stl"] {
+            assert_eq!(load_as(name, &content).triangles, expected.triangles, "{name}");
+        }
+    }
+    assert!(error("cube.txt", &ply_text()).ends_with("in none of .toml, .obj, .ply and .stl"));
+}
+
+#[test]
+fn scene_files_place_meshes_of_every_format() {
+    let scene =
+        b"[[mesh]]\nfile = 'a.ply'\n[[mesh]]\nfile = 'b.stl'\ntransform = { translate = [4, 0, 0] }\nsmooth = false\n";
+    let found = load(&[("scene.toml", scene), ("a.ply", &ply_binary(false)), ("b.stl", &stl_binary(b""))]).unwrap();
+    assert_eq!(found.triangles.len(), 24);
+    assert_eq!(found.triangles[12].v0, found.triangles[0].v0 + Vec3::new(4.0, 0.0, 0.0));
+    let missing = error("scene.toml", b"# a comment\n[[mesh]]\nfile = 'none.ply'\n");
+    assert!(missing.contains("scene.toml:2") && missing.contains("none.ply"), "{missing}");
+}
+
+#[test]
+fn ply_is_read_as_people_write_it() {
+    // Doubles, integers, properties and elements that are not read, faces before vertices, another name of the list,
+    // a polygon of five corners, and faces of fewer than three.
+    let text = "ply\nformat ascii 1.0\nobj_info scanned\n\
+                element camera 1\nproperty float view_px\nproperty list uchar int ids\n\
+                element face 4\nproperty uchar flags\nproperty list ushort uint vertex_index\nelement vertex 5\n\
+                property double x\nproperty int y\nproperty uchar red\nproperty float z\nend_header\n\
+                0.5 2 7 8\n0 5 0 1 2 3 4\n1 2 0 1\n0 0\n2 3 4 2 0\n\
+                0 0 255 0\n2 0 0 0\n3e0 1 9 0\n2 2 0 0\n0.25 2 1 0\n";
+    let scene = load_as("x.ply", text.as_bytes());
+    let corners: Vec<_> = scene.triangles.iter().map(|t| [t.v0, t.v1, t.v2].map(|v| v.truncate().to_array())).collect();
+    let [a, b, c, d, e] = [[0.0, 0.0], [2.0, 0.0], [3.0, 1.0], [2.0, 2.0], [0.25, 2.0]];
+    assert_eq!(corners, [[a, b, c], [a, c, d], [a, d, e], [e, c, a]]);
+}
+
+#[test]
+fn the_normals_of_a_ply_file_count() {
+    let text = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float nx\nproperty float ny\nproperty float nz\n\
+                property float x\nproperty float y\nproperty float z\nelement face 1\n\
+                property list uchar int vertex_indices\nend_header\n0 3 4 0 0 0\n0 0 2 1 0 0\n0 0 0 0 1 0\n3 0 1 2\n";
+    let scene = load_as("x.ply", text.as_bytes());
+    let [triangle] = scene.triangles[..] else { panic!("one triangle") };
+    assert!(decode_octahedral(triangle.n0).distance(Vec3::new(0.0, 0.6, 0.8)) < 1e-4);
+    assert!(decode_octahedral(triangle.n1).distance(Vec3::Z) < 1e-4);
+    assert_eq!(triangle.n2, kdray::layout::FLAT_NORMAL, "a zero normal is none");
+    let flat = load(&[("s.toml", b"mesh = [{ file = 'x.ply', smooth = false }]"), ("x.ply", text.as_bytes())]).unwrap();
+    assert_eq!(flat.triangles[0].n0, kdray::layout::FLAT_NORMAL);
+}
+
+#[test]
+fn mistakes_are_named() {
+    let ply = String::from_utf8(ply_text()).unwrap();
+    for (from, to, what) in [
+        ("4 0 3 2 1", "4 0 3 2 8", "face 0 (counted from 0) has vertex 8, but there are 8 vertices"),
+        ("4 0 3 2 1", "4 0 3 2 -1", "element `face`"),
+        ("element face 6", "element face 600", "element `face`: the file ends too early"),
+        (
+            "element face 6\nproperty list uchar int vertex_indices",
+            "element edge 6\nproperty list uchar int vertex_indices",
+            "no element `face`: clouds of points",
+        ),
+        ("element face 6", "element tristrips 6", "strips are not read"),
+        ("vertex_indices", "indices", "lacks the list `vertex_indices`"),
+        ("property float z", "property float w", "lacks x, y or z"),
+        ("element vertex 8", "element corner 8", "no element `vertex`"),
+        ("-1 -1 -1", "-1 -1 nan", "a vertex lies at"),
+        ("1 -1 -1", "1 x -1", "element `vertex`"),
+        ("format ascii 1.0", "format morse 1.0", "is no PLY file"),
+    ] {
+        let found = error("x.ply", ply.replacen(from, to, 1).as_bytes());
+        assert!(found.contains("x.ply: ") && found.contains(what) && found.lines().count() == 1, "{to}: {found}");
+    }
+    let empty = ply.replace("end_header", "element empty 99999999999999999\nend_header");
+    assert!(error("x.ply", empty.as_bytes()).contains("element `empty` has no properties"));
+    assert!(error("x.ply", b"v 0 0 0\n").contains("is no PLY file"));
+    assert!(
+        error("x.ply", ply.replace("element face 6", "element face 99999999999999").as_bytes())
+            .contains("element `face`")
+    );
+    let stl = stl_text("", triangles());
+    for (from, to, what) in [
+        ("vertex -1e0 -1 -1", "vertex -1e0 -1", "the solid at line 1: vertex f32 f32 f32"),
+        ("vertex -1e0 -1 -1", "vertex -1e0 -1 inf", "expected finite"),
+        ("endloop", "", "expected"),
+        ("endsolid", "", "EOF"),
+    ] {
+        let found = error("x.stl", stl.replacen(from, to, 1).as_bytes());
+        assert!(found.contains("x.stl: ") && found.contains(what) && found.lines().count() == 1, "{to}: {found}");
+    }
+    assert!(error("x.stl", b"solid x\nendsolid x\n").contains("has no triangles"));
+    assert!(error("x.stl", b"junk").contains("is no STL file"));
+    let binary = stl_binary(b"");
+    assert!(error("x.stl", &binary[..200]).contains("ends after 2 of 12 facets"));
+}
+
+/// Changes random bytes and cuts files off. Files are loaded or refused, in one line, and nothing else happens.
+#[test]
+fn spoilt_files_are_no_trouble() {
+    let mut random = Random(5);
+    let cubes = cubes();
+    let mut n_refused = 0;
+    for round in 0..3000 {
+        let (ending, mut content) = cubes[round % cubes.len()].clone();
+        for _ in 0..1 + random.below(4) {
+            let at = random.below(content.len());
+            content[at] = random.below(256) as u8;
+        }
+        if random.below(3) == 0 {
+            content.truncate(random.below(content.len()));
+        }
+        if let Err(error) = load(&[(&format!("x.{ending}"), &content)]) {
+            n_refused += 1;
+            assert_eq!(error.to_string().lines().count(), 1, "{error}");
+        }
+    }
+    assert!((300..3000).contains(&n_refused), "{n_refused} of 3000");
+}
