@@ -26,7 +26,8 @@
 //! # Documents
 //!
 //! - [`documents::guide`]: scene files, rendering, layers, films, the viewer, casting rays, measuring.
-//! - [`documents::architecture`]: the way of the data; adding a pass, an array, a traversal, an acceleration structure.
+//! - [`documents::architecture`]: the way of the data; adding a pass, an array, a traversal, an acceleration
+//!   structure.
 //! - [`documents::performance`]: all figures, each with its machine and command.
 //! - [`documents::experiments`]: what was tried, what it gave, what limits the traversal today.
 //! - [`documents::conventions`]: how the code and its comments are written.

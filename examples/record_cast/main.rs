@@ -68,6 +68,7 @@ unsafe fn cast(program: &Program, buffers: &Buffers, scene: Scene) -> Result<(),
     let mut caster = Caster::new(&context, world.geometry(), Traversal::Mask)?;
     let cast = caster.recorded(rays, hits, Query::Closest)?;
     let record = |commands: vk::CommandBuffer| {
+        // The cast needs no barrier before it: the submission makes the rays, which the host has written, visible.
         // SAFETY: the command buffer is being recorded.
         unsafe {
             cast.record(&GivenCommands::new(commands));

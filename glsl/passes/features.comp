@@ -23,7 +23,7 @@ void main() {
     if (hit.triangle_ix == NO_TRIANGLE) {
         pixel_features[pixel_ix].material_ix = NO_TRIANGLE;
         pixel_features[pixel_ix].depth = uintBitsToFloat(0x7f800000u);
-        return; // the host has cleared the vectors
+        return; // the vectors were cleared at the frame's start
     }
     Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
     uint material_ix = load_triangle_materials(hit.triangle_ix);

@@ -1,9 +1,10 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_ballot : require
-// Grid, sort, 1 of 3 (a least-significant-digit radix sort: Satish, Harris, Garland, "Designing efficient sorting
-// algorithms for manycore GPUs", 2009): each workgroup counts the pairs of its build.tiles_per_group tiles of
-// GRID_BLOCK_SIZE pairs by one digit of their cells' indices. grid_spine.comp is the second kernel of the sort.
+// Grid, sort, 1 of 3: each workgroup goes through build.tiles_per_group tiles of GRID_BLOCK_SIZE pairs. It counts how
+// many of their pairs have each value of one digit of the cell's index. grid_spine.comp is the second kernel. The
+// sort is a least-significant-digit radix sort (Satish, Harris, Garland, "Designing efficient sorting algorithms for
+// manycore GPUs", 2009).
 // Reads build, pairs_from; writes scan_blocks[digit * workgroups + workgroup].
 #include "grid_build.glsl"
 #include "grid_digits.glsl"

@@ -2,9 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
 #extension GL_KHR_shader_subgroup_ballot : require
-// Grid, sort, 3 of 3: each workgroup writes the pairs of its build.tiles_per_group tiles of GRID_BLOCK_SIZE pairs in
-// the order of one digit. Pairs of the same digit keep their order. A tile is sorted in shared memory first, so that
-// neighbouring invocations write to neighbouring addresses.
+// Grid, sort, 3 of 3: each workgroup goes through the same tiles as in grid_sort_count.comp, and writes each pair to
+// its place in the order of the digit. Pairs of the same digit keep their order. A tile is sorted in shared memory
+// first, so that neighbouring invocations write to neighbouring addresses.
 // Reads build, pairs_from, scan_blocks; writes pairs_to.
 #include "grid_build.glsl"
 #include "grid_digits.glsl"

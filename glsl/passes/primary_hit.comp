@@ -31,8 +31,8 @@ uint triangle_of(uvec2 pixel) {
     return imageLoad(triangle_ids, ivec2(in_picture(pixel))).x;
 }
 
-// The camera ray's hit. Kernels find only triangles that the ray hits. The graphics pipeline may find a triangle that
-// the ray just misses. The hit is then moved to the triangle's edge.
+// The camera ray's hit. The kernels rasterize_*.comp find only triangles that the ray hits. The graphics pipeline may
+// find a triangle that the ray just misses. The hit is then moved to the triangle's edge.
 Hit hit_of(PathRay ray, uint triangle_ix) {
     Shear shear = shear_of(ray.origin, ray.direction);
     Triangle triangle = triangle_at(triangle_ix);

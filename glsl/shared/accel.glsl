@@ -2,7 +2,8 @@
 //
 // Needs a constant `bool COUNT_COSTS`, which the kernel declares before this file (steps.glsl). Provides `traverse`,
 // and `traverse_any_length` for directions of any length, which are all that a kernel calls to find a hit. Kernels
-// also use `is_stalled` and `runs_in_round` of stalls.glsl.
+// also use `is_stalled` and `runs_in_round` of stalls.glsl. cast.comp checks its rays by `exponent_of`,
+// `longest_bits` and `magnitude_bits`.
 //
 //   traversal_ray.glsl   the ray, clipped to the structure's box
 //   kdtree.glsl          the search through a kd-tree
@@ -69,8 +70,8 @@ uint exponent_of(vec3 direction) {
 // Does what `traverse` does, for a ray whose direction has any length, such as a ray that was transformed to the
 // space of an instance. t is in units of the direction. `exponent_of` the direction must be 1..254.
 //
-// The direction and t are scaled by a power of two, which loses none of their bits. For exponent 254, the power would
-// be denormal, so the power for 253 is used.
+// The direction and t are scaled by a power of two, which loses none of their bits unless they underflow. For
+// exponent 254, the power would be denormal, so the power for 253 is used.
 Hit traverse_any_length(PathRay ray, float t_min, bool any_hit) {
     uint exponent = min(exponent_of(ray.direction), 253u);
     float scale = uintBitsToFloat((254u - exponent) << 23); // 2^(127 - exponent)

@@ -14,7 +14,8 @@ struct Nearest {
 };
 
 // Whether a hit is in the ray's interval, not on its source triangle, and nearer than the best one. Of two hits at
-// the same t, the one with the lower triangle index wins, so the order of tests does not matter.
+// the same t, the one with the lower triangle index wins, so the order of tests does not matter. The first `best` is
+// at the ray's t_max with NO_TRIANGLE, the highest index, so a hit at t_max counts.
 bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
     bool nearer = t < best.t || (t == best.t && triangle_ix < best.triangle_ix);
     return t > ray.t_min && nearer && triangle_ix != ray.source_triangle;

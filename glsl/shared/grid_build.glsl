@@ -3,7 +3,7 @@
 //
 //   pair     the index of a cell, and the index of a triangle that comes near to it
 //   item     a triangle, and the lattice into whose cells it is sorted (grid_items.glsl)
-//   box      of an item: the cells of its lattice that the bounds of its triangle meet, grown by the margin
+//   box      of an item: the cells of its lattice that meet its triangle's bounds, which are grown by the margin
 //   column   the cells of an item's box that are in a line along one axis (grid_overlap.glsl)
 //   block    GRID_BLOCK_SIZE consecutive items, columns, pairs or upper cells, whose sum is one of scan_blocks. A
 //            block of lower cells (`blocks`) is something else: the cells that an upper cell is cut into.

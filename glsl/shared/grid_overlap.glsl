@@ -13,7 +13,8 @@
 
 // A factor on the margin, which covers the rounding of the cubes' middles and half edges.
 const float MARGIN_FACTOR = 1.0625;
-// A bound of the error of a product of two vectors, as a multiple of the product of their `sum_of_magnitudes`s.
+// A bound of the error of a cross product, and of the dot product of a cross product and a third vector. It is a
+// multiple of the product of all factors' `sum_of_magnitudes`.
 const float PRODUCT_ERROR = 1.0 / 1048576.0;
 
 // A triangle and the columns of its box. The axes are permuted so that columns extend along z, which is the axis of

@@ -1,10 +1,10 @@
 // Depth-first traversal of the kd-tree (the paper's section 2.3, Algorithm 2), closest hit or any hit. A part of
 // accel.glsl.
 //
-// A cell is a node and the interval [t_enter, t_exit] that the ray spends in it. Children are visited in the ray's
-// order: the first child is the one on the side that the ray comes from, the second child is the other one. A subtree
-// that is left for later is pending. The variants of the traversal differ in how they keep pending subtrees
-// (pending_*.glsl).
+// A `Cell` is a node and the interval [t_enter, t_exit] that the ray spends in the node's box. "A node's cell", which
+// other files use, is that box. Children are visited in the ray's order: the first child is the one on the side that
+// the ray comes from, the second child is the other one. A subtree that is left for later is pending. The variants of
+// the traversal differ in how they keep pending subtrees (pending_*.glsl).
 //
 // Needs scene.glsl, stalls.glsl, steps.glsl, traversal_ray.glsl, local_memory.glsl, candidate.glsl and
 // PREDICATES_BRANCHES. Provides `search_kdtree`, and with leaf.glsl the `Visit` that grid.glsl uses, too.
@@ -63,10 +63,10 @@ Visit next_leaf(TraversalRay ray, float t_best, inout Cell cell) {
     return visit_leaf(leaf, cell.t_enter, min(cell.t_exit, t_best));
 }
 
-// Searches in one loop, each of whose turns either tests a triangle or goes on to a leaf. So lanes that test stay
-// together, and so do lanes that go on. With a nested loop, lanes that are finished with it would wait for all other
-// lanes: until each of them has found a leaf, or has tested the triangles of its leaf. Returns 0, or the mark of a
-// ray that has stalled.
+// Searches in one loop, each of whose turns either tests a triangle or goes on to the next leaf. So lanes that test
+// stay together, and so do lanes that go on. If a turn tested all triangles of a leaf instead, lanes with few
+// triangles would wait for lanes with many. If a turn went from leaf to leaf until it has a triangle to test, lanes
+// that have one would wait for lanes that still seek. Returns 0, or the mark of a ray that has stalled.
 uint search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (!is_in(ray)) return 0u;
     Cell cell = root_cell(ray);
@@ -100,8 +100,8 @@ uint search_by_turns(TraversalRay ray, bool any_hit, inout Nearest best) {
 #include "lockstep.glsl"
 #include "brute.glsl"
 
-// Visits all leaves that the ray meets in [t_enter, t_exit], until no nearer hit can follow. Returns 0, or the mark
-// of a ray that has stalled.
+// Visits all leaves that the ray meets in [t_enter, t_exit], until no nearer hit can follow. With any_hit, the first
+// hit ends the search. TRAVERSAL_BRUTE tests all triangles instead. Returns 0, or the mark of a ray that has stalled.
 uint search_kdtree(TraversalRay ray, bool any_hit, inout Nearest best) {
     if (TRAVERSAL == TRAVERSAL_BRUTE) return intersect_all(ray, any_hit, best);
     clear_pending();

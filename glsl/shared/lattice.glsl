@@ -1,6 +1,6 @@
 // Lattices: adjacent cubes that fill a box from its least corner on. A lattice's cubes are the cells of a grid, or
 // those of a block of its lower level. At the greatest corner, the box may cut some of them. Twin of
-// src/accel/grid/lattice.rs, with the same results to the last bit.
+// src/accel/grid/lattice.rs, with the same results to the last bit, except for `cube_near`, which is an estimate.
 #ifndef KDRAY_LATTICE
 #define KDRAY_LATTICE
 

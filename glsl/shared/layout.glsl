@@ -7,7 +7,7 @@
 #ifndef KDRAY_LAYOUT
 #define KDRAY_LAYOUT
 
-// Invocations of a workgroup in ray kernels. Each invocation handles one ray.
+// Invocations of a workgroup in ray kernels. An invocation handles one ray, or none (`MOST_LANES_LOG2`).
 #define RAY_GROUP_SIZE 64u
 // Side of the square of pixels that a workgroup of a pixel kernel handles. It is also the side of the tiles in whose
 // order pixels are rendered.
@@ -176,8 +176,8 @@ struct LeafTriangle {
     uint reserved1;
 };
 
-// A node of the kd-tree, 8 bytes. The children of a split are neighbours at an even index, so a node's sibling is
-// `index ^ 1`. The root is node 0, and node 1 is unused.
+// A node of the kd-tree, 8 bytes. The children of a split are neighbours, the first of them at an even index. So a
+// node's sibling is `index ^ 1`. The root is node 0, and node 1 is unused.
 //
 // - `split_or_first`: in a split, the bits of the plane's position on the axis (a float, world units). In a leaf, the
 //   index of its first entry in `leaf_triangles`.
@@ -188,12 +188,14 @@ struct KdNode {
     uint axis_and_child;
 };
 
-// The plane of a leaf's triangle, 16 bytes. The planes of a leaf are side by side in memory, apart from its
-// triangles. A point p is `dot(normal, p) - distance` above the plane (world units).
+// The plane of a triangle in a leaf or in a grid's cell, 16 bytes. The planes of a leaf are side by side in memory,
+// apart from its triangles. A point p is in the plane if `dot(normal, p) == distance`. In general, the difference of
+// the two is p's height above the plane, times the normal's length.
 //
-// - `normal`: unit length, or 0 if the triangle has no area or its plane is not certain. Rays always test a triangle
-//   whose normal here is 0.
-// - `distance`: of the plane from the world's origin, along the normal (world units).
+// - `normal`: in a kd-tree, unit length. In a grid, the longest component is in `[1/4, 1/2)`, so the length is below
+//   1 (src/accel/grid/planes.rs). 0 if the triangle has no area or its plane is not certain. Rays always test a
+//   triangle whose normal here is 0.
+// - `distance`: of the plane from the world's origin, along the normal, times the normal's length (world units).
 struct Plane {
     vec3 normal;
     float distance;
@@ -290,9 +292,10 @@ struct PathRay {
 };
 
 // A ray that is cast by itself, not for a picture, 32 bytes. The length of `direction` is arbitrary; it is the unit
-// of t. Hits have t in `(t_min, t_max]`. All numbers are valid as `t_min` and `t_max`, but those below 2^-126 may
-// count as 0. Both are exact to the last bit if the origin is within the limit of `KD_MAX_ORIGIN_DISTANCE`. Otherwise
-// they are exact to 2^-24 of the distance from the ray's origin to the scene.
+// of t. Hits have t in `(t_min, t_max]`. All numbers are valid as `t_min` and `t_max`. An end that is less than 1e-36
+// world units from the ray's origin may count as 0, since devices may flush denormals. Otherwise both ends are exact
+// to the last bit if the origin is within the limit of `KD_MAX_ORIGIN_DISTANCE`. If it is not, they are exact to
+// 2^-24 of the distance from the ray's origin to the scene.
 struct Ray {
     vec3 origin;
     float t_min;
@@ -326,7 +329,8 @@ struct Hit {
 //   distance 1, to its right and its upper edge.
 // - `width`, `height`: of the window (pixels).
 // - `n_triangles`, `n_lights`: of the scene.
-// - `ambient`: radiance, weighted by `Material.ka`. `background`: radiance of rays that hit nothing.
+// - `ambient`: irradiance that every point receives, weighted by `Material.ka`. `background`: radiance of rays that
+//   hit nothing.
 // - `exposure`: factor of radiance before the tone curve.
 // - `denoise_threshold`: a pixel is smoothed if the differences between its luminance and those of its four
 //   neighbours add up to more than this.
@@ -365,9 +369,10 @@ struct Frame {
     uint reserved1;
 };
 
-// The rays of one bounce of one batch, 80 bytes. The host writes the row of a batch's first bounce. Compaction of
-// each bounce's rays (`compact_spine.comp`) writes the row of the next bounce. The rays of a batch are in one queue,
-// bounce after bounce. Each `groups` is a `VkDispatchIndirectCommand`.
+// The rays of one bounce of one batch, 80 bytes. The host writes the row of a batch's first bounce, and in all rows
+// the y and z of the `groups`. Compaction of each bounce's rays (`compact_spine.comp`) writes the rest of the next
+// bounce's row. The rays of a batch are in one queue, bounce after bounce. Each `groups` is a
+// `VkDispatchIndirectCommand`.
 //
 // - `first_ray`, `n_rays`: the bounce's rays in the queue.
 // - `n_wanted`: child rays of the bounce before, including those for which the queue has no room.
@@ -377,7 +382,7 @@ struct Frame {
 // - `shadow_groups`: over the segments from hits to lights. y counts lights, x all rays of the batch up to the last
 //   one of this bounce. A segment has `2^shadow_lanes_log2` lanes.
 // - `scan_groups`: over the bounce's rays.
-// - `any_overflow`: in the first row only, 1 if any row of the frame has an overflow.
+// - `any_overflow`: in the first row of `bounces` only, 1 if any row of the frame has an overflow.
 // - `shade_groups`: over all rays of the batch up to the last one of this bounce.
 struct Bounce {
     uint first_ray;
@@ -444,7 +449,7 @@ struct Feature {
 //
 // - `box_min`, `box_max`: the box that holds all triangles, with the structure's rounding margin (world units). In
 //   a grid, `box_min` is the least corner of the first cell.
-// - `plane_epsilon`: `KD_PLANE_EPSILON` times the scene's largest coordinate (world units).
+// - `plane_epsilon`: `KD_PLANE_EPSILON` times the greatest magnitude of a coordinate of that box (world units).
 // - `n_triangles`: of the scene.
 // - `n_cells_x`, `n_cells_y`, `n_cells_z`: cells of a grid's upper level along each axis.
 // - `cell_size`: edge of a cell of a grid's upper level (world units).
@@ -466,8 +471,8 @@ struct AccelConstants {
 
 // Specialization constants. Each has one number, one type and one meaning in all kernels. A kernel that uses one
 // declares it as `layout(constant_id = CONSTANT_X) const TYPE X = DEFAULT;`, and Rust sets it as `constants::X`.
-// build.rs refuses two constants with the same number. In a kernel, it refuses a constant that has the number of
-// another constant, or none here.
+// build.rs refuses two constants with the same number. In a kernel, it refuses a declaration of X whose number is not
+// `CONSTANT_X`, and an X for which this list has no number.
 
 // The algorithm that takes rays through the kd-tree: `TRAVERSAL_MASK` and its like.
 #define CONSTANT_TRAVERSAL 0u
@@ -571,9 +576,9 @@ struct LargeTriangle {
     uint size;
 };
 
-// The workgroups over the blocks of large triangles, 16 bytes: a `VkDispatchIndirectCommand`. In the same buffer, 8
-// bytes of counts follow it: the number of large triangles in the upper half, the number of their blocks in the
-// lower.
+// The workgroups over the blocks of large triangles, 16 bytes: a `VkDispatchIndirectCommand` and a spare word. In the
+// same buffer, 8 bytes of counts follow: the number of large triangles in the upper half, the number of their blocks
+// in the lower.
 struct RasterGroups {
     uint x;
     uint y;
@@ -646,7 +651,8 @@ struct GridBuild {
     vec3 box_max;
     float margin;
     // n_cells_*: cells of this lattice along each axis.
-    // largest_coordinate: the greatest magnitude of a coordinate of the finite triangles' bounds (world units).
+    // largest_coordinate: the greatest magnitude of a coordinate of box_min and box_max, which are the bounds of the
+    // finite triangles grown by the margin (world units).
     uint n_cells_x;
     uint n_cells_y;
     uint n_cells_z;

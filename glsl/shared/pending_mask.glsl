@@ -1,5 +1,5 @@
 // Pending subtrees by the paper's bit mask. It has one bit for each level, which is set if the sibling on that level
-// is still to be visited. (The paper stores the opposite, "sibling done", of 32 levels in one word.) A part of
+// is still to be visited. (The paper stores the opposite, "sibling done", in one word of 32 bits.) A part of
 // pending.glsl.
 //
 // The paper counts levels from the root, and climbs them one by one to test the sibling's box. Here the mask is

@@ -2,9 +2,9 @@
 // by level, a bit tells whether the sibling has been visited. If it has not, its box is tested. A part of
 // pending.glsl.
 //
-// This version corrects the paper in three points. There are 64 levels instead of 31. A failed test does not change
-// the entry point. A hit ends the search only if no other cell can hold a nearer one, not as soon as any leaf has a
-// hit.
+// This version corrects the paper in three points. There are 64 levels instead of 31. If the test of a box fails, the
+// t at which the ray enters stays as it is. A hit ends the search only if no other cell can hold a nearer one, not as
+// soon as any leaf has a hit.
 //
 // Needs kd_nodes.glsl, kd_boxes.glsl and pending_mask.glsl. Provides `climb_by_boxes` and `siblings_done`.
 

@@ -15,8 +15,9 @@ Interval interval_of(float t_enter, float t_exit) {
     return Interval(t_enter + t_exit, t_exit - t_enter);
 }
 
-// Whether the ray, within `interval`, stays on one side of a plane and farther from it than `reach`. plane: normal,
-// and distance from the world's origin. reach: in units of `plane.w`, as a point's `dot(normal, p)` is.
+// Whether the ray, within `interval`, stays on one side of a plane and farther from it than `reach`. plane: xyz is a
+// normal of any length, w is `dot(normal, p)` of the plane's points p. reach: in the same units, a distance times the
+// normal's length.
 bool is_clear(TraversalRay ray, Interval interval, vec4 plane, float reach) {
     float height = dot(plane.xyz, ray.shear.origin) - plane.w;
     float slope = dot(plane.xyz, ray.direction);

@@ -21,8 +21,8 @@ const bool CAN_STALL = TURN_BUDGET != 0u;
 // node_offset, t_enter, t_exit: the cell that the ray is in (kd_nodes.glsl). entry_ix, end_ix: the entries of the
 // leaf that are still to be tested. t_best, triangle_ix, u, v: the nearest hit so far. n_steps: reads so far
 // (steps.glsl). siblings_done: the mask of TRAVERSAL_MASK_BOXES; the other traversals of the kd-tree rebuild their
-// pending subtrees. grid.glsl stores the packed indices of the ray's cell in node_offset, and those of the cell of
-// the upper level in siblings_done.x.
+// pending subtrees or store none. grid.glsl stores the packed indices of the ray's cell in node_offset, and those of
+// the cell of the upper level in siblings_done.x.
 struct StalledRay {
     uint node_offset;
     float t_enter;
@@ -80,8 +80,8 @@ bool is_stalled(uint mark) {
     return CAN_STALL && mark >= STALLED && mark != NO_TRIANGLE;
 }
 
-// Whether a ray runs in this round (ROUND_*). Sets `resumed_slot` in ROUND_RESUME. mark: the word that the round
-// before has written as the ray's result.
+// Whether a ray runs in this round (ROUND_*). Sets `resumed_slot` in ROUND_RESUME. mark: the word that was written as
+// the ray's result in the last round in which the ray ran.
 bool runs_in_round(uint round, uint mark) {
     if (TURN_BUDGET == 0u || round == ROUND_BEGIN) return true;
     if (!is_stalled(mark)) return false;

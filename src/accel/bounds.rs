@@ -10,10 +10,13 @@ use crate::layout::Triangle;
 /// Thanks to the margin, the traversal may treat its own arithmetic as exact: the leaf that the traversal visits at a
 /// hit's t has the hit triangle. Proof: let m be the largest coordinate, u = 2^-24, and o the ray's origin. |o| is at
 /// most 4 m (`KD_MAX_ORIGIN_DISTANCE`). Divisions are right to 2.5 units in the last place, as Vulkan guarantees.
-/// Then the point where a ray crosses the split plane of coordinate p is off by u (|o| + |p| + 6 |p - o|) <= 35 u m.
-/// The point at a hit's t is off the triangle by u (11.5 D + 14 L) on each axis, as `reference::triangle` proves. D,
-/// the greatest coordinate difference between o and a corner, is at most 5 m. L, that between two corners, is at most
-/// 2 m. So the point is off by at most 85.5 u m. The sum is 120.5 u m, of the margin's 128 u m.
+/// Then the point where a ray crosses the split plane of coordinate p is off by u (|o| + |p| + 6 |p - o|) <= 35 u m
+/// on the plane's axis. Since t is `fma(p, inv_direction, bias)` with `bias = -o * inv_direction`, |o| comes from the
+/// product in `bias`, |p| from the product in `fma`, which some devices round, and of the 6, 1 comes from the sum in
+/// `fma` and 5 from the division, as 2.5 units in the last place are up to 5 u of a quotient. The point at a hit's t
+/// is off the triangle by u (11.5 D + 14 L) on each axis, as `reference::triangle` proves. D, the greatest coordinate
+/// difference between o and a corner, is at most 5 m. L, that between two corners, is at most 2 m. So the point is
+/// off by at most 85.5 u m. The sum is 120.5 u m, of the margin's 128 u m.
 pub const MARGIN: f32 = 1.0 / (1 << 17) as f32;
 
 /// Closed axis-aligned box, world units.

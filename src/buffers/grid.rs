@@ -36,7 +36,7 @@ pub struct GridCapacities {
     pub n_triangles: u32,
     /// Pairs of a cell and a triangle.
     pub n_references: u32,
-    /// Columns of cells in the boxes of all triangles.
+    /// Columns of cells in the boxes of all items of a level.
     pub n_columns: u32,
     /// Cells of the upper level, or of the only level.
     pub n_upper: u32,

@@ -165,7 +165,8 @@ impl Caster {
         Ok(())
     }
 
-    /// Runs the kernel on the uploaded batch, with one submit for each repetition. Returns the milliseconds of each.
+    /// Runs the kernel on the uploaded batch, with one command buffer for each repetition. Returns the milliseconds
+    /// of each repetition.
     fn run(&self, query: Query, n_rays: u32, n_times: u32) -> Result<Option<Vec<f64>>, GpuError> {
         let kernel = match query {
             Query::Closest => &self.closest,

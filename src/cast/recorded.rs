@@ -43,9 +43,10 @@ impl Caster {
 }
 
 impl RecordedCast {
-    /// Records the cast. The caller records a barrier before it, which makes the rays visible to storage reads of
-    /// compute shaders, and one after it, since a compute shader writes the hits to storage. The cast replaces the
-    /// pipeline, descriptor set and push constants that are bound for compute, and the descriptor set for graphics.
+    /// Records the cast. The caller records a barrier before it, which makes rays that the device has written
+    /// visible to storage reads of compute shaders, and one after it, since a compute shader writes the hits to
+    /// storage. Rays that the host has written before the submission need no barrier. The cast replaces the pipeline,
+    /// descriptor set and push constants that are bound for compute, and the descriptor set for graphics.
     ///
     /// Only one cast of a [`Caster`] may run at a time. The cast must live until the device has run the commands.
     pub fn record(&self, commands: &GivenCommands) {

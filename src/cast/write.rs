@@ -24,7 +24,7 @@ use crate::{
 /// Number of hits that are read from the spool at a time: 1 MiB.
 const HITS_AT_A_TIME: usize = 1 << 16;
 
-/// Writes a `.npz` file. The file does not exist before [`HitWriter::finish`].
+/// Writes a `.npz` file. Until [`HitWriter::finish`], no file is created at its path, and an earlier file stays.
 ///
 /// The arrays for [`Query::Closest`] are `t_hit` (float32 K, infinity on a miss), `primitive_ids` (uint32 K,
 /// 4294967295 on a miss), `primitive_uvs` (float32 K x 2, the weights of the triangle's second and third corner) and

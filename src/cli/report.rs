@@ -52,7 +52,7 @@ pub struct Report {
     pub frame: Frame,
 }
 
-/// Times of a frame that was drawn more than once.
+/// Range of the times of several frames: one frame drawn repeatedly, or the frames of a path.
 #[derive(Serialize)]
 pub struct FrameTimeRange {
     n_frames: usize,

@@ -165,8 +165,8 @@ impl Renderer {
         self.options.window().part(&self.pixel_features, &self.options.crop_or_whole())
     }
 
-    /// Returns the properties that decide the passes of the next sample. Only devices rasterize, so the CPU replaces
-    /// `Primary::SoftwareRaster` by `Primary::Raster`.
+    /// Returns the properties that decide the passes of the next sample. The CPU does not rasterize: for both kinds
+    /// of rasterization it runs the pass `visibility` of `Primary::Raster`, which here traces a ray for each pixel.
     fn frame_kind(&self) -> FrameKind {
         let kind = FrameKind::new(&self.options, self.frame.n_lights);
         let primary = if kind.primary == Primary::Trace { Primary::Trace } else { Primary::Raster };

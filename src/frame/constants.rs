@@ -10,8 +10,8 @@ use crate::{
 };
 
 /// Distance of the near plane from the eye, divided by the distance of the farthest corner of the scene's box. The
-/// camera is assumed to see nothing nearer than this plane, since the graphics pipeline clips it. Reverse-Z in
-/// floating point loses no precision if the plane is so near.
+/// graphics pipeline clips all that is nearer than this plane, so the camera is assumed to see nothing there.
+/// Reverse-Z in floating point loses no precision if the plane is so near.
 const NEAR_SHARE: f64 = 1.0 / (1 << 20) as f64;
 
 impl Frame {

@@ -36,7 +36,7 @@ pub use self::{
 };
 use crate::{accel::kdtree::Traversal, layout};
 
-/// How a frame is rendered. The command takes what its user does not set from the scene's
+/// How a frame is rendered. For each option that the user does not set, the command takes the value of the scene's
 /// [`RenderDefaults`](crate::scene::RenderDefaults).
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderOptions {

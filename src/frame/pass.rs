@@ -283,12 +283,13 @@ impl Pass {
         self.info().color
     }
 
-    /// Returns the resources that its kernel reads, without the scene's arrays, which no pass writes.
+    /// Returns the resources that its kernel declares as readable, without the scene's arrays, which no pass writes.
     pub fn reads(self) -> &'static [Resource] {
         self.info().reads
     }
 
-    /// Returns the resources that its kernel writes. Most kernels write only parts of them.
+    /// Returns the resources that its kernel declares as writable. Most kernels write only parts of them, and
+    /// `rasterize_blocks` writes only `PixelNearest`: it includes the others with `rasterize.glsl`.
     pub fn writes(self) -> &'static [Resource] {
         self.info().writes
     }

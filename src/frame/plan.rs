@@ -55,7 +55,7 @@ pub struct FrameKind {
     pub primary: Primary,
     /// Number of bounces, the primary rays included.
     pub n_bounces: u32,
-    /// Whether the features of each pixel are written: what it shows.
+    /// Whether the features of each pixel are written: what its primary ray hits, and what all its rays cost.
     pub features: bool,
     /// Whether hits are lit. They are not if the frame displays a feature, such as depth, that depends on the hits of
     /// primary rays only.

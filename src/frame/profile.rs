@@ -15,7 +15,8 @@ pub struct Profile {
     pub passes: Vec<PassTime>,
     /// Counts of rays, the sums of all batches. One row a bounce; row 0: primary rays.
     pub bounces: Vec<BounceStats>,
-    /// Number of batches that the frame was split into. In a sum of frames, the largest of their numbers.
+    /// Number of batches that the frame was split into. In a sum of frames, the largest of their numbers; in a
+    /// picture of several bands, the sum of theirs.
     pub n_batches: u32,
     /// Milliseconds from the first pass's start to the last one's end, summed over frames and bands if there are
     /// several; None if the device has no timestamps.

@@ -1,5 +1,5 @@
-//! Temporary files beside their targets. None of them outlives the process, unless SIGKILL ends it, which no handler
-//! sees.
+//! Temporary files beside their targets. None of them outlives a process that ends by itself, or by a signal whose
+//! handler calls [`remove_temporaries`].
 //!
 //! Every temporary file with a name is registered while it has that name. A signal handler's thread calls
 //! [`remove_temporaries`] before it ends the process. One lock covers the registry and the files themselves: only the

@@ -15,7 +15,8 @@
 //! The names are those of the buffers in the kernels, which are fields of [`Resources`](crate::buffers::Resources)
 //! and its parts. Not mentioned are the scene's arrays, which no pass writes, and `bounces` where it only gives a
 //! pass its range of rays and the size of its dispatch. The barriers between the passes of a frame are in
-//! [`plan`](crate::frame::plan). Only the build of a grid and the transfers within a pass have their own.
+//! [`plan`](crate::frame::plan). Only the build of a grid, the images of [`Visibility`] and the transfers within a
+//! pass have their own.
 
 use std::sync::Arc;
 

@@ -30,7 +30,7 @@ impl PrimaryHit {
     }
 
     /// Needs `triangle_ids`, or `pixel_nearest` if kernels rasterize. Leaves `hits` of the camera rays. Updates the
-    /// counters and, if the options ask for features, `pixel_features`.
+    /// counters if the options ask for a profile, and `pixel_features` if they ask for features.
     pub fn record(&self, commands: &Commands, batch: &Batch) {
         let dispatch = Dispatch::Threads([batch.n_pixels, 1, 1], [RAY_GROUP_SIZE, 1, 1]);
         commands.dispatch(&self.kernel, Some(batch.depth), batch, dispatch);

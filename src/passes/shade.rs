@@ -26,7 +26,7 @@ impl Shade {
     }
 
     /// Needs `rays`, `hits` and `light_visibility` of all bounces of the batch. Leaves `ray_radiance`. Updates the
-    /// counters.
+    /// counters if the options ask for a profile.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         commands.dispatch(&self.kernel, None, batch, resources.shade_dispatch(batch));
     }

@@ -35,8 +35,8 @@ impl Trace {
     }
 
     /// Needs `rays` of the bounce; camera rays are computed, not read. Leaves `hits`; a ray that has stalled leaves a
-    /// mark in place of its hit. Updates the counters and, if the options ask for features, `pixel_features`.
-    /// `batch.round`: which rays are traced, all or those that have stalled.
+    /// mark in place of its hit. Updates the counters if the options ask for a profile, and `pixel_features` if they
+    /// ask for features. `batch.round`: which rays are traced, all or those that have stalled.
     pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
         let of_camera = self.from_camera.as_ref().filter(|_| batch.depth == 0);
         commands.dispatch(of_camera.unwrap_or(&self.kernel), Some(batch.depth), batch, resources.trace_dispatch(batch));

@@ -25,8 +25,8 @@ impl TraversalRay {
         BoxPlanes { near: [0, 1, 2].map(|i| min(t0[i], t1[i])), far: [0, 1, 2].map(|i| max(t0[i], t1[i])) }
     }
 
-    /// Returns `[t_enter, t_exit]` of the ray in a node's cell. The planes of the box are the split planes that
-    /// `descend` crosses on the way to the node.
+    /// Returns `[t_enter, t_exit]` of the ray in a node's cell. The planes of the cell are those of the root's box
+    /// and of the splits above the node. Their t are computed as on the way down, so they have the same bits.
     #[inline(always)]
     pub fn interval_in(&self, inputs: &KernelInputs<impl ReadCounter>, node_ix: u32) -> [f32; 2] {
         let BoxPlanes { near, far } = self.box_planes_of(inputs, node_ix);

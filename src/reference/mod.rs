@@ -1,9 +1,11 @@
 //! The reference: every kernel as a function over slices, without Vulkan. The kernels' tests compare with it. The CPU
 //! renderer also uses it for the passes that are not worth a faster version.
 //!
-//! Each file is the twin of the kernel or shared GLSL file of the same name. It does the same operations in the same
-//! order, so that hits agree to the last bits. The code is as plain as possible. Rays are handled in tasks of a fixed
-//! size, so the picture does not depend on the number of threads.
+//! Each file is the twin of the kernel or shared GLSL file of the same name. It does the same computation in the same
+//! order. A device may round divisions differently, so its hits may differ in their last bits. Crossings of planes
+//! are not fused (`fma`) here. Hits do not depend on their rounding, unless the ray is first moved to the scene
+//! (`near_scene`). The code is as plain as possible. Rays are handled in tasks of a fixed size, so the picture does
+//! not depend on the number of threads.
 //!
 //! ```text
 //! passes      primary_hit, trace, features, compact, shadow, shade, resolve, accumulate, denoise, false_color,

@@ -9,7 +9,7 @@ use super::{
 
 /// Pending subtrees that are found on the way back up: the mask of the siblings that have been visited.
 pub struct PendingMaskBoxes {
-    /// Bit i is set if the sibling i levels above the cell's node has been visited.
+    /// Bit i is set if the sibling of the node i levels above the cell's node has been visited.
     siblings_done: u64,
 }
 

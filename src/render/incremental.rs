@@ -49,7 +49,7 @@ impl Part {
 pub(super) enum Until {
     /// The end of the next part.
     Part,
-    /// The end of the next batch, or the frame's end if that is the last batch.
+    /// The end of the batch that has begun or is next, or the frame's end if that is the last batch.
     Batch,
     /// The frame's end.
     End,
@@ -225,9 +225,10 @@ impl Renderer {
         Ok(PartialSample { parts, n_done: 0, sample_ix, begun_at: None })
     }
 
-    /// Sets the view that is displayed from the next sample on: the picture, or a feature in its place. A feature is
-    /// displayed only if the options ask for features. `brightest`: in views of costs and of numbers of rays, the
-    /// value that is displayed brightest; in the view of depth, the depth that is half as bright as depth 0.
+    /// Sets the view that the next sample and [`Renderer::show`] display: the picture, or a feature in its place. A
+    /// feature is displayed only if the options ask for features. `brightest`: in views of costs and of numbers of
+    /// rays, the value that is displayed brightest; in the view of depth, the depth that is half as bright as
+    /// depth 0.
     ///
     /// Returns whether the view or `brightest` has changed. A change drops a pending sample. Samples of a view that
     /// needs primary rays only have no radiance. So a change from such a view to one that needs all rays, or back,

@@ -37,8 +37,8 @@ impl Renderer {
         &self.options
     }
 
-    /// Sets the picture's size, pixels, and removes its crop. The next sample is the first of a new picture. The
-    /// buffers of the largest picture so far are kept, so that changes below its size are cheap.
+    /// Sets the picture's size, pixels, and removes its crop. If either changes, the next sample is the first of a
+    /// new picture. The buffers of the largest picture so far are kept, so that changes below its size are cheap.
     ///
     /// # Errors
     /// The picture exceeds the device's limits or memory. Then nothing has changed, and a pending sample stays
@@ -48,8 +48,8 @@ impl Renderer {
         self.remake(&options)
     }
 
-    /// Sets the part of the picture to render. The next sample is the first of a new picture. Buffers are kept as
-    /// [`Renderer::resize`] keeps them.
+    /// Sets the part of the picture to render. If it changes, the next sample is the first of a new picture. Buffers
+    /// are kept as [`Renderer::resize`] keeps them.
     ///
     /// # Panics
     /// The crop exceeds the picture.

@@ -16,8 +16,8 @@ pub struct Mesh {
     pub positions: Vec<Vec3>,
     /// Indices into `positions`, counter-clockwise seen from outside.
     pub faces: Vec<[u32; 3]>,
-    /// One entry per face: unit shading normals at its three corners. Three zero vectors stand for the normal of the
-    /// face's plane.
+    /// One entry per face: unit shading normals at its three corners. If any of the three is zero, the whole face is
+    /// shaded with the normal of its plane.
     pub normals: Vec<[Vec3; 3]>,
     /// One entry per face: its slot, which selects one of the instance's materials.
     pub slots: Vec<u32>,

@@ -11,7 +11,7 @@ use super::{
     ply::parse_ply,
     read::{lossy_text, read_bytes},
     smooth::Shading,
-    stl::{is_binary_stl, parse_stl},
+    stl::{is_binary_stl, is_stl_text, parse_stl},
 };
 
 /// Format of a mesh file.
@@ -33,11 +33,12 @@ impl MeshFormat {
         }
     }
 
-    /// Returns the format of a file. OBJ is text without a mark, so it is what the file has if nothing else fits.
+    /// Returns the format of a file: by its first bytes or its size, else by its name's ending, else OBJ, which is
+    /// text without a magic number.
     pub fn of(path: &Path, bytes: &[u8]) -> Self {
         if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
             Self::Ply
-        } else if is_binary_stl(bytes) || bytes.trim_ascii_start().starts_with(b"solid") {
+        } else if is_binary_stl(bytes) || is_stl_text(bytes) {
             Self::Stl
         } else {
             Self::of_name(path).unwrap_or(Self::Obj)
@@ -48,7 +49,7 @@ impl MeshFormat {
 /// Reads a mesh file, unless it is too large for the memory.
 pub(super) fn read_mesh(path: &Path) -> Result<Vec<u8>, SceneError> {
     let required = match MeshFormat::of_name(path) {
-        Some(MeshFormat::Ply | MeshFormat::Stl) => require_for_bytes(path),
+        Some(MeshFormat::Ply) => require_for_bytes(path),
         _ => require_for_text(path),
     };
     required.map_err(|what| SceneError::file(path, what))?;

@@ -92,9 +92,10 @@ pub struct Camera {
 }
 
 impl Scene {
-    /// Loads a scene file, `.toml`, or a mesh file, `.obj`, `.ply` or `.stl`. The content of a mesh file says which of
-    /// the three it is. Emits `tracing` warnings for unknown OBJ statements, missing material libraries, undefined
-    /// materials, properties that are not shown, and coordinates too large for the scene's detail.
+    /// Loads a scene file, `.toml`, or a mesh file, `.obj`, `.ply` or `.stl`. The content of a mesh file says which
+    /// of the three it is. Emits `tracing` warnings for unknown OBJ statements, missing material libraries, undefined
+    /// materials, colours and texture coordinates of PLY files, which are not shown, and coordinates too large for
+    /// the scene's detail.
     ///
     /// # Errors
     /// The file, or one that it names, cannot be read or understood; the scene has no triangles, is too small to be
@@ -165,7 +166,8 @@ fn is_scene_file(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
 }
 
-/// Loads a mesh file as a scene: the mesh with its own materials, a camera that frames it, one light and ambient light.
+/// Loads a mesh file as a scene: the mesh with its own materials, a camera that frames it, one light and ambient
+/// light.
 fn load_mesh_file(path: &Path) -> Result<Scene, SceneError> {
     let mut scene = Scene::empty(path);
     let (mesh, library) = mesh_file::parse_mesh(path, mesh_file::read_mesh(path)?, Shading::default(), 0)?;

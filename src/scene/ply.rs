@@ -1,6 +1,7 @@
-//! PLY files (Polygon File Format, also called Stanford Triangle Format), as text and in both byte orders. The elements
-//! `vertex` (x, y, z and, if all three are there, nx, ny, nz) and `face` (a list of indices) are read. Polygons are cut
-//! into fans. Coordinates are taken as they are: the format states neither a unit nor an axis that points up.
+//! PLY files (Polygon File Format, also called Stanford Triangle Format), as text and as binary in both byte orders.
+//! The elements `vertex` (x, y, z and, if all three are there, nx, ny, nz) and `face` (a list of indices) are read.
+//! Polygons are cut into fans. Coordinates are taken as they are: the format states neither a unit nor an axis that
+//! points up.
 
 use std::path::Path;
 
@@ -58,11 +59,11 @@ pub(super) fn parse_ply(path: &Path, bytes: &[u8], shading: Shading, n_loaded: u
     warn(path, &elements);
     let (mut vertices, mut polygons): (Vec<Vertex>, Vec<Polygon>) = (Vec::new(), Vec::new());
     for element in &elements {
-        // Each row takes a byte or more, so a header that promises more rows than that cannot ask for more memory.
         let failed = |error| format!("element `{}`: {}", element.name.escape_debug(), text(&error));
         match element.name.as_str() {
             "vertex" => vertices = reader.next_element().map_err(failed)?,
             "face" => {
+                // A row takes at least one byte, so a file has no more rows than bytes, whatever its header states.
                 let n_faces = element.count.min(bytes.len());
                 require_for_triangles(n_loaded as u64, n_faces as u64)?;
                 polygons = reader.next_element().map_err(failed)?;
@@ -74,6 +75,8 @@ pub(super) fn parse_ply(path: &Path, bytes: &[u8], shading: Shading, n_loaded: u
             _ => drop(reader.next_element::<Vec<Skipped>>().map_err(failed)?),
         }
     }
+    let n_triangles: usize = polygons.iter().map(|polygon| polygon.vertex_indices.len().saturating_sub(2)).sum();
+    require_for_triangles(n_loaded as u64, n_triangles as u64)?;
     let has_normals = elements.iter().any(|element| element.name == "vertex" && has_all(element, ["nx", "ny", "nz"]));
     mesh(&vertices, &polygons, has_normals, shading)
 }

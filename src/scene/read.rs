@@ -1,4 +1,4 @@
-//! Functions that read a whole scene file as text.
+//! Functions that read a whole file of a scene, as text or as bytes.
 
 use std::{fs, path::Path};
 

@@ -1,6 +1,7 @@
-//! STL files, as text and binary. Facets have corners of their own, so points at the same place are welded before they
-//! are shaded. The facets' stored normals are not used: corners counter-clockwise from outside define them. Coordinates
-//! are taken as they are: the format states neither a unit nor an axis that points up.
+//! STL files, as text and binary. Each facet has corners of its own; for shading normals, corners at the same place
+//! count as one point. The stored normals of facets are not used, since the order of a facet's corners,
+//! counter-clockwise seen from outside, gives its normal. Coordinates are taken as they are: the format states
+//! neither a unit nor an axis that points up.
 
 use std::io::Cursor;
 
@@ -14,29 +15,43 @@ use super::{
     smooth::{Shading, smooth_normals},
 };
 
-/// Size of a binary file's head, 80 bytes of comment and the number of facets, and of a facet.
+/// Size in bytes of the header of a binary file: 80 bytes of comment, then the number of facets.
 const HEAD_BYTES: usize = 84;
+/// Size in bytes of a facet in a binary file.
 const FACET_BYTES: usize = 50;
-/// The fewest bytes of a facet as text, with every number of one digit.
-const LEAST_TEXT_BYTES: usize = 80;
 
-/// Returns whether a file has exactly the size that its number of facets gives a binary STL file. Such a file may begin
-/// with the word `solid`, as text does.
+/// Returns whether a file is certainly a binary STL file: its size is exactly that of the number of facets that its
+/// header states. The comment of such a file may begin with the word `solid`, as text does.
 pub(super) fn is_binary_stl(bytes: &[u8]) -> bool {
     n_facets(bytes).is_some_and(|n| n > 0 && bytes.len() - HEAD_BYTES == n * FACET_BYTES)
 }
 
-/// Returns the number of facets that the head of a binary file states.
+/// Returns the number of facets that the header of a binary file states.
 fn n_facets(bytes: &[u8]) -> Option<usize> {
     let n = bytes.get(80..HEAD_BYTES)?;
     Some(u32::from_le_bytes(n.try_into().expect("four bytes")) as usize)
 }
 
+/// Returns whether a file that is not certainly binary is text: it begins with the word `solid`.
+pub(super) fn is_stl_text(bytes: &[u8]) -> bool {
+    is_statement(without_bom(bytes).trim_ascii_start(), b"solid")
+}
+
+/// Returns what follows a byte order mark.
+fn without_bom(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)
+}
+
+/// Returns whether a line begins with a keyword. Some writers use capitals.
+fn is_statement(line: &[u8], keyword: &[u8]) -> bool {
+    line.get(..keyword.len()).is_some_and(|word| word.eq_ignore_ascii_case(keyword))
+}
+
 /// Makes a mesh of a file's content. Its faces have slot 0.
 pub(super) fn parse_stl(bytes: Vec<u8>, shading: Shading, n_loaded: usize) -> Checked<Mesh> {
-    let triangles = match is_binary_stl(&bytes) || !bytes.trim_ascii_start().starts_with(b"solid") {
+    let triangles = match is_binary_stl(&bytes) || !is_stl_text(&bytes) {
         true => binary(bytes, n_loaded)?,
-        false => text(&bytes, n_loaded)?,
+        false => text(without_bom(&bytes), n_loaded)?,
     };
     let positions: Vec<_> = triangles.iter().flat_map(|triangle| triangle.vertices.map(|v| Vec3::from(v.0))).collect();
     let faces: Vec<_> = (0..triangles.len() as u32).map(|ix| [3 * ix, 3 * ix + 1, 3 * ix + 2]).collect();
@@ -57,7 +72,9 @@ fn binary(mut bytes: Vec<u8>, n_loaded: usize) -> Checked<Vec<Triangle>> {
 
 /// Reads the solids of a text.
 fn text(bytes: &[u8], n_loaded: usize) -> Checked<Vec<Triangle>> {
-    require_for_triangles(n_loaded as u64, (bytes.len() / LEAST_TEXT_BYTES) as u64)?;
+    let lines = bytes.split(|byte| *byte == b'\n');
+    let n_facets = lines.filter(|line| is_statement(line.trim_ascii_start(), b"facet")).count();
+    require_for_triangles(n_loaded as u64, n_facets as u64)?;
     let mut triangles = Vec::new();
     for (line, solid) in solids(bytes) {
         let named = |what| format!("the solid at line {line}: {what}");
@@ -73,20 +90,20 @@ fn triangles_of(bytes: Vec<u8>) -> Checked<Vec<Triangle>> {
     triangles.map_err(|error| error.to_string().escape_debug().to_string().replace("\\\"", "\""))
 }
 
-/// Returns all solids of a text as the reader accepts them, each with the number of its first line: without names,
-/// which may be missing or in any encoding, and without stored normals, which may be no numbers.
+/// Returns all solids of a text as the reader accepts them, each with the number of its first line: in small letters,
+/// without names, which may be missing or in any encoding, and without stored normals, which need not be numbers.
 fn solids(bytes: &[u8]) -> Vec<(usize, Vec<u8>)> {
     let mut solids: Vec<(usize, Vec<u8>)> = Vec::new();
     for (ix, line) in bytes.split_inclusive(|byte| *byte == b'\n').enumerate() {
         let statement = line.trim_ascii_start();
-        if statement.starts_with(b"solid") {
+        if is_statement(statement, b"solid") {
             solids.push((ix + 1, b"solid \n".to_vec()));
         } else if let Some((_, solid)) = solids.last_mut() {
-            solid.extend_from_slice(match () {
-                () if statement.starts_with(b"facet") => b"facet normal 0 0 0\n",
-                () if statement.starts_with(b"endsolid") => b"endsolid\n",
-                () => line,
-            });
+            match () {
+                () if is_statement(statement, b"facet") => solid.extend(b"facet normal 0 0 0\n"),
+                () if is_statement(statement, b"endsolid") => solid.extend(b"endsolid\n"),
+                () => solid.extend(line.iter().map(u8::to_ascii_lowercase)),
+            }
         }
     }
     solids

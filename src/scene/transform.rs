@@ -39,7 +39,7 @@ enum ScaleSpec {
 
 /// A transform from object space to world space: a scale, then a rotation, then a translation.
 ///
-/// It is applied in f64, so that the identity leaves every bit of a point as it is.
+/// It is applied in f64, so that the identity changes no coordinate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Transform {
     linear: DMat3,
@@ -51,7 +51,7 @@ pub struct Transform {
 }
 
 impl Transform {
-    /// The identity, which leaves every bit of a point as it is.
+    /// The identity, which changes no coordinate.
     pub const IDENTITY: Self =
         Self { linear: DMat3::IDENTITY, translation: DVec3::ZERO, normals: DMat3::IDENTITY, mirrors: false };
 

@@ -119,8 +119,8 @@ impl Controller {
         Quat::from_axis_angle(right, pitch) * yawed
     }
 
-    /// Moves the camera along its view until the scene fills the picture. `aspect` is the picture's width divided by
-    /// its height.
+    /// Moves the camera, without turning it, so that the scene is in the middle and fills the picture. `aspect` is
+    /// the picture's width divided by its height.
     pub fn frame_scene(&mut self, aspect: f32) {
         let Axes { forward, .. } = self.axes();
         let half_height = (self.camera.vertical_fov_degrees.to_radians() / 2.0).tan();

@@ -58,7 +58,7 @@ impl LoadedScene {
         let LoadOptions { request, processor, workload } = load_options;
         let accel = request.choose_accel(processor, scene.n_triangles(), &workload);
         let flat = FlatScene::new(&scene).expect("a loaded scene fits together");
-        // Building the structure needs the memory of the unflattened scene.
+        // The unflattened scene is freed here, because building the structure needs the memory.
         drop(scene);
         let start = Instant::now();
         let world = World::with_accel(flat, &accel.options(processor)).expect("a material for each triangle");

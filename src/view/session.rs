@@ -132,8 +132,8 @@ impl Session {
         &mut self.budgets[usize::from(self.settings.view.needs_primary_rays_only())]
     }
 
-    /// Draws one more sample or a part of it. While the camera moves, the picture is smaller than the window.
-    /// `window` is the window's size in pixels, not 0.
+    /// Draws one more sample or a part of it. While the camera moves, the picture is as much smaller than the window
+    /// as the time budget requires. `window` is the window's size in pixels, not 0.
     ///
     /// # Errors
     /// A Vulkan call fails. Settings that the device refuses are not an error: the previous settings return.

@@ -90,6 +90,8 @@ fn cubes() -> Vec<(&'static str, Vec<u8>)> {
         ("stl", stl_text(" cube", triangles()).into_bytes()),
         ("stl", [b"solid caf\xe9\n", stl_text("", triangles()).split_at(6).1.as_bytes()].concat()),
         ("stl", halves.into_bytes()),
+        ("stl", stl_text(" cube", triangles()).to_uppercase().replace("NAN", "NaN").into_bytes()),
+        ("stl", ["\u{feff}\n", &stl_text(" cube", triangles())].concat().into_bytes()),
         ("stl", stl_binary(b"a cube")),
         ("stl", stl_binary(b"solid cube")),
     ]

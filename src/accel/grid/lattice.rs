@@ -22,8 +22,8 @@ pub struct Lattice {
 }
 
 impl Lattice {
-    /// Returns the lattice of the smallest cubes with which the box has no more than `max_cells` cubes, each no
-    /// smaller than the margin of the box.
+    /// Returns the lattice of the smallest cubes with which the box has no more than `max_cells` cubes, and no more
+    /// than `GRID_MAX_RESOLUTION` along an axis. The cubes are no smaller than the margin of the box.
     pub fn of_density(bounds: &Bounds, max_cells: u32) -> Self {
         let margin = bounds.margin();
         // The bits of positive floats, as integers, have the same order as the floats. The search finds the bits of
@@ -98,8 +98,8 @@ impl Lattice {
         (((at - self.min[axis]) / self.cell_size) as u32).min(self.n_cells[axis] - 1)
     }
 
-    /// Returns the first and the last index of the closed cubes that meet an interval on an axis. An interval outside
-    /// the box meets the cubes at the box's side.
+    /// Returns the first and the last index of the closed cubes that meet an interval on an axis. For an interval
+    /// outside the box, both are the index of the cubes on that side of the box.
     pub fn indices_in(&self, axis: usize, least: f32, greatest: f32) -> [u32; 2] {
         let last_ix = self.n_cells[axis] - 1;
         let mut first = self.index_near(axis, least);

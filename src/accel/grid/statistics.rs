@@ -23,7 +23,8 @@ pub struct Statistics {
     pub n_references: u64,
     /// References divided by the number of triangles; 0 if there are no triangles.
     pub references_per_triangle: f64,
-    /// The number of times that the edges of all cells were doubled to keep to the limits of memory.
+    /// The number of times that the cells' edges were doubled to keep to the limits of memory. With two levels, this
+    /// is the number of the upper level's doublings plus that of the halvings of all blocks' resolutions.
     pub n_coarser: u32,
     /// Size of cells, entries and their planes as the host stores them, bytes.
     pub bytes: u64,

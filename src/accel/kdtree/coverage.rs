@@ -8,8 +8,8 @@ use super::{Invalid, KdTree, Node};
 use crate::{accel::bounds::is_finite, layout::Triangle};
 
 /// Share of the margin, and of the reach of slabs, that is checked. The rest is room for two kinds of rounding:
-/// bounds are rounded to f32, and a point may be cut by seven planes, where each cut is off by four times 2^-53 of
-/// the coordinates.
+/// bounds are rounded to f32, and a corner may be the result of seven cuts, by six faces of a cell and a plane
+/// (clip.rs), each of which is off by four times 2^-53 of the coordinates.
 const CHECKED: f64 = 0.96;
 
 /// A triangle on its way down a tree.

@@ -22,7 +22,7 @@ pub struct Input<'a> {
 #[derive(Clone, Copy)]
 pub struct BuildCell {
     pub bounds: Bounds,
-    /// The number of levels below the root.
+    /// The cell's level, 0 for the root of the whole tree.
     pub level: u32,
     /// The most references that all leaves in the cell may have together.
     pub budget: u64,

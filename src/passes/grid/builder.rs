@@ -1,5 +1,5 @@
 //! Builds a grid on a device: runs the kernels over the triangles, and copies the grid from arrays of the largest
-//! possible size to arrays that it just fills.
+//! possible size to arrays of exactly the grid's size.
 
 use std::sync::Arc;
 

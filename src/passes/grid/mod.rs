@@ -22,11 +22,15 @@
 //! that cell. A pair is a cell and a triangle in it. A column is a line of cells along one axis within the box of an
 //! item.
 //!
-//! Scans find where each item's columns and each column's pairs begin, so that the order of all pairs is fixed. Each
-//! scan has three steps, as in compaction: the sums of blocks of entries, the spine over these sums, and the
-//! positions within each block. (These blocks have nothing to do with the blocks of upper cells.) The spine also
-//! compares the total with its limit and sizes the dispatches that follow: either the next count of the attempt, or
-//! another attempt with larger cells. When everything is counted, the kernels of further attempts have no workgroups.
+//! Scans find where each item's columns and each column's pairs begin, so that the order of all pairs is fixed. A
+//! scan is two kernels. The one that counts also writes the sum of each block of entries, and each entry's position
+//! within its block. The spine then turns the sums into the positions of the blocks. Kernels that read a position
+//! add the two. (These blocks have nothing to do with the blocks of upper cells.) A pass of the sort has three
+//! kernels, as compaction has: the third computes the positions within the blocks.
+//!
+//! The spine also compares the total with its limit and sizes the dispatches that follow: either the next count of
+//! the attempt, or another attempt with larger cells. When everything is counted, the counting kernels of further
+//! attempts have no workgroups, and their spines do nothing.
 //!
 //! Kalojanov and Slusallek, "A parallel algorithm for construction of uniform grids", 2009; Kalojanov, Billeter and
 //! Slusallek, "Two-level grids for ray tracing on GPUs", 2011.
