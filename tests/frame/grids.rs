@@ -31,15 +31,13 @@ fn on_device(world: &World, options: &RenderOptions) -> (Picture, Vec<Feature>) 
 
 #[test]
 fn frames_on_the_device_are_the_kd_trees() {
-    for scene in [scenes::mixed(), scenes::mixed_outdoors()] {
-        for primary in [Primary::Raster, Primary::Trace] {
-            let options = RenderOptions { primary, ..options(80, 60, 5) };
-            let expected = on_device(&world_of(&scene), &options);
-            for world in grid_worlds(&scene) {
-                let found = on_device(&world, &options);
-                assert!(identical(&expected.0, &found.0), "{} {primary}", world.accel().kind());
-                assert!(expected.1 == found.1, "{} {primary}: features", world.accel().kind());
-            }
+    for (scene, primary) in [(scenes::mixed(), Primary::Raster), (scenes::mixed_outdoors(), Primary::Trace)] {
+        let options = RenderOptions { primary, ..options(80, 60, 5) };
+        let expected = on_device(&world_of(&scene), &options);
+        for world in grid_worlds(&scene) {
+            let found = on_device(&world, &options);
+            assert!(identical(&expected.0, &found.0), "{} {primary}", world.accel().kind());
+            assert!(expected.1 == found.1, "{} {primary}: features", world.accel().kind());
         }
     }
 }
