@@ -10,13 +10,10 @@ use std::{
 };
 
 use tempfile::TempDir;
-use x11rb::{
-    connection::Connection,
-    protocol::xproto::{ClientMessageEvent, ConnectionExt, EventMask},
-};
+use x11rb::protocol::xproto::{ClientMessageEvent, ConnectionExt, EventMask};
 
 /// Longer than any picture takes to appear on a busy machine.
-const PATIENCE: Duration = Duration::from_secs(120);
+pub const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A running Xvfb.
 pub struct Display {
@@ -88,7 +85,8 @@ impl Display {
         let data = [atom("WM_DELETE_WINDOW"), x11rb::CURRENT_TIME, 0, 0, 0];
         let message = ClientMessageEvent::new(32, window, atom("WM_PROTOCOLS"), data);
         connection.send_event(false, window, EventMask::NO_EVENT, message).unwrap();
-        connection.flush().unwrap();
+        // The server may drop what it has not read yet when a connection ends, so the test waits for a reply.
+        connection.get_input_focus().unwrap().reply().expect("a reply after the message");
     }
 
     /// Waits for the window of a name and gives it the keyboard focus, since there is no window manager that would.

@@ -11,12 +11,14 @@ use std::{
     fs,
     path::Path,
     process::{Child, Output, Stdio},
+    thread,
+    time::{Duration, Instant},
 };
 
 use serde_json::Value;
 use support::{
     command::{cornell, kdray, names, stderr, stdout, succeed},
-    display::{Display, Screen},
+    display::{Display, PATIENCE, Screen},
 };
 use tempfile::TempDir;
 
@@ -34,8 +36,17 @@ fn viewer_of_size(directory: &Path, display: &Display, scene: &str, more: &[&str
     command.spawn().unwrap()
 }
 
-/// Waits until the viewer ends, and asserts that it succeeds.
+/// Waits until the viewer ends, but not for ever, and asserts that it succeeds.
 fn ended(viewer: Child) -> Output {
+    let mut viewer = viewer;
+    let start = Instant::now();
+    while viewer.try_wait().unwrap().is_none() {
+        if start.elapsed() > PATIENCE {
+            viewer.kill().unwrap();
+            panic!("the viewer does not end: {}", stderr(&viewer.wait_with_output().unwrap()));
+        }
+        thread::sleep(Duration::from_millis(20));
+    }
     let output = viewer.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     output
