@@ -71,7 +71,7 @@ float refraction_cosine(float cos_in, float eta) {
 }
 
 // The direction, mirrored at the surface if it points to the wrong side, which an interpolated normal can cause.
-// side: the normal on the correct side.
+// side: the unit normal that points to the side on which the direction has to be.
 vec3 keep_side(vec3 direction, vec3 side) {
     return direction - 2.0 * min(dot(direction, side), 0.0) * side;
 }

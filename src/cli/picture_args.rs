@@ -128,14 +128,17 @@ pub fn traversal_long_help() -> String {
 
 /// Returns the help text of `--traversal` of a benchmark, which measures the default of the device.
 pub fn fixed_traversal_help() -> String {
-    let default = format!("{}, with --cpu {}", traversals_of_devices(), Traversal::OF_CPU);
-    with_words(TRAVERSAL, Some(&default), &Traversal::words())
+    with_words(TRAVERSAL, Some(&default_traversals()), &Traversal::words())
 }
 
 /// Returns the help text of `--traversal` of a benchmark with all words explained.
 pub fn fixed_traversal_long_help() -> String {
-    let default = format!("{}, with --cpu {}", traversals_of_devices(), Traversal::OF_CPU);
-    listed(TRAVERSAL, &default, &Traversal::descriptions())
+    listed(TRAVERSAL, &default_traversals(), &Traversal::descriptions())
+}
+
+/// Returns the default traversals of devices and of the CPU, as a phrase of a help text.
+fn default_traversals() -> String {
+    format!("{}, with --cpu {}", traversals_of_devices(), Traversal::OF_CPU)
 }
 
 /// Returns the help text of `--build`.

@@ -76,7 +76,7 @@ fn refraction_cosine(cos_in: f32, eta: f32) -> f32 {
 }
 
 /// The direction, mirrored at the surface if it points to the wrong side, which an interpolated normal can cause.
-/// `side`: the normal on the correct side.
+/// `side`: the unit normal that points to the side on which the direction has to be.
 fn keep_side(direction: Vec3, side: Vec3) -> Vec3 {
     direction - 2.0 * direction.dot(side).min(0.0) * side
 }

@@ -8,7 +8,7 @@ use super::{
     is_scene_file,
     mesh_file::MeshFormat,
     obj::named_libraries,
-    read::{lossy_text, read_bytes, read_utf8},
+    read::{read_lossy, read_utf8},
 };
 
 /// Returns the sorted paths of the scene file, the mesh files that it names, and the material libraries that the mesh
@@ -31,10 +31,10 @@ fn meshes(scene: &Path) -> Vec<PathBuf> {
 }
 
 fn libraries(mesh: &Path) -> Vec<PathBuf> {
-    let bytes = read_bytes(mesh).unwrap_or_default();
-    match MeshFormat::of(mesh, &bytes) {
-        MeshFormat::Obj => named_libraries(mesh, &lossy_text(bytes)),
-        MeshFormat::Ply | MeshFormat::Stl => Vec::new(),
+    match MeshFormat::of_name(mesh) {
+        // Such a file is never taken for OBJ, so it need not be read to know that it names no libraries.
+        Some(MeshFormat::Ply | MeshFormat::Stl) => Vec::new(),
+        Some(MeshFormat::Obj) | None => named_libraries(mesh, &read_lossy(mesh).unwrap_or_default()),
     }
 }
 
