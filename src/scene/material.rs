@@ -17,7 +17,7 @@
 use glam::Vec3;
 use serde::Deserialize;
 
-use super::error::Checked;
+use super::{error::Checked, texture::Texture};
 
 /// A material in MTL's terms. Colours are linear RGB.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,6 +42,136 @@ pub struct Material {
     pub d: f32,
     /// Terms beside diffuse reflection.
     pub lobes: Lobes,
+    /// Microfacet reflection in place of Phong's. The terms above then have the meaning that [`Microfacet`] says.
+    pub microfacet: Option<Microfacet>,
+    /// How opacity acts.
+    pub alpha: Alpha,
+    /// Whether the surface shows `kd` as it is, without any light.
+    pub is_unlit: bool,
+    /// Whether the file declares the material for both sides of a surface. It is only reported: both sides of every
+    /// surface are always shown.
+    pub is_double_sided: bool,
+    /// A clear layer above the surface. It is read, but not shaded.
+    pub clearcoat: Clearcoat,
+    /// The sheen of cloth. It is read, but not shaded.
+    pub sheen: Sheen,
+    /// Textures of the terms.
+    pub maps: Maps,
+}
+
+/// Microfacet reflection by metals and dielectrics (glTF's metallic-roughness model). `kd` is the base colour, `ks` a
+/// factor on the reflectance of a dielectric, `ni` its index of refraction, and `d` and `ke` are as in MTL. `ka`,
+/// `ns`, `tf` and `lobes` are ignored.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Microfacet {
+    /// Share of metal, 0 to 1.
+    pub metallic: f32,
+    /// Perceived roughness, 0 to 1. Its square is the width of the distribution of microfacets' normals.
+    pub roughness: f32,
+    /// Share of the light that enters a dielectric and passes through it, in place of diffuse reflection, 0 to 1.
+    pub transmission: f32,
+    /// Whether the surface is the boundary of a solid, in which light is refracted and absorbed. If not, it is a thin
+    /// sheet, through which light passes straight.
+    pub is_solid: bool,
+    /// Colour that white light has after a distance of `attenuation_distance` in the solid, linear RGB.
+    pub attenuation_colour: Vec3,
+    /// World units, above 0. Infinity: nothing is absorbed.
+    pub attenuation_distance: f32,
+}
+
+impl Default for Microfacet {
+    /// A rough dielectric that nothing passes through.
+    fn default() -> Self {
+        Self {
+            metallic: 0.0,
+            roughness: 1.0,
+            transmission: 0.0,
+            is_solid: false,
+            attenuation_colour: Vec3::ONE,
+            attenuation_distance: f32::INFINITY,
+        }
+    }
+}
+
+/// How the opacity of a surface acts, `d` times the opacity of the maps.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Alpha {
+    /// It is ignored: the surface is opaque.
+    Opaque,
+    /// It is the share of what is behind the surface that the surface covers.
+    #[default]
+    Coverage,
+    /// Where it is below this value, there is no surface.
+    Cutout(f32),
+}
+
+/// A clear layer above a surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Clearcoat {
+    /// Share of the surface that the layer covers, 0 to 1.
+    pub factor: f32,
+    /// Perceived roughness of the layer, 0 to 1.
+    pub roughness: f32,
+}
+
+/// The sheen of cloth, whose fibres stand upright.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sheen {
+    /// Reflectance, linear RGB.
+    pub colour: Vec3,
+    /// Perceived roughness, 0 to 1.
+    pub roughness: f32,
+}
+
+/// Textures of a material's terms. Each multiplies the term of its name, unless it says otherwise.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Maps {
+    /// Colour of `kd`, and of `ka`. With microfacets, the opacity of the image multiplies `d`.
+    pub base_colour: Option<Texture>,
+    /// One number, which multiplies `d`.
+    pub opacity: Option<Texture>,
+    /// Colour of `ks`.
+    pub specular: Option<Texture>,
+    /// One number, which multiplies `ks`.
+    pub specular_factor: Option<Texture>,
+    /// Colour of `ke`.
+    pub emission: Option<Texture>,
+    /// One number, which multiplies the roughness, or Phong's exponent `ns`.
+    pub roughness: Option<Texture>,
+    /// One number.
+    pub metallic: Option<Texture>,
+    /// One number.
+    pub transmission: Option<Texture>,
+    /// Share of the ambient light that reaches the surface; one number.
+    pub occlusion: Option<Texture>,
+    /// How much of `occlusion` acts, 0 to 1.
+    pub occlusion_strength: f32,
+    /// Normals in tangent space: each channel c stands for 2 c - 1. x is along u, y along decreasing v, z along the
+    /// interpolated normal.
+    pub normal: Option<Texture>,
+    /// Factor on x and y of the normals that `normal` shows.
+    pub normal_scale: f32,
+}
+
+impl Maps {
+    /// Returns all textures, in the order of the fields.
+    pub fn textures(&self) -> impl Iterator<Item = &Texture> {
+        let Self { base_colour, opacity, specular, specular_factor, emission, roughness, metallic, .. } = self;
+        let Self { transmission, occlusion, normal, .. } = self;
+        let first = [base_colour, opacity, specular, specular_factor, emission, roughness, metallic];
+        first.into_iter().chain([transmission, occlusion, normal]).flatten()
+    }
+
+    /// Calls `change` for each texture.
+    pub(super) fn change_each(&mut self, mut change: impl FnMut(&mut Texture)) {
+        let Self { base_colour, opacity, specular, specular_factor, emission, roughness, metallic, .. } = self;
+        [base_colour, opacity, specular, specular_factor, emission, roughness, metallic]
+            .into_iter()
+            .flatten()
+            .for_each(&mut change);
+        let Self { transmission, occlusion, normal, .. } = self;
+        [transmission, occlusion, normal].into_iter().flatten().for_each(&mut change);
+    }
 }
 
 /// A grey diffuse surface without a name.
@@ -143,6 +273,13 @@ impl MaterialSpec {
             ke: colour("Ke", self.ke, Vec3::ZERO)?,
             lobes: Lobes::of_illum(illum).ok_or_else(|| format!("illum {illum} is not one of 0 to 10"))?,
             tf: colour("Tf", self.tf, Vec3::ONE)?,
+            microfacet: None,
+            alpha: Alpha::Coverage,
+            is_unlit: false,
+            is_double_sided: true,
+            clearcoat: Clearcoat::default(),
+            sheen: Sheen::default(),
+            maps: Maps::default(),
         })
     }
 }

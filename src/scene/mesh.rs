@@ -1,6 +1,6 @@
 //! Indexed meshes in object space.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::{error::Checked, transform::Transform};
@@ -21,6 +21,15 @@ pub struct Mesh {
     pub normals: Vec<[Vec3; 3]>,
     /// One entry per face: its slot, which selects one of the instance's materials.
     pub slots: Vec<u32>,
+    /// Two sets of texture coordinates. A set is empty, or has one entry per face: the coordinates at its three
+    /// corners. (0, 0) is the upper left corner of an image.
+    pub uvs: [Vec<[Vec2; 3]>; 2],
+    /// Empty, or one entry per face: colours at its three corners, linear RGB and opacity, by which the material's base
+    /// colour and opacity are multiplied.
+    pub colours: Vec<[Vec4; 3]>,
+    /// Empty, or one entry per face: unit tangents at its three corners, along increasing u, in object space. w is 1 or
+    /// -1: the bitangent, along decreasing v, is w times the cross product of normal and tangent.
+    pub tangents: Vec<[Vec4; 3]>,
 }
 
 impl Mesh {
@@ -37,13 +46,20 @@ impl Mesh {
         (self.positions.len() - 1) as u32
     }
 
-    /// Adds another mesh. Points at the same place are not merged.
+    /// Adds another mesh. Points at the same place are not merged. Where one of the meshes lacks texture coordinates,
+    /// colours or tangents that the other one has, its corners get the coordinates 0, white, and no tangent.
     pub fn append(&mut self, other: Mesh) {
         let first = self.positions.len() as u32;
+        let n_faces = (self.faces.len(), other.faces.len());
         self.positions.extend(other.positions);
         self.faces.extend(other.faces.iter().map(|face| face.map(|ix| first + ix)));
         self.normals.extend(other.normals);
         self.slots.extend(other.slots);
+        for (uvs, others) in self.uvs.iter_mut().zip(other.uvs) {
+            append_corners(uvs, others, n_faces, [Vec2::ZERO; 3]);
+        }
+        append_corners(&mut self.colours, other.colours, n_faces, [Vec4::ONE; 3]);
+        append_corners(&mut self.tangents, other.tangents, n_faces, [Vec4::ZERO; 3]);
     }
 
     /// Returns the positions in world space.
@@ -58,4 +74,14 @@ impl Mesh {
             None => Ok(world),
         }
     }
+}
+
+/// Joins two lists of corners, each of which may be empty. `n_faces`: the faces of their meshes.
+fn append_corners<T: Copy>(corners: &mut Vec<T>, others: Vec<T>, n_faces: (usize, usize), missing: T) {
+    if corners.is_empty() && others.is_empty() {
+        return;
+    }
+    corners.resize(n_faces.0, missing);
+    corners.extend(others);
+    corners.resize(n_faces.0 + n_faces.1, missing);
 }

@@ -23,6 +23,7 @@ mod read;
 mod smooth;
 mod sources;
 mod stl;
+mod texture;
 mod transform;
 
 use std::path::Path;
@@ -34,10 +35,11 @@ pub use self::{
     error::SceneError,
     extent::MIN_EXTENT,
     light::Light,
-    material::{Lobes, Material},
+    material::{Alpha, Clearcoat, Lobes, Maps, Material, Microfacet, Sheen},
     mesh::Mesh,
     path::CameraPath,
     sources::source_files,
+    texture::{Channel, Encoding, Image, Pixels, Texture, Wrap},
     transform::Transform,
 };
 use self::{mesh_file::MeshFormat, smooth::Shading};
@@ -54,10 +56,14 @@ pub struct Scene {
     pub instances: Vec<Instance>,
     /// Materials, to which the instances refer by index.
     pub materials: Vec<Material>,
+    /// Images, to which the materials' textures refer by index.
+    pub images: Vec<Image>,
     /// Lights, possibly none.
     pub lights: Vec<Light>,
     /// The camera that renders the scene unless another one is set.
     pub camera: Camera,
+    /// The cameras of the scene's file with their names, possibly none.
+    pub cameras: Vec<(String, Camera)>,
     /// Irradiance that every point receives, linear RGB. The material's `ka` weights it.
     pub ambient: Vec3,
     /// Radiance of rays that leave the scene, linear RGB.
@@ -152,8 +158,10 @@ impl Scene {
             meshes: Vec::new(),
             instances: Vec::new(),
             materials: Vec::new(),
+            images: Vec::new(),
             lights: Vec::new(),
             camera: Camera { eye: Vec3::ZERO, target: Vec3::NEG_Z, up: Vec3::Y, vertical_fov_degrees: 45.0 },
+            cameras: Vec::new(),
             ambient: Vec3::ZERO,
             background: Vec3::ZERO,
             defaults: RenderDefaults::default(),

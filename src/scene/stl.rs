@@ -56,7 +56,7 @@ pub(super) fn parse_stl(bytes: Vec<u8>, shading: Shading, n_loaded: usize) -> Ch
     let positions: Vec<_> = triangles.iter().flat_map(|triangle| triangle.vertices.map(|v| Vec3::from(v.0))).collect();
     let faces: Vec<_> = (0..triangles.len() as u32).map(|ix| [3 * ix, 3 * ix + 1, 3 * ix + 2]).collect();
     let normals = smooth_normals(&positions, &faces, shading);
-    Ok(Mesh { positions, slots: vec![0; faces.len()], faces, normals })
+    Ok(Mesh { positions, slots: vec![0; faces.len()], faces, normals, ..Mesh::default() })
 }
 
 fn binary(mut bytes: Vec<u8>, n_loaded: usize) -> Checked<Vec<Triangle>> {

@@ -18,6 +18,7 @@ fn square() -> Mesh {
         faces: vec![[0, 1, 2], [0, 2, 3]],
         normals: vec![[Vec3::ZERO; 3], [Vec3::Z; 3]],
         slots: vec![0, 1],
+        ..Mesh::default()
     }
 }
 
@@ -36,6 +37,8 @@ fn scene(instances: Vec<Instance>) -> Scene {
         instances,
         materials: ["red", "green", "blue"].map(named).into(),
         lights: vec![Light::Point { position: Vec3::Z, intensity: Vec3::ONE }],
+        images: Vec::new(),
+        cameras: Vec::new(),
         camera: Camera { eye: Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 60.0 },
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,

@@ -69,6 +69,7 @@ impl Rings {
             normals,
             slots: vec![0; faces.len()],
             faces,
+            ..Mesh::default()
         }
     }
 

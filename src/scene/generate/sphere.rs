@@ -146,11 +146,11 @@ impl Geodesic {
                 }
             }
         }
-        let Mesh { positions, faces, mut normals, slots } = points.mesh;
+        let Mesh { positions, faces, mut normals, slots, .. } = points.mesh;
         for (normals, face) in normals.iter_mut().zip(&faces) {
             *normals = face.map(|ix| positions[ix as usize].normalize());
         }
-        Ok(Mesh { positions, faces, normals, slots })
+        Ok(Mesh { positions, faces, normals, slots, ..Mesh::default() })
     }
 }
 

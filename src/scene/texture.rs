@@ -1,0 +1,108 @@
+//! Textures: images, and how a material uses them.
+
+use glam::{Affine2, Vec2};
+
+/// An image that textures show, decoded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// Name of the file, or of the image within its file, for messages.
+    pub name: String,
+    /// Width, pixels; at least 1.
+    pub width: u32,
+    /// Height, pixels; at least 1.
+    pub height: u32,
+    /// `width * height` pixels, rows from the top.
+    pub pixels: Pixels,
+}
+
+/// The pixels of an image: red, green, blue and opacity, not premultiplied.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Pixels {
+    /// 8 bits a channel, 255 for 1. The [`Encoding`] of a texture says whether colours are linear.
+    Bytes(Vec<[u8; 4]>),
+    /// Bits of half-precision floats, linear. Images of 16 bits or of floats have them.
+    Halves(Vec<[u16; 4]>),
+}
+
+/// An image as a material uses it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Texture {
+    /// Index into the scene's images.
+    pub image_ix: u32,
+    /// How the bytes of the image's colours stand for light. Opacity is always linear.
+    pub encoding: Encoding,
+    /// The channel that a texture of one number reads. A texture of a colour ignores it.
+    pub channel: Channel,
+    /// Which of the mesh's sets of texture coordinates it uses, 0 or 1.
+    pub uv_set: u32,
+    /// Transform of texture coordinates before the image is looked up. (0, 0) is the upper left corner of the image, and
+    /// (1, 1) the lower right one.
+    pub transform: Affine2,
+    /// What the image shows outside of 0 to 1, along u and along v.
+    pub wrap: [Wrap; 2],
+    /// Whether pixels are blended with their neighbours. If not, a texture shows squares of one colour.
+    pub is_smooth: bool,
+}
+
+/// Encoding of an image's colours.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Encoding {
+    /// sRGB (IEC 61966-2-1), for colours.
+    #[default]
+    Srgb,
+    /// The numbers are linear, for normals, roughness and other data.
+    Linear,
+}
+
+/// Channel of an image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Channel {
+    /// Red.
+    #[default]
+    Red,
+    /// Green.
+    Green,
+    /// Blue.
+    Blue,
+    /// Opacity.
+    Alpha,
+    /// Relative luminance of the colour (ITU-R BT.709).
+    Luminance,
+}
+
+/// Continuation of an image outside of 0 to 1.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Wrap {
+    /// The image repeats.
+    #[default]
+    Repeat,
+    /// The image repeats, and every second copy is mirrored.
+    Mirror,
+    /// The pixels of the border continue.
+    Clamp,
+}
+
+impl Texture {
+    /// Returns the texture of an image with sRGB colours, which repeats and uses the first texture coordinates.
+    pub fn of_image(image_ix: u32) -> Self {
+        Self {
+            image_ix,
+            encoding: Encoding::Srgb,
+            channel: Channel::Red,
+            uv_set: 0,
+            transform: Affine2::IDENTITY,
+            wrap: [Wrap::Repeat; 2],
+            is_smooth: true,
+        }
+    }
+
+    /// Returns the texture of an image with linear numbers, of which a texture of one number reads `channel`.
+    pub fn of_data(image_ix: u32, channel: Channel) -> Self {
+        Self { encoding: Encoding::Linear, channel, ..Self::of_image(image_ix) }
+    }
+
+    /// Returns the texture with its coordinates scaled, then moved.
+    pub fn placed(self, scale: Vec2, offset: Vec2) -> Self {
+        Self { transform: Affine2::from_translation(offset) * Affine2::from_scale(scale), ..self }
+    }
+}
