@@ -39,7 +39,7 @@ fn context() -> Arc<Context> {
 
 /// Returns a scene of the triangles under a lamp and a sun.
 fn scene(triangles: &[Triangle]) -> FlatScene {
-    let lamp = Light { position: vec3(0.3, 1.5, 0.2), kind: LIGHT_POINT, intensity: Vec3::ONE, reserved: 0 };
+    let lamp = Light { position: vec3(0.3, 1.5, 0.2), kind: LIGHT_POINT, intensity: Vec3::ONE, ..Light::default() };
     let sun = Light { position: vec3(0.48, 0.6, 0.64), kind: LIGHT_DIRECTIONAL, ..lamp };
     FlatScene {
         name: "variants".into(),
@@ -47,6 +47,7 @@ fn scene(triangles: &[Triangle]) -> FlatScene {
         triangle_materials: vec![0; triangles.len()],
         materials: vec![scenes::diffuse(Vec3::ONE)],
         material_names: vec![String::new()],
+        textures: kdray::world::Textures::default(),
         lights: vec![lamp, sun],
         camera: Camera { eye: vec3(0.0, 0.5, 5.0), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 45.0 },
         ambient: Vec3::ZERO,

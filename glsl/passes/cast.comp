@@ -7,6 +7,7 @@
 #include "layout.glsl"
 
 const bool COUNT_COSTS = false;
+const bool PASSES_VEILS = false;
 #include "accel.glsl"
 #include "lanes.glsl"
 

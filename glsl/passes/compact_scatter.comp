@@ -23,8 +23,8 @@ layout(std430, set = 0, binding = BIND_SCAN_BLOCKS) readonly buffer ScanBlocksBl
 void make_children(uint ray_ix, uint kinds, uint child_ix) {
     PathRay ray = ray_at(ray_ix);
     Hit hit = hits[ray_ix];
-    Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
-    Scattering next = scatter(material_at(hit), surface, ray.direction);
+    Surface surface;
+    Scattering next = scattering_at(ray, hit, surface);
     if ((kinds & CHILD_REFLECTED) != 0u) {
         vec3 throughput = ray.throughput * next.reflected_weight;
         store_ray(child_ix, ray_from(surface, next.reflected, hit.triangle_ix, ray, throughput));

@@ -8,6 +8,7 @@
 #include "scene.glsl"
 #include "surface.glsl"
 #include "material.glsl"
+#include "maps.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
@@ -25,11 +26,13 @@ void main() {
         pixel_features[pixel_ix].depth = uintBitsToFloat(0x7f800000u);
         return; // the vectors were cleared at the frame's start
     }
-    Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
+    Surface surface;
+    Material material;
+    shaded_at(ray, hit, surface, material);
     uint material_ix = load_triangle_materials(hit.triangle_ix);
     pixel_features[pixel_ix].position_world = surface.point_world;
     pixel_features[pixel_ix].normal_world = surface.shading;
     pixel_features[pixel_ix].material_ix = material_ix;
-    pixel_features[pixel_ix].albedo = materials[material_ix].kd;
+    pixel_features[pixel_ix].albedo = material.kd;
     pixel_features[pixel_ix].depth = dot(surface.point_world - frame.eye, frame.forward);
 }

@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 // Rasterize, 2 of 2: tests the pixels that large triangles may cover. One workgroup per block of a large triangle's
 // bounding rectangle; if there are more blocks than workgroups, each workgroup takes several.
-// Reads triangles, large_triangles, raster_count; updates pixel_nearest.
+// Reads triangles and the buffer of raster_groups; updates pixel_nearest.
 #include "layout.glsl"
 #include "rasterize.glsl"
 #include "footprint.glsl"

@@ -2,7 +2,7 @@
 #extension GL_GOOGLE_include_directive : require
 // Rasterize, 1 of 2: one invocation per triangle finds the pixels that the triangle may cover. The invocations of a
 // workgroup share the tests of all pixels of its small triangles; large triangles are left to rasterize_blocks.comp.
-// Reads triangles; writes large_triangles; updates pixel_nearest, raster_groups, raster_count.
+// Reads triangles; updates pixel_nearest, raster_groups, raster_count; writes large_triangles.
 #include "layout.glsl"
 #include "rasterize.glsl"
 #include "footprint.glsl"

@@ -11,6 +11,7 @@
 #include "surface.glsl"
 #include "light.glsl"
 #include "material.glsl"
+#include "maps.glsl"
 #include "counters.glsl"
 
 // Whether shadow rays are counted.
@@ -28,11 +29,13 @@ layout(std430, set = 0, binding = BIND_RAY_RADIANCE) writeonly buffer RayRadianc
 // The radiance that the surface itself emits and reflects towards the viewer, from the ambient light and all lights
 // that it sees.
 vec3 local_radiance(PathRay ray, uint ray_ix, Surface surface, Material material) {
-    vec3 radiance = material.ke + material.ka * frame.ambient;
+    vec3 radiance = emitted(material);
+    radiance += ambient_share(material, surface.shading, -ray.direction) * frame.ambient;
     for (uint light_ix = 0u; light_ix < frame.n_lights; ++light_ix) {
         if (light_visibility[light_ix * frame.queue_capacity + ray_ix] != LIGHT_LIT) continue;
         LightSample to_light = sample_light(lights[light_ix], surface.point_world);
-        radiance += phong(material, surface.shading, -ray.direction, to_light.direction) * to_light.irradiance;
+        vec3 reflectance = reflectance_of(material, surface.shading, -ray.direction, to_light.direction);
+        radiance += reflectance * bump_shadowing(surface, to_light.direction) * to_light.irradiance;
     }
     return radiance * local_weight(material);
 }
@@ -41,8 +44,11 @@ vec3 local_radiance(PathRay ray, uint ray_ix, Surface surface, Material material
 vec3 radiance_of(PathRay ray, uint ray_ix) {
     Hit hit = hits[ray_ix];
     if (hit.triangle_ix == NO_TRIANGLE) return ray.throughput * frame.background;
-    Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
-    return ray.throughput * local_radiance(ray, ray_ix, surface, material_at(hit));
+    Surface surface;
+    Material material;
+    shaded_at(ray, hit, surface, material);
+    vec3 throughput = ray.throughput * unabsorbed(material, surface, hit.t);
+    return throughput * local_radiance(ray, ray_ix, surface, material);
 }
 
 // Adds the number of the ray's shadow rays to the counter of its bounce.

@@ -10,12 +10,14 @@
 
 // Whether the segments' cost is added to pixel_features.
 layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
+const bool PASSES_VEILS = true;
 #include "accel.glsl"
 #include "rays.glsl"
 #include "lanes.glsl"
 #include "surface.glsl"
 #include "light.glsl"
 #include "material.glsl"
+#include "maps.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };
@@ -26,12 +28,16 @@ layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock
 
 // Computes the segment to the light. Returns false if the surface faces away from the light or would not show it.
 bool shadow_segment(PathRay ray, Hit hit, Light light, out PathRay segment) {
-    Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
+    Surface surface;
+    Material material;
+    shaded_at(ray, hit, surface, material);
     LightSample to_light = sample_light(light, surface.point_world);
-    if (!(dot(surface.geometric, to_light.direction) > 0.0)) return false;
-    if (!can_show(material_at(hit), surface.shading, -ray.direction, to_light.direction)) return false;
-    segment = ray_from(surface, to_light.direction, hit.triangle_ix, ray, vec3(0.0));
-    segment.t_max = to_light.distance;
+    if (!(dot(surface.interpolated, to_light.direction) > 0.0)) return false;
+    if (!can_show(material, surface.shading, -ray.direction, to_light.direction)) return false;
+    vec3 origin = lit_point(surface, hit, triangle_at(hit.triangle_ix)) + surface.clearance * surface.geometric;
+    segment = PathRay(
+        origin, ray.pixel_ix, to_light.direction, hit.triangle_ix, vec3(0.0), to_light.distance
+    );
     return true;
 }
 

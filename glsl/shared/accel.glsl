@@ -1,6 +1,7 @@
 // The acceleration structure: finds the hit of a ray.
 //
-// Needs a constant `bool COUNT_COSTS`, which the kernel declares before this file (steps.glsl). Provides `traverse`,
+// Needs the constants `bool COUNT_COSTS` (steps.glsl) and `bool PASSES_VEILS` (cutout.glsl), which the kernel declares
+// before this file. Provides `traverse`,
 // and `traverse_any_length` for directions of any length, which are all that a kernel calls to find a hit. Kernels
 // also use `is_stalled` and `runs_in_round` of stalls.glsl. cast.comp checks its rays by `exponent_of`,
 // `longest_bits` and `magnitude_bits`.

@@ -1,8 +1,10 @@
 // Candidates, which are the triangles that a search comes to, and their test against the nearest hit so far. A part
 // of accel.glsl.
 //
-// Needs scene.glsl, triangle.glsl, traversal_ray.glsl and local_memory.glsl. Provides `Nearest`, `intersect`,
+// Needs scene.glsl, triangle.glsl, traversal_ray.glsl, local_memory.glsl and PASSES_VEILS. Provides `Nearest`, `intersect`,
 // `is_better`, `is_accepted` and `is_done`.
+
+#include "cutout.glsl"
 
 // Whether rays pass through triangles that are marked TRIANGLE_HIDDEN in `triangle_materials`.
 layout(constant_id = CONSTANT_SKIPS_HIDDEN) const bool SKIPS_HIDDEN = false;
@@ -21,9 +23,10 @@ bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
     return t > ray.t_min && nearer && triangle_ix != ray.source_triangle;
 }
 
-// Whether a hit counts. Without SKIPS_HIDDEN every hit does, and nothing is read. u, v: barycentric weights of the
-// hit, which are not used: the triangle's mark decides alone.
+// Whether a hit counts. Without SKIPS_HIDDEN and CUTOUTS every hit does, and nothing is read. u, v: barycentric weights
+// of the hit.
 bool is_accepted(uint triangle_ix, float u, float v) {
+    if (CUTOUTS) return !is_cut_out(triangle_ix, u, v, PASSES_VEILS);
     if (SKIPS_HIDDEN) return (load_triangle_materials(triangle_ix) & TRIANGLE_HIDDEN) == 0u;
     return true;
 }

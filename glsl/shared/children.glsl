@@ -6,17 +6,32 @@
 #include "scene.glsl"
 #include "surface.glsl"
 #include "material.glsl"
+#include "maps.glsl"
 
 // Whether a child ray of this weight has a throughput above 0 in any colour.
 bool carries_light(PathRay ray, vec3 weight) {
     return any(greaterThan(ray.throughput * weight, vec3(0.0)));
 }
 
+// How the ray continues from its hit.
+Scattering scattering_at(PathRay ray, Hit hit, out Surface surface) {
+    Material material;
+    shaded_at(ray, hit, surface, material);
+    Scattering next = scatter(material, surface, ray.direction);
+    vec3 unabsorbed_share = unabsorbed(material, surface, hit.t);
+    next.reflected_weight *= unabsorbed_share;
+    next.transmitted_weight *= unabsorbed_share;
+    return next;
+}
+
 // The ray's children that carry light, as bits CHILD_*.
 uint child_kinds_of(PathRay ray, Hit hit) {
-    if (hit.triangle_ix == NO_TRIANGLE || !scatters_light(material_at(hit))) return 0u;
-    Surface surface = surface_at(ray, hit, triangle_at(hit.triangle_ix));
-    Scattering next = scatter(material_at(hit), surface, ray.direction);
+    if (hit.triangle_ix == NO_TRIANGLE) return 0u;
+    // Textures may change what a material scatters.
+    bool may_scatter = TEXTURED ? true : scatters_light(materials[load_triangle_materials(hit.triangle_ix)]);
+    if (!may_scatter) return 0u;
+    Surface surface;
+    Scattering next = scattering_at(ray, hit, surface);
     return (carries_light(ray, next.reflected_weight) ? CHILD_REFLECTED : 0u)
          | (carries_light(ray, next.transmitted_weight) ? CHILD_TRANSMITTED : 0u);
 }

@@ -117,6 +117,24 @@
 #define MATERIAL_REFRACT 4u
 // `Material.flags`: the share of reflected light follows Fresnel's equations.
 #define MATERIAL_FRESNEL 8u
+// `Material.flags`: the material reflects by microfacets (microfacet.glsl), not by Phong's model.
+#define MATERIAL_MICROFACET 16u
+// `Material.flags`, with microfacets: the surface is the boundary of a solid, which refracts and absorbs light. Without
+// this flag it is a thin sheet.
+#define MATERIAL_SOLID 32u
+// `Material.flags`: the surface shows `kd` and `ke` without any light.
+#define MATERIAL_UNLIT 64u
+
+// Roughness up to which a microfacet surface reflects rays as a mirror does.
+#define MIRROR_ROUGHNESS 0.1
+// Roughness from which a microfacet surface reflects no rays. In between, the share of mirrored light falls linearly.
+#define MATT_ROUGHNESS 0.3
+// Lower bound of the width of a distribution of microfacets, the squared roughness. It keeps highlights of point lights
+// finite.
+#define LEAST_MICROFACET_WIDTH 0.002
+// Opacity below which light passes through a see-through microfacet surface on its way to another hit. A shadow ray
+// cannot be weakened, only stopped.
+#define LEAST_SHADOWING_OPACITY 0.5
 
 // Bit of `child_kinds`: a reflected ray continues from the hit. It precedes a transmitted one in the queue.
 #define CHILD_REFLECTED 1u
@@ -148,6 +166,7 @@
 // Value of `Light.kind`.
 #define LIGHT_POINT 0u
 #define LIGHT_DIRECTIONAL 1u
+#define LIGHT_SPOT 2u
 
 // A triangle, 48 bytes.
 //
@@ -239,7 +258,7 @@ struct GridCell {
     uint count;
 };
 
-// A material, 80 bytes. The members are named as in Wavefront MTL.
+// A material, 112 bytes. The members are named as in Wavefront MTL, but for the last five.
 //
 // - `ka`, `kd`, `ks`: ambient, diffuse and specular reflectance.
 // - `ns`: exponent of the Phong highlight.
@@ -248,6 +267,11 @@ struct GridCell {
 // - `ke`: emitted radiance.
 // - `flags`: bits of `MATERIAL_SPECULAR` and its like.
 // - `tf`: weight of refracted light by colour.
+// - `transmission`, `metallic`, `roughness`: of microfacets (microfacet.glsl), 0..1.
+// - `absorption`: of light in the solid behind the surface, by colour (per world unit).
+//
+// With microfacets, `kd` is the base colour, `ks` a factor on the reflectance of a dielectric, and `ka` the share of
+// ambient light that reaches the surface.
 struct Material {
     vec3 ka;
     float ns;
@@ -258,21 +282,90 @@ struct Material {
     vec3 ke;
     uint flags;
     vec3 tf;
-    uint reserved;
+    float transmission;
+    vec3 absorption;
+    float metallic;
+    float roughness;
+    uint reserved0;
+    uint reserved1;
+    uint reserved2;
 };
 
-// A light, 32 bytes.
+// A light, 48 bytes.
 //
-// - `position`: of a point light, in world space. Of a directional light, the unit vector towards the light.
-// - `kind`: `LIGHT_POINT` or `LIGHT_DIRECTIONAL`.
+// - `position`: of a point or spot light, in world space. Of a directional light, the unit vector towards the light.
+// - `kind`: `LIGHT_POINT`, `LIGHT_DIRECTIONAL` or `LIGHT_SPOT`.
 // - `intensity`: of a point light, power per steradian; its irradiance falls with the square of the distance. Of a
-//   directional light, the irradiance on a surface that faces it.
+//   directional light, the irradiance on a surface that faces it. Of a spot light, power per steradian on its axis.
+// - `axis`: of a spot light, the unit vector along which it shines.
+// - `inner_cos`, `outer_cos`: cosines of the angles from the axis at which the spot light begins to fall off, and at
+//   which it ends.
 struct Light {
     vec3 position;
     uint kind;
     vec3 intensity;
+    float inner_cos;
+    vec3 axis;
+    float outer_cos;
+};
+
+// Replaces the index of a part of `texture_words` that the scene does not have.
+#define NO_WORDS 0xffffffffu
+
+// What a corner of a triangle has beside its position and normal, 8 bytes.
+//
+// - `tangent`: unit tangent along increasing u, octahedral 2 x snorm16. The lowest bit is replaced: it is 1 if the
+//   bitangent, along decreasing v, is the cross product of normal and tangent, and 0 if it is the opposite.
+//   `FLAT_NORMAL` if there is no tangent.
+// - `colour`: 8 bits a channel, red in the lowest byte. Colours are sRGB, opacity is linear.
+struct CornerSurface {
+    uint tangent;
+    uint colour;
+};
+
+// TEMPORARY
+#define NO_TEXTURE 0xffffffffu
+struct Texture {
+    float m00;
+    float m01;
+    float offset_u;
+    uint first_texel;
+    float m10;
+    float m11;
+    float offset_v;
+    uint size;
+    uint flags;
+    uint n_levels;
+    uint reserved0;
+    uint reserved1;
+};
+
+struct MaterialMaps {
+    uint base_colour;
+    uint opacity;
+    uint specular;
+    uint specular_factor;
+    uint emission;
+    uint normal;
+    uint roughness;
+    uint metallic;
+    uint transmission;
+    uint occlusion;
+    float normal_scale;
+    float occlusion_strength;
+    float alpha_cutoff;
+    float opacity_factor;
+    uint flags;
     uint reserved;
 };
+// END TEMPORARY
+
+// `MaterialMaps.flags`: rays pass through the surface where its opacity is below `alpha_cutoff`.
+#define MAPS_CUTOUT 1u
+// `MaterialMaps.flags`: shadow rays do so.
+#define MAPS_VEIL 2u
+// `MaterialMaps.flags`: the opacity of the base colour's texture and of the corners' colours counts.
+#define MAPS_COLOUR_HAS_OPACITY 4u
 
 // A ray of a picture, 48 bytes. Its hits have t in `(0, t_max]`.
 //
@@ -453,6 +546,9 @@ struct Feature {
 // - `n_triangles`: of the scene.
 // - `n_cells_x`, `n_cells_y`, `n_cells_z`: cells of a grid's upper level along each axis.
 // - `cell_size`: edge of a cell of a grid's upper level (world units).
+// - `uvs_begin`, `corners_begin`, `material_maps_begin`, `textures_begin`: index in `texture_words` at which the
+//   triangles' texture coordinates, the tangents and colours of their corners, the materials' maps and the textures
+//   begin. `NO_WORDS`: the scene has none of them.
 // - The rest: the device address of each of the scene's arrays, low word first. 0 if kernels read the array by its
 //   binding.
 struct AccelConstants {
@@ -464,6 +560,10 @@ struct AccelConstants {
     uint n_cells_y;
     uint n_cells_z;
     float cell_size;
+    uint uvs_begin;
+    uint corners_begin;
+    uint material_maps_begin;
+    uint textures_begin;
 #define ARRAY(name, element, row, number) uvec2 name;
 #include "scene_arrays.glsl"
 #undef ARRAY
@@ -504,6 +604,13 @@ struct AccelConstants {
 #define GRID_SCANS_DIGITS 3u
 
 // Constants that have the same value in all kernels over one scene.
+
+// Whether the scene has textures, or colours at the corners of triangles.
+#define CONSTANT_TEXTURED 24u
+// Whether the scene has materials of microfacets.
+#define CONSTANT_MICROFACETS 25u
+// Whether rays pass through parts of triangles (cutout.glsl).
+#define CONSTANT_CUTOUTS 26u
 
 // Whether rays pass through triangles with `TRIANGLE_HIDDEN` in `triangle_materials`.
 #define CONSTANT_SKIPS_HIDDEN 28u
@@ -578,7 +685,7 @@ struct LargeTriangle {
 
 // The workgroups over the blocks of large triangles, 16 bytes: a `VkDispatchIndirectCommand` and a spare word. In the
 // same buffer, 8 bytes of counts follow: the number of large triangles in the upper half, the number of their blocks
-// in the lower.
+// in the lower. After 8 spare bytes come the large triangles.
 struct RasterGroups {
     uint x;
     uint y;
@@ -773,10 +880,8 @@ struct GridSort {
 #define BIND_ACCEL 26u
 // Two words for each pixel: index of the nearest triangle, and above it the bits of its distance.
 #define BIND_PIXEL_NEAREST 28u
-// One `RasterGroups` and 8 bytes of counts.
+// One `RasterGroups`, counts, and one `LargeTriangle` for each triangle of the scene.
 #define BIND_RASTER_GROUPS 29u
-// One `LargeTriangle` for each triangle of the scene.
-#define BIND_LARGE_TRIANGLES 31u
 // A row of counts, then `STALLED_RAY_ROWS` rows of four words for each slot (stalls.glsl).
 #define BIND_STALLS 32u
 

@@ -1,4 +1,4 @@
-// Point and directional lights, as seen from a point of a surface. Twin of src/reference/light.rs.
+// Point, spot and directional lights, as seen from a point of a surface. Twin of src/reference/light.rs.
 #ifndef KDRAY_LIGHT
 #define KDRAY_LIGHT
 
@@ -13,6 +13,13 @@ struct LightSample {
     vec3 irradiance;
 };
 
+// The share of a spot light's intensity in a direction, whose opposite is `direction` (glTF's KHR_lights_punctual).
+float spot_share(Light light, vec3 direction) {
+    float cosine = dot(light.axis, -direction);
+    float share = clamp((cosine - light.outer_cos) / max(light.inner_cos - light.outer_cos, 1.0e-3), 0.0, 1.0);
+    return share * share;
+}
+
 // Returns what arrives from a light at a point.
 LightSample sample_light(Light light, vec3 point_world) {
     if (light.kind == LIGHT_DIRECTIONAL) {
@@ -21,7 +28,9 @@ LightSample sample_light(Light light, vec3 point_world) {
     vec3 to_light = light.position - point_world;
     float squared = dot(to_light, to_light);
     float distance = sqrt(squared);
-    return LightSample(to_light / distance, distance, light.intensity / squared);
+    vec3 direction = to_light / distance;
+    float cone = light.kind == LIGHT_SPOT ? spot_share(light, direction) : 1.0;
+    return LightSample(direction, distance, light.intensity * cone / squared);
 }
 
 #endif

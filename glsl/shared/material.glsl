@@ -1,17 +1,14 @@
-// Materials of Wavefront MTL: local light by Phong, mirrors, glass, transparency. Twin of src/reference/material.rs.
+// Materials: local light by Phong, mirrors, glass and transparency as in Wavefront MTL, and microfacets
+// (microfacet.glsl). Twin of src/reference/material.rs.
 #ifndef KDRAY_MATERIAL
 #define KDRAY_MATERIAL
 
 #include "layout.glsl"
 #include "scene.glsl"
 #include "surface.glsl"
+#include "microfacet.glsl"
 
 layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
-
-// The material of the triangle that was hit.
-Material material_at(Hit hit) {
-    return materials[load_triangle_materials(hit.triangle_ix)];
-}
 
 // The directions in which a ray continues from a surface, and the weights by which its throughput is multiplied. A
 // weight of zero means that there is no such ray.
@@ -25,11 +22,15 @@ struct Scattering {
 // The weight of the light that the surface itself reflects and emits. A see-through material (d < 1) covers only a
 // share d of what is behind it. A material that refracts shows its own light in full.
 float local_weight(Material material) {
+    if (is_microfacet(material)) return material.d;
     return (material.flags & MATERIAL_REFRACT) != 0u ? 1.0 : material.d;
 }
 
 // Whether rays may continue from the surface.
 bool scatters_light(Material material) {
+    if (is_microfacet(material)) {
+        return material.d < 1.0 || material.transmission > 0.0 || mirror_share(material) > 0.0;
+    }
     return (material.flags & (MATERIAL_REFLECT | MATERIAL_REFRACT)) != 0u || material.d < 1.0;
 }
 
@@ -46,13 +47,39 @@ vec3 phong(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
     return reflectance;
 }
 
+// Whether the surface shows its colour without any light.
+bool is_unlit(Material material) {
+    return MICROFACETS && (material.flags & MATERIAL_UNLIT) != 0u;
+}
+
+// The radiance that the surface gives off by itself.
+vec3 emitted(Material material) {
+    return is_unlit(material) ? material.kd + material.ke : material.ke;
+}
+
+// The share of the ambient light that the surface shows.
+vec3 ambient_share(Material material, vec3 normal, vec3 to_viewer) {
+    if (is_unlit(material)) return vec3(0.0);
+    if (is_microfacet(material)) return material.ka * ambient_reflectance(material, normal, to_viewer);
+    return material.ka;
+}
+
+// The reflectance towards the viewer, times the cosine of the light's direction where the light is reflected
+// diffusely or by microfacets. All vectors are unit vectors that point away from the surface.
+vec3 reflectance_of(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
+    if (is_unlit(material)) return vec3(0.0);
+    if (is_microfacet(material)) return microfacet_reflectance(material, normal, to_viewer, to_light);
+    return phong(material, normal, to_viewer, to_light);
+}
+
 // Whether the surface can show a light: whether it reflects towards the viewer more than LEAST_REFLECTANCE, in any
 // colour, of the light that comes from the direction to_light.
 bool can_show(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
+    if (is_unlit(material)) return false;
     // The diffuse part alone decides most cases, without the exponentiation of the specular part.
     vec3 diffuse = material.kd * dot(normal, to_light) * local_weight(material);
-    if (any(greaterThan(diffuse, vec3(LEAST_REFLECTANCE)))) return true;
-    vec3 reflectance = phong(material, normal, to_viewer, to_light) * local_weight(material);
+    if (!is_microfacet(material) && any(greaterThan(diffuse, vec3(LEAST_REFLECTANCE)))) return true;
+    vec3 reflectance = reflectance_of(material, normal, to_viewer, to_light) * local_weight(material);
     return any(greaterThan(reflectance, vec3(LEAST_REFLECTANCE)));
 }
 
@@ -76,8 +103,40 @@ vec3 keep_side(vec3 direction, vec3 side) {
     return direction - 2.0 * min(dot(direction, side), 0.0) * side;
 }
 
+// How a ray of this direction continues from a surface of microfacets. What is transmitted is not spread, however rough
+// the surface is.
+Scattering scatter_by_microfacets(Material material, Surface surface, vec3 direction) {
+    Scattering s = Scattering(vec3(0.0), vec3(0.0), direction, vec3(0.0));
+    bool is_solid = (material.flags & MATERIAL_SOLID) != 0u;
+    float eta = surface.from_inside ? material.ni : 1.0 / material.ni;
+    float cos_in = max(dot(surface.shading, -direction), LEAST_COSINE);
+    float cos_out = refraction_cosine(cos_in, eta);
+    bool total = is_solid && cos_out <= 0.0;
+    vec3 dielectric = is_solid ? vec3(fresnel(cos_in, cos_out, eta)) : dielectric_reflectance(material, cos_in);
+    vec3 reflected = mix(dielectric, metal_reflectance(material, cos_in), material.metallic);
+    s.reflected = keep_side(normalize(direction + 2.0 * cos_in * surface.shading), surface.geometric);
+    s.reflected_weight = material.d * (total ? 1.0 : mirror_share(material)) * reflected;
+    float through = material.transmission * (1.0 - material.metallic);
+    // A ray through a solid is tinted twice, where it enters and where it leaves.
+    vec3 tint = is_solid ? sqrt(material.kd) : material.kd;
+    s.transmitted_weight = material.d * through * (1.0 - dielectric) * tint + (1.0 - material.d);
+    if (is_solid && through > 0.0 && !total) {
+        vec3 refracted = eta * direction + (eta * cos_in - cos_out) * surface.shading;
+        s.transmitted = keep_side(normalize(refracted), -surface.geometric);
+    }
+    return s;
+}
+
+// The share of light that is left at the end of a ray, which may have come through a solid. t: the ray's length, world
+// units.
+vec3 unabsorbed(Material material, Surface surface, float t) {
+    bool is_absorbed = is_microfacet(material) && (material.flags & MATERIAL_SOLID) != 0u && surface.from_inside;
+    return is_absorbed ? exp(-material.absorption * t) : vec3(1.0);
+}
+
 // How a ray of this direction continues from a surface.
 Scattering scatter(Material material, Surface surface, vec3 direction) {
+    if (is_microfacet(material)) return scatter_by_microfacets(material, surface, direction);
     Scattering s = Scattering(vec3(0.0), vec3(0.0), direction, vec3(0.0));
     bool reflects = (material.flags & MATERIAL_REFLECT) != 0u;
     bool refracts = (material.flags & MATERIAL_REFRACT) != 0u;

@@ -11,17 +11,19 @@
 #include "scene.glsl"
 #include "camera.glsl"
 #include "triangle.glsl"
+#include "cutout.glsl"
 
 layout(std430, set = 0, binding = BIND_PIXEL_NEAREST) buffer PixelNearestBlock { uint64_t pixel_nearest[]; };
 
 layout(push_constant) uniform RasterPushBlock { RasterPush raster; };
 // raster_count: the number of large triangles in the upper 32 bits, the number of their blocks in the lower 32 bits.
-// It shares a buffer with raster_groups, since some devices bind no more than 30 buffers in a stage.
+// All of this is in one buffer, since some devices bind no more than 30 buffers in a stage.
 layout(std430, set = 0, binding = BIND_RASTER_GROUPS) buffer RasterGroupsBlock {
     RasterGroups raster_groups;
     uint64_t raster_count;
+    uint64_t reserved;
+    LargeTriangle large_triangles[];
 };
-layout(std430, set = 0, binding = BIND_LARGE_TRIANGLES) buffer LargeTrianglesBlock { LargeTriangle large_triangles[]; };
 
 // The number of blocks that a rectangle of this size is cut into, along x and y.
 uvec2 blocks_of(uvec2 size) {
@@ -38,6 +40,7 @@ void keep_nearest(uvec2 pixel, float t, uint triangle_ix) {
 void test_pixel(uvec2 pixel, Triangle triangle, uint triangle_ix) {
     Hit hit;
     if (!intersect_triangle(shear_of(frame.eye, camera_direction(pixel)), triangle, triangle_ix, hit)) return;
+    if (CUTOUTS && is_cut_out(triangle_ix, hit.u, hit.v, false)) return;
     if (hit.t > 0.0) keep_nearest(pixel, hit.t, triangle_ix);
 }
 

@@ -15,6 +15,10 @@ ARRAY(triangles, Triangle, vec4, 1u)
 // One word for each triangle: the index of its material. For casts with a filter, it is TRIANGLE_HIDDEN or 0.
 ARRAY(triangle_materials, uint, uint, 2u)
 
+// Everything that textures need, as words, or none if the scene has neither textures nor colours at the corners of
+// triangles (texture_words.glsl).
+ARRAY(texture_words, uint, uint, 31u)
+
 // The nodes of the kd-tree.
 ARRAY(kd_nodes, KdNode, uvec2, 5u)
 // One word for each pair of siblings: the index of their parent.

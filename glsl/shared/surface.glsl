@@ -7,10 +7,13 @@
 // The surface of a triangle at a hit, as the ray meets it.
 struct Surface {
     vec3 point_world;
-    // Unit normals, both on the side that the ray comes from. geometric: the normal of the triangle's plane. shading:
-    // the normal interpolated from the corners.
+    // Unit normals, all on the side that the ray comes from. geometric: the normal of the triangle's plane.
+    // interpolated: the normal interpolated from the corners. shading: the same, or what a normal map makes of it.
     vec3 geometric;
+    vec3 interpolated;
     vec3 shading;
+    // Whether `interpolated` is the reverse of what the corners' normals give.
+    bool is_reversed;
     // Distance along `geometric` at which a new ray starts so that it does not hit this surface, world units.
     float clearance;
     // Whether the ray meets the triangle's back. The ray then counts as inside a solid.
@@ -36,11 +39,6 @@ vec3 shading_normal(Triangle t, Hit hit, vec3 geometric) {
     return squared > LEAST_NORMAL_SQUARED ? n * inversesqrt(squared) : geometric;
 }
 
-// n or -n, whichever has a non-negative component along `side`.
-vec3 towards(vec3 n, vec3 side) {
-    return dot(n, side) < 0.0 ? -n : n;
-}
-
 // Barycentric weights of the hit, at least LEAST_WEIGHT each before they are normalized, so that the point is not on
 // an edge.
 vec3 inner_weights(Hit hit) {
@@ -61,9 +59,31 @@ Surface surface_at(PathRay ray, Hit hit, Triangle t) {
     vec3 outward = normalize(cross(e1 * scale, e2 * scale));
     s.from_inside = dot(outward, ray.direction) > 0.0;
     s.geometric = s.from_inside ? -outward : outward;
-    s.shading = towards(shading_normal(t, hit, outward), s.geometric);
+    vec3 interpolated = shading_normal(t, hit, outward);
+    s.is_reversed = dot(interpolated, s.geometric) < 0.0;
+    s.interpolated = s.is_reversed ? -interpolated : interpolated;
+    s.shading = s.interpolated;
     s.clearance = SURFACE_CLEARANCE * dot(magnitude, abs(s.geometric));
     return s;
+}
+
+// The part of p, relative to a corner, that is not below the plane through the corner with the normal of that corner.
+vec3 above_corner(vec3 p, vec3 corner, uint normal, vec3 interpolated) {
+    vec3 n = decode_normal(normal);
+    n = dot(n, interpolated) < 0.0 ? -n : n;
+    return p - min(dot(p - corner, n), 0.0) * n;
+}
+
+// The point at which rays to lights start: the surface's point, moved up to the curved surface that the corners' normals
+// suggest, if that is above the triangle (Hanika: Hacking the Shadow Terminator, Ray Tracing Gems II, 2021). From a
+// point of a coarse mesh itself, the light would be hidden by the neighbouring triangles, one triangle earlier or
+// later than the shading ends.
+vec3 lit_point(Surface s, Hit hit, Triangle t) {
+    if (t.n0 == FLAT_NORMAL || t.n1 == FLAT_NORMAL || t.n2 == FLAT_NORMAL) return s.point_world;
+    vec3 weights = inner_weights(hit);
+    return weights.x * above_corner(s.point_world, t.v0, t.n0, s.interpolated)
+        + weights.y * above_corner(s.point_world, t.v1, t.n1, s.interpolated)
+        + weights.z * above_corner(s.point_world, t.v2, t.n2, s.interpolated);
 }
 
 // A child ray from the surface, with the parent's t_max. It starts on the side of the surface to which its direction

@@ -90,7 +90,15 @@ mod tests {
     use super::*;
 
     fn surface(geometric: Vec3, shading: Vec3) -> Surface {
-        Surface { point_world: Vec3::ZERO, geometric, shading, clearance: 0.0, from_inside: false }
+        Surface {
+            point_world: Vec3::ZERO,
+            geometric,
+            interpolated: shading,
+            shading,
+            is_reversed: false,
+            clearance: 0.0,
+            from_inside: false,
+        }
     }
 
     #[test]

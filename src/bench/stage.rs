@@ -47,7 +47,7 @@ impl Stage {
     /// # Panics
     /// The scene has a triangle without a material.
     pub fn open(scene: FlatScene, size: (u32, u32), build_options: &BuildOptions) -> Self {
-        let above = Light { position: Vec3::Y, kind: LIGHT_DIRECTIONAL, intensity: Vec3::ONE, reserved: 0 };
+        let above = Light { position: Vec3::Y, kind: LIGHT_DIRECTIONAL, intensity: Vec3::ONE, ..Light::default() };
         let light = scene.lights.first().copied().unwrap_or(above);
         let begin = Instant::now();
         let world = World::of_flat(scene, build_options).expect("a material for each triangle");
@@ -157,7 +157,7 @@ impl Room {
                 position: centre + radius * Vec3::new(0.0, 1.4, 0.0),
                 kind: LIGHT_POINT,
                 intensity: Vec3::ONE,
-                reserved: 0,
+                ..Light::default()
             },
         }
     }

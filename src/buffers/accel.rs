@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::{
     Stalls,
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
+    texture_words::TextureWords,
 };
 use crate::{
     accel::{
@@ -16,11 +17,11 @@ use crate::{
     },
     gpu::{Binding, Buffer, BufferUse, Constants, Context, GpuError, Timer},
     layout::{
-        AccelConstants, BIND_ACCEL, BIND_STALLS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, LeafTriangle, Slab,
-        TRIANGLE_HIDDEN, Triangle, constants,
+        AccelConstants, BIND_ACCEL, BIND_STALLS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, LeafTriangle, MATERIAL_MICROFACET,
+        MATERIAL_UNLIT, NO_WORDS, Slab, TRIANGLE_HIDDEN, Triangle, constants,
     },
     passes::grid::GridBuilder,
-    world::Geometry,
+    world::{Geometry, World},
 };
 
 /// Returns the numbers of the bindings of [`AccelBuffers`].
@@ -50,6 +51,10 @@ pub struct AccelBuffers {
     structure: Structure,
     /// Whether rays pass through some of the triangles.
     filters: bool,
+    /// Whether some materials are not those of MTL: of microfacets, or unlit.
+    has_microfacets: bool,
+    /// Whether textures cut out parts of triangles.
+    has_cutouts: bool,
     /// The contents of `constants`.
     uploaded: AccelConstants,
 }
@@ -60,18 +65,45 @@ impl AccelBuffers {
     /// # Errors
     /// A buffer is beyond the device's limits, or memory runs out.
     pub fn new(context: &Arc<Context>, geometry: Geometry) -> Result<Self, GpuError> {
+        Self::with_room(context, geometry, 0)
+    }
+
+    /// Uploads the geometry and the surfaces of a scene.
+    ///
+    /// # Errors
+    /// A buffer is beyond the device's limits, or memory runs out.
+    pub fn of_world(context: &Arc<Context>, world: &World) -> Result<Self, GpuError> {
+        let scene = world.scene();
+        let words = TextureWords::new(&scene.textures);
+        let mut made = Self::with_room(context, world.geometry(), words.len())?;
+        made.add_materials(context, &scene.triangle_materials)?;
+        made.add_textures(context, &words)?;
+        made.has_microfacets =
+            scene.materials.iter().any(|material| material.flags & (MATERIAL_MICROFACET | MATERIAL_UNLIT) != 0);
+        made.has_cutouts = scene.textures.has_cutouts();
+        Ok(made)
+    }
+
+    /// Uploads triangles and their structure. `n_texture_words`: the length that `texture_words` will have.
+    fn with_room(context: &Arc<Context>, geometry: Geometry, n_texture_words: usize) -> Result<Self, GpuError> {
         let triangles = geometry.triangles();
+        let common = || Contents::of_triangles(triangles, n_texture_words);
         match geometry.accel() {
-            Accel::KdTree(tree) => Self::of_tree(context, triangles, tree),
+            Accel::KdTree(tree) => Self::of_tree(context, triangles, tree, common()),
             Accel::Grid(grid) if GridBuilder::has_room(context, triangles.len()) => {
-                Self::of_device_grid(context, triangles, grid)
+                Self::of_device_grid(context, triangles, grid, common())
             }
-            Accel::Grid(grid) => Self::of_grid(context, triangles, grid.get(triangles)),
+            Accel::Grid(grid) => Self::of_grid(context, triangles, grid.get(triangles), common()),
         }
     }
 
     /// Uploads triangles and their kd-tree.
-    fn of_tree(context: &Arc<Context>, triangles: &[Triangle], tree: &KdTree) -> Result<Self, GpuError> {
+    fn of_tree(
+        context: &Arc<Context>,
+        triangles: &[Triangle],
+        tree: &KdTree,
+        common: Contents,
+    ) -> Result<Self, GpuError> {
         let n_nodes = tree.nodes().len();
         let entries = tree.leaf_triangles();
         let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);
@@ -83,14 +115,19 @@ impl AccelBuffers {
             kd_slabs: Content::Elements(slabs_for(context, tree)),
             kd_boxes: Content::Reserved(n_nodes),
             kd_ropes: Content::Reserved(6 * n_nodes),
-            ..Contents::of_triangles(triangles)
+            ..common
         };
         let mask_words = if tree.depth() <= KD_WORD_DEPTH { 1 } else { 2 };
         Self::with(context, contents, &tree.constants(), Structure::KdTree { mask_words })
     }
 
     /// Uploads triangles, whose grid the device builds.
-    fn of_device_grid(context: &Arc<Context>, triangles: &[Triangle], grid: &LazyGrid) -> Result<Self, GpuError> {
+    fn of_device_grid(
+        context: &Arc<Context>,
+        triangles: &[Triangle],
+        grid: &LazyGrid,
+        common: Contents,
+    ) -> Result<Self, GpuError> {
         let on_device = Buffer::with(context, "triangles", triangles, BufferUse::Texels)?;
         let builder = GridBuilder::new(context, &on_device, grid.options())?;
         let timer = Timer::new(context, builder.n_stages())?;
@@ -103,21 +140,26 @@ impl AccelBuffers {
             grid_cells: Content::OnDevice(built.cells),
             leaf_triangles: Content::OnDevice(built.leaf_triangles),
             leaf_planes: Content::OnDevice(built.leaf_planes),
-            ..Contents::of_triangles(triangles)
+            ..common
         };
         Self::with(context, contents, &constants, structure)
     }
 
     /// Uploads triangles and the grid that the host has built. This is for scenes with more triangles than the device
     /// can bind as one storage buffer, since the kernels that build grids need that.
-    fn of_grid(context: &Arc<Context>, triangles: &[Triangle], grid: &Grid) -> Result<Self, GpuError> {
+    fn of_grid(
+        context: &Arc<Context>,
+        triangles: &[Triangle],
+        grid: &Grid,
+        common: Contents,
+    ) -> Result<Self, GpuError> {
         let entries = grid.leaf_triangles();
         let write_entries = |first: usize, part: &mut [LeafTriangle]| leaf_triangles(triangles, entries, first, part);
         let contents = Contents {
             grid_cells: Content::Elements(grid.cells()),
             leaf_triangles: Content::Written { len: entries.len(), write: &write_entries },
             leaf_planes: Content::Elements(grid.leaf_planes()),
-            ..Contents::of_triangles(triangles)
+            ..common
         };
         Self::with(context, contents, &grid.constants(), Structure::Grid { n_levels: grid.n_levels() })
     }
@@ -131,13 +173,23 @@ impl AccelBuffers {
     ) -> Result<Self, GpuError> {
         let access = SceneAccess::of(context, &contents);
         let arrays = contents.upload(context, access)?;
-        let uploaded = AccelConstants { n_triangles: arrays.triangles.len() as u32, ..*constants };
+        let n_triangles = arrays.triangles.len() as u32;
+        let uploaded = AccelConstants {
+            n_triangles,
+            uvs_begin: NO_WORDS,
+            corners_begin: NO_WORDS,
+            material_maps_begin: NO_WORDS,
+            textures_begin: NO_WORDS,
+            ..*constants
+        };
         let mut made = Self {
             constants: Buffer::new(context, "accel", 1, BufferUse::Uniform)?,
             arrays,
             stalls: Stalls::new(context)?,
             access,
             filters: false,
+            has_microfacets: false,
+            has_cutouts: false,
             structure,
             uploaded,
         };
@@ -153,6 +205,14 @@ impl AccelBuffers {
     pub(super) fn add_materials(&mut self, context: &Arc<Context>, triangle_materials: &[u32]) -> Result<(), GpuError> {
         let materials = Content::Elements(triangle_materials);
         self.arrays.triangle_materials = materials.upload(context, "triangle_materials", self.access)?;
+        self.upload_constants(context)
+    }
+
+    /// Uploads the textures, and notes where their parts begin.
+    fn add_textures(&mut self, context: &Arc<Context>, words: &TextureWords) -> Result<(), GpuError> {
+        let content = Content::Written { len: words.len(), write: &|first, part| words.write(first, part) };
+        self.arrays.texture_words = content.upload(context, "texture_words", self.access)?;
+        words.note_begins(&mut self.uploaded);
         self.upload_constants(context)
     }
 
@@ -214,6 +274,9 @@ impl AccelBuffers {
             .set(constants::SKIPS_HIDDEN, self.filters)
             .set(constants::MASK_WORDS, mask_words)
             .set(constants::GRID_LEVELS, n_levels)
+            .set(constants::TEXTURED, self.uploaded.material_maps_begin != NO_WORDS)
+            .set(constants::MICROFACETS, self.has_microfacets)
+            .set(constants::CUTOUTS, self.has_cutouts)
             .set(constants::TURN_BUDGET, self.stalls.turn_budget())
     }
 

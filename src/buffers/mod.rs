@@ -7,6 +7,7 @@
 //! pixels          samples, sums, filtered and displayed pixels
 //! raster_queue    large triangles, between the two kernels that rasterize
 //! vertex_indices  the index buffer of the triangles that the graphics pipeline rasterizes
+//! texture_words   textures, and what leads from triangles to them
 //! stalls          rays that have spent a dispatch's loop turns
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid
@@ -22,6 +23,7 @@ mod raster_queue;
 mod resources;
 mod scene_arrays;
 mod stalls;
+mod texture_words;
 mod vertex_indices;
 
 pub use self::{

@@ -1,4 +1,4 @@
-//! Buffers that the kernels that rasterize hand to one another.
+//! The buffer that the kernels that rasterize hand to one another.
 
 use std::sync::Arc;
 
@@ -8,7 +8,8 @@ use crate::{
     layout::{LargeTriangle, RasterGroups},
 };
 
-/// State that the kernel for small triangles leaves to the one for large triangles.
+/// State that the kernel for small triangles leaves to the one for large triangles. In the buffer, the large triangles
+/// follow it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct RasterState {
@@ -16,40 +17,41 @@ pub struct RasterState {
     pub groups: RasterGroups,
     /// The number of large triangles in the upper half, that of their blocks in the lower half.
     pub count: u64,
+    pub reserved: u64,
 }
 
-/// Triangles with large bounding rectangles, and their blocks. The array of triangles is empty unless compute kernels
-/// rasterize the primary rays ([`Primary::SoftwareRaster`]). A clone is a second handle to the same buffers.
+/// The size of a [`RasterState`], in elements of the buffer.
+const STATE_LEN: usize = size_of::<RasterState>() / size_of::<LargeTriangle>();
+const _: () = assert!(STATE_LEN * size_of::<LargeTriangle>() == size_of::<RasterState>());
+
+/// Triangles with large bounding rectangles, and their blocks. A clone is a second handle to the same buffer.
 #[derive(Clone)]
 pub struct RasterQueue {
-    /// The state: one element.
-    pub groups: Buffer<RasterState>,
-    /// The large triangles, with room for all triangles.
-    pub large_triangles: Buffer<LargeTriangle>,
+    /// The state, a [`RasterState`], and the large triangles. There is room for all triangles if compute kernels
+    /// rasterize the primary rays ([`Primary::SoftwareRaster`]), and for none otherwise.
+    pub groups: Buffer<LargeTriangle>,
 }
 
 impl RasterQueue {
-    /// Makes the buffers for `n_triangles` triangles.
+    /// Makes the buffer for `n_triangles` triangles.
     ///
     /// # Errors
-    /// A buffer is beyond the device's limits, or memory runs out.
+    /// The buffer is beyond the device's limits, or memory runs out.
     pub fn new(context: &Arc<Context>, n_triangles: u32, options: &RenderOptions) -> Result<Self, GpuError> {
         let n_large = if options.primary == Primary::SoftwareRaster { n_triangles as usize } else { 0 };
-        Ok(Self {
-            groups: Buffer::new(context, "raster_groups", 1, BufferUse::Indirect)?,
-            large_triangles: Buffer::new(context, "large_triangles", n_large, BufferUse::Storage)?,
-        })
+        Ok(Self { groups: Buffer::new(context, "raster_groups", STATE_LEN + n_large, BufferUse::Indirect)? })
     }
 
     /// Whether the device can bind the buffer for `n_triangles` large triangles.
     pub fn has_room(context: &Context, n_triangles: usize) -> bool {
-        (n_triangles as u64).saturating_mul(size_of::<LargeTriangle>() as u64) <= context.limits().storage_range
+        let n_bytes = (STATE_LEN as u64 + n_triangles as u64).saturating_mul(size_of::<LargeTriangle>() as u64);
+        n_bytes <= context.limits().storage_range
     }
 
     /// Whether the array of triangles has the length that the options need: `n_triangles`, or 0 if no compute kernel
     /// rasterizes.
     pub fn fits(&self, n_triangles: u32, options: &RenderOptions) -> bool {
-        let has_room = self.large_triangles.len() == n_triangles as usize;
-        if options.primary == Primary::SoftwareRaster { has_room } else { self.large_triangles.is_empty() }
+        let n_large = if options.primary == Primary::SoftwareRaster { n_triangles as usize } else { 0 };
+        self.groups.len() == STATE_LEN + n_large
     }
 }

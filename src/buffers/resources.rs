@@ -22,7 +22,7 @@ const PUSH_BYTES: u32 = {
 };
 
 /// The bindings of the frame's descriptor set beside those of the acceleration structure.
-const OWN_BINDINGS: [u32; 21] = [
+const OWN_BINDINGS: [u32; 20] = [
     layout::BIND_FRAME,
     layout::BIND_MATERIALS,
     layout::BIND_LIGHTS,
@@ -42,7 +42,6 @@ const OWN_BINDINGS: [u32; 21] = [
     layout::BIND_COUNTERS,
     layout::BIND_PIXEL_NEAREST,
     layout::BIND_RASTER_GROUPS,
-    layout::BIND_LARGE_TRIANGLES,
     layout::BIND_TRIANGLE_IDS,
 ];
 
@@ -97,8 +96,7 @@ impl Resources {
         let scene = world.scene();
         let storage = BufferUse::Storage;
         let &Needs { constants, options, n_bounces } = needs;
-        let mut accel = AccelBuffers::new(context, world.geometry())?;
-        accel.add_materials(context, &scene.triangle_materials)?;
+        let mut accel = AccelBuffers::of_world(context, world)?;
         accel.add_links(context, world.accel(), options.traversal)?;
         let kinds: Vec<_> = OWN_BINDINGS.into_iter().chain(accel::bindings()).map(binding).collect();
         let upload_indices = || new_vertex_indices(context, &vertex_indices(&scene.triangles));
@@ -143,7 +141,6 @@ impl Resources {
             (layout::BIND_COUNTERS, Binding::Buffer(self.counters.any())),
             (layout::BIND_PIXEL_NEAREST, Binding::Buffer(pixels.pixel_nearest.any())),
             (layout::BIND_RASTER_GROUPS, Binding::Buffer(self.raster.groups.any())),
-            (layout::BIND_LARGE_TRIANGLES, Binding::Buffer(self.raster.large_triangles.any())),
             (layout::BIND_TRIANGLE_IDS, Binding::Image(&pixels.triangle_ids)),
         ];
         BindingSet::new(&self.bindings, "frame", &[&self.accel.objects(), &own[..]].concat())

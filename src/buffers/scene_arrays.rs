@@ -116,12 +116,13 @@ macro_rules! declare {
         const NUMBERS: &[u32] = &[$($number),*];
 
         impl<'a> Contents<'a> {
-            /// Returns the contents of a scene that has triangles, room for their materials, and no acceleration
-            /// structure.
-            pub fn of_triangles(triangles: &'a [Triangle]) -> Self {
+            /// Returns the contents of a scene that has triangles, room for their materials and textures, and no
+            /// acceleration structure.
+            pub fn of_triangles(triangles: &'a [Triangle], n_texture_words: usize) -> Self {
                 Self {
                     triangles: Content::Elements(triangles),
                     triangle_materials: Content::Reserved(triangles.len()),
+                    texture_words: Content::Reserved(n_texture_words),
                     ..Self { $($name: Content::Reserved(0),)* }
                 }
             }

@@ -115,6 +115,13 @@ fn dot<S: Simd>(normal: Vec3, v: &[f32x16<S>; 3]) -> f32x16<S> {
     normal.x * v[0] + normal.y * v[1] + normal.z * v[2]
 }
 
+/// Returns those of `lanes` whose hits count.
+#[cold]
+fn accepted<S: Simd>(inputs: &KernelInputs<impl ReadCounter>, found: &HitColumns<S>, lanes: LaneMask) -> LaneMask {
+    let counts = |lane: &usize| lanes >> lane & 1 == 1 && inputs.is_accepted(&found.of_lane(*lane));
+    (0..LANES).filter(counts).fold(0, |mask, lane| mask | 1 << lane)
+}
+
 impl<S: Simd> Packet<S> {
     /// Makes a packet of the first `n_rays` rays, and returns it with the rays' t intervals in the root's cell. The
     /// operations are those of `TraversalRay::new`.
@@ -235,10 +242,12 @@ impl<S: Simd> Packet<S> {
                 let nearer = found.t.simd_lt(self.best.t)
                     | (found.t.simd_eq(self.best.t) & found.triangle_ix.simd_lt(self.best.triangle_ix));
                 let is_new = found.t.simd_gt(self.t_min) & found.triangle_ix.simd_ne(self.source_triangle);
-                let is_better = hit & nearer & is_new;
-                if inputs.is_accepted(triangle_ix) {
-                    self.best = found.or(self.best, is_better);
+                let mut is_better = hit & nearer & is_new;
+                if inputs.lets_rays_pass() {
+                    let lanes = accepted(inputs, &found, is_better.to_bitmask() as LaneMask);
+                    is_better = mask32x16::from_bitmask(self.t_min.simd, lanes.into());
                 }
+                self.best = found.or(self.best, is_better);
             }
         }
     }

@@ -3,9 +3,9 @@
 use super::resource::{
     Resource,
     Resource::{
-        Bounces, ChildKinds, Counters, FirstChildren, Hits, LargeTriangles, LightVisibility, PixelAccumulated,
-        PixelDisplay, PixelFeatures, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups, RayRadiance, Rays,
-        ScanBlocks, Stalls, TriangleIds,
+        Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, PixelAccumulated, PixelDisplay,
+        PixelFeatures, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups, RayRadiance, Rays, ScanBlocks, Stalls,
+        TriangleIds,
     },
 };
 
@@ -107,8 +107,8 @@ const TABLE: [Info; 16] = [
         role: Role::PrimaryVisibility,
         scope: Scope::Frame,
         color: [110, 225, 235],
-        reads: &[PixelNearest, LargeTriangles, RasterGroups],
-        writes: &[PixelNearest, LargeTriangles, RasterGroups],
+        reads: &[PixelNearest, RasterGroups],
+        writes: &[PixelNearest, RasterGroups],
         indirect: None,
     },
     Info {
@@ -117,8 +117,8 @@ const TABLE: [Info; 16] = [
         role: Role::PrimaryVisibility,
         scope: Scope::Frame,
         color: [60, 160, 170],
-        reads: &[PixelNearest, LargeTriangles, RasterGroups],
-        writes: &[PixelNearest, LargeTriangles, RasterGroups],
+        reads: &[PixelNearest, RasterGroups],
+        writes: &[PixelNearest, RasterGroups],
         indirect: Some(RasterGroups),
     },
     Info {

@@ -8,8 +8,8 @@ use super::{
     resource::{
         Resource,
         Resource::{
-            Bounces, ChildKinds, Counters, FirstChildren, Hits, LargeTriangles, LightVisibility, PixelAccumulated,
-            PixelFeatures, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups, RayRadiance, Rays, ScanBlocks,
+            Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, PixelAccumulated, PixelFeatures,
+            PixelFiltered, PixelNearest, PixelRadiance, RasterGroups, RayRadiance, Rays, ScanBlocks,
         },
     },
     {Denoise, Primary, RenderOptions},
@@ -138,7 +138,7 @@ pub fn visibility(primary: Primary) -> Section {
         Primary::Raster => vec![Step::Run(Pass::Visibility)], // the pass itself makes triangle_ids visible to kernels
         Primary::SoftwareRaster => vec![
             Step::Run(Pass::RasterizeTriangles),
-            barrier(Touch::Write, Touch::Update, &[PixelNearest, LargeTriangles, RasterGroups]),
+            barrier(Touch::Write, Touch::Update, &[PixelNearest, RasterGroups]),
             barrier(Touch::Write, Touch::Indirect, &[RasterGroups]),
             Step::Run(Pass::RasterizeBlocks),
             barrier(Touch::Write, Touch::Read, &[PixelNearest]),

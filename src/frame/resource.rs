@@ -35,10 +35,9 @@ pub enum Resource {
     TriangleIds,
     /// The nearest triangle in each pixel and its distance, as found by the compute kernels that rasterize.
     PixelNearest,
-    /// The size of the dispatch of `RasterizeBlocks`, and the numbers of large triangles and of their blocks.
+    /// Triangles with large bounding rectangles, which `RasterizeBlocks` rasterizes, their number and that of their
+    /// blocks, and the size of its dispatch.
     RasterGroups,
-    /// Triangles with large bounding rectangles, which `RasterizeBlocks` rasterizes.
-    LargeTriangles,
     /// Numbers of hits and of shadow segments of each bounce of each batch.
     Counters,
     /// States of stalled rays: rays that have spent the loop turns of a dispatch and go on in a further dispatch.
@@ -47,7 +46,7 @@ pub enum Resource {
 
 impl Resource {
     /// Every resource.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 18] = [
         Self::Rays,
         Self::Hits,
         Self::ChildKinds,
@@ -64,7 +63,6 @@ impl Resource {
         Self::TriangleIds,
         Self::PixelNearest,
         Self::RasterGroups,
-        Self::LargeTriangles,
         Self::Counters,
         Self::Stalls,
     ];
@@ -88,7 +86,6 @@ impl Resource {
             Self::TriangleIds => layout::BIND_TRIANGLE_IDS,
             Self::PixelNearest => layout::BIND_PIXEL_NEAREST,
             Self::RasterGroups => layout::BIND_RASTER_GROUPS,
-            Self::LargeTriangles => layout::BIND_LARGE_TRIANGLES,
             Self::Counters => layout::BIND_COUNTERS,
             Self::Stalls => layout::BIND_STALLS,
         }

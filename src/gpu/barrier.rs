@@ -51,7 +51,13 @@ impl Access {
             Self::RayTracingUpdate => S::RAY_TRACING_SHADER_KHR,
             Self::StructureBuild => S::ACCELERATION_STRUCTURE_BUILD_KHR,
             Self::AnyUse => {
-                S::INDEX_INPUT | S::VERTEX_SHADER | S::COMPUTE_SHADER | S::DRAW_INDIRECT | S::COPY | S::CLEAR
+                S::INDEX_INPUT
+                    | S::VERTEX_SHADER
+                    | S::FRAGMENT_SHADER
+                    | S::COMPUTE_SHADER
+                    | S::DRAW_INDIRECT
+                    | S::COPY
+                    | S::CLEAR
             }
         }
     }
@@ -77,6 +83,7 @@ impl Access {
             Self::AnyUse => {
                 A::SHADER_STORAGE_READ
                     | A::SHADER_STORAGE_WRITE
+                    | A::SHADER_SAMPLED_READ
                     | A::UNIFORM_READ
                     | A::INDEX_READ
                     | A::INDIRECT_COMMAND_READ

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::{AnyBuffer, Constants, Context, GivenBuffer, GpuError, Target};
+use super::{AnyBuffer, Constant, Constants, Context, GivenBuffer, GpuError, Target};
 
 /// Kind of the object at a binding number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -104,6 +104,14 @@ impl BindingLayout {
                 .map_err(GpuError::call("vkCreatePipelineLayout", "bindings"))?;
             Ok(Arc::new(made))
         }
+    }
+}
+
+impl BindingLayout {
+    /// Returns whether the constant is true in all pipelines of the layout. A constant that the layout does not set is
+    /// not.
+    pub fn sets(&self, constant: Constant<bool>) -> bool {
+        self.constants.value(constant) == Some(1)
     }
 }
 

@@ -403,12 +403,9 @@ impl Context {
 
     /// Returns the shader stages that see bindings and push constants.
     pub(super) fn stages(&self) -> vk::ShaderStageFlags {
-        let mut stages = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX;
+        let mut stages = vk::ShaderStageFlags::COMPUTE | vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT;
         if self.ray_tracing.is_some() {
             stages |= vk::ShaderStageFlags::RAYGEN_KHR;
-        }
-        if self.presentation.is_some() {
-            stages |= vk::ShaderStageFlags::FRAGMENT;
         }
         stages
     }

@@ -64,6 +64,11 @@ impl Constants {
         self
     }
 
+    /// Returns the bits of a constant's value, if it has one.
+    pub(super) fn value<T>(&self, constant: Constant<T>) -> Option<u32> {
+        self.values.iter().find(|(name, ..)| *name == constant.name).map(|(.., bits)| *bits)
+    }
+
     /// Returns the names of the constants that have values.
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
         self.values.iter().map(|(name, ..)| *name)

@@ -43,7 +43,6 @@ mod tests {
             BIND_PIXEL_FEATURES => Some("Feature"),
             BIND_COUNTERS => Some("Counters"),
             BIND_RASTER_GROUPS => Some("RasterGroups"),
-            BIND_LARGE_TRIANGLES => Some("LargeTriangle"),
             BIND_GRID_BUILD => Some("GridBuild"),
             BIND_GRID_TRIANGLES => Some("Triangle"),
             BIND_GRID_CELLS => Some("GridCell"),

@@ -42,11 +42,11 @@ impl Rasterize {
     /// [`Rasterize::triangles`] needs them.
     pub fn reset(commands: &Commands, resources: &Resources) {
         let groups = RasterGroups { x: RASTER_GROUPS_X, y: 0, z: 1, reserved: 0 };
-        commands.update_buffer(resources.raster.groups.any(), &RasterState { groups, count: 0 });
+        commands.update_buffer(resources.raster.groups.any(), &RasterState { groups, count: 0, reserved: 0 });
     }
 
     /// Needs what [`Rasterize::reset`] leaves. Clears `pixel_nearest`, and leaves the nearest hits of small triangles
-    /// there, the large triangles in `large_triangles`, and the size of the next dispatch in `raster_groups`.
+    /// there, and in `raster_groups` the large triangles and the size of the next dispatch.
     pub fn triangles(&self, commands: &Commands, resources: &Resources) {
         let (pixels, constants) = (&resources.pixels, resources.constants());
         let push = RasterPush { block_log2: block_log2(constants) };

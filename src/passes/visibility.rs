@@ -6,7 +6,7 @@ use super::spirv;
 use crate::{
     buffers::Resources,
     gpu::{Area, BindingLayout, Commands, Context, DrawDesc, GpuError, RasterDesc, RasterPipeline, RasterTargets},
-    layout::Frame,
+    layout::{Frame, constants},
 };
 
 /// The pipeline of the pass.
@@ -19,7 +19,10 @@ impl Visibility {
         let desc = RasterDesc {
             name: "visibility",
             vertex: spirv!("visibility.vert"),
-            fragment: spirv!("visibility.frag"),
+            fragment: match bindings.sets(constants::CUTOUTS) {
+                true => spirv!("visibility_cutout.frag"),
+                false => spirv!("visibility.frag"),
+            },
             targets: RasterTargets::Uint,
         };
         Ok(Self { pipeline: RasterPipeline::new(context, bindings, &desc)? })

@@ -9,16 +9,16 @@ pub fn closest_hit(triangles: &[Triangle], ray: &SearchRay) -> Hit {
     closest_hit_of(triangles, ray, |_| true)
 }
 
-/// Does what [`closest_hit`] does, over the triangles whose indices `is_accepted` accepts.
-pub fn closest_hit_of(triangles: &[Triangle], ray: &SearchRay, is_accepted: impl Fn(u32) -> bool) -> Hit {
+/// Does what [`closest_hit`] does, over the hits that `is_accepted` accepts.
+pub fn closest_hit_of(triangles: &[Triangle], ray: &SearchRay, is_accepted: impl Fn(&Hit) -> bool) -> Hit {
     let shear = Shear::of(ray.origin.to_array(), ray.direction.to_array());
     let mut best = ray.miss();
     for (triangle_ix, triangle) in (0..).zip(triangles) {
         let hit = shear.intersect_triangle(triangle, triangle_ix);
         let is_nearer =
             |hit: &Hit| hit.t > ray.t_min && (hit.t < best.t || hit.t == best.t && best.triangle_ix == NO_TRIANGLE);
-        let is_target = triangle_ix != ray.source_triangle && is_accepted(triangle_ix);
-        if let Some(hit) = hit.filter(|hit| is_target && is_nearer(hit)) {
+        let is_target = triangle_ix != ray.source_triangle;
+        if let Some(hit) = hit.filter(|hit| is_target && is_nearer(hit) && is_accepted(hit)) {
             best = hit;
         }
     }

@@ -30,7 +30,7 @@ pub fn intersect(inputs: &KernelInputs<impl ReadCounter>, hit_filter: &HitFilter
     let Some(hit) = hit_filter.shear.intersect_triangle(triangle, triangle_ix) else { return };
     let nearer = hit.t < best.t || (hit.t == best.t && triangle_ix < best.triangle_ix);
     let is_of_ray = hit.t > hit_filter.t_min && triangle_ix != hit_filter.source_triangle;
-    if is_of_ray && nearer && inputs.is_accepted(triangle_ix) {
+    if is_of_ray && nearer && inputs.is_accepted(&hit) {
         *best = hit;
     }
 }

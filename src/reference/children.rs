@@ -4,20 +4,28 @@ use glam::Vec3;
 
 use super::{
     inputs::KernelInputs,
-    material::{Scattering, scatter, scatters_light},
-    surface::{Surface, surface_at},
+    maps::shaded_at,
+    material::{Scattering, scatter, scatters_light, unabsorbed},
+    surface::Surface,
 };
 use crate::layout::{CHILD_REFLECTED, CHILD_TRANSMITTED, Hit, NO_TRIANGLE, PathRay};
 
 fn scattering_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, Scattering) {
-    let surface = surface_at(ray, hit, &inputs.triangles[hit.triangle_ix as usize]);
-    let scattering = scatter(inputs.material_at(hit), &surface, ray.direction);
-    (surface, scattering)
+    let (surface, material) = shaded_at(inputs, ray, hit);
+    let mut next = scatter(&material, &surface, ray.direction);
+    let unabsorbed_share = unabsorbed(&material, &surface, hit.t);
+    next.reflected_weight *= unabsorbed_share;
+    next.transmitted_weight *= unabsorbed_share;
+    (surface, next)
 }
 
 /// The ray's children that carry light, as bits `CHILD_*`.
 pub fn child_kinds_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> u32 {
-    if hit.triangle_ix == NO_TRIANGLE || !scatters_light(inputs.material_at(hit)) {
+    if hit.triangle_ix == NO_TRIANGLE {
+        return 0;
+    }
+    // Textures may change what a material scatters.
+    if inputs.textures.is_none() && !scatters_light(inputs.material_at(hit)) {
         return 0;
     }
     let carries_light = |weight: Vec3| (ray.throughput * weight).cmpgt(Vec3::ZERO).any();

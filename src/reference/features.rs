@@ -1,7 +1,7 @@
 //! Features: the first-hit AOVs of each pixel (position, normal, albedo, depth and the indices of the triangle and
 //! its material). Twin of `features.comp`.
 
-use super::{inputs::KernelInputs, surface::surface_at};
+use super::{inputs::KernelInputs, maps::shaded_at};
 use crate::layout::{Feature, Hit, NO_TRIANGLE, PathRay};
 
 /// Writes `pixel_features` of the primary rays' pixels, except the counts `n_rays` and `n_steps`.
@@ -18,14 +18,13 @@ fn feature_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> Feature {
         let depth = f32::INFINITY;
         return Feature { triangle_ix: NO_TRIANGLE, material_ix: NO_TRIANGLE, depth, ..Feature::default() };
     }
-    let surface = surface_at(ray, hit, &inputs.triangles[hit.triangle_ix as usize]);
-    let material_ix = inputs.triangle_materials[hit.triangle_ix as usize];
+    let (surface, material) = shaded_at(inputs, ray, hit);
     Feature {
         position_world: surface.point_world,
         triangle_ix: hit.triangle_ix,
         normal_world: surface.shading,
-        material_ix,
-        albedo: inputs.materials[material_ix as usize].kd,
+        material_ix: inputs.triangle_materials[hit.triangle_ix as usize],
+        albedo: material.kd,
         depth: (surface.point_world - inputs.frame().eye).dot(inputs.frame().forward),
         ..Feature::default()
     }

@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::counting::table::{Counted, CountedSlice, NoCounter, ReadCounts};
+use super::cutout::is_cut_out;
 use crate::{
     accel::{
         Accel,
@@ -10,7 +11,7 @@ use crate::{
         kdtree::{KdTree, TraversalLinks},
     },
     layout::{Frame, GridCell, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN, Triangle},
-    world::{Geometry, World},
+    world::{Geometry, Textures, World},
 };
 
 /// The scene, its acceleration structure and the frame's constants. `R` counts reads of the structure.
@@ -28,6 +29,12 @@ pub struct KernelInputs<'a, R = NoCounter> {
     /// Whether rays pass through triangles with `TRIANGLE_HIDDEN`.
     pub filters: bool,
     pub materials: &'a [Material],
+    /// The scene's textures; `None` if it has none.
+    pub textures: Option<&'a Textures>,
+    /// The textures if some of them cut out parts of triangles.
+    pub cutouts: Option<&'a Textures>,
+    /// Whether rays pass through see-through surfaces with an opacity below `LEAST_SHADOWING_OPACITY`.
+    pub passes_veils: bool,
     pub lights: &'a [Light],
     pub kd_nodes: CountedSlice<'a, KdNode, R>,
     /// For each pair of siblings, the index of their parent.
@@ -61,10 +68,25 @@ impl<'a, R> KernelInputs<'a, R> {
         self.frame.expect("rays of a frame")
     }
 
-    /// Returns whether a hit on the triangle counts.
+    /// Returns whether a hit counts: rays pass through hidden triangles, and through cut-outs.
     #[inline(always)]
-    pub fn is_accepted(&self, triangle_ix: u32) -> bool {
-        !self.filters || self.triangle_materials[triangle_ix as usize] & TRIANGLE_HIDDEN == 0
+    pub fn is_accepted(&self, hit: &Hit) -> bool {
+        !self.lets_rays_pass() || self.is_solid_at(hit)
+    }
+
+    /// Returns whether triangles may let a ray pass, so that [`KernelInputs::is_accepted`] has to be asked.
+    #[inline(always)]
+    pub fn lets_rays_pass(&self) -> bool {
+        self.filters || self.cutouts.is_some()
+    }
+
+    #[cold]
+    fn is_solid_at(&self, hit: &Hit) -> bool {
+        let word = self.triangle_materials[hit.triangle_ix as usize];
+        match self.cutouts {
+            Some(textures) => !is_cut_out(textures, word, hit.triangle_ix, [hit.u, hit.v], self.passes_veils),
+            None => word & TRIANGLE_HIDDEN == 0,
+        }
     }
 }
 
@@ -75,6 +97,8 @@ impl<'a> KernelInputs<'a> {
         Self {
             triangle_materials: &scene.triangle_materials,
             materials: &scene.materials,
+            textures: scene.textures.is_in_use().then_some(&scene.textures),
+            cutouts: scene.textures.has_cutouts().then_some(&scene.textures),
             lights: &scene.lights,
             frame: Some(frame),
             ..Self::of_geometry(world.geometry())
@@ -125,6 +149,9 @@ impl<'a> KernelInputs<'a> {
             triangle_materials: &[],
             filters: false,
             materials: &[],
+            textures: None,
+            cutouts: None,
+            passes_veils: false,
             lights: &[],
             kd_nodes: CountedSlice::from(&[][..]),
             kd_parents: CountedSlice::from(&[][..]),
@@ -149,6 +176,9 @@ impl<'a> KernelInputs<'a> {
             triangle_materials: self.triangle_materials,
             filters: self.filters,
             materials: self.materials,
+            textures: self.textures,
+            cutouts: self.cutouts,
+            passes_veils: self.passes_veils,
             lights: self.lights,
             kd_nodes: self.kd_nodes.with_counter(Counted(&counts.n_nodes)),
             kd_parents: self.kd_parents.with_counter(Counted(&counts.n_links)),
@@ -175,6 +205,12 @@ impl<'a> KernelInputs<'a> {
     /// for each triangle.
     pub fn with_hidden(self, words: &'a [u32]) -> Self {
         Self { triangle_materials: words, filters: true, ..self }
+    }
+
+    /// Returns the inputs of shadow rays, which pass through see-through surfaces with an opacity below
+    /// `LEAST_SHADOWING_OPACITY`.
+    pub fn through_veils(self) -> Self {
+        Self { passes_veils: true, ..self }
     }
 
     /// Returns the same inputs with a kd-tree's boxes and ropes.

@@ -1,8 +1,8 @@
-//! Point and directional lights, as seen from a point of a surface. Twin of `light.glsl`.
+//! Point, spot and directional lights, as seen from a point of a surface. Twin of `light.glsl`.
 
 use glam::Vec3;
 
-use crate::layout::{LIGHT_DIRECTIONAL, Light};
+use crate::layout::{LIGHT_DIRECTIONAL, LIGHT_SPOT, Light};
 
 /// What arrives from a light at a point.
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +15,13 @@ pub struct LightSample {
     pub irradiance: Vec3,
 }
 
+/// The share of a spot light's intensity in a direction, whose opposite is `direction`.
+fn spot_share(light: &Light, direction: Vec3) -> f32 {
+    let cosine = light.axis.dot(-direction);
+    let share = ((cosine - light.outer_cos) / (light.inner_cos - light.outer_cos).max(1.0e-3)).clamp(0.0, 1.0);
+    share * share
+}
+
 /// Returns what arrives from a light at a point.
 pub fn sample_light(light: &Light, point_world: Vec3) -> LightSample {
     if light.kind == LIGHT_DIRECTIONAL {
@@ -23,5 +30,7 @@ pub fn sample_light(light: &Light, point_world: Vec3) -> LightSample {
     let to_light = light.position - point_world;
     let squared = to_light.dot(to_light);
     let distance = squared.sqrt();
-    LightSample { direction: to_light / distance, distance, irradiance: light.intensity / squared }
+    let direction = to_light / distance;
+    let cone = if light.kind == LIGHT_SPOT { spot_share(light, direction) } else { 1.0 };
+    LightSample { direction, distance, irradiance: light.intensity * cone / squared }
 }

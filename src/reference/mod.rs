@@ -13,7 +13,8 @@
 //! traversal   traverser: one ray by any algorithm
 //!               kdtree, leaf, slab, kd_boxes, ropes, brute and the pending_* of each algorithm; grid; candidate
 //! geometry    triangle, surface, camera; search_ray and traversal_ray: a ray in the form that searches use
-//! light       light, material, children, display, tone_curves
+//! light       light, material, microfacet, children, display, tone_curves
+//! textures    texture, maps, cutout
 //! inputs      the data that kernels only read
 //! counting    the same traversal with its reads counted
 //! ```
@@ -26,6 +27,7 @@ pub mod cast;
 pub mod children;
 pub mod compact;
 pub mod counting;
+pub mod cutout;
 pub mod denoise;
 pub mod display;
 pub mod false_color;
@@ -36,7 +38,9 @@ pub mod kd_boxes;
 pub mod kdtree;
 pub mod leaf;
 pub mod light;
+pub mod maps;
 pub mod material;
+pub mod microfacet;
 pub mod pending_backtrack;
 pub mod pending_mask;
 pub mod pending_mask_boxes;
@@ -51,6 +55,7 @@ pub mod shade;
 pub mod shadow;
 pub mod slab;
 pub mod surface;
+pub mod texture;
 pub mod tone_curves;
 pub mod tonemap;
 pub mod trace;

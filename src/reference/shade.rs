@@ -7,8 +7,9 @@ use super::{
     RAYS_PER_TASK,
     inputs::KernelInputs,
     light::sample_light,
-    material::{local_weight, phong},
-    surface::{Surface, surface_at},
+    maps::{bump_shadowing, shaded_at},
+    material::{ambient_share, emitted, local_weight, reflectance_of, unabsorbed},
+    surface::Surface,
 };
 use crate::layout::{Hit, LIGHT_LIT, Material, NO_TRIANGLE, PathRay};
 
@@ -31,13 +32,15 @@ fn local_radiance(
     surface: &Surface,
     material: &Material,
 ) -> Vec3 {
-    let mut radiance = material.ke + material.ka * inputs.frame().ambient;
+    let mut radiance = emitted(material);
+    radiance += ambient_share(material, surface.shading, -ray.direction) * inputs.frame().ambient;
     for (light_ix, light) in inputs.lights.iter().enumerate() {
         if !is_lit(light_ix) {
             continue;
         }
         let to_light = sample_light(light, surface.point_world);
-        radiance += phong(material, surface.shading, -ray.direction, to_light.direction) * to_light.irradiance;
+        let reflectance = reflectance_of(material, surface.shading, -ray.direction, to_light.direction);
+        radiance += reflectance * bump_shadowing(inputs, surface, to_light.direction) * to_light.irradiance;
     }
     radiance * local_weight(material)
 }
@@ -47,8 +50,9 @@ fn radiance_of(inputs: &KernelInputs, (ray, hit): (&PathRay, &Hit), is_lit: impl
     if hit.triangle_ix == NO_TRIANGLE {
         return ray.throughput * inputs.frame().background;
     }
-    let surface = surface_at(ray, hit, &inputs.triangles[hit.triangle_ix as usize]);
-    ray.throughput * local_radiance(inputs, is_lit, ray, &surface, inputs.material_at(hit))
+    let (surface, material) = shaded_at(inputs, ray, hit);
+    let throughput = ray.throughput * unabsorbed(&material, &surface, hit.t);
+    throughput * local_radiance(inputs, is_lit, ray, &surface, &material)
 }
 
 /// Writes `ray_radiance`, one for each ray, weighted by the ray's throughput.

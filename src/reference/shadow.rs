@@ -9,9 +9,10 @@ use super::{
     RAYS_PER_TASK,
     inputs::KernelInputs,
     light::sample_light,
+    maps::shaded_at,
     material::can_show,
     search_ray::SearchRay,
-    surface::surface_at,
+    surface::lit_point,
     traverser::{Tracer, Traverser},
 };
 use crate::{
@@ -21,17 +22,24 @@ use crate::{
 
 /// The segment to the light, or none if the surface faces away from the light or would not show it.
 pub(crate) fn shadow_segment(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, light: &Light) -> Option<PathRay> {
-    let surface = surface_at(ray, hit, &inputs.triangles[hit.triangle_ix as usize]);
+    let (surface, material) = shaded_at(inputs, ray, hit);
     let to_light = sample_light(light, surface.point_world);
     // Not `<=`: a NaN is unlit.
-    if !(surface.geometric.dot(to_light.direction) > 0.0) {
+    if !(surface.interpolated.dot(to_light.direction) > 0.0) {
         return None;
     }
-    if !can_show(inputs.material_at(hit), surface.shading, -ray.direction, to_light.direction) {
+    if !can_show(&material, surface.shading, -ray.direction, to_light.direction) {
         return None;
     }
-    let segment = surface.ray_from(to_light.direction, hit.triangle_ix, ray, Vec3::ZERO);
-    Some(PathRay { t_max: to_light.distance, ..segment })
+    let from = lit_point(&surface, hit, &inputs.triangles[hit.triangle_ix as usize]);
+    Some(PathRay {
+        origin: from + surface.clearance * surface.geometric,
+        pixel_ix: ray.pixel_ix,
+        direction: to_light.direction,
+        source_triangle: hit.triangle_ix,
+        throughput: Vec3::ZERO,
+        t_max: to_light.distance,
+    })
 }
 
 /// Writes `light_visibility[light * queue_capacity + ray]`, one of `LIGHT_*`, for some of the queue's rays, those at
@@ -56,6 +64,7 @@ pub fn shadow_by<T: Tracer>(
     light_visibility: &mut [u32],
 ) -> u32 {
     let (rays, hits) = (&rays[places.clone()], &hits[places.clone()]);
+    let inputs = &inputs.through_veils();
     let of_light = |(light, visibility): (&Light, &mut [u32])| -> u32 {
         let of_task = |traverser: &mut T, ((rays, hits), visibility): ((&[PathRay], &[Hit]), &mut [u32])| {
             let mut n_tested = 0;

@@ -11,7 +11,11 @@ pub struct Surface {
     /// The unit normal of the triangle's plane, on the side that the ray comes from.
     pub geometric: Vec3,
     /// The interpolated unit normal, on the same side.
+    pub interpolated: Vec3,
+    /// The interpolated normal, or what a normal map makes of it, on the same side.
     pub shading: Vec3,
+    /// Whether `interpolated` is the reverse of what the corners' normals give.
+    pub is_reversed: bool,
     /// Distance along `geometric` at which a new ray starts so that it does not hit this surface, world units.
     pub clearance: f32,
     /// Whether the ray meets the triangle's back. The ray then counts as inside a solid.
@@ -44,11 +48,6 @@ fn shading_normal(t: &Triangle, hit: &Hit, geometric: Vec3) -> Vec3 {
     if squared > LEAST_NORMAL_SQUARED { n * (1.0 / squared.sqrt()) } else { geometric }
 }
 
-/// `n` or `-n`, whichever has a non-negative component along `side`.
-fn towards(n: Vec3, side: Vec3) -> Vec3 {
-    if n.dot(side) < 0.0 { -n } else { n }
-}
-
 /// Barycentric weights of the hit, at least [`LEAST_WEIGHT`] each before they are normalized, so that the point is
 /// not on an edge.
 fn inner_weights(hit: &Hit) -> Vec3 {
@@ -67,13 +66,37 @@ pub fn surface_at(ray: &PathRay, hit: &Hit, t: &Triangle) -> Surface {
     let outward = (e1 * scale).cross(e2 * scale).normalize();
     let from_inside = outward.dot(ray.direction) > 0.0;
     let geometric = if from_inside { -outward } else { outward };
+    let interpolated = shading_normal(t, hit, outward);
+    let is_reversed = interpolated.dot(geometric) < 0.0;
+    let interpolated = if is_reversed { -interpolated } else { interpolated };
     Surface {
         point_world: weights.x * t.v0 + weights.y * t.v1 + weights.z * t.v2,
         geometric,
-        shading: towards(shading_normal(t, hit, outward), geometric),
+        interpolated,
+        shading: interpolated,
+        is_reversed,
         clearance: SURFACE_CLEARANCE * magnitude.dot(geometric.abs()),
         from_inside,
     }
+}
+
+/// The part of `p`, relative to a corner, that is not below the plane through the corner with the normal of that corner.
+fn above_corner(p: Vec3, corner: Vec3, normal: u32, interpolated: Vec3) -> Vec3 {
+    let n = decode_normal(normal);
+    let n = if n.dot(interpolated) < 0.0 { -n } else { n };
+    p - (p - corner).dot(n).min(0.0) * n
+}
+
+/// The point at which rays to lights start: the surface's point, moved up to the curved surface that the corners'
+/// normals suggest, if that is above the triangle (Hanika: Hacking the Shadow Terminator, Ray Tracing Gems II, 2021).
+pub fn lit_point(s: &Surface, hit: &Hit, t: &Triangle) -> Vec3 {
+    if [t.n0, t.n1, t.n2].contains(&FLAT_NORMAL) {
+        return s.point_world;
+    }
+    let weights = inner_weights(hit);
+    weights.x * above_corner(s.point_world, t.v0, t.n0, s.interpolated)
+        + weights.y * above_corner(s.point_world, t.v1, t.n1, s.interpolated)
+        + weights.z * above_corner(s.point_world, t.v2, t.n2, s.interpolated)
 }
 
 impl Surface {

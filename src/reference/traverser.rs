@@ -71,7 +71,7 @@ impl Traverser {
                 Self::Grid => search_grid::<ANY_HIT>(inputs, ray, best),
                 Self::Ropes => follow_ropes::<ANY_HIT>(inputs, ray, best),
                 Self::Brute => {
-                    *best = brute::closest_hit_of(inputs.triangles, near, |ix| inputs.is_accepted(ix));
+                    *best = brute::closest_hit_of(inputs.triangles, near, |hit| inputs.is_accepted(hit));
                 }
             }
         })

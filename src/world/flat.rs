@@ -3,13 +3,14 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::Mismatch;
+use super::{Mismatch, Textures};
 use crate::{
     layout::{
-        FLAT_NORMAL, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT,
-        MATERIAL_SPECULAR, Material, Triangle, normal::encode_octahedral,
+        FLAT_NORMAL, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, MATERIAL_FRESNEL, MATERIAL_MICROFACET, MATERIAL_REFLECT,
+        MATERIAL_REFRACT, MATERIAL_SOLID, MATERIAL_SPECULAR, MATERIAL_UNLIT, Material, Triangle,
+        normal::encode_octahedral,
     },
-    scene::{self, Camera, Instance, Lobes, Mesh, RenderDefaults, Scene},
+    scene::{self, Alpha, Camera, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene},
 };
 
 /// Scene as it is traced: everything that a frame shows, with all meshes in world space.
@@ -26,6 +27,8 @@ pub struct FlatScene {
     pub materials: Vec<Material>,
     /// The name of each material.
     pub material_names: Vec<String>,
+    /// The textures, with what leads from triangles to them.
+    pub textures: Textures,
     /// The lights; there may be none.
     pub lights: Vec<Light>,
     /// The camera that renders the scene unless another one is set.
@@ -62,6 +65,7 @@ impl FlatScene {
             triangle_materials,
             materials: scene.materials.iter().map(Material::from).collect(),
             material_names: scene.materials.iter().map(|material| material.name.clone()).collect(),
+            textures: Textures::default(),
             lights: scene.lights.iter().map(Light::from).collect(),
             camera: scene.camera,
             ambient: scene.ambient,
@@ -119,9 +123,42 @@ fn push_triangles(mesh: &Mesh, instance: &Instance, triangles: &mut Vec<Triangle
 
 impl From<&scene::Material> for Material {
     fn from(material: &scene::Material) -> Self {
-        let &scene::Material { ka, kd, ks, ke, tf, ns, ni, d, lobes, .. } = material;
-        Self { ka, ns, kd, d, ks, ni, ke, flags: flags_of(lobes), tf, reserved: 0 }
+        let &scene::Material { kd, d, ks, ni, ke, is_unlit, microfacet, alpha, .. } = material;
+        let unlit = if is_unlit { MATERIAL_UNLIT } else { 0 };
+        let d = if alpha == Alpha::Coverage { d } else { 1.0 };
+        let Some(microfacet) = microfacet else {
+            let &scene::Material { ka, tf, ns, lobes, .. } = material;
+            return Self { ka, ns, kd, d, ks, ni, ke, flags: flags_of(lobes) | unlit, tf, ..Self::default() };
+        };
+        let Microfacet { metallic, roughness, transmission, is_solid, .. } = microfacet;
+        Self {
+            ka: Vec3::ONE,
+            ns: 1.0,
+            kd,
+            d,
+            ks,
+            ni,
+            ke,
+            flags: MATERIAL_MICROFACET | unlit | if is_solid { MATERIAL_SOLID } else { 0 },
+            tf: Vec3::ONE,
+            transmission,
+            absorption: absorption(&microfacet),
+            metallic,
+            roughness,
+            ..Self::default()
+        }
     }
+}
+
+/// Returns the coefficients of absorption by which light has the attenuation colour after the attenuation distance, per
+/// world unit (Beer's law).
+fn absorption(microfacet: &Microfacet) -> Vec3 {
+    let Microfacet { attenuation_colour, attenuation_distance, .. } = *microfacet;
+    if attenuation_distance.is_infinite() {
+        return Vec3::ZERO;
+    }
+    // Black would absorb at once; 2^-24 is darker than what a display shows.
+    -attenuation_colour.max(Vec3::splat(f32::EPSILON / 2.0)).ln() / attenuation_distance
 }
 
 /// Returns the flags of a [`Material`].
@@ -136,9 +173,11 @@ fn flags_of(lobes: Lobes) -> u32 {
 impl From<&scene::Light> for Light {
     fn from(light: &scene::Light) -> Self {
         match *light {
-            scene::Light::Point { position, intensity } => Self { position, kind: LIGHT_POINT, intensity, reserved: 0 },
+            scene::Light::Point { position, intensity } => {
+                Self { position, kind: LIGHT_POINT, intensity, ..Self::default() }
+            }
             scene::Light::Directional { towards, irradiance } => {
-                Self { position: towards, kind: LIGHT_DIRECTIONAL, intensity: irradiance, reserved: 0 }
+                Self { position: towards, kind: LIGHT_DIRECTIONAL, intensity: irradiance, ..Self::default() }
             }
         }
     }

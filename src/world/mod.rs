@@ -5,12 +5,13 @@ mod flat;
 mod frame_constants;
 mod geometry;
 mod mismatch;
+mod textures;
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-pub use self::{flat::FlatScene, geometry::Geometry, mismatch::Mismatch};
+pub use self::{flat::FlatScene, geometry::Geometry, mismatch::Mismatch, textures::Textures};
 use crate::{
     accel::{
         Accel, AccelOptions, Statistics,

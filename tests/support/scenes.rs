@@ -9,7 +9,7 @@ use kdray::{
         Material, Triangle, normal::encode_octahedral,
     },
     scene::{Camera, RenderDefaults, Scene},
-    world::FlatScene,
+    world::{FlatScene, Textures},
 };
 
 use super::meshes;
@@ -27,6 +27,7 @@ pub fn empty() -> FlatScene {
         triangle_materials: Vec::new(),
         materials: Vec::new(),
         material_names: Vec::new(),
+        textures: Textures::default(),
         lights: Vec::new(),
         camera: Camera { eye: vec3(0.0, 0.0, 4.0), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 45.0 },
         ambient: Vec3::ZERO,
@@ -54,7 +55,13 @@ pub const BLACK: Material = Material {
     ke: Vec3::ZERO,
     flags: 0,
     tf: Vec3::ONE,
-    reserved: 0,
+    transmission: 0.0,
+    absorption: Vec3::ZERO,
+    metallic: 0.0,
+    roughness: 1.0,
+    reserved0: 0,
+    reserved1: 0,
+    reserved2: 0,
 };
 
 pub fn diffuse(kd: Vec3) -> Material {
@@ -96,11 +103,11 @@ pub fn veil(kd: Vec3, d: f32) -> Material {
 }
 
 pub fn point_light(position: Vec3, intensity: Vec3) -> Light {
-    Light { position, kind: LIGHT_POINT, intensity, reserved: 0 }
+    Light { position, kind: LIGHT_POINT, intensity, ..Light::default() }
 }
 
 pub fn directional_light(towards: Vec3, intensity: Vec3) -> Light {
-    Light { position: towards.normalize(), kind: LIGHT_DIRECTIONAL, intensity, reserved: 0 }
+    Light { position: towards.normalize(), kind: LIGHT_DIRECTIONAL, intensity, ..Light::default() }
 }
 
 /// A closed sphere with interpolated normals.

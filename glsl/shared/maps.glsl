@@ -1,0 +1,148 @@
+// The surface and the material at a hit, with the material's textures applied. Twin of src/reference/maps.rs.
+//
+// A ray from the camera widens to a cone, whose width at a hit selects the level of a texture (Akenine-Möller et al.:
+// Texture Level of Detail Strategies for Real-Time Ray Tracing, Ray Tracing Gems, 2019). The cone is as wide as a pixel
+// of the image plane, times the length of the path from the eye. Of a path with more than one reflection or
+// refraction, the straight distance to the last one stands for the length up to there.
+#ifndef KDRAY_MAPS
+#define KDRAY_MAPS
+
+#include "layout.glsl"
+#include "frame.glsl"
+#include "scene.glsl"
+#include "surface.glsl"
+#include "material.glsl"
+#include "cutout.glsl"
+
+// A hit, as textures are looked up at it.
+struct TextureHit {
+    uint triangle_ix;
+    float u;
+    float v;
+    // Base-2 logarithm of the cone's width on the surface, divided by the square root of twice the triangle's area.
+    float log_width;
+};
+
+// Width of the ray's cone at its hit, world units.
+float cone_width(PathRay ray, Hit hit) {
+    float pixel = 2.0 * length(frame.up) / float(frame.picture_height);
+    return pixel * (distance(ray.origin, frame.eye) + hit.t);
+}
+
+TextureHit texture_hit(PathRay ray, Hit hit, Triangle t, Surface surface) {
+    // The edges are scaled to about 1, since the cross product of a tiny triangle would underflow.
+    vec3 e1 = t.v1 - t.v0, e2 = t.v2 - t.v0;
+    float scale = 1.0 / max(largest_of(abs(e1)), largest_of(abs(e2)));
+    float doubled_area = length(cross(e1 * scale, e2 * scale));
+    float cosine = max(abs(dot(ray.direction, surface.geometric)), LEAST_COSINE);
+    float log_width = log2(cone_width(ray, hit) * scale / cosine) - 0.5 * log2(doubled_area);
+    return TextureHit(hit.triangle_ix, hit.u, hit.v, log_width);
+}
+
+// The level of a texture whose texels are as large as the cone on the surface.
+float level_of(Texture map, TextureHit hit) {
+    uint uv_set = uv_set_of(map);
+    vec2 a = corner_uv(hit.triangle_ix, uv_set, 0u);
+    vec2 e1 = corner_uv(hit.triangle_ix, uv_set, 1u) - a, e2 = corner_uv(hit.triangle_ix, uv_set, 2u) - a;
+    float scale = abs(map.m00 * map.m11 - map.m01 * map.m10);
+    float n_texels = abs(e1.x * e2.y - e1.y * e2.x) * scale * float(map.size & 0xffffu) * float(map.size >> 16);
+    // A triangle whose texture coordinates have no area shows one texel, whatever the level.
+    return n_texels > 0.0 ? hit.log_width + 0.5 * log2(n_texels) : 0.0;
+}
+
+vec4 map_at(uint texture_ix, TextureHit hit) {
+    Texture map = texture_at(texture_ix);
+    if (accel.uvs_begin == NO_WORDS) return sample_texture(map, vec2(0.0), 0.0);
+    return sample_texture(map, uv_at(hit.triangle_ix, uv_set_of(map), hit.u, hit.v), level_of(map, hit));
+}
+
+// The value of a texture of one number; 1 if there is none.
+float factor_at(uint texture_ix, TextureHit hit) {
+    if (texture_ix == NO_TEXTURE) return 1.0;
+    return scalar_of(texture_at(texture_ix), map_at(texture_ix, hit));
+}
+
+// The colour of a texture; white if there is none.
+vec3 colour_at(uint texture_ix, TextureHit hit) {
+    return texture_ix == NO_TEXTURE ? vec3(1.0) : map_at(texture_ix, hit).rgb;
+}
+
+// Adds a corner's tangent, weighted.
+void add_tangent(uint code, float weight, inout vec3 tangent, inout float side) {
+    tangent += weight * decode_normal(code & ~1u);
+    side = (code & 1u) != 0u ? 1.0 : -1.0;
+}
+
+// The shading normal that the normal map gives, on the side of the interpolated normal. Without tangents, it is the
+// interpolated normal.
+vec3 mapped_normal(MaterialMaps maps, TextureHit hit, Surface surface) {
+    if (maps.normal == NO_TEXTURE || accel.corners_begin == NO_WORDS) return surface.interpolated;
+    vec3 tangent = vec3(0.0);
+    float side = 1.0;
+    vec3 weights = vec3(1.0 - hit.u - hit.v, hit.u, hit.v);
+    for (uint corner = 0u; corner < 3u; ++corner) {
+        uint code = corner_surface(hit.triangle_ix, corner).tangent;
+        if (code == FLAT_NORMAL) return surface.interpolated;
+        add_tangent(code, weights[corner], tangent, side);
+    }
+    // Seen from behind, the interpolated normal is reversed; the tangent frame belongs to the front.
+    float front = surface.is_reversed ? -1.0 : 1.0;
+    vec3 normal = front * surface.interpolated;
+    tangent -= dot(tangent, normal) * normal;
+    float squared = dot(tangent, tangent);
+    if (!(squared > LEAST_NORMAL_SQUARED)) return surface.interpolated;
+    tangent *= inversesqrt(squared);
+    vec3 bitangent = side * cross(normal, tangent);
+    vec3 map = 2.0 * map_at(maps.normal, hit).xyz - 1.0;
+    vec3 bent = maps.normal_scale * (map.x * tangent + map.y * bitangent) + map.z * normal;
+    float length_squared = dot(bent, bent);
+    return length_squared > LEAST_NORMAL_SQUARED ? front * bent * inversesqrt(length_squared) : surface.interpolated;
+}
+
+// Multiplies the material's terms by its textures and by the colours of the triangle's corners.
+void apply_maps(MaterialMaps maps, TextureHit hit, inout Material material) {
+    vec4 corner_colour = corner_colour_at(hit.triangle_ix, hit.u, hit.v);
+    vec4 base = corner_colour;
+    if (maps.base_colour != NO_TEXTURE) base *= map_at(maps.base_colour, hit);
+    material.kd *= base.rgb;
+    bool colour_has_opacity = (maps.flags & MAPS_COLOUR_HAS_OPACITY) != 0u && (maps.flags & MAPS_CUTOUT) == 0u;
+    if (colour_has_opacity) material.d *= base.a;
+    if ((maps.flags & MAPS_CUTOUT) == 0u) material.d *= factor_at(maps.opacity, hit);
+    material.ks *= colour_at(maps.specular, hit) * factor_at(maps.specular_factor, hit);
+    material.ke *= colour_at(maps.emission, hit);
+    float rough = factor_at(maps.roughness, hit);
+    material.roughness *= rough;
+    material.ns = max(material.ns * rough, 1.0);
+    material.metallic *= factor_at(maps.metallic, hit);
+    material.transmission *= factor_at(maps.transmission, hit);
+    material.ka *= 1.0 + maps.occlusion_strength * (factor_at(maps.occlusion, hit) - 1.0);
+    if (!is_microfacet(material)) material.ka *= base.rgb;
+}
+
+// The share of a light that a bent normal lets through: 1 at the interpolated normal, 0 at the horizon of the interpolated
+// surface, whose own shadow the bent normal does not know (Chiang, Li, Burley: Taming the Shadow Terminator, SIGGRAPH
+// 2019 Talks).
+float bump_shadowing(Surface surface, vec3 to_light) {
+    float g = 1.0;
+    if (TEXTURED) {
+        float bent = dot(surface.shading, to_light) * dot(surface.interpolated, surface.shading);
+        g = clamp(dot(surface.interpolated, to_light) / max(bent, LEAST_COSINE * LEAST_COSINE), 0.0, 1.0);
+    }
+    return ((1.0 - g) * g + 1.0) * g;
+}
+
+// The surface and its material at a ray's hit.
+void shaded_at(PathRay ray, Hit hit, out Surface surface, out Material material) {
+    Triangle t = triangle_at(hit.triangle_ix);
+    uint material_ix = load_triangle_materials(hit.triangle_ix);
+    surface = surface_at(ray, hit, t);
+    material = materials[material_ix];
+    if (TEXTURED) {
+        MaterialMaps maps = maps_of(material_ix);
+        TextureHit at = texture_hit(ray, hit, t, surface);
+        apply_maps(maps, at, material);
+        surface.shading = mapped_normal(maps, at, surface);
+    }
+}
+
+#endif

@@ -1,0 +1,39 @@
+//! Cut-outs: the parts of a triangle in which there is no surface, since the opacity of its texture is too low. Twin of
+//! `cutout.glsl`.
+
+use super::texture::{sample_texture, scalar_of, uv_set_of};
+use crate::{
+    layout::{MAPS_COLOUR_HAS_OPACITY, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps, NO_TEXTURE},
+    world::Textures,
+};
+
+/// The texture's value at a point of a triangle, in its largest level.
+fn finest_at(textures: &Textures, texture_ix: u32, triangle_ix: u32, [u, v]: [f32; 2]) -> glam::Vec4 {
+    let map = &textures.textures[texture_ix as usize];
+    sample_texture(&textures.texels, map, textures.uv_at(triangle_ix, uv_set_of(map), u, v), 0.0)
+}
+
+/// The opacity at a point of a triangle, 0 to 1, by the largest levels of its textures. `at`: barycentric weights of the
+/// second and the third corner.
+pub fn opacity_at(textures: &Textures, maps: &MaterialMaps, triangle_ix: u32, at: [f32; 2]) -> f32 {
+    let mut opacity = maps.opacity_factor;
+    if maps.flags & MAPS_COLOUR_HAS_OPACITY != 0 {
+        opacity *= textures.corner_colour_at(triangle_ix, at[0], at[1]).w;
+        if maps.base_colour != NO_TEXTURE {
+            opacity *= finest_at(textures, maps.base_colour, triangle_ix, at).w;
+        }
+    }
+    if maps.opacity != NO_TEXTURE {
+        let map = &textures.textures[maps.opacity as usize];
+        opacity *= scalar_of(map, finest_at(textures, maps.opacity, triangle_ix, at));
+    }
+    opacity
+}
+
+/// Whether a ray passes through a triangle at a point. `passes_veils`: whether the ray also passes through see-through
+/// surfaces with an opacity below `LEAST_SHADOWING_OPACITY`.
+pub fn is_cut_out(textures: &Textures, material_ix: u32, triangle_ix: u32, at: [f32; 2], passes_veils: bool) -> bool {
+    let kinds = if passes_veils { MAPS_CUTOUT | MAPS_VEIL } else { MAPS_CUTOUT };
+    let maps = &textures.material_maps[material_ix as usize];
+    maps.flags & kinds != 0 && opacity_at(textures, maps, triangle_ix, at) < maps.alpha_cutoff
+}

@@ -1,0 +1,157 @@
+//! The surface and the material at a hit, with the material's textures applied. Twin of `maps.glsl`.
+
+use glam::{Vec3, Vec4};
+
+use super::{
+    inputs::KernelInputs,
+    microfacet::is_microfacet,
+    surface::{Surface, decode_normal, surface_at},
+    texture::{sample_texture, scalar_of, uv_set_of},
+};
+use crate::{
+    layout::{
+        FLAT_NORMAL, Frame, Hit, LEAST_COSINE, LEAST_NORMAL_SQUARED, MAPS_COLOUR_HAS_OPACITY, MAPS_CUTOUT, Material,
+        MaterialMaps, NO_TEXTURE, PathRay, Texture, Triangle,
+    },
+    world::Textures,
+};
+
+/// A hit, as textures are looked up at it.
+struct TextureHit<'a> {
+    textures: &'a Textures,
+    triangle_ix: u32,
+    u: f32,
+    v: f32,
+    /// Base-2 logarithm of the cone's width on the surface, divided by the square root of twice the triangle's area.
+    log_width: f32,
+}
+
+/// Width of the ray's cone at its hit, world units.
+fn cone_width(frame: &Frame, ray: &PathRay, hit: &Hit) -> f32 {
+    let pixel = 2.0 * frame.up.length() / frame.picture_height as f32;
+    pixel * (ray.origin.distance(frame.eye) + hit.t)
+}
+
+fn log_width(frame: &Frame, ray: &PathRay, hit: &Hit, t: &Triangle, surface: &Surface) -> f32 {
+    let (e1, e2) = (t.v1 - t.v0, t.v2 - t.v0);
+    let scale = 1.0 / e1.abs().max_element().max(e2.abs().max_element());
+    let doubled_area = (e1 * scale).cross(e2 * scale).length();
+    let cosine = ray.direction.dot(surface.geometric).abs().max(LEAST_COSINE);
+    (cone_width(frame, ray, hit) * scale / cosine).log2() - 0.5 * doubled_area.log2()
+}
+
+impl TextureHit<'_> {
+    /// The level of a texture whose texels are as large as the cone on the surface.
+    fn level_of(&self, map: &Texture) -> f32 {
+        let [a, b, c] = self.textures.uvs_of(self.triangle_ix, uv_set_of(map));
+        let (e1, e2) = (b - a, c - a);
+        let scale = (map.m00 * map.m11 - map.m01 * map.m10).abs();
+        let (width, height) = ((map.size & 0xffff) as f32, (map.size >> 16) as f32);
+        let n_texels = (e1.x * e2.y - e1.y * e2.x).abs() * scale * width * height;
+        if n_texels > 0.0 { self.log_width + 0.5 * n_texels.log2() } else { 0.0 }
+    }
+
+    fn map_at(&self, texture_ix: u32) -> Vec4 {
+        let map = &self.textures.textures[texture_ix as usize];
+        let uv = self.textures.uv_at(self.triangle_ix, uv_set_of(map), self.u, self.v);
+        let level = if self.textures.has_uvs() { self.level_of(map) } else { 0.0 };
+        sample_texture(&self.textures.texels, map, uv, level)
+    }
+
+    /// The value of a texture of one number; 1 if there is none.
+    fn factor_at(&self, texture_ix: u32) -> f32 {
+        if texture_ix == NO_TEXTURE {
+            return 1.0;
+        }
+        scalar_of(&self.textures.textures[texture_ix as usize], self.map_at(texture_ix))
+    }
+
+    /// The colour of a texture; white if there is none.
+    fn colour_at(&self, texture_ix: u32) -> Vec3 {
+        if texture_ix == NO_TEXTURE { Vec3::ONE } else { self.map_at(texture_ix).truncate() }
+    }
+
+    /// The shading normal that the normal map gives, on the side of the interpolated normal.
+    fn mapped_normal(&self, maps: &MaterialMaps, surface: &Surface) -> Vec3 {
+        let corners = self.textures.corners.get(self.triangle_ix as usize);
+        let Some(corners) = corners.filter(|_| maps.normal != NO_TEXTURE) else { return surface.interpolated };
+        if corners.iter().any(|corner| corner.tangent == FLAT_NORMAL) {
+            return surface.interpolated;
+        }
+        let weights = [1.0 - self.u - self.v, self.u, self.v];
+        let weighted = weights.iter().zip(corners).map(|(weight, corner)| *weight * decode_normal(corner.tangent & !1));
+        let tangent: Vec3 = weighted.fold(Vec3::ZERO, |sum, tangent| sum + tangent);
+        let side = if corners[2].tangent & 1 != 0 { 1.0 } else { -1.0 };
+        let front = if surface.is_reversed { -1.0 } else { 1.0 };
+        let normal = front * surface.interpolated;
+        let tangent = tangent - tangent.dot(normal) * normal;
+        let squared = tangent.dot(tangent);
+        if !(squared > LEAST_NORMAL_SQUARED) {
+            return surface.interpolated;
+        }
+        let tangent = tangent * (1.0 / squared.sqrt());
+        let bitangent = side * normal.cross(tangent);
+        let map = 2.0 * self.map_at(maps.normal).truncate() - 1.0;
+        let bent = maps.normal_scale * (map.x * tangent + map.y * bitangent) + map.z * normal;
+        let squared = bent.dot(bent);
+        if squared > LEAST_NORMAL_SQUARED { front * bent * (1.0 / squared.sqrt()) } else { surface.interpolated }
+    }
+
+    /// Multiplies the material's terms by its textures and by the colours of the triangle's corners.
+    fn apply_maps(&self, maps: &MaterialMaps, material: &mut Material) {
+        let mut base = self.textures.corner_colour_at(self.triangle_ix, self.u, self.v);
+        if maps.base_colour != NO_TEXTURE {
+            base *= self.map_at(maps.base_colour);
+        }
+        material.kd *= base.truncate();
+        let is_cutout = maps.flags & MAPS_CUTOUT != 0;
+        if maps.flags & MAPS_COLOUR_HAS_OPACITY != 0 && !is_cutout {
+            material.d *= base.w;
+        }
+        if !is_cutout {
+            material.d *= self.factor_at(maps.opacity);
+        }
+        material.ks *= self.colour_at(maps.specular) * self.factor_at(maps.specular_factor);
+        material.ke *= self.colour_at(maps.emission);
+        let rough = self.factor_at(maps.roughness);
+        material.roughness *= rough;
+        material.ns = (material.ns * rough).max(1.0);
+        material.metallic *= self.factor_at(maps.metallic);
+        material.transmission *= self.factor_at(maps.transmission);
+        material.ka *= 1.0 + maps.occlusion_strength * (self.factor_at(maps.occlusion) - 1.0);
+        if !is_microfacet(material) {
+            material.ka *= base.truncate();
+        }
+    }
+}
+
+/// The share of a light that a bent normal lets through: 1 at the interpolated normal, 0 at the horizon of the
+/// interpolated surface.
+pub fn bump_shadowing(inputs: &KernelInputs, surface: &Surface, to_light: Vec3) -> f32 {
+    if inputs.textures.is_none() {
+        return 1.0;
+    }
+    let bent = surface.shading.dot(to_light) * surface.interpolated.dot(surface.shading);
+    let g = (surface.interpolated.dot(to_light) / bent.max(LEAST_COSINE * LEAST_COSINE)).clamp(0.0, 1.0);
+    ((1.0 - g) * g + 1.0) * g
+}
+
+/// Returns the surface and its material at a ray's hit.
+///
+/// # Panics
+/// Nothing was hit.
+pub fn shaded_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, Material) {
+    let triangle_ix = hit.triangle_ix as usize;
+    let t = &inputs.triangles[triangle_ix];
+    let material_ix = inputs.triangle_materials[triangle_ix] as usize;
+    let mut surface = surface_at(ray, hit, t);
+    let mut material = inputs.materials[material_ix];
+    if let Some(textures) = inputs.textures {
+        let maps = &textures.material_maps[material_ix];
+        let log_width = log_width(inputs.frame(), ray, hit, t, &surface);
+        let at = TextureHit { textures, triangle_ix: hit.triangle_ix, u: hit.u, v: hit.v, log_width };
+        at.apply_maps(maps, &mut material);
+        surface.shading = at.mapped_normal(maps, &surface);
+    }
+    (surface, material)
+}
