@@ -10,6 +10,8 @@ mod error;
 mod extent;
 pub mod framing;
 pub mod generate;
+#[cfg_attr(not(test), expect(dead_code, reason = "no reader of scene files calls it yet"))]
+mod image;
 mod light;
 mod lighting;
 mod material;
