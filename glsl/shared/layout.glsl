@@ -323,43 +323,6 @@ struct CornerSurface {
     uint colour;
 };
 
-// TEMPORARY
-#define NO_TEXTURE 0xffffffffu
-struct Texture {
-    float m00;
-    float m01;
-    float offset_u;
-    uint first_texel;
-    float m10;
-    float m11;
-    float offset_v;
-    uint size;
-    uint flags;
-    uint n_levels;
-    uint reserved0;
-    uint reserved1;
-};
-
-struct MaterialMaps {
-    uint base_colour;
-    uint opacity;
-    uint specular;
-    uint specular_factor;
-    uint emission;
-    uint normal;
-    uint roughness;
-    uint metallic;
-    uint transmission;
-    uint occlusion;
-    float normal_scale;
-    float occlusion_strength;
-    float alpha_cutoff;
-    float opacity_factor;
-    uint flags;
-    uint reserved;
-};
-// END TEMPORARY
-
 // `MaterialMaps.flags`: rays pass through the surface where its opacity is below `alpha_cutoff`.
 #define MAPS_CUTOUT 1u
 // `MaterialMaps.flags`: shadow rays do so.

@@ -140,7 +140,9 @@ mod tests {
         for (name, block) in &blocks {
             check(name, block, STRUCTS).unwrap();
         }
-        let seen: BTreeSet<_> = blocks.iter().map(|(name, _)| *name).collect();
+        // Kernels assemble these from the words of an array, and find large triangles behind another struct.
+        let apart = ["CornerSurface", "LargeTriangle", "MaterialMaps", "Texture"];
+        let seen: BTreeSet<_> = blocks.iter().map(|(name, _)| *name).chain(apart).collect();
         assert_eq!(seen, STRUCTS.iter().map(|(name, ..)| *name).collect());
     }
 

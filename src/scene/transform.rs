@@ -88,6 +88,11 @@ impl Transform {
         (self.normals * n.as_dvec3()).normalize_or_zero().as_vec3()
     }
 
+    /// Returns a tangent of object space in world space: unit length, or zero if `t` is zero.
+    pub fn tangent(&self, t: Vec3) -> Vec3 {
+        (self.linear * t.as_dvec3()).normalize_or_zero().as_vec3()
+    }
+
     /// Returns whether the transform is a reflection. A reflection reverses the winding of triangles, so two of a
     /// triangle's corners must be swapped for its outside to stay outside.
     pub fn mirrors(&self) -> bool {

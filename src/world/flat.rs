@@ -10,7 +10,7 @@ use crate::{
         MATERIAL_REFRACT, MATERIAL_SOLID, MATERIAL_SPECULAR, MATERIAL_UNLIT, Material, Triangle,
         normal::encode_octahedral,
     },
-    scene::{self, Alpha, Camera, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene},
+    scene::{self, Alpha, Camera, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene, Transform},
 };
 
 /// Scene as it is traced: everything that a frame shows, with all meshes in world space.
@@ -65,7 +65,7 @@ impl FlatScene {
             triangle_materials,
             materials: scene.materials.iter().map(Material::from).collect(),
             material_names: scene.materials.iter().map(|material| material.name.clone()).collect(),
-            textures: Textures::default(),
+            textures: Textures::new(scene)?,
             lights: scene.lights.iter().map(Light::from).collect(),
             camera: scene.camera,
             ambient: scene.ambient,
@@ -84,9 +84,13 @@ impl FlatScene {
 
 /// Checks that a mesh's arrays belong together, and that its faces have a material.
 fn check(mesh: &Mesh, instance: &Instance) -> Result<(), String> {
-    let Mesh { positions, faces, normals, slots, .. } = mesh;
+    let Mesh { positions, faces, normals, slots, uvs, colours, tangents } = mesh;
     if (normals.len(), slots.len()) != (faces.len(), faces.len()) {
         return Err(format!("its mesh has {} faces, {} normals, {} slots", faces.len(), normals.len(), slots.len()));
+    }
+    let lens = [uvs[0].len(), uvs[1].len(), colours.len(), tangents.len()];
+    if let Some(len) = lens.into_iter().find(|&len| len != 0 && len != faces.len()) {
+        return Err(format!("its mesh has {} faces, and corners of {len}", faces.len()));
     }
     if instance.materials.is_empty() && !faces.is_empty() {
         return Err("it has no material".to_owned());
@@ -97,6 +101,12 @@ fn check(mesh: &Mesh, instance: &Instance) -> Result<(), String> {
     }
 }
 
+/// Returns the order of a face's corners in the world. A mirroring transform reverses the winding, so two corners are
+/// swapped.
+pub(super) fn corners_of(transform: &Transform) -> [usize; 3] {
+    if transform.mirrors() { [0, 2, 1] } else { [0, 1, 2] }
+}
+
 /// Appends a world-space triangle for each face, in the order of the faces.
 fn push_triangles(mesh: &Mesh, instance: &Instance, triangles: &mut Vec<Triangle>) -> Result<(), String> {
     let transform = &instance.transform;
@@ -105,9 +115,8 @@ fn push_triangles(mesh: &Mesh, instance: &Instance, triangles: &mut Vec<Triangle
         Vec3::ZERO => FLAT_NORMAL,
         normal => encode_octahedral(normal),
     };
+    let [a, b, c] = corners_of(transform);
     let triangle = |(face, normals): (&[u32; 3], &[Vec3; 3])| {
-        // A mirroring transform reverses the winding, so two corners are swapped.
-        let [a, b, c] = if transform.mirrors() { [0, 2, 1] } else { [0, 1, 2] };
         Triangle {
             v0: world[face[a] as usize],
             n0: encoded(normals[a]),

@@ -1,17 +1,18 @@
 //! Worlds: what is rendered. A world is a scene with the acceleration structure over its triangles, and is consistent
 //! by construction.
 
+mod corners;
 mod flat;
 mod frame_constants;
 mod geometry;
 mod mismatch;
-mod textures;
+mod textured;
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-pub use self::{flat::FlatScene, geometry::Geometry, mismatch::Mismatch, textures::Textures};
+pub use self::{flat::FlatScene, geometry::Geometry, mismatch::Mismatch, textured::Textures};
 use crate::{
     accel::{
         Accel, AccelOptions, Statistics,

@@ -1,0 +1,144 @@
+//! Textures of a flattened scene, as kernels read them: texels, how materials use them, and the texture coordinates,
+//! tangents and colours at the corners of triangles.
+
+use glam::{Vec2, Vec4};
+
+use super::{
+    Mismatch,
+    corners::{corner_surfaces, uvs},
+    texture_arrays::{TextureArrays, srgb_table, texture_arrays},
+};
+use crate::{
+    layout::{
+        CornerSurface, LEAST_SHADOWING_OPACITY, MAPS_COLOUR_HAS_OPACITY, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps,
+        NO_TEXTURE, Texture,
+    },
+    scene::{Alpha, Material, Pixels, Scene},
+};
+
+/// Everything that textures need. All of it is empty if the scene has neither textures nor colours at corners.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Textures {
+    /// The linear values of the 256 bytes of sRGB, as bits, and the levels of the images.
+    pub texels: Vec<u32>,
+    /// The textures, to which the maps refer by index.
+    pub textures: Vec<Texture>,
+    /// For each material, its textures.
+    pub material_maps: Vec<MaterialMaps>,
+    /// Texture coordinates of the triangles' corners. Those of the second set, if a texture uses it, follow those of the
+    /// first set. Empty if there is no texture.
+    pub uvs: Vec<[Vec2; 3]>,
+    /// Tangents and colours of the triangles' corners. Empty if there are neither.
+    pub corners: Vec<[CornerSurface; 3]>,
+    /// The number of triangles.
+    pub n_triangles: usize,
+}
+
+impl Textures {
+    /// Makes the arrays of a scene, whose meshes and instances fit together.
+    ///
+    /// # Errors
+    /// A texture refers to an image that the scene does not have, or the images need more memory than there is.
+    pub(super) fn new(scene: &Scene) -> Result<Self, Mismatch> {
+        let (arrays, mut material_maps) = texture_arrays(scene)?;
+        let TextureArrays { mut texels, textures } = arrays;
+        for (maps, material) in material_maps.iter_mut().zip(&scene.materials) {
+            set_opacity(maps, material, scene);
+        }
+        let has_colours = scene.meshes.iter().any(|mesh| !mesh.colours.is_empty());
+        let has_opacity = material_maps.iter().any(|maps| maps.flags & (MAPS_CUTOUT | MAPS_VEIL) != 0);
+        if textures.is_empty() && !has_colours && !has_opacity {
+            return Ok(Self::default());
+        }
+        if texels.is_empty() {
+            texels = srgb_table().map(f32::to_bits).to_vec();
+        }
+        let all_textures = || scene.materials.iter().flat_map(|material| material.maps.textures());
+        let n_sets = all_textures().map(|texture| texture.uv_set as usize + 1).max().unwrap_or(0).min(2);
+        let has_normals = scene.materials.iter().any(|material| material.maps.normal.is_some());
+        Ok(Self {
+            texels,
+            textures,
+            material_maps,
+            uvs: uvs(scene, n_sets),
+            corners: if has_colours || has_normals { corner_surfaces(scene) } else { Vec::new() },
+            n_triangles: scene.n_triangles(),
+        })
+    }
+
+    /// Returns whether the scene has textures, colours at corners, or opacity that rays have to ask for.
+    pub fn is_in_use(&self) -> bool {
+        !self.material_maps.is_empty()
+    }
+
+    /// Returns whether some rays pass through parts of triangles.
+    pub fn has_cutouts(&self) -> bool {
+        self.material_maps.iter().any(|maps| maps.flags & (MAPS_CUTOUT | MAPS_VEIL) != 0)
+    }
+
+    /// Returns whether triangles have texture coordinates.
+    pub fn has_uvs(&self) -> bool {
+        !self.uvs.is_empty()
+    }
+
+    /// Returns the texture coordinates of a triangle's corners; 0 if the scene has none.
+    pub fn uvs_of(&self, triangle_ix: u32, uv_set: u32) -> [Vec2; 3] {
+        let at = uv_set as usize * self.n_triangles + triangle_ix as usize;
+        self.uvs.get(at).copied().unwrap_or_default()
+    }
+
+    /// Returns the texture coordinates at barycentric weights; 0 if the scene has none.
+    pub fn uv_at(&self, triangle_ix: u32, uv_set: u32, u: f32, v: f32) -> Vec2 {
+        let [a, b, c] = self.uvs_of(triangle_ix, uv_set);
+        (1.0 - u - v) * a + u * b + v * c
+    }
+
+    /// Returns the interpolated colour of a triangle's corners; white if the scene has none.
+    pub fn corner_colour_at(&self, triangle_ix: u32, u: f32, v: f32) -> Vec4 {
+        let Some(corners) = self.corners.get(triangle_ix as usize) else { return Vec4::ONE };
+        let [a, b, c] = corners.map(|corner| self.decode_colour(corner.colour));
+        (1.0 - u - v) * a + u * b + v * c
+    }
+
+    /// Decodes a colour of 8 bits a channel, with sRGB.
+    fn decode_colour(&self, colour: u32) -> Vec4 {
+        let linear = |byte: u32| f32::from_bits(self.texels[(byte & 255) as usize]);
+        Vec4::new(linear(colour), linear(colour >> 8), linear(colour >> 16), (colour >> 24) as f32 * (1.0 / 255.0))
+    }
+}
+
+/// Sets how a material's opacity acts on rays.
+fn set_opacity(maps: &mut MaterialMaps, material: &Material, scene: &Scene) {
+    let is_microfacet = material.microfacet.is_some();
+    if is_microfacet && material.alpha != Alpha::Opaque {
+        maps.flags |= MAPS_COLOUR_HAS_OPACITY;
+    }
+    match material.alpha {
+        Alpha::Opaque => maps.opacity = NO_TEXTURE,
+        Alpha::Cutout(cutoff) => {
+            maps.flags |= MAPS_CUTOUT;
+            maps.alpha_cutoff = cutoff;
+        }
+        Alpha::Coverage => {
+            // MTL's own transparency `d` casts whole shadows, as in the paper.
+            let by_factor = is_microfacet && material.d < 1.0;
+            let by_colour = is_microfacet && colours_are_see_through(material, scene);
+            if by_factor || by_colour || material.maps.opacity.is_some() {
+                maps.flags |= MAPS_VEIL;
+                maps.alpha_cutoff = LEAST_SHADOWING_OPACITY;
+            }
+        }
+    }
+}
+
+/// Returns whether the image of the base colour, or a colour at a corner, is not opaque.
+fn colours_are_see_through(material: &Material, scene: &Scene) -> bool {
+    let image = material.maps.base_colour.as_ref().and_then(|map| scene.images.get(map.image_ix as usize));
+    let by_image = image.is_some_and(|image| match &image.pixels {
+        Pixels::Bytes(pixels) => pixels.iter().any(|pixel| pixel[3] < 255),
+        // 1 as a half-precision float.
+        Pixels::Halves(pixels) => pixels.iter().any(|pixel| pixel[3] < 0x3c00),
+    });
+    let is_see_through = |corners: &[Vec4; 3]| corners.iter().any(|colour| colour.w < 1.0);
+    by_image || scene.meshes.iter().any(|mesh| mesh.colours.iter().any(is_see_through))
+}
