@@ -13,7 +13,7 @@
 //! traversal   traverser: one ray by any algorithm
 //!               kdtree, leaf, slab, kd_boxes, ropes, brute and the pending_* of each algorithm; grid; candidate
 //! geometry    triangle, surface, camera; search_ray and traversal_ray: a ray in the form that searches use
-//! light       light, material, children, display, tone_curves
+//! light       light, material, texture, children, display, tone_curves
 //! inputs      the data that kernels only read
 //! counting    the same traversal with its reads counted
 //! ```
@@ -51,6 +51,7 @@ pub mod shade;
 pub mod shadow;
 pub mod slab;
 pub mod surface;
+pub mod texture;
 pub mod tone_curves;
 pub mod tonemap;
 pub mod trace;

@@ -4,13 +4,22 @@
 mod flat;
 mod frame_constants;
 mod geometry;
+mod levels;
 mod mismatch;
+mod textures;
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-pub use self::{flat::FlatScene, geometry::Geometry, mismatch::Mismatch};
+#[cfg(test)]
+pub(crate) use self::textures::tests::scene_of;
+pub use self::{
+    flat::FlatScene,
+    geometry::Geometry,
+    mismatch::Mismatch,
+    textures::{TextureArrays, texture_arrays},
+};
 use crate::{
     accel::{
         Accel, AccelOptions, Statistics,
