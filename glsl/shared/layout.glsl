@@ -136,6 +136,46 @@
 // cannot be weakened, only stopped.
 #define LEAST_SHADOWING_OPACITY 0.5
 
+// Takes the place of an index in `textures` where a material has no texture.
+#define NO_TEXTURE 0xffffffffu
+// Words at the beginning of `texels`: for each byte that encodes a colour by sRGB, the bits of its linear value as a
+// float.
+#define SRGB_TABLE_SIZE 256u
+// `Texture.flags`, bits 0..1: what the texture shows outside of 0 to 1 along u, `WRAP_REPEAT` and its like.
+#define TEXTURE_WRAP_U_SHIFT 0u
+// `Texture.flags`, bits 2..3: the same along v.
+#define TEXTURE_WRAP_V_SHIFT 2u
+// The bits of one direction's wrap, once they are shifted down.
+#define TEXTURE_WRAP_MASK 3u
+// The image repeats.
+#define WRAP_REPEAT 0u
+// The image repeats, and every second copy is mirrored.
+#define WRAP_MIRROR 1u
+// The texels of the border continue.
+#define WRAP_CLAMP 2u
+// `Texture.flags`: the texture uses the second set of texture coordinates.
+#define TEXTURE_UV_SET 16u
+// `Texture.flags`: the bytes of the colours are encoded by sRGB. Textures with `TEXTURE_HALVES` are always linear.
+#define TEXTURE_SRGB 32u
+// `Texture.flags`: a texel has two words, each of which packs two half-precision floats: first red (in the lower bits)
+// and green, then blue and opacity. Without the flag, a texel is one word of four bytes, red in the lowest one.
+#define TEXTURE_HALVES 64u
+// `Texture.flags`: the texture shows squares of one colour, not blends of neighbouring texels.
+#define TEXTURE_NEAREST 128u
+// `Texture.flags`, bits 8..10: the channel that a texture of one number reads, `CHANNEL_RED` and its like.
+#define TEXTURE_CHANNEL_SHIFT 8u
+// The bits of the channel, once they are shifted down.
+#define TEXTURE_CHANNEL_MASK 7u
+// Values of the channel.
+#define CHANNEL_RED 0u
+#define CHANNEL_GREEN 1u
+#define CHANNEL_BLUE 2u
+#define CHANNEL_ALPHA 3u
+// Relative luminance of the colour (ITU-R BT.709).
+#define CHANNEL_LUMINANCE 4u
+// The greatest magnitude of a transformed texture coordinate. Others are replaced by it, and NaN by 0.
+#define TEXTURE_MAX_COORDINATE 1048576.0
+
 // Bit of `child_kinds`: a reflected ray continues from the hit. It precedes a transmitted one in the queue.
 #define CHILD_REFLECTED 1u
 // Bit of `child_kinds`: a transmitted ray continues from the hit.
@@ -289,6 +329,56 @@ struct Material {
     uint reserved0;
     uint reserved1;
     uint reserved2;
+};
+
+// A texture as a material uses it, 48 bytes. A lookup at (u, v) reads the image at (m00 u + m01 v + offset_u, m10 u +
+// m11 v + offset_v), where (0, 0) is the image's upper left corner and (1, 1) its lower right one.
+//
+// - `first_texel`: index in `texels` of a table of `n_levels` words. Each of them is the index in `texels` of a level's
+//   first texel. A level's texels are stored row by row, from the top.
+// - `size`: of level 0, texels. The width is in bits 0..15, the height in 16..31. Each further level is half as wide
+//   and half as high, rounded down, but at least 1.
+// - `flags`: `TEXTURE_SRGB` and its like.
+// - `n_levels`: down to the level of one texel.
+struct Texture {
+    float m00;
+    float m01;
+    float offset_u;
+    uint first_texel;
+    float m10;
+    float m11;
+    float offset_v;
+    uint size;
+    uint flags;
+    uint n_levels;
+    uint reserved0;
+    uint reserved1;
+};
+
+// The textures of a material, 64 bytes: indices in `textures`, or `NO_TEXTURE`.
+//
+// - `normal_scale`: factor on x and y of the normals that `normal` shows.
+// - `occlusion_strength`: how much of `occlusion` acts, 0..1.
+// - `alpha_cutoff`: opacity below which rays pass through the surface, as `flags` say.
+// - `opacity_factor`: opacity of the material, by which that of its textures is multiplied.
+// - `flags`: `MAPS_CUTOUT` and its like.
+struct MaterialMaps {
+    uint base_colour;
+    uint opacity;
+    uint specular;
+    uint specular_factor;
+    uint emission;
+    uint normal;
+    uint roughness;
+    uint metallic;
+    uint transmission;
+    uint occlusion;
+    float normal_scale;
+    float occlusion_strength;
+    float alpha_cutoff;
+    float opacity_factor;
+    uint flags;
+    uint reserved;
 };
 
 // A light, 48 bytes.

@@ -10,7 +10,7 @@ mod error;
 mod extent;
 pub mod framing;
 pub mod generate;
-#[cfg_attr(not(test), expect(dead_code, reason = "no reader of scene files calls it yet"))]
+#[cfg_attr(not(test), expect(dead_code, unused_imports, reason = "no reader of scene files calls it yet"))]
 mod image;
 mod light;
 mod lighting;
@@ -154,7 +154,7 @@ impl Scene {
     }
 
     /// A scene without meshes, materials and lights. Its camera is a placeholder.
-    fn empty(path: &Path) -> Self {
+    pub(crate) fn empty(path: &Path) -> Self {
         Self {
             name: Self::name_of(path),
             meshes: Vec::new(),

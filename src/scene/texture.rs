@@ -45,7 +45,7 @@ pub struct Texture {
 }
 
 /// Encoding of an image's colours.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Encoding {
     /// sRGB (IEC 61966-2-1), for colours.
     #[default]

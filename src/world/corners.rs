@@ -32,7 +32,8 @@ pub fn corner_surfaces(scene: &Scene) -> Vec<[CornerSurface; 3]> {
     let mut corners = Vec::with_capacity(scene.n_triangles());
     for instance in &scene.instances {
         let mesh = &scene.meshes[instance.mesh_ix];
-        let of_face = |face| corners_of(&instance.transform).map(|ix| corner_surface(mesh, &instance.transform, face, ix));
+        let of_face =
+            |face| corners_of(&instance.transform).map(|ix| corner_surface(mesh, &instance.transform, face, ix));
         corners.par_extend((0..mesh.faces.len()).into_par_iter().map(of_face));
     }
     corners
@@ -63,7 +64,7 @@ fn encode_colour(colour: Vec4) -> u32 {
         high => 1.055 * high.powf(1.0 / 2.4) - 0.055,
     };
     let byte = |value: f32| (value.clamp(0.0, 1.0) * 255.0).round() as u8;
-    let Vec4 { x, y, z, w } = colour;
+    let [x, y, z, w] = colour.to_array();
     u32::from_le_bytes([byte(encoded(x)), byte(encoded(y)), byte(encoded(z)), byte(w)])
 }
 

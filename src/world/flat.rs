@@ -116,15 +116,13 @@ fn push_triangles(mesh: &Mesh, instance: &Instance, triangles: &mut Vec<Triangle
         normal => encode_octahedral(normal),
     };
     let [a, b, c] = corners_of(transform);
-    let triangle = |(face, normals): (&[u32; 3], &[Vec3; 3])| {
-        Triangle {
-            v0: world[face[a] as usize],
-            n0: encoded(normals[a]),
-            v1: world[face[b] as usize],
-            n1: encoded(normals[b]),
-            v2: world[face[c] as usize],
-            n2: encoded(normals[c]),
-        }
+    let triangle = |(face, normals): (&[u32; 3], &[Vec3; 3])| Triangle {
+        v0: world[face[a] as usize],
+        n0: encoded(normals[a]),
+        v1: world[face[b] as usize],
+        n1: encoded(normals[b]),
+        v2: world[face[c] as usize],
+        n2: encoded(normals[c]),
     };
     triangles.par_extend(mesh.faces.par_iter().zip(&mesh.normals).map(triangle));
     Ok(())

@@ -46,6 +46,27 @@ pub enum Mismatch {
         /// Number of materials.
         materials: usize,
     },
+    /// An image of a scene cannot be shown.
+    #[error("image {image} of the scene, `{name}`: {what}")]
+    Image {
+        /// Index of the image.
+        image: usize,
+        /// The image's name.
+        name: String,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A texture of a material cannot be shown.
+    #[error("a texture of material {material}: {what}")]
+    Texture {
+        /// Index of the material.
+        material: usize,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// The images of a scene are too large together.
+    #[error("the textures of the scene: {0}")]
+    Textures(String),
 }
 
 impl From<Mismatch> for GpuError {

@@ -5,14 +5,24 @@ mod corners;
 mod flat;
 mod frame_constants;
 mod geometry;
+mod levels;
 mod mismatch;
+mod texture_arrays;
 mod textured;
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-pub use self::{flat::FlatScene, geometry::Geometry, mismatch::Mismatch, textured::Textures};
+#[cfg(test)]
+pub(crate) use self::texture_arrays::tests::scene_of;
+pub use self::{
+    flat::FlatScene,
+    geometry::Geometry,
+    mismatch::Mismatch,
+    texture_arrays::{TextureArrays, texture_arrays},
+    textured::Textures,
+};
 use crate::{
     accel::{
         Accel, AccelOptions, Statistics,

@@ -6,7 +6,8 @@ use glam::{Vec2, Vec4};
 use super::{
     Mismatch,
     corners::{corner_surfaces, uvs},
-    texture_arrays::{TextureArrays, srgb_table, texture_arrays},
+    levels,
+    texture_arrays::{TextureArrays, texture_arrays},
 };
 use crate::{
     layout::{
@@ -51,7 +52,7 @@ impl Textures {
             return Ok(Self::default());
         }
         if texels.is_empty() {
-            texels = srgb_table().map(f32::to_bits).to_vec();
+            texels = levels::SRGB.map(f32::to_bits).to_vec();
         }
         let all_textures = || scene.materials.iter().flat_map(|material| material.maps.textures());
         let n_sets = all_textures().map(|texture| texture.uv_set as usize + 1).max().unwrap_or(0).min(2);

@@ -8,8 +8,8 @@ use crate::scene::texture::{Channel, Image, Pixels};
 /// Returns the normal map of a bump map, which repeats.
 ///
 /// The height of the surface is `scale` times the image's value in a channel, in units in which the image is 1 wide and
-/// 1 high. Its slopes are the differences between the next and the previous pixel, along a row and along a column. As in
-/// a texture of normals, x is along u and y along decreasing v, and each channel c stands for 2 c - 1.
+/// 1 high. Its slopes follow from the differences between the next and the previous pixel, along a row and along a
+/// column. As in a texture of normals, x is along u and y along decreasing v, and each channel c stands for 2 c - 1.
 pub(in crate::scene) fn normals_of_heights(image: &Image, channel: Channel, scale: f32) -> Image {
     let (width, height) = (image.width as usize, image.height as usize);
     let value = |x: usize, y: usize| value_of(&image.pixels, y * width + x, channel);

@@ -29,8 +29,8 @@ const MAX_SIDE: u32 = 16_384;
 const MAX_PIXELS: u64 = 1 << 31;
 /// Bytes that a decoder may allocate beside its pixels, such as for a colour profile, which is compressed.
 const MAX_EXTRA_BYTES: u64 = 16 << 20;
-/// How many times the size of its own pixels a decoder may hold at once: JPEG's coefficients and their pixels, a copy in
-/// another order, a buffer that grows.
+/// How many times the size of its own pixels a decoder may hold at once: JPEG's coefficients and their pixels, a copy
+/// in another order, a buffer that grows.
 const WORKING_COPIES: u64 = 3;
 
 /// An image file in memory.

@@ -1,0 +1,111 @@
+// Lookups in textures, whose texels are words of the array `texels`. Positions within an image and weights of texels
+// are multiples of 1/256, so all devices blend alike. Twin of src/reference/texture.rs.
+//
+// Needs load_texels(uint) -> uint, a word of the array `texels`.
+#ifndef KDRAY_TEXTURE
+#define KDRAY_TEXTURE
+
+#include "layout.glsl"
+
+// Which of a triangle's sets of texture coordinates the texture uses, 0 or 1.
+uint uv_set_of(Texture map) {
+    return (map.flags & TEXTURE_UV_SET) != 0u ? 1u : 0u;
+}
+
+// Width and height of a level, texels.
+uvec2 size_of_level(Texture map, uint level) {
+    return max(uvec2(map.size & 0xffffu, map.size >> 16u) >> level, uvec2(1u));
+}
+
+// The wrap along an axis, `WRAP_REPEAT` and its like. shift: TEXTURE_WRAP_U_SHIFT or TEXTURE_WRAP_V_SHIFT.
+uint wrap_of(Texture map, uint shift) {
+    return (map.flags >> shift) & TEXTURE_WRAP_MASK;
+}
+
+// A texel: linear colour, and opacity.
+vec4 texel(Texture map, uint level, uint x, uint y) {
+    uint texel_ix = y * size_of_level(map, level).x + x;
+    uint first = load_texels(map.first_texel + level);
+    if ((map.flags & TEXTURE_HALVES) != 0u) {
+        uint word_ix = first + 2u * texel_ix;
+        return vec4(unpackHalf2x16(load_texels(word_ix)), unpackHalf2x16(load_texels(word_ix + 1u)));
+    }
+    uint word = load_texels(first + texel_ix);
+    uvec4 bytes = uvec4(word & 255u, (word >> 8u) & 255u, (word >> 16u) & 255u, word >> 24u);
+    vec4 linear = vec4(bytes) * (1.0 / 255.0);
+    if ((map.flags & TEXTURE_SRGB) == 0u) return linear;
+    vec3 colour = uintBitsToFloat(uvec3(load_texels(bytes.x), load_texels(bytes.y), load_texels(bytes.z)));
+    return vec4(colour, linear.w);
+}
+
+// The coordinate within one period of the image: 0..2 if every second copy is mirrored, otherwise 0..1.
+float folded(float coordinate, uint wrap) {
+    const float most = TEXTURE_MAX_COORDINATE;
+    // NaN becomes 0.
+    float bounded = coordinate > 0.0 ? min(coordinate, most) : (coordinate < 0.0 ? max(coordinate, -most) : 0.0);
+    if (wrap == WRAP_CLAMP) return clamp(bounded, 0.0, 1.0);
+    if (wrap == WRAP_MIRROR) return bounded - 2.0 * floor(0.5 * bounded);
+    return bounded - floor(bounded);
+}
+
+// The column or row of an image of n that is shown at an index. index: at most one outside of the period.
+uint wrapped(int index, uint n, uint wrap) {
+    int size = int(n);
+    int period = wrap == WRAP_MIRROR ? 2 * size : size;
+    if (wrap == WRAP_CLAMP) {
+        index = clamp(index, 0, size - 1);
+    } else {
+        if (index < 0) index += period;
+        if (index >= period) index -= period;
+        if (index >= size) index = period - 1 - index;
+    }
+    // This holds anyway. It keeps the index in range on devices that have other rules for NaN.
+    return min(uint(index), n - 1u);
+}
+
+// The colour of a level at a place, with the texture's transform applied.
+vec4 sample_level(Texture map, uint level, vec2 place) {
+    uvec2 size = size_of_level(map, level);
+    uint wrap_u = wrap_of(map, TEXTURE_WRAP_U_SHIFT);
+    uint wrap_v = wrap_of(map, TEXTURE_WRAP_V_SHIFT);
+    precise vec2 at = vec2(folded(place.x, wrap_u), folded(place.y, wrap_v)) * vec2(size);
+    if ((map.flags & TEXTURE_NEAREST) != 0u) {
+        ivec2 nearest = ivec2(floor(at));
+        return texel(map, level, wrapped(nearest.x, size.x, wrap_u), wrapped(nearest.y, size.y, wrap_v));
+    }
+    // The centre of the first texel is 0.
+    ivec2 steps = ivec2(floor(at * 256.0 + 0.5)) - 128;
+    ivec2 low = steps >> 8;
+    vec2 weight = vec2(steps & 255) * (1.0 / 256.0);
+    uint x0 = wrapped(low.x, size.x, wrap_u);
+    uint x1 = wrapped(low.x + 1, size.x, wrap_u);
+    uint y0 = wrapped(low.y, size.y, wrap_v);
+    uint y1 = wrapped(low.y + 1, size.y, wrap_v);
+    vec4 upper_left = texel(map, level, x0, y0);
+    vec4 lower_left = texel(map, level, x0, y1);
+    vec4 upper = upper_left + (texel(map, level, x1, y0) - upper_left) * weight.x;
+    vec4 lower = lower_left + (texel(map, level, x1, y1) - lower_left) * weight.x;
+    return upper + (lower - upper) * weight.y;
+}
+
+// The linear colour and the opacity of a texture. lod: the level, of which a fraction blends two levels. It is bounded
+// to the texture's levels, and NaN is 0.
+vec4 sample_texture(Texture map, vec2 uv, float lod) {
+    precise float u = map.m00 * uv.x + map.m01 * uv.y + map.offset_u;
+    precise float v = map.m10 * uv.x + map.m11 * uv.y + map.offset_v;
+    uint steps = lod > 0.0 ? uint(min(lod, float(map.n_levels - 1u)) * 256.0 + 0.5) : 0u;
+    uint level = steps >> 8u;
+    vec4 fine = sample_level(map, level, vec2(u, v));
+    if ((steps & 255u) == 0u) return fine;
+    vec4 coarse = sample_level(map, level + 1u, vec2(u, v));
+    return fine + (coarse - fine) * (float(steps & 255u) * (1.0 / 256.0));
+}
+
+// The number that a texture of one number shows. value: from sample_texture.
+float scalar_of(Texture map, vec4 value) {
+    uint channel = (map.flags >> TEXTURE_CHANNEL_SHIFT) & TEXTURE_CHANNEL_MASK;
+    if (channel == CHANNEL_LUMINANCE) return 0.2126 * value.x + 0.7152 * value.y + 0.0722 * value.z;
+    return value[min(channel, CHANNEL_ALPHA)];
+}
+
+#endif
