@@ -12,6 +12,19 @@ pub enum Light {
         /// Radiant intensity (power per steradian), linear RGB.
         intensity: Vec3,
     },
+    /// A point light that shines in a cone.
+    Spot {
+        /// Position in world space.
+        position: Vec3,
+        /// Unit vector along the axis of the cone, from the light, world space.
+        towards: Vec3,
+        /// Radiant intensity on the axis (power per steradian), linear RGB.
+        intensity: Vec3,
+        /// Cosine of the angle from the axis at which the intensity begins to fall.
+        inner_cos: f32,
+        /// Cosine of the angle from the axis from which on there is no light.
+        outer_cos: f32,
+    },
     /// A light so far away that its direction is the same everywhere.
     Directional {
         /// Unit vector towards the light, world space.
@@ -25,7 +38,9 @@ impl Light {
     /// Returns whether the light's power is zero.
     pub fn is_black(&self) -> bool {
         match self {
-            Self::Point { intensity: power, .. } | Self::Directional { irradiance: power, .. } => *power == Vec3::ZERO,
+            Self::Point { intensity: power, .. }
+            | Self::Spot { intensity: power, .. }
+            | Self::Directional { irradiance: power, .. } => *power == Vec3::ZERO,
         }
     }
 }

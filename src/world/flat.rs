@@ -6,8 +6,8 @@ use rayon::prelude::*;
 use super::{Mismatch, Textures};
 use crate::{
     layout::{
-        FLAT_NORMAL, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, MATERIAL_FRESNEL, MATERIAL_MICROFACET, MATERIAL_REFLECT,
-        MATERIAL_REFRACT, MATERIAL_SOLID, MATERIAL_SPECULAR, MATERIAL_UNLIT, Material, Triangle,
+        FLAT_NORMAL, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT, Light, MATERIAL_FRESNEL, MATERIAL_MICROFACET,
+        MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SOLID, MATERIAL_SPECULAR, MATERIAL_UNLIT, Material, Triangle,
         normal::encode_octahedral,
     },
     scene::{self, Alpha, Camera, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene, Transform},
@@ -182,6 +182,9 @@ impl From<&scene::Light> for Light {
         match *light {
             scene::Light::Point { position, intensity } => {
                 Self { position, kind: LIGHT_POINT, intensity, ..Self::default() }
+            }
+            scene::Light::Spot { position, towards, intensity, inner_cos, outer_cos } => {
+                Self { position, kind: LIGHT_SPOT, intensity, inner_cos, axis: towards, outer_cos }
             }
             scene::Light::Directional { towards, irradiance } => {
                 Self { position: towards, kind: LIGHT_DIRECTIONAL, intensity: irradiance, ..Self::default() }

@@ -22,4 +22,5 @@ mod refused;
 mod samples;
 mod slabs;
 mod studio;
+mod textures;
 mod unused;

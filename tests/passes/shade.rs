@@ -6,7 +6,7 @@ use kdray::{
 };
 
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_PIXEL, hits_of, options, rays_of};
-use crate::support::{compare, random::Random, scenes};
+use crate::support::{compare, random::Random, scenes, textured};
 
 /// Asserts that radiance agrees within 1e-4: `pow` and `inversesqrt` have an error of some 2^-13 of a steep
 /// highlight. The rays are those of two bounces.
@@ -43,6 +43,15 @@ fn agrees_with_its_twin() {
     for n_rays in RAY_COUNTS {
         check(&stage, &FIRST, n_rays);
         check(&stage, &Batch { first_pixel: 300, n_pixels: n_rays / 3, ..FIRST }, n_rays);
+    }
+}
+
+#[test]
+fn agrees_on_textures_and_microfacets() {
+    let stage = Stage::new(textured::every_kind(), options(50, 50), 2010);
+    for n_rays in [1, 2000] {
+        check(&stage, &FIRST, n_rays);
+        check(&stage, &Batch { n_pixels: n_rays / 3, ..FIRST }, n_rays);
     }
 }
 

@@ -12,7 +12,7 @@ use kdray::{
 };
 
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_WORD, hits_of, options, rays_of, some_rays};
-use crate::support::{compare, scenes};
+use crate::support::{compare, scenes, textured};
 
 /// Asserts that both agree on the rays of two bounces. Returns the light visibilities.
 fn check(stage: &Stage, batch: &Batch, n_rays: u32) -> Vec<u32> {
@@ -45,6 +45,14 @@ fn agrees_with_its_twin() {
         let stage = Stage::new(scenes::mixed_outdoors(), RenderOptions { traversal, ..options(8, 8) }, 2010);
         let states: HashSet<u32> = RAY_COUNTS.into_iter().flat_map(|n| check(&stage, &FIRST, n)).collect();
         assert_eq!(states, HashSet::from([LIGHT_UNTESTED, LIGHT_LIT, LIGHT_SHADOWED, UNTOUCHED_WORD]));
+    }
+}
+
+#[test]
+fn agrees_on_cut_outs_and_normal_maps() {
+    for traversal in [Traversal::Mask, Traversal::Ropes] {
+        let stage = Stage::new(textured::every_kind(), RenderOptions { traversal, ..options(50, 50) }, 2010);
+        check(&stage, &Batch { n_pixels: 1200, ..FIRST }, 2000);
     }
 }
 

@@ -11,6 +11,7 @@ pub mod packets;
 pub mod random;
 pub mod rays;
 pub mod scenes;
+pub mod textured;
 
 use std::sync::Arc;
 

@@ -1,0 +1,285 @@
+//! Tests of frames with textures, cut-outs and microfacets: against closed forms, and device against CPU.
+
+use glam::{DQuat, DVec3, Vec3, Vec4, vec2, vec3};
+use kdray::{
+    accel::kdtree::Traversal,
+    frame::{Picture, Primary, RenderOptions},
+    scene::{Alpha, Camera, Channel, Light, Maps, Material, Scene, Texture, Transform, Wrap},
+    world::FlatScene,
+};
+
+use super::studio::{differing, identical, on_both, on_cpu, on_device, options};
+use crate::support::textured::{self, add, add_image, empty, placed, square, unlit};
+
+/// Half the side of what the camera at z = 4 sees at z = 0, for a picture that is as wide as high.
+const HALF_VIEW: f64 = 4.0 * 0.414_213_56;
+
+/// A camera that sees the same at z = 0 from so far away that all its rays are almost parallel.
+fn far_camera() -> Camera {
+    let vertical_fov_degrees = 1.0_f32;
+    let distance = HALF_VIEW as f32 / (vertical_fov_degrees.to_radians() / 2.0).tan();
+    Camera { eye: vec3(0.0, 0.0, distance), vertical_fov_degrees, ..empty().camera }
+}
+
+/// A scene of one unlit square that fills the view.
+fn poster(is_far: bool, texture: impl FnOnce(&mut Scene) -> Texture) -> FlatScene {
+    let mut scene = empty();
+    let texture = texture(&mut scene);
+    add(&mut scene, square(), placed(HALF_VIEW, DVec3::ZERO), unlit(Vec3::ONE, Some(texture)));
+    if is_far {
+        scene.camera = far_camera();
+    }
+    flat(&scene)
+}
+
+fn flat(scene: &Scene) -> FlatScene {
+    FlatScene::new(scene).expect("a scene that fits together")
+}
+
+fn linear(byte: u8) -> f32 {
+    let encoded = f32::from(byte) / 255.0;
+    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
+}
+
+fn rgb(picture: &Picture, x: u32, y: u32) -> Vec3 {
+    Vec4::from_array(picture.radiance[(y * picture.width + x) as usize]).truncate()
+}
+
+/// Each pixel's centre falls on the centre of a texel, so it shows that texel: by each kind of primary visibility.
+#[test]
+fn a_pixel_shows_its_texel() {
+    let colour = |x: u32, y: u32| [(16 * x) as u8, (16 * y) as u8, (x * y) as u8, 255];
+    for is_smooth in [false, true] {
+        let image = |scene: &mut Scene| add_image(scene, [16, 16], colour);
+        let scene = poster(true, |scene| Texture { is_smooth, ..Texture::of_image(image(scene)) });
+        for primary in [Primary::Raster, Primary::Trace] {
+            for picture in on_both(&scene, &RenderOptions { primary, ..options(16, 16, 1) }) {
+                for (x, y) in (0..256).map(|i| (i % 16, i / 16)) {
+                    let [r, g, b, _] = colour(x, y).map(linear);
+                    let off = (rgb(&picture, x, y) - vec3(r, g, b)).abs().max_element();
+                    assert!(off < 1.0 / 255.0, "{x}, {y}: {}, not {:?}", rgb(&picture, x, y), colour(x, y));
+                }
+            }
+        }
+    }
+}
+
+/// From afar, a fine checkerboard is grey: the mean of its colours in linear light.
+#[test]
+fn a_distant_checkerboard_is_the_mean_of_its_colours() {
+    let check = |x: u32, y: u32| if (x + y) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] };
+    let scene = poster(false, |scene| Texture::of_image(add_image(scene, [256, 256], check)));
+    for picture in on_both(&scene, &options(16, 16, 1)) {
+        assert!((0..256).all(|i| (rgb(&picture, i % 16, i / 16) - 0.5).abs().max_element() < 0.005));
+    }
+}
+
+/// The level is that at which a texel is as large as a pixel. The image's columns are as wide as the texels of level 2,
+/// so a picture with pixels of that size still shows them, and one with pixels of twice the size shows their mean.
+#[test]
+fn the_level_follows_the_size_of_pixels() {
+    let column = |x: u32, _: u32| if x / 4 % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] };
+    let scene = poster(true, |scene| Texture::of_image(add_image(scene, [64, 64], column)));
+    for picture in on_both(&scene, &options(16, 16, 1)) {
+        assert!((0..16).all(|x| (rgb(&picture, x, 8).x - if x % 2 == 0 { 1.0 } else { 0.0 }).abs() < 0.02));
+    }
+    for picture in on_both(&scene, &options(8, 8, 1)) {
+        assert!((0..8).all(|x| (rgb(&picture, x, 4).x - 0.5).abs() < 0.02));
+    }
+}
+
+#[test]
+fn images_wrap_as_the_texture_says() {
+    let colours = [40_u8, 200];
+    for (wrap, expected) in
+        [(Wrap::Repeat, [40, 200, 40, 200]), (Wrap::Mirror, [200, 40, 40, 200]), (Wrap::Clamp, [40, 40, 40, 200])]
+    {
+        let scene = poster(true, |scene| {
+            let image = add_image(scene, [2, 1], |x, _| [colours[x as usize], 0, 0, 255]);
+            // Two texels fill half of the square, from its middle to the right.
+            let texture = Texture { wrap: [wrap; 2], is_smooth: false, ..Texture::of_image(image) };
+            texture.placed(vec2(2.0, 1.0), vec2(-1.0, 0.0))
+        });
+        for picture in on_both(&scene, &options(4, 4, 1)) {
+            let found = [0, 1, 2, 3].map(|x| rgb(&picture, x, 1).x);
+            assert!((0..4).all(|x| (found[x] - linear(expected[x])).abs() < 0.01), "{wrap:?}: {found:?}");
+        }
+    }
+}
+
+/// A red sheet with a hole in front of a white wall, lit from the front. Through the hole, the wall is seen and lit.
+fn holed_sheet() -> Scene {
+    let mut scene = empty();
+    let image = add_image(&mut scene, [8, 8], |x, y| {
+        let is_hole = (2..6).contains(&x) && (2..6).contains(&y);
+        [255, 0, 0, if is_hole { 0 } else { 255 }]
+    });
+    let texture = Texture { is_smooth: false, ..Texture::of_image(image) };
+    let maps = Maps { base_colour: Some(texture), ..Maps::default() };
+    let sheet = Material { alpha: Alpha::Cutout(0.5), maps, ..textured::rough(Vec3::ONE) };
+    add(&mut scene, square(), placed(1.0, DVec3::new(0.0, 0.0, 0.5)), sheet);
+    add(&mut scene, square(), placed(3.0, DVec3::new(0.0, 0.0, -0.5)), textured::rough(Vec3::ONE));
+    scene.lights = vec![Light::Directional { towards: Vec3::Z, irradiance: Vec3::ONE }];
+    scene
+}
+
+/// All ways of seeing agree on the hole: rasterization, kernels that rasterize, and every traversal, on device and CPU.
+/// Rays to the light pass through it, too.
+#[test]
+fn a_hole_is_seen_through_and_lit_through_in_every_way() {
+    let scene = flat(&holed_sheet());
+    let traced = RenderOptions { primary: Primary::Trace, ..options(32, 32, 2) };
+    let expected = on_cpu(&scene, &traced);
+    let middle = rgb(&expected, 16, 16);
+    assert!(middle.min_element() > 0.8, "the wall is lit through the hole: {middle}");
+    assert!(rgb(&expected, 10, 16).y < 0.1 && rgb(&expected, 10, 16).x > 0.5, "{}", rgb(&expected, 10, 16));
+    // The sheet shadows the wall beside the lit part, which the hole shows a little of.
+    assert!(rgb(&expected, 11, 16).max_element() < 0.05, "{}", rgb(&expected, 11, 16));
+    for &traversal in Traversal::ALL {
+        let picture = on_cpu(&scene, &RenderOptions { traversal, ..traced.clone() });
+        assert_eq!(differing(&expected, &picture, 0.0), [0usize; 0], "{traversal}");
+    }
+    for traversal in [Traversal::Mask, Traversal::Ropes, Traversal::Brute] {
+        for (way, picture) in
+            ["device", "CPU"].iter().zip(on_both(&scene, &RenderOptions { traversal, ..traced.clone() }))
+        {
+            assert_eq!(differing(&expected, &picture, 1e-4), [0usize; 0], "{way}, {traversal}");
+        }
+    }
+    let raster = on_device(&scene, &RenderOptions { primary: Primary::Raster, ..traced.clone() });
+    assert!(differing(&expected, &raster, 1e-4).len() <= 40, "only pixels on outlines differ");
+    assert!((rgb(&raster, 16, 16) - middle).abs().max_element() < 1e-4);
+    if super::studio::device().has_int64_atomics() {
+        let compute = on_device(&scene, &RenderOptions { primary: Primary::SoftwareRaster, ..traced.clone() });
+        assert!(identical(&compute, &on_device(&scene, &traced)));
+    }
+}
+
+#[test]
+fn without_its_cutoff_the_sheet_has_no_hole() {
+    let mut scene = holed_sheet();
+    scene.materials[0].alpha = Alpha::Opaque;
+    for picture in on_both(&flat(&scene), &options(32, 32, 2)) {
+        assert!(rgb(&picture, 16, 16).y < 0.1);
+    }
+}
+
+/// A see-through sheet weakens what is behind it by its coverage, and lets shadow rays pass below half of it.
+#[test]
+fn coverage_blends_and_a_thin_veil_casts_no_shadow() {
+    for (alpha, is_shadowed) in [(0.25_f32, false), (0.75, true)] {
+        let mut scene = empty();
+        let veil = Material { d: alpha, ks: Vec3::ZERO, ..textured::rough(Vec3::ZERO) };
+        add(&mut scene, square(), placed(1.0, DVec3::new(0.0, 0.0, 0.5)), veil);
+        let wall = Material { ks: Vec3::ZERO, ..textured::rough(Vec3::ONE) };
+        add(&mut scene, square(), placed(3.0, DVec3::new(0.0, 0.0, -0.5)), wall);
+        scene.lights = vec![Light::Directional { towards: Vec3::Z, irradiance: Vec3::ONE }];
+        let expected = if is_shadowed { 0.0 } else { 1.0 - alpha };
+        for picture in on_both(&flat(&scene), &options(16, 16, 3)) {
+            let found = rgb(&picture, 8, 8);
+            assert!((found - expected).abs().max_element() < 1e-3, "{alpha}: {found}, not {expected}");
+        }
+    }
+}
+
+/// A normal map of one colour tilts all normals alike, as a mesh with tilted normals has them. The sheet is also
+/// mirrored, rotated, and seen from behind.
+#[test]
+fn a_constant_normal_map_equals_tilted_normals() {
+    let tilt = vec3(0.6, 0.0, 0.8);
+    let encoded = tilt.to_array().map(|c| ((c + 1.0) / 2.0 * 255.0).round() as u8);
+    let decoded = Vec3::from_array(encoded.map(|c| f32::from(c) / 255.0 * 2.0 - 1.0)).normalize();
+    let turned = DQuat::from_rotation_z(0.7);
+    for (scale, rotation) in [(DVec3::ONE, DQuat::IDENTITY), (DVec3::new(-1.0, 1.0, 1.0), turned), (DVec3::ONE, turned)]
+    {
+        let transform = Transform::new(scale, rotation, DVec3::ZERO).expect("a transform");
+        let scene_with = |mesh: kdray::scene::Mesh, is_mapped: bool| {
+            let mut scene = empty();
+            let image = add_image(&mut scene, [1, 1], |_, _| [encoded[0], encoded[1], encoded[2], 255]);
+            let normal = is_mapped.then(|| Texture::of_data(image, Channel::Red));
+            let maps = Maps { normal, normal_scale: 1.0, ..Maps::default() };
+            let material = Material { maps, ks: Vec3::ZERO, ..textured::rough(Vec3::ONE) };
+            add(&mut scene, mesh, transform.clone(), material);
+            scene.lights = vec![Light::Directional { towards: vec3(0.3, 0.2, 1.0).normalize(), irradiance: Vec3::ONE }];
+            flat(&scene)
+        };
+        let mut tilted = square();
+        // The square's tangent is +x, so the map's x is along +x.
+        tilted.normals.fill([decoded; 3]);
+        let expected = on_both(&scene_with(tilted, false), &options(12, 12, 1));
+        let found = on_both(&scene_with(square(), true), &options(12, 12, 1));
+        for (expected, found) in expected.iter().zip(&found) {
+            let [a, b] = [expected, found].map(|picture| rgb(picture, 6, 6));
+            assert!(a.x > 0.3 && a.x < 0.97 && (a - b).abs().max_element() < 4e-3, "{b}, not {a}");
+        }
+    }
+}
+
+/// The light of a spot falls off between its two angles, and with the square of the distance.
+#[test]
+fn a_spot_light_falls_off_as_the_closed_form_says() {
+    let mut scene = empty();
+    let wall = Material { ks: Vec3::ZERO, ..textured::rough(Vec3::ONE) };
+    add(&mut scene, square(), placed(HALF_VIEW, DVec3::ZERO), wall);
+    let (inner_cos, outer_cos, height) = (0.95_f32, 0.85, 2.0_f32);
+    let position = vec3(0.0, 0.0, height);
+    let intensity = Vec3::splat(5.0);
+    scene.lights = vec![Light::Spot { position, towards: Vec3::NEG_Z, intensity, inner_cos, outer_cos }];
+    for picture in on_both(&flat(&scene), &options(33, 33, 1)) {
+        for x in 0..33 {
+            let offset = (x as f32 + 0.5) / 33.0 * 2.0 - 1.0;
+            let squared = (offset * HALF_VIEW as f32).powi(2) + height * height;
+            let cosine = height / squared.sqrt();
+            let share = ((cosine - outer_cos) / (inner_cos - outer_cos)).clamp(0.0, 1.0).powi(2);
+            let expected = 5.0 * share * cosine / squared;
+            assert!((rgb(&picture, x, 16).x - expected).abs() < 2e-3, "{x}: {} {expected}", rgb(&picture, x, 16).x);
+        }
+    }
+}
+
+/// A solid absorbs light by Beer's law, over the distance that the light takes through it.
+#[test]
+fn a_solid_absorbs_what_beers_law_says() {
+    let mut scene = empty();
+    let glow = unlit(Vec3::ONE, None);
+    add(&mut scene, square(), placed(9.0, DVec3::new(0.0, 0.0, -3.0)), glow);
+    let microfacet = kdray::scene::Microfacet {
+        transmission: 1.0,
+        roughness: 1.0,
+        is_solid: true,
+        attenuation_colour: vec3(0.5, 0.25, 1.0),
+        attenuation_distance: 0.5,
+        ..Default::default()
+    };
+    // The index of refraction is 1, so nothing is reflected or bent. The slab is 1 thick.
+    let glass = Material { ni: 1.0, microfacet: Some(microfacet), ..textured::rough(Vec3::ONE) };
+    add(&mut scene, square(), placed(2.0, DVec3::new(0.0, 0.0, 0.5)), glass.clone());
+    let turned =
+        Transform::new(DVec3::splat(2.0), DQuat::from_rotation_y(std::f64::consts::PI), DVec3::new(0.0, 0.0, -0.5));
+    add(&mut scene, square(), turned.expect("a transform"), glass);
+    for picture in on_both(&flat(&scene), &options(9, 9, 4)) {
+        let found = rgb(&picture, 4, 4);
+        assert!((found - vec3(0.25, 0.0625, 1.0)).abs().max_element() < 2e-3, "{found}");
+    }
+}
+
+#[test]
+fn device_and_cpu_agree_on_every_kind() {
+    let scene = textured::every_kind();
+    for traversal in [Traversal::Mask, Traversal::Ropes] {
+        let options = RenderOptions { traversal, primary: Primary::Trace, ..options(80, 60, 5) };
+        let [device, cpu] = on_both(&scene, &options);
+        let n_differing = differing(&device, &cpu, 4e-3).len();
+        assert!(n_differing <= device.radiance.len() / 100, "{traversal}: {n_differing} pixels differ");
+    }
+    let [device, cpu] = on_both(&scene, &options(80, 60, 5));
+    let n_differing = differing(&device, &cpu, 4e-3).len();
+    assert!(n_differing <= device.radiance.len() / 20, "rasterized: {n_differing} pixels differ");
+}
+
+#[test]
+fn frames_with_textures_are_the_same_bits_each_time() {
+    let scene = textured::every_kind();
+    let options = options(60, 45, 4);
+    assert!(identical(&on_device(&scene, &options), &on_device(&scene, &options)));
+}
