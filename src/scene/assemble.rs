@@ -13,10 +13,11 @@ use super::{
     extent, framing,
     generate::TriangleBudget,
     material::{MaterialSpec, colour, within},
-    mesh::MAX_COORDINATE,
+    mesh::{MAX_COORDINATE, Mesh},
     mesh_file::{parse_mesh, read_mesh},
     obj::Library,
     read::read_utf8,
+    tangents,
     transform::finite,
 };
 use crate::frame::Denoise;
@@ -110,7 +111,7 @@ fn add_mesh(
     let transform = common.transform.transform().map_err(failed)?;
     let named = named_materials(&common, materials).map_err(failed)?;
     let n_loaded = scene.n_triangles();
-    let (mesh, slots, n_made) = match source {
+    let (mut mesh, slots, n_made) = match source {
         Source::File { path, shading } => {
             let path = file.path.parent().unwrap_or(Path::new("")).join(path);
             // The scene file may misspell the name, so the error names the line in the scene file.
@@ -133,6 +134,7 @@ fn add_mesh(
             (mesh, slots, n_made)
         }
     };
+    scene.add_tangents(&mut mesh, &slots);
     scene.push_mesh(mesh, transform, slots).map_err(failed)?;
     Ok(n_made)
 }
@@ -146,6 +148,16 @@ fn named_materials(common: &CommonSpec, materials: &HashMap<String, u32>) -> Che
 }
 
 impl Scene {
+    /// Gives a mesh the tangents that the normal maps of its materials need. `slots`: the materials of its slots.
+    pub(super) fn add_tangents(&self, mesh: &mut Mesh, slots: &[u32]) {
+        let set = |material: &u32| Some(self.materials[*material as usize].maps.normal.as_ref()?.uv_set as usize);
+        let sets: Vec<Option<usize>> = slots.iter().map(set).collect();
+        if sets.iter().any(Option::is_some) {
+            let of_faces = mesh.slots.clone();
+            tangents::add_tangents(mesh, |face| sets[of_faces[face] as usize % sets.len()]);
+        }
+    }
+
     fn push_material(&mut self, material: Material) -> u32 {
         self.materials.push(material);
         (self.materials.len() - 1) as u32
@@ -160,9 +172,14 @@ impl Scene {
         self.push_material(MaterialSpec::default().material(NAME).expect("defaults are in range"))
     }
 
-    /// Adds a library's materials. Returns the material indices for the slots of the mesh that came with it; the last
-    /// one is the default material, for faces without one.
-    pub(super) fn push_library(&mut self, library: Library) -> Vec<u32> {
+    /// Adds a library's materials and images. Returns the material indices for the slots of the mesh that came with it;
+    /// the last one is the default material, for faces without one.
+    pub(super) fn push_library(&mut self, mut library: Library) -> Vec<u32> {
+        let n_images = self.images.len() as u32;
+        self.images.append(&mut library.images);
+        for material in &mut library.materials {
+            material.maps.change_each(|texture| texture.image_ix += n_images);
+        }
         let mut slots: Vec<u32> = library.materials.into_iter().map(|material| self.push_material(material)).collect();
         slots.push(self.default_material());
         slots

@@ -10,6 +10,8 @@ mod error;
 mod extent;
 pub mod framing;
 pub mod generate;
+mod image;
+mod image_files;
 mod light;
 mod lighting;
 mod material;
@@ -19,10 +21,12 @@ mod needs;
 mod obj;
 mod path;
 mod ply;
+mod polygon;
 mod read;
 mod smooth;
 mod sources;
 mod stl;
+mod tangents;
 mod texture;
 mod transform;
 
@@ -178,8 +182,9 @@ fn is_scene_file(path: &Path) -> bool {
 /// light.
 fn load_mesh_file(path: &Path) -> Result<Scene, SceneError> {
     let mut scene = Scene::empty(path);
-    let (mesh, library) = mesh_file::parse_mesh(path, mesh_file::read_mesh(path)?, Shading::default(), 0)?;
+    let (mut mesh, library) = mesh_file::parse_mesh(path, mesh_file::read_mesh(path)?, Shading::default(), 0)?;
     let slots = scene.push_library(library);
+    scene.add_tangents(&mut mesh, &slots);
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
     let bounds = scene.bounds();
     extent::check(path, bounds)?;

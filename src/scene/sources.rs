@@ -7,12 +7,13 @@ use toml::{Table, Value};
 use super::{
     is_scene_file,
     mesh_file::MeshFormat,
-    obj::named_libraries,
+    obj::named_files,
+    ply::named_images,
     read::{read_lossy, read_utf8},
 };
 
-/// Returns the sorted paths of the scene file, the mesh files that it names, and the material libraries that the mesh
-/// files name. The files need not exist. A file that cannot be read contributes no names.
+/// Returns the sorted paths of the scene file, the mesh files that it names, the material libraries that the mesh
+/// files name, and the images that these name. The files need not exist. A file that cannot be read contributes no names.
 pub fn source_files(path: &Path) -> Vec<PathBuf> {
     let meshes = if is_scene_file(path) { meshes(path) } else { vec![path.to_owned()] };
     let libraries: Vec<_> = meshes.iter().flat_map(|mesh| libraries(mesh)).collect();
@@ -32,9 +33,10 @@ fn meshes(scene: &Path) -> Vec<PathBuf> {
 
 fn libraries(mesh: &Path) -> Vec<PathBuf> {
     match MeshFormat::of_name(mesh) {
-        // Such a file is never taken for OBJ, so it need not be read to know that it names no libraries.
-        Some(MeshFormat::Ply | MeshFormat::Stl) => Vec::new(),
-        Some(MeshFormat::Obj) | None => named_libraries(mesh, &read_lossy(mesh).unwrap_or_default()),
+        // Such files are never taken for OBJ, and STL files name no others.
+        Some(MeshFormat::Stl) => Vec::new(),
+        Some(MeshFormat::Ply) => named_images(mesh),
+        Some(MeshFormat::Obj) | None => named_files(mesh, &read_lossy(mesh).unwrap_or_default()),
     }
 }
 

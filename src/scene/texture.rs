@@ -106,3 +106,10 @@ impl Texture {
         Self { transform: Affine2::from_translation(offset) * Affine2::from_scale(scale), ..self }
     }
 }
+
+/// Returns the linear value of an sRGB one (IEC 61966-2-1). Values outside of 0 to 1 are clamped, and NaN
+/// becomes 0.
+pub(super) fn linear_of_srgb(value: f32) -> f32 {
+    let value = if value > 0.0 { value.min(1.0) } else { 0.0 };
+    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
+}

@@ -59,10 +59,6 @@ fn bad_objs_are_refused() {
         (&after("f a b c"), "a.obj:4", "`a` is not the index"),
         (&after("usemtl"), "a.obj:4", "names no material"),
         (&after("mtllib"), "a.obj:4", "names no file"),
-        (&after("mtllib /etc/passwd\nf 1 2 3"), "a.obj:4", "leaves the folder"),
-        (&after("mtllib ../x.mtl\nf 1 2 3"), "a.obj:4", "leaves the folder"),
-        (&after("mtllib a\\..\\..\\x.mtl\nf 1 2 3"), "a.obj:4", "leaves the folder"),
-        (&after("mtllib c:x.mtl\nf 1 2 3"), "a.obj:4", "leaves the folder"),
         ("\u{1}\0\0\0\u{2}", "a.obj:1", "no text file"),
         ("v 2e9 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3", "a.obj", "beyond 1e9"),
     ];
