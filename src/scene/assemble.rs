@@ -1,8 +1,12 @@
 //! Conversion of a scene file's text into a scene.
 
-use std::{collections::HashMap, ops::Range, path::Path};
+use std::{
+    collections::{BTreeMap, HashMap},
+    ops::Range,
+    path::Path,
+};
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 
@@ -12,6 +16,7 @@ use super::{
     error::{Checked, SceneError},
     extent, framing,
     generate::TriangleBudget,
+    image_files::{ImageFiles, Images},
     material::{MaterialSpec, colour, within},
     mesh::{MAX_COORDINATE, Mesh},
     mesh_file::{parse_mesh, read_mesh},
@@ -62,11 +67,7 @@ impl File<'_> {
 
 fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> {
     let mut scene = Scene::empty(file.path);
-    let mut materials = HashMap::new();
-    for (name, spec) in &description.materials {
-        let material = file.check(&format!("material `{name}`"), spec, |spec| spec.material(name))?;
-        materials.insert(name.clone(), scene.push_material(material));
-    }
+    let materials = add_materials(file, &mut scene, &description.materials)?;
     for (ix, spec) in description.light.iter().enumerate() {
         scene.lights.push(file.check(&format!("light {}", ix + 1), spec, light)?);
     }
@@ -93,6 +94,41 @@ fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> 
         None => framing::camera(bounds),
     };
     Ok(scene)
+}
+
+/// Adds the materials of a scene file and their images. Returns the indices of the materials by their names.
+fn add_materials(
+    file: &File,
+    scene: &mut Scene,
+    specs: &BTreeMap<String, Spanned<MaterialSpec>>,
+) -> Result<HashMap<String, u32>, SceneError> {
+    let folder = file.path.parent().unwrap_or(Path::new(""));
+    let mut files = ImageFiles::default();
+    let mut add = |spec: &Spanned<MaterialSpec>| -> Vec<usize> {
+        spec.get_ref().maps().map(|(_, map)| files.add(map.path(folder))).collect()
+    };
+    let of_materials: Vec<Vec<usize>> = specs.values().map(&mut add).collect();
+    let (mut images, mut wrong) = (Vec::new(), HashMap::new());
+    for (ix, image) in files.decode().into_iter().enumerate() {
+        images.push(image.map_err(|what| wrong.insert(ix, what)).ok());
+    }
+    let mut images = Images::new(images);
+    let mut indices = HashMap::new();
+    for ((name, spec), files) in specs.iter().zip(of_materials) {
+        let material = file.check(&format!("material `{name}`"), spec, |spec| {
+            let mut material = spec.material(name)?;
+            for ((key, map), ix) in spec.maps().zip(files) {
+                if let Some(what) = wrong.get(&ix) {
+                    return Err(format!("{key}: {what}"));
+                }
+                map.set(&mut material, key, &mut images, ix)?;
+            }
+            Ok(material)
+        })?;
+        indices.insert(name.clone(), scene.push_material(material));
+    }
+    scene.images = images.finish();
+    Ok(indices)
 }
 
 /// Adds a mesh to the scene and returns the number of triangles that a generator made for it. `n_generated` is the
@@ -130,13 +166,29 @@ fn add_mesh(
                 mesh.normals.fill([Vec3::ZERO; 3]);
             }
             let slots = if named.is_empty() { vec![scene.default_material()] } else { named };
+            if !slots.iter().any(|ix| scene.materials[*ix as usize].maps.textures().next().is_some()) {
+                mesh.uvs = Default::default();
+            }
             let n_made = mesh.faces.len() as u64;
             (mesh, slots, n_made)
         }
     };
+    if let Some(scale) = common.uv_scale {
+        scale_uvs(&mut mesh, scale).map_err(failed)?;
+    }
     scene.add_tangents(&mut mesh, &slots);
     scene.push_mesh(mesh, transform, slots).map_err(failed)?;
     Ok(n_made)
+}
+
+/// Multiplies all texture coordinates of a mesh.
+fn scale_uvs(mesh: &mut Mesh, scale: [f32; 2]) -> Checked<()> {
+    let scale = Vec2::from_array(scale);
+    if !scale.is_finite() {
+        return Err(format!("uv_scale = {:?} is not finite", scale.to_array()));
+    }
+    mesh.uvs.iter_mut().flatten().flatten().for_each(|uv| *uv *= scale);
+    Ok(())
 }
 
 /// Returns the indices of the materials that a mesh names.

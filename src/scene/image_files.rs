@@ -158,6 +158,16 @@ impl Images {
     }
 }
 
+/// Returns the channel that holds the opacity of an image: alpha if it has any, else luminance.
+pub(super) fn opacity_channel(image: &Image) -> Channel {
+    const ONE: u16 = 0x3c00; // 1 as a half
+    let has_alpha = match &image.pixels {
+        Pixels::Bytes(pixels) => pixels.iter().any(|pixel| pixel[3] != 255),
+        Pixels::Halves(pixels) => pixels.iter().any(|pixel| pixel[3] != ONE),
+    };
+    if has_alpha { Channel::Alpha } else { Channel::Luminance }
+}
+
 /// Returns the image with 1 - x in place of each colour x.
 fn inverted(image: &Image) -> Image {
     let half = |bits: u16| half::f16::from_f32(1.0 - half::f16::from_bits(bits).to_f32()).to_bits();

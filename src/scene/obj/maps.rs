@@ -5,7 +5,7 @@ use glam::Vec2;
 use super::clean::split_keyword;
 use crate::scene::{
     error::Checked,
-    image_files::{Images, View},
+    image_files::{Images, View, opacity_channel},
     material::{Alpha, Material},
     texture::{Channel, Encoding, Image, Pixels, Texture, Wrap},
 };
@@ -163,7 +163,7 @@ pub fn set_map(material: &mut Material, term: Term, options: &MapOptions, images
     let image = images.get(file).expect("only maps with images are set");
     let grey = options.channel.unwrap_or(Channel::Luminance);
     let is_normal = term == Term::Normal || term == Term::Height && shows_normals(image);
-    let covers = opacity_channel(image, options.channel);
+    let covers = options.channel.unwrap_or_else(|| opacity_channel(image));
     let is_cutout = term == Term::Opacity && material.d == 1.0 && is_nearly_binary(image, covers);
     let maps = &mut material.maps;
     let mut plain = |encoding, channel| Some(options.texture(images.show(file, View::Plain), encoding, channel));
@@ -191,16 +191,6 @@ pub fn set_map(material: &mut Material, term: Term, options: &MapOptions, images
     if is_cutout {
         material.alpha = Alpha::Cutout(CUTOFF);
     }
-}
-
-/// Returns the channel that holds the opacity: the stated one, else alpha if the image has any, else luminance.
-fn opacity_channel(image: &Image, stated: Option<Channel>) -> Channel {
-    const ONE: u16 = 0x3c00; // 1 as a half
-    let has_alpha = match &image.pixels {
-        Pixels::Bytes(pixels) => pixels.iter().any(|pixel| pixel[3] != 255),
-        Pixels::Halves(pixels) => pixels.iter().any(|pixel| pixel[3] != ONE),
-    };
-    stated.unwrap_or(if has_alpha { Channel::Alpha } else { Channel::Luminance })
 }
 
 /// Returns a pixel, linear or not.
