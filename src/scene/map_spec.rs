@@ -14,8 +14,11 @@ use super::{
 
 /// A map: the name of an image, relative to the scene file's folder, or a table.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(untagged, expecting = "expected the name of an image, or a table with the keys file, scale, offset, wrap, \
-                               filter, channel and encoding")]
+#[serde(
+    untagged,
+    expecting = "expected the name of an image, or a table with the keys file, scale, offset, wrap, \
+                               filter, channel and encoding"
+)]
 pub(super) enum MapSpec {
     Name(String),
     Table(MapTable),
@@ -114,7 +117,8 @@ impl MapTable {
             Some(value) if !value.is_finite() => Err(format!("{name} is not finite")),
             value => Ok(value.unwrap_or(default)),
         };
-        let placed = texture.placed(vector("scale", self.scale, Vec2::ONE)?, vector("offset", self.offset, Vec2::ZERO)?);
+        let placed =
+            texture.placed(vector("scale", self.scale, Vec2::ONE)?, vector("offset", self.offset, Vec2::ZERO)?);
         let wrap = match self.wrap {
             None | Some(WrapSpec::Repeat) => Wrap::Repeat,
             Some(WrapSpec::Mirror) => Wrap::Mirror,

@@ -75,17 +75,8 @@ pub(super) struct MaterialSpec {
 }
 
 /// The keys of a material's maps in a scene file.
-pub(super) const MAP_KEYS: [&str; 9] = [
-    "map_Kd",
-    "map_Ks",
-    "map_Ke",
-    "map_d",
-    "map_Ns",
-    "map_normal",
-    "map_roughness",
-    "map_metallic",
-    "map_occlusion",
-];
+pub(super) const MAP_KEYS: [&str; 9] =
+    ["map_Kd", "map_Ks", "map_Ke", "map_d", "map_Ns", "map_normal", "map_roughness", "map_metallic", "map_occlusion"];
 
 impl MaterialSpec {
     /// Returns the maps with their keys.

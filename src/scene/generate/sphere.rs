@@ -159,13 +159,14 @@ impl Geodesic {
 /// angle from +z around the y axis, v that from +y, as shares of the full and the half turn. A triangle across the seam
 /// has u beyond 1. At a pole, u is the mean of the other corners'.
 fn spherical_uvs(corners: [Vec3; 3]) -> [Vec2; 3] {
-    let [mut us, vs] = [
-        corners.map(|p| (f64::from(p.x).atan2(f64::from(p.z)) / (2.0 * PI)).rem_euclid(1.0)),
-        corners.map(|p| f64::from(p.y).clamp(-1.0, 1.0).acos() / PI),
-    ];
+    let turn = |p: Vec3| (f64::from(p.x).atan2(f64::from(p.z)) / (2.0 * PI)).rem_euclid(1.0);
+    let vs = corners.map(|p| f64::from(p.y).clamp(-1.0, 1.0).acos() / PI);
     let is_pole = corners.map(|p| p.x.hypot(p.z) < 1e-6);
-    let largest = (0..3).filter(|ix| !is_pole[*ix]).map(|ix| us[ix]).fold(0.0, f64::max);
-    us = us.map(|u| if largest - u > 0.5 { u + 1.0 } else { u });
+    // Corners are at most half a turn from the middle of the triangle.
+    let middle = turn(corners.iter().sum());
+    let mut us = corners.map(|p| middle + (turn(p) - middle + 0.5).rem_euclid(1.0) - 0.5);
+    let least = (0..3).filter(|ix| !is_pole[*ix]).map(|ix| us[ix]).fold(1.0, f64::min);
+    us = us.map(|u| if least < -1e-6 { u + 1.0 } else { u });
     if let Some(pole) = is_pole.iter().position(|is_pole| *is_pole) {
         us[pole] = (us[(pole + 1) % 3] + us[(pole + 2) % 3]) / 2.0;
     }
