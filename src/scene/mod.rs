@@ -105,9 +105,9 @@ pub struct Camera {
 
 impl Scene {
     /// Loads a scene file, `.toml`, or a mesh file, `.obj`, `.ply` or `.stl`. The content of a mesh file says which
-    /// of the three it is. Emits `tracing` warnings for unknown OBJ statements, missing material libraries, undefined
-    /// materials, colours and texture coordinates of PLY files, which are not shown, and coordinates too large for
-    /// the scene's detail.
+    /// of the three it is. Emits `tracing` warnings for unknown OBJ statements, material libraries and images that are
+    /// missing or leave the folder of the mesh file, undefined materials, names in the wrong case, maps that are not
+    /// shown, and coordinates too large for the scene's detail.
     ///
     /// # Errors
     /// The file, or one that it names, cannot be read or understood; the scene has no triangles, is too small to be

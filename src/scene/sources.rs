@@ -14,8 +14,8 @@ use super::{
 };
 
 /// Returns the sorted paths of the scene file, the mesh files that it names, the material libraries that the mesh
-/// files name, and the images that
-/// these and the scene file name. The files need not exist. A file that cannot be read contributes no names.
+/// files name, and the images that any of them names. The files need not exist. A file that cannot be read contributes
+/// no names.
 pub fn source_files(path: &Path) -> Vec<PathBuf> {
     let (meshes, maps) = if is_scene_file(path) { named(path) } else { (vec![path.to_owned()], Vec::new()) };
     let libraries: Vec<_> = meshes.iter().flat_map(|mesh| libraries(mesh)).collect();

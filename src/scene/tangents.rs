@@ -211,4 +211,29 @@ mod tests {
         assert!((mesh.tangents[0][0] - Vec4::new(1.0, 0.0, 0.0, 1.0)).length() < 0.01, "{:?}", mesh.tangents[0]);
         assert_eq!(mesh.tangents[250_000], [Vec4::ZERO; 3]);
     }
+    #[test]
+    fn nasty_numbers_are_no_trouble() {
+        const NASTY: [f32; 10] = [0.0, -0.0, 1.0, -1.0, 0.5, 1e-30, 1e30, 3e38, f32::INFINITY, f32::NAN];
+        let mut state = 1_u64;
+        let mut next = move || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 33) as usize
+        };
+        for n_numbers in [5, 8, 10].repeat(100) {
+            let mut mesh = Mesh::default();
+            let mut number = || NASTY[next() % n_numbers];
+            for _ in 0..8 {
+                mesh.push_position(Vec3::new(number(), number(), number()));
+            }
+            for _ in 0..30 {
+                let uvs = [(); 3].map(|()| Vec2::new(number(), number()));
+                let face = [number(), number(), number()].map(|x| (x.to_bits() >> 7) % 8);
+                mesh.push_flat(face, 0);
+                mesh.uvs[0].push(uvs);
+            }
+            add_tangents(&mut mesh, |_| Some(0));
+            let is_tangent = |t: &Vec4| *t == Vec4::ZERO || (t.truncate().length() - 1.0).abs() < 0.01;
+            assert!(mesh.tangents.as_flattened().iter().all(is_tangent));
+        }
+    }
 }

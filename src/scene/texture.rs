@@ -35,8 +35,8 @@ pub struct Texture {
     pub channel: Channel,
     /// Which of the mesh's sets of texture coordinates it uses, 0 or 1.
     pub uv_set: u32,
-    /// Transform of texture coordinates before the image is looked up. (0, 0) is the upper left corner of the image, and
-    /// (1, 1) the lower right one.
+    /// Transform of texture coordinates before the image is looked up. (0, 0) is the upper left corner of the image,
+    /// and (1, 1) the lower right one.
     pub transform: Affine2,
     /// What the image shows outside of 0 to 1, along u and along v.
     pub wrap: [Wrap; 2],

@@ -250,8 +250,9 @@ fn scene_files_describe_maps_and_microfacets() {
     let images: [(&str, &[u8]); 2] = [("maps/a.png", &grey(1)), ("b.png", &png(|x, _| [x as u8 * 60; 4]))];
     let text = "map_Kd = 'maps/a.png', metallic = 0.5, roughness = 0.25, transmission = 1, Ni = 1.33, cutoff = 0.25, \
                 attenuation_color = [0.5, 1, 1], attenuation_distance = 2, map_d = 'b.png', normal_scale = 2, \
-                map_normal = { file = 'b.png', scale = [2, 3], offset = [0.5, 0], wrap = 'mirror', filter = 'nearest' }, \
-                map_roughness = { file = 'b.png', channel = 'green', encoding = 'srgb' }, map_occlusion = 'maps/a.png'";
+                map_normal = { file = 'b.png', scale = [2, 3], offset = [0.5, 0], wrap = 'mirror', filter = 'nearest' \
+                }, map_roughness = { file = 'b.png', channel = 'green', encoding = 'srgb' }, \
+                map_occlusion = 'maps/a.png'";
     let scene = load_toml(text, &images).unwrap();
     let m = &scene.materials[0];
     let pbr = m.microfacet.unwrap();

@@ -155,9 +155,9 @@ impl Geodesic {
     }
 }
 
-/// Returns the texture coordinates of a triangle on the unit sphere, as [`Rings::sweep`] gives them to a sphere: u is the
-/// angle from +z around the y axis, v that from +y, as shares of the full and the half turn. A triangle across the seam
-/// has u beyond 1. At a pole, u is the mean of the other corners'.
+/// Returns the texture coordinates of a triangle on the unit sphere, as [`Rings::sweep`] gives them to a sphere: u is
+/// the angle from +z around the y axis, v that from +y, as shares of the full and the half turn. A triangle across the
+/// seam has u beyond 1. At a pole, u is the mean of the other corners'.
 fn spherical_uvs(corners: [Vec3; 3]) -> [Vec2; 3] {
     let turn = |p: Vec3| (f64::from(p.x).atan2(f64::from(p.z)) / (2.0 * PI)).rem_euclid(1.0);
     let vs = corners.map(|p| f64::from(p.y).clamp(-1.0, 1.0).acos() / PI);

@@ -1,6 +1,7 @@
 //! Wavefront OBJ files with their MTL materials.
 
 mod clean;
+mod files;
 mod maps;
 mod mtl;
 
@@ -9,7 +10,7 @@ use std::{collections::HashMap, path::Path};
 use glam::{Vec2, Vec3};
 
 use self::clean::{CleanObj, FaceKind, FaceShading, clean_obj};
-pub(super) use self::mtl::{Library, named_files};
+pub(super) use self::{files::named_files, mtl::Library};
 use super::{
     error::SceneError,
     mesh::Mesh,
