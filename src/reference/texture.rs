@@ -147,7 +147,7 @@ mod tests {
     /// Returns the arrays of a scene with one material, which has one texture.
     fn arrays(image: (u32, u32, Pixels), texture: scene::Texture) -> TextureArrays {
         let (width, height, pixels) = image;
-        let image = Image { name: "image".to_owned(), width, height, pixels };
+        let image = Image { name: "image".to_owned(), width, height, pixels, is_linear: false };
         let mut material = Material::default();
         material.maps.base_colour = Some(texture);
         texture_arrays(&scene_of(vec![image], vec![material])).unwrap().0

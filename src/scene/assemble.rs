@@ -1,8 +1,12 @@
 //! Conversion of a scene file's text into a scene.
 
-use std::{collections::HashMap, ops::Range, path::Path};
+use std::{
+    collections::{BTreeMap, HashMap},
+    ops::Range,
+    path::Path,
+};
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 
@@ -12,11 +16,13 @@ use super::{
     error::{Checked, SceneError},
     extent, framing,
     generate::TriangleBudget,
+    image_files::{ImageFiles, Images},
     material::{MaterialSpec, colour, within},
-    mesh::MAX_COORDINATE,
+    mesh::{MAX_COORDINATE, Mesh},
     mesh_file::{parse_mesh, read_mesh},
     obj::Library,
     read::read_utf8,
+    tangents,
     transform::finite,
 };
 use crate::frame::Denoise;
@@ -61,11 +67,7 @@ impl File<'_> {
 
 fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> {
     let mut scene = Scene::empty(file.path);
-    let mut materials = HashMap::new();
-    for (name, spec) in &description.materials {
-        let material = file.check(&format!("material `{name}`"), spec, |spec| spec.material(name))?;
-        materials.insert(name.clone(), scene.push_material(material));
-    }
+    let materials = add_materials(file, &mut scene, &description.materials)?;
     for (ix, spec) in description.light.iter().enumerate() {
         scene.lights.push(file.check(&format!("light {}", ix + 1), spec, light)?);
     }
@@ -94,6 +96,41 @@ fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> 
     Ok(scene)
 }
 
+/// Adds the materials of a scene file and their images. Returns the indices of the materials by their names.
+fn add_materials(
+    file: &File,
+    scene: &mut Scene,
+    specs: &BTreeMap<String, Spanned<MaterialSpec>>,
+) -> Result<HashMap<String, u32>, SceneError> {
+    let folder = file.path.parent().unwrap_or(Path::new(""));
+    let mut files = ImageFiles::default();
+    let mut add = |spec: &Spanned<MaterialSpec>| -> Vec<usize> {
+        spec.get_ref().maps().map(|(_, map)| files.add(map.path(folder))).collect()
+    };
+    let of_materials: Vec<Vec<usize>> = specs.values().map(&mut add).collect();
+    let (mut images, mut wrong) = (Vec::new(), HashMap::new());
+    for (ix, image) in files.decode().into_iter().enumerate() {
+        images.push(image.map_err(|what| wrong.insert(ix, what)).ok());
+    }
+    let mut images = Images::new(images);
+    let mut indices = HashMap::new();
+    for ((name, spec), files) in specs.iter().zip(of_materials) {
+        let material = file.check(&format!("material `{name}`"), spec, |spec| {
+            let mut material = spec.material(name)?;
+            for ((key, map), ix) in spec.maps().zip(files) {
+                if let Some(what) = wrong.get(&ix) {
+                    return Err(format!("{key}: {what}"));
+                }
+                map.set(&mut material, key, &mut images, ix)?;
+            }
+            Ok(material)
+        })?;
+        indices.insert(name.clone(), scene.push_material(material));
+    }
+    scene.images = images.finish();
+    Ok(indices)
+}
+
 /// Adds a mesh to the scene and returns the number of triangles that a generator made for it. `n_generated` is the
 /// number that generators have made for the scene's earlier meshes.
 fn add_mesh(
@@ -110,7 +147,7 @@ fn add_mesh(
     let transform = common.transform.transform().map_err(failed)?;
     let named = named_materials(&common, materials).map_err(failed)?;
     let n_loaded = scene.n_triangles();
-    let (mesh, slots, n_made) = match source {
+    let (mut mesh, slots, n_made) = match source {
         Source::File { path, shading } => {
             let path = file.path.parent().unwrap_or(Path::new("")).join(path);
             // The scene file may misspell the name, so the error names the line in the scene file.
@@ -129,12 +166,29 @@ fn add_mesh(
                 mesh.normals.fill([Vec3::ZERO; 3]);
             }
             let slots = if named.is_empty() { vec![scene.default_material()] } else { named };
+            if !slots.iter().any(|ix| scene.materials[*ix as usize].maps.textures().next().is_some()) {
+                mesh.uvs = Default::default();
+            }
             let n_made = mesh.faces.len() as u64;
             (mesh, slots, n_made)
         }
     };
+    if let Some(scale) = common.uv_scale {
+        scale_uvs(&mut mesh, scale).map_err(failed)?;
+    }
+    scene.add_tangents(&mut mesh, &slots);
     scene.push_mesh(mesh, transform, slots).map_err(failed)?;
     Ok(n_made)
+}
+
+/// Multiplies all texture coordinates of a mesh.
+fn scale_uvs(mesh: &mut Mesh, scale: [f32; 2]) -> Checked<()> {
+    let scale = Vec2::from_array(scale);
+    if !scale.is_finite() {
+        return Err(format!("uv_scale = {:?} is not finite", scale.to_array()));
+    }
+    mesh.uvs.iter_mut().flatten().flatten().for_each(|uv| *uv *= scale);
+    Ok(())
 }
 
 /// Returns the indices of the materials that a mesh names.
@@ -146,6 +200,16 @@ fn named_materials(common: &CommonSpec, materials: &HashMap<String, u32>) -> Che
 }
 
 impl Scene {
+    /// Gives a mesh the tangents that the normal maps of its materials need. `slots`: the materials of its slots.
+    pub(super) fn add_tangents(&self, mesh: &mut Mesh, slots: &[u32]) {
+        let set = |material: &u32| Some(self.materials[*material as usize].maps.normal.as_ref()?.uv_set as usize);
+        let sets: Vec<Option<usize>> = slots.iter().map(set).collect();
+        if sets.iter().any(Option::is_some) {
+            let of_faces = mesh.slots.clone();
+            tangents::add_tangents(mesh, |face| sets[of_faces[face] as usize % sets.len()]);
+        }
+    }
+
     fn push_material(&mut self, material: Material) -> u32 {
         self.materials.push(material);
         (self.materials.len() - 1) as u32
@@ -160,9 +224,14 @@ impl Scene {
         self.push_material(MaterialSpec::default().material(NAME).expect("defaults are in range"))
     }
 
-    /// Adds a library's materials. Returns the material indices for the slots of the mesh that came with it; the last
-    /// one is the default material, for faces without one.
-    pub(super) fn push_library(&mut self, library: Library) -> Vec<u32> {
+    /// Adds a library's materials and images. Returns the material indices for the slots of the mesh that came with it;
+    /// the last one is the default material, for faces without one.
+    pub(super) fn push_library(&mut self, mut library: Library) -> Vec<u32> {
+        let n_images = self.images.len() as u32;
+        self.images.append(&mut library.images);
+        for material in &mut library.materials {
+            material.maps.change_each(|texture| texture.image_ix += n_images);
+        }
         let mut slots: Vec<u32> = library.materials.into_iter().map(|material| self.push_material(material)).collect();
         slots.push(self.default_material());
         slots

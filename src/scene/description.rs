@@ -102,6 +102,8 @@ pub(super) struct CommonSpec {
     pub materials: Vec<String>,
     /// If false, every face is shaded with its own plane's normal; true where absent.
     pub smooth: Option<bool>,
+    /// Factors on the texture coordinates u and v; 1 and 1 where absent.
+    pub uv_scale: Option<[f32; 2]>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -113,7 +115,7 @@ struct FileSpec {
     crease: Option<f32>,
 }
 
-const COMMON_KEYS: [&str; 4] = ["transform", "material", "materials", "smooth"];
+const COMMON_KEYS: [&str; 5] = ["transform", "material", "materials", "smooth", "uv_scale"];
 
 impl MeshSpec {
     /// Splits a mesh's table into the keys that all meshes have and those of its own kind. An unknown key is an

@@ -15,8 +15,8 @@
 //! | 9 | as 4, without reflection |
 
 use glam::Vec3;
-use serde::Deserialize;
 
+pub(super) use super::material_spec::MaterialSpec;
 use super::{error::Checked, texture::Texture};
 
 /// A material in MTL's terms. Colours are linear RGB.
@@ -194,40 +194,6 @@ pub struct Lobes {
     pub fresnel: bool,
 }
 
-/// A material as a file describes it. Each term may be absent.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct MaterialSpec {
-    /// Ambient colour; Kd where absent.
-    #[serde(rename = "Ka")]
-    pub ka: Option<[f32; 3]>,
-    /// Diffuse colour; 0.8 where absent, as in MTL.
-    #[serde(rename = "Kd")]
-    pub kd: Option<[f32; 3]>,
-    /// Specular colour, of the highlight and of the mirror; black where absent.
-    #[serde(rename = "Ks")]
-    pub ks: Option<[f32; 3]>,
-    /// Radiance that the surface gives off; black where absent.
-    #[serde(rename = "Ke")]
-    pub ke: Option<[f32; 3]>,
-    /// Transmission colour; white where absent.
-    #[serde(rename = "Tf")]
-    pub tf: Option<[f32; 3]>,
-    /// Exponent of the highlight; 32 where absent.
-    #[serde(rename = "Ns")]
-    pub ns: Option<f32>,
-    /// Index of refraction; 1.5 where absent.
-    #[serde(rename = "Ni")]
-    pub ni: Option<f32>,
-    /// Opacity, 0 to 1; 1 where absent.
-    pub d: Option<f32>,
-    /// Transparency, 1 - d; an error beside `d`.
-    #[serde(rename = "Tr")]
-    pub tr: Option<f32>,
-    /// Illumination model, 0 to 10; where absent, 2 if Ks is not black and 1 otherwise.
-    pub illum: Option<u8>,
-}
-
 impl Lobes {
     /// Returns the lobes of MTL's illumination model `illum`, or `None` beyond 10.
     pub fn of_illum(illum: u32) -> Option<Self> {
@@ -244,43 +210,6 @@ impl Lobes {
             9 => Some(Self { refraction: true, ..highlight }),
             _ => None,
         }
-    }
-}
-
-impl MaterialSpec {
-    /// Returns the material with defaults in place of absent terms. The error says which term is out of range.
-    pub fn material(&self, name: &str) -> Checked<Material> {
-        let kd = colour("Kd", self.kd, Vec3::splat(0.8))?;
-        let ks = colour("Ks", self.ks, Vec3::ZERO)?;
-        let illum = self.illum.map_or(if ks == Vec3::ZERO { 1 } else { 2 }, u32::from);
-        let opacity = match (self.d, self.tr) {
-            (Some(_), Some(_)) => return Err("has both d and Tr: they are one term (Tr = 1 - d)".to_owned()),
-            (None, Some(tr)) => 1.0 - within("Tr", tr, 0.0, 1.0)?,
-            (d, None) => within("d", d.unwrap_or(1.0), 0.0, 1.0)?,
-        };
-        // Some exporters write 0 for a surface that does not refract.
-        let ni = self.ni.map(|ni| if ni == 0.0 { 1.0 } else { ni }).unwrap_or(1.5);
-        Ok(Material {
-            name: name.to_owned(),
-            ka: colour("Ka", self.ka, kd)?,
-            // An exponent below 1 is raised to 1: 0 would be a constant highlight, and pow(0, 0) is undefined in
-            // GLSL.
-            ns: within("Ns", self.ns.unwrap_or(32.0), 0.0, 1e6)?.max(1.0),
-            kd,
-            d: opacity,
-            ks,
-            ni: within("Ni", ni, 0.001, 100.0)?,
-            ke: colour("Ke", self.ke, Vec3::ZERO)?,
-            lobes: Lobes::of_illum(illum).ok_or_else(|| format!("illum {illum} is not one of 0 to 10"))?,
-            tf: colour("Tf", self.tf, Vec3::ONE)?,
-            microfacet: None,
-            alpha: Alpha::Coverage,
-            is_unlit: false,
-            is_double_sided: true,
-            clearcoat: Clearcoat::default(),
-            sheen: Sheen::default(),
-            maps: Maps::default(),
-        })
     }
 }
 

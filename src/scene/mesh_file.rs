@@ -68,7 +68,7 @@ pub(super) fn parse_mesh(
     let failed = |what: String| SceneError::file(path, what);
     let (mesh, library) = match MeshFormat::of(path, &bytes) {
         MeshFormat::Obj => parse_obj(path, &lossy_text(bytes), shading, n_loaded)?,
-        MeshFormat::Ply => (parse_ply(path, &bytes, shading, n_loaded).map_err(failed)?, Library::default()),
+        MeshFormat::Ply => parse_ply(path, &bytes, shading, n_loaded).map_err(failed)?,
         MeshFormat::Stl => (parse_stl(bytes, shading, n_loaded).map_err(failed)?, Library::default()),
     };
     if mesh.faces.is_empty() {

@@ -10,21 +10,25 @@ mod error;
 mod extent;
 pub mod framing;
 pub mod generate;
-#[cfg_attr(not(test), expect(dead_code, unused_imports, reason = "no reader of scene files calls it yet"))]
 mod image;
+mod image_files;
 mod light;
 mod lighting;
+mod map_spec;
 mod material;
+mod material_spec;
 pub mod mesh;
 mod mesh_file;
 mod needs;
 mod obj;
 mod path;
 mod ply;
+mod polygon;
 mod read;
 mod smooth;
 mod sources;
 mod stl;
+mod tangents;
 mod texture;
 mod transform;
 
@@ -101,9 +105,9 @@ pub struct Camera {
 
 impl Scene {
     /// Loads a scene file, `.toml`, or a mesh file, `.obj`, `.ply` or `.stl`. The content of a mesh file says which
-    /// of the three it is. Emits `tracing` warnings for unknown OBJ statements, missing material libraries, undefined
-    /// materials, colours and texture coordinates of PLY files, which are not shown, and coordinates too large for
-    /// the scene's detail.
+    /// of the three it is. Emits `tracing` warnings for unknown OBJ statements, material libraries and images that are
+    /// missing or leave the folder of the mesh file, undefined materials, names in the wrong case, maps that are not
+    /// shown, and coordinates too large for the scene's detail.
     ///
     /// # Errors
     /// The file, or one that it names, cannot be read or understood; the scene has no triangles, is too small to be
@@ -180,8 +184,9 @@ fn is_scene_file(path: &Path) -> bool {
 /// light.
 fn load_mesh_file(path: &Path) -> Result<Scene, SceneError> {
     let mut scene = Scene::empty(path);
-    let (mesh, library) = mesh_file::parse_mesh(path, mesh_file::read_mesh(path)?, Shading::default(), 0)?;
+    let (mut mesh, library) = mesh_file::parse_mesh(path, mesh_file::read_mesh(path)?, Shading::default(), 0)?;
     let slots = scene.push_library(library);
+    scene.add_tangents(&mut mesh, &slots);
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
     let bounds = scene.bounds();
     extent::check(path, bounds)?;

@@ -6,35 +6,43 @@ use toml::{Table, Value};
 
 use super::{
     is_scene_file,
+    material_spec::MAP_KEYS,
     mesh_file::MeshFormat,
-    obj::named_libraries,
+    obj::named_files,
+    ply::named_images,
     read::{read_lossy, read_utf8},
 };
 
-/// Returns the sorted paths of the scene file, the mesh files that it names, and the material libraries that the mesh
-/// files name. The files need not exist. A file that cannot be read contributes no names.
+/// Returns the sorted paths of the scene file, the mesh files that it names, the material libraries that the mesh
+/// files name, and the images that any of them names. The files need not exist. A file that cannot be read contributes
+/// no names.
 pub fn source_files(path: &Path) -> Vec<PathBuf> {
-    let meshes = if is_scene_file(path) { meshes(path) } else { vec![path.to_owned()] };
+    let (meshes, maps) = if is_scene_file(path) { named(path) } else { (vec![path.to_owned()], Vec::new()) };
     let libraries: Vec<_> = meshes.iter().flat_map(|mesh| libraries(mesh)).collect();
-    let mut files = [vec![path.to_owned()], meshes, libraries].concat();
+    let mut files = [vec![path.to_owned()], meshes, maps, libraries].concat();
     files.sort();
     files.dedup();
     files
 }
 
-fn meshes(scene: &Path) -> Vec<PathBuf> {
+/// Returns the meshes and the images that a scene file names.
+fn named(scene: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
     let table: Table = read_utf8(scene).ok().and_then(|text| text.parse().ok()).unwrap_or_default();
-    let meshes = table.get("mesh").and_then(Value::as_array).into_iter().flatten();
-    let names = meshes.filter_map(|mesh| mesh.get("file").and_then(Value::as_str));
     let folder = scene.parent().unwrap_or(Path::new(""));
-    names.map(|name| folder.join(name)).collect()
+    let meshes = table.get("mesh").and_then(Value::as_array).into_iter().flatten();
+    let meshes = meshes.filter_map(|mesh| Some(folder.join(mesh.get("file")?.as_str()?))).collect();
+    let materials = table.get("materials").and_then(Value::as_table).into_iter().flat_map(Table::values);
+    let maps = materials.flat_map(|material| MAP_KEYS.iter().filter_map(|key| material.get(key)));
+    let name = |map: &Value| Some(folder.join(map.as_str().or_else(|| map.get("file")?.as_str())?));
+    (meshes, maps.filter_map(name).collect())
 }
 
 fn libraries(mesh: &Path) -> Vec<PathBuf> {
     match MeshFormat::of_name(mesh) {
-        // Such a file is never taken for OBJ, so it need not be read to know that it names no libraries.
-        Some(MeshFormat::Ply | MeshFormat::Stl) => Vec::new(),
-        Some(MeshFormat::Obj) | None => named_libraries(mesh, &read_lossy(mesh).unwrap_or_default()),
+        // Such files are never taken for OBJ, and STL files name no others.
+        Some(MeshFormat::Stl) => Vec::new(),
+        Some(MeshFormat::Ply) => named_images(mesh),
+        Some(MeshFormat::Obj) | None => named_files(mesh, &read_lossy(mesh).unwrap_or_default()),
     }
 }
 

@@ -13,6 +13,15 @@ pub struct Image {
     pub height: u32,
     /// `width * height` pixels, rows from the top.
     pub pixels: Pixels,
+    /// Whether colours are linear, whatever the textures that show them say. Files of floats are (HDR, EXR).
+    pub is_linear: bool,
+}
+
+impl Image {
+    /// Returns the encoding of the colours as a texture with the encoding `wanted` shows them.
+    pub(crate) fn encoding(&self, wanted: Encoding) -> Encoding {
+        if self.is_linear { Encoding::Linear } else { wanted }
+    }
 }
 
 /// The pixels of an image: red, green, blue and opacity, not premultiplied.
@@ -35,8 +44,8 @@ pub struct Texture {
     pub channel: Channel,
     /// Which of the mesh's sets of texture coordinates it uses, 0 or 1.
     pub uv_set: u32,
-    /// Transform of texture coordinates before the image is looked up. (0, 0) is the upper left corner of the image, and
-    /// (1, 1) the lower right one.
+    /// Transform of texture coordinates before the image is looked up. (0, 0) is the upper left corner of the image,
+    /// and (1, 1) the lower right one.
     pub transform: Affine2,
     /// What the image shows outside of 0 to 1, along u and along v.
     pub wrap: [Wrap; 2],
@@ -105,4 +114,11 @@ impl Texture {
     pub fn placed(self, scale: Vec2, offset: Vec2) -> Self {
         Self { transform: Affine2::from_translation(offset) * Affine2::from_scale(scale), ..self }
     }
+}
+
+/// Returns the linear value of an sRGB one (IEC 61966-2-1). Values outside of 0 to 1 are clamped, and NaN
+/// becomes 0.
+pub(super) fn linear_of_srgb(value: f32) -> f32 {
+    let value = if value > 0.0 { value.min(1.0) } else { 0.0 };
+    if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
 }

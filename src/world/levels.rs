@@ -218,7 +218,7 @@ mod tests {
     use super::*;
 
     fn image(width: u32, height: u32, pixels: Vec<[u8; 4]>) -> Image {
-        Image { name: "image".to_owned(), width, height, pixels: Pixels::Bytes(pixels) }
+        Image { name: "image".to_owned(), width, height, pixels: Pixels::Bytes(pixels), is_linear: false }
     }
 
     /// Returns the levels of an image as bytes.

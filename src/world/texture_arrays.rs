@@ -69,8 +69,9 @@ impl<'a> TexelLayout<'a> {
         let mut n_words = levels::SRGB.len() as u64;
         for (material_ix, material) in scene.materials.iter().enumerate() {
             for texture in material.maps.textures() {
-                let scene::Texture { image_ix, encoding, .. } = *texture;
+                let image_ix = texture.image_ix;
                 let image = image_of(scene, material_ix, texture)?;
+                let encoding = image.encoding(texture.encoding);
                 if ix_of.contains_key(&(image_ix, encoding)) {
                     continue;
                 }
@@ -122,7 +123,7 @@ fn image_of<'a>(scene: &'a Scene, material_ix: usize, texture: &scene::Texture) 
     let n_images = scene.images.len();
     let image = scene.images.get(image_ix as usize);
     let image = image.ok_or_else(|| wrong(format!("it shows image {image_ix}, but there are {n_images} images")))?;
-    let &Image { width, height, ref pixels, ref name } = image;
+    let &Image { width, height, ref pixels, ref name, .. } = image;
     let n_pixels = match pixels {
         Pixels::Bytes(pixels) => pixels.len(),
         Pixels::Halves(pixels) => pixels.len(),
@@ -182,7 +183,8 @@ impl Textures {
 /// Returns a texture as kernels read it.
 fn texture_of(texture: &scene::Texture, scene: &Scene, layout: &TexelLayout) -> Texture {
     let image = &scene.images[texture.image_ix as usize];
-    let stored = &layout.list[layout.ix_of[&(texture.image_ix, texture.encoding)]];
+    let encoding = image.encoding(texture.encoding);
+    let stored = &layout.list[layout.ix_of[&(texture.image_ix, encoding)]];
     let (matrix, offset) = (texture.transform.matrix2, texture.transform.translation);
     Texture {
         m00: matrix.x_axis.x,
@@ -193,7 +195,7 @@ fn texture_of(texture: &scene::Texture, scene: &Scene, layout: &TexelLayout) -> 
         m11: matrix.y_axis.y,
         offset_v: offset.y,
         size: image.width | image.height << 16,
-        flags: flags_of(texture, Coding::of(image, texture.encoding)),
+        flags: flags_of(texture, Coding::of(image, encoding)),
         n_levels: levels::sizes(image.width, image.height).count() as u32,
         reserved0: 0,
         reserved1: 0,
@@ -233,7 +235,7 @@ pub(crate) mod tests {
 
     fn image(width: u32, height: u32) -> Image {
         let pixels = Pixels::Bytes(vec![[255, 0, 0, 255]; (width * height) as usize]);
-        Image { name: "image".to_owned(), width, height, pixels }
+        Image { name: "image".to_owned(), width, height, pixels, is_linear: false }
     }
 
     /// Returns a scene without triangles.

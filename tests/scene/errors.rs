@@ -59,10 +59,6 @@ fn bad_objs_are_refused() {
         (&after("f a b c"), "a.obj:4", "`a` is not the index"),
         (&after("usemtl"), "a.obj:4", "names no material"),
         (&after("mtllib"), "a.obj:4", "names no file"),
-        (&after("mtllib /etc/passwd\nf 1 2 3"), "a.obj:4", "leaves the folder"),
-        (&after("mtllib ../x.mtl\nf 1 2 3"), "a.obj:4", "leaves the folder"),
-        (&after("mtllib a\\..\\..\\x.mtl\nf 1 2 3"), "a.obj:4", "leaves the folder"),
-        (&after("mtllib c:x.mtl\nf 1 2 3"), "a.obj:4", "leaves the folder"),
         ("\u{1}\0\0\0\u{2}", "a.obj:1", "no text file"),
         ("v 2e9 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3", "a.obj", "beyond 1e9"),
     ];
@@ -198,14 +194,15 @@ const SEEDS: [&[(&str, &str)]; 4] = [
     &[(
         "m.obj",
         "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0.5\nvt 0 0\nvn 0 0 1\nusemtl m\ns 1\n\
-         f 1/1/1 2//1 3//1\nf 2 4 3\ns off\nf -1 -2 -3 -4\n",
+         f 1/1/1 2//1 3//1\nf 2 4 3\ns off\nf -1 -2 -3 -4\nv 1 1 1 0.5 0.5 0.5\nvt 1 0.5\nvt 0.5 1\n\
+         f 1/1 2/2 5/3 4/-1 3/-2\n",
     )],
     &[("m.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")],
     &[
         (
             "m.mtl",
             "newmtl m\nKa 0.1 0.1 0.1\nKd 0.5\nKs 1 1 1\nNs 10\nNi 1.5\nd 0.5\nTr 0.5\nTf 1 1 1\nillum 7\n\
-             map_Kd a.png\nbump b.png\n",
+             map_Kd a.png\nbump b.png\nmap_d -s 2 2 -o 0.5 -imfchan m -bm 2 -clamp on c d.png\nPr 0.5\nPm 1\n",
         ),
         ("user.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n"),
     ],

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use kdray::scene::{
     generate::{Generator, TriangleBudget},
     mesh::Mesh,
@@ -169,5 +169,71 @@ fn rooms_face_inwards_and_planes_up() {
         let mesh = build(toml);
         assert_eq!(mesh.faces.len(), n_triangles);
         assert!(mesh.faces.iter().all(|face| facet_normal(&mesh, *face).normalize().y > 0.999), "{toml}");
+    }
+}
+
+/// Returns all corners of a generated mesh with their texture coordinates.
+fn corners_with_uvs(text: &str) -> Vec<(Vec3, Vec2)> {
+    let generator: Generator = toml::from_str(text).unwrap();
+    let mesh = generator.build(&TriangleBudget::default()).unwrap();
+    assert_eq!(mesh.uvs[0].len(), mesh.faces.len(), "{text}");
+    let corners = mesh.faces.as_flattened().iter().map(|ix| mesh.positions[*ix as usize]);
+    corners.zip(mesh.uvs[0].as_flattened().iter().copied()).collect()
+}
+
+#[test]
+fn texture_coordinates_are_the_documented_ones() {
+    let heading = |u: f32| Vec3::new((u * std::f32::consts::TAU).sin(), 0.0, (u * std::f32::consts::TAU).cos());
+    let sphere = |uv: Vec2| {
+        let (sin, cos) = (uv.y * std::f32::consts::PI).sin_cos();
+        2.0 * (sin * heading(uv.x) + cos * Vec3::Y)
+    };
+    let cylinder = |uv: Vec2| heading(uv.x) + (1.0 - 2.0 * uv.y) * Vec3::Y;
+    let plane = |uv: Vec2| Vec3::new(3.0 * (uv.x - 0.5), 0.0, 5.0 * (uv.y - 0.5));
+    let disc = |uv: Vec2| Vec3::new(4.0 * (uv.x - 0.5), 0.0, 4.0 * (uv.y - 0.5));
+    let front = |uv: Vec2| Vec3::new(uv.x - 0.5, 1.0 - 2.0 * uv.y, 1.5);
+    let inside_back = |uv: Vec2| Vec3::new(uv.x - 0.5, 1.0 - 2.0 * uv.y, -1.5);
+    let cases: [(&str, &dyn Fn(Vec2) -> Vec3); 9] = [
+        ("generator = 'sphere'\nradius = 2\nsegments = 33\nrings = 16", &sphere),
+        ("generator = 'sphere'\nradius = 2\ntriangles = 998", &sphere),
+        ("generator = 'geodesic'\nradius = 2\nfrequency = 1", &sphere),
+        ("generator = 'geodesic'\nradius = 2\nfrequency = 7", &sphere),
+        ("generator = 'lathe'\nsegments = 24\nprofile = [[1, 1], [1, -1]]", &cylinder),
+        ("generator = 'plane'\nsize = [3, 5]\nfields = [2, 3]", &plane),
+        ("generator = 'disc'\nradius = 2\nsegments = 7", &disc),
+        ("generator = 'box'\nsize = [1, 2, 3]\nsides = ['front']", &front),
+        // Seen from inside, the back wall of a room is before the eye, and +x on the right.
+        ("generator = 'room'\nsize = [1, 2, 3]\nsides = ['back']", &inside_back),
+    ];
+    for (text, point) in cases {
+        for (corner, uv) in corners_with_uvs(text) {
+            assert!(point(uv).distance(corner) < 1e-5, "{text}: {uv} is {} and not {corner}", point(uv));
+        }
+    }
+    // A sharp edge is at its share of the profile's spans: the second of three.
+    let lathe = "generator = 'lathe'\nsegments = 9\nprofile = [[0, 1], [1, 1], [1, 1], [1, 0], [1, 0], [0, 0]]";
+    for (corner, uv) in corners_with_uvs(lathe) {
+        let v = if corner.y == 1.0 { [0.0, 1.0 / 3.0] } else { [2.0 / 3.0, 1.0] };
+        let on_axis = corner.x == 0.0 && corner.z == 0.0;
+        let expected = if on_axis == (corner.y == 1.0) { v[0] } else { v[1] };
+        assert!((uv.y - expected).abs() < 1e-6, "{corner} {uv}");
+    }
+}
+
+#[test]
+fn images_are_not_mirrored_and_cover_closed_surfaces_once() {
+    for (text, _) in CLOSED {
+        let generator: Generator = toml::from_str(text).unwrap();
+        let mesh = generator.build(&TriangleBudget::default()).unwrap();
+        let mut covered = 0.0;
+        for [a, b, c] in &mesh.uvs[0] {
+            // Counter-clockwise with v upwards, as the triangle is from outside.
+            let doubled = -(*b - *a).perp_dot(*c - *a);
+            assert!(doubled > -1e-6, "{text}: {a} {b} {c}");
+            covered += f64::from(doubled) / 2.0;
+        }
+        if text.contains("torus_knot") {
+            assert!((covered - 1.0).abs() < 1e-4, "{text}: {covered}");
+        }
     }
 }

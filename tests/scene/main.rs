@@ -4,6 +4,7 @@ mod errors;
 mod extent;
 mod generators;
 mod instances;
+mod materials;
 mod mesh_files;
 mod obj;
 mod path;

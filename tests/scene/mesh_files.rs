@@ -2,10 +2,14 @@
 
 use std::fmt::Write;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3, Vec4};
 use kdray::{layout::normal::decode_octahedral, world::FlatScene};
 
-use super::{load, support::random::Random};
+use super::{
+    load,
+    materials::{load_scene, png},
+    support::random::Random,
+};
 
 /// The corners of a cube, and its sides as polygons that are counter-clockwise from outside.
 const CORNERS: [[f32; 3]; 8] = [
@@ -187,7 +191,7 @@ fn mistakes_are_named() {
             "element edge 6\nproperty list uchar int vertex_indices",
             "no element `face`: clouds of points",
         ),
-        ("element face 6", "element tristrips 6", "strips are not read"),
+        ("element face 6", "element tristrips 7", "element `tristrips`: the file ends too early"),
         ("vertex_indices", "indices", "lacks the list `vertex_indices`"),
         ("property float z", "property float w", "lacks x, y or z"),
         ("element vertex 8", "element corner 8", "no element `vertex`"),
@@ -242,4 +246,119 @@ fn spoilt_files_are_no_trouble() {
         }
     }
     assert!((300..3000).contains(&n_refused), "{n_refused} of 3000");
+}
+
+fn mesh(text: &[u8]) -> kdray::scene::Mesh {
+    let (scene, warnings) = load_scene(&[("x.ply", text)]);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    scene.unwrap_or_else(|e| panic!("{e}")).meshes.remove(0)
+}
+
+/// Returns a PLY file of one triangle. `properties` and `values`: what its vertices have beside x, y and z.
+fn painted(format: &str, properties: &str, values: impl Fn(&mut Vec<u8>, usize)) -> Vec<u8> {
+    let mut bytes = format!(
+        "ply\nformat {format} 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+         {properties}element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    .into_bytes();
+    let is_big = format == "binary_big_endian";
+    let word = |bits: u32| if is_big { bits.to_be_bytes() } else { bits.to_le_bytes() };
+    let corners: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+    for (ix, corner) in corners.iter().enumerate() {
+        match format {
+            "ascii" => bytes.extend(format!("{} {} {} ", corner[0], corner[1], corner[2]).into_bytes()),
+            _ => bytes.extend(corner.iter().flat_map(|x| word(x.to_bits()))),
+        }
+        values(&mut bytes, ix);
+    }
+    match format {
+        "ascii" => bytes.extend(b"3 0 1 2\n"),
+        _ => {
+            bytes.push(3);
+            bytes.extend([0, 1, 2].into_iter().flat_map(word));
+        }
+    }
+    bytes
+}
+
+#[test]
+fn ply_colours_and_texture_coordinates_are_read_in_every_encoding() {
+    let colours: [[u8; 4]; 3] = [[255, 0, 188, 51], [0, 0, 0, 0], [255; 4]];
+    let uvs: [[f32; 2]; 3] = [[0.0, 0.0], [1.0, 0.25], [0.5, 1.0]];
+    let check = |mesh: kdray::scene::Mesh, what: &str| {
+        // 188 / 255 in sRGB is 0.5029.
+        let expected = [Vec4::new(1.0, 0.0, 0.5029, 0.2), Vec4::ZERO, Vec4::ONE];
+        for (found, expected) in mesh.colours[0].iter().zip(expected) {
+            assert!((*found - expected).length() < 1e-3, "{what}: {found} in place of {expected}");
+        }
+        assert_eq!(mesh.uvs[0], [[Vec2::new(0.0, 1.0), Vec2::new(1.0, 0.75), Vec2::new(0.5, 0.0)]], "{what}");
+    };
+    for names in [
+        ["red", "green", "blue", "alpha", "s", "t"],
+        ["diffuse_red", "diffuse_green", "diffuse_blue", "alpha", "u", "v"],
+    ] {
+        let bytes_then_floats: String = names
+            .iter()
+            .enumerate()
+            .map(|(ix, name)| format!("property {} {name}\n", if ix < 4 { "uchar" } else { "float" }))
+            .collect();
+        for format in ["binary_little_endian", "binary_big_endian"] {
+            let binary = painted(format, &bytes_then_floats, |bytes, ix| {
+                bytes.extend(colours[ix]);
+                let is_big = format == "binary_big_endian";
+                bytes.extend(uvs[ix].iter().flat_map(|x| if is_big { x.to_be_bytes() } else { x.to_le_bytes() }));
+            });
+            check(mesh(&binary), format);
+        }
+        let text = |bytes: &mut Vec<u8>, values: [f32; 4], uv: [f32; 2]| {
+            let [r, g, b, a] = values;
+            bytes.extend(format!("{r} {g} {b} {a} {} {}\n", uv[0], uv[1]).into_bytes());
+        };
+        let ascii = painted("ascii", &bytes_then_floats, |bytes, ix| text(bytes, colours[ix].map(f32::from), uvs[ix]));
+        check(mesh(&ascii), "text");
+        let floats = bytes_then_floats.replace("uchar", "double");
+        let ascii =
+            painted("ascii", &floats, |bytes, ix| text(bytes, colours[ix].map(|c| f32::from(c) / 255.0), uvs[ix]));
+        check(mesh(&ascii), "floats");
+    }
+    let opaque = painted("ascii", "property uchar red\nproperty uchar green\nproperty uchar blue\n", |bytes, _| {
+        bytes.extend(b"0 0 0\n");
+    });
+    assert_eq!(mesh(&opaque).colours[0][0], Vec4::new(0.0, 0.0, 0.0, 1.0));
+}
+
+#[test]
+fn meshlabs_textures_are_read() {
+    let text = "ply\nformat ascii 1.0\ncomment TextureFile a.png\ncomment TextureFile none.png\nelement vertex 4\n\
+                property float x\nproperty float y\nproperty float z\nelement face 3\n\
+                property list uchar int vertex_indices\nproperty list uchar float texcoord\nproperty int texnumber\n\
+                end_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2 6 0 0 1 0 1 0.75 0\n3 0 2 3 0 1\n3 0 2 3 0 -1\n";
+    let image = png(|_, _| [1, 2, 3, 255]);
+    let (scene, warnings) = load_scene(&[("x.ply", text.as_bytes()), ("a.png", &image)]);
+    let scene = scene.unwrap();
+    assert!(warnings.len() == 1 && warnings[0].contains("none.png"), "{warnings:?}");
+    let names: Vec<&str> = scene.materials.iter().map(|m| m.name.as_str()).collect();
+    assert_eq!(names, ["a.png", "none.png", "(default)"]);
+    assert_eq!((scene.images.len(), scene.materials[0].kd), (1, Vec3::ONE));
+    assert_eq!(scene.materials[0].maps.base_colour, Some(kdray::scene::Texture::of_image(0)));
+    assert!(scene.materials[1].maps.base_colour.is_none());
+    let mesh = &scene.meshes[0];
+    assert_eq!(mesh.uvs[0][0], [Vec2::new(0.0, 1.0), Vec2::new(1.0, 1.0), Vec2::new(1.0, 0.25)]);
+    assert_eq!((mesh.uvs[0][1], &mesh.slots[..]), ([Vec2::ZERO; 3], &[0, 1, 2][..]));
+}
+
+#[test]
+fn triangle_strips_and_concave_polygons_are_read() {
+    let text = "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty float z\n\
+                element tristrips 1\nproperty list int int vertex_indices\nend_header\n\
+                0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 0\n8 0 1 2 3 -1 2 3 4\n";
+    assert_eq!(mesh(text.as_bytes()).faces, [[0, 1, 2], [2, 1, 3], [2, 3, 4]]);
+    assert!(error("x.ply", text.replace("2 3 4", "2 3 5").as_bytes()).contains("a triangle strip has vertex 5"));
+    // An arrow head whose second corner is in front of the first one's view.
+    let text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n\
+                element face 1\nproperty list uchar int vertex_indices\nend_header\n\
+                2 -1 0\n0 2 0\n-2 -1 0\n0 0 0\n4 0 1 2 3\n";
+    let scene = load_as("x.ply", text.as_bytes());
+    let areas: Vec<f32> = scene.triangles.iter().map(|t| super::facet_normal(t).z / 2.0).collect();
+    assert!(areas.iter().all(|area| *area > 0.0) && areas.iter().sum::<f32>() == 4.0, "{areas:?}");
 }

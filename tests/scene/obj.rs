@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use kdray::{
     layout::{
         FLAT_NORMAL, MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR, normal::decode_octahedral,
@@ -10,7 +10,7 @@ use kdray::{
     world::FlatScene,
 };
 
-use super::{facet_normal, load};
+use super::{facet_normal, load, materials::load_scene};
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
 /// The unit cube's corners and its quads.
@@ -181,5 +181,65 @@ fn a_bare_obj_is_framed_and_lit() {
         }
         // The box is not too small in the picture.
         assert!((camera.target - camera.eye).length() < 3.5 * (max - min).length());
+    }
+}
+
+/// Loads an OBJ file and returns its mesh.
+fn mesh(text: &str) -> kdray::scene::Mesh {
+    let (scene, warnings) = load_scene(&[("m.obj", text.as_bytes())]);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    scene.unwrap_or_else(|e| panic!("{e}\n{text}")).meshes.remove(0)
+}
+
+#[test]
+fn texture_coordinates_count_from_the_upper_left_corner() {
+    let points = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0.25 9\nvt 0.5\nvn 0 0 1\n";
+    let mesh = mesh(&format!("{points}f 1/1 2/2 3/-1 4/1\nf 1//1 2//1 3//1\nf 1/2/1 2/2/1 3/1/1\nf 1/1 2 3/1\n"));
+    let [a, b, c] = [Vec2::new(0.0, 1.0), Vec2::new(1.0, 0.75), Vec2::new(0.5, 1.0)];
+    let none = [Vec2::ZERO; 3];
+    // Faces without coordinates at all their corners have zeros.
+    assert_eq!(mesh.uvs[0], [[a, b, c], [a, c, a], none, [b, b, a], none]);
+    assert_eq!(mesh.normals[2], [Vec3::Z; 3]);
+    assert!(mesh.uvs[1].is_empty() && mesh.colours.is_empty() && mesh.tangents.is_empty());
+}
+
+#[test]
+fn colours_of_points_are_srgb() {
+    let colour = |text: &str| {
+        mesh(&format!("v 0 0 0 {text}\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")).colours.first().map(|c| [c[0], c[1]])
+    };
+    let white = glam::Vec4::ONE;
+    // 0.5 in sRGB is ((0.5 + 0.055) / 1.055)^2.4 = 0.21404.
+    let close = |found: Option<[glam::Vec4; 2]>, expected: [f32; 3]| {
+        let [first, second] = found.unwrap();
+        assert!((first - Vec3::from_array(expected).extend(1.0)).length() < 1e-4, "{first}");
+        assert_eq!(second, white);
+    };
+    close(colour("0.5 0 1"), [0.21404, 0.0, 1.0]);
+    close(colour("0.5 0 1 0.25"), [0.21404, 0.0, 1.0]);
+    assert_eq!(colour("1"), None);
+    let bytes = mesh("v 0 0 0 255 0 51\nv 1 0 0 255 255 255\nv 0 1 0 0 0 0\nf 1 2 3\n").colours[0];
+    assert_eq!((bytes[1], bytes[0].x), (white, 1.0));
+    assert!((bytes[0].z - 0.0331).abs() < 1e-4, "{}", bytes[0]);
+}
+
+#[test]
+fn concave_polygons_cover_their_area_once() {
+    // An L of area 3, tilted, whose first corner does not see all others.
+    let obj = "v 2 0 0\nv 2 1 1\nv 1 1 1\nv 1 2 2\nv 0 2 2\nv 0 0 0\nvt 0 0\nvt 1 1\n\
+               f 1/1 2/1 3/1 4/1 5/1 6/2\n";
+    let scene = load_obj(obj);
+    assert_eq!(scene.triangles.len(), 4);
+    let area: f32 = scene.triangles.iter().map(|t| facet_normal(t).length() / 2.0).sum();
+    assert!((area - 3.0 * 2f32.sqrt()).abs() < 1e-5, "{area}");
+    let up = Vec3::new(0.0, -1.0, 1.0).normalize();
+    assert!(scene.triangles.iter().all(|t| facet_normal(t).normalize().distance(up) < 1e-5));
+    // Corners keep their coordinates: only the last one has (1, 0).
+    let mesh = mesh(obj);
+    for (face, uvs) in mesh.faces.iter().zip(&mesh.uvs[0]) {
+        for (ix, uv) in face.iter().zip(uvs) {
+            let is_last = mesh.positions[*ix as usize] == Vec3::ZERO;
+            assert_eq!(*uv, if is_last { Vec2::new(1.0, 0.0) } else { Vec2::new(0.0, 1.0) });
+        }
     }
 }

@@ -40,7 +40,7 @@ pub fn add(scene: &mut Scene, mesh: Mesh, transform: Transform, material: Materi
 pub fn add_image(scene: &mut Scene, size: [u32; 2], colour: impl Fn(u32, u32) -> [u8; 4]) -> u32 {
     let [width, height] = size;
     let pixels = Pixels::Bytes((0..width * height).map(|i| colour(i % width, i / width)).collect());
-    scene.images.push(Image { name: "image".to_owned(), width, height, pixels });
+    scene.images.push(Image { name: "image".to_owned(), width, height, pixels, is_linear: false });
     (scene.images.len() - 1) as u32
 }
 

@@ -1,6 +1,6 @@
 //! Boxes that face outwards or inwards.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use serde::Deserialize;
 
 use super::length;
@@ -66,24 +66,31 @@ impl Side {
 
 impl Cuboid {
     pub fn build(&self) -> Checked<Mesh> {
-        faces(self.size, self.sides.as_deref(), |corners| corners)
+        faces(self.size, self.sides.as_deref(), [0, 1, 2, 3], LOWER_LEFT_FIRST)
     }
 }
 
 impl Room {
     pub fn build(&self) -> Checked<Mesh> {
-        faces(self.size, self.sides.as_deref(), |[a, b, c, d]| [a, d, c, b])
+        faces(self.size, self.sides.as_deref(), [0, 3, 2, 1], LOWER_RIGHT_FIRST)
     }
 }
 
-/// Makes two triangles per side. `order` receives a side's corners counter-clockwise seen from outside, and returns
-/// them in the order of the faces.
-fn faces(size: [f32; 3], sides: Option<&[Side]>, order: impl Fn([u32; 4]) -> [u32; 4]) -> Checked<Mesh> {
+/// Texture coordinates of a side's corners, counter-clockwise from the lower left corner of the image.
+const LOWER_LEFT_FIRST: [Vec2; 4] = [Vec2::Y, Vec2::ONE, Vec2::X, Vec2::ZERO];
+/// Texture coordinates of a side's corners, counter-clockwise from the lower right corner of the image.
+const LOWER_RIGHT_FIRST: [Vec2; 4] = [Vec2::ONE, Vec2::X, Vec2::ZERO, Vec2::Y];
+
+/// Makes two triangles per side. `order` names the corners of `Side::corners` in the order of the faces, and `uvs` are
+/// their texture coordinates in this order.
+fn faces(size: [f32; 3], sides: Option<&[Side]>, order: [usize; 4], uvs: [Vec2; 4]) -> Checked<Mesh> {
     let mut mesh = Mesh { positions: corners(size)?, ..Mesh::default() };
     for (slot, side) in sides.unwrap_or(&ALL_SIDES).iter().enumerate() {
-        let [a, b, c, d] = order(side.corners());
-        mesh.push_flat([a, b, c], slot as u32);
-        mesh.push_flat([a, c, d], slot as u32);
+        let corners = order.map(|ix| side.corners()[ix]);
+        for face in [[0, 1, 2], [0, 2, 3]] {
+            mesh.push_flat(face.map(|ix: usize| corners[ix]), slot as u32);
+            mesh.uvs[0].push(face.map(|ix| uvs[ix]));
+        }
     }
     Ok(mesh)
 }

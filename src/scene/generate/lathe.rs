@@ -34,6 +34,8 @@ impl Lathe {
         budget.require(2 * u64::from(segments) * u64::from(steps) * self.profile.len() as u64)?;
         let points = self.profile.iter().map(|[r, y]| profile_point(*r, *y)).collect::<Checked<Vec<DVec2>>>()?;
         let mut mesh = Mesh::default();
+        let n_spans = points.array_windows().filter(|[a, b]| a != b).count() as f32;
+        let mut n_spans_before = 0.0;
         for run in points.chunk_by(|a, b| a != b) {
             let curve = curve(run, steps)?;
             // On the axis, a ring is a single point.
@@ -43,7 +45,12 @@ impl Lathe {
                 let turned = |v: DVec2| v.x * heading(around) + v.y * DVec3::Y;
                 (turned(at), turned(normal))
             };
-            mesh.append(Rings { n_points, cyclic: false }.sweep(point));
+            let mut part = Rings { n_points, cyclic: false }.sweep(point);
+            // Each span between two points of the profile has an equal share of the image's height.
+            let n_spans_of_run = (run.len() - 1) as f32;
+            part.uvs[0].iter_mut().flatten().for_each(|uv| uv.y = (n_spans_before + uv.y * n_spans_of_run) / n_spans);
+            n_spans_before += n_spans_of_run;
+            mesh.append(part);
         }
         Ok(mesh)
     }

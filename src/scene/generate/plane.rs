@@ -1,6 +1,6 @@
 //! Flat shapes: rectangles of fields, and discs. Both lie in the plane y = 0 and face up.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use serde::Deserialize;
 
 use super::{TriangleBudget, count, length, rings::heading};
@@ -47,6 +47,7 @@ impl Plane {
                 mesh.push_flat([back, front + 1, back + 1], i + k);
             }
         }
+        set_uvs(&mut mesh, [width, depth]);
         Ok(mesh)
     }
 }
@@ -64,6 +65,14 @@ impl Disc {
         for ix in 0..n {
             mesh.push_flat([centre, 1 + ix, 1 + (ix + 1) % n], 0);
         }
+        set_uvs(&mut mesh, [2.0 * radius; 2]);
         Ok(mesh)
     }
+}
+
+/// Gives a flat mesh texture coordinates: u grows with x and v with z, from 0 to 1 over the `size` along x and z. From
+/// above, with -z at the top, the image is upright.
+fn set_uvs(mesh: &mut Mesh, size: [f64; 2]) {
+    let uv = |p: Vec3| Vec2::new((f64::from(p.x) / size[0] + 0.5) as f32, (f64::from(p.z) / size[1] + 0.5) as f32);
+    mesh.uvs[0] = mesh.faces.iter().map(|face| face.map(|ix| uv(mesh.positions[ix as usize]))).collect();
 }

@@ -12,7 +12,7 @@
 //! as many triangles as the rings between them have points. The same is true of a surface whose last ring is stitched
 //! to the first. With r rings (poles do not count), every even number of triangles from 6 r is possible.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3, Vec2};
 use rayon::prelude::*;
 
 use crate::scene::{error::Checked, mesh::Mesh};
@@ -51,7 +51,9 @@ impl Rings {
         Ok(Self { n_points: distribute(half(n_triangles)?, &vec![1.0; n_rings as usize])?, cyclic: true })
     }
 
-    /// Makes the mesh. `point` is called with the index of a ring and the position around it, 0 to 1.
+    /// Makes the mesh. `point` is called with the index of a ring and the position around it, 0 to 1. The texture
+    /// coordinate u is the position around the ring, and v grows evenly from the first ring, 0, to the last, 1; on a
+    /// cyclic surface to the first one again. At a pole, u is that of the middle of the triangle's other edge.
     pub fn sweep(&self, point: impl Fn(usize, f64) -> SurfacePoint + Sync) -> Mesh {
         let ring = |(ring, n): (usize, &u32)| {
             (0..*n).map(|ix| point(ring, f64::from(ix) / f64::from(*n))).collect::<Vec<SurfacePoint>>()
@@ -60,8 +62,12 @@ impl Rings {
         let points: Vec<SurfacePoint> = points.into_iter().flatten().collect();
         let mut faces = Vec::with_capacity(self.n_triangles() as usize);
         let first: Vec<u32> = self.n_points.iter().scan(0, |sum, n| Some(std::mem::replace(sum, *sum + n))).collect();
+        let mut uvs = Vec::with_capacity(faces.capacity());
+        let n_pairs = self.pairs().count() as f64;
         for (a, b) in self.pairs() {
-            stitch(&mut faces, (first[a], self.n_points[a]), (first[b], self.n_points[b]));
+            let rows = [a as f64 / n_pairs, (a + 1) as f64 / n_pairs];
+            let uv = |u: f64, row: usize| DVec2::new(u, rows[row]).as_vec2();
+            stitch(&mut faces, &mut uvs, (first[a], self.n_points[a]), (first[b], self.n_points[b]), uv);
         }
         let normals = faces.iter().map(|face: &[u32; 3]| face.map(|ix| points[ix as usize].1.as_vec3())).collect();
         Mesh {
@@ -69,6 +75,7 @@ impl Rings {
             normals,
             slots: vec![0; faces.len()],
             faces,
+            uvs: [uvs, Vec::new()],
             ..Mesh::default()
         }
     }
@@ -115,22 +122,34 @@ fn distribute(total: u32, weights: &[f64]) -> Checked<Vec<u32>> {
 }
 
 /// Adds the strip of triangles between an upper and a lower ring, each given by the index of its first point and its
-/// number of points.
-fn stitch(faces: &mut Vec<[u32; 3]>, (first_a, n_a): (u32, u32), (first_b, n_b): (u32, u32)) {
+/// number of points. `uv` returns the texture coordinates at a position around the upper (0) or lower (1) ring.
+fn stitch(
+    faces: &mut Vec<[u32; 3]>,
+    uvs: &mut Vec<[Vec2; 3]>,
+    (first_a, n_a): (u32, u32),
+    (first_b, n_b): (u32, u32),
+    uv: impl Fn(f64, usize) -> Vec2,
+) {
     let (edges_a, edges_b) = (edges(n_a), edges(n_b));
     let (mut a, mut b) = (0, 0);
+    // A pole is at every position around itself.
+    let uv_a = |at: u64, pole: f64| uv(if n_a == 1 { pole } else { at as f64 / f64::from(n_a) }, 0);
+    let uv_b = |at: u64, pole: f64| uv(if n_b == 1 { pole } else { at as f64 / f64::from(n_b) }, 1);
     while a < edges_a || b < edges_b {
         let at_a = first_a + (a % u64::from(n_a)) as u32;
         let at_b = first_b + (b % u64::from(n_b)) as u32;
         // Advance on the ring whose next edge has its middle further back. The middles are at (a + 1/2) / n_a and
         // (b + 1/2) / n_b.
         let upper = b == edges_b || a < edges_a && (2 * a + 1) * edges_b <= (2 * b + 1) * edges_a;
+        let middle = if upper { (a as f64 + 0.5) / f64::from(n_a) } else { (b as f64 + 0.5) / f64::from(n_b) };
         if upper {
+            faces.push([at_a, at_b, first_a + ((a + 1) % u64::from(n_a)) as u32]);
+            uvs.push([uv_a(a, middle), uv_b(b, middle), uv_a(a + 1, middle)]);
             a += 1;
-            faces.push([at_a, at_b, first_a + (a % u64::from(n_a)) as u32]);
         } else {
+            faces.push([at_b, first_b + ((b + 1) % u64::from(n_b)) as u32, at_a]);
+            uvs.push([uv_b(b, middle), uv_b(b + 1, middle), uv_a(a, middle)]);
             b += 1;
-            faces.push([at_b, first_b + (b % u64::from(n_b)) as u32, at_a]);
         }
     }
 }

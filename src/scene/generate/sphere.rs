@@ -2,7 +2,7 @@
 
 use std::{collections::HashMap, f64::consts::PI};
 
-use glam::DVec3;
+use glam::{DVec3, Vec2, Vec3};
 use serde::Deserialize;
 
 use super::{
@@ -150,8 +150,27 @@ impl Geodesic {
         for (normals, face) in normals.iter_mut().zip(&faces) {
             *normals = face.map(|ix| positions[ix as usize].normalize());
         }
-        Ok(Mesh { positions, faces, normals, slots, ..Mesh::default() })
+        let uvs = normals.iter().map(|normals| spherical_uvs(*normals)).collect();
+        Ok(Mesh { positions, faces, normals, slots, uvs: [uvs, Vec::new()], ..Mesh::default() })
     }
+}
+
+/// Returns the texture coordinates of a triangle on the unit sphere, as [`Rings::sweep`] gives them to a sphere: u is
+/// the angle from +z around the y axis, v that from +y, as shares of the full and the half turn. A triangle across the
+/// seam has u beyond 1. At a pole, u is the mean of the other corners'.
+fn spherical_uvs(corners: [Vec3; 3]) -> [Vec2; 3] {
+    let turn = |p: Vec3| (f64::from(p.x).atan2(f64::from(p.z)) / (2.0 * PI)).rem_euclid(1.0);
+    let vs = corners.map(|p| f64::from(p.y).clamp(-1.0, 1.0).acos() / PI);
+    let is_pole = corners.map(|p| p.x.hypot(p.z) < 1e-6);
+    // Corners are at most half a turn from the middle of the triangle.
+    let middle = turn(corners.iter().sum());
+    let mut us = corners.map(|p| middle + (turn(p) - middle + 0.5).rem_euclid(1.0) - 0.5);
+    let least = (0..3).filter(|ix| !is_pole[*ix]).map(|ix| us[ix]).fold(1.0, f64::min);
+    us = us.map(|u| if least < -1e-6 { u + 1.0 } else { u });
+    if let Some(pole) = is_pole.iter().position(|is_pole| *is_pole) {
+        us[pole] = (us[(pole + 1) % 3] + us[(pole + 2) % 3]) / 2.0;
+    }
+    [0, 1, 2].map(|ix| Vec2::new(us[ix] as f32, vs[ix] as f32))
 }
 
 /// Points on the sphere. Faces that share a point share its index.

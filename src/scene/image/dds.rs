@@ -30,7 +30,7 @@ pub(super) fn header_of(bytes: &[u8]) -> Checked<Header> {
     let is_fine = matches!(storage_of(bytes, &dds)?, Storage::Known(format) if is_fine(format));
     let (decoder_bytes, pixel_bytes) = if is_fine { (16, 8) } else { (4, 4) };
     let (width, height) = (dds.get_width(), dds.get_height());
-    Ok(Header { format: Format::Dds, width, height, decoder_bytes, pixel_bytes })
+    Ok(Header { format: Format::Dds, width, height, decoder_bytes, pixel_bytes, is_linear: is_fine })
 }
 
 /// Decodes a file whose size has been checked.

@@ -27,7 +27,7 @@ pub(in crate::scene) fn normals_of_heights(image: &Image, channel: Channel, scal
         row.iter_mut().enumerate().for_each(|(x, pixel)| *pixel = normal(x, y));
     });
     let name = format!("{} (normals)", image.name);
-    Image { name, width: image.width, height: image.height, pixels: Pixels::Bytes(pixels) }
+    Image { name, width: image.width, height: image.height, pixels: Pixels::Bytes(pixels), is_linear: false }
 }
 
 /// Bounds a slope such that its square is finite. NaN becomes 0.

@@ -14,7 +14,7 @@ use std::{
     panic::{AssertUnwindSafe, catch_unwind},
 };
 
-use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use ::image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 
 pub(super) use self::heights::normals_of_heights;
@@ -51,6 +51,8 @@ struct Header {
     decoder_bytes: u64,
     /// Size of a pixel of the [`Image`].
     pixel_bytes: u64,
+    /// Whether the colours are floats, which are linear.
+    is_linear: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,7 +116,8 @@ fn header_of(image: &Encoded) -> Checked<Header> {
             let (colour, decoder_bytes) = (decoder.color_type(), decoder.color_type().bytes_per_pixel().into());
             let is_bytes = colour.bytes_per_pixel() == colour.channel_count();
             let pixel_bytes = if is_bytes { 4 } else { 8 };
-            Header { format: Format::Common(format), width, height, decoder_bytes, pixel_bytes }
+            let is_linear = matches!(colour, ColorType::Rgb32F | ColorType::Rgba32F);
+            Header { format: Format::Common(format), width, height, decoder_bytes, pixel_bytes, is_linear }
         }
     };
     let Header { width, height, .. } = header;
@@ -166,5 +169,11 @@ fn decode(image: &Encoded, header: &Header) -> Checked<Image> {
             pixels::of_dynamic(decoded, format == ImageFormat::OpenExr)?
         }
     };
-    Ok(Image { name: image.name.clone(), width: header.width, height: header.height, pixels })
+    Ok(Image {
+        name: image.name.clone(),
+        width: header.width,
+        height: header.height,
+        pixels,
+        is_linear: header.is_linear,
+    })
 }

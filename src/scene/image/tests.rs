@@ -202,8 +202,19 @@ fn a_bomb_is_refused_by_its_header() {
     let format = [32, 4, u32::from_le_bytes(*b"DXT1"), 0, 0, 0, 0, 0];
     let error = decoded("a.dds", dds([16_385, 1], format, &[0; 8])).unwrap_err();
     assert!(error.ends_with("has 16385 x 1 pixels, not 1 to 16384 a side"), "{error}");
-    let header =
-        |n| vec![Header { format: Format::Dds, width: 1 << 14, height: 1 << 14, decoder_bytes: 0, pixel_bytes: 0 }; n];
+    let header = |n| {
+        vec![
+            Header {
+                format: Format::Dds,
+                width: 1 << 14,
+                height: 1 << 14,
+                decoder_bytes: 0,
+                pixel_bytes: 0,
+                is_linear: false
+            };
+            n
+        ]
+    };
     assert_eq!(check_sum(header(8).iter()), Ok(()));
     assert!(check_sum(header(9).iter()).unwrap_err().contains("more than 2147483648"));
 }
@@ -257,7 +268,7 @@ fn a_ramp_tilts_the_normal() {
     let ramp = |of: fn(usize, usize) -> usize| {
         let bits = |i: usize| f16::from_f32(of(i % 64, i / 64) as f32 / 8.0).to_bits();
         let pixels = Pixels::Halves((0..64 * 64).map(|i| [0, bits(i), 0, 0]).collect());
-        Image { name: "ramp".to_owned(), width: 64, height: 64, pixels }
+        Image { name: "ramp".to_owned(), width: 64, height: 64, pixels, is_linear: false }
     };
     let stored = |c: f32| (127.5 * c / 5_f32.sqrt() + 127.5).round() as u8;
     let along_u = normals_of_heights(&ramp(|x, _| x), Channel::Green, 0.25);

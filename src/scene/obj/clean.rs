@@ -1,20 +1,55 @@
 //! Checks the text of an OBJ file, statement by statement, and rewrites it into a form that tobj reads correctly.
 //!
-//! tobj 4.0.5 panics on an overflowing normal index, accepts NaN as a coordinate, uses a neighbour's normal where a
-//! corner has none, and ignores `s`. The rewritten text avoids all of this: its numbers are finite, its indices are
-//! absolute and in range, and each run of faces that are shaded alike has its own group, named [`NORMALS`],
-//! [`SMOOTH`] or [`FLAT`].
+//! tobj 4.0.5 panics on an overflowing normal index, accepts NaN as a coordinate, uses a neighbour's normal or texture
+//! coordinates where a corner has none, ignores `s`, and mixes up colours if some points have none. The rewritten text
+//! avoids all of this: its numbers are finite, its indices are absolute and in range, all points have colours or none,
+//! and each run of faces of one kind has its own group, named as [`FaceKind::name`] says.
 
 use std::{borrow::Cow, collections::BTreeMap, fmt::Write};
 
 use crate::scene::error::Checked;
 
-/// Group of faces whose corners all have normals.
-pub const NORMALS: &str = "normals";
-/// Group of faces without normals that are shaded smoothly.
-pub const SMOOTH: &str = "smooth";
-/// Group of faces without normals after `s off`.
-pub const FLAT: &str = "flat";
+/// How a face is shaded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaceShading {
+    /// By the normals that all its corners have.
+    Normals,
+    /// Smoothly, without normals.
+    Smooth,
+    /// Flat, after `s off`.
+    Flat,
+}
+
+/// What the faces of a group have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FaceKind {
+    pub shading: FaceShading,
+    /// Whether all corners have texture coordinates.
+    pub has_uvs: bool,
+}
+
+impl FaceKind {
+    const ALL: [(&str, FaceShading, bool); 6] = [
+        ("normals", FaceShading::Normals, false),
+        ("smooth", FaceShading::Smooth, false),
+        ("flat", FaceShading::Flat, false),
+        ("normals_uvs", FaceShading::Normals, true),
+        ("smooth_uvs", FaceShading::Smooth, true),
+        ("flat_uvs", FaceShading::Flat, true),
+    ];
+
+    /// Returns the name of the group of such faces.
+    fn name(self) -> &'static str {
+        let is_self = |(_, shading, has_uvs): &&_| (*shading, *has_uvs) == (self.shading, self.has_uvs);
+        Self::ALL.iter().find(is_self).expect("all kinds have names").0
+    }
+
+    /// Returns the kind of the faces in a group.
+    pub fn of_group(name: &str) -> Option<Self> {
+        let named = Self::ALL.iter().find(|(known, ..)| *known == name);
+        named.map(|(_, shading, has_uvs)| Self { shading: *shading, has_uvs: *has_uvs })
+    }
+}
 
 /// Keywords of the format that do not concern polygons or their materials.
 const IGNORED: [&str; 31] = [
@@ -54,8 +89,8 @@ const IGNORED: [&str; 31] = [
 /// A checked OBJ file.
 #[derive(Debug, Default)]
 pub struct CleanObj {
-    /// Text for tobj: all positions, all normals, then the faces. The first line names a material library, so that
-    /// tobj calls its material loader.
+    /// Text for tobj: all positions with their colours, all texture coordinates, all normals, then the faces. The first
+    /// line names a material library, so that tobj calls its material loader.
     pub text: String,
     /// Names after `mtllib`, each with its line, counted from 1.
     pub libraries: Vec<(usize, String)>,
@@ -69,12 +104,13 @@ pub struct CleanObj {
 
 /// Checks and rewrites the text of an OBJ file. The error is a line, counted from 1, and what is wrong with it.
 pub fn clean_obj(text: &str) -> Result<CleanObj, (usize, String)> {
-    let mut cleaner = Cleaner { totals: count(text), ..Cleaner::default() };
+    let (totals, has_colours) = count(text);
+    let mut cleaner = Cleaner { totals, has_colours, ..Cleaner::default() };
     for (line, statement) in statements(text) {
         cleaner.statement(line, &statement).map_err(|what| (line, what))?;
     }
-    let Cleaner { mut out, positions, normals, faces, .. } = cleaner;
-    out.text = ["mtllib all\n", &positions, &normals, &faces].concat();
+    let Cleaner { mut out, positions, texcoords, normals, faces, .. } = cleaner;
+    out.text = ["mtllib all\n", &positions, &texcoords, &normals, &faces].concat();
     Ok(out)
 }
 
@@ -119,38 +155,52 @@ impl Counts {
     }
 }
 
-fn count(text: &str) -> Counts {
-    let mut counts = Counts::default();
-    statements(text).for_each(|(_, statement)| counts.add(split_keyword(&statement).0));
-    counts
+/// Returns the numbers of a file's elements, and whether a point has a colour.
+fn count(text: &str) -> (Counts, bool) {
+    let (mut counts, mut has_colours) = (Counts::default(), false);
+    for (_, statement) in statements(text) {
+        let (keyword, rest) = split_keyword(&statement);
+        counts.add(keyword);
+        has_colours |= keyword == "v" && words(rest).count() >= 6;
+    }
+    (counts, has_colours)
 }
+
+/// Returns the words before a comment.
+pub fn words(rest: &str) -> impl Iterator<Item = &str> {
+    rest.split('#').next().unwrap_or_default().split_whitespace()
+}
+
+/// A corner of a face: indices of its position, its texture coordinates and its normal, counted from 1.
+type Corner = (usize, Option<usize>, Option<usize>);
 
 #[derive(Debug, Default)]
 struct Cleaner {
     totals: Counts,
+    /// Whether points without colours get white.
+    has_colours: bool,
     /// Counts up to the current line, from which negative indices count back.
     seen: Counts,
     /// Whether the last `s` statement was `s off`. A file without `s` is smooth except at creases.
     flat: bool,
-    /// The group of the last face.
-    group: &'static str,
+    /// The kind of the last face.
+    kind: Option<FaceKind>,
     positions: String,
+    texcoords: String,
     normals: String,
     faces: String,
-    corners: Vec<(usize, Option<usize>)>,
+    corners: Vec<Corner>,
     out: CleanObj,
 }
 
 impl Cleaner {
     fn statement(&mut self, line: usize, statement: &str) -> Checked<()> {
         let (keyword, rest) = split_keyword(statement);
-        let words = || rest.split('#').next().unwrap_or_default().split_whitespace();
         match keyword {
-            // A weight (used by curves only) or a colour may follow the point.
-            "v" => vector(&mut self.positions, "v", words(), 3..=7)?,
-            "vn" => vector(&mut self.normals, "vn", words(), 3..=3)?,
-            "vt" => vector(&mut String::new(), "vt", words(), 1..=3)?,
-            "f" => self.face(words())?,
+            "v" => self.point(rest)?,
+            "vn" => vector(&mut self.normals, "vn", rest, 3..=3)?,
+            "vt" => self.texcoord(rest)?,
+            "f" => self.face(words(rest))?,
             "s" => self.flat = matches!(rest, "off" | "0"),
             "usemtl" if rest.is_empty() => return Err("usemtl names no material".to_owned()),
             "usemtl" => {
@@ -169,6 +219,27 @@ impl Cleaner {
         Ok(())
     }
 
+    /// Adds a point. A weight (used by curves only) or a colour may follow it, and an opacity, which is ignored.
+    fn point(&mut self, rest: &str) -> Checked<()> {
+        let n_numbers = words(rest).count();
+        if self.has_colours && n_numbers < 6 {
+            let xyz: Vec<&str> = words(rest).take(3).collect();
+            vector(&mut String::new(), "v", rest, 3..=7)?;
+            push(&mut self.positions, format_args!("v {} 1 1 1\n", xyz.join(" ")));
+            return Ok(());
+        }
+        vector(&mut self.positions, "v", rest, 3..=7)
+    }
+
+    /// Adds texture coordinates. v is 0 where there is none, and a third number is ignored.
+    fn texcoord(&mut self, rest: &str) -> Checked<()> {
+        vector(&mut String::new(), "vt", rest, 1..=3)?;
+        let mut numbers = words(rest);
+        let (u, v) = (numbers.next().unwrap_or("0"), numbers.next().unwrap_or("0"));
+        push(&mut self.texcoords, format_args!("vt {u} {v}\n"));
+        Ok(())
+    }
+
     /// Adds a face. It has three or more corners, each of the form `v`, `v/vt`, `v//vn` or `v/vt/vn`.
     fn face<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> Checked<()> {
         self.corners.clear();
@@ -180,31 +251,34 @@ impl Cleaner {
             return Err(format!("a face of {} corners: it needs 3 or more", self.corners.len()));
         }
         self.out.n_triangles += self.corners.len() as u64 - 2;
-        let has_normals = self.corners.iter().all(|(_, normal)| normal.is_some());
-        let group = if has_normals {
-            NORMALS
-        } else if self.flat {
-            FLAT
-        } else {
-            SMOOTH
+        let has_normals = self.corners.iter().all(|(.., normal)| normal.is_some());
+        let has_uvs = self.corners.iter().all(|(_, texcoord, _)| texcoord.is_some());
+        let shading = match (has_normals, self.flat) {
+            (true, _) => FaceShading::Normals,
+            (false, true) => FaceShading::Flat,
+            (false, false) => FaceShading::Smooth,
         };
-        if group != self.group {
-            push(&mut self.faces, format_args!("g {group}\n"));
-            self.group = group;
+        let kind = FaceKind { shading, has_uvs };
+        if self.kind != Some(kind) {
+            push(&mut self.faces, format_args!("g {}\n", kind.name()));
+            self.kind = Some(kind);
         }
         self.faces.push('f');
-        for (position, normal) in &self.corners {
-            match normal {
-                Some(normal) if has_normals => push(&mut self.faces, format_args!(" {position}//{normal}")),
-                _ => push(&mut self.faces, format_args!(" {position}")),
+        for (position, texcoord, normal) in &self.corners {
+            match (texcoord.filter(|_| has_uvs), normal.filter(|_| has_normals)) {
+                (None, None) => push(&mut self.faces, format_args!(" {position}")),
+                (Some(texcoord), None) => push(&mut self.faces, format_args!(" {position}/{texcoord}")),
+                (None, Some(normal)) => push(&mut self.faces, format_args!(" {position}//{normal}")),
+                (Some(texcoord), Some(normal)) => {
+                    push(&mut self.faces, format_args!(" {position}/{texcoord}/{normal}"))
+                }
             }
         }
         self.faces.push('\n');
         Ok(())
     }
 
-    /// Returns the indices of one corner's position and normal, counted from 1.
-    fn corner(&self, word: &str) -> Checked<(usize, Option<usize>)> {
+    fn corner(&self, word: &str) -> Checked<Corner> {
         let mut parts = word.split('/');
         let position = parts.next().unwrap_or_default();
         let texcoord = parts.next().filter(|part| !part.is_empty());
@@ -214,11 +288,10 @@ impl Cleaner {
         }
         let (seen, totals) = (&self.seen, &self.totals);
         let position = index(position, "vertex", seen.positions, totals.positions)?;
-        if let Some(texcoord) = texcoord {
-            index(texcoord, "texture vertex", seen.texcoords, totals.texcoords)?;
-        }
+        let texcoord =
+            texcoord.map(|word| index(word, "texture vertex", seen.texcoords, totals.texcoords)).transpose()?;
         let normal = normal.map(|word| index(word, "normal", seen.normals, totals.normals)).transpose()?;
-        Ok((position, normal))
+        Ok((position, texcoord, normal))
     }
 }
 
@@ -232,27 +305,22 @@ fn index(word: &str, what: &str, seen: usize, total: usize) -> Checked<usize> {
     }
 }
 
-/// Writes the keyword and the first three of the numbers in `words`. Fails if a number is not finite, or if there are
-/// more or fewer numbers than `counts` allows.
-fn vector<'a>(
-    out: &mut String,
-    keyword: &str,
-    words: impl Iterator<Item = &'a str>,
-    counts: std::ops::RangeInclusive<usize>,
-) -> Checked<()> {
-    let mut n_words = 0;
+/// Writes the keyword and the first three of the numbers in `rest`, or six if there are that many. Fails if a number is
+/// not finite, or if there are more or fewer numbers than `counts` allows.
+fn vector(out: &mut String, keyword: &str, rest: &str, counts: std::ops::RangeInclusive<usize>) -> Checked<()> {
+    let n_words = words(rest).count();
+    let n_written = if n_words < 6 { 3 } else { 6 };
     out.push_str(keyword);
-    for word in words {
+    for (ix, word) in words(rest).enumerate() {
         match word.parse::<f32>() {
             Ok(number) if number.is_finite() => {}
             Ok(_) => return Err(format!("`{word}` is not a finite number of single precision")),
             Err(_) => return Err(format!("`{word}` is not a number")),
         }
-        if n_words < 3 {
+        if ix < n_written {
             out.push(' ');
             out.push_str(word);
         }
-        n_words += 1;
     }
     out.push('\n');
     if counts.contains(&n_words) {

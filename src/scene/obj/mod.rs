@@ -1,19 +1,23 @@
 //! Wavefront OBJ files with their MTL materials.
 
 mod clean;
+mod files;
+mod maps;
 mod mtl;
 
-use std::path::Path;
+use std::{collections::HashMap, path::Path};
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
-use self::clean::{CleanObj, NORMALS, SMOOTH, clean_obj};
-pub(super) use self::mtl::{Library, named_libraries};
+use self::clean::{CleanObj, FaceKind, FaceShading, clean_obj};
+pub(super) use self::{files::named_files, mtl::Library};
 use super::{
     error::SceneError,
     mesh::Mesh,
     needs::require_for_triangles,
+    polygon::Triangulator,
     smooth::{Shading, crease_normals},
+    texture::linear_of_srgb,
 };
 
 /// Makes a mesh from an OBJ file's text, and reads its materials. A face's slot is an index into the library. A face
@@ -29,51 +33,76 @@ pub(super) fn parse_obj(
     let required = require_for_triangles(n_loaded as u64, clean.n_triangles);
     required.map_err(|what| SceneError::file(path, what))?;
     let library = mtl::load_libraries(path, &clean.libraries)?;
-    warn(path, &clean, &library);
-    let models = parse(&clean, &library).map_err(|e| SceneError::file(path, e.to_string()))?;
+    if let Some((line, statement)) = &clean.unknown {
+        tracing::warn!("{}:{line}: unknown statement `{}`", path.display(), statement.escape_debug());
+    }
+    let by_name = used_materials(path, &clean, &library);
+    let models = parse(&clean, by_name).map_err(|e| SceneError::file(path, e.to_string()))?;
     Ok((mesh(&models, library.materials.len() as u32, shading), library))
 }
 
-/// Warns of the first unknown statement, and of the first material, by name, that is used but not defined. Further
-/// ones are not reported.
-fn warn(path: &Path, clean: &CleanObj, library: &Library) {
+/// Returns the indices of the used materials in the library. A name that differs from that of one material in the case
+/// of letters alone stands for it. Warns of the first such name, and of the first name that no library defines;
+/// further ones are not reported.
+fn used_materials(path: &Path, clean: &CleanObj, library: &Library) -> HashMap<String, usize> {
     let path = path.display();
-    if let Some((line, statement)) = &clean.unknown {
-        tracing::warn!("{path}:{line}: unknown statement `{}`", statement.escape_debug());
+    let mut by_lower: HashMap<String, Vec<usize>> = HashMap::new();
+    for (ix, material) in library.materials.iter().enumerate() {
+        by_lower.entry(material.name.to_lowercase()).or_default().push(ix);
     }
-    if let Some((name, line)) = clean.used_materials.iter().find(|(name, _)| !library.has(name)) {
-        tracing::warn!(
-            "{path}:{line}: no library defines material `{}`: it becomes the default one",
-            name.escape_debug()
-        );
+    let (mut by_name, mut undefined, mut other_case) = (HashMap::new(), None, None);
+    for (name, line) in &clean.used_materials {
+        let alike = by_lower.get(&name.to_lowercase()).map_or(&[][..], |alike| alike);
+        // If several materials have the same name, the last one counts.
+        let exact = alike.iter().rev().find(|ix| library.materials[**ix].name == *name);
+        let Some(ix) = exact.or(alike.last()) else {
+            undefined = undefined.or(Some((name, line)));
+            continue;
+        };
+        let found = &library.materials[*ix].name;
+        if exact.is_none() && alike.iter().any(|ix| library.materials[*ix].name != *found) {
+            undefined = undefined.or(Some((name, line)));
+            continue;
+        }
+        if exact.is_none() {
+            other_case = other_case.or(Some((name, line, found)));
+        }
+        by_name.insert(name.clone(), *ix);
     }
+    if let Some((name, line)) = undefined {
+        let name = name.escape_debug();
+        tracing::warn!("{path}:{line}: no library defines material `{name}`: it becomes the default one");
+    }
+    if let Some((name, line, found)) = other_case {
+        let (name, found) = (name.escape_debug(), found.escape_debug());
+        tracing::warn!("{path}:{line}: no library defines material `{name}`: `{found}` is taken");
+    }
+    by_name
 }
 
-fn parse(clean: &CleanObj, library: &Library) -> Result<Vec<tobj::Model>, tobj::LoadError> {
-    let options =
-        tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
-    let by_name = library.materials.iter().map(|material| material.name.clone()).zip(0..).collect();
+fn parse(clean: &CleanObj, by_name: HashMap<String, usize>) -> Result<Vec<tobj::Model>, tobj::LoadError> {
+    let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     // tobj needs the materials only for their names; the materials themselves are in the library.
+    let by_name = by_name.into_iter().collect();
     let materials = |_: &Path| Ok((vec![tobj::Material::default()], std::clone::Clone::clone(&by_name)));
     tobj::load_obj_buf(&mut clean.text.as_bytes(), &options, materials).map(|(models, _)| models)
 }
 
-/// Joins all models into one mesh. tobj has cut polygons into fans.
+/// Joins all models into one mesh. All faces of a model are of one kind.
 fn mesh(models: &[tobj::Model], no_material: u32, shading: Shading) -> Mesh {
     let mut mesh = Mesh::default();
     let mut to_smooth = Vec::new();
+    let mut triangulator = Triangulator::default();
+    // Some writers state colours as 0 to 255.
+    let largest = models.iter().flat_map(|model| &model.mesh.vertex_color).fold(0.0, |a: f32, b| a.max(*b));
+    let colour_scale = if largest > 1.0 { 255.0 } else { 1.0 };
     for tobj::Model { mesh: model, name } in models {
-        let first = mesh.positions.len() as u32;
-        mesh.positions.extend(model.positions.as_chunks().0.iter().copied().map(Vec3::from_array));
-        mesh.faces.extend(model.indices.as_chunks::<3>().0.iter().map(|face| face.map(|ix| first + ix)));
-        let n_faces = mesh.faces.len();
-        mesh.slots.resize(n_faces, model.material_id.map_or(no_material, |ix| ix as u32));
-        to_smooth.resize(n_faces, shading.smooth && name == SMOOTH);
-        if shading.smooth && name == NORMALS {
-            let normal = |ix: u32| Vec3::from_slice(&model.normals[ix as usize * 3..]).normalize_or_zero();
-            mesh.normals.extend(model.normal_indices.as_chunks::<3>().0.iter().map(|face| face.map(normal)));
-        }
-        mesh.normals.resize(n_faces, [Vec3::ZERO; 3]);
+        let kind = FaceKind::of_group(name).unwrap_or(FaceKind { shading: FaceShading::Smooth, has_uvs: false });
+        let corners = triangles(model, &mut triangulator);
+        let part = part(model, &corners, kind, shading, colour_scale);
+        to_smooth.extend(corners.iter().map(|_| shading.smooth && kind.shading == FaceShading::Smooth));
+        let slot = model.material_id.map_or(no_material, |ix| ix as u32);
+        mesh.append(Mesh { slots: vec![slot; corners.len()], ..part });
     }
     if to_smooth.contains(&true) {
         let computed = crease_normals(&mesh.positions, &mesh.faces, &to_smooth, shading.crease);
@@ -82,4 +111,53 @@ fn mesh(models: &[tobj::Model], no_material: u32, shading: Shading) -> Mesh {
         }
     }
     mesh
+}
+
+/// Cuts the polygons of a model into triangles. Returns the numbers of their corners in the model's lists of indices.
+fn triangles(model: &tobj::Mesh, triangulator: &mut Triangulator) -> Vec<[usize; 3]> {
+    let mut triangles = Vec::with_capacity(model.indices.len() / 3);
+    let all_triangles = std::iter::repeat_n(3, if model.face_arities.is_empty() { model.indices.len() / 3 } else { 0 });
+    let (mut first, mut polygon) = (0, Vec::new());
+    for n_corners in all_triangles.chain(model.face_arities.iter().map(|n| *n as usize)) {
+        let indices = &model.indices[first..first + n_corners];
+        polygon.clear();
+        polygon.extend(indices.iter().map(|ix| Vec3::from_slice(&model.positions[*ix as usize * 3..])));
+        triangulator.cut(&polygon, |corners| triangles.push(corners.map(|corner| first + corner)));
+        first += n_corners;
+    }
+    triangles
+}
+
+/// Makes the mesh of a model without its slots. `corners` are the corners of its triangles.
+fn part(model: &tobj::Mesh, corners: &[[usize; 3]], kind: FaceKind, shading: Shading, colour_scale: f32) -> Mesh {
+    let point = |corner: usize| model.indices[corner];
+    let normal = |corner: usize| {
+        let ix = model.normal_indices[corner] as usize;
+        Vec3::from_slice(&model.normals[ix * 3..]).normalize_or_zero()
+    };
+    let uv = |corner: usize| {
+        let ix = model.texcoord_indices[corner] as usize;
+        // The origin of OBJ's coordinates is the lower left corner of the image.
+        Vec2::new(model.texcoords[ix * 2], 1.0 - model.texcoords[ix * 2 + 1])
+    };
+    let colour = |corner: usize| {
+        let colour = Vec3::from_slice(&model.vertex_color[point(corner) as usize * 3..]) / colour_scale;
+        Vec3::from_array(colour.to_array().map(linear_of_srgb)).extend(1.0)
+    };
+    let mut part = Mesh {
+        positions: model.positions.as_chunks().0.iter().copied().map(Vec3::from_array).collect(),
+        faces: corners.iter().map(|face| face.map(point)).collect(),
+        normals: vec![[Vec3::ZERO; 3]; corners.len()],
+        ..Mesh::default()
+    };
+    if shading.smooth && kind.shading == FaceShading::Normals {
+        part.normals = corners.iter().map(|face| face.map(normal)).collect();
+    }
+    if kind.has_uvs {
+        part.uvs[0] = corners.iter().map(|face| face.map(uv)).collect();
+    }
+    if !model.vertex_color.is_empty() {
+        part.colours = corners.iter().map(|face| face.map(colour)).collect();
+    }
+    part
 }

@@ -3,94 +3,222 @@
 //! A colour of one number is a grey in MTL, but tobj 4.0.5 panics on it; so it is rewritten as three numbers.
 
 use std::{
-    borrow::Cow,
+    collections::{HashMap, HashSet},
     fmt::Write,
     path::{Path, PathBuf},
 };
 
-use super::clean::{split_keyword, statements};
+use super::{
+    clean::{split_keyword, statements, words},
+    files::{library_files, map_file},
+    maps::{MapKind, MapOptions, Term, set_map},
+};
 use crate::scene::{
     error::{Checked, SceneError},
-    material::{Material, MaterialSpec},
+    image_files::{ImageFiles, Images, NamedFile},
+    material::{Alpha, Clearcoat, Material, MaterialSpec, Microfacet, Sheen},
     read::read_lossy,
+    texture::{Channel, Image},
 };
 
-/// Materials of MTL files. If several have the same name, the last one counts.
+/// Roughness of a material that states how metallic it is, and nothing about its roughness.
+const DEFAULT_ROUGHNESS: f32 = 0.5;
+
+/// Materials of MTL files, and the images that they use. If several materials have the same name, the last one counts.
 #[derive(Clone, Debug, Default)]
 pub struct Library {
     pub materials: Vec<Material>,
+    pub images: Vec<Image>,
 }
 
-impl Library {
-    /// Returns whether there is a material of this name.
-    pub fn has(&self, name: &str) -> bool {
-        self.materials.iter().any(|material| material.name == name)
-    }
+/// A material as its file describes it.
+#[derive(Debug)]
+struct Described {
+    spec: MaterialSpec,
+    name: String,
+    path: PathBuf,
+    more: More,
 }
 
-/// Reads the files that the `mtllib` lines of an OBJ file name, relative to its folder. Warns of a file that does not
-/// exist.
+/// What tobj does not read of a material.
+#[derive(Debug, Default)]
+struct More {
+    /// Pr, Pm, Ps, Pc and Pcr by their keywords.
+    numbers: HashMap<String, f32>,
+    maps: Vec<Map>,
+}
+
+/// A map of a material.
+#[derive(Debug)]
+struct Map {
+    line: usize,
+    term: Term,
+    options: MapOptions,
+    /// Index of the image's file.
+    file: usize,
+}
+
+/// Reads the files that the `mtllib` lines of an OBJ file name, relative to its folder. Warns of files that do not
+/// exist, and of names that leave the folder.
 pub fn load_libraries(obj: &Path, libraries: &[(usize, String)]) -> Result<Library, SceneError> {
-    let mut library = Library::default();
     let folder = obj.parent().unwrap_or(Path::new(""));
+    let (mut described, mut images) = (Vec::new(), ImageFiles::default());
+    let mut read = HashSet::new();
     for (line, rest) in libraries {
-        for file in library_files(folder, rest).map_err(|what| SceneError::line(obj, *line, what))? {
-            if file.exists() {
-                load_library(&file, &mut library)?;
-            } else {
-                let (obj, file) = (obj.display(), file.display());
-                tracing::warn!("{obj}:{line}: {file} does not exist: its materials become the default one");
+        for file in library_files(folder, rest) {
+            let warn = |what: &str| tracing::warn!("{}:{line}: {what}", obj.display());
+            match file {
+                Err(what) => warn(&format!("mtllib {}", what.escape_debug())),
+                Ok(NamedFile { path, .. }) if !path.exists() => {
+                    warn(&format!("{} does not exist: its materials become the default one", path.display()));
+                }
+                Ok(NamedFile { path, is_other_case }) => {
+                    if is_other_case {
+                        warn(&format!("mtllib `{}`: {} is taken", rest.escape_debug(), path.display()));
+                    }
+                    if read.insert(path.clone()) {
+                        described.extend(load_library(folder, &path, &mut images)?);
+                    }
+                }
             }
         }
     }
-    Ok(library)
+    materials(described, images)
 }
 
-/// Returns the files that the `mtllib` statements of an OBJ file's text name. Names that are refused are left out.
-pub fn named_libraries(obj: &Path, text: &str) -> Vec<PathBuf> {
-    let folder = obj.parent().unwrap_or(Path::new(""));
-    let files = |(_, statement): (usize, Cow<str>)| match split_keyword(&statement) {
-        ("mtllib", rest) => library_files(folder, rest).unwrap_or_default(),
-        _ => Vec::new(),
-    };
-    statements(text).flat_map(files).collect()
-}
-
-/// Returns the files that a `mtllib` line names. The rest of the line is one name, possibly with spaces, if such a
-/// file exists; otherwise it is a list of names.
-fn library_files(folder: &Path, rest: &str) -> Checked<Vec<PathBuf>> {
-    let whole = inside(folder, rest)?;
-    if whole.exists() {
-        return Ok(vec![whole]);
-    }
-    rest.split_whitespace().map(|name| inside(folder, name)).collect()
-}
-
-/// Returns the path of a file below the folder. Backslashes count as separators, as in files from Windows.
-fn inside(folder: &Path, name: &str) -> Checked<PathBuf> {
-    let climbs = name.split(['/', '\\']).any(|part| part == "..");
-    let is_absolute = name.starts_with(['/', '\\']) || name.chars().nth(1) == Some(':');
-    if climbs || is_absolute {
-        return Err(format!("mtllib `{name}` leaves the folder of the OBJ file: it is not read"));
-    }
-    Ok(folder.join(name.replace('\\', "/")))
-}
-
-fn load_library(path: &Path, library: &mut Library) -> Result<(), SceneError> {
+fn load_library(root: &Path, path: &Path, images: &mut ImageFiles) -> Result<Vec<Described>, SceneError> {
     let text = read_lossy(path)?;
     let clean = clean_mtl(&text).map_err(|(line, what)| SceneError::line(path, line, what))?;
+    let more = read_more(root, path, &text, images).map_err(|(line, what)| SceneError::line(path, line, what))?;
     let (materials, _) =
         tobj::load_mtl_buf(&mut clean.as_bytes()).map_err(|e| SceneError::file(path, e.to_string()))?;
-    for material in materials {
-        let spec = spec(&material);
-        let named = |what| SceneError::file(path, format!("material `{}`: {what}", material.name));
-        library.materials.push(spec.material(&material.name).map_err(named)?);
+    let described = |(material, more): (tobj::Material, More)| Described {
+        spec: spec(&material),
+        name: material.name,
+        path: path.to_owned(),
+        more,
+    };
+    Ok(materials.into_iter().zip(more).map(described).collect())
+}
+
+/// Reads the maps and the physically based terms, one entry for each material. Warns of maps that are not shown: once
+/// for each kind, and once for each file that is missing or has another name.
+fn read_more(root: &Path, path: &Path, text: &str, images: &mut ImageFiles) -> Result<Vec<More>, (usize, String)> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut materials: Vec<More> = Vec::new();
+    let mut told: HashSet<String> = HashSet::new();
+    let mut warn = |line: usize, key: &str, what: String| {
+        if told.insert(key.to_owned()) {
+            tracing::warn!("{}:{line}: {}", path.display(), what.escape_debug());
+        }
+    };
+    let maps_colour = statements(text).any(|(_, s)| split_keyword(&s).0.eq_ignore_ascii_case("map_Kd"));
+    for (line, statement) in statements(text) {
+        let (keyword, rest) = split_keyword(&statement);
+        if keyword == "newmtl" {
+            materials.push(More::default());
+        }
+        let Some(material) = materials.last_mut() else { continue };
+        if matches!(keyword, "Pr" | "Pm" | "Ps" | "Pc" | "Pcr") {
+            material.numbers.insert(keyword.to_owned(), fraction(keyword, rest).map_err(|what| (line, what))?);
+        }
+        let term = match MapKind::of(keyword) {
+            MapKind::None => continue,
+            // The ambient term has the colours of map_Kd.
+            MapKind::NotShown if keyword.eq_ignore_ascii_case("map_Ka") && maps_colour => continue,
+            MapKind::NotShown => {
+                warn(line, keyword, format!("`{keyword}` is not shown"));
+                continue;
+            }
+            MapKind::Shown(term) => term,
+        };
+        let found = MapOptions::new(rest).and_then(|options| Ok((map_file(root, folder, &options.name)?, options)));
+        match found {
+            Err(what) => warn(line, rest, format!("`{keyword}` is not shown: {what}")),
+            Ok((NamedFile { path, is_other_case }, options)) => {
+                if is_other_case {
+                    warn(line, &options.name, format!("`{}`: {} is taken", options.name, path.display()));
+                }
+                material.maps.push(Map { line, term, options, file: images.add(path) });
+            }
+        }
     }
-    Ok(())
+    Ok(materials)
+}
+
+/// Returns the first number, clamped to 0 to 1.
+fn fraction(keyword: &str, rest: &str) -> Checked<f32> {
+    let word = words(rest).next().unwrap_or_default();
+    finite(keyword, word).map(|number| number.clamp(0.0, 1.0))
+}
+
+/// Decodes the images and makes the materials. Warns of each image that cannot be read.
+fn materials(described: Vec<Described>, images: ImageFiles) -> Result<Library, SceneError> {
+    let decoded = images.decode();
+    let mut told = HashSet::new();
+    for (path, map) in described.iter().flat_map(|d| d.more.maps.iter().map(|map| (&d.path, map))) {
+        if let Some(Err(what)) = decoded.get(map.file).filter(|_| told.insert(map.file)) {
+            tracing::warn!("{}:{}: the image is not shown: {}", path.display(), map.line, what.escape_debug());
+        }
+    }
+    let mut images = Images::new(decoded.into_iter().map(Result::ok).collect());
+    let mut materials = Vec::new();
+    for Described { spec, name, path, more } in described {
+        let named = |what| SceneError::file(&path, format!("material `{name}`: {what}"));
+        materials.push(material(spec, &name, &more, &mut images).map_err(named)?);
+    }
+    Ok(Library { materials, images: images.finish() })
+}
+
+/// Makes a material. A colour that is stated by its map alone is white.
+fn material(mut spec: MaterialSpec, name: &str, more: &More, images: &mut Images) -> Checked<Material> {
+    let maps = || more.maps.iter().filter(|map| images.get(map.file).is_some());
+    let has_map = |term: Term| maps().any(|map| map.term == term);
+    let white = |colour: &mut Option<[f32; 3]>, term: Term| {
+        if colour.is_none() && has_map(term) {
+            *colour = Some([1.0; 3]);
+        }
+    };
+    white(&mut spec.kd, Term::BaseColour);
+    white(&mut spec.ks, Term::Specular);
+    white(&mut spec.ke, Term::Emission);
+    let (has_roughness, has_metal) = (has_map(Term::Roughness), has_map(Term::Metallic));
+    let has_opacity = has_map(Term::Opacity) || has_map(Term::Transparency);
+    let mut material = spec.material(name)?;
+    let number = |keyword: &str| more.numbers.get(keyword).copied();
+    material.clearcoat = Clearcoat { factor: number("Pc").unwrap_or(0.0), roughness: number("Pcr").unwrap_or(0.0) };
+    material.sheen = Sheen { colour: glam::Vec3::splat(number("Ps").unwrap_or(0.0)), ..Sheen::default() };
+    if number("Pr").is_some() || number("Pm").is_some() || has_roughness || has_metal {
+        material.microfacet = Some(Microfacet {
+            roughness: number("Pr").unwrap_or(if has_roughness { 1.0 } else { DEFAULT_ROUGHNESS }),
+            metallic: number("Pm").unwrap_or(if has_metal { 1.0 } else { 0.0 }),
+            transmission: if material.lobes.refraction { 1.0 } else { 0.0 },
+            is_solid: material.lobes.refraction,
+            ..Microfacet::default()
+        });
+        material.ks = glam::Vec3::ONE;
+        // The opacity of an image of colours is not meant unless map_d names it.
+        if !has_opacity && material.d == 1.0 {
+            material.alpha = Alpha::Opaque;
+        }
+    }
+    for map in &more.maps {
+        if images.get(map.file).is_some() {
+            set_map(&mut material, map.term, &map.options, images, map.file);
+        }
+    }
+    // The image of the base colour has this opacity already.
+    let maps = &mut material.maps;
+    if let (Some(_), Some(base), Some(opacity)) = (material.microfacet, &maps.base_colour, &maps.opacity)
+        && (opacity.image_ix, opacity.channel) == (base.image_ix, Channel::Alpha)
+    {
+        maps.opacity = None;
+    }
+    Ok(material)
 }
 
 /// Returns the statements of the terms that are rendered. Numbers are checked and greys are written as three numbers.
-/// Textures and all other statements are left out.
+/// Maps and all other statements are left out.
 fn clean_mtl(text: &str) -> Result<String, (usize, String)> {
     let mut clean = String::new();
     for (line, statement) in statements(text) {
@@ -107,11 +235,6 @@ fn clean_mtl(text: &str) -> Result<String, (usize, String)> {
         writeln!(clean, "{keyword} {cleaned}").expect("a String takes what it is given");
     }
     Ok(clean)
-}
-
-/// Returns the words before a comment.
-fn words(rest: &str) -> impl Iterator<Item = &str> {
-    rest.split('#').next().unwrap_or_default().split_whitespace()
 }
 
 /// Returns `r g b`. One number alone is a grey.
@@ -142,9 +265,9 @@ fn illum(rest: &str) -> Checked<String> {
     }
 }
 
-fn finite(keyword: &str, word: &str) -> Checked<()> {
+fn finite(keyword: &str, word: &str) -> Checked<f32> {
     match word.parse::<f32>() {
-        Ok(number) if number.is_finite() => Ok(()),
+        Ok(number) if number.is_finite() => Ok(number),
         _ => Err(format!("{keyword} `{word}` is not a finite number")),
     }
 }
@@ -166,5 +289,6 @@ fn spec(material: &tobj::Material) -> MaterialSpec {
         // Files often have both; the format documents only d.
         tr: unknown("Tr").filter(|_| material.dissolve.is_none()).and_then(|tr| tr.first().copied()),
         illum: material.illumination_model,
+        ..MaterialSpec::default()
     }
 }

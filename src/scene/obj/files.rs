@@ -1,0 +1,64 @@
+//! Files that OBJ and MTL files name.
+
+use std::path::{Path, PathBuf};
+
+use super::{
+    clean::{split_keyword, statements},
+    maps::{MapKind, MapOptions},
+};
+use crate::scene::{
+    error::Checked,
+    image_files::{NamedFile, named_file},
+    read::read_lossy,
+};
+
+/// Returns the files that the `mtllib` statements of an OBJ file's text name, and the images that these name. Names
+/// that are refused are left out.
+pub fn named_files(obj: &Path, text: &str) -> Vec<PathBuf> {
+    let folder = obj.parent().unwrap_or(Path::new(""));
+    let mut files = Vec::new();
+    for (_, statement) in statements(text) {
+        if let ("mtllib", rest) = split_keyword(&statement) {
+            files.extend(library_files(folder, rest).into_iter().flatten().map(|file| file.path));
+        }
+    }
+    let images: Vec<PathBuf> = files.iter().flat_map(|mtl| named_images(folder, mtl)).collect();
+    files.into_iter().chain(images).collect()
+}
+
+/// Returns the images that an MTL file names.
+fn named_images(root: &Path, mtl: &Path) -> Vec<PathBuf> {
+    let text = read_lossy(mtl).unwrap_or_default();
+    let folder = mtl.parent().unwrap_or(Path::new(""));
+    let file = |statement: &str| match split_keyword(statement) {
+        (keyword, rest) if matches!(MapKind::of(keyword), MapKind::Shown(_)) => {
+            map_file(root, folder, &MapOptions::new(rest).ok()?.name).ok().map(|file| file.path)
+        }
+        _ => None,
+    };
+    statements(&text).filter_map(|(_, statement)| file(&statement)).collect()
+}
+
+/// Returns the files that a `mtllib` line names. The rest of the line is one name, possibly with spaces, if such a
+/// file exists; otherwise it is a list of names.
+pub fn library_files(folder: &Path, rest: &str) -> Vec<Checked<NamedFile>> {
+    let find = |name: &str| named_file(folder, folder, name.trim_matches('"'));
+    match find(rest) {
+        Ok(whole) if whole.path.is_file() => vec![Ok(whole)],
+        _ => rest.split_whitespace().map(find).collect(),
+    }
+}
+
+/// Returns the file of a map. Writers often state absolute names of their own machine: where a name leaves the folder
+/// of the OBJ file, a file of the same name beside the MTL file is taken. A comment may follow the name.
+pub fn map_file(root: &Path, folder: &Path, name: &str) -> Checked<NamedFile> {
+    let exists = |file: &Checked<NamedFile>| file.as_ref().is_ok_and(|file| file.path.is_file());
+    let whole = named_file(root, folder, name);
+    if exists(&whole) {
+        return whole;
+    }
+    let name = name.split_once(" #").map_or(name, |(name, _)| name.trim_end().trim_end_matches('"'));
+    let without_comment = named_file(root, folder, name);
+    let beside = named_file(root, folder, name.rsplit(['/', '\\']).next().unwrap_or_default());
+    if without_comment.is_err() && exists(&beside) { beside } else { without_comment }
+}

@@ -1,0 +1,163 @@
+//! Vertices of PLY files, with the colours and texture coordinates that some have.
+
+use std::fmt;
+
+use glam::{Vec2, Vec3, Vec4};
+use serde::{
+    Deserialize, Deserializer,
+    de::{IgnoredAny, MapAccess, Visitor},
+};
+use serde_ply::{ElementDef, PlyReader, PropertyType, ScalarType};
+
+use super::text;
+use crate::scene::{error::Checked, texture::linear_of_srgb};
+
+/// Vertices; a list that the file lacks is empty.
+#[derive(Debug, Default)]
+pub struct Vertices {
+    pub positions: Vec<Vec3>,
+    /// Unit normals, or zero.
+    pub normals: Vec<Vec3>,
+    /// Linear RGB and opacity.
+    pub colours: Vec<Vec4>,
+    /// Texture coordinates, (0, 0) at the upper left corner of the image.
+    pub uvs: Vec<Vec2>,
+}
+
+/// Point with its normal, which is zero if the file has none.
+#[derive(Deserialize)]
+struct Plain {
+    x: f32,
+    y: f32,
+    z: f32,
+    #[serde(default)]
+    nx: f32,
+    #[serde(default)]
+    ny: f32,
+    #[serde(default)]
+    nz: f32,
+}
+
+/// Names of properties. Writers use several for one thing.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(field_identifier, rename_all = "snake_case")]
+enum Property {
+    X,
+    Y,
+    Z,
+    Nx,
+    Ny,
+    Nz,
+    #[serde(alias = "diffuse_red", alias = "r")]
+    Red,
+    #[serde(alias = "diffuse_green", alias = "g")]
+    Green,
+    #[serde(alias = "diffuse_blue", alias = "b")]
+    Blue,
+    #[serde(alias = "diffuse_alpha", alias = "a")]
+    Alpha,
+    #[serde(alias = "u", alias = "texture_u")]
+    S,
+    #[serde(alias = "v", alias = "texture_v")]
+    T,
+    #[serde(other)]
+    Other,
+}
+
+/// Number of properties that are read.
+const N_PROPERTIES: usize = Property::Other as usize;
+/// Names of the red part of a colour, and of the first texture coordinate.
+const REDS: [&str; 3] = ["red", "diffuse_red", "r"];
+const FIRST_UVS: [&str; 3] = ["s", "u", "texture_u"];
+
+/// The numbers of a vertex, by property.
+struct Painted([f32; N_PROPERTIES]);
+
+impl<'de> Deserialize<'de> for Painted {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(PaintedVisitor)
+    }
+}
+
+struct PaintedVisitor;
+
+impl<'de> Visitor<'de> for PaintedVisitor {
+    type Value = Painted;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("a vertex")
+    }
+
+    fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<Painted, M::Error> {
+        let mut numbers = [0.0; N_PROPERTIES];
+        while let Some(property) = map.next_key::<Property>()? {
+            match property {
+                Property::Other => drop(map.next_value::<IgnoredAny>()?),
+                property => numbers[property as usize] = map.next_value()?,
+            }
+        }
+        Ok(Painted(numbers))
+    }
+}
+
+impl Vertices {
+    /// Reads the vertices, the element that comes next in the file.
+    pub fn read(reader: &mut PlyReader<&[u8]>, element: &ElementDef) -> Checked<Self> {
+        let failed = |error| format!("element `vertex`: {}", text(&error));
+        let has = |name: &&str| element.has_property(name);
+        let has_normals = ["nx", "ny", "nz"].iter().all(has);
+        let (red, has_uvs) = (REDS.iter().find(|name| has(name)), FIRST_UVS.iter().any(has));
+        let mut vertices = Self::default();
+        if red.is_none() && !has_uvs {
+            let plain: Vec<Plain> = reader.next_element().map_err(failed)?;
+            vertices.positions = plain.iter().map(|v| Vec3::new(v.x, v.y, v.z)).collect();
+            if has_normals {
+                vertices.normals = plain.iter().map(|v| Vec3::new(v.nx, v.ny, v.nz).normalize_or_zero()).collect();
+            }
+            return Ok(vertices);
+        }
+        let painted: Vec<Painted> = reader.next_element().map_err(failed)?;
+        let three = |p: &Painted, first: Property| Vec3::from_slice(&p.0[first as usize..]);
+        vertices.positions = painted.iter().map(|p| three(p, Property::X)).collect();
+        if has_normals {
+            vertices.normals = painted.iter().map(|p| three(p, Property::Nx).normalize_or_zero()).collect();
+        }
+        if let Some(red) = red {
+            let has_alpha = ["alpha", "diffuse_alpha", "a"].iter().any(has);
+            let colours = painted.iter().map(|p| Vec4::from_slice(&p.0[Property::Red as usize..]));
+            let one = largest_colour(element, red, colours.clone());
+            let linear = |colour: Vec4| {
+                let rgb = Vec3::from_array((colour.truncate() / one).to_array().map(linear_of_srgb));
+                let has_opacity = has_alpha && colour.w.is_finite();
+                rgb.extend(if has_opacity { (colour.w / one).clamp(0.0, 1.0) } else { 1.0 })
+            };
+            vertices.colours = colours.map(linear).collect();
+        }
+        if has_uvs {
+            let uv = |p: &Painted| upper_left(p.0[Property::S as usize], p.0[Property::T as usize]);
+            vertices.uvs = painted.iter().map(uv).collect();
+        }
+        Ok(vertices)
+    }
+}
+
+/// Returns the number that stands for 1 in the colours: the largest of an integer type, 1 for floats, or 255 for floats
+/// that exceed 1.
+fn largest_colour(element: &ElementDef, red: &str, mut colours: impl Iterator<Item = Vec4>) -> f32 {
+    let property = element.properties.iter().find(|property| property.name == red);
+    match property.map(|property| &property.property_type) {
+        Some(PropertyType::Scalar(ScalarType::F32 | ScalarType::F64)) => {
+            if colours.any(|colour| colour.truncate().max_element() > 1.0) { 255.0 } else { 1.0 }
+        }
+        Some(PropertyType::Scalar(ScalarType::I8)) => 127.0,
+        Some(PropertyType::Scalar(ScalarType::U16)) => 65_535.0,
+        _ => 255.0,
+    }
+}
+
+/// Returns texture coordinates whose origin is the upper left corner of the image. PLY files count from the lower left
+/// one. Numbers that are not finite become 0.
+pub fn upper_left(u: f32, v: f32) -> Vec2 {
+    let uv = Vec2::new(u, 1.0 - v);
+    if uv.is_finite() { uv } else { Vec2::ZERO }
+}
