@@ -12,9 +12,10 @@ use super::{
     error::{Checked, SceneError},
     extent, framing,
     generate::TriangleBudget,
+    gltf,
     material::{MaterialSpec, colour, within},
     mesh::MAX_COORDINATE,
-    mesh_file::{parse_mesh, read_mesh},
+    mesh_file::{MeshFormat, parse_mesh, read_mesh},
     obj::Library,
     read::read_utf8,
     transform::finite,
@@ -94,7 +95,8 @@ fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> 
     Ok(scene)
 }
 
-/// Adds a mesh to the scene and returns the number of triangles that a generator made for it. `n_generated` is the
+/// Adds a mesh to the scene, or of a glTF file all meshes with their materials, but neither lights nor cameras. It
+/// returns the number of triangles that a generator made. `n_generated` is the
 /// number that generators have made for the scene's earlier meshes.
 fn add_mesh(
     file: &File,
@@ -110,14 +112,23 @@ fn add_mesh(
     let transform = common.transform.transform().map_err(failed)?;
     let named = named_materials(&common, materials).map_err(failed)?;
     let n_loaded = scene.n_triangles();
-    let (mesh, slots, n_made) = match source {
+    match source {
         Source::File { path, shading } => {
             let path = file.path.parent().unwrap_or(Path::new("")).join(path);
             // The scene file may misspell the name, so the error names the line in the scene file.
             let bytes = read_mesh(&path).map_err(|error| failed(error.to_string()))?;
+            if MeshFormat::of(&path, &bytes) == MeshFormat::Gltf {
+                let mut model = gltf::load_meshes(&path, bytes, named.is_empty(), n_loaded)?;
+                if !shading.smooth {
+                    model.meshes.iter_mut().for_each(|mesh| mesh.normals.fill([Vec3::ZERO; 3]));
+                }
+                scene.append(model, &transform, &named).map_err(failed)?;
+                return Ok(0);
+            }
             let (mesh, library) = parse_mesh(&path, bytes, shading, n_loaded)?;
             let slots = if named.is_empty() { scene.push_library(library) } else { named };
-            (mesh, slots, 0)
+            scene.push_mesh(mesh, transform, slots).map_err(failed)?;
+            Ok(0)
         }
         Source::Generator(generator) => {
             let budget = TriangleBudget { n_generated, n_triangles: n_loaded as u64 };
@@ -130,11 +141,10 @@ fn add_mesh(
             }
             let slots = if named.is_empty() { vec![scene.default_material()] } else { named };
             let n_made = mesh.faces.len() as u64;
-            (mesh, slots, n_made)
+            scene.push_mesh(mesh, transform, slots).map_err(failed)?;
+            Ok(n_made)
         }
-    };
-    scene.push_mesh(mesh, transform, slots).map_err(failed)?;
-    Ok(n_made)
+    }
 }
 
 /// Returns the indices of the materials that a mesh names.

@@ -12,6 +12,19 @@ pub enum Light {
         /// Radiant intensity (power per steradian), linear RGB.
         intensity: Vec3,
     },
+    /// A point light that shines into a cone.
+    Spot {
+        /// Position in world space.
+        position: Vec3,
+        /// Unit vector along which it shines, the axis of the cone, world space.
+        towards: Vec3,
+        /// Radiant intensity along the axis (power per steradian), linear RGB.
+        intensity: Vec3,
+        /// Cosine of the angle between the axis and a direction up to which the intensity is whole.
+        inner_cos: f32,
+        /// Cosine of the angle beyond which the light is dark, at most `inner_cos`.
+        outer_cos: f32,
+    },
     /// A light so far away that its direction is the same everywhere.
     Directional {
         /// Unit vector towards the light, world space.
@@ -25,7 +38,9 @@ impl Light {
     /// Returns whether the light's power is zero.
     pub fn is_black(&self) -> bool {
         match self {
-            Self::Point { intensity: power, .. } | Self::Directional { irradiance: power, .. } => *power == Vec3::ZERO,
+            Self::Point { intensity: power, .. }
+            | Self::Spot { intensity: power, .. }
+            | Self::Directional { irradiance: power, .. } => *power == Vec3::ZERO,
         }
     }
 }

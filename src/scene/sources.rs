@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 use super::{
-    is_scene_file,
+    gltf, is_scene_file,
     mesh_file::MeshFormat,
     obj::named_libraries,
-    read::{read_lossy, read_utf8},
+    read::{lossy_text, read_bytes, read_utf8},
 };
 
-/// Returns the sorted paths of the scene file, the mesh files that it names, and the material libraries that the mesh
-/// files name. The files need not exist. A file that cannot be read contributes no names.
+/// Returns the sorted paths of the scene file, the mesh files that it names, and the material libraries, buffers and
+/// images that the mesh files name. The files need not exist. A file that cannot be read contributes no names.
 pub fn source_files(path: &Path) -> Vec<PathBuf> {
     let meshes = if is_scene_file(path) { meshes(path) } else { vec![path.to_owned()] };
     let libraries: Vec<_> = meshes.iter().flat_map(|mesh| libraries(mesh)).collect();
@@ -30,11 +30,16 @@ fn meshes(scene: &Path) -> Vec<PathBuf> {
     names.map(|name| folder.join(name)).collect()
 }
 
+/// Returns the files that a mesh file names.
 fn libraries(mesh: &Path) -> Vec<PathBuf> {
-    match MeshFormat::of_name(mesh) {
-        // Such a file is never taken for OBJ, so it need not be read to know that it names no libraries.
-        Some(MeshFormat::Ply | MeshFormat::Stl) => Vec::new(),
-        Some(MeshFormat::Obj) | None => named_libraries(mesh, &read_lossy(mesh).unwrap_or_default()),
+    // Content that names no files need not be read.
+    if matches!(MeshFormat::of_name(mesh), Some(MeshFormat::Ply | MeshFormat::Stl)) {
+        return Vec::new();
+    }
+    let bytes = read_bytes(mesh).unwrap_or_default();
+    match MeshFormat::of(mesh, &bytes) {
+        MeshFormat::Gltf => gltf::named_files(mesh, &bytes),
+        _ => named_libraries(mesh, &lossy_text(bytes)),
     }
 }
 

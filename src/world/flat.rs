@@ -136,7 +136,9 @@ fn flags_of(lobes: Lobes) -> u32 {
 impl From<&scene::Light> for Light {
     fn from(light: &scene::Light) -> Self {
         match *light {
-            scene::Light::Point { position, intensity } => Self { position, kind: LIGHT_POINT, intensity, reserved: 0 },
+            scene::Light::Point { position, intensity } | scene::Light::Spot { position, intensity, .. } => {
+                Self { position, kind: LIGHT_POINT, intensity, reserved: 0 }
+            }
             scene::Light::Directional { towards, irradiance } => {
                 Self { position: towards, kind: LIGHT_DIRECTIONAL, intensity: irradiance, reserved: 0 }
             }
