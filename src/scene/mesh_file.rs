@@ -1,5 +1,5 @@
-//! Mesh files: glTF, OBJ, PLY and STL. A file's content says which of them it is; its name counts only if the content does
-//! not tell.
+//! Mesh files: glTF, OBJ, PLY and STL. A file's content says which of them it is; its name counts only if the content
+//! does not tell.
 
 use std::path::Path;
 
@@ -67,9 +67,9 @@ pub(super) fn read_mesh(path: &Path) -> Result<Vec<u8>, SceneError> {
     read_bytes(path)
 }
 
-/// Makes a mesh from the content of a file that is not glTF, and reads the materials that it names. A face's slot is an index into the
-/// library. A face without a material, or with one that the library lacks, has slot `library.materials.len()`.
-/// `n_loaded` is the number of triangles that the scene has already.
+/// Makes a mesh from the content of a file that is not glTF, and reads the materials that it names. A face's slot is an
+/// index into the library. A face without a material, or with one that the library lacks, has slot
+/// `library.materials.len()`. `n_loaded` is the number of triangles that the scene has already.
 pub(super) fn parse_mesh(
     path: &Path,
     bytes: Vec<u8>,

@@ -109,9 +109,9 @@ pub struct Camera {
 
 impl Scene {
     /// Loads a scene file, `.toml`, a glTF file, `.gltf` or `.glb`, or a mesh file, `.obj`, `.ply` or `.stl`. The
-    /// content of a glTF or mesh file says which of the four it is. Emits `tracing` warnings for unknown OBJ statements,
-    /// missing material libraries, undefined materials, colours and texture coordinates of PLY files, which are not
-    /// shown, for what is not shown of glTF files, and for coordinates too large for the scene's detail.
+    /// content of a glTF or mesh file says which of the four it is. Emits `tracing` warnings for unknown OBJ
+    /// statements, missing material libraries, undefined materials, colours and texture coordinates of PLY files, which
+    /// are not shown, for what is not shown of glTF files, and for coordinates too large for the scene's detail.
     ///
     /// # Errors
     /// The file, or one that it names, cannot be read or understood; the scene has no triangles, is too small to be

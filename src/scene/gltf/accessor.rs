@@ -112,7 +112,8 @@ impl<'a> Accessor<'a> {
         }
     }
 
-    /// Returns an element as finite numbers; components that it lacks are `missing`. Normalized integers become -1 to 1.
+    /// Returns an element as finite numbers; components that it lacks are `missing`. Normalized integers become
+    /// numbers from -1 to 1.
     pub fn numbers<const N: usize>(&self, ix: usize, missing: f32) -> Checked<[f32; N]> {
         let mut numbers = [missing; N];
         let Some(bytes) = self.bytes(ix) else {

@@ -37,8 +37,8 @@ struct Vertices {
     tangents: Vec<Vec4>,
 }
 
-/// Returns the mesh of a primitive, whose faces have the slot `slot`, or `None` for points and lines. `path` is its JSON
-/// path, `n_loaded` the number of triangles that there are already.
+/// Returns the mesh of a primitive, whose faces have the slot `slot`, or `None` for points and lines. `path` is its
+/// JSON path, `n_loaded` the number of triangles that there are already.
 pub(super) fn mesh(
     document: &Document,
     (primitive, slot): (&Primitive, u32),

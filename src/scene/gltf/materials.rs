@@ -32,7 +32,8 @@ impl<'a> Materials<'a> {
         Self { document, materials: Vec::new(), textures: Textures::new(document), known: HashMap::new() }
     }
 
-    /// Returns the index of a primitive's material, and reads it at the first call. `path` is the primitive's JSON path.
+    /// Returns the index of a primitive's material, and reads it at the first call. `path` is the primitive's JSON
+    /// path.
     pub fn index(&mut self, index: Option<Index<json::Material>>, path: &str) -> Checked<u32> {
         let key = index.map(|index| index.value());
         if let Some(ix) = self.known.get(&key) {

@@ -15,8 +15,8 @@ pub(super) struct Nodes {
 }
 
 impl Nodes {
-    /// Follows the nodes of a scene: the one that `name` says by its name or index, else the default one, else the first.
-    /// A document without scenes shows all nodes.
+    /// Follows the nodes of a scene: the one that `name` says by its name or index, else the default one, else the
+    /// first. A document without scenes shows all nodes.
     ///
     /// # Errors
     /// The scene or a node does not exist, or a node is reached twice: the nodes are not a tree.
