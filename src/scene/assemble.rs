@@ -16,10 +16,11 @@ use super::{
     error::{Checked, SceneError},
     extent, framing,
     generate::TriangleBudget,
+    gltf,
     image_files::{ImageFiles, Images},
     material::{MaterialSpec, colour, within},
     mesh::{MAX_COORDINATE, Mesh},
-    mesh_file::{parse_mesh, read_mesh},
+    mesh_file::{MeshFormat, parse_mesh, read_mesh},
     obj::Library,
     read::read_utf8,
     tangents,
@@ -131,7 +132,8 @@ fn add_materials(
     Ok(indices)
 }
 
-/// Adds a mesh to the scene and returns the number of triangles that a generator made for it. `n_generated` is the
+/// Adds a mesh to the scene, or of a glTF file all meshes with their materials, but neither lights nor cameras. Returns
+/// the number of triangles that a generator made for it. `n_generated` is the
 /// number that generators have made for the scene's earlier meshes.
 fn add_mesh(
     file: &File,
@@ -152,6 +154,18 @@ fn add_mesh(
             let path = file.path.parent().unwrap_or(Path::new("")).join(path);
             // The scene file may misspell the name, so the error names the line in the scene file.
             let bytes = read_mesh(&path).map_err(|error| failed(error.to_string()))?;
+            if MeshFormat::of(&path, &bytes) == MeshFormat::Gltf {
+                let mut model = gltf::load_meshes(&path, bytes, named.is_empty(), n_loaded)?;
+                for mesh in &mut model.meshes {
+                    if !shading.smooth {
+                        mesh.normals.fill([Vec3::ZERO; 3]);
+                    }
+                    common.uv_scale.map_or(Ok(()), |scale| scale_uvs(mesh, scale)).map_err(failed)?;
+                    scene.add_tangents(mesh, &named);
+                }
+                scene.append(model, &transform, &named).map_err(failed)?;
+                return Ok(0);
+            }
             let (mesh, library) = parse_mesh(&path, bytes, shading, n_loaded)?;
             let slots = if named.is_empty() { scene.push_library(library) } else { named };
             (mesh, slots, 0)

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Camera, Light};
+use super::{Camera, Light, Scene};
 
 /// Direction from the middle of the scene towards the eye: to the front, the right and above. Not of unit length.
 const TOWARDS_EYE: Vec3 = Vec3::new(0.45, 0.35, 1.0);
@@ -25,7 +25,14 @@ pub(super) fn camera((min, max): (Vec3, Vec3)) -> Camera {
     }
 }
 
+/// Lights a scene that describes no light: by one light, ambient light, and a background.
+pub(super) fn light_up(scene: &mut Scene) {
+    scene.lights = vec![light()];
+    scene.ambient = Vec3::splat(0.25);
+    scene.background = Vec3::new(0.32, 0.36, 0.42);
+}
+
 /// Returns a directional light from above the camera's left shoulder.
-pub(super) fn light() -> Light {
+fn light() -> Light {
     Light::Directional { towards: Vec3::new(-0.4, 0.8, 0.7).normalize(), irradiance: Vec3::splat(0.8) }
 }

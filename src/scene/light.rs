@@ -12,17 +12,17 @@ pub enum Light {
         /// Radiant intensity (power per steradian), linear RGB.
         intensity: Vec3,
     },
-    /// A point light that shines in a cone.
+    /// A point light that shines into a cone.
     Spot {
         /// Position in world space.
         position: Vec3,
-        /// Unit vector along the axis of the cone, from the light, world space.
+        /// Unit vector along which it shines, the axis of the cone, world space.
         towards: Vec3,
-        /// Radiant intensity on the axis (power per steradian), linear RGB.
+        /// Radiant intensity along the axis (power per steradian), linear RGB.
         intensity: Vec3,
-        /// Cosine of the angle from the axis at which the intensity begins to fall.
+        /// Cosine of the angle between the axis and a direction up to which the intensity is whole.
         inner_cos: f32,
-        /// Cosine of the angle from the axis from which on there is no light.
+        /// Cosine of the angle beyond which the light is dark, at most `inner_cos`.
         outer_cos: f32,
     },
     /// A light so far away that its direction is the same everywhere.

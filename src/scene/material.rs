@@ -163,14 +163,31 @@ impl Maps {
     }
 
     /// Calls `change` for each texture.
-    pub(super) fn change_each(&mut self, mut change: impl FnMut(&mut Texture)) {
-        let Self { base_colour, opacity, specular, specular_factor, emission, roughness, metallic, .. } = self;
-        [base_colour, opacity, specular, specular_factor, emission, roughness, metallic]
-            .into_iter()
-            .flatten()
-            .for_each(&mut change);
-        let Self { transmission, occlusion, normal, .. } = self;
-        [transmission, occlusion, normal].into_iter().flatten().for_each(&mut change);
+    pub(super) fn change_each(&mut self, change: impl FnMut(&mut Texture)) {
+        self.places().into_iter().flatten().for_each(change);
+    }
+
+    /// Removes the textures for which `is_kept` returns false.
+    pub(super) fn keep_each(&mut self, is_kept: impl Fn(&Texture) -> bool) {
+        self.places().into_iter().for_each(|texture| *texture = texture.take().filter(&is_kept));
+    }
+
+    fn places(&mut self) -> [&mut Option<Texture>; 10] {
+        let Self {
+            base_colour: a,
+            opacity: b,
+            specular: c,
+            specular_factor: d,
+            emission: e,
+            roughness: f,
+            metallic: g,
+            transmission: h,
+            occlusion: i,
+            normal: j,
+            occlusion_strength: _,
+            normal_scale: _,
+        } = self;
+        [a, b, c, d, e, f, g, h, i, j]
     }
 }
 

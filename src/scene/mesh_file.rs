@@ -1,5 +1,5 @@
-//! Mesh files: OBJ, PLY and STL. A file's content says which of them it is; its name counts only if the content does
-//! not tell.
+//! Mesh files: glTF, OBJ, PLY and STL. A file's content says which of them it is; its name counts only if the content
+//! does not tell.
 
 use std::path::Path;
 
@@ -17,6 +17,7 @@ use super::{
 /// Format of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum MeshFormat {
+    Gltf,
     Obj,
     Ply,
     Stl,
@@ -26,6 +27,7 @@ impl MeshFormat {
     /// Returns the format that the name's ending stands for, if it is a mesh file's.
     pub fn of_name(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "gltf" | "glb" => Some(Self::Gltf),
             "obj" => Some(Self::Obj),
             "ply" => Some(Self::Ply),
             "stl" => Some(Self::Stl),
@@ -38,6 +40,8 @@ impl MeshFormat {
     pub fn of(path: &Path, bytes: &[u8]) -> Self {
         if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
             Self::Ply
+        } else if is_gltf(bytes) {
+            Self::Gltf
         } else if is_binary_stl(bytes) || is_stl_text(bytes) {
             Self::Stl
         } else {
@@ -46,19 +50,26 @@ impl MeshFormat {
     }
 }
 
+/// Returns whether a file is glTF: a GLB file, or a JSON object with the key `asset`.
+fn is_gltf(bytes: &[u8]) -> bool {
+    const KEY: &[u8] = b"\"asset\"";
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    bytes.starts_with(b"glTF") || text.starts_with(b"{") && text.windows(KEY.len()).any(|part| part == KEY)
+}
+
 /// Reads a mesh file, unless it is too large for the memory.
 pub(super) fn read_mesh(path: &Path) -> Result<Vec<u8>, SceneError> {
     let required = match MeshFormat::of_name(path) {
-        Some(MeshFormat::Ply) => require_for_bytes(path),
+        Some(MeshFormat::Ply | MeshFormat::Gltf) => require_for_bytes(path),
         _ => require_for_text(path),
     };
     required.map_err(|what| SceneError::file(path, what))?;
     read_bytes(path)
 }
 
-/// Makes a mesh from a file's content, and reads the materials that it names. A face's slot is an index into the
-/// library. A face without a material, or with one that the library lacks, has slot `library.materials.len()`.
-/// `n_loaded` is the number of triangles that the scene has already.
+/// Makes a mesh from the content of a file that is not glTF, and reads the materials that it names. A face's slot is an
+/// index into the library. A face without a material, or with one that the library lacks, has slot
+/// `library.materials.len()`. `n_loaded` is the number of triangles that the scene has already.
 pub(super) fn parse_mesh(
     path: &Path,
     bytes: Vec<u8>,
@@ -69,6 +80,7 @@ pub(super) fn parse_mesh(
     let (mesh, library) = match MeshFormat::of(path, &bytes) {
         MeshFormat::Obj => parse_obj(path, &lossy_text(bytes), shading, n_loaded)?,
         MeshFormat::Ply => parse_ply(path, &bytes, shading, n_loaded).map_err(failed)?,
+        MeshFormat::Gltf => return Err(failed("is glTF, which is a whole scene".to_owned())),
         MeshFormat::Stl => (parse_stl(bytes, shading, n_loaded).map_err(failed)?, Library::default()),
     };
     if mesh.faces.is_empty() {

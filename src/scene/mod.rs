@@ -1,7 +1,7 @@
 //! Scenes as files and programs describe them: meshes, their instances in the world, materials, lights, a camera.
 //! Nothing here depends on how kernels lay data out; `world` flattens a scene for tracing.
 //!
-//! A scene file is a TOML file, whose keys `description` lists, or a mesh file: OBJ, PLY or STL.
+//! A scene file is a TOML file, whose keys `description` lists, a glTF file, or a mesh file: OBJ, PLY or STL.
 
 mod assemble;
 mod defaults;
@@ -10,6 +10,7 @@ mod error;
 mod extent;
 pub mod framing;
 pub mod generate;
+mod gltf;
 mod image;
 mod image_files;
 mod light;
@@ -21,6 +22,7 @@ pub mod mesh;
 mod mesh_file;
 mod needs;
 mod obj;
+mod outside;
 mod path;
 mod ply;
 mod polygon;
@@ -78,6 +80,13 @@ pub struct Scene {
     pub defaults: RenderDefaults,
 }
 
+/// Options of loading a scene.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LoadOptions {
+    /// The scene of a glTF file by its name or its index, counted from 0. Where absent, it is the file's default scene.
+    pub scene: Option<String>,
+}
+
 /// A mesh that is placed in the world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
@@ -104,22 +113,32 @@ pub struct Camera {
 }
 
 impl Scene {
-    /// Loads a scene file, `.toml`, or a mesh file, `.obj`, `.ply` or `.stl`. The content of a mesh file says which
-    /// of the three it is. Emits `tracing` warnings for unknown OBJ statements, material libraries and images that are
-    /// missing or leave the folder of the mesh file, undefined materials, names in the wrong case, maps that are not
-    /// shown, and coordinates too large for the scene's detail.
+    /// Loads a scene file, `.toml`, a glTF file, `.gltf` or `.glb`, or a mesh file, `.obj`, `.ply` or `.stl`. The
+    /// content of a glTF or mesh file says which of the four it is. Emits `tracing` warnings for unknown OBJ statements,
+    /// material libraries and images that are missing or leave the folder of the mesh file, undefined materials, names
+    /// in the wrong case, what is not shown of a file, and coordinates too large for the scene's detail.
     ///
     /// # Errors
     /// The file, or one that it names, cannot be read or understood; the scene has no triangles, is too small to be
     /// traced ([`MIN_EXTENT`]), reaches too far from the origin (`mesh::MAX_COORDINATE`), or needs more memory than
     /// there is.
     pub fn load(path: &Path) -> Result<Scene, SceneError> {
+        Self::load_with(path, &LoadOptions::default())
+    }
+
+    /// Loads a scene as [`Scene::load`] does, with options.
+    ///
+    /// # Errors
+    /// Those of [`Scene::load`]; the file does not have the scene that `options` names.
+    pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         if is_scene_file(path) {
+            check_only_scene(path, options)?;
             assemble::load_toml(path)
         } else if MeshFormat::of_name(path).is_some() {
-            load_mesh_file(path)
+            load_mesh_file(path, options)
         } else {
-            Err(SceneError::file(path, "is no scene: its name ends in none of .toml, .obj, .ply and .stl"))
+            let endings = "its name ends in none of .toml, .gltf, .glb, .obj, .ply and .stl";
+            Err(SceneError::file(path, format!("is no scene: {endings}")))
         }
     }
 
@@ -157,6 +176,37 @@ impl Scene {
         Ok(())
     }
 
+    /// Adds the meshes, materials and images of another scene. `outer` places the other scene's world in this one. If
+    /// `named` has materials of this scene, they replace all those of the other scene, as [`Instance::materials`] of
+    /// each instance.
+    ///
+    /// # Errors
+    /// A mesh reaches beyond `mesh::MAX_COORDINATE` in world space. The error is a message for people.
+    fn append(&mut self, other: Scene, outer: &Transform, named: &[u32]) -> Result<(), String> {
+        let first_mesh = self.meshes.len();
+        for mut instance in other.instances {
+            instance.transform = outer.after(&instance.transform);
+            other.meshes[instance.mesh_ix].placed(&instance.transform)?;
+            instance.mesh_ix += first_mesh;
+            if named.is_empty() {
+                instance.materials.iter_mut().for_each(|ix| *ix += self.materials.len() as u32);
+            } else {
+                instance.materials = named.to_vec();
+            }
+            self.instances.push(instance);
+        }
+        self.meshes.extend(other.meshes);
+        if named.is_empty() {
+            let first_image = self.images.len() as u32;
+            self.images.extend(other.images);
+            self.materials.extend(other.materials.into_iter().map(|mut material| {
+                material.maps.change_each(|texture| texture.image_ix += first_image);
+                material
+            }));
+        }
+        Ok(())
+    }
+
     /// A scene without meshes, materials and lights. Its camera is a placeholder.
     pub(crate) fn empty(path: &Path) -> Self {
         Self {
@@ -181,18 +231,29 @@ fn is_scene_file(path: &Path) -> bool {
 }
 
 /// Loads a mesh file as a scene: the mesh with its own materials, a camera that frames it, one light and ambient
-/// light.
-fn load_mesh_file(path: &Path) -> Result<Scene, SceneError> {
+/// light. A glTF file has lights and cameras of its own.
+fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
+    let bytes = mesh_file::read_mesh(path)?;
+    if MeshFormat::of(path, &bytes) == MeshFormat::Gltf {
+        return gltf::load(path, bytes, options);
+    }
+    check_only_scene(path, options)?;
     let mut scene = Scene::empty(path);
-    let (mut mesh, library) = mesh_file::parse_mesh(path, mesh_file::read_mesh(path)?, Shading::default(), 0)?;
+    let (mut mesh, library) = mesh_file::parse_mesh(path, bytes, Shading::default(), 0)?;
     let slots = scene.push_library(library);
     scene.add_tangents(&mut mesh, &slots);
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
     let bounds = scene.bounds();
     extent::check(path, bounds)?;
     scene.camera = framing::camera(bounds);
-    scene.lights = vec![framing::light()];
-    scene.ambient = Vec3::splat(0.25);
-    scene.background = Vec3::new(0.32, 0.36, 0.42);
+    framing::light_up(&mut scene);
     Ok(scene)
+}
+
+/// Refuses the choice of a scene for a file that has only one.
+fn check_only_scene(path: &Path, options: &LoadOptions) -> Result<(), SceneError> {
+    match &options.scene {
+        Some(name) => Err(SceneError::file(path, format!("there is no scene `{name}`: only glTF files name scenes"))),
+        None => Ok(()),
+    }
 }

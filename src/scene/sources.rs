@@ -5,17 +5,17 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 use super::{
-    is_scene_file,
+    gltf, is_scene_file,
     material_spec::MAP_KEYS,
     mesh_file::MeshFormat,
     obj::named_files,
     ply::named_images,
-    read::{read_lossy, read_utf8},
+    read::{lossy_text, read_bytes, read_utf8},
 };
 
-/// Returns the sorted paths of the scene file, the mesh files that it names, the material libraries that the mesh
-/// files name, and the images that any of them names. The files need not exist. A file that cannot be read contributes
-/// no names.
+/// Returns the sorted paths of the scene file, the mesh files that it names, the material libraries and buffers that the
+/// mesh files name, and the images that any of them names. The files need not exist. A file that cannot be read
+/// contributes no names.
 pub fn source_files(path: &Path) -> Vec<PathBuf> {
     let (meshes, maps) = if is_scene_file(path) { named(path) } else { (vec![path.to_owned()], Vec::new()) };
     let libraries: Vec<_> = meshes.iter().flat_map(|mesh| libraries(mesh)).collect();
@@ -37,12 +37,18 @@ fn named(scene: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
     (meshes, maps.filter_map(name).collect())
 }
 
+/// Returns the files that a mesh file names.
 fn libraries(mesh: &Path) -> Vec<PathBuf> {
-    match MeshFormat::of_name(mesh) {
-        // Such files are never taken for OBJ, and STL files name no others.
-        Some(MeshFormat::Stl) => Vec::new(),
-        Some(MeshFormat::Ply) => named_images(mesh),
-        Some(MeshFormat::Obj) | None => named_files(mesh, &read_lossy(mesh).unwrap_or_default()),
+    // Content that names no files need not be read.
+    if MeshFormat::of_name(mesh) == Some(MeshFormat::Stl) {
+        return Vec::new();
+    }
+    let bytes = read_bytes(mesh).unwrap_or_default();
+    match MeshFormat::of(mesh, &bytes) {
+        MeshFormat::Gltf => gltf::named_files(mesh, &bytes),
+        MeshFormat::Ply => named_images(mesh),
+        MeshFormat::Stl => Vec::new(),
+        MeshFormat::Obj => named_files(mesh, &lossy_text(bytes)),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Transforms that place a mesh in the world.
 
-use glam::{DMat3, DQuat, DVec3, Vec3};
+use glam::{DMat3, DMat4, DQuat, DVec3, Vec3};
 use serde::Deserialize;
 
 use super::error::Checked;
@@ -37,7 +37,7 @@ enum ScaleSpec {
     Axes([f32; 3]),
 }
 
-/// A transform from object space to world space: a scale, then a rotation, then a translation.
+/// A transform from object space to world space: an invertible linear map, then a translation.
 ///
 /// It is applied in f64, so that the identity changes no coordinate.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,6 +78,36 @@ impl Transform {
         })
     }
 
+    /// Makes the transform of an affine matrix, which may shear a mesh. The last row of the matrix is ignored.
+    ///
+    /// # Errors
+    /// The matrix flattens the mesh, or a number is not finite. The error is a message for people.
+    pub fn of_affine(world_from_object: DMat4) -> Result<Self, String> {
+        if !world_from_object.is_finite() {
+            return Err("the transform has a number that is not finite".to_owned());
+        }
+        let linear = DMat3::from_mat4(world_from_object);
+        // Each of the determinant's six products is rounded to 2^-53 of at most the product of the columns' lengths.
+        let DMat3 { x_axis, y_axis, z_axis } = scaled_to_one(linear);
+        let noise = 6.0 * f64::EPSILON * x_axis.length() * y_axis.length() * z_axis.length();
+        let determinant = scaled_to_one(linear).determinant();
+        if !(determinant.abs() > noise) {
+            return Err("the transform flattens the mesh".to_owned());
+        }
+        let translation = world_from_object.w_axis.truncate();
+        Ok(Self { linear, translation, normals: normals_of(linear), mirrors: determinant < 0.0 })
+    }
+
+    /// Returns the transform that applies `inner`, then this one.
+    pub(super) fn after(&self, inner: &Self) -> Self {
+        Self {
+            linear: self.linear * inner.linear,
+            translation: self.linear * inner.translation + self.translation,
+            normals: scaled_to_one(self.normals * inner.normals),
+            mirrors: self.mirrors != inner.mirrors,
+        }
+    }
+
     /// Returns a point of object space in world space.
     pub fn point(&self, p: Vec3) -> Vec3 {
         (self.linear * p.as_dvec3() + self.translation).as_vec3()
@@ -98,6 +128,20 @@ impl Transform {
     pub fn mirrors(&self) -> bool {
         self.mirrors
     }
+}
+
+/// Returns a linear map divided by its largest coefficient's size, so that products of three coefficients neither
+/// overflow nor underflow.
+fn scaled_to_one(linear: DMat3) -> DMat3 {
+    let largest = linear.to_cols_array().into_iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
+    if largest > 0.0 { linear * largest.recip().min(f64::MAX) } else { linear }
+}
+
+/// Returns the inverse transpose of a linear map up to a positive factor. Unlike the inverse, it exists for all maps.
+pub(super) fn normals_of(linear: DMat3) -> DMat3 {
+    let DMat3 { x_axis, y_axis, z_axis } = scaled_to_one(linear);
+    let cofactors = DMat3::from_cols(y_axis.cross(z_axis), z_axis.cross(x_axis), x_axis.cross(y_axis));
+    if linear.determinant() < 0.0 { -cofactors } else { cofactors }
 }
 
 impl TransformSpec {

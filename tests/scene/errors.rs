@@ -179,7 +179,7 @@ fn bad_scene_files_are_refused() {
 #[test]
 fn files_that_are_no_scenes_are_refused() {
     assert!(error("a.toml", b"\n\xff").ends_with("a.toml:2: is not UTF-8"));
-    assert!(error("a.gltf", b"").ends_with("in none of .toml, .obj, .ply and .stl"));
+    assert!(error("a.fbx", b"").ends_with("in none of .toml, .gltf, .glb, .obj, .ply and .stl"));
     let folder = tempfile::tempdir().unwrap();
     fs::create_dir(folder.path().join("x.obj")).unwrap();
     assert!(

@@ -3,6 +3,8 @@
 mod errors;
 mod extent;
 mod generators;
+mod gltf;
+mod gltf_materials;
 mod instances;
 mod materials;
 mod mesh_files;

@@ -12,7 +12,7 @@ use super::{
 };
 
 /// The corners of a cube, and its sides as polygons that are counter-clockwise from outside.
-const CORNERS: [[f32; 3]; 8] = [
+pub const CORNERS: [[f32; 3]; 8] = [
     [-1.0, -1.0, -1.0],
     [1.0, -1.0, -1.0],
     [1.0, 1.0, -1.0],
@@ -22,9 +22,9 @@ const CORNERS: [[f32; 3]; 8] = [
     [1.0, 1.0, 1.0],
     [-1.0, 1.0, 1.0],
 ];
-const SIDES: [[u32; 4]; 6] = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+pub const SIDES: [[u32; 4]; 6] = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
 
-fn obj() -> Vec<u8> {
+pub fn obj() -> Vec<u8> {
     let mut text: String = CORNERS.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
     text.extend(SIDES.map(|side| format!("f {} {} {} {}\n", side[0] + 1, side[1] + 1, side[2] + 1, side[3] + 1)));
     text.into_bytes()
@@ -135,7 +135,7 @@ fn the_content_counts_and_not_the_name() {
             assert_eq!(load_as(name, &content).triangles, expected.triangles, "{name}");
         }
     }
-    assert!(error("cube.txt", &ply_text()).ends_with("in none of .toml, .obj, .ply and .stl"));
+    assert!(error("cube.txt", &ply_text()).ends_with("in none of .toml, .gltf, .glb, .obj, .ply and .stl"));
 }
 
 #[test]

@@ -1,0 +1,88 @@
+//! Cameras of a scene's nodes.
+
+use glam::{DVec3, Vec3};
+use gltf::json::{self, camera::Type, validation::Checked::Valid};
+
+use super::{
+    document::{Document, item},
+    nodes::Nodes,
+};
+use crate::scene::{Camera, error::Checked, material::within, mesh::MAX_COORDINATE};
+
+/// Smallest and largest vertical field of view, degrees. Cameras beyond get the limit.
+const FOV_DEGREES: (f32, f32) = (0.1, 170.0);
+
+/// Returns the cameras of a scene's nodes with their names. Each looks at the middle of `bounds`, the scene's, or at a
+/// point as far away.
+pub(super) fn cameras(document: &Document, nodes: &Nodes, bounds: (Vec3, Vec3)) -> Checked<Vec<(String, Camera)>> {
+    let mut cameras = Vec::new();
+    for &ix in &nodes.shown {
+        let node = &document.root.nodes[ix];
+        let Some(index) = node.camera else { continue };
+        let json = item(&document.root.cameras, "cameras", index.value(), &format_args!("nodes[{ix}].camera"))?;
+        let name = node.name.clone().or_else(|| json.name.clone());
+        let name = name.unwrap_or_else(|| format!("camera {}", cameras.len() + 1));
+        let Some(view) = View::new(nodes, ix, bounds) else {
+            document.note("cameras whose nodes flatten them or lie too far away, which are left out", name);
+            continue;
+        };
+        let fov = vertical_fov(json, &view).map_err(|what| format!("cameras[{index}]: {what}"))?;
+        if matches!(json.type_, Valid(Type::Orthographic)) {
+            document.note("orthographic cameras, which are shown in perspective", &name);
+        }
+        let vertical_fov_degrees = fov.to_degrees().clamp(FOV_DEGREES.0, FOV_DEGREES.1);
+        let View { eye, target, up, .. } = view;
+        cameras.push((name, Camera { eye, target, up, vertical_fov_degrees }));
+    }
+    Ok(cameras)
+}
+
+/// Where a camera stands.
+struct View {
+    eye: Vec3,
+    target: Vec3,
+    up: Vec3,
+    /// Distance from the eye to the target.
+    distance: f32,
+}
+
+impl View {
+    /// Returns the view of a node's camera, or `None` if its directions span no picture.
+    fn new(nodes: &Nodes, node_ix: usize, (min, max): (Vec3, Vec3)) -> Option<Self> {
+        let world_from_node = nodes.world_from_node(node_ix)?;
+        let eye = world_from_node.w_axis.truncate();
+        let forward = world_from_node.transform_vector3(DVec3::NEG_Z).try_normalize()?;
+        let up = world_from_node.transform_vector3(DVec3::Y).try_normalize()?;
+        let (min, max) = (min.as_dvec3(), max.as_dvec3());
+        // The distance must exceed the rounding of the eye's coordinates.
+        let least = ((max - min).length() / 2.0).max(eye.abs().max_element()) * 1e-3;
+        let depth = ((min + max) / 2.0 - eye).dot(forward);
+        let distance = if depth > least { depth } else { (max - min).length().max(least) };
+        let target = eye + distance * forward;
+        let is_inside = |p: DVec3| p.abs().max_element() <= f64::from(MAX_COORDINATE);
+        let spans = forward.cross(up).length() > 1e-3 && is_inside(eye) && is_inside(target);
+        spans.then(|| Self {
+            eye: eye.as_vec3(),
+            target: target.as_vec3(),
+            up: up.as_vec3(),
+            distance: distance as f32,
+        })
+    }
+}
+
+/// Returns the vertical field of view in radians. A parallel projection gets the one that shows the same height at the
+/// target.
+fn vertical_fov(json: &json::Camera, view: &View) -> Checked<f32> {
+    match (&json.type_, &json.perspective, &json.orthographic) {
+        (Valid(Type::Perspective), Some(perspective), _) => {
+            within("perspective.yfov", perspective.yfov, f32::MIN_POSITIVE, std::f32::consts::PI)
+        }
+        (Valid(Type::Orthographic), _, Some(orthographic)) => {
+            // Some exporters mirror the picture by negative factors.
+            let half = within("orthographic.ymag", orthographic.ymag.abs(), f32::MIN_POSITIVE, f32::MAX)?;
+            Ok(2.0 * half.atan2(view.distance))
+        }
+        (Valid(_), ..) => Err("it lacks the object that its type names".to_owned()),
+        _ => Err("its type is neither perspective nor orthographic".to_owned()),
+    }
+}

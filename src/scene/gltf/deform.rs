@@ -1,0 +1,141 @@
+//! Morph targets and skins in the pose that the file gives. Animations are not shown.
+
+use glam::{DMat3, DMat4, Vec3};
+use gltf::{
+    Semantic,
+    json::{accessor::Type, mesh::MorphTarget},
+};
+
+use super::{accessor::Accessor, document::Document, geometry::Attributes};
+use crate::scene::{error::Checked, transform::normals_of};
+
+/// The morph targets of a primitive whose weight is not 0.
+pub(super) struct Morph<'a> {
+    targets: Vec<Target<'a>>,
+}
+
+/// A morph target: what it adds to positions, normals and tangents.
+struct Target<'a> {
+    weight: f32,
+    added: [Option<Accessor<'a>>; 3],
+}
+
+impl<'a> Morph<'a> {
+    /// Returns the morph targets of a primitive of `n` vertices, or `None` if none has a weight.
+    pub fn new(attributes: &Attributes<'a>, weights: &[f32], n: usize) -> Checked<Option<Self>> {
+        let targets = attributes.primitive.targets.iter().flatten().zip(weights).enumerate();
+        let targets = targets.filter(|(_, (_, weight))| **weight != 0.0);
+        let targets = targets.map(|(ix, (target, weight))| Target::new(attributes, (ix, target), *weight, n));
+        let targets: Vec<_> = targets.collect::<Checked<_>>()?;
+        Ok((!targets.is_empty()).then_some(Self { targets }))
+    }
+
+    /// Returns position, normal and tangent of the vertex with index `ix`.
+    pub fn apply(&self, ix: usize, mut vertex: [Vec3; 3]) -> Checked<[Vec3; 3]> {
+        for target in &self.targets {
+            for (vector, added) in vertex.iter_mut().zip(&target.added) {
+                if let Some(added) = added {
+                    *vector += target.weight * Vec3::from_array(added.numbers(ix, 0.0)?);
+                }
+            }
+        }
+        Ok(vertex)
+    }
+}
+
+impl<'a> Target<'a> {
+    fn new(attributes: &Attributes<'a>, (ix, target): (usize, &MorphTarget), weight: f32, n: usize) -> Checked<Self> {
+        let MorphTarget { positions, normals, tangents } = target;
+        let accessor = |index: &Option<_>, name: &str| {
+            let path = format!("{}.targets[{ix}].{name}", attributes.path);
+            index.map(|index| attributes.accessor(index, &[Type::Vec3], Some(n), path)).transpose()
+        };
+        let added = [accessor(positions, "POSITION")?, accessor(normals, "NORMAL")?, accessor(tangents, "TANGENT")?];
+        Ok(Self { weight, added })
+    }
+}
+
+/// A skin: for each joint the transform of vertices that it moves alone.
+pub(super) struct Skin {
+    /// JSON path.
+    path: String,
+    world_from_mesh: Vec<DMat4>,
+}
+
+/// A skin as it moves a primitive's vertices.
+pub(super) struct Skinning<'a> {
+    skin: &'a Skin,
+    /// Joints and weights, four in each set.
+    sets: Vec<[Accessor<'a>; 2]>,
+}
+
+impl Skin {
+    /// Makes a skin from its joints' transforms. `inverse_bind` is the accessor of the matrices that come before them.
+    pub fn new(document: &Document, ix: usize, world_from_joints: Vec<DMat4>) -> Checked<Self> {
+        let path = format!("skins[{ix}]");
+        let mut world_from_mesh = world_from_joints;
+        if let Some(index) = document.root.skins[ix].inverse_bind_matrices {
+            let path = format!("{path}.inverseBindMatrices");
+            let matrices = Accessor::new(document, index, &[Type::Mat4], path)?;
+            if matrices.n < world_from_mesh.len() {
+                return Err(format!("{}: has {} of {} matrices", matrices.path, matrices.n, world_from_mesh.len()));
+            }
+            for (ix, matrix) in world_from_mesh.iter_mut().enumerate() {
+                *matrix *= glam::Mat4::from_cols_array(&matrices.numbers(ix, 0.0)?).as_dmat4();
+            }
+        }
+        Ok(Self { path, world_from_mesh })
+    }
+
+    /// Returns the skin as it moves a primitive of `n` vertices.
+    pub fn of<'a>(&'a self, attributes: &Attributes<'a>, n: usize) -> Checked<Skinning<'a>> {
+        let mut sets = Vec::new();
+        for set in 0.. {
+            let joints = attributes.find(Semantic::Joints(set), &[Type::Vec4], Some(n))?;
+            let weights = attributes.find(Semantic::Weights(set), &[Type::Vec4], Some(n))?;
+            let (Some(joints), Some(weights)) = (joints, weights) else { break };
+            sets.push([joints, weights]);
+        }
+        if sets.is_empty() {
+            return Err(format!("{}.attributes: a node has a skin, but there are no joints", attributes.path));
+        }
+        Ok(Skinning { skin: self, sets })
+    }
+}
+
+impl Skinning<'_> {
+    /// Returns position, normal and tangent of the vertex with index `ix` in world space.
+    pub fn apply(&self, ix: usize, [position, normal, tangent]: [Vec3; 3]) -> Checked<[Vec3; 3]> {
+        let matrix = self.matrix(ix)?;
+        let linear = DMat3::from_mat4(matrix);
+        let position = matrix.transform_point3(position.as_dvec3()).as_vec3();
+        let normal = (normals_of(linear) * normal.as_dvec3()).normalize_or_zero().as_vec3();
+        let tangent = (linear * tangent.as_dvec3()).normalize_or_zero().as_vec3();
+        Ok([position, normal, tangent])
+    }
+
+    /// Returns whether the skin mirrors the surface at the vertex with index `ix`.
+    pub fn mirrors(&self, ix: usize) -> Checked<bool> {
+        Ok(DMat3::from_mat4(self.matrix(ix)?).determinant() < 0.0)
+    }
+
+    /// Returns the weighted mean of the joints' transforms.
+    fn matrix(&self, ix: usize) -> Checked<DMat4> {
+        let (mut sum, mut total) = (DMat4::ZERO, 0.0);
+        for [joints, weights] in &self.sets {
+            for (joint, weight) in joints.integers::<4>(ix).into_iter().zip(weights.numbers::<4>(ix, 0.0)?) {
+                if weight == 0.0 {
+                    continue;
+                }
+                let matrix = self.skin.world_from_mesh.get(joint as usize).ok_or_else(|| {
+                    format!("{}: element {ix} is joint {joint}, which {} lacks", joints.path, self.skin.path)
+                })?;
+                sum += *matrix * f64::from(weight);
+                total += f64::from(weight);
+            }
+        }
+        // A vertex without weights would vanish. Most programs give it to the first joint.
+        let first = self.skin.world_from_mesh.first().copied().unwrap_or_default();
+        Ok(if total > 0.0 { sum * total.recip() } else { first })
+    }
+}

@@ -1,0 +1,266 @@
+//! A glTF file with its buffers: `.gltf`, JSON beside files of data, and `.glb`, one file with both.
+
+use std::{
+    cell::RefCell,
+    fmt::Display,
+    path::{Path, PathBuf},
+};
+
+use gltf::json::{self, Index, Root, image};
+use hashbrown::HashMap;
+
+use super::{meshopt, uri::Uri};
+use crate::{
+    scene::{error::Checked, needs::require_for_bytes, outside, read::read_bytes},
+    util::memory::require,
+};
+
+/// Extensions that are read. A file that requires another one is refused.
+const SUPPORTED: [&str; 16] = [
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_lights_punctual",
+    "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_unlit",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_texture_transform",
+    "KHR_xmp_json_ld",
+    "MSFT_texture_dds",
+];
+
+/// Extensions that are not read, but change no picture of a file that does not require them.
+const WITHOUT_EFFECT: [&str; 6] = [
+    "KHR_animation_pointer",
+    "KHR_draco_mesh_compression",
+    "KHR_materials_variants",
+    "KHR_texture_basisu",
+    "KHR_xmp",
+    "MSFT_packing_normalRoughnessMetallic",
+];
+
+/// A glTF file, its buffers, and what is not shown of it.
+pub(super) struct Document {
+    /// The JSON. No index in it is checked.
+    pub root: Root,
+    folder: PathBuf,
+    buffers: Vec<Vec<u8>>,
+    /// Contents of the compressed buffer views, by the view's index.
+    decoded: HashMap<usize, Vec<u8>>,
+    notes: RefCell<Vec<(&'static str, Vec<String>)>>,
+}
+
+/// The part of a buffer that a buffer view shows.
+#[derive(Clone, Copy)]
+pub(super) struct View<'a> {
+    pub bytes: &'a [u8],
+    /// Distance of elements in bytes, if the view has one.
+    pub stride: Option<usize>,
+}
+
+impl Document {
+    /// Reads a glTF file from its content, and its buffers.
+    pub fn read(path: &Path, bytes: &[u8]) -> Checked<Self> {
+        let (json, chunk) = split(bytes)?;
+        let root: Root = json::deserialize::from_slice(json).map_err(|error| format!("the JSON: {error}"))?;
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let (buffers, decoded, notes) = (Vec::new(), HashMap::new(), RefCell::default());
+        let mut document = Self { root, folder, buffers, decoded, notes };
+        document.check_version()?;
+        document.check_extensions()?;
+        for ix in 0..document.root.buffers.len() {
+            let buffer = document.buffer(ix, chunk).map_err(|what| format!("buffers[{ix}]: {what}"))?;
+            document.buffers.push(buffer);
+        }
+        document.decode_views()?;
+        Ok(document)
+    }
+
+    fn check_version(&self) -> Checked<()> {
+        let asset = &self.root.asset;
+        match asset.min_version.as_ref().unwrap_or(&asset.version) {
+            version if version.starts_with("2.") => Ok(()),
+            version => Err(format!("asset: this is glTF {version}, and only glTF 2 is read")),
+        }
+    }
+
+    fn check_extensions(&self) -> Checked<()> {
+        let required = &self.root.extensions_required;
+        let refused: Vec<_> = required.iter().filter(|name| !SUPPORTED.contains(&name.as_str())).collect();
+        if !refused.is_empty() {
+            let names: Vec<_> = refused.iter().map(|name| format!("`{name}`")).collect();
+            return Err(format!("extensionsRequired: the file needs {}, which is not supported", names.join(", ")));
+        }
+        let is_known = |name: &str| SUPPORTED.contains(&name) || WITHOUT_EFFECT.contains(&name);
+        for name in self.root.extensions_used.iter().filter(|name| !is_known(name)) {
+            self.note("extensions that are not read, so the picture may differ", name);
+        }
+        Ok(())
+    }
+
+    /// Returns the content of a buffer. Buffers that only stand in for compressed views are empty.
+    fn buffer(&self, ix: usize, chunk: Option<&[u8]>) -> Checked<Vec<u8>> {
+        let buffer = &self.root.buffers[ix];
+        let extensions = buffer.extensions.as_ref();
+        if extensions.is_some_and(|extensions| meshopt::is_fallback(&extensions.others)) {
+            return Ok(Vec::new());
+        }
+        let mut bytes = match (&buffer.uri, chunk) {
+            (Some(uri), _) => self.fetch(uri)?,
+            (None, Some(chunk)) if ix == 0 => chunk.to_vec(),
+            (None, _) => return Err("has no uri, and there is no binary chunk for it".to_owned()),
+        };
+        let n_bytes = buffer.byte_length.0;
+        if (bytes.len() as u64) < n_bytes {
+            return Err(format!("has {} bytes, but byteLength = {n_bytes}", bytes.len()));
+        }
+        bytes.truncate(n_bytes as usize);
+        Ok(bytes)
+    }
+
+    /// Decodes the compressed buffer views.
+    fn decode_views(&mut self) -> Checked<()> {
+        let mut n_total = 0;
+        for (ix, view) in self.root.buffer_views.iter().enumerate() {
+            let Some(packed) = view.extensions.as_ref().and_then(|it| meshopt::packed(&it.others)) else { continue };
+            let failed = |what: String| format!("bufferViews[{ix}].extensions: meshopt_compression: {what}");
+            let packed = packed.map_err(failed)?;
+            n_total += packed.n_bytes().map_err(failed)?;
+            require("decoding the buffer views", n_total).map_err(|error| failed(error.to_string()))?;
+            let buffer = item(&self.buffers, "buffers", packed.buffer, &"buffer").map_err(failed)?;
+            let bytes = part(buffer, packed.byte_offset, packed.byte_length).map_err(failed)?;
+            self.decoded.insert(ix, packed.decode(bytes).map_err(failed)?);
+        }
+        Ok(())
+    }
+
+    /// Returns what a URI stands for.
+    fn fetch(&self, uri: &str) -> Checked<Vec<u8>> {
+        match Uri::new(uri)? {
+            Uri::Data(bytes) => Ok(bytes),
+            Uri::File(name) => {
+                let path = outside::below(&self.folder, &name)?;
+                require_for_bytes(&path)?;
+                read_bytes(&path).map_err(|error| error.to_string())
+            }
+        }
+    }
+
+    /// Returns the bytes of an image, or `None` with a note if its file cannot be read.
+    pub fn image(&self, index: Index<image::Image>, from: &dyn Display) -> Checked<Option<Vec<u8>>> {
+        let image = item(&self.root.images, "images", index.value(), from)?;
+        let place = format!("images[{index}]");
+        match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => match Uri::new(uri).map_err(|what| format!("{place}: {what}"))? {
+                Uri::Data(bytes) => Ok(Some(bytes)),
+                Uri::File(name) => {
+                    let path = outside::below(&self.folder, &name).map_err(|what| format!("{place}: {what}"))?;
+                    require_for_bytes(&path).map_err(|what| format!("{place}: {what}"))?;
+                    match read_bytes(&path) {
+                        Ok(bytes) => Ok(Some(bytes)),
+                        Err(error) => {
+                            self.note("images that cannot be read, without which materials are shown", error);
+                            Ok(None)
+                        }
+                    }
+                }
+            },
+            (None, Some(view)) => Ok(Some(self.view(view, &place)?.bytes.to_vec())),
+            (None, None) => Err(format!("{place}: has neither uri nor bufferView")),
+        }
+    }
+
+    /// Returns the part of a buffer that a view shows. `from` is the JSON path that names the view.
+    pub fn view(&self, index: Index<json::buffer::View>, from: &dyn Display) -> Checked<View<'_>> {
+        let ix = index.value();
+        let view = item(&self.root.buffer_views, "bufferViews", ix, from)?;
+        let stride = view.byte_stride.map(|stride| stride.0);
+        if let Some(bytes) = self.decoded.get(&ix) {
+            return Ok(View { bytes, stride });
+        }
+        let place = format!("bufferViews[{ix}]");
+        let buffer = item(&self.buffers, "buffers", view.buffer.value(), &place)?;
+        let offset = view.byte_offset.unwrap_or_default().0;
+        let bytes = part(buffer, offset, view.byte_length.0).map_err(|what| format!("{place}: {what}"))?;
+        Ok(View { bytes, stride })
+    }
+
+    /// Remembers that something is not shown. `kind` begins the warning, in which things of one kind are listed.
+    pub fn note(&self, kind: &'static str, what: impl Display) {
+        let mut notes = self.notes.borrow_mut();
+        match notes.iter_mut().find(|(other, _)| *other == kind) {
+            Some((_, list)) => list.push(what.to_string()),
+            None => notes.push((kind, vec![what.to_string()])),
+        }
+    }
+
+    /// Emits a warning for each kind of thing that is not shown.
+    pub fn warn(&self, path: &Path) {
+        const MAX_LISTED: usize = 8;
+        for (kind, list) in self.notes.take() {
+            let mut listed = list[..list.len().min(MAX_LISTED)].join(", ");
+            if list.len() > MAX_LISTED {
+                listed += &format!(" and {} more", list.len() - MAX_LISTED);
+            }
+            tracing::warn!("{}: {kind}: {listed}", path.display());
+        }
+    }
+}
+
+/// Returns an item of one of the document's lists, or an error that names the JSON path `from`.
+pub(super) fn item<'a, T>(list: &'a [T], name: &str, ix: usize, from: &dyn Display) -> Checked<&'a T> {
+    list.get(ix).ok_or_else(|| format!("{from}: there is no {name}[{ix}], but only {}", list.len()))
+}
+
+/// Returns a part of some bytes, or an error if they end before it does.
+pub(super) fn part(bytes: &[u8], offset: u64, n_bytes: u64) -> Checked<&[u8]> {
+    let end = offset.checked_add(n_bytes).filter(|end| *end <= bytes.len() as u64);
+    match end {
+        Some(end) => Ok(&bytes[offset as usize..end as usize]),
+        None => Err(format!("{n_bytes} bytes from byte {offset} on reach beyond the {} that there are", bytes.len())),
+    }
+}
+
+/// Returns the JSON of a file, and the binary chunk if it has one.
+pub(super) fn split(bytes: &[u8]) -> Checked<(&[u8], Option<&[u8]>)> {
+    if !bytes.starts_with(b"glTF") {
+        return Ok((bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), None));
+    }
+    let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?) as usize);
+    match word(4) {
+        Some(2) => {}
+        Some(version) => return Err(format!("is a GLB file of version {version}, and only version 2 is read")),
+        None => return Err("the header ends too early".to_owned()),
+    }
+    let chunk = |at: usize, kind: &[u8; 4], name: &str| {
+        let n_bytes = word(at).ok_or_else(|| format!("the header of the chunk {name} ends too early"))?;
+        if bytes.get(at + 4..at + 8) != Some(kind) {
+            return Err(format!("there is no chunk {name} at byte {at}"));
+        }
+        part(bytes, at as u64 + 8, n_bytes as u64).map_err(|what| format!("the chunk {name}: {what}"))
+    };
+    let json = chunk(12, b"JSON", "JSON")?;
+    let end = 20 + json.len();
+    let binary = if end + 8 <= bytes.len() { Some(chunk(end, b"BIN\0", "BIN")?) } else { None };
+    Ok((json, binary))
+}
+
+/// Returns the names of the files that a glTF file names: its buffers and images. What cannot be read names nothing.
+pub(in crate::scene) fn named_files(path: &Path, bytes: &[u8]) -> Vec<PathBuf> {
+    let json = split(bytes).map(|(json, _)| json).unwrap_or_default();
+    let root: json::Value = json::deserialize::from_slice(json).unwrap_or_default();
+    let items = ["buffers", "images"].into_iter().filter_map(|list| root.get(list)?.as_array()).flatten();
+    let uris = items.filter_map(|item| item.get("uri")?.as_str());
+    let folder = path.parent().unwrap_or(Path::new(""));
+    uris.filter_map(|uri| match Uri::new(uri) {
+        Ok(Uri::File(name)) => outside::below(folder, &name).ok(),
+        _ => None,
+    })
+    .collect()
+}

@@ -1,0 +1,241 @@
+//! Meshes from primitives: triangles, strips and fans with their attributes.
+
+use glam::{Vec2, Vec3, Vec4};
+use gltf::{
+    Semantic,
+    json::{
+        Index,
+        accessor::Type,
+        mesh::{Mode, Primitive},
+        validation::Checked::Valid,
+    },
+};
+use rayon::prelude::*;
+
+use super::{
+    accessor::Accessor,
+    deform::{Morph, Skin, Skinning},
+    document::Document,
+    tangents::{NormalMap, add_tangents},
+};
+use crate::scene::{error::Checked, mesh::Mesh, needs::require_for_triangles};
+
+/// How the vertices of a mesh move away from the places that the file gives.
+#[derive(Clone, Copy)]
+pub(super) struct Pose<'a> {
+    /// Weights of the morph targets; missing ones are 0.
+    pub weights: &'a [f32],
+    pub skin: Option<&'a Skin>,
+}
+
+/// The vertices of a primitive that its faces use.
+struct Vertices {
+    positions: Vec<Vec3>,
+    /// Unit normals, or zero; empty if the file has none.
+    normals: Vec<Vec3>,
+    /// Empty if the file has none.
+    tangents: Vec<Vec4>,
+}
+
+/// Returns the mesh of a primitive, whose faces have the slot `slot`, or `None` for points and lines. `path` is its
+/// JSON path, `n_loaded` the number of triangles that there are already.
+pub(super) fn mesh(
+    document: &Document,
+    (primitive, slot): (&Primitive, u32),
+    pose: Pose,
+    normal_map: Option<NormalMap>,
+    (path, n_loaded): (&str, u64),
+) -> Checked<Option<Mesh>> {
+    let mode = match primitive.mode {
+        Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
+        Valid(_) => {
+            document.note("points and lines, which are not shown", path);
+            return Ok(None);
+        }
+        _ => return Err(format!("{path}: its mode is none of 0 to 6")),
+    };
+    let attributes = Attributes { document, primitive, path };
+    let positions = attributes.find(Semantic::Positions, &[Type::Vec3], None)?;
+    let Some(positions) = positions else { return Err(format!("{path}.attributes: there is no POSITION")) };
+    let mut faces = attributes.faces(mode, positions.n, n_loaded)?;
+    let used = renumber(&mut faces);
+    let skin = pose.skin.map(|skin| skin.of(&attributes, positions.n)).transpose()?;
+    let vertices = attributes.vertices(&positions, &used, pose.weights, skin.as_ref())?;
+    if let Some(skin) = &skin {
+        turn_mirrored(&mut faces, |vertex| skin.mirrors(used[vertex as usize] as usize))?;
+    }
+    let mut mesh = Mesh { slots: vec![slot; faces.len()], ..Mesh::default() };
+    // Tangents without normals are ignored, as the specification says.
+    mesh.normals = corners(&faces, &vertices.normals).unwrap_or_else(|| vec![[Vec3::ZERO; 3]; faces.len()]);
+    mesh.tangents = corners(&faces, &vertices.tangents).unwrap_or_default();
+    for (set, uvs) in mesh.uvs.iter_mut().enumerate() {
+        let found = attributes.find(Semantic::TexCoords(set as u32), &[Type::Vec2], Some(positions.n))?;
+        let found = found.map(|found| read(&used, |ix| Ok(Vec2::from_array(found.numbers(ix, 0.0)?)))).transpose()?;
+        *uvs = found.and_then(|found| corners(&faces, &found)).unwrap_or_default();
+    }
+    let colours = attributes.find(Semantic::Colors(0), &[Type::Vec3, Type::Vec4], Some(positions.n))?;
+    let colours = colours.map(|found| read(&used, |ix| Ok(Vec4::from_array(found.numbers(ix, 1.0)?)))).transpose()?;
+    mesh.colours = colours.and_then(|found| corners(&faces, &found)).unwrap_or_default();
+    (mesh.positions, mesh.faces) = (vertices.positions, faces);
+    if let Some(normal_map) = normal_map.filter(|_| mesh.tangents.is_empty()) {
+        add_tangents(&mut mesh, &normal_map);
+    }
+    Ok(Some(mesh))
+}
+
+/// The attributes of a primitive.
+pub(super) struct Attributes<'a> {
+    pub document: &'a Document,
+    pub primitive: &'a Primitive,
+    /// JSON path of the primitive.
+    pub path: &'a str,
+}
+
+impl<'a> Attributes<'a> {
+    /// Returns an attribute, if the primitive has it. `n`: the number of elements that it must have.
+    pub fn find(&self, semantic: Semantic, types: &[Type], n: Option<usize>) -> Checked<Option<Accessor<'a>>> {
+        let name = semantic.to_string();
+        let Some(index) = self.primitive.attributes.get(&Valid(semantic)) else { return Ok(None) };
+        self.accessor(*index, types, n, format!("{}.attributes.{name}", self.path)).map(Some)
+    }
+
+    /// Returns an accessor that has an element for each of `n` vertices.
+    pub fn accessor(
+        &self,
+        index: Index<gltf::json::Accessor>,
+        types: &[Type],
+        n: Option<usize>,
+        path: String,
+    ) -> Checked<Accessor<'a>> {
+        let accessor = Accessor::new(self.document, index, types, path)?;
+        match n {
+            Some(n) if accessor.n != n => {
+                Err(format!("{}: has {} elements, but there are {n} vertices", accessor.path, accessor.n))
+            }
+            _ => Ok(accessor),
+        }
+    }
+
+    /// Returns the faces as indices of vertices.
+    fn faces(&self, mode: Mode, n_vertices: usize, n_loaded: u64) -> Checked<Vec<[u32; 3]>> {
+        let path = format!("{}.indices", self.path);
+        let indices = self.primitive.indices.map(|index| Accessor::new(self.document, index, &[Type::Scalar], path));
+        let indices = indices.transpose()?;
+        let n = indices.as_ref().map_or(n_vertices, |indices| indices.n);
+        let n_faces = if mode == Mode::Triangles { n / 3 } else { n.saturating_sub(2) };
+        require_for_triangles(n_loaded, n_faces as u64)?;
+        let vertex = |at: usize| {
+            let Some(indices) = &indices else { return Ok(at as u32) };
+            let [ix] = indices.integers(at);
+            if (ix as usize) < n_vertices {
+                Ok(ix)
+            } else {
+                Err(format!("{}: element {at} is {ix}, but there are {n_vertices} vertices", indices.path))
+            }
+        };
+        let face = |ix: usize| -> Checked<[u32; 3]> {
+            let [a, b, c] = match mode {
+                Mode::TriangleStrip => [ix, ix + 1 + ix % 2, ix + 2 - ix % 2],
+                Mode::TriangleFan => [ix + 1, ix + 2, 0],
+                _ => [3 * ix, 3 * ix + 1, 3 * ix + 2],
+            };
+            Ok([vertex(a)?, vertex(b)?, vertex(c)?])
+        };
+        // Strips are joined by faces without area.
+        let is_stitch = |&[a, b, c]: &[u32; 3]| mode == Mode::TriangleStrip && (a == b || b == c || c == a);
+        (0..n_faces).map(face).filter(|face| !face.as_ref().is_ok_and(is_stitch)).collect()
+    }
+
+    /// Reads positions, normals and tangents in their pose. `used` are the indices of the vertices.
+    fn vertices(
+        &self,
+        positions: &Accessor,
+        used: &[u32],
+        weights: &[f32],
+        skin: Option<&Skinning>,
+    ) -> Checked<Vertices> {
+        let normals = self.find(Semantic::Normals, &[Type::Vec3], Some(positions.n))?;
+        let tangents = match &normals {
+            Some(_) => self.find(Semantic::Tangents, &[Type::Vec4], Some(positions.n))?,
+            None => None,
+        };
+        let mut vertices = Vertices {
+            positions: read(used, |ix| Ok(Vec3::from_array(positions.numbers(ix, 0.0)?)))?,
+            normals: Vec::new(),
+            tangents: Vec::new(),
+        };
+        if let Some(normals) = normals {
+            vertices.normals = read(used, |ix| Ok(Vec3::from_array(normals.numbers(ix, 0.0)?).normalize_or_zero()))?;
+        }
+        if let Some(tangents) = tangents {
+            vertices.tangents = read(used, |ix| Ok(unit_tangent(Vec4::from_array(tangents.numbers(ix, 0.0)?))))?;
+        }
+        if let Some(morph) = Morph::new(self, weights, positions.n)? {
+            vertices.change(used, |ix, vertex| morph.apply(ix, vertex))?;
+        }
+        if let Some(skin) = skin {
+            vertices.change(used, |ix, vertex| skin.apply(ix, vertex))?;
+        }
+        Ok(vertices)
+    }
+}
+
+impl Vertices {
+    /// Changes each vertex by a function that gets its index.
+    fn change(&mut self, used: &[u32], change: impl Fn(usize, [Vec3; 3]) -> Checked<[Vec3; 3]>) -> Checked<()> {
+        for (at, ix) in used.iter().enumerate() {
+            let normal = self.normals.get(at).copied().unwrap_or_default();
+            let tangent = self.tangents.get(at).copied().unwrap_or_default();
+            let [position, normal, along] = change(*ix as usize, [self.positions[at], normal, tangent.truncate()])?;
+            self.positions[at] = position;
+            if let Some(changed) = self.normals.get_mut(at) {
+                *changed = normal.normalize_or_zero();
+            }
+            if let Some(changed) = self.tangents.get_mut(at) {
+                *changed = unit_tangent(along.extend(tangent.w));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Swaps two corners of the faces that a skin mirrors, so that their outside stays outside.
+fn turn_mirrored(faces: &mut [[u32; 3]], mirrors: impl Fn(u32) -> Checked<bool>) -> Checked<()> {
+    for face in faces {
+        if mirrors(face[0])? {
+            face.swap(1, 2);
+        }
+    }
+    Ok(())
+}
+
+/// Returns a tangent of unit length whose w is 1 or -1, or zero if the tangent has no direction.
+fn unit_tangent(tangent: Vec4) -> Vec4 {
+    match tangent.truncate().try_normalize() {
+        Some(along) => along.extend(if tangent.w < 0.0 { -1.0 } else { 1.0 }),
+        None => Vec4::ZERO,
+    }
+}
+
+fn read<T>(used: &[u32], read: impl Fn(usize) -> Checked<T>) -> Checked<Vec<T>> {
+    used.iter().map(|ix| read(*ix as usize)).collect()
+}
+
+/// Returns the values at the corners of faces, or `None` without values.
+fn corners<T: Copy>(faces: &[[u32; 3]], values: &[T]) -> Option<Vec<[T; 3]>> {
+    (!values.is_empty()).then(|| faces.iter().map(|face| face.map(|ix| values[ix as usize])).collect())
+}
+
+/// Renumbers the vertices of faces so that none is left out. Returns the former index of each, ascending.
+fn renumber(faces: &mut [[u32; 3]]) -> Vec<u32> {
+    let mut used = faces.as_flattened().to_vec();
+    used.par_sort_unstable();
+    used.dedup();
+    let is_whole = used.last().is_none_or(|last| *last as usize + 1 == used.len());
+    if !is_whole {
+        faces.as_flattened_mut().par_iter_mut().for_each(|ix| {
+            *ix = used.binary_search(ix).expect("all vertices are listed") as u32;
+        });
+    }
+    used
+}

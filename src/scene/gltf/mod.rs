@@ -1,0 +1,212 @@
+//! glTF 2.0: `.gltf` and `.glb`.
+//!
+//! A glTF mesh becomes a mesh, each of its primitives one slot of it. A node with a mesh becomes an instance. Skins and
+//! morph targets are shown in the pose that the file gives; their vertices are moved here, so that such a mesh has a
+//! copy for each pose. Animations, points and lines are not shown.
+//!
+//! The crate `gltf` parses the JSON. All indices, sizes and offsets are checked here, since its own readers panic on
+//! files that are wrong. Errors name the JSON path.
+
+mod accessor;
+mod cameras;
+mod deform;
+mod document;
+mod geometry;
+mod lights;
+mod materials;
+mod meshopt;
+mod nodes;
+mod tangents;
+mod textures;
+mod uri;
+
+use std::path::Path;
+
+use glam::Vec3;
+use gltf::json::{Node, mesh::Primitive};
+use hashbrown::HashMap;
+
+pub(super) use self::document::named_files;
+use self::{
+    deform::Skin,
+    document::{Document, item},
+    geometry::Pose,
+    materials::Materials,
+    nodes::Nodes,
+};
+use super::{
+    Instance, LoadOptions, Mesh, Scene, SceneError, Transform, error::Checked, extent, framing,
+    needs::require_for_triangles,
+};
+
+/// Loads a glTF file as a scene with its lights and cameras.
+pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Scene, SceneError> {
+    let failed = |what: String| SceneError::file(path, what);
+    let document = read(path, bytes)?;
+    let nodes = Nodes::new(&document, options.scene.as_deref()).map_err(failed)?;
+    let mut scene = Loader::new(&document, &nodes, 0, true).load(path).map_err(failed)?;
+    let bounds = scene.bounds();
+    extent::check(path, bounds)?;
+    scene.lights = lights::lights(&document, &nodes).map_err(failed)?;
+    scene.cameras = cameras::cameras(&document, &nodes, bounds).map_err(failed)?;
+    scene.camera = scene.cameras.first().map_or_else(|| framing::camera(bounds), |(_, camera)| *camera);
+    if scene.lights.is_empty() && scene.materials.iter().all(|material| material.ke == Vec3::ZERO) {
+        framing::light_up(&mut scene);
+    }
+    document.warn(path);
+    Ok(scene)
+}
+
+/// Loads the meshes of a glTF file's default scene with their materials and images, without its lights and cameras. If
+/// `has_materials` is false, the materials and images are left out, and the instances' materials have no meaning.
+/// `n_loaded` is the number of triangles that there are already.
+pub(super) fn load_meshes(
+    path: &Path,
+    bytes: Vec<u8>,
+    has_materials: bool,
+    n_loaded: usize,
+) -> Result<Scene, SceneError> {
+    let failed = |what: String| SceneError::file(path, what);
+    let document = read(path, bytes)?;
+    let nodes = Nodes::new(&document, None).map_err(failed)?;
+    let scene = Loader::new(&document, &nodes, n_loaded as u64, has_materials).load(path).map_err(failed)?;
+    document.warn(path);
+    Ok(scene)
+}
+
+fn read(path: &Path, bytes: Vec<u8>) -> Result<Document, SceneError> {
+    let document = Document::read(path, &bytes).map_err(|what| SceneError::file(path, what))?;
+    for ix in 0..document.root.animations.len() {
+        let name = document.root.animations[ix].name.clone();
+        document.note("animations, which are not shown", name.unwrap_or_else(|| format!("animations[{ix}]")));
+    }
+    Ok(document)
+}
+
+/// What makes two instances share a mesh: the mesh's index, the skin's, and the bits of the weights of morph targets.
+type MeshKey = (usize, Option<usize>, Vec<u32>);
+
+/// Loads the meshes of a scene's nodes.
+struct Loader<'a> {
+    document: &'a Document,
+    nodes: &'a Nodes,
+    /// Number of triangles of the meshes so far, and of those that were loaded before.
+    n_loaded: u64,
+    has_materials: bool,
+    materials: Materials<'a>,
+    meshes: Vec<Mesh>,
+    /// Indices into `meshes`, and the materials of the mesh; `None` for meshes without triangles.
+    known: HashMap<MeshKey, Option<(usize, Vec<u32>)>>,
+}
+
+impl<'a> Loader<'a> {
+    fn new(document: &'a Document, nodes: &'a Nodes, n_loaded: u64, has_materials: bool) -> Self {
+        let materials = Materials::new(document);
+        Self { document, nodes, n_loaded, has_materials, materials, meshes: Vec::new(), known: HashMap::new() }
+    }
+
+    fn load(mut self, path: &Path) -> Checked<Scene> {
+        let mut scene = Scene::empty(path);
+        let mut n_placed = self.n_loaded;
+        for &ix in &self.nodes.shown {
+            let Some(instance) = self.instance(ix)? else { continue };
+            let mesh = &self.meshes[instance.mesh_ix];
+            n_placed += mesh.faces.len() as u64;
+            require_for_triangles(n_placed, 0)?;
+            mesh.placed(&instance.transform).map_err(|what| format!("nodes[{ix}]: {what}"))?;
+            scene.instances.push(instance);
+        }
+        if scene.instances.is_empty() {
+            return Err("has no triangles".to_owned());
+        }
+        scene.meshes = self.meshes;
+        scene.materials = self.materials.materials;
+        scene.images = self.materials.textures.decode(&mut scene.materials);
+        Ok(scene)
+    }
+
+    /// Returns the instance that a node is, if it has a mesh with triangles.
+    fn instance(&mut self, node_ix: usize) -> Checked<Option<Instance>> {
+        let document = self.document;
+        let node = &document.root.nodes[node_ix];
+        let Some(mesh) = node.mesh else { return Ok(None) };
+        // The joints of a skin place it, and its node does not.
+        let transform = match node.skin {
+            Some(_) => Transform::IDENTITY,
+            None => match Transform::of_affine(self.nodes.world_from_node(node_ix).unwrap_or_default()) {
+                Ok(transform) => transform,
+                Err(_) => {
+                    document.note("meshes that their nodes flatten, which are left out", format!("nodes[{node_ix}]"));
+                    return Ok(None);
+                }
+            },
+        };
+        let json = item(&document.root.meshes, "meshes", mesh.value(), &format_args!("nodes[{node_ix}].mesh"))?;
+        let weights = node.weights.as_ref().or(json.weights.as_ref()).map(|weights| &weights[..]).unwrap_or_default();
+        let bits = weights.iter().map(|weight| weight.to_bits()).collect();
+        let key = (mesh.value(), node.skin.map(|skin| skin.value()), bits);
+        let known = match self.known.get(&key) {
+            Some(known) => known.clone(),
+            None => {
+                let known = self.mesh(mesh.value(), node, node_ix, weights)?;
+                self.known.insert(key, known.clone());
+                known
+            }
+        };
+        Ok(known.map(|(mesh_ix, materials)| Instance { mesh_ix, transform, materials }))
+    }
+
+    /// Adds the mesh of a node in its pose. Returns its index and its materials, or `None` if it has no triangles.
+    fn mesh(
+        &mut self,
+        mesh_ix: usize,
+        node: &Node,
+        node_ix: usize,
+        weights: &[f32],
+    ) -> Checked<Option<(usize, Vec<u32>)>> {
+        let document = self.document;
+        let skin = node.skin.map(|skin| self.skin(skin.value(), node_ix)).transpose()?;
+        if weights.iter().any(|weight| !weight.is_finite()) {
+            return Err(format!("nodes[{node_ix}]: a weight of its morph targets is not finite"));
+        }
+        let pose = Pose { weights, skin: skin.as_ref() };
+        let (mut whole, mut materials) = (Mesh::default(), Vec::new());
+        for (ix, primitive) in document.root.meshes[mesh_ix].primitives.iter().enumerate() {
+            let path = format!("meshes[{mesh_ix}].primitives[{ix}]");
+            self.note_morphs(primitive, &path);
+            let material = if self.has_materials { self.materials.index(primitive.material, &path)? } else { 0 };
+            let normal_map = if self.has_materials { self.materials.normal_map(material) } else { None };
+            let part = (primitive, materials.len() as u32);
+            let Some(mesh) = geometry::mesh(document, part, pose, normal_map, (&path, self.n_loaded))? else {
+                continue;
+            };
+            self.n_loaded += mesh.faces.len() as u64;
+            materials.push(material);
+            whole.append(mesh);
+        }
+        if whole.faces.is_empty() {
+            return Ok(None);
+        }
+        self.meshes.push(whole);
+        Ok(Some((self.meshes.len() - 1, materials)))
+    }
+
+    /// Returns a skin in the pose of its joints.
+    fn skin(&self, skin_ix: usize, node_ix: usize) -> Checked<Skin> {
+        let skin = item(&self.document.root.skins, "skins", skin_ix, &format_args!("nodes[{node_ix}].skin"))?;
+        let joint = |(ix, joint): (usize, &gltf::json::Index<Node>)| {
+            let transform = self.nodes.world_from_node(joint.value());
+            transform.ok_or_else(|| format!("skins[{skin_ix}].joints[{ix}]: nodes[{joint}] is not in the scene"))
+        };
+        let joints = skin.joints.iter().enumerate().map(joint).collect::<Checked<_>>()?;
+        let name = skin.name.clone().unwrap_or_else(|| format!("skins[{skin_ix}]"));
+        self.document.note("skins, which are shown in their rest pose", name);
+        Skin::new(self.document, skin_ix, joints)
+    }
+
+    fn note_morphs(&self, primitive: &Primitive, path: &str) {
+        if primitive.targets.as_ref().is_some_and(|targets| !targets.is_empty()) {
+            self.document.note("morph targets, which are shown with their default weights", path);
+        }
+    }
+}
