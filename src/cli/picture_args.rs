@@ -3,9 +3,11 @@
 use clap::{ValueEnum, value_parser};
 use kdray::{
     accel::{AccelKind, kdtree::Traversal},
+    cpu::metered_exposure,
     engine::choices::{BuildPolicy, Request},
     frame::{Denoise, Primary, RenderOptions, Tonemap},
     scene::Scene,
+    world::World,
 };
 
 use super::{args::Size, error::CliError, or_auto::OrAuto};
@@ -27,7 +29,8 @@ pub struct PictureArgs {
     /// the scene's, else 2.5]
     #[arg(long, value_name = "X", value_parser = threshold)]
     pub denoise_threshold: Option<f32>,
-    /// Factor on radiance before the tone curve, above 0 [default: the scene's]
+    /// Factor on radiance before the tone curve, above 0 [default: the scene's; measured in the first view if the
+    /// scene's lights have physical units, as in glTF files]
     #[arg(long, value_name = "X", value_parser = positive)]
     pub exposure: Option<f32>,
     #[arg(long, value_name = "CURVE")]
@@ -191,6 +194,16 @@ impl PictureArgs {
             denoise: self.denoise(scene.denoise),
             ..RenderOptions::default()
         }
+    }
+
+    /// Sets the exposure of a scene whose light has physical units, unless the user has set it. Returns a note that says
+    /// what it is.
+    pub fn meter(&self, world: &World, options: &mut RenderOptions) -> Option<String> {
+        if self.exposure.is_some() || !world.scene().defaults.is_metered {
+            return None;
+        }
+        options.exposure = metered_exposure(world);
+        Some(format!("exposure {0}, measured in the first view; --exposure {0} pins it", options.exposure))
     }
 
     /// Returns the user's noise filter, or the scene's. `--denoise-threshold` alone turns the filter on.

@@ -37,7 +37,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     let (scene, _) = progress.stage(&format!("loading {}", args.scene.display()), || Scene::load(&args.scene));
     let scene = scene?;
     scene.warn_if_unlit(&args.scene);
-    let options = args.picture.options(&scene);
+    let mut options = args.picture.options(&scene);
     let tour = tour(args, scene.camera)?;
     let max_samples = args.spp.unwrap_or(if tour.is_some() { 1 } else { SAMPLES_AT_REST });
     let workload = match &tour {
@@ -53,6 +53,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     build::check_memory(accel, scene.n_triangles())?;
     let building = build::building(accel, scene.n_triangles());
     let (loaded, _) = progress.stage(&building, || LoadedScene::with_tree(&args.scene, scene, load_options));
+    args.picture.meter(&loaded.world, &mut options).into_iter().for_each(|note| progress.note(&note));
     drop(progress);
 
     let vsync = args.vsync == Switch::On;

@@ -5,6 +5,7 @@
 //! render   the frame, batch by batch, in the order of its plan
 //!   queue    the rays of a batch
 //!   timing   wall-clock times of passes
+//! meter    the exposure of a scene whose light has physical units
 //! trace    the reference's passes that trace rays, with the tracer of this folder
 //!   tracer   traces rays one after the other, or as packets:
 //!     octant_bins        collect rays of one octant until they fill a packet
@@ -13,6 +14,7 @@
 //! ```
 
 pub mod lanes;
+mod meter;
 pub mod octant_bins;
 pub mod packet;
 pub mod packet_traverser;
@@ -25,6 +27,7 @@ mod trace;
 pub mod tracer;
 
 pub use self::{
+    meter::metered_exposure,
     render::{Batching, Renderer},
     trace::{cast, shadow, trace, visibility},
 };

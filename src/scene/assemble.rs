@@ -310,6 +310,7 @@ fn render_defaults(spec: &RenderSpec) -> Checked<RenderDefaults> {
             None => defaults.tonemap,
         },
         exposure: within("exposure", spec.exposure.unwrap_or(defaults.exposure), 1e-6, 1e6)?,
+        is_metered: false,
         denoise: match spec.denoise.unwrap_or(SceneDenoise::Paper) {
             SceneDenoise::Off => Denoise::Off,
             SceneDenoise::Paper => Denoise::Paper { threshold },

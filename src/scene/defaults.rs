@@ -13,6 +13,9 @@ pub struct RenderDefaults {
     pub max_depth: u32,
     /// Factor on radiance before the tone curve.
     pub exposure: f32,
+    /// Whether the exposure is to be measured ([`metered_exposure`](crate::cpu::metered_exposure)) in place of
+    /// `exposure`. It is for scenes of files whose lights have physical units.
+    pub is_metered: bool,
     /// The curve from radiance to display.
     pub tonemap: Tonemap,
     /// The noise filter.
@@ -22,14 +25,14 @@ pub struct RenderDefaults {
 impl Default for RenderDefaults {
     fn default() -> Self {
         let RenderOptions { width, height, max_depth, exposure, tonemap, denoise, .. } = RenderOptions::default();
-        Self { width, height, max_depth, exposure, tonemap, denoise }
+        Self { width, height, max_depth, exposure, is_metered: false, tonemap, denoise }
     }
 }
 
 impl RenderDefaults {
     /// Returns full render options with the scene's values.
     pub fn options(&self) -> RenderOptions {
-        let &Self { width, height, max_depth, exposure, tonemap, denoise } = self;
+        let &Self { width, height, max_depth, exposure, tonemap, denoise, .. } = self;
         RenderOptions { width, height, max_depth, exposure, tonemap, denoise, ..RenderOptions::default() }
     }
 }

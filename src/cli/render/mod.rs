@@ -66,7 +66,8 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let (built, build_ms) = progress.stage(&building, build);
     let Built { world, accel } = built.map_err(GpuError::from)?;
     let methods = engine.methods(&world, &workload)?;
-    let options = methods.apply(&options);
+    let mut options = methods.apply(&options);
+    args.picture.meter(&world, &mut options).into_iter().for_each(|note| progress.note(&note));
     let crop = options.crop_or_whole();
     let rendering = format!("rendering {}x{}", crop.width(), crop.height());
     let (drawn, _) = progress.stage(&rendering, || {

@@ -50,8 +50,11 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     scene.lights = lights::lights(&document, &nodes).map_err(failed)?;
     scene.cameras = cameras::cameras(&document, &nodes, bounds).map_err(failed)?;
     scene.camera = scene.cameras.first().map_or_else(|| framing::camera(bounds), |(_, camera)| *camera);
-    if scene.lights.is_empty() && scene.materials.iter().all(|material| material.ke == Vec3::ZERO) {
+    // The light of emissive surfaces does not reach others.
+    if scene.lights.is_empty() {
         framing::light_up(&mut scene);
+    } else {
+        scene.defaults.is_metered = true;
     }
     document.warn(path);
     Ok(scene)

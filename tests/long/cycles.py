@@ -1,0 +1,705 @@
+"""Compares kdray's pictures with those of Cycles, Blender's path tracer, feature by feature.
+
+Needs from PyPI, in Python 3.11: bpy==4.5.15, numpy, OpenEXR. Usage:
+
+    python3 tests/long/cycles.py KDRAY [--keep FOLDER] [--cpu] [--only NAME,NAME]
+
+Each case is a small scene that this script makes in Blender: objects, one light of radius 0, a camera. Blender exports
+it as .glb or .obj and renders it by Cycles with direct light alone (no bounces). kdray renders the exported file. Both
+take their samples at the pixels' centres, so that pictures are compared pixel by pixel, edges included. With --keep,
+the files, the pictures and contact sheets (NAME.png: kdray on the left, Cycles on the right, and the relative difference,
+white from 20 % on) stay in FOLDER.
+
+Units. No factor is fitted. The exporter's lighting mode `COMPAT` keeps watts: a point light or spot of P watts gets the
+intensity P / (4 pi) W/sr, and a sun of S W/m^2 the illuminance S. kdray divides both by pi and has no 1/pi in its
+reflectances, so that a Lambertian surface of reflectance c under the irradiance E shows c E / pi in both programs.
+
+Bounds. Compared are the pixels in which either picture exceeds a thousandth of the greater picture's maximum, in all
+three channels together. `mean` is the relative difference of the means, `p95` the 95th percentile of the relative
+difference of pixels (the absolute difference, divided by the greater value), `outliers` the share of pixels that differ
+by more than 10 %. A case that comes out of its bounds fails. Bounds are in `CASES`; those above a percent have these
+reasons:
+
+| cases | known difference |
+|---|---|
+| `highlight`, `dielectric`, `half_metal`, `obj_pbr` | glTF and kdray have Schlick's approximation of a dielectric's reflectance, and Cycles the exact one, which is up to a percent higher where light and view enclose about 40 degrees |
+| `dielectric`, `half_metal`, `obj_pbr` | diffuse light is weakened by the reflectance at the half vector in glTF, and in Cycles by all that the highlight reflects towards the viewer, which grows at grazing views: 40 % at the rim of a smooth sphere |
+| `spot_hard` | glTF's formula, as its specification recommends, has an edge of at least 0.001 in the cosine. Cycles's edge is sharp |
+| `spot_soft` | none: as the formulas differ, Cycles renders a point light, and this script multiplies its picture by glTF's formula |
+| `texture_wrapped` | kdray shows smaller levels of an image where the surface is seen at a grazing angle, Cycles has no levels |
+| `texture_linear`, `obj` | Cycles blends the encoded values of neighbouring pixels, kdray the decoded ones. The images are gradients, in which this is little |
+| `normal_map` | the shadow that a bent normal does not know: kdray weakens the light after Chiang et al. (2019), Cycles after Estevez et al. (2019), which is up to 40 % brighter near the terminator (`normal_map_side`). kdray rounds tangents to 16 bits |
+| `vertex_colours` | kdray rounds colours of corners to 8 bits of sRGB |
+| `smooth_heads`, `obj` | kdray moves the origins of shadow rays up to the curved surface that the normals suggest, whatever the light's direction, up to 7 % of the size of a coarse head. Shadows on it shift, and light that something else stops leaks in |
+| `many_lights` | Cycles selects one light for each sample, so that its picture has noise |
+| `alpha_blend` | Cycles selects by chance what a see-through surface shows. kdray's shadows of such surfaces are full or none, so that they are not compared |
+"""
+
+import argparse
+import math
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+# Blender's own module `cycles` would otherwise be looked for in this file.
+sys.path[:] = [path for path in sys.path if Path(path).resolve() != Path(__file__).resolve().parent]
+
+import bpy
+import numpy as np
+import OpenEXR
+
+# These modules exist once `bpy` has been imported.
+import bmesh
+from mathutils import Vector
+
+SIZE = (160, 120)
+# Relative difference of a pixel from which on it is an outlier.
+OUTLIER = 0.1
+
+
+# --- Scenes -------------------------------------------------------------------------------------------------------
+
+
+def reset():
+    """Empties Blender and sets Cycles up for direct light, one sample at each pixel's centre."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x, scene.render.resolution_y = SIZE
+    scene.render.resolution_percentage = 100
+    scene.render.film_transparent = False
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_mode = "RGB"
+    scene.render.image_settings.color_depth = "32"
+    cycles = scene.cycles
+    cycles.device = "CPU"
+    cycles.samples = 1
+    cycles.use_adaptive_sampling = False
+    cycles.use_denoising = False
+    cycles.max_bounces = 0
+    cycles.transparent_max_bounces = 16
+    cycles.light_sampling_threshold = 0.0
+    cycles.sample_clamp_direct = 0.0
+    cycles.blur_glossy = 0.0
+    # A filter of almost no width: all samples are at the pixel's centre.
+    cycles.pixel_filter_type = "GAUSSIAN"
+    cycles.filter_width = 0.01
+    camera((0.0, -6.0, 3.0), (0.0, 0.0, 0.6))
+
+
+def look(thing, eye, target):
+    """Puts an object at `eye` and turns its -z axis towards `target`."""
+    thing.location = eye
+    thing.rotation_euler = (Vector(target) - Vector(eye)).to_track_quat("-Z", "Y").to_euler()
+
+
+def add(name, data):
+    """Adds an object to the scene."""
+    thing = bpy.data.objects.new(name, data)
+    bpy.context.scene.collection.objects.link(thing)
+    # Cycles would otherwise move the origins of shadow rays away from smooth surfaces.
+    if hasattr(thing, "cycles"):
+        thing.cycles.shadow_terminator_geometry_offset = 0.0
+        thing.cycles.shadow_terminator_offset = 0.0
+    return thing
+
+
+def camera(eye, target, degrees=40.0):
+    """Sets the scene's camera; `degrees` is its horizontal field of view."""
+    data = bpy.data.cameras.new("camera")
+    data.angle = math.radians(degrees)
+    thing = add("camera", data)
+    look(thing, eye, target)
+    bpy.context.scene.camera = thing
+
+
+def light(kind, power, eye, target=(0.0, 0.0, 0.0), colour=(1.0, 1.0, 1.0), **values):
+    """Adds a light of radius 0. `power`: watts, or of a sun watts per square metre."""
+    data = bpy.data.lights.new("light", kind)
+    data.energy, data.color = power, colour
+    if kind == "SUN":
+        data.angle = 0.0
+    else:
+        data.shadow_soft_size = 0.0
+    for key, value in values.items():
+        setattr(data, key, value)
+    look(add("light", data), eye, target)
+
+
+def point_light():
+    """Adds the light of most cases."""
+    light("POINT", 600.0, (-2.5, -3.0, 5.0), colour=(1.0, 0.9, 0.7))
+
+
+def material(name, colour=(0.8, 0.8, 0.8), specular=0.0, **values):
+    """Makes a material of the Principled BSDF without multiple scattering. `specular`: 0.5 for a dielectric as it is.
+
+    Further values are inputs of the node, with underscores for the spaces of their names. Returns the material.
+    """
+    made = bpy.data.materials.new(name)
+    made.use_nodes = True
+    made.cycles.emission_sampling = "NONE"
+    node = made.node_tree.nodes["Principled BSDF"]
+    node.distribution = "GGX"
+    node.inputs["Base Color"].default_value = (*colour, 1.0)
+    node.inputs["Roughness"].default_value = 1.0
+    node.inputs["Specular IOR Level"].default_value = specular
+    for key, value in values.items():
+        node.inputs[key.replace("_", " ")].default_value = value
+    return made
+
+
+def principled(made):
+    """Returns the nodes, the links and the Principled BSDF of a material."""
+    tree = made.node_tree
+    return tree.nodes, tree.links, tree.nodes["Principled BSDF"]
+
+
+def mesh(name, points, faces, made, uvs=None):
+    """Adds a mesh of polygons. `uvs`: one for each point."""
+    data = bpy.data.meshes.new(name)
+    data.from_pydata(points, [], faces)
+    if uvs is not None:
+        layer = data.uv_layers.new(name="UVMap")
+        for loop in data.loops:
+            layer.data[loop.index].uv = uvs[loop.vertex_index]
+    data.materials.append(made)
+    return add(name, data)
+
+
+def rectangle(name, origin, along, up, made, inset=0.0):
+    """Adds a parallelogram whose texture coordinates go from (0, 0) at `origin` to (1, 1), less `inset` on all sides."""
+    o, a, u = np.array(origin), np.array(along), np.array(up)
+    points = [tuple(map(float, p)) for p in (o, o + a, o + a + u, o + u)]
+    a, b = inset, 1.0 - inset
+    return mesh(name, points, [(0, 1, 2, 3)], made, [(a, a), (b, a), (b, b), (a, b)])
+
+
+def floor(made=None):
+    """Adds a square of 8 by 8 in the plane z = 0."""
+    return rectangle("floor", (-4, -4, 0), (8, 0, 0), (0, 8, 0), made or material("floor", (0.6, 0.6, 0.6)))
+
+
+def take(made, smooth):
+    """Takes the object that an operator has just made: gives it a material and smooth or flat faces.
+
+    Faces become triangles, since the exporter gives a flat, bent quadrangle one normal, and Cycles two.
+    """
+    thing = bpy.context.object
+    cut = bmesh.new()
+    cut.from_mesh(thing.data)
+    bmesh.ops.triangulate(cut, faces=cut.faces)
+    cut.to_mesh(thing.data)
+    cut.free()
+    for polygon in thing.data.polygons:
+        polygon.use_smooth = smooth
+    thing.data.materials.append(made)
+    thing.cycles.shadow_terminator_geometry_offset = 0.0
+    thing.cycles.shadow_terminator_offset = 0.0
+    return thing
+
+
+def sphere(made, centre=(0.0, 0.0, 1.0), radius=1.0, segments=64, smooth=True):
+    """Adds a sphere of `segments` by half as many faces."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=segments // 2, radius=radius, location=centre)
+    return take(made, smooth)
+
+
+def monkey(made, centre=(0.0, 0.0, 1.0), scale=(1.0, 1.0, 1.0), smooth=False):
+    """Adds Blender's head of a monkey."""
+    bpy.ops.mesh.primitive_monkey_add(location=centre)
+    bpy.context.object.scale = scale
+    return take(made, smooth)
+
+
+def image(name, pixels, linear=False):
+    """Saves an array of rows from the top, of RGBA from 0 to 1, as a PNG in the working directory, and loads it."""
+    height, width = pixels.shape[:2]
+    made = bpy.data.images.new(name, width, height, alpha=True)
+    made.colorspace_settings.name = "Non-Color" if linear else "sRGB"
+    made.pixels.foreach_set(np.ascontiguousarray(pixels[::-1], dtype=np.float32).ravel())
+    made.filepath_raw, made.file_format = str(Path.cwd() / name), "PNG"
+    made.save()
+    loaded = bpy.data.images.load(str(Path.cwd() / name))
+    loaded.colorspace_settings.name = "Non-Color" if linear else "sRGB"
+    # Colours would otherwise be multiplied by opacity, and rounded.
+    loaded.alpha_mode = "CHANNEL_PACKED"
+    return loaded
+
+
+def texture(made, loaded, filtering="Linear", extension="REPEAT"):
+    """Adds a node that shows an image to a material, and returns it."""
+    nodes, _, _ = principled(made)
+    node = nodes.new("ShaderNodeTexImage")
+    node.image, node.interpolation, node.extension = loaded, filtering, extension
+    return node
+
+
+def letters():
+    """Returns an image of 8 by 8 pixels without any symmetry: an F, and corners of different colours."""
+    rows = ["#......g", "..####..", "..#.....", "..###...", "..#.....", "..#.....", "..#.....", "b......w"]
+    colours = {".": (0.35, 0.30, 0.25), "#": (0.9, 0.2, 0.1), "g": (0.1, 0.8, 0.2), "b": (0.1, 0.2, 0.9), "w": (1, 1, 1)}
+    return np.array([[(*colours[c], 1.0) for c in row] for row in rows])
+
+
+def gradient(n=64):
+    """Returns an image whose red grows to the right, whose green grows downwards, and whose blue is 0.5."""
+    y, x = np.mgrid[0:n, 0:n] / (n - 1)
+    return np.stack([0.15 + 0.8 * x, 0.15 + 0.8 * y, np.full_like(x, 0.5), np.ones_like(x)], axis=-1)
+
+
+def slopes(n=64):
+    """Returns a normal map: waves along x in the upper half, along y in the lower half, a tilt at the right."""
+    y, x = np.mgrid[0:n, 0:n] / n
+    dx = np.where(y < 0.5, 0.6 * np.sin(6 * np.pi * x), 0.0) + np.where(x > 0.75, 0.4, 0.0)
+    dy = np.where(y >= 0.5, 0.6 * np.sin(6 * np.pi * y), 0.0) - np.where(x > 0.75, 0.2, 0.0)
+    normal = np.stack([dx, dy, np.ones_like(dx)], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    return np.concatenate([normal * 0.5 + 0.5, np.ones((n, n, 1))], axis=-1)
+
+
+def diffuse():
+    """A matt sphere on a matt floor, by a point light."""
+    floor()
+    sphere(material("matt", (0.8, 0.4, 0.2)))
+    point_light()
+
+
+def sun():
+    """The same by a sun that is not overhead."""
+    floor()
+    monkey(material("matt", (0.8, 0.4, 0.2)))
+    light("SUN", 3.0, (-2.0, -3.0, 4.0), colour=(1.0, 0.8, 0.6))
+
+
+def spot_hard():
+    """A spot with a sharp edge, aimed beside the middle."""
+    floor()
+    sphere(material("matt", (0.8, 0.4, 0.2)))
+    light("SPOT", 900.0, (-2.5, -2.0, 5.0), (0.3, 0.4, 0.2), spot_size=math.radians(40), spot_blend=0.0)
+
+
+def spot_soft():
+    """A spot with a soft edge."""
+    floor()
+    light("SPOT", 900.0, (-2.5, -2.0, 5.0), (0.3, 0.4, 0.2), spot_size=math.radians(40), spot_blend=0.4)
+
+
+def gltf_spot():
+    """Makes the spot a point light, and returns what glTF's formula makes of its light on the floor, for each pixel."""
+    scene = bpy.context.scene
+    scene.view_layers[0].update()
+    lamp = next(thing for thing in bpy.data.objects if thing.type == "LIGHT")
+    outer = lamp.data.spot_size / 2.0
+    inner = outer * (1.0 - lamp.data.spot_blend)
+    lamp.data.type = "POINT"
+    bpy.data.lights[0].shadow_soft_size = 0.0
+    seen, half = scene.camera, math.tan(scene.camera.data.angle / 2.0)
+    y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]] + 0.5
+    aside, up = (2.0 * x / SIZE[0] - 1.0) * half, (1.0 - 2.0 * y / SIZE[1]) * half * SIZE[1] / SIZE[0]
+    rays = np.stack([aside, up, -np.ones_like(x)], axis=-1) @ np.array(seen.matrix_world.to_3x3()).T
+    points = np.array(seen.location) - rays * (seen.location.z / rays[..., 2:])
+    towards = points - np.array(lamp.location)
+    axis = np.array(lamp.matrix_world.to_3x3() @ Vector((0.0, 0.0, -1.0)))
+    cosine = towards @ axis / np.linalg.norm(towards, axis=-1)
+    share = (cosine - math.cos(outer)) / (math.cos(inner) - math.cos(outer))
+    return np.clip(share, 0.0, 1.0)[..., None] ** 2
+
+
+def metal(roughness):
+    """Returns a case of a coloured metal."""
+
+    def build():
+        sphere(material("metal", (0.9, 0.6, 0.3), Metallic=1.0, Roughness=roughness, specular=0.5))
+        light("POINT", 600.0, (-2.5, -4.0, 5.0))
+
+    return build
+
+
+def dielectric(roughness, colour=(0.0, 0.0, 0.0)):
+    """Returns a case of a dielectric; a black one shows its highlight alone."""
+
+    def build():
+        sphere(material("dielectric", colour, Roughness=roughness, specular=0.5))
+        light("POINT", 600.0, (-2.5, -4.0, 5.0))
+
+    return build
+
+
+def half_metal():
+    """A sphere that is metal by 40 %."""
+    sphere(material("mixed", (0.9, 0.6, 0.3), Metallic=0.4, Roughness=0.5, specular=0.5))
+    light("POINT", 600.0, (-2.5, -4.0, 5.0))
+
+
+def card(made):
+    """Adds an upright rectangle that faces the camera and its light."""
+    thing = rectangle("card", (-1.6, 0.0, -0.6), (3.2, 0, 0), (0, 0.8, 2.3), made)
+    light("POINT", 600.0, (-1.5, -4.0, 4.0))
+    return thing
+
+
+def base_texture(pixels, filtering, extension):
+    """Returns a case of a texture of the base colour."""
+
+    def build():
+        made = material("textured")
+        _, links, node = principled(made)
+        shown = texture(made, image("base.png", pixels()), filtering, extension)
+        links.new(shown.outputs["Color"], node.inputs["Base Color"])
+        card(made)
+
+    return build
+
+
+def wrapped_texture():
+    """A texture on a sphere, moved, scaled and turned by a mapping node."""
+    made = material("textured")
+    nodes, links, node = principled(made)
+    shown = texture(made, image("base.png", letters()), "Closest")
+    mapping, coordinates = nodes.new("ShaderNodeMapping"), nodes.new("ShaderNodeTexCoord")
+    mapping.inputs["Location"].default_value = (0.15, 0.3, 0.0)
+    mapping.inputs["Rotation"].default_value = (0.0, 0.0, math.radians(25))
+    mapping.inputs["Scale"].default_value = (3.0, 2.0, 1.0)
+    links.new(coordinates.outputs["UV"], mapping.inputs["Vector"])
+    links.new(mapping.outputs["Vector"], shown.inputs["Vector"])
+    links.new(shown.outputs["Color"], node.inputs["Base Color"])
+    sphere(made)
+    point_light()
+
+
+def normal_map(place):
+    """Returns a case of a normal map on what `place` adds."""
+
+    def build():
+        made = material("bumpy", (0.7, 0.7, 0.7))
+        nodes, links, node = principled(made)
+        mapped = nodes.new("ShaderNodeNormalMap")
+        links.new(texture(made, image("normal.png", slopes(), True)).outputs["Color"], mapped.inputs["Color"])
+        links.new(mapped.outputs["Normal"], node.inputs["Normal"])
+        place(made)
+
+    return build
+
+
+def normal_mapped_sphere(x_scale, eye):
+    """Returns a place of a normal map on a sphere, which its node mirrors if `x_scale` is -1, with a light at `eye`."""
+
+    def place(made):
+        sphere(made).scale = (x_scale, 1.0, 1.0)
+        light("POINT", 600.0, eye)
+
+    return place
+
+
+def metallic_roughness():
+    """Roughness in green and metallic in blue of one texture, as glTF packs them."""
+    n = 64
+    y, x = np.mgrid[0:n, 0:n] / (n - 1)
+    packed = np.stack([np.zeros_like(x), 0.4 + 0.6 * x, (y > 0.5) * 1.0, np.ones_like(x)], axis=-1)
+    made = material("packed", (0.8, 0.5, 0.3), specular=0.0)
+    nodes, links, node = principled(made)
+    split = nodes.new("ShaderNodeSeparateColor")
+    links.new(texture(made, image("packed.png", packed, True), "Closest").outputs["Color"], split.inputs["Color"])
+    links.new(split.outputs["Green"], node.inputs["Roughness"])
+    links.new(split.outputs["Blue"], node.inputs["Metallic"])
+    card(made)
+
+
+def vertex_colours():
+    """Colours of corners, linear, on a sphere of flat faces."""
+    made = material("coloured")
+    nodes, links, node = principled(made)
+    colours = nodes.new("ShaderNodeVertexColor")
+    colours.layer_name = "Col"
+    links.new(colours.outputs["Color"], node.inputs["Base Color"])
+    thing = sphere(made, segments=16, smooth=False)
+    layer = thing.data.color_attributes.new("Col", "FLOAT_COLOR", "CORNER")
+    rng = np.random.default_rng(1)
+    for entry in layer.data:
+        entry.color = (*rng.uniform(0.05, 0.95, 3), 1.0)
+    point_light()
+
+
+def holes(round_alpha, alpha):
+    """Returns a case of a card with opacity above a floor, which shows the card's shadow."""
+
+    def build():
+        floor()
+        made = material("holes", (0.8, 0.3, 0.2))
+        nodes, links, node = principled(made)
+        pixels = letters()
+        pixels[..., 3] = alpha(pixels)
+        shown = texture(made, image("holes.png", pixels), "Closest")
+        links.new(shown.outputs["Color"], node.inputs["Base Color"])
+        if round_alpha:
+            rounding = nodes.new("ShaderNodeMath")
+            rounding.operation = "ROUND"
+            links.new(shown.outputs["Alpha"], rounding.inputs[0])
+            links.new(rounding.outputs[0], node.inputs["Alpha"])
+        else:
+            links.new(shown.outputs["Alpha"], node.inputs["Alpha"])
+            made.surface_render_method = "BLENDED"
+            bpy.context.scene.cycles.samples = 4096
+        thing = rectangle("card", (-1.2, 0.0, 0.4), (2.4, 0, 0), (0, 0, 2.0), made)
+        # Light passes through such surfaces unweakened in kdray, if their opacity is below 0.5.
+        thing.visible_shadow = round_alpha
+        light("POINT", 900.0, (-0.5, -3.0, 5.0))
+
+    return build
+
+
+def emission():
+    """A sphere that emits more than its factor can say, on a floor."""
+    floor()
+    made = material("glowing", (0.3, 0.3, 0.3), Emission_Color=(0.5, 0.2, 0.1, 1.0), Emission_Strength=3.0)
+    # Cycles would otherwise light the floor by the sphere.
+    sphere(made).visible_diffuse = False
+    point_light()
+
+
+def negative_scale(smooth):
+    """Returns a case of mirrored, stretched and turned heads on a floor."""
+
+    def build():
+        floor()
+        made = material("matt", (0.8, 0.4, 0.2))
+        monkey(made, (-1.2, 0.0, 1.0), (-1.0, 1.0, 1.0), smooth)
+        monkey(made, (1.2, 0.0, 1.0), (0.8, -0.8, -1.2), smooth).rotation_euler = (0.2, 0.4, 0.6)
+        light("SUN", 3.0, (-2.0, -3.0, 4.0))
+
+    return build
+
+
+def terminator():
+    """A smooth sphere of few faces, whose facets shadow themselves, by a sun from the side."""
+    sphere(material("matt"), segments=16)
+    light("SUN", 3.0, (-4.0, -1.0, 1.5))
+
+
+def many_lights():
+    """Three lights of different kinds and colours."""
+    floor()
+    sphere(material("matt"))
+    light("POINT", 400.0, (-2.5, -3.0, 5.0), colour=(1.0, 0.3, 0.3))
+    light("SUN", 1.0, (2.0, -3.0, 4.0), colour=(0.3, 1.0, 0.3))
+    light("SPOT", 900.0, (0.5, -2.0, 5.0), colour=(0.3, 0.3, 1.0), spot_size=1.0, spot_blend=0.0)
+    bpy.context.scene.cycles.samples = 1024
+
+
+def obj_scene(specular):
+    """Returns a case of a card with a texture whose name has spaces, and a smooth head, by a sun, for OBJ, which has no
+    lights of its own."""
+
+    def build():
+        made = material("textured", specular=specular)
+        _, links, node = principled(made)
+        shown = texture(made, image("my picture of (a) gradient.png", gradient()))
+        links.new(shown.outputs["Color"], node.inputs["Base Color"])
+        # The border is left out, since OBJ files repeat the image, and colours are blended differently there.
+        rectangle("card", (-2.2, 0.6, 0.0), (2.2, 0, 0), (0, 0.3, 2.0), made, 0.02)
+        monkey(material("matt", (0.2, 0.5, 0.8), specular=specular), (1.0, 0.0, 1.0), smooth=True)
+        light("SUN", 3.0, (-2.0, -3.0, 4.0), colour=(1.0, 0.8, 0.6))
+
+    return build
+
+
+# --- Pictures -----------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Case:
+    """A scene and the bounds of its differences."""
+
+    build: object
+    mean: float
+    p95: float
+    outliers: float
+    kind: str = "glb"
+    # Changes Blender's scene after the export, and returns what to multiply Cycles's picture by.
+    change: object = None
+
+
+CASES = {
+    "diffuse": Case(diffuse, 0.001, 0.001, 0.001),
+    "sun": Case(sun, 0.001, 0.001, 0.001),
+    "spot_hard": Case(spot_hard, 0.012, 0.001, 0.015),
+    "spot_soft": Case(spot_soft, 0.001, 0.001, 0.001, change=gltf_spot),
+    "many_lights": Case(many_lights, 0.002, 0.005, 0.004),
+    "metal_0.3": Case(metal(0.3), 0.001, 0.001, 0.002),
+    "metal_0.5": Case(metal(0.5), 0.001, 0.001, 0.001),
+    "metal_0.8": Case(metal(0.8), 0.001, 0.001, 0.001),
+    "highlight_0.2": Case(dielectric(0.2), 0.01, 0.01, 0.001),
+    "highlight_0.5": Case(dielectric(0.5), 0.01, 0.01, 0.001),
+    "dielectric_0.3": Case(dielectric(0.3, (0.6, 0.3, 0.2)), 0.03, 0.18, 0.11),
+    "dielectric_0.8": Case(dielectric(0.8, (0.6, 0.3, 0.2)), 0.012, 0.045, 0.001),
+    "half_metal": Case(half_metal, 0.018, 0.1, 0.042),
+    "metallic_roughness": Case(metallic_roughness, 0.001, 0.001, 0.001),
+    "texture_nearest": Case(base_texture(letters, "Closest", "REPEAT"), 0.001, 0.001, 0.001),
+    "texture_linear": Case(base_texture(gradient, "Linear", "EXTEND"), 0.001, 0.002, 0.001),
+    "texture_wrapped": Case(wrapped_texture, 0.002, 0.001, 0.016),
+    "normal_map": Case(normal_map(card), 0.002, 0.008, 0.001),
+    "normal_map_sphere": Case(normal_map(normal_mapped_sphere(1.0, (-0.6, -6.0, 4.0))), 0.002, 0.002, 0.002),
+    "normal_map_mirrored": Case(normal_map(normal_mapped_sphere(-1.0, (-0.6, -6.0, 4.0))), 0.002, 0.002, 0.002),
+    "normal_map_side": Case(normal_map(normal_mapped_sphere(1.0, (-2.5, -3.0, 5.0))), 0.015, 0.17, 0.1),
+    "vertex_colours": Case(vertex_colours, 0.001, 0.006, 0.001),
+    "alpha_mask": Case(holes(True, lambda p: np.where(p[..., 0] > 0.5, 1.0, 0.2)), 0.001, 0.001, 0.001),
+    "alpha_blend": Case(holes(False, lambda p: np.where(p[..., 0] > 0.5, 0.45, 0.2)), 0.001, 0.001, 0.001),
+    "emission": Case(emission, 0.001, 0.001, 0.001),
+    "negative_scale": Case(negative_scale(False), 0.001, 0.001, 0.001),
+    "smooth_heads": Case(negative_scale(True), 0.008, 0.001, 0.016),
+    "terminator": Case(terminator, 0.001, 0.001, 0.001),
+    "obj_phong": Case(obj_scene(0.0), 0.005, 0.002, 0.009, "obj"),
+    "obj_pbr": Case(obj_scene(0.5), 0.01, 0.018, 0.012, "obj+pbr"),
+}
+
+
+def read_exr(path):
+    """Reads the colours of an EXR file, of any names of their layer, as an array of height, width, 3."""
+    channels = OpenEXR.File(str(path)).channels()
+    for name in ("RGB", "RGBA", "Combined", "ViewLayer.Combined"):
+        if name in channels:
+            return np.asarray(channels[name].pixels, dtype=np.float64)[..., :3]
+    return np.stack([np.asarray(channels[c].pixels, dtype=np.float64) for c in "RGB"], axis=-1)
+
+
+def render_cycles(path):
+    """Renders Blender's scene by Cycles into an EXR file and returns its colours."""
+    bpy.context.scene.render.filepath = str(path)
+    bpy.ops.render.render(write_still=True)
+    return read_exr(path)
+
+
+def yup(vector):
+    """Returns a vector of Blender's in the axes of the exported files, whose y axis points up."""
+    return [vector[0], vector[2], -vector[1]]
+
+
+def export(kind, stem):
+    """Exports Blender's scene and returns the file for kdray."""
+    if kind == "glb":
+        path = stem.with_suffix(".glb")
+        bpy.ops.export_scene.gltf(
+            filepath=str(path),
+            export_format="GLB",
+            export_cameras=True,
+            export_lights=True,
+            export_import_convert_lighting_mode="COMPAT",
+        )
+        return path
+    path = stem.with_suffix(".obj")
+    bpy.ops.wm.obj_export(filepath=str(path), path_mode="COPY", export_pbr_extensions=kind == "obj+pbr")
+    seen = bpy.context.scene.camera
+    target = seen.matrix_world @ Vector((0.0, 0.0, -1.0))
+    fov = math.degrees(2.0 * math.atan(math.tan(seen.data.angle / 2.0) * SIZE[1] / SIZE[0]))
+    lamp = next(thing for thing in bpy.data.objects if thing.type == "LIGHT")
+    travels = lamp.matrix_world.to_3x3() @ Vector((0.0, 0.0, -1.0))
+    irradiance = [lamp.data.energy * part / math.pi for part in lamp.data.color]
+    toml = stem.with_suffix(".toml")
+    toml.write_text(
+        f"[camera]\neye = {yup(seen.location)}\ntarget = {yup(target)}\nvertical_fov = {fov}\n"
+        f'[[light]]\nkind = "directional"\ndirection = {yup(travels)}\nirradiance = {irradiance}\n'
+        f'[[mesh]]\nfile = "{path.name}"\n'
+    )
+    return toml
+
+
+def render_kdray(kdray, cpu, path, out):
+    """Renders a file by kdray into an EXR file and returns its colours."""
+    command = [kdray, "render", path, "-o", out, "--size", f"{SIZE[0]}x{SIZE[1]}", "--denoise", "off"]
+    command += ["--primary", "trace", "--quiet"] + (["--cpu"] if cpu else [])
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    if done.returncode != 0:
+        raise RuntimeError(f"kdray failed with {done.returncode}: {done.stderr.strip()}")
+    return read_exr(out)
+
+
+def differences(ours, theirs):
+    """Returns the relative difference of means (ours above theirs is positive), p95, the share of outliers, the
+    relative differences of all pixels, and which pixels are compared."""
+    least = 1e-3 * max(ours.max(), theirs.max())
+    lit = np.maximum(ours, theirs).max(axis=-1) > least
+    greater = np.maximum(np.maximum(ours, theirs), least)
+    relative = (np.abs(ours - theirs) / greater).max(axis=-1)
+    mean = ours[lit].mean() / theirs[lit].mean() - 1.0 if lit.any() and theirs[lit].any() else math.inf
+    if not lit.any():
+        return math.inf, math.inf, 1.0, relative, lit
+    return mean, np.percentile(relative[lit], 95), (relative[lit] > OUTLIER).mean(), relative, lit
+
+
+def contact_sheet(path, ours, theirs, relative):
+    """Writes both pictures and their relative difference side by side."""
+    white = np.percentile(np.maximum(ours, theirs), 99.5) or 1.0
+    encoded = [np.clip(picture / white, 0.0, 1.0) ** (1.0 / 2.2) for picture in (ours, theirs)]
+    encoded.append(np.repeat(np.clip(relative / 0.2, 0.0, 1.0)[..., None], 3, axis=-1))
+    sheet = np.concatenate(encoded, axis=1).repeat(2, axis=0).repeat(2, axis=1)
+    pixels = np.concatenate([sheet, np.ones((*sheet.shape[:2], 1))], axis=-1)
+    made = bpy.data.images.new("sheet", sheet.shape[1], sheet.shape[0])
+    made.pixels.foreach_set(np.ascontiguousarray(pixels[::-1], dtype=np.float32).ravel())
+    made.filepath_raw, made.file_format = str(path), "PNG"
+    made.save()
+    bpy.data.images.remove(made)
+
+
+def compare(name, case, arguments, folder):
+    """Renders a case by both programs, prints its differences, and returns whether they are within the bounds."""
+    place = folder / name
+    place.mkdir(exist_ok=True)
+    os.chdir(place)
+    reset()
+    case.build()
+    path = export(case.kind, place / "scene")
+    factor = case.change() if case.change else 1.0
+    theirs = render_cycles(place / "cycles.exr") * factor
+    ours = render_kdray(arguments.kdray, arguments.cpu, path, place / "kdray.exr")
+    mean, p95, outliers, relative, lit = differences(ours, theirs)
+    contact_sheet(folder / f"{name}.png", ours, theirs, relative)
+    good = abs(mean) <= case.mean and p95 <= case.p95 and outliers <= case.outliers
+    report(
+        f"{'ok  ' if good else 'FAIL'} {name:20} {lit.sum():6} pixels, mean {mean:+8.4%} (bound {case.mean:.1%}), "
+        f"p95 {p95:8.4%} ({case.p95:.1%}), outliers {outliers:8.4%} ({case.outliers:.1%})"
+    )
+    return good
+
+
+# --- The command --------------------------------------------------------------------------------------------------
+
+
+def report(line):
+    """Prints a line to the standard output that the script began with."""
+    os.write(STANDARD_OUTPUT, f"{line}\n".encode())
+
+
+def silence():
+    """Sends what Blender prints to nowhere. Returns a file descriptor of the former standard output."""
+    kept = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    return kept
+
+
+def main():
+    """Compares all cases, and returns the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("kdray", type=Path, help="the command to test")
+    parser.add_argument("--keep", type=Path, help="folder in which the files and pictures stay")
+    parser.add_argument("--cpu", action="store_true", help="render by kdray without Vulkan")
+    parser.add_argument("--only", help="names of cases, separated by commas")
+    arguments = parser.parse_args()
+    arguments.kdray = arguments.kdray.resolve()
+    names = arguments.only.split(",") if arguments.only else list(CASES)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = (arguments.keep or Path(temporary)).resolve()
+        folder.mkdir(parents=True, exist_ok=True)
+        good = [compare(name, CASES[name], arguments, folder) for name in names]
+        os.chdir("/")
+    report(f"{sum(good)} of {len(good)} cases are within their bounds")
+    return 0 if all(good) else 1
+
+
+if __name__ == "__main__":
+    STANDARD_OUTPUT = silence()
+    sys.exit(main())
