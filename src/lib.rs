@@ -26,6 +26,7 @@
 //! # Documents
 //!
 //! - [`documents::guide`]: scene files, rendering, layers, films, the viewer, casting rays, measuring.
+//! - [`documents::materials`]: the material model, light units, what MTL and glTF become, textures.
 //! - [`documents::architecture`]: the way of the data; adding a pass, an array, a traversal, an acceleration
 //!   structure.
 //! - [`documents::performance`]: all figures, each with its machine and command.
@@ -119,6 +120,8 @@ pub mod view;
 pub mod documents {
     #[doc = include_str!("../docs/guide.md")]
     pub mod guide {}
+    #[doc = include_str!("../docs/materials.md")]
+    pub mod materials {}
     #[doc = include_str!("../docs/architecture.md")]
     pub mod architecture {}
     #[doc = include_str!("../docs/performance.md")]
