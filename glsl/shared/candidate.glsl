@@ -1,7 +1,8 @@
 // Candidates, which are the triangles that a search comes to, and their test against the nearest hit so far. A part
 // of accel.glsl.
 //
-// Needs scene.glsl, triangle.glsl, traversal_ray.glsl, local_memory.glsl and PASSES_VEILS. Provides `Nearest`, `intersect`,
+// Needs scene.glsl, triangle.glsl, traversal_ray.glsl, local_memory.glsl and PASSES_VEILS. Provides `Nearest`,
+// `intersect`,
 // `is_better`, `is_accepted` and `is_done`.
 
 #include "cutout.glsl"

@@ -20,9 +20,9 @@ vec4 finest_at(uint texture_ix, uint triangle_ix, float u, float v) {
 // The opacity at a point of a triangle, 0..1, by the largest levels of its textures.
 float opacity_at(MaterialMaps maps, uint triangle_ix, float u, float v) {
     float opacity = maps.opacity_factor;
-    if ((maps.flags & MAPS_COLOUR_HAS_OPACITY) != 0u) {
-        opacity *= corner_colour_at(triangle_ix, u, v).a;
-        if (maps.base_colour != NO_TEXTURE) opacity *= finest_at(maps.base_colour, triangle_ix, u, v).a;
+    if ((maps.flags & MAPS_CORNERS_HAVE_OPACITY) != 0u) opacity *= corner_colour_at(triangle_ix, u, v).a;
+    if ((maps.flags & MAPS_COLOUR_HAS_OPACITY) != 0u && maps.base_colour != NO_TEXTURE) {
+        opacity *= finest_at(maps.base_colour, triangle_ix, u, v).a;
     }
     if (maps.opacity != NO_TEXTURE) {
         opacity *= scalar_of(texture_at(maps.opacity), finest_at(maps.opacity, triangle_ix, u, v));

@@ -132,8 +132,8 @@
 // Lower bound of the width of a distribution of microfacets, the squared roughness. It keeps highlights of point lights
 // finite.
 #define LEAST_MICROFACET_WIDTH 0.002
-// Opacity below which light passes through a see-through microfacet surface on its way to another hit. A shadow ray
-// cannot be weakened, only stopped.
+// Opacity below which light passes through a see-through surface on its way to another hit. A shadow ray cannot be
+// weakened, only stopped.
 #define LEAST_SHADOWING_OPACITY 0.5
 
 // Takes the place of an index in `textures` where a material has no texture.
@@ -417,8 +417,10 @@ struct CornerSurface {
 #define MAPS_CUTOUT 1u
 // `MaterialMaps.flags`: shadow rays do so.
 #define MAPS_VEIL 2u
-// `MaterialMaps.flags`: the opacity of the base colour's texture and of the corners' colours counts.
+// `MaterialMaps.flags`: the opacity of the base colour's texture counts.
 #define MAPS_COLOUR_HAS_OPACITY 4u
+// `MaterialMaps.flags`: the opacity of the corners' colours counts.
+#define MAPS_CORNERS_HAVE_OPACITY 8u
 
 // A ray of a picture, 48 bytes. Its hits have t in `(0, t_max]`.
 //

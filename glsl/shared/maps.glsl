@@ -102,12 +102,15 @@ vec3 mapped_normal(MaterialMaps maps, TextureHit hit, Surface surface) {
 // Multiplies the material's terms by its textures and by the colours of the triangle's corners.
 void apply_maps(MaterialMaps maps, TextureHit hit, inout Material material) {
     vec4 corner_colour = corner_colour_at(hit.triangle_ix, hit.u, hit.v);
-    vec4 base = corner_colour;
-    if (maps.base_colour != NO_TEXTURE) base *= map_at(maps.base_colour, hit);
-    material.kd *= base.rgb;
-    bool colour_has_opacity = (maps.flags & MAPS_COLOUR_HAS_OPACITY) != 0u && (maps.flags & MAPS_CUTOUT) == 0u;
-    if (colour_has_opacity) material.d *= base.a;
-    if ((maps.flags & MAPS_CUTOUT) == 0u) material.d *= factor_at(maps.opacity, hit);
+    vec4 map_colour = maps.base_colour == NO_TEXTURE ? vec4(1.0) : map_at(maps.base_colour, hit);
+    vec3 base = corner_colour.rgb * map_colour.rgb;
+    material.kd *= base;
+    // What is left of a surface with cut-outs is opaque.
+    if ((maps.flags & MAPS_CUTOUT) == 0u) {
+        if ((maps.flags & MAPS_CORNERS_HAVE_OPACITY) != 0u) material.d *= corner_colour.a;
+        if ((maps.flags & MAPS_COLOUR_HAS_OPACITY) != 0u) material.d *= map_colour.a;
+        material.d *= factor_at(maps.opacity, hit);
+    }
     material.ks *= colour_at(maps.specular, hit) * factor_at(maps.specular_factor, hit);
     material.ke *= colour_at(maps.emission, hit);
     float rough = factor_at(maps.roughness, hit);
@@ -116,12 +119,12 @@ void apply_maps(MaterialMaps maps, TextureHit hit, inout Material material) {
     material.metallic *= factor_at(maps.metallic, hit);
     material.transmission *= factor_at(maps.transmission, hit);
     material.ka *= 1.0 + maps.occlusion_strength * (factor_at(maps.occlusion, hit) - 1.0);
-    if (!is_microfacet(material)) material.ka *= base.rgb;
+    if (!is_microfacet(material)) material.ka *= base;
 }
 
-// The share of a light that a bent normal lets through: 1 at the interpolated normal, 0 at the horizon of the interpolated
-// surface, whose own shadow the bent normal does not know (Chiang, Li, Burley: Taming the Shadow Terminator, SIGGRAPH
-// 2019 Talks).
+// The share of a light that a bent normal lets through: 1 at the interpolated normal, 0 at the horizon of the
+// interpolated surface, whose own shadow the bent normal does not know (Chiang, Li, Burley: Taming the Shadow
+// Terminator, SIGGRAPH 2019 Talks).
 float bump_shadowing(Surface surface, vec3 to_light) {
     float g = 1.0;
     if (TEXTURED) {

@@ -26,8 +26,14 @@ float local_weight(Material material) {
     return (material.flags & MATERIAL_REFRACT) != 0u ? 1.0 : material.d;
 }
 
+// Whether the surface shows its colour without any light.
+bool is_unlit(Material material) {
+    return MICROFACETS && (material.flags & MATERIAL_UNLIT) != 0u;
+}
+
 // Whether rays may continue from the surface.
 bool scatters_light(Material material) {
+    if (is_unlit(material)) return material.d < 1.0;
     if (is_microfacet(material)) {
         return material.d < 1.0 || material.transmission > 0.0 || mirror_share(material) > 0.0;
     }
@@ -45,11 +51,6 @@ vec3 phong(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
         reflectance += material.ks * pow(cos_mirror, material.ns);
     }
     return reflectance;
-}
-
-// Whether the surface shows its colour without any light.
-bool is_unlit(Material material) {
-    return MICROFACETS && (material.flags & MATERIAL_UNLIT) != 0u;
 }
 
 // The radiance that the surface gives off by itself.
@@ -107,7 +108,8 @@ vec3 keep_side(vec3 direction, vec3 side) {
 // the surface is.
 Scattering scatter_by_microfacets(Material material, Surface surface, vec3 direction) {
     Scattering s = Scattering(vec3(0.0), vec3(0.0), direction, vec3(0.0));
-    bool is_solid = (material.flags & MATERIAL_SOLID) != 0u;
+    float through = material.transmission * (1.0 - material.metallic);
+    bool is_solid = (material.flags & MATERIAL_SOLID) != 0u && through > 0.0;
     float eta = surface.from_inside ? material.ni : 1.0 / material.ni;
     float cos_in = max(dot(surface.shading, -direction), LEAST_COSINE);
     float cos_out = refraction_cosine(cos_in, eta);
@@ -116,11 +118,10 @@ Scattering scatter_by_microfacets(Material material, Surface surface, vec3 direc
     vec3 reflected = mix(dielectric, metal_reflectance(material, cos_in), material.metallic);
     s.reflected = keep_side(normalize(direction + 2.0 * cos_in * surface.shading), surface.geometric);
     s.reflected_weight = material.d * (total ? 1.0 : mirror_share(material)) * reflected;
-    float through = material.transmission * (1.0 - material.metallic);
     // A ray through a solid is tinted twice, where it enters and where it leaves.
     vec3 tint = is_solid ? sqrt(material.kd) : material.kd;
     s.transmitted_weight = material.d * through * (1.0 - dielectric) * tint + (1.0 - material.d);
-    if (is_solid && through > 0.0 && !total) {
+    if (is_solid && !total) {
         vec3 refracted = eta * direction + (eta * cos_in - cos_out) * surface.shading;
         s.transmitted = keep_side(normalize(refracted), -surface.geometric);
     }
@@ -136,6 +137,7 @@ vec3 unabsorbed(Material material, Surface surface, float t) {
 
 // How a ray of this direction continues from a surface.
 Scattering scatter(Material material, Surface surface, vec3 direction) {
+    if (is_unlit(material)) return Scattering(vec3(0.0), vec3(0.0), direction, vec3(1.0 - material.d));
     if (is_microfacet(material)) return scatter_by_microfacets(material, surface, direction);
     Scattering s = Scattering(vec3(0.0), vec3(0.0), direction, vec3(0.0));
     bool reflects = (material.flags & MATERIAL_REFLECT) != 0u;

@@ -65,8 +65,8 @@ float ggx_smith(float width, float cos_view, float cos_light, float cos_half, fl
     return distribution * 0.5 / shadowing;
 }
 
-// The reflectance towards the viewer, times the cosine of the light's direction. All vectors are unit vectors that point
-// away from the surface.
+// The reflectance towards the viewer, times the cosine of the light's direction. All vectors are unit vectors that
+// point away from the surface.
 vec3 microfacet_reflectance(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
     float cos_light = dot(normal, to_light);
     if (!(cos_light > 0.0)) return vec3(0.0);

@@ -74,10 +74,10 @@ vec3 above_corner(vec3 p, vec3 corner, uint normal, vec3 interpolated) {
     return p - min(dot(p - corner, n), 0.0) * n;
 }
 
-// The point at which rays to lights start: the surface's point, moved up to the curved surface that the corners' normals
-// suggest, if that is above the triangle (Hanika: Hacking the Shadow Terminator, Ray Tracing Gems II, 2021). From a
-// point of a coarse mesh itself, the light would be hidden by the neighbouring triangles, one triangle earlier or
-// later than the shading ends.
+// The point at which rays to lights start: the surface's point, moved up to the curved surface that the corners'
+// normals suggest, if that is above the triangle (Hanika: Hacking the Shadow Terminator, Ray Tracing Gems II, 2021).
+// From a point of a coarse mesh itself, the light would be hidden by the neighbouring triangles, one triangle earlier
+// or later than the shading ends.
 vec3 lit_point(Surface s, Hit hit, Triangle t) {
     if (t.n0 == FLAT_NORMAL || t.n1 == FLAT_NORMAL || t.n2 == FLAT_NORMAL) return s.point_world;
     vec3 weights = inner_weights(hit);

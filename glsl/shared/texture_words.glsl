@@ -1,8 +1,8 @@
 // The parts of `texture_words`: the texels of images, and what leads from a triangle to them. The array begins with the
-// linear values of the 256 bytes of sRGB (src/world/textures.rs). The other parts begin where `accel` says.
+// linear values of the 256 bytes of sRGB (src/world/levels.rs). The other parts begin where `accel` says.
 //
 // Needs nothing: it includes scene.glsl. Provides `TEXTURED`, `load_texels`, `texture_at`, `maps_of`, `uv_at`,
-// `tangent_at` and `corner_colour_at`.
+// `corner_uv`, `corner_surface` and `corner_colour_at`.
 #ifndef KDRAY_TEXTURE_WORDS
 #define KDRAY_TEXTURE_WORDS
 

@@ -196,8 +196,8 @@ impl PictureArgs {
         }
     }
 
-    /// Sets the exposure of a scene whose light has physical units, unless the user has set it. Returns a note that says
-    /// what it is.
+    /// Sets the exposure of a scene whose light has physical units, unless the user has set it. Returns a note that
+    /// says what it is.
     pub fn meter(&self, world: &World, options: &mut RenderOptions) -> Option<String> {
         if self.exposure.is_some() || !world.scene().defaults.is_metered {
             return None;

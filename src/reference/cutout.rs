@@ -3,7 +3,7 @@
 
 use super::texture::{sample_texture, scalar_of, uv_set_of};
 use crate::{
-    layout::{MAPS_COLOUR_HAS_OPACITY, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps, NO_TEXTURE},
+    layout::{MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps, NO_TEXTURE},
     world::Textures,
 };
 
@@ -13,15 +13,15 @@ fn finest_at(textures: &Textures, texture_ix: u32, triangle_ix: u32, [u, v]: [f3
     sample_texture(&textures.texels, map, textures.uv_at(triangle_ix, uv_set_of(map), u, v), 0.0)
 }
 
-/// The opacity at a point of a triangle, 0 to 1, by the largest levels of its textures. `at`: barycentric weights of the
-/// second and the third corner.
+/// The opacity at a point of a triangle, 0 to 1, by the largest levels of its textures. `at`: barycentric weights of
+/// the second and the third corner.
 pub fn opacity_at(textures: &Textures, maps: &MaterialMaps, triangle_ix: u32, at: [f32; 2]) -> f32 {
     let mut opacity = maps.opacity_factor;
-    if maps.flags & MAPS_COLOUR_HAS_OPACITY != 0 {
+    if maps.flags & MAPS_CORNERS_HAVE_OPACITY != 0 {
         opacity *= textures.corner_colour_at(triangle_ix, at[0], at[1]).w;
-        if maps.base_colour != NO_TEXTURE {
-            opacity *= finest_at(textures, maps.base_colour, triangle_ix, at).w;
-        }
+    }
+    if maps.flags & MAPS_COLOUR_HAS_OPACITY != 0 && maps.base_colour != NO_TEXTURE {
+        opacity *= finest_at(textures, maps.base_colour, triangle_ix, at).w;
     }
     if maps.opacity != NO_TEXTURE {
         let map = &textures.textures[maps.opacity as usize];

@@ -10,8 +10,8 @@ use super::{
 };
 use crate::{
     layout::{
-        FLAT_NORMAL, Frame, Hit, LEAST_COSINE, LEAST_NORMAL_SQUARED, MAPS_COLOUR_HAS_OPACITY, MAPS_CUTOUT, Material,
-        MaterialMaps, NO_TEXTURE, PathRay, Texture, Triangle,
+        FLAT_NORMAL, Frame, Hit, LEAST_COSINE, LEAST_NORMAL_SQUARED, MAPS_COLOUR_HAS_OPACITY,
+        MAPS_CORNERS_HAVE_OPACITY, MAPS_CUTOUT, Material, MaterialMaps, NO_TEXTURE, PathRay, Texture, Triangle,
     },
     world::Textures,
 };
@@ -99,16 +99,17 @@ impl TextureHit<'_> {
 
     /// Multiplies the material's terms by its textures and by the colours of the triangle's corners.
     fn apply_maps(&self, maps: &MaterialMaps, material: &mut Material) {
-        let mut base = self.textures.corner_colour_at(self.triangle_ix, self.u, self.v);
-        if maps.base_colour != NO_TEXTURE {
-            base *= self.map_at(maps.base_colour);
-        }
-        material.kd *= base.truncate();
-        let is_cutout = maps.flags & MAPS_CUTOUT != 0;
-        if maps.flags & MAPS_COLOUR_HAS_OPACITY != 0 && !is_cutout {
-            material.d *= base.w;
-        }
-        if !is_cutout {
+        let corner_colour = self.textures.corner_colour_at(self.triangle_ix, self.u, self.v);
+        let map_colour = if maps.base_colour == NO_TEXTURE { Vec4::ONE } else { self.map_at(maps.base_colour) };
+        let base = corner_colour.truncate() * map_colour.truncate();
+        material.kd *= base;
+        if maps.flags & MAPS_CUTOUT == 0 {
+            if maps.flags & MAPS_CORNERS_HAVE_OPACITY != 0 {
+                material.d *= corner_colour.w;
+            }
+            if maps.flags & MAPS_COLOUR_HAS_OPACITY != 0 {
+                material.d *= map_colour.w;
+            }
             material.d *= self.factor_at(maps.opacity);
         }
         material.ks *= self.colour_at(maps.specular) * self.factor_at(maps.specular_factor);
@@ -120,7 +121,7 @@ impl TextureHit<'_> {
         material.transmission *= self.factor_at(maps.transmission);
         material.ka *= 1.0 + maps.occlusion_strength * (self.factor_at(maps.occlusion) - 1.0);
         if !is_microfacet(material) {
-            material.ka *= base.truncate();
+            material.ka *= base;
         }
     }
 }

@@ -41,6 +41,9 @@ fn reflect(incident: Vec3, normal: Vec3) -> Vec3 {
 
 /// Whether rays may continue from the surface.
 pub fn scatters_light(material: &Material) -> bool {
+    if is_unlit(material) {
+        return material.d < 1.0;
+    }
     if is_microfacet(material) {
         return material.d < 1.0 || material.transmission > 0.0 || mirror_share(material) > 0.0;
     }
@@ -133,7 +136,8 @@ fn keep_side(direction: Vec3, side: Vec3) -> Vec3 {
 
 /// Returns how a ray of this direction continues from a surface of microfacets.
 fn scatter_by_microfacets(material: &Material, surface: &Surface, direction: Vec3) -> Scattering {
-    let is_solid = material.flags & MATERIAL_SOLID != 0;
+    let through = material.transmission * (1.0 - material.metallic);
+    let is_solid = material.flags & MATERIAL_SOLID != 0 && through > 0.0;
     let eta = if surface.from_inside { material.ni } else { 1.0 / material.ni };
     let cos_in = surface.shading.dot(-direction).max(LEAST_COSINE);
     let cos_out = refraction_cosine(cos_in, eta);
@@ -143,13 +147,12 @@ fn scatter_by_microfacets(material: &Material, surface: &Surface, direction: Vec
         false => dielectric_reflectance(material, cos_in),
     };
     let reflected = dielectric.lerp(metal_reflectance(material, cos_in), material.metallic);
-    let through = material.transmission * (1.0 - material.metallic);
     let tint = if is_solid { material.kd.map(f32::sqrt) } else { material.kd };
     let refracted = eta * direction + (eta * cos_in - cos_out) * surface.shading;
     Scattering {
         reflected: keep_side((direction + 2.0 * cos_in * surface.shading).normalize(), surface.geometric),
         reflected_weight: material.d * (if total { 1.0 } else { mirror_share(material) }) * reflected,
-        transmitted: match is_solid && through > 0.0 && !total {
+        transmitted: match is_solid && !total {
             true => keep_side(refracted.normalize(), -surface.geometric),
             false => direction,
         },
@@ -166,6 +169,14 @@ pub fn unabsorbed(material: &Material, surface: &Surface, t: f32) -> Vec3 {
 
 /// Returns how a ray of this direction continues from a surface.
 pub fn scatter(material: &Material, surface: &Surface, direction: Vec3) -> Scattering {
+    if is_unlit(material) {
+        return Scattering {
+            reflected: Vec3::ZERO,
+            reflected_weight: Vec3::ZERO,
+            transmitted: direction,
+            transmitted_weight: Vec3::splat(1.0 - material.d),
+        };
+    }
     if is_microfacet(material) {
         return scatter_by_microfacets(material, surface, direction);
     }

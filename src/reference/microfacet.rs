@@ -1,5 +1,5 @@
-//! Reflection by microfacets: metals and dielectrics, after glTF 2.0, Appendix B. Twin of `microfacet.glsl`, which names
-//! the sources.
+//! Reflection by microfacets: metals and dielectrics, after glTF 2.0, Appendix B. Twin of `microfacet.glsl`, which
+//! names the sources.
 
 use glam::{Vec3, Vec4};
 
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn a_white_metal_reflects_no_more_than_it_receives() {
         let white = |roughness| Material { kd: Vec3::ONE, ..material(1.0, roughness) };
-        for (roughness, least) in [(0.3, 0.9), (0.6, 0.8), (1.0, 0.3)] {
+        for (roughness, least) in [(0.3, 0.9), (0.6, 0.75), (1.0, 0.3)] {
             for cos_view in [0.2_f32, 0.6, 1.0] {
                 let to_viewer = vec3((1.0 - cos_view * cos_view).sqrt(), 0.0, cos_view);
                 let n = 400;

@@ -80,7 +80,8 @@ pub fn surface_at(ray: &PathRay, hit: &Hit, t: &Triangle) -> Surface {
     }
 }
 
-/// The part of `p`, relative to a corner, that is not below the plane through the corner with the normal of that corner.
+/// The part of `p`, relative to a corner, that is not below the plane through the corner with the normal of that
+/// corner.
 fn above_corner(p: Vec3, corner: Vec3, normal: u32, interpolated: Vec3) -> Vec3 {
     let n = decode_normal(normal);
     let n = if n.dot(interpolated) < 0.0 { -n } else { n };

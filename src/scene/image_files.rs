@@ -168,15 +168,15 @@ pub(super) fn opacity_channel(image: &Image) -> Channel {
     if has_alpha { Channel::Alpha } else { Channel::Luminance }
 }
 
-/// Returns the image with 1 - x in place of each colour x.
+/// Returns the image with 1 - x in place of each number x, opacity included.
 fn inverted(image: &Image) -> Image {
     let half = |bits: u16| half::f16::from_f32(1.0 - half::f16::from_bits(bits).to_f32()).to_bits();
     let pixels = match &image.pixels {
         Pixels::Bytes(pixels) => {
-            Pixels::Bytes(pixels.iter().map(|[r, g, b, a]| [255 - r, 255 - g, 255 - b, *a]).collect())
+            Pixels::Bytes(pixels.iter().map(|[r, g, b, a]| [255 - r, 255 - g, 255 - b, 255 - a]).collect())
         }
         Pixels::Halves(pixels) => {
-            Pixels::Halves(pixels.iter().map(|[r, g, b, a]| [half(*r), half(*g), half(*b), *a]).collect())
+            Pixels::Halves(pixels.iter().map(|[r, g, b, a]| [half(*r), half(*g), half(*b), half(*a)]).collect())
         }
     };
     Image { pixels, ..image.clone() }

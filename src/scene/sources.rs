@@ -13,8 +13,8 @@ use super::{
     read::{lossy_text, read_bytes, read_utf8},
 };
 
-/// Returns the sorted paths of the scene file, the mesh files that it names, the material libraries and buffers that the
-/// mesh files name, and the images that any of them names. The files need not exist. A file that cannot be read
+/// Returns the sorted paths of the scene file, the mesh files that it names, the material libraries and buffers that
+/// the mesh files name, and the images that any of them names. The files need not exist. A file that cannot be read
 /// contributes no names.
 pub fn source_files(path: &Path) -> Vec<PathBuf> {
     let (meshes, maps) = if is_scene_file(path) { named(path) } else { (vec![path.to_owned()], Vec::new()) };

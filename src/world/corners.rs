@@ -9,8 +9,8 @@ use crate::{
     scene::{Mesh, Scene, Transform},
 };
 
-/// Returns the texture coordinates of all triangles' corners, in the order of the triangles: those of the first set, and
-/// after them, if `n_sets` is 2, those of the second set. A mesh without coordinates has zeros.
+/// Returns the texture coordinates of all triangles' corners, in the order of the triangles: those of the first set,
+/// and after them, if `n_sets` is 2, those of the second set. A mesh without coordinates has zeros.
 pub fn uvs(scene: &Scene, n_sets: usize) -> Vec<[Vec2; 3]> {
     let mut uvs = Vec::with_capacity(n_sets * scene.n_triangles());
     for set in 0..n_sets {
@@ -45,8 +45,8 @@ fn corner_surface(mesh: &Mesh, transform: &Transform, face: usize, corner: usize
     CornerSurface { tangent: encode_tangent(transform, tangent), colour: encode_colour(colour) }
 }
 
-/// Encodes a tangent of object space. The cross product of two reflected vectors is the reverse of their reflected cross
-/// product, so a reflection changes the side of the bitangent.
+/// Encodes a tangent of object space. The cross product of two reflected vectors is the reverse of their reflected
+/// cross product, so a reflection changes the side of the bitangent.
 fn encode_tangent(transform: &Transform, tangent: Vec4) -> u32 {
     match transform.tangent(tangent.truncate()) {
         Vec3::ZERO => FLAT_NORMAL,

@@ -2,6 +2,7 @@
 //! tangents and colours at the corners of triangles.
 
 use glam::{Vec2, Vec4};
+use rayon::prelude::*;
 
 use super::{
     Mismatch,
@@ -11,8 +12,8 @@ use super::{
 };
 use crate::{
     layout::{
-        CornerSurface, LEAST_SHADOWING_OPACITY, MAPS_COLOUR_HAS_OPACITY, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps,
-        NO_TEXTURE, Texture,
+        CornerSurface, LEAST_SHADOWING_OPACITY, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_CUTOUT,
+        MAPS_VEIL, MaterialMaps, NO_TEXTURE, Texture,
     },
     scene::{Alpha, Material, Pixels, Scene},
 };
@@ -26,8 +27,8 @@ pub struct Textures {
     pub textures: Vec<Texture>,
     /// For each material, its textures.
     pub material_maps: Vec<MaterialMaps>,
-    /// Texture coordinates of the triangles' corners. Those of the second set, if a texture uses it, follow those of the
-    /// first set. Empty if there is no texture.
+    /// Texture coordinates of the triangles' corners. Those of the second set, if a texture uses it, follow those of
+    /// the first set. Empty if there is no texture.
     pub uvs: Vec<[Vec2; 3]>,
     /// Tangents and colours of the triangles' corners. Empty if there are neither.
     pub corners: Vec<[CornerSurface; 3]>,
@@ -43,8 +44,10 @@ impl Textures {
     pub(super) fn new(scene: &Scene) -> Result<Self, Mismatch> {
         let (arrays, mut material_maps) = texture_arrays(scene)?;
         let TextureArrays { mut texels, textures } = arrays;
+        let is_see_through = |corners: &[Vec4; 3]| corners.iter().any(|colour| colour.w < 1.0);
+        let corners_have_opacity = scene.meshes.par_iter().any(|mesh| mesh.colours.iter().any(is_see_through));
         for (maps, material) in material_maps.iter_mut().zip(&scene.materials) {
-            set_opacity(maps, material, scene);
+            set_opacity(maps, material, scene, corners_have_opacity);
         }
         let has_colours = scene.meshes.iter().any(|mesh| !mesh.colours.is_empty());
         let has_opacity = material_maps.iter().any(|maps| maps.flags & (MAPS_CUTOUT | MAPS_VEIL) != 0);
@@ -57,19 +60,30 @@ impl Textures {
         let all_textures = || scene.materials.iter().flat_map(|material| material.maps.textures());
         let n_sets = all_textures().map(|texture| texture.uv_set as usize + 1).max().unwrap_or(0).min(2);
         let has_normals = scene.materials.iter().any(|material| material.maps.normal.is_some());
-        Ok(Self {
+        let made = Self {
             texels,
             textures,
             material_maps,
             uvs: uvs(scene, n_sets),
             corners: if has_colours || has_normals { corner_surfaces(scene) } else { Vec::new() },
             n_triangles: scene.n_triangles(),
-        })
+        };
+        match made.n_bytes() / 4 {
+            n_words if n_words < u64::from(u32::MAX) => Ok(made),
+            n_words => Err(Mismatch::Textures(format!("they and the triangles' corners need {n_words} words"))),
+        }
     }
 
     /// Returns whether the scene has textures, colours at corners, or opacity that rays have to ask for.
     pub fn is_in_use(&self) -> bool {
         !self.material_maps.is_empty()
+    }
+
+    /// Returns the memory that the arrays take on a device, bytes.
+    pub fn n_bytes(&self) -> u64 {
+        let Self { texels, textures, material_maps, uvs, corners, .. } = self;
+        let of_textures = size_of_val(&texels[..]) + size_of_val(&textures[..]) + size_of_val(&material_maps[..]);
+        (of_textures + size_of_val(&uvs[..]) + size_of_val(&corners[..])) as u64
     }
 
     /// Returns whether some rays pass through parts of triangles.
@@ -108,11 +122,13 @@ impl Textures {
     }
 }
 
-/// Sets how a material's opacity acts on rays.
-fn set_opacity(maps: &mut MaterialMaps, material: &Material, scene: &Scene) {
+/// Sets how a material's opacity acts on rays. `corners_have_opacity`: whether colours at corners of the scene's meshes
+/// are not opaque.
+fn set_opacity(maps: &mut MaterialMaps, material: &Material, scene: &Scene, corners_have_opacity: bool) {
     let is_microfacet = material.microfacet.is_some();
-    if is_microfacet && material.alpha != Alpha::Opaque {
-        maps.flags |= MAPS_COLOUR_HAS_OPACITY;
+    if material.alpha != Alpha::Opaque {
+        maps.flags |= if is_microfacet { MAPS_COLOUR_HAS_OPACITY } else { 0 };
+        maps.flags |= if corners_have_opacity { MAPS_CORNERS_HAVE_OPACITY } else { 0 };
     }
     match material.alpha {
         Alpha::Opaque => maps.opacity = NO_TEXTURE,
@@ -124,7 +140,7 @@ fn set_opacity(maps: &mut MaterialMaps, material: &Material, scene: &Scene) {
             // MTL's own transparency `d` casts whole shadows, as in the paper.
             let by_factor = is_microfacet && material.d < 1.0;
             let by_colour = is_microfacet && colours_are_see_through(material, scene);
-            if by_factor || by_colour || material.maps.opacity.is_some() {
+            if by_factor || by_colour || corners_have_opacity || material.maps.opacity.is_some() {
                 maps.flags |= MAPS_VEIL;
                 maps.alpha_cutoff = LEAST_SHADOWING_OPACITY;
             }
@@ -132,14 +148,12 @@ fn set_opacity(maps: &mut MaterialMaps, material: &Material, scene: &Scene) {
     }
 }
 
-/// Returns whether the image of the base colour, or a colour at a corner, is not opaque.
+/// Returns whether the image of the base colour is not opaque.
 fn colours_are_see_through(material: &Material, scene: &Scene) -> bool {
     let image = material.maps.base_colour.as_ref().and_then(|map| scene.images.get(map.image_ix as usize));
-    let by_image = image.is_some_and(|image| match &image.pixels {
+    image.is_some_and(|image| match &image.pixels {
         Pixels::Bytes(pixels) => pixels.iter().any(|pixel| pixel[3] < 255),
         // 1 as a half-precision float.
         Pixels::Halves(pixels) => pixels.iter().any(|pixel| pixel[3] < 0x3c00),
-    });
-    let is_see_through = |corners: &[Vec4; 3]| corners.iter().any(|colour| colour.w < 1.0);
-    by_image || scene.meshes.iter().any(|mesh| mesh.colours.iter().any(is_see_through))
+    })
 }

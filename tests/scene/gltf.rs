@@ -325,7 +325,7 @@ fn primitives_are_slots_and_nodes_are_instances() {
     assert_eq!((scene.meshes.len(), scene.instances.len()), (1, 2));
     assert_eq!(scene.meshes[0].slots, [0, 1]);
     let names: Vec<_> = scene.instances[1].materials.iter().map(|ix| &scene.materials[*ix as usize].name[..]).collect();
-    assert_eq!(names, ["(default)", "red"]);
+    assert_eq!(names, ["(default of glTF)", "red"]);
     assert_eq!(flattened(&scene).triangles[2].v0, Vec3::Z);
 }
 
@@ -420,6 +420,7 @@ fn punctual_lights_have_kdrays_units() {
     }
     let scene = model.scene();
     assert_eq!((scene.ambient, scene.background), (Vec3::ZERO, Vec3::ZERO));
+    assert!(scene.defaults.is_metered, "the lights have physical units");
     let at = Vec3::new(1.0, 2.0, 3.0);
     let close = |a: Vec3, b: Vec3| assert!(a.distance(b) < 1e-6, "{a} is not {b}");
     let [
@@ -444,13 +445,14 @@ fn punctual_lights_have_kdrays_units() {
 }
 
 #[test]
-fn emissive_materials_need_no_other_light() {
+fn a_file_without_lights_is_lit_even_if_a_surface_glows() {
     let mut model = triangle();
-    assert_eq!(model.scene().lights.len(), 1);
+    let bare = model.scene();
+    assert_eq!((bare.lights.len(), bare.defaults.is_metered), (1, false));
     model.push("materials", json!({ "emissiveFactor": [1, 1, 1] }));
     model.json["meshes"][0]["primitives"][0]["material"] = json!(0);
     let scene = model.scene();
-    assert_eq!((scene.lights.len(), scene.ambient, scene.background), (0, Vec3::ZERO, Vec3::ZERO));
+    assert_eq!((scene.lights, scene.ambient, scene.background), (bare.lights, bare.ambient, bare.background));
 }
 
 #[test]

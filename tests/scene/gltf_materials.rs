@@ -53,7 +53,7 @@ fn the_default_material_is_white_metal() {
     let mut model = with_material(json!({}));
     model.json["meshes"][0]["primitives"][0].as_object_mut().unwrap().remove("material");
     let unnamed = model.scene().materials.remove(0);
-    assert_eq!(unnamed, Material { name: "(default)".to_owned(), ..found });
+    assert_eq!(unnamed, Material { name: "(default of glTF)".to_owned(), ..found });
 }
 
 #[test]

@@ -134,7 +134,11 @@ fn opacity_is_in_alpha_or_in_the_colour() {
     assert_eq!((m.maps.opacity.unwrap().channel, m.alpha), (Channel::Luminance, Alpha::Coverage));
     assert_eq!(material("d 0.5\nmap_d a.png", &[("a.png", &holes)]).alpha, Alpha::Coverage);
     let (scene, _) = load_mtl("map_Tr a.png", &[("a.png", &grey(100))]);
-    assert_eq!(first_pixel(&scene.images[0]), [155, 155, 155, 255]);
+    // Transparency becomes opacity, whichever channel holds it.
+    assert_eq!(first_pixel(&scene.images[0]), [155, 155, 155, 0]);
+    let (scene, _) = load_mtl("map_Tr -imfchan m a.png", &[("a.png", &png(|_, _| [9, 9, 9, 100]))]);
+    let map = scene.materials[0].maps.opacity.as_ref().expect("a map");
+    assert_eq!((map.channel, first_pixel(&scene.images[0])[3]), (Channel::Alpha, 155));
     // The base colour of microfacets brings the opacity of its image along.
     let m = material("Pr 1\nmap_Kd a.png\nmap_d a.png", &[("a.png", &holes)]);
     assert_eq!((m.maps.opacity, m.alpha), (None, Alpha::Cutout(0.5)));

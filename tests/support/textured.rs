@@ -119,7 +119,8 @@ fn see_through(is_solid: bool) -> Material {
     Material { microfacet: Some(microfacet), ..rough(vec3(0.9, 0.95, 1.0)) }
 }
 
-/// Returns a scene with every kind of texture and of microfacet material, under a point, a spot and a directional light.
+/// Returns a scene with every kind of texture and of microfacet material, under a point, a spot and a directional
+/// light.
 pub fn every_kind() -> FlatScene {
     let mut scene = empty();
     let checks =

@@ -46,7 +46,7 @@ impl<'a> Materials<'a> {
                 reader.material(json, &mut self.textures)?
             }
             None => {
-                let reader = Reader { document: self.document, path: "(default)".to_owned() };
+                let reader = Reader { document: self.document, path: "(default of glTF)".to_owned() };
                 reader.material(&json::Material::default(), &mut self.textures)?
             }
         };
@@ -79,13 +79,16 @@ impl Reader<'_> {
         let ior = extensions.and_then(|it| it.ior.as_ref()).map_or(1.5, |it| it.ior.0);
         let strength = extensions.and_then(|it| it.emissive_strength.as_ref());
         let strength = strength.map_or(1.0, |it| it.emissive_strength.0);
+        let is_unlit = extensions.is_some_and(|it| it.unlit.is_some());
+        let ke = self.colour("emissiveFactor", json.emissive_factor.0)?
+            * self.within("emissiveStrength", strength, 0.0, f32::MAX)?;
         Ok(Material {
             name: json.name.clone().unwrap_or_else(|| self.path.clone()),
             ka: kd,
             kd,
             ks: self.specular(json)?,
-            ke: self.colour("emissiveFactor", json.emissive_factor.0)?
-                * self.within("emissiveStrength", strength, 0.0, f32::MAX)?,
+            // An unlit material shows its base colour alone.
+            ke: if is_unlit { Vec3::ZERO } else { ke },
             tf: Vec3::ONE,
             ns: 32.0,
             ni: if ior == 0.0 { MAX_IOR } else { self.within("ior", ior, 1.0, MAX_IOR)? },
@@ -101,7 +104,7 @@ impl Reader<'_> {
                 }
                 _ => return Err(format!("{}: its alphaMode is none of OPAQUE, MASK and BLEND", self.path)),
             },
-            is_unlit: extensions.is_some_and(|it| it.unlit.is_some()),
+            is_unlit,
             is_double_sided: json.double_sided,
             clearcoat: self.clearcoat(json)?,
             sheen: self.sheen(json)?,
@@ -141,6 +144,9 @@ impl Reader<'_> {
     fn clearcoat(&self, json: &json::Material) -> Checked<Clearcoat> {
         let Some(raw) = self.extension(json, "KHR_materials_clearcoat")? else { return Ok(Clearcoat::default()) };
         let Raw { factor, roughness, .. } = raw;
+        if factor > 0.0 {
+            self.document.note("layers of clearcoat, which are not shown", &self.path);
+        }
         Ok(Clearcoat {
             factor: self.within("clearcoatFactor", factor, 0.0, 1.0)?,
             roughness: self.within("clearcoatRoughnessFactor", roughness, 0.0, 1.0)?,
@@ -150,6 +156,9 @@ impl Reader<'_> {
     fn sheen(&self, json: &json::Material) -> Checked<Sheen> {
         let Some(raw) = self.extension(json, "KHR_materials_sheen")? else { return Ok(Sheen::default()) };
         let Raw { colour, sheen_roughness, .. } = raw;
+        if colour != [0.0; 3] {
+            self.document.note("sheen, which is not shown", &self.path);
+        }
         Ok(Sheen {
             colour: self.colour("sheenColorFactor", colour)?,
             roughness: self.within("sheenRoughnessFactor", sheen_roughness, 0.0, 1.0)?,

@@ -22,7 +22,6 @@ mod uri;
 
 use std::path::Path;
 
-use glam::Vec3;
 use gltf::json::{Node, mesh::Primitive};
 use hashbrown::HashMap;
 
