@@ -1,5 +1,7 @@
 //! Tests of frames with textures, cut-outs and microfacets: against closed forms, and device against CPU.
 
+use std::path::Path;
+
 use glam::{DQuat, DVec3, Vec3, Vec4, vec2, vec3};
 use kdray::{
     accel::kdtree::Traversal,
@@ -9,7 +11,10 @@ use kdray::{
 };
 
 use super::studio::{differing, identical, on_both, on_cpu, on_device, options};
-use crate::support::textured::{self, add, add_image, empty, placed, square, unlit};
+use crate::support::{
+    scenes,
+    textured::{self, add, add_image, empty, placed, square, unlit},
+};
 
 /// Half the side of what the camera at z = 4 sees at z = 0, for a picture that is as wide as high.
 const HALF_VIEW: f64 = 4.0 * 0.414_213_56;
@@ -282,4 +287,19 @@ fn frames_with_textures_are_the_same_bits_each_time() {
     let scene = textured::every_kind();
     let options = options(60, 45, 4);
     assert!(identical(&on_device(&scene, &options), &on_device(&scene, &options)));
+}
+
+/// The radiance of a picture in relation to its own brightness: a file's lights may have any units.
+#[test]
+fn device_and_cpu_agree_on_the_scenes_with_textures_that_ship() {
+    for name in ["room.toml", "still_life.gltf"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+        let scene = scenes::load(&path);
+        let options = RenderOptions { primary: Primary::Trace, ..options(96, 72, scene.defaults.max_depth) };
+        let [device, cpu] = on_both(&scene, &options);
+        let sum: f32 = cpu.radiance.iter().map(|pixel| pixel[..3].iter().sum::<f32>()).sum();
+        let mean = sum / (3 * cpu.radiance.len()) as f32;
+        let n_differing = differing(&device, &cpu, 0.02 * mean).len();
+        assert!(mean > 0.0 && n_differing <= device.radiance.len() / 50, "{name}: {n_differing} pixels differ");
+    }
 }
