@@ -34,7 +34,8 @@ bool shadow_segment(PathRay ray, Hit hit, Light light, out PathRay segment) {
     LightSample to_light = sample_light(light, surface.point_world);
     if (!(dot(surface.interpolated, to_light.direction) > 0.0)) return false;
     if (!can_show(material, surface.shading, -ray.direction, to_light.direction)) return false;
-    vec3 origin = lit_point(surface, hit, triangle_at(hit.triangle_ix)) + surface.clearance * surface.geometric;
+    vec3 origin = lit_point(surface, hit, triangle_at(hit.triangle_ix), to_light.direction);
+    origin += surface.clearance * surface.geometric;
     segment = PathRay(
         origin, ray.pixel_ix, to_light.direction, hit.triangle_ix, vec3(0.0), to_light.distance
     );

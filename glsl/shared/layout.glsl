@@ -92,6 +92,12 @@
 // because an interpolated normal can point away from the viewer.
 #define LEAST_COSINE 1.0e-4
 
+// Cosine of the angle between a light and the normal of a triangle's plane, up to which rays to the light start at the
+// curved surface that the corners' normals suggest (`lit_point`).
+#define CURVED_START_COSINE 0.1
+// The cosine from which on these rays start at the triangle itself. In between, the start moves linearly.
+#define PLANE_START_COSINE 0.2
+
 // Values of the specialization constant `TRAVERSAL`: the algorithm that takes rays through the kd-tree.
 #define TRAVERSAL_MASK 0u
 #define TRAVERSAL_STACK 1u

@@ -122,16 +122,24 @@ void apply_maps(MaterialMaps maps, TextureHit hit, inout Material material) {
     if (!is_microfacet(material)) material.ka *= base;
 }
 
-// The share of a light that a bent normal lets through: 1 at the interpolated normal, 0 at the horizon of the
-// interpolated surface, whose own shadow the bent normal does not know (Chiang, Li, Burley: Taming the Shadow
-// Terminator, SIGGRAPH 2019 Talks).
+// The squared tangent of an angle, from its cosine.
+float squared_tangent(float cosine) {
+    return max(1.0 - cosine * cosine, 0.0) / (cosine * cosine);
+}
+
+// The share of a light that reaches a bent normal, whose bumps shadow one another: 1 from the direction of the
+// interpolated normal, 0 at the horizon of the interpolated surface. The bumps are taken for microfacets of GGX, the
+// rougher the more the normal is bent (Estevez, Lecocq, Stein: A Microfacet-Based Shadowing Function to Solve the Bump
+// Terminator Problem, Ray Tracing Gems, 2019).
 float bump_shadowing(Surface surface, vec3 to_light) {
-    float g = 1.0;
+    float share = 1.0;
     if (TEXTURED) {
-        float bent = dot(surface.shading, to_light) * dot(surface.interpolated, surface.shading);
-        g = clamp(dot(surface.interpolated, to_light) / max(bent, LEAST_COSINE * LEAST_COSINE), 0.0, 1.0);
+        float cos_bend = max(abs(dot(surface.interpolated, surface.shading)), LEAST_COSINE);
+        float cos_light = max(dot(surface.interpolated, to_light), LEAST_COSINE);
+        float squared_width = min(0.125 * squared_tangent(cos_bend), 1.0);
+        share = 2.0 / (1.0 + sqrt(1.0 + squared_width * squared_tangent(cos_light)));
     }
-    return ((1.0 - g) * g + 1.0) * g;
+    return share;
 }
 
 // The surface and its material at a ray's hit.

@@ -126,15 +126,21 @@ impl TextureHit<'_> {
     }
 }
 
-/// The share of a light that a bent normal lets through: 1 at the interpolated normal, 0 at the horizon of the
-/// interpolated surface.
+/// The squared tangent of an angle, from its cosine.
+fn squared_tangent(cosine: f32) -> f32 {
+    (1.0 - cosine * cosine).max(0.0) / (cosine * cosine)
+}
+
+/// The share of a light that reaches a bent normal, whose bumps shadow one another: 1 from the direction of the
+/// interpolated normal, 0 at the horizon of the interpolated surface.
 pub fn bump_shadowing(inputs: &KernelInputs, surface: &Surface, to_light: Vec3) -> f32 {
     if inputs.textures.is_none() {
         return 1.0;
     }
-    let bent = surface.shading.dot(to_light) * surface.interpolated.dot(surface.shading);
-    let g = (surface.interpolated.dot(to_light) / bent.max(LEAST_COSINE * LEAST_COSINE)).clamp(0.0, 1.0);
-    ((1.0 - g) * g + 1.0) * g
+    let cos_bend = surface.interpolated.dot(surface.shading).abs().max(LEAST_COSINE);
+    let cos_light = surface.interpolated.dot(to_light).max(LEAST_COSINE);
+    let squared_width = (0.125 * squared_tangent(cos_bend)).min(1.0);
+    2.0 / (1.0 + (1.0 + squared_width * squared_tangent(cos_light)).sqrt())
 }
 
 /// Returns the surface and its material at a ray's hit.

@@ -31,7 +31,7 @@ pub(crate) fn shadow_segment(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, li
     if !can_show(&material, surface.shading, -ray.direction, to_light.direction) {
         return None;
     }
-    let from = lit_point(&surface, hit, &inputs.triangles[hit.triangle_ix as usize]);
+    let from = lit_point(&surface, hit, &inputs.triangles[hit.triangle_ix as usize], to_light.direction);
     Some(PathRay {
         origin: from + surface.clearance * surface.geometric,
         pixel_ix: ray.pixel_ix,

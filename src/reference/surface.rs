@@ -2,7 +2,10 @@
 
 use glam::{Vec2, Vec3};
 
-use crate::layout::{FLAT_NORMAL, Hit, LEAST_NORMAL_SQUARED, LEAST_WEIGHT, PathRay, SURFACE_CLEARANCE, Triangle};
+use crate::layout::{
+    CURVED_START_COSINE, FLAT_NORMAL, Hit, LEAST_NORMAL_SQUARED, LEAST_WEIGHT, PLANE_START_COSINE, PathRay,
+    SURFACE_CLEARANCE, Triangle,
+};
 
 /// The surface of a triangle at a hit, as the ray meets it.
 #[derive(Clone, Copy, Debug)]
@@ -88,16 +91,24 @@ fn above_corner(p: Vec3, corner: Vec3, normal: u32, interpolated: Vec3) -> Vec3 
     p - (p - corner).dot(n).min(0.0) * n
 }
 
-/// The point at which rays to lights start: the surface's point, moved up to the curved surface that the corners'
-/// normals suggest, if that is above the triangle (Hanika: Hacking the Shadow Terminator, Ray Tracing Gems II, 2021).
-pub fn lit_point(s: &Surface, hit: &Hit, t: &Triangle) -> Vec3 {
+/// The point at which a ray to a light starts. If the light is near the horizon of the triangle's plane, it is the
+/// surface's point, moved up to the curved surface that the corners' normals suggest, if that is above the triangle
+/// (Hanika: Hacking the Shadow Terminator, Ray Tracing Gems II, 2021).
+pub fn lit_point(s: &Surface, hit: &Hit, t: &Triangle, to_light: Vec3) -> Vec3 {
     if [t.n0, t.n1, t.n2].contains(&FLAT_NORMAL) {
         return s.point_world;
     }
+    let span = PLANE_START_COSINE - CURVED_START_COSINE;
+    let share = ((PLANE_START_COSINE - s.geometric.dot(to_light)) / span).clamp(0.0, 1.0);
+    // Not `<=`: a NaN stays where it is.
+    if !(share > 0.0) {
+        return s.point_world;
+    }
     let weights = inner_weights(hit);
-    weights.x * above_corner(s.point_world, t.v0, t.n0, s.interpolated)
+    let curved = weights.x * above_corner(s.point_world, t.v0, t.n0, s.interpolated)
         + weights.y * above_corner(s.point_world, t.v1, t.n1, s.interpolated)
-        + weights.z * above_corner(s.point_world, t.v2, t.n2, s.interpolated)
+        + weights.z * above_corner(s.point_world, t.v2, t.n2, s.interpolated);
+    s.point_world + share * (curved - s.point_world)
 }
 
 impl Surface {
