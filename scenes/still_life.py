@@ -2,6 +2,8 @@
 
     python3 scenes/still_life.py
 
+kdray render scenes/still_life.gltf --exposure 0.0095 --max-depth 6 --spp 16 then makes the picture.
+
 Everything is made here from formulas, with Python's standard library alone. A second run writes the same bytes.
 
 Lengths are metres, y is up. Images are written as PNG: colours with a palette, normals as RGB. A texture is a function
@@ -616,11 +618,6 @@ def joined(*parts):
         triangles += [tuple(ix + len(positions) for ix in face) for face in f]
         positions, normals, uvs = positions + p, normals + n, uvs + t
     return positions, normals, uvs, triangles
-
-
-def moved(part, scale, offset):
-    p, n, t, f = part
-    return [tuple(c * scale + o for c, o in zip(q, offset)) for q in p], n, t, f
 
 
 def tube(path, radius, sides, n):

@@ -127,7 +127,9 @@ impl Textures {
 fn set_opacity(maps: &mut MaterialMaps, material: &Material, scene: &Scene, corners_have_opacity: bool) {
     let is_microfacet = material.microfacet.is_some();
     if material.alpha != Alpha::Opaque {
-        maps.flags |= if is_microfacet { MAPS_COLOUR_HAS_OPACITY } else { 0 };
+        // Of MTL's materials, only a cut-out without an opacity map of its own takes that of the colours.
+        let takes_colours = matches!(material.alpha, Alpha::Cutout(_)) && material.maps.opacity.is_none();
+        maps.flags |= if is_microfacet || takes_colours { MAPS_COLOUR_HAS_OPACITY } else { 0 };
         maps.flags |= if corners_have_opacity { MAPS_CORNERS_HAVE_OPACITY } else { 0 };
     }
     match material.alpha {
