@@ -29,9 +29,9 @@ above a tenth of a percent have these reasons:
 | `spot_soft` | none: as the formulas differ, Cycles renders a point light, and this script multiplies its picture by glTF's formula |
 | `texture_wrapped` | kdray shows smaller levels of an image where the surface is seen at a grazing angle, Cycles has no levels |
 | `texture_linear`, `obj` | Cycles blends the encoded values of neighbouring pixels, kdray the decoded ones. The images are gradients, in which this is little |
-| `normal_map` | the shadow that a bent normal does not know: kdray weakens the light after Chiang et al. (2019), Cycles after Estevez et al. (2019), which is up to 40 % brighter near the terminator (`normal_map_side`) |
+| `normal_map` | both weaken light on bent normals after Estevez et al. (2019). Near the horizon of the unbent surface (`normal_map_side`), where the light is weak, their pixels differ by more than a percent |
 | `vertex_colours` | kdray rounds colours of corners to 8 bits of sRGB |
-| `smooth_heads`, `obj` | kdray moves the origins of shadow rays up to the curved surface that the normals suggest, whatever the light's direction, up to 7 % of the size of a coarse head. Shadows on it shift, and light that something else stops leaks in |
+| `smooth_heads`, `obj` | both move the origins of shadow rays up to the curved surface that the normals suggest, where the light is near the horizon of the triangle's plane, but fade this out by formulas of their own |
 | `many_lights` | Cycles selects one light for each sample, so that its picture has noise |
 | `alpha_blend` | Cycles selects by chance what a see-through surface shows. kdray's shadows of such surfaces are full or none, so that they are not compared |
 """
@@ -547,18 +547,18 @@ CASES = {
     "texture_nearest": Case(base_texture(letters, "Closest", "REPEAT"), 0.001, 0.001, 0.001),
     "texture_linear": Case(base_texture(gradient, "Linear", "EXTEND"), 0.001, 0.002, 0.001),
     "texture_wrapped": Case(wrapped_texture, 0.002, 0.001, 0.016),
-    "normal_map": Case(normal_map(card, 1.0), 0.002, 0.008, 0.001),
-    "normal_map_sphere": Case(normal_map(normal_mapped_sphere(1.0, FRONT), 0.5), 0.012, 0.1, 0.05, least=0.4),
-    "normal_map_mirrored": Case(normal_map(normal_mapped_sphere(-1.0, FRONT), 0.5), 0.015, 0.15, 0.08, least=0.4),
-    "normal_map_side": Case(normal_map(normal_mapped_sphere(1.0, SIDE), 1.0), 0.015, 0.17, 0.1),
+    "normal_map": Case(normal_map(card, 1.0), 0.0005, 0.001, 0.001),
+    "normal_map_sphere": Case(normal_map(normal_mapped_sphere(1.0, FRONT), 0.5), 0.001, 0.004, 0.002, least=0.4),
+    "normal_map_mirrored": Case(normal_map(normal_mapped_sphere(-1.0, FRONT), 0.5), 0.001, 0.004, 0.002, least=0.4),
+    "normal_map_side": Case(normal_map(normal_mapped_sphere(1.0, SIDE), 1.0), 0.002, 0.02, 0.03),
     "vertex_colours": Case(vertex_colours, 0.001, 0.006, 0.001),
     "alpha_mask": Case(holes(True, lambda p: np.where(p[..., 0] > 0.5, 1.0, 0.2)), 0.001, 0.001, 0.001),
     "alpha_blend": Case(holes(False, lambda p: np.where(p[..., 0] > 0.5, 0.45, 0.2)), 0.001, 0.001, 0.001),
     "emission": Case(emission, 0.001, 0.001, 0.001),
     "negative_scale": Case(negative_scale(False), 0.001, 0.001, 0.001),
-    "smooth_heads": Case(negative_scale(True), 0.008, 0.001, 0.016),
+    "smooth_heads": Case(negative_scale(True), 0.001, 0.001, 0.004),
     "terminator": Case(terminator, 0.001, 0.001, 0.001),
-    "obj_phong": Case(obj_scene(0.0), 0.005, 0.002, 0.009, "obj"),
+    "obj_phong": Case(obj_scene(0.0), 0.002, 0.002, 0.005, "obj"),
     "obj_pbr": Case(obj_scene(0.5), 0.01, 0.018, 0.012, "obj+pbr"),
 }
 
