@@ -18,6 +18,7 @@ const bool PASSES_VEILS = true;
 #include "light.glsl"
 #include "material.glsl"
 #include "maps.glsl"
+#include "lit_point.glsl"
 
 layout(local_size_x = RAY_GROUP_SIZE) in;
 layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };
@@ -34,7 +35,7 @@ bool shadow_segment(PathRay ray, Hit hit, Light light, out PathRay segment) {
     LightSample to_light = sample_light(light, surface.point_world);
     if (!(dot(surface.interpolated, to_light.direction) > 0.0)) return false;
     if (!can_show(material, surface.shading, -ray.direction, to_light.direction)) return false;
-    vec3 origin = lit_point(surface, hit, triangle_at(hit.triangle_ix), to_light.direction);
+    vec3 origin = lit_point(surface, hit, to_light.direction);
     origin += surface.clearance * surface.geometric;
     segment = PathRay(
         origin, ray.pixel_ix, to_light.direction, hit.triangle_ix, vec3(0.0), to_light.distance

@@ -67,30 +67,6 @@ Surface surface_at(PathRay ray, Hit hit, Triangle t) {
     return s;
 }
 
-// The part of p, relative to a corner, that is not below the plane through the corner with the normal of that corner.
-vec3 above_corner(vec3 p, vec3 corner, uint normal, vec3 interpolated) {
-    vec3 n = decode_normal(normal);
-    n = dot(n, interpolated) < 0.0 ? -n : n;
-    return p - min(dot(p - corner, n), 0.0) * n;
-}
-
-// The point at which a ray to a light starts. If the light is near the horizon of the triangle's plane, it is the
-// surface's point, moved up to the curved surface that the corners' normals suggest, if that is above the triangle
-// (Hanika: Hacking the Shadow Terminator, Ray Tracing Gems II, 2021). From a point of a coarse mesh itself, the light
-// would be hidden by the neighbouring triangles, one triangle earlier or later than the shading ends. Where the light
-// is higher, the point stays, so that what is near it casts its shadow.
-vec3 lit_point(Surface s, Hit hit, Triangle t, vec3 to_light) {
-    if (t.n0 == FLAT_NORMAL || t.n1 == FLAT_NORMAL || t.n2 == FLAT_NORMAL) return s.point_world;
-    float span = PLANE_START_COSINE - CURVED_START_COSINE;
-    float share = clamp((PLANE_START_COSINE - dot(s.geometric, to_light)) / span, 0.0, 1.0);
-    if (!(share > 0.0)) return s.point_world;
-    vec3 weights = inner_weights(hit);
-    vec3 curved = weights.x * above_corner(s.point_world, t.v0, t.n0, s.interpolated)
-        + weights.y * above_corner(s.point_world, t.v1, t.n1, s.interpolated)
-        + weights.z * above_corner(s.point_world, t.v2, t.n2, s.interpolated);
-    return s.point_world + share * (curved - s.point_world);
-}
-
 // A child ray from the surface, with the parent's t_max. It starts on the side of the surface to which its direction
 // points. triangle_ix: the surface's triangle, which the ray does not hit.
 PathRay ray_from(Surface s, vec3 direction, uint triangle_ix, PathRay parent, vec3 throughput) {

@@ -72,7 +72,7 @@ fn a_pixel_shows_its_texel() {
 /// From afar, a fine checkerboard is grey: the mean of its colours in linear light.
 #[test]
 fn a_distant_checkerboard_is_the_mean_of_its_colours() {
-    let check = |x: u32, y: u32| if (x + y) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] };
+    let check = |x: u32, y: u32| if (x + y).is_multiple_of(2) { [255; 4] } else { [0, 0, 0, 255] };
     let scene = poster(false, |scene| Texture::of_image(add_image(scene, [256, 256], check)));
     for picture in on_both(&scene, &options(16, 16, 1)) {
         assert!((0..256).all(|i| (rgb(&picture, i % 16, i / 16) - 0.5).abs().max_element() < 0.005));
@@ -83,7 +83,7 @@ fn a_distant_checkerboard_is_the_mean_of_its_colours() {
 /// so a picture with pixels of that size still shows them, and one with pixels of twice the size shows their mean.
 #[test]
 fn the_level_follows_the_size_of_pixels() {
-    let column = |x: u32, _: u32| if x / 4 % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] };
+    let column = |x: u32, _: u32| if (x / 4).is_multiple_of(2) { [255; 4] } else { [0, 0, 0, 255] };
     let scene = poster(true, |scene| Texture::of_image(add_image(scene, [64, 64], column)));
     for picture in on_both(&scene, &options(16, 16, 1)) {
         assert!((0..16).all(|x| (rgb(&picture, x, 8).x - if x % 2 == 0 { 1.0 } else { 0.0 }).abs() < 0.02));
