@@ -9,7 +9,6 @@ use kdray::{
     gpu::{ContextOptions, GpuError},
     layout::Triangle,
     output,
-    scene::Scene,
 };
 
 use super::{
@@ -34,7 +33,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
 
     let rays = RayReader::open(&args.rays)?;
     let progress = Progress::new(args.quiet, 3);
-    let (scene, load_ms) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
+    let (scene, load_ms) = progress.stage(&format!("loading {}", args.mesh.display()), || args.load.load(&args.mesh));
     let scene = scene?;
     let device = ContextOptions::new(args.device.clone(), args.validate);
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };

@@ -97,8 +97,8 @@ impl Reloader {
     /// Starts to read the scene again. If a reading is under way, another one starts when it has ended.
     pub fn load(&mut self) {
         if self.loading.begin() {
-            let (path, load_options, proxy) = (self.path.clone(), self.load_options, self.proxy.clone());
-            let load = move || Box::new(LoadedScene::load(&path, load_options));
+            let (path, load_options, proxy) = (self.path.clone(), self.load_options.clone(), self.proxy.clone());
+            let load = move || Box::new(LoadedScene::load(&path, &load_options));
             thread::spawn(move || drop(proxy.send_event(Wake::Reloaded(load()))));
         }
     }

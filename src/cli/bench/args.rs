@@ -17,6 +17,7 @@ use crate::cli::{
     args::{Size, device},
     error::CliError,
     file_roles::FileRoles,
+    load_args::LoadArgs,
     picture_args::{
         accel_help, accel_long_help, fixed_traversal_help, fixed_traversal_long_help, listed, traversals_of_devices,
     },
@@ -72,8 +73,10 @@ pub struct PaperArgs {
 
 #[derive(clap::Args)]
 pub struct TraversalArgs {
-    /// Mesh file (OBJ, PLY, STL) or scene file
+    /// Mesh file (glTF, OBJ, PLY, STL) or scene file
     pub mesh: PathBuf,
+    #[command(flatten)]
+    pub load: LoadArgs,
     /// Size of the picture in pixels; each pixel has one primary ray
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,
@@ -107,8 +110,10 @@ pub struct TraversalArgs {
 
 #[derive(clap::Args)]
 pub struct DriverArgs {
-    /// Mesh file (OBJ, PLY, STL) or scene file
+    /// Mesh file (glTF, OBJ, PLY, STL) or scene file
     pub mesh: PathBuf,
+    #[command(flatten)]
+    pub load: LoadArgs,
     /// Size of the picture in pixels; each pixel has one primary ray
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,

@@ -14,7 +14,6 @@ use kdray::{
     },
     engine::choices::{Processor, TreeKind},
     gpu::{Context, ContextOptions, GpuError},
-    scene::Scene,
     world::FlatScene,
 };
 
@@ -32,7 +31,7 @@ pub fn run(args: &DriverArgs) -> Result<(), CliError> {
     args.files.check(&[&args.mesh])?;
     let context = Context::with_ray_tracing(&ContextOptions::new(args.device.clone(), false))?;
     let progress = Progress::new(false, 8);
-    let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
+    let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || args.load.load(&args.mesh));
     let scene = FlatScene::new(&scene?).map_err(GpuError::from)?;
     let build_options = TreeKind::Best.options(Processor::of(Some(&context)));
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());

@@ -57,18 +57,19 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     Ok(scene)
 }
 
-/// Loads the meshes of a glTF file's default scene with their materials and images, without its lights and cameras. If
+/// Loads the meshes of a scene of a glTF file with their materials and images, without its lights and cameras. If
 /// `has_materials` is false, the materials and images are left out, and the instances' materials have no meaning.
-/// `n_loaded` is the number of triangles that there are already.
+/// `n_loaded` is the number of triangles that there are already. `scene`: as in [`LoadOptions`].
 pub(super) fn load_meshes(
     path: &Path,
     bytes: Vec<u8>,
+    scene: Option<&str>,
     has_materials: bool,
     n_loaded: usize,
 ) -> Result<Scene, SceneError> {
     let failed = |what: String| SceneError::file(path, what);
     let document = read(path, bytes)?;
-    let nodes = Nodes::new(&document, None).map_err(failed)?;
+    let nodes = Nodes::new(&document, scene).map_err(failed)?;
     let scene = Loader::new(&document, &nodes, n_loaded as u64, has_materials).load(path).map_err(failed)?;
     document.warn(path);
     Ok(scene)
@@ -187,6 +188,7 @@ impl<'a> Loader<'a> {
         if whole.faces.is_empty() {
             return Ok(None);
         }
+        whole.name = document.root.meshes[mesh_ix].name.clone().unwrap_or_default();
         self.meshes.push(whole);
         Ok(Some((self.meshes.len() - 1, materials)))
     }
