@@ -83,7 +83,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
 /// Refuses an output that the command also reads, or that it writes twice.
 fn check_roles(args: &CastArgs) -> Result<(), CliError> {
     let mut roles = FileRoles::default();
-    roles.read_scene("MESH", &args.mesh);
+    roles.read_scene("MESH", &args.mesh, args.load.options());
     roles.read("RAYS", &args.rays);
     roles.write("--output", &args.output)?;
     args.json.iter().try_for_each(|path| roles.write("--json", path))

@@ -11,7 +11,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
         return Err(CliError::Usage(format!("cannot write `{path}`: the name of a scene file must end in .toml")));
     }
     let mut roles = FileRoles::default();
-    roles.read_scene("IN", &args.input);
+    roles.read_scene("IN", &args.input, args.load.options());
     roles.write("OUT", &args.output)?;
     // A link that leads nowhere exists, too.
     if args.output.symlink_metadata().is_ok() && !args.force {

@@ -13,6 +13,10 @@ pub struct LoadArgs {
     /// Scene of a glTF file to load: its name, or its index, counted from 0 [default: the file's default scene]
     #[arg(long = "scene", value_name = "NAME|INDEX")]
     pub scene_name: Option<String>,
+    /// Read files that the scene's files name wherever they lie; otherwise only below the folder of the file that names
+    /// them
+    #[arg(long)]
+    pub allow_outside: bool,
 }
 
 impl LoadArgs {
@@ -23,6 +27,7 @@ impl LoadArgs {
 
     /// Returns the options of loading.
     pub fn options(&self) -> LoadOptions {
-        LoadOptions { scene: self.scene_name.clone(), camera: self.camera.clone() }
+        let &Self { allow_outside, .. } = self;
+        LoadOptions { scene: self.scene_name.clone(), camera: self.camera.clone(), allow_outside }
     }
 }

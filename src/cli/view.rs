@@ -130,7 +130,7 @@ fn check_outputs(args: &ViewArgs) -> Result<(), CliError> {
 /// Refuses an output that the command also reads, or that it writes twice.
 fn check_roles(args: &ViewArgs) -> Result<(), CliError> {
     let mut roles = FileRoles::default();
-    roles.read_scene("SCENE", &args.scene);
+    roles.read_scene("SCENE", &args.scene, args.load.options());
     args.path.iter().for_each(|path| roles.read("--path", path));
     args.screenshot.iter().try_for_each(|path| roles.write("--screenshot", path))?;
     args.profile.iter().try_for_each(|path| roles.write("--profile", path))

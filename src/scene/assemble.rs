@@ -11,17 +11,19 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use super::{
-    Camera, Light, Material, RenderDefaults, Scene, Transform,
+    Camera, Light, LoadOptions, Material, RenderDefaults, Scene, Transform,
     description::{CameraSpec, CommonSpec, Description, LightSpec, MeshSpec, RenderSpec, SceneDenoise, Source},
     error::{Checked, SceneError},
     extent, framing,
     generate::TriangleBudget,
     gltf,
     image_files::{ImageFiles, Images},
+    map_spec::MapSpec,
     material::{MaterialSpec, colour, within},
     mesh::{MAX_COORDINATE, Mesh},
     mesh_file::{MeshFormat, parse_mesh, read_mesh},
     obj::Library,
+    outside::Access,
     overrides::NamedMaterials,
     read::read_utf8,
     tangents,
@@ -33,9 +35,9 @@ use crate::frame::Denoise;
 pub(super) const DEFAULT_MATERIAL: &str = "(default)";
 
 /// Loads a scene file and the meshes that it names. Their names are relative to the scene file's folder.
-pub(super) fn load_toml(path: &Path) -> Result<Scene, SceneError> {
+pub(super) fn load_toml(path: &Path, access: Access) -> Result<Scene, SceneError> {
     let text = read_utf8(path)?;
-    let file = File { path, text: &text };
+    let file = File { path, text: &text, access };
     assemble(&file, file.parse()?)
 }
 
@@ -43,6 +45,8 @@ pub(super) fn load_toml(path: &Path) -> Result<Scene, SceneError> {
 pub(super) struct File<'a> {
     pub path: &'a Path,
     pub text: &'a str,
+    /// Which files it may name.
+    pub access: Access,
 }
 
 impl File<'_> {
@@ -114,12 +118,16 @@ fn add_materials(
     scene: &mut Scene,
     specs: &BTreeMap<String, Spanned<MaterialSpec>>,
 ) -> Result<HashMap<String, u32>, SceneError> {
-    let folder = file.path.parent().unwrap_or(Path::new(""));
     let mut files = ImageFiles::default();
-    let mut add = |spec: &Spanned<MaterialSpec>| -> Vec<usize> {
-        spec.get_ref().maps().map(|(_, map)| files.add(map.path(folder))).collect()
-    };
-    let of_materials: Vec<Vec<usize>> = specs.values().map(&mut add).collect();
+    let mut of_materials: Vec<Vec<usize>> = Vec::new();
+    for (name, spec) in specs {
+        of_materials.push(file.check(&format!("material `{name}`"), spec, |spec| {
+            let path = |(key, map): (&str, &MapSpec)| {
+                file.access.beside(file.path).exact(map.file()).map_err(|what| format!("{key}: {what}"))
+            };
+            spec.maps().map(|map| Ok(files.add(path(map)?))).collect()
+        })?);
+    }
     let (mut images, mut wrong) = (Vec::new(), HashMap::new());
     for (ix, image) in files.decode().into_iter().enumerate() {
         images.push(image.map_err(|what| wrong.insert(ix, what)).ok());
@@ -162,18 +170,20 @@ fn add_mesh(
     let n_loaded = scene.n_triangles();
     let (mut mesh, slots, n_made) = match source {
         Source::File { path, shading, scene: scene_name } => {
-            let path = file.path.parent().unwrap_or(Path::new("")).join(path);
+            let path = file.access.beside(file.path).exact(&path).map_err(failed)?;
             // The scene file may misspell the name, so the error names the line in the scene file.
             let bytes = read_mesh(&path).map_err(|error| failed(error.to_string()))?;
             if MeshFormat::of(&path, &bytes) == MeshFormat::Gltf {
-                let model = gltf::load_meshes(&path, bytes, scene_name.as_deref(), named.is_empty(), n_loaded)?;
+                let allow_outside = file.access.is_anywhere();
+                let options = LoadOptions { scene: scene_name, camera: None, allow_outside };
+                let model = gltf::load_meshes(&path, bytes, &options, named.is_empty(), n_loaded)?;
                 add_gltf(scene, model, (&transform, &common, &named), materials).map_err(failed)?;
                 return Ok(0);
             }
             if let Some(name) = scene_name {
                 return Err(failed(format!("there is no scene `{name}`: only glTF files name scenes")));
             }
-            let (mesh, library) = parse_mesh(&path, bytes, shading, n_loaded)?;
+            let (mesh, library) = parse_mesh(&path, bytes, shading, n_loaded, file.access)?;
             let n_materials = scene.materials.len();
             let slots = if named.is_empty() { scene.push_library(library) } else { named };
             if common.overrides {
@@ -323,8 +333,8 @@ fn unit(name: &str, value: [f32; 3]) -> Checked<Vec3> {
     if direction == Vec3::ZERO { Err(format!("{name} = {value:?} has no direction")) } else { Ok(direction) }
 }
 
-/// Returns a vector of length 1, or 0 for a vector without a direction. A vector whose length is 1 up to the rounding of
-/// its coordinates is kept as it is, so that a unit vector that was written is read.
+/// Returns a vector of length 1, or 0 for a vector without a direction. A vector whose length is 1 up to the rounding
+/// of its coordinates is kept as it is, so that a unit vector that was written is read.
 fn normalized(vector: DVec3) -> Vec3 {
     let is_unit = (vector.length_squared() - 1.0).abs() <= f64::from(4.0 * f32::EPSILON);
     if is_unit { vector.as_vec3() } else { vector.normalize_or_zero().as_vec3() }

@@ -50,12 +50,12 @@ pub use self::{
     material::{Alpha, Clearcoat, Lobes, Maps, Material, Microfacet, Sheen},
     mesh::Mesh,
     path::CameraPath,
-    sources::source_files,
+    sources::{source_files, source_files_with},
     terms::{Term, TermValue},
     texture::{Channel, Encoding, Image, Pixels, Texture, Wrap},
     transform::Transform,
 };
-use self::{mesh_file::MeshFormat, smooth::Shading};
+use self::{mesh_file::MeshFormat, outside::Access, smooth::Shading};
 
 /// Everything that a frame shows. World space is right-handed, +y up by default.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,6 +93,8 @@ pub struct LoadOptions {
     /// The camera of the scene's file by its name or its index, counted from 0. Where absent, it is the file's default
     /// camera.
     pub camera: Option<String>,
+    /// Whether the scene's files may name files that do not lie below their own folders.
+    pub allow_outside: bool,
 }
 
 /// A mesh that is placed in the world.
@@ -122,8 +124,8 @@ pub struct Camera {
 
 impl Scene {
     /// Loads a scene file, `.toml`, a glTF file, `.gltf` or `.glb`, or a mesh file, `.obj`, `.ply` or `.stl`. The
-    /// content of a glTF or mesh file says which of the four it is. Emits `tracing` warnings for unknown OBJ statements,
-    /// material libraries and images that are missing or leave the folder of the mesh file, undefined materials, names
+    /// content of a glTF or mesh file says which of the four it is. Emits `tracing` warnings for unknown OBJ
+    /// statements, material libraries and images that are missing or leave the folder of the mesh file, undefined materials, names
     /// in the wrong case, what is not shown of a file, and coordinates too large for the scene's detail.
     ///
     /// # Errors
@@ -141,7 +143,7 @@ impl Scene {
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         let mut scene = if is_scene_file(path) {
             check_only_scene(path, options)?;
-            assemble::load_toml(path)?
+            assemble::load_toml(path, Access::of(options))?
         } else if MeshFormat::of_name(path).is_some() {
             load_mesh_file(path, options)?
         } else {
@@ -267,7 +269,7 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<Scene, SceneErro
     }
     check_only_scene(path, options)?;
     let mut scene = Scene::empty(path);
-    let (mut mesh, library) = mesh_file::parse_mesh(path, bytes, Shading::default(), 0)?;
+    let (mut mesh, library) = mesh_file::parse_mesh(path, bytes, Shading::default(), 0, Access::of(options))?;
     let slots = scene.push_library(library);
     scene.add_tangents(&mut mesh, &slots);
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;

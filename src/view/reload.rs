@@ -11,7 +11,7 @@ use super::{
     session::Session,
     watch::Watch,
 };
-use crate::scene::{SceneError, source_files};
+use crate::scene::{SceneError, source_files_with};
 
 /// Event from another thread that wakes the viewer.
 pub enum Wake {
@@ -82,7 +82,7 @@ impl Reloader {
     /// scene cannot be read.
     fn watch(&mut self) {
         let n_known = self.files.len();
-        self.files.extend(source_files(&self.path));
+        self.files.extend(source_files_with(&self.path, &self.load_options.scene));
         if self.files.len() == n_known {
             return;
         }

@@ -164,7 +164,8 @@ fn a_converted_scene_file_names_its_files_from_its_new_folder() {
     fs::create_dir_all(path("in/parts")).unwrap();
     fs::write(path("in/parts/x.obj"), OBJ.replace("mtllib m.mtl\n", "")).unwrap();
     fs::write(path("in/a.png"), png(|x, _| [x as u8, 1, 2, 255])).unwrap();
-    let toml = "# a comment\nambient = [0.1, 0.2, 0.3]\n[materials]\nm = { map_Kd = 'a.png', map_d = { file = 'a.png' } }\n\
+    let toml = "# a comment\nambient = [0.1, 0.2, 0.3]\n[materials]\n\
+                m = { map_Kd = 'a.png', map_d = { file = 'a.png' } }\n\
                 [[cameras]]\nname = 'c'\neye = [0.1, 0.2, 9]\ntarget = [0, 0, 0]\n[[mesh]]\nfile = 'parts/x.obj'\n\
                 material = 'm'\n";
     fs::write(path("in/s.toml"), toml).unwrap();

@@ -11,6 +11,7 @@ use kdray::{
     },
     gpu::DeviceSelector,
     output,
+    scene::LoadOptions,
 };
 
 use crate::cli::{
@@ -174,9 +175,9 @@ pub struct FileArgs {
 impl FileArgs {
     /// Refuses files that cannot be written, or that belong to `scenes`, which the command reads. It is called before
     /// anything is measured.
-    pub fn check(&self, scenes: &[&Path]) -> Result<(), CliError> {
+    pub fn check(&self, scenes: &[&Path], options: &LoadOptions) -> Result<(), CliError> {
         let mut roles = FileRoles::default();
-        scenes.iter().for_each(|scene| roles.read_scene("a scene", scene));
+        scenes.iter().for_each(|scene| roles.read_scene("a scene", scene, options.clone()));
         self.json.iter().try_for_each(|path| roles.write("--json", path))?;
         self.svg.iter().try_for_each(|path| roles.write("--svg", path))?;
         Ok([&self.json, &self.svg].into_iter().flatten().try_for_each(|path| output::check(path))?)

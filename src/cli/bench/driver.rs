@@ -28,7 +28,7 @@ use crate::cli::{
 /// Opens the device, which must have ray tracing. Then loads the mesh, makes the rays, and lets kdray and the driver
 /// trace each set of rays.
 pub fn run(args: &DriverArgs) -> Result<(), CliError> {
-    args.files.check(&[&args.mesh])?;
+    args.files.check(&[&args.mesh], &args.load.options())?;
     let context = Context::with_ray_tracing(&ContextOptions::new(args.device.clone(), false))?;
     let progress = Progress::new(false, 8);
     let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || args.load.load(&args.mesh));

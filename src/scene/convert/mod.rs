@@ -9,17 +9,17 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use self::relative::Places;
-use super::{LoadOptions, Scene, SceneError, is_scene_file, material_spec::MAP_KEYS, read::read_utf8};
+use super::{LoadOptions, Scene, SceneError, is_scene_file, material_spec::MAP_KEYS, outside::Access, read::read_utf8};
 
 /// Returns the text of a scene file that shows what `input` shows. The names of files in it are relative to the folder
 /// of `output`, where the text is to be written; this function does not write it. `options` say how `input` is loaded,
 /// and its camera becomes `[camera]`.
 ///
 /// # Errors
-/// The input cannot be loaded, or a file does not lie below the folder of `output`.
+/// The input cannot be loaded, or a file does not lie below the folder of `output` and `options` do not allow it.
 pub fn scene_file_of(input: &Path, output: &Path, options: &LoadOptions) -> Result<String, SceneError> {
     let scene = Scene::load_with(input, options)?;
-    let places = Places::new(output)?;
+    let places = Places::new(output, Access::of(options))?;
     if is_scene_file(input) {
         return moved(input, &places, options.camera.is_some().then_some(&scene));
     }

@@ -1,23 +1,25 @@
 //! Names of files relative to the folder of a file that is to be written.
 
 use std::{
+    ffi::OsStr,
     fs, io,
     path::{Component, Path, PathBuf},
 };
 
-use crate::scene::SceneError;
+use crate::scene::{SceneError, outside::Access};
 
 /// The folder of a file that is to be written.
 pub(super) struct Places {
     output: PathBuf,
     /// The folder of the output, without links.
     folder: PathBuf,
+    access: Access,
 }
 
 impl Places {
-    pub fn new(output: &Path) -> Result<Self, SceneError> {
+    pub fn new(output: &Path, access: Access) -> Result<Self, SceneError> {
         let folder = folder_of(output).map_err(|error| SceneError::file(output, format!("its folder: {error}")))?;
-        Ok(Self { output: output.to_owned(), folder })
+        Ok(Self { output: output.to_owned(), folder, access })
     }
 
     /// Returns whether a folder is the output's.
@@ -31,15 +33,17 @@ impl Places {
         // A link to the file stays one, since what the file names is looked up beside the link.
         let folder = folder_of(file).map_err(|error| failed(format!("its folder: {error}")))?;
         let file_name = file.file_name().ok_or_else(|| failed("has no name".to_owned()))?;
-        let Ok(below) = folder.strip_prefix(&self.folder) else {
+        let is_common = |(a, b): &(Component, Component)| a == b;
+        let n_common = folder.components().zip(self.folder.components()).take_while(is_common).count();
+        let n_up = self.folder.components().count() - n_common;
+        if n_up > 0 && !self.access.is_anywhere() {
             let output = self.output.display();
-            return Err(failed(format!("does not lie below the folder of `{output}`, which has to name it")));
-        };
-        let path = below.join(file_name);
-        let parts = path.components().map(|part| match part {
-            Component::Normal(part) => part.to_str().ok_or_else(|| failed("its path is not UTF-8".to_owned())),
-            _ => Err(failed("has no relative path".to_owned())),
-        });
+            let what = format!("does not lie below the folder of `{output}`, which has to name it");
+            return Err(failed(what + "; --allow-outside lets it"));
+        }
+        let below = folder.components().skip(n_common).map(Component::as_os_str).chain([file_name]);
+        let parts = std::iter::repeat_n(OsStr::new(".."), n_up).chain(below);
+        let parts = parts.map(|part| part.to_str().ok_or_else(|| failed("its path is not UTF-8".to_owned())));
         Ok(parts.collect::<Result<Vec<_>, _>>()?.join("/"))
     }
 }
