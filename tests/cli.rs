@@ -63,6 +63,7 @@ fn usage_mistakes_are_refused_before_the_scene_is_read() {
         (&["render", "none.toml", "-o", "x"], ".png"),
         (&["render", "none.toml", "-o", "x.png", "--profile", "x.png"], "same file"),
         (&["inspect"], "SCENE"),
+        (&["convert", "none.obj"], "<OUT>"),
         (&["devices", "0"], "'0'"),
     ];
     for (arguments, named) in cases {
@@ -162,6 +163,97 @@ fn inspect_describes_the_scene_and_its_tree() {
     for row in ["nodes", "leaves", "empty leaves", "depth", "references a triangle", "SAH cost", "bytes", "build ms"] {
         assert!(text.lines().any(|line| line.starts_with(row)), "{row}: {text}");
     }
+}
+
+/// A scene file with two cameras, a spot light, and a mesh file with a map.
+fn write_scene(directory: &Path) {
+    let write = |name: &str, content: &str| fs::write(directory.join(name), content).unwrap();
+    write("m.mtl", "newmtl wood\nKd 0.1 0.2 0.3\nmap_Kd a.png\nNs 9\n");
+    write("m.obj", "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl wood\nf 1/1 2/1 3/1\n");
+    image::RgbaImage::from_pixel(4, 2, image::Rgba([250, 240, 230, 255])).save(directory.join("a.png")).unwrap();
+    let cameras = ["left", "right"].map(|name| {
+        let x = name.len();
+        format!("[[cameras]]\nname = '{name}'\neye = [{x}, 0, 5]\ntarget = [0, 0, 0]\n")
+    });
+    let light = "[[light]]\nkind = 'spot'\nposition = [0, 0, 4]\ndirection = [0, 0, -1]\nintensity = [9, 9, 9]\n\
+                 inner_angle = 10\nouter_angle = 30\n";
+    let meshes = "[[mesh]]\nfile = 'm.obj'\n".repeat(2);
+    write("s.toml", &format!("{}{light}{meshes}", cameras.concat()));
+}
+
+#[test]
+fn inspect_lists_what_a_scene_consists_of() {
+    let directory = TempDir::new().unwrap();
+    write_scene(directory.path());
+    let text = stdout(&succeed(directory.path(), &["inspect", "s.toml"]));
+    let json = succeed(directory.path(), &["inspect", "s.toml", "--json", "--camera", "1"]).stdout;
+    let json: Value = serde_json::from_slice(&json).unwrap();
+    assert_eq!((json["meshes"][1]["triangles"].as_u64(), json["meshes"][1]["instances"].as_u64()), (Some(1), Some(1)));
+    let wood = &json["materials"][0];
+    assert_eq!((wood["name"].as_str(), wood["model"].as_str()), (Some("wood"), Some("phong")));
+    assert_eq!((wood["terms"]["Ns"].as_f64(), wood["maps"]["base colour"].as_str()), (Some(9.0), Some("a.png")));
+    assert!(wood["terms"]["Ni"].is_null() && wood["opacity"] == "coverage" && wood["double_sided"] == true);
+    let image = &json["images"][0];
+    assert_eq!(
+        (image["width"].as_u64(), image["height"].as_u64(), image["bytes"].as_u64()),
+        (Some(4), Some(2), Some(32))
+    );
+    assert_eq!((image["channels"].as_str(), image["used_by"][0]["material"].as_str()), (Some("8 bit"), Some("wood")));
+    assert_eq!(
+        (json["lights"][0]["kind"].as_str(), json["lights"][0]["direction"][2].as_f64()),
+        (Some("spot"), Some(-1.0))
+    );
+    assert!((json["lights"][0]["outer_angle"].as_f64().unwrap() - 30.0).abs() < 1e-4);
+    assert_eq!((json["cameras"][1]["name"].as_str(), json["camera"]["eye"][0].as_f64()), (Some("right"), Some(5.0)));
+    let memory = &json["texture_memory"];
+    // The table of sRGB has 256 words. Each image has three levels of 8, 2 and 1 texels, and a word for each level.
+    assert!(memory["texels"].as_u64() >= Some(4 * (256 + 14)) && memory["uvs"].as_u64() == Some(2 * 24), "{memory}");
+    for row in ["mesh", "terms of material", "image", "spot light at", "camera", "textures on a device"] {
+        assert!(text.lines().any(|line| line.starts_with(row)), "{row}: {text}");
+    }
+    assert!(
+        text.contains("base colour of wood")
+            && text.lines().any(|line| line.starts_with("1") && line.contains("right"))
+    );
+}
+
+#[test]
+fn cameras_and_scenes_are_chosen() {
+    let directory = TempDir::new().unwrap();
+    write_scene(directory.path());
+    let picture = |camera: &[&str]| {
+        let render = ["render", "s.toml", "--cpu", "-q", "--size", "32x24", "-o", "x.png"];
+        succeed(directory.path(), &[&render, camera].concat());
+        fs::read(directory.path().join("x.png")).unwrap()
+    };
+    let [first, second] = [picture(&["--camera", "left"]), picture(&["--camera", "1"])];
+    assert!(first == picture(&[]) && first != second && second == picture(&["--camera", "right"]));
+    let wrong = ["render", "s.toml", "--cpu", "--camera", "up"];
+    fail(directory.path(), &wrong, 3, "s.toml: there is no camera `up`, but 0 `left`, 1 `right`");
+    fail(directory.path(), &["inspect", "m.obj", "--camera", "0"], 3, "the file names no cameras");
+    fail(directory.path(), &["inspect", "s.toml", "--scene", "0"], 3, "only glTF files name scenes");
+}
+
+#[test]
+fn convert_writes_a_scene_file() {
+    let directory = TempDir::new().unwrap();
+    write_scene(directory.path());
+    let path = |name: &str| directory.path().join(name);
+    assert_eq!(stdout(&succeed(directory.path(), &["convert", "m.obj", "c.toml"])), "wrote c.toml\n");
+    for (file, picture) in [("m.obj", "a.exr"), ("c.toml", "b.exr")] {
+        succeed(directory.path(), &["render", file, "--cpu", "-q", "--size", "32x24", "-o", picture]);
+    }
+    assert_eq!(fs::read(path("a.exr")).unwrap(), fs::read(path("b.exr")).unwrap());
+    let written = fs::read(path("c.toml")).unwrap();
+    fail(directory.path(), &["convert", "m.obj", "c.toml"], 2, "`c.toml` exists: --force replaces it");
+    fail(directory.path(), &["convert", "m.obj", "c.txt"], 2, "must end in .toml");
+    fail(directory.path(), &["convert", "s.toml", "./s.toml", "--force"], 2, "is read as IN");
+    fail(directory.path(), &["convert", "m.obj", "none/c.toml"], 5, "none/c.toml");
+    fs::create_dir(path("sub")).unwrap();
+    fail(directory.path(), &["convert", "m.obj", "sub/c.toml"], 3, "m.obj: does not lie below the folder of");
+    assert_eq!(fs::read(path("c.toml")).unwrap(), written);
+    let quiet = succeed(directory.path(), &["convert", "s.toml", "c.toml", "--force", "-q"]);
+    assert!(quiet.stdout.is_empty() && fs::read(path("c.toml")).unwrap() == fs::read(path("s.toml")).unwrap());
 }
 
 #[test]

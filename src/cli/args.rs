@@ -17,6 +17,7 @@ use super::bench::Suite;
 pub use super::view_args::ViewArgs;
 use super::{
     error::CliError,
+    load_args::LoadArgs,
     or_auto::OrAuto,
     picture_args::{
         PictureArgs, accel_help, accel_long_help, build_help, build_long_help, check_accel, listed, traversal_help,
@@ -50,6 +51,8 @@ pub enum Command {
     Devices,
     /// Describe a scene and its acceleration structure
     Inspect(InspectArgs),
+    /// Write a scene file that shows what another file shows, to be edited
+    Convert(ConvertArgs),
     #[cfg(feature = "bench")]
     /// Measure whole frames, search algorithms, the driver's own ray tracing, or the cost of larger meshes
     #[command(subcommand)]
@@ -58,7 +61,7 @@ pub enum Command {
 
 #[derive(clap::Args)]
 pub struct RenderArgs {
-    /// Scene file (TOML), or mesh file (OBJ, PLY, STL)
+    /// Scene file (TOML), or mesh file (glTF, OBJ, PLY, STL)
     pub scene: PathBuf,
     /// Picture to write: .png, or .exr for linear radiance; with --path, #### in the name stands for the frame's
     /// number [default: the scene's name with .png, or with .####.png, in the working directory]
@@ -80,6 +83,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     #[arg(help = with_words(AOV, None, &Aov::words()), long_help = listed(AOV, "none", &Aov::descriptions()))]
     pub aov: Vec<Aov>,
+    #[command(flatten)]
+    pub load: LoadArgs,
     #[command(flatten)]
     pub picture: PictureArgs,
     /// Render on the CPU, without Vulkan
@@ -112,8 +117,10 @@ pub struct RenderArgs {
 
 #[derive(clap::Args)]
 pub struct CastArgs {
-    /// Mesh file (OBJ, PLY, STL) or scene file
+    /// Mesh file (glTF, OBJ, PLY, STL) or scene file
     pub mesh: PathBuf,
+    #[command(flatten)]
+    pub load: LoadArgs,
     /// Rays to cast, a .npy file of float32: K x 8 (origin, direction, t_min, t_max), or K x 6 for t from 0 to
     /// infinity; directions need not be unit vectors, but a ray whose direction is shorter than 1.2e-38 misses
     pub rays: PathBuf,
@@ -160,14 +167,34 @@ pub struct CastArgs {
 
 #[derive(clap::Args)]
 pub struct InspectArgs {
-    /// Scene file (TOML), or mesh file (OBJ, PLY, STL)
+    /// Scene file (TOML), or mesh file (glTF, OBJ, PLY, STL)
     pub scene: PathBuf,
     #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
     #[arg(hide_default_value = true)]
     pub accel: AccelKind,
+    #[command(flatten)]
+    pub load: LoadArgs,
     /// Print the description as JSON
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(clap::Args)]
+pub struct ConvertArgs {
+    /// Mesh file (glTF, OBJ, PLY, STL), or scene file (TOML)
+    #[arg(value_name = "IN")]
+    pub input: PathBuf,
+    /// Scene file to write: .toml, in a folder that holds IN
+    #[arg(value_name = "OUT")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub load: LoadArgs,
+    /// Replace OUT if it exists
+    #[arg(short, long)]
+    pub force: bool,
+    /// Print errors only
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 impl RenderArgs {

@@ -9,7 +9,6 @@ use kdray::{
     gpu::{ContextOptions, GpuError},
     layout::Triangle,
     output,
-    scene::Scene,
 };
 
 use super::{
@@ -34,7 +33,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
 
     let rays = RayReader::open(&args.rays)?;
     let progress = Progress::new(args.quiet, 3);
-    let (scene, load_ms) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
+    let (scene, load_ms) = progress.stage(&format!("loading {}", args.mesh.display()), || args.load.load(&args.mesh));
     let scene = scene?;
     let device = ContextOptions::new(args.device.clone(), args.validate);
     let context = if args.cpu { None } else { Some(open_device(&device, &progress)?) };
@@ -84,7 +83,7 @@ pub fn run(args: &CastArgs) -> Result<(), CliError> {
 /// Refuses an output that the command also reads, or that it writes twice.
 fn check_roles(args: &CastArgs) -> Result<(), CliError> {
     let mut roles = FileRoles::default();
-    roles.read_scene("MESH", &args.mesh);
+    roles.read_scene("MESH", &args.mesh, args.load.options());
     roles.read("RAYS", &args.rays);
     roles.write("--output", &args.output)?;
     args.json.iter().try_for_each(|path| roles.write("--json", path))

@@ -6,7 +6,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use kdray::{output::regular_file, scene::source_files};
+use kdray::{
+    output::regular_file,
+    scene::{LoadOptions, source_files_with},
+};
 
 use super::error::CliError;
 
@@ -22,7 +25,7 @@ struct Role {
 pub struct FileRoles {
     roles: HashMap<PathBuf, Role>,
     /// Scenes whose meshes and material libraries have not been looked up yet.
-    scenes: Vec<PathBuf>,
+    scenes: Vec<(PathBuf, LoadOptions)>,
 }
 
 impl FileRoles {
@@ -31,10 +34,10 @@ impl FileRoles {
         self.roles.insert(key_of(path), Role { name: name.to_owned(), is_read: true });
     }
 
-    /// Notes a scene or mesh file, and all files that it names.
-    pub fn read_scene(&mut self, name: &str, path: &Path) {
+    /// Notes a scene or mesh file, and all files that it names if it is loaded with `options`.
+    pub fn read_scene(&mut self, name: &str, path: &Path, options: LoadOptions) {
         self.read(name, path);
-        self.scenes.push(path.to_owned());
+        self.scenes.push((path.to_owned(), options));
     }
 
     /// Notes an output.
@@ -64,8 +67,8 @@ impl FileRoles {
 
     /// Notes the files that the scenes name as read.
     fn look_up_scenes(&mut self) {
-        for scene in std::mem::take(&mut self.scenes) {
-            for source in source_files(&scene) {
+        for (scene, options) in std::mem::take(&mut self.scenes) {
+            for source in source_files_with(&scene, &options) {
                 let role = || Role { name: format!("a part of `{}`", scene.display()), is_read: true };
                 self.roles.entry(key_of(&source)).or_insert_with(role);
             }

@@ -8,10 +8,12 @@ mod bench;
 mod build;
 mod cast;
 mod cast_report;
+mod convert;
 mod devices;
 mod error;
 mod file_roles;
 mod inspect;
+mod load_args;
 mod log;
 mod or_auto;
 mod picture_args;
@@ -71,6 +73,7 @@ fn run(args: Args) -> Result<(), CliError> {
         Command::Cast(args) => cast::run(&args),
         Command::Devices => devices::run(),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Convert(args) => convert::run(&args),
         #[cfg(feature = "bench")]
         Command::Bench(suite) => bench::run(&suite),
     }

@@ -7,7 +7,7 @@ use kdray::{
     frame::View,
     gpu::{ContextOptions, chosen_device},
     output::{self, Format, OutputError},
-    scene::{Camera, CameraPath, Scene},
+    scene::{Camera, CameraPath},
     view::{Display, LoadOptions, LoadedScene, Settings, Tour, ViewOptions, ViewReport},
 };
 use serde::Serialize;
@@ -34,7 +34,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     let display = Display::open()?;
 
     let progress = Progress::new(args.quiet, 2);
-    let (scene, _) = progress.stage(&format!("loading {}", args.scene.display()), || Scene::load(&args.scene));
+    let (scene, _) = progress.stage(&format!("loading {}", args.scene.display()), || args.load.load(&args.scene));
     let scene = scene?;
     scene.warn_if_unlit(&args.scene);
     let mut options = args.picture.options(&scene);
@@ -48,11 +48,11 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         None => Workload::of_window((options.width, options.height)),
     };
     let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
-    let load_options = LoadOptions { request: args.picture.request(), processor, workload };
+    let load_options = LoadOptions { request: args.picture.request(), processor, workload, scene: args.load.options() };
     let accel = load_options.request.choose_accel(processor, scene.n_triangles(), &workload);
     build::check_memory(accel, scene.n_triangles())?;
     let building = build::building(accel, scene.n_triangles());
-    let (loaded, _) = progress.stage(&building, || LoadedScene::with_tree(&args.scene, scene, load_options));
+    let (loaded, _) = progress.stage(&building, || LoadedScene::with_tree(&args.scene, scene, &load_options));
     args.picture.meter(&loaded.world, &mut options).into_iter().for_each(|note| progress.note(&note));
     drop(progress);
 
@@ -131,7 +131,7 @@ fn check_outputs(args: &ViewArgs) -> Result<(), CliError> {
 /// Refuses an output that the command also reads, or that it writes twice.
 fn check_roles(args: &ViewArgs) -> Result<(), CliError> {
     let mut roles = FileRoles::default();
-    roles.read_scene("SCENE", &args.scene);
+    roles.read_scene("SCENE", &args.scene, args.load.options());
     args.path.iter().for_each(|path| roles.read("--path", path));
     args.screenshot.iter().try_for_each(|path| roles.write("--screenshot", path))?;
     args.profile.iter().try_for_each(|path| roles.write("--profile", path))

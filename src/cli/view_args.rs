@@ -7,6 +7,7 @@ use kdray::gpu::DeviceSelector;
 
 use super::{
     args::device,
+    load_args::LoadArgs,
     picture_args::{PictureArgs, positive},
 };
 
@@ -14,8 +15,10 @@ use super::{
 #[group(skip)]
 #[command(group = clap::ArgGroup::new("tour").args(["frames", "path"]).multiple(true))]
 pub struct ViewArgs {
-    /// Scene file (TOML), or mesh file (OBJ, PLY, STL); the window follows changes of the file
+    /// Scene file (TOML), or mesh file (glTF, OBJ, PLY, STL); the window follows changes of the file
     pub scene: PathBuf,
+    #[command(flatten)]
+    pub load: LoadArgs,
     #[command(flatten)]
     pub picture: PictureArgs,
     /// Samples per pixel while the camera rests, 1 to 65536 [default: 256; 1 with --frames or --path]

@@ -6,32 +6,38 @@ use std::{
     path::Path,
 };
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use super::{
-    Camera, Light, Material, RenderDefaults, Scene,
+    Camera, Light, LoadOptions, Material, RenderDefaults, Scene, Transform,
     description::{CameraSpec, CommonSpec, Description, LightSpec, MeshSpec, RenderSpec, SceneDenoise, Source},
     error::{Checked, SceneError},
     extent, framing,
     generate::TriangleBudget,
     gltf,
     image_files::{ImageFiles, Images},
+    map_spec::MapSpec,
     material::{MaterialSpec, colour, within},
     mesh::{MAX_COORDINATE, Mesh},
     mesh_file::{MeshFormat, parse_mesh, read_mesh},
     obj::Library,
+    outside::Access,
+    overrides::NamedMaterials,
     read::read_utf8,
     tangents,
     transform::finite,
 };
 use crate::frame::Denoise;
 
+/// Name of the material of meshes and faces that name none.
+pub(super) const DEFAULT_MATERIAL: &str = "(default)";
+
 /// Loads a scene file and the meshes that it names. Their names are relative to the scene file's folder.
-pub(super) fn load_toml(path: &Path) -> Result<Scene, SceneError> {
+pub(super) fn load_toml(path: &Path, access: Access) -> Result<Scene, SceneError> {
     let text = read_utf8(path)?;
-    let file = File { path, text: &text };
+    let file = File { path, text: &text, access };
     assemble(&file, file.parse()?)
 }
 
@@ -39,6 +45,8 @@ pub(super) fn load_toml(path: &Path) -> Result<Scene, SceneError> {
 pub(super) struct File<'a> {
     pub path: &'a Path,
     pub text: &'a str,
+    /// Which files it may name.
+    pub access: Access,
 }
 
 impl File<'_> {
@@ -68,7 +76,8 @@ impl File<'_> {
 
 fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> {
     let mut scene = Scene::empty(file.path);
-    let materials = add_materials(file, &mut scene, &description.materials)?;
+    let indices = add_materials(file, &mut scene, &description.materials)?;
+    let mut materials = NamedMaterials::new(&description.materials, indices);
     for (ix, spec) in description.light.iter().enumerate() {
         scene.lights.push(file.check(&format!("light {}", ix + 1), spec, light)?);
     }
@@ -83,16 +92,22 @@ fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> 
     }
     let mut n_generated = 0;
     for (ix, table) in description.mesh.into_iter().enumerate() {
-        n_generated += add_mesh(file, &mut scene, &materials, n_generated, (ix, table))?;
+        n_generated += add_mesh(file, &mut scene, &mut materials, n_generated, (ix, table))?;
     }
+    materials.remove_idle(&mut scene);
     if scene.n_triangles() == 0 {
         return Err(SceneError::file(file.path, "has no triangles"));
     }
     let bounds = scene.bounds();
     extent::check(file.path, bounds)?;
-    scene.camera = match &description.camera {
-        Some(spec) => file.check("camera", spec, camera)?,
-        None => framing::camera(bounds),
+    for (ix, spec) in description.cameras.iter().enumerate() {
+        let named = file.check(&format!("camera {}", ix + 1), spec, |spec| camera(&spec.camera()))?;
+        scene.cameras.push((spec.get_ref().name.clone(), named));
+    }
+    scene.camera = match (&description.camera, scene.cameras.first()) {
+        (Some(spec), _) => file.check("camera", spec, camera)?,
+        (None, Some((_, first))) => *first,
+        (None, None) => framing::camera(bounds),
     };
     Ok(scene)
 }
@@ -103,12 +118,16 @@ fn add_materials(
     scene: &mut Scene,
     specs: &BTreeMap<String, Spanned<MaterialSpec>>,
 ) -> Result<HashMap<String, u32>, SceneError> {
-    let folder = file.path.parent().unwrap_or(Path::new(""));
     let mut files = ImageFiles::default();
-    let mut add = |spec: &Spanned<MaterialSpec>| -> Vec<usize> {
-        spec.get_ref().maps().map(|(_, map)| files.add(map.path(folder))).collect()
-    };
-    let of_materials: Vec<Vec<usize>> = specs.values().map(&mut add).collect();
+    let mut of_materials: Vec<Vec<usize>> = Vec::new();
+    for (name, spec) in specs {
+        of_materials.push(file.check(&format!("material `{name}`"), spec, |spec| {
+            let path = |(key, map): (&str, &MapSpec)| {
+                file.access.beside(file.path).exact(map.file()).map_err(|what| format!("{key}: {what}"))
+            };
+            spec.maps().map(|map| Ok(files.add(path(map)?))).collect()
+        })?);
+    }
     let (mut images, mut wrong) = (Vec::new(), HashMap::new());
     for (ix, image) in files.decode().into_iter().enumerate() {
         images.push(image.map_err(|what| wrong.insert(ix, what)).ok());
@@ -138,7 +157,7 @@ fn add_materials(
 fn add_mesh(
     file: &File,
     scene: &mut Scene,
-    materials: &HashMap<String, u32>,
+    materials: &mut NamedMaterials,
     n_generated: u64,
     (ix, table): (usize, Spanned<toml::Table>),
 ) -> Result<u64, SceneError> {
@@ -147,27 +166,29 @@ fn add_mesh(
     let failed = |what: String| file.at(&span, format!("{object}: {what}"));
     let MeshSpec { source, common } = MeshSpec::new(table.into_inner()).map_err(failed)?;
     let transform = common.transform.transform().map_err(failed)?;
-    let named = named_materials(&common, materials).map_err(failed)?;
+    let named = materials.of_mesh(&common).map_err(failed)?;
     let n_loaded = scene.n_triangles();
     let (mut mesh, slots, n_made) = match source {
-        Source::File { path, shading } => {
-            let path = file.path.parent().unwrap_or(Path::new("")).join(path);
+        Source::File { path, shading, scene: scene_name } => {
+            let path = file.access.beside(file.path).exact(&path).map_err(failed)?;
             // The scene file may misspell the name, so the error names the line in the scene file.
             let bytes = read_mesh(&path).map_err(|error| failed(error.to_string()))?;
             if MeshFormat::of(&path, &bytes) == MeshFormat::Gltf {
-                let mut model = gltf::load_meshes(&path, bytes, named.is_empty(), n_loaded)?;
-                for mesh in &mut model.meshes {
-                    if !shading.smooth {
-                        mesh.normals.fill([Vec3::ZERO; 3]);
-                    }
-                    common.uv_scale.map_or(Ok(()), |scale| scale_uvs(mesh, scale)).map_err(failed)?;
-                    scene.add_tangents(mesh, &named);
-                }
-                scene.append(model, &transform, &named).map_err(failed)?;
+                let allow_outside = file.access.is_anywhere();
+                let options = LoadOptions { scene: scene_name, camera: None, allow_outside };
+                let model = gltf::load_meshes(&path, bytes, &options, named.is_empty(), n_loaded)?;
+                add_gltf(scene, model, (&transform, &common, &named), materials).map_err(failed)?;
                 return Ok(0);
             }
-            let (mesh, library) = parse_mesh(&path, bytes, shading, n_loaded)?;
+            if let Some(name) = scene_name {
+                return Err(failed(format!("there is no scene `{name}`: only glTF files name scenes")));
+            }
+            let (mesh, library) = parse_mesh(&path, bytes, shading, n_loaded, file.access)?;
+            let n_materials = scene.materials.len();
             let slots = if named.is_empty() { scene.push_library(library) } else { named };
+            if common.overrides {
+                materials.override_from(scene, n_materials).map_err(failed)?;
+            }
             (mesh, slots, 0)
         }
         Source::Generator(generator) => {
@@ -195,6 +216,40 @@ fn add_mesh(
     Ok(n_made)
 }
 
+/// Adds the meshes of a glTF file. `placed`: where they are, what their table states, and their materials if it names
+/// any.
+fn add_gltf(
+    scene: &mut Scene,
+    mut model: Scene,
+    placed: (&Transform, &CommonSpec, &[u32]),
+    materials: &mut NamedMaterials,
+) -> Checked<()> {
+    let (transform, common, named) = placed;
+    for mesh in &mut model.meshes {
+        if common.smooth == Some(false) {
+            mesh.normals.fill([Vec3::ZERO; 3]);
+        }
+        common.uv_scale.map_or(Ok(()), |scale| scale_uvs(mesh, scale))?;
+        scene.add_tangents(mesh, named);
+    }
+    let (n_materials, n_instances) = (scene.materials.len(), scene.instances.len());
+    scene.append(model, transform, named)?;
+    if !common.overrides {
+        return Ok(());
+    }
+    materials.override_from(scene, n_materials)?;
+    // The file has tangents for its own normal maps alone.
+    for ix in n_instances..scene.instances.len() {
+        let (mesh_ix, slots) = (scene.instances[ix].mesh_ix, scene.instances[ix].materials.clone());
+        let mut mesh = std::mem::take(&mut scene.meshes[mesh_ix]);
+        if mesh.tangents.is_empty() {
+            scene.add_tangents(&mut mesh, &slots);
+        }
+        scene.meshes[mesh_ix] = mesh;
+    }
+    Ok(())
+}
+
 /// Multiplies all texture coordinates of a mesh.
 fn scale_uvs(mesh: &mut Mesh, scale: [f32; 2]) -> Checked<()> {
     let scale = Vec2::from_array(scale);
@@ -203,14 +258,6 @@ fn scale_uvs(mesh: &mut Mesh, scale: [f32; 2]) -> Checked<()> {
     }
     mesh.uvs.iter_mut().flatten().flatten().for_each(|uv| *uv *= scale);
     Ok(())
-}
-
-/// Returns the indices of the materials that a mesh names.
-fn named_materials(common: &CommonSpec, materials: &HashMap<String, u32>) -> Checked<Vec<u32>> {
-    let index = |name: &String| {
-        materials.get(name).copied().ok_or_else(|| format!("there is no material `{name}` in [materials]"))
-    };
-    common.material.iter().chain(&common.materials).map(index).collect()
 }
 
 impl Scene {
@@ -231,11 +278,10 @@ impl Scene {
 
     /// Returns the index of the default material, for meshes and faces that name none. Adds it at the first call.
     fn default_material(&mut self) -> u32 {
-        const NAME: &str = "(default)";
-        if let Some(ix) = self.materials.iter().position(|material| material.name == NAME) {
+        if let Some(ix) = self.materials.iter().position(|material| material.name == DEFAULT_MATERIAL) {
             return ix as u32;
         }
-        self.push_material(MaterialSpec::default().material(NAME).expect("defaults are in range"))
+        self.push_material(MaterialSpec::default().material(DEFAULT_MATERIAL).expect("defaults are in range"))
     }
 
     /// Adds a library's materials and images. Returns the material indices for the slots of the mesh that came with it;
@@ -259,19 +305,46 @@ fn light(spec: &LightSpec) -> Checked<Light> {
             intensity: colour("intensity", Some(intensity), Vec3::ZERO)?,
         }),
         LightSpec::Directional { direction, irradiance } => {
-            let travels = finite("direction", direction)?.try_normalize();
-            let travels = travels.ok_or_else(|| format!("direction = {direction:?} has no direction"))?;
             let irradiance = colour("irradiance", Some(irradiance), Vec3::ZERO)?;
-            Ok(Light::Directional { towards: -travels.as_vec3(), irradiance })
+            Ok(Light::Directional { towards: -unit("direction", direction)?, irradiance })
+        }
+        LightSpec::Spot { position, direction, intensity, inner_angle, outer_angle } => {
+            if !(0.0 <= inner_angle && inner_angle <= outer_angle && outer_angle <= 90.0) {
+                return Err(format!(
+                    "inner_angle = {inner_angle} and outer_angle = {outer_angle} are not in order from 0 to 90 degrees"
+                ));
+            }
+            // The cosine of a right angle is rounded to a number above 0.
+            let cosine = |degrees: f64| if degrees < 90.0 { degrees.to_radians().cos() as f32 } else { 0.0 };
+            Ok(Light::Spot {
+                position: point("position", position)?,
+                towards: unit("direction", direction)?,
+                intensity: colour("intensity", Some(intensity), Vec3::ZERO)?,
+                inner_cos: cosine(inner_angle),
+                outer_cos: cosine(outer_angle),
+            })
         }
     }
+}
+
+/// Returns a vector's direction as a unit vector.
+fn unit(name: &str, value: [f32; 3]) -> Checked<Vec3> {
+    let direction = normalized(finite(name, value)?);
+    if direction == Vec3::ZERO { Err(format!("{name} = {value:?} has no direction")) } else { Ok(direction) }
+}
+
+/// Returns a vector of length 1, or 0 for a vector without a direction. A vector whose length is 1 up to the rounding
+/// of its coordinates is kept as it is, so that a unit vector that was written is read.
+fn normalized(vector: DVec3) -> Vec3 {
+    let is_unit = (vector.length_squared() - 1.0).abs() <= f64::from(4.0 * f32::EPSILON);
+    if is_unit { vector.as_vec3() } else { vector.normalize_or_zero().as_vec3() }
 }
 
 pub(super) fn camera(spec: &CameraSpec) -> Checked<Camera> {
     let camera = Camera {
         eye: point("eye", spec.eye)?,
         target: point("target", spec.target)?,
-        up: finite("up", spec.up.unwrap_or([0.0, 1.0, 0.0]))?.normalize_or_zero().as_vec3(),
+        up: normalized(finite("up", spec.up.unwrap_or([0.0, 1.0, 0.0]))?),
         vertical_fov_degrees: within("vertical_fov", spec.vertical_fov.unwrap_or(45.0), 0.1, 170.0)?,
     };
     let forward = (camera.target.as_dvec3() - camera.eye.as_dvec3()).normalize_or_zero();
@@ -301,6 +374,10 @@ fn render_defaults(spec: &RenderSpec) -> Checked<RenderDefaults> {
     };
     let threshold = spec.denoise_threshold.unwrap_or(Denoise::DEFAULT_THRESHOLD);
     let threshold = within("denoise_threshold", threshold, 0.0, 4.0)?;
+    let is_metered = spec.metered.unwrap_or(false);
+    if is_metered && spec.exposure.is_some() {
+        return Err("has both `exposure` and `metered = true`".to_owned());
+    }
     Ok(RenderDefaults {
         width: count("width", spec.width, defaults.width, 16_384)?,
         height: count("height", spec.height, defaults.height, 16_384)?,
@@ -310,7 +387,7 @@ fn render_defaults(spec: &RenderSpec) -> Checked<RenderDefaults> {
             None => defaults.tonemap,
         },
         exposure: within("exposure", spec.exposure.unwrap_or(defaults.exposure), 1e-6, 1e6)?,
-        is_metered: false,
+        is_metered,
         denoise: match spec.denoise.unwrap_or(SceneDenoise::Paper) {
             SceneDenoise::Off => Denoise::Off,
             SceneDenoise::Paper => Denoise::Paper { threshold },

@@ -19,6 +19,9 @@ use super::{
 pub(super) struct Description {
     /// Camera; where absent, `framing` makes one that shows all meshes.
     pub camera: Option<Spanned<CameraSpec>>,
+    /// Cameras with names. Without `camera`, the first one is the scene's.
+    #[serde(default)]
+    pub cameras: Vec<Spanned<NamedCameraSpec>>,
     #[serde(default)]
     pub light: Vec<Spanned<LightSpec>>,
     /// Irradiance that every point receives, weighted by Ka; black where absent.
@@ -44,11 +47,33 @@ pub(super) struct CameraSpec {
     pub vertical_fov: Option<f32>,
 }
 
+/// One `[[cameras]]` table: a camera with a name.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct NamedCameraSpec {
+    pub name: String,
+    eye: [f32; 3],
+    target: [f32; 3],
+    up: Option<[f32; 3]>,
+    vertical_fov: Option<f32>,
+}
+
+impl NamedCameraSpec {
+    /// Returns the camera without its name.
+    pub fn camera(&self) -> CameraSpec {
+        let &Self { eye, target, up, vertical_fov, .. } = self;
+        CameraSpec { eye, target, up, vertical_fov }
+    }
+}
+
 #[derive(Debug, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub(super) enum LightSpec {
     /// A point light, whose irradiance falls with the square of the distance.
     Point { position: [f32; 3], intensity: [f32; 3] },
+    /// A point light that shines into a cone about `direction`: whole up to `inner_angle` from it, dark beyond
+    /// `outer_angle`, both in degrees. In double precision, angles stand for every cosine of single precision.
+    Spot { position: [f32; 3], direction: [f32; 3], intensity: [f32; 3], inner_angle: f64, outer_angle: f64 },
     /// A light whose rays all travel along `direction`.
     Directional { direction: [f32; 3], irradiance: [f32; 3] },
 }
@@ -61,6 +86,8 @@ pub(super) struct RenderSpec {
     pub height: Option<u32>,
     pub max_depth: Option<u32>,
     pub exposure: Option<f32>,
+    /// Whether the exposure is measured in the first view, for lights in physical units; an error beside `exposure`.
+    pub metered: Option<bool>,
     /// `linear`, `agx` or `aces`.
     pub tonemap: Option<String>,
     pub denoise: Option<SceneDenoise>,
@@ -85,7 +112,7 @@ pub(super) struct MeshSpec {
 #[derive(Debug)]
 pub(super) enum Source {
     /// A mesh file; `path` is relative to the scene file's folder.
-    File { path: String, shading: Shading },
+    File { path: String, shading: Shading, scene: Option<String> },
     /// A generator that makes the mesh from a few parameters.
     Generator(Generator),
 }
@@ -104,6 +131,10 @@ pub(super) struct CommonSpec {
     pub smooth: Option<bool>,
     /// Factors on the texture coordinates u and v; 1 and 1 where absent.
     pub uv_scale: Option<[f32; 2]>,
+    /// Whether materials of the mesh file take the terms that materials of the same names in the scene file state;
+    /// false where absent.
+    #[serde(rename = "override")]
+    pub overrides: bool,
 }
 
 #[derive(Debug, Deserialize)]
@@ -113,9 +144,11 @@ struct FileSpec {
     /// Angle between two faces, in degrees, beyond which their common edge is sharp. Applies to faces without
     /// normals.
     crease: Option<f32>,
+    /// Scene of a glTF file by its name or its index, counted from 0; the file's default scene where absent.
+    scene: Option<String>,
 }
 
-const COMMON_KEYS: [&str; 5] = ["transform", "material", "materials", "smooth", "uv_scale"];
+const COMMON_KEYS: [&str; 6] = ["transform", "material", "materials", "smooth", "uv_scale", "override"];
 
 impl MeshSpec {
     /// Splits a mesh's table into the keys that all meshes have and those of its own kind. An unknown key is an
@@ -126,11 +159,17 @@ impl MeshSpec {
         if common.material.is_some() && !common.materials.is_empty() {
             return Err("has both `material` and `materials`".to_owned());
         }
+        if common.overrides && (common.material.is_some() || !common.materials.is_empty()) {
+            return Err("has both `override` and `material` or `materials`".to_owned());
+        }
         let source = match (table.contains_key("file"), table.contains_key("generator")) {
             (true, false) => {
-                let FileSpec { file: path, crease } = read(table)?;
+                let FileSpec { file: path, crease, scene } = read(table)?;
                 let crease = super::material::within("crease", crease.unwrap_or(DEFAULT_CREASE), 0.0, 180.0)?;
-                Source::File { path, shading: Shading { smooth: common.smooth.unwrap_or(true), crease } }
+                Source::File { path, shading: Shading { smooth: common.smooth.unwrap_or(true), crease }, scene }
+            }
+            (false, true) if common.overrides => {
+                return Err("has `override`, but only mesh files have materials of their own".to_owned());
             }
             (false, true) => Source::Generator(read(table)?),
             (true, true) => return Err("has both `file` and `generator`".to_owned()),

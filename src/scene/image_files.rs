@@ -1,10 +1,6 @@
-//! Files that the files of a scene name, found below a folder, and the images among them.
+//! Image files that the files of a scene name.
 
-use std::{
-    collections::HashMap,
-    fs,
-    path::{Component, Path, PathBuf},
-};
+use std::{collections::HashMap, path::PathBuf};
 
 use super::{
     error::Checked,
@@ -13,62 +9,6 @@ use super::{
     read::read_bytes,
     texture::{Channel, Image, Pixels},
 };
-
-/// A file that another one names.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct NamedFile {
-    /// Its path, whether it exists or not.
-    pub path: PathBuf,
-    /// Whether its name on disk differs from the stated one in the case of letters.
-    pub is_other_case: bool,
-}
-
-/// Returns the file of a name that is relative to `folder`. It must lie in or below the folder `root`, links resolved.
-/// Backslashes count as separators, as in files from Windows. Where no file has the name, the only one whose name
-/// differs in the case of letters is taken.
-pub(super) fn named_file(root: &Path, folder: &Path, name: &str) -> Checked<NamedFile> {
-    let leaves = || format!("`{name}` leaves the folder of the scene's file: it is not read");
-    let name = name.replace('\\', "/");
-    if name.starts_with('/') || name.chars().nth(1) == Some(':') {
-        return Err(leaves());
-    }
-    let mut found = NamedFile { path: folder.to_owned(), is_other_case: false };
-    for part in name.split('/').filter(|part| !matches!(*part, "" | ".")) {
-        if part == ".." {
-            let ends_in_name = matches!(found.path.components().next_back(), Some(Component::Normal(_)));
-            if !ends_in_name || !found.path.pop() || !found.path.starts_with(root) {
-                return Err(leaves());
-            }
-            continue;
-        }
-        let exact = found.path.join(part);
-        match exact.exists() {
-            true => found.path = exact,
-            false => match only_other_case(&found.path, part) {
-                Some(other) => found = NamedFile { path: other, is_other_case: true },
-                None => found.path = exact,
-            },
-        }
-    }
-    // A file that does not exist has no links to resolve.
-    let canonical = |path: &Path| fs::canonicalize(if path.as_os_str().is_empty() { Path::new(".") } else { path });
-    match (canonical(root), canonical(&found.path)) {
-        (Ok(root), Ok(path)) if !path.starts_with(&root) => Err(leaves()),
-        _ => Ok(found),
-    }
-}
-
-/// Returns the only entry of a folder whose name differs from `name` in the case of letters alone.
-fn only_other_case(folder: &Path, name: &str) -> Option<PathBuf> {
-    let folder_or_here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let lower = name.to_lowercase();
-    let names = fs::read_dir(folder_or_here).ok()?.flatten().map(|entry| entry.file_name());
-    let mut same = names.filter(|entry| entry.to_str().is_some_and(|entry| entry.to_lowercase() == lower));
-    match (same.next(), same.next()) {
-        (Some(only), None) => Some(folder.join(only)),
-        _ => None,
-    }
-}
 
 /// Image files, each of which is read once.
 #[derive(Debug, Default)]
@@ -180,37 +120,4 @@ fn inverted(image: &Image) -> Image {
         }
     };
     Image { pixels, ..image.clone() }
-}
-
-#[cfg(test)]
-mod tests {
-    use tempfile::TempDir;
-
-    use super::*;
-
-    #[test]
-    fn names_are_found_below_the_folder() {
-        let directory = TempDir::new().unwrap();
-        let root = directory.path().join("scene");
-        fs::create_dir_all(root.join("Maps")).unwrap();
-        fs::create_dir_all(root.join("mtl")).unwrap();
-        fs::write(root.join("Maps/a b.PNG"), "").unwrap();
-        fs::write(directory.path().join("secret.png"), "").unwrap();
-        let find = |folder: &str, name: &str| named_file(&root, &root.join(folder), name);
-        let path = |name: &str, is_other_case| Ok(NamedFile { path: root.join(name), is_other_case });
-        assert_eq!(find("", "Maps/a b.PNG"), path("Maps/a b.PNG", false));
-        assert_eq!(find("", "maps\\A B.png"), path("Maps/a b.PNG", true));
-        assert_eq!(find("mtl", "..\\.\\Maps/a b.PNG"), path("Maps/a b.PNG", false));
-        assert_eq!(find("mtl", "none.png"), path("mtl/none.png", false));
-        fs::write(root.join("Maps/A B.png"), "").unwrap();
-        assert_eq!(find("", "Maps/a b.png"), path("Maps/a b.png", false), "two names differ in case");
-        for name in ["../secret.png", "mtl/../../secret.png", "/secret.png", "\\secret.png", "c:\\secret.png"] {
-            assert!(find("", name).unwrap_err().contains("leaves the folder"), "{name}");
-        }
-        #[cfg(unix)]
-        {
-            std::os::unix::fs::symlink(directory.path().join("secret.png"), root.join("link.png")).unwrap();
-            assert!(find("", "link.png").unwrap_err().contains("leaves the folder"));
-        }
-    }
 }

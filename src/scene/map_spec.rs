@@ -1,7 +1,5 @@
 //! Maps of materials as scene files describe them.
 
-use std::path::{Path, PathBuf};
-
 use glam::Vec2;
 use serde::Deserialize;
 
@@ -71,10 +69,10 @@ enum EncodingSpec {
 }
 
 impl MapSpec {
-    /// Returns the path of the image.
-    pub fn path(&self, folder: &Path) -> PathBuf {
+    /// Returns the name of the image's file.
+    pub fn file(&self) -> &str {
         match self {
-            Self::Name(file) | Self::Table(MapTable { file, .. }) => folder.join(file),
+            Self::Name(file) | Self::Table(MapTable { file, .. }) => file,
         }
     }
 

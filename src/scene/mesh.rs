@@ -12,6 +12,8 @@ pub const MAX_COORDINATE: f32 = 1e9;
 /// An indexed triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
+    /// The name in its file; empty if it has none.
+    pub name: String,
     /// Points in object space.
     pub positions: Vec<Vec3>,
     /// Indices into `positions`, counter-clockwise seen from outside.

@@ -8,6 +8,7 @@ use super::{
     mesh::Mesh,
     needs::{require_for_bytes, require_for_text},
     obj::{Library, parse_obj},
+    outside::Access,
     ply::parse_ply,
     read::{lossy_text, read_bytes},
     smooth::Shading,
@@ -69,17 +70,19 @@ pub(super) fn read_mesh(path: &Path) -> Result<Vec<u8>, SceneError> {
 
 /// Makes a mesh from the content of a file that is not glTF, and reads the materials that it names. A face's slot is an
 /// index into the library. A face without a material, or with one that the library lacks, has slot
-/// `library.materials.len()`. `n_loaded` is the number of triangles that the scene has already.
+/// `library.materials.len()`. `n_loaded` is the number of triangles that the scene has already, and
+/// `access` says which files the mesh file may name.
 pub(super) fn parse_mesh(
     path: &Path,
     bytes: Vec<u8>,
     shading: Shading,
     n_loaded: usize,
+    access: Access,
 ) -> Result<(Mesh, Library), SceneError> {
     let failed = |what: String| SceneError::file(path, what);
     let (mesh, library) = match MeshFormat::of(path, &bytes) {
-        MeshFormat::Obj => parse_obj(path, &lossy_text(bytes), shading, n_loaded)?,
-        MeshFormat::Ply => parse_ply(path, &bytes, shading, n_loaded).map_err(failed)?,
+        MeshFormat::Obj => parse_obj(path, &lossy_text(bytes), shading, n_loaded, access)?,
+        MeshFormat::Ply => parse_ply(path, &bytes, shading, n_loaded, access).map_err(failed)?,
         MeshFormat::Gltf => return Err(failed("is glTF, which is a whole scene".to_owned())),
         MeshFormat::Stl => (parse_stl(bytes, shading, n_loaded).map_err(failed)?, Library::default()),
     };

@@ -4,6 +4,7 @@
 //! A scene file is a TOML file, whose keys `description` lists, a glTF file, or a mesh file: OBJ, PLY or STL.
 
 mod assemble;
+mod convert;
 mod defaults;
 mod description;
 mod error;
@@ -23,6 +24,7 @@ mod mesh_file;
 mod needs;
 mod obj;
 mod outside;
+mod overrides;
 mod path;
 mod ply;
 mod polygon;
@@ -31,6 +33,7 @@ mod smooth;
 mod sources;
 mod stl;
 mod tangents;
+mod terms;
 mod texture;
 mod transform;
 
@@ -39,6 +42,7 @@ use std::path::Path;
 use glam::Vec3;
 
 pub use self::{
+    convert::scene_file_of,
     defaults::RenderDefaults,
     error::SceneError,
     extent::MIN_EXTENT,
@@ -46,11 +50,12 @@ pub use self::{
     material::{Alpha, Clearcoat, Lobes, Maps, Material, Microfacet, Sheen},
     mesh::Mesh,
     path::CameraPath,
-    sources::source_files,
+    sources::{source_files, source_files_with},
+    terms::{Term, TermValue},
     texture::{Channel, Encoding, Image, Pixels, Texture, Wrap},
     transform::Transform,
 };
-use self::{mesh_file::MeshFormat, smooth::Shading};
+use self::{mesh_file::MeshFormat, outside::Access, smooth::Shading};
 
 /// Everything that a frame shows. World space is right-handed, +y up by default.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,6 +90,11 @@ pub struct Scene {
 pub struct LoadOptions {
     /// The scene of a glTF file by its name or its index, counted from 0. Where absent, it is the file's default scene.
     pub scene: Option<String>,
+    /// The camera of the scene's file by its name or its index, counted from 0. Where absent, it is the file's default
+    /// camera.
+    pub camera: Option<String>,
+    /// Whether the scene's files may name files that do not lie below their own folders.
+    pub allow_outside: bool,
 }
 
 /// A mesh that is placed in the world.
@@ -130,17 +140,37 @@ impl Scene {
     /// Loads a scene as [`Scene::load`] does, with options.
     ///
     /// # Errors
-    /// Those of [`Scene::load`]; the file does not have the scene that `options` names.
+    /// Those of [`Scene::load`]; the file does not have the scene or the camera that `options` names.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
-        if is_scene_file(path) {
+        let mut scene = if is_scene_file(path) {
             check_only_scene(path, options)?;
-            assemble::load_toml(path)
+            assemble::load_toml(path, Access::of(options))?
         } else if MeshFormat::of_name(path).is_some() {
-            load_mesh_file(path, options)
+            load_mesh_file(path, options)?
         } else {
             let endings = "its name ends in none of .toml, .gltf, .glb, .obj, .ply and .stl";
-            Err(SceneError::file(path, format!("is no scene: {endings}")))
+            return Err(SceneError::file(path, format!("is no scene: {endings}")));
+        };
+        if let Some(name) = &options.camera {
+            scene.choose_camera(name).map_err(|what| SceneError::file(path, what))?;
         }
+        Ok(scene)
+    }
+
+    /// Makes one of [`Scene::cameras`] the scene's camera: the first one of this name, or else the one of this index.
+    fn choose_camera(&mut self, name: &str) -> Result<(), String> {
+        let named = self.cameras.iter().find(|(other, _)| other == name);
+        let found = named.or_else(|| self.cameras.get(name.parse::<usize>().ok()?));
+        let Some((_, camera)) = found else {
+            let cameras = self.cameras.iter().enumerate().map(|(ix, (name, _))| format!("{ix} `{name}`"));
+            let cameras = cameras.collect::<Vec<_>>().join(", ");
+            return Err(match cameras.is_empty() {
+                true => format!("there is no camera `{name}`: the file names no cameras"),
+                false => format!("there is no camera `{name}`, but {cameras}"),
+            });
+        };
+        self.camera = *camera;
+        Ok(())
     }
 
     /// Returns the name of the scene in a file: the file's name without its folder and extension.
@@ -240,7 +270,7 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<Scene, SceneErro
     }
     check_only_scene(path, options)?;
     let mut scene = Scene::empty(path);
-    let (mut mesh, library) = mesh_file::parse_mesh(path, bytes, Shading::default(), 0)?;
+    let (mut mesh, library) = mesh_file::parse_mesh(path, bytes, Shading::default(), 0, Access::of(options))?;
     let slots = scene.push_library(library);
     scene.add_tangents(&mut mesh, &slots);
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;

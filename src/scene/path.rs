@@ -11,6 +11,7 @@ use super::{
     assemble::{File, camera},
     description::CameraSpec,
     error::Checked,
+    outside::Access,
     read::read_utf8,
 };
 
@@ -67,7 +68,7 @@ impl CameraPath {
     /// nothing.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         let text = read_utf8(path)?;
-        let file = File { path, text: &text };
+        let file = File { path, text: &text, access: Access::default() };
         let spec: PathSpec = file.parse()?;
         let fps = match &spec.fps {
             Some(fps) => file.check("fps", fps, |&fps| rate(fps))?,

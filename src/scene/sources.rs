@@ -5,20 +5,27 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 use super::{
-    gltf, is_scene_file,
+    LoadOptions, gltf, is_scene_file,
     material_spec::MAP_KEYS,
     mesh_file::MeshFormat,
     obj::named_files,
+    outside::Access,
     ply::named_images,
     read::{lossy_text, read_bytes, read_utf8},
 };
 
 /// Returns the sorted paths of the scene file, the mesh files that it names, the material libraries and buffers that
 /// the mesh files name, and the images that any of them names. The files need not exist. A file that cannot be read
-/// contributes no names.
+/// contributes no names. Names that are refused when the scene is loaded are left out.
 pub fn source_files(path: &Path) -> Vec<PathBuf> {
-    let (meshes, maps) = if is_scene_file(path) { named(path) } else { (vec![path.to_owned()], Vec::new()) };
-    let libraries: Vec<_> = meshes.iter().flat_map(|mesh| libraries(mesh)).collect();
+    source_files_with(path, &LoadOptions::default())
+}
+
+/// Returns the files as [`source_files`] does, of a scene that is loaded with options.
+pub fn source_files_with(path: &Path, options: &LoadOptions) -> Vec<PathBuf> {
+    let access = Access::of(options);
+    let (meshes, maps) = if is_scene_file(path) { named(path, access) } else { (vec![path.to_owned()], Vec::new()) };
+    let libraries: Vec<_> = meshes.iter().flat_map(|mesh| libraries(mesh, access)).collect();
     let mut files = [vec![path.to_owned()], meshes, maps, libraries].concat();
     files.sort();
     files.dedup();
@@ -26,29 +33,29 @@ pub fn source_files(path: &Path) -> Vec<PathBuf> {
 }
 
 /// Returns the meshes and the images that a scene file names.
-fn named(scene: &Path) -> (Vec<PathBuf>, Vec<PathBuf>) {
+fn named(scene: &Path, access: Access) -> (Vec<PathBuf>, Vec<PathBuf>) {
     let table: Table = read_utf8(scene).ok().and_then(|text| text.parse().ok()).unwrap_or_default();
-    let folder = scene.parent().unwrap_or(Path::new(""));
+    let path = |name: &str| access.beside(scene).exact(name).ok();
     let meshes = table.get("mesh").and_then(Value::as_array).into_iter().flatten();
-    let meshes = meshes.filter_map(|mesh| Some(folder.join(mesh.get("file")?.as_str()?))).collect();
+    let meshes = meshes.filter_map(|mesh| path(mesh.get("file")?.as_str()?)).collect();
     let materials = table.get("materials").and_then(Value::as_table).into_iter().flat_map(Table::values);
     let maps = materials.flat_map(|material| MAP_KEYS.iter().filter_map(|key| material.get(key)));
-    let name = |map: &Value| Some(folder.join(map.as_str().or_else(|| map.get("file")?.as_str())?));
+    let name = |map: &Value| path(map.as_str().or_else(|| map.get("file")?.as_str())?);
     (meshes, maps.filter_map(name).collect())
 }
 
 /// Returns the files that a mesh file names.
-fn libraries(mesh: &Path) -> Vec<PathBuf> {
+fn libraries(mesh: &Path, access: Access) -> Vec<PathBuf> {
     // Content that names no files need not be read.
     if MeshFormat::of_name(mesh) == Some(MeshFormat::Stl) {
         return Vec::new();
     }
     let bytes = read_bytes(mesh).unwrap_or_default();
     match MeshFormat::of(mesh, &bytes) {
-        MeshFormat::Gltf => gltf::named_files(mesh, &bytes),
-        MeshFormat::Ply => named_images(mesh),
+        MeshFormat::Gltf => gltf::named_files(mesh, &bytes, access),
+        MeshFormat::Ply => named_images(mesh, access),
         MeshFormat::Stl => Vec::new(),
-        MeshFormat::Obj => named_files(mesh, &lossy_text(bytes)),
+        MeshFormat::Obj => named_files(mesh, &lossy_text(bytes), access),
     }
 }
 

@@ -100,6 +100,10 @@ impl Transform {
 
     /// Returns the transform that applies `inner`, then this one.
     pub(super) fn after(&self, inner: &Self) -> Self {
+        // The identity must not even round the normals.
+        if *self == Self::IDENTITY {
+            return inner.clone();
+        }
         Self {
             linear: self.linear * inner.linear,
             translation: self.linear * inner.translation + self.translation,

@@ -25,8 +25,8 @@ pub fn one_line(text: &str) -> String {
     escape_controls(&words.join(" ")).into_owned()
 }
 
-/// Whether a terminal would obey a character instead of printing it.
-fn is_obeyed(c: char) -> bool {
+/// Returns whether a terminal would obey a character instead of printing it.
+pub(crate) fn is_obeyed(c: char) -> bool {
     c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 

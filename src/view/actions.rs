@@ -150,11 +150,13 @@ mod tests {
             gain: 1.0,
         };
         let load_options = LoadOptions {
+            scene: crate::scene::LoadOptions::default(),
             request: Request::default(),
             processor: Processor::SoftwareDriver,
             workload: Workload::of_window((640, 480)),
         };
-        let mut session = Session::new(LoadedScene::load(&path, load_options).unwrap(), settings.clone(), true, |_| ());
+        let mut session =
+            Session::new(LoadedScene::load(&path, &load_options).unwrap(), settings.clone(), true, |_| ());
         let seen = session.loaded.scene().camera;
         let displayed = Displayed { size: (80, 60), camera: seen };
         session.controller.look(0.5, 0.0);

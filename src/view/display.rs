@@ -92,7 +92,7 @@ impl Display {
     pub fn view(self, loaded: LoadedScene, options: ViewOptions) -> Result<ViewReport, ViewError> {
         let script =
             (options.tour.clone()).map(|tour| Script::new(tour, options.record.clone(), options.screenshot.clone()));
-        let reloader = Reloader::new(loaded.path.clone(), loaded.load_options, self.event_loop.create_proxy());
+        let reloader = Reloader::new(loaded.path.clone(), loaded.load_options.clone(), self.event_loop.create_proxy());
         let session = Session::new(loaded, options.settings.clone(), script.is_none(), options.print);
         let mut app = App::new(session, options, script, reloader);
         self.event_loop.run_app(&mut app).map_err(|error| ViewError::Window(error.to_string()))?;

@@ -10,13 +10,15 @@ use glam::Vec3;
 use crate::{
     accel::Statistics,
     engine::choices::{ChosenAccel, Processor, Request, Workload},
-    scene::{Scene, SceneError},
+    scene::{self, Scene, SceneError},
     world::{FlatScene, World},
 };
 
 /// The inputs to the choice of an acceleration structure. They stay the same each time that the scene is read.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct LoadOptions {
+    /// What is loaded of the scene's file.
+    pub scene: scene::LoadOptions,
     /// The user's choices.
     pub request: Request,
     /// The processor that traces rays.
@@ -46,16 +48,16 @@ impl LoadedScene {
     ///
     /// # Errors
     /// The scene cannot be loaded.
-    pub fn load(path: &Path, load_options: LoadOptions) -> Result<Self, SceneError> {
-        Ok(Self::with_tree(path, Scene::load(path)?, load_options))
+    pub fn load(path: &Path, load_options: &LoadOptions) -> Result<Self, SceneError> {
+        Ok(Self::with_tree(path, Scene::load_with(path, &load_options.scene)?, load_options))
     }
 
     /// Builds a scene's acceleration structure, a kd-tree or a grid.
     ///
     /// # Panics
     /// The scene has a triangle without a material, which no loaded scene has.
-    pub fn with_tree(path: &Path, scene: Scene, load_options: LoadOptions) -> Self {
-        let LoadOptions { request, processor, workload } = load_options;
+    pub fn with_tree(path: &Path, scene: Scene, load_options: &LoadOptions) -> Self {
+        let &LoadOptions { request, processor, workload, .. } = load_options;
         let accel = request.choose_accel(processor, scene.n_triangles(), &workload);
         let flat = FlatScene::new(&scene).expect("a loaded scene fits together");
         // The unflattened scene is freed here, because building the structure needs the memory.
@@ -64,7 +66,7 @@ impl LoadedScene {
         let world = World::with_accel(flat, &accel.options(processor)).expect("a material for each triangle");
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
         let statistics = world.statistics();
-        Self { path: path.to_owned(), world, accel, load_options, statistics, build_ms }
+        Self { path: path.to_owned(), world, accel, load_options: load_options.clone(), statistics, build_ms }
     }
 
     /// Returns the scene.

@@ -11,7 +11,7 @@ use super::{
     session::Session,
     watch::Watch,
 };
-use crate::scene::{SceneError, source_files};
+use crate::scene::{SceneError, source_files_with};
 
 /// Event from another thread that wakes the viewer.
 pub enum Wake {
@@ -82,7 +82,7 @@ impl Reloader {
     /// scene cannot be read.
     fn watch(&mut self) {
         let n_known = self.files.len();
-        self.files.extend(source_files(&self.path));
+        self.files.extend(source_files_with(&self.path, &self.load_options.scene));
         if self.files.len() == n_known {
             return;
         }
@@ -97,8 +97,8 @@ impl Reloader {
     /// Starts to read the scene again. If a reading is under way, another one starts when it has ended.
     pub fn load(&mut self) {
         if self.loading.begin() {
-            let (path, load_options, proxy) = (self.path.clone(), self.load_options, self.proxy.clone());
-            let load = move || Box::new(LoadedScene::load(&path, load_options));
+            let (path, load_options, proxy) = (self.path.clone(), self.load_options.clone(), self.proxy.clone());
+            let load = move || Box::new(LoadedScene::load(&path, &load_options));
             thread::spawn(move || drop(proxy.send_event(Wake::Reloaded(load()))));
         }
     }

@@ -84,7 +84,7 @@ impl FlatScene {
 
 /// Checks that a mesh's arrays belong together, and that its faces have a material.
 fn check(mesh: &Mesh, instance: &Instance) -> Result<(), String> {
-    let Mesh { positions, faces, normals, slots, uvs, colours, tangents } = mesh;
+    let Mesh { positions, faces, normals, slots, uvs, colours, tangents, name: _ } = mesh;
     if (normals.len(), slots.len()) != (faces.len(), faces.len()) {
         return Err(format!("its mesh has {} faces, {} normals, {} slots", faces.len(), normals.len(), slots.len()));
     }

@@ -102,7 +102,7 @@ fn bad_scene_files_are_refused() {
         (disc("\nmaterials.m = { illum = 12 }"), "a.toml:2", "material `m`: illum 12"),
         (disc("\nmaterials.m = { d = 1, Tr = 0 }"), "a.toml:2", "material `m`: has both d and Tr"),
         (disc("\nmaterials.m = { Ni = inf }"), "a.toml:2", "material `m`: Ni"),
-        (disc("light = [{ kind = 'spot' }]"), "a.toml:1", "unknown variant `spot`"),
+        (disc("light = [{ kind = 'laser' }]"), "a.toml:1", "unknown variant `laser`"),
         (disc("light = [{ kind = 'point', position = [0, 0, 0] }]"), "a.toml:1", "missing field `intensity`"),
         (
             disc("light = [{ kind = 'point', position = [0, nan, 0], intensity = [1, 1, 1] }]"),

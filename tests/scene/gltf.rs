@@ -387,7 +387,9 @@ fn a_scene_can_be_chosen() {
     let folder = TempDir::new().unwrap();
     let path = folder.path().join("model.glb");
     fs::write(&path, model.glb()).unwrap();
-    let load = |name: Option<&str>| Scene::load_with(&path, &LoadOptions { scene: name.map(str::to_owned) });
+    let load = |name: Option<&str>| {
+        Scene::load_with(&path, &LoadOptions { scene: name.map(str::to_owned), ..LoadOptions::default() })
+    };
     let x = |name| load(name).unwrap().bounds().0.x;
     assert_eq!([x(None), x(Some("0")), x(Some("1")), x(Some("second"))], [0.0, 0.0, 5.0, 5.0]);
     let error = load(Some("third")).unwrap_err().to_string();
@@ -870,6 +872,8 @@ fn wrong_numbers_are_no_trouble() {
 #[test]
 fn shipped_scenes_are_no_models() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cornell.toml");
-    let error = Scene::load_with(&path, &LoadOptions { scene: Some("0".to_owned()) }).unwrap_err().to_string();
+    let error = Scene::load_with(&path, &LoadOptions { scene: Some("0".to_owned()), ..LoadOptions::default() })
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("only glTF files name scenes"), "{error}");
 }

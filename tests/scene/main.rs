@@ -1,5 +1,6 @@
 //! Tests of scenes: the shipped scenes, generators, OBJ files, and errors.
 
+mod convert;
 mod errors;
 mod extent;
 mod generators;

@@ -11,12 +11,14 @@ use kdray::{
     },
     gpu::DeviceSelector,
     output,
+    scene::LoadOptions,
 };
 
 use crate::cli::{
     args::{Size, device},
     error::CliError,
     file_roles::FileRoles,
+    load_args::LoadArgs,
     picture_args::{
         accel_help, accel_long_help, fixed_traversal_help, fixed_traversal_long_help, listed, traversals_of_devices,
     },
@@ -72,8 +74,10 @@ pub struct PaperArgs {
 
 #[derive(clap::Args)]
 pub struct TraversalArgs {
-    /// Mesh file (OBJ, PLY, STL) or scene file
+    /// Mesh file (glTF, OBJ, PLY, STL) or scene file
     pub mesh: PathBuf,
+    #[command(flatten)]
+    pub load: LoadArgs,
     /// Size of the picture in pixels; each pixel has one primary ray
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,
@@ -107,8 +111,10 @@ pub struct TraversalArgs {
 
 #[derive(clap::Args)]
 pub struct DriverArgs {
-    /// Mesh file (OBJ, PLY, STL) or scene file
+    /// Mesh file (glTF, OBJ, PLY, STL) or scene file
     pub mesh: PathBuf,
+    #[command(flatten)]
+    pub load: LoadArgs,
     /// Size of the picture in pixels; each pixel has one primary ray
     #[arg(long, value_name = "WxH", default_value = "1920x1080")]
     pub size: Size,
@@ -169,9 +175,9 @@ pub struct FileArgs {
 impl FileArgs {
     /// Refuses files that cannot be written, or that belong to `scenes`, which the command reads. It is called before
     /// anything is measured.
-    pub fn check(&self, scenes: &[&Path]) -> Result<(), CliError> {
+    pub fn check(&self, scenes: &[&Path], options: &LoadOptions) -> Result<(), CliError> {
         let mut roles = FileRoles::default();
-        scenes.iter().for_each(|scene| roles.read_scene("a scene", scene));
+        scenes.iter().for_each(|scene| roles.read_scene("a scene", scene, options.clone()));
         self.json.iter().try_for_each(|path| roles.write("--json", path))?;
         self.svg.iter().try_for_each(|path| roles.write("--svg", path))?;
         Ok([&self.json, &self.svg].into_iter().flatten().try_for_each(|path| output::check(path))?)

@@ -14,7 +14,6 @@ use kdray::{
     },
     engine::choices::{Processor, TreeKind},
     gpu::{Context, ContextOptions, GpuError},
-    scene::Scene,
     world::FlatScene,
 };
 
@@ -29,10 +28,10 @@ use crate::cli::{
 /// Opens the device, which must have ray tracing. Then loads the mesh, makes the rays, and lets kdray and the driver
 /// trace each set of rays.
 pub fn run(args: &DriverArgs) -> Result<(), CliError> {
-    args.files.check(&[&args.mesh])?;
+    args.files.check(&[&args.mesh], &args.load.options())?;
     let context = Context::with_ray_tracing(&ContextOptions::new(args.device.clone(), false))?;
     let progress = Progress::new(false, 8);
-    let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
+    let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || args.load.load(&args.mesh));
     let scene = FlatScene::new(&scene?).map_err(GpuError::from)?;
     let build_options = TreeKind::Best.options(Processor::of(Some(&context)));
     let building = format!("building the kd-tree of {} triangles", scene.triangles.len());

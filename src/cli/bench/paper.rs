@@ -10,7 +10,7 @@ use kdray::{
     engine::choices::{Processor, TreeKind, traversal_by_rule},
     frame::RenderOptions,
     gpu::{Context, ContextOptions, GpuError},
-    scene::Scene,
+    scene::{LoadOptions, Scene},
     world::World,
 };
 
@@ -25,7 +25,7 @@ use crate::cli::{
 /// Draws each scene at each size on the GPU and the CPU, and reports the times.
 pub fn run(args: &PaperArgs) -> Result<(), CliError> {
     let scenes = SCENES.map(|name| args.scenes.join(name).with_extension("toml"));
-    args.files.check(&scenes.each_ref().map(|scene| scene.as_path()))?;
+    args.files.check(&scenes.each_ref().map(|scene| scene.as_path()), &LoadOptions::default())?;
     let sizes: Vec<_> = match &args.size[..] {
         [] => SIZES.to_vec(),
         asked => asked.iter().map(|size| (size.width, size.height)).collect(),

@@ -11,6 +11,7 @@ use kdray::{
     },
     engine::choices::{Processor, TreeKind, traversal_by_rule},
     gpu::{Context, ContextOptions, GpuError},
+    scene::LoadOptions,
 };
 
 use super::args::SizeArgs;
@@ -25,7 +26,7 @@ use crate::cli::{
 
 /// Measures each mesh, the smallest first, and reports.
 pub fn run(args: &SizeArgs) -> Result<(), CliError> {
-    args.files.check(&[])?;
+    args.files.check(&[], &LoadOptions::default())?;
     check_traversal(args.accel, args.traversal)?;
     let mut sizes = args.triangles.clone();
     sizes.sort_unstable();

@@ -12,7 +12,6 @@ use kdray::{
     },
     engine::choices::{Processor, TreeKind},
     gpu::{Context, ContextOptions, GpuError},
-    scene::Scene,
     world::FlatScene,
 };
 
@@ -26,9 +25,9 @@ use crate::cli::{
 
 /// Loads the mesh, makes the rays and casts each set of rays with each algorithm.
 pub fn run(args: &TraversalArgs) -> Result<(), CliError> {
-    args.files.check(&[&args.mesh])?;
+    args.files.check(&[&args.mesh], &args.load.options())?;
     let progress = Progress::new(false, 7);
-    let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || Scene::load(&args.mesh));
+    let (scene, _) = progress.stage(&format!("loading {}", args.mesh.display()), || args.load.load(&args.mesh));
     let scene = FlatScene::new(&scene?).map_err(GpuError::from)?;
     let variants = variants(&args.variants);
     let device = ContextOptions::new(args.device.clone(), false);

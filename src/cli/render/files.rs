@@ -68,7 +68,7 @@ impl Files {
 /// Refuses outputs that the command also reads, or that it writes twice.
 pub fn roles(args: &RenderArgs) -> Result<FileRoles, CliError> {
     let mut roles = FileRoles::default();
-    roles.read_scene("SCENE", &args.scene);
+    roles.read_scene("SCENE", &args.scene, args.load.options());
     match &args.path {
         Some(path) => roles.read("--path", path),
         None => Files::of(output_of(args), &args.aov).note(&mut roles)?,

@@ -11,7 +11,7 @@ use hashbrown::HashMap;
 
 use super::{meshopt, uri::Uri};
 use crate::{
-    scene::{error::Checked, needs::require_for_bytes, outside, read::read_bytes},
+    scene::{error::Checked, needs::require_for_bytes, outside::Access, read::read_bytes},
     util::memory::require,
 };
 
@@ -49,7 +49,8 @@ const WITHOUT_EFFECT: [&str; 6] = [
 pub(super) struct Document {
     /// The JSON. No index in it is checked.
     pub root: Root,
-    folder: PathBuf,
+    path: PathBuf,
+    access: Access,
     buffers: Vec<Vec<u8>>,
     /// Contents of the compressed buffer views, by the view's index.
     decoded: HashMap<usize, Vec<u8>>,
@@ -66,12 +67,12 @@ pub(super) struct View<'a> {
 
 impl Document {
     /// Reads a glTF file from its content, and its buffers.
-    pub fn read(path: &Path, bytes: &[u8]) -> Checked<Self> {
+    pub fn read(path: &Path, bytes: &[u8], access: Access) -> Checked<Self> {
         let (json, chunk) = split(bytes)?;
         let root: Root = json::deserialize::from_slice(json).map_err(|error| format!("the JSON: {error}"))?;
-        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let path = path.to_owned();
         let (buffers, decoded, notes) = (Vec::new(), HashMap::new(), RefCell::default());
-        let mut document = Self { root, folder, buffers, decoded, notes };
+        let mut document = Self { root, path, access, buffers, decoded, notes };
         document.check_version()?;
         document.check_extensions()?;
         for ix in 0..document.root.buffers.len() {
@@ -145,7 +146,7 @@ impl Document {
         match Uri::new(uri)? {
             Uri::Data(bytes) => Ok(bytes),
             Uri::File(name) => {
-                let path = outside::below(&self.folder, &name)?;
+                let path = self.access.beside(&self.path).exact(&name)?;
                 require_for_bytes(&path)?;
                 read_bytes(&path).map_err(|error| error.to_string())
             }
@@ -160,7 +161,8 @@ impl Document {
             (Some(uri), _) => match Uri::new(uri).map_err(|what| format!("{place}: {what}"))? {
                 Uri::Data(bytes) => Ok(Some(bytes)),
                 Uri::File(name) => {
-                    let path = outside::below(&self.folder, &name).map_err(|what| format!("{place}: {what}"))?;
+                    let path =
+                        self.access.beside(&self.path).exact(&name).map_err(|what| format!("{place}: {what}"))?;
                     require_for_bytes(&path).map_err(|what| format!("{place}: {what}"))?;
                     match read_bytes(&path) {
                         Ok(bytes) => Ok(Some(bytes)),
@@ -252,14 +254,13 @@ pub(super) fn split(bytes: &[u8]) -> Checked<(&[u8], Option<&[u8]>)> {
 }
 
 /// Returns the names of the files that a glTF file names: its buffers and images. What cannot be read names nothing.
-pub(in crate::scene) fn named_files(path: &Path, bytes: &[u8]) -> Vec<PathBuf> {
+pub(in crate::scene) fn named_files(path: &Path, bytes: &[u8], access: Access) -> Vec<PathBuf> {
     let json = split(bytes).map(|(json, _)| json).unwrap_or_default();
     let root: json::Value = json::deserialize::from_slice(json).unwrap_or_default();
     let items = ["buffers", "images"].into_iter().filter_map(|list| root.get(list)?.as_array()).flatten();
     let uris = items.filter_map(|item| item.get("uri")?.as_str());
-    let folder = path.parent().unwrap_or(Path::new(""));
     uris.filter_map(|uri| match Uri::new(uri) {
-        Ok(Uri::File(name)) => outside::below(folder, &name).ok(),
+        Ok(Uri::File(name)) => access.beside(path).exact(&name).ok(),
         _ => None,
     })
     .collect()

@@ -35,13 +35,13 @@ use self::{
 };
 use super::{
     Instance, LoadOptions, Mesh, Scene, SceneError, Transform, error::Checked, extent, framing,
-    needs::require_for_triangles,
+    needs::require_for_triangles, outside::Access,
 };
 
 /// Loads a glTF file as a scene with its lights and cameras.
 pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Scene, SceneError> {
     let failed = |what: String| SceneError::file(path, what);
-    let document = read(path, bytes)?;
+    let document = read(path, bytes, options)?;
     let nodes = Nodes::new(&document, options.scene.as_deref()).map_err(failed)?;
     let mut scene = Loader::new(&document, &nodes, 0, true).load(path).map_err(failed)?;
     let bounds = scene.bounds();
@@ -59,25 +59,26 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     Ok(scene)
 }
 
-/// Loads the meshes of a glTF file's default scene with their materials and images, without its lights and cameras. If
+/// Loads the meshes of a scene of a glTF file with their materials and images, without its lights and cameras. If
 /// `has_materials` is false, the materials and images are left out, and the instances' materials have no meaning.
-/// `n_loaded` is the number of triangles that there are already.
+/// `n_loaded` is the number of triangles that there are already. `options` name the scene.
 pub(super) fn load_meshes(
     path: &Path,
     bytes: Vec<u8>,
+    options: &LoadOptions,
     has_materials: bool,
     n_loaded: usize,
 ) -> Result<Scene, SceneError> {
     let failed = |what: String| SceneError::file(path, what);
-    let document = read(path, bytes)?;
-    let nodes = Nodes::new(&document, None).map_err(failed)?;
+    let document = read(path, bytes, options)?;
+    let nodes = Nodes::new(&document, options.scene.as_deref()).map_err(failed)?;
     let scene = Loader::new(&document, &nodes, n_loaded as u64, has_materials).load(path).map_err(failed)?;
     document.warn(path);
     Ok(scene)
 }
 
-fn read(path: &Path, bytes: Vec<u8>) -> Result<Document, SceneError> {
-    let document = Document::read(path, &bytes).map_err(|what| SceneError::file(path, what))?;
+fn read(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Document, SceneError> {
+    let document = Document::read(path, &bytes, Access::of(options)).map_err(|what| SceneError::file(path, what))?;
     for ix in 0..document.root.animations.len() {
         let name = document.root.animations[ix].name.clone();
         document.note("animations, which are not shown", name.unwrap_or_else(|| format!("animations[{ix}]")));
@@ -189,6 +190,7 @@ impl<'a> Loader<'a> {
         if whole.faces.is_empty() {
             return Ok(None);
         }
+        whole.name = document.root.meshes[mesh_ix].name.clone().unwrap_or_default();
         self.meshes.push(whole);
         Ok(Some((self.meshes.len() - 1, materials)))
     }

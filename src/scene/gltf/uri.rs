@@ -31,11 +31,24 @@ impl Uri {
         match uri.get(..5) {
             Some(scheme) if scheme.eq_ignore_ascii_case("data:") => data(&uri[5..]).map(Self::Data),
             _ => match percent_decode_str(uri).decode_utf8() {
-                Ok(name) => Ok(Self::File(name.into_owned())),
+                Ok(name) => match scheme(&name) {
+                    Some(scheme) => {
+                        Err(format!("`{name}` is not a relative path: files with `{scheme}:` are not read"))
+                    }
+                    None => Ok(Self::File(name.into_owned())),
+                },
                 Err(_) => Err(format!("the name `{uri}` is not UTF-8")),
             },
         }
     }
+}
+
+/// Returns the scheme of a URI, or the letter of a drive.
+fn scheme(name: &str) -> Option<&str> {
+    let (scheme, _) = name.split_once(':')?;
+    let is_scheme = scheme.starts_with(|c: char| c.is_ascii_alphabetic())
+        && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c));
+    is_scheme.then_some(scheme)
 }
 
 /// Returns the data of a data URI without its scheme.

@@ -8,31 +8,31 @@ use super::{
 };
 use crate::scene::{
     error::Checked,
-    image_files::{NamedFile, named_file},
+    outside::{Access, NamedFile, Reach},
     read::read_lossy,
 };
 
 /// Returns the files that the `mtllib` statements of an OBJ file's text name, and the images that these name. Names
 /// that are refused are left out.
-pub fn named_files(obj: &Path, text: &str) -> Vec<PathBuf> {
-    let folder = obj.parent().unwrap_or(Path::new(""));
+pub fn named_files(obj: &Path, text: &str, access: Access) -> Vec<PathBuf> {
+    let reach = access.beside(obj);
     let mut files = Vec::new();
     for (_, statement) in statements(text) {
         if let ("mtllib", rest) = split_keyword(&statement) {
-            files.extend(library_files(folder, rest).into_iter().flatten().map(|file| file.path));
+            files.extend(library_files(reach, rest).into_iter().flatten().map(|file| file.path));
         }
     }
-    let images: Vec<PathBuf> = files.iter().flat_map(|mtl| named_images(folder, mtl)).collect();
+    let images: Vec<PathBuf> = files.iter().flat_map(|mtl| named_images(reach, mtl)).collect();
     files.into_iter().chain(images).collect()
 }
 
 /// Returns the images that an MTL file names.
-fn named_images(root: &Path, mtl: &Path) -> Vec<PathBuf> {
+fn named_images(reach: Reach, mtl: &Path) -> Vec<PathBuf> {
     let text = read_lossy(mtl).unwrap_or_default();
     let folder = mtl.parent().unwrap_or(Path::new(""));
     let file = |statement: &str| match split_keyword(statement) {
         (keyword, rest) if matches!(MapKind::of(keyword), MapKind::Shown(_)) => {
-            map_file(root, folder, &MapOptions::new(rest).ok()?.name).ok().map(|file| file.path)
+            map_file(reach, folder, &MapOptions::new(rest).ok()?.name).ok().map(|file| file.path)
         }
         _ => None,
     };
@@ -41,8 +41,8 @@ fn named_images(root: &Path, mtl: &Path) -> Vec<PathBuf> {
 
 /// Returns the files that a `mtllib` line names. The rest of the line is one name, possibly with spaces, if such a
 /// file exists; otherwise it is a list of names.
-pub fn library_files(folder: &Path, rest: &str) -> Vec<Checked<NamedFile>> {
-    let find = |name: &str| named_file(folder, folder, name.trim_matches('"'));
+pub fn library_files(reach: Reach, rest: &str) -> Vec<Checked<NamedFile>> {
+    let find = |name: &str| reach.find(reach.root, name.trim_matches('"'));
     match find(rest) {
         Ok(whole) if whole.path.is_file() => vec![Ok(whole)],
         _ => rest.split_whitespace().map(find).collect(),
@@ -51,14 +51,18 @@ pub fn library_files(folder: &Path, rest: &str) -> Vec<Checked<NamedFile>> {
 
 /// Returns the file of a map. Writers often state absolute names of their own machine: where a name leaves the folder
 /// of the OBJ file, a file of the same name beside the MTL file is taken. A comment may follow the name.
-pub fn map_file(root: &Path, folder: &Path, name: &str) -> Checked<NamedFile> {
+pub fn map_file(reach: Reach, folder: &Path, name: &str) -> Checked<NamedFile> {
     let exists = |file: &Checked<NamedFile>| file.as_ref().is_ok_and(|file| file.path.is_file());
-    let whole = named_file(root, folder, name);
+    let whole = reach.find(folder, name);
     if exists(&whole) {
         return whole;
     }
     let name = name.split_once(" #").map_or(name, |(name, _)| name.trim_end().trim_end_matches('"'));
-    let without_comment = named_file(root, folder, name);
-    let beside = named_file(root, folder, name.rsplit(['/', '\\']).next().unwrap_or_default());
-    if without_comment.is_err() && exists(&beside) { beside } else { without_comment }
+    let without_comment = reach.find(folder, name);
+    let beside = reach.find(folder, name.rsplit(['/', '\\']).next().unwrap_or_default());
+    if !exists(&without_comment) && reach.within().find(folder, name).is_err() && exists(&beside) {
+        beside
+    } else {
+        without_comment
+    }
 }

@@ -15,6 +15,7 @@ use super::{
     error::SceneError,
     mesh::Mesh,
     needs::require_for_triangles,
+    outside::Access,
     polygon::Triangulator,
     smooth::{Shading, crease_normals},
     texture::linear_of_srgb,
@@ -22,17 +23,18 @@ use super::{
 
 /// Makes a mesh from an OBJ file's text, and reads its materials. A face's slot is an index into the library. A face
 /// without a material, or with one that the library lacks, has slot `library.materials.len()`. `n_loaded` is the
-/// number of triangles that the scene has already.
+/// number of triangles that the scene has already, and `access` says which files the OBJ file may name.
 pub(super) fn parse_obj(
     path: &Path,
     text: &str,
     shading: Shading,
     n_loaded: usize,
+    access: Access,
 ) -> Result<(Mesh, Library), SceneError> {
     let clean = clean_obj(text).map_err(|(line, what)| SceneError::line(path, line, what))?;
     let required = require_for_triangles(n_loaded as u64, clean.n_triangles);
     required.map_err(|what| SceneError::file(path, what))?;
-    let library = mtl::load_libraries(path, &clean.libraries)?;
+    let library = mtl::load_libraries(path, &clean.libraries, access)?;
     if let Some((line, statement)) = &clean.unknown {
         tracing::warn!("{}:{line}: unknown statement `{}`", path.display(), statement.escape_debug());
     }

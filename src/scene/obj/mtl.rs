@@ -15,8 +15,9 @@ use super::{
 };
 use crate::scene::{
     error::{Checked, SceneError},
-    image_files::{ImageFiles, Images, NamedFile},
+    image_files::{ImageFiles, Images},
     material::{Alpha, Clearcoat, Material, MaterialSpec, Microfacet, Sheen},
+    outside::{Access, NamedFile, Reach},
     read::read_lossy,
     texture::{Channel, Image},
 };
@@ -60,12 +61,12 @@ struct Map {
 
 /// Reads the files that the `mtllib` lines of an OBJ file name, relative to its folder. Warns of files that do not
 /// exist, and of names that leave the folder.
-pub fn load_libraries(obj: &Path, libraries: &[(usize, String)]) -> Result<Library, SceneError> {
-    let folder = obj.parent().unwrap_or(Path::new(""));
+pub fn load_libraries(obj: &Path, libraries: &[(usize, String)], access: Access) -> Result<Library, SceneError> {
+    let reach = access.beside(obj);
     let (mut described, mut images) = (Vec::new(), ImageFiles::default());
     let mut read = HashSet::new();
     for (line, rest) in libraries {
-        for file in library_files(folder, rest) {
+        for file in library_files(reach, rest) {
             let warn = |what: &str| tracing::warn!("{}:{line}: {what}", obj.display());
             match file {
                 Err(what) => warn(&format!("mtllib {}", what.escape_debug())),
@@ -77,7 +78,7 @@ pub fn load_libraries(obj: &Path, libraries: &[(usize, String)]) -> Result<Libra
                         warn(&format!("mtllib `{}`: {} is taken", rest.escape_debug(), path.display()));
                     }
                     if read.insert(path.clone()) {
-                        described.extend(load_library(folder, &path, &mut images)?);
+                        described.extend(load_library(reach, &path, &mut images)?);
                     }
                 }
             }
@@ -86,10 +87,10 @@ pub fn load_libraries(obj: &Path, libraries: &[(usize, String)]) -> Result<Libra
     materials(described, images)
 }
 
-fn load_library(root: &Path, path: &Path, images: &mut ImageFiles) -> Result<Vec<Described>, SceneError> {
+fn load_library(reach: Reach, path: &Path, images: &mut ImageFiles) -> Result<Vec<Described>, SceneError> {
     let text = read_lossy(path)?;
     let clean = clean_mtl(&text).map_err(|(line, what)| SceneError::line(path, line, what))?;
-    let more = read_more(root, path, &text, images).map_err(|(line, what)| SceneError::line(path, line, what))?;
+    let more = read_more(reach, path, &text, images).map_err(|(line, what)| SceneError::line(path, line, what))?;
     let (materials, _) =
         tobj::load_mtl_buf(&mut clean.as_bytes()).map_err(|e| SceneError::file(path, e.to_string()))?;
     let described = |(material, more): (tobj::Material, More)| Described {
@@ -103,7 +104,7 @@ fn load_library(root: &Path, path: &Path, images: &mut ImageFiles) -> Result<Vec
 
 /// Reads the maps and the physically based terms, one entry for each material. Warns of maps that are not shown: once
 /// for each kind, and once for each file that is missing or has another name.
-fn read_more(root: &Path, path: &Path, text: &str, images: &mut ImageFiles) -> Result<Vec<More>, (usize, String)> {
+fn read_more(reach: Reach, path: &Path, text: &str, images: &mut ImageFiles) -> Result<Vec<More>, (usize, String)> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut materials: Vec<More> = Vec::new();
     let mut told: HashSet<String> = HashSet::new();
@@ -132,7 +133,7 @@ fn read_more(root: &Path, path: &Path, text: &str, images: &mut ImageFiles) -> R
             }
             MapKind::Shown(term) => term,
         };
-        let found = MapOptions::new(rest).and_then(|options| Ok((map_file(root, folder, &options.name)?, options)));
+        let found = MapOptions::new(rest).and_then(|options| Ok((map_file(reach, folder, &options.name)?, options)));
         match found {
             Err(what) => warn(line, rest, format!("`{keyword}` is not shown: {what}")),
             Ok((NamedFile { path, is_other_case }, options)) => {

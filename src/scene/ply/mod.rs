@@ -18,11 +18,12 @@ use serde_ply::{DeserializeError, ElementDef, PlyReader};
 use self::vertex::{Vertices, upper_left};
 use super::{
     error::Checked,
-    image_files::{ImageFiles, Images, View, named_file},
+    image_files::{ImageFiles, Images, View},
     material::MaterialSpec,
     mesh::Mesh,
     needs::require_for_triangles,
     obj::Library,
+    outside::Access,
     polygon::Triangulator,
     smooth::{Shading, smooth_normals},
     texture::Texture,
@@ -64,7 +65,13 @@ struct Elements {
 }
 
 /// Makes a mesh of a file's content, and reads the images that it names. Its faces have the slot of their image.
-pub(super) fn parse_ply(path: &Path, bytes: &[u8], shading: Shading, n_loaded: usize) -> Checked<(Mesh, Library)> {
+pub(super) fn parse_ply(
+    path: &Path,
+    bytes: &[u8],
+    shading: Shading,
+    n_loaded: usize,
+    access: Access,
+) -> Checked<(Mesh, Library)> {
     let mut reader = PlyReader::from_reader(bytes).map_err(|error| format!("is no PLY file: {}", text(&error)))?;
     let header = reader.header().clone();
     check(&header.elem_defs)?;
@@ -74,7 +81,7 @@ pub(super) fn parse_ply(path: &Path, bytes: &[u8], shading: Shading, n_loaded: u
     require_for_triangles(n_loaded as u64, (n_of_polygons + n_of_strips) as u64)?;
     let names: Vec<&str> = texture_files(&header.comments).collect();
     let mesh = mesh(elements, names.len(), shading)?;
-    let library = if mesh.uvs[0].is_empty() { Library::default() } else { library(path, &names) };
+    let library = if mesh.uvs[0].is_empty() { Library::default() } else { library(path, &names, access) };
     Ok((mesh, library))
 }
 
@@ -107,11 +114,11 @@ fn texture_files(comments: &[String]) -> impl Iterator<Item = &str> {
 }
 
 /// Returns one material for each name of an image, which is its base colour. Warns of images that cannot be read.
-fn library(path: &Path, names: &[&str]) -> Library {
-    let folder = path.parent().unwrap_or(Path::new(""));
+fn library(path: &Path, names: &[&str], access: Access) -> Library {
+    let reach = access.beside(path);
     let warn = |what: &str| tracing::warn!("{}: TextureFile is not shown: {}", path.display(), what.escape_debug());
     let mut files = ImageFiles::default();
-    let mut add = |name: &&str| named_file(folder, folder, name).map(|file| files.add(file.path)).map_err(|e| warn(&e));
+    let mut add = |name: &&str| reach.find(reach.root, name).map(|file| files.add(file.path)).map_err(|e| warn(&e));
     let of_names: Vec<Option<usize>> = names.iter().map(|name| add(name).ok()).collect();
     let decoded = files.decode().into_iter().map(|image| image.map_err(|what| warn(&what)).ok()).collect();
     let mut images = Images::new(decoded);
@@ -213,13 +220,13 @@ fn check_indices(mut indices: impl Iterator<Item = i64>, n: usize, what: impl Fn
 }
 
 /// Returns the images that the comments of a file's header name. Names that are refused are left out.
-pub(super) fn named_images(path: &Path) -> Vec<PathBuf> {
+pub(super) fn named_images(path: &Path, access: Access) -> Vec<PathBuf> {
     // Reading a device or a pipe might never end.
     let file = fs::metadata(path).ok().filter(fs::Metadata::is_file).and_then(|_| fs::File::open(path).ok());
     let reader = file.and_then(|file| PlyReader::from_reader(BufReader::new(file)).ok());
-    let folder = path.parent().unwrap_or(Path::new(""));
+    let reach = access.beside(path);
     let comments = reader.map(|reader| reader.header().comments.clone()).unwrap_or_default();
-    texture_files(&comments).filter_map(|name| Some(named_file(folder, folder, name).ok()?.path)).collect()
+    texture_files(&comments).filter_map(|name| Some(reach.find(reach.root, name).ok()?.path)).collect()
 }
 
 /// The reader's error without its prefix, in one line.

@@ -1,22 +1,34 @@
 //! `kdray inspect`: the contents of a scene, and the figures of its acceleration structure.
 
+mod contents;
+mod text;
+
 use kdray::{
     accel::Statistics,
     engine::choices::{BuildPolicy, Processor, Request, Workload},
     gpu::GpuError,
-    layout::{LIGHT_DIRECTIONAL, Light},
-    scene::Scene,
+    layout::{LIGHT_DIRECTIONAL, LIGHT_SPOT, Light},
     world::{FlatScene, Mismatch, World},
 };
 use serde::Serialize;
 
+use self::{
+    contents::{Contents, MaterialDetails, TextureMemory},
+    text::{cut_table, shortened},
+};
 use super::{args::InspectArgs, build, error::CliError, print, print_raw, progress::Progress, table::table};
 
 /// Loads the scene, builds its structure and describes both.
 pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let progress = Progress::new(false, 2);
-    let (scene, load_ms) = progress.stage(&format!("loading {}", args.scene.display()), || Scene::load(&args.scene));
-    let scene = FlatScene::new(&scene?).map_err(GpuError::from)?;
+    let (scene, load_ms) = progress.stage(&format!("loading {}", args.scene.display()), || args.load.load(&args.scene));
+    let scene = scene?;
+    let contents = Contents::from(&scene);
+    let details: Vec<_> = scene.materials.iter().map(|material| MaterialDetails::new(material, &scene)).collect();
+    let flat = FlatScene::new(&scene).map_err(GpuError::from)?;
+    // The unflattened scene is freed here, because building the structure needs the memory.
+    drop(scene);
+    let scene = flat;
     let n_triangles = scene.triangles.len();
     let request = Request { accel: args.accel, build: BuildPolicy::Best, ..Request::default() };
     let accel = request.choose_accel(Processor::Gpu, n_triangles, &Workload::of_rays(0));
@@ -35,8 +47,10 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
     let inspection = Inspection {
         triangles: n_triangles,
         bounds: world.bounds().map(|corner| corner.to_array()),
-        materials: material_uses(scene),
+        materials: material_uses(scene, details),
         lights: scene.lights.iter().map(LightUse::from).collect(),
+        contents,
+        texture_memory: TextureMemory::from(&scene.textures),
         accel: statistics,
         load_ms,
         build_ms,
@@ -59,6 +73,9 @@ struct Inspection {
     bounds: [[f32; 3]; 2],
     materials: Vec<MaterialUse>,
     lights: Vec<LightUse>,
+    #[serde(flatten)]
+    contents: Contents,
+    texture_memory: TextureMemory,
     /// Statistics of the acceleration structure, serialized under the key `tree` or `grid`.
     #[serde(flatten)]
     accel: Statistics,
@@ -70,30 +87,51 @@ struct Inspection {
 struct MaterialUse {
     name: String,
     triangles: usize,
+    #[serde(flatten)]
+    details: MaterialDetails,
 }
 
 #[derive(Serialize)]
 struct LightUse {
     kind: &'static str,
-    /// Position of a point light in world units; unit vector towards a directional light.
+    /// Position of a point light or a spot light in world units; unit vector towards a directional light.
     position: [f32; 3],
-    /// Radiant intensity of a point light, irradiance of a directional light; linear RGB.
+    /// Radiant intensity of a point light or a spot light, irradiance of a directional light; linear RGB.
     intensity: [f32; 3],
+    /// Unit vector along which a spot light shines.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    direction: Option<[f32; 3]>,
+    /// Angle from there up to which a spot light is whole, degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    inner_angle: Option<f32>,
+    /// Angle beyond which a spot light is dark, degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    outer_angle: Option<f32>,
 }
 
 impl From<&Light> for LightUse {
     fn from(light: &Light) -> Self {
+        let is_spot = light.kind == LIGHT_SPOT;
+        let angle = |cosine: f32| is_spot.then(|| cosine.acos().to_degrees());
         Self {
-            kind: if light.kind == LIGHT_DIRECTIONAL { "directional" } else { "point" },
+            kind: match light.kind {
+                LIGHT_DIRECTIONAL => "directional",
+                LIGHT_SPOT => "spot",
+                _ => "point",
+            },
             position: light.position.to_array(),
             intensity: light.intensity.to_array(),
+            direction: is_spot.then(|| light.axis.to_array()),
+            inner_angle: angle(light.inner_cos),
+            outer_angle: angle(light.outer_cos),
         }
     }
 }
 
-fn material_uses(scene: &FlatScene) -> Vec<MaterialUse> {
+fn material_uses(scene: &FlatScene, details: Vec<MaterialDetails>) -> Vec<MaterialUse> {
+    let named = scene.material_names.iter().zip(details);
     let mut uses: Vec<_> =
-        scene.material_names.iter().map(|name| MaterialUse { name: name.clone(), triangles: 0 }).collect();
+        named.map(|(name, details)| MaterialUse { name: name.clone(), triangles: 0, details }).collect();
     for &material_ix in &scene.triangle_materials {
         uses[material_ix as usize].triangles += 1;
     }
@@ -105,17 +143,17 @@ impl Inspection {
         let [min, max] = self.bounds.map(vector);
         let mut text = format!("{}: {} triangles, loaded in {:.0} ms\n", self.scene, self.triangles, self.load_ms);
         text += &format!("bounds {min} to {max}\n\n");
-        let materials: Vec<_> =
-            self.materials.iter().map(|used| [used.name.clone(), used.triangles.to_string()]).collect();
-        text += &table(["material", "triangles"], &materials);
+        text += &cut_table(["material", "triangles"], &self.materials, |_, used| {
+            [shortened(&used.name), used.triangles.to_string()]
+        });
         text.push('\n');
-        let lights: Vec<_> = (self.lights.iter())
-            .map(|light| [light.kind.to_owned(), vector(light.position), vector(light.intensity)])
-            .collect();
-        text += &table(["light", "position or direction", "intensity"], &lights);
+        text += &cut_table(["light", "position or direction", "intensity"], &self.lights, |_, light| {
+            [light.kind.to_owned(), vector(light.position), vector(light.intensity)]
+        });
         text.push('\n');
         text += &self.accel_text();
-        text
+        text.push('\n');
+        text + &text::contents(&self.contents, &self.materials, &self.lights, &self.texture_memory)
     }
 
     fn accel_text(&self) -> String {

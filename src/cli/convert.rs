@@ -1,0 +1,24 @@
+//! `kdray convert`: a scene file made from any file that is a scene, to be edited.
+
+use kdray::{output, scene::scene_file_of};
+
+use super::{args::ConvertArgs, error::CliError, file_roles::FileRoles, print};
+
+/// Loads the input and writes a scene file that shows the same. An existing file is only replaced with `--force`.
+pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
+    let path = args.output.display();
+    if args.output.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("toml")) {
+        return Err(CliError::Usage(format!("cannot write `{path}`: the name of a scene file must end in .toml")));
+    }
+    let mut roles = FileRoles::default();
+    roles.read_scene("IN", &args.input, args.load.options());
+    roles.write("OUT", &args.output)?;
+    // A link that leads nowhere exists, too.
+    if args.output.symlink_metadata().is_ok() && !args.force {
+        return Err(CliError::Usage(format!("`{path}` exists: --force replaces it")));
+    }
+    output::check(&args.output)?;
+    let text = scene_file_of(&args.input, &args.output, &args.load.options())?;
+    output::write(&args.output, text.as_bytes())?;
+    if args.quiet { Ok(()) } else { print(&format!("wrote {path}\n")) }
+}

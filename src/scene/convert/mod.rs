@@ -1,0 +1,71 @@
+//! Scene files made from other files: a mesh or glTF file with its cameras, lights and materials in tables, to be
+//! edited; or a scene file for another folder. The result shows the same picture.
+
+mod relative;
+mod text;
+
+use std::path::Path;
+
+use toml::{Table, Value};
+
+use self::relative::Places;
+use super::{LoadOptions, Scene, SceneError, is_scene_file, material_spec::MAP_KEYS, outside::Access, read::read_utf8};
+
+/// Returns the text of a scene file that shows what `input` shows. The names of files in it are relative to the folder
+/// of `output`, where the text is to be written; this function does not write it. `options` say how `input` is loaded,
+/// and its camera becomes `[camera]`.
+///
+/// # Errors
+/// The input cannot be loaded, or a file does not lie below the folder of `output` and `options` do not allow it.
+pub fn scene_file_of(input: &Path, output: &Path, options: &LoadOptions) -> Result<String, SceneError> {
+    let scene = Scene::load_with(input, options)?;
+    let places = Places::new(output, Access::of(options))?;
+    if is_scene_file(input) {
+        return moved(input, &places, options.camera.is_some().then_some(&scene));
+    }
+    let mesh = text::MeshTable { file: places.name_of(input)?, scene: options.scene.clone() };
+    Ok(text::scene_file(&scene, &mesh))
+}
+
+/// Returns a scene file's text with the names of files relative to the folder of the output. The camera of
+/// `with_camera` becomes its `[camera]`. A text that needs no change keeps its comments.
+fn moved(input: &Path, places: &Places, with_camera: Option<&Scene>) -> Result<String, SceneError> {
+    let text = read_utf8(input)?;
+    let folder = input.parent().unwrap_or(Path::new(""));
+    if places.is_here(folder) && with_camera.is_none() {
+        return Ok(text);
+    }
+    let mut table: Table = text.parse().map_err(|error: toml::de::Error| SceneError::file(input, error.message()))?;
+    if let Some(scene) = with_camera {
+        let camera = text::camera(&scene.camera).parse().expect("the table of a camera is TOML");
+        table.insert("camera".to_owned(), Value::Table(camera));
+    }
+    for name in names_of_files(&mut table) {
+        *name = places.name_of(&folder.join(&*name))?;
+    }
+    toml::to_string(&table).map_err(|error| SceneError::file(input, error.to_string()))
+}
+
+/// Returns the names of files in a scene file.
+fn names_of_files(table: &mut Table) -> Vec<&mut String> {
+    let mut names = Vec::new();
+    for (key, value) in table.iter_mut() {
+        match (key.as_str(), value) {
+            ("mesh", Value::Array(meshes)) => names.extend(meshes.iter_mut().filter_map(|mesh| mesh.get_mut("file"))),
+            ("materials", Value::Table(materials)) => {
+                let materials = materials.iter_mut().filter_map(|(_, material)| material.as_table_mut()).flatten();
+                let maps = materials.filter(|(key, _)| MAP_KEYS.contains(&key.as_str()));
+                names.extend(maps.filter_map(|(_, map)| match map {
+                    Value::Table(map) => map.get_mut("file"),
+                    name => Some(name),
+                }));
+            }
+            _ => {}
+        }
+    }
+    let text = |value| match value {
+        &mut Value::String(ref mut name) => Some(name),
+        _ => None,
+    };
+    names.into_iter().filter_map(text).collect()
+}

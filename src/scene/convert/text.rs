@@ -1,0 +1,193 @@
+//! The text of a scene file.
+
+use std::fmt::Write;
+
+use glam::Vec3;
+use hashbrown::HashMap;
+
+use crate::{
+    frame::Denoise,
+    scene::{
+        Camera, Light, Material, RenderDefaults, Scene, assemble::DEFAULT_MATERIAL, material_spec::MaterialSpec,
+        overrides::override_terms, terms::TermValue,
+    },
+    util::text::is_obeyed,
+};
+
+/// The `[[mesh]]` table of the input.
+pub(super) struct MeshTable {
+    pub file: String,
+    /// Scene of a glTF file.
+    pub scene: Option<String>,
+}
+
+/// Returns the scene file of a scene that consists of one file.
+pub(super) fn scene_file(scene: &Scene, mesh: &MeshTable) -> String {
+    let mut text = format!("# {} as a scene of kdray, to be edited.\n\n", quoted(&mesh.file));
+    text += &format!("ambient = {}\nbackground = {}\n", vector(scene.ambient), vector(scene.background));
+    text += &format!("\n[camera]\n{}", camera(&scene.camera));
+    for (name, named) in &scene.cameras {
+        text += &format!("\n[[cameras]]\nname = {}\n{}", quoted(name), camera(named));
+    }
+    text.extend(scene.lights.iter().map(light));
+    text += &render(&scene.defaults);
+    let materials = materials(scene);
+    if !materials.is_empty() {
+        text += "\n# Terms that a table leaves out, and maps, are those of the file.\n";
+        text += &materials;
+    }
+    text += &format!("\n[[mesh]]\nfile = {}\n", quoted(&mesh.file));
+    if let Some(name) = &mesh.scene {
+        text += &format!("scene = {}\n", quoted(name));
+    }
+    if !materials.is_empty() {
+        text += "override = true\n";
+    }
+    text
+}
+
+/// Returns the keys of a camera.
+pub(super) fn camera(camera: &Camera) -> String {
+    let Camera { eye, target, up, vertical_fov_degrees } = *camera;
+    let (eye, target, up) = (vector(eye), vector(target), vector(up));
+    format!("eye = {eye}\ntarget = {target}\nup = {up}\nvertical_fov = {}\n", number(vertical_fov_degrees))
+}
+
+fn light(light: &Light) -> String {
+    let keys = match *light {
+        Light::Point { position, intensity } => {
+            format!("kind = \"point\"\nposition = {}\nintensity = {}\n", vector(position), vector(intensity))
+        }
+        Light::Directional { towards, irradiance } => {
+            let (direction, irradiance) = (vector(-towards), vector(irradiance));
+            format!("kind = \"directional\"\ndirection = {direction}\nirradiance = {irradiance}\n")
+        }
+        Light::Spot { position, towards, intensity, inner_cos, outer_cos } => {
+            let (position, direction, intensity) = (vector(position), vector(towards), vector(intensity));
+            // Double precision is needed to read the same cosines.
+            let [inner, outer] = [inner_cos, outer_cos].map(|cosine| f64::from(cosine).acos().to_degrees());
+            format!(
+                "kind = \"spot\"\nposition = {position}\ndirection = {direction}\nintensity = {intensity}\n\
+                 inner_angle = {inner:?}\nouter_angle = {outer:?}\n"
+            )
+        }
+    };
+    format!("\n[[light]]\n{keys}")
+}
+
+fn render(defaults: &RenderDefaults) -> String {
+    let RenderDefaults { width, height, max_depth, exposure, is_metered, tonemap, denoise } = *defaults;
+    let denoise = match denoise {
+        Denoise::Off => "denoise = \"off\"\n".to_owned(),
+        Denoise::Paper { threshold } => format!("denoise = \"paper\"\ndenoise_threshold = {}\n", number(threshold)),
+    };
+    let exposure = if is_metered { "metered = true".to_owned() } else { format!("exposure = {}", number(exposure)) };
+    format!(
+        "\n[render]\nwidth = {width}\nheight = {height}\nmax_depth = {max_depth}\n{exposure}\n\
+         tonemap = \"{tonemap}\"\n{denoise}"
+    )
+}
+
+/// Returns the tables of the file's materials, a table for each name.
+fn materials(scene: &Scene) -> String {
+    let mut by_name: HashMap<&str, Vec<&Material>> = HashMap::new();
+    let of_file = || scene.materials.iter().filter(|material| material.name != DEFAULT_MATERIAL);
+    of_file().for_each(|material| by_name.entry(&material.name).or_default().push(material));
+    let tables = of_file().filter_map(|material| {
+        let alike = by_name.remove(material.name.as_str())?;
+        Some(material_table(scene, material, &alike))
+    });
+    tables.collect()
+}
+
+/// Returns the table of a material. If it does not leave all materials of its name (`alike`) as they are, its lines are
+/// comments.
+fn material_table(scene: &Scene, material: &Material, alike: &[&Material]) -> String {
+    let mut keys = String::new();
+    for term in material.terms() {
+        let value = match term.value {
+            TermValue::Number(value) if value.is_finite() => number(value),
+            TermValue::Number(_) => continue,
+            // The key means the colour of Phong's highlight.
+            TermValue::Colour(_) if term.key == "Ks" && material.microfacet.is_some() => continue,
+            TermValue::Colour(value) => vector(value),
+            TermValue::Model(value) => value.to_string(),
+            TermValue::Flag(value) => value.to_string(),
+        };
+        writeln!(keys, "{} = {value}", term.key).expect("a String takes what it is given");
+    }
+    let header = format!("[materials.{}]\n", quoted(&material.name));
+    let maps = material.maps.named().map(|(name, texture)| {
+        let image = scene.images.get(texture.image_ix as usize).map_or("", |image| &image.name);
+        format!("# {name}: {}\n", quoted(image))
+    });
+    let maps: String = maps.collect();
+    if leaves_as_they_are(&keys, alike) {
+        format!("\n{header}{maps}{keys}")
+    } else {
+        let commented: String = (header + &keys).lines().map(|line| format!("# {line}\n")).collect();
+        let why = if alike.len() > 1 { "several materials have this name" } else { "not all terms have keys" };
+        format!("\n# Only an example, since {why}:\n{commented}{maps}")
+    }
+}
+
+/// Returns whether materials that take the terms of a table stay the same.
+fn leaves_as_they_are(keys: &str, materials: &[&Material]) -> bool {
+    let Ok(spec) = toml::from_str::<MaterialSpec>(keys) else { return false };
+    materials.iter().all(|material| {
+        let Ok(stated) = spec.material(&material.name) else { return false };
+        let mut changed = (*material).clone();
+        override_terms(&mut changed, &spec, &stated).is_ok() && changed == **material
+    })
+}
+
+fn vector(v: Vec3) -> String {
+    format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
+}
+
+/// Returns a number that is read as the same number of single precision.
+fn number(value: f32) -> String {
+    let short = format!("{value:?}");
+    // TOML's numbers are rounded twice, to double and to single precision.
+    let is_exact = short.parse::<f64>().is_ok_and(|read| (read as f32).to_bits() == value.to_bits());
+    if is_exact { short } else { format!("{:?}", f64::from(value)) }
+}
+
+/// Returns a string or a key of TOML on one line, without characters that a terminal would obey.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => quoted.extend(['\\', c]),
+            c if is_obeyed(c) => {
+                quoted += &format!("\\u{:04x}", u32::from(c));
+            }
+            c => quoted.push(c),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_read_as_they_were() {
+        for value in [0.1, -0.0, 1.0 / 3.0, 1e-45, f32::MIN_POSITIVE, f32::MAX, 16_777_216.0, 1e16, 1e-7] {
+            let table: toml::Table = format!("x = {}", number(value)).parse().unwrap();
+            let read = table["x"].as_float().unwrap() as f32;
+            assert_eq!(read.to_bits(), value.to_bits(), "{value:?}");
+        }
+    }
+
+    #[test]
+    fn quoted_text_is_read_as_it_was() {
+        for text in ["", "a b", "a.b", "\"\\\n\t\u{1b}\u{7f}\u{9b}\u{202e}", "süß 日本"] {
+            let table: toml::Table = format!("{} = {}", quoted(text), quoted(text)).parse().unwrap();
+            assert_eq!(table[text].as_str(), Some(text));
+        }
+        assert_eq!(quoted("\u{202e}\n"), "\"\\u202e\\u000a\"");
+    }
+}

@@ -1,0 +1,148 @@
+//! The materials of a scene file, by which its meshes are named or the materials of its mesh files are changed.
+
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+use glam::Vec3;
+use toml::Spanned;
+
+use super::{
+    Scene,
+    description::CommonSpec,
+    error::Checked,
+    material::{Alpha, Material, MaterialSpec},
+};
+
+/// The materials of a scene file, and what its meshes use them for.
+pub(super) struct NamedMaterials<'a> {
+    specs: &'a BTreeMap<String, Spanned<MaterialSpec>>,
+    /// Indices into the scene's materials.
+    indices: HashMap<String, u32>,
+    /// Materials that meshes have.
+    worn: HashSet<u32>,
+    /// Materials whose terms replace those of a mesh file's material.
+    overriding: HashSet<u32>,
+}
+
+impl<'a> NamedMaterials<'a> {
+    /// `indices`: where the scene has the material of each name in `specs`.
+    pub fn new(specs: &'a BTreeMap<String, Spanned<MaterialSpec>>, indices: HashMap<String, u32>) -> Self {
+        Self { specs, indices, worn: HashSet::new(), overriding: HashSet::new() }
+    }
+
+    /// Returns the indices of the materials that a mesh names.
+    pub fn of_mesh(&mut self, common: &CommonSpec) -> Checked<Vec<u32>> {
+        let index = |name: &String| {
+            let ix = self.indices.get(name).copied();
+            ix.ok_or_else(|| format!("there is no material `{name}` in [materials]"))
+        };
+        let named = common.material.iter().chain(&common.materials).map(index).collect::<Checked<Vec<u32>>>()?;
+        self.worn.extend(&named);
+        Ok(named)
+    }
+
+    /// Gives the scene's materials from index `first` on the terms that materials of the same names state.
+    pub fn override_from(&mut self, scene: &mut Scene, first: usize) -> Checked<()> {
+        let (named, of_file) = scene.materials.split_at_mut(first);
+        for material in of_file {
+            let Some(&ix) = self.indices.get(&material.name) else { continue };
+            let spec = self.specs[&material.name].get_ref();
+            let changed = override_terms(material, spec, &named[ix as usize]);
+            changed.map_err(|what| format!("override of material `{}`: {what}", material.name))?;
+            self.overriding.insert(ix);
+        }
+        Ok(())
+    }
+
+    /// Removes the materials that only changed others from the scene.
+    pub fn remove_idle(&self, scene: &mut Scene) {
+        let is_idle = |ix: u32| self.overriding.contains(&ix) && !self.worn.contains(&ix);
+        let mut n_kept = 0;
+        let new_ix: Vec<u32> = (0..scene.materials.len() as u32)
+            .map(|ix| {
+                n_kept += u32::from(!is_idle(ix));
+                n_kept.saturating_sub(1)
+            })
+            .collect();
+        let mut ix = 0..;
+        scene.materials.retain(|_| ix.next().is_some_and(|ix| !is_idle(ix)));
+        for material in scene.instances.iter_mut().flat_map(|instance| &mut instance.materials) {
+            *material = new_ix[*material as usize];
+        }
+    }
+}
+
+/// Gives a material the terms that `spec` states. `stated` is the material that `spec` alone describes.
+pub(super) fn override_terms(material: &mut Material, spec: &MaterialSpec, stated: &Material) -> Checked<()> {
+    let had_equal_colours = material.ka == material.kd;
+    set(&mut material.kd, stated.kd, spec.kd.is_some());
+    // Kd is the default of Ka.
+    let ka = if spec.ka.is_some() { stated.ka } else { stated.kd };
+    set(&mut material.ka, ka, spec.ka.is_some() || spec.kd.is_some() && had_equal_colours);
+    set(&mut material.ks, stated.ks, spec.ks.is_some());
+    set(&mut material.ke, stated.ke, spec.ke.is_some());
+    set(&mut material.tf, stated.tf, spec.tf.is_some());
+    set(&mut material.ns, stated.ns, spec.ns.is_some());
+    set(&mut material.ni, stated.ni, spec.ni.is_some());
+    set(&mut material.lobes, stated.lobes, spec.illum.is_some());
+    set(&mut material.is_unlit, stated.is_unlit, spec.unlit.is_some());
+    override_opacity(material, spec, stated);
+    override_microfacet(material, spec, stated);
+    override_maps(material, spec, stated);
+    let idle = [("Tf", spec.tf.is_some()), ("Ns", spec.ns.is_some()), ("illum", spec.illum.is_some())];
+    match idle.into_iter().find(|(_, is_stated)| *is_stated && material.microfacet.is_some()) {
+        Some((term, _)) => Err(format!("it is a microfacet material, which ignores {term}")),
+        None => Ok(()),
+    }
+}
+
+fn set<T>(term: &mut T, value: T, is_stated: bool) {
+    if is_stated {
+        *term = value;
+    }
+}
+
+fn override_opacity(material: &mut Material, spec: &MaterialSpec, stated: &Material) {
+    let is_stated = spec.d.is_some() || spec.tr.is_some();
+    // Another opacity is meant to be seen.
+    if is_stated && material.d != stated.d && material.alpha == Alpha::Opaque {
+        material.alpha = Alpha::Coverage;
+    }
+    set(&mut material.d, stated.d, is_stated);
+    set(&mut material.alpha, stated.alpha, spec.cutoff.is_some());
+}
+
+/// Gives a material the microfacet terms that `spec` states. They make a microfacet material of another one.
+fn override_microfacet(material: &mut Material, spec: &MaterialSpec, stated: &Material) {
+    let Some(stated) = stated.microfacet else { return };
+    if material.microfacet.is_none() {
+        material.ks = Vec3::ONE;
+        material.microfacet = Some(stated);
+        return;
+    }
+    let Some(terms) = &mut material.microfacet else { return };
+    set(&mut terms.metallic, stated.metallic, spec.metallic.is_some());
+    set(&mut terms.roughness, stated.roughness, spec.roughness.is_some());
+    // Light that begins to pass through a surface enters a solid unless it is said to be thin.
+    let begins = spec.transmission.is_some() && terms.transmission == 0.0 && stated.transmission > 0.0;
+    set(&mut terms.transmission, stated.transmission, spec.transmission.is_some());
+    match spec.thin {
+        Some(is_thin) => terms.is_solid = !is_thin,
+        None if begins => terms.is_solid = true,
+        None => {}
+    }
+    set(&mut terms.attenuation_colour, stated.attenuation_colour, spec.attenuation_color.is_some());
+    set(&mut terms.attenuation_distance, stated.attenuation_distance, spec.attenuation_distance.is_some());
+}
+
+fn override_maps(material: &mut Material, spec: &MaterialSpec, stated: &Material) {
+    let (maps, stated) = (&mut material.maps, &stated.maps);
+    set(&mut maps.base_colour, stated.base_colour.clone(), spec.map_kd.is_some());
+    set(&mut maps.specular, stated.specular.clone(), spec.map_ks.is_some());
+    set(&mut maps.emission, stated.emission.clone(), spec.map_ke.is_some());
+    set(&mut maps.opacity, stated.opacity.clone(), spec.map_d.is_some());
+    set(&mut maps.roughness, stated.roughness.clone(), spec.map_ns.is_some() || spec.map_roughness.is_some());
+    set(&mut maps.metallic, stated.metallic.clone(), spec.map_metallic.is_some());
+    set(&mut maps.occlusion, stated.occlusion.clone(), spec.map_occlusion.is_some());
+    set(&mut maps.normal, stated.normal.clone(), spec.map_normal.is_some());
+    set(&mut maps.normal_scale, stated.normal_scale, spec.map_normal.is_some());
+}
