@@ -8,8 +8,11 @@ use hashbrown::HashMap;
 use crate::{
     frame::Denoise,
     scene::{
-        Camera, Light, Material, RenderDefaults, Scene, assemble::DEFAULT_MATERIAL, material_spec::MaterialSpec,
-        overrides::override_terms, terms::TermValue,
+        Camera, Light, Material, RenderDefaults, Scene,
+        assemble::DEFAULT_MATERIAL,
+        material_spec::MaterialSpec,
+        overrides::override_terms,
+        terms::{Term, TermValue},
     },
     util::text::is_obeyed,
 };
@@ -104,7 +107,9 @@ fn materials(scene: &Scene) -> String {
 /// comments.
 fn material_table(scene: &Scene, material: &Material, alike: &[&Material]) -> String {
     let mut keys = String::new();
-    for term in material.terms() {
+    // Ka follows Kd unless it is stated.
+    let is_stated = |term: &Term| !(term.is_default && matches!(term.key, "Ka" | "unlit"));
+    for term in material.terms().into_iter().filter(is_stated) {
         let value = match term.value {
             TermValue::Number(value) if value.is_finite() => number(value),
             TermValue::Number(_) => continue,
