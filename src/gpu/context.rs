@@ -65,6 +65,7 @@ pub struct Context {
     /// Whether kernels have 64-bit atomics on buffers.
     int64_atomics: bool,
     /// Functions of the swapchain extension. `None` if the device was opened without a window.
+    #[cfg_attr(not(feature = "view"), expect(dead_code, reason = "only windows present pictures"))]
     pub(super) presentation: Option<khr::swapchain::Device>,
     #[cfg(feature = "view")]
     pub(super) physical: vk::PhysicalDevice,
