@@ -37,9 +37,9 @@ bool shadow_segment(PathRay ray, Hit hit, Light light, out PathRay segment) {
     if (!can_show(material, surface.shading, -ray.direction, to_light.direction)) return false;
     vec3 origin = lit_point(surface, hit, to_light.direction);
     origin += surface.clearance * surface.geometric;
-    segment = PathRay(
-        origin, ray.pixel_ix, to_light.direction, hit.triangle_ix, vec3(0.0), to_light.distance
-    );
+    // The segment ends where the light is seen from the surface's own point.
+    float t_max = to_light.distance - dot(origin - surface.point_world, to_light.direction);
+    segment = PathRay(origin, ray.pixel_ix, to_light.direction, hit.triangle_ix, vec3(0.0), t_max);
     return true;
 }
 

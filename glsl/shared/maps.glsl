@@ -46,7 +46,7 @@ float level_of(Texture map, TextureHit hit) {
     vec2 e1 = corner_uv(hit.triangle_ix, uv_set, 1u) - a, e2 = corner_uv(hit.triangle_ix, uv_set, 2u) - a;
     float scale = abs(map.m00 * map.m11 - map.m01 * map.m10);
     float n_texels = abs(e1.x * e2.y - e1.y * e2.x) * scale * float(map.size & 0xffffu) * float(map.size >> 16);
-    // A triangle whose texture coordinates have no area shows one texel, whatever the level.
+    // Texture coordinates without area say nothing about the size of texels.
     return n_texels > 0.0 ? hit.log_width + 0.5 * log2(n_texels) : 0.0;
 }
 
@@ -94,6 +94,7 @@ vec3 mapped_normal(MaterialMaps maps, TextureHit hit, Surface surface) {
     tangent *= inversesqrt(squared);
     vec3 bitangent = side * cross(normal, tangent);
     vec3 map = 2.0 * map_at(maps.normal, hit).xyz - 1.0;
+    map.z = max(map.z, 0.0);
     vec3 bent = maps.normal_scale * (map.x * tangent + map.y * bitangent) + map.z * normal;
     float length_squared = dot(bent, bent);
     return length_squared > LEAST_NORMAL_SQUARED ? front * bent * inversesqrt(length_squared) : surface.interpolated;
@@ -133,7 +134,7 @@ float squared_tangent(float cosine) {
 // Terminator Problem, Ray Tracing Gems, 2019).
 float bump_shadowing(Surface surface, vec3 to_light) {
     float share = 1.0;
-    if (TEXTURED) {
+    if (TEXTURED && surface.shading != surface.interpolated) {
         float cos_bend = max(abs(dot(surface.interpolated, surface.shading)), LEAST_COSINE);
         float cos_light = max(dot(surface.interpolated, to_light), LEAST_COSINE);
         float squared_width = min(0.125 * squared_tangent(cos_bend), 1.0);

@@ -92,6 +92,7 @@ impl TextureHit<'_> {
         let tangent = tangent * (1.0 / squared.sqrt());
         let bitangent = side * normal.cross(tangent);
         let map = 2.0 * self.map_at(maps.normal).truncate() - 1.0;
+        let map = map.with_z(map.z.max(0.0));
         let bent = maps.normal_scale * (map.x * tangent + map.y * bitangent) + map.z * normal;
         let squared = bent.dot(bent);
         if squared > LEAST_NORMAL_SQUARED { front * bent * (1.0 / squared.sqrt()) } else { surface.interpolated }
@@ -134,7 +135,7 @@ fn squared_tangent(cosine: f32) -> f32 {
 /// The share of a light that reaches a bent normal, whose bumps shadow one another: 1 from the direction of the
 /// interpolated normal, 0 at the horizon of the interpolated surface.
 pub fn bump_shadowing(inputs: &KernelInputs, surface: &Surface, to_light: Vec3) -> f32 {
-    if inputs.textures.is_none() {
+    if inputs.textures.is_none() || surface.shading == surface.interpolated {
         return 1.0;
     }
     let cos_bend = surface.interpolated.dot(surface.shading).abs().max(LEAST_COSINE);

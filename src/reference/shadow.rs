@@ -32,13 +32,15 @@ pub(crate) fn shadow_segment(inputs: &KernelInputs, ray: &PathRay, hit: &Hit, li
         return None;
     }
     let from = lit_point(&surface, hit, &inputs.triangles[hit.triangle_ix as usize], to_light.direction);
+    let origin = from + surface.clearance * surface.geometric;
     Some(PathRay {
-        origin: from + surface.clearance * surface.geometric,
+        origin,
         pixel_ix: ray.pixel_ix,
         direction: to_light.direction,
         source_triangle: hit.triangle_ix,
         throughput: Vec3::ZERO,
-        t_max: to_light.distance,
+        // The segment ends where the light is seen from the surface's own point.
+        t_max: to_light.distance - (origin - surface.point_world).dot(to_light.direction),
     })
 }
 

@@ -139,13 +139,16 @@ fn set_opacity(maps: &mut MaterialMaps, material: &Material, scene: &Scene, corn
             maps.alpha_cutoff = cutoff;
         }
         Alpha::Coverage => {
-            // MTL's own transparency `d` casts whole shadows, as in the paper.
-            let by_factor = is_microfacet && material.d < 1.0;
-            let by_colour = is_microfacet && colours_are_see_through(material, scene);
-            if by_factor || by_colour || corners_have_opacity || material.maps.opacity.is_some() {
+            let is_glass = material.lobes.reflection || material.lobes.refraction;
+            if is_microfacet {
+                let by_colour = colours_are_see_through(material, scene);
+                maps.flags |= if material.d < 1.0 || by_colour || corners_have_opacity { MAPS_VEIL } else { 0 };
+            } else if !is_glass && (corners_have_opacity || material.maps.opacity.is_some()) {
+                // MTL's own transparency `d` casts whole shadows, as in the paper.
                 maps.flags |= MAPS_VEIL;
-                maps.alpha_cutoff = LEAST_SHADOWING_OPACITY;
+                maps.opacity_factor = 1.0;
             }
+            maps.alpha_cutoff = LEAST_SHADOWING_OPACITY;
         }
     }
 }
