@@ -11,21 +11,18 @@
 
 layout(constant_id = CONSTANT_CUTOUTS) const bool CUTOUTS = false;
 
-// The texture's value at a point of a triangle, in its largest level.
-vec4 finest_at(uint texture_ix, uint triangle_ix, float u, float v) {
-    Texture map = texture_at(texture_ix);
-    return sample_texture(map, uv_at(triangle_ix, uv_set_of(map), u, v), 0.0);
-}
-
 // The opacity at a point of a triangle, 0..1, by the largest levels of its textures.
 float opacity_at(MaterialMaps maps, uint triangle_ix, float u, float v) {
     float opacity = maps.opacity_factor;
     if ((maps.flags & MAPS_CORNERS_HAVE_OPACITY) != 0u) opacity *= corner_colour_at(triangle_ix, u, v).a;
-    if ((maps.flags & MAPS_COLOUR_HAS_OPACITY) != 0u && maps.base_colour != NO_TEXTURE) {
-        opacity *= finest_at(maps.base_colour, triangle_ix, u, v).a;
-    }
-    if (maps.opacity != NO_TEXTURE) {
-        opacity *= scalar_of(texture_at(maps.opacity), finest_at(maps.opacity, triangle_ix, u, v));
+    for (uint i = 0u; i < 2u; ++i) {
+        bool is_colour = i == 0u;
+        uint texture_ix = is_colour ? maps.base_colour : maps.opacity;
+        bool counts = !is_colour || (maps.flags & MAPS_COLOUR_HAS_OPACITY) != 0u;
+        if (!counts || texture_ix == NO_TEXTURE) continue;
+        Texture map = texture_at(texture_ix);
+        vec4 value = sample_finest(map, uv_at(triangle_ix, uv_set_of(map), u, v));
+        opacity *= is_colour ? value.a : scalar_of(map, value);
     }
     return opacity;
 }

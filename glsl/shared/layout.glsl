@@ -419,6 +419,20 @@ struct CornerSurface {
     uint colour;
 };
 
+// The number of textures of a material.
+#define N_MAPS 10u
+// The places of the textures in `MaterialMaps`.
+#define MAP_BASE_COLOUR 0u
+#define MAP_OPACITY 1u
+#define MAP_SPECULAR 2u
+#define MAP_SPECULAR_FACTOR 3u
+#define MAP_EMISSION 4u
+#define MAP_NORMAL 5u
+#define MAP_ROUGHNESS 6u
+#define MAP_METALLIC 7u
+#define MAP_TRANSMISSION 8u
+#define MAP_OCCLUSION 9u
+
 // `MaterialMaps.flags`: rays pass through the surface where its opacity is below `alpha_cutoff`.
 #define MAPS_CUTOUT 1u
 // `MaterialMaps.flags`: shadow rays do so.

@@ -56,15 +56,20 @@ vec4 map_at(uint texture_ix, TextureHit hit) {
     return sample_texture(map, uv_at(hit.triangle_ix, uv_set_of(map), hit.u, hit.v), level_of(map, hit));
 }
 
-// The value of a texture of one number; 1 if there is none.
-float factor_at(uint texture_ix, TextureHit hit) {
-    if (texture_ix == NO_TEXTURE) return 1.0;
-    return scalar_of(texture_at(texture_ix), map_at(texture_ix, hit));
-}
-
-// The colour of a texture; white if there is none.
-vec3 colour_at(uint texture_ix, TextureHit hit) {
-    return texture_ix == NO_TEXTURE ? vec3(1.0) : map_at(texture_ix, hit).rgb;
+// The values of a material's textures, in the order of `MaterialMaps`: a colour with opacity, or the number of a
+// texture of one number in all components. A texture that is missing has 1. They are looked up in a loop, since each
+// copy of the lookup would make every kernel that shades longer by a thousand instructions.
+vec4[N_MAPS] map_values(uint material_ix, TextureHit hit) {
+    vec4 values[N_MAPS];
+    for (uint i = 0u; i < N_MAPS; ++i) {
+        values[i] = vec4(1.0);
+        uint texture_ix = load_texture_words(accel.material_maps_begin + 16u * material_ix + i);
+        if (texture_ix == NO_TEXTURE) continue;
+        vec4 value = map_at(texture_ix, hit);
+        bool is_colour = i == MAP_BASE_COLOUR || i == MAP_SPECULAR || i == MAP_EMISSION || i == MAP_NORMAL;
+        values[i] = is_colour ? value : vec4(scalar_of(texture_at(texture_ix), value));
+    }
+    return values;
 }
 
 // Adds a corner's tangent, weighted.
@@ -73,9 +78,9 @@ void add_tangent(uint code, float weight, inout vec3 tangent, inout float side) 
     side = (code & 1u) != 0u ? 1.0 : -1.0;
 }
 
-// The shading normal that the normal map gives, on the side of the interpolated normal. Without tangents, it is the
-// interpolated normal.
-vec3 mapped_normal(MaterialMaps maps, TextureHit hit, Surface surface) {
+// The shading normal that the value of the normal map gives, on the side of the interpolated normal. Without tangents,
+// it is the interpolated normal.
+vec3 mapped_normal(MaterialMaps maps, vec4 value, TextureHit hit, Surface surface) {
     if (maps.normal == NO_TEXTURE || accel.corners_begin == NO_WORDS) return surface.interpolated;
     vec3 tangent = vec3(0.0);
     float side = 1.0;
@@ -93,7 +98,7 @@ vec3 mapped_normal(MaterialMaps maps, TextureHit hit, Surface surface) {
     if (!(squared > LEAST_NORMAL_SQUARED)) return surface.interpolated;
     tangent *= inversesqrt(squared);
     vec3 bitangent = side * cross(normal, tangent);
-    vec3 map = 2.0 * map_at(maps.normal, hit).xyz - 1.0;
+    vec3 map = 2.0 * value.xyz - 1.0;
     map.z = max(map.z, 0.0);
     vec3 bent = maps.normal_scale * (map.x * tangent + map.y * bitangent) + map.z * normal;
     float length_squared = dot(bent, bent);
@@ -101,25 +106,25 @@ vec3 mapped_normal(MaterialMaps maps, TextureHit hit, Surface surface) {
 }
 
 // Multiplies the material's terms by its textures and by the colours of the triangle's corners.
-void apply_maps(MaterialMaps maps, TextureHit hit, inout Material material) {
+void apply_maps(MaterialMaps maps, vec4 values[N_MAPS], TextureHit hit, inout Material material) {
     vec4 corner_colour = corner_colour_at(hit.triangle_ix, hit.u, hit.v);
-    vec4 map_colour = maps.base_colour == NO_TEXTURE ? vec4(1.0) : map_at(maps.base_colour, hit);
+    vec4 map_colour = values[MAP_BASE_COLOUR];
     vec3 base = corner_colour.rgb * map_colour.rgb;
     material.kd *= base;
     // What is left of a surface with cut-outs is opaque.
     if ((maps.flags & MAPS_CUTOUT) == 0u) {
         if ((maps.flags & MAPS_CORNERS_HAVE_OPACITY) != 0u) material.d *= corner_colour.a;
         if ((maps.flags & MAPS_COLOUR_HAS_OPACITY) != 0u) material.d *= map_colour.a;
-        material.d *= factor_at(maps.opacity, hit);
+        material.d *= values[MAP_OPACITY].x;
     }
-    material.ks *= colour_at(maps.specular, hit) * factor_at(maps.specular_factor, hit);
-    material.ke *= colour_at(maps.emission, hit);
-    float rough = factor_at(maps.roughness, hit);
+    material.ks *= values[MAP_SPECULAR].rgb * values[MAP_SPECULAR_FACTOR].x;
+    material.ke *= values[MAP_EMISSION].rgb;
+    float rough = values[MAP_ROUGHNESS].x;
     material.roughness *= rough;
     material.ns = max(material.ns * rough, 1.0);
-    material.metallic *= factor_at(maps.metallic, hit);
-    material.transmission *= factor_at(maps.transmission, hit);
-    material.ka *= 1.0 + maps.occlusion_strength * (factor_at(maps.occlusion, hit) - 1.0);
+    material.metallic *= values[MAP_METALLIC].x;
+    material.transmission *= values[MAP_TRANSMISSION].x;
+    material.ka *= 1.0 + maps.occlusion_strength * (values[MAP_OCCLUSION].x - 1.0);
     if (!is_microfacet(material)) material.ka *= base;
 }
 
@@ -152,8 +157,9 @@ void shaded_at(PathRay ray, Hit hit, out Surface surface, out Material material)
     if (TEXTURED) {
         MaterialMaps maps = maps_of(material_ix);
         TextureHit at = texture_hit(ray, hit, t, surface);
-        apply_maps(maps, at, material);
-        surface.shading = mapped_normal(maps, at, surface);
+        vec4 values[N_MAPS] = map_values(material_ix, at);
+        apply_maps(maps, values, at, material);
+        surface.shading = mapped_normal(maps, values[MAP_NORMAL], at, surface);
     }
 }
 

@@ -69,23 +69,29 @@ vec4 sample_level(Texture map, uint level, vec2 place) {
     uint wrap_u = wrap_of(map, TEXTURE_WRAP_U_SHIFT);
     uint wrap_v = wrap_of(map, TEXTURE_WRAP_V_SHIFT);
     precise vec2 at = vec2(folded(place.x, wrap_u), folded(place.y, wrap_v)) * vec2(size);
-    if ((map.flags & TEXTURE_NEAREST) != 0u) {
-        ivec2 nearest = ivec2(floor(at));
-        return texel(map, level, wrapped(nearest.x, size.x, wrap_u), wrapped(nearest.y, size.y, wrap_v));
-    }
+    bool is_nearest = (map.flags & TEXTURE_NEAREST) != 0u;
     // The centre of the first texel is 0.
-    ivec2 steps = ivec2(floor(at * 256.0 + 0.5)) - 128;
+    ivec2 steps = is_nearest ? ivec2(floor(at)) << 8 : ivec2(floor(at * 256.0 + 0.5)) - 128;
     ivec2 low = steps >> 8;
     vec2 weight = vec2(steps & 255) * (1.0 / 256.0);
-    uint x0 = wrapped(low.x, size.x, wrap_u);
-    uint x1 = wrapped(low.x + 1, size.x, wrap_u);
-    uint y0 = wrapped(low.y, size.y, wrap_v);
-    uint y1 = wrapped(low.y + 1, size.y, wrap_v);
-    vec4 upper_left = texel(map, level, x0, y0);
-    vec4 lower_left = texel(map, level, x0, y1);
-    vec4 upper = upper_left + (texel(map, level, x1, y0) - upper_left) * weight.x;
-    vec4 lower = lower_left + (texel(map, level, x1, y1) - lower_left) * weight.x;
+    // The texels are looked up in a loop: each copy of the lookup would make all kernels longer.
+    vec4 texels[4];
+    for (int i = 0; i < 4; ++i) {
+        ivec2 high = is_nearest ? ivec2(0) : ivec2(i & 1, i >> 1);
+        uint x = wrapped(low.x + high.x, size.x, wrap_u);
+        uint y = wrapped(low.y + high.y, size.y, wrap_v);
+        texels[i] = texel(map, level, x, y);
+    }
+    vec4 upper = texels[0] + (texels[1] - texels[0]) * weight.x;
+    vec4 lower = texels[2] + (texels[3] - texels[2]) * weight.x;
     return upper + (lower - upper) * weight.y;
+}
+
+// The texture's value in its largest level.
+vec4 sample_finest(Texture map, vec2 uv) {
+    precise float u = map.m00 * uv.x + map.m01 * uv.y + map.offset_u;
+    precise float v = map.m10 * uv.x + map.m11 * uv.y + map.offset_v;
+    return sample_level(map, 0u, vec2(u, v));
 }
 
 // The linear colour and the opacity of a texture. lod: the level, of which a fraction blends two levels. It is bounded
@@ -95,10 +101,13 @@ vec4 sample_texture(Texture map, vec2 uv, float lod) {
     precise float v = map.m10 * uv.x + map.m11 * uv.y + map.offset_v;
     uint steps = lod > 0.0 ? uint(min(lod, float(map.n_levels - 1u)) * 256.0 + 0.5) : 0u;
     uint level = steps >> 8u;
-    vec4 fine = sample_level(map, level, vec2(u, v));
-    if ((steps & 255u) == 0u) return fine;
-    vec4 coarse = sample_level(map, level + 1u, vec2(u, v));
-    return fine + (coarse - fine) * (float(steps & 255u) * (1.0 / 256.0));
+    float share = float(steps & 255u) * (1.0 / 256.0);
+    vec4 levels[2];
+    for (uint i = 0u; i < 2u; ++i) {
+        // Where the share is 0, the second level need not exist.
+        levels[i] = i == 0u || share > 0.0 ? sample_level(map, level + i, vec2(u, v)) : levels[0];
+    }
+    return levels[0] + (levels[1] - levels[0]) * share;
 }
 
 // The number that a texture of one number shows. value: from sample_texture.
