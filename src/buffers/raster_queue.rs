@@ -44,7 +44,8 @@ impl RasterQueue {
 
     /// Whether the device can bind the buffer for `n_triangles` large triangles.
     pub fn has_room(context: &Context, n_triangles: usize) -> bool {
-        let n_bytes = (STATE_LEN as u64 + n_triangles as u64).saturating_mul(size_of::<LargeTriangle>() as u64);
+        let n_bytes =
+            (STATE_LEN as u64).saturating_add(n_triangles as u64).saturating_mul(size_of::<LargeTriangle>() as u64);
         n_bytes <= context.limits().storage_range
     }
 
