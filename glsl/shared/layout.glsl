@@ -149,7 +149,7 @@
 #define SRGB_TABLE_SIZE 256u
 // `Texture.flags`, bits 0..1: what the texture shows outside of 0 to 1 along u, `WRAP_REPEAT` and its like.
 #define TEXTURE_WRAP_U_SHIFT 0u
-// `Texture.flags`, bits 2..3: the same along v.
+// `Texture.flags`, bits 2..3: what the texture shows outside of 0 to 1 along v.
 #define TEXTURE_WRAP_V_SHIFT 2u
 // The bits of one direction's wrap, once they are shifted down.
 #define TEXTURE_WRAP_MASK 3u
@@ -435,7 +435,7 @@ struct CornerSurface {
 
 // `MaterialMaps.flags`: rays pass through the surface where its opacity is below `alpha_cutoff`.
 #define MAPS_CUTOUT 1u
-// `MaterialMaps.flags`: shadow rays do so.
+// `MaterialMaps.flags`: shadow rays, but no others, pass through the surface where its opacity is below `alpha_cutoff`.
 #define MAPS_VEIL 2u
 // `MaterialMaps.flags`: the opacity of the base colour's texture counts.
 #define MAPS_COLOUR_HAS_OPACITY 4u

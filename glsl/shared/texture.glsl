@@ -63,7 +63,7 @@ uint wrapped(int index, uint n, uint wrap) {
     return min(uint(index), n - 1u);
 }
 
-// The colour of a level at a place, with the texture's transform applied.
+// The colour of a level at a place. place: coordinates to which the texture's transform has been applied already.
 vec4 sample_level(Texture map, uint level, vec2 place) {
     uvec2 size = size_of_level(map, level);
     uint wrap_u = wrap_of(map, TEXTURE_WRAP_U_SHIFT);

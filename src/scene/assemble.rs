@@ -151,9 +151,9 @@ fn add_materials(
     Ok(indices)
 }
 
-/// Adds a mesh to the scene, or of a glTF file all meshes with their materials, but neither lights nor cameras. Returns
-/// the number of triangles that a generator made for it. `n_generated` is the
-/// number that generators have made for the scene's earlier meshes.
+/// Adds a mesh to the scene. Of a glTF file it adds all meshes with their materials, and leaves out lights and cameras.
+/// Returns the number of triangles that a generator made for the mesh. `n_generated` is the number that generators have
+/// made for the scene's earlier meshes.
 fn add_mesh(
     file: &File,
     scene: &mut Scene,

@@ -2,8 +2,8 @@
 //!
 //! Each level is half as wide and half as high as the level before it, rounded down. A texel is the mean of the texels
 //! that lie under it, each weighted by its area. Where a side is odd, a texel covers between two and three others along
-//! it. The mean is one of light, so colours are decoded before and encoded after. It is weighted by opacity, since the
-//! colour of what cannot be seen must not show in the neighbourhood.
+//! it. The mean is one of light, so colours are decoded before and encoded after. It is weighted by opacity:
+//! otherwise the hidden colour of transparent texels would bleed into the visible ones.
 
 use std::sync::LazyLock;
 
