@@ -29,11 +29,11 @@ layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock
 
 // Computes the segment to the light. Returns false if the surface faces away from the light or would not show it.
 bool shadow_segment(PathRay ray, Hit hit, Light light, out PathRay segment) {
-    Surface surface;
-    Material material;
-    shaded_at(ray, hit, surface, material);
+    Triangle t = triangle_at(hit.triangle_ix);
+    Surface surface = surface_at(ray, hit, t);
     LightSample to_light = sample_light(light, surface.point_world);
     if (!(dot(surface.interpolated, to_light.direction) > 0.0)) return false;
+    Material material = material_at(ray, hit, t, surface);
     if (!can_show(material, surface.shading, -ray.direction, to_light.direction)) return false;
     vec3 origin = lit_point(surface, hit, to_light.direction);
     origin += surface.clearance * surface.geometric;

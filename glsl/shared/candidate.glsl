@@ -1,9 +1,8 @@
 // Candidates, which are the triangles that a search comes to, and their test against the nearest hit so far. A part
 // of accel.glsl.
 //
-// Needs scene.glsl, triangle.glsl, traversal_ray.glsl, local_memory.glsl and PASSES_VEILS. Provides `Nearest`,
-// `intersect`,
-// `is_better`, `is_accepted` and `is_done`.
+// Needs scene.glsl, triangle.glsl, traversal_ray.glsl, local_memory.glsl and PASSES_VEILS, whether the rays are shadow
+// rays, which pass through veils. Provides `Nearest`, `intersect`, `is_better`, `has_gaps`, `is_accepted` and `is_done`.
 
 #include "cutout.glsl"
 
@@ -24,10 +23,16 @@ bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
     return t > ray.t_min && nearer && triangle_ix != ray.source_triangle;
 }
 
-// Whether a hit counts. Without SKIPS_HIDDEN and CUTOUTS every hit does, and nothing is read. u, v: barycentric weights
-// of the hit.
+// Whether the rays pass through parts of triangles.
+bool has_gaps() {
+    if (PASSES_VEILS) return SHADOW_GAPS;
+    return CUTOUTS;
+}
+
+// Whether a hit counts. Without SKIPS_HIDDEN and gaps every hit does, and nothing is read. u, v: barycentric weights of
+// the hit.
 bool is_accepted(uint triangle_ix, float u, float v) {
-    if (CUTOUTS) return !is_cut_out(triangle_ix, u, v, PASSES_VEILS);
+    if (has_gaps()) return !is_gap(triangle_ix, u, v, PASSES_VEILS);
     if (SKIPS_HIDDEN) return (load_triangle_materials(triangle_ix) & TRIANGLE_HIDDEN) == 0u;
     return true;
 }

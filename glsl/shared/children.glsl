@@ -8,9 +8,11 @@
 #include "material.glsl"
 #include "maps.glsl"
 
-// Whether a child ray of this weight has a throughput above 0 in any colour.
-bool carries_light(PathRay ray, vec3 weight) {
-    return any(greaterThan(ray.throughput * weight, vec3(0.0)));
+// The weight of a child ray, or 0 if its throughput is negligible in all colours. Only surfaces of microfacets have
+// negligible children other than those without light: the model of MTL stays exact.
+vec3 kept_weight(PathRay ray, Material material, vec3 weight) {
+    float least = is_microfacet(material) ? LEAST_THROUGHPUT : 0.0;
+    return any(greaterThan(ray.throughput * weight, vec3(least))) ? weight : vec3(0.0);
 }
 
 // How the ray continues from its hit.
@@ -19,8 +21,8 @@ Scattering scattering_at(PathRay ray, Hit hit, out Surface surface) {
     shaded_at(ray, hit, surface, material);
     Scattering next = scatter(material, surface, ray.direction);
     vec3 unabsorbed_share = unabsorbed(material, surface, hit.t);
-    next.reflected_weight *= unabsorbed_share;
-    next.transmitted_weight *= unabsorbed_share;
+    next.reflected_weight = kept_weight(ray, material, next.reflected_weight * unabsorbed_share);
+    next.transmitted_weight = kept_weight(ray, material, next.transmitted_weight * unabsorbed_share);
     return next;
 }
 
@@ -32,8 +34,8 @@ uint child_kinds_of(PathRay ray, Hit hit) {
     if (!may_scatter) return 0u;
     Surface surface;
     Scattering next = scattering_at(ray, hit, surface);
-    return (carries_light(ray, next.reflected_weight) ? CHILD_REFLECTED : 0u)
-         | (carries_light(ray, next.transmitted_weight) ? CHILD_TRANSMITTED : 0u);
+    return (next.reflected_weight != vec3(0.0) ? CHILD_REFLECTED : 0u)
+         | (next.transmitted_weight != vec3(0.0) ? CHILD_TRANSMITTED : 0u);
 }
 
 #endif

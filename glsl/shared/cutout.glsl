@@ -1,7 +1,8 @@
-// Cut-outs: the parts of a triangle in which there is no surface, since the opacity of its texture is too low. Rays of
-// every kind pass through them. Twin of src/reference/cutout.rs.
+// Gaps: the parts of a triangle through which rays pass, since the opacity there is too low. Rays of every kind pass
+// through the gaps of a cut-out, a material that is either opaque or not there. Shadow rays also pass through those of a
+// veil, a see-through material. Twin of src/reference/cutout.rs.
 //
-// Needs nothing: it includes texture.glsl. Provides `CUTOUTS`, `opacity_at` and `is_cut_out`.
+// Needs nothing: it includes texture.glsl. Provides `CUTOUTS`, `SHADOW_GAPS`, `opacity_at` and `is_gap`.
 #ifndef KDRAY_CUTOUT
 #define KDRAY_CUTOUT
 
@@ -10,6 +11,7 @@
 #include "texture.glsl"
 
 layout(constant_id = CONSTANT_CUTOUTS) const bool CUTOUTS = false;
+layout(constant_id = CONSTANT_SHADOW_GAPS) const bool SHADOW_GAPS = false;
 
 // The opacity at a point of a triangle, 0..1, by the largest levels of its textures.
 float opacity_at(MaterialMaps maps, uint triangle_ix, float u, float v) {
@@ -27,13 +29,12 @@ float opacity_at(MaterialMaps maps, uint triangle_ix, float u, float v) {
     return opacity;
 }
 
-// Whether a ray passes through a triangle at a point. passes_veils: whether the ray also passes through see-through
-// surfaces with an opacity below LEAST_SHADOWING_OPACITY.
-bool is_cut_out(uint triangle_ix, float u, float v, bool passes_veils) {
+// Whether a ray passes through a triangle at a point. passes_veils: whether the gaps of veils count, too.
+bool is_gap(uint triangle_ix, float u, float v, bool passes_veils) {
     uint material_ix = load_triangle_materials(triangle_ix);
     uint kinds = passes_veils ? MAPS_CUTOUT | MAPS_VEIL : MAPS_CUTOUT;
+    if ((map_flags_of(material_ix) & kinds) == 0u) return false;
     MaterialMaps maps = maps_of(material_ix);
-    if ((maps.flags & kinds) == 0u) return false;
     return opacity_at(maps, triangle_ix, u, v) < maps.alpha_cutoff;
 }
 

@@ -88,6 +88,9 @@
 // Reflectance, 2^-64, below which light is never visible. Outside its small bright spot, a narrow highlight reflects
 // less than this. Hits that reflect no more of a light trace no shadow ray to it.
 #define LEAST_REFLECTANCE 5.421011e-20
+// Throughput below which the children of a ray at a surface of microfacets are dropped. Such a surface reflects a little
+// at each hit, so the number of rays would double from bounce to bounce.
+#define LEAST_THROUGHPUT 0.0009765625
 // Lower bound of the cosine between an interpolated normal and the direction to the ray's origin. The bound is needed
 // because an interpolated normal can point away from the viewer.
 #define LEAST_COSINE 1.0e-4
@@ -684,8 +687,12 @@ struct AccelConstants {
 #define CONSTANT_TEXTURED 24u
 // Whether the scene has materials of microfacets.
 #define CONSTANT_MICROFACETS 25u
-// Whether rays pass through parts of triangles (cutout.glsl).
+// Whether rays of all kinds pass through parts of triangles: whether there are cut-outs (cutout.glsl).
 #define CONSTANT_CUTOUTS 26u
+// Whether some triangles have normals at their corners.
+#define CONSTANT_SMOOTH 22u
+// Whether shadow rays pass through parts of triangles: whether there are cut-outs or veils.
+#define CONSTANT_SHADOW_GAPS 23u
 
 // Whether rays pass through triangles with `TRIANGLE_HIDDEN` in `triangle_materials`.
 #define CONSTANT_SKIPS_HIDDEN 28u

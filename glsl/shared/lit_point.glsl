@@ -8,6 +8,8 @@
 #include "scene.glsl"
 #include "surface.glsl"
 
+layout(constant_id = CONSTANT_SMOOTH) const bool SMOOTH = true;
+
 // The part of p, relative to a corner, that is not below the plane through the corner with the normal of that corner.
 vec3 above_corner(vec3 p, vec3 corner, uint normal, vec3 interpolated) {
     vec3 n = decode_normal(normal);
@@ -23,6 +25,7 @@ vec3 above_corner(vec3 p, vec3 corner, uint normal, vec3 interpolated) {
 //
 // Corners are loaded one after the other: all three at once would take registers, which shadow rays need.
 vec3 lit_point(Surface s, Hit hit, vec3 to_light) {
+    if (!SMOOTH) return s.point_world;
     float span = PLANE_START_COSINE - CURVED_START_COSINE;
     float share = clamp((PLANE_START_COSINE - dot(s.geometric, to_light)) / span, 0.0, 1.0);
     if (!(share > 0.0)) return s.point_world;
@@ -32,7 +35,8 @@ vec3 lit_point(Surface s, Hit hit, vec3 to_light) {
         vec4 row = load_triangles(3u * hit.triangle_ix + corner);
         uint normal = floatBitsToUint(row.w);
         if (normal == FLAT_NORMAL) return s.point_world;
-        curved += weights[corner] * above_corner(s.point_world, row.xyz, normal, s.interpolated);
+        curved += weights.x * above_corner(s.point_world, row.xyz, normal, s.interpolated);
+        weights = weights.yzx;
     }
     return s.point_world + share * (curved - s.point_world);
 }

@@ -105,26 +105,27 @@ vec3 mapped_normal(MaterialMaps maps, vec4 value, TextureHit hit, Surface surfac
     return length_squared > LEAST_NORMAL_SQUARED ? front * bent * inversesqrt(length_squared) : surface.interpolated;
 }
 
-// Multiplies the material's terms by its textures and by the colours of the triangle's corners.
+// Multiplies the material's terms by its textures and by the colours of the triangle's corners. Images of floats can
+// have any values, which are bounded to those that make sense.
 void apply_maps(MaterialMaps maps, vec4 values[N_MAPS], TextureHit hit, inout Material material) {
     vec4 corner_colour = corner_colour_at(hit.triangle_ix, hit.u, hit.v);
     vec4 map_colour = values[MAP_BASE_COLOUR];
-    vec3 base = corner_colour.rgb * map_colour.rgb;
+    vec3 base = corner_colour.rgb * max(map_colour.rgb, 0.0);
     material.kd *= base;
     // What is left of a surface with cut-outs is opaque.
     if ((maps.flags & MAPS_CUTOUT) == 0u) {
         if ((maps.flags & MAPS_CORNERS_HAVE_OPACITY) != 0u) material.d *= corner_colour.a;
         if ((maps.flags & MAPS_COLOUR_HAS_OPACITY) != 0u) material.d *= map_colour.a;
-        material.d *= values[MAP_OPACITY].x;
+        material.d = clamp(material.d * values[MAP_OPACITY].x, 0.0, 1.0);
     }
-    material.ks *= values[MAP_SPECULAR].rgb * values[MAP_SPECULAR_FACTOR].x;
-    material.ke *= values[MAP_EMISSION].rgb;
-    float rough = values[MAP_ROUGHNESS].x;
-    material.roughness *= rough;
+    material.ks *= max(values[MAP_SPECULAR].rgb * values[MAP_SPECULAR_FACTOR].x, 0.0);
+    material.ke *= max(values[MAP_EMISSION].rgb, 0.0);
+    float rough = max(values[MAP_ROUGHNESS].x, 0.0);
+    material.roughness = min(material.roughness * rough, 1.0);
     material.ns = max(material.ns * rough, 1.0);
-    material.metallic *= values[MAP_METALLIC].x;
-    material.transmission *= values[MAP_TRANSMISSION].x;
-    material.ka *= 1.0 + maps.occlusion_strength * (values[MAP_OCCLUSION].x - 1.0);
+    material.metallic *= clamp(values[MAP_METALLIC].x, 0.0, 1.0);
+    material.transmission *= clamp(values[MAP_TRANSMISSION].x, 0.0, 1.0);
+    material.ka *= 1.0 + maps.occlusion_strength * (clamp(values[MAP_OCCLUSION].x, 0.0, 1.0) - 1.0);
     if (!is_microfacet(material)) material.ka *= base;
 }
 
@@ -148,12 +149,11 @@ float bump_shadowing(Surface surface, vec3 to_light) {
     return share;
 }
 
-// The surface and its material at a ray's hit.
-void shaded_at(PathRay ray, Hit hit, out Surface surface, out Material material) {
-    Triangle t = triangle_at(hit.triangle_ix);
+// The material at a hit. If it has a normal map, the surface's shading normal becomes that of the map. t: the triangle
+// that is hit.
+Material material_at(PathRay ray, Hit hit, Triangle t, inout Surface surface) {
     uint material_ix = load_triangle_materials(hit.triangle_ix);
-    surface = surface_at(ray, hit, t);
-    material = materials[material_ix];
+    Material material = materials[material_ix];
     if (TEXTURED) {
         MaterialMaps maps = maps_of(material_ix);
         TextureHit at = texture_hit(ray, hit, t, surface);
@@ -161,6 +161,14 @@ void shaded_at(PathRay ray, Hit hit, out Surface surface, out Material material)
         apply_maps(maps, values, at, material);
         surface.shading = mapped_normal(maps, values[MAP_NORMAL], at, surface);
     }
+    return material;
+}
+
+// The surface and its material at a ray's hit.
+void shaded_at(PathRay ray, Hit hit, out Surface surface, out Material material) {
+    Triangle t = triangle_at(hit.triangle_ix);
+    surface = surface_at(ray, hit, t);
+    material = material_at(ray, hit, t, surface);
 }
 
 #endif

@@ -19,16 +19,16 @@ struct Scattering {
     vec3 transmitted_weight;
 };
 
-// The weight of the light that the surface itself reflects and emits. A see-through material (d < 1) covers only a
-// share d of what is behind it. A material that refracts shows its own light in full.
-float local_weight(Material material) {
-    if (is_microfacet(material)) return material.d;
-    return (material.flags & MATERIAL_REFRACT) != 0u ? 1.0 : material.d;
-}
-
 // Whether the surface shows its colour without any light.
 bool is_unlit(Material material) {
     return MICROFACETS && (material.flags & MATERIAL_UNLIT) != 0u;
+}
+
+// The weight of the light that the surface itself reflects and emits. A see-through material (d < 1) covers only a
+// share d of what is behind it. A material that refracts shows its own light in full.
+float local_weight(Material material) {
+    if (is_microfacet(material) || is_unlit(material)) return material.d;
+    return (material.flags & MATERIAL_REFRACT) != 0u ? 1.0 : material.d;
 }
 
 // Whether rays may continue from the surface.
@@ -120,7 +120,7 @@ Scattering scatter_by_microfacets(Material material, Surface surface, vec3 direc
     s.reflected_weight = material.d * (total ? 1.0 : mirror_share(material)) * reflected;
     // A ray through a solid is tinted twice, where it enters and where it leaves.
     vec3 tint = is_solid ? sqrt(material.kd) : material.kd;
-    s.transmitted_weight = material.d * through * (1.0 - dielectric) * tint + (1.0 - material.d);
+    s.transmitted_weight = material.d * through * (1.0 - largest_of(dielectric)) * tint + (1.0 - material.d);
     if (is_solid && !total) {
         vec3 refracted = eta * direction + (eta * cos_in - cos_out) * surface.shading;
         s.transmitted = keep_side(normalize(refracted), -surface.geometric);

@@ -1,8 +1,8 @@
 // The parts of `texture_words`: the texels of images, and what leads from a triangle to them. The array begins with the
 // linear values of the 256 bytes of sRGB (src/world/levels.rs). The other parts begin where `accel` says.
 //
-// Needs nothing: it includes scene.glsl. Provides `TEXTURED`, `load_texels`, `texture_at`, `maps_of`, `uv_at`,
-// `corner_uv`, `corner_surface` and `corner_colour_at`.
+// Needs nothing: it includes scene.glsl. Provides `TEXTURED`, `load_texels`, `texture_at`, `maps_of`,
+// `map_flags_of`, `uv_at`, `corner_uv`, `corner_surface` and `corner_colour_at`.
 #ifndef KDRAY_TEXTURE_WORDS
 #define KDRAY_TEXTURE_WORDS
 
@@ -39,6 +39,11 @@ MaterialMaps maps_of(uint material_ix) {
         load_float(at + 10u), load_float(at + 11u), load_float(at + 12u), load_float(at + 13u),
         load_texture_words(at + 14u), 0u
     );
+}
+
+// `MaterialMaps.flags` of a material.
+uint map_flags_of(uint material_ix) {
+    return load_texture_words(accel.material_maps_begin + 16u * material_ix + 14u);
 }
 
 // Texture coordinates of a corner of a triangle, 0..2.

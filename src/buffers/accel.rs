@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::{
     Stalls,
     scene_arrays::{Content, Contents, SceneAccess, SceneArrays},
+    surface_kinds::SurfaceKinds,
     texture_words::TextureWords,
 };
 use crate::{
@@ -17,8 +18,8 @@ use crate::{
     },
     gpu::{Binding, Buffer, BufferUse, Constants, Context, GpuError, Timer},
     layout::{
-        AccelConstants, BIND_ACCEL, BIND_STALLS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, LeafTriangle, MATERIAL_MICROFACET,
-        MATERIAL_UNLIT, NO_WORDS, Slab, TRIANGLE_HIDDEN, Triangle, constants,
+        AccelConstants, BIND_ACCEL, BIND_STALLS, BRUTE_MAX_TRIANGLES, KD_WORD_DEPTH, LeafTriangle, NO_WORDS, Slab,
+        TRIANGLE_HIDDEN, Triangle, constants,
     },
     passes::grid::GridBuilder,
     world::{Geometry, World},
@@ -51,10 +52,7 @@ pub struct AccelBuffers {
     structure: Structure,
     /// Whether rays pass through some of the triangles.
     filters: bool,
-    /// Whether some materials are not those of MTL: of microfacets, or unlit.
-    has_microfacets: bool,
-    /// Whether textures cut out parts of triangles.
-    has_cutouts: bool,
+    surface_kinds: SurfaceKinds,
     /// The contents of `constants`.
     uploaded: AccelConstants,
 }
@@ -78,9 +76,7 @@ impl AccelBuffers {
         let mut made = Self::with_room(context, world.geometry(), words.len())?;
         made.add_materials(context, &scene.triangle_materials)?;
         made.add_textures(context, &words)?;
-        made.has_microfacets =
-            scene.materials.iter().any(|material| material.flags & (MATERIAL_MICROFACET | MATERIAL_UNLIT) != 0);
-        made.has_cutouts = scene.textures.has_cutouts();
+        made.surface_kinds = SurfaceKinds::of(scene);
         Ok(made)
     }
 
@@ -188,8 +184,7 @@ impl AccelBuffers {
             stalls: Stalls::new(context)?,
             access,
             filters: false,
-            has_microfacets: false,
-            has_cutouts: false,
+            surface_kinds: SurfaceKinds::default(),
             structure,
             uploaded,
         };
@@ -269,15 +264,14 @@ impl AccelBuffers {
             Structure::KdTree { mask_words } => (mask_words, 0),
             Structure::Grid { n_levels } => (1, n_levels),
         };
-        Constants::new()
+        let constants = Constants::new()
             .set(constants::READING, self.access.constant())
             .set(constants::SKIPS_HIDDEN, self.filters)
             .set(constants::MASK_WORDS, mask_words)
             .set(constants::GRID_LEVELS, n_levels)
             .set(constants::TEXTURED, self.uploaded.material_maps_begin != NO_WORDS)
-            .set(constants::MICROFACETS, self.has_microfacets)
-            .set(constants::CUTOUTS, self.has_cutouts)
-            .set(constants::TURN_BUDGET, self.stalls.turn_budget())
+            .set(constants::TURN_BUDGET, self.stalls.turn_budget());
+        self.surface_kinds.set(constants)
     }
 
     /// Uploads the constants, with the arrays' addresses if kernels read by address. They go to a new buffer, since

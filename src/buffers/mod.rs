@@ -8,6 +8,7 @@
 //! raster_queue    large triangles, between the two kernels that rasterize
 //! vertex_indices  the index buffer of the triangles that the graphics pipeline rasterizes
 //! texture_words   textures, and what leads from triangles to them
+//! surface_kinds   which kinds of surfaces a scene has, as specialization constants
 //! stalls          rays that have spent a dispatch's loop turns
 //! resources       all of these, with the frame's descriptor set
 //! grid            the build of a grid
@@ -23,6 +24,7 @@ mod raster_queue;
 mod resources;
 mod scene_arrays;
 mod stalls;
+mod surface_kinds;
 mod texture_words;
 mod vertex_indices;
 

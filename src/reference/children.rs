@@ -6,16 +6,23 @@ use super::{
     inputs::KernelInputs,
     maps::shaded_at,
     material::{Scattering, scatter, scatters_light, unabsorbed},
+    microfacet::is_microfacet,
     surface::Surface,
 };
-use crate::layout::{CHILD_REFLECTED, CHILD_TRANSMITTED, Hit, NO_TRIANGLE, PathRay};
+use crate::layout::{CHILD_REFLECTED, CHILD_TRANSMITTED, Hit, LEAST_THROUGHPUT, Material, NO_TRIANGLE, PathRay};
+
+/// The weight of a child ray, or 0 if its throughput is negligible in all colours.
+fn kept_weight(ray: &PathRay, material: &Material, weight: Vec3) -> Vec3 {
+    let least = if is_microfacet(material) { LEAST_THROUGHPUT } else { 0.0 };
+    if (ray.throughput * weight).cmpgt(Vec3::splat(least)).any() { weight } else { Vec3::ZERO }
+}
 
 fn scattering_at(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> (Surface, Scattering) {
     let (surface, material) = shaded_at(inputs, ray, hit);
     let mut next = scatter(&material, &surface, ray.direction);
     let unabsorbed_share = unabsorbed(&material, &surface, hit.t);
-    next.reflected_weight *= unabsorbed_share;
-    next.transmitted_weight *= unabsorbed_share;
+    next.reflected_weight = kept_weight(ray, &material, next.reflected_weight * unabsorbed_share);
+    next.transmitted_weight = kept_weight(ray, &material, next.transmitted_weight * unabsorbed_share);
     (surface, next)
 }
 
@@ -28,10 +35,9 @@ pub fn child_kinds_of(inputs: &KernelInputs, ray: &PathRay, hit: &Hit) -> u32 {
     if inputs.textures.is_none() && !scatters_light(inputs.material_at(hit)) {
         return 0;
     }
-    let carries_light = |weight: Vec3| (ray.throughput * weight).cmpgt(Vec3::ZERO).any();
     let (_, next) = scattering_at(inputs, ray, hit);
-    let reflected = if carries_light(next.reflected_weight) { CHILD_REFLECTED } else { 0 };
-    let transmitted = if carries_light(next.transmitted_weight) { CHILD_TRANSMITTED } else { 0 };
+    let reflected = if next.reflected_weight != Vec3::ZERO { CHILD_REFLECTED } else { 0 };
+    let transmitted = if next.transmitted_weight != Vec3::ZERO { CHILD_TRANSMITTED } else { 0 };
     reflected | transmitted
 }
 

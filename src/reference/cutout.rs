@@ -1,5 +1,4 @@
-//! Cut-outs: the parts of a triangle in which there is no surface, since the opacity of its texture is too low. Twin of
-//! `cutout.glsl`.
+//! Gaps: the parts of a triangle through which rays pass, since the opacity there is too low. Twin of `cutout.glsl`.
 
 use super::texture::{sample_texture, scalar_of, uv_set_of};
 use crate::{
@@ -30,9 +29,9 @@ pub fn opacity_at(textures: &Textures, maps: &MaterialMaps, triangle_ix: u32, at
     opacity
 }
 
-/// Whether a ray passes through a triangle at a point. `passes_veils`: whether the ray also passes through see-through
-/// surfaces with an opacity below `LEAST_SHADOWING_OPACITY`.
-pub fn is_cut_out(textures: &Textures, material_ix: u32, triangle_ix: u32, at: [f32; 2], passes_veils: bool) -> bool {
+/// Whether a ray passes through a triangle at a point. `passes_veils`: whether the ray is a shadow ray, which also
+/// passes through see-through surfaces with an opacity below `LEAST_SHADOWING_OPACITY`.
+pub fn is_gap(textures: &Textures, material_ix: u32, triangle_ix: u32, at: [f32; 2], passes_veils: bool) -> bool {
     let kinds = if passes_veils { MAPS_CUTOUT | MAPS_VEIL } else { MAPS_CUTOUT };
     let maps = &textures.material_maps[material_ix as usize];
     maps.flags & kinds != 0 && opacity_at(textures, maps, triangle_ix, at) < maps.alpha_cutoff

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::counting::table::{Counted, CountedSlice, NoCounter, ReadCounts};
-use super::cutout::is_cut_out;
+use super::cutout::is_gap;
 use crate::{
     accel::{
         Accel,
@@ -84,7 +84,7 @@ impl<'a, R> KernelInputs<'a, R> {
     fn is_solid_at(&self, hit: &Hit) -> bool {
         let word = self.triangle_materials[hit.triangle_ix as usize];
         match self.cutouts {
-            Some(textures) => !is_cut_out(textures, word, hit.triangle_ix, [hit.u, hit.v], self.passes_veils),
+            Some(textures) => !is_gap(textures, word, hit.triangle_ix, [hit.u, hit.v], self.passes_veils),
             None => word & TRIANGLE_HIDDEN == 0,
         }
     }
@@ -98,7 +98,7 @@ impl<'a> KernelInputs<'a> {
             triangle_materials: &scene.triangle_materials,
             materials: &scene.materials,
             textures: scene.textures.is_in_use().then_some(&scene.textures),
-            cutouts: scene.textures.has_cutouts().then_some(&scene.textures),
+            cutouts: scene.textures.has_shadow_gaps().then_some(&scene.textures),
             lights: &scene.lights,
             frame: Some(frame),
             ..Self::of_geometry(world.geometry())

@@ -98,11 +98,12 @@ impl TextureHit<'_> {
         if squared > LEAST_NORMAL_SQUARED { front * bent * (1.0 / squared.sqrt()) } else { surface.interpolated }
     }
 
-    /// Multiplies the material's terms by its textures and by the colours of the triangle's corners.
+    /// Multiplies the material's terms by its textures and by the colours of the triangle's corners. Values that make
+    /// no sense are bounded.
     fn apply_maps(&self, maps: &MaterialMaps, material: &mut Material) {
         let corner_colour = self.textures.corner_colour_at(self.triangle_ix, self.u, self.v);
         let map_colour = if maps.base_colour == NO_TEXTURE { Vec4::ONE } else { self.map_at(maps.base_colour) };
-        let base = corner_colour.truncate() * map_colour.truncate();
+        let base = corner_colour.truncate() * map_colour.truncate().max(Vec3::ZERO);
         material.kd *= base;
         if maps.flags & MAPS_CUTOUT == 0 {
             if maps.flags & MAPS_CORNERS_HAVE_OPACITY != 0 {
@@ -111,16 +112,16 @@ impl TextureHit<'_> {
             if maps.flags & MAPS_COLOUR_HAS_OPACITY != 0 {
                 material.d *= map_colour.w;
             }
-            material.d *= self.factor_at(maps.opacity);
+            material.d = (material.d * self.factor_at(maps.opacity)).clamp(0.0, 1.0);
         }
-        material.ks *= self.colour_at(maps.specular) * self.factor_at(maps.specular_factor);
-        material.ke *= self.colour_at(maps.emission);
-        let rough = self.factor_at(maps.roughness);
-        material.roughness *= rough;
+        material.ks *= (self.colour_at(maps.specular) * self.factor_at(maps.specular_factor)).max(Vec3::ZERO);
+        material.ke *= self.colour_at(maps.emission).max(Vec3::ZERO);
+        let rough = self.factor_at(maps.roughness).max(0.0);
+        material.roughness = (material.roughness * rough).min(1.0);
         material.ns = (material.ns * rough).max(1.0);
-        material.metallic *= self.factor_at(maps.metallic);
-        material.transmission *= self.factor_at(maps.transmission);
-        material.ka *= 1.0 + maps.occlusion_strength * (self.factor_at(maps.occlusion) - 1.0);
+        material.metallic *= self.factor_at(maps.metallic).clamp(0.0, 1.0);
+        material.transmission *= self.factor_at(maps.transmission).clamp(0.0, 1.0);
+        material.ka *= 1.0 + maps.occlusion_strength * (self.factor_at(maps.occlusion).clamp(0.0, 1.0) - 1.0);
         if !is_microfacet(material) {
             material.ka *= base;
         }

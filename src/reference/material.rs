@@ -28,7 +28,7 @@ pub struct Scattering {
 /// The weight of the light that the surface itself reflects and emits. A see-through material (d < 1) covers only a
 /// share d of what is behind it. A material that refracts shows its own light in full.
 pub fn local_weight(material: &Material) -> f32 {
-    if is_microfacet(material) {
+    if is_microfacet(material) || is_unlit(material) {
         return material.d;
     }
     if material.flags & MATERIAL_REFRACT != 0 { 1.0 } else { material.d }
@@ -156,7 +156,7 @@ fn scatter_by_microfacets(material: &Material, surface: &Surface, direction: Vec
             true => keep_side(refracted.normalize(), -surface.geometric),
             false => direction,
         },
-        transmitted_weight: material.d * through * (1.0 - dielectric) * tint + (1.0 - material.d),
+        transmitted_weight: material.d * through * (1.0 - dielectric.max_element()) * tint + (1.0 - material.d),
     }
 }
 

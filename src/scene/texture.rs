@@ -22,6 +22,16 @@ impl Image {
     pub(crate) fn encoding(&self, wanted: Encoding) -> Encoding {
         if self.is_linear { Encoding::Linear } else { wanted }
     }
+
+    /// Returns whether some pixel is not opaque. This looks at all pixels.
+    pub(crate) fn is_see_through(&self) -> bool {
+        /// 1 as a half-precision float.
+        const ONE: u16 = 0x3c00;
+        match &self.pixels {
+            Pixels::Bytes(pixels) => pixels.iter().any(|pixel| pixel[3] != u8::MAX),
+            Pixels::Halves(pixels) => pixels.iter().any(|pixel| pixel[3] != ONE),
+        }
+    }
 }
 
 /// The pixels of an image: red, green, blue and opacity, not premultiplied.

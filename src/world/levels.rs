@@ -2,8 +2,7 @@
 //!
 //! Each level is half as wide and half as high as the level before it, rounded down. A texel is the mean of the texels
 //! that lie under it, each weighted by its area. Where a side is odd, a texel covers between two and three others along
-//! it. The mean is one of light, so colours are decoded before and encoded after. It is weighted by opacity:
-//! otherwise the hidden colour of transparent texels would bleed into the visible ones.
+//! it. The mean is one of light, so colours are decoded before and encoded after.
 
 use std::sync::LazyLock;
 
@@ -86,6 +85,16 @@ impl Coding {
     }
 }
 
+/// Which texels the mean colour of a smaller level is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Mean {
+    /// All texels alike.
+    OfAll,
+    /// Each texel as much as it is opaque. Otherwise the hidden colour of transparent texels would bleed into the
+    /// visible ones.
+    OfSeen,
+}
+
 /// Returns half-precision floats in two words, red in the lowest bits. All of them are finite.
 fn packed(texel: [f32; 4]) -> [u32; 2] {
     let half = |value: f32| if value.is_nan() { 0.0 } else { value.clamp(-MAX_HALF, MAX_HALF) };
@@ -107,7 +116,7 @@ pub(super) fn n_words(image: &Image, coding: Coding) -> u64 {
 
 /// Writes an image's levels to `words`, which [`n_words`] counts, after the table of where each begins. `first_word`:
 /// index of the first one of these words in the array.
-pub(super) fn write(image: &Image, encoding: Encoding, words: &mut [u32], first_word: u32) {
+pub(super) fn write(image: &Image, encoding: Encoding, mean: Mean, words: &mut [u32], first_word: u32) {
     let coding = Coding::of(image, encoding);
     let sizes: Vec<_> = sizes(image.width, image.height).collect();
     let (table, mut rest) = words.split_at_mut(sizes.len());
@@ -121,7 +130,7 @@ pub(super) fn write(image: &Image, encoding: Encoding, words: &mut [u32], first_
         }
         *entry = begin;
         begin += level.len() as u32;
-        before = Some(Level { words: level, size, coding });
+        before = Some(Level { words: level, size, coding, mean });
         rest = after;
     }
 }
@@ -148,6 +157,7 @@ struct Level<'a> {
     words: &'a [u32],
     size: [u32; 2],
     coding: Coding,
+    mean: Mean,
 }
 
 impl Level<'_> {
@@ -165,7 +175,7 @@ impl Level<'_> {
 
     /// Returns the mean of the texels under a texel of the next level.
     fn mean(&self, columns: &Taps, rows: &Taps) -> [f32; 4] {
-        let (mut seen, mut plain, mut opacity) = ([0.0; 3], [0.0; 3], 0.0);
+        let (mut seen, mut all, mut opacity) = ([0.0; 3], [0.0; 3], 0.0);
         for (y, row_weight) in rows.iter() {
             for (x, column_weight) in columns.iter() {
                 let n_words = self.coding.n_words();
@@ -176,12 +186,15 @@ impl Level<'_> {
                 let weight = area * a.max(0.0);
                 for (i, c) in [r, g, b].into_iter().enumerate() {
                     seen[i] += weight * c;
-                    plain[i] += area * c;
+                    all[i] += area * c;
                 }
                 opacity += weight;
             }
         }
-        let [r, g, b] = if opacity > 0.0 { seen.map(|sum| sum / opacity) } else { plain };
+        let [r, g, b] = match self.mean {
+            Mean::OfSeen if opacity > 0.0 => seen.map(|sum| sum / opacity),
+            _ => all,
+        };
         [r, g, b, opacity]
     }
 }
@@ -223,8 +236,12 @@ mod tests {
 
     /// Returns the levels of an image as bytes.
     fn levels(image: &Image, encoding: Encoding) -> Vec<Vec<[u8; 4]>> {
+        levels_by(image, encoding, Mean::OfSeen)
+    }
+
+    fn levels_by(image: &Image, encoding: Encoding, mean: Mean) -> Vec<Vec<[u8; 4]>> {
         let mut words = vec![0; n_words(image, Coding::of(image, encoding)) as usize];
-        write(image, encoding, &mut words, 1000);
+        write(image, encoding, mean, &mut words, 1000);
         let sizes: Vec<_> = sizes(image.width, image.height).map(|[w, h]| (w * h) as usize).collect();
         let mut begin = sizes.len();
         let of_level = |(level, n): (usize, &usize)| {
@@ -283,5 +300,11 @@ mod tests {
         assert_eq!(levels(&weighted, Encoding::Linear)[1], [[175, 0, 0, 102]]);
         let unseen = image(2, 1, vec![[100, 0, 0, 0], [200, 0, 0, 0]]);
         assert_eq!(levels(&unseen, Encoding::Linear)[1], [[150, 0, 0, 0]]);
+    }
+
+    #[test]
+    fn data_beside_opacity_is_averaged_plainly() {
+        let roughness = image(2, 1, vec![[100, 0, 0, 0], [200, 0, 0, 255]]);
+        assert_eq!(levels_by(&roughness, Encoding::Linear, Mean::OfAll)[1], [[150, 0, 0, 128]]);
     }
 }

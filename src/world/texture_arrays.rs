@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{
     Mismatch,
-    levels::{self, Coding},
+    levels::{self, Coding, Mean},
 };
 use crate::{
     layout::{
@@ -46,10 +46,28 @@ pub fn texture_arrays(scene: &Scene) -> Result<(TextureArrays, Vec<MaterialMaps>
     Ok((TextureArrays { texels: layout.texels(), textures: textures.list }, maps))
 }
 
-/// An image in one of its encodings, and where its levels are in the array of texels.
+/// How the levels of an image are made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Making {
+    image_ix: u32,
+    encoding: Encoding,
+    mean: Mean,
+}
+
+impl Making {
+    /// `texture`: one of the material's.
+    fn of(texture: &scene::Texture, material: &Material, image: &Image) -> Self {
+        let is_colour = material.maps.base_colour.as_ref().is_some_and(|map| std::ptr::eq(map, texture));
+        // Elsewhere, the opacity of an image says nothing about its other channels.
+        let mean = if is_colour && material.alpha != Alpha::Opaque { Mean::OfSeen } else { Mean::OfAll };
+        Self { image_ix: texture.image_ix, encoding: image.encoding(texture.encoding), mean }
+    }
+}
+
+/// An image's levels, and where they are in the array of texels.
 struct Stored<'a> {
     image: &'a Image,
-    encoding: Encoding,
+    making: Making,
     first_word: u32,
     n_words: usize,
 }
@@ -58,8 +76,8 @@ struct Stored<'a> {
 struct TexelLayout<'a> {
     /// In the order of the array.
     list: Vec<Stored<'a>>,
-    /// Index into `list` for each image's index and encoding.
-    ix_of: HashMap<(u32, Encoding), usize>,
+    /// Index into `list`.
+    ix_of: HashMap<Making, usize>,
     n_words: usize,
 }
 
@@ -69,19 +87,18 @@ impl<'a> TexelLayout<'a> {
         let mut n_words = levels::SRGB.len() as u64;
         for (material_ix, material) in scene.materials.iter().enumerate() {
             for texture in material.maps.textures() {
-                let image_ix = texture.image_ix;
                 let image = image_of(scene, material_ix, texture)?;
-                let encoding = image.encoding(texture.encoding);
-                if ix_of.contains_key(&(image_ix, encoding)) {
+                let making = Making::of(texture, material, image);
+                if ix_of.contains_key(&making) {
                     continue;
                 }
-                let n_levels_words = levels::n_words(image, Coding::of(image, encoding));
-                let stored = Stored { image, encoding, first_word: n_words as u32, n_words: n_levels_words as usize };
+                let n_levels_words = levels::n_words(image, Coding::of(image, making.encoding));
+                let stored = Stored { image, making, first_word: n_words as u32, n_words: n_levels_words as usize };
                 n_words += n_levels_words;
                 if n_words > MAX_WORDS {
                     return Err(Mismatch::Textures(format!("they need more than {MAX_WORDS} words")));
                 }
-                ix_of.insert((image_ix, encoding), list.len());
+                ix_of.insert(making, list.len());
                 list.push(stored);
             }
         }
@@ -107,7 +124,8 @@ impl<'a> TexelLayout<'a> {
             rest = after;
         }
         parts.into_par_iter().for_each(|(stored, words)| {
-            levels::write(stored.image, stored.encoding, words, stored.first_word);
+            let Making { encoding, mean, .. } = stored.making;
+            levels::write(stored.image, encoding, mean, words, stored.first_word);
         });
         texels
     }
@@ -148,7 +166,7 @@ impl Textures {
     /// Returns the textures of a material, and lists those that are new.
     fn maps_of(&mut self, material: &Material, scene: &Scene, layout: &TexelLayout) -> MaterialMaps {
         let mut index = |texture: &Option<scene::Texture>| match texture {
-            Some(texture) => self.index_of(texture_of(texture, scene, layout)),
+            Some(texture) => self.index_of(texture_of(texture, material, scene, layout)),
             None => NO_TEXTURE,
         };
         let maps = &material.maps;
@@ -180,11 +198,11 @@ impl Textures {
     }
 }
 
-/// Returns a texture as kernels read it.
-fn texture_of(texture: &scene::Texture, scene: &Scene, layout: &TexelLayout) -> Texture {
+/// Returns a texture of a material as kernels read it.
+fn texture_of(texture: &scene::Texture, material: &Material, scene: &Scene, layout: &TexelLayout) -> Texture {
     let image = &scene.images[texture.image_ix as usize];
-    let encoding = image.encoding(texture.encoding);
-    let stored = &layout.list[layout.ix_of[&(texture.image_ix, encoding)]];
+    let making = Making::of(texture, material, image);
+    let stored = &layout.list[layout.ix_of[&making]];
     let (matrix, offset) = (texture.transform.matrix2, texture.transform.translation);
     Texture {
         m00: matrix.x_axis.x,
@@ -195,7 +213,7 @@ fn texture_of(texture: &scene::Texture, scene: &Scene, layout: &TexelLayout) -> 
         m11: matrix.y_axis.y,
         offset_v: offset.y,
         size: image.width | image.height << 16,
-        flags: flags_of(texture, Coding::of(image, encoding)),
+        flags: flags_of(texture, Coding::of(image, making.encoding)),
         n_levels: levels::sizes(image.width, image.height).count() as u32,
         reserved0: 0,
         reserved1: 0,
@@ -281,6 +299,25 @@ pub(crate) mod tests {
         assert_eq!(mirrored.flags & (TEXTURE_UV_SET | TEXTURE_SRGB), TEXTURE_UV_SET | TEXTURE_SRGB);
         assert_eq!(arrays.texels[255], 1.0_f32.to_bits());
         assert_eq!(arrays.texels[256..259], [259, 267, 269]);
+    }
+
+    #[test]
+    fn only_see_through_colours_are_averaged_by_opacity() {
+        let texture = || Some(scene::Texture::of_image(0));
+        let leaf = with(|it| {
+            (it.maps.base_colour, it.maps.emission, it.alpha) = (texture(), texture(), Alpha::Cutout(0.5));
+        });
+        let bark = with(|it| (it.maps.base_colour, it.alpha) = (texture(), Alpha::Opaque));
+        let pixels = Pixels::Bytes(vec![[200, 0, 0, 255], [0, 0, 0, 0]]);
+        let (arrays, maps) =
+            texture_arrays(&scene_of(vec![Image { pixels, ..image(2, 1) }], vec![leaf, bark])).unwrap();
+        let smaller_level = |map: u32| {
+            let first = arrays.textures[map as usize].first_texel as usize;
+            arrays.texels[arrays.texels[first + 1] as usize].to_le_bytes()
+        };
+        assert_eq!(smaller_level(maps[0].base_colour), [200, 0, 0, 128]);
+        assert_eq!(smaller_level(maps[0].emission), [146, 0, 0, 128]);
+        assert_eq!(maps[1].base_colour, maps[0].emission);
     }
 
     #[test]

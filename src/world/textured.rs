@@ -15,7 +15,8 @@ use crate::{
         CornerSurface, LEAST_SHADOWING_OPACITY, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_CUTOUT,
         MAPS_VEIL, MaterialMaps, NO_TEXTURE, Texture,
     },
-    scene::{Alpha, Material, Pixels, Scene},
+    scene::{Alpha, Image, Material, Scene},
+    util::memory,
 };
 
 /// Everything that textures need. All of it is empty if the scene has neither textures nor colours at corners.
@@ -60,12 +61,16 @@ impl Textures {
         let all_textures = || scene.materials.iter().flat_map(|material| material.maps.textures());
         let n_sets = all_textures().map(|texture| texture.uv_set as usize + 1).max().unwrap_or(0).min(2);
         let has_normals = scene.materials.iter().any(|material| material.maps.normal.is_some());
+        let has_corners = has_colours || has_normals;
+        let n_bytes = n_bytes_of_corners(scene.n_triangles(), n_sets, has_corners);
+        memory::require("texture coordinates, tangents and colours", n_bytes)
+            .map_err(|error| Mismatch::Textures(error.to_string()))?;
         let made = Self {
             texels,
             textures,
             material_maps,
             uvs: uvs(scene, n_sets),
-            corners: if has_colours || has_normals { corner_surfaces(scene) } else { Vec::new() },
+            corners: if has_corners { corner_surfaces(scene) } else { Vec::new() },
             n_triangles: scene.n_triangles(),
         };
         match made.n_bytes() / 4 {
@@ -86,8 +91,13 @@ impl Textures {
         (of_textures + size_of_val(&uvs[..]) + size_of_val(&corners[..])) as u64
     }
 
-    /// Returns whether some rays pass through parts of triangles.
+    /// Returns whether rays of all kinds pass through parts of triangles.
     pub fn has_cutouts(&self) -> bool {
+        self.material_maps.iter().any(|maps| maps.flags & MAPS_CUTOUT != 0)
+    }
+
+    /// Returns whether shadow rays pass through parts of triangles.
+    pub fn has_shadow_gaps(&self) -> bool {
         self.material_maps.iter().any(|maps| maps.flags & (MAPS_CUTOUT | MAPS_VEIL) != 0)
     }
 
@@ -120,6 +130,13 @@ impl Textures {
         let linear = |byte: u32| f32::from_bits(self.texels[(byte & 255) as usize]);
         Vec4::new(linear(colour), linear(colour >> 8), linear(colour >> 16), (colour >> 24) as f32 * (1.0 / 255.0))
     }
+}
+
+/// Returns the size of all that is stored for each corner of each triangle, bytes.
+fn n_bytes_of_corners(n_triangles: usize, n_uv_sets: usize, has_corners: bool) -> u64 {
+    let of_uvs = n_uv_sets * size_of::<[Vec2; 3]>();
+    let of_corners = if has_corners { size_of::<[CornerSurface; 3]>() } else { 0 };
+    n_triangles as u64 * (of_uvs + of_corners) as u64
 }
 
 /// Sets how a material's opacity acts on rays. `corners_have_opacity`: whether colours at corners of the scene's meshes
@@ -156,9 +173,5 @@ fn set_opacity(maps: &mut MaterialMaps, material: &Material, scene: &Scene, corn
 /// Returns whether the image of the base colour is not opaque.
 fn colours_are_see_through(material: &Material, scene: &Scene) -> bool {
     let image = material.maps.base_colour.as_ref().and_then(|map| scene.images.get(map.image_ix as usize));
-    image.is_some_and(|image| match &image.pixels {
-        Pixels::Bytes(pixels) => pixels.iter().any(|pixel| pixel[3] < 255),
-        // 1 as a half-precision float.
-        Pixels::Halves(pixels) => pixels.iter().any(|pixel| pixel[3] < 0x3c00),
-    })
+    image.is_some_and(Image::is_see_through)
 }
