@@ -14,6 +14,18 @@ use std::{
     path::{Path, PathBuf},
 };
 
+/// The kernels that traverse. Each has a second module, `NAME_gaps.comp`, whose rays pass through parts of triangles
+/// (the macro `WITH_GAPS`). That code is inlined wherever a triangle is tested, so it would make the modules for scenes
+/// without gaps half as large again, and drivers compile them that much longer.
+const TRAVERSING: [&str; 3] = ["cast", "shadow", "trace"];
+
+/// A module of SPIR-V: a shader, compiled with or without `WITH_GAPS`.
+struct Module {
+    name: String,
+    path: PathBuf,
+    with_gaps: bool,
+}
+
 fn main() {
     let out_dir = env::var("OUT_DIR").expect("cargo sets OUT_DIR");
     let out_dir = Path::new(&out_dir);
@@ -32,12 +44,11 @@ fn main() {
     fs::write(out_dir.join("layout.rs"), layout).expect("write layout.rs");
 
     let compiler = shaderc::Compiler::new().expect("shaderc");
-    for path in shaders_in_order() {
-        let name = path.file_name().and_then(|n| n.to_str()).expect("a shader's name is UTF-8").to_owned();
-        match compile(&compiler, &path, &name) {
+    for module in modules() {
+        match compile(&compiler, &module) {
             Ok(spirv) => {
                 name_compiler(&spirv);
-                fs::write(out_dir.join(format!("{name}.spv")), spirv).expect("write SPIR-V");
+                fs::write(out_dir.join(format!("{}.spv", module.name)), spirv).expect("write SPIR-V");
             }
             // Each line of the compiler's output becomes an error of its own, so that an editor can jump to its
             // place.
@@ -63,8 +74,7 @@ fn layout_in_rust() -> Result<String, String> {
 fn constants_of_shaders(layout: &str) -> Result<String, String> {
     let numbers = specialization::numbers(layout)?;
     let mut shaders = Vec::new();
-    for path in shaders_in_order() {
-        let name = path.file_name().and_then(|name| name.to_str()).expect("a shader's name is UTF-8").to_owned();
+    for Module { name, path, .. } in modules() {
         let mut declarations = Vec::new();
         for file in with_includes(&path) {
             let source = fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
@@ -95,6 +105,20 @@ fn name_compiler(spirv: &[u8]) {
     println!("cargo::rustc-env=KDRAY_SPIRV_COMPILER=SPIR-V {:#x}, generator {:#010x}", word(1), word(2));
 }
 
+/// Returns all modules, in a fixed order.
+fn modules() -> Vec<Module> {
+    let mut modules = Vec::new();
+    for path in shaders_in_order() {
+        let name = path.file_name().and_then(|name| name.to_str()).expect("a shader's name is UTF-8").to_owned();
+        let kernel = name.strip_suffix(".comp").filter(|kernel| TRAVERSING.contains(kernel));
+        if let Some(kernel) = kernel {
+            modules.push(Module { name: format!("{kernel}_gaps.comp"), path: path.clone(), with_gaps: true });
+        }
+        modules.push(Module { name, path, with_gaps: false });
+    }
+    modules
+}
+
 /// Returns the paths of all shaders, in a fixed order.
 fn shaders_in_order() -> Vec<PathBuf> {
     let mut shaders: Vec<_> = ["glsl/passes", "glsl/probes", "glsl/driver"]
@@ -106,8 +130,9 @@ fn shaders_in_order() -> Vec<PathBuf> {
     shaders
 }
 
-/// Compiles a shader for Vulkan 1.3, optimized. `#include "x.glsl"` reads from glsl/shared.
-fn compile(compiler: &shaderc::Compiler, path: &Path, name: &str) -> Result<Vec<u8>, String> {
+/// Compiles a module for Vulkan 1.3, optimized. `#include "x.glsl"` reads from glsl/shared.
+fn compile(compiler: &shaderc::Compiler, module: &Module) -> Result<Vec<u8>, String> {
+    let Module { name, path, with_gaps } = module;
     let kind = match path.extension().and_then(|e| e.to_str()) {
         Some("comp") => shaderc::ShaderKind::Compute,
         Some("vert") => shaderc::ShaderKind::Vertex,
@@ -121,6 +146,9 @@ fn compile(compiler: &shaderc::Compiler, path: &Path, name: &str) -> Result<Vec<
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
     options.set_optimization_level(shaderc::OptimizationLevel::Performance);
     options.set_warnings_as_errors();
+    if *with_gaps {
+        options.add_macro_definition("WITH_GAPS", None);
+    }
     options.set_include_callback(|include, _, _, _| {
         let path = Path::new("glsl/shared").join(include);
         let content = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;

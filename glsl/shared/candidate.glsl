@@ -2,7 +2,7 @@
 // of accel.glsl.
 //
 // Needs scene.glsl, triangle.glsl, traversal_ray.glsl, local_memory.glsl and PASSES_VEILS, whether the rays are shadow
-// rays, which pass through veils. Provides `Nearest`, `intersect`, `is_better`, `has_gaps`, `is_accepted` and `is_done`.
+// rays, which pass through veils. Provides `Nearest`, `intersect`, `is_better`, `has_gaps`, `is_accepted`, `is_done`.
 
 #include "cutout.glsl"
 
@@ -23,10 +23,15 @@ bool is_better(TraversalRay ray, float t, uint triangle_ix, Nearest best) {
     return t > ray.t_min && nearer && triangle_ix != ray.source_triangle;
 }
 
-// Whether the rays pass through parts of triangles.
+// Whether the rays pass through parts of triangles. Only modules that are compiled with WITH_GAPS have the code for it
+// (build.rs).
 bool has_gaps() {
+#ifdef WITH_GAPS
     if (PASSES_VEILS) return SHADOW_GAPS;
     return CUTOUTS;
+#else
+    return false;
+#endif
 }
 
 // Whether a hit counts. Without SKIPS_HIDDEN and gaps every hit does, and nothing is read. u, v: barycentric weights of

@@ -1,6 +1,6 @@
 // Gaps: the parts of a triangle through which rays pass, since the opacity there is too low. Rays of every kind pass
-// through the gaps of a cut-out, a material that is either opaque or not there. Shadow rays also pass through those of a
-// veil, a see-through material. Twin of src/reference/cutout.rs.
+// through the gaps of a cut-out, a material that is either opaque or not there. Shadow rays also pass through the gaps
+// of a veil, a see-through material. Twin of src/reference/cutout.rs.
 //
 // Needs nothing: it includes texture.glsl. Provides `CUTOUTS`, `SHADOW_GAPS`, `opacity_at` and `is_gap`.
 #ifndef KDRAY_CUTOUT

@@ -88,8 +88,8 @@
 // Reflectance, 2^-64, below which light is never visible. Outside its small bright spot, a narrow highlight reflects
 // less than this. Hits that reflect no more of a light trace no shadow ray to it.
 #define LEAST_REFLECTANCE 5.421011e-20
-// Throughput below which the children of a ray at a surface of microfacets are dropped. Such a surface reflects a little
-// at each hit, so the number of rays would double from bounce to bounce.
+// Throughput below which the children of a ray at a surface of microfacets are dropped. Such a surface reflects a
+// little at each hit, so the number of rays would double from bounce to bounce.
 #define LEAST_THROUGHPUT 0.0009765625
 // Lower bound of the cosine between an interpolated normal and the direction to the ray's origin. The bound is needed
 // because an interpolated normal can point away from the viewer.

@@ -31,9 +31,13 @@ impl Cast {
         traversal: Traversal,
         query: Query,
     ) -> Result<Self, GpuError> {
+        let shader = match bindings.sets(constants::CUTOUTS) {
+            true => spirv!("cast_gaps.comp"),
+            false => spirv!("cast.comp"),
+        };
         let constants = traversal_constants(context, traversal)?.set(constants::ANY_HIT, query == Query::Any);
         let n_lanes = context.n_lanes()?;
-        Ok(Self { kernel: kernel(context, bindings, "cast", spirv!("cast.comp"), &constants)?, n_lanes })
+        Ok(Self { kernel: kernel(context, bindings, "cast", shader, &constants)?, n_lanes })
     }
 
     /// Returns the driver's statistics of the compiled kernel.

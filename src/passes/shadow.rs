@@ -22,9 +22,13 @@ impl Shadow {
         bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
+        let shader = match bindings.sets(constants::SHADOW_GAPS) {
+            true => spirv!("shadow_gaps.comp"),
+            false => spirv!("shadow.comp"),
+        };
         // `COUNTS` is not set, since the pass shade counts the segments.
         let constants = traversal_constants(context, options.traversal)?.set(constants::COUNT_COSTS, options.features);
-        Ok(Self { kernel: kernel(context, bindings, "shadow", spirv!("shadow.comp"), &constants)? })
+        Ok(Self { kernel: kernel(context, bindings, "shadow", shader, &constants)? })
     }
 
     /// Needs `rays` and `hits` of all bounces of the batch. Leaves `light_visibility`; a segment that has stalled

@@ -23,12 +23,16 @@ impl Trace {
         bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
+        let shader = match bindings.sets(constants::CUTOUTS) {
+            true => spirv!("trace_gaps.comp"),
+            false => spirv!("trace.comp"),
+        };
         let constants = traversal_constants(context, options.traversal)?
             .set(constants::COUNTS, options.profile)
             .set(constants::COUNT_COSTS, options.features);
         let from = |camera: bool| {
             let constants = constants.clone().set(constants::FROM_CAMERA, camera);
-            kernel(context, bindings, "trace", spirv!("trace.comp"), &constants)
+            kernel(context, bindings, "trace", shader, &constants)
         };
         let from_camera = (options.primary == Primary::Trace).then(|| from(true)).transpose()?;
         Ok(Self { kernel: from(false)?, from_camera })
