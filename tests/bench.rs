@@ -18,13 +18,12 @@ use kdray::{
         traversal::Tracers,
         variant::Variant,
     },
-    gpu::{Context, ContextOptions},
     layout::{Hit, NO_TRIANGLE, PathRay},
     reference::traverser::{Tracer, Traverser},
     world::{FlatScene, World},
 };
 use serde_json::Value;
-use support::{meshes::torus, scenes};
+use support::{device, meshes::torus, scenes};
 use tempfile::TempDir;
 
 const SIZE: (u32, u32) = (33, 23);
@@ -99,7 +98,7 @@ fn a_slow_variant_warms_up_with_fewer_casts_than_a_fast_one() {
     let triangles = torus(100, 100);
     let scene = FlatScene { triangle_materials: vec![0; triangles.len()], triangles, ..mesh() };
     let stage = Stage::in_room(scene, SIZE, &BuildOptions::default());
-    let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
+    let context = device();
     let variants = [Traversal::Mask, Traversal::Brute].map(Variant::KdTree);
     let mut tracers = Tracers::new(Some(&context), &stage, &variants).unwrap();
     let [primary, ..] = ray_sets(&stage);

@@ -8,7 +8,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     accel::{Query, kdtree::Traversal},
     cast::{Caster, Hit, NO_TRIANGLE, Ray, cast_on_cpu},
-    gpu::{Context, ContextOptions},
+    gpu::Context,
     layout::{KD_MAX_DEPTH, KD_WORD_DEPTH, PathRay},
     reference::{search_ray::SearchRay, traversal_ray::near_scene},
 };
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use support::{
     MeshWithTree,
     chain::chain,
-    compare, meshes,
+    compare, device, meshes,
     random::Random,
     rays::{nasty_ray, ray},
     with_lanes,
@@ -29,7 +29,7 @@ struct Device(Arc<Context>);
 
 impl Device {
     fn new() -> Self {
-        Self(Context::new(&ContextOptions::new(None, true)).expect("a device with validation"))
+        Self(device())
     }
 
     /// Opens a device that runs kernels as a GPU of `n_lanes` lanes does, whatever it is.

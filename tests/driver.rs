@@ -30,15 +30,11 @@ use kdray::{
 use serde_json::Value;
 use support::{
     command::{fail, names, stdout, succeed},
-    scenes,
+    device, scenes,
 };
 use tempfile::TempDir;
 
 const SIZE: (u32, u32) = (40, 30);
-
-fn context() -> Arc<Context> {
-    Context::new(&ContextOptions::new(None, true)).expect("a device with validation")
-}
 
 fn stage() -> Stage {
     Stage::in_room(scenes::mixed(), SIZE, &BuildOptions::default())
@@ -100,7 +96,7 @@ impl Contender for Idle {
 
 /// Runs two kernels on the same set of rays, in place of the driver and its rival.
 fn trials(stage: &Stage, rivals: &Stage, set: &RaySet) -> Vec<ContenderResult> {
-    let context = context();
+    let context = device();
     let contenders =
         vec![walker(&context, stage, set, Traversal::Stack), walker(&context, rivals, set, Traversal::Mask)];
     let mut pauses = Vec::new();
@@ -150,7 +146,7 @@ fn a_wrong_tree_is_noticed() {
 
 #[test]
 fn a_contender_that_writes_nothing_is_noticed() {
-    let (stage, context) = (stage(), context());
+    let (stage, context) = (stage(), device());
     for set in &ray_sets(&stage) {
         let mut contenders = [walker(&context, &stage, set, Traversal::Mask)];
         let right = run_contest(&context, &contenders, 1, |_| Ok(())).expect("a contest").remove(0).hits;
@@ -164,7 +160,7 @@ fn a_contender_that_writes_nothing_is_noticed() {
 
 #[test]
 fn rasterized_primary_rays_are_timed() {
-    let (stage, context) = (stage(), context());
+    let (stage, context) = (stage(), device());
     let set = &ray_sets(&stage)[0];
     let primary = SetResult::new(set.kind, &trials(&stage, &stage, set));
     let mut rasters = Raster::all(&context, &stage).expect("renderers");

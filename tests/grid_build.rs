@@ -7,24 +7,15 @@ use std::sync::Arc;
 use glam::{Vec3, vec3};
 use kdray::{
     accel::grid::{Grid, GridLevels, GridOptions},
-    gpu::{Buffer, BufferUse, Context, ContextOptions, DeviceOverrides, Timer},
+    gpu::{Buffer, BufferUse, Context, DeviceOverrides, Timer},
     layout::{GRID_BLOCK_SIZE, GRID_GROUPS_X, GRID_MAX_SORT_GROUPS, GridCell, LeafTriangle, Plane, Triangle},
     passes::grid::{DeviceGrid, GridBuilder},
 };
-use support::{meshes, random::Random};
+use support::{assert_silent, device, meshes, random::Random};
 
 /// Returns the options of both kinds of grids, each with its name.
 fn kinds() -> [(&'static str, GridOptions); 2] {
     [("uniform", GridOptions::uniform()), ("two levels", GridOptions::two_level())]
-}
-
-fn device() -> Arc<Context> {
-    Context::new(&ContextOptions::new(None, true)).expect("a device with validation")
-}
-
-fn assert_silent(context: &Context) {
-    let messages = context.validation_messages();
-    assert!(messages.is_empty(), "{} messages: {}", messages.len(), messages.join("\n"));
 }
 
 /// The content of a grid, by which two grids are compared.

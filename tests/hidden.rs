@@ -7,7 +7,6 @@ use glam::Vec3;
 use kdray::{
     accel::{Query, kdtree::Traversal},
     cast::{Caster, CpuCaster, Hit, NO_TRIANGLE, Ray},
-    gpu::{Context, ContextOptions},
     layout::{TRIANGLE_HIDDEN, Triangle},
     reference::{
         brute,
@@ -16,7 +15,7 @@ use kdray::{
         traverser::{Tracer, Traverser},
     },
 };
-use support::{MeshWithTree, compare, meshes, random::Random, rays::nasty_ray};
+use support::{MeshWithTree, compare, device, meshes, random::Random, rays::nasty_ray};
 
 const MISS: Hit = Hit { t: f32::INFINITY, triangle_ix: NO_TRIANGLE, u: 0.0, v: 0.0 };
 
@@ -71,7 +70,7 @@ fn occluded(hits: &[Hit]) -> Vec<bool> {
 
 #[test]
 fn the_device_finds_what_is_not_hidden() {
-    let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
+    let context = device();
     let n_outliers = |n_rays: usize| if context.is_software() { 0 } else { n_rays.div_ceil(500) };
     for case in cases() {
         let rays = case.rays();

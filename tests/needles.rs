@@ -7,12 +7,11 @@ use glam::{DVec3, Vec3};
 use kdray::{
     accel::{Query, kdtree::Traversal},
     cast::{Caster, Ray, cast_on_cpu},
-    gpu::{Context, ContextOptions},
     layout::{Hit, NO_TRIANGLE, PathRay, Triangle},
     reference::triangle::Shear,
 };
 use support::{
-    MeshWithTree, compare,
+    MeshWithTree, compare, device,
     meshes::triangle,
     packets::{levels, traced},
     random::Random,
@@ -241,7 +240,7 @@ fn cast_ray(ray: &PathRay) -> Ray {
 #[test]
 fn needles_in_a_tree_are_hit_where_they_are() {
     const N_RAYS_A_NEEDLE: usize = 25;
-    let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
+    let context = device();
     // This device runs kernels with branches, as GPUs do.
     let with_lanes = with_lanes(5000);
     let ways = [(&context, Traversal::Mask), (&context, Traversal::Stack), (&with_lanes, Traversal::Ropes)];

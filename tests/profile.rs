@@ -8,7 +8,7 @@ use std::{collections::BTreeSet, fs, path::Path, sync::Arc};
 use kdray::{
     cpu::{self, Batching},
     frame::{BounceStats, Pass, PassTime, Primary, Profile, RenderOptions, Scope, View},
-    gpu::{Context, ContextOptions},
+    gpu::Context,
     layout::Counters,
     render::Renderer,
     world::FlatScene,
@@ -16,7 +16,7 @@ use kdray::{
 use serde_json::Value;
 use support::{
     command::{cornell, fail, succeed},
-    scenes, world_of,
+    device, scenes, world_of,
 };
 use tempfile::TempDir;
 
@@ -24,10 +24,6 @@ const N_PIXELS: u32 = 40 * 30;
 
 fn options() -> RenderOptions {
     RenderOptions { width: 40, height: 30, max_depth: 4, ..RenderOptions::default() }
-}
-
-fn context() -> Arc<Context> {
-    Context::new(&ContextOptions::new(None, true)).expect("a device with validation")
 }
 
 fn renderer(context: &Arc<Context>, scene: &FlatScene, options: &RenderOptions, capacity: u32) -> Renderer {
@@ -62,7 +58,7 @@ fn checked_names(profile: &Profile, next: &str) -> Vec<&'static str> {
 
 #[test]
 fn the_table_has_every_pass_and_tracing_takes_all_that_find_primary_hits() {
-    let (scene, context) = (scenes::mixed(), context());
+    let (scene, context) = (scenes::mixed(), device());
     let world = world_of(&scene);
     let mut names = BTreeSet::new();
     for &primary in primaries(&context) {
@@ -85,7 +81,7 @@ fn the_table_has_every_pass_and_tracing_takes_all_that_find_primary_hits() {
 
 #[test]
 fn every_pass_of_every_batch_and_bounce_has_its_rays() {
-    let (scene, context) = (scenes::mixed(), context());
+    let (scene, context) = (scenes::mixed(), device());
     for (primary, capacity) in [(Primary::Raster, 8 * N_PIXELS), (Primary::Trace, N_PIXELS / 3)] {
         let options = RenderOptions { primary, ..options() };
         let profile = renderer(&context, &scene, &options, capacity).draw().expect("a frame");
@@ -120,7 +116,7 @@ fn every_pass_of_every_batch_and_bounce_has_its_rays() {
 
 #[test]
 fn passes_run_one_after_the_other() {
-    let (scene, context) = (scenes::mixed(), context());
+    let (scene, context) = (scenes::mixed(), device());
     let profile = renderer(&context, &scene, &options(), 8 * N_PIXELS).draw().expect("a frame");
     let spans: Vec<_> = profile.passes.iter().map(|p| (p.start_ms.unwrap(), p.ms.unwrap())).collect();
     assert_eq!(spans[0].0, 0.0);
@@ -134,7 +130,7 @@ fn passes_run_one_after_the_other() {
 /// same.
 #[test]
 fn without_a_profile_nothing_is_measured() {
-    let (scene, context) = (scenes::mixed(), context());
+    let (scene, context) = (scenes::mixed(), device());
     for capacity in [8 * N_PIXELS, N_PIXELS / 3] {
         let mut measured = renderer(&context, &scene, &options(), capacity);
         let mut bare = renderer(&context, &scene, &RenderOptions { profile: false, ..options() }, capacity);
@@ -234,7 +230,7 @@ fn the_trace_has_a_slice_for_each_pass_within_its_bounce() {
 #[test]
 fn reported_rates_count_every_pass_that_finds_primary_hits() {
     let directory = TempDir::new().unwrap();
-    for primary in primaries(&context()) {
+    for primary in primaries(&device()) {
         let (profile, _) = measure(directory.path(), &["--primary", &primary.to_string()]);
         let passes = profile["passes"].as_array().unwrap();
         let n_primary = passes.iter().position(|pass| pass["name"] == "compact_reduce").unwrap();

@@ -15,21 +15,15 @@ use kdray::{
     render::Renderer,
     world::Geometry,
 };
-use support::{MeshWithTree, compare, meshes, pretended, random::Random, rays::nasty_ray, scenes, world_of};
+use support::{
+    MeshWithTree, assert_silent, compare, device, meshes, pretended, random::Random, rays::nasty_ray, scenes, world_of,
+};
 
 /// Opens the device as it is.
-fn plain_device() -> Arc<Context> {
-    pretended(DeviceOverrides::default())
-}
-
 /// Opens a device that ends shaders after `loop_limit` turns. With `n_lanes` it is a GPU of that many lanes, in place
 /// of a software driver.
 fn limited_device(loop_limit: u32, n_lanes: Option<u32>, n_stall_slots: Option<usize>) -> Arc<Context> {
     pretended(DeviceOverrides { loop_limit: Some(loop_limit), n_lanes, n_stall_slots, ..DeviceOverrides::default() })
-}
-
-fn assert_silent(context: &Context) {
-    assert_eq!(context.validation_messages(), Vec::<String>::new());
 }
 
 fn cast(context: &Arc<Context>, world: &MeshWithTree, traversal: Traversal, query: Query, rays: &[Ray]) -> Vec<Hit> {
@@ -79,7 +73,7 @@ fn n_right(n: usize, hits: &[Hit], query: Query) -> usize {
 fn a_leaf_of_more_triangles_than_a_driver_takes_turns_is_searched_to_its_end() {
     const N: usize = 70_000;
     let (world, rays) = copies(N);
-    let context = plain_device();
+    let context = device();
     for &traversal in Traversal::ALL.iter().filter(|&&traversal| traversal != Traversal::Brute) {
         for query in [Query::Closest, Query::Any] {
             let hits = cast(&context, &world, traversal, query, &rays);
@@ -108,7 +102,7 @@ fn a_leaf_of_more_triangles_than_a_driver_takes_turns_is_searched_to_its_end() {
 fn a_far_soup_of_small_triangles_is_as_on_the_cpu() {
     let world = MeshWithTree::new(meshes::placed(meshes::soup(20_000, 3), 1.0, Vec3::splat(1e7)));
     let rays = nasty_rays(&world, 280);
-    let context = plain_device();
+    let context = device();
     for traversal in [Traversal::OF_SOFTWARE_DRIVERS, Traversal::OF_GPUS] {
         let expected = cast_on_cpu(world.geometry(), traversal, &rays, Query::Closest);
         let hits = cast(&context, &world, traversal, Query::Closest, &rays);
@@ -190,7 +184,7 @@ fn draw(context: &Arc<Context>, options: &RenderOptions) -> (Picture, Vec<Featur
 
 #[test]
 fn interrupted_frames_are_the_same() {
-    let plain = plain_device();
+    let plain = device();
     for (traversal, primary) in [
         (Traversal::Ropes, Primary::Trace),
         (Traversal::Mask, Primary::Raster),

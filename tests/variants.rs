@@ -14,7 +14,7 @@ use kdray::{
     buffers::{Needs, Resources},
     cast::{Caster, Ray},
     frame::RenderOptions,
-    gpu::{Access, Context, ContextOptions, GpuError},
+    gpu::{Access, Context, GpuError},
     layout::{
         BRUTE_MAX_TRIANGLES, Batch, Bounce, Frame, Hit, LIGHT_DIRECTIONAL, LIGHT_LIT, LIGHT_POINT, LIGHT_SHADOWED,
         LIGHT_UNTESTED, Light, NO_TRIANGLE, PathRay, Triangle,
@@ -25,17 +25,13 @@ use kdray::{
     world::{FlatScene, World},
 };
 use support::{
-    MeshWithTree, meshes,
+    MeshWithTree, device, meshes,
     random::Random,
     rays::{N_KINDS, nasty_ray, outward_ray},
     scenes, world_by,
 };
 
 const N_RAYS: usize = 4000;
-
-fn context() -> Arc<Context> {
-    Context::new(&ContextOptions::new(None, true)).expect("a Vulkan driver and the validation layer")
-}
 
 /// Returns a scene of the triangles under a lamp and a sun.
 fn scene(triangles: &[Triangle]) -> FlatScene {
@@ -146,7 +142,7 @@ fn check_against_cpu(name: &str, world: &MeshWithTree, rays: &[PathRay], (found,
 
 #[test]
 fn all_kernels_find_the_same() {
-    let context = context();
+    let context = device();
     check(&context, "torus", meshes::torus(40, 20));
     check(&context, "cube", meshes::cube(9, 0.0));
     check(&context, "soup", meshes::soup(1200, 7));
@@ -157,7 +153,7 @@ fn all_kernels_find_the_same() {
 /// Traces rays from inside a closed mesh at its vertices and edges, through each structure.
 #[test]
 fn rays_from_inside_never_leak() {
-    let context = context();
+    let context = device();
     for (name, triangles) in [("sphere", meshes::cube(20, 1.0)), ("cube", meshes::cube(20, 0.0))] {
         let rays: Vec<Ray> = (0..50_000).map(|i| cast_ray(&outward_ray(&mut Random(i), &triangles))).collect();
         let scene = scene(&triangles);
@@ -184,7 +180,7 @@ fn cast_ray(ray: &PathRay) -> Ray {
 fn a_wrong_bit_is_noticed() {
     let world = MeshWithTree::new(meshes::torus(20, 10));
     let rays: Vec<PathRay> = (0..64).map(|i| nasty_ray(&mut Random(i), &world, i as usize)).collect();
-    let context = context();
+    let context = device();
     let of = |traversal| traced(&context, &world_of_tree(&world), &rays, traversal);
     let expected = of(Traversal::Mask);
     for wrong in 0..4 {
@@ -205,6 +201,6 @@ fn brute_force_refuses_large_meshes() {
     let triangles = vec![meshes::triangle(Vec3::X, Vec3::Y, Vec3::Z); BRUTE_MAX_TRIANGLES as usize + 1];
     let world = world_by(&scene(&triangles), &BuildOptions::fast());
     let options = RenderOptions { width: 8, height: 8, traversal: Traversal::Brute, ..RenderOptions::default() };
-    let refused = Renderer::new(context(), &world, &options).err();
+    let refused = Renderer::new(device(), &world, &options).err();
     assert!(matches!(refused, Some(GpuError::Limit { value: 65_001, limit: 65_000, .. })), "{refused:?}");
 }

@@ -1,6 +1,6 @@
 //! Descriptor set layouts, each shared by several pipelines, and their sets.
 
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 use ash::vk;
 
@@ -70,6 +70,36 @@ impl BindingLayout {
         push_bytes: u32,
         constants: Constants,
     ) -> Result<Arc<Self>, GpuError> {
+        let Layouts { set_layout, pipeline_layout, .. } = Layouts::of(context, kinds, push_bytes)?;
+        let (kinds, context) = (kinds.to_vec(), context.clone());
+        Ok(Arc::new(Self { set_layout, pipeline_layout, kinds, constants, context }))
+    }
+}
+
+/// Vulkan's layouts of a descriptor set and of the pipelines that use it. A context makes them once and keeps them: a
+/// driver can find a compiled pipeline in the context's cache only by the same layout.
+#[derive(Clone)]
+pub(super) struct Layouts {
+    kinds: Vec<(u32, BindingKind)>,
+    push_bytes: u32,
+    set_layout: vk::DescriptorSetLayout,
+    pipeline_layout: vk::PipelineLayout,
+}
+
+impl Layouts {
+    /// Returns the context's layouts of the bindings. They are created if it has none yet.
+    fn of(context: &Context, kinds: &[(u32, BindingKind)], push_bytes: u32) -> Result<Self, GpuError> {
+        let mut made = context.layouts.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = made.iter().find(|known| known.kinds == kinds && known.push_bytes == push_bytes);
+        if let Some(known) = known {
+            return Ok(known.clone());
+        }
+        let layouts = Self::new(context, kinds, push_bytes)?;
+        made.push(layouts.clone());
+        Ok(layouts)
+    }
+
+    fn new(context: &Context, kinds: &[(u32, BindingKind)], push_bytes: u32) -> Result<Self, GpuError> {
         let stages = context.stages();
         let bindings: Vec<_> = kinds
             .iter()
@@ -82,46 +112,41 @@ impl BindingLayout {
             })
             .collect();
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-        // SAFETY: all that the infos point to lives until the calls return, and `Drop` releases what was made.
+        // SAFETY: all that the infos point to lives until the calls return.
         unsafe {
-            let set_layout = context
-                .device
-                .create_descriptor_set_layout(&info, None)
+            let set_layout = (context.device.create_descriptor_set_layout(&info, None))
                 .map_err(GpuError::call("vkCreateDescriptorSetLayout", "bindings"))?;
-            let mut made = Self {
-                set_layout,
-                pipeline_layout: vk::PipelineLayout::null(),
-                kinds: kinds.to_vec(),
-                constants,
-                context: context.clone(),
-            };
             let set_layouts = [set_layout];
             let push = [vk::PushConstantRange::default().stage_flags(stages).size(push_bytes)];
             let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts).push_constant_ranges(&push);
-            made.pipeline_layout = context
-                .device
-                .create_pipeline_layout(&info, None)
-                .map_err(GpuError::call("vkCreatePipelineLayout", "bindings"))?;
-            Ok(Arc::new(made))
+            match context.device.create_pipeline_layout(&info, None) {
+                Ok(pipeline_layout) => Ok(Self { kinds: kinds.to_vec(), push_bytes, set_layout, pipeline_layout }),
+                Err(error) => {
+                    context.device.destroy_descriptor_set_layout(set_layout, None);
+                    Err(GpuError::call("vkCreatePipelineLayout", "bindings")(error))
+                }
+            }
+        }
+    }
+
+    /// Destroys the layouts.
+    ///
+    /// # Safety
+    /// No pipeline or set of the layouts is left, and nobody uses the layouts any more.
+    pub(super) unsafe fn destroy(self, device: &ash::Device) {
+        // SAFETY: the caller guarantees it.
+        unsafe {
+            device.destroy_pipeline_layout(self.pipeline_layout, None);
+            device.destroy_descriptor_set_layout(self.set_layout, None);
         }
     }
 }
 
 impl BindingLayout {
-    /// Returns whether the constant is true in all pipelines of the layout. A constant that the layout does not set is
-    /// not.
-    pub fn sets(&self, constant: Constant<bool>) -> bool {
-        self.constants.value(constant) == Some(1)
-    }
-}
-
-impl Drop for BindingLayout {
-    fn drop(&mut self) {
-        // SAFETY: pipelines and sets hold the layout, so none is left.
-        unsafe {
-            self.context.device.destroy_pipeline_layout(self.pipeline_layout, None);
-            self.context.device.destroy_descriptor_set_layout(self.set_layout, None);
-        }
+    /// Returns the bits of the value that a constant has in all pipelines of the layout. They are 0 if the layout does
+    /// not set it.
+    pub fn value<T>(&self, constant: Constant<T>) -> u32 {
+        self.constants.value(constant).unwrap_or(0)
     }
 }
 
@@ -212,5 +237,23 @@ impl Drop for BindingSet {
     fn drop(&mut self) {
         // SAFETY: the device has ended all work with the set, which is freed with its pool.
         unsafe { self.bindings.context.device.destroy_descriptor_pool(self.pool, None) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::ContextOptions;
+
+    #[test]
+    fn equal_bindings_share_their_layouts() {
+        let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
+        let layout = |kinds: &[_], push_bytes| BindingLayout::new(&context, kinds, push_bytes).expect("a layout");
+        let kinds = [(0, BindingKind::Uniform), (3, BindingKind::Storage)];
+        let first = layout(&kinds, 16).pipeline_layout;
+        assert_eq!(layout(&kinds, 16).pipeline_layout, first);
+        assert_ne!(layout(&kinds, 20).pipeline_layout, first);
+        assert_ne!(layout(&kinds[..1], 16).pipeline_layout, first);
+        assert_eq!(context.validation_messages(), Vec::<String>::new());
     }
 }

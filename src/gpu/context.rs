@@ -11,6 +11,7 @@ use gpu_allocator::vulkan::Allocator;
 
 use super::{
     Commands, DeviceInfo, DeviceOverrides, DeviceSelector, GivenDevice, GpuError, Limits, TimelinePoint,
+    bindings::Layouts,
     commands::CommandBuffer,
     device::{DeviceExtras, Purpose},
     devices::{list, queue_family, select},
@@ -54,6 +55,11 @@ pub struct Context {
     /// (1.3.239) corrupts its heap after some ten thousand labelled command buffers.
     pub(super) has_labels: bool,
     pub(super) command_pool: vk::CommandPool,
+    /// What the driver has compiled for this context. A pipeline that is created again, for other options or another
+    /// renderer, is then taken from there: software drivers need up to a second to compile a kernel.
+    pub(super) pipeline_cache: vk::PipelineCache,
+    /// All layouts that the context has made.
+    pub(super) layouts: Mutex<Vec<Layouts>>,
     pub(super) timestamp_period_ns: f32,
     pub(super) timestamp_valid_bits: u32,
     /// `None` if the context was opened without the driver's ray tracing.
@@ -195,7 +201,7 @@ impl Context {
         let Opened { physical, device, queue, family, info, extras, is_given } = opened;
         let ray_tracing = purpose == Purpose::RayTracing;
         // SAFETY: the physical device belongs to the instance, and the device has a queue of this family.
-        let (families, properties, command_pool) = unsafe {
+        let (families, properties, command_pool, pipeline_cache) = unsafe {
             let pool = vk::CommandPoolCreateInfo::default()
                 .queue_family_index(family as u32)
                 .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER);
@@ -203,6 +209,8 @@ impl Context {
                 instance.raw.get_physical_device_queue_family_properties(physical),
                 instance.raw.get_physical_device_properties(physical),
                 device.create_command_pool(&pool, None).map_err(GpuError::call("vkCreateCommandPool", "kdray"))?,
+                (device.create_pipeline_cache(&vk::PipelineCacheCreateInfo::default(), None))
+                    .map_err(GpuError::call("vkCreatePipelineCache", "kdray"))?,
             )
         };
         let allocator = create_allocator(&instance, &device, physical)?;
@@ -218,6 +226,8 @@ impl Context {
             #[cfg(feature = "view")]
             physical,
             command_pool,
+            pipeline_cache,
+            layouts: Mutex::default(),
             timestamp_period_ns: properties.limits.timestamp_period,
             timestamp_valid_bits: families[family].timestamp_valid_bits,
             queue,
@@ -429,6 +439,9 @@ impl Drop for Context {
             let _ =
                 if self.is_given { self.device.queue_wait_idle(self.queue) } else { self.device.device_wait_idle() };
             ManuallyDrop::drop(&mut self.allocator);
+            let layouts = std::mem::take(&mut *self.layouts.lock().unwrap_or_else(PoisonError::into_inner));
+            layouts.into_iter().for_each(|layouts| layouts.destroy(&self.device));
+            self.device.destroy_pipeline_cache(self.pipeline_cache, None);
             self.device.destroy_command_pool(self.command_pool, None);
             if !self.is_given {
                 self.device.destroy_device(None);

@@ -62,7 +62,7 @@ impl ComputePipeline {
             info = info.push_next(&mut without_checks);
         }
         // SAFETY: all that `info` points to lives until the call returns.
-        let raw = unsafe { context.device.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) }
+        let raw = unsafe { context.device.create_compute_pipelines(context.pipeline_cache, &[info], None) }
             .map_err(|(_, result)| GpuError::call("vkCreateComputePipelines", desc.name)(result))?[0];
         context.set_name(raw, desc.name);
         Ok(Self { raw, bindings: bindings.clone(), name: desc.name, context: context.clone() })
@@ -177,7 +177,7 @@ impl RasterPipeline {
             .layout(bindings.pipeline_layout)
             .push_next(&mut rendering)];
         // SAFETY: all that `info` points to lives until the call returns.
-        let raw = unsafe { context.device.create_graphics_pipelines(vk::PipelineCache::null(), &info, None) }
+        let raw = unsafe { context.device.create_graphics_pipelines(context.pipeline_cache, &info, None) }
             .map_err(|(_, result)| GpuError::call("vkCreateGraphicsPipelines", desc.name)(result))?[0];
         context.set_name(raw, desc.name);
         Ok(Self { raw, _bindings: bindings.clone(), name: desc.name, context: context.clone() })

@@ -110,7 +110,7 @@ impl RayTracingPipeline {
             .groups(&groups)
             .max_pipeline_ray_recursion_depth(1)
             .layout(bindings.pipeline_layout)];
-        let (deferred, cache) = (vk::DeferredOperationKHR::null(), vk::PipelineCache::null());
+        let (deferred, cache) = (vk::DeferredOperationKHR::null(), context.pipeline_cache);
         // SAFETY: all that `info` points to lives until the call returns.
         let raw = unsafe { calls.pipelines.create_ray_tracing_pipelines(deferred, cache, &info, None) }
             .map_err(|(_, result)| GpuError::call("vkCreateRayTracingPipelinesKHR", desc.name)(result))?[0];

@@ -1,30 +1,17 @@
 //! Functions that render pictures in tests, and compare them.
 
-use std::sync::Arc;
-
 use kdray::{
     cpu::{self, Batching},
     frame::{Denoise, Picture, RenderOptions},
-    gpu::{Context, ContextOptions},
     render::Renderer,
     world::FlatScene,
 };
 
-pub use crate::support::world_of;
+pub use crate::support::{assert_silent, device, world_of};
 
 /// Returns options without a noise filter.
 pub fn options(width: u32, height: u32, max_depth: u32) -> RenderOptions {
     RenderOptions { width, height, max_depth, denoise: Denoise::Off, ..RenderOptions::default() }
-}
-
-/// Returns a device that collects validation messages, for `assert_silent`.
-pub fn device() -> Arc<Context> {
-    Context::new(&ContextOptions::new(None, true)).expect("a device with validation")
-}
-
-pub fn assert_silent(context: &Context) {
-    let messages = context.validation_messages();
-    assert!(messages.is_empty(), "{}", messages.join("\n"));
 }
 
 pub fn on_device(scene: &FlatScene, options: &RenderOptions) -> Picture {

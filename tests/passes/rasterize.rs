@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec3, uvec2, vec3};
 use kdray::{
     frame::{Crop, Primary, RenderOptions, plan},
-    gpu::{Access, Commands, Context, ContextOptions, GpuError},
+    gpu::{Access, Commands, GpuError},
     layout::{Batch, Hit, RASTER_GROUPS_X, RASTER_GROUPS_Y, Triangle},
     passes::{Inputs, Passes, Rasterize, Trace},
     reference::primary_hit::camera_ray,
@@ -15,7 +15,7 @@ use kdray::{
 };
 
 use super::stage::{FIRST, Stage, options};
-use crate::support::{compare, meshes, random::Random, scenes, without_wide_atomics, world_of};
+use crate::support::{compare, device, meshes, random::Random, scenes, without_wide_atomics, world_of};
 
 /// A stage that rasterizes by kernels, and the pass that traces the same rays.
 struct View {
@@ -25,10 +25,10 @@ struct View {
 
 /// Makes a view, or returns `None` if the device has no atomics of 64 bits.
 fn view(scene: FlatScene, options: RenderOptions) -> Option<View> {
-    let context = Context::new(&ContextOptions::default()).expect("a device");
+    let can_rasterize = device().has_int64_atomics();
     let crop = options.crop_or_whole();
     let options = RenderOptions { primary: Primary::SoftwareRaster, ..options };
-    let stage = context.has_int64_atomics().then(|| Stage::new(scene, options, crop.width() * crop.height()))?;
+    let stage = can_rasterize.then(|| Stage::new(scene, options, crop.width() * crop.height()))?;
     let options = RenderOptions { primary: Primary::Trace, ..stage.options.clone() };
     let passes = Passes::new(&stage.context, &stage.resources.bindings, &options).expect("passes");
     Some(View { stage, trace: passes.trace })

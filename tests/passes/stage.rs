@@ -6,12 +6,14 @@ use kdray::{
     accel::kdtree::{BuildOptions, TraversalLinks},
     buffers::{Needs, Resources},
     frame::{Denoise, RenderOptions},
-    gpu::{Commands, Context, ContextOptions},
+    gpu::{Commands, Context},
     layout::{Batch, Bounce, Counters, Frame, Hit, NO_TRIANGLE, PathRay, RAY_GROUP_SIZE},
     passes::Passes,
     reference::inputs::KernelInputs,
     world::{FlatScene, World},
 };
+
+use crate::support::device;
 
 /// Numbers of rays around a workgroup's size.
 pub const RAY_COUNTS: [u32; 7] =
@@ -49,7 +51,7 @@ pub fn options(width: u32, height: u32) -> RenderOptions {
 impl Stage {
     /// Makes a stage with a queue for `capacity` rays.
     pub fn new(scene: FlatScene, options: RenderOptions, capacity: u32) -> Self {
-        let context = Context::new(&ContextOptions::new(None, true)).expect("a device with validation");
+        let context = device();
         let world = World::of_flat(scene, &BuildOptions::default()).expect("a world");
         let constants = Frame { queue_capacity: capacity, ..world.frame_constants(&options) };
         let needs = Needs { constants: &constants, options: &options, n_bounces: constants.max_depth as usize };

@@ -1,10 +1,11 @@
 //! Shared code of the tests: random numbers from a seed, small meshes, and their trees without a scene.
 
-#![allow(dead_code)] // each test target uses a part of it
+#![allow(dead_code, unused_imports)] // each test target uses a part of it
 
 pub mod chain;
 pub mod command;
 pub mod compare;
+pub mod devices;
 pub mod display;
 pub mod meshes;
 pub mod packets;
@@ -13,7 +14,7 @@ pub mod rays;
 pub mod scenes;
 pub mod textured;
 
-use std::sync::Arc;
+pub use devices::{assert_silent, device, pretended, with_lanes, without_wide_atomics};
 
 use glam::Vec3;
 use kdray::{
@@ -22,27 +23,10 @@ use kdray::{
         grid::GridOptions,
         kdtree::{BuildOptions, KdTree, TraversalLinks},
     },
-    gpu::{Context, ContextOptions, DeviceOverrides},
     layout::{Hit, NO_TRIANGLE, PathRay, Triangle},
     reference::{brute, inputs::KernelInputs, search_ray::SearchRay, traversal_ray::near_scene},
     world::{FlatScene, Geometry, World},
 };
-
-/// Opens a device under validation, which kdray takes for what the overrides make of it.
-pub fn pretended(overrides: DeviceOverrides) -> Arc<Context> {
-    let options = ContextOptions { overrides, ..ContextOptions::new(None, true) };
-    Context::new(&options).expect("a device with validation")
-}
-
-/// Opens a device under validation that runs kernels as a GPU of `n_lanes` lanes does.
-pub fn with_lanes(n_lanes: u32) -> Arc<Context> {
-    pretended(DeviceOverrides { n_lanes: Some(n_lanes), ..DeviceOverrides::default() })
-}
-
-/// Opens a device under validation whose kernels have no 64-bit atomics.
-pub fn without_wide_atomics() -> Arc<Context> {
-    pretended(DeviceOverrides { no_int64_atomics: true, ..DeviceOverrides::default() })
-}
 
 /// Returns the scene with its best tree.
 pub fn world_of(scene: &FlatScene) -> World {
