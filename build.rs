@@ -12,18 +12,28 @@ use std::{
     fmt::Write,
     fs,
     path::{Path, PathBuf},
+    sync::{
+        Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
 };
 
-/// The kernels that traverse. Each has a second module, `NAME_gaps.comp`, whose rays pass through parts of triangles
-/// (the macro `WITH_GAPS`). That code is inlined wherever a triangle is tested, so it would make the modules for scenes
-/// without gaps half as large again, and drivers compile them that much longer.
-const TRAVERSING: [&str; 3] = ["cast", "shadow", "trace"];
+/// The kernels that find hits. Each is compiled for every search of [`SEARCHES`], without and with `WITH_GAPS`.
+const SEARCHING: [&str; 3] = ["cast", "shadow", "trace"];
 
-/// A module of SPIR-V: a shader, compiled with or without `WITH_GAPS`.
+/// What hits are searched in and how: the traversals of the kd-tree, and the grid. A module has the code of one search,
+/// `TRAVERSAL`, since drivers take seconds to compile the code of all of them.
+const SEARCHES: [&str; 9] =
+    ["mask", "mask_boxes", "restart", "backtrack", "short_stack", "ropes", "stack", "brute", "grid"];
+
+/// A module of SPIR-V: a shader, compiled with some macros.
 struct Module {
+    /// The name by which Rust finds the module: that of the shader's file, in kernels that find hits with the search
+    /// and with `gaps`, such as `trace_mask_gaps.comp`.
     name: String,
     path: PathBuf,
-    with_gaps: bool,
+    macros: Vec<(&'static str, Option<String>)>,
 }
 
 fn main() {
@@ -42,21 +52,43 @@ fn main() {
         std::process::exit(1);
     });
     fs::write(out_dir.join("layout.rs"), layout).expect("write layout.rs");
+    fs::write(out_dir.join("searching_modules.rs"), table_of_searching_modules()).expect("write searching_modules.rs");
 
-    let compiler = shaderc::Compiler::new().expect("shaderc");
-    for module in modules() {
-        match compile(&compiler, &module) {
+    let modules = modules();
+    let n_threads = thread::available_parallelism().map_or(1, usize::from);
+    let next_ix = AtomicUsize::new(0);
+    let compiled = Mutex::new(Vec::new());
+    thread::scope(|scope| {
+        for _ in 0..n_threads {
+            scope.spawn(|| {
+                let compiler = shaderc::Compiler::new().expect("shaderc");
+                while let Some(module) = modules.get(next_ix.fetch_add(1, Ordering::Relaxed)) {
+                    let spirv = compile(&compiler, module);
+                    compiled.lock().expect("no thread has panicked").push((&module.name, spirv));
+                }
+            });
+        }
+    });
+    let mut compiled = compiled.into_inner().expect("no thread has panicked");
+    compiled.sort_by_key(|(name, _)| *name);
+    let mut errors: Vec<String> = Vec::new();
+    for (name, spirv) in compiled {
+        match spirv {
             Ok(spirv) => {
                 name_compiler(&spirv);
-                fs::write(out_dir.join(format!("{}.spv", module.name)), spirv).expect("write SPIR-V");
+                fs::write(out_dir.join(format!("{name}.spv")), spirv).expect("write SPIR-V");
             }
-            // Each line of the compiler's output becomes an error of its own, so that an editor can jump to its
-            // place.
             Err(error) => {
-                error.lines().for_each(|line| println!("cargo::error={line}"));
-                std::process::exit(1);
+                let new: Vec<_> = error.lines().filter(|line| errors.iter().all(|known| known != line)).collect();
+                errors.extend(new.into_iter().map(str::to_owned));
             }
         }
+    }
+    // Each line of the compiler's output becomes an error of its own, so that an editor can jump to its place. The
+    // modules of a kernel share most of their errors.
+    if !errors.is_empty() {
+        errors.iter().for_each(|line| println!("cargo::error={line}"));
+        std::process::exit(1);
     }
 }
 
@@ -110,13 +142,37 @@ fn modules() -> Vec<Module> {
     let mut modules = Vec::new();
     for path in shaders_in_order() {
         let name = path.file_name().and_then(|name| name.to_str()).expect("a shader's name is UTF-8").to_owned();
-        let kernel = name.strip_suffix(".comp").filter(|kernel| TRAVERSING.contains(kernel));
-        if let Some(kernel) = kernel {
-            modules.push(Module { name: format!("{kernel}_gaps.comp"), path: path.clone(), with_gaps: true });
+        match name.strip_suffix(".comp").filter(|kernel| SEARCHING.contains(kernel)) {
+            Some(kernel) => modules.extend(searching_modules(kernel, &path)),
+            None => modules.push(Module { name, path, macros: Vec::new() }),
         }
-        modules.push(Module { name, path, with_gaps: false });
     }
     modules
+}
+
+/// Returns the modules of a kernel that finds hits. The code for gaps, through which rays pass, is inlined wherever a
+/// triangle is tested. Scenes without gaps are spared it.
+fn searching_modules(kernel: &str, path: &Path) -> Vec<Module> {
+    let of_search = |search: &str| {
+        let traversal = ("TRAVERSAL", Some(format!("TRAVERSAL_{}", search.to_uppercase())));
+        let module = |gaps: &str, macros| Module {
+            name: format!("{kernel}_{search}{gaps}.comp"),
+            path: path.to_owned(),
+            macros,
+        };
+        [module("", vec![traversal.clone()]), module("_gaps", vec![traversal, ("WITH_GAPS", None)])]
+    };
+    SEARCHES.into_iter().flat_map(of_search).collect()
+}
+
+/// Generates a Rust table of the modules of all kernels that find hits, each with its SPIR-V.
+fn table_of_searching_modules() -> String {
+    let is_searching = |module: &Module| !module.macros.is_empty();
+    let row = |Module { name, .. }| {
+        format!("Shader {{ file: {name:?}, spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")) }},\n")
+    };
+    let rows: String = modules().into_iter().filter(is_searching).map(row).collect();
+    format!("&[\n{rows}]\n")
 }
 
 /// Returns the paths of all shaders, in a fixed order.
@@ -132,7 +188,7 @@ fn shaders_in_order() -> Vec<PathBuf> {
 
 /// Compiles a module for Vulkan 1.3, optimized. `#include "x.glsl"` reads from glsl/shared.
 fn compile(compiler: &shaderc::Compiler, module: &Module) -> Result<Vec<u8>, String> {
-    let Module { name, path, with_gaps } = module;
+    let Module { name, path, macros } = module;
     let kind = match path.extension().and_then(|e| e.to_str()) {
         Some("comp") => shaderc::ShaderKind::Compute,
         Some("vert") => shaderc::ShaderKind::Vertex,
@@ -146,8 +202,8 @@ fn compile(compiler: &shaderc::Compiler, module: &Module) -> Result<Vec<u8>, Str
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
     options.set_optimization_level(shaderc::OptimizationLevel::Performance);
     options.set_warnings_as_errors();
-    if *with_gaps {
-        options.add_macro_definition("WITH_GAPS", None);
+    for (name, value) in macros {
+        options.add_macro_definition(name, value.as_deref());
     }
     options.set_include_callback(|include, _, _, _| {
         let path = Path::new("glsl/shared").join(include);

@@ -1,7 +1,7 @@
 // The acceleration structure: finds the hit of a ray.
 //
-// Needs the constants `bool COUNT_COSTS` (steps.glsl) and `bool PASSES_VEILS` (cutout.glsl), which the kernel declares
-// before this file. Provides `traverse`,
+// Needs the macros TRAVERSAL and, for scenes with gaps, WITH_GAPS (build.rs); and the constants `bool COUNT_COSTS`
+// (steps.glsl) and `bool PASSES_VEILS` (cutout.glsl), which the kernel declares before this file. Provides `traverse`,
 // and `traverse_any_length` for directions of any length, which are all that a kernel calls to find a hit. Kernels
 // also use `is_stalled` and `runs_in_round` of stalls.glsl. cast.comp checks its rays by `exponent_of`,
 // `longest_bits` and `magnitude_bits`.
@@ -31,8 +31,8 @@ layout(constant_id = CONSTANT_PREDICATES_BRANCHES) const bool PREDICATES_BRANCHE
 
 // Searches the structure that the scene has. Returns 0, or the mark of a ray that has stalled (stalls.glsl).
 uint search(TraversalRay ray, bool any_hit, inout Nearest best) {
-    if (GRID_LEVELS == 0u) return search_kdtree(ray, any_hit, best);
-    return search_grid(ray, any_hit, best);
+    if (TRAVERSAL == TRAVERSAL_GRID) return search_grid(ray, any_hit, best);
+    return search_kdtree(ray, any_hit, best);
 }
 
 // Returns the closest hit in (t_min, t_max], or with any_hit one that need not be the closest. The direction has

@@ -101,7 +101,8 @@
 // The cosine from which on these rays start at the triangle itself. In between, the start moves linearly.
 #define PLANE_START_COSINE 0.2
 
-// Values of the specialization constant `TRAVERSAL`: the algorithm that takes rays through the kd-tree.
+// Values of the macro `TRAVERSAL`, one in each module of a kernel that finds hits (build.rs): the algorithm that takes
+// rays through the kd-tree, or the grid.
 #define TRAVERSAL_MASK 0u
 #define TRAVERSAL_STACK 1u
 #define TRAVERSAL_BRUTE 2u
@@ -110,6 +111,7 @@
 #define TRAVERSAL_MASK_BOXES 5u
 #define TRAVERSAL_BACKTRACK 6u
 #define TRAVERSAL_ROPES 7u
+#define TRAVERSAL_GRID 8u
 // The most triangles that brute force accepts.
 #define BRUTE_MAX_TRIANGLES 65000u
 
@@ -652,8 +654,6 @@ struct AccelConstants {
 // build.rs refuses two constants with the same number. In a kernel, it refuses a declaration of X whose number is not
 // `CONSTANT_X`, and an X for which this list has no number.
 
-// The algorithm that takes rays through the kd-tree: `TRAVERSAL_MASK` and its like.
-#define CONSTANT_TRAVERSAL 0u
 // Whether `fma` rounds once on the device.
 #define CONSTANT_FUSED_FMA 1u
 // Whether hits and shadow segments are counted.

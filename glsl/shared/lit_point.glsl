@@ -25,9 +25,8 @@ vec3 above_corner(vec3 p, vec3 corner, uint normal, vec3 interpolated) {
 //
 // Corners are loaded one after the other: all three at once would take registers, which shadow rays need.
 vec3 lit_point(Surface s, Hit hit, vec3 to_light) {
-    if (!SMOOTH) return s.point_world;
     float span = PLANE_START_COSINE - CURVED_START_COSINE;
-    float share = clamp((PLANE_START_COSINE - dot(s.geometric, to_light)) / span, 0.0, 1.0);
+    float share = SMOOTH ? clamp((PLANE_START_COSINE - dot(s.geometric, to_light)) / span, 0.0, 1.0) : 0.0;
     if (!(share > 0.0)) return s.point_world;
     vec3 weights = inner_weights(hit);
     vec3 curved = vec3(0.0);

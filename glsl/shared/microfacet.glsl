@@ -39,19 +39,19 @@ float grazing_weight(float cosine) {
     return x * x * x * x * x;
 }
 
+float largest_of(vec3 v) {
+    return max(v.x, max(v.y, v.z));
+}
+
 // The dielectric's reflectance where the light's angle to the normal has this cosine.
 vec3 dielectric_reflectance(Material material, float cosine) {
-    float at_grazing = min(max(material.ks.x, max(material.ks.y, material.ks.z)), 1.0);
+    float at_grazing = min(largest_of(material.ks), 1.0);
     return mix(normal_reflectance(material), vec3(at_grazing), grazing_weight(cosine));
 }
 
 // The metal's reflectance where the light's angle to the normal has this cosine.
 vec3 metal_reflectance(Material material, float cosine) {
     return mix(material.kd, vec3(1.0), grazing_weight(cosine));
-}
-
-float largest_of(vec3 v) {
-    return max(v.x, max(v.y, v.z));
 }
 
 // pi times the distribution of normals, times masking and shadowing, divided by 4 and by both cosines.

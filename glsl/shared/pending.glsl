@@ -1,4 +1,4 @@
-// Pending subtrees, which the ray visits later. The constant TRAVERSAL selects the method by which they are kept.
+// Pending subtrees, which the ray visits later. The macro TRAVERSAL selects the method by which they are kept.
 // Each method has its own file. A part of kdtree.glsl.
 //
 // Needs TRAVERSAL, kd_nodes.glsl, local_cells.glsl and slab.glsl. Provides `clear_pending`, `go_down`,

@@ -55,7 +55,7 @@ mod tests {
     /// Returns the name of the struct of a shader's push constants.
     fn pushed_to(shader: &str) -> &'static str {
         match shader {
-            "cast.comp" => "CastBatch",
+            cast if cast.starts_with("cast_") => "CastBatch",
             "driver.rgen" => "DriverCast",
             "false_color.comp" => "FalseColor",
             "present.frag" => "Present",
@@ -113,22 +113,20 @@ mod tests {
         Ok(())
     }
 
-    /// Returns the struct name and the block of every binding and push constant of all shaders in `passes` and
-    /// `driver`.
+    /// Returns the struct name and the block of every binding and push constant of all modules, except for the probes'.
     fn blocks() -> Vec<(&'static str, Type)> {
-        let folders = ["passes", "driver"].map(|name| format!("{}/glsl/{name}", env!("CARGO_MANIFEST_DIR")));
-        let sources = folders.iter().flat_map(|folder| fs::read_dir(folder).expect("a folder of shaders"));
-        let variables = sources.flat_map(|source| {
-            let name = source.expect("an entry").file_name().into_string().expect("a shader's name is UTF-8");
+        let is_probe = |name: &str| ["fused_fma.comp", "lanes.comp", "loop_turns.comp"].contains(&name);
+        let modules = CONSTANTS_OF_SHADERS.iter().map(|(name, _)| *name).filter(|name| !is_probe(name));
+        let variables = modules.flat_map(|name| {
             let spirv = fs::read(format!("{}/{name}.spv", env!("OUT_DIR"))).expect("SPIR-V");
             let entry_points = ReflectConfig::new().spv(spirv).ref_all_rscs(true).reflect();
             let variables = entry_points.expect("valid SPIR-V").into_iter().flat_map(|entry_point| entry_point.vars);
-            variables.map(move |variable| (name.clone(), variable))
+            variables.map(move |variable| (name, variable))
         });
         variables
             .filter_map(|(shader, variable)| match variable {
                 Variable::Descriptor { desc_bind, ty, .. } => Some((struct_at(desc_bind.bind())?, ty)),
-                Variable::PushConstant { ty, .. } => Some((pushed_to(&shader), ty)),
+                Variable::PushConstant { ty, .. } => Some((pushed_to(shader), ty)),
                 _ => None,
             })
             .collect()

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::{kernel, spirv, traversal_constants};
+use super::{kernel, search_constants, searching};
 use crate::{
     accel::{Query, kdtree::Traversal},
     buffers::Round,
@@ -31,11 +31,8 @@ impl Cast {
         traversal: Traversal,
         query: Query,
     ) -> Result<Self, GpuError> {
-        let shader = match bindings.sets(constants::CUTOUTS) {
-            true => spirv!("cast_gaps.comp"),
-            false => spirv!("cast.comp"),
-        };
-        let constants = traversal_constants(context, traversal)?.set(constants::ANY_HIT, query == Query::Any);
+        let shader = searching("cast", bindings, traversal, constants::CUTOUTS);
+        let constants = search_constants(context)?.set(constants::ANY_HIT, query == Query::Any);
         let n_lanes = context.n_lanes()?;
         Ok(Self { kernel: kernel(context, bindings, "cast", shader, &constants)?, n_lanes })
     }

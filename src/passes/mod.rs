@@ -24,7 +24,7 @@ use crate::{
     accel::kdtree::Traversal,
     buffers::uses_graphics_pipeline,
     frame::{Primary, RenderOptions},
-    gpu::{BindingLayout, ComputeDesc, ComputePipeline, Constants, Context, GpuError, Shader},
+    gpu::{BindingLayout, ComputeDesc, ComputePipeline, Constant, Constants, Context, GpuError, Shader},
     layout::{CONSTANTS_OF_SHADERS, constants},
 };
 
@@ -182,10 +182,32 @@ impl Passes {
     }
 }
 
-/// Returns the specialization constants that all kernels which trace rays have in common.
-fn traversal_constants(context: &Arc<Context>, traversal: Traversal) -> Result<Constants, GpuError> {
+/// The modules of the kernels that find hits, one for each search without and with gaps.
+static SEARCHING: &[Shader] = include!(concat!(env!("OUT_DIR"), "/searching_modules.rs"));
+
+/// Returns the modules of a kernel that finds hits, for every search.
+pub(crate) fn modules_of(kernel: &str) -> impl Iterator<Item = Shader> {
+    SEARCHING
+        .iter()
+        .copied()
+        .filter(move |module| module.file.strip_prefix(kernel).is_some_and(|rest| rest.starts_with('_')))
+}
+
+/// Returns the module of a kernel that finds hits: in the scene's grid, or in its kd-tree by the traversal. `gaps` is
+/// the constant that tells whether the kernel's rays pass through parts of triangles.
+fn searching(kernel: &str, bindings: &BindingLayout, traversal: Traversal, gaps: Constant<bool>) -> Shader {
+    let search = match bindings.value(constants::GRID_LEVELS) {
+        0 => traversal.to_string().replace('-', "_"),
+        _ => "grid".to_owned(),
+    };
+    let gaps = if bindings.value(gaps) == 0 { "" } else { "_gaps" };
+    let file = format!("{kernel}_{search}{gaps}.comp");
+    *SEARCHING.iter().find(|module| module.file == file).unwrap_or_else(|| panic!("build.rs makes no {file}"))
+}
+
+/// Returns the specialization constants that all kernels which find hits have in common.
+fn search_constants(context: &Arc<Context>) -> Result<Constants, GpuError> {
     Ok(Constants::new()
-        .set(constants::TRAVERSAL, traversal.constant())
         .set(constants::FUSED_FMA, context.fuses_fma()?)
         .set(constants::PREDICATES_BRANCHES, context.predicates_branches()))
 }
@@ -224,6 +246,18 @@ mod tests {
         assert_eq!(undeclared("tonemap.comp", &curve), None);
         assert_eq!(undeclared("tonemap.comp", &curve.set(constants::COUNTS, true)), Some("COUNTS"));
         let fused = Constants::new().set(constants::FUSED_FMA, true);
-        assert_eq!(undeclared("trace.comp", &fused), None, "a shared file declares it");
+        assert_eq!(undeclared("trace_mask.comp", &fused), None, "a shared file declares it");
+    }
+
+    #[test]
+    fn every_traversal_has_its_modules() {
+        for kernel in ["cast", "shadow", "trace"] {
+            let modules: Vec<_> = modules_of(kernel).map(|module| module.file).collect();
+            assert_eq!(modules.len(), 2 * (Traversal::ALL.len() + 1), "{kernel}: those of the grid, too");
+            for traversal in Traversal::ALL {
+                let file = format!("{kernel}_{traversal}.comp").replace('-', "_");
+                assert!(modules.contains(&&*file), "{file}");
+            }
+        }
     }
 }

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::{kernel, spirv, traversal_constants};
+use super::{kernel, search_constants, searching};
 use crate::{
     buffers::Resources,
     frame::RenderOptions,
@@ -22,12 +22,9 @@ impl Shadow {
         bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        let shader = match bindings.sets(constants::SHADOW_GAPS) {
-            true => spirv!("shadow_gaps.comp"),
-            false => spirv!("shadow.comp"),
-        };
+        let shader = searching("shadow", bindings, options.traversal, constants::SHADOW_GAPS);
         // `COUNTS` is not set, since the pass shade counts the segments.
-        let constants = traversal_constants(context, options.traversal)?.set(constants::COUNT_COSTS, options.features);
+        let constants = search_constants(context)?.set(constants::COUNT_COSTS, options.features);
         Ok(Self { kernel: kernel(context, bindings, "shadow", shader, &constants)? })
     }
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{kernel, spirv, traversal_constants};
+use super::{kernel, search_constants, searching};
 use crate::{
     buffers::Resources,
     frame::{Primary, RenderOptions},
@@ -23,11 +23,8 @@ impl Trace {
         bindings: &Arc<BindingLayout>,
         options: &RenderOptions,
     ) -> Result<Self, GpuError> {
-        let shader = match bindings.sets(constants::CUTOUTS) {
-            true => spirv!("trace_gaps.comp"),
-            false => spirv!("trace.comp"),
-        };
-        let constants = traversal_constants(context, options.traversal)?
+        let shader = searching("trace", bindings, options.traversal, constants::CUTOUTS);
+        let constants = search_constants(context)?
             .set(constants::COUNTS, options.profile)
             .set(constants::COUNT_COSTS, options.features);
         let from = |camera: bool| {

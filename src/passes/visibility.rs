@@ -19,7 +19,7 @@ impl Visibility {
         let desc = RasterDesc {
             name: "visibility",
             vertex: spirv!("visibility.vert"),
-            fragment: match bindings.sets(constants::CUTOUTS) {
+            fragment: match bindings.value(constants::CUTOUTS) != 0 {
                 true => spirv!("visibility_cutout.frag"),
                 false => spirv!("visibility.frag"),
             },

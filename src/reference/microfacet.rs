@@ -116,6 +116,14 @@ mod tests {
         }
     }
 
+    /// What a coloured coat reflects most of is missing below it in every colour, so that no colour is added.
+    #[test]
+    fn diffuse_light_lacks_the_largest_reflectance() {
+        let coated = Material { kd: Vec3::ONE, ks: vec3(1.0, 0.2, 0.2), ..material(0.0, 1.0) };
+        let found = microfacet_reflectance(&coated, Vec3::Z, Vec3::Z, Vec3::Z);
+        assert!((found - (0.96 + vec3(0.04, 0.008, 0.008) * 0.25)).abs().max_element() < 1e-5, "{found}");
+    }
+
     /// A white metal reflects no more than it receives, for each direction of view: the integral over the hemisphere of
     /// lights. It loses what bounces between microfacets, the more the rougher it is.
     #[test]

@@ -166,10 +166,10 @@ mod tests {
     fn unchanged_shaders_are_those_that_the_program_brings_along() {
         let copy = edited("glsl/shared/layout.glsl", |text| text.replacen("// ", "// Documentation: ", 1));
         let modules = compile(copy.path()).unwrap();
-        let trace = include_bytes!(concat!(env!("OUT_DIR"), "/trace.comp.spv"));
-        assert_eq!(modules["trace.comp"], trace);
+        let trace = include_bytes!(concat!(env!("OUT_DIR"), "/trace_mask.comp.spv"));
+        assert_eq!(modules["trace_mask.comp"], trace);
         let copy = edited("glsl/passes/trace.comp", |text| text.replace("void main() {", "void main() { return;"));
-        assert_ne!(compile(copy.path()).unwrap()["trace.comp"], trace);
+        assert_ne!(compile(copy.path()).unwrap()["trace_mask.comp"], trace);
     }
 
     #[test]

@@ -1,8 +1,6 @@
 //! Traversal algorithms of the kd-tree. They differ in how they find the pending subtrees: far children that the ray
 //! has passed and still has to visit. README.md names the paper that comments here refer to.
 
-use crate::layout;
-
 /// Traversal algorithm of the kd-tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Traversal {
@@ -35,20 +33,6 @@ impl Traversal {
     pub const OF_SOFTWARE_DRIVERS: Self = Self::Ropes;
     /// The fastest algorithm on the CPU without a driver.
     pub const OF_CPU: Self = Self::Stack;
-
-    /// The value of the kernels' specialization constant `TRAVERSAL`.
-    pub(crate) fn constant(self) -> u32 {
-        match self {
-            Self::Mask => layout::TRAVERSAL_MASK,
-            Self::MaskBoxes => layout::TRAVERSAL_MASK_BOXES,
-            Self::Restart => layout::TRAVERSAL_RESTART,
-            Self::Backtrack => layout::TRAVERSAL_BACKTRACK,
-            Self::ShortStack => layout::TRAVERSAL_SHORT_STACK,
-            Self::Ropes => layout::TRAVERSAL_ROPES,
-            Self::Stack => layout::TRAVERSAL_STACK,
-            Self::Brute => layout::TRAVERSAL_BRUTE,
-        }
-    }
 
     /// Whether the algorithm reads the nodes' boxes.
     pub(crate) fn needs_boxes(self) -> bool {

@@ -20,7 +20,7 @@ use crate::{
     accel::{AccelOptions, kdtree::Traversal},
     gpu::DeviceInfo,
     layout::Triangle,
-    passes::spirv,
+    passes::modules_of,
 };
 
 /// Environment variable with the path of the cache folder. If its value is empty, nothing is kept.
@@ -37,7 +37,7 @@ pub struct Key {
     driver: String,
     /// What was measured: traversals, or primary visibility, with the picture's size and the traversal.
     subject: String,
-    /// A hash of `cast.comp`, the kernel by which traversals are timed. It is also used for measurements of primary
+    /// A hash of the modules of `cast.comp`, the kernel by which traversals are timed. It is also used for measurements of primary
     /// visibility, since their kernels share the traversal code.
     kernel: String,
     /// A hash of the scene's triangles.
@@ -53,7 +53,7 @@ impl Key {
             device: device.name.clone(),
             driver: device.driver.clone(),
             subject: "traversals".to_owned(),
-            kernel: hash(spirv!("cast.comp").spirv),
+            kernel: hash(&modules_of("cast").flat_map(|module| module.spirv).copied().collect::<Vec<_>>()),
             triangles: hash(bytemuck::cast_slice(triangles)),
             build: format!("{accel_options:?}"),
         }
