@@ -1,18 +1,23 @@
 //! Tests of frames with textures, cut-outs and microfacets: against closed forms, and device against CPU.
 
-use std::path::Path;
+use std::{f64::consts::PI, path::Path};
 
-use glam::{DQuat, DVec3, Vec3, Vec4, vec2, vec3};
+use glam::{DQuat, DVec3, Vec2, Vec3, Vec4, vec2, vec3};
+use half::f16;
 use kdray::{
     accel::kdtree::Traversal,
-    frame::{Picture, Primary, RenderOptions},
-    scene::{Alpha, Camera, Channel, Light, Maps, Material, Scene, Texture, Transform, Wrap},
+    cpu,
+    frame::{BounceStats, Picture, Primary, RenderOptions},
+    render::Renderer,
+    scene::{
+        Alpha, Camera, Channel, Image, Light, Maps, Material, Microfacet, Pixels, Scene, Texture, Transform, Wrap,
+    },
     world::FlatScene,
 };
 
-use super::studio::{differing, identical, on_both, on_cpu, on_device, options};
+use super::studio::{assert_silent, device, differing, identical, on_both, on_cpu, on_device, options, world_of};
 use crate::support::{
-    scenes,
+    grid_worlds, scenes,
     textured::{self, add, add_image, empty, placed, square, unlit},
 };
 
@@ -73,7 +78,9 @@ fn a_pixel_shows_its_texel() {
 #[test]
 fn a_distant_checkerboard_is_the_mean_of_its_colours() {
     let check = |x: u32, y: u32| if (x + y).is_multiple_of(2) { [255; 4] } else { [0, 0, 0, 255] };
-    let scene = poster(false, |scene| Texture::of_image(add_image(scene, [256, 256], check)));
+    // Half a texel aside, pixels' centres are not where four texels meet, whose mean is grey at every level.
+    let aside = Vec2::splat(0.5 / 256.0);
+    let scene = poster(false, |scene| Texture::of_image(add_image(scene, [256, 256], check)).placed(Vec2::ONE, aside));
     for picture in on_both(&scene, &options(16, 16, 1)) {
         assert!((0..256).all(|i| (rgb(&picture, i % 16, i / 16) - 0.5).abs().max_element() < 0.005));
     }
@@ -88,6 +95,10 @@ fn the_level_follows_the_size_of_pixels() {
     for picture in on_both(&scene, &options(16, 16, 1)) {
         assert!((0..16).all(|x| (rgb(&picture, x, 8).x - if x % 2 == 0 { 1.0 } else { 0.0 }).abs() < 0.02));
     }
+    // Half a column aside, the centre of each of the larger pixels lies in the middle of a column.
+    let scene = poster(true, |scene| {
+        Texture::of_image(add_image(scene, [64, 64], column)).placed(Vec2::ONE, vec2(2.0 / 64.0, 0.0))
+    });
     for picture in on_both(&scene, &options(8, 8, 1)) {
         assert!((0..8).all(|x| (rgb(&picture, x, 4).x - 0.5).abs() < 0.02));
     }
@@ -151,10 +162,19 @@ fn a_hole_is_seen_through_and_lit_through_in_every_way() {
             assert_eq!(differing(&expected, &picture, 1e-4), [0usize; 0], "{way}, {traversal}");
         }
     }
+    for world in grid_worlds(&scene) {
+        let context = device();
+        let mut renderer = Renderer::new(context.clone(), &world, &traced).expect("a renderer");
+        let pictures = [renderer.render().expect("a frame").0, cpu::render(&world, &traced).0];
+        assert_silent(&context);
+        for picture in pictures {
+            assert_eq!(differing(&expected, &picture, 1e-4), [0usize; 0], "{}", world.accel().kind());
+        }
+    }
     let raster = on_device(&scene, &RenderOptions { primary: Primary::Raster, ..traced.clone() });
     assert!(differing(&expected, &raster, 1e-4).len() <= 40, "only pixels on outlines differ");
     assert!((rgb(&raster, 16, 16) - middle).abs().max_element() < 1e-4);
-    if super::studio::device().has_int64_atomics() {
+    if device().has_int64_atomics() {
         let compute = on_device(&scene, &RenderOptions { primary: Primary::SoftwareRaster, ..traced.clone() });
         assert!(identical(&compute, &on_device(&scene, &traced)));
     }
@@ -169,34 +189,85 @@ fn without_its_cutoff_the_sheet_has_no_hole() {
     }
 }
 
-/// A see-through sheet weakens what is behind it by its coverage, and lets shadow rays pass below half of it.
+/// A see-through sheet weakens what is behind it by its coverage, and lets shadow rays pass below half of it. The
+/// material, its texture or the mesh's corners say what the coverage is.
 #[test]
 fn coverage_blends_and_a_thin_veil_casts_no_shadow() {
-    for (alpha, is_shadowed) in [(0.25_f32, false), (0.75, true)] {
-        let mut scene = empty();
-        let veil = Material { d: alpha, ks: Vec3::ZERO, ..textured::rough(Vec3::ZERO) };
-        add(&mut scene, square(), placed(1.0, DVec3::new(0.0, 0.0, 0.5)), veil);
-        let wall = Material { ks: Vec3::ZERO, ..textured::rough(Vec3::ONE) };
-        add(&mut scene, square(), placed(3.0, DVec3::new(0.0, 0.0, -0.5)), wall);
-        scene.lights = vec![Light::Directional { towards: Vec3::Z, irradiance: Vec3::ONE }];
-        let expected = if is_shadowed { 0.0 } else { 1.0 - alpha };
-        for picture in on_both(&flat(&scene), &options(16, 16, 3)) {
-            let found = rgb(&picture, 8, 8);
-            assert!((found - expected).abs().max_element() < 1e-3, "{alpha}: {found}, not {expected}");
+    for (alpha, is_shadowed) in [(64, false), (191, true)] {
+        let coverage = f32::from(alpha) / 255.0;
+        for source in ["material", "texture", "corners"] {
+            let mut scene = empty();
+            let (mut sheet, mut veil) = (square(), Material { ks: Vec3::ZERO, ..textured::rough(Vec3::ZERO) });
+            match source {
+                "material" => veil.d = coverage,
+                "texture" => {
+                    let image = add_image(&mut scene, [1, 1], |_, _| [255, 255, 255, alpha]);
+                    veil.maps.base_colour = Some(Texture::of_image(image));
+                }
+                _ => sheet.colours = vec![[Vec3::ONE.extend(coverage); 3]; 2],
+            }
+            add(&mut scene, sheet, placed(1.0, DVec3::new(0.0, 0.0, 0.5)), veil);
+            let wall = Material { ks: Vec3::ZERO, ..textured::rough(Vec3::ONE) };
+            add(&mut scene, square(), placed(3.0, DVec3::new(0.0, 0.0, -0.5)), wall);
+            scene.lights = vec![Light::Directional { towards: Vec3::Z, irradiance: Vec3::ONE }];
+            let expected = if is_shadowed { 0.0 } else { 1.0 - coverage };
+            for picture in on_both(&flat(&scene), &options(16, 16, 3)) {
+                let found = rgb(&picture, 8, 8);
+                assert!((found - expected).abs().max_element() < 1e-3, "{source} {coverage}: {found}, not {expected}");
+            }
         }
     }
+}
+
+/// Colours of float images that nothing can reflect become the nearest that something can.
+#[test]
+fn colours_of_float_images_are_bounded() {
+    let pixel = [-1.0, 0.5, 2.0, 1.0].map(|value| f16::from_f32(value).to_bits());
+    let scene = poster(true, |scene| {
+        let (pixels, name) = (Pixels::Halves(vec![pixel]), "image".to_owned());
+        scene.images.push(Image { name, width: 1, height: 1, pixels, is_linear: true });
+        Texture::of_image(0)
+    });
+    for picture in on_both(&scene, &options(4, 4, 1)) {
+        assert_eq!(rgb(&picture, 2, 2), vec3(0.0, 0.5, 1.0));
+    }
+}
+
+/// Between two smooth dielectrics, each reflection leaves 4 % of the light. Rays that carry next to nothing are not
+/// traced.
+#[test]
+fn rays_that_carry_next_to_nothing_are_dropped() {
+    let mut scene = empty();
+    let smooth = Microfacet { roughness: 0.0, ..Microfacet::default() };
+    let plate = Material { microfacet: Some(smooth), ..textured::rough(Vec3::ONE) };
+    add(&mut scene, square(), placed(9.0, DVec3::ZERO), plate.clone());
+    add(&mut scene, square(), placed(9.0, DVec3::new(0.0, 0.0, 9.0)), plate);
+    let (scene, options) = (flat(&scene), RenderOptions { profile: true, ..options(16, 16, 10) });
+    let n_rays = |stats: &[BounceStats]| stats.iter().map(|bounce| bounce.n_rays).collect::<Vec<_>>();
+    let context = device();
+    let mut renderer = Renderer::new(context.clone(), &world_of(&scene), &options).expect("a renderer");
+    let on_device = n_rays(&renderer.render().expect("a frame").1.bounces);
+    assert_silent(&context);
+    assert_eq!(on_device[..3], [256; 3]);
+    assert!(on_device[3..].iter().all(|&n| n == 0), "{on_device:?}");
+    assert_eq!(n_rays(&cpu::render(&world_of(&scene), &options).1.bounces), on_device);
 }
 
 /// A normal map of one colour tilts all normals alike, as a mesh with tilted normals has them. The sheet is also
 /// mirrored, rotated, and seen from behind.
 #[test]
 fn a_constant_normal_map_equals_tilted_normals() {
-    let tilt = vec3(0.6, 0.0, 0.8);
+    let tilt = vec3(0.48, 0.36, 0.8);
     let encoded = tilt.to_array().map(|c| ((c + 1.0) / 2.0 * 255.0).round() as u8);
     let decoded = Vec3::from_array(encoded.map(|c| f32::from(c) / 255.0 * 2.0 - 1.0)).normalize();
     let turned = DQuat::from_rotation_z(0.7);
-    for (scale, rotation) in [(DVec3::ONE, DQuat::IDENTITY), (DVec3::new(-1.0, 1.0, 1.0), turned), (DVec3::ONE, turned)]
-    {
+    let from_behind = DQuat::from_rotation_y(PI);
+    for (scale, rotation) in [
+        (DVec3::ONE, DQuat::IDENTITY),
+        (DVec3::new(-1.0, 1.0, 1.0), turned),
+        (DVec3::ONE, turned),
+        (DVec3::ONE, from_behind),
+    ] {
         let transform = Transform::new(scale, rotation, DVec3::ZERO).expect("a transform");
         let scene_with = |mesh: kdray::scene::Mesh, is_mapped: bool| {
             let mut scene = empty();
@@ -209,7 +280,7 @@ fn a_constant_normal_map_equals_tilted_normals() {
             flat(&scene)
         };
         let mut tilted = square();
-        // The square's tangent is +x, so the map's x is along +x.
+        // The square's tangent is +x and its bitangent +y, as the map's x and y are.
         tilted.normals.fill([decoded; 3]);
         let expected = on_both(&scene_with(tilted, false), &options(12, 12, 1));
         let found = on_both(&scene_with(square(), true), &options(12, 12, 1));
@@ -259,8 +330,7 @@ fn a_solid_absorbs_what_beers_law_says() {
     // The index of refraction is 1, so nothing is reflected or bent. The slab is 1 thick.
     let glass = Material { ni: 1.0, microfacet: Some(microfacet), ..textured::rough(Vec3::ONE) };
     add(&mut scene, square(), placed(2.0, DVec3::new(0.0, 0.0, 0.5)), glass.clone());
-    let turned =
-        Transform::new(DVec3::splat(2.0), DQuat::from_rotation_y(std::f64::consts::PI), DVec3::new(0.0, 0.0, -0.5));
+    let turned = Transform::new(DVec3::splat(2.0), DQuat::from_rotation_y(PI), DVec3::new(0.0, 0.0, -0.5));
     add(&mut scene, square(), turned.expect("a transform"), glass);
     for picture in on_both(&flat(&scene), &options(9, 9, 4)) {
         let found = rgb(&picture, 4, 4);
