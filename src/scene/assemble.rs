@@ -6,7 +6,7 @@ use std::{
     path::Path,
 };
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 
@@ -26,7 +26,6 @@ use super::{
     outside::Access,
     overrides::NamedMaterials,
     read::read_utf8,
-    tangents,
     transform::finite,
 };
 use crate::frame::Denoise;
@@ -211,7 +210,6 @@ fn add_mesh(
     if let Some(scale) = common.uv_scale {
         scale_uvs(&mut mesh, scale).map_err(failed)?;
     }
-    scene.add_tangents(&mut mesh, &slots);
     scene.push_mesh(mesh, transform, slots).map_err(failed)?;
     Ok(n_made)
 }
@@ -230,47 +228,27 @@ fn add_gltf(
             mesh.normals.fill([Vec3::ZERO; 3]);
         }
         common.uv_scale.map_or(Ok(()), |scale| scale_uvs(mesh, scale))?;
-        scene.add_tangents(mesh, named);
     }
-    let (n_materials, n_instances) = (scene.materials.len(), scene.instances.len());
+    let n_materials = scene.materials.len();
     scene.append(model, transform, named)?;
-    if !common.overrides {
-        return Ok(());
-    }
-    materials.override_from(scene, n_materials)?;
-    // The file has tangents for its own normal maps alone.
-    for ix in n_instances..scene.instances.len() {
-        let (mesh_ix, slots) = (scene.instances[ix].mesh_ix, scene.instances[ix].materials.clone());
-        let mut mesh = std::mem::take(&mut scene.meshes[mesh_ix]);
-        if mesh.tangents.is_empty() {
-            scene.add_tangents(&mut mesh, &slots);
-        }
-        scene.meshes[mesh_ix] = mesh;
-    }
-    Ok(())
+    if common.overrides { materials.override_from(scene, n_materials) } else { Ok(()) }
 }
 
-/// Multiplies all texture coordinates of a mesh.
+/// Multiplies all texture coordinates of a mesh. Tangents of its file remain along increasing u, and their bitangents
+/// along decreasing v.
 fn scale_uvs(mesh: &mut Mesh, scale: [f32; 2]) -> Checked<()> {
     let scale = Vec2::from_array(scale);
     if !scale.is_finite() {
         return Err(format!("uv_scale = {:?} is not finite", scale.to_array()));
     }
     mesh.uvs.iter_mut().flatten().flatten().for_each(|uv| *uv *= scale);
+    let along = scale.x.signum();
+    let signs = Vec4::new(along, along, along, along * scale.y.signum());
+    mesh.tangents.as_flattened_mut().iter_mut().for_each(|tangent| *tangent *= signs);
     Ok(())
 }
 
 impl Scene {
-    /// Gives a mesh the tangents that the normal maps of its materials need. `slots`: the materials of its slots.
-    pub(super) fn add_tangents(&self, mesh: &mut Mesh, slots: &[u32]) {
-        let set = |material: &u32| Some(self.materials[*material as usize].maps.normal.as_ref()?.uv_set as usize);
-        let sets: Vec<Option<usize>> = slots.iter().map(set).collect();
-        if sets.iter().any(Option::is_some) {
-            let of_faces = mesh.slots.clone();
-            tangents::add_tangents(mesh, |face| sets[of_faces[face] as usize % sets.len()]);
-        }
-    }
-
     fn push_material(&mut self, material: Material) -> u32 {
         self.materials.push(material);
         (self.materials.len() - 1) as u32

@@ -151,6 +151,7 @@ impl Scene {
             let endings = "its name ends in none of .toml, .gltf, .glb, .obj, .ply and .stl";
             return Err(SceneError::file(path, format!("is no scene: {endings}")));
         };
+        scene.add_tangents().map_err(|what| SceneError::file(path, what))?;
         if let Some(name) = &options.camera {
             scene.choose_camera(name).map_err(|what| SceneError::file(path, what))?;
         }
@@ -270,9 +271,8 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<Scene, SceneErro
     }
     check_only_scene(path, options)?;
     let mut scene = Scene::empty(path);
-    let (mut mesh, library) = mesh_file::parse_mesh(path, bytes, Shading::default(), 0, Access::of(options))?;
+    let (mesh, library) = mesh_file::parse_mesh(path, bytes, Shading::default(), 0, Access::of(options))?;
     let slots = scene.push_library(library);
-    scene.add_tangents(&mut mesh, &slots);
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
     let bounds = scene.bounds();
     extent::check(path, bounds)?;

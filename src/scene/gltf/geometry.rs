@@ -16,7 +16,6 @@ use super::{
     accessor::Accessor,
     deform::{Morph, Skin, Skinning},
     document::Document,
-    tangents::{NormalMap, add_tangents},
 };
 use crate::scene::{error::Checked, mesh::Mesh, needs::require_for_triangles};
 
@@ -43,7 +42,6 @@ pub(super) fn mesh(
     document: &Document,
     (primitive, slot): (&Primitive, u32),
     pose: Pose,
-    normal_map: Option<NormalMap>,
     (path, n_loaded): (&str, u64),
 ) -> Checked<Option<Mesh>> {
     let mode = match primitive.mode {
@@ -77,9 +75,6 @@ pub(super) fn mesh(
     let colours = colours.map(|found| read(&used, |ix| Ok(Vec4::from_array(found.numbers(ix, 1.0)?)))).transpose()?;
     mesh.colours = colours.and_then(|found| corners(&faces, &found)).unwrap_or_default();
     (mesh.positions, mesh.faces) = (vertices.positions, faces);
-    if let Some(normal_map) = normal_map.filter(|_| mesh.tangents.is_empty()) {
-        add_tangents(&mut mesh, &normal_map);
-    }
     Ok(Some(mesh))
 }
 

@@ -16,7 +16,6 @@ mod lights;
 mod materials;
 mod meshopt;
 mod nodes;
-mod tangents;
 mod textures;
 mod uri;
 
@@ -178,9 +177,8 @@ impl<'a> Loader<'a> {
             let path = format!("meshes[{mesh_ix}].primitives[{ix}]");
             self.note_morphs(primitive, &path);
             let material = if self.has_materials { self.materials.index(primitive.material, &path)? } else { 0 };
-            let normal_map = if self.has_materials { self.materials.normal_map(material) } else { None };
             let part = (primitive, materials.len() as u32);
-            let Some(mesh) = geometry::mesh(document, part, pose, normal_map, (&path, self.n_loaded))? else {
+            let Some(mesh) = geometry::mesh(document, part, pose, (&path, self.n_loaded))? else {
                 continue;
             };
             self.n_loaded += mesh.faces.len() as u64;
