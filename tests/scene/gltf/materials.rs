@@ -8,9 +8,7 @@ use kdray::scene::{Alpha, Channel, Clearcoat, Encoding, Material, Microfacet, Pi
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use super::gltf::Model;
-
-const F32: u32 = 5126;
+use super::{F32, Model};
 
 /// A square in the plane z = 0 that faces +z, whose texture coordinates are those of an image that stands upright.
 fn square() -> Model {
@@ -302,4 +300,21 @@ fn terms_out_of_range_are_named() {
         let error = with_material(json).load().unwrap_err();
         assert!(error.contains("model.glb: materials[0]") && error.contains(what), "{what}: {error}");
     }
+}
+
+#[test]
+fn images_with_the_same_bytes_are_one() {
+    let pbr = json!({ "baseColorTexture": { "index": 0 }, "metallicRoughnessTexture": { "index": 1 } });
+    let mut model = with_material(json!({ "pbrMetallicRoughness": pbr }));
+    let view = model.view(&png([0, 255, 0, 255]));
+    model.json["images"] = json!([{ "bufferView": view }, { "bufferView": view, "name": "again" }]);
+    model.push("textures", json!({ "source": 1 }));
+    let of_view = model.scene();
+    assert_eq!(of_view.images.len(), 1);
+    assert_eq!(of_view.materials[0].maps.roughness.as_ref().map(|texture| texture.image_ix), Some(0));
+    let folder = TempDir::new().unwrap();
+    model.json["images"] = json!([{ "uri": "a.png" }, { "uri": "./a%2Epng" }]);
+    fs::write(folder.path().join("a.png"), png([0, 255, 0, 255])).unwrap();
+    fs::write(folder.path().join("m.glb"), model.glb()).unwrap();
+    assert_eq!(Scene::load(&folder.path().join("m.glb")).unwrap().images.len(), 1);
 }
