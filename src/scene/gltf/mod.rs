@@ -12,6 +12,7 @@ mod cameras;
 mod deform;
 mod document;
 mod geometry;
+mod glb;
 mod lights;
 mod materials;
 mod meshopt;
