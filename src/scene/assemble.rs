@@ -6,27 +6,23 @@ use std::{
     path::Path,
 };
 
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec3, Vec3};
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use super::{
-    Camera, Light, LoadOptions, Material, RenderDefaults, Scene, Transform,
-    description::{CameraSpec, CommonSpec, Description, LightSpec, MeshSpec, RenderSpec, SceneDenoise, Source},
+    Camera, Light, Material, RenderDefaults, Scene,
+    description::{CameraSpec, Description, LightSpec, MeshSpec, RenderSpec, SceneDenoise},
     error::{Checked, SceneError},
     extent, framing,
-    generate::TriangleBudget,
-    gltf,
-    image_files::{ImageFiles, Images},
+    image_files::Images,
     map_spec::MapSpec,
     material::{MaterialSpec, colour, within},
-    mesh::{MAX_COORDINATE, Mesh},
-    mesh_file::{MeshFormat, parse_mesh, read_mesh},
-    obj::Library,
+    mesh::MAX_COORDINATE,
     outside::Access,
     overrides::NamedMaterials,
+    placed::{MeshTable, Placer},
     read::read_utf8,
-    tangents,
     transform::finite,
 };
 use crate::frame::Denoise;
@@ -58,7 +54,7 @@ impl File<'_> {
         })
     }
 
-    fn at(&self, span: &Range<usize>, what: impl AsRef<str>) -> SceneError {
+    pub fn at(&self, span: &Range<usize>, what: impl AsRef<str>) -> SceneError {
         let before = &self.text.as_bytes()[..span.start.min(self.text.len())];
         SceneError::line(self.path, 1 + before.iter().filter(|byte| **byte == b'\n').count(), what)
     }
@@ -76,8 +72,8 @@ impl File<'_> {
 
 fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> {
     let mut scene = Scene::empty(file.path);
-    let indices = add_materials(file, &mut scene, &description.materials)?;
-    let mut materials = NamedMaterials::new(&description.materials, indices);
+    let mut images = Images::default();
+    let indices = add_materials(file, (&mut scene, &mut images), &description.materials)?;
     for (ix, spec) in description.light.iter().enumerate() {
         scene.lights.push(file.check(&format!("light {}", ix + 1), spec, light)?);
     }
@@ -90,11 +86,22 @@ fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> 
     if let Some(spec) = &description.render {
         scene.defaults = file.check("render", spec, render_defaults)?;
     }
-    let mut n_generated = 0;
+    let mut tables = Vec::new();
     for (ix, table) in description.mesh.into_iter().enumerate() {
-        n_generated += add_mesh(file, &mut scene, &mut materials, n_generated, (ix, table))?;
+        let (number, span) = (ix + 1, table.span());
+        let spec = MeshSpec::new(table.into_inner());
+        let spec = spec.map_err(|what| file.at(&span, format!("mesh {number}: {what}")))?;
+        tables.push(MeshTable { number, span, spec });
     }
-    materials.remove_idle(&mut scene);
+    let materials = NamedMaterials::new(&description.materials, indices);
+    let mut placer = Placer::new(file, (scene, images), materials, &tables);
+    for table in &tables {
+        placer.add(table)?;
+    }
+    placer.materials.warn_of_unmatched(file);
+    placer.materials.remove_idle(&mut placer.scene);
+    let Placer { mut scene, images, .. } = placer;
+    scene.images = images.finish();
     if scene.n_triangles() == 0 {
         return Err(SceneError::file(file.path, "has no triangles"));
     }
@@ -115,184 +122,52 @@ fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> 
 /// Adds the materials of a scene file and their images. Returns the indices of the materials by their names.
 fn add_materials(
     file: &File,
-    scene: &mut Scene,
+    (scene, images): (&mut Scene, &mut Images),
     specs: &BTreeMap<String, Spanned<MaterialSpec>>,
 ) -> Result<HashMap<String, u32>, SceneError> {
-    let mut files = ImageFiles::default();
     let mut of_materials: Vec<Vec<usize>> = Vec::new();
     for (name, spec) in specs {
         of_materials.push(file.check(&format!("material `{name}`"), spec, |spec| {
             let path = |(key, map): (&str, &MapSpec)| {
                 file.access.beside(file.path).exact(map.file()).map_err(|what| format!("{key}: {what}"))
             };
-            spec.maps().map(|map| Ok(files.add(path(map)?))).collect()
+            spec.maps().map(|map| Ok(images.add(path(map)?))).collect()
         })?);
     }
-    let (mut images, mut wrong) = (Vec::new(), HashMap::new());
-    for (ix, image) in files.decode().into_iter().enumerate() {
-        images.push(image.map_err(|what| wrong.insert(ix, what)).ok());
-    }
-    let mut images = Images::new(images);
+    images.decode();
     let mut indices = HashMap::new();
     for ((name, spec), files) in specs.iter().zip(of_materials) {
         let material = file.check(&format!("material `{name}`"), spec, |spec| {
             let mut material = spec.material(name)?;
             for ((key, map), ix) in spec.maps().zip(files) {
-                if let Some(what) = wrong.get(&ix) {
-                    return Err(format!("{key}: {what}"));
-                }
-                map.set(&mut material, key, &mut images, ix)?;
+                map.set(&mut material, key, images, ix).map_err(|what| format!("{key}: {what}"))?;
             }
             Ok(material)
         })?;
         indices.insert(name.clone(), scene.push_material(material));
     }
-    scene.images = images.finish();
     Ok(indices)
 }
 
-/// Adds a mesh to the scene. Of a glTF file it adds all meshes with their materials, and leaves out lights and cameras.
-/// Returns the number of triangles that a generator made for the mesh. `n_generated` is the number that generators have
-/// made for the scene's earlier meshes.
-fn add_mesh(
-    file: &File,
-    scene: &mut Scene,
-    materials: &mut NamedMaterials,
-    n_generated: u64,
-    (ix, table): (usize, Spanned<toml::Table>),
-) -> Result<u64, SceneError> {
-    let span = table.span();
-    let object = format!("mesh {}", ix + 1);
-    let failed = |what: String| file.at(&span, format!("{object}: {what}"));
-    let MeshSpec { source, common } = MeshSpec::new(table.into_inner()).map_err(failed)?;
-    let transform = common.transform.transform().map_err(failed)?;
-    let named = materials.of_mesh(&common).map_err(failed)?;
-    let n_loaded = scene.n_triangles();
-    let (mut mesh, slots, n_made) = match source {
-        Source::File { path, shading, scene: scene_name } => {
-            let path = file.access.beside(file.path).exact(&path).map_err(failed)?;
-            // The scene file may misspell the name, so the error names the line in the scene file.
-            let bytes = read_mesh(&path).map_err(|error| failed(error.to_string()))?;
-            if MeshFormat::of(&path, &bytes) == MeshFormat::Gltf {
-                let allow_outside = file.access.is_anywhere();
-                let options = LoadOptions { scene: scene_name, camera: None, allow_outside };
-                let model = gltf::load_meshes(&path, bytes, &options, named.is_empty(), n_loaded)?;
-                add_gltf(scene, model, (&transform, &common, &named), materials).map_err(failed)?;
-                return Ok(0);
-            }
-            if let Some(name) = scene_name {
-                return Err(failed(format!("there is no scene `{name}`: only glTF files name scenes")));
-            }
-            let (mesh, library) = parse_mesh(&path, bytes, shading, n_loaded, file.access)?;
-            let n_materials = scene.materials.len();
-            let slots = if named.is_empty() { scene.push_library(library) } else { named };
-            if common.overrides {
-                materials.override_from(scene, n_materials).map_err(failed)?;
-            }
-            (mesh, slots, 0)
-        }
-        Source::Generator(generator) => {
-            let budget = TriangleBudget { n_generated, n_triangles: n_loaded as u64 };
-            let mut mesh = generator.build(&budget).map_err(failed)?;
-            if mesh.faces.is_empty() {
-                return Err(failed("makes no triangles".to_owned()));
-            }
-            if common.smooth == Some(false) {
-                mesh.normals.fill([Vec3::ZERO; 3]);
-            }
-            let slots = if named.is_empty() { vec![scene.default_material()] } else { named };
-            if !slots.iter().any(|ix| scene.materials[*ix as usize].maps.textures().next().is_some()) {
-                mesh.uvs = Default::default();
-            }
-            let n_made = mesh.faces.len() as u64;
-            (mesh, slots, n_made)
-        }
-    };
-    if let Some(scale) = common.uv_scale {
-        scale_uvs(&mut mesh, scale).map_err(failed)?;
-    }
-    scene.add_tangents(&mut mesh, &slots);
-    scene.push_mesh(mesh, transform, slots).map_err(failed)?;
-    Ok(n_made)
-}
-
-/// Adds the meshes of a glTF file. `placed`: where they are, what their table states, and their materials if it names
-/// any.
-fn add_gltf(
-    scene: &mut Scene,
-    mut model: Scene,
-    placed: (&Transform, &CommonSpec, &[u32]),
-    materials: &mut NamedMaterials,
-) -> Checked<()> {
-    let (transform, common, named) = placed;
-    for mesh in &mut model.meshes {
-        if common.smooth == Some(false) {
-            mesh.normals.fill([Vec3::ZERO; 3]);
-        }
-        common.uv_scale.map_or(Ok(()), |scale| scale_uvs(mesh, scale))?;
-        scene.add_tangents(mesh, named);
-    }
-    let (n_materials, n_instances) = (scene.materials.len(), scene.instances.len());
-    scene.append(model, transform, named)?;
-    if !common.overrides {
-        return Ok(());
-    }
-    materials.override_from(scene, n_materials)?;
-    // The file has tangents for its own normal maps alone.
-    for ix in n_instances..scene.instances.len() {
-        let (mesh_ix, slots) = (scene.instances[ix].mesh_ix, scene.instances[ix].materials.clone());
-        let mut mesh = std::mem::take(&mut scene.meshes[mesh_ix]);
-        if mesh.tangents.is_empty() {
-            scene.add_tangents(&mut mesh, &slots);
-        }
-        scene.meshes[mesh_ix] = mesh;
-    }
-    Ok(())
-}
-
-/// Multiplies all texture coordinates of a mesh.
-fn scale_uvs(mesh: &mut Mesh, scale: [f32; 2]) -> Checked<()> {
-    let scale = Vec2::from_array(scale);
-    if !scale.is_finite() {
-        return Err(format!("uv_scale = {:?} is not finite", scale.to_array()));
-    }
-    mesh.uvs.iter_mut().flatten().flatten().for_each(|uv| *uv *= scale);
-    Ok(())
-}
-
 impl Scene {
-    /// Gives a mesh the tangents that the normal maps of its materials need. `slots`: the materials of its slots.
-    pub(super) fn add_tangents(&self, mesh: &mut Mesh, slots: &[u32]) {
-        let set = |material: &u32| Some(self.materials[*material as usize].maps.normal.as_ref()?.uv_set as usize);
-        let sets: Vec<Option<usize>> = slots.iter().map(set).collect();
-        if sets.iter().any(Option::is_some) {
-            let of_faces = mesh.slots.clone();
-            tangents::add_tangents(mesh, |face| sets[of_faces[face] as usize % sets.len()]);
-        }
-    }
-
-    fn push_material(&mut self, material: Material) -> u32 {
+    /// Adds a material and returns its index.
+    pub(super) fn push_material(&mut self, material: Material) -> u32 {
         self.materials.push(material);
         (self.materials.len() - 1) as u32
     }
 
     /// Returns the index of the default material, for meshes and faces that name none. Adds it at the first call.
-    fn default_material(&mut self) -> u32 {
+    pub(super) fn default_material(&mut self) -> u32 {
         if let Some(ix) = self.materials.iter().position(|material| material.name == DEFAULT_MATERIAL) {
             return ix as u32;
         }
         self.push_material(MaterialSpec::default().material(DEFAULT_MATERIAL).expect("defaults are in range"))
     }
 
-    /// Adds a library's materials and images. Returns the material indices for the slots of the mesh that came with it;
-    /// the last one is the default material, for faces without one.
-    pub(super) fn push_library(&mut self, mut library: Library) -> Vec<u32> {
-        let n_images = self.images.len() as u32;
-        self.images.append(&mut library.images);
-        for material in &mut library.materials {
-            material.maps.change_each(|texture| texture.image_ix += n_images);
-        }
-        let mut slots: Vec<u32> = library.materials.into_iter().map(|material| self.push_material(material)).collect();
+    /// Adds the materials of a mesh that came with them. Returns their indices for the slots of the mesh; the last one
+    /// is the default material, for faces without one.
+    pub(super) fn push_materials(&mut self, materials: Vec<Material>) -> Vec<u32> {
+        let mut slots: Vec<u32> = materials.into_iter().map(|material| self.push_material(material)).collect();
         slots.push(self.default_material());
         slots
     }

@@ -8,8 +8,7 @@ use toml::{Spanned, Table};
 use super::{
     error::Checked,
     generate::Generator,
-    material::MaterialSpec,
-    smooth::{DEFAULT_CREASE, Shading},
+    material::{MaterialSpec, within},
     transform::TransformSpec,
 };
 
@@ -111,8 +110,8 @@ pub(super) struct MeshSpec {
 /// Source of a mesh's triangles.
 #[derive(Debug)]
 pub(super) enum Source {
-    /// A mesh file; `path` is relative to the scene file's folder.
-    File { path: String, shading: Shading, scene: Option<String> },
+    /// A mesh file; `path` is relative to the scene file's folder. `crease` is in degrees.
+    File { path: String, crease: Option<f32>, scene: Option<String> },
     /// A generator that makes the mesh from a few parameters.
     Generator(Generator),
 }
@@ -165,8 +164,8 @@ impl MeshSpec {
         let source = match (table.contains_key("file"), table.contains_key("generator")) {
             (true, false) => {
                 let FileSpec { file: path, crease, scene } = read(table)?;
-                let crease = super::material::within("crease", crease.unwrap_or(DEFAULT_CREASE), 0.0, 180.0)?;
-                Source::File { path, shading: Shading { smooth: common.smooth.unwrap_or(true), crease }, scene }
+                let crease = crease.map(|crease| within("crease", crease, 0.0, 180.0)).transpose()?;
+                Source::File { path, crease, scene }
             }
             (false, true) if common.overrides => {
                 return Err("has `override`, but only mesh files have materials of their own".to_owned());

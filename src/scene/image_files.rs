@@ -1,52 +1,17 @@
-//! Image files that the files of a scene name.
+//! The images of a scene. Each image file is read and decoded once, whichever of the scene's files name it.
 
 use std::{collections::HashMap, path::PathBuf};
 
 use super::{
     error::Checked,
-    image::{Encoded, decode_all, normals_of_heights},
-    needs::require_for_bytes,
+    image::{Encoded, Examined, MAX_PIXELS, decode_all, normals_of_heights},
+    needs::{require_for_bytes, require_for_images},
     read::read_bytes,
     texture::{Channel, Image, Pixels},
 };
 
-/// Image files, each of which is read once.
-#[derive(Debug, Default)]
-pub(super) struct ImageFiles {
-    paths: Vec<PathBuf>,
-    by_path: HashMap<PathBuf, usize>,
-}
-
-impl ImageFiles {
-    /// Returns the index of a file.
-    pub fn add(&mut self, path: PathBuf) -> usize {
-        *self.by_path.entry(path).or_insert_with_key(|path| {
-            self.paths.push(path.clone());
-            self.paths.len() - 1
-        })
-    }
-
-    /// Reads and decodes all files. An error is a message that names the file.
-    pub fn decode(self) -> Vec<Checked<Image>> {
-        let read = |path: &PathBuf| {
-            require_for_bytes(path).map_err(|what| format!("{}: {what}", path.display()))?;
-            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            let bytes = read_bytes(path).map_err(|error| error.to_string())?;
-            Ok(Encoded { name, bytes })
-        };
-        let mut encoded = Vec::new();
-        let read: Vec<Checked<()>> = self.paths.iter().map(|path| read(path).map(|file| encoded.push(file))).collect();
-        let mut decoded = decode_all(encoded).into_iter();
-        let mut next = || decoded.next().expect("each image is decoded or refused");
-        let named = |(read, path): (Checked<()>, &PathBuf)| {
-            read.and_then(|()| next().map_err(|what| format!("{}: {what}", path.display())))
-        };
-        read.into_iter().zip(&self.paths).map(named).collect()
-    }
-}
-
 /// What a texture shows of an image file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum View {
     /// The image itself.
     Plain,
@@ -56,56 +21,145 @@ pub(super) enum View {
     Inverted,
 }
 
-/// Decoded images, and those of them that textures show.
+/// Image files, and the images that textures show, whose indices are those of the scene.
+#[derive(Debug, Default)]
 pub(super) struct Images {
-    decoded: Vec<Option<Image>>,
-    shown: Vec<(usize, View)>,
+    files: Vec<File>,
+    by_path: HashMap<PathBuf, usize>,
+    shown: Vec<Shown>,
+    /// Index into `shown` by file and view.
+    views: HashMap<(usize, View), u32>,
+    /// Number of pixels of all images, with those that are yet to be made from others.
+    n_pixels: u64,
+    /// Size of the images that are yet to be made, bytes.
+    n_bytes_to_make: u64,
+}
+
+#[derive(Debug)]
+struct File {
+    path: PathBuf,
+    /// `None` until the file is decoded. An error is a message that names the file.
+    image: Option<Checked<Examined>>,
+}
+
+/// An image that textures show.
+#[derive(Debug)]
+enum Shown {
+    OfFile(usize, View),
+    /// An image of a glTF file.
+    Own(Image),
 }
 
 impl Images {
-    /// The indices of `decoded` are those of the files. None: the file has no image.
-    pub fn new(decoded: Vec<Option<Image>>) -> Self {
-        Self { decoded, shown: Vec::new() }
+    /// Returns the index of a file.
+    pub fn add(&mut self, path: PathBuf) -> usize {
+        // One file can have several names. A file that does not exist has those that are stated.
+        let canonical = path.canonicalize().unwrap_or_else(|_| path.clone());
+        *self.by_path.entry(canonical).or_insert_with(|| {
+            self.files.push(File { path, image: None });
+            self.files.len() - 1
+        })
     }
 
-    /// Returns the image of a file.
-    pub fn get(&self, file: usize) -> Option<&Image> {
-        self.decoded.get(file)?.as_ref()
+    /// Reads and decodes the files that have not been decoded.
+    pub fn decode(&mut self) {
+        let read = |path: &PathBuf| {
+            require_for_bytes(path).map_err(|what| format!("{}: {what}", path.display()))?;
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let bytes = read_bytes(path).map_err(|error| error.to_string())?;
+            Ok(Encoded { name, bytes: bytes.into() })
+        };
+        let (mut encoded, mut waiting) = (Vec::new(), Vec::new());
+        for file in self.files.iter_mut().filter(|file| file.image.is_none()) {
+            match read(&file.path) {
+                Ok(read) => {
+                    encoded.push(read);
+                    waiting.push(file);
+                }
+                Err(what) => file.image = Some(Err(what)),
+            }
+        }
+        for (file, decoded) in waiting.into_iter().zip(decode_all(encoded, self.n_pixels)) {
+            self.n_pixels += decoded.as_ref().map_or(0, |image| image.pixels.len() as u64);
+            let decoded = decoded.map(Examined::new).map_err(|what| format!("{}: {what}", file.path.display()));
+            file.image = Some(decoded);
+        }
     }
 
-    /// Returns the index, among the shown images, of a view of a file that has an image.
-    pub fn show(&mut self, file: usize, view: View) -> u32 {
-        let found = self.shown.iter().position(|shown| *shown == (file, view));
-        found.unwrap_or_else(|| {
-            self.shown.push((file, view));
-            self.shown.len() - 1
-        }) as u32
+    /// Returns the image of a file that has been decoded. An error is a message that names the file.
+    pub fn get(&self, file: usize) -> Result<&Examined, &str> {
+        let image = self.files[file].image.as_ref().expect("files are decoded before they are shown");
+        image.as_ref().map_err(String::as_str)
+    }
+
+    /// Returns the index, among the shown images, of a view of a file that has an image. The view itself is made later.
+    ///
+    /// # Errors
+    /// With the view, the images have too many pixels or need more memory than there is.
+    pub fn show(&mut self, file: usize, view: View) -> Checked<u32> {
+        if let Some(known) = self.views.get(&(file, view)) {
+            return Ok(*known);
+        }
+        if view != View::Plain {
+            let image = self.get(file)?.image();
+            let n_pixels = self.n_pixels.saturating_add(image.pixels.len() as u64);
+            if n_pixels > MAX_PIXELS {
+                let name = &image.name;
+                return Err(format!("with a copy of `{name}`, the scene's images have more than {MAX_PIXELS} pixels"));
+            }
+            let pixel_bytes = if matches!((view, &image.pixels), (View::Inverted, Pixels::Halves(_))) { 8 } else { 4 };
+            let n_bytes = self.n_bytes_to_make.saturating_add(image.pixels.len() as u64 * pixel_bytes);
+            require_for_images(n_bytes)?;
+            (self.n_pixels, self.n_bytes_to_make) = (n_pixels, n_bytes);
+        }
+        self.shown.push(Shown::OfFile(file, view));
+        let ix = (self.shown.len() - 1) as u32;
+        self.views.insert((file, view), ix);
+        Ok(ix)
+    }
+
+    /// Adds the images of a glTF file. Returns the index of the first one.
+    pub fn adopt(&mut self, images: Vec<Image>) -> u32 {
+        let first = self.shown.len() as u32;
+        self.n_pixels += images.iter().map(|image| image.pixels.len() as u64).sum::<u64>();
+        self.shown.extend(images.into_iter().map(Shown::Own));
+        first
     }
 
     /// Returns the shown images.
-    pub fn finish(mut self) -> Vec<Image> {
-        let made = |(file, view): &(usize, View)| {
-            let image = self.decoded[*file].as_ref().expect("only images are shown");
-            match view {
-                View::Plain => None,
-                View::Heights(channel, scale) => Some(normals_of_heights(image, *channel, f32::from_bits(*scale))),
-                View::Inverted => Some(inverted(image)),
+    pub fn finish(self) -> Vec<Image> {
+        let Self { mut files, shown, .. } = self;
+        let made = |shown: &Shown| match *shown {
+            Shown::Own(_) | Shown::OfFile(_, View::Plain) => None,
+            Shown::OfFile(file, view) => Some(view_of(image_of(&files[file]), view)),
+        };
+        // Plain views take the images that the others are made of.
+        let made: Vec<Option<Image>> = shown.iter().map(made).collect();
+        let image = |(shown, made)| match (shown, made) {
+            (_, Some(made)) => made,
+            (Shown::Own(image), None) => image,
+            (Shown::OfFile(file, _), None) => {
+                let image = files[file].image.take().and_then(Result::ok);
+                image.expect("each plain view is shown once").into_image()
             }
         };
-        let made: Vec<Option<Image>> = self.shown.iter().map(made).collect();
-        let mut plain = |file: usize| self.decoded[file].take().expect("each plain view is shown once");
-        made.into_iter().zip(&self.shown).map(|(image, (file, _))| image.unwrap_or_else(|| plain(*file))).collect()
+        shown.into_iter().zip(made).map(image).collect()
     }
 }
 
-/// Returns the channel that holds the opacity of an image: alpha if it has any, else luminance.
-pub(super) fn opacity_channel(image: &Image) -> Channel {
-    const ONE: u16 = 0x3c00; // 1 as a half
-    let has_alpha = match &image.pixels {
-        Pixels::Bytes(pixels) => pixels.iter().any(|pixel| pixel[3] != 255),
-        Pixels::Halves(pixels) => pixels.iter().any(|pixel| pixel[3] != ONE),
-    };
-    if has_alpha { Channel::Alpha } else { Channel::Luminance }
+/// Returns the image of a file that is shown.
+fn image_of(file: &File) -> &Image {
+    let image = file.image.as_ref().and_then(|image| image.as_ref().ok());
+    image.expect("only images are shown").image()
+}
+
+/// Returns a view of an image.
+fn view_of(image: &Image, view: View) -> Image {
+    match view {
+        View::Plain => image.clone(),
+        View::Heights(channel, scale) => normals_of_heights(image, channel, f32::from_bits(scale)),
+        View::Inverted => inverted(image),
+    }
 }
 
 /// Returns the image with 1 - x in place of each number x, opacity included.
@@ -120,4 +174,43 @@ fn inverted(image: &Image) -> Image {
         }
     };
     Image { pixels, ..image.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn images() -> Images {
+        let pixels = Pixels::Bytes(vec![[9, 8, 7, 6]; 20]);
+        let image = Image { name: "a.png".to_owned(), width: 5, height: 4, pixels, is_linear: false };
+        let mut images = Images::default();
+        images.files.push(File { path: PathBuf::from("a.png"), image: Some(Ok(Examined::new(image))) });
+        images
+    }
+
+    #[test]
+    fn each_view_is_made_once() {
+        let mut images = images();
+        let heights = |scale: f32| View::Heights(Channel::Red, scale.to_bits());
+        let views = [heights(1.0), View::Plain, heights(2.0), View::Inverted, heights(1.0), View::Plain];
+        assert_eq!(views.map(|view| images.show(0, view).unwrap()), [0, 1, 2, 3, 0, 1]);
+        let shown = images.finish();
+        assert_eq!(shown.len(), 4);
+        assert_eq!((shown[1].pixels.get(0)[0], shown[3].pixels.get(0)[0]), (9.0 / 255.0, 246.0 / 255.0));
+    }
+
+    #[test]
+    fn views_are_limited_together() {
+        let mut images = images();
+        images.n_pixels = MAX_PIXELS - 50;
+        for scale in 0..2_u32 {
+            images.show(0, View::Heights(Channel::Red, scale)).unwrap();
+        }
+        let error = images.show(0, View::Inverted).unwrap_err();
+        assert!(error.contains("with a copy of `a.png`"), "{error}");
+        images.show(0, View::Plain).unwrap();
+        let mut images = self::images();
+        images.n_bytes_to_make = u64::MAX;
+        assert!(images.show(0, View::Inverted).unwrap_err().contains("memory"));
+    }
 }

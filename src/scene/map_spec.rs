@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 use super::{
     error::Checked,
-    image_files::{Images, View, opacity_channel},
+    image_files::{Images, View},
     material::Material,
     texture::{Channel, Encoding, Texture, Wrap},
 };
@@ -78,18 +78,23 @@ impl MapSpec {
 
     /// Gives a material the map of a key. `file` is the map's image among `images`.
     pub fn set(&self, material: &mut Material, key: &str, images: &mut Images, file: usize) -> Checked<()> {
-        let image = images.get(file).ok_or_else(|| format!("{key} has no image"))?;
+        let image = images.get(file)?;
         let is_colour = matches!(key, "map_Kd" | "map_Ks" | "map_Ke");
         let encoding = if is_colour { Encoding::Srgb } else { Encoding::Linear };
         let channel = match key {
-            "map_d" => opacity_channel(image),
+            "map_d" => image.opacity_channel(),
             "map_Ns" | "map_roughness" | "map_metallic" | "map_occlusion" => Channel::Luminance,
             _ => Channel::Red,
         };
-        let plain = Texture { encoding, channel, ..Texture::of_image(images.show(file, View::Plain)) };
+        let is_linear = image.image().is_linear;
+        let plain = Texture { encoding, channel, ..Texture::of_image(images.show(file, View::Plain)?) };
         let texture = match self {
             Self::Name(_) => plain,
-            Self::Table(table) => table.texture(plain).map_err(|what| format!("{key}: {what}"))?,
+            Self::Table(table) => {
+                let texture = table.texture(plain)?;
+                table.check_effect(&texture, is_colour || key == "map_normal", is_linear)?;
+                texture
+            }
         };
         let maps = &mut material.maps;
         let map = match key {
@@ -109,6 +114,23 @@ impl MapSpec {
 }
 
 impl MapTable {
+    /// Refuses a channel and an encoding that make no difference to the texture. `is_vector`: the map has several
+    /// numbers. `is_linear`: the image's colours are linear, whatever its encoding says.
+    fn check_effect(&self, texture: &Texture, is_vector: bool, is_linear: bool) -> Checked<()> {
+        if self.channel.is_some() && is_vector {
+            return Err("has `channel`, but the map reads all colours".to_owned());
+        }
+        match self.encoding {
+            Some(_) if !is_vector && texture.channel == Channel::Alpha => {
+                Err("has `encoding`, but the map reads the opacity, which is always linear".to_owned())
+            }
+            Some(EncodingSpec::Srgb) if is_linear => {
+                Err("has `encoding = \"srgb\"`, but the image's numbers are linear".to_owned())
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Returns the texture with the stated options in place of its own.
     fn texture(&self, texture: Texture) -> Checked<Texture> {
         let vector = |name: &str, value: Option<[f32; 2]>, default: Vec2| match value.map(Vec2::from_array) {

@@ -5,9 +5,11 @@ use std::path::Path;
 
 use super::{
     error::SceneError,
+    image_files::Images,
+    material::Material,
     mesh::Mesh,
     needs::{require_for_bytes, require_for_text},
-    obj::{Library, parse_obj},
+    obj::parse_obj,
     outside::Access,
     ply::parse_ply,
     read::{lossy_text, read_bytes},
@@ -68,26 +70,41 @@ pub(super) fn read_mesh(path: &Path) -> Result<Vec<u8>, SceneError> {
     read_bytes(path)
 }
 
-/// Makes a mesh from the content of a file that is not glTF, and reads the materials that it names. A face's slot is an
-/// index into the library. A face without a material, or with one that the library lacks, has slot
-/// `library.materials.len()`. `n_loaded` is the number of triangles that the scene has already, and
-/// `access` says which files the mesh file may name.
-pub(super) fn parse_mesh(
-    path: &Path,
-    bytes: Vec<u8>,
-    shading: Shading,
-    n_loaded: usize,
-    access: Access,
-) -> Result<(Mesh, Library), SceneError> {
+/// How a mesh file is loaded.
+pub(super) struct Loading<'a> {
+    pub shading: Shading,
+    /// Number of triangles that the scene has already.
+    pub n_loaded: usize,
+    /// Which files the mesh file may name.
+    pub access: Access,
+    /// The images of the scene, to which those of the mesh file are added.
+    pub images: &'a mut Images,
+}
+
+/// What a mesh file that is not glTF gives.
+pub(super) struct Loaded {
+    /// The mesh. The slot of a face is an index into `materials`, or `materials.len()` for a face without a material,
+    /// or with one that no library defines.
+    pub mesh: Mesh,
+    pub materials: Vec<Material>,
+    /// Whether normals depend on the crease angle.
+    pub uses_crease: bool,
+}
+
+/// Makes a mesh from the content of a file that is not glTF, and reads the materials that it names.
+pub(super) fn parse_mesh(path: &Path, bytes: Vec<u8>, loading: &mut Loading) -> Result<Loaded, SceneError> {
     let failed = |what: String| SceneError::file(path, what);
-    let (mesh, library) = match MeshFormat::of(path, &bytes) {
-        MeshFormat::Obj => parse_obj(path, &lossy_text(bytes), shading, n_loaded, access)?,
-        MeshFormat::Ply => parse_ply(path, &bytes, shading, n_loaded, access).map_err(failed)?,
+    let loaded = match MeshFormat::of(path, &bytes) {
+        MeshFormat::Obj => parse_obj(path, &lossy_text(bytes), loading)?,
+        MeshFormat::Ply => parse_ply(path, &bytes, loading).map_err(failed)?,
         MeshFormat::Gltf => return Err(failed("is glTF, which is a whole scene".to_owned())),
-        MeshFormat::Stl => (parse_stl(bytes, shading, n_loaded).map_err(failed)?, Library::default()),
+        MeshFormat::Stl => {
+            let mesh = parse_stl(bytes, loading.shading, loading.n_loaded).map_err(failed)?;
+            Loaded { mesh, materials: Vec::new(), uses_crease: loading.shading.smooth }
+        }
     };
-    if mesh.faces.is_empty() {
+    if loaded.mesh.faces.is_empty() {
         return Err(SceneError::file(path, "has no triangles"));
     }
-    Ok((mesh, library))
+    Ok(loaded)
 }

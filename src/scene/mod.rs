@@ -26,6 +26,7 @@ mod obj;
 mod outside;
 mod overrides;
 mod path;
+mod placed;
 mod ply;
 mod polygon;
 mod read;
@@ -55,7 +56,12 @@ pub use self::{
     texture::{Channel, Encoding, Image, Pixels, Texture, Wrap},
     transform::Transform,
 };
-use self::{mesh_file::MeshFormat, outside::Access, smooth::Shading};
+use self::{
+    image_files::Images,
+    mesh_file::{Loaded, Loading, MeshFormat},
+    outside::Access,
+    smooth::Shading,
+};
 
 /// Everything that a frame shows. World space is right-handed, +y up by default.
 #[derive(Clone, Debug, PartialEq)]
@@ -151,6 +157,7 @@ impl Scene {
             let endings = "its name ends in none of .toml, .gltf, .glb, .obj, .ply and .stl";
             return Err(SceneError::file(path, format!("is no scene: {endings}")));
         };
+        scene.add_tangents().map_err(|what| SceneError::file(path, what))?;
         if let Some(name) = &options.camera {
             scene.choose_camera(name).map_err(|what| SceneError::file(path, what))?;
         }
@@ -207,37 +214,6 @@ impl Scene {
         Ok(())
     }
 
-    /// Adds the meshes, materials and images of another scene. `outer` places the other scene's world in this one. If
-    /// `named` has materials of this scene, they replace all those of the other scene, as [`Instance::materials`] of
-    /// each instance.
-    ///
-    /// # Errors
-    /// A mesh reaches beyond `mesh::MAX_COORDINATE` in world space. The error is a message for people.
-    fn append(&mut self, other: Scene, outer: &Transform, named: &[u32]) -> Result<(), String> {
-        let first_mesh = self.meshes.len();
-        for mut instance in other.instances {
-            instance.transform = outer.after(&instance.transform);
-            other.meshes[instance.mesh_ix].placed(&instance.transform)?;
-            instance.mesh_ix += first_mesh;
-            if named.is_empty() {
-                instance.materials.iter_mut().for_each(|ix| *ix += self.materials.len() as u32);
-            } else {
-                instance.materials = named.to_vec();
-            }
-            self.instances.push(instance);
-        }
-        self.meshes.extend(other.meshes);
-        if named.is_empty() {
-            let first_image = self.images.len() as u32;
-            self.images.extend(other.images);
-            self.materials.extend(other.materials.into_iter().map(|mut material| {
-                material.maps.change_each(|texture| texture.image_ix += first_image);
-                material
-            }));
-        }
-        Ok(())
-    }
-
     /// A scene without meshes, materials and lights. Its camera is a placeholder.
     pub(crate) fn empty(path: &Path) -> Self {
         Self {
@@ -270,9 +246,12 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<Scene, SceneErro
     }
     check_only_scene(path, options)?;
     let mut scene = Scene::empty(path);
-    let (mut mesh, library) = mesh_file::parse_mesh(path, bytes, Shading::default(), 0, Access::of(options))?;
-    let slots = scene.push_library(library);
-    scene.add_tangents(&mut mesh, &slots);
+    let mut images = Images::default();
+    let access = Access::of(options);
+    let mut loading = Loading { shading: Shading::default(), n_loaded: 0, access, images: &mut images };
+    let Loaded { mesh, materials, .. } = mesh_file::parse_mesh(path, bytes, &mut loading)?;
+    let slots = scene.push_materials(materials);
+    scene.images = images.finish();
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
     let bounds = scene.bounds();
     extent::check(path, bounds)?;

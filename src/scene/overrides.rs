@@ -1,12 +1,13 @@
 //! The materials of a scene file, by which its meshes are named or the materials of its mesh files are changed.
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use glam::Vec3;
 use toml::Spanned;
 
 use super::{
     Scene,
+    assemble::File,
     description::CommonSpec,
     error::Checked,
     material::{Alpha, Material, MaterialSpec},
@@ -21,12 +22,14 @@ pub(super) struct NamedMaterials<'a> {
     worn: HashSet<u32>,
     /// Materials whose terms replace those of a mesh file's material.
     overriding: HashSet<u32>,
+    /// Names of the materials of the mesh files whose materials are overridden; `None` if there is no such file.
+    of_files: Option<BTreeSet<String>>,
 }
 
 impl<'a> NamedMaterials<'a> {
     /// `indices`: where the scene has the material of each name in `specs`.
     pub fn new(specs: &'a BTreeMap<String, Spanned<MaterialSpec>>, indices: HashMap<String, u32>) -> Self {
-        Self { specs, indices, worn: HashSet::new(), overriding: HashSet::new() }
+        Self { specs, indices, worn: HashSet::new(), overriding: HashSet::new(), of_files: None }
     }
 
     /// Returns the indices of the materials that a mesh names.
@@ -43,7 +46,9 @@ impl<'a> NamedMaterials<'a> {
     /// Gives the scene's materials from index `first` on the terms that materials of the same names state.
     pub fn override_from(&mut self, scene: &mut Scene, first: usize) -> Checked<()> {
         let (named, of_file) = scene.materials.split_at_mut(first);
+        let names = self.of_files.get_or_insert_default();
         for material in of_file {
+            names.insert(material.name.clone());
             let Some(&ix) = self.indices.get(&material.name) else { continue };
             let spec = self.specs[&material.name].get_ref();
             let changed = override_terms(material, spec, &named[ix as usize]);
@@ -51,6 +56,24 @@ impl<'a> NamedMaterials<'a> {
             self.overriding.insert(ix);
         }
         Ok(())
+    }
+
+    /// Warns of materials that neither a mesh has nor override another one, if materials are overridden at all. Names
+    /// that are alike are suggested.
+    pub fn warn_of_unmatched(&self, file: &File) {
+        let Some(of_files) = &self.of_files else { return };
+        let is_idle = |name: &str| {
+            let ix = self.indices[name];
+            !self.worn.contains(&ix) && !self.overriding.contains(&ix)
+        };
+        for (name, spec) in self.specs.iter().filter(|(name, _)| is_idle(name)) {
+            let alike = match alike(name, of_files)[..] {
+                [] => String::new(),
+                ref names => format!(": is {} meant?", names.join(" or ")),
+            };
+            let what = format!("material `{name}` overrides no material of a mesh file, and no mesh has it{alike}");
+            tracing::warn!("{}", file.at(&spec.span(), what));
+        }
     }
 
     /// Removes the materials that only changed others from the scene.
@@ -69,6 +92,18 @@ impl<'a> NamedMaterials<'a> {
             *material = new_ix[*material as usize];
         }
     }
+}
+
+/// Returns the names that a name may be a misspelling of, in quotes: those of the greatest likeness, three at most.
+fn alike(name: &str, names: &BTreeSet<String>) -> Vec<String> {
+    /// Least likeness (Jaro and Winkler's, 0 to 1) of a name and its misspelling.
+    const LEAST_LIKENESS: f64 = 0.8;
+    let likeness = |other: &String| strsim::jaro_winkler(&name.to_lowercase(), &other.to_lowercase());
+    let mut alike: Vec<(f64, &String)> = names.iter().map(|other| (likeness(other), other)).collect();
+    alike.retain(|(likeness, _)| *likeness >= LEAST_LIKENESS);
+    alike.sort_by(|a, b| b.0.total_cmp(&a.0));
+    alike.truncate(3);
+    alike.into_iter().map(|(_, other)| format!("`{other}`")).collect()
 }
 
 /// Gives a material the terms that `spec` states. `stated` is the material that `spec` alone describes.

@@ -11,7 +11,7 @@ use stl_io::{Triangle, create_stl_reader};
 use super::{
     error::Checked,
     mesh::Mesh,
-    needs::require_for_triangles,
+    needs::{MeshSize, require_for_mesh},
     smooth::{Shading, smooth_normals},
 };
 
@@ -65,16 +65,23 @@ fn binary(mut bytes: Vec<u8>, n_loaded: usize) -> Checked<Vec<Triangle>> {
     if n_held < n {
         return Err(format!("ends after {n_held} of {n} facets"));
     }
-    require_for_triangles(n_loaded as u64, n as u64)?;
+    require_for_facets(n_loaded, n)?;
     bytes[..80].fill(0); // a comment, which the reader would take for text if it began with `solid`
     triangles_of(bytes)
+}
+
+/// Refuses facets, which have three points each, if there is not enough memory for them.
+fn require_for_facets(n_loaded: usize, n: usize) -> Checked<()> {
+    let n_triangles = n as u64;
+    let size = MeshSize { n_triangles, n_points: n_triangles.saturating_mul(3), ..MeshSize::default() };
+    require_for_mesh(n_loaded as u64, &size)
 }
 
 /// Reads the solids of a text.
 fn text(bytes: &[u8], n_loaded: usize) -> Checked<Vec<Triangle>> {
     let lines = bytes.split(|byte| *byte == b'\n');
     let n_facets = lines.filter(|line| is_statement(line.trim_ascii_start(), b"facet")).count();
-    require_for_triangles(n_loaded as u64, n_facets as u64)?;
+    require_for_facets(n_loaded, n_facets)?;
     let mut triangles = Vec::new();
     for (line, solid) in solids(bytes) {
         let named = |what| format!("the solid at line {line}: {what}");

@@ -1,6 +1,7 @@
 //! Textures: images, and how a material uses them.
 
 use glam::{Affine2, Vec2};
+use half::f16;
 
 /// An image that textures show, decoded.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,6 +44,29 @@ pub enum Pixels {
     Halves(Vec<[u16; 4]>),
 }
 
+impl Pixels {
+    /// Returns the number of pixels.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Bytes(pixels) => pixels.len(),
+            Self::Halves(pixels) => pixels.len(),
+        }
+    }
+
+    /// Returns whether there are no pixels.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Returns a pixel: 1 for a byte of 255, without regard to the encoding.
+    pub(super) fn get(&self, ix: usize) -> [f32; 4] {
+        match self {
+            Self::Bytes(pixels) => pixels[ix].map(|byte| f32::from(byte) / 255.0),
+            Self::Halves(pixels) => pixels[ix].map(|bits| f16::from_bits(bits).to_f32()),
+        }
+    }
+}
+
 /// An image as a material uses it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
@@ -74,7 +98,7 @@ pub enum Encoding {
 }
 
 /// Channel of an image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Channel {
     /// Red.
     #[default]
@@ -87,6 +111,22 @@ pub enum Channel {
     Alpha,
     /// Relative luminance of the colour (ITU-R BT.709).
     Luminance,
+}
+
+impl Channel {
+    /// All channels, in the order of their numbers.
+    pub(super) const ALL: [Self; 5] = [Self::Red, Self::Green, Self::Blue, Self::Alpha, Self::Luminance];
+
+    /// Returns the number that a pixel has in the channel.
+    pub(super) fn of(self, [r, g, b, a]: [f32; 4]) -> f32 {
+        match self {
+            Self::Red => r,
+            Self::Green => g,
+            Self::Blue => b,
+            Self::Alpha => a,
+            Self::Luminance => 0.2126 * r + 0.7152 * g + 0.0722 * b,
+        }
+    }
 }
 
 /// Continuation of an image outside of 0 to 1.

@@ -15,7 +15,7 @@ use crate::{
         TEXTURE_CHANNEL_SHIFT, TEXTURE_HALVES, TEXTURE_NEAREST, TEXTURE_SRGB, TEXTURE_UV_SET, TEXTURE_WRAP_U_SHIFT,
         TEXTURE_WRAP_V_SHIFT, Texture, WRAP_CLAMP, WRAP_MIRROR, WRAP_REPEAT,
     },
-    scene::{self, Alpha, Channel, Encoding, Image, Material, Pixels, Scene, Wrap},
+    scene::{self, Alpha, Channel, Encoding, Image, Material, Scene, Wrap},
     util::memory,
 };
 
@@ -142,10 +142,7 @@ fn image_of<'a>(scene: &'a Scene, material_ix: usize, texture: &scene::Texture) 
     let image = scene.images.get(image_ix as usize);
     let image = image.ok_or_else(|| wrong(format!("it shows image {image_ix}, but there are {n_images} images")))?;
     let &Image { width, height, ref pixels, ref name, .. } = image;
-    let n_pixels = match pixels {
-        Pixels::Bytes(pixels) => pixels.len(),
-        Pixels::Halves(pixels) => pixels.len(),
-    };
+    let n_pixels = pixels.len();
     let is_size = (1..=MAX_SIDE).contains(&width) && (1..=MAX_SIDE).contains(&height);
     if !is_size || u64::from(width) * u64::from(height) != n_pixels as u64 {
         let what = format!("its size is {width} x {height}, and it has {n_pixels} pixels");
@@ -249,7 +246,10 @@ pub(crate) mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::layout::{SRGB_TABLE_SIZE, TEXTURE_WRAP_MASK};
+    use crate::{
+        layout::{SRGB_TABLE_SIZE, TEXTURE_WRAP_MASK},
+        scene::Pixels,
+    };
 
     fn image(width: u32, height: u32) -> Image {
         let pixels = Pixels::Bytes(vec![[255, 0, 0, 255]; (width * height) as usize]);

@@ -1,6 +1,8 @@
 //! Textures of a flattened scene, as kernels read them: texels, how materials use them, and the texture coordinates,
 //! tangents and colours at the corners of triangles.
 
+use std::cell::OnceCell;
+
 use glam::{Vec2, Vec4};
 use rayon::prelude::*;
 
@@ -15,7 +17,7 @@ use crate::{
         CornerSurface, LEAST_SHADOWING_OPACITY, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_CUTOUT,
         MAPS_VEIL, MaterialMaps, NO_TEXTURE, Texture,
     },
-    scene::{Alpha, Image, Material, Scene},
+    scene::{Alpha, Material, Scene},
     util::memory,
 };
 
@@ -47,8 +49,12 @@ impl Textures {
         let TextureArrays { mut texels, textures } = arrays;
         let is_see_through = |corners: &[Vec4; 3]| corners.iter().any(|colour| colour.w < 1.0);
         let corners_have_opacity = scene.meshes.par_iter().any(|mesh| mesh.colours.iter().any(is_see_through));
+        let known = vec![OnceCell::new(); scene.images.len()];
+        let is_see_through = |ix: usize| {
+            known.get(ix).is_some_and(|known: &OnceCell<bool>| *known.get_or_init(|| scene.images[ix].is_see_through()))
+        };
         for (maps, material) in material_maps.iter_mut().zip(&scene.materials) {
-            set_opacity(maps, material, scene, corners_have_opacity);
+            set_opacity(maps, material, is_see_through, corners_have_opacity);
         }
         let has_colours = scene.meshes.iter().any(|mesh| !mesh.colours.is_empty());
         let has_opacity = material_maps.iter().any(|maps| maps.flags & (MAPS_CUTOUT | MAPS_VEIL) != 0);
@@ -139,9 +145,14 @@ fn n_bytes_of_corners(n_triangles: usize, n_uv_sets: usize, has_corners: bool) -
     n_triangles as u64 * (of_uvs + of_corners) as u64
 }
 
-/// Sets how a material's opacity acts on rays. `corners_have_opacity`: whether colours at corners of the scene's meshes
-/// are not opaque.
-fn set_opacity(maps: &mut MaterialMaps, material: &Material, scene: &Scene, corners_have_opacity: bool) {
+/// Sets how a material's opacity acts on rays. `is_see_through` returns whether the image at an index is not opaque, and
+/// `corners_have_opacity` says whether colours at corners of the scene's meshes are not.
+fn set_opacity(
+    maps: &mut MaterialMaps,
+    material: &Material,
+    is_see_through: impl Fn(usize) -> bool,
+    corners_have_opacity: bool,
+) {
     let is_microfacet = material.microfacet.is_some();
     if material.alpha != Alpha::Opaque {
         // Of MTL's materials, only a cut-out without an opacity map of its own takes that of the colours.
@@ -158,7 +169,8 @@ fn set_opacity(maps: &mut MaterialMaps, material: &Material, scene: &Scene, corn
         Alpha::Coverage => {
             let is_glass = material.lobes.reflection || material.lobes.refraction;
             if is_microfacet {
-                let by_colour = colours_are_see_through(material, scene);
+                let colours = material.maps.base_colour.as_ref();
+                let by_colour = colours.is_some_and(|map| is_see_through(map.image_ix as usize));
                 maps.flags |= if material.d < 1.0 || by_colour || corners_have_opacity { MAPS_VEIL } else { 0 };
             } else if !is_glass && (corners_have_opacity || material.maps.opacity.is_some()) {
                 // MTL's own transparency `d` casts whole shadows, as in the paper.
@@ -168,10 +180,4 @@ fn set_opacity(maps: &mut MaterialMaps, material: &Material, scene: &Scene, corn
             maps.alpha_cutoff = LEAST_SHADOWING_OPACITY;
         }
     }
-}
-
-/// Returns whether the image of the base colour is not opaque.
-fn colours_are_see_through(material: &Material, scene: &Scene) -> bool {
-    let image = material.maps.base_colour.as_ref().and_then(|map| scene.images.get(map.image_ix as usize));
-    image.is_some_and(Image::is_see_through)
 }

@@ -5,12 +5,12 @@ mod errors;
 mod extent;
 mod generators;
 mod gltf;
-mod gltf_materials;
 mod instances;
 mod materials;
 mod mesh_files;
 mod obj;
 mod path;
+mod placed;
 #[path = "../support/mod.rs"]
 mod support;
 

@@ -19,6 +19,14 @@ pub fn png(pixel: impl Fn(u32, u32) -> [u8; 4]) -> Vec<u8> {
     bytes.into_inner()
 }
 
+/// Returns an HDR file of one pixel.
+fn hdr() -> Vec<u8> {
+    let mut bytes = io::Cursor::new(Vec::new());
+    let image = image::DynamicImage::ImageRgb32F(image::Rgb32FImage::new(1, 1));
+    image.write_to(&mut bytes, image::ImageFormat::Hdr).unwrap();
+    bytes.into_inner()
+}
+
 fn grey(value: u8) -> Vec<u8> {
     png(|_, _| [value, value, value, 255])
 }
@@ -109,7 +117,15 @@ fn options_place_the_image() {
 #[test]
 fn physically_based_terms_make_microfacets() {
     let files: [(&str, &[u8]); 1] = [("r.png", &grey(128))];
-    let m = material("Kd 1 0 0\nPr 0.25\nPm 1\nPs 0.5\nPc 1\nPcr 0.125\nNi 1.4\naniso 0.5\nanisor 0", &files);
+    let mtl = "Kd 1 0 0\nPr 0.25\nPm 1\nPs 0.5\nPc 1\nPcr 0.125\nNi 1.4\naniso 0.5\nanisor 0\nnewmtl n\nPc 1";
+    let (scene, warnings) = load_mtl(mtl, &files);
+    // Each term is told once, and none of its value 0.
+    for (warning, term) in warnings.iter().zip(["m.mtl:5: `Ps`", "m.mtl:6: `Pc`", "m.mtl:9: `aniso`"]) {
+        assert!(warning.ends_with(&format!("{term} is not shown")), "{warnings:?}");
+    }
+    assert_eq!(warnings.len(), 3, "{warnings:?}");
+    material("Ps 0\nPc 0\nPcr 0.03\naniso 0\nanisor 0", &files);
+    let m = &scene.materials[0];
     let pbr = m.microfacet.unwrap();
     assert_eq!((pbr.roughness, pbr.metallic, m.kd, m.ks, m.ni), (0.25, 1.0, Vec3::X, Vec3::ONE, 1.4));
     assert_eq!((m.sheen.colour, m.clearcoat.factor, m.clearcoat.roughness), (Vec3::splat(0.5), 1.0, 0.125));
@@ -281,7 +297,7 @@ fn scene_files_describe_maps_and_microfacets() {
 
 #[test]
 fn mistakes_in_materials_are_named() {
-    let image: [(&str, &[u8]); 1] = [("a.png", &grey(1))];
+    let image: [(&str, &[u8]); 2] = [("a.png", &grey(1)), ("a.hdr", &hdr())];
     for (text, what) in [
         ("map_Kd = 'none.png'", "material `m`: map_Kd: "),
         ("map_Kd = 3", "expected the name of an image, or a table"),
@@ -294,6 +310,10 @@ fn mistakes_in_materials_are_named() {
         ("attenuation_distance = 0", "attenuation_distance = 0 is not above 0"),
         ("cutoff = -1", "cutoff = -1 is outside"),
         ("normal_scale = 1", "normal_scale and no map_normal"),
+        ("map_Kd = { file = 'a.png', channel = 'red' }", "map_Kd: has `channel`"),
+        ("map_normal = { file = 'a.png', channel = 'green' }", "map_normal: has `channel`"),
+        ("map_d = { file = 'a.png', channel = 'alpha', encoding = 'srgb' }", "map_d: has `encoding`"),
+        ("map_Kd = { file = 'a.hdr', encoding = 'srgb' }", "map_Kd: has `encoding = \"srgb\"`"),
     ] {
         let error = load_toml(text, &image).map(|scene| scene.materials).expect_err(text).to_string();
         assert!(error.contains("s.toml:1: ") && error.contains(what) && error.lines().count() == 1, "{text}: {error}");

@@ -209,6 +209,18 @@ fn mistakes_are_named() {
         error("x.ply", ply.replace("element face 6", "element face 99999999999999").as_bytes())
             .contains("element `face`")
     );
+    // The header alone is refused, before any row is read.
+    for (n, element) in [(99_999_999, "vertex 8"), (usize::MAX, "vertex 8"), (1 << 40, "face 6")] {
+        let (name, _) = element.split_once(' ').unwrap();
+        for content in [ply.as_bytes(), &ply_binary(false)] {
+            let text = String::from_utf8_lossy(content).into_owned();
+            let head = text.split_once("end_header\n").unwrap().0.replace(element, &format!("{name} {n}"));
+            let body = &content[text.find("end_header").unwrap()..];
+            let found = error("x.ply", &[head.as_bytes(), body].concat());
+            assert!(found.contains(&format!("element `{name}`: the file ends too early: ")), "{found}");
+            assert!(found.ends_with(&format!("bytes do not hold its {n} rows")), "{found}");
+        }
+    }
     let stl = stl_text("", triangles());
     for (from, to, what) in [
         ("vertex -1e0 -1 -1", "vertex -1e0 -1", "the solid at line 1: vertex f32 f32 f32"),

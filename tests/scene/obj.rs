@@ -223,6 +223,11 @@ fn colours_of_points_are_srgb() {
     let bytes = mesh("v 0 0 0 255 0 51\nv 1 0 0 255 255 255\nv 0 1 0 0 0 0\nf 1 2 3\n").colours[0];
     assert_eq!((bytes[1], bytes[0].x), (white, 1.0));
     assert!((bytes[0].z - 0.0331).abs() < 1e-4, "{}", bytes[0]);
+    // Points without a colour are white, whatever number stands for 1, and a point that no face has decides, too.
+    assert_eq!(mesh("v 0 0 0 255 0 51\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").colours[0][1], white);
+    let unused = mesh("v 0 0 0 1 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5 2 0 0\nf 1 2 3\n").colours[0];
+    assert_eq!(unused[1], white);
+    assert!(unused[0].x < 0.001, "{}", unused[0]);
 }
 
 #[test]

@@ -14,11 +14,15 @@ mod torus_knot;
 
 use serde::Deserialize;
 
-use super::{error::Checked, mesh::Mesh, needs};
+use super::{
+    error::Checked,
+    mesh::Mesh,
+    needs::{Attributes, MeshSize, require_for_mesh},
+};
 
-/// Largest number of triangles of one generator's mesh: 0.8 GiB at 52 bytes each.
+/// Largest number of triangles of one generator's mesh: 1.4 GiB at 88 bytes each.
 pub const MAX_TRIANGLES: u64 = 1 << 24;
-/// Largest number of triangles that all generators of a scene may make together: 3.2 GiB at 52 bytes each.
+/// Largest number of triangles that all generators of a scene may make together: 5.5 GiB at 88 bytes each.
 pub const MAX_TRIANGLES_OF_SCENE: u64 = 1 << 26;
 
 /// A generator, selected by `generator = "name"`, with its own parameters. Other parameters are an error.
@@ -97,7 +101,9 @@ impl TriangleBudget {
                  {MAX_TRIANGLES_OF_SCENE} from generators"
             ));
         }
-        needs::require_for_triangles(self.n_triangles, n_triangles)
+        // Most meshes have one point for two triangles, and some have one for each.
+        let attributes = Attributes { n_uv_sets: 1, ..Attributes::default() };
+        require_for_mesh(self.n_triangles, &MeshSize { n_triangles, n_points: n_triangles, attributes })
     }
 }
 

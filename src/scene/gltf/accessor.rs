@@ -1,5 +1,7 @@
-//! Accessors: typed elements of buffers. Each element is read when it is asked for, since a hostile file can name a
-//! large accessor many times.
+//! Accessors: typed elements of buffers. Each element is read when it is asked for, and the indices of a sparse accessor
+//! once, since a hostile file can name a large accessor many times.
+
+use std::rc::Rc;
 
 use gltf::json::{
     Index,
@@ -23,7 +25,7 @@ pub(super) struct Accessor<'a> {
     /// Elements, unless all are 0.
     elements: Option<Elements<'a>>,
     /// Elements that replace others, by their ascending indices.
-    replaced: Vec<u32>,
+    replaced: Rc<[u32]>,
     replacements: Option<Elements<'a>>,
 }
 
@@ -74,29 +76,33 @@ impl<'a> Accessor<'a> {
             None => None,
         };
         let is_normalized = json.normalized;
-        let (replaced, replacements) = (Vec::new(), None);
+        let (replaced, replacements) = (Rc::default(), None);
         let mut accessor = Self { n, n_components, path, kind, is_normalized, elements, replaced, replacements };
         if let Some(sparse) = &json.sparse {
             accessor
-                .replace(document, sparse, size)
+                .replace(document, (index.value(), sparse), size)
                 .map_err(|what| format!("{}: accessors[{index}].sparse: {what}", accessor.path))?;
         }
         Ok(accessor)
     }
 
-    fn replace(&mut self, document: &'a Document, sparse: &sparse::Sparse, size: usize) -> Checked<()> {
+    /// Reads which elements are replaced. `ix` is the accessor's index.
+    fn replace(&mut self, document: &'a Document, (ix, sparse): (usize, &sparse::Sparse), size: usize) -> Checked<()> {
         let n = usize::try_from(sparse.count.0).ok().filter(|n| *n <= self.n);
         let n = n.ok_or_else(|| format!("count = {} is more than the accessor has", sparse.count.0))?;
         let Valid(accessor::IndexComponentType(kind)) = sparse.indices.component_type else {
             return Err("the componentType of its indices is unknown".to_owned());
         };
-        let view = document.view(sparse.indices.buffer_view, &"indices")?;
-        let indices = Elements::new(view, sparse.indices.byte_offset.0, n, kind.size())?;
-        self.replaced = (0..n).map(|ix| unsigned(kind, indices.of(ix, kind.size()))).collect();
-        let is_ascending = self.replaced.windows(2).all(|pair| pair[0] < pair[1]);
-        if !is_ascending || self.replaced.last().is_some_and(|last| *last as usize >= self.n) {
-            return Err(format!("its indices do not ascend, or are not below {}", self.n));
-        }
+        self.replaced = document.replaced(ix, || {
+            let view = document.view(sparse.indices.buffer_view, &"indices")?;
+            let indices = Elements::new(view, sparse.indices.byte_offset.0, n, kind.size())?;
+            let replaced: Rc<[u32]> = (0..n).map(|ix| unsigned(kind, indices.of(ix, kind.size()))).collect();
+            let is_ascending = replaced.windows(2).all(|pair| pair[0] < pair[1]);
+            match !is_ascending || replaced.last().is_some_and(|last| *last as usize >= self.n) {
+                true => Err(format!("its indices do not ascend, or are not below {}", self.n)),
+                false => Ok(replaced),
+            }
+        })?;
         let view = document.view(sparse.values.buffer_view, &"values")?;
         self.replacements = Some(Elements::new(view, sparse.values.byte_offset.0, n, size)?);
         Ok(())

@@ -1,10 +1,13 @@
 //! Morph targets and skins in the pose that the file gives. Animations are not shown.
 
+use std::collections::HashMap;
+
 use glam::{DMat3, DMat4, Vec3};
 use gltf::{
     Semantic,
-    json::{accessor::Type, mesh::MorphTarget},
+    json::{Index, accessor::Type, mesh::MorphTarget},
 };
+use serde::Deserialize;
 
 use super::{accessor::Accessor, document::Document, geometry::Attributes};
 use crate::scene::{error::Checked, transform::normals_of};
@@ -40,6 +43,72 @@ impl<'a> Morph<'a> {
             }
         }
         Ok(vertex)
+    }
+}
+
+/// What the morph targets of a primitive add to texture coordinates or colours.
+pub(super) struct Added<'a>(Vec<(f32, Accessor<'a>)>);
+
+impl<'a> Added<'a> {
+    /// Returns what targets with weights add to an attribute of `n` vertices.
+    pub fn new(
+        attributes: &Attributes<'a>,
+        semantic: &Semantic,
+        types: &[Type],
+        (weights, n): (&[f32], usize),
+    ) -> Checked<Self> {
+        let name = semantic.to_string();
+        let mut added = Vec::new();
+        for (ix, (target, weight)) in attributes.targets.iter().zip(weights).enumerate() {
+            let Some(accessor) = target.get(&name).filter(|_| *weight != 0.0) else { continue };
+            let path = format!("{}.targets[{ix}].{name}", attributes.path);
+            added.push((*weight, attributes.accessor(Index::new(*accessor), types, Some(n), path)?));
+        }
+        Ok(Self(added))
+    }
+
+    /// Returns the value at the vertex with index `ix`, which is `value` without targets.
+    pub fn to<const N: usize>(&self, ix: usize, mut value: [f32; N]) -> Checked<[f32; N]> {
+        for (weight, accessor) in &self.0 {
+            let added: [f32; N] = accessor.numbers(ix, 0.0)?;
+            value.iter_mut().zip(added).for_each(|(value, added)| *value += weight * added);
+        }
+        Ok(value)
+    }
+
+    /// Returns the colour at a vertex, as [`Added::to`] does. Colours that targets change are clamped to 0 to 1.
+    pub fn to_colour(&self, ix: usize, colour: [f32; 4]) -> Checked<[f32; 4]> {
+        let changed = self.to(ix, colour)?;
+        Ok(if self.0.is_empty() { changed } else { changed.map(|number| number.clamp(0.0, 1.0)) })
+    }
+}
+
+/// The attributes of a morph target, as indices of accessors. The crate `gltf` does not read all of them.
+pub(super) type TargetAttributes = HashMap<String, u32>;
+
+/// The morph targets of a document, by its meshes and their primitives.
+#[derive(Default, Deserialize)]
+pub(super) struct MorphTargets {
+    #[serde(default)]
+    meshes: Vec<OfMesh>,
+}
+
+#[derive(Deserialize)]
+struct OfMesh {
+    #[serde(default)]
+    primitives: Vec<OfPrimitive>,
+}
+
+#[derive(Deserialize)]
+struct OfPrimitive {
+    targets: Option<Vec<TargetAttributes>>,
+}
+
+impl MorphTargets {
+    /// Returns the morph targets of a primitive.
+    pub fn of(&self, mesh_ix: usize, primitive_ix: usize) -> &[TargetAttributes] {
+        let primitive = self.meshes.get(mesh_ix).and_then(|mesh| mesh.primitives.get(primitive_ix));
+        primitive.and_then(|primitive| primitive.targets.as_deref()).unwrap_or_default()
     }
 }
 

@@ -1,15 +1,22 @@
 //! A glTF file with its buffers: `.gltf`, JSON beside files of data, and `.glb`, one file with both.
 
 use std::{
+    borrow::Cow,
     cell::RefCell,
     fmt::Display,
     path::{Path, PathBuf},
+    rc::Rc,
 };
 
 use gltf::json::{self, Index, Root, image};
 use hashbrown::HashMap;
 
-use super::{meshopt, uri::Uri};
+use super::{
+    deform::MorphTargets,
+    glb::split,
+    meshopt,
+    uri::{Uri, is_data},
+};
 use crate::{
     scene::{error::Checked, needs::require_for_bytes, outside::Access, read::read_bytes},
     util::memory::require,
@@ -49,12 +56,33 @@ const WITHOUT_EFFECT: [&str; 6] = [
 pub(super) struct Document {
     /// The JSON. No index in it is checked.
     pub root: Root,
+    /// The morph targets of the meshes.
+    pub morph_targets: MorphTargets,
     path: PathBuf,
     access: Access,
-    buffers: Vec<Vec<u8>>,
+    buffers: Vec<Buffer>,
+    /// Contents of the files that buffers name.
+    files: RefCell<HashMap<PathBuf, Rc<Vec<u8>>>>,
+    /// Indices of the elements that sparse accessors replace, by the accessor's index.
+    replaced: RefCell<HashMap<usize, Rc<[u32]>>>,
     /// Contents of the compressed buffer views, by the view's index.
     decoded: HashMap<usize, Vec<u8>>,
     notes: RefCell<Vec<(&'static str, Vec<String>)>>,
+}
+
+/// The first bytes of a file, of a data URI or of the binary chunk. Several buffers can share a file.
+struct Buffer {
+    content: Rc<Vec<u8>>,
+    n_bytes: usize,
+}
+
+/// Where the bytes of an image are.
+#[derive(Clone, PartialEq, Eq, Hash)]
+pub(super) enum ImageSource {
+    /// In the URI of the image at this index.
+    Uri(usize),
+    File(PathBuf),
+    View(usize),
 }
 
 /// The part of a buffer that a buffer view shows.
@@ -71,8 +99,14 @@ impl Document {
         let (json, chunk) = split(bytes)?;
         let root: Root = json::deserialize::from_slice(json).map_err(|error| format!("the JSON: {error}"))?;
         let path = path.to_owned();
-        let (buffers, decoded, notes) = (Vec::new(), HashMap::new(), RefCell::default());
-        let mut document = Self { root, path, access, buffers, decoded, notes };
+        let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+        let morph_targets = match primitives.flat_map(|primitive| &primitive.targets).next() {
+            Some(_) => json::deserialize::from_slice(json).map_err(|error| format!("the JSON: {error}"))?,
+            None => MorphTargets::default(),
+        };
+        let (buffers, files, replaced) = (Vec::new(), RefCell::default(), RefCell::default());
+        let (decoded, notes) = (HashMap::new(), RefCell::default());
+        let mut document = Self { root, morph_targets, path, access, buffers, files, replaced, decoded, notes };
         document.check_version()?;
         document.check_extensions()?;
         for ix in 0..document.root.buffers.len() {
@@ -106,23 +140,22 @@ impl Document {
     }
 
     /// Returns the content of a buffer. Buffers that only stand in for compressed views are empty.
-    fn buffer(&self, ix: usize, chunk: Option<&[u8]>) -> Checked<Vec<u8>> {
+    fn buffer(&self, ix: usize, chunk: Option<&[u8]>) -> Checked<Buffer> {
         let buffer = &self.root.buffers[ix];
         let extensions = buffer.extensions.as_ref();
         if extensions.is_some_and(|extensions| meshopt::is_fallback(&extensions.others)) {
-            return Ok(Vec::new());
+            return Ok(Buffer { content: Rc::default(), n_bytes: 0 });
         }
-        let mut bytes = match (&buffer.uri, chunk) {
+        let content = match (&buffer.uri, chunk) {
             (Some(uri), _) => self.fetch(uri)?,
-            (None, Some(chunk)) if ix == 0 => chunk.to_vec(),
+            (None, Some(chunk)) if ix == 0 => Rc::new(chunk.to_vec()),
             (None, _) => return Err("has no uri, and there is no binary chunk for it".to_owned()),
         };
         let n_bytes = buffer.byte_length.0;
-        if (bytes.len() as u64) < n_bytes {
-            return Err(format!("has {} bytes, but byteLength = {n_bytes}", bytes.len()));
+        if (content.len() as u64) < n_bytes {
+            return Err(format!("has {} bytes, but byteLength = {n_bytes}", content.len()));
         }
-        bytes.truncate(n_bytes as usize);
-        Ok(bytes)
+        Ok(Buffer { content, n_bytes: n_bytes as usize })
     }
 
     /// Decodes the compressed buffer views.
@@ -132,49 +165,77 @@ impl Document {
             let Some(packed) = view.extensions.as_ref().and_then(|it| meshopt::packed(&it.others)) else { continue };
             let failed = |what: String| format!("bufferViews[{ix}].extensions: meshopt_compression: {what}");
             let packed = packed.map_err(failed)?;
-            n_total += packed.n_bytes().map_err(failed)?;
+            n_total = packed.n_bytes().map_err(failed)?.saturating_add(n_total);
             require("decoding the buffer views", n_total).map_err(|error| failed(error.to_string()))?;
             let buffer = item(&self.buffers, "buffers", packed.buffer, &"buffer").map_err(failed)?;
-            let bytes = part(buffer, packed.byte_offset, packed.byte_length).map_err(failed)?;
+            let bytes = part(buffer.bytes(), packed.byte_offset, packed.byte_length).map_err(failed)?;
             self.decoded.insert(ix, packed.decode(bytes).map_err(failed)?);
         }
         Ok(())
     }
 
-    /// Returns what a URI stands for.
-    fn fetch(&self, uri: &str) -> Checked<Vec<u8>> {
-        match Uri::new(uri)? {
-            Uri::Data(bytes) => Ok(bytes),
-            Uri::File(name) => {
-                let path = self.access.beside(&self.path).exact(&name)?;
-                require_for_bytes(&path)?;
-                read_bytes(&path).map_err(|error| error.to_string())
-            }
+    /// Returns what a buffer's URI stands for. A file that several buffers name is read once.
+    fn fetch(&self, uri: &str) -> Checked<Rc<Vec<u8>>> {
+        let name = match Uri::new(uri)? {
+            Uri::Data(bytes) => return Ok(Rc::new(bytes)),
+            Uri::File(name) => name,
+        };
+        let path = self.access.beside(&self.path).exact(&name)?;
+        if let Some(content) = self.files.borrow().get(&path) {
+            return Ok(content.clone());
+        }
+        require_for_bytes(&path)?;
+        let content = Rc::new(read_bytes(&path).map_err(|error| error.to_string())?);
+        self.files.borrow_mut().insert(path, content.clone());
+        Ok(content)
+    }
+
+    /// Returns the indices of the elements that the sparse accessor at an index replaces. `read` reads them at the first
+    /// call.
+    pub fn replaced(&self, accessor_ix: usize, read: impl FnOnce() -> Checked<Rc<[u32]>>) -> Checked<Rc<[u32]>> {
+        if let Some(known) = self.replaced.borrow().get(&accessor_ix) {
+            return Ok(known.clone());
+        }
+        let replaced = read()?;
+        self.replaced.borrow_mut().insert(accessor_ix, replaced.clone());
+        Ok(replaced)
+    }
+
+    /// Returns where the bytes of an image are. `from` is the JSON path that names the image.
+    pub fn image_source(&self, index: Index<image::Image>, from: &dyn Display) -> Checked<ImageSource> {
+        let image = item(&self.root.images, "images", index.value(), from)?;
+        let failed = |what: String| format!("images[{index}]: {what}");
+        match (&image.uri, image.buffer_view) {
+            (Some(uri), _) if is_data(uri) => Ok(ImageSource::Uri(index.value())),
+            (Some(uri), _) => match Uri::new(uri).map_err(failed)? {
+                Uri::Data(_) => unreachable!("data is another source"),
+                Uri::File(name) => self.access.beside(&self.path).exact(&name).map(ImageSource::File).map_err(failed),
+            },
+            (None, Some(view)) => Ok(ImageSource::View(view.value())),
+            (None, None) => Err(failed("has neither uri nor bufferView".to_owned())),
         }
     }
 
-    /// Returns the bytes of an image, or `None` with a note if its file cannot be read.
-    pub fn image(&self, index: Index<image::Image>, from: &dyn Display) -> Checked<Option<Vec<u8>>> {
-        let image = item(&self.root.images, "images", index.value(), from)?;
-        let place = format!("images[{index}]");
-        match (&image.uri, image.buffer_view) {
-            (Some(uri), _) => match Uri::new(uri).map_err(|what| format!("{place}: {what}"))? {
-                Uri::Data(bytes) => Ok(Some(bytes)),
-                Uri::File(name) => {
-                    let path =
-                        self.access.beside(&self.path).exact(&name).map_err(|what| format!("{place}: {what}"))?;
-                    require_for_bytes(&path).map_err(|what| format!("{place}: {what}"))?;
-                    match read_bytes(&path) {
-                        Ok(bytes) => Ok(Some(bytes)),
-                        Err(error) => {
-                            self.note("images that cannot be read, without which materials are shown", error);
-                            Ok(None)
-                        }
+    /// Returns the bytes of the image at an index, or `None` with a note if its file cannot be read.
+    pub fn image(&self, ix: usize, source: &ImageSource) -> Checked<Option<Cow<'_, [u8]>>> {
+        let place = format!("images[{ix}]");
+        match source {
+            ImageSource::Uri(ix) => match Uri::new(self.root.images[*ix].uri.as_deref().unwrap_or_default()) {
+                Ok(Uri::Data(bytes)) => Ok(Some(bytes.into())),
+                Ok(Uri::File(_)) => unreachable!("files are another source"),
+                Err(what) => Err(format!("{place}: {what}")),
+            },
+            ImageSource::View(view) => Ok(Some(self.view(Index::new(*view as u32), &place)?.bytes.into())),
+            ImageSource::File(path) => {
+                require_for_bytes(path).map_err(|what| format!("{place}: {what}"))?;
+                match read_bytes(path) {
+                    Ok(bytes) => Ok(Some(bytes.into())),
+                    Err(error) => {
+                        self.note("images that cannot be read, without which materials are shown", error);
+                        Ok(None)
                     }
                 }
-            },
-            (None, Some(view)) => Ok(Some(self.view(view, &place)?.bytes.to_vec())),
-            (None, None) => Err(format!("{place}: has neither uri nor bufferView")),
+            }
         }
     }
 
@@ -189,7 +250,7 @@ impl Document {
         let place = format!("bufferViews[{ix}]");
         let buffer = item(&self.buffers, "buffers", view.buffer.value(), &place)?;
         let offset = view.byte_offset.unwrap_or_default().0;
-        let bytes = part(buffer, offset, view.byte_length.0).map_err(|what| format!("{place}: {what}"))?;
+        let bytes = part(buffer.bytes(), offset, view.byte_length.0).map_err(|what| format!("{place}: {what}"))?;
         Ok(View { bytes, stride })
     }
 
@@ -215,6 +276,12 @@ impl Document {
     }
 }
 
+impl Buffer {
+    fn bytes(&self) -> &[u8] {
+        &self.content[..self.n_bytes]
+    }
+}
+
 /// Returns an item of one of the document's lists, or an error that names the JSON path `from`.
 pub(super) fn item<'a, T>(list: &'a [T], name: &str, ix: usize, from: &dyn Display) -> Checked<&'a T> {
     list.get(ix).ok_or_else(|| format!("{from}: there is no {name}[{ix}], but only {}", list.len()))
@@ -229,30 +296,6 @@ pub(super) fn part(bytes: &[u8], offset: u64, n_bytes: u64) -> Checked<&[u8]> {
     }
 }
 
-/// Returns the JSON of a file, and the binary chunk if it has one.
-pub(super) fn split(bytes: &[u8]) -> Checked<(&[u8], Option<&[u8]>)> {
-    if !bytes.starts_with(b"glTF") {
-        return Ok((bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), None));
-    }
-    let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?) as usize);
-    match word(4) {
-        Some(2) => {}
-        Some(version) => return Err(format!("is a GLB file of version {version}, and only version 2 is read")),
-        None => return Err("the header ends too early".to_owned()),
-    }
-    let chunk = |at: usize, kind: &[u8; 4], name: &str| {
-        let n_bytes = word(at).ok_or_else(|| format!("the header of the chunk {name} ends too early"))?;
-        if bytes.get(at + 4..at + 8) != Some(kind) {
-            return Err(format!("there is no chunk {name} at byte {at}"));
-        }
-        part(bytes, at as u64 + 8, n_bytes as u64).map_err(|what| format!("the chunk {name}: {what}"))
-    };
-    let json = chunk(12, b"JSON", "JSON")?;
-    let end = 20 + json.len();
-    let binary = if end + 8 <= bytes.len() { Some(chunk(end, b"BIN\0", "BIN")?) } else { None };
-    Ok((json, binary))
-}
-
 /// Returns the names of the files that a glTF file names: its buffers and images. What cannot be read names nothing.
 pub(in crate::scene) fn named_files(path: &Path, bytes: &[u8], access: Access) -> Vec<PathBuf> {
     let json = split(bytes).map(|(json, _)| json).unwrap_or_default();
@@ -264,4 +307,24 @@ pub(in crate::scene) fn named_files(path: &Path, bytes: &[u8], access: Access) -
         _ => None,
     })
     .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    #[test]
+    fn a_file_of_several_buffers_is_read_once() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("a b.bin"), [7; 12]).unwrap();
+        let buffers = r#"[{ "uri": "a%20b.bin", "byteLength": 4 }, { "uri": "./a b.bin", "byteLength": 12 }]"#;
+        let json = format!(r#"{{ "asset": {{ "version": "2.0" }}, "buffers": {buffers} }}"#);
+        let path = folder.path().join("m.gltf");
+        let document = Document::read(&path, json.as_bytes(), Access::default()).unwrap();
+        let [a, b] = &document.buffers[..] else { panic!("two buffers") };
+        assert!(Rc::ptr_eq(&a.content, &b.content));
+        assert_eq!((a.bytes(), b.bytes()), (&[7; 4][..], &[7; 12][..]));
+    }
 }

@@ -14,11 +14,14 @@ use rayon::prelude::*;
 
 use super::{
     accessor::Accessor,
-    deform::{Morph, Skin, Skinning},
+    deform::{Added, Morph, Skin, Skinning, TargetAttributes},
     document::Document,
-    tangents::{NormalMap, add_tangents},
 };
-use crate::scene::{error::Checked, mesh::Mesh, needs::require_for_triangles};
+use crate::scene::{
+    error::Checked,
+    mesh::Mesh,
+    needs::{self, MeshSize, require_for_mesh},
+};
 
 /// How the vertices of a mesh move away from the places that the file gives.
 #[derive(Clone, Copy)]
@@ -37,15 +40,37 @@ struct Vertices {
     tangents: Vec<Vec4>,
 }
 
-/// Returns the mesh of a primitive, whose faces have the slot `slot`, or `None` for points and lines. `path` is its
-/// JSON path, `n_loaded` the number of triangles that there are already.
-pub(super) fn mesh(
-    document: &Document,
-    (primitive, slot): (&Primitive, u32),
-    pose: Pose,
-    normal_map: Option<NormalMap>,
-    (path, n_loaded): (&str, u64),
-) -> Checked<Option<Mesh>> {
+/// A primitive of a mesh.
+pub(super) struct Part<'a> {
+    pub primitive: &'a Primitive,
+    /// Its morph targets.
+    pub targets: &'a [TargetAttributes],
+    /// Its JSON path.
+    pub path: String,
+    /// The slot of its faces.
+    pub slot: u32,
+    /// What the faces of the whole mesh have.
+    pub whole: needs::Attributes,
+}
+
+/// Returns the attributes that some primitive of a mesh has.
+pub(super) fn attributes_of(primitives: &[Primitive]) -> needs::Attributes {
+    let some_has = |semantic| {
+        let semantic = Valid(semantic);
+        primitives.iter().any(|primitive| primitive.attributes.contains_key(&semantic))
+    };
+    needs::Attributes {
+        n_uv_sets: [0, 1].into_iter().filter(|set| some_has(Semantic::TexCoords(*set))).count() as u64,
+        has_colours: some_has(Semantic::Colors(0)),
+        has_tangents: some_has(Semantic::Tangents),
+    }
+}
+
+/// Returns the mesh of a primitive, or `None` for points and lines. `n_read` is the number of triangles that have been
+/// read already, and those of the primitive are added. The faces without area that join strips count: they are in no
+/// mesh, but a short file can state any number of them.
+pub(super) fn mesh(document: &Document, part: &Part, pose: Pose, n_read: &mut u64) -> Checked<Option<Mesh>> {
+    let &Part { primitive, targets, ref path, slot, .. } = part;
     let mode = match primitive.mode {
         Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
         Valid(_) => {
@@ -54,10 +79,10 @@ pub(super) fn mesh(
         }
         _ => return Err(format!("{path}: its mode is none of 0 to 6")),
     };
-    let attributes = Attributes { document, primitive, path };
+    let attributes = Attributes { document, primitive, targets, path };
     let positions = attributes.find(Semantic::Positions, &[Type::Vec3], None)?;
     let Some(positions) = positions else { return Err(format!("{path}.attributes: there is no POSITION")) };
-    let mut faces = attributes.faces(mode, positions.n, n_loaded)?;
+    let mut faces = attributes.faces(mode, positions.n, (part.whole, n_read))?;
     let used = renumber(&mut faces);
     let skin = pose.skin.map(|skin| skin.of(&attributes, positions.n)).transpose()?;
     let vertices = attributes.vertices(&positions, &used, pose.weights, skin.as_ref())?;
@@ -69,17 +94,19 @@ pub(super) fn mesh(
     mesh.normals = corners(&faces, &vertices.normals).unwrap_or_else(|| vec![[Vec3::ZERO; 3]; faces.len()]);
     mesh.tangents = corners(&faces, &vertices.tangents).unwrap_or_default();
     for (set, uvs) in mesh.uvs.iter_mut().enumerate() {
-        let found = attributes.find(Semantic::TexCoords(set as u32), &[Type::Vec2], Some(positions.n))?;
-        let found = found.map(|found| read(&used, |ix| Ok(Vec2::from_array(found.numbers(ix, 0.0)?)))).transpose()?;
-        *uvs = found.and_then(|found| corners(&faces, &found)).unwrap_or_default();
+        let semantic = Semantic::TexCoords(set as u32);
+        let added = Added::new(&attributes, &semantic, &[Type::Vec2], (pose.weights, positions.n))?;
+        let Some(found) = attributes.find(semantic, &[Type::Vec2], Some(positions.n))? else { continue };
+        let found = read(&used, |ix| added.to(ix, found.numbers(ix, 0.0)?).map(Vec2::from_array))?;
+        *uvs = corners(&faces, &found).unwrap_or_default();
     }
-    let colours = attributes.find(Semantic::Colors(0), &[Type::Vec3, Type::Vec4], Some(positions.n))?;
-    let colours = colours.map(|found| read(&used, |ix| Ok(Vec4::from_array(found.numbers(ix, 1.0)?)))).transpose()?;
-    mesh.colours = colours.and_then(|found| corners(&faces, &found)).unwrap_or_default();
+    let (semantic, types) = (Semantic::Colors(0), [Type::Vec3, Type::Vec4]);
+    let added = Added::new(&attributes, &semantic, &types, (pose.weights, positions.n))?;
+    if let Some(found) = attributes.find(semantic, &types, Some(positions.n))? {
+        let found = read(&used, |ix| added.to_colour(ix, found.numbers(ix, 1.0)?).map(Vec4::from_array))?;
+        mesh.colours = corners(&faces, &found).unwrap_or_default();
+    }
     (mesh.positions, mesh.faces) = (vertices.positions, faces);
-    if let Some(normal_map) = normal_map.filter(|_| mesh.tangents.is_empty()) {
-        add_tangents(&mut mesh, &normal_map);
-    }
     Ok(Some(mesh))
 }
 
@@ -87,6 +114,8 @@ pub(super) fn mesh(
 pub(super) struct Attributes<'a> {
     pub document: &'a Document,
     pub primitive: &'a Primitive,
+    /// Morph targets of the primitive.
+    pub targets: &'a [TargetAttributes],
     /// JSON path of the primitive.
     pub path: &'a str,
 }
@@ -116,14 +145,21 @@ impl<'a> Attributes<'a> {
         }
     }
 
-    /// Returns the faces as indices of vertices.
-    fn faces(&self, mode: Mode, n_vertices: usize, n_loaded: u64) -> Checked<Vec<[u32; 3]>> {
+    /// Returns the faces as indices of vertices. `whole`: what the faces of the mesh have. `n_read`: see [`mesh`].
+    fn faces(
+        &self,
+        mode: Mode,
+        n_vertices: usize,
+        (whole, n_read): (needs::Attributes, &mut u64),
+    ) -> Checked<Vec<[u32; 3]>> {
         let path = format!("{}.indices", self.path);
         let indices = self.primitive.indices.map(|index| Accessor::new(self.document, index, &[Type::Scalar], path));
         let indices = indices.transpose()?;
         let n = indices.as_ref().map_or(n_vertices, |indices| indices.n);
         let n_faces = if mode == Mode::Triangles { n / 3 } else { n.saturating_sub(2) };
-        require_for_triangles(n_loaded, n_faces as u64)?;
+        let n_points = n_vertices.min(3 * n_faces) as u64;
+        require_for_mesh(*n_read, &MeshSize { n_triangles: n_faces as u64, n_points, attributes: whole })?;
+        *n_read = n_read.saturating_add(n_faces as u64);
         let vertex = |at: usize| {
             let Some(indices) = &indices else { return Ok(at as u32) };
             let [ix] = indices.integers(at);
@@ -175,6 +211,10 @@ impl<'a> Attributes<'a> {
         }
         if let Some(skin) = skin {
             vertices.change(used, |ix, vertex| skin.apply(ix, vertex))?;
+            // The cross product of reflected vectors is the reverse of their reflected cross product.
+            for (tangent, ix) in vertices.tangents.iter_mut().zip(used) {
+                tangent.w = if skin.mirrors(*ix as usize)? { -tangent.w } else { tangent.w };
+            }
         }
         Ok(vertices)
     }
@@ -238,4 +278,31 @@ fn renumber(faces: &mut [[u32; 3]]) -> Vec<u32> {
         });
     }
     used
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::scene::outside::Access;
+
+    /// The strip's indices take no bytes in the file, and none of its faces has an area.
+    #[test]
+    fn faces_that_join_strips_count() {
+        let json = br#"{ "asset": { "version": "2.0" }, "accessors": [
+            { "componentType": 5126, "count": 3, "type": "VEC3" },
+            { "componentType": 5125, "count": 1000, "type": "SCALAR" }
+        ], "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1, "mode": 5 }] }] }"#;
+        let document = Document::read(Path::new("x.gltf"), json, Access::default()).unwrap();
+        let primitive = &document.root.meshes[0].primitives[0];
+        let part = Part { primitive, targets: &[], path: String::new(), slot: 0, whole: Default::default() };
+        let mut n_read = 5;
+        for n in [1003, 2001] {
+            let found = mesh(&document, &part, Pose { weights: &[], skin: None }, &mut n_read).unwrap().unwrap();
+            assert_eq!((found.faces.len(), n_read), (0, n));
+        }
+        n_read = u64::MAX;
+        assert!(mesh(&document, &part, Pose { weights: &[], skin: None }, &mut n_read).is_err());
+    }
 }

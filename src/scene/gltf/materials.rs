@@ -6,7 +6,6 @@ use hashbrown::HashMap;
 
 use super::{
     document::{Document, item},
-    tangents::NormalMap,
     textures::{TextureUse, Textures},
 };
 use crate::scene::{
@@ -54,12 +53,6 @@ impl<'a> Materials<'a> {
         let ix = (self.materials.len() - 1) as u32;
         self.known.insert(key, ix);
         Ok(ix)
-    }
-
-    /// Returns how a material's normal map uses texture coordinates, if it has one.
-    pub fn normal_map(&self, ix: u32) -> Option<NormalMap> {
-        let texture = self.materials[ix as usize].maps.normal.as_ref()?;
-        Some(NormalMap { uv_set: texture.uv_set as usize, transform: texture.transform })
     }
 }
 

@@ -12,11 +12,11 @@ mod cameras;
 mod deform;
 mod document;
 mod geometry;
+mod glb;
 mod lights;
 mod materials;
 mod meshopt;
 mod nodes;
-mod tangents;
 mod textures;
 mod uri;
 
@@ -29,13 +29,16 @@ pub(super) use self::document::named_files;
 use self::{
     deform::Skin,
     document::{Document, item},
-    geometry::Pose,
+    geometry::{Part, Pose},
     materials::Materials,
     nodes::Nodes,
 };
 use super::{
-    Instance, LoadOptions, Mesh, Scene, SceneError, Transform, error::Checked, extent, framing,
-    needs::require_for_triangles, outside::Access,
+    Instance, LoadOptions, Mesh, Scene, SceneError, Transform,
+    error::Checked,
+    extent, framing,
+    needs::{MeshSize, require_for_mesh},
+    outside::Access,
 };
 
 /// Loads a glTF file as a scene with its lights and cameras.
@@ -93,8 +96,11 @@ type MeshKey = (usize, Option<usize>, Vec<u32>);
 struct Loader<'a> {
     document: &'a Document,
     nodes: &'a Nodes,
-    /// Number of triangles of the meshes so far, and of those that were loaded before.
+    /// Number of triangles that were loaded before.
     n_loaded: u64,
+    /// Number of triangles of the meshes so far, and of those that were loaded before, with the faces without area that
+    /// join strips.
+    n_read: u64,
     has_materials: bool,
     materials: Materials<'a>,
     meshes: Vec<Mesh>,
@@ -105,7 +111,8 @@ struct Loader<'a> {
 impl<'a> Loader<'a> {
     fn new(document: &'a Document, nodes: &'a Nodes, n_loaded: u64, has_materials: bool) -> Self {
         let materials = Materials::new(document);
-        Self { document, nodes, n_loaded, has_materials, materials, meshes: Vec::new(), known: HashMap::new() }
+        let (meshes, known, n_read) = (Vec::new(), HashMap::new(), n_loaded);
+        Self { document, nodes, n_loaded, n_read, has_materials, materials, meshes, known }
     }
 
     fn load(mut self, path: &Path) -> Checked<Scene> {
@@ -115,7 +122,7 @@ impl<'a> Loader<'a> {
             let Some(instance) = self.instance(ix)? else { continue };
             let mesh = &self.meshes[instance.mesh_ix];
             n_placed += mesh.faces.len() as u64;
-            require_for_triangles(n_placed, 0)?;
+            require_for_mesh(n_placed, &MeshSize::default())?;
             mesh.placed(&instance.transform).map_err(|what| format!("nodes[{ix}]: {what}"))?;
             scene.instances.push(instance);
         }
@@ -174,16 +181,15 @@ impl<'a> Loader<'a> {
         }
         let pose = Pose { weights, skin: skin.as_ref() };
         let (mut whole, mut materials) = (Mesh::default(), Vec::new());
-        for (ix, primitive) in document.root.meshes[mesh_ix].primitives.iter().enumerate() {
+        let primitives = &document.root.meshes[mesh_ix].primitives;
+        let attributes = geometry::attributes_of(primitives);
+        for (ix, primitive) in primitives.iter().enumerate() {
             let path = format!("meshes[{mesh_ix}].primitives[{ix}]");
             self.note_morphs(primitive, &path);
             let material = if self.has_materials { self.materials.index(primitive.material, &path)? } else { 0 };
-            let normal_map = if self.has_materials { self.materials.normal_map(material) } else { None };
-            let part = (primitive, materials.len() as u32);
-            let Some(mesh) = geometry::mesh(document, part, pose, normal_map, (&path, self.n_loaded))? else {
-                continue;
-            };
-            self.n_loaded += mesh.faces.len() as u64;
+            let targets = document.morph_targets.of(mesh_ix, ix);
+            let part = Part { primitive, targets, path, slot: materials.len() as u32, whole: attributes };
+            let Some(mesh) = geometry::mesh(document, &part, pose, &mut self.n_read)? else { continue };
             materials.push(material);
             whole.append(mesh);
         }

@@ -10,7 +10,10 @@ use gltf::json::{
 };
 use hashbrown::HashMap;
 
-use super::document::{Document, item};
+use super::{
+    document::{Document, ImageSource, item},
+    uri::is_data,
+};
 use crate::scene::{
     Channel, Encoding, Image, Material, Texture, Wrap,
     error::Checked,
@@ -54,9 +57,10 @@ fn raw_transform(
 /// The images that textures use, in the order in which they are met first.
 pub(super) struct Textures<'a> {
     document: &'a Document,
-    encoded: Vec<Encoded>,
-    /// Index into `encoded` by the image's index in the document; `None` if the image cannot be read.
-    known: HashMap<usize, Option<u32>>,
+    encoded: Vec<Encoded<'a>>,
+    /// Index into `encoded` by the place of the image's bytes, which several images can share; `None` if they cannot be
+    /// read.
+    known: HashMap<ImageSource, Option<u32>>,
 }
 
 impl<'a> Textures<'a> {
@@ -101,18 +105,19 @@ impl<'a> Textures<'a> {
             self.document.note("textures without an image of a known format, which are left out", path);
             return Ok(None);
         };
-        if let Some(known) = self.known.get(&image.value()) {
+        let source = self.document.image_source(image, &format_args!("{path}.source"))?;
+        if let Some(known) = self.known.get(&source) {
             return Ok(*known);
         }
-        let bytes = self.document.image(image, &format_args!("{path}.source"))?;
+        let bytes = self.document.image(image.value(), &source)?;
         let image_ix = bytes.map(|bytes| {
             let json = &self.document.root.images[image.value()];
-            let file = json.uri.as_ref().filter(|uri| !uri.starts_with("data:"));
+            let file = json.uri.as_ref().filter(|uri| !is_data(uri));
             let name = file.or(json.name.as_ref()).cloned().unwrap_or_else(|| format!("images[{image}]"));
             self.encoded.push(Encoded { name, bytes });
             (self.encoded.len() - 1) as u32
         });
-        self.known.insert(image.value(), image_ix);
+        self.known.insert(source, image_ix);
         Ok(image_ix)
     }
 
@@ -120,7 +125,7 @@ impl<'a> Textures<'a> {
     pub fn decode(self, materials: &mut [Material]) -> Vec<Image> {
         let names: Vec<_> = self.encoded.iter().map(|image| image.name.clone()).collect();
         let (mut images, mut new_ix) = (Vec::new(), Vec::new());
-        for (name, decoded) in names.into_iter().zip(decode_all(self.encoded)) {
+        for (name, decoded) in names.into_iter().zip(decode_all(self.encoded, 0)) {
             match decoded {
                 Ok(image) => {
                     new_ix.push(Some(images.len() as u32));

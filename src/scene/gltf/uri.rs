@@ -28,9 +28,9 @@ pub(super) enum Uri {
 impl Uri {
     /// Decodes a URI.
     pub fn new(uri: &str) -> Checked<Self> {
-        match uri.get(..5) {
-            Some(scheme) if scheme.eq_ignore_ascii_case("data:") => data(&uri[5..]).map(Self::Data),
-            _ => match percent_decode_str(uri).decode_utf8() {
+        match is_data(uri) {
+            true => data(&uri[5..]).map(Self::Data),
+            false => match percent_decode_str(uri).decode_utf8() {
                 Ok(name) => match scheme(&name) {
                     Some(scheme) => {
                         Err(format!("`{name}` is not a relative path: files with `{scheme}:` are not read"))
@@ -41,6 +41,11 @@ impl Uri {
             },
         }
     }
+}
+
+/// Returns whether a URI holds data.
+pub(super) fn is_data(uri: &str) -> bool {
+    uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:"))
 }
 
 /// Returns the scheme of a URI, or the letter of a drive.

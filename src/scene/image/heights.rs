@@ -1,6 +1,5 @@
 //! Normal maps from bump maps.
 
-use half::f16;
 use rayon::prelude::*;
 
 use crate::scene::texture::{Channel, Image, Pixels};
@@ -12,7 +11,7 @@ use crate::scene::texture::{Channel, Image, Pixels};
 /// column. As in a texture of normals, x is along u and y along decreasing v, and each channel c stands for 2 c - 1.
 pub(in crate::scene) fn normals_of_heights(image: &Image, channel: Channel, scale: f32) -> Image {
     let (width, height) = (image.width as usize, image.height as usize);
-    let value = |x: usize, y: usize| value_of(&image.pixels, y * width + x, channel);
+    let value = |x: usize, y: usize| channel.of(image.pixels.get(y * width + x));
     let half_widths = [0.5 * scale * width as f32, 0.5 * scale * height as f32];
     let normal = |x: usize, y: usize| {
         let (left, right) = (value((x + width - 1) % width, y), value((x + 1) % width, y));
@@ -33,19 +32,4 @@ pub(in crate::scene) fn normals_of_heights(image: &Image, channel: Channel, scal
 /// Bounds a slope such that its square is finite. NaN becomes 0.
 fn finite(slope: f32) -> f32 {
     if slope.is_nan() { 0.0 } else { slope.clamp(-1e9, 1e9) }
-}
-
-/// Returns the number that a pixel has in a channel, 1 for 255.
-fn value_of(pixels: &Pixels, pixel_ix: usize, channel: Channel) -> f32 {
-    let [r, g, b, a] = match pixels {
-        Pixels::Bytes(pixels) => pixels[pixel_ix].map(|byte| f32::from(byte) / 255.0),
-        Pixels::Halves(pixels) => pixels[pixel_ix].map(|bits| f16::from_bits(bits).to_f32()),
-    };
-    match channel {
-        Channel::Red => r,
-        Channel::Green => g,
-        Channel::Blue => b,
-        Channel::Alpha => a,
-        Channel::Luminance => 0.2126 * r + 0.7152 * g + 0.0722 * b,
-    }
 }

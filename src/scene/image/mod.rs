@@ -4,12 +4,14 @@
 //! decoded.
 
 mod dds;
+mod facts;
 mod heights;
 mod pixels;
 #[cfg(test)]
 mod tests;
 
 use std::{
+    borrow::Cow,
     io::Cursor,
     panic::{AssertUnwindSafe, catch_unwind},
 };
@@ -17,7 +19,7 @@ use std::{
 use ::image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 
-pub(super) use self::heights::normals_of_heights;
+pub(super) use self::{facts::Examined, heights::normals_of_heights};
 use super::{error::Checked, texture::Image};
 use crate::util::{memory, text::one_line};
 
@@ -26,7 +28,7 @@ use crate::util::{memory, text::one_line};
 const MAX_SIDE: u32 = 16_384;
 /// The most pixels of all images of a scene. Kernels find a texel by an index of 32 bits, and the smaller copies of an
 /// image add a third to its texels.
-const MAX_PIXELS: u64 = 1 << 31;
+pub(super) const MAX_PIXELS: u64 = 1 << 31;
 /// Bytes that a decoder may allocate beside its pixels, such as for a colour profile, which is compressed.
 const MAX_EXTRA_BYTES: u64 = 16 << 20;
 /// How many times the size of its own pixels a decoder may hold at once: JPEG's coefficients and their pixels, a copy
@@ -34,11 +36,11 @@ const MAX_EXTRA_BYTES: u64 = 16 << 20;
 const WORKING_COPIES: u64 = 3;
 
 /// An image file in memory.
-pub(super) struct Encoded {
+pub(super) struct Encoded<'a> {
     /// The file's name, or the image's name within its file, for messages. Its ending tells TGA, which has no mark.
     pub name: String,
     /// The file's content.
-    pub bytes: Vec<u8>,
+    pub bytes: Cow<'a, [u8]>,
 }
 
 /// What the header of an image file says.
@@ -71,10 +73,11 @@ impl Header {
 /// Decodes image files on the current rayon pool, in their order. Of several frames, layers or levels the first counts.
 /// An orientation that the file's metadata demands and a colour profile are ignored, as glTF requires.
 ///
-/// An error is one line that begins with the image's name. If all images together are too large, no image is decoded.
-pub(super) fn decode_all(images: Vec<Encoded>) -> Vec<Checked<Image>> {
+/// An error is one line that begins with the image's name. If all images together, with `n_pixels` that the scene has
+/// already, are too large, no image is decoded.
+pub(super) fn decode_all(images: Vec<Encoded>, n_pixels: u64) -> Vec<Checked<Image>> {
     let headers: Vec<_> = images.par_iter().map(|image| named(&image.name, || header_of(image))).collect();
-    let sum = check_sum(headers.iter().flatten());
+    let sum = check_sum(headers.iter().flatten(), n_pixels);
     let decode_one = |(image, header): (Encoded, Checked<Header>)| {
         let header = header?;
         named(&image.name, || sum.clone().and_then(|()| decode(&image, &header)))
@@ -89,9 +92,10 @@ fn named<T>(name: &str, step: impl FnOnce() -> Checked<T>) -> Checked<T> {
     result.map_err(|what| one_line(&format!("image `{name}`: {what}")))
 }
 
-/// Checks that all images together are not too many pixels and fit into memory.
-fn check_sum<'a>(headers: impl Iterator<Item = &'a Header> + Clone) -> Checked<()> {
-    let n_pixels: u64 = headers.clone().map(Header::n_pixels).sum();
+/// Checks that all images together are not too many pixels and fit into memory. `n_before`: the number of pixels that
+/// there are already.
+fn check_sum<'a>(headers: impl Iterator<Item = &'a Header> + Clone, n_before: u64) -> Checked<()> {
+    let n_pixels = headers.clone().map(Header::n_pixels).fold(n_before, u64::saturating_add);
     if n_pixels > MAX_PIXELS {
         return Err(format!("the scene's images have {n_pixels} pixels, more than {MAX_PIXELS}"));
     }

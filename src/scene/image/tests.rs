@@ -14,7 +14,7 @@ fn encoded(image: impl Into<DynamicImage>, format: ImageFormat) -> Vec<u8> {
 }
 
 fn decoded(name: &str, bytes: Vec<u8>) -> Checked<Image> {
-    decode_all(vec![Encoded { name: name.to_owned(), bytes }]).remove(0)
+    decode_all(vec![Encoded { name: name.to_owned(), bytes: bytes.into() }], 0).remove(0)
 }
 
 fn bytes_of(image: &Image) -> &[[u8; 4]] {
@@ -215,15 +215,17 @@ fn a_bomb_is_refused_by_its_header() {
             n
         ]
     };
-    assert_eq!(check_sum(header(8).iter()), Ok(()));
-    assert!(check_sum(header(9).iter()).unwrap_err().contains("more than 2147483648"));
+    assert_eq!(check_sum(header(8).iter(), 0), Ok(()));
+    for (n, n_before) in [(9, 0), (8, 1), (1, u64::MAX)] {
+        assert!(check_sum(header(n).iter(), n_before).unwrap_err().contains("more than 2147483648"));
+    }
 }
 
 #[test]
 fn an_error_is_one_line_and_leaves_the_others() {
-    let good = Encoded { name: "good".to_owned(), bytes: encoded(with_alpha(), ImageFormat::Png) };
-    let bad = Encoded { name: "b\nad".to_owned(), bytes: b"GIF89a".to_vec() };
-    let results = decode_all(vec![bad, good]);
+    let good = Encoded { name: "good".to_owned(), bytes: encoded(with_alpha(), ImageFormat::Png).into() };
+    let bad = Encoded { name: "b\nad".to_owned(), bytes: b"GIF89a"[..].into() };
+    let results = decode_all(vec![bad, good], 0);
     let error = results[0].as_ref().unwrap_err();
     assert_eq!(error, "image `b ad`: is none of PNG, JPEG, TGA, BMP, WebP, HDR, EXR and DDS");
     assert_eq!(bytes_of(results[1].as_ref().unwrap()), pixels(&with_alpha()));

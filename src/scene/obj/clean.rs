@@ -7,7 +7,7 @@
 
 use std::{borrow::Cow, collections::BTreeMap, fmt::Write};
 
-use crate::scene::error::Checked;
+use crate::scene::{error::Checked, needs::MeshSize};
 
 /// How a face is shaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,19 +96,27 @@ pub struct CleanObj {
     pub libraries: Vec<(usize, String)>,
     /// Names after `usemtl`, each with the first line that uses it.
     pub used_materials: BTreeMap<String, usize>,
-    /// Number of triangles after polygons are cut into fans.
-    pub n_triangles: u64,
+    /// Size of the mesh, if polygons are cut into fans.
+    pub size: MeshSize,
+    /// The number that stands for 1 in colours.
+    pub colour_scale: f32,
     /// Line and keyword of the first statement that is not part of the format, if any.
     pub unknown: Option<(usize, String)>,
 }
 
 /// Checks and rewrites the text of an OBJ file. The error is a line, counted from 1, and what is wrong with it.
 pub fn clean_obj(text: &str) -> Result<CleanObj, (usize, String)> {
-    let (totals, has_colours) = count(text);
-    let mut cleaner = Cleaner { totals, has_colours, ..Cleaner::default() };
+    let (totals, largest_colour) = count(text);
+    // Some writers state colours as 0 to 255.
+    let colour_scale = if largest_colour.is_some_and(|largest| largest > 1.0) { 255.0 } else { 1.0 };
+    let white = largest_colour.map(|_| colour_scale);
+    let mut cleaner = Cleaner { totals, white, ..Cleaner::default() };
+    cleaner.out.colour_scale = colour_scale;
     for (line, statement) in statements(text) {
         cleaner.statement(line, &statement).map_err(|what| (line, what))?;
     }
+    cleaner.out.size.n_points = totals.positions as u64;
+    cleaner.out.size.attributes.has_colours = white.is_some();
     let Cleaner { mut out, positions, texcoords, normals, faces, .. } = cleaner;
     out.text = ["mtllib all\n", &positions, &texcoords, &normals, &faces].concat();
     Ok(out)
@@ -155,15 +163,18 @@ impl Counts {
     }
 }
 
-/// Returns the numbers of a file's elements, and whether a point has a colour.
-fn count(text: &str) -> (Counts, bool) {
-    let (mut counts, mut has_colours) = (Counts::default(), false);
+/// Returns the numbers of a file's elements, and the largest number in a point's colour if a point has one.
+fn count(text: &str) -> (Counts, Option<f32>) {
+    let (mut counts, mut largest_colour) = (Counts::default(), None);
     for (_, statement) in statements(text) {
         let (keyword, rest) = split_keyword(&statement);
         counts.add(keyword);
-        has_colours |= keyword == "v" && words(rest).count() >= 6;
+        if keyword == "v" && words(rest).count() >= 6 {
+            let colour = words(rest).skip(3).take(3).flat_map(str::parse::<f32>);
+            largest_colour = Some(colour.fold(largest_colour.unwrap_or(0.0), f32::max));
+        }
     }
-    (counts, has_colours)
+    (counts, largest_colour)
 }
 
 /// Returns the words before a comment.
@@ -177,8 +188,8 @@ type Corner = (usize, Option<usize>, Option<usize>);
 #[derive(Debug, Default)]
 struct Cleaner {
     totals: Counts,
-    /// Whether points without colours get white.
-    has_colours: bool,
+    /// The number that stands for 1 in colours, which points without colours get, if a point of the file has a colour.
+    white: Option<f32>,
     /// Counts up to the current line, from which negative indices count back.
     seen: Counts,
     /// Whether the last `s` statement was `s off`. A file without `s` is smooth except at creases.
@@ -222,10 +233,10 @@ impl Cleaner {
     /// Adds a point. A weight (used by curves only) or a colour may follow it, and an opacity, which is ignored.
     fn point(&mut self, rest: &str) -> Checked<()> {
         let n_numbers = words(rest).count();
-        if self.has_colours && n_numbers < 6 {
+        if let Some(white) = self.white.filter(|_| n_numbers < 6) {
             let xyz: Vec<&str> = words(rest).take(3).collect();
             vector(&mut String::new(), "v", rest, 3..=7)?;
-            push(&mut self.positions, format_args!("v {} 1 1 1\n", xyz.join(" ")));
+            push(&mut self.positions, format_args!("v {} {white} {white} {white}\n", xyz.join(" ")));
             return Ok(());
         }
         vector(&mut self.positions, "v", rest, 3..=7)
@@ -250,7 +261,7 @@ impl Cleaner {
         if self.corners.len() < 3 {
             return Err(format!("a face of {} corners: it needs 3 or more", self.corners.len()));
         }
-        self.out.n_triangles += self.corners.len() as u64 - 2;
+        self.out.size.n_triangles += self.corners.len() as u64 - 2;
         let has_normals = self.corners.iter().all(|(.., normal)| normal.is_some());
         let has_uvs = self.corners.iter().all(|(_, texcoord, _)| texcoord.is_some());
         let shading = match (has_normals, self.flat) {
@@ -259,6 +270,7 @@ impl Cleaner {
             (false, false) => FaceShading::Smooth,
         };
         let kind = FaceKind { shading, has_uvs };
+        self.out.size.attributes.n_uv_sets |= u64::from(has_uvs);
         if self.kind != Some(kind) {
             push(&mut self.faces, format_args!("g {}\n", kind.name()));
             self.kind = Some(kind);

@@ -5,14 +5,12 @@ use glam::Vec2;
 use super::clean::split_keyword;
 use crate::scene::{
     error::Checked,
-    image_files::{Images, View, opacity_channel},
+    image_files::{Images, View},
     material::{Alpha, Material},
-    texture::{Channel, Encoding, Image, Pixels, Texture, Wrap},
+    texture::{Channel, Encoding, Texture, Wrap},
 };
 
-/// Share of the opacities that are 0 or 1 in the map of a surface with holes, such as a leaf.
-const CUTOUT_SHARE: f64 = 0.95;
-/// Opacity below which such a surface is a hole.
+/// Opacity below which a surface with holes, such as a leaf, is a hole.
 const CUTOFF: f32 = 0.5;
 
 /// A term that a map varies.
@@ -159,82 +157,50 @@ fn vector<'a>(option: &str, after: &'a str, uv: &mut Vec2) -> Checked<&'a str> {
 }
 
 /// Gives a material a map. `file` has an image.
-pub fn set_map(material: &mut Material, term: Term, options: &MapOptions, images: &mut Images, file: usize) {
-    let image = images.get(file).expect("only maps with images are set");
+///
+/// # Errors
+/// The image that the map needs cannot be made from that of the file. The material has no such map then.
+pub fn set_map(
+    material: &mut Material,
+    term: Term,
+    options: &MapOptions,
+    images: &mut Images,
+    file: usize,
+) -> Checked<()> {
+    let image = images.get(file)?;
     let grey = options.channel.unwrap_or(Channel::Luminance);
-    let is_normal = term == Term::Normal || term == Term::Height && shows_normals(image);
-    let covers = options.channel.unwrap_or_else(|| opacity_channel(image));
-    let is_cutout = term == Term::Opacity && material.d == 1.0 && is_nearly_binary(image, covers);
+    let (view, channel) = match term {
+        Term::Opacity => (View::Plain, options.channel.unwrap_or_else(|| image.opacity_channel())),
+        Term::Transparency => (View::Inverted, grey),
+        Term::Height if !image.shows_normals() => (View::Heights(grey, options.bump.to_bits()), Channel::Red),
+        Term::Exponent | Term::Roughness | Term::Metallic => (View::Plain, grey),
+        Term::BaseColour | Term::Specular | Term::Emission | Term::Normal | Term::Height => (View::Plain, Channel::Red),
+    };
+    let is_cutout = term == Term::Opacity && material.d == 1.0 && image.is_nearly_binary(channel);
+    // With microfacets, the map of the roughness counts.
+    if term == Term::Exponent && material.microfacet.is_some() {
+        return Ok(());
+    }
+    let is_colour = matches!(term, Term::BaseColour | Term::Specular | Term::Emission);
+    let encoding = if is_colour { Encoding::Srgb } else { Encoding::Linear };
+    let texture = Some(options.texture(images.show(file, view)?, encoding, channel));
     let maps = &mut material.maps;
-    let mut plain = |encoding, channel| Some(options.texture(images.show(file, View::Plain), encoding, channel));
     match term {
-        Term::BaseColour => maps.base_colour = plain(Encoding::Srgb, Channel::Red),
-        Term::Specular => maps.specular = plain(Encoding::Srgb, Channel::Red),
-        Term::Emission => maps.emission = plain(Encoding::Srgb, Channel::Red),
-        Term::Opacity => maps.opacity = plain(Encoding::Linear, covers),
-        Term::Transparency => {
-            maps.opacity = Some(options.texture(images.show(file, View::Inverted), Encoding::Linear, grey));
-        }
-        // With microfacets, the map of the roughness counts.
-        Term::Exponent if material.microfacet.is_some() => {}
-        Term::Exponent | Term::Roughness => maps.roughness = plain(Encoding::Linear, grey),
-        Term::Metallic => maps.metallic = plain(Encoding::Linear, grey),
+        Term::BaseColour => maps.base_colour = texture,
+        Term::Specular => maps.specular = texture,
+        Term::Emission => maps.emission = texture,
+        Term::Opacity | Term::Transparency => maps.opacity = texture,
+        Term::Exponent | Term::Roughness => maps.roughness = texture,
+        Term::Metallic => maps.metallic = texture,
         Term::Height | Term::Normal => {
-            let view = match is_normal {
-                true => View::Plain,
-                false => View::Heights(grey, options.bump.to_bits()),
-            };
-            maps.normal_scale = if is_normal { options.bump } else { 1.0 };
-            maps.normal = Some(options.texture(images.show(file, view), Encoding::Linear, Channel::Red));
+            maps.normal_scale = if view == View::Plain { options.bump } else { 1.0 };
+            maps.normal = texture;
         }
     }
     if is_cutout {
         material.alpha = Alpha::Cutout(CUTOFF);
     }
-}
-
-/// Returns a pixel, linear or not.
-fn pixel(image: &Image, ix: usize) -> [f32; 4] {
-    match &image.pixels {
-        Pixels::Bytes(pixels) => pixels[ix].map(|byte| f32::from(byte) / 255.0),
-        Pixels::Halves(pixels) => pixels[ix].map(|bits| half::f16::from_bits(bits).to_f32()),
-    }
-}
-
-fn n_pixels(image: &Image) -> usize {
-    match &image.pixels {
-        Pixels::Bytes(pixels) => pixels.len(),
-        Pixels::Halves(pixels) => pixels.len(),
-    }
-}
-
-/// Returns whether almost all values of a channel are 0 or 1.
-fn is_nearly_binary(image: &Image, channel: Channel) -> bool {
-    let value = |[r, g, b, a]: [f32; 4]| match channel {
-        Channel::Red => r,
-        Channel::Green => g,
-        Channel::Blue => b,
-        Channel::Alpha => a,
-        // Whatever its encoding, a colour whose luminance is 0 or 1 is black or white.
-        Channel::Luminance => 0.2126 * r + 0.7152 * g + 0.0722 * b,
-    };
-    // A byte away from 0 or 1 counts as such.
-    let is_end = |value: f32| !(0.5 / 255.0..=254.5 / 255.0).contains(&value);
-    let n = n_pixels(image);
-    let n_ends = (0..n).filter(|ix| is_end(value(pixel(image, *ix)))).count();
-    n_ends as f64 >= CUTOUT_SHARE * n as f64
-}
-
-/// Returns whether an image under `bump` is a normal map and no height map: its mean colour is blue, as normals along
-/// +z are, while heights are grey.
-fn shows_normals(image: &Image) -> bool {
-    let n = n_pixels(image);
-    let sum = (0..n).map(|ix| pixel(image, ix)).fold([0.0; 3], |sum: [f64; 3], [r, g, b, _]| {
-        [sum[0] + f64::from(r), sum[1] + f64::from(g), sum[2] + f64::from(b)]
-    });
-    let [r, g, b] = sum.map(|sum| sum / n as f64);
-    // A map of slopes up to 45 degrees has a mean blue of 0.85 or more, and a mean red and green of about 0.5.
-    b > 0.6 && b - r > 0.15 && b - g > 0.15
+    Ok(())
 }
 
 #[cfg(test)]

@@ -10,59 +10,53 @@ use std::{collections::HashMap, path::Path};
 use glam::{Vec2, Vec3};
 
 use self::clean::{CleanObj, FaceKind, FaceShading, clean_obj};
-pub(super) use self::{files::named_files, mtl::Library};
+pub(super) use self::files::named_files;
 use super::{
     error::SceneError,
+    material::Material,
     mesh::Mesh,
-    needs::require_for_triangles,
-    outside::Access,
+    mesh_file::{Loaded, Loading},
+    needs::require_for_mesh,
     polygon::Triangulator,
     smooth::{Shading, crease_normals},
     texture::linear_of_srgb,
 };
 
-/// Makes a mesh from an OBJ file's text, and reads its materials. A face's slot is an index into the library. A face
-/// without a material, or with one that the library lacks, has slot `library.materials.len()`. `n_loaded` is the
-/// number of triangles that the scene has already, and `access` says which files the OBJ file may name.
-pub(super) fn parse_obj(
-    path: &Path,
-    text: &str,
-    shading: Shading,
-    n_loaded: usize,
-    access: Access,
-) -> Result<(Mesh, Library), SceneError> {
+/// Makes a mesh from an OBJ file's text, and reads its materials.
+pub(super) fn parse_obj(path: &Path, text: &str, loading: &mut Loading) -> Result<Loaded, SceneError> {
+    let &mut Loading { shading, n_loaded, access, ref mut images } = loading;
     let clean = clean_obj(text).map_err(|(line, what)| SceneError::line(path, line, what))?;
-    let required = require_for_triangles(n_loaded as u64, clean.n_triangles);
-    required.map_err(|what| SceneError::file(path, what))?;
-    let library = mtl::load_libraries(path, &clean.libraries, access)?;
+    require_for_mesh(n_loaded as u64, &clean.size).map_err(|what| SceneError::file(path, what))?;
+    let materials = mtl::load_libraries(path, &clean.libraries, access, images)?;
     if let Some((line, statement)) = &clean.unknown {
         tracing::warn!("{}:{line}: unknown statement `{}`", path.display(), statement.escape_debug());
     }
-    let by_name = used_materials(path, &clean, &library);
+    let by_name = used_materials(path, &clean, &materials);
     let models = parse(&clean, by_name).map_err(|e| SceneError::file(path, e.to_string()))?;
-    Ok((mesh(&models, library.materials.len() as u32, shading), library))
+    let (mesh, uses_crease) = mesh(&models, materials.len() as u32, (shading, clean.colour_scale));
+    Ok(Loaded { mesh, materials, uses_crease })
 }
 
 /// Returns the indices of the used materials in the library. A name that differs from that of one material in the case
 /// of letters alone stands for it. Warns of the first such name, and of the first name that no library defines;
 /// further ones are not reported.
-fn used_materials(path: &Path, clean: &CleanObj, library: &Library) -> HashMap<String, usize> {
+fn used_materials(path: &Path, clean: &CleanObj, materials: &[Material]) -> HashMap<String, usize> {
     let path = path.display();
     let mut by_lower: HashMap<String, Vec<usize>> = HashMap::new();
-    for (ix, material) in library.materials.iter().enumerate() {
+    for (ix, material) in materials.iter().enumerate() {
         by_lower.entry(material.name.to_lowercase()).or_default().push(ix);
     }
     let (mut by_name, mut undefined, mut other_case) = (HashMap::new(), None, None);
     for (name, line) in &clean.used_materials {
         let alike = by_lower.get(&name.to_lowercase()).map_or(&[][..], |alike| alike);
         // If several materials have the same name, the last one counts.
-        let exact = alike.iter().rev().find(|ix| library.materials[**ix].name == *name);
+        let exact = alike.iter().rev().find(|ix| materials[**ix].name == *name);
         let Some(ix) = exact.or(alike.last()) else {
             undefined = undefined.or(Some((name, line)));
             continue;
         };
-        let found = &library.materials[*ix].name;
-        if exact.is_none() && alike.iter().any(|ix| library.materials[*ix].name != *found) {
+        let found = &materials[*ix].name;
+        if exact.is_none() && alike.iter().any(|ix| materials[*ix].name != *found) {
             undefined = undefined.or(Some((name, line)));
             continue;
         }
@@ -90,14 +84,12 @@ fn parse(clean: &CleanObj, by_name: HashMap<String, usize>) -> Result<Vec<tobj::
     tobj::load_obj_buf(&mut clean.text.as_bytes(), &options, materials).map(|(models, _)| models)
 }
 
-/// Joins all models into one mesh. All faces of a model are of one kind.
-fn mesh(models: &[tobj::Model], no_material: u32, shading: Shading) -> Mesh {
+/// Joins all models into one mesh. All faces of a model are of one kind. Also returns whether the crease angle counts.
+/// `colour_scale`: the number that stands for 1 in colours.
+fn mesh(models: &[tobj::Model], no_material: u32, (shading, colour_scale): (Shading, f32)) -> (Mesh, bool) {
     let mut mesh = Mesh::default();
     let mut to_smooth = Vec::new();
     let mut triangulator = Triangulator::default();
-    // Some writers state colours as 0 to 255.
-    let largest = models.iter().flat_map(|model| &model.mesh.vertex_color).fold(0.0, |a: f32, b| a.max(*b));
-    let colour_scale = if largest > 1.0 { 255.0 } else { 1.0 };
     for tobj::Model { mesh: model, name } in models {
         let kind = FaceKind::of_group(name).unwrap_or(FaceKind { shading: FaceShading::Smooth, has_uvs: false });
         let corners = triangles(model, &mut triangulator);
@@ -106,13 +98,14 @@ fn mesh(models: &[tobj::Model], no_material: u32, shading: Shading) -> Mesh {
         let slot = model.material_id.map_or(no_material, |ix| ix as u32);
         mesh.append(Mesh { slots: vec![slot; corners.len()], ..part });
     }
-    if to_smooth.contains(&true) {
+    let uses_crease = to_smooth.contains(&true);
+    if uses_crease {
         let computed = crease_normals(&mesh.positions, &mesh.faces, &to_smooth, shading.crease);
         for (face, normals) in computed.into_iter().enumerate().filter(|(face, _)| to_smooth[*face]) {
             mesh.normals[face] = normals;
         }
     }
-    mesh
+    (mesh, uses_crease)
 }
 
 /// Cuts the polygons of a model into triangles. Returns the numbers of their corners in the model's lists of indices.

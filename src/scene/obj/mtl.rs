@@ -15,22 +15,15 @@ use super::{
 };
 use crate::scene::{
     error::{Checked, SceneError},
-    image_files::{ImageFiles, Images},
+    image_files::Images,
     material::{Alpha, Clearcoat, Material, MaterialSpec, Microfacet, Sheen},
     outside::{Access, NamedFile, Reach},
     read::read_lossy,
-    texture::{Channel, Image},
+    texture::Channel,
 };
 
 /// Roughness of a material that states how metallic it is, and nothing about its roughness.
 const DEFAULT_ROUGHNESS: f32 = 0.5;
-
-/// Materials of MTL files, and the images that they use. If several materials have the same name, the last one counts.
-#[derive(Clone, Debug, Default)]
-pub struct Library {
-    pub materials: Vec<Material>,
-    pub images: Vec<Image>,
-}
 
 /// A material as its file describes it.
 #[derive(Debug)]
@@ -59,11 +52,17 @@ struct Map {
     file: usize,
 }
 
-/// Reads the files that the `mtllib` lines of an OBJ file name, relative to its folder. Warns of files that do not
-/// exist, and of names that leave the folder.
-pub fn load_libraries(obj: &Path, libraries: &[(usize, String)], access: Access) -> Result<Library, SceneError> {
+/// Reads the materials in the files that the `mtllib` lines of an OBJ file name, relative to its folder. If several
+/// materials have the same name, the last one counts. Warns of files that do not exist, and of names that leave the
+/// folder.
+pub fn load_libraries(
+    obj: &Path,
+    libraries: &[(usize, String)],
+    access: Access,
+    images: &mut Images,
+) -> Result<Vec<Material>, SceneError> {
     let reach = access.beside(obj);
-    let (mut described, mut images) = (Vec::new(), ImageFiles::default());
+    let mut described = Vec::new();
     let mut read = HashSet::new();
     for (line, rest) in libraries {
         for file in library_files(reach, rest) {
@@ -78,7 +77,7 @@ pub fn load_libraries(obj: &Path, libraries: &[(usize, String)], access: Access)
                         warn(&format!("mtllib `{}`: {} is taken", rest.escape_debug(), path.display()));
                     }
                     if read.insert(path.clone()) {
-                        described.extend(load_library(reach, &path, &mut images)?);
+                        described.extend(load_library(reach, &path, images)?);
                     }
                 }
             }
@@ -87,7 +86,7 @@ pub fn load_libraries(obj: &Path, libraries: &[(usize, String)], access: Access)
     materials(described, images)
 }
 
-fn load_library(reach: Reach, path: &Path, images: &mut ImageFiles) -> Result<Vec<Described>, SceneError> {
+fn load_library(reach: Reach, path: &Path, images: &mut Images) -> Result<Vec<Described>, SceneError> {
     let text = read_lossy(path)?;
     let clean = clean_mtl(&text).map_err(|(line, what)| SceneError::line(path, line, what))?;
     let more = read_more(reach, path, &text, images).map_err(|(line, what)| SceneError::line(path, line, what))?;
@@ -102,9 +101,9 @@ fn load_library(reach: Reach, path: &Path, images: &mut ImageFiles) -> Result<Ve
     Ok(materials.into_iter().zip(more).map(described).collect())
 }
 
-/// Reads the maps and the physically based terms, one entry for each material. Warns of maps that are not shown: once
-/// for each kind, and once for each file that is missing or has another name.
-fn read_more(reach: Reach, path: &Path, text: &str, images: &mut ImageFiles) -> Result<Vec<More>, (usize, String)> {
+/// Reads the maps and the physically based terms, one entry for each material. Warns of terms and maps that are not
+/// shown: once for each kind, and once for each file that is missing or has another name.
+fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Result<Vec<More>, (usize, String)> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut materials: Vec<More> = Vec::new();
     let mut told: HashSet<String> = HashSet::new();
@@ -121,7 +120,15 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut ImageFiles) -> 
         }
         let Some(material) = materials.last_mut() else { continue };
         if matches!(keyword, "Pr" | "Pm" | "Ps" | "Pc" | "Pcr") {
-            material.numbers.insert(keyword.to_owned(), fraction(keyword, rest).map_err(|what| (line, what))?);
+            let number = fraction(keyword, rest).map_err(|what| (line, what))?;
+            material.numbers.insert(keyword.to_owned(), number);
+            // The roughness of the clearcoat says nothing without a clearcoat.
+            if matches!(keyword, "Ps" | "Pc") && number > 0.0 {
+                warn(line, keyword, format!("`{keyword}` is not shown"));
+            }
+        }
+        if keyword == "aniso" && words(rest).next().and_then(|word| word.parse().ok()).is_some_and(|x: f32| x != 0.0) {
+            warn(line, keyword, format!("`{keyword}` is not shown"));
         }
         let term = match MapKind::of(keyword) {
             MapKind::None => continue,
@@ -154,26 +161,33 @@ fn fraction(keyword: &str, rest: &str) -> Checked<f32> {
 }
 
 /// Decodes the images and makes the materials. Warns of each image that cannot be read.
-fn materials(described: Vec<Described>, images: ImageFiles) -> Result<Library, SceneError> {
-    let decoded = images.decode();
+fn materials(described: Vec<Described>, images: &mut Images) -> Result<Vec<Material>, SceneError> {
+    images.decode();
     let mut told = HashSet::new();
     for (path, map) in described.iter().flat_map(|d| d.more.maps.iter().map(|map| (&d.path, map))) {
-        if let Some(Err(what)) = decoded.get(map.file).filter(|_| told.insert(map.file)) {
-            tracing::warn!("{}:{}: the image is not shown: {}", path.display(), map.line, what.escape_debug());
+        if let Err(what) = images.get(map.file)
+            && told.insert(map.file)
+        {
+            warn_of_image(path, map, what);
         }
     }
-    let mut images = Images::new(decoded.into_iter().map(Result::ok).collect());
     let mut materials = Vec::new();
-    for Described { spec, name, path, more } in described {
-        let named = |what| SceneError::file(&path, format!("material `{name}`: {what}"));
-        materials.push(material(spec, &name, &more, &mut images).map_err(named)?);
+    for described in described {
+        let named = |what| SceneError::file(&described.path, format!("material `{}`: {what}", described.name));
+        materials.push(material(&described, images).map_err(named)?);
     }
-    Ok(Library { materials, images: images.finish() })
+    Ok(materials)
+}
+
+fn warn_of_image(path: &Path, map: &Map, what: &str) {
+    tracing::warn!("{}:{}: the image is not shown: {}", path.display(), map.line, what.escape_debug());
 }
 
 /// Makes a material. A colour that is stated by its map alone is white.
-fn material(mut spec: MaterialSpec, name: &str, more: &More, images: &mut Images) -> Checked<Material> {
-    let maps = || more.maps.iter().filter(|map| images.get(map.file).is_some());
+fn material(described: &Described, images: &mut Images) -> Checked<Material> {
+    let Described { spec, name, path, more } = described;
+    let mut spec = spec.clone();
+    let maps = || more.maps.iter().filter(|map| images.get(map.file).is_ok());
     let has_map = |term: Term| maps().any(|map| map.term == term);
     let white = |colour: &mut Option<[f32; 3]>, term: Term| {
         if colour.is_none() && has_map(term) {
@@ -204,8 +218,9 @@ fn material(mut spec: MaterialSpec, name: &str, more: &More, images: &mut Images
         }
     }
     for map in &more.maps {
-        if images.get(map.file).is_some() {
-            set_map(&mut material, map.term, &map.options, images, map.file);
+        if images.get(map.file).is_ok() {
+            let set = set_map(&mut material, map.term, &map.options, images, map.file);
+            set.unwrap_or_else(|what| warn_of_image(path, map, &what));
         }
     }
     // The image of the base colour has this opacity already.

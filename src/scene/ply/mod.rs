@@ -13,16 +13,16 @@ use std::{
 
 use glam::Vec2;
 use serde::Deserialize;
-use serde_ply::{DeserializeError, ElementDef, PlyReader};
+use serde_ply::{DeserializeError, ElementDef, PlyFormat, PlyHeader, PlyProperty, PlyReader, PropertyType, ScalarType};
 
 use self::vertex::{Vertices, upper_left};
 use super::{
     error::Checked,
-    image_files::{ImageFiles, Images, View},
-    material::MaterialSpec,
+    image_files::{Images, View},
+    material::{Material, MaterialSpec},
     mesh::Mesh,
-    needs::require_for_triangles,
-    obj::Library,
+    mesh_file::{Loaded, Loading},
+    needs::{Attributes, MeshSize, require_for_mesh, require_for_rows},
     outside::Access,
     polygon::Triangulator,
     smooth::{Shading, smooth_normals},
@@ -65,43 +65,85 @@ struct Elements {
 }
 
 /// Makes a mesh of a file's content, and reads the images that it names. Its faces have the slot of their image.
-pub(super) fn parse_ply(
-    path: &Path,
-    bytes: &[u8],
-    shading: Shading,
-    n_loaded: usize,
-    access: Access,
-) -> Checked<(Mesh, Library)> {
+pub(super) fn parse_ply(path: &Path, bytes: &[u8], loading: &mut Loading) -> Checked<Loaded> {
+    let &mut Loading { shading, n_loaded, access, ref mut images } = loading;
     let mut reader = PlyReader::from_reader(bytes).map_err(|error| format!("is no PLY file: {}", text(&error)))?;
     let header = reader.header().clone();
     check(&header.elem_defs)?;
-    let elements = read(&mut reader, &header.elem_defs, bytes.len(), n_loaded)?;
-    let n_of_polygons: usize = elements.polygons.iter().map(|p| p.vertex_indices.len().saturating_sub(2)).sum();
-    let n_of_strips: usize = elements.strips.iter().map(|strips| strips.vertex_indices.len().saturating_sub(2)).sum();
-    require_for_triangles(n_loaded as u64, (n_of_polygons + n_of_strips) as u64)?;
+    check_counts(&header, bytes.len() as u64)?;
+    let elements = read(&mut reader, &header.elem_defs)?;
+    require_for_mesh(n_loaded as u64, &elements.size())?;
     let names: Vec<&str> = texture_files(&header.comments).collect();
+    let uses_crease = shading.smooth && elements.vertices.normals.is_empty();
     let mesh = mesh(elements, names.len(), shading)?;
-    let library = if mesh.uvs[0].is_empty() { Library::default() } else { library(path, &names, access) };
-    Ok((mesh, library))
+    let materials = if mesh.uvs[0].is_empty() { Vec::new() } else { materials(path, &names, access, images) };
+    Ok(Loaded { mesh, materials, uses_crease })
 }
 
-/// Reads the elements in the order of the file, of `n_bytes`.
-fn read(reader: &mut PlyReader<&[u8]>, elements: &[ElementDef], n_bytes: usize, n_loaded: usize) -> Checked<Elements> {
+impl Elements {
+    /// Returns the size of the mesh.
+    fn size(&self) -> MeshSize {
+        let of_polygons = self.polygons.iter().map(|polygon| polygon.vertex_indices.len());
+        let n_corners = of_polygons.chain(self.strips.iter().map(|strips| strips.vertex_indices.len()));
+        let has_uvs = !self.vertices.uvs.is_empty() || self.polygons.iter().any(|p| !p.texcoord.is_empty());
+        let has_colours = !self.vertices.colours.is_empty();
+        MeshSize {
+            n_triangles: n_corners.map(|n| n.saturating_sub(2) as u64).sum(),
+            // The points are there already.
+            n_points: 0,
+            attributes: Attributes { n_uv_sets: u64::from(has_uvs), has_colours, has_tangents: false },
+        }
+    }
+}
+
+/// Refuses a header that promises more rows than a file of `n_bytes` can hold, or more than there is memory for.
+fn check_counts(header: &PlyHeader, n_bytes: u64) -> Checked<()> {
+    let is_text = matches!(header.format, PlyFormat::Ascii);
+    let (mut n_promised, mut n_held) = (0_u64, 0_u64);
+    for element in &header.elem_defs {
+        let name = element.name.escape_debug();
+        if element.properties.is_empty() && element.count > 0 {
+            return Err(format!("element `{name}` has no properties"));
+        }
+        // In a text, a number takes a digit and a blank, and the file need not end in one.
+        let least = |property: &PlyProperty| if is_text { 2 } else { least_bytes(&property.property_type) };
+        let n_row_bytes: u64 = element.properties.iter().map(least).sum();
+        n_promised = n_promised.saturating_add((element.count as u64).saturating_mul(n_row_bytes));
+        if n_promised > n_bytes.saturating_add(1) {
+            let n = element.count;
+            return Err(format!("element `{name}`: the file ends too early: {n_bytes} bytes do not hold its {n} rows"));
+        }
+        let of_row = match element.name.as_str() {
+            "vertex" => Vertices::n_row_bytes(element),
+            "face" => size_of::<Polygon>(),
+            "tristrips" => size_of::<Strips>(),
+            _ => 0,
+        };
+        n_held = n_held.saturating_add((element.count as u64).saturating_mul(of_row as u64));
+    }
+    require_for_rows(n_held.saturating_add(n_bytes))
+}
+
+/// Returns the least number of bytes that a property takes in a binary file: those of a number, or of a list's length.
+fn least_bytes(property: &PropertyType) -> u64 {
+    let (PropertyType::Scalar(number) | PropertyType::List { count_type: number, .. }) = property;
+    match number {
+        ScalarType::I8 | ScalarType::U8 => 1,
+        ScalarType::I16 | ScalarType::U16 => 2,
+        ScalarType::I32 | ScalarType::U32 | ScalarType::F32 => 4,
+        ScalarType::F64 => 8,
+    }
+}
+
+/// Reads the elements in the order of the file.
+fn read(reader: &mut PlyReader<&[u8]>, elements: &[ElementDef]) -> Checked<Elements> {
     let mut found = Elements::default();
     for element in elements {
         let failed = |error| format!("element `{}`: {}", element.name.escape_debug(), text(&error));
         match element.name.as_str() {
             "vertex" => found.vertices = Vertices::read(reader, element)?,
-            "face" => {
-                // A row takes at least one byte, so a file has no more rows than bytes, whatever its header states.
-                require_for_triangles(n_loaded as u64, element.count.min(n_bytes) as u64)?;
-                found.polygons = reader.next_element().map_err(failed)?;
-            }
+            "face" => found.polygons = reader.next_element().map_err(failed)?,
             "tristrips" => found.strips = reader.next_element().map_err(failed)?,
-            // Rows without properties take no bytes, and a header can promise any number of them.
-            _ if element.properties.is_empty() && element.count > 0 => {
-                return Err(format!("element `{}` has no properties", element.name.escape_debug()));
-            }
             _ => drop(reader.next_element::<Vec<Skipped>>().map_err(failed)?),
         }
     }
@@ -114,23 +156,24 @@ fn texture_files(comments: &[String]) -> impl Iterator<Item = &str> {
 }
 
 /// Returns one material for each name of an image, which is its base colour. Warns of images that cannot be read.
-fn library(path: &Path, names: &[&str], access: Access) -> Library {
+fn materials(path: &Path, names: &[&str], access: Access, images: &mut Images) -> Vec<Material> {
     let reach = access.beside(path);
     let warn = |what: &str| tracing::warn!("{}: TextureFile is not shown: {}", path.display(), what.escape_debug());
-    let mut files = ImageFiles::default();
-    let mut add = |name: &&str| reach.find(reach.root, name).map(|file| files.add(file.path)).map_err(|e| warn(&e));
-    let of_names: Vec<Option<usize>> = names.iter().map(|name| add(name).ok()).collect();
-    let decoded = files.decode().into_iter().map(|image| image.map_err(|what| warn(&what)).ok()).collect();
-    let mut images = Images::new(decoded);
-    let mut material = |(name, file): (&&str, Option<usize>)| {
-        let file = file.filter(|file| images.get(*file).is_some());
-        let spec = MaterialSpec { kd: file.map(|_| [1.0; 3]), ..MaterialSpec::default() };
+    let mut add = |name: &&str| reach.find(reach.root, name).map(|file| images.add(file.path));
+    let files: Vec<Checked<usize>> = names.iter().map(&mut add).collect();
+    images.decode();
+    let material = |(name, file): (&&str, Checked<usize>)| {
+        let image = file.and_then(|file| {
+            images.get(file)?;
+            images.show(file, View::Plain)
+        });
+        let image = image.map_err(|what| warn(&what)).ok();
+        let spec = MaterialSpec { kd: image.map(|_| [1.0; 3]), ..MaterialSpec::default() };
         let mut material = spec.material(name).expect("defaults are in range");
-        material.maps.base_colour = file.map(|file| Texture::of_image(images.show(file, View::Plain)));
+        material.maps.base_colour = image.map(Texture::of_image);
         material
     };
-    let materials = names.iter().zip(of_names).map(&mut material).collect();
-    Library { materials, images: images.finish() }
+    names.iter().zip(files).map(material).collect()
 }
 
 fn has_all<const N: usize>(element: &ElementDef, names: [&str; N]) -> bool {

@@ -101,6 +101,15 @@ impl<'de> Visitor<'de> for PaintedVisitor {
 }
 
 impl Vertices {
+    /// Returns the memory that a vertex takes while vertices are read, bytes: its row, and what the row becomes.
+    pub fn n_row_bytes(element: &ElementDef) -> usize {
+        let has_any = |names: &[&str]| names.iter().any(|name| element.has_property(name));
+        let has_more = has_any(&REDS) || has_any(&FIRST_UVS);
+        let row = if has_more { size_of::<Painted>() } else { size_of::<Plain>() };
+        let more = if has_more { size_of::<Vec4>() + size_of::<Vec2>() } else { 0 };
+        row + 2 * size_of::<Vec3>() + more
+    }
+
     /// Reads the vertices, the element that comes next in the file.
     pub fn read(reader: &mut PlyReader<&[u8]>, element: &ElementDef) -> Checked<Self> {
         let failed = |error| format!("element `vertex`: {}", text(&error));

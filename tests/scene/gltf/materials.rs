@@ -8,9 +8,7 @@ use kdray::scene::{Alpha, Channel, Clearcoat, Encoding, Material, Microfacet, Pi
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-use super::gltf::Model;
-
-const F32: u32 = 5126;
+use super::{F32, Model};
 
 /// A square in the plane z = 0 that faces +z, whose texture coordinates are those of an image that stands upright.
 fn square() -> Model {
@@ -229,13 +227,47 @@ fn tangents_follow_the_texture_coordinates() {
     assert!(bare.scene().meshes[0].tangents.is_empty());
 }
 
-/// A fan of very many triangles around one point has no tangents there, since the algorithm would recurse too deeply.
+/// A scene file replaces a model's material by one with a normal map, and mirrors its coordinates.
+#[test]
+fn tangents_follow_the_material_that_counts() {
+    let load = |table: &str, model: &Model| {
+        let folder = TempDir::new().unwrap();
+        let toml = format!(
+            "[materials.m]\nmap_normal = {{ file = 'a.png', scale = [-1, 1] }}\n[[mesh]]\nfile = 'm.glb'\n{table}\n"
+        );
+        let files = [("s.toml", toml.as_bytes()), ("m.glb", &model.glb()), ("a.png", &png([128, 128, 255, 255]))];
+        for (name, bytes) in files {
+            fs::write(folder.path().join(name), bytes).unwrap();
+        }
+        Scene::load(&folder.path().join("s.toml")).unwrap().meshes[0].tangents.clone()
+    };
+    let [along, against] = [Vec4::new(1.0, 0.0, 0.0, 1.0), Vec4::new(-1.0, 0.0, 0.0, -1.0)];
+    let named = with_material(json!({ "name": "m" }));
+    assert!(load("", &named).is_empty());
+    for table in ["material = 'm'", "override = true"] {
+        assert_eq!(load(table, &named), [[against; 3]; 2], "{table}");
+        assert_eq!(load(&format!("{table}\nuv_scale = [-3, 2]"), &named), [[along; 3]; 2], "{table}");
+    }
+    // The file's own tangents and their sides follow the texture coordinates.
+    let mut own = named;
+    let tangents = own.accessor("VEC4", F32, &[[0.0_f32, 1.0, 0.0, 1.0]; 4].concat());
+    let normals = own.accessor("VEC3", F32, &[[0.0_f32, 0.0, 1.0]; 4].concat());
+    let attributes = &mut own.json["meshes"][0]["primitives"][0]["attributes"];
+    (attributes["TANGENT"], attributes["NORMAL"]) = (json!(tangents), json!(normals));
+    assert_eq!(load("material = 'm'", &own), [[Vec4::new(0.0, 1.0, 0.0, 1.0); 3]; 2]);
+    assert_eq!(load("uv_scale = [-1, 1]", &own), [[Vec4::new(0.0, -1.0, 0.0, -1.0); 3]; 2]);
+    assert_eq!(load("uv_scale = [1, -1]", &own), [[Vec4::new(0.0, 1.0, 0.0, -1.0); 3]; 2]);
+}
+
+/// In a fan of very many triangles around one point, each has the tangent of its own plane, since MikkTSpace would recur
+/// too deeply. Faces without area take no time.
 #[test]
 fn large_fans_do_not_exhaust_the_stack() {
     let n = 200_000;
     let mut model = with_material(json!({ "normalTexture": { "index": 0 } }));
     let circle = (0..n).map(|ix| Vec2::from_angle(ix as f32 / n as f32 * std::f32::consts::TAU));
-    let points: Vec<_> = std::iter::once(Vec2::ZERO).chain(circle).collect();
+    let mut points: Vec<_> = std::iter::once(Vec2::ZERO).chain(circle).collect();
+    points.resize(2 * n, Vec2::X);
     let positions: Vec<_> = points.iter().flat_map(|p| [p.x, p.y, 0.0]).collect();
     let uvs: Vec<_> = points.iter().flat_map(|p| p.to_array()).collect();
     let (positions, uvs) = (model.accessor("VEC3", F32, &positions), model.accessor("VEC2", F32, &uvs));
@@ -243,7 +275,11 @@ fn large_fans_do_not_exhaust_the_stack() {
     primitive["attributes"] = json!({ "POSITION": positions, "TEXCOORD_0": uvs });
     primitive["mode"] = json!(6);
     let scene = model.scene();
-    assert_eq!(scene.meshes[0].tangents, vec![[Vec4::ZERO; 3]; n - 1]);
+    let tangents = &scene.meshes[0].tangents;
+    // v grows along y.
+    let is_along_x = |tangent: &Vec4| tangent.distance(Vec4::new(1.0, 0.0, 0.0, -1.0)) < 0.05;
+    assert!(tangents[..n - 1].as_flattened().iter().all(is_along_x));
+    assert_eq!(tangents[n + 1..], vec![[Vec4::ZERO; 3]; n - 3]);
 }
 
 #[test]
@@ -264,4 +300,21 @@ fn terms_out_of_range_are_named() {
         let error = with_material(json).load().unwrap_err();
         assert!(error.contains("model.glb: materials[0]") && error.contains(what), "{what}: {error}");
     }
+}
+
+#[test]
+fn images_with_the_same_bytes_are_one() {
+    let pbr = json!({ "baseColorTexture": { "index": 0 }, "metallicRoughnessTexture": { "index": 1 } });
+    let mut model = with_material(json!({ "pbrMetallicRoughness": pbr }));
+    let view = model.view(&png([0, 255, 0, 255]));
+    model.json["images"] = json!([{ "bufferView": view }, { "bufferView": view, "name": "again" }]);
+    model.push("textures", json!({ "source": 1 }));
+    let of_view = model.scene();
+    assert_eq!(of_view.images.len(), 1);
+    assert_eq!(of_view.materials[0].maps.roughness.as_ref().map(|texture| texture.image_ix), Some(0));
+    let folder = TempDir::new().unwrap();
+    model.json["images"] = json!([{ "uri": "a.png" }, { "uri": "./a%2Epng" }]);
+    fs::write(folder.path().join("a.png"), png([0, 255, 0, 255])).unwrap();
+    fs::write(folder.path().join("m.glb"), model.glb()).unwrap();
+    assert_eq!(Scene::load(&folder.path().join("m.glb")).unwrap().images.len(), 1);
 }

@@ -1,0 +1,244 @@
+//! The meshes of a scene file: of generators, and of mesh files, each of which is read once, however often it is placed.
+
+use std::{
+    collections::{HashMap, HashSet},
+    ops::Range,
+    path::PathBuf,
+};
+
+use glam::{Vec2, Vec3, Vec4};
+
+use super::{
+    Instance, LoadOptions, Material, Scene, SceneError, Transform,
+    assemble::File,
+    description::{CommonSpec, MeshSpec, Source},
+    error::Checked,
+    generate::{Generator, TriangleBudget},
+    gltf,
+    image_files::Images,
+    mesh::Mesh,
+    mesh_file::{Loaded, Loading, MeshFormat, parse_mesh, read_mesh},
+    needs::{MeshSize, require_for_mesh},
+    overrides::NamedMaterials,
+    smooth::{DEFAULT_CREASE, Shading},
+};
+
+/// A `[[mesh]]` table.
+pub(super) struct MeshTable {
+    /// Its number, counted from 1.
+    pub number: usize,
+    /// Where it is in the scene file's text.
+    pub span: Range<usize>,
+    pub spec: MeshSpec,
+}
+
+/// What decides which meshes a mesh file gives.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct Reading {
+    path: PathBuf,
+    /// Name of the scene of a glTF file.
+    scene: Option<String>,
+    is_smooth: bool,
+    /// Bits of the crease angle.
+    crease: u32,
+    /// Bits of the factors on texture coordinates.
+    uv_scale: Option<[u32; 2]>,
+}
+
+/// A mesh file whose meshes are in the scene.
+struct Read {
+    /// The instances of the file with indices of the scene's meshes. Their materials are indices into `materials`.
+    instances: Vec<Instance>,
+    /// The materials of the file; `None` is the scene's default material.
+    materials: Vec<Option<Material>>,
+    /// Indices of the file's materials in the scene: as they are, and overridden. `None` until a mesh has them.
+    material_ixs: [Option<Vec<u32>>; 2],
+    /// Whether normals depend on the crease angle.
+    uses_crease: bool,
+}
+
+/// Adds the meshes of a scene file to its scene.
+pub(super) struct Placer<'a> {
+    pub file: &'a File<'a>,
+    pub scene: Scene,
+    pub materials: NamedMaterials<'a>,
+    pub images: Images,
+    /// Number of triangles that generators have made.
+    n_generated: u64,
+    read: HashMap<Reading, Read>,
+    /// The readings whose materials some table shows.
+    with_materials: HashSet<Reading>,
+}
+
+impl<'a> Placer<'a> {
+    /// `tables`: all those that will be added.
+    pub fn new(
+        file: &'a File<'a>,
+        (scene, images): (Scene, Images),
+        materials: NamedMaterials<'a>,
+        tables: &[MeshTable],
+    ) -> Self {
+        let has_own =
+            |table: &&MeshTable| table.spec.common.material.is_none() && table.spec.common.materials.is_empty();
+        let with_materials = tables.iter().filter(has_own).filter_map(|table| Reading::of(file, &table.spec).ok()?);
+        let with_materials = with_materials.collect();
+        Self { file, scene, materials, images, n_generated: 0, read: HashMap::new(), with_materials }
+    }
+
+    /// Adds the meshes of a table.
+    pub fn add(&mut self, table: &MeshTable) -> Result<(), SceneError> {
+        let failed = |what: String| self.file.at(&table.span, format!("mesh {}: {what}", table.number));
+        let MeshSpec { source, common } = &table.spec;
+        let transform = common.transform.transform().map_err(failed)?;
+        let named = self.materials.of_mesh(common).map_err(failed)?;
+        match source {
+            Source::Generator(generator) => self.generate(generator, common, (transform, named)).map_err(failed),
+            Source::File { crease, .. } => {
+                let reading = Reading::of(self.file, &table.spec).map_err(failed)?.expect("the source is a file");
+                if !self.read.contains_key(&reading) {
+                    let read = self.read_file(&reading, table)?;
+                    self.read.insert(reading.clone(), read);
+                }
+                if crease.is_some() && !self.read[&reading].uses_crease {
+                    let what = "`crease` has no effect: no normals of the file's faces are computed";
+                    tracing::warn!("{}", failed(what.to_owned()));
+                }
+                self.place(&reading, common, (transform, named)).map_err(failed)
+            }
+        }
+    }
+
+    /// Adds a generator's mesh.
+    fn generate(
+        &mut self,
+        generator: &Generator,
+        common: &CommonSpec,
+        (transform, named): (Transform, Vec<u32>),
+    ) -> Checked<()> {
+        let scene = &mut self.scene;
+        let budget = TriangleBudget { n_generated: self.n_generated, n_triangles: scene.n_triangles() as u64 };
+        let mut mesh = generator.build(&budget)?;
+        if mesh.faces.is_empty() {
+            return Err("makes no triangles".to_owned());
+        }
+        if common.smooth == Some(false) {
+            mesh.normals.fill([Vec3::ZERO; 3]);
+        }
+        let slots = if named.is_empty() { vec![scene.default_material()] } else { named };
+        if !slots.iter().any(|ix| scene.materials[*ix as usize].maps.textures().next().is_some()) {
+            mesh.uvs = Default::default();
+        }
+        scale_uvs(&mut mesh, common.uv_scale)?;
+        self.n_generated += mesh.faces.len() as u64;
+        scene.push_mesh(mesh, transform, slots)
+    }
+
+    /// Reads a mesh file and adds its meshes, without instances. Of a glTF file, lights and cameras are left out.
+    fn read_file(&mut self, reading: &Reading, table: &MeshTable) -> Result<Read, SceneError> {
+        let failed = |what: String| self.file.at(&table.span, format!("mesh {}: {what}", table.number));
+        // The scene file may misspell the name, so the error names the line in the scene file.
+        let path = &reading.path;
+        let bytes = read_mesh(path).map_err(|error| failed(error.to_string()))?;
+        let n_loaded = self.scene.n_triangles();
+        let first_mesh = self.scene.meshes.len();
+        let uv_scale = table.spec.common.uv_scale;
+        if MeshFormat::of(path, &bytes) == MeshFormat::Gltf {
+            let allow_outside = self.file.access.is_anywhere();
+            let options = LoadOptions { scene: reading.scene.clone(), camera: None, allow_outside };
+            let has_materials = self.with_materials.contains(reading);
+            let mut model = gltf::load_meshes(path, bytes, &options, has_materials, n_loaded)?;
+            for mesh in &mut model.meshes {
+                if !reading.is_smooth {
+                    mesh.normals.fill([Vec3::ZERO; 3]);
+                }
+                scale_uvs(mesh, uv_scale).map_err(failed)?;
+            }
+            self.scene.meshes.append(&mut model.meshes);
+            model.instances.iter_mut().for_each(|instance| instance.mesh_ix += first_mesh);
+            let first_image = self.images.adopt(model.images);
+            let own = |mut material: Material| {
+                material.maps.change_each(|texture| texture.image_ix += first_image);
+                Some(material)
+            };
+            let materials = model.materials.into_iter().map(own).collect();
+            return Ok(Read { instances: model.instances, materials, material_ixs: [None, None], uses_crease: false });
+        }
+        if let Some(name) = &reading.scene {
+            return Err(failed(format!("there is no scene `{name}`: only glTF files name scenes")));
+        }
+        let shading = Shading { smooth: reading.is_smooth, crease: f32::from_bits(reading.crease) };
+        let mut loading = Loading { shading, n_loaded, access: self.file.access, images: &mut self.images };
+        let Loaded { mut mesh, materials, uses_crease } = parse_mesh(path, bytes, &mut loading)?;
+        scale_uvs(&mut mesh, uv_scale).map_err(failed)?;
+        self.scene.meshes.push(mesh);
+        let materials: Vec<_> = materials.into_iter().map(Some).chain([None]).collect();
+        let slots = (0..materials.len() as u32).collect();
+        let instances = vec![Instance { mesh_ix: first_mesh, transform: Transform::IDENTITY, materials: slots }];
+        Ok(Read { instances, materials, material_ixs: [None, None], uses_crease })
+    }
+
+    /// Adds instances of a mesh file's meshes, with the materials that are named or else with those of the file.
+    fn place(
+        &mut self,
+        reading: &Reading,
+        common: &CommonSpec,
+        (transform, named): (Transform, Vec<u32>),
+    ) -> Checked<()> {
+        let read = self.read.get_mut(reading).expect("the file is read");
+        let scene = &mut self.scene;
+        if named.is_empty() && read.material_ixs[usize::from(common.overrides)].is_none() {
+            let n_materials = scene.materials.len();
+            let add = |material: &Option<Material>| match material {
+                Some(material) => scene.push_material(material.clone()),
+                None => scene.default_material(),
+            };
+            let material_ixs = read.materials.iter().map(add).collect();
+            read.material_ixs[usize::from(common.overrides)] = Some(material_ixs);
+            if common.overrides {
+                self.materials.override_from(scene, n_materials)?;
+            }
+        }
+        let own = read.material_ixs[usize::from(common.overrides)].as_ref();
+        let mut n_triangles = scene.n_triangles() as u64;
+        for instance in &read.instances {
+            let mesh = &scene.meshes[instance.mesh_ix];
+            let transform = transform.after(&instance.transform);
+            mesh.placed(&transform)?;
+            n_triangles += mesh.faces.len() as u64;
+            let materials = match own.filter(|_| named.is_empty()) {
+                Some(own) => instance.materials.iter().map(|ix| own[*ix as usize]).collect(),
+                None => named.clone(),
+            };
+            scene.instances.push(Instance { mesh_ix: instance.mesh_ix, transform, materials });
+        }
+        require_for_mesh(n_triangles, &MeshSize::default())
+    }
+}
+
+impl Reading {
+    /// Returns how the file of a mesh is read, or `None` for a generator.
+    fn of(file: &File, spec: &MeshSpec) -> Checked<Option<Self>> {
+        let Source::File { path, crease, scene } = &spec.source else { return Ok(None) };
+        Ok(Some(Self {
+            path: file.access.beside(file.path).exact(path)?,
+            scene: scene.clone(),
+            is_smooth: spec.common.smooth.unwrap_or(true),
+            crease: crease.unwrap_or(DEFAULT_CREASE).to_bits(),
+            uv_scale: spec.common.uv_scale.map(|scale| scale.map(f32::to_bits)),
+        }))
+    }
+}
+
+/// Multiplies all texture coordinates of a mesh. Tangents of its file remain along increasing u, and their bitangents
+/// along decreasing v.
+fn scale_uvs(mesh: &mut Mesh, scale: Option<[f32; 2]>) -> Checked<()> {
+    let Some(scale) = scale.map(Vec2::from_array) else { return Ok(()) };
+    if !scale.is_finite() {
+        return Err(format!("uv_scale = {:?} is not finite", scale.to_array()));
+    }
+    mesh.uvs.iter_mut().flatten().flatten().for_each(|uv| *uv *= scale);
+    let along = scale.x.signum();
+    let signs = Vec4::new(along, along, along, along * scale.y.signum());
+    mesh.tangents.as_flattened_mut().iter_mut().for_each(|tangent| *tangent *= signs);
+    Ok(())
+}

@@ -1,0 +1,126 @@
+//! Mesh files that a scene file places, more than once or with keys that have no effect.
+
+use glam::Vec3;
+use kdray::scene::{Pixels, Scene};
+
+use super::{
+    gltf::Model,
+    materials::{load_scene, png},
+};
+
+const OBJ: &str = "mtllib m.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\nvt 1 0\nvt 0 1\n\
+                   f 1/1 2/2 3/3\nf 1/1 2/2 4/3\n";
+const MTL: &[u8] = b"newmtl red\nKd 1 0 0\nmap_Kd a.png\n";
+
+/// Loads a scene file with a mesh, its material and its image beside it. Returns the warnings, too.
+fn load(toml: &str) -> (Scene, Vec<String>) {
+    let image = png(|_, _| [9, 8, 7, 255]);
+    let files: [(&str, &[u8]); 4] =
+        [("s.toml", toml.as_bytes()), ("m.obj", OBJ.as_bytes()), ("m.mtl", MTL), ("a.png", &image)];
+    let (scene, warnings) = load_scene(&files);
+    (scene.unwrap_or_else(|error| panic!("{error}\n{toml}")), warnings)
+}
+
+#[test]
+fn a_mesh_file_that_is_placed_twice_is_read_once() {
+    let (scene, warnings) = load(
+        "materials.red = { Kd = [0, 1, 0] }\nmaterials.own = {}\n[[mesh]]\nfile = 'm.obj'\nmaterial = 'own'\n\
+         [[mesh]]\nfile = 'm.obj'\n[[mesh]]\nfile = './m.obj'\ntransform.translate = [0, 0, 5]\n\
+         [[mesh]]\nfile = 'm.obj'\noverride = true\n",
+    );
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!((scene.meshes.len(), scene.images.len()), (1, 1));
+    assert!(scene.instances.iter().all(|instance| instance.mesh_ix == 0));
+    let colours: Vec<Vec3> = scene.instances.iter().map(|it| scene.materials[it.materials[0] as usize].kd).collect();
+    assert_eq!(colours, [Vec3::splat(0.8), Vec3::X, Vec3::X, Vec3::Y]);
+    assert_eq!(scene.instances[1].materials, scene.instances[2].materials);
+    assert_eq!(scene.instances[2].transform.point(Vec3::ZERO), Vec3::new(0.0, 0.0, 5.0));
+    // What changes the mesh makes another one.
+    for key in ["smooth = false", "crease = 10", "uv_scale = [2, 2]"] {
+        let (scene, _) = load(&format!("[[mesh]]\nfile = 'm.obj'\n[[mesh]]\nfile = 'm.obj'\n{key}\n"));
+        assert_eq!((scene.meshes.len(), scene.images.len()), (2, 1), "{key}");
+    }
+}
+
+#[test]
+fn a_model_that_is_placed_twice_is_read_once() {
+    let mut model = Model::new();
+    let positions = model.accessor("VEC3", 5126, &[0.0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    model.push("materials", serde_json::json!({ "name": "red" }));
+    model.show(serde_json::json!({ "attributes": { "POSITION": positions }, "material": 0 }));
+    model.root(serde_json::json!({ "mesh": 0, "translation": [0, 0, 1] }));
+    let toml = "materials.own = {}\n[[mesh]]\nfile = 'm.glb'\nmaterial = 'own'\n\
+                [[mesh]]\nfile = 'm.glb'\ntransform.scale = 2\n[[mesh]]\nfile = 'm.glb'\n";
+    let scene = load_scene(&[("s.toml", toml.as_bytes()), ("m.glb", &model.glb())]).0.unwrap();
+    assert_eq!((scene.meshes.len(), scene.instances.len(), scene.materials.len()), (1, 6, 2));
+    let names: Vec<&str> =
+        scene.instances.iter().map(|it| &scene.materials[it.materials[0] as usize].name[..]).collect();
+    assert_eq!(names, ["own", "own", "red", "red", "red", "red"]);
+    assert_eq!(scene.instances[3].transform.point(Vec3::ZERO), Vec3::new(0.0, 0.0, 2.0));
+}
+
+#[test]
+fn images_of_several_libraries_are_decoded_once() {
+    let image = png(|_, _| [1, 2, 3, 255]);
+    let obj = OBJ.replace("m.mtl", "n.mtl");
+    let toml = "materials.own = { map_Kd = 'a.png' }\n[[mesh]]\nfile = 'm.obj'\n[[mesh]]\nfile = 'n.obj'\n\
+                [[mesh]]\nfile = 'n.obj'\nmaterial = 'own'\n";
+    let (scene, warnings) = load_scene(&[
+        ("s.toml", toml.as_bytes()),
+        ("m.obj", OBJ.as_bytes()),
+        ("n.obj", obj.as_bytes()),
+        ("m.mtl", MTL),
+        ("n.mtl", b"newmtl red\nmap_Kd a.png\nmap_Tr a.png\nbump -bm 0.5 a.png\n"),
+        ("a.png", &image),
+    ]);
+    let scene = scene.unwrap();
+    assert!(warnings.is_empty(), "{warnings:?}");
+    let names: Vec<&str> = scene.images.iter().map(|image| &image.name[..]).collect();
+    assert_eq!(names, ["a.png", "a.png", "a.png (normals)"]);
+    let Pixels::Bytes(inverted) = &scene.images[1].pixels else { panic!("bytes") };
+    assert_eq!(inverted[0], [254, 253, 252, 0]);
+    let of_material = |name: &str| {
+        let of_name = scene.materials.iter().filter(|material| material.name == name);
+        of_name.map(|material| material.maps.base_colour.as_ref().unwrap().image_ix).collect::<Vec<_>>()
+    };
+    assert_eq!((of_material("own"), of_material("red")), (vec![0], vec![0, 0]));
+}
+
+#[test]
+fn a_crease_without_effect_is_told() {
+    let with_normals = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n";
+    let mixed = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\nf 1 2 3\n";
+    let flat = b"v 0 0 0\nv 1 0 0\nv 0 1 0\ns off\nf 1 2 3\n";
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+               property float nx\nproperty float ny\nproperty float nz\nelement face 1\n\
+               property list uchar int vertex_indices\nend_header\n0 0 0 0 0 1\n1 0 0 0 0 1\n0 1 0 0 0 1\n3 0 1 2\n";
+    let bare = ply.replace("property float nx\nproperty float ny\nproperty float nz\n", "").replace(" 0 0 1\n", "\n");
+    for (name, content, key, is_told) in [
+        ("m.obj", &with_normals[..], "crease = 10", true),
+        ("m.obj", mixed, "crease = 10", false),
+        ("m.obj", flat, "crease = 10", true),
+        ("m.obj", OBJ.as_bytes(), "crease = 10\nsmooth = false", true),
+        ("m.obj", with_normals, "", false),
+        ("m.ply", ply.as_bytes(), "crease = 10", true),
+        ("m.ply", bare.as_bytes(), "crease = 10", false),
+    ] {
+        let toml = format!("# a comment\n[[mesh]]\nfile = '{name}'\n{key}\n");
+        let (scene, warnings) = load_scene(&[("s.toml", toml.as_bytes()), (name, content), ("m.mtl", b"newmtl red\n")]);
+        scene.unwrap();
+        let told: Vec<_> = warnings.iter().filter(|warning| warning.contains("s.toml:2: mesh 1: `crease`")).collect();
+        assert_eq!((told.len(), warnings.len()), (usize::from(is_told), usize::from(is_told)), "{name}: {warnings:?}");
+    }
+}
+
+#[test]
+fn overrides_that_match_nothing_are_told() {
+    let warnings = |materials: &str, keys: &str| load(&format!("{materials}\n[[mesh]]\nfile = 'm.obj'\n{keys}")).1;
+    assert!(warnings("materials.red = {}", "override = true").is_empty());
+    assert!(warnings("materials.reed = {}", "").is_empty(), "nothing is overridden");
+    let worn = "override = true\n[[mesh]]\nfile = 'm.obj'\nmaterial = 'other'";
+    assert!(warnings("materials.other = {}", worn).is_empty());
+    let told = warnings("materials.red = {}\nmaterials.Reed = {}\nmaterials.sky = {}", "override = true");
+    assert_eq!(told.len(), 2, "{told:?}");
+    assert!(told[0].contains("s.toml:2: material `Reed` overrides no material of a mesh file"), "{told:?}");
+    assert!(told[0].ends_with("is `red` meant?") && !told[1].contains("meant"), "{told:?}");
+}
