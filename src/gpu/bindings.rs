@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::{AnyBuffer, Constant, Constants, Context, GivenBuffer, GpuError, Target};
+use super::{AnyBuffer, Constant, ConstantValue, Constants, Context, GivenBuffer, GpuError, Target};
 
 /// Kind of the object at a binding number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,12 +46,17 @@ pub enum Binding<'a> {
 
 /// Layout of a descriptor set. The pipelines that use it also share its specialization constants.
 pub struct BindingLayout {
-    pub(super) set_layout: vk::DescriptorSetLayout,
-    pub(super) pipeline_layout: vk::PipelineLayout,
-    /// Binding numbers and their kinds.
-    kinds: Vec<(u32, BindingKind)>,
+    layouts: Arc<Layouts>,
     /// Specialization constants that have the same values in all pipelines.
     pub(super) constants: Constants,
+}
+
+/// The Vulkan objects of a layout.
+struct Layouts {
+    set_layout: vk::DescriptorSetLayout,
+    pipeline_layout: vk::PipelineLayout,
+    /// Binding numbers and their kinds.
+    kinds: Vec<(u32, BindingKind)>,
     context: Arc<Context>,
 }
 
@@ -88,11 +93,10 @@ impl BindingLayout {
                 .device
                 .create_descriptor_set_layout(&info, None)
                 .map_err(GpuError::call("vkCreateDescriptorSetLayout", "bindings"))?;
-            let mut made = Self {
+            let mut made = Layouts {
                 set_layout,
                 pipeline_layout: vk::PipelineLayout::null(),
                 kinds: kinds.to_vec(),
-                constants,
                 context: context.clone(),
             };
             let set_layouts = [set_layout];
@@ -102,12 +106,24 @@ impl BindingLayout {
                 .device
                 .create_pipeline_layout(&info, None)
                 .map_err(GpuError::call("vkCreatePipelineLayout", "bindings"))?;
-            Ok(Arc::new(made))
+            Ok(Arc::new(Self { layouts: Arc::new(made), constants }))
         }
     }
 }
 
 impl BindingLayout {
+    /// Returns the same layout with another value of one constant. Descriptor sets of either layout serve the pipelines
+    /// of both.
+    #[must_use]
+    pub fn with_constant<T: ConstantValue>(&self, constant: Constant<T>, value: T) -> Arc<Self> {
+        Arc::new(Self { layouts: self.layouts.clone(), constants: self.constants.with(constant, value) })
+    }
+
+    /// Returns the pipeline layout.
+    pub(super) fn pipeline_layout(&self) -> vk::PipelineLayout {
+        self.layouts.pipeline_layout
+    }
+
     /// Returns whether the constant is true in all pipelines of the layout. A constant that the layout does not set is
     /// not.
     pub fn sets(&self, constant: Constant<bool>) -> bool {
@@ -115,7 +131,7 @@ impl BindingLayout {
     }
 }
 
-impl Drop for BindingLayout {
+impl Drop for Layouts {
     fn drop(&mut self) {
         // SAFETY: pipelines and sets hold the layout, so none is left.
         unsafe {
@@ -140,11 +156,10 @@ impl BindingSet {
     /// # Panics
     /// The number of objects is not that of the layout's bindings, or an object has no binding in the layout.
     pub fn new(bindings: &Arc<BindingLayout>, name: &str, objects: &[(u32, Binding)]) -> Result<Self, GpuError> {
-        assert_eq!(objects.len(), bindings.kinds.len(), "one object a binding");
-        let context = &bindings.context;
+        let Layouts { set_layout, kinds, context, .. } = &*bindings.layouts;
+        assert_eq!(objects.len(), kinds.len(), "one object a binding");
         context.count_creation("vkCreateDescriptorPool", name)?;
-        let sizes: Vec<_> = bindings
-            .kinds
+        let sizes: Vec<_> = kinds
             .iter()
             .map(|(_, kind)| vk::DescriptorPoolSize { ty: kind.descriptor(), descriptor_count: 1 })
             .collect();
@@ -157,7 +172,7 @@ impl BindingSet {
                 .map_err(GpuError::call("vkCreateDescriptorPool", name))?;
             let mut set = Self { raw: vk::DescriptorSet::null(), pool, bindings: bindings.clone() };
             context.count_creation("vkAllocateDescriptorSets", name)?;
-            let layouts = [bindings.set_layout];
+            let layouts = [*set_layout];
             let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
             set.raw = context
                 .device
@@ -170,9 +185,10 @@ impl BindingSet {
     }
 
     fn write(&self, objects: &[(u32, Binding)]) {
-        let most_bytes = self.bindings.context.limits().storage_range;
+        let Layouts { kinds, context, .. } = &*self.bindings.layouts;
+        let most_bytes = context.limits().storage_range;
         for (binding, object) in objects {
-            let known = self.bindings.kinds.iter().find(|(known, _)| known == binding);
+            let known = kinds.iter().find(|(known, _)| known == binding);
             let (_, kind) = known.unwrap_or_else(|| panic!("the set has no binding {binding}"));
             let write = vk::WriteDescriptorSet::default()
                 .dst_set(self.raw)
@@ -203,7 +219,7 @@ impl BindingSet {
                 }
             };
             // SAFETY: the set is not in use yet, and the object is of the binding's kind.
-            unsafe { self.bindings.context.device.update_descriptor_sets(&[write], &[]) };
+            unsafe { context.device.update_descriptor_sets(&[write], &[]) };
         }
     }
 }
@@ -211,6 +227,6 @@ impl BindingSet {
 impl Drop for BindingSet {
     fn drop(&mut self) {
         // SAFETY: the device has ended all work with the set, which is freed with its pool.
-        unsafe { self.bindings.context.device.destroy_descriptor_pool(self.pool, None) };
+        unsafe { self.bindings.layouts.context.device.destroy_descriptor_pool(self.pool, None) };
     }
 }

@@ -170,7 +170,7 @@ impl Commands<'_> {
             let ray_tracing = self.context.ray_tracing.as_ref().map(|_| vk::PipelineBindPoint::RAY_TRACING_KHR);
             let points = [vk::PipelineBindPoint::COMPUTE, vk::PipelineBindPoint::GRAPHICS];
             for point in points.into_iter().chain(ray_tracing) {
-                let layout = set.bindings.pipeline_layout;
+                let layout = set.bindings.pipeline_layout();
                 self.context.device.cmd_bind_descriptor_sets(self.raw, point, layout, 0, &[set.raw], &[]);
             }
         }
@@ -204,7 +204,7 @@ impl Commands<'_> {
         // SAFETY: the set is bound, and the push constants fit the layout's range.
         unsafe {
             device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::COMPUTE, pipeline.raw);
-            let layout = pipeline.bindings.pipeline_layout;
+            let layout = pipeline.bindings.pipeline_layout();
             device.cmd_push_constants(self.raw, layout, stages, 0, bytemuck::bytes_of(push));
             match dispatch {
                 Dispatch::Threads([nx, ny, nz], [x, y, z]) => {

@@ -56,7 +56,7 @@ impl ComputePipeline {
         let mut info = vk::ComputePipelineCreateInfo::default()
             .flags(capture_flags(context))
             .stage(stage)
-            .layout(bindings.pipeline_layout);
+            .layout(bindings.pipeline_layout());
         let mut without_checks = without_checks();
         if context.unchecked {
             info = info.push_next(&mut without_checks);
@@ -174,7 +174,7 @@ impl RasterPipeline {
             .depth_stencil_state(&depth)
             .color_blend_state(&blend)
             .dynamic_state(&dynamic)
-            .layout(bindings.pipeline_layout)
+            .layout(bindings.pipeline_layout())
             .push_next(&mut rendering)];
         // SAFETY: all that `info` points to lives until the call returns.
         let raw = unsafe { context.device.create_graphics_pipelines(vk::PipelineCache::null(), &info, None) }

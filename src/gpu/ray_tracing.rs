@@ -109,7 +109,7 @@ impl RayTracingPipeline {
             .stages(&stages)
             .groups(&groups)
             .max_pipeline_ray_recursion_depth(1)
-            .layout(bindings.pipeline_layout)];
+            .layout(bindings.pipeline_layout())];
         let (deferred, cache) = (vk::DeferredOperationKHR::null(), vk::PipelineCache::null());
         // SAFETY: all that `info` points to lives until the call returns.
         let raw = unsafe { calls.pipelines.create_ray_tracing_pipelines(deferred, cache, &info, None) }
@@ -191,7 +191,7 @@ impl Commands<'_> {
             // groups.
             unsafe {
                 device.cmd_bind_pipeline(self.raw, vk::PipelineBindPoint::RAY_TRACING_KHR, pipeline.raw);
-                let (layout, stages) = (pipeline.bindings.pipeline_layout, self.context.stages());
+                let (layout, stages) = (pipeline.bindings.pipeline_layout(), self.context.stages());
                 device.cmd_push_constants(self.raw, layout, stages, 0, bytemuck::bytes_of(push));
                 calls.pipelines.cmd_trace_rays(self.raw, &generation, &miss, &hit, &none, n_rays, 1, 1);
             }

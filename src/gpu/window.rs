@@ -51,7 +51,7 @@ impl Commands<'_> {
         self.pass(pipeline.name, None, || {
             // SAFETY: rendering to the window has begun, and the set's layout is the pipeline's.
             unsafe {
-                let layout = set.bindings.pipeline_layout;
+                let layout = set.bindings.pipeline_layout();
                 let point = vk::PipelineBindPoint::GRAPHICS;
                 device.cmd_bind_pipeline(self.raw, point, pipeline.raw);
                 device.cmd_bind_descriptor_sets(self.raw, point, layout, 0, &[set.raw], &[]);

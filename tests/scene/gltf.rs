@@ -5,7 +5,7 @@ use std::{f32::consts::PI, fs, path::Path};
 use base64::{Engine, engine::general_purpose::STANDARD};
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 use kdray::{
-    scene::{Camera, Light, LoadOptions, Scene, source_files},
+    scene::{Camera, Light, LoadOptions, Projection, Scene, source_files},
     world::FlatScene,
 };
 use serde_json::{Value, json};
@@ -477,13 +477,14 @@ fn cameras_look_at_the_scene() {
     let scene = model.scene();
     let names: Vec<_> = scene.cameras.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["front", "flat", "camera 3"]);
-    let Camera { eye, target, up, vertical_fov_degrees } = scene.camera;
+    let Camera { eye, target, up, projection } = scene.camera;
     assert_ne!(scene.camera, frontal);
     assert_eq!(scene.camera, scene.cameras[0].1);
     assert_eq!((eye, target, up), (Vec3::new(0.5, 0.5, 4.0), Vec3::new(0.5, 0.5, 0.0), Vec3::Y));
+    let Projection::Perspective { vertical_fov_degrees } = projection else { panic!("{projection:?}") };
     assert!((vertical_fov_degrees - 90.0).abs() < 1e-4);
-    // The parallel projection is 8 high, and so is the picture at a distance of 4.
-    assert!((scene.cameras[1].1.vertical_fov_degrees - 90.0).abs() < 1e-4);
+    // `ymag` is half of the height.
+    assert_eq!(scene.cameras[1].1, Camera { projection: Projection::Orthographic { height: 8.0 }, ..scene.camera });
     assert!(scene.cameras[2].1.target.z > 4.1);
 }
 
@@ -682,7 +683,7 @@ type Mistake = (&'static str, fn(&mut Value), &'static str);
 
 #[test]
 fn mistakes_are_named() {
-    let mistakes: [Mistake; 32] = [
+    let mistakes: [Mistake; 33] = [
         ("version", |m| m["asset"]["version"] = json!("1.0"), "asset: this is glTF 1.0"),
         ("asset", |m| drop(m.as_object_mut().unwrap().remove("asset")), "the JSON: missing field `asset`"),
         ("required", |m| m["extensionsRequired"] = json!(["KHR_x"]), "extensionsRequired: the file needs `KHR_x`"),
@@ -739,6 +740,15 @@ fn mistakes_are_named() {
         ("far off", |m| m["nodes"][0]["scale"] = json!([1e12, 1, 1]), "nodes[0]: a vertex lies at"),
         ("skin", |m| m["nodes"][0]["skin"] = json!(0), "nodes[0].skin: there is no skins[0]"),
         ("empty", |m| m["scenes"][0]["nodes"] = json!([]), "has no triangles"),
+        (
+            "flat camera",
+            |m| {
+                let flat = json!({ "xmag": 1, "ymag": 0, "znear": 0, "zfar": 9 });
+                m["cameras"] = json!([{ "type": "orthographic", "orthographic": flat }]);
+                m["nodes"][0]["camera"] = json!(0);
+            },
+            "cameras[0]: orthographic.ymag = 0 is outside",
+        ),
     ];
     let mut model = cube();
     let indices = model.accessor("SCALAR", U8, &cube_indices().iter().map(|ix| *ix as u8).collect::<Vec<_>>());
