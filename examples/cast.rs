@@ -11,7 +11,7 @@ use kdray::{
     cast::{NO_TRIANGLE, Ray},
     engine::{Built, Engine, choices::Workload},
     gpu::ContextOptions,
-    scene::{Camera, Scene},
+    scene::{Camera, Projection, Scene},
 };
 
 /// Numbers of columns and rows of characters.
@@ -41,10 +41,14 @@ fn ray(camera: &Camera, x: u32, y: u32) -> Ray {
     let forward = (camera.target - camera.eye).normalize();
     let right = forward.cross(camera.up).normalize();
     let up = right.cross(forward);
-    let half_height = (camera.vertical_fov_degrees.to_radians() / 2.0).tan();
+    let half_height = camera.height_at(1.0) / 2.0;
     let half_width = half_height * SIZE.0 as f32 / (2 * SIZE.1) as f32;
     let across = (2.0 * (x as f32 + 0.5) / SIZE.0 as f32 - 1.0) * half_width;
     let above = (1.0 - 2.0 * (y as f32 + 0.5) / SIZE.1 as f32) * half_height;
-    let direction = (forward + across * right + above * up).normalize();
-    Ray { origin: camera.eye, t_min: 0.0, direction, t_max: f32::INFINITY }
+    let in_picture = across * right + above * up;
+    let (origin, direction) = match camera.projection {
+        Projection::Perspective { .. } => (camera.eye, (forward + in_picture).normalize()),
+        Projection::Orthographic { .. } => (camera.eye + in_picture, forward),
+    };
+    Ray { origin, t_min: 0.0, direction, t_max: f32::INFINITY }
 }

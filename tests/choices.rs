@@ -18,7 +18,7 @@ use kdray::{
     gpu::DeviceInfo,
     layout::Triangle,
     render::Renderer,
-    scene::Camera,
+    scene::{Camera, Projection},
     world::{FlatScene, World},
 };
 use support::{meshes, pretended, random::Random, scenes, with_lanes, world_by, world_of};
@@ -260,7 +260,8 @@ fn primary_rays_are_measured_where_that_changes_no_bit() {
     };
     let many = Workload { n_rays: u64::MAX, ..Workload::of_pictures(&options, 0, 1) };
     let far = Camera { eye: Vec3::Z * 1e3, ..scene.camera };
-    for unknown in [many, many.with_cameras([scene.camera, far].iter())] {
+    let wide = Camera { projection: Projection::Orthographic { height: 1e3 }, ..scene.camera };
+    for unknown in [many, many.with_cameras([scene.camera, far].iter()), many.with_cameras([wide].iter())] {
         assert_eq!(primary_of(unknown), Chosen { value: Primary::SoftwareRaster, by: Reason::Rule });
     }
     let near = many.with_cameras([scene.camera].iter());

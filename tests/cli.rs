@@ -165,7 +165,7 @@ fn inspect_describes_the_scene_and_its_tree() {
     }
 }
 
-/// A scene file with two cameras, a spot light, and a mesh file with a map.
+/// A scene file with three cameras, the last of which is orthographic, a spot light, and a mesh file with a map.
 fn write_scene(directory: &Path) {
     let write = |name: &str, content: &str| fs::write(directory.join(name), content).unwrap();
     write("m.mtl", "newmtl wood\nKd 0.1 0.2 0.3\nmap_Kd a.png\nNs 9\n");
@@ -175,10 +175,11 @@ fn write_scene(directory: &Path) {
         let x = name.len();
         format!("[[cameras]]\nname = '{name}'\neye = [{x}, 0, 5]\ntarget = [0, 0, 0]\n")
     });
+    let plan = "[[cameras]]\nname = 'plan'\neye = [0, 0, 5]\ntarget = [0, 0, 0]\northographic_height = 2.5\n";
     let light = "[[light]]\nkind = 'spot'\nposition = [0, 0, 4]\ndirection = [0, 0, -1]\nintensity = [9, 9, 9]\n\
                  inner_angle = 10\nouter_angle = 30\n";
     let meshes = "[[mesh]]\nfile = 'm.obj'\n".repeat(2);
-    write("s.toml", &format!("{}{light}{meshes}", cameras.concat()));
+    write("s.toml", &format!("{}{plan}{light}{meshes}", cameras.concat()));
 }
 
 #[test]
@@ -205,6 +206,16 @@ fn inspect_lists_what_a_scene_consists_of() {
     );
     assert!((json["lights"][0]["outer_angle"].as_f64().unwrap() - 30.0).abs() < 1e-4);
     assert_eq!((json["cameras"][1]["name"].as_str(), json["camera"]["eye"][0].as_f64()), (Some("right"), Some(5.0)));
+    assert_eq!(
+        (json["camera"]["vertical_fov"].as_f64(), &json["camera"]["orthographic_height"]),
+        (Some(45.0), &Value::Null)
+    );
+    let plan = &json["cameras"][2];
+    assert_eq!((&plan["vertical_fov"], plan["orthographic_height"].as_f64()), (&Value::Null, Some(2.5)));
+    assert!(
+        text.lines().any(|line| line.starts_with("2 ") && line.contains("plan") && line.ends_with("2.5")),
+        "{text}"
+    );
     let memory = &json["texture_memory"];
     // The table of sRGB has 256 words. Each image has three levels of 8, 2 and 1 texels, and a word for each level.
     assert!(memory["texels"].as_u64() >= Some(4 * (256 + 14)) && memory["uvs"].as_u64() == Some(2 * 24), "{memory}");
@@ -229,7 +240,7 @@ fn cameras_and_scenes_are_chosen() {
     let [first, second] = [picture(&["--camera", "left"]), picture(&["--camera", "1"])];
     assert!(first == picture(&[]) && first != second && second == picture(&["--camera", "right"]));
     let wrong = ["render", "s.toml", "--cpu", "--camera", "up"];
-    fail(directory.path(), &wrong, 3, "s.toml: there is no camera `up`, but 0 `left`, 1 `right`");
+    fail(directory.path(), &wrong, 3, "s.toml: there is no camera `up`, but 0 `left`, 1 `right`, 2 `plan`");
     fail(directory.path(), &["inspect", "m.obj", "--camera", "0"], 3, "the file names no cameras");
     fail(directory.path(), &["inspect", "s.toml", "--scene", "0"], 3, "only glTF files name scenes");
 }

@@ -21,7 +21,7 @@ use kdray::{
     },
     passes::Passes,
     render::Renderer,
-    scene::{Camera, RenderDefaults},
+    scene::{Camera, Projection, RenderDefaults},
     world::{FlatScene, World},
 };
 use support::{
@@ -45,7 +45,12 @@ fn scene(triangles: &[Triangle]) -> FlatScene {
         material_names: vec![String::new()],
         textures: kdray::world::Textures::default(),
         lights: vec![lamp, sun],
-        camera: Camera { eye: vec3(0.0, 0.5, 5.0), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 45.0 },
+        camera: Camera {
+            eye: vec3(0.0, 0.5, 5.0),
+            target: Vec3::ZERO,
+            up: Vec3::Y,
+            projection: Projection::Perspective { vertical_fov_degrees: 45.0 },
+        },
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,
         defaults: RenderDefaults::default(),

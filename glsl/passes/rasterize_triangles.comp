@@ -86,17 +86,10 @@ void rasterize_beside_eye(uint triangle_ix, vec3 a, vec3 b, vec3 c, vec3 ahead) 
     add_large(triangle_ix, rectangle);
 }
 
-// Returns the pixels of a small triangle. Appends a large triangle to large_triangles, and returns no pixels.
-PixelTests rasterize(Triangle triangle, uint triangle_ix) {
-    vec3 a = triangle.v0 - frame.eye, b = triangle.v1 - frame.eye, c = triangle.v2 - frame.eye;
-    vec3 ahead = vec3(dot(a, frame.forward), dot(b, frame.forward), dot(c, frame.forward));
-    if (all(lessThanEqual(ahead, vec3(0.0)))) return nothing_pending();
-    if (is_steep(a, ahead.x) || is_steep(b, ahead.y) || is_steep(c, ahead.z)) {
-        rasterize_beside_eye(triangle_ix, a, b, c, ahead);
-        return nothing_pending();
-    }
-    vec2 a_px = projected(a, ahead.x), b_px = projected(b, ahead.y), c_px = projected(c, ahead.z);
-    Footprint bounds = Footprint(min(a_px, min(b_px, c_px)), max(a_px, max(b_px, c_px)), least_slack());
+// Returns the pixels of a triangle whose corners are projected to a_px, b_px and c_px, if it is small. slack: how far
+// off the corners may be because of rounding. Appends a large triangle to large_triangles, and returns no pixels.
+PixelTests rasterize_projected(uint triangle_ix, vec2 a_px, vec2 b_px, vec2 c_px, float slack) {
+    Footprint bounds = Footprint(min(a_px, min(b_px, c_px)), max(a_px, max(b_px, c_px)), slack);
     Rectangle rectangle = rectangle_of(bounds);
     if (area_of(rectangle) == 0u) return nothing_pending();
     if (area_of(rectangle) > RASTER_SMALL || rectangle.size.x > 32u) {
@@ -107,6 +100,24 @@ PixelTests rasterize(Triangle triangle, uint triangle_ix) {
     return pixel_tests_of(
         rectangle, covered_of(rectangle.size, edge_lines(a_px - first, b_px - first, c_px - first, bounds.slack))
     );
+}
+
+// Returns the pixels of a small triangle. Appends a large triangle to large_triangles, and returns no pixels.
+PixelTests rasterize(Triangle triangle, uint triangle_ix) {
+    vec3 a = triangle.v0 - frame.eye, b = triangle.v1 - frame.eye, c = triangle.v2 - frame.eye;
+    vec3 ahead = vec3(dot(a, frame.forward), dot(b, frame.forward), dot(c, frame.forward));
+    if (ORTHOGRAPHIC) {
+        if (is_behind(a, b, c, ahead)) return nothing_pending();
+        vec2 a_px = projected_in_parallel(a), b_px = projected_in_parallel(b), c_px = projected_in_parallel(c);
+        return rasterize_projected(triangle_ix, a_px, b_px, c_px, parallel_slack_px(a, b, c));
+    }
+    if (all(lessThanEqual(ahead, vec3(0.0)))) return nothing_pending();
+    if (is_steep(a, ahead.x) || is_steep(b, ahead.y) || is_steep(c, ahead.z)) {
+        rasterize_beside_eye(triangle_ix, a, b, c, ahead);
+        return nothing_pending();
+    }
+    vec2 a_px = projected(a, ahead.x), b_px = projected(b, ahead.y), c_px = projected(c, ahead.z);
+    return rasterize_projected(triangle_ix, a_px, b_px, c_px, least_slack());
 }
 
 void main() {

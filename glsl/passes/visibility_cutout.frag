@@ -15,7 +15,7 @@ layout(location = 0) out uint triangle_id;
 
 bool is_fragment_cut_out() {
     uvec2 pixel = uvec2(gl_FragCoord.xy) - uvec2(frame.window_x, frame.window_y);
-    Shear shear = shear_of(frame.eye, camera_direction(pixel));
+    Shear shear = shear_of(camera_origin(pixel), camera_direction(pixel));
     Hit hit = clamp_to_triangle(shear, triangle_at(triangle_ix), triangle_ix);
     return is_gap(triangle_ix, hit.u, hit.v, false);
 }

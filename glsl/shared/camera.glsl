@@ -43,16 +43,33 @@ uvec2 in_picture(uvec2 pixel) {
     return pixel + uvec2(frame.window_x, frame.window_y);
 }
 
-// The point of the pixel's sample in the image plane, which is at distance 1 from the eye. The rasterizer tests the
-// same sample. The point is relative to the eye, with world axes.
+// The point of the pixel's sample in the image plane of a perspective camera, which is at distance 1 from the eye. The
+// rasterizer tests the same sample. The point is relative to the eye, with world axes.
 vec3 sample_in_image(uvec2 pixel) {
     vec2 at_px = vec2(in_picture(pixel)) + vec2(frame.sample_x, frame.sample_y);
     vec2 at = at_px / vec2(frame.picture_width, frame.picture_height) * 2.0 - 1.0;
     return frame.forward + at.x * frame.right - at.y * frame.up;
 }
 
-// The unit direction through the pixel's sample.
+// The same point for an orthographic camera, whose image plane contains the eye. `precise`: all kernels must compute the
+// same bits.
+vec3 sample_beside_eye(uvec2 pixel) {
+    vec2 at_px = vec2(in_picture(pixel)) + vec2(frame.sample_x, frame.sample_y);
+    vec2 at = at_px / vec2(frame.picture_width, frame.picture_height) * 2.0 - 1.0;
+    precise vec3 point = at.x * frame.right - at.y * frame.up;
+    return point;
+}
+
+// Where the ray through the pixel's sample begins.
+vec3 camera_origin(uvec2 pixel) {
+    if (!ORTHOGRAPHIC) return frame.eye;
+    precise vec3 origin = frame.eye + sample_beside_eye(pixel);
+    return origin;
+}
+
+// The unit direction of the ray through the pixel's sample.
 vec3 camera_direction(uvec2 pixel) {
+    if (ORTHOGRAPHIC) return frame.forward;
     return normalize(sample_in_image(pixel));
 }
 
@@ -64,7 +81,8 @@ uint pixel_ix_of(uvec2 pixel) {
 // The camera ray through the pixel's sample.
 PathRay camera_ray(uvec2 pixel) {
     float infinity = uintBitsToFloat(0x7f800000u);
-    return PathRay(frame.eye, pixel_ix_of(pixel), camera_direction(pixel), NO_TRIANGLE, vec3(1.0), infinity);
+    vec3 direction = camera_direction(pixel);
+    return PathRay(camera_origin(pixel), pixel_ix_of(pixel), direction, NO_TRIANGLE, vec3(1.0), infinity);
 }
 
 #endif

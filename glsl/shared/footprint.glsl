@@ -17,15 +17,17 @@ uint area_of(Rectangle rectangle) {
     return rectangle.size.x * rectangle.size.y;
 }
 
-// Heights of the directions through a rectangle's pixels above three planes, positive towards the triangle. Each
-// plane contains the eye and one edge of the triangle. Heights are linear in the pixel: at_first is that of the
-// rectangle's first pixel, step_x and step_y are the changes per pixel. at_first includes a slack above all rounding
-// errors, so no height of a ray that meets the triangle is below 0.
+// Heights of the rays through a rectangle's pixels above three planes, positive towards the triangle. Each plane
+// contains one edge of the triangle and, of a perspective camera, the eye. Heights are linear in the pixel: at_first is
+// that of the rectangle's first pixel, step_x and step_y are the changes per pixel. at_first includes a slack above all
+// rounding errors, so no height of a ray that meets the triangle is below 0.
 struct EdgeHeights {
     vec3 at_first;
     vec3 step_x;
     vec3 step_y;
 };
+
+#include "parallel.glsl"
 
 // A bound of the length of the directions through pixels before they are normalized.
 float longest_in_image() {
@@ -35,6 +37,7 @@ float longest_in_image() {
 // The heights for a triangle a, b, c. If the triangle is seen edge-on, rounding may flip the planes' normals. Then
 // all heights are set to the slack, and no pixel is excluded.
 EdgeHeights edge_heights(vec3 a, vec3 b, vec3 c, Rectangle rectangle) {
+    if (ORTHOGRAPHIC) return parallel_heights(a, b, c, rectangle);
     vec3 across_a = cross(b, c), across_b = cross(c, a), across_c = cross(a, b);
     float volume = dot(a, across_a);
     vec3 far = vec3(length(a), length(b), length(c));

@@ -489,17 +489,19 @@ struct Hit {
 };
 
 // The frame's constants, 208 bytes (a uniform buffer, std140-compatible). The window is the part of the picture that
-// is rendered. The camera ray of the window's pixel (x, y) has the direction
+// is rendered. The point of the window's pixel (x, y) in the image plane is
 //
 // ```text
-// forward + (2 (window_x + x + sample_x) / picture_width - 1) * right
-//         + (1 - 2 (window_y + y + sample_y) / picture_height) * up
+// (2 (window_x + x + sample_x) / picture_width - 1) * right + (1 - 2 (window_y + y + sample_y) / picture_height) * up
 // ```
+//
+// The camera ray of the pixel begins at `eye` in the direction of `forward` plus this point. That of an orthographic
+// camera begins at `eye` plus this point, in the direction of `forward`.
 //
 // - `clip_from_world`: world space to the clip space of the whole picture. It is shifted within a pixel so that the
 //   frame's sample is at the centre of its pixel, where the rasterizer samples.
-// - `eye`: world space. `forward`: unit length. `right`, `up`: from the middle of the image plane, which is at
-//   distance 1, to its right and its upper edge.
+// - `eye`: world space. `forward`: unit length. `right`, `up`: from the middle of the image plane to its right and its
+//   upper edge. The image plane is at distance 1 from the eye, that of an orthographic camera contains the eye.
 // - `width`, `height`: of the window (pixels).
 // - `n_triangles`, `n_lights`: of the scene.
 // - `ambient`: irradiance that every point receives, weighted by `Material.ka`. `background`: radiance of rays that
@@ -514,6 +516,8 @@ struct Hit {
 // - `sample_x`, `sample_y`: position of the frame's sample in each pixel (pixels from its upper left corner).
 // - `n_samples`: samples of each pixel so far, including this frame's.
 // - `n_lanes`: lanes of the device, which are shared out if there are fewer rays. 0: each ray gets one lane.
+// - `is_orthographic`: 1 for an orthographic camera, 0 for a perspective one. Kernels are made for one of the two
+//   (`CONSTANT_ORTHOGRAPHIC`).
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -538,8 +542,8 @@ struct Frame {
     float sample_y;
     uint n_samples;
     uint n_lanes;
+    uint is_orthographic;
     uint reserved0;
-    uint reserved1;
 };
 
 // The rays of one bounce of one batch, 80 bytes. The host writes the row of a batch's first bounce, and in all rows
@@ -602,7 +606,8 @@ struct Counters {
 // - `triangle_ix`, `material_ix`: indices of the triangle and of its material.
 // - `normal_world`: the shading normal, unit length, towards the eye.
 // - `albedo`: the material's `kd`.
-// - `depth`: distance from the eye along `Frame.forward` (world units).
+// - `depth`: distance from the eye along `Frame.forward` (world units). For an orthographic camera, it is the length of
+//   the ray.
 // - `n_rays`: primary, secondary and shadow rays.
 // - `n_steps`: nodes, slabs, cells of a grid and triangles of leaves that all of these rays read.
 struct Feature {
@@ -664,6 +669,8 @@ struct AccelConstants {
 #define CONSTANT_PREDICATES_BRANCHES 4u
 // Whether the rays are the camera's, which are not stored.
 #define CONSTANT_FROM_CAMERA 5u
+// Whether the camera is orthographic: its rays are parallel.
+#define CONSTANT_ORTHOGRAPHIC 6u
 // Whether a search may end at any hit, instead of finding the closest one.
 #define CONSTANT_ANY_HIT 7u
 // The curve that maps radiance to the display's range: `TONEMAP_LINEAR` and its like.

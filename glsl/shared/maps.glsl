@@ -3,7 +3,8 @@
 // A ray from the camera widens to a cone, whose width at a hit selects the level of a texture (Akenine-Möller et al.:
 // Texture Level of Detail Strategies for Real-Time Ray Tracing, Ray Tracing Gems, 2019). The cone is as wide as a pixel
 // of the image plane, times the length of the path from the eye. Of a path with more than one reflection or
-// refraction, the straight distance to the last one stands for the length up to there.
+// refraction, the straight distance to the last one stands for the length up to there. The rays of an orthographic
+// camera do not widen: they are as wide as a pixel everywhere.
 #ifndef KDRAY_MAPS
 #define KDRAY_MAPS
 
@@ -26,6 +27,7 @@ struct TextureHit {
 // Width of the ray's cone at its hit, world units.
 float cone_width(PathRay ray, Hit hit) {
     float pixel = 2.0 * length(frame.up) / float(frame.picture_height);
+    if (ORTHOGRAPHIC) return pixel;
     return pixel * (distance(ray.origin, frame.eye) + hit.t);
 }
 

@@ -39,7 +39,8 @@ void keep_nearest(uvec2 pixel, float t, uint triangle_ix) {
 // Tests a triangle against a pixel's camera ray, and keeps its hit if it is the nearest.
 void test_pixel(uvec2 pixel, Triangle triangle, uint triangle_ix) {
     Hit hit;
-    if (!intersect_triangle(shear_of(frame.eye, camera_direction(pixel)), triangle, triangle_ix, hit)) return;
+    Shear shear = shear_of(camera_origin(pixel), camera_direction(pixel));
+    if (!intersect_triangle(shear, triangle, triangle_ix, hit)) return;
     if (CUTOUTS && is_gap(triangle_ix, hit.u, hit.v, false)) return;
     if (hit.t > 0.0) keep_nearest(pixel, hit.t, triangle_ix);
 }

@@ -19,7 +19,7 @@ use crate::{
     accel::{Accel, Statistics, kdtree::BuildOptions},
     gpu::{Context, GpuError},
     scene::{
-        Camera, Instance, Material, RenderDefaults, Scene, Transform,
+        Camera, Instance, Material, Projection, RenderDefaults, Scene, Transform,
         generate::{Generator, MAX_TRIANGLES, TriangleBudget},
     },
     world::FlatScene,
@@ -56,7 +56,12 @@ pub fn knot(n_triangles: u32) -> Scene {
         images: Vec::new(),
         lights: Vec::new(),
         cameras: Vec::new(),
-        camera: Camera { eye: Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 60.0 },
+        camera: Camera {
+            eye: Vec3::Z,
+            target: Vec3::ZERO,
+            up: Vec3::Y,
+            projection: Projection::Perspective { vertical_fov_degrees: 60.0 },
+        },
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,
         defaults: RenderDefaults::default(),

@@ -15,7 +15,7 @@ use crate::{
     frame::RenderOptions,
     layout::{FLAT_NORMAL, Frame, LIGHT_DIRECTIONAL, LIGHT_POINT, Light, Triangle},
     reference::inputs::KernelInputs,
-    scene::Camera,
+    scene::{Camera, Projection},
     world::{FlatScene, Geometry, World},
 };
 
@@ -151,7 +151,7 @@ impl Room {
                 eye: centre + TOWARDS_EYE.normalize() * distance * radius,
                 target: centre,
                 up: Vec3::Y,
-                vertical_fov_degrees: VERTICAL_FOV_DEGREES,
+                projection: Projection::Perspective { vertical_fov_degrees: VERTICAL_FOV_DEGREES },
             },
             light: Light {
                 position: centre + radius * Vec3::new(0.0, 1.4, 0.0),

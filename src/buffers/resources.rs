@@ -110,7 +110,12 @@ impl Resources {
             raster: RasterQueue::new(context, constants.n_triangles, options)?,
             bounces: new_bounces(context, n_bounces)?,
             counters: new_counters(context, n_bounces)?,
-            bindings: BindingLayout::with_constants(context, &kinds, PUSH_BYTES, accel.constants())?,
+            bindings: BindingLayout::with_constants(
+                context,
+                &kinds,
+                PUSH_BYTES,
+                accel.constants().set(layout::constants::ORTHOGRAPHIC, constants.is_orthographic == 1),
+            )?,
             accel,
             set: None,
             constants: *constants,

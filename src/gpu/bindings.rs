@@ -4,7 +4,7 @@ use std::sync::{Arc, PoisonError};
 
 use ash::vk;
 
-use super::{AnyBuffer, Constant, Constants, Context, GivenBuffer, GpuError, Target};
+use super::{AnyBuffer, Constant, ConstantValue, Constants, Context, GivenBuffer, GpuError, Target};
 
 /// Kind of the object at a binding number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +45,7 @@ pub enum Binding<'a> {
 }
 
 /// Layout of a descriptor set. The pipelines that use it also share its specialization constants.
+#[derive(Clone)]
 pub struct BindingLayout {
     pub(super) set_layout: vk::DescriptorSetLayout,
     pub(super) pipeline_layout: vk::PipelineLayout,
@@ -143,6 +144,13 @@ impl Layouts {
 }
 
 impl BindingLayout {
+    /// Returns the same layout with another value of one constant. Descriptor sets of either layout serve the pipelines
+    /// of both.
+    #[must_use]
+    pub fn with_constant<T: ConstantValue>(&self, constant: Constant<T>, value: T) -> Arc<Self> {
+        Arc::new(Self { constants: self.constants.with(constant, value), ..self.clone() })
+    }
+
     /// Returns the bits of the value that a constant has in all pipelines of the layout. They are 0 if the layout does
     /// not set it.
     pub fn value<T>(&self, constant: Constant<T>) -> u32 {

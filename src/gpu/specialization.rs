@@ -64,6 +64,12 @@ impl Constants {
         self
     }
 
+    /// Returns the same values, except for that of one constant, which need not have a value yet.
+    pub(super) fn with<T: ConstantValue>(&self, constant: Constant<T>, value: T) -> Self {
+        let others = self.values.iter().filter(|(name, ..)| *name != constant.name);
+        Self { values: others.copied().collect() }.set(constant, value)
+    }
+
     /// Returns the bits of a constant's value, if it has one.
     pub(super) fn value<T>(&self, constant: Constant<T>) -> Option<u32> {
         self.values.iter().find(|(name, ..)| *name == constant.name).map(|(.., bits)| *bits)

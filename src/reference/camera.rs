@@ -1,6 +1,6 @@
-//! The order of pixels in the ray queue, and the directions of the camera's rays. Twin of `camera.glsl`.
+//! The order of pixels in the ray queue, and the origins and directions of the camera's rays. Twin of `camera.glsl`.
 
-use glam::{UVec2, Vec3, uvec2, vec2};
+use glam::{UVec2, Vec2, Vec3, uvec2, vec2};
 
 use crate::layout::{Frame, TILE_SIZE};
 
@@ -41,10 +41,28 @@ pub fn in_picture(frame: &Frame, pixel: UVec2) -> UVec2 {
     pixel + uvec2(frame.window_x, frame.window_y)
 }
 
-/// The unit direction through the sample of a pixel of the window. The rasterizer tests the same sample.
-pub fn camera_direction(frame: &Frame, pixel: UVec2) -> Vec3 {
+/// Where the sample of a pixel of the window is in the picture: -1 to 1 from its left edge to its right one, and from
+/// its upper edge to its lower one. The rasterizer tests the same sample.
+fn sample_in_picture(frame: &Frame, pixel: UVec2) -> Vec2 {
     let at_px = in_picture(frame, pixel).as_vec2() + vec2(frame.sample_x, frame.sample_y);
-    let at = at_px / uvec2(frame.picture_width, frame.picture_height).as_vec2() * 2.0 - 1.0;
+    at_px / uvec2(frame.picture_width, frame.picture_height).as_vec2() * 2.0 - 1.0
+}
+
+/// Where the ray through the sample of a pixel of the window begins.
+pub fn camera_origin(frame: &Frame, pixel: UVec2) -> Vec3 {
+    if frame.is_orthographic == 0 {
+        return frame.eye;
+    }
+    let at = sample_in_picture(frame, pixel);
+    frame.eye + (at.x * frame.right - at.y * frame.up)
+}
+
+/// The unit direction of the ray through the sample of a pixel of the window.
+pub fn camera_direction(frame: &Frame, pixel: UVec2) -> Vec3 {
+    if frame.is_orthographic == 1 {
+        return frame.forward;
+    }
+    let at = sample_in_picture(frame, pixel);
     (frame.forward + at.x * frame.right - at.y * frame.up).normalize()
 }
 

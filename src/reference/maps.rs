@@ -29,6 +29,9 @@ struct TextureHit<'a> {
 /// Width of the ray's cone at its hit, world units.
 fn cone_width(frame: &Frame, ray: &PathRay, hit: &Hit) -> f32 {
     let pixel = 2.0 * frame.up.length() / frame.picture_height as f32;
+    if frame.is_orthographic == 1 {
+        return pixel;
+    }
     pixel * (ray.origin.distance(frame.eye) + hit.t)
 }
 

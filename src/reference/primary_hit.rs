@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::{
     RAYS_PER_TASK,
-    camera::{camera_direction, pixel_of},
+    camera::{camera_direction, camera_origin, pixel_of},
     inputs::KernelInputs,
     triangle::Shear,
 };
@@ -15,7 +15,7 @@ use crate::layout::{Frame, Hit, NO_TRIANGLE, PathRay};
 /// The camera ray through a pixel's sample.
 pub fn camera_ray(frame: &Frame, pixel: UVec2) -> PathRay {
     PathRay {
-        origin: frame.eye,
+        origin: camera_origin(frame, pixel),
         pixel_ix: pixel.y * frame.width + pixel.x,
         direction: camera_direction(frame, pixel),
         source_triangle: NO_TRIANGLE,

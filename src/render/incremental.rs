@@ -11,7 +11,8 @@ use super::{Renderer, schedule::Schedule};
 use crate::{
     frame::{Picture, Profile, View},
     gpu::{CommandBuffer, GpuError},
-    layout::{Batch, FalseColor, Frame},
+    layout::{Batch, FalseColor, Frame, constants},
+    passes::Passes,
     scene::Camera,
 };
 
@@ -216,8 +217,20 @@ impl Renderer {
         }
         let mut constants = *self.resources.constants();
         constants.set_view(&self.camera, self.world.bounds(), sample_ix);
+        if constants.is_orthographic != self.resources.constants().is_orthographic {
+            self.make_kernels_for(&constants)?;
+        }
         self.resources.set_constants(&constants);
         self.recorded(sample_ix)
+    }
+
+    /// Replaces all kernels, which are made for one kind of camera, by those for the camera of `constants`.
+    fn make_kernels_for(&mut self, constants: &Frame) -> Result<(), GpuError> {
+        let is_orthographic = constants.is_orthographic == 1;
+        let bindings = self.resources.bindings.with_constant(constants::ORTHOGRAPHIC, is_orthographic);
+        self.passes = Passes::new(&self.context, &bindings, &self.options)?;
+        self.resources.bindings = bindings;
+        Ok(())
     }
 
     fn recorded(&self, sample_ix: u32) -> Result<PartialSample, GpuError> {

@@ -11,7 +11,8 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use super::{
-    Camera, Light, Material, RenderDefaults, Scene,
+    Camera, Light, Material, Projection, RenderDefaults, Scene,
+    camera::{FOV_DEGREES, HEIGHTS},
     description::{CameraSpec, Description, LightSpec, MeshSpec, RenderSpec, SceneDenoise},
     error::{Checked, SceneError},
     extent, framing,
@@ -220,7 +221,7 @@ pub(super) fn camera(spec: &CameraSpec) -> Checked<Camera> {
         eye: point("eye", spec.eye)?,
         target: point("target", spec.target)?,
         up: normalized(finite("up", spec.up.unwrap_or([0.0, 1.0, 0.0]))?),
-        vertical_fov_degrees: within("vertical_fov", spec.vertical_fov.unwrap_or(45.0), 0.1, 170.0)?,
+        projection: projection(spec.vertical_fov, spec.orthographic_height)?,
     };
     let forward = (camera.target.as_dvec3() - camera.eye.as_dvec3()).normalize_or_zero();
     if forward.cross(camera.up.as_dvec3()).length() < 1e-4 {
@@ -229,6 +230,18 @@ pub(super) fn camera(spec: &CameraSpec) -> Checked<Camera> {
         );
     }
     Ok(camera)
+}
+
+fn projection(vertical_fov: Option<f32>, orthographic_height: Option<f32>) -> Checked<Projection> {
+    let Some(height) = orthographic_height else {
+        let (least, most) = FOV_DEGREES;
+        let vertical_fov_degrees = within("vertical_fov", vertical_fov.unwrap_or(45.0), least, most)?;
+        return Ok(Projection::Perspective { vertical_fov_degrees });
+    };
+    if vertical_fov.is_some() {
+        return Err("has both `vertical_fov` and `orthographic_height`".to_owned());
+    }
+    Ok(Projection::Orthographic { height: within("orthographic_height", height, HEIGHTS.0, HEIGHTS.1)? })
 }
 
 /// Checks a point in world space, which must be finite and lie within [`MAX_COORDINATE`].

@@ -44,6 +44,8 @@ pub(super) struct CameraSpec {
     pub up: Option<[f32; 3]>,
     /// Angle between the picture's lower and upper edge, degrees; 45 where absent.
     pub vertical_fov: Option<f32>,
+    /// Distance between the picture's lower and upper edge, world units; makes the camera orthographic.
+    pub orthographic_height: Option<f32>,
 }
 
 /// One `[[cameras]]` table: a camera with a name.
@@ -55,13 +57,14 @@ pub(super) struct NamedCameraSpec {
     target: [f32; 3],
     up: Option<[f32; 3]>,
     vertical_fov: Option<f32>,
+    orthographic_height: Option<f32>,
 }
 
 impl NamedCameraSpec {
     /// Returns the camera without its name.
     pub fn camera(&self) -> CameraSpec {
-        let &Self { eye, target, up, vertical_fov, .. } = self;
-        CameraSpec { eye, target, up, vertical_fov }
+        let &Self { eye, target, up, vertical_fov, orthographic_height, .. } = self;
+        CameraSpec { eye, target, up, vertical_fov, orthographic_height }
     }
 }
 

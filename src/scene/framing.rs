@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Camera, Light, Scene};
+use super::{Camera, Light, Projection, Scene};
 
 /// Direction from the middle of the scene towards the eye: to the front, the right and above. Not of unit length.
 const TOWARDS_EYE: Vec3 = Vec3::new(0.45, 0.35, 1.0);
@@ -21,7 +21,7 @@ pub(super) fn camera((min, max): (Vec3, Vec3)) -> Camera {
         eye: centre + TOWARDS_EYE.normalize() * distance,
         target: centre,
         up: Vec3::Y,
-        vertical_fov_degrees: VERTICAL_FOV_DEGREES,
+        projection: Projection::Perspective { vertical_fov_degrees: VERTICAL_FOV_DEGREES },
     }
 }
 

@@ -4,6 +4,7 @@
 //! A scene file is a TOML file, whose keys `description` lists, a glTF file, or a mesh file: OBJ, PLY or STL.
 
 mod assemble;
+mod camera;
 mod convert;
 mod defaults;
 mod description;
@@ -43,6 +44,7 @@ use std::path::Path;
 use glam::Vec3;
 
 pub use self::{
+    camera::{Camera, Projection},
     convert::scene_file_of,
     defaults::RenderDefaults,
     error::SceneError,
@@ -113,19 +115,6 @@ pub struct Instance {
     /// Indices into the scene's materials, at least one. A face of slot i has the material at index
     /// `i % materials.len()` of this list.
     pub materials: Vec<u32>,
-}
-
-/// A pinhole camera. `eye`, `target` and `up` span a plane.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Camera {
-    /// Position of the pinhole, world space.
-    pub eye: Vec3,
-    /// Point that the middle of the picture shows, world space.
-    pub target: Vec3,
-    /// Unit vector that points up in the picture, world space. It is not parallel to the view.
-    pub up: Vec3,
-    /// Angle between the picture's lower and upper edge, degrees.
-    pub vertical_fov_degrees: f32,
 }
 
 impl Scene {
@@ -223,7 +212,12 @@ impl Scene {
             materials: Vec::new(),
             images: Vec::new(),
             lights: Vec::new(),
-            camera: Camera { eye: Vec3::ZERO, target: Vec3::NEG_Z, up: Vec3::Y, vertical_fov_degrees: 45.0 },
+            camera: Camera {
+                eye: Vec3::ZERO,
+                target: Vec3::NEG_Z,
+                up: Vec3::Y,
+                projection: Projection::Perspective { vertical_fov_degrees: 45.0 },
+            },
             cameras: Vec::new(),
             ambient: Vec3::ZERO,
             background: Vec3::ZERO,

@@ -7,8 +7,9 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::{
-    Camera, SceneError,
+    Camera, Projection, SceneError,
     assemble::{File, camera},
+    camera::{FOV_DEGREES, HEIGHTS},
     description::CameraSpec,
     error::Checked,
     outside::Access,
@@ -41,6 +42,7 @@ struct KeyframeSpec {
     target: [f32; 3],
     up: Option<[f32; 3]>,
     vertical_fov: Option<f32>,
+    orthographic_height: Option<f32>,
 }
 
 /// The path of a moving camera: one or more keyframes in the order of their frames.
@@ -48,6 +50,8 @@ struct KeyframeSpec {
 pub struct CameraPath {
     /// Frames per second.
     pub fps: f64,
+    /// Whether the camera is orthographic, in all frames.
+    is_orthographic: bool,
     keyframes: Vec<Keyframe>,
 }
 
@@ -57,7 +61,9 @@ struct Keyframe {
     pose: Pose,
 }
 
-/// A camera as ten numbers that are interpolated one by one: eye, target, up, vertical field of view in degrees.
+/// A camera as ten numbers that are interpolated one by one: eye, target, up, and the vertical field of view in degrees
+/// or, for an orthographic camera, the logarithm of its height. So equal times change the scale of an orthographic
+/// picture by equal factors.
 type Pose = [f64; 10];
 
 impl CameraPath {
@@ -74,16 +80,21 @@ impl CameraPath {
             Some(fps) => file.check("fps", fps, |&fps| rate(fps))?,
             None => DEFAULT_FPS,
         };
+        let is_orthographic = |spec: &KeyframeSpec| spec.orthographic_height.is_some();
+        let first_is = spec.keyframe.first().is_some_and(|first| is_orthographic(first.get_ref()));
         let mut keyframes: Vec<Keyframe> = Vec::new();
         for (ix, spec) in spec.keyframe.iter().enumerate() {
             let before = keyframes.last().map(|keyframe| keyframe.frame);
-            let check = |spec: &KeyframeSpec| keyframe(spec, fps, before);
+            let check = |spec: &KeyframeSpec| match is_orthographic(spec) == first_is {
+                true => keyframe(spec, fps, before),
+                false => Err("orthographic_height: either all keyframes have it or none".to_owned()),
+            };
             keyframes.push(file.check(&format!("keyframe {}", ix + 1), spec, check)?);
         }
         if keyframes.is_empty() {
             return Err(SceneError::file(path, "has no [[keyframe]]"));
         }
-        Ok(Self { fps, keyframes })
+        Ok(Self { fps, is_orthographic: first_is, keyframes })
     }
 
     /// Returns the frame of the first keyframe.
@@ -108,7 +119,7 @@ impl CameraPath {
         let after = self.keyframes.partition_point(|keyframe| keyframe.frame <= frame);
         let from = after.saturating_sub(1);
         if from + 1 == self.keyframes.len() {
-            return to_camera(&self.keyframes[from].pose);
+            return self.camera_of(&self.keyframes[from].pose);
         }
         let (a, b) = (&self.keyframes[from], &self.keyframes[from + 1]);
         let span = b.frame - a.frame;
@@ -118,7 +129,7 @@ impl CameraPath {
         let b_weight = s * s * (3.0 - 2.0 * s);
         let (a_slope, b_slope) = (span * s * (1.0 - s) * (1.0 - s), span * s * s * (s - 1.0));
         let (a_tangent, b_tangent) = (self.tangent(from), self.tangent(from + 1));
-        to_camera(&std::array::from_fn(|i| {
+        self.camera_of(&std::array::from_fn(|i| {
             let between = a.pose[i] + (b.pose[i] - a.pose[i]) * b_weight;
             between + a_tangent[i] * a_slope + b_tangent[i] * b_slope
         }))
@@ -130,6 +141,17 @@ impl CameraPath {
         let before = &self.keyframes[ix.saturating_sub(1)];
         let after = &self.keyframes[(ix + 1).min(self.keyframes.len() - 1)];
         std::array::from_fn(|i| (after.pose[i] - before.pose[i]) / (after.frame - before.frame))
+    }
+
+    fn camera_of(&self, pose: &Pose) -> Option<Camera> {
+        let vector = |i: usize| DVec3::from_slice(&pose[i..]).as_vec3().to_array();
+        // A spline may overshoot its keyframes.
+        let (vertical_fov, orthographic_height) = match self.is_orthographic {
+            true => (None, Some((pose[9].exp() as f32).clamp(HEIGHTS.0, HEIGHTS.1))),
+            false => (Some((pose[9] as f32).clamp(FOV_DEGREES.0, FOV_DEGREES.1)), None),
+        };
+        let (eye, target, up) = (vector(0), vector(3), Some(vector(6)));
+        camera(&CameraSpec { eye, target, up, vertical_fov, orthographic_height }).ok()
     }
 }
 
@@ -150,20 +172,16 @@ fn keyframe(spec: &KeyframeSpec, fps: f64, before: Option<f64>) -> Checked<Keyfr
     if before.is_some_and(|before| frame <= before) {
         return Err(format!("frame {frame} does not come after the keyframe before it"));
     }
-    let KeyframeSpec { eye, target, up, vertical_fov, .. } = *spec;
-    let Camera { eye, target, up, vertical_fov_degrees } = camera(&CameraSpec { eye, target, up, vertical_fov })?;
+    let KeyframeSpec { eye, target, up, vertical_fov, orthographic_height, .. } = *spec;
+    let spec = CameraSpec { eye, target, up, vertical_fov, orthographic_height };
+    let Camera { eye, target, up, projection } = camera(&spec)?;
     let mut pose = [0.0; 10];
     for (numbers, vector) in pose.chunks_exact_mut(3).zip([eye, target, up]) {
         numbers.copy_from_slice(&vector.as_dvec3().to_array());
     }
-    pose[9] = f64::from(vertical_fov_degrees);
+    pose[9] = match projection {
+        Projection::Perspective { vertical_fov_degrees } => f64::from(vertical_fov_degrees),
+        Projection::Orthographic { height } => f64::from(height).ln(),
+    };
     Ok(Keyframe { frame, pose })
-}
-
-fn to_camera(pose: &Pose) -> Option<Camera> {
-    let vector = |i: usize| DVec3::from_slice(&pose[i..]).as_vec3().to_array();
-    // A spline may overshoot its keyframes.
-    let vertical_fov = (pose[9] as f32).clamp(0.1, 170.0);
-    let spec = CameraSpec { eye: vector(0), target: vector(3), up: Some(vector(6)), vertical_fov: Some(vertical_fov) };
-    camera(&spec).ok()
 }

@@ -10,7 +10,7 @@ use crate::{
     gpu::GpuError,
     output::{self, OutputError},
     render::Displayed,
-    scene::Camera,
+    scene::{Camera, Projection},
 };
 
 /// The reason why a picture was not saved.
@@ -106,9 +106,13 @@ fn next_free(scene_name: &str) -> PathBuf {
 /// Returns the camera in the format of scene files.
 fn to_toml(camera: &Camera) -> String {
     let vector = |v: Vec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
-    let Camera { eye, target, up, vertical_fov_degrees } = *camera;
+    let Camera { eye, target, up, projection } = *camera;
     let (eye, target, up) = (vector(eye), vector(target), vector(up));
-    format!("[camera]\neye = {eye}\ntarget = {target}\nup = {up}\nvertical_fov = {vertical_fov_degrees:?}\n")
+    let projection = match projection {
+        Projection::Perspective { vertical_fov_degrees } => format!("vertical_fov = {vertical_fov_degrees:?}"),
+        Projection::Orthographic { height } => format!("orthographic_height = {height:?}"),
+    };
+    format!("[camera]\neye = {eye}\ntarget = {target}\nup = {up}\n{projection}\n")
 }
 
 #[cfg(test)]
@@ -130,11 +134,13 @@ mod tests {
             eye: vec3(3.0e8, -2.5e-7, 1.0),
             target: vec3(0.1, 1.0 / 3.0, -7.0),
             up: Vec3::Z,
-            vertical_fov_degrees: 39.5,
+            projection: Projection::Perspective { vertical_fov_degrees: 39.5 },
         };
         let mesh = "[[mesh]]\ngenerator = \"plane\"\nsize = [1.0, 1.0]\n";
-        std::fs::write(&path, format!("{}{mesh}", to_toml(&camera))).unwrap();
-        assert_eq!(crate::scene::Scene::load(&path).unwrap().camera, camera);
+        for camera in [camera, Camera { projection: Projection::Orthographic { height: 1.0 / 3.0 }, ..camera }] {
+            std::fs::write(&path, format!("{}{mesh}", to_toml(&camera))).unwrap();
+            assert_eq!(crate::scene::Scene::load(&path).unwrap().camera, camera);
+        }
     }
 
     /// While a picture from another camera is being drawn, the previous picture is displayed, and clicks pick in it.
@@ -164,7 +170,8 @@ mod tests {
         let picked = session.picked.expect("rays");
         assert_eq!(picked.pixel, uvec2(40, 37), "a pixel of the small picture that is seen");
         let to_hit = picked.rays[0].hit.as_ref().expect("a hit").point_world - seen.eye;
-        let angle = to_hit.angle_between(seen.target - seen.eye).to_degrees();
-        assert!(angle < seen.vertical_fov_degrees / 4.0, "{angle} degrees off the middle");
+        let view = (seen.target - seen.eye).normalize();
+        let off_middle = to_hit.reject_from(view).length() / seen.height_at(to_hit.dot(view));
+        assert!(off_middle < 0.25, "{off_middle} of the picture's height off the middle");
     }
 }

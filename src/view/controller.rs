@@ -5,14 +5,14 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use glam::{Quat, Vec3};
 
 use super::flight::{Axes, Flight};
-use crate::scene::Camera;
+use crate::scene::{Camera, Projection};
 
 /// Angle in radians by which a drag over the window's height turns the camera.
 const TURN_PER_HEIGHT: f32 = PI;
 /// Least angle in radians between the view and straight up or down.
 const POLE_MARGIN: f32 = 0.02;
-/// Factor on the distance to the target for one step of the wheel.
-const DISTANCE_PER_STEP: f32 = 0.85;
+/// Factor on the distance to the target, or on the height of an orthographic picture, for one step of the wheel.
+const ZOOM_PER_STEP: f32 = 0.85;
 /// Factor on the radius of the scene's bounding sphere when the scene is framed, which leaves a margin around it.
 const FRAME_MARGIN: f32 = 1.05;
 
@@ -81,18 +81,26 @@ impl Controller {
         self.camera.target += step;
     }
 
-    /// Moves the camera nearer to the target by steps of the wheel; negative steps move it away. The point at the
-    /// target's distance that is `x` to the right of the window's middle and `y` below it, in heights of the window,
-    /// stays in place.
+    /// Magnifies the picture by steps of the wheel; negative steps reduce it. A perspective camera moves nearer to the
+    /// target or away from it, an orthographic one shows less or more height. The point at the target's distance that
+    /// is `x` to the right of the window's middle and `y` below it, in heights of the window, stays in place.
     pub fn zoom(&mut self, steps: f32, x: f32, y: f32) {
-        let distance = (self.camera.target - self.camera.eye).length();
-        // A scene's own camera may be closer to its target than the wheel can go, or farther away. From there the
-        // wheel only leads back.
-        let (least, most) = (distance.min(1e-4 * self.radius), distance.max(1e3 * self.radius));
-        let share = (distance * DISTANCE_PER_STEP.powf(steps)).clamp(least, most) / distance;
-        let point = self.camera.target + self.across(x, y);
-        self.camera.eye = point + (self.camera.eye - point) * share;
-        self.camera.target = point + (self.camera.target - point) * share;
+        let Camera { eye, target, .. } = self.camera;
+        let point = target + self.across(x, y);
+        match &mut self.camera.projection {
+            Projection::Perspective { .. } => {
+                let share = zoom_share((target - eye).length(), steps, self.radius);
+                self.camera.eye = point + (eye - point) * share;
+                self.camera.target = point + (target - point) * share;
+            }
+            Projection::Orthographic { height } => {
+                let share = zoom_share(*height, steps, self.radius);
+                *height *= share;
+                let step = (point - target) * (1.0 - share);
+                self.camera.eye += step;
+                self.camera.target += step;
+            }
+        }
     }
 
     /// Returns the world-space vector at the target's distance that spans `x` to the right and `y` down, in heights
@@ -100,8 +108,7 @@ impl Controller {
     fn across(&self, x: f32, y: f32) -> Vec3 {
         let Axes { forward, right, .. } = self.axes();
         let distance = (self.camera.target - self.camera.eye).length();
-        let height = 2.0 * distance * (self.camera.vertical_fov_degrees.to_radians() / 2.0).tan();
-        (right * x - right.cross(forward) * y) * height
+        (right * x - right.cross(forward) * y) * self.camera.height_at(distance)
     }
 
     /// Returns the vector from eye to target, turned by a drag of `x` to the right and `y` down, in heights of the
@@ -123,10 +130,20 @@ impl Controller {
     /// the picture's width divided by its height.
     pub fn frame_scene(&mut self, aspect: f32) {
         let Axes { forward, .. } = self.axes();
-        let half_height = (self.camera.vertical_fov_degrees.to_radians() / 2.0).tan();
-        let narrower = (half_height * aspect.min(1.0)).atan();
+        let radius = FRAME_MARGIN * self.radius;
+        let distance = match &mut self.camera.projection {
+            Projection::Perspective { .. } => {
+                let narrower = (self.camera.height_at(1.0) / 2.0 * aspect.min(1.0)).atan();
+                radius / narrower.sin()
+            }
+            Projection::Orthographic { height } => {
+                *height = 2.0 * radius / aspect.min(1.0);
+                // Any distance shows the same, as long as the scene is in front of the eye.
+                2.0 * radius
+            }
+        };
         self.camera.target = self.centre;
-        self.camera.eye = self.centre - forward * (FRAME_MARGIN * self.radius / narrower.sin());
+        self.camera.eye = self.centre - forward * distance;
     }
 
     /// Moves the camera back to where it started.
@@ -147,6 +164,13 @@ impl Controller {
     }
 }
 
+/// Returns the factor on a distance or a height for steps of the wheel. The wheel ends at 1e-4 and 1e3 times the
+/// scene's radius. A scene's own camera may be beyond these limits. From there the wheel only leads back.
+fn zoom_share(from: f32, steps: f32, radius: f32) -> f32 {
+    let (least, most) = (from.min(1e-4 * radius), from.max(1e3 * radius));
+    (from * ZOOM_PER_STEP.powf(steps)).clamp(least, most) / from
+}
+
 #[cfg(test)]
 mod tests {
     use glam::vec3;
@@ -155,8 +179,17 @@ mod tests {
     use crate::view::flight::Fly;
 
     fn controller() -> Controller {
-        let camera =
-            Camera { eye: vec3(1.0, 2.0, 8.0), target: vec3(0.0, 1.0, 0.0), up: Vec3::Y, vertical_fov_degrees: 40.0 };
+        let camera = Camera {
+            eye: vec3(1.0, 2.0, 8.0),
+            target: vec3(0.0, 1.0, 0.0),
+            up: Vec3::Y,
+            projection: Projection::Perspective { vertical_fov_degrees: 40.0 },
+        };
+        Controller::new(camera, (Vec3::splat(-2.0), Vec3::splat(2.0)))
+    }
+
+    fn orthographic() -> Controller {
+        let camera = Camera { projection: Projection::Orthographic { height: 3.0 }, ..controller().camera };
         Controller::new(camera, (Vec3::splat(-2.0), Vec3::splat(2.0)))
     }
 
@@ -247,7 +280,7 @@ mod tests {
     fn seen_at(controller: &Controller, point: Vec3) -> (f32, f32) {
         let Axes { forward, right, .. } = controller.axes();
         let view = point - controller.camera.eye;
-        let height = 2.0 * view.dot(forward) * (controller.camera.vertical_fov_degrees.to_radians() / 2.0).tan();
+        let height = controller.camera.height_at(view.dot(forward));
         (view.dot(right) / height, -view.dot(right.cross(forward)) / height)
     }
 
@@ -266,7 +299,7 @@ mod tests {
             assert!(is_near(seen_at(&controller, point), (x, y)), "{steps} steps");
             let Camera { eye, target, .. } = *controller.camera();
             let share = (target - eye).length() / (before.target - before.eye).length();
-            assert!((share - DISTANCE_PER_STEP.powf(steps)).abs() < 1e-4);
+            assert!((share - ZOOM_PER_STEP.powf(steps)).abs() < 1e-4);
             assert!((target - eye).angle_between(before.target - before.eye) < 1e-3, "it looks where it looked");
             assert!((target == before.target) == (x == 0.0));
             controller.zoom(-steps, x, y);
@@ -275,23 +308,62 @@ mod tests {
     }
 
     #[test]
+    fn the_wheel_magnifies_an_orthographic_picture() {
+        for (steps, x, y) in [(1.0, 0.0, 0.0), (3.0, 0.3, -0.2), (-2.5, -0.6, 0.4)] {
+            let mut controller = orthographic();
+            let before = *controller.camera();
+            let point = before.target + controller.across(x, y);
+            let elsewhere = before.target + controller.across(0.2, 0.1);
+            controller.zoom(steps, x, y);
+            assert!(is_near(seen_at(&controller, point), (x, y)), "{steps} steps");
+            let moved = seen_at(&controller, elsewhere);
+            let factor = ZOOM_PER_STEP.powf(-steps);
+            assert!(is_near(moved, (x + (0.2 - x) * factor, y + (0.1 - y) * factor)), "{moved:?}");
+            let Camera { eye, target, .. } = *controller.camera();
+            assert!(((target - eye) - (before.target - before.eye)).length() < 1e-5, "the distance stays");
+            controller.zoom(-steps, x, y);
+            assert!(apart(controller.camera(), &before) < 1e-3, "and back");
+            assert!((controller.camera().height_at(1.0) - before.height_at(1.0)).abs() < 1e-4);
+        }
+    }
+
+    #[test]
     fn the_wheel_ends_somewhere() {
-        for steps in [1e9, -1e9] {
-            let mut controller = controller();
-            controller.zoom(steps, 0.1, 0.1);
-            let distance = (controller.camera.target - controller.camera.eye).length();
-            assert!(distance > 0.0 && distance.is_finite() && controller.axes().right.is_finite());
+        for mut controller in [controller(), orthographic()] {
+            for steps in [1e9, -1e9] {
+                controller.zoom(steps, 0.1, 0.1);
+                let camera = *controller.camera();
+                let distance = (camera.target - camera.eye).length();
+                assert!(distance > 0.0 && distance.is_finite() && controller.axes().right.is_finite());
+                assert!(camera.height_at(distance) > 0.0 && camera.height_at(distance).is_finite());
+                controller.go_home();
+            }
         }
     }
 
     #[test]
     fn a_pan_takes_the_target_along_with_the_mouse() {
-        let mut controller = controller();
-        let before = *controller.camera();
-        controller.pan(0.25, -0.1);
-        let after = *controller.camera();
-        assert!(is_near(seen_at(&controller, before.target), (0.25, -0.1)));
-        assert!(((after.target - after.eye) - (before.target - before.eye)).length() < 1e-5);
+        for mut controller in [controller(), orthographic()] {
+            let before = *controller.camera();
+            controller.pan(0.25, -0.1);
+            let after = *controller.camera();
+            assert!(is_near(seen_at(&controller, before.target), (0.25, -0.1)));
+            assert!(((after.target - after.eye) - (before.target - before.eye)).length() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn the_framed_scene_fills_an_orthographic_picture() {
+        for aspect in [2.0, 1.0, 0.5] {
+            let mut controller = orthographic();
+            controller.look(1.0, 0.3);
+            controller.frame_scene(aspect);
+            let camera = *controller.camera();
+            assert_eq!(camera.target, Vec3::ZERO);
+            assert!((camera.target - camera.eye).length() > controller.radius, "all of the scene is in front");
+            let narrower = camera.height_at(1.0) * aspect.min(1.0) / 2.0;
+            assert!((0.9..1.0).contains(&(controller.radius / narrower)), "{aspect}: {narrower}");
+        }
     }
 
     #[test]

@@ -199,12 +199,17 @@ mod tests {
     use glam::{Vec3, vec3};
 
     use super::*;
-    use crate::scene::Camera;
+    use crate::scene::{Camera, Projection};
 
     const WINDOW: (u32, u32) = (200, 100);
 
     fn controller() -> Controller {
-        let camera = Camera { eye: vec3(0.0, 1.0, 5.0), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 40.0 };
+        let camera = Camera {
+            eye: vec3(0.0, 1.0, 5.0),
+            target: Vec3::ZERO,
+            up: Vec3::Y,
+            projection: Projection::Perspective { vertical_fov_degrees: 40.0 },
+        };
         Controller::new(camera, (Vec3::NEG_ONE, Vec3::ONE))
     }
 

@@ -54,10 +54,16 @@ mod tests {
     use glam::{Vec3, vec3};
 
     use super::*;
+    use crate::scene::Projection;
 
     #[test]
     fn it_goes_round_and_ends_where_it_began() {
-        let start = Camera { eye: vec3(0.0, 1.0, 4.0), target: Vec3::Y, up: Vec3::Y, vertical_fov_degrees: 40.0 };
+        let start = Camera {
+            eye: vec3(0.0, 1.0, 4.0),
+            target: Vec3::Y,
+            up: Vec3::Y,
+            projection: Projection::Perspective { vertical_fov_degrees: 40.0 },
+        };
         let tour = Tour::around(start, 4);
         let eyes: Vec<_> = (0..4).map(|frame_ix| tour.camera(frame_ix).eye).collect();
         let expected = [vec3(4.0, 1.0, 0.0), vec3(0.0, 1.0, -4.0), vec3(-4.0, 1.0, 0.0), start.eye];

@@ -9,7 +9,7 @@ use kdray::{
     gpu::{Context, DeviceOverrides, GpuError},
     layout::Feature,
     render::{BandedRenderer, Renderer},
-    scene::Camera,
+    scene::{Camera, Projection},
     world::FlatScene,
 };
 
@@ -18,8 +18,12 @@ use crate::support::{meshes, pretended, scenes};
 
 /// Size of a row of 64 pixels without features, in bytes.
 const ROW: u64 = 64 * 16;
-const ELSEWHERE: Camera =
-    Camera { eye: vec3(1.5, 0.5, 3.5), target: vec3(0.0, -0.2, 0.0), up: Vec3::Y, vertical_fov_degrees: 60.0 };
+const ELSEWHERE: Camera = Camera {
+    eye: vec3(1.5, 0.5, 3.5),
+    target: vec3(0.0, -0.2, 0.0),
+    up: Vec3::Y,
+    projection: Projection::Perspective { vertical_fov_degrees: 60.0 },
+};
 const FILTER: Denoise = Denoise::Paper { threshold: 0.1 };
 
 /// Returns a device that binds at most 24 rows of 64 pixels.

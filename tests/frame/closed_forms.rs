@@ -3,7 +3,7 @@
 use glam::{Vec3, vec3};
 use kdray::{
     frame::{Picture, Primary, RenderOptions},
-    scene::Camera,
+    scene::{Camera, Projection},
     world::FlatScene,
 };
 
@@ -107,7 +107,12 @@ fn a_mirror_shows_the_mirrored_world() {
         }
     };
     // The camera is between the mirror (z = 0) and the objects, and looks away from the objects.
-    let camera = Camera { eye: vec3(0.1, 0.0, 1.5), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 50.0 };
+    let camera = Camera {
+        eye: vec3(0.1, 0.0, 1.5),
+        target: Vec3::ZERO,
+        up: Vec3::Y,
+        projection: Projection::Perspective { vertical_fov_degrees: 50.0 },
+    };
     let mut before = FlatScene { camera, background: vec3(0.1, 0.1, 0.2), ..scenes::empty() };
     things(&mut before, 1.0);
     let plane = meshes::triangle(vec3(-90.0, -50.0, 0.0), vec3(90.0, -50.0, 0.0), vec3(0.0, 99.0, 0.0));
@@ -140,7 +145,12 @@ fn a_shadow_ends_where_it_must() {
     scenes::add(&mut scene, square(0.5, 2.0), scenes::diffuse(Vec3::ONE));
     scene.lights = vec![scenes::point_light(vec3(0.0, 4.0, 0.0), Vec3::splat(16.0))];
     // With a field of view of 90 degrees from a height of 1.5, the picture's edge is 1.5 from its middle.
-    scene.camera = Camera { eye: vec3(0.0, 1.5, 0.0), target: Vec3::ZERO, up: Vec3::NEG_Z, vertical_fov_degrees: 90.0 };
+    scene.camera = Camera {
+        eye: vec3(0.0, 1.5, 0.0),
+        target: Vec3::ZERO,
+        up: Vec3::NEG_Z,
+        projection: Projection::Perspective { vertical_fov_degrees: 90.0 },
+    };
     let n = 90;
     for picture in on_both(&scene, &options(n, n, 1)) {
         for (i, pixel) in picture.radiance.iter().enumerate() {

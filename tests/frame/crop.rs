@@ -26,16 +26,20 @@ fn cut(whole: &Picture, crop: Crop) -> Picture {
 
 #[test]
 fn a_crop_is_a_part_of_the_whole() {
-    let scene = scenes::mixed_outdoors();
+    let perspective = scenes::mixed_outdoors();
+    let orthographic = scenes::orthographic(perspective.clone());
     let filter = Denoise::Paper { threshold: 0.1 };
-    for (primary, denoise, n_samples) in
-        [(Primary::Raster, filter, 1), (Primary::Trace, filter, 1), (Primary::Raster, Denoise::Off, 3)]
-    {
+    for (scene, primary, denoise, n_samples) in [
+        (&perspective, Primary::Raster, filter, 1),
+        (&perspective, Primary::Trace, filter, 1),
+        (&perspective, Primary::Raster, Denoise::Off, 3),
+        (&orthographic, Primary::Raster, filter, 2),
+    ] {
         let whole = RenderOptions { primary, denoise, ..options(SIZE.0, SIZE.1, 4) };
         for (name, render) in [("device", on_device as fn(&_, &_, _) -> _), ("cpu", on_cpu)] {
-            let picture = render(&scene, &whole, n_samples);
+            let picture = render(scene, &whole, n_samples);
             for crop in CROPS {
-                let part = render(&scene, &RenderOptions { crop: Some(crop), ..whole.clone() }, n_samples);
+                let part = render(scene, &RenderOptions { crop: Some(crop), ..whole.clone() }, n_samples);
                 assert!(identical(&cut(&picture, crop), &part), "{name}, {primary}, {denoise:?}: {crop}");
             }
         }

@@ -6,15 +6,19 @@ use kdray::{
     frame::{Denoise, Picture, Primary, RenderOptions, Tonemap},
     gpu::GpuError,
     render::Renderer,
-    scene::Camera,
+    scene::{Camera, Projection},
     world::FlatScene,
 };
 
 use super::studio::{assert_silent, device, identical, on_device, options, world_of};
 use crate::support::scenes;
 
-const ELSEWHERE: Camera =
-    Camera { eye: vec3(1.5, 0.5, 3.5), target: vec3(0.0, -0.2, 0.0), up: glam::Vec3::Y, vertical_fov_degrees: 60.0 };
+const ELSEWHERE: Camera = Camera {
+    eye: vec3(1.5, 0.5, 3.5),
+    target: vec3(0.0, -0.2, 0.0),
+    up: glam::Vec3::Y,
+    projection: Projection::Perspective { vertical_fov_degrees: 60.0 },
+};
 
 /// Draws `n_samples` samples from the start and returns their mean.
 fn sampled(renderer: &mut Renderer, n_samples: u32) -> Picture {
@@ -71,6 +75,13 @@ fn other_cameras_and_sizes_draw_what_a_new_renderer_draws() {
         renderer.resize(width, height).expect("another size");
         let expected = on_device(&from_there, &options(width, height, 3));
         assert!(identical(&sampled(&mut renderer, 1), &expected), "{width}x{height}");
+    }
+    // The kernels of an orthographic camera are others.
+    let in_parallel = scenes::orthographic(from_there.clone());
+    for scene in [&in_parallel, &from_there] {
+        renderer.set_camera(&scene.camera);
+        let expected = on_device(scene, &options(41, 30, 3));
+        assert!(identical(&sampled(&mut renderer, 1), &expected), "orthographic: {}", scene.camera.is_orthographic());
     }
     assert_silent(&context);
 }

@@ -16,6 +16,7 @@ mod lanes;
 mod large;
 mod living;
 mod mismatch;
+mod orthographic;
 mod parts;
 mod primaries;
 mod refused;

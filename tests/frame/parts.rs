@@ -4,7 +4,7 @@
 use kdray::{
     frame::{Picture, RenderOptions, View},
     render::{Displayed, Renderer},
-    scene::Camera,
+    scene::{Camera, Projection},
 };
 
 use super::{
@@ -106,7 +106,7 @@ fn the_picture_changes_with_the_last_part() {
     assert!(renderer.draw_batch().expect("a part").is_some());
     let seen_from = |camera: Camera, size| Some(Displayed { size, camera });
     assert_eq!(renderer.displayed(), seen_from(scene.camera, (32, 24)));
-    let elsewhere = Camera { vertical_fov_degrees: 20.0, ..scene.camera };
+    let elsewhere = Camera { projection: Projection::Perspective { vertical_fov_degrees: 20.0 }, ..scene.camera };
     renderer.set_camera(&elsewhere);
     let before = renderer.displayed_picture().expect("a picture");
     assert!(renderer.draw_batch().expect("a part").is_none());

@@ -29,8 +29,7 @@ fn is_on_edge(world: &World, options: &RenderOptions, pixel_ix: usize) -> bool {
     let ids: HashSet<u32> = (0..25 * 25)
         .map(|i| {
             let [x, y] = [i % 25, i / 25].map(|i| (i - 12) as f32 / 96.0);
-            let shift = frame.right * (2.0 * x / frame.width as f32) - frame.up * (2.0 * y / frame.height as f32);
-            let frame = Frame { forward: frame.forward + shift, ..frame };
+            let frame = Frame { sample_x: frame.sample_x + x, sample_y: frame.sample_y + y, ..frame };
             traverser
                 .traverse::<false>(&KernelInputs::new(world, &frame), &(&camera_ray(&frame, pixel)).into())
                 .triangle_ix
@@ -49,7 +48,8 @@ fn off_edges(scene: &FlatScene, options: &RenderOptions, a: &Picture, b: &Pictur
 
 #[test]
 fn raster_and_trace_differ_only_on_edges() {
-    for (scene, max_depth) in [(scenes::mixed(), 1), (scenes::mixed_outdoors(), 4)] {
+    let orthographic = scenes::orthographic(scenes::mixed_outdoors());
+    for (scene, max_depth) in [(scenes::mixed(), 1), (scenes::mixed_outdoors(), 4), (orthographic, 4)] {
         let raster = options(120, 90, max_depth);
         let trace = RenderOptions { primary: Primary::Trace, ..raster.clone() };
         for (name, render) in [("device", on_device as fn(&_, &_) -> _), ("cpu", on_cpu)] {
@@ -67,11 +67,13 @@ fn raster_and_trace_differ_only_on_edges() {
 fn compute_and_trace_are_the_same() {
     let trace = RenderOptions { primary: Primary::Trace, ..options(120, 90, 4) };
     let crop = Some(Crop { x0: 33, y0: 0, x1: 120, y1: 41 });
-    let compute_and_trace = |options: &RenderOptions, n_samples: u32, capacity: u32| {
+    let perspective = scenes::mixed_outdoors();
+    let orthographic = scenes::orthographic(perspective.clone());
+    let compute_and_trace = |scene: &FlatScene, options: &RenderOptions, n_samples: u32, capacity: u32| {
         let context = device();
         [Primary::SoftwareRaster, Primary::Trace].map(|primary| {
-            let (scene, options) = (scenes::mixed_outdoors(), RenderOptions { primary, ..options.clone() });
-            let world = world_of(&scene);
+            let options = RenderOptions { primary, ..options.clone() };
+            let world = world_of(scene);
             let mut renderer =
                 Renderer::with_queue_capacity(context.clone(), &world, &options, capacity).expect("a renderer");
             (0..n_samples).for_each(|_| drop(renderer.draw_sample().expect("a sample")));
@@ -82,10 +84,15 @@ fn compute_and_trace_are_the_same() {
     if !device().has_int64_atomics() {
         return;
     }
-    for (options, n_samples, capacity) in
-        [(&trace, 1, 1 << 20), (&RenderOptions { crop, ..trace.clone() }, 3, 1 << 20), (&trace, 2, 4000)]
-    {
-        let [compute, trace] = compute_and_trace(options, n_samples, capacity);
+    let cropped = RenderOptions { crop, ..trace.clone() };
+    for (scene, options, n_samples, capacity) in [
+        (&perspective, &trace, 1, 1 << 20),
+        (&perspective, &cropped, 3, 1 << 20),
+        (&perspective, &trace, 2, 4000),
+        (&orthographic, &trace, 2, 4000),
+        (&orthographic, &cropped, 3, 1 << 20),
+    ] {
+        let [compute, trace] = compute_and_trace(scene, options, n_samples, capacity);
         assert!(identical(&compute, &trace), "{n_samples} samples, room for {capacity} rays");
     }
 }

@@ -10,7 +10,7 @@ use kdray::{
     frame::{Crop, Denoise, Picture, Primary, RenderOptions, Tonemap},
     gpu::{Context, DeviceOverrides, GpuError},
     render::Renderer,
-    scene::Camera,
+    scene::{Camera, Projection},
     world::World,
 };
 
@@ -18,8 +18,12 @@ use super::studio::{assert_silent, device, identical, options, world_of};
 use crate::support::{pretended, scenes, without_wide_atomics};
 
 /// Camera of all pictures here, which is not the scene's own.
-const CAMERA: Camera =
-    Camera { eye: Vec3::new(0.4, 0.3, 3.9), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 50.0 };
+const CAMERA: Camera = Camera {
+    eye: Vec3::new(0.4, 0.3, 3.9),
+    target: Vec3::ZERO,
+    up: Vec3::Y,
+    projection: Projection::Perspective { vertical_fov_degrees: 50.0 },
+};
 
 /// Returns options of a picture with few pixels, since each refused step draws two samples.
 fn small() -> RenderOptions {

@@ -4,6 +4,7 @@ use glam::{Vec3, vec3};
 use kdray::{
     frame::{Picture, Primary, RenderOptions},
     render::Renderer,
+    scene::Projection,
     world::FlatScene,
 };
 
@@ -24,7 +25,14 @@ fn half_plane(edge: f32) -> FlatScene {
     let plane = meshes::triangle(corner(edge, -90.0), corner(edge, 90.0), corner(-90.0, 0.0));
     scenes::add(&mut scene, vec![plane], scenes::emissive(Vec3::ONE));
     scene.camera.eye = vec3(0.0, 0.0, 1.5);
-    scene.camera.vertical_fov_degrees = 90.0;
+    scene.camera.projection = Projection::Perspective { vertical_fov_degrees: 90.0 };
+    scene
+}
+
+/// Returns the same scene in the same size, as an orthographic camera shows it.
+fn half_plane_in_parallel(edge: f32) -> FlatScene {
+    let mut scene = half_plane(edge);
+    scene.camera.projection = Projection::Orthographic { height: 3.0 };
     scene
 }
 
@@ -43,8 +51,13 @@ fn worst(picture: &Picture, edge: f32) -> f32 {
 
 #[test]
 fn an_edge_converges_to_the_filter_s_coverage() {
-    for (edge, primary) in [(0.03, Primary::Raster), (0.68, Primary::Trace), (-1.25, Primary::Raster)] {
-        let (scene, options) = (half_plane(edge), RenderOptions { primary, ..options(40, 30, 1) });
+    for (scene, edge, primary) in [
+        (half_plane(0.03), 0.03, Primary::Raster),
+        (half_plane(0.68), 0.68, Primary::Trace),
+        (half_plane(-1.25), -1.25, Primary::Raster),
+        (half_plane_in_parallel(0.47), 0.47, Primary::Raster),
+    ] {
+        let options = RenderOptions { primary, ..options(40, 30, 1) };
         for (name, render) in [("device", on_device as fn(&_, &_, _) -> _), ("cpu", on_cpu)] {
             // The tolerance is the weight of three of 256 samples, and 1/32 px for edges moved by snapping to 1/16
             // px.

@@ -10,7 +10,8 @@ use kdray::{
     frame::{BounceStats, Picture, Primary, RenderOptions},
     render::Renderer,
     scene::{
-        Alpha, Camera, Channel, Image, Light, Maps, Material, Microfacet, Pixels, Scene, Texture, Transform, Wrap,
+        Alpha, Camera, Channel, Image, Light, Lobes, Maps, Material, Microfacet, Pixels, Projection, Scene, Texture,
+        Transform, Wrap,
     },
     world::FlatScene,
 };
@@ -26,9 +27,8 @@ const HALF_VIEW: f64 = 4.0 * 0.414_213_56;
 
 /// A camera that sees the same at z = 0 from so far away that all its rays are almost parallel.
 fn far_camera() -> Camera {
-    let vertical_fov_degrees = 1.0_f32;
-    let distance = HALF_VIEW as f32 / (vertical_fov_degrees.to_radians() / 2.0).tan();
-    Camera { eye: vec3(0.0, 0.0, distance), vertical_fov_degrees, ..empty().camera }
+    let camera = Camera { projection: Projection::Perspective { vertical_fov_degrees: 1.0 }, ..empty().camera };
+    Camera { eye: vec3(0.0, 0.0, 2.0 * HALF_VIEW as f32 / camera.height_at(1.0)), ..camera }
 }
 
 /// A scene of one unlit square that fills the view.
@@ -69,6 +69,41 @@ fn a_pixel_shows_its_texel() {
                     let off = (rgb(&picture, x, y) - vec3(r, g, b)).abs().max_element();
                     assert!(off < 1.0 / 255.0, "{x}, {y}: {}, not {:?}", rgb(&picture, x, y), colour(x, y));
                 }
+            }
+        }
+    }
+}
+
+/// To an orthographic camera, a pixel of 4 x 4 texels shows their mean from any distance, also in a mirror.
+#[test]
+fn a_pixel_shows_the_mean_of_its_texels_at_any_distance() {
+    let colour = |x: u32, y: u32| [(4 * x) as u8, (4 * y) as u8, (x * y % 256) as u8, 255];
+    let mean = |x: u32, y: u32| {
+        let texel = |i: u32| colour(4 * x + i % 4, 4 * y + i / 4).map(linear);
+        (0..16).map(texel).map(|[r, g, b, _]| vec3(r, g, b)).sum::<Vec3>() / 16.0
+    };
+    let seen_from = |eye: Vec3, target: Vec3| {
+        let mut scene = empty();
+        let texture = Texture::of_image(add_image(&mut scene, [64, 64], colour));
+        add(&mut scene, square(), placed(HALF_VIEW, DVec3::ZERO), unlit(Vec3::ONE, Some(texture)));
+        let lobes = Lobes { reflection: true, ..Lobes::default() };
+        let mirror = Material { kd: Vec3::ZERO, ks: Vec3::ONE, lobes, ..Material::default() };
+        let turned = Transform::new(DVec3::splat(9.0), DQuat::from_rotation_y(std::f64::consts::PI), DVec3::Z * 50.0);
+        add(&mut scene, square(), turned.expect("a transform"), mirror);
+        let projection = Projection::Orthographic { height: 2.0 * HALF_VIEW as f32 };
+        scene.camera = Camera { eye, target, projection, ..scene.camera };
+        flat(&scene)
+    };
+    let [near, far] = [1.0, 49.0].map(|z| seen_from(Vec3::Z * z, Vec3::ZERO));
+    // The camera looks away from the poster, at the mirror.
+    let mirrored = seen_from(Vec3::Z * 2.0, Vec3::Z * 50.0);
+    for (scene, is_mirrored) in [(near, false), (far, false), (mirrored, true)] {
+        for picture in on_both(&scene, &options(16, 16, 2)) {
+            for (x, y) in (0..256).map(|i| (i % 16, i / 16)) {
+                let expected = if is_mirrored { mean(15 - x, y) } else { mean(x, y) };
+                let off = (rgb(&picture, x, y) - expected).abs().max_element();
+                // Each of two levels is rounded to bytes.
+                assert!(off < 2.0 / 255.0, "{x}, {y}: {}, not {expected}", rgb(&picture, x, y));
             }
         }
     }
@@ -124,7 +159,7 @@ fn images_wrap_as_the_texture_says() {
 }
 
 /// A red sheet with a hole in front of a white wall, lit from the front. Through the hole, the wall is seen and lit.
-fn holed_sheet() -> Scene {
+pub(super) fn holed_sheet() -> Scene {
     let mut scene = empty();
     let image = add_image(&mut scene, [8, 8], |x, y| {
         let is_hole = (2..6).contains(&x) && (2..6).contains(&y);

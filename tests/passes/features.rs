@@ -7,7 +7,7 @@ use kdray::{
     frame::RenderOptions,
     layout::{Batch, Feature, NO_TRIANGLE, PathRay},
     reference,
-    scene::Camera,
+    scene::{Camera, Projection},
 };
 
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_RAY, hits_of, options};
@@ -48,7 +48,11 @@ fn difference(a: &[Feature], b: &[Feature]) -> Option<usize> {
 fn stage() -> Stage {
     let options = RenderOptions { features: true, ..options(50, 40) };
     let mut scene = scenes::mixed_outdoors();
-    scene.camera = Camera { eye: vec3(7.0, 3.0, 7.0), vertical_fov_degrees: 100.0, ..scene.camera };
+    scene.camera = Camera {
+        eye: vec3(7.0, 3.0, 7.0),
+        projection: Projection::Perspective { vertical_fov_degrees: 100.0 },
+        ..scene.camera
+    };
     Stage::new(scene, options, 2000)
 }
 

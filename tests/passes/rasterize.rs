@@ -10,7 +10,7 @@ use kdray::{
     passes::{Inputs, Passes, Rasterize, Trace},
     reference::primary_hit::camera_ray,
     render::Renderer,
-    scene::Camera,
+    scene::{Camera, Projection},
     world::FlatScene,
 };
 
@@ -77,11 +77,23 @@ fn check(scene: FlatScene, options: RenderOptions) -> usize {
     view(scene, options).map_or(usize::MAX, |view| view.check())
 }
 
+/// Returns an orthographic camera. The heights range from a detail of one triangle to more than the scene.
+fn random_parallel_camera(random: &mut Random, reach: f32) -> Camera {
+    let heights = [0.05, 1.0, 6.0, 12.0];
+    let projection = Projection::Orthographic { height: heights[random.below(heights.len())] };
+    Camera { projection, ..random_camera(random, reach) }
+}
+
 fn random_camera(random: &mut Random, reach: f32) -> Camera {
     let [eye, target, up] = [reach, 3.0, 1.0].map(|r| random.in_box(Vec3::splat(-r), Vec3::splat(r)));
     // The fields of view range from very narrow to so wide that parts beside the eye are cut off.
     let fovs = [5.0, 45.0, 90.0, 150.0, 176.0];
-    Camera { eye, target, up, vertical_fov_degrees: fovs[random.below(fovs.len())] }
+    Camera {
+        eye,
+        target,
+        up,
+        projection: Projection::Perspective { vertical_fov_degrees: fovs[random.below(fovs.len())] },
+    }
 }
 
 /// The eye is inside and outside of the scene, with triangles behind, beside and around it.
@@ -97,6 +109,35 @@ fn shows_what_camera_rays_hit_from_anywhere() {
     }
 }
 
+/// The eye is inside and outside of the scene, but not so far away that traced rays are moved to the scene first.
+#[test]
+fn shows_what_parallel_rays_hit_from_anywhere() {
+    let mut random = Random(19);
+    for scene in [scenes::mixed(), scenes::mixed_outdoors()] {
+        let Some(mut view) = view(scenes::orthographic(scene), options(41, 33)) else { return };
+        for i in 0..30 {
+            view.look(&random_parallel_camera(&mut random, [2.0, 4.9, 9.0][i % 3]));
+            view.check();
+        }
+    }
+}
+
+/// Rays are parallel to many triangles, and begin in the plane of some.
+#[test]
+fn shows_what_parallel_rays_hit_along_the_axes() {
+    let Some(mut view) = view(scenes::orthographic(scenes::mixed()), options(40, 40)) else { return };
+    for (axis, up) in [(Vec3::X, Vec3::Y), (Vec3::Y, Vec3::Z), (Vec3::Z, Vec3::Y)] {
+        for eye in [axis * -5.0, axis * 5.0, axis * 9.0, axis * 0.1] {
+            // At a height of 10, a pixel is 1/4 wide, and edges pass through samples.
+            for height in [10.0, 4.0] {
+                let projection = Projection::Orthographic { height };
+                view.look(&Camera { eye, target: eye - axis, up, projection });
+                view.check();
+            }
+        }
+    }
+}
+
 /// Triangles as large as a room are all around the eye, and some pass through it.
 #[test]
 fn shows_what_camera_rays_hit_amid_triangles() {
@@ -108,11 +149,15 @@ fn shows_what_camera_rays_hit_amid_triangles() {
     triangles.push(meshes::triangle(eye, corner(), corner()));
     let mut scene = scenes::empty();
     scenes::add(&mut scene, triangles, scenes::BLACK);
-    let Some(mut view) = view(scene, options(50, 37)) else { return };
-    for i in 0..30 {
-        let camera = random_camera(&mut random, 2.0);
-        view.look(&if i % 2 == 0 { Camera { eye, ..camera } } else { camera });
-        assert!(view.check() > 0, "view {i}");
+    for is_parallel in [false, true] {
+        let scene = if is_parallel { scenes::orthographic(scene.clone()) } else { scene.clone() };
+        let Some(mut view) = view(scene, options(50, 37)) else { return };
+        for i in 0..30 {
+            let random_camera = if is_parallel { random_parallel_camera } else { random_camera };
+            let camera = random_camera(&mut random, 2.0);
+            view.look(&if i % 2 == 0 { Camera { eye, ..camera } } else { camera });
+            assert!(view.check() > 0, "view {i}");
+        }
     }
 }
 
@@ -123,6 +168,7 @@ fn shows_what_camera_rays_hit_of_small_triangles() {
     for triangles in [meshes::soup(20_000, 3), meshes::torus(300, 120), meshes::threefold(meshes::cube(9, 0.0))] {
         let mut scene = scenes::empty();
         scenes::add(&mut scene, triangles, scenes::BLACK);
+        assert!(check(scenes::orthographic(scene.clone()), options(64, 48)) > 0);
         assert!(check(scene, options(64, 48)) > 0);
     }
 }
@@ -132,24 +178,26 @@ fn shows_what_camera_rays_hit_of_small_triangles() {
 #[test]
 fn shows_what_camera_rays_hit_of_slivers() {
     let (options, mut random) = (options(64, 48), Random(41));
-    let mut scene = scenes::empty();
-    let world = world_of(&scene);
-    let frame = world.frame_constants(&options);
-    let mut sliver = || {
-        let pixel = uvec2(random.below(64) as u32, random.below(48) as u32);
-        let ray = camera_ray(&frame, pixel);
-        let across = ray.direction.cross(random.direction()).normalize();
-        // Slivers are some 6 pixels long.
-        let at = |random: &mut Random, share: f32| {
-            let along = ray.direction + share * across * random.between(0.0, 0.04);
-            frame.eye + along * random.between(2.0, 6.0)
+    for empty in [scenes::empty(), scenes::orthographic(scenes::empty())] {
+        let mut scene = empty;
+        let world = world_of(&scene);
+        let frame = world.frame_constants(&options);
+        let mut sliver = || {
+            let pixel = uvec2(random.below(64) as u32, random.below(48) as u32);
+            let ray = camera_ray(&frame, pixel);
+            let across = ray.direction.cross(random.direction()).normalize();
+            // Slivers are some 6 pixels long.
+            let at = |random: &mut Random, share: f32| {
+                let along = ray.direction + share * across * random.between(0.0, 0.04);
+                ray.origin + along * random.between(2.0, 6.0)
+            };
+            let (a, b) = (at(&mut random, 1.0), at(&mut random, -1.0));
+            let width = 10f32.powf(random.between(-8.0, -3.0));
+            meshes::triangle(a, b, a + width * random.direction())
         };
-        let (a, b) = (at(&mut random, 1.0), at(&mut random, -1.0));
-        let width = 10f32.powf(random.between(-8.0, -3.0));
-        meshes::triangle(a, b, a + width * random.direction())
-    };
-    scenes::add(&mut scene, (0..20_000).map(|_| sliver()).collect(), scenes::BLACK);
-    assert!(check(scene, options) > 1000);
+        scenes::add(&mut scene, (0..20_000).map(|_| sliver()).collect(), scenes::BLACK);
+        assert!(check(scene, options.clone()) > 1000);
+    }
 }
 
 /// Triangles have some 25 pixels, so that a workgroup has more tests than fit at once.
@@ -183,6 +231,8 @@ fn shows_all_blocks_of_large_triangles() {
         meshes::triangle(a, b, b + vec3(0.001, 0.0, 0.0))
     };
     scenes::add(&mut scene, (0..n_slivers).map(sliver).collect(), scenes::BLACK);
+    assert!(check(scene.clone(), options(width, height)) > 500);
+    scene.camera.projection = Projection::Orthographic { height: 3.3 };
     assert!(check(scene, options(width, height)) > 500);
 }
 
@@ -191,6 +241,7 @@ fn a_window_shows_its_part() {
     for (x0, y0, x1, y1) in [(0, 0, 1, 1), (30, 20, 51, 48), (63, 47, 64, 48), (0, 9, 64, 10)] {
         let crop = Some(Crop { x0, y0, x1, y1 });
         check(scenes::mixed(), RenderOptions { crop, ..options(64, 48) });
+        check(scenes::orthographic(scenes::mixed()), RenderOptions { crop, ..options(64, 48) });
     }
 }
 

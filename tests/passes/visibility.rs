@@ -49,11 +49,7 @@ fn is_met_nearby(stage: &Stage, pixel_ix: u32, id: u32) -> bool {
     let mut traverser = Traverser::new(&stage.inputs(), stage.options.traversal);
     let frame = stage.resources.constants();
     let pixel = uvec2(pixel_ix % frame.width, pixel_ix / frame.width);
-    let shifted = |dx: f32, dy: f32| Frame {
-        forward: frame.forward + frame.right * (2.0 * dx / frame.width as f32)
-            - frame.up * (2.0 * dy / frame.height as f32),
-        ..*frame
-    };
+    let shifted = |dx: f32, dy: f32| Frame { sample_x: frame.sample_x + dx, sample_y: frame.sample_y + dy, ..*frame };
     (0..17 * 17).any(|i| {
         let offset = |i: i32| (i - 8) as f32 / 8.0 * SNAP_PX;
         let ray = camera_ray(&shifted(offset(i % 17), offset(i / 17)), pixel);
@@ -94,9 +90,12 @@ fn differences(stage: &Stage, expected: &[u32], found: &[u32]) -> (usize, Vec<u3
 
 #[test]
 fn shows_the_triangle_that_the_camera_ray_meets() {
-    for (scene, width, height) in
-        [(scenes::mixed(), 160, 120), (scenes::mixed_outdoors(), 33, 65), (scenes::mixed(), 1, 1)]
-    {
+    for (scene, width, height) in [
+        (scenes::mixed(), 160, 120),
+        (scenes::mixed_outdoors(), 33, 65),
+        (scenes::mixed(), 1, 1),
+        (scenes::orthographic(scenes::mixed_outdoors()), 80, 61),
+    ] {
         let stage = Stage::new(scene, options(width, height), width * height);
         let expected = on_cpu(&stage);
         let found = rasterized(&stage);

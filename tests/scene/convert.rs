@@ -87,12 +87,15 @@ fn model() -> Model {
         let (at, turn) = (unit(&mut random), [0.1 * light as f32, 0.2, -0.3, 0.8]);
         model.root(json!({ "translation": at, "rotation": turn, "extensions": extension }));
     }
-    for (name, yfov) in [("left", 0.5), ("right", 0.77)] {
-        let perspective = json!({ "yfov": yfov, "znear": 0.1 });
-        let camera = model.push("cameras", json!({ "type": "perspective", "perspective": perspective }));
-        model.root(
-            json!({ "name": name, "camera": camera, "translation": [yfov, 0.3, 7], "rotation": [0.1, 0.2, 0, 1] }),
-        );
+    for (name, x) in [("left", 0.5), ("right", 0.77), ("plan", 1.3)] {
+        let camera = match name {
+            "plan" => json!({
+                "type": "orthographic", "orthographic": { "xmag": x, "ymag": x, "znear": 0.1, "zfar": 9 },
+            }),
+            _ => json!({ "type": "perspective", "perspective": { "yfov": x, "znear": 0.1 } }),
+        };
+        let camera = model.push("cameras", camera);
+        model.root(json!({ "name": name, "camera": camera, "translation": [x, 0.3, 7], "rotation": [0.1, 0.2, 0, 1] }));
     }
     model
 }
@@ -105,15 +108,17 @@ fn a_converted_gltf_file_shows_the_same() {
     fs::write(path("parts/a model.glb"), model().glb()).unwrap();
     let (text, before, after) = converted(&path("parts/a model.glb"), &path("s.toml"), &LoadOptions::default());
     assert_same(&text, &before, &after);
-    assert_eq!((before.lights.len(), before.cameras.len()), (4, 2));
+    assert_eq!((before.lights.len(), before.cameras.len()), (4, 3));
     assert!(text.contains("file = \"parts/a model.glb\"\noverride = true\n"), "{text}");
     assert!(text.contains("\n[materials.\"Leather \\u202e\\u000a\"]\n# base colour: \"images[0]\"\n"), "{text}");
     // Two materials have one name, and so a table cannot stand for both.
     assert!(text.contains("\n# [materials.\"twin\"]\n") && text.contains("\n[materials.\"ice\"]\n"), "{text}");
-    let right = LoadOptions { camera: Some("right".to_owned()), ..LoadOptions::default() };
-    let (text, before, after) = converted(&path("parts/a model.glb"), &path("s.toml"), &right);
-    assert_same(&text, &before, &after);
-    assert_eq!(before.camera, before.cameras[1].1);
+    for (name, ix) in [("right", 1), ("plan", 2)] {
+        let chosen = LoadOptions { camera: Some(name.to_owned()), ..LoadOptions::default() };
+        let (text, before, after) = converted(&path("parts/a model.glb"), &path("s.toml"), &chosen);
+        assert_same(&text, &before, &after);
+        assert_eq!((before.camera, before.camera.is_orthographic()), (before.cameras[ix].1, name == "plan"));
+    }
 }
 
 #[test]

@@ -90,6 +90,8 @@ fn bad_mtls_are_refused() {
 fn bad_scene_files_are_refused() {
     let mesh = |rest: &str| format!("\n[[mesh]]\n{rest}\n");
     let disc = |rest: &str| format!("{rest}\n{DISC}");
+    let orthographic =
+        |height: &str| format!("camera = {{ eye = [1, 1, 2], target = [1, 3, 1], orthographic_height = {height} }}");
     let cases = [
         (String::new(), "a.toml", "no triangles"),
         ("[camera\n".to_owned(), "a.toml:1", ""),
@@ -124,6 +126,15 @@ fn bad_scene_files_are_refused() {
         (disc("\ncamera = { eye = [1, 1, 1], target = [1, 3, 1] }"), "a.toml:2", "camera: eye, target and up"),
         (disc("camera = { eye = [1, 1, inf], target = [1, 3, 1] }"), "a.toml:1", "camera: eye"),
         (disc("camera = { eye = [1, 1, 2], target = [1, 3, 1], vertical_fov = 180 }"), "a.toml:1", "vertical_fov"),
+        (disc(&orthographic("0")), "a.toml:1", "camera: orthographic_height = 0 is outside 0.00000001 to"),
+        (disc(&orthographic("-2")), "a.toml:1", "camera: orthographic_height = -2 is outside"),
+        (disc(&orthographic("nan")), "a.toml:1", "camera: orthographic_height = NaN is outside"),
+        (disc(&orthographic("inf")), "a.toml:1", "camera: orthographic_height = inf is outside"),
+        (
+            disc(&format!("\n{}", orthographic("2, vertical_fov = 45"))),
+            "a.toml:2",
+            "camera: has both `vertical_fov` and `orthographic_height`",
+        ),
         (disc("render = { width = 0 }"), "a.toml:1", "render: width = 0"),
         (disc("render = { height = 20000 }"), "a.toml:1", "render: height = 20000"),
         (disc("render = { max_depth = 0 }"), "a.toml:1", "render: max_depth = 0"),

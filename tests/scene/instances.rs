@@ -5,7 +5,7 @@ use glam::{DQuat, DVec3, Vec3, vec3};
 use kdray::{
     accel::kdtree::BuildOptions,
     layout::{FLAT_NORMAL, normal::encode_octahedral},
-    scene::{Camera, Instance, Light, Material, Mesh, RenderDefaults, Scene, Transform},
+    scene::{Camera, Instance, Light, Material, Mesh, Projection, RenderDefaults, Scene, Transform},
     world::{FlatScene, Mismatch, World},
 };
 
@@ -39,7 +39,12 @@ fn scene(instances: Vec<Instance>) -> Scene {
         lights: vec![Light::Point { position: Vec3::Z, intensity: Vec3::ONE }],
         images: Vec::new(),
         cameras: Vec::new(),
-        camera: Camera { eye: Vec3::Z, target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 60.0 },
+        camera: Camera {
+            eye: Vec3::Z,
+            target: Vec3::ZERO,
+            up: Vec3::Y,
+            projection: Projection::Perspective { vertical_fov_degrees: 60.0 },
+        },
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,
         defaults: RenderDefaults::default(),

@@ -24,7 +24,7 @@ use kdray::{
         MATERIAL_SPECULAR, Triangle,
         normal::{decode_octahedral, encode_octahedral},
     },
-    scene::{Lobes, Scene, SceneError},
+    scene::{Lobes, Projection, Scene, SceneError},
     world::FlatScene,
 };
 
@@ -141,7 +141,8 @@ fn a_scene_file_says_everything() {
     assert_eq!((scene.ambient, scene.background), (Vec3::new(0.1, 0.2, 0.3), Vec3::new(1.0, 2.0, 3.0)));
     assert_eq!((scene.defaults.width, scene.defaults.height, scene.defaults.max_depth), (320, 200, 7));
     assert_eq!((scene.defaults.exposure, scene.defaults.denoise), (2.0, Denoise::Paper { threshold: 1.5 }));
-    assert_eq!((scene.camera.up, scene.camera.vertical_fov_degrees), (Vec3::Y, 30.0));
+    let projection = Projection::Perspective { vertical_fov_degrees: 30.0 };
+    assert_eq!((scene.camera.up, scene.camera.projection), (Vec3::Y, projection));
     assert_eq!((scene.lights[0].kind, scene.lights[0].position), (LIGHT_POINT, Vec3::new(1.0, 2.0, 3.0)));
     // The direction towards the light is opposite to the direction in which the light travels.
     assert_eq!((scene.lights[1].kind, scene.lights[1].position), (LIGHT_DIRECTIONAL, Vec3::Y));

@@ -3,7 +3,7 @@
 use std::fs;
 
 use glam::{Vec3, vec3};
-use kdray::scene::{Camera, CameraPath};
+use kdray::scene::{Camera, CameraPath, Projection};
 use tempfile::TempDir;
 
 fn load(text: &str) -> Result<CameraPath, String> {
@@ -19,8 +19,18 @@ fn key(when: &str, eye: Vec3, fov: f32) -> String {
     format!("[[keyframe]]\n{when}\neye = [{x}, {y}, {z}]\ntarget = [{x}, {y}, {}]\nvertical_fov = {fov}\n", z - 1.0)
 }
 
+/// Returns the text of a keyframe whose camera is orthographic.
+fn orthographic_key(when: &str, eye: Vec3, height: f32) -> String {
+    key(when, eye, 1.0).replace("vertical_fov = 1\n", &format!("orthographic_height = {height}\n"))
+}
+
 fn at(path: &CameraPath, frame: f64) -> Camera {
     path.camera_at(frame).expect("a camera")
+}
+
+fn fov_at(path: &CameraPath, frame: f64) -> f32 {
+    let Projection::Perspective { vertical_fov_degrees } = at(path, frame).projection else { panic!("a perspective") };
+    vertical_fov_degrees
 }
 
 #[test]
@@ -32,8 +42,8 @@ fn keyframes_are_met_and_ends_stand_still() {
     assert_eq!((path.begin(), path.end(), path.fps), (3.0, 40.0, 25.0));
     for (i, (frame, eye)) in frames.into_iter().zip(eyes).enumerate() {
         let camera = at(&path, frame);
-        let Camera { target, up, vertical_fov_degrees, .. } = camera;
-        assert_eq!((camera.eye, target, up, vertical_fov_degrees), (eye, eye - Vec3::Z, Vec3::Y, 30.0 + i as f32));
+        let Camera { target, up, .. } = camera;
+        assert_eq!((camera.eye, target, up, fov_at(&path, frame)), (eye, eye - Vec3::Z, Vec3::Y, 30.0 + i as f32));
     }
     assert_eq!((at(&path, 0.0), at(&path, 99.0)), (at(&path, 3.0), at(&path, 40.0)));
 }
@@ -50,7 +60,22 @@ fn even_motion_stays_even() {
         let frame = f64::from(i) / 10.0;
         let camera = at(&path, frame);
         assert!((camera.eye - frame as f32 * speed).abs().max_element() < 1e-4, "{frame}: {}", camera.eye);
-        assert!((camera.vertical_fov_degrees - 20.0 - frame as f32).abs() < 1e-4);
+        assert!((fov_at(&path, frame) - 20.0 - frame as f32).abs() < 1e-4);
+    }
+}
+
+/// Keyframes of an orthographic camera are met. In between, equal times change its scale by equal factors.
+#[test]
+fn an_orthographic_picture_is_magnified_evenly() {
+    let text: String = (0..4)
+        .map(|i| orthographic_key(&format!("frame = {}", 10 * i), Vec3::X * i as f32, 3.0 * 0.5_f32.powi(i)))
+        .collect();
+    let path = load(&text).unwrap();
+    for frame in 0..=30 {
+        let height = at(&path, f64::from(frame)).height_at(7.0);
+        let expected = 3.0 * 0.5_f32.powf(frame as f32 / 10.0);
+        assert!((height / expected - 1.0).abs() < 1e-5, "{frame}: {height}");
+        assert!(frame % 10 != 0 || height == expected, "{frame}: {height}");
     }
 }
 
@@ -102,6 +127,18 @@ fn bad_files_are_refused() {
         (good.replace("frame = 4", "frame = 'x'"), "p.toml:2", "invalid type"),
         (format!("{good}{good}"), "p.toml:6", "keyframe 2: frame 4 does not come after"),
         (good.replace("= 45", "= 0"), "p.toml:1", "vertical_fov"),
+        (format!("{good}orthographic_height = 1\n"), "p.toml:1", "both `vertical_fov` and `orthographic_height`"),
+        (orthographic_key("frame = 4", Vec3::ZERO, 0.0), "p.toml:1", "orthographic_height = 0 is outside"),
+        (
+            format!("{good}{}", orthographic_key("frame = 5", Vec3::ZERO, 1.0)),
+            "p.toml:6",
+            "keyframe 2: orthographic_height: either all keyframes have it or none",
+        ),
+        (
+            format!("{}{}", orthographic_key("frame = 3", Vec3::ZERO, 1.0), good),
+            "p.toml:6",
+            "keyframe 2: orthographic_height: either all keyframes have it or none",
+        ),
         (good.replace("eye = [0, 0, 0]", "eye = [0, 0, -1]"), "p.toml:1", "span no picture"),
         (good.replace("eye = [0, 0, 0]", "eye = [0, inf, 0]"), "p.toml:1", "eye"),
         (good.replace("eye = [0, 0, 0]", "eye = [0, 0]"), "p.toml:3", ""),

@@ -8,7 +8,7 @@ use kdray::{
         LIGHT_DIRECTIONAL, LIGHT_POINT, Light, MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR,
         Material, Triangle, normal::encode_octahedral,
     },
-    scene::{Camera, RenderDefaults, Scene},
+    scene::{Camera, Projection, RenderDefaults, Scene},
     world::{FlatScene, Textures},
 };
 
@@ -29,11 +29,23 @@ pub fn empty() -> FlatScene {
         material_names: Vec::new(),
         textures: Textures::default(),
         lights: Vec::new(),
-        camera: Camera { eye: vec3(0.0, 0.0, 4.0), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 45.0 },
+        camera: Camera {
+            eye: vec3(0.0, 0.0, 4.0),
+            target: Vec3::ZERO,
+            up: Vec3::Y,
+            projection: Projection::Perspective { vertical_fov_degrees: 45.0 },
+        },
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,
         defaults: RenderDefaults::default(),
     }
+}
+
+/// Returns the scene as an orthographic camera shows it obliquely, with triangles on both sides of the eye.
+pub fn orthographic(scene: FlatScene) -> FlatScene {
+    let (eye, target) = (vec3(1.0, 0.7, 2.6), vec3(-0.1, -0.2, 0.1));
+    let projection = Projection::Orthographic { height: 3.5 };
+    FlatScene { camera: Camera { eye, target, projection, ..scene.camera }, ..scene }
 }
 
 /// Adds a mesh of one material.

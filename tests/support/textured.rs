@@ -5,8 +5,8 @@ use std::f32::consts::{PI, TAU};
 use glam::{DQuat, DVec3, Vec2, Vec3, Vec4, vec2, vec3};
 use kdray::{
     scene::{
-        Alpha, Camera, Channel, Image, Instance, Light, Maps, Material, Mesh, Microfacet, Pixels, RenderDefaults,
-        Scene, Texture, Transform,
+        Alpha, Camera, Channel, Image, Instance, Light, Maps, Material, Mesh, Microfacet, Pixels, Projection,
+        RenderDefaults, Scene, Texture, Transform,
     },
     world::FlatScene,
 };
@@ -20,7 +20,12 @@ pub fn empty() -> Scene {
         materials: Vec::new(),
         images: Vec::new(),
         lights: Vec::new(),
-        camera: Camera { eye: vec3(0.0, 0.0, 4.0), target: Vec3::ZERO, up: Vec3::Y, vertical_fov_degrees: 45.0 },
+        camera: Camera {
+            eye: vec3(0.0, 0.0, 4.0),
+            target: Vec3::ZERO,
+            up: Vec3::Y,
+            projection: Projection::Perspective { vertical_fov_degrees: 45.0 },
+        },
         cameras: Vec::new(),
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,

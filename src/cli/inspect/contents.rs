@@ -1,7 +1,7 @@
 //! What a scene consists of, before it is flattened.
 
 use kdray::{
-    scene::{Alpha, Camera, Image, Material, Pixels, Scene, TermValue},
+    scene::{Alpha, Camera, Image, Material, Pixels, Projection, Scene, TermValue},
     world::Textures,
 };
 use serde::Serialize;
@@ -58,8 +58,12 @@ pub struct CameraUse {
     pub eye: [f32; 3],
     pub target: [f32; 3],
     pub up: [f32; 3],
-    /// Degrees.
-    pub vertical_fov: f32,
+    /// Degrees; none for an orthographic camera.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vertical_fov: Option<f32>,
+    /// World units; none for a perspective camera.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub orthographic_height: Option<f32>,
 }
 
 /// What is known of a material beside its triangles.
@@ -111,8 +115,13 @@ impl From<&Scene> for Contents {
 
 impl CameraUse {
     fn new(name: Option<String>, camera: &Camera) -> Self {
-        let Camera { eye, target, up, vertical_fov_degrees: vertical_fov } = *camera;
-        Self { name, eye: eye.to_array(), target: target.to_array(), up: up.to_array(), vertical_fov }
+        let Camera { eye, target, up, projection } = *camera;
+        let (vertical_fov, orthographic_height) = match projection {
+            Projection::Perspective { vertical_fov_degrees } => (Some(vertical_fov_degrees), None),
+            Projection::Orthographic { height } => (None, Some(height)),
+        };
+        let (eye, target, up) = (eye.to_array(), target.to_array(), up.to_array());
+        Self { name, eye, target, up, vertical_fov, orthographic_height }
     }
 }
 

@@ -128,10 +128,11 @@ fn cameras(contents: &Contents) -> String {
         // The first row is the camera that is rendered, and the index of the second one is 0.
         let number = if ix == 0 { "shown".to_owned() } else { (ix - 1).to_string() };
         let name = camera.name.as_deref().map_or_else(String::new, shortened);
-        let fov = format!("{:.1}", camera.vertical_fov);
-        [number, name, vector(camera.eye), vector(camera.target), fov]
+        let fov = camera.vertical_fov.map_or_else(String::new, |degrees| format!("{degrees:.1}"));
+        let height = camera.orthographic_height.map_or_else(String::new, |height| height.to_string());
+        [number, name, vector(camera.eye), vector(camera.target), fov, height]
     };
-    cut_table(["camera", "name", "eye", "target", "vertical fov"], &all, row)
+    cut_table(["camera", "name", "eye", "target", "vertical fov", "orthographic height"], &all, row)
 }
 
 fn memory_table(memory: &TextureMemory) -> String {

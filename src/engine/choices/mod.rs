@@ -35,6 +35,8 @@ mod trial;
 
 use std::sync::Arc;
 
+use glam::Vec2;
+
 use self::trial::Trial;
 pub use self::{
     accel::ChosenAccel,
@@ -50,7 +52,7 @@ use crate::{
     frame::{Primary, RenderOptions},
     gpu::{Context, DeviceInfo, GpuError},
     layout::KD_MAX_ORIGIN_DISTANCE,
-    scene::Camera,
+    scene::{Camera, Projection},
     world::World,
 };
 
@@ -104,7 +106,8 @@ pub struct Workload {
     pub n_rays: u64,
     /// Whether the output contains the traversal costs of rays (features), which depend on tree and traversal.
     pub shows_costs: bool,
-    /// The greatest absolute coordinate of any camera's eye; infinity where a camera may go anywhere.
+    /// The greatest absolute coordinate of the points where cameras' rays begin; infinity where a camera may go
+    /// anywhere.
     pub farthest_eye: f32,
 }
 
@@ -122,7 +125,15 @@ impl Workload {
     /// Returns the same work with `farthest_eye` set from `cameras`, which are all the cameras of the work.
     #[must_use]
     pub fn with_cameras<'c>(self, cameras: impl Iterator<Item = &'c Camera>) -> Self {
-        Self { farthest_eye: cameras.map(|camera| camera.eye.abs().max_element()).fold(0.0, f32::max), ..self }
+        let aspect = self.size.0 as f32 / self.size.1 as f32;
+        let farthest = |camera: &Camera| {
+            let beside_eye = match camera.projection {
+                Projection::Perspective { .. } => 0.0,
+                Projection::Orthographic { height } => Vec2::new(aspect, 1.0).length() * height / 2.0,
+            };
+            camera.eye.abs().max_element() + beside_eye
+        };
+        Self { farthest_eye: cameras.map(farthest).fold(0.0, f32::max), ..self }
     }
 
     /// Tells whether tracing and compute kernels that rasterize find the same primary hits, bit for bit.

@@ -8,7 +8,7 @@ use hashbrown::HashMap;
 use crate::{
     frame::Denoise,
     scene::{
-        Camera, Light, Material, RenderDefaults, Scene,
+        Camera, Light, Material, Projection, RenderDefaults, Scene,
         assemble::DEFAULT_MATERIAL,
         material_spec::MaterialSpec,
         overrides::override_terms,
@@ -51,9 +51,13 @@ pub(super) fn scene_file(scene: &Scene, mesh: &MeshTable) -> String {
 
 /// Returns the keys of a camera.
 pub(super) fn camera(camera: &Camera) -> String {
-    let Camera { eye, target, up, vertical_fov_degrees } = *camera;
+    let Camera { eye, target, up, projection } = *camera;
     let (eye, target, up) = (vector(eye), vector(target), vector(up));
-    format!("eye = {eye}\ntarget = {target}\nup = {up}\nvertical_fov = {}\n", number(vertical_fov_degrees))
+    let projection = match projection {
+        Projection::Perspective { vertical_fov_degrees } => format!("vertical_fov = {}", number(vertical_fov_degrees)),
+        Projection::Orthographic { height } => format!("orthographic_height = {}", number(height)),
+    };
+    format!("eye = {eye}\ntarget = {target}\nup = {up}\n{projection}\n")
 }
 
 fn light(light: &Light) -> String {

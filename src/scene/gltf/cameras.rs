@@ -7,10 +7,13 @@ use super::{
     document::{Document, item},
     nodes::Nodes,
 };
-use crate::scene::{Camera, error::Checked, material::within, mesh::MAX_COORDINATE};
-
-/// Smallest and largest vertical field of view, degrees. Cameras beyond get the limit.
-const FOV_DEGREES: (f32, f32) = (0.1, 170.0);
+use crate::scene::{
+    Camera, Projection,
+    camera::{FOV_DEGREES, HEIGHTS},
+    error::Checked,
+    material::within,
+    mesh::MAX_COORDINATE,
+};
 
 /// Returns the cameras of a scene's nodes with their names. Each looks at the middle of `bounds`, the scene's, or at a
 /// point as far away.
@@ -26,13 +29,9 @@ pub(super) fn cameras(document: &Document, nodes: &Nodes, bounds: (Vec3, Vec3)) 
             document.note("cameras whose nodes flatten them or lie too far away, which are left out", name);
             continue;
         };
-        let fov = vertical_fov(json, &view).map_err(|what| format!("cameras[{index}]: {what}"))?;
-        if matches!(json.type_, Valid(Type::Orthographic)) {
-            document.note("orthographic cameras, which are shown in perspective", &name);
-        }
-        let vertical_fov_degrees = fov.to_degrees().clamp(FOV_DEGREES.0, FOV_DEGREES.1);
-        let View { eye, target, up, .. } = view;
-        cameras.push((name, Camera { eye, target, up, vertical_fov_degrees }));
+        let projection = projection(json).map_err(|what| format!("cameras[{index}]: {what}"))?;
+        let View { eye, target, up } = view;
+        cameras.push((name, Camera { eye, target, up, projection }));
     }
     Ok(cameras)
 }
@@ -42,8 +41,6 @@ struct View {
     eye: Vec3,
     target: Vec3,
     up: Vec3,
-    /// Distance from the eye to the target.
-    distance: f32,
 }
 
 impl View {
@@ -61,26 +58,23 @@ impl View {
         let target = eye + distance * forward;
         let is_inside = |p: DVec3| p.abs().max_element() <= f64::from(MAX_COORDINATE);
         let spans = forward.cross(up).length() > 1e-3 && is_inside(eye) && is_inside(target);
-        spans.then(|| Self {
-            eye: eye.as_vec3(),
-            target: target.as_vec3(),
-            up: up.as_vec3(),
-            distance: distance as f32,
-        })
+        spans.then(|| Self { eye: eye.as_vec3(), target: target.as_vec3(), up: up.as_vec3() })
     }
 }
 
-/// Returns the vertical field of view in radians. A parallel projection gets the one that shows the same height at the
-/// target.
-fn vertical_fov(json: &json::Camera, view: &View) -> Checked<f32> {
+/// Returns a camera's projection. The picture's own shape replaces `aspectRatio` and `xmag`. Values beyond the limits
+/// become the limit.
+fn projection(json: &json::Camera) -> Checked<Projection> {
     match (&json.type_, &json.perspective, &json.orthographic) {
         (Valid(Type::Perspective), Some(perspective), _) => {
-            within("perspective.yfov", perspective.yfov, f32::MIN_POSITIVE, std::f32::consts::PI)
+            let fov = within("perspective.yfov", perspective.yfov, f32::MIN_POSITIVE, std::f32::consts::PI)?;
+            let vertical_fov_degrees = fov.to_degrees().clamp(FOV_DEGREES.0, FOV_DEGREES.1);
+            Ok(Projection::Perspective { vertical_fov_degrees })
         }
         (Valid(Type::Orthographic), _, Some(orthographic)) => {
             // Some exporters mirror the picture by negative factors.
             let half = within("orthographic.ymag", orthographic.ymag.abs(), f32::MIN_POSITIVE, f32::MAX)?;
-            Ok(2.0 * half.atan2(view.distance))
+            Ok(Projection::Orthographic { height: (2.0 * half).clamp(HEIGHTS.0, HEIGHTS.1) })
         }
         (Valid(_), ..) => Err("it lacks the object that its type names".to_owned()),
         _ => Err("its type is neither perspective nor orthographic".to_owned()),

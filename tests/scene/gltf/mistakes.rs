@@ -9,7 +9,7 @@ type Mistake = (&'static str, fn(&mut Value), &'static str);
 
 #[test]
 fn mistakes_are_named() {
-    let mistakes: [Mistake; 32] = [
+    let mistakes: [Mistake; 33] = [
         ("version", |m| m["asset"]["version"] = json!("1.0"), "asset: this is glTF 1.0"),
         ("asset", |m| drop(m.as_object_mut().unwrap().remove("asset")), "the JSON: missing field `asset`"),
         ("required", |m| m["extensionsRequired"] = json!(["KHR_x"]), "extensionsRequired: the file needs `KHR_x`"),
@@ -65,6 +65,15 @@ fn mistakes_are_named() {
         ("scale", |m| m["nodes"][0]["scale"] = json!([3e38, 1, 1]), "nodes[0]: a vertex lies at"),
         ("far off", |m| m["nodes"][0]["scale"] = json!([1e12, 1, 1]), "nodes[0]: a vertex lies at"),
         ("skin", |m| m["nodes"][0]["skin"] = json!(0), "nodes[0].skin: there is no skins[0]"),
+        (
+            "flat camera",
+            |m| {
+                let flat = json!({ "xmag": 1, "ymag": 0, "znear": 0, "zfar": 9 });
+                m["cameras"] = json!([{ "type": "orthographic", "orthographic": flat }]);
+                m["nodes"][0]["camera"] = json!(0);
+            },
+            "cameras[0]: orthographic.ymag = 0 is outside",
+        ),
         ("empty", |m| m["scenes"][0]["nodes"] = json!([]), "has no triangles"),
     ];
     let mut model = cube();

@@ -3,7 +3,7 @@
 use std::{f32::consts::PI, fs};
 
 use glam::{Mat4, Quat, Vec3};
-use kdray::scene::{Camera, Light, LoadOptions, Scene};
+use kdray::scene::{Camera, Light, LoadOptions, Projection, Scene};
 use serde_json::json;
 use tempfile::TempDir;
 
@@ -170,12 +170,13 @@ fn cameras_look_at_the_scene() {
     let scene = model.scene();
     let names: Vec<_> = scene.cameras.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["front", "flat", "camera 3"]);
-    let Camera { eye, target, up, vertical_fov_degrees } = scene.camera;
+    let Camera { eye, target, up, projection } = scene.camera;
     assert_ne!(scene.camera, frontal);
     assert_eq!(scene.camera, scene.cameras[0].1);
     assert_eq!((eye, target, up), (Vec3::new(0.5, 0.5, 4.0), Vec3::new(0.5, 0.5, 0.0), Vec3::Y));
+    let Projection::Perspective { vertical_fov_degrees } = projection else { panic!("{projection:?}") };
     assert!((vertical_fov_degrees - 90.0).abs() < 1e-4);
-    // The parallel projection is 8 high, and so is the picture at a distance of 4.
-    assert!((scene.cameras[1].1.vertical_fov_degrees - 90.0).abs() < 1e-4);
+    // `ymag` is half of the height.
+    assert_eq!(scene.cameras[1].1, Camera { projection: Projection::Orthographic { height: 8.0 }, ..scene.camera });
     assert!(scene.cameras[2].1.target.z > 4.1);
 }

@@ -1,0 +1,57 @@
+//! Cameras.
+
+use glam::Vec3;
+
+use super::mesh::MAX_COORDINATE;
+
+/// Least and greatest vertical field of view, degrees.
+pub(super) const FOV_DEGREES: (f32, f32) = (0.1, 170.0);
+/// Least and greatest height of what an orthographic camera shows, world units: from the smallest scene to more than
+/// the largest one.
+pub(super) const HEIGHTS: (f32, f32) = (1e-8, 10.0 * MAX_COORDINATE);
+
+/// A camera. `eye`, `target` and `up` span a plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Point at which the rays of a perspective camera begin, world space. For an orthographic camera, it is the
+    /// middle of the rectangle in which they begin. No camera shows what is behind this point.
+    pub eye: Vec3,
+    /// Point that the middle of the picture shows, world space.
+    pub target: Vec3,
+    /// Unit vector that points up in the picture, world space. It is not parallel to the view.
+    pub up: Vec3,
+    /// How the picture shows the world.
+    pub projection: Projection,
+}
+
+/// How a picture shows the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// A pinhole's picture: all rays begin at the eye.
+    Perspective {
+        /// Angle between the picture's lower and upper edge, degrees.
+        vertical_fov_degrees: f32,
+    },
+    /// All rays are parallel to the view, so that the size of things in the picture does not depend on their distance.
+    Orthographic {
+        /// Distance between the picture's lower and upper edge, world units.
+        height: f32,
+    },
+}
+
+impl Camera {
+    /// Returns whether the camera is orthographic.
+    pub fn is_orthographic(&self) -> bool {
+        matches!(self.projection, Projection::Orthographic { .. })
+    }
+
+    /// Returns the height, in world units, of what the picture shows at a distance from the eye along the view.
+    pub fn height_at(&self, distance: f32) -> f32 {
+        match self.projection {
+            Projection::Perspective { vertical_fov_degrees } => {
+                2.0 * distance * (vertical_fov_degrees.to_radians() / 2.0).tan()
+            }
+            Projection::Orthographic { height } => height,
+        }
+    }
+}
