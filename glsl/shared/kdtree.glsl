@@ -7,7 +7,8 @@
 // the traversal differ in how they keep pending subtrees (pending_*.glsl).
 //
 // Needs scene.glsl, stalls.glsl, steps.glsl, traversal_ray.glsl, local_memory.glsl, candidate.glsl and
-// PREDICATES_BRANCHES, and the macro TRAVERSAL. Provides `search_kdtree`, and with leaf.glsl the `Visit` that grid.glsl uses, too.
+// PREDICATES_BRANCHES, and the macro TRAVERSAL. Provides `search_kdtree`, and with leaf.glsl the `Visit` that
+// grid.glsl uses, too.
 
 #include "kd_nodes.glsl"
 #include "local_cells.glsl"

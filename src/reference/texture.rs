@@ -141,7 +141,7 @@ mod tests {
     use super::*;
     use crate::{
         scene::{self, Channel, Encoding, Image, Material, Pixels, Wrap},
-        world::{TextureArrays, scene_of, texture_arrays},
+        world::{TextureArrays, arrays_of, scene_of},
     };
 
     /// Returns the arrays of a scene with one material, which has one texture.
@@ -150,7 +150,7 @@ mod tests {
         let image = Image { name: "image".to_owned(), width, height, pixels, is_linear: false };
         let mut material = Material::default();
         material.maps.base_colour = Some(texture);
-        texture_arrays(&scene_of(vec![image], vec![material])).unwrap().0
+        arrays_of(&scene_of(vec![image], vec![material])).unwrap().0
     }
 
     /// Samples the only texture.

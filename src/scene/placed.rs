@@ -1,4 +1,5 @@
-//! The meshes of a scene file: of generators, and of mesh files, each of which is read once, however often it is placed.
+//! The meshes of a scene file: of generators, and of mesh files, each of which is read once, however often it is
+//! placed.
 
 use std::{
     collections::{HashMap, HashSet},

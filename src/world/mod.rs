@@ -15,12 +15,12 @@ use std::sync::Arc;
 use glam::Vec3;
 
 #[cfg(test)]
-pub(crate) use self::texture_arrays::tests::scene_of;
+pub(crate) use self::texture_arrays::tests::{arrays_of, scene_of};
 pub use self::{
     flat::FlatScene,
     geometry::Geometry,
     mismatch::Mismatch,
-    texture_arrays::{TextureArrays, texture_arrays},
+    texture_arrays::TextureArrays,
     textured::Textures,
 };
 use crate::{

@@ -1,7 +1,7 @@
 //! The textures of a scene as kernels read them: one array of texels, one of textures, and which of the textures each
 //! material has.
 
-use std::collections::HashMap;
+use std::{cell::OnceCell, collections::HashMap};
 
 use rayon::prelude::*;
 
@@ -33,14 +33,34 @@ pub struct TextureArrays {
     pub textures: Vec<Texture>,
 }
 
+/// Whether the images of a scene are not opaque. All pixels of an image are looked at when it is first asked for.
+pub struct Opacities<'a> {
+    images: &'a [Image],
+    known: Vec<OnceCell<bool>>,
+}
+
+impl<'a> Opacities<'a> {
+    pub fn new(images: &'a [Image]) -> Self {
+        Self { images, known: vec![OnceCell::new(); images.len()] }
+    }
+
+    /// Returns whether some pixel of the image at the index is not opaque. If there is no such image, none is.
+    pub fn is_see_through(&self, image_ix: usize) -> bool {
+        self.known.get(image_ix).is_some_and(|known| *known.get_or_init(|| self.images[image_ix].is_see_through()))
+    }
+}
+
 /// Converts the textures of a scene for kernels, on the current rayon pool. Also returns the textures of each material.
 /// Images that no texture shows are left out.
 ///
 /// # Errors
 /// A texture names an image or a set of coordinates that does not exist, an image's pixels do not have the number that
 /// its size says, or the images are too large together for indices of 32 bits or for the memory.
-pub fn texture_arrays(scene: &Scene) -> Result<(TextureArrays, Vec<MaterialMaps>), Mismatch> {
-    let layout = TexelLayout::new(scene)?;
+pub fn texture_arrays(
+    scene: &Scene,
+    opacities: &Opacities,
+) -> Result<(TextureArrays, Vec<MaterialMaps>), Mismatch> {
+    let layout = TexelLayout::new(scene, opacities)?;
     let mut textures = Textures::default();
     let maps = scene.materials.iter().map(|material| textures.maps_of(material, scene, &layout)).collect();
     Ok((TextureArrays { texels: layout.texels(), textures: textures.list }, maps))
@@ -55,11 +75,13 @@ struct Making {
 }
 
 impl Making {
-    /// `texture`: one of the material's.
-    fn of(texture: &scene::Texture, material: &Material, image: &Image) -> Self {
+    /// `texture`: one of the material's. `image`: the image that it shows.
+    fn of(texture: &scene::Texture, material: &Material, image: &Image, opacities: &Opacities) -> Self {
         let is_colour = material.maps.base_colour.as_ref().is_some_and(|map| std::ptr::eq(map, texture));
         // Elsewhere, the opacity of an image says nothing about its other channels.
-        let mean = if is_colour && material.alpha != Alpha::Opaque { Mean::OfSeen } else { Mean::OfAll };
+        let has_opacity = is_colour && material.alpha != Alpha::Opaque;
+        let is_seen_in_part = has_opacity && opacities.is_see_through(texture.image_ix as usize);
+        let mean = if is_seen_in_part { Mean::OfSeen } else { Mean::OfAll };
         Self { image_ix: texture.image_ix, encoding: image.encoding(texture.encoding), mean }
     }
 }
@@ -79,16 +101,17 @@ struct TexelLayout<'a> {
     /// Index into `list`.
     ix_of: HashMap<Making, usize>,
     n_words: usize,
+    opacities: &'a Opacities<'a>,
 }
 
 impl<'a> TexelLayout<'a> {
-    fn new(scene: &'a Scene) -> Result<Self, Mismatch> {
+    fn new(scene: &'a Scene, opacities: &'a Opacities<'a>) -> Result<Self, Mismatch> {
         let (mut list, mut ix_of) = (Vec::new(), HashMap::new());
         let mut n_words = levels::SRGB.len() as u64;
         for (material_ix, material) in scene.materials.iter().enumerate() {
             for texture in material.maps.textures() {
                 let image = image_of(scene, material_ix, texture)?;
-                let making = Making::of(texture, material, image);
+                let making = Making::of(texture, material, image, opacities);
                 if ix_of.contains_key(&making) {
                     continue;
                 }
@@ -106,7 +129,7 @@ impl<'a> TexelLayout<'a> {
             n_words = 0;
         }
         memory::require("the array of texels", 4 * n_words).map_err(|error| Mismatch::Textures(error.to_string()))?;
-        Ok(Self { list, ix_of, n_words: n_words as usize })
+        Ok(Self { list, ix_of, n_words: n_words as usize, opacities })
     }
 
     /// Returns the array of texels.
@@ -198,7 +221,7 @@ impl Textures {
 /// Returns a texture of a material as kernels read it.
 fn texture_of(texture: &scene::Texture, material: &Material, scene: &Scene, layout: &TexelLayout) -> Texture {
     let image = &scene.images[texture.image_ix as usize];
-    let making = Making::of(texture, material, image);
+    let making = Making::of(texture, material, image, layout.opacities);
     let stored = &layout.list[layout.ix_of[&making]];
     let (matrix, offset) = (texture.transform.matrix2, texture.transform.translation);
     Texture {
@@ -261,6 +284,10 @@ pub(crate) mod tests {
         Scene { images, materials, ..Scene::empty(Path::new("scene")) }
     }
 
+    pub(crate) fn arrays_of(scene: &Scene) -> Result<(TextureArrays, Vec<MaterialMaps>), Mismatch> {
+        texture_arrays(scene, &Opacities::new(&scene.images))
+    }
+
     fn with(change: impl FnOnce(&mut Material)) -> Material {
         let mut material = Material::default();
         change(&mut material);
@@ -270,7 +297,7 @@ pub(crate) mod tests {
     #[test]
     fn a_scene_without_textures_has_no_texels() {
         let scene = scene_of(vec![image(4, 4)], vec![with(|it| (it.alpha, it.d) = (Alpha::Cutout(0.25), 0.5))]);
-        let (arrays, maps) = texture_arrays(&scene).unwrap();
+        let (arrays, maps) = arrays_of(&scene).unwrap();
         assert_eq!(arrays, TextureArrays::default());
         assert_eq!((maps[0].base_colour, maps[0].occlusion), (NO_TEXTURE, NO_TEXTURE));
         assert_eq!((maps[0].alpha_cutoff, maps[0].opacity_factor), (0.25, 0.5));
@@ -286,7 +313,7 @@ pub(crate) mod tests {
             (it.maps.base_colour, it.maps.emission, it.maps.roughness) = (Some(colour), Some(mirrored), Some(data));
             it.maps.normal_scale = 2.0;
         });
-        let (arrays, maps) = texture_arrays(&scene_of(vec![image(9, 9), image(4, 2)], vec![first, second])).unwrap();
+        let (arrays, maps) = arrays_of(&scene_of(vec![image(9, 9), image(4, 2)], vec![first, second])).unwrap();
         // The image of 8, 2 and 1 texels is stored as sRGB and as linear numbers, the unused one not at all.
         assert_eq!(arrays.texels.len(), SRGB_TABLE_SIZE as usize + 2 * (3 + 8 + 2 + 1));
         assert_eq!((maps[0].base_colour, maps[0].normal, maps[0].emission), (0, 1, NO_TEXTURE));
@@ -310,7 +337,7 @@ pub(crate) mod tests {
         let bark = with(|it| (it.maps.base_colour, it.alpha) = (texture(), Alpha::Opaque));
         let pixels = Pixels::Bytes(vec![[200, 0, 0, 255], [0, 0, 0, 0]]);
         let (arrays, maps) =
-            texture_arrays(&scene_of(vec![Image { pixels, ..image(2, 1) }], vec![leaf, bark])).unwrap();
+            arrays_of(&scene_of(vec![Image { pixels, ..image(2, 1) }], vec![leaf, bark])).unwrap();
         let smaller_level = |map: u32| {
             let first = arrays.textures[map as usize].first_texel as usize;
             arrays.texels[arrays.texels[first + 1] as usize].to_le_bytes()
@@ -324,7 +351,7 @@ pub(crate) mod tests {
     fn what_does_not_fit_together_is_refused() {
         let refusal = |images, texture| {
             let scene = scene_of(images, vec![Material::default(), with(|it| it.maps.metallic = Some(texture))]);
-            texture_arrays(&scene).unwrap_err().to_string()
+            arrays_of(&scene).unwrap_err().to_string()
         };
         let missing = refusal(vec![image(1, 1)], scene::Texture::of_image(1));
         assert_eq!(missing, "a texture of material 1: it shows image 1, but there are 1 images");

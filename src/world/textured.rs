@@ -1,8 +1,6 @@
 //! Textures of a flattened scene, as kernels read them: texels, how materials use them, and the texture coordinates,
 //! tangents and colours at the corners of triangles.
 
-use std::cell::OnceCell;
-
 use glam::{Vec2, Vec4};
 use rayon::prelude::*;
 
@@ -10,7 +8,7 @@ use super::{
     Mismatch,
     corners::{corner_surfaces, uvs},
     levels,
-    texture_arrays::{TextureArrays, texture_arrays},
+    texture_arrays::{Opacities, TextureArrays, texture_arrays},
 };
 use crate::{
     layout::{
@@ -45,16 +43,13 @@ impl Textures {
     /// # Errors
     /// A texture refers to an image that the scene does not have, or the images need more memory than there is.
     pub(super) fn new(scene: &Scene) -> Result<Self, Mismatch> {
-        let (arrays, mut material_maps) = texture_arrays(scene)?;
+        let opacities = Opacities::new(&scene.images);
+        let (arrays, mut material_maps) = texture_arrays(scene, &opacities)?;
         let TextureArrays { mut texels, textures } = arrays;
         let is_see_through = |corners: &[Vec4; 3]| corners.iter().any(|colour| colour.w < 1.0);
         let corners_have_opacity = scene.meshes.par_iter().any(|mesh| mesh.colours.iter().any(is_see_through));
-        let known = vec![OnceCell::new(); scene.images.len()];
-        let is_see_through = |ix: usize| {
-            known.get(ix).is_some_and(|known: &OnceCell<bool>| *known.get_or_init(|| scene.images[ix].is_see_through()))
-        };
         for (maps, material) in material_maps.iter_mut().zip(&scene.materials) {
-            set_opacity(maps, material, is_see_through, corners_have_opacity);
+            set_opacity(maps, material, |image_ix| opacities.is_see_through(image_ix), corners_have_opacity);
         }
         let has_colours = scene.meshes.iter().any(|mesh| !mesh.colours.is_empty());
         let has_opacity = material_maps.iter().any(|maps| maps.flags & (MAPS_CUTOUT | MAPS_VEIL) != 0);
@@ -145,8 +140,8 @@ fn n_bytes_of_corners(n_triangles: usize, n_uv_sets: usize, has_corners: bool) -
     n_triangles as u64 * (of_uvs + of_corners) as u64
 }
 
-/// Sets how a material's opacity acts on rays. `is_see_through` returns whether the image at an index is not opaque, and
-/// `corners_have_opacity` says whether colours at corners of the scene's meshes are not.
+/// Sets how a material's opacity acts on rays. `is_see_through` returns whether the image at an index is not opaque,
+/// and `corners_have_opacity` says whether colours at corners of the scene's meshes are not.
 fn set_opacity(
     maps: &mut MaterialMaps,
     material: &Material,

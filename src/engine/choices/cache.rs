@@ -37,8 +37,8 @@ pub struct Key {
     driver: String,
     /// What was measured: traversals, or primary visibility, with the picture's size and the traversal.
     subject: String,
-    /// A hash of the modules of `cast.comp`, the kernel by which traversals are timed. It is also used for measurements of primary
-    /// visibility, since their kernels share the traversal code.
+    /// A hash of the modules of `cast.comp`, the kernel by which traversals are timed. It is also used for measurements
+    /// of primary visibility, since their kernels share the traversal code.
     kernel: String,
     /// A hash of the scene's triangles.
     triangles: String,

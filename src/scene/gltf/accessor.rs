@@ -1,5 +1,5 @@
-//! Accessors: typed elements of buffers. Each element is read when it is asked for, and the indices of a sparse accessor
-//! once, since a hostile file can name a large accessor many times.
+//! Accessors: typed elements of buffers. Each element is read when it is asked for, and the indices of a sparse
+//! accessor once, since a hostile file can name a large accessor many times.
 
 use std::rc::Rc;
 

@@ -190,8 +190,8 @@ impl Document {
         Ok(content)
     }
 
-    /// Returns the indices of the elements that the sparse accessor at an index replaces. `read` reads them at the first
-    /// call.
+    /// Returns the indices of the elements that the sparse accessor at an index replaces. `read` reads them at the
+    /// first call.
     pub fn replaced(&self, accessor_ix: usize, read: impl FnOnce() -> Checked<Rc<[u32]>>) -> Checked<Rc<[u32]>> {
         if let Some(known) = self.replaced.borrow().get(&accessor_ix) {
             return Ok(known.clone());

@@ -259,8 +259,8 @@ fn tangents_follow_the_material_that_counts() {
     assert_eq!(load("uv_scale = [1, -1]", &own), [[Vec4::new(0.0, 1.0, 0.0, -1.0); 3]; 2]);
 }
 
-/// In a fan of very many triangles around one point, each has the tangent of its own plane, since MikkTSpace would recur
-/// too deeply. Faces without area take no time.
+/// In a fan of very many triangles around one point, each has the tangent of its own plane, since MikkTSpace would
+/// recur too deeply. Faces without area take no time.
 #[test]
 fn large_fans_do_not_exhaust_the_stack() {
     let n = 200_000;
