@@ -189,7 +189,7 @@ fn inspect_lists_what_a_scene_consists_of() {
     let text = stdout(&succeed(directory.path(), &["inspect", "s.toml"]));
     let json = succeed(directory.path(), &["inspect", "s.toml", "--json", "--camera", "1"]).stdout;
     let json: Value = serde_json::from_slice(&json).unwrap();
-    assert_eq!((json["meshes"][1]["triangles"].as_u64(), json["meshes"][1]["instances"].as_u64()), (Some(1), Some(1)));
+    assert_eq!((json["meshes"][0]["triangles"].as_u64(), json["meshes"][0]["instances"].as_u64()), (Some(1), Some(2)));
     let wood = &json["materials"][0];
     assert_eq!((wood["name"].as_str(), wood["model"].as_str()), (Some("wood"), Some("phong")));
     assert_eq!((wood["terms"]["Ns"].as_f64(), wood["maps"]["base colour"].as_str()), (Some(9.0), Some("a.png")));

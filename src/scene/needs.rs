@@ -117,6 +117,9 @@ mod tests {
         for n_loaded in [0, u64::MAX] {
             assert!(require_for_mesh(n_loaded, &mesh).unwrap_err().contains("a scene of 18446744073709551615"));
         }
+        // 2^63 times an even number is 0 in 64 bits.
+        assert!(require_for_mesh(1 << 63, &MeshSize::default()).is_err());
         assert!(require_for_tangents(vec![u64::MAX, 7], u64::MAX).is_err());
+        assert!(require_for_tangents(vec![1 << 63], 0).is_err());
     }
 }

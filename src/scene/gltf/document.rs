@@ -4,6 +4,7 @@ use std::{
     borrow::Cow,
     cell::RefCell,
     fmt::Display,
+    ops::Range,
     path::{Path, PathBuf},
     rc::Rc,
 };
@@ -70,10 +71,11 @@ pub(super) struct Document {
     notes: RefCell<Vec<(&'static str, Vec<String>)>>,
 }
 
-/// The first bytes of a file, of a data URI or of the binary chunk. Several buffers can share a file.
+/// A part of a file or of the data in a URI. Several buffers can share a file.
+#[derive(Default)]
 struct Buffer {
     content: Rc<Vec<u8>>,
-    n_bytes: usize,
+    part: Range<usize>,
 }
 
 /// Where the bytes of an image are.
@@ -95,8 +97,9 @@ pub(super) struct View<'a> {
 
 impl Document {
     /// Reads a glTF file from its content, and its buffers.
-    pub fn read(path: &Path, bytes: &[u8], access: Access) -> Checked<Self> {
-        let (json, chunk) = split(bytes)?;
+    pub fn read(path: &Path, bytes: Vec<u8>, access: Access) -> Checked<Self> {
+        let (json, chunk) = split(&bytes)?;
+        let json = &bytes[json];
         let root: Root = json::deserialize::from_slice(json).map_err(|error| format!("the JSON: {error}"))?;
         let path = path.to_owned();
         let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives);
@@ -109,8 +112,9 @@ impl Document {
         let mut document = Self { root, morph_targets, path, access, buffers, files, replaced, decoded, notes };
         document.check_version()?;
         document.check_extensions()?;
+        let chunk = chunk.map(|part| Buffer { content: Rc::new(bytes), part });
         for ix in 0..document.root.buffers.len() {
-            let buffer = document.buffer(ix, chunk).map_err(|what| format!("buffers[{ix}]: {what}"))?;
+            let buffer = document.buffer(ix, chunk.as_ref()).map_err(|what| format!("buffers[{ix}]: {what}"))?;
             document.buffers.push(buffer);
         }
         document.decode_views()?;
@@ -140,22 +144,22 @@ impl Document {
     }
 
     /// Returns the content of a buffer. Buffers that only stand in for compressed views are empty.
-    fn buffer(&self, ix: usize, chunk: Option<&[u8]>) -> Checked<Buffer> {
+    fn buffer(&self, ix: usize, chunk: Option<&Buffer>) -> Checked<Buffer> {
         let buffer = &self.root.buffers[ix];
         let extensions = buffer.extensions.as_ref();
         if extensions.is_some_and(|extensions| meshopt::is_fallback(&extensions.others)) {
-            return Ok(Buffer { content: Rc::default(), n_bytes: 0 });
+            return Ok(Buffer::default());
         }
-        let content = match (&buffer.uri, chunk) {
-            (Some(uri), _) => self.fetch(uri)?,
-            (None, Some(chunk)) if ix == 0 => Rc::new(chunk.to_vec()),
+        let Buffer { content, part } = match (&buffer.uri, chunk) {
+            (Some(uri), _) => self.fetch(uri).map(|content| Buffer { part: 0..content.len(), content })?,
+            (None, Some(chunk)) if ix == 0 => Buffer { content: chunk.content.clone(), part: chunk.part.clone() },
             (None, _) => return Err("has no uri, and there is no binary chunk for it".to_owned()),
         };
         let n_bytes = buffer.byte_length.0;
-        if (content.len() as u64) < n_bytes {
-            return Err(format!("has {} bytes, but byteLength = {n_bytes}", content.len()));
+        if (part.len() as u64) < n_bytes {
+            return Err(format!("has {} bytes, but byteLength = {n_bytes}", part.len()));
         }
-        Ok(Buffer { content, n_bytes: n_bytes as usize })
+        Ok(Buffer { content, part: part.start..part.start + n_bytes as usize })
     }
 
     /// Decodes the compressed buffer views.
@@ -278,7 +282,7 @@ impl Document {
 
 impl Buffer {
     fn bytes(&self) -> &[u8] {
-        &self.content[..self.n_bytes]
+        &self.content[self.part.clone()]
     }
 }
 
@@ -298,7 +302,7 @@ pub(super) fn part(bytes: &[u8], offset: u64, n_bytes: u64) -> Checked<&[u8]> {
 
 /// Returns the names of the files that a glTF file names: its buffers and images. What cannot be read names nothing.
 pub(in crate::scene) fn named_files(path: &Path, bytes: &[u8], access: Access) -> Vec<PathBuf> {
-    let json = split(bytes).map(|(json, _)| json).unwrap_or_default();
+    let json = split(bytes).map(|(json, _)| &bytes[json]).unwrap_or_default();
     let root: json::Value = json::deserialize::from_slice(json).unwrap_or_default();
     let items = ["buffers", "images"].into_iter().filter_map(|list| root.get(list)?.as_array()).flatten();
     let uris = items.filter_map(|item| item.get("uri")?.as_str());
@@ -322,9 +326,19 @@ mod tests {
         let buffers = r#"[{ "uri": "a%20b.bin", "byteLength": 4 }, { "uri": "./a b.bin", "byteLength": 12 }]"#;
         let json = format!(r#"{{ "asset": {{ "version": "2.0" }}, "buffers": {buffers} }}"#);
         let path = folder.path().join("m.gltf");
-        let document = Document::read(&path, json.as_bytes(), Access::default()).unwrap();
+        let document = Document::read(&path, json.into_bytes(), Access::default()).unwrap();
         let [a, b] = &document.buffers[..] else { panic!("two buffers") };
         assert!(Rc::ptr_eq(&a.content, &b.content));
         assert_eq!((a.bytes(), b.bytes()), (&[7; 4][..], &[7; 12][..]));
+    }
+
+    #[test]
+    fn the_indices_of_a_sparse_accessor_are_read_once() {
+        let json = br#"{ "asset": { "version": "2.0" } }"#;
+        let document = Document::read(Path::new("m.gltf"), json.to_vec(), Access::default()).unwrap();
+        let first = document.replaced(3, || Ok([1, 5].into())).unwrap();
+        let again = document.replaced(3, || Err("it is known".to_owned())).unwrap();
+        assert!(Rc::ptr_eq(&first, &again));
+        assert!(document.replaced(4, || Err("it is not known".to_owned())).is_err());
     }
 }

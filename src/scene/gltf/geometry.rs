@@ -294,7 +294,7 @@ mod tests {
             { "componentType": 5126, "count": 3, "type": "VEC3" },
             { "componentType": 5125, "count": 1000, "type": "SCALAR" }
         ], "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1, "mode": 5 }] }] }"#;
-        let document = Document::read(Path::new("x.gltf"), json, Access::default()).unwrap();
+        let document = Document::read(Path::new("x.gltf"), json.to_vec(), Access::default()).unwrap();
         let primitive = &document.root.meshes[0].primitives[0];
         let part = Part { primitive, targets: &[], path: String::new(), slot: 0, whole: Default::default() };
         let mut n_read = 5;

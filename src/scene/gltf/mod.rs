@@ -81,7 +81,7 @@ pub(super) fn load_meshes(
 }
 
 fn read(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Document, SceneError> {
-    let document = Document::read(path, &bytes, Access::of(options)).map_err(|what| SceneError::file(path, what))?;
+    let document = Document::read(path, bytes, Access::of(options)).map_err(|what| SceneError::file(path, what))?;
     for ix in 0..document.root.animations.len() {
         let name = document.root.animations[ix].name.clone();
         document.note("animations, which are not shown", name.unwrap_or_else(|| format!("animations[{ix}]")));
