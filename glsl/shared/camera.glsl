@@ -51,8 +51,8 @@ vec3 sample_in_image(uvec2 pixel) {
     return frame.forward + at.x * frame.right - at.y * frame.up;
 }
 
-// The same point for an orthographic camera, whose image plane contains the eye. `precise`: all kernels must compute the
-// same bits.
+// The same point for an orthographic camera, whose image plane contains the eye. `precise`: all kernels must compute
+// the same bits.
 vec3 sample_beside_eye(uvec2 pixel) {
     vec2 at_px = vec2(in_picture(pixel)) + vec2(frame.sample_x, frame.sample_y);
     vec2 at = at_px / vec2(frame.picture_width, frame.picture_height) * 2.0 - 1.0;

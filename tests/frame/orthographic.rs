@@ -117,8 +117,8 @@ fn off_their_rays(scene: &FlatScene, (width, height): (u32, u32), features: &[Fe
     (0..features.len()).filter(is_off).collect()
 }
 
-/// The device and the CPU show the same, and each pixel shows a point of its ray. A rasterized pixel on an edge may show
-/// the edge's nearest point.
+/// The device and the CPU show the same, and each pixel shows a point of its ray. A rasterized pixel on an edge may
+/// show the edge's nearest point.
 #[test]
 fn every_pixel_shows_a_point_of_its_ray() {
     let context = device();
