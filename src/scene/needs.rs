@@ -21,8 +21,9 @@ const TREE_BYTES: u64 = 140;
 /// Peak memory of MikkTSpace in bytes per triangle: what it notes of the triangle (160), its corners in a search tree
 /// and in lists (150), edges (120), groups of corners (150) and tangents (120).
 const MIKKTSPACE_BYTES: u64 = 700;
-/// Copies of a text file in memory while it is checked: the file itself, and its statements rewritten for the parser.
-const TEXT_COPIES: u64 = 2;
+/// Copies of a text file in memory while it is checked: the file itself, its statements rewritten for the parser, and
+/// these once more while their lists are joined.
+const TEXT_COPIES: u64 = 3;
 
 /// What triangles have beside corners, normals and slots.
 #[derive(Clone, Copy, Debug, Default)]

@@ -323,6 +323,17 @@ def metal(roughness):
     return build
 
 
+def orthographic(build):
+    """Another case's scene, as an orthographic camera shows it. `ortho_scale` is the picture's width."""
+
+    def seen_in_parallel():
+        build()
+        seen = bpy.context.scene.camera.data
+        seen.type, seen.ortho_scale = "ORTHO", 4.4
+
+    return seen_in_parallel
+
+
 def dielectric(roughness, colour=(0.0, 0.0, 0.0)):
     """Returns a case of a dielectric; a black one shows its highlight alone."""
 
@@ -538,6 +549,7 @@ CASES = {
     "metal_0.3": Case(metal(0.3), 0.001, 0.001, 0.002),
     "metal_0.5": Case(metal(0.5), 0.001, 0.001, 0.001),
     "metal_0.8": Case(metal(0.8), 0.001, 0.001, 0.001),
+    "orthographic": Case(orthographic(metal(0.3)), 0.001, 0.001, 0.002),
     "highlight_0.2": Case(dielectric(0.2), 0.01, 0.01, 0.001),
     "highlight_0.5": Case(dielectric(0.5), 0.01, 0.01, 0.001),
     "dielectric_0.3": Case(dielectric(0.3, (0.6, 0.3, 0.2)), 0.03, 0.18, 0.11),
@@ -566,6 +578,12 @@ CASES = {
 def brighter():
     """Plants an error: the light has half a percent more power."""
     bpy.data.lights[0].energy *= 1.005
+    return 1.0
+
+
+def wider():
+    """Plants an error: the orthographic camera shows one percent more."""
+    bpy.context.scene.camera.data.ortho_scale *= 1.01
     return 1.0
 
 
@@ -599,6 +617,7 @@ def not_decoded():
 # Errors that are planted in Cycles's scene after the export, and must be found, by the name of the case.
 PLANTED = [
     ("diffuse", brighter),
+    ("orthographic", wider),
     ("texture_linear", upside_down),
     ("texture_linear", not_decoded),
     ("normal_map", green_down),

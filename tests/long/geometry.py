@@ -483,12 +483,16 @@ def camera(values, location, rotation, parented=False):
         x, y = (np.arange(SIZE[0]) + 0.5) / SIZE[0], (np.arange(SIZE[1]) + 0.5) / SIZE[1]
         low, high = frame.min(axis=0), frame.max(axis=0)
         aside, up = np.meshgrid(low[0] + x * (high[0] - low[0]), high[1] - y * (high[1] - low[1]))
-        local = np.stack([aside, up, np.full_like(up, frame[0, 2])], axis=-1).reshape(-1, 3)
+        in_image = np.stack([aside, up, np.zeros_like(up)], axis=-1).reshape(-1, 3)
+        # An orthographic camera's rays begin in the image plane, and are parallel to its -z axis.
+        is_parallel = data.type == "ORTHO"
+        directions = np.array([0.0, 0.0, -1.0]) if is_parallel else in_image + (0.0, 0.0, frame[0, 2])
+        origins = in_image if is_parallel else np.zeros(3)
         yup = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-        directions = local @ matrix[:3, :3].T @ yup.T
+        directions = np.broadcast_to(directions, in_image.shape) @ matrix[:3, :3].T @ yup.T
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
-        eyes = np.broadcast_to(yup @ matrix[:3, 3], directions.shape)
-        return triangles, np.hstack([eyes, directions])
+        origins = (origins @ matrix[:3, :3].T + matrix[:3, 3]) @ yup.T
+        return triangles, np.hstack([np.broadcast_to(origins, directions.shape), directions])
 
     return write
 
@@ -526,6 +530,10 @@ CAMERAS = {
         {"lens": 30.0, "sensor_fit": "VERTICAL", "sensor_height": 20.0}, (0.0, -9.0, 4.0), (1.2, 0.0, 0.0)
     ),
     "camera_parented.glb": camera({"lens": 24.0}, (0.0, -5.0, 1.0), (1.4, 0.0, 0.0), True),
+    "camera_orthographic.glb": camera({"type": "ORTHO", "ortho_scale": 9.0}, (6.0, -7.0, 3.0), (1.3, 0.5, 0.7)),
+    "camera_orthographic_parented.glb": camera(
+        {"type": "ORTHO", "ortho_scale": 8.0}, (0.0, -5.0, 1.0), (1.4, 0.0, 0.0), True
+    ),
 }
 
 
@@ -565,8 +573,8 @@ def planted(arguments, folder):
     found = [check_planted(name, compare_triangles, (wrong,), arguments, folder) for wrong in (moved, turned)]
     name = "colours_float.glb"
     found.append(check_planted(name, compare_colours, COLOURS[name](folder / name, 0.05), arguments, folder))
-    name = "camera_plain.glb"
-    found.append(check_planted(name, compare_camera, CAMERAS[name](folder / name, 1.0), arguments, folder))
+    for name in ("camera_plain.glb", "camera_orthographic.glb"):
+        found.append(check_planted(name, compare_camera, CAMERAS[name](folder / name, 1.0), arguments, folder))
     return found
 
 
