@@ -10,7 +10,7 @@ use std::{
     collections::BTreeSet,
     env,
     fmt::Write,
-    fs,
+    fs, iter,
     path::{Path, PathBuf},
     sync::{
         Mutex,
@@ -19,8 +19,9 @@ use std::{
     thread,
 };
 
-/// The kernels that find hits. Each is compiled for every search of [`SEARCHES`], without and with `WITH_GAPS`.
-const SEARCHING: [&str; 3] = ["cast", "shadow", "trace"];
+/// The kernels that find hits. Each is compiled for every search of [`SEARCHES`], and those that are marked here also
+/// with `WITH_GAPS`. Casts know no materials, so their rays pass through nothing.
+const SEARCHING: [(&str, bool); 3] = [("cast", false), ("shadow", true), ("trace", true)];
 
 /// What hits are searched in and how: the traversals of the kd-tree, and the grid. A module has the code of one search,
 /// `TRAVERSAL`, since drivers take seconds to compile the code of all of them.
@@ -142,8 +143,8 @@ fn modules() -> Vec<Module> {
     let mut modules = Vec::new();
     for path in shaders_in_order() {
         let name = path.file_name().and_then(|name| name.to_str()).expect("a shader's name is UTF-8").to_owned();
-        match name.strip_suffix(".comp").filter(|kernel| SEARCHING.contains(kernel)) {
-            Some(kernel) => modules.extend(searching_modules(kernel, &path)),
+        match SEARCHING.iter().find(|(kernel, _)| name.strip_suffix(".comp") == Some(kernel)) {
+            Some((kernel, has_gaps)) => modules.extend(searching_modules(kernel, *has_gaps, &path)),
             None => modules.push(Module { name, path, macros: Vec::new() }),
         }
     }
@@ -152,7 +153,7 @@ fn modules() -> Vec<Module> {
 
 /// Returns the modules of a kernel that finds hits. The code for gaps, through which rays pass, is inlined wherever a
 /// triangle is tested. Scenes without gaps are spared it.
-fn searching_modules(kernel: &str, path: &Path) -> Vec<Module> {
+fn searching_modules(kernel: &str, has_gaps: bool, path: &Path) -> Vec<Module> {
     let of_search = |search: &str| {
         let traversal = ("TRAVERSAL", Some(format!("TRAVERSAL_{}", search.to_uppercase())));
         let module = |gaps: &str, macros| Module {
@@ -160,7 +161,8 @@ fn searching_modules(kernel: &str, path: &Path) -> Vec<Module> {
             path: path.to_owned(),
             macros,
         };
-        [module("", vec![traversal.clone()]), module("_gaps", vec![traversal, ("WITH_GAPS", None)])]
+        let with_gaps = has_gaps.then(|| module("_gaps", vec![traversal.clone(), ("WITH_GAPS", None)]));
+        iter::once(module("", vec![traversal])).chain(with_gaps)
     };
     SEARCHES.into_iter().flat_map(of_search).collect()
 }
