@@ -17,11 +17,7 @@ use glam::Vec3;
 #[cfg(test)]
 pub(crate) use self::texture_arrays::tests::{arrays_of, scene_of};
 pub use self::{
-    flat::FlatScene,
-    geometry::Geometry,
-    mismatch::Mismatch,
-    texture_arrays::TextureArrays,
-    textured::Textures,
+    flat::FlatScene, geometry::Geometry, mismatch::Mismatch, texture_arrays::TextureArrays, textured::Textures,
 };
 use crate::{
     accel::{

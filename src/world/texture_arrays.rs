@@ -56,10 +56,7 @@ impl<'a> Opacities<'a> {
 /// # Errors
 /// A texture names an image or a set of coordinates that does not exist, an image's pixels do not have the number that
 /// its size says, or the images are too large together for indices of 32 bits or for the memory.
-pub fn texture_arrays(
-    scene: &Scene,
-    opacities: &Opacities,
-) -> Result<(TextureArrays, Vec<MaterialMaps>), Mismatch> {
+pub fn texture_arrays(scene: &Scene, opacities: &Opacities) -> Result<(TextureArrays, Vec<MaterialMaps>), Mismatch> {
     let layout = TexelLayout::new(scene, opacities)?;
     let mut textures = Textures::default();
     let maps = scene.materials.iter().map(|material| textures.maps_of(material, scene, &layout)).collect();
@@ -336,8 +333,7 @@ pub(crate) mod tests {
         });
         let bark = with(|it| (it.maps.base_colour, it.alpha) = (texture(), Alpha::Opaque));
         let pixels = Pixels::Bytes(vec![[200, 0, 0, 255], [0, 0, 0, 0]]);
-        let (arrays, maps) =
-            arrays_of(&scene_of(vec![Image { pixels, ..image(2, 1) }], vec![leaf, bark])).unwrap();
+        let (arrays, maps) = arrays_of(&scene_of(vec![Image { pixels, ..image(2, 1) }], vec![leaf, bark])).unwrap();
         let smaller_level = |map: u32| {
             let first = arrays.textures[map as usize].first_texel as usize;
             arrays.texels[arrays.texels[first + 1] as usize].to_le_bytes()
