@@ -118,6 +118,11 @@ impl Images {
         Ok(ix)
     }
 
+    /// Returns the number of pixels of all images, with those that are yet to be made from others.
+    pub fn n_pixels(&self) -> u64 {
+        self.n_pixels
+    }
+
     /// Adds the images of a glTF file. Returns the index of the first one.
     pub fn adopt(&mut self, images: Vec<Image>) -> u32 {
         let first = self.shown.len() as u32;

@@ -147,7 +147,8 @@ impl<'a> Placer<'a> {
             let allow_outside = self.file.access.is_anywhere();
             let options = LoadOptions { scene: reading.scene.clone(), camera: None, allow_outside };
             let has_materials = self.with_materials.contains(reading);
-            let mut model = gltf::load_meshes(path, bytes, &options, has_materials, n_loaded)?;
+            let before = gltf::LoadedBefore { n_triangles: n_loaded as u64, n_pixels: self.images.n_pixels() };
+            let mut model = gltf::load_meshes(path, bytes, &options, has_materials, before)?;
             for mesh in &mut model.meshes {
                 if !reading.is_smooth {
                     mesh.normals.fill([Vec3::ZERO; 3]);

@@ -46,7 +46,7 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     let failed = |what: String| SceneError::file(path, what);
     let document = read(path, bytes, options)?;
     let nodes = Nodes::new(&document, options.scene.as_deref()).map_err(failed)?;
-    let mut scene = Loader::new(&document, &nodes, 0, true).load(path).map_err(failed)?;
+    let mut scene = Loader::new(&document, &nodes, LoadedBefore::default(), true).load(path).map_err(failed)?;
     let bounds = scene.bounds();
     extent::check(path, bounds)?;
     scene.lights = lights::lights(&document, &nodes).map_err(failed)?;
@@ -62,20 +62,28 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     Ok(scene)
 }
 
+/// What a scene has before a glTF file is loaded.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LoadedBefore {
+    pub n_triangles: u64,
+    /// Number of pixels of all images.
+    pub n_pixels: u64,
+}
+
 /// Loads the meshes of a scene of a glTF file with their materials and images, without its lights and cameras. If
 /// `has_materials` is false, the materials and images are left out, and the instances' materials have no meaning.
-/// `n_loaded` is the number of triangles that there are already. `options` name the scene.
+/// `options` name the scene.
 pub(super) fn load_meshes(
     path: &Path,
     bytes: Vec<u8>,
     options: &LoadOptions,
     has_materials: bool,
-    n_loaded: usize,
+    before: LoadedBefore,
 ) -> Result<Scene, SceneError> {
     let failed = |what: String| SceneError::file(path, what);
     let document = read(path, bytes, options)?;
     let nodes = Nodes::new(&document, options.scene.as_deref()).map_err(failed)?;
-    let scene = Loader::new(&document, &nodes, n_loaded as u64, has_materials).load(path).map_err(failed)?;
+    let scene = Loader::new(&document, &nodes, before, has_materials).load(path).map_err(failed)?;
     document.warn(path);
     Ok(scene)
 }
@@ -96,8 +104,7 @@ type MeshKey = (usize, Option<usize>, Vec<u32>);
 struct Loader<'a> {
     document: &'a Document,
     nodes: &'a Nodes,
-    /// Number of triangles that were loaded before.
-    n_loaded: u64,
+    before: LoadedBefore,
     /// Number of triangles of the meshes so far, and of those that were loaded before, with the faces without area that
     /// join strips.
     n_read: u64,
@@ -109,15 +116,15 @@ struct Loader<'a> {
 }
 
 impl<'a> Loader<'a> {
-    fn new(document: &'a Document, nodes: &'a Nodes, n_loaded: u64, has_materials: bool) -> Self {
+    fn new(document: &'a Document, nodes: &'a Nodes, before: LoadedBefore, has_materials: bool) -> Self {
         let materials = Materials::new(document);
-        let (meshes, known, n_read) = (Vec::new(), HashMap::new(), n_loaded);
-        Self { document, nodes, n_loaded, n_read, has_materials, materials, meshes, known }
+        let (meshes, known, n_read) = (Vec::new(), HashMap::new(), before.n_triangles);
+        Self { document, nodes, before, n_read, has_materials, materials, meshes, known }
     }
 
     fn load(mut self, path: &Path) -> Checked<Scene> {
         let mut scene = Scene::empty(path);
-        let mut n_placed = self.n_loaded;
+        let mut n_placed = self.before.n_triangles;
         for &ix in &self.nodes.shown {
             let Some(instance) = self.instance(ix)? else { continue };
             let mesh = &self.meshes[instance.mesh_ix];
@@ -131,7 +138,7 @@ impl<'a> Loader<'a> {
         }
         scene.meshes = self.meshes;
         scene.materials = self.materials.materials;
-        scene.images = self.materials.textures.decode(&mut scene.materials);
+        scene.images = self.materials.textures.decode(&mut scene.materials, self.before.n_pixels);
         Ok(scene)
     }
 

@@ -122,10 +122,11 @@ impl<'a> Textures<'a> {
     }
 
     /// Decodes the images and returns them. Textures of those that cannot be decoded are removed from the materials.
-    pub fn decode(self, materials: &mut [Material]) -> Vec<Image> {
+    /// `n_pixels`: the number of pixels that the scene has already.
+    pub fn decode(self, materials: &mut [Material], n_pixels: u64) -> Vec<Image> {
         let names: Vec<_> = self.encoded.iter().map(|image| image.name.clone()).collect();
         let (mut images, mut new_ix) = (Vec::new(), Vec::new());
-        for (name, decoded) in names.into_iter().zip(decode_all(self.encoded, 0)) {
+        for (name, decoded) in names.into_iter().zip(decode_all(self.encoded, n_pixels)) {
             match decoded {
                 Ok(image) => {
                     new_ix.push(Some(images.len() as u32));
