@@ -36,24 +36,22 @@ above a tenth of a percent have these reasons:
 | `alpha_blend` | Cycles selects by chance what a see-through surface shows. kdray's shadows of such surfaces are full or none, so that they are not compared |
 """
 
-import argparse
 import math
 import os
-import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
-# Blender's own module `cycles` would otherwise be looked for in this file.
-sys.path[:] = [path for path in sys.path if Path(path).resolve() != Path(__file__).resolve().parent]
+# This import has to come first.
+import blender
+from blender import YUP, camera_matrix, link, report, triangulate
 
 import bpy
 import numpy as np
 import OpenEXR
 
-# These modules exist once `bpy` has been imported.
-import bmesh
+# This module exists once `bpy` has been imported.
 from mathutils import Vector
 
 SIZE = (160, 120)
@@ -101,12 +99,13 @@ def look(thing, eye, target):
 
 def add(name, data):
     """Adds an object to the scene."""
-    thing = bpy.data.objects.new(name, data)
-    bpy.context.scene.collection.objects.link(thing)
-    # Cycles would otherwise move the origins of shadow rays away from smooth surfaces.
-    if hasattr(thing, "cycles"):
-        thing.cycles.shadow_terminator_geometry_offset = 0.0
-        thing.cycles.shadow_terminator_offset = 0.0
+    return without_offsets(link(name, data))
+
+
+def without_offsets(thing):
+    """Returns an object after it has told Cycles not to move the origins of shadow rays away from smooth surfaces."""
+    thing.cycles.shadow_terminator_geometry_offset = 0.0
+    thing.cycles.shadow_terminator_offset = 0.0
     return thing
 
 
@@ -192,17 +191,11 @@ def take(made, smooth):
     Faces become triangles, since the exporter gives a flat, bent quadrangle one normal, and Cycles two.
     """
     thing = bpy.context.object
-    cut = bmesh.new()
-    cut.from_mesh(thing.data)
-    bmesh.ops.triangulate(cut, faces=cut.faces)
-    cut.to_mesh(thing.data)
-    cut.free()
+    triangulate(thing.data)
     for polygon in thing.data.polygons:
         polygon.use_smooth = smooth
     thing.data.materials.append(made)
-    thing.cycles.shadow_terminator_geometry_offset = 0.0
-    thing.cycles.shadow_terminator_offset = 0.0
-    return thing
+    return without_offsets(thing)
 
 
 def sphere(made, centre=(0.0, 0.0, 1.0), radius=1.0, segments=64, smooth=True):
@@ -294,18 +287,17 @@ def spot_soft():
 
 def gltf_spot():
     """Makes the spot a point light, and returns what glTF's formula makes of its light on the floor, for each pixel."""
-    scene = bpy.context.scene
-    scene.view_layers[0].update()
+    matrix = camera_matrix(bpy.context.scene.camera)
     lamp = next(thing for thing in bpy.data.objects if thing.type == "LIGHT")
     outer = lamp.data.spot_size / 2.0
     inner = outer * (1.0 - lamp.data.spot_blend)
     lamp.data.type = "POINT"
     bpy.data.lights[0].shadow_soft_size = 0.0
-    seen, half = scene.camera, math.tan(scene.camera.data.angle / 2.0)
+    half = math.tan(bpy.context.scene.camera.data.angle / 2.0)
     y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]] + 0.5
     aside, up = (2.0 * x / SIZE[0] - 1.0) * half, (1.0 - 2.0 * y / SIZE[1]) * half * SIZE[1] / SIZE[0]
-    rays = np.stack([aside, up, -np.ones_like(x)], axis=-1) @ np.array(seen.matrix_world.to_3x3()).T
-    points = np.array(seen.location) - rays * (seen.location.z / rays[..., 2:])
+    rays = np.stack([aside, up, -np.ones_like(x)], axis=-1) @ matrix[:3, :3].T
+    points = matrix[:3, 3] - rays * (matrix[2, 3] / rays[..., 2:])
     towards = points - np.array(lamp.location)
     axis = np.array(lamp.matrix_world.to_3x3() @ Vector((0.0, 0.0, -1.0)))
     cosine = towards @ axis / np.linalg.norm(towards, axis=-1)
@@ -643,8 +635,8 @@ def render_cycles(path):
 
 
 def yup(vector):
-    """Returns a vector of Blender's in the axes of the exported files, whose y axis points up."""
-    return [vector[0], vector[2], -vector[1]]
+    """Returns a vector of Blender's in the axes of the exported files, as a list."""
+    return (YUP @ np.array(vector)).tolist()
 
 
 def export(kind, stem):
@@ -674,16 +666,6 @@ def export(kind, stem):
         f'[[mesh]]\nfile = "{path.name}"\n'
     )
     return toml
-
-
-def render_kdray(kdray, cpu, path, out):
-    """Renders a file by kdray into an EXR file and returns its colours."""
-    command = [kdray, "render", path, "-o", out, "--size", f"{SIZE[0]}x{SIZE[1]}", "--denoise", "off"]
-    command += ["--primary", "trace", "--quiet"] + (["--cpu"] if cpu else [])
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
-    if done.returncode != 0:
-        raise RuntimeError(f"kdray failed with {done.returncode}: {done.stderr.strip()}")
-    return read_exr(out)
 
 
 def differences(ours, theirs, share):
@@ -716,7 +698,7 @@ def contact_sheet(path, ours, theirs, relative):
     bpy.data.images.remove(made)
 
 
-def compare(name, case, arguments, folder, planted=None):
+def compare(name, case, planted, arguments, folder):
     """Renders a case by both programs, prints its differences, and returns whether they are within the bounds, or with
     a planted error whether they are not."""
     if planted:
@@ -730,7 +712,8 @@ def compare(name, case, arguments, folder, planted=None):
     path = export(case.kind, place / "scene")
     factor = case.change() if case.change else 1.0
     theirs = render_cycles(place / "cycles.exr") * factor
-    ours = render_kdray(arguments.kdray, arguments.cpu, path, place / "kdray.exr")
+    blender.render(arguments, path, place / "kdray.exr", SIZE)
+    ours = read_exr(place / "kdray.exr")
     mean, p95, outliers, relative, lit = differences(ours, theirs, case.least)
     contact_sheet(folder / f"{name}.png", ours, theirs, relative)
     is_within = abs(mean) <= case.mean and p95 <= case.p95 and outliers <= case.outliers
@@ -744,41 +727,7 @@ def compare(name, case, arguments, folder, planted=None):
 
 # --- The command --------------------------------------------------------------------------------------------------
 
-
-def report(line):
-    """Prints a line to the standard output that the script began with."""
-    os.write(STANDARD_OUTPUT, f"{line}\n".encode())
-
-
-def silence():
-    """Sends what Blender prints to nowhere. Returns a file descriptor of the former standard output."""
-    kept = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    return kept
-
-
-def main():
-    """Compares all cases, and returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("kdray", type=Path, help="the command to test")
-    parser.add_argument("--keep", type=Path, help="folder in which the files and pictures stay")
-    parser.add_argument("--cpu", action="store_true", help="render by kdray without Vulkan")
-    parser.add_argument("--only", help="names of cases, separated by commas")
-    arguments = parser.parse_args()
-    arguments.kdray = arguments.kdray.resolve()
-    names = arguments.only.split(",") if arguments.only else list(CASES)
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = (arguments.keep or Path(temporary)).resolve()
-        folder.mkdir(parents=True, exist_ok=True)
-        good = [compare(name, CASES[name], arguments, folder) for name in names]
-        planted = [pair for pair in PLANTED if pair[0] in names]
-        good += [compare(name, CASES[name], arguments, folder, change) for name, change in planted]
-        os.chdir("/")
-    report(f"{sum(good)} of {len(good)} cases are as they must be")
-    return 0 if all(good) else 1
-
-
 if __name__ == "__main__":
-    STANDARD_OUTPUT = silence()
-    sys.exit(main())
+    CHECKS = [(name, partial(compare, name, case, None)) for name, case in CASES.items()]
+    CHECKS += [(name, partial(compare, name, CASES[name], change)) for name, change in PLANTED]
+    sys.exit(blender.main(__doc__, CHECKS))

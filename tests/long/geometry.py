@@ -2,7 +2,7 @@
 
 Needs from PyPI, in Python 3.11: bpy==4.5.15, numpy, trimesh, pygltflib, OpenEXR. Usage:
 
-    python3 tests/long/geometry.py KDRAY [--keep FOLDER] [--cpu]
+    python3 tests/long/geometry.py KDRAY [--keep FOLDER] [--cpu] [--only NAME,NAME]
 
 The script makes files by pygltflib, trimesh and Blender: glTF with hierarchies of nodes, mirrored nodes, instances and
 all modes and types of indices, OBJ, PLY and STL. Each time it knows the triangles that the file stands for, in double
@@ -21,17 +21,14 @@ they only graze. Last, the script plants errors: a vertex that is moved by a hun
 turned round, a colour that is changed by 0.05, and a camera that is turned by a degree. The comparison must find each.
 """
 
-import argparse
 import json
 import math
-import os
-import subprocess
 import sys
-import tempfile
-from pathlib import Path
+from functools import partial
 
-# Blender's own module `cycles` would otherwise be taken from this folder.
-sys.path[:] = [path for path in sys.path if Path(path).resolve() != Path(__file__).resolve().parent]
+# This import has to come first.
+import blender
+from blender import YUP, KdrayError, camera_matrix, link, report, triangulate
 
 import bpy
 import numpy as np
@@ -39,8 +36,7 @@ import OpenEXR
 import pygltflib as gltf
 import trimesh
 
-# These modules exist once `bpy` has been imported.
-import bmesh
+# This module exists once `bpy` has been imported.
 from mathutils import Matrix
 
 SIZE = (96, 64)
@@ -53,14 +49,6 @@ class Difference(Exception):
 
 
 # --- The comparison -----------------------------------------------------------------------------------------------
-
-
-def run(kdray, *arguments):
-    """Runs kdray and returns what it printed."""
-    done = subprocess.run([str(part) for part in (kdray, *arguments)], capture_output=True, text=True)
-    if done.returncode != 0:
-        raise Difference(f"kdray {arguments[0]} failed with {done.returncode}: {done.stderr.strip()}")
-    return done.stdout
 
 
 def hits_of(triangles, rays):
@@ -113,9 +101,9 @@ def rays_at(triangles, rng):
     return np.vstack([near, far]).astype(np.float32)
 
 
-def compare_triangles(kdray, options, path, triangles, folder):
+def compare_triangles(arguments, path, triangles, folder):
     """Compares number, bounds and hits. Returns a line for the report."""
-    told = json.loads(run(kdray, "inspect", path, "--json"))
+    told = json.loads(blender.run(arguments.kdray, "inspect", path, "--json"))
     if told["triangles"] != len(triangles):
         raise Difference(f"{told['triangles']} triangles in place of {len(triangles)}")
     bounds = np.array([triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))])
@@ -125,7 +113,8 @@ def compare_triangles(kdray, options, path, triangles, folder):
         raise Difference(f"bounds differ by {off:.3g}: {told['bounds']} in place of {bounds.tolist()}")
     rays = rays_at(triangles, np.random.default_rng(1))
     np.save(folder / "rays.npy", rays)
-    run(kdray, "cast", path, folder / "rays.npy", "-o", folder / "hits.npz", "--quiet", *options)
+    cast = ["cast", path, folder / "rays.npy", "-o", folder / "hits.npz", "--quiet"]
+    blender.run(arguments.kdray, *cast, *arguments.options)
     ours = np.load(folder / "hits.npz")
     ts, normals, clear = hits_of(triangles, rays.astype(np.float64))
     is_hit = np.isfinite(ts)
@@ -142,20 +131,18 @@ def compare_triangles(kdray, options, path, triangles, folder):
     return f"{len(triangles)} triangles, {both.sum()} hits, t within {off_t:.1e}, normals within {off_normal:.1e}"
 
 
-def layers(kdray, options, path, folder, names):
+def layers(arguments, path, folder, names):
     """Renders a file and returns the layers of these names, by name."""
     out = folder / "layers.exr"
-    size = f"{SIZE[0]}x{SIZE[1]}"
-    common = ["--size", size, "--denoise", "off", "--primary", "trace", "--quiet", "--aov", ",".join(names)]
-    run(kdray, "render", path, "-o", out, *common, *options)
+    blender.render(arguments, path, out, SIZE, "--aov", ",".join(names))
     channels = OpenEXR.File(str(out), separate_channels=True).channels()
     parts = {"position": "XYZ", "albedo": "RGB", "id": ["ID"]}
     return {name: np.stack([channels[f"{name}.{part}"].pixels for part in parts[name]], axis=-1) for name in names}
 
 
-def compare_colours(kdray, options, path, triangles, colours, folder):
+def compare_colours(arguments, path, triangles, colours, folder):
     """Compares colours of corners, linear, in the order of the file's triangles. Returns a line for the report."""
-    shown = layers(kdray, options, path, folder, ["position", "albedo", "id"])
+    shown = layers(arguments, path, folder, ["position", "albedo", "id"])
     is_hit = shown["id"][..., 0] != 0xFFFFFFFF
     if is_hit.sum() < 500:
         raise Difference(f"only {is_hit.sum()} pixels show the mesh")
@@ -174,9 +161,9 @@ def compare_colours(kdray, options, path, triangles, colours, folder):
     return f"{is_hit.sum()} pixels, colours within {off:.1e}"
 
 
-def compare_camera(kdray, options, path, triangles, rays, folder):
+def compare_camera(arguments, path, triangles, rays, folder):
     """Compares the points that the pixels show with the hits of rays. Returns a line for the report."""
-    points = layers(kdray, options, path, folder, ["position"])["position"].reshape(-1, 3).astype(np.float64)
+    points = layers(arguments, path, folder, ["position"])["position"].reshape(-1, 3).astype(np.float64)
     ts, _, clear = hits_of(triangles, rays)
     both = clear & np.isfinite(ts) & (points != 0.0).any(axis=-1)
     n_lost = (clear & (np.isfinite(ts) != (points != 0.0).any(axis=-1))).sum()
@@ -394,12 +381,7 @@ def blender_scene():
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.mesh.primitive_monkey_add(location=(0.0, 0.0, 1.0), rotation=(0.2, 0.3, 0.4))
     parent = bpy.context.object
-    # Where polygons that are not flat are cut would otherwise be up to the program.
-    cut = bmesh.new()
-    cut.from_mesh(parent.data)
-    bmesh.ops.triangulate(cut, faces=cut.faces)
-    cut.to_mesh(parent.data)
-    cut.free()
+    triangulate(parent.data)
     parent.scale = (1.0, 1.5, 0.7)
     bpy.ops.mesh.primitive_cone_add(vertices=9, location=(2.0, 0.5, 0.0))
     child = bpy.context.object
@@ -409,22 +391,21 @@ def blender_scene():
     bpy.ops.mesh.primitive_torus_add(location=(-3.0, 1.0, 0.5), major_segments=16, minor_segments=8)
     torus = bpy.context.object
     torus.scale = (-1.0, -1.0, -1.0)
-    linked = bpy.data.objects.new("linked", torus.data)
+    linked = link("linked", torus.data)
     linked.matrix_world = Matrix.Translation((0.0, -3.0, 1.0)) @ Matrix.Rotation(0.7, 4, "X")
-    bpy.context.scene.collection.objects.link(linked)
     group = bpy.data.collections.new("group")
     group.objects.link(linked)
-    instance = bpy.data.objects.new("instance", None)
+    instance = link("instance")
     instance.instance_type, instance.instance_collection = "COLLECTION", group
     instance.location, instance.scale = (4.0, 2.0, 0.0), (0.5, 0.7, -0.5)
-    bpy.context.scene.collection.objects.link(instance)
 
 
 def blender_triangles(turns_mirrored=True):
     """Returns the triangles that Blender shows, with y up. `turns_mirrored`: whether mirrored ones are turned round."""
     bpy.context.scene.view_layers[0].update()
     graph = bpy.context.evaluated_depsgraph_get()
-    yup = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+    yup = np.eye(4)
+    yup[:3, :3] = YUP
     parts = []
     for instance in graph.object_instances:
         if instance.object.type != "MESH":
@@ -464,22 +445,18 @@ def camera(values, location, rotation, parented=False):
         data = bpy.data.cameras.new("camera")
         for name, value in values.items():
             setattr(data, name, value)
-        seen = bpy.data.objects.new("camera", data)
+        seen = link("camera", data)
         seen.location, seen.rotation_euler = location, rotation
-        scene.collection.objects.link(seen)
         scene.camera = seen
         if parented:
-            holder = bpy.data.objects.new("holder", None)
+            holder = link("holder")
             holder.location, holder.rotation_euler, holder.scale = (0.3, -0.5, 0.2), (0.1, 0.2, 0.3), (2.0, 2.0, 2.0)
-            scene.collection.objects.link(holder)
             seen.parent = holder
         bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", export_apply=True, export_cameras=True)
         triangles = blender_triangles()
         seen.rotation_euler.z += math.radians(turned)
-        bpy.context.scene.view_layers[0].update()
+        matrix = camera_matrix(seen)
         frame = np.array(data.view_frame(scene=scene))
-        matrix = np.array(seen.matrix_world)
-        matrix[:3, :3] /= np.linalg.norm(matrix[:3, :3], axis=0)
         x, y = (np.arange(SIZE[0]) + 0.5) / SIZE[0], (np.arange(SIZE[1]) + 0.5) / SIZE[1]
         low, high = frame.min(axis=0), frame.max(axis=0)
         aside, up = np.meshgrid(low[0] + x * (high[0] - low[0]), high[1] - y * (high[1] - low[1]))
@@ -488,10 +465,9 @@ def camera(values, location, rotation, parented=False):
         is_parallel = data.type == "ORTHO"
         directions = np.array([0.0, 0.0, -1.0]) if is_parallel else in_image + (0.0, 0.0, frame[0, 2])
         origins = in_image if is_parallel else np.zeros(3)
-        yup = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-        directions = np.broadcast_to(directions, in_image.shape) @ matrix[:3, :3].T @ yup.T
+        directions = np.broadcast_to(directions, in_image.shape) @ matrix[:3, :3].T @ YUP.T
         directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
-        origins = (origins @ matrix[:3, :3].T + matrix[:3, 3]) @ yup.T
+        origins = (origins @ matrix[:3, :3].T + matrix[:3, 3]) @ YUP.T
         return triangles, np.hstack([np.broadcast_to(origins, directions.shape), directions])
 
     return write
@@ -537,21 +513,23 @@ CAMERAS = {
 }
 
 
-def check(name, compare, made, arguments, folder):
-    """Compares one file, prints a line, and returns whether nothing differs."""
+def check(name, compare, write, arguments, folder):
+    """Writes and compares one file, prints a line, and returns whether nothing differs."""
     try:
-        line = compare(arguments.kdray, arguments.options, folder / name, *made, folder)
-    except Difference as difference:
+        made = write(folder / name)
+        line = compare(arguments, folder / name, *(made if isinstance(made, tuple) else (made,)), folder)
+    except (Difference, KdrayError) as difference:
         report(f"FAIL {name:26} {difference}")
         return False
     report(f"ok   {name:26} {line}")
     return True
 
 
-def check_planted(name, compare, made, arguments, folder):
+def check_planted(name, compare, write, arguments, folder):
     """Compares a file with what it does not stand for, and returns whether the difference is found."""
     try:
-        compare(arguments.kdray, arguments.options, folder / name, *made, folder)
+        made = write(folder / name)
+        compare(arguments, folder / name, *(made if isinstance(made, tuple) else (made,)), folder)
     except Difference as difference:
         report(f"ok   planted in {name:15} found: {difference}")
         return True
@@ -559,62 +537,34 @@ def check_planted(name, compare, made, arguments, folder):
     return False
 
 
-def planted(arguments, folder):
-    """Compares files with planted errors, and returns which were found."""
-    name = "trimesh.obj"
-    mesh = trimesh.load(folder / name, process=False)
-    moved = mesh.triangles.copy()
-    size = np.ptp(moved.reshape(-1, 3), axis=0).max()
-    vertex = moved[17, 0].copy()
-    normal = np.cross(moved[17, 1] - vertex, moved[17, 2] - vertex)
-    moved[(moved == vertex).all(axis=-1)] += 0.01 * size * normal / np.linalg.norm(normal)
-    turned = mesh.triangles.copy()
-    turned[17] = turned[17, ::-1]
-    found = [check_planted(name, compare_triangles, (wrong,), arguments, folder) for wrong in (moved, turned)]
-    name = "colours_float.glb"
-    found.append(check_planted(name, compare_colours, COLOURS[name](folder / name, 0.05), arguments, folder))
-    for name in ("camera_plain.glb", "camera_orthographic.glb"):
-        found.append(check_planted(name, compare_camera, CAMERAS[name](folder / name, 1.0), arguments, folder))
-    return found
+def moved(path):
+    """Plants an error: one vertex is moved by a hundredth of the size."""
+    triangles = by_trimesh(path).copy()
+    size = np.ptp(triangles.reshape(-1, 3), axis=0).max()
+    vertex = triangles[17, 0].copy()
+    normal = np.cross(triangles[17, 1] - vertex, triangles[17, 2] - vertex)
+    triangles[(triangles == vertex).all(axis=-1)] += 0.01 * size * normal / np.linalg.norm(normal)
+    return triangles
 
 
-def report(line):
-    """Prints a line to the standard output that the script began with."""
-    os.write(STANDARD_OUTPUT, f"{line}\n".encode())
+def turned_round(path):
+    """Plants an error: one triangle is turned round."""
+    triangles = by_trimesh(path).copy()
+    triangles[17] = triangles[17, ::-1]
+    return triangles
 
 
-def silence():
-    """Sends what Blender prints to nowhere. Returns a file descriptor of the former standard output."""
-    kept = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, 1)
-    return kept
-
-
-def main():
-    """Compares all files, and returns the exit status."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("kdray", type=Path, help="the command to test")
-    parser.add_argument("--keep", type=Path, help="folder in which the files stay")
-    parser.add_argument("--cpu", action="store_true", help="cast and render by kdray without Vulkan")
-    arguments = parser.parse_args()
-    arguments.kdray = arguments.kdray.resolve()
-    arguments.options = ["--cpu"] if arguments.cpu else []
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = (arguments.keep or Path(temporary)).resolve()
-        folder.mkdir(parents=True, exist_ok=True)
-        good = []
-        for name, write in TRIANGLES.items():
-            good.append(check(name, compare_triangles, (write(folder / name),), arguments, folder))
-        for name, write in COLOURS.items():
-            good.append(check(name, compare_colours, write(folder / name), arguments, folder))
-        for name, write in CAMERAS.items():
-            good.append(check(name, compare_camera, write(folder / name), arguments, folder))
-        good.extend(planted(arguments, folder))
-    report(f"{sum(good)} of {len(good)} comparisons are as they must be")
-    return 0 if all(good) else 1
-
+PLANTED = [
+    ("trimesh.obj", compare_triangles, moved),
+    ("trimesh.obj", compare_triangles, turned_round),
+    ("colours_float.glb", compare_colours, partial(COLOURS["colours_float.glb"], changed=0.05)),
+    ("camera_plain.glb", compare_camera, partial(CAMERAS["camera_plain.glb"], turned=1.0)),
+    ("camera_orthographic.glb", compare_camera, partial(CAMERAS["camera_orthographic.glb"], turned=1.0)),
+]
 
 if __name__ == "__main__":
-    STANDARD_OUTPUT = silence()
-    sys.exit(main())
+    CASES = [(compare_triangles, TRIANGLES), (compare_colours, COLOURS), (compare_camera, CAMERAS)]
+    FILES = [(name, compare, write) for compare, files in CASES for name, write in files.items()]
+    CHECKS = [(name, partial(check, name, compare, write)) for name, compare, write in FILES]
+    CHECKS += [(name, partial(check_planted, name, compare, write)) for name, compare, write in PLANTED]
+    sys.exit(blender.main(__doc__, CHECKS))
