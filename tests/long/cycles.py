@@ -39,7 +39,7 @@ above a tenth of a percent have these reasons:
 import math
 import os
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -57,6 +57,8 @@ from mathutils import Vector
 SIZE = (160, 120)
 # Relative difference of a pixel from which on it is an outlier.
 OUTLIER = 0.1
+# Ambient light of the case `occlusion`.
+AMBIENT = np.array([0.5, 0.7, 0.9])
 # Places of lights: beside the camera, and where most lights are.
 FRONT, SIDE = (-0.6, -6.0, 4.0), (-2.5, -3.0, 5.0)
 
@@ -248,6 +250,13 @@ def gradient(n=64):
     return np.stack([0.15 + 0.8 * x, 0.15 + 0.8 * y, np.full_like(x, 0.5), np.ones_like(x)], axis=-1)
 
 
+def waves(n=64):
+    """Returns an image that repeats without a seam, of one wave of red along x and two of green along y."""
+    y, x = np.mgrid[0:n, 0:n] / n
+    red, green = 0.6 + 0.25 * np.sin(2 * np.pi * x), 0.6 + 0.25 * np.sin(4 * np.pi * y + 0.5)
+    return np.stack([red, green, np.full_like(x, 0.5), np.ones_like(x)], axis=-1)
+
+
 def slopes(strength, n=64):
     """Returns a normal map: waves along x in the upper half, along y in the lower half, a tilt at the right."""
     y, x = np.mgrid[0:n, 0:n] / n
@@ -285,19 +294,24 @@ def spot_soft():
     light("SPOT", 900.0, (-2.5, -2.0, 5.0), (0.3, 0.4, 0.2), spot_size=math.radians(40), spot_blend=0.4)
 
 
+def pixel_rays():
+    """Returns the position of the scene's camera, and the directions of the rays through the pixels' centres."""
+    seen = bpy.context.scene.camera
+    matrix, half = camera_matrix(seen), math.tan(seen.data.angle / 2.0)
+    y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]] + 0.5
+    aside, up = (2.0 * x / SIZE[0] - 1.0) * half, (1.0 - 2.0 * y / SIZE[1]) * half * SIZE[1] / SIZE[0]
+    return matrix[:3, 3], np.stack([aside, up, -np.ones_like(x)], axis=-1) @ matrix[:3, :3].T
+
+
 def gltf_spot():
     """Makes the spot a point light, and returns what glTF's formula makes of its light on the floor, for each pixel."""
-    matrix = camera_matrix(bpy.context.scene.camera)
+    eye, rays = pixel_rays()
     lamp = next(thing for thing in bpy.data.objects if thing.type == "LIGHT")
     outer = lamp.data.spot_size / 2.0
     inner = outer * (1.0 - lamp.data.spot_blend)
     lamp.data.type = "POINT"
     bpy.data.lights[0].shadow_soft_size = 0.0
-    half = math.tan(bpy.context.scene.camera.data.angle / 2.0)
-    y, x = np.mgrid[0 : SIZE[1], 0 : SIZE[0]] + 0.5
-    aside, up = (2.0 * x / SIZE[0] - 1.0) * half, (1.0 - 2.0 * y / SIZE[1]) * half * SIZE[1] / SIZE[0]
-    rays = np.stack([aside, up, -np.ones_like(x)], axis=-1) @ matrix[:3, :3].T
-    points = matrix[:3, 3] - rays * (matrix[2, 3] / rays[..., 2:])
+    points = eye - rays * (eye[2] / rays[..., 2:])
     towards = points - np.array(lamp.location)
     axis = np.array(lamp.matrix_world.to_3x3() @ Vector((0.0, 0.0, -1.0)))
     cosine = towards @ axis / np.linalg.norm(towards, axis=-1)
@@ -362,20 +376,85 @@ def base_texture(pixels, filtering, extension):
     return build
 
 
+def map_coordinates(made, shown, location, scale, degrees=0.0):
+    """Adds nodes that scale, turn and move the coordinates of a texture's node, in this order."""
+    nodes, links, _ = principled(made)
+    mapping, coordinates = nodes.new("ShaderNodeMapping"), nodes.new("ShaderNodeTexCoord")
+    mapping.inputs["Location"].default_value = (*location, 0.0)
+    mapping.inputs["Rotation"].default_value = (0.0, 0.0, math.radians(degrees))
+    mapping.inputs["Scale"].default_value = (*scale, 1.0)
+    links.new(coordinates.outputs["UV"], mapping.inputs["Vector"])
+    links.new(mapping.outputs["Vector"], shown.inputs["Vector"])
+
+
 def wrapped_texture():
     """A texture on a sphere, moved, scaled and turned by a mapping node."""
     made = material("textured")
-    nodes, links, node = principled(made)
+    _, links, node = principled(made)
     shown = texture(made, image("base.png", letters()), "Closest")
-    mapping, coordinates = nodes.new("ShaderNodeMapping"), nodes.new("ShaderNodeTexCoord")
-    mapping.inputs["Location"].default_value = (0.15, 0.3, 0.0)
-    mapping.inputs["Rotation"].default_value = (0.0, 0.0, math.radians(25))
-    mapping.inputs["Scale"].default_value = (3.0, 2.0, 1.0)
-    links.new(coordinates.outputs["UV"], mapping.inputs["Vector"])
-    links.new(mapping.outputs["Vector"], shown.inputs["Vector"])
+    map_coordinates(made, shown, (0.15, 0.3), (3.0, 2.0), 25.0)
     links.new(shown.outputs["Color"], node.inputs["Base Color"])
     sphere(made)
     point_light()
+
+
+def second_uvs():
+    """A texture that uses the second set of coordinates, in which the image is turned by a quarter and enlarged."""
+    made = material("textured")
+    nodes, links, node = principled(made)
+    shown = texture(made, image("base.png", letters()), "Closest")
+    coordinates = nodes.new("ShaderNodeUVMap")
+    coordinates.uv_map = "second"
+    links.new(coordinates.outputs["UV"], shown.inputs["Vector"])
+    links.new(shown.outputs["Color"], node.inputs["Base Color"])
+    data = card(made).data
+    first, second = data.uv_layers[0], data.uv_layers.new(name="second")
+    for loop in data.loops:
+        u, v = data.uv_layers[0].data[loop.index].uv
+        second.data[loop.index].uv = (0.1 + 0.7 * v, 0.9 - 0.7 * u)
+    data.uv_layers.active = data.uv_layers[0]
+
+
+def occlusion():
+    """An occlusion texture of strength 0.7 on a card that has ambient light, and light of a sun, which it must not dim.
+
+    Cycles has no such term. `ambient_emission` shows the card's ambient light by the formula.
+    """
+    made = material("dusty", (0.8, 0.5, 0.3))
+    nodes, links, _ = principled(made)
+    split, mix, group = (nodes.new(f"ShaderNode{kind}") for kind in ("SeparateColor", "Mix", "Group"))
+    links.new(texture(made, image("occlusion.png", letters(), True), "Closest").outputs["Color"], split.inputs["Color"])
+    mix.data_type = "RGBA"
+    mix.inputs["Factor"].default_value = 0.7
+    mix.inputs["A"].default_value = (1.0, 1.0, 1.0, 1.0)
+    links.new(split.outputs["Red"], mix.inputs["B"])
+    group.node_tree = gltf_output()
+    links.new(mix.outputs["Result"], group.inputs["Occlusion"])
+    rectangle("card", (-1.6, 0.0, -0.6), (3.2, 0, 0), (0, 0.8, 2.3), made)
+    light("SUN", 1.0, (-2.0, -3.0, 4.0))
+
+
+def gltf_output():
+    """Makes the group of nodes that tells the exporter of glTF what Blender's own nodes do not have."""
+    group = bpy.data.node_groups.new("glTF Material Output", "ShaderNodeTree")
+    for name in ("Occlusion", "Thickness"):
+        group.interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketFloat")
+    return group
+
+
+def ambient_emission():
+    """Makes the card emit its colour times the ambient light times 1 + strength * (occlusion - 1)."""
+    made = bpy.data.materials["dusty"]
+    nodes, links, node = principled(made)
+    seen = nodes.new("ShaderNodeMix")
+    seen.data_type, seen.blend_type = "RGBA", "MULTIPLY"
+    seen.inputs["Factor"].default_value = 1.0
+    links.new(nodes["Mix"].outputs["Result"], seen.inputs["A"])
+    colour = np.array(node.inputs["Base Color"].default_value)
+    seen.inputs["B"].default_value = (*(colour[:3] * AMBIENT).tolist(), 1.0)
+    links.new(seen.outputs["Result"], node.inputs["Emission Color"])
+    node.inputs["Emission Strength"].default_value = 1.0
+    return 1.0
 
 
 def normal_map(place, strength):
@@ -400,6 +479,21 @@ def normal_mapped_sphere(x_scale, eye):
         light("POINT", 600.0, eye)
 
     return place
+
+
+def turned_normal_map():
+    """A normal map whose image is moved, scaled and turned, with tangents from the file.
+
+    In Cycles, tangents are along the coordinates before this transform. Without tangents in the file, kdray takes them
+    along the transformed ones, as three.js and Khronos's viewer do.
+    """
+    made = material("bumpy", (0.7, 0.7, 0.7))
+    nodes, links, node = principled(made)
+    mapped, shown = nodes.new("ShaderNodeNormalMap"), texture(made, image("normal.png", slopes(1.0), True))
+    map_coordinates(made, shown, (0.2, 0.1), (1.5, 1.2), 30.0)
+    links.new(shown.outputs["Color"], mapped.inputs["Color"])
+    links.new(mapped.outputs["Normal"], node.inputs["Normal"])
+    card(made)
 
 
 def metallic_roughness():
@@ -481,6 +575,153 @@ def negative_scale(smooth):
     return build
 
 
+def see_through(n_bounces, samples):
+    """Lets Cycles follow rays through glass, over this number of bounces, and take this number of samples."""
+    cycles = bpy.context.scene.cycles
+    cycles.max_bounces = cycles.transmission_bounces = cycles.glossy_bounces = n_bounces
+    cycles.diffuse_bounces = cycles.volume_bounces = 0
+    # Dark rays would otherwise be ended by chance.
+    cycles.min_light_bounces = n_bounces
+    cycles.samples = samples
+
+
+def wall():
+    """Adds a card with a coarse image, in front of which glass is put, and the light of these cases."""
+    made = material("wall")
+    _, links, node = principled(made)
+    links.new(texture(made, image("wall.png", letters()), "Closest").outputs["Color"], node.inputs["Base Color"])
+    card(made)
+
+
+# A pane in front of the wall: a corner and two edges.
+PANE = ((-0.9, -1.5, 0.5), (1.6, 0.3, 0.0), (0.0, 0.3, 1.1))
+
+
+def thin_pane():
+    """A pane of thin, tinted glass, as glTF has it without thickness: it does not bend rays, and reflects by Fresnel."""
+    wall()
+    rectangle("pane", *PANE, material("glass", (0.5, 0.8, 0.9), 0.5, Roughness=0.0, Transmission_Weight=1.0))
+    see_through(1, 1)
+
+
+def thin_as_boundary():
+    """Gives the pane in Cycles what its single boundary needs to act as a thin sheet: the index of refraction 1, and the
+    square of its colour. Returns what Schlick's formula leaves of the light that the pane transmits, for each pixel."""
+    node = principled(bpy.data.materials["glass"])[2]
+    node.inputs["IOR"].default_value = 1.0
+    colour = node.inputs["Base Color"]
+    colour.default_value = [part**2 for part in colour.default_value]
+    origin, along, up = map(np.array, PANE)
+    normal = np.cross(along, up) / np.linalg.norm(np.cross(along, up))
+    eye, rays = pixel_rays()
+    points = eye + rays * ((origin - eye) @ normal / (rays @ normal))[..., None] - origin
+    weights = points @ np.linalg.pinv(np.stack([along, up]))
+    inside = ((weights > 0.0) & (weights < 1.0)).all(axis=-1)
+    cosine = abs(rays @ normal) / np.linalg.norm(rays, axis=-1)
+    reflected = 0.04 + 0.96 * (1.0 - cosine) ** 5
+    return np.where(inside, 1.0 - reflected, 1.0)[..., None]
+
+
+def transmission_texture():
+    """A pane whose share of transmitted light is in the red of a texture, and which reflects the rest diffusely.
+
+    It has the index of refraction 1 and no highlight, so that nothing but this share counts. Its channels are 0 or 1,
+    whose square roots are the same.
+    """
+    wall()
+    made = material("glass", (1.0, 1.0, 0.0), Roughness=0.0, IOR=1.0)
+    nodes, links, node = principled(made)
+    split = nodes.new("ShaderNodeSeparateColor")
+    shown = texture(made, image("transmission.png", letters(), True), "Closest")
+    links.new(shown.outputs["Color"], split.inputs["Color"])
+    links.new(split.outputs["Red"], node.inputs["Transmission Weight"])
+    rectangle("pane", *PANE, made)
+    see_through(1, 1024)
+
+
+def solid_glass(ior, samples):
+    """Returns a case of a cuboid and a sphere of tinted glass that absorbs light, in front of the wall.
+
+    It has no highlights, which Cycles does not show on a smooth surface by a light of radius 0.
+    """
+
+    def build():
+        wall()
+        made = material("glass", (0.9, 0.8, 0.95), Roughness=0.0, IOR=ior, Transmission_Weight=1.0)
+        nodes, links, _ = principled(made)
+        group, volume = nodes.new("ShaderNodeGroup"), nodes.new("ShaderNodeVolumeAbsorption")
+        group.node_tree = gltf_output()
+        group.inputs["Thickness"].default_value = 1.0
+        volume.inputs["Color"].default_value = (0.3, 0.8, 0.5, 1.0)
+        volume.inputs["Density"].default_value = 0.6
+        links.new(volume.outputs["Volume"], nodes["Material Output"].inputs["Volume"])
+        sphere(made, (-0.7, -1.2, 0.8), 0.6)
+        bpy.ops.mesh.primitive_cube_add(size=1.0, location=(0.8, -1.3, 0.8), rotation=(0.3, 0.2, 0.5))
+        take(made, False)
+        see_through(4, samples)
+
+    return build
+
+
+def absorption_of_gltf():
+    """Gives the volume in Cycles the absorption that glTF's formula states: exp(-s t) = colour^(t / distance).
+
+    Cycles's own s is density * (1 - colour).
+    """
+    volume = principled(bpy.data.materials["glass"])[0]["Volume Absorption"]
+    colour, density = volume.inputs["Color"], volume.inputs["Density"]
+    absorbed = -np.log(np.array(colour.default_value)[:3]) * density.default_value
+    density.default_value = absorbed.max()
+    colour.default_value = (*(1.0 - absorbed / absorbed.max()), 1.0)
+    return 1.0
+
+
+def skin():
+    """Two smooth heads, which are one mesh, each turned and moved by a bone of its own in the armature's pose."""
+    floor()
+    made = material("matt", (0.8, 0.4, 0.2))
+    left, right = (monkey(made, (x, 0.0, 1.0), smooth=True) for x in (-1.2, 1.2))
+    n_left = len(left.data.vertices)
+    bpy.ops.object.select_all(action="DESELECT")
+    left.select_set(True)
+    right.select_set(True)
+    bpy.context.view_layer.objects.active = left
+    bpy.ops.object.join()
+    armature = link("armature", bpy.data.armatures.new("armature"))
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    for name, x in (("left", -1.2), ("right", 1.2)):
+        bone = armature.data.edit_bones.new(name)
+        bone.head, bone.tail = (x, 0.0, 0.5), (x, 0.3, 1.5)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    everything = range(len(left.data.vertices))
+    for name, members in (("left", everything[:n_left]), ("right", everything[n_left:])):
+        left.vertex_groups.new(name=name).add(list(members), 1.0, "REPLACE")
+        armature.pose.bones[name].rotation_mode = "XYZ"
+    left.modifiers.new("armature", "ARMATURE").object = armature
+    left.parent = armature
+    armature.pose.bones["left"].rotation_euler = (0.3, 0.6, -0.2)
+    armature.pose.bones["right"].rotation_euler = (-0.4, -0.3, 0.5)
+    armature.pose.bones["right"].location = (0.2, 0.3, 0.1)
+    armature.pose.bones["right"].scale = (0.8, 0.8, 0.8)
+    armature.rotation_euler = (0.0, 0.0, 0.2)
+    light("SUN", 3.0, (-2.0, -3.0, 4.0))
+
+
+def morph():
+    """A smooth ball with two morph targets: one that bends it, with its whole weight, and one with the weight 0."""
+    floor()
+    ball = sphere(material("matt", (0.8, 0.4, 0.2)))
+    ball.shape_key_add(name="Basis")
+    bent, flat = ball.shape_key_add(name="bent"), ball.shape_key_add(name="flat")
+    for bent_point, flat_point in zip(bent.data, flat.data):
+        x, y, z = bent_point.co
+        bent_point.co = (x * (1.0 + 0.5 * z) + 0.4 * z * z, y * (1.0 - 0.4 * z), 0.9 * z + 0.3 * x * x)
+        flat_point.co = (x, y, 0.2 * z)
+    bent.value, flat.value = 1.0, 0.0
+    light("SUN", 3.0, (-2.0, -3.0, 4.0))
+
+
 def terminator():
     """A smooth sphere of few faces, whose facets shadow themselves, by a sun from the side."""
     sphere(material("matt"), segments=16)
@@ -495,6 +736,17 @@ def many_lights():
     light("SUN", 1.0, (2.0, -3.0, 4.0), colour=(0.3, 1.0, 0.3))
     light("SPOT", 900.0, (0.5, -2.0, 5.0), colour=(0.3, 0.3, 1.0), spot_size=1.0, spot_blend=0.0)
     bpy.context.scene.cycles.samples = 1024
+
+
+def obj_transform():
+    """A card whose texture is scaled and moved by the options `-s` and `-o` of its line in the MTL file."""
+    made = material("textured")
+    _, links, node = principled(made)
+    shown = texture(made, image("base.png", waves()))
+    map_coordinates(made, shown, (0.15, 0.3), (1.5, 0.7))
+    links.new(shown.outputs["Color"], node.inputs["Base Color"])
+    rectangle("card", (-1.6, 0.0, -0.6), (3.2, 0, 0), (0, 0.8, 2.3), made)
+    light("SUN", 3.0, (-2.0, -3.0, 4.0), colour=(1.0, 0.8, 0.6))
 
 
 def obj_scene(specular):
@@ -558,11 +810,21 @@ CASES = {
     "vertex_colours": Case(vertex_colours, 0.001, 0.006, 0.001),
     "alpha_mask": Case(holes(True, lambda p: np.where(p[..., 0] > 0.5, 1.0, 0.2)), 0.001, 0.001, 0.001),
     "alpha_blend": Case(holes(False, lambda p: np.where(p[..., 0] > 0.5, 0.45, 0.2)), 0.001, 0.001, 0.001),
+    "texture_second_uvs": Case(second_uvs, 0.001, 0.001, 0.001),
+    "normal_map_turned": Case(turned_normal_map, 0.001, 0.001, 0.001, "glb+tangents"),
+    "occlusion": Case(occlusion, 0.001, 0.001, 0.001, "glb+ambient", change=ambient_emission),
+    "transmission_thin": Case(thin_pane, 0.001, 0.001, 0.001, change=thin_as_boundary),
+    "transmission_texture": Case(transmission_texture, 0.001, 0.001, 0.002),
+    "glass_absorbing": Case(solid_glass(1.0, 1), 0.001, 0.001, 0.001, change=absorption_of_gltf),
+    "glass_refracting": Case(solid_glass(1.45, 1024), 0.001, 0.01, 0.006, change=absorption_of_gltf),
+    "skin": Case(skin, 0.001, 0.001, 0.004),
+    "morph": Case(morph, 0.001, 0.001, 0.001),
     "emission": Case(emission, 0.001, 0.001, 0.001),
     "negative_scale": Case(negative_scale(False), 0.001, 0.001, 0.001),
     "smooth_heads": Case(negative_scale(True), 0.001, 0.001, 0.004),
     "terminator": Case(terminator, 0.001, 0.001, 0.001),
     "obj_phong": Case(obj_scene(0.0), 0.002, 0.002, 0.005, "obj"),
+    "obj_transform": Case(obj_transform, 0.001, 0.004, 0.001, "obj"),
     "obj_pbr": Case(obj_scene(0.5), 0.01, 0.018, 0.012, "obj+pbr"),
 }
 
@@ -570,13 +832,11 @@ CASES = {
 def brighter():
     """Plants an error: the light has half a percent more power."""
     bpy.data.lights[0].energy *= 1.005
-    return 1.0
 
 
 def wider():
     """Plants an error: the orthographic camera shows one percent more."""
     bpy.context.scene.camera.data.ortho_scale *= 1.01
-    return 1.0
 
 
 def replace_image(change):
@@ -591,19 +851,62 @@ def replace_image(change):
 def upside_down():
     """Plants an error: the image is upside down."""
     replace_image(lambda pixels: pixels[::-1])
-    return 1.0
 
 
 def green_down():
     """Plants an error: the green of a normal map points down."""
     replace_image(lambda pixels: np.abs(pixels - (0.0, 1.0, 0.0, 0.0)))
-    return 1.0
 
 
 def not_decoded():
     """Plants an error: the colours of the image count as linear."""
     replace_image(lambda pixels: pixels).colorspace_settings.name = "Non-Color"
-    return 1.0
+
+
+def set_input(node, name, change):
+    """Replaces the value of an input of a node by what `change` makes of it."""
+    node.inputs[name].default_value = change(node.inputs[name].default_value)
+
+
+def darker_glass():
+    """Plants an error: the green of the glass is one percent less."""
+    set_input(principled(bpy.data.materials["glass"])[2], "Base Color", lambda c: (c[0], 0.99 * c[1], c[2], 1.0))
+
+
+def denser_glass():
+    """Plants an error: the glass absorbs two percent more."""
+    set_input(principled(bpy.data.materials["glass"])[0]["Volume Absorption"], "Density", lambda d: 1.02 * d)
+
+
+def bends_more():
+    """Plants an error: the index of refraction is greater by 0.01."""
+    set_input(principled(bpy.data.materials["glass"])[2], "IOR", lambda ior: ior + 0.01)
+
+
+def more_occlusion():
+    """Plants an error: the occlusion's strength is 0.72."""
+    set_input(bpy.data.materials["dusty"].node_tree.nodes["Mix"], "Factor", lambda strength: strength + 0.02)
+
+
+def first_uvs():
+    """Plants an error: the texture uses the first set of coordinates."""
+    bpy.data.materials["textured"].node_tree.nodes["UV Map"].uv_map = "UVMap"
+
+
+def moved_texture():
+    """Plants an error: the texture is moved by a hundredth of its width."""
+    node = bpy.data.materials["textured"].node_tree.nodes["Mapping"]
+    set_input(node, "Location", lambda place: (place[0] + 0.01, place[1], 0.0))
+
+
+def turned_bone():
+    """Plants an error: a bone is turned by a degree."""
+    bpy.data.objects["armature"].pose.bones["left"].rotation_euler.x += math.radians(1.0)
+
+
+def less_bent():
+    """Plants an error: the weight of a morph target is 0.98."""
+    bpy.data.shape_keys[0].key_blocks["bent"].value = 0.98
 
 
 # Errors that are planted in Cycles's scene after the export, and must be found, by the name of the case.
@@ -615,6 +918,19 @@ PLANTED = [
     ("normal_map", green_down),
     ("normal_map_sphere", green_down),
     ("normal_map_mirrored", green_down),
+    ("normal_map_turned", green_down),
+    ("texture_wrapped", moved_texture),
+    ("texture_second_uvs", first_uvs),
+    ("occlusion", upside_down),
+    ("occlusion", more_occlusion),
+    ("transmission_thin", darker_glass),
+    ("transmission_texture", upside_down),
+    ("glass_absorbing", denser_glass),
+    ("glass_refracting", denser_glass),
+    ("glass_refracting", bends_more),
+    ("skin", turned_bone),
+    ("morph", less_bent),
+    ("obj_transform", moved_texture),
 ]
 
 
@@ -641,27 +957,35 @@ def yup(vector):
 
 def export(kind, stem):
     """Exports Blender's scene and returns the file for kdray."""
-    if kind == "glb":
-        path = stem.with_suffix(".glb")
-        bpy.ops.export_scene.gltf(
-            filepath=str(path),
-            export_format="GLB",
-            export_cameras=True,
-            export_lights=True,
-            export_import_convert_lighting_mode="COMPAT",
-        )
-        return path
-    path = stem.with_suffix(".obj")
-    bpy.ops.wm.obj_export(filepath=str(path), path_mode="COPY", export_pbr_extensions=kind == "obj+pbr")
+    if not kind.startswith("glb"):
+        path = stem.with_suffix(".obj")
+        bpy.ops.wm.obj_export(filepath=str(path), path_mode="COPY", export_pbr_extensions=kind == "obj+pbr")
+        return scene_file(path)
+    path = stem.with_suffix(".glb")
+    bpy.ops.export_scene.gltf(
+        filepath=str(path),
+        export_format="GLB",
+        export_cameras=True,
+        export_lights=True,
+        export_import_convert_lighting_mode="COMPAT",
+        export_tangents=kind == "glb+tangents",
+        # Bones keep their pose.
+        export_rest_position_armature=False,
+    )
+    return scene_file(path, f"ambient = {AMBIENT.tolist()}\n") if kind == "glb+ambient" else path
+
+
+def scene_file(path, keys=""):
+    """Writes a scene file of kdray with a mesh file, Blender's camera and its sun, and returns the path."""
     seen = bpy.context.scene.camera
     target = seen.matrix_world @ Vector((0.0, 0.0, -1.0))
     fov = math.degrees(2.0 * math.atan(math.tan(seen.data.angle / 2.0) * SIZE[1] / SIZE[0]))
     lamp = next(thing for thing in bpy.data.objects if thing.type == "LIGHT")
     travels = lamp.matrix_world.to_3x3() @ Vector((0.0, 0.0, -1.0))
     irradiance = [lamp.data.energy * part / math.pi for part in lamp.data.color]
-    toml = stem.with_suffix(".toml")
+    toml = path.with_suffix(".toml")
     toml.write_text(
-        f"[camera]\neye = {yup(seen.location)}\ntarget = {yup(target)}\nvertical_fov = {fov}\n"
+        f"{keys}[camera]\neye = {yup(seen.location)}\ntarget = {yup(target)}\nvertical_fov = {fov}\n"
         f'[[light]]\nkind = "directional"\ndirection = {yup(travels)}\nirradiance = {irradiance}\n'
         f'[[mesh]]\nfile = "{path.name}"\n'
     )
@@ -702,7 +1026,6 @@ def compare(name, case, planted, arguments, folder):
     """Renders a case by both programs, prints its differences, and returns whether they are within the bounds, or with
     a planted error whether they are not."""
     if planted:
-        case = replace(case, change=planted)
         name = f"{name}.{planted.__name__}"
     place = folder / name
     place.mkdir(exist_ok=True)
@@ -711,6 +1034,8 @@ def compare(name, case, planted, arguments, folder):
     case.build()
     path = export(case.kind, place / "scene")
     factor = case.change() if case.change else 1.0
+    if planted:
+        planted()
     theirs = render_cycles(place / "cycles.exr") * factor
     blender.render(arguments, path, place / "kdray.exr", SIZE)
     ours = read_exr(place / "kdray.exr")
