@@ -5,10 +5,10 @@ Needs from PyPI, in Python 3.11: bpy==4.5.15, numpy, OpenEXR. Usage:
     python3 tests/long/cycles.py KDRAY [--keep FOLDER] [--cpu] [--only NAME,NAME]
 
 Each case is a small scene that this script makes in Blender: objects, one light of radius 0, a camera. Blender exports
-it as .glb or .obj and renders it by Cycles with direct light alone (no bounces). kdray renders the exported file. Both
-take their samples at the pixels' centres, so that pictures are compared pixel by pixel, edges included. With --keep,
-the files, the pictures and contact sheets stay in FOLDER. A sheet, NAME.png, shows kdray on the left, Cycles in the
-middle, and their relative difference on the right, white from 20 % on.
+it as .glb or .obj and renders it by Cycles with direct light alone: rays bounce off nothing but glass. kdray renders
+the exported file. Both take their samples at the pixels' centres, so that pictures are compared pixel by pixel, edges
+included. With --keep, the files, the pictures and contact sheets stay in FOLDER. A sheet, NAME.png, shows kdray on the
+left, Cycles in the middle, and their relative difference on the right, white from 20 % on.
 
 Units. No factor is fitted. The exporter's lighting mode `COMPAT` keeps watts: a point light or spot of P watts gets the
 intensity P / (4 pi) W/sr, and a sun of S W/m^2 the illuminance S. kdray divides both by pi and has no 1/pi in its
@@ -19,7 +19,7 @@ Bounds. Compared are the pixels in which either picture exceeds a thousandth of 
 percentile of the relative difference of pixels (the absolute difference, divided by the greater value), `outliers` the
 share of pixels that differ by more than 10 %. A case that comes out of its bounds, which are in `CASES`, fails. After
 the cases, errors are planted in Cycles's scene, such as an image upside down; these must come out of the bounds. Bounds
-above a tenth of a percent have these reasons:
+above a tenth of a percent, and changes of Cycles's scene after the export, have these reasons:
 
 | cases | known difference |
 |---|---|
@@ -28,11 +28,17 @@ above a tenth of a percent have these reasons:
 | `spot_hard` | glTF's formula, as its specification recommends, has an edge of at least 0.001 in the cosine. Cycles's edge is sharp |
 | `spot_soft` | none: as the formulas differ, Cycles renders a point light, and this script multiplies its picture by glTF's formula |
 | `texture_wrapped` | kdray shows smaller levels of an image where the surface is seen at a grazing angle, Cycles has no levels |
-| `texture_linear`, `obj` | Cycles blends the encoded values of neighbouring pixels, kdray the decoded ones. The images are gradients, in which this is little |
+| `texture_linear`, `obj_phong`, `obj_pbr`, `obj_transform` | Cycles blends the encoded values of neighbouring pixels, kdray the decoded ones. The images are gradients, in which this is little |
 | `normal_map` | both weaken light on bent normals after Estevez et al. (2019). Near the horizon of the unbent surface (`normal_map_side`), where the light is weak, their pixels differ by more than a percent |
 | `vertex_colours` | kdray rounds colours of corners to 8 bits of sRGB |
-| `smooth_heads`, `obj` | both move the origins of shadow rays up to the curved surface that the normals suggest, where the light is near the horizon of the triangle's plane, but fade this out by formulas of their own |
+| `smooth_heads`, `skin`, `obj_phong`, `obj_pbr` | both move the origins of shadow rays up to the curved surface that the normals suggest, where the light is near the horizon of the triangle's plane, but fade this out by formulas of their own |
 | `many_lights` | Cycles selects one light for each sample, so that its picture has noise |
+| `occlusion` | Cycles ignores occlusion textures, and its ambient light would be dimmed by what hides it. The card emits there what glTF's formula states |
+| `transmission_thin` | glTF's surface without thickness is a sheet that does not bend rays, Cycles's a single boundary that bends them and takes the square root of the colour. Cycles therefore gets the index 1 and the square of the colour, and this script multiplies its picture by what Schlick's formula leaves |
+| `transmission_texture` | Cycles selects by chance whether light is transmitted. At the borders of the image's pixels, rounding selects the pixel |
+| `glass_absorbing`, `glass_refracting` | Cycles's formula of absorption has another parameter, which this script computes from glTF's. With the index 1, light is only absorbed |
+| `glass_refracting` | Cycles selects by chance whether light is reflected or refracted, so that its picture has noise. Both programs follow rays over four bounces |
+| `normal_map_turned` | none: the file has tangents, as Cycles takes them along coordinates that are not transformed |
 | `alpha_blend` | Cycles selects by chance what a see-through surface shows. kdray's shadows of such surfaces are full or none, so that they are not compared |
 """
 
@@ -423,7 +429,8 @@ def occlusion():
     made = material("dusty", (0.8, 0.5, 0.3))
     nodes, links, _ = principled(made)
     split, mix, group = (nodes.new(f"ShaderNode{kind}") for kind in ("SeparateColor", "Mix", "Group"))
-    links.new(texture(made, image("occlusion.png", letters(), True), "Closest").outputs["Color"], split.inputs["Color"])
+    shown = texture(made, image("occlusion.png", letters(), True), "Closest")
+    links.new(shown.outputs["Color"], split.inputs["Color"])
     mix.data_type = "RGBA"
     mix.inputs["Factor"].default_value = 0.7
     mix.inputs["A"].default_value = (1.0, 1.0, 1.0, 1.0)
@@ -598,15 +605,15 @@ PANE = ((-0.9, -1.5, 0.5), (1.6, 0.3, 0.0), (0.0, 0.3, 1.1))
 
 
 def thin_pane():
-    """A pane of thin, tinted glass, as glTF has it without thickness: it does not bend rays, and reflects by Fresnel."""
+    """A pane of thin, tinted glass, as glTF has it without thickness: it does not bend rays, but it reflects."""
     wall()
     rectangle("pane", *PANE, material("glass", (0.5, 0.8, 0.9), 0.5, Roughness=0.0, Transmission_Weight=1.0))
     see_through(1, 1)
 
 
 def thin_as_boundary():
-    """Gives the pane in Cycles what its single boundary needs to act as a thin sheet: the index of refraction 1, and the
-    square of its colour. Returns what Schlick's formula leaves of the light that the pane transmits, for each pixel."""
+    """Gives the pane in Cycles what a boundary needs to act as a thin sheet: the index of refraction 1, and the square
+    of its colour. Returns what Schlick's formula leaves of the light that the pane transmits, for each pixel."""
     node = principled(bpy.data.materials["glass"])[2]
     node.inputs["IOR"].default_value = 1.0
     colour = node.inputs["Base Color"]

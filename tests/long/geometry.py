@@ -4,9 +4,10 @@ Needs from PyPI, in Python 3.11: bpy==4.5.15, numpy, trimesh, pygltflib, OpenEXR
 
     python3 tests/long/geometry.py KDRAY [--keep FOLDER] [--cpu] [--only NAME,NAME]
 
-The script makes files by pygltflib, trimesh and Blender: glTF with hierarchies of nodes, mirrored nodes, instances and
-all modes and types of indices, OBJ, PLY and STL. Each time it knows the triangles that the file stands for, in double
-precision, either from its own numbers or from the program that wrote the file. With --keep, the files stay in FOLDER.
+The script makes files by pygltflib, trimesh and Blender: glTF with hierarchies of nodes, mirrored nodes, instances, all
+modes and types of indices, sparse and quantized positions, morph targets and skins, OBJ, PLY and STL. Each time it
+knows the triangles that the file stands for, in double precision, either from its own numbers or from the program that
+wrote the file. With --keep, the files stay in FOLDER.
 
 | compared | with | bound |
 |---|---|---|
@@ -18,11 +19,13 @@ precision, either from its own numbers or from the program that wrote the file. 
 
 Rays that pass within 1e-4 of an edge (in weights of corners) are left out, as are those within 1e-3 of a surface that
 they only graze. Last, the script plants errors: a vertex that is moved by a hundredth of the size, a triangle that is
-turned round, a colour that is changed by 0.05, and a camera that is turned by a degree. The comparison must find each.
+turned round, a colour that is changed by 0.05, a camera or a bone that is turned by a degree, elements that are not
+replaced, another divisor, other weights, and joints in another pose. The comparison must find each.
 """
 
 import json
 import math
+import struct
 import sys
 from functools import partial
 
@@ -186,21 +189,46 @@ class Writer:
     def __init__(self):
         self.document = gltf.GLTF2(scene=0, scenes=[gltf.Scene(nodes=[])], asset=gltf.Asset(version="2.0"))
         self.blob = bytearray()
+        # Weights of morph targets by node, since pygltflib's nodes have none.
+        self.weights = {}
 
-    def accessor(self, array, component, kind, normalized=False, bounds=False):
-        """Adds an array and returns the index of its accessor."""
+    def view(self, array):
+        """Adds an array's bytes and returns the index of their buffer view."""
         self.blob.extend(b"\0" * (-len(self.blob) % 4))
         view = gltf.BufferView(buffer=0, byteOffset=len(self.blob), byteLength=array.nbytes)
         self.blob.extend(np.ascontiguousarray(array).tobytes())
         self.document.bufferViews.append(view)
-        made = gltf.Accessor(
-            bufferView=len(self.document.bufferViews) - 1, componentType=component, count=len(array), type=kind
-        )
+        return len(self.document.bufferViews) - 1
+
+    def accessor(self, array, component, kind, normalized=False, bounds=False):
+        """Adds an array and returns the index of its accessor."""
+        made = gltf.Accessor(bufferView=self.view(array), componentType=component, count=len(array), type=kind)
         made.normalized = normalized
         if bounds:
             made.min, made.max = array.min(axis=0).tolist(), array.max(axis=0).tolist()
         self.document.accessors.append(made)
         return len(self.document.accessors) - 1
+
+    def sparse(self, array, indices, values, base=True):
+        """Adds an array of float vectors in which some elements are replaced, and returns the index of its accessor.
+
+        Without `base`, the array is of zeros and the file does not have it.
+        """
+        replaced = np.asarray(indices, "<u2"), np.asarray(values, "<f4")
+        views = [self.view(part) for part in replaced]
+        ix = self.accessor(array.astype("<f4"), gltf.FLOAT, "VEC3")
+        made = self.document.accessors[ix]
+        if not base:
+            made.bufferView = None
+        made.sparse = gltf.Sparse(
+            count=len(indices),
+            indices=gltf.AccessorSparseIndices(bufferView=views[0], componentType=gltf.UNSIGNED_SHORT),
+            values=gltf.AccessorSparseValues(bufferView=views[1]),
+        )
+        whole = array.copy()
+        whole[indices] = values
+        made.min, made.max = whole.min(axis=0).tolist(), whole.max(axis=0).tolist()
+        return ix
 
     def primitive(self, points, indices=None, component=gltf.UNSIGNED_INT, mode=gltf.TRIANGLES, colours=None):
         """Makes a primitive. `colours`: the array, its component type, and whether it is normalized."""
@@ -230,8 +258,14 @@ class Writer:
     def save(self, path):
         """Writes the document as .glb."""
         self.document.buffers = [gltf.Buffer(byteLength=len(self.blob))]
-        self.document.set_binary_blob(bytes(self.blob))
-        self.document.save_binary(str(path))
+        told = json.loads(self.document.to_json())
+        for node, weights in self.weights.items():
+            told["nodes"][node]["weights"] = weights
+        body = b""
+        for kind, data, padding in [(b"JSON", json.dumps(told).encode(), b" "), (b"BIN\0", bytes(self.blob), b"\0")]:
+            data += padding * (-len(data) % 4)
+            body += struct.pack("<I", len(data)) + kind + data
+        path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(body)) + body)
 
 
 def placed(triangles, matrix):
@@ -289,6 +323,133 @@ def modes(path):
     moved = [strip - np.float32(4.0), fan + np.float32(6.0)]
     all_parts = [loose.reshape(-1, 3, 3), strip[strips], moved[0][strips], fan[fans], moved[1][fans]]
     return np.vstack(all_parts).astype(np.float64)
+
+
+def ball():
+    """Returns the points and the faces of a ball of 80 triangles, in single precision."""
+    shape = trimesh.creation.icosphere(subdivisions=1)
+    return shape.vertices.astype(np.float32), np.asarray(shape.faces)
+
+
+def sparse(path, is_planted=False):
+    """Writes positions of which some are replaced, and positions that are zero where they are not replaced. Returns the
+    triangles, or with `is_planted` those without replacements."""
+    points, faces = ball()
+    rng = np.random.default_rng(6)
+    writer, parts = Writer(), []
+    chosen = np.sort(rng.permutation(len(points))[:9])
+    everything = np.arange(len(points))
+    shifted = points + np.float32(3.0)
+    for base, indices, values in [
+        (points, chosen, points[chosen] * np.float32(1.5)),
+        (np.zeros_like(points), everything[1:], shifted[1:]),
+    ]:
+        part = writer.primitive(points, faces.ravel(), gltf.UNSIGNED_SHORT)
+        part.attributes.POSITION = writer.sparse(base, indices, values, base.any())
+        writer.node(mesh=writer.mesh(part))
+        whole = base.copy()
+        whole[indices] = values
+        parts.append(whole[faces])
+    writer.save(path)
+    if is_planted:
+        parts[0] = points[faces]
+    return np.vstack(parts).astype(np.float64)
+
+
+def quantized(path, is_planted=False):
+    """Writes positions of 16 bits, normalized and not, and of 8 bits, which nodes scale. Returns the triangles, or with
+    `is_planted` those of another divisor."""
+    points, faces = ball()
+    writer, parts = Writer(), []
+    kinds = [("<i2", gltf.SHORT, 32767, True), ("<u2", gltf.UNSIGNED_SHORT, 0, False), ("<i1", gltf.BYTE, 127, True)]
+    for place, (kind, component, divisor, normalized) in enumerate(kinds):
+        array = np.round(points * divisor if divisor else 1000.0 * points + 2000.0).astype(kind)
+        # Each element has a multiple of four bytes, the last ones of which are padding.
+        padded = np.zeros((len(array), 4), kind)
+        padded[:, :3] = array
+        part = writer.primitive(points, faces.ravel(), gltf.UNSIGNED_SHORT)
+        ix = writer.accessor(padded, component, "VEC3", normalized)
+        part.attributes.POSITION = ix
+        view = writer.document.bufferViews[writer.document.accessors[ix].bufferView]
+        view.byteStride, view.target = padded.itemsize * 4, gltf.ARRAY_BUFFER
+        made = writer.document.accessors[ix]
+        made.min, made.max = array.min(axis=0).tolist(), array.max(axis=0).tolist()
+        size = 1.5 if divisor else 0.001
+        writer.node(mesh=writer.mesh(part), translation=[4.0 * place, 0.0, 0.0], scale=[size] * 3)
+        values = np.maximum(array / float(divisor + is_planted), -1.0) if divisor else array.astype(np.float64)
+        parts.append(size * values[faces] + (4.0 * place, 0.0, 0.0))
+    writer.document.extensionsUsed = writer.document.extensionsRequired = ["KHR_mesh_quantization"]
+    writer.save(path)
+    return np.vstack(parts)
+
+
+def morphed(path, is_planted=False):
+    """Writes morph targets: weights of the mesh, of a node, and a sparse target. Returns the triangles, or with
+    `is_planted` those of other weights."""
+    points, faces = ball()
+    rng = np.random.default_rng(7)
+    moves = [rng.normal(0.0, 0.2, points.shape).astype(np.float32) for _ in range(2)]
+    chosen = np.arange(5, 20)
+    few = np.zeros_like(points)
+    few[chosen] = rng.normal(0.0, 0.3, (len(chosen), 3)).astype(np.float32)
+    writer = Writer()
+    part = writer.primitive(points, faces.ravel(), gltf.UNSIGNED_SHORT)
+    targets = [writer.accessor(move, gltf.FLOAT, "VEC3", bounds=True) for move in moves]
+    targets.append(writer.sparse(np.zeros_like(points), chosen, few[chosen], False))
+    part.targets = [{"POSITION": target} for target in targets]
+    shared = writer.mesh(part)
+    of_mesh, of_node = [0.5, 0.0, 1.0], [-0.25, 1.5, 0.75]
+    writer.document.meshes[shared].weights = of_mesh
+    writer.node(mesh=shared)
+    writer.weights[writer.node(mesh=shared, translation=[4.0, 0.0, 0.0], scale=[1.0, -1.0, 1.0])] = of_node
+    writer.save(path)
+    places = [np.eye(4), translation(4, 0, 0) @ np.diag([1.0, -1.0, 1.0, 1.0])]
+    parts = []
+    for weights, matrix in zip((of_mesh, of_mesh if is_planted else of_node), places):
+        whole = points + sum(weight * move.astype(np.float64) for weight, move in zip(weights, [*moves, few]))
+        parts.append(placed(whole[faces], matrix))
+    return np.vstack(parts)
+
+
+def skinned(path, is_planted=False):
+    """Writes a skin of three joints in a pose that is not that of the bind, with weights of floats and of 8 bits, and a
+    mesh node whose own place does not count. Returns the triangles, or with `is_planted` those of the bind pose."""
+    points, faces = ball()
+    rng = np.random.default_rng(8)
+    writer = Writer()
+    half = math.sqrt(0.5)
+    root = writer.node(translation=[1.0, 0.0, 2.0])
+    arm = writer.node(root, translation=[0.0, 1.0, 0.0], rotation=[half, 0.0, 0.0, half])
+    hand = writer.node(arm, translation=[0.5, 0.5, 0.0], scale=[1.2, 0.7, 1.1])
+    poses = [translation(1, 0, 2)]
+    poses.append(poses[0] @ translation(0, 1, 0) @ turn("x", 90))
+    poses.append(poses[1] @ translation(0.5, 0.5, 0) @ np.diag([1.2, 0.7, 1.1, 1.0]))
+    bind = [np.eye(4), translation(0, -1, 0), translation(0.3, -1, 0.2) @ turn("z", 30)]
+    bind = [matrix.astype(np.float32) for matrix in bind]
+    matrices = np.array([matrix.T.ravel() for matrix in bind], "<f4")
+    skin = gltf.Skin(joints=[root, arm, hand], inverseBindMatrices=writer.accessor(matrices, gltf.FLOAT, "MAT4"))
+    writer.document.skins.append(skin)
+    joints = np.tile(np.array([0, 1, 2, 0], "<u1"), (len(points), 1))
+    shares = rng.dirichlet((1.0, 1.0, 1.0), len(points))
+    shares = np.hstack([shares, np.zeros((len(points), 1))])
+    bytes_of = np.floor(shares * 255.0).astype("<u1")
+    bytes_of[:, 0] += (255 - bytes_of.sum(axis=1, dtype=int)).astype("<u1")
+    joint_matrices = np.array([pose @ matrix for pose, matrix in zip(poses, bind)])
+    if is_planted:
+        joint_matrices[:] = poses[0]
+    parts = []
+    for array, kind in ((shares.astype("<f4"), gltf.FLOAT), (bytes_of, gltf.UNSIGNED_BYTE)):
+        move = np.float32(0.0 if kind == gltf.FLOAT else 3.0)
+        part = writer.primitive(points + move, faces.ravel(), gltf.UNSIGNED_SHORT)
+        part.attributes.JOINTS_0 = writer.accessor(joints, gltf.UNSIGNED_BYTE, "VEC4")
+        part.attributes.WEIGHTS_0 = writer.accessor(array, kind, "VEC4", kind != gltf.FLOAT)
+        writer.node(mesh=writer.mesh(part), skin=0, translation=[9.0, 9.0, 9.0], scale=[2.0, 2.0, 2.0])
+        weights = array[:, :3] / (1.0 if kind == gltf.FLOAT else 255.0)
+        whole = np.hstack([points + move, np.ones((len(points), 1))])
+        moved = np.einsum("ij,jkl,il->ik", weights, joint_matrices, whole)[:, :3]
+        parts.append(moved[faces])
+    writer.save(path)
+    return np.vstack(parts).astype(np.float64)
 
 
 def translation(x, y, z):
@@ -400,6 +561,49 @@ def blender_scene():
     instance.location, instance.scale = (4.0, 2.0, 0.0), (0.5, 0.7, -0.5)
 
 
+def deformed(path, is_planted=False):
+    """Writes a mesh that bones of an armature bend, whose vertices follow up to three bones, with shape keys, by
+    Blender. Returns the triangles that Blender shows, or with `is_planted` those of a bone that is turned further."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_cylinder_add(vertices=10, radius=0.5, depth=3.0)
+    tube = bpy.context.object
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.subdivide(number_cuts=5)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    triangulate(tube.data)
+    tube.shape_key_add(name="Basis")
+    for name, weight in (("wide", 0.6), ("wavy", 0.3)):
+        key = tube.shape_key_add(name=name)
+        for point in key.data:
+            x, y, z = point.co
+            point.co = (1.5 * x, 1.2 * y, z) if name == "wide" else (x + 0.3 * math.sin(4.0 * z), y, z)
+        key.value = weight
+    armature = link("armature", bpy.data.armatures.new("armature"))
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    heights = (-1.5, -0.5, 0.5, 1.5)
+    for ix in range(3):
+        bone = armature.data.edit_bones.new(f"bone{ix}")
+        bone.head, bone.tail = (0.0, 0.0, heights[ix]), (0.0, 0.0, heights[ix + 1])
+        bone.parent = armature.data.edit_bones[f"bone{ix - 1}"] if ix else None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for ix in range(3):
+        group = tube.vertex_groups.new(name=f"bone{ix}")
+        for vertex in tube.data.vertices:
+            group.add([vertex.index], math.exp(-((vertex.co.z - heights[ix] - 0.5) ** 2)), "REPLACE")
+        armature.pose.bones[f"bone{ix}"].rotation_mode = "XYZ"
+        armature.pose.bones[f"bone{ix}"].rotation_euler = (0.3 * ix, 0.2, -0.4 * ix)
+    armature.pose.bones["bone2"].scale = (1.3, 0.8, 1.0)
+    tube.modifiers.new("armature", "ARMATURE").object = armature
+    tube.parent = armature
+    armature.location, armature.rotation_euler, armature.scale = (1.0, 2.0, 0.5), (0.3, 0.2, 0.1), (1.0, 1.4, 1.2)
+    options = {"export_rest_position_armature": False, "export_skins": True, "export_morph": True}
+    bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", **options)
+    if is_planted:
+        armature.pose.bones["bone1"].rotation_euler.x += math.radians(1.0)
+    return blender_triangles()
+
+
 def blender_triangles(turns_mirrored=True):
     """Returns the triangles that Blender shows, with y up. `turns_mirrored`: whether mirrored ones are turned round."""
     bpy.context.scene.view_layers[0].update()
@@ -478,6 +682,10 @@ def camera(values, location, rotation, parented=False):
 TRIANGLES = {
     "pygltflib_hierarchy.glb": hierarchy,
     "pygltflib_modes.glb": modes,
+    "pygltflib_sparse.glb": sparse,
+    "pygltflib_quantized.glb": quantized,
+    "pygltflib_morphed.glb": morphed,
+    "pygltflib_skinned.glb": skinned,
     "trimesh.glb": by_trimesh,
     "trimesh.obj": by_trimesh,
     "trimesh.ply": by_trimesh,
@@ -486,6 +694,7 @@ TRIANGLES = {
     "trimesh_text.stl": by_trimesh,
     "blender.glb": by_blender,
     "blender.gltf": by_blender,
+    "blender_deformed.glb": deformed,
     "blender.obj": by_blender,
     "blender.ply": by_blender,
     "blender_text.ply": by_blender,
@@ -557,6 +766,11 @@ def turned_round(path):
 PLANTED = [
     ("trimesh.obj", compare_triangles, moved),
     ("trimesh.obj", compare_triangles, turned_round),
+    ("pygltflib_sparse.glb", compare_triangles, partial(sparse, is_planted=True)),
+    ("pygltflib_quantized.glb", compare_triangles, partial(quantized, is_planted=True)),
+    ("pygltflib_morphed.glb", compare_triangles, partial(morphed, is_planted=True)),
+    ("pygltflib_skinned.glb", compare_triangles, partial(skinned, is_planted=True)),
+    ("blender_deformed.glb", compare_triangles, partial(deformed, is_planted=True)),
     ("colours_float.glb", compare_colours, partial(COLOURS["colours_float.glb"], changed=0.05)),
     ("camera_plain.glb", compare_camera, partial(CAMERAS["camera_plain.glb"], turned=1.0)),
     ("camera_orthographic.glb", compare_camera, partial(CAMERAS["camera_orthographic.glb"], turned=1.0)),
