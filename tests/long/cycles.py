@@ -404,6 +404,38 @@ def wrapped_texture():
     point_light()
 
 
+def texture_outside(extension):
+    """Returns a case of a card whose coordinates go beyond the image at all sides, where it continues in this way."""
+
+    def build():
+        made = material("textured")
+        _, links, node = principled(made)
+        shown = texture(made, image("base.png", letters()), "Closest", extension)
+        map_coordinates(made, shown, (-0.7, -0.4), (2.3, 1.9))
+        links.new(shown.outputs["Color"], node.inputs["Base Color"])
+        card(made)
+
+    return build
+
+
+def unlit():
+    """A card that shows its image whatever the light is."""
+    made = material("textured")
+    nodes, links, _ = principled(made)
+    shown = texture(made, image("base.png", letters()), "Closest")
+    links.new(shown.outputs["Color"], nodes["Material Output"].inputs["Surface"])
+    card(made)
+
+
+def emission_texture():
+    """A card that emits by a texture more than its factor can say, and reflects light."""
+    made = material("glowing", (0.3, 0.3, 0.3), Emission_Strength=1.5)
+    _, links, node = principled(made)
+    shown = texture(made, image("emission.png", letters()), "Closest")
+    links.new(shown.outputs["Color"], node.inputs["Emission Color"])
+    card(made)
+
+
 def second_uvs():
     """A texture that uses the second set of coordinates, in which the image is turned by a quarter and enlarged."""
     made = material("textured")
@@ -817,6 +849,10 @@ CASES = {
     "vertex_colours": Case(vertex_colours, 0.001, 0.006, 0.001),
     "alpha_mask": Case(holes(True, lambda p: np.where(p[..., 0] > 0.5, 1.0, 0.2)), 0.001, 0.001, 0.001),
     "alpha_blend": Case(holes(False, lambda p: np.where(p[..., 0] > 0.5, 0.45, 0.2)), 0.001, 0.001, 0.001),
+    "texture_mirror": Case(texture_outside("MIRROR"), 0.001, 0.001, 0.001),
+    "texture_extend": Case(texture_outside("EXTEND"), 0.001, 0.001, 0.001),
+    "unlit": Case(unlit, 0.001, 0.001, 0.001),
+    "emission_texture": Case(emission_texture, 0.001, 0.001, 0.001),
     "texture_second_uvs": Case(second_uvs, 0.001, 0.001, 0.001),
     "normal_map_turned": Case(turned_normal_map, 0.001, 0.001, 0.001, "glb+tangents"),
     "occlusion": Case(occlusion, 0.001, 0.001, 0.001, "glb+ambient", change=ambient_emission),
@@ -858,6 +894,11 @@ def replace_image(change):
 def upside_down():
     """Plants an error: the image is upside down."""
     replace_image(lambda pixels: pixels[::-1])
+
+
+def repeated():
+    """Plants an error: the image repeats."""
+    bpy.data.materials["textured"].node_tree.nodes["Image Texture"].extension = "REPEAT"
 
 
 def green_down():
@@ -927,6 +968,10 @@ PLANTED = [
     ("normal_map_mirrored", green_down),
     ("normal_map_turned", green_down),
     ("texture_wrapped", moved_texture),
+    ("texture_mirror", repeated),
+    ("texture_extend", repeated),
+    ("unlit", not_decoded),
+    ("emission_texture", upside_down),
     ("texture_second_uvs", first_uvs),
     ("occlusion", upside_down),
     ("occlusion", more_occlusion),
