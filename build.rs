@@ -20,7 +20,8 @@ use std::{
 };
 
 /// The kernels that find hits. Each is compiled for every search of [`SEARCHES`], and those that are marked here also
-/// with `WITH_GAPS`. Casts know no materials, so their rays pass through nothing.
+/// with `WITH_GAPS`, the code for parts of triangles through which rays pass. Casts know no materials, so they have no
+/// such gaps.
 const SEARCHING: [(&str, bool); 3] = [("cast", false), ("shadow", true), ("trace", true)];
 
 /// What hits are searched in and how: the traversals of the kd-tree, and the grid. A module has the code of one search,

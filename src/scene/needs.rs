@@ -22,11 +22,11 @@ const TREE_BYTES: u64 = 140;
 /// and in lists (150), edges (120), groups of corners (150) and tangents (120).
 const MIKKTSPACE_BYTES: u64 = 700;
 /// Copies of a text file in memory while it is checked: the file itself, its statements rewritten for the parser, and
-/// these once more while their lists are joined.
+/// these once more where the quick way has missed what the careful way finds.
 const TEXT_COPIES: u64 = 3;
 
 /// What triangles have beside corners, normals and slots.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Attributes {
     /// Number of sets of texture coordinates.
     pub n_uv_sets: u64,
@@ -35,7 +35,7 @@ pub(super) struct Attributes {
 }
 
 /// The size of a mesh.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct MeshSize {
     pub n_triangles: u64,
     pub n_points: u64,

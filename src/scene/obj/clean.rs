@@ -5,7 +5,12 @@
 //! avoids all of this: its numbers are finite, its indices are absolute and in range, all points have colours or none,
 //! and each run of faces of one kind has its own group, named as [`FaceKind::name`] says.
 
-use std::{borrow::Cow, collections::BTreeMap, fmt::Write};
+use std::{
+    borrow::Cow,
+    collections::BTreeMap,
+    fmt::Write,
+    io::{BufRead, Read},
+};
 
 use crate::scene::{error::Checked, needs::MeshSize};
 
@@ -89,9 +94,8 @@ const IGNORED: [&str; 31] = [
 /// A checked OBJ file.
 #[derive(Debug, Default)]
 pub struct CleanObj {
-    /// Text for tobj: all positions with their colours, all texture coordinates, all normals, then the faces. The first
-    /// line names a material library, so that tobj calls its material loader.
-    pub text: String,
+    /// Text for tobj, in parts: all positions with their colours, all texture coordinates, all normals, then the faces.
+    text: [String; 4],
     /// Names after `mtllib`, each with its line, counted from 1.
     pub libraries: Vec<(usize, String)>,
     /// Names after `usemtl`, each with the first line that uses it.
@@ -102,6 +106,14 @@ pub struct CleanObj {
     pub colour_scale: f32,
     /// Line and keyword of the first statement that is not part of the format, if any.
     pub unknown: Option<(usize, String)>,
+}
+
+impl CleanObj {
+    /// Returns the text for tobj. Its first line names a material library, so that tobj calls its material loader.
+    pub fn text(&self) -> impl BufRead {
+        let [positions, texcoords, normals, faces] = self.text.each_ref().map(|part| part.as_bytes());
+        b"mtllib all\n".chain(positions).chain(texcoords).chain(normals).chain(faces)
+    }
 }
 
 /// Checks and rewrites the text of an OBJ file. The error is a line, counted from 1, and what is wrong with it.
@@ -115,11 +127,7 @@ pub fn clean_obj(text: &str) -> Result<CleanObj, (usize, String)> {
     for (line, statement) in statements(text) {
         cleaner.statement(line, &statement).map_err(|what| (line, what))?;
     }
-    cleaner.out.size.n_points = totals.positions as u64;
-    cleaner.out.size.attributes.has_colours = white.is_some();
-    let Cleaner { mut out, positions, texcoords, normals, faces, .. } = cleaner;
-    out.text = ["mtllib all\n", &positions, &texcoords, &normals, &faces].concat();
-    Ok(out)
+    Ok(cleaner.finish())
 }
 
 /// Returns the statements of a file, each with the number of its first line. Comments and blank lines are left out;
@@ -183,10 +191,11 @@ pub fn words(rest: &str) -> impl Iterator<Item = &str> {
 }
 
 /// A corner of a face: indices of its position, its texture coordinates and its normal, counted from 1.
-type Corner = (usize, Option<usize>, Option<usize>);
+pub type Corner = (usize, Option<usize>, Option<usize>);
 
-#[derive(Debug, Default)]
-struct Cleaner {
+/// Writes the text for tobj, statement by statement.
+#[derive(Debug)]
+pub struct Cleaner {
     totals: Counts,
     /// The number that stands for 1 in colours, which points without colours get, if a point of the file has a colour.
     white: Option<f32>,
@@ -204,8 +213,28 @@ struct Cleaner {
     out: CleanObj,
 }
 
+impl Default for Cleaner {
+    /// Returns a cleaner of a file without colours.
+    fn default() -> Self {
+        Self {
+            totals: Counts::default(),
+            white: None,
+            seen: Counts::default(),
+            flat: false,
+            kind: None,
+            positions: String::new(),
+            texcoords: String::new(),
+            normals: String::new(),
+            faces: String::new(),
+            corners: Vec::new(),
+            out: CleanObj { colour_scale: 1.0, ..CleanObj::default() },
+        }
+    }
+}
+
 impl Cleaner {
-    fn statement(&mut self, line: usize, statement: &str) -> Checked<()> {
+    /// Adds a statement. The error says what is wrong with it.
+    pub fn statement(&mut self, line: usize, statement: &str) -> Checked<()> {
         let (keyword, rest) = split_keyword(statement);
         match keyword {
             "v" => self.point(rest)?,
@@ -251,13 +280,40 @@ impl Cleaner {
         Ok(())
     }
 
+    /// Counts one more element of the keyword, and returns the text to which it is to be appended.
+    pub fn element(&mut self, keyword: &str) -> &mut String {
+        self.seen.add(keyword);
+        match keyword {
+            "v" => &mut self.positions,
+            "vt" => &mut self.texcoords,
+            _ => &mut self.normals,
+        }
+    }
+
+    /// Returns the numbers of positions, of texture coordinates and of normals so far.
+    pub fn seen(&self) -> [usize; 3] {
+        let Counts { positions, texcoords, normals } = self.seen;
+        [positions, texcoords, normals]
+    }
+
     /// Adds a face. It has three or more corners, each of the form `v`, `v/vt`, `v//vn` or `v/vt/vn`.
     fn face<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> Checked<()> {
-        self.corners.clear();
+        self.begin_face();
         for word in words {
             let corner = self.corner(word)?;
             self.corners.push(corner);
         }
+        self.end_face()
+    }
+
+    /// Returns the empty list of the next face's corners.
+    pub fn begin_face(&mut self) -> &mut Vec<Corner> {
+        self.corners.clear();
+        &mut self.corners
+    }
+
+    /// Adds the face of the listed corners.
+    pub fn end_face(&mut self) -> Checked<()> {
         if self.corners.len() < 3 {
             return Err(format!("a face of {} corners: it needs 3 or more", self.corners.len()));
         }
@@ -276,18 +332,33 @@ impl Cleaner {
             self.kind = Some(kind);
         }
         self.faces.push('f');
-        for (position, texcoord, normal) in &self.corners {
-            match (texcoord.filter(|_| has_uvs), normal.filter(|_| has_normals)) {
-                (None, None) => push(&mut self.faces, format_args!(" {position}")),
-                (Some(texcoord), None) => push(&mut self.faces, format_args!(" {position}/{texcoord}")),
-                (None, Some(normal)) => push(&mut self.faces, format_args!(" {position}//{normal}")),
-                (Some(texcoord), Some(normal)) => {
-                    push(&mut self.faces, format_args!(" {position}/{texcoord}/{normal}"))
-                }
+        let mut digits = itoa::Buffer::new();
+        for &(position, texcoord, normal) in &self.corners {
+            let (texcoord, normal) = (texcoord.filter(|_| has_uvs), normal.filter(|_| has_normals));
+            self.faces.push(' ');
+            self.faces.push_str(digits.format(position));
+            if texcoord.or(normal).is_some() {
+                self.faces.push('/');
+            }
+            if let Some(texcoord) = texcoord {
+                self.faces.push_str(digits.format(texcoord));
+            }
+            if let Some(normal) = normal {
+                self.faces.push('/');
+                self.faces.push_str(digits.format(normal));
             }
         }
         self.faces.push('\n');
         Ok(())
+    }
+
+    /// Returns the rewritten file.
+    pub fn finish(self) -> CleanObj {
+        let Self { mut out, seen, white, positions, texcoords, normals, faces, .. } = self;
+        out.size.n_points = seen.positions as u64;
+        out.size.attributes.has_colours = white.is_some();
+        out.text = [positions, texcoords, normals, faces];
+        out
     }
 
     fn corner(&self, word: &str) -> Checked<Corner> {

@@ -4,13 +4,17 @@ mod clean;
 mod files;
 mod maps;
 mod mtl;
+mod quick;
 
 use std::{collections::HashMap, path::Path};
 
 use glam::{Vec2, Vec3};
 
-use self::clean::{CleanObj, FaceKind, FaceShading, clean_obj};
 pub(super) use self::files::named_files;
+use self::{
+    clean::{CleanObj, FaceKind, FaceShading, clean_obj},
+    quick::quick_obj,
+};
 use super::{
     error::SceneError,
     material::Material,
@@ -25,14 +29,19 @@ use super::{
 /// Makes a mesh from an OBJ file's text, and reads its materials.
 pub(super) fn parse_obj(path: &Path, text: &str, loading: &mut Loading) -> Result<Loaded, SceneError> {
     let &mut Loading { shading, n_loaded, access, ref mut images } = loading;
-    let clean = clean_obj(text).map_err(|(line, what)| SceneError::line(path, line, what))?;
+    let careful = || clean_obj(text).map_err(|(line, what)| SceneError::line(path, line, what));
+    let clean = quick_obj(text).map_or_else(careful, Ok)?;
     require_for_mesh(n_loaded as u64, &clean.size).map_err(|what| SceneError::file(path, what))?;
     let materials = mtl::load_libraries(path, &clean.libraries, access, images)?;
     if let Some((line, statement)) = &clean.unknown {
         tracing::warn!("{}:{line}: unknown statement `{}`", path.display(), statement.escape_debug());
     }
     let by_name = used_materials(path, &clean, &materials);
-    let models = parse(&clean, by_name).map_err(|e| SceneError::file(path, e.to_string()))?;
+    let models = match parse(&clean, &by_name) {
+        Ok(models) if !models.is_empty() && models.iter().all(is_finite) => models,
+        // The quick way has not looked at the numbers, so it is the careful way that finds what is wrong with one.
+        _ => parse(&careful()?, &by_name).map_err(|e| SceneError::file(path, e.to_string()))?,
+    };
     let (mesh, uses_crease) = mesh(&models, materials.len() as u32, (shading, clean.colour_scale));
     Ok(Loaded { mesh, materials, uses_crease })
 }
@@ -76,12 +85,19 @@ fn used_materials(path: &Path, clean: &CleanObj, materials: &[Material]) -> Hash
     by_name
 }
 
-fn parse(clean: &CleanObj, by_name: HashMap<String, usize>) -> Result<Vec<tobj::Model>, tobj::LoadError> {
+fn parse(clean: &CleanObj, by_name: &HashMap<String, usize>) -> Result<Vec<tobj::Model>, tobj::LoadError> {
     let options = tobj::LoadOptions { ignore_points: true, ignore_lines: true, ..Default::default() };
     // tobj needs the materials only for their names; the materials themselves are in the library.
-    let by_name = by_name.into_iter().collect();
-    let materials = |_: &Path| Ok((vec![tobj::Material::default()], std::clone::Clone::clone(&by_name)));
-    tobj::load_obj_buf(&mut clean.text.as_bytes(), &options, materials).map(|(models, _)| models)
+    let materials = |_: &Path| {
+        let by_name = by_name.iter().map(|(name, ix)| (name.clone(), *ix)).collect();
+        Ok((vec![tobj::Material::default()], by_name))
+    };
+    tobj::load_obj_buf(&mut clean.text(), &options, materials).map(|(models, _)| models)
+}
+
+/// Returns whether all numbers of a model are finite.
+fn is_finite(tobj::Model { mesh, .. }: &tobj::Model) -> bool {
+    [&mesh.positions, &mesh.normals, &mesh.texcoords].iter().all(|numbers| numbers.iter().all(|it| it.is_finite()))
 }
 
 /// Joins all models into one mesh. All faces of a model are of one kind. Also returns whether the crease angle counts.
