@@ -37,7 +37,7 @@ above a tenth of a percent, and changes of Cycles's scene after the export, have
 | `transmission_thin` | glTF's surface without thickness is a sheet that does not bend rays, Cycles's a single boundary that bends them and takes the square root of the colour. Cycles therefore gets the index 1 and the square of the colour, and this script multiplies its picture by what Schlick's formula leaves |
 | `transmission_texture` | Cycles selects by chance whether light is transmitted. At the borders of the image's pixels, rounding selects the pixel |
 | `glass_absorbing`, `glass_refracting` | Cycles's formula of absorption has another parameter, which this script computes from glTF's. With the index 1, light is only absorbed |
-| `glass_refracting` | Cycles selects by chance whether light is reflected or refracted, so that its picture has noise. Both programs follow rays over four bounces |
+| `glass_refracting` | Cycles selects by chance whether light is reflected or refracted, so that its picture has noise. Both programs follow rays over four bounces, but kdray leaves out those of which less than 1/1024 reaches the camera |
 | `normal_map_turned` | none: the file has tangents, as Cycles takes them along coordinates that are not transformed |
 | `alpha_blend` | Cycles selects by chance what a see-through surface shows. kdray's shadows of such surfaces are full or none, so that they are not compared |
 """
