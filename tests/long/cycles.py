@@ -30,7 +30,7 @@ above a tenth of a percent, and changes of Cycles's scene after the export, have
 | `texture_wrapped` | kdray shows smaller levels of an image where the surface is seen at a grazing angle, Cycles has no levels |
 | `texture_linear`, `obj_phong`, `obj_pbr`, `obj_transform` | Cycles blends the encoded values of neighbouring pixels, kdray the decoded ones. The images are gradients, in which this is little |
 | `normal_map` | both weaken light on bent normals after Estevez et al. (2019). Near the horizon of the unbent surface (`normal_map_side`), where the light is weak, their pixels differ by more than a percent |
-| `vertex_colours` | kdray rounds colours of corners to 8 bits of sRGB |
+| `vertex_colours`, `vertex_colours_texture` | kdray rounds colours of corners to 8 bits of sRGB |
 | `smooth_heads`, `skin`, `obj_phong`, `obj_pbr` | both move the origins of shadow rays up to the curved surface that the normals suggest, where the light is near the horizon of the triangle's plane, but fade this out by formulas of their own |
 | `many_lights` | Cycles selects one light for each sample, so that its picture has noise |
 | `occlusion` | Cycles ignores occlusion textures, and its ambient light would be dimmed by what hides it. The card emits there what glTF's formula states |
@@ -436,21 +436,31 @@ def emission_texture():
     card(made)
 
 
-def second_uvs():
-    """A texture that uses the second set of coordinates, in which the image is turned by a quarter and enlarged."""
-    made = material("textured")
-    nodes, links, node = principled(made)
-    shown = texture(made, image("base.png", letters()), "Closest")
+def use_second_uvs(made, shown):
+    """Adds a node by which a texture's node uses the second set of coordinates."""
+    nodes, links, _ = principled(made)
     coordinates = nodes.new("ShaderNodeUVMap")
     coordinates.uv_map = "second"
     links.new(coordinates.outputs["UV"], shown.inputs["Vector"])
+
+
+def add_second_uvs(data):
+    """Adds a second set of coordinates to a mesh, in which an image is turned by a quarter and enlarged."""
+    data.uv_layers.new(name="second")
+    first, second = data.uv_layers
+    for corner, turned in zip(first.data, second.data):
+        turned.uv = (0.1 + 0.7 * corner.uv[1], 0.9 - 0.7 * corner.uv[0])
+    data.uv_layers.active = first
+
+
+def second_uvs():
+    """A texture that uses the second set of coordinates."""
+    made = material("textured")
+    _, links, node = principled(made)
+    shown = texture(made, image("base.png", letters()), "Closest")
+    use_second_uvs(made, shown)
     links.new(shown.outputs["Color"], node.inputs["Base Color"])
-    data = card(made).data
-    first, second = data.uv_layers[0], data.uv_layers.new(name="second")
-    for loop in data.loops:
-        u, v = data.uv_layers[0].data[loop.index].uv
-        second.data[loop.index].uv = (0.1 + 0.7 * v, 0.9 - 0.7 * u)
-    data.uv_layers.active = data.uv_layers[0]
+    add_second_uvs(card(made).data)
 
 
 def occlusion():
@@ -535,6 +545,18 @@ def turned_normal_map():
     card(made)
 
 
+def normal_map_second_uvs():
+    """A normal map that uses the second set of coordinates, along which its tangents are. The file has no tangents."""
+    made = material("textured", (0.7, 0.7, 0.7))
+    nodes, links, node = principled(made)
+    mapped, shown = nodes.new("ShaderNodeNormalMap"), texture(made, image("normal.png", slopes(1.0), True))
+    mapped.uv_map = "second"
+    use_second_uvs(made, shown)
+    links.new(shown.outputs["Color"], mapped.inputs["Color"])
+    links.new(mapped.outputs["Normal"], node.inputs["Normal"])
+    add_second_uvs(card(made).data)
+
+
 def metallic_roughness():
     """Roughness in green and metallic in blue of one texture, as glTF packs them."""
     n = 64
@@ -562,6 +584,24 @@ def vertex_colours():
     for entry in layer.data:
         entry.color = (*rng.uniform(0.05, 0.95, 3), 1.0)
     point_light()
+
+
+def coloured_texture():
+    """Colours of corners that multiply a texture."""
+    made = material("textured")
+    nodes, links, node = principled(made)
+    colours, shown = nodes.new("ShaderNodeVertexColor"), texture(made, image("base.png", letters()), "Closest")
+    colours.layer_name = "Col"
+    mix = nodes.new("ShaderNodeMix")
+    mix.data_type, mix.blend_type = "RGBA", "MULTIPLY"
+    mix.inputs["Factor"].default_value = 1.0
+    links.new(shown.outputs["Color"], mix.inputs["A"])
+    links.new(colours.outputs["Color"], mix.inputs["B"])
+    links.new(mix.outputs["Result"], node.inputs["Base Color"])
+    layer = card(made).data.color_attributes.new("Col", "FLOAT_COLOR", "CORNER")
+    shades = [(0.9, 0.5, 0.3), (0.4, 0.9, 0.6), (0.5, 0.4, 0.9), (0.8, 0.8, 0.4)]
+    for entry, shade in zip(layer.data, shades):
+        entry.color = (*shade, 1.0)
 
 
 def holes(round_alpha, alpha):
@@ -854,6 +894,8 @@ CASES = {
     "unlit": Case(unlit, 0.001, 0.001, 0.001),
     "emission_texture": Case(emission_texture, 0.001, 0.001, 0.001),
     "texture_second_uvs": Case(second_uvs, 0.001, 0.001, 0.001),
+    "normal_map_second_uvs": Case(normal_map_second_uvs, 0.001, 0.001, 0.001),
+    "vertex_colours_texture": Case(coloured_texture, 0.001, 0.006, 0.001),
     "normal_map_turned": Case(turned_normal_map, 0.001, 0.001, 0.001, "glb+tangents"),
     "occlusion": Case(occlusion, 0.001, 0.001, 0.001, "glb+ambient", change=ambient_emission),
     "transmission_thin": Case(thin_pane, 0.001, 0.001, 0.001, change=thin_as_boundary),
@@ -941,6 +983,11 @@ def first_uvs():
     bpy.data.materials["textured"].node_tree.nodes["UV Map"].uv_map = "UVMap"
 
 
+def tangents_of_first():
+    """Plants an error: the tangents of a normal map are along the first set of coordinates."""
+    bpy.data.materials["textured"].node_tree.nodes["Normal Map"].uv_map = "UVMap"
+
+
 def moved_texture():
     """Plants an error: the texture is moved by a hundredth of its width."""
     node = bpy.data.materials["textured"].node_tree.nodes["Mapping"]
@@ -973,6 +1020,8 @@ PLANTED = [
     ("unlit", not_decoded),
     ("emission_texture", upside_down),
     ("texture_second_uvs", first_uvs),
+    ("normal_map_second_uvs", tangents_of_first),
+    ("vertex_colours_texture", upside_down),
     ("occlusion", upside_down),
     ("occlusion", more_occlusion),
     ("transmission_thin", darker_glass),
