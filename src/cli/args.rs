@@ -212,7 +212,7 @@ impl RenderArgs {
     /// Returns the render options: the user's, and the scene's own where the user gave none. Refuses a crop beyond
     /// the picture.
     pub fn options(&self, scene: &Scene) -> Result<RenderOptions, CliError> {
-        let options = self.picture.options(scene);
+        let options = self.picture.options(&scene.defaults);
         let RenderOptions { width, height, .. } = options;
         if let Some(crop) = self.crop.filter(|crop| crop.x1 > width || crop.y1 > height) {
             return Err(CliError::Usage(format!(

@@ -6,13 +6,13 @@ use kdray::{
     cpu::metered_exposure,
     engine::choices::{BuildPolicy, Request},
     frame::{Denoise, Primary, RenderOptions, Tonemap},
-    scene::Scene,
+    scene::RenderDefaults,
     world::World,
 };
 
 use super::{args::Size, error::CliError, or_auto::OrAuto};
 
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub struct PictureArgs {
     /// Size of the picture in pixels, for example 1024x768, each side 1 to 16384 [default: the scene's]
     #[arg(long, value_name = "WxH")]
@@ -181,8 +181,7 @@ impl PictureArgs {
 
     /// Returns the render options: the user's, and the scene's own where the user gave none. Traversal and primary
     /// visibility depend on the device and keep their defaults; [`Self::request`] returns the user's choice of them.
-    pub fn options(&self, scene: &Scene) -> RenderOptions {
-        let scene = &scene.defaults;
+    pub fn options(&self, scene: &RenderDefaults) -> RenderOptions {
         let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });
         RenderOptions {
             width,

@@ -1,14 +1,14 @@
-//! `kdray view`: a scene in a window.
+//! `kdray view`: a scene in a window, or a window that waits for a file.
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use kdray::{
     engine::choices::{Processor, Workload},
-    frame::View,
+    frame::{RenderOptions, View},
     gpu::{ContextOptions, chosen_device},
     output::{self, Format, OutputError},
-    scene::{Camera, CameraPath},
-    view::{Display, LoadOptions, LoadedScene, Settings, Tour, ViewOptions, ViewReport},
+    scene::{self, Camera, CameraPath, RenderDefaults, Scene},
+    view::{Display, LoadOptions, LoadedScene, Opened, Opener, Settings, Tour, ViewOptions, ViewReport},
 };
 use serde::Serialize;
 
@@ -16,6 +16,7 @@ use super::{
     build,
     error::CliError,
     file_roles::FileRoles,
+    picture_args::PictureArgs,
     print, print_line,
     progress::Progress,
     render::set_threads,
@@ -25,37 +26,24 @@ use super::{
 /// Default number of samples per pixel while the camera rests.
 const SAMPLES_AT_REST: u32 = 256;
 
-/// Runs `kdray view`: loads the scene, builds its structure and shows it. Arguments and files are checked before the
-/// work that an error would waste.
+/// Runs `kdray view`: loads the scene if there is one, builds its structure and shows it. Arguments and files are checked
+/// before the work that an error would waste.
 pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     args.picture.check()?;
+    check_scene(args)?;
     check_outputs(args)?;
     set_threads(args.threads)?;
     let display = Display::open()?;
 
     let progress = Progress::new(args.quiet, 2);
-    let (scene, _) = progress.stage(&format!("loading {}", args.scene.display()), || args.load.load(&args.scene));
-    let scene = scene?;
-    scene.warn_if_unlit(&args.scene);
-    let mut options = args.picture.options(&scene);
-    let tour = tour(args, scene.camera)?;
-    let max_samples = args.spp.unwrap_or(if tour.is_some() { 1 } else { SAMPLES_AT_REST });
-    let workload = match &tour {
-        Some(tour) => {
-            let n_pictures = u64::from(tour.n_frames()) * u64::from(max_samples);
-            Workload::of_pictures(&options, scene.lights.len(), n_pictures)
-        }
-        None => Workload::of_window((options.width, options.height)),
+    let Start { loaded, options, tour } = match &args.scene {
+        Some(path) => load(args, path, &progress)?,
+        None => without_scene(args)?,
     };
-    let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
-    let load_options = LoadOptions { request: args.picture.request(), processor, workload, scene: args.load.options() };
-    let accel = load_options.request.choose_accel(processor, scene.n_triangles(), &workload);
-    build::check_memory(accel, scene.n_triangles())?;
-    let building = build::building(accel, scene.n_triangles());
-    let (loaded, _) = progress.stage(&building, || LoadedScene::with_tree(&args.scene, scene, &load_options));
-    args.picture.meter(&loaded.world, &mut options).into_iter().for_each(|note| progress.note(&note));
     drop(progress);
 
+    let processor = loaded.load_options.processor;
+    let max_samples = n_samples(args, tour.is_some());
     let vsync = args.vsync == Switch::On;
     let settings = Settings { options, max_samples, budget_ms: args.budget_ms, vsync, view: View::Picture, gain: 1.0 };
     let scene_name = loaded.scene().name.clone();
@@ -68,6 +56,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
             tour,
             screenshot: args.screenshot.clone(),
             record: args.record.clone(),
+            opener: opener(args, processor),
             // The window stays open even if the terminal is gone.
             print: |text| drop(print(text)),
         },
@@ -82,6 +71,79 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         print_line("validation", message);
     }
     if report.validation.is_empty() { Ok(()) } else { Err(CliError::Validation(report.validation.len())) }
+}
+
+/// Returns the function that loads the files which the user opens in the window. The options of pictures on the
+/// command line apply to them, too.
+fn opener(args: &ViewArgs, processor: Processor) -> Opener {
+    let (picture, allow_outside) = (args.picture.clone(), args.load.allow_outside);
+    // The names of a camera and a scene on the command line are those of the first file.
+    let load_options = scene::LoadOptions { allow_outside, ..scene::LoadOptions::default() };
+    Arc::new(move |path| open(path, &load_options, &picture, processor).map_err(|error| error.to_string()))
+}
+
+fn open(
+    path: &Path,
+    scene_options: &scene::LoadOptions,
+    picture: &PictureArgs,
+    processor: Processor,
+) -> Result<Opened, CliError> {
+    let scene = Scene::load_with(path, scene_options)?;
+    scene.warn_if_unlit(path);
+    let mut options = picture.options(&scene.defaults);
+    let (request, workload) = (picture.request(), Workload::of_window((options.width, options.height)));
+    let accel = request.choose_accel(processor, scene.n_triangles(), &workload);
+    build::check_memory(accel, scene.n_triangles())?;
+    let load_options = LoadOptions { request, processor, workload, scene: scene_options.clone() };
+    let loaded = LoadedScene::with_tree(path, scene, &load_options);
+    picture.meter(&loaded.world, &mut options);
+    Ok(Opened { loaded, options })
+}
+
+/// What the window shows first.
+struct Start {
+    loaded: LoadedScene,
+    options: RenderOptions,
+    tour: Option<Tour>,
+}
+
+/// Loads the scene and builds its structure.
+fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliError> {
+    let (scene, _) = progress.stage(&format!("loading {}", path.display()), || args.load.load(path));
+    let scene = scene?;
+    scene.warn_if_unlit(path);
+    let mut options = args.picture.options(&scene.defaults);
+    let tour = tour(args, scene.camera)?;
+    let workload = match &tour {
+        Some(tour) => {
+            let n_pictures = u64::from(tour.n_frames()) * u64::from(n_samples(args, true));
+            Workload::of_pictures(&options, scene.lights.len(), n_pictures)
+        }
+        None => Workload::of_window((options.width, options.height)),
+    };
+    let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
+    let load_options = LoadOptions { request: args.picture.request(), processor, workload, scene: args.load.options() };
+    let accel = load_options.request.choose_accel(processor, scene.n_triangles(), &workload);
+    build::check_memory(accel, scene.n_triangles())?;
+    let building = build::building(accel, scene.n_triangles());
+    let (loaded, _) = progress.stage(&building, || LoadedScene::with_tree(path, scene, &load_options));
+    args.picture.meter(&loaded.world, &mut options).into_iter().for_each(|note| progress.note(&note));
+    Ok(Start { loaded, options, tour })
+}
+
+/// Returns the start of a window that waits for a file.
+fn without_scene(args: &ViewArgs) -> Result<Start, CliError> {
+    let scene = args.load.options();
+    let options = args.picture.options(&RenderDefaults::default());
+    let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
+    let (request, workload) = (args.picture.request(), Workload::of_window((options.width, options.height)));
+    let loaded = LoadedScene::none(&LoadOptions { request, processor, workload, scene });
+    Ok(Start { loaded, options, tour: None })
+}
+
+/// Returns the number of samples per pixel while the camera rests.
+fn n_samples(args: &ViewArgs, has_tour: bool) -> u32 {
+    args.spp.unwrap_or(if has_tour { 1 } else { SAMPLES_AT_REST })
 }
 
 /// Returns the camera tour of `--path` and `--frames`, or none if neither is given.
@@ -112,6 +174,14 @@ fn json(profile: &Profile) -> Vec<u8> {
     json
 }
 
+/// Refuses options that choose a part of the scene's file if there is none.
+fn check_scene(args: &ViewArgs) -> Result<(), CliError> {
+    if args.scene.is_none() && (args.load.camera.is_some() || args.load.scene_name.is_some()) {
+        return Err(CliError::Usage("--camera and --scene choose a part of SCENE, which is missing".into()));
+    }
+    Ok(())
+}
+
 /// Refuses outputs that cannot be written, or that the command also reads.
 fn check_outputs(args: &ViewArgs) -> Result<(), CliError> {
     check_roles(args)?;
@@ -131,7 +201,7 @@ fn check_outputs(args: &ViewArgs) -> Result<(), CliError> {
 /// Refuses an output that the command also reads, or that it writes twice.
 fn check_roles(args: &ViewArgs) -> Result<(), CliError> {
     let mut roles = FileRoles::default();
-    roles.read_scene("SCENE", &args.scene, args.load.options());
+    args.scene.iter().for_each(|scene| roles.read_scene("SCENE", scene, args.load.options()));
     args.path.iter().for_each(|path| roles.read("--path", path));
     args.screenshot.iter().try_for_each(|path| roles.write("--screenshot", path))?;
     args.profile.iter().try_for_each(|path| roles.write("--profile", path))

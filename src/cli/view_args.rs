@@ -15,8 +15,9 @@ use super::{
 #[group(skip)]
 #[command(group = clap::ArgGroup::new("tour").args(["frames", "path"]).multiple(true))]
 pub struct ViewArgs {
-    /// Scene file (TOML), or mesh file (glTF, OBJ, PLY, STL); the window follows changes of the file
-    pub scene: PathBuf,
+    /// Scene file (TOML), or mesh file (glTF, OBJ, PLY, STL); the window follows changes of the file. Without it, the
+    /// window waits for a file to be dropped on it
+    pub scene: Option<PathBuf>,
     #[command(flatten)]
     pub load: LoadArgs,
     #[command(flatten)]
@@ -35,10 +36,10 @@ pub struct ViewArgs {
     #[arg(long)]
     pub no_overlay: bool,
     /// Move the camera along the keyframes of this TOML file, then exit
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", requires = "scene")]
     pub path: Option<PathBuf>,
     /// Move the camera once around its target, or along --path, in this number of frames, 1 to 1000000, then exit
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", requires = "scene", value_parser = value_parser!(u32).range(1..=1_000_000))]
     pub frames: Option<u32>,
     /// Write the last frame of --frames or --path to this .png or .exr file
     #[arg(long, value_name = "FILE", requires = "tour")]

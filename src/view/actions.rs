@@ -1,10 +1,16 @@
 //! One-time actions of the user: saving the picture, picking a pixel, placing the camera.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::{Vec3, uvec2};
 
-use super::{error::Topic, gpu_session::GpuSession, input::Action, pick::pick, session::Session};
+use super::{
+    gpu_session::GpuSession,
+    input::Action,
+    message::{Message, Topic},
+    pick::pick,
+    session::Session,
+};
 use crate::{
     frame::RenderOptions,
     gpu::GpuError,
@@ -34,6 +40,10 @@ impl Session {
             Action::PrintCamera => (self.print)(&to_toml(self.controller.camera())),
             Action::FrameScene => self.controller.frame_scene(window.0 as f32 / window.1 as f32),
             Action::GoHome => self.controller.go_home(),
+            Action::ChangeUp => {
+                let axis = self.controller.change_up();
+                self.message = Some(Message::note(Topic::Settings, &format!("{axis} points up")));
+            }
             Action::Show(view) => self.settings.view = view,
             Action::Pick { x, y } => {
                 if let Some(displayed) = gpu.renderer.displayed() {
@@ -53,20 +63,38 @@ impl Session {
         }
     }
 
-    /// Saves the displayed picture if a save is due, even if the picture is small or unfinished. It is called before
-    /// another camera or view replaces the picture, and before the viewer ends.
+    /// Saves the displayed picture if a save is due, even if the picture is small or unfinished. The file is written on
+    /// another thread. The method is called before another camera or view replaces the picture, and before the viewer
+    /// ends.
     pub fn save_as_it_is(&mut self, gpu: &GpuSession) {
         if !std::mem::take(&mut self.is_save_due) {
             return;
         }
-        let path = next_free(&self.loaded.scene().name);
-        match save_displayed(gpu, &path) {
-            Ok(()) => {
-                (self.print)(&format!("wrote {}\n", path.display()));
-                self.clear_message(Topic::File);
-            }
+        match gpu.renderer.displayed_picture() {
+            Ok(Some(picture)) => self.saver.save(&self.loaded.scene().name, picture),
+            Ok(None) => {}
             Err(error) => self.show_error(Topic::File, &error.to_string()),
         }
+    }
+
+    /// Tells of the pictures that have been written since the last call, and of those that could not be written.
+    pub fn report_saves(&mut self) {
+        for saved in self.saver.results() {
+            match saved {
+                Ok(path) => {
+                    let note = format!("wrote {}", path.display());
+                    (self.print)(&format!("{note}\n"));
+                    self.message = Some(Message::note(Topic::File, &note));
+                }
+                Err(error) => self.show_error(Topic::File, &error.to_string()),
+            }
+        }
+    }
+
+    /// Waits until all pictures have been written, and tells of them.
+    pub fn finish_saves(&mut self) {
+        self.saver.finish();
+        self.report_saves();
     }
 
     /// Follows the rays of the displayed picture's pixel at a point of the window. `window` and `(x, y)` are in
@@ -82,25 +110,10 @@ impl Session {
     }
 }
 
-/// Writes the displayed picture as PNG. Writes nothing if no picture has been displayed yet.
-fn save_displayed(gpu: &GpuSession, path: &Path) -> Result<(), SaveError> {
-    match gpu.renderer.displayed_picture()? {
-        Some(picture) => Ok(output::write_picture(path, &picture)?),
-        None => Ok(()),
-    }
-}
-
 /// Writes the renderer's picture in the format of the path's extension, as `kdray render` does.
 pub fn save(gpu: &GpuSession, path: &Path) -> Result<(), SaveError> {
     output::write_picture(path, &gpu.renderer.picture()?)?;
     Ok(())
-}
-
-/// Returns the first path `NAME-001.png`, `NAME-002.png` and so on that does not exist.
-fn next_free(scene_name: &str) -> PathBuf {
-    let stem = output::stem_of(scene_name);
-    let mut names = (1..).map(|n| PathBuf::from(format!("{stem}-{n:03}.png")));
-    names.find(|path| !path.exists()).expect("numbers do not end")
 }
 
 /// Returns the camera in the format of scene files.
@@ -123,7 +136,7 @@ mod tests {
     use crate::{
         engine::choices::{Processor, Request, Workload},
         frame::View,
-        view::{LoadOptions, LoadedScene, Settings},
+        view::{LoadOptions, LoadedScene, Settings, saver::Saver},
     };
 
     #[test]
@@ -161,8 +174,12 @@ mod tests {
             processor: Processor::SoftwareDriver,
             workload: Workload::of_window((640, 480)),
         };
-        let mut session =
-            Session::new(LoadedScene::load(&path, &load_options).unwrap(), settings.clone(), true, |_| ());
+        let mut session = Session::new(
+            LoadedScene::load(&path, &load_options).unwrap(),
+            settings.clone(),
+            true,
+            (|_| (), Saver::new(|| ())),
+        );
         let seen = session.loaded.scene().camera;
         let displayed = Displayed { size: (80, 60), camera: seen };
         session.controller.look(0.5, 0.0);

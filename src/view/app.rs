@@ -1,6 +1,7 @@
 //! The window: handles its events, and defines the order of work in a frame.
 
 use std::{
+    path::Path,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -15,9 +16,11 @@ use winit::{
 
 use super::{
     display::{PaceReport, ViewOptions, ViewReport},
-    error::{Topic, ViewError},
+    error::ViewError,
     gpu_session::GpuSession,
     input::{Action, Input},
+    message::Topic,
+    opened::Opened,
     panel::{Layers, Settings},
     reload::{Reloader, Wake},
     script::Script,
@@ -59,7 +62,13 @@ impl App {
     pub fn new(session: Session, options: ViewOptions, script: Option<Script>, reloader: Reloader) -> Self {
         Self {
             session,
-            layers: Layers { panel: options.overlay, keys: false, hint: options.overlay && script.is_none() },
+            layers: Layers {
+                panel: options.overlay,
+                keys: false,
+                hint: options.overlay && script.is_none(),
+                messages: options.overlay,
+                start: false,
+            },
             options,
             script,
             reloader,
@@ -75,7 +84,7 @@ impl App {
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<Shown, ViewError> {
         let Settings { options, vsync, .. } = &self.session.settings;
         let attributes = Window::default_attributes()
-            .with_title(format!("kdray: {}", self.session.loaded.scene().name))
+            .with_title(self.title())
             .with_inner_size(PhysicalSize::new(options.width, options.height));
         let window = event_loop.create_window(attributes).map_err(|error| ViewError::Window(error.to_string()))?;
         let window = Arc::new(window);
@@ -84,6 +93,45 @@ impl App {
         self.choices = Some(gpu.choices.clone());
         self.session.settings.options = gpu.renderer.options().clone();
         Ok(Shown { gpu, ui: Ui::new(&window), window })
+    }
+
+    fn title(&self) -> String {
+        let loaded = &self.session.loaded;
+        if loaded.is_open() { format!("kdray: {}", loaded.scene().name) } else { "kdray".to_owned() }
+    }
+
+    /// Returns the layers that show something now.
+    fn seen_layers(&self) -> Layers {
+        if !self.session.loaded.is_open() {
+            return Layers { start: true, panel: false, messages: false, ..self.layers };
+        }
+        Layers { messages: self.layers.messages && self.session.message.is_some(), ..self.layers }
+    }
+
+    /// Opens a file that the user has dropped on the window. A tour goes on with its own scene.
+    fn open_file(&mut self, path: &Path) {
+        if self.script.is_some() {
+            return;
+        }
+        self.session.note_opening(path);
+        self.reloader.open(path);
+        if let Some(Shown { window, .. }) = &self.shown {
+            window.request_redraw();
+        }
+    }
+
+    /// Shows the file that was opened, or the error.
+    fn opened(&mut self, opened: Result<Opened, String>) {
+        if let Some(Shown { gpu, window, .. }) = &mut self.shown {
+            if self.session.open_scene(gpu, opened) {
+                self.reloader.follow(&self.session.loaded);
+            }
+            window.request_redraw();
+        }
+        if let Some(Shown { window, .. }) = &self.shown {
+            window.set_title(&self.title());
+        }
+        self.reloader.done();
     }
 
     fn end(&mut self, event_loop: &ActiveEventLoop, outcome: Result<(), ViewError>) {
@@ -112,6 +160,7 @@ impl App {
 
     /// Draws and shows a frame. Returns true when the script has ended.
     fn draw(&mut self, shown: &mut Shown) -> Result<bool, ViewError> {
+        let layers = self.seen_layers();
         let Shown { gpu, ui, window } = shown;
         let size = window.inner_size();
         let size = (size.width, size.height);
@@ -127,8 +176,7 @@ impl App {
             None => size,
         };
         let session = &mut self.session;
-        let layout =
-            self.layers.any().then(|| lay_out(session, gpu, (ui, window, self.layers), self.input.is_flying()));
+        let layout = layers.any().then(|| lay_out(session, gpu, (ui, window, layers), self.input.is_flying()));
         session.draw(gpu, picture)?;
         session.save_if_due(gpu, picture);
         let frame = match layout {
@@ -177,13 +225,14 @@ impl App {
         match action {
             Action::Quit if self.layers.keys => self.layers.keys = false,
             Action::Quit => self.quit(event_loop),
-            Action::TogglePanel => self.layers.panel = !self.layers.panel,
             Action::ToggleKeys => self.layers.keys = !self.layers.keys,
+            _ if !self.session.loaded.is_open() => {}
+            Action::TogglePanel => self.layers.panel = !self.layers.panel,
             action => self.session.act(action, gpu, (size.width.max(1), size.height.max(1))),
         }
     }
 
-    /// Ends the viewer because the user closes it. A save that is due is made first.
+    /// Ends the viewer because the user closes it. A save that is due is begun first; [`App::report`] waits for it.
     fn quit(&mut self, event_loop: &ActiveEventLoop) {
         if let Some(Shown { gpu, .. }) = &self.shown {
             self.session.save_as_it_is(gpu);
@@ -194,8 +243,9 @@ impl App {
     /// Handles an event of the user. The overlay may take the event. Otherwise the event moves the camera or triggers
     /// an action.
     fn handle_input(&mut self, event_loop: &ActiveEventLoop, event: &WindowEvent) {
+        let layers = self.seen_layers();
         let Some(Shown { ui, window, .. }) = &mut self.shown else { return };
-        let is_overlays = self.layers.any() && !is_tab(event) && ui.take_event(window, event);
+        let is_overlays = layers.any() && !is_tab(event) && ui.take_event(window, event);
         self.layers.hint &= !is_press(event);
         window.request_redraw();
         if is_overlays || self.script.is_some() {
@@ -215,7 +265,8 @@ impl App {
     }
 
     /// Returns the report after the event loop has ended.
-    pub fn report(self) -> Result<ViewReport, ViewError> {
+    pub fn report(mut self) -> Result<ViewReport, ViewError> {
+        self.session.finish_saves();
         self.outcome?;
         let frames = &self.session.all_frames;
         let pace =
@@ -253,6 +304,13 @@ impl ApplicationHandler<Wake> for App {
                 }
                 self.reloader.done();
             }
+            Wake::Opened(opened) => self.opened(*opened),
+            Wake::Saved => {
+                self.session.report_saves();
+                if let Some(Shown { window, .. }) = &self.shown {
+                    window.request_redraw();
+                }
+            }
             #[cfg(feature = "hot-reload")]
             Wake::ShadersChanged => self.reloader.shaders.compile(),
             #[cfg(feature = "hot-reload")]
@@ -270,6 +328,7 @@ impl ApplicationHandler<Wake> for App {
         match event {
             WindowEvent::CloseRequested => self.quit(event_loop),
             WindowEvent::RedrawRequested => self.frame(event_loop),
+            WindowEvent::DroppedFile(path) => self.open_file(&path),
             WindowEvent::Occluded(is_occluded) => self.is_occluded = is_occluded,
             WindowEvent::Resized(_) | WindowEvent::ScaleFactorChanged { .. } => {
                 if let Some(Shown { gpu, .. }) = &mut self.shown {
@@ -287,7 +346,7 @@ impl ApplicationHandler<Wake> for App {
         let Some(Shown { gpu, ui, window }) = &self.shown else { return };
         let (now, size) = (Instant::now(), window.inner_size());
         let is_busy = self.script.is_some() || self.session.is_busy(gpu, now, (size.width, size.height));
-        let wait = if is_busy || !self.layers.any() { Duration::MAX } else { ui.repaint_after() };
+        let wait = if is_busy || !self.seen_layers().any() { Duration::MAX } else { ui.repaint_after() };
         let has_area = size.width > 0 && size.height > 0;
         // A script goes on even if its window is hidden.
         let is_seen = self.script.is_some() || !(self.is_occluded || window.is_minimized() == Some(true));

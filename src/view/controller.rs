@@ -1,6 +1,9 @@
 //! Moves the camera by keys and the mouse, independently of the frame rate.
 
-use std::f32::consts::{FRAC_PI_2, PI};
+use std::{
+    f32::consts::{FRAC_PI_2, PI},
+    ops::RangeInclusive,
+};
 
 use glam::{Quat, Vec3};
 
@@ -13,6 +16,13 @@ const TURN_PER_HEIGHT: f32 = PI;
 const POLE_MARGIN: f32 = 0.02;
 /// Factor on the distance to the target, or on the height of an orthographic picture, for one step of the wheel.
 const ZOOM_PER_STEP: f32 = 0.85;
+/// Factor on the height of the picture, at any distance, for one step of the keys that widen the view.
+const WIDER_PER_STEP: f32 = 1.1;
+/// Vertical fields of view that the user can set, degrees.
+pub const FOV_DEGREES: RangeInclusive<f32> = 2.0..=150.0;
+/// Directions that can point up in the picture, in the order in which a key selects them.
+const UP_AXES: [(&str, Vec3); 6] =
+    [("+y", Vec3::Y), ("+z", Vec3::Z), ("+x", Vec3::X), ("-y", Vec3::NEG_Y), ("-z", Vec3::NEG_Z), ("-x", Vec3::NEG_X)];
 /// Factor on the radius of the scene's bounding sphere when the scene is framed, which leaves a margin around it.
 const FRAME_MARGIN: f32 = 1.05;
 
@@ -101,6 +111,41 @@ impl Controller {
                 self.camera.target += step;
             }
         }
+    }
+
+    /// Widens the view by steps without moving the camera; negative steps narrow it. A perspective camera's field of
+    /// view grows, or the height that an orthographic one shows.
+    pub fn widen(&mut self, steps: f32) {
+        let projection = match self.camera.projection {
+            Projection::Perspective { vertical_fov_degrees: degrees } => {
+                let half_height = (degrees.to_radians() / 2.0).tan() * WIDER_PER_STEP.powf(steps);
+                // A scene's own camera may be beyond the limits. From there steps only lead back.
+                let (least, most) = (degrees.min(*FOV_DEGREES.start()), degrees.max(*FOV_DEGREES.end()));
+                let degrees = (2.0 * half_height.atan().to_degrees()).clamp(least, most);
+                Projection::Perspective { vertical_fov_degrees: degrees }
+            }
+            Projection::Orthographic { height } => {
+                let steps_of_zoom = steps * WIDER_PER_STEP.ln() / ZOOM_PER_STEP.ln();
+                Projection::Orthographic { height: height * zoom_share(height, steps_of_zoom, self.radius) }
+            }
+        };
+        self.camera.projection = projection;
+    }
+
+    /// Replaces the camera's projection.
+    pub fn set_projection(&mut self, projection: Projection) {
+        self.camera.projection = projection;
+    }
+
+    /// Makes the next of [`UP_AXES`] point up in the picture, or the first if none does. The camera is turned about its
+    /// target together with that axis. Returns the axis's name.
+    pub fn change_up(&mut self) -> &'static str {
+        let Camera { eye, target, up, .. } = self.camera;
+        let now = UP_AXES.iter().position(|(_, axis)| axis.dot(up) > 0.999);
+        let (name, axis) = UP_AXES[now.map_or(0, |ix| (ix + 1) % UP_AXES.len())];
+        self.camera.eye = target + Quat::from_rotation_arc(up, axis) * (eye - target);
+        self.camera.up = axis;
+        name
     }
 
     /// Returns the world-space vector at the target's distance that spans `x` to the right and `y` down, in heights
@@ -325,6 +370,45 @@ mod tests {
             assert!(apart(controller.camera(), &before) < 1e-3, "and back");
             assert!((controller.camera().height_at(1.0) - before.height_at(1.0)).abs() < 1e-4);
         }
+    }
+
+    #[test]
+    fn the_view_widens_and_narrows_and_the_camera_stays() {
+        for mut controller in [controller(), orthographic()] {
+            let before = *controller.camera();
+            controller.widen(3.0);
+            let share = controller.camera().height_at(2.0) / before.height_at(2.0);
+            assert!((share - WIDER_PER_STEP.powi(3)).abs() < 1e-4, "{share}");
+            assert_eq!(apart(controller.camera(), &before), 0.0);
+            controller.widen(-3.0);
+            assert!((controller.camera().height_at(2.0) / before.height_at(2.0) - 1.0).abs() < 1e-4);
+            for steps in [1e3, -1e3] {
+                controller.widen(steps);
+                let height = controller.camera().height_at(1.0);
+                assert!(height.is_finite() && height > 0.0, "{height}");
+            }
+        }
+    }
+
+    #[test]
+    fn each_axis_can_point_up() {
+        let mut controller = controller();
+        let start = *controller.camera();
+        let offset = |camera: &Camera| camera.eye - camera.target;
+        let names: Vec<_> = (0..6)
+            .map(|_| {
+                let name = controller.change_up();
+                let camera = controller.camera();
+                let height = offset(camera).dot(camera.up);
+                assert!((height - offset(&start).dot(start.up)).abs() < 1e-4, "as far above the target as before");
+                assert!((offset(camera).length() - offset(&start).length()).abs() < 1e-4);
+                assert_eq!(camera.target, start.target);
+                name
+            })
+            .collect();
+        assert_eq!(names, ["+z", "+x", "-y", "-z", "-x", "+y"]);
+        controller.camera.up = vec3(0.6, 0.8, 0.0);
+        assert_eq!(controller.change_up(), "+y", "first the axis that most scenes have");
     }
 
     #[test]

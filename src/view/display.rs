@@ -10,8 +10,10 @@ use super::{
     error::ViewError,
     history::{Moving, Percentiles},
     loaded_scene::LoadedScene,
+    opened::Opener,
     panel::Settings,
     reload::{Reloader, Wake},
+    saver::Saver,
     script::Script,
     session::Session,
     tour::Tour,
@@ -32,6 +34,8 @@ pub struct ViewOptions {
     pub screenshot: Option<PathBuf>,
     /// Directory for the pictures of all frames of the tour.
     pub record: Option<PathBuf>,
+    /// Loads the files that the user opens.
+    pub opener: Opener,
     /// Prints text to the terminal.
     pub print: fn(&str),
 }
@@ -92,8 +96,11 @@ impl Display {
     pub fn view(self, loaded: LoadedScene, options: ViewOptions) -> Result<ViewReport, ViewError> {
         let script =
             (options.tour.clone()).map(|tour| Script::new(tour, options.record.clone(), options.screenshot.clone()));
-        let reloader = Reloader::new(loaded.path.clone(), loaded.load_options.clone(), self.event_loop.create_proxy());
-        let session = Session::new(loaded, options.settings.clone(), script.is_none(), options.print);
+        let reloader = Reloader::new(&loaded, options.opener.clone(), self.event_loop.create_proxy());
+        let proxy = self.event_loop.create_proxy();
+        // An error means that the viewer has ended; then nothing needs to be woken.
+        let saver = Saver::new(move || drop(proxy.send_event(Wake::Saved)));
+        let session = Session::new(loaded, options.settings.clone(), script.is_none(), (options.print, saver));
         let mut app = App::new(session, options, script, reloader);
         self.event_loop.run_app(&mut app).map_err(|error| ViewError::Window(error.to_string()))?;
         app.report()

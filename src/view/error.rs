@@ -1,4 +1,4 @@
-//! Errors that end the viewer, and topics of those that it survives.
+//! Errors that end the viewer.
 
 use super::actions::SaveError;
 use crate::{gpu::GpuError, output::OutputError};
@@ -23,15 +23,4 @@ impl From<SaveError> for ViewError {
             SaveError::Output(error) => Self::Output(error),
         }
     }
-}
-
-/// Topic of an error that does not close the window. A later success on the same topic clears the message.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Topic {
-    Device,
-    Scene,
-    #[cfg(feature = "hot-reload")]
-    Shaders,
-    Settings,
-    File,
 }

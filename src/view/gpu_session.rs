@@ -9,7 +9,7 @@ use super::{
     overlay::{Overlay, OverlayFrame},
 };
 use crate::{
-    engine::choices::{Cache, Choices, Request, Workload},
+    engine::choices::{Cache, Choices, Methods, Request, Workload},
     frame::RenderOptions,
     gpu::{Context, ContextOptions, GpuError, Presenter, WindowHandles},
     passes::Present,
@@ -42,11 +42,7 @@ impl GpuSession {
         vsync: bool,
     ) -> Result<Self, GpuError> {
         let (context, surface) = Context::for_window(device, window)?;
-        // Methods are chosen for pictures in motion, which must be quick and are smaller than the window.
-        let moving = (options.width / 4, options.height / 4);
-        let workload = Workload { size: moving, ..loaded.load_options.workload };
-        let cache = Cache::open();
-        let methods = request.methods(Some(&context), &loaded.world, &workload, &cache)?;
+        let methods = methods_for(&context, loaded, request, (options.width, options.height))?;
         let options = methods.apply(options);
         let presenter = Presenter::new(&context, surface, vsync)?;
         let overlay = Overlay::new(&context, &presenter)?;
@@ -67,6 +63,22 @@ impl GpuSession {
         self.context.wait()?;
         self.renderer = renderer;
         Ok(())
+    }
+
+    /// Replaces the scene by that of another file, from whose camera the next picture is drawn. Chooses traversal and
+    /// primary visibility as [`Self::open`] does; the size of the pictures stays. Returns the options. If it fails, the
+    /// previous scene stays.
+    ///
+    /// # Errors
+    /// The scene exceeds the device's limits or memory.
+    pub fn open_scene(&mut self, loaded: &LoadedScene, options: &RenderOptions) -> Result<RenderOptions, GpuError> {
+        let RenderOptions { width, height, .. } = *self.renderer.options();
+        let methods = methods_for(&self.context, loaded, loaded.load_options.request, (width, height))?;
+        let options = methods.apply(&RenderOptions { width, height, ..options.clone() });
+        let renderer = Renderer::new(self.context.clone(), &loaded.world, &options)?;
+        self.context.wait()?;
+        self.renderer = renderer;
+        Ok(options)
     }
 
     /// Replaces the shaders. If the device refuses them, the previous ones stay.
@@ -110,6 +122,18 @@ impl GpuSession {
             }
         })
     }
+}
+
+/// Chooses traversal and primary visibility for pictures in motion, which must be quick and are smaller than the
+/// window. `window` is the window's size in pixels.
+fn methods_for(
+    context: &Arc<Context>,
+    loaded: &LoadedScene,
+    request: Request,
+    window: (u32, u32),
+) -> Result<Methods, GpuError> {
+    let workload = Workload { size: (window.0 / 4, window.1 / 4), ..loaded.load_options.workload };
+    request.methods(Some(context), &loaded.world, &workload, &Cache::open())
 }
 
 impl Drop for GpuSession {

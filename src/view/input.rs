@@ -26,6 +26,8 @@ pub enum Action {
     FrameScene,
     /// Moves the camera back to where it started.
     GoHome,
+    /// Makes another axis point up in the picture.
+    ChangeUp,
     TogglePanel,
     /// Shows or hides the list of keys.
     ToggleKeys,
@@ -119,6 +121,7 @@ impl Input {
             KeyCode::KeyP => Some(Action::PrintCamera),
             KeyCode::KeyF => Some(Action::FrameScene),
             KeyCode::Home => Some(Action::GoHome),
+            KeyCode::KeyU => Some(Action::ChangeUp),
             KeyCode::KeyH | KeyCode::F1 => Some(Action::ToggleKeys),
             KeyCode::Tab => Some(Action::TogglePanel),
             KeyCode::Escape => Some(Action::Quit),
@@ -187,6 +190,10 @@ fn press_symbol(symbol: &str, is_repeat: bool, controller: &mut Controller) -> O
     match symbol {
         "+" | "=" => controller.flight.change_speed(1.0),
         "-" => controller.flight.change_speed(-1.0),
+        "," | "." => {
+            controller.widen(if symbol == "." { 1.0 } else { -1.0 });
+            return Some(InputEffect { action: None, moves: true });
+        }
         "?" if is_repeat => {}
         "?" => return Some(InputEffect { action: Some(Action::ToggleKeys), moves: false }),
         _ => return None,
@@ -298,13 +305,20 @@ mod tests {
     }
 
     #[test]
-    fn symbols_change_the_speed_and_show_the_keys() {
+    fn symbols_change_speed_and_field_of_view_and_show_the_keys() {
         let mut controller = controller();
         let speed = controller.flight.speed();
         press_symbol("+", false, &mut controller);
         assert!(controller.flight.speed() > speed);
         press_symbol("-", true, &mut controller);
         assert!((controller.flight.speed() - speed).abs() < 1e-6);
+        let height = controller.camera().height_at(1.0);
+        let moves = Some(InputEffect { action: None, moves: true });
+        assert_eq!(press_symbol(".", true, &mut controller), moves);
+        assert!(controller.camera().height_at(1.0) > height);
+        assert_eq!(press_symbol(",", false, &mut controller), moves);
+        assert!((controller.camera().height_at(1.0) - height).abs() < 1e-5);
+        assert_eq!(tap(&mut Input::default(), &mut controller, KeyCode::KeyU), Some(Action::ChangeUp));
         let shows = Some(InputEffect { action: Some(Action::ToggleKeys), moves: false });
         assert_eq!(press_symbol("?", false, &mut controller), shows);
         assert_eq!(press_symbol("?", true, &mut controller), Some(InputEffect::default()));

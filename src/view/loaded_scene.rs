@@ -1,4 +1,4 @@
-//! A loaded scene with its acceleration structure, before it is uploaded to a device.
+//! A loaded scene with its acceleration structure, before it is uploaded to a device; or an empty one in its place.
 
 use std::{
     path::{Path, PathBuf},
@@ -10,8 +10,8 @@ use glam::Vec3;
 use crate::{
     accel::Statistics,
     engine::choices::{ChosenAccel, Processor, Request, Workload},
-    scene::{self, Scene, SceneError},
-    world::{FlatScene, World},
+    scene::{self, Camera, Projection, RenderDefaults, Scene, SceneError},
+    world::{FlatScene, Textures, World},
 };
 
 /// The inputs to the choice of an acceleration structure. They stay the same each time that the scene is read.
@@ -29,8 +29,8 @@ pub struct LoadOptions {
 
 /// A scene and its acceleration structure.
 pub struct LoadedScene {
-    /// The scene's file.
-    pub path: PathBuf,
+    /// The scene's file; none while no file is open.
+    pub path: Option<PathBuf>,
     /// The scene with its structure.
     pub world: World,
     /// The structure that was chosen.
@@ -66,7 +66,40 @@ impl LoadedScene {
         let world = World::with_accel(flat, &accel.options(processor)).expect("a material for each triangle");
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
         let statistics = world.statistics();
-        Self { path: path.to_owned(), world, accel, load_options: load_options.clone(), statistics, build_ms }
+        let path = Some(path.to_owned());
+        Self { path, world, accel, load_options: load_options.clone(), statistics, build_ms }
+    }
+
+    /// Returns a scene without triangles, in the place of one, while no file is open.
+    pub fn none(load_options: &LoadOptions) -> Self {
+        let flat = FlatScene {
+            name: String::new(),
+            triangles: Vec::new(),
+            triangle_materials: Vec::new(),
+            materials: Vec::new(),
+            material_names: Vec::new(),
+            textures: Textures::default(),
+            lights: Vec::new(),
+            camera: Camera {
+                eye: Vec3::Z,
+                target: Vec3::ZERO,
+                up: Vec3::Y,
+                projection: Projection::Perspective { vertical_fov_degrees: 40.0 },
+            },
+            ambient: Vec3::ZERO,
+            background: Vec3::splat(0.02),
+            defaults: RenderDefaults::default(),
+        };
+        let &LoadOptions { request, processor, workload, .. } = load_options;
+        let accel = request.choose_accel(processor, 0, &workload);
+        let world = World::with_accel(flat, &accel.options(processor)).expect("a material for each of no triangles");
+        let statistics = world.statistics();
+        Self { path: None, world, accel, load_options: load_options.clone(), statistics, build_ms: 0.0 }
+    }
+
+    /// Returns whether a file is open.
+    pub fn is_open(&self) -> bool {
+        self.path.is_some()
     }
 
     /// Returns the scene.
@@ -74,8 +107,9 @@ impl LoadedScene {
         self.world.scene()
     }
 
-    /// Returns the minimum and the maximum corner of the scene, world space.
+    /// Returns the minimum and the maximum corner of the scene, world space. Those of a scene without triangles are
+    /// the corners of a cube around the origin.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        self.scene().bounds()
+        if self.scene().triangles.is_empty() { (Vec3::NEG_ONE, Vec3::ONE) } else { self.scene().bounds() }
     }
 }

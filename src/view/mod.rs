@@ -12,12 +12,15 @@ mod gpu_session;
 pub mod history;
 mod input;
 pub mod loaded_scene;
+mod message;
 mod mouse;
+mod opened;
 mod overlay;
 mod pace;
 pub mod panel;
 pub mod pick;
 mod reload;
+mod saver;
 mod script;
 mod session;
 #[cfg(feature = "hot-reload")]
@@ -30,6 +33,7 @@ pub use self::{
     display::{Display, PaceReport, ViewOptions, ViewReport},
     error::ViewError,
     loaded_scene::{LoadOptions, LoadedScene},
+    opened::{Opened, Opener},
     panel::Settings,
     tour::Tour,
 };

@@ -1,13 +1,19 @@
-//! Reloads the scene when its files change, while the previous version stays on screen.
+//! Reloads the scene when its files change and opens other files, while the previous scene stays on screen.
 
-use std::{collections::BTreeSet, path::PathBuf, thread, time::Instant};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+    thread,
+    time::Instant,
+};
 
 use winit::event_loop::EventLoopProxy;
 
 use super::{
-    error::Topic,
     gpu_session::GpuSession,
     loaded_scene::{LoadOptions, LoadedScene},
+    message::Topic,
+    opened::{Opened, Opener},
     session::Session,
     watch::Watch,
 };
@@ -19,6 +25,10 @@ pub enum Wake {
     Changed,
     /// The scene was read again, or could not be read.
     Reloaded(Box<Result<LoadedScene, SceneError>>),
+    /// A picture was written, or could not be written.
+    Saved,
+    /// A file that the user opens was loaded, or could not be loaded.
+    Opened(Box<Result<Opened, String>>),
     /// A shader has changed.
     #[cfg(feature = "hot-reload")]
     ShadersChanged,
@@ -48,31 +58,40 @@ impl OneAtATime {
     }
 }
 
-/// Watches the scene's files and reads them again on a thread of its own.
+/// Watches the scene's files and reads them again on a thread of its own. Loads files that the user opens there, too.
 pub struct Reloader {
-    path: PathBuf,
+    /// The scene's file; none while no file is open.
+    path: Option<PathBuf>,
     load_options: LoadOptions,
     /// All files that the scene has named so far.
     files: BTreeSet<PathBuf>,
     proxy: EventLoopProxy<Wake>,
     /// None if the system refuses to watch.
     _watch: Option<Watch>,
+    opener: Opener,
     loading: OneAtATime,
+    /// Whether a file of the scene has changed since the last reading began.
+    is_changed: bool,
+    /// The file that the user has opened last, until its loading begins.
+    to_open: Option<PathBuf>,
     #[cfg(feature = "hot-reload")]
     pub shaders: super::shaders::Shaders,
 }
 
 impl Reloader {
-    pub fn new(path: PathBuf, load_options: LoadOptions, proxy: EventLoopProxy<Wake>) -> Self {
+    pub fn new(loaded: &LoadedScene, opener: Opener, proxy: EventLoopProxy<Wake>) -> Self {
         let mut reloader = Self {
-            path,
-            load_options,
+            path: loaded.path.clone(),
+            load_options: loaded.load_options.clone(),
             files: BTreeSet::new(),
             #[cfg(feature = "hot-reload")]
             shaders: super::shaders::Shaders::new(proxy.clone()),
             proxy,
             _watch: None,
+            opener,
             loading: OneAtATime::default(),
+            is_changed: false,
+            to_open: None,
         };
         reloader.watch();
         reloader
@@ -81,8 +100,9 @@ impl Reloader {
     /// Watches the files that the scene names now, and those that it has named before. The latter matter while the
     /// scene cannot be read.
     fn watch(&mut self) {
+        let Some(path) = &self.path else { return };
         let n_known = self.files.len();
-        self.files.extend(source_files_with(&self.path, &self.load_options.scene));
+        self.files.extend(source_files_with(path, &self.load_options.scene));
         if self.files.len() == n_known {
             return;
         }
@@ -96,18 +116,54 @@ impl Reloader {
 
     /// Starts to read the scene again. If a reading is under way, another one starts when it has ended.
     pub fn load(&mut self) {
-        if self.loading.begin() {
-            let (path, load_options, proxy) = (self.path.clone(), self.load_options.clone(), self.proxy.clone());
-            let load = move || Box::new(LoadedScene::load(&path, &load_options));
-            thread::spawn(move || drop(proxy.send_event(Wake::Reloaded(load()))));
+        self.is_changed = true;
+        self.start();
+    }
+
+    /// Starts to load another file, or does so when the reading that is under way has ended. Of several files, the
+    /// last is loaded.
+    pub fn open(&mut self, path: &Path) {
+        self.to_open = Some(path.to_owned());
+        self.start();
+    }
+
+    fn start(&mut self) {
+        if !self.loading.begin() {
+            return;
         }
+        let proxy = self.proxy.clone();
+        let load: Box<dyn FnOnce() -> Wake + Send> = match (self.to_open.take(), self.path.clone()) {
+            (Some(path), _) => {
+                let opener = self.opener.clone();
+                Box::new(move || Wake::Opened(Box::new(opener(&path))))
+            }
+            (None, Some(path)) => {
+                self.is_changed = false;
+                let load_options = self.load_options.clone();
+                Box::new(move || Wake::Reloaded(Box::new(LoadedScene::load(&path, &load_options))))
+            }
+            (None, None) => {
+                self.loading.end();
+                return;
+            }
+        };
+        // An error means that the viewer has ended; then nothing needs to be woken.
+        thread::spawn(move || drop(proxy.send_event(load())));
+    }
+
+    /// Follows the changes of another scene's files from now on.
+    pub fn follow(&mut self, loaded: &LoadedScene) {
+        self.path.clone_from(&loaded.path);
+        self.load_options.clone_from(&loaded.load_options);
+        self.files.clear();
+        self.is_changed = false;
     }
 
     /// Notes that a reading has ended, and starts the one that is due.
     pub fn done(&mut self) {
         self.watch();
-        if self.loading.end() {
-            self.load();
+        if self.loading.end() || self.is_changed {
+            self.start();
         }
     }
 }

@@ -5,13 +5,14 @@ use std::time::Instant;
 use super::{
     budget::{Budget, PART_MS, differs_by_two},
     controller::Controller,
-    error::Topic,
     gpu_session::GpuSession,
     history::{FrameRecord, History},
     loaded_scene::LoadedScene,
+    message::{Message, Topic},
     pace::Pace,
     panel::{Facts, Settings},
     pick::Picked,
+    saver::Saver,
 };
 use crate::{
     accel::Statistics,
@@ -45,8 +46,8 @@ pub struct Session {
     /// All frames, without the times of their passes.
     pub all_frames: History,
     /// Budget of views that need all rays, then of views that need primary rays only.
-    budgets: [Budget; 2],
-    profile: Profile,
+    pub(super) budgets: [Budget; 2],
+    pub(super) profile: Profile,
     /// Whether a user moves the camera. Then a new picture is first drawn small, so that it is shown at once. With a
     /// script, only frames in which the camera moves are drawn small: see `Script::direct`.
     is_interactive: bool,
@@ -55,7 +56,7 @@ pub struct Session {
     /// Whether the last frame completed a sample.
     has_new_sample: bool,
     /// Maximum width and maximum height of all pictures so far, pixels. The buffers are large enough for them.
-    room: (u32, u32),
+    pub(super) room: (u32, u32),
     /// Size of the window for which the last frame was drawn, pixels.
     window: (u32, u32),
     /// Time spent so far on the sample that is being drawn, milliseconds.
@@ -66,12 +67,19 @@ pub struct Session {
     pub(super) is_save_due: bool,
     /// Prints text to the terminal.
     pub(super) print: fn(&str),
-    message: Option<(Topic, String)>,
+    pub(super) saver: Saver,
+    pub(super) message: Option<Message>,
     start: Instant,
 }
 
 impl Session {
-    pub fn new(loaded: LoadedScene, settings: Settings, is_interactive: bool, print: fn(&str)) -> Self {
+    /// Creates the state of a viewer that prints to the terminal with `print` and saves pictures with `saver`.
+    pub fn new(
+        loaded: LoadedScene,
+        settings: Settings,
+        is_interactive: bool,
+        (print, saver): (fn(&str), Saver),
+    ) -> Self {
         Self {
             controller: Controller::new(loaded.scene().camera, loaded.bounds()),
             budgets: [(); 2].map(|()| Budget::new(settings.budget_ms)),
@@ -90,6 +98,7 @@ impl Session {
             picked: None,
             is_save_due: false,
             print,
+            saver,
             message: None,
             start: Instant::now(),
         }
@@ -118,9 +127,10 @@ impl Session {
     }
 
     /// Returns the number of samples per pixel with which the view is complete. Views of primary hits need a single
-    /// sample.
+    /// sample, and so does the background while no file is open.
     fn n_wanted(&self) -> u32 {
-        if self.settings.view.needs_primary_rays_only() { 1 } else { self.settings.max_samples }
+        let needs_one = self.settings.view.needs_primary_rays_only() || !self.loaded.is_open();
+        if needs_one { 1 } else { self.settings.max_samples }
     }
 
     /// Returns the budget of the current view.
@@ -302,18 +312,18 @@ impl Session {
             history: &self.history,
             memory: gpu.context.memory(),
             picked: self.picked.as_ref(),
-            message: self.message.as_ref().map(|(_, message)| &**message),
+            message: self.message.as_ref(),
         }
     }
 
     /// Shows an error in the overlay, in place of the last one, and on the terminal.
     pub fn show_error(&mut self, topic: Topic, message: &str) {
         tracing::warn!("{message}");
-        self.message = Some((topic, message.to_owned()));
+        self.message = Some(Message::error(topic, message));
     }
 
     /// Clears the overlay's message if it is about this topic, which works again.
     pub fn clear_message(&mut self, topic: Topic) {
-        self.message.take_if(|(wrong, _)| *wrong == topic);
+        self.message.take_if(|message| message.topic == topic);
     }
 }

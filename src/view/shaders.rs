@@ -14,8 +14,8 @@ use tempfile::TempDir;
 use winit::event_loop::EventLoopProxy;
 
 use super::{
-    error::Topic,
     gpu_session::GpuSession,
+    message::Topic,
     reload::{OneAtATime, Wake},
     session::Session,
     watch::Watch,

@@ -13,7 +13,7 @@ use winit::{
 use super::overlay::OverlayFrame;
 use super::{
     gpu_session::GpuSession,
-    panel::{self, Facts, Layers, Settings},
+    panel::{self, Edited, Facts, Layers},
     session::Session,
 };
 
@@ -73,11 +73,11 @@ impl Ui {
         self.repaint_after
     }
 
-    /// Lays out the overlay and applies the user's changes to `settings`.
-    pub fn layout(&mut self, window: &Window, layers: Layers, settings: &mut Settings, facts: &Facts) -> Layout {
+    /// Lays out the overlay and applies the user's changes to `edited`.
+    pub fn layout(&mut self, window: &Window, layers: Layers, edited: &mut Edited, facts: &Facts) -> Layout {
         let input = self.state.take_egui_input(window);
         let context = self.state.egui_ctx().clone();
-        let output = context.run_ui(input, |ui| panel::show(ui, layers, settings, facts));
+        let output = context.run_ui(input, |ui| panel::show(ui, layers, edited, facts));
         self.state.handle_platform_output(window, output.platform_output);
         let root = output.viewport_output.get(&ViewportId::ROOT);
         self.repaint_after = root.map_or(Duration::MAX, |viewport| viewport.repaint_delay);
@@ -87,7 +87,7 @@ impl Ui {
     }
 }
 
-/// Lays out the overlay of the session's picture and applies the user's changes to the session's settings.
+/// Lays out the overlay of the session's picture and applies the user's changes to the session's settings and camera.
 pub fn lay_out(
     session: &mut Session,
     gpu: &GpuSession,
@@ -95,12 +95,19 @@ pub fn lay_out(
     is_flying: bool,
 ) -> Layout {
     let size = window.inner_size();
-    let mut settings = session.settings.clone();
+    let projection = session.controller.camera().projection;
+    let mut edited = Edited { settings: session.settings.clone(), projection };
     let facts = session.facts(gpu, (size.width, size.height), is_flying);
-    let layout = ui.layout(window, layers, &mut settings, &facts);
-    if settings != session.settings {
-        session.pace.note_input(Instant::now());
-        session.settings = settings;
+    let layout = ui.layout(window, layers, &mut edited, &facts);
+    let now = Instant::now();
+    if edited.settings != session.settings {
+        session.pace.note_input(now);
+        session.settings = edited.settings;
+    }
+    if edited.projection != projection {
+        session.pace.note_input(now);
+        session.pace.moved(now);
+        session.controller.set_projection(edited.projection);
     }
     layout
 }

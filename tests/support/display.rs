@@ -3,14 +3,24 @@
 use std::{
     fs,
     io::{BufRead, BufReader},
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     thread,
     time::{Duration, Instant},
 };
 
 use tempfile::TempDir;
-use x11rb::protocol::xproto::{ClientMessageEvent, ConnectionExt, EventMask};
+use x11rb::{
+    connection::Connection,
+    protocol::{
+        Event,
+        xproto::{
+            ClientMessageEvent, ConnectionExt, CreateWindowAux, EventMask, PropMode, SELECTION_NOTIFY_EVENT,
+            SelectionNotifyEvent, WindowClass,
+        },
+    },
+    wrapper::ConnectionExt as _,
+};
 
 /// Longer than any picture takes to appear on a busy machine.
 pub const PATIENCE: Duration = Duration::from_secs(120);
@@ -87,6 +97,52 @@ impl Display {
         connection.send_event(false, window, EventMask::NO_EVENT, message).unwrap();
         // The server may drop what it has not read yet when a connection ends, so the test waits for a reply.
         connection.get_input_focus().unwrap().reply().expect("a reply after the message");
+    }
+
+    /// Drops a file on a window as a file manager does, by the protocol XDND, and waits until the window has taken it.
+    pub fn drop_file(&self, window: &str, file: &Path) {
+        let (connection, screen_ix) = x11rb::connect(Some(&self.name)).expect("a connection to Xvfb");
+        let atom = |name: &str| connection.intern_atom(false, name.as_bytes()).unwrap().reply().unwrap().atom;
+        let target: u32 = window.parse().expect("a window's id");
+        let source = connection.generate_id().unwrap();
+        let (root, look) = (connection.setup().roots[screen_ix].root, &CreateWindowAux::new());
+        connection.create_window(0, source, root, 0, 0, 1, 1, 0, WindowClass::INPUT_ONLY, 0, look).unwrap();
+        connection.set_selection_owner(source, atom("XdndSelection"), x11rb::CURRENT_TIME).unwrap();
+        let send = |name: &str, data: [u32; 4]| {
+            let data = [source, data[0], data[1], data[2], data[3]];
+            let message = ClientMessageEvent::new(32, target, atom(name), data);
+            connection.send_event(false, target, EventMask::NO_EVENT, message).unwrap();
+            connection.flush().unwrap();
+        };
+        send("XdndEnter", [5 << 24, atom("text/uri-list"), 0, 0]);
+        send("XdndPosition", [0, 1 << 16 | 1, x11rb::CURRENT_TIME, atom("XdndActionCopy")]);
+        let start = Instant::now();
+        loop {
+            match connection.poll_for_event().unwrap() {
+                Some(Event::SelectionRequest(request)) => {
+                    let list = format!("file://{}\r\n", file.display());
+                    let (mode, of) = (PropMode::REPLACE, request.requestor);
+                    connection.change_property8(mode, of, request.property, request.target, list.as_bytes()).unwrap();
+                    let notice = SelectionNotifyEvent {
+                        response_type: SELECTION_NOTIFY_EVENT,
+                        sequence: 0,
+                        time: request.time,
+                        requestor: of,
+                        selection: request.selection,
+                        target: request.target,
+                        property: request.property,
+                    };
+                    connection.send_event(false, of, EventMask::NO_EVENT, notice).unwrap();
+                    send("XdndDrop", [0, x11rb::CURRENT_TIME, 0, 0]);
+                }
+                Some(Event::ClientMessage(message)) if message.type_ == atom("XdndFinished") => return,
+                Some(_) => {}
+                None => {
+                    assert!(start.elapsed() < PATIENCE, "the window took no file");
+                    thread::sleep(Duration::from_millis(5));
+                }
+            }
+        }
     }
 
     /// Waits for the window of a name and gives it the keyboard focus, since there is no window manager that would.

@@ -5,6 +5,7 @@
 mod support;
 
 mod failures;
+mod files;
 mod slow;
 
 use std::{
@@ -31,7 +32,12 @@ fn viewer(directory: &Path, display: &Display, scene: &str, more: &[&str]) -> Ch
 
 /// Starts a viewer of a scene on the display, in a window whose size is among the arguments.
 fn viewer_of_size(directory: &Path, display: &Display, scene: &str, more: &[&str]) -> Child {
-    let mut command = kdray(directory, &[&["view", scene, "--validate"], more].concat());
+    started(directory, display, &[&[scene], more].concat())
+}
+
+/// Starts a viewer on the display.
+fn started(directory: &Path, display: &Display, arguments: &[&str]) -> Child {
+    let mut command = kdray(directory, &[&["view", "--validate"], arguments].concat());
     command.env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY").stdout(Stdio::piped()).stderr(Stdio::piped());
     command.spawn().unwrap()
 }
@@ -155,7 +161,8 @@ fn the_window_shows_the_picture_and_the_overlay_over_it() {
     display.wait_until("the picture again", |screen| picture.is_shown_on(screen));
     display.act(&["key", "s", "key", "p", "key", "Escape"]);
     let output = ended(viewer);
-    assert!(stdout(&output).contains("wrote cornell-001.png\n[camera]\neye = [0.0, 2.75, 10.7]\n"));
+    let text = stdout(&output);
+    assert!(text.contains("[camera]\neye = [0.0, 2.75, 10.7]\n") && text.contains("wrote cornell-001.png\n"), "{text}");
     assert_eq!(Screen::load(&directory.path().join("cornell-001.png")), picture);
 }
 
@@ -166,7 +173,7 @@ fn keys_and_mouse_move_the_camera_and_home_brings_it_back() {
     let viewer = viewer(directory.path(), &display, &cornell(), &["--spp", "1", "--no-overlay", "-q"]);
     display.wait_until("the picture", |screen| picture.is_shown_on(screen));
     display.focus("kdray");
-    let moves: [&[&str]; 7] = [
+    let moves: [&[&str]; 9] = [
         &["keydown", "w", "sleep", "0.3", "keyup", "w"],
         &["mousemove", "80", "60", "mousedown", "1", "mousemove", "120", "60", "mouseup", "1"],
         &["mousemove", "80", "60", "mousedown", "3", "mousemove", "120", "60", "mouseup", "3"],
@@ -174,6 +181,8 @@ fn keys_and_mouse_move_the_camera_and_home_brings_it_back() {
         &["keydown", "shift", "mousedown", "1", "mousemove", "80", "60", "mouseup", "1", "keyup", "shift"],
         &["mousemove", "80", "60", "click", "4"],
         &["key", "f"],
+        &["key", "period"],
+        &["key", "u"],
     ];
     for arguments in moves {
         display.act(arguments);

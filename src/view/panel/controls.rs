@@ -2,23 +2,26 @@
 
 use std::fmt::Display;
 
-use egui::{ComboBox, Grid, Slider, Ui};
+use egui::{ComboBox, DragValue, Grid, Slider, SliderClamping, Ui};
 
 use super::Settings;
 use crate::{
     accel::{AccelKind, kdtree::Traversal},
     frame::{Denoise, Primary, Tonemap, View},
+    scene::Projection,
+    view::controller::FOV_DEGREES,
 };
 
 /// Shows the controls. Changes take effect with the next frame. `accel` is the structure in use: only a kd-tree has a
 /// choice of traversals.
-pub fn show(ui: &mut Ui, settings: &mut Settings, accel: AccelKind) {
+pub fn show(ui: &mut Ui, settings: &mut Settings, projection: &mut Projection, accel: AccelKind) {
     Grid::new("controls").num_columns(2).spacing([10.0, 3.0]).show(ui, |ui| {
         let Settings { options, max_samples, budget_ms, vsync, view, gain } = settings;
         choice(ui, "view", view, View::ALL);
         if matches!(view, View::Depth | View::Cost | View::Rays) {
             row(ui, "brightness", |ui| ui.add(Slider::new(gain, 0.01..=100.0).logarithmic(true)));
         }
+        lens(ui, projection);
         row(ui, "max depth", |ui| ui.add(Slider::new(&mut options.max_depth, 1..=16)));
         row(ui, "samples", |ui| ui.add(Slider::new(max_samples, 1..=4096).logarithmic(true)));
         row(ui, "exposure", |ui| ui.add(Slider::new(&mut options.exposure, 0.01..=100.0).logarithmic(true)));
@@ -31,6 +34,28 @@ pub fn show(ui: &mut Ui, settings: &mut Settings, accel: AccelKind) {
         row(ui, "budget, ms", |ui| ui.add(Slider::new(budget_ms, 1.0..=200.0).logarithmic(true)));
         row(ui, "vsync", |ui| ui.checkbox(vsync, ""));
     });
+}
+
+/// Shows the slider of a perspective camera's field of view, or of an orthographic camera's height.
+fn lens(ui: &mut Ui, projection: &mut Projection) {
+    match projection {
+        Projection::Perspective { vertical_fov_degrees: degrees } => {
+            row(ui, "field of view", |ui| {
+                // A scene's own field of view may be beyond the slider's ends. It is kept until the slider is moved.
+                let slider = Slider::new(degrees, FOV_DEGREES).clamping(SliderClamping::Edits);
+                ui.add(slider.suffix("\u{b0}").max_decimals(1))
+            });
+        }
+        Projection::Orthographic { height } => {
+            row(ui, "height", |ui| ui.add(drag(height)));
+        }
+    }
+}
+
+/// Returns a field in which a length is dragged by a share of itself.
+fn drag(length: &mut f32) -> DragValue<'_> {
+    let speed = 0.01 * *length;
+    DragValue::new(length).speed(speed).range(1e-6..=1e9).clamp_existing_to_range(false)
 }
 
 fn row<R>(ui: &mut Ui, name: &str, control: impl FnOnce(&mut Ui) -> R) {

@@ -3,7 +3,7 @@
 use egui::{Align2, Area, Color32, Frame, Grid, Id, Order, RichText, ScrollArea, Ui, Window, vec2};
 
 /// Keys and mouse actions, each with its effect. docs/guide.md has the same rows.
-pub const KEYS: [(&str, &str); 14] = [
+pub const KEYS: [(&str, &str); 16] = [
     ("left drag, right drag", "go around the target, look around"),
     ("middle drag, Shift + left drag", "move sideways, up and down"),
     ("wheel", "nearer, farther, to where the mouse points"),
@@ -12,6 +12,8 @@ pub const KEYS: [(&str, &str); 14] = [
     ("Shift, Ctrl", "fly faster, slower, as long as it is held"),
     ("+ -, Ctrl or Alt + wheel", "fly faster, slower from now on"),
     ("F, Home", "frame the scene, back to the start"),
+    (", .", "narrower, wider field of view; less, more height"),
+    ("U", "another axis points up: +z, +x, -y, -z, -x, +y"),
     ("1, 2 3 4", "picture; depth, normals, triangles: primary rays only"),
     ("5, 6", "steps, rays: sums over all rays, slow as the picture"),
     ("P", "print the camera as a scene file has it"),

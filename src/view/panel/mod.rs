@@ -5,16 +5,20 @@ mod graph;
 mod keys;
 mod tables;
 
-use egui::{Color32, CornerRadius, Frame, Margin, RichText, ScrollArea, Ui, Window};
+use std::time::Instant;
+
+use egui::{Align2, Area, Color32, CornerRadius, Frame, Id, Margin, RichText, ScrollArea, Ui, Window};
 
 use super::{
     history::{History, Percentiles},
     loaded_scene::LoadedScene,
+    message::Message,
     pick::Picked,
 };
 use crate::{
     frame::{Profile, RenderOptions, View},
     gpu::MemoryUse,
+    scene::Projection,
 };
 
 /// Width of the panel, points.
@@ -37,6 +41,15 @@ pub struct Settings {
     pub gain: f32,
 }
 
+/// What the panel's controls change.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Edited {
+    /// The settings.
+    pub settings: Settings,
+    /// The camera's projection.
+    pub projection: Projection,
+}
+
 /// The parts of the overlay that are shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layers {
@@ -46,12 +59,16 @@ pub struct Layers {
     pub keys: bool,
     /// The hint that names the key for the list.
     pub hint: bool,
+    /// Messages while the panel is hidden. Each is shown for a few seconds.
+    pub messages: bool,
+    /// The window's contents while no file is open: what to do, and the last message.
+    pub start: bool,
 }
 
 impl Layers {
     /// Returns whether any part is shown.
     pub fn any(self) -> bool {
-        self.panel || self.keys || self.hint
+        self.panel || self.keys || self.hint || self.messages || self.start
     }
 }
 
@@ -85,19 +102,24 @@ pub struct Facts<'a> {
     pub memory: Vec<MemoryUse>,
     /// The rays of the pixel that was clicked last.
     pub picked: Option<&'a Picked>,
-    /// The last error, unless a later success on the same topic has cleared it.
-    pub message: Option<&'a str>,
+    /// The last message, unless a later success on the same topic has cleared it.
+    pub message: Option<&'a Message>,
 }
 
-/// Lays out the overlay and applies the user's changes to `settings`.
-pub fn show(ui: &mut Ui, layers: Layers, settings: &mut Settings, facts: &Facts) {
+/// Lays out the overlay and applies the user's changes to `edited`.
+pub fn show(ui: &mut Ui, layers: Layers, edited: &mut Edited, facts: &Facts) {
     let style = ui.ctx().global_style();
     let frame = Frame::window(&style)
         .fill(Color32::from_black_alpha(200))
         .corner_radius(CornerRadius::same(4))
         .inner_margin(Margin::same(8));
     if layers.panel {
-        panel(ui, frame, settings, facts);
+        panel(ui, frame, edited, facts);
+    } else if layers.messages {
+        message_alone(ui, frame, facts);
+    }
+    if layers.start {
+        start(ui, facts);
     }
     if layers.keys {
         keys::show(ui, frame);
@@ -106,7 +128,7 @@ pub fn show(ui: &mut Ui, layers: Layers, settings: &mut Settings, facts: &Facts)
     }
 }
 
-fn panel(ui: &mut Ui, frame: Frame, settings: &mut Settings, facts: &Facts) {
+fn panel(ui: &mut Ui, frame: Frame, edited: &mut Edited, facts: &Facts) {
     Window::new("kdray").frame(frame).default_pos([8.0, 8.0]).default_width(WIDTH).resizable([false, false]).show(
         ui.ctx(),
         |ui| {
@@ -115,14 +137,14 @@ fn panel(ui: &mut Ui, frame: Frame, settings: &mut Settings, facts: &Facts) {
             ScrollArea::vertical()
                 .max_height(room.max(80.0))
                 .min_scrolled_height(room.max(80.0))
-                .show(ui, |ui| sections(ui, settings, facts));
+                .show(ui, |ui| sections(ui, edited, facts));
         },
     );
 }
 
-fn sections(ui: &mut Ui, settings: &mut Settings, facts: &Facts) {
-    if let Some(message) = facts.message {
-        ui.label(RichText::new(message).color(Color32::LIGHT_RED));
+fn sections(ui: &mut Ui, edited: &mut Edited, facts: &Facts) {
+    if let Some(message) = facts.message.filter(|message| message.is_error || is_fresh(ui, message)) {
+        message_label(ui, message);
         ui.separator();
     }
     status(ui, facts);
@@ -130,10 +152,44 @@ fn sections(ui: &mut Ui, settings: &mut Settings, facts: &Facts) {
         section(ui, "Pixel", true, |ui| tables::picked(ui, picked));
     }
     section(ui, "Passes", true, |ui| graph::show(ui, facts.history, facts.profile));
-    section(ui, "Picture", true, |ui| controls::show(ui, settings, facts.loaded.world.accel().kind()));
+    section(ui, "Picture", true, |ui| {
+        controls::show(ui, &mut edited.settings, &mut edited.projection, facts.loaded.world.accel().kind());
+    });
     section(ui, "Rays", true, |ui| tables::rays(ui, facts.profile));
     section(ui, "Acceleration structure", false, |ui| tables::accel(ui, facts.loaded));
     section(ui, "Memory", false, |ui| tables::memory(ui, &facts.memory));
+}
+
+/// Shows what to do while no file is open, and the last message below it.
+fn start(ui: &Ui, facts: &Facts) {
+    let middle = Area::new(Id::new("start")).anchor(Align2::CENTER_CENTER, [0.0, 0.0]).interactable(false);
+    middle.show(ui.ctx(), |ui| {
+        ui.set_max_width(0.9 * ui.ctx().content_rect().width());
+        ui.vertical_centered(|ui| {
+            ui.label(RichText::new("Drop a glTF, OBJ, PLY, STL or scene file here").size(18.0).strong());
+            if let Some(message) = facts.message {
+                message_label(ui, message);
+            }
+        });
+    });
+}
+
+/// Shows a recent message in the picture's lower left corner.
+fn message_alone(ui: &Ui, frame: Frame, facts: &Facts) {
+    let Some(message) = facts.message.filter(|message| is_fresh(ui, message)) else { return };
+    let corner = Area::new(Id::new("message")).anchor(Align2::LEFT_BOTTOM, [8.0, -8.0]).interactable(false);
+    corner.show(ui.ctx(), |ui| frame.show(ui, |ui| message_label(ui, message)));
+}
+
+/// Returns whether a message is recent. If it is, the overlay is laid out again once it is not any more.
+fn is_fresh(ui: &Ui, message: &Message) -> bool {
+    let left = message.time_left(Instant::now());
+    left.inspect(|left| ui.ctx().request_repaint_after(*left)).is_some()
+}
+
+fn message_label(ui: &mut Ui, message: &Message) {
+    let color = if message.is_error { Color32::LIGHT_RED } else { Color32::LIGHT_GREEN };
+    ui.label(RichText::new(&message.text).color(color));
 }
 
 fn section(ui: &mut Ui, name: &str, is_open: bool, body: impl FnOnce(&mut Ui)) {
