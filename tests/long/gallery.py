@@ -58,7 +58,9 @@ def render(kdray, path, name, size, seconds, options):
         command = [kdray, "render", str(path.resolve()), "--size", size, "-o", str(picture), *options]
         start = time.monotonic()
         try:
-            done = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=seconds, check=False)
+            done = subprocess.run(
+                command, capture_output=True, text=True, errors="replace", timeout=seconds, check=False
+            )
         except subprocess.TimeoutExpired:
             return Outcome(name, seconds, None, [f"error: took more than {seconds} s"], True)
         took = time.monotonic() - start

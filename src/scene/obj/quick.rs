@@ -138,10 +138,13 @@ mod tests {
 
     #[test]
     fn both_ways_give_the_same_text() {
-        let file = "# made by hand\nmtllib a.mtl\no thing\nv 0 0 0\nv 1.5 0 -2e-3\r\nv 1 1 0\nv 0 1 0\nvt 0 1\nvt 1 1 0.5\n\
-                    vn 0 0 1\ng part\nusemtl red\nf 1 2 3\ns off\nf -4 -3 -2 -1\nf 1/1 2/2 3/-1 \nf 1//1 2//1 3//-1\nusemtl blue\n\
-                    f 1/1/1 2/2/1 4/2/1\nf 1/1/1 2 3\nl 1 2\nwhat 3\n";
-        let (quick, careful) = (quick_obj(file).unwrap(), clean_obj(file).unwrap());
+        let file = [
+            "# made by hand\nmtllib a.mtl\no thing\nv 0 0 0\nv 1.5 0 -2e-3\r\nv 1 1 0\nv 0 1 0\nvt 0 1\nvt 1 1 0.5\n",
+            "vn 0 0 1\ng part\nusemtl red\nf 1 2 3\ns off\nf -4 -3 -2 -1\nf 1/1 2/2 3/-1 \nf 1//1 2//1 3//-1\n",
+            "usemtl blue\nf 1/1/1 2/2/1 4/2/1\nf 1/1/1 2 3\nl 1 2\nwhat 3\n",
+        ]
+        .concat();
+        let (quick, careful) = (quick_obj(&file).unwrap(), clean_obj(&file).unwrap());
         assert_eq!(text(&quick).replace("vt 1 1 0.5", "vt 1 1"), text(&careful));
         assert_eq!((&quick.libraries, &quick.used_materials), (&careful.libraries, &careful.used_materials));
         assert_eq!((quick.size, quick.colour_scale, &quick.unknown), (careful.size, 1.0, &careful.unknown));
