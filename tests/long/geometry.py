@@ -596,7 +596,7 @@ def deformed(path, is_planted=False):
     armature.pose.bones["bone2"].scale = (1.3, 0.8, 1.0)
     tube.modifiers.new("armature", "ARMATURE").object = armature
     tube.parent = armature
-    armature.location, armature.rotation_euler, armature.scale = (1.0, 2.0, 0.5), (0.3, 0.2, 0.1), (1.0, 1.4, 1.2)
+    armature.location, armature.rotation_euler, armature.scale = (1.0, 2.0, 0.5), (0.3, 0.2, 0.1), (1.0, 1.4, -1.2)
     options = {"export_rest_position_armature": False, "export_skins": True, "export_morph": True}
     bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", **options)
     if is_planted:

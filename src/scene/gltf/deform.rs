@@ -183,7 +183,7 @@ impl Skinning<'_> {
         Ok([position, normal, tangent])
     }
 
-    /// Returns whether the skin mirrors the surface at the vertex with index `ix`.
+    /// Returns whether the skin mirrors the neighbourhood of the vertex with index `ix`.
     pub fn mirrors(&self, ix: usize) -> Checked<bool> {
         Ok(DMat3::from_mat4(self.matrix(ix)?).determinant() < 0.0)
     }

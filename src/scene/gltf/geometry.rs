@@ -29,6 +29,8 @@ pub(super) struct Pose<'a> {
     /// Weights of the morph targets; missing ones are 0.
     pub weights: &'a [f32],
     pub skin: Option<&'a Skin>,
+    /// Whether the order of the faces' corners is reversed.
+    pub is_turned: bool,
 }
 
 /// The vertices of a primitive that its faces use.
@@ -86,8 +88,8 @@ pub(super) fn mesh(document: &Document, part: &Part, pose: Pose, n_read: &mut u6
     let used = renumber(&mut faces);
     let skin = pose.skin.map(|skin| skin.of(&attributes, positions.n)).transpose()?;
     let vertices = attributes.vertices(&positions, &used, pose.weights, skin.as_ref())?;
-    if let Some(skin) = &skin {
-        turn_mirrored(&mut faces, |vertex| skin.mirrors(used[vertex as usize] as usize))?;
+    if pose.is_turned {
+        faces.iter_mut().for_each(|face| face.swap(1, 2));
     }
     let mut mesh = Mesh { slots: vec![slot; faces.len()], ..Mesh::default() };
     // Tangents without normals are ignored, as the specification says.
@@ -239,16 +241,6 @@ impl Vertices {
     }
 }
 
-/// Swaps two corners of the faces that a skin mirrors, so that their outside stays outside.
-fn turn_mirrored(faces: &mut [[u32; 3]], mirrors: impl Fn(u32) -> Checked<bool>) -> Checked<()> {
-    for face in faces {
-        if mirrors(face[0])? {
-            face.swap(1, 2);
-        }
-    }
-    Ok(())
-}
-
 /// Returns a tangent of unit length whose w is 1 or -1, or zero if the tangent has no direction.
 fn unit_tangent(tangent: Vec4) -> Vec4 {
     match tangent.truncate().try_normalize() {
@@ -299,10 +291,12 @@ mod tests {
         let part = Part { primitive, targets: &[], path: String::new(), slot: 0, whole: Default::default() };
         let mut n_read = 5;
         for n in [1003, 2001] {
-            let found = mesh(&document, &part, Pose { weights: &[], skin: None }, &mut n_read).unwrap().unwrap();
+            let found = mesh(&document, &part, Pose { weights: &[], skin: None, is_turned: false }, &mut n_read)
+                .unwrap()
+                .unwrap();
             assert_eq!((found.faces.len(), n_read), (0, n));
         }
         n_read = u64::MAX;
-        assert!(mesh(&document, &part, Pose { weights: &[], skin: None }, &mut n_read).is_err());
+        assert!(mesh(&document, &part, Pose { weights: &[], skin: None, is_turned: false }, &mut n_read).is_err());
     }
 }

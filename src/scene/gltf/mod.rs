@@ -97,8 +97,9 @@ fn read(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Document, 
     Ok(document)
 }
 
-/// What makes two instances share a mesh: the mesh's index, the skin's, and the bits of the weights of morph targets.
-type MeshKey = (usize, Option<usize>, Vec<u32>);
+/// What makes two instances share a mesh: the mesh's index, the skin's, whether its faces are turned, and the bits of
+/// the weights of morph targets.
+type MeshKey = (usize, Option<usize>, bool, Vec<u32>);
 
 /// Loads the meshes of a scene's nodes.
 struct Loader<'a> {
@@ -147,10 +148,13 @@ impl<'a> Loader<'a> {
         let document = self.document;
         let node = &document.root.nodes[node_ix];
         let Some(mesh) = node.mesh else { return Ok(None) };
-        // The joints of a skin place it, and its node does not.
+        let world_from_node = self.nodes.world_from_node(node_ix).unwrap_or_default();
+        // The joints of a skin place it. Its node does not, but as with every mesh, the node says which side of the
+        // faces is outside: Blender writes vertices that are mirrored already below a node that mirrors.
+        let is_turned = node.skin.is_some() && world_from_node.determinant() < 0.0;
         let transform = match node.skin {
             Some(_) => Transform::IDENTITY,
-            None => match Transform::of_affine(self.nodes.world_from_node(node_ix).unwrap_or_default()) {
+            None => match Transform::of_affine(world_from_node) {
                 Ok(transform) => transform,
                 Err(_) => {
                     document.note("meshes that their nodes flatten, which are left out", format!("nodes[{node_ix}]"));
@@ -161,11 +165,11 @@ impl<'a> Loader<'a> {
         let json = item(&document.root.meshes, "meshes", mesh.value(), &format_args!("nodes[{node_ix}].mesh"))?;
         let weights = node.weights.as_ref().or(json.weights.as_ref()).map(|weights| &weights[..]).unwrap_or_default();
         let bits = weights.iter().map(|weight| weight.to_bits()).collect();
-        let key = (mesh.value(), node.skin.map(|skin| skin.value()), bits);
+        let key = (mesh.value(), node.skin.map(|skin| skin.value()), is_turned, bits);
         let known = match self.known.get(&key) {
             Some(known) => known.clone(),
             None => {
-                let known = self.mesh(mesh.value(), node, node_ix, weights)?;
+                let known = self.mesh(mesh.value(), node, node_ix, (weights, is_turned))?;
                 self.known.insert(key, known.clone());
                 known
             }
@@ -179,14 +183,14 @@ impl<'a> Loader<'a> {
         mesh_ix: usize,
         node: &Node,
         node_ix: usize,
-        weights: &[f32],
+        (weights, is_turned): (&[f32], bool),
     ) -> Checked<Option<(usize, Vec<u32>)>> {
         let document = self.document;
         let skin = node.skin.map(|skin| self.skin(skin.value(), node_ix)).transpose()?;
         if weights.iter().any(|weight| !weight.is_finite()) {
             return Err(format!("nodes[{node_ix}]: a weight of its morph targets is not finite"));
         }
-        let pose = Pose { weights, skin: skin.as_ref() };
+        let pose = Pose { weights, skin: skin.as_ref(), is_turned };
         let (mut whole, mut materials) = (Mesh::default(), Vec::new());
         let primitives = &document.root.meshes[mesh_ix].primitives;
         let attributes = geometry::attributes_of(primitives);
