@@ -34,7 +34,8 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     let display = Display::open()?;
 
     let progress = Progress::new(args.quiet, 2);
-    let (scene, _) = progress.stage(&format!("loading {}", args.scene.display()), || args.load.load(&args.scene));
+    let (scene, _) =
+        progress.stage(&format!("loading {}", args.scene.display()), || args.load.load_for(&args.picture, &args.scene));
     let scene = scene?;
     scene.warn_if_unlit(&args.scene);
     let mut options = args.picture.options(&scene);
@@ -48,7 +49,12 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         None => Workload::of_window((options.width, options.height)),
     };
     let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
-    let load_options = LoadOptions { request: args.picture.request(), processor, workload, scene: args.load.options() };
+    let load_options = LoadOptions {
+        request: args.picture.request(),
+        processor,
+        workload,
+        scene: args.load.options_for(&args.picture),
+    };
     let accel = load_options.request.choose_accel(processor, scene.n_triangles(), &workload);
     build::check_memory(accel, scene.n_triangles())?;
     let building = build::building(accel, scene.n_triangles());
