@@ -26,8 +26,9 @@ fn a_scene_that_nothing_lights_is_named_once() {
     let disc = "[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 8\n";
     let light = "[[light]]\nkind = 'directional'\ndirection = [-1, -2, -1]\nirradiance = [1, 1, 1]\n";
     let off = light.replace("[1, 1, 1]", "[0, 0, 0]");
-    let emitter = format!("materials.m = {{ Ke = [1, 1, 1] }}\n{disc}material = 'm'\n");
-    for (text, emits) in [(disc, false), (&format!("{disc}{off}"), false), (&emitter, true)] {
+    let emitter = format!("ambient = [0, 0, 0]\nmaterials.m = {{ Ke = [1, 1, 1] }}\n{disc}material = 'm'\n");
+    let black = format!("ambient = [0, 0, 0]\n{disc}");
+    for (text, emits) in [(&black, false), (&format!("{disc}{off}"), false), (&emitter, true)] {
         let told = warnings(&render(directory.path(), "dark.toml", text));
         let [line] = &told[..] else { panic!("{text}: {told:?}") };
         for part in ["dark.toml: nothing lights the scene", "[[light]]", "ambient = [0.3, 0.3, 0.3]", "irradiance"] {
@@ -36,7 +37,9 @@ fn a_scene_that_nothing_lights_is_named_once() {
         assert_eq!(line.contains("Ke"), emits, "{line}");
     }
     let ambient = format!("ambient = [0.3, 0.3, 0.3]\n{disc}");
-    for (name, text) in [("a.toml", &ambient[..]), ("a.toml", &format!("{disc}{light}")), ("a.obj", TRIANGLE)] {
+    for (name, text) in
+        [("a.toml", &ambient[..]), ("a.toml", &format!("{disc}{light}")), ("a.toml", disc), ("a.obj", TRIANGLE)]
+    {
         let told = warnings(&render(directory.path(), name, text));
         assert!(told.is_empty(), "{text}: {told:?}");
     }

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use kdray::scene::{LoadOptions, Scene, SceneError};
 
+use super::picture_args::PictureArgs;
+
 #[derive(clap::Args)]
 pub struct LoadArgs {
     /// Camera of the scene's file to look from: its name, or its index in `kdray inspect`, counted from 0 [default: the
@@ -25,9 +27,20 @@ impl LoadArgs {
         Scene::load_with(path, &self.options())
     }
 
+    /// Loads a scene whose picture has the user's size.
+    pub fn load_for(&self, picture: &PictureArgs, path: &Path) -> Result<Scene, SceneError> {
+        Scene::load_with(path, &self.options_for(picture))
+    }
+
+    /// Returns the options of loading a scene whose picture has the user's size.
+    pub fn options_for(&self, picture: &PictureArgs) -> LoadOptions {
+        let aspect = picture.size.map(|size| size.width as f32 / size.height as f32);
+        LoadOptions { aspect, ..self.options() }
+    }
+
     /// Returns the options of loading.
     pub fn options(&self) -> LoadOptions {
         let &Self { allow_outside, .. } = self;
-        LoadOptions { scene: self.scene_name.clone(), camera: self.camera.clone(), allow_outside }
+        LoadOptions { scene: self.scene_name.clone(), camera: self.camera.clone(), allow_outside, aspect: None }
     }
 }

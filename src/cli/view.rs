@@ -76,9 +76,9 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
 /// Returns the function that loads the files which the user opens in the window. The options of pictures on the
 /// command line apply to them, too.
 fn opener(args: &ViewArgs, processor: Processor) -> Opener {
-    let (picture, allow_outside) = (args.picture.clone(), args.load.allow_outside);
+    let picture = args.picture.clone();
     // The names of a camera and a scene on the command line are those of the first file.
-    let load_options = scene::LoadOptions { allow_outside, ..scene::LoadOptions::default() };
+    let load_options = scene::LoadOptions { scene: None, camera: None, ..args.load.options_for(&picture) };
     Arc::new(move |path| open(path, &load_options, &picture, processor).map_err(|error| error.to_string()))
 }
 
@@ -109,7 +109,7 @@ struct Start {
 
 /// Loads the scene and builds its structure.
 fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliError> {
-    let (scene, _) = progress.stage(&format!("loading {}", path.display()), || args.load.load(path));
+    let (scene, _) = progress.stage(&format!("loading {}", path.display()), || args.load.load_for(&args.picture, path));
     let scene = scene?;
     scene.warn_if_unlit(path);
     let mut options = args.picture.options(&scene.defaults);
@@ -122,7 +122,8 @@ fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliE
         None => Workload::of_window((options.width, options.height)),
     };
     let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
-    let load_options = LoadOptions { request: args.picture.request(), processor, workload, scene: args.load.options() };
+    let scene_options = args.load.options_for(&args.picture);
+    let load_options = LoadOptions { request: args.picture.request(), processor, workload, scene: scene_options };
     let accel = load_options.request.choose_accel(processor, scene.n_triangles(), &workload);
     build::check_memory(accel, scene.n_triangles())?;
     let building = build::building(accel, scene.n_triangles());
@@ -133,7 +134,7 @@ fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliE
 
 /// Returns the start of a window that waits for a file.
 fn without_scene(args: &ViewArgs) -> Result<Start, CliError> {
-    let scene = args.load.options();
+    let scene = args.load.options_for(&args.picture);
     let options = args.picture.options(&RenderDefaults::default());
     let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
     let (request, workload) = (args.picture.request(), Workload::of_window((options.width, options.height)));

@@ -15,7 +15,7 @@ use super::{
     camera::{FOV_DEGREES, HEIGHTS},
     description::{CameraSpec, Description, LightSpec, MeshSpec, RenderSpec, SceneDenoise},
     error::{Checked, SceneError},
-    extent, framing,
+    extent,
     image_files::Images,
     map_spec::MapSpec,
     material::{MaterialSpec, colour, within},
@@ -24,6 +24,7 @@ use super::{
     overrides::NamedMaterials,
     placed::{MeshTable, Placer},
     read::read_utf8,
+    standard::Lacks,
     transform::finite,
 };
 use crate::frame::Denoise;
@@ -32,7 +33,7 @@ use crate::frame::Denoise;
 pub(super) const DEFAULT_MATERIAL: &str = "(default)";
 
 /// Loads a scene file and the meshes that it names. Their names are relative to the scene file's folder.
-pub(super) fn load_toml(path: &Path, access: Access) -> Result<Scene, SceneError> {
+pub(super) fn load_toml(path: &Path, access: Access) -> Result<(Scene, Lacks), SceneError> {
     let text = read_utf8(path)?;
     let file = File { path, text: &text, access };
     assemble(&file, file.parse()?)
@@ -71,7 +72,12 @@ impl File<'_> {
     }
 }
 
-fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> {
+fn assemble(file: &File, description: Description) -> Result<(Scene, Lacks), SceneError> {
+    let lacks = Lacks {
+        camera: description.camera.is_none() && description.cameras.is_empty(),
+        light: description.light.is_empty() && description.ambient.is_none(),
+        background: description.background.is_none(),
+    };
     let mut scene = Scene::empty(file.path);
     let mut images = Images::default();
     let indices = add_materials(file, (&mut scene, &mut images), &description.materials)?;
@@ -106,8 +112,7 @@ fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> 
     if scene.n_triangles() == 0 {
         return Err(SceneError::file(file.path, "has no triangles"));
     }
-    let bounds = scene.bounds();
-    extent::check(file.path, bounds)?;
+    extent::check(file.path, scene.bounds())?;
     for (ix, spec) in description.cameras.iter().enumerate() {
         let named = file.check(&format!("camera {}", ix + 1), spec, |spec| camera(&spec.camera()))?;
         scene.cameras.push((spec.get_ref().name.clone(), named));
@@ -115,9 +120,9 @@ fn assemble(file: &File, description: Description) -> Result<Scene, SceneError> 
     scene.camera = match (&description.camera, scene.cameras.first()) {
         (Some(spec), _) => file.check("camera", spec, camera)?,
         (None, Some((_, first))) => *first,
-        (None, None) => framing::camera(bounds),
+        (None, None) => scene.camera,
     };
-    Ok(scene)
+    Ok((scene, lacks))
 }
 
 /// Adds the materials of a scene file and their images. Returns the indices of the materials by their names.

@@ -1,38 +1,195 @@
-//! A camera and a light for meshes without either.
+//! A camera for scenes without one: its picture is filled by the bounding box of the scene.
 
-use glam::Vec3;
+use glam::{DVec2, DVec3, Vec3};
 
-use super::{Camera, Light, Projection, Scene};
+use super::{Camera, Projection};
 
-/// Direction from the middle of the scene towards the eye: to the front, the right and above. Not of unit length.
-const TOWARDS_EYE: Vec3 = Vec3::new(0.45, 0.35, 1.0);
-const VERTICAL_FOV_DEGREES: f32 = 40.0;
-/// Factor on the eye's distance, which leaves a margin around the bounding sphere.
-const MARGIN: f32 = 1.05;
+/// Vertical field of view unless the user states one, degrees.
+pub(super) const VERTICAL_FOV_DEGREES: f32 = 40.0;
+/// Factor on the half width and half height of the picture that the bounding box may fill.
+const FILLED: f64 = 0.95;
 
-/// Returns a camera that sees the whole bounding sphere of a bounding box, in any picture whose height is at most its
-/// width.
-pub(super) fn camera((min, max): (Vec3, Vec3)) -> Camera {
-    let centre = (min + max) / 2.0;
-    // For a small scene far from the origin, the eye's distance must exceed the rounding of its coordinates.
-    let radius = ((max - min).length() / 2.0).max(centre.abs().max_element() * 1e-3);
-    let distance = MARGIN * radius / (VERTICAL_FOV_DEGREES / 2.0).to_radians().sin();
-    Camera {
-        eye: centre + TOWARDS_EYE.normalize() * distance,
-        target: centre,
-        up: Vec3::Y,
-        projection: Projection::Perspective { vertical_fov_degrees: VERTICAL_FOV_DEGREES },
+/// The direction from which a scene is usually seen, degrees: from the front, the right and above.
+const USUAL: Direction = Direction { azimuth: 24, elevation: 18 };
+/// Elevations of the other directions, degrees.
+const ELEVATIONS: [u32; 5] = [18, 26, 34, 42, 50];
+/// The usual direction is taken if it shows this share of what the best direction shows.
+const USUAL_IS_ENOUGH: f64 = 0.7;
+/// Of the other directions, those that show this share of what the best one shows count as equal.
+const EQUALS_BEST: f64 = 0.95;
+
+/// The directions of a world: unit vectors to its right, to its front and up.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WorldAxes {
+    pub right: DVec3,
+    pub front: DVec3,
+    pub up: DVec3,
+}
+
+impl WorldAxes {
+    /// Returns the axes of a world whose +x is to the right. `up` is +y or +z.
+    pub fn with_up(up: Vec3) -> Self {
+        let (right, up) = (DVec3::X, up.as_dvec3());
+        Self { right, front: right.cross(up), up }
     }
 }
 
-/// Lights a scene that describes no light: by one light, ambient light, and a background.
-pub(super) fn light_up(scene: &mut Scene) {
-    scene.lights = vec![light()];
-    scene.ambient = Vec3::splat(0.25);
-    scene.background = Vec3::new(0.32, 0.36, 0.42);
+/// Direction from a scene towards its viewer, whole degrees: `azimuth` is from the front to the right, `elevation` is
+/// upwards.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Direction {
+    azimuth: u32,
+    elevation: u32,
 }
 
-/// Returns a directional light from above the camera's left shoulder.
-fn light() -> Light {
-    Light::Directional { towards: Vec3::new(-0.4, 0.8, 0.7).normalize(), irradiance: Vec3::splat(0.8) }
+impl Direction {
+    /// Returns the unit vector.
+    fn vector(self, axes: &WorldAxes) -> DVec3 {
+        let (azimuth, elevation) = (f64::from(self.azimuth).to_radians(), f64::from(self.elevation).to_radians());
+        let horizontal = axes.front * azimuth.cos() + axes.right * azimuth.sin();
+        horizontal * elevation.cos() + axes.up * elevation.sin()
+    }
+
+    /// Returns all directions but the usual one. Those beyond the right would show mirror images of the same boxes.
+    fn others() -> impl Iterator<Item = Self> {
+        let row = |elevation| (0..=90).step_by(2).map(move |azimuth| Self { azimuth, elevation });
+        ELEVATIONS.into_iter().flat_map(row)
+    }
+
+    /// Returns the distance from the usual direction in a measure of its own.
+    fn strangeness(self) -> u32 {
+        self.azimuth.abs_diff(USUAL.azimuth) + 2 * self.elevation.abs_diff(USUAL.elevation)
+    }
+}
+
+/// What a camera is made for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    pub axes: WorldAxes,
+    /// Width of the picture divided by its height.
+    pub aspect: f64,
+    pub vertical_fov_degrees: f32,
+}
+
+/// Returns a camera that sees a whole bounding box from outside, and that is as close as it can be. Long and flat
+/// boxes are seen from a direction that shows much of their sides.
+pub(super) fn camera(bounds: (Vec3, Vec3), frame: &Frame) -> Camera {
+    let bounds = BoundingBox::new(bounds);
+    let usual = View::new(&bounds, USUAL, frame);
+    let others: Vec<_> =
+        Direction::others().map(|direction| (direction, View::new(&bounds, direction, frame))).collect();
+    let best = others.iter().map(|(_, view)| view.shown).fold(usual.shown, f64::max);
+    let is_equal = |(_, view): &&(Direction, View)| view.shown >= EQUALS_BEST * best;
+    let nearest = others.iter().filter(is_equal).min_by_key(|(direction, _)| direction.strangeness());
+    let view = match nearest {
+        Some((_, view)) if usual.shown < USUAL_IS_ENOUGH * best => view,
+        _ => &usual,
+    };
+    view.camera(frame)
+}
+
+/// Returns a camera that sees a whole bounding box horizontally from outside: from the front, or from an `azimuth` to
+/// the right of it, in degrees.
+pub(super) fn level_camera(bounds: (Vec3, Vec3), azimuth: u32, frame: &Frame) -> Camera {
+    View::new(&BoundingBox::new(bounds), Direction { azimuth, elevation: 0 }, frame).camera(frame)
+}
+
+/// A bounding box.
+struct BoundingBox {
+    centre: DVec3,
+    /// Half of its extents.
+    half: DVec3,
+}
+
+impl BoundingBox {
+    fn new((min, max): (Vec3, Vec3)) -> Self {
+        let (min, max) = (min.as_dvec3(), max.as_dvec3());
+        let (centre, mut half) = ((min + max) / 2.0, (max - min) / 2.0);
+        // For a small scene far from the origin, the eye's distance must exceed the rounding of its coordinates.
+        let least = centre.abs().max_element() * 1e-3;
+        if half.length() < least {
+            half *= least / half.length();
+        }
+        Self { centre, half }
+    }
+
+    /// Returns the corner whose coordinates have the given signs.
+    fn corner(&self, signs: DVec3) -> DVec3 {
+        self.centre + self.half * signs
+    }
+
+    fn corners(&self) -> [DVec3; 8] {
+        let sign = |ix: usize, axis: usize| if ix >> axis & 1 == 0 { -1.0 } else { 1.0 };
+        std::array::from_fn(|ix| self.corner(DVec3::new(sign(ix, 0), sign(ix, 1), sign(ix, 2))))
+    }
+}
+
+/// A camera's place.
+struct View {
+    eye: DVec3,
+    target: DVec3,
+    /// Sum over the visible faces of the bounding box of the square root of the share of the picture that the face
+    /// covers. Among equal sums of shares, it is largest where no face hides the others.
+    shown: f64,
+}
+
+impl View {
+    /// Returns the view of a box whose eye is as near as the box's corners allow.
+    ///
+    /// Let x, y and z be the coordinates of a corner to the right, up and forward, and a and b those of the eye to the
+    /// right and forward. The corner is in the picture if |x - a| <= t (z - b), where t is the tangent of half the
+    /// field of view. So b is at most -(R + L) / 2t, where R is the largest x - t z and L the largest -x - t z. The
+    /// middle of the range of a is (R - L) / 2. The vertical works alike, and the smaller of both b counts.
+    fn new(bounds: &BoundingBox, direction: Direction, frame: &Frame) -> Self {
+        let forward = -direction.vector(&frame.axes);
+        let right = forward.cross(frame.axes.up).normalize();
+        let up = right.cross(forward);
+        let tangent = (f64::from(frame.vertical_fov_degrees) / 2.0).to_radians().tan() * FILLED;
+        let tangents = DVec2::new(tangent * frame.aspect, tangent);
+        let corners = bounds.corners().map(|corner| corner - bounds.centre);
+        let fit = |axis: DVec3, tangent: f64| {
+            let most = |axis: DVec3| {
+                let slopes = corners.iter().map(|corner| corner.dot(axis) - tangent * corner.dot(forward));
+                slopes.fold(f64::NEG_INFINITY, f64::max)
+            };
+            let (above, below) = (most(axis), most(-axis));
+            ((above - below) / 2.0, -(above + below) / (2.0 * tangent))
+        };
+        let ((x, z_of_width), (y, z_of_height)) = (fit(right, tangents.x), fit(up, tangents.y));
+        let z = z_of_width.min(z_of_height);
+        let eye = bounds.centre + x * right + y * up + z * forward;
+        let to_picture = |point: DVec3| {
+            let from_eye = point - eye;
+            DVec2::new(from_eye.dot(right), from_eye.dot(up)) / (tangents * from_eye.dot(forward))
+        };
+        // The target is as deep as the middle of the box.
+        Self { eye, target: eye - z * forward, shown: shown(bounds, eye, to_picture) }
+    }
+
+    fn camera(&self, frame: &Frame) -> Camera {
+        Camera {
+            eye: self.eye.as_vec3(),
+            target: self.target.as_vec3(),
+            up: frame.axes.up.as_vec3(),
+            projection: Projection::Perspective { vertical_fov_degrees: frame.vertical_fov_degrees },
+        }
+    }
+}
+
+/// Returns [`View::shown`]. `to_picture` maps a point to coordinates from -1 to 1.
+fn shown(bounds: &BoundingBox, eye: DVec3, to_picture: impl Fn(DVec3) -> DVec2) -> f64 {
+    let mut shown = 0.0;
+    for (normal, a, b) in
+        [(DVec3::X, DVec3::Y, DVec3::Z), (DVec3::Y, DVec3::Z, DVec3::X), (DVec3::Z, DVec3::X, DVec3::Y)]
+    {
+        let away = (eye - bounds.centre).dot(normal);
+        if away.abs() <= bounds.half.dot(normal) {
+            continue;
+        }
+        let normal = normal * away.signum();
+        let corners = [-a - b, a - b, a + b, b - a].map(|side| to_picture(bounds.corner(normal + side)));
+        let doubled: f64 = (0..4).map(|ix| corners[ix].perp_dot(corners[(ix + 1) % 4])).sum();
+        shown += (doubled.abs() / 8.0).sqrt();
+    }
+    shown
 }

@@ -10,11 +10,12 @@ mod defaults;
 mod description;
 mod error;
 mod extent;
-pub mod framing;
+mod framing;
 pub mod generate;
 mod gltf;
 mod image;
 mod image_files;
+mod interior;
 mod light;
 mod lighting;
 mod map_spec;
@@ -33,6 +34,7 @@ mod polygon;
 mod read;
 mod smooth;
 mod sources;
+mod standard;
 mod stl;
 mod tangents;
 mod terms;
@@ -63,6 +65,7 @@ use self::{
     mesh_file::{Loaded, Loading, MeshFormat},
     outside::Access,
     smooth::Shading,
+    standard::Lacks,
 };
 
 /// Everything that a frame shows. World space is right-handed, +y up by default.
@@ -94,7 +97,7 @@ pub struct Scene {
 }
 
 /// Options of loading a scene.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LoadOptions {
     /// The scene of a glTF file by its name or its index, counted from 0. Where absent, it is the file's default scene.
     pub scene: Option<String>,
@@ -103,6 +106,9 @@ pub struct LoadOptions {
     pub camera: Option<String>,
     /// Whether the scene's files may name files that do not lie below their own folders.
     pub allow_outside: bool,
+    /// Width of the picture divided by its height, which a camera is made for where the file has none. Where absent, it
+    /// is that of [`Scene::defaults`].
+    pub aspect: Option<f32>,
 }
 
 /// A mesh that is placed in the world.
@@ -137,7 +143,7 @@ impl Scene {
     /// # Errors
     /// Those of [`Scene::load`]; the file does not have the scene or the camera that `options` names.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
-        let mut scene = if is_scene_file(path) {
+        let (mut scene, lacks) = if is_scene_file(path) {
             check_only_scene(path, options)?;
             assemble::load_toml(path, Access::of(options))?
         } else if MeshFormat::of_name(path).is_some() {
@@ -146,6 +152,7 @@ impl Scene {
             let endings = "its name ends in none of .toml, .gltf, .glb, .obj, .ply and .stl";
             return Err(SceneError::file(path, format!("is no scene: {endings}")));
         };
+        standard::fill_in(&mut scene, lacks, options);
         scene.add_tangents().map_err(|what| SceneError::file(path, what))?;
         if let Some(name) = &options.camera {
             scene.choose_camera(name).map_err(|what| SceneError::file(path, what))?;
@@ -231,9 +238,8 @@ fn is_scene_file(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
 }
 
-/// Loads a mesh file as a scene: the mesh with its own materials, a camera that frames it, one light and ambient
-/// light. A glTF file has lights and cameras of its own.
-fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
+/// Loads a mesh file as a scene: the mesh with its own materials. Only a glTF file may have lights and cameras.
+fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
     let bytes = mesh_file::read_mesh(path)?;
     if MeshFormat::of(path, &bytes) == MeshFormat::Gltf {
         return gltf::load(path, bytes, options);
@@ -247,11 +253,8 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<Scene, SceneErro
     let slots = scene.push_materials(materials);
     scene.images = images.finish();
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
-    let bounds = scene.bounds();
-    extent::check(path, bounds)?;
-    scene.camera = framing::camera(bounds);
-    framing::light_up(&mut scene);
-    Ok(scene)
+    extent::check(path, scene.bounds())?;
+    Ok((scene, Lacks { camera: true, light: true, background: true }))
 }
 
 /// Refuses the choice of a scene for a file that has only one.

@@ -7,6 +7,7 @@ use kdray::{
     layout::{
         FLAT_NORMAL, MATERIAL_FRESNEL, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SPECULAR, normal::decode_octahedral,
     },
+    scene::{Lobes, Material},
     world::FlatScene,
 };
 
@@ -142,6 +143,79 @@ fn mtl_terms_become_the_kernels() {
     assert_eq!(load_mtl("newmtl my own\nTr 1\nd -halo 0.5\n").materials[0].d, 0.5);
 }
 
+/// Loads a triangle with a material of an MTL file. Returns the material and the warnings.
+fn material_of(mtl: &str) -> (Material, Vec<String>) {
+    let obj = format!("mtllib a.mtl\n{TRIANGLE}usemtl m\nf 1 2 3\n");
+    let mtl = format!("newmtl m\n{mtl}\n");
+    let (scene, warnings) = load_scene(&[("m.obj", obj.as_bytes()), ("a.mtl", mtl.as_bytes())]);
+    (scene.unwrap_or_else(|e| panic!("{e}\n{mtl}")).materials.remove(0), warnings)
+}
+
+#[test]
+fn the_ambient_colours_that_exporters_write_for_everything_are_those_of_kd() {
+    let kd = Vec3::new(0.1, 0.2, 0.3);
+    for (ka, expected) in [("0 0 0", kd), ("1 1 1", kd), ("0", kd), ("0.1 0 0", Vec3::new(0.1, 0.0, 0.0))] {
+        let (material, warnings) = material_of(&format!("Ka {ka}\nKd 0.1 0.2 0.3"));
+        assert_eq!((material.ka, warnings), (expected, vec![]), "{ka}");
+    }
+}
+
+#[test]
+fn surfaces_that_opacity_would_hide_whole_are_shown() {
+    for hidden in ["d 0", "Tr 1", "d 0\nTr 1", "d 0.0\nTr 0"] {
+        let (material, warnings) = material_of(hidden);
+        assert_eq!(material.d, 1.0, "{hidden}");
+        let [warning] = &warnings[..] else { panic!("{hidden}: {warnings:?}") };
+        assert!(warning.contains("material `m` would be invisible"), "{warning}");
+    }
+    for (shown, d) in [("d 1\nTr 1", 1.0), ("d 0.01", 0.01), ("Tr 0.75", 0.25)] {
+        let (material, warnings) = material_of(shown);
+        assert_eq!((material.d, warnings), (d, vec![]), "{shown}");
+    }
+    // One warning counts all materials of a file.
+    let (_, warnings) = material_of("d 0\nnewmtl n\nd 0\nnewmtl o\nTr 1");
+    assert_eq!(warnings.len(), 1);
+    assert!(warnings[0].contains("`m` and 2 more"), "{warnings:?}");
+}
+
+#[test]
+fn illum_alone_makes_no_glass() {
+    for illum in [4, 6, 9] {
+        for rest in ["", "Ni 1", "Tf 1 1 1\nNi 1.00", "d 1", "Tr 0", "Ni 0"] {
+            let (material, warnings) = material_of(&format!("illum {illum}\n{rest}\nKs 0.5 0.5 0.5"));
+            let highlight = Lobes { highlight: true, ..Lobes::default() };
+            assert_eq!(material.lobes, highlight, "illum {illum}, {rest}");
+            let [warning] = &warnings[..] else { panic!("illum {illum}, {rest}: {warnings:?}") };
+            assert!(warning.contains("would be glass"), "{warning}");
+        }
+        assert_eq!(material_of(&format!("illum {illum}")).0.lobes, Lobes::default(), "illum {illum}");
+        for rest in ["Ni 1.5", "Tf 0.9 1 1", "d 0.5", "Tr 0.5", "d 0"] {
+            let (material, warnings) = material_of(&format!("illum {illum}\n{rest}"));
+            assert!(material.lobes.refraction, "illum {illum}, {rest}");
+            assert_eq!(warnings.len(), usize::from(rest == "d 0"), "illum {illum}, {rest}: {warnings:?}");
+        }
+    }
+    assert!(material_of("illum 7").0.lobes.refraction);
+}
+
+#[test]
+fn faces_without_the_normals_that_they_name_have_computed_ones() {
+    let plain = load_obj(&format!("{TRIANGLE}vn 0 0 1\nf 1 2 3\n"));
+    for face in
+        ["f 1//1 2//1 3//2", "f 1//0 2//1 3//1", "f 1//-2 2//1 3//1", "f 1/1 2/1 3/1", "f 1//6148914691236517206 2 3"]
+    {
+        let (scene, warnings) = load_scene(&[("m.obj", format!("{TRIANGLE}vn 0 0 1\n{face}\n").as_bytes())]);
+        assert_eq!(FlatScene::new(&scene.unwrap()).unwrap().triangles, plain.triangles, "{face}");
+        let [warning] = &warnings[..] else { panic!("{face}: {warnings:?}") };
+        assert!(warning.contains("m.obj:5: ") && warning.contains("out of range: there are"), "{warning}");
+    }
+    // The first of several is named.
+    let obj = format!("{TRIANGLE}f 1//1 2//1 3//1\nf 3/7 2/7 1/7\n");
+    let (scene, warnings) = load_scene(&[("m.obj", obj.as_bytes())]);
+    assert_eq!(scene.unwrap().n_triangles(), 2);
+    assert!(warnings.len() == 1 && warnings[0].contains("m.obj:4: normal 1 "), "{warnings:?}");
+}
+
 #[test]
 fn what_no_library_defines_is_the_default() {
     for obj in ["mtllib no.mtl\nusemtl x\n", "usemtl x\n", ""] {
@@ -169,7 +243,7 @@ fn a_bare_obj_is_framed_and_lit() {
                 .unwrap();
         }
         let scene = load_obj(&format!("{obj}f 1 2 3\nf 1 3 4\n"));
-        assert_eq!((scene.name.as_str(), scene.lights.len()), ("mesh", 1));
+        assert_eq!((scene.name.as_str(), scene.lights.len()), ("mesh", 2));
         let (min, max) = scene.bounds();
         let camera = scene.camera;
         let forward = (camera.target - camera.eye).normalize();
@@ -179,7 +253,8 @@ fn a_bare_obj_is_framed_and_lit() {
             let to = Vec3::new(side(1, 0), side(2, 1), side(4, 2)) - camera.eye;
             let edge = camera.height_at(to.dot(forward)) / 2.0;
             assert!(edge > 0.0, "behind the camera");
-            assert!(to.dot(right).abs() < edge && to.dot(right.cross(forward)).abs() < edge, "outside the picture");
+            let (x, y) = (to.dot(right).abs() / edge, to.dot(right.cross(forward)).abs() / edge);
+            assert!(x < 4.0 / 3.0 && y < 1.0, "outside the picture");
         }
         // The box is not too small in the picture.
         assert!((camera.target - camera.eye).length() < 3.5 * (max - min).length());

@@ -111,8 +111,8 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
 /// Loads the scene. Returns it and the loading time in milliseconds. Warns if the scene has no light.
 fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError> {
     let loading = format!("loading {}", args.scene.display());
-    let (scene, load_ms) =
-        progress.stage(&loading, || info_span!("load scene").in_scope(|| args.load.load(&args.scene)));
+    let (scene, load_ms) = progress
+        .stage(&loading, || info_span!("load scene").in_scope(|| args.load.load_for(&args.picture, &args.scene)));
     let scene = scene?;
     scene.warn_if_unlit(&args.scene);
     Ok((scene, load_ms))

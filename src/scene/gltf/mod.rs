@@ -36,13 +36,14 @@ use self::{
 use super::{
     Instance, LoadOptions, Mesh, Scene, SceneError, Transform,
     error::Checked,
-    extent, framing,
+    extent,
     needs::{MeshSize, require_for_mesh},
     outside::Access,
+    standard::Lacks,
 };
 
 /// Loads a glTF file as a scene with its lights and cameras.
-pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Scene, SceneError> {
+pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
     let failed = |what: String| SceneError::file(path, what);
     let document = read(path, bytes, options)?;
     let nodes = Nodes::new(&document, options.scene.as_deref()).map_err(failed)?;
@@ -51,15 +52,13 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     extent::check(path, bounds)?;
     scene.lights = lights::lights(&document, &nodes).map_err(failed)?;
     scene.cameras = cameras::cameras(&document, &nodes, bounds).map_err(failed)?;
-    scene.camera = scene.cameras.first().map_or_else(|| framing::camera(bounds), |(_, camera)| *camera);
+    let lacks_camera = scene.cameras.is_empty();
+    scene.camera = scene.cameras.first().map_or(scene.camera, |(_, camera)| *camera);
     // The light of emissive surfaces does not reach others.
-    if scene.lights.is_empty() {
-        framing::light_up(&mut scene);
-    } else {
-        scene.defaults.is_metered = true;
-    }
+    let lacks_light = scene.lights.is_empty();
+    scene.defaults.is_metered = !lacks_light;
     document.warn(path);
-    Ok(scene)
+    Ok((scene, Lacks { camera: lacks_camera, light: lacks_light, background: lacks_light }))
 }
 
 /// What a scene has before a glTF file is loaded.

@@ -106,6 +106,8 @@ pub struct CleanObj {
     pub colour_scale: f32,
     /// Line and keyword of the first statement that is not part of the format, if any.
     pub unknown: Option<(usize, String)>,
+    /// Line of the first normal or texture vertex that does not exist, and what is wrong with it, if there is any.
+    pub missing: Option<(usize, String)>,
 }
 
 impl CleanObj {
@@ -240,7 +242,7 @@ impl Cleaner {
             "v" => self.point(rest)?,
             "vn" => vector(&mut self.normals, "vn", rest, 3..=3)?,
             "vt" => self.texcoord(rest)?,
-            "f" => self.face(words(rest))?,
+            "f" => self.face(line, words(rest))?,
             "s" => self.flat = matches!(rest, "off" | "0"),
             "usemtl" if rest.is_empty() => return Err("usemtl names no material".to_owned()),
             "usemtl" => {
@@ -297,10 +299,10 @@ impl Cleaner {
     }
 
     /// Adds a face. It has three or more corners, each of the form `v`, `v/vt`, `v//vn` or `v/vt/vn`.
-    fn face<'a>(&mut self, words: impl Iterator<Item = &'a str>) -> Checked<()> {
+    fn face<'a>(&mut self, line: usize, words: impl Iterator<Item = &'a str>) -> Checked<()> {
         self.begin_face();
         for word in words {
-            let corner = self.corner(word)?;
+            let corner = self.corner(line, word)?;
             self.corners.push(corner);
         }
         self.end_face()
@@ -361,7 +363,8 @@ impl Cleaner {
         out
     }
 
-    fn corner(&self, word: &str) -> Checked<Corner> {
+    /// Reads a corner. A normal or texture vertex that does not exist counts as none.
+    fn corner(&mut self, line: usize, word: &str) -> Checked<Corner> {
         let mut parts = word.split('/');
         let position = parts.next().unwrap_or_default();
         let texcoord = parts.next().filter(|part| !part.is_empty());
@@ -369,23 +372,43 @@ impl Cleaner {
         if parts.next().is_some() {
             return Err(format!("`{word}` has more than three indices"));
         }
-        let (seen, totals) = (&self.seen, &self.totals);
-        let position = index(position, "vertex", seen.positions, totals.positions)?;
-        let texcoord =
-            texcoord.map(|word| index(word, "texture vertex", seen.texcoords, totals.texcoords)).transpose()?;
-        let normal = normal.map(|word| index(word, "normal", seen.normals, totals.normals)).transpose()?;
+        let Counts { positions, texcoords, normals } = self.totals;
+        let position = index(position, "vertex", self.seen.positions)?.within("vertex", positions)?;
+        let mut optional = |word: Option<&str>, what: &str, (seen, total): (usize, usize)| {
+            let index = word.map(|word| index(word, what, seen)).transpose()?;
+            let found = index.map(|index| index.within(what, total));
+            if let Some(Err(what)) = &found {
+                self.out.missing.get_or_insert_with(|| (line, what.clone()));
+            }
+            Ok::<_, String>(found.and_then(Result::ok))
+        };
+        let texcoord = optional(texcoord, "texture vertex", (self.seen.texcoords, texcoords))?;
+        let normal = optional(normal, "normal", (self.seen.normals, normals))?;
         Ok((position, texcoord, normal))
     }
 }
 
-/// Returns an absolute index in `1..=total`. A negative index counts back from the last of the `seen` elements.
-fn index(word: &str, what: &str, seen: usize, total: usize) -> Checked<usize> {
-    let index: i64 = word.parse().map_err(|_| format!("`{word}` is not the index of a {what}"))?;
-    let absolute = if index < 0 { (seen as i64).checked_add(index).map(|i| i + 1) } else { Some(index) };
-    match absolute {
-        Some(absolute) if (1..=total as i64).contains(&absolute) => Ok(absolute as usize),
-        _ => Err(format!("{what} {index} is out of range: there are {total}")),
+/// An index as the file states it, and as it counts from 1 if it fits into a number.
+struct Index {
+    stated: i64,
+    absolute: Option<i64>,
+}
+
+impl Index {
+    /// Returns the index if it is in `1..=total`.
+    fn within(&self, what: &str, total: usize) -> Checked<usize> {
+        match self.absolute {
+            Some(absolute) if (1..=total as i64).contains(&absolute) => Ok(absolute as usize),
+            _ => Err(format!("{what} {} is out of range: there are {total}", self.stated)),
+        }
     }
+}
+
+/// Reads an index. A negative one counts back from the last of the `seen` elements.
+fn index(word: &str, what: &str, seen: usize) -> Checked<Index> {
+    let stated: i64 = word.parse().map_err(|_| format!("`{word}` is not the index of a {what}"))?;
+    let absolute = if stated < 0 { (seen as i64).checked_add(stated).map(|i| i + 1) } else { Some(stated) };
+    Ok(Index { stated, absolute })
 }
 
 /// Writes the keyword and the first three of the numbers in `rest`, or six if there are that many. Fails if a number is

@@ -36,6 +36,9 @@ pub(super) fn parse_obj(path: &Path, text: &str, loading: &mut Loading) -> Resul
     if let Some((line, statement)) = &clean.unknown {
         tracing::warn!("{}:{line}: unknown statement `{}`", path.display(), statement.escape_debug());
     }
+    if let Some((line, what)) = &clean.missing {
+        tracing::warn!("{}:{line}: {what}; faces that name such normals or texture vertices have none", path.display());
+    }
     let by_name = used_materials(path, &clean, &materials);
     let models = match parse(&clean, &by_name) {
         Ok(models) if !models.is_empty() && models.iter().all(is_finite) => models,

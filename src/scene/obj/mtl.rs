@@ -98,7 +98,52 @@ fn load_library(reach: Reach, path: &Path, images: &mut Images) -> Result<Vec<De
         path: path.to_owned(),
         more,
     };
-    Ok(materials.into_iter().zip(more).map(described).collect())
+    let mut described: Vec<_> = materials.into_iter().zip(more).map(described).collect();
+    as_meant(path, &mut described);
+    Ok(described)
+}
+
+/// Changes terms that exporters write without meaning them. Warns once for each kind of change that could hide what a
+/// person has meant.
+fn as_meant(path: &Path, described: &mut [Described]) {
+    let (mut invisible, mut no_glass) = (Vec::new(), Vec::new());
+    for Described { spec, name, more, .. } in described {
+        if spec.ka.is_some_and(is_exporters_ambient) {
+            spec.ka = None;
+        }
+        if matches!(spec.illum, Some(4 | 6 | 9)) && !is_transparent(spec, more) {
+            // The default of `illum` depends on `Ks`.
+            spec.illum = None;
+            no_glass.push(name.as_str());
+        }
+        if spec.d == Some(0.0) || spec.tr == Some(1.0) {
+            (spec.d, spec.tr) = (None, None);
+            invisible.push(name.as_str());
+        }
+    }
+    let warn = |names: &[&str], what: &str| {
+        let Some(first) = names.first() else { return };
+        let others = if names.len() > 1 { format!(" and {} more", names.len() - 1) } else { String::new() };
+        tracing::warn!("{}: material `{}`{others} {what}", path.display(), first.escape_debug());
+    };
+    warn(&invisible, "would be invisible by `d 0` or `Tr 1`: shown opaque");
+    warn(&no_glass, "would be glass by `illum`, but no other term says so: shown opaque; `Ni 1.5` would make it glass");
+}
+
+/// Returns whether a `Ka` is one that exporters write for all materials, whatever their colours are: black or white.
+fn is_exporters_ambient(ka: [f32; 3]) -> bool {
+    ka == [0.0; 3] || ka == [1.0; 3]
+}
+
+/// Returns whether a term beside `illum` says that light passes through a material. Maya writes `illum 4`, `Tf 1 1 1`
+/// and `Ni 1` for opaque ones.
+fn is_transparent(spec: &MaterialSpec, more: &More) -> bool {
+    let has_opacity = more.maps.iter().any(|map| matches!(map.term, Term::Opacity | Term::Transparency));
+    has_opacity
+        || spec.d.is_some_and(|d| d != 1.0)
+        || spec.tr.is_some_and(|tr| tr != 0.0)
+        || spec.tf.is_some_and(|tf| tf != [1.0; 3])
+        || spec.ni.is_some_and(|ni| ni != 1.0 && ni != 0.0)
 }
 
 /// Reads the maps and the physically based terms, one entry for each material. Warns of terms and maps that are not

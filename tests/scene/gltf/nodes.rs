@@ -82,7 +82,7 @@ fn scene_files_place_whole_models() {
     model.push("materials", json!({ "name": "red", "pbrMetallicRoughness": { "baseColorFactor": [1, 0, 0, 1] } }));
     model.json["meshes"][0]["primitives"][0]["material"] = json!(0);
     model.root(json!({ "mesh": 0, "translation": [0, 0, 1] }));
-    let toml = "[materials]\nown = {}\n[[mesh]]\nfile = 'm.glb'\ntransform = { translate = [5, 0, 0], scale = 2 }\n\
+    let toml = "ambient = [0, 0, 0]\n[materials]\nown = {}\n[[mesh]]\nfile = 'm.glb'\ntransform = { translate = [5, 0, 0], scale = 2 }\n\
                 [[mesh]]\nfile = 'm.glb'\nmaterial = 'own'\nsmooth = false\n";
     let found = load(&[("s.toml", toml.as_bytes()), ("m.glb", &model.glb())]).unwrap();
     assert_eq!(found.material_names, ["own", "red"]);
@@ -143,7 +143,7 @@ fn punctual_lights_have_kdrays_units() {
 fn a_file_without_lights_is_lit_even_if_a_surface_glows() {
     let mut model = triangle();
     let bare = model.scene();
-    assert_eq!((bare.lights.len(), bare.defaults.is_metered), (1, false));
+    assert_eq!((bare.lights.len(), bare.defaults.is_metered), (2, false));
     model.push("materials", json!({ "emissiveFactor": [1, 1, 1] }));
     model.json["meshes"][0]["primitives"][0]["material"] = json!(0);
     let scene = model.scene();

@@ -1,0 +1,215 @@
+//! Interiors: scenes whose outer walls are made to be seen from inside, such as a room without thickness. Seen from
+//! outside, they would show the backs of their walls. Rays from the middle tell them from bodies: a body's outermost
+//! surface turns its front outwards, a room's turns it inwards.
+//!
+//! Few rays meet all triangles here, without an acceleration structure, since the rays come before the structure is
+//! chosen and built.
+
+use std::f32::consts::PI;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::{
+    Camera, Instance, Projection, Scene,
+    framing::{self, Frame},
+};
+
+/// Number of rays from the middle.
+const N_RAYS: usize = 64;
+/// A ray meets a wall if its last hit lies beyond this share of the way to the bounding box. Other shapes than rooms,
+/// such as an inside-out sphere, are smaller in most directions.
+const WALLS_BEGIN: f32 = 0.85;
+/// Least share of the rays that meet a wall, in an interior. A missing side of a cube leaves 5 of 6.
+const ENCLOSED: f32 = 0.7;
+
+/// Places of the eye in an interior, in half extents from the middle: to the right and to the front. The front comes
+/// first, so that it is taken where others are as good.
+const EYES: [(f32, f32); 8] =
+    [(0.0, 0.8), (0.7, 0.8), (-0.7, 0.8), (0.8, 0.0), (-0.8, 0.0), (0.0, -0.8), (0.7, -0.8), (-0.7, -0.8)];
+/// Height of the eye and of its target above the middle, in half extents.
+const EYE_HEIGHT: f32 = 0.0;
+const TARGET_HEIGHT: f32 = -0.1;
+/// Field of view in an interior, degrees: wider than outside, since walls limit the distance.
+pub(super) const VERTICAL_FOV_DEGREES: f32 = 60.0;
+/// Numbers of rays of a view, across and down.
+const VIEW_RAYS: (usize, usize) = (6, 4);
+/// Least share of a view's rays that meet the fronts of surfaces. Where there are fewer, the eye is in a body.
+const FREE: f32 = 0.5;
+
+/// Returns whether walls surround the middle of a scene.
+pub(super) fn is_interior(scene: &Scene, (min, max): (Vec3, Vec3)) -> bool {
+    let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0);
+    if half.min_element() <= 0.0 {
+        return false;
+    }
+    let rays: Vec<Ray> = (0..N_RAYS).map(|ix| Ray { origin: centre, direction: on_sphere(ix) * half }).collect();
+    let hits = hits(scene, &rays);
+    // In half extents, the ray leaves the box where its largest coordinate is 1.
+    let is_wall = |(ray, hits): &(&Ray, &Hits)| {
+        let exit = (ray.direction / half).abs().max_element().recip();
+        hits.last.is_some_and(|hit| hit.is_front && hit.t >= WALLS_BEGIN * exit)
+    };
+    let n_walls = rays.iter().zip(&hits).filter(is_wall).count();
+    n_walls as f32 >= ENCLOSED * N_RAYS as f32
+}
+
+/// Returns a camera for an interior. If a side is open, the camera is outside and sees the whole interior through it.
+/// If not, the camera is in one of a few places near the walls, the one that sees farthest. Returns `None` if all of
+/// them are in bodies. `frames` are those of a camera outside and of one inside.
+pub(super) fn camera(scene: &Scene, bounds: (Vec3, Vec3), [outside, inside]: [&Frame; 2]) -> Option<Camera> {
+    match open_side(scene, bounds, outside) {
+        Some(azimuth) => Some(framing::level_camera(bounds, azimuth, outside)),
+        None => camera_inside(scene, bounds, inside),
+    }
+}
+
+/// Returns the azimuth of the first open side, from the front to the right, in degrees. No ray from the middle to it
+/// hits anything.
+fn open_side(scene: &Scene, (min, max): (Vec3, Vec3), frame: &Frame) -> Option<u32> {
+    const PLACES: [(f32, f32); 5] = [(0.0, 0.0), (0.5, 0.5), (0.5, -0.5), (-0.5, 0.5), (-0.5, -0.5)];
+    let (origin, half) = ((min + max) / 2.0, (max - min) / 2.0);
+    let [right, front, up] = [frame.axes.right, frame.axes.front, frame.axes.up].map(|axis| axis.as_vec3());
+    let sides = [front, right, -front, -right];
+    let ray = |side: Vec3, (x, y): (f32, f32)| Ray { origin, direction: half * (side + x * side.cross(up) + y * up) };
+    let rays: Vec<Ray> = sides.iter().flat_map(|side| PLACES.map(|place| ray(*side, place))).collect();
+    let hits = hits(scene, &rays);
+    let is_open = |hits: &[Hits]| hits.iter().all(|hits| hits.first.is_none());
+    let side_ix = hits.chunks(PLACES.len()).position(is_open)?;
+    Some(90 * side_ix as u32)
+}
+
+/// Returns the camera that sees farthest of a few in an interior, or `None` if all of them are in bodies.
+fn camera_inside(scene: &Scene, (min, max): (Vec3, Vec3), frame: &Frame) -> Option<Camera> {
+    let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0);
+    let [right, front, up] = [frame.axes.right, frame.axes.front, frame.axes.up].map(|axis| axis.as_vec3());
+    let cameras = EYES.map(|(x, z)| Camera {
+        eye: centre + half * (x * right + z * front + EYE_HEIGHT * up),
+        target: centre + half * TARGET_HEIGHT * up,
+        up,
+        projection: Projection::Perspective { vertical_fov_degrees: frame.vertical_fov_degrees },
+    });
+    let rays: Vec<Ray> = cameras.iter().flat_map(|camera| view_rays(camera, frame.aspect as f32)).collect();
+    let hits = hits(scene, &rays);
+    let diagonal = 2.0 * half.length();
+    let mut best: Option<(f32, Camera)> = None;
+    for (camera, hits) in cameras.into_iter().zip(hits.chunks(VIEW_RAYS.0 * VIEW_RAYS.1)) {
+        let distances =
+            hits.iter().filter_map(|hits| hits.first.filter(|hit| hit.is_front)).map(|hit| hit.t / diagonal);
+        let (n, sum) = distances.fold((0, 0.0), |(n, sum): (usize, f32), distance| (n + 1, sum + distance.min(1.0)));
+        if n as f32 >= FREE * hits.len() as f32 && best.is_none_or(|(most, _)| sum > most * 1.01) {
+            best = Some((sum, camera));
+        }
+    }
+    best.map(|(_, camera)| camera)
+}
+
+/// Returns rays of length 1 through the whole picture of a camera.
+fn view_rays(camera: &Camera, aspect: f32) -> Vec<Ray> {
+    let forward = (camera.target - camera.eye).normalize();
+    let right = forward.cross(camera.up).normalize();
+    let up = right.cross(forward);
+    let half_height = camera.height_at(1.0) / 2.0;
+    let (n_across, n_down) = VIEW_RAYS;
+    let place = |ix: usize, n: usize| (2 * ix + 1) as f32 / n as f32 - 1.0;
+    let ray = |ix: usize| {
+        let (x, y) = (place(ix % n_across, n_across), place(ix / n_across, n_down));
+        let direction = forward + half_height * (x * aspect * right + y * up);
+        Ray { origin: camera.eye, direction: direction.normalize() }
+    };
+    (0..n_across * n_down).map(ray).collect()
+}
+
+/// Returns one of [`N_RAYS`] unit vectors, which are evenly distributed along a spiral.
+fn on_sphere(ix: usize) -> Vec3 {
+    let y = 1.0 - (2 * ix + 1) as f32 / N_RAYS as f32;
+    let angle = ix as f32 * PI * (3.0 - 5.0_f32.sqrt());
+    let radius = (1.0 - y * y).sqrt();
+    Vec3::new(radius * angle.cos(), y, radius * angle.sin())
+}
+
+/// A ray from t = 0 to infinity.
+#[derive(Clone, Copy, Debug)]
+struct Ray {
+    origin: Vec3,
+    direction: Vec3,
+}
+
+/// A hit at `t`, and whether the ray meets the front of the triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Hit {
+    t: f32,
+    is_front: bool,
+}
+
+/// The first and the last hit of a ray.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Hits {
+    first: Option<Hit>,
+    last: Option<Hit>,
+}
+
+impl Hits {
+    /// Adds a hit. Of hits at the same t, fronts count, so that the order of the hits makes no difference.
+    fn add(&mut self, hit: Hit) {
+        let replaces = |old: Option<Hit>, sign: f32| {
+            old.is_none_or(|old| sign * hit.t < sign * old.t || hit.t == old.t && hit.is_front)
+        };
+        if replaces(self.first, 1.0) {
+            self.first = Some(hit);
+        }
+        if replaces(self.last, -1.0) {
+            self.last = Some(hit);
+        }
+    }
+
+    /// Adds both hits of another set.
+    fn join(mut self, other: &Self) -> Self {
+        other.first.into_iter().chain(other.last).for_each(|hit| self.add(hit));
+        self
+    }
+}
+
+/// Number of faces that one thread tests at a time.
+const FACES_PER_CHUNK: usize = 16_384;
+
+/// Returns the hits of each ray with all triangles of a scene.
+fn hits(scene: &Scene, rays: &[Ray]) -> Vec<Hits> {
+    let none = || vec![Hits::default(); rays.len()];
+    let joined = |a: Vec<Hits>, b: Vec<Hits>| a.iter().zip(&b).map(|(a, b)| a.join(b)).collect();
+    let of_instance = |Instance { mesh_ix, transform, .. }: &Instance| {
+        let mesh = &scene.meshes[*mesh_ix];
+        let of_chunk = |faces: &[[u32; 3]]| {
+            let mut hits = none();
+            for face in faces {
+                let corners = face.map(|ix| transform.point(mesh.positions[ix as usize]));
+                for (ray, hits) in rays.iter().zip(&mut hits) {
+                    if let Some(mut hit) = hit(ray, corners) {
+                        hit.is_front ^= transform.mirrors();
+                        hits.add(hit);
+                    }
+                }
+            }
+            hits
+        };
+        mesh.faces.par_chunks(FACES_PER_CHUNK).map(of_chunk).reduce(none, joined)
+    };
+    scene.instances.par_iter().map(of_instance).reduce(none, joined)
+}
+
+/// Returns the hit of a ray with a triangle (Möller and Trumbore, Fast, Minimum Storage Ray/Triangle Intersection,
+/// 1997).
+fn hit(ray: &Ray, [a, b, c]: [Vec3; 3]) -> Option<Hit> {
+    let (ab, ac) = (b - a, c - a);
+    let p = ray.direction.cross(ac);
+    let determinant = ab.dot(p);
+    let from_a = ray.origin - a;
+    let u = from_a.dot(p) / determinant;
+    if !(0.0..=1.0).contains(&u) {
+        return None;
+    }
+    let q = from_a.cross(ab);
+    let v = ray.direction.dot(q) / determinant;
+    let t = ac.dot(q) / determinant;
+    (v >= 0.0 && u + v <= 1.0 && t > 0.0 && t.is_finite()).then_some(Hit { t, is_front: determinant > 0.0 })
+}

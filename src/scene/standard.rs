@@ -1,0 +1,93 @@
+//! Standard cameras and lights, for scenes that lack their own.
+
+use glam::Vec3;
+
+use super::{
+    Light, LoadOptions, Scene,
+    framing::{self, Frame, WorldAxes},
+    interior,
+};
+
+/// What a scene's file leaves out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Lacks {
+    pub camera: bool,
+    /// Neither lights nor ambient light.
+    pub light: bool,
+    /// Only a scene without light gets a background.
+    pub background: bool,
+}
+
+/// Outside, the main light comes over the left shoulder of the viewer, and a weaker one from the right fills its
+/// shadows.
+const KEY: Lamp = Lamp { azimuth: -50.0, elevation: 45.0, irradiance: 0.75 };
+const FILL: Lamp = Lamp { azimuth: 60.0, elevation: 20.0, irradiance: 0.22 };
+/// Irradiance of the ambient light.
+const AMBIENT: f32 = 0.2;
+const AMBIENT_OF_INTERIORS: f32 = 0.35;
+/// In an interior, the irradiance of the light in its middle, at a distance of a mean half extent.
+const MIDDLE_IRRADIANCE: f32 = 0.35;
+/// Height of that light above the middle, in half extents.
+const MIDDLE_HEIGHT: f32 = 0.3;
+/// In an interior, the irradiance of the light beside the eye, at the distance of the middle.
+const EYE_IRRADIANCE: f32 = 0.25;
+const BACKGROUND: Vec3 = Vec3::new(0.32, 0.36, 0.42);
+
+/// Gives a scene what its file lacks.
+pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) {
+    if !lacks.camera && !lacks.light {
+        return;
+    }
+    let bounds = scene.bounds();
+    let axes = WorldAxes::with_up(Vec3::Y);
+    let is_interior = interior::is_interior(scene, bounds);
+    if lacks.camera {
+        let aspect = options.aspect.unwrap_or(scene.defaults.width as f32 / scene.defaults.height as f32);
+        let frame = |vertical_fov_degrees| Frame { axes, aspect: f64::from(aspect), vertical_fov_degrees };
+        let (outside, inside) = (frame(framing::VERTICAL_FOV_DEGREES), frame(interior::VERTICAL_FOV_DEGREES));
+        let of_interior = if is_interior { interior::camera(scene, bounds, [&outside, &inside]) } else { None };
+        scene.camera = of_interior.unwrap_or_else(|| framing::camera(bounds, &outside));
+    }
+    if lacks.light {
+        let lamps = if is_interior { lamps_inside(scene, bounds) } else { lamps_outside(scene, &axes) };
+        scene.ambient = Vec3::splat(if is_interior { AMBIENT_OF_INTERIORS } else { AMBIENT });
+        scene.lights = lamps.to_vec();
+        if lacks.background {
+            scene.background = BACKGROUND;
+        }
+    }
+}
+
+/// A directional light. Its direction is relative to the viewer: `azimuth` to the right, `elevation` upwards, degrees.
+struct Lamp {
+    azimuth: f32,
+    elevation: f32,
+    irradiance: f32,
+}
+
+/// Returns the lights of a scene that is seen from outside.
+fn lamps_outside(scene: &Scene, axes: &WorldAxes) -> [Light; 2] {
+    let up = axes.up.as_vec3();
+    let towards_eye = (scene.camera.eye - scene.camera.target).reject_from_normalized(up);
+    let towards_eye = towards_eye.try_normalize().unwrap_or(axes.front.as_vec3());
+    let right = up.cross(towards_eye);
+    [KEY, FILL].map(|Lamp { azimuth, elevation, irradiance }| {
+        let (azimuth, elevation) = (azimuth.to_radians(), elevation.to_radians());
+        let horizontal = towards_eye * azimuth.cos() + right * azimuth.sin();
+        let towards = (horizontal * elevation.cos() + up * elevation.sin()).normalize();
+        Light::Directional { towards, irradiance: Vec3::splat(irradiance) }
+    })
+}
+
+/// Returns the lights of an interior: one in its middle, and one at the eye, whose shadows the eye does not see.
+fn lamps_inside(scene: &Scene, (min, max): (Vec3, Vec3)) -> [Light; 2] {
+    let (centre, half) = ((min + max) / 2.0, (max - min) / 2.0);
+    let up = scene.camera.up;
+    let mean = (half.x * half.y * half.z).cbrt();
+    let lamp = |position: Vec3, irradiance: f32, distance: f32| Light::Point {
+        position,
+        intensity: Vec3::splat(irradiance * distance * distance),
+    };
+    let eye = scene.camera.eye;
+    [lamp(centre + half * MIDDLE_HEIGHT * up, MIDDLE_IRRADIANCE, mean), lamp(eye, EYE_IRRADIANCE, eye.distance(centre))]
+}
