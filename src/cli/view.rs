@@ -26,8 +26,8 @@ use super::{
 /// Default number of samples per pixel while the camera rests.
 const SAMPLES_AT_REST: u32 = 256;
 
-/// Runs `kdray view`: loads the scene if there is one, builds its structure and shows it. Arguments and files are checked
-/// before the work that an error would waste.
+/// Runs `kdray view`: loads the scene if there is one, builds its structure and shows it. Arguments and files are
+/// checked before the work that an error would waste.
 pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     args.picture.check()?;
     check_scene(args)?;
