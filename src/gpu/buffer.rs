@@ -182,7 +182,16 @@ impl<T: Pod> Buffer<T> {
     /// # Panics
     /// The buffer has fewer elements.
     pub fn download_first(&self, len: usize) -> Result<Vec<T>, GpuError> {
-        assert!(len <= self.len, "`{}` holds {} elements, not {len}", self.any.name, self.len);
+        self.download_part(0, len)
+    }
+
+    /// Downloads `len` elements from index `first` on and waits for the device.
+    ///
+    /// # Panics
+    /// The buffer has fewer elements.
+    pub fn download_part(&self, first: usize, len: usize) -> Result<Vec<T>, GpuError> {
+        let end = first + len;
+        assert!(end <= self.len, "`{}` holds {} elements, not {end}", self.any.name, self.len);
         let bytes = len * size_of::<T>();
         if bytes == 0 {
             return Ok(Vec::new());
@@ -191,7 +200,8 @@ impl<T: Pod> Buffer<T> {
         let mut staging = AnyBuffer::staging(context, &self.any.name, bytes as u64, MemoryLocation::GpuToCpu)?;
         context.run("download", |commands| {
             commands.barrier(Access::ComputeWrite, Access::TransferRead); // the buffer
-            commands.copy_buffer(&self.any, &staging, bytes as u64);
+            let begin = (first * size_of::<T>()) as u64;
+            commands.copy_buffer_part((&self.any, begin), (&staging, 0), bytes as u64);
             commands.barrier(Access::TransferWrite, Access::HostRead); // staging
         })?;
         let mut data = vec![T::zeroed(); len];

@@ -370,8 +370,18 @@ impl Commands<'_> {
     }
 
     /// Copies the source's first `bytes` bytes to the destination, from its byte `begin` on.
-    pub fn copy_buffer_to(&self, (destination, begin): (&AnyBuffer, u64), source: &AnyBuffer, bytes: u64) {
-        let region = [vk::BufferCopy::default().dst_offset(begin).size(bytes)];
+    pub fn copy_buffer_to(&self, destination: (&AnyBuffer, u64), source: &AnyBuffer, bytes: u64) {
+        self.copy_buffer_part((source, 0), destination, bytes);
+    }
+
+    /// Copies `bytes` bytes. Both buffers come with the byte at which the copy begins.
+    pub fn copy_buffer_part(
+        &self,
+        (source, source_begin): (&AnyBuffer, u64),
+        (destination, begin): (&AnyBuffer, u64),
+        bytes: u64,
+    ) {
+        let region = [vk::BufferCopy::default().src_offset(source_begin).dst_offset(begin).size(bytes)];
         // SAFETY: both buffers hold that many bytes, as their owners have checked.
         unsafe { self.context.device.cmd_copy_buffer(self.raw, source.raw(), destination.raw(), &region) };
     }

@@ -14,7 +14,7 @@ fn id_color(id: u32) -> Vec3 {
 }
 
 /// A heat map: from black over violet, red and yellow to white as x rises from 0 to 1.
-fn heat_color(x: f32) -> Vec3 {
+pub fn heat_color(x: f32) -> Vec3 {
     let rising = (3.0 * x - vec3(0.0, 1.0, 2.0)).clamp(Vec3::ZERO, Vec3::ONE);
     rising + vec3(0.0, 0.0, 0.5 * (1.0 - (6.0 * x - 1.5).abs() / 1.5).max(0.0))
 }

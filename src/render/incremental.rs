@@ -5,13 +5,14 @@
 
 use std::time::Instant;
 
+use glam::UVec2;
 use tracing::info_span;
 
 use super::{Renderer, schedule::Schedule};
 use crate::{
     frame::{Picture, Profile, View},
     gpu::{CommandBuffer, GpuError},
-    layout::{Batch, FalseColor, Frame, constants},
+    layout::{Batch, FalseColor, Feature, Frame, constants},
     passes::Passes,
     scene::Camera,
 };
@@ -276,6 +277,24 @@ impl Renderer {
         let display = self.resources.pixels.pixel_display.download_first(width as usize * height as usize)?;
         let display = display.into_iter().map(u32::to_le_bytes).collect();
         Ok(Some(Picture { width, height, radiance: Vec::new(), display }))
+    }
+
+    /// Downloads what the primary ray of a pixel hit in the last sample, and what the pixel's rays cost. Returns None
+    /// if the options do not ask for features, or while a sample is drawn in parts.
+    ///
+    /// # Panics
+    /// The picture does not have the pixel.
+    ///
+    /// # Errors
+    /// The copy fails.
+    pub fn feature_at(&self, pixel: UVec2) -> Result<Option<Feature>, GpuError> {
+        if !self.options.features || self.pending.is_some() || self.n_samples == 0 {
+            return Ok(None);
+        }
+        let Frame { width, height, .. } = *self.resources.constants();
+        assert!(pixel.x < width && pixel.y < height, "a pixel of the picture");
+        let pixel_ix = pixel.y as usize * width as usize + pixel.x as usize;
+        Ok(self.resources.pixels.pixel_features.download_part(pixel_ix, 1)?.first().copied())
     }
 
     /// Notes that `pixel_display` holds a complete picture.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use glam::{Vec3, uvec2};
+use glam::{UVec2, Vec3, uvec2};
 
 use super::{
     gpu_session::GpuSession,
@@ -97,17 +97,37 @@ impl Session {
         self.report_saves();
     }
 
-    /// Follows the rays of the displayed picture's pixel at a point of the window. `window` and `(x, y)` are in
-    /// pixels.
-    fn pick(&mut self, options: &RenderOptions, displayed: Displayed, window: (u32, u32), (x, y): (f64, f64)) {
+    /// Follows the rays of the displayed picture's pixel at a point of the window. `window` and `at` are in pixels.
+    fn pick(&mut self, options: &RenderOptions, displayed: Displayed, window: (u32, u32), at: (f64, f64)) {
         let (width, height) = displayed.size;
-        let pixel = |at: f64, window: u32, picture: u32| {
-            ((at / f64::from(window) * f64::from(picture)).max(0.0) as u32).min(picture - 1)
-        };
-        let pixel = uvec2(pixel(x, window.0, width), pixel(y, window.1, height));
+        let pixel = pixel_at(at, window, displayed.size);
         let options = RenderOptions { width, height, ..options.clone() };
         self.picked = Some(pick(&self.loaded.world, &options, &displayed.camera, pixel));
     }
+
+    /// Reads the features of the pixel at a point of the window, if the view shows features. While a sample is drawn in
+    /// parts, those that were read last stay. `window` and `at` are in pixels.
+    ///
+    /// # Errors
+    /// The copy fails.
+    pub fn point_at(&mut self, gpu: &GpuSession, window: (u32, u32), at: (f64, f64)) -> Result<(), GpuError> {
+        let RenderOptions { width, height, features, .. } = *gpu.renderer.options();
+        if !features {
+            self.pointed = None;
+        } else if let Some(feature) = gpu.renderer.feature_at(pixel_at(at, window, (width, height)))? {
+            self.pointed = Some(feature);
+        }
+        Ok(())
+    }
+}
+
+/// Returns the pixel of a picture that is shown at a point of the window, or the one nearest to it. All sizes and
+/// places are in pixels.
+fn pixel_at(at: (f64, f64), window: (u32, u32), picture: (u32, u32)) -> UVec2 {
+    let pixel = |at: f64, window: u32, picture: u32| {
+        ((at / f64::from(window) * f64::from(picture)).max(0.0) as u32).min(picture - 1)
+    };
+    uvec2(pixel(at.0, window.0, picture.0), pixel(at.1, window.1, picture.1))
 }
 
 /// Writes the renderer's picture in the format of the path's extension, as `kdray render` does.

@@ -176,6 +176,9 @@ impl App {
             None => size,
         };
         let session = &mut self.session;
+        if layers.panel {
+            session.point_at(gpu, size, self.input.pointer())?;
+        }
         let layout = layers.any().then(|| lay_out(session, gpu, (ui, window, layers), self.input.is_flying()));
         session.draw(gpu, picture)?;
         session.save_if_due(gpu, picture);

@@ -67,6 +67,11 @@ impl Input {
         self.is_flying
     }
 
+    /// Returns the pointer's position in pixels from the window's upper left corner.
+    pub fn pointer(&self) -> (f64, f64) {
+        self.mouse.position()
+    }
+
     /// Handles an event that the overlay has not taken. `window` is the window's size in pixels.
     pub fn handle(&mut self, event: &WindowEvent, window: (u32, u32), controller: &mut Controller) -> InputEffect {
         match event {

@@ -80,6 +80,11 @@ impl Mouse {
         self.press = None;
     }
 
+    /// Returns the mouse's position in pixels from the window's upper left corner.
+    pub fn position(&self) -> (f64, f64) {
+        self.cursor
+    }
+
     /// Returns the mouse's offset to the right of the window's middle and below it, in heights of the window.
     pub fn offset_from_middle(&self, window: (u32, u32)) -> (f32, f32) {
         let middle = (f64::from(window.0) / 2.0, f64::from(window.1) / 2.0);

@@ -18,6 +18,7 @@ use crate::{
     accel::Statistics,
     frame::{Denoise, Profile, RenderOptions, View},
     gpu::GpuError,
+    layout::Feature,
 };
 
 /// Least length in seconds of the history that the panel shows.
@@ -62,6 +63,8 @@ pub struct Session {
     /// Time spent so far on the sample that is being drawn, milliseconds.
     sample_ms: f64,
     pub(super) picked: Option<Picked>,
+    /// The features of the pixel under the pointer, from the last picture with features.
+    pub(super) pointed: Option<Feature>,
     /// Whether the user has asked to save the picture. It is saved once a picture of the window's size is displayed,
     /// even if further samples are to come.
     pub(super) is_save_due: bool,
@@ -96,6 +99,7 @@ impl Session {
             room: (0, 0),
             window: (0, 0),
             picked: None,
+            pointed: None,
             is_save_due: false,
             print,
             saver,
@@ -311,6 +315,8 @@ impl Session {
             profile: &self.profile,
             history: &self.history,
             memory: gpu.context.memory(),
+            view: self.view(),
+            pointed: self.pointed,
             picked: self.picked.as_ref(),
             message: self.message.as_ref(),
         }

@@ -1,6 +1,7 @@
 //! Tests that a sample drawn in parts is the same, bit for bit, as one drawn at once, and is not visible before it is
 //! complete.
 
+use glam::uvec2;
 use kdray::{
     frame::{Picture, RenderOptions, View},
     render::{Displayed, Renderer},
@@ -188,6 +189,10 @@ fn views_of_first_hits_trace_primary_rays_only() {
         renderer.set_view(view, 1.0);
         renderer.draw().expect("a frame");
         assert_eq!(renderer.features().expect("features"), features, "{view} sums over all rays");
+        for pixel in [uvec2(0, 0), uvec2(31, 0), uvec2(7, 23)] {
+            let expected = features[(pixel.y * 32 + pixel.x) as usize];
+            assert_eq!(renderer.feature_at(pixel).expect("a feature"), Some(expected), "{pixel}");
+        }
     }
     assert_silent(&context);
 }

@@ -147,6 +147,29 @@ fn number_keys_show_other_views_and_the_picture_again() {
 }
 
 #[test]
+fn a_false_colour_view_has_a_legend_with_the_value_under_the_pointer() {
+    let (directory, display) = (TempDir::new().unwrap(), Display::start(800, 400));
+    let viewer = viewer_of_size(directory.path(), &display, &cornell(), &["--size", "800x400", "--spp", "1", "-q"]);
+    display.focus("kdray");
+    // The legend's place, where the picture shows nothing bright.
+    let corner = |screen: &Screen| -> Vec<[u8; 3]> {
+        (8..90).flat_map(|y| screen.pixels[y * screen.width..][560..790].to_vec()).collect()
+    };
+    let has_white = |screen: &Screen| corner(screen).iter().any(|pixel| pixel.iter().all(|channel| *channel > 240));
+    display.act(&["mousemove", "400", "200"]);
+    display.wait_until("a picture", |screen| screen.pixels[200 * 800 + 400] != [0; 3]);
+    assert!(!has_white(&display.screen()), "the picture has no legend");
+    display.act(&["key", "2"]);
+    display.wait_until("a bar from white to black", has_white);
+    thread::sleep(Duration::from_millis(500));
+    let before = corner(&display.screen());
+    display.act(&["mousemove", "420", "330"]);
+    display.wait_until("another value", |screen| corner(screen) != before);
+    display.act(&["key", "Escape"]);
+    ended(viewer);
+}
+
+#[test]
 fn the_window_shows_the_picture_and_the_overlay_over_it() {
     let (directory, display) = (TempDir::new().unwrap(), Display::start(320, 240));
     let picture = rendered(directory.path(), &cornell(), &[]);

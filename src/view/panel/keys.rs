@@ -12,7 +12,7 @@ pub const KEYS: [(&str, &str); 16] = [
     ("Shift, Ctrl", "fly faster, slower, as long as it is held"),
     ("+ -, Ctrl or Alt + wheel", "fly faster, slower from now on"),
     ("F, Home", "frame the scene, back to the start"),
-    (", .", "narrower, wider field of view; less, more height"),
+    ("comma, full stop", "narrower, wider field of view; less, more height"),
     ("U", "another axis points up: +z, +x, -y, -z, -x, +y"),
     ("1, 2 3 4", "picture; depth, normals, triangles: primary rays only"),
     ("5, 6", "steps, rays: sums over all rays, slow as the picture"),

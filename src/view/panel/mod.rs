@@ -3,6 +3,7 @@
 mod controls;
 mod graph;
 mod keys;
+mod legend;
 mod tables;
 
 use std::time::Instant;
@@ -18,6 +19,7 @@ use super::{
 use crate::{
     frame::{Profile, RenderOptions, View},
     gpu::MemoryUse,
+    layout::Feature,
     scene::Projection,
 };
 
@@ -100,6 +102,10 @@ pub struct Facts<'a> {
     pub history: &'a History,
     /// Device memory by use.
     pub memory: Vec<MemoryUse>,
+    /// The current view, and the value that it shows brightest; for depths, the one that it shows half as bright.
+    pub view: (View, f32),
+    /// The features of the pixel under the pointer; none if they are unknown.
+    pub pointed: Option<Feature>,
     /// The rays of the pixel that was clicked last.
     pub picked: Option<&'a Picked>,
     /// The last message, unless a later success on the same topic has cleared it.
@@ -114,6 +120,7 @@ pub fn show(ui: &mut Ui, layers: Layers, edited: &mut Edited, facts: &Facts) {
         .corner_radius(CornerRadius::same(4))
         .inner_margin(Margin::same(8));
     if layers.panel {
+        legend::show(ui, frame, facts);
         panel(ui, frame, edited, facts);
     } else if layers.messages {
         message_alone(ui, frame, facts);
