@@ -41,7 +41,7 @@ pub(super) fn parse_obj(path: &Path, text: &str, loading: &mut Loading) -> Resul
     }
     let by_name = used_materials(path, &clean, &materials);
     let models = match parse(&clean, &by_name) {
-        Ok(models) if !models.is_empty() && models.iter().all(is_finite) => models,
+        Ok(models) if clean.size.n_triangles > 0 && models.iter().all(is_finite) => models,
         // The quick way has not looked at the numbers, so it is the careful way that finds what is wrong with one.
         _ => parse(&careful()?, &by_name).map_err(|e| SceneError::file(path, e.to_string()))?,
     };
