@@ -7,7 +7,7 @@ use kdray::{
     frame::View,
     gpu::{ContextOptions, chosen_device},
     output::{self, Format, OutputError},
-    scene::{Camera, CameraPath},
+    scene::{Camera, CameraPath, Scene},
     view::{Display, LoadOptions, LoadedScene, Settings, Tour, ViewOptions, ViewReport},
 };
 use serde::Serialize;
@@ -34,10 +34,12 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
     let display = Display::open()?;
 
     let progress = Progress::new(args.quiet, 2);
-    let (scene, _) =
-        progress.stage(&format!("loading {}", args.scene.display()), || args.load.load_for(&args.picture, &args.scene));
+    let (scene, _) = progress.stage(&format!("loading {}", args.scene.display()), || {
+        Scene::load_with(&args.scene, &args.load.options_for(&args.picture, &args.look))
+    });
     let scene = scene?;
     scene.warn_if_unlit(&args.scene);
+    args.look.note_up(&args.scene, &scene).into_iter().for_each(|note| progress.note(&note));
     let mut options = args.picture.options(&scene);
     let tour = tour(args, scene.camera)?;
     let max_samples = args.spp.unwrap_or(if tour.is_some() { 1 } else { SAMPLES_AT_REST });
@@ -53,7 +55,7 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
         request: args.picture.request(),
         processor,
         workload,
-        scene: args.load.options_for(&args.picture),
+        scene: args.load.options_for(&args.picture, &args.look),
     };
     let accel = load_options.request.choose_accel(processor, scene.n_triangles(), &workload);
     build::check_memory(accel, scene.n_triangles())?;
