@@ -18,6 +18,7 @@ pub use super::view_args::ViewArgs;
 use super::{
     error::CliError,
     load_args::LoadArgs,
+    look_args::LookArgs,
     or_auto::OrAuto,
     picture_args::{
         PictureArgs, accel_help, accel_long_help, build_help, build_long_help, check_accel, listed, traversal_help,
@@ -77,14 +78,17 @@ pub struct RenderArgs {
     /// Render only the pixels x0 <= x < x1, y0 <= y < y1, counted from the picture's upper left corner
     #[arg(long, value_name = "x0,y0,x1,y1")]
     pub crop: Option<Crop>,
-    /// Samples per pixel, 1 to 65536: the first sample is at the pixel's centre, further ones smooth edges
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = value_parser!(u32).range(1..=65_536))]
-    pub spp: u32,
+    /// Samples per pixel, 1 to 65536: the first sample is at the pixel's centre, further ones smooth edges [default:
+    /// the scene file's, else 1; 4 for a mesh file; 1 with --trace]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=65_536))]
+    pub spp: Option<u32>,
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     #[arg(help = with_words(AOV, None, &Aov::words()), long_help = listed(AOV, "none", &Aov::descriptions()))]
     pub aov: Vec<Aov>,
     #[command(flatten)]
     pub load: LoadArgs,
+    #[command(flatten)]
+    pub look: LookArgs,
     #[command(flatten)]
     pub picture: PictureArgs,
     /// Render on the CPU, without Vulkan
@@ -189,6 +193,8 @@ pub struct ConvertArgs {
     pub output: PathBuf,
     #[command(flatten)]
     pub load: LoadArgs,
+    #[command(flatten)]
+    pub look: LookArgs,
     /// Replace OUT if it exists
     #[arg(short, long)]
     pub force: bool,
@@ -201,12 +207,17 @@ impl RenderArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         self.picture.check()?;
-        if self.trace.is_some() && (self.spp > 1 || self.path.is_some()) {
+        if self.trace.is_some() && (self.spp.is_some_and(|n| n > 1) || self.path.is_some()) {
             return Err(CliError::Usage(
                 "--trace cannot be combined with --spp or --path: it shows a single sample".into(),
             ));
         }
         Ok(())
+    }
+
+    /// Returns the number of samples per pixel: the user's, else the scene's.
+    pub fn samples(&self, scene: &Scene) -> u32 {
+        self.spp.unwrap_or(if self.trace.is_some() { 1 } else { scene.defaults.samples })
     }
 
     /// Returns the render options: the user's, and the scene's own where the user gave none. Refuses a crop beyond

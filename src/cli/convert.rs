@@ -1,6 +1,9 @@
 //! `kdray convert`: a scene file made from any file that is a scene, to be edited.
 
-use kdray::{output, scene::scene_file_of};
+use kdray::{
+    output,
+    scene::{LoadOptions, scene_file_of},
+};
 
 use super::{args::ConvertArgs, error::CliError, file_roles::FileRoles, print};
 
@@ -18,7 +21,8 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
         return Err(CliError::Usage(format!("`{path}` exists: --force replaces it")));
     }
     output::check(&args.output)?;
-    let text = scene_file_of(&args.input, &args.output, &args.load.options())?;
+    let options = LoadOptions { look: args.look.look(), ..args.load.options() };
+    let text = scene_file_of(&args.input, &args.output, &options)?;
     output::write(&args.output, text.as_bytes())?;
     if args.quiet { Ok(()) } else { print(&format!("wrote {path}\n")) }
 }

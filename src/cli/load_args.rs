@@ -4,7 +4,7 @@ use std::path::Path;
 
 use kdray::scene::{LoadOptions, Scene, SceneError};
 
-use super::picture_args::PictureArgs;
+use super::{look_args::LookArgs, picture_args::PictureArgs};
 
 #[derive(clap::Args)]
 pub struct LoadArgs {
@@ -27,20 +27,20 @@ impl LoadArgs {
         Scene::load_with(path, &self.options())
     }
 
-    /// Loads a scene whose picture has the user's size.
-    pub fn load_for(&self, picture: &PictureArgs, path: &Path) -> Result<Scene, SceneError> {
-        Scene::load_with(path, &self.options_for(picture))
-    }
-
-    /// Returns the options of loading a scene whose picture has the user's size.
-    pub fn options_for(&self, picture: &PictureArgs) -> LoadOptions {
+    /// Returns the options of loading a scene whose picture has the user's size and look.
+    pub fn options_for(&self, picture: &PictureArgs, look: &LookArgs) -> LoadOptions {
         let aspect = picture.size.map(|size| size.width as f32 / size.height as f32);
-        LoadOptions { aspect, ..self.options() }
+        LoadOptions { aspect, look: look.look(), ..self.options() }
     }
 
     /// Returns the options of loading.
     pub fn options(&self) -> LoadOptions {
         let &Self { allow_outside, .. } = self;
-        LoadOptions { scene: self.scene_name.clone(), camera: self.camera.clone(), allow_outside, aspect: None }
+        LoadOptions {
+            scene: self.scene_name.clone(),
+            camera: self.camera.clone(),
+            allow_outside,
+            ..LoadOptions::default()
+        }
     }
 }

@@ -15,6 +15,7 @@ mod file_roles;
 mod inspect;
 mod load_args;
 mod log;
+mod look_args;
 mod or_auto;
 mod picture_args;
 mod progress;

@@ -77,8 +77,10 @@ pub fn run(args: &ViewArgs) -> Result<(), CliError> {
 /// command line apply to them, too.
 fn opener(args: &ViewArgs, processor: Processor) -> Opener {
     let picture = args.picture.clone();
-    // The names of a camera and a scene on the command line are those of the first file.
-    let load_options = scene::LoadOptions { scene: None, camera: None, ..args.load.options_for(&picture) };
+    let first = args.load.options_for(&picture, &args.look);
+    // The camera and the scene on the command line are those of the first file.
+    let look = scene::Look { eye: None, target: None, ..first.look };
+    let load_options = scene::LoadOptions { scene: None, camera: None, look, ..first };
     Arc::new(move |path| open(path, &load_options, &picture, processor).map_err(|error| error.to_string()))
 }
 
@@ -109,9 +111,12 @@ struct Start {
 
 /// Loads the scene and builds its structure.
 fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliError> {
-    let (scene, _) = progress.stage(&format!("loading {}", path.display()), || args.load.load_for(&args.picture, path));
+    let scene_options = args.load.options_for(&args.picture, &args.look);
+    let loading = format!("loading {}", path.display());
+    let (scene, _) = progress.stage(&loading, || Scene::load_with(path, &scene_options));
     let scene = scene?;
     scene.warn_if_unlit(path);
+    args.look.note_up(path, &scene).into_iter().for_each(|note| progress.note(&note));
     let mut options = args.picture.options(&scene.defaults);
     let tour = tour(args, scene.camera)?;
     let workload = match &tour {
@@ -122,7 +127,6 @@ fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliE
         None => Workload::of_window((options.width, options.height)),
     };
     let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
-    let scene_options = args.load.options_for(&args.picture);
     let load_options = LoadOptions { request: args.picture.request(), processor, workload, scene: scene_options };
     let accel = load_options.request.choose_accel(processor, scene.n_triangles(), &workload);
     build::check_memory(accel, scene.n_triangles())?;
@@ -134,7 +138,7 @@ fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliE
 
 /// Returns the start of a window that waits for a file.
 fn without_scene(args: &ViewArgs) -> Result<Start, CliError> {
-    let scene = args.load.options_for(&args.picture);
+    let scene = args.load.options_for(&args.picture, &args.look);
     let options = args.picture.options(&RenderDefaults::default());
     let processor = Processor::of_device(&chosen_device(args.device.as_ref())?);
     let (request, workload) = (args.picture.request(), Workload::of_window((options.width, options.height)));

@@ -8,6 +8,7 @@ use kdray::gpu::DeviceSelector;
 use super::{
     args::device,
     load_args::LoadArgs,
+    look_args::LookArgs,
     picture_args::{PictureArgs, positive},
 };
 
@@ -20,6 +21,8 @@ pub struct ViewArgs {
     pub scene: Option<PathBuf>,
     #[command(flatten)]
     pub load: LoadArgs,
+    #[command(flatten)]
+    pub look: LookArgs,
     #[command(flatten)]
     pub picture: PictureArgs,
     /// Samples per pixel while the camera rests, 1 to 65536 [default: 256; 1 with --frames or --path]

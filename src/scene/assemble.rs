@@ -17,6 +17,7 @@ use super::{
     error::{Checked, SceneError},
     extent,
     image_files::Images,
+    look::Up,
     map_spec::MapSpec,
     material::{MaterialSpec, colour, within},
     mesh::MAX_COORDINATE,
@@ -74,6 +75,7 @@ impl File<'_> {
 
 fn assemble(file: &File, description: Description) -> Result<(Scene, Lacks), SceneError> {
     let lacks = Lacks {
+        up: Up::Y,
         camera: description.camera.is_none() && description.cameras.is_empty(),
         light: description.light.is_empty() && description.ambient.is_none(),
         background: description.background.is_none(),
@@ -228,8 +230,7 @@ pub(super) fn camera(spec: &CameraSpec) -> Checked<Camera> {
         up: normalized(finite("up", spec.up.unwrap_or([0.0, 1.0, 0.0]))?),
         projection: projection(spec.vertical_fov, spec.orthographic_height)?,
     };
-    let forward = (camera.target.as_dvec3() - camera.eye.as_dvec3()).normalize_or_zero();
-    if forward.cross(camera.up.as_dvec3()).length() < 1e-4 {
+    if !camera.spans_picture() {
         return Err(
             "eye, target and up span no picture: eye and target coincide, or up points along the view".to_owned()
         );
@@ -279,6 +280,7 @@ fn render_defaults(spec: &RenderSpec) -> Checked<RenderDefaults> {
             Some(word) => word.parse().map_err(|e| format!("tonemap: {e}"))?,
             None => defaults.tonemap,
         },
+        samples: count("samples", spec.samples, defaults.samples, 65_536)?,
         exposure: within("exposure", spec.exposure.unwrap_or(defaults.exposure), 1e-6, 1e6)?,
         is_metered,
         denoise: match spec.denoise.unwrap_or(SceneDenoise::Paper) {

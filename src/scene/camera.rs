@@ -40,6 +40,12 @@ pub enum Projection {
 }
 
 impl Camera {
+    /// Returns whether eye and target differ, and up does not point along the view.
+    pub(super) fn spans_picture(&self) -> bool {
+        let forward = (self.target.as_dvec3() - self.eye.as_dvec3()).normalize_or_zero();
+        forward.cross(self.up.as_dvec3()).length() >= 1e-4
+    }
+
     /// Returns whether the camera is orthographic.
     pub fn is_orthographic(&self) -> bool {
         matches!(self.projection, Projection::Orthographic { .. })

@@ -11,6 +11,8 @@ pub struct RenderDefaults {
     pub height: u32,
     /// Number of ray levels, including the primary rays: 1 stands for primary rays only.
     pub max_depth: u32,
+    /// Number of samples per pixel of a picture.
+    pub samples: u32,
     /// Factor on radiance before the tone curve.
     pub exposure: f32,
     /// Whether the exposure is to be measured ([`metered_exposure`](crate::cpu::metered_exposure)) in place of
@@ -25,7 +27,7 @@ pub struct RenderDefaults {
 impl Default for RenderDefaults {
     fn default() -> Self {
         let RenderOptions { width, height, max_depth, exposure, tonemap, denoise, .. } = RenderOptions::default();
-        Self { width, height, max_depth, exposure, is_metered: false, tonemap, denoise }
+        Self { width, height, max_depth, samples: 1, exposure, is_metered: false, tonemap, denoise }
     }
 }
 

@@ -87,6 +87,8 @@ pub(super) struct RenderSpec {
     pub width: Option<u32>,
     pub height: Option<u32>,
     pub max_depth: Option<u32>,
+    /// Number of samples per pixel.
+    pub samples: Option<u32>,
     pub exposure: Option<f32>,
     /// Whether the exposure is measured in the first view, for lights in physical units; an error beside `exposure`.
     pub metered: Option<bool>,

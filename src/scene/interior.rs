@@ -1,6 +1,6 @@
-//! Interiors: scenes whose outer walls are made to be seen from inside, such as a room without thickness. Seen from
-//! outside, they would show the backs of their walls. Rays from the middle tell them from bodies: a body's outermost
-//! surface turns its front outwards, a room's turns it inwards.
+//! Interiors: scenes whose outer walls are made to be seen from inside. Seen from outside, they would show the backs of
+//! their walls, or nothing but these. Rays from the middle tell them from bodies: a body's outermost surface turns its
+//! front outwards, that of a room without thickness turns it inwards, and walls with thickness have a front inside, too.
 //!
 //! Few rays meet all triangles here, without an acceleration structure, since the rays come before the structure is
 //! chosen and built.
@@ -17,8 +17,8 @@ use super::{
 
 /// Number of rays from the middle.
 const N_RAYS: usize = 64;
-/// A ray meets a wall if its last hit lies beyond this share of the way to the bounding box. Other shapes than rooms,
-/// such as an inside-out sphere, are smaller in most directions.
+/// A ray meets a wall if its last hit, or its first one, lies beyond this share of the way to the bounding box. Other
+/// shapes than rooms, such as an inside-out sphere, are smaller in most directions.
 const WALLS_BEGIN: f32 = 0.85;
 /// Least share of the rays that meet a wall, in an interior. A missing side of a cube leaves 5 of 6.
 const ENCLOSED: f32 = 0.7;
@@ -48,7 +48,8 @@ pub(super) fn is_interior(scene: &Scene, (min, max): (Vec3, Vec3)) -> bool {
     // In half extents, the ray leaves the box where its largest coordinate is 1.
     let is_wall = |(ray, hits): &(&Ray, &Hits)| {
         let exit = (ray.direction / half).abs().max_element().recip();
-        hits.last.is_some_and(|hit| hit.is_front && hit.t >= WALLS_BEGIN * exit)
+        let is_wall = |hit: Option<Hit>| hit.is_some_and(|hit| hit.is_front && hit.t >= WALLS_BEGIN * exit);
+        is_wall(hits.last) || is_wall(hits.first)
     };
     let n_walls = rays.iter().zip(&hits).filter(is_wall).count();
     n_walls as f32 >= ENCLOSED * N_RAYS as f32

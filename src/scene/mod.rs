@@ -18,6 +18,7 @@ mod image_files;
 mod interior;
 mod light;
 mod lighting;
+mod look;
 mod map_spec;
 mod material;
 mod material_spec;
@@ -52,6 +53,7 @@ pub use self::{
     error::SceneError,
     extent::MIN_EXTENT,
     light::Light,
+    look::{LightChoice, Look, Up},
     material::{Alpha, Clearcoat, Lobes, Maps, Material, Microfacet, Sheen},
     mesh::Mesh,
     path::CameraPath,
@@ -109,6 +111,8 @@ pub struct LoadOptions {
     /// Width of the picture divided by its height, which a camera is made for where the file has none. Where absent, it
     /// is that of [`Scene::defaults`].
     pub aspect: Option<f32>,
+    /// What replaces parts of the scene.
+    pub look: Look,
 }
 
 /// A mesh that is placed in the world.
@@ -141,7 +145,8 @@ impl Scene {
     /// Loads a scene as [`Scene::load`] does, with options.
     ///
     /// # Errors
-    /// Those of [`Scene::load`]; the file does not have the scene or the camera that `options` names.
+    /// Those of [`Scene::load`]; the file does not have the scene or the camera that `options` names, or its camera
+    /// with the changes of `options` shows nothing.
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         let (mut scene, lacks) = if is_scene_file(path) {
             check_only_scene(path, options)?;
@@ -152,11 +157,11 @@ impl Scene {
             let endings = "its name ends in none of .toml, .gltf, .glb, .obj, .ply and .stl";
             return Err(SceneError::file(path, format!("is no scene: {endings}")));
         };
-        standard::fill_in(&mut scene, lacks, options);
         scene.add_tangents().map_err(|what| SceneError::file(path, what))?;
         if let Some(name) = &options.camera {
             scene.choose_camera(name).map_err(|what| SceneError::file(path, what))?;
         }
+        standard::fill_in(&mut scene, lacks, options).map_err(|what| SceneError::file(path, what))?;
         Ok(scene)
     }
 
@@ -249,12 +254,14 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), 
     let mut images = Images::default();
     let access = Access::of(options);
     let mut loading = Loading { shading: Shading::default(), n_loaded: 0, access, images: &mut images };
+    let up = if MeshFormat::of(path, &bytes) == MeshFormat::Stl { Up::Z } else { Up::Y };
     let Loaded { mesh, materials, .. } = mesh_file::parse_mesh(path, bytes, &mut loading)?;
     let slots = scene.push_materials(materials);
     scene.images = images.finish();
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
     extent::check(path, scene.bounds())?;
-    Ok((scene, Lacks { camera: true, light: true, background: true }))
+    scene.defaults.samples = standard::SAMPLES;
+    Ok((scene, Lacks { camera: true, up, light: true, background: true }))
 }
 
 /// Refuses the choice of a scene for a file that has only one.

@@ -4,19 +4,26 @@ use glam::Vec3;
 
 use super::{
     Light, LoadOptions, Scene,
+    error::Checked,
     framing::{self, Frame, WorldAxes},
     interior,
+    look::Up,
 };
 
 /// What a scene's file leaves out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Lacks {
     pub camera: bool,
+    /// The axis that points up in a scene without a camera, unless the user states one.
+    pub up: Up,
     /// Neither lights nor ambient light.
     pub light: bool,
     /// Only a scene without light gets a background.
     pub background: bool,
 }
+
+/// Samples per pixel of a picture of a file that is no scene file, enough to smooth its edges.
+pub(super) const SAMPLES: u32 = 4;
 
 /// Outside, the main light comes over the left shoulder of the viewer, and a weaker one from the right fills its
 /// shadows.
@@ -33,21 +40,22 @@ const MIDDLE_HEIGHT: f32 = 0.3;
 const EYE_IRRADIANCE: f32 = 0.25;
 const BACKGROUND: Vec3 = Vec3::new(0.32, 0.36, 0.42);
 
-/// Gives a scene what its file lacks.
-pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) {
-    if !lacks.camera && !lacks.light {
-        return;
-    }
-    let bounds = scene.bounds();
-    let axes = WorldAxes::with_up(Vec3::Y);
-    let is_interior = interior::is_interior(scene, bounds);
+/// Gives a scene what its file lacks, and what the user has chosen.
+pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) -> Checked<()> {
+    let look = &options.look;
+    let axes = WorldAxes::with_up(look.up.unwrap_or(lacks.up).vector());
+    let needs_bounds = lacks.camera || lacks.light;
+    let bounds = if needs_bounds { scene.bounds() } else { Default::default() };
+    let is_interior = needs_bounds && interior::is_interior(scene, bounds);
     if lacks.camera {
         let aspect = options.aspect.unwrap_or(scene.defaults.width as f32 / scene.defaults.height as f32);
-        let frame = |vertical_fov_degrees| Frame { axes, aspect: f64::from(aspect), vertical_fov_degrees };
+        let fov = |standard| look.vertical_fov_degrees.unwrap_or(standard);
+        let frame = |standard| Frame { axes, aspect: f64::from(aspect), vertical_fov_degrees: fov(standard) };
         let (outside, inside) = (frame(framing::VERTICAL_FOV_DEGREES), frame(interior::VERTICAL_FOV_DEGREES));
         let of_interior = if is_interior { interior::camera(scene, bounds, [&outside, &inside]) } else { None };
         scene.camera = of_interior.unwrap_or_else(|| framing::camera(bounds, &outside));
     }
+    look.set_camera(scene)?;
     if lacks.light {
         let lamps = if is_interior { lamps_inside(scene, bounds) } else { lamps_outside(scene, &axes) };
         scene.ambient = Vec3::splat(if is_interior { AMBIENT_OF_INTERIORS } else { AMBIENT });
@@ -56,6 +64,8 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) {
             scene.background = BACKGROUND;
         }
     }
+    look.set_light(scene);
+    Ok(())
 }
 
 /// A directional light. Its direction is relative to the viewer: `azimuth` to the right, `elevation` upwards, degrees.

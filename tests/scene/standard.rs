@@ -3,7 +3,7 @@
 use std::fs;
 
 use glam::{Vec2, Vec3};
-use kdray::scene::{Camera, Light, LoadOptions, Scene};
+use kdray::scene::{Camera, Light, LightChoice, LoadOptions, Look, Projection, Scene, Up, scene_file_of};
 
 /// Writes files to one folder and loads the first one.
 fn load(files: &[(&str, &str)], options: &LoadOptions) -> Scene {
@@ -161,6 +161,21 @@ fn rooms_are_seen_and_lit_from_inside() {
         // Light from outside would not come in.
         assert!(scene.lights.iter().all(|light| matches!(light, Light::Point { .. })), "{:?}", scene.lights);
     }
+    // Walls, a floor and a ceiling with thickness, and a table.
+    let slabs = [
+        ([6.0, 0.1, 9.0], [0.0, -1.5, 0.0]),
+        ([6.0, 0.1, 9.0], [0.0, 1.5, 0.0]),
+        ([0.1, 3.0, 9.0], [-3.0, 0.0, 0.0]),
+        ([0.1, 3.0, 9.0], [3.0, 0.0, 0.0]),
+        ([6.0, 3.0, 0.1], [0.0, 0.0, -4.5]),
+        ([6.0, 3.0, 0.1], [0.0, 0.0, 4.5]),
+        ([1.5, 0.1, 1.0], [1.0, -0.7, 0.5]),
+    ];
+    let slab = |(size, at)| {
+        format!("[[mesh]]\ngenerator = 'box'\nsize = {size:?}\ntransform = {{ translate = {at:?} }}\n")
+    };
+    let built: String = slabs.into_iter().map(slab).collect();
+    assert!(is_inside(&load_toml(&built)), "{:?}", load_toml(&built).camera);
     let half = Vec3::new(3.0, 1.5, 4.5);
     for (open, axis) in [("front", Vec3::Z), ("right", Vec3::X), ("back", Vec3::NEG_Z), ("left", Vec3::NEG_X)] {
         let sides: Vec<_> =
@@ -193,4 +208,118 @@ fn bodies_are_seen_from_outside() {
     let obj: String = points.chain(faces).collect();
     let scene = load(&[("a.obj", &obj)], &LoadOptions::default());
     assert!(!is_inside(&scene), "{:?}", scene.camera);
+}
+
+fn with_look(look: Look) -> LoadOptions {
+    LoadOptions { look, ..LoadOptions::default() }
+}
+
+#[test]
+fn the_users_up_turns_the_picture_and_its_lights() {
+    let size = Vec3::new(2.0, 3.0, 1.0);
+    let turned = Vec3::new(size.x, size.z, size.y);
+    let [y, z] = [Up::Y, Up::Z].map(|up| with_look(Look { up: Some(up), ..Look::default() }));
+    // The box with y up looks like the box whose y and z are exchanged, with z up, but for a half turn about x.
+    let centred = |size: Vec3| box_obj(-size / 2.0, size);
+    let before = load(&[("a.obj", &centred(size))], &y);
+    let after = load(&[("a.obj", &centred(turned))], &z);
+    let to_z = |v: Vec3| Vec3::new(v.x, -v.z, v.y);
+    assert!(to_z(before.camera.eye).distance(after.camera.eye) < 1e-4, "{:?} {:?}", before.camera, after.camera);
+    assert_eq!(after.camera.up, Vec3::Z);
+    for lights in before.lights.iter().zip(&after.lights) {
+        let (Light::Directional { towards: a, .. }, Light::Directional { towards: b, .. }) = lights else {
+            panic!("{lights:?}")
+        };
+        assert!(to_z(*a).distance(*b) < 1e-4, "{a} {b}");
+    }
+    assert_eq!(load(&[("a.obj", &centred(size))], &LoadOptions::default()).camera, before.camera);
+    // The picture of a scene's own camera is turned, too.
+    let toml = "[camera]\neye = [0, -9, 2]\ntarget = [0, 0, 0]\n[[mesh]]\nfile = 'a.obj'\n";
+    let files = [("a.toml", toml), ("a.obj", &centred(size))];
+    assert_eq!(load(&files, &z).camera.up, Vec3::Z);
+}
+
+#[test]
+fn stl_files_have_z_up_and_others_y() {
+    let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 1\nendloop\nendfacet\n";
+    let stl = format!("solid a\n{facet}endsolid a\n");
+    let ply = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
+               element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 1\n3 0 1 2\n";
+    let auto = LoadOptions::default();
+    assert_eq!(load(&[("a.stl", &stl)], &auto).camera.up, Vec3::Z);
+    assert_eq!(load(&[("a.ply", ply)], &auto).camera.up, Vec3::Y);
+    let y = with_look(Look { up: Some(Up::Y), ..Look::default() });
+    assert_eq!(load(&[("a.stl", &stl)], &y).camera.up, Vec3::Y);
+    let in_scene = [("a.toml", "[[mesh]]\nfile = 'a.stl'\n"), ("a.stl", &stl)];
+    assert_eq!(load(&in_scene, &auto).camera.up, Vec3::Y);
+}
+
+#[test]
+fn the_users_look_replaces_the_scenes() {
+    let toml = "ambient = [0.1, 0.1, 0.1]\nbackground = [0, 0, 1]\n[camera]\neye = [0, 0, 9]\ntarget = [0, 0, 0]\n\
+                vertical_fov = 20\n[render]\nmetered = true\n[[light]]\nkind = 'point'\nposition = [1, 9, 1]\n\
+                intensity = [9, 9, 9]\n[[mesh]]\ngenerator = 'box'\nsize = [2, 2, 2]\n\
+                transform = { translate = [0, 1, 0] }\n";
+    let files = [("a.toml", toml)];
+    let scene = |look: Look| load(&files, &with_look(look));
+    let same = load(&files, &LoadOptions::default());
+    assert_eq!(scene(Look::default()), same);
+    let (eye, target) = (Some(Vec3::new(5.0, 4.0, 3.0)), Some(Vec3::new(0.0, 0.5, 0.0)));
+    let Camera { eye: moved, target: middle, .. } = scene(Look { eye, ..Look::default() }).camera;
+    assert_eq!((moved, middle), (eye.unwrap(), Vec3::Y));
+    let camera = scene(Look { target, ..Look::default() }).camera;
+    assert_eq!((camera.eye, camera.target), (same.camera.eye, target.unwrap()));
+    let wide = scene(Look { vertical_fov_degrees: Some(70.0), ..Look::default() }).camera;
+    assert_eq!(wide.projection, Projection::Perspective { vertical_fov_degrees: 70.0 });
+    let lit = scene(Look { light: Some(LightChoice::Along(Vec3::new(0.0, -2.0, 0.0))), ..Look::default() });
+    let [Light::Directional { towards, .. }] = lit.lights[..] else { panic!("{:?}", lit.lights) };
+    assert_eq!((towards, lit.ambient, lit.defaults.is_metered), (Vec3::Y, same.ambient, false));
+    let dark = scene(Look { light: Some(LightChoice::None), background: Some(Vec3::ONE), ..Look::default() });
+    assert!(dark.lights.is_empty() && dark.ambient == same.ambient && dark.background == Vec3::ONE);
+    // A picture that no camera could show.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.toml");
+    fs::write(&path, toml).unwrap();
+    for look in [
+        Look { eye: Some(Vec3::Y), ..Look::default() },
+        Look { eye: Some(Vec3::splat(2e9)), ..Look::default() },
+        Look { up: Some(Up::Z), ..Look::default() },
+        Look { vertical_fov_degrees: Some(180.0), ..Look::default() },
+    ] {
+        let error = Scene::load_with(&path, &with_look(look)).unwrap_err().to_string();
+        assert!(error.contains("a.toml"), "{look:?}: {error}");
+    }
+}
+
+#[test]
+fn a_field_of_view_keeps_a_bare_mesh_in_the_picture() {
+    let look = Look { vertical_fov_degrees: Some(10.0), ..Look::default() };
+    let scene = load(&[("a.obj", &box_obj(Vec3::ZERO, Vec3::ONE))], &with_look(look));
+    let most = corners_in_picture(&scene, 4.0 / 3.0).into_iter().map(|p| p.abs()).reduce(Vec2::max).unwrap();
+    assert!((0.94..0.955).contains(&most.max_element()), "{most}");
+}
+
+#[test]
+fn converted_files_keep_the_look_and_the_samples() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("a.obj"), box_obj(Vec3::ZERO, Vec3::ONE)).unwrap();
+    let toml = "[[light]]\nkind = 'directional'\ndirection = [0, -1, 0]\nirradiance = [1, 1, 1]\n\
+                [render]\nmetered = true\n[[mesh]]\nfile = 'a.obj'\n";
+    fs::write(path("b.toml"), toml).unwrap();
+    let along = Some(LightChoice::Along(Vec3::new(1.0, -2.0, -0.3)));
+    for (input, samples) in [("a.obj", 4), ("b.toml", 1)] {
+        for light in [None, Some(LightChoice::None), along] {
+            let (eye, background) = (Some(Vec3::new(3.0, 4.0, 5.0)), Some(Vec3::new(0.1, 0.2, 0.3)));
+            let options = with_look(Look { eye, light, background, up: Some(Up::Z), ..Look::default() });
+            let text = scene_file_of(&path(input), &path("c.toml"), &options).unwrap();
+            fs::write(path("c.toml"), &text).unwrap();
+            let (before, after) =
+                (Scene::load_with(&path(input), &options).unwrap(), Scene::load(&path("c.toml")).unwrap());
+            assert_eq!((before.camera, &before.lights), (after.camera, &after.lights), "{text}");
+            assert_eq!((before.ambient, before.background), (after.ambient, after.background), "{text}");
+            assert_eq!(before.defaults, after.defaults, "{text}");
+            assert_eq!(after.defaults.samples, samples, "{text}");
+        }
+    }
 }

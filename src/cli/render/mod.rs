@@ -49,14 +49,15 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let (scene, load_ms) = load(args, &progress)?;
     let views = views(args, &scene, roles)?;
     let options = args.options(&scene)?;
-    check_memory(&options, args.spp, args.cpu)?;
+    let n_samples = args.samples(&scene);
+    check_memory(&options, n_samples, args.cpu)?;
     let device = ContextOptions::new(args.device.clone(), args.validate);
     let opening = || info_span!("create device").in_scope(|| open_device(&device, &progress));
     let context = if args.cpu { None } else { Some(opening()?) };
 
     let engine = context.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.picture.request());
     let n_triangles = scene.n_triangles();
-    let n_pictures = u64::from(args.spp) * views.len() as u64;
+    let n_pictures = u64::from(n_samples) * views.len() as u64;
     let cameras = views.iter().map(|view| &view.camera);
     let workload = Workload::of_pictures(&options, scene.lights.len(), n_pictures).with_cameras(cameras);
     let accel = engine.choose_accel(n_triangles, &workload);
@@ -73,7 +74,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let (drawn, _) = progress.stage(&rendering, || {
         let begin = Instant::now();
         let renderer = engine.renderer(&world, &options)?;
-        draw_and_write(args, renderer, &views, (&progress, &rendering), begin)
+        draw_and_write((args, n_samples), renderer, &views, (&progress, &rendering), begin)
     });
     let (profiles, render_ms) = drawn.map_err(CliError::of_drawing)?;
     drop(progress);
@@ -89,7 +90,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         extra_files: views.iter().flat_map(|view| view.files.beside()).cloned().collect(),
         options: (&options).into(),
         choices: Choices::of_pictures(accel, methods),
-        samples: args.spp,
+        samples: n_samples,
         triangles: n_triangles,
         accel: world.statistics(),
         grid_build: world.grid_build().cloned(),
@@ -111,10 +112,13 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
 /// Loads the scene. Returns it and the loading time in milliseconds. Warns if the scene has no light.
 fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError> {
     let loading = format!("loading {}", args.scene.display());
-    let (scene, load_ms) = progress
-        .stage(&loading, || info_span!("load scene").in_scope(|| args.load.load_for(&args.picture, &args.scene)));
+    let (scene, load_ms) = progress.stage(&loading, || {
+        info_span!("load scene")
+            .in_scope(|| Scene::load_with(&args.scene, &args.load.options_for(&args.picture, &args.look)))
+    });
     let scene = scene?;
     scene.warn_if_unlit(&args.scene);
+    args.look.note_up(&args.scene, &scene).into_iter().for_each(|note| progress.note(&note));
     Ok((scene, load_ms))
 }
 
@@ -164,13 +168,13 @@ fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec
 /// Draws each view `--repeat` times and writes its picture. Returns the frames' profiles, and the time in
 /// milliseconds from `begin` until the pictures were in memory, without the time of writing files.
 fn draw_and_write(
-    args: &RenderArgs,
+    (args, n_samples): (&RenderArgs, u32),
     mut renderer: Renderer,
     views: &[FrameJob],
     (progress, message): (&Progress, &str),
     begin: Instant,
 ) -> Result<(Vec<Profile>, f64), CliError> {
-    let factors = [views.len() as u32, args.spp, args.repeat.into(), renderer.n_bands()];
+    let factors = [views.len() as u32, n_samples, args.repeat.into(), renderer.n_bands()];
     let n_steps = factors.into_iter().fold(1, u32::saturating_mul);
     let mut steps = progress.steps(message, n_steps);
     // Progress within a sample takes time, because the CPU waits for the device. Measured frames are drawn without
@@ -180,7 +184,7 @@ fn draw_and_write(
     for view in views {
         let mut features = Vec::new();
         for _ in 0..args.repeat {
-            let drawn = renderer.draw(&view.camera, args.spp, Bar(&mut steps))?;
+            let drawn = renderer.draw(&view.camera, n_samples, Bar(&mut steps))?;
             profiles.push(drawn.profile);
             features = drawn.features;
         }

@@ -9,7 +9,9 @@ use std::path::Path;
 use toml::{Table, Value};
 
 use self::relative::Places;
-use super::{LoadOptions, Scene, SceneError, is_scene_file, material_spec::MAP_KEYS, outside::Access, read::read_utf8};
+use super::{
+    LoadOptions, Look, Scene, SceneError, is_scene_file, material_spec::MAP_KEYS, outside::Access, read::read_utf8,
+};
 
 /// Returns the text of a scene file that shows what `input` shows. The names of files in it are relative to the folder
 /// of `output`, where the text is to be written; this function does not write it. `options` say how `input` is loaded,
@@ -21,24 +23,38 @@ pub fn scene_file_of(input: &Path, output: &Path, options: &LoadOptions) -> Resu
     let scene = Scene::load_with(input, options)?;
     let places = Places::new(output, Access::of(options))?;
     if is_scene_file(input) {
-        return moved(input, &places, options.camera.is_some().then_some(&scene));
+        return moved(input, &places, (&scene, options));
     }
     let mesh = text::MeshTable { file: places.name_of(input)?, scene: options.scene.clone() };
     Ok(text::scene_file(&scene, &mesh))
 }
 
-/// Returns a scene file's text with the names of files relative to the folder of the output. The camera of
-/// `with_camera` becomes its `[camera]`. A text that needs no change keeps its comments.
-fn moved(input: &Path, places: &Places, with_camera: Option<&Scene>) -> Result<String, SceneError> {
+/// Returns a scene file's text with the names of files relative to the folder of the output, and with the camera, the
+/// lights and the background that `options` choose, as `scene` has them. A text that needs no change keeps its
+/// comments.
+fn moved(input: &Path, places: &Places, (scene, options): (&Scene, &LoadOptions)) -> Result<String, SceneError> {
     let text = read_utf8(input)?;
     let folder = input.parent().unwrap_or(Path::new(""));
-    if places.is_here(folder) && with_camera.is_none() {
+    if places.is_here(folder) && options.camera.is_none() && options.look == Look::default() {
         return Ok(text);
     }
     let mut table: Table = text.parse().map_err(|error: toml::de::Error| SceneError::file(input, error.message()))?;
-    if let Some(scene) = with_camera {
-        let camera = text::camera(&scene.camera).parse().expect("the table of a camera is TOML");
-        table.insert("camera".to_owned(), Value::Table(camera));
+    let parsed = |text: String| text.parse::<Table>().expect("the text of a table is TOML");
+    if options.camera.is_some() || options.look.has_camera() {
+        table.insert("camera".to_owned(), Value::Table(parsed(text::camera(&scene.camera))));
+    }
+    if options.look.light.is_some() {
+        // Without `ambient`, a file that has no lights would be given some.
+        let lights: String = scene.lights.iter().map(text::light).collect();
+        table.remove("light");
+        table.extend(parsed(format!("ambient = {}\n{lights}", text::vector(scene.ambient))));
+        // A scene without the lights of its file is not metered.
+        if let Some(Value::Table(render)) = table.get_mut("render") {
+            render.remove("metered");
+        }
+    }
+    if options.look.light.is_some() || options.look.background.is_some() {
+        table.extend(parsed(format!("background = {}\n", text::vector(scene.background))));
     }
     for name in names_of_files(&mut table) {
         *name = places.name_of(&folder.join(&*name))?;

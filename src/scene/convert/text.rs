@@ -60,7 +60,8 @@ pub(super) fn camera(camera: &Camera) -> String {
     format!("eye = {eye}\ntarget = {target}\nup = {up}\n{projection}\n")
 }
 
-fn light(light: &Light) -> String {
+/// Returns the table of a light.
+pub(super) fn light(light: &Light) -> String {
     let keys = match *light {
         Light::Point { position, intensity } => {
             format!("kind = \"point\"\nposition = {}\nintensity = {}\n", vector(position), vector(intensity))
@@ -83,14 +84,14 @@ fn light(light: &Light) -> String {
 }
 
 fn render(defaults: &RenderDefaults) -> String {
-    let RenderDefaults { width, height, max_depth, exposure, is_metered, tonemap, denoise } = *defaults;
+    let RenderDefaults { width, height, max_depth, samples, exposure, is_metered, tonemap, denoise } = *defaults;
     let denoise = match denoise {
         Denoise::Off => "denoise = \"off\"\n".to_owned(),
         Denoise::Paper { threshold } => format!("denoise = \"paper\"\ndenoise_threshold = {}\n", number(threshold)),
     };
     let exposure = if is_metered { "metered = true".to_owned() } else { format!("exposure = {}", number(exposure)) };
     format!(
-        "\n[render]\nwidth = {width}\nheight = {height}\nmax_depth = {max_depth}\n{exposure}\n\
+        "\n[render]\nwidth = {width}\nheight = {height}\nmax_depth = {max_depth}\nsamples = {samples}\n{exposure}\n\
          tonemap = \"{tonemap}\"\n{denoise}"
     )
 }
@@ -150,7 +151,7 @@ fn leaves_as_they_are(keys: &str, materials: &[&Material]) -> bool {
     })
 }
 
-fn vector(v: Vec3) -> String {
+pub(super) fn vector(v: Vec3) -> String {
     format!("[{}, {}, {}]", number(v.x), number(v.y), number(v.z))
 }
 

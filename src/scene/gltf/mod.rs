@@ -37,9 +37,10 @@ use super::{
     Instance, LoadOptions, Mesh, Scene, SceneError, Transform,
     error::Checked,
     extent,
+    look::Up,
     needs::{MeshSize, require_for_mesh},
     outside::Access,
-    standard::Lacks,
+    standard::{Lacks, SAMPLES},
 };
 
 /// Loads a glTF file as a scene with its lights and cameras.
@@ -57,8 +58,9 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     // The light of emissive surfaces does not reach others.
     let lacks_light = scene.lights.is_empty();
     scene.defaults.is_metered = !lacks_light;
+    scene.defaults.samples = SAMPLES;
     document.warn(path);
-    Ok((scene, Lacks { camera: lacks_camera, light: lacks_light, background: lacks_light }))
+    Ok((scene, Lacks { camera: lacks_camera, up: Up::Y, light: lacks_light, background: lacks_light }))
 }
 
 /// What a scene has before a glTF file is loaded.

@@ -1,0 +1,110 @@
+//! Arguments that replace the camera, the lights and the background of a scene.
+
+use std::path::Path;
+
+use glam::Vec3;
+use kdray::scene::{LightChoice, Look, Scene, Up};
+
+use super::{
+    or_auto::OrAuto,
+    picture_args::{listed, with_words},
+};
+
+const UP: &str = "Axis that points up in the picture";
+
+#[derive(clap::Args)]
+pub struct LookArgs {
+    #[arg(long, value_name = "AXIS", default_value = "auto", hide_default_value = true)]
+    #[arg(help = with_words(UP, Some("auto"), &format!("{}, auto", Up::words())), long_help = up_long_help())]
+    pub up: OrAuto<Up>,
+    /// Point from which the camera looks, in world space; without --target, it looks at the middle of the scene
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector, conflicts_with = "camera")]
+    pub eye: Option<Vec3>,
+    /// Point that the middle of the picture shows, in world space
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = vector)]
+    pub target: Option<Vec3>,
+    /// Angle between the picture's lower and upper edge, 0.1 to 170 degrees [default: the camera's, else 40, or 60 in
+    /// an interior]
+    #[arg(long, value_name = "DEGREES", value_parser = fov)]
+    pub fov: Option<f32>,
+    /// Replace all lights by one directional light that travels along this vector, or by none; ambient light stays
+    #[arg(long, value_name = "X,Y,Z|none", allow_hyphen_values = true, value_parser = light)]
+    pub light: Option<LightChoice>,
+    /// Background, linear red, green and blue, each at least 0 [default: the scene's]
+    #[arg(long, value_name = "R,G,B", allow_hyphen_values = true, value_parser = colour)]
+    pub background: Option<Vec3>,
+}
+
+impl LookArgs {
+    /// Returns the user's choices.
+    pub fn look(&self) -> Look {
+        let &Self { up, eye, target, fov, light, background } = self;
+        Look { up: up.pinned(), eye, target, vertical_fov_degrees: fov, light, background }
+    }
+
+    /// Returns a note that says which axis of an STL file points up, if the user has not stated it.
+    pub fn note_up(&self, path: &Path, scene: &Scene) -> Option<String> {
+        let is_stl = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl"));
+        let is_assumed = is_stl && self.up == OrAuto::Auto && scene.camera.up == Up::Z.vector();
+        is_assumed.then(|| "+z points up, as in most STL files; --up y turns the picture".to_owned())
+    }
+}
+
+/// Returns the help text of `--up` with all words explained.
+fn up_long_help() -> String {
+    listed(
+        UP,
+        "auto",
+        &format!("{}\n- auto: the camera's; without a camera, z for STL files and else y", Up::descriptions()),
+    )
+}
+
+/// Parses three finite numbers with commas between them.
+fn vector(word: &str) -> Result<Vec3, String> {
+    let numbers: Option<Vec<f32>> = word.split(',').map(|number| number.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[x, y, z]) if [x, y, z].iter().all(|number| number.is_finite()) => Ok(Vec3::new(x, y, z)),
+        _ => Err("expected three numbers with commas between them, such as 1,0.5,-2".into()),
+    }
+}
+
+fn fov(word: &str) -> Result<f32, String> {
+    let fov = word.parse().ok().filter(|fov| (0.1..=170.0).contains(fov));
+    fov.ok_or_else(|| "expected a number of degrees from 0.1 to 170".into())
+}
+
+fn light(word: &str) -> Result<LightChoice, String> {
+    if word == "none" {
+        return Ok(LightChoice::None);
+    }
+    match vector(word) {
+        Ok(Vec3::ZERO) => Err("0,0,0 has no direction".into()),
+        Ok(direction) => Ok(LightChoice::Along(direction)),
+        Err(error) => Err(format!("{error}, or none")),
+    }
+}
+
+fn colour(word: &str) -> Result<Vec3, String> {
+    vector(word).and_then(|colour| match colour.min_element() >= 0.0 {
+        true => Ok(colour),
+        false => Err("a colour has no number below 0".into()),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_are_three_finite_numbers() {
+        assert_eq!(vector("-1,0.5, 2e3"), Ok(Vec3::new(-1.0, 0.5, 2000.0)));
+        for word in ["", "1", "1,2", "1,2,3,4", "1,2,x", "1,2,nan", "1,2,inf", "1 2 3", "1,,2"] {
+            assert!(vector(word).is_err(), "{word}");
+        }
+        assert_eq!(light("none"), Ok(LightChoice::None));
+        assert_eq!(light("0,-1,0"), Ok(LightChoice::Along(Vec3::NEG_Y)));
+        assert!(light("0,0,0").is_err() && light("None").is_err());
+        assert!(colour("0,0,0").is_ok() && colour("0,-0.1,0").is_err());
+        assert!(fov("0.1").is_ok() && fov("171").is_err() && fov("nan").is_err());
+    }
+}

@@ -1,0 +1,124 @@
+//! What the user wants to see in place of what a scene's file states or leaves out.
+
+use glam::Vec3;
+
+use super::{Camera, Light, Projection, Scene, camera::FOV_DEGREES, error::Checked, mesh::MAX_COORDINATE};
+
+/// The axis of the world that points up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Up {
+    /// +y.
+    #[default]
+    Y,
+    /// +z.
+    Z,
+}
+
+named_enum!(Up {
+    Y = "y": "+y, as in glTF and in most OBJ and PLY files",
+    Z = "z": "+z, as in most STL files, in CAD, in maps and in Blender",
+});
+
+impl Up {
+    /// Returns the unit vector.
+    pub fn vector(self) -> Vec3 {
+        match self {
+            Self::Y => Vec3::Y,
+            Self::Z => Vec3::Z,
+        }
+    }
+}
+
+/// The user's choice of light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LightChoice {
+    /// No light but the ambient light.
+    None,
+    /// A directional light that travels along this vector, which is finite and has a length above 0.
+    Along(Vec3),
+}
+
+/// The user's choices. Absent ones leave the scene as it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Look {
+    /// The axis that points up in the picture. Where absent, it is +z for a bare STL file, and else that of the camera.
+    pub up: Option<Up>,
+    /// The camera's eye, world space.
+    pub eye: Option<Vec3>,
+    /// The point that the middle of the picture shows, world space. With an eye alone, it is the middle of the scene.
+    pub target: Option<Vec3>,
+    /// Angle between the picture's lower and upper edge, degrees, 0.1 to 170. It makes a camera perspective.
+    pub vertical_fov_degrees: Option<f32>,
+    /// The light, which replaces all lights of the scene. Its ambient light stays.
+    pub light: Option<LightChoice>,
+    /// Radiance of rays that leave the scene, linear RGB, at least 0.
+    pub background: Option<Vec3>,
+}
+
+/// Irradiance of the user's light.
+const IRRADIANCE: f32 = 0.8;
+
+impl Look {
+    /// Returns whether a choice concerns the camera.
+    pub fn has_camera(&self) -> bool {
+        self.up.is_some() || self.eye.is_some() || self.target.is_some() || self.vertical_fov_degrees.is_some()
+    }
+
+    /// Changes a scene's camera.
+    pub(super) fn set_camera(&self, scene: &mut Scene) -> Checked<()> {
+        if !self.has_camera() {
+            return Ok(());
+        }
+        let centre = || {
+            let (min, max) = scene.bounds();
+            (min + max) / 2.0
+        };
+        let Camera { eye, target, up, projection } = scene.camera;
+        let target = self.target.unwrap_or_else(|| if self.eye.is_some() { centre() } else { target });
+        let fov = self.vertical_fov_degrees;
+        if let Some(fov) = fov.filter(|fov| !(FOV_DEGREES.0..=FOV_DEGREES.1).contains(fov)) {
+            return Err(format!("a field of view of {fov} degrees is outside {} to {}", FOV_DEGREES.0, FOV_DEGREES.1));
+        }
+        let camera = Camera {
+            eye: self.eye.unwrap_or(eye),
+            target,
+            up: self.up.map_or(up, Up::vector),
+            projection: fov.map_or(projection, |vertical_fov_degrees| Projection::Perspective { vertical_fov_degrees }),
+        };
+        for (name, point) in [("eye", camera.eye), ("target", camera.target)] {
+            let is_inside = point.abs().max_element() <= MAX_COORDINATE;
+            if !is_inside {
+                return Err(format!("the {name} {:?} is not within {MAX_COORDINATE:e}", point.to_array()));
+            }
+        }
+        if !camera.spans_picture() {
+            return Err(format!(
+                "the eye {:?}, the target {:?} and up = {:?} span no picture: eye and target coincide, or up points \
+                 along the view",
+                camera.eye.to_array(),
+                camera.target.to_array(),
+                camera.up.to_array()
+            ));
+        }
+        scene.camera = camera;
+        Ok(())
+    }
+
+    /// Changes a scene's lights and its background.
+    pub(super) fn set_light(&self, scene: &mut Scene) {
+        if let Some(light) = self.light {
+            scene.lights = match light {
+                LightChoice::None => Vec::new(),
+                LightChoice::Along(direction) => {
+                    let towards = -direction.as_dvec3().normalize().as_vec3();
+                    vec![Light::Directional { towards, irradiance: Vec3::splat(IRRADIANCE) }]
+                }
+            };
+            // The lights that had physical units are gone.
+            scene.defaults.is_metered = false;
+        }
+        if let Some(background) = self.background {
+            scene.background = background;
+        }
+    }
+}
