@@ -39,7 +39,11 @@ impl Session {
             }
             Action::PrintCamera => (self.print)(&to_toml(self.controller.camera())),
             Action::FrameScene => self.controller.frame_scene(window.0 as f32 / window.1 as f32),
-            Action::GoHome => self.controller.go_home(),
+            Action::GoHome => {
+                self.controller.go_home();
+                // A note on the axis that points up is no longer true.
+                self.message.take_if(|message| !message.is_error);
+            }
             Action::ChangeUp => {
                 let axis = self.controller.change_up();
                 self.message = Some(Message::note(Topic::Settings, &format!("{axis} points up")));

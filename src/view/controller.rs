@@ -137,8 +137,8 @@ impl Controller {
         self.camera.projection = projection;
     }
 
-    /// Makes the next of [`UP_AXES`] point up in the picture, or the first if none does. The camera is turned about its
-    /// target together with that axis. Returns the axis's name.
+    /// Makes the next of +y, +z, +x, -y, -z and -x point up in the picture, or +y if none of them does. The camera is
+    /// turned about its target together with that axis. Returns the axis's name.
     pub fn change_up(&mut self) -> &'static str {
         let Camera { eye, target, up, .. } = self.camera;
         let now = UP_AXES.iter().position(|(_, axis)| axis.dot(up) > 0.999);

@@ -153,7 +153,7 @@ fn a_false_colour_view_has_a_legend_with_the_value_under_the_pointer() {
     display.focus("kdray");
     // The legend's place, where the picture shows nothing bright.
     let corner = |screen: &Screen| -> Vec<[u8; 3]> {
-        (8..90).flat_map(|y| screen.pixels[y * screen.width..][560..790].to_vec()).collect()
+        (8..90).flat_map(|y| screen.pixels[y * screen.width..][530..790].to_vec()).collect()
     };
     let has_white = |screen: &Screen| corner(screen).iter().any(|pixel| pixel.iter().all(|channel| *channel > 240));
     display.act(&["mousemove", "400", "200"]);

@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Size of a bar, points.
-const BAR: (f32, f32) = (220.0, 12.0);
+const BAR: (f32, f32) = (260.0, 12.0);
 /// Height of the values below a bar, points.
 const TICKS: f32 = 14.0;
 /// Number of colours in a bar.
@@ -77,7 +77,8 @@ fn value(view: View, feature: &Feature) -> String {
         _ if !is_hit => "no hit".to_owned(),
         View::Depth => format!("{:.6}", feature.depth),
         View::Normal => {
-            let Vec3 { x, y, z } = feature.normal_world;
+            // Adding 0 turns -0 into 0, whose sign would only confuse.
+            let [x, y, z] = feature.normal_world.to_array().map(|x| (x * 1e3).round() / 1e3 + 0.0);
             format!("{x:.3}, {y:.3}, {z:.3}")
         }
         View::Id => format!("triangle {}", feature.triangle_ix),
@@ -140,7 +141,7 @@ mod tests {
 
     #[test]
     fn values_are_those_of_the_view() {
-        let normal_world = vec3(0.6, -0.8, 0.0);
+        let normal_world = vec3(0.6, -0.8, -1e-5);
         let hit = Feature { triangle_ix: 7, depth: 2.5, normal_world, n_steps: 40, n_rays: 3, ..Feature::default() };
         let views = [View::Depth, View::Normal, View::Id, View::Cost, View::Rays];
         let expected = ["2.500000", "0.600, -0.800, 0.000", "triangle 7", "40 steps", "3 rays"];
