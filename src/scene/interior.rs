@@ -1,6 +1,7 @@
 //! Interiors: scenes whose outer walls are made to be seen from inside. Seen from outside, they would show the backs of
 //! their walls, or nothing but these. Rays from the middle tell them from bodies: a body's outermost surface turns its
-//! front outwards, that of a room without thickness turns it inwards, and walls with thickness have a front inside, too.
+//! front outwards, that of a room without thickness turns it inwards, and walls with thickness have a front on the
+//! inside as well.
 //!
 //! Few rays meet all triangles here, without an acceleration structure, since the rays come before the structure is
 //! chosen and built.

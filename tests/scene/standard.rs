@@ -171,9 +171,8 @@ fn rooms_are_seen_and_lit_from_inside() {
         ([6.0, 3.0, 0.1], [0.0, 0.0, 4.5]),
         ([1.5, 0.1, 1.0], [1.0, -0.7, 0.5]),
     ];
-    let slab = |(size, at)| {
-        format!("[[mesh]]\ngenerator = 'box'\nsize = {size:?}\ntransform = {{ translate = {at:?} }}\n")
-    };
+    let slab =
+        |(size, at)| format!("[[mesh]]\ngenerator = 'box'\nsize = {size:?}\ntransform = {{ translate = {at:?} }}\n");
     let built: String = slabs.into_iter().map(slab).collect();
     assert!(is_inside(&load_toml(&built)), "{:?}", load_toml(&built).camera);
     let half = Vec3::new(3.0, 1.5, 4.5);

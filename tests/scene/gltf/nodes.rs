@@ -83,7 +83,8 @@ fn scene_files_place_whole_models() {
     model.json["meshes"][0]["primitives"][0]["material"] = json!(0);
     model.root(json!({ "mesh": 0, "translation": [0, 0, 1] }));
     let toml = "ambient = [0, 0, 0]\n[materials]\nown = {}\n[[mesh]]\nfile = 'm.glb'\n\
-                transform = { translate = [5, 0, 0], scale = 2 }\n[[mesh]]\nfile = 'm.glb'\nmaterial = 'own'\nsmooth = false\n";
+                transform = { translate = [5, 0, 0], scale = 2 }\n\
+                [[mesh]]\nfile = 'm.glb'\nmaterial = 'own'\nsmooth = false\n";
     let found = load(&[("s.toml", toml.as_bytes()), ("m.glb", &model.glb())]).unwrap();
     assert_eq!(found.material_names, ["own", "red"]);
     assert_eq!(found.triangle_materials, [1, 1, 0, 0]);
