@@ -16,11 +16,12 @@ use super::{
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Description {
-    /// Camera; where absent, `framing` makes one that shows all meshes.
+    /// Camera; where absent, and without `cameras`, `standard` chooses one.
     pub camera: Option<Spanned<CameraSpec>>,
     /// Cameras with names. Without `camera`, the first one is the scene's.
     #[serde(default)]
     pub cameras: Vec<Spanned<NamedCameraSpec>>,
+    /// Lights; without any and without `ambient`, `standard` chooses lights, `ambient` and, where absent, `background`.
     #[serde(default)]
     pub light: Vec<Spanned<LightSpec>>,
     /// Irradiance that every point receives, weighted by Ka; black where absent.

@@ -131,8 +131,9 @@ impl Scene {
     /// Loads a scene file, `.toml`, a glTF file, `.gltf` or `.glb`, or a mesh file, `.obj`, `.ply` or `.stl`. The
     /// content of a glTF or mesh file says which of the four it is. Emits `tracing` warnings for unknown OBJ
     /// statements, material libraries and images that are missing or leave the folder of the mesh file, undefined
-    /// materials, names in the wrong case, what is not shown of a file, creases and overrides without effect, and
-    /// coordinates too large for the scene's detail.
+    /// materials, names in the wrong case, normals that an OBJ file names and does not have, terms of MTL files that
+    /// are not taken as they are, what is not shown of a file, creases and overrides without effect, and coordinates
+    /// too large for the scene's detail.
     ///
     /// # Errors
     /// The file, or one that it names, cannot be read or understood; the scene has no triangles, is too small to be
