@@ -9,6 +9,10 @@ pub(super) const VERTICAL_FOV_DEGREES: f32 = 40.0;
 /// Factor on the half width and half height of the picture that the bounding box may fill.
 const FILLED: f64 = 0.95;
 
+/// Least half diagonal of a box, in steps of single precision at its coordinates. The eye's coordinates are rounded to
+/// such steps, so from nearer a small scene far from the origin could be out of the picture.
+const LEAST_STEPS: f64 = 16.0;
+
 /// The direction from which a scene is usually seen, degrees: from the front, the right and above.
 const USUAL: Direction = Direction { azimuth: 24, elevation: 18 };
 /// Elevations of the other directions, degrees.
@@ -105,8 +109,7 @@ impl BoundingBox {
     fn new((min, max): (Vec3, Vec3)) -> Self {
         let (min, max) = (min.as_dvec3(), max.as_dvec3());
         let (centre, mut half) = ((min + max) / 2.0, (max - min) / 2.0);
-        // For a small scene far from the origin, the eye's distance must exceed the rounding of its coordinates.
-        let least = centre.abs().max_element() * 1e-3;
+        let least = LEAST_STEPS * f64::from(f32::EPSILON) * centre.abs().max_element();
         if half.length() < least {
             half *= least / half.length();
         }

@@ -83,6 +83,14 @@ fn boxes_of_all_shapes_fill_pictures_of_all_shapes() {
 }
 
 #[test]
+fn a_small_scene_far_from_the_origin_fills_the_picture() {
+    let obj = box_obj(Vec3::new(5e5, 0.0, 2e5), Vec3::splat(10.0));
+    let scene = load(&[("a.obj", &obj)], &LoadOptions::default());
+    let most = corners_in_picture(&scene, 4.0 / 3.0).into_iter().map(|p| p.abs()).reduce(Vec2::max).unwrap();
+    assert!((0.9..1.0).contains(&most.max_element()), "{most}: {:?}", scene.camera);
+}
+
+#[test]
 fn a_picture_is_framed_for_the_scenes_size_if_no_other_is_stated() {
     let mesh = box_obj(Vec3::ZERO, Vec3::new(5.0, 1.0, 1.0));
     let toml = "[render]\nwidth = 300\nheight = 900\n[[mesh]]\nfile = 'a.obj'\n";
