@@ -18,6 +18,8 @@ use super::{
 
 /// Number of rays from the middle.
 const N_RAYS: usize = 64;
+/// Number of those rays that come first. A scene is no interior if fewer than half of them meet a wall.
+const N_FIRST_RAYS: usize = 4;
 /// A ray meets a wall if its last hit, or its first one, lies beyond this share of the way to the bounding box. Other
 /// shapes than rooms, such as an inside-out sphere, are smaller in most directions.
 const WALLS_BEGIN: f32 = 0.85;
@@ -44,16 +46,26 @@ pub(super) fn is_interior(scene: &Scene, (min, max): (Vec3, Vec3)) -> bool {
     if half.min_element() <= 0.0 {
         return false;
     }
-    let rays: Vec<Ray> = (0..N_RAYS).map(|ix| Ray { origin: centre, direction: on_sphere(ix) * half }).collect();
-    let hits = hits(scene, &rays);
+    let ray = |ix: usize| Ray { origin: centre, direction: on_sphere(ix) * half };
+    // Few rays are enough to tell most bodies, of which some have millions of triangles.
+    let few: Vec<Ray> = (0..N_RAYS).step_by(N_RAYS / N_FIRST_RAYS).map(ray).collect();
+    if n_walls(scene, half, &few) < N_FIRST_RAYS / 2 {
+        return false;
+    }
+    let rays: Vec<Ray> = (0..N_RAYS).map(ray).collect();
+    n_walls(scene, half, &rays) as f32 >= ENCLOSED * N_RAYS as f32
+}
+
+/// Returns the number of rays from the middle of a box with half extents that meet a wall.
+fn n_walls(scene: &Scene, half: Vec3, rays: &[Ray]) -> usize {
+    let hits = hits(scene, rays);
     // In half extents, the ray leaves the box where its largest coordinate is 1.
     let is_wall = |(ray, hits): &(&Ray, &Hits)| {
         let exit = (ray.direction / half).abs().max_element().recip();
         let is_wall = |hit: Option<Hit>| hit.is_some_and(|hit| hit.is_front && hit.t >= WALLS_BEGIN * exit);
         is_wall(hits.last) || is_wall(hits.first)
     };
-    let n_walls = rays.iter().zip(&hits).filter(is_wall).count();
-    n_walls as f32 >= ENCLOSED * N_RAYS as f32
+    rays.iter().zip(&hits).filter(is_wall).count()
 }
 
 /// Returns a camera for an interior. If a side is open, the camera is outside and sees the whole interior through it.
