@@ -40,7 +40,8 @@ def run(kdray, *arguments):
 def render(arguments, path, out, size, *options):
     """Renders a file by kdray into `out`, without the noise filter and with traced primary rays."""
     options = [*options, "--denoise", "off", "--primary", "trace", "--quiet", *arguments.options]
-    run(arguments.kdray, "render", path, "-o", out, "--size", f"{size[0]}x{size[1]}", *options)
+    # One sample is at the pixel's centre.
+    run(arguments.kdray, "render", path, "-o", out, "--size", f"{size[0]}x{size[1]}", "--spp", "1", *options)
 
 
 def triangulate(data):
