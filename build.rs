@@ -24,15 +24,15 @@ use std::{
 /// such gaps.
 const SEARCHING: [(&str, bool); 3] = [("cast", false), ("shadow", true), ("trace", true)];
 
-/// What hits are searched in and how: the traversals of the kd-tree, and the grid. A module has the code of one search,
-/// `TRAVERSAL`, since drivers take seconds to compile the code of all of them.
+/// The ways to search for hits: the traversals of the kd-tree, and the grid. A module has the code of one search, which
+/// the macro `TRAVERSAL` selects, since drivers take seconds to compile the code of all of them.
 const SEARCHES: [&str; 9] =
     ["mask", "mask_boxes", "restart", "backtrack", "short_stack", "ropes", "stack", "brute", "grid"];
 
 /// A module of SPIR-V: a shader, compiled with some macros.
 struct Module {
-    /// The name by which Rust finds the module: that of the shader's file, in kernels that find hits with the search
-    /// and with `gaps`, such as `trace_mask_gaps.comp`.
+    /// The name by which Rust finds the module. It is that of the shader's file. In the names of kernels that find
+    /// hits, the search and `gaps` follow the kernel's name, as in `trace_mask_gaps.comp`.
     name: String,
     path: PathBuf,
     macros: Vec<(&'static str, Option<String>)>,

@@ -73,8 +73,8 @@ fn moved_by(step: DVec2) -> DMat4 {
     DMat4::from_cols(DVec4::X, DVec4::Y, DVec4::Z, step.extend(0.0).extend(1.0))
 }
 
-/// The picture's rectangle in the world. That of a perspective camera is at unit distance from the eye, in the middle
-/// of that of an orthographic camera is the eye. `forward`: the direction of the view. `right`, `up`: the vectors from
+/// The picture's rectangle in the world. It is at unit distance from the eye of a perspective camera. Its middle is the
+/// eye of an orthographic camera. `forward`: the direction of the view. `right`, `up`: the vectors from
 /// the rectangle's centre to its right and to its upper edge, world space.
 struct ImagePlane {
     forward: DVec3,

@@ -116,7 +116,7 @@ mod tests {
         }
     }
 
-    /// What a coloured coat reflects most of is missing below it in every colour, so that no colour is added.
+    /// Diffuse light lacks the coat's largest reflectance in all three channels, so that the coat does not tint it.
     #[test]
     fn diffuse_light_lacks_the_largest_reflectance() {
         let coated = Material { kd: Vec3::ONE, ks: vec3(1.0, 0.2, 0.2), ..material(0.0, 1.0) };

@@ -60,13 +60,13 @@ impl Direction {
         ELEVATIONS.into_iter().flat_map(row)
     }
 
-    /// Returns the distance from the usual direction in a measure of its own.
+    /// Returns how far the direction is from the usual one, in degrees of azimuth. A degree of elevation counts as two.
     fn strangeness(self) -> u32 {
         self.azimuth.abs_diff(USUAL.azimuth) + 2 * self.elevation.abs_diff(USUAL.elevation)
     }
 }
 
-/// What a camera is made for.
+/// The conditions for a new camera: the axes of the world, the shape of the picture and the field of view.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     pub axes: WorldAxes,
@@ -131,8 +131,8 @@ impl BoundingBox {
 struct View {
     eye: DVec3,
     target: DVec3,
-    /// Sum over the visible faces of the bounding box of the square root of the share of the picture that the face
-    /// covers. Among equal sums of shares, it is largest where no face hides the others.
+    /// How much the view shows of the bounding box. Each visible face adds the square root of the share of the picture
+    /// that it covers. So of two views that cover as much, the one that shows several faces has the larger sum.
     shown: f64,
 }
 

@@ -10,8 +10,8 @@ use glam::Vec3;
 use crate::{
     accel::Statistics,
     engine::choices::{ChosenAccel, Processor, Request, Workload},
-    scene::{self, Camera, Projection, RenderDefaults, Scene, SceneError},
-    world::{FlatScene, Textures, World},
+    scene::{self, Scene, SceneError},
+    world::{FlatScene, World},
 };
 
 /// The inputs to the choice of an acceleration structure. They stay the same each time that the scene is read.
@@ -70,26 +70,10 @@ impl LoadedScene {
         Self { path, world, accel, load_options: load_options.clone(), statistics, build_ms }
     }
 
-    /// Returns a scene without triangles, in the place of one, while no file is open.
+    /// Returns a scene without triangles. It takes the place of a loaded scene while no file is open.
     pub fn none(load_options: &LoadOptions) -> Self {
-        let flat = FlatScene {
-            name: String::new(),
-            triangles: Vec::new(),
-            triangle_materials: Vec::new(),
-            materials: Vec::new(),
-            material_names: Vec::new(),
-            textures: Textures::default(),
-            lights: Vec::new(),
-            camera: Camera {
-                eye: Vec3::Z,
-                target: Vec3::ZERO,
-                up: Vec3::Y,
-                projection: Projection::Perspective { vertical_fov_degrees: 40.0 },
-            },
-            ambient: Vec3::ZERO,
-            background: Vec3::splat(0.02),
-            defaults: RenderDefaults::default(),
-        };
+        let empty = Scene { background: Vec3::splat(0.02), ..Scene::empty(Path::new("")) };
+        let flat = FlatScene::new(&empty).expect("an empty scene fits together");
         let &LoadOptions { request, processor, workload, .. } = load_options;
         let accel = request.choose_accel(processor, 0, &workload);
         let world = World::with_accel(flat, &accel.options(processor)).expect("a material for each of no triangles");

@@ -33,7 +33,8 @@ pub struct TextureArrays {
     pub textures: Vec<Texture>,
 }
 
-/// Whether the images of a scene are not opaque. All pixels of an image are looked at when it is first asked for.
+/// Tells which images of a scene have pixels that are not opaque. It looks at the pixels of an image when it is first
+/// asked about that image.
 pub struct Opacities<'a> {
     images: &'a [Image],
     known: Vec<OnceCell<bool>>,

@@ -140,8 +140,8 @@ fn n_bytes_of_corners(n_triangles: usize, n_uv_sets: usize, has_corners: bool) -
     n_triangles as u64 * (of_uvs + of_corners) as u64
 }
 
-/// Sets how a material's opacity acts on rays. `is_see_through` returns whether the image at an index is not opaque,
-/// and `corners_have_opacity` says whether colours at corners of the scene's meshes are not.
+/// Sets how a material's opacity acts on rays. `is_see_through` returns whether the image at an index is not opaque.
+/// `corners_have_opacity` says whether some colour at a corner of the scene's meshes is not opaque.
 fn set_opacity(
     maps: &mut MaterialMaps,
     material: &Material,

@@ -226,7 +226,7 @@ fn the_users_up_turns_the_picture_and_its_lights() {
     let size = Vec3::new(2.0, 3.0, 1.0);
     let turned = Vec3::new(size.x, size.z, size.y);
     let [y, z] = [Up::Y, Up::Z].map(|up| with_look(Look { up: Some(up), ..Look::default() }));
-    // The box with y up looks like the box whose y and z are exchanged, with z up, but for a half turn about x.
+    // A box whose y and z are exchanged is seen with z up as the box itself is seen with y up.
     let centred = |size: Vec3| box_obj(-size / 2.0, size);
     let before = load(&[("a.obj", &centred(size))], &y);
     let after = load(&[("a.obj", &centred(turned))], &z);

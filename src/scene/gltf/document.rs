@@ -81,7 +81,7 @@ struct Buffer {
 /// Where the bytes of an image are.
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub(super) enum ImageSource {
-    /// In the URI of the image at this index.
+    /// They are in the URI of the image at this index.
     Uri(usize),
     File(PathBuf),
     View(usize),

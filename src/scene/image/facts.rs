@@ -14,7 +14,7 @@ pub(in crate::scene) struct Examined {
     image: Image,
     is_see_through: OnceCell<bool>,
     shows_normals: OnceCell<bool>,
-    /// By channel.
+    /// For each channel, whether almost all of its values are 0 or 1.
     is_nearly_binary: [OnceCell<bool>; Channel::ALL.len()],
 }
 

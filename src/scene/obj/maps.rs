@@ -10,7 +10,7 @@ use crate::scene::{
     texture::{Channel, Encoding, Texture, Wrap},
 };
 
-/// Opacity below which a surface with holes, such as a leaf, is a hole.
+/// Opacity below which a surface with holes, such as a leaf, has a hole.
 const CUTOFF: f32 = 0.5;
 
 /// A term that a map varies.

@@ -29,8 +29,8 @@ struct Quick {
 }
 
 impl Quick {
-    /// Adds a point, a normal or texture coordinates of so many numbers. Texture coordinates may have one more, which
-    /// is ignored.
+    /// Adds a point, a normal or texture coordinates, which have `n_numbers` numbers. Texture coordinates may have a
+    /// third number, which is ignored.
     fn numbers(&mut self, keyword: &str, rest: &str, n_numbers: usize) -> Option<()> {
         let n_words = n_words_of(rest.as_bytes())?;
         let is_number = |word: &str| word.parse::<f32>().is_ok_and(f32::is_finite);
