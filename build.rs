@@ -22,7 +22,7 @@ use std::{
 /// The kernels that find hits. Each is compiled for every search of [`SEARCHES`], and those that are marked here also
 /// with `WITH_GAPS`, the code for parts of triangles through which rays pass. Casts know no materials, so they have no
 /// such gaps.
-const SEARCHING: [(&str, bool); 3] = [("cast", false), ("shadow", true), ("trace", true)];
+const SEARCHING: [(&str, bool); 4] = [("cast", false), ("path_trace", true), ("shadow", true), ("trace", true)];
 
 /// The ways to search for hits: the traversals of the kd-tree, and the grid. A module has the code of one search, which
 /// the macro `TRAVERSAL` selects, since drivers take seconds to compile the code of all of them.

@@ -4,7 +4,7 @@
 use std::{collections::BTreeSet, fs};
 
 use kdray::frame::{
-    FrameKind, Pass, Plan, Primary, RenderOptions, Resource, Step, Touch,
+    FrameKind, Integrator, Pass, Plan, Primary, RenderOptions, Resource, Step, Touch,
     plan::{self, passes},
 };
 use spirq::{
@@ -17,10 +17,11 @@ use spirq::{
 fn kinds() -> Vec<FrameKind> {
     let mut kinds = Vec::new();
     for (&primary, n_bounces) in Primary::ALL.iter().zip([3, 2, 1]).chain(Primary::ALL.iter().zip([1, 3, 2])) {
-        for flags in 0..64_u32 {
-            let [features, is_lit, has_lights, adds_samples, denoises, shows_feature] =
+        for flags in 0..128_u32 {
+            let [features, is_lit, has_lights, adds_samples, denoises, shows_feature, of_paths] =
                 std::array::from_fn(|bit| flags & (1 << bit) != 0);
             let kind = FrameKind {
+                integrator: if of_paths { Integrator::Path } else { Integrator::Whitted },
                 primary,
                 n_bounces,
                 features,
@@ -102,16 +103,23 @@ fn no_pass_runs_before_what_it_needs_is_there() {
 /// Without any one of the barriers, some pass could run too early.
 #[test]
 fn every_barrier_is_needed() {
-    let options =
-        RenderOptions { features: true, max_depth: 3, primary: Primary::SoftwareRaster, ..RenderOptions::default() };
-    let all = steps(&Plan::new(&FrameKind::new(&options, 1)));
-    let barriers: Vec<_> = (0..all.len()).filter(|&i| matches!(all[i], Step::Barrier { .. })).collect();
-    assert!(barriers.len() > 20);
-    for &i in &barriers {
-        let mut without = all.clone();
-        // This removes the equal barriers of all batches and bounces.
-        without.retain(|step| *step != all[i]);
-        assert!(!hazards(&without, true).is_empty(), "{:?} is not needed", all[i]);
+    for &integrator in Integrator::ALL {
+        let options = RenderOptions {
+            integrator,
+            features: true,
+            max_depth: 3,
+            primary: Primary::SoftwareRaster,
+            ..RenderOptions::default()
+        };
+        let all = steps(&Plan::new(&FrameKind::new(&options, 1)));
+        let barriers: Vec<_> = (0..all.len()).filter(|&i| matches!(all[i], Step::Barrier { .. })).collect();
+        assert!(barriers.len() > 20);
+        for &i in &barriers {
+            let mut without = all.clone();
+            // This removes the equal barriers of all batches and bounces.
+            without.retain(|step| *step != all[i]);
+            assert!(!hazards(&without, true).is_empty(), "{integrator}: {:?} is not needed", all[i]);
+        }
     }
 }
 
@@ -136,6 +144,7 @@ fn found_in_kernels(pass: Pass) -> (BTreeSet<Resource>, BTreeSet<Resource>) {
         Pass::Visibility => vec!["visibility.vert.spv".to_owned(), "visibility.frag.spv".to_owned()],
         // Kernels that find hits have modules that differ in their search alone.
         Pass::Trace => vec!["trace_mask.comp.spv".to_owned(), "trace_grid_gaps.comp.spv".to_owned()],
+        Pass::PathTrace => vec!["path_trace_mask.comp.spv".to_owned(), "path_trace_grid_gaps.comp.spv".to_owned()],
         Pass::Shadow => vec!["shadow_mask.comp.spv".to_owned(), "shadow_grid_gaps.comp.spv".to_owned()],
         _ => vec![format!("{}.comp.spv", pass.name())],
     };

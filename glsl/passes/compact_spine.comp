@@ -8,6 +8,9 @@
 #include "layout.glsl"
 #include "scan.glsl"
 
+// Whether the rays are those of paths, which are not stored bounce after bounce: each path has one ray.
+layout(constant_id = CONSTANT_PATHS) const bool PATHS = false;
+
 layout(local_size_x = SCAN_GROUP_SIZE) in;
 layout(push_constant) uniform BatchBlock { Batch batch; };
 layout(std140, set = 0, binding = BIND_FRAME) uniform FrameBlock { Frame frame; };
@@ -23,6 +26,18 @@ uint lanes_log2(uint n_rays) {
 
 uint groups_for(uint n_invocations, uint group_size) {
     return (n_invocations + group_size - 1u) / group_size;
+}
+
+// Sizes the next bounce of paths, n_paths of which go on. Its dispatch also traces the segments of this bounce.
+void size_next_bounce_of_paths(uint n_paths) {
+    uint next_ix = batch.bounce_ix + 1u;
+    uint n_traced = n_paths + bounces[batch.bounce_ix].n_rays;
+    uint for_rays = lanes_log2(n_traced);
+    bounces[next_ix].n_rays = n_paths;
+    bounces[next_ix].n_wanted = n_paths;
+    bounces[next_ix].trace_groups_x = groups_for(n_traced << for_rays, RAY_GROUP_SIZE);
+    bounces[next_ix].trace_lanes_log2 = for_rays;
+    bounces[next_ix].scan_groups_x = groups_for(n_paths, SCAN_GROUP_SIZE);
 }
 
 void size_next_bounce(uint n_wanted) {
@@ -63,5 +78,7 @@ void main() {
         }
         carry += total;
     }
-    if (gl_LocalInvocationIndex == 0u) size_next_bounce(carry);
+    if (gl_LocalInvocationIndex != 0u) return;
+    if (PATHS) size_next_bounce_of_paths(carry);
+    else size_next_bounce(carry);
 }

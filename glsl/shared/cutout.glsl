@@ -1,6 +1,7 @@
 // Gaps: the parts of a triangle through which rays pass, since the opacity there is too low. Rays of every kind pass
 // through the gaps of a cut-out, a material that is either opaque or not there. Shadow rays also pass through the gaps
-// of a veil, a see-through material. Twin of src/reference/cutout.rs.
+// of a veil, a see-through material. Kernels that define RANDOM_OPACITY pass through veils at random, as often as the
+// opacity says. Twin of src/reference/cutout.rs.
 //
 // Needs nothing: it includes texture.glsl. Provides `CUTOUTS`, `SHADOW_GAPS`, `opacity_at` and `is_gap`.
 #ifndef KDRAY_CUTOUT
@@ -12,6 +13,15 @@
 
 layout(constant_id = CONSTANT_CUTOUTS) const bool CUTOUTS = false;
 layout(constant_id = CONSTANT_SHADOW_GAPS) const bool SHADOW_GAPS = false;
+
+#ifdef RANDOM_OPACITY
+#include "sampler.glsl"
+
+// A random number in [0, 1) for a point of a triangle. Different rays hit different points.
+float random_at(uint triangle_ix, float u, float v) {
+    return unit_number(mixed(floatBitsToUint(u) ^ mixed(floatBitsToUint(v) ^ mixed(triangle_ix))));
+}
+#endif
 
 // The opacity at a point of a triangle, 0..1, by the largest levels of its textures.
 float opacity_at(MaterialMaps maps, uint triangle_ix, float u, float v) {
@@ -35,7 +45,12 @@ bool is_gap(uint triangle_ix, float u, float v, bool passes_veils) {
     uint kinds = passes_veils ? MAPS_CUTOUT | MAPS_VEIL : MAPS_CUTOUT;
     if ((map_flags_of(material_ix) & kinds) == 0u) return false;
     MaterialMaps maps = maps_of(material_ix);
-    return opacity_at(maps, triangle_ix, u, v) < maps.alpha_cutoff;
+    float opacity = opacity_at(maps, triangle_ix, u, v);
+#ifdef RANDOM_OPACITY
+    // A random number is below 1, so an opaque point is never a gap; at opacity 0, every point is one.
+    if ((maps.flags & MAPS_VEIL) != 0u) return random_at(triangle_ix, u, v) >= opacity;
+#endif
+    return opacity < maps.alpha_cutoff;
 }
 
 #endif

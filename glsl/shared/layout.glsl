@@ -476,6 +476,55 @@ struct Ray {
     float t_max;
 };
 
+// A path of a picture, 16 bytes: what is known of it beside its ray.
+//
+// - `radiance`: the light that the path has brought to its pixel so far.
+// - `density`: of the direction in which the path goes on, among those that could have been sampled (per steradian). 0
+//   if no light can be sampled in its place: the ray comes from the camera or from a perfectly smooth surface.
+struct PathState {
+    vec3 radiance;
+    float density;
+};
+
+// A segment from a hit of a path to a sampled light, 48 bytes. If nothing is in between, its light is added to the path.
+//
+// - `origin`: world units.
+// - `state`: `SEGMENT_NONE`, `SEGMENT_WAITS`, or the mark of a segment whose traversal has stalled.
+// - `direction`: unit length.
+// - `source_triangle`: the triangle on which the segment starts, which it never hits again.
+// - `light`: what the segment adds to the path's radiance.
+// - `t_max`: length of the segment (world units).
+struct Segment {
+    vec3 origin;
+    uint state;
+    vec3 direction;
+    uint source_triangle;
+    vec3 light;
+    float t_max;
+};
+
+// `Segment.state`: the path has no segment.
+#define SEGMENT_NONE 0u
+// `Segment.state`: the segment has not been traced yet.
+#define SEGMENT_WAITS 1u
+
+// Values of `Frame.pixel_filter`: the density of samples around the centre of their pixel.
+//
+// The square of the pixel.
+#define FILTER_BOX 0u
+// A tent on each axis, which ends at the centres of the neighbouring pixels.
+#define FILTER_TENT 1u
+// A Gaussian of standard deviation 0.5 px, up to 1.5 px from the centre.
+#define FILTER_GAUSSIAN 2u
+// Base-2 logarithm of the most samples that a frame of paths draws.
+#define MOST_SAMPLES_LOG2 4u
+// The bounce of a path, counted from 0, from which on it may end by Russian roulette.
+#define ROULETTE_DEPTH 3u
+// The least probability with which a path survives Russian roulette. It bounds the weight of those that survive.
+#define LEAST_SURVIVAL 0.05
+// The share of the distance to a light at which a segment ends, so that it does not hit the light itself.
+#define SEGMENT_SHARE 0.9998
+
 // The hit of a ray, 16 bytes.
 //
 // - `t`: in units of the ray's direction. For a miss, infinity in a cast, and the ray's `t_max` in a frame.
@@ -488,7 +537,7 @@ struct Hit {
     float v;
 };
 
-// The frame's constants, 208 bytes (a uniform buffer, std140-compatible). The window is the part of the picture that
+// The frame's constants, 240 bytes (a uniform buffer, std140-compatible). The window is the part of the picture that
 // is rendered. The point of the window's pixel (x, y) in the image plane is
 //
 // ```text
@@ -518,6 +567,12 @@ struct Hit {
 // - `n_lanes`: lanes of the device, which are shared out if there are fewer rays. 0: each ray gets one lane.
 // - `is_orthographic`: 1 for an orthographic camera, 0 for a perspective one. Kernels are made for one of the two
 //   (`CONSTANT_ORTHOGRAPHIC`).
+// - The rest is for frames of paths. `samples_log2`: the frame draws `2^samples_log2` samples of each pixel.
+//   `first_sample`: the index of the first of them in the picture, a multiple of their number. `pixel_filter`:
+//   `FILTER_BOX` and its like. `clamp`: the most light that a path adds to its pixel after its first hit, in any colour
+//   (radiance; infinity: any amount). `aperture`: radius of the lens (world units; 0: everything is sharp). `focus`:
+//   distance of what is sharp from the eye, along `forward` (world units). `focuses_on_target`: 1 if that is the distance
+//   of the camera's target.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -543,7 +598,15 @@ struct Frame {
     uint n_samples;
     uint n_lanes;
     uint is_orthographic;
+    uint samples_log2;
+    uint first_sample;
+    uint pixel_filter;
+    float clamp;
+    float aperture;
+    float focus;
+    uint focuses_on_target;
     uint reserved0;
+    uint reserved1;
 };
 
 // The rays of one bounce of one batch, 80 bytes. The host writes the row of a batch's first bounce, and in all rows
@@ -560,6 +623,9 @@ struct Frame {
 //   one of this bounce. A segment has `2^shadow_lanes_log2` lanes.
 // - `scan_groups`: over the bounce's rays.
 // - `any_overflow`: in the first row of `bounces` only, 1 if any row of the frame has an overflow.
+//
+// In frames of paths, the rays of a bounce are those of the paths that are alive, `first_ray` is 0, and
+// `trace_groups` also count the segments of the bounce before.
 // - `shade_groups`: over all rays of the batch up to the last one of this bounce.
 struct Bounce {
     uint first_ray;
@@ -677,6 +743,9 @@ struct AccelConstants {
 #define CONSTANT_CURVE 8u
 // Whether compute kernels, and not the graphics pipeline, found the triangle that each pixel shows.
 #define CONSTANT_SOFTWARE_RASTER 9u
+
+// Whether the frame traces paths, whose rays are all stored, and not the ray trees of the paper.
+#define CONSTANT_PATHS 12u
 
 // Whether a kernel builds the lower level of a grid.
 #define CONSTANT_LOWER_LEVEL 10u
@@ -973,6 +1042,17 @@ struct GridSort {
 #define BIND_RASTER_GROUPS 29u
 // A row of counts, then `STALLED_RAY_ROWS` rows of four words for each slot (stalls.glsl).
 #define BIND_STALLS 32u
+
+// Bindings that only frames of paths have. `rays`, `hits` and the next two have an element for each path of a batch: the
+// first samples of all pixels, then the second ones, and so on.
+
+// One `PathState` for each path.
+#define BIND_PATH_STATES 33u
+// One `Segment` for each path.
+#define BIND_SEGMENTS 34u
+// Two lists of `Frame.queue_capacity` words: the indices of the paths that are alive, in their order. Bounces of even
+// depth have the first list, those of odd depth the second.
+#define BIND_LIVE_PATHS 35u
 
 // The scene's arrays as texels: the binding of each is this plus its own. All other bindings are below it.
 #define BIND_TEXELS 64u

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! accel           triangles and their acceleration structure, with the arrays of scene_arrays
-//! queue           rays of a batch and what belongs to each
+//! queue           rays or paths of a batch and what belongs to each
 //! pixels          samples, sums, filtered and displayed pixels
 //! raster_queue    large triangles, between the two kernels that rasterize
 //! vertex_indices  the index buffer of the triangles that the graphics pipeline rasterizes
@@ -33,7 +33,7 @@ pub use self::{
     cast::CastResources,
     grid::{GridBuffers, GridCapacities, PairSets},
     pixels::Pixels,
-    queue::Queue,
+    queue::{PathQueue, Queue},
     raster_queue::{RasterQueue, RasterState},
     resources::{Needs, Resources},
     scene_arrays::{SceneAccess, SceneArrays},

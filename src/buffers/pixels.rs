@@ -3,10 +3,13 @@
 use std::sync::Arc;
 
 use crate::{
-    frame::{Primary, RenderOptions},
+    frame::{Integrator, Primary, RenderOptions},
     gpu::{Buffer, BufferUse, Context, GpuError, Target, TargetKind},
     layout::{Feature, Frame},
 };
+
+/// Sums of samples for which each pixel of a frame of paths has room at least. They are enough for 4096 samples.
+const SUMS_OF_PATHS: usize = 8;
 
 /// Buffers and images of the window's pixels, rows from the top. The window is the part of the picture that is
 /// rendered ([`Frame`]). Buffers may be longer than the window needs. A clone is a second handle to the same memory.
@@ -15,7 +18,8 @@ pub struct Pixels {
     /// The radiance of the frame's sample, which the kernel `accumulate` replaces by the mean of all samples. There
     /// are `width * height` elements, as in all buffers here.
     pub pixel_radiance: Buffer<[f32; 4]>,
-    /// The sums of all samples; none before there is a second sample.
+    /// The sums of all samples; none before there is a second sample. Frames of paths have several sums for each pixel
+    /// (glsl/passes/path_accumulate.comp).
     pub pixel_accumulated: Option<Buffer<[f32; 4]>>,
     /// The radiance after the noise filter. None without a noise filter, in which case later kernels read
     /// `pixel_radiance`.
@@ -66,7 +70,8 @@ impl Pixels {
     /// Returns the bytes of a pixel in the widest buffer that the options need.
     pub fn bytes_per_pixel(options: &RenderOptions) -> u64 {
         let widest = if options.features { size_of::<Feature>() } else { 0 };
-        widest.max(size_of::<[f32; 4]>()).max(size_of::<u64>()) as u64
+        let sums = if options.integrator == Integrator::Path { SUMS_OF_PATHS * size_of::<[f32; 4]>() } else { 0 };
+        widest.max(sums).max(size_of::<[f32; 4]>()).max(size_of::<u64>()) as u64
     }
 
     /// Whether the buffers and images are large enough for the frame, and exist only if the frame uses them.

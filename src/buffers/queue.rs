@@ -4,8 +4,35 @@ use std::sync::Arc;
 
 use crate::{
     gpu::{Buffer, BufferUse, Context, GpuError},
-    layout::{Hit, PathRay, SCAN_GROUP_SIZE},
+    layout::{Hit, PathRay, PathState, SCAN_GROUP_SIZE, Segment},
 };
+
+/// What a batch of paths has beside the buffers of [`Queue`], in which each path has one ray. A clone is a second handle
+/// to the same buffers.
+#[derive(Clone)]
+pub struct PathQueue {
+    /// One for each path, as in the next buffer.
+    pub path_states: Buffer<PathState>,
+    pub segments: Buffer<Segment>,
+    /// Two lists, each with room for all paths: those that are alive at this bounce, and at the next.
+    pub live_paths: Buffer<u32>,
+}
+
+impl PathQueue {
+    /// Makes the buffers for `capacity` paths.
+    ///
+    /// # Errors
+    /// A buffer is beyond the device's limits, or memory runs out.
+    pub fn new(context: &Arc<Context>, capacity: u32) -> Result<Self, GpuError> {
+        let storage = BufferUse::Storage;
+        let capacity = capacity as usize;
+        Ok(Self {
+            path_states: Buffer::new(context, "path_states", capacity, storage)?,
+            segments: Buffer::new(context, "segments", capacity, storage)?,
+            live_paths: Buffer::new(context, "live_paths", 2 * capacity, storage)?,
+        })
+    }
+}
 
 /// Queue of the rays of all bounces of a batch, at most `queue_capacity`, with the hit, the children, the radiance
 /// and the shadows of each ray. A clone is a second handle to the same buffers.
@@ -44,6 +71,25 @@ impl Queue {
             first_children: Buffer::new(context, "first_children", capacity, storage)?,
             ray_radiance: Buffer::new(context, "ray_radiance", capacity, storage)?,
             light_visibility: Buffer::new(context, "light_visibility", n_lights * capacity, storage)?,
+            scan_blocks: Buffer::new(context, "scan_blocks", n_blocks, storage)?,
+        })
+    }
+
+    /// Makes the buffers for `capacity` paths. What ray trees need beside them is empty.
+    ///
+    /// # Errors
+    /// Fails as [`Queue::new`] does.
+    pub fn of_paths(context: &Arc<Context>, capacity: u32) -> Result<Self, GpuError> {
+        let storage = BufferUse::Storage;
+        let capacity = capacity as usize;
+        let n_blocks = capacity.div_ceil(SCAN_GROUP_SIZE as usize);
+        Ok(Self {
+            rays: Buffer::new(context, "rays", capacity, storage)?,
+            hits: Buffer::new(context, "hits", capacity, storage)?,
+            child_kinds: Buffer::new(context, "child_kinds", capacity, storage)?,
+            first_children: Buffer::new(context, "first_children", 0, storage)?,
+            ray_radiance: Buffer::new(context, "ray_radiance", 0, storage)?,
+            light_visibility: Buffer::new(context, "light_visibility", 0, storage)?,
             scan_blocks: Buffer::new(context, "scan_blocks", n_blocks, storage)?,
         })
     }

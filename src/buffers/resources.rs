@@ -3,13 +3,13 @@
 use std::{mem::offset_of, sync::Arc};
 
 use super::{
-    AccelBuffers, Pixels, Queue, RasterQueue, accel, binding,
+    AccelBuffers, PathQueue, Pixels, Queue, RasterQueue, accel, binding,
     pixels::{n_pixels, uses_graphics_pipeline},
     vertex_indices::{has_indices, vertex_indices},
 };
 use crate::{
     accel::Accel,
-    frame::RenderOptions,
+    frame::{Integrator, RenderOptions},
     gpu::{Access, Binding, BindingLayout, BindingSet, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
     layout::{self, Batch, Bounce, COUNTER_COPIES, COUNTER_STRIDE, Counters, Frame, Light, Material},
     world::World,
@@ -21,29 +21,34 @@ const PUSH_BYTES: u32 = {
     if batch > present { batch as u32 } else { present as u32 }
 };
 
-/// The bindings of the frame's descriptor set beside those of the acceleration structure.
-const OWN_BINDINGS: [u32; 20] = [
+/// The bindings of the frame's descriptor set beside those of the acceleration structure, for both integrators.
+const OWN_BINDINGS: [u32; 15] = [
     layout::BIND_FRAME,
     layout::BIND_MATERIALS,
     layout::BIND_LIGHTS,
     layout::BIND_RAYS,
     layout::BIND_CHILD_KINDS,
-    layout::BIND_FIRST_CHILDREN,
     layout::BIND_SCAN_BLOCKS,
     layout::BIND_BOUNCES,
     layout::BIND_HITS,
-    layout::BIND_LIGHT_VISIBILITY,
-    layout::BIND_RAY_RADIANCE,
     layout::BIND_PIXEL_RADIANCE,
     layout::BIND_PIXEL_ACCUMULATED,
     layout::BIND_PIXEL_FILTERED,
     layout::BIND_PIXEL_DISPLAY,
     layout::BIND_PIXEL_FEATURES,
     layout::BIND_COUNTERS,
-    layout::BIND_PIXEL_NEAREST,
-    layout::BIND_RASTER_GROUPS,
     layout::BIND_TRIANGLE_IDS,
 ];
+/// Further bindings, for ray trees.
+const BINDINGS_OF_WHITTED: [u32; 5] = [
+    layout::BIND_FIRST_CHILDREN,
+    layout::BIND_LIGHT_VISIBILITY,
+    layout::BIND_RAY_RADIANCE,
+    layout::BIND_PIXEL_NEAREST,
+    layout::BIND_RASTER_GROUPS,
+];
+/// Further bindings, for paths.
+const BINDINGS_OF_PATHS: [u32; 3] = [layout::BIND_PATH_STATES, layout::BIND_SEGMENTS, layout::BIND_LIVE_PATHS];
 
 /// The number of elements of `counters` for each bounce of each batch, including the unused elements between the
 /// copies of a counter.
@@ -66,6 +71,8 @@ pub struct Resources {
     /// `n_lights` elements.
     pub lights: Buffer<Light>,
     pub queue: Queue,
+    /// None unless the frame traces paths.
+    pub paths: Option<PathQueue>,
     pub pixels: Pixels,
     pub raster: RasterQueue,
     /// A row for each bounce of each batch.
@@ -98,14 +105,19 @@ impl Resources {
         let &Needs { constants, options, n_bounces } = needs;
         let mut accel = AccelBuffers::of_world(context, world)?;
         accel.add_links(context, world.accel(), options.traversal)?;
-        let kinds: Vec<_> = OWN_BINDINGS.into_iter().chain(accel::bindings()).map(binding).collect();
+        let is_of_paths = options.integrator == Integrator::Path;
+        let more = if is_of_paths { &BINDINGS_OF_PATHS[..] } else { &BINDINGS_OF_WHITTED };
+        let own = OWN_BINDINGS.iter().chain(more).copied();
+        let kinds: Vec<_> = own.chain(accel::bindings()).map(binding).collect();
+        let (queue, paths) = new_queues(context, constants, is_of_paths)?;
         let upload_indices = || new_vertex_indices(context, &vertex_indices(&scene.triangles));
         let mut resources = Self {
             frame: Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?,
             vertex_indices: uses_graphics_pipeline(options).then(upload_indices).transpose()?,
             materials: Buffer::with(context, "materials", &scene.materials, storage)?,
             lights: Buffer::with(context, "lights", &scene.lights, storage)?,
-            queue: Queue::new(context, constants.queue_capacity, constants.n_lights)?,
+            queue,
+            paths,
             pixels: Pixels::new(context, constants, options)?,
             raster: RasterQueue::new(context, constants.n_triangles, options)?,
             bounces: new_bounces(context, n_bounces)?,
@@ -114,7 +126,9 @@ impl Resources {
                 context,
                 &kinds,
                 PUSH_BYTES,
-                accel.constants().set(layout::constants::ORTHOGRAPHIC, constants.is_orthographic == 1),
+                (accel.constants())
+                    .set(layout::constants::ORTHOGRAPHIC, constants.is_orthographic == 1)
+                    .set(layout::constants::PATHS, is_of_paths),
             )?,
             accel,
             set: None,
@@ -132,23 +146,32 @@ impl Resources {
             (layout::BIND_LIGHTS, Binding::Buffer(self.lights.any())),
             (layout::BIND_RAYS, Binding::Buffer(queue.rays.any())),
             (layout::BIND_CHILD_KINDS, Binding::Buffer(queue.child_kinds.any())),
-            (layout::BIND_FIRST_CHILDREN, Binding::Buffer(queue.first_children.any())),
             (layout::BIND_SCAN_BLOCKS, Binding::Buffer(queue.scan_blocks.any())),
             (layout::BIND_BOUNCES, Binding::Buffer(self.bounces.any())),
             (layout::BIND_HITS, Binding::Buffer(queue.hits.any())),
-            (layout::BIND_LIGHT_VISIBILITY, Binding::Buffer(queue.light_visibility.any())),
-            (layout::BIND_RAY_RADIANCE, Binding::Buffer(queue.ray_radiance.any())),
             (layout::BIND_PIXEL_RADIANCE, Binding::Buffer(pixels.pixel_radiance.any())),
             (layout::BIND_PIXEL_ACCUMULATED, Binding::Buffer(pixels.accumulated().any())),
             (layout::BIND_PIXEL_FILTERED, Binding::Buffer(pixels.filtered().any())),
             (layout::BIND_PIXEL_DISPLAY, Binding::Buffer(pixels.pixel_display.any())),
             (layout::BIND_PIXEL_FEATURES, Binding::Buffer(pixels.pixel_features.any())),
             (layout::BIND_COUNTERS, Binding::Buffer(self.counters.any())),
-            (layout::BIND_PIXEL_NEAREST, Binding::Buffer(pixels.pixel_nearest.any())),
-            (layout::BIND_RASTER_GROUPS, Binding::Buffer(self.raster.groups.any())),
             (layout::BIND_TRIANGLE_IDS, Binding::Image(&pixels.triangle_ids)),
         ];
-        BindingSet::new(&self.bindings, "frame", &[&self.accel.objects(), &own[..]].concat())
+        let more = match &self.paths {
+            None => vec![
+                (layout::BIND_FIRST_CHILDREN, Binding::Buffer(queue.first_children.any())),
+                (layout::BIND_LIGHT_VISIBILITY, Binding::Buffer(queue.light_visibility.any())),
+                (layout::BIND_RAY_RADIANCE, Binding::Buffer(queue.ray_radiance.any())),
+                (layout::BIND_PIXEL_NEAREST, Binding::Buffer(pixels.pixel_nearest.any())),
+                (layout::BIND_RASTER_GROUPS, Binding::Buffer(self.raster.groups.any())),
+            ],
+            Some(paths) => vec![
+                (layout::BIND_PATH_STATES, Binding::Buffer(paths.path_states.any())),
+                (layout::BIND_SEGMENTS, Binding::Buffer(paths.segments.any())),
+                (layout::BIND_LIVE_PATHS, Binding::Buffer(paths.live_paths.any())),
+            ],
+        };
+        BindingSet::new(&self.bindings, "frame", &[&self.accel.objects(), &own[..], &more].concat())
     }
 
     /// Makes the resources for another frame of the same scene. The scene keeps its contents, and so do the pixels if
@@ -168,7 +191,7 @@ impl Resources {
                     uses_graphics_pipeline(options).then(|| next.make_vertex_indices(context)).transpose()?;
             }
             if next.queue.capacity() < constants.queue_capacity {
-                next.queue = Queue::new(context, constants.queue_capacity, constants.n_lights)?;
+                (next.queue, next.paths) = new_queues(context, constants, next.paths.is_some())?;
             }
             if !next.pixels.fit(constants, options) {
                 next.pixels = Pixels::new(context, constants, options)?;
@@ -242,6 +265,33 @@ impl Resources {
         Ok(())
     }
 
+    /// Makes room for `n_sums` sums of samples for each pixel. The sums that are there are kept.
+    ///
+    /// # Errors
+    /// The buffer is beyond the device's limits, memory runs out, or a copy fails. Nothing has changed then.
+    pub fn make_room_for_sums(&mut self, context: &Arc<Context>, n_sums: u32) -> Result<(), GpuError> {
+        let n_elements = n_sums as usize * self.n_pixels();
+        let (before, n_before) = (&self.pixels.pixel_accumulated, self.pixels.accumulated().len());
+        if before.is_some() && n_before >= n_elements {
+            return Ok(());
+        }
+        let next = self.changed(|next| {
+            let sums = Buffer::new(context, "pixel_accumulated", n_elements, BufferUse::Storage)?;
+            next.pixels.pixel_accumulated = Some(sums);
+            Ok(())
+        })?;
+        if let Some(before) = before {
+            let (from, to) = (before.any(), next.pixels.accumulated().any());
+            context.run("more sums", |commands| {
+                commands.barrier(Access::ComputeWrite, Access::TransferRead); // pixel_accumulated
+                commands.copy_buffer(from, to, from.bytes());
+                commands.barrier(Access::TransferWrite, Access::AnyUse); // pixel_accumulated
+            })?;
+        }
+        *self = next;
+        Ok(())
+    }
+
     /// Sets all counters to 0.
     pub fn clear_counters(&self, commands: &Commands) {
         commands.clear_buffer(self.counters.any());
@@ -269,6 +319,12 @@ impl Resources {
     /// The constants that the kernels read, from the next frame on.
     pub fn constants(&self) -> &Frame {
         &self.constants
+    }
+
+    /// A dispatch of one invocation for each path of the batch.
+    pub fn paths_dispatch(&self, batch: &Batch) -> Dispatch<'_> {
+        let n_paths = batch.n_pixels << self.constants.samples_log2;
+        Dispatch::Threads([n_paths, 1, 1], [layout::RAY_GROUP_SIZE, 1, 1])
     }
 
     /// A dispatch over the rays of the bounce, with `2^trace_lanes_log2` lanes for each ray ([`Bounce`]).
@@ -315,6 +371,20 @@ impl Resources {
 
     pub(crate) fn set(&self) -> &BindingSet {
         self.set.as_ref().expect("made with the resources")
+    }
+}
+
+/// Makes the queue, and what frames of paths have beside it.
+fn new_queues(
+    context: &Arc<Context>,
+    constants: &Frame,
+    is_of_paths: bool,
+) -> Result<(Queue, Option<PathQueue>), GpuError> {
+    let capacity = constants.queue_capacity;
+    if is_of_paths {
+        Ok((Queue::of_paths(context, capacity)?, Some(PathQueue::new(context, capacity)?)))
+    } else {
+        Ok((Queue::new(context, capacity, constants.n_lights)?, None))
     }
 }
 

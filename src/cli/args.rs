@@ -217,7 +217,8 @@ impl RenderArgs {
 
     /// Returns the number of samples per pixel: the user's, else the scene's.
     pub fn samples(&self, scene: &Scene) -> u32 {
-        self.spp.unwrap_or(if self.trace.is_some() { 1 } else { scene.defaults.samples })
+        let defaults = scene.defaults.for_integrator(self.picture.integrator);
+        self.spp.unwrap_or(if self.trace.is_some() { 1 } else { defaults.samples })
     }
 
     /// Returns the render options: the user's, and the scene's own where the user gave none. Refuses a crop beyond

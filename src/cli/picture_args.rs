@@ -5,7 +5,7 @@ use kdray::{
     accel::{AccelKind, kdtree::Traversal},
     cpu::metered_exposure,
     engine::choices::{BuildPolicy, Request},
-    frame::{Denoise, Primary, RenderOptions, Tonemap},
+    frame::{Denoise, Integrator, PathOptions, PixelFilter, Primary, RenderOptions, Tonemap},
     scene::RenderDefaults,
     world::World,
 };
@@ -17,6 +17,10 @@ pub struct PictureArgs {
     /// Size of the picture in pixels, for example 1024x768, each side 1 to 16384 [default: the scene's]
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
+    #[arg(long, value_name = "NAME")]
+    #[arg(help = with_words(INTEGRATOR, Some(INTEGRATOR_DEFAULT), &Integrator::words()))]
+    #[arg(long_help = listed(INTEGRATOR, INTEGRATOR_DEFAULT, &Integrator::descriptions()))]
+    pub integrator: Option<Integrator>,
     /// Levels of rays per pixel, 1 to 64: 1 traces primary rays only, and each further level adds one bounce of
     /// reflected and refracted rays; shadow rays are not counted [default: the scene's]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=64))]
@@ -37,6 +41,21 @@ pub struct PictureArgs {
     #[arg(help = with_words(TONEMAP, Some("the scene's"), &Tonemap::words()))]
     #[arg(long_help = listed(TONEMAP, "the scene's", &Tonemap::descriptions()))]
     pub tonemap: Option<Tonemap>,
+    /// Most light that a path adds to its pixel after its first hit, in any colour, above 0; bright specks fade, and so
+    /// does some of the light [default: any amount]
+    #[arg(long, value_name = "RADIANCE", value_parser = positive)]
+    pub clamp: Option<f32>,
+    #[arg(long, value_name = "FILTER", help = with_words(FILTER, Some("tent"), &PixelFilter::words()))]
+    #[arg(long_help = listed(FILTER, "tent", &PixelFilter::descriptions()))]
+    pub pixel_filter: Option<PixelFilter>,
+    /// Radius of the camera's lens in world units, above 0, for --integrator path: what is nearer or farther than
+    /// --focus is blurred [default: 0, everything is sharp]
+    #[arg(long, value_name = "R", value_parser = positive)]
+    pub aperture: Option<f32>,
+    /// Distance from the eye, along the view, at which things are sharp, in world units; needs --aperture [default: that
+    /// of the camera's target]
+    #[arg(long, value_name = "D", value_parser = positive, requires = "aperture")]
+    pub focus: Option<f32>,
     #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]
     #[arg(hide_default_value = true)]
     pub accel: AccelKind,
@@ -64,6 +83,10 @@ pub fn listed(what: &str, default: &str, descriptions: &str) -> String {
     format!("{what} [default: {default}]\n\n{descriptions}")
 }
 
+const INTEGRATOR: &str = "How light is computed";
+const INTEGRATOR_DEFAULT: &str =
+    "the scene's; if its file states none, path if surfaces or an environment give off light, else whitted";
+const FILTER: &str = "How samples are spread around the centre of their pixel, for --integrator path";
 const TONEMAP: &str = "Tone curve from radiance to what a display shows";
 const ACCEL: &str = "Acceleration structure that leads rays to triangles";
 const TRAVERSAL: &str = "Algorithm by which rays go through the kd-tree";
@@ -183,10 +206,19 @@ impl PictureArgs {
     /// visibility depend on the device and keep their defaults; [`Self::request`] returns the user's choice of them.
     pub fn options(&self, scene: &RenderDefaults) -> RenderOptions {
         let Size { width, height } = self.size.unwrap_or(Size { width: scene.width, height: scene.height });
+        let scene = scene.for_integrator(self.integrator);
+        let paths = PathOptions::default();
         RenderOptions {
             width,
             height,
             crop: None,
+            integrator: scene.integrator,
+            paths: PathOptions {
+                filter: self.pixel_filter.unwrap_or(paths.filter),
+                clamp: self.clamp.unwrap_or(paths.clamp),
+                aperture: self.aperture.unwrap_or(paths.aperture),
+                focus: self.focus.or(paths.focus),
+            },
             max_depth: self.max_depth.unwrap_or(scene.max_depth),
             exposure: self.exposure.unwrap_or(scene.exposure),
             tonemap: self.tonemap.unwrap_or(scene.tonemap),

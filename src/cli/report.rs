@@ -79,6 +79,7 @@ pub struct Options {
     height: u32,
     /// The crop as `x0,y0,x1,y1` in pixels; none for the whole picture.
     crop: Option<String>,
+    integrator: String,
     max_depth: u32,
     exposure: f32,
     tonemap: String,
@@ -98,6 +99,7 @@ impl From<&RenderOptions> for Options {
             width: options.width,
             height: options.height,
             crop: options.crop.map(|crop| crop.to_string()),
+            integrator: options.integrator.to_string(),
             max_depth: options.max_depth,
             exposure: options.exposure,
             tonemap: options.tonemap.to_string(),

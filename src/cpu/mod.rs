@@ -4,6 +4,7 @@
 //! ```text
 //! render   the frame, batch by batch, in the order of its plan
 //!   queue    the rays of a batch
+//!   paths    the passes of a batch of paths
 //!   timing   wall-clock times of passes
 //! meter    the exposure of a scene whose light has physical units
 //! trace    the reference's passes that trace rays, with the tracer of this folder
@@ -19,6 +20,7 @@ pub mod octant_bins;
 pub mod packet;
 pub mod packet_traverser;
 pub mod packet_triangle;
+mod paths;
 mod queue;
 mod render;
 pub mod soa;

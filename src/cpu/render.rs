@@ -2,18 +2,20 @@
 
 use bytemuck::Zeroable;
 
-use super::{queue::Queue, timing::Clock};
+use super::{paths::Paths, queue::Queue, timing::Clock};
 use crate::{
     accel::kdtree::TraversalLinks,
-    frame::{BounceStats, Denoise, FrameKind, Pass, Picture, Plan, Primary, Profile, RenderOptions, plan::passes},
-    layout::{Bounce, Feature, Frame, Hit, PathRay, SCAN_GROUP_SIZE},
+    frame::{
+        BounceStats, Denoise, FrameKind, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, plan::passes,
+    },
+    layout::{Batch, Bounce, Feature, Frame, Hit, MOST_SAMPLES_LOG2, PathRay, SCAN_GROUP_SIZE},
     reference::{
         accumulate,
         compact::{self, Parents},
         counting::costs,
         denoise, features,
         inputs::KernelInputs,
-        primary_hit, resolve,
+        path_accumulate, path_resolve, primary_hit, resolve,
         shade::{self, LitRays},
         tonemap,
     },
@@ -59,6 +61,9 @@ pub struct Renderer {
     /// Empty unless the options request features.
     pixel_features: Vec<Feature>,
     queue: Queue,
+    paths: Paths,
+    /// The batch of paths that is drawn.
+    batch: Batch,
     /// Number of rays beyond which the current batch is halved: `queue_capacity`, or no limit for one pixel.
     most_rays: u32,
     /// Counts of the current batch, one row for each bounce.
@@ -90,6 +95,8 @@ impl Renderer {
             pixel_display: vec![[0; 4]; n_pixels],
             pixel_features: vec![Feature::default(); if options.features { n_pixels } else { 0 }],
             queue: Queue::default(),
+            paths: Paths::default(),
+            batch: Batch::default(),
             most_rays: 0,
             batch_stats: Vec::new(),
             n_samples: 0,
@@ -99,8 +106,8 @@ impl Renderer {
         }
     }
 
-    /// Draws one more sample of each pixel on the current rayon pool. The first sample is at the pixel's centre. The
-    /// picture is the mean of all samples.
+    /// Draws one more sample of each pixel on the current rayon pool. The first sample is at the pixel's centre. Of paths,
+    /// as many samples are drawn as [`Renderer::set_samples_per_frame`] says. The picture is the mean of all samples.
     pub fn draw_sample(&mut self) -> Profile {
         self.draw_sample_with(|_| ())
     }
@@ -112,21 +119,42 @@ impl Renderer {
         self.bounces.clear();
         self.n_batches = 0;
         self.frame.set_view(&self.camera, self.world.bounds(), self.n_samples);
-        if self.n_samples == 1 {
+        let of_paths = self.options.integrator == Integrator::Path;
+        if self.n_samples == 1 && !of_paths {
             self.pixel_accumulated.clone_from(&self.pixel_radiance);
         }
         self.pixel_features.fill(Feature::default());
         let plan = Plan::new(&self.frame_kind());
         passes(&plan.visibility).for_each(|pass| self.run(pass, 0));
         let n_pixels = self.pixel_radiance.len() as u32;
-        for first_pixel in (0..n_pixels).step_by(self.batching.n_pixels as usize) {
-            let n_pixels_of_batch = self.batching.n_pixels.min(n_pixels - first_pixel);
-            self.batch(&plan, first_pixel, n_pixels_of_batch);
+        let most_pixels = (self.batching.n_pixels >> self.frame.samples_log2).max(1);
+        for first_pixel in (0..n_pixels).step_by(most_pixels as usize) {
+            let n_pixels_of_batch = most_pixels.min(n_pixels - first_pixel);
+            if of_paths {
+                self.batch_of_paths(&plan, first_pixel, n_pixels_of_batch);
+            } else {
+                self.batch(&plan, first_pixel, n_pixels_of_batch);
+            }
             progress((first_pixel + n_pixels_of_batch) as f32 / n_pixels as f32);
         }
         passes(&plan.image).for_each(|pass| self.run(pass, 0));
-        self.n_samples += 1;
+        self.n_samples = self.frame.n_samples;
         self.profile()
+    }
+
+    /// Sets the number of samples that the next frame of paths draws: `2^log2`, at most `2^MOST_SAMPLES_LOG2`. The
+    /// number of samples so far must be a multiple of it. Other frames draw one sample.
+    ///
+    /// # Panics
+    /// `log2` is too large, or the number of samples so far is no multiple.
+    pub fn set_samples_per_frame(&mut self, log2: u32) {
+        assert!(log2 <= MOST_SAMPLES_LOG2 && self.n_samples % (1 << log2) == 0, "2^{log2} after {}", self.n_samples);
+        self.frame.samples_log2 = log2;
+    }
+
+    /// Number of samples of each pixel in the picture.
+    pub fn n_samples(&self) -> u32 {
+        self.n_samples
     }
 
     /// Moves the camera. The next sample is the first of a new picture.
@@ -199,6 +227,22 @@ impl Renderer {
         self.count();
     }
 
+    /// Draws a batch of paths: all samples of the frame, of some pixels.
+    fn batch_of_paths(&mut self, plan: &Plan, first_pixel: u32, n_pixels: u32) {
+        self.batch = Batch { first_pixel, n_pixels, ..Batch::default() };
+        self.batch_stats.clear();
+        for (depth, bounce) in (0..).zip(&plan.bounces) {
+            self.batch.depth = depth;
+            passes(bounce).for_each(|pass| self.run(pass, depth));
+            // After a bounce that ends all paths, its segments are still to be traced.
+            if self.queue.bounces[depth as usize].n_rays == 0 {
+                break;
+            }
+        }
+        passes(&plan.light).for_each(|pass| self.run(pass, 0));
+        self.count();
+    }
+
     /// Runs a pass. `depth` is its bounce, and is ignored by a pass that belongs to no bounce.
     fn run(&mut self, pass: Pass, depth: u32) {
         match pass {
@@ -206,6 +250,7 @@ impl Renderer {
             Pass::PrimaryHit | Pass::Trace => self.closest_hits(pass, depth),
             Pass::Features => self.note_features(),
             Pass::CompactReduce => self.compact_reduce(depth),
+            Pass::CompactSpine if self.options.integrator == Integrator::Path => self.path_spine(depth),
             Pass::CompactSpine => self.compact_spine(depth),
             Pass::CompactScatter => self.compact_scatter(depth),
             Pass::Shadow => self.shadow(),
@@ -214,10 +259,62 @@ impl Renderer {
             Pass::Accumulate => self.accumulate(),
             Pass::Denoise => self.denoise(),
             Pass::Tonemap => self.tonemap(),
+            Pass::PathBegin => self.path_begin(),
+            Pass::PathTrace => self.path_trace(depth),
+            Pass::PathScatter => self.path_scatter(depth),
+            Pass::PathCompact => self.path_compact(depth),
+            Pass::PathResolve => self.path_resolve(),
+            Pass::PathAccumulate => self.path_accumulate(),
             Pass::RasterizeTriangles | Pass::RasterizeBlocks | Pass::FalseColor => {
                 unreachable!("the CPU's plan has no `{}`", pass.name())
             }
         }
+    }
+
+    fn path_begin(&mut self) {
+        let Self { frame, batch, paths, queue, .. } = self;
+        let n_paths = batch.n_pixels << frame.samples_log2;
+        self.clock.time(Pass::PathBegin, Some(0), || paths.begin(frame, batch, n_paths, queue));
+    }
+
+    /// Finds the closest hits of the bounce's paths, tests the segments of the bounce before, and counts both.
+    fn path_trace(&mut self, depth: u32) {
+        let Self { world, frame, links, paths, queue, .. } = self;
+        let inputs = KernelInputs::new(world, frame).with_links(links);
+        let trace = || paths.trace(&inputs, self.options.traversal, depth, queue);
+        let (n_hits, n_segments) = self.clock.time(Pass::PathTrace, Some(depth), trace);
+        if let Some(before) = self.batch_stats.last_mut() {
+            before.n_shadow_rays = n_segments.into();
+        }
+        let n_rays = self.queue.bounces[depth as usize].n_rays.into();
+        self.batch_stats.push(BounceStats { n_rays, n_hits: n_hits.into(), n_shadow_rays: 0 });
+    }
+
+    fn path_scatter(&mut self, depth: u32) {
+        let Self { world, frame, links, batch, paths, queue, .. } = self;
+        let inputs = KernelInputs::new(world, frame).with_links(links);
+        self.clock.time(Pass::PathScatter, Some(depth), || paths.scatter(&inputs, batch, queue));
+    }
+
+    fn path_spine(&mut self, depth: u32) {
+        let Self { frame, paths, queue, .. } = self;
+        self.clock.time(Pass::CompactSpine, Some(depth), || paths.spine(frame, depth, queue));
+    }
+
+    fn path_compact(&mut self, depth: u32) {
+        let Self { paths, queue, .. } = self;
+        self.clock.time(Pass::PathCompact, Some(depth), || paths.compact(depth, queue));
+    }
+
+    fn path_resolve(&mut self) {
+        let Self { frame, batch, paths, pixel_radiance, .. } = self;
+        let resolve = || path_resolve::path_resolve(frame, batch, &paths.states, pixel_radiance);
+        self.clock.time(Pass::PathResolve, None, resolve);
+    }
+
+    fn path_accumulate(&mut self) {
+        let (frame, radiance, sums) = (&self.frame, &mut self.pixel_radiance, &mut self.pixel_accumulated);
+        self.clock.time(Pass::PathAccumulate, None, || path_accumulate::path_accumulate(frame, radiance, sums));
     }
 
     fn visibility(&mut self) {
@@ -255,6 +352,9 @@ impl Renderer {
     fn note_features(&mut self) {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let (Queue { rays, hits, .. }, pixels) = (&self.queue, &mut self.pixel_features);
+        // Of paths, the first ones are the first samples of the pixels.
+        let n_rays = if self.options.integrator == Integrator::Path { self.batch.n_pixels as usize } else { rays.len() };
+        let (rays, hits) = (&rays[..n_rays], &hits[..n_rays]);
         self.clock.time(Pass::Features, Some(0), || features::features(&inputs, rays, hits, pixels));
     }
 

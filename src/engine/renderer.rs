@@ -6,7 +6,7 @@ use tracing::info_span;
 
 use crate::{
     cpu::{self, Batching},
-    frame::{Drawn, Picture, RenderOptions, Watcher},
+    frame::{Drawn, Integrator, Picture, RenderOptions, Watcher, sampling::samples_log2},
     gpu::{Context, GivenImage, GpuError, TimelinePoint},
     render::BandedRenderer,
     scene::Camera,
@@ -103,13 +103,19 @@ impl Renderer {
 }
 
 fn draw_on_cpu(renderer: &mut cpu::Renderer, n_samples: u32, watcher: &mut impl Watcher) -> Drawn {
-    let mut sample = |renderer: &mut cpu::Renderer| {
+    let mut frame = |renderer: &mut cpu::Renderer| {
+        let n_before = renderer.n_samples();
+        if renderer.options().integrator == Integrator::Path {
+            renderer.set_samples_per_frame(samples_log2(n_before, n_samples));
+        }
         let profile = info_span!("render").in_scope(|| renderer.draw_sample_with(|share| watcher.part(share)));
-        watcher.sample();
+        (n_before..renderer.n_samples()).for_each(|_| watcher.sample());
         profile
     };
-    let mut profile = sample(renderer);
+    let mut profile = frame(renderer);
     let features = if renderer.options().features { renderer.features() } else { Vec::new() };
-    (1..n_samples).for_each(|_| profile.add(&sample(renderer)));
+    while renderer.n_samples() < n_samples {
+        profile.add(&frame(renderer));
+    }
     Drawn { features, profile }
 }

@@ -26,6 +26,25 @@ impl Bounce {
         row
     }
 
+    /// Returns the row of the first bounce of a batch of `n_paths` paths. With no paths, it is the initial row of a later
+    /// bounce, which compaction fills in.
+    pub fn of_paths(n_paths: u32, constants: &Frame) -> Self {
+        let mut row = Self::of(0, constants);
+        row.set_paths(n_paths, 0, constants);
+        row
+    }
+
+    /// Sets the number of paths that are alive at the bounce, the lanes of each ray and segment, and the sizes of the
+    /// dispatches along x. `n_before`: the number of paths that were alive at the bounce before.
+    pub fn set_paths(&mut self, n_paths: u32, n_before: u32, constants: &Frame) {
+        let n_traced = n_paths + n_before;
+        self.n_rays = n_paths;
+        self.n_wanted = n_paths;
+        self.trace_lanes_log2 = lanes_log2(n_traced, constants.n_lanes);
+        self.trace_groups_x = (n_traced << self.trace_lanes_log2).div_ceil(RAY_GROUP_SIZE);
+        self.scan_groups_x = n_paths.div_ceil(SCAN_GROUP_SIZE);
+    }
+
     /// Sets the bounce's range of rays in the queue, the lanes of each ray, and the sizes of the dispatches along x.
     pub fn set_rays(&mut self, first_ray: u32, n_rays: u32, constants: &Frame) {
         let n_so_far = first_ray + n_rays;

@@ -4,8 +4,8 @@
 use glam::{DMat4, DVec2, DVec3, DVec4, Vec3, dvec2};
 
 use crate::{
-    frame::{Crop, Denoise, RenderOptions, sampling::sample_offset},
-    layout::Frame,
+    frame::{Crop, Denoise, PixelFilter, RenderOptions, sampling::sample_offset},
+    layout::{FILTER_BOX, FILTER_GAUSSIAN, FILTER_TENT, Frame},
     scene::{Camera, Projection},
 };
 
@@ -31,7 +31,16 @@ impl Frame {
         self.picture_height = options.height;
         (self.window_x, self.window_y) = (window.x0, window.y0);
         (self.width, self.height) = (window.width(), window.height());
-        self.max_depth = options.max_depth;
+        self.max_depth = options.n_bounces();
+        self.pixel_filter = match options.paths.filter {
+            PixelFilter::Box => FILTER_BOX,
+            PixelFilter::Tent => FILTER_TENT,
+            PixelFilter::Gaussian => FILTER_GAUSSIAN,
+        };
+        self.clamp = options.paths.clamp;
+        self.aperture = options.paths.aperture;
+        self.focus = options.paths.focus.unwrap_or(0.0);
+        self.focuses_on_target = options.paths.focus.is_none().into();
         self.exposure = options.exposure;
         self.denoise_threshold = match options.denoise {
             Denoise::Off => f32::INFINITY,
@@ -39,8 +48,9 @@ impl Frame {
         };
     }
 
-    /// Sets the camera and the frame's sample, whose index counts from 0. `bounds`: the least and the greatest corner
-    /// of a box that contains the scene, world units.
+    /// Sets the camera and the frame's sample, whose index counts from 0. In a frame of paths, which draws several
+    /// samples, it is the first of them. `bounds`: the least and the greatest corner of a box that contains the scene,
+    /// world units.
     pub fn set_view(&mut self, camera: &Camera, bounds: [Vec3; 2], sample_ix: u32) {
         let size = dvec2(self.picture_width.into(), self.picture_height.into());
         let offset = sample_offset(sample_ix);
@@ -63,7 +73,11 @@ impl Frame {
         self.up = image_plane.up.as_vec3();
         self.forward = image_plane.forward.as_vec3();
         [self.sample_x, self.sample_y] = (offset + 0.5).as_vec2().to_array();
-        self.n_samples = sample_ix + 1;
+        self.first_sample = sample_ix;
+        self.n_samples = sample_ix + (1 << self.samples_log2);
+        if self.focuses_on_target == 1 {
+            self.focus = eye.distance(camera.target);
+        }
     }
 }
 

@@ -46,6 +46,8 @@ pub struct RenderOptions {
     pub height: u32,
     /// The part of the picture to render, which is inside the picture. None: all of it.
     pub crop: Option<Crop>,
+    /// How light is computed.
+    pub integrator: Integrator,
     /// Number of bounces, the primary rays included: 1 is ray casting with shadows (Algorithm 1's `maximumDepth`).
     pub max_depth: u32,
     /// Factor by which radiance is multiplied before it is encoded for display.
@@ -62,6 +64,39 @@ pub struct RenderOptions {
     pub profile: bool,
     /// Whether the features of each pixel are written: what its primary ray hits, and what all its rays cost.
     pub features: bool,
+    /// What only paths have: filters, lens, bounds.
+    pub paths: PathOptions,
+}
+
+impl RenderOptions {
+    /// Returns the number of bounces of a frame. Paths have one more than `max_depth`, in which the rays from the last
+    /// hits only meet light.
+    pub fn n_bounces(&self) -> u32 {
+        match self.integrator {
+            Integrator::Whitted => self.max_depth,
+            Integrator::Path => self.max_depth + 1,
+        }
+    }
+}
+
+/// Options of [`Integrator::Path`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathOptions {
+    /// The density of samples around the centre of their pixel.
+    pub filter: PixelFilter,
+    /// The most light that a path adds to its pixel after its first hit, in any colour (radiance). It makes pictures
+    /// darker than they should be. Infinity: any amount.
+    pub clamp: f32,
+    /// Radius of the camera's lens, world units. 0: everything is sharp.
+    pub aperture: f32,
+    /// Distance from the eye, along the view, at which things are sharp, world units. None: the camera's target.
+    pub focus: Option<f32>,
+}
+
+impl Default for PathOptions {
+    fn default() -> Self {
+        Self { filter: PixelFilter::Tent, clamp: f32::INFINITY, aperture: 0.0, focus: None }
+    }
 }
 
 impl Default for RenderOptions {
@@ -70,6 +105,7 @@ impl Default for RenderOptions {
             width: 1024,
             height: 768,
             crop: None,
+            integrator: Integrator::Whitted,
             max_depth: 5,
             exposure: 1.0,
             tonemap: Tonemap::Linear,
@@ -78,6 +114,7 @@ impl Default for RenderOptions {
             primary: Primary::Raster,
             profile: true,
             features: false,
+            paths: PathOptions::default(),
         }
     }
 }
@@ -122,6 +159,27 @@ impl Tonemap {
     }
 }
 
+/// How light is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Integrator {
+    /// The paper's ray tracing, after Whitted (1980): each hit is lit by points and directions of light with hard
+    /// shadows and by a constant ambient light, and mirrors and glass make further rays.
+    Whitted,
+    /// Path tracing (Kajiya: The Rendering Equation, 1986): light from everywhere, by random paths.
+    Path,
+}
+
+/// The density of samples around the centre of their pixel, by which they make up the pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PixelFilter {
+    /// The square of the pixel.
+    Box,
+    /// A tent on each axis, which ends at the centres of the neighbouring pixels.
+    Tent,
+    /// A Gaussian of standard deviation 0.5 px, up to 1.5 px from the centre.
+    Gaussian,
+}
+
 /// How primary rays find their triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Primary {
@@ -162,6 +220,15 @@ named_enum!(Tonemap {
     Linear = "linear": "radiance as it is; what is above white is clipped",
     Agx = "agx": "AgX: bright colours fade to white, dark ones keep their hue",
     Aces = "aces": "the ACES curve of films: more contrast",
+});
+named_enum!(Integrator {
+    Whitted = "whitted": "the paper's ray tracing: point lights, hard shadows, mirrors, glass, constant ambient light",
+    Path = "path": "path tracing: light from lamps, surfaces and the sky, soft shadows, any number of reflections",
+});
+named_enum!(PixelFilter {
+    Box = "box": "the square of the pixel",
+    Tent = "tent": "a tent that ends at the centres of the neighbouring pixels",
+    Gaussian = "gaussian": "a Gaussian of standard deviation half a pixel",
 });
 named_enum!(Primary {
     Raster = "raster": "the device's graphics pipeline rasterizes the triangles; best if they are fewer than pixels",

@@ -3,9 +3,9 @@
 use super::resource::{
     Resource,
     Resource::{
-        Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, PixelAccumulated, PixelDisplay,
-        PixelFeatures, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups, RayRadiance, Rays, ScanBlocks, Stalls,
-        TriangleIds,
+        Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathStates, PixelAccumulated,
+        PixelDisplay, PixelFeatures, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups, RayRadiance, Rays,
+        ScanBlocks, Segments, Stalls, TriangleIds,
     },
 };
 
@@ -74,6 +74,18 @@ pub enum Pass {
     FalseColor,
     /// Encodes radiance for display.
     Tonemap,
+    /// Makes the camera rays of a batch's paths.
+    PathBegin,
+    /// Finds the closest hits of paths, and tests the segments to lights of the bounce before.
+    PathTrace,
+    /// Adds the light that paths meet, samples lights at their hits, and the directions in which they go on.
+    PathScatter,
+    /// Lists the paths that go on, without gaps.
+    PathCompact,
+    /// Adds up the radiance of each pixel's paths.
+    PathResolve,
+    /// Turns the sum of the frame's samples into the mean of all samples.
+    PathAccumulate,
 }
 
 /// The properties of a pass, the same in every frame.
@@ -90,7 +102,7 @@ struct Info {
 }
 
 /// A row for each pass, in the order of [`Pass`].
-const TABLE: [Info; 16] = [
+const TABLE: [Info; 22] = [
     Info {
         pass: Pass::Visibility,
         name: "visibility",
@@ -249,6 +261,66 @@ const TABLE: [Info; 16] = [
         color: [170, 170, 170],
         reads: &[PixelFiltered],
         writes: &[PixelDisplay],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::PathBegin,
+        name: "path_begin",
+        role: Role::PrimaryVisibility,
+        scope: Scope::Bounce,
+        color: [90, 160, 235],
+        reads: &[],
+        writes: &[Rays, PathStates, Segments, LivePaths],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::PathTrace,
+        name: "path_trace",
+        role: Role::ClosestHit,
+        scope: Scope::Bounce,
+        color: [235, 110, 40],
+        reads: &[Rays, Hits, LivePaths, Bounces, PathStates, Segments, Counters, PixelFeatures, Stalls],
+        writes: &[Hits, PathStates, Segments, Counters, PixelFeatures, Stalls],
+        indirect: Some(Bounces),
+    },
+    Info {
+        pass: Pass::PathScatter,
+        name: "path_scatter",
+        role: Role::Light,
+        scope: Scope::Bounce,
+        color: [240, 200, 70],
+        reads: &[Rays, Hits, LivePaths, Bounces, PathStates],
+        writes: &[Rays, PathStates, Segments, ChildKinds, ScanBlocks],
+        indirect: Some(Bounces),
+    },
+    Info {
+        pass: Pass::PathCompact,
+        name: "path_compact",
+        role: Role::Compaction,
+        scope: Scope::Bounce,
+        color: [250, 150, 150],
+        reads: &[ChildKinds, ScanBlocks, Bounces, LivePaths],
+        writes: &[LivePaths],
+        indirect: Some(Bounces),
+    },
+    Info {
+        pass: Pass::PathResolve,
+        name: "path_resolve",
+        role: Role::Light,
+        scope: Scope::Batch,
+        color: [100, 190, 110],
+        reads: &[PathStates],
+        writes: &[PixelRadiance],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::PathAccumulate,
+        name: "path_accumulate",
+        role: Role::Image,
+        scope: Scope::Frame,
+        color: [200, 170, 230],
+        reads: &[PixelAccumulated, PixelRadiance],
+        writes: &[PixelAccumulated, PixelRadiance],
         indirect: None,
     },
 ];

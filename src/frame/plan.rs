@@ -8,11 +8,12 @@ use super::{
     resource::{
         Resource,
         Resource::{
-            Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, PixelAccumulated, PixelFeatures,
-            PixelFiltered, PixelNearest, PixelRadiance, RasterGroups, RayRadiance, Rays, ScanBlocks,
+            Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathStates,
+            PixelAccumulated, PixelFeatures, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups, RayRadiance,
+            Rays, ScanBlocks, Segments,
         },
     },
-    {Denoise, Primary, RenderOptions},
+    {Denoise, Integrator, Primary, RenderOptions},
 };
 
 /// How the passes before or after a barrier access its resources.
@@ -51,9 +52,11 @@ pub type Section = Vec<Step>;
 /// The properties of a frame that decide which passes it has.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameKind {
-    /// How primary rays find their triangles.
+    /// How light is computed.
+    pub integrator: Integrator,
+    /// How primary rays find their triangles. Those of paths are always traced.
     pub primary: Primary,
-    /// Number of bounces, the primary rays included.
+    /// Number of bounces, the primary rays included. The last one of paths only meets light.
     pub n_bounces: u32,
     /// Whether the features of each pixel are written: what its primary ray hits, and what all its rays cost.
     pub features: bool,
@@ -75,8 +78,9 @@ impl FrameKind {
     /// its sample is added to earlier ones. It displays the picture. To display a feature takes no more passes.
     pub fn new(options: &RenderOptions, n_lights: u32) -> Self {
         Self {
+            integrator: options.integrator,
             primary: options.primary,
-            n_bounces: options.max_depth,
+            n_bounces: options.n_bounces(),
             features: options.features,
             is_lit: true,
             has_lights: n_lights > 0,
@@ -107,6 +111,27 @@ pub struct Plan {
 impl Plan {
     /// Returns the passes of a frame of this kind.
     pub fn new(kind: &FrameKind) -> Self {
+        match kind.integrator {
+            Integrator::Whitted => Self::of_ray_trees(kind),
+            Integrator::Path => Self::of_paths(kind),
+        }
+    }
+
+    /// Returns the passes of a frame that traces paths.
+    fn of_paths(kind: &FrameKind) -> Self {
+        let light = vec![Step::Run(Pass::PathResolve), barrier(Touch::Write, Touch::Update, &[PixelRadiance])];
+        let sums =
+            vec![Step::Run(Pass::PathAccumulate), barrier(Touch::Write, Touch::Read, &[PixelAccumulated, PixelRadiance])];
+        Self {
+            visibility: Section::new(),
+            bounces: (0..kind.n_bounces).map(|depth| bounce_of_paths(kind, depth)).collect(),
+            light: if kind.is_lit { light } else { Section::new() },
+            image: [if kind.is_lit { sums } else { Section::new() }, display(kind)].concat(),
+        }
+    }
+
+    /// Returns the passes of a frame that traces the paper's trees of reflected and refracted rays.
+    fn of_ray_trees(kind: &FrameKind) -> Self {
         Self {
             visibility: visibility(kind.primary),
             bounces: (0..kind.n_bounces).map(|depth| bounce(kind, depth)).collect(),
@@ -144,6 +169,41 @@ pub fn visibility(primary: Primary) -> Section {
             barrier(Touch::Write, Touch::Read, &[PixelNearest]),
         ],
     }
+}
+
+/// Returns the section of one bounce of paths: closest hits, then the light that the paths meet and the way on.
+fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
+    let mut bounce = Section::new();
+    if depth == 0 {
+        bounce.extend([
+            Step::Run(Pass::PathBegin),
+            barrier(Touch::Write, Touch::Update, &[Rays, PathStates, Segments, LivePaths]),
+        ]);
+    }
+    bounce.extend([
+        Step::Run(Pass::PathTrace),
+        barrier(Touch::Write, Touch::Update, &[Hits, PathStates, Segments, Counters, PixelFeatures]),
+    ]);
+    if depth == 0 && kind.features {
+        bounce.extend([Step::Run(Pass::Features), barrier(Touch::Write, Touch::Update, &[PixelFeatures])]);
+    }
+    if kind.is_lit {
+        bounce.extend([
+            Step::Run(Pass::PathScatter),
+            barrier(Touch::Write, Touch::Update, &[Rays, PathStates, Segments, ChildKinds, ScanBlocks]),
+        ]);
+    }
+    if depth + 1 < kind.n_bounces {
+        bounce.extend([
+            barrier(Touch::Indirect, Touch::Write, &[Bounces]),
+            Step::Run(Pass::CompactSpine),
+            barrier(Touch::Write, Touch::Read, &[ScanBlocks, Bounces]),
+            barrier(Touch::Write, Touch::Indirect, &[Bounces]),
+            Step::Run(Pass::PathCompact),
+            barrier(Touch::Write, Touch::Update, &[LivePaths]),
+        ]);
+    }
+    bounce
 }
 
 /// Returns the section that finds the closest hits of one bounce's rays and, from these, makes the next bounce's

@@ -42,11 +42,17 @@ pub enum Resource {
     Counters,
     /// States of stalled rays: rays that have spent the loop turns of a dispatch and go on in a further dispatch.
     Stalls,
+    /// What is known of each path beside its ray: the light that it has brought, the density of its direction.
+    PathStates,
+    /// The segment of each path from its last hit to a sampled light.
+    Segments,
+    /// The indices of the paths that are alive, for this bounce and the next.
+    LivePaths,
 }
 
 impl Resource {
     /// Every resource.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 21] = [
         Self::Rays,
         Self::Hits,
         Self::ChildKinds,
@@ -65,6 +71,9 @@ impl Resource {
         Self::RasterGroups,
         Self::Counters,
         Self::Stalls,
+        Self::PathStates,
+        Self::Segments,
+        Self::LivePaths,
     ];
 
     /// Returns its binding in the frame's descriptor set.
@@ -88,6 +97,9 @@ impl Resource {
             Self::RasterGroups => layout::BIND_RASTER_GROUPS,
             Self::Counters => layout::BIND_COUNTERS,
             Self::Stalls => layout::BIND_STALLS,
+            Self::PathStates => layout::BIND_PATH_STATES,
+            Self::Segments => layout::BIND_SEGMENTS,
+            Self::LivePaths => layout::BIND_LIVE_PATHS,
         }
     }
 }

@@ -34,7 +34,14 @@ mod compact;
 mod denoise;
 mod false_color;
 mod features;
+mod frame_passes;
 pub mod grid;
+mod path_accumulate;
+mod path_begin;
+mod path_compact;
+mod path_resolve;
+mod path_scatter;
+mod path_trace;
 #[cfg(feature = "view")]
 mod present;
 mod primary_hit;
@@ -49,8 +56,10 @@ mod visibility;
 
 pub use self::{
     accumulate::Accumulate, cast::Cast, compact::Compact, denoise::Denoise, false_color::FalseColor,
-    features::Features, primary_hit::PrimaryHit, rasterize::Rasterize, record::Inputs, resolve::Resolve, shade::Shade,
-    shadow::Shadow, tonemap::Tonemap, trace::Trace, visibility::Visibility,
+    features::Features, frame_passes::{FramePasses, PathPasses}, path_accumulate::PathAccumulate, path_begin::PathBegin,
+    path_compact::PathCompact, path_resolve::PathResolve, path_scatter::PathScatter, path_trace::PathTrace,
+    primary_hit::PrimaryHit, rasterize::Rasterize, record::Inputs, resolve::Resolve, shade::Shade, shadow::Shadow,
+    tonemap::Tonemap, trace::Trace, visibility::Visibility,
 };
 
 #[cfg(feature = "view")]
@@ -64,7 +73,7 @@ macro_rules! spirv {
 }
 pub(crate) use spirv;
 
-/// All passes of a frame. A clone shares its pipelines with the original.
+/// All passes of a frame that traces the paper's trees of rays. A clone shares its pipelines with the original.
 #[derive(Clone)]
 pub struct Passes {
     /// None unless the options have [`Primary::Raster`].
@@ -251,7 +260,7 @@ mod tests {
 
     #[test]
     fn every_traversal_has_its_modules() {
-        for (kernel, n_of_each) in [("cast", 1), ("shadow", 2), ("trace", 2)] {
+        for (kernel, n_of_each) in [("cast", 1), ("path_trace", 2), ("shadow", 2), ("trace", 2)] {
             let modules: Vec<_> = modules_of(kernel).map(|module| module.file).collect();
             assert_eq!(modules.len(), n_of_each * (Traversal::ALL.len() + 1), "{kernel}: those of the grid, too");
             for traversal in Traversal::ALL {

@@ -18,15 +18,20 @@ pub struct Inputs {
     pub false_color: Option<FalseColor>,
 }
 
+impl Inputs {
+    /// Returns the feature that [`Pass::FalseColor`] displays.
+    ///
+    /// # Panics
+    /// There is none.
+    pub(super) fn displayed_feature(&self) -> &FalseColor {
+        self.false_color.as_ref().expect("a feature is displayed")
+    }
+}
+
 impl Passes {
     /// Records passes and the barriers between them. The resources must be bound.
     pub fn record_section(&self, commands: &Commands, resources: &Resources, section: &[Step], inputs: &Inputs) {
-        for step in section {
-            match *step {
-                Step::Run(pass) => self.record(commands, resources, pass, inputs),
-                Step::Barrier { before, after, .. } => commands.barrier(access(before), access(after)),
-            }
-        }
+        record_steps(commands, section, |pass| self.record(commands, resources, pass, inputs));
     }
 
     /// Records one pass. The resources must be bound.
@@ -50,11 +55,19 @@ impl Passes {
             Pass::Resolve => self.resolve.record(commands, batch),
             Pass::Accumulate => self.accumulate.record(commands, resources),
             Pass::Denoise => self.denoise.record(commands, resources),
-            Pass::FalseColor => {
-                let push = inputs.false_color.as_ref().expect("a feature is displayed");
-                self.false_color.record(commands, resources, push);
-            }
+            Pass::FalseColor => self.false_color.record(commands, resources, inputs.displayed_feature()),
             Pass::Tonemap => self.tonemap.record(commands, resources),
+            _ => panic!("a frame of ray trees has no `{}`", pass.name()),
+        }
+    }
+}
+
+/// Records the steps of a section: passes by `record`, and barriers.
+pub(super) fn record_steps(commands: &Commands, section: &[Step], record: impl Fn(Pass)) {
+    for step in section {
+        match *step {
+            Step::Run(pass) => record(pass),
+            Step::Barrier { before, after, .. } => commands.barrier(access(before), access(after)),
         }
     }
 }

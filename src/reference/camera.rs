@@ -36,6 +36,11 @@ pub fn pixel_of(order: u32, width: u32, height: u32) -> UVec2 {
     TILE_SIZE * uvec2(tile, band) + at
 }
 
+/// The pixel's index in buffers of the window's pixels, which hold rows from the top.
+pub fn pixel_ix_of(frame: &Frame, pixel: UVec2) -> u32 {
+    pixel.y * frame.width + pixel.x
+}
+
 /// Converts a pixel of the window to the same pixel's coordinates in the whole picture.
 pub fn in_picture(frame: &Frame, pixel: UVec2) -> UVec2 {
     pixel + uvec2(frame.window_x, frame.window_y)

@@ -1,8 +1,11 @@
 //! Gaps: the parts of a triangle through which rays pass, since the opacity there is too low. Twin of `cutout.glsl`.
 
-use super::texture::{sample_texture, scalar_of, uv_set_of};
+use super::{
+    sampler::{mixed, unit_number},
+    texture::{sample_texture, scalar_of, uv_set_of},
+};
 use crate::{
-    layout::{MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps, NO_TEXTURE},
+    layout::{Hit, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps, NO_TEXTURE},
     world::Textures,
 };
 
@@ -29,10 +32,20 @@ pub fn opacity_at(textures: &Textures, maps: &MaterialMaps, triangle_ix: u32, at
     opacity
 }
 
-/// Whether a ray passes through a triangle at a point. `passes_veils`: whether the ray is a shadow ray, which also
-/// passes through see-through surfaces with an opacity below `LEAST_SHADOWING_OPACITY`.
-pub fn is_gap(textures: &Textures, material_ix: u32, triangle_ix: u32, at: [f32; 2], passes_veils: bool) -> bool {
+/// A random number in [0, 1) for a point of a triangle. Different rays hit different points.
+fn random_at(hit: &Hit) -> f32 {
+    unit_number(mixed(hit.u.to_bits() ^ mixed(hit.v.to_bits() ^ mixed(hit.triangle_ix))))
+}
+
+/// Whether a ray passes through a triangle at a hit. `passes_veils`: whether the ray is a shadow ray, which also
+/// passes through see-through surfaces with an opacity below `LEAST_SHADOWING_OPACITY`. `is_random`: whether it passes
+/// through them at random instead, as often as the opacity says.
+pub fn is_gap(textures: &Textures, material_ix: u32, hit: &Hit, passes_veils: bool, is_random: bool) -> bool {
     let kinds = if passes_veils { MAPS_CUTOUT | MAPS_VEIL } else { MAPS_CUTOUT };
     let maps = &textures.material_maps[material_ix as usize];
-    maps.flags & kinds != 0 && opacity_at(textures, maps, triangle_ix, at) < maps.alpha_cutoff
+    if maps.flags & kinds == 0 {
+        return false;
+    }
+    let opacity = opacity_at(textures, maps, hit.triangle_ix, [hit.u, hit.v]);
+    if is_random && maps.flags & MAPS_VEIL != 0 { random_at(hit) >= opacity } else { opacity < maps.alpha_cutoff }
 }

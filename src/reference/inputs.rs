@@ -35,6 +35,8 @@ pub struct KernelInputs<'a, R = NoCounter> {
     pub cutouts: Option<&'a Textures>,
     /// Whether rays pass through see-through surfaces with an opacity below `LEAST_SHADOWING_OPACITY`.
     pub passes_veils: bool,
+    /// Whether rays pass through see-through surfaces at random, as often as their opacity says.
+    pub random_opacity: bool,
     pub lights: &'a [Light],
     pub kd_nodes: CountedSlice<'a, KdNode, R>,
     /// For each pair of siblings, the index of their parent.
@@ -84,7 +86,7 @@ impl<'a, R> KernelInputs<'a, R> {
     fn is_solid_at(&self, hit: &Hit) -> bool {
         let word = self.triangle_materials[hit.triangle_ix as usize];
         match self.cutouts {
-            Some(textures) => !is_gap(textures, word, hit.triangle_ix, [hit.u, hit.v], self.passes_veils),
+            Some(textures) => !is_gap(textures, word, hit, self.passes_veils, self.random_opacity),
             None => word & TRIANGLE_HIDDEN == 0,
         }
     }
@@ -152,6 +154,7 @@ impl<'a> KernelInputs<'a> {
             textures: None,
             cutouts: None,
             passes_veils: false,
+            random_opacity: false,
             lights: &[],
             kd_nodes: CountedSlice::from(&[][..]),
             kd_parents: CountedSlice::from(&[][..]),
@@ -179,6 +182,7 @@ impl<'a> KernelInputs<'a> {
             textures: self.textures,
             cutouts: self.cutouts,
             passes_veils: self.passes_veils,
+            random_opacity: self.random_opacity,
             lights: self.lights,
             kd_nodes: self.kd_nodes.with_counter(Counted(&counts.n_nodes)),
             kd_parents: self.kd_parents.with_counter(Counted(&counts.n_links)),
@@ -211,6 +215,12 @@ impl<'a> KernelInputs<'a> {
     /// `LEAST_SHADOWING_OPACITY`.
     pub fn through_veils(self) -> Self {
         Self { passes_veils: true, ..self }
+    }
+
+    /// Returns the inputs of paths, whose rays pass through see-through surfaces at random, as often as their opacity
+    /// says.
+    pub fn through_veils_at_random(self) -> Self {
+        Self { passes_veils: true, random_opacity: true, ..self }
     }
 
     /// Returns the same inputs with a kd-tree's boxes and ropes.

@@ -67,7 +67,7 @@ pub fn phong(material: &Material, normal: Vec3, to_viewer: Vec3, to_light: Vec3)
 }
 
 /// Whether the surface shows its colour without any light.
-fn is_unlit(material: &Material) -> bool {
+pub fn is_unlit(material: &Material) -> bool {
     material.flags & MATERIAL_UNLIT != 0
 }
 

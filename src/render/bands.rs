@@ -10,7 +10,7 @@ use std::{
 use super::Renderer;
 use crate::{
     buffers::Pixels,
-    frame::{Crop, Drawn, Picture, Profile, RenderOptions, Watcher},
+    frame::{Crop, Drawn, Integrator, Picture, Profile, RenderOptions, Watcher, sampling::samples_log2},
     gpu::{Context, GivenImage, GpuError, Limits, TimelinePoint},
     layout::Feature,
     scene::Camera,
@@ -121,16 +121,21 @@ impl BandedRenderer {
 
     fn draw_band(&mut self, n_samples: u32, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         self.renderer.reset_samples();
-        let mut profile = self.draw_sample(watcher)?;
+        let mut profile = self.draw_frame(n_samples, watcher)?;
         let features = if self.renderer.options().features { self.renderer.features()? } else { Vec::new() };
-        for _ in 1..n_samples {
-            profile.add(&self.draw_sample(watcher)?);
+        while self.renderer.n_samples() < n_samples {
+            profile.add(&self.draw_frame(n_samples, watcher)?);
         }
         Ok(Drawn { features, profile })
     }
 
-    /// Draws a sample, part by part if it is expected to be slow and the watcher sees parts.
-    fn draw_sample(&mut self, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
+    /// Draws the next sample of `n_samples`, or the next samples if the frame traces paths, part by part if it is
+    /// expected to be slow and the watcher sees parts.
+    fn draw_frame(&mut self, n_samples: u32, watcher: &mut impl Watcher) -> Result<Profile, GpuError> {
+        let n_before = self.renderer.n_samples();
+        if self.renderer.options().integrator == Integrator::Path {
+            self.renderer.set_samples_per_frame(samples_log2(n_before, n_samples));
+        }
         let begin = Instant::now();
         let profile = if self.is_slow && watcher.sees_parts() {
             self.draw_steps(watcher)?
@@ -138,7 +143,7 @@ impl BandedRenderer {
             self.renderer.draw_sample()?
         };
         self.is_slow = begin.elapsed() > SLOW_SAMPLE;
-        watcher.sample();
+        (n_before..self.renderer.n_samples()).for_each(|_| watcher.sample());
         Ok(profile)
     }
 

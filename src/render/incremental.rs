@@ -10,10 +10,10 @@ use tracing::info_span;
 
 use super::{Renderer, schedule::Schedule};
 use crate::{
-    frame::{Picture, Profile, View},
+    frame::{Integrator, Pass, Picture, Profile, View},
     gpu::{CommandBuffer, GpuError},
-    layout::{Batch, FalseColor, Feature, Frame, constants},
-    passes::Passes,
+    layout::{Batch, FalseColor, Feature, Frame, MOST_SAMPLES_LOG2, constants},
+    passes::FramePasses,
     scene::Camera,
 };
 
@@ -26,12 +26,10 @@ pub(super) struct Part {
     pub ends_batch: bool,
 }
 
-/// Rays that a part traces through the acceleration structure.
-pub(super) enum Traced {
-    /// Rays of a bounce.
-    Rays(Batch),
-    /// Shadow rays from the hits of all bounces of a batch.
-    Shadows(Batch),
+/// Rays that a part traces through the acceleration structure: those of a pass, in a batch.
+pub(super) struct Traced {
+    pub pass: Pass,
+    pub batch: Batch,
 }
 
 impl Part {
@@ -191,7 +189,7 @@ impl Renderer {
             let pending = self.recorded(pending.sample_ix)?;
             return self.try_to_go_on(pending, Until::End);
         }
-        self.n_samples = pending.sample_ix + 1;
+        self.n_samples = self.resources.constants().n_samples;
         self.note_displayed();
         self.profile(&bounces, begun_at).map(Some)
     }
@@ -211,10 +209,14 @@ impl Renderer {
 
     fn begin_sample(&mut self) -> Result<PartialSample, GpuError> {
         let sample_ix = self.n_samples;
-        // If the second sample was dropped and is drawn again, the sums contain the first sample already.
-        if sample_ix == 1 && !self.has_sums {
-            self.resources.begin_sums(&self.context)?;
-            self.has_sums = true;
+        match self.options.integrator {
+            Integrator::Path => self.begin_paths()?,
+            // If the second sample was dropped and is drawn again, the sums contain the first sample already.
+            Integrator::Whitted if sample_ix == 1 && !self.has_sums => {
+                self.resources.begin_sums(&self.context)?;
+                self.has_sums = true;
+            }
+            Integrator::Whitted => (),
         }
         let mut constants = *self.resources.constants();
         constants.set_view(&self.camera, self.world.bounds(), sample_ix);
@@ -225,11 +227,38 @@ impl Renderer {
         self.recorded(sample_ix)
     }
 
+    /// Prepares a frame of paths: batches for its number of samples, and room for the sums of the samples.
+    fn begin_paths(&mut self) -> Result<(), GpuError> {
+        let samples_log2 = if self.draws_primary_rays_only() { 0 } else { self.samples_log2 };
+        let mut constants = *self.resources.constants();
+        if constants.samples_log2 != samples_log2 {
+            constants.samples_log2 = samples_log2;
+            let spans = self.budget.spans(&constants, self.most_pixels);
+            let schedule = Schedule::new(&self.context, &constants, spans, &self.options)?;
+            let mut resources = self.resources.with_bounces(&self.context, schedule.n_rows())?;
+            resources.set_constants(&constants);
+            (self.resources, self.schedule) = (resources, schedule);
+        }
+        // There is one sum for each bit of the number of samples. Those of the lowest bits become one with the frame's.
+        let n_joined = (self.n_samples >> samples_log2).trailing_ones();
+        self.resources.make_room_for_sums(&self.context, self.n_samples.count_ones() - n_joined + 1)
+    }
+
+    /// Sets the number of samples that the next frame of paths draws: `2^log2`, at most `2^MOST_SAMPLES_LOG2`. The
+    /// number of samples so far must be a multiple of it. The picture does not depend on it. Other frames draw one.
+    ///
+    /// # Panics
+    /// `log2` is too large, or the number of samples so far is no multiple.
+    pub fn set_samples_per_frame(&mut self, log2: u32) {
+        assert!(log2 <= MOST_SAMPLES_LOG2 && self.n_samples % (1 << log2) == 0, "2^{log2} after {}", self.n_samples);
+        self.samples_log2 = log2;
+    }
+
     /// Replaces all kernels, which are made for one kind of camera, by those for the camera of `constants`.
     fn make_kernels_for(&mut self, constants: &Frame) -> Result<(), GpuError> {
         let is_orthographic = constants.is_orthographic == 1;
         let bindings = self.resources.bindings.with_constant(constants::ORTHOGRAPHIC, is_orthographic);
-        self.passes = Passes::new(&self.context, &bindings, &self.options)?;
+        self.passes = FramePasses::new(&self.context, &bindings, &self.options)?;
         self.resources.bindings = bindings;
         Ok(())
     }

@@ -32,10 +32,10 @@ use self::{
 };
 use crate::{
     buffers::{Needs, Resources},
-    frame::{FrameKind, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step, plan},
+    frame::{FrameKind, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step, plan},
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
-    passes::{Inputs, Passes, Rasterize},
+    passes::{FramePasses, Inputs, Rasterize},
     scene::Camera,
     world::World,
 };
@@ -48,10 +48,12 @@ pub struct Renderer {
     options: RenderOptions,
     budget: QueueSizing,
     resources: Resources,
-    passes: Passes,
+    passes: FramePasses,
     schedule: Schedule,
     /// Number of samples per pixel of which the picture is the mean.
     n_samples: u32,
+    /// Base-2 logarithm of the number of samples that a frame of paths draws.
+    samples_log2: u32,
     /// The feature that is displayed in place of the picture. Used only if the options ask for features.
     false_color: Option<FalseColor>,
     /// Whether the view needs only the hits of primary rays. Used only if the options ask for features.
@@ -97,11 +99,13 @@ impl Renderer {
         fixed_capacity: Option<u32>,
     ) -> Result<Self, GpuError> {
         let scene = world.scene();
+        let options = &in_use(options);
         let both = MATERIAL_REFLECT | MATERIAL_REFRACT;
         let branches = scene.materials.iter().any(|material| material.flags & both == both);
         let mut constants = world.frame_constants(options);
         constants.n_lanes = lanes_to_share(&context, options)?;
-        let budget = QueueSizing { fixed_capacity, branches };
+        let of_paths = options.integrator == Integrator::Path;
+        let budget = QueueSizing { fixed_capacity, branches, of_paths };
         constants.queue_capacity = budget.queue_capacity(context.limits(), &constants);
         let spans = budget.spans(&constants, None);
         let schedule = Schedule::new(&context, &constants, spans, options)?;
@@ -109,7 +113,7 @@ impl Renderer {
         let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
         let resources = Resources::new(&context, world, &needs)?;
         drop(uploading);
-        let passes = info_span!("make pipelines").in_scope(|| Passes::new(&context, &resources.bindings, options))?;
+        let passes = info_span!("make pipelines").in_scope(|| FramePasses::new(&context, &resources.bindings, options))?;
         let (camera, options) = (scene.camera, options.clone());
         Ok(Self {
             context,
@@ -121,6 +125,7 @@ impl Renderer {
             passes,
             schedule,
             n_samples: 0,
+            samples_log2: 0,
             false_color: None,
             needs_primary_rays_only: false,
             has_sums: false,
@@ -148,8 +153,9 @@ impl Renderer {
         self.draw_sample()
     }
 
-    /// Draws one more sample a pixel; the first is at the pixel's centre. The picture, which stays on the device, is
-    /// the mean of all samples. If the ray queue overflows in a batch, the batch is halved and the sample is drawn
+    /// Draws one more sample a pixel; the first is at the pixel's centre. Of paths, as many samples are drawn as
+    /// [`Renderer::set_samples_per_frame`] says, at random places. The picture, which stays on the device, is the mean
+    /// of all samples. If the ray queue overflows in a batch, the batch is halved and the sample is drawn
     /// again. Later samples keep the smaller batches.
     ///
     /// # Errors
@@ -244,7 +250,7 @@ impl Renderer {
         let only_primary_rays = self.draws_primary_rays_only();
         let constants = self.resources.constants();
         FrameKind {
-            n_bounces: if only_primary_rays { 1 } else { self.options.max_depth },
+            n_bounces: if only_primary_rays { 1 } else { self.options.n_bounces() },
             is_lit: !only_primary_rays,
             adds_samples: constants.n_samples > 1,
             shows_feature: self.options.features && self.false_color.is_some(),
@@ -263,8 +269,10 @@ impl Renderer {
             };
             return Ok(vec![Part::plain(self.command_buffer(name, all)?)]);
         };
-        // `trace` is the pass that traces the rays, and the barrier after it.
-        let (trace, rest) = section.split_at(2);
+        // `trace` ends with the pass that traces the rays, and the barrier after it.
+        let is_tracing = |step: &Step| matches!(step, Step::Run(Pass::Trace | Pass::Shadow | Pass::PathTrace));
+        let tracing_ix = section.iter().position(is_tracing).expect("a pass that traces rays");
+        let (trace, rest) = section.split_at(tracing_ix + 2);
         let tracing = |commands: &Commands| {
             self.resources.bind(commands);
             self.resources.accel.stalls.reset(commands);
@@ -280,25 +288,23 @@ impl Renderer {
         ])
     }
 
-    /// Returns the rays of a section's first pass if that pass traces rays through the acceleration structure.
+    /// Returns the rays that a section traces through the acceleration structure, if it does. A section has one such
+    /// pass at most.
     fn traced(&self, section: &[Step], batch: &Batch) -> Option<Traced> {
-        match section.first()? {
-            Step::Run(Pass::Trace) => Some(Traced::Rays(*batch)),
-            Step::Run(Pass::Shadow) => Some(Traced::Shadows(*batch)),
+        section.iter().find_map(|step| match step {
+            Step::Run(pass @ (Pass::Trace | Pass::Shadow | Pass::PathTrace)) => {
+                Some(Traced { pass: *pass, batch: *batch })
+            }
             _ => None,
-        }
+        })
     }
 
     /// Repeats the tracing pass of a part, whose commands have run once, until none of its rays is stalled.
     fn finish_rays(&self, traced: &Traced) -> Result<(), GpuError> {
         self.resources.accel.stalls.finish(&self.context, |commands, round| {
             self.resources.bind(commands);
-            let round = round.constant();
-            let (pass, batch) = match *traced {
-                Traced::Rays(batch) => (Pass::Trace, batch),
-                Traced::Shadows(batch) => (Pass::Shadow, batch),
-            };
-            self.record_section(commands, &[Step::Run(pass)], &Batch { round, ..batch });
+            let batch = Batch { round: round.constant(), ..traced.batch };
+            self.record_section(commands, &[Step::Run(traced.pass)], &batch);
         })?;
         Ok(())
     }
@@ -336,6 +342,12 @@ impl Renderer {
         let inputs = Inputs { batch: *batch, false_color: self.false_color };
         self.passes.record_section(commands, &self.resources, section, &inputs);
     }
+}
+
+/// Returns the options that a renderer uses: paths' primary rays are always traced.
+fn in_use(options: &RenderOptions) -> RenderOptions {
+    let primary = if options.integrator == Integrator::Path { Primary::Trace } else { options.primary };
+    RenderOptions { primary, ..options.clone() }
 }
 
 /// Returns the number of lanes to share among the rays of a dispatch. 0 means that each ray gets one lane, and is

@@ -1,7 +1,7 @@
 //! Changes between frames: of the camera, the size, the crop and the options. The scene and its acceleration
 //! structure stay on the device; a change of the traversal adds the links that it reads.
 
-use super::{Renderer, lanes_to_share, schedule::Schedule};
+use super::{Renderer, in_use, lanes_to_share, schedule::Schedule};
 use crate::{
     buffers::{Needs, Resources},
     frame::{Crop, RenderOptions},
@@ -81,7 +81,7 @@ impl Renderer {
     /// The driver refuses a shader. Then all kernels are as before.
     #[cfg(feature = "hot-reload")]
     pub fn remake_passes(&mut self) -> Result<(), GpuError> {
-        let passes = crate::passes::Passes::new(&self.context, &self.resources.bindings, &self.options)?;
+        let passes = crate::passes::FramePasses::new(&self.context, &self.resources.bindings, &self.options)?;
         self.reset_samples();
         self.passes = passes;
         Ok(())
@@ -90,6 +90,10 @@ impl Renderer {
     /// Creates the buffers and kernels that the changed options need, and then installs them by steps that cannot
     /// fail.
     fn remake(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
+        let options = &in_use(options);
+        if options.integrator != self.options.integrator {
+            return self.replace(options);
+        }
         let (context, before) = (&self.context, &self.options);
         let mut constants = *self.resources.constants();
         constants.set_options(options);
@@ -109,6 +113,17 @@ impl Renderer {
             }
         }
         (self.passes, self.options) = (passes, options.clone());
+        Ok(())
+    }
+
+    /// Becomes a new renderer of the same world, for another integrator.
+    fn replace(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
+        let capacity = self.budget.fixed_capacity;
+        let mut next = Self::with_capacity(self.context.clone(), &self.world, options, capacity)?;
+        next.false_color = self.false_color;
+        next.needs_primary_rays_only = self.needs_primary_rays_only;
+        next.set_camera(&self.camera);
+        *self = next;
         Ok(())
     }
 

@@ -4,14 +4,16 @@
 use std::{mem, sync::Arc};
 
 use crate::{
-    frame::{FrameKind, Plan, RenderOptions},
+    frame::{FrameKind, Integrator, Plan, RenderOptions},
     gpu::{Buffer, BufferUse, Context, GpuError, Limits, Timer},
-    layout::{Batch, Bounce, Frame, PathRay, RAY_GROUP_SIZE, ROUND_BEGIN},
+    layout::{Batch, Bounce, Frame, MOST_SAMPLES_LOG2, PathRay, RAY_GROUP_SIZE, ROUND_BEGIN},
 };
 
 /// Upper limit of the queue's capacity, in rays, unless the caller sets the capacity. This number of rays keeps any
 /// device busy. They take some 100 bytes each, 1.7 GB together, which fits well into memory.
 const MOST_RAYS: u64 = 1 << 24;
+/// The same limit for paths, which take some 140 bytes each. A dispatch traces all of them, and their segments.
+const MOST_PATHS: u64 = 1 << 21;
 
 /// The batches of a frame, and the objects whose size depends on their number.
 pub struct Schedule {
@@ -49,7 +51,10 @@ impl Schedule {
         let rows: Vec<_> = batches
             .iter()
             .flat_map(|batch| (0..max_depth).map(|depth| if depth == 0 { batch.n_pixels } else { 0 }))
-            .map(|n_rays| Bounce::of(n_rays, constants))
+            .map(|n_rays| match options.integrator {
+                Integrator::Whitted => Bounce::of(n_rays, constants),
+                Integrator::Path => Bounce::of_paths(n_rays << constants.samples_log2, constants),
+            })
             .collect();
         let n_passes = Plan::new(&FrameKind::new(options, constants.n_lights)).n_passes(batches.len()) as u32;
         Ok(Self {
@@ -97,6 +102,8 @@ pub struct QueueSizing {
     pub fixed_capacity: Option<u32>,
     /// Whether a hit can have two child rays, a reflected and a refracted one.
     pub branches: bool,
+    /// Whether the queue holds paths, one ray each.
+    pub of_paths: bool,
 }
 
 impl QueueSizing {
@@ -107,6 +114,12 @@ impl QueueSizing {
             return capacity;
         }
         let n_pixels = u64::from(constants.width) * u64::from(constants.height);
+        if self.of_paths {
+            let most = limits.storage_range / size_of::<PathRay>() as u64;
+            let most_in_groups = u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE) / 2;
+            let wanted = n_pixels << MOST_SAMPLES_LOG2;
+            return wanted.min(MOST_PATHS).min(most).min(most_in_groups).max(1 << MOST_SAMPLES_LOG2) as u32;
+        }
         // The largest buffer of the queue is `rays` or `light_visibility`.
         let bytes_per_ray = mem::size_of::<PathRay>().max(4 * constants.n_lights as usize) as u64;
         let most = (limits.storage_range / bytes_per_ray).min(u64::from(limits.n_groups) * u64::from(RAY_GROUP_SIZE));
@@ -119,7 +132,8 @@ impl QueueSizing {
     /// `most_pixels` pixels, if that is given.
     pub fn spans(&self, constants: &Frame, most_pixels: Option<u32>) -> Vec<(u32, u32)> {
         let n_pixels = constants.width * constants.height;
-        let with_room = (constants.queue_capacity / self.rays_per_pixel(constants.max_depth)).max(1);
+        let rays_per_pixel = if self.of_paths { 1 << constants.samples_log2 } else { self.rays_per_pixel(constants.max_depth) };
+        let with_room = (constants.queue_capacity / rays_per_pixel).max(1);
         let n_batches = n_pixels.div_ceil(most_pixels.map_or(with_room, |most| most.clamp(1, with_room))).max(1);
         let size = n_pixels.div_ceil(n_batches);
         (0..n_batches).map(|i| (i * size, size.min(n_pixels - i * size))).collect()
@@ -150,7 +164,7 @@ mod tests {
         };
         for (width, height, max_depth) in [(1, 1, 1), (1024, 768, 5), (3840, 2160, 8), (7, 9, 64)] {
             for (branches, fixed_capacity) in [(false, None), (true, None), (true, Some(50))] {
-                let budget = QueueSizing { fixed_capacity, branches };
+                let budget = QueueSizing { fixed_capacity, branches, of_paths: false };
                 let mut constants = Frame { width, height, max_depth, n_lights: 3, ..Frame::default() };
                 constants.queue_capacity = budget.queue_capacity(&limits, &constants);
                 assert!(u64::from(constants.queue_capacity) * 48 <= limits.storage_range);

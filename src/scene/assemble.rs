@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use super::{
-    Camera, Light, Material, Projection, RenderDefaults, Scene,
+    Camera, Light, Material, PathDefaults, Projection, RenderDefaults, Scene,
     camera::{FOV_DEGREES, HEIGHTS},
     description::{CameraSpec, Description, LightSpec, MeshSpec, RenderSpec, SceneDenoise},
     error::{Checked, SceneError},
@@ -28,7 +28,7 @@ use super::{
     standard::Lacks,
     transform::finite,
 };
-use crate::frame::Denoise;
+use crate::frame::{Denoise, Integrator};
 
 /// Name of the material of meshes and faces that name none.
 pub(super) const DEFAULT_MATERIAL: &str = "(default)";
@@ -79,6 +79,7 @@ fn assemble(file: &File, description: Description) -> Result<(Scene, Lacks), Sce
         camera: description.camera.is_none() && description.cameras.is_empty(),
         light: description.light.is_empty() && description.ambient.is_none(),
         background: description.background.is_none(),
+        integrator: description.render.as_ref().is_none_or(|render| render.as_ref().integrator.is_none()),
     };
     let mut scene = Scene::empty(file.path);
     let mut images = Images::default();
@@ -272,20 +273,38 @@ fn render_defaults(spec: &RenderSpec) -> Checked<RenderDefaults> {
     if is_metered && spec.exposure.is_some() {
         return Err("has both `exposure` and `metered = true`".to_owned());
     }
+    let samples = count("samples", spec.samples, defaults.samples, 65_536)?;
+    let max_depth = count("max_depth", spec.max_depth, defaults.max_depth, 64)?;
+    let filter = Denoise::Paper { threshold };
+    let integrator = spec.integrator.as_ref().map(|word| word.parse()).transpose();
+    let integrator = integrator.map_err(|e| format!("integrator: {e}"))?;
+    // What the file states is for the integrator that it states. If it states none, it is for both.
+    let is_for_paths = integrator != Some(Integrator::Whitted);
+    let of_paths = PathDefaults {
+        max_depth: if is_for_paths && spec.max_depth.is_some() { max_depth } else { defaults.of_paths.max_depth },
+        samples: if is_for_paths && spec.samples.is_some() { samples } else { defaults.of_paths.samples },
+        denoise: match spec.denoise.filter(|_| is_for_paths) {
+            Some(SceneDenoise::Paper) => filter,
+            Some(SceneDenoise::Off) => Denoise::Off,
+            None => defaults.of_paths.denoise,
+        },
+    };
     Ok(RenderDefaults {
+        integrator: integrator.unwrap_or(defaults.integrator),
+        of_paths,
         width: count("width", spec.width, defaults.width, 16_384)?,
         height: count("height", spec.height, defaults.height, 16_384)?,
-        max_depth: count("max_depth", spec.max_depth, defaults.max_depth, 64)?,
+        max_depth,
         tonemap: match &spec.tonemap {
             Some(word) => word.parse().map_err(|e| format!("tonemap: {e}"))?,
             None => defaults.tonemap,
         },
-        samples: count("samples", spec.samples, defaults.samples, 65_536)?,
+        samples,
         exposure: within("exposure", spec.exposure.unwrap_or(defaults.exposure), 1e-6, 1e6)?,
         is_metered,
         denoise: match spec.denoise.unwrap_or(SceneDenoise::Paper) {
             SceneDenoise::Off => Denoise::Off,
-            SceneDenoise::Paper => Denoise::Paper { threshold },
+            SceneDenoise::Paper => filter,
         },
     })
 }

@@ -1,6 +1,6 @@
 //! The render options that a scene file can set.
 
-use crate::frame::{Denoise, RenderOptions, Tonemap};
+use crate::frame::{Denoise, Integrator, RenderOptions, Tonemap};
 
 /// Render options of a scene, which the user may override.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,10 +9,14 @@ pub struct RenderDefaults {
     pub width: u32,
     /// Height of the picture, pixels.
     pub height: u32,
+    /// How light is computed.
+    pub integrator: Integrator,
     /// Number of ray levels, including the primary rays: 1 stands for primary rays only.
     pub max_depth: u32,
     /// Number of samples per pixel of a picture.
     pub samples: u32,
+    /// The values of the three above that take the place of those if paths are traced.
+    pub of_paths: PathDefaults,
     /// Factor on radiance before the tone curve.
     pub exposure: f32,
     /// Whether the exposure is to be measured ([`metered_exposure`](crate::cpu::metered_exposure)) in place of
@@ -24,17 +28,47 @@ pub struct RenderDefaults {
     pub denoise: Denoise,
 }
 
+/// The render options of a scene whose file leaves them out, or that is rendered by tracing paths.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathDefaults {
+    /// See [`RenderDefaults::max_depth`].
+    pub max_depth: u32,
+    /// See [`RenderDefaults::samples`].
+    pub samples: u32,
+    /// See [`RenderDefaults::denoise`].
+    pub denoise: Denoise,
+}
+
+impl Default for PathDefaults {
+    /// Twelve levels of rays and 64 samples, without the noise filter.
+    fn default() -> Self {
+        Self { max_depth: 12, samples: 64, denoise: Denoise::Off }
+    }
+}
+
 impl Default for RenderDefaults {
     fn default() -> Self {
-        let RenderOptions { width, height, max_depth, exposure, tonemap, denoise, .. } = RenderOptions::default();
-        Self { width, height, max_depth, samples: 1, exposure, is_metered: false, tonemap, denoise }
+        let RenderOptions { width, height, integrator, max_depth, exposure, tonemap, denoise, .. } =
+            RenderOptions::default();
+        let of_paths = PathDefaults::default();
+        Self { width, height, integrator, max_depth, samples: 1, of_paths, exposure, is_metered: false, tonemap, denoise }
     }
 }
 
 impl RenderDefaults {
     /// Returns full render options with the scene's values.
     pub fn options(&self) -> RenderOptions {
-        let &Self { width, height, max_depth, exposure, tonemap, denoise, .. } = self;
-        RenderOptions { width, height, max_depth, exposure, tonemap, denoise, ..RenderOptions::default() }
+        let Self { width, height, integrator, max_depth, exposure, tonemap, denoise, .. } = self.for_integrator(None);
+        RenderOptions { width, height, integrator, max_depth, exposure, tonemap, denoise, ..RenderOptions::default() }
+    }
+
+    /// Returns the options for an integrator, or for the scene's own if there is none.
+    pub fn for_integrator(&self, integrator: Option<Integrator>) -> Self {
+        let integrator = integrator.unwrap_or(self.integrator);
+        let PathDefaults { max_depth, samples, denoise } = self.of_paths;
+        match integrator {
+            Integrator::Whitted => Self { integrator, ..*self },
+            Integrator::Path => Self { integrator, max_depth, samples, denoise, ..*self },
+        }
     }
 }

@@ -87,6 +87,8 @@ pub(super) enum LightSpec {
 pub(super) struct RenderSpec {
     pub width: Option<u32>,
     pub height: Option<u32>,
+    /// `whitted` or `path`; where absent, `path` if surfaces or an environment light the scene.
+    pub integrator: Option<String>,
     pub max_depth: Option<u32>,
     /// Number of samples per pixel.
     pub samples: Option<u32>,

@@ -49,7 +49,7 @@ use glam::Vec3;
 pub use self::{
     camera::{Camera, Projection},
     convert::scene_file_of,
-    defaults::RenderDefaults,
+    defaults::{PathDefaults, RenderDefaults},
     error::SceneError,
     extent::MIN_EXTENT,
     light::Light,
@@ -262,7 +262,7 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), 
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
     extent::check(path, scene.bounds())?;
     scene.defaults.samples = standard::SAMPLES;
-    Ok((scene, Lacks { camera: true, up, light: true, background: true }))
+    Ok((scene, Lacks { camera: true, up, light: true, background: true, integrator: true }))
 }
 
 /// Refuses the choice of a scene for a file that has only one.

@@ -9,6 +9,7 @@ use super::{
     interior,
     look::Up,
 };
+use crate::frame::Integrator;
 
 /// What a scene's file leaves out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,6 +21,8 @@ pub(super) struct Lacks {
     pub light: bool,
     /// Only a scene without light gets a background.
     pub background: bool,
+    /// Without it, the scene's content decides.
+    pub integrator: bool,
 }
 
 /// Samples per pixel of a picture of a file that is no scene file, enough to smooth its edges.
@@ -56,7 +59,10 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) ->
         scene.camera = of_interior.unwrap_or_else(|| framing::camera(bounds, &outside));
     }
     look.set_camera(scene)?;
-    if lacks.light {
+    if lacks.integrator && scene.has_shining_surfaces() {
+        scene.defaults.integrator = Integrator::Path;
+    }
+    if lacks.light && !scene.has_bright_surfaces() {
         let lamps = if is_interior { lamps_inside(scene, bounds) } else { lamps_outside(scene, &axes) };
         scene.ambient = Vec3::splat(if is_interior { AMBIENT_OF_INTERIORS } else { AMBIENT });
         scene.lights = lamps.to_vec();

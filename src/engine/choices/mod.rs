@@ -49,7 +49,7 @@ pub use self::{
 };
 use crate::{
     accel::{AccelKind, kdtree::Traversal},
-    frame::{Primary, RenderOptions},
+    frame::{Integrator, Primary, RenderOptions},
     gpu::{Context, DeviceInfo, GpuError},
     layout::KD_MAX_ORIGIN_DISTANCE,
     scene::{Camera, Projection},
@@ -109,6 +109,8 @@ pub struct Workload {
     /// The greatest absolute coordinate of the points where cameras' rays begin; infinity where a camera may go
     /// anywhere.
     pub farthest_eye: f32,
+    /// Whether paths are traced. Their primary rays are never rasterized.
+    pub traces_paths: bool,
 }
 
 impl Workload {
@@ -119,7 +121,8 @@ impl Workload {
         let rays_per_pixel = u64::from(options.max_depth.min(2)) * (1 + n_lights as u64);
         let factors = [u64::from(size.0), u64::from(size.1), rays_per_pixel, n_pictures];
         let n_rays = factors.into_iter().fold(1, u64::saturating_mul);
-        Self { size, n_rays, shows_costs: options.features, farthest_eye: f32::INFINITY }
+        let traces_paths = options.integrator == Integrator::Path;
+        Self { size, n_rays, shows_costs: options.features, farthest_eye: f32::INFINITY, traces_paths }
     }
 
     /// Returns the same work with `farthest_eye` set from `cameras`, which are all the cameras of the work.
@@ -145,7 +148,7 @@ impl Workload {
 
     /// Returns the work of an interactive window, whose number of rays and cameras have no bound.
     pub fn of_window(size: (u32, u32)) -> Self {
-        Self { size, n_rays: u64::MAX, shows_costs: false, farthest_eye: f32::INFINITY }
+        Self { size, n_rays: u64::MAX, shows_costs: false, farthest_eye: f32::INFINITY, traces_paths: false }
     }
 
     /// Returns the work of casting rays without a picture.
@@ -189,7 +192,10 @@ impl Request {
         cache: &Cache,
     ) -> Result<Methods, GpuError> {
         let n_triangles = world.scene().triangles.len();
-        let by_rule = self.methods_by_rule(context.map(|context| &**context), n_triangles, workload.size);
+        let mut by_rule = self.methods_by_rule(context.map(|context| &**context), n_triangles, workload.size);
+        if workload.traces_paths {
+            by_rule.primary = Chosen { value: Primary::Trace, by: Reason::Rule };
+        }
         let is_gpu = |context: &&Arc<Context>| Processor::of(Some(context)) == Processor::Gpu && !workload.shows_costs;
         let Some(context) = context.filter(is_gpu) else { return Ok(by_rule) };
         let trial = Trial { context, world, workload, cache };

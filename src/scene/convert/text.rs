@@ -84,14 +84,15 @@ pub(super) fn light(light: &Light) -> String {
 }
 
 fn render(defaults: &RenderDefaults) -> String {
-    let RenderDefaults { width, height, max_depth, samples, exposure, is_metered, tonemap, denoise } = *defaults;
+    let RenderDefaults { width, height, integrator, max_depth, samples, denoise, exposure, is_metered, tonemap, .. } =
+        defaults.for_integrator(None);
     let denoise = match denoise {
         Denoise::Off => "denoise = \"off\"\n".to_owned(),
         Denoise::Paper { threshold } => format!("denoise = \"paper\"\ndenoise_threshold = {}\n", number(threshold)),
     };
     let exposure = if is_metered { "metered = true".to_owned() } else { format!("exposure = {}", number(exposure)) };
     format!(
-        "\n[render]\nwidth = {width}\nheight = {height}\nmax_depth = {max_depth}\nsamples = {samples}\n{exposure}\n\
+        "\n[render]\nwidth = {width}\nheight = {height}\nintegrator = \"{integrator}\"\nmax_depth = {max_depth}\nsamples = {samples}\n{exposure}\n\
          tonemap = \"{tonemap}\"\n{denoise}"
     )
 }

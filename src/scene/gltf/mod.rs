@@ -60,7 +60,9 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     scene.defaults.is_metered = !lacks_light;
     scene.defaults.samples = SAMPLES;
     document.warn(path);
-    Ok((scene, Lacks { camera: lacks_camera, up: Up::Y, light: lacks_light, background: lacks_light }))
+    let lacks =
+        Lacks { camera: lacks_camera, up: Up::Y, light: lacks_light, background: lacks_light, integrator: true };
+    Ok((scene, lacks))
 }
 
 /// What a scene has before a glTF file is loaded.

@@ -1,0 +1,56 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+// Path scatter: one invocation per path that is alive at the bounce. It adds the light that the path's ray meets,
+// samples a light at the hit, to which the next dispatch of path_trace.comp traces a segment, and samples the direction
+// in which the path goes on. Each workgroup counts those of its SCAN_GROUP_SIZE paths that go on.
+// Reads hits, live_paths, bounces and the scene; updates rays and path_states; writes segments, child_kinds (whether the
+// path at a place of the list goes on) and scan_blocks[workgroup].
+#include "layout.glsl"
+#include "paths.glsl"
+#include "scan.glsl"
+#include "store.glsl"
+#include "path_vertex.glsl"
+
+layout(local_size_x = SCAN_GROUP_SIZE) in;
+layout(std430, set = 0, binding = BIND_LIVE_PATHS) readonly buffer LivePathsBlock { uint live_paths[]; };
+layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { PathRay rays[]; };
+layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
+layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
+layout(std430, set = 0, binding = BIND_CHILD_KINDS) writeonly buffer ChildKindsBlock { uint child_kinds[]; };
+layout(std430, set = 0, binding = BIND_SCAN_BLOCKS) writeonly buffer ScanBlocksBlock { uint scan_blocks[]; };
+layout(std430, set = 0, binding = BIND_PATH_STATES) buffer PathStatesBlock { vec4 path_states[]; };
+layout(std430, set = 0, binding = BIND_SEGMENTS) writeonly buffer SegmentsBlock { uvec4 stored_segments[]; };
+
+void store_segment(uint path_ix, Segment segment) {
+    stored_segments[3u * path_ix] = words_of(segment.origin, segment.state);
+    stored_segments[3u * path_ix + 1u] = words_of(segment.direction, segment.source_triangle);
+    stored_segments[3u * path_ix + 2u] = words_of(segment.light, floatBitsToUint(segment.t_max));
+}
+
+// Takes a path one step further. Returns whether it goes on.
+bool step_of(uint path_ix) {
+    uvec2 pixel = pixel_of_path(path_ix);
+    PathRay ray = rays[path_ix];
+    vec4 words = path_states[path_ix];
+    PathState state = PathState(words.xyz, words.w);
+    Segment segment;
+    bool goes_on = step_path(key_of_path(path_ix, pixel), batch.depth, hits[path_ix], ray, state, segment);
+    path_states[path_ix] = vec4(state.radiance, state.density);
+    // A path without a segment has none already: path_trace.comp has cleared the last one.
+    if (segment.state != SEGMENT_NONE) store_segment(path_ix, segment);
+    if (goes_on) store_ray(path_ix, ray);
+    return goes_on;
+}
+
+void main() {
+    uint place = gl_GlobalInvocationID.x;
+    bool goes_on = false;
+    if (place < bounces[batch.bounce_ix].n_rays) {
+        goes_on = step_of(live_paths[list_of(batch.depth) + place]);
+        child_kinds[place] = goes_on ? 1u : 0u;
+    }
+    uint n_of_group;
+    workgroup_exclusive_add(goes_on ? 1u : 0u, n_of_group);
+    if (gl_LocalInvocationIndex == 0u) scan_blocks[gl_WorkGroupID.x] = n_of_group;
+}

@@ -1,0 +1,81 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+// Path trace: finds the closest hits of the paths that are alive, and tests the segments to lights of the bounce before.
+// One dispatch does both: it lasts as long as its longest ray, and so waits for such a ray once a bounce, not twice.
+// There are 2^trace_lanes_log2 invocations per ray and segment, the first of which works (lanes.glsl). The segments
+// follow the rays. Rays pass through see-through surfaces at random (cutout.glsl).
+// Reads rays, live_paths, bounces and the acceleration structure; updates hits and segments, in which stalled rays and
+// segments leave their mark (stalls.glsl), path_states (light that arrives is added), counters and, with COUNT_COSTS,
+// n_rays and n_steps of pixel_features.
+#include "layout.glsl"
+
+// Whether the rays' cost is added to pixel_features.
+layout(constant_id = CONSTANT_COUNT_COSTS) const bool COUNT_COSTS = false;
+const bool PASSES_VEILS = true;
+#define RANDOM_OPACITY
+#include "accel.glsl"
+#include "paths.glsl"
+#include "lanes.glsl"
+#include "store.glsl"
+#include "counters.glsl"
+
+// Whether hits and segments are counted.
+layout(constant_id = CONSTANT_COUNTS) const bool COUNTS = true;
+
+layout(local_size_x = RAY_GROUP_SIZE) in;
+layout(std430, set = 0, binding = BIND_LIVE_PATHS) readonly buffer LivePathsBlock { uint live_paths[]; };
+layout(std430, set = 0, binding = BIND_RAYS) readonly buffer RaysBlock { PathRay rays[]; };
+layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hits[]; };
+layout(std430, set = 0, binding = BIND_BOUNCES) readonly buffer BouncesBlock { Bounce bounces[]; };
+layout(std430, set = 0, binding = BIND_PATH_STATES) buffer PathStatesBlock { vec4 path_states[]; };
+layout(std430, set = 0, binding = BIND_SEGMENTS) buffer SegmentsBlock { Segment segments[]; };
+layout(std430, set = 0, binding = BIND_PIXEL_FEATURES) buffer PixelFeaturesBlock { Feature pixel_features[]; };
+
+PathRay ray_of(Segment segment, uint pixel_ix) {
+    return PathRay(segment.origin, pixel_ix, segment.direction, segment.source_triangle, vec3(0.0), segment.t_max);
+}
+
+// Stores the result of a path's segment, whose traversal has found this triangle, none, or a mark.
+void end_segment(uint path_ix, uint found) {
+    segments[path_ix].state = is_stalled(found) ? found : SEGMENT_NONE;
+    if (found == NO_TRIANGLE) path_states[path_ix].xyz += segments[path_ix].light;
+}
+
+void count(PathRay ray) {
+    atomicAdd(pixel_features[ray.pixel_ix].n_rays, 1u);
+    atomicAdd(pixel_features[ray.pixel_ix].n_steps, n_steps);
+}
+
+// Traces a ray, or a segment. Returns whether it has a hit; or of a segment, whether it was traced to its end.
+bool traced(uint path_ix, bool is_segment) {
+    PathRay ray = rays[path_ix];
+    if (is_segment) ray = ray_of(segments[path_ix], ray.pixel_ix);
+    Hit hit = traverse(ray, 0.0, is_segment);
+    bool ends = !is_stalled(hit.triangle_ix);
+    if (COUNT_COSTS && ends) count(ray);
+    if (is_segment) end_segment(path_ix, hit.triangle_ix);
+    else store_hit(path_ix, hit);
+    return ends && (is_segment || hit.triangle_ix != NO_TRIANGLE);
+}
+
+void main() {
+    uint place = ray_of_lane(gl_GlobalInvocationID.x, bounces[batch.bounce_ix].trace_lanes_log2);
+    uint n_rays = bounces[batch.bounce_ix].n_rays;
+    uint n_segments = batch.depth > 0u ? bounces[batch.bounce_ix - 1u].n_rays : 0u;
+    bool is_segment = place >= n_rays;
+    bool counts = false;
+    // The index of a lane that does not work is beyond both, also after the subtraction.
+    uint in_list = is_segment ? place - n_rays : place;
+    if (in_list < (is_segment ? n_segments : n_rays)) {
+        uint path_ix = live_paths[list_of(is_segment ? batch.depth + 1u : batch.depth) + in_list];
+        uint mark = is_segment ? segments[path_ix].state : hits[path_ix].triangle_ix;
+        bool is_there = !is_segment || mark != SEGMENT_NONE;
+        if (is_there && runs_in_round(batch.round, mark)) counts = traced(path_ix, is_segment);
+    }
+    if (COUNTS) {
+        count_hits(batch.bounce_ix, gl_WorkGroupID.x, counts && !is_segment);
+        uint before = batch.depth > 0u ? batch.bounce_ix - 1u : batch.bounce_ix;
+        count_shadow_rays(before, gl_WorkGroupID.x, counts && is_segment ? 1u : 0u);
+    }
+}

@@ -1,0 +1,127 @@
+// One step of a path: the light at its hit, and the way on. Twin of src/reference/path_vertex.rs.
+//
+// Light reaches a hit in two ways: a sampled light is seen from it, or the direction in which the path goes on meets a
+// light. Each way gets the share of the power heuristic (Veach: Robust Monte Carlo Methods for Light Transport
+// Simulation, 1997, section 9.2.4), so that the sum of both is the light, and each counts where it is good.
+//
+// Needs nothing. Provides `step_path`.
+#ifndef KDRAY_PATH_VERTEX
+#define KDRAY_PATH_VERTEX
+
+#include "layout.glsl"
+#include "frame.glsl"
+#include "sampler.glsl"
+#include "scene.glsl"
+#include "surface.glsl"
+#include "material.glsl"
+#include "maps.glsl"
+#include "bsdf/bsdf.glsl"
+#include "emitters/emitters.glsl"
+
+// The number of pairs of random numbers that come before those of the first hit: in the pixel and in the lens.
+#define PAIRS_OF_CAMERA 2u
+// The number of pairs for each hit.
+#define PAIRS_OF_HIT 4u
+
+// The share of a way of sampling, whose density is the first one, beside another way.
+float power_share(float density, float other) {
+    // Densities are divided by the larger one, since their squares could overflow.
+    float largest = max(density, other);
+    float own = density / largest, others = other / largest;
+    return own * own / (own * own + others * others);
+}
+
+// The share of light that a path meets on its way, and that could have been sampled with the density `of_lights`.
+float share_of_met(PathState state, float of_lights) {
+    return state.density > 0.0 ? power_share(state.density, of_lights) : 1.0;
+}
+
+// Light that is added to the path: bounded after the first hit, and nothing if it is not a number.
+vec3 added_light(vec3 light, uint depth) {
+    if (depth > 0u) light = min(light, vec3(frame.clamp));
+    bool is_finite = all(lessThan(light, vec3(1.0e30)));
+    return is_finite ? max(light, 0.0) : vec3(0.0);
+}
+
+// The light of an environment that a ray meets. The camera and perfectly smooth surfaces do not see the ambient light.
+vec3 met_environment(PathRay ray, PathState state) {
+    vec3 radiance = environment_radiance(ray.direction);
+    if (state.density > 0.0) radiance += ambient_radiance();
+    return radiance * share_of_met(state, environment_density(ray.direction));
+}
+
+// The segment to a light that is picked at a hit.
+Segment segment_to_light(
+    uint depth, vec3 u, Surface surface, Material material, uint triangle_ix, vec3 to_viewer, vec3 throughput
+) {
+    Segment segment;
+    segment.state = SEGMENT_NONE;
+    if (is_smooth(material)) return segment;
+    LightPick pick = pick_light(surface.point_world, u);
+    if (pick.light == vec3(0.0)) return segment;
+    vec3 reflected = evaluate_bsdf(material, surface, to_viewer, pick.direction);
+    if (!any(greaterThan(reflected, vec3(0.0)))) return segment;
+    float share = 1.0;
+    if (pick.density > 0.0) {
+        share = power_share(pick.density, bsdf_density(material, surface, to_viewer, pick.direction));
+    }
+    vec3 light = added_light(throughput * reflected * pick.light * share, depth + 1u);
+    if (!any(greaterThan(light, vec3(0.0)))) return segment;
+    float side = dot(pick.direction, surface.geometric) < 0.0 ? -surface.clearance : surface.clearance;
+    vec3 origin = surface.point_world + side * surface.geometric;
+    return Segment(origin, SEGMENT_WAITS, pick.direction, triangle_ix, light, SEGMENT_SHARE * pick.distance);
+}
+
+// Whether a path survives Russian roulette. Its throughput is then larger, by the reciprocal of the probability.
+bool survives(uint depth, float u, inout vec3 throughput) {
+    if (depth < ROULETTE_DEPTH) return true;
+    float survival = clamp(largest_of(throughput), LEAST_SURVIVAL, 1.0);
+    throughput /= survival;
+    return u < survival;
+}
+
+// Adds the light that the path's ray meets to its state, samples a light at the hit, and replaces the ray by the one
+// with which the path goes on. Returns whether it does.
+bool step_path(
+    SampleKey key, uint depth, Hit hit, inout PathRay ray, inout PathState state, out Segment segment
+) {
+    segment.state = SEGMENT_NONE;
+    bool is_miss = hit.triangle_ix == NO_TRIANGLE;
+    float infinity = uintBitsToFloat(0x7f800000u);
+    SeenLight seen = seen_light(ray.origin, ray.direction, is_miss ? infinity : hit.t);
+    if (seen.t < infinity) {
+        vec3 light = seen.radiance * share_of_met(state, seen.density);
+        state.radiance += added_light(ray.throughput * light, depth);
+        return false;
+    }
+    if (is_miss) {
+        state.radiance += added_light(ray.throughput * met_environment(ray, state), depth);
+        return false;
+    }
+    Surface surface;
+    Material material;
+    shaded_at(ray, hit, surface, material);
+    vec3 throughput = ray.throughput * unabsorbed(material, surface, hit.t);
+    if (is_unlit(material) || any(greaterThan(material.ke, vec3(0.0)))) {
+        vec3 light = is_unlit(material) ? emitted(material) : emission_at(hit.triangle_ix, hit.u, hit.v);
+        float share = share_of_met(state, emission_density(hit.triangle_ix, ray.direction, hit.t));
+        state.radiance += added_light(throughput * light * share, depth);
+    }
+    // The last ray of a path only meets light.
+    if (is_unlit(material) || depth + 1u >= frame.max_depth) return false;
+    vec3 to_viewer = -ray.direction;
+    uint first_pair = PAIRS_OF_CAMERA + PAIRS_OF_HIT * depth;
+    vec2 to_light = random_pair(key, first_pair), choices = random_pair(key, first_pair + 1u);
+    vec2 to_next = random_pair(key, first_pair + 2u), lobe = random_pair(key, first_pair + 3u);
+    segment = segment_to_light(
+        depth, vec3(to_light, choices.x), surface, material, hit.triangle_ix, to_viewer, throughput
+    );
+    BsdfSample next = sample_bsdf(material, surface, to_viewer, vec3(to_next, lobe.x));
+    throughput *= next.weight;
+    if (!any(greaterThan(throughput, vec3(0.0))) || !survives(depth, choices.y, throughput)) return false;
+    ray = ray_from(surface, next.direction, hit.triangle_ix, ray, throughput);
+    state.density = next.is_delta ? 0.0 : next.density;
+    return true;
+}
+
+#endif

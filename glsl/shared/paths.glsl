@@ -1,0 +1,29 @@
+// The paths of a batch. Each path has a fixed place in the buffers: its pixel in the batch, plus its sample times the
+// number of pixels. Lists of indices say which paths are alive at a bounce. Twin of src/reference/paths.rs.
+//
+// Needs nothing. Provides the push constants `batch`, `list_of`, `pixel_of_path` and `key_of_path`.
+#ifndef KDRAY_PATHS
+#define KDRAY_PATHS
+
+#include "layout.glsl"
+#include "camera.glsl"
+#include "sampler.glsl"
+
+layout(push_constant) uniform BatchBlock { Batch batch; };
+
+// Where the list of the paths that are alive at a bounce begins in `live_paths`.
+uint list_of(uint depth) {
+    return (depth & 1u) * frame.queue_capacity;
+}
+
+// The window's pixel of a path.
+uvec2 pixel_of_path(uint path_ix) {
+    return pixel_of(batch.first_pixel + path_ix % batch.n_pixels, frame.width, frame.height);
+}
+
+// What the random numbers of a path depend on. pixel: the window's pixel.
+SampleKey key_of_path(uint path_ix, uvec2 pixel) {
+    return sample_key(in_picture(pixel), frame.first_sample + path_ix / batch.n_pixels);
+}
+
+#endif

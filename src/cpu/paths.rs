@@ -1,0 +1,79 @@
+//! The passes of a batch of paths, with the buffers of the paths.
+
+use bytemuck::Zeroable;
+
+use super::{queue::Queue, tracer::FastTracer};
+use crate::{
+    accel::kdtree::Traversal,
+    layout::{Batch, Bounce, Frame, Hit, PathRay, PathState, SCAN_GROUP_SIZE, Segment},
+    reference::{
+        inputs::KernelInputs,
+        path_begin::path_begin,
+        path_compact,
+        path_scatter::{PathBuffers, path_scatter},
+        path_trace::{closest_hits_by, segments_by},
+    },
+};
+
+/// What the paths of a batch have beside their rays and hits, which are in a [`Queue`]. The buffers grow with the number
+/// of paths.
+#[derive(Default)]
+pub struct Paths {
+    pub states: Vec<PathState>,
+    segments: Vec<Segment>,
+    /// The indices of the paths that are alive, for bounces of even depth and for those of odd depth.
+    live: [Vec<u32>; 2],
+}
+
+impl Paths {
+    /// Makes the camera rays of `n_paths` paths.
+    pub fn begin(&mut self, frame: &Frame, batch: &Batch, n_paths: u32, queue: &mut Queue) {
+        let n = n_paths as usize;
+        queue.bounces = vec![Bounce::of_paths(n_paths, frame)];
+        queue.rays.resize(n, PathRay::zeroed());
+        queue.hits.resize(n, Hit::zeroed());
+        self.states.clear();
+        self.states.resize(n, PathState::zeroed());
+        self.segments.clear();
+        self.segments.resize(n, Segment::zeroed());
+        self.live[0] = (0..n_paths).collect();
+        path_begin(frame, batch, &mut queue.rays);
+    }
+
+    /// Finds the hits of the paths that are alive, and tests the segments of the bounce before. Returns the numbers of
+    /// hits and of segments.
+    pub fn trace(&mut self, inputs: &KernelInputs, traversal: Traversal, depth: u32, queue: &mut Queue) -> (u32, u32) {
+        let Self { states, segments, live } = self;
+        let [live, before] = [depth, depth + 1].map(|depth| &live[depth as usize % 2]);
+        let n_hits = closest_hits_by::<FastTracer>(inputs, traversal, live, &queue.rays, &mut queue.hits);
+        if depth == 0 {
+            return (n_hits, 0);
+        }
+        (n_hits, segments_by::<FastTracer>(inputs, traversal, before, segments, states))
+    }
+
+    /// Adds the light at the hits, and replaces the rays by those with which the paths go on.
+    pub fn scatter(&mut self, inputs: &KernelInputs, batch: &Batch, queue: &mut Queue) {
+        let live = &self.live[batch.depth as usize % 2];
+        queue.child_kinds.resize(live.len(), 0);
+        queue.scan_blocks.resize(live.len().div_ceil(SCAN_GROUP_SIZE as usize), 0);
+        let Queue { rays, hits, child_kinds, scan_blocks, .. } = queue;
+        let paths = PathBuffers { rays, states: &mut self.states, segments: &mut self.segments };
+        path_scatter(inputs, batch, (live, hits), paths, (child_kinds, scan_blocks));
+    }
+
+    /// Computes the prefix sums of the numbers of paths that go on, and the row of the next bounce.
+    pub fn spine(&self, frame: &Frame, depth: u32, queue: &mut Queue) {
+        let mut next = Bounce::of_paths(0, frame);
+        path_compact::spine(&mut queue.scan_blocks, frame, &queue.bounces[depth as usize], &mut next);
+        queue.bounces.push(next);
+    }
+
+    /// Lists the paths that go on.
+    pub fn compact(&mut self, depth: u32, queue: &Queue) {
+        let [even, odd] = &mut self.live;
+        let (live, next) = if depth % 2 == 0 { (even, odd) } else { (odd, even) };
+        next.resize(queue.bounces[depth as usize + 1].n_rays as usize, 0);
+        path_compact::path_compact(live, &queue.child_kinds, &queue.scan_blocks, next);
+    }
+}

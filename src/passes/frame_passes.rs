@@ -1,0 +1,150 @@
+//! The passes of a frame of either integrator.
+
+use std::sync::Arc;
+
+use super::{
+    Denoise, FalseColor, Features, Inputs, Passes, PathAccumulate, PathBegin, PathCompact, PathResolve, PathScatter,
+    PathTrace, Tonemap, record::record_steps,
+};
+use crate::{
+    buffers::Resources,
+    frame::{Integrator, Pass, RenderOptions, Step},
+    gpu::{BindingLayout, Commands, Context, GpuError},
+};
+
+/// The passes of a frame. A clone shares its pipelines with the original.
+#[derive(Clone)]
+pub enum FramePasses {
+    /// Those of [`Integrator::Whitted`].
+    Whitted(Passes),
+    /// Those of [`Integrator::Path`].
+    Path(PathPasses),
+}
+
+impl FramePasses {
+    /// Creates the pipelines.
+    ///
+    /// # Errors
+    /// Fails as [`Passes::new`] does.
+    pub fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<BindingLayout>,
+        options: &RenderOptions,
+    ) -> Result<Self, GpuError> {
+        match options.integrator {
+            Integrator::Whitted => Passes::new(context, bindings, options).map(Self::Whitted),
+            Integrator::Path => PathPasses::new(context, bindings, options).map(Self::Path),
+        }
+    }
+
+    /// Creates the passes for the options `to`, which have the same integrator. `self` was created for the options
+    /// `from`. The new passes share with it all pipelines that do not depend on a changed option.
+    ///
+    /// # Errors
+    /// Fails as [`Passes::new`] does.
+    pub fn with_options(
+        &self,
+        context: &Arc<Context>,
+        bindings: &Arc<BindingLayout>,
+        from: &RenderOptions,
+        to: &RenderOptions,
+    ) -> Result<Self, GpuError> {
+        match self {
+            Self::Whitted(passes) => passes.with_options(context, bindings, from, to).map(Self::Whitted),
+            Self::Path(passes) => passes.with_options(context, bindings, from, to).map(Self::Path),
+        }
+    }
+
+    /// Records passes and the barriers between them. The resources must be bound.
+    pub fn record_section(&self, commands: &Commands, resources: &Resources, section: &[Step], inputs: &Inputs) {
+        match self {
+            Self::Whitted(passes) => passes.record_section(commands, resources, section, inputs),
+            Self::Path(passes) => passes.record_section(commands, resources, section, inputs),
+        }
+    }
+}
+
+/// All passes of a frame that traces paths. A clone shares its pipelines with the original.
+#[derive(Clone)]
+pub struct PathPasses {
+    pub path_begin: Arc<PathBegin>,
+    pub path_trace: Arc<PathTrace>,
+    pub path_scatter: Arc<PathScatter>,
+    pub path_compact: Arc<PathCompact>,
+    pub path_resolve: Arc<PathResolve>,
+    pub path_accumulate: Arc<PathAccumulate>,
+    pub features: Arc<Features>,
+    pub denoise: Arc<Denoise>,
+    pub tonemap: Arc<Tonemap>,
+    pub false_color: Arc<FalseColor>,
+}
+
+impl PathPasses {
+    /// Creates the pipelines.
+    ///
+    /// # Errors
+    /// The driver refuses a shader.
+    pub fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<BindingLayout>,
+        options: &RenderOptions,
+    ) -> Result<Self, GpuError> {
+        Ok(Self {
+            path_begin: PathBegin::new(context, bindings)?.into(),
+            path_trace: PathTrace::new(context, bindings, options)?.into(),
+            path_scatter: PathScatter::new(context, bindings)?.into(),
+            path_compact: PathCompact::new(context, bindings)?.into(),
+            path_resolve: PathResolve::new(context, bindings)?.into(),
+            path_accumulate: PathAccumulate::new(context, bindings)?.into(),
+            features: Features::new(context, bindings)?.into(),
+            denoise: Denoise::new(context, bindings)?.into(),
+            tonemap: Tonemap::new(context, bindings, options.tonemap)?.into(),
+            false_color: FalseColor::new(context, bindings)?.into(),
+        })
+    }
+
+    fn with_options(
+        &self,
+        context: &Arc<Context>,
+        bindings: &Arc<BindingLayout>,
+        from: &RenderOptions,
+        to: &RenderOptions,
+    ) -> Result<Self, GpuError> {
+        let mut next = self.clone();
+        let of_trace = |options: &RenderOptions| (options.traversal, options.profile, options.features);
+        if of_trace(from) != of_trace(to) {
+            next.path_trace = PathTrace::new(context, bindings, to)?.into();
+        }
+        if from.tonemap != to.tonemap {
+            next.tonemap = Tonemap::new(context, bindings, to.tonemap)?.into();
+        }
+        Ok(next)
+    }
+
+    /// Records passes and the barriers between them. The resources must be bound.
+    pub fn record_section(&self, commands: &Commands, resources: &Resources, section: &[Step], inputs: &Inputs) {
+        record_steps(commands, section, |pass| self.record(commands, resources, pass, inputs));
+    }
+
+    /// Records one pass. The resources must be bound.
+    ///
+    /// # Panics
+    /// Frames of paths do not have `pass`, or `inputs` lacks the feature that it displays.
+    pub fn record(&self, commands: &Commands, resources: &Resources, pass: Pass, inputs: &Inputs) {
+        let batch = &inputs.batch;
+        match pass {
+            Pass::PathBegin => self.path_begin.record(commands, resources, batch),
+            Pass::PathTrace => self.path_trace.record(commands, resources, batch),
+            Pass::PathScatter => self.path_scatter.record(commands, resources, batch),
+            Pass::CompactSpine => self.path_compact.spine(commands, batch),
+            Pass::PathCompact => self.path_compact.record(commands, resources, batch),
+            Pass::PathResolve => self.path_resolve.record(commands, batch),
+            Pass::PathAccumulate => self.path_accumulate.record(commands, resources),
+            Pass::Features => self.features.record(commands, batch),
+            Pass::Denoise => self.denoise.record(commands, resources),
+            Pass::FalseColor => self.false_color.record(commands, resources, inputs.displayed_feature()),
+            Pass::Tonemap => self.tonemap.record(commands, resources),
+            _ => panic!("a frame of paths has no `{}`", pass.name()),
+        }
+    }
+}

@@ -1,0 +1,40 @@
+//! Path compact: lists the paths that go on, without gaps and in order, by a prefix sum. The kernels path_scatter and
+//! compact_spine have made the sum.
+
+use std::sync::Arc;
+
+use super::spirv;
+use crate::{
+    buffers::Resources,
+    gpu::{BindingLayout, Commands, ComputeDesc, ComputePipeline, Constants, Context, Dispatch, GpuError},
+    layout::Batch,
+};
+
+/// The pipelines of the pass and of the prefix sum.
+pub struct PathCompact {
+    spine: ComputePipeline,
+    list: ComputePipeline,
+}
+
+impl PathCompact {
+    pub(super) fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
+        let kernel = |name, shader| {
+            let desc = ComputeDesc { name, shader, constants: &Constants::new(), full_subgroups: true };
+            ComputePipeline::new(context, bindings, &desc)
+        };
+        Ok(Self {
+            spine: kernel("compact_spine", spirv!("compact_spine.comp"))?,
+            list: kernel("path_compact", spirv!("path_compact.comp"))?,
+        })
+    }
+
+    /// Needs `scan_blocks`. Leaves their exclusive prefix sums there, and the next bounce's row of `bounces`.
+    pub fn spine(&self, commands: &Commands, batch: &Batch) {
+        commands.dispatch(&self.spine, Some(batch.depth), batch, Dispatch::Threads([1, 1, 1], [1, 1, 1]));
+    }
+
+    /// Needs `child_kinds`, `scan_blocks` and the list of this bounce in `live_paths`. Leaves that of the next bounce.
+    pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
+        commands.dispatch(&self.list, Some(batch.depth), batch, resources.scan_dispatch(batch));
+    }
+}

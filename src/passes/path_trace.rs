@@ -1,0 +1,38 @@
+//! Path trace: finds the closest hits of paths, and tests the segments to lights of the bounce before.
+
+use std::sync::Arc;
+
+use super::{kernel, search_constants, searching};
+use crate::{
+    buffers::Resources,
+    frame::RenderOptions,
+    gpu::{BindingLayout, Commands, ComputePipeline, Context, GpuError},
+    layout::{Batch, constants},
+};
+
+/// The pipeline of the pass.
+pub struct PathTrace {
+    kernel: ComputePipeline,
+}
+
+impl PathTrace {
+    pub(super) fn new(
+        context: &Arc<Context>,
+        bindings: &Arc<BindingLayout>,
+        options: &RenderOptions,
+    ) -> Result<Self, GpuError> {
+        let shader = searching("path_trace", bindings, options.traversal, Some(constants::SHADOW_GAPS));
+        let constants = search_constants(context)?
+            .set(constants::COUNTS, options.profile)
+            .set(constants::COUNT_COSTS, options.features);
+        Ok(Self { kernel: kernel(context, bindings, "path_trace", shader, &constants)? })
+    }
+
+    /// Needs `rays` of the paths that are alive, `segments` and `live_paths` of this bounce and the one before. Leaves
+    /// `hits`. Updates `segments` and `path_states`, the counters if the options ask for a profile, and
+    /// `pixel_features` if they ask for features. A ray that has stalled leaves a mark in place of its hit, a segment
+    /// in place of its state. `batch.round`: which of them are traced, all or those that have stalled.
+    pub fn record(&self, commands: &Commands, resources: &Resources, batch: &Batch) {
+        commands.dispatch(&self.kernel, Some(batch.depth), batch, resources.trace_dispatch(batch));
+    }
+}

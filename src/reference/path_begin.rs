@@ -1,0 +1,19 @@
+//! Path begin: the camera rays of a batch's paths. Twin of `path_begin.comp`.
+
+use rayon::prelude::*;
+
+use super::{
+    path_camera::path_camera_ray,
+    paths::{key_of_path, pixel_of_path},
+    sampler::random_pair,
+};
+use crate::layout::{Batch, Frame, PathRay};
+
+/// Writes the camera ray of each path.
+pub fn path_begin(frame: &Frame, batch: &Batch, rays: &mut [PathRay]) {
+    rays.par_iter_mut().enumerate().for_each(|(path_ix, ray)| {
+        let pixel = pixel_of_path(frame, batch, path_ix as u32);
+        let key = key_of_path(frame, batch, path_ix as u32, pixel);
+        *ray = path_camera_ray(frame, pixel, random_pair(key, 0), random_pair(key, 1));
+    });
+}

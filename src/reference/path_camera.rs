@@ -1,0 +1,68 @@
+//! The camera rays of paths. Twin of `path_camera.glsl`.
+
+use glam::{UVec2, Vec2, Vec3, vec2};
+
+use super::camera::{in_picture, pixel_ix_of};
+use crate::layout::{FILTER_BOX, FILTER_TENT, Frame, NO_TRIANGLE, PathRay};
+
+/// The offset on one axis with the share `u` of a tent of radius 1 to its left.
+fn tent(u: f32) -> f32 {
+    if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 * (1.0 - u)).sqrt() }
+}
+
+/// The direction of an angle that is the share `turn` of a full turn.
+fn on_circle(turn: f32) -> Vec2 {
+    let angle = std::f32::consts::TAU * turn;
+    vec2(angle.cos(), angle.sin())
+}
+
+/// The offset of a sample from the centre of its pixel, pixels. Its density is the pixel's filter.
+pub fn filter_offset(frame: &Frame, u: Vec2) -> Vec2 {
+    match frame.pixel_filter {
+        FILTER_BOX => u - 0.5,
+        FILTER_TENT => vec2(tent(u.x), tent(u.y)),
+        _ => {
+            let within = 1.0 - (-4.5_f32).exp();
+            0.5 * (-2.0 * (1.0 - u.x * within).ln()).sqrt() * on_circle(u.y)
+        }
+    }
+}
+
+/// The point of the unit disk, by the concentric map of the square.
+pub fn disk_point(u: Vec2) -> Vec2 {
+    let at = 2.0 * u - 1.0;
+    if at == Vec2::ZERO {
+        return Vec2::ZERO;
+    }
+    let is_flat = at.x.abs() > at.y.abs();
+    let radius = if is_flat { at.x } else { at.y };
+    let turn = if is_flat { 0.125 * at.y / at.x } else { 0.25 - 0.125 * at.x / at.y };
+    radius * on_circle(turn)
+}
+
+/// The camera ray of a sample of the window's pixel. `in_pixel`, `in_lens`: random numbers in [0, 1).
+pub fn path_camera_ray(frame: &Frame, pixel: UVec2, in_pixel: Vec2, in_lens: Vec2) -> PathRay {
+    let at_px = in_picture(frame, pixel).as_vec2() + 0.5 + filter_offset(frame, in_pixel);
+    let at = at_px / vec2(frame.picture_width as f32, frame.picture_height as f32) * 2.0 - 1.0;
+    let in_image = at.x * frame.right - at.y * frame.up;
+    let (mut origin, mut direction) = (frame.eye, frame.forward);
+    if frame.is_orthographic == 1 {
+        origin += in_image;
+    } else {
+        direction += in_image;
+    }
+    if frame.aperture > 0.0 {
+        let lens = frame.aperture * disk_point(in_lens);
+        let aside = lens.x * frame.right.normalize() + lens.y * frame.up.normalize();
+        direction = frame.focus * direction - aside;
+        origin += aside;
+    }
+    PathRay {
+        origin,
+        pixel_ix: pixel_ix_of(frame, pixel),
+        direction: direction.normalize(),
+        source_triangle: NO_TRIANGLE,
+        throughput: Vec3::ONE,
+        t_max: f32::INFINITY,
+    }
+}

@@ -1,0 +1,172 @@
+//! One step of a path: the light at its hit, and the way on. Twin of `path_vertex.glsl`.
+
+use glam::{Vec3, vec3};
+
+use super::{
+    bsdf::{bsdf_density, evaluate_bsdf, is_smooth, sample_bsdf},
+    emitters::{
+        ambient_radiance, emission_at, emission_density, environment_density, environment_radiance, pick_light, seen_light,
+    },
+    inputs::KernelInputs,
+    maps::shaded_at,
+    material::{emitted, is_unlit, unabsorbed},
+    sampler::{SampleKey, random_pair},
+    surface::Surface,
+};
+use crate::layout::{
+    Hit, LEAST_SURVIVAL, Material, NO_TRIANGLE, PathRay, PathState, ROULETTE_DEPTH, SEGMENT_NONE, SEGMENT_SHARE,
+    SEGMENT_WAITS, Segment,
+};
+
+/// The number of pairs of random numbers that come before those of the first hit: in the pixel and in the lens.
+const PAIRS_OF_CAMERA: u32 = 2;
+/// The number of pairs for each hit.
+const PAIRS_OF_HIT: u32 = 4;
+
+/// The share of a way of sampling, whose density is the first one, beside another way.
+pub fn power_share(density: f32, other: f32) -> f32 {
+    let largest = density.max(other);
+    let (own, others) = (density / largest, other / largest);
+    own * own / (own * own + others * others)
+}
+
+/// The share of light that a path meets on its way, and that could have been sampled with the density `of_lights`.
+fn share_of_met(state: &PathState, of_lights: f32) -> f32 {
+    if state.density > 0.0 { power_share(state.density, of_lights) } else { 1.0 }
+}
+
+/// Light that is added to the path: bounded after the first hit, and nothing if it is not a number.
+fn added_light(inputs: &KernelInputs, light: Vec3, depth: u32) -> Vec3 {
+    let light = if depth > 0 { light.min(Vec3::splat(inputs.frame().clamp)) } else { light };
+    let is_finite = light.cmplt(Vec3::splat(1.0e30)).all();
+    if is_finite { light.max(Vec3::ZERO) } else { Vec3::ZERO }
+}
+
+/// The light of an environment that a ray meets.
+fn met_environment(inputs: &KernelInputs, ray: &PathRay, state: &PathState) -> Vec3 {
+    let mut radiance = environment_radiance(inputs, ray.direction);
+    if state.density > 0.0 {
+        radiance += ambient_radiance(inputs);
+    }
+    radiance * share_of_met(state, environment_density(inputs, ray.direction))
+}
+
+const NO_SEGMENT: Segment = Segment {
+    origin: Vec3::ZERO,
+    state: SEGMENT_NONE,
+    direction: Vec3::ZERO,
+    source_triangle: NO_TRIANGLE,
+    light: Vec3::ZERO,
+    t_max: 0.0,
+};
+
+/// A hit of a path, as its light is computed.
+struct Vertex<'a> {
+    depth: u32,
+    surface: &'a Surface,
+    material: &'a Material,
+    triangle_ix: u32,
+    to_viewer: Vec3,
+    throughput: Vec3,
+}
+
+/// The segment to a light that is picked at a hit.
+fn segment_to_light(inputs: &KernelInputs, u: Vec3, vertex: &Vertex) -> Segment {
+    let &Vertex { depth, surface, material, triangle_ix, to_viewer, throughput } = vertex;
+    if is_smooth(material) {
+        return NO_SEGMENT;
+    }
+    let pick = pick_light(inputs, surface.point_world, u);
+    if pick.light == Vec3::ZERO {
+        return NO_SEGMENT;
+    }
+    let reflected = evaluate_bsdf(material, surface, to_viewer, pick.direction);
+    if !reflected.cmpgt(Vec3::ZERO).any() {
+        return NO_SEGMENT;
+    }
+    let mut share = 1.0;
+    if pick.density > 0.0 {
+        share = power_share(pick.density, bsdf_density(material, surface, to_viewer, pick.direction));
+    }
+    let light = added_light(inputs, throughput * reflected * pick.light * share, depth + 1);
+    if !light.cmpgt(Vec3::ZERO).any() {
+        return NO_SEGMENT;
+    }
+    let side = if pick.direction.dot(surface.geometric) < 0.0 { -surface.clearance } else { surface.clearance };
+    Segment {
+        origin: surface.point_world + side * surface.geometric,
+        state: SEGMENT_WAITS,
+        direction: pick.direction,
+        source_triangle: triangle_ix,
+        light,
+        t_max: SEGMENT_SHARE * pick.distance,
+    }
+}
+
+/// Whether a path survives Russian roulette. Its throughput is then larger, by the reciprocal of the probability.
+fn survives(depth: u32, u: f32, throughput: &mut Vec3) -> bool {
+    if depth < ROULETTE_DEPTH {
+        return true;
+    }
+    let survival = throughput.max_element().clamp(LEAST_SURVIVAL, 1.0);
+    *throughput /= survival;
+    u < survival
+}
+
+/// Adds the light that the path's ray meets to its state, samples a light at the hit, and replaces the ray by the one
+/// with which the path goes on. Returns whether it does, and the segment to the light.
+pub fn step_path(
+    inputs: &KernelInputs,
+    key: SampleKey,
+    depth: u32,
+    hit: &Hit,
+    ray: &mut PathRay,
+    state: &mut PathState,
+) -> (bool, Segment) {
+    let is_miss = hit.triangle_ix == NO_TRIANGLE;
+    let seen = seen_light(inputs, ray.origin, ray.direction, if is_miss { f32::INFINITY } else { hit.t });
+    if seen.t < f32::INFINITY {
+        let light = seen.radiance * share_of_met(state, seen.density);
+        state.radiance += added_light(inputs, ray.throughput * light, depth);
+        return (false, NO_SEGMENT);
+    }
+    if is_miss {
+        state.radiance += added_light(inputs, ray.throughput * met_environment(inputs, ray, state), depth);
+        return (false, NO_SEGMENT);
+    }
+    let (surface, material) = shaded_at(inputs, ray, hit);
+    let mut throughput = ray.throughput * unabsorbed(&material, &surface, hit.t);
+    if is_unlit(&material) || material.ke.cmpgt(Vec3::ZERO).any() {
+        let light = if is_unlit(&material) {
+            emitted(&material)
+        } else {
+            emission_at(inputs, hit.triangle_ix, hit.u, hit.v)
+        };
+        let share = share_of_met(state, emission_density(inputs, hit.triangle_ix, ray.direction, hit.t));
+        state.radiance += added_light(inputs, throughput * light * share, depth);
+    }
+    // The last ray of a path only meets light.
+    if is_unlit(&material) || depth + 1 >= inputs.frame().max_depth {
+        return (false, NO_SEGMENT);
+    }
+    let to_viewer = -ray.direction;
+    let first_pair = PAIRS_OF_CAMERA + PAIRS_OF_HIT * depth;
+    let [to_light, choices, to_next, lobe] = [0, 1, 2, 3].map(|place| random_pair(key, first_pair + place));
+    let vertex = Vertex {
+        depth,
+        surface: &surface,
+        material: &material,
+        triangle_ix: hit.triangle_ix,
+        to_viewer,
+        throughput,
+    };
+    let segment = segment_to_light(inputs, vec3(to_light.x, to_light.y, choices.x), &vertex);
+    let next = sample_bsdf(&material, &surface, to_viewer, vec3(to_next.x, to_next.y, lobe.x));
+    throughput *= next.weight;
+    if !throughput.cmpgt(Vec3::ZERO).any() || !survives(depth, choices.y, &mut throughput) {
+        return (false, segment);
+    }
+    *ray = surface.ray_from(next.direction, hit.triangle_ix, ray, throughput);
+    state.density = if next.is_delta { 0.0 } else { next.density };
+    (true, segment)
+}

@@ -1,0 +1,19 @@
+//! The paths of a batch. Twin of `paths.glsl`.
+
+use glam::UVec2;
+
+use super::{
+    camera::{in_picture, pixel_of},
+    sampler::{SampleKey, sample_key},
+};
+use crate::layout::{Batch, Frame};
+
+/// The window's pixel of a path.
+pub fn pixel_of_path(frame: &Frame, batch: &Batch, path_ix: u32) -> UVec2 {
+    pixel_of(batch.first_pixel + path_ix % batch.n_pixels, frame.width, frame.height)
+}
+
+/// What the random numbers of a path depend on. `pixel`: the window's pixel.
+pub fn key_of_path(frame: &Frame, batch: &Batch, path_ix: u32, pixel: UVec2) -> SampleKey {
+    sample_key(in_picture(frame, pixel), frame.first_sample + path_ix / batch.n_pixels)
+}
