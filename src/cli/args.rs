@@ -6,8 +6,9 @@ use clap::{Parser, Subcommand, value_parser};
 use kdray::{
     accel::{AccelKind, Query, kdtree::Traversal},
     engine::choices::{BuildPolicy, Request},
-    frame::{Aov, Crop, RenderOptions},
+    frame::{Aov, Crop, Integrator, RenderOptions},
     gpu::DeviceSelector,
+    layout::MOST_SAMPLES_LOG2,
     scene::Scene,
 };
 
@@ -82,6 +83,11 @@ pub struct RenderArgs {
     /// the scene file's, else 1; 4 for a mesh file; 1 with --trace]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=65_536))]
     pub spp: Option<u32>,
+    /// The samples of each pixel to render, of which the first is 0 and the last is not included, for example 0-64 or
+    /// 64-128, both multiples of 16; the picture is their mean, and the mean of the pictures of several ranges of one
+    /// length is that of all their samples; for --integrator path [default: 0 to the number of samples]
+    #[arg(long, value_name = "A-B", conflicts_with_all = ["spp", "trace"])]
+    pub samples: Option<SampleRange>,
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     #[arg(help = with_words(AOV, None, &Aov::words()), long_help = listed(AOV, "none", &Aov::descriptions()))]
     pub aov: Vec<Aov>,
@@ -217,6 +223,9 @@ impl RenderArgs {
 
     /// Returns the number of samples per pixel: the user's, else the scene's.
     pub fn samples(&self, scene: &Scene) -> u32 {
+        if let Some(SampleRange { first, end }) = self.samples {
+            return end - first;
+        }
         let defaults = scene.defaults.for_integrator(self.picture.integrator);
         self.spp.unwrap_or(if self.trace.is_some() { 1 } else { defaults.samples })
     }
@@ -231,9 +240,18 @@ impl RenderArgs {
                 "--crop {crop} reaches beyond the picture of {width}x{height} pixels"
             )));
         }
+        let mut paths = options.paths;
+        if let Some(SampleRange { first, .. }) = self.samples {
+            if options.integrator != Integrator::Path {
+                return Err(CliError::Usage(
+                    "--samples needs --integrator path: whitted's samples are no ranges that can be joined".into(),
+                ));
+            }
+            paths.first_sample = first;
+        }
         // Passes are timed only if some output shows the times.
         let profile = !self.quiet || self.profile.is_some() || self.trace.is_some();
-        Ok(RenderOptions { crop: self.crop, features: !self.aov.is_empty(), profile, ..options })
+        Ok(RenderOptions { crop: self.crop, features: !self.aov.is_empty(), profile, paths, ..options })
     }
 }
 
@@ -303,6 +321,28 @@ impl FromStr for Frames {
     }
 }
 
+/// Range of samples; the end is not included. Both are multiples of the samples that a frame of paths draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SampleRange {
+    pub first: u32,
+    pub end: u32,
+}
+
+impl FromStr for SampleRange {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, Self::Err> {
+        let size = 1 << MOST_SAMPLES_LOG2;
+        let number = |digits: &str| digits.parse().ok().filter(|n: &u32| *n <= 1 << 24 && n % size == 0);
+        let ends = word.split_once('-').and_then(|(first, end)| Some((number(first)?, number(end)?)));
+        match ends {
+            Some((first, end)) if first < end => Ok(Self { first, end }),
+            Some(_) => Err("the range is empty".to_owned()),
+            None => Err(format!("expected A-B, multiples of {size} up to {}", 1 << 24)),
+        }
+    }
+}
+
 /// Parses a device selector: an index if the word is a number, else a part of a name.
 pub fn device(word: &str) -> Result<DeviceSelector, String> {
     match word.parse() {
@@ -328,6 +368,14 @@ mod tests {
         assert_eq!("1x16384".parse(), Ok(Size { width: 1, height: 16384 }));
         for word in ["", "x", "0x1", "1x0", "16385x1", "-1x1", "1x1x1", "1", "1 x 1", "4294967297x1", "1X1"] {
             assert!(word.parse::<Size>().is_err(), "{word}");
+        }
+    }
+
+    #[test]
+    fn sample_ranges() {
+        assert_eq!("16-64".parse(), Ok(SampleRange { first: 16, end: 64 }));
+        for word in ["", "-", "16", "0-0", "32-16", "0-15", "8-16", "-16-32", "0-16777232", "a-b"] {
+            assert!(word.parse::<SampleRange>().is_err(), "{word}");
         }
     }
 

@@ -214,6 +214,7 @@ impl PictureArgs {
             crop: None,
             integrator: scene.integrator,
             paths: PathOptions {
+                first_sample: 0,
                 filter: self.pixel_filter.unwrap_or(paths.filter),
                 clamp: self.clamp.unwrap_or(paths.clamp),
                 aperture: self.aperture.unwrap_or(paths.aperture),

@@ -353,7 +353,8 @@ impl Renderer {
         let inputs = KernelInputs::new(&self.world, &self.frame).with_links(&self.links);
         let (Queue { rays, hits, .. }, pixels) = (&self.queue, &mut self.pixel_features);
         // Of paths, the first ones are the first samples of the pixels.
-        let n_rays = if self.options.integrator == Integrator::Path { self.batch.n_pixels as usize } else { rays.len() };
+        let n_rays =
+            if self.options.integrator == Integrator::Path { self.batch.n_pixels as usize } else { rays.len() };
         let (rays, hits) = (&rays[..n_rays], &hits[..n_rays]);
         self.clock.time(Pass::Features, Some(0), || features::features(&inputs, rays, hits, pixels));
     }

@@ -37,6 +37,7 @@ impl Frame {
             PixelFilter::Tent => FILTER_TENT,
             PixelFilter::Gaussian => FILTER_GAUSSIAN,
         };
+        self.range_begin = options.paths.first_sample;
         self.clamp = options.paths.clamp;
         self.aperture = options.paths.aperture;
         self.focus = options.paths.focus.unwrap_or(0.0);
@@ -73,7 +74,7 @@ impl Frame {
         self.up = image_plane.up.as_vec3();
         self.forward = image_plane.forward.as_vec3();
         [self.sample_x, self.sample_y] = (offset + 0.5).as_vec2().to_array();
-        self.first_sample = sample_ix;
+        self.first_sample = self.range_begin + sample_ix;
         self.n_samples = sample_ix + (1 << self.samples_log2);
         if self.focuses_on_target == 1 {
             self.focus = eye.distance(camera.target);

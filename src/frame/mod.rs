@@ -82,6 +82,9 @@ impl RenderOptions {
 /// Options of [`Integrator::Path`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathOptions {
+    /// Index of the picture's first sample in each pixel, a multiple of `2^MOST_SAMPLES_LOG2`. Pictures of other samples
+    /// are independent of this one, and their mean is the picture of all samples.
+    pub first_sample: u32,
     /// The density of samples around the centre of their pixel.
     pub filter: PixelFilter,
     /// The most light that a path adds to its pixel after its first hit, in any colour (radiance). It makes pictures
@@ -95,7 +98,7 @@ pub struct PathOptions {
 
 impl Default for PathOptions {
     fn default() -> Self {
-        Self { filter: PixelFilter::Tent, clamp: f32::INFINITY, aperture: 0.0, focus: None }
+        Self { first_sample: 0, filter: PixelFilter::Tent, clamp: f32::INFINITY, aperture: 0.0, focus: None }
     }
 }
 

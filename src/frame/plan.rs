@@ -120,8 +120,10 @@ impl Plan {
     /// Returns the passes of a frame that traces paths.
     fn of_paths(kind: &FrameKind) -> Self {
         let light = vec![Step::Run(Pass::PathResolve), barrier(Touch::Write, Touch::Update, &[PixelRadiance])];
-        let sums =
-            vec![Step::Run(Pass::PathAccumulate), barrier(Touch::Write, Touch::Read, &[PixelAccumulated, PixelRadiance])];
+        let sums = vec![
+            Step::Run(Pass::PathAccumulate),
+            barrier(Touch::Write, Touch::Read, &[PixelAccumulated, PixelRadiance]),
+        ];
         Self {
             visibility: Section::new(),
             bounces: (0..kind.n_bounces).map(|depth| bounce_of_paths(kind, depth)).collect(),

@@ -55,11 +55,28 @@ mod trace;
 mod visibility;
 
 pub use self::{
-    accumulate::Accumulate, cast::Cast, compact::Compact, denoise::Denoise, false_color::FalseColor,
-    features::Features, frame_passes::{FramePasses, PathPasses}, path_accumulate::PathAccumulate, path_begin::PathBegin,
-    path_compact::PathCompact, path_resolve::PathResolve, path_scatter::PathScatter, path_trace::PathTrace,
-    primary_hit::PrimaryHit, rasterize::Rasterize, record::Inputs, resolve::Resolve, shade::Shade, shadow::Shadow,
-    tonemap::Tonemap, trace::Trace, visibility::Visibility,
+    accumulate::Accumulate,
+    cast::Cast,
+    compact::Compact,
+    denoise::Denoise,
+    false_color::FalseColor,
+    features::Features,
+    frame_passes::{FramePasses, PathPasses},
+    path_accumulate::PathAccumulate,
+    path_begin::PathBegin,
+    path_compact::PathCompact,
+    path_resolve::PathResolve,
+    path_scatter::PathScatter,
+    path_trace::PathTrace,
+    primary_hit::PrimaryHit,
+    rasterize::Rasterize,
+    record::Inputs,
+    resolve::Resolve,
+    shade::Shade,
+    shadow::Shadow,
+    tonemap::Tonemap,
+    trace::Trace,
+    visibility::Visibility,
 };
 
 #[cfg(feature = "view")]

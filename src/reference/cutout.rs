@@ -5,7 +5,9 @@ use super::{
     texture::{sample_texture, scalar_of, uv_set_of},
 };
 use crate::{
-    layout::{Hit, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps, NO_TEXTURE},
+    layout::{
+        Hit, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps, NO_TEXTURE,
+    },
     world::Textures,
 };
 

@@ -5,7 +5,8 @@ use glam::{Vec3, vec3};
 use super::{
     bsdf::{bsdf_density, evaluate_bsdf, is_smooth, sample_bsdf},
     emitters::{
-        ambient_radiance, emission_at, emission_density, environment_density, environment_radiance, pick_light, seen_light,
+        ambient_radiance, emission_at, emission_density, environment_density, environment_radiance, pick_light,
+        seen_light,
     },
     inputs::KernelInputs,
     maps::shaded_at,
@@ -137,11 +138,8 @@ pub fn step_path(
     let (surface, material) = shaded_at(inputs, ray, hit);
     let mut throughput = ray.throughput * unabsorbed(&material, &surface, hit.t);
     if is_unlit(&material) || material.ke.cmpgt(Vec3::ZERO).any() {
-        let light = if is_unlit(&material) {
-            emitted(&material)
-        } else {
-            emission_at(inputs, hit.triangle_ix, hit.u, hit.v)
-        };
+        let light =
+            if is_unlit(&material) { emitted(&material) } else { emission_at(inputs, hit.triangle_ix, hit.u, hit.v) };
         let share = share_of_met(state, emission_density(inputs, hit.triangle_ix, ray.direction, hit.t));
         state.radiance += added_light(inputs, throughput * light * share, depth);
     }
@@ -152,14 +150,8 @@ pub fn step_path(
     let to_viewer = -ray.direction;
     let first_pair = PAIRS_OF_CAMERA + PAIRS_OF_HIT * depth;
     let [to_light, choices, to_next, lobe] = [0, 1, 2, 3].map(|place| random_pair(key, first_pair + place));
-    let vertex = Vertex {
-        depth,
-        surface: &surface,
-        material: &material,
-        triangle_ix: hit.triangle_ix,
-        to_viewer,
-        throughput,
-    };
+    let vertex =
+        Vertex { depth, surface: &surface, material: &material, triangle_ix: hit.triangle_ix, to_viewer, throughput };
     let segment = segment_to_light(inputs, vec3(to_light.x, to_light.y, choices.x), &vertex);
     let next = sample_bsdf(&material, &surface, to_viewer, vec3(to_next.x, to_next.y, lobe.x));
     throughput *= next.weight;

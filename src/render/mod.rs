@@ -113,7 +113,8 @@ impl Renderer {
         let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
         let resources = Resources::new(&context, world, &needs)?;
         drop(uploading);
-        let passes = info_span!("make pipelines").in_scope(|| FramePasses::new(&context, &resources.bindings, options))?;
+        let passes =
+            info_span!("make pipelines").in_scope(|| FramePasses::new(&context, &resources.bindings, options))?;
         let (camera, options) = (scene.camera, options.clone());
         Ok(Self {
             context,

@@ -132,7 +132,8 @@ impl QueueSizing {
     /// `most_pixels` pixels, if that is given.
     pub fn spans(&self, constants: &Frame, most_pixels: Option<u32>) -> Vec<(u32, u32)> {
         let n_pixels = constants.width * constants.height;
-        let rays_per_pixel = if self.of_paths { 1 << constants.samples_log2 } else { self.rays_per_pixel(constants.max_depth) };
+        let rays_per_pixel =
+            if self.of_paths { 1 << constants.samples_log2 } else { self.rays_per_pixel(constants.max_depth) };
         let with_room = (constants.queue_capacity / rays_per_pixel).max(1);
         let n_batches = n_pixels.div_ceil(most_pixels.map_or(with_room, |most| most.clamp(1, with_room))).max(1);
         let size = n_pixels.div_ceil(n_batches);

@@ -51,7 +51,18 @@ impl Default for RenderDefaults {
         let RenderOptions { width, height, integrator, max_depth, exposure, tonemap, denoise, .. } =
             RenderOptions::default();
         let of_paths = PathDefaults::default();
-        Self { width, height, integrator, max_depth, samples: 1, of_paths, exposure, is_metered: false, tonemap, denoise }
+        Self {
+            width,
+            height,
+            integrator,
+            max_depth,
+            samples: 1,
+            of_paths,
+            exposure,
+            is_metered: false,
+            tonemap,
+            denoise,
+        }
     }
 }
 

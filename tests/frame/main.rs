@@ -18,6 +18,7 @@ mod living;
 mod mismatch;
 mod orthographic;
 mod parts;
+mod paths;
 mod primaries;
 mod refused;
 mod samples;

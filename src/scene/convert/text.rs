@@ -84,8 +84,9 @@ pub(super) fn light(light: &Light) -> String {
 }
 
 fn render(defaults: &RenderDefaults) -> String {
-    let RenderDefaults { width, height, integrator, max_depth, samples, denoise, exposure, is_metered, tonemap, .. } =
-        defaults.for_integrator(None);
+    let RenderDefaults {
+        width, height, integrator, max_depth, samples, denoise, exposure, is_metered, tonemap, ..
+    } = defaults.for_integrator(None);
     let denoise = match denoise {
         Denoise::Off => "denoise = \"off\"\n".to_owned(),
         Denoise::Paper { threshold } => format!("denoise = \"paper\"\ndenoise_threshold = {}\n", number(threshold)),

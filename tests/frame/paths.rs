@@ -1,0 +1,240 @@
+//! Tests of frames that trace paths: closed forms, and the same bits however the frame is cut into samples, batches,
+//! crops and bands.
+
+use glam::{Vec3, vec3};
+use kdray::{
+    cpu::{self, Batching},
+    frame::{Crop, Denoise, Integrator, PathOptions, Picture, PixelFilter, RenderOptions, sampling::samples_log2},
+    gpu::DeviceOverrides,
+    layout::Material,
+    render::{BandedRenderer, Renderer},
+    scene::Projection,
+    world::FlatScene,
+};
+
+use super::studio::{assert_silent, device, differing, identical, world_of};
+use crate::support::{meshes, pretended, scenes};
+
+fn options(width: u32, height: u32, max_depth: u32) -> RenderOptions {
+    let (integrator, denoise) = (Integrator::Path, Denoise::Off);
+    RenderOptions { width, height, max_depth, integrator, denoise, ..RenderOptions::default() }
+}
+
+/// Draws samples on the device, as many in a frame as the renderer can.
+fn draw(renderer: &mut Renderer, n_samples: u32) -> Picture {
+    while renderer.n_samples() < n_samples {
+        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples));
+        renderer.draw_sample().expect("samples");
+    }
+    renderer.picture().expect("a picture")
+}
+
+fn on_device(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
+    let context = device();
+    let mut renderer = Renderer::new(context.clone(), &world_of(scene), options).expect("a renderer");
+    let picture = draw(&mut renderer, n_samples);
+    assert_silent(&context);
+    picture
+}
+
+fn on_cpu(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture {
+    on_cpu_in_batches(scene, options, n_samples, Batching::default())
+}
+
+fn on_cpu_in_batches(scene: &FlatScene, options: &RenderOptions, n_samples: u32, batching: Batching) -> Picture {
+    let mut renderer = cpu::Renderer::new(&world_of(scene), options, batching);
+    while renderer.n_samples() < n_samples {
+        renderer.set_samples_per_frame(samples_log2(renderer.n_samples(), n_samples));
+        renderer.draw_sample();
+    }
+    renderer.picture()
+}
+
+/// Scenes with mirrors, glass, see-through surfaces and lights of several kinds.
+fn all_kinds() -> Vec<(&'static str, FlatScene)> {
+    let lamp = |mut scene: FlatScene| {
+        scenes::add(&mut scene, meshes::torus(6, 5), scenes::emissive(vec3(3.0, 2.0, 1.0)));
+        scene
+    };
+    vec![
+        ("indoors", scenes::mixed()),
+        ("outdoors", scenes::mixed_outdoors()),
+        ("with a lamp", lamp(scenes::mixed())),
+        ("in parallel", scenes::orthographic(scenes::mixed_outdoors())),
+    ]
+}
+
+/// Returns the mean radiance of a picture, and the standard error of that mean if its pixels are independent.
+fn mean_of(picture: &Picture) -> (Vec3, f32) {
+    let n = picture.radiance.len() as f32;
+    let pixels = || picture.radiance.iter().map(|&[r, g, b, _]| vec3(r, g, b));
+    let mean = pixels().sum::<Vec3>() / n;
+    let variance = pixels().map(|pixel| (pixel - mean).length_squared() / 3.0).sum::<f32>() / (n - 1.0);
+    (mean, (variance / n).sqrt())
+}
+
+#[test]
+fn device_and_cpu_agree() {
+    for (name, scene) in all_kinds() {
+        let options = options(40, 30, 5);
+        let (found, expected) = (on_device(&scene, &options, 3), on_cpu(&scene, &options, 3));
+        // Sines and cosines are rounded differently, so a few paths take another way.
+        let n_differing = differing(&found, &expected, 1e-3).len();
+        assert!(n_differing <= 1200 / 20, "{name}: {n_differing} of 1200 pixels differ");
+        let n_others = differing(&found, &on_cpu(&scene, &options, 2), 1e-3).len();
+        assert!(n_others > 300, "{name}: pictures of other samples differ in {n_others} pixels");
+    }
+}
+
+#[test]
+fn the_number_of_samples_in_a_frame_changes_no_bit() {
+    let (scene, options) = (scenes::mixed_outdoors(), options(17, 13, 4));
+    let context = device();
+    let world = world_of(&scene);
+    let render = |frames: &[u32]| {
+        let mut renderer = Renderer::new(context.clone(), &world, &options).expect("a renderer");
+        for log2 in frames {
+            renderer.set_samples_per_frame(*log2);
+            renderer.draw_sample().expect("samples");
+        }
+        assert_eq!(renderer.n_samples(), 53);
+        renderer.picture().expect("a picture")
+    };
+    let one_by_one = render(&[0; 53]);
+    for frames in
+        [&[4, 4, 4, 2, 0][..], &[1; 26].iter().chain(&[0]).copied().collect::<Vec<_>>(), &[0, 0, 1, 2, 3, 4, 4, 2, 0]]
+    {
+        assert!(identical(&one_by_one, &render(frames)), "{frames:?}");
+    }
+    assert!(!identical(&one_by_one, &on_device(&scene, &options, 52)));
+    let on_cpu_one_by_one = {
+        let mut renderer = cpu::Renderer::new(&world, &options, Batching::default());
+        (0..53).for_each(|_| drop(renderer.draw_sample()));
+        renderer.picture()
+    };
+    assert!(identical(&on_cpu_one_by_one, &on_cpu(&scene, &options, 53)));
+    assert_silent(&context);
+}
+
+#[test]
+fn batches_and_bands_change_no_bit() {
+    let (scene, options, context) = (scenes::mixed(), options(31, 80, 5), device());
+    let world = world_of(&scene);
+    let whole = on_device(&scene, &options, 20);
+    for capacity in [100, 1000, 31 * 80 * 16] {
+        let renderer = Renderer::with_queue_capacity(context.clone(), &world, &options, capacity);
+        assert!(identical(&whole, &draw(&mut renderer.expect("a renderer"), 20)), "a queue for {capacity} paths");
+    }
+    let narrow = pretended(DeviceOverrides { storage_range: Some(31 * 25 * 128), ..DeviceOverrides::default() });
+    let mut renderer = BandedRenderer::new(narrow.clone(), &world, &options).expect("a renderer");
+    assert!(renderer.n_bands() > 3);
+    renderer.draw(20, || ()).expect("a picture");
+    assert!(identical(&whole, &renderer.picture().expect("a picture")));
+    let whole = on_cpu(&scene, &options, 20);
+    for n_pixels in [1, 100] {
+        let batching = Batching { n_pixels, ..Batching::default() };
+        let in_batches = on_cpu_in_batches(&scene, &options, 20, batching);
+        assert!(identical(&whole, &in_batches), "batches of {n_pixels} pixels");
+    }
+    [&context, &narrow].into_iter().for_each(|context| assert_silent(context));
+}
+
+#[test]
+fn a_crop_is_a_part_of_the_whole() {
+    let (scene, options) = (scenes::mixed_outdoors(), options(61, 47, 4));
+    let lens = PathOptions { aperture: 0.1, filter: PixelFilter::Gaussian, ..PathOptions::default() };
+    let options = RenderOptions { paths: lens, ..options };
+    let crop = Crop { x0: 13, y0: 9, x1: 50, y1: 31 };
+    for render in [on_device as fn(&_, &_, _) -> Picture, on_cpu] {
+        let whole = render(&scene, &options, 5);
+        let part = render(&scene, &RenderOptions { crop: Some(crop), ..options.clone() }, 5);
+        let pixels = (crop.y0..crop.y1).flat_map(|y| (crop.x0..crop.x1).map(move |x| (y * 61 + x) as usize));
+        let (radiance, display) = pixels.map(|i| (whole.radiance[i], whole.display[i])).unzip();
+        assert!(identical(&Picture { width: 37, height: 22, radiance, display }, &part));
+    }
+}
+
+/// Rays and segments that stall go on in further dispatches.
+#[test]
+fn a_limit_of_loop_turns_changes_no_bit() {
+    let (scene, options) = (scenes::mixed(), options(24, 18, 4));
+    let overrides = DeviceOverrides { loop_limit: Some(400), n_stall_slots: Some(50), ..DeviceOverrides::default() };
+    let context = pretended(overrides);
+    let mut renderer = Renderer::new(context.clone(), &world_of(&scene), &options).expect("a renderer");
+    assert!(identical(&draw(&mut renderer, 5), &on_device(&scene, &options, 5)));
+    assert_silent(&context);
+}
+
+/// A closed box whose walls give off 1 - r and reflect r of the light: every point has the radiance 1, of which each
+/// bounce brings its share of the geometric series. It is the same for all ways of sampling, and after roulette.
+#[test]
+fn light_in_a_closed_box_is_a_geometric_series() {
+    let reflectance = 0.75;
+    let mut scene = scenes::empty();
+    let walls = Material { ke: Vec3::splat(1.0 - reflectance), ..scenes::diffuse(Vec3::splat(reflectance)) };
+    scenes::add(&mut scene, scenes::room(1.0), walls);
+    scene.camera.eye = vec3(0.1, 0.2, 0.3);
+    scene.camera.target = vec3(0.7, -0.4, 0.5);
+    for max_depth in [1, 2, 3, 64] {
+        let picture = on_cpu(&scene, &options(32, 32, max_depth), 64);
+        let (mean, error) = mean_of(&picture);
+        let expected = 1.0 - reflectance.powi(max_depth as i32 + 1);
+        assert!(
+            (mean - expected).abs().max_element() < (4.0 * error).max(1e-5),
+            "{max_depth}: {mean}, {expected} +- {error}"
+        );
+        assert!(error < 0.01, "{max_depth}: {error}");
+        // The test can fail: without the last bounce there is less.
+        assert!(max_depth > 9 || (mean - (1.0 - reflectance.powi(max_depth as i32))).x > 5.0 * error);
+    }
+}
+
+/// A sphere that reflects half of the light, in a white environment, is grey: it does not see itself.
+#[test]
+fn a_grey_sphere_in_a_furnace_is_grey() {
+    let mut scene = scenes::empty();
+    scenes::add(&mut scene, scenes::smooth_sphere(40, 1.0, Vec3::ZERO), scenes::diffuse(Vec3::splat(0.5)));
+    scene.background = Vec3::ONE;
+    scene.camera.eye = vec3(0.0, 0.0, 3.0);
+    scene.camera.projection = Projection::Perspective { vertical_fov_degrees: 20.0 };
+    let picture = on_cpu(&scene, &options(32, 32, 3), 64);
+    let (mean, error) = mean_of(&picture);
+    assert!((mean - 0.5).abs().max_element() < 4.0 * error.max(5e-4), "{mean} +- {error}");
+}
+
+/// Four times the samples halve the error, or better: the samples of a pixel are spread evenly.
+#[test]
+fn the_error_falls_with_the_number_of_samples() {
+    let scene = scenes::mixed_outdoors();
+    let options = options(48, 36, 4);
+    let truth = on_cpu(&scene, &options, 1024);
+    let error = |n_samples| {
+        let picture = on_cpu(&scene, &options, n_samples);
+        let squared = |(a, b): (&[f32; 4], &[f32; 4])| (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f32>();
+        (picture.radiance.iter().zip(&truth.radiance).map(squared).sum::<f32>() / truth.radiance.len() as f32).sqrt()
+    };
+    let errors = [4, 16, 64].map(error);
+    for pair in errors.windows(2) {
+        let ratio = pair[0] / pair[1];
+        assert!(ratio > 1.7, "{errors:?}");
+    }
+}
+
+/// With a lens, what is at the distance of sharpness has an edge of the width of a pixel, and what is farther has none.
+#[test]
+fn a_lens_blurs_what_is_out_of_focus() {
+    let mut scene = scenes::empty();
+    let corner = |x: f32, y: f32| vec3(x, y, 0.0);
+    let half_plane = meshes::triangle(corner(0.0, -90.0), corner(0.0, 90.0), corner(-90.0, 0.0));
+    scenes::add(&mut scene, vec![half_plane], scenes::emissive(Vec3::ONE));
+    scene.camera.eye = vec3(0.0, 0.0, 4.0);
+    scene.camera.target = Vec3::ZERO;
+    let n_grey = |paths| {
+        let picture = on_cpu(&scene, &RenderOptions { paths, ..options(40, 30, 1) }, 64);
+        picture.radiance.iter().filter(|pixel| (0.05..0.95).contains(&pixel[0])).count()
+    };
+    let sharp = PathOptions { filter: PixelFilter::Box, ..PathOptions::default() };
+    let [pinhole, focused] = [0.0, 0.4].map(|aperture| n_grey(PathOptions { aperture, ..sharp }));
+    let blurred = n_grey(PathOptions { aperture: 0.4, focus: Some(2.0), ..sharp });
+    assert!(pinhole <= 60 && focused <= 60 && blurred > 150, "{pinhole}, {focused}, {blurred}");
+}

@@ -1,0 +1,94 @@
+"""Builds a scene for Mitsuba 3, and renders it."""
+
+import mitsuba as mi
+import numpy as np
+
+from .description import Diffuse, Emitting, Glass, Metal
+
+mi.set_variant("llvm_ad_rgb", "scalar_rgb")
+
+
+def rgb(colour):
+    return {"type": "rgb", "value": [float(part) for part in colour]}
+
+
+def bsdf(material):
+    match material:
+        case Diffuse(texture=None):
+            return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": rgb(material.reflectance)}}
+        case Diffuse():
+            texture = {"type": "bitmap", "filename": material.texture, "filter_type": "bilinear"}
+            return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": texture}}
+        case Emitting():
+            return {"type": "diffuse", "reflectance": rgb((0, 0, 0))}
+        case Metal():
+            conductor = {"type": "roughconductor", "material": "none", "distribution": "ggx", "alpha": material.alpha}
+            return {"type": "twosided", "bsdf": conductor}
+        case Glass():
+            return {"type": "roughdielectric", "distribution": "ggx", "alpha": material.alpha, "int_ior": material.ior}
+
+
+def both_sides(mesh):
+    """Emitters shine from their front alone. So each triangle is there twice, a hair's breadth apart."""
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    normal = np.cross(b - a, c - a)
+    aside = 1e-5 * normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    front, back = np.stack([a, b, c], 1) + aside[:, None], np.stack([a, c, b], 1) - aside[:, None]
+    vertices = np.concatenate([front, back]).reshape(-1, 3)
+    return vertices, np.arange(len(vertices)).reshape(-1, 3)
+
+
+def shape(mesh):
+    vertices, faces = (mesh.vertices, mesh.faces)
+    properties = mi.Properties()
+    properties["bsdf"] = mi.load_dict(bsdf(mesh.material))
+    if isinstance(mesh.material, Emitting):
+        vertices, faces = both_sides(mesh)
+        properties["emitter"] = mi.load_dict({"type": "area", "radiance": rgb(mesh.material.radiance)})
+    made = mi.Mesh(mesh.name, len(vertices), len(faces), props=properties, has_vertex_texcoords=mesh.uvs is not None)
+    parameters = mi.traverse(made)
+    parameters["vertex_positions"] = np.ravel(vertices).astype(np.float32)
+    parameters["faces"] = np.ravel(faces).astype(np.uint32)
+    if mesh.uvs is not None:
+        # Here v points down.
+        parameters["vertex_texcoords"] = np.ravel(mesh.uvs * [1, -1] + [0, 1]).astype(np.float32)
+    parameters.update()
+    return made
+
+
+def build(scene):
+    camera = mi.ScalarTransform4f().look_at(list(scene.eye), list(scene.target), [0, 1, 0])
+    parts = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": scene.max_depth + 1, "rr_depth": 5},
+        "sensor": {
+            "type": "perspective",
+            "to_world": camera,
+            "fov": float(scene.vertical_fov),
+            "fov_axis": "y",
+            "film": {
+                "type": "hdrfilm", "width": scene.size, "height": scene.size, "pixel_format": "rgb",
+                "rfilter": {"type": "box"},
+            },
+            "sampler": {"type": "independent"},
+        },
+    }  # fmt: skip
+    for mesh in scene.meshes:
+        parts[mesh.name] = shape(mesh)
+    for i, light in enumerate(scene.lights):
+        parts[f"light{i}"] = {
+            "type": "sphere", "center": list(light.centre), "radius": light.radius,
+            "emitter": {"type": "area", "radiance": rgb(light.radiance)},
+        }  # fmt: skip
+    if scene.environment is not None:
+        parts["sky"] = {"type": "envmap", "bitmap": mi.Bitmap(scene.environment), "to_world": ENVIRONMENT_TO_WORLD}
+    return mi.load_dict(parts)
+
+
+# Turns the middle column of the picture to where kdray has it.
+ENVIRONMENT_TO_WORLD = mi.ScalarTransform4f().rotate([0, 1, 0], 0)
+
+
+def render(built, n_samples, seed):
+    """Returns the radiance as a height x width x 3 array."""
+    return np.asarray(mi.render(built, spp=n_samples, seed=seed), np.float64)

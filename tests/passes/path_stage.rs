@@ -1,0 +1,118 @@
+//! A scene on a device with the passes of paths, of which tests run one at a time.
+
+use std::{sync::Arc, thread};
+
+use kdray::{
+    accel::kdtree::{BuildOptions, TraversalLinks},
+    buffers::{Needs, PathQueue, Resources},
+    frame::{Denoise, Integrator, RenderOptions},
+    gpu::{Commands, Context},
+    layout::{Batch, Bounce, Frame, Hit, PathRay},
+    passes::PathPasses,
+    reference::{inputs::KernelInputs, path_begin::path_begin, path_trace},
+    world::{FlatScene, World},
+};
+
+use super::stage::FIRST;
+use crate::support::device;
+
+pub struct PathStage {
+    pub world: World,
+    pub links: TraversalLinks,
+    pub options: RenderOptions,
+    pub resources: Resources,
+    pub passes: PathPasses,
+    pub context: Arc<Context>,
+}
+
+impl PathStage {
+    /// Makes a stage for a picture of 40 x 30 pixels, of which a frame draws `2^samples_log2` samples.
+    pub fn new(scene: FlatScene, samples_log2: u32) -> Self {
+        let (integrator, denoise) = (Integrator::Path, Denoise::Off);
+        let size = RenderOptions { width: 40, height: 30, ..RenderOptions::default() };
+        let options = RenderOptions { integrator, denoise, max_depth: 3, ..size };
+        let context = device();
+        let world = World::of_flat(scene, &BuildOptions::default()).expect("a world");
+        let mut constants = Frame { queue_capacity: 1200 << samples_log2, ..world.frame_constants(&options) };
+        constants.samples_log2 = samples_log2;
+        constants.set_view(&world.scene().camera, world.bounds(), 0);
+        let needs = Needs { constants: &constants, options: &options, n_bounces: constants.max_depth as usize };
+        let resources = Resources::new(&context, &world, &needs).expect("resources");
+        let links = TraversalLinks::of(world.accel(), options.traversal);
+        let passes = PathPasses::new(&context, &resources.bindings, &options).expect("passes");
+        Self { world, links, options, resources, passes, context }
+    }
+
+    /// Returns the twin's inputs for the same scene.
+    pub fn inputs(&self) -> KernelInputs<'_> {
+        KernelInputs::new(&self.world, self.frame()).with_links(&self.links)
+    }
+
+    pub fn frame(&self) -> &Frame {
+        self.resources.constants()
+    }
+
+    pub fn paths(&self) -> &PathQueue {
+        self.resources.paths.as_ref().expect("the frame traces paths")
+    }
+
+    /// Binds the descriptor set, records the commands and runs them.
+    pub fn run(&self, record: impl FnOnce(&Commands)) {
+        let body = |commands: &Commands| {
+            self.resources.bind(commands);
+            record(commands);
+        };
+        self.context.run("test", body).expect("the commands run");
+    }
+
+    /// Does what [`PathStage::run`] does for a kernel whose rays can stall: repeats it until all have ended.
+    pub fn trace(&self, batch: &Batch) {
+        let stalls = &self.resources.accel.stalls;
+        self.run(|commands| {
+            stalls.reset(commands);
+            self.passes.path_trace.record(commands, &self.resources, batch);
+        });
+        let resumed = stalls.finish(&self.context, |commands, round| {
+            self.resources.bind(commands);
+            let batch = Batch { round: round.constant(), ..*batch };
+            self.passes.path_trace.record(commands, &self.resources, &batch);
+        });
+        resumed.expect("all rays end");
+    }
+
+    /// Uploads rows of bounces with these numbers of paths, and clears the counters.
+    pub fn set_n_paths(&self, n_paths: &[u32]) {
+        let mut rows = vec![Bounce::of_paths(0, self.frame()); self.frame().max_depth as usize];
+        let mut before = 0;
+        for (row, &n) in rows.iter_mut().zip(n_paths) {
+            row.set_paths(n, before, self.frame());
+            before = n;
+        }
+        self.resources.bounces.upload(&rows).expect("bounces");
+        self.context.run("clear", |commands| self.resources.clear_counters(commands)).expect("cleared counters");
+    }
+
+    /// The batch of all pixels.
+    pub fn batch(&self) -> Batch {
+        Batch { n_pixels: 1200, ..FIRST }
+    }
+
+    /// Returns the twin's camera rays of all paths, and their hits.
+    pub fn rays_and_hits(&self) -> (Vec<PathRay>, Vec<Hit>) {
+        let n = 1200 << self.frame().samples_log2;
+        let mut rays = vec![PathRay { pixel_ix: 0, ..super::stage::UNTOUCHED_RAY }; n];
+        path_begin(self.frame(), &self.batch(), &mut rays);
+        let all: Vec<u32> = (0..n as u32).collect();
+        let mut hits = vec![super::stage::UNTOUCHED_HIT; n];
+        path_trace::closest_hits(&self.inputs(), self.options.traversal, &all, &rays, &mut hits);
+        (rays, hits)
+    }
+}
+
+/// Fails the test if the validation layer reported messages.
+impl Drop for PathStage {
+    fn drop(&mut self) {
+        let messages = self.context.validation_messages();
+        assert!(messages.is_empty() || thread::panicking(), "{} messages: {}", messages.len(), messages.join("\n"));
+    }
+}
