@@ -45,6 +45,9 @@ pub struct Renderer {
     context: Arc<Context>,
     world: World,
     camera: Camera,
+    /// The options as the caller has set them.
+    asked: RenderOptions,
+    /// The options that are in use ([`in_use`]).
     options: RenderOptions,
     budget: QueueSizing,
     resources: Resources,
@@ -99,7 +102,7 @@ impl Renderer {
         fixed_capacity: Option<u32>,
     ) -> Result<Self, GpuError> {
         let scene = world.scene();
-        let options = &in_use(options);
+        let (asked, options) = (options.clone(), &in_use(options));
         let both = MATERIAL_REFLECT | MATERIAL_REFRACT;
         let branches = scene.materials.iter().any(|material| material.flags & both == both);
         let mut constants = world.frame_constants(options);
@@ -120,6 +123,7 @@ impl Renderer {
             context,
             world: world.clone(),
             camera,
+            asked,
             options,
             budget,
             resources,

@@ -33,8 +33,9 @@ impl Renderer {
         self.n_samples
     }
 
+    /// The options as the caller has set them.
     pub fn options(&self) -> &RenderOptions {
-        &self.options
+        &self.asked
     }
 
     /// Sets the picture's size, pixels, and removes its crop. If either changes, the next sample is the first of a
@@ -44,7 +45,7 @@ impl Renderer {
     /// The picture exceeds the device's limits or memory. Then nothing has changed, and a pending sample stays
     /// pending.
     pub fn resize(&mut self, width: u32, height: u32) -> Result<(), GpuError> {
-        let options = RenderOptions { width, height, crop: None, ..self.options.clone() };
+        let options = RenderOptions { width, height, crop: None, ..self.asked.clone() };
         self.remake(&options)
     }
 
@@ -57,7 +58,7 @@ impl Renderer {
     /// # Errors
     /// The part exceeds the device's limits or memory. Then nothing has changed.
     pub fn set_crop(&mut self, crop: Crop) -> Result<(), GpuError> {
-        self.remake(&RenderOptions { crop: Some(crop), ..self.options.clone() })
+        self.remake(&RenderOptions { crop: Some(crop), ..self.asked.clone() })
     }
 
     /// Sets the options of the next samples. Only kernels that depend on a changed option are created again. Samples
@@ -90,9 +91,9 @@ impl Renderer {
     /// Creates the buffers and kernels that the changed options need, and then installs them by steps that cannot
     /// fail.
     fn remake(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
-        let options = &in_use(options);
+        let (asked, options) = (options.clone(), &in_use(options));
         if options.integrator != self.options.integrator {
-            return self.replace(options);
+            return self.replace(&asked);
         }
         let (context, before) = (&self.context, &self.options);
         let mut constants = *self.resources.constants();
@@ -112,7 +113,7 @@ impl Renderer {
                 (self.resources, self.schedule) = (resources, schedule);
             }
         }
-        (self.passes, self.options) = (passes, options.clone());
+        (self.passes, self.options, self.asked) = (passes, options.clone(), asked);
         Ok(())
     }
 

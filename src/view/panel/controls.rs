@@ -7,7 +7,7 @@ use egui::{ComboBox, DragValue, Grid, Slider, SliderClamping, Ui};
 use super::Settings;
 use crate::{
     accel::{AccelKind, kdtree::Traversal},
-    frame::{Denoise, Primary, Tonemap, View},
+    frame::{Denoise, Integrator, Primary, Tonemap, View},
     scene::Projection,
     view::controller::FOV_DEGREES,
 };
@@ -22,7 +22,8 @@ pub fn show(ui: &mut Ui, settings: &mut Settings, projection: &mut Projection, a
             row(ui, "brightness", |ui| ui.add(Slider::new(gain, 0.01..=100.0).logarithmic(true)));
         }
         lens(ui, projection);
-        row(ui, "max depth", |ui| ui.add(Slider::new(&mut options.max_depth, 1..=16)));
+        choice(ui, "integrator", &mut options.integrator, Integrator::ALL);
+        row(ui, "max depth", |ui| ui.add(Slider::new(&mut options.max_depth, 1..=32)));
         row(ui, "samples", |ui| ui.add(Slider::new(max_samples, 1..=4096).logarithmic(true)));
         row(ui, "exposure", |ui| ui.add(Slider::new(&mut options.exposure, 0.01..=100.0).logarithmic(true)));
         choice(ui, "tone curve", &mut options.tonemap, Tonemap::ALL);
@@ -30,7 +31,9 @@ pub fn show(ui: &mut Ui, settings: &mut Settings, projection: &mut Projection, a
         if accel == AccelKind::KdTree {
             choice(ui, "traversal", &mut options.traversal, Traversal::ALL);
         }
-        choice(ui, "primary rays", &mut options.primary, Primary::ALL);
+        if options.integrator == Integrator::Whitted {
+            choice(ui, "primary rays", &mut options.primary, Primary::ALL);
+        }
         row(ui, "budget, ms", |ui| ui.add(Slider::new(budget_ms, 1.0..=200.0).logarithmic(true)));
         row(ui, "vsync", |ui| ui.checkbox(vsync, ""));
     });
