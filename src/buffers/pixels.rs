@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::{
     frame::{Integrator, Primary, RenderOptions},
     gpu::{Buffer, BufferUse, Context, GpuError, Target, TargetKind},
-    layout::{Feature, Frame},
+    layout::{Feature, Frame, MOST_SAMPLES_LOG2},
 };
 
 /// Sums of samples for which each pixel of a frame of paths has room at least. They are enough for 4096 samples.
@@ -72,6 +72,16 @@ impl Pixels {
         let widest = if options.features { size_of::<Feature>() } else { 0 };
         let sums = if options.integrator == Integrator::Path { SUMS_OF_PATHS * size_of::<[f32; 4]>() } else { 0 };
         widest.max(sums).max(size_of::<[f32; 4]>()).max(size_of::<u64>()) as u64
+    }
+
+    /// Returns the bytes that a pixel of a frame of paths takes for a picture of `n_samples` samples without a noise
+    /// filter: the mean, the sums, and the colour for display. The memory of the paths themselves does not grow with the
+    /// picture.
+    pub fn bytes_per_pixel_of_paths(n_samples: u32) -> u64 {
+        let frames = n_samples >> MOST_SAMPLES_LOG2;
+        // The sums before the last frame, one for each bit of their number, and that of the last frame.
+        let n_sums = u64::from(frames.saturating_sub(1).checked_ilog2().map_or(0, |log2| log2 + 1) + 1);
+        (1 + n_sums) * size_of::<[f32; 4]>() as u64 + size_of::<u32>() as u64
     }
 
     /// Whether the buffers and images are large enough for the frame, and exist only if the frame uses them.

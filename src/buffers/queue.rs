@@ -19,6 +19,10 @@ pub struct PathQueue {
 }
 
 impl PathQueue {
+    /// Bytes that a path takes, with its ray and hit, whether it goes on, and its places in both lists.
+    pub const BYTES_PER_PATH: usize =
+        size_of::<PathRay>() + size_of::<Hit>() + size_of::<PathState>() + size_of::<Segment>() + 3 * size_of::<u32>();
+
     /// Makes the buffers for `capacity` paths.
     ///
     /// # Errors

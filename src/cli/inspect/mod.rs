@@ -5,6 +5,7 @@ mod text;
 
 use kdray::{
     accel::Statistics,
+    buffers::{PathQueue, Pixels},
     engine::choices::{BuildPolicy, Processor, Request, Workload},
     gpu::GpuError,
     layout::{LIGHT_DIRECTIONAL, LIGHT_SPOT, Light},
@@ -51,6 +52,7 @@ pub fn run(args: &InspectArgs) -> Result<(), CliError> {
         lights: scene.lights.iter().map(LightUse::from).collect(),
         contents,
         texture_memory: TextureMemory::from(&scene.textures),
+        path_memory: PathMemory::of_samples(scene.defaults.of_paths.samples),
         accel: statistics,
         load_ms,
         build_ms,
@@ -76,11 +78,35 @@ struct Inspection {
     #[serde(flatten)]
     contents: Contents,
     texture_memory: TextureMemory,
+    path_memory: PathMemory,
     /// Statistics of the acceleration structure, serialized under the key `tree` or `grid`.
     #[serde(flatten)]
     accel: Statistics,
     load_ms: f64,
     build_ms: f64,
+}
+
+/// The memory on a device that `--integrator path` takes beside the scene.
+#[derive(Serialize)]
+struct PathMemory {
+    samples: u32,
+    bytes_per_path: usize,
+    bytes_per_pixel: u64,
+}
+
+impl PathMemory {
+    fn of_samples(samples: u32) -> Self {
+        let bytes_per_pixel = Pixels::bytes_per_pixel_of_paths(samples);
+        Self { samples, bytes_per_path: PathQueue::BYTES_PER_PATH, bytes_per_pixel }
+    }
+
+    fn text(&self) -> String {
+        let rows = [
+            ["a path; the most at a time are 2 million".to_owned(), self.bytes_per_path.to_string()],
+            [format!("a pixel, with {} samples", self.samples), self.bytes_per_pixel.to_string()],
+        ];
+        table(["path tracing on a device", "bytes"], &rows)
+    }
 }
 
 #[derive(Serialize)]
@@ -153,7 +179,9 @@ impl Inspection {
         text.push('\n');
         text += &self.accel_text();
         text.push('\n');
-        text + &text::contents(&self.contents, &self.materials, &self.lights, &self.texture_memory)
+        text += &text::contents(&self.contents, &self.materials, &self.lights, &self.texture_memory);
+        text.push('\n');
+        text + &self.path_memory.text()
     }
 
     fn accel_text(&self) -> String {
