@@ -135,6 +135,14 @@
 #define MATERIAL_SOLID 32u
 // `Material.flags`: the surface shows `kd` and `ke` without any light.
 #define MATERIAL_UNLIT 64u
+// `Material.flags`: the path tracer adds no light that bounces between microfacets more than once.
+#define MATERIAL_SINGLE_SCATTERING 128u
+// `Material.flags`: for the path tracer, the metal has the complex index of refraction `conductor_eta` +
+// i `conductor_k`. Without this flag, its reflectance follows from the base colour.
+#define MATERIAL_CONDUCTOR 256u
+// `Material.flags`: for the path tracer, the width of the distribution of microfacets' normals follows from Phong's
+// exponent `ns`, not from `roughness`.
+#define MATERIAL_PHONG_WIDTH 512u
 
 // Roughness up to which a microfacet surface reflects rays as a mirror does.
 #define MIRROR_ROUGHNESS 0.1
@@ -143,6 +151,14 @@
 // Lower bound of the width of a distribution of microfacets, the squared roughness. It keeps highlights of point lights
 // finite.
 #define LEAST_MICROFACET_WIDTH 0.002
+// Width of a distribution of microfacets below which the path tracer takes a surface for perfectly smooth. It is that
+// of the roughness 0.03.
+#define LEAST_ROUGH_WIDTH 0.001
+// Relative difference of two indices of refraction below which the path tracer takes them for equal. The light that
+// passes is then not bent. Otherwise, rounding would blur the microfacet that bends a direction into another one.
+#define LEAST_INDEX_STEP 0.01
+// Lower bound of the roughness of sheen. Below, sheen would be a line at the horizon.
+#define LEAST_SHEEN_ROUGHNESS 0.25
 // Opacity below which light passes through a see-through surface on its way to another hit. A shadow ray cannot be
 // weakened, only stopped.
 #define LEAST_SHADOWING_OPACITY 0.5
@@ -309,7 +325,7 @@ struct GridCell {
     uint count;
 };
 
-// A material, 112 bytes. The members are named as in Wavefront MTL, but for the last five.
+// A material, 160 bytes. The members up to `tf` are named as in Wavefront MTL.
 //
 // - `ka`, `kd`, `ks`: ambient, diffuse and specular reflectance.
 // - `ns`: exponent of the Phong highlight.
@@ -320,6 +336,11 @@ struct GridCell {
 // - `tf`: weight of refracted light by colour.
 // - `transmission`, `metallic`, `roughness`: of microfacets (microfacet.glsl), 0..1.
 // - `absorption`: of light in the solid behind the surface, by colour (per world unit).
+// - `clearcoat`: share of the surface that a clear layer covers, 0..1. `clearcoat_roughness`: of this layer, 0..1.
+// - `sheen_colour`, `sheen_roughness`: reflectance and roughness (0..1) of the sheen of cloth.
+// - `conductor_eta`, `conductor_k`: complex index of refraction of a metal with `MATERIAL_CONDUCTOR`, by colour.
+//
+// The path tracer alone shows clearcoat, sheen and conductors (bsdf/bsdf.glsl).
 //
 // With microfacets, `kd` is the base colour, `ks` a factor on the reflectance of a dielectric, and `ka` the share of
 // ambient light that reaches the surface.
@@ -337,8 +358,14 @@ struct Material {
     vec3 absorption;
     float metallic;
     float roughness;
+    float clearcoat;
+    float clearcoat_roughness;
+    float sheen_roughness;
+    vec3 sheen_colour;
     uint reserved0;
+    vec3 conductor_eta;
     uint reserved1;
+    vec3 conductor_k;
     uint reserved2;
 };
 

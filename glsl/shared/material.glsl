@@ -7,6 +7,7 @@
 #include "scene.glsl"
 #include "surface.glsl"
 #include "microfacet.glsl"
+#include "fresnel.glsl"
 
 layout(std430, set = 0, binding = BIND_MATERIALS) readonly buffer MaterialsBlock { Material materials[]; };
 
@@ -82,26 +83,6 @@ bool can_show(Material material, vec3 normal, vec3 to_viewer, vec3 to_light) {
     if (!is_microfacet(material) && any(greaterThan(diffuse, vec3(LEAST_REFLECTANCE)))) return true;
     vec3 reflectance = reflectance_of(material, normal, to_viewer, to_light) * local_weight(material);
     return any(greaterThan(reflectance, vec3(LEAST_REFLECTANCE)));
-}
-
-// Unpolarized Fresnel reflectance of a smooth dielectric; 1 in total internal reflection. cos_in: above 0. cos_out:
-// from refraction_cosine. eta: refractive index on the ray's side divided by that beyond the surface.
-float fresnel(float cos_in, float cos_out, float eta) {
-    if (cos_out <= 0.0) return 1.0;
-    float parallel = (cos_in - eta * cos_out) / (cos_in + eta * cos_out);
-    float perpendicular = (eta * cos_in - cos_out) / (eta * cos_in + cos_out);
-    return 0.5 * (parallel * parallel + perpendicular * perpendicular);
-}
-
-// Cosine between the refracted ray and the normal by Snell's law; 0 in total internal reflection.
-float refraction_cosine(float cos_in, float eta) {
-    return sqrt(max(0.0, 1.0 - eta * eta * (1.0 - cos_in * cos_in)));
-}
-
-// The direction, mirrored at the surface if it points to the wrong side, which an interpolated normal can cause.
-// side: the unit normal that points to the side on which the direction has to be.
-vec3 keep_side(vec3 direction, vec3 side) {
-    return direction - 2.0 * min(dot(direction, side), 0.0) * side;
 }
 
 // How a ray of this direction continues from a surface of microfacets. What is transmitted is not spread, however rough

@@ -18,13 +18,13 @@ fn microfacet_width(material: &Material) -> f32 {
 }
 
 /// The dielectric's reflectance for light along the normal.
-fn normal_reflectance(material: &Material) -> Vec3 {
+pub fn normal_reflectance(material: &Material) -> Vec3 {
     let ratio = (material.ni - 1.0) / (material.ni + 1.0);
     (ratio * ratio * material.ks).min(Vec3::ONE)
 }
 
 /// Schlick's weight of the reflectance at grazing angles.
-fn grazing_weight(cosine: f32) -> f32 {
+pub fn grazing_weight(cosine: f32) -> f32 {
     let x = (1.0 - cosine).clamp(0.0, 1.0);
     x * x * x * x * x
 }

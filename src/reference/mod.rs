@@ -13,7 +13,8 @@
 //! traversal   traverser: one ray by any algorithm
 //!               kdtree, leaf, slab, kd_boxes, ropes, brute and the pending_* of each algorithm; grid; candidate
 //! geometry    triangle, surface, camera; search_ray and traversal_ray: a ray in the form that searches use
-//! light       light, material, microfacet, children, display, tone_curves
+//! light       light, material, microfacet, fresnel, children, display, tone_curves
+//! scattering  bsdf: the surfaces of the path tracer
 //! textures    texture, maps, cutout
 //! inputs      the data that kernels only read
 //! counting    the same traversal with its reads counted
@@ -34,6 +35,7 @@ pub mod display;
 pub mod emitters;
 pub mod false_color;
 pub mod features;
+pub mod fresnel;
 pub mod grid;
 pub mod inputs;
 pub mod kd_boxes;

@@ -51,9 +51,9 @@ pub struct Material {
     /// Whether the file declares the material for both sides of a surface. It is only reported: both sides of every
     /// surface are always shown.
     pub is_double_sided: bool,
-    /// A clear layer above the surface. It is read, but not shaded.
+    /// A clear layer above the surface. The path tracer alone shows it, with microfacets.
     pub clearcoat: Clearcoat,
-    /// The sheen of cloth. It is read, but not shaded.
+    /// The sheen of cloth. The path tracer alone shows it, with microfacets.
     pub sheen: Sheen,
     /// Textures of the terms.
     pub maps: Maps,
@@ -77,6 +77,29 @@ pub struct Microfacet {
     pub attenuation_colour: Vec3,
     /// World units, above 0. Infinity: nothing is absorbed.
     pub attenuation_distance: f32,
+    /// Index of refraction of the metal. Without it, the metal's reflectance follows from the base colour. The path
+    /// tracer alone uses it.
+    pub conductor: Option<Conductor>,
+    /// Whether light that bounces between microfacets more than once is lost. The path tracer alone shows that light.
+    pub has_single_scattering: bool,
+}
+
+/// Complex index of refraction of a metal, by colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Conductor {
+    /// Real part, above 0.
+    pub eta: Vec3,
+    /// Imaginary part, the extinction coefficient, at least 0.
+    pub k: Vec3,
+}
+
+impl Conductor {
+    /// Returns the reflectance along the normal.
+    pub fn normal_reflectance(&self) -> Vec3 {
+        let squared = self.k * self.k;
+        let (less, more) = (self.eta - 1.0, self.eta + 1.0);
+        (less * less + squared) / (more * more + squared)
+    }
 }
 
 impl Default for Microfacet {
@@ -89,6 +112,8 @@ impl Default for Microfacet {
             is_solid: false,
             attenuation_colour: Vec3::ONE,
             attenuation_distance: f32::INFINITY,
+            conductor: None,
+            has_single_scattering: false,
         }
     }
 }

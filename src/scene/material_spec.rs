@@ -6,7 +6,7 @@ use serde::Deserialize;
 use super::{
     error::Checked,
     map_spec::MapSpec,
-    material::{Alpha, Clearcoat, Lobes, Maps, Material, Microfacet, Sheen, colour, within},
+    material::{Alpha, Clearcoat, Conductor, Lobes, Maps, Material, Microfacet, Sheen, colour, within},
 };
 
 /// A material as a file describes it. Each term may be absent.
@@ -41,7 +41,8 @@ pub(super) struct MaterialSpec {
     pub tr: Option<f32>,
     /// Illumination model, 0 to 10; where absent, 2 if Ks is not black and 1 otherwise.
     pub illum: Option<u8>,
-    /// Share of metal, 0 to 1; 0 where absent. This key and the next five make a microfacet material.
+    /// Share of metal, 0 to 1; where absent, 1 beside `conductor_eta`, and else 0. This key and the next twelve make a
+    /// microfacet material.
     pub metallic: Option<f32>,
     /// Perceived roughness, 0 to 1; 1 where absent.
     pub roughness: Option<f32>,
@@ -53,6 +54,20 @@ pub(super) struct MaterialSpec {
     pub attenuation_color: Option<[f32; 3]>,
     /// World units; infinite where absent.
     pub attenuation_distance: Option<f32>,
+    /// Share of the surface that a clear layer covers, 0 to 1; 0 where absent.
+    pub clearcoat: Option<f32>,
+    /// Perceived roughness of the clear layer, 0 to 1; 0 where absent.
+    pub clearcoat_roughness: Option<f32>,
+    /// Reflectance of the sheen of cloth; black where absent.
+    pub sheen_color: Option<[f32; 3]>,
+    /// Perceived roughness of the sheen, 0 to 1; 0 where absent.
+    pub sheen_roughness: Option<f32>,
+    /// Real part of a metal's index of refraction, above 0; needs `conductor_k`.
+    pub conductor_eta: Option<[f32; 3]>,
+    /// Imaginary part of a metal's index of refraction; needs `conductor_eta`.
+    pub conductor_k: Option<[f32; 3]>,
+    /// Whether light that bounces between microfacets more than once is lost; false where absent.
+    pub single_scattering: Option<bool>,
     /// Whether the surface shows Kd without any light; false where absent.
     pub unlit: Option<bool>,
     /// Opacity below which there is no surface.
@@ -90,8 +105,11 @@ impl MaterialSpec {
     /// Returns the material with defaults in place of absent terms, and without maps. The error says which term is out
     /// of range.
     pub fn material(&self, name: &str) -> Checked<Material> {
-        let kd = colour("Kd", self.kd, self.map_kd.as_ref().map_or(Vec3::splat(0.8), |_| Vec3::ONE))?;
         let microfacet = self.microfacet()?;
+        // The whitted integrator shows a metal by its base colour alone.
+        let metal = microfacet.and_then(|terms| terms.conductor).map(|conductor| conductor.normal_reflectance());
+        let plain = metal.unwrap_or(Vec3::splat(0.8));
+        let kd = colour("Kd", self.kd, self.map_kd.as_ref().map_or(plain, |_| Vec3::ONE))?;
         let ks_is_white = microfacet.is_some() || self.map_ks.is_some();
         let ks = colour("Ks", self.ks, if ks_is_white { Vec3::ONE } else { Vec3::ZERO })?;
         let illum = self.illum.map_or(if ks == Vec3::ZERO { 1 } else { 2 }, u32::from);
@@ -118,8 +136,14 @@ impl MaterialSpec {
             alpha: cutoff.map_or(Alpha::Coverage, Alpha::Cutout),
             is_unlit: self.unlit.unwrap_or(false),
             is_double_sided: true,
-            clearcoat: Clearcoat::default(),
-            sheen: Sheen::default(),
+            clearcoat: Clearcoat {
+                factor: within("clearcoat", self.clearcoat.unwrap_or(0.0), 0.0, 1.0)?,
+                roughness: within("clearcoat_roughness", self.clearcoat_roughness.unwrap_or(0.0), 0.0, 1.0)?,
+            },
+            sheen: Sheen {
+                colour: colour("sheen_color", self.sheen_color, Vec3::ZERO)?.min(Vec3::ONE),
+                roughness: within("sheen_roughness", self.sheen_roughness.unwrap_or(0.0), 0.0, 1.0)?,
+            },
             maps: Maps {
                 normal_scale: within("normal_scale", self.normal_scale.unwrap_or(1.0), -100.0, 100.0)?,
                 occlusion_strength: 1.0,
@@ -145,6 +169,13 @@ impl MaterialSpec {
             ("thin", self.thin.is_some()),
             ("attenuation_color", self.attenuation_color.is_some()),
             ("attenuation_distance", self.attenuation_distance.is_some()),
+            ("clearcoat", self.clearcoat.is_some()),
+            ("clearcoat_roughness", self.clearcoat_roughness.is_some()),
+            ("sheen_color", self.sheen_color.is_some()),
+            ("sheen_roughness", self.sheen_roughness.is_some()),
+            ("conductor_eta", self.conductor_eta.is_some()),
+            ("conductor_k", self.conductor_k.is_some()),
+            ("single_scattering", self.single_scattering.is_some()),
             ("map_roughness", self.map_roughness.is_some()),
             ("map_metallic", self.map_metallic.is_some()),
         ];
@@ -165,7 +196,9 @@ impl MaterialSpec {
         if !(distance > 0.0) {
             return Err(format!("attenuation_distance = {distance} is not above 0"));
         }
-        let metallic = self.metallic.unwrap_or(if self.map_metallic.is_some() { 1.0 } else { 0.0 });
+        let conductor = self.conductor()?;
+        let is_metal = self.map_metallic.is_some() || conductor.is_some();
+        let metallic = self.metallic.unwrap_or(if is_metal { 1.0 } else { 0.0 });
         Ok(Some(Microfacet {
             metallic: within("metallic", metallic, 0.0, 1.0)?,
             roughness: within("roughness", self.roughness.unwrap_or(1.0), 0.0, 1.0)?,
@@ -173,6 +206,24 @@ impl MaterialSpec {
             is_solid: transmission > 0.0 && !self.thin.unwrap_or(false),
             attenuation_colour: colour("attenuation_color", self.attenuation_color, Vec3::ONE)?.min(Vec3::ONE),
             attenuation_distance: distance,
+            conductor,
+            has_single_scattering: self.single_scattering.unwrap_or(false),
         }))
+    }
+
+    /// Returns a metal's index of refraction. One of its parts without the other is an error.
+    fn conductor(&self) -> Checked<Option<Conductor>> {
+        let (eta, k) = match (self.conductor_eta, self.conductor_k) {
+            (None, None) => return Ok(None),
+            (Some(eta), Some(k)) => (eta, k),
+            (Some(_), None) => return Err("has conductor_eta and no conductor_k".to_owned()),
+            (None, Some(_)) => return Err("has conductor_k and no conductor_eta".to_owned()),
+        };
+        for (name, parts, least) in [("conductor_eta", eta, 0.001), ("conductor_k", k, 0.0)] {
+            for part in parts {
+                within(name, part, least, 100.0)?;
+            }
+        }
+        Ok(Some(Conductor { eta: Vec3::from_array(eta), k: Vec3::from_array(k) }))
     }
 }

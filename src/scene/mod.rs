@@ -54,7 +54,7 @@ pub use self::{
     extent::MIN_EXTENT,
     light::Light,
     look::{LightChoice, Look, Up},
-    material::{Alpha, Clearcoat, Lobes, Maps, Material, Microfacet, Sheen},
+    material::{Alpha, Clearcoat, Conductor, Lobes, Maps, Material, Microfacet, Sheen},
     mesh::Mesh,
     path::CameraPath,
     sources::{source_files, source_files_with},

@@ -122,6 +122,7 @@ pub(super) fn override_terms(material: &mut Material, spec: &MaterialSpec, state
     set(&mut material.is_unlit, stated.is_unlit, spec.unlit.is_some());
     override_opacity(material, spec, stated);
     override_microfacet(material, spec, stated);
+    override_layers(material, spec, stated);
     override_maps(material, spec, stated);
     let idle = [("Tf", spec.tf.is_some()), ("Ns", spec.ns.is_some()), ("illum", spec.illum.is_some())];
     match idle.into_iter().find(|(_, is_stated)| *is_stated && material.microfacet.is_some()) {
@@ -167,6 +168,16 @@ fn override_microfacet(material: &mut Material, spec: &MaterialSpec, stated: &Ma
     }
     set(&mut terms.attenuation_colour, stated.attenuation_colour, spec.attenuation_color.is_some());
     set(&mut terms.attenuation_distance, stated.attenuation_distance, spec.attenuation_distance.is_some());
+    set(&mut terms.conductor, stated.conductor, spec.conductor_eta.is_some());
+    set(&mut terms.has_single_scattering, stated.has_single_scattering, spec.single_scattering.is_some());
+}
+
+/// Gives a material the clear layer and the sheen that `spec` states.
+fn override_layers(material: &mut Material, spec: &MaterialSpec, stated: &Material) {
+    set(&mut material.clearcoat.factor, stated.clearcoat.factor, spec.clearcoat.is_some());
+    set(&mut material.clearcoat.roughness, stated.clearcoat.roughness, spec.clearcoat_roughness.is_some());
+    set(&mut material.sheen.colour, stated.sheen.colour, spec.sheen_color.is_some());
+    set(&mut material.sheen.roughness, stated.sheen.roughness, spec.sheen_roughness.is_some());
 }
 
 fn override_maps(material: &mut Material, spec: &MaterialSpec, stated: &Material) {

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{
-    material::{Alpha, Lobes, Maps, Material, Microfacet},
+    material::{Alpha, Conductor, Lobes, Maps, Material, Microfacet},
     texture::Texture,
 };
 
@@ -85,7 +85,26 @@ impl Material {
             terms.push(colour("attenuation_color", attenuation_colour, default.attenuation_colour));
             terms.push(number("attenuation_distance", attenuation_distance, default.attenuation_distance));
         }
+        if let Some(Conductor { eta, k }) = microfacet.conductor {
+            terms.push(colour("conductor_eta", eta, Vec3::ZERO));
+            // Both keys are needed, whatever the value.
+            terms.push(Term { key: "conductor_k", value: TermValue::Colour(k), is_default: false });
+        }
+        terms.extend(self.layer_terms());
+        terms.push(flag("single_scattering", microfacet.has_single_scattering, default.has_single_scattering));
         terms
+    }
+
+    /// Returns the terms of the layers above the surface that differ from their defaults.
+    fn layer_terms(&self) -> impl Iterator<Item = Term> {
+        let (coat, sheen) = (self.clearcoat, self.sheen);
+        let terms = [
+            number("clearcoat", coat.factor, 0.0),
+            number("clearcoat_roughness", coat.roughness, 0.0),
+            colour("sheen_color", sheen.colour, Vec3::ZERO),
+            number("sheen_roughness", sheen.roughness, 0.0),
+        ];
+        terms.into_iter().filter(|term| !term.is_default)
     }
 }
 

@@ -6,11 +6,11 @@ use rayon::prelude::*;
 use super::{Mismatch, Textures};
 use crate::{
     layout::{
-        FLAT_NORMAL, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT, Light, MATERIAL_FRESNEL, MATERIAL_MICROFACET,
-        MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SOLID, MATERIAL_SPECULAR, MATERIAL_UNLIT, Material, Triangle,
-        normal::encode_octahedral,
+        FLAT_NORMAL, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT, Light, MATERIAL_CONDUCTOR, MATERIAL_FRESNEL,
+        MATERIAL_MICROFACET, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SINGLE_SCATTERING, MATERIAL_SOLID,
+        MATERIAL_SPECULAR, MATERIAL_UNLIT, Material, Triangle, normal::encode_octahedral,
     },
-    scene::{self, Alpha, Camera, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene, Transform},
+    scene::{self, Alpha, Camera, Conductor, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene, Transform},
 };
 
 /// Scene as it is traced: everything that a frame shows, with all meshes in world space.
@@ -130,14 +130,27 @@ fn push_triangles(mesh: &Mesh, instance: &Instance, triangles: &mut Vec<Triangle
 
 impl From<&scene::Material> for Material {
     fn from(material: &scene::Material) -> Self {
-        let &scene::Material { kd, d, ks, ni, ke, is_unlit, microfacet, alpha, .. } = material;
+        let &scene::Material { kd, d, ks, ni, ke, is_unlit, microfacet, alpha, clearcoat, sheen, .. } = material;
         let unlit = if is_unlit { MATERIAL_UNLIT } else { 0 };
         let d = if alpha == Alpha::Coverage { d } else { 1.0 };
+        let layers = Self {
+            clearcoat: clearcoat.factor,
+            clearcoat_roughness: clearcoat.roughness,
+            sheen_colour: sheen.colour,
+            sheen_roughness: sheen.roughness,
+            ..Self::default()
+        };
         let Some(microfacet) = microfacet else {
             let &scene::Material { ka, tf, ns, lobes, .. } = material;
-            return Self { ka, ns, kd, d, ks, ni, ke, flags: flags_of(lobes) | unlit, tf, ..Self::default() };
+            return Self { ka, ns, kd, d, ks, ni, ke, flags: flags_of(lobes) | unlit, tf, ..layers };
         };
-        let Microfacet { metallic, roughness, transmission, is_solid, .. } = microfacet;
+        let Microfacet { metallic, roughness, transmission, is_solid, conductor, has_single_scattering, .. } =
+            microfacet;
+        let flag = |is_set: bool, flag: u32| if is_set { flag } else { 0 };
+        let solid = flag(is_solid, MATERIAL_SOLID);
+        let single = flag(has_single_scattering, MATERIAL_SINGLE_SCATTERING);
+        let conductor_flag = flag(conductor.is_some(), MATERIAL_CONDUCTOR);
+        let Conductor { eta, k } = conductor.unwrap_or_default();
         Self {
             ka: Vec3::ONE,
             ns: 1.0,
@@ -146,13 +159,15 @@ impl From<&scene::Material> for Material {
             ks,
             ni,
             ke,
-            flags: MATERIAL_MICROFACET | unlit | if is_solid { MATERIAL_SOLID } else { 0 },
+            flags: MATERIAL_MICROFACET | unlit | solid | single | conductor_flag,
             tf: Vec3::ONE,
             transmission,
             absorption: absorption(&microfacet),
             metallic,
             roughness,
-            ..Self::default()
+            conductor_eta: eta,
+            conductor_k: k,
+            ..layers
         }
     }
 }

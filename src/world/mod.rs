@@ -7,6 +7,7 @@ mod frame_constants;
 mod geometry;
 mod levels;
 mod mismatch;
+mod path_materials;
 mod texture_arrays;
 mod textured;
 
@@ -17,7 +18,8 @@ use glam::Vec3;
 #[cfg(test)]
 pub(crate) use self::texture_arrays::tests::{arrays_of, scene_of};
 pub use self::{
-    flat::FlatScene, geometry::Geometry, mismatch::Mismatch, texture_arrays::TextureArrays, textured::Textures,
+    flat::FlatScene, geometry::Geometry, mismatch::Mismatch, path_materials::path_materials,
+    texture_arrays::TextureArrays, textured::Textures,
 };
 use crate::{
     accel::{

@@ -115,7 +115,7 @@ fn materials(scene: &Scene) -> String {
 fn material_table(scene: &Scene, material: &Material, alike: &[&Material]) -> String {
     let mut keys = String::new();
     // Ka follows Kd unless it is stated.
-    let is_stated = |term: &Term| !(term.is_default && matches!(term.key, "Ka" | "unlit"));
+    let is_stated = |term: &Term| !(term.is_default && matches!(term.key, "Ka" | "unlit" | "single_scattering"));
     for term in material.terms().into_iter().filter(is_stated) {
         let value = match term.value {
             TermValue::Number(value) if value.is_finite() => number(value),

@@ -138,7 +138,7 @@ impl Reader<'_> {
         let Some(raw) = self.extension(json, "KHR_materials_clearcoat")? else { return Ok(Clearcoat::default()) };
         let Raw { factor, roughness, .. } = raw;
         if factor > 0.0 {
-            self.document.note("layers of clearcoat, which are not shown", &self.path);
+            self.document.note("layers of clearcoat, which the integrator whitted does not show", &self.path);
         }
         Ok(Clearcoat {
             factor: self.within("clearcoatFactor", factor, 0.0, 1.0)?,
@@ -150,7 +150,7 @@ impl Reader<'_> {
         let Some(raw) = self.extension(json, "KHR_materials_sheen")? else { return Ok(Sheen::default()) };
         let Raw { colour, sheen_roughness, .. } = raw;
         if colour != [0.0; 3] {
-            self.document.note("sheen, which is not shown", &self.path);
+            self.document.note("sheen, which the integrator whitted does not show", &self.path);
         }
         Ok(Sheen {
             colour: self.colour("sheenColorFactor", colour)?,

@@ -1,0 +1,21 @@
+//! Diffuse reflection: the same radiance in all directions. Directions are in the frame of the surface. Twin of
+//! `bsdf/lambert.glsl`.
+
+use std::f32::consts::PI;
+
+use glam::{Vec2, Vec3};
+
+/// Returns a direction with a density in proportion to its cosine.
+pub fn sample_lambert(u: Vec2) -> Vec3 {
+    let (radius, azimuth) = (u.x.sqrt(), 2.0 * PI * u.y);
+    Vec3::new(radius * azimuth.cos(), radius * azimuth.sin(), (1.0 - u.x).max(0.0).sqrt())
+}
+
+pub fn lambert_density(to_light: Vec3) -> f32 {
+    to_light.z.max(0.0) / PI
+}
+
+/// The reflectance towards any viewer, times the cosine.
+pub fn evaluate_lambert(reflectance: Vec3, to_light: Vec3) -> Vec3 {
+    reflectance * (to_light.z.max(0.0) / PI)
+}
