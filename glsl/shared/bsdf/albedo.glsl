@@ -20,55 +20,58 @@ vec4 roughness_powers(float roughness) {
     return vec4(roughness, squared, squared * roughness, squared * squared);
 }
 
-float loss_polynomial(float z, vec4 powers) {
-    float y = 1.8103135 + dot(vec4(17.644272, -48.685867, 54.702972, -79.665092), powers);
-    y = y * z + -3.1318867 + dot(vec4(-32.687866, 106.18821, -128.7383, 117.78883), powers);
-    y = y * z + 1.0895424 + dot(vec4(14.451166, -50.563808, 62.125889, -48.548805), powers);
-    y = y * z + 0.27177879 + dot(vec4(0.053681884, -1.788789, 7.0341892, 0.087344877), powers);
-    y = y * z + 0.0019733009 + dot(vec4(0.020006094, -0.085017398, 0.11722442, -0.032452136), powers);
+float loss_polynomial(float z, vec4 powers, float fifth) {
+    float y = 10.795775 + dot(vec4(-16.239405, 51.006134, -202.83482, 78.299561), powers) + 161.27727 * fifth;
+    y = y * z + -26.562994 + dot(vec4(49.515839, -153.49359, 573.59247, -562.10712), powers) + 9.8753901 * fifth;
+    y = y * z + 21.523111 + dot(vec4(-54.38987, 151.65544, -468.54492, 543.95184), powers) + -135.23792 * fifth;
+    y = y * z + -7.1015534 + dot(vec4(27.680758, -71.783775, 157.78279, -171.56929), powers) + 50.612175 * fifth;
+    y = y * z + 1.3948812 + dot(vec4(-6.7729173, 20.076412, -35.698917, 37.305031), powers) + -12.584991 * fifth;
+    y = y * z + -0.065100223 + dot(vec4(0.53698862, -1.8196399, 3.0541897, -2.4706855), powers) + 0.77343577 * fifth;
     return y;
 }
 
-float grazing_polynomial(float z, vec4 powers) {
-    float y = 0.17026286 + dot(vec4(-40.135624, 71.991638, 29.312443, -7.0983129), powers);
-    y = y * z + -0.99493665 + dot(vec4(91.650658, -287.85217, 151.4442, 35.913036), powers);
-    y = y * z + 1.1559658 + dot(vec4(-52.552502, 241.3324, -300.06158, 90.341942), powers);
-    y = y * z + -0.54141819 + dot(vec4(4.3573852, -17.462431, 40.811142, -18.658777), powers);
-    y = y * z + 0.17344359 + dot(vec4(-3.660898, 4.5660009, -2.5668268, 0.53247041), powers);
+float grazing_polynomial(float z, vec4 powers, float fifth) {
+    float y = -15.311678 + dot(vec4(77.970711, -616.11096, 1457.0963, -1220.7534), powers) + 398.43201 * fifth;
+    y = y * z + 34.28347 + dot(vec4(-95.196609, 811.09833, -2338.3191, 2226.7793), powers) + -709.02826 * fifth;
+    y = y * z + -27.839417 + dot(vec4(41.735516, -209.92664, 854.85785, -1024.0162), powers) + 378.24075 * fifth;
+    y = y * z + 10.974108 + dot(vec4(-33.234219, 68.285072, -130.46713, 134.6618), powers) + -53.064407 * fifth;
+    y = y * z + -2.5162318 + dot(vec4(13.853616, -45.667526, 88.942169, -74.077003), powers) + 23.311783 * fifth;
+    y = y * z + 0.26436004 + dot(vec4(-4.1400652, 5.2931671, -2.6391835, -0.070078336), powers) + 0.33687666 * fifth;
     return y;
 }
 
 // roughness: square root of the distribution's width; 0 if the surface is perfectly smooth.
 GgxAlbedo ggx_albedo(float cosine, float roughness) {
     vec4 powers = roughness_powers(roughness);
-    float z = cosine / (cosine + 2.0 * powers.y);
+    float fifth = roughness * powers.w;
+    float z = cosine / (cosine + powers.y);
     float x = clamp(1.0 - cosine, 0.0, 1.0);
-    float loss = clamp((1.0 - z) * loss_polynomial(z, powers), 0.0, 0.9);
+    float loss = clamp((1.0 - z) * loss_polynomial(z, powers, fifth), 0.0, 0.9);
     float smooth_grazing = x * x * x * x * x;
-    float grazing = smooth_grazing + (1.0 - z) * grazing_polynomial(z, powers);
+    float grazing = smooth_grazing + (1.0 - z) * grazing_polynomial(z, powers, fifth);
     return GgxAlbedo(loss, clamp(grazing, 0.0001, 1.0 - loss));
 }
 
 // The mean of `ggx_albedo` over the hemisphere, weighted by the cosine.
 GgxAlbedo mean_ggx_albedo(float roughness) {
     vec4 powers = roughness_powers(roughness);
-    float loss = roughness * (0.012756904 + dot(vec4(-0.24498497, 1.8110416, -0.72292089, -0.26957878), powers));
-    float change = -0.0036951823 + dot(vec4(-0.0077142245, -0.72144741, 1.3787318, -0.69522977), powers);
-    float grazing = 1.0 / 21.0 + roughness * change;
-    return GgxAlbedo(max(loss, 0.0), grazing);
+    float fifth = roughness * powers.w;
+    float loss = 0.000210142 + dot(vec4(-0.036332227, 0.48725173, 2.7229965, -4.1021533), powers) + 1.5190759 * fifth;
+    float change = -0.030435629 + dot(vec4(0.54656982, -3.856077, 8.7369375, -8.3240175), powers) + 2.8850048 * fifth;
+    return GgxAlbedo(max(roughness * loss, 0.0), 1.0 / 21.0 + roughness * change);
 }
 
 // Of the sheen of reflectance 1. roughness: at least LEAST_SHEEN_ROUGHNESS.
 float sheen_albedo(float cosine, float roughness) {
     vec4 powers = roughness_powers(roughness);
     float z = clamp(1.0 - cosine, 0.0, 1.0);
-    float y = 23.986086 + dot(vec4(-119.28143, 200.94769, -151.67065, 43.763714), powers);
-    y = y * z + -64.226761 + dot(vec4(329.45627, -557.09039, 422.47842, -122.59611), powers);
-    y = y * z + 68.012299 + dot(vec4(-360.90784, 617.33014, -473.15115, 138.55827), powers);
-    y = y * z + -34.929424 + dot(vec4(193.87425, -337.08887, 260.95612, -76.759003), powers);
-    y = y * z + 11.257267 + dot(vec4(-64.440125, 116.21407, -91.912369, 27.265678), powers);
-    y = y * z + -2.5927036 + dot(vec4(18.825815, -38.398308, 33.545334, -10.854482), powers);
-    y = y * z + 0.08693248 + dot(vec4(-1.1865282, 4.6127133, -4.6773009, 1.5656458), powers);
+    float y = 24.152172 + dot(vec4(-120.4353, 203.7431, -154.49158, 44.784389), powers);
+    y = y * z + -64.693489 + dot(vec4(332.72348, -565.05505, 430.55728, -125.53234), powers);
+    y = y * z + 68.502266 + dot(vec4(-364.3663, 625.81909, -481.81183, 141.72218), powers);
+    y = y * z + -35.167366 + dot(vec4(195.56726, -341.27466, 265.25433, -78.338684), powers);
+    y = y * z + 11.311654 + dot(vec4(-64.828766, 117.18, -92.910378, 27.634874), powers);
+    y = y * z + -2.5980201 + dot(vec4(18.863771, -38.492477, 33.642723, -10.890631), powers);
+    y = y * z + 0.087039657 + dot(vec4(-1.1872613, 4.6144295, -4.6789732, 1.5662416), powers);
     y = max(y, 0.01);
     return y * y;
 }

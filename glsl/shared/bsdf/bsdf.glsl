@@ -323,7 +323,7 @@ bool is_consistent(Surface surface, vec3 direction, vec3 local) {
     return dot(surface.geometric, direction) * local.z > 0.0;
 }
 
-// The sum of all lobes but the delta lobes, at a surface.
+// The sum of all lobes but the delta lobes, at a surface: what `evaluate_bsdf` and `bsdf_density` return.
 BsdfValue value_at(Material material, Surface surface, vec3 to_viewer, vec3 to_light) {
     BsdfTerms terms = bsdf_terms(material, surface, to_viewer);
     vec3 local = to_local(terms.frame, to_light);

@@ -18,58 +18,69 @@ fn roughness_powers(roughness: f32) -> Vec4 {
     Vec4::new(roughness, squared, squared * roughness, squared * squared)
 }
 
-#[rustfmt::skip]
-fn loss_polynomial(z: f32, powers: Vec4) -> f32 {
-    let y = 1.8103135 + Vec4::new(17.644272, -48.685867, 54.702972, -79.665092).dot(powers);
-    let y = y * z + -3.1318867 + Vec4::new(-32.687866, 106.18821, -128.7383, 117.78883).dot(powers);
-    let y = y * z + 1.0895424 + Vec4::new(14.451166, -50.563808, 62.125889, -48.548805).dot(powers);
-    let y = y * z + 0.27177879 + Vec4::new(0.053681884, -1.788789, 7.0341892, 0.087344877).dot(powers);
-    let y = y * z + 0.0019733009 + Vec4::new(0.020006094, -0.085017398, 0.11722442, -0.032452136).dot(powers);
+fn loss_polynomial(z: f32, powers: Vec4, fifth: f32) -> f32 {
+    let y = 10.795775 + Vec4::new(-16.239405, 51.006134, -202.83482, 78.299561).dot(powers) + 161.27727 * fifth;
+    let y =
+        y * z + -26.562994 + Vec4::new(49.515839, -153.49359, 573.59247, -562.10712).dot(powers) + 9.8753901 * fifth;
+    let y = y * z + 21.523111 + Vec4::new(-54.38987, 151.65544, -468.54492, 543.95184).dot(powers) + -135.23792 * fifth;
+    let y =
+        y * z + -7.1015534 + Vec4::new(27.680758, -71.783775, 157.78279, -171.56929).dot(powers) + 50.612175 * fifth;
+    let y =
+        y * z + 1.3948812 + Vec4::new(-6.7729173, 20.076412, -35.698917, 37.305031).dot(powers) + -12.584991 * fifth;
+    let y = y * z
+        + -0.065100223
+        + Vec4::new(0.53698862, -1.8196399, 3.0541897, -2.4706855).dot(powers)
+        + 0.77343577 * fifth;
     y
 }
 
-#[rustfmt::skip]
-fn grazing_polynomial(z: f32, powers: Vec4) -> f32 {
-    let y = 0.17026286 + Vec4::new(-40.135624, 71.991638, 29.312443, -7.0983129).dot(powers);
-    let y = y * z + -0.99493665 + Vec4::new(91.650658, -287.85217, 151.4442, 35.913036).dot(powers);
-    let y = y * z + 1.1559658 + Vec4::new(-52.552502, 241.3324, -300.06158, 90.341942).dot(powers);
-    let y = y * z + -0.54141819 + Vec4::new(4.3573852, -17.462431, 40.811142, -18.658777).dot(powers);
-    let y = y * z + 0.17344359 + Vec4::new(-3.660898, 4.5660009, -2.5668268, 0.53247041).dot(powers);
+fn grazing_polynomial(z: f32, powers: Vec4, fifth: f32) -> f32 {
+    let y = -15.311678 + Vec4::new(77.970711, -616.11096, 1457.0963, -1220.7534).dot(powers) + 398.43201 * fifth;
+    let y = y * z + 34.28347 + Vec4::new(-95.196609, 811.09833, -2338.3191, 2226.7793).dot(powers) + -709.02826 * fifth;
+    let y =
+        y * z + -27.839417 + Vec4::new(41.735516, -209.92664, 854.85785, -1024.0162).dot(powers) + 378.24075 * fifth;
+    let y = y * z + 10.974108 + Vec4::new(-33.234219, 68.285072, -130.46713, 134.6618).dot(powers) + -53.064407 * fifth;
+    let y =
+        y * z + -2.5162318 + Vec4::new(13.853616, -45.667526, 88.942169, -74.077003).dot(powers) + 23.311783 * fifth;
+    let y = y * z
+        + 0.26436004
+        + Vec4::new(-4.1400652, 5.2931671, -2.6391835, -0.070078336).dot(powers)
+        + 0.33687666 * fifth;
     y
 }
 
 /// `roughness`: square root of the distribution's width; 0 if the surface is perfectly smooth.
 pub fn ggx_albedo(cosine: f32, roughness: f32) -> GgxAlbedo {
     let powers = roughness_powers(roughness);
-    let z = cosine / (cosine + 2.0 * powers.y);
+    let fifth = roughness * powers.w;
+    let z = cosine / (cosine + powers.y);
     let x = (1.0 - cosine).clamp(0.0, 1.0);
-    let loss = ((1.0 - z) * loss_polynomial(z, powers)).clamp(0.0, 0.9);
+    let loss = ((1.0 - z) * loss_polynomial(z, powers, fifth)).clamp(0.0, 0.9);
     let smooth_grazing = x * x * x * x * x;
-    let grazing = smooth_grazing + (1.0 - z) * grazing_polynomial(z, powers);
+    let grazing = smooth_grazing + (1.0 - z) * grazing_polynomial(z, powers, fifth);
     GgxAlbedo { loss, grazing: grazing.clamp(0.0001, 1.0 - loss) }
 }
 
 /// The mean of [`ggx_albedo`] over the hemisphere, weighted by the cosine.
 pub fn mean_ggx_albedo(roughness: f32) -> GgxAlbedo {
     let powers = roughness_powers(roughness);
-    let loss = roughness * (0.012756904 + Vec4::new(-0.24498497, 1.8110416, -0.72292089, -0.26957878).dot(powers));
-    let change = -0.0036951823 + Vec4::new(-0.0077142245, -0.72144741, 1.3787318, -0.69522977).dot(powers);
-    let grazing = 1.0 / 21.0 + roughness * change;
-    GgxAlbedo { loss: loss.max(0.0), grazing }
+    let fifth = roughness * powers.w;
+    let loss = 0.000210142 + Vec4::new(-0.036332227, 0.48725173, 2.7229965, -4.1021533).dot(powers) + 1.5190759 * fifth;
+    let change = -0.030435629 + Vec4::new(0.54656982, -3.856077, 8.7369375, -8.3240175).dot(powers) + 2.8850048 * fifth;
+    GgxAlbedo { loss: (roughness * loss).max(0.0), grazing: 1.0 / 21.0 + roughness * change }
 }
 
 /// Of the sheen of reflectance 1. `roughness`: at least [`crate::layout::LEAST_SHEEN_ROUGHNESS`].
-#[rustfmt::skip]
 pub fn sheen_albedo(cosine: f32, roughness: f32) -> f32 {
     let powers = roughness_powers(roughness);
     let z = (1.0 - cosine).clamp(0.0, 1.0);
-    let y = 23.986086 + Vec4::new(-119.28143, 200.94769, -151.67065, 43.763714).dot(powers);
-    let y = y * z + -64.226761 + Vec4::new(329.45627, -557.09039, 422.47842, -122.59611).dot(powers);
-    let y = y * z + 68.012299 + Vec4::new(-360.90784, 617.33014, -473.15115, 138.55827).dot(powers);
-    let y = y * z + -34.929424 + Vec4::new(193.87425, -337.08887, 260.95612, -76.759003).dot(powers);
-    let y = y * z + 11.257267 + Vec4::new(-64.440125, 116.21407, -91.912369, 27.265678).dot(powers);
-    let y = y * z + -2.5927036 + Vec4::new(18.825815, -38.398308, 33.545334, -10.854482).dot(powers);
-    let y = y * z + 0.08693248 + Vec4::new(-1.1865282, 4.6127133, -4.6773009, 1.5656458).dot(powers);
+    let y = 24.152172 + Vec4::new(-120.4353, 203.7431, -154.49158, 44.784389).dot(powers);
+    let y = y * z + -64.693489 + Vec4::new(332.72348, -565.05505, 430.55728, -125.53234).dot(powers);
+    let y = y * z + 68.502266 + Vec4::new(-364.3663, 625.81909, -481.81183, 141.72218).dot(powers);
+    let y = y * z + -35.167366 + Vec4::new(195.56726, -341.27466, 265.25433, -78.338684).dot(powers);
+    let y = y * z + 11.311654 + Vec4::new(-64.828766, 117.18, -92.910378, 27.634874).dot(powers);
+    let y = y * z + -2.5980201 + Vec4::new(18.863771, -38.492477, 33.642723, -10.890631).dot(powers);
+    let y = y * z + 0.087039657 + Vec4::new(-1.1872613, 4.6144295, -4.6789732, 1.5662416).dot(powers);
     let y = y.max(0.01);
     y * y
 }

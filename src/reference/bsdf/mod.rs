@@ -91,9 +91,9 @@ struct InterfaceSplit {
 
 /// The scattered share of light times the cosine, and the density of its direction.
 #[derive(Clone, Copy, Debug)]
-struct BsdfValue {
-    value: Vec3,
-    density: f32,
+pub struct BsdfValue {
+    pub value: Vec3,
+    pub density: f32,
 }
 
 const BSDF_ABSORBED: BsdfSample = BsdfSample { direction: Vec3::Z, weight: Vec3::ZERO, density: 0.0, is_delta: false };
@@ -373,8 +373,8 @@ fn is_consistent(surface: &Surface, direction: Vec3, local: Vec3) -> bool {
     surface.geometric.dot(direction) * local.z > 0.0
 }
 
-/// Returns the sum of all lobes but the delta lobes, at a surface.
-fn value_at(material: &Material, surface: &Surface, to_viewer: Vec3, to_light: Vec3) -> BsdfValue {
+/// Returns the sum of all lobes but the delta lobes, at a surface: what [`evaluate_bsdf`] and [`bsdf_density`] return.
+pub fn value_at(material: &Material, surface: &Surface, to_viewer: Vec3, to_light: Vec3) -> BsdfValue {
     let terms = bsdf_terms(material, surface, to_viewer);
     let local = to_local(&terms.frame, to_light);
     if terms.choice == Vec4::ZERO || !is_consistent(surface, to_light, local) {
