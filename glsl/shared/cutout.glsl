@@ -1,7 +1,7 @@
 // Gaps: the parts of a triangle through which rays pass, since the opacity there is too low. Rays of every kind pass
 // through the gaps of a cut-out, a material that is either opaque or not there. Shadow rays also pass through the gaps
-// of a veil, a see-through material. Kernels that define RANDOM_OPACITY pass through veils at random, as often as the
-// opacity says. Twin of src/reference/cutout.rs.
+// of a veil, a see-through material. Kernels that define RANDOM_OPACITY trace paths, whose rays of all kinds pass through
+// see-through materials at random, as often as the opacity says. Twin of src/reference/cutout.rs.
 //
 // Needs nothing: it includes texture.glsl. Provides `CUTOUTS`, `SHADOW_GAPS`, `opacity_at` and `is_gap`.
 #ifndef KDRAY_CUTOUT
@@ -23,9 +23,8 @@ float random_at(uint triangle_ix, float u, float v) {
 }
 #endif
 
-// The opacity at a point of a triangle, 0..1, by the largest levels of its textures.
-float opacity_at(MaterialMaps maps, uint triangle_ix, float u, float v) {
-    float opacity = maps.opacity_factor;
+// The opacity at a point of a triangle, 0..1, by the largest levels of its textures. opacity: that of the material.
+float opacity_at(MaterialMaps maps, float opacity, uint triangle_ix, float u, float v) {
     if ((maps.flags & MAPS_CORNERS_HAVE_OPACITY) != 0u) opacity *= corner_colour_at(triangle_ix, u, v).a;
     for (uint i = 0u; i < 2u; ++i) {
         bool is_colour = i == 0u;
@@ -42,15 +41,20 @@ float opacity_at(MaterialMaps maps, uint triangle_ix, float u, float v) {
 // Whether a ray passes through a triangle at a point. passes_veils: whether the gaps of veils count, too.
 bool is_gap(uint triangle_ix, float u, float v, bool passes_veils) {
     uint material_ix = load_triangle_materials(triangle_ix);
+#ifdef RANDOM_OPACITY
+    uint kinds = MAPS_CUTOUT | MAPS_COVERAGE;
+#else
     uint kinds = passes_veils ? MAPS_CUTOUT | MAPS_VEIL : MAPS_CUTOUT;
+#endif
     if ((map_flags_of(material_ix) & kinds) == 0u) return false;
     MaterialMaps maps = maps_of(material_ix);
-    float opacity = opacity_at(maps, triangle_ix, u, v);
 #ifdef RANDOM_OPACITY
-    // A random number is below 1, so an opaque point is never a gap; at opacity 0, every point is one.
-    if ((maps.flags & MAPS_VEIL) != 0u) return random_at(triangle_ix, u, v) >= opacity;
+    if ((maps.flags & MAPS_COVERAGE) != 0u) {
+        // A random number is below 1, so an opaque point is never a gap; at opacity 0, every point is one.
+        return random_at(triangle_ix, u, v) >= opacity_at(maps, maps.coverage, triangle_ix, u, v);
+    }
 #endif
-    return opacity < maps.alpha_cutoff;
+    return opacity_at(maps, maps.opacity_factor, triangle_ix, u, v) < maps.alpha_cutoff;
 }
 
 #endif

@@ -400,6 +400,7 @@ struct Texture {
 // - `alpha_cutoff`: opacity below which rays pass through the surface, as `flags` say.
 // - `opacity_factor`: opacity of the material, by which that of its textures is multiplied.
 // - `flags`: `MAPS_CUTOUT` and its like.
+// - `coverage`: opacity of the material for rays of paths, by which that of its textures is multiplied.
 struct MaterialMaps {
     uint base_colour;
     uint opacity;
@@ -416,7 +417,7 @@ struct MaterialMaps {
     float alpha_cutoff;
     float opacity_factor;
     uint flags;
-    uint reserved;
+    float coverage;
 };
 
 // A light, 48 bytes.
@@ -469,6 +470,8 @@ struct CornerSurface {
 #define MAPS_CUTOUT 1u
 // `MaterialMaps.flags`: shadow rays, but no others, pass through the surface where its opacity is below `alpha_cutoff`.
 #define MAPS_VEIL 2u
+// `MaterialMaps.flags`: rays of paths pass through the surface at random, as often as its opacity says.
+#define MAPS_COVERAGE 16u
 // `MaterialMaps.flags`: the opacity of the base colour's texture counts.
 #define MAPS_COLOUR_HAS_OPACITY 4u
 // `MaterialMaps.flags`: the opacity of the corners' colours counts.

@@ -59,13 +59,10 @@ Segment segment_to_light(
     if (is_smooth(material)) return segment;
     LightPick pick = pick_light(surface.point_world, u);
     if (pick.light == vec3(0.0)) return segment;
-    vec3 reflected = evaluate_bsdf(material, surface, to_viewer, pick.direction);
-    if (!any(greaterThan(reflected, vec3(0.0)))) return segment;
-    float share = 1.0;
-    if (pick.density > 0.0) {
-        share = power_share(pick.density, bsdf_density(material, surface, to_viewer, pick.direction));
-    }
-    vec3 light = added_light(throughput * reflected * pick.light * share, depth + 1u);
+    BsdfValue scattered = value_at(material, surface, to_viewer, pick.direction);
+    if (!any(greaterThan(scattered.value, vec3(0.0)))) return segment;
+    float share = pick.density > 0.0 ? power_share(pick.density, scattered.density) : 1.0;
+    vec3 light = added_light(throughput * scattered.value * pick.light * share, depth + 1u);
     if (!any(greaterThan(light, vec3(0.0)))) return segment;
     float side = dot(pick.direction, surface.geometric) < 0.0 ? -surface.clearance : surface.clearance;
     vec3 origin = surface.point_world + side * surface.geometric;

@@ -269,7 +269,6 @@ impl AccelBuffers {
             .set(constants::SKIPS_HIDDEN, self.filters)
             .set(constants::MASK_WORDS, mask_words)
             .set(constants::GRID_LEVELS, n_levels)
-            .set(constants::TEXTURED, self.uploaded.material_maps_begin != NO_WORDS)
             .set(constants::TURN_BUDGET, self.stalls.turn_budget());
         self.surface_kinds.set(constants)
     }

@@ -10,9 +10,11 @@ use super::{
 use crate::{
     accel::Accel,
     frame::{Integrator, RenderOptions},
-    gpu::{Access, Binding, BindingLayout, BindingSet, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
-    layout::{self, Batch, Bounce, COUNTER_COPIES, COUNTER_STRIDE, Counters, Frame, Light, Material},
-    world::World,
+    gpu::{
+        Access, Binding, BindingLayout, BindingSet, Buffer, BufferUse, Commands, Constants, Context, Dispatch, GpuError,
+    },
+    layout::{self, constants, Batch, Bounce, COUNTER_COPIES, COUNTER_STRIDE, Counters, Frame, Light, Material},
+    world::{FlatScene, World, path_materials},
 };
 
 /// The size of the longest push constants, bytes.
@@ -114,7 +116,11 @@ impl Resources {
         let mut resources = Self {
             frame: Buffer::with(context, "frame", &[*constants], BufferUse::Uniform)?,
             vertex_indices: uses_graphics_pipeline(options).then(upload_indices).transpose()?,
-            materials: Buffer::with(context, "materials", &scene.materials, storage)?,
+            materials: if is_of_paths {
+                Buffer::with(context, "materials", &path_materials(scene), storage)?
+            } else {
+                Buffer::with(context, "materials", &scene.materials, storage)?
+            },
             lights: Buffer::with(context, "lights", &scene.lights, storage)?,
             queue,
             paths,
@@ -126,9 +132,7 @@ impl Resources {
                 context,
                 &kinds,
                 PUSH_BYTES,
-                (accel.constants())
-                    .set(layout::constants::ORTHOGRAPHIC, constants.is_orthographic == 1)
-                    .set(layout::constants::PATHS, is_of_paths),
+                kernel_constants(&accel, scene, constants, is_of_paths),
             )?,
             accel,
             set: None,
@@ -372,6 +376,17 @@ impl Resources {
     pub(crate) fn set(&self) -> &BindingSet {
         self.set.as_ref().expect("made with the resources")
     }
+}
+
+/// Returns the specialization constants of all kernels of a frame.
+fn kernel_constants(accel: &AccelBuffers, scene: &FlatScene, frame: &Frame, is_of_paths: bool) -> Constants {
+    let all = accel.constants().set(constants::ORTHOGRAPHIC, frame.is_orthographic == 1);
+    if !is_of_paths {
+        return all;
+    }
+    // All materials of paths are of microfacets.
+    let has_gaps = scene.textures.has_path_gaps();
+    all.set(constants::PATHS, true).set(constants::MICROFACETS, true).set(constants::SHADOW_GAPS, has_gaps)
 }
 
 /// Makes the queue, and what frames of paths have beside it.

@@ -13,6 +13,8 @@ use crate::{
 pub struct SurfaceKinds {
     /// Whether some materials are not those of MTL: of microfacets, or unlit.
     has_microfacets: bool,
+    /// Whether the scene has textures, or colours or opacity at corners.
+    is_textured: bool,
     /// Whether some triangles have normals at their corners.
     is_smooth: bool,
     /// Whether rays of all kinds pass through parts of triangles.
@@ -27,6 +29,7 @@ impl SurfaceKinds {
         let is_microfacet = |flags: u32| flags & (MATERIAL_MICROFACET | MATERIAL_UNLIT) != 0;
         Self {
             has_microfacets: scene.materials.iter().any(|material| is_microfacet(material.flags)),
+            is_textured: scene.textures.is_in_use(),
             is_smooth: scene.triangles.par_iter().any(|t| ![t.n0, t.n1, t.n2].contains(&FLAT_NORMAL)),
             has_cutouts: scene.textures.has_cutouts(),
             has_shadow_gaps: scene.textures.has_shadow_gaps(),
@@ -37,6 +40,7 @@ impl SurfaceKinds {
     pub fn set(&self, constants: Constants) -> Constants {
         constants
             .set(constants::MICROFACETS, self.has_microfacets)
+            .set(constants::TEXTURED, self.is_textured)
             .set(constants::SMOOTH, self.is_smooth)
             .set(constants::CUTOUTS, self.has_cutouts)
             .set(constants::SHADOW_GAPS, self.has_shadow_gaps)

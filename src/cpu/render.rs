@@ -8,7 +8,7 @@ use crate::{
     frame::{
         BounceStats, Denoise, FrameKind, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, plan::passes,
     },
-    layout::{Batch, Bounce, Feature, Frame, Hit, MOST_SAMPLES_LOG2, PathRay, SCAN_GROUP_SIZE},
+    layout::{Batch, Bounce, Feature, Frame, Hit, MOST_SAMPLES_LOG2, Material, PathRay, SCAN_GROUP_SIZE},
     reference::{
         accumulate,
         compact::{self, Parents},
@@ -20,7 +20,7 @@ use crate::{
         tonemap,
     },
     scene::Camera,
-    world::World,
+    world::{World, path_materials},
 };
 
 /// How a frame is cut into batches. The picture does not depend on it.
@@ -62,6 +62,8 @@ pub struct Renderer {
     pixel_features: Vec<Feature>,
     queue: Queue,
     paths: Paths,
+    /// The materials of paths. Empty for ray trees.
+    path_materials: Vec<Material>,
     /// The batch of paths that is drawn.
     batch: Batch,
     /// Number of rays beyond which the current batch is halved: `queue_capacity`, or no limit for one pixel.
@@ -96,6 +98,11 @@ impl Renderer {
             pixel_features: vec![Feature::default(); if options.features { n_pixels } else { 0 }],
             queue: Queue::default(),
             paths: Paths::default(),
+            path_materials: if options.integrator == Integrator::Path {
+                path_materials(world.scene())
+            } else {
+                Vec::new()
+            },
             batch: Batch::default(),
             most_rays: 0,
             batch_stats: Vec::new(),
@@ -279,8 +286,8 @@ impl Renderer {
 
     /// Finds the closest hits of the bounce's paths, tests the segments of the bounce before, and counts both.
     fn path_trace(&mut self, depth: u32) {
-        let Self { world, frame, links, paths, queue, .. } = self;
-        let inputs = KernelInputs::new(world, frame).with_links(links);
+        let Self { world, frame, links, paths, queue, path_materials, .. } = self;
+        let inputs = KernelInputs::new(world, frame).with_links(links).with_materials(path_materials);
         let trace = || paths.trace(&inputs, self.options.traversal, depth, queue);
         let (n_hits, n_segments) = self.clock.time(Pass::PathTrace, Some(depth), trace);
         if let Some(before) = self.batch_stats.last_mut() {
@@ -291,8 +298,8 @@ impl Renderer {
     }
 
     fn path_scatter(&mut self, depth: u32) {
-        let Self { world, frame, links, batch, paths, queue, .. } = self;
-        let inputs = KernelInputs::new(world, frame).with_links(links);
+        let Self { world, frame, links, batch, paths, queue, path_materials, .. } = self;
+        let inputs = KernelInputs::new(world, frame).with_links(links).with_materials(path_materials);
         self.clock.time(Pass::PathScatter, Some(depth), || paths.scatter(&inputs, batch, queue));
     }
 

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     layout::{
-        Hit, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps, NO_TEXTURE,
+        Hit, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_COVERAGE, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps, NO_TEXTURE,
     },
     world::Textures,
 };
@@ -17,10 +17,15 @@ fn finest_at(textures: &Textures, texture_ix: u32, triangle_ix: u32, [u, v]: [f3
     sample_texture(&textures.texels, map, textures.uv_at(triangle_ix, uv_set_of(map), u, v), 0.0)
 }
 
-/// The opacity at a point of a triangle, 0 to 1, by the largest levels of its textures. `at`: barycentric weights of
-/// the second and the third corner.
-pub fn opacity_at(textures: &Textures, maps: &MaterialMaps, triangle_ix: u32, at: [f32; 2]) -> f32 {
-    let mut opacity = maps.opacity_factor;
+/// The opacity at a point of a triangle, 0 to 1, by the largest levels of its textures. `opacity`: that of the material.
+/// `at`: barycentric weights of the second and the third corner.
+pub fn opacity_at(
+    textures: &Textures,
+    maps: &MaterialMaps,
+    mut opacity: f32,
+    triangle_ix: u32,
+    at: [f32; 2],
+) -> f32 {
     if maps.flags & MAPS_CORNERS_HAVE_OPACITY != 0 {
         opacity *= textures.corner_colour_at(triangle_ix, at[0], at[1]).w;
     }
@@ -43,11 +48,18 @@ fn random_at(hit: &Hit) -> f32 {
 /// passes through see-through surfaces with an opacity below `LEAST_SHADOWING_OPACITY`. `is_random`: whether it passes
 /// through them at random instead, as often as the opacity says.
 pub fn is_gap(textures: &Textures, material_ix: u32, hit: &Hit, passes_veils: bool, is_random: bool) -> bool {
-    let kinds = if passes_veils { MAPS_CUTOUT | MAPS_VEIL } else { MAPS_CUTOUT };
+    let kinds = match (is_random, passes_veils) {
+        (true, _) => MAPS_CUTOUT | MAPS_COVERAGE,
+        (false, true) => MAPS_CUTOUT | MAPS_VEIL,
+        (false, false) => MAPS_CUTOUT,
+    };
     let maps = &textures.material_maps[material_ix as usize];
     if maps.flags & kinds == 0 {
         return false;
     }
-    let opacity = opacity_at(textures, maps, hit.triangle_ix, [hit.u, hit.v]);
-    if is_random && maps.flags & MAPS_VEIL != 0 { random_at(hit) >= opacity } else { opacity < maps.alpha_cutoff }
+    let at = [hit.u, hit.v];
+    if is_random && maps.flags & MAPS_COVERAGE != 0 {
+        return random_at(hit) >= opacity_at(textures, maps, maps.coverage, hit.triangle_ix, at);
+    }
+    opacity_at(textures, maps, maps.opacity_factor, hit.triangle_ix, at) < maps.alpha_cutoff
 }

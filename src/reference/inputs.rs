@@ -33,6 +33,8 @@ pub struct KernelInputs<'a, R = NoCounter> {
     pub textures: Option<&'a Textures>,
     /// The textures if some of them cut out parts of triangles.
     pub cutouts: Option<&'a Textures>,
+    /// The textures if rays of paths pass through some triangles.
+    pub path_gaps: Option<&'a Textures>,
     /// Whether rays pass through see-through surfaces with an opacity below `LEAST_SHADOWING_OPACITY`.
     pub passes_veils: bool,
     /// Whether rays pass through see-through surfaces at random, as often as their opacity says.
@@ -101,6 +103,7 @@ impl<'a> KernelInputs<'a> {
             materials: &scene.materials,
             textures: scene.textures.is_in_use().then_some(&scene.textures),
             cutouts: scene.textures.has_shadow_gaps().then_some(&scene.textures),
+            path_gaps: scene.textures.has_path_gaps().then_some(&scene.textures),
             lights: &scene.lights,
             frame: Some(frame),
             ..Self::of_geometry(world.geometry())
@@ -153,6 +156,7 @@ impl<'a> KernelInputs<'a> {
             materials: &[],
             textures: None,
             cutouts: None,
+            path_gaps: None,
             passes_veils: false,
             random_opacity: false,
             lights: &[],
@@ -181,6 +185,7 @@ impl<'a> KernelInputs<'a> {
             materials: self.materials,
             textures: self.textures,
             cutouts: self.cutouts,
+            path_gaps: self.path_gaps,
             passes_veils: self.passes_veils,
             random_opacity: self.random_opacity,
             lights: self.lights,
@@ -217,10 +222,15 @@ impl<'a> KernelInputs<'a> {
         Self { passes_veils: true, ..self }
     }
 
+    /// Returns the same inputs with other materials, of the same number.
+    pub fn with_materials(self, materials: &'a [Material]) -> Self {
+        Self { materials, ..self }
+    }
+
     /// Returns the inputs of paths, whose rays pass through see-through surfaces at random, as often as their opacity
     /// says.
     pub fn through_veils_at_random(self) -> Self {
-        Self { passes_veils: true, random_opacity: true, ..self }
+        Self { cutouts: self.path_gaps, passes_veils: true, random_opacity: true, ..self }
     }
 
     /// Returns the same inputs with a kd-tree's boxes and ropes.

@@ -3,7 +3,7 @@
 use glam::{Vec3, vec3};
 
 use super::{
-    bsdf::{bsdf_density, evaluate_bsdf, is_smooth, sample_bsdf},
+    bsdf::{is_smooth, sample_bsdf, value_at},
     emitters::{
         ambient_radiance, emission_at, emission_density, environment_density, environment_radiance, pick_light,
         seen_light,
@@ -81,15 +81,12 @@ fn segment_to_light(inputs: &KernelInputs, u: Vec3, vertex: &Vertex) -> Segment 
     if pick.light == Vec3::ZERO {
         return NO_SEGMENT;
     }
-    let reflected = evaluate_bsdf(material, surface, to_viewer, pick.direction);
-    if !reflected.cmpgt(Vec3::ZERO).any() {
+    let scattered = value_at(material, surface, to_viewer, pick.direction);
+    if !scattered.value.cmpgt(Vec3::ZERO).any() {
         return NO_SEGMENT;
     }
-    let mut share = 1.0;
-    if pick.density > 0.0 {
-        share = power_share(pick.density, bsdf_density(material, surface, to_viewer, pick.direction));
-    }
-    let light = added_light(inputs, throughput * reflected * pick.light * share, depth + 1);
+    let share = if pick.density > 0.0 { power_share(pick.density, scattered.density) } else { 1.0 };
+    let light = added_light(inputs, throughput * scattered.value * pick.light * share, depth + 1);
     if !light.cmpgt(Vec3::ZERO).any() {
         return NO_SEGMENT;
     }

@@ -204,7 +204,7 @@ impl Textures {
             alpha_cutoff: if let Alpha::Cutout(cutoff) = material.alpha { cutoff } else { 0.0 },
             opacity_factor: material.d,
             flags: 0,
-            reserved: 0,
+            coverage: 1.0,
         }
     }
 

@@ -7,10 +7,10 @@ use kdray::{
     buffers::{Needs, PathQueue, Resources},
     frame::{Denoise, Integrator, RenderOptions},
     gpu::{Commands, Context},
-    layout::{Batch, Bounce, Frame, Hit, PathRay},
+    layout::{Batch, Bounce, Frame, Hit, Material, PathRay},
     passes::PathPasses,
     reference::{inputs::KernelInputs, path_begin::path_begin, path_trace},
-    world::{FlatScene, World},
+    world::{FlatScene, World, path_materials},
 };
 
 use super::stage::FIRST;
@@ -18,6 +18,7 @@ use crate::support::device;
 
 pub struct PathStage {
     pub world: World,
+    pub materials: Vec<Material>,
     pub links: TraversalLinks,
     pub options: RenderOptions,
     pub resources: Resources,
@@ -40,12 +41,13 @@ impl PathStage {
         let resources = Resources::new(&context, &world, &needs).expect("resources");
         let links = TraversalLinks::of(world.accel(), options.traversal);
         let passes = PathPasses::new(&context, &resources.bindings, &options).expect("passes");
-        Self { world, links, options, resources, passes, context }
+        let materials = path_materials(world.scene());
+        Self { world, materials, links, options, resources, passes, context }
     }
 
     /// Returns the twin's inputs for the same scene.
     pub fn inputs(&self) -> KernelInputs<'_> {
-        KernelInputs::new(&self.world, self.frame()).with_links(&self.links)
+        KernelInputs::new(&self.world, self.frame()).with_links(&self.links).with_materials(&self.materials)
     }
 
     pub fn frame(&self) -> &Frame {
