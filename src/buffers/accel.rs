@@ -258,8 +258,8 @@ impl AccelBuffers {
         self.access
     }
 
-    /// The specialization constants of all kernels that read the arrays.
-    pub(super) fn constants(&self) -> Constants {
+    /// The specialization constants of all kernels that read the arrays, in frames of paths or elsewhere.
+    pub(super) fn constants(&self, of_paths: bool) -> Constants {
         let (mask_words, n_levels) = match self.structure {
             Structure::KdTree { mask_words } => (mask_words, 0),
             Structure::Grid { n_levels } => (1, n_levels),
@@ -270,7 +270,7 @@ impl AccelBuffers {
             .set(constants::MASK_WORDS, mask_words)
             .set(constants::GRID_LEVELS, n_levels)
             .set(constants::TURN_BUDGET, self.stalls.turn_budget());
-        self.surface_kinds.set(constants)
+        self.surface_kinds.set(constants, of_paths)
     }
 
     /// Uploads the constants, with the arrays' addresses if kernels read by address. They go to a new buffer, since

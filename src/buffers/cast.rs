@@ -24,7 +24,7 @@ impl CastResources {
     /// Memory runs out.
     pub fn bindings(context: &Arc<Context>, accel: &AccelBuffers) -> Result<Arc<BindingLayout>, GpuError> {
         let kinds: Vec<_> = accel::bindings().chain([BIND_CAST_RAYS, BIND_CAST_HITS]).map(binding).collect();
-        BindingLayout::with_constants(context, &kinds, size_of::<CastBatch>() as u32, accel.constants())
+        BindingLayout::with_constants(context, &kinds, size_of::<CastBatch>() as u32, accel.constants(false))
     }
 
     /// Makes the set over buffers of rays and hits that the caller gives.

@@ -10,11 +10,9 @@ use super::{
 use crate::{
     accel::Accel,
     frame::{Integrator, RenderOptions},
-    gpu::{
-        Access, Binding, BindingLayout, BindingSet, Buffer, BufferUse, Commands, Constants, Context, Dispatch, GpuError,
-    },
-    layout::{self, constants, Batch, Bounce, COUNTER_COPIES, COUNTER_STRIDE, Counters, Frame, Light, Material},
-    world::{FlatScene, World, path_materials},
+    gpu::{Access, Binding, BindingLayout, BindingSet, Buffer, BufferUse, Commands, Context, Dispatch, GpuError},
+    layout::{self, Batch, Bounce, COUNTER_COPIES, COUNTER_STRIDE, Counters, Frame, Light, Material},
+    world::{World, path_materials},
 };
 
 /// The size of the longest push constants, bytes.
@@ -132,7 +130,9 @@ impl Resources {
                 context,
                 &kinds,
                 PUSH_BYTES,
-                kernel_constants(&accel, scene, constants, is_of_paths),
+                (accel.constants(is_of_paths))
+                    .set(layout::constants::ORTHOGRAPHIC, constants.is_orthographic == 1)
+                    .set(layout::constants::PATHS, is_of_paths),
             )?,
             accel,
             set: None,
@@ -376,17 +376,6 @@ impl Resources {
     pub(crate) fn set(&self) -> &BindingSet {
         self.set.as_ref().expect("made with the resources")
     }
-}
-
-/// Returns the specialization constants of all kernels of a frame.
-fn kernel_constants(accel: &AccelBuffers, scene: &FlatScene, frame: &Frame, is_of_paths: bool) -> Constants {
-    let all = accel.constants().set(constants::ORTHOGRAPHIC, frame.is_orthographic == 1);
-    if !is_of_paths {
-        return all;
-    }
-    // All materials of paths are of microfacets.
-    let has_gaps = scene.textures.has_path_gaps();
-    all.set(constants::PATHS, true).set(constants::MICROFACETS, true).set(constants::SHADOW_GAPS, has_gaps)
 }
 
 /// Makes the queue, and what frames of paths have beside it.

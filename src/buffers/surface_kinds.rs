@@ -21,6 +21,8 @@ pub struct SurfaceKinds {
     has_cutouts: bool,
     /// Whether shadow rays do.
     has_shadow_gaps: bool,
+    /// Whether rays of paths do.
+    has_path_gaps: bool,
 }
 
 impl SurfaceKinds {
@@ -33,16 +35,18 @@ impl SurfaceKinds {
             is_smooth: scene.triangles.par_iter().any(|t| ![t.n0, t.n1, t.n2].contains(&FLAT_NORMAL)),
             has_cutouts: scene.textures.has_cutouts(),
             has_shadow_gaps: scene.textures.has_shadow_gaps(),
+            has_path_gaps: scene.textures.has_path_gaps(),
         }
     }
 
-    /// Sets the specialization constants.
-    pub fn set(&self, constants: Constants) -> Constants {
+    /// Sets the specialization constants of frames of paths, or of other kernels.
+    pub fn set(&self, constants: Constants, of_paths: bool) -> Constants {
         constants
-            .set(constants::MICROFACETS, self.has_microfacets)
+            // All materials of paths are of microfacets.
+            .set(constants::MICROFACETS, self.has_microfacets || of_paths)
             .set(constants::TEXTURED, self.is_textured)
             .set(constants::SMOOTH, self.is_smooth)
             .set(constants::CUTOUTS, self.has_cutouts)
-            .set(constants::SHADOW_GAPS, self.has_shadow_gaps)
+            .set(constants::SHADOW_GAPS, if of_paths { self.has_path_gaps } else { self.has_shadow_gaps })
     }
 }

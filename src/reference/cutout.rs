@@ -6,7 +6,8 @@ use super::{
 };
 use crate::{
     layout::{
-        Hit, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_COVERAGE, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps, NO_TEXTURE,
+        Hit, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_COVERAGE, MAPS_CUTOUT, MAPS_VEIL, MaterialMaps,
+        NO_TEXTURE,
     },
     world::Textures,
 };
@@ -19,13 +20,7 @@ fn finest_at(textures: &Textures, texture_ix: u32, triangle_ix: u32, [u, v]: [f3
 
 /// The opacity at a point of a triangle, 0 to 1, by the largest levels of its textures. `opacity`: that of the material.
 /// `at`: barycentric weights of the second and the third corner.
-pub fn opacity_at(
-    textures: &Textures,
-    maps: &MaterialMaps,
-    mut opacity: f32,
-    triangle_ix: u32,
-    at: [f32; 2],
-) -> f32 {
+pub fn opacity_at(textures: &Textures, maps: &MaterialMaps, mut opacity: f32, triangle_ix: u32, at: [f32; 2]) -> f32 {
     if maps.flags & MAPS_CORNERS_HAVE_OPACITY != 0 {
         opacity *= textures.corner_colour_at(triangle_ix, at[0], at[1]).w;
     }

@@ -12,8 +12,8 @@ use super::{
 };
 use crate::{
     layout::{
-        CornerSurface, LEAST_SHADOWING_OPACITY, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_COVERAGE, MAPS_CUTOUT,
-        MAPS_VEIL, MaterialMaps, NO_TEXTURE, Texture,
+        CornerSurface, LEAST_SHADOWING_OPACITY, MAPS_COLOUR_HAS_OPACITY, MAPS_CORNERS_HAVE_OPACITY, MAPS_COVERAGE,
+        MAPS_CUTOUT, MAPS_VEIL, MaterialMaps, NO_TEXTURE, Texture,
     },
     scene::{Alpha, Material, Scene},
     util::memory,
