@@ -53,6 +53,8 @@ fn scene(triangles: &[Triangle]) -> FlatScene {
         },
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,
+        area_lights: Vec::new(),
+        environment: None,
         defaults: RenderDefaults::default(),
     }
 }

@@ -427,8 +427,9 @@ struct MaterialMaps {
 // - `intensity`: of a point light, power per steradian; its irradiance falls with the square of the distance. Of a
 //   directional light, the irradiance on a surface that faces it. Of a spot light, power per steradian on its axis.
 // - `axis`: of a spot light, the unit vector along which it shines.
-// - `inner_cos`, `outer_cos`: cosines of the angles from the axis at which the spot light begins to fall off, and at
-//   which it ends.
+// - `inner_cos`, `outer_cos`: of a spot light, cosines of the angles from the axis at which it begins to fall off, and
+//   at which it ends. Of a directional light that is seen as a disk, `outer_cos` is the cosine of the disk's angular
+//   radius; 0 if the light has no size. Only the path tracer knows disks.
 struct Light {
     vec3 position;
     uint kind;
@@ -437,6 +438,63 @@ struct Light {
     vec3 axis;
     float outer_cos;
 };
+
+// What emits light and can be picked by the path tracer, 20 bytes: an entry of an alias table.
+//
+// - `threshold`: the share of the entry's picks that stay with it, 0 to 1.
+// - `alias_ix`: the entry that gets the other picks.
+// - `probability`: with which the entry is picked in the end.
+// - `kind`: `EMITTER_LIGHT` and its like.
+// - `ix`: index of the light, the area light, the sun or the triangle; 0 for the environment.
+struct Emitter {
+    float threshold;
+    uint alias_ix;
+    float probability;
+    uint kind;
+    uint ix;
+};
+
+// The kinds of emitters, in the order of their entries. The entries of triangles are in the order of the triangles.
+// A point, spot or directional light without a size.
+#define EMITTER_LIGHT 0u
+// A rectangle, a disk or a sphere.
+#define EMITTER_AREA 1u
+// A directional light that is seen as a disk.
+#define EMITTER_SUN 2u
+// A triangle whose material emits light.
+#define EMITTER_TRIANGLE 3u
+// What is seen beyond the scene.
+#define EMITTER_ENVIRONMENT 4u
+
+// A light with an area or, for a sun, with a solid angle, 80 bytes. Only the path tracer knows such lights.
+//
+// - `position`: centre, world space. Of a sun, the unit vector to the disk's centre.
+// - `kind`: `AREA_RECTANGLE` and its like.
+// - `radiance`: emitted radiance, the same in all directions.
+// - `radius`: of a disk or a sphere, world units. Of a sun, 1 less the cosine of the disk's angular radius.
+// - `axis`: unit vector. A rectangle and a disk shine to the side to which it points.
+// - `area`: square world units. Of a sun, the disk's solid angle.
+// - `edge_u`, `edge_v`: from the centre of a rectangle to the middle of an edge. Of a disk and a sun, unit vectors.
+//   They are at right angles to one another and to the axis.
+// - `probability`: with which the light is picked.
+struct AreaLight {
+    vec3 position;
+    uint kind;
+    vec3 radiance;
+    float radius;
+    vec3 axis;
+    float area;
+    vec3 edge_u;
+    float probability;
+    vec3 edge_v;
+    uint reserved;
+};
+
+// The kinds of area lights.
+#define AREA_RECTANGLE 0u
+#define AREA_DISK 1u
+#define AREA_SPHERE 2u
+#define AREA_SUN 3u
 
 // Replaces the index of a part of `texture_words` that the scene does not have.
 #define NO_WORDS 0xffffffffu
@@ -731,6 +789,18 @@ struct Feature {
 // - `uvs_begin`, `corners_begin`, `material_maps_begin`, `textures_begin`: index in `texture_words` at which the
 //   triangles' texture coordinates, the tangents and colours of their corners, the materials' maps and the textures
 //   begin. `NO_WORDS`: the scene has none of them.
+// - `background`, `ambient`: radiance of the environment if it has no map; radiance that neither the camera nor mirrors
+//   see.
+// - `environment_probability`: with which the environment is picked as a light.
+// - `n_emitters`, `emitters_begin`: number of entries of `Emitter`, and index in `texture_words` of the first one.
+// - `first_triangle_emitter`, `n_triangle_emitters`: index and number of the entries of triangles.
+// - `area_lights_begin`, `n_area_lights`, `n_suns`: index in `texture_words` of the first `AreaLight`, number of those
+//   that are no suns, and number of suns, which follow them.
+// - `environment_begin`: index in `texture_words` of the environment's map: pairs of a threshold and an alias, first
+//   for each row and then for each texel, and the texels. A texel is a linear colour, and the density with which its
+//   directions are picked if the environment is picked, per steradian. `NO_WORDS`: there is no map.
+// - `environment_width`, `environment_height`: size of the map, texels.
+// - `environment_turn`: by which the map is turned about +y, in turns, counter-clockwise as seen from above.
 // - The rest: the device address of each of the scene's arrays, low word first. 0 if kernels read the array by its
 //   binding.
 struct AccelConstants {
@@ -746,6 +816,20 @@ struct AccelConstants {
     uint corners_begin;
     uint material_maps_begin;
     uint textures_begin;
+    vec3 background;
+    float environment_probability;
+    vec3 ambient;
+    uint n_emitters;
+    uint emitters_begin;
+    uint first_triangle_emitter;
+    uint n_triangle_emitters;
+    uint area_lights_begin;
+    uint n_area_lights;
+    uint n_suns;
+    uint environment_begin;
+    uint environment_width;
+    uint environment_height;
+    float environment_turn;
 #define ARRAY(name, element, row, number) uvec2 name;
 #include "scene_arrays.glsl"
 #undef ARRAY

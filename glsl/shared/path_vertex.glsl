@@ -16,6 +16,9 @@
 #include "material.glsl"
 #include "maps.glsl"
 #include "bsdf/bsdf.glsl"
+
+layout(std430, set = 0, binding = BIND_LIGHTS) readonly buffer LightsBlock { Light lights[]; };
+#include "light.glsl"
 #include "emitters/emitters.glsl"
 
 // The number of pairs of random numbers that come before those of the first hit: in the pixel and in the lens.

@@ -64,6 +64,7 @@ pub fn knot(n_triangles: u32) -> Scene {
         },
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,
+        environment: None,
         defaults: RenderDefaults::default(),
     }
 }

@@ -22,7 +22,7 @@ use crate::{
         TRIANGLE_HIDDEN, Triangle, constants,
     },
     passes::grid::GridBuilder,
-    world::{Geometry, World},
+    world::{Emitters, Geometry, World},
 };
 
 /// Returns the numbers of the bindings of [`AccelBuffers`].
@@ -70,12 +70,14 @@ impl AccelBuffers {
     ///
     /// # Errors
     /// A buffer is beyond the device's limits, or memory runs out.
-    pub fn of_world(context: &Arc<Context>, world: &World) -> Result<Self, GpuError> {
+    pub fn of_world(context: &Arc<Context>, world: &World, of_paths: bool) -> Result<Self, GpuError> {
         let scene = world.scene();
-        let words = TextureWords::new(&scene.textures);
+        let none = Emitters::default();
+        let emitters = if of_paths { world.emitters() } else { &none };
+        let words = TextureWords::new(&scene.textures, emitters);
         let mut made = Self::with_room(context, world.geometry(), words.len())?;
         made.add_materials(context, &scene.triangle_materials)?;
-        made.add_textures(context, &words)?;
+        made.add_words(context, &words)?;
         made.surface_kinds = SurfaceKinds::of(scene);
         Ok(made)
     }
@@ -176,6 +178,9 @@ impl AccelBuffers {
             corners_begin: NO_WORDS,
             material_maps_begin: NO_WORDS,
             textures_begin: NO_WORDS,
+            emitters_begin: NO_WORDS,
+            area_lights_begin: NO_WORDS,
+            environment_begin: NO_WORDS,
             ..*constants
         };
         let mut made = Self {
@@ -203,8 +208,8 @@ impl AccelBuffers {
         self.upload_constants(context)
     }
 
-    /// Uploads the textures, and notes where their parts begin.
-    fn add_textures(&mut self, context: &Arc<Context>, words: &TextureWords) -> Result<(), GpuError> {
+    /// Uploads textures and emitters, and notes where their parts begin.
+    fn add_words(&mut self, context: &Arc<Context>, words: &TextureWords) -> Result<(), GpuError> {
         let content = Content::Written { len: words.len(), write: &|first, part| words.write(first, part) };
         self.arrays.texture_words = content.upload(context, "texture_words", self.access)?;
         words.note_begins(&mut self.uploaded);

@@ -103,9 +103,9 @@ impl Resources {
         let scene = world.scene();
         let storage = BufferUse::Storage;
         let &Needs { constants, options, n_bounces } = needs;
-        let mut accel = AccelBuffers::of_world(context, world)?;
-        accel.add_links(context, world.accel(), options.traversal)?;
         let is_of_paths = options.integrator == Integrator::Path;
+        let mut accel = AccelBuffers::of_world(context, world, is_of_paths)?;
+        accel.add_links(context, world.accel(), options.traversal)?;
         let more = if is_of_paths { &BINDINGS_OF_PATHS[..] } else { &BINDINGS_OF_WHITTED };
         let own = OWN_BINDINGS.iter().chain(more).copied();
         let kinds: Vec<_> = own.chain(accel::bindings()).map(binding).collect();

@@ -1,31 +1,54 @@
-//! The array `texture_words`: everything that textures need, one part after the other (glsl/shared/texture_words.glsl).
+//! The array `texture_words`: everything that textures and emitters need, one part after the other
+//! (glsl/shared/texture_words.glsl).
 
 use bytemuck::cast_slice;
 
 use crate::{
     layout::{AccelConstants, NO_WORDS},
-    world::Textures,
+    world::{Emitters, Textures},
 };
 
-/// The parts of the array, in their order: texels, textures, maps of materials, texture coordinates, corners.
-pub struct TextureWords<'a>([&'a [u32]; 5]);
+const N_PARTS: usize = 10;
+
+/// The parts of the array, in their order: texels, textures, maps of materials, texture coordinates, corners; emitters,
+/// area lights; of the environment's map the alias tables of rows and of texels, and the texels.
+pub struct TextureWords<'a> {
+    parts: [&'a [u32]; N_PARTS],
+    /// The constants of the emitters, without the indices at which their parts begin.
+    emitters: AccelConstants,
+}
 
 impl<'a> TextureWords<'a> {
-    /// Returns the array of a scene's textures. It has no words if the scene has no textures.
-    pub fn new(textures: &'a Textures) -> Self {
+    /// Returns the array of a scene's textures and emitters. It has no words if the scene has neither.
+    pub fn new(textures: &'a Textures, emitters: &'a Emitters) -> Self {
         let Textures { texels, textures, material_maps, uvs, corners, .. } = textures;
-        Self([texels, cast_slice(textures), cast_slice(material_maps), cast_slice(uvs), cast_slice(corners)])
+        let [rows, columns, map] = emitters.environment.as_ref().map_or([&[][..]; 3], |environment| {
+            [cast_slice(&environment.rows), cast_slice(&environment.columns), cast_slice(&environment.texels)]
+        });
+        let parts = [
+            &texels[..],
+            cast_slice(textures),
+            cast_slice(material_maps),
+            cast_slice(uvs),
+            cast_slice(corners),
+            cast_slice(&emitters.entries),
+            cast_slice(&emitters.area_lights),
+            rows,
+            columns,
+            map,
+        ];
+        Self { parts, emitters: emitters.constants() }
     }
 
     /// Returns the number of words.
     pub fn len(&self) -> usize {
-        self.0.iter().map(|part| part.len()).sum()
+        self.parts.iter().map(|part| part.len()).sum()
     }
 
     /// Writes the words from index `first` on.
     pub fn write(&self, first: usize, words: &mut [u32]) {
         let (mut begin, end) = (0, first + words.len());
-        for part in self.0 {
+        for part in self.parts {
             let (from, to) = (first.max(begin), end.min(begin + part.len()));
             if from < to {
                 words[from - first..to - first].copy_from_slice(&part[from - begin..to - begin]);
@@ -37,16 +60,34 @@ impl<'a> TextureWords<'a> {
     /// Writes where the parts begin into the constants.
     pub fn note_begins(&self, constants: &mut AccelConstants) {
         let mut begin = 0;
-        let begins = self.0.map(|part| {
+        let begins = self.parts.map(|part| {
             let here = if part.is_empty() { NO_WORDS } else { begin };
             begin += part.len() as u32;
             here
         });
-        let [_, textures, maps, uvs, corners] = begins;
-        constants.textures_begin = textures;
-        constants.material_maps_begin = maps;
-        constants.uvs_begin = uvs;
-        constants.corners_begin = corners;
+        let [_, textures, maps, uvs, corners, emitters, area_lights, environment, _, _] = begins;
+        let of_emitters = &self.emitters;
+        *constants = AccelConstants {
+            textures_begin: textures,
+            material_maps_begin: maps,
+            uvs_begin: uvs,
+            corners_begin: corners,
+            background: of_emitters.background,
+            environment_probability: of_emitters.environment_probability,
+            ambient: of_emitters.ambient,
+            n_emitters: of_emitters.n_emitters,
+            emitters_begin: emitters,
+            first_triangle_emitter: of_emitters.first_triangle_emitter,
+            n_triangle_emitters: of_emitters.n_triangle_emitters,
+            area_lights_begin: area_lights,
+            n_area_lights: of_emitters.n_area_lights,
+            n_suns: of_emitters.n_suns,
+            environment_begin: environment,
+            environment_width: of_emitters.environment_width,
+            environment_height: of_emitters.environment_height,
+            environment_turn: of_emitters.environment_turn,
+            ..*constants
+        };
     }
 }
 
@@ -56,12 +97,13 @@ mod tests {
 
     #[test]
     fn parts_follow_one_another() {
-        let words = TextureWords([&[1, 2, 3], &[], &[4], &[5, 6], &[7]]);
-        let mut whole = [0; 7];
+        let parts: [&[u32]; N_PARTS] = [&[1, 2, 3], &[], &[4], &[5, 6], &[7], &[8], &[], &[9, 10], &[11], &[12]];
+        let words = TextureWords { parts, emitters: AccelConstants { n_suns: 2, ..AccelConstants::default() } };
+        let mut whole = [0; 12];
         words.write(0, &mut whole);
-        assert_eq!((words.len(), whole), (7, [1, 2, 3, 4, 5, 6, 7]));
-        for first in 0..7 {
-            for n in 0..=7 - first {
+        assert_eq!((words.len(), whole), (12, [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]));
+        for first in 0..12 {
+            for n in 0..=12 - first {
                 let mut part = vec![0; n];
                 words.write(first, &mut part);
                 assert_eq!(part, whole[first..first + n]);
@@ -71,5 +113,7 @@ mod tests {
         words.note_begins(&mut constants);
         let begins = [constants.textures_begin, constants.material_maps_begin, constants.uvs_begin];
         assert_eq!((begins, constants.corners_begin), ([NO_WORDS, 3, 4], 6));
+        let begins = [constants.emitters_begin, constants.area_lights_begin, constants.environment_begin];
+        assert_eq!((begins, constants.n_suns), ([7, NO_WORDS, 8], 2));
     }
 }

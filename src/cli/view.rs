@@ -91,8 +91,8 @@ fn open(
     processor: Processor,
 ) -> Result<Opened, CliError> {
     let scene = Scene::load_with(path, scene_options)?;
-    scene.warn_if_unlit(path);
     let mut options = picture.options(&scene.defaults);
+    scene.warn_of_missing_light(path, options.integrator);
     let (request, workload) = (picture.request(), Workload::of_window((options.width, options.height)));
     let accel = request.choose_accel(processor, scene.n_triangles(), &workload);
     build::check_memory(accel, scene.n_triangles())?;
@@ -115,7 +115,7 @@ fn load(args: &ViewArgs, path: &Path, progress: &Progress) -> Result<Start, CliE
     let loading = format!("loading {}", path.display());
     let (scene, _) = progress.stage(&loading, || Scene::load_with(path, &scene_options));
     let scene = scene?;
-    scene.warn_if_unlit(path);
+    scene.warn_of_missing_light(path, args.picture.options(&scene.defaults).integrator);
     args.look.note_up(path, &scene).into_iter().for_each(|note| progress.note(&note));
     let mut options = args.picture.options(&scene.defaults);
     let tour = tour(args, scene.camera)?;

@@ -287,7 +287,7 @@ impl Renderer {
     /// Finds the closest hits of the bounce's paths, tests the segments of the bounce before, and counts both.
     fn path_trace(&mut self, depth: u32) {
         let Self { world, frame, links, paths, queue, path_materials, .. } = self;
-        let inputs = KernelInputs::new(world, frame).with_links(links).with_materials(path_materials);
+        let inputs = KernelInputs::new(world, frame).with_links(links).of_paths(path_materials, world.emitters());
         let trace = || paths.trace(&inputs, self.options.traversal, depth, queue);
         let (n_hits, n_segments) = self.clock.time(Pass::PathTrace, Some(depth), trace);
         if let Some(before) = self.batch_stats.last_mut() {
@@ -299,7 +299,7 @@ impl Renderer {
 
     fn path_scatter(&mut self, depth: u32) {
         let Self { world, frame, links, batch, paths, queue, path_materials, .. } = self;
-        let inputs = KernelInputs::new(world, frame).with_links(links).with_materials(path_materials);
+        let inputs = KernelInputs::new(world, frame).with_links(links).of_paths(path_materials, world.emitters());
         self.clock.time(Pass::PathScatter, Some(depth), || paths.scatter(&inputs, batch, queue));
     }
 

@@ -11,7 +11,7 @@ use crate::{
         kdtree::{KdTree, TraversalLinks},
     },
     layout::{Frame, GridCell, Hit, KdBox, KdNode, KdRope, Light, Material, Plane, Slab, TRIANGLE_HIDDEN, Triangle},
-    world::{Geometry, Textures, World},
+    world::{Emitters, Geometry, Textures, World},
 };
 
 /// The scene, its acceleration structure and the frame's constants. `R` counts reads of the structure.
@@ -40,6 +40,8 @@ pub struct KernelInputs<'a, R = NoCounter> {
     /// Whether rays pass through see-through surfaces at random, as often as their opacity says.
     pub random_opacity: bool,
     pub lights: &'a [Light],
+    /// What the path tracer picks lights from; `None` for rays that do not belong to a frame.
+    pub emitters: Option<&'a Emitters>,
     pub kd_nodes: CountedSlice<'a, KdNode, R>,
     /// For each pair of siblings, the index of their parent.
     pub kd_parents: CountedSlice<'a, u32, R>,
@@ -160,6 +162,7 @@ impl<'a> KernelInputs<'a> {
             passes_veils: false,
             random_opacity: false,
             lights: &[],
+            emitters: None,
             kd_nodes: CountedSlice::from(&[][..]),
             kd_parents: CountedSlice::from(&[][..]),
             leaf_triangles: CountedSlice::from(&[][..]),
@@ -189,6 +192,7 @@ impl<'a> KernelInputs<'a> {
             passes_veils: self.passes_veils,
             random_opacity: self.random_opacity,
             lights: self.lights,
+            emitters: self.emitters,
             kd_nodes: self.kd_nodes.with_counter(Counted(&counts.n_nodes)),
             kd_parents: self.kd_parents.with_counter(Counted(&counts.n_links)),
             leaf_triangles: self.leaf_triangles.with_counter(Counted(&counts.n_triangles)),
@@ -222,9 +226,10 @@ impl<'a> KernelInputs<'a> {
         Self { passes_veils: true, ..self }
     }
 
-    /// Returns the same inputs with other materials, of the same number.
-    pub fn with_materials(self, materials: &'a [Material]) -> Self {
-        Self { materials, ..self }
+    /// Returns the inputs of paths: with the materials that [`path_materials`](crate::world::path_materials) returns,
+    /// and the world's emitters.
+    pub fn of_paths(self, materials: &'a [Material], emitters: &'a Emitters) -> Self {
+        Self { materials, emitters: Some(emitters), ..self }
     }
 
     /// Returns the inputs of paths, whose rays pass through see-through surfaces at random, as often as their opacity

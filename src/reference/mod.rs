@@ -14,7 +14,7 @@
 //!               kdtree, leaf, slab, kd_boxes, ropes, brute and the pending_* of each algorithm; grid; candidate
 //! geometry    triangle, surface, camera; search_ray and traversal_ray: a ray in the form that searches use
 //! light       light, material, microfacet, fresnel, children, display, tone_curves
-//! scattering  bsdf: the surfaces of the path tracer
+//! paths       sampler, path_camera, paths, path_vertex; bsdf: surfaces; emitters: lights
 //! textures    texture, maps, cutout
 //! inputs      the data that kernels only read
 //! counting    the same traversal with its reads counted

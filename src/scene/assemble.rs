@@ -11,11 +11,12 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use super::{
-    Camera, Light, Material, PathDefaults, Projection, RenderDefaults, Scene,
+    Camera, Environment, Light, Material, PathDefaults, Projection, RenderDefaults, Scene,
     camera::{FOV_DEGREES, HEIGHTS},
-    description::{CameraSpec, Description, LightSpec, MeshSpec, RenderSpec, SceneDenoise},
+    description::{CameraSpec, Description, EnvironmentSpec, LightSpec, MeshSpec, RenderSpec, SceneDenoise},
     error::{Checked, SceneError},
     extent,
+    image::{Encoded, decode_colours},
     image_files::Images,
     look::Up,
     map_spec::MapSpec,
@@ -24,7 +25,7 @@ use super::{
     outside::Access,
     overrides::NamedMaterials,
     placed::{MeshTable, Placer},
-    read::read_utf8,
+    read::{read_bytes, read_utf8},
     standard::Lacks,
     transform::finite,
 };
@@ -77,8 +78,8 @@ fn assemble(file: &File, description: Description) -> Result<(Scene, Lacks), Sce
     let lacks = Lacks {
         up: Up::Y,
         camera: description.camera.is_none() && description.cameras.is_empty(),
-        light: description.light.is_empty() && description.ambient.is_none(),
-        background: description.background.is_none(),
+        light: description.light.is_empty() && description.ambient.is_none() && description.environment.is_none(),
+        background: description.background.is_none() && description.environment.is_none(),
         integrator: description.render.as_ref().is_none_or(|render| render.as_ref().integrator.is_none()),
     };
     let mut scene = Scene::empty(file.path);
@@ -92,6 +93,9 @@ fn assemble(file: &File, description: Description) -> Result<(Scene, Lacks), Sce
     }
     if let Some(spec) = &description.background {
         scene.background = file.check("background", spec, |rgb| colour("background", Some(*rgb), Vec3::ZERO))?;
+    }
+    if let Some(spec) = &description.environment {
+        scene.environment = Some(file.check("environment", spec, |spec| environment(file, spec))?);
     }
     if let Some(spec) = &description.render {
         scene.defaults = file.check("render", spec, render_defaults)?;
@@ -188,10 +192,38 @@ fn light(spec: &LightSpec) -> Checked<Light> {
             position: point("position", position)?,
             intensity: colour("intensity", Some(intensity), Vec3::ZERO)?,
         }),
-        LightSpec::Directional { direction, irradiance } => {
+        LightSpec::Directional { direction, irradiance, angle } => {
             let irradiance = colour("irradiance", Some(irradiance), Vec3::ZERO)?;
-            Ok(Light::Directional { towards: -unit("direction", direction)?, irradiance })
+            let towards = -unit("direction", direction)?;
+            match angle.map(|angle| within("angle", angle, 0.0, 180.0)).transpose()? {
+                Some(angle_degrees) if angle_degrees > 0.0 => Ok(Light::Sun { towards, irradiance, angle_degrees }),
+                _ => Ok(Light::Directional { towards, irradiance }),
+            }
         }
+        LightSpec::Rectangle { position, direction, up, width, height, radiance } => {
+            let towards = unit("direction", direction)?;
+            let up = up.map(|up| unit("up", up)).transpose()?.unwrap_or(Vec3::Y);
+            // If up is along the direction, any other one will do.
+            let beside = if up.cross(towards).length() > 1e-6 { up } else { towards.any_orthonormal_vector() };
+            let up = beside.reject_from_normalized(towards).normalize();
+            Ok(Light::Rectangle {
+                position: point("position", position)?,
+                edge_u: up.cross(towards) * (extent_of("width", width)? / 2.0),
+                edge_v: up * (extent_of("height", height)? / 2.0),
+                radiance: colour("radiance", Some(radiance), Vec3::ZERO)?,
+            })
+        }
+        LightSpec::Disk { position, direction, radius, radiance } => Ok(Light::Disk {
+            position: point("position", position)?,
+            towards: unit("direction", direction)?,
+            radius: extent_of("radius", radius)?,
+            radiance: colour("radiance", Some(radiance), Vec3::ZERO)?,
+        }),
+        LightSpec::Sphere { position, radius, radiance } => Ok(Light::Sphere {
+            position: point("position", position)?,
+            radius: extent_of("radius", radius)?,
+            radiance: colour("radiance", Some(radiance), Vec3::ZERO)?,
+        }),
         LightSpec::Spot { position, direction, intensity, inner_angle, outer_angle } => {
             if !(0.0 <= inner_angle && inner_angle <= outer_angle && outer_angle <= 90.0) {
                 return Err(format!(
@@ -209,6 +241,25 @@ fn light(spec: &LightSpec) -> Checked<Light> {
             })
         }
     }
+}
+
+/// Checks a length, which must be at least 0 and at most [`MAX_COORDINATE`].
+fn extent_of(name: &str, length: f32) -> Checked<f32> {
+    within(name, length, 0.0, MAX_COORDINATE)
+}
+
+/// Reads the image of what is seen beyond the scene.
+fn environment(file: &File, spec: &EnvironmentSpec) -> Checked<Environment> {
+    let path = file.access.beside(file.path).exact(&spec.file)?;
+    let bytes = read_bytes(&path).map_err(|error| error.to_string())?;
+    let (size, colours) = decode_colours(&Encoded { name: spec.file.clone(), bytes: bytes.into() })?;
+    let rotation = within("rotation", spec.rotation.unwrap_or(0.0), -3600.0, 3600.0)?;
+    let strength = within("strength", spec.strength.unwrap_or(1.0), 0.0, 1e6)?;
+    let (environment, mended) = Environment::new(size, colours, (rotation, strength))?;
+    if let Some(message) = mended.message() {
+        tracing::warn!("{}: environment `{}` {message}", file.path.display(), spec.file);
+    }
+    Ok(environment)
 }
 
 /// Returns a vector's direction as a unit vector.

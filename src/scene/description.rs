@@ -28,6 +28,8 @@ pub(super) struct Description {
     pub ambient: Option<Spanned<[f32; 3]>>,
     /// Radiance of rays that leave the scene; black where absent.
     pub background: Option<Spanned<[f32; 3]>>,
+    /// Image of what rays see that leave the scene, for `path`.
+    pub environment: Option<Spanned<EnvironmentSpec>>,
     #[serde(default)]
     pub materials: BTreeMap<String, Spanned<MaterialSpec>>,
     /// Meshes, as tables that `MeshSpec::new` reads.
@@ -77,8 +79,34 @@ pub(super) enum LightSpec {
     /// A point light that shines into a cone about `direction`: whole up to `inner_angle` from it, dark beyond
     /// `outer_angle`, both in degrees. In double precision, angles stand for every cosine of single precision.
     Spot { position: [f32; 3], direction: [f32; 3], intensity: [f32; 3], inner_angle: f64, outer_angle: f64 },
-    /// A light whose rays all travel along `direction`.
-    Directional { direction: [f32; 3], irradiance: [f32; 3] },
+    /// A light whose rays all travel along `direction`. With an `angle`, in degrees, it is seen as a disk by `path`.
+    Directional { direction: [f32; 3], irradiance: [f32; 3], angle: Option<f32> },
+    /// A rectangle that shines along `direction`, for `path`. Its height is along `up`, as far as that is possible; +y
+    /// where absent.
+    Rectangle {
+        position: [f32; 3],
+        direction: [f32; 3],
+        up: Option<[f32; 3]>,
+        width: f32,
+        height: f32,
+        radiance: [f32; 3],
+    },
+    /// A disk that shines along `direction`, for `path`.
+    Disk { position: [f32; 3], direction: [f32; 3], radius: f32, radiance: [f32; 3] },
+    /// A sphere, for `path`.
+    Sphere { position: [f32; 3], radius: f32, radiance: [f32; 3] },
+}
+
+/// The image of what rays see that leave the scene.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct EnvironmentSpec {
+    /// HDR or EXR, equirectangular; relative to the scene file's folder.
+    pub file: String,
+    /// Turn about +y, counter-clockwise as seen from above, degrees; 0 where absent.
+    pub rotation: Option<f32>,
+    /// Factor on the image's radiance; 1 where absent.
+    pub strength: Option<f32>,
 }
 
 /// Options of rendering, which the command line may override.

@@ -8,8 +8,14 @@ use super::{Light, Scene};
 use crate::frame::Integrator;
 
 impl Scene {
+    /// Returns whether the scene has light that only paths show: surfaces that shine, lights with an area, or an
+    /// environment.
+    pub fn needs_path(&self) -> bool {
+        self.has_shining_surfaces() || self.environment.is_some() || self.lights.iter().any(Light::has_area)
+    }
+
     /// Returns whether some surfaces give off light. Only paths show it on other surfaces.
-    pub fn has_shining_surfaces(&self) -> bool {
+    fn has_shining_surfaces(&self) -> bool {
         self.materials.iter().any(|material| material.ke != Vec3::ZERO)
     }
 
@@ -18,23 +24,36 @@ impl Scene {
         self.materials.iter().any(|material| material.ke.max_element() > 1.0)
     }
 
-    /// Warns if neither a light nor the ambient term illuminates the scene, and says how to add a light. `path` is
-    /// the scene's file.
-    pub fn warn_if_unlit(&self, path: &Path) {
-        let is_lit = self.ambient != Vec3::ZERO || !self.lights.iter().all(Light::is_black);
-        if is_lit || (self.defaults.integrator == Integrator::Path && self.has_shining_surfaces()) {
+    /// Warns of light that the integrator does not show, and if nothing illuminates the scene, how to add a light.
+    /// `path` is the scene's file.
+    pub fn warn_of_missing_light(&self, path: &Path, integrator: Integrator) {
+        let path = path.display();
+        let is_whitted = integrator == Integrator::Whitted;
+        let hidden: Vec<_> = [
+            (self.lights.iter().any(Light::has_area), "lights with an area"),
+            (self.environment.is_some(), "the environment's image"),
+        ]
+        .into_iter()
+        .filter_map(|(is_there, what)| (is_there && is_whitted).then_some(what))
+        .collect();
+        if !hidden.is_empty() {
+            tracing::warn!("{path}: --integrator whitted does not show {}; path does", hidden.join(" and "));
+        }
+        let shows = |light: &Light| !light.is_black() && !(is_whitted && light.has_area());
+        let is_lit = self.ambient != Vec3::ZERO || self.lights.iter().any(shows);
+        let shines = self.has_shining_surfaces() || self.environment.is_some() || self.background != Vec3::ZERO;
+        if is_lit || (!is_whitted && shines) {
             return;
         }
         let emission = if self.has_shining_surfaces() {
-            "; emission (Ke) shows on its own surface but lights no other one, except with --integrator path"
+            "; emission (Ke) lights other surfaces only with --integrator path"
         } else {
             ""
         };
         tracing::warn!(
-            "{}: nothing lights the scene, since it has neither a [[light]] nor `ambient` above 0: surfaces are \
+            "{path}: nothing lights the scene, since it has neither a [[light]] nor `ambient` above 0: surfaces are \
              black{emission}; add `ambient = [0.3, 0.3, 0.3]` at the top, or at the end `[[light]]` with `kind = \
-             \"directional\"`, `direction = [-1, -2, -1]` and `irradiance = [1, 1, 1]`",
-            path.display()
+             \"directional\"`, `direction = [-1, -2, -1]` and `irradiance = [1, 1, 1]`"
         );
     }
 }

@@ -8,6 +8,7 @@ mod camera;
 mod convert;
 mod defaults;
 mod description;
+mod environment;
 mod error;
 mod extent;
 mod framing;
@@ -50,6 +51,7 @@ pub use self::{
     camera::{Camera, Projection},
     convert::scene_file_of,
     defaults::{PathDefaults, RenderDefaults},
+    environment::{Environment, MendedTexels},
     error::SceneError,
     extent::MIN_EXTENT,
     light::Light,
@@ -86,6 +88,8 @@ pub struct Scene {
     pub images: Vec<Image>,
     /// Lights, possibly none.
     pub lights: Vec<Light>,
+    /// The image of what is seen beyond the scene; without one, that is `background`. Only the path tracer knows it.
+    pub environment: Option<Environment>,
     /// The camera that renders the scene unless another one is set.
     pub camera: Camera,
     /// The cameras of the scene's file with their names, possibly none.
@@ -234,6 +238,7 @@ impl Scene {
             cameras: Vec::new(),
             ambient: Vec3::ZERO,
             background: Vec3::ZERO,
+            environment: None,
             defaults: RenderDefaults::default(),
         }
     }

@@ -41,7 +41,8 @@ fn named(scene: &Path, access: Access) -> (Vec<PathBuf>, Vec<PathBuf>) {
     let materials = table.get("materials").and_then(Value::as_table).into_iter().flat_map(Table::values);
     let maps = materials.flat_map(|material| MAP_KEYS.iter().filter_map(|key| material.get(key)));
     let name = |map: &Value| path(map.as_str().or_else(|| map.get("file")?.as_str())?);
-    (meshes, maps.filter_map(name).collect())
+    let environment = table.get("environment").and_then(|it| path(it.get("file")?.as_str()?));
+    (meshes, maps.filter_map(name).chain(environment).collect())
 }
 
 /// Returns the files that a mesh file names.

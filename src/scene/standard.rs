@@ -59,7 +59,7 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) ->
         scene.camera = of_interior.unwrap_or_else(|| framing::camera(bounds, &outside));
     }
     look.set_camera(scene)?;
-    if lacks.integrator && scene.has_shining_surfaces() {
+    if lacks.integrator && scene.needs_path() {
         scene.defaults.integrator = Integrator::Path;
     }
     if lacks.light && !scene.has_bright_surfaces() {

@@ -1,16 +1,21 @@
 //! Flat scenes: world-space triangles, and materials and lights as kernels read them.
 
+use std::f32::consts::PI;
+
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{Mismatch, Textures};
+use super::{Mismatch, Textures, emitters};
 use crate::{
     layout::{
-        FLAT_NORMAL, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT, Light, MATERIAL_CONDUCTOR, MATERIAL_FRESNEL,
-        MATERIAL_MICROFACET, MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SINGLE_SCATTERING, MATERIAL_SOLID,
-        MATERIAL_SPECULAR, MATERIAL_UNLIT, Material, Triangle, normal::encode_octahedral,
+        AREA_DISK, AREA_RECTANGLE, AREA_SPHERE, AreaLight, FLAT_NORMAL, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT,
+        Light, MATERIAL_CONDUCTOR, MATERIAL_FRESNEL, MATERIAL_MICROFACET, MATERIAL_REFLECT, MATERIAL_REFRACT,
+        MATERIAL_SINGLE_SCATTERING, MATERIAL_SOLID, MATERIAL_SPECULAR, MATERIAL_UNLIT, Material, Triangle,
+        normal::encode_octahedral,
     },
-    scene::{self, Alpha, Camera, Conductor, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene, Transform},
+    scene::{
+        self, Alpha, Camera, Conductor, Environment, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene, Transform,
+    },
 };
 
 /// Scene as it is traced: everything that a frame shows, with all meshes in world space.
@@ -29,8 +34,12 @@ pub struct FlatScene {
     pub material_names: Vec<String>,
     /// The textures, with what leads from triangles to them.
     pub textures: Textures,
-    /// The lights; there may be none.
+    /// The lights without an area; there may be none.
     pub lights: Vec<Light>,
+    /// Rectangles, disks and spheres that shine. Only the path tracer knows them.
+    pub area_lights: Vec<AreaLight>,
+    /// The image of what is beyond the scene. Only the path tracer knows it.
+    pub environment: Option<Environment>,
     /// The camera that renders the scene unless another one is set.
     pub camera: Camera,
     /// The irradiance that every point receives, which is weighted by the point's Ka.
@@ -66,12 +75,21 @@ impl FlatScene {
             materials: scene.materials.iter().map(Material::from).collect(),
             material_names: scene.materials.iter().map(|material| material.name.clone()).collect(),
             textures: Textures::new(scene)?,
-            lights: scene.lights.iter().map(Light::from).collect(),
+            lights: scene.lights.iter().filter_map(flat_light).collect(),
+            area_lights: scene.lights.iter().filter_map(area_light).collect(),
+            environment: scene.environment.clone(),
             camera: scene.camera,
             ambient: scene.ambient,
             background: scene.background,
             defaults: scene.defaults,
         })
+    }
+
+    /// Returns whether something lights the scene that only the path tracer knows: area lights, an environment map, or
+    /// surfaces that emit light.
+    pub fn needs_path(&self) -> bool {
+        let is_emissive = |ix: &u32| self.materials.get(*ix as usize).is_some_and(emitters::is_emissive);
+        !self.area_lights.is_empty() || self.environment.is_some() || self.triangle_materials.iter().any(is_emissive)
     }
 
     /// Returns the smallest and the largest coordinates of all triangles, world units. Without triangles these are
@@ -192,18 +210,46 @@ fn flags_of(lobes: Lobes) -> u32 {
         | flag(lobes.fresnel, MATERIAL_FRESNEL)
 }
 
-impl From<&scene::Light> for Light {
-    fn from(light: &scene::Light) -> Self {
-        match *light {
-            scene::Light::Point { position, intensity } => {
-                Self { position, kind: LIGHT_POINT, intensity, ..Self::default() }
-            }
-            scene::Light::Spot { position, towards, intensity, inner_cos, outer_cos } => {
-                Self { position, kind: LIGHT_SPOT, intensity, inner_cos, axis: towards, outer_cos }
-            }
-            scene::Light::Directional { towards, irradiance } => {
-                Self { position: towards, kind: LIGHT_DIRECTIONAL, intensity: irradiance, ..Self::default() }
-            }
+/// Returns a light as kernels read it, or `None` if it has an area.
+fn flat_light(light: &scene::Light) -> Option<Light> {
+    Some(match *light {
+        scene::Light::Point { position, intensity } => {
+            Light { position, kind: LIGHT_POINT, intensity, ..Light::default() }
         }
-    }
+        scene::Light::Spot { position, towards, intensity, inner_cos, outer_cos } => {
+            Light { position, kind: LIGHT_SPOT, intensity, inner_cos, axis: towards, outer_cos }
+        }
+        scene::Light::Directional { towards, irradiance } => {
+            Light { position: towards, kind: LIGHT_DIRECTIONAL, intensity: irradiance, ..Light::default() }
+        }
+        scene::Light::Sun { towards, irradiance, angle_degrees } => {
+            let outer_cos = f64::from(angle_degrees / 2.0).to_radians().cos() as f32;
+            Light { position: towards, kind: LIGHT_DIRECTIONAL, intensity: irradiance, outer_cos, ..Light::default() }
+        }
+        scene::Light::Rectangle { .. } | scene::Light::Disk { .. } | scene::Light::Sphere { .. } => return None,
+    })
+}
+
+/// Returns a light that has an area, as kernels read it. A light without area or radiance is left out.
+fn area_light(light: &scene::Light) -> Option<AreaLight> {
+    let of_disk = |axis: Vec3| axis.any_orthonormal_pair();
+    let made = match *light {
+        scene::Light::Rectangle { position, edge_u, edge_v, radiance } => {
+            let doubled = edge_u.cross(edge_v);
+            let (axis, area) = (doubled.normalize_or_zero(), 4.0 * doubled.length());
+            let kind = AREA_RECTANGLE;
+            AreaLight { position, kind, radiance, axis, area, edge_u, edge_v, ..AreaLight::default() }
+        }
+        scene::Light::Disk { position, towards: axis, radius, radiance } => {
+            let ((edge_u, edge_v), area) = (of_disk(axis), PI * radius * radius);
+            let kind = AREA_DISK;
+            AreaLight { position, kind, radiance, radius, axis, area, edge_u, edge_v, ..AreaLight::default() }
+        }
+        scene::Light::Sphere { position, radius, radiance } => {
+            let area = 4.0 * PI * radius * radius;
+            AreaLight { position, kind: AREA_SPHERE, radiance, radius, area, ..AreaLight::default() }
+        }
+        _ => return None,
+    };
+    (!light.is_black()).then_some(made)
 }

@@ -1,7 +1,10 @@
 //! Worlds: what is rendered. A world is a scene with the acceleration structure over its triangles, and is consistent
 //! by construction.
 
+mod alias;
 mod corners;
+mod emitters;
+mod environment_map;
 mod flat;
 mod frame_constants;
 mod geometry;
@@ -11,15 +14,15 @@ mod path_materials;
 mod texture_arrays;
 mod textured;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::Vec3;
 
 #[cfg(test)]
 pub(crate) use self::texture_arrays::tests::{arrays_of, scene_of};
 pub use self::{
-    flat::FlatScene, geometry::Geometry, mismatch::Mismatch, path_materials::path_materials,
-    texture_arrays::TextureArrays, textured::Textures,
+    alias::AliasEntry, emitters::Emitters, environment_map::EnvironmentMap, flat::FlatScene, geometry::Geometry,
+    mismatch::Mismatch, path_materials::path_materials, texture_arrays::TextureArrays, textured::Textures,
 };
 use crate::{
     accel::{
@@ -43,6 +46,8 @@ struct Parts {
     scene: FlatScene,
     accel: Accel,
     accel_options: AccelOptions,
+    /// Made when they are first needed.
+    emitters: OnceLock<Emitters>,
 }
 
 impl World {
@@ -69,7 +74,12 @@ impl World {
     pub fn with_accel(scene: FlatScene, options: &AccelOptions) -> Result<Self, Mismatch> {
         mismatch::check_materials(&scene)?;
         let accel = Accel::new(&scene.triangles, options);
-        Ok(Self(Arc::new(Parts { scene, accel, accel_options: options.clone() })))
+        Ok(Self(Arc::new(Parts {
+            scene,
+            accel,
+            accel_options: options.clone(),
+            emitters: OnceLock::new(),
+        })))
     }
 
     /// Joins a scene and a kd-tree that was built elsewhere. `build_options`: the options that the tree was built
@@ -81,12 +91,17 @@ impl World {
         mismatch::check_materials(&scene)?;
         let (accel, accel_options) = (Accel::KdTree(tree), AccelOptions::KdTree(build_options.clone()));
         Geometry::new(&scene.triangles, &accel)?;
-        Ok(Self(Arc::new(Parts { scene, accel, accel_options })))
+        Ok(Self(Arc::new(Parts { scene, accel, accel_options, emitters: OnceLock::new() })))
     }
 
     /// The flattened scene.
     pub fn scene(&self) -> &FlatScene {
         &self.0.scene
+    }
+
+    /// The tables from which the path tracer picks lights. They are made at the first call.
+    pub fn emitters(&self) -> &Emitters {
+        self.0.emitters.get_or_init(|| Emitters::new(&self.0.scene))
     }
 
     /// The acceleration structure over the scene's triangles.
@@ -115,7 +130,7 @@ impl World {
     /// Computes the statistics of the acceleration structure. If the structure is a grid that no device has built,
     /// the host builds the grid first.
     pub fn statistics(&self) -> Statistics {
-        let Parts { scene, accel, accel_options } = &*self.0;
+        let Parts { scene, accel, accel_options, .. } = &*self.0;
         match (accel, accel_options) {
             (Accel::KdTree(tree), AccelOptions::KdTree(options)) => {
                 Statistics::KdTree(tree.statistics(scene.triangles.len(), options))

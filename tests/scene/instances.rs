@@ -47,6 +47,7 @@ fn scene(instances: Vec<Instance>) -> Scene {
         },
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,
+        environment: None,
         defaults: RenderDefaults::default(),
     }
 }

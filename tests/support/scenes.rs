@@ -37,6 +37,8 @@ pub fn empty() -> FlatScene {
         },
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,
+        area_lights: Vec::new(),
+        environment: None,
         defaults: RenderDefaults::default(),
     }
 }

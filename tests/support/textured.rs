@@ -29,6 +29,7 @@ pub fn empty() -> Scene {
         cameras: Vec::new(),
         ambient: Vec3::ZERO,
         background: Vec3::ZERO,
+        environment: None,
         defaults: RenderDefaults::default(),
     }
 }

@@ -117,7 +117,7 @@ fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError
             .in_scope(|| Scene::load_with(&args.scene, &args.load.options_for(&args.picture, &args.look)))
     });
     let scene = scene?;
-    scene.warn_if_unlit(&args.scene);
+    scene.warn_of_missing_light(&args.scene, args.picture.options(&scene.defaults).integrator);
     args.look.note_up(&args.scene, &scene).into_iter().for_each(|note| progress.note(&note));
     Ok((scene, load_ms))
 }

@@ -70,6 +70,31 @@ pub(super) fn light(light: &Light) -> String {
             let (direction, irradiance) = (vector(-towards), vector(irradiance));
             format!("kind = \"directional\"\ndirection = {direction}\nirradiance = {irradiance}\n")
         }
+        Light::Sun { towards, irradiance, angle_degrees } => {
+            let (direction, irradiance, angle) = (vector(-towards), vector(irradiance), number(angle_degrees));
+            format!("kind = \"directional\"\ndirection = {direction}\nirradiance = {irradiance}\nangle = {angle}\n")
+        }
+        Light::Rectangle { position, edge_u, edge_v, radiance } => {
+            let direction = vector(edge_u.cross(edge_v).normalize_or(Vec3::NEG_Y));
+            let (up, position, radiance) = (vector(edge_v.normalize_or(Vec3::Y)), vector(position), vector(radiance));
+            let (width, height) = (number(2.0 * edge_u.length()), number(2.0 * edge_v.length()));
+            format!(
+                "kind = \"rectangle\"\nposition = {position}\ndirection = {direction}\nup = {up}\nwidth = {width}\n\
+                 height = {height}\nradiance = {radiance}\n"
+            )
+        }
+        Light::Disk { position, towards, radius, radiance } => {
+            let (position, direction, radiance) = (vector(position), vector(towards), vector(radiance));
+            let radius = number(radius);
+            format!(
+                "kind = \"disk\"\nposition = {position}\ndirection = {direction}\nradius = {radius}\n\
+                 radiance = {radiance}\n"
+            )
+        }
+        Light::Sphere { position, radius, radiance } => {
+            let (position, radius, radiance) = (vector(position), number(radius), vector(radiance));
+            format!("kind = \"sphere\"\nposition = {position}\nradius = {radius}\nradiance = {radiance}\n")
+        }
         Light::Spot { position, towards, intensity, inner_cos, outer_cos } => {
             let (position, direction, intensity) = (vector(position), vector(towards), vector(intensity));
             // Double precision is needed to read the same cosines.

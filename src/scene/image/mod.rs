@@ -17,6 +17,7 @@ use std::{
 };
 
 use ::image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use glam::Vec3;
 use rayon::prelude::*;
 
 pub(super) use self::{facts::Examined, heights::normals_of_heights};
@@ -83,6 +84,22 @@ pub(super) fn decode_all(images: Vec<Encoded>, n_pixels: u64) -> Vec<Checked<Ima
         named(&image.name, || sum.clone().and_then(|()| decode(&image, &header)))
     };
     images.into_par_iter().zip(headers).map(decode_one).collect()
+}
+
+/// Decodes an image of floats, HDR or EXR. Returns its size and its colours, row by row, as they are in the file: they
+/// may be negative, infinite or NaN.
+pub(super) fn decode_colours(image: &Encoded) -> Checked<([u32; 2], Vec<Vec3>)> {
+    let decoded = named(&image.name, || {
+        let header = header_of(image)?;
+        let Format::Common(format @ (ImageFormat::Hdr | ImageFormat::OpenExr)) = header.format else {
+            return Err("is neither HDR nor EXR".to_owned());
+        };
+        check_sum([header].iter(), 0)?;
+        let decoder = decoder_of(format, &image.bytes)?;
+        Ok(DynamicImage::from_decoder(decoder).map_err(|error| error.to_string())?.into_rgb32f())
+    })?;
+    let size = [decoded.width(), decoded.height()];
+    Ok((size, decoded.as_raw().as_chunks().0.iter().copied().map(Vec3::from_array).collect()))
 }
 
 /// Does one step for an image, and names the image in the step's error. A decoder's panic becomes an error: a fault in

@@ -86,7 +86,7 @@ def build(scene):
 
 
 # Turns the middle column of the picture to where kdray has it.
-ENVIRONMENT_TO_WORLD = mi.ScalarTransform4f().rotate([0, 1, 0], 0)
+ENVIRONMENT_TO_WORLD = mi.ScalarTransform4f().rotate([0, 1, 0], 180)
 
 
 def render(built, n_samples, seed):

@@ -95,7 +95,7 @@ def sky(height=64):
     """A smooth sky with a broad bright spot."""
     v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(2 * height) + 0.5) / (2 * height), indexing="ij")
     up = np.cos(np.pi * v)
-    spot = np.exp(-((u - 0.3) ** 2) / 0.005 - ((v - 0.3) ** 2) / 0.01)
+    spot = np.exp(-((u - 0.8) ** 2) / 0.005 - ((v - 0.3) ** 2) / 0.01)
     colour = np.stack([0.4 + 0.2 * up, 0.5 + 0.3 * up, 0.6 + 0.4 * up], -1)
     return (colour + 12 * spot[..., None] * np.array([1.0, 0.9, 0.7])).astype(np.float32)
 

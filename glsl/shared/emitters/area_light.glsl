@@ -1,0 +1,70 @@
+// Rectangles, disks and spheres, which are no part of the acceleration structure. Twin of
+// src/reference/emitters/area_light.rs.
+//
+// Needs the words of textures (texture_words.glsl).
+#ifndef KDRAY_AREA_LIGHT
+#define KDRAY_AREA_LIGHT
+
+#include "layout.glsl"
+#include "texture_words.glsl"
+#include "emitters/pick.glsl"
+#include "emitters/rectangle.glsl"
+#include "emitters/disk.glsl"
+#include "emitters/sphere.glsl"
+
+// What a ray sees of the area lights. t: distance of the nearest one, infinity if it meets none. density: with which
+// pick_light picks the direction, per steradian.
+struct SeenLight {
+    float t;
+    vec3 radiance;
+    float density;
+};
+
+vec3 load_vector(uint at) {
+    return vec3(load_float(at), load_float(at + 1u), load_float(at + 2u));
+}
+
+// An area light or, behind the last one, a sun.
+AreaLight area_light_at(uint light_ix) {
+    uint at = accel.area_lights_begin + 20u * light_ix;
+    return AreaLight(
+        load_vector(at), load_texture_words(at + 3u), load_vector(at + 4u), load_float(at + 7u),
+        load_vector(at + 8u), load_float(at + 11u), load_vector(at + 12u), load_float(at + 15u),
+        load_vector(at + 16u), 0u
+    );
+}
+
+// Distance at which a ray meets an area light, world units; infinity if it does not. direction: a unit vector.
+float hit_area_light(AreaLight light, vec3 origin, vec3 direction) {
+    if (light.kind == AREA_RECTANGLE) return hit_rectangle(light, origin, direction);
+    if (light.kind == AREA_DISK) return hit_disk(light, origin, direction);
+    return hit_sphere(light, origin, direction);
+}
+
+// The nearest rectangle, disk or sphere that the ray meets between 0 and t_max. direction: a unit vector. The backs of
+// rectangles and disks and the insides of spheres are not seen.
+SeenLight seen_light(vec3 origin, vec3 direction, float t_max) {
+    float nearest = uintBitsToFloat(0x7f800000u);
+    uint nearest_ix = 0u;
+    for (uint light_ix = 0u; light_ix < accel.n_area_lights; ++light_ix) {
+        float t = hit_area_light(area_light_at(light_ix), origin, direction);
+        if (t < nearest && t < t_max) {
+            nearest = t;
+            nearest_ix = light_ix;
+        }
+    }
+    if (isinf(nearest)) return SeenLight(nearest, vec3(0.0), 0.0);
+    AreaLight light = area_light_at(nearest_ix);
+    float density = light.kind == AREA_SPHERE ? sphere_density(light, origin)
+        : flat_density(light, direction, nearest);
+    return SeenLight(nearest, light.radiance, light.probability * density);
+}
+
+LightPick pick_area_light(uint light_ix, vec3 point_world, vec2 u) {
+    AreaLight light = area_light_at(light_ix);
+    if (light.kind == AREA_RECTANGLE) return pick_rectangle(light, point_world, u);
+    if (light.kind == AREA_DISK) return pick_disk(light, point_world, u);
+    return pick_sphere(light, point_world, u);
+}
+
+#endif

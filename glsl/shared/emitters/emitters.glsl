@@ -1,0 +1,74 @@
+// The emitters of the path tracer: what a point of a surface may get light from. One emitter is picked with a
+// probability by its power, and then a direction towards it. Twin of src/reference/emitters/mod.rs.
+//
+// Needs the bindings `lights` and `materials` (material.glsl), and the words of textures.
+#ifndef KDRAY_EMITTERS
+#define KDRAY_EMITTERS
+
+#include "layout.glsl"
+#include "scene.glsl"
+#include "texture_words.glsl"
+#include "emitters/alias.glsl"
+#include "emitters/area_light.glsl"
+#include "emitters/environment.glsl"
+#include "emitters/pick.glsl"
+#include "emitters/punctual.glsl"
+#include "emitters/triangle.glsl"
+
+// The share of the way to a light within which another light hides it. What is beyond counts as the light itself.
+const float LIGHT_HIDES_UP_TO = 0.9999;
+
+Emitter emitter_at(uint emitter_ix) {
+    uint at = accel.emitters_begin + 5u * emitter_ix;
+    return Emitter(
+        load_float(at), load_texture_words(at + 1u), load_float(at + 2u), load_texture_words(at + 3u),
+        load_texture_words(at + 4u)
+    );
+}
+
+// Picks a direction from which light may come to a point. u: in [0, 1); u.x selects the emitter. What hides the light
+// is not asked, except for rectangles, disks and spheres, which only seen_light knows.
+LightPick pick_light(vec3 point_world, vec3 u) {
+    if (accel.n_emitters == 0u) return no_pick();
+    // Tables of many entries need more bits than u.x has. The lowest bits of u.y hardly move the point that is picked.
+    float more = fract(u.y * 4096.0);
+    Emitter emitter = emitter_at(pick_alias(accel.emitters_begin, 5u, accel.n_emitters, u.x, more).ix);
+    LightPick pick = no_pick();
+    if (emitter.kind == EMITTER_LIGHT) {
+        pick = pick_punctual(lights[emitter.ix], point_world, emitter.probability);
+    } else if (emitter.kind == EMITTER_AREA) {
+        pick = pick_area_light(emitter.ix, point_world, u.yz);
+    } else if (emitter.kind == EMITTER_SUN) {
+        pick = pick_sun(emitter.ix, u.yz);
+    } else if (emitter.kind == EMITTER_TRIANGLE) {
+        pick = pick_triangle(emitter.ix, point_world, u.yz, emitter.probability);
+    } else {
+        pick = pick_environment(u.yz);
+    }
+    if (accel.n_area_lights == 0u) return pick;
+    SeenLight before = seen_light(point_world, pick.direction, LIGHT_HIDES_UP_TO * pick.distance);
+    if (!isinf(before.t)) return no_pick();
+    return pick;
+}
+
+// The density with which pick_light picks the point of a triangle that is seen in a direction at a distance, per
+// steradian; 0 for a triangle that is never picked. direction: a unit vector.
+float emission_density(uint triangle_ix, vec3 direction, float distance) {
+    uint low = accel.first_triangle_emitter, end = low + accel.n_triangle_emitters;
+    // The first entry whose triangle has this index or a larger one.
+    uint high = end;
+    while (low < high) {
+        uint middle = low + (high - low) / 2u;
+        if (load_texture_words(accel.emitters_begin + 5u * middle + 4u) < triangle_ix) {
+            low = middle + 1u;
+        } else {
+            high = middle;
+        }
+    }
+    if (low == end) return 0.0;
+    Emitter emitter = emitter_at(low);
+    if (emitter.ix != triangle_ix) return 0.0;
+    return emitter.probability * area_density(triangle_at(triangle_ix), direction, distance);
+}
+
+#endif

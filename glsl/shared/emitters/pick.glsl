@@ -1,0 +1,56 @@
+// What `pick_light` returns, whichever kind of emitter was picked. Twin of src/reference/emitters/pick.rs.
+#ifndef KDRAY_PICK
+#define KDRAY_PICK
+
+#include "layout.glsl"
+
+const float EMITTER_PI = 3.14159265;
+// A number beyond which a density or a weight counts as infinite.
+const float MOST_LIGHT = 1.0e30;
+
+// A direction from which light may come.
+struct LightPick {
+    // Unit vector from the point, and the distance up to which the way must be free, world units (infinity for what is
+    // beyond the scene).
+    vec3 direction;
+    float distance;
+    // Radiance divided by `density`. Of lights without a size: irradiance on a facing surface, divided by the
+    // probability of the pick. Either is multiplied by f |cos| to give the reflected radiance. 0: there is no light.
+    vec3 light;
+    // With which the direction is picked, per steradian, the probability of the emitter included. 0 for lights without
+    // a size, which no ray can hit.
+    float density;
+};
+
+LightPick no_pick() {
+    return LightPick(vec3(0.0), 0.0, vec3(0.0), 0.0);
+}
+
+// Unit vector and distance to a point; the distance is 0 if there is no direction.
+struct Towards {
+    vec3 direction;
+    float distance;
+};
+
+Towards towards(vec3 from, vec3 to) {
+    vec3 way = to - from;
+    float distance = sqrt(dot(way, way));
+    if (!(distance > 0.0)) return Towards(vec3(0.0), 0.0);
+    return Towards(way / distance, distance);
+}
+
+// The pick of a point from which light of this radiance comes.
+LightPick pick_of_point(Towards way, vec3 radiance, float density) {
+    if (!(density > 0.0 && density < MOST_LIGHT)) return no_pick();
+    return LightPick(way.direction, way.distance, radiance / density, density);
+}
+
+// A vector that is `cosine` along the axis, and `sine` aside of it at an azimuth in turns. The three axes are
+// orthonormal.
+vec3 around(vec3 axis, vec3 aside_u, vec3 aside_v, vec3 cosine_sine_turns) {
+    float azimuth = 2.0 * EMITTER_PI * cosine_sine_turns.z;
+    return cosine_sine_turns.x * axis
+        + cosine_sine_turns.y * (cos(azimuth) * aside_u + sin(azimuth) * aside_v);
+}
+
+#endif

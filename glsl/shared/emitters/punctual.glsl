@@ -1,0 +1,19 @@
+// Point, spot and directional lights without a size. Scene files state them for surfaces that show the irradiance as
+// radiance, so that the irradiance of the physical light is pi times as large. Twin of
+// src/reference/emitters/punctual.rs.
+#ifndef KDRAY_PUNCTUAL
+#define KDRAY_PUNCTUAL
+
+#include "layout.glsl"
+#include "light.glsl"
+#include "emitters/pick.glsl"
+
+// probability: with which this light is picked.
+LightPick pick_punctual(Light light, vec3 point_world, float probability) {
+    LightSample arriving = sample_light(light, point_world);
+    // Not `<=`: at the light itself, there are NaNs.
+    if (!(arriving.distance > 0.0)) return no_pick();
+    return LightPick(arriving.direction, arriving.distance, arriving.irradiance * (EMITTER_PI / probability), 0.0);
+}
+
+#endif

@@ -1,0 +1,54 @@
+// Spheres that shine outwards. A direction is picked uniformly in the cone in which the sphere is seen. From inside,
+// there is no light. Twin of src/reference/emitters/sphere.rs.
+#ifndef KDRAY_SPHERE
+#define KDRAY_SPHERE
+
+#include "layout.glsl"
+#include "emitters/pick.glsl"
+
+// Distance at which a ray meets the sphere from outside, in lengths of its direction, a unit vector; infinity if it
+// does not. The distance of the centre from the ray's line is computed first, which keeps small and distant spheres
+// exact (Haines et al.: Precision Improvements for Ray/Sphere Intersection, Ray Tracing Gems, 2019).
+float hit_sphere(AreaLight light, vec3 origin, vec3 direction) {
+    vec3 to_centre = light.position - origin;
+    float along = dot(to_centre, direction);
+    vec3 aside = to_centre - along * direction;
+    float squared = light.radius * light.radius - dot(aside, aside);
+    bool is_outside = dot(to_centre, to_centre) > light.radius * light.radius;
+    return is_outside && along > 0.0 && squared >= 0.0 ? along - sqrt(squared) : uintBitsToFloat(0x7f800000u);
+}
+
+// 1 less the cosine of the angle between the centre of the sphere and its edge, seen from a point; 0 from inside.
+// to_centre: from the point to the centre.
+float sphere_versine(AreaLight light, vec3 to_centre) {
+    float squared_sine = light.radius * light.radius / dot(to_centre, to_centre);
+    return squared_sine < 1.0 ? squared_sine / (1.0 + sqrt(1.0 - squared_sine)) : 0.0;
+}
+
+// Density per steradian of the directions in which the sphere is seen; 0 from inside.
+float sphere_density(AreaLight light, vec3 point_world) {
+    float versine = sphere_versine(light, light.position - point_world);
+    return versine > 0.0 ? 1.0 / (2.0 * EMITTER_PI * versine) : 0.0;
+}
+
+LightPick pick_sphere(AreaLight light, vec3 point_world, vec2 u) {
+    Towards to_centre = towards(point_world, light.position);
+    float versine = u.x * sphere_versine(light, light.position - point_world);
+    float sine = sqrt(versine * (2.0 - versine));
+    // Two axes that complete the first one (Duff et al.: Building an Orthonormal Basis, Revisited, JCGT 2017).
+    vec3 axis = to_centre.direction;
+    float side = axis.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (side + axis.z);
+    float b = axis.x * axis.y * a;
+    vec3 aside_u = vec3(1.0 + side * axis.x * axis.x * a, side * b, -side * axis.x);
+    vec3 aside_v = vec3(b, side + axis.y * axis.y * a, -axis.y);
+    vec3 direction = around(axis, aside_u, aside_v, vec3(1.0 - versine, sine, u.y));
+    float aside = to_centre.distance * sine;
+    float half_chord = sqrt(max(light.radius * light.radius - aside * aside, 0.0));
+    float distance = max(to_centre.distance * (1.0 - versine) - half_chord, 0.0);
+    return pick_of_point(
+        Towards(direction, distance), light.radiance, light.probability * sphere_density(light, point_world)
+    );
+}
+
+#endif

@@ -1,0 +1,52 @@
+// Triangles whose material emits light, to both sides. A point is picked uniformly on the area. Twin of
+// src/reference/emitters/triangle.rs.
+//
+// Needs the binding `materials` (material.glsl) and the words of textures.
+#ifndef KDRAY_EMITTING_TRIANGLE
+#define KDRAY_EMITTING_TRIANGLE
+
+#include "layout.glsl"
+#include "scene.glsl"
+#include "texture_words.glsl"
+#include "texture.glsl"
+#include "material.glsl"
+#include "emitters/pick.glsl"
+
+// The radiance that a triangle emits at barycentric weights of its second and third corner, by the largest level of
+// its texture. A surface without shading (`unlit`) emits nothing.
+vec3 emission_at(uint triangle_ix, float u, float v) {
+    uint material_ix = load_triangle_materials(triangle_ix);
+    if ((materials[material_ix].flags & MATERIAL_UNLIT) != 0u) return vec3(0.0);
+    vec3 emitted = materials[material_ix].ke;
+    if (!TEXTURED || accel.material_maps_begin == NO_WORDS) return emitted;
+    uint texture_ix = maps_of(material_ix).emission;
+    if (texture_ix == NO_TEXTURE) return emitted;
+    Texture map = texture_at(texture_ix);
+    return emitted * max(sample_finest(map, uv_at(triangle_ix, uv_set_of(map), u, v)).rgb, 0.0);
+}
+
+// Density per steradian of a direction in which the triangle is seen at a distance, if its points are picked uniformly.
+float area_density(Triangle t, vec3 direction, float distance) {
+    // Twice the area, times the cosine.
+    float facing = abs(dot(cross(t.v1 - t.v0, t.v2 - t.v0), direction));
+    float density = 2.0 * distance * distance / facing;
+    return density < MOST_LIGHT ? density : 0.0;
+}
+
+// Barycentric weights of a triangle's second and third corner, uniform on its area (Heitz: A Low-Distortion Map Between
+// Triangle and Square, 2019).
+vec2 triangle_weights(vec2 u) {
+    return u.y > u.x ? vec2(0.5 * u.x, u.y - 0.5 * u.x) : vec2(u.x - 0.5 * u.y, 0.5 * u.y);
+}
+
+// probability: with which this triangle is picked.
+LightPick pick_triangle(uint triangle_ix, vec3 point_world, vec2 u, float probability) {
+    Triangle t = triangle_at(triangle_ix);
+    vec2 weights = triangle_weights(u);
+    vec3 point = t.v0 + weights.x * (t.v1 - t.v0) + weights.y * (t.v2 - t.v0);
+    Towards way = towards(point_world, point);
+    float density = probability * area_density(t, way.direction, way.distance);
+    return pick_of_point(way, emission_at(triangle_ix, weights.x, weights.y), density);
+}
+
+#endif

@@ -1,0 +1,61 @@
+//! Rectangles, disks and spheres, which are no part of the acceleration structure. Twin of
+//! `emitters/area_light.glsl`.
+
+use glam::{Vec2, Vec3};
+
+use super::{
+    disk::{hit_disk, pick_disk},
+    pick::LightPick,
+    rectangle::{flat_density, hit_rectangle, pick_rectangle},
+    sphere::{hit_sphere, pick_sphere, sphere_density},
+};
+use crate::{
+    layout::{AREA_DISK, AREA_RECTANGLE, AREA_SPHERE, AreaLight},
+    reference::inputs::KernelInputs,
+};
+
+/// What a ray sees of the area lights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeenLight {
+    /// Distance of the nearest one, world units; infinity if the ray meets none.
+    pub t: f32,
+    /// Radiance that it emits.
+    pub radiance: Vec3,
+    /// With which [`pick_light`](super::pick_light) picks the direction, per steradian.
+    pub density: f32,
+}
+
+/// Distance at which a ray meets an area light, world units; infinity if it does not.
+fn hit_area_light(light: &AreaLight, origin: Vec3, direction: Vec3) -> f32 {
+    match light.kind {
+        AREA_RECTANGLE => hit_rectangle(light, origin, direction),
+        AREA_DISK => hit_disk(light, origin, direction),
+        _ => hit_sphere(light, origin, direction),
+    }
+}
+
+/// The nearest rectangle, disk or sphere that the ray meets between 0 and `t_max`. `direction`: a unit vector. The backs
+/// of rectangles and disks and the insides of spheres are not seen.
+pub fn seen_light(inputs: &KernelInputs, origin: Vec3, direction: Vec3, t_max: f32) -> SeenLight {
+    let (mut nearest, mut seen) = (f32::INFINITY, None);
+    for light in inputs.emitters.into_iter().flat_map(|emitters| emitters.shapes()) {
+        let t = hit_area_light(light, origin, direction);
+        if t < nearest && t < t_max {
+            (nearest, seen) = (t, Some(light));
+        }
+    }
+    let Some(light) = seen else { return SeenLight { t: nearest, radiance: Vec3::ZERO, density: 0.0 } };
+    let density = match light.kind {
+        AREA_SPHERE => sphere_density(light, origin),
+        _ => flat_density(light, direction, nearest),
+    };
+    SeenLight { t: nearest, radiance: light.radiance, density: light.probability * density }
+}
+
+pub(super) fn pick_area_light(light: &AreaLight, point_world: Vec3, u: Vec2) -> LightPick {
+    match light.kind {
+        AREA_RECTANGLE => pick_rectangle(light, point_world, u),
+        AREA_DISK => pick_disk(light, point_world, u),
+        _ => pick_sphere(light, point_world, u),
+    }
+}

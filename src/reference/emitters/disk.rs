@@ -1,0 +1,39 @@
+//! Disks that shine to one side. Twin of `emitters/disk.glsl`, which names the source.
+
+use std::f32::consts::FRAC_PI_4;
+
+use glam::{Vec2, Vec3};
+
+use super::{
+    pick::{LightPick, pick_of_point, towards},
+    rectangle::{flat_density, hit_plane},
+};
+use crate::layout::AreaLight;
+
+/// Distance at which a ray meets the disk's front, in lengths of its direction; infinity if it does not.
+pub(super) fn hit_disk(light: &AreaLight, origin: Vec3, direction: Vec3) -> f32 {
+    let t = hit_plane(light, origin, direction);
+    let from_centre = origin + t * direction - light.position;
+    if from_centre.dot(from_centre) <= light.radius * light.radius { t } else { f32::INFINITY }
+}
+
+/// A point of the unit disk, uniform on its area.
+fn disk_point(u: Vec2) -> Vec2 {
+    let at = 2.0 * u - 1.0;
+    if at == Vec2::ZERO {
+        return at;
+    }
+    if at.x.abs() > at.y.abs() {
+        at.x * Vec2::from_angle(FRAC_PI_4 * (at.y / at.x))
+    } else {
+        let (sine, cosine) = (FRAC_PI_4 * (at.x / at.y)).sin_cos();
+        at.y * Vec2::new(sine, cosine)
+    }
+}
+
+pub(super) fn pick_disk(light: &AreaLight, point_world: Vec3, u: Vec2) -> LightPick {
+    let place = light.radius * disk_point(u);
+    let way = towards(point_world, light.position + place.x * light.edge_u + place.y * light.edge_v);
+    let density = light.probability * flat_density(light, way.direction, way.distance);
+    pick_of_point(way, light.radiance, density)
+}

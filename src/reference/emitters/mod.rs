@@ -1,0 +1,65 @@
+//! The emitters of the path tracer: what a point of a surface may get light from. Twin of `emitters/emitters.glsl`.
+
+pub mod alias;
+pub mod area_light;
+mod disk;
+pub mod environment;
+pub mod pick;
+pub mod punctual;
+mod rectangle;
+mod sphere;
+mod sun;
+#[cfg(test)]
+mod tests;
+pub mod triangle;
+
+use glam::{Vec2, Vec3};
+
+pub use self::{
+    area_light::{SeenLight, seen_light},
+    environment::{ambient_radiance, environment_density, environment_radiance},
+    pick::LightPick,
+    triangle::emission_at,
+};
+use self::{
+    alias::pick_alias,
+    area_light::pick_area_light,
+    environment::{pick_environment, pick_sun},
+    punctual::pick_punctual,
+    triangle::{area_density, pick_triangle},
+};
+use super::inputs::KernelInputs;
+use crate::layout::{EMITTER_AREA, EMITTER_LIGHT, EMITTER_SUN, EMITTER_TRIANGLE};
+
+/// The share of the way to a light within which another light hides it. What is beyond counts as the light itself.
+const LIGHT_HIDES_UP_TO: f32 = 0.9999;
+
+/// Picks a direction from which light may come to a point. `u` is in [0, 1), and `u.x` selects the emitter. What hides
+/// the light is not asked, except for rectangles, disks and spheres, which only [`seen_light`] knows.
+pub fn pick_light(inputs: &KernelInputs, point_world: Vec3, u: Vec3) -> LightPick {
+    let Some(emitters) = inputs.emitters.filter(|emitters| !emitters.entries.is_empty()) else {
+        return LightPick::NONE;
+    };
+    // Tables of many entries need more bits than u.x has. The lowest bits of u.y hardly move the point that is picked.
+    let more = (u.y * 4096.0).fract();
+    let entry = |ix: u32| (emitters.entries[ix as usize].threshold, emitters.entries[ix as usize].alias_ix);
+    let emitter = &emitters.entries[pick_alias(emitters.entries.len() as u32, entry, u.x, more).ix as usize];
+    let (ix, rest) = (emitter.ix as usize, Vec2::new(u.y, u.z));
+    let pick = match emitter.kind {
+        EMITTER_LIGHT => pick_punctual(&inputs.lights[ix], point_world, emitter.probability),
+        EMITTER_AREA => pick_area_light(&emitters.shapes()[ix], point_world, rest),
+        EMITTER_SUN => pick_sun(emitters, &emitters.suns()[ix], rest),
+        EMITTER_TRIANGLE => pick_triangle(inputs, emitter.ix, point_world, rest, emitter.probability),
+        _ => pick_environment(emitters, rest),
+    };
+    let before = seen_light(inputs, point_world, pick.direction, LIGHT_HIDES_UP_TO * pick.distance);
+    if before.t.is_infinite() { pick } else { LightPick::NONE }
+}
+
+/// The density with which [`pick_light`] picks the point of a triangle that is seen in a direction at a distance, per
+/// steradian; 0 for a triangle that is never picked. `direction`: a unit vector.
+pub fn emission_density(inputs: &KernelInputs, triangle_ix: u32, direction: Vec3, distance: f32) -> f32 {
+    let triangles = inputs.emitters.map_or(&[][..], |emitters| emitters.triangles());
+    let Ok(ix) = triangles.binary_search_by_key(&triangle_ix, |emitter| emitter.ix) else { return 0.0 };
+    triangles[ix].probability * area_density(&inputs.triangles[triangle_ix as usize], direction, distance)
+}

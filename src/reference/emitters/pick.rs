@@ -1,0 +1,59 @@
+//! What [`pick_light`](super::pick_light) returns, whichever kind of emitter was picked. Twin of `emitters/pick.glsl`.
+
+use std::f32::consts::TAU;
+
+use glam::Vec3;
+
+/// A number beyond which a density or a weight counts as infinite.
+pub(super) const MOST_LIGHT: f32 = 1.0e30;
+
+/// A direction from which light may come.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightPick {
+    /// Unit vector from the point.
+    pub direction: Vec3,
+    /// Distance up to which the way must be free, world units (infinity for what is beyond the scene).
+    pub distance: f32,
+    /// Radiance divided by `density`. Of lights without a size: irradiance on a facing surface, divided by the
+    /// probability of the pick. Either is multiplied by f |cos| to give the reflected radiance. 0: there is no light.
+    pub light: Vec3,
+    /// With which the direction is picked, per steradian, the probability of the emitter included. 0 for lights
+    /// without a size, which no ray can hit.
+    pub density: f32,
+}
+
+impl LightPick {
+    /// There is no light.
+    pub const NONE: Self = Self { direction: Vec3::ZERO, distance: 0.0, light: Vec3::ZERO, density: 0.0 };
+}
+
+/// Unit vector and distance to a point; the distance is 0 if there is no direction.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Towards {
+    pub direction: Vec3,
+    pub distance: f32,
+}
+
+pub(super) fn towards(from: Vec3, to: Vec3) -> Towards {
+    let way = to - from;
+    let distance = way.dot(way).sqrt();
+    // Not `<=`: a NaN has no direction.
+    if !(distance > 0.0) {
+        return Towards { direction: Vec3::ZERO, distance: 0.0 };
+    }
+    Towards { direction: way / distance, distance }
+}
+
+/// The pick of a point from which light of this radiance comes.
+pub(super) fn pick_of_point(way: Towards, radiance: Vec3, density: f32) -> LightPick {
+    if !(density > 0.0 && density < MOST_LIGHT) {
+        return LightPick::NONE;
+    }
+    LightPick { direction: way.direction, distance: way.distance, light: radiance / density, density }
+}
+
+/// A vector that is `cosine` along the first of three orthonormal axes, and `sine` aside of it at an azimuth in turns.
+pub(super) fn around([axis, aside_u, aside_v]: [Vec3; 3], [cosine, sine, turns]: [f32; 3]) -> Vec3 {
+    let azimuth = TAU * turns;
+    cosine * axis + sine * (azimuth.cos() * aside_u + azimuth.sin() * aside_v)
+}
