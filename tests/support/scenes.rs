@@ -71,8 +71,14 @@ pub const BLACK: Material = Material {
     absorption: Vec3::ZERO,
     metallic: 0.0,
     roughness: 1.0,
+    clearcoat: 0.0,
+    clearcoat_roughness: 0.0,
+    sheen_roughness: 0.0,
+    sheen_colour: Vec3::ZERO,
     reserved0: 0,
+    conductor_eta: Vec3::ZERO,
     reserved1: 0,
+    conductor_k: Vec3::ZERO,
     reserved2: 0,
 };
 
