@@ -156,7 +156,7 @@ fn override_microfacet(material: &mut Material, spec: &MaterialSpec, stated: &Ma
         return;
     }
     let Some(terms) = &mut material.microfacet else { return };
-    set(&mut terms.metallic, stated.metallic, spec.metallic.is_some());
+    set(&mut terms.metallic, stated.metallic, spec.metallic.is_some() || spec.conductor_eta.is_some());
     set(&mut terms.roughness, stated.roughness, spec.roughness.is_some());
     // Light that begins to pass through a surface enters a solid unless it is said to be thin.
     let begins = spec.transmission.is_some() && terms.transmission == 0.0 && stated.transmission > 0.0;

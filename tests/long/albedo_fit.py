@@ -2,14 +2,14 @@
 
 The directional albedo of a lobe, for a viewer at the cosine mu, is computed by quasi-Monte Carlo over visible normals
 (Dupuy & Benyoub 2023; the weight of a sample is F G2 / G1) or, for sheen, over the hemisphere. It is fitted by least
-squares to a sum of products of powers of two variables. One is r, the roughness. The other is z = mu / (mu + 2 r^2),
+squares to a sum of products of powers of two variables. One is r, the roughness. The other is z = mu / (mu + r^2),
 since the albedo of GGX depends on the slope of the view relative to the slopes of the microfacets, or x = 1 - mu for
 sheen. The script prints the coefficients in GLSL and in Rust, and the errors.
 """
 
 import numpy as np
 
-N = 1 << 13
+N = 1 << 14
 
 
 def sobol_like(n):
@@ -101,21 +101,38 @@ def fitted(columns, values, weights=1.0):
     return c, (a @ c).reshape(values.shape)
 
 
+def evened(columns, values, weights, n):
+    """Coefficients that even out the errors, by Lawson's algorithm: n times, weights grow where errors are large."""
+    by_error = np.ones(values.shape)
+    for _ in range(n):
+        error = abs(fitted(columns, values, np.sqrt(by_error * weights))[1] - values) * weights
+        by_error *= (error / error.max() + 1e-3) ** 0.3
+        by_error /= by_error.max()
+    return fitted(columns, values, np.sqrt(by_error * weights))
+
+
+def nodes_of(n):
+    """Chebyshev's nodes in [0, 1], which are dense at the ends, where polynomials err most."""
+    return (1 - np.cos(np.pi * (np.arange(n) + 0.5) / n)) / 2
+
+
 def number(value):
     text = f"{np.float32(value):.8g}"
     return text if "." in text else text + ".0"
 
 
+def polynomial(row, language):
+    """A polynomial in r. `powers` are its powers 1 to 4, `fifth` the fifth."""
+    middle = ", ".join(number(value) for value in row[1:5])
+    product = f"dot(vec4({middle}), powers)" if language == "GLSL" else f"Vec4::new({middle}).dot(powers)"
+    return f"{number(row[0])} + {product}" + (f" + {number(row[5])} * fifth" if len(row) > 5 else "")
+
+
 def printed(name, rows):
     """Prints the polynomials in r, one for each power of the other variable from the highest on, in both languages."""
-    for ix, row in enumerate(rows[::-1]):
-        first, rest = number(row[0]), ", ".join(number(value) for value in row[1:])
-        begin = "float y = " if ix == 0 else "y = y * z + "
-        print(f"    {begin}{first} + dot(vec4({rest}), powers);   // {name}")
-    for ix, row in enumerate(rows[::-1]):
-        first, rest = number(row[0]), ", ".join(number(value) for value in row[1:])
-        begin = "let y = " if ix == 0 else "let y = y * z + "
-        print(f"    {begin}{first} + Vec4::new({rest}).dot(powers);   // {name}")
+    for language, first, more in (("GLSL", "float y = ", "y = y * z + "), ("Rust", "let y = ", "let y = y * z + ")):
+        for ix, row in enumerate(rows[::-1]):
+            print(f"    {first if ix == 0 else more}{polynomial(row, language)};   // {language} {name}")
 
 
 def report(name, found, exact):
@@ -124,17 +141,16 @@ def report(name, found, exact):
 
 
 def main():
-    mus = ((np.arange(48) + 0.5) / 48) ** 1.5
-    rs = np.linspace(0, 1, 33)[1:]
+    mus, rs = nodes_of(48), np.append(nodes_of(40), 1.0)
     table = np.array([[reflection_albedo(mu, r) for mu in mus] for r in rs])
     r, mu = np.meshgrid(rs, mus, indexing="ij")
-    z = mu / (mu + 2 * r * r)
-    columns = [z**i * (1 - z) * r**j for i in range(5) for j in range(5)]
+    z = mu / (mu + r * r)
+    columns = [z**i * (1 - z) * r**j for i in range(6) for j in range(6)]
     smooth = (1 - mu) ** 5
     fits = []
     for name, values in (("loss", 1 - table[..., 0]), ("grazing", table[..., 1] - smooth)):
-        c, found = fitted(columns, values)
-        printed(name, c.reshape(5, 5))
+        c, found = evened(columns, values, 0.5 + mu, 0 if name == "loss" else 6)
+        printed(name, c.reshape(6, 6))
         report(name, found, values)
         fits.append(c)
     # The averages over the hemisphere, weighted by the cosine, are those of the fits, so that the compensation has
@@ -143,13 +159,14 @@ def main():
     nodes, weights = (nodes + 1) / 2, weights / 2
     rs = np.linspace(0, 1, 65)[1:]
     r, mu = np.meshgrid(rs, nodes, indexing="ij")
-    z = mu / (mu + 2 * r * r)
-    columns = [z**i * (1 - z) * r**j for i in range(5) for j in range(5)]
+    z = mu / (mu + r * r)
+    columns = [z**i * (1 - z) * r**j for i in range(6) for j in range(6)]
     for name, c in zip(("mean loss", "mean grazing"), fits):
         value = sum(column * number for column, number in zip(columns, c))
         mean = (value * 2 * mu * weights).sum(1)
-        c, found = fitted([rs**j for j in range(1, 6)], mean, 1 / rs if name == "mean loss" else 1.0)
-        print(name, "r * (", number(c[0]), ",", [number(x) for x in c[1:]], ")")
+        c, found = fitted([rs**j for j in range(1, 7)], mean, 1 / rs if name == "mean loss" else 1.0)
+        for language in ("GLSL", "Rust"):
+            print(f"    roughness * ({polynomial(c, language)})   // {language} {name}")
         report(name, found, mean)
     mus = ((np.arange(32) + 0.5) / 32) ** 1.5
     rs = np.linspace(LEAST_SHEEN_ROUGHNESS, 1, 25)

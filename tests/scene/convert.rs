@@ -211,6 +211,10 @@ fn stated_terms_override_those_of_the_file() {
     // A map brings the tangents that it needs.
     let mapped = load("glass = { metallic = 1, map_normal = 'a.png' }").unwrap();
     assert!(mapped.materials[1].microfacet.is_some() && mapped.materials[1].maps.normal.is_some());
+    let layered = load("plain = { clearcoat = 0.5, conductor_eta = [1, 1, 1], conductor_k = [2, 2, 2] }").unwrap();
+    let metal = layered.materials.iter().find(|material| material.name == "plain").unwrap();
+    assert_eq!((metal.clearcoat.factor, metal.microfacet.unwrap().metallic), (0.5, 1.0));
+    assert!(metal.microfacet.unwrap().conductor.is_some());
     let error = load("plain = { Ns = 3 }").unwrap_err();
     let expected = "mesh 1: override of material `plain`: it is a microfacet material, which ignores Ns";
     assert!(error.ends_with(expected), "{error}");

@@ -7,7 +7,14 @@ use std::{
 };
 
 use glam::{Vec2, Vec3, Vec4};
-use kdray::scene::{Alpha, Channel, Encoding, Image, Material, Pixels, Scene, SceneError, Texture, Wrap};
+use kdray::{
+    layout::{MATERIAL_CONDUCTOR, MATERIAL_MICROFACET, MATERIAL_SINGLE_SCATTERING},
+    scene::{
+        Alpha, Channel, Clearcoat, Conductor, Encoding, Image, Material, Pixels, Scene, SceneError, Sheen, Texture,
+        Wrap,
+    },
+    world::FlatScene,
+};
 
 const QUAD: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
 
@@ -120,8 +127,10 @@ fn physically_based_terms_make_microfacets() {
     let mtl = "Kd 1 0 0\nPr 0.25\nPm 1\nPs 0.5\nPc 1\nPcr 0.125\nNi 1.4\naniso 0.5\nanisor 0\nnewmtl n\nPc 1";
     let (scene, warnings) = load_mtl(mtl, &files);
     // Each term is told once, and none of its value 0.
-    for (warning, term) in warnings.iter().zip(["m.mtl:5: `Ps`", "m.mtl:6: `Pc`", "m.mtl:9: `aniso`"]) {
-        assert!(warning.ends_with(&format!("{term} is not shown")), "{warnings:?}");
+    let by_whitted = "is not shown by the integrator whitted";
+    let terms = [("m.mtl:5: `Ps`", by_whitted), ("m.mtl:6: `Pc`", by_whitted), ("m.mtl:9: `aniso`", "is not shown")];
+    for (warning, (term, what)) in warnings.iter().zip(terms) {
+        assert!(warning.ends_with(&format!("{term} {what}")), "{warnings:?}");
     }
     assert_eq!(warnings.len(), 3, "{warnings:?}");
     material("Ps 0\nPc 0\nPcr 0.03\naniso 0\nanisor 0", &files);
@@ -266,6 +275,32 @@ fn load_toml(material: &str, images: &[(&str, &[u8])]) -> Result<Scene, SceneErr
 }
 
 #[test]
+fn scene_files_describe_layers_and_conductors() {
+    let text = "clearcoat = 0.5, clearcoat_roughness = 0.25, sheen_color = [0.1, 0.2, 2], sheen_roughness = 0.75, \
+                conductor_eta = [0.2, 1, 2], conductor_k = [4, 0, 1], single_scattering = true";
+    let scene = load_toml(text, &[]).unwrap();
+    let m = &scene.materials[0];
+    let pbr = m.microfacet.unwrap();
+    let (eta, k) = (Vec3::new(0.2, 1.0, 2.0), Vec3::new(4.0, 0.0, 1.0));
+    assert_eq!((pbr.conductor, pbr.metallic, pbr.has_single_scattering), (Some(Conductor { eta, k }), 1.0, true));
+    assert_eq!(m.clearcoat, Clearcoat { factor: 0.5, roughness: 0.25 });
+    assert_eq!(m.sheen, Sheen { colour: Vec3::new(0.1, 0.2, 1.0), roughness: 0.75 });
+    // The base colour is the reflectance along the normal: ((eta - 1)^2 + k^2) / ((eta + 1)^2 + k^2).
+    let reflectance = Vec3::new(16.64 / 17.44, 0.0, 2.0 / 10.0);
+    assert!((m.kd - reflectance).abs().max_element() < 1e-6, "{}", m.kd);
+    let flat = FlatScene::new(&scene).unwrap().materials[0];
+    let flags = MATERIAL_MICROFACET | MATERIAL_CONDUCTOR | MATERIAL_SINGLE_SCATTERING;
+    assert_eq!((flat.flags, flat.conductor_eta, flat.conductor_k), (flags, eta, k));
+    assert_eq!((flat.clearcoat, flat.clearcoat_roughness), (0.5, 0.25));
+    assert_eq!((flat.sheen_colour, flat.sheen_roughness), (m.sheen.colour, 0.75));
+    let terms: Vec<_> = m.terms().into_iter().filter(|term| !term.is_default).map(|term| term.key).collect();
+    let keys = ["clearcoat", "clearcoat_roughness", "sheen_color", "sheen_roughness", "single_scattering"];
+    let missing: Vec<_> =
+        keys.iter().chain(&["conductor_eta", "conductor_k"]).filter(|key| !terms.contains(key)).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
+#[test]
 fn scene_files_describe_maps_and_microfacets() {
     let images: [(&str, &[u8]); 2] = [("maps/a.png", &grey(1)), ("b.png", &png(|x, _| [x as u8 * 60; 4]))];
     let text = "map_Kd = 'maps/a.png', metallic = 0.5, roughness = 0.25, transmission = 1, Ni = 1.33, cutoff = 0.25, \
@@ -305,6 +340,13 @@ fn mistakes_in_materials_are_named() {
         ("map_Kd = { file = 'a.png', scale = [nan, 1] }", "map_Kd: scale is not finite"),
         ("map_kd = 'a.png'", "unknown field `map_kd`"),
         ("metallic = 2", "metallic = 2 is outside 0 to 1"),
+        ("clearcoat = 1.5", "clearcoat = 1.5 is outside 0 to 1"),
+        ("sheen_color = [0, -1, 0]", "sheen_color = [0.0, -1.0, 0.0] is not a colour"),
+        ("sheen_roughness = 2", "sheen_roughness = 2 is outside 0 to 1"),
+        ("conductor_eta = [1, 1, 1]", "has conductor_eta and no conductor_k"),
+        ("conductor_k = [1, 1, 1]", "has conductor_k and no conductor_eta"),
+        ("conductor_eta = [1, 0, 1], conductor_k = [1, 1, 1]", "conductor_eta = 0 is outside 0.001 to 100"),
+        ("clearcoat = 1, Ks = [1, 1, 1]", "has Ks beside clearcoat"),
         ("roughness = 0.5, Ns = 3", "has Ns beside roughness"),
         ("map_metallic = 'a.png', illum = 3", "has illum beside map_metallic"),
         ("attenuation_distance = 0", "attenuation_distance = 0 is not above 0"),

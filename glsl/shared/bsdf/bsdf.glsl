@@ -152,12 +152,6 @@ bool passes_straight(BsdfTerms terms) {
     return terms.is_solid ? terms.eta == 1.0 : terms.width == 0.0;
 }
 
-// The cosine that decides between reflection and transmission. A direction without density is chosen by the surface's
-// normal, since a microfacet's normal cannot be told from it.
-float choice_cosine(BsdfTerms terms, float cosine) {
-    return passes_straight(terms) ? terms.to_viewer.z : cosine;
-}
-
 // Share of light that the dielectric reflects, from `BsdfTerms.dielectric`.
 float dielectric_albedo(vec3 dielectric, GgxAlbedo albedo) {
     float at_normal = 1.0 - albedo.loss - albedo.grazing;
@@ -197,8 +191,9 @@ vec3 interface_albedo(BsdfTerms terms, GgxAlbedo albedo) {
 void set_layers(inout BsdfTerms terms, GgxAlbedo albedo) {
     Material material = terms.material;
     float cosine = terms.to_viewer.z;
-    float coat = material.clearcoat * clearcoat_albedo(cosine, terms.coat_roughness);
-    float sheen = sheen_albedo(cosine, terms.sheen_roughness);
+    float coat = 0.0, sheen = 0.0;
+    if (material.clearcoat > 0.0) coat = material.clearcoat * clearcoat_albedo(cosine, terms.coat_roughness);
+    if (largest_of(material.sheen_colour) > 0.0) sheen = sheen_albedo(cosine, terms.sheen_roughness);
     terms.sheen_bound = sheen_bound(sheen);
     sheen *= terms.sheen_bound;
     terms.sheen_share = 1.0 - coat;
@@ -224,6 +219,7 @@ BsdfTerms bsdf_terms(Material material, Surface surface, vec3 to_viewer) {
     material.kd = clamp(material.kd, 0.0, 1.0);
     material.sheen_colour = clamp(material.sheen_colour, 0.0, 1.0);
     BsdfTerms terms;
+    // The viewer is on the front of the triangle, but may be behind an interpolated normal.
     bool is_behind = dot(surface.shading, to_viewer) < LEAST_COSINE;
     terms.frame = frame_around(is_behind ? surface.geometric : surface.shading);
     terms.to_viewer = to_local(terms.frame, to_viewer);
@@ -249,10 +245,11 @@ BsdfTerms bsdf_terms(Material material, Surface surface, vec3 to_viewer) {
 // Adds the interface's reflection.
 void add_reflection(BsdfTerms terms, vec3 to_light, vec3 half_vector, inout BsdfValue sum) {
     if (terms.width == 0.0) return;
-    float cosine = dot(terms.to_viewer, half_vector);
     float lobe = evaluate_reflection(terms.to_viewer, to_light, half_vector, terms.width);
-    sum.value += terms.base_share * split_at(terms, cosine).reflected * lobe;
-    float choice = terms.choice.x * reflected_choice(split_at(terms, choice_cosine(terms, cosine)));
+    InterfaceSplit split = split_at(terms, dot(terms.to_viewer, half_vector));
+    sum.value += terms.base_share * split.reflected * lobe;
+    if (passes_straight(terms)) split = split_at(terms, terms.to_viewer.z);
+    float choice = terms.choice.x * reflected_choice(split);
     sum.density += choice * reflection_density(terms.to_viewer, half_vector, terms.width);
 }
 
@@ -365,7 +362,8 @@ BsdfSample sample_interface(BsdfTerms terms, Surface surface, vec3 u) {
     vec3 half_vector = vec3(0.0, 0.0, 1.0);
     if (terms.width > 0.0) half_vector = sample_ggx(terms.to_viewer, terms.width, u.xy);
     float cosine = dot(terms.to_viewer, half_vector);
-    InterfaceSplit split = split_at(terms, choice_cosine(terms, cosine));
+    // Light that passes straight tells nothing of a microfacet, so the surface's normal decides.
+    InterfaceSplit split = split_at(terms, passes_straight(terms) ? terms.to_viewer.z : cosine);
     float choice = reflected_choice(split);
     bool is_reflected = u.z < choice;
     float probability = terms.choice.x * (is_reflected ? choice : 1.0 - choice);

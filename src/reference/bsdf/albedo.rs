@@ -19,33 +19,31 @@ fn roughness_powers(roughness: f32) -> Vec4 {
 }
 
 fn loss_polynomial(z: f32, powers: Vec4, fifth: f32) -> f32 {
-    let y = 10.795775 + Vec4::new(-16.239405, 51.006134, -202.83482, 78.299561).dot(powers) + 161.27727 * fifth;
+    let y = 8.5227442 + Vec4::new(-10.963147, 79.872063, -232.42944, 17.419209).dot(powers) + 210.4131 * fifth;
     let y =
-        y * z + -26.562994 + Vec4::new(49.515839, -153.49359, 573.59247, -562.10712).dot(powers) + 9.8753901 * fifth;
-    let y = y * z + 21.523111 + Vec4::new(-54.38987, 151.65544, -468.54492, 543.95184).dot(powers) + -135.23792 * fifth;
+        y * z + -20.575962 + Vec4::new(37.890228, -249.74614, 771.74255, -597.86566).dot(powers) + -41.687645 * fifth;
+    let y = y * z + 15.525029 + Vec4::new(-40.795704, 236.88469, -706.77136, 706.883).dot(powers) + -155.20528 * fifth;
+    let y = y * z + -4.2633696 + Vec4::new(17.504826, -85.484901, 228.00821, -237.29614).dot(powers) + 67.25351 * fifth;
     let y =
-        y * z + -7.1015534 + Vec4::new(27.680758, -71.783775, 157.78279, -171.56929).dot(powers) + 50.612175 * fifth;
-    let y =
-        y * z + 1.3948812 + Vec4::new(-6.7729173, 20.076412, -35.698917, 37.305031).dot(powers) + -12.584991 * fifth;
+        y * z + 0.78486699 + Vec4::new(-3.3760931, 14.595876, -33.455288, 38.245049).dot(powers) + -13.047832 * fifth;
     let y = y * z
-        + -0.065100223
-        + Vec4::new(0.53698862, -1.8196399, 3.0541897, -2.4706855).dot(powers)
-        + 0.77343577 * fifth;
+        + -0.021635758
+        + Vec4::new(0.20264785, -0.82070565, 1.5798448, -1.3904365).dot(powers)
+        + 0.45798045 * fifth;
     y
 }
 
 fn grazing_polynomial(z: f32, powers: Vec4, fifth: f32) -> f32 {
-    let y = -15.311678 + Vec4::new(77.970711, -616.11096, 1457.0963, -1220.7534).dot(powers) + 398.43201 * fifth;
-    let y = y * z + 34.28347 + Vec4::new(-95.196609, 811.09833, -2338.3191, 2226.7793).dot(powers) + -709.02826 * fifth;
+    let y = 43.237442 + Vec4::new(-688.62921, 2864.2729, -5492.8657, 5023.2246).dot(powers) + -1638.3431 * fifth;
     let y =
-        y * z + -27.839417 + Vec4::new(41.735516, -209.92664, 854.85785, -1024.0162).dot(powers) + 378.24075 * fifth;
-    let y = y * z + 10.974108 + Vec4::new(-33.234219, 68.285072, -130.46713, 134.6618).dot(powers) + -53.064407 * fifth;
+        y * z + -98.257233 + Vec4::new(1623.2207, -6962.7178, 13274.707, -12001.156).dot(powers) + 4049.2202 * fifth;
     let y =
-        y * z + -2.5162318 + Vec4::new(13.853616, -45.667526, 88.942169, -74.077003).dot(powers) + 23.311783 * fifth;
-    let y = y * z
-        + 0.26436004
-        + Vec4::new(-4.1400652, 5.2931671, -2.6391835, -0.070078336).dot(powers)
-        + 0.33687666 * fifth;
+        y * z + 78.186623 + Vec4::new(-1303.4658, 5784.9307, -11117.942, 9912.4473).dot(powers) + -3318.6135 * fifth;
+    let y = y * z + -24.997671 + Vec4::new(405.41129, -1829.0001, 3588.5264, -3229.603).dot(powers) + 1082.3663 * fifth;
+    let y =
+        y * z + 2.3397923 + Vec4::new(-41.212421, 180.50139, -338.95181, 304.03543).dot(powers) + -102.57932 * fifth;
+    let y =
+        y * z + -0.00194966 + Vec4::new(-1.1703906, -6.7782693, 19.844473, -19.539381).dot(powers) + 6.6895761 * fifth;
     y
 }
 
@@ -65,8 +63,9 @@ pub fn ggx_albedo(cosine: f32, roughness: f32) -> GgxAlbedo {
 pub fn mean_ggx_albedo(roughness: f32) -> GgxAlbedo {
     let powers = roughness_powers(roughness);
     let fifth = roughness * powers.w;
-    let loss = 0.000210142 + Vec4::new(-0.036332227, 0.48725173, 2.7229965, -4.1021533).dot(powers) + 1.5190759 * fifth;
-    let change = -0.030435629 + Vec4::new(0.54656982, -3.856077, 8.7369375, -8.3240175).dot(powers) + 2.8850048 * fifth;
+    let loss =
+        -0.0012865789 + Vec4::new(-0.01124437, 0.44400364, 2.6509104, -3.9033575).dot(powers) + 1.4113265 * fifth;
+    let change = 0.01249467 + Vec4::new(0.12266012, -2.301764, 6.0072041, -5.9807024).dot(powers) + 2.0946815 * fifth;
     GgxAlbedo { loss: (roughness * loss).max(0.0), grazing: 1.0 / 21.0 + roughness * change }
 }
 

@@ -174,12 +174,6 @@ fn passes_straight(terms: &BsdfTerms) -> bool {
     if terms.is_solid { terms.eta == 1.0 } else { terms.width == 0.0 }
 }
 
-/// The cosine that decides between reflection and transmission. A direction without density is chosen by the surface's
-/// normal, since a microfacet's normal cannot be told from it.
-fn choice_cosine(terms: &BsdfTerms, cosine: f32) -> f32 {
-    if passes_straight(terms) { terms.to_viewer.z } else { cosine }
-}
-
 /// Share of light that the dielectric reflects, from `BsdfTerms::dielectric`.
 fn dielectric_albedo(dielectric: Vec3, albedo: GgxAlbedo) -> f32 {
     let at_normal = 1.0 - albedo.loss - albedo.grazing;
@@ -219,8 +213,13 @@ fn interface_albedo(terms: &BsdfTerms, albedo: GgxAlbedo) -> Vec3 {
 fn set_layers(terms: &mut BsdfTerms, albedo: GgxAlbedo) {
     let material = terms.material;
     let cosine = terms.to_viewer.z;
-    let coat = material.clearcoat * clearcoat_albedo(cosine, terms.coat_roughness);
-    let sheen = sheen_albedo(cosine, terms.sheen_roughness);
+    let (mut coat, mut sheen) = (0.0, 0.0);
+    if material.clearcoat > 0.0 {
+        coat = material.clearcoat * clearcoat_albedo(cosine, terms.coat_roughness);
+    }
+    if material.sheen_colour.max_element() > 0.0 {
+        sheen = sheen_albedo(cosine, terms.sheen_roughness);
+    }
     terms.sheen_bound = sheen_bound(sheen);
     let sheen = sheen * terms.sheen_bound;
     terms.sheen_share = 1.0 - coat;
@@ -287,10 +286,13 @@ fn add_reflection(terms: &BsdfTerms, to_light: Vec3, half_vector: Vec3, sum: &mu
     if terms.width == 0.0 {
         return;
     }
-    let cosine = terms.to_viewer.dot(half_vector);
     let lobe = evaluate_reflection(terms.to_viewer, to_light, half_vector, terms.width);
-    sum.value += terms.base_share * split_at(terms, cosine).reflected * lobe;
-    let choice = terms.choice.x * reflected_choice(&split_at(terms, choice_cosine(terms, cosine)));
+    let mut split = split_at(terms, terms.to_viewer.dot(half_vector));
+    sum.value += terms.base_share * split.reflected * lobe;
+    if passes_straight(terms) {
+        split = split_at(terms, terms.to_viewer.z);
+    }
+    let choice = terms.choice.x * reflected_choice(&split);
     sum.density += choice * reflection_density(terms.to_viewer, half_vector, terms.width);
 }
 
@@ -423,7 +425,8 @@ fn sample_interface(terms: &BsdfTerms, surface: &Surface, u: Vec3) -> BsdfSample
     let is_rough = terms.width > 0.0;
     let half_vector = if is_rough { sample_ggx(terms.to_viewer, terms.width, u.xy()) } else { Vec3::Z };
     let cosine = terms.to_viewer.dot(half_vector);
-    let split = split_at(terms, choice_cosine(terms, cosine));
+    // Light that passes straight tells nothing of a microfacet, so the surface's normal decides.
+    let split = split_at(terms, if passes_straight(terms) { terms.to_viewer.z } else { cosine });
     let choice = reflected_choice(&split);
     let is_reflected = u.z < choice;
     let probability = terms.choice.x * if is_reflected { choice } else { 1.0 - choice };

@@ -7,7 +7,7 @@ use glam::{Vec3, vec3};
 use super::{
     albedo::{ggx_albedo, mean_ggx_albedo, sheen_albedo},
     conductor::conductor_reflectance,
-    ggx::{ggx_visible_density, sample_ggx},
+    ggx::{ggx_root, ggx_visible_density, sample_ggx},
     reflection::{evaluate_reflection, reflected_by},
     sheen::{evaluate_sheen, sample_sheen},
     *,
@@ -100,7 +100,7 @@ fn point(i: usize) -> Vec3 {
 /// The share of uniform light from all around that is scattered to the viewer. Light from beyond a solid's boundary is
 /// stated relative to the square of the index there, as it is in equilibrium.
 fn furnace(material: &Material, surface: &Surface, to_viewer: Vec3) -> Vec3 {
-    let n = 4096;
+    let n = 16_384;
     let is_solid = material.flags & SOLID != 0 && (material.ni - 1.0).abs() >= LEAST_INDEX_STEP;
     let eta = if surface.from_inside { material.ni } else { 1.0 / material.ni };
     let sum = (0..n).fold(Vec3::ZERO, |sum, i| {
@@ -123,12 +123,10 @@ fn white_surfaces_lose_no_light() {
         materials.push(Material { clearcoat: 0.5, ..plain });
         materials.push(Material { sheen_colour: Vec3::ONE, sheen_roughness: roughness, ..plain });
     }
-    let mut worst = 0.0_f32;
     for material in &materials {
         for cosine in VIEW_COSINES {
             let found = furnace(material, &flat(false), view(cosine));
-            worst = worst.max((found - 1.0).abs().max_element());
-            assert!((found - 1.0).abs().max_element() < 0.03, "{cosine}: {found} for {material:?}");
+            assert!((found - 1.0).abs().max_element() < 0.015, "{cosine}: {found} for {material:?}");
         }
     }
     // Without the compensation, the same comparison fails.
@@ -170,22 +168,28 @@ fn no_surface_gains_light() {
 /// furnace; Heitz 2014).
 #[test]
 fn visible_normals_integrate_to_one() {
+    let integral = |density: &dyn Fn(Vec3) -> f32| {
+        let n = 300;
+        let mut sum = 0.0_f64;
+        for i in 0..n * n {
+            // A grid that is finer near the normal, where the distribution is high.
+            let (a, b) = (((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32);
+            let z = 1.0 - a * a;
+            let sine = (1.0 - z * z).sqrt();
+            let normal = vec3(sine * (b * TAU).cos(), sine * (b * TAU).sin(), z);
+            sum += f64::from(density(normal) * 2.0 * a * TAU);
+        }
+        sum / (n * n) as f64
+    };
     for width in [0.1_f32, 0.4, 1.0] {
         for cosine in VIEW_COSINES {
             let to_viewer = view(cosine);
-            let n = 300;
-            let mut sum = 0.0_f64;
-            for i in 0..n * n {
-                // A grid that is finer near the normal, where the distribution is high.
-                let (a, b) = (((i % n) as f32 + 0.5) / n as f32, ((i / n) as f32 + 0.5) / n as f32);
-                let z = 1.0 - a * a;
-                let sine = (1.0 - z * z).sqrt();
-                let normal = vec3(sine * (b * TAU).cos(), sine * (b * TAU).sin(), z);
-                let facing = to_viewer.dot(normal).max(0.0);
-                sum += f64::from(ggx_visible_density(to_viewer, normal, width) * facing * 2.0 * a * TAU);
-            }
-            let found = sum / (n * n) as f64;
+            let of_normal = |normal| ggx_visible_density(to_viewer, normal, width) * to_viewer.dot(normal).max(0.0);
+            let found = integral(&of_normal);
             assert!((found - 1.0).abs() < 0.01, "{width}, {cosine}: {found}");
+            // Normals of which none is masked are too many, except for a view along the normal of a smooth surface.
+            let unmasked = |normal| of_normal(normal) * (to_viewer.z + ggx_root(to_viewer.z, width)) / (2.0 * cosine);
+            assert!(width < 0.4 || cosine > 0.9 || integral(&unmasked) > 1.02, "{width}, {cosine}");
         }
     }
 }
@@ -371,7 +375,27 @@ fn values_integrate_to_the_mean_weight() {
             let n = 4096;
             let weights = (0..n).map(|i| sample_bsdf(&material, &surface, to_viewer, point(i)).weight);
             let mean = weights.sum::<Vec3>() / n as f32;
-            assert!((integral - mean).abs().max_element() < 0.02, "{integral} {mean} {material:?}");
+            let is_near = |integral: Vec3| (integral - mean).abs().max_element() < 0.01;
+            assert!(is_near(integral), "{integral} {mean} {material:?}");
+            // A lobe that is evaluated and not sampled, which reflects 3 %, is noticed.
+            assert!(!is_near(integral + 0.03), "{integral} {mean} {material:?}");
+        }
+    }
+}
+
+/// Samples are chosen about as their values need: no weight is large, so that no path becomes a bright speck. Light
+/// from beyond a solid's boundary is scaled by the square of the index besides.
+#[test]
+fn weights_are_bounded() {
+    for material in rough_materials() {
+        for from_inside in [false, true] {
+            for i in 0..20_000 {
+                let to_viewer = view(0.02 + 0.97 * point(i + 999).y);
+                let sample = sample_bsdf(&material, &flat(from_inside), to_viewer, point(i));
+                let eta = if from_inside { material.ni } else { 1.0 / material.ni };
+                let scale = if sample.direction.z < 0.0 && material.flags & SOLID != 0 { eta * eta } else { 1.0 };
+                assert!(sample.weight.max_element() < 6.0 * scale, "{sample:?} {to_viewer} {material:?}");
+            }
         }
     }
 }
@@ -399,8 +423,8 @@ fn albedos_are_those_of_the_lobes() {
                 sheen += evaluate_sheen(to_viewer, to_light, roughness.max(LEAST_SHEEN_ROUGHNESS)) * TAU / n as f32;
             }
             let found = ggx_albedo(cosine, roughness);
-            assert!((1.0 - found.loss - whole).abs() < 0.02, "{roughness}, {cosine}: {found:?} {whole}");
-            assert!((found.grazing - grazing).abs() < 0.03, "{roughness}, {cosine}: {found:?} {grazing}");
+            assert!((1.0 - found.loss - whole).abs() < 0.006, "{roughness}, {cosine}: {found:?} {whole}");
+            assert!((found.grazing - grazing).abs() < 0.02, "{roughness}, {cosine}: {found:?} {grazing}");
             let found = sheen_albedo(cosine, roughness.max(LEAST_SHEEN_ROUGHNESS));
             assert!((found - sheen).abs() < 0.04, "{roughness}, {cosine}: {found} {sheen}");
         }
@@ -411,8 +435,8 @@ fn albedos_are_those_of_the_lobes() {
             (loss + weight * albedo.loss, grazing + weight * albedo.grazing)
         });
         let mean = mean_ggx_albedo(roughness);
-        assert!((mean.loss - loss).abs() < 0.01, "{roughness}: {mean:?} {loss}");
-        assert!((mean.grazing - grazing).abs() < 0.005, "{roughness}: {mean:?} {grazing}");
+        assert!((mean.loss - loss).abs() < 0.001, "{roughness}: {mean:?} {loss}");
+        assert!((mean.grazing - grazing).abs() < 0.002, "{roughness}: {mean:?} {grazing}");
     }
 }
 

@@ -169,7 +169,7 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Resu
             material.numbers.insert(keyword.to_owned(), number);
             // The roughness of the clearcoat says nothing without a clearcoat.
             if matches!(keyword, "Ps" | "Pc") && number > 0.0 {
-                warn(line, keyword, format!("`{keyword}` is not shown"));
+                warn(line, keyword, format!("`{keyword}` is not shown by the integrator whitted"));
             }
         }
         if keyword == "aniso" && words(rest).next().and_then(|word| word.parse().ok()).is_some_and(|x: f32| x != 0.0) {

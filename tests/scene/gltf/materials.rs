@@ -82,6 +82,8 @@ fn every_term_is_read() {
         is_solid: true,
         attenuation_colour: Vec3::new(0.9, 0.8, 0.7),
         attenuation_distance: 2.0,
+        conductor: None,
+        has_single_scattering: false,
     };
     assert_eq!(found.microfacet, Some(expected));
     assert_eq!(found.clearcoat, Clearcoat { factor: 0.7, roughness: 0.1 });
