@@ -68,8 +68,16 @@ Segment segment_to_light(
     vec3 light = added_light(throughput * scattered.value * pick.light * share, depth + 1u);
     if (!any(greaterThan(light, vec3(0.0)))) return segment;
     float side = dot(pick.direction, surface.geometric) < 0.0 ? -surface.clearance : surface.clearance;
-    vec3 origin = surface.point_world + side * surface.geometric;
-    return Segment(origin, SEGMENT_WAITS, pick.direction, triangle_ix, light, SEGMENT_SHARE * pick.distance);
+    vec3 offset = side * surface.geometric;
+    vec3 origin = surface.point_world + offset;
+    segment = Segment(origin, SEGMENT_WAITS, pick.direction, triangle_ix, light, pick.distance);
+    if (isinf(pick.distance)) return segment;
+    // From its start beside the surface, the segment still goes to the point that was picked.
+    vec3 to_light = pick.distance * pick.direction - offset;
+    float distance = length(to_light);
+    segment.direction = to_light / distance;
+    segment.t_max = SEGMENT_SHARE * distance;
+    return segment;
 }
 
 // Whether a path survives Russian roulette. Its throughput is then larger, by the reciprocal of the probability.

@@ -91,14 +91,24 @@ fn segment_to_light(inputs: &KernelInputs, u: Vec3, vertex: &Vertex) -> Segment 
         return NO_SEGMENT;
     }
     let side = if pick.direction.dot(surface.geometric) < 0.0 { -surface.clearance } else { surface.clearance };
-    Segment {
-        origin: surface.point_world + side * surface.geometric,
+    let offset = side * surface.geometric;
+    let mut segment = Segment {
+        origin: surface.point_world + offset,
         state: SEGMENT_WAITS,
         direction: pick.direction,
         source_triangle: triangle_ix,
         light,
-        t_max: SEGMENT_SHARE * pick.distance,
+        t_max: pick.distance,
+    };
+    if pick.distance.is_infinite() {
+        return segment;
     }
+    // From its start beside the surface, the segment still goes to the point that was picked.
+    let to_light = pick.distance * pick.direction - offset;
+    let distance = to_light.length();
+    segment.direction = to_light / distance;
+    segment.t_max = SEGMENT_SHARE * distance;
+    segment
 }
 
 /// Whether a path survives Russian roulette. Its throughput is then larger, by the reciprocal of the probability.

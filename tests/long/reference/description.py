@@ -10,6 +10,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 
+ENVIRONMENT_HEIGHT = 256
+
+
+def environment_image(environment, rows):
+    """The picture of an environment whose rows are at these heights, 0 to 1. Columns are at their middles."""
+    width = 2 * ENVIRONMENT_HEIGHT
+    v, u = np.meshgrid(rows, (np.arange(width) + 0.5) / width, indexing="ij")
+    return np.ascontiguousarray(environment(u, v), np.float32)
+
+
 @dataclass
 class Diffuse:
     reflectance: tuple = (0.5, 0.5, 0.5)
@@ -59,5 +69,5 @@ class Scene:
     max_depth: int  # surfaces that a path meets at most
     meshes: list
     lights: list = field(default_factory=list)
-    environment: np.ndarray | None = None  # height x width x 3, radiance; the first row is straight up
+    environment: object = None  # a function of places in an equirectangular picture (to the right, down: 0 to 1)
     size: int = 128  # width and height, pixels

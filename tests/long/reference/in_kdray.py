@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 
-from .description import Diffuse, Emitting, Glass, Metal
+from .description import ENVIRONMENT_HEIGHT, Diffuse, Emitting, Glass, Metal, environment_image
 
 
 def write_obj(path, mesh):
@@ -53,9 +53,9 @@ def write(scene, folder):
         f"[camera]\neye = {toml(scene.eye)}\ntarget = {toml(scene.target)}\nvertical_fov = {float(scene.vertical_fov)}\n",
     ]
     if scene.environment is not None:
-        height, width, _ = scene.environment.shape
+        rows = (np.arange(ENVIRONMENT_HEIGHT) + 0.5) / ENVIRONMENT_HEIGHT
         path = Path(folder) / f"{scene.name}_sky.exr"
-        channels = {"RGB": np.ascontiguousarray(scene.environment)}
+        channels = {"RGB": environment_image(scene.environment, rows)}
         OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, channels).write(str(path))
         tables.append(f'[environment]\nfile = "{path.name}"\n')
     for light in scene.lights:

@@ -3,7 +3,7 @@
 import mitsuba as mi
 import numpy as np
 
-from .description import Diffuse, Emitting, Glass, Metal
+from .description import ENVIRONMENT_HEIGHT, Diffuse, Emitting, Glass, Metal, environment_image
 
 mi.set_variant("llvm_ad_rgb", "scalar_rgb")
 
@@ -81,7 +81,9 @@ def build(scene):
             "emitter": {"type": "area", "radiance": rgb(light.radiance)},
         }  # fmt: skip
     if scene.environment is not None:
-        parts["sky"] = {"type": "envmap", "bitmap": mi.Bitmap(scene.environment), "to_world": ENVIRONMENT_TO_WORLD}
+        # Mitsuba's first and last row are the poles themselves.
+        image = environment_image(scene.environment, np.linspace(0, 1, ENVIRONMENT_HEIGHT))
+        parts["sky"] = {"type": "envmap", "bitmap": mi.Bitmap(image), "to_world": ENVIRONMENT_TO_WORLD}
     return mi.load_dict(parts)
 
 

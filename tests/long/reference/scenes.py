@@ -91,13 +91,12 @@ def veach():
     return Scene("veach", tuple(eye), (0, -0.4, 0), 38, 5, meshes, lights)
 
 
-def sky(height=64):
-    """A smooth sky with a broad bright spot."""
-    v, u = np.meshgrid((np.arange(height) + 0.5) / height, (np.arange(2 * height) + 0.5) / (2 * height), indexing="ij")
+def sky(u, v):
+    """Radiance of a smooth sky with a broad bright spot, at places of its picture: to the right and down, 0 to 1."""
     up = np.cos(np.pi * v)
     spot = np.exp(-((u - 0.8) ** 2) / 0.005 - ((v - 0.3) ** 2) / 0.01)
     colour = np.stack([0.4 + 0.2 * up, 0.5 + 0.3 * up, 0.6 + 0.4 * up], -1)
-    return (colour + 12 * spot[..., None] * np.array([1.0, 0.9, 0.7])).astype(np.float32)
+    return colour + 12 * spot[..., None] * np.array([1.0, 0.9, 0.7])
 
 
 def rough():
@@ -106,7 +105,7 @@ def rough():
         sphere("glass", (-1.15, 0, 0), 1, Glass(0.15)),
         sphere("metal", (1.15, 0, 0), 1, Metal(0.25)),
     ]
-    return Scene("rough", (0, 1.6, 6), (0, -0.1, 0), 30, 12, meshes, environment=sky())
+    return Scene("rough", (0, 1.6, 6), (0, -0.1, 0), 30, 12, meshes, environment=sky)
 
 
 def window(folder):
@@ -129,7 +128,7 @@ def window(folder):
         (a, b), (c, d) = low, high
         meshes.append(quad(name, (x, a, b), (x, a, d), (x, c, d), (x, c, b), white))
     meshes.append(box("chest", (-1.2, -1.25, -1.6), (-0.3, -0.5, -0.8), Diffuse((0.5, 0.3, 0.2))))
-    return Scene("window", (-1.2, 0.2, 2.3), (0.6, -0.4, -1.5), 60, 9, meshes, environment=4 * sky())
+    return Scene("window", (-1.2, 0.2, 2.3), (0.6, -0.4, -1.5), 60, 9, meshes, environment=lambda u, v: 4 * sky(u, v))
 
 
 def many():
