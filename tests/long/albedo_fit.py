@@ -2,9 +2,9 @@
 
 The directional albedo of a lobe, for a viewer at the cosine mu, is computed by quasi-Monte Carlo over visible normals
 (Dupuy & Benyoub 2023; the weight of a sample is F G2 / G1) or, for sheen, over the hemisphere. It is fitted by least
-squares to a sum of products of powers of two variables. One is r, the roughness. The other is z = mu / (mu + r^2),
-since the albedo of GGX depends on the slope of the view relative to the slopes of the microfacets, or x = 1 - mu for
-sheen. The script prints the coefficients in GLSL and in Rust, and the errors.
+squares to a sum of products of powers of two variables, of which each is centred. One is r, the roughness. The other is
+z = mu / (mu + r^2), since the albedo of GGX depends on the slope of the view relative to the slopes of the microfacets,
+or x = 1 - mu for sheen. The script prints the coefficients in GLSL and in Rust, and the errors.
 """
 
 import numpy as np
@@ -111,18 +111,23 @@ def evened(columns, values, weights, n):
     return fitted(columns, values, np.sqrt(by_error * weights))
 
 
+def centred(x):
+    """A variable of [-1, 1] for one of [0, 1]. Its polynomials have small coefficients, which round little."""
+    return 2 * x - 1
+
+
 def nodes_of(n):
     """Chebyshev's nodes in [0, 1], which are dense at the ends, where polynomials err most."""
     return (1 - np.cos(np.pi * (np.arange(n) + 0.5) / n)) / 2
 
 
 def number(value):
-    text = f"{np.float32(value):.8g}"
-    return text if "." in text else text + ".0"
+    """The shortest decimal that is this number in single precision."""
+    return np.format_float_positional(np.float32(value), unique=True, trim="0")
 
 
 def polynomial(row, language):
-    """A polynomial in r. `powers` are its powers 1 to 4, `fifth` the fifth."""
+    """A polynomial in 2 r - 1. `powers` are the powers 1 to 4 of this variable, `fifth` the fifth."""
     middle = ", ".join(number(value) for value in row[1:5])
     product = f"dot(vec4({middle}), powers)" if language == "GLSL" else f"Vec4::new({middle}).dot(powers)"
     return f"{number(row[0])} + {product}" + (f" + {number(row[5])} * fifth" if len(row) > 5 else "")
@@ -145,7 +150,7 @@ def main():
     table = np.array([[reflection_albedo(mu, r) for mu in mus] for r in rs])
     r, mu = np.meshgrid(rs, mus, indexing="ij")
     z = mu / (mu + r * r)
-    columns = [z**i * (1 - z) * r**j for i in range(6) for j in range(6)]
+    columns = [(1 - z) * centred(z) ** i * centred(r) ** j for i in range(6) for j in range(6)]
     smooth = (1 - mu) ** 5
     fits = []
     for name, values in (("loss", 1 - table[..., 0]), ("grazing", table[..., 1] - smooth)):
@@ -160,11 +165,11 @@ def main():
     rs = np.linspace(0, 1, 65)[1:]
     r, mu = np.meshgrid(rs, nodes, indexing="ij")
     z = mu / (mu + r * r)
-    columns = [z**i * (1 - z) * r**j for i in range(6) for j in range(6)]
+    columns = [(1 - z) * centred(z) ** i * centred(r) ** j for i in range(6) for j in range(6)]
     for name, c in zip(("mean loss", "mean grazing"), fits):
         value = sum(column * number for column, number in zip(columns, c))
         mean = (value * 2 * mu * weights).sum(1)
-        c, found = fitted([rs**j for j in range(1, 7)], mean, 1 / rs if name == "mean loss" else 1.0)
+        c, found = fitted([rs * centred(rs) ** j for j in range(6)], mean, 1 / rs if name == "mean loss" else 1.0)
         for language in ("GLSL", "Rust"):
             print(f"    roughness * ({polynomial(c, language)})   // {language} {name}")
         report(name, found, mean)
@@ -172,7 +177,7 @@ def main():
     rs = np.linspace(LEAST_SHEEN_ROUGHNESS, 1, 25)
     r, mu = np.meshgrid(rs, mus, indexing="ij")
     values = np.array([[sheen_albedo(mu, r) for mu in mus] for r in rs])
-    c, found = fitted([(1 - mu) ** i * r**j for i in range(7) for j in range(5)], np.sqrt(values))
+    c, found = fitted([centred(1 - mu) ** i * centred(r) ** j for i in range(7) for j in range(5)], np.sqrt(values))
     printed("sheen", c.reshape(7, 5))
     report("sheen", np.maximum(found, 0) ** 2, values)
 

@@ -12,74 +12,76 @@ pub struct GgxAlbedo {
     pub grazing: f32,
 }
 
-/// Powers 1 to 4 of the roughness.
-fn roughness_powers(roughness: f32) -> Vec4 {
-    let squared = roughness * roughness;
-    Vec4::new(roughness, squared, squared * roughness, squared * squared)
+/// Powers 1 to 4.
+fn powers_of(x: f32) -> Vec4 {
+    let squared = x * x;
+    Vec4::new(x, squared, squared * x, squared * squared)
+}
+
+/// The variable of the polynomials, -1 to 1, for one of 0 to 1. Coefficients are then small, and round little.
+fn centred(x: f32) -> f32 {
+    2.0 * x - 1.0
 }
 
 fn loss_polynomial(z: f32, powers: Vec4, fifth: f32) -> f32 {
-    let y = 8.5227442 + Vec4::new(-10.963147, 79.872063, -232.42944, 17.419209).dot(powers) + 210.4131 * fifth;
+    let y = 0.05061298 + Vec4::new(-0.48358548, 0.15916474, 1.2829756, 1.0614296).dot(powers) + 0.20548154 * fifth;
     let y =
-        y * z + -20.575962 + Vec4::new(37.890228, -249.74614, 771.74255, -597.86566).dot(powers) + -41.687645 * fifth;
-    let y = y * z + 15.525029 + Vec4::new(-40.795704, 236.88469, -706.77136, 706.883).dot(powers) + -155.20528 * fifth;
-    let y = y * z + -4.2633696 + Vec4::new(17.504826, -85.484901, 228.00821, -237.29614).dot(powers) + 67.25351 * fifth;
+        y * z + -0.13874173 + Vec4::new(-0.6994655, 0.15456805, 2.2882538, 2.5646296).dot(powers) + 0.94598657 * fifth;
     let y =
-        y * z + 0.78486699 + Vec4::new(-3.3760931, 14.595876, -33.455288, 38.245049).dot(powers) + -13.047832 * fifth;
-    let y = y * z
-        + -0.021635758
-        + Vec4::new(0.20264785, -0.82070565, 1.5798448, -1.3904365).dot(powers)
-        + 0.45798045 * fifth;
-    y
+        y * z + -0.39460304 + Vec4::new(0.22238626, 0.37179673, 1.3073437, 2.1353924).dot(powers) + 1.1228601 * fifth;
+    let y =
+        y * z + -0.12285215 + Vec4::new(0.7024384, 0.82025933, 0.5706922, 0.5520335).dot(powers) + 0.27289453 * fifth;
+    let y =
+        y * z + 0.40329757 + Vec4::new(0.6511315, 1.0314175, 0.60844195, -0.1749438).dot(powers) + -0.27012518 * fifth;
+    y * z + 0.32030332 + Vec4::new(0.39432263, 0.5965222, 0.33280572, -0.11012778).dot(powers) + -0.14635271 * fifth
 }
 
 fn grazing_polynomial(z: f32, powers: Vec4, fifth: f32) -> f32 {
-    let y = 43.237442 + Vec4::new(-688.62921, 2864.2729, -5492.8657, 5023.2246).dot(powers) + -1638.3431 * fifth;
+    let y = -0.27699554 + Vec4::new(0.86916727, 0.8740421, 1.7877537, 1.8112689).dot(powers) + -1.5997394 * fifth;
     let y =
-        y * z + -98.257233 + Vec4::new(1623.2207, -6962.7178, 13274.707, -12001.156).dot(powers) + 4049.2202 * fifth;
+        y * z + -0.8551063 + Vec4::new(0.6374431, 4.513031, 4.2166076, 1.7199866).dot(powers) + -0.090891734 * fifth;
+    let y = y * z + -0.8048706 + Vec4::new(-2.256373, 3.9497612, 5.400407, 1.3915476).dot(powers) + 2.6716585 * fifth;
+    let y = y * z + 0.19544311 + Vec4::new(-2.9967628, -2.5920486, 3.630944, 3.7848535).dot(powers) + 1.0182526 * fifth;
     let y =
-        y * z + 78.186623 + Vec4::new(-1303.4658, 5784.9307, -11117.942, 9912.4473).dot(powers) + -3318.6135 * fifth;
-    let y = y * z + -24.997671 + Vec4::new(405.41129, -1829.0001, 3588.5264, -3229.603).dot(powers) + 1082.3663 * fifth;
-    let y =
-        y * z + 2.3397923 + Vec4::new(-41.212421, 180.50139, -338.95181, 304.03543).dot(powers) + -102.57932 * fifth;
-    let y =
-        y * z + -0.00194966 + Vec4::new(-1.1703906, -6.7782693, 19.844473, -19.539381).dot(powers) + 6.6895761 * fifth;
-    y
+        y * z + 0.9133323 + Vec4::new(0.23875533, -3.3636262, -0.2198798, 2.705742).dot(powers) + 0.053990252 * fifth;
+    y * z + -0.32218575 + Vec4::new(0.8386179, 0.049529385, -1.1930618, 0.22775501).dot(powers) + 0.40759394 * fifth
 }
 
 /// `roughness`: square root of the distribution's width; 0 if the surface is perfectly smooth.
 pub fn ggx_albedo(cosine: f32, roughness: f32) -> GgxAlbedo {
-    let powers = roughness_powers(roughness);
-    let fifth = roughness * powers.w;
-    let z = cosine / (cosine + powers.y);
+    let powers = powers_of(centred(roughness));
+    let fifth = centred(roughness) * powers.w;
+    let z = cosine / (cosine + roughness * roughness);
     let x = (1.0 - cosine).clamp(0.0, 1.0);
-    let loss = ((1.0 - z) * loss_polynomial(z, powers, fifth)).clamp(0.0, 0.9);
+    let loss = ((1.0 - z) * loss_polynomial(centred(z), powers, fifth)).clamp(0.0, 0.9);
     let smooth_grazing = x * x * x * x * x;
-    let grazing = smooth_grazing + (1.0 - z) * grazing_polynomial(z, powers, fifth);
+    let grazing = smooth_grazing + (1.0 - z) * grazing_polynomial(centred(z), powers, fifth);
     GgxAlbedo { loss, grazing: grazing.clamp(0.0001, 1.0 - loss) }
 }
 
 /// The mean of [`ggx_albedo`] over the hemisphere, weighted by the cosine.
 pub fn mean_ggx_albedo(roughness: f32) -> GgxAlbedo {
-    let powers = roughness_powers(roughness);
-    let fifth = roughness * powers.w;
+    let powers = powers_of(centred(roughness));
+    let fifth = centred(roughness) * powers.w;
     let loss =
-        -0.0012865789 + Vec4::new(-0.01124437, 0.44400364, 2.6509104, -3.9033575).dot(powers) + 1.4113265 * fifth;
-    let change = 0.01249467 + Vec4::new(0.12266012, -2.301764, 6.0072041, -5.9807024).dot(powers) + 2.0946815 * fifth;
+        0.23559959 + Vec4::new(0.45514977, 0.08237253, -0.20343474, -0.023440205).dot(powers) + 0.044103485 * fifth;
+    let change = -0.059065323
+        + Vec4::new(-0.0047479947, 0.08910083, -0.08968468, -0.046510242).dot(powers)
+        + 0.065464064 * fifth;
     GgxAlbedo { loss: (roughness * loss).max(0.0), grazing: 1.0 / 21.0 + roughness * change }
 }
 
 /// Of the sheen of reflectance 1. `roughness`: at least [`crate::layout::LEAST_SHEEN_ROUGHNESS`].
 pub fn sheen_albedo(cosine: f32, roughness: f32) -> f32 {
-    let powers = roughness_powers(roughness);
-    let z = (1.0 - cosine).clamp(0.0, 1.0);
-    let y = 24.152172 + Vec4::new(-120.4353, 203.7431, -154.49158, 44.784389).dot(powers);
-    let y = y * z + -64.693489 + Vec4::new(332.72348, -565.05505, 430.55728, -125.53234).dot(powers);
-    let y = y * z + 68.502266 + Vec4::new(-364.3663, 625.81909, -481.81183, 141.72218).dot(powers);
-    let y = y * z + -35.167366 + Vec4::new(195.56726, -341.27466, 265.25433, -78.338684).dot(powers);
-    let y = y * z + 11.311654 + Vec4::new(-64.828766, 117.18, -92.910378, 27.634874).dot(powers);
-    let y = y * z + -2.5980201 + Vec4::new(18.863771, -38.492477, 33.642723, -10.890631).dot(powers);
-    let y = y * z + 0.087039657 + Vec4::new(-1.1872613, 4.6144295, -4.6789732, 1.5662416).dot(powers);
+    let powers = powers_of(centred(roughness));
+    let z = centred((1.0 - cosine).clamp(0.0, 1.0));
+    let y = -0.025658233 + Vec4::new(-0.079442926, 0.15305589, -0.12680236, 0.04373475).dot(powers);
+    let y = y * z + 0.04537495 + Vec4::new(-0.04196653, 0.07835384, -0.05967113, 0.017228179).dot(powers);
+    let y = y * z + 0.074563555 + Vec4::new(0.07415557, -0.096496835, 0.05393373, -0.016278138).dot(powers);
+    let y = y * z + 0.026118582 + Vec4::new(0.006430548, -0.011569813, -0.027085755, 0.02527979).dot(powers);
+    let y = y * z + 0.046010688 + Vec4::new(-0.09292707, 0.23614322, -0.2758054, 0.12156358).dot(powers);
+    let y = y * z + 0.298807 + Vec4::new(-0.13584308, 0.102032214, 0.02426417, -0.061889347).dot(powers);
+    let y = y * z + 0.4354193 + Vec4::new(0.27736488, -0.137553, 0.09287007, -0.070511475).dot(powers);
     let y = y.max(0.01);
     y * y
 }
