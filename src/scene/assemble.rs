@@ -29,8 +29,14 @@ use super::{
     standard::Lacks,
     transform::finite,
 };
-use crate::frame::{Denoise, Integrator};
+use crate::{
+    frame::{Denoise, Integrator},
+    util::memory,
+};
 
+/// Memory of a pixel of an environment while its tables are made, bytes: the colour as it is read (12), luminance and
+/// weight (16), the texel (16) and its alias (8), and the words that are uploaded (24).
+const ENVIRONMENT_BYTES: u64 = 76;
 /// Name of the material of meshes and faces that name none.
 pub(super) const DEFAULT_MATERIAL: &str = "(default)";
 
@@ -88,6 +94,7 @@ fn assemble(file: &File, description: Description) -> Result<(Scene, Lacks), Sce
     for (ix, spec) in description.light.iter().enumerate() {
         scene.lights.push(file.check(&format!("light {}", ix + 1), spec, light)?);
     }
+    warn_of_black(file, &scene.lights);
     if let Some(spec) = &description.ambient {
         scene.ambient = file.check("ambient", spec, |rgb| colour("ambient", Some(*rgb), Vec3::ZERO))?;
     }
@@ -243,6 +250,17 @@ fn light(spec: &LightSpec) -> Checked<Light> {
     }
 }
 
+/// Warns once of the lights from which no light comes, if light comes from others. Otherwise, the warning of scenes
+/// that nothing lights is enough.
+fn warn_of_black(file: &File, lights: &[Light]) {
+    let black = (1..).zip(lights).filter(|(_, light)| light.is_black());
+    let numbers: Vec<String> = black.map(|(number, _)| number.to_string()).collect();
+    if !numbers.is_empty() && numbers.len() < lights.len() {
+        let path = file.path.display();
+        tracing::warn!("{path}: no light comes from light {}, whose power or area is 0", numbers.join(", "));
+    }
+}
+
 /// Checks a length, which must be at least 0 and at most [`MAX_COORDINATE`].
 fn extent_of(name: &str, length: f32) -> Checked<f32> {
     within(name, length, 0.0, MAX_COORDINATE)
@@ -253,6 +271,7 @@ fn environment(file: &File, spec: &EnvironmentSpec) -> Checked<Environment> {
     let path = file.access.beside(file.path).exact(&spec.file)?;
     let bytes = read_bytes(&path).map_err(|error| error.to_string())?;
     let (size, colours) = decode_colours(&Encoded { name: spec.file.clone(), bytes: bytes.into() })?;
+    memory::require("the environment", colours.len() as u64 * ENVIRONMENT_BYTES).map_err(|error| error.to_string())?;
     let rotation = within("rotation", spec.rotation.unwrap_or(0.0), -3600.0, 3600.0)?;
     let strength = within("strength", spec.strength.unwrap_or(1.0), 0.0, 1e6)?;
     let (environment, mended) = Environment::new(size, colours, (rotation, strength))?;

@@ -249,7 +249,8 @@ fn mean_emission(scene: &FlatScene, triangle_ix: usize, material_ix: usize) -> V
     ke * sum / (EMISSION_CELLS * EMISSION_CELLS) as f32
 }
 
-/// Returns the barycentric weights of the middles of equal cells, into which lines parallel to its edges cut a triangle.
+/// Returns the barycentric weights of the middles of the equal cells into which lines parallel to the edges cut a
+/// triangle.
 fn middles_of_cells() -> impl Iterator<Item = [f32; 2]> {
     const N: usize = EMISSION_CELLS;
     let cells = (0..N).flat_map(|i| (0..N - i).map(move |j| (i, j)));

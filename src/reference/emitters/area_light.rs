@@ -34,8 +34,8 @@ fn hit_area_light(light: &AreaLight, origin: Vec3, direction: Vec3) -> f32 {
     }
 }
 
-/// The nearest rectangle, disk or sphere that the ray meets between 0 and `t_max`. `direction`: a unit vector. The backs
-/// of rectangles and disks and the insides of spheres are not seen.
+/// The nearest rectangle, disk or sphere that the ray meets between 0 and `t_max`. `direction`: a unit vector. The
+/// backs of rectangles and disks and the insides of spheres are not seen.
 pub fn seen_light(inputs: &KernelInputs, origin: Vec3, direction: Vec3, t_max: f32) -> SeenLight {
     let (mut nearest, mut seen) = (f32::INFINITY, None);
     for light in inputs.emitters.into_iter().flat_map(|emitters| emitters.shapes()) {

@@ -68,6 +68,7 @@ fn names_of_files(table: &mut Table) -> Vec<&mut String> {
     for (key, value) in table.iter_mut() {
         match (key.as_str(), value) {
             ("mesh", Value::Array(meshes)) => names.extend(meshes.iter_mut().filter_map(|mesh| mesh.get_mut("file"))),
+            ("environment", Value::Table(environment)) => names.extend(environment.get_mut("file")),
             ("materials", Value::Table(materials)) => {
                 let materials = materials.iter_mut().filter_map(|(_, material)| material.as_table_mut()).flatten();
                 let maps = materials.filter(|(key, _)| MAP_KEYS.contains(&key.as_str()));
@@ -84,4 +85,19 @@ fn names_of_files(table: &mut Table) -> Vec<&mut String> {
         _ => None,
     };
     names.into_iter().filter_map(text).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_meshes_materials_and_the_environment_are_named() {
+        let text = "environment = { file = \"sky.hdr\" }\nmesh = [{ file = \"a.obj\" }]\n\
+                    materials = { m = { map_Kd = \"b.png\" } }\n";
+        let mut table: Table = text.parse().unwrap();
+        let mut names: Vec<String> = names_of_files(&mut table).into_iter().map(|name| name.clone()).collect();
+        names.sort();
+        assert_eq!(names, ["a.obj", "b.png", "sky.hdr"]);
+    }
 }

@@ -1,0 +1,300 @@
+//! Tests of the emitters against closed forms, and of densities against picks.
+
+use std::{f32::consts::PI, path::Path};
+
+use glam::{DVec3, Vec3, vec3};
+
+use super::{
+    LightPick, ambient_radiance, emission_at, emission_density, environment_density, environment_radiance, pick_light,
+    seen_light,
+};
+use crate::{
+    accel::kdtree::BuildOptions,
+    frame::RenderOptions,
+    layout::{Frame, Material, Triangle},
+    reference::inputs::KernelInputs,
+    scene::{Environment, Light, Scene},
+    world::{Emitters, FlatScene, World},
+};
+
+fn world_with(lights: Vec<Light>, change: impl FnOnce(&mut FlatScene)) -> World {
+    let scene = Scene { lights, ..Scene::empty(Path::new("scene")) };
+    let mut flat = FlatScene::new(&scene).unwrap();
+    change(&mut flat);
+    World::of_flat(flat, &BuildOptions::default()).unwrap()
+}
+
+fn world(lights: Vec<Light>) -> World {
+    world_with(lights, |_| {})
+}
+
+fn frame(world: &World) -> Frame {
+    world.frame_constants(&RenderOptions::default())
+}
+
+/// Two triangles in the plane z = 2 that emit light, as a square with edges of 2.
+fn emitting_square(scene: &mut FlatScene) {
+    let corners = [vec3(-1.0, -1.0, 2.0), vec3(1.0, -1.0, 2.0), vec3(1.0, 1.0, 2.0), vec3(-1.0, 1.0, 2.0)];
+    let triangle =
+        |[a, b, c]: [usize; 3]| Triangle { v0: corners[a], v1: corners[b], v2: corners[c], ..Triangle::default() };
+    scene.triangles = [[0, 1, 2], [0, 1, 2], [0, 2, 3]].map(triangle).to_vec();
+    // The first triangle is far away and dark.
+    scene.triangles[0].v0.z = 9.0;
+    scene.triangle_materials = vec![1, 0, 0];
+    scene.materials = vec![Material { ke: vec3(3.0, 2.0, 1.0), ..Material::default() }, Material::default()];
+    scene.material_names = vec![String::new(); 2];
+}
+
+/// The random numbers of `n` picks: points of a sequence that fills the cube evenly.
+fn numbers(n: usize) -> impl Iterator<Item = Vec3> {
+    const STEPS: DVec3 = DVec3::new(0.819_172_513_4, 0.671_043_606_7, 0.549_700_477_9);
+    (0..n).map(|i| (STEPS * i as f64 + 0.5).fract().as_vec3().min(Vec3::splat(0.999_999)))
+}
+
+/// The irradiance that picks estimate at a point of a surface.
+fn irradiance(inputs: &KernelInputs, point: Vec3, normal: Vec3) -> Vec3 {
+    const N: usize = 100_000;
+    let sum: Vec3 = numbers(N)
+        .map(|u| {
+            let LightPick { direction, light, .. } = pick_light(inputs, point, u);
+            light * direction.dot(normal).max(0.0)
+        })
+        .sum();
+    sum / N as f32
+}
+
+fn assert_near(found: f32, expected: f32, tolerance: f32) {
+    assert!((found - expected).abs() <= tolerance * expected.abs(), "{found}, expected {expected}");
+}
+
+/// Irradiance below the middle of a rectangle that is parallel to the surface, from its half edges at distance 1.
+fn under_rectangle(a: f32, b: f32) -> f32 {
+    let part = |a: f32, b: f32| a / (1.0 + a * a).sqrt() * (b / (1.0 + a * a).sqrt()).atan();
+    2.0 * (part(a, b) + part(b, a))
+}
+
+/// Integrates over all directions.
+fn over_sphere(of: impl Fn(Vec3) -> f32) -> f32 {
+    const N: usize = 1500;
+    let mut sum = 0.0_f64;
+    for row in 0..N {
+        let up = 1.0 - 2.0 * (row as f32 + 0.5) / N as f32;
+        let sine = (1.0 - up * up).sqrt();
+        for column in 0..N {
+            let azimuth = 2.0 * PI * (column as f32 + 0.5) / N as f32;
+            sum += f64::from(of(vec3(sine * azimuth.sin(), up, -sine * azimuth.cos())));
+        }
+    }
+    (sum * 4.0 * std::f64::consts::PI / (N * N) as f64) as f32
+}
+
+fn rectangle() -> Light {
+    let radiance = vec3(2.0, 1.0, 0.5);
+    Light::Rectangle { position: vec3(0.0, 0.0, 2.0), edge_u: 2.0 * Vec3::Y, edge_v: 3.0 * Vec3::X, radiance }
+}
+
+fn disk() -> Light {
+    Light::Disk { position: vec3(0.0, 0.0, 2.0), towards: Vec3::NEG_Z, radius: 1.5, radiance: Vec3::ONE }
+}
+
+fn sphere() -> Light {
+    Light::Sphere { position: vec3(0.0, 0.0, 3.0), radius: 1.0, radiance: Vec3::splat(4.0) }
+}
+
+fn sun() -> Light {
+    Light::Sun { towards: vec3(0.0, 0.6, 0.8), irradiance: Vec3::splat(2.0), angle_degrees: 20.0 }
+}
+
+#[test]
+fn light_without_a_size_falls_with_the_squared_distance() {
+    let world = world(vec![Light::Point { position: vec3(0.0, 0.0, 2.0), intensity: Vec3::splat(3.0) }]);
+    let frame = frame(&world);
+    let inputs = KernelInputs::new(&world, &frame);
+    assert_near(irradiance(&inputs, Vec3::ZERO, Vec3::Z).x, PI * 3.0 / 4.0, 1e-4);
+    assert_near(irradiance(&inputs, vec3(0.0, 0.0, -2.0), Vec3::Z).x, PI * 3.0 / 16.0, 1e-4);
+    assert_eq!(pick_light(&inputs, vec3(0.0, 0.0, 2.0), Vec3::splat(0.5)), LightPick::NONE);
+    assert_eq!(pick_light(&inputs, Vec3::ZERO, Vec3::splat(0.5)).density, 0.0);
+}
+
+/// Lights, and the red irradiance that they cause at the origin on a surface that faces +z.
+fn closed_forms() -> Vec<(World, f32)> {
+    let directional = |angle_degrees| Light::Sun { towards: Vec3::Z, irradiance: Vec3::splat(2.0), angle_degrees };
+    vec![
+        (world(vec![rectangle()]), 2.0 * under_rectangle(1.0, 1.5)),
+        (world(vec![disk()]), PI * 1.5 * 1.5 / (1.5 * 1.5 + 4.0)),
+        (world(vec![sphere()]), PI * 4.0 / 9.0),
+        (world_with(Vec::new(), emitting_square), 3.0 * under_rectangle(0.5, 0.5)),
+        (world(vec![directional(0.5)]), 2.0 * PI),
+        (world(vec![directional(60.0)]), 2.0 * PI),
+        (world(vec![Light::Directional { towards: Vec3::Z, irradiance: Vec3::ONE }]), PI),
+        (world_with(Vec::new(), |scene| (scene.background, scene.ambient) = (Vec3::ONE, Vec3::ONE)), 2.0 * PI),
+    ]
+}
+
+#[test]
+fn irradiance_is_that_of_closed_forms() {
+    for (world, expected) in closed_forms() {
+        let frame = frame(&world);
+        let found = irradiance(&KernelInputs::new(&world, &frame), Vec3::ZERO, Vec3::Z).x;
+        assert_near(found, expected, 3e-3);
+    }
+}
+
+/// A wrong density shifts the irradiance beyond what the comparison allows.
+#[test]
+fn a_wrong_area_changes_the_irradiance() {
+    let world = world(vec![rectangle()]);
+    let mut emitters: Emitters = world.emitters().clone();
+    emitters.area_lights[0].area *= 1.02;
+    let frame = frame(&world);
+    let inputs = KernelInputs { emitters: Some(&emitters), ..KernelInputs::new(&world, &frame) };
+    let found = irradiance(&inputs, Vec3::ZERO, Vec3::Z).x;
+    assert!((found / (2.0 * under_rectangle(1.0, 1.5)) - 1.0).abs() > 1e-2, "{found}");
+}
+
+#[test]
+fn densities_of_area_lights_are_whole() {
+    for light in [rectangle(), disk(), sphere()] {
+        let world = world(vec![light]);
+        let frame = frame(&world);
+        let inputs = KernelInputs::new(&world, &frame);
+        for point in [Vec3::ZERO, vec3(1.0, -0.5, 0.5)] {
+            let sum = over_sphere(|direction| seen_light(&inputs, point, direction, f32::INFINITY).density);
+            assert_near(sum, 1.0, 5e-3);
+        }
+    }
+}
+
+/// An image with a bright texel, dark ones and a NaN.
+fn map(rotation: f32) -> Environment {
+    let mut colours: Vec<Vec3> = (0..32 * 17).map(|ix| Vec3::splat((ix % 5) as f32 * 0.1)).collect();
+    colours[4 * 32 + 24] = Vec3::splat(50.0);
+    colours[0] = vec3(f32::NAN, 1.0, 1.0);
+    Environment::new([32, 17], colours, (rotation, 1.0)).unwrap().0
+}
+
+#[test]
+fn densities_of_environments_are_whole() {
+    let of_map = |scene: &mut FlatScene| scene.environment = Some(map(40.0));
+    let of_background = |scene: &mut FlatScene| scene.background = Vec3::ONE;
+    for world in [
+        world_with(Vec::new(), of_map),
+        world_with(vec![sun()], of_map),
+        world_with(vec![sun()], of_background),
+        world_with(vec![sun()], |_| {}),
+    ] {
+        let frame = frame(&world);
+        let inputs = KernelInputs::new(&world, &frame);
+        assert_near(over_sphere(|direction| environment_density(&inputs, direction)), 1.0, 5e-3);
+        // Picks find all the light that there is.
+        let found = irradiance(&inputs, Vec3::ZERO, Vec3::Y).x;
+        let expected = over_sphere(|it| environment_radiance(&inputs, it).x * it.y.max(0.0));
+        assert_near(found, expected, 2e-2);
+    }
+}
+
+#[test]
+fn picks_have_the_density_of_what_is_seen() {
+    let (radiance, radius) = (Vec3::splat(3.0), 1.0);
+    let lights = vec![
+        Light::Rectangle { position: vec3(-9.0, 0.0, 2.0), edge_u: 2.0 * Vec3::Y, edge_v: 3.0 * Vec3::X, radiance },
+        Light::Disk { position: vec3(0.0, 8.0, 3.0), towards: Vec3::NEG_Z, radius, radiance },
+        Light::Sphere { position: vec3(0.0, -7.0, 3.0), radius, radiance },
+        sun(),
+    ];
+    let world = world_with(lights, |scene| {
+        emitting_square(scene);
+        scene.environment = Some(map(0.0));
+        scene.ambient = Vec3::splat(0.1);
+    });
+    let frame = frame(&world);
+    let inputs = KernelInputs::new(&world, &frame);
+    let point = vec3(6.0, 0.2, -4.0);
+    let (mut n_shapes, mut n_beyond, mut n_triangles, mut n_borders) = (0, 0, 0, 0);
+    for u in numbers(20_000) {
+        let pick = pick_light(&inputs, point, u);
+        let seen = seen_light(&inputs, point, pick.direction, f32::INFINITY);
+        if pick == LightPick::NONE {
+            continue;
+        }
+        let density = if pick.distance.is_infinite() {
+            n_beyond += 1;
+            environment_density(&inputs, pick.direction)
+        } else if (seen.t - pick.distance).abs() < 1e-3 * pick.distance {
+            n_shapes += 1;
+            seen.density
+        } else {
+            n_triangles += 1;
+            let densities = [0, 1, 2].map(|ix| emission_density(&inputs, ix, pick.direction, pick.distance));
+            assert_eq!(densities[0], 0.0);
+            // Both triangles are in one plane and have the same size.
+            densities[1]
+        };
+        if (density - pick.density).abs() > 1e-2 * pick.density {
+            // At the border of two texels and of the sun, rounding decides.
+            assert!(pick.distance.is_infinite(), "{u}: {density}, {pick:?}");
+            n_borders += 1;
+        }
+    }
+    assert!(n_borders * 1000 <= n_beyond, "{n_borders} of {n_beyond}");
+    assert!(n_shapes > 50 && n_beyond > 50 && n_triangles > 50, "{n_shapes} {n_beyond} {n_triangles}");
+    assert_eq!(emission_at(&inputs, 1, 0.2, 0.2), vec3(3.0, 2.0, 1.0));
+    assert_eq!(ambient_radiance(&inputs), Vec3::splat(0.1));
+}
+
+#[test]
+fn nearer_lights_hide_what_is_behind_them() {
+    let behind = Light::Point { position: vec3(0.0, 0.0, 9.0), intensity: Vec3::ONE };
+    let world = world(vec![behind, sphere()]);
+    let frame = frame(&world);
+    let inputs = KernelInputs::new(&world, &frame);
+    assert!(numbers(500).all(|u| pick_light(&inputs, Vec3::ZERO, u).distance < 3.0));
+    // Beside the sphere, both are seen.
+    assert!(numbers(500).any(|u| pick_light(&inputs, vec3(5.0, 0.0, 0.0), u).distance > 9.0));
+}
+
+#[test]
+fn the_map_is_where_it_is_documented() {
+    for (rotation, expected) in [(0.0, Vec3::X), (90.0, Vec3::NEG_Z), (-90.0, Vec3::Z)] {
+        let mut colours = vec![Vec3::ZERO; 64 * 32];
+        // Both texels beside the quarter to the right of the middle.
+        for ix in [15 * 64 + 47, 15 * 64 + 48, 16 * 64 + 47, 16 * 64 + 48] {
+            colours[ix] = Vec3::ONE;
+        }
+        let (made, _) = Environment::new([64, 32], colours, (rotation, 1.0)).unwrap();
+        let world = world_with(Vec::new(), |scene| scene.environment = Some(made));
+        let frame = frame(&world);
+        let inputs = KernelInputs::new(&world, &frame);
+        assert_near(environment_radiance(&inputs, expected).x, 1.0, 1e-3);
+        assert_eq!(environment_radiance(&inputs, -expected), Vec3::ZERO);
+    }
+    let mut colours = vec![Vec3::ZERO; 64 * 32];
+    colours[..64].fill(Vec3::ONE);
+    let (made, _) = Environment::new([64, 32], colours, (0.0, 1.0)).unwrap();
+    let world = world_with(Vec::new(), |scene| scene.environment = Some(made));
+    let frame = frame(&world);
+    assert_eq!(environment_radiance(&KernelInputs::new(&world, &frame), Vec3::Y), Vec3::ONE);
+}
+
+#[test]
+fn texels_that_are_no_radiance_are_mended() {
+    let colours = vec![vec3(f32::NAN, 1.0, 2.0), vec3(-3.0, 0.0, 0.0), vec3(f32::INFINITY, 5.0, 0.0), Vec3::ONE];
+    let (made, mended) = Environment::new([2, 2], colours, (0.0, 2.0)).unwrap();
+    assert_eq!(made.colours(), [vec3(0.0, 2.0, 4.0), Vec3::ZERO, vec3(10.0, 10.0, 0.0), Vec3::splat(2.0)]);
+    assert_eq!((mended.n_nan, mended.n_negative, mended.n_infinite), (1, 1, 1));
+    assert!(mended.message().unwrap().contains("1 NaN, 1 negative, 1 infinite"));
+    let (_, mended) = Environment::new([1, 1], vec![Vec3::ONE], (0.0, 1.0)).unwrap();
+    assert_eq!(mended.message(), None);
+    assert!(Environment::new([2, 2], vec![Vec3::ONE; 3], (0.0, 1.0)).is_err());
+}
+
+#[test]
+fn nothing_is_picked_where_there_is_no_light() {
+    let black = Light::Sphere { position: Vec3::ONE, radius: 0.0, radiance: Vec3::ONE };
+    let world = world(vec![black, Light::Point { position: Vec3::ONE, intensity: Vec3::ZERO }]);
+    let frame = frame(&world);
+    let inputs = KernelInputs::new(&world, &frame);
+    assert!(numbers(100).all(|u| pick_light(&inputs, Vec3::ZERO, u) == LightPick::NONE));
+    assert!(!world.scene().needs_path());
+    assert!(self::world(vec![disk()]).scene().needs_path());
+}
