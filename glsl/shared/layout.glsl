@@ -506,6 +506,8 @@ struct Hit {
 // - `n_triangles`, `n_lights`: of the scene.
 // - `ambient`: irradiance that every point receives, weighted by `Material.ka`. `background`: radiance of rays that
 //   hit nothing.
+// - `ambient_tilt`: irradiance that a surface which faces up receives beside `ambient`, and that one which faces down
+//   lacks. `up_axis`: index of the coordinate that points up, 1 or 2.
 // - `exposure`: factor of radiance before the tone curve.
 // - `denoise_threshold`: a pixel is smoothed if the differences between its luminance and those of its four
 //   neighbours add up to more than this.
@@ -532,6 +534,8 @@ struct Frame {
     float exposure;
     vec3 background;
     float denoise_threshold;
+    vec3 ambient_tilt;
+    uint up_axis;
     uint max_depth;
     uint queue_capacity;
     uint picture_width;

@@ -10,7 +10,9 @@ impl Scene {
     /// Warns if neither a light nor the ambient term illuminates the scene, and says how to add a light. `path` is
     /// the scene's file.
     pub fn warn_if_unlit(&self, path: &Path) {
-        let is_lit = self.ambient != Vec3::ZERO || !self.lights.iter().all(Light::is_black);
+        let is_lit = self.ambient != Vec3::ZERO
+            || self.ground.is_some_and(|ground| ground.ambient != Vec3::ZERO)
+            || !self.lights.iter().all(Light::is_black);
         if is_lit {
             return;
         }

@@ -10,7 +10,7 @@ use crate::{
         MATERIAL_REFLECT, MATERIAL_REFRACT, MATERIAL_SOLID, MATERIAL_SPECULAR, MATERIAL_UNLIT, Material, Triangle,
         normal::encode_octahedral,
     },
-    scene::{self, Alpha, Camera, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene, Transform},
+    scene::{self, Alpha, Camera, Ground, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene, Transform},
 };
 
 /// Scene as it is traced: everything that a frame shows, with all meshes in world space.
@@ -35,6 +35,8 @@ pub struct FlatScene {
     pub camera: Camera,
     /// The irradiance that every point receives, which is weighted by the point's Ka.
     pub ambient: Vec3,
+    /// The ambient light from below, if it is not that of all sides.
+    pub ground: Option<Ground>,
     /// The radiance of rays that leave the scene.
     pub background: Vec3,
     /// The options that the scene is rendered with unless others are set.
@@ -69,6 +71,7 @@ impl FlatScene {
             lights: scene.lights.iter().map(Light::from).collect(),
             camera: scene.camera,
             ambient: scene.ambient,
+            ground: scene.ground,
             background: scene.background,
             defaults: scene.defaults,
         })
