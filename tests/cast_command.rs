@@ -200,6 +200,9 @@ fn rays_that_cannot_be_read_are_named() {
     let many = "{'descr': '<f4', 'fortran_order': False, 'shape': (4611686018427387904, 8), }\n";
     fs::write(path("many.npy"), with_header(many, &[0; 64])).unwrap();
     fs::write(path("deep.npy"), with_header(&"(".repeat(60_000), &[])).unwrap();
+    // Parsed, it would take minutes.
+    let nested = format!("{{'descr': {}, 'shape': (1, 8)}}\n", "{".repeat(60));
+    fs::write(path("nested.npy"), with_header(&nested, &[0; 32])).unwrap();
     fs::write(
         path("record.npy"),
         with_header("{'descr': [('a', '<f4')], 'fortran_order': False, 'shape': (1, 8)}\n", &[0; 32]),
@@ -224,6 +227,7 @@ fn rays_that_cannot_be_read_are_named() {
         ("huge.npy", "2 of 1152921504606846976"),
         ("many.npy", "4611686018427387904"),
         ("deep.npy", "header"),
+        ("nested.npy", "nested brackets"),
         ("giant.npy", "header"),
     ] {
         fail(directory.path(), &["cast", "mesh.obj", rays, "-o", "x.npz", "--cpu"], 3, what);

@@ -52,6 +52,7 @@ fn scene(triangles: &[Triangle]) -> FlatScene {
             projection: Projection::Perspective { vertical_fov_degrees: 45.0 },
         },
         ambient: Vec3::ZERO,
+        ground: None,
         background: Vec3::ZERO,
         area_lights: Vec::new(),
         environment: None,

@@ -26,11 +26,17 @@ layout(std430, set = 0, binding = BIND_LIGHT_VISIBILITY) readonly buffer LightVi
 };
 layout(std430, set = 0, binding = BIND_RAY_RADIANCE) writeonly buffer RayRadianceBlock { vec4 ray_radiance[]; };
 
+// The irradiance of the ambient light on a surface. Between facing up and facing down it is blended by the normal's
+// coordinate along the up axis. Without a tilt it is `frame.ambient`, bit for bit.
+vec3 ambient_at(vec3 normal) {
+    return frame.ambient + frame.ambient_tilt * normal[frame.up_axis];
+}
+
 // The radiance that the surface itself emits and reflects towards the viewer, from the ambient light and all lights
 // that it sees.
 vec3 local_radiance(PathRay ray, uint ray_ix, Surface surface, Material material) {
     vec3 radiance = emitted(material);
-    radiance += ambient_share(material, surface.shading, -ray.direction) * frame.ambient;
+    radiance += ambient_share(material, surface.shading, -ray.direction) * ambient_at(surface.shading);
     for (uint light_ix = 0u; light_ix < frame.n_lights; ++light_ix) {
         if (light_visibility[light_ix * frame.queue_capacity + ray_ix] != LIGHT_LIT) continue;
         LightSample to_light = sample_light(lights[light_ix], surface.point_world);

@@ -625,7 +625,7 @@ struct Hit {
     float v;
 };
 
-// The frame's constants, 240 bytes (a uniform buffer, std140-compatible). The window is the part of the picture that
+// The frame's constants, 256 bytes (a uniform buffer, std140-compatible). The window is the part of the picture that
 // is rendered. The point of the window's pixel (x, y) in the image plane is
 //
 // ```text
@@ -643,6 +643,8 @@ struct Hit {
 // - `n_triangles`, `n_lights`: of the scene.
 // - `ambient`: irradiance that every point receives, weighted by `Material.ka`. `background`: radiance of rays that
 //   hit nothing.
+// - `ambient_tilt`: irradiance that a surface which faces up receives beside `ambient`, and that one which faces down
+//   lacks. `up_axis`: index of the coordinate that points up, 1 or 2.
 // - `exposure`: factor of radiance before the tone curve.
 // - `denoise_threshold`: a pixel is smoothed if the differences between its luminance and those of its four
 //   neighbours add up to more than this.
@@ -676,6 +678,8 @@ struct Frame {
     float exposure;
     vec3 background;
     float denoise_threshold;
+    vec3 ambient_tilt;
+    uint up_axis;
     uint max_depth;
     uint queue_capacity;
     uint picture_width;
@@ -789,8 +793,9 @@ struct Feature {
 // - `uvs_begin`, `corners_begin`, `material_maps_begin`, `textures_begin`: index in `texture_words` at which the
 //   triangles' texture coordinates, the tangents and colours of their corners, the materials' maps and the textures
 //   begin. `NO_WORDS`: the scene has none of them.
-// - `background`, `ambient`: radiance of the environment if it has no map; radiance that neither the camera nor mirrors
-//   see.
+// - `background`: radiance of the environment if it has no map.
+// - `ambient`, `ground_ambient`: radiance that neither the camera nor mirrors see, from above and from below. `up_axis`:
+//   index of the coordinate that points up, 1 or 2.
 // - `environment_probability`: with which the environment is picked as a light.
 // - `n_emitters`, `emitters_begin`: number of entries of `Emitter`, and index in `texture_words` of the first one.
 // - `first_triangle_emitter`, `n_triangle_emitters`: index and number of the entries of triangles.
@@ -820,6 +825,8 @@ struct AccelConstants {
     float environment_probability;
     vec3 ambient;
     uint n_emitters;
+    vec3 ground_ambient;
+    uint up_axis;
     uint emitters_begin;
     uint first_triangle_emitter;
     uint n_triangle_emitters;

@@ -49,7 +49,7 @@ vec3 added_light(vec3 light, uint depth) {
 // The light of an environment that a ray meets. The camera and perfectly smooth surfaces do not see the ambient light.
 vec3 met_environment(PathRay ray, PathState state) {
     vec3 radiance = environment_radiance(ray.direction);
-    if (state.density > 0.0) radiance += ambient_radiance();
+    if (state.density > 0.0) radiance += ambient_radiance(ray.direction);
     return radiance * share_of_met(state, environment_density(ray.direction));
 }
 

@@ -63,6 +63,7 @@ pub fn knot(n_triangles: u32) -> Scene {
             projection: Projection::Perspective { vertical_fov_degrees: 60.0 },
         },
         ambient: Vec3::ZERO,
+        ground: None,
         background: Vec3::ZERO,
         environment: None,
         defaults: RenderDefaults::default(),

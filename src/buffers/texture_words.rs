@@ -75,6 +75,8 @@ impl<'a> TextureWords<'a> {
             background: of_emitters.background,
             environment_probability: of_emitters.environment_probability,
             ambient: of_emitters.ambient,
+            ground_ambient: of_emitters.ground_ambient,
+            up_axis: of_emitters.up_axis,
             n_emitters: of_emitters.n_emitters,
             emitters_begin: emitters,
             first_triangle_emitter: of_emitters.first_triangle_emitter,

@@ -1,4 +1,4 @@
-//! Prints the library's log events as `warning: …` and `error: …` lines above the progress bar.
+//! Prints the library's log events as `note: …`, `warning: …` and `error: …` lines above the progress bar.
 
 use std::{
     fmt,
@@ -9,21 +9,21 @@ use indicatif::ProgressBar;
 use kdray::util::text::one_line;
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::{
-    Layer,
-    filter::LevelFilter,
+    Layer, Registry,
+    filter::{LevelFilter, filter_fn},
     fmt::{
         FmtContext, FormatFields,
         format::{FormatEvent, Writer},
     },
-    layer::SubscriberExt,
+    layer::{self, SubscriberExt},
     registry::LookupSpan,
     util::SubscriberInitExt,
 };
 
 use super::spans::Spans;
 
-/// Sends the library's log events to standard error from now on: errors, and warnings unless `quiet`. The library's
-/// tracing spans go to `spans`; without it, spans are disabled and cost nothing.
+/// Sends the library's log events to standard error from now on: errors, and unless `quiet` warnings and notes. The
+/// library's tracing spans go to `spans`; without it, spans are disabled and cost nothing.
 pub fn start(quiet: bool, bar: Option<&ProgressBar>, spans: Option<&Spans>) {
     let bar = bar.cloned();
     let lines = tracing_subscriber::fmt::layer()
@@ -31,10 +31,16 @@ pub fn start(quiet: bool, bar: Option<&ProgressBar>, spans: Option<&Spans>) {
         .log_internal_errors(false)
         .event_format(Line)
         .with_writer(move || Beside(bar.clone()))
-        .with_filter(if quiet { LevelFilter::ERROR } else { LevelFilter::WARN });
+        .with_filter(only_events(if quiet { Level::ERROR } else { Level::INFO }));
     let started = tracing_subscriber::registry().with(lines).with(spans.map(Spans::layer)).try_init();
     // A second command in the same process keeps the first one's subscriber.
     drop(started);
+}
+
+/// Lets events up to a level pass, and no spans: these would cost time although the lines do not show them.
+fn only_events(level: Level) -> impl layer::Filter<Registry> {
+    let filter = filter_fn(move |metadata| metadata.is_event() && *metadata.level() <= level);
+    filter.with_max_level_hint(LevelFilter::from_level(level))
 }
 
 /// Format of an event: `level: message` on one line, with control characters escaped.
@@ -50,7 +56,11 @@ where
         if !event.metadata().target().starts_with("kdray") {
             return Ok(());
         }
-        let label = if *event.metadata().level() == Level::ERROR { "error" } else { "warning" };
+        let label = match *event.metadata().level() {
+            Level::ERROR => "error",
+            Level::WARN => "warning",
+            _ => "note",
+        };
         // A message may quote a name from a file.
         let mut remark = String::new();
         context.field_format().format_fields(Writer::new(&mut remark), event)?;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use glam::Vec3;
-use kdray::scene::{LightChoice, Look, Scene, Up};
+use kdray::scene::{LightChoice, Look, MaterialChoice, Preset, Scene, Up};
 
 use super::{
     or_auto::OrAuto,
@@ -11,6 +11,8 @@ use super::{
 };
 
 const UP: &str = "Axis that points up in the picture";
+const MATERIAL: &str =
+    "Replace all materials, or those called NAME, by a preset such as clay or chrome; may be repeated";
 
 #[derive(clap::Args)]
 pub struct LookArgs {
@@ -30,6 +32,8 @@ pub struct LookArgs {
     /// Replace all lights by one directional light that travels along this vector, or by none; ambient light stays
     #[arg(long, value_name = "X,Y,Z|none", allow_hyphen_values = true, value_parser = light)]
     pub light: Option<LightChoice>,
+    #[arg(long = "material", value_name = "[NAME=]PRESET", help = MATERIAL, long_help = material_long_help())]
+    pub materials: Vec<MaterialChoice>,
     /// Background, linear red, green and blue, each at least 0 [default: the scene's]
     #[arg(long, value_name = "R,G,B", allow_hyphen_values = true, value_parser = colour)]
     pub background: Option<Vec3>,
@@ -38,8 +42,9 @@ pub struct LookArgs {
 impl LookArgs {
     /// Returns the user's choices.
     pub fn look(&self) -> Look {
-        let &Self { up, eye, target, fov, light, background } = self;
-        Look { up: up.pinned(), eye, target, vertical_fov_degrees: fov, light, background }
+        let &Self { up, eye, target, fov, light, background, ref materials } = self;
+        let materials = materials.clone();
+        Look { up: up.pinned(), eye, target, vertical_fov_degrees: fov, light, background, materials }
     }
 
     /// Returns a note that says which axis of an STL file points up, if the user has not stated it.
@@ -55,8 +60,17 @@ fn up_long_help() -> String {
     listed(
         UP,
         "auto",
-        &format!("{}\n- auto: the camera's; without a camera, z for STL files and else y", Up::descriptions()),
+        &format!(
+            "{}\n- auto: the camera's; without a camera, z for STL files, for OBJ and PLY files as their \
+             comments or a ground below everything tell, and else y",
+            Up::descriptions()
+        ),
     )
+}
+
+/// Returns the help text of `--material` with all words explained.
+fn material_long_help() -> String {
+    format!("{MATERIAL}. Images of replaced materials are not read.\n\nPresets:\n{}", Preset::descriptions())
 }
 
 /// Parses three finite numbers with commas between them.

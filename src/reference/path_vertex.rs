@@ -47,7 +47,7 @@ fn added_light(inputs: &KernelInputs, light: Vec3, depth: u32) -> Vec3 {
 fn met_environment(inputs: &KernelInputs, ray: &PathRay, state: &PathState) -> Vec3 {
     let mut radiance = environment_radiance(inputs, ray.direction);
     if state.density > 0.0 {
-        radiance += ambient_radiance(inputs);
+        radiance += ambient_radiance(inputs, ray.direction);
     }
     radiance * share_of_met(state, environment_density(inputs, ray.direction))
 }

@@ -11,7 +11,7 @@ use super::{
     material::{ambient_share, emitted, local_weight, reflectance_of, unabsorbed},
     surface::Surface,
 };
-use crate::layout::{Hit, LIGHT_LIT, Material, NO_TRIANGLE, PathRay};
+use crate::layout::{Frame, Hit, LIGHT_LIT, Material, NO_TRIANGLE, PathRay};
 
 /// The rays to shade, with the lights that their hits see.
 #[derive(Clone, Copy)]
@@ -21,6 +21,12 @@ pub struct LitRays<'a> {
     pub hits: &'a [Hit],
     /// One of `LIGHT_*` at each `[light * queue_capacity + ray]`.
     pub light_visibility: &'a [u32],
+}
+
+/// The irradiance of the ambient light on a surface. Between facing up and facing down it is blended by the normal's
+/// coordinate along the up axis.
+fn ambient_at(frame: &Frame, normal: Vec3) -> Vec3 {
+    frame.ambient + frame.ambient_tilt * normal[frame.up_axis as usize]
 }
 
 /// The radiance that the surface itself emits and reflects towards the viewer, from the ambient light and all lights
@@ -33,7 +39,7 @@ fn local_radiance(
     material: &Material,
 ) -> Vec3 {
     let mut radiance = emitted(material);
-    radiance += ambient_share(material, surface.shading, -ray.direction) * inputs.frame().ambient;
+    radiance += ambient_share(material, surface.shading, -ray.direction) * ambient_at(inputs.frame(), surface.shading);
     for (light_ix, light) in inputs.lights.iter().enumerate() {
         if !is_lit(light_ix) {
             continue;

@@ -11,9 +11,13 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use super::{
-    Camera, Environment, Light, Material, PathDefaults, Projection, RenderDefaults, Scene,
+    Camera, Environment, Ground, Light, LoadOptions, Material, MaterialChoice, PathDefaults, Projection,
+    RenderDefaults, Scene,
     camera::{FOV_DEGREES, HEIGHTS},
-    description::{CameraSpec, Description, EnvironmentSpec, LightSpec, MeshSpec, RenderSpec, SceneDenoise},
+    description::{
+        AmbientSpec, CameraSpec, Description, EnvironmentSpec, HemispheresSpec, LightSpec, MeshSpec, RenderSpec,
+        SceneDenoise,
+    },
     error::{Checked, SceneError},
     extent,
     image::{Encoded, decode_colours},
@@ -25,6 +29,7 @@ use super::{
     outside::Access,
     overrides::NamedMaterials,
     placed::{MeshTable, Placer},
+    preset,
     read::{read_bytes, read_utf8},
     standard::Lacks,
     transform::finite,
@@ -41,10 +46,10 @@ const ENVIRONMENT_BYTES: u64 = 76;
 pub(super) const DEFAULT_MATERIAL: &str = "(default)";
 
 /// Loads a scene file and the meshes that it names. Their names are relative to the scene file's folder.
-pub(super) fn load_toml(path: &Path, access: Access) -> Result<(Scene, Lacks), SceneError> {
+pub(super) fn load_toml(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
     let text = read_utf8(path)?;
-    let file = File { path, text: &text, access };
-    assemble(&file, file.parse()?)
+    let file = File { path, text: &text, access: Access::of(options) };
+    assemble(&file, file.parse()?, &options.look.materials)
 }
 
 /// A file and its text. Errors name the file and the line.
@@ -80,7 +85,8 @@ impl File<'_> {
     }
 }
 
-fn assemble(file: &File, description: Description) -> Result<(Scene, Lacks), SceneError> {
+/// `replaced`: the materials that the user replaces beside those that the file does.
+fn assemble(file: &File, description: Description, replaced: &[MaterialChoice]) -> Result<(Scene, Lacks), SceneError> {
     let lacks = Lacks {
         up: Up::Y,
         camera: description.camera.is_none() && description.cameras.is_empty(),
@@ -89,14 +95,16 @@ fn assemble(file: &File, description: Description) -> Result<(Scene, Lacks), Sce
         integrator: description.render.as_ref().is_none_or(|render| render.as_ref().integrator.is_none()),
     };
     let mut scene = Scene::empty(file.path);
-    let mut images = Images::default();
+    let replace = description.replace.as_ref().map(|spec| file.check("replace", spec, |words| choices(words)));
+    let replace = replace.transpose()?.unwrap_or_default();
+    let mut images = Images::new([&replace[..], replaced].concat());
     let indices = add_materials(file, (&mut scene, &mut images), &description.materials)?;
     for (ix, spec) in description.light.iter().enumerate() {
         scene.lights.push(file.check(&format!("light {}", ix + 1), spec, light)?);
     }
     warn_of_black(file, &scene.lights);
     if let Some(spec) = &description.ambient {
-        scene.ambient = file.check("ambient", spec, |rgb| colour("ambient", Some(*rgb), Vec3::ZERO))?;
+        (scene.ambient, scene.ground) = file.check("ambient", spec, ambient)?;
     }
     if let Some(spec) = &description.background {
         scene.background = file.check("background", spec, |rgb| colour("background", Some(*rgb), Vec3::ZERO))?;
@@ -123,6 +131,9 @@ fn assemble(file: &File, description: Description) -> Result<(Scene, Lacks), Sce
     placer.materials.remove_idle(&mut placer.scene);
     let Placer { mut scene, images, .. } = placer;
     scene.images = images.finish();
+    if let Some(spec) = &description.replace {
+        file.check("replace", spec, |_| preset::replace(&mut scene, &replace))?;
+    }
     if scene.n_triangles() == 0 {
         return Err(SceneError::file(file.path, "has no triangles"));
     }
@@ -151,7 +162,8 @@ fn add_materials(
             let path = |(key, map): (&str, &MapSpec)| {
                 file.access.beside(file.path).exact(map.file()).map_err(|what| format!("{key}: {what}"))
             };
-            spec.maps().map(|map| Ok(images.add(path(map)?))).collect()
+            let maps = spec.maps().filter(|_| !images.is_replaced(name)).collect::<Vec<_>>();
+            maps.into_iter().map(|map| Ok(images.add(path(map)?))).collect()
         })?);
     }
     images.decode();
@@ -190,6 +202,22 @@ impl Scene {
         let mut slots: Vec<u32> = materials.into_iter().map(|material| self.push_material(material)).collect();
         slots.push(self.default_material());
         slots
+    }
+}
+
+fn choices(words: &[String]) -> Checked<Vec<MaterialChoice>> {
+    words.iter().map(|word| word.parse()).collect()
+}
+
+/// Returns the ambient light from above, and that from below if it differs.
+fn ambient(spec: &AmbientSpec) -> Checked<(Vec3, Option<Ground>)> {
+    match spec {
+        AmbientSpec::Even(rgb) => Ok((colour("ambient", Some(*rgb), Vec3::ZERO)?, None)),
+        AmbientSpec::Hemispheres(HemispheresSpec { sky, ground, up }) => {
+            let up = up.as_ref().map_or(Ok(Up::Y), |word| word.parse()).map_err(|error| format!("up: {error}"))?;
+            let ambient = colour("ground", Some(*ground), Vec3::ZERO)?;
+            Ok((colour("sky", Some(*sky), Vec3::ZERO)?, Some(Ground { ambient, up })))
+        }
     }
 }
 

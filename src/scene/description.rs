@@ -25,17 +25,37 @@ pub(super) struct Description {
     #[serde(default)]
     pub light: Vec<Spanned<LightSpec>>,
     /// Irradiance that every point receives, weighted by Ka; black where absent.
-    pub ambient: Option<Spanned<[f32; 3]>>,
+    pub ambient: Option<Spanned<AmbientSpec>>,
     /// Radiance of rays that leave the scene; black where absent.
     pub background: Option<Spanned<[f32; 3]>>,
     /// Image of what rays see that leave the scene, for `path`.
     pub environment: Option<Spanned<EnvironmentSpec>>,
+    /// Presets in place of materials, as `--material` takes them.
+    pub replace: Option<Spanned<Vec<String>>>,
     #[serde(default)]
     pub materials: BTreeMap<String, Spanned<MaterialSpec>>,
     /// Meshes, as tables that `MeshSpec::new` reads.
     #[serde(default)]
     pub mesh: Vec<Spanned<Table>>,
     pub render: Option<Spanned<RenderSpec>>,
+}
+
+/// Ambient light: one colour, or two that are blended by the normal's coordinate along `up`.
+#[derive(Debug, Deserialize)]
+#[serde(untagged, expecting = "expected a colour, or a table of `sky`, `ground` and perhaps `up`")]
+pub(super) enum AmbientSpec {
+    Even([f32; 3]),
+    Hemispheres(HemispheresSpec),
+}
+
+/// Irradiance of surfaces that face up, and of those that face down.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct HemispheresSpec {
+    pub sky: [f32; 3],
+    pub ground: [f32; 3],
+    /// `y` or `z`; `y` where absent.
+    pub up: Option<String>,
 }
 
 /// A camera in world space.
@@ -146,8 +166,9 @@ pub(super) struct MeshSpec {
 /// Source of a mesh's triangles.
 #[derive(Debug)]
 pub(super) enum Source {
-    /// A mesh file; `path` is relative to the scene file's folder. `crease` is in degrees.
-    File { path: String, crease: Option<f32>, scene: Option<String> },
+    /// A mesh file; `path` is relative to the scene file's folder. `crease` is in degrees. `origin` is the point of the
+    /// file that becomes the origin of the mesh.
+    File { path: String, crease: Option<f32>, scene: Option<String>, origin: Option<[f64; 3]> },
     /// A generator that makes the mesh from a few parameters.
     Generator(Generator),
 }
@@ -181,7 +202,12 @@ struct FileSpec {
     crease: Option<f32>,
     /// Scene of a glTF file by its name or its index, counted from 0; the file's default scene where absent.
     scene: Option<String>,
+    /// Point of the file that becomes the origin of the mesh, in double precision; 0 where absent.
+    origin: Option<[f64; 3]>,
 }
+
+/// Largest coordinate of an origin. Farther away, double precision is coarse, too.
+const MAX_ORIGIN: f64 = 1e12;
 
 const COMMON_KEYS: [&str; 6] = ["transform", "material", "materials", "smooth", "uv_scale", "override"];
 
@@ -199,9 +225,12 @@ impl MeshSpec {
         }
         let source = match (table.contains_key("file"), table.contains_key("generator")) {
             (true, false) => {
-                let FileSpec { file: path, crease, scene } = read(table)?;
+                let FileSpec { file: path, crease, scene, origin } = read(table)?;
+                if let Some(origin) = origin.filter(|origin| !origin.iter().all(|x| x.abs() <= MAX_ORIGIN)) {
+                    return Err(format!("origin = {origin:?} is not within {MAX_ORIGIN:e}"));
+                }
                 let crease = crease.map(|crease| within("crease", crease, 0.0, 180.0)).transpose()?;
-                Source::File { path, crease, scene }
+                Source::File { path, crease, scene, origin }
             }
             (false, true) if common.overrides => {
                 return Err("has `override`, but only mesh files have materials of their own".to_owned());

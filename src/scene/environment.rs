@@ -93,8 +93,7 @@ impl MendedTexels {
         if n + n_infinite == 0 {
             return None;
         }
-        let counts: Vec<_> =
-            kinds.iter().filter(|(n, _)| *n > 0).map(|(n, kind)| format!("{n} {kind}")).collect();
+        let counts: Vec<_> = kinds.iter().filter(|(n, _)| *n > 0).map(|(n, kind)| format!("{n} {kind}")).collect();
         Some(format!(
             "has pixels that are no radiance ({}): NaN and negative become 0, infinite becomes the greatest of the \
              other numbers",

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::util::text::one_line;
+use crate::util::text::short_line;
 
 /// A scene file that cannot be read, understood or drawn. It displays as one line: `FILE:LINE: what` or
 /// `FILE: object: what`.
@@ -16,24 +16,14 @@ pub struct SceneError {
 impl SceneError {
     /// An error that concerns a file as a whole.
     pub(super) fn file(path: &Path, what: impl AsRef<str>) -> Self {
-        Self { place: quoted(&path.display().to_string()), what: quoted(what.as_ref()) }
+        Self { place: short_line(&path.display().to_string()), what: short_line(what.as_ref()) }
     }
 
     /// An error that concerns one line of a file. Lines count from 1.
     pub(super) fn line(path: &Path, line: usize, what: impl AsRef<str>) -> Self {
-        Self { place: format!("{}:{line}", quoted(&path.display().to_string())), what: quoted(what.as_ref()) }
+        Self { place: format!("{}:{line}", short_line(&path.display().to_string())), what: short_line(what.as_ref()) }
     }
 }
 
 /// Result of a check that does not know the file and the line of what it checks. The error is a message for people.
 pub(super) type Checked<T> = Result<T, String>;
-
-/// Returns `text` on one line. After 300 characters an ellipsis replaces the rest, since the text may quote a hostile
-/// file.
-fn quoted(text: &str) -> String {
-    let line = one_line(text);
-    match line.char_indices().nth(300) {
-        Some((end, _)) => format!("{}…", &line[..end]),
-        None => line,
-    }
-}

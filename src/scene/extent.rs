@@ -46,9 +46,13 @@ pub(super) fn check(path: &Path, (min, max): (Vec3, Vec3)) -> Result<(), SceneEr
         return Err(SceneError::file(path, what));
     }
     if is_coarse {
+        // A few digits are enough for a point near the middle.
+        let step = 10_f64.powf(extent.log10().floor());
+        let middle = (min.as_dvec3() + max.as_dvec3()) / 2.0;
+        let [x, y, z] = (middle / step).round().to_array().map(|n| n * step);
         tracing::warn!(
-            "{}: {precision}: smaller details are lost; move the scene to the origin before it is saved in single \
-             precision",
+            "{}: {precision}: smaller details are lost; `origin = [{x:?}, {y:?}, {z:?}]` in the [[mesh]] table of a \
+             scene file keeps what an OBJ, PLY or STL file has of them",
             path.display()
         );
     }

@@ -6,6 +6,7 @@ use super::{
     error::Checked,
     image::{Encoded, Examined, MAX_PIXELS, decode_all, normals_of_heights},
     needs::{require_for_bytes, require_for_images},
+    preset::{MaterialChoice, is_replaced},
     read::read_bytes,
     texture::{Channel, Image, Pixels},
 };
@@ -24,6 +25,8 @@ pub(super) enum View {
 /// Image files, and the images that textures show, whose indices are those of the scene.
 #[derive(Debug, Default)]
 pub(super) struct Images {
+    /// Which materials are replaced. The images of their files are not needed.
+    replaced: Vec<MaterialChoice>,
     files: Vec<File>,
     by_path: HashMap<PathBuf, usize>,
     shown: Vec<Shown>,
@@ -51,6 +54,21 @@ enum Shown {
 }
 
 impl Images {
+    /// `replaced`: which materials are replaced once they are loaded.
+    pub fn new(replaced: Vec<MaterialChoice>) -> Self {
+        Self { replaced, ..Self::default() }
+    }
+
+    /// Returns whether the materials of a name are replaced, so that their images need not be read.
+    pub fn is_replaced(&self, material: &str) -> bool {
+        is_replaced(&self.replaced, material)
+    }
+
+    /// Returns which materials are replaced.
+    pub fn replaced(&self) -> &[MaterialChoice] {
+        &self.replaced
+    }
+
     /// Returns the index of a file.
     pub fn add(&mut self, path: PathBuf) -> usize {
         // One file can have several names. A file that does not exist has those that are stated.

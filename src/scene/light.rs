@@ -2,6 +2,18 @@
 
 use glam::Vec3;
 
+use super::look::Up;
+
+/// Ambient light from below. The irradiance of a surface is blended from that of the sky and that of the ground by the
+/// height to which its normal points.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ground {
+    /// Irradiance of surfaces that face down, linear RGB.
+    pub ambient: Vec3,
+    /// The axis of the world that points up.
+    pub up: Up,
+}
+
 /// A source of light that is no surface of the scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {

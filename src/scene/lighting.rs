@@ -40,7 +40,9 @@ impl Scene {
             tracing::warn!("{path}: --integrator whitted does not show {}; path does", hidden.join(" and "));
         }
         let shows = |light: &Light| !light.is_black() && !(is_whitted && light.has_area());
-        let is_lit = self.ambient != Vec3::ZERO || self.lights.iter().any(shows);
+        let is_lit = self.ambient != Vec3::ZERO
+            || self.ground.is_some_and(|ground| ground.ambient != Vec3::ZERO)
+            || self.lights.iter().any(shows);
         let shines = self.has_shining_surfaces() || self.environment.is_some() || self.background != Vec3::ZERO;
         if is_lit || (!is_whitted && shines) {
             return;

@@ -2,7 +2,9 @@
 
 use glam::Vec3;
 
-use super::{Camera, Light, Projection, Scene, camera::FOV_DEGREES, error::Checked, mesh::MAX_COORDINATE};
+use super::{
+    Camera, Light, Projection, Scene, camera::FOV_DEGREES, error::Checked, mesh::MAX_COORDINATE, preset::MaterialChoice,
+};
 
 /// The axis of the world that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -39,7 +41,7 @@ pub enum LightChoice {
 }
 
 /// The user's choices. Absent ones leave the scene as it is.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Look {
     /// The axis that points up in the picture. Where absent, it is +z for a bare STL file, and else that of the camera.
     pub up: Option<Up>,
@@ -53,6 +55,8 @@ pub struct Look {
     pub light: Option<LightChoice>,
     /// Radiance of rays that leave the scene, linear RGB, at least 0.
     pub background: Option<Vec3>,
+    /// Materials in place of the scene's own. Of several for a material the last one counts.
+    pub materials: Vec<MaterialChoice>,
 }
 
 /// Irradiance of the user's light.

@@ -3,6 +3,8 @@
 
 use std::path::Path;
 
+use glam::DVec3;
+
 use super::{
     error::SceneError,
     image_files::Images,
@@ -73,6 +75,9 @@ pub(super) fn read_mesh(path: &Path) -> Result<Vec<u8>, SceneError> {
 /// How a mesh file is loaded.
 pub(super) struct Loading<'a> {
     pub shading: Shading,
+    /// The point of the file that becomes the origin of the mesh. It is subtracted before coordinates are rounded to
+    /// single precision.
+    pub origin: DVec3,
     /// Number of triangles that the scene has already.
     pub n_loaded: usize,
     /// Which files the mesh file may name.
@@ -99,7 +104,7 @@ pub(super) fn parse_mesh(path: &Path, bytes: Vec<u8>, loading: &mut Loading) -> 
         MeshFormat::Ply => parse_ply(path, &bytes, loading).map_err(failed)?,
         MeshFormat::Gltf => return Err(failed("is glTF, which is a whole scene".to_owned())),
         MeshFormat::Stl => {
-            let mesh = parse_stl(bytes, loading.shading, loading.n_loaded).map_err(failed)?;
+            let mesh = parse_stl(bytes, (loading.shading, loading.origin), loading.n_loaded).map_err(failed)?;
             Loaded { mesh, materials: Vec::new(), uses_crease: loading.shading.smooth }
         }
     };

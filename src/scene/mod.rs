@@ -33,6 +33,7 @@ mod path;
 mod placed;
 mod ply;
 mod polygon;
+mod preset;
 mod read;
 mod smooth;
 mod sources;
@@ -42,10 +43,11 @@ mod tangents;
 mod terms;
 mod texture;
 mod transform;
+mod up;
 
 use std::path::Path;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 pub use self::{
     camera::{Camera, Projection},
@@ -54,11 +56,12 @@ pub use self::{
     environment::{Environment, MendedTexels},
     error::SceneError,
     extent::MIN_EXTENT,
-    light::Light,
+    light::{Ground, Light},
     look::{LightChoice, Look, Up},
     material::{Alpha, Clearcoat, Conductor, Lobes, Maps, Material, Microfacet, Sheen},
     mesh::Mesh,
     path::CameraPath,
+    preset::{MaterialChoice, Preset},
     sources::{source_files, source_files_with},
     terms::{Term, TermValue},
     texture::{Channel, Encoding, Image, Pixels, Texture, Wrap},
@@ -94,8 +97,11 @@ pub struct Scene {
     pub camera: Camera,
     /// The cameras of the scene's file with their names, possibly none.
     pub cameras: Vec<(String, Camera)>,
-    /// Irradiance that every point receives, linear RGB. The material's `ka` weights it.
+    /// Irradiance that every point receives, linear RGB. The material's `ka` weights it. If there is a `ground`, this
+    /// is the irradiance of surfaces that face up.
     pub ambient: Vec3,
+    /// The ambient light from below, if it is not that of all sides.
+    pub ground: Option<Ground>,
     /// Radiance of rays that leave the scene, linear RGB.
     pub background: Vec3,
     /// The options that the scene is rendered with unless others are set.
@@ -155,13 +161,14 @@ impl Scene {
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         let (mut scene, lacks) = if is_scene_file(path) {
             check_only_scene(path, options)?;
-            assemble::load_toml(path, Access::of(options))?
+            assemble::load_toml(path, options)?
         } else if MeshFormat::of_name(path).is_some() {
             load_mesh_file(path, options)?
         } else {
             let endings = "its name ends in none of .toml, .gltf, .glb, .obj, .ply and .stl";
             return Err(SceneError::file(path, format!("is no scene: {endings}")));
         };
+        preset::replace(&mut scene, &options.look.materials).map_err(|what| SceneError::file(path, what))?;
         scene.add_tangents().map_err(|what| SceneError::file(path, what))?;
         if let Some(name) = &options.camera {
             scene.choose_camera(name).map_err(|what| SceneError::file(path, what))?;
@@ -237,6 +244,7 @@ impl Scene {
             },
             cameras: Vec::new(),
             ambient: Vec3::ZERO,
+            ground: None,
             background: Vec3::ZERO,
             environment: None,
             defaults: RenderDefaults::default(),
@@ -257,17 +265,22 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), 
     }
     check_only_scene(path, options)?;
     let mut scene = Scene::empty(path);
-    let mut images = Images::default();
+    let mut images = Images::new(options.look.materials.clone());
     let access = Access::of(options);
-    let mut loading = Loading { shading: Shading::default(), n_loaded: 0, access, images: &mut images };
-    let up = if MeshFormat::of(path, &bytes) == MeshFormat::Stl { Up::Z } else { Up::Y };
+    let mut loading =
+        Loading { shading: Shading::default(), origin: DVec3::ZERO, n_loaded: 0, access, images: &mut images };
+    let (format, head) = (MeshFormat::of(path, &bytes), bytes[..bytes.len().min(up::HEAD_BYTES)].to_vec());
     let Loaded { mesh, materials, .. } = mesh_file::parse_mesh(path, bytes, &mut loading)?;
+    let guess = up::guess(format, &head, &mesh);
+    if let (Some(why), None) = (&guess.why, options.look.up) {
+        tracing::info!("{}: {why}", path.display());
+    }
     let slots = scene.push_materials(materials);
     scene.images = images.finish();
     scene.push_mesh(mesh, Transform::IDENTITY, slots).map_err(|what| SceneError::file(path, what))?;
     extent::check(path, scene.bounds())?;
     scene.defaults.samples = standard::SAMPLES;
-    Ok((scene, Lacks { camera: true, up, light: true, background: true, integrator: true }))
+    Ok((scene, Lacks { camera: true, up: guess.up, light: true, background: true, integrator: true }))
 }
 
 /// Refuses the choice of a scene for a file that has only one.

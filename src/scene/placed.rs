@@ -7,10 +7,10 @@ use std::{
     path::PathBuf,
 };
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::{
-    Instance, LoadOptions, Material, Scene, SceneError, Transform,
+    Instance, LoadOptions, Look, Material, Scene, SceneError, Transform,
     assemble::File,
     description::{CommonSpec, MeshSpec, Source},
     error::Checked,
@@ -44,6 +44,8 @@ struct Reading {
     crease: u32,
     /// Bits of the factors on texture coordinates.
     uv_scale: Option<[u32; 2]>,
+    /// Bits of the coordinates of the point that becomes the mesh's origin.
+    origin: Option<[u64; 3]>,
 }
 
 /// A mesh file whose meshes are in the scene.
@@ -143,9 +145,14 @@ impl<'a> Placer<'a> {
         let n_loaded = self.scene.n_triangles();
         let first_mesh = self.scene.meshes.len();
         let uv_scale = table.spec.common.uv_scale;
+        let origin = reading.origin.map(|bits| DVec3::from_array(bits.map(f64::from_bits)));
         if MeshFormat::of(path, &bytes) == MeshFormat::Gltf {
+            if origin.is_some() {
+                return Err(failed("has `origin`, but coordinates of glTF files are of single precision".to_owned()));
+            }
             let allow_outside = self.file.access.is_anywhere();
-            let options = LoadOptions { scene: reading.scene.clone(), allow_outside, ..LoadOptions::default() };
+            let look = Look { materials: self.images.replaced().to_vec(), ..Look::default() };
+            let options = LoadOptions { scene: reading.scene.clone(), allow_outside, look, ..LoadOptions::default() };
             let has_materials = self.with_materials.contains(reading);
             let before = gltf::LoadedBefore { n_triangles: n_loaded as u64, n_pixels: self.images.n_pixels() };
             let mut model = gltf::load_meshes(path, bytes, &options, has_materials, before)?;
@@ -169,7 +176,8 @@ impl<'a> Placer<'a> {
             return Err(failed(format!("there is no scene `{name}`: only glTF files name scenes")));
         }
         let shading = Shading { smooth: reading.is_smooth, crease: f32::from_bits(reading.crease) };
-        let mut loading = Loading { shading, n_loaded, access: self.file.access, images: &mut self.images };
+        let origin = origin.unwrap_or_default();
+        let mut loading = Loading { shading, origin, n_loaded, access: self.file.access, images: &mut self.images };
         let Loaded { mut mesh, materials, uses_crease } = parse_mesh(path, bytes, &mut loading)?;
         scale_uvs(&mut mesh, uv_scale).map_err(failed)?;
         self.scene.meshes.push(mesh);
@@ -220,13 +228,14 @@ impl<'a> Placer<'a> {
 impl Reading {
     /// Returns how the file of a mesh is read, or `None` for a generator.
     fn of(file: &File, spec: &MeshSpec) -> Checked<Option<Self>> {
-        let Source::File { path, crease, scene } = &spec.source else { return Ok(None) };
+        let Source::File { path, crease, scene, origin } = &spec.source else { return Ok(None) };
         Ok(Some(Self {
             path: file.access.beside(file.path).exact(path)?,
             scene: scene.clone(),
             is_smooth: spec.common.smooth.unwrap_or(true),
             crease: crease.unwrap_or(DEFAULT_CREASE).to_bits(),
             uv_scale: spec.common.uv_scale.map(|scale| scale.map(f32::to_bits)),
+            origin: origin.map(|origin| origin.map(f64::to_bits)),
         }))
     }
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::{
-    Light, LoadOptions, Scene,
+    Ground, Light, LoadOptions, Scene,
     error::Checked,
     framing::{self, Frame, WorldAxes},
     interior,
@@ -32,9 +32,10 @@ pub(super) const SAMPLES: u32 = 4;
 /// shadows.
 const KEY: Lamp = Lamp { azimuth: -50.0, elevation: 45.0, irradiance: 0.75 };
 const FILL: Lamp = Lamp { azimuth: 60.0, elevation: 20.0, irradiance: 0.22 };
-/// Irradiance of the ambient light.
-const AMBIENT: f32 = 0.2;
-const AMBIENT_OF_INTERIORS: f32 = 0.35;
+/// Irradiance of the ambient light on surfaces that face up, and on those that face down. The mean is grey, so walls
+/// have their own colours.
+const AMBIENT: [Vec3; 2] = [Vec3::new(0.25, 0.26, 0.28), Vec3::new(0.15, 0.14, 0.12)];
+const AMBIENT_OF_INTERIORS: [Vec3; 2] = [Vec3::splat(0.4), Vec3::splat(0.3)];
 /// In an interior, the irradiance of the light in its middle, at a distance of a mean half extent.
 const MIDDLE_IRRADIANCE: f32 = 0.35;
 /// Height of that light above the middle, in half extents.
@@ -46,7 +47,8 @@ const BACKGROUND: Vec3 = Vec3::new(0.32, 0.36, 0.42);
 /// Gives a scene what its file lacks, and what the user has chosen.
 pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) -> Checked<()> {
     let look = &options.look;
-    let axes = WorldAxes::with_up(look.up.unwrap_or(lacks.up).vector());
+    let up = look.up.unwrap_or(lacks.up);
+    let axes = WorldAxes::with_up(up.vector());
     let needs_bounds = lacks.camera || lacks.light;
     let bounds = if needs_bounds { scene.bounds() } else { Default::default() };
     let is_interior = needs_bounds && interior::is_interior(scene, bounds);
@@ -64,7 +66,8 @@ pub(super) fn fill_in(scene: &mut Scene, lacks: Lacks, options: &LoadOptions) ->
     }
     if lacks.light && !scene.has_bright_surfaces() {
         let lamps = if is_interior { lamps_inside(scene, bounds) } else { lamps_outside(scene, &axes) };
-        scene.ambient = Vec3::splat(if is_interior { AMBIENT_OF_INTERIORS } else { AMBIENT });
+        let [sky, ground] = if is_interior { AMBIENT_OF_INTERIORS } else { AMBIENT };
+        (scene.ambient, scene.ground) = (sky, Some(Ground { ambient: ground, up }));
         scene.lights = lamps.to_vec();
         if lacks.background {
             scene.background = BACKGROUND;

@@ -5,7 +5,7 @@
 
 use std::io::Cursor;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use stl_io::{Triangle, create_stl_reader};
 
 use super::{
@@ -48,12 +48,13 @@ fn is_statement(line: &[u8], keyword: &[u8]) -> bool {
 }
 
 /// Makes a mesh of a file's content. Its faces have slot 0.
-pub(super) fn parse_stl(bytes: Vec<u8>, shading: Shading, n_loaded: usize) -> Checked<Mesh> {
+pub(super) fn parse_stl(bytes: Vec<u8>, (shading, origin): (Shading, DVec3), n_loaded: usize) -> Checked<Mesh> {
     let triangles = match is_binary_stl(&bytes) || !is_stl_text(&bytes) {
         true => binary(bytes, n_loaded)?,
         false => text(without_bom(&bytes), n_loaded)?,
     };
-    let positions: Vec<_> = triangles.iter().flat_map(|triangle| triangle.vertices.map(|v| Vec3::from(v.0))).collect();
+    let position = |v: stl_io::Vertex| (Vec3::from(v.0).as_dvec3() - origin).as_vec3();
+    let positions: Vec<_> = triangles.iter().flat_map(|triangle| triangle.vertices.map(position)).collect();
     let faces: Vec<_> = (0..triangles.len() as u32).map(|ix| [3 * ix, 3 * ix + 1, 3 * ix + 2]).collect();
     let normals = smooth_normals(&positions, &faces, shading);
     Ok(Mesh { positions, slots: vec![0; faces.len()], faces, normals, ..Mesh::default() })

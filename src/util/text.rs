@@ -25,6 +25,16 @@ pub fn one_line(text: &str) -> String {
     escape_controls(&words.join(" ")).into_owned()
 }
 
+/// Makes text one line as [`one_line`] does. After 300 characters an ellipsis replaces the rest, since the text may
+/// quote a hostile file.
+pub fn short_line(text: &str) -> String {
+    let line = one_line(text);
+    match line.char_indices().nth(300) {
+        Some((end, _)) => format!("{}…", &line[..end]),
+        None => line,
+    }
+}
+
 /// Returns whether a terminal would obey a character instead of printing it.
 pub(crate) fn is_obeyed(c: char) -> bool {
     c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
@@ -46,5 +56,6 @@ mod tests {
     #[test]
     fn lines_become_one() {
         assert_eq!(one_line("  a\n\n  b\t\u{7}c \r\n"), "a b \\u{7}c");
+        assert_eq!(short_line(&"ä\n".repeat(200)), format!("{}…", "ä ".repeat(150)));
     }
 }

@@ -17,6 +17,7 @@ use crate::{
         Triangle,
     },
     reference::texture::{sample_texture, uv_set_of},
+    scene::{Ground, Up},
 };
 
 /// The number of parts of each edge of a triangle over whose cells the mean of its emission is taken.
@@ -40,6 +41,10 @@ pub struct Emitters {
     pub background: Vec3,
     /// Radiance that surfaces get from all directions in addition.
     pub ambient: Vec3,
+    /// The same from below.
+    pub ground_ambient: Vec3,
+    /// Index of the coordinate that points up.
+    pub up_axis: usize,
     /// The index and the number of the entries of triangles.
     triangle_entries: (usize, usize),
 }
@@ -55,7 +60,10 @@ impl Emitters {
     /// Makes the tables of a scene on the current rayon pool.
     pub(super) fn new(scene: &FlatScene) -> Self {
         let disk = bounding_disk(scene);
-        let environment = scene.environment.as_ref().map(|map| EnvironmentMap::new(map, scene.ambient));
+        let ground = scene.ground.unwrap_or(Ground { ambient: scene.ambient, up: Up::Y });
+        // Directions are picked as if the brighter half of the ambient light came from everywhere.
+        let ambient = scene.ambient.max(ground.ambient);
+        let environment = scene.environment.as_ref().map(|map| EnvironmentMap::new(map, ambient));
         let mut area_lights = scene.area_lights.clone();
         let (lights, suns) = lights_and_suns(&scene.lights, disk);
         let of_areas = area_lights.iter().enumerate().map(|(ix, light)| Weighed {
@@ -73,7 +81,7 @@ impl Emitters {
         area_lights.extend(suns);
         weighed.extend(triangles(scene));
         let mean = environment.as_ref().map_or(luminance(scene.background), EnvironmentMap::mean_luminance);
-        let power = (mean + luminance(scene.ambient)) * 4.0 * PI * disk;
+        let power = (mean + luminance(ambient)) * 4.0 * PI * disk;
         weighed.push(Weighed { kind: EMITTER_ENVIRONMENT, ix: 0, power });
         let mut made = Self {
             area_lights,
@@ -81,6 +89,8 @@ impl Emitters {
             environment,
             background: scene.background,
             ambient: scene.ambient,
+            ground_ambient: ground.ambient,
+            up_axis: if ground.up == Up::Z { 2 } else { 1 },
             ..Self::default()
         };
         made.set_entries(weighed);
@@ -140,6 +150,8 @@ impl Emitters {
             background: self.background,
             environment_probability: self.environment_probability,
             ambient: self.ambient,
+            ground_ambient: self.ground_ambient,
+            up_axis: self.up_axis as u32,
             n_emitters: self.entries.len() as u32,
             first_triangle_emitter: self.triangle_entries.0 as u32,
             n_triangle_emitters: self.triangle_entries.1 as u32,

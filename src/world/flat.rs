@@ -14,7 +14,8 @@ use crate::{
         normal::encode_octahedral,
     },
     scene::{
-        self, Alpha, Camera, Conductor, Environment, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene, Transform,
+        self, Alpha, Camera, Conductor, Environment, Ground, Instance, Lobes, Mesh, Microfacet, RenderDefaults, Scene,
+        Transform,
     },
 };
 
@@ -44,6 +45,8 @@ pub struct FlatScene {
     pub camera: Camera,
     /// The irradiance that every point receives, which is weighted by the point's Ka.
     pub ambient: Vec3,
+    /// The ambient light from below, if it is not that of all sides.
+    pub ground: Option<Ground>,
     /// The radiance of rays that leave the scene.
     pub background: Vec3,
     /// The options that the scene is rendered with unless others are set.
@@ -80,6 +83,7 @@ impl FlatScene {
             environment: scene.environment.clone(),
             camera: scene.camera,
             ambient: scene.ambient,
+            ground: scene.ground,
             background: scene.background,
             defaults: scene.defaults,
         })

@@ -1,16 +1,25 @@
 //! Constants of a frame of a world, as the kernels read them.
 
-use crate::{frame::RenderOptions, layout::Frame, world::World};
+use crate::{
+    frame::RenderOptions,
+    layout::Frame,
+    scene::{Ground, Up},
+    world::World,
+};
 
 impl World {
     /// Returns the constants of a frame that shows the first sample of each pixel from the scene's own camera.
     /// `queue_capacity` is left 0; the code that makes the queues sets it.
     pub fn frame_constants(&self, options: &RenderOptions) -> Frame {
         let scene = self.scene();
+        let ground = scene.ground.unwrap_or(Ground { ambient: scene.ambient, up: Up::Y });
         let mut frame = Frame {
             n_triangles: scene.triangles.len() as u32,
             n_lights: scene.lights.len() as u32,
-            ambient: scene.ambient,
+            // Equal colours give this colour and no tilt, without any rounding.
+            ambient: scene.ambient + (ground.ambient - scene.ambient) / 2.0,
+            ambient_tilt: (scene.ambient - ground.ambient) / 2.0,
+            up_axis: if ground.up == Up::Z { 2 } else { 1 },
             background: scene.background,
             ..Frame::default()
         };

@@ -74,12 +74,7 @@ impl World {
     pub fn with_accel(scene: FlatScene, options: &AccelOptions) -> Result<Self, Mismatch> {
         mismatch::check_materials(&scene)?;
         let accel = Accel::new(&scene.triangles, options);
-        Ok(Self(Arc::new(Parts {
-            scene,
-            accel,
-            accel_options: options.clone(),
-            emitters: OnceLock::new(),
-        })))
+        Ok(Self(Arc::new(Parts { scene, accel, accel_options: options.clone(), emitters: OnceLock::new() })))
     }
 
     /// Joins a scene and a kd-tree that was built elsewhere. `build_options`: the options that the tree was built

@@ -3,7 +3,8 @@
 use glam::{Vec3, vec3};
 use kdray::{
     frame::{Picture, Primary, RenderOptions},
-    scene::{Camera, Projection},
+    layout::{FLAT_NORMAL, Triangle},
+    scene::{Camera, Ground, Projection, Up},
     world::FlatScene,
 };
 
@@ -54,6 +55,46 @@ fn ambient_light_is_ka_times_ambient() {
     for picture in on_both(&scene, &options(16, 12, 2)) {
         assert_eq!(worst(&picture, vec3(0.125, 0.125, 0.75)), 0.0);
     }
+}
+
+/// A white plane shows the irradiance that its slope receives: (1 + s) / 2 of the sky's and the rest of the ground's,
+/// s being the cosine of the angle between its normal and the up axis.
+#[test]
+fn a_plane_shows_as_much_of_the_sky_as_its_slope_says() {
+    let (sky, ground) = (vec3(0.25, 0.5, 1.0), vec3(0.75, 0.25, 0.0));
+    for (up, normal, cosine) in [
+        (Up::Y, Vec3::Y, 1.0),
+        (Up::Y, Vec3::NEG_Y, -1.0),
+        (Up::Y, Vec3::X, 0.0),
+        (Up::Y, vec3(0.0, 0.6, 0.8), 0.6),
+        (Up::Z, Vec3::Z, 1.0),
+        (Up::Z, vec3(0.0, 0.6, -0.8), -0.8),
+    ] {
+        let mut scene = scenes::empty();
+        let (right, above) = normal.any_orthonormal_pair();
+        let corner = |x: f32, y: f32| 50.0 * (x * right + y * above);
+        let [v0, v1, v2] = [corner(-1.0, -1.0), corner(3.0, -1.0), corner(-1.0, 3.0)];
+        let plane = Triangle { v0, v1, v2, n0: FLAT_NORMAL, n1: FLAT_NORMAL, n2: FLAT_NORMAL };
+        scenes::add(&mut scene, vec![plane], scenes::diffuse(Vec3::ONE));
+        scene.ambient = sky;
+        scene.ground = Some(Ground { ambient: ground, up });
+        scene.camera = Camera { eye: 5.0 * normal, target: Vec3::ZERO, up: right, ..scene.camera };
+        let expected = ground + (sky - ground) * (1.0 + cosine) / 2.0;
+        for picture in on_both(&scene, &options(16, 12, 2)) {
+            assert!(worst(&picture, expected) < 1e-4, "{up} {normal}: {}", worst(&picture, expected));
+        }
+    }
+}
+
+/// Equal colours from above and below change no bit.
+#[test]
+fn an_even_sky_is_ambient_light() {
+    let mut scene = colourful_room();
+    scenes::add(&mut scene, scenes::smooth_sphere(8, 1.0, vec3(0.5, 0.0, 0.0)), scenes::diffuse(vec3(0.3, 0.7, 0.1)));
+    scene.ambient = vec3(0.1, 0.3, 0.7);
+    let even = on_both(&scene, &options(32, 24, 3));
+    scene.ground = Some(Ground { ambient: scene.ambient, up: Up::Z });
+    assert_eq!(on_both(&scene, &options(32, 24, 3)), even);
 }
 
 /// Returns a room whose walls emit different colours.

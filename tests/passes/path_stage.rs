@@ -47,7 +47,9 @@ impl PathStage {
 
     /// Returns the twin's inputs for the same scene.
     pub fn inputs(&self) -> KernelInputs<'_> {
-        KernelInputs::new(&self.world, self.frame()).with_links(&self.links).of_paths(&self.materials, self.world.emitters())
+        KernelInputs::new(&self.world, self.frame())
+            .with_links(&self.links)
+            .of_paths(&self.materials, self.world.emitters())
     }
 
     pub fn frame(&self) -> &Frame {

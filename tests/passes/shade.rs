@@ -1,8 +1,10 @@
 //! Tests of the kernel shade against its twin on the CPU, with the same hits and light visibilities.
 
+use glam::vec3;
 use kdray::{
     layout::{Batch, LIGHT_UNTESTED},
     reference::{self, shade::LitRays},
+    scene::{Ground, Up},
 };
 
 use super::stage::{FIRST, RAY_COUNTS, Stage, UNTOUCHED_PIXEL, hits_of, options, rays_of};
@@ -52,6 +54,17 @@ fn agrees_on_textures_and_microfacets() {
     for n_rays in [1, 2000] {
         check(&stage, &FIRST, n_rays);
         check(&stage, &Batch { n_pixels: n_rays / 3, ..FIRST }, n_rays);
+    }
+}
+
+#[test]
+fn agrees_below_a_sky() {
+    for up in [Up::Y, Up::Z] {
+        let mut scene = scenes::mixed();
+        scene.lights.clear();
+        scene.ambient = vec3(0.5, 0.7, 1.0);
+        scene.ground = Some(Ground { ambient: vec3(0.4, 0.1, 0.0), up });
+        check(&Stage::new(scene, options(50, 50), 500), &FIRST, 500);
     }
 }
 

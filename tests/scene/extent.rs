@@ -141,3 +141,52 @@ fn just_below_the_limit_a_scene_is_refused() {
     let error = load(&[("utm.obj", point.as_bytes())]).unwrap_err().to_string();
     assert!(error.contains("5.00e-1 apart") && error.contains("move it to the origin"), "{error}");
 }
+
+/// A step of an eighth between points half a million away from 0 is lost in single precision, unless the points are
+/// taken relative to an origin there.
+#[test]
+fn an_origin_keeps_the_details_of_far_points() {
+    let far = [500_000.0, 4_100_000.0, -8.0];
+    let points = [[0.125, 0.0, 0.0], [9.0, 0.0625, 0.0], [0.0, 7.0, 2.5]];
+    let word = |p: [f64; 3]| format!("{} {} {}", far[0] + p[0], far[1] + p[1], far[2] + p[2]);
+    let lines = points.map(word);
+    let obj = format!("v {}\nv {}\nv {}\nf 1 2 3\n", lines[0], lines[1], lines[2]);
+    let coloured = format!("v {} 1 0 0\nv {}\nv {}\nf 1 2 3\n", lines[0], lines[1], lines[2]);
+    let ply = |colour: &str, value: &str| {
+        format!(
+            "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double z\n{colour}\
+             element face 1\nproperty list uchar int vertex_indices\nend_header\n{}{value}\n{}{value}\n{}{value}\n\
+             3 0 1 2\n",
+            lines[0], lines[1], lines[2]
+        )
+    };
+    let red = "property uchar red\nproperty uchar green\nproperty uchar blue\n";
+    for (name, content) in
+        [("a.obj", obj.clone()), ("a.obj", coloured), ("a.ply", ply("", "")), ("a.ply", ply(red, " 9 9 9"))]
+    {
+        let toml = format!("[[mesh]]\nfile = '{name}'\norigin = {far:?}\n");
+        let scene = load(&[("a.toml", toml.as_bytes()), (name, content.as_bytes())]).unwrap();
+        let t = &scene.triangles[0];
+        let found = [t.v0, t.v1, t.v2].map(|v| v.as_dvec3().to_array());
+        assert_eq!(found, points, "{content}");
+        let plain = format!("[[mesh]]\nfile = '{name}'\n");
+        let scene = load(&[("a.toml", plain.as_bytes()), (name, content.as_bytes())]).unwrap();
+        assert_eq!(scene.triangles[0].v1.y, 4_100_000.0, "single precision has only multiples of 0.25 there");
+    }
+    let stl = format!(
+        "solid a\nfacet normal 0 0 1\nouter loop\nvertex {}\nvertex {}\nvertex {}\nendloop\nendfacet\nendsolid a\n",
+        lines[0], lines[1], lines[2]
+    );
+    let toml = format!("[[mesh]]\nfile = 'a.stl'\norigin = {far:?}\n");
+    let scene = load(&[("a.toml", toml.as_bytes()), ("a.stl", stl.as_bytes())]).unwrap();
+    assert_eq!(scene.triangles[0].v2.to_array(), [0.0, 7.0, 2.5]);
+    // The warning of a bare file names an origin.
+    let (scene, warnings) = super::materials::load_scene(&[("a.obj", obj.as_bytes())]);
+    assert!(scene.is_ok());
+    assert!(warnings[0].contains("`origin = [500005.0, 4100004.0, -7.0]`"), "{warnings:?}");
+    for origin in ["[1e13, 0, 0]", "[nan, 0, 0]"] {
+        let toml = format!("[[mesh]]\nfile = 'a.obj'\norigin = {origin}\n");
+        let error = load(&[("a.toml", toml.as_bytes()), ("a.obj", obj.as_bytes())]).unwrap_err().to_string();
+        assert!(error.contains("a.toml:1: mesh 1: origin = ["), "{error}");
+    }
+}

@@ -46,6 +46,7 @@ fn scene(instances: Vec<Instance>) -> Scene {
             projection: Projection::Perspective { vertical_fov_degrees: 60.0 },
         },
         ambient: Vec3::ZERO,
+        ground: None,
         background: Vec3::ZERO,
         environment: None,
         defaults: RenderDefaults::default(),

@@ -11,6 +11,7 @@ mod mesh_files;
 mod obj;
 mod path;
 mod placed;
+mod replaced;
 mod standard;
 #[path = "../support/mod.rs"]
 mod support;
@@ -25,7 +26,7 @@ use kdray::{
         MATERIAL_SPECULAR, Triangle,
         normal::{decode_octahedral, encode_octahedral},
     },
-    scene::{Lobes, Projection, Scene, SceneError},
+    scene::{Ground, Lobes, Projection, Scene, SceneError, Up},
     world::FlatScene,
 };
 
@@ -125,6 +126,17 @@ fn materials_have_documented_defaults() {
 }
 
 #[test]
+fn ambient_light_may_differ_from_above_and_from_below() {
+    let disc = "[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 3\n";
+    for (key, up) in [("", Up::Y), (", up = 'y'", Up::Y), (", up = 'z'", Up::Z)] {
+        let scene = load_toml(&format!("ambient = {{ sky = [0.1, 0.2, 3], ground = [0, 0.5, 1]{key} }}\n{disc}"));
+        let ground = Ground { ambient: Vec3::new(0.0, 0.5, 1.0), up };
+        assert_eq!((scene.ambient, scene.ground), (Vec3::new(0.1, 0.2, 3.0), Some(ground)));
+        assert!(scene.lights.is_empty());
+    }
+}
+
+#[test]
 fn a_scene_file_says_everything() {
     let scene = load_toml(
         r#"
@@ -140,6 +152,7 @@ fn a_scene_file_says_everything() {
         "#,
     );
     assert_eq!((scene.ambient, scene.background), (Vec3::new(0.1, 0.2, 0.3), Vec3::new(1.0, 2.0, 3.0)));
+    assert_eq!(scene.ground, None);
     assert_eq!((scene.defaults.width, scene.defaults.height, scene.defaults.max_depth), (320, 200, 7));
     assert_eq!((scene.defaults.exposure, scene.defaults.denoise), (2.0, Denoise::Paper { threshold: 1.5 }));
     let projection = Projection::Perspective { vertical_fov_degrees: 30.0 };

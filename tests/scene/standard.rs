@@ -3,7 +3,7 @@
 use std::fs;
 
 use glam::{Vec2, Vec3};
-use kdray::scene::{Camera, Light, LightChoice, LoadOptions, Look, Projection, Scene, Up, scene_file_of};
+use kdray::scene::{Camera, Ground, Light, LightChoice, LoadOptions, Look, Projection, Scene, Up, scene_file_of};
 
 /// Writes files to one folder and loads the first one.
 fn load(files: &[(&str, &str)], options: &LoadOptions) -> Scene {
@@ -110,13 +110,17 @@ fn a_scene_file_with_nothing_but_a_mesh_looks_like_the_bare_mesh() {
     assert!(bare.ambient.min_element() > 0.0 && bare.background.min_element() > 0.0);
     let scene = files("");
     assert_eq!((scene.camera, scene.lights), (bare.camera, bare.lights.clone()));
-    assert_eq!((scene.ambient, scene.background), (bare.ambient, bare.background));
+    assert_eq!((scene.ambient, scene.ground, scene.background), (bare.ambient, bare.ground, bare.background));
+    // More light comes from the sky than from the ground, and a wall has its own colour.
+    let Some(Ground { ambient: below, up: Up::Y }) = bare.ground else { panic!("{:?}", bare.ground) };
+    assert!((bare.ambient - below).min_element() > 0.05, "{} {below}", bare.ambient);
+    assert!((bare.ambient + below).abs_diff_eq(Vec3::splat(0.4), 1e-6));
     // What the file states stays as it is.
     let scene = files("background = [0, 0, 0.5]");
     assert_eq!((scene.lights, scene.background), (bare.lights.clone(), Vec3::new(0.0, 0.0, 0.5)));
     let scene = files("ambient = [0, 0, 0]");
     assert!(scene.lights.is_empty());
-    assert_eq!((scene.ambient, scene.background), (Vec3::ZERO, Vec3::ZERO));
+    assert_eq!((scene.ambient, scene.ground, scene.background), (Vec3::ZERO, None, Vec3::ZERO));
     let light = "kind = 'directional'\ndirection = [0, -1, 0]\nirradiance = [1, 1, 1]";
     let scene = files(&format!("[[light]]\n{light}"));
     assert_eq!((scene.lights.len(), scene.ambient, scene.background), (1, Vec3::ZERO, Vec3::ZERO));
@@ -257,6 +261,10 @@ fn stl_files_have_z_up_and_others_y() {
     assert_eq!(load(&[("a.ply", ply)], &auto).camera.up, Vec3::Y);
     let y = with_look(Look { up: Some(Up::Y), ..Look::default() });
     assert_eq!(load(&[("a.stl", &stl)], &y).camera.up, Vec3::Y);
+    // A comment tells the axis, unless the user states another one.
+    let blenders = ply.replace("element vertex", "comment Created by Blender 3.6\nelement vertex");
+    assert_eq!(load(&[("a.ply", &blenders)], &auto).camera.up, Vec3::Z);
+    assert_eq!(load(&[("a.ply", &blenders)], &y).camera.up, Vec3::Y);
     let in_scene = [("a.toml", "[[mesh]]\nfile = 'a.stl'\n"), ("a.stl", &stl)];
     assert_eq!(load(&in_scene, &auto).camera.up, Vec3::Y);
 }
@@ -293,7 +301,7 @@ fn the_users_look_replaces_the_scenes() {
         Look { up: Some(Up::Z), ..Look::default() },
         Look { vertical_fov_degrees: Some(180.0), ..Look::default() },
     ] {
-        let error = Scene::load_with(&path, &with_look(look)).unwrap_err().to_string();
+        let error = Scene::load_with(&path, &with_look(look.clone())).unwrap_err().to_string();
         assert!(error.contains("a.toml"), "{look:?}: {error}");
     }
 }
@@ -324,7 +332,8 @@ fn converted_files_keep_the_look_and_the_samples() {
             let (before, after) =
                 (Scene::load_with(&path(input), &options).unwrap(), Scene::load(&path("c.toml")).unwrap());
             assert_eq!((before.camera, &before.lights), (after.camera, &after.lights), "{text}");
-            assert_eq!((before.ambient, before.background), (after.ambient, after.background), "{text}");
+            assert_eq!((before.ambient, before.ground), (after.ambient, after.ground), "{text}");
+            assert_eq!(before.background, after.background, "{text}");
             assert_eq!(before.defaults, after.defaults, "{text}");
             assert_eq!(after.defaults.samples, samples, "{text}");
         }

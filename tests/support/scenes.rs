@@ -36,6 +36,7 @@ pub fn empty() -> FlatScene {
             projection: Projection::Perspective { vertical_fov_degrees: 45.0 },
         },
         ambient: Vec3::ZERO,
+        ground: None,
         background: Vec3::ZERO,
         area_lights: Vec::new(),
         environment: None,

@@ -28,6 +28,7 @@ pub fn empty() -> Scene {
         },
         cameras: Vec::new(),
         ambient: Vec3::ZERO,
+        ground: None,
         background: Vec3::ZERO,
         environment: None,
         defaults: RenderDefaults::default(),

@@ -65,9 +65,9 @@ vec3 environment_radiance(vec3 direction) {
     return radiance + seen_suns(direction).radiance;
 }
 
-// The radiance that surfaces get from all directions in addition. Neither the camera nor mirrors see it.
-vec3 ambient_radiance() {
-    return accel.ambient;
+// The radiance that surfaces get from a direction in addition: from the sky or from the ground. Neither the camera nor mirrors see it.
+vec3 ambient_radiance(vec3 direction) {
+    return direction[accel.up_axis] < 0.0 ? accel.ground_ambient : accel.ambient;
 }
 
 // With which pick_light picks the direction because of the environment and its suns, per steradian.
@@ -117,7 +117,7 @@ LightPick pick_beyond(vec3 direction, float density) {
     vec3 radiance = has_environment_map() ? environment_map(direction) : accel.background;
     Towards way = Towards(direction, uintBitsToFloat(0x7f800000u));
     float whole = accel.environment_probability * density + suns.density;
-    return pick_of_point(way, radiance + suns.radiance + accel.ambient, whole);
+    return pick_of_point(way, radiance + suns.radiance + ambient_radiance(direction), whole);
 }
 
 LightPick pick_environment(vec2 u) {

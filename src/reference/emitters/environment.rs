@@ -67,8 +67,12 @@ pub fn environment_radiance(inputs: &KernelInputs, direction: Vec3) -> Vec3 {
 }
 
 /// The radiance that surfaces get from all directions in addition. Neither the camera nor mirrors see it.
-pub fn ambient_radiance(inputs: &KernelInputs) -> Vec3 {
-    inputs.emitters.map_or(Vec3::ZERO, |emitters| emitters.ambient)
+pub fn ambient_radiance(inputs: &KernelInputs, direction: Vec3) -> Vec3 {
+    inputs.emitters.map_or(Vec3::ZERO, |emitters| ambient_from(emitters, direction))
+}
+
+fn ambient_from(emitters: &Emitters, direction: Vec3) -> Vec3 {
+    if direction[emitters.up_axis] < 0.0 { emitters.ground_ambient } else { emitters.ambient }
 }
 
 /// With which [`pick_light`](super::pick_light) picks the direction because of the environment and its suns, per
@@ -114,7 +118,7 @@ fn pick_beyond(emitters: &Emitters, direction: Vec3, density: f32) -> LightPick 
     let radiance = radiance_without_suns(emitters, direction);
     let way = Towards { direction, distance: f32::INFINITY };
     let whole = emitters.environment_probability * density + suns.density;
-    pick_of_point(way, radiance + suns.radiance + emitters.ambient, whole)
+    pick_of_point(way, radiance + suns.radiance + ambient_from(emitters, direction), whole)
 }
 
 pub(super) fn pick_environment(emitters: &Emitters, u: Vec2) -> LightPick {

@@ -15,18 +15,18 @@ pub mod triangle;
 
 use glam::{Vec2, Vec3};
 
-pub use self::{
-    area_light::{SeenLight, seen_light},
-    environment::{ambient_radiance, environment_density, environment_radiance},
-    pick::LightPick,
-    triangle::emission_at,
-};
 use self::{
     alias::pick_alias,
     area_light::pick_area_light,
     environment::{pick_environment, pick_sun},
     punctual::pick_punctual,
     triangle::{area_density, pick_triangle},
+};
+pub use self::{
+    area_light::{SeenLight, seen_light},
+    environment::{ambient_radiance, environment_density, environment_radiance},
+    pick::LightPick,
+    triangle::emission_at,
 };
 use super::inputs::KernelInputs;
 use crate::layout::{EMITTER_AREA, EMITTER_LIGHT, EMITTER_SUN, EMITTER_TRIANGLE};

@@ -239,7 +239,7 @@ fn picks_have_the_density_of_what_is_seen() {
     assert!(n_borders * 1000 <= n_beyond, "{n_borders} of {n_beyond}");
     assert!(n_shapes > 50 && n_beyond > 50 && n_triangles > 50, "{n_shapes} {n_beyond} {n_triangles}");
     assert_eq!(emission_at(&inputs, 1, 0.2, 0.2), vec3(3.0, 2.0, 1.0));
-    assert_eq!(ambient_radiance(&inputs), Vec3::splat(0.1));
+    assert_eq!(ambient_radiance(&inputs, Vec3::X), Vec3::splat(0.1));
 }
 
 #[test]

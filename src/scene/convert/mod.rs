@@ -25,7 +25,11 @@ pub fn scene_file_of(input: &Path, output: &Path, options: &LoadOptions) -> Resu
     if is_scene_file(input) {
         return moved(input, &places, (&scene, options));
     }
-    let mesh = text::MeshTable { file: places.name_of(input)?, scene: options.scene.clone() };
+    let mesh = text::MeshTable {
+        file: places.name_of(input)?,
+        scene: options.scene.clone(),
+        replaced: options.look.materials.clone(),
+    };
     Ok(text::scene_file(&scene, &mesh))
 }
 
@@ -47,7 +51,7 @@ fn moved(input: &Path, places: &Places, (scene, options): (&Scene, &LoadOptions)
         // Without `ambient`, a file that has no lights would be given some.
         let lights: String = scene.lights.iter().map(text::light).collect();
         table.remove("light");
-        table.extend(parsed(format!("ambient = {}\n{lights}", text::vector(scene.ambient))));
+        table.extend(parsed(format!("ambient = {}\n{lights}", text::ambient(scene))));
         // A scene without the lights of its file is not metered.
         if let Some(Value::Table(render)) = table.get_mut("render") {
             render.remove("metered");
@@ -55,6 +59,11 @@ fn moved(input: &Path, places: &Places, (scene, options): (&Scene, &LoadOptions)
     }
     if options.look.light.is_some() || options.look.background.is_some() {
         table.extend(parsed(format!("background = {}\n", text::vector(scene.background))));
+    }
+    if !options.look.materials.is_empty() {
+        let words = options.look.materials.iter().map(|choice| Value::String(choice.to_string()));
+        let replace = table.entry("replace").or_insert(Value::Array(Vec::new()));
+        replace.as_array_mut().expect("the input is loaded, so this is a list").extend(words);
     }
     for name in names_of_files(&mut table) {
         *name = places.name_of(&folder.join(&*name))?;

@@ -8,10 +8,11 @@ use hashbrown::HashMap;
 use crate::{
     frame::Denoise,
     scene::{
-        Camera, Light, Material, Projection, RenderDefaults, Scene,
+        Camera, Ground, Light, Material, MaterialChoice, Projection, RenderDefaults, Scene,
         assemble::DEFAULT_MATERIAL,
         material_spec::MaterialSpec,
         overrides::override_terms,
+        preset::is_replaced,
         terms::{Term, TermValue},
     },
     util::text::is_obeyed,
@@ -22,19 +23,25 @@ pub(super) struct MeshTable {
     pub file: String,
     /// Scene of a glTF file.
     pub scene: Option<String>,
+    /// Which materials of the file are replaced.
+    pub replaced: Vec<MaterialChoice>,
 }
 
 /// Returns the scene file of a scene that consists of one file.
 pub(super) fn scene_file(scene: &Scene, mesh: &MeshTable) -> String {
     let mut text = format!("# {} as a scene of kdray, to be edited.\n\n", quoted(&mesh.file));
-    text += &format!("ambient = {}\nbackground = {}\n", vector(scene.ambient), vector(scene.background));
+    text += &format!("ambient = {}\nbackground = {}\n", ambient(scene), vector(scene.background));
+    if !mesh.replaced.is_empty() {
+        let words: Vec<_> = mesh.replaced.iter().map(|choice| quoted(&choice.to_string())).collect();
+        text += &format!("replace = [{}]\n", words.join(", "));
+    }
     text += &format!("\n[camera]\n{}", camera(&scene.camera));
     for (name, named) in &scene.cameras {
         text += &format!("\n[[cameras]]\nname = {}\n{}", quoted(name), camera(named));
     }
     text.extend(scene.lights.iter().map(light));
     text += &render(&scene.defaults);
-    let materials = materials(scene);
+    let materials = materials(scene, &mesh.replaced);
     if !materials.is_empty() {
         text += "\n# Terms that a table leaves out, and maps, are those of the file.\n";
         text += &materials;
@@ -47,6 +54,15 @@ pub(super) fn scene_file(scene: &Scene, mesh: &MeshTable) -> String {
         text += "override = true\n";
     }
     text
+}
+
+/// Returns the value of the key `ambient`.
+pub(super) fn ambient(scene: &Scene) -> String {
+    let sky = vector(scene.ambient);
+    match scene.ground {
+        Some(Ground { ambient, up }) => format!("{{ sky = {sky}, ground = {}, up = \"{up}\" }}", vector(ambient)),
+        None => sky,
+    }
 }
 
 /// Returns the keys of a camera.
@@ -123,10 +139,11 @@ fn render(defaults: &RenderDefaults) -> String {
     )
 }
 
-/// Returns the tables of the file's materials, a table for each name.
-fn materials(scene: &Scene) -> String {
+/// Returns the tables of the file's materials that are not replaced, a table for each name.
+fn materials(scene: &Scene, replaced: &[MaterialChoice]) -> String {
     let mut by_name: HashMap<&str, Vec<&Material>> = HashMap::new();
-    let of_file = || scene.materials.iter().filter(|material| material.name != DEFAULT_MATERIAL);
+    let is_shown = |name: &str| name != DEFAULT_MATERIAL && !is_replaced(replaced, name);
+    let of_file = || scene.materials.iter().filter(|material| is_shown(&material.name));
     of_file().for_each(|material| by_name.entry(&material.name).or_default().push(material));
     let tables = of_file().filter_map(|material| {
         let alike = by_name.remove(material.name.as_str())?;

@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     scene::{error::Checked, needs::require_for_bytes, outside::Access, read::read_bytes},
-    util::memory::require,
+    util::{memory::require, text::one_line},
 };
 
 /// Extensions that are read. A file that requires another one is refused.
@@ -275,7 +275,7 @@ impl Document {
             if list.len() > MAX_LISTED {
                 listed += &format!(" and {} more", list.len() - MAX_LISTED);
             }
-            tracing::warn!("{}: {kind}: {listed}", path.display());
+            tracing::warn!("{}: {kind}: {}", path.display(), one_line(&listed));
         }
     }
 }

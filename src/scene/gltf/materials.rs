@@ -12,6 +12,7 @@ use crate::scene::{
     Alpha, Channel, Clearcoat, Lobes, Maps, Material, Microfacet, Sheen,
     error::Checked,
     material::{colour, within},
+    preset::{MaterialChoice, is_replaced},
 };
 
 /// Largest index of refraction. A material of index 0, which stands for a perfect reflector, has it, too.
@@ -20,6 +21,8 @@ const MAX_IOR: f32 = 100.0;
 /// The materials that primitives use, in the order in which they are met first.
 pub(super) struct Materials<'a> {
     document: &'a Document,
+    /// Which materials are replaced. Their textures are not read.
+    replaced: &'a [MaterialChoice],
     pub materials: Vec<Material>,
     pub textures: Textures<'a>,
     /// Index into `materials` by the index in the document; `None` is the default material.
@@ -27,8 +30,9 @@ pub(super) struct Materials<'a> {
 }
 
 impl<'a> Materials<'a> {
-    pub fn new(document: &'a Document) -> Self {
-        Self { document, materials: Vec::new(), textures: Textures::new(document), known: HashMap::new() }
+    pub fn new(document: &'a Document, replaced: &'a [MaterialChoice]) -> Self {
+        let (textures, known) = (Textures::new(document), HashMap::new());
+        Self { document, replaced, materials: Vec::new(), textures, known }
     }
 
     /// Returns the index of a primitive's material, and reads it at the first call. `path` is the primitive's JSON
@@ -42,11 +46,11 @@ impl<'a> Materials<'a> {
             Some(ix) => {
                 let json = item(&self.document.root.materials, "materials", ix, &format_args!("{path}.material"))?;
                 let reader = Reader { document: self.document, path: format!("materials[{ix}]") };
-                reader.material(json, &mut self.textures)?
+                reader.material(json, (&mut self.textures, self.replaced))?
             }
             None => {
                 let reader = Reader { document: self.document, path: "(default of glTF)".to_owned() };
-                reader.material(&json::Material::default(), &mut self.textures)?
+                reader.material(&json::Material::default(), (&mut self.textures, self.replaced))?
             }
         };
         self.materials.push(material);
@@ -64,7 +68,13 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn material(&self, json: &json::Material, textures: &mut Textures) -> Checked<Material> {
+    fn material(
+        &self,
+        json: &json::Material,
+        (textures, replaced): (&mut Textures, &[MaterialChoice]),
+    ) -> Checked<Material> {
+        let name = json.name.clone().unwrap_or_else(|| self.path.clone());
+        let maps = if is_replaced(replaced, &name) { Maps::default() } else { self.maps(json, textures)? };
         let pbr = &json.pbr_metallic_roughness;
         let [r, g, b, opacity] = pbr.base_color_factor.0;
         let kd = self.colour("baseColorFactor", [r, g, b])?;
@@ -76,7 +86,7 @@ impl Reader<'_> {
         let ke = self.colour("emissiveFactor", json.emissive_factor.0)?
             * self.within("emissiveStrength", strength, 0.0, f32::MAX)?;
         Ok(Material {
-            name: json.name.clone().unwrap_or_else(|| self.path.clone()),
+            name,
             ka: kd,
             kd,
             ks: self.specular(json)?,
@@ -101,7 +111,7 @@ impl Reader<'_> {
             is_double_sided: json.double_sided,
             clearcoat: self.clearcoat(json)?,
             sheen: self.sheen(json)?,
-            maps: self.maps(json, textures)?,
+            maps,
         })
     }
 

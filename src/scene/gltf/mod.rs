@@ -40,6 +40,7 @@ use super::{
     look::Up,
     needs::{MeshSize, require_for_mesh},
     outside::Access,
+    preset::MaterialChoice,
     standard::{Lacks, SAMPLES},
 };
 
@@ -48,7 +49,9 @@ pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result
     let failed = |what: String| SceneError::file(path, what);
     let document = read(path, bytes, options)?;
     let nodes = Nodes::new(&document, options.scene.as_deref()).map_err(failed)?;
-    let mut scene = Loader::new(&document, &nodes, LoadedBefore::default(), true).load(path).map_err(failed)?;
+    let replaced = &options.look.materials[..];
+    let mut scene =
+        Loader::new(&document, &nodes, LoadedBefore::default(), Some(replaced)).load(path).map_err(failed)?;
     let bounds = scene.bounds();
     extent::check(path, bounds)?;
     scene.lights = lights::lights(&document, &nodes).map_err(failed)?;
@@ -86,7 +89,8 @@ pub(super) fn load_meshes(
     let failed = |what: String| SceneError::file(path, what);
     let document = read(path, bytes, options)?;
     let nodes = Nodes::new(&document, options.scene.as_deref()).map_err(failed)?;
-    let scene = Loader::new(&document, &nodes, before, has_materials).load(path).map_err(failed)?;
+    let replaced = has_materials.then_some(&options.look.materials[..]);
+    let scene = Loader::new(&document, &nodes, before, replaced).load(path).map_err(failed)?;
     document.warn(path);
     Ok(scene)
 }
@@ -120,8 +124,15 @@ struct Loader<'a> {
 }
 
 impl<'a> Loader<'a> {
-    fn new(document: &'a Document, nodes: &'a Nodes, before: LoadedBefore, has_materials: bool) -> Self {
-        let materials = Materials::new(document);
+    /// `replaced`: which materials are replaced, or `None` to read none of them.
+    fn new(
+        document: &'a Document,
+        nodes: &'a Nodes,
+        before: LoadedBefore,
+        replaced: Option<&'a [MaterialChoice]>,
+    ) -> Self {
+        let has_materials = replaced.is_some();
+        let materials = Materials::new(document, replaced.unwrap_or_default());
         let (meshes, known, n_read) = (Vec::new(), HashMap::new(), before.n_triangles);
         Self { document, nodes, before, n_read, has_materials, materials, meshes, known }
     }

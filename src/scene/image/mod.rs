@@ -161,15 +161,28 @@ fn format_of(Encoded { name, bytes }: &Encoded) -> Checked<Format> {
     }
 }
 
-/// Checks the sizes of an EXR file's layers. They may be larger than the window that is shown, and blocks of their rows
-/// are decoded even so.
+/// The most pixels of an EXR file's tile that is larger than its layer. The decoder allocates whole tiles.
+const MAX_TILE_PIXELS: usize = 1 << 20;
+
+/// Checks the sizes of an EXR file's layers and tiles. Layers may be larger than the window that is shown, and blocks
+/// of their rows are decoded even so.
 fn check_exr(bytes: &[u8]) -> Checked<()> {
     let meta = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|e| e.to_string())?;
     let is_large = |layer: &exr::meta::header::Header| layer.layer_size.0.max(layer.layer_size.1) > MAX_SIDE as usize;
-    match meta.headers.iter().find(|layer| is_large(layer)) {
-        Some(layer) => Err(format!("has a layer of {} x {} pixels", layer.layer_size.0, layer.layer_size.1)),
-        None => Ok(()),
+    if let Some(layer) = meta.headers.iter().find(|layer| is_large(layer)) {
+        return Err(format!("has a layer of {} x {} pixels", layer.layer_size.0, layer.layer_size.1));
     }
+    for layer in &meta.headers {
+        if let exr::meta::BlockDescription::Tiles(tiles) = layer.blocks {
+            let (tile, most) = (tiles.tile_size, layer.layer_size.area().max(MAX_TILE_PIXELS));
+            if tile.0.checked_mul(tile.1).is_none_or(|n_pixels| n_pixels > most) {
+                return Err(format!("has tiles of {} x {} pixels, larger than its layer", tile.0, tile.1));
+            }
+        }
+        // A block is read whole, with all channels that the layer has.
+        memory::require("reading its blocks", layer.max_block_byte_size() as u64).map_err(|error| error.to_string())?;
+    }
+    Ok(())
 }
 
 fn decoder_of(format: ImageFormat, bytes: &[u8]) -> Checked<impl ImageDecoder> {

@@ -284,3 +284,11 @@ fn a_ramp_tilts_the_normal() {
     assert!(bytes_of(&along_u)[0][0] > 250);
     assert_eq!(bytes_of(&normals_of_heights(&along_u, Channel::Alpha, 5.0))[9], [128, 128, 255, 255]);
 }
+
+/// A tile is allocated whole before its first byte is read.
+#[test]
+fn exr_tiles_beyond_their_layer_are_refused() {
+    let file = include_bytes!("../../../tests/corpus/image/huge_tiles.exr");
+    let error = decoded("a.exr", file.to_vec()).unwrap_err();
+    assert!(error.contains("has tiles of 11993152 x 64 pixels, larger than its layer"), "{error}");
+}

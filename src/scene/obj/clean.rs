@@ -12,6 +12,8 @@ use std::{
     io::{BufRead, Read},
 };
 
+use glam::DVec3;
+
 use crate::scene::{error::Checked, needs::MeshSize};
 
 /// How a face is shaded.
@@ -118,13 +120,14 @@ impl CleanObj {
     }
 }
 
-/// Checks and rewrites the text of an OBJ file. The error is a line, counted from 1, and what is wrong with it.
-pub fn clean_obj(text: &str) -> Result<CleanObj, (usize, String)> {
+/// Checks and rewrites the text of an OBJ file. `origin` is subtracted from its points. The error is a line, counted
+/// from 1, and what is wrong with it.
+pub fn clean_obj(text: &str, origin: DVec3) -> Result<CleanObj, (usize, String)> {
     let (totals, largest_colour) = count(text);
     // Some writers state colours as 0 to 255.
     let colour_scale = if largest_colour.is_some_and(|largest| largest > 1.0) { 255.0 } else { 1.0 };
     let white = largest_colour.map(|_| colour_scale);
-    let mut cleaner = Cleaner { totals, white, ..Cleaner::default() };
+    let mut cleaner = Cleaner { totals, white, origin, ..Cleaner::default() };
     cleaner.out.colour_scale = colour_scale;
     for (line, statement) in statements(text) {
         cleaner.statement(line, &statement).map_err(|what| (line, what))?;
@@ -203,6 +206,8 @@ pub struct Cleaner {
     white: Option<f32>,
     /// Counts up to the current line, from which negative indices count back.
     seen: Counts,
+    /// Point that is subtracted from all points.
+    origin: DVec3,
     /// Whether the last `s` statement was `s off`. A file without `s` is smooth except at creases.
     flat: bool,
     /// The kind of the last face.
@@ -222,6 +227,7 @@ impl Default for Cleaner {
             totals: Counts::default(),
             white: None,
             seen: Counts::default(),
+            origin: DVec3::ZERO,
             flat: false,
             kind: None,
             positions: String::new(),
@@ -263,6 +269,13 @@ impl Cleaner {
 
     /// Adds a point. A weight (used by curves only) or a colour may follow it, and an opacity, which is ignored.
     fn point(&mut self, rest: &str) -> Checked<()> {
+        let moved;
+        let rest = if self.origin == DVec3::ZERO {
+            rest
+        } else {
+            moved = moved_point(rest, self.origin);
+            &moved
+        };
         let n_numbers = words(rest).count();
         if let Some(white) = self.white.filter(|_| n_numbers < 6) {
             let xyz: Vec<&str> = words(rest).take(3).collect();
@@ -434,6 +447,16 @@ fn vector(out: &mut String, keyword: &str, rest: &str, counts: std::ops::RangeIn
     } else {
         Err(format!("`{keyword}` has {n_words} numbers: it takes {} to {}", counts.start(), counts.end()))
     }
+}
+
+/// Returns the words of a point with `origin` subtracted from its coordinates in double precision. Words that are no
+/// numbers stay as they are.
+fn moved_point(rest: &str, origin: DVec3) -> String {
+    let moved = |(ix, word): (usize, &str)| match word.parse::<f64>() {
+        Ok(number) if ix < 3 => format!("{:?}", (number - origin[ix]) as f32),
+        _ => word.to_owned(),
+    };
+    words(rest).enumerate().map(moved).collect::<Vec<_>>().join(" ")
 }
 
 /// Appends to a `String`, which cannot fail.

@@ -8,7 +8,7 @@ mod quick;
 
 use std::{collections::HashMap, path::Path};
 
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 pub(super) use self::files::named_files;
 use self::{
@@ -28,9 +28,11 @@ use super::{
 
 /// Makes a mesh from an OBJ file's text, and reads its materials.
 pub(super) fn parse_obj(path: &Path, text: &str, loading: &mut Loading) -> Result<Loaded, SceneError> {
-    let &mut Loading { shading, n_loaded, access, ref mut images } = loading;
-    let careful = || clean_obj(text).map_err(|(line, what)| SceneError::line(path, line, what));
-    let clean = quick_obj(text).map_or_else(careful, Ok)?;
+    let &mut Loading { shading, origin, n_loaded, access, ref mut images } = loading;
+    let careful = || clean_obj(text, origin).map_err(|(line, what)| SceneError::line(path, line, what));
+    // The quick way keeps points as they are written.
+    let clean = if origin == DVec3::ZERO { quick_obj(text) } else { None };
+    let clean = clean.map_or_else(careful, Ok)?;
     require_for_mesh(n_loaded as u64, &clean.size).map_err(|what| SceneError::file(path, what))?;
     let materials = mtl::load_libraries(path, &clean.libraries, access, images)?;
     if let Some((line, statement)) = &clean.unknown {

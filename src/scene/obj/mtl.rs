@@ -21,6 +21,7 @@ use crate::scene::{
     read::read_lossy,
     texture::Channel,
 };
+use crate::util::text::escape_controls;
 
 /// Roughness of a material that states how metallic it is, and nothing about its roughness.
 const DEFAULT_ROUGHNESS: f32 = 0.5;
@@ -70,11 +71,11 @@ pub fn load_libraries(
             match file {
                 Err(what) => warn(&format!("mtllib {}", what.escape_debug())),
                 Ok(NamedFile { path, .. }) if !path.exists() => {
-                    warn(&format!("{} does not exist: its materials become the default one", path.display()));
+                    warn(&format!("{} does not exist: its materials become the default one", shown(&path)));
                 }
                 Ok(NamedFile { path, is_other_case }) => {
                     if is_other_case {
-                        warn(&format!("mtllib `{}`: {} is taken", rest.escape_debug(), path.display()));
+                        warn(&format!("mtllib `{}`: {} is taken", rest.escape_debug(), shown(&path)));
                     }
                     if read.insert(path.clone()) {
                         described.extend(load_library(reach, &path, images)?);
@@ -124,10 +125,15 @@ fn as_meant(path: &Path, described: &mut [Described]) {
     let warn = |names: &[&str], what: &str| {
         let Some(first) = names.first() else { return };
         let others = if names.len() > 1 { format!(" and {} more", names.len() - 1) } else { String::new() };
-        tracing::warn!("{}: material `{}`{others} {what}", path.display(), first.escape_debug());
+        tracing::warn!("{}: material `{}`{others} {what}", shown(path), first.escape_debug());
     };
     warn(&invisible, "would be invisible by `d 0` or `Tr 1`: shown opaque");
     warn(&no_glass, "would be glass by `illum`, but no other term says so: shown opaque; `Ni 1.5` would make it glass");
+}
+
+/// Returns the path of a file that another one names, without characters that a terminal would obey.
+fn shown(path: &Path) -> String {
+    escape_controls(&path.display().to_string()).into_owned()
 }
 
 /// Returns whether a `Ka` is one that exporters write for all materials, whatever their colours are: black or white.
@@ -150,11 +156,11 @@ fn is_transparent(spec: &MaterialSpec, more: &More) -> bool {
 /// shown: once for each kind, and once for each file that is missing or has another name.
 fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Result<Vec<More>, (usize, String)> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    let mut materials: Vec<More> = Vec::new();
+    let (mut materials, mut is_replaced): (Vec<More>, bool) = (Vec::new(), false);
     let mut told: HashSet<String> = HashSet::new();
     let mut warn = |line: usize, key: &str, what: String| {
         if told.insert(key.to_owned()) {
-            tracing::warn!("{}:{line}: {}", path.display(), what.escape_debug());
+            tracing::warn!("{}:{line}: {}", shown(path), what.escape_debug());
         }
     };
     let maps_colour = statements(text).any(|(_, s)| split_keyword(&s).0.eq_ignore_ascii_case("map_Kd"));
@@ -162,6 +168,7 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Resu
         let (keyword, rest) = split_keyword(&statement);
         if keyword == "newmtl" {
             materials.push(More::default());
+            is_replaced = images.is_replaced(rest);
         }
         let Some(material) = materials.last_mut() else { continue };
         if matches!(keyword, "Pr" | "Pm" | "Ps" | "Pc" | "Pcr") {
@@ -176,6 +183,7 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Resu
             warn(line, keyword, format!("`{keyword}` is not shown"));
         }
         let term = match MapKind::of(keyword) {
+            _ if is_replaced => continue,
             MapKind::None => continue,
             // The ambient term has the colours of map_Kd.
             MapKind::NotShown if keyword.eq_ignore_ascii_case("map_Ka") && maps_colour => continue,
@@ -190,7 +198,7 @@ fn read_more(reach: Reach, path: &Path, text: &str, images: &mut Images) -> Resu
             Err(what) => warn(line, rest, format!("`{keyword}` is not shown: {what}")),
             Ok((NamedFile { path, is_other_case }, options)) => {
                 if is_other_case {
-                    warn(line, &options.name, format!("`{}`: {} is taken", options.name, path.display()));
+                    warn(line, &options.name, format!("`{}`: {} is taken", options.name, shown(&path)));
                 }
                 material.maps.push(Map { line, term, options, file: images.add(path) });
             }
@@ -225,7 +233,7 @@ fn materials(described: Vec<Described>, images: &mut Images) -> Result<Vec<Mater
 }
 
 fn warn_of_image(path: &Path, map: &Map, what: &str) {
-    tracing::warn!("{}:{}: the image is not shown: {}", path.display(), map.line, what.escape_debug());
+    tracing::warn!("{}:{}: the image is not shown: {}", shown(path), map.line, what.escape_debug());
 }
 
 /// Makes a material. A colour that is stated by its map alone is white.

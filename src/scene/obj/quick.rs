@@ -112,7 +112,8 @@ fn index(bytes: &[u8], at: &mut usize, seen: usize) -> Option<usize> {
     let first = *at;
     let mut value = 0;
     while let Some(digit) = bytes.get(*at).map(|byte| byte.wrapping_sub(b'0')).filter(|digit| *digit < 10) {
-        value = 10 * value + usize::from(digit);
+        // An index that wraps has more digits than are accepted below.
+        value = usize::wrapping_mul(value, 10).wrapping_add(usize::from(digit));
         *at += 1;
     }
     // More digits could overflow.
@@ -144,7 +145,7 @@ mod tests {
             "usemtl blue\nf 1/1/1 2/2/1 4/2/1\nf 1/1/1 2 3\nl 1 2\nwhat 3\n",
         ]
         .concat();
-        let (quick, careful) = (quick_obj(&file).unwrap(), clean_obj(&file).unwrap());
+        let (quick, careful) = (quick_obj(&file).unwrap(), clean_obj(&file, glam::DVec3::ZERO).unwrap());
         assert_eq!(text(&quick).replace("vt 1 1 0.5", "vt 1 1"), text(&careful));
         assert_eq!((&quick.libraries, &quick.used_materials), (&careful.libraries, &careful.used_materials));
         assert_eq!((quick.size, quick.colour_scale, &quick.unknown), (careful.size, 1.0, &careful.unknown));

@@ -11,7 +11,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use glam::Vec2;
+use glam::{DVec3, Vec2};
 use serde::Deserialize;
 use serde_ply::{DeserializeError, ElementDef, PlyFormat, PlyHeader, PlyProperty, PlyReader, PropertyType, ScalarType};
 
@@ -66,12 +66,12 @@ struct Elements {
 
 /// Makes a mesh of a file's content, and reads the images that it names. Its faces have the slot of their image.
 pub(super) fn parse_ply(path: &Path, bytes: &[u8], loading: &mut Loading) -> Checked<Loaded> {
-    let &mut Loading { shading, n_loaded, access, ref mut images } = loading;
+    let &mut Loading { shading, origin, n_loaded, access, ref mut images } = loading;
     let mut reader = PlyReader::from_reader(bytes).map_err(|error| format!("is no PLY file: {}", text(&error)))?;
     let header = reader.header().clone();
     check(&header.elem_defs)?;
     check_counts(&header, bytes.len() as u64)?;
-    let elements = read(&mut reader, &header.elem_defs)?;
+    let elements = read(&mut reader, &header.elem_defs, origin)?;
     require_for_mesh(n_loaded as u64, &elements.size())?;
     let names: Vec<&str> = texture_files(&header.comments).collect();
     let uses_crease = shading.smooth && elements.vertices.normals.is_empty();
@@ -136,12 +136,12 @@ fn least_bytes(property: &PropertyType) -> u64 {
 }
 
 /// Reads the elements in the order of the file.
-fn read(reader: &mut PlyReader<&[u8]>, elements: &[ElementDef]) -> Checked<Elements> {
+fn read(reader: &mut PlyReader<&[u8]>, elements: &[ElementDef], origin: DVec3) -> Checked<Elements> {
     let mut found = Elements::default();
     for element in elements {
         let failed = |error| format!("element `{}`: {}", element.name.escape_debug(), text(&error));
         match element.name.as_str() {
-            "vertex" => found.vertices = Vertices::read(reader, element)?,
+            "vertex" => found.vertices = Vertices::read(reader, element, origin)?,
             "face" => found.polygons = reader.next_element().map_err(failed)?,
             "tristrips" => found.strips = reader.next_element().map_err(failed)?,
             _ => drop(reader.next_element::<Vec<Skipped>>().map_err(failed)?),
@@ -159,15 +159,20 @@ fn texture_files(comments: &[String]) -> impl Iterator<Item = &str> {
 fn materials(path: &Path, names: &[&str], access: Access, images: &mut Images) -> Vec<Material> {
     let reach = access.beside(path);
     let warn = |what: &str| tracing::warn!("{}: TextureFile is not shown: {}", path.display(), what.escape_debug());
-    let mut add = |name: &&str| reach.find(reach.root, name).map(|file| images.add(file.path));
-    let files: Vec<Checked<usize>> = names.iter().map(&mut add).collect();
+    let mut add = |name: &&str| {
+        let is_shown = !images.is_replaced(name);
+        is_shown.then(|| reach.find(reach.root, name).map(|file| images.add(file.path)))
+    };
+    let files: Vec<Option<Checked<usize>>> = names.iter().map(&mut add).collect();
     images.decode();
-    let material = |(name, file): (&&str, Checked<usize>)| {
+    let material = |(name, file): (&&str, Option<Checked<usize>>)| {
         let image = file.and_then(|file| {
-            images.get(file)?;
-            images.show(file, View::Plain)
+            let image = file.and_then(|file| {
+                images.get(file)?;
+                images.show(file, View::Plain)
+            });
+            image.map_err(|what| warn(&what)).ok()
         });
-        let image = image.map_err(|what| warn(&what)).ok();
         let spec = MaterialSpec { kd: image.map(|_| [1.0; 3]), ..MaterialSpec::default() };
         let mut material = spec.material(name).expect("defaults are in range");
         material.maps.base_colour = image.map(Texture::of_image);

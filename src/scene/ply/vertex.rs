@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use serde::{
     Deserialize, Deserializer,
     de::{IgnoredAny, MapAccess, Visitor},
@@ -27,9 +27,9 @@ pub struct Vertices {
 /// Point with its normal, which is zero if the file has none.
 #[derive(Deserialize)]
 struct Plain {
-    x: f32,
-    y: f32,
-    z: f32,
+    x: f64,
+    y: f64,
+    z: f64,
     #[serde(default)]
     nx: f32,
     #[serde(default)]
@@ -70,8 +70,8 @@ const N_PROPERTIES: usize = Property::Other as usize;
 const REDS: [&str; 3] = ["red", "diffuse_red", "r"];
 const FIRST_UVS: [&str; 3] = ["s", "u", "texture_u"];
 
-/// The numbers of a vertex, by property.
-struct Painted([f32; N_PROPERTIES]);
+/// The coordinates of a vertex, and its numbers by property. Those of the coordinates are 0.
+struct Painted(DVec3, [f32; N_PROPERTIES]);
 
 impl<'de> Deserialize<'de> for Painted {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -89,14 +89,15 @@ impl<'de> Visitor<'de> for PaintedVisitor {
     }
 
     fn visit_map<M: MapAccess<'de>>(self, mut map: M) -> Result<Painted, M::Error> {
-        let mut numbers = [0.0; N_PROPERTIES];
+        let (mut point, mut numbers) = (DVec3::ZERO, [0.0; N_PROPERTIES]);
         while let Some(property) = map.next_key::<Property>()? {
             match property {
                 Property::Other => drop(map.next_value::<IgnoredAny>()?),
+                Property::X | Property::Y | Property::Z => point[property as usize] = map.next_value()?,
                 property => numbers[property as usize] = map.next_value()?,
             }
         }
-        Ok(Painted(numbers))
+        Ok(Painted(point, numbers))
     }
 }
 
@@ -110,8 +111,8 @@ impl Vertices {
         row + 2 * size_of::<Vec3>() + more
     }
 
-    /// Reads the vertices, the element that comes next in the file.
-    pub fn read(reader: &mut PlyReader<&[u8]>, element: &ElementDef) -> Checked<Self> {
+    /// Reads the vertices, the element that comes next in the file. `origin` is subtracted from their coordinates.
+    pub fn read(reader: &mut PlyReader<&[u8]>, element: &ElementDef, origin: DVec3) -> Checked<Self> {
         let failed = |error| format!("element `vertex`: {}", text(&error));
         let has = |name: &&str| element.has_property(name);
         let has_normals = ["nx", "ny", "nz"].iter().all(has);
@@ -119,21 +120,21 @@ impl Vertices {
         let mut vertices = Self::default();
         if red.is_none() && !has_uvs {
             let plain: Vec<Plain> = reader.next_element().map_err(failed)?;
-            vertices.positions = plain.iter().map(|v| Vec3::new(v.x, v.y, v.z)).collect();
+            vertices.positions = plain.iter().map(|v| (DVec3::new(v.x, v.y, v.z) - origin).as_vec3()).collect();
             if has_normals {
                 vertices.normals = plain.iter().map(|v| Vec3::new(v.nx, v.ny, v.nz).normalize_or_zero()).collect();
             }
             return Ok(vertices);
         }
         let painted: Vec<Painted> = reader.next_element().map_err(failed)?;
-        let three = |p: &Painted, first: Property| Vec3::from_slice(&p.0[first as usize..]);
-        vertices.positions = painted.iter().map(|p| three(p, Property::X)).collect();
+        let three = |p: &Painted, first: Property| Vec3::from_slice(&p.1[first as usize..]);
+        vertices.positions = painted.iter().map(|p| (p.0 - origin).as_vec3()).collect();
         if has_normals {
             vertices.normals = painted.iter().map(|p| three(p, Property::Nx).normalize_or_zero()).collect();
         }
         if let Some(red) = red {
             let has_alpha = ["alpha", "diffuse_alpha", "a"].iter().any(has);
-            let colours = painted.iter().map(|p| Vec4::from_slice(&p.0[Property::Red as usize..]));
+            let colours = painted.iter().map(|p| Vec4::from_slice(&p.1[Property::Red as usize..]));
             let one = largest_colour(element, red, colours.clone());
             let linear = |colour: Vec4| {
                 let rgb = Vec3::from_array((colour.truncate() / one).to_array().map(linear_of_srgb));
@@ -143,7 +144,7 @@ impl Vertices {
             vertices.colours = colours.map(linear).collect();
         }
         if has_uvs {
-            let uv = |p: &Painted| upper_left(p.0[Property::S as usize], p.0[Property::T as usize]);
+            let uv = |p: &Painted| upper_left(p.1[Property::S as usize], p.1[Property::T as usize]);
             vertices.uvs = painted.iter().map(uv).collect();
         }
         Ok(vertices)

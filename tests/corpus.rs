@@ -1,0 +1,45 @@
+//! Reads all files of `tests/corpus`: those that once broke a reader, and those with which the fuzz targets (`fuzz/`)
+//! reach most of its code. docs/conventions.md says how the targets are run.
+
+#[path = "support/hostile.rs"]
+mod hostile;
+
+use std::{fs, path::Path};
+
+use hostile::{Format, Reader, check_error};
+
+#[test]
+fn no_file_breaks_a_reader() {
+    let reader = Reader::new();
+    for (format, folder) in Format::ALL {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus").join(folder);
+        let mut files: Vec<_> = fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+        files.sort();
+        assert!(!files.is_empty(), "{} has no files", folder.display());
+        let mut n_read = 0;
+        for file in &files {
+            // A panic is told from others by this line.
+            eprintln!("{}", file.display());
+            n_read += usize::from(reader.check(format, &fs::read(file).unwrap()).is_none());
+        }
+        assert!(0 < n_read && n_read < files.len(), "{n_read} of {} files are read", files.len());
+    }
+}
+
+#[test]
+fn an_error_that_names_its_file_is_accepted() {
+    for line in ["/a/file.obj:3: vertex 4 is out of range", "/a/file.obj: has no triangles"] {
+        check_error(line, &[Path::new("/a/file.mtl"), Path::new("/a/file.obj")]);
+    }
+}
+
+#[test]
+fn other_errors_are_noticed() {
+    let long = format!("/a/file.obj: {}", "x".repeat(800));
+    let lines =
+        ["", "has no triangles", "/a/file.obj", "/a/file.obj:3:", "/a/file.obj: two\nlines", "/b/file.obj: x", &long];
+    for line in lines {
+        let noticed = std::panic::catch_unwind(|| check_error(line, &[Path::new("/a/file.obj")]));
+        assert!(noticed.is_err(), "{line:?} is accepted");
+    }
+}

@@ -1,0 +1,227 @@
+//! Reads files of unknown content as the command does, and checks what a hostile one must not break. The fuzz targets
+//! (`fuzz/`) and `tests/corpus.rs` share it.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::Once,
+};
+
+use kdray::{
+    cast::RayReader,
+    engine::{Engine, choices::Workload},
+    frame::RenderOptions,
+    scene::{Scene, source_files},
+};
+use tempfile::TempDir;
+use tracing::{
+    Event, Metadata,
+    field::{Field, Visit},
+    span,
+};
+
+/// The formats that kdray reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    Obj,
+    Mtl,
+    Toml,
+    Gltf,
+    Ply,
+    Stl,
+    Image,
+    Npy,
+}
+
+impl Format {
+    /// All formats with the folder of `tests/corpus` that has files of it.
+    pub const ALL: [(Self, &str); 8] = [
+        (Self::Obj, "obj"),
+        (Self::Mtl, "mtl"),
+        (Self::Toml, "toml"),
+        (Self::Gltf, "gltf"),
+        (Self::Ply, "ply"),
+        (Self::Stl, "stl"),
+        (Self::Image, "image"),
+        (Self::Npy, "npy"),
+    ];
+
+    /// Returns the name under which a file of the format is read. The content says which format an image has, but
+    /// for TGA, which has no mark.
+    fn file_name(self) -> &'static str {
+        match self {
+            Self::Obj => "file.obj",
+            Self::Mtl => "file.mtl",
+            Self::Toml => "file.toml",
+            Self::Gltf => "file.gltf",
+            Self::Ply => "file.ply",
+            Self::Stl => "file.stl",
+            Self::Image => "file.tga",
+            Self::Npy => "file.npy",
+        }
+    }
+
+    /// Returns the scene that uses a file which is no scene itself.
+    fn user(self) -> Option<(&'static str, &'static str)> {
+        match self {
+            Self::Mtl => Some(("user.obj", USER_OF_MTL)),
+            Self::Image => Some(("user.toml", USER_OF_IMAGE)),
+            _ => None,
+        }
+    }
+}
+
+/// A mesh of three triangles with the materials `a`, `b` and `c` of `file.mtl`.
+const USER_OF_MTL: &str = "mtllib file.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 2 0\nvt 0 1\n\
+                           usemtl a\nf 1/1 2/2 3/3\nusemtl b\nf 1/1 3/3 2/2\nusemtl c\nf 2/2 1/1 3/3\n";
+
+/// A scene whose materials use `file.tga` in each of the ways in which pixels are read.
+const USER_OF_IMAGE: &str = "materials.a = { map_Kd = 'file.tga', map_d = 'file.tga', map_normal = 'file.tga' }\n\
+                             materials.b = { map_Kd = 'file.tga', map_roughness = 'file.tga', cutoff = 0.5 }\n\
+                             [[mesh]]\ngenerator = 'plane'\nsize = [2, 2]\nfields = [2, 1]\nmaterials = ['a', 'b']\n";
+
+/// The most triangles and pixels of a scene that is also rendered. Larger ones would take the time of many files.
+const MAX_RENDERED_TRIANGLES: usize = 4096;
+const MAX_RENDERED_PIXELS: usize = 1 << 14;
+
+/// The largest count that a scene file may state. Generators make up to 2^24 triangles in seconds, as they should.
+const MAX_COUNT: i64 = 64;
+
+/// A folder in which files are read, in memory where the system has such a folder.
+pub struct Reader {
+    folder: TempDir,
+}
+
+impl Reader {
+    pub fn new() -> Self {
+        static SUBSCRIBER: Once = Once::new();
+        SUBSCRIBER.call_once(|| tracing::subscriber::set_global_default(LineChecker).expect("the only subscriber"));
+        let memory = Path::new("/dev/shm");
+        let folder = if memory.is_dir() { TempDir::new_in(memory) } else { TempDir::new() };
+        Self { folder: folder.expect("a temporary folder") }
+    }
+
+    /// Reads a file. Of a scene that is read, draws a small picture, too. Returns the error, if there is one.
+    ///
+    /// # Panics
+    /// An error or a warning is not one line of printable text, or does not name the file.
+    pub fn check(&self, format: Format, content: &[u8]) -> Option<String> {
+        if format == Format::Toml && asks_for_much(content) {
+            return None;
+        }
+        let path = self.write(format.file_name(), content);
+        let scene = match format.user() {
+            Some((name, content)) => self.write(name, content.as_bytes()),
+            None => path.clone(),
+        };
+        let error = match format {
+            Format::Npy => read_rays(&path).err(),
+            _ => read_scene(&scene).err(),
+        };
+        if let Some(line) = &error {
+            check_error(line, &[&path, &scene]);
+        }
+        error
+    }
+
+    fn write(&self, name: &str, content: &[u8]) -> PathBuf {
+        let path = self.folder.path().join(name);
+        fs::write(&path, content).expect("a file in the temporary folder");
+        path
+    }
+}
+
+/// Checks that an error begins with the name of a file, perhaps with a line, and then says what is wrong.
+pub fn check_error(line: &str, files: &[&Path]) {
+    check_line(line);
+    assert!(line.chars().count() < 800, "too long: {line}");
+    let rest = files.iter().find_map(|file| line.strip_prefix(file.to_str()?)?.strip_prefix(':'));
+    let rest = rest.unwrap_or_else(|| panic!("the error names no file: {line}"));
+    let what = rest.trim_start_matches(|c: char| c.is_ascii_digit() || c == ':');
+    assert!(what.starts_with(' ') && what.len() > 5, "the error says nothing: {line}");
+}
+
+/// Loads a scene. If it is small, builds its tree and renders a picture.
+fn read_scene(path: &Path) -> Result<(), String> {
+    // The viewer watches these files.
+    let _ = source_files(path);
+    let scene = Scene::load(path).map_err(|error| error.to_string())?;
+    let n_pixels: usize = scene.images.iter().map(|image| image.pixels.len()).sum();
+    if scene.n_triangles() > MAX_RENDERED_TRIANGLES || n_pixels > MAX_RENDERED_PIXELS {
+        return Ok(());
+    }
+    let options = RenderOptions { width: 6, height: 5, max_depth: 3, ..scene.defaults.options() };
+    let workload = Workload::of_pictures(&options, scene.lights.len(), 1);
+    let engine = Engine::on_cpu();
+    let world = engine.build(scene, &workload).expect("a loaded scene has a tree").world;
+    engine.render(&world, &options).expect("a loaded scene is rendered");
+    Ok(())
+}
+
+/// Reads all rays of a file, in batches of different sizes.
+fn read_rays(path: &Path) -> Result<(), String> {
+    let mut reader = RayReader::open(path).map_err(|error| error.to_string())?;
+    let mut n_read = 0;
+    for most in [1, 7, 1 << 12].into_iter().chain(std::iter::repeat(1 << 16)) {
+        let batch = reader.next_batch(most).map_err(|error| error.to_string())?;
+        n_read += batch.len() as u64;
+        if batch.is_empty() {
+            break;
+        }
+    }
+    assert_eq!(n_read, reader.n_rays());
+    Ok(())
+}
+
+/// Returns whether a scene file states a count that only takes time.
+fn asks_for_much(content: &[u8]) -> bool {
+    fn is_large(value: &toml::Value) -> bool {
+        match value {
+            toml::Value::Integer(count) => *count > MAX_COUNT,
+            toml::Value::Array(values) => values.iter().any(is_large),
+            toml::Value::Table(table) => table.values().any(is_large),
+            _ => false,
+        }
+    }
+    let table = std::str::from_utf8(content).ok().and_then(|text| text.parse::<toml::Table>().ok());
+    table.is_some_and(|table| table.values().any(is_large))
+}
+
+/// Checks that a message is one line of printable text.
+fn check_line(line: &str) {
+    assert!(!line.is_empty(), "an empty message");
+    assert!(!line.chars().any(|c| c.is_control() || ('\u{2028}'..='\u{202e}').contains(&c)), "{line:?}");
+}
+
+/// Formats every message of the library and checks that it is one line.
+struct LineChecker;
+
+impl tracing::Subscriber for LineChecker {
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        *metadata.level() <= tracing::Level::WARN
+    }
+
+    fn new_span(&self, _: &span::Attributes<'_>) -> span::Id {
+        span::Id::from_u64(1)
+    }
+
+    fn record(&self, _: &span::Id, _: &span::Record<'_>) {}
+
+    fn record_follows_from(&self, _: &span::Id, _: &span::Id) {}
+
+    fn event(&self, event: &Event<'_>) {
+        event.record(&mut LineVisitor);
+    }
+
+    fn enter(&self, _: &span::Id) {}
+
+    fn exit(&self, _: &span::Id) {}
+}
+
+struct LineVisitor;
+
+impl Visit for LineVisitor {
+    fn record_debug(&mut self, _: &Field, value: &dyn std::fmt::Debug) {
+        check_line(&format!("{value:?}"));
+    }
+}
