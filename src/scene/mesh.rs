@@ -51,6 +51,10 @@ impl Mesh {
     /// Adds another mesh. Points at the same place are not merged. Where one of the meshes lacks texture coordinates,
     /// colours or tangents that the other one has, its corners get the coordinates 0, white, and no tangent.
     pub fn append(&mut self, other: Mesh) {
+        if self.positions.is_empty() && self.faces.is_empty() {
+            *self = Mesh { name: std::mem::take(&mut self.name), ..other };
+            return;
+        }
         let first = self.positions.len() as u32;
         let n_faces = (self.faces.len(), other.faces.len());
         self.positions.extend(other.positions);
