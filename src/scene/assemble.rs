@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use toml::Spanned;
 
 use super::{
-    Camera, Light, Material, Projection, RenderDefaults, Scene,
+    Camera, Light, LoadOptions, Material, Projection, RenderDefaults, Scene,
     camera::{FOV_DEGREES, HEIGHTS},
     description::{CameraSpec, Description, LightSpec, MeshSpec, RenderSpec, SceneDenoise},
     error::{Checked, SceneError},
@@ -28,16 +28,16 @@ use super::{
     standard::Lacks,
     transform::finite,
 };
-use crate::frame::Denoise;
+use crate::{frame::Denoise, util::progress::Progress};
 
 /// Name of the material of meshes and faces that name none.
 pub(super) const DEFAULT_MATERIAL: &str = "(default)";
 
 /// Loads a scene file and the meshes that it names. Their names are relative to the scene file's folder.
-pub(super) fn load_toml(path: &Path, access: Access) -> Result<(Scene, Lacks), SceneError> {
+pub(super) fn load_toml(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
     let text = read_utf8(path)?;
-    let file = File { path, text: &text, access };
-    assemble(&file, file.parse()?)
+    let file = File { path, text: &text, access: Access::of(options) };
+    assemble(&file, file.parse()?, &options.progress)
 }
 
 /// A file and its text. Errors name the file and the line.
@@ -73,7 +73,7 @@ impl File<'_> {
     }
 }
 
-fn assemble(file: &File, description: Description) -> Result<(Scene, Lacks), SceneError> {
+fn assemble(file: &File, description: Description, progress: &Progress) -> Result<(Scene, Lacks), SceneError> {
     let lacks = Lacks {
         up: Up::Y,
         camera: description.camera.is_none() && description.cameras.is_empty(),
@@ -81,7 +81,7 @@ fn assemble(file: &File, description: Description) -> Result<(Scene, Lacks), Sce
         background: description.background.is_none(),
     };
     let mut scene = Scene::empty(file.path);
-    let mut images = Images::default();
+    let mut images = Images::new(progress);
     let indices = add_materials(file, (&mut scene, &mut images), &description.materials)?;
     for (ix, spec) in description.light.iter().enumerate() {
         scene.lights.push(file.check(&format!("light {}", ix + 1), spec, light)?);

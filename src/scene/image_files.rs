@@ -9,6 +9,7 @@ use super::{
     read::read_bytes,
     texture::{Channel, Image, Pixels},
 };
+use crate::util::progress::Progress;
 
 /// What a texture shows of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -33,6 +34,7 @@ pub(super) struct Images {
     n_pixels: u64,
     /// Size of the images that are yet to be made, bytes.
     n_bytes_to_make: u64,
+    progress: Progress,
 }
 
 #[derive(Debug)]
@@ -51,6 +53,16 @@ enum Shown {
 }
 
 impl Images {
+    /// Returns no images. `progress` is told of those that are decoded.
+    pub fn new(progress: &Progress) -> Self {
+        Self { progress: progress.clone(), ..Self::default() }
+    }
+
+    /// Who is told of the progress of loading.
+    pub fn progress(&self) -> &Progress {
+        &self.progress
+    }
+
     /// Returns the index of a file.
     pub fn add(&mut self, path: PathBuf) -> usize {
         // One file can have several names. A file that does not exist has those that are stated.
@@ -79,7 +91,7 @@ impl Images {
                 Err(what) => file.image = Some(Err(what)),
             }
         }
-        for (file, decoded) in waiting.into_iter().zip(decode_all(encoded, self.n_pixels)) {
+        for (file, decoded) in waiting.into_iter().zip(decode_all(encoded, self.n_pixels, &self.progress)) {
             self.n_pixels += decoded.as_ref().map_or(0, |image| image.pixels.len() as u64);
             let decoded = decoded.map(Examined::new).map_err(|what| format!("{}: {what}", file.path.display()));
             file.image = Some(decoded);

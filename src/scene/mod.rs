@@ -69,6 +69,7 @@ use self::{
     smooth::Shading,
     standard::Lacks,
 };
+use crate::util::progress::Progress;
 
 /// Everything that a frame shows. World space is right-handed, +y up by default.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,6 +114,8 @@ pub struct LoadOptions {
     pub aspect: Option<f32>,
     /// What replaces parts of the scene.
     pub look: Look,
+    /// Who is told of the progress: of mesh files that are read, and of images that are decoded.
+    pub progress: Progress,
 }
 
 /// A mesh that is placed in the world.
@@ -151,7 +154,7 @@ impl Scene {
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Scene, SceneError> {
         let (mut scene, lacks) = if is_scene_file(path) {
             check_only_scene(path, options)?;
-            assemble::load_toml(path, Access::of(options))?
+            assemble::load_toml(path, options)?
         } else if MeshFormat::of_name(path).is_some() {
             load_mesh_file(path, options)?
         } else {
@@ -252,7 +255,7 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), 
     }
     check_only_scene(path, options)?;
     let mut scene = Scene::empty(path);
-    let mut images = Images::default();
+    let mut images = Images::new(&options.progress);
     let access = Access::of(options);
     let mut loading = Loading { shading: Shading::default(), n_loaded: 0, access, images: &mut images };
     let up = if MeshFormat::of(path, &bytes) == MeshFormat::Stl { Up::Z } else { Up::Y };

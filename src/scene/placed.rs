@@ -145,7 +145,9 @@ impl<'a> Placer<'a> {
         let uv_scale = table.spec.common.uv_scale;
         if MeshFormat::of(path, &bytes) == MeshFormat::Gltf {
             let allow_outside = self.file.access.is_anywhere();
-            let options = LoadOptions { scene: reading.scene.clone(), allow_outside, ..LoadOptions::default() };
+            let progress = self.images.progress().clone();
+            let scene = reading.scene.clone();
+            let options = LoadOptions { scene, allow_outside, progress, ..LoadOptions::default() };
             let has_materials = self.with_materials.contains(reading);
             let before = gltf::LoadedBefore { n_triangles: n_loaded as u64, n_pixels: self.images.n_pixels() };
             let mut model = gltf::load_meshes(path, bytes, &options, has_materials, before)?;

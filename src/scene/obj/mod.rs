@@ -26,7 +26,7 @@ use super::{
 pub(super) fn parse_obj(path: &Path, text: &str, loading: &mut Loading) -> Result<Loaded, SceneError> {
     let &mut Loading { shading, n_loaded, access, ref mut images } = loading;
     let careful = || clean_obj(text).map_err(|(line, what)| SceneError::line(path, line, what));
-    let quick = quick_obj(text);
+    let quick = quick_obj(text, images.progress());
     let cleaned = if quick.is_none() { Some(careful()?) } else { None };
     let clean = quick.as_ref().map(|quick| &quick.clean).or(cleaned.as_ref()).expect("the file is read in either way");
     require_for_mesh(n_loaded as u64, &clean.size).map_err(|what| SceneError::file(path, what))?;

@@ -10,6 +10,7 @@ use super::{
     clean::{CleanObj, Cleaner, Corner, FaceKind, FaceShading, split_keyword, statements},
     model::Model,
 };
+use crate::util::progress::{Meter, Progress, Work};
 
 /// Least number of bytes of the text that one thread reads at a time.
 const CHUNK_BYTES: usize = 1 << 20;
@@ -40,15 +41,19 @@ enum Item {
 }
 
 /// Reads the text of an OBJ file, or returns `None` for a file that has anything else than is usual.
-pub fn quick_obj(text: &str) -> Option<QuickObj<'_>> {
-    quick_obj_in_chunks(text, CHUNK_BYTES)
+/// `progress` is told of the bytes that have been read.
+pub fn quick_obj<'a>(text: &'a str, progress: &Progress) -> Option<QuickObj<'a>> {
+    quick_obj_in_chunks(text, CHUNK_BYTES, &progress.begin(Work::Reading, text.len() as u64))
 }
 
-fn quick_obj_in_chunks(text: &str, chunk_bytes: usize) -> Option<QuickObj<'_>> {
+fn quick_obj_in_chunks<'a>(text: &'a str, chunk_bytes: usize, meter: &Meter) -> Option<QuickObj<'a>> {
     let texts = chunks_of(text, chunk_bytes);
-    let chunks = read_chunks(&texts, None).or_else(|stop| match stop {
+    let chunks = read_chunks(&texts, None, meter).or_else(|stop| match stop {
         Stop::Unusual => Err(stop),
-        Stop::Relative => read_chunks(&texts, Some(&texts.par_iter().map(|text| n_elements(text)).collect::<Vec<_>>())),
+        Stop::Relative => {
+            let n_elements: Vec<_> = texts.par_iter().map(|text| n_elements(text)).collect();
+            read_chunks(&texts, Some(&n_elements), meter)
+        }
     });
     joined(chunks.ok()?)
 }
@@ -78,12 +83,20 @@ enum Stop {
 
 /// Reads all chunks. `n_elements`: the numbers of positions, texture coordinates and normals of each one, if they are
 /// known.
-fn read_chunks<'a>(texts: &[&'a str], n_elements: Option<&[[usize; 3]]>) -> Result<Vec<Chunk<'a>>, Stop> {
+fn read_chunks<'a>(
+    texts: &[&'a str],
+    n_elements: Option<&[[usize; 3]]>,
+    meter: &Meter,
+) -> Result<Vec<Chunk<'a>>, Stop> {
     let before = |ix: usize| {
         let counts = n_elements?[..ix].iter();
         Some(counts.fold([0; 3], |sum, counts| [0, 1, 2].map(|kind| sum[kind] + counts[kind])))
     };
-    let read = |(ix, text): (usize, &&'a str)| Chunk::new(text, if ix == 0 { Some([0; 3]) } else { before(ix) });
+    let read = |(ix, text): (usize, &&'a str)| {
+        let chunk = Chunk::new(text, if ix == 0 { Some([0; 3]) } else { before(ix) })?;
+        meter.add(text.len() as u64);
+        Ok(chunk)
+    };
     texts.par_iter().enumerate().map(read).collect()
 }
 
@@ -415,8 +428,12 @@ mod tests {
 
     /// Returns the mesh that the quick way reads, with a text cut into chunks.
     fn quickly(text: &str, chunk_bytes: usize) -> Mesh {
-        let quick = quick_obj_in_chunks(text, chunk_bytes).unwrap();
+        let quick = in_chunks(text, chunk_bytes).unwrap();
         mesh(&quick.models(material_ix).unwrap(), 3, (Shading::default(), 1.0)).0
+    }
+
+    fn in_chunks(text: &str, chunk_bytes: usize) -> Option<QuickObj<'_>> {
+        quick_obj_in_chunks(text, chunk_bytes, &Progress::default().begin(Work::Reading, 1))
     }
 
     /// A file of everything that is usual. `relative`: whether some indices count back.
@@ -442,7 +459,7 @@ mod tests {
             assert_eq!(expected.slots, [0, 0, 0, 0, 0, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2]);
             for chunk_bytes in [1, 10, 40, 100, 200, CHUNK_BYTES] {
                 assert_eq!(quickly(&text, chunk_bytes), expected, "{chunk_bytes}");
-                let (quick, careful) = (quick_obj_in_chunks(&text, chunk_bytes).unwrap(), clean_obj(&text).unwrap());
+                let (quick, careful) = (in_chunks(&text, chunk_bytes).unwrap(), clean_obj(&text).unwrap());
                 let quick = quick.clean;
                 assert_eq!((&quick.libraries, &quick.used_materials), (&careful.libraries, &careful.used_materials));
                 assert_eq!((quick.size, quick.colour_scale), (careful.size, 1.0));
@@ -455,16 +472,19 @@ mod tests {
     #[test]
     fn numbers_that_are_not_finite_count_where_a_face_names_them() {
         let file = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv inf 0 0\nvn 0 1e99 0\nvt 0 nan\n";
-        assert!(quick_obj(&format!("{file}f 1 2 3\n")).unwrap().models(material_ix).is_some());
+        assert!(quick_obj(&format!("{file}f 1 2 3\n"), &Progress::default()).unwrap().models(material_ix).is_some());
         for face in ["f 1 2 4", "f 1//1 2//1 3//1", "f 1/1 2/1 3/1"] {
-            assert!(quick_obj(&format!("{file}{face}\n")).unwrap().models(material_ix).is_none(), "{face}");
+            assert!(
+                quick_obj(&format!("{file}{face}\n"), &Progress::default()).unwrap().models(material_ix).is_none(),
+                "{face}"
+            );
         }
     }
 
     #[test]
     fn what_is_unusual_is_left_to_the_careful_way() {
         let start = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\n";
-        assert!(quick_obj(&format!("{start}f 1 2 3\n")).is_some());
+        assert!(quick_obj(&format!("{start}f 1 2 3\n"), &Progress::default()).is_some());
         for unusual in [
             "v 0 0 0 1 1 1",
             "v 0 0 0 1",
@@ -490,7 +510,7 @@ mod tests {
             "usemtl",
             "mtllib",
         ] {
-            assert!(quick_obj(&format!("{start}{unusual}\n")).is_none(), "{unusual}");
+            assert!(quick_obj(&format!("{start}{unusual}\n"), &Progress::default()).is_none(), "{unusual}");
         }
     }
 }
