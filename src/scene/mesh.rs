@@ -68,6 +68,16 @@ impl Mesh {
         append_corners(&mut self.tangents, other.tangents, n_faces, [Vec4::ZERO; 3]);
     }
 
+    /// Returns the positions at which triangles have corners, each once.
+    ///
+    /// # Panics
+    /// An index is out of range.
+    pub(super) fn corners(&self) -> Vec<Vec3> {
+        let mut is_corner = vec![false; self.positions.len()];
+        self.faces.as_flattened().iter().for_each(|ix| is_corner[*ix as usize] = true);
+        self.positions.iter().zip(is_corner).filter(|(_, is_corner)| *is_corner).map(|(p, _)| *p).collect()
+    }
+
     /// Returns the positions in world space.
     ///
     /// # Errors

@@ -45,6 +45,7 @@ mod transform;
 use std::path::Path;
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 pub use self::{
     camera::{Camera, Projection},
@@ -201,11 +202,15 @@ impl Scene {
     /// # Panics
     /// An index of a mesh or of a position is out of range.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        let corners = self.instances.iter().flat_map(|Instance { mesh_ix, transform, .. }| {
-            let mesh = &self.meshes[*mesh_ix];
-            mesh.faces.as_flattened().iter().map(|ix| transform.point(mesh.positions[*ix as usize]))
-        });
-        corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
+        // Instances share the list of their mesh's corners, in which each point is once.
+        let corners: Vec<Vec<Vec3>> = self.meshes.par_iter().map(Mesh::corners).collect();
+        let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let joined = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
+        let of_instance = |Instance { mesh_ix, transform, .. }: &Instance| {
+            let world = corners[*mesh_ix].par_iter().map(|p| transform.point(*p));
+            world.map(|p| (p, p)).reduce(none, joined)
+        };
+        self.instances.par_iter().map(of_instance).reduce(none, joined)
     }
 
     /// Adds a mesh and one instance of it. `materials` becomes [`Instance::materials`].

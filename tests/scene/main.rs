@@ -11,7 +11,6 @@ mod mesh_files;
 mod obj;
 mod path;
 mod placed;
-mod progress;
 mod standard;
 #[path = "../support/mod.rs"]
 mod support;
