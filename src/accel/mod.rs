@@ -15,6 +15,7 @@ use self::{
 pub use self::{query::Query, statistics::Statistics};
 use crate::layout::Triangle;
 pub use crate::layout::{Hit, NO_TRIANGLE, Ray};
+use crate::util::progress::Progress;
 
 /// An acceleration structure over the triangles of a world.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,8 +68,13 @@ impl Accel {
     /// Builds a structure over triangles on the current rayon pool. For a grid, this only keeps the options: the grid
     /// is built at its first use ([`LazyGrid`]).
     pub fn new(triangles: &[Triangle], options: &AccelOptions) -> Self {
+        Self::new_observed(triangles, options, &Progress::default())
+    }
+
+    /// Does what [`Accel::new`] does, and reports the progress of a kd-tree's build.
+    pub fn new_observed(triangles: &[Triangle], options: &AccelOptions, progress: &Progress) -> Self {
         match options {
-            AccelOptions::KdTree(options) => Self::KdTree(KdTree::build(triangles, options)),
+            AccelOptions::KdTree(options) => Self::KdTree(KdTree::build_observed(triangles, options, progress)),
             AccelOptions::Grid(options) => Self::Grid(LazyGrid::new(triangles, options.clone())),
         }
     }

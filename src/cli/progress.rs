@@ -2,12 +2,16 @@
 
 use std::{
     io::{self, IsTerminal},
+    sync::{Arc, Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use kdray::util::text::one_line;
+use kdray::util::{
+    progress::{self, Observer, Work},
+    text::one_line,
+};
 
 use super::{log, print_line, spans::Spans};
 
@@ -65,6 +69,19 @@ impl Progress {
         (made, start.elapsed().as_secs_f64() * 1e3)
     }
 
+    /// Returns the observer of a stage that consists of pieces of `work`, which share its part of the bar. It is none
+    /// without a bar.
+    pub fn observer(&self, message: &str, work: &'static [Work]) -> progress::Progress {
+        let Self::Bar(bar) = self else { return progress::Progress::default() };
+        progress::Progress::to(Arc::new(StageObserver {
+            bar: bar.clone(),
+            message: one_line(message),
+            begin: bar.position(),
+            work,
+            state: Mutex::new(StageState { present: None, shares: vec![0.0; work.len()] }),
+        }))
+    }
+
     /// Returns the bar's position, or 0 without a bar.
     fn position(&self) -> u64 {
         if let Self::Bar(bar) = self { bar.position() } else { 0 }
@@ -77,6 +94,47 @@ impl Progress {
             Self::Lines => print_line("note", message),
             Self::Bar(bar) => bar.suspend(|| print_line("note", message)),
         }
+    }
+}
+
+/// Moves the bar while the library works on a stage.
+struct StageObserver {
+    bar: ProgressBar,
+    message: String,
+    /// Position of the bar when the stage began.
+    begin: u64,
+    /// What the stage consists of.
+    work: &'static [Work],
+    state: Mutex<StageState>,
+}
+
+struct StageState {
+    /// The piece of work that was reported last, when it began, and the share of it that was done.
+    present: Option<(usize, Instant, f32)>,
+    /// The largest share that was reported of each piece of work.
+    shares: Vec<f32>,
+}
+
+impl Observer for StageObserver {
+    fn progress(&self, work: Work, share: f32) {
+        let Some(ix) = self.work.iter().position(|other| *other == work) else { return };
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let begin = match state.present {
+            // Threads report in any order.
+            Some((same, _, last)) if same == ix && share < last && last < 1.0 => return,
+            Some((same, begin, last)) if same == ix && share >= last => begin,
+            _ => Instant::now(),
+        };
+        state.present = Some((ix, begin, share));
+        state.shares[ix] = state.shares[ix].max(share);
+        let done = state.shares.iter().sum::<f32>() / self.work.len() as f32;
+        self.bar.set_position(self.begin + (done * BAR_STEPS as f32) as u64);
+        let name = match work {
+            Work::Reading | Work::Building => "",
+            Work::Images => " images",
+        };
+        let left = left_text(time_left(begin.elapsed(), share.into()));
+        self.bar.set_message(format!("{}:{name} {:.0} %, {left} left", self.message, 100.0 * share));
     }
 }
 
@@ -155,8 +213,7 @@ impl StepProgress<'_> {
     }
 
     fn text(&self) -> String {
-        let left_s = time_left(self.start.elapsed(), self.share()).as_secs_f64().ceil();
-        let left = if left_s < 120.0 { format!("{left_s} s") } else { format!("{} min", (left_s / 60.0).ceil()) };
+        let left = left_text(time_left(self.start.elapsed(), self.share()));
         let done = match self.n_steps {
             1 => format!("{:.0} %", 100.0 * self.share()),
             n_steps => format!("{} of {n_steps}", self.n_done),
@@ -169,6 +226,11 @@ impl StepProgress<'_> {
 /// is zero.
 fn time_left(elapsed: Duration, share_done: f64) -> Duration {
     if share_done > 0.0 { elapsed.mul_f64((1.0 - share_done) / share_done) } else { Duration::ZERO }
+}
+
+fn left_text(left: Duration) -> String {
+    let left_s = left.as_secs_f64().ceil();
+    if left_s < 120.0 { format!("{left_s} s") } else { format!("{} min", (left_s / 60.0).ceil()) }
 }
 
 impl Drop for Progress {
@@ -192,6 +254,35 @@ mod tests {
         let mut steps = progress.steps("rendering", 3);
         steps.step();
         assert!(steps.text().starts_with("rendering: 1 of 3, ") && steps.text().ends_with(" left"), "{}", steps.text());
+    }
+
+    #[test]
+    fn the_bar_moves_while_the_library_works() {
+        let bar = ProgressBar::hidden();
+        bar.set_length(3 * BAR_STEPS);
+        let progress = Progress::Bar(bar.clone());
+        progress.stage("first", || ());
+        progress.stage("loading x", || {
+            let observer = progress.observer("loading x", &[Work::Reading, Work::Images]);
+            let report = |work, share| observer.report(work, share);
+            report(Work::Reading, 0.5);
+            assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS / 4);
+            assert!(bar.message().starts_with("loading x: 50 %, "), "{}", bar.message());
+            // A thread that is late, another file, other work, and work that the stage does not have.
+            report(Work::Reading, 0.25);
+            assert!(bar.message().starts_with("loading x: 50 %, "), "{}", bar.message());
+            report(Work::Reading, 1.0);
+            report(Work::Reading, 0.1);
+            assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS / 2);
+            assert!(bar.message().starts_with("loading x: 10 %, "), "{}", bar.message());
+            report(Work::Images, 0.5);
+            assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS * 3 / 4);
+            assert!(bar.message().starts_with("loading x: images 50 %, "), "{}", bar.message());
+            report(Work::Building, 1.0);
+            assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS * 3 / 4);
+        });
+        assert_eq!(bar.position(), 2 * BAR_STEPS);
+        assert_eq!(Progress::Lines.observer("x", &[Work::Reading]), progress::Progress::default());
     }
 
     #[test]

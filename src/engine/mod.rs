@@ -23,6 +23,7 @@ use crate::{
     frame::RenderOptions,
     gpu::{Context, ContextOptions, GpuError},
     scene::Scene,
+    util::progress::Progress,
     world::{FlatScene, Geometry, Mismatch, World},
 };
 
@@ -34,6 +35,7 @@ pub struct Engine {
     context: Option<Arc<Context>>,
     request: Request,
     cache: Cache,
+    progress: Progress,
 }
 
 /// A world, and the acceleration structure that was chosen for it.
@@ -61,13 +63,19 @@ impl Engine {
 
     /// Uses the CPU without Vulkan, on the current rayon pool.
     pub fn on_cpu() -> Self {
-        Self { context: None, request: Request::default(), cache: Cache::open() }
+        Self { context: None, request: Request::default(), cache: Cache::open(), progress: Progress::default() }
     }
 
     /// Returns the same engine with the choices that `request` specifies. The engine makes all other choices.
     #[must_use]
     pub fn with_request(self, request: Request) -> Self {
         Self { request, ..self }
+    }
+
+    /// Returns the same engine, which reports the progress of the kd-trees that it builds.
+    #[must_use]
+    pub fn with_progress(self, progress: Progress) -> Self {
+        Self { progress, ..self }
     }
 
     /// Returns the Vulkan device, or none on the CPU.
@@ -112,7 +120,7 @@ impl Engine {
     /// The scene has a triangle without a material.
     pub fn build_flat(&self, scene: FlatScene, workload: &Workload) -> Result<Built, Mismatch> {
         let accel = self.choose_accel(scene.triangles.len(), workload);
-        let world = World::with_accel(scene, &accel.options(self.processor()))?;
+        let world = World::with_accel_observed(scene, &accel.options(self.processor()), &self.progress)?;
         Ok(Built { world, accel })
     }
 

@@ -49,7 +49,7 @@ pub(super) const DEFAULT_MATERIAL: &str = "(default)";
 pub(super) fn load_toml(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
     let text = read_utf8(path)?;
     let file = File { path, text: &text, access: Access::of(options) };
-    assemble(&file, file.parse()?, &options.look.materials)
+    assemble(&file, file.parse()?, options)
 }
 
 /// A file and its text. Errors name the file and the line.
@@ -85,8 +85,8 @@ impl File<'_> {
     }
 }
 
-/// `replaced`: the materials that the user replaces beside those that the file does.
-fn assemble(file: &File, description: Description, replaced: &[MaterialChoice]) -> Result<(Scene, Lacks), SceneError> {
+/// `options`: they name the materials that the user replaces beside those that the file does.
+fn assemble(file: &File, description: Description, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
     let lacks = Lacks {
         up: Up::Y,
         camera: description.camera.is_none() && description.cameras.is_empty(),
@@ -97,7 +97,7 @@ fn assemble(file: &File, description: Description, replaced: &[MaterialChoice]) 
     let mut scene = Scene::empty(file.path);
     let replace = description.replace.as_ref().map(|spec| file.check("replace", spec, |words| choices(words)));
     let replace = replace.transpose()?.unwrap_or_default();
-    let mut images = Images::new([&replace[..], replaced].concat());
+    let mut images = Images::new([&replace[..], &options.look.materials].concat(), &options.progress);
     let indices = add_materials(file, (&mut scene, &mut images), &description.materials)?;
     for (ix, spec) in description.light.iter().enumerate() {
         scene.lights.push(file.check(&format!("light {}", ix + 1), spec, light)?);

@@ -10,6 +10,7 @@ use super::{
     read::read_bytes,
     texture::{Channel, Image, Pixels},
 };
+use crate::util::progress::Progress;
 
 /// What a texture shows of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -36,6 +37,7 @@ pub(super) struct Images {
     n_pixels: u64,
     /// Size of the images that are yet to be made, bytes.
     n_bytes_to_make: u64,
+    progress: Progress,
 }
 
 #[derive(Debug)]
@@ -54,9 +56,10 @@ enum Shown {
 }
 
 impl Images {
-    /// `replaced`: which materials are replaced once they are loaded.
-    pub fn new(replaced: Vec<MaterialChoice>) -> Self {
-        Self { replaced, ..Self::default() }
+    /// Returns no images. `replaced`: which materials are replaced once they are loaded. `progress` is told of images that
+    /// are decoded.
+    pub fn new(replaced: Vec<MaterialChoice>, progress: &Progress) -> Self {
+        Self { replaced, progress: progress.clone(), ..Self::default() }
     }
 
     /// Returns whether the materials of a name are replaced, so that their images need not be read.
@@ -67,6 +70,11 @@ impl Images {
     /// Returns which materials are replaced.
     pub fn replaced(&self) -> &[MaterialChoice] {
         &self.replaced
+    }
+
+    /// Who is told of the progress of loading.
+    pub fn progress(&self) -> &Progress {
+        &self.progress
     }
 
     /// Returns the index of a file.
@@ -97,7 +105,7 @@ impl Images {
                 Err(what) => file.image = Some(Err(what)),
             }
         }
-        for (file, decoded) in waiting.into_iter().zip(decode_all(encoded, self.n_pixels)) {
+        for (file, decoded) in waiting.into_iter().zip(decode_all(encoded, self.n_pixels, &self.progress)) {
             self.n_pixels += decoded.as_ref().map_or(0, |image| image.pixels.len() as u64);
             let decoded = decoded.map(Examined::new).map_err(|what| format!("{}: {what}", file.path.display()));
             file.image = Some(decoded);

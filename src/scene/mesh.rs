@@ -51,6 +51,10 @@ impl Mesh {
     /// Adds another mesh. Points at the same place are not merged. Where one of the meshes lacks texture coordinates,
     /// colours or tangents that the other one has, its corners get the coordinates 0, white, and no tangent.
     pub fn append(&mut self, other: Mesh) {
+        if self.positions.is_empty() && self.faces.is_empty() {
+            *self = Mesh { name: std::mem::take(&mut self.name), ..other };
+            return;
+        }
         let first = self.positions.len() as u32;
         let n_faces = (self.faces.len(), other.faces.len());
         self.positions.extend(other.positions);
@@ -62,6 +66,16 @@ impl Mesh {
         }
         append_corners(&mut self.colours, other.colours, n_faces, [Vec4::ONE; 3]);
         append_corners(&mut self.tangents, other.tangents, n_faces, [Vec4::ZERO; 3]);
+    }
+
+    /// Returns the positions at which triangles have corners, each once.
+    ///
+    /// # Panics
+    /// An index is out of range.
+    pub(super) fn corners(&self) -> Vec<Vec3> {
+        let mut is_corner = vec![false; self.positions.len()];
+        self.faces.as_flattened().iter().for_each(|ix| is_corner[*ix as usize] = true);
+        self.positions.iter().zip(is_corner).filter(|(_, is_corner)| *is_corner).map(|(p, _)| *p).collect()
     }
 
     /// Returns the positions in world space.

@@ -48,6 +48,7 @@ mod up;
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 pub use self::{
     camera::{Camera, Projection},
@@ -74,6 +75,7 @@ use self::{
     smooth::Shading,
     standard::Lacks,
 };
+use crate::util::progress::Progress;
 
 /// Everything that a frame shows. World space is right-handed, +y up by default.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,6 +125,8 @@ pub struct LoadOptions {
     pub aspect: Option<f32>,
     /// What replaces parts of the scene.
     pub look: Look,
+    /// Who is told of the progress: of mesh files that are read, and of images that are decoded.
+    pub progress: Progress,
 }
 
 /// A mesh that is placed in the world.
@@ -209,11 +213,15 @@ impl Scene {
     /// # Panics
     /// An index of a mesh or of a position is out of range.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        let corners = self.instances.iter().flat_map(|Instance { mesh_ix, transform, .. }| {
-            let mesh = &self.meshes[*mesh_ix];
-            mesh.faces.as_flattened().iter().map(|ix| transform.point(mesh.positions[*ix as usize]))
-        });
-        corners.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
+        // Instances share the list of their mesh's corners, in which each point is once.
+        let corners: Vec<Vec<Vec3>> = self.meshes.par_iter().map(Mesh::corners).collect();
+        let none = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        let joined = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
+        let of_instance = |Instance { mesh_ix, transform, .. }: &Instance| {
+            let world = corners[*mesh_ix].par_iter().map(|p| transform.point(*p));
+            world.map(|p| (p, p)).reduce(none, joined)
+        };
+        self.instances.par_iter().map(of_instance).reduce(none, joined)
     }
 
     /// Adds a mesh and one instance of it. `materials` becomes [`Instance::materials`].
@@ -265,7 +273,7 @@ fn load_mesh_file(path: &Path, options: &LoadOptions) -> Result<(Scene, Lacks), 
     }
     check_only_scene(path, options)?;
     let mut scene = Scene::empty(path);
-    let mut images = Images::new(options.look.materials.clone());
+    let mut images = Images::new(options.look.materials.clone(), &options.progress);
     let access = Access::of(options);
     let mut loading =
         Loading { shading: Shading::default(), origin: DVec3::ZERO, n_loaded: 0, access, images: &mut images };

@@ -21,8 +21,8 @@ const TREE_BYTES: u64 = 140;
 /// Peak memory of MikkTSpace in bytes per triangle: what it notes of the triangle (160), its corners in a search tree
 /// and in lists (150), edges (120), groups of corners (150) and tangents (120).
 const MIKKTSPACE_BYTES: u64 = 700;
-/// Copies of a text file in memory while it is checked: the file itself, its statements rewritten for the parser, and
-/// these once more where the quick way has missed what the careful way finds.
+/// Copies of a text file in memory while it is read: the file itself, what the quick way has read of it, and the
+/// statements rewritten for tobj where the quick way has missed what the careful way finds.
 const TEXT_COPIES: u64 = 3;
 
 /// What triangles have beside corners, normals and slots.

@@ -152,7 +152,8 @@ impl<'a> Placer<'a> {
             }
             let allow_outside = self.file.access.is_anywhere();
             let look = Look { materials: self.images.replaced().to_vec(), ..Look::default() };
-            let options = LoadOptions { scene: reading.scene.clone(), allow_outside, look, ..LoadOptions::default() };
+            let (scene, progress) = (reading.scene.clone(), self.images.progress().clone());
+            let options = LoadOptions { scene, allow_outside, look, progress, ..LoadOptions::default() };
             let has_materials = self.with_materials.contains(reading);
             let before = gltf::LoadedBefore { n_triangles: n_loaded as u64, n_pixels: self.images.n_pixels() };
             let mut model = gltf::load_meshes(path, bytes, &options, has_materials, before)?;

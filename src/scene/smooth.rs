@@ -4,9 +4,8 @@
 //!
 //! The weights follow Thürmer and Wüthrich, "Computing Vertex Normals from Polygonal Facets" (JGT 1998).
 
-use std::collections::HashMap;
-
 use glam::{DVec3, Vec3};
+use hashbrown::HashMap;
 use rayon::prelude::*;
 
 /// Largest number of faces around a point that are compared in pairs. A point where more faces meet is called a hub,
@@ -15,6 +14,9 @@ use rayon::prelude::*;
 const MAX_PAIRED_FACES: usize = 256;
 /// Deviation (1 - cosine; 0.08 degrees) below which a normal counts as the normal of the face's plane.
 const FLAT_TOLERANCE: f32 = 1e-6;
+/// Margin of the cosine of half the crease angle. With a margin of m, the cosine between two normals that keep it
+/// exceeds that of the crease angle by 2 m^2 or more: 2e-6, more than dot products of unit vectors are rounded by.
+const COSINE_MARGIN: f32 = 1e-3;
 
 /// Angle between two faces, in degrees, beyond which their common edge is sharp.
 pub(super) const DEFAULT_CREASE: f32 = 40.0;
@@ -48,11 +50,11 @@ struct Facet {
 /// Points at the same place count as one, whatever their indices. A face whose `smooth` is false stays flat, and its
 /// neighbours' normals ignore it. `crease` is in degrees.
 pub(super) fn crease_normals(positions: &[Vec3], faces: &[[u32; 3]], smooth: &[bool], crease: f32) -> Vec<[Vec3; 3]> {
-    let point_of = weld(positions);
     let facet = |(face, smooth): (&[u32; 3], &bool)| {
         if *smooth { facet(face.map(|ix| positions[ix as usize].as_dvec3())) } else { Facet::default() }
     };
-    let facets: Vec<Facet> = faces.par_iter().zip(smooth).map(facet).collect();
+    let facets = || -> Vec<Facet> { faces.par_iter().zip(smooth).map(facet).collect() };
+    let (point_of, facets) = rayon::join(|| weld(positions), facets);
     let around = FacesAround::new(&point_of, faces, positions.len());
     let corner_normals = CornerNormals::new(&around, &facets, crease);
     let normals_of = |(face, facet): (&[u32; 3], &Facet)| {
@@ -79,15 +81,28 @@ struct CornerNormals<'a> {
     around: &'a FacesAround,
     facets: &'a [Facet],
     min_cosine: f32,
-    /// The normals of hubs, points where more than `MAX_PAIRED_FACES` faces meet.
-    hubs: HashMap<u32, Vec3>,
+    /// For each point the average that all its faces have in common, or `None` if the crease angle parts them.
+    common: Vec<Option<Vec3>>,
 }
 
 impl<'a> CornerNormals<'a> {
     fn new(around: &'a FacesAround, facets: &'a [Facet], crease: f32) -> Self {
-        let mut normals = Self { around, facets, min_cosine: crease.to_radians().cos(), hubs: HashMap::new() };
-        let is_hub = |point: &u32| around.of(*point).len() > MAX_PAIRED_FACES;
-        normals.hubs = (0..around.n_points()).filter(is_hub).map(|p| (p, normals.average(p, |_| true))).collect();
+        let min_cosine = crease.to_radians().cos();
+        let mut normals = Self { around, facets, min_cosine, common: Vec::new() };
+        // If all normals are within half the crease angle of their average, each pair is within the crease angle.
+        let half_cosine = (crease.to_radians() / 2.0).cos() + COSINE_MARGIN;
+        let common = |point: u32| {
+            let corners = around.of(point);
+            let average = normals.average(point, |_| true);
+            let is_near = |corner: &u32| {
+                let facet = &facets[*corner as usize / 3];
+                facet.normal == Vec3::ZERO || facet.normal.dot(average) >= half_cosine
+            };
+            // A hub's normal is the average of all its faces.
+            let is_common = corners.len() > MAX_PAIRED_FACES || corners.iter().all(is_near);
+            is_common.then_some(average)
+        };
+        normals.common = (0..around.n_points()).into_par_iter().map(common).collect();
         normals
     }
 
@@ -95,7 +110,7 @@ impl<'a> CornerNormals<'a> {
     /// crease angle.
     fn at(&self, point: u32, own: Vec3) -> Vec3 {
         let near = |n: Vec3| n.dot(own) >= self.min_cosine;
-        let normal = self.hubs.get(&point).copied().unwrap_or_else(|| self.average(point, near));
+        let normal = self.common[point as usize].unwrap_or_else(|| self.average(point, near));
         if near(normal) { normal } else { own }
     }
 
@@ -164,5 +179,59 @@ impl FacesAround {
 
     fn of(&self, point: u32) -> &[u32] {
         &self.corners[self.first[point as usize] as usize..self.first[point as usize + 1] as usize]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the normals as their definition states them, corner by corner.
+    fn plain_normals(positions: &[Vec3], faces: &[[u32; 3]], smooth: &[bool], crease: f32) -> Vec<[Vec3; 3]> {
+        let at = |ix: u32| positions[ix as usize];
+        let facets: Vec<Facet> = (faces.iter().zip(smooth))
+            .map(|(face, smooth)| if *smooth { facet(face.map(|ix| at(ix).as_dvec3())) } else { Facet::default() })
+            .collect();
+        let normal = |point: Vec3, own: Vec3| {
+            let near = |n: Vec3| n.dot(own) >= crease.to_radians().cos();
+            let mut sum = Vec3::ZERO;
+            for (face, facet) in faces.iter().zip(&facets).filter(|(_, facet)| near(facet.normal)) {
+                for (_, angle) in face.iter().zip(facet.angles).filter(|(ix, _)| at(**ix) == point) {
+                    sum += facet.normal * angle;
+                }
+            }
+            let normal = sum.normalize_or_zero();
+            if near(normal) { normal } else { own }
+        };
+        let normals = |(face, facet): (&[u32; 3], &Facet)| {
+            let normals = face.map(|ix| normal(at(ix), facet.normal));
+            let is_flat = normals.iter().all(|n| n.dot(facet.normal) > 1.0 - FLAT_TOLERANCE);
+            if is_flat || facet.normal == Vec3::ZERO { [Vec3::ZERO; 3] } else { normals }
+        };
+        faces.iter().zip(&facets).map(normals).collect()
+    }
+
+    #[test]
+    fn normals_are_those_of_the_definition_bit_for_bit() {
+        // A rough height field, whose points some faces have by another index, with faces without area.
+        let n = 12;
+        let height = |ix: u32| (ix.wrapping_mul(2_654_435_761) >> 16) as f32 / 65_536.0;
+        for roughness in [0.0, 0.1, 0.6, 3.0] {
+            let mut positions: Vec<Vec3> =
+                (0..n * n).map(|ix| Vec3::new((ix % n) as f32, roughness * height(ix), (ix / n) as f32)).collect();
+            positions.extend_from_within(..);
+            let corner = |x: u32, y: u32| y * n + x + if (x + y) % 3 == 0 { n * n } else { 0 };
+            let mut faces = Vec::new();
+            for (x, y) in (0..n - 1).flat_map(|y| (0..n - 1).map(move |x| (x, y))) {
+                faces.push([corner(x, y), corner(x, y + 1), corner(x + 1, y)]);
+                faces.push([y * n + x + 1, corner(x, y + 1), corner(x + 1, y + 1)]);
+            }
+            faces.push([3, 3, 4]);
+            let smooth: Vec<bool> = (0..faces.len()).map(|ix| ix % 17 != 5).collect();
+            for crease in [0.0, 10.0, 40.0, 90.0, 180.0] {
+                let computed = crease_normals(&positions, &faces, &smooth, crease);
+                assert_eq!(computed, plain_normals(&positions, &faces, &smooth, crease), "{roughness}, {crease}");
+            }
+        }
     }
 }

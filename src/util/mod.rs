@@ -1,10 +1,11 @@
 //! Helpers that know nothing about rays: names of an option's variants, text that is safe to print, the host's
-//! memory.
+//! memory, progress.
 
 #[macro_use]
 mod named_enum;
 
 pub mod memory;
+pub mod progress;
 pub mod text;
 
 pub use self::named_enum::UnknownWord;

@@ -31,6 +31,7 @@ use crate::{
         kdtree::{BuildOptions, KdTree},
     },
     scene::Scene,
+    util::progress::Progress,
 };
 
 /// A scene and its acceleration structure.
@@ -72,8 +73,20 @@ impl World {
     /// # Errors
     /// The scene has a triangle without a material.
     pub fn with_accel(scene: FlatScene, options: &AccelOptions) -> Result<Self, Mismatch> {
+        Self::with_accel_observed(scene, options, &Progress::default())
+    }
+
+    /// Does what [`World::with_accel`] does, and reports the progress of a kd-tree's build.
+    ///
+    /// # Errors
+    /// The scene has a triangle without a material.
+    pub fn with_accel_observed(
+        scene: FlatScene,
+        options: &AccelOptions,
+        progress: &Progress,
+    ) -> Result<Self, Mismatch> {
         mismatch::check_materials(&scene)?;
-        let accel = Accel::new(&scene.triangles, options);
+        let accel = Accel::new_observed(&scene.triangles, options, progress);
         Ok(Self(Arc::new(Parts { scene, accel, accel_options: options.clone(), emitters: OnceLock::new() })))
     }
 

@@ -11,6 +11,7 @@ mod mesh_files;
 mod obj;
 mod path;
 mod placed;
+mod progress;
 mod replaced;
 mod standard;
 #[path = "../support/mod.rs"]

@@ -15,6 +15,7 @@ use super::{
 use crate::{
     accel::bounds::{Bounds, Reference, is_finite},
     layout::Triangle,
+    util::progress::{Meter, Progress, Work},
 };
 
 /// The most references of a cell that one thread builds, with all cells below it. This takes some 5 ms.
@@ -34,6 +35,11 @@ impl KdTree {
     /// The same triangles and options give the same tree on any number of threads. The build takes O(n log n) time,
     /// and some 200 bytes a triangle while it runs.
     pub fn build(triangles: &[Triangle], options: &BuildOptions) -> KdTree {
+        Self::build_observed(triangles, options, &Progress::default())
+    }
+
+    /// Does what [`KdTree::build`] does, and reports its progress.
+    pub fn build_observed(triangles: &[Triangle], options: &BuildOptions, progress: &Progress) -> KdTree {
         let exact_bounds = Bounds::of_all(triangles);
         let margin = exact_bounds.margin();
         let references: Vec<Reference> = (0..triangles.len() as u32)
@@ -45,7 +51,10 @@ impl KdTree {
         let n = references.len() as u64;
         let budget = (n * u64::from(options.max_references_per_triangle) + MIN_BUDGET).min(MAX_BUDGET.max(n));
         let cell = BuildCell { bounds, level: 0, budget };
-        let mut parts = flatten(grow(Input { triangles, options, margin }, references, cell), bounds);
+        // The budget of a cell is its share of the triangles.
+        let meter = progress.begin(Work::Building, budget);
+        let input = Input { triangles, options, margin };
+        let mut parts = flatten(grow((input, &meter), references, cell), bounds);
         parts.leaf_planes = planes_of(triangles, &parts.leaf_triangles);
         let mut tree = KdTree { parts, n_triangles: triangles.len() };
         if options.slabs {
@@ -56,16 +65,22 @@ impl KdTree {
 }
 
 /// Builds the node of a cell and all nodes below it.
-fn grow(input: Input, references: Vec<Reference>, cell: BuildCell) -> UpperTree {
+fn grow((input, meter): (Input, &Meter), references: Vec<Reference>, cell: BuildCell) -> UpperTree {
+    let subtree = |references| {
+        let subtree = subtree::build(input, references, cell);
+        meter.add(cell.budget);
+        UpperTree::Subtree(subtree)
+    };
     if references.len() <= TASK_REFERENCES {
-        return UpperTree::Subtree(subtree::build(input, references, cell));
+        return subtree(references);
     }
     let Some((split, cells)) = cell.split(&references, input.options, &mut Search::default()) else {
         // The cell becomes a leaf. This is rare: nearly all of its triangles coincide, or a split exceeds the budget.
-        return UpperTree::Subtree(subtree::build(input, references, cell));
+        return subtree(references);
     };
     let [below, above] = partition(input, references, &cell.bounds, &split);
-    let (below, above) = rayon::join(|| grow(input, below, cells[0]), || grow(input, above, cells[1]));
+    let (below, above) =
+        rayon::join(|| grow((input, meter), below, cells[0]), || grow((input, meter), above, cells[1]));
     UpperTree::Split { axis: split.axis, position: split.position, children: Box::new([below, above]) }
 }
 

@@ -16,7 +16,8 @@ use kdray::{
     frame::{Profile, Watcher},
     gpu::{Context, ContextOptions, GpuError},
     output,
-    scene::{Camera, CameraPath, Scene},
+    scene::{Camera, CameraPath, LoadOptions, Scene},
+    util::progress::Work,
 };
 use tracing::info_span;
 
@@ -63,6 +64,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let accel = engine.choose_accel(n_triangles, &workload);
     build::check_memory(accel, n_triangles)?;
     let building = build::building(accel, n_triangles);
+    let engine = engine.with_progress(progress.observer(&building, &[Work::Building]));
     let build = || info_span!("build tree").in_scope(|| engine.build(scene, &workload));
     let (built, build_ms) = progress.stage(&building, build);
     let Built { world, accel } = built.map_err(GpuError::from)?;
@@ -112,10 +114,11 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
 /// Loads the scene. Returns it and the loading time in milliseconds. Warns if the scene has no light.
 fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError> {
     let loading = format!("loading {}", args.scene.display());
-    let (scene, load_ms) = progress.stage(&loading, || {
-        info_span!("load scene")
-            .in_scope(|| Scene::load_with(&args.scene, &args.load.options_for(&args.picture, &args.look)))
-    });
+    let observer = progress.observer(&loading, &[Work::Reading, Work::Images]);
+    let options = args.load.options_for(&args.picture, &args.look);
+    let options = LoadOptions { progress: observer, ..options };
+    let (scene, load_ms) =
+        progress.stage(&loading, || info_span!("load scene").in_scope(|| Scene::load_with(&args.scene, &options)));
     let scene = scene?;
     scene.warn_of_missing_light(&args.scene, args.picture.options(&scene.defaults).integrator);
     args.look.note_up(&args.scene, &scene).into_iter().for_each(|note| progress.note(&note));

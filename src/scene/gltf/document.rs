@@ -18,6 +18,7 @@ use super::{
     meshopt,
     uri::{Uri, is_data},
 };
+use crate::util::progress::Progress;
 use crate::{
     scene::{error::Checked, needs::require_for_bytes, outside::Access, read::read_bytes},
     util::{memory::require, text::one_line},
@@ -69,6 +70,8 @@ pub(super) struct Document {
     /// Contents of the compressed buffer views, by the view's index.
     decoded: HashMap<usize, Vec<u8>>,
     notes: RefCell<Vec<(&'static str, Vec<String>)>>,
+    /// Who is told of the progress of loading.
+    pub progress: Progress,
 }
 
 /// A part of a file or of the data in a URI. Several buffers can share a file.
@@ -108,8 +111,9 @@ impl Document {
             None => MorphTargets::default(),
         };
         let (buffers, files, replaced) = (Vec::new(), RefCell::default(), RefCell::default());
-        let (decoded, notes) = (HashMap::new(), RefCell::default());
-        let mut document = Self { root, morph_targets, path, access, buffers, files, replaced, decoded, notes };
+        let (decoded, notes, progress) = (HashMap::new(), RefCell::default(), Progress::default());
+        let mut document =
+            Self { root, morph_targets, path, access, buffers, files, replaced, decoded, notes, progress };
         document.check_version()?;
         document.check_extensions()?;
         let chunk = chunk.map(|part| Buffer { content: Rc::new(bytes), part });

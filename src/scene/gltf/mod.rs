@@ -43,6 +43,7 @@ use super::{
     preset::MaterialChoice,
     standard::{Lacks, SAMPLES},
 };
+use crate::util::progress::Work;
 
 /// Loads a glTF file as a scene with its lights and cameras.
 pub(super) fn load(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<(Scene, Lacks), SceneError> {
@@ -96,7 +97,8 @@ pub(super) fn load_meshes(
 }
 
 fn read(path: &Path, bytes: Vec<u8>, options: &LoadOptions) -> Result<Document, SceneError> {
-    let document = Document::read(path, bytes, Access::of(options)).map_err(|what| SceneError::file(path, what))?;
+    let mut document = Document::read(path, bytes, Access::of(options)).map_err(|what| SceneError::file(path, what))?;
+    document.progress = options.progress.clone();
     for ix in 0..document.root.animations.len() {
         let name = document.root.animations[ix].name.clone();
         document.note("animations, which are not shown", name.unwrap_or_else(|| format!("animations[{ix}]")));
@@ -140,7 +142,9 @@ impl<'a> Loader<'a> {
     fn load(mut self, path: &Path) -> Checked<Scene> {
         let mut scene = Scene::empty(path);
         let mut n_placed = self.before.n_triangles;
+        let meter = self.document.progress.begin(Work::Reading, self.nodes.shown.len() as u64);
         for &ix in &self.nodes.shown {
+            meter.add(1);
             let Some(instance) = self.instance(ix)? else { continue };
             let mesh = &self.meshes[instance.mesh_ix];
             n_placed += mesh.faces.len() as u64;

@@ -126,7 +126,7 @@ impl<'a> Textures<'a> {
     pub fn decode(self, materials: &mut [Material], n_pixels: u64) -> Vec<Image> {
         let names: Vec<_> = self.encoded.iter().map(|image| image.name.clone()).collect();
         let (mut images, mut new_ix) = (Vec::new(), Vec::new());
-        for (name, decoded) in names.into_iter().zip(decode_all(self.encoded, n_pixels)) {
+        for (name, decoded) in names.into_iter().zip(decode_all(self.encoded, n_pixels, &self.document.progress)) {
             match decoded {
                 Ok(image) => {
                     new_ix.push(Some(images.len() as u32));

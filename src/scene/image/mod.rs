@@ -22,7 +22,11 @@ use rayon::prelude::*;
 
 pub(super) use self::{facts::Examined, heights::normals_of_heights};
 use super::{error::Checked, texture::Image};
-use crate::util::{memory, text::one_line};
+use crate::util::{
+    memory,
+    progress::{Progress, Work},
+    text::one_line,
+};
 
 /// The most pixels along a side of an image, the limit of many GPUs for their own textures. An image has thus at most
 /// 2^28 pixels.
@@ -76,12 +80,15 @@ impl Header {
 ///
 /// An error is one line that begins with the image's name. If all images together, with `n_pixels` that the scene has
 /// already, are too large, no image is decoded.
-pub(super) fn decode_all(images: Vec<Encoded>, n_pixels: u64) -> Vec<Checked<Image>> {
+pub(super) fn decode_all(images: Vec<Encoded>, n_pixels: u64, progress: &Progress) -> Vec<Checked<Image>> {
+    let meter = progress.begin(Work::Images, images.len() as u64);
     let headers: Vec<_> = images.par_iter().map(|image| named(&image.name, || header_of(image))).collect();
     let sum = check_sum(headers.iter().flatten(), n_pixels);
     let decode_one = |(image, header): (Encoded, Checked<Header>)| {
-        let header = header?;
-        named(&image.name, || sum.clone().and_then(|()| decode(&image, &header)))
+        let decoded =
+            header.and_then(|header| named(&image.name, || sum.clone().and_then(|()| decode(&image, &header))));
+        meter.add(1);
+        decoded
     };
     images.into_par_iter().zip(headers).map(decode_one).collect()
 }

@@ -14,7 +14,7 @@ fn encoded(image: impl Into<DynamicImage>, format: ImageFormat) -> Vec<u8> {
 }
 
 fn decoded(name: &str, bytes: Vec<u8>) -> Checked<Image> {
-    decode_all(vec![Encoded { name: name.to_owned(), bytes: bytes.into() }], 0).remove(0)
+    decode_all(vec![Encoded { name: name.to_owned(), bytes: bytes.into() }], 0, &Progress::default()).remove(0)
 }
 
 fn bytes_of(image: &Image) -> &[[u8; 4]] {
@@ -225,7 +225,7 @@ fn a_bomb_is_refused_by_its_header() {
 fn an_error_is_one_line_and_leaves_the_others() {
     let good = Encoded { name: "good".to_owned(), bytes: encoded(with_alpha(), ImageFormat::Png).into() };
     let bad = Encoded { name: "b\nad".to_owned(), bytes: b"GIF89a"[..].into() };
-    let results = decode_all(vec![bad, good], 0);
+    let results = decode_all(vec![bad, good], 0, &Progress::default());
     let error = results[0].as_ref().unwrap_err();
     assert_eq!(error, "image `b ad`: is none of PNG, JPEG, TGA, BMP, WebP, HDR, EXR and DDS");
     assert_eq!(bytes_of(results[1].as_ref().unwrap()), pixels(&with_alpha()));

@@ -27,6 +27,17 @@ pub enum FaceShading {
     Flat,
 }
 
+impl FaceShading {
+    /// Returns the shading of a face. `is_flat`: whether it comes after `s off`.
+    pub fn of(has_normals: bool, is_flat: bool) -> Self {
+        match (has_normals, is_flat) {
+            (true, _) => Self::Normals,
+            (false, true) => Self::Flat,
+            (false, false) => Self::Smooth,
+        }
+    }
+}
+
 /// What the faces of a group have in common.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FaceKind {
@@ -295,52 +306,25 @@ impl Cleaner {
         Ok(())
     }
 
-    /// Counts one more element of the keyword, and returns the text to which it is to be appended.
-    pub fn element(&mut self, keyword: &str) -> &mut String {
-        self.seen.add(keyword);
-        match keyword {
-            "v" => &mut self.positions,
-            "vt" => &mut self.texcoords,
-            _ => &mut self.normals,
-        }
-    }
-
-    /// Returns the numbers of positions, of texture coordinates and of normals so far.
-    pub fn seen(&self) -> [usize; 3] {
-        let Counts { positions, texcoords, normals } = self.seen;
-        [positions, texcoords, normals]
+    /// Returns whether the next faces without normals are flat.
+    pub fn is_flat(&self) -> bool {
+        self.flat
     }
 
     /// Adds a face. It has three or more corners, each of the form `v`, `v/vt`, `v//vn` or `v/vt/vn`.
     fn face<'a>(&mut self, line: usize, words: impl Iterator<Item = &'a str>) -> Checked<()> {
-        self.begin_face();
+        self.corners.clear();
         for word in words {
             let corner = self.corner(line, word)?;
             self.corners.push(corner);
         }
-        self.end_face()
-    }
-
-    /// Returns the empty list of the next face's corners.
-    pub fn begin_face(&mut self) -> &mut Vec<Corner> {
-        self.corners.clear();
-        &mut self.corners
-    }
-
-    /// Adds the face of the listed corners.
-    pub fn end_face(&mut self) -> Checked<()> {
         if self.corners.len() < 3 {
             return Err(format!("a face of {} corners: it needs 3 or more", self.corners.len()));
         }
         self.out.size.n_triangles += self.corners.len() as u64 - 2;
         let has_normals = self.corners.iter().all(|(.., normal)| normal.is_some());
         let has_uvs = self.corners.iter().all(|(_, texcoord, _)| texcoord.is_some());
-        let shading = match (has_normals, self.flat) {
-            (true, _) => FaceShading::Normals,
-            (false, true) => FaceShading::Flat,
-            (false, false) => FaceShading::Smooth,
-        };
-        let kind = FaceKind { shading, has_uvs };
+        let kind = FaceKind { shading: FaceShading::of(has_normals, self.flat), has_uvs };
         self.out.size.attributes.n_uv_sets |= u64::from(has_uvs);
         if self.kind != Some(kind) {
             push(&mut self.faces, format_args!("g {}\n", kind.name()));

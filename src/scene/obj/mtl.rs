@@ -70,7 +70,7 @@ pub fn load_libraries(
             let warn = |what: &str| tracing::warn!("{}:{line}: {what}", obj.display());
             match file {
                 Err(what) => warn(&format!("mtllib {}", what.escape_debug())),
-                Ok(NamedFile { path, .. }) if !path.exists() => {
+                Ok(NamedFile { path, .. }) if !path.is_file() => {
                     warn(&format!("{} does not exist: its materials become the default one", shown(&path)));
                 }
                 Ok(NamedFile { path, is_other_case }) => {

@@ -3,19 +3,24 @@
 //! MeshLab names the image of the surface. Coordinates are taken as they are: the format states neither a unit nor an
 //! axis that points up.
 
+mod quick;
 mod vertex;
 
 use std::{
     fs,
-    io::BufReader,
+    io::{self, BufRead, BufReader, Read},
     path::{Path, PathBuf},
 };
 
 use glam::{DVec3, Vec2};
+use rayon::prelude::*;
 use serde::Deserialize;
 use serde_ply::{DeserializeError, ElementDef, PlyFormat, PlyHeader, PlyProperty, PlyReader, PropertyType, ScalarType};
 
-use self::vertex::{Vertices, upper_left};
+use self::{
+    quick::quick_triangles,
+    vertex::{Vertices, upper_left},
+};
 use super::{
     error::Checked,
     image_files::{Images, View},
@@ -28,6 +33,7 @@ use super::{
     smooth::{Shading, smooth_normals},
     texture::Texture,
 };
+use crate::util::progress::{Meter, Progress, Work};
 
 /// Polygon as the indices of its vertices. Writers use either of the two names.
 #[derive(Deserialize)]
@@ -56,10 +62,60 @@ struct Skipped {}
 /// The names of a face's list of indices.
 const INDICES: [&str; 2] = ["vertex_indices", "vertex_index"];
 
+/// The rest of a file's content. It reports the bytes that have been read.
+struct Counted<'a> {
+    rest: &'a [u8],
+    meter: Meter<'a>,
+    n_unreported: usize,
+}
+
+impl<'a> Counted<'a> {
+    /// Number of bytes between two reports.
+    const REPORTED_BYTES: usize = 1 << 20;
+
+    fn new(bytes: &'a [u8], progress: &'a Progress) -> Self {
+        Self { rest: bytes, meter: progress.begin(Work::Reading, bytes.len() as u64), n_unreported: 0 }
+    }
+
+    fn count(&mut self, n: usize) {
+        self.n_unreported += n;
+        if self.n_unreported >= Self::REPORTED_BYTES || self.rest.is_empty() {
+            self.meter.add(std::mem::take(&mut self.n_unreported) as u64);
+        }
+    }
+}
+
+impl Read for Counted<'_> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let n = self.rest.read(out)?;
+        self.count(n);
+        Ok(n)
+    }
+
+    fn read_exact(&mut self, out: &mut [u8]) -> io::Result<()> {
+        self.rest.read_exact(out)?;
+        self.count(out.len());
+        Ok(())
+    }
+}
+
+impl BufRead for Counted<'_> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        Ok(self.rest)
+    }
+
+    fn consume(&mut self, n: usize) {
+        self.rest.consume(n);
+        self.count(n);
+    }
+}
+
 /// The elements of a file.
 #[derive(Default)]
 struct Elements {
     vertices: Vertices,
+    /// All faces, if they were read in the quick way.
+    triangles: Vec<[u32; 3]>,
     polygons: Vec<Polygon>,
     strips: Vec<Strips>,
 }
@@ -67,11 +123,12 @@ struct Elements {
 /// Makes a mesh of a file's content, and reads the images that it names. Its faces have the slot of their image.
 pub(super) fn parse_ply(path: &Path, bytes: &[u8], loading: &mut Loading) -> Checked<Loaded> {
     let &mut Loading { shading, origin, n_loaded, access, ref mut images } = loading;
-    let mut reader = PlyReader::from_reader(bytes).map_err(|error| format!("is no PLY file: {}", text(&error)))?;
+    let mut reader = PlyReader::from_reader(Counted::new(bytes, images.progress()))
+        .map_err(|error| format!("is no PLY file: {}", text(&error)))?;
     let header = reader.header().clone();
     check(&header.elem_defs)?;
     check_counts(&header, bytes.len() as u64)?;
-    let elements = read(&mut reader, &header.elem_defs, origin)?;
+    let elements = read(&mut reader, (&header, bytes), origin)?;
     require_for_mesh(n_loaded as u64, &elements.size())?;
     let names: Vec<&str> = texture_files(&header.comments).collect();
     let uses_crease = shading.smooth && elements.vertices.normals.is_empty();
@@ -88,7 +145,7 @@ impl Elements {
         let has_uvs = !self.vertices.uvs.is_empty() || self.polygons.iter().any(|p| !p.texcoord.is_empty());
         let has_colours = !self.vertices.colours.is_empty();
         MeshSize {
-            n_triangles: n_corners.map(|n| n.saturating_sub(2) as u64).sum(),
+            n_triangles: self.triangles.len() as u64 + n_corners.map(|n| n.saturating_sub(2) as u64).sum::<u64>(),
             // The points are there already.
             n_points: 0,
             attributes: Attributes { n_uv_sets: u64::from(has_uvs), has_colours, has_tangents: false },
@@ -136,13 +193,16 @@ fn least_bytes(property: &PropertyType) -> u64 {
 }
 
 /// Reads the elements in the order of the file.
-fn read(reader: &mut PlyReader<&[u8]>, elements: &[ElementDef], origin: DVec3) -> Checked<Elements> {
+fn read(reader: &mut PlyReader<Counted>, (header, bytes): (&PlyHeader, &[u8]), origin: DVec3) -> Checked<Elements> {
     let mut found = Elements::default();
-    for element in elements {
+    for element in &header.elem_defs {
         let failed = |error| format!("element `{}`: {}", element.name.escape_debug(), text(&error));
         match element.name.as_str() {
             "vertex" => found.vertices = Vertices::read(reader, element, origin)?,
-            "face" => found.polygons = reader.next_element().map_err(failed)?,
+            "face" => match quick_triangles(bytes, header) {
+                Some(triangles) => found.triangles = triangles,
+                None => found.polygons = reader.next_element().map_err(failed)?,
+            },
             "tristrips" => found.strips = reader.next_element().map_err(failed)?,
             _ => drop(reader.next_element::<Vec<Skipped>>().map_err(failed)?),
         }
@@ -206,11 +266,14 @@ fn check(elements: &[ElementDef]) -> Checked<()> {
 
 /// Makes the mesh. `n_images`: the number of images that polygons can show.
 fn mesh(elements: Elements, n_images: usize, shading: Shading) -> Checked<Mesh> {
-    let Elements { vertices, polygons, strips } = elements;
-    let mut mesh = Mesh::default();
+    let Elements { vertices, triangles, polygons, strips } = elements;
+    let mut mesh = Mesh { slots: vec![0; triangles.len()], faces: triangles, ..Mesh::default() };
     let has_own_uvs = |polygon: &Polygon| polygon.texcoord.len() == 2 * polygon.vertex_indices.len();
     let has_uvs = !vertices.uvs.is_empty() || polygons.iter().any(|p| !p.texcoord.is_empty() && has_own_uvs(p));
     let uv_of_vertex = |ix: u32| vertices.uvs.get(ix as usize).copied().unwrap_or(Vec2::ZERO);
+    if !vertices.uvs.is_empty() {
+        mesh.uvs[0] = mesh.faces.par_iter().map(|face| face.map(uv_of_vertex)).collect();
+    }
     let mut triangulator = Triangulator::default();
     let mut corners = Vec::new();
     for (polygon_ix, polygon) in polygons.iter().enumerate() {
@@ -249,10 +312,10 @@ fn mesh(elements: Elements, n_images: usize, shading: Shading) -> Checked<Mesh> 
         mesh.slots.fill(0);
     }
     if !vertices.colours.is_empty() {
-        mesh.colours = mesh.faces.iter().map(|face| face.map(|ix| vertices.colours[ix as usize])).collect();
+        mesh.colours = mesh.faces.par_iter().map(|face| face.map(|ix| vertices.colours[ix as usize])).collect();
     }
     mesh.normals = match shading.smooth && !vertices.normals.is_empty() {
-        true => mesh.faces.iter().map(|face| face.map(|ix| vertices.normals[ix as usize])).collect(),
+        true => mesh.faces.par_iter().map(|face| face.map(|ix| vertices.normals[ix as usize])).collect(),
         false => smooth_normals(&vertices.positions, &mesh.faces, shading),
     };
     mesh.positions = vertices.positions;

@@ -9,6 +9,7 @@ use serde::{
 };
 use serde_ply::{ElementDef, PlyReader, PropertyType, ScalarType};
 
+use super::Counted;
 use super::text;
 use crate::scene::{error::Checked, texture::linear_of_srgb};
 
@@ -112,7 +113,7 @@ impl Vertices {
     }
 
     /// Reads the vertices, the element that comes next in the file. `origin` is subtracted from their coordinates.
-    pub fn read(reader: &mut PlyReader<&[u8]>, element: &ElementDef, origin: DVec3) -> Checked<Self> {
+    pub fn read(reader: &mut PlyReader<Counted>, element: &ElementDef, origin: DVec3) -> Checked<Self> {
         let failed = |error| format!("element `vertex`: {}", text(&error));
         let has = |name: &&str| element.has_property(name);
         let has_normals = ["nx", "ny", "nz"].iter().all(has);
