@@ -1,7 +1,7 @@
 // Gaps: the parts of a triangle through which rays pass, since the opacity there is too low. Rays of every kind pass
 // through the gaps of a cut-out, a material that is either opaque or not there. Shadow rays also pass through the gaps
-// of a veil, a see-through material. Kernels that define RANDOM_OPACITY trace paths, whose rays of all kinds pass through
-// see-through materials at random, as often as the opacity says. Twin of src/reference/cutout.rs.
+// of a veil, a see-through material. Kernels that define RANDOM_OPACITY trace paths, whose rays of all kinds pass
+// through see-through materials at random, as often as the opacity says. Twin of src/reference/cutout.rs.
 //
 // Needs nothing: it includes texture.glsl. Provides `CUTOUTS`, `SHADOW_GAPS`, `opacity_at` and `is_gap`.
 #ifndef KDRAY_CUTOUT

@@ -574,7 +574,8 @@ struct PathState {
     float density;
 };
 
-// A segment from a hit of a path to a sampled light, 48 bytes. If nothing is in between, its light is added to the path.
+// A segment from a hit of a path to a sampled light, 48 bytes. If nothing is in between, its light is added to the
+// path.
 //
 // - `origin`: world units.
 // - `state`: `SEGMENT_NONE`, `SEGMENT_WAITS`, or the mark of a segment whose traversal has stalled.
@@ -659,11 +660,10 @@ struct Hit {
 //   (`CONSTANT_ORTHOGRAPHIC`).
 // - The rest is for frames of paths. `samples_log2`: the frame draws `2^samples_log2` samples of each pixel.
 //   `first_sample`: the index of the first of them, a multiple of their number. `range_begin`: the index of the first
-//   sample of the picture, which can be one part of all samples. `pixel_filter`:
-//   `FILTER_BOX` and its like. `clamp`: the most light that a path adds to its pixel after its first hit, in any colour
-//   (radiance; infinity: any amount). `aperture`: radius of the lens (world units; 0: everything is sharp). `focus`:
-//   distance of what is sharp from the eye, along `forward` (world units). `focuses_on_target`: 1 if that is the distance
-//   of the camera's target.
+//   sample of the picture, which can be one part of all samples. `pixel_filter`: `FILTER_BOX` and its like. `clamp`:
+//   the most light that a path adds to its pixel after its first hit, in any colour (radiance; infinity: any amount).
+//   `aperture`: radius of the lens (world units; 0: everything is sharp). `focus`: distance of what is sharp from the
+//   eye, along `forward` (world units). `focuses_on_target`: 1 if that is the distance of the camera's target.
 struct Frame {
     mat4 clip_from_world;
     vec3 eye;
@@ -794,8 +794,8 @@ struct Feature {
 //   triangles' texture coordinates, the tangents and colours of their corners, the materials' maps and the textures
 //   begin. `NO_WORDS`: the scene has none of them.
 // - `background`: radiance of the environment if it has no map.
-// - `ambient`, `ground_ambient`: radiance that neither the camera nor mirrors see, from above and from below. `up_axis`:
-//   index of the coordinate that points up, 1 or 2.
+// - `ambient`, `ground_ambient`: radiance that neither the camera nor mirrors see, from above and from below.
+//   `up_axis`: index of the coordinate that points up, 1 or 2.
 // - `environment_probability`: with which the environment is picked as a light.
 // - `n_emitters`, `emitters_begin`: number of entries of `Emitter`, and index in `texture_words` of the first one.
 // - `first_triangle_emitter`, `n_triangle_emitters`: index and number of the entries of triangles.
@@ -1165,8 +1165,8 @@ struct GridSort {
 // A row of counts, then `STALLED_RAY_ROWS` rows of four words for each slot (stalls.glsl).
 #define BIND_STALLS 32u
 
-// Bindings that only frames of paths have. `rays`, `hits` and the next two have an element for each path of a batch: the
-// first samples of all pixels, then the second ones, and so on.
+// Bindings that only frames of paths have. `rays`, `hits` and the next two have an element for each path of a batch:
+// the first samples of all pixels, then the second ones, and so on.
 
 // One `PathState` for each path.
 #define BIND_PATH_STATES 33u

@@ -1,13 +1,13 @@
 // Random numbers of a path: Sobol points, scrambled by Owen's method. Twin of src/reference/sampler.rs.
 //
 // The numbers depend on nothing but the pixel of the whole picture, the index of the sample and the number's place in
-// the path. So crops, tiles and batches get the same numbers as the whole picture. Numbers come in pairs. For each pair,
-// the first 2^n samples of a pixel are spread evenly: every rectangle of area 2^-n, of any shape whose sides are powers
-// of 1/2, has one of them.
+// the path. So crops, tiles and batches get the same numbers as the whole picture. Numbers come in pairs. For each
+// pair, the first 2^n samples of a pixel are spread evenly: every rectangle of area 2^-n, of any shape whose sides are
+// powers of 1/2, has one of them.
 //
-// Each pair takes the first two dimensions of the Sobol sequence in an order of its own, which is shuffled and scrambled
-// by hashes (Burley: Practical Hash-based Owen Scrambling, JCGT 2020; the hash of bits is by Vegdahl: Building a Better
-// LK Hash, 2021). Needs nothing. Provides `SampleKey`, `sample_key` and `random_pair`.
+// Each pair takes the first two dimensions of the Sobol sequence in an order of its own, which is shuffled and
+// scrambled by hashes (Burley: Practical Hash-based Owen Scrambling, JCGT 2020; the hash of bits is by Vegdahl:
+// Building a Better LK Hash, 2021). Needs nothing. Provides `SampleKey`, `sample_key` and `random_pair`.
 #ifndef KDRAY_SAMPLER
 #define KDRAY_SAMPLER
 
@@ -42,8 +42,8 @@ uint flipped_by_lower_bits(uint x, uint seed) {
     return x ^ (x * 0x53a22864u);
 }
 
-// The second Sobol coordinate of a point of this index, with its bits reversed. Its digits are those of the index, times
-// Pascal's triangle modulo 2.
+// The second Sobol coordinate of a point of this index, with its bits reversed. Its digits are those of the index,
+// times Pascal's triangle modulo 2.
 uint second_coordinate_reversed(uint x) {
     x ^= (x >> 1) & 0x55555555u;
     x ^= (x >> 2) & 0x33333333u;

@@ -75,8 +75,8 @@ impl Pixels {
     }
 
     /// Returns the bytes that a pixel of a frame of paths takes for a picture of `n_samples` samples without a noise
-    /// filter: the mean, the sums, and the colour for display. The memory of the paths themselves does not grow with the
-    /// picture.
+    /// filter: the mean, the sums, and the colour for display. The memory of the paths themselves does not grow with
+    /// the picture.
     pub fn bytes_per_pixel_of_paths(n_samples: u32) -> u64 {
         let frames = n_samples >> MOST_SAMPLES_LOG2;
         // The sums before the last frame, one for each bit of their number, and that of the last frame.

@@ -7,8 +7,8 @@ use crate::{
     layout::{Hit, PathRay, PathState, SCAN_GROUP_SIZE, Segment},
 };
 
-/// What a batch of paths has beside the buffers of [`Queue`], in which each path has one ray. A clone is a second handle
-/// to the same buffers.
+/// What a batch of paths has beside the buffers of [`Queue`], in which each path has one ray. A clone is a second
+/// handle to the same buffers.
 #[derive(Clone)]
 pub struct PathQueue {
     /// One for each path, as in the next buffer.

@@ -52,8 +52,8 @@ pub struct PictureArgs {
     /// --focus is blurred [default: 0, everything is sharp]
     #[arg(long, value_name = "R", value_parser = positive)]
     pub aperture: Option<f32>,
-    /// Distance from the eye, along the view, at which things are sharp, in world units; needs --aperture [default: that
-    /// of the camera's target]
+    /// Distance from the eye, along the view, at which things are sharp, in world units; needs --aperture [default:
+    /// that of the camera's target]
     #[arg(long, value_name = "D", value_parser = positive, requires = "aperture")]
     pub focus: Option<f32>,
     #[arg(long, value_name = "KIND", help = accel_help(), long_help = accel_long_help(), default_value_t)]

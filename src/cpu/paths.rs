@@ -15,8 +15,8 @@ use crate::{
     },
 };
 
-/// What the paths of a batch have beside their rays and hits, which are in a [`Queue`]. The buffers grow with the number
-/// of paths.
+/// What the paths of a batch have beside their rays and hits, which are in a [`Queue`]. The buffers grow with the
+/// number of paths.
 #[derive(Default)]
 pub struct Paths {
     pub states: Vec<PathState>,
@@ -72,7 +72,7 @@ impl Paths {
     /// Lists the paths that go on.
     pub fn compact(&mut self, depth: u32, queue: &Queue) {
         let [even, odd] = &mut self.live;
-        let (live, next) = if depth % 2 == 0 { (even, odd) } else { (odd, even) };
+        let (live, next) = if depth.is_multiple_of(2) { (even, odd) } else { (odd, even) };
         next.resize(queue.bounces[depth as usize + 1].n_rays as usize, 0);
         path_compact::path_compact(live, &queue.child_kinds, &queue.scan_blocks, next);
     }

@@ -113,8 +113,9 @@ impl Renderer {
         }
     }
 
-    /// Draws one more sample of each pixel on the current rayon pool. The first sample is at the pixel's centre. Of paths,
-    /// as many samples are drawn as [`Renderer::set_samples_per_frame`] says. The picture is the mean of all samples.
+    /// Draws one more sample of each pixel on the current rayon pool. The first sample is at the pixel's centre. Of
+    /// paths, as many samples are drawn as [`Renderer::set_samples_per_frame`] says. The picture is the mean of all
+    /// samples.
     pub fn draw_sample(&mut self) -> Profile {
         self.draw_sample_with(|_| ())
     }
@@ -155,7 +156,11 @@ impl Renderer {
     /// # Panics
     /// `log2` is too large, or the number of samples so far is no multiple.
     pub fn set_samples_per_frame(&mut self, log2: u32) {
-        assert!(log2 <= MOST_SAMPLES_LOG2 && self.n_samples % (1 << log2) == 0, "2^{log2} after {}", self.n_samples);
+        assert!(
+            log2 <= MOST_SAMPLES_LOG2 && self.n_samples.is_multiple_of(1 << log2),
+            "2^{log2} after {}",
+            self.n_samples
+        );
         self.frame.samples_log2 = log2;
     }
 

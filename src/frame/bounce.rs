@@ -26,8 +26,8 @@ impl Bounce {
         row
     }
 
-    /// Returns the row of the first bounce of a batch of `n_paths` paths. With no paths, it is the initial row of a later
-    /// bounce, which compaction fills in.
+    /// Returns the row of the first bounce of a batch of `n_paths` paths. With no paths, it is the initial row of a
+    /// later bounce, which compaction fills in.
     pub fn of_paths(n_paths: u32, constants: &Frame) -> Self {
         let mut row = Self::of(0, constants);
         row.set_paths(n_paths, 0, constants);

@@ -20,8 +20,8 @@ pub fn sample_offset(sample_ix: u32) -> DVec2 {
 }
 
 /// Returns the base-2 logarithm of the number of samples that the next frame of paths draws, at most
-/// `MOST_SAMPLES_LOG2`, if `n_before` of `n_samples` samples are drawn. So all frames draw as many as they can, except for
-/// the last few.
+/// `MOST_SAMPLES_LOG2`, if `n_before` of `n_samples` samples are drawn. So all frames draw as many as they can, except
+/// for the last few.
 pub fn samples_log2(n_before: u32, n_samples: u32) -> u32 {
     let n_left = n_samples.saturating_sub(n_before).max(1);
     n_left.ilog2().min(n_before.trailing_zeros()).min(MOST_SAMPLES_LOG2)

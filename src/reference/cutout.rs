@@ -18,8 +18,8 @@ fn finest_at(textures: &Textures, texture_ix: u32, triangle_ix: u32, [u, v]: [f3
     sample_texture(&textures.texels, map, textures.uv_at(triangle_ix, uv_set_of(map), u, v), 0.0)
 }
 
-/// The opacity at a point of a triangle, 0 to 1, by the largest levels of its textures. `opacity`: that of the material.
-/// `at`: barycentric weights of the second and the third corner.
+/// The opacity at a point of a triangle, 0 to 1, by the largest levels of its textures. `opacity`: that of the
+/// material. `at`: barycentric weights of the second and the third corner.
 pub fn opacity_at(textures: &Textures, maps: &MaterialMaps, mut opacity: f32, triangle_ix: u32, at: [f32; 2]) -> f32 {
     if maps.flags & MAPS_CORNERS_HAVE_OPACITY != 0 {
         opacity *= textures.corner_colour_at(triangle_ix, at[0], at[1]).w;

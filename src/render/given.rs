@@ -15,7 +15,7 @@ impl Renderer {
         after: Option<TimelinePoint>,
         then: Option<TimelinePoint>,
     ) -> Result<(), GpuError> {
-        let (window, crop) = (self.options.window(), self.options.crop_or_whole());
+        let (window, crop) = (self.in_use.window(), self.in_use.crop_or_whole());
         let (width, height) = image.size();
         if crop.width() > width || crop.height() > height {
             let (value, limit) = (u64::from(crop.width().max(crop.height())), u64::from(width.min(height)));

@@ -112,7 +112,7 @@ impl Renderer {
 
     /// Whether a sample consists of the hits of primary rays only, without light.
     pub(super) fn draws_primary_rays_only(&self) -> bool {
-        self.options.features && self.needs_primary_rays_only
+        self.in_use.features && self.needs_primary_rays_only
     }
 
     /// Whether a sample is pending.
@@ -147,7 +147,7 @@ impl Renderer {
 
     /// Replaces the batches by those of `spans`, and drops a pending sample.
     fn reschedule(&mut self, spans: Vec<(u32, u32)>) -> Result<(), GpuError> {
-        let schedule = Schedule::new(&self.context, self.resources.constants(), spans, &self.options)?;
+        let schedule = Schedule::new(&self.context, self.resources.constants(), spans, &self.in_use)?;
         let resources = self.resources.with_bounces(&self.context, schedule.n_rows())?;
         self.pending = None;
         (self.resources, self.schedule) = (resources, schedule);
@@ -209,7 +209,7 @@ impl Renderer {
 
     fn begin_sample(&mut self) -> Result<PartialSample, GpuError> {
         let sample_ix = self.n_samples;
-        match self.options.integrator {
+        match self.in_use.integrator {
             Integrator::Path => self.begin_paths()?,
             // If the second sample was dropped and is drawn again, the sums contain the first sample already.
             Integrator::Whitted if sample_ix == 1 && !self.has_sums => {
@@ -234,7 +234,7 @@ impl Renderer {
         if constants.samples_log2 != samples_log2 {
             constants.samples_log2 = samples_log2;
             let spans = self.budget.spans(&constants, self.most_pixels);
-            let schedule = Schedule::new(&self.context, &constants, spans, &self.options)?;
+            let schedule = Schedule::new(&self.context, &constants, spans, &self.in_use)?;
             let mut resources = self.resources.with_bounces(&self.context, schedule.n_rows())?;
             resources.set_constants(&constants);
             (self.resources, self.schedule) = (resources, schedule);
@@ -250,7 +250,11 @@ impl Renderer {
     /// # Panics
     /// `log2` is too large, or the number of samples so far is no multiple.
     pub fn set_samples_per_frame(&mut self, log2: u32) {
-        assert!(log2 <= MOST_SAMPLES_LOG2 && self.n_samples % (1 << log2) == 0, "2^{log2} after {}", self.n_samples);
+        assert!(
+            log2 <= MOST_SAMPLES_LOG2 && self.n_samples.is_multiple_of(1 << log2),
+            "2^{log2} after {}",
+            self.n_samples
+        );
         self.samples_log2 = log2;
     }
 
@@ -258,7 +262,7 @@ impl Renderer {
     fn make_kernels_for(&mut self, constants: &Frame) -> Result<(), GpuError> {
         let is_orthographic = constants.is_orthographic == 1;
         let bindings = self.resources.bindings.with_constant(constants::ORTHOGRAPHIC, is_orthographic);
-        self.passes = FramePasses::new(&self.context, &bindings, &self.options)?;
+        self.passes = FramePasses::new(&self.context, &bindings, &self.in_use)?;
         self.resources.bindings = bindings;
         Ok(())
     }
@@ -317,7 +321,7 @@ impl Renderer {
     /// # Errors
     /// The copy fails.
     pub fn feature_at(&self, pixel: UVec2) -> Result<Option<Feature>, GpuError> {
-        if !self.options.features || self.pending.is_some() || self.n_samples == 0 {
+        if !self.in_use.features || self.pending.is_some() || self.n_samples == 0 {
             return Ok(None);
         }
         let Frame { width, height, .. } = *self.resources.constants();

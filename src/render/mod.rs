@@ -46,9 +46,9 @@ pub struct Renderer {
     world: World,
     camera: Camera,
     /// The options as the caller has set them.
-    asked: RenderOptions,
-    /// The options that are in use ([`in_use`]).
     options: RenderOptions,
+    /// The options that are in use ([`in_use`]).
+    in_use: RenderOptions,
     budget: QueueSizing,
     resources: Resources,
     passes: FramePasses,
@@ -123,8 +123,8 @@ impl Renderer {
             context,
             world: world.clone(),
             camera,
-            asked,
-            options,
+            options: asked,
+            in_use: options,
             budget,
             resources,
             passes,
@@ -197,7 +197,7 @@ impl Renderer {
     pub fn picture(&self) -> Result<Picture, GpuError> {
         let _fetching = info_span!("fetch picture").entered();
         let (pixels, n_pixels) = (&self.resources.pixels, self.resources.n_pixels());
-        let (window, crop) = (self.options.window(), self.options.crop_or_whole());
+        let (window, crop) = (self.in_use.window(), self.in_use.crop_or_whole());
         let display = pixels.pixel_display.download_first(n_pixels)?;
         Ok(Picture {
             width: crop.width(),
@@ -215,9 +215,9 @@ impl Renderer {
     /// # Errors
     /// A copy fails.
     pub fn features(&self) -> Result<Vec<Feature>, GpuError> {
-        assert!(self.options.features, "the options ask for features");
+        assert!(self.in_use.features, "the options ask for features");
         let features = self.resources.pixels.pixel_features.download_first(self.resources.n_pixels())?;
-        Ok(self.options.window().part(&features, &self.options.crop_or_whole()))
+        Ok(self.in_use.window().part(&features, &self.in_use.crop_or_whole()))
     }
 
     /// Returns the frame's buffers, with the contents that the last frame left.
@@ -255,11 +255,11 @@ impl Renderer {
         let only_primary_rays = self.draws_primary_rays_only();
         let constants = self.resources.constants();
         FrameKind {
-            n_bounces: if only_primary_rays { 1 } else { self.options.n_bounces() },
+            n_bounces: if only_primary_rays { 1 } else { self.in_use.n_bounces() },
             is_lit: !only_primary_rays,
             adds_samples: constants.n_samples > 1,
-            shows_feature: self.options.features && self.false_color.is_some(),
-            ..FrameKind::new(&self.options, constants.n_lights)
+            shows_feature: self.in_use.features && self.false_color.is_some(),
+            ..FrameKind::new(&self.in_use, constants.n_lights)
         }
     }
 
@@ -326,10 +326,10 @@ impl Renderer {
         self.update_constants(commands);
         copy_all(commands, self.schedule.first_bounces.any(), self.resources.bounces.any());
         self.resources.clear_counters(commands);
-        if self.options.features {
+        if self.in_use.features {
             commands.clear_buffer(self.resources.pixels.pixel_features.any());
         }
-        if self.options.primary == Primary::SoftwareRaster {
+        if self.in_use.primary == Primary::SoftwareRaster {
             Rasterize::reset(commands, &self.resources);
         }
         // bounces, counters, pixel_features, raster_groups

@@ -21,7 +21,7 @@ impl Renderer {
     pub(super) fn profile(&self, bounces: &[Bounce], begun_at: Instant) -> Result<Profile, GpuError> {
         let Some(timer) = &self.schedule.timer else { return Ok(Profile::default()) };
         let rows = timer.rows()?;
-        let max_depth = self.options.n_bounces();
+        let max_depth = self.in_use.n_bounces();
         let counts = device_counts(bounces, &self.resources.counters()?);
         let ends_ms = rows.iter().map(|row| row.span_ms.map(|(_, end)| end));
         let pass = |row: &TimerRow| PassTime {

@@ -35,7 +35,7 @@ impl Renderer {
 
     /// The options as the caller has set them.
     pub fn options(&self) -> &RenderOptions {
-        &self.asked
+        &self.options
     }
 
     /// Sets the picture's size, pixels, and removes its crop. If either changes, the next sample is the first of a
@@ -45,7 +45,7 @@ impl Renderer {
     /// The picture exceeds the device's limits or memory. Then nothing has changed, and a pending sample stays
     /// pending.
     pub fn resize(&mut self, width: u32, height: u32) -> Result<(), GpuError> {
-        let options = RenderOptions { width, height, crop: None, ..self.asked.clone() };
+        let options = RenderOptions { width, height, crop: None, ..self.options.clone() };
         self.remake(&options)
     }
 
@@ -58,7 +58,7 @@ impl Renderer {
     /// # Errors
     /// The part exceeds the device's limits or memory. Then nothing has changed.
     pub fn set_crop(&mut self, crop: Crop) -> Result<(), GpuError> {
-        self.remake(&RenderOptions { crop: Some(crop), ..self.asked.clone() })
+        self.remake(&RenderOptions { crop: Some(crop), ..self.options.clone() })
     }
 
     /// Sets the options of the next samples. Only kernels that depend on a changed option are created again. Samples
@@ -82,7 +82,7 @@ impl Renderer {
     /// The driver refuses a shader. Then all kernels are as before.
     #[cfg(feature = "hot-reload")]
     pub fn remake_passes(&mut self) -> Result<(), GpuError> {
-        let passes = crate::passes::FramePasses::new(&self.context, &self.resources.bindings, &self.options)?;
+        let passes = crate::passes::FramePasses::new(&self.context, &self.resources.bindings, &self.in_use)?;
         self.reset_samples();
         self.passes = passes;
         Ok(())
@@ -92,10 +92,10 @@ impl Renderer {
     /// fail.
     fn remake(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
         let (asked, options) = (options.clone(), &in_use(options));
-        if options.integrator != self.options.integrator {
+        if options.integrator != self.in_use.integrator {
             return self.replace(&asked);
         }
-        let (context, before) = (&self.context, &self.options);
+        let (context, before) = (&self.context, &self.in_use);
         let mut constants = *self.resources.constants();
         constants.set_options(options);
         let room = (!same_samples(before, options)).then(|| self.with_room(constants, options)).transpose()?;
@@ -113,7 +113,7 @@ impl Renderer {
                 (self.resources, self.schedule) = (resources, schedule);
             }
         }
-        (self.passes, self.options, self.asked) = (passes, options.clone(), asked);
+        (self.passes, self.in_use, self.options) = (passes, options.clone(), asked);
         Ok(())
     }
 
@@ -137,7 +137,7 @@ impl Renderer {
         let spans = self.budget.spans(&constants, self.most_pixels);
         let schedule = Schedule::new(&self.context, &constants, spans, options)?;
         let needs = Needs { constants: &constants, options, n_bounces: schedule.n_rows() };
-        let accel = (self.options.traversal != options.traversal).then(|| self.world.accel());
+        let accel = (self.in_use.traversal != options.traversal).then(|| self.world.accel());
         Ok((self.resources.for_frame(&self.context, accel, &needs)?, schedule))
     }
 }

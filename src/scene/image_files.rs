@@ -56,8 +56,8 @@ enum Shown {
 }
 
 impl Images {
-    /// Returns no images. `replaced`: which materials are replaced once they are loaded. `progress` is told of images that
-    /// are decoded.
+    /// Returns no images. `replaced`: which materials are replaced once they are loaded. `progress` is told of images
+    /// that are decoded.
     pub fn new(replaced: Vec<MaterialChoice>, progress: &Progress) -> Self {
         Self { replaced, progress: progress.clone(), ..Self::default() }
     }

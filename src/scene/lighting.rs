@@ -39,7 +39,7 @@ impl Scene {
         if !hidden.is_empty() {
             tracing::warn!("{path}: --integrator whitted does not show {}; path does", hidden.join(" and "));
         }
-        let shows = |light: &Light| !light.is_black() && !(is_whitted && light.has_area());
+        let shows = |light: &Light| !(light.is_black() || is_whitted && light.has_area());
         let is_lit = self.ambient != Vec3::ZERO
             || self.ground.is_some_and(|ground| ground.ambient != Vec3::ZERO)
             || self.lights.iter().any(shows);

@@ -220,7 +220,7 @@ mod tests {
             let mut positions: Vec<Vec3> =
                 (0..n * n).map(|ix| Vec3::new((ix % n) as f32, roughness * height(ix), (ix / n) as f32)).collect();
             positions.extend_from_within(..);
-            let corner = |x: u32, y: u32| y * n + x + if (x + y) % 3 == 0 { n * n } else { 0 };
+            let corner = |x: u32, y: u32| y * n + x + if (x + y).is_multiple_of(3) { n * n } else { 0 };
             let mut faces = Vec::new();
             for (x, y) in (0..n - 1).flat_map(|y| (0..n - 1).map(move |x| (x, y))) {
                 faces.push([corner(x, y), corner(x, y + 1), corner(x + 1, y)]);

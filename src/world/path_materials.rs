@@ -8,7 +8,7 @@
 //! |---|---|
 //! | Kd | base colour, at most 1 |
 //! | Ks, with a highlight or mirror | reflectance along the normal |
-//! | Ns, with a highlight | width sqrt(2 / (Ns + 2)), with which the distribution is about as wide as Blinn's of this exponent (Walter et al., 2007) |
+//! | Ns, with a highlight | width sqrt(2 / (Ns + 2)), about as wide as Blinn's distribution (Walter et al., 2007) |
 //! | illum 3, 8 | perfectly smooth, as a mirror is |
 //! | illum 5 | the same; Ni and Ks give the reflectance, as Fresnel's term times Ks does |
 //! | illum 4, 6, 7, 9 | glass: perfectly smooth, Ni, and Tf as the tint of each boundary. Kd and Ks are ignored |

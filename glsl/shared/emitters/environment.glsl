@@ -65,7 +65,8 @@ vec3 environment_radiance(vec3 direction) {
     return radiance + seen_suns(direction).radiance;
 }
 
-// The radiance that surfaces get from a direction in addition: from the sky or from the ground. Neither the camera nor mirrors see it.
+// The radiance that surfaces get from a direction in addition: from the sky or from the ground. Neither the camera nor
+// mirrors see it.
 vec3 ambient_radiance(vec3 direction) {
     return direction[accel.up_axis] < 0.0 ? accel.ground_ambient : accel.ambient;
 }

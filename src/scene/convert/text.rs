@@ -134,7 +134,8 @@ fn render(defaults: &RenderDefaults) -> String {
     };
     let exposure = if is_metered { "metered = true".to_owned() } else { format!("exposure = {}", number(exposure)) };
     format!(
-        "\n[render]\nwidth = {width}\nheight = {height}\nintegrator = \"{integrator}\"\nmax_depth = {max_depth}\nsamples = {samples}\n{exposure}\n\
+        "\n[render]\nwidth = {width}\nheight = {height}\nintegrator = \"{integrator}\"\n\
+         max_depth = {max_depth}\nsamples = {samples}\n{exposure}\n\
          tonemap = \"{tonemap}\"\n{denoise}"
     )
 }

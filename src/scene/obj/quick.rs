@@ -421,7 +421,7 @@ mod tests {
     /// Returns the mesh that tobj reads from the careful way's text.
     fn by_tobj(text: &str) -> Mesh {
         let by_name = MATERIALS.iter().enumerate().map(|(ix, name)| ((*name).to_owned(), ix)).collect();
-        let models = parse(&clean_obj(text).unwrap(), &by_name).unwrap();
+        let models = parse(&clean_obj(text, glam::DVec3::ZERO).unwrap(), &by_name).unwrap();
         let models: Vec<Model> = models.iter().map(Model::of_tobj).collect();
         mesh(&models, 3, (Shading::default(), 1.0)).0
     }

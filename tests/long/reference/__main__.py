@@ -61,7 +61,8 @@ def main():
             is_right = worst < 1 < planted
             failed |= not is_right
             verdict = "" if is_right else "  WRONG"
-            print(f"{scene.name:10} {worst:10.2f} {difference:11.3%} {error:10.3%} {planted:12.2f}{verdict}", flush=True)
+            figures = f"{worst:10.2f} {difference:11.3%} {error:10.3%} {planted:12.2f}"
+            print(f"{scene.name:10} {figures}{verdict}", flush=True)
     sys.exit(failed)
 
 

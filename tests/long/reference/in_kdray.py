@@ -50,7 +50,8 @@ def write(scene, folder):
     """Returns the scene file. Meshes are beside it; so must be the textures."""
     tables = [
         f'[render]\nintegrator = "path"\nwidth = {scene.size}\nheight = {scene.size}\nmax_depth = {scene.max_depth}\n',
-        f"[camera]\neye = {toml(scene.eye)}\ntarget = {toml(scene.target)}\nvertical_fov = {float(scene.vertical_fov)}\n",
+        f"[camera]\neye = {toml(scene.eye)}\ntarget = {toml(scene.target)}\n",
+        f"vertical_fov = {float(scene.vertical_fov)}\n",
     ]
     if scene.environment is not None:
         rows = (np.arange(ENVIRONMENT_HEIGHT) + 0.5) / ENVIRONMENT_HEIGHT

@@ -64,8 +64,8 @@ def cornell():
 
 
 def veach():
-    """Plates of growing roughness below spheres of growing size (Veach, Guibas: Optimally Combining Sampling Techniques,
-    1995)."""
+    """Plates of growing roughness below spheres of growing size (Veach, Guibas: Optimally Combining Sampling
+    Techniques, 1995)."""
     meshes = [
         quad("floor", (-9, -3.2, 9), (9, -3.2, 9), (9, -3.2, -7), (-9, -3.2, -7), Diffuse((0.4, 0.4, 0.4))),
         quad("wall", (-9, -3.2, -7), (9, -3.2, -7), (9, 9, -7), (-9, 9, -7), Diffuse((0.4, 0.4, 0.4))),
@@ -140,7 +140,8 @@ def many():
     meshes = [quad("floor", (-5, 0, 5), (5, 0, 5), (5, 0, -5), (-5, 0, -5), Diffuse((0.6, 0.6, 0.6)))]
     for i, radiance in enumerate(((9, 2, 1), (1, 6, 2), (2, 3, 12), (20, 18, 15))):
         part = corners[i::4]
-        meshes.append(Mesh(f"lamps{i}", part.reshape(-1, 3), np.arange(3 * len(part)).reshape(-1, 3), Emitting(radiance)))
+        faces = np.arange(3 * len(part)).reshape(-1, 3)
+        meshes.append(Mesh(f"lamps{i}", part.reshape(-1, 3), faces, Emitting(radiance)))
     return Scene("many", (0, 2.5, 7), (0, 0.7, 0), 40, 4, meshes)
 
 

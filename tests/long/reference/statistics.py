@@ -35,8 +35,8 @@ def critical_t(degrees, probability):
 
 def compare(ours, theirs, false_alarms):
     """Compares lists of independent pictures. Returns the largest deviation of a tile in units of what chance would
-    exceed with the probability `false_alarms` anywhere in the picture (above 1: they differ), the relative difference of
-    the whole picture, and the standard error of that difference."""
+    exceed with the probability `false_alarms` anywhere in the picture (above 1: they differ), the relative difference
+    of the whole picture, and the standard error of that difference."""
     a, b = (np.array([tiles(picture) for picture in pictures]) for pictures in (ours, theirs))
     error = np.sqrt(a.var(0, ddof=1) / len(a) + b.var(0, ddof=1) / len(b))
     # The fewest degrees of freedom that Welch's test can have: a bound that errs on the side of fewer alarms.
