@@ -26,7 +26,8 @@ fn a_scene_that_nothing_lights_is_named_once() {
     let disc = "[[mesh]]\ngenerator = 'disc'\nradius = 1\nsegments = 8\n";
     let light = "[[light]]\nkind = 'directional'\ndirection = [-1, -2, -1]\nirradiance = [1, 1, 1]\n";
     let off = light.replace("[1, 1, 1]", "[0, 0, 0]");
-    let emitter = format!("ambient = [0, 0, 0]\nmaterials.m = {{ Ke = [1, 1, 1] }}\n{disc}material = 'm'\n");
+    let shining = format!("ambient = [0, 0, 0]\nmaterials.m = {{ Ke = [1, 1, 1] }}\n{disc}material = 'm'\n");
+    let emitter = format!("{shining}[render]\nintegrator = 'whitted'\n");
     let black = format!("ambient = [0, 0, 0]\n{disc}");
     for (text, emits) in [(&black, false), (&format!("{disc}{off}"), false), (&emitter, true)] {
         let told = warnings(&render(directory.path(), "dark.toml", text));
@@ -37,9 +38,13 @@ fn a_scene_that_nothing_lights_is_named_once() {
         assert_eq!(line.contains("Ke"), emits, "{line}");
     }
     let ambient = format!("ambient = [0.3, 0.3, 0.3]\n{disc}");
-    for (name, text) in
-        [("a.toml", &ambient[..]), ("a.toml", &format!("{disc}{light}")), ("a.toml", disc), ("a.obj", TRIANGLE)]
-    {
+    for (name, text) in [
+        ("a.toml", &shining[..]),
+        ("a.toml", &ambient[..]),
+        ("a.toml", &format!("{disc}{light}")),
+        ("a.toml", disc),
+        ("a.obj", TRIANGLE),
+    ] {
         let told = warnings(&render(directory.path(), name, text));
         assert!(told.is_empty(), "{text}: {told:?}");
     }

@@ -29,7 +29,9 @@ layout(std430, set = 0, binding = BIND_RAY_RADIANCE) writeonly buffer RayRadianc
 // The irradiance of the ambient light on a surface. Between facing up and facing down it is blended by the normal's
 // coordinate along the up axis. Without a tilt it is `frame.ambient`, bit for bit.
 vec3 ambient_at(vec3 normal) {
-    return frame.ambient + frame.ambient_tilt * normal[frame.up_axis];
+    float height = normal[frame.up_axis];
+    // A triangle of a shape that has no normal counts as upright.
+    return frame.ambient + frame.ambient_tilt * (abs(height) <= 1.0 ? height : 0.0);
 }
 
 // The radiance that the surface itself emits and reflects towards the viewer, from the ambient light and all lights

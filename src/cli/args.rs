@@ -333,7 +333,7 @@ impl FromStr for SampleRange {
 
     fn from_str(word: &str) -> Result<Self, Self::Err> {
         let size = 1 << MOST_SAMPLES_LOG2;
-        let number = |digits: &str| digits.parse().ok().filter(|n: &u32| *n <= 1 << 24 && n % size == 0);
+        let number = |digits: &str| digits.parse().ok().filter(|n: &u32| *n <= 1 << 24 && n.is_multiple_of(size));
         let ends = word.split_once('-').and_then(|(first, end)| Some((number(first)?, number(end)?)));
         match ends {
             Some((first, end)) if first < end => Ok(Self { first, end }),

@@ -41,6 +41,8 @@ mod tests {
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
             BIND_CAST_RAYS => Some("Ray"),
             BIND_PIXEL_FEATURES => Some("Feature"),
+            BIND_PATH_STATES => Some("PathState"),
+            BIND_SEGMENTS => Some("Segment"),
             BIND_COUNTERS => Some("Counters"),
             BIND_RASTER_GROUPS => Some("RasterGroups"),
             BIND_GRID_BUILD => Some("GridBuild"),
@@ -139,7 +141,7 @@ mod tests {
             check(name, block, STRUCTS).unwrap();
         }
         // Kernels assemble these from the words of an array, and find large triangles behind another struct.
-        let apart = ["CornerSurface", "LargeTriangle", "MaterialMaps", "Texture"];
+        let apart = ["AreaLight", "CornerSurface", "Emitter", "LargeTriangle", "MaterialMaps", "Texture"];
         let seen: BTreeSet<_> = blocks.iter().map(|(name, _)| *name).chain(apart).collect();
         assert_eq!(seen, STRUCTS.iter().map(|(name, ..)| *name).collect());
     }

@@ -26,7 +26,9 @@ pub struct LitRays<'a> {
 /// The irradiance of the ambient light on a surface. Between facing up and facing down it is blended by the normal's
 /// coordinate along the up axis.
 fn ambient_at(frame: &Frame, normal: Vec3) -> Vec3 {
-    frame.ambient + frame.ambient_tilt * normal[frame.up_axis as usize]
+    let height = normal[frame.up_axis as usize];
+    // A triangle of a shape that has no normal counts as upright.
+    frame.ambient + frame.ambient_tilt * if height.abs() <= 1.0 { height } else { 0.0 }
 }
 
 /// The radiance that the surface itself emits and reflects towards the viewer, from the ambient light and all lights

@@ -4,7 +4,10 @@
 use glam::{Vec3, vec3};
 use kdray::{
     cpu::{self, Batching},
-    frame::{Crop, Denoise, Integrator, PathOptions, Picture, PixelFilter, RenderOptions, sampling::samples_log2},
+    frame::{
+        Crop, Denoise, FrameKind, Integrator, Pass, PathOptions, Picture, PixelFilter, Plan, RenderOptions, plan,
+        sampling::samples_log2,
+    },
     gpu::DeviceOverrides,
     layout::Material,
     render::{BandedRenderer, Renderer},
@@ -83,6 +86,21 @@ fn device_and_cpu_agree() {
         assert!(n_differing <= 1200 / 20, "{name}: {n_differing} of 1200 pixels differ");
         let n_others = differing(&found, &on_cpu(&scene, &options, 2), 1e-3).len();
         assert!(n_others > 300, "{name}: pictures of other samples differ in {n_others} pixels");
+    }
+}
+
+#[test]
+fn a_profile_has_the_passes_of_the_plan() {
+    let (scene, options) = (scenes::mixed(), RenderOptions { features: true, ..options(20, 15, 2) });
+    let mut renderer = Renderer::new(device(), &world_of(&scene), &options).expect("a renderer");
+    let mut on_cpu = cpu::Renderer::new(&world_of(&scene), &options, Batching::default());
+    let plan = Plan::new(&FrameKind::new(&options, scene.lights.len() as u32));
+    let steps = [plan.bounces.concat(), plan.light, plan.image].concat();
+    let expected: Vec<_> = plan::passes(&steps).map(Pass::name).collect();
+    for profile in [renderer.draw_sample().expect("a sample"), on_cpu.draw_sample()] {
+        let found: Vec<_> = profile.passes.iter().map(|pass| pass.name).collect();
+        assert_eq!(found, expected);
+        assert!(profile.bounces[0].n_rays == 300 && profile.bounces[0].n_shadow_rays > 100, "{:?}", profile.bounces);
     }
 }
 

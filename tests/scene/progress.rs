@@ -81,7 +81,7 @@ fn loading_and_building_report_their_progress() {
         RgbImage::new(4, 4).save_with_format(path(&format!("{ix}.png")), ImageFormat::Png).unwrap();
         writeln!(scene, "[materials.m{ix}]\nmap_Kd = '{ix}.png'").unwrap();
     }
-    scene += "[[mesh]]\nfile = 'large.obj'\nmaterials = { a = 'm0' }\n";
+    scene += "[[mesh]]\nfile = 'large.obj'\nmaterials = ['m0', 'm1', 'm2', 'm3', 'm4']\n";
     fs::write(path("scene.toml"), scene).unwrap();
     for (name, n_images) in [("large.obj", 0), ("large.ply", 0), ("scene.toml", 5)] {
         let reports = Arc::new(Reports::default());

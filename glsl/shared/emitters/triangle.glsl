@@ -18,7 +18,8 @@ vec3 emission_at(uint triangle_ix, float u, float v) {
     uint material_ix = load_triangle_materials(triangle_ix);
     if ((materials[material_ix].flags & MATERIAL_UNLIT) != 0u) return vec3(0.0);
     vec3 emitted = materials[material_ix].ke;
-    if (!TEXTURED || accel.material_maps_begin == NO_WORDS) return emitted;
+    bool has_maps = TEXTURED ? accel.material_maps_begin != NO_WORDS : false;
+    if (!has_maps) return emitted;
     uint texture_ix = maps_of(material_ix).emission;
     if (texture_ix == NO_TEXTURE) return emitted;
     Texture map = texture_at(texture_ix);

@@ -28,6 +28,11 @@ fn world(lights: Vec<Light>) -> World {
     world_with(lights, |_| {})
 }
 
+/// The inputs of kernels of paths.
+fn inputs_of<'a>(world: &'a World, frame: &'a Frame) -> KernelInputs<'a> {
+    KernelInputs::new(world, frame).of_paths(&world.scene().materials, world.emitters())
+}
+
 fn frame(world: &World) -> Frame {
     world.frame_constants(&RenderOptions::default())
 }
@@ -54,13 +59,13 @@ fn numbers(n: usize) -> impl Iterator<Item = Vec3> {
 /// The irradiance that picks estimate at a point of a surface.
 fn irradiance(inputs: &KernelInputs, point: Vec3, normal: Vec3) -> Vec3 {
     const N: usize = 100_000;
-    let sum: Vec3 = numbers(N)
+    let sum: DVec3 = numbers(N)
         .map(|u| {
             let LightPick { direction, light, .. } = pick_light(inputs, point, u);
-            light * direction.dot(normal).max(0.0)
+            (light * direction.dot(normal).max(0.0)).as_dvec3()
         })
         .sum();
-    sum / N as f32
+    (sum / N as f64).as_vec3()
 }
 
 fn assert_near(found: f32, expected: f32, tolerance: f32) {
@@ -109,7 +114,7 @@ fn sun() -> Light {
 fn light_without_a_size_falls_with_the_squared_distance() {
     let world = world(vec![Light::Point { position: vec3(0.0, 0.0, 2.0), intensity: Vec3::splat(3.0) }]);
     let frame = frame(&world);
-    let inputs = KernelInputs::new(&world, &frame);
+    let inputs = inputs_of(&world, &frame);
     assert_near(irradiance(&inputs, Vec3::ZERO, Vec3::Z).x, PI * 3.0 / 4.0, 1e-4);
     assert_near(irradiance(&inputs, vec3(0.0, 0.0, -2.0), Vec3::Z).x, PI * 3.0 / 16.0, 1e-4);
     assert_eq!(pick_light(&inputs, vec3(0.0, 0.0, 2.0), Vec3::splat(0.5)), LightPick::NONE);
@@ -135,7 +140,7 @@ fn closed_forms() -> Vec<(World, f32)> {
 fn irradiance_is_that_of_closed_forms() {
     for (world, expected) in closed_forms() {
         let frame = frame(&world);
-        let found = irradiance(&KernelInputs::new(&world, &frame), Vec3::ZERO, Vec3::Z).x;
+        let found = irradiance(&inputs_of(&world, &frame), Vec3::ZERO, Vec3::Z).x;
         assert_near(found, expected, 3e-3);
     }
 }
@@ -147,7 +152,7 @@ fn a_wrong_area_changes_the_irradiance() {
     let mut emitters: Emitters = world.emitters().clone();
     emitters.area_lights[0].area *= 1.02;
     let frame = frame(&world);
-    let inputs = KernelInputs { emitters: Some(&emitters), ..KernelInputs::new(&world, &frame) };
+    let inputs = KernelInputs { emitters: Some(&emitters), ..inputs_of(&world, &frame) };
     let found = irradiance(&inputs, Vec3::ZERO, Vec3::Z).x;
     assert!((found / (2.0 * under_rectangle(1.0, 1.5)) - 1.0).abs() > 1e-2, "{found}");
 }
@@ -157,7 +162,7 @@ fn densities_of_area_lights_are_whole() {
     for light in [rectangle(), disk(), sphere()] {
         let world = world(vec![light]);
         let frame = frame(&world);
-        let inputs = KernelInputs::new(&world, &frame);
+        let inputs = inputs_of(&world, &frame);
         for point in [Vec3::ZERO, vec3(1.0, -0.5, 0.5)] {
             let sum = over_sphere(|direction| seen_light(&inputs, point, direction, f32::INFINITY).density);
             assert_near(sum, 1.0, 5e-3);
@@ -184,7 +189,7 @@ fn densities_of_environments_are_whole() {
         world_with(vec![sun()], |_| {}),
     ] {
         let frame = frame(&world);
-        let inputs = KernelInputs::new(&world, &frame);
+        let inputs = inputs_of(&world, &frame);
         assert_near(over_sphere(|direction| environment_density(&inputs, direction)), 1.0, 5e-3);
         // Picks find all the light that there is.
         let found = irradiance(&inputs, Vec3::ZERO, Vec3::Y).x;
@@ -208,7 +213,7 @@ fn picks_have_the_density_of_what_is_seen() {
         scene.ambient = Vec3::splat(0.1);
     });
     let frame = frame(&world);
-    let inputs = KernelInputs::new(&world, &frame);
+    let inputs = inputs_of(&world, &frame);
     let point = vec3(6.0, 0.2, -4.0);
     let (mut n_shapes, mut n_beyond, mut n_triangles, mut n_borders) = (0, 0, 0, 0);
     for u in numbers(20_000) {
@@ -247,7 +252,7 @@ fn nearer_lights_hide_what_is_behind_them() {
     let behind = Light::Point { position: vec3(0.0, 0.0, 9.0), intensity: Vec3::ONE };
     let world = world(vec![behind, sphere()]);
     let frame = frame(&world);
-    let inputs = KernelInputs::new(&world, &frame);
+    let inputs = inputs_of(&world, &frame);
     assert!(numbers(500).all(|u| pick_light(&inputs, Vec3::ZERO, u).distance < 3.0));
     // Beside the sphere, both are seen.
     assert!(numbers(500).any(|u| pick_light(&inputs, vec3(5.0, 0.0, 0.0), u).distance > 9.0));
@@ -264,7 +269,7 @@ fn the_map_is_where_it_is_documented() {
         let (made, _) = Environment::new([64, 32], colours, (rotation, 1.0)).unwrap();
         let world = world_with(Vec::new(), |scene| scene.environment = Some(made));
         let frame = frame(&world);
-        let inputs = KernelInputs::new(&world, &frame);
+        let inputs = inputs_of(&world, &frame);
         assert_near(environment_radiance(&inputs, expected).x, 1.0, 1e-3);
         assert_eq!(environment_radiance(&inputs, -expected), Vec3::ZERO);
     }
@@ -273,7 +278,7 @@ fn the_map_is_where_it_is_documented() {
     let (made, _) = Environment::new([64, 32], colours, (0.0, 1.0)).unwrap();
     let world = world_with(Vec::new(), |scene| scene.environment = Some(made));
     let frame = frame(&world);
-    assert_eq!(environment_radiance(&KernelInputs::new(&world, &frame), Vec3::Y), Vec3::ONE);
+    assert_eq!(environment_radiance(&inputs_of(&world, &frame), Vec3::Y), Vec3::ONE);
 }
 
 #[test]
@@ -293,7 +298,7 @@ fn nothing_is_picked_where_there_is_no_light() {
     let black = Light::Sphere { position: Vec3::ONE, radius: 0.0, radiance: Vec3::ONE };
     let world = world(vec![black, Light::Point { position: Vec3::ONE, intensity: Vec3::ZERO }]);
     let frame = frame(&world);
-    let inputs = KernelInputs::new(&world, &frame);
+    let inputs = inputs_of(&world, &frame);
     assert!(numbers(100).all(|u| pick_light(&inputs, Vec3::ZERO, u) == LightPick::NONE));
     assert!(!world.scene().needs_path());
     assert!(self::world(vec![disk()]).scene().needs_path());
