@@ -12,9 +12,10 @@ float tent(float u) {
     return u < 0.5 ? sqrt(2.0 * u) - 1.0 : 1.0 - sqrt(2.0 * (1.0 - u));
 }
 
-// The direction of an angle that is the share `turn` of a full turn.
+// The direction of an angle that is the share `turn` of a full turn. Vulkan bounds the errors of sines and cosines only
+// between minus and plus half a turn.
 vec2 on_circle(float turn) {
-    float angle = 6.2831853 * turn;
+    float angle = 6.2831853 * (turn - floor(turn + 0.5));
     return vec2(cos(angle), sin(angle));
 }
 

@@ -12,7 +12,7 @@ fn tent(u: f32) -> f32 {
 
 /// The direction of an angle that is the share `turn` of a full turn.
 fn on_circle(turn: f32) -> Vec2 {
-    let angle = std::f32::consts::TAU * turn;
+    let angle = std::f32::consts::TAU * (turn - (turn + 0.5).floor());
     vec2(angle.cos(), angle.sin())
 }
 

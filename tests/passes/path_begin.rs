@@ -1,12 +1,12 @@
 //! Tests of the kernel path_begin against its twin: the camera rays of all samples of all pixels.
 
 use kdray::{
-    layout::{PathState, SEGMENT_NONE},
+    layout::{PathRay, PathState, SEGMENT_NONE},
     scene::Projection,
 };
 
 use super::path_stage::PathStage;
-use crate::support::{compare, scenes};
+use crate::support::scenes;
 
 #[test]
 fn agrees_with_its_twin() {
@@ -21,8 +21,17 @@ fn agrees_with_its_twin() {
             stage.run(|commands| stage.passes.path_begin.record(commands, &stage.resources, &stage.batch()));
             let (expected, _) = stage.rays_and_hits();
             let found = stage.resources.queue.rays.download().expect("rays");
-            compare::rays(2e-6, 0, &expected, &found).unwrap();
-            let is_unlike = |ray: &&kdray::layout::PathRay| ray.direction != expected[0].direction;
+            // The absolute error that Vulkan allows for sines and cosines is 2^-11, here of the lens or of a pixel.
+            let is_near = |a: &PathRay, b: &PathRay| {
+                a.origin.distance(b.origin) <= 2.0e-3 * aperture + 1e-5
+                    && a.direction.distance(b.direction) <= 2.0e-3 * aperture + 1e-4
+                    && (a.pixel_ix, a.source_triangle) == (b.pixel_ix, b.source_triangle)
+            };
+            let differing = expected.iter().zip(&found).position(|(a, b)| !is_near(a, b));
+            assert!(differing.is_none(), "{filter}, {aperture}: {differing:?}");
+            let moved = PathRay { origin: expected[0].origin + 0.01, ..expected[0] };
+            assert!(!is_near(&expected[0], &moved));
+            let is_unlike = |ray: &&PathRay| ray.direction != expected[0].direction;
             let is_perspective = matches!(stage.world.scene().camera.projection, Projection::Perspective { .. });
             assert!(!is_perspective || found.iter().filter(is_unlike).count() > 1000);
             let paths = stage.paths();
