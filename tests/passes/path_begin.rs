@@ -21,14 +21,15 @@ fn agrees_with_its_twin() {
             stage.run(|commands| stage.passes.path_begin.record(commands, &stage.resources, &stage.batch()));
             let (expected, _) = stage.rays_and_hits();
             let found = stage.resources.queue.rays.download().expect("rays");
-            // The absolute error that Vulkan allows for sines and cosines is 2^-11, here of the lens or of a pixel.
+            // Vulkan allows sines and cosines an absolute error of 2^-11, and SwiftShader has several times that.
             let is_near = |a: &PathRay, b: &PathRay| {
-                a.origin.distance(b.origin) <= 2.0e-3 * aperture + 1e-5
-                    && a.direction.distance(b.direction) <= 2.0e-3 * aperture + 1e-4
+                a.origin.distance(b.origin) <= 5.0e-3 * aperture + 1e-5
+                    && a.direction.distance(b.direction) <= 5.0e-3 * aperture + 1e-4
                     && (a.pixel_ix, a.source_triangle) == (b.pixel_ix, b.source_triangle)
             };
             let differing = expected.iter().zip(&found).position(|(a, b)| !is_near(a, b));
-            assert!(differing.is_none(), "{filter}, {aperture}: {differing:?}");
+            let pair = differing.map(|ix| (expected[ix], found[ix]));
+            assert!(differing.is_none(), "{filter}, {aperture}: {pair:?}");
             let moved = PathRay { origin: expected[0].origin + 0.01, ..expected[0] };
             assert!(!is_near(&expected[0], &moved));
             let is_unlike = |ray: &&PathRay| ray.direction != expected[0].direction;
