@@ -7,8 +7,8 @@
 // sum of 2^n samples that begins at a multiple of 2^n is the sum of its two halves. So the picture has the same bits
 // however many samples a frame draws. Of the samples so far, pixel_accumulated has one sum for each bit of their
 // number, the largest first, and each `width * height` elements long. If their number is no power of two, the mean adds
-// up these sums, from the smallest to the largest. Updates pixel_accumulated and pixel_radiance (the frame's sum, then
-// the mean).
+// up these sums, from the smallest to the largest.
+// Updates pixel_accumulated and pixel_radiance (the frame's sum, then the mean).
 #include "layout.glsl"
 
 layout(local_size_x = TILE_SIZE, local_size_y = TILE_SIZE) in;

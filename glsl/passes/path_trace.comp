@@ -4,10 +4,10 @@
 // Path trace: finds the closest hits of the paths that are alive, and tests the segments to lights of the bounce
 // before. One dispatch does both: it lasts as long as its longest ray, and so waits for such a ray once a bounce, not
 // twice. There are 2^trace_lanes_log2 invocations per ray and segment, the first of which works (lanes.glsl). The
-// segments follow the rays. Rays pass through see-through surfaces at random (cutout.glsl). Reads rays, live_paths,
-// bounces and the acceleration structure; updates hits and segments, in which stalled rays and segments leave their
-// mark (stalls.glsl), path_states (light that arrives is added), counters and, with COUNT_COSTS, n_rays and n_steps of
-// pixel_features.
+// segments follow the rays. Rays pass through see-through surfaces at random (cutout.glsl).
+// Reads rays, live_paths, bounces and the acceleration structure; updates hits and segments, in which stalled rays and
+// segments leave their mark (stalls.glsl), path_states (light that arrives is added), counters and, with COUNT_COSTS,
+// n_rays and n_steps of pixel_features.
 #include "layout.glsl"
 
 // Whether the rays' cost is added to pixel_features.

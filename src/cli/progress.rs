@@ -268,7 +268,7 @@ mod tests {
             report(Work::Reading, 0.5);
             assert_eq!(bar.position(), BAR_STEPS + BAR_STEPS / 4);
             assert!(bar.message().starts_with("loading x: 50 %, "), "{}", bar.message());
-            // A thread that is late, another file, other work, and work that the stage does not have.
+            // These reports come from a late thread, another file, the next work, and work of other stages.
             report(Work::Reading, 0.25);
             assert!(bar.message().starts_with("loading x: 50 %, "), "{}", bar.message());
             report(Work::Reading, 1.0);

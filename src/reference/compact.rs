@@ -39,13 +39,16 @@ pub fn reduce(inputs: &KernelInputs, parents: Parents, child_kinds: &mut [u32], 
 /// `constants.queue_capacity` rays, has no room for the next bounce's rays, that bounce is empty and its `overflow`
 /// is set.
 pub fn spine(scan_blocks: &mut [u32], constants: &Frame, this: &Bounce, next: &mut Bounce) {
+    size_next_bounce(exclusive_prefix_sum(scan_blocks), constants, this, next);
+}
+
+/// Replaces numbers by the sums of those before them. Returns the sum of all.
+pub fn exclusive_prefix_sum(numbers: &mut [u32]) -> u32 {
     let mut carry = 0;
-    for block in scan_blocks {
-        let sum = *block;
-        *block = carry;
-        carry += sum;
+    for number in numbers {
+        carry += std::mem::replace(number, carry);
     }
-    size_next_bounce(carry, constants, this, next);
+    carry
 }
 
 fn size_next_bounce(n_wanted: u32, constants: &Frame, this: &Bounce, next: &mut Bounce) {

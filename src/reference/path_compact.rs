@@ -1,16 +1,11 @@
 //! Path compact: the list of the paths that go on. Twin of `path_compact.comp`, and of `compact_spine.comp` for paths.
 
+use super::compact::exclusive_prefix_sum;
 use crate::layout::{Bounce, Frame, SCAN_GROUP_SIZE};
 
 /// Turns the blocks' sums into their exclusive prefix sums, and sizes the next bounce.
 pub fn spine(scan_blocks: &mut [u32], constants: &Frame, this: &Bounce, next: &mut Bounce) {
-    let mut carry = 0;
-    for block in scan_blocks {
-        let sum = *block;
-        *block = carry;
-        carry += sum;
-    }
-    next.set_paths(carry, this.n_rays, constants);
+    next.set_paths(exclusive_prefix_sum(scan_blocks), this.n_rays, constants);
 }
 
 /// Writes those of the paths `live` that go on, as `child_kinds` says, to `next`.

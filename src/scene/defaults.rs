@@ -15,7 +15,7 @@ pub struct RenderDefaults {
     pub max_depth: u32,
     /// Number of samples per pixel of a picture.
     pub samples: u32,
-    /// The values of the three above that take the place of those if paths are traced.
+    /// Values of `max_depth`, `samples` and `denoise` for [`Integrator::Path`], which take the place of the others.
     pub of_paths: PathDefaults,
     /// Factor on radiance before the tone curve.
     pub exposure: f32,
@@ -28,14 +28,14 @@ pub struct RenderDefaults {
     pub denoise: Denoise,
 }
 
-/// The render options of a scene whose file leaves them out, or that is rendered by tracing paths.
+/// Render options whose values differ if paths are traced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathDefaults {
-    /// See [`RenderDefaults::max_depth`].
+    /// Number of ray levels, including the primary rays.
     pub max_depth: u32,
-    /// See [`RenderDefaults::samples`].
+    /// Number of samples per pixel of a picture.
     pub samples: u32,
-    /// See [`RenderDefaults::denoise`].
+    /// The noise filter.
     pub denoise: Denoise,
 }
 

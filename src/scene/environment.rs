@@ -19,14 +19,15 @@ pub struct Environment {
     rotation_degrees: f32,
 }
 
-/// Numbers of texels that are no radiance.
+/// How many texels of an image were no radiance, and have been replaced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MendedTexels {
-    /// With a NaN, which becomes 0.
+    /// Texels with a NaN, which has become 0.
     pub n_nan: usize,
-    /// With a negative number, which becomes 0.
+    /// Texels with a negative number, which has become 0.
     pub n_negative: usize,
-    /// With a number that is infinite or above 1e12, which becomes 1e12 or the greatest of the image's other numbers.
+    /// Texels with a number that is infinite or above 1e12. It has become 1e12, or the greatest of the image's other
+    /// numbers.
     pub n_infinite: usize,
 }
 

@@ -17,11 +17,11 @@ pub(super) struct Lacks {
     pub camera: bool,
     /// The axis that points up in a scene without a camera, unless the user states one.
     pub up: Up,
-    /// Neither lights nor ambient light.
+    /// The scene has neither lights nor ambient light.
     pub light: bool,
     /// Only a scene without light gets a background.
     pub background: bool,
-    /// Without it, the scene's content decides.
+    /// How light is computed. If the file leaves it out, the scene's content decides.
     pub integrator: bool,
 }
 

@@ -84,11 +84,16 @@ impl Session {
     }
 }
 
-/// Returns the files in the folders below the checkout's `glsl`.
+/// Returns all files below the checkout's `glsl`.
 fn shader_files(checkout: &Path) -> BTreeSet<PathBuf> {
-    let folders = fs::read_dir(checkout.join("glsl")).into_iter().flatten().flatten();
-    let files = folders.flat_map(|folder| fs::read_dir(folder.path()).into_iter().flatten().flatten());
-    files.map(|file| file.path()).collect()
+    let (mut files, mut folders) = (BTreeSet::new(), vec![checkout.join("glsl")]);
+    while let Some(folder) = folders.pop() {
+        let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+        let (inner, new): (Vec<_>, Vec<_>) = entries.partition(|path| path.is_dir());
+        folders.extend(inner);
+        files.extend(new);
+    }
+    files
 }
 
 /// Compiles all shaders of the checkout.
@@ -179,9 +184,11 @@ mod tests {
         let copy = edited("glsl/passes/trace.comp", |text| text.replace("void main() {", "void main() { oops();"));
         let error = compile(copy.path()).unwrap_err();
         assert!(error.starts_with(&format!("glsl/passes/trace.comp:{}: error: 'oops'", line_of(text))), "{error}");
-        let copy = edited("glsl/shared/kdtree.glsl", |text| format!("oops\n{text}"));
-        let error = compile(copy.path()).unwrap_err();
-        assert!(error.contains("glsl/shared/kdtree.glsl:"), "{error}");
+        for shared in ["glsl/shared/kdtree.glsl", "glsl/shared/bsdf/bsdf.glsl"] {
+            let copy = edited(shared, |text| format!("oops\n{text}"));
+            let error = compile(copy.path()).unwrap_err();
+            assert!(error.contains(&format!("{shared}:")), "{error}");
+        }
     }
 
     #[test]

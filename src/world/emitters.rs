@@ -35,7 +35,7 @@ pub struct Emitters {
     pub n_suns: usize,
     /// The map of the environment.
     pub environment: Option<EnvironmentMap>,
-    /// With which the environment is picked.
+    /// Probability with which the environment is picked.
     pub environment_probability: f32,
     /// Radiance of the environment if it has no map.
     pub background: Vec3,

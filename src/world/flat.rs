@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::{Mismatch, Textures, emitters};
+use super::{Mismatch, Textures};
 use crate::{
     layout::{
         AREA_DISK, AREA_RECTANGLE, AREA_SPHERE, AreaLight, FLAT_NORMAL, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SPOT,
@@ -87,13 +87,6 @@ impl FlatScene {
             background: scene.background,
             defaults: scene.defaults,
         })
-    }
-
-    /// Returns whether something lights the scene that only the path tracer knows: area lights, an environment map, or
-    /// surfaces that emit light.
-    pub fn needs_path(&self) -> bool {
-        let is_emissive = |ix: &u32| self.materials.get(*ix as usize).is_some_and(emitters::is_emissive);
-        !self.area_lights.is_empty() || self.environment.is_some() || self.triangle_materials.iter().any(is_emissive)
     }
 
     /// Returns the smallest and the largest coordinates of all triangles, world units. Without triangles these are

@@ -6,9 +6,10 @@
 #ifndef KDRAY_BSDF_ALBEDO
 #define KDRAY_BSDF_ALBEDO
 
-// Of reflection by GGX, at one cosine. loss: the share of light that is not reflected although the Fresnel term is 1,
-// because it meets further microfacets. grazing: the share that is reflected if the Fresnel term is Schlick's weight
-// (1 - V.H)^5. So a Fresnel term F0 + (F90 - F0) (1 - V.H)^5 reflects F0 (1 - loss - grazing) + F90 grazing.
+// The albedo of reflection by GGX at one cosine. A Fresnel term F0 + (F90 - F0) (1 - V.H)^5 reflects
+// F0 (1 - loss - grazing) + F90 grazing. loss: the share of light that is not reflected although the Fresnel term is
+// 1, because it meets further microfacets. grazing: the share that is reflected if the Fresnel term is Schlick's weight
+// (1 - V.H)^5.
 struct GgxAlbedo {
     float loss;
     float grazing;
@@ -68,7 +69,7 @@ GgxAlbedo mean_ggx_albedo(float roughness) {
     return GgxAlbedo(max(roughness * loss, 0.0), 1.0 / 21.0 + roughness * change);
 }
 
-// Of the sheen of reflectance 1. roughness: at least LEAST_SHEEN_ROUGHNESS.
+// The albedo of a sheen of reflectance 1. roughness: at least LEAST_SHEEN_ROUGHNESS.
 float sheen_albedo(float cosine, float roughness) {
     vec4 powers = powers_of(centred(roughness));
     float z = centred(clamp(1.0 - cosine, 0.0, 1.0));

@@ -50,9 +50,9 @@ struct BsdfTerms {
     Material material;
     LocalFrame frame;
     vec3 to_viewer;
-    // Of the interface's distribution of normals. It is 0 if the interface is perfectly smooth. `coat_roughness` is 0
-    // if the clear layer is so.
+    // Width of the interface's distribution of normals. It is 0 if the interface is perfectly smooth.
     float width;
+    // Roughness of the clear layer. It is 0 if the layer is perfectly smooth.
     float coat_roughness;
     float sheen_roughness;
     // Index of refraction on the viewer's side, divided by that of the other side. 1: light passes unbent.
@@ -64,8 +64,8 @@ struct BsdfTerms {
     float sheen_bound;
     // Factor on what a sheet reflects and transmits, which makes up for light that bounces between microfacets.
     float clear_gain;
-    // Of the dielectric: largest channels of the reflectances along the normal and at grazing angles, and of the light
-    // that bounces between microfacets. They give its albedo.
+    // Largest channels of what the dielectric reflects: along the normal, at grazing angles, and after light has
+    // bounced between microfacets. They give its albedo.
     vec3 dielectric;
     // Reflectance of the Lambertian surface and of the light that bounces between microfacets, apart from the factor
     // that depends on the light's direction.

@@ -24,7 +24,7 @@ vec3 refracting_normal(vec3 to_viewer, vec3 to_light, float eta) {
     return normal.z < 0.0 ? -normal : normal;
 }
 
-// Whether both directions are on those sides of the microfacet on which they are of the surface.
+// Whether each direction is on the same side of the microfacet as of the surface.
 bool refracts_between(vec3 to_viewer, vec3 to_light, vec3 half_vector) {
     return dot(to_viewer, half_vector) > 0.0 && dot(to_light, half_vector) < 0.0;
 }

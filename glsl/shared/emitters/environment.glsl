@@ -71,7 +71,7 @@ vec3 ambient_radiance(vec3 direction) {
     return direction[accel.up_axis] < 0.0 ? accel.ground_ambient : accel.ambient;
 }
 
-// With which pick_light picks the direction because of the environment and its suns, per steradian.
+// The environment's and its suns' part of the density with which pick_light picks a direction, per steradian.
 float environment_density(vec3 direction) {
     return accel.environment_probability * map_density(direction) + seen_suns(direction).density;
 }

@@ -17,8 +17,8 @@ struct LightPick {
     // Radiance divided by `density`. Of lights without a size: irradiance on a facing surface, divided by the
     // probability of the pick. Either is multiplied by f |cos| to give the reflected radiance. 0: there is no light.
     vec3 light;
-    // With which the direction is picked, per steradian, the probability of the emitter included. 0 for lights without
-    // a size, which no ray can hit.
+    // Density of the direction, per steradian, the probability of the emitter included. It is 0 for lights without a
+    // size, which no ray can hit.
     float density;
 };
 

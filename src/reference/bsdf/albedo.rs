@@ -2,7 +2,7 @@
 
 use glam::Vec4;
 
-/// Of reflection by GGX, at one cosine. So a Fresnel term F0 + (F90 - F0) (1 - V.H)^5 reflects
+/// The albedo of reflection by GGX at one cosine. A Fresnel term F0 + (F90 - F0) (1 - V.H)^5 reflects
 /// F0 (1 - loss - grazing) + F90 grazing.
 #[derive(Clone, Copy, Debug)]
 pub struct GgxAlbedo {
@@ -71,7 +71,7 @@ pub fn mean_ggx_albedo(roughness: f32) -> GgxAlbedo {
     GgxAlbedo { loss: (roughness * loss).max(0.0), grazing: 1.0 / 21.0 + roughness * change }
 }
 
-/// Of the sheen of reflectance 1. `roughness`: at least [`crate::layout::LEAST_SHEEN_ROUGHNESS`].
+/// The albedo of a sheen of reflectance 1. `roughness`: at least [`crate::layout::LEAST_SHEEN_ROUGHNESS`].
 pub fn sheen_albedo(cosine: f32, roughness: f32) -> f32 {
     let powers = powers_of(centred(roughness));
     let z = centred((1.0 - cosine).clamp(0.0, 1.0));

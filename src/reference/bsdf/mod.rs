@@ -56,9 +56,9 @@ struct BsdfTerms {
     material: Material,
     frame: LocalFrame,
     to_viewer: Vec3,
-    /// Of the interface's distribution of normals. It is 0 if the interface is perfectly smooth.
+    /// Width of the interface's distribution of normals. It is 0 if the interface is perfectly smooth.
     width: f32,
-    /// It is 0 if the clear layer is perfectly smooth.
+    /// Roughness of the clear layer. It is 0 if the layer is perfectly smooth.
     coat_roughness: f32,
     sheen_roughness: f32,
     /// Index of refraction on the viewer's side, divided by that of the other side. 1: light passes unbent.
@@ -71,8 +71,8 @@ struct BsdfTerms {
     sheen_bound: f32,
     /// Factor on what a sheet reflects and transmits, which makes up for light that bounces between microfacets.
     clear_gain: f32,
-    /// Of the dielectric: largest channels of the reflectances along the normal and at grazing angles, and of the light
-    /// that bounces between microfacets. They give its albedo.
+    /// Largest channels of what the dielectric reflects: along the normal, at grazing angles, and after light has
+    /// bounced between microfacets. They give its albedo.
     dielectric: Vec3,
     /// Reflectance of the Lambertian surface, apart from the factor that depends on the light's direction.
     below: Vec3,

@@ -35,7 +35,7 @@ fn bent(shading: Vec3, from_inside: bool) -> Surface {
     }
 }
 
-/// A white dielectric of this roughness.
+/// Returns a white dielectric of this roughness.
 fn white(roughness: f32) -> Material {
     Material {
         kd: Vec3::ONE,

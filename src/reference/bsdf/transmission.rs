@@ -23,7 +23,7 @@ pub fn refracting_normal(to_viewer: Vec3, to_light: Vec3, eta: f32) -> Vec3 {
     if normal.z < 0.0 { -normal } else { normal }
 }
 
-/// Whether both directions are on those sides of the microfacet on which they are of the surface.
+/// Whether each direction is on the same side of the microfacet as of the surface.
 pub fn refracts_between(to_viewer: Vec3, to_light: Vec3, half_vector: Vec3) -> bool {
     to_viewer.dot(half_vector) > 0.0 && to_light.dot(half_vector) < 0.0
 }

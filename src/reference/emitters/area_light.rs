@@ -21,7 +21,7 @@ pub struct SeenLight {
     pub t: f32,
     /// Radiance that it emits.
     pub radiance: Vec3,
-    /// With which [`pick_light`](super::pick_light) picks the direction, per steradian.
+    /// Density with which [`pick_light`](super::pick_light) picks the direction, per steradian.
     pub density: f32,
 }
 

@@ -75,8 +75,8 @@ fn ambient_from(emitters: &Emitters, direction: Vec3) -> Vec3 {
     if direction[emitters.up_axis] < 0.0 { emitters.ground_ambient } else { emitters.ambient }
 }
 
-/// With which [`pick_light`](super::pick_light) picks the direction because of the environment and its suns, per
-/// steradian.
+/// The environment's and its suns' part of the density with which [`pick_light`](super::pick_light) picks a direction,
+/// per steradian.
 pub fn environment_density(inputs: &KernelInputs, direction: Vec3) -> f32 {
     inputs.emitters.map_or(0.0, |emitters| {
         emitters.environment_probability * map_density(emitters, direction) + seen_suns(emitters, direction).density

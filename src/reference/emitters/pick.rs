@@ -17,13 +17,13 @@ pub struct LightPick {
     /// Radiance divided by `density`. Of lights without a size: irradiance on a facing surface, divided by the
     /// probability of the pick. Either is multiplied by f |cos| to give the reflected radiance. 0: there is no light.
     pub light: Vec3,
-    /// With which the direction is picked, per steradian, the probability of the emitter included. 0 for lights
-    /// without a size, which no ray can hit.
+    /// Density of the direction, per steradian, the probability of the emitter included. It is 0 for lights without a
+    /// size, which no ray can hit.
     pub density: f32,
 }
 
 impl LightPick {
-    /// There is no light.
+    /// The pick where there is no light.
     pub const NONE: Self = Self { direction: Vec3::ZERO, distance: 0.0, light: Vec3::ZERO, density: 0.0 };
 }
 

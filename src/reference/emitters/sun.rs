@@ -9,7 +9,7 @@ use crate::{layout::AreaLight, world::Emitters};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SeenSuns {
     pub radiance: Vec3,
-    /// With which the direction is picked because of the suns, per steradian.
+    /// The suns' part of the density with which the direction is picked, per steradian.
     pub density: f32,
 }
 

@@ -300,6 +300,6 @@ fn nothing_is_picked_where_there_is_no_light() {
     let frame = frame(&world);
     let inputs = inputs_of(&world, &frame);
     assert!(numbers(100).all(|u| pick_light(&inputs, Vec3::ZERO, u) == LightPick::NONE));
-    assert!(!world.scene().needs_path());
-    assert!(self::world(vec![disk()]).scene().needs_path());
+    assert!(world.scene().area_lights.is_empty());
+    assert_eq!(self::world(vec![disk()]).scene().area_lights.len(), 1);
 }
