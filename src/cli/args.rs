@@ -249,6 +249,9 @@ impl RenderArgs {
             }
             paths.first_sample = first;
         }
+        if let Some(aov) = self.aov.iter().find(|aov| aov.is_of_paths() && options.integrator != Integrator::Path) {
+            return Err(CliError::Usage(format!("--aov {aov} needs --integrator path: it is about random samples")));
+        }
         // Passes are timed only if some output shows the times.
         let profile = !self.quiet || self.profile.is_some() || self.trace.is_some();
         Ok(RenderOptions { crop: self.crop, features: !self.aov.is_empty(), profile, paths, ..options })

@@ -113,9 +113,12 @@ fn draw_on_cpu(renderer: &mut cpu::Renderer, n_samples: u32, watcher: &mut impl 
         profile
     };
     let mut profile = frame(renderer);
-    let features = if renderer.options().features { renderer.features() } else { Vec::new() };
+    let mut features = if renderer.options().features { renderer.features() } else { Vec::new() };
     while renderer.n_samples() < n_samples {
         profile.add(&frame(renderer));
+    }
+    if renderer.options().integrator == Integrator::Path {
+        renderer.note_noise(&mut features);
     }
     Drawn { features, profile }
 }

@@ -154,6 +154,7 @@ pub(super) struct RenderSpec {
 pub(super) enum SceneDenoise {
     Off,
     Paper,
+    Edge,
 }
 
 /// One `[[mesh]]` table.

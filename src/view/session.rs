@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     accel::Statistics,
-    frame::{Denoise, Profile, RenderOptions, View},
+    frame::{Profile, RenderOptions, View},
     gpu::GpuError,
     layout::Feature,
 };
@@ -226,8 +226,8 @@ impl Session {
         let now = gpu.renderer.options();
         let has_room = whole.width <= self.room.0 && whole.height <= self.room.1;
         self.room = (self.room.0.max(whole.width), self.room.1.max(whole.height));
-        let filters = |options: &RenderOptions| options.denoise != Denoise::Off;
-        has_room && whole.features == now.features && filters(whole) == filters(now)
+        let filter = |options: &RenderOptions| std::mem::discriminant(&options.noise_filter());
+        has_room && whole.features == now.features && filter(whole) == filter(now)
     }
 
     /// Draws the rest of the sample in parts, until the sample is complete or half of [`PART_MS`] is spent. At rest,

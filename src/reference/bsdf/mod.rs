@@ -144,6 +144,16 @@ fn metal_fresnel(material: &Material, cosine: f32) -> Vec3 {
     conductor_reflectance(cosine, material.conductor_eta, material.conductor_k)
 }
 
+/// About the share of light that the surface scatters, by colour: what it reflects along its normal, or lets pass. It
+/// is 1 if the surface is perfectly smooth, since that shows other surfaces.
+pub fn surface_albedo(material: &Material) -> Vec3 {
+    if is_smooth(material) {
+        return Vec3::ONE;
+    }
+    let dielectric = material.kd + normal_reflectance(material);
+    mix(dielectric, metal_fresnel(material, 1.0), material.metallic).clamp(Vec3::ZERO, Vec3::ONE)
+}
+
 /// Returns what a microfacet of the interface does with light. `cosine`: between the microfacet's normal and the
 /// viewer.
 fn split_at(terms: &BsdfTerms, cosine: f32) -> InterfaceSplit {
