@@ -17,8 +17,16 @@ layout(std430, set = 0, binding = BIND_PIXEL_GUIDES) readonly buffer PixelGuides
 layout(std430, set = 0, binding = BIND_PIXEL_FILTERED) buffer PixelFilteredBlock { vec4 pixel_filtered[]; };
 layout(push_constant) uniform EdgeStepBlock { EdgeStep edge_step; };
 
-// How many standard deviations of noise the luminances of two pixels may differ until the weight has fallen to 1 / e.
-const float LUMINANCE_DEVIATIONS = 4.0;
+// How many standard deviations of noise the luminances of two pixels of one sample may differ until the weight has
+// fallen to 1 / e.
+const float DEVIATIONS = 8.0;
+// The power of the number of samples by which these deviations are multiplied. More samples show more of what is
+// behind the noise, and their variance is better known.
+const float DEVIATIONS_POWER = -0.4;
+// The factor on these deviations for perfectly glossy surfaces. What they reflect differs from pixel to pixel.
+const float GLOSSY_DEVIATIONS = 0.25;
+// The variance of another pixel counts up to this multiple of the pixel's own, which is 1 for perfectly glossy surfaces.
+const float MOST_OF_OTHER = 4.0;
 // A luminance that is less than any noise of interest. It keeps quotients finite where there is no noise at all.
 const float LEAST_DEVIATION = 1.0e-8;
 // The weights of the five pixels in a row: a B-spline.
@@ -37,8 +45,8 @@ int index_of(ivec2 pixel) {
     return pixel.y * int(frame.width) + pixel.x;
 }
 
-// The standard deviation of the light at a pixel, from the variances of the 3 x 3 pixels around it that show a surface.
-float deviation_at(ivec2 pixel) {
+// The variance of the light at a pixel, as the mean of 3 x 3 pixels that show a surface.
+float variance_at(ivec2 pixel) {
     float weights = 0.0, variance = 0.0;
     for (int y = -1; y <= 1; ++y) {
         for (int x = -1; x <= 1; ++x) {
@@ -49,12 +57,14 @@ float deviation_at(ivec2 pixel) {
             variance += weight * pixel_filtered[source_begin() + index_of(other)].w;
         }
     }
-    return weights > 0.0 ? sqrt(variance / weights) : 0.0;
+    return weights > 0.0 ? variance / weights : 0.0;
 }
 
 // The mean of the light, and the variance of its luminance. light: of the pixel itself.
 vec4 mean_around(ivec2 pixel, Guide guide, vec4 light) {
-    float tolerance = LUMINANCE_DEVIATIONS * deviation_at(pixel) + LEAST_DEVIATION;
+    float deviations = DEVIATIONS * pow(float(frame.n_samples), DEVIATIONS_POWER);
+    deviations *= mix(1.0, GLOSSY_DEVIATIONS, guide.gloss);
+    float variance = variance_at(pixel), most = mix(MOST_OF_OTHER, 1.0, guide.gloss) * variance;
     float luminance = luminance_of(light.xyz), weights = 0.0;
     vec4 sum = vec4(0.0);
     for (int y = -2; y <= 2; ++y) {
@@ -63,6 +73,7 @@ vec4 mean_around(ivec2 pixel, Guide guide, vec4 light) {
             if (!is_in_window(other)) continue;
             vec4 found = pixel_filtered[source_begin() + index_of(other)];
             float weight = SPLINE[abs(x)] * SPLINE[abs(y)] * surface_weight(guide, pixel_guides[index_of(other)]);
+            float tolerance = deviations * sqrt(variance + min(most, found.w)) + LEAST_DEVIATION;
             weight *= exp(-abs(luminance_of(found.xyz) - luminance) / tolerance);
             weights += weight;
             sum += vec4(weight * found.xyz, weight * weight * found.w);

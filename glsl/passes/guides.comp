@@ -15,14 +15,13 @@ layout(std430, set = 0, binding = BIND_HITS) readonly buffer HitsBlock { Hit hit
 layout(std430, set = 0, binding = BIND_PATH_STATES) readonly buffer PathStatesBlock { vec4 path_states[]; };
 layout(std430, set = 0, binding = BIND_PIXEL_GUIDES) buffer PixelGuidesBlock { Guide pixel_guides[]; };
 
-// Adds the point and the normal of a sample's hit.
-void add_surface(inout Guide guide, Surface surface) {
+// Adds the surface at a sample's hit.
+void add_surface(inout Guide guide, Surface surface, float gloss) {
     guide.n_hits += 1u;
     float weight = 1.0 / float(guide.n_hits);
-    vec3 step = surface.point_world - guide.position_world;
-    guide.position_world += weight * step;
-    guide.spread += dot(step, surface.point_world - guide.position_world);
+    guide.position_world += weight * (surface.point_world - guide.position_world);
     guide.normal_world += weight * (surface.shading - guide.normal_world);
+    guide.gloss += weight * (gloss - guide.gloss);
 }
 
 // Adds a path.
@@ -36,7 +35,7 @@ void add_path(inout Guide guide, uvec2 pixel, uint path_ix) {
         Surface surface;
         Material material;
         shaded_at(ray, hit, surface, material);
-        add_surface(guide, surface);
+        add_surface(guide, surface, surface_gloss(material));
         if (!is_unlit(material)) albedo = surface_albedo(material);
     }
     guide.n_samples += 1u;

@@ -10,9 +10,9 @@
 #define LEAST_ALBEDO 1.0e-4
 // The sine of the angle between a pixel's surface and the straight line to another pixel's point at which the weight of
 // the other pixel has fallen to 1 / e.
-#define PLANE_SINE 0.1
+#define PLANE_SINE 0.2
 // The exponent of the cosine between two normals is 2 to the power of this.
-#define NORMAL_EXPONENT_LOG2 6u
+#define NORMAL_EXPONENT_LOG2 5u
 
 // The light that surfaces scatter to the camera, divided by their albedo. radiance: of the pixel.
 vec3 light_on(vec3 radiance, Guide guide) {

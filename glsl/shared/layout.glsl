@@ -788,7 +788,7 @@ struct Feature {
 //
 // - `position_world`: mean of the first hits' points (world units). `n_hits`: number of samples that have one.
 // - `normal_world`: mean of the first hits' shading normals, not of unit length.
-// - `spread`: sum of the squared distances of the points from their mean (square world units).
+// - `gloss`: mean of the first hits' `surface_gloss`, 0..1.
 // - `albedo`: mean share of light that the first hit scatters (`surface_albedo`). A sample without a hit has 0.
 // - `seen`: mean of the light that camera rays meet: emission, lamps and what is beyond the scene.
 // - `seen_squared`: mean of the squared luminance of this light.
@@ -797,7 +797,7 @@ struct Guide {
     vec3 position_world;
     uint n_hits;
     vec3 normal_world;
-    float spread;
+    float gloss;
     vec3 albedo;
     float seen_squared;
     vec3 seen;

@@ -6,7 +6,7 @@ use clap::{Parser, Subcommand, value_parser};
 use kdray::{
     accel::{AccelKind, Query, kdtree::Traversal},
     engine::choices::{BuildPolicy, Request},
-    frame::{Aov, Crop, Integrator, RenderOptions},
+    frame::{Aov, Crop, Denoise, Integrator, RenderOptions},
     gpu::DeviceSelector,
     layout::MOST_SAMPLES_LOG2,
     scene::Scene,
@@ -248,6 +248,11 @@ impl RenderArgs {
                 ));
             }
             paths.first_sample = first;
+        }
+        if options.denoise == Denoise::Edge && options.integrator != Integrator::Path {
+            return Err(CliError::Usage(
+                "--denoise edge needs --integrator path: it removes the noise of random samples".into(),
+            ));
         }
         if let Some(aov) = self.aov.iter().find(|aov| aov.is_of_paths() && options.integrator != Integrator::Path) {
             return Err(CliError::Usage(format!("--aov {aov} needs --integrator path: it is about random samples")));

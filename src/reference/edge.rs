@@ -9,9 +9,9 @@ use crate::layout::Guide;
 pub const LEAST_ALBEDO: f32 = 1e-4;
 /// The sine of the angle between a pixel's surface and the straight line to another pixel's point at which the weight
 /// of the other pixel has fallen to 1 / e.
-const PLANE_SINE: f32 = 0.1;
+const PLANE_SINE: f32 = 0.2;
 /// The exponent of the cosine between two normals is 2 to the power of this.
-const NORMAL_EXPONENT_LOG2: u32 = 6;
+const NORMAL_EXPONENT_LOG2: u32 = 5;
 
 /// The light that surfaces scatter to the camera, divided by their albedo. `radiance`: of the pixel.
 pub fn light_on(radiance: Vec3, guide: &Guide) -> Vec3 {

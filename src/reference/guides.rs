@@ -3,7 +3,7 @@
 use glam::{UVec2, Vec3};
 
 use super::{
-    bsdf::surface_albedo,
+    bsdf::{surface_albedo, surface_gloss},
     camera::pixel_ix_of,
     emitters::seen_light,
     inputs::KernelInputs,
@@ -37,14 +37,15 @@ pub fn guides(inputs: &KernelInputs, batch: &Batch, hits: &[Hit], states: &[Path
     }
 }
 
-/// Returns the surface that a camera ray hits, and its albedo. A lamp in front of the hit ends the path.
-fn first_surface(
-    inputs: &KernelInputs,
-    batch: &Batch,
-    pixel: UVec2,
-    path_ix: u32,
-    hit: &Hit,
-) -> Option<(Surface, Vec3)> {
+/// What a camera ray hits.
+struct FirstSurface {
+    surface: Surface,
+    albedo: Vec3,
+    gloss: f32,
+}
+
+/// Returns the surface that a camera ray hits. A lamp in front of the hit ends the path.
+fn first_surface(inputs: &KernelInputs, batch: &Batch, pixel: UVec2, path_ix: u32, hit: &Hit) -> Option<FirstSurface> {
     let key = key_of_path(inputs.frame(), batch, path_ix, pixel);
     let ray = path_camera_ray(inputs.frame(), pixel, random_pair(key, 0), random_pair(key, 1));
     if hit.triangle_ix == NO_TRIANGLE || seen_light(inputs, ray.origin, ray.direction, hit.t).t.is_finite() {
@@ -52,22 +53,21 @@ fn first_surface(
     }
     let (surface, material) = shaded_at(inputs, &ray, hit);
     let albedo = if is_unlit(&material) { Vec3::ZERO } else { surface_albedo(&material) };
-    Some((surface, albedo))
+    Some(FirstSurface { surface, albedo, gloss: surface_gloss(&material) })
 }
 
 /// Adds a path.
-fn add_path(guide: &mut Guide, surface: Option<(Surface, Vec3)>, seen: Vec3) {
-    if let Some((surface, _)) = &surface {
+fn add_path(guide: &mut Guide, first: Option<FirstSurface>, seen: Vec3) {
+    if let Some(FirstSurface { surface, gloss, .. }) = &first {
         guide.n_hits += 1;
         let weight = 1.0 / guide.n_hits as f32;
-        let step = surface.point_world - guide.position_world;
-        guide.position_world += weight * step;
-        guide.spread += step.dot(surface.point_world - guide.position_world);
+        guide.position_world += weight * (surface.point_world - guide.position_world);
         guide.normal_world += weight * (surface.shading - guide.normal_world);
+        guide.gloss += weight * (gloss - guide.gloss);
     }
     guide.n_samples += 1;
     let weight = 1.0 / guide.n_samples as f32;
-    let albedo = surface.map_or(Vec3::ZERO, |(_, albedo)| albedo);
+    let albedo = first.map_or(Vec3::ZERO, |first| first.albedo);
     guide.albedo += weight * (albedo - guide.albedo);
     guide.seen += weight * (seen - guide.seen);
     guide.seen_squared += weight * (squared_luminance(seen) - guide.seen_squared);
