@@ -11,8 +11,11 @@
 // The sine of the angle between a pixel's surface and the straight line to another pixel's point at which the weight of
 // the other pixel has fallen to 1 / e.
 #define PLANE_SINE 0.2
-// The exponent of the cosine between two normals is 2 to the power of this.
-#define NORMAL_EXPONENT_LOG2 5u
+// The squared distance of two mean normals at which the weight has fallen to 1 / e.
+#define NORMAL_DISTANCE 0.0625
+// What is subtracted from this distance if the pixel's own normals differ, as a multiple of their variance. Then a pixel
+// on an edge gets light from both sides if its samples are on both sides, up to one in four.
+#define NORMAL_VARIANCES 3.0
 
 // The light that surfaces scatter to the camera, divided by their albedo. radiance: of the pixel.
 vec3 light_on(vec3 radiance, Guide guide) {
@@ -30,11 +33,11 @@ vec3 direction_of(vec3 vector) {
 // less, because the division by the albedo increases their noise.
 float surface_weight(Guide a, Guide b) {
     if (a.n_hits == 0u || b.n_hits == 0u) return 0.0;
-    vec3 normal = direction_of(a.normal_world);
-    float cosine = clamp(dot(normal, direction_of(b.normal_world)), 0.0, 1.0);
-    for (uint i = 0u; i < NORMAL_EXPONENT_LOG2; ++i) cosine *= cosine;
-    float sine = abs(dot(normal, direction_of(b.position_world - a.position_world)));
-    return luminance_of(b.albedo) * cosine * exp(-sine / PLANE_SINE);
+    vec3 apart = a.normal_world - b.normal_world;
+    float own_variance = max(1.0 - dot(a.normal_world, a.normal_world), 0.0);
+    float turned = max(dot(apart, apart) - NORMAL_VARIANCES * own_variance, 0.0);
+    float sine = abs(dot(direction_of(a.normal_world), direction_of(b.position_world - a.position_world)));
+    return luminance_of(b.albedo) * exp(-turned / NORMAL_DISTANCE - sine / PLANE_SINE);
 }
 
 #endif

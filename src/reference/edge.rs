@@ -10,8 +10,10 @@ pub const LEAST_ALBEDO: f32 = 1e-4;
 /// The sine of the angle between a pixel's surface and the straight line to another pixel's point at which the weight
 /// of the other pixel has fallen to 1 / e.
 const PLANE_SINE: f32 = 0.2;
-/// The exponent of the cosine between two normals is 2 to the power of this.
-const NORMAL_EXPONENT_LOG2: u32 = 5;
+/// The squared distance of two mean normals at which the weight has fallen to 1 / e.
+const NORMAL_DISTANCE: f32 = 0.0625;
+/// What is subtracted from this distance if the pixel's own normals differ, as a multiple of their variance.
+const NORMAL_VARIANCES: f32 = 3.0;
 
 /// The light that surfaces scatter to the camera, divided by their albedo. `radiance`: of the pixel.
 pub fn light_on(radiance: Vec3, guide: &Guide) -> Vec3 {
@@ -26,8 +28,9 @@ pub fn surface_weight(a: &Guide, b: &Guide) -> f32 {
     if a.n_hits == 0 || b.n_hits == 0 {
         return 0.0;
     }
-    let normal = a.normal_world.normalize_or_zero();
-    let cosine = normal.dot(b.normal_world.normalize_or_zero()).clamp(0.0, 1.0);
-    let sine = normal.dot((b.position_world - a.position_world).normalize_or_zero()).abs();
-    luminance_of(b.albedo) * cosine.powi(1 << NORMAL_EXPONENT_LOG2) * (-sine / PLANE_SINE).exp()
+    let own_variance = (1.0 - a.normal_world.length_squared()).max(0.0);
+    let turned = (a.normal_world.distance_squared(b.normal_world) - NORMAL_VARIANCES * own_variance).max(0.0);
+    let direction = (b.position_world - a.position_world).normalize_or_zero();
+    let sine = a.normal_world.normalize_or_zero().dot(direction).abs();
+    luminance_of(b.albedo) * (-turned / NORMAL_DISTANCE - sine / PLANE_SINE).exp()
 }

@@ -108,3 +108,23 @@ fn a_step_reduces_noise_by_the_factor_of_its_weights() {
     assert!((found_factor / factor - 1.0).abs() < 0.3, "{found_factor}, not {factor}");
     assert!(inner().all(|pixel_ix| (found[pixel_ix][3] / 1e6 / factor - 1.0).abs() < 0.01));
 }
+
+/// A pixel on an edge, whose samples are on both sides, is blurred with both sides.
+#[test]
+fn a_pixel_of_two_surfaces_gets_light_from_both() {
+    let mut guides = plane(1.0);
+    let at = |pixel_ix: usize| pixel_ix % 40;
+    for (pixel_ix, guide) in guides.iter_mut().enumerate().filter(|(pixel_ix, _)| at(*pixel_ix) >= 17) {
+        let is_edge = at(pixel_ix) == 17;
+        guide.normal_world = if is_edge { 0.5 * (Vec3::X + Vec3::Z) } else { Vec3::X };
+        guide.position_world.z = 17.0 - guide.position_world.x;
+        guide.position_world.x = 17.0;
+    }
+    // The samples of one pixel on the edge were dark by chance.
+    let dark = 15 * 40 + 17;
+    let light = |pixel_ix| if pixel_ix == dark { 0.0 } else { 1.0 };
+    assert!((whole(&guides, light, 1.0)[dark] - 1.0).abs() < 0.2);
+    let mut apart = guides;
+    apart[dark].normal_world = Vec3::Y;
+    assert!(whole(&apart, light, 1.0)[dark] < 0.2, "a surface of its own");
+}
