@@ -219,3 +219,28 @@ fn frames_differ_by_the_camera_alone_on_the_device_too() {
     succeed(path, &[&arguments[..], &["--frames", "1", "-o", "b#.png"]].concat());
     assert_eq!(pixels(path, "a1.png"), pixels(path, "b1.png"));
 }
+
+/// Pictures of paths know their noise, which only they have, and a filter reduces it.
+#[test]
+fn the_noise_of_paths_is_written_and_filtered() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let of_paths = ["--integrator", "path", "--spp", "4"];
+    render(path, &[&of_paths[..], &["-o", "noisy.exr", "--aov", "variance,samples"]].concat());
+    let channels = channels(&path.join("noisy.exr"));
+    let bits = |name: &str| &channels.iter().find(|(found, ..)| found == name).expect("the channel").2;
+    assert!(bits("samples.N").iter().all(|&n| n == 4));
+    let variances: Vec<_> = bits("variance.Y").iter().map(|&bits| f32::from_bits(bits)).collect();
+    assert!(variances.iter().all(|v| (0.0..1e3).contains(v)) && variances.iter().any(|&v| v > 0.0));
+    for filter in ["off", "edge"] {
+        render(path, &[&of_paths[..], &["-o", &format!("{filter}.png"), "--denoise", filter]].concat());
+    }
+    let roughness = |name| {
+        let picture = pixels(path, name);
+        let rows = picture.rows().map(|row| row.map(|pixel| i32::from(pixel.0[1])).collect::<Vec<_>>());
+        rows.flat_map(|row| row.windows(2).map(|pair| (pair[0] - pair[1]).abs()).collect::<Vec<_>>()).sum::<i32>()
+    };
+    assert!(2 * roughness("edge.png") < roughness("off.png"));
+    refused(path, 2, &["--integrator", "whitted", "--denoise", "edge"], "--integrator path");
+    refused(path, 2, &["--integrator", "whitted", "--aov", "samples", "-o", "a.exr"], "--integrator path");
+}

@@ -13,8 +13,8 @@
 #define PLANE_SINE 0.2
 // The squared distance of two mean normals at which the weight has fallen to 1 / e.
 #define NORMAL_DISTANCE 0.0625
-// What is subtracted from this distance if the pixel's own normals differ, as a multiple of their variance. Then a pixel
-// on an edge gets light from both sides if its samples are on both sides, up to one in four.
+// What is subtracted from this distance if the pixel's own normals differ, as a multiple of their variance. Then a
+// pixel on an edge gets light from both sides if its samples are on both sides, up to one in four.
 #define NORMAL_VARIANCES 3.0
 
 // The light that surfaces scatter to the camera, divided by their albedo. radiance: of the pixel.

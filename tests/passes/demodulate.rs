@@ -78,7 +78,7 @@ fn agrees_with_its_twin() {
 fn noise_has_its_variance() {
     let guides: Vec<_> = (0..N_PIXELS).map(|pixel_ix| flat(pixel_ix, 0.5)).collect();
     // A chessboard of 0.4 and 0.6, whose variance is 0.01.
-    let board = |pixel_ix: usize| if (pixel_ix % 40 + pixel_ix / 40) % 2 == 0 { 0.4 } else { 0.6 };
+    let board = |pixel_ix: usize| if (pixel_ix % 40 + pixel_ix / 40).is_multiple_of(2) { 0.4 } else { 0.6 };
     let radiance: Vec<[f32; 4]> =
         (0..N_PIXELS).map(|pixel_ix| [board(pixel_ix); 3]).map(|[r, g, b]| [r, g, b, r * r]).collect();
     let found = demodulated(&edge_stage(1), &radiance, &guides);
