@@ -30,5 +30,5 @@ void main() {
     }
     pixel_accumulated[n_sums * stride + pixel_ix] = vec4(sum, 1.0);
     for (; n_sums > 0u; --n_sums) sum = pixel_accumulated[(n_sums - 1u) * stride + pixel_ix].xyz + sum;
-    pixel_radiance[pixel_ix] = vec4(sum / float(frame.n_samples), 1.0);
+    pixel_radiance[pixel_ix] = vec4(sum * frame.samples_reciprocal, 1.0);
 }

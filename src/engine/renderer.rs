@@ -6,7 +6,7 @@ use tracing::info_span;
 
 use crate::{
     cpu::{self, Batching},
-    frame::{Drawn, Integrator, Picture, RenderOptions, Watcher, sampling::samples_log2},
+    frame::{Drawn, Integrator, Picture, RenderOptions, SampleRange, SampleSums, Watcher, sampling::samples_log2},
     gpu::{Context, GivenImage, GpuError, TimelinePoint},
     render::BandedRenderer,
     scene::Camera,
@@ -57,6 +57,37 @@ impl Renderer {
     /// # Errors
     /// A call fails, one pixel alone makes more rays than a queue holds, or memory runs out.
     pub fn draw(&mut self, camera: &Camera, n_samples: u32, mut watcher: impl Watcher) -> Result<Drawn, GpuError> {
+        self.draw_watched(camera, n_samples, &mut watcher)
+    }
+
+    /// Draws the samples of a range with the path tracer, one aligned block after the other. Returns their sums, from
+    /// which [`SampleSums::mean`] makes the picture. The features are those of the first block.
+    ///
+    /// # Errors
+    /// Fails as [`Renderer::draw`] does.
+    pub fn draw_range(
+        &mut self,
+        camera: &Camera,
+        samples: SampleRange,
+        mut watcher: impl Watcher,
+    ) -> Result<(Drawn, SampleSums), GpuError> {
+        let (mut drawn, mut sums) = (None::<Drawn>, SampleSums::default());
+        for block in samples.blocks() {
+            match &mut self.0 {
+                Backend::Device(renderer) => renderer.set_first_sample(block.first)?,
+                Backend::Cpu(renderer) => renderer.set_first_sample(block.first),
+            }
+            let next = self.draw_watched(camera, block.len(), &mut watcher)?;
+            sums.push_mean(block, &self.picture()?.radiance);
+            match &mut drawn {
+                None => drawn = Some(next),
+                Some(all) => all.profile.add(&next.profile),
+            }
+        }
+        Ok((drawn.unwrap_or_default(), sums))
+    }
+
+    fn draw_watched(&mut self, camera: &Camera, n_samples: u32, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         match &mut self.0 {
             Backend::Device(renderer) => {
                 renderer.set_camera(camera);
@@ -64,7 +95,7 @@ impl Renderer {
             }
             Backend::Cpu(renderer) => {
                 renderer.set_camera(camera);
-                Ok(draw_on_cpu(renderer, n_samples, &mut watcher))
+                Ok(draw_on_cpu(renderer, n_samples, watcher))
             }
         }
     }

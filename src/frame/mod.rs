@@ -4,6 +4,7 @@
 //! ```text
 //! options    RenderOptions, crop: what to render, and by which methods
 //! constants  the uniform buffer of the kernels; sampling: the positions of samples in their pixels
+//! sample_range  parts of a picture's samples, and their sums
 //! plan       the order of passes and the barriers between them
 //!   pass       what each pass does, reads and writes
 //!   resource   the buffers and images that passes write
@@ -21,6 +22,7 @@ mod pass;
 pub mod plan;
 mod profile;
 mod resource;
+mod sample_range;
 pub mod sampling;
 mod view;
 
@@ -32,6 +34,7 @@ pub use self::{
     plan::{FrameKind, Plan, Section, Step, Touch},
     profile::{BounceStats, PassTime, Profile},
     resource::Resource,
+    sample_range::{BlockSum, SampleRange, SampleSums},
     view::View,
 };
 use crate::{accel::kdtree::Traversal, layout};

@@ -10,7 +10,7 @@ use std::{
 use super::Renderer;
 use crate::{
     buffers::Pixels,
-    frame::{Crop, Drawn, Integrator, Picture, Profile, RenderOptions, Watcher, sampling::samples_log2},
+    frame::{Crop, Drawn, Integrator, PathOptions, Picture, Profile, RenderOptions, Watcher, sampling::samples_log2},
     gpu::{Context, GivenImage, GpuError, Limits, TimelinePoint},
     layout::Feature,
     scene::Camera,
@@ -63,19 +63,30 @@ impl BandedRenderer {
         self.renderer.set_camera(camera);
     }
 
+    /// Sets the index of the next picture's first sample, a multiple of `2^MOST_SAMPLES_LOG2`. Only frames of paths
+    /// know it.
+    ///
+    /// # Errors
+    /// A Vulkan call fails.
+    pub fn set_first_sample(&mut self, first_sample: u32) -> Result<(), GpuError> {
+        let options = self.renderer.options();
+        let paths = PathOptions { first_sample, ..options.paths };
+        self.renderer.set_options(&RenderOptions { paths, ..options.clone() })
+    }
+
     /// Draws a new picture of `n_samples` samples a pixel, at least one, and reports its progress to the watcher.
     ///
     /// # Errors
     /// A Vulkan call fails; one pixel alone makes more rays than the queue holds; out of memory.
-    pub fn draw(&mut self, n_samples: u32, mut watcher: impl Watcher) -> Result<Drawn, GpuError> {
+    pub fn draw(&mut self, n_samples: u32, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         if let [_] = self.bands[..] {
-            return self.draw_band(n_samples, &mut watcher);
+            return self.draw_band(n_samples, watcher);
         }
         let mut all = Drawn { features: Vec::new(), profile: Profile::default() };
         let mut joined = self.room_for_all(&mut all.features)?;
         for (band_ix, &band) in self.bands.clone().iter().enumerate() {
             self.renderer.set_crop(band)?;
-            let drawn = self.draw_band(n_samples, &mut watcher)?;
+            let drawn = self.draw_band(n_samples, watcher)?;
             let picture = self.renderer.picture()?;
             joined.radiance.extend(picture.radiance);
             joined.display.extend(picture.display);

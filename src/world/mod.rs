@@ -11,6 +11,7 @@ mod geometry;
 mod levels;
 mod mismatch;
 mod path_materials;
+mod scene_hash;
 mod texture_arrays;
 mod textured;
 
