@@ -132,6 +132,7 @@ fn assemble(file: &File, description: Description, options: &LoadOptions) -> Res
     }
     let materials = NamedMaterials::new(&description.materials, indices);
     let mut placer = Placer::new(file, (scene, images), materials, &tables);
+    placer.read_together(&tables);
     for table in &tables {
         placer.add(table)?;
     }
