@@ -69,7 +69,7 @@ struct Read {
 /// What a file that was read together with others has become.
 enum Content {
     /// A mesh.
-    Shape(Result<Shape, SceneError>),
+    Shape(Box<Result<Shape, SceneError>>),
     /// Bytes, since their format is not the one that the file's name tells.
     Bytes(Vec<u8>),
 }
@@ -236,7 +236,7 @@ impl<'a> Placer<'a> {
         let (shading, origin) = reading.shape_options();
         let mut loading = Loading { shading, origin, n_loaded, access: self.file.access, images: &mut self.images };
         let loaded = match content {
-            Content::Shape(shape) => shape?.loaded(path, &mut loading),
+            Content::Shape(shape) => (*shape)?.loaded(path, &mut loading),
             Content::Bytes(bytes) => parse_mesh(path, bytes, &mut loading),
         };
         let Loaded { mut mesh, materials, uses_crease } = loaded?;
@@ -311,7 +311,7 @@ impl Reading {
         match MeshFormat::of(&self.path, &bytes) {
             MeshFormat::Ply | MeshFormat::Stl => {
                 let made = Shape::parse(&self.path, bytes, self.shape_options(), (0, &Progress::default()));
-                Content::Shape(made)
+                Content::Shape(Box::new(made))
             }
             MeshFormat::Gltf | MeshFormat::Obj => Content::Bytes(bytes),
         }

@@ -14,7 +14,6 @@ use crate::{
     gpu::{Context, ContextOptions, GpuError, Presenter, WindowHandles},
     passes::Present,
     render::Renderer,
-    world::World,
 };
 
 /// A device that renders a scene and shows its pictures in a window.
@@ -64,13 +63,13 @@ impl GpuSession {
     /// integrator, and a size for which the buffers are made.
     ///
     /// # Errors
-    /// The scene or the picture exceeds the device's memory. Then nothing has changed.
-    pub fn change_to(&mut self, world: &World, options: &RenderOptions) -> Result<(), GpuError> {
+    /// The buffers exceed the device's memory. Then nothing has changed.
+    pub fn change_to(&mut self, options: &RenderOptions) -> Result<(), GpuError> {
         let is_of = |renderer: &Renderer| renderer.options().integrator == options.integrator;
         let (renderer, present) = match self.other.take_if(|(renderer, _)| is_of(renderer)) {
             Some(other) => other,
             None => {
-                let renderer = Renderer::new(self.context.clone(), world, options)?;
+                let renderer = self.renderer.sharing(options)?;
                 let present = Present::new(&self.context, renderer.resources(), &self.presenter)?;
                 (renderer, present)
             }

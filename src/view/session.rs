@@ -258,7 +258,7 @@ impl Session {
 
     /// Changes to the renderer of another integrator. If the device refuses it, the one that is used stays.
     fn change_to(&mut self, gpu: &mut GpuSession, whole: &RenderOptions) -> Result<(), GpuError> {
-        match gpu.change_to(&self.loaded.world, whole) {
+        match gpu.change_to(whole) {
             Ok(()) => {
                 self.drawing = whole.integrator;
                 let (view, brightest) = self.view();

@@ -386,7 +386,11 @@ fn files_that_are_read_together_are_those_that_are_read_alone() {
     // The content counts, and not the name.
     files.insert(3, ("odd.ply".to_owned(), stl_binary(b"")));
     let table = |ix: usize, name: &str| {
-        format!("[[mesh]]\nfile = '{name}'\nsmooth = {}\ntransform.translate = [{}, 0, 0]\n", ix % 2 == 0, 4 * ix)
+        format!(
+            "[[mesh]]\nfile = '{name}'\nsmooth = {}\ntransform.translate = [{}, 0, 0]\n",
+            ix.is_multiple_of(2),
+            4 * ix
+        )
     };
     let load_tables = |tables: &str| {
         let named = files.iter().map(|(name, content)| (&name[..], &content[..]));
