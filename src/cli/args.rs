@@ -31,9 +31,8 @@ const AOV: &str = "Layers of each pixel to write into an .exr, separated by comm
 /// Ray tracing by depth-first kd-tree traversal, in Vulkan compute.
 #[derive(Parser)]
 #[command(name = "kdray", version, arg_required_else_help = false)]
-#[command(
-    after_help = "Exit codes: 0 success, 2 usage, 3 scene, rays or parts, 4 device, 5 output, 128 + n ended by signal n."
-)]
+#[command(after_help = "Exit codes: 0 success, 2 usage, 3 scene, rays or parts, 4 device, 5 output, 128 + n ended by \
+                  signal n.")]
 pub struct Args {
     #[command(subcommand)]
     pub command: Command,

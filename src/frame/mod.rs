@@ -67,6 +67,9 @@ pub struct RenderOptions {
     pub profile: bool,
     /// Whether the features of each pixel are written: what its primary ray hits, and what all its rays cost.
     pub features: bool,
+    /// Whether [`Integrator::Whitted`] shows ambient light in place of light that only paths show: of an environment,
+    /// of lights with an area and of surfaces that shine.
+    pub stands_in: bool,
     /// What only paths have: filters, lens, bounds.
     pub paths: PathOptions,
 }
@@ -120,6 +123,7 @@ impl Default for RenderOptions {
             primary: Primary::Raster,
             profile: true,
             features: false,
+            stands_in: false,
             paths: PathOptions::default(),
         }
     }

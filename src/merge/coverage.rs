@@ -55,7 +55,8 @@ fn names(part: &Part) -> Vec<&str> {
     part.channels.iter().map(|channel| channel.name.as_str()).collect()
 }
 
-/// Refuses two parts that have the same sample of a pixel, or some of their pixels in common. The tiles are in the order of their first rows.
+/// Refuses two parts that have the same sample of a pixel, or some of their pixels in common. The tiles are in the
+/// order of their first rows.
 fn check_overlaps(tiles: &[Tile]) -> Result<(), MergeError> {
     let overlap =
         |a: &Part, b: &Part, common| MergeError::Overlap { path: a.path.clone(), other: b.path.clone(), common };
