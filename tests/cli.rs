@@ -30,6 +30,7 @@ fn usage_mistakes_are_refused_before_the_scene_is_read() {
         (&["render", "none.toml", "--denoise", "median"], "median"),
         (&["render", "none.toml", "--denoise-threshold", "nan"], "--denoise-threshold"),
         (&["render", "none.toml", "--denoise", "off", "--denoise-threshold", "1"], "--denoise off"),
+        (&["render", "none.toml", "--denoise", "edge", "--denoise-threshold", "1"], "--denoise edge"),
         (&["render", "none.toml", "--exposure", "0"], "--exposure"),
         (&["render", "none.toml", "--exposure", "inf"], "--exposure"),
         (&["render", "none.toml", "--tonemap", "film"], "linear, agx, aces"),

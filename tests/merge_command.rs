@@ -77,6 +77,32 @@ fn samples_and_tiles_join_to_the_same_bits() {
     }
 }
 
+/// The counts of samples add up, and the variance is about that of all samples: the mean over the picture is within a
+/// tenth.
+#[test]
+fn noise_is_that_of_all_samples() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let noise = ["--cpu", "--spp", "80", "--aov", "variance,samples"];
+    render_paths(path, "whole.exr", &noise);
+    render_paths(path, "a.exr", &[&noise[..], &["--samples", "0-48"]].concat());
+    render_paths(path, "b.exr", &[&noise[..], &["--samples", "48-80"]].concat());
+    merge(path, &["a.exr", "b.exr"], "merged.exr");
+    let channel = |file: &str, name: &str| {
+        contents(&path.join(file)).0.into_iter().find(|(channel, _)| channel == name).unwrap().1
+    };
+    for (file, n_samples) in [("whole.exr", 80), ("a.exr", 48), ("b.exr", 32), ("merged.exr", 80)] {
+        assert!(channel(file, "samples.N").iter().all(|n| *n == n_samples), "{file}");
+    }
+    let mean = |file: &str| {
+        channel(file, "variance.Y").into_iter().map(|bits| f64::from(f32::from_bits(bits))).sum::<f64>() / 1200.0
+    };
+    let (whole, merged) = (mean("whole.exr"), mean("merged.exr"));
+    assert!(whole > 0.0 && (merged / whole - 1.0).abs() < 0.1, "{merged}, {whole}");
+    // The variance of a part is that of fewer samples.
+    assert!(mean("a.exr") > 1.3 * whole, "{}", mean("a.exr"));
+}
+
 /// Tiles of the paper's tracer with the noise filter, whose windows overlap, join as well. What a display shows is
 /// encoded again, within a step of 8 bits.
 #[test]

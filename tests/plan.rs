@@ -4,7 +4,7 @@
 use std::{collections::BTreeSet, fs};
 
 use kdray::frame::{
-    FrameKind, Integrator, Pass, Plan, Primary, RenderOptions, Resource, Step, Touch,
+    Denoise, FrameKind, Integrator, Pass, Plan, Primary, RenderOptions, Resource, Step, Touch,
     plan::{self, passes},
 };
 use spirq::{
@@ -17,8 +17,8 @@ use spirq::{
 fn kinds() -> Vec<FrameKind> {
     let mut kinds = Vec::new();
     for (&primary, n_bounces) in Primary::ALL.iter().zip([3, 2, 1]).chain(Primary::ALL.iter().zip([1, 3, 2])) {
-        for flags in 0..128_u32 {
-            let [features, is_lit, has_lights, adds_samples, denoises, shows_feature, of_paths] =
+        for flags in 0..192_u32 {
+            let [features, is_lit, has_lights, adds_samples, shows_feature, of_paths] =
                 std::array::from_fn(|bit| flags & (1 << bit) != 0);
             let kind = FrameKind {
                 integrator: if of_paths { Integrator::Path } else { Integrator::Whitted },
@@ -28,10 +28,12 @@ fn kinds() -> Vec<FrameKind> {
                 is_lit,
                 has_lights,
                 adds_samples,
-                denoises,
+                denoise: [Denoise::Off, Denoise::Paper { threshold: 1.0 }, Denoise::Edge][flags as usize / 64],
                 shows_feature: shows_feature && features,
             };
-            kinds.push(kind);
+            if of_paths || kind.denoise != Denoise::Edge {
+                kinds.push(kind);
+            }
         }
     }
     kinds
@@ -95,7 +97,7 @@ fn hazards(steps: &[Step], denoises: bool) -> Vec<String> {
 #[test]
 fn no_pass_runs_before_what_it_needs_is_there() {
     for kind in kinds() {
-        let found = hazards(&steps(&Plan::new(&kind)), kind.denoises && kind.is_lit);
+        let found = hazards(&steps(&Plan::new(&kind)), kind.denoise != Denoise::Off && kind.is_lit);
         assert!(found.is_empty(), "{kind:?}: {found:#?}");
     }
 }
@@ -103,9 +105,12 @@ fn no_pass_runs_before_what_it_needs_is_there() {
 /// Without any one of the barriers, some pass could run too early.
 #[test]
 fn every_barrier_is_needed() {
-    for &integrator in Integrator::ALL {
+    let paper = RenderOptions::default().denoise;
+    let kinds = [(Integrator::Whitted, paper), (Integrator::Path, paper), (Integrator::Path, Denoise::Edge)];
+    for (integrator, denoise) in kinds {
         let options = RenderOptions {
             integrator,
+            denoise,
             features: true,
             max_depth: 3,
             primary: Primary::SoftwareRaster,
@@ -118,7 +123,7 @@ fn every_barrier_is_needed() {
             let mut without = all.clone();
             // This removes the equal barriers of all batches and bounces.
             without.retain(|step| *step != all[i]);
-            assert!(!hazards(&without, true).is_empty(), "{integrator}: {:?} is not needed", all[i]);
+            assert!(!hazards(&without, true).is_empty(), "{integrator}, {denoise:?}: {:?} is not needed", all[i]);
         }
     }
 }

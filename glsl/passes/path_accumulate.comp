@@ -23,12 +23,12 @@ void main() {
     uint stride = frame.width * frame.height;
     uint n_earlier = frame.n_samples - (1u << frame.samples_log2);
     uint n_sums = uint(bitCount(n_earlier));
-    precise vec3 sum = pixel_radiance[pixel_ix].xyz;
+    precise vec4 sum = pixel_radiance[pixel_ix];
     for (uint level = frame.samples_log2; ((n_earlier >> level) & 1u) != 0u; ++level) {
         n_sums -= 1u;
-        sum = pixel_accumulated[n_sums * stride + pixel_ix].xyz + sum;
+        sum = pixel_accumulated[n_sums * stride + pixel_ix] + sum;
     }
-    pixel_accumulated[n_sums * stride + pixel_ix] = vec4(sum, 1.0);
-    for (; n_sums > 0u; --n_sums) sum = pixel_accumulated[(n_sums - 1u) * stride + pixel_ix].xyz + sum;
-    pixel_radiance[pixel_ix] = vec4(sum * frame.samples_reciprocal, 1.0);
+    pixel_accumulated[n_sums * stride + pixel_ix] = sum;
+    for (; n_sums > 0u; --n_sums) sum = pixel_accumulated[(n_sums - 1u) * stride + pixel_ix] + sum;
+    pixel_radiance[pixel_ix] = sum * frame.samples_reciprocal;
 }

@@ -770,6 +770,8 @@ struct Counters {
 //   the ray.
 // - `n_rays`: primary, secondary and shadow rays.
 // - `n_steps`: nodes, slabs, cells of a grid and triangles of leaves that all of these rays read.
+// - `variance`, `n_samples`: of the mean luminance of the pixel of a picture of paths, and the number of its samples.
+//   Kernels do not know them: the host sets them when the picture is complete.
 struct Feature {
     vec3 position_world;
     uint triangle_ix;
@@ -779,8 +781,28 @@ struct Feature {
     float depth;
     uint n_rays;
     uint n_steps;
-    uint reserved0;
-    uint reserved1;
+    float variance;
+    uint n_samples;
+};
+
+// What the noise filter `edge` knows of a pixel beside its colour, 64 bytes: means over its samples so far.
+//
+// - `position_world`: mean of the first hits' points (world units). `n_hits`: number of samples that have one.
+// - `normal_world`: mean of the first hits' shading normals, not of unit length.
+// - `gloss`: mean of the first hits' `surface_gloss`, 0..1.
+// - `albedo`: mean share of light that the first hit scatters (`surface_albedo`). A sample without a hit has 0.
+// - `seen`: mean of the light that camera rays meet: emission, lamps and what is beyond the scene.
+// - `seen_squared`: mean of the squared luminance of this light.
+// - `n_samples`: number of samples of these means.
+struct Guide {
+    vec3 position_world;
+    uint n_hits;
+    vec3 normal_world;
+    float gloss;
+    vec3 albedo;
+    float seen_squared;
+    vec3 seen;
+    uint n_samples;
 };
 
 // What kernels need of the scene's triangles and acceleration structure besides the arrays (a uniform buffer).
@@ -941,6 +963,17 @@ struct FalseColor {
     uint view;
     float brightest;
 };
+
+// Push constants of `edge_filter.comp`: the number of the filter's step, from 0 to `EDGE_STEPS - 1`.
+struct EdgeStep {
+    uint step_ix;
+};
+
+// The number of steps of the noise filter `edge`, which is odd. Step i compares pixels at multiples of 2^i pixels.
+#define EDGE_STEPS 5u
+// How far the light of another pixel can get by all steps: 2 * (2^EDGE_STEPS - 1), and the radius of the square in which
+// the variance is estimated (pixels).
+#define EDGE_BORDER 65u
 
 // Push constants of `present.frag`, which shows a picture in a window: the sizes of both (pixels).
 struct Present {
@@ -1143,9 +1176,11 @@ struct GridSort {
 #define BIND_LIGHT_VISIBILITY 14u
 // A vec4 for each ray: its radiance, weighted by its throughput.
 #define BIND_RAY_RADIANCE 15u
-// A vec4 for each pixel: the sample's radiance, or the mean of all samples.
+// A vec4 for each pixel: the sample's radiance, or the mean of all samples. In frames of paths, it is first the sum of
+// the frame's samples, and w has the same of the samples' squared luminance.
 #define BIND_PIXEL_RADIANCE 16u
-// A vec4 for each pixel: the radiance after noise reduction.
+// A vec4 for each pixel: the radiance after noise reduction. With the filter `edge`, as many elements follow: the light
+// on surfaces, and in w the variance of its luminance, between two steps of the filter.
 #define BIND_PIXEL_FILTERED 17u
 // A word for each pixel: what is displayed, 8 bits a channel, R in the lowest byte.
 #define BIND_PIXEL_DISPLAY 18u
@@ -1176,6 +1211,8 @@ struct GridSort {
 // Two lists of `Frame.queue_capacity` words: the indices of the paths that are alive, in their order. Bounces of even
 // depth have the first list, those of odd depth the second.
 #define BIND_LIVE_PATHS 35u
+// One `Guide` for each pixel.
+#define BIND_PIXEL_GUIDES 36u
 
 // The scene's arrays as texels: the binding of each is this plus its own. All other bindings are below it.
 #define BIND_TEXELS 64u

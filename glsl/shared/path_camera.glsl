@@ -31,7 +31,7 @@ vec2 filter_offset(vec2 u) {
 
 // The point of the unit disk, by the concentric map of the square (Shirley, Chiu: A Low Distortion Map Between Disk and
 // Square, 1997).
-vec2 disk_point(vec2 u) {
+vec2 lens_point(vec2 u) {
     vec2 at = 2.0 * u - 1.0;
     if (at == vec2(0.0)) return vec2(0.0);
     bool is_flat = abs(at.x) > abs(at.y);
@@ -50,7 +50,7 @@ PathRay path_camera_ray(uvec2 pixel, vec2 in_pixel, vec2 in_lens) {
     if (ORTHOGRAPHIC) origin += in_image;
     else direction += in_image;
     if (frame.aperture > 0.0) {
-        vec2 lens = frame.aperture * disk_point(in_lens);
+        vec2 lens = frame.aperture * lens_point(in_lens);
         vec3 aside = lens.x * normalize(frame.right) + lens.y * normalize(frame.up);
         direction = frame.focus * direction - aside;
         origin += aside;

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use crate::{
-    frame::{Integrator, Primary, RenderOptions},
+    frame::{Denoise, Integrator, Primary, RenderOptions},
     gpu::{Buffer, BufferUse, Context, GpuError, Target, TargetKind},
-    layout::{Feature, Frame, MOST_SAMPLES_LOG2},
+    layout::{Feature, Frame, Guide, MOST_SAMPLES_LOG2},
 };
 
 /// Sums of samples for which each pixel of a frame of paths has room at least. They are enough for 4096 samples.
@@ -22,7 +22,7 @@ pub struct Pixels {
     /// (glsl/passes/path_accumulate.comp).
     pub pixel_accumulated: Option<Buffer<[f32; 4]>>,
     /// The radiance after the noise filter. None without a noise filter, in which case later kernels read
-    /// `pixel_radiance`.
+    /// `pixel_radiance`. For the filter `edge`, it has twice as many elements: the second half is between two steps.
     pub pixel_filtered: Option<Buffer<[f32; 4]>>,
     /// The displayed colour, 8 bits each: red in the lowest byte, green, blue, 255.
     pub pixel_display: Buffer<u32>,
@@ -31,6 +31,8 @@ pub struct Pixels {
     pub pixel_nearest: Buffer<u64>,
     /// The first-hit features. Empty unless the options request them.
     pub pixel_features: Buffer<Feature>,
+    /// What the noise filter `edge` knows of the pixels. Empty unless it runs.
+    pub pixel_guides: Buffer<Guide>,
     /// The index of the nearest triangle at each pixel of the whole picture, of which only the window's part is
     /// drawn. If the options do not use the graphics pipeline, this is one pixel that no kernel reads.
     pub triangle_ids: Arc<Target>,
@@ -48,7 +50,8 @@ impl Pixels {
         let size = (frame.picture_width, frame.picture_height);
         let storage = BufferUse::Storage;
         let (features, software_raster) = (options.features, options.primary == Primary::SoftwareRaster);
-        let filters = frame.denoise_threshold.is_finite();
+        let n_guides = if options.noise_filter() == Denoise::Edge { n_pixels } else { 0 };
+        let n_filtered = n_filtered(frame, options);
         let (triangle_ids, depth) = if uses_graphics_pipeline(options) {
             let target = |name, kind| Target::new(context, name, kind, size).map(Arc::new);
             (target("triangle_ids", TargetKind::Uint)?, Some(target("depth", TargetKind::Depth)?))
@@ -58,10 +61,13 @@ impl Pixels {
         Ok(Self {
             pixel_radiance: Buffer::new(context, "pixel_radiance", n_pixels, storage)?,
             pixel_accumulated: None,
-            pixel_filtered: filters.then(|| Buffer::new(context, "pixel_filtered", n_pixels, storage)).transpose()?,
+            pixel_filtered: (n_filtered > 0)
+                .then(|| Buffer::new(context, "pixel_filtered", n_filtered, storage))
+                .transpose()?,
             pixel_display: Buffer::new(context, "pixel_display", n_pixels, storage)?,
             pixel_nearest: Buffer::new(context, "pixel_nearest", if software_raster { n_pixels } else { 0 }, storage)?,
             pixel_features: Buffer::new(context, "pixel_features", if features { n_pixels } else { 0 }, storage)?,
+            pixel_guides: Buffer::new(context, "pixel_guides", n_guides, storage)?,
             triangle_ids,
             depth,
         })
@@ -93,7 +99,9 @@ impl Pixels {
             && self.depth.is_some() == uses_graphics_pipeline(options)
             && self.pixel_features.is_empty() != options.features
             && self.pixel_nearest.is_empty() == (options.primary != Primary::SoftwareRaster)
-            && self.pixel_filtered.is_some() == frame.denoise_threshold.is_finite()
+            && self.pixel_filtered.is_some() == (n_filtered(frame, options) > 0)
+            && self.pixel_filtered.as_ref().map_or(0, Buffer::len) >= n_filtered(frame, options)
+            && self.pixel_guides.is_empty() == (options.noise_filter() != Denoise::Edge)
     }
 
     /// The radiance after the noise filter, or without it if there is none.
@@ -110,6 +118,15 @@ impl Pixels {
 /// Whether the graphics pipeline rasterizes the primary rays.
 pub(crate) fn uses_graphics_pipeline(options: &RenderOptions) -> bool {
     options.primary == Primary::Raster
+}
+
+/// The number of elements of `pixel_filtered` that the noise filter needs.
+fn n_filtered(frame: &Frame, options: &RenderOptions) -> usize {
+    match options.noise_filter() {
+        Denoise::Off => 0,
+        Denoise::Paper { .. } => n_pixels(frame),
+        Denoise::Edge => 2 * n_pixels(frame),
+    }
 }
 
 /// The number of the window's pixels.

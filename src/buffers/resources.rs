@@ -48,7 +48,8 @@ const BINDINGS_OF_WHITTED: [u32; 5] = [
     layout::BIND_RASTER_GROUPS,
 ];
 /// Further bindings, for paths.
-const BINDINGS_OF_PATHS: [u32; 3] = [layout::BIND_PATH_STATES, layout::BIND_SEGMENTS, layout::BIND_LIVE_PATHS];
+const BINDINGS_OF_PATHS: [u32; 4] =
+    [layout::BIND_PATH_STATES, layout::BIND_SEGMENTS, layout::BIND_LIVE_PATHS, layout::BIND_PIXEL_GUIDES];
 
 /// The number of elements of `counters` for each bounce of each batch, including the unused elements between the
 /// copies of a counter.
@@ -198,6 +199,7 @@ impl Resources {
                 (layout::BIND_PATH_STATES, Binding::Buffer(paths.path_states.any())),
                 (layout::BIND_SEGMENTS, Binding::Buffer(paths.segments.any())),
                 (layout::BIND_LIVE_PATHS, Binding::Buffer(paths.live_paths.any())),
+                (layout::BIND_PIXEL_GUIDES, Binding::Buffer(pixels.pixel_guides.any())),
             ],
         };
         BindingSet::new(&self.bindings, "frame", &[&self.accel.objects(), &own[..], &more].concat())

@@ -280,6 +280,14 @@ impl RenderArgs {
                 "--crop {crop} reaches beyond the picture of {width}x{height} pixels"
             )));
         }
+        if options.denoise == Denoise::Edge && options.integrator != Integrator::Path {
+            return Err(CliError::Usage(
+                "--denoise edge needs --integrator path: it removes the noise of random samples".into(),
+            ));
+        }
+        if let Some(aov) = self.aov.iter().find(|aov| aov.is_of_paths() && options.integrator != Integrator::Path) {
+            return Err(CliError::Usage(format!("--aov {aov} needs --integrator path: it is about random samples")));
+        }
         // Passes are timed only if some output shows the times.
         let profile = !self.quiet || self.profile.is_some() || self.trace.is_some();
         Ok(RenderOptions { crop, features: !self.aov.is_empty(), profile, ..options })

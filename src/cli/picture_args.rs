@@ -25,8 +25,8 @@ pub struct PictureArgs {
     /// reflected and refracted rays; shadow rays are not counted [default: the scene's]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=64))]
     pub max_depth: Option<u32>,
-    /// Noise filter for the finished picture [default: the scene's]
-    #[arg(long, value_name = "paper|off")]
+    /// Noise filter for the finished picture; edge needs --integrator path [default: the scene's]
+    #[arg(long, value_name = "paper|edge|off")]
     pub denoise: Option<DenoiseWord>,
     /// Threshold of the noise filter, 0 to 4: the filter smooths a pixel if its luminance differences to its four
     /// neighbours, in units of display white, add up to more than the threshold; implies --denoise paper [default:
@@ -186,8 +186,9 @@ impl PictureArgs {
     /// Refuses arguments that contradict each other.
     pub fn check(&self) -> Result<(), CliError> {
         check_accel(self.accel, self.traversal, self.build)?;
-        if matches!(self.denoise, Some(DenoiseWord::Off)) && self.denoise_threshold.is_some() {
-            return Err(CliError::Usage("--denoise-threshold has no meaning with --denoise off".into()));
+        if let (Some(word @ (DenoiseWord::Off | DenoiseWord::Edge)), Some(_)) = (self.denoise, self.denoise_threshold) {
+            let word = if word == DenoiseWord::Off { "off" } else { "edge" };
+            return Err(CliError::Usage(format!("--denoise-threshold has no meaning with --denoise {word}")));
         }
         Ok(())
     }
@@ -242,21 +243,24 @@ impl PictureArgs {
     fn denoise(&self, scene: Denoise) -> Denoise {
         let threshold = match scene {
             Denoise::Paper { threshold } => threshold,
-            Denoise::Off => Denoise::DEFAULT_THRESHOLD,
+            Denoise::Off | Denoise::Edge => Denoise::DEFAULT_THRESHOLD,
         };
         match (self.denoise, self.denoise_threshold) {
             (None, None) => scene,
             (Some(DenoiseWord::Off), _) => Denoise::Off,
+            (Some(DenoiseWord::Edge), _) => Denoise::Edge,
             (_, asked) => Denoise::Paper { threshold: asked.unwrap_or(threshold) },
         }
     }
 }
 
 /// Value of `--denoise`; [`Denoise`] without the threshold.
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
 pub enum DenoiseWord {
     /// Smooths pixels that differ from their four neighbours (the paper's filter)
     Paper,
+    /// Blurs light within surfaces as far as its noise demands, and keeps edges; for --integrator path
+    Edge,
     /// No filter
     Off,
 }
@@ -305,5 +309,7 @@ mod tests {
         assert_eq!(denoise(&["--denoise-threshold", "0.5"], Denoise::Off), Denoise::Paper { threshold: 0.5 });
         let default = Denoise::Paper { threshold: Denoise::DEFAULT_THRESHOLD };
         assert_eq!(denoise(&["--denoise", "paper"], Denoise::Off), default);
+        assert_eq!(denoise(&["--denoise", "edge"], scene), Denoise::Edge);
+        assert_eq!(denoise(&[], Denoise::Edge), Denoise::Edge);
     }
 }

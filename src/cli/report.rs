@@ -93,6 +93,7 @@ impl From<&RenderOptions> for Options {
     fn from(options: &RenderOptions) -> Self {
         let (denoise, denoise_threshold) = match options.denoise {
             Denoise::Off => ("off", None),
+            Denoise::Edge => ("edge", None),
             Denoise::Paper { threshold } => ("paper", Some(threshold)),
         };
         Self {

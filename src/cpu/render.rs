@@ -6,14 +6,17 @@ use super::{paths::Paths, queue::Queue, timing::Clock};
 use crate::{
     accel::kdtree::TraversalLinks,
     frame::{
-        BounceStats, Denoise, FrameKind, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, plan::passes,
+        BounceStats, Denoise, FrameKind, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, opaque,
+        plan::passes,
     },
-    layout::{Batch, Bounce, Feature, Frame, Hit, MOST_SAMPLES_LOG2, Material, PathRay, SCAN_GROUP_SIZE},
+    layout::{
+        Batch, Bounce, EdgeStep, Feature, Frame, Guide, Hit, MOST_SAMPLES_LOG2, Material, PathRay, SCAN_GROUP_SIZE,
+    },
     reference::{
         accumulate,
         compact::{self, Parents},
         counting::costs,
-        denoise, features,
+        demodulate, denoise, edge_filter, features, guides,
         inputs::KernelInputs,
         path_accumulate, path_resolve, primary_hit, resolve,
         shade::{self, LitRays},
@@ -60,6 +63,10 @@ pub struct Renderer {
     pixel_display: Vec<[u8; 4]>,
     /// Empty unless the options request features.
     pixel_features: Vec<Feature>,
+    /// Empty unless the noise filter `edge` runs.
+    pixel_guides: Vec<Guide>,
+    /// The next step of that filter.
+    edge_step: u32,
     queue: Queue,
     paths: Paths,
     /// The materials of paths. Empty for ray trees.
@@ -96,6 +103,8 @@ impl Renderer {
             pixel_filtered: Vec::new(),
             pixel_display: vec![[0; 4]; n_pixels],
             pixel_features: vec![Feature::default(); if options.features { n_pixels } else { 0 }],
+            pixel_guides: vec![Guide::default(); if options.noise_filter() == Denoise::Edge { n_pixels } else { 0 }],
+            edge_step: 0,
             queue: Queue::default(),
             paths: Paths::default(),
             path_materials: if options.integrator == Integrator::Path {
@@ -195,10 +204,11 @@ impl Renderer {
     /// Returns the mean of the samples so far, after the noise filter if there is one.
     pub fn picture(&self) -> Picture {
         let (window, crop) = (self.options.window(), self.options.crop_or_whole());
+        let radiance = if self.filters() { &self.pixel_filtered } else { &self.pixel_radiance };
         Picture {
             width: crop.width(),
             height: crop.height(),
-            radiance: window.part(if self.filters() { &self.pixel_filtered } else { &self.pixel_radiance }, &crop),
+            radiance: opaque(window.part(radiance, &crop)),
             display: window.part(&self.pixel_display, &crop),
         }
     }
@@ -211,6 +221,12 @@ impl Renderer {
     pub fn features(&self) -> Vec<Feature> {
         assert!(self.options.features, "the options ask for features");
         self.options.window().part(&self.pixel_features, &self.options.crop_or_whole())
+    }
+
+    /// Adds to features what the samples of each pixel tell of its noise. The frames must trace paths.
+    pub(crate) fn note_noise(&self, features: &mut [Feature]) {
+        let means = self.options.window().part(&self.pixel_radiance, &self.options.crop_or_whole());
+        features.iter_mut().zip(means).for_each(|(feature, mean)| feature.set_noise(mean, self.n_samples));
     }
 
     /// Returns the properties that decide the passes of the next sample. The CPU does not rasterize: for both kinds
@@ -285,6 +301,9 @@ impl Renderer {
             Pass::PathCompact => self.path_compact(depth),
             Pass::PathResolve => self.path_resolve(),
             Pass::PathAccumulate => self.path_accumulate(),
+            Pass::Guides => self.guides(),
+            Pass::Demodulate => self.demodulate(),
+            Pass::EdgeFilter => self.edge_filter(),
             Pass::RasterizeTriangles | Pass::RasterizeBlocks | Pass::FalseColor => {
                 unreachable!("the CPU's plan has no `{}`", pass.name())
             }
@@ -314,6 +333,28 @@ impl Renderer {
         let Self { world, frame, links, batch, paths, queue, path_materials, .. } = self;
         let inputs = KernelInputs::new(world, frame).with_links(links).of_paths(path_materials, world.emitters());
         self.clock.time(Pass::PathScatter, Some(depth), || paths.scatter(&inputs, batch, queue));
+    }
+
+    fn guides(&mut self) {
+        let Self { world, frame, batch, paths, queue, path_materials, pixel_guides, .. } = self;
+        let inputs = KernelInputs::new(world, frame).of_paths(path_materials, world.emitters());
+        let guides = || guides::guides(&inputs, batch, &queue.hits, &paths.states, pixel_guides);
+        self.clock.time(Pass::Guides, Some(0), guides);
+    }
+
+    fn demodulate(&mut self) {
+        let Self { frame, pixel_radiance, pixel_guides, pixel_filtered, .. } = self;
+        pixel_filtered.resize(2 * pixel_radiance.len(), [0.0; 4]);
+        let demodulate = || demodulate::demodulate(frame, pixel_radiance, pixel_guides, pixel_filtered);
+        self.clock.time(Pass::Demodulate, None, demodulate);
+        self.edge_step = 0;
+    }
+
+    fn edge_filter(&mut self) {
+        let (frame, guides, filtered) = (&self.frame, &self.pixel_guides, &mut self.pixel_filtered);
+        let step = EdgeStep { step_ix: self.edge_step };
+        self.clock.time(Pass::EdgeFilter, None, || edge_filter::edge_filter(frame, &step, guides, filtered));
+        self.edge_step += 1;
     }
 
     fn path_spine(&mut self, depth: u32) {
@@ -488,7 +529,7 @@ impl Renderer {
     }
 
     fn filters(&self) -> bool {
-        self.options.denoise != Denoise::Off
+        self.options.noise_filter() != Denoise::Off
     }
 
     fn profile(&self) -> Profile {

@@ -61,7 +61,7 @@ impl Renderer {
     }
 
     /// Draws the samples of a range with the path tracer, one aligned block after the other. Returns their sums, from
-    /// which [`SampleSums::mean`] makes the picture. The features are those of the first block.
+    /// which [`SampleSums::mean`] makes the picture. The features are those of the first block, with the noise of all.
     ///
     /// # Errors
     /// Fails as [`Renderer::draw`] does.
@@ -81,7 +81,10 @@ impl Renderer {
             sums.push_mean(block, &self.picture()?.radiance);
             match &mut drawn {
                 None => drawn = Some(next),
-                Some(all) => all.profile.add(&next.profile),
+                Some(all) => {
+                    all.profile.add(&next.profile);
+                    all.features.iter_mut().zip(&next.features).for_each(|(all, next)| all.join_noise(next));
+                }
             }
         }
         Ok((drawn.unwrap_or_default(), sums))
@@ -144,9 +147,12 @@ fn draw_on_cpu(renderer: &mut cpu::Renderer, n_samples: u32, watcher: &mut impl 
         profile
     };
     let mut profile = frame(renderer);
-    let features = if renderer.options().features { renderer.features() } else { Vec::new() };
+    let mut features = if renderer.options().features { renderer.features() } else { Vec::new() };
     while renderer.n_samples() < n_samples {
         profile.add(&frame(renderer));
+    }
+    if renderer.options().integrator == Integrator::Path {
+        renderer.note_noise(&mut features);
     }
     Drawn { features, profile }
 }

@@ -1,7 +1,8 @@
 //! AOVs (arbitrary output variables): what a pixel shows and costs, beside its colour. Users see the names of this
 //! file.
 
-use crate::layout::Feature;
+use super::variance_of_joined;
+use crate::{layout::Feature, reference::noise};
 
 /// An output variable, in world space and world units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,6 +24,11 @@ pub enum Aov {
     /// Number of entries of the acceleration structure that the pixel's rays read, such as nodes and triangles in
     /// leaves.
     Cost,
+    /// Variance of the pixel's mean luminance, before the noise filter, as estimated from its samples. Infinity for a
+    /// single sample. Only pictures of paths have it.
+    Variance,
+    /// Number of the pixel's samples. Only pictures of paths have it.
+    Samples,
 }
 
 named_enum!(Aov {
@@ -34,6 +40,8 @@ named_enum!(Aov {
     Material = "material": "index of the material; 4294967295 where nothing is hit",
     Rays = "rays": "number of the pixel's primary, secondary and shadow rays",
     Cost = "cost": "nodes or cells, and triangles that these rays read; also drawn as NAME.cost.png",
+    Variance = "variance": "variance of the pixel's mean luminance, from its samples; needs --integrator path",
+    Samples = "samples": "number of the pixel's samples; needs --integrator path",
 });
 
 /// A named channel, with a number for each pixel.
@@ -54,7 +62,27 @@ pub enum Samples {
     Uint(Vec<u32>),
 }
 
+impl Feature {
+    /// Notes the noise of a pixel of paths. `mean`: of the radiance of its samples and of their squared luminance.
+    pub(crate) fn set_noise(&mut self, mean: [f32; 4], n_samples: u32) {
+        self.variance = noise::variance_of_mean(mean, n_samples);
+        self.n_samples = n_samples;
+    }
+
+    /// Adds the noise of further samples of the pixel.
+    pub(crate) fn join_noise(&mut self, next: &Self) {
+        let ranges = [&*self, next].map(|feature| (feature.n_samples, feature.variance));
+        self.variance = variance_of_joined(ranges.into_iter());
+        self.n_samples += next.n_samples;
+    }
+}
+
 impl Aov {
+    /// Whether only pictures of paths have the output.
+    pub fn is_of_paths(self) -> bool {
+        matches!(self, Self::Variance | Self::Samples)
+    }
+
     /// Returns the output's channels, from a picture's features.
     pub fn channels(self, features: &[Feature]) -> Vec<Channel> {
         let float = |component: &str, value: fn(&Feature) -> f32| Channel {
@@ -84,6 +112,8 @@ impl Aov {
             Self::Material => vec![uint("ID", |f| f.material_ix)],
             Self::Rays => vec![uint("N", |f| f.n_rays)],
             Self::Cost => vec![uint("N", |f| f.n_steps)],
+            Self::Variance => vec![float("Y", |f| f.variance)],
+            Self::Samples => vec![uint("N", |f| f.n_samples)],
         }
     }
 }

@@ -44,7 +44,7 @@ impl Frame {
         self.focuses_on_target = options.paths.focus.is_none().into();
         self.exposure = options.exposure;
         self.denoise_threshold = match options.denoise {
-            Denoise::Off => f32::INFINITY,
+            Denoise::Off | Denoise::Edge => f32::INFINITY,
             Denoise::Paper { threshold } => threshold,
         };
     }

@@ -3,6 +3,7 @@
 use std::{fmt, str::FromStr};
 
 use super::{Denoise, RenderOptions};
+use crate::layout::EDGE_BORDER;
 
 /// A rectangle of at least one pixel: the pixels (x, y) of a picture with `x0 <= x < x1` and `y0 <= y < y1`, counted
 /// from the upper left corner. Crops, windows and bands are such rectangles.
@@ -67,7 +68,11 @@ impl RenderOptions {
 
     /// Returns the width of the border around the crop that the noise filter reads, pixels.
     pub(crate) fn border(&self) -> u32 {
-        if self.denoise == Denoise::Off { 0 } else { 1 }
+        match self.noise_filter() {
+            Denoise::Off => 0,
+            Denoise::Paper { .. } => 1,
+            Denoise::Edge => EDGE_BORDER,
+        }
     }
 }
 
@@ -93,6 +98,7 @@ impl fmt::Display for Crop {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frame::Integrator;
 
     #[test]
     fn words() {
@@ -111,6 +117,12 @@ mod tests {
         assert_eq!(options.window(), Crop { x0: 0, y0: 2, x1: 6, y1: 8 });
         let options = RenderOptions { denoise: Denoise::Off, ..options };
         assert_eq!(options.window(), options.crop_or_whole());
+        let crop = Some(Crop { x0: 400, y0: 10, x1: 410, y1: 20 });
+        let (integrator, denoise) = (Integrator::Path, Denoise::Edge);
+        let options = RenderOptions { width: 480, height: 300, crop, denoise, ..RenderOptions::default() };
+        assert_eq!(options.window(), options.crop_or_whole(), "of Whitted's rays, nothing is filtered");
+        let options = RenderOptions { integrator, ..options };
+        assert_eq!(options.window(), Crop { x0: 335, y0: 0, x1: 475, y1: 85 });
     }
 
     #[test]

@@ -34,7 +34,7 @@ pub use self::{
     plan::{FrameKind, Plan, Section, Step, Touch},
     profile::{BounceStats, PassTime, Profile},
     resource::Resource,
-    sample_range::{BlockSum, SampleRange, SampleSums},
+    sample_range::{BlockSum, SampleRange, SampleSums, variance_of_joined},
     view::View,
 };
 use crate::{accel::kdtree::Traversal, layout};
@@ -81,6 +81,15 @@ impl RenderOptions {
         match self.integrator {
             Integrator::Whitted => self.max_depth,
             Integrator::Path => self.max_depth + 1,
+        }
+    }
+
+    /// Returns the noise filter that frames have: that of the options, but none in place of [`Denoise::Edge`] unless
+    /// the frames trace paths.
+    pub fn noise_filter(&self) -> Denoise {
+        match (self.integrator, self.denoise) {
+            (Integrator::Whitted, Denoise::Edge) => Denoise::Off,
+            (_, denoise) => denoise,
         }
     }
 }
@@ -139,6 +148,10 @@ pub enum Denoise {
         /// Sum of the four differences above which a pixel is smoothed, in units of display white, 0 to 4.
         threshold: f32,
     },
+    /// Blurs light within surfaces and keeps their edges, as far as the noise of each pixel demands: an edge-avoiding
+    /// à-trous wavelet transform, guided by the variance of samples (Dammertz et al. 2010, Schied et al. 2017). Only
+    /// frames of [`Integrator::Path`] have it.
+    Edge,
 }
 
 impl Denoise {
@@ -224,6 +237,12 @@ pub struct Picture {
     pub radiance: Vec<[f32; 4]>,
     /// `width * height` sRGB-encoded RGBA pixels.
     pub display: Vec<[u8; 4]>,
+}
+
+/// Sets the fourth component of pixels to 1. In frames of paths, kernels use it for the noise of the samples.
+pub(crate) fn opaque(mut radiance: Vec<[f32; 4]>) -> Vec<[f32; 4]> {
+    radiance.iter_mut().for_each(|pixel| pixel[3] = 1.0);
+    radiance
 }
 
 named_enum!(Tonemap {

@@ -4,8 +4,8 @@ use super::resource::{
     Resource,
     Resource::{
         Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathStates, PixelAccumulated,
-        PixelDisplay, PixelFeatures, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups, RayRadiance, Rays,
-        ScanBlocks, Segments, Stalls, TriangleIds,
+        PixelDisplay, PixelFeatures, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance, RasterGroups,
+        RayRadiance, Rays, ScanBlocks, Segments, Stalls, TriangleIds,
     },
 };
 
@@ -29,12 +29,12 @@ pub enum Role {
 /// How often a frame runs a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scope {
-    /// Once.
+    /// Once, or for a filter of several steps, once for each step.
     Frame,
     /// Once for each batch, for the rays of all its bounces together.
     Batch,
-    /// Once for a bounce of a batch, in each bounce that has the pass. Not all bounces have it: `primary_hit` and
-    /// `features` run for bounce 0 only, and the last bounce has no compaction.
+    /// Once for a bounce of a batch, in each bounce that has the pass. Not all bounces have it: `primary_hit`,
+    /// `features` and `guides` run for bounce 0 only, and the last bounce has no compaction.
     Bounce,
 }
 
@@ -86,6 +86,12 @@ pub enum Pass {
     PathResolve,
     /// Turns the sum of the frame's samples into the mean of all samples.
     PathAccumulate,
+    /// Adds the first hits of paths to what the noise filter `edge` knows of their pixels.
+    Guides,
+    /// Divides the light of each pixel by the albedo of what it shows, and estimates its variance.
+    Demodulate,
+    /// Blurs the light within surfaces: one step of the noise filter `edge`.
+    EdgeFilter,
 }
 
 /// The properties of a pass, the same in every frame.
@@ -102,7 +108,7 @@ struct Info {
 }
 
 /// A row for each pass, in the order of [`Pass`].
-const TABLE: [Info; 22] = [
+const TABLE: [Info; 25] = [
     Info {
         pass: Pass::Visibility,
         name: "visibility",
@@ -321,6 +327,36 @@ const TABLE: [Info; 22] = [
         color: [200, 170, 230],
         reads: &[PixelAccumulated, PixelRadiance],
         writes: &[PixelAccumulated, PixelRadiance],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::Guides,
+        name: "guides",
+        role: Role::Image,
+        scope: Scope::Bounce,
+        color: [50, 150, 110],
+        reads: &[Hits, PathStates, PixelGuides],
+        writes: &[PixelGuides],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::Demodulate,
+        name: "demodulate",
+        role: Role::Image,
+        scope: Scope::Frame,
+        color: [70, 200, 170],
+        reads: &[PixelRadiance, PixelGuides],
+        writes: &[PixelFiltered],
+        indirect: None,
+    },
+    Info {
+        pass: Pass::EdgeFilter,
+        name: "edge_filter",
+        role: Role::Image,
+        scope: Scope::Frame,
+        color: [80, 170, 190],
+        reads: &[PixelGuides, PixelFiltered],
+        writes: &[PixelFiltered],
         indirect: None,
     },
 ];

@@ -9,12 +9,13 @@ use super::{
         Resource,
         Resource::{
             Bounces, ChildKinds, Counters, FirstChildren, Hits, LightVisibility, LivePaths, PathStates,
-            PixelAccumulated, PixelFeatures, PixelFiltered, PixelNearest, PixelRadiance, RasterGroups, RayRadiance,
-            Rays, ScanBlocks, Segments,
+            PixelAccumulated, PixelFeatures, PixelFiltered, PixelGuides, PixelNearest, PixelRadiance, RasterGroups,
+            RayRadiance, Rays, ScanBlocks, Segments,
         },
     },
     {Denoise, Integrator, Primary, RenderOptions},
 };
+use crate::layout::EDGE_STEPS;
 
 /// How the passes before or after a barrier access its resources.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,8 +68,8 @@ pub struct FrameKind {
     pub has_lights: bool,
     /// Whether the frame's sample is added to earlier ones.
     pub adds_samples: bool,
-    /// Whether the noise filter runs.
-    pub denoises: bool,
+    /// The noise filter.
+    pub denoise: Denoise,
     /// Whether a feature is displayed in place of the picture.
     pub shows_feature: bool,
 }
@@ -85,7 +86,7 @@ impl FrameKind {
             is_lit: true,
             has_lights: n_lights > 0,
             adds_samples: true,
-            denoises: options.denoise != Denoise::Off,
+            denoise: options.noise_filter(),
             shows_feature: false,
         }
     }
@@ -195,6 +196,9 @@ fn bounce_of_paths(kind: &FrameKind, depth: u32) -> Section {
             barrier(Touch::Write, Touch::Update, &[Rays, PathStates, Segments, ChildKinds, ScanBlocks]),
         ]);
     }
+    if depth == 0 && kind.is_lit && kind.denoise == Denoise::Edge {
+        bounce.extend([Step::Run(Pass::Guides), barrier(Touch::Write, Touch::Update, &[PixelGuides])]);
+    }
     if depth + 1 < kind.n_bounces {
         bounce.extend([
             barrier(Touch::Indirect, Touch::Write, &[Bounces]),
@@ -278,11 +282,24 @@ fn samples(kind: &FrameKind) -> Section {
 /// Returns the steps that turn the mean of all samples into the displayed picture, or display a feature in its place.
 pub fn display(kind: &FrameKind) -> Section {
     let mut display = Section::new();
-    if kind.is_lit && kind.denoises {
-        display.extend([Step::Run(Pass::Denoise), barrier(Touch::Write, Touch::Read, &[PixelFiltered])]);
+    if kind.is_lit {
+        display.extend(noise_filter(kind.denoise));
     }
     display.push(Step::Run(if kind.shows_feature { Pass::FalseColor } else { Pass::Tonemap }));
     display
+}
+
+/// Returns the steps of a noise filter.
+fn noise_filter(denoise: Denoise) -> Section {
+    match denoise {
+        Denoise::Off => Section::new(),
+        Denoise::Paper { .. } => vec![Step::Run(Pass::Denoise), barrier(Touch::Write, Touch::Read, &[PixelFiltered])],
+        Denoise::Edge => {
+            let steps = std::iter::repeat_n(Pass::EdgeFilter, EDGE_STEPS as usize);
+            let passes = std::iter::once(Pass::Demodulate).chain(steps);
+            passes.flat_map(|pass| [Step::Run(pass), barrier(Touch::Write, Touch::Update, &[PixelFiltered])]).collect()
+        }
+    }
 }
 
 fn barrier(before: Touch, after: Touch, of: &'static [Resource]) -> Step {

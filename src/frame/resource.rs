@@ -25,12 +25,15 @@ pub enum Resource {
     PixelRadiance,
     /// The sum of the radiances of all samples of each pixel.
     PixelAccumulated,
-    /// The radiance of each pixel after the noise filter; the same buffer as `PixelRadiance` if there is no filter.
+    /// The radiance of each pixel after the noise filter; the same buffer as `PixelRadiance` if there is no filter. The
+    /// filter `edge` also keeps the light here that it has blurred so far.
     PixelFiltered,
     /// Each pixel as it is displayed, sRGB bytes.
     PixelDisplay,
     /// What each pixel shows, and what its rays cost.
     PixelFeatures,
+    /// What the noise filter `edge` knows of each pixel beside its colour.
+    PixelGuides,
     /// Index of the triangle that the graphics pipeline found in each pixel.
     TriangleIds,
     /// The nearest triangle in each pixel and its distance, as found by the compute kernels that rasterize.
@@ -52,7 +55,7 @@ pub enum Resource {
 
 impl Resource {
     /// Every resource.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::Rays,
         Self::Hits,
         Self::ChildKinds,
@@ -66,6 +69,7 @@ impl Resource {
         Self::PixelFiltered,
         Self::PixelDisplay,
         Self::PixelFeatures,
+        Self::PixelGuides,
         Self::TriangleIds,
         Self::PixelNearest,
         Self::RasterGroups,
@@ -92,6 +96,7 @@ impl Resource {
             Self::PixelFiltered => layout::BIND_PIXEL_FILTERED,
             Self::PixelDisplay => layout::BIND_PIXEL_DISPLAY,
             Self::PixelFeatures => layout::BIND_PIXEL_FEATURES,
+            Self::PixelGuides => layout::BIND_PIXEL_GUIDES,
             Self::TriangleIds => layout::BIND_TRIANGLE_IDS,
             Self::PixelNearest => layout::BIND_PIXEL_NEAREST,
             Self::RasterGroups => layout::BIND_RASTER_GROUPS,

@@ -145,6 +145,17 @@ impl SampleSums {
     }
 }
 
+/// Returns the variance of the mean of several ranges of samples. Each range is given by its number of samples and the
+/// variance of its mean. The estimate has no bias, but is not that of all samples drawn at once.
+pub fn variance_of_joined(ranges: impl Iterator<Item = (u32, f32)>) -> f32 {
+    let (mut n_all, mut sum) = (0.0, 0.0);
+    for (n, variance) in ranges {
+        n_all += f64::from(n);
+        sum += f64::from(n).powi(2) * f64::from(variance);
+    }
+    (sum / (n_all * n_all)) as f32
+}
+
 impl Picture {
     /// Returns the picture of the samples, without what a display shows.
     pub fn of_sums((width, height): (u32, u32), sums: &SampleSums) -> Self {
@@ -221,6 +232,14 @@ mod tests {
         }
         let one_by_one = (0..112).map(sample).sum::<f32>();
         assert_ne!(one_by_one, expected[2] + expected[1] + expected[0]);
+    }
+
+    /// Two halves of equal variance have half of it together. A single range keeps its own.
+    #[test]
+    fn variances_of_ranges_add_up() {
+        assert_eq!(variance_of_joined([(16, 0.5), (16, 0.5)].into_iter()), 0.25);
+        assert_eq!(variance_of_joined([(48, 0.3)].into_iter()), 0.3);
+        assert_eq!(variance_of_joined([(48, 1.0), (16, 9.0)].into_iter()), (9.0 + 9.0) / 16.0);
     }
 
     #[test]

@@ -41,6 +41,7 @@ mod tests {
             BIND_HITS | BIND_CAST_HITS => Some("Hit"),
             BIND_CAST_RAYS => Some("Ray"),
             BIND_PIXEL_FEATURES => Some("Feature"),
+            BIND_PIXEL_GUIDES => Some("Guide"),
             BIND_PATH_STATES => Some("PathState"),
             BIND_SEGMENTS => Some("Segment"),
             BIND_COUNTERS => Some("Counters"),
@@ -59,6 +60,7 @@ mod tests {
         match shader {
             cast if cast.starts_with("cast_") => "CastBatch",
             "driver.rgen" => "DriverCast",
+            "edge_filter.comp" => "EdgeStep",
             "false_color.comp" => "FalseColor",
             "present.frag" => "Present",
             "grid_sort_count.comp" | "grid_sort_scatter.comp" => "GridSort",

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::coverage::Tile;
+use super::{Part, coverage::Tile};
 use crate::{
     cpu,
-    frame::{Channel, Crop, Picture, SampleRange, SampleSums, Samples, Tonemap},
+    frame::{Aov, Channel, Crop, Picture, SampleRange, SampleSums, Samples, Tonemap, variance_of_joined},
     output::{self, Format, OutputError, Record},
 };
 
@@ -14,7 +14,7 @@ use crate::{
 pub struct Merged {
     /// The whole picture. Its display is encoded on the CPU.
     pub picture: Picture,
-    /// The channels beside colour. They are those of the parts with the first samples.
+    /// The channels beside colour. Those of single samples are from the parts with the first samples.
     pub channels: Vec<Channel>,
     /// What the picture shows. Its device is that of all parts, or all their names.
     pub record: Record,
@@ -71,10 +71,10 @@ pub fn join(tiles: Vec<Tile>) -> Merged {
     for tile in tiles {
         let crop = tile[0].record.crop;
         place(&mut radiance, width, &crop, &mean_of(&tile));
-        for (whole, part) in channels.iter_mut().zip(&tile[0].channels) {
-            match (&mut whole.samples, &part.samples) {
-                (Samples::Float(whole), Samples::Float(part)) => place(whole, width, &crop, part),
-                (Samples::Uint(whole), Samples::Uint(part)) => place(whole, width, &crop, part),
+        for (channel_ix, whole) in channels.iter_mut().enumerate() {
+            match (&mut whole.samples, joined_channel(&tile, channel_ix)) {
+                (Samples::Float(whole), Samples::Float(part)) => place(whole, width, &crop, &part),
+                (Samples::Uint(whole), Samples::Uint(part)) => place(whole, width, &crop, &part),
                 _ => (),
             }
         }
@@ -98,6 +98,38 @@ fn mean_of(tile: &Tile) -> Vec<[f32; 4]> {
             sums.mean()
         }
     }
+}
+
+/// Returns a channel of a tile. It is that of the part with the first samples, unless it is about all samples.
+fn joined_channel(tile: &Tile, channel_ix: usize) -> Samples {
+    let samples = |part: &Part| part.channels[channel_ix].samples.clone();
+    let name = tile[0].channels[channel_ix].name.as_str();
+    let mut joined = samples(&tile[0]);
+    match &mut joined {
+        Samples::Float(variances) if is_of(name, Aov::Variance) => {
+            let mut n_before = tile[0].record.samples.len();
+            for part in &tile[1..] {
+                let (n, Samples::Float(others)) = (part.record.samples.len(), samples(part)) else { continue };
+                for (variance, other) in variances.iter_mut().zip(others) {
+                    *variance = variance_of_joined([(n_before, *variance), (n, other)].into_iter());
+                }
+                n_before += n;
+            }
+        }
+        Samples::Uint(counts) if is_of(name, Aov::Samples) => {
+            for part in &tile[1..] {
+                let Samples::Uint(others) = samples(part) else { continue };
+                counts.iter_mut().zip(others).for_each(|(count, other)| *count += other);
+            }
+        }
+        _ => (),
+    }
+    joined
+}
+
+/// Whether a channel is one of an output variable's.
+fn is_of(channel: &str, aov: Aov) -> bool {
+    channel.split_once('.').is_some_and(|(layer, _)| layer == aov.to_string())
 }
 
 /// Copies the pixels of a crop to their places in a picture of the given width.

@@ -91,6 +91,7 @@ impl WholeRecord {
         let denoise = match options.denoise {
             Denoise::Off => "off".to_owned(),
             Denoise::Paper { threshold } => format!("paper {threshold}"),
+            Denoise::Edge => "edge".to_owned(),
         };
         // Primary rays of paths are always traced.
         let of_paths = options.integrator == Integrator::Path;

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{
-    Denoise, FalseColor, Features, Inputs, Passes, PathAccumulate, PathBegin, PathCompact, PathResolve, PathScatter,
-    PathTrace, Tonemap, record::record_steps,
+    Demodulate, Denoise, EdgeFilter, FalseColor, Features, Guides, Inputs, Passes, PathAccumulate, PathBegin,
+    PathCompact, PathResolve, PathScatter, PathTrace, Tonemap, record::record_steps,
 };
 use crate::{
     buffers::Resources,
@@ -64,6 +64,23 @@ impl FramePasses {
     }
 }
 
+/// The passes of the noise filter `edge`.
+pub struct EdgePasses {
+    pub guides: Guides,
+    pub demodulate: Demodulate,
+    pub edge_filter: EdgeFilter,
+}
+
+impl EdgePasses {
+    fn new(context: &Arc<Context>, bindings: &Arc<BindingLayout>) -> Result<Self, GpuError> {
+        Ok(Self {
+            guides: Guides::new(context, bindings)?,
+            demodulate: Demodulate::new(context, bindings)?,
+            edge_filter: EdgeFilter::new(context, bindings)?,
+        })
+    }
+}
+
 /// All passes of a frame that traces paths. A clone shares its pipelines with the original.
 #[derive(Clone)]
 pub struct PathPasses {
@@ -75,6 +92,7 @@ pub struct PathPasses {
     pub path_accumulate: Arc<PathAccumulate>,
     pub features: Arc<Features>,
     pub denoise: Arc<Denoise>,
+    pub edge: Arc<EdgePasses>,
     pub tonemap: Arc<Tonemap>,
     pub false_color: Arc<FalseColor>,
 }
@@ -98,6 +116,7 @@ impl PathPasses {
             path_accumulate: PathAccumulate::new(context, bindings)?.into(),
             features: Features::new(context, bindings)?.into(),
             denoise: Denoise::new(context, bindings)?.into(),
+            edge: EdgePasses::new(context, bindings)?.into(),
             tonemap: Tonemap::new(context, bindings, options.tonemap)?.into(),
             false_color: FalseColor::new(context, bindings)?.into(),
         })
@@ -123,14 +142,14 @@ impl PathPasses {
 
     /// Records passes and the barriers between them. The resources must be bound.
     pub fn record_section(&self, commands: &Commands, resources: &Resources, section: &[Step], inputs: &Inputs) {
-        record_steps(commands, section, |pass| self.record(commands, resources, pass, inputs));
+        record_steps(commands, section, |pass, nth| self.record(commands, resources, (pass, nth), inputs));
     }
 
-    /// Records one pass. The resources must be bound.
+    /// Records one pass. `nth`: how often the section has run the pass before. The resources must be bound.
     ///
     /// # Panics
     /// Frames of paths do not have `pass`, or `inputs` lacks the feature that it displays.
-    pub fn record(&self, commands: &Commands, resources: &Resources, pass: Pass, inputs: &Inputs) {
+    fn record(&self, commands: &Commands, resources: &Resources, (pass, nth): (Pass, u32), inputs: &Inputs) {
         let batch = &inputs.batch;
         match pass {
             Pass::PathBegin => self.path_begin.record(commands, resources, batch),
@@ -142,6 +161,9 @@ impl PathPasses {
             Pass::PathAccumulate => self.path_accumulate.record(commands, resources),
             Pass::Features => self.features.record(commands, batch),
             Pass::Denoise => self.denoise.record(commands, resources),
+            Pass::Guides => self.edge.guides.record(commands, batch),
+            Pass::Demodulate => self.edge.demodulate.record(commands, resources),
+            Pass::EdgeFilter => self.edge.edge_filter.record(commands, resources, nth),
             Pass::FalseColor => self.false_color.record(commands, resources, inputs.displayed_feature()),
             Pass::Tonemap => self.tonemap.record(commands, resources),
             _ => panic!("a frame of paths has no `{}`", pass.name()),

@@ -31,11 +31,14 @@ use crate::{
 mod accumulate;
 mod cast;
 mod compact;
+mod demodulate;
 mod denoise;
+mod edge_filter;
 mod false_color;
 mod features;
 mod frame_passes;
 pub mod grid;
+mod guides;
 mod path_accumulate;
 mod path_begin;
 mod path_compact;
@@ -58,10 +61,13 @@ pub use self::{
     accumulate::Accumulate,
     cast::Cast,
     compact::Compact,
+    demodulate::Demodulate,
     denoise::Denoise,
+    edge_filter::EdgeFilter,
     false_color::FalseColor,
     features::Features,
-    frame_passes::{FramePasses, PathPasses},
+    frame_passes::{EdgePasses, FramePasses, PathPasses},
+    guides::Guides,
     path_accumulate::PathAccumulate,
     path_begin::PathBegin,
     path_compact::PathCompact,

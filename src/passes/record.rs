@@ -31,7 +31,7 @@ impl Inputs {
 impl Passes {
     /// Records passes and the barriers between them. The resources must be bound.
     pub fn record_section(&self, commands: &Commands, resources: &Resources, section: &[Step], inputs: &Inputs) {
-        record_steps(commands, section, |pass| self.record(commands, resources, pass, inputs));
+        record_steps(commands, section, |pass, _| self.record(commands, resources, pass, inputs));
     }
 
     /// Records one pass. The resources must be bound.
@@ -62,11 +62,12 @@ impl Passes {
     }
 }
 
-/// Records the steps of a section: passes by `record`, and barriers.
-pub(super) fn record_steps(commands: &Commands, section: &[Step], record: impl Fn(Pass)) {
-    for step in section {
+/// Records the steps of a section: passes by `record`, and barriers. `record` also receives how often the section has
+/// run the pass before.
+pub(super) fn record_steps(commands: &Commands, section: &[Step], record: impl Fn(Pass, u32)) {
+    for (i, step) in section.iter().enumerate() {
         match *step {
-            Step::Run(pass) => record(pass),
+            Step::Run(pass) => record(pass, section[..i].iter().filter(|before| *before == step).count() as u32),
             Step::Barrier { before, after, .. } => commands.barrier(access(before), access(after)),
         }
     }

@@ -9,12 +9,12 @@
 //!
 //! ```text
 //! passes      primary_hit, trace, features, compact, shadow, shade, resolve, accumulate, denoise, false_color,
-//!             tonemap, cast; visibility, for which the device rasterizes
+//!             tonemap, cast; path_*; guides, demodulate, edge_filter: a noise filter; visibility, for which the device rasterizes
 //! traversal   traverser: one ray by any algorithm
 //!               kdtree, leaf, slab, kd_boxes, ropes, brute and the pending_* of each algorithm; grid; candidate
 //! geometry    triangle, surface, camera; search_ray and traversal_ray: a ray in the form that searches use
 //! light       light, material, microfacet, fresnel, children, display, tone_curves
-//! paths       sampler, path_camera, paths, path_vertex; bsdf: surfaces; emitters: lights
+//! paths       sampler, path_camera, paths, path_vertex; bsdf: surfaces; emitters: lights; noise: variances
 //! textures    texture, maps, cutout
 //! inputs      the data that kernels only read
 //! counting    the same traversal with its reads counted
@@ -30,13 +30,17 @@ pub mod children;
 pub mod compact;
 pub mod counting;
 pub mod cutout;
+pub mod demodulate;
 pub mod denoise;
 pub mod display;
+pub mod edge;
+pub mod edge_filter;
 pub mod emitters;
 pub mod false_color;
 pub mod features;
 pub mod fresnel;
 pub mod grid;
+pub mod guides;
 pub mod inputs;
 pub mod kd_boxes;
 pub mod kdtree;
@@ -45,6 +49,7 @@ pub mod light;
 pub mod maps;
 pub mod material;
 pub mod microfacet;
+pub mod noise;
 pub mod path_accumulate;
 pub mod path_begin;
 pub mod path_camera;

@@ -29,7 +29,7 @@ pub fn filter_offset(frame: &Frame, u: Vec2) -> Vec2 {
 }
 
 /// The point of the unit disk, by the concentric map of the square.
-pub fn disk_point(u: Vec2) -> Vec2 {
+pub fn lens_point(u: Vec2) -> Vec2 {
     let at = 2.0 * u - 1.0;
     if at == Vec2::ZERO {
         return Vec2::ZERO;
@@ -52,7 +52,7 @@ pub fn path_camera_ray(frame: &Frame, pixel: UVec2, in_pixel: Vec2, in_lens: Vec
         direction += in_image;
     }
     if frame.aperture > 0.0 {
-        let lens = frame.aperture * disk_point(in_lens);
+        let lens = frame.aperture * lens_point(in_lens);
         let aside = lens.x * frame.right.normalize() + lens.y * frame.up.normalize();
         direction = frame.focus * direction - aside;
         origin += aside;

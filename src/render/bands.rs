@@ -133,9 +133,12 @@ impl BandedRenderer {
     fn draw_band(&mut self, n_samples: u32, watcher: &mut impl Watcher) -> Result<Drawn, GpuError> {
         self.renderer.reset_samples();
         let mut profile = self.draw_frame(n_samples, watcher)?;
-        let features = if self.renderer.options().features { self.renderer.features()? } else { Vec::new() };
+        let mut features = if self.renderer.options().features { self.renderer.features()? } else { Vec::new() };
         while self.renderer.n_samples() < n_samples {
             profile.add(&self.draw_frame(n_samples, watcher)?);
+        }
+        if !features.is_empty() && self.renderer.options().integrator == Integrator::Path {
+            self.renderer.note_noise(&mut features)?;
         }
         Ok(Drawn { features, profile })
     }

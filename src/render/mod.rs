@@ -32,7 +32,7 @@ use self::{
 };
 use crate::{
     buffers::{Needs, Resources},
-    frame::{FrameKind, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step, plan},
+    frame::{FrameKind, Integrator, Pass, Picture, Plan, Primary, Profile, RenderOptions, Step, opaque, plan},
     gpu::{Access, AnyBuffer, CommandBuffer, Commands, Context, GpuError},
     layout::{Batch, FalseColor, Feature, MATERIAL_REFLECT, MATERIAL_REFRACT},
     passes::{FramePasses, Inputs, Rasterize},
@@ -220,7 +220,7 @@ impl Renderer {
         Ok(Picture {
             width: crop.width(),
             height: crop.height(),
-            radiance: window.part(&pixels.filtered().download_first(n_pixels)?, &crop),
+            radiance: opaque(window.part(&pixels.filtered().download_first(n_pixels)?, &crop)),
             display: window.part(&display, &crop).into_iter().map(u32::to_le_bytes).collect(),
         })
     }
@@ -236,6 +236,17 @@ impl Renderer {
         assert!(self.in_use.features, "the options ask for features");
         let features = self.resources.pixels.pixel_features.download_first(self.resources.n_pixels())?;
         Ok(self.in_use.window().part(&features, &self.in_use.crop_or_whole()))
+    }
+
+    /// Adds to features what the samples of each pixel tell of its noise. The frames must trace paths.
+    ///
+    /// # Errors
+    /// A copy fails.
+    fn note_noise(&self, features: &mut [Feature]) -> Result<(), GpuError> {
+        let means = self.resources.pixels.pixel_radiance.download_first(self.resources.n_pixels())?;
+        let means = self.in_use.window().part(&means, &self.in_use.crop_or_whole());
+        features.iter_mut().zip(means).for_each(|(feature, mean)| feature.set_noise(mean, self.n_samples));
+        Ok(())
     }
 
     /// Returns the frame's buffers, with the contents that the last frame left.

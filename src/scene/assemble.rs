@@ -419,6 +419,7 @@ fn render_defaults(spec: &RenderSpec) -> Checked<RenderDefaults> {
         denoise: match spec.denoise.filter(|_| is_for_paths) {
             Some(SceneDenoise::Paper) => filter,
             Some(SceneDenoise::Off) => Denoise::Off,
+            Some(SceneDenoise::Edge) => Denoise::Edge,
             None => defaults.of_paths.denoise,
         },
     };
@@ -438,6 +439,9 @@ fn render_defaults(spec: &RenderSpec) -> Checked<RenderDefaults> {
         denoise: match spec.denoise.unwrap_or(SceneDenoise::Paper) {
             SceneDenoise::Off => Denoise::Off,
             SceneDenoise::Paper => filter,
+            // It filters paths only. Other frames of the scene have the default filter.
+            SceneDenoise::Edge if is_for_paths => filter,
+            SceneDenoise::Edge => return Err("denoise = \"edge\" needs integrator = \"path\"".to_owned()),
         },
     })
 }

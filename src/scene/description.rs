@@ -176,6 +176,7 @@ pub(super) struct RenderSpec {
 pub(super) enum SceneDenoise {
     Off,
     Paper,
+    Edge,
 }
 
 /// One `[[mesh]]` table.

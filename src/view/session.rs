@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     accel::Statistics,
-    frame::{Denoise, Integrator, Profile, RenderOptions, View},
+    frame::{Integrator, Profile, RenderOptions, View},
     gpu::GpuError,
     layout::Feature,
     scene::RenderDefaults,
@@ -300,8 +300,8 @@ impl Session {
         let room = &mut self.rooms[usize::from(whole.integrator == Integrator::Path)];
         let has_room = whole.width <= room.0 && whole.height <= room.1;
         *room = (room.0.max(whole.width), room.1.max(whole.height));
-        let filters = |options: &RenderOptions| options.denoise != Denoise::Off;
-        has_room && whole.features == now.features && filters(whole) == filters(now)
+        let filter = |options: &RenderOptions| std::mem::discriminant(&options.noise_filter());
+        has_room && whole.features == now.features && filter(whole) == filter(now)
     }
 
     /// Draws the rest of the sample in parts, until the sample is complete or half of [`PART_MS`] is spent. At rest,

@@ -10,6 +10,7 @@ mod batches;
 mod closed_forms;
 mod compiler;
 mod crop;
+mod edge;
 mod features;
 mod grids;
 mod lanes;

@@ -29,9 +29,13 @@ pub struct PathStage {
 impl PathStage {
     /// Makes a stage for a picture of 40 x 30 pixels, of which a frame draws `2^samples_log2` samples.
     pub fn new(scene: FlatScene, samples_log2: u32) -> Self {
-        let (integrator, denoise) = (Integrator::Path, Denoise::Off);
+        Self::with_filter(scene, samples_log2, Denoise::Off)
+    }
+
+    /// Makes the same stage with a noise filter.
+    pub fn with_filter(scene: FlatScene, samples_log2: u32, denoise: Denoise) -> Self {
         let size = RenderOptions { width: 40, height: 30, ..RenderOptions::default() };
-        let options = RenderOptions { integrator, denoise, max_depth: 3, ..size };
+        let options = RenderOptions { integrator: Integrator::Path, denoise, max_depth: 3, ..size };
         let context = device();
         let world = World::of_flat(scene, &BuildOptions::default()).expect("a world");
         let mut constants = Frame { queue_capacity: 1200 << samples_log2, ..world.frame_constants(&options) };
@@ -58,6 +62,15 @@ impl PathStage {
 
     pub fn paths(&self) -> &PathQueue {
         self.resources.paths.as_ref().expect("the frame traces paths")
+    }
+
+    /// Sets the number of samples before the frame, and uploads the constants.
+    pub fn set_n_earlier(&mut self, n_earlier: u32) {
+        let mut frame = *self.frame();
+        frame.first_sample = n_earlier;
+        frame.n_samples = n_earlier + (1 << frame.samples_log2);
+        self.resources.set_constants(&frame);
+        self.resources.frame.upload(&[frame]).expect("constants");
     }
 
     /// Binds the descriptor set, records the commands and runs them.

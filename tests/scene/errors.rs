@@ -157,6 +157,7 @@ fn bad_scene_files_are_refused() {
         (disc("render = { max_depth = 0 }"), "a.toml:1", "render: max_depth = 0"),
         (disc("render = { exposure = -1 }"), "a.toml:1", "render: exposure = -1"),
         (disc("render = { denoise = 'much' }"), "a.toml:1", "unknown variant `much`"),
+        (disc("render = { denoise = 'edge', integrator = 'whitted' }"), "a.toml:1", "needs integrator = \"path\""),
         (disc("render = { denoise_threshold = 5 }"), "a.toml:1", "render: denoise_threshold = 5"),
         (mesh(""), "a.toml:2", "mesh 1: has neither `file` nor `generator`"),
         (mesh("file = 'x.obj'\ngenerator = 'disc'"), "a.toml:2", "mesh 1: has both"),

@@ -126,6 +126,23 @@ vec3 metal_fresnel(Material material, float cosine) {
     return conductor_reflectance(cosine, material.conductor_eta, material.conductor_k);
 }
 
+// About the share of light that the surface scatters, by colour: what it reflects along its normal, or lets pass. It is
+// 1 if the surface is perfectly smooth, since that shows other surfaces.
+vec3 surface_albedo(Material material) {
+    if (is_smooth(material)) return vec3(1.0);
+    vec3 dielectric = material.kd + normal_reflectance(material);
+    return clamp(mix(dielectric, metal_fresnel(material, 1.0), material.metallic), 0.0, 1.0);
+}
+
+// How narrow the surface scatters light, 0..1: the share of its albedo that is not Lambertian, less the wider its
+// distribution of microfacets is.
+float surface_gloss(Material material) {
+    float sum = mean_of(surface_albedo(material));
+    if (is_smooth(material) || !(sum > 0.0)) return is_smooth(material) ? 1.0 : 0.0;
+    float lambertian = mean_of(material.kd) * (1.0 - material.metallic) * (1.0 - material.transmission);
+    return (1.0 - interface_width(material)) * clamp(1.0 - lambertian / sum, 0.0, 1.0);
+}
+
 // What a microfacet of the interface does with light. cosine: between the microfacet's normal and the viewer.
 InterfaceSplit split_at(BsdfTerms terms, float cosine) {
     Material material = terms.material;

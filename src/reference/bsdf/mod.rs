@@ -144,6 +144,27 @@ fn metal_fresnel(material: &Material, cosine: f32) -> Vec3 {
     conductor_reflectance(cosine, material.conductor_eta, material.conductor_k)
 }
 
+/// About the share of light that the surface scatters, by colour: what it reflects along its normal, or lets pass. It
+/// is 1 if the surface is perfectly smooth, since that shows other surfaces.
+pub fn surface_albedo(material: &Material) -> Vec3 {
+    if is_smooth(material) {
+        return Vec3::ONE;
+    }
+    let dielectric = material.kd + normal_reflectance(material);
+    mix(dielectric, metal_fresnel(material, 1.0), material.metallic).clamp(Vec3::ZERO, Vec3::ONE)
+}
+
+/// How narrow the surface scatters light, 0..1: the share of its albedo that is not Lambertian, less the wider its
+/// distribution of microfacets is.
+pub fn surface_gloss(material: &Material) -> f32 {
+    let sum = mean_of(surface_albedo(material));
+    if is_smooth(material) || sum <= 0.0 {
+        return if is_smooth(material) { 1.0 } else { 0.0 };
+    }
+    let lambertian = mean_of(material.kd) * (1.0 - material.metallic) * (1.0 - material.transmission);
+    (1.0 - interface_width(material)) * (1.0 - lambertian / sum).clamp(0.0, 1.0)
+}
+
 /// Returns what a microfacet of the interface does with light. `cosine`: between the microfacet's normal and the
 /// viewer.
 fn split_at(terms: &BsdfTerms, cosine: f32) -> InterfaceSplit {

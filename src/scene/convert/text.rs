@@ -143,6 +143,7 @@ fn render(defaults: &RenderDefaults) -> String {
     } = defaults.for_integrator(None);
     let denoise = match denoise {
         Denoise::Off => "denoise = \"off\"\n".to_owned(),
+        Denoise::Edge => "denoise = \"edge\"\n".to_owned(),
         Denoise::Paper { threshold } => format!("denoise = \"paper\"\ndenoise_threshold = {}\n", number(threshold)),
     };
     let exposure = if is_metered { "metered = true".to_owned() } else { format!("exposure = {}", number(exposure)) };

@@ -30,7 +30,7 @@ pub fn show(ui: &mut Ui, settings: &mut Settings, projection: &mut Projection, a
         row(ui, "samples", |ui| ui.add(Slider::new(max_samples, 1..=4096).logarithmic(true)));
         row(ui, "exposure", |ui| ui.add(Slider::new(&mut options.exposure, 0.01..=100.0).logarithmic(true)));
         choice(ui, "tone curve", &mut options.tonemap, Tonemap::ALL);
-        denoise(ui, &mut options.denoise);
+        denoise(ui, &mut options.denoise, options.integrator);
         if accel == AccelKind::KdTree {
             choice(ui, "traversal", &mut options.traversal, Traversal::ALL);
         }
@@ -81,15 +81,23 @@ fn choice<T: Copy + PartialEq + Display>(ui: &mut Ui, name: &str, chosen: &mut T
     });
 }
 
-fn denoise(ui: &mut Ui, denoise: &mut Denoise) {
-    let mut is_on = *denoise != Denoise::Off;
-    let mut threshold = match *denoise {
-        Denoise::Off => Denoise::DEFAULT_THRESHOLD,
-        Denoise::Paper { threshold } => threshold,
+/// Shows the choice of the noise filter. `edge` filters paths only.
+fn denoise(ui: &mut Ui, denoise: &mut Denoise, integrator: Integrator) {
+    let paper = match *denoise {
+        Denoise::Paper { threshold } => Denoise::Paper { threshold },
+        Denoise::Off | Denoise::Edge => Denoise::Paper { threshold: Denoise::DEFAULT_THRESHOLD },
     };
-    row(ui, "noise filter", |ui| ui.checkbox(&mut is_on, ""));
-    if is_on {
-        row(ui, "threshold", |ui| ui.add(Slider::new(&mut threshold, 0.0..=4.0)));
+    let filters = [(Denoise::Off, "off"), (paper, "paper"), (Denoise::Edge, "edge")];
+    let filters = &filters[..if integrator == Integrator::Path { 3 } else { 2 }];
+    let name = filters.iter().find(|(filter, _)| filter == denoise).map_or("off", |(_, name)| name);
+    row(ui, "noise filter", |ui| {
+        ComboBox::from_id_salt("noise filter").selected_text(name).show_ui(ui, |ui| {
+            for (filter, name) in filters {
+                ui.selectable_value(denoise, *filter, *name);
+            }
+        });
+    });
+    if let Denoise::Paper { threshold } = denoise {
+        row(ui, "threshold", |ui| ui.add(Slider::new(threshold, 0.0..=4.0)));
     }
-    *denoise = if is_on { Denoise::Paper { threshold } } else { Denoise::Off };
 }

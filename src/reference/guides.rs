@@ -1,0 +1,74 @@
+//! Guides: what the noise filter `edge` knows of each pixel beside its colour. Twin of `guides.comp`.
+
+use glam::{UVec2, Vec3};
+
+use super::{
+    bsdf::{surface_albedo, surface_gloss},
+    camera::pixel_ix_of,
+    emitters::seen_light,
+    inputs::KernelInputs,
+    maps::shaded_at,
+    material::is_unlit,
+    noise::squared_luminance,
+    path_camera::path_camera_ray,
+    paths::{key_of_path, pixel_of_path},
+    sampler::random_pair,
+    surface::Surface,
+};
+use crate::layout::{Batch, Guide, Hit, NO_TRIANGLE, PathState};
+
+/// Adds the first hits of the batch's paths to the guides of their pixels. `states`: after bounce 0.
+pub fn guides(inputs: &KernelInputs, batch: &Batch, hits: &[Hit], states: &[PathState], pixel_guides: &mut [Guide]) {
+    let frame = inputs.frame();
+    let n_of_frame = 1 << frame.samples_log2;
+    let n_earlier = frame.n_samples - n_of_frame;
+    for in_batch in 0..batch.n_pixels {
+        let pixel = pixel_of_path(frame, batch, in_batch);
+        let guide = &mut pixel_guides[pixel_ix_of(frame, pixel) as usize];
+        if n_earlier == 0 {
+            *guide = Guide::default();
+        }
+        for sample_ix in guide.n_samples.saturating_sub(n_earlier).min(n_of_frame)..n_of_frame {
+            let path_ix = sample_ix * batch.n_pixels + in_batch;
+            let (hit, seen) = (&hits[path_ix as usize], states[path_ix as usize].radiance);
+            let surface = first_surface(inputs, batch, pixel, path_ix, hit);
+            add_path(guide, surface, seen);
+        }
+    }
+}
+
+/// What a camera ray hits.
+struct FirstSurface {
+    surface: Surface,
+    albedo: Vec3,
+    gloss: f32,
+}
+
+/// Returns the surface that a camera ray hits. A lamp in front of the hit ends the path.
+fn first_surface(inputs: &KernelInputs, batch: &Batch, pixel: UVec2, path_ix: u32, hit: &Hit) -> Option<FirstSurface> {
+    let key = key_of_path(inputs.frame(), batch, path_ix, pixel);
+    let ray = path_camera_ray(inputs.frame(), pixel, random_pair(key, 0), random_pair(key, 1));
+    if hit.triangle_ix == NO_TRIANGLE || seen_light(inputs, ray.origin, ray.direction, hit.t).t.is_finite() {
+        return None;
+    }
+    let (surface, material) = shaded_at(inputs, &ray, hit);
+    let albedo = if is_unlit(&material) { Vec3::ZERO } else { surface_albedo(&material) };
+    Some(FirstSurface { surface, albedo, gloss: surface_gloss(&material) })
+}
+
+/// Adds a path.
+fn add_path(guide: &mut Guide, first: Option<FirstSurface>, seen: Vec3) {
+    if let Some(FirstSurface { surface, gloss, .. }) = &first {
+        guide.n_hits += 1;
+        let weight = 1.0 / guide.n_hits as f32;
+        guide.position_world += weight * (surface.point_world - guide.position_world);
+        guide.normal_world += weight * (surface.shading - guide.normal_world);
+        guide.gloss += weight * (gloss - guide.gloss);
+    }
+    guide.n_samples += 1;
+    let weight = 1.0 / guide.n_samples as f32;
+    let albedo = first.map_or(Vec3::ZERO, |first| first.albedo);
+    guide.albedo += weight * (albedo - guide.albedo);
+    guide.seen += weight * (seen - guide.seen);
+    guide.seen_squared += weight * (squared_luminance(seen) - guide.seen_squared);
+}
