@@ -50,6 +50,29 @@ fn a_crop_is_a_part_of_the_picture() {
     refused(path, 2, &["--crop", "0,0,4294967295,1"], "beyond the picture");
 }
 
+/// A picture that ends by the clock has some samples, and is that of as many samples.
+#[test]
+fn a_time_is_filled_with_samples() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    let paths = ["--integrator", "path", "--max-depth", "2"];
+    for integrator in [&paths[..], &["--integrator", "whitted"]] {
+        let output =
+            render(path, &[integrator, &["--time", "700ms", "-o", "timed.exr", "--profile", "x.json"]].concat());
+        let json: serde_json::Value = serde_json::from_slice(&fs::read(path.join("x.json")).unwrap()).unwrap();
+        let n_samples = json["samples"].as_u64().unwrap();
+        assert!(n_samples > 1 && stdout(&output).contains(&format!("{n_samples} samples a pixel")), "{n_samples}");
+        render(path, &[integrator, &["--spp", &n_samples.to_string(), "-o", "counted.exr"]].concat());
+        assert_eq!(channels(&path.join("timed.exr")), channels(&path.join("counted.exr")));
+        render(path, &[integrator, &["--time", "1ms", "-o", "one.exr"]].concat());
+        render(path, &[integrator, &["--spp", "1", "-o", "counted.exr"]].concat());
+        assert_eq!(channels(&path.join("one.exr")), channels(&path.join("counted.exr")));
+    }
+    refused(path, 2, &["--time", "0s"], "expected a time above 0");
+    refused(path, 2, &["--time", "30"], "expected a number with a unit");
+    refused(path, 2, &["--time", "1s", "--spp", "4"], "--spp");
+}
+
 #[test]
 fn curves_change_what_is_shown_and_not_what_is() {
     let directory = TempDir::new().unwrap();

@@ -1,6 +1,6 @@
 //! The arguments of the subcommands, and the defaults of those that are left out.
 
-use std::{path::PathBuf, str::FromStr};
+use std::{path::PathBuf, str::FromStr, time::Duration};
 
 use clap::{Parser, Subcommand, value_parser};
 use kdray::{
@@ -86,6 +86,10 @@ pub struct RenderArgs {
     /// the scene file's, else 1; 4 for a mesh file; 1 with --trace]
     #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=65_536))]
     pub spp: Option<u32>,
+    /// Draw as many samples of each pixel as fit into this time, at least one, for example 30s or 5m; loading and
+    /// building do not count
+    #[arg(long, value_name = "TIME", value_parser = time, conflicts_with_all = ["spp", "samples", "repeat", "trace", "path"])]
+    pub time: Option<Duration>,
     /// Render only some of the samples of each pixel, from A on up to but without B, both multiples of 16, for example
     /// 0-32; `kdray merge` joins such parts to the picture of all --spp samples; for --integrator path, without a noise
     /// filter
@@ -393,6 +397,16 @@ impl FromStr for Tile {
             Some((ix, n)) if (1..=n).contains(&ix) => Ok(Self { ix: ix - 1, n }),
             _ => Err("expected I/N, where I is 1 to N"),
         }
+    }
+}
+
+/// Parses a time above 0, such as `30s` or `1m 30s`.
+fn time(word: &str) -> Result<Duration, String> {
+    match humantime::parse_duration(word) {
+        Ok(Duration::ZERO) => Err("expected a time above 0".to_owned()),
+        Ok(time) if time > Duration::from_secs(30 * 24 * 3600) => Err("expected at most 30 days".to_owned()),
+        Ok(time) => Ok(time),
+        Err(_) => Err("expected a number with a unit, such as 30s, 5m or 1h".to_owned()),
     }
 }
 

@@ -4,6 +4,7 @@
 //! ```text
 //! options    RenderOptions, crop: what to render, and by which methods
 //! constants  the uniform buffer of the kernels; sampling: the positions of samples in their pixels
+//! goal       the end of a picture: a number of samples, or a time
 //! sample_range  parts of a picture's samples, and their sums
 //! plan       the order of passes and the barriers between them
 //!   pass       what each pass does, reads and writes
@@ -18,6 +19,7 @@ mod constants;
 pub(crate) mod counts;
 mod crop;
 mod drawn;
+mod goal;
 mod pass;
 pub mod plan;
 mod profile;
@@ -30,6 +32,7 @@ pub use self::{
     aov::{Aov, Channel, Samples},
     crop::Crop,
     drawn::{Drawn, Watcher},
+    goal::{Goal, Pacer},
     pass::{Pass, Role, Scope},
     plan::{FrameKind, Plan, Section, Step, Touch},
     profile::{BounceStats, PassTime, Profile},

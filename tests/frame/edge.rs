@@ -4,7 +4,7 @@
 use glam::{Vec3, vec3};
 use kdray::{
     cpu::{self, Batching},
-    frame::{Crop, Denoise, Integrator, Picture, RenderOptions, sampling::samples_log2},
+    frame::{Crop, Denoise, Goal, Integrator, Picture, RenderOptions, sampling::samples_log2},
     gpu::DeviceOverrides,
     render::{BandedRenderer, Renderer},
     world::FlatScene,
@@ -117,7 +117,7 @@ fn batches_and_bands_change_no_bit() {
     let narrow = pretended(DeviceOverrides { storage_range: Some(31 * 180 * 128), ..DeviceOverrides::default() });
     let mut renderer = BandedRenderer::new(narrow.clone(), &world, &options).expect("a renderer");
     assert!(renderer.n_bands() > 1);
-    renderer.draw(3, &mut || ()).expect("a picture");
+    renderer.draw(Goal::Samples(3), &mut || ()).expect("a picture");
     assert!(identical(&whole, &renderer.picture().expect("a picture")));
     [&context, &narrow].into_iter().for_each(|context| assert_silent(context));
 }
@@ -152,7 +152,7 @@ fn pictures_know_their_noise() {
     for (denoise, n_samples) in [(Denoise::Off, 16), (Denoise::Edge, 20), (Denoise::Paper { threshold: 0.1 }, 1)] {
         let with_filter = RenderOptions { denoise, ..noisy.clone() };
         let mut renderer = BandedRenderer::new(context.clone(), &world_of(&scene), &with_filter).expect("a renderer");
-        let features = renderer.draw(n_samples, &mut || ()).expect("a picture").features;
+        let features = renderer.draw(Goal::Samples(n_samples), &mut || ()).expect("a picture").features;
         assert!(features.iter().all(|feature| feature.n_samples == n_samples));
         assert!(renderer.picture().expect("a picture").radiance.iter().all(|pixel| pixel[3] == 1.0));
         let variance = features.iter().map(|feature| feature.variance).sum::<f32>() / features.len() as f32;

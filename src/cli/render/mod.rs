@@ -11,7 +11,7 @@ use kdray::{
         Built, Engine,
         choices::{Choices, ChosenAccel, Workload},
     },
-    frame::{Profile, RenderOptions, SampleRange},
+    frame::{Goal, Profile, RenderOptions, SampleRange},
     gpu::{Context, ContextOptions, GpuError},
     output::{self, Record, WholeRecord},
     scene::{CameraPath, LoadOptions, Scene},
@@ -21,7 +21,7 @@ use kdray::{
 use tracing::info_span;
 
 use self::{
-    draw::{Common, FrameJob, draw_and_write},
+    draw::{Common, DrawnPictures, FrameJob, draw_and_write},
     files::{Files, check_outputs, numbered, output_of, roles},
     memory::check_memory,
 };
@@ -75,14 +75,15 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     args.picture.meter(&world, &mut options).into_iter().for_each(|note| progress.note(&note));
     let record = record(&engine, &world, &options, accel, (n_samples, some_samples));
     let crop = record.crop;
-    let common = Common { args, options: &options, n_drawn, some_samples, record };
+    let goal = args.time.map_or(Goal::Samples(n_drawn), Goal::Time);
+    let common = Common { args, options: &options, goal, n_drawn, some_samples, record };
     let rendering = format!("rendering {}x{}", crop.width(), crop.height());
     let (drawn, _) = progress.stage(&rendering, || {
         let begin = Instant::now();
         let renderer = engine.renderer(&world, &options)?;
         draw_and_write(&common, renderer, &views, (&progress, &rendering), begin)
     });
-    let (profiles, render_ms) = drawn.map_err(CliError::of_drawing)?;
+    let DrawnPictures { profiles, n_samples, render_ms } = drawn.map_err(CliError::of_drawing)?;
     drop(progress);
 
     let repeated = FrameTimeRange::of(&profiles);
@@ -96,7 +97,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
         extra_files: views.iter().flat_map(|view| view.files.beside()).cloned().collect(),
         options: (&options).into(),
         choices: Choices::of_pictures(accel, methods),
-        samples: n_drawn,
+        samples: n_samples,
         triangles: n_triangles,
         accel: world.statistics(),
         grid_build: world.grid_build().cloned(),
