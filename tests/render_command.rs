@@ -196,6 +196,29 @@ const PATH: &str = "
     target = [0, 2.75, 0]
 ";
 
+/// Only the pictures that are missing are rendered, and files that exist stay as they are.
+#[test]
+fn existing_pictures_are_left_out() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    fs::write(path.join("path.toml"), PATH).unwrap();
+    fs::write(path.join("f.1.png"), "old").unwrap();
+    let film = ["--path", "path.toml", "-o", "f.#.png", "--skip-existing"];
+    let output = render(path, &film);
+    assert!(stderr(&output).contains("note: 1 picture exists already\n"), "{}", stderr(&output));
+    assert_eq!(names(path), ["f.0.png", "f.1.png", "f.2.png", "path.toml"]);
+    assert_eq!(fs::read(path.join("f.1.png")).unwrap(), b"old");
+    // Nothing is left to do, so the scene is not even loaded.
+    let none = ["render", "none.toml", "--cpu", "--skip-existing", "-o"];
+    succeed(path, &[&none[..], &["f.1.png"]].concat());
+    let output = succeed(path, &[&none[..], &["f.#.png", "--path", "path.toml"]].concat());
+    assert!(stderr(&output).contains("note: 3 pictures exist already\n") && output.stdout.is_empty());
+    // A picture without its layers is not complete.
+    fail(path, &[&none[..], &["f.1.png", "--aov", "depth"]].concat(), 3, "none.toml");
+    render(path, &["--path", "path.toml", "--frames", "0-2x2", "-o", "g.#.png"]);
+    assert_eq!(names(path), ["f.0.png", "f.1.png", "f.2.png", "g.0.png", "g.2.png", "path.toml"]);
+}
+
 #[test]
 fn a_path_makes_a_picture_a_frame() {
     let directory = TempDir::new().unwrap();

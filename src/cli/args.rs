@@ -72,10 +72,13 @@ pub struct RenderArgs {
     /// Move the camera along the keyframes of this TOML file, and write one picture per frame
     #[arg(long, value_name = "FILE", conflicts_with = "repeat")]
     pub path: Option<PathBuf>,
-    /// Frames of the path to render, both ends included, for example 0-99 or 7 [default: from the first keyframe to
-    /// the last]
-    #[arg(long, value_name = "A-B", requires = "path")]
+    /// Frames of the path to render, both ends included, for example 0-99, 7, or 0-99x4 for every fourth [default: from
+    /// the first keyframe to the last]
+    #[arg(long, value_name = "A-BxS", requires = "path")]
     pub frames: Option<Frames>,
+    /// Leave out pictures whose files exist already, so that a film that was interrupted goes on where it ended
+    #[arg(long, conflicts_with_all = ["repeat", "profile", "trace"])]
+    pub skip_existing: bool,
     /// Render only the pixels x0 <= x < x1, y0 <= y < y1, counted from the picture's upper left corner
     #[arg(long, value_name = "x0,y0,x1,y1")]
     pub crop: Option<Crop>,
@@ -348,6 +351,8 @@ impl FromStr for Size {
 pub struct Frames {
     pub first: u32,
     pub last: u32,
+    /// Distance between the frames that are rendered, at least 1.
+    pub step: u32,
 }
 
 impl FromStr for Frames {
@@ -355,11 +360,12 @@ impl FromStr for Frames {
 
     fn from_str(word: &str) -> Result<Self, Self::Err> {
         let number = |digits: &str| digits.parse().ok().filter(|frame| *frame <= 1_000_000);
-        let (first, last) = word.split_once('-').unwrap_or((word, word));
-        match (number(first), number(last)) {
-            (Some(first), Some(last)) if first <= last => Ok(Self { first, last }),
-            (Some(_), Some(_)) => Err("the first frame comes after the last"),
-            _ => Err("expected A-B or A, whole numbers up to 1000000"),
+        let (ends, step) = word.split_once('x').unwrap_or((word, "1"));
+        let (first, last) = ends.split_once('-').unwrap_or((ends, ends));
+        match (number(first), number(last), number(step)) {
+            (Some(first), Some(last), Some(step)) if first <= last && step > 0 => Ok(Self { first, last, step }),
+            (Some(first), Some(last), Some(_)) if first > last => Err("the first frame comes after the last"),
+            _ => Err("expected A, A-B or A-BxS, whole numbers up to 1000000, S above 0"),
         }
     }
 }
@@ -448,9 +454,11 @@ mod tests {
 
     #[test]
     fn frames() {
-        assert_eq!("3-17".parse(), Ok(Frames { first: 3, last: 17 }));
-        assert_eq!("0".parse(), Ok(Frames { first: 0, last: 0 }));
-        for word in ["", "-", "3-", "-3", "4-3", "1-2-3", "1.5-2", "0-1000001", "a-b"] {
+        assert_eq!("3-17".parse(), Ok(Frames { first: 3, last: 17, step: 1 }));
+        assert_eq!("0".parse(), Ok(Frames { first: 0, last: 0, step: 1 }));
+        assert_eq!("0-9x4".parse(), Ok(Frames { first: 0, last: 9, step: 4 }));
+        for word in ["", "0-9x0", "0-9x", "x2", "0-9x1x1", "-", "3-", "-3", "4-3", "1-2-3", "1.5-2", "0-1000001", "a-b"]
+        {
             assert!(word.parse::<Frames>().is_err(), "{word}");
         }
     }

@@ -19,7 +19,8 @@ use crate::cli::{
 
 /// A camera, and the files of its picture.
 pub struct FrameJob {
-    pub camera: Camera,
+    /// None for the scene's own camera.
+    pub camera: Option<Camera>,
     pub files: Files,
 }
 
@@ -27,6 +28,8 @@ pub struct FrameJob {
 pub struct Common<'a> {
     pub args: &'a RenderArgs,
     pub options: &'a RenderOptions,
+    /// The scene's own camera.
+    pub camera: Camera,
     /// The end of each picture, if all samples are drawn.
     pub goal: Goal,
     /// Number of samples of each pixel that are drawn, if they have a number.
@@ -68,10 +71,11 @@ pub fn draw_and_write(
     let (mut profiles, mut drawing, mut last) = (Vec::new(), Duration::ZERO, begin);
     let mut n_samples = common.n_drawn;
     for view in views {
+        let camera = view.camera.unwrap_or(common.camera);
         let (picture, sums, features);
         match common.some_samples {
             Some(range) => {
-                let (drawn, drawn_sums) = renderer.draw_range(&view.camera, range, Bar(&mut steps))?;
+                let (drawn, drawn_sums) = renderer.draw_range(&camera, range, Bar(&mut steps))?;
                 picture = part(common, &drawn_sums);
                 profiles.push(drawn.profile);
                 (sums, features) = (drawn_sums, drawn.features);
@@ -79,7 +83,7 @@ pub fn draw_and_write(
             None => {
                 let mut drawn = Drawn::default();
                 for _ in 0..args.repeat {
-                    drawn = renderer.draw(&view.camera, common.goal, Bar(&mut steps))?;
+                    drawn = renderer.draw(&camera, common.goal, Bar(&mut steps))?;
                     profiles.push(std::mem::take(&mut drawn.profile));
                 }
                 n_samples = drawn.n_samples;
@@ -88,7 +92,7 @@ pub fn draw_and_write(
             }
         }
         drawing += last.elapsed();
-        let record = record_of(common, &view.camera, n_samples);
+        let record = record_of(common, &camera, n_samples);
         // The mean of a single block tells its sums.
         let sums = if sums.blocks().len() > 1 { sums.blocks() } else { &[] };
         view.files.write(&picture, &Layers { aovs: &args.aov, features: &features, sums, record: Some(&record) })?;

@@ -36,6 +36,11 @@ impl Files {
         self.layers.iter().chain(&self.heat_map).filter(|path| **path != self.picture)
     }
 
+    /// Whether all files exist.
+    pub fn exist(&self) -> bool {
+        self.picture.exists() && self.beside().all(|path| path.exists())
+    }
+
     /// Enters the files into `roles` as outputs. Refuses files that the command also reads, or that it writes twice.
     pub fn note(&self, roles: &mut FileRoles) -> Result<(), CliError> {
         roles.write("--output", &self.picture)?;

@@ -47,8 +47,11 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
 
     let (begun_at, spans) = (Instant::now(), Spans::default());
     let progress = Progress::with_spans(args.quiet, 3, args.trace.is_some().then_some(&spans));
+    let views = views(args, roles, &progress)?;
+    if views.is_empty() {
+        return Ok(());
+    }
     let (scene, load_ms) = load(args, &progress)?;
-    let views = views(args, &scene, roles)?;
     let options = args.options(&scene)?;
     let n_samples = args.samples(&scene);
     let some_samples = args.some_samples(&scene, &options)?;
@@ -61,7 +64,8 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let engine = context.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.picture.request());
     let n_triangles = scene.n_triangles();
     let n_pictures = u64::from(n_drawn) * views.len() as u64;
-    let cameras = views.iter().map(|view| &view.camera);
+    let camera = scene.camera;
+    let cameras = views.iter().map(|view| view.camera.as_ref().unwrap_or(&camera));
     let workload = Workload::of_pictures(&options, scene.lights.len(), n_pictures).with_cameras(cameras);
     let accel = engine.choose_accel(n_triangles, &workload);
     build::check_memory(accel, n_triangles)?;
@@ -76,7 +80,7 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
     let record = record(&engine, &world, &options, accel, (n_samples, some_samples));
     let crop = record.crop;
     let goal = args.time.map_or(Goal::Samples(n_drawn), Goal::Time);
-    let common = Common { args, options: &options, goal, n_drawn, some_samples, record };
+    let common = Common { args, options: &options, camera, goal, n_drawn, some_samples, record };
     let rendering = format!("rendering {}x{}", crop.width(), crop.height());
     let (drawn, _) = progress.stage(&rendering, || {
         let begin = Instant::now();
@@ -153,18 +157,27 @@ fn load(args: &RenderArgs, progress: &Progress) -> Result<(Scene, f64), CliError
     Ok((scene, load_ms))
 }
 
-/// Returns the scene's own view or, with a path, one view per frame. Refuses views whose files cannot be written or
-/// have another role.
-fn views(args: &RenderArgs, scene: &Scene, mut roles: FileRoles) -> Result<Vec<FrameJob>, CliError> {
+/// Returns the scene's own view or, with a path, one view per frame. Leaves out views whose files exist, if the user
+/// wants that. Refuses views whose files cannot be written or have another role.
+fn views(args: &RenderArgs, mut roles: FileRoles, progress: &Progress) -> Result<Vec<FrameJob>, CliError> {
     let output = output_of(args);
-    let views = match &args.path {
-        None => vec![FrameJob { camera: scene.camera, files: Files::of(output, &args.aov) }],
+    let mut views = match &args.path {
+        None => vec![FrameJob { camera: None, files: Files::of(output, &args.aov) }],
         Some(path) => {
             let views = views_along(path, args, &output)?;
             views.iter().try_for_each(|view| view.files.note(&mut roles))?;
             views
         }
     };
+    if args.skip_existing {
+        let n_all = views.len();
+        views.retain(|view| !view.files.exist());
+        match n_all - views.len() {
+            0 => (),
+            1 => progress.note("1 picture exists already"),
+            n => progress.note(&format!("{n} pictures exist already")),
+        }
+    }
     views.iter().try_for_each(|view| view.files.check())?;
     Ok(views)
 }
@@ -172,8 +185,8 @@ fn views(args: &RenderArgs, scene: &Scene, mut roles: FileRoles) -> Result<Vec<F
 /// Returns one view per frame of the path.
 fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec<FrameJob>, CliError> {
     let path = CameraPath::load(path_file)?;
-    let Frames { first, last } =
-        args.frames.unwrap_or(Frames { first: path.begin().ceil() as u32, last: path.end().floor() as u32 });
+    let Frames { first, last, step } =
+        args.frames.unwrap_or(Frames { first: path.begin().ceil() as u32, last: path.end().floor() as u32, step: 1 });
     if first > last {
         return Err(CliError::Usage(format!(
             "{}: no whole frame number lies between its first and last keyframe",
@@ -185,9 +198,9 @@ fn views_along(path_file: &Path, args: &RenderArgs, output: &Path) -> Result<Vec
             let file = path_file.display();
             CliError::Usage(format!("{file}: at frame {frame}, eye and target coincide, or up points along the view"))
         })?;
-        Ok(FrameJob { camera, files: Files::of(numbered(output, frame)?, &args.aov) })
+        Ok(FrameJob { camera: Some(camera), files: Files::of(numbered(output, frame)?, &args.aov) })
     };
-    (first..=last).map(view).collect()
+    (first..=last).step_by(step as usize).map(view).collect()
 }
 
 /// Sets the number of threads of rayon's global pool. Without a number, rayon chooses.
