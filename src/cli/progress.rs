@@ -224,7 +224,12 @@ impl StepProgress<'_> {
     }
 
     fn text(&self) -> String {
-        let left = left_text(time_left(self.start.elapsed(), self.share()));
+        let elapsed = self.start.elapsed();
+        let left = match self.ends_after {
+            Some(time) => time.saturating_sub(elapsed),
+            None => time_left(elapsed, self.share()),
+        };
+        let left = left_text(left);
         let done = match self.n_steps {
             _ if self.ends_after.is_some() => format!("{} samples", self.n_done),
             1 => format!("{:.0} %", 100.0 * self.share()),
