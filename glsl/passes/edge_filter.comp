@@ -4,8 +4,8 @@
 // edge-avoiding a-trous wavelet transform (Dammertz et al.: Edge-Avoiding A-Trous Wavelet Transform for Fast Global
 // Illumination Filtering, 2010) that is guided by variance (Schied et al.: Spatiotemporal Variance-Guided Filtering,
 // 2017). It replaces the light of the pixel by a mean of 5 x 5 pixels, which are 2^step_ix pixels apart. A pixel counts
-// the more, the more alike its surface is, and the less its light differs beyond the noise. The last step multiplies the
-// light by the albedo again and adds what the camera sees directly.
+// the more, the more alike its surface is, and the less its light differs beyond the noise. The last step multiplies
+// the light by the albedo again and adds what the camera sees directly.
 // Reads pixel_guides; updates pixel_filtered: even steps read its second half and write the first one.
 #include "layout.glsl"
 #include "noise.glsl"
@@ -25,7 +25,8 @@ const float DEVIATIONS = 8.0;
 const float DEVIATIONS_POWER = -0.4;
 // The factor on these deviations for perfectly glossy surfaces. What they reflect differs from pixel to pixel.
 const float GLOSSY_DEVIATIONS = 0.25;
-// The variance of another pixel counts up to this multiple of the pixel's own, which is 1 for perfectly glossy surfaces.
+// The variance of another pixel counts up to this multiple of the pixel's own. The multiple is 1 for perfectly glossy
+// surfaces.
 const float MOST_OF_OTHER = 4.0;
 // A luminance that is less than any noise of interest. It keeps quotients finite where there is no noise at all.
 const float LEAST_DEVIATION = 1.0e-8;

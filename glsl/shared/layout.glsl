@@ -971,8 +971,8 @@ struct EdgeStep {
 
 // The number of steps of the noise filter `edge`, which is odd. Step i compares pixels at multiples of 2^i pixels.
 #define EDGE_STEPS 5u
-// How far the light of another pixel can get by all steps: 2 * (2^EDGE_STEPS - 1), and the radius of the square in which
-// the variance is estimated (pixels).
+// How far the light of another pixel can get by all steps: 2 * (2^EDGE_STEPS - 1), and the radius of the square in
+// which the variance is estimated (pixels).
 #define EDGE_BORDER 65u
 
 // Push constants of `present.frag`, which shows a picture in a window: the sizes of both (pixels).

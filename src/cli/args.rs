@@ -91,7 +91,8 @@ pub struct RenderArgs {
     pub spp: Option<u32>,
     /// Draw as many samples of each pixel as fit into this time, at least one, for example 30s or 5m; loading and
     /// building do not count
-    #[arg(long, value_name = "TIME", value_parser = time, conflicts_with_all = ["spp", "samples", "repeat", "trace", "path"])]
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    #[arg(conflicts_with_all = ["spp", "samples", "repeat", "trace", "path"])]
     pub time: Option<Duration>,
     /// Render only some of the samples of each pixel, from A on up to but without B, both multiples of 16, for example
     /// 0-32; `kdray merge` joins such parts to the picture of all --spp samples; for --integrator path, without a noise

@@ -1,5 +1,5 @@
-//! Demodulate: the light on the surface that each pixel shows, apart from the surface's albedo, and the variance of this
-//! light. Twin of `demodulate.comp`.
+//! Demodulate: the light on the surface that each pixel shows, apart from the surface's albedo, and the variance of
+//! this light. Twin of `demodulate.comp`.
 
 use glam::{Vec3, Vec4, Vec4Swizzles};
 use rayon::prelude::*;

@@ -9,7 +9,8 @@
 //!
 //! ```text
 //! passes      primary_hit, trace, features, compact, shadow, shade, resolve, accumulate, denoise, false_color,
-//!             tonemap, cast; path_*; guides, demodulate, edge_filter: a noise filter; visibility, for which the device rasterizes
+//!             tonemap, cast; path_*; guides, demodulate, edge_filter: a noise filter; visibility, for which the
+//!             device rasterizes
 //! traversal   traverser: one ray by any algorithm
 //!               kdtree, leaf, slab, kd_boxes, ropes, brute and the pending_* of each algorithm; grid; candidate
 //! geometry    triangle, surface, camera; search_ray and traversal_ray: a ray in the form that searches use

@@ -1,4 +1,5 @@
-//! Path resolve: the sums of the radiance of each pixel's paths, and of their squared luminance. Twin of `path_resolve.comp`.
+//! Path resolve: the sums of the radiance of each pixel's paths, and of their squared luminance. Twin of
+//! `path_resolve.comp`.
 
 use glam::Vec4;
 

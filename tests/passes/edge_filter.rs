@@ -86,8 +86,8 @@ fn an_edge_of_light_stays_if_there_is_no_noise() {
     }
 }
 
-/// A step that regards all differences as noise averages them with the spline's weights, which leave (35 / 128)^2 of the
-/// variance.
+/// A step that regards all differences as noise averages them with the spline's weights, which leave (35 / 128)^2 of
+/// the variance.
 #[test]
 fn a_step_reduces_noise_by_the_factor_of_its_weights() {
     let stage = edge_stage(1);
