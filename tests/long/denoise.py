@@ -4,11 +4,11 @@ Needs from PyPI: numpy, OpenEXR, pillow, flip-evaluator. Usage, in the repositor
 
     python3 -m tests.long.denoise KDRAY FOLDER [--cpu] [--only NAME,NAME] [--size N] [--reference-spp N]
 
-The five scenes of tests/long/reference are rendered with 1, 4 and 16 samples by each filter, and compared with pictures
-of many samples, which are kept in FOLDER for the next time. Printed are the relative mean squared error (squared
-differences over the squared reference plus 0.01) and LDR-FLIP (Andersson et al. 2020). Pictures are kept in FOLDER,
-too: the reference and those of all filters side by side, for each number of samples. The program fails if `edge` does not
-have the smallest error of both kinds everywhere.
+The five scenes of tests/long/reference are rendered with 1, 4 and 16 samples by each filter, and compared with
+pictures of many samples, which are kept in FOLDER for the next time. Printed are the relative mean squared error
+(squared differences over the squared reference plus 0.01) and LDR-FLIP (Andersson et al. 2020). Pictures are kept in
+FOLDER, too: the reference and those of all filters side by side, for each number of samples. The program fails if
+`edge` does not have the smallest error of both kinds everywhere.
 """
 
 import argparse
