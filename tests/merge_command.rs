@@ -62,8 +62,8 @@ fn samples_and_tiles_join_to_the_same_bits() {
             ("b", &["--tile", "2/3", "--samples", "0-48"]),
             ("c", &["--tile", "2/3", "--samples", "48-96"]),
             ("d", &["--tile", "3/3", "--samples", "0-16"]),
-            ("e", &["--tile", "3/3", "--samples", "16-80"]),
-            ("f", &["--tile", "3/3", "--samples", "80-96"]),
+            ("e", &["--tile", "3/3", "--samples", "16-48"]),
+            ("f", &["--tile", "3/3", "--samples", "48-96"]),
         ] {
             let name = format!("{part}.exr");
             render_paths(path, &name, &[&["--spp", "96"], options, &aov, cpu].concat());

@@ -234,6 +234,17 @@ mod tests {
         assert_ne!(one_by_one, expected[2] + expected[1] + expected[0]);
     }
 
+    /// Blocks that follow each other are joined only if they make up an aligned block.
+    #[test]
+    fn unaligned_neighbours_stay_apart() {
+        let mut sums = SampleSums::default();
+        for block in range("16-48").blocks() {
+            sums.push(BlockSum { samples: block, sums: vec![[1.0; 3]] });
+        }
+        let blocks: Vec<_> = sums.blocks().iter().map(|block| block.samples.to_string()).collect();
+        assert_eq!(blocks, ["16-32", "32-48"]);
+    }
+
     /// Two halves of equal variance have half of it together. A single range keeps its own.
     #[test]
     fn variances_of_ranges_add_up() {
