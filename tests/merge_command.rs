@@ -56,20 +56,21 @@ fn samples_and_tiles_join_to_the_same_bits() {
         let directory = TempDir::new().unwrap();
         let path = directory.path();
         let aov = ["--aov", "depth,id"];
-        render_paths(path, "whole.exr", &[&["--spp", "96"], &aov[..], cpu].concat());
+        // The last samples need not be a multiple of 16.
+        let spp = ["--spp", "100"];
+        render_paths(path, "whole.exr", &[&spp, &aov[..], cpu].concat());
         for (part, options) in [
-            ("a", &["--tile", "1/3", "--samples", "0-96"][..]),
+            ("a", &["--tile", "1/3"][..]),
             ("b", &["--tile", "2/3", "--samples", "0-48"]),
-            ("c", &["--tile", "2/3", "--samples", "48-96"]),
+            ("c", &["--tile", "2/3", "--samples", "48-100"]),
             ("d", &["--tile", "3/3", "--samples", "0-16"]),
             ("e", &["--tile", "3/3", "--samples", "16-48"]),
-            ("f", &["--tile", "3/3", "--samples", "48-96"]),
+            ("f", &["--tile", "3/3", "--samples", "48-100"]),
         ] {
-            let name = format!("{part}.exr");
-            render_paths(path, &name, &[&["--spp", "96"], options, &aov, cpu].concat());
+            render_paths(path, &format!("{part}.exr"), &[&spp, options, &aov, cpu].concat());
         }
         let report = merge(path, &["f.exr", "e.exr", "d.exr", "c.exr", "b.exr", "a.exr"], "merged.exr");
-        assert_eq!(report, "6 parts of cornell, 40x30 pixels with 96 samples\nwrote merged.exr\n");
+        assert_eq!(report, "6 parts of cornell, 40x30 pixels with 100 samples\nwrote merged.exr\n");
         assert_same(path, "whole.exr", "merged.exr");
         // The comparison can fail: other samples make another picture.
         render_paths(path, "fewer.exr", &[&["--spp", "80"], &aov[..], cpu].concat());
@@ -153,24 +154,24 @@ fn what_is_missing_or_does_not_fit_is_named() {
         fail(path, &[&["merge"], parts, &["-o", "x.exr"]].concat(), 3, named);
         assert!(!path.join("x.exr").exists());
     };
-    refused(&["1.exr", "2.exr"], "the parts have gaps: pixels 0,15,40,30");
-    refused(&["1.exr", "3.exr"], "the parts have gaps: samples 32-64 of pixels 0,0,40,15");
-    refused(&["3.exr", "2.exr", "3.exr", "1.exr"], "overlap: both have samples 0-64 of pixels 0,15,40,30");
+    refused(&["1.exr", "2.exr"], "the parts have gaps: the pixels of --crop 0,15,40,30");
+    refused(&["1.exr", "3.exr"], "the parts have gaps: --samples 32-64 of --crop 0,0,40,15");
+    refused(&["3.exr", "2.exr", "3.exr", "1.exr"], "overlap: both have --samples 0-64 of --crop 0,15,40,30");
     cpu("rows.exr", &["--crop", "3,10,9,20"]);
-    refused(&["1.exr", "2.exr", "3.exr", "rows.exr"], "overlap: both have pixels 3,10,9,15");
+    refused(&["1.exr", "2.exr", "3.exr", "rows.exr"], "overlap: both have the pixels of --crop 3,10,9,15");
 
     render_paths(path, "fewer.exr", &["--cpu", "--spp", "32", "--tile", "2/2"]);
-    refused(&["1.exr", "2.exr", "fewer.exr"], "n_samples is 64 in one and 32 in the other");
+    refused(&["1.exr", "2.exr", "fewer.exr"], "n_samples: 64 and 32");
     cpu("filter.exr", &["--tile", "2/2", "--pixel-filter", "box"]);
-    refused(&["1.exr", "2.exr", "filter.exr"], "paths is ");
+    refused(&["1.exr", "2.exr", "filter.exr"], "paths: {");
     cpu("layers.exr", &["--tile", "2/2", "--aov", "depth"]);
-    refused(&["1.exr", "2.exr", "layers.exr"], "one has layers that the other lacks");
+    refused(&["1.exr", "2.exr", "layers.exr"], "the layers are `` and `depth.Z`");
     let text = fs::read_to_string(cornell()).unwrap();
     let light = "[[light]]\nkind = \"point\"\nposition = [0.1, 0.1, 0.1]\nintensity = [1.0, 1.0, 1.0]\n";
     fs::write(path.join("cornell.toml"), format!("{text}\n{light}")).unwrap();
     let other = ["render", "cornell.toml", "--size", SIZE, "-q", "--cpu", "--spp", "64", "--integrator", "path"];
     succeed(path, &[&other[..], &["--max-depth", "3", "--tile", "2/2", "-o", "scene.exr"]].concat());
-    refused(&["1.exr", "2.exr", "scene.exr"], "scene_hash is ");
+    refused(&["1.exr", "2.exr", "scene.exr"], "scene_hash: ");
 
     fs::write(path.join("empty.exr"), "").unwrap();
     refused(&["1.exr", "empty.exr"], "empty.exr: ");
@@ -182,6 +183,38 @@ fn what_is_missing_or_does_not_fit_is_named() {
     fail(path, &["merge", "1.exr", "-o", "x.tif"], 2, "must end in .png or .exr");
     fail(path, &["merge", "-o", "x.png"], 2, "PART");
     assert!(!names(path).iter().any(|name| name.starts_with('x')));
+}
+
+/// Replaces bytes of a file that occur once by others of the same number.
+fn patched(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
+    let places: Vec<_> = (0..bytes.len() - from.len()).filter(|&place| bytes[place..].starts_with(from)).collect();
+    assert_eq!((places.len(), from.len()), (1, to.len()));
+    [&bytes[..places[0]], to, &bytes[places[0] + from.len()..]].concat()
+}
+
+/// Headers are checked before memory is taken for what they promise, and parts of other versions are told apart.
+#[test]
+fn headers_are_checked_first() {
+    let directory = TempDir::new().unwrap();
+    let path = directory.path();
+    render_paths(path, "part.exr", &["--cpu", "--spp", "1"]);
+    let good = fs::read(path.join("part.exr")).unwrap();
+    let refused = |bytes: Vec<u8>, named: &str| {
+        fs::write(path.join("bad.exr"), bytes).unwrap();
+        fail(path, &["merge", "bad.exr", "-o", "x.exr"], 3, named);
+    };
+    let window = |x: i32, y: i32| {
+        let ends = [0, 0, x, y].map(i32::to_le_bytes).concat();
+        [&b"dataWindow\0box2i\0\x10\0\0\0"[..], &ends].concat()
+    };
+    refused(patched(&good, &window(39, 29), &window(99_999_999, 29)), "which are not those of its crop");
+    let crop = |word: &str| format!("\"crop\":\"{word}\"").into_bytes();
+    refused(patched(&good, &crop("0,0,40,30"), &crop("0,0,40,99")), "reaches beyond 40x30 pixels");
+    let version = concat!("\"version\":\"", env!("CARGO_PKG_VERSION"), "\"");
+    let other = version.replace("0.", "7.");
+    refused(patched(&good, version.as_bytes(), other.as_bytes()), "kdray 7.");
+    let curve = |word: &str| format!("\"tonemap\":\"{word}\"").into_bytes();
+    refused(patched(&good, &curve("linear"), &curve("curved")), "`curved` is not one of");
 }
 
 /// No flipped bit of a part gets into a picture.
@@ -227,7 +260,12 @@ fn samples_that_cannot_be_joined_are_refused() {
     refused(&["--integrator", "whitted", "--samples", "0-16"], "--samples needs --integrator path");
     refused(&[&paths[..], &["0-32", "--denoise", "paper"]].concat(), "--samples needs --denoise off");
     refused(&[&paths[..], &["0-128"]].concat(), "--samples 0-128 reaches beyond the picture's 64 samples");
-    refused(&[&paths[..], &["0-8"]].concat(), "expected A-B, multiples of 16");
+    refused(&[&paths[..], &["0-8"]].concat(), "both numbers must be multiples of 16");
+    refused(&[&paths[..], &["96-90"]].concat(), "the range is empty");
+    let picture = ["render", &scene, "--cpu", "--integrator", "path", "--samples", "0-16"];
+    for output in [&[][..], &["-o", "x.png"]] {
+        fail(directory.path(), &[&picture, output].concat(), 2, "--samples needs --output FILE.exr");
+    }
     for tile in ["0/4", "5/4", "1", "1/0", "a/b", "-1/2"] {
         refused(&[&format!("--tile={tile}")], "expected I/N");
     }

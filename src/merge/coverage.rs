@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{MergeError, Part};
-use crate::frame::{Crop, SampleRange};
+use crate::frame::{Channel, Crop, SampleRange, Samples};
 
 /// The parts that have the same pixels, in the order of their samples. There is at least one.
 pub type Tile = Vec<Part>;
@@ -16,8 +16,9 @@ pub fn tiles(parts: Vec<Part>) -> Result<Vec<Tile>, MergeError> {
     let first = parts.first().ok_or_else(|| MergeError::Missing("there is no part".to_owned()))?;
     for other in &parts {
         let mut difference = first.record.whole.difference(&other.record.whole);
-        if difference.is_none() && names(first) != names(other) {
-            difference = Some("one has layers that the other lacks".to_owned());
+        if difference.is_none() && layers(first) != layers(other) {
+            let names = |part| layers(part).into_iter().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
+            difference = Some(format!("the layers are `{}` and `{}`", names(first), names(other)));
         }
         if let Some(difference) = difference {
             return Err(MergeError::Other { path: first.path.clone(), other: other.path.clone(), difference });
@@ -35,7 +36,7 @@ pub fn tiles(parts: Vec<Part>) -> Result<Vec<Tile>, MergeError> {
     check_overlaps(&tiles)?;
     let missing: Vec<_> = uncovered(&tiles, size)
         .into_iter()
-        .map(|crop| format!("pixels {crop}"))
+        .map(|crop| format!("the pixels of --crop {crop}"))
         .chain(tiles.iter().flat_map(|tile| missing_samples(tile, samples)))
         .collect();
     match missing.len() {
@@ -50,9 +51,11 @@ pub fn tiles(parts: Vec<Part>) -> Result<Vec<Tile>, MergeError> {
 /// The most gaps that an error names.
 const MOST_NAMED: usize = 8;
 
-/// Returns the names of a part's channels beside colour, in the order of the file, which is that of the names.
-fn names(part: &Part) -> Vec<&str> {
-    part.channels.iter().map(|channel| channel.name.as_str()).collect()
+/// Returns the names of a part's channels beside colour, and whether each has whole numbers, in the order of the file,
+/// which is that of the names.
+fn layers(part: &Part) -> Vec<(&str, bool)> {
+    let layer = |channel: &'_ Channel| matches!(channel.samples, Samples::Uint(_));
+    part.channels.iter().map(|channel| (channel.name.as_str(), layer(channel))).collect()
 }
 
 /// Refuses two parts that have the same sample of a pixel, or some of their pixels in common. The tiles are in the
@@ -64,14 +67,14 @@ fn check_overlaps(tiles: &[Tile]) -> Result<(), MergeError> {
         for pair in tile.windows(2) {
             let [a, b] = [&pair[0], &pair[1]].map(|part| part.record.samples);
             if let Some(samples) = common_samples(a, b) {
-                let common = format!("samples {samples} of pixels {}", pair[0].record.crop);
+                let common = format!("--samples {samples} of --crop {}", pair[0].record.crop);
                 return Err(overlap(&pair[0], &pair[1], common));
             }
         }
         let crop = tile[0].record.crop;
         for other in tiles[tile_ix + 1..].iter().take_while(|other| other[0].record.crop.y0 < crop.y1) {
             if let Some(common) = common_pixels(crop, other[0].record.crop) {
-                return Err(overlap(&tile[0], &other[0], format!("pixels {common}")));
+                return Err(overlap(&tile[0], &other[0], format!("the pixels of --crop {common}")));
             }
         }
     }
@@ -125,6 +128,6 @@ fn missing_samples(tile: &Tile, samples: SampleRange) -> Vec<String> {
     let firsts = tile.iter().map(|part| part.record.samples.first);
     let gaps = std::iter::once(samples.first).chain(ends).zip(firsts.chain([samples.end]));
     gaps.filter(|(end, first)| end < first)
-        .map(|(first, end)| format!("samples {} of pixels {}", SampleRange { first, end }, tile[0].record.crop))
+        .map(|(first, end)| format!("--samples {} of --crop {}", SampleRange { first, end }, tile[0].record.crop))
         .collect()
 }

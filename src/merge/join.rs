@@ -1,4 +1,4 @@
-//! Joins the tiles of a picture, whose parts are complete.
+//! Joins the parts of a picture, of which none is missing.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ pub struct Merged {
     pub picture: Picture,
     /// The channels beside colour. Those of single samples are from the parts with the first samples.
     pub channels: Vec<Channel>,
-    /// What the picture shows. Its device is that of all parts, or all their names.
+    /// What the picture shows. If the parts come from several devices, the record names all of them.
     pub record: Record,
     /// The devices and drivers of the parts, each once. If there are several, parts may differ in their last bits.
     pub devices: Vec<String>,
@@ -119,7 +119,7 @@ fn joined_channel(tile: &Tile, channel_ix: usize) -> Samples {
         Samples::Uint(counts) if is_of(name, Aov::Samples) => {
             for part in &tile[1..] {
                 let Samples::Uint(others) = samples(part) else { continue };
-                counts.iter_mut().zip(others).for_each(|(count, other)| *count += other);
+                counts.iter_mut().zip(others).for_each(|(count, other)| *count = count.saturating_add(other));
             }
         }
         _ => (),

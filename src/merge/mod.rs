@@ -2,11 +2,12 @@
 //!
 //! A crop has the bits that the whole picture has there, and sums of aligned blocks of samples are nodes of the tree in
 //! which all samples are added ([`SampleSums`](crate::frame::SampleSums)). So the joined picture has the same bits as
-//! one that is rendered at once on a device of the same kind.
+//! one that is rendered at once on a device of the same kind. Of the layers, the variance of joined samples is another
+//! estimate, and costs are those of the structure that each part was rendered with.
 //!
 //! ```text
 //! part      file -> pixels, sums and record
-//! coverage  are the parts those of one picture, and is each pixel's each sample in exactly one of them?
+//! coverage  checks that the parts are those of one picture, and that no sample of a pixel is missing or there twice
 //! join      parts -> picture
 //! ```
 
@@ -31,7 +32,7 @@ pub enum MergeError {
         message: String,
     },
     /// Two files belong to different pictures.
-    #[error("{path} and {other} are not parts of one picture: {difference}")]
+    #[error("{path} and {other} are not parts of one picture, {difference}")]
     Other {
         /// A file.
         path: PathBuf,

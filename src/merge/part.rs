@@ -2,14 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use exr::prelude::{
-    AnyChannel, AnyChannels, AttributeValue, FlatSamples, Layer, ReadChannels, ReadLayers, Text, f16, read as exr_read,
+use exr::{
+    meta::{BlockDescription, MetaData},
+    prelude::{
+        AnyChannel, AnyChannels, AttributeValue, FlatSamples, Layer, LayerAttributes, ReadChannels, ReadLayers, Text,
+        f16, read as exr_read,
+    },
 };
 
 use super::MergeError;
 use crate::{
     frame::{BlockSum, Channel, SampleRange, SampleSums, Samples},
     output::{RECORD_ATTRIBUTE, Record},
+    util::memory,
 };
 
 /// A part of a picture.
@@ -34,6 +39,7 @@ impl Part {
     /// The file cannot be read, has no record, is damaged, or lacks a channel.
     pub fn read(path: &Path) -> Result<Self, MergeError> {
         let refused = |message: String| MergeError::Part { path: path.to_owned(), message };
+        check_size(path).map_err(refused)?;
         let image = exr_read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
         let image = image.all_attributes().from_file(path).map_err(|error| refused(error.to_string()))?;
         Self::of_layer(path, &image.layer_data).map_err(refused)
@@ -52,14 +58,7 @@ impl Part {
     }
 
     fn of_layer(path: &Path, layer: &Layer<AnyChannels<FlatSamples>>) -> Result<Self, String> {
-        let json = match layer.attributes.other.get(&Text::from(RECORD_ATTRIBUTE)) {
-            Some(AttributeValue::Text(json)) => json.to_string(),
-            _ => return Err("the file does not say what it shows: `kdray render` writes files that do".to_owned()),
-        };
-        let record = Record::of_json(&json).map_err(|error| format!("its record cannot be read: {error}"))?;
-        if (layer.size.0, layer.size.1) != (record.crop.width() as usize, record.crop.height() as usize) {
-            return Err(format!("it has {}x{} pixels, which are not those of its crop", layer.size.0, layer.size.1));
-        }
+        let record = record_of(&layer.attributes)?;
         let channels: Vec<_> = layer.channel_data.list.iter().map(channel_of).collect();
         if !record.is_intact(&channels) {
             return Err(
@@ -76,6 +75,37 @@ impl Part {
         let is_colour = |name: &str| ["R", "G", "B"].contains(&name) || name.starts_with("sum ");
         let channels = channels.into_iter().filter(|channel| !is_colour(&channel.name)).collect();
         Ok(Self { path: path.to_owned(), record, radiance, sums, channels })
+    }
+}
+
+/// The longest side of a file's tiles, pixels. The decoder allocates whole tiles; those that kdray writes are smaller.
+const MOST_TILE_SIDE: usize = 1024;
+
+/// Refuses a file that is not a part, or whose header asks for more pixels than its record states or than fit into
+/// memory, since the decoder allocates them all.
+fn check_size(path: &Path) -> Result<(), String> {
+    let meta = MetaData::read_from_file(path, false).map_err(|error| error.to_string())?;
+    let [header] = &meta.headers[..] else { return Err(format!("it has {} layers, not one", meta.headers.len())) };
+    let record = record_of(&header.own_attributes)?;
+    let (width, height) = (header.layer_size.0, header.layer_size.1);
+    if (width, height) != (record.crop.width() as usize, record.crop.height() as usize) {
+        return Err(format!("it has {width}x{height} pixels, which are not those of its crop"));
+    }
+    if let BlockDescription::Tiles(tiles) = header.blocks
+        && tiles.tile_size.0.max(tiles.tile_size.1) > MOST_TILE_SIDE
+    {
+        return Err(format!("it has tiles of {}x{} pixels", tiles.tile_size.0, tiles.tile_size.1));
+    }
+    let n_bytes = (width * height) as u64 * 4 * header.channels.list.len() as u64;
+    memory::require("reading it", 2 * n_bytes).map_err(|error| error.to_string())
+}
+
+fn record_of(attributes: &LayerAttributes) -> Result<Record, String> {
+    match attributes.other.get(&Text::from(RECORD_ATTRIBUTE)) {
+        Some(AttributeValue::Text(json)) => {
+            Record::of_json(&json.to_string()).map_err(|error| format!("its record cannot be used: {error}"))
+        }
+        _ => Err("the file does not say what it shows: `kdray render` writes files that do".to_owned()),
     }
 }
 

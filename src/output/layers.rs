@@ -38,13 +38,6 @@ const COLOUR: [(&str, usize); 3] = [("R", 0), ("G", 1), ("B", 2)];
 /// # Errors
 /// Fails as [`write()`] does, or if the pixels cannot be encoded.
 pub fn write_layers(path: &Path, picture: &Picture, layers: &Layers) -> Result<(), OutputError> {
-    let n_pixels = picture.width as usize * picture.height as usize;
-    let has_all = picture.radiance.len() == n_pixels
-        && (layers.aovs.is_empty() || layers.features.len() == n_pixels)
-        && layers.sums.iter().all(|block| block.sums.len() == n_pixels);
-    if !has_all {
-        return Err(OutputError::encode(path, dimension_mismatch()));
-    }
     write_channels(path, (picture.width, picture.height), channels(picture, layers), layers.record)
 }
 
@@ -69,6 +62,14 @@ fn write_channels(
     channels: Vec<Channel>,
     record: Option<&Record>,
 ) -> Result<(), OutputError> {
+    let n_pixels = size.0 as usize * size.1 as usize;
+    let len = |channel: &Channel| match &channel.samples {
+        Samples::Float(samples) => samples.len(),
+        Samples::Uint(samples) => samples.len(),
+    };
+    if channels.iter().any(|channel| len(channel) != n_pixels) {
+        return Err(OutputError::encode(path, dimension_mismatch()));
+    }
     let bytes = info_span!("encode picture").in_scope(|| encode(size, channels, record));
     let _writing = info_span!("write picture").entered();
     write(path, &bytes.map_err(|source| OutputError::encode(path, source))?)

@@ -4,7 +4,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    frame::{Channel, Crop, Denoise, Integrator, Primary, RenderOptions, SampleRange, Samples},
+    frame::{Channel, Crop, Denoise, Integrator, Primary, RenderOptions, SampleRange, Samples, Tonemap},
     scene::{Camera, Projection},
     world::FlatScene,
 };
@@ -15,6 +15,8 @@ pub const RECORD_ATTRIBUTE: &str = "kdray";
 /// What a picture shows, and how it was made. All parts of one picture have the same `whole`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
+    /// The scene's name.
+    pub scene: String,
     /// What the parts of a picture have in common.
     pub whole: WholeRecord,
     /// The part of the picture that the file has: columns `x0` to `x1` and rows `y0` to `y1`, the second of each not
@@ -42,8 +44,6 @@ pub struct Record {
 pub struct WholeRecord {
     /// The version of kdray.
     pub version: String,
-    /// The scene's name.
-    pub scene: String,
     /// A hash of everything that the scene's frames read: triangles, materials, texels and lights.
     pub scene_hash: String,
     /// The camera: eye, target and up in world space, and the projection.
@@ -64,8 +64,9 @@ pub struct WholeRecord {
     pub tonemap: String,
     /// The noise filter, with its threshold if it has one.
     pub denoise: String,
-    /// How primary rays find their triangles.
-    pub primary: String,
+    /// Whether the graphics pipeline rasterizes primary rays, which hits are computed from in another way than by
+    /// `trace` and by the rasterizer of kernels.
+    pub is_rasterized: bool,
     /// The filters and bounds of paths; none for whitted.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub paths: Option<PathRecord>,
@@ -95,11 +96,9 @@ impl WholeRecord {
         };
         // Primary rays of paths are always traced.
         let of_paths = options.integrator == Integrator::Path;
-        let primary = if of_paths { Primary::Trace } else { options.primary };
         let paths = options.paths;
         Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
-            scene: scene.name.clone(),
             scene_hash: scene.hash(),
             camera: Self::camera(&scene.camera),
             width,
@@ -110,7 +109,7 @@ impl WholeRecord {
             exposure,
             tonemap: options.tonemap.to_string(),
             denoise,
-            primary: primary.to_string(),
+            is_rasterized: !of_paths && options.primary == Primary::Raster,
             paths: of_paths.then(|| PathRecord {
                 pixel_filter: paths.filter.to_string(),
                 clamp: paths.clamp.is_finite().then_some(paths.clamp),
@@ -135,11 +134,10 @@ impl WholeRecord {
     /// Returns the first property in which two records differ, with both values as JSON.
     pub fn difference(&self, other: &Self) -> Option<String> {
         let [own, others] = [self, other].map(|record| serde_json::to_value(record).expect("plain values"));
-        let values = own.as_object().into_iter().flatten();
-        let mut differing = values.filter(|(name, value)| others.get(name) != Some(value));
-        differing.next().map(|(name, value)| {
-            format!("{name} is {value} in one and {} in the other", others.get(name).unwrap_or_default())
-        })
+        let names = [&own, &others].into_iter().filter_map(|record| record.as_object()).flatten().map(|(name, _)| name);
+        let value = |record: &serde_json::Value, name: &str| record.get(name).cloned().unwrap_or_default();
+        let mut differing = names.filter(|name| value(&own, name) != value(&others, name));
+        differing.next().map(|name| format!("{name}: {} and {}", value(&own, name), value(&others, name)))
     }
 }
 
@@ -191,9 +189,19 @@ impl Record {
     /// Returns the record that a line of JSON states.
     ///
     /// # Errors
-    /// The text is no record, or its crop or samples are none of the picture.
+    /// The text is no record, or that of another version of kdray, or its crop or samples are none of the picture.
     pub fn of_json(text: &str) -> Result<Self, String> {
-        let record: Self = serde_json::from_str(text).map_err(|error| error.to_string())?;
+        let value: serde_json::Value = serde_json::from_str(text).map_err(|error| error.to_string())?;
+        let version = env!("CARGO_PKG_VERSION");
+        // Other versions may have other properties.
+        match value.pointer("/whole/version").and_then(|found| found.as_str()) {
+            Some(found) if found != version => {
+                return Err(format!("kdray {found} has written it, and this is kdray {version}"));
+            }
+            _ => (),
+        }
+        let record: Self = serde_json::from_value(value).map_err(|error| error.to_string())?;
+        record.whole.tonemap.parse::<Tonemap>().map_err(|error| error.to_string())?;
         let Self { whole: WholeRecord { width, height, n_samples, .. }, crop, samples, .. } = &record;
         if crop.x1 > *width || crop.y1 > *height {
             return Err(format!("the crop {crop} reaches beyond {width}x{height} pixels"));

@@ -10,7 +10,7 @@ use kdray::{
     world::FlatScene,
 };
 
-use super::studio::{assert_silent, device, differing, identical, world_of};
+use super::studio::{assert_silent, device, identical, world_of};
 use crate::support::{pretended, scenes};
 
 fn options(width: u32, height: u32) -> RenderOptions {
@@ -38,17 +38,26 @@ fn on_cpu(scene: &FlatScene, options: &RenderOptions, n_samples: u32) -> Picture
     renderer.picture()
 }
 
+/// Returns the root of the mean squared difference of two pictures, divided by that of their radiance.
+fn difference(a: &Picture, b: &Picture) -> f32 {
+    let [a, b] = [a, b].map(|picture| picture.radiance.iter().map(|&[r, g, b, _]| vec3(r, g, b)));
+    let squares = a.clone().zip(b).map(|(a, b)| (a - b).length_squared()).sum::<f32>();
+    (squares / a.map(Vec3::length_squared).sum::<f32>()).sqrt()
+}
+
 #[test]
 fn device_and_cpu_agree() {
     let scene = scenes::mixed_outdoors();
     for n_samples in [1, 3] {
         let (found, expected) =
             (on_device(&scene, &options(40, 30), n_samples), on_cpu(&scene, &options(40, 30), n_samples));
-        // A path that takes another way also changes the pixels around.
-        let n_differing = differing(&found, &expected, 1e-2).len();
-        assert!(n_differing <= 60, "{n_differing} of 1200 pixels differ");
+        // A path that takes another way also changes the pixels around, all of them a little. There are more such paths
+        // on drivers whose sines are rough.
+        let same = difference(&found, &expected);
+        assert!(same < 0.1, "{same} with {n_samples} samples");
         let unfiltered = RenderOptions { denoise: Denoise::Off, ..options(40, 30) };
-        assert!(differing(&found, &on_cpu(&scene, &unfiltered, n_samples), 1e-2).len() > 300);
+        let others = difference(&found, &on_cpu(&scene, &unfiltered, n_samples));
+        assert!(others > 0.3, "{others} with {n_samples} samples");
     }
 }
 

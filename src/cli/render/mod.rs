@@ -63,7 +63,8 @@ pub fn run(args: &RenderArgs) -> Result<(), CliError> {
 
     let engine = context.clone().map_or_else(Engine::on_cpu, Engine::on_device).with_request(args.picture.request());
     let n_triangles = scene.n_triangles();
-    let n_pictures = u64::from(n_drawn) * views.len() as u64;
+    // A part of a picture gets the structure that the whole picture gets.
+    let n_pictures = u64::from(n_samples) * views.len() as u64;
     let camera = scene.camera;
     let cameras = views.iter().map(|view| view.camera.as_ref().unwrap_or(&camera));
     let workload = Workload::of_pictures(&options, scene.lights.len(), n_pictures).with_cameras(cameras);
@@ -130,6 +131,7 @@ fn record(
 ) -> Record {
     let device = engine.context().map(|context| context.info());
     Record {
+        scene: world.scene().name.clone(),
         whole: WholeRecord::new(world.scene(), options, n_samples),
         crop: options.crop_or_whole(),
         samples: some_samples.unwrap_or(SampleRange::whole(n_samples)),
