@@ -95,9 +95,9 @@ pub struct RenderArgs {
     #[arg(long, value_name = "TIME", value_parser = time)]
     #[arg(conflicts_with_all = ["spp", "samples", "repeat", "trace", "path", "tile"])]
     pub time: Option<Duration>,
-    /// Render only some of the samples of each pixel, from A on up to but without B, both multiples of 16 or B the
-    /// number of --spp, for example 0-32, to an .exr file; `kdray merge` joins such parts to the picture of all --spp samples; for --integrator path, without a noise
-    /// filter
+    /// Render only some of the samples of each pixel to an .exr file, from A on up to but without B, for example 0-32;
+    /// both are multiples of 16, or B is the number of all samples; `kdray merge` joins such files; for --integrator
+    /// path, without a noise filter
     #[arg(long, value_name = "A-B", conflicts_with_all = ["trace", "repeat"])]
     pub samples: Option<SampleRange>,
     #[arg(long, value_name = "LIST", value_delimiter = ',')]

@@ -47,8 +47,8 @@ impl SampleRange {
         })
     }
 
-    /// Whether the range can be drawn as a part of a picture of `n_samples` samples: it begins and ends at a multiple of
-    /// the samples that a frame of paths draws, or ends with the picture's last sample.
+    /// Whether the range can be drawn as a part of a picture of `n_samples` samples: it begins and ends at a multiple
+    /// of the samples that a frame of paths draws, or ends with the picture's last sample.
     pub fn is_part_of(&self, n_samples: u32) -> bool {
         let size = 1 << MOST_SAMPLES_LOG2;
         self.first.is_multiple_of(size)
